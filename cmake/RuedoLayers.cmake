@@ -1,0 +1,33 @@
+# One layer of Ruedo: the library ruedo_<name> of all sources in src/<name>.
+#
+# OBJECT keeps every object file in what links the layer (sensors register themselves; from a static library
+# the linker would drop them).
+
+add_library(ruedo_flags INTERFACE)
+# The same bytes everywhere: no contraction to FMA, no fast math, no -march=native.
+target_compile_options(ruedo_flags INTERFACE -ffp-contract=off -Wall -Wextra -Wpedantic)
+
+# Sanitizers: -DRUEDO_SANITIZE=address,undefined or thread (see CMakePresets.json).
+set(RUEDO_SANITIZE "" CACHE STRING "Sanitizers for everything that is built here")
+if(RUEDO_SANITIZE)
+  add_compile_options(-fsanitize=${RUEDO_SANITIZE} -fno-omit-frame-pointer -g1)
+  add_link_options(-fsanitize=${RUEDO_SANITIZE})
+endif()
+
+function(ruedo_layer name)
+  cmake_parse_arguments(ARG "OBJECT" "" "LINK" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/src/${name}/*.cpp)
+  list(FILTER sources EXCLUDE REGEX "_main\\.cpp$")
+  if(NOT sources)
+    add_library(ruedo_${name} INTERFACE)
+    target_link_libraries(ruedo_${name} INTERFACE ${ARG_LINK})
+    return()
+  endif()
+  if(ARG_OBJECT)
+    add_library(ruedo_${name} OBJECT ${sources})
+  else()
+    add_library(ruedo_${name} STATIC ${sources})
+  endif()
+  target_include_directories(ruedo_${name} PUBLIC ${CMAKE_CURRENT_SOURCE_DIR}/src ${CMAKE_CURRENT_SOURCE_DIR}/include)
+  target_link_libraries(ruedo_${name} PUBLIC ${ARG_LINK} PRIVATE ruedo_flags)
+endfunction()

@@ -1,0 +1,25 @@
+// The bus, as the rest of Ruedo sees it: bytes on named channels. src/bus implements it over LCM.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace ruedo {
+
+class Bus {
+ public:
+  virtual ~Bus() = default;
+
+  // Safe from any thread. Never throws: a message that cannot be sent is counted.
+  virtual void publish(const std::string& channel, const uint8_t* data, size_t size) = 0;
+
+  // Called from the bus's own thread for every message on one of the channels given to listen(). The bytes are
+  // as they came: nothing about them is checked.
+  using Handler = std::function<void(const std::string& channel, const uint8_t* data, size_t size)>;
+  virtual void listen(const std::vector<std::string>& channels, Handler handler) = 0;
+};
+
+}  // namespace ruedo

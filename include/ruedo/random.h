@@ -1,0 +1,42 @@
+// Counter-based random numbers: a draw depends on (seed, robot, device, sample, draw) and on nothing else,
+// so that no thread, no other device and no added robot can change it.
+//
+// The generator is Philox4x32-10 (Salmon et al., "Parallel Random Numbers: As Easy as 1, 2, 3", SC 2011).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+namespace ruedo {
+
+// The draws of one sample. Cheap to make; holds 64 bytes and no reference.
+class RandomStream {
+ public:
+  RandomStream(uint64_t key, uint64_t sample) : key_(key), sample_(sample) {}
+
+  uint32_t bits();     // 32 random bits
+  double uniform();    // in [0, 1), 53 bits
+  // Normal with mean 0 and sigma 1, by the inverse of the normal distribution (Wichura's AS 241): one
+  // uniform gives one value, with no state between draws.
+  double gaussian();
+
+ private:
+  uint64_t key_;
+  uint64_t sample_;
+  uint64_t block_ = 0;
+  std::array<uint32_t, 4> output_{};
+  int next_ = 4;
+};
+
+// The random source of one device of one robot.
+class RandomSource {
+ public:
+  RandomSource(uint64_t seed, std::string_view robot, std::string_view device);
+  RandomStream stream(uint64_t sample) const { return {key_, sample}; }
+
+ private:
+  uint64_t key_;
+};
+
+}  // namespace ruedo

@@ -1,0 +1,127 @@
+// What a sensor's author writes against. A sensor is one source file in src/sensors: a class derived from
+// Sensor, and one registration at its end. docs/adding-a-sensor.md is the story.
+//
+// Life of a sensor: made once from its element; then, in its module's thread, observe() for every step (only
+// when it asks for that) and sample() at the steps that its rate says. Devices of one module may run in
+// parallel with each other, never with themselves. A sensor reads the snapshot, its configuration and its own
+// state, and nothing else: no clock, no other device, no shared generator.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ruedo/element.h"
+#include "ruedo/random.h"
+#include "ruedo/sim_time.h"
+#include "ruedo/snapshot.h"
+
+namespace ruedo {
+
+namespace model { struct WorldModel; struct BodyLayout; struct DriveDescription; }
+namespace scene { class RayScene; class Renderer; }
+class device_info_t;
+
+// Where the bytes of a sensor's messages go. Buffers are reused: nothing is allocated in the steady state.
+class Outbox {
+ public:
+  struct Entry {
+    int64_t step;
+    int channel;       // index that SensorSetup::add_channel gave
+    size_t offset, size;
+  };
+
+  // Encodes an LCM message for `channel`.
+  template <class Message>
+  void publish(int channel, const Message& message) {
+    const int size = message.getEncodedSize();
+    uint8_t* bytes = append(channel, static_cast<size_t>(size));
+    message.encode(bytes, 0, size);
+  }
+
+  void clear() { entries_.clear(); bytes_.clear(); }
+  void begin_step(int64_t step) { step_ = step; }
+  const std::vector<Entry>& entries() const { return entries_; }
+  const uint8_t* data(const Entry& entry) const { return bytes_.data() + entry.offset; }
+
+ private:
+  uint8_t* append(int channel, size_t size) {
+    const size_t offset = bytes_.size();
+    bytes_.resize(offset + size);
+    entries_.push_back({step_, channel, offset, size});
+    return bytes_.data() + offset;
+  }
+  std::vector<Entry> entries_;
+  std::vector<uint8_t> bytes_;
+  int64_t step_ = 0;
+};
+
+// What a sensor is told when it is made.
+struct SensorSetup {
+  const model::WorldModel& world;
+  const model::BodyLayout& layout;
+  const Element& element;          // its <sensor>, or <ruedo:odometry>, ...; an empty element when there is none
+  std::string robot, device;       // names; the main channel is robot + "/" + device
+  int robot_index;                 // into layout.robots and Snapshot::robots
+  int link;                        // into layout.links: the link that carries it
+  Pose X_LS;                       // the device's frame in that link
+  RandomSource random;
+  bool noise;                      // false: --no-noise
+  Rate rate;                       // <update_rate>, or the module's default
+  Findings* findings;              // for what is not supported
+
+  // Announces a channel and returns its index for Outbox::publish. suffix "": robot/device; "depth": robot/device/depth.
+  std::function<int(const std::string& suffix, const std::string& type, int64_t fingerprint)> add_channel;
+
+  template <class Message>
+  int channel(const std::string& suffix = "") const {
+    return add_channel(suffix, Message::getTypeName(), Message::getHash());
+  }
+};
+
+// What a sensor is given for a sample.
+struct SampleInput {
+  const Snapshot& snapshot;
+  int64_t sample;                        // its index, from 0
+  const scene::RayScene* rays;           // at this snapshot's poses; null unless the module asks for rays
+  scene::Renderer* renderer;             // null unless the module asks for pictures
+};
+
+class Sensor {
+ public:
+  virtual ~Sensor() = default;
+  // For every step in order, the initial state included, before sample() of the same step.
+  virtual void observe(const Snapshot&) {}
+  virtual bool observes() const { return false; }
+  virtual void sample(const SampleInput& input, Outbox& out) = 0;
+  // Fills in what ruedo/info says of the device; robot, name, kind, rate and pose are filled in already.
+  virtual void describe(device_info_t&) const {}
+};
+
+// A kind of sensor: the devices of one kind, on all robots, are served by one module thread.
+struct SensorKind {
+  std::string module;                    // thread and kind: "lrf"
+  int order;                             // of the modules in the schedule, then by name
+  std::vector<std::string> types;        // SDF sensor types that it serves: "ray", "gpu_lidar", "lidar"
+  // "": from <sensor> elements. "drive": one on each robot with a drive, "robot": one on each robot,
+  // "joints": one on each robot with joints; with this device name.
+  std::string attach_to;
+  std::string device_name;
+  Rate default_rate;
+  bool needs_rays = false;
+  bool needs_visual_rays = false;
+  bool needs_renderer = false;
+  std::function<std::unique_ptr<Sensor>(const SensorSetup&)> make;
+};
+
+// All registered kinds, sorted by (order, module).
+const std::vector<SensorKind>& sensor_kinds();
+
+// Put one at namespace scope in the sensor's file: static const RegisterSensor kRegister{{...}};
+struct RegisterSensor {
+  explicit RegisterSensor(SensorKind kind);
+};
+
+}  // namespace ruedo

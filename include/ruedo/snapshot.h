@@ -1,0 +1,57 @@
+// The state of the world at one step: written once by the kinematics module, then read by all others.
+//
+// Index spaces are those of model::BodyLayout. Everything is in the world frame and in SI units unless a
+// comment says otherwise. Plain arrays: copying one allocates nothing once its vectors have their size.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "ruedo/pose.h"
+#include "ruedo/sim_time.h"
+
+namespace ruedo {
+
+// Two shapes that touched during the step that led to this state.
+struct Contact {
+  int link_a = -1, link_b = -1;    // indices into BodyLayout::links
+  int body_a = -1, body_b = -1;    // indices into BodyLayout::bodies; -1: static
+  Vec3 position = Vec3::Zero();    // m, world
+  Vec3 normal = Vec3::UnitZ();     // unit, world, from b towards a
+  double force = 0.0;              // N along the normal, mean over the step
+  double depth = 0.0;              // m, positive inside
+};
+
+// What a robot's drive is executing; the members are motion_status_t's.
+struct MotionState {
+  int64_t id = 0;
+  int8_t kind = 0, state = 0, reason = 0;
+  double done = 0.0, remaining = 0.0;
+  int64_t changes = 0;             // counts the changes of id, kind, state and reason
+};
+
+struct RobotState {
+  Pose X_WBase;                    // base_link
+  Twist twist;                     // of base_link, expressed in base_link
+  Vec3 acceleration = Vec3::Zero();    // m/s^2 of base_link's origin, expressed in base_link, without gravity
+  double wheel_v = 0.0, wheel_omega = 0.0;    // m/s, rad/s: what the wheels do, before slip
+  MotionState motion;
+  int32_t odometry_resets = 0;     // counts the commands that reset the odometry
+};
+
+struct Snapshot {
+  int64_t step = 0;
+  SimTime time = 0;
+  std::vector<Pose> bodies;              // X_WB
+  std::vector<Twist> body_twists;        // of B's origin
+  std::vector<Vec3> body_accelerations;  // m/s^2, of B's origin, without gravity
+  std::vector<double> wheel_angles;      // rad since the start, positive ahead, not wrapped
+  std::vector<double> wheel_rates;       // rad/s
+  std::vector<double> joint_positions;   // rad or m
+  std::vector<double> joint_velocities;
+  std::vector<double> joint_efforts;
+  std::vector<RobotState> robots;
+  std::vector<Contact> contacts;         // in a fixed order
+};
+
+}  // namespace ruedo

@@ -1,0 +1,65 @@
+// Which links move as one: the numbering of bodies, links, wheels, joints and robots that physics, scenes and
+// snapshots share.
+//
+// Links that fixed joints tie together are one body; with the kinematic drive, the wheels belong to it too
+// (their turning is an angle in the snapshot, not a body). Static models have no moving body.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "model/world_model.h"
+
+namespace ruedo::model {
+
+struct LinkPlacement {
+  int instance = -1;        // index into WorldModel::models
+  int link = -1;            // index into Model::links
+  int body = -1;            // index into BodyLayout::bodies; -1: static, X_BL is then X_WL
+  Pose X_BL;                // at wheel angle 0
+  int wheel = -1;           // index into BodyLayout::wheels when the link turns with that wheel
+};
+
+struct WheelPlacement {
+  int robot = -1;           // index into BodyLayout::robots
+  int joint = -1;           // index into Model::joints
+  int link = -1;            // index into BodyLayout::links
+  bool left = false;
+  Vec3 axis_in_L = Vec3::UnitY();    // unit; a positive angle about it rolls the robot ahead
+};
+
+struct BodyPlacement {
+  int instance = -1;
+  int root_link = -1;       // index into Model::links; the body's frame is this link's frame
+  std::vector<int> links;   // indices into BodyLayout::links
+  Pose X_WB;                // at the start
+  std::string name;         // MODEL/LINK
+};
+
+struct JointPlacement {     // joints that are neither fixed nor wheels of a drive
+  int instance = -1;
+  int joint = -1;           // index into Model::joints
+  int parent_body = -1;     // -1: the world
+  int child_body = -1;
+};
+
+struct RobotPlacement {
+  int instance = -1;
+  int body = -1;            // that carries base_link; -1 for a robot that does not move
+  Pose X_BBase;             // base_link in that body (X_WBase when body is -1)
+  std::vector<int> wheels;  // indices into BodyLayout::wheels: left ones first, then right, front first
+  std::vector<int> joints;  // indices into BodyLayout::joints
+};
+
+struct BodyLayout {
+  std::vector<LinkPlacement> links;      // all links of all models, in world order
+  std::vector<int> first_link;           // of each instance
+  std::vector<BodyPlacement> bodies;     // movable ones, in world order
+  std::vector<WheelPlacement> wheels;
+  std::vector<JointPlacement> joints;
+  std::vector<RobotPlacement> robots;    // instances that are robots, in world order
+
+  explicit BodyLayout(const WorldModel& world);
+};
+
+}  // namespace ruedo::model

@@ -1,0 +1,41 @@
+// Loading: files in, one immutable WorldModel out.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "model/world_model.h"
+
+namespace ruedo::model {
+
+// --spawn MODEL[:NAME]@X,Y[,YAW]
+struct Spawn {
+  std::string model;    // a file, or the name of a model that the search path finds ("p3at")
+  std::string name;     // empty: the model's own, with _2, _3, ... when taken
+  double x = 0, y = 0, yaw = 0;    // m, m, rad; the height is found: on the ground below
+};
+
+// --set ROBOT/DEVICE.KEY=VALUE; KEY is a path of elements with dots below the <sensor> ("update_rate",
+// "lidar.range.max"), or below <ruedo:drive> for the devices velocity, wheels and odometry.
+struct Setting {
+  std::string robot, device, key, value;
+};
+
+struct LoadOptions {
+  std::vector<Spawn> spawns;
+  std::vector<Setting> settings;
+  std::vector<std::string> disabled;     // "ROBOT/DEVICE"
+  std::string drive_for_spawned;         // reserved for --spawn's drive option; empty: the model's own
+};
+
+// Loads an SDF world, an SDF model or a URDF robot (the latter two in an empty world with a ground plane).
+// Throws InputError for what cannot be loaded; what can be gone on from is in WorldModel::findings.
+std::shared_ptr<const WorldModel> load_world(const std::string& path, const LoadOptions& options = {});
+
+// The same from text, with `path` naming it in messages and giving the folder to search from; for tests and
+// models sent along in a request.
+std::shared_ptr<const WorldModel> load_world_text(const std::string& text, const std::string& path,
+                                                  const LoadOptions& options = {});
+
+}  // namespace ruedo::model

@@ -1,0 +1,184 @@
+// The world as the files describe it: immutable once loaded, shared by every other part of the program.
+//
+// A Model is what one file says; a ModelInstance places it. A thousand robots of one kind share one Model.
+// Nested models are flattened: their links, joints and sensors carry the scoped name ("arm.wrist").
+// Frames: W world, M model, L link, J joint, S sensor, C collision, V visual.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "model/mesh.h"
+#include "ruedo/element.h"
+#include "ruedo/pose.h"
+
+namespace ruedo::model {
+
+enum class Shape { box, sphere, cylinder, capsule, ellipsoid, cone, plane, mesh };
+
+// A shape in its own frame, centred at the origin; cylinder, capsule and cone stand along z (the cone's apex up).
+struct Geometry {
+  Shape shape = Shape::box;
+  // box: full lengths; sphere: radius in x; cylinder, cone: radius in x, length in y; capsule: radius in x,
+  // length of the cylindrical part in y; ellipsoid: radii; plane: unused. Metres.
+  Vec3 size = Vec3::Ones();
+  Vec3 normal = Vec3::UnitZ();           // plane only; the plane goes through the origin and is infinite
+  Eigen::Vector2d extent{100, 100};      // plane only: how much of it is drawn
+  std::shared_ptr<const Mesh> mesh;      // mesh only; polylines and heightmaps are meshes too
+  Vec3 scale = Vec3::Ones();             // mesh only
+};
+
+// What contact and rays need to know of a surface.
+struct Surface {
+  double friction = 1.0;                 // Coulomb, SDF's mu
+  double friction2 = 1.0;                // across, SDF's mu2
+  double restitution = 0.0;
+  double laser_reflectance = 1.0;        // ruedo:laser_reflectance, 0 to 1
+  double laser_mirror = 0.0;             // part of the light that leaves like from a mirror
+  double acoustic_reflectance = 1.0;     // ruedo:acoustic_reflectance, 0 to 1
+};
+
+struct Collision {
+  std::string name;
+  Pose X_LC;
+  Geometry geometry;
+  Surface surface;
+  Source source;
+};
+
+struct Visual {
+  std::string name;
+  Pose X_LV;
+  Geometry geometry;
+  std::optional<Material> material;      // absent: the mesh's own, or grey
+  double transparency = 0.0;             // 0 opaque, 1 invisible
+  bool cast_shadows = true;
+};
+
+struct Light {
+  enum class Type { directional, point, spot };
+  std::string name;
+  Type type = Type::point;
+  Pose pose;                             // in the world, or in the link that carries it
+  Vec3 direction = -Vec3::UnitZ();       // in the light's frame
+  Rgba diffuse{1, 1, 1, 1};
+  Rgba specular{0.1f, 0.1f, 0.1f, 1};
+  double range = 10.0, constant = 1.0, linear = 0.0, quadratic = 0.0;
+  double inner_angle = 0.0, outer_angle = 0.0, falloff = 0.0;    // spot, rad
+  double intensity = 1.0;
+  bool cast_shadows = false;
+};
+
+struct Inertial {
+  double mass = 1.0;                     // kg
+  Pose X_LI;                             // centre of mass, axes of the moments
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Identity();    // kg m^2, about the centre of mass, in I
+};
+
+struct Link {
+  std::string name;
+  Pose X_ML;
+  Inertial inertial;
+  bool gravity = true;
+  bool kinematic = false;
+  std::vector<Collision> collisions;
+  std::vector<Visual> visuals;
+  std::vector<Light> lights;
+  Source source;
+};
+
+enum class JointType { fixed, revolute, continuous, prismatic, ball, universal };
+
+struct JointAxis {
+  Vec3 axis_in_J = Vec3::UnitZ();        // unit vector, in the joint's frame (expressed_in is resolved)
+  double lower = -std::numeric_limits<double>::infinity();
+  double upper = std::numeric_limits<double>::infinity();
+  double effort = std::numeric_limits<double>::infinity();
+  double velocity = std::numeric_limits<double>::infinity();
+  double damping = 0.0, friction = 0.0;
+};
+
+struct Joint {
+  std::string name;
+  JointType type = JointType::fixed;
+  int parent = -1;                       // index into links; -1: the world
+  int child = 0;
+  Pose X_MJ;                             // at the start
+  JointAxis axis, axis2;                 // axis2: universal only
+  Source source;
+};
+
+// A sensor of a file, still as its element: the sensor's own source file reads it.
+struct SensorDescription {
+  std::string name;                      // the device's name: unique in its model, fit for a channel
+  std::string type;                      // SDF's type: "ray", "gpu_lidar", "lidar", "sonar", "camera", "custom", ...
+  int link = 0;
+  Pose X_LS;
+  std::shared_ptr<const Element> element;
+};
+
+// How a robot drives: read from <ruedo:drive>, or mapped from a Gazebo plugin. See docs/world-files.md.
+struct DriveDescription {
+  enum class Kind { kinematic, wheels };
+  Kind kind = Kind::kinematic;
+  std::vector<int> left_joints, right_joints;    // wheel joints, front first
+  double wheel_radius = 0.0;             // m
+  double track = 0.0;                    // m, between the left and right wheels
+  Pose X_MBase;                          // base_link: on the ground below the centre of rotation, x ahead
+  double max_speed = std::numeric_limits<double>::infinity();            // m/s
+  double max_turn_rate = std::numeric_limits<double>::infinity();        // rad/s
+  double acceleration = std::numeric_limits<double>::infinity();         // m/s^2
+  double deceleration = std::numeric_limits<double>::infinity();         // m/s^2
+  double turn_acceleration = std::numeric_limits<double>::infinity();    // rad/s^2
+  double max_force = std::numeric_limits<double>::infinity();            // N, of the drive as a whole
+  double max_wheel_torque = std::numeric_limits<double>::infinity();     // N m, wheels drive
+  double max_wheel_rate = std::numeric_limits<double>::infinity();       // rad/s
+  int64_t watchdog_us = 600'000;         // 0: off
+  Rate odometry_rate{50, 1}, pose_rate{50, 1}, status_rate{10, 1};
+  std::shared_ptr<const Element> element;    // <ruedo:drive> or <plugin>; null when synthesised
+  std::shared_ptr<const Element> odometry;   // <ruedo:odometry>; null: ideal encoders, arc integrator
+};
+
+struct Model {
+  std::string name;                      // as the file says
+  bool is_static = false;
+  bool self_collide = false;
+  std::vector<Link> links;               // links[0] is the canonical link, or the first
+  std::vector<Joint> joints;
+  std::vector<SensorDescription> sensors;
+  std::optional<DriveDescription> drive;
+  std::shared_ptr<const Element> path;   // <ruedo:path> or an actor's trajectory; null: none
+  Source source;
+};
+
+struct ModelInstance {
+  std::string name;                      // unique in the world, fit for a channel
+  Pose X_WM;
+  std::shared_ptr<const Model> model;
+  bool is_robot() const { return model->drive.has_value() || !model->sensors.empty(); }
+};
+
+struct Sky {
+  Rgba ambient{0.4f, 0.4f, 0.4f, 1};
+  Rgba background{0.7f, 0.7f, 0.7f, 1};
+  bool sky = false;                      // a gradient and a horizon instead of the background colour
+  bool shadows = true;
+};
+
+struct WorldModel {
+  std::string name;
+  std::string file;
+  int64_t step_us = 5000;
+  Vec3 gravity{0, 0, -9.8};
+  Sky sky;
+  std::vector<Light> lights;
+  std::vector<ModelInstance> models;     // in file order; --spawn's after them
+  std::vector<Finding> findings;         // what was unsupported or repaired
+  std::vector<std::string> files_read;   // absolute paths, in the order of first reading
+};
+
+}  // namespace ruedo::model

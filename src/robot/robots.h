@@ -1,0 +1,51 @@
+// The robots' execution layer: takes commands at step boundaries, runs drives and motion primitives, moves
+// the bodies. Belongs to the kinematics module; not thread safe.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "model/body_layout.h"
+#include "physics/physics_world.h"
+#include "ruedo/snapshot.h"
+
+namespace ruedo::robot {
+
+struct VelocityCommand { double vx, vy, omega; };
+struct WheelCommand { std::vector<double> rates; };
+struct MoveCommand { int64_t id; int8_t kind; double value, radius, speed, acceleration, deceleration; };
+struct JointCommand { std::vector<std::string> names; std::vector<int8_t> modes; std::vector<double> values; };
+struct ResetOdometry {};
+
+// A command that has a robot and passed the checks of size and fingerprint; its values are not checked yet.
+struct Command {
+  int robot = -1;    // index into BodyLayout::robots
+  std::variant<VelocityCommand, WheelCommand, MoveCommand, JointCommand, ResetOdometry> what;
+};
+
+class Robots {
+ public:
+  // All must outlive it.
+  Robots(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics);
+  ~Robots();
+
+  // Takes effect on the current state: at the beginning of the next step. Bad values refuse the command.
+  void apply(const Command& command);
+
+  // One step of everything: drives before, physics.step(), drives after.
+  void step();
+
+  // Writes the whole state: physics.read() and the robots' part.
+  void read(Snapshot& snapshot) const;
+
+  int64_t current_step() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace ruedo::robot

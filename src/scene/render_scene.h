@@ -1,0 +1,53 @@
+// Pictures of the world without a display: OpenGL 3.3 core on OSMesa, or on surfaceless EGL.
+//
+// A Renderer owns one context and belongs to one thread at a time. Pixels are the same in every run on one
+// CPU type, with both backends.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "model/body_layout.h"
+#include "ruedo/snapshot.h"
+
+namespace ruedo::scene {
+
+// A pinhole camera. X_WCamera is in SDF's camera convention: x ahead, y left, z up.
+struct View {
+  Pose X_WCamera;
+  int width = 640, height = 480;       // pixels
+  double fx = 0, fy = 0, cx = 0, cy = 0;    // pixels
+  double near_m = 0.1, far_m = 100.0;
+  bool orthographic = false;           // then fx and fy are pixels per metre
+};
+
+// What to draw; each buffer that is wanted gets filled, rows from the top.
+struct Picture {
+  bool want_rgb = true, want_depth = false, want_labels = false;
+  std::vector<uint8_t> rgb;            // width * height * 3
+  std::vector<float> depth;            // m along the optical axis, +inf: nothing
+  std::vector<uint16_t> labels;        // link index + 1, 0: nothing
+};
+
+// Coloured lines drawn over the world, for rays and cones in ruedo render.
+struct Line {
+  Vec3 from, to;
+  std::array<float, 4> rgba;
+};
+
+class Renderer {
+ public:
+  virtual ~Renderer() = default;
+  // Draws the world as in `snapshot`; the picture's vectors keep their capacity. ignored_link: as for rays.
+  virtual void draw(const Snapshot& snapshot, const View& view, Picture& picture, std::span<const Line> lines = {}) = 0;
+  virtual std::string description() const = 0;    // for ruedo doctor: backend, renderer, version
+};
+
+// world and layout must outlive the renderer. Throws EnvironmentError with the cure when there is no backend.
+std::unique_ptr<Renderer> make_renderer(const model::WorldModel& world, const model::BodyLayout& layout);
+
+}  // namespace ruedo::scene
