@@ -19,11 +19,14 @@
 
 namespace ruedo {
 
-// An interval of allowed numbers, for reads and their error messages.
+// An interval of allowed numbers, for reads and their error messages. Infinity is refused unless or_infinite()
+// lets it in ("inf" and "-inf", as SDF writes the limits of a joint); NaN always is.
 struct Allowed {
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
   bool min_excluded = false;    // true: the value must be above min
+  bool infinite = false;        // true: infinity is a value, where min and max admit it
+  Allowed or_infinite() const { return {min, max, min_excluded, true}; }
   static Allowed any() { return {}; }
   static Allowed positive() { return {0.0, std::numeric_limits<double>::infinity(), true}; }
   static Allowed not_negative() { return {0.0, std::numeric_limits<double>::infinity(), false}; }
@@ -49,7 +52,8 @@ class Element {
   bool has(std::string_view path) const { return child(path) != nullptr; }
 
   // Typed reads of the child at `path`; `fallback` when it is absent. They throw InputError for what is not
-  // of the type (trailing characters, NaN and infinity included) or not allowed.
+  // of the type (trailing characters, NaN and infinity included) or not allowed. Numbers are read the same in
+  // every locale: "1,5" is refused.
   double number(std::string_view path, double fallback, Allowed allowed = Allowed::any()) const;
   int64_t integer(std::string_view path, int64_t fallback, Allowed allowed = Allowed::any()) const;
   bool boolean(std::string_view path, bool fallback) const;             // true, false, 1, 0

@@ -3,6 +3,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <unordered_set>
 #include <vector>
 
 namespace ruedo {
@@ -59,6 +60,7 @@ class Findings {
  private:
   void add(Finding finding);
   std::vector<Finding> list_;
+  std::unordered_set<std::string> seen_;    // looked up only, never walked through
 };
 
 }  // namespace ruedo

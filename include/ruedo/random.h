@@ -10,6 +10,14 @@
 
 namespace ruedo {
 
+// The bijection itself: ten rounds of Philox4x32 on a counter under a key.
+std::array<uint32_t, 4> philox4x32(std::array<uint32_t, 4> counter, std::array<uint32_t, 2> key);
+
+// The x for which a normal variable of mean 0 and sigma 1 is below x with probability p, 0 < p < 1: Wichura's
+// AS 241 (PPND16), relative error below 1e-15. Uses no function of libm but the square root, which is exact
+// everywhere, so that its bits depend on no CPU.
+double normal_quantile(double p);
+
 // The draws of one sample. Cheap to make; holds 64 bytes and no reference.
 class RandomStream {
  public:
