@@ -1,0 +1,85 @@
+"""The benchmark's map, read from the world that `ruedo bench --write-world FILE --robots N` writes.
+
+Every peer runs on the walls and the starting poses of that one file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import resource
+import time
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+
+SPEED_M_S = 0.4
+TURN_RATE_RAD_S = 0.4
+LRF_RAYS = 181
+LRF_RANGE_M = 8.0
+LRF_RATE_HZ = 10.0
+LRF_HEIGHT_M = 0.4
+
+
+@dataclass(frozen=True)
+class Box:
+    """A wall: its centre and its full lengths, in metres."""
+
+    center: tuple[float, float, float]
+    size: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where a robot starts: metres and radians."""
+
+    x: float
+    y: float
+    yaw: float
+
+
+@dataclass(frozen=True)
+class Rooms:
+    walls: list[Box]
+    starts: list[Start]
+
+
+def load(path: str) -> Rooms:
+    world = ET.parse(path).getroot().find("world")
+    walls = []
+    for collision in world.iterfind("model[@name='walls']/link/collision"):
+        pose = [float(v) for v in collision.findtext("pose").split()]
+        size = [float(v) for v in collision.findtext("geometry/box/size").split()]
+        walls.append(Box(tuple(pose[:3]), tuple(size)))
+    starts = []
+    for include in world.iterfind("include"):
+        if include.findtext("uri") == "model://p3at":
+            pose = [float(v) for v in include.findtext("pose").split()]
+            starts.append(Start(pose[0], pose[1], pose[5]))
+    return Rooms(walls, starts)
+
+
+def ray_angles() -> list[float]:
+    """Angles of the LRF's rays from the robot's x axis, in radians."""
+    return [math.radians(degree - 90) for degree in range(LRF_RAYS)]
+
+
+def main(simulator: str, step_s: float, run) -> None:
+    """Times `run(rooms, sim_seconds)`, which returns a function that advances by that long, and prints a JSON row."""
+    parser = argparse.ArgumentParser(description=f"{simulator} on Ruedo's benchmark map")
+    parser.add_argument("world", help="file written by ruedo bench --write-world")
+    parser.add_argument("--duration", type=float, default=5.0, help="simulated seconds to time (default 5)")
+    arguments = parser.parse_args()
+    rooms = load(arguments.world)
+    advance = run(rooms)
+    advance(0.5)
+    began = time.perf_counter()
+    advance(arguments.duration)
+    wall_s = time.perf_counter() - began
+    print(json.dumps({
+        "simulator": simulator,
+        "robots": len(rooms.starts),
+        "step_ms": step_s * 1e3,
+        "real_time_factor": arguments.duration / wall_s,
+        "memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }))
