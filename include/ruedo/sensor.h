@@ -92,17 +92,20 @@ struct SampleInput {
 class Sensor {
  public:
   virtual ~Sensor() = default;
-  // For every step in order, the initial state included, before sample() of the same step.
-  virtual void observe(const Snapshot&) {}
+  // For every step in order, the initial state included, before sample() of the same step; only when observes()
+  // is true. It may publish what cannot wait for the next sample.
+  virtual void observe(const Snapshot&, Outbox&) {}
   virtual bool observes() const { return false; }
   virtual void sample(const SampleInput& input, Outbox& out) = 0;
   // Fills in what ruedo/info says of the device; robot, name, kind, rate and pose are filled in already.
   virtual void describe(device_info_t&) const {}
 };
 
-// A kind of sensor: the devices of one kind, on all robots, are served by one module thread.
+// A kind of sensor. A module is a thread: it serves the devices of its kinds on all robots. Kinds that cost little
+// share one: odometry, pose, motion and joints are all of the module "odometry" (they have the same order, and
+// within a robot they come in the order of sensor_kinds()).
 struct SensorKind {
-  std::string module;                    // thread and kind: "lrf"
+  std::string module;                    // the thread: "lrf"
   int order;                             // of the modules in the schedule, then by name
   std::vector<std::string> types;        // SDF sensor types that it serves: "ray", "gpu_lidar", "lidar"
   // "": from <sensor> elements. "drive": one on each robot with a drive, "robot": one on each robot,
@@ -114,9 +117,16 @@ struct SensorKind {
   bool needs_visual_rays = false;
   bool needs_renderer = false;
   std::function<std::unique_ptr<Sensor>(const SensorSetup&)> make;
+  // As ruedo/info names it; empty: the module's name.
+  std::string kind = {};
+  // Attached kinds only: the rate that the robot's drive asks for; where it is null, or the robot has no
+  // drive, default_rate holds.
+  std::function<Rate(const model::DriveDescription&)> drive_rate = {};
+
+  const std::string& name() const { return kind.empty() ? module : kind; }
 };
 
-// All registered kinds, sorted by (order, module).
+// All registered kinds, sorted by (order, module, kind): never in the order of registration, which no one fixes.
 const std::vector<SensorKind>& sensor_kinds();
 
 // Put one at namespace scope in the sensor's file: static const RegisterSensor kRegister{{...}};

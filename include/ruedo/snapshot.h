@@ -20,6 +20,7 @@ struct Contact {
   Vec3 normal = Vec3::UnitZ();     // unit, world, from b towards a
   double force = 0.0;              // N along the normal, mean over the step
   double depth = 0.0;              // m, positive inside
+  int shape_a = -1, shape_b = -1;  // indices into the links' collisions; -1: not known
 };
 
 // What a robot's drive is executing; the members are motion_status_t's.

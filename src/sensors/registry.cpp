@@ -19,7 +19,7 @@ std::vector<SensorKind>& registered() {
 RegisterSensor::RegisterSensor(SensorKind kind) {
   std::vector<SensorKind>& kinds = registered();
   const auto place = std::upper_bound(kinds.begin(), kinds.end(), kind, [](const SensorKind& a, const SensorKind& b) {
-    return std::tie(a.order, a.module, a.attach_to, a.device_name) < std::tie(b.order, b.module, b.attach_to, b.device_name);
+    return std::tie(a.order, a.module, a.name()) < std::tie(b.order, b.module, b.name());
   });
   kinds.insert(place, std::move(kind));
 }
