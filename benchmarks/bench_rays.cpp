@@ -1,0 +1,268 @@
+// Rays a second of Ruedo's caster, of bare Embree (native triangles, single precision) and of Bullet's rayTest
+// (double), in one program, scene and run: an office of 269 boxes, and the same as triangle meshes.
+//
+//   bench_rays [repeats]      one core; medians; 181-ray scans of 180 degrees, 30 m
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <btBulletCollisionCommon.h>
+
+#include "ruedo/random.h"
+#include "scene/ray_embree.h"
+#include "scene/ray_scene.h"
+
+namespace {
+
+using namespace ruedo;
+
+struct BoxAt {
+  Vec3 center, half;
+};
+
+// Rooms of 5 x 5 m with doors in thin walls, and furniture; 40 x 30 m.
+std::vector<BoxAt> office() {
+  std::vector<BoxAt> boxes;
+  const auto wall = [&](double x0, double y0, double x1, double y1) {
+    boxes.push_back({{(x0 + x1) / 2, (y0 + y1) / 2, 1.25}, {(x1 - x0) / 2 + 0.05, (y1 - y0) / 2 + 0.05, 1.25}});
+  };
+  for (int i = 0; i < 8; ++i)
+    for (int j = 0; j <= 6; ++j) {
+      const double x = 5.0 * i, y = 5.0 * j;
+      if (j == 0 || j == 6) {
+        wall(x, y, x + 5, y);
+      } else {
+        wall(x, y, x + 2, y);
+        wall(x + 3, y, x + 5, y);
+      }
+    }
+  for (int i = 0; i <= 8; ++i)
+    for (int j = 0; j < 6; ++j) {
+      const double x = 5.0 * i, y = 5.0 * j;
+      if (i == 0 || i == 8) {
+        wall(x, y, x, y + 5);
+      } else {
+        wall(x, y, x, y + 2);
+        if (boxes.size() < 168) wall(x, y + 3, x, y + 5);
+      }
+    }
+  RandomStream random = RandomSource(1, "office", "furniture").stream(0);
+  for (int i = 0; i < 100; ++i) {
+    const Vec3 half(0.1 + 0.4 * random.uniform(), 0.1 + 0.4 * random.uniform(), 0.2 + 0.6 * random.uniform());
+    boxes.push_back({{1 + 38 * random.uniform(), 1 + 28 * random.uniform(), half.z()}, half});
+  }
+  boxes.push_back({{20, 15, -0.05}, {30, 30, 0.05}});
+  return boxes;
+}
+
+// All boxes as one mesh, every face cut into cells x cells squares.
+std::shared_ptr<model::Mesh> as_mesh(const std::vector<BoxAt>& boxes, int cells) {
+  auto mesh = std::make_shared<model::Mesh>();
+  mesh->name = "office";
+  for (const BoxAt& box : boxes)
+    for (int axis = 0; axis < 3; ++axis)
+      for (int side = -1; side <= 1; side += 2) {
+        const auto first = static_cast<uint32_t>(mesh->positions.size());
+        for (int i = 0; i <= cells; ++i)
+          for (int j = 0; j <= cells; ++j) {
+            Vec3 p;
+            p[axis] = side;
+            p[(axis + 1) % 3] = side * (2.0 * i / cells - 1.0);
+            p[(axis + 2) % 3] = 2.0 * j / cells - 1.0;
+            mesh->positions.push_back((box.center + p.cwiseProduct(box.half)).cast<float>());
+          }
+        for (int i = 0; i < cells; ++i)
+          for (int j = 0; j < cells; ++j) {
+            const uint32_t a = first + static_cast<uint32_t>(i * (cells + 1) + j), b = a + static_cast<uint32_t>(cells) + 1;
+            mesh->triangles.push_back({a, b, b + 1});
+            mesh->triangles.push_back({a, b + 1, a + 1});
+          }
+      }
+  return mesh;
+}
+
+model::WorldModel world_of(const std::vector<BoxAt>& boxes, const std::shared_ptr<model::Mesh>& mesh) {
+  auto model = std::make_shared<model::Model>();
+  model->name = "office";
+  model->is_static = true;
+  model->links.resize(1);
+  const auto add = [&](const Vec3& at, model::Geometry geometry) {
+    model::Collision collision;
+    collision.X_LC.translation = at;
+    collision.geometry = std::move(geometry);
+    model->links[0].collisions.push_back(collision);
+  };
+  if (mesh) {
+    model::Geometry geometry;
+    geometry.shape = model::Shape::mesh;
+    geometry.mesh = mesh;
+    add(Vec3::Zero(), geometry);
+  } else {
+    for (const BoxAt& box : boxes) {
+      model::Geometry geometry;
+      geometry.size = 2.0 * box.half;
+      add(box.center, geometry);
+    }
+  }
+  model::WorldModel world;
+  world.models.push_back({"office", {}, model});
+  return world;
+}
+
+// Scans from places that are not inside a box.
+std::vector<scene::Ray> scans(const std::vector<BoxAt>& boxes, int count) {
+  std::vector<scene::Ray> rays;
+  RandomStream random = RandomSource(1, "office", "scans").stream(0);
+  while (static_cast<int>(rays.size()) < count * 181) {
+    const Vec3 at(0.2 + 39.6 * random.uniform(), 0.2 + 29.6 * random.uniform(), 0.3);
+    const double heading = 2.0 * M_PI * random.uniform();
+    bool free = true;
+    for (const BoxAt& box : boxes) free = free && ((at - box.center).cwiseAbs() - box.half).maxCoeff() > 0.0;
+    if (!free) continue;
+    for (int i = 0; i < 181; ++i) {
+      const double angle = heading + (i - 90) * M_PI / 180.0;
+      rays.push_back({at, Vec3(std::cos(angle), std::sin(angle), 0.0), 30.0});
+    }
+  }
+  return rays;
+}
+
+// Million rays a second: the median of some runs.
+double measure(size_t rays, int repeats, const std::function<void()>& run) {
+  std::vector<double> rates;
+  for (int i = 0; i < repeats; ++i) {
+    const auto start = std::chrono::steady_clock::now();
+    run();
+    rates.push_back(static_cast<double>(rays) / std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - start).count());
+  }
+  std::nth_element(rates.begin(), rates.begin() + repeats / 2, rates.end());
+  return rates[static_cast<size_t>(repeats / 2)];
+}
+
+// Bullet's world of the same boxes or triangles.
+struct BulletOffice {
+  btDefaultCollisionConfiguration configuration;
+  btCollisionDispatcher dispatcher{&configuration};
+  btDbvtBroadphase broadphase;
+  btCollisionWorld world{&dispatcher, &broadphase, &configuration};
+  std::vector<std::unique_ptr<btCollisionShape>> shapes;
+  std::vector<std::unique_ptr<btCollisionObject>> objects;
+  btTriangleMesh triangles;
+
+  BulletOffice(const std::vector<BoxAt>& boxes, const model::Mesh* mesh) {
+    const auto add = [&](std::unique_ptr<btCollisionShape> shape, const btVector3& at) {
+      auto object = std::make_unique<btCollisionObject>();
+      object->setCollisionShape(shape.get());
+      object->getWorldTransform().setIdentity();
+      object->getWorldTransform().setOrigin(at);
+      world.addCollisionObject(object.get());
+      shapes.push_back(std::move(shape));
+      objects.push_back(std::move(object));
+    };
+    const auto vector = [](const auto& v) { return btVector3(v.x(), v.y(), v.z()); };
+    if (mesh) {
+      for (const auto& t : mesh->triangles)
+        triangles.addTriangle(vector(mesh->positions[t[0]]), vector(mesh->positions[t[1]]), vector(mesh->positions[t[2]]));
+      add(std::make_unique<btBvhTriangleMeshShape>(&triangles, false), btVector3(0, 0, 0));
+    } else {
+      for (const BoxAt& box : boxes) add(std::make_unique<btBoxShape>(vector(box.half)), vector(box.center));
+    }
+    world.updateAabbs();
+  }
+  ~BulletOffice() {
+    for (auto& object : objects) world.removeCollisionObject(object.get());
+  }
+  double cast(const scene::Ray& ray) const {
+    const Vec3 end = ray.origin + ray.max_range * ray.direction;
+    const btVector3 from(ray.origin.x(), ray.origin.y(), ray.origin.z()), to(end.x(), end.y(), end.z());
+    btCollisionWorld::ClosestRayResultCallback result(from, to);
+    world.rayTest(from, to, result);
+    return result.m_closestHitFraction * ray.max_range;
+  }
+};
+
+// Embree's own triangles and nothing of ours.
+struct BareEmbree {
+  scene::DevicePtr device = scene::make_device();
+  scene::ScenePtr scene{rtcNewScene(device.get())};
+
+  explicit BareEmbree(const model::Mesh& mesh) {
+    RTCGeometry geometry = rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
+    auto* p = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, mesh.positions.size()));
+    auto* t = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, mesh.triangles.size()));
+    for (const auto& v : mesh.positions) p = std::copy(v.data(), v.data() + 3, p);
+    for (const auto& v : mesh.triangles) t = std::copy(v.begin(), v.end(), t);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(scene.get(), geometry);
+    rtcReleaseGeometry(geometry);
+    rtcCommitScene(scene.get());
+  }
+  void cast(const std::vector<scene::Ray>& rays, std::vector<double>& ranges, bool packets) const {
+    scene::EmbreeContext context;
+    scene::init_context(context);
+    for (size_t first = 0; first < rays.size(); first += packets ? scene::kLanes : 1) {
+      scene::Packet packet;
+      const size_t last = packets ? std::min(rays.size(), first + scene::kLanes) : first + 1;
+      for (size_t i = first; i < last; ++i)
+        packet.add(static_cast<int>(i - first), rays[i].origin, rays[i].direction, 0.0, rays[i].max_range);
+      if (packets) {
+        scene::intersect(scene.get(), context, packet.valid, packet.rays);
+        for (size_t i = first; i < last; ++i) ranges[i] = static_cast<double>(packet.rays.ray.tfar[i - first]);
+      } else {
+        const RTCRay8& r = packet.rays.ray;
+        RTCRayHit one;
+        one.ray = {r.org_x[0], r.org_y[0], r.org_z[0], 0, r.dir_x[0], r.dir_y[0], r.dir_z[0], 0, r.tfar[0], ~0u, 0, 0};
+        one.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+        scene::intersect(scene.get(), context, one);
+        ranges[first] = static_cast<double>(one.ray.tfar);
+      }
+    }
+  }
+};
+
+void compare(const std::string& name, const std::vector<BoxAt>& boxes, const std::shared_ptr<model::Mesh>& mesh, int repeats) {
+  const std::vector<scene::Ray> rays = scans(boxes, 200);
+  const model::WorldModel world = world_of(boxes, mesh);
+  const model::BodyLayout layout(world);
+  const auto ours = scene::make_ray_scene(scene::make_static_ray_scene(world, layout));
+  const BulletOffice bullet(boxes, mesh.get());
+  const BareEmbree bare(mesh ? *mesh : *as_mesh(boxes, 1));
+  std::vector<scene::Hit> hits(rays.size());
+  std::vector<double> ranges(rays.size());
+
+  const double scan = measure(rays.size(), repeats, [&] {
+    for (size_t i = 0; i < rays.size(); i += 181) ours->cast(std::span(&rays[i], 181), std::span(&hits[i], 181));
+  });
+  const double single = measure(rays.size(), repeats, [&] {
+    for (size_t i = 0; i < rays.size(); ++i) ours->cast(std::span(&rays[i], 1), std::span(&hits[i], 1));
+  });
+  const double bare_packets = measure(rays.size(), repeats, [&] { bare.cast(rays, ranges, true); });
+  const double bare_single = measure(rays.size(), repeats, [&] { bare.cast(rays, ranges, false); });
+  double embree_error = 0.0, bullet_error = 0.0;
+  for (size_t i = 0; i < rays.size(); ++i) embree_error = std::max(embree_error, std::abs(ranges[i] - std::min(hits[i].range, 30.0)));
+  const double theirs = measure(rays.size(), std::min(repeats, 3), [&] {
+    for (size_t i = 0; i < rays.size(); ++i) ranges[i] = bullet.cast(rays[i]);
+  });
+  for (size_t i = 0; i < rays.size(); ++i) bullet_error = std::max(bullet_error, std::abs(ranges[i] - std::min(hits[i].range, 30.0)));
+  std::printf("%-24s %8.2f %8.2f %8.2f %8.2f %8.2f %9.1f %9.2f   %.1e %.1e\n", name.c_str(), scan, single, bare_packets, bare_single,
+              theirs, scan / theirs, bare_packets / scan, embree_error, bullet_error);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const int repeats = argc > 1 ? std::max(1, std::atoi(argv[1])) : 7;
+  std::printf("Million rays a second, one core                                              ratio to         largest difference\n");
+  std::printf("%-24s %8s %8s %8s %8s %8s %9s %9s   %s\n", "office", "scans", "single", "Embree 8", "Embree 1", "Bullet", "Bullet", "Embree 8",
+              "Embree  Bullet");
+  const std::vector<BoxAt> boxes = office();
+  const auto mesh = as_mesh(boxes, 2), fine = as_mesh(boxes, 12);
+  compare(std::to_string(boxes.size()) + " boxes", boxes, nullptr, repeats);
+  compare("mesh, " + std::to_string(mesh->triangles.size()), boxes, mesh, repeats);
+  compare("mesh, " + std::to_string(fine->triangles.size()), boxes, fine, repeats);
+}

@@ -1,0 +1,183 @@
+// The little of Embree that rays need, the same over Embree 3 and 4: a device, packets of eight, and room for
+// data of our own beside Embree's context.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <utility>
+
+#if defined(__SSE2__)
+#include <xmmintrin.h>
+#endif
+
+#if RUEDO_EMBREE == 4
+#include <embree4/rtcore.h>
+#else
+#include <embree3/rtcore.h>
+#endif
+
+#include "ruedo/pose.h"
+
+namespace ruedo::scene {
+
+inline constexpr int kLanes = 8;    // rays in a packet
+
+#if RUEDO_EMBREE == 4
+using EmbreeContext = RTCRayQueryContext;
+inline void init_context(EmbreeContext& context) { rtcInitRayQueryContext(&context); }
+inline void intersect(RTCScene scene, EmbreeContext& context, RTCRayHit& ray) {
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.context = &context;
+  rtcIntersect1(scene, &ray, &arguments);
+}
+inline void intersect(RTCScene scene, EmbreeContext& context, const int* valid, RTCRayHit8& rays) {
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.context = &context;
+  rtcIntersect8(valid, scene, &rays, &arguments);
+}
+#else
+using EmbreeContext = RTCIntersectContext;
+inline void init_context(EmbreeContext& context) { rtcInitIntersectContext(&context); }
+inline void intersect(RTCScene scene, EmbreeContext& context, RTCRayHit& ray) { rtcIntersect1(scene, &context, &ray); }
+inline void intersect(RTCScene scene, EmbreeContext& context, const int* valid, RTCRayHit8& rays) {
+  rtcIntersect8(valid, scene, &context, &rays);
+}
+#endif
+
+// Building may switch denormals off; physics in the same thread must not notice.
+class KeepFloatMode {
+ public:
+#if defined(__SSE2__)
+  KeepFloatMode() : mode_(_mm_getcsr()) {}
+  ~KeepFloatMode() { _mm_setcsr(mode_); }
+
+ private:
+  unsigned mode_;
+#else
+  KeepFloatMode() {}
+#endif
+  KeepFloatMode(const KeepFloatMode&) = delete;
+  KeepFloatMode& operator=(const KeepFloatMode&) = delete;
+};
+
+struct ReleaseEmbree {
+  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+};
+using DevicePtr = std::unique_ptr<std::remove_pointer_t<RTCDevice>, ReleaseEmbree>;
+using ScenePtr = std::unique_ptr<std::remove_pointer_t<RTCScene>, ReleaseEmbree>;
+
+// One thread: builds run in the caller's, and leave the cores to the modules.
+inline DevicePtr make_device() { return DevicePtr(rtcNewDevice("threads=1,set_affinity=0")); }
+
+// The smallest float that is not below x, and the largest that is not above it.
+inline float round_up(double x) {
+  const float f = static_cast<float>(x);
+  return f < x ? std::nextafterf(f, std::numeric_limits<float>::infinity()) : f;
+}
+inline float round_down(double x) {
+  const float f = static_cast<float>(x);
+  return f > x ? std::nextafterf(f, -std::numeric_limits<float>::infinity()) : f;
+}
+
+// An axis-aligned box, in double.
+struct Box {
+  Vec3 lower = Vec3::Constant(std::numeric_limits<double>::infinity());
+  Vec3 upper = -lower;
+
+  bool empty() const { return !(lower.x() <= upper.x()); }
+  void add(const Vec3& point) {
+    lower = lower.cwiseMin(point);
+    upper = upper.cwiseMax(point);
+  }
+  void add(const Box& box) {
+    lower = lower.cwiseMin(box.lower);
+    upper = upper.cwiseMax(box.upper);
+  }
+  void grow(double margin) {
+    lower.array() -= margin;
+    upper.array() += margin;
+  }
+  bool contains(const Vec3& p) const {
+    return (p.array() >= lower.array()).all() && (p.array() <= upper.array()).all();
+  }
+  // How far boxes within this one are grown, so that the single-precision traversal never misses what the
+  // test in double finds: rays start in this box, and their errors are a few parts in 2^22 of its coordinates.
+  double margin() const {
+    return empty() ? 0.0 : 1e-9 + 4e-6 * std::max(lower.cwiseAbs().maxCoeff(), upper.cwiseAbs().maxCoeff());
+  }
+  RTCBounds bounds() const {
+    return {round_down(lower.x()), round_down(lower.y()), round_down(lower.z()), 0.0f,
+            round_up(upper.x()),   round_up(upper.y()),   round_up(upper.z()),   0.0f};
+  }
+  // Where the line enters the box, 0 when it starts inside; +inf when the ray misses it.
+  double entry(const Vec3& o, const Vec3& d) const {
+    double enter = 0.0, exit = std::numeric_limits<double>::infinity();
+    for (int axis = 0; axis < 3; ++axis) {
+      if (d[axis] == 0.0) {
+        if (o[axis] < lower[axis] || o[axis] > upper[axis]) return std::numeric_limits<double>::infinity();
+        continue;
+      }
+      const double inverse = 1.0 / d[axis];
+      const double a = (lower[axis] - o[axis]) * inverse, b = (upper[axis] - o[axis]) * inverse;
+      enter = std::max(enter, std::min(a, b));
+      exit = std::min(exit, std::max(a, b));
+    }
+    return enter <= exit ? enter : std::numeric_limits<double>::infinity();
+  }
+};
+
+// Eight rays on their way into Embree. Each starts where it enters the scene's box, so that its coordinates
+// are of the scene's size; `start` is that distance.
+struct Packet {
+  RTCRayHit8 rays;
+  alignas(32) int valid[kLanes];
+  double start[kLanes];
+  int active = 0, last = 0;    // number of valid lanes, and one of them
+
+  Packet() { clear(); }
+  void clear() {
+    std::fill(valid, valid + kLanes, 0);
+    active = 0;
+  }
+
+  void add(int lane, const Vec3& o, const Vec3& d, double enter, double far) {
+    const Vec3 p = o + enter * d;
+    RTCRay8& r = rays.ray;
+    r.org_x[lane] = static_cast<float>(p.x());
+    r.org_y[lane] = static_cast<float>(p.y());
+    r.org_z[lane] = static_cast<float>(p.z());
+    r.dir_x[lane] = static_cast<float>(d.x());
+    r.dir_y[lane] = static_cast<float>(d.y());
+    r.dir_z[lane] = static_cast<float>(d.z());
+    r.tnear[lane] = 0.0f;
+    r.tfar[lane] = round_up(far - enter);
+    r.time[lane] = 0.0f;
+    r.mask[lane] = ~0u;
+    r.id[lane] = static_cast<unsigned>(lane);
+    r.flags[lane] = 0;
+    rays.hit.geomID[lane] = RTC_INVALID_GEOMETRY_ID;
+    valid[lane] = -1;
+    start[lane] = enter;
+    ++active;
+    last = lane;
+  }
+
+  // Casts what was added; a lone ray goes singly, which is faster and gives the same.
+  void cast(RTCScene scene, EmbreeContext& context) {
+    if (active == 0) return;
+    if (active > 1) return intersect(scene, context, valid, rays);
+    const RTCRay8& r = rays.ray;
+    RTCRayHit one;
+    one.ray = {r.org_x[last], r.org_y[last], r.org_z[last], 0.0f,     r.dir_x[last],   r.dir_y[last],
+               r.dir_z[last], 0.0f,          r.tfar[last],  ~0u,      r.id[last],      0u};
+    one.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    intersect(scene, context, one);
+  }
+};
+
+}  // namespace ruedo::scene

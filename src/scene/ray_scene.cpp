@@ -1,0 +1,187 @@
+// The fast caster: Embree finds the boxes that a ray may run through, the tests in double decide. Movers are one
+// box a body, so that bringing a thousand robots up to date means a thousand boxes.
+#include "scene/ray_scene.h"
+
+#include "scene/ray_static.h"
+
+namespace ruedo::scene {
+
+namespace {
+
+class EmbreeRayScene : public RayScene {
+ public:
+  explicit EmbreeRayScene(std::shared_ptr<const StaticRayScene> statics);
+
+  void update(const Snapshot& snapshot) override;
+  void cast(std::span<const Ray> rays, std::span<Hit> hits, int ignored_link) const override;
+
+ private:
+  struct Mover {
+    int body = -1;                  // index into BodyLayout::bodies
+    Vec3 center_B, half_B;          // box around its shapes
+    IntoShape into;                 // world to body
+    bool there = false;             // false: its pose is not finite
+  };
+
+  static void test_primitive(const RTCIntersectFunctionNArguments* arguments);
+  void test_mover(const Mover& mover, unsigned lanes, RayBatch& batch) const;
+  void cast_batch(unsigned lanes, TreeQuery& query) const;
+  void write(const RayBatch& batch, int lane, Hit& hit) const;
+
+  std::shared_ptr<const StaticRayScene> statics_;
+  std::vector<Mover> bounded_, unbounded_;
+  std::vector<int> mover_of_body_;    // index into bounded_, or ~index into unbounded_
+  std::vector<IntoShape> turning_;    // as RayTable::turning, at the snapshot's wheel angles
+  RayTree tree_;
+};
+
+EmbreeRayScene::EmbreeRayScene(std::shared_ptr<const StaticRayScene> statics) : statics_(std::move(statics)) {
+  const RayTable& table = statics_->table;
+  std::vector<Box> boxes;
+  mover_of_body_.resize(table.bodies.size());
+  for (size_t body = 0; body < table.bodies.size(); ++body) {
+    Box box;
+    bool fits = true;
+    for (const int index : table.bodies[body]) {
+      const Box& of_shape = table.shapes[static_cast<size_t>(index)].box_F;
+      fits = fits && fits_tree(of_shape);
+      box.add(of_shape);
+    }
+    if (table.bodies[body].empty()) continue;
+    Mover mover;
+    mover.body = static_cast<int>(body);
+    mover.center_B = 0.5 * (box.lower + box.upper);
+    mover.half_B = 0.5 * (box.upper - box.lower);
+    mover_of_body_[body] = fits ? static_cast<int>(bounded_.size()) : ~static_cast<int>(unbounded_.size());
+    (fits ? bounded_ : unbounded_).push_back(mover);
+    if (fits) boxes.push_back(box);
+  }
+  for (const TurningShape& shape : table.turning) turning_.push_back(shape.at(0.0));
+  tree_.build(statics_->device(), std::move(boxes), test_primitive, true);
+  Snapshot start;
+  for (const model::BodyPlacement& body : statics_->layout.bodies) start.bodies.push_back(body.X_WB);
+  start.wheel_angles.resize(statics_->layout.wheels.size());
+  update(start);
+}
+
+void EmbreeRayScene::update(const Snapshot& snapshot) {
+  const auto place = [&](Mover& mover) {
+    const Pose& X_WB = snapshot.bodies[static_cast<size_t>(mover.body)];
+    mover.into = IntoShape(X_WB);
+    mover.there = X_WB.translation.allFinite() && X_WB.rotation.coeffs().allFinite();
+  };
+  for (Mover& mover : unbounded_) place(mover);
+  for (size_t i = 0; i < bounded_.size(); ++i) {
+    Mover& mover = bounded_[i];
+    place(mover);
+    const Eigen::Matrix3d R_WB = mover.into.rotation.transpose();
+    const Vec3 center = snapshot.bodies[static_cast<size_t>(mover.body)].translation + R_WB * mover.center_B;
+    const Vec3 half = R_WB.cwiseAbs() * mover.half_B;
+    const Box box{center - half, center + half};
+    mover.there = mover.there && fits_tree(box);
+    tree_.box(i) = mover.there ? box : Box{Vec3::Zero(), Vec3::Zero()};
+  }
+  for (size_t i = 0; i < turning_.size(); ++i) {
+    const TurningShape& shape = statics_->table.turning[i];
+    turning_[i] = shape.at(snapshot.wheel_angles[static_cast<size_t>(shape.wheel)]);
+  }
+  tree_.refit();
+}
+
+void EmbreeRayScene::test_mover(const Mover& mover, unsigned lanes, RayBatch& batch) const {
+  if (!mover.there) return;
+  FrameRays body;
+  for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
+    const int lane = std::countr_zero(rest);
+    body.o[lane] = mover.into.point(batch.world.o[lane]);
+    body.d[lane] = mover.into.vector(batch.world.d[lane]);
+  }
+  for (const int index : statics_->table.bodies[static_cast<size_t>(mover.body)]) {
+    const RayShape& shape = statics_->table.shapes[static_cast<size_t>(index)];
+    unsigned near = lanes;
+    if (shape.kind != model::Shape::plane) {
+      near = 0;
+      for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
+        const int lane = std::countr_zero(rest);
+        if (near_ball(shape, body.o[lane], body.d[lane])) near |= 1u << lane;
+      }
+    }
+    const IntoShape& into = shape.turning < 0 ? shape.into : turning_[static_cast<size_t>(shape.turning)];
+    if (near) test_shape(shape, index, into, near, body, batch);
+  }
+}
+
+void EmbreeRayScene::test_primitive(const RTCIntersectFunctionNArguments* arguments) {
+  auto& query = *static_cast<TreeQuery*>(arguments->context);
+  const auto& scene = *static_cast<const EmbreeRayScene*>(query.owner);
+  run_callback(*arguments, query, [&](unsigned primitive, unsigned lanes) {
+    scene.test_mover(scene.bounded_[primitive], lanes, query.batch);
+  });
+}
+
+void EmbreeRayScene::cast_batch(unsigned lanes, TreeQuery& query) const {
+  statics_->cast(lanes, query);
+  for (const Mover& mover : unbounded_) test_mover(mover, lanes, query.batch);
+  query.owner = this;
+  tree_.cast(lanes, query);
+}
+
+void EmbreeRayScene::cast(std::span<const Ray> rays, std::span<Hit> hits, int ignored_link) const {
+  TreeQuery query;
+  init_context(query);
+  RayBatch& batch = query.batch;
+  batch.ignored_link = ignored_link;
+  for (size_t first = 0; first < rays.size(); first += kLanes) {
+    const int n = static_cast<int>(std::min<size_t>(kLanes, rays.size() - first));
+    unsigned lanes = 0;
+    for (int lane = 0; lane < n; ++lane) {
+      const Ray& ray = rays[first + static_cast<size_t>(lane)];
+      batch.shape[lane] = RayBatch::kNothing;
+      if (!usable(ray)) continue;
+      batch.world.o[lane] = ray.origin;
+      batch.world.d[lane] = ray.direction;
+      batch.t[lane] = ray.max_range;
+      lanes |= 1u << lane;
+    }
+    if (lanes) cast_batch(lanes, query);
+    for (int lane = 0; lane < n; ++lane) write(batch, lane, hits[first + static_cast<size_t>(lane)]);
+  }
+}
+
+void EmbreeRayScene::write(const RayBatch& batch, int lane, Hit& hit) const {
+  if (batch.shape[lane] == RayBatch::kNothing) {
+    hit = {};
+    return;
+  }
+  const RayShape& shape = statics_->table.shapes[static_cast<size_t>(batch.shape[lane])];
+  hit.range = batch.t[lane];
+  hit.link = shape.link;
+  hit.shape = shape.shape;
+  Vec3 o = batch.world.o[lane], d = batch.world.d[lane];
+  if (batch.feature[lane] == kInside) {
+    hit.normal = -d;
+    return;
+  }
+  const IntoShape* body = nullptr;
+  if (shape.body >= 0) {
+    const int mover = mover_of_body_[static_cast<size_t>(shape.body)];
+    body = mover >= 0 ? &bounded_[static_cast<size_t>(mover)].into : &unbounded_[static_cast<size_t>(~mover)].into;
+    o = body->point(o);
+    d = body->vector(d);
+  }
+  const IntoShape& into = shape.turning < 0 ? shape.into : turning_[static_cast<size_t>(shape.turning)];
+  o = into.point(o);
+  d = into.vector(d);
+  Vec3 normal = into.vector_back(shape_normal(shape, batch.feature[lane], o + hit.range * d));
+  if (body) normal = body->vector_back(normal);
+  hit.normal = normal.dot(batch.world.d[lane]) <= 0.0 ? normal : Vec3(-normal);
+}
+
+}  // namespace
+
+std::unique_ptr<RayScene> make_ray_scene(std::shared_ptr<const StaticRayScene> statics) {
+  if (statics->backend == Backend::reference) return make_reference_ray_scene(std::move(statics));
+  return std::make_unique<EmbreeRayScene>(std::move(statics));
+}
+
+}  // namespace ruedo::scene

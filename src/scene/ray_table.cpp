@@ -1,0 +1,209 @@
+#include "scene/ray_table.h"
+
+namespace ruedo::scene {
+
+using model::Shape;
+
+namespace {
+
+// Corners of the box around the shape, in its own frame.
+Vec3 half_box(const RayShape& shape) {
+  const Vec3& s = shape.size;
+  switch (shape.kind) {
+    case Shape::box:
+    case Shape::ellipsoid: return s;
+    case Shape::sphere: return Vec3::Constant(s.x());
+    case Shape::cylinder:
+    case Shape::cone: return {s.x(), s.x(), s.y()};
+    case Shape::capsule: return {s.x(), s.x(), s.x() + s.y()};
+    case Shape::plane:
+    case Shape::mesh: break;
+  }
+  return Vec3::Zero();
+}
+
+// The shortest rotation that takes z to that unit vector.
+Quat turned_to(const Vec3& n) {
+  if (n.z() < -1.0 + 1e-12) return Quat(0, 1, 0, 0);
+  return Quat(1.0 + n.z(), -n.y(), n.x(), 0.0).normalized();
+}
+
+// Does turning about that axis of the link leave the shape as it is?
+bool round_about(const RayShape& shape, const Pose& X_LS, const Vec3& axis_in_L) {
+  const auto on_axis = [&](const Vec3& p) { return p.cross(axis_in_L).norm() <= 1e-9; };
+  if (!on_axis(X_LS.translation)) return false;
+  switch (shape.kind) {
+    case Shape::sphere: return true;
+    case Shape::cylinder:
+    case Shape::capsule:
+    case Shape::cone: return on_axis(X_LS.rotation * Vec3::UnitZ());
+    default: return false;
+  }
+}
+
+}  // namespace
+
+RayTable::RayTable(const model::WorldModel& world, const model::BodyLayout& layout, bool visuals, RTCDevice device)
+    : bodies(layout.bodies.size()) {
+  for (size_t i = 0; i < layout.links.size(); ++i) {
+    const model::LinkPlacement& placement = layout.links[i];
+    const model::Link& link = world.models[static_cast<size_t>(placement.instance)].model->links[static_cast<size_t>(placement.link)];
+    const int link_index = static_cast<int>(i);
+    if (visuals) {
+      for (size_t v = 0; v < link.visuals.size(); ++v)
+        if (link.visuals[v].transparency < 1.0)
+          add(placement, link_index, static_cast<int>(v), link.visuals[v].X_LV, link.visuals[v].geometry, layout, true, device);
+    } else {
+      for (size_t c = 0; c < link.collisions.size(); ++c)
+        add(placement, link_index, static_cast<int>(c), link.collisions[c].X_LC, link.collisions[c].geometry, layout, false, device);
+    }
+  }
+}
+
+void RayTable::add(const model::LinkPlacement& link, int link_index, int shape_index, const Pose& X_LShape,
+                   const model::Geometry& geometry, const model::BodyLayout& layout, bool visuals, RTCDevice device) {
+  RayShape shape;
+  Pose X_LS = X_LShape;
+  shape.kind = geometry.shape;
+  shape.link = link_index;
+  shape.shape = shape_index;
+  shape.body = link.body;
+  const Vec3& s = geometry.size;
+  switch (geometry.shape) {
+    case Shape::box: shape.size = 0.5 * s; break;
+    case Shape::sphere: shape.size = Vec3(s.x(), 0, 0); break;
+    case Shape::cylinder:
+    case Shape::capsule:
+    case Shape::cone: shape.size = Vec3(s.x(), 0.5 * s.y(), 0); break;
+    case Shape::ellipsoid: shape.size = s; break;
+    case Shape::plane:
+      if (visuals) {    // what is drawn is a rectangle: a box without height
+        shape.kind = Shape::box;
+        shape.size = Vec3(0.5 * geometry.extent.x(), 0.5 * geometry.extent.y(), 0.0);
+        X_LS = X_LS * Pose{turned_to(geometry.normal.normalized()), Vec3::Zero()};
+      } else {
+        shape.normal = geometry.normal.normalized();
+      }
+      break;
+    case Shape::mesh: {
+      if (!geometry.mesh || geometry.mesh->triangles.empty()) return;
+      auto& mesh = meshes_[{geometry.mesh.get(), geometry.scale.x(), geometry.scale.y(), geometry.scale.z()}];
+      if (!mesh) mesh = std::make_shared<RayMesh>(*geometry.mesh, geometry.scale, device);
+      shape.mesh = mesh;
+      break;
+    }
+  }
+
+  const Pose X_FL = link.X_BL, X_FS = (X_FL * X_LS).normalized();
+  shape.into = IntoShape(X_FS);
+  if (shape.kind == Shape::mesh) {
+    for (const Vec3& p : shape.mesh->positions()) shape.box_F.add(X_FS * p);
+  } else if (shape.kind != Shape::plane) {
+    const Vec3 half = shape.into.rotation.transpose().cwiseAbs() * half_box(shape);
+    shape.box_F.add(X_FS.translation - half);
+    shape.box_F.add(X_FS.translation + half);
+  }
+  if (!shape.box_F.empty()) {
+    shape.center_F = 0.5 * (shape.box_F.lower + shape.box_F.upper);
+    shape.radius = 0.5 * (shape.box_F.upper - shape.box_F.lower).norm();
+  }
+  if (link.wheel >= 0 && shape.kind != Shape::plane) {
+    const Vec3 axis_in_L = layout.wheels[static_cast<size_t>(link.wheel)].axis_in_L.normalized();
+    if (!round_about(shape, X_LS, axis_in_L)) {
+      shape.turning = static_cast<int>(turning.size());
+      turning.push_back({link.wheel, X_FL, X_LS, axis_in_L});
+      // The ball around all it sweeps: about the point of the axis that is nearest to its centre.
+      const Vec3 axis_in_F = X_FL.rotation * axis_in_L;
+      const Vec3 arm = shape.center_F - X_FL.translation;
+      const Vec3 on_axis = X_FL.translation + axis_in_F * axis_in_F.dot(arm);
+      shape.radius += (shape.center_F - on_axis).norm();
+      shape.center_F = on_axis;
+      shape.box_F.add(on_axis - Vec3::Constant(shape.radius));
+      shape.box_F.add(on_axis + Vec3::Constant(shape.radius));
+    }
+  }
+  shape.radius *= 1.0 + 1e-9;    // rounding of the test against it
+  const int index = static_cast<int>(shapes.size());
+  if (shape.body < 0) statics.push_back(index);
+  else bodies[static_cast<size_t>(shape.body)].push_back(index);
+  shapes.push_back(std::move(shape));
+}
+
+bool RayBatch::inside_mesh(const RayShape& shape, int index, const Vec3& p_F, const Vec3& p_S) {
+  if (!shape.mesh->closed() || !shape.mesh->box().contains(p_S)) return false;
+  for (const Asked& asked : asked_)
+    if (asked.index == index && asked.p_F == p_F) return asked.inside;
+  asked_[oldest_] = {index, p_F, shape.mesh->inside(p_S)};
+  const bool inside = asked_[oldest_].inside;
+  oldest_ = (oldest_ + 1) % 4;
+  return inside;
+}
+
+namespace {
+
+template <class Test>
+inline void each_lane(int index, const IntoShape& into, unsigned lanes, const FrameRays& rays, RayBatch& batch, Test test) {
+  for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
+    const int lane = std::countr_zero(rest);
+    batch.offer(lane, test(into.point(rays.o[lane]), into.vector(rays.d[lane])), index);
+  }
+}
+
+void test_mesh(const RayShape& shape, int index, const IntoShape& into, unsigned lanes, const FrameRays& rays, RayBatch& batch) {
+  FrameRays local;
+  unsigned outside = 0;
+  for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
+    const int lane = std::countr_zero(rest);
+    local.o[lane] = into.point(rays.o[lane]);
+    local.d[lane] = into.vector(rays.d[lane]);
+    if (batch.inside_mesh(shape, index, rays.o[lane], local.o[lane])) batch.offer(lane, {0.0, kInside}, index);
+    else outside |= 1u << lane;
+  }
+  ShapeHit hits[kLanes];
+  shape.mesh->intersect(outside, local.o, local.d, batch.t, hits);
+  for (unsigned rest = outside; rest != 0; rest &= rest - 1) {
+    const int lane = std::countr_zero(rest);
+    batch.offer(lane, hits[lane], index);
+  }
+}
+
+}  // namespace
+
+void test_shape(const RayShape& shape, int index, const IntoShape& into, unsigned lanes, const FrameRays& rays, RayBatch& batch) {
+  if (shape.link == batch.ignored_link) return;
+  const Vec3& s = shape.size;
+  const auto each = [&](auto test) { each_lane(index, into, lanes, rays, batch, test); };
+  switch (shape.kind) {
+    case Shape::box: return each([&](const Vec3& o, const Vec3& d) { return intersect_box(o, d, s); });
+    case Shape::sphere: return each([&](const Vec3& o, const Vec3& d) { return intersect_sphere(o, d, s.x()); });
+    case Shape::cylinder: return each([&](const Vec3& o, const Vec3& d) { return intersect_cylinder(o, d, s.x(), s.y()); });
+    case Shape::capsule: return each([&](const Vec3& o, const Vec3& d) { return intersect_capsule(o, d, s.x(), s.y()); });
+    case Shape::ellipsoid: return each([&](const Vec3& o, const Vec3& d) { return intersect_ellipsoid(o, d, s); });
+    case Shape::cone: return each([&](const Vec3& o, const Vec3& d) { return intersect_cone(o, d, s.x(), s.y()); });
+    case Shape::plane: return each([&](const Vec3& o, const Vec3& d) { return intersect_plane(o, d, shape.normal); });
+    case Shape::mesh: return test_mesh(shape, index, into, lanes, rays, batch);
+  }
+}
+
+Vec3 shape_normal(const RayShape& shape, int feature, const Vec3& p) {
+  const Vec3& s = shape.size;
+  const auto end = [&](int f) { return Vec3(0.0, 0.0, f == kTop ? 1.0 : -1.0); };
+  switch (shape.kind) {
+    case Shape::box: return (feature % 2 == 0 ? -1.0 : 1.0) * Vec3::Unit(feature / 2);
+    case Shape::sphere: return p.normalized();
+    case Shape::ellipsoid: return p.cwiseQuotient(s).cwiseQuotient(s).normalized();
+    case Shape::cylinder: return feature == kSide ? Vec3(p.x(), p.y(), 0.0).normalized() : end(feature);
+    case Shape::capsule: return feature == kSide ? Vec3(p.x(), p.y(), 0.0).normalized() : (p - s.y() * end(feature)).normalized();
+    case Shape::cone: {
+      if (feature != kSide) return end(feature);
+      const double around = std::hypot(p.x(), p.y());
+      if (around == 0.0) return Vec3::UnitZ();    // the apex
+      return Vec3(p.x() / around * 2.0 * s.y(), p.y() / around * 2.0 * s.y(), s.x()).normalized();
+    }
+    case Shape::plane: return shape.normal;
+    case Shape::mesh: return shape.mesh->normal(feature);
+  }
+  return Vec3::UnitZ();
+}
+
+}  // namespace ruedo::scene

@@ -1,0 +1,121 @@
+// All shapes that rays can hit, ordered by link and shape, each with its place in the frame F that carries it:
+// the world for static links, the body's frame for movers. Built once and shared by all backends.
+#pragma once
+
+#include <bit>
+#include <map>
+#include <memory>
+#include <span>
+#include <tuple>
+#include <vector>
+
+#include "model/body_layout.h"
+#include "scene/ray_mesh.h"
+
+namespace ruedo::scene {
+
+// Maps frame F to a shape's frame S: p_S = rotation * p_F + translation.
+struct IntoShape {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Vec3 translation = Vec3::Zero();
+
+  IntoShape() = default;
+  explicit IntoShape(const Pose& X_FS)
+      : rotation(X_FS.rotation.conjugate().toRotationMatrix()), translation(-(rotation * X_FS.translation)) {}
+  Vec3 point(const Vec3& p_F) const { return rotation * p_F + translation; }
+  Vec3 vector(const Vec3& v_F) const { return rotation * v_F; }
+  Vec3 vector_back(const Vec3& v_S) const { return rotation.transpose() * v_S; }
+};
+
+struct RayShape {
+  model::Shape kind = model::Shape::box;
+  int link = -1, shape = -1;     // as in Hit
+  int body = -1;                 // -1: static
+  int turning = -1;              // index into RayTable::turning: its place depends on a wheel's angle
+  IntoShape into;                // at wheel angle 0
+  Vec3 size = Vec3::Zero();      // box: half lengths; sphere, cylinder, capsule, cone: radius, half length; ellipsoid: radii
+  Vec3 normal = Vec3::UnitZ();   // plane
+  std::shared_ptr<const RayMesh> mesh;
+  Box box_F;                     // around the shape at every wheel angle; empty for a plane
+  Vec3 center_F = Vec3::Zero();  // ball around the same
+  double radius = 0.0;
+};
+
+// A shape that is not round about its wheel's axis.
+struct TurningShape {
+  int wheel = -1;                // index into BodyLayout::wheels
+  Pose X_FL, X_LS;               // at angle 0
+  Vec3 axis_in_L = Vec3::UnitY();
+
+  IntoShape at(double angle_rad) const {
+    return IntoShape(X_FL * Pose{Quat(Eigen::AngleAxisd(angle_rad, axis_in_L)), Vec3::Zero()} * X_LS);
+  }
+};
+
+struct RayTable {
+  std::vector<RayShape> shapes;          // by (link, shape)
+  std::vector<std::vector<int>> bodies;  // indices into shapes, of each body
+  std::vector<int> statics;              // indices into shapes
+  std::vector<TurningShape> turning;
+
+  // device null: meshes without trees.
+  RayTable(const model::WorldModel& world, const model::BodyLayout& layout, bool visuals, RTCDevice device);
+
+ private:
+  void add(const model::LinkPlacement& link, int link_index, int shape_index, const Pose& X_LS,
+           const model::Geometry& geometry, const model::BodyLayout& layout, bool visuals, RTCDevice device);
+  std::map<std::tuple<const model::Mesh*, double, double, double>, std::shared_ptr<const RayMesh>> meshes_;
+};
+
+// Eight rays in some frame.
+struct FrameRays {
+  Vec3 o[kLanes], d[kLanes];
+};
+
+// Eight rays, and the nearest hit of each so far.
+struct RayBatch {
+  static constexpr int kNothing = std::numeric_limits<int>::max();
+
+  FrameRays world;
+  double t[kLanes];         // nearest hit, or the maximum range
+  int shape[kLanes];        // index into RayTable::shapes; kNothing: no hit yet
+  int feature[kLanes];
+  int ignored_link = -1;
+
+  // Keeps the nearer hit; of equals the one of the lower shape.
+  void offer(int lane, const ShapeHit& hit, int index) {
+    if (hit.t < t[lane] || (hit.t == t[lane] && index < shape[lane] && hit.t < kNoHit)) {
+      t[lane] = hit.t;
+      shape[lane] = index;
+      feature[lane] = hit.feature;
+    }
+  }
+
+  // Whether a point is inside a closed mesh is asked again and again by the rays of one device.
+  bool inside_mesh(const RayShape& shape, int index, const Vec3& p_F, const Vec3& p_S);
+
+ private:
+  struct Asked {
+    int index = -1;
+    Vec3 p_F;
+    bool inside;
+  };
+  Asked asked_[4];
+  int oldest_ = 0;
+};
+
+// Tests the lanes (bits) of rays in frame F against a shape.
+void test_shape(const RayShape& shape, int index, const IntoShape& into, unsigned lanes, const FrameRays& rays, RayBatch& batch);
+
+// Outward normal in the shape's frame at a point of its surface.
+Vec3 shape_normal(const RayShape& shape, int feature, const Vec3& p_S);
+
+// Does the ray come near the shape's ball?
+inline bool near_ball(const RayShape& shape, const Vec3& o, const Vec3& d) {
+  const Vec3 to_center = shape.center_F - o;
+  const double along = to_center.dot(d);
+  const double squared = to_center.squaredNorm(), radius2 = shape.radius * shape.radius;
+  return squared <= radius2 || (along > 0.0 && squared - along * along <= radius2);
+}
+
+}  // namespace ruedo::scene
