@@ -1,0 +1,38 @@
+"""Ruedo's client for Python: connect to a robot simulation, read its sensors, drive its robots.
+
+    import ruedo
+
+    with ruedo.connect() as sim:
+        robot = sim.robot("p3at")
+        robot.set_velocity(0.3, 0.0)            # m/s, rad/s; holds until changed
+        while robot.lrf.next().nearest(-0.5, 0.5) > 0.8:
+            pass
+        robot.stop().wait()
+
+Units are SI, angles radians; x ahead, y left, z up. `ruedo.lcmtypes` has the message types themselves.
+"""
+
+try:
+    from . import lcmtypes
+except ImportError as _error:
+    raise ImportError("ruedo's message types were not generated: install the package (pip install clients/python) or "
+                      "build the target python_types and use BUILD/python") from _error
+from .control import State
+from .errors import (LaunchError, MotionError, NoServer, NotSupported, RequestError, RuedoError, Timeout, TypeMismatch,
+                     UnknownName)
+from .launch import find_ruedo, launch
+from .motion import Motion
+from .robot import Camera, Device, Robot
+from .samples import (CameraInfo, Contact, ContactPoint, Image, Imu, Joints, LidarScan, MotionStatus, Odometry, Pose, Sample,
+                      Scan, SonarReading)
+from .simulation import Simulation, connect
+from .stream import Stream
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Camera", "CameraInfo", "Contact", "ContactPoint", "Device", "Image", "Imu", "Joints", "LaunchError", "LidarScan",
+    "Motion", "MotionError", "MotionStatus", "NoServer", "NotSupported", "Odometry", "Pose", "RequestError", "Robot",
+    "RuedoError", "Sample", "Scan", "Simulation", "SonarReading", "State", "Stream", "Timeout", "TypeMismatch",
+    "UnknownName", "connect", "find_ruedo", "launch", "lcmtypes",
+]

@@ -1,0 +1,147 @@
+"""Requests to the simulation: each is repeated until it is answered, and executed once."""
+
+from __future__ import annotations
+
+import random
+import threading
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import lcmtypes
+from .errors import NotSupported, RequestError, Timeout, TypeMismatch
+from .samples import Floats
+
+if TYPE_CHECKING:
+    from .simulation import Simulation
+
+_REPEAT_SECONDS = 0.1
+
+
+def _names(of: Any) -> dict[int, str]:
+    return {value: name for name, value in vars(of).items() if name.isupper() and isinstance(value, int)}
+
+
+_KINDS = _names(lcmtypes.request_t)
+_CODES = _names(lcmtypes.reply_t)
+
+
+@dataclass(frozen=True)
+class State:
+    """The state of the simulation, and of the model or MODEL/LINK that was asked for (else name is "")."""
+
+    utime: int           # us, sim time
+    step: int            # number of the state
+    state_hash: int      # of all bodies' and robots' state
+    paused: bool
+    rate: float          # sim time per real time that is asked for; inf: as fast as it goes
+    name: str
+    position: Floats     # (3,) m, world
+    orientation: Floats  # (4,) w, x, y, z: to world
+    linear: Floats       # (3,) m/s, world
+    angular: Floats      # (3,) rad/s, world
+
+    @property
+    def time(self) -> float:
+        """Sim time, s."""
+        return self.utime * 1e-6
+
+
+class Session:
+    """A client's session with the server: joins on the first request."""
+
+    def __init__(self, sim: Simulation, name: str):
+        self._sim = sim
+        self._name = name
+        self._one_at_a_time = threading.Lock()
+        self._news = threading.Condition()
+        self._session = 0
+        self._run_id = 0
+        self._sequence = 0
+        self._awaited: tuple[int, int] | None = None    # kind, sequence
+        self._reply: Any = None
+
+    def request(self, kind: int, body: Any = None, timeout: float = 5.0) -> Any:
+        """The reply. Raises NotSupported, RequestError, Timeout (after timeout seconds of real time)."""
+        info = self._sim._info
+        if not info.features >> kind & 1:
+            raise NotSupported(f"this server (Ruedo {info.version}) has no {_KINDS[kind]} request")
+        with self._one_at_a_time:
+            for attempt in (1, 2):
+                if not self._session or self._run_id != info.run_id:
+                    self._join(info.run_id, timeout)
+                self._sequence += 1
+                reply = self._exchange(kind, self._session, self._sequence, body, timeout)
+                if reply.code != lcmtypes.reply_t.UNKNOWN_SESSION or attempt == 2:
+                    break
+                self._session = 0    # its place went to another: join again
+        return self._checked(reply)
+
+    def leave(self) -> None:
+        """Gives the session back, without waiting for an answer."""
+        if self._session and self._sim._info.features >> lcmtypes.request_t.LEAVE & 1:
+            self._sequence += 1
+            self._publish(lcmtypes.request_t.LEAVE, self._session, self._sequence, b"")
+            self._session = 0
+
+    def receive(self, data: bytes) -> None:
+        """A message of ruedo/reply."""
+        if data[:8] != lcmtypes.reply_t._get_packed_fingerprint():
+            return
+        try:
+            reply = lcmtypes.reply_t.decode(data)
+        except Exception:
+            return
+        with self._news:
+            ours = reply.session == self._session or reply.kind == lcmtypes.request_t.JOIN
+            if self._awaited == (reply.kind, reply.sequence) and ours:
+                self._reply = reply
+                self._news.notify_all()
+
+    def _join(self, run_id: int, timeout: float) -> None:
+        join = lcmtypes.join_t()
+        join.client = self._name
+        reply = self._checked(self._exchange(lcmtypes.request_t.JOIN, 0, random.getrandbits(62) + 1, join, timeout))
+        self._session, self._run_id, self._sequence = reply.session, run_id, 0
+
+    def _exchange(self, kind: int, session: int, sequence: int, body: Any, timeout: float) -> Any:
+        deadline = time.monotonic() + timeout
+        encoded = body.encode() if body is not None else b""
+        with self._news:
+            self._awaited, self._reply = (kind, sequence), None
+            while self._reply is None:
+                if time.monotonic() >= deadline:
+                    self._awaited = None
+                    raise Timeout(f"no reply to {_KINDS[kind]} on ruedo/reply within {timeout:g} s")
+                self._publish(kind, session, sequence, encoded)
+                self._news.wait(_REPEAT_SECONDS)
+                self._sim._check_server()
+            reply, self._awaited = self._reply, None
+        return reply
+
+    def _publish(self, kind: int, session: int, sequence: int, body: bytes) -> None:
+        request = lcmtypes.request_t()
+        request.utime, request.run_id, request.epoch = self._sim._utime, self._sim._info.run_id, -1
+        request.session, request.sequence, request.kind = session, sequence, kind
+        request.size, request.body = len(body), body
+        self._sim._bus.publish("ruedo/request", request.encode())
+
+    @staticmethod
+    def _checked(reply: Any) -> Any:
+        if reply.code == lcmtypes.reply_t.OK:
+            return reply
+        code, kind = _CODES.get(reply.code, str(reply.code)), _KINDS.get(reply.kind, str(reply.kind))
+        if reply.code == lcmtypes.reply_t.NOT_SUPPORTED:
+            raise NotSupported(f"{kind}: {reply.text or 'this server does not have it'}")
+        raise RequestError(f"{kind}: {reply.text or code}", code)
+
+
+def state_of(reply: Any) -> State:
+    try:
+        m = lcmtypes.state_reply_t.decode(reply.body)
+    except Exception:
+        raise TypeMismatch("the reply's body is no state_reply_t of this client's version") from None
+    return State(m.utime, m.step, m.state_hash, m.paused, m.rate, m.name, np.array(m.position), np.array(m.orientation),
+                 np.array(m.linear), np.array(m.angular))

@@ -1,0 +1,135 @@
+"""Driving: commands that are repeated until changed, and motion primitives with a handle to wait on."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from typing import TYPE_CHECKING
+
+from . import lcmtypes
+from .errors import MotionError, Timeout
+from .samples import MotionStatus
+
+if TYPE_CHECKING:
+    from .robot import Robot
+
+log = logging.getLogger("ruedo")
+
+# A primitive that no status has shown after this many statuses and seconds was lost or replaced at once.
+_UNSEEN_STATUSES = 20
+_UNSEEN_SECONDS = 1.0
+
+
+class Motion:
+    """A motion primitive under way. state: "sent", then the states of MotionStatus."""
+
+    def __init__(self, robot: Robot, id: int, kind: str, amount: float):
+        self.id, self.kind = id, kind
+        self.state = "sent"
+        self.progress = 0.0               # m or rad done
+        self.remaining = amount           # m or rad
+        self.reason = ""                  # why it ended early or was refused: MotionStatus's reasons
+        self._robot = robot
+        self._unseen = 0
+        self._sent = time.monotonic()
+        self._news = threading.Condition()
+
+    @property
+    def done(self) -> bool:
+        """True when the robot is not executing it any more, for whatever reason."""
+        return self.state in ("done", "ended", "refused")
+
+    def wait(self, timeout: float | None = None) -> Motion:
+        """Waits until it is done, at most timeout seconds of real time. Raises MotionError when it ended early or
+        was refused, Timeout when it still runs; the robot goes on then."""
+        deadline = None if timeout is None else time.monotonic() + timeout
+        with self._news:
+            while not self.done:
+                if deadline is not None and time.monotonic() >= deadline:
+                    raise Timeout(f"{self._robot.name}: {self.kind} was not done within {timeout:g} s "
+                                  f"({self.remaining:.3f} remain)")
+                left = 0.5 if deadline is None else max(0.0, min(0.5, deadline - time.monotonic()))
+                self._news.wait(left)
+                self._robot._sim._check_server()
+        if self.state != "done":
+            raise MotionError(f"{self._robot.name}: {self.kind} {'was refused' if self.state == 'refused' else 'ended'}: "
+                              f"{self.reason}, {self.remaining:.3f} remain", self.reason)
+        return self
+
+    def _update(self, status: MotionStatus) -> None:
+        with self._news:
+            if status.id == self.id:
+                self.progress, self.remaining = status.progress, status.remaining
+                self.state, self.reason = status.state, status.reason
+            elif self.state != "sent":
+                self.state, self.reason = "ended", "replaced"    # its own end fell between two statuses
+            else:
+                self._unseen += 1
+                if self._unseen >= _UNSEEN_STATUSES and time.monotonic() - self._sent >= _UNSEEN_SECONDS:
+                    self.state, self.reason = "ended", "replaced"
+            self._news.notify_all()
+
+    def __repr__(self) -> str:
+        return f"<Motion {self.kind} of {self._robot.name}: {self.state} {self.reason}, {self.remaining:.3f} remain>"
+
+
+class Driver:
+    """The commands of one robot: what is repeated, and the primitives under way."""
+
+    def __init__(self, robot: Robot):
+        self._robot = robot
+        self._lock = threading.Lock()
+        self._held: tuple[str, bytes] | None = None
+        self._motions: list[Motion] = []
+        self._listening = False
+        self._running = False          # a status has shown the held command
+        self._watchdog_told = False
+
+    def hold(self, channel: str, data: bytes) -> None:
+        """Publishes the command now, and again until the next one."""
+        self._listen()
+        with self._lock:
+            self._held = (channel, data)
+            self._running = False
+            self._robot._sim._bus.publish(channel, data)
+        self._robot._sim._keep_repeating(self)
+
+    def repeat(self) -> None:
+        with self._lock:
+            if self._held:
+                self._robot._sim._bus.publish(*self._held)
+
+    def period(self) -> float:
+        """s of real time between repetitions: a quarter of the watchdog's time, at most 0.1."""
+        watchdog = self._robot.watchdog
+        return min(0.1, max(0.01, watchdog / 4.0)) if watchdog > 0.0 else 0.1
+
+    def move(self, channel: str, command: lcmtypes.move_command_t, kind: str) -> Motion:
+        self._listen()
+        motion = Motion(self._robot, command.id, kind, abs(command.value))
+        with self._lock:
+            self._held = None    # a repetition after this would replace the primitive
+            self._motions = [m for m in self._motions if not m.done] + [motion]
+            self._robot._sim._bus.publish(channel, command.encode())
+        return motion
+
+    def _listen(self) -> None:
+        with self._lock:
+            if self._listening:
+                return
+            self._listening = True
+        self._robot.motion.on_sample(self._on_status)
+
+    def _on_status(self, status: MotionStatus) -> None:
+        with self._lock:
+            motions = list(self._motions)
+            self._running = self._running or (self._held is not None and status.id == 0 and status.state == "running")
+            stopped = self._running and self._held is not None and status.reason == "watchdog" and not self._watchdog_told
+            self._watchdog_told = self._watchdog_told or stopped
+        if stopped:
+            log.warning("%s: stopped by its watchdog: no command came for %g s of sim time", self._robot.name,
+                        self._robot.watchdog)
+        for motion in motions:
+            if not motion.done:
+                motion._update(status)

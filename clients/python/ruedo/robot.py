@@ -1,0 +1,306 @@
+"""A robot, its devices, and how it is driven."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from . import lcmtypes
+from .errors import NotSupported, UnknownName
+from .motion import Driver, Motion
+from .samples import (CameraInfo, Contact, Floats, Image, Imu, Joints, LidarScan, MotionStatus, Odometry, Pose, Scan,
+                      SonarReading)
+from .stream import Stream
+
+if TYPE_CHECKING:
+    from .simulation import Simulation
+
+T = TypeVar("T")
+
+
+class Device(Stream[T]):
+    """A sensor of a robot: latest(), next() and on_sample() deliver its samples.
+
+    kind: "lrf", "sonar", "odometry", "camera", "pose", "motion", "imu", "contact", ...
+    position (3,) m and orientation (4,) w, x, y, z: the device's frame in base_link at the start.
+    range_min, range_max: m. fov_horizontal, fov_vertical: rad. width, height: rays and layers,
+    transducers, or pixels. elements (n, 6): a sonar's transducers, x, y, z, roll, pitch, yaw in its frame.
+    """
+
+    def __init__(self, sim: Simulation, robot: str, info: Any, channel: Any):
+        super().__init__(sim, channel.name, channel.type, channel.fingerprint, info.rate)
+        self.robot: str = robot
+        self.name: str = info.name
+        self.kind: str = info.kind
+        self.position: Floats = np.array(info.position, np.float64)
+        self.orientation: Floats = np.array(info.orientation, np.float64)
+        self.range_min: float = info.range_min
+        self.range_max: float = info.range_max
+        self.fov_horizontal: float = info.fov_horizontal
+        self.fov_vertical: float = info.fov_vertical
+        self.width: int = info.width
+        self.height: int = info.height
+        self.elements: Floats = np.array(info.element_pose, np.float64).reshape(info.nelements, 6)
+
+
+class Camera(Device[Image]):
+    """A camera; its further channels, where the world file asks for them: depth, labels, info."""
+
+    @property
+    def depth(self) -> Stream[Image]:
+        return self._part("depth")
+
+    @property
+    def labels(self) -> Stream[Image]:
+        return self._part("labels")
+
+    @property
+    def info(self) -> Stream[CameraInfo]:
+        return self._part("info")
+
+    def _part(self, part: str) -> Stream[Any]:
+        return self._sim.robot(self.robot)._camera_part(self.name, part)
+
+
+class Robot:
+    """A robot of the simulation. Lengths in m, angles in rad, counter-clockwise is positive.
+
+    drive: "kinematic", "wheels", or "" for a robot that only senses. watchdog: s of sim time without a
+    command after which it stops, 0: never. wheels: names of the wheel joints.
+    """
+
+    def __init__(self, sim: Simulation, name: str):
+        self.name = name
+        self._sim = sim
+        self._streams: dict[str, Stream[Any]] = {}
+        self._devices_of: Any = None    # the info that _devices_now was made from
+        self._devices_now: list[Device[Any]] = []
+        self._driver = Driver(self)
+
+    def __repr__(self) -> str:
+        return f"<Robot {self.name}: {', '.join(d.name for d in self.devices)}>"
+
+    # What it is.
+
+    @property
+    def _info(self) -> Any:
+        return self._sim._robot_info(self.name)
+
+    @property
+    def model(self) -> str:
+        return str(self._info.model)
+
+    @property
+    def drive(self) -> str:
+        return str(self._info.drive)
+
+    @property
+    def wheel_radius(self) -> float:
+        return float(self._info.wheel_radius)
+
+    @property
+    def track(self) -> float:
+        """m between the left and the right wheels."""
+        return float(self._info.track)
+
+    @property
+    def max_speed(self) -> float:
+        """m/s."""
+        return float(self._info.max_speed)
+
+    @property
+    def max_turn_rate(self) -> float:
+        """rad/s."""
+        return float(self._info.max_turn_rate)
+
+    @property
+    def watchdog(self) -> float:
+        return float(self._info.watchdog_us) * 1e-6
+
+    @property
+    def wheels(self) -> list[str]:
+        return list(self._info.wheels)
+
+    # Its devices.
+
+    @property
+    def devices(self) -> list[Device[Any]]:
+        """All devices, in the order of the world file."""
+        known = self._sim._info
+        if self._devices_of is not known:
+            found = [self._device(info) for info in known.devices.get(self.name, ())]
+            self._devices_now = [device for device in found if device is not None]
+            self._devices_of = known
+        return list(self._devices_now)
+
+    def device(self, name: str) -> Device[Any]:
+        """The device of that name; UnknownName lists those that exist."""
+        devices = self.devices
+        for device in devices:
+            if device.name == name:
+                return device
+        raise UnknownName(f"{self.name} has no device {name!r}; it has {', '.join(d.name for d in devices) or 'none'}")
+
+    @property
+    def lrf(self) -> Device[Scan]:
+        """The first laser range finder with one layer."""
+        return self._first("planar_lidar_t", "laser range finder")
+
+    @property
+    def lidar(self) -> Device[LidarScan]:
+        """The first laser scanner with several layers."""
+        return self._first("lidar_t", "laser scanner with several layers")
+
+    @property
+    def sonar(self) -> Device[SonarReading]:
+        """The first sonar array."""
+        return self._first("sonar_t", "sonar")
+
+    @property
+    def odometry(self) -> Device[Odometry]:
+        return self._first("odometry_t", "odometry")
+
+    @property
+    def camera(self) -> Camera:
+        """The first camera."""
+        camera = self._first("image_t", "camera")
+        assert isinstance(camera, Camera)
+        return camera
+
+    @property
+    def imu(self) -> Device[Imu]:
+        return self._first("imu_t", "IMU")
+
+    @property
+    def contact(self) -> Device[Contact]:
+        """The first bumper."""
+        return self._first("contact_t", "contact sensor")
+
+    @property
+    def pose(self) -> Stream[Pose]:
+        """The true pose."""
+        return self._stream("pose_t", "true pose")
+
+    @property
+    def motion(self) -> Stream[MotionStatus]:
+        """What the robot is executing."""
+        return self._stream("motion_status_t", "motion status")
+
+    @property
+    def joints(self) -> Stream[Joints]:
+        return self._stream("joint_state_t", "joints")
+
+    # Driving.
+
+    def set_velocity(self, v: float, omega: float) -> None:
+        """Drives with v (m/s ahead) and omega (rad/s), within the robot's limits, until the next command of any
+        kind: the command is repeated in the background, so that the watchdog does not stop the robot."""
+        command = lcmtypes.velocity_command_t()
+        command.utime, command.vx, command.omega = self._sim._utime, _finite("v", v), _finite("omega", omega)
+        self._driver.hold(self._input("velocity_command_t"), command.encode())
+
+    def set_wheels(self, left: float, right: float) -> None:
+        """Turns the wheels of the left and right side (rad/s, positive ahead), until the next command."""
+        command = lcmtypes.wheel_command_t()
+        command.utime, command.n = self._sim._utime, 2
+        command.rate = [_finite("left", left), _finite("right", right)]
+        self._driver.hold(self._input("wheel_command_t"), command.encode())
+
+    def stop(self, deceleration: float = 0.0) -> Motion:
+        """Comes to rest. deceleration: limit in m/s^2, 0: the robot's own."""
+        return self._move("stop", lcmtypes.move_command_t.STOP, 0.0, deceleration=deceleration)
+
+    def advance(self, distance: float, speed: float = 0.0, acceleration: float = 0.0, deceleration: float = 0.0) -> Motion:
+        """Drives straight on by a distance (m, negative: back), and comes to rest. Returns at once; wait() on what
+        it returns waits for the end. Limits in m/s and m/s^2, 0: the robot's own."""
+        return self._move("advance", lcmtypes.move_command_t.ADVANCE, distance, 0.0, speed, acceleration, deceleration)
+
+    def rotate(self, angle: float, speed: float = 0.0, acceleration: float = 0.0, deceleration: float = 0.0) -> Motion:
+        """Turns on the spot by an angle (rad, more than a turn is allowed). Limits in rad/s and rad/s^2."""
+        return self._move("rotate", lcmtypes.move_command_t.ROTATE, angle, 0.0, speed, acceleration, deceleration)
+
+    def turn_to(self, heading: float, speed: float = 0.0, acceleration: float = 0.0, deceleration: float = 0.0) -> Motion:
+        """Turns on the spot, the shorter way, to a heading (rad, in the frame odom). Limits in rad/s and rad/s^2."""
+        return self._move("turn_to", lcmtypes.move_command_t.HEADING, heading, 0.0, speed, acceleration, deceleration)
+
+    def arc(self, angle: float, radius: float, speed: float = 0.0, acceleration: float = 0.0, deceleration: float = 0.0) -> Motion:
+        """Drives ahead along a circle of a radius (m, > 0) until it has turned by an angle (rad; positive: to the
+        left). Limits in m/s and m/s^2."""
+        if not radius > 0.0:
+            raise ValueError(f"radius is {radius}: it must be > 0 m; the sign of the angle says left or right")
+        return self._move("arc", lcmtypes.move_command_t.ARC, angle, radius, speed, acceleration, deceleration)
+
+    def _move(self, name: str, kind: int, value: float, radius: float = 0.0, speed: float = 0.0, acceleration: float = 0.0,
+              deceleration: float = 0.0) -> Motion:
+        command = lcmtypes.move_command_t()
+        command.utime, command.id, command.kind = self._sim._utime, self._sim._next_id(), kind
+        command.value, command.radius = _finite("value", value), _finite("radius", radius)
+        command.speed = _limit("speed", speed)
+        command.acceleration = _limit("acceleration", acceleration)
+        command.deceleration = _limit("deceleration", deceleration)
+        return self._driver.move(self._input("move_command_t"), command, name)
+
+    # Channels, by what info says of them: names on the bus may be remapped.
+
+    @property
+    def _channels(self) -> list[Any]:
+        return self._sim._info.channels.get(self.name, [])
+
+    def _input(self, type: str) -> str:
+        if not self.drive:
+            raise NotSupported(f"{self.name} cannot be driven: its model has no drive")
+        for channel in self._channels:
+            if channel.input and channel.type == type:
+                return str(channel.name)
+        raise NotSupported(f"{self.name} takes no {type}")
+
+    def _device(self, info: Any) -> Device[Any] | None:
+        for channel in self._channels:
+            if channel.device == info.name and not channel.input:
+                if channel.name not in self._streams:
+                    make = Camera if channel.type == "image_t" else Device
+                    self._streams[channel.name] = make(self._sim, self.name, info, channel)
+                stream = self._streams[channel.name]
+                return stream if isinstance(stream, Device) else None
+        return None
+
+    def _first(self, type: str, what: str) -> Any:
+        devices = self.devices
+        for device in devices:
+            if device.type == type:
+                return device
+        raise UnknownName(f"{self.name} has no {what}; it has {', '.join(d.name for d in devices) or 'no devices'}")
+
+    def _stream(self, type: str, what: str) -> Any:
+        for device in self.devices:
+            if device.type == type:
+                return device
+        for channel in self._channels:
+            if channel.type == type and not channel.input:
+                return self._plain(channel)
+        raise UnknownName(f"{self.name} publishes no {what}")
+
+    def _camera_part(self, camera: str, part: str) -> Any:
+        for channel in self._channels:
+            if channel.device == f"{camera}/{part}":
+                return self._plain(channel)
+        raise UnknownName(f"{self.name}/{camera} publishes no {part}; <ruedo:{part}> in the world file switches it on")
+
+    def _plain(self, channel: Any) -> Stream[Any]:
+        if channel.name not in self._streams:
+            self._streams[channel.name] = Stream(self._sim, channel.name, channel.type, channel.fingerprint, channel.rate)
+        return self._streams[channel.name]
+
+
+def _finite(name: str, value: float) -> float:
+    if not math.isfinite(value):
+        raise ValueError(f"{name} is {value}: it must be a finite number")
+    return float(value)
+
+
+def _limit(name: str, value: float) -> float:
+    if not (math.isfinite(value) and value >= 0.0):
+        raise ValueError(f"{name} is {value}: it must be a finite number >= 0; 0 is the robot's own limit")
+    return float(value)

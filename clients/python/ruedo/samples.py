@@ -1,0 +1,306 @@
+"""What devices deliver: one frozen class for each kind of sample, with numpy arrays.
+
+SI units and radians. x ahead, y left, z up; quaternions w, x, y, z. `utime` is the sim time of the state
+shown, in integer microseconds; `time` is the same in seconds.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import lcmtypes
+
+Floats = NDArray[np.float64]
+
+_PIXEL_FORMATS = {
+    lcmtypes.image_t.PIXEL_FORMAT_GRAY: "gray",
+    lcmtypes.image_t.PIXEL_FORMAT_RGB: "rgb",
+    lcmtypes.image_t.PIXEL_FORMAT_BGR: "bgr",
+    lcmtypes.image_t.PIXEL_FORMAT_MJPEG: "jpeg",
+    lcmtypes.image_t.PIXEL_FORMAT_LE_GRAY16: "gray16",
+    lcmtypes.image_t.PIXEL_FORMAT_FLOAT_GRAY32: "float32",
+}
+_MOTION_KINDS = {0: "none", 1: "advance", 2: "rotate", 3: "heading", 4: "arc", 5: "stop", 16: "velocity", 17: "wheels"}
+_MOTION_STATES = {0: "idle", 1: "running", 2: "done", 3: "ended", 4: "refused"}
+_MOTION_REASONS = {
+    0: "", 1: "replaced", 2: "blocked", 3: "watchdog", 4: "not finite", 5: "bad kind", 6: "bad value", 7: "no drive",
+}
+
+
+@dataclass(frozen=True)
+class Sample:
+    """utime: us of sim time."""
+
+    utime: int
+
+    @property
+    def time(self) -> float:
+        """Sim time, s."""
+        return self.utime * 1e-6
+
+
+@dataclass(frozen=True)
+class Scan(Sample):
+    """A scan of a planar laser range finder with n rays, in the device's frame."""
+
+    ranges: Floats         # (n,) m; +inf: no return, -inf: nearer than the minimum range
+    angles: Floats         # (n,) rad from the device's x axis towards y (left)
+    intensities: Floats    # (n,) 0 to 1; (0,) when the device has none
+
+    def nearest(self, from_angle: float = -math.pi, to_angle: float = math.pi) -> float:
+        """The smallest range (m) between two angles (rad); +inf when nothing is there, -inf when something
+        is nearer than the device can measure."""
+        part = self.ranges[(self.angles >= from_angle) & (self.angles <= to_angle)]
+        return float(part.min()) if part.size else math.inf
+
+
+@dataclass(frozen=True)
+class LidarScan(Sample):
+    """A scan of a laser scanner with m layers of n rays, in the device's frame."""
+
+    ranges: Floats         # (m, n) m, lowest layer first; +inf: no return, -inf: nearer than the minimum range
+    azimuths: Floats       # (n,) rad, left is positive
+    elevations: Floats     # (m,) rad, up is positive
+    intensities: Floats    # (m, n) 0 to 1, or (0, 0)
+
+
+@dataclass(frozen=True)
+class SonarReading(Sample):
+    """The last reading of each of an array's n transducers; their poses are the device's `elements`."""
+
+    ranges: Floats               # (n,) m from the transducer's face; without an echo: the maximum range
+    fired_utime: NDArray[np.int64]    # (n,) us of sim time at which each fired last; -1: not yet
+    fresh: NDArray[np.bool_]     # (n,) true where the reading is of this very message
+
+
+@dataclass(frozen=True)
+class Odometry(Sample):
+    """What the robot believes of its motion from its wheels; pose of base_link in the frame odom."""
+
+    x: float                     # m
+    y: float                     # m
+    theta: float                 # rad, not wrapped
+    v: float                     # m/s
+    omega: float                 # rad/s
+    wheel_angles: Floats         # (n,) rad since the start, positive ahead; order of Robot.wheels
+    wheel_rates: Floats          # (n,) rad/s
+    ticks: NDArray[np.int64]     # (n,) encoder counts
+    resets: int                  # how often the pose was reset
+
+
+@dataclass(frozen=True)
+class Pose(Sample):
+    """The true pose of base_link in the world; velocities are expressed in base_link."""
+
+    position: Floats         # (3,) m
+    orientation: Floats      # (4,) w, x, y, z
+    velocity: Floats         # (3,) m/s
+    rotation_rate: Floats    # (3,) rad/s
+    acceleration: Floats     # (3,) m/s^2, without gravity
+
+    @property
+    def x(self) -> float:
+        return float(self.position[0])
+
+    @property
+    def y(self) -> float:
+        return float(self.position[1])
+
+    @property
+    def heading(self) -> float:
+        """rad, counter-clockwise from the world's x axis, in (-pi, pi]."""
+        w, x, y, z = self.orientation
+        return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+@dataclass(frozen=True)
+class Image(Sample):
+    """A picture. format: "jpeg", "rgb", "bgr", "gray", "gray16" (labels: body index + 1) or "float32"
+    (depth, m along the optical axis, +inf: nothing)."""
+
+    width: int         # pixels
+    height: int        # pixels
+    format: str
+    row_stride: int    # bytes in a row, 0 for jpeg
+    data: bytes        # as they came
+
+    def array(self) -> NDArray[Any]:
+        """The pixels, rows from the top: (height, width, 3) uint8 in the order R, G, B for "jpeg", "rgb" and
+        "bgr"; (height, width) uint8, uint16 or float32 for the others. Pictures in "jpeg" need Pillow."""
+        if self.format == "jpeg":
+            try:
+                from PIL import Image as pillow    # type: ignore[import-not-found, unused-ignore]
+            except ImportError:
+                raise ImportError("the picture is a JPEG: array() needs Pillow (pip install pillow); "
+                                  "save(path) writes it without") from None
+            import io
+
+            return np.asarray(pillow.open(io.BytesIO(self.data)).convert("RGB"))
+        if self.format not in _RAW:
+            raise ValueError(f"unknown pixel format {self.format}")
+        dtype, channels = _RAW[self.format]
+        pixel_bytes = np.dtype(dtype).itemsize * channels
+        stride = self.row_stride or self.width * pixel_bytes
+        if stride < self.width * pixel_bytes or len(self.data) < stride * self.height:
+            raise ValueError(f"a {self.format} picture of {self.width} x {self.height} pixels needs more than "
+                             f"{len(self.data)} bytes in rows of {stride}")
+        rows = np.frombuffer(self.data, np.uint8, stride * self.height).reshape(self.height, stride)
+        pixels = np.ascontiguousarray(rows[:, : self.width * pixel_bytes]).view(dtype)
+        if channels == 1:
+            return pixels
+        colour = pixels.reshape(self.height, self.width, channels)
+        return colour[:, :, ::-1] if self.format == "bgr" else colour
+
+    def save(self, path: str | Path) -> None:
+        """Writes a JPEG's bytes as they are. Raw 8-bit pictures are written as PPM or PGM."""
+        content = self.data
+        if self.format in ("rgb", "bgr", "gray"):
+            head = "P5" if self.format == "gray" else "P6"
+            content = f"{head} {self.width} {self.height} 255\n".encode() + self.array().tobytes()
+        elif self.format != "jpeg":
+            raise ValueError(f"{self.format} pictures have no common file format: use array()")
+        Path(path).write_bytes(content)
+
+
+_RAW = {"gray": ("u1", 1), "rgb": ("u1", 3), "bgr": ("u1", 3), "gray16": ("<u2", 1), "float32": ("<f4", 1)}
+
+
+@dataclass(frozen=True)
+class CameraInfo(Sample):
+    """Intrinsics: a pinhole with OpenCV's distortion."""
+
+    width: int             # pixels
+    height: int            # pixels
+    fx: float              # pixels
+    fy: float              # pixels
+    cx: float              # pixels
+    cy: float              # pixels
+    distortion: Floats     # (5,) k1, k2, p1, p2, k3
+
+
+@dataclass(frozen=True)
+class Imu(Sample):
+    """An inertial measurement unit, in the device's frame."""
+
+    orientation: Floats            # (4,) w, x, y, z: device to world
+    angular_velocity: Floats       # (3,) rad/s
+    linear_acceleration: Floats    # (3,) m/s^2, specific force: at rest gravity upwards
+
+
+@dataclass(frozen=True)
+class ContactPoint:
+    body: str            # the other body
+    position: Floats     # (3,) m, world
+    normal: Floats       # (3,) unit vector, world, towards the sensor's body
+    force: float         # N
+    depth: float         # m
+
+
+@dataclass(frozen=True)
+class Contact(Sample):
+    """A bumper."""
+
+    pressed: bool
+    points: list[ContactPoint]
+
+
+@dataclass(frozen=True)
+class Joints(Sample):
+    names: list[str]
+    positions: Floats     # (n,) rad or m
+    velocities: Floats    # (n,) rad/s or m/s
+    efforts: Floats       # (n,) N m or N
+
+
+@dataclass(frozen=True)
+class MotionStatus(Sample):
+    """What a robot is executing."""
+
+    id: int             # of the primitive; 0 for velocity and wheel commands
+    kind: str           # "none", "advance", "rotate", "heading", "arc", "stop", "velocity", "wheels"
+    state: str          # "idle", "running", "done", "ended", "refused"
+    reason: str         # "", "replaced", "blocked", "watchdog", "not finite", "bad kind", "bad value", "no drive"
+    progress: float     # m or rad done
+    remaining: float    # m or rad
+    v: float            # m/s
+    omega: float        # rad/s
+
+
+def _floats(values: Any) -> Floats:
+    return np.asarray(values, np.float64)
+
+
+def _scan(m: Any) -> Scan:
+    return Scan(m.utime, _floats(m.ranges), m.rad0 + m.radstep * np.arange(m.nranges), _floats(m.intensities))
+
+
+def _lidar(m: Any) -> LidarScan:
+    if m.nranges != m.nlayers * m.ncolumns or m.nintensities not in (0, m.nranges):
+        raise ValueError("sizes that do not fit each other")
+    shape = (m.nlayers, m.ncolumns)
+    return LidarScan(
+        m.utime, _floats(m.ranges).reshape(shape), m.azimuth0 + m.azimuth_step * np.arange(m.ncolumns),
+        m.elevation0 + m.elevation_step * np.arange(m.nlayers),
+        _floats(m.intensities).reshape(shape if m.nintensities else (0, 0)))
+
+
+def _sonar(m: Any) -> SonarReading:
+    return SonarReading(m.utime, _floats(m.range), np.asarray(m.fired_utime, np.int64), np.asarray(m.fresh, np.bool_))
+
+
+def _odometry(m: Any) -> Odometry:
+    return Odometry(m.utime, m.x, m.y, m.theta, m.v, m.omega, _floats(m.angle), _floats(m.rate),
+                    np.asarray(m.ticks, np.int64), m.resets)
+
+
+def _pose(m: Any) -> Pose:
+    return Pose(m.utime, _floats(m.pos), _floats(m.orientation), _floats(m.vel), _floats(m.rotation_rate), _floats(m.accel))
+
+
+def _image(m: Any) -> Image:
+    return Image(m.utime, m.width, m.height, _PIXEL_FORMATS.get(m.pixelformat, f"0x{m.pixelformat:08x}"), m.row_stride,
+                 bytes(m.data))
+
+
+def _camera_info(m: Any) -> CameraInfo:
+    return CameraInfo(m.utime, m.width, m.height, m.fx, m.fy, m.cx, m.cy, _floats(m.distortion))
+
+
+def _imu(m: Any) -> Imu:
+    return Imu(m.utime, _floats(m.orientation), _floats(m.angular_velocity), _floats(m.linear_acceleration))
+
+
+def _contact(m: Any) -> Contact:
+    points = [ContactPoint(p.body, _floats(p.position), _floats(p.normal), p.force, p.depth) for p in m.points]
+    return Contact(m.utime, bool(m.pressed), points)
+
+
+def _joints(m: Any) -> Joints:
+    return Joints(m.utime, list(m.joint_name), _floats(m.joint_position), _floats(m.joint_velocity), _floats(m.joint_effort))
+
+
+def _motion(m: Any) -> MotionStatus:
+    return MotionStatus(m.utime, m.id, _MOTION_KINDS.get(m.kind, str(m.kind)), _MOTION_STATES.get(m.state, str(m.state)),
+                        _MOTION_REASONS.get(m.reason, str(m.reason)), m.done, m.remaining, m.v, m.omega)
+
+
+# Message type -> (generated class, conversion to a sample). A type that is not here is delivered as generated.
+CONVERSIONS: dict[str, tuple[Any, Callable[[Any], Any]]] = {
+    "planar_lidar_t": (lcmtypes.planar_lidar_t, _scan),
+    "lidar_t": (lcmtypes.lidar_t, _lidar),
+    "sonar_t": (lcmtypes.sonar_t, _sonar),
+    "odometry_t": (lcmtypes.odometry_t, _odometry),
+    "pose_t": (lcmtypes.pose_t, _pose),
+    "image_t": (lcmtypes.image_t, _image),
+    "camera_info_t": (lcmtypes.camera_info_t, _camera_info),
+    "imu_t": (lcmtypes.imu_t, _imu),
+    "contact_t": (lcmtypes.contact_t, _contact),
+    "joint_state_t": (lcmtypes.joint_state_t, _joints),
+    "motion_status_t": (lcmtypes.motion_status_t, _motion),
+}

@@ -1,0 +1,342 @@
+"""connect(), and the simulation: its robots, its time, and its control."""
+
+from __future__ import annotations
+
+import atexit
+import binascii
+import math
+import os
+import struct
+import threading
+import time
+from types import TracebackType
+from typing import Any, Callable, Sequence
+
+from . import control, lcmtypes
+from .bus import Bus, resolve_url
+from .control import Session, State
+from .errors import NoServer, RuedoError, Timeout, UnknownName
+from .motion import Driver
+from .robot import Robot
+from .world_info import WorldInfo, WorldInfoAssembler
+
+_SILENCE_SECONDS = 30.0
+
+
+def connect(url: str | None = None, *, name: str | None = None, timeout: float = 2.0) -> Simulation:
+    """Joins the simulation at an LCM URL.
+
+    url: default LCM_DEFAULT_URL, else LCM's own default group and port with ttl 0.
+    name: of this client, default "client-PID"; numbers of motion primitives derive from it.
+    timeout: s of real time to wait for a server. Raises NoServer.
+    """
+    return Simulation(resolve_url(url), name or f"client-{os.getpid()}", timeout)
+
+
+class Simulation:
+    """A running simulation. Made by connect() or launch(); safe to use from any thread.
+
+    Works as a context manager; close() (or leaving it) ends a server that launch() started.
+    """
+
+    def __init__(self, url: str, name: str, timeout: float, server_ended: Callable[[], str | None] = lambda: None,
+                 end_server: Callable[[], None] = lambda: None):
+        self.url = url
+        self._server_ended = server_ended    # why a private server is gone, None while it runs
+        self._end_server = end_server
+        self._news = threading.Condition()
+        self._assembler = WorldInfoAssembler()
+        self._known: WorldInfo | None = None
+        self._fault: RuedoError | None = None
+        self._utime = 0
+        self._last_sign = time.monotonic()
+        self._robots: dict[str, Robot] = {}
+        self._session = Session(self, name)
+        self._ids = (binascii.crc32(name.encode()) & 0x7FFFFFFF) << 20
+        self._drivers: set[Driver] = set()
+        self._wake = threading.Condition()
+        self._repeater: threading.Thread | None = None
+        self._closed = False
+        self._bus = Bus(url)
+        atexit.register(self.close)
+        try:
+            self._bus.subscribe("ruedo/info", self._on_info)
+            self._bus.subscribe("ruedo/tick", self._on_tick)
+            self._bus.subscribe("ruedo/reply", self._session.receive)
+            self._bus.start()
+            self._await_info(timeout)
+        except BaseException:
+            self.close()
+            raise
+
+    # What there is.
+
+    @property
+    def version(self) -> str:
+        """Of the server."""
+        return self._info.version
+
+    @property
+    def world(self) -> str:
+        return self._info.world
+
+    @property
+    def seed(self) -> int:
+        return self._info.seed
+
+    @property
+    def step_size(self) -> float:
+        """Length of a step, s."""
+        return self._info.step_us * 1e-6
+
+    @property
+    def time(self) -> float:
+        """Sim time of the newest message that came, s."""
+        return self._utime * 1e-6
+
+    @property
+    def paused(self) -> bool:
+        """As ruedo/info last said it."""
+        return self._info.paused
+
+    @property
+    def robots(self) -> list[Robot]:
+        """All robots, in the order of the world file."""
+        return [self.robot(name) for name in self._info.robots]
+
+    def robot(self, name: str) -> Robot:
+        """The robot of that name; UnknownName lists those that exist."""
+        self._robot_info(name)
+        with self._news:
+            return self._robots.setdefault(name, Robot(self, name))
+
+    def sleep(self, seconds: float) -> None:
+        """Waits until so much sim time has passed."""
+        until = self._utime + round(seconds * 1e6)
+        with self._news:
+            while self._utime < until:
+                self._news.wait(0.5)
+                self._check_server()
+
+    # Control. Every call raises NotSupported where the server has no such request, RequestError when it refuses.
+
+    def pause(self) -> None:
+        """Stops sim time after the current step."""
+        self._session.request(lcmtypes.request_t.PAUSE)
+
+    def resume(self) -> None:
+        self._session.request(lcmtypes.request_t.RESUME)
+
+    def step(self, n: int = 1, timeout: float = 60.0) -> State:
+        """Takes n steps of a paused simulation and returns the state after them. timeout: s of real time."""
+        body = lcmtypes.step_request_t()
+        body.steps = n
+        return control.state_of(self._session.request(lcmtypes.request_t.STEP, body, timeout))
+
+    def set_rate(self, rate: float) -> None:
+        """Sim time per real time, > 0; math.inf: as fast as it goes."""
+        body = lcmtypes.rate_request_t()
+        body.rate = rate
+        self._session.request(lcmtypes.request_t.RATE, body)
+
+    def reset(self, what: str = "all", seed: int | None = None) -> None:
+        """Starts anew. what: "all" (equals a fresh run), "time" (sim time alone) or "poses" (everything back to where
+        it started). seed: of what follows, None: the same again."""
+        body = lcmtypes.reset_request_t()
+        kinds = {"all": body.ALL, "time": body.TIME, "poses": body.POSES}
+        if what not in kinds:
+            raise ValueError(f"what is {what!r}: it must be one of {', '.join(map(repr, kinds))}")
+        body.what, body.seed = kinds[what], -1 if seed is None else seed
+        self._session.request(lcmtypes.request_t.RESET, body, 60.0)
+        self._utime = 0
+
+    def spawn(self, model: str = "", x: float = 0.0, y: float = 0.0, heading: float = 0.0, *, name: str = "", text: str = "",
+              z: float | None = None) -> None:
+        """Adds a model: one of Ruedo's ("p3at"), a file in the server's search folders, or SDF or URDF sent along
+        as text. It stands on the ground below x, y (m), or at z (m) where that is given; heading in rad. The server
+        refuses to put it into something."""
+        body = lcmtypes.spawn_request_t()
+        body.name, body.model, body.text, body.on_ground = name, model, text, z is None
+        body.position, body.orientation = [x, y, z or 0.0], _about_z(heading)
+        self._session.request(lcmtypes.request_t.SPAWN, body, 60.0)
+        self._refresh_info()
+
+    def remove(self, name: str) -> None:
+        """Takes a model away."""
+        self._session.request(lcmtypes.request_t.REMOVE, _name_body(name))
+        self._refresh_info()
+
+    def set_pose(self, name: str, x: float, y: float, heading: float = 0.0, z: float = 0.0,
+                 orientation: Sequence[float] | None = None) -> None:
+        """Puts a model at x, y, z (m), at rest. orientation: w, x, y, z instead of the heading (rad)."""
+        body = lcmtypes.set_pose_request_t()
+        body.name, body.position = name, [x, y, z]
+        body.orientation = list(orientation) if orientation is not None else _about_z(heading)
+        self._session.request(lcmtypes.request_t.SET_POSE, body)
+
+    def set_twist(self, name: str, linear: Sequence[float], angular: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
+        """Gives a model a velocity (m/s) and a turn rate (rad/s), in the world."""
+        body = lcmtypes.set_twist_request_t()
+        body.name, body.linear, body.angular = name, list(linear), list(angular)
+        self._session.request(lcmtypes.request_t.SET_TWIST, body)
+
+    def state(self, name: str = "") -> State:
+        """Time, step and state hash, and pose and twist of a model or MODEL/LINK when one is named."""
+        return control.state_of(self._session.request(lcmtypes.request_t.GET_STATE, _name_body(name)))
+
+    def reset_odometry(self, robot: str) -> None:
+        """Sets a robot's odometry to zero where it stands."""
+        self._session.request(lcmtypes.request_t.RESET_ODOMETRY, _name_body(robot))
+
+    def quit(self) -> None:
+        """Ends the server."""
+        self._session.request(lcmtypes.request_t.QUIT)
+
+    def close(self) -> None:
+        """Leaves the simulation: repeated commands end, and so does a server that launch() started."""
+        if self._closed:
+            return
+        with self._wake:
+            self._closed = True
+            self._wake.notify_all()
+        if self._known:
+            self._session.leave()
+        self._bus.close()
+        self._end_server()
+        atexit.unregister(self.close)
+
+    def __enter__(self) -> Simulation:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<Simulation {self.world} at {self.url}: {', '.join(self._info.robots)}>"
+
+    # For the package's other files.
+
+    @property
+    def _info(self) -> WorldInfo:
+        assert self._known is not None
+        return self._known
+
+    def _robot_info(self, name: str) -> Any:
+        robots = self._info.robots
+        if name not in robots:
+            raise UnknownName(f"there is no robot {name!r}; there is {', '.join(robots) or 'none'}")
+        return robots[name]
+
+    def _next_id(self) -> int:
+        with self._news:
+            self._ids += 1
+            return self._ids
+
+    def _check_server(self) -> None:
+        """Raises NoServer when the private server ended, or nothing was heard for long."""
+        if self._closed:
+            raise NoServer("this simulation was closed")
+        ended = self._server_ended()
+        if ended:
+            raise NoServer(ended)
+        if time.monotonic() - self._last_sign > _SILENCE_SECONDS:
+            raise NoServer(f"nothing was heard from the server at {self.url} for {_SILENCE_SECONDS:g} s")
+
+    def _what_is_known(self, rate: float) -> str:
+        silence = time.monotonic() - self._last_sign
+        if silence > 3.0:
+            return f"nothing at all was heard from the server for {silence:.1f} s"
+        if self._info.paused:
+            return "the simulation is paused"
+        return f"its rate is {rate:g} Hz of sim time, which is now {self.time:.2f} s" if rate else "it sends when something happens"
+
+    def _note_time(self, utime: int) -> None:
+        with self._news:
+            self._utime = max(self._utime, utime)
+            self._last_sign = time.monotonic()
+            self._news.notify_all()
+
+    def _keep_repeating(self, driver: Driver) -> None:
+        with self._wake:
+            self._drivers.add(driver)
+            if self._repeater is None:
+                self._repeater = threading.Thread(target=self._repeat, name="ruedo-repeat", daemon=True)
+                self._repeater.start()
+            self._wake.notify_all()
+
+    def _repeat(self) -> None:
+        """Feeds the watchdogs in real time."""
+        period = 0.1
+        while True:
+            with self._wake:
+                if not self._closed:
+                    self._wake.wait(period)
+                if self._closed:
+                    return
+                drivers = tuple(self._drivers)
+            for driver in drivers:
+                driver.repeat()
+            period = min(driver.period() for driver in drivers)
+
+    # The receiving thread.
+
+    def _on_info(self, data: bytes) -> None:
+        try:
+            info = self._assembler.add(data)
+        except RuedoError as error:
+            with self._news:
+                self._fault = error
+                self._news.notify_all()
+            return
+        with self._news:
+            self._last_sign = time.monotonic()
+            if info:
+                if self._known and (info.run_id, info.epoch) != (self._known.run_id, self._known.epoch):
+                    self._utime = 0
+                self._known = info
+            self._news.notify_all()
+
+    def _on_tick(self, data: bytes) -> None:
+        if len(data) < 16 or data[:8] != lcmtypes.tick_t._get_packed_fingerprint():
+            return
+        self._note_time(struct.unpack_from(">q", data, 8)[0])
+        # Sim time may run a hundred times faster than real time: the watchdog is fed by its beat, too.
+        for driver in tuple(self._drivers):
+            driver.repeat()
+
+    def _await_info(self, timeout: float) -> None:
+        deadline = time.monotonic() + timeout
+        with self._news:
+            while self._known is None:
+                if self._fault:
+                    raise self._fault
+                ended = self._server_ended()
+                if ended:
+                    raise NoServer(ended)
+                if time.monotonic() >= deadline:
+                    raise NoServer(f"no Ruedo server answered at {self.url} within {timeout:g} s. Is `ruedo run` started, "
+                                   "with the same --lcm or LCM_DEFAULT_URL? `ruedo doctor` looks for what is wrong")
+                self._ask_info()
+                self._news.wait(0.1)
+
+    def _ask_info(self) -> None:
+        request = lcmtypes.request_t()
+        request.epoch, request.kind = -1, lcmtypes.request_t.INFO
+        self._bus.publish("ruedo/request", request.encode())
+
+    def _refresh_info(self) -> None:
+        before, deadline = self._known, time.monotonic() + 2.0
+        with self._news:
+            while self._known is before and time.monotonic() < deadline:
+                self._ask_info()
+                self._news.wait(0.1)
+
+
+def _name_body(name: str) -> Any:
+    body = lcmtypes.name_request_t()
+    body.name = name
+    return body
+
+
+def _about_z(heading: float) -> list[float]:
+    return [math.cos(heading / 2.0), 0.0, 0.0, math.sin(heading / 2.0)]

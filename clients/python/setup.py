@@ -1,0 +1,32 @@
+"""Adds the message types, generated from ../../proto, to what is built. The rest is in pyproject.toml."""
+
+import sys
+from pathlib import Path
+
+from setuptools import setup
+from setuptools.command.build_py import build_py
+from setuptools.command.sdist import sdist
+
+HERE = Path(__file__).resolve().parent
+PROTO = HERE.parent.parent / "proto"
+sys.path.insert(0, str(HERE))
+
+from generate_types import generate  # noqa: E402
+
+
+class BuildWithTypes(build_py):
+    def run(self):
+        super().run()
+        if PROTO.is_dir():    # else: built from an sdist, which brings the types along
+            generate(PROTO, HERE if getattr(self, "editable_mode", False) else Path(self.build_lib))
+
+
+class SdistWithTypes(sdist):
+    def run(self):
+        generate(PROTO, HERE)
+        super().run()
+
+
+# With proto/ at hand the build makes the types; from an sdist they are a package like any other.
+packages = ["ruedo"] if PROTO.is_dir() else ["ruedo", "ruedo.lcmtypes"]
+setup(packages=packages, cmdclass={"build_py": BuildWithTypes, "sdist": SdistWithTypes})
