@@ -1,0 +1,117 @@
+// An inertial measurement unit: gyroscope and accelerometer with noise, bias and wandering bias as SDF's <imu>
+// writes them, on ROBOT/IMU.
+//
+// Ideal values, in the device's frame S at p = p_BS in the body B: the gyroscope shows omega; the accelerometer
+// the specific force a_S - g, with a_S = a_B + alpha x p + omega x (omega x p). a_B comes from the snapshot; alpha is
+// the change of omega over the last step. At rest it shows gravity upwards, on a ramp along the ramp's axes.
+#include "model/body_layout.h"
+#include "ruedo/imu_t.hpp"
+#include "ruedo/sensor.h"
+#include "sensors/noise.h"
+
+namespace ruedo {
+namespace {
+
+class Imu : public Sensor {
+ public:
+  explicit Imu(const SensorSetup& setup)
+      : random_(setup.random), gravity_(setup.world.gravity), channel_(setup.channel<imu_t>()) {
+    const model::LinkPlacement& link = setup.layout.links[static_cast<size_t>(setup.link)];
+    body_ = link.body;
+    X_BS_ = link.X_BL * setup.X_LS;
+    setup.element.refuse_unknown({});
+    if (const Element* imu = setup.element.child("imu")) configure(*imu, setup);
+  }
+
+  // For alpha.
+  bool observes() const override { return body_ >= 0; }
+
+  void observe(const Snapshot& now, Outbox&) override {
+    const Vec3& omega = now.body_twists[static_cast<size_t>(body_)].angular;
+    if (time_ >= 0) alpha_ = (omega - omega_before_) / (1e-6 * static_cast<double>(now.time - time_));
+    omega_before_ = omega;
+    time_ = now.time;
+  }
+
+  void sample(const SampleInput& input, Outbox& out) override {
+    const Snapshot& now = input.snapshot;
+    Pose X_WS = X_BS_;
+    Vec3 omega = Vec3::Zero(), acceleration = Vec3::Zero();    // of S, in the world's axes
+    if (body_ >= 0) {
+      const size_t body = static_cast<size_t>(body_);
+      const Pose& X_WB = now.bodies[body];
+      X_WS = X_WB * X_BS_;
+      const Vec3 arm = X_WB.rotation * X_BS_.translation;
+      omega = now.body_twists[body].angular;
+      acceleration = now.body_accelerations[body] + alpha_.cross(arm) + omega.cross(omega.cross(arm));
+    }
+    const Quat R_SW = X_WS.rotation.conjugate();
+    const Vec3 rate = R_SW * omega;
+    const Vec3 force = R_SW * (acceleration - gravity_);
+
+    const double dt_s = sampled_ ? 1e-6 * static_cast<double>(now.time - sample_time_) : 0.0;
+    sampled_ = true;
+    sample_time_ = now.time;
+    RandomStream stream = random_.stream(static_cast<uint64_t>(input.sample));
+    imu_t message;
+    message.utime = now.time;
+    for (int i = 0; i < 3; ++i) message.angular_velocity[i] = gyroscope_[i].apply(rate[i], dt_s, stream);
+    for (int i = 0; i < 3; ++i) message.linear_acceleration[i] = accelerometer_[i].apply(force[i], dt_s, stream);
+    const Quat& q = X_WS.rotation;
+    const double orientation[4] = {q.w(), q.x(), q.y(), q.z()};
+    for (int i = 0; i < 4; ++i) message.orientation[i] = has_orientation_ ? orientation[i] : 0.0;
+    out.publish(channel_, message);
+  }
+
+ private:
+  void configure(const Element& imu, const SensorSetup& setup) {
+    has_orientation_ = imu.boolean("enable_orientation", true);
+    if (const Element* frame = imu.child("orientation_reference_frame")) {
+      if (setup.findings && frame->string("localization", "CUSTOM") != "ENU") {
+        setup.findings->unsupported(frame->source, "sensor " + setup.device + "/imu/orientation_reference_frame",
+                                    "the orientation is that of the device in the world (east, north, up)");
+      }
+    }
+    constexpr const char* kAxes[3] = {"x", "y", "z"};
+    for (int i = 0; i < 3; ++i) {
+      gyroscope_[i] = Noise(imu.child(std::string("angular_velocity/") + kAxes[i] + "/noise"));
+      accelerometer_[i] = Noise(imu.child(std::string("linear_acceleration/") + kAxes[i] + "/noise"));
+    }
+    // SDF up to 1.4: one <noise> with <rate> and <accel> for all axes.
+    if (const Element* old = imu.child("noise")) {
+      const std::string type = old->choice("type", "none", {"none", "gaussian"});
+      for (int i = 0; i < 3 && type == "gaussian"; ++i) {
+        if (const Element* rate = old->child("rate")) gyroscope_[i] = Noise::from_parameters(*rate, false);
+        if (const Element* accel = old->child("accel")) accelerometer_[i] = Noise::from_parameters(*accel, false);
+      }
+    }
+    RandomStream constants = random_.stream(kConstantDraws);
+    for (Noise* noise : {&gyroscope_[0], &gyroscope_[1], &gyroscope_[2], &accelerometer_[0], &accelerometer_[1], &accelerometer_[2]}) {
+      if (!setup.noise) *noise = Noise();
+      noise->draw_bias(constants);
+    }
+  }
+
+  RandomSource random_;
+  Vec3 gravity_;
+  int channel_;
+  int body_ = -1;          // into BodyLayout::bodies; -1: does not move
+  Pose X_BS_;              // X_WS when it does not move
+  bool has_orientation_ = true;
+  Noise gyroscope_[3], accelerometer_[3];
+
+  SimTime time_ = -1, sample_time_ = 0;
+  bool sampled_ = false;
+  Vec3 omega_before_ = Vec3::Zero(), alpha_ = Vec3::Zero();    // rad/s, rad/s^2, world
+};
+
+const RegisterSensor kRegister{{.module = "imu",
+                                .order = 5,
+                                .types = {"imu"},
+                                .attach_to = "",
+                                .device_name = "",
+                                .default_rate = {100, 1},
+                                .make = [](const SensorSetup& setup) { return std::make_unique<Imu>(setup); }}};
+
+}  // namespace
+}  // namespace ruedo

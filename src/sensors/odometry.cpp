@@ -1,0 +1,261 @@
+// Odometry: the pose that a robot computes from its wheel encoders, on ROBOT/odometry. What encoders see, and
+// what the robot makes of it, with the errors of both: ticks, wrap-around, slip, wrong radius, wrong track.
+//
+// The wheels are read at every step. With s_l and s_r the way of the left and right wheels in a step (the mean of
+// a side's wheels, times the radius that the robot believes in), d = (s_l + s_r) / 2 and
+// turn = (s_r - s_l) / track:
+// - arc: the robot moved on the circle through both, d sin(turn/2) / (turn/2) along heading theta + turn/2. Exact
+//   while v/omega is constant in a step: straight, on the spot, on a circle, ramps of them included. Where v and
+//   omega ramp independently, at a and alpha, a step leaves (v alpha - a omega) dt^3 / 12 to the side: 2e-9 m for
+//   0.3 m/s^2 at 0.5 rad/s and 5 ms.
+// - trapezoid: eqs. 4 to 8 of Hernandez-Belmonte et al., ROSSUM 2011, with omega from the difference of the wheel
+//   rates (the printed eq. 4 has their sum): speeds at both ends of the step, averaged. It leaves
+//   v omega^2 dt^3 / 12 a step, 5e-10 m at 0.2 m/s, 0.5 rad/s and 5 ms.
+#include <cmath>
+
+#include "model/body_layout.h"
+#include "ruedo/odometry_t.hpp"
+#include "ruedo/sensor.h"
+
+namespace ruedo {
+namespace {
+
+struct Configuration {
+  bool trapezoid = false;
+  int64_t ticks_per_turn = 0;           // 0: ideal
+  int counter_bits = 0;                 // 0: 64
+  double radius_error[2] = {0.0, 0.0};  // left, right; relative
+  double track_error = 0.0;             // relative
+  double slip_noise = 0.0;              // sqrt(m)
+
+  explicit Configuration(const Element& element) {
+    element.refuse_unknown({"ruedo:rate", "ruedo:integrator", "ruedo:ticks_per_turn", "ruedo:counter_bits",
+                            "ruedo:radius_error", "ruedo:track_error", "ruedo:slip_noise"});
+    trapezoid = element.choice("ruedo:integrator", "arc", {"arc", "trapezoid"}) == "trapezoid";
+    ticks_per_turn = element.integer("ruedo:ticks_per_turn", 0, Allowed::between(0, 1e9));
+    counter_bits = static_cast<int>(element.integer("ruedo:counter_bits", 0, Allowed::between(0, 62)));
+    if (counter_bits > 0 && ticks_per_turn == 0) {
+      element.child("ruedo:counter_bits")->fail("needs <ruedo:ticks_per_turn>: ideal encoders do not wrap");
+    }
+    if (const Element* errors = element.child("ruedo:radius_error")) {
+      const std::vector<double> values = errors->as_numbers();
+      if (values.size() != 2 || values[0] <= -1.0 || values[1] <= -1.0) {
+        errors->fail("'" + errors->text + "' is not allowed; allowed are two numbers above -1, for left and right");
+      }
+      radius_error[0] = values[0];
+      radius_error[1] = values[1];
+    }
+    track_error = element.number("ruedo:track_error", 0.0, {-1.0, std::numeric_limits<double>::infinity(), true});
+    slip_noise = element.number("ruedo:slip_noise", 0.0, Allowed::not_negative());
+  }
+};
+
+// sin(x) / x
+double sinc(double x) {
+  const double x2 = x * x;
+  return x2 < 1e-4 ? 1.0 - x2 / 6.0 * (1.0 - x2 / 20.0) : std::sin(x) / x;
+}
+
+class Odometry : public Sensor {
+ public:
+  explicit Odometry(const SensorSetup& setup)
+      : configuration_(setup.element), random_(setup.random), robot_(setup.robot_index), channel_(setup.channel<odometry_t>()) {
+    const model::RobotPlacement& robot = setup.layout.robots[static_cast<size_t>(robot_)];
+    const model::DriveDescription& drive = *setup.world.models[static_cast<size_t>(robot.instance)].model->drive;
+    if (!setup.noise) configuration_.slip_noise = 0.0;
+    radius_ = drive.wheel_radius;
+    track_ = drive.track * (1.0 + configuration_.track_error);
+    for (const int wheel : robot.wheels) {
+      const int side = setup.layout.wheels[static_cast<size_t>(wheel)].left ? 0 : 1;
+      wheels_.push_back({wheel, side});
+      ++wheels_of_side_[side];
+    }
+    message_.n = static_cast<int32_t>(wheels_.size());
+    message_.angle.resize(wheels_.size());
+    message_.rate.resize(wheels_.size());
+    message_.ticks.resize(wheels_.size());
+  }
+
+  bool observes() const override { return true; }
+
+  void observe(const Snapshot& now, Outbox&) override {
+    const RobotState& robot = now.robots[static_cast<size_t>(robot_)];
+    if (time_ < 0) {
+      for (Wheel& wheel : wheels_) start(wheel, now);
+      side_rates(speed_before_);
+    } else {
+      const double dt_s = 1e-6 * static_cast<double>(now.time - time_);
+      turn_wheels(now, dt_s);
+      configuration_.trapezoid ? integrate_trapezoid(dt_s) : integrate_arc();
+    }
+    time_ = now.time;
+    if (robot.odometry_resets != resets_) {
+      resets_ = robot.odometry_resets;
+      x_ = y_ = theta_ = 0.0;
+    }
+  }
+
+  void sample(const SampleInput& input, Outbox& out) override {
+    const double period_s = 1e-6 * static_cast<double>(input.snapshot.time - sample_time_);
+    double speed[2] = {0.0, 0.0};
+    for (size_t i = 0; i < wheels_.size(); ++i) {
+      Wheel& wheel = wheels_[i];
+      // Within a step ticks and slip say little of the rate: it is the mean since the last sample.
+      double rate = wheel.rate;
+      if (configuration_.ticks_per_turn > 0 || configuration_.slip_noise > 0.0) rate = period_s > 0.0 ? (wheel.measured - wheel.sampled) / period_s : 0.0;
+      wheel.sampled = wheel.measured;
+      message_.angle[i] = wheel.measured;
+      message_.rate[i] = rate;
+      message_.ticks[i] = wheel.counter;
+      speed[wheel.side] += rate * believed_radius(wheel.side);
+    }
+    for (int side : {0, 1}) speed[side] /= std::max(1, wheels_of_side_[side]);
+    sample_time_ = input.snapshot.time;
+    message_.utime = input.snapshot.time;
+    message_.x = x_;
+    message_.y = y_;
+    message_.theta = theta_;
+    message_.v = 0.5 * (speed[0] + speed[1]);
+    message_.omega = (speed[1] - speed[0]) / track_;
+    message_.resets = resets_;
+    out.publish(channel_, message_);
+  }
+
+ private:
+  struct Wheel {
+    int index;                  // into Snapshot::wheel_angles
+    int side;                   // 0 left, 1 right
+    double true_angle = 0.0;    // rad
+    double slipped = 0.0;       // rad, what slip has added to the encoder's angle so far
+    int64_t counter = 0;        // as the encoder shows it, wrapped
+    int64_t ticks = 0;          // as the robot unwraps it
+    double measured = 0.0;      // rad since the start
+    double rate = 0.0;          // rad/s
+    double turned = 0.0;        // rad, measured in the last step
+    double sampled = 0.0;       // rad, at the last sample
+  };
+
+  double believed_radius(int side) const { return radius_ * (1.0 + configuration_.radius_error[side]); }
+
+  void start(Wheel& wheel, const Snapshot& now) const {
+    wheel.true_angle = now.wheel_angles[static_cast<size_t>(wheel.index)];
+    wheel.rate = now.wheel_rates[static_cast<size_t>(wheel.index)];
+    if (configuration_.ticks_per_turn > 0) {
+      wheel.counter = wrapped(count(wheel.true_angle));
+      wheel.ticks = wheel.counter;
+      wheel.measured = wheel.sampled = angle_of(wheel.ticks);
+    } else {
+      wheel.measured = wheel.sampled = wheel.true_angle;
+    }
+  }
+
+  int64_t count(double angle) const {
+    return static_cast<int64_t>(std::floor(angle * static_cast<double>(configuration_.ticks_per_turn) / (2.0 * M_PI)));
+  }
+  double angle_of(int64_t ticks) const {
+    return static_cast<double>(ticks) * (2.0 * M_PI) / static_cast<double>(configuration_.ticks_per_turn);
+  }
+  int64_t wrapped(int64_t ticks) const {
+    return configuration_.counter_bits == 0 ? ticks : ticks & ((int64_t{1} << configuration_.counter_bits) - 1);
+  }
+  // What the robot takes the difference of two counter values for: the smaller way round.
+  int64_t unwrapped(int64_t difference) const {
+    if (configuration_.counter_bits == 0) return difference;
+    const int64_t range = int64_t{1} << configuration_.counter_bits;
+    const int64_t positive = difference & (range - 1);
+    return positive >= range / 2 ? positive - range : positive;
+  }
+
+  // Reads the encoders: turned, measured, rate of every wheel.
+  void turn_wheels(const Snapshot& now, double dt_s) {
+    double way[2] = {0.0, 0.0};    // m, of each side, true
+    for (Wheel& wheel : wheels_) {
+      const double angle = now.wheel_angles[static_cast<size_t>(wheel.index)];
+      wheel.turned = angle - wheel.true_angle;
+      wheel.true_angle = angle;
+      wheel.rate = now.wheel_rates[static_cast<size_t>(wheel.index)];
+      way[wheel.side] += radius_ * wheel.turned / wheels_of_side_[wheel.side];
+    }
+    if (configuration_.slip_noise > 0.0 && (way[0] != 0.0 || way[1] != 0.0)) {
+      RandomStream stream = random_.stream(static_cast<uint64_t>(now.step));
+      double slip[2];
+      for (const int side : {0, 1}) slip[side] = configuration_.slip_noise * std::sqrt(std::abs(way[side])) * stream.gaussian() / radius_;
+      for (Wheel& wheel : wheels_) {
+        wheel.slipped += slip[wheel.side];
+        wheel.turned += slip[wheel.side];
+        wheel.rate += slip[wheel.side] / dt_s;
+      }
+    }
+    for (Wheel& wheel : wheels_) {
+      if (configuration_.ticks_per_turn > 0) {
+        const int64_t counter = wrapped(count(wheel.true_angle + wheel.slipped));
+        const int64_t passed = unwrapped(counter - wheel.counter);
+        wheel.counter = counter;
+        wheel.ticks += passed;
+        wheel.measured = angle_of(wheel.ticks);
+        wheel.turned = angle_of(passed);
+        wheel.rate = wheel.turned / dt_s;
+      } else {
+        wheel.measured = wheel.true_angle + wheel.slipped;
+      }
+    }
+  }
+
+  void integrate_arc() {
+    double way[2] = {0.0, 0.0};
+    for (const Wheel& wheel : wheels_) way[wheel.side] += believed_radius(wheel.side) * wheel.turned / wheels_of_side_[wheel.side];
+    if (way[0] == 0.0 && way[1] == 0.0) return;
+    const double turn = (way[1] - way[0]) / track_;
+    const double chord = 0.5 * (way[0] + way[1]) * sinc(0.5 * turn);
+    const double along = theta_ + 0.5 * turn;
+    x_ += chord * std::cos(along);
+    y_ += chord * std::sin(along);
+    theta_ += turn;
+  }
+
+  void side_rates(double (&speed)[2]) const {
+    speed[0] = speed[1] = 0.0;
+    for (const Wheel& wheel : wheels_) speed[wheel.side] += believed_radius(wheel.side) * wheel.rate / wheels_of_side_[wheel.side];
+  }
+
+  void integrate_trapezoid(double dt_s) {
+    double speed[2];
+    side_rates(speed);
+    const double v_before = 0.5 * (speed_before_[0] + speed_before_[1]);          // eq. 5
+    const double v = 0.5 * (speed[0] + speed[1]);
+    const double omega_before = (speed_before_[1] - speed_before_[0]) / track_;   // eq. 4, with the sign of eq. 3
+    const double omega = (speed[1] - speed[0]) / track_;
+    const double theta_before = theta_;
+    theta_ += dt_s * 0.5 * (omega + omega_before);                                                  // eq. 8
+    x_ += dt_s * 0.5 * (v * std::cos(theta_) + v_before * std::cos(theta_before));                  // eq. 6
+    y_ += dt_s * 0.5 * (v * std::sin(theta_) + v_before * std::sin(theta_before));                  // eq. 7
+    speed_before_[0] = speed[0];
+    speed_before_[1] = speed[1];
+  }
+
+  Configuration configuration_;
+  RandomSource random_;
+  int robot_;
+  int channel_;
+  double radius_ = 0.0, track_ = 0.0;    // m; the track is the one that the robot believes in
+  std::vector<Wheel> wheels_;
+  int wheels_of_side_[2] = {0, 0};
+
+  SimTime time_ = -1, sample_time_ = 0;
+  double x_ = 0.0, y_ = 0.0, theta_ = 0.0;    // m, m, rad: base_link in odom
+  double speed_before_[2] = {0.0, 0.0};       // m/s, left and right at the step before
+  int32_t resets_ = 0;
+  odometry_t message_;
+};
+
+const RegisterSensor kRegister{{.module = "odometry",
+                                .order = 1,
+                                .types = {},
+                                .attach_to = "drive",
+                                .device_name = "odometry",
+                                .default_rate = {50, 1},
+                                .make = [](const SensorSetup& setup) { return std::make_unique<Odometry>(setup); },
+                                .drive_rate = [](const model::DriveDescription& drive) { return drive.odometry_rate; }}};
+
+}  // namespace
+}  // namespace ruedo
