@@ -1,0 +1,164 @@
+# Shared by scripts/run and scripts/test: packages, virtual environment, build, multicast route.
+# Sourced, never run. Every step looks first and does something only when something is missing, so that a second
+# start needs no network and no rights.
+# shellcheck shell=bash disable=SC2034  # the constants are for the scripts that source this
+
+ruedo_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+ruedo_venv=$ruedo_root/.venv
+ruedo_build=$ruedo_root/build/release
+
+readonly EXIT_BUILD=1 EXIT_ENVIRONMENT=4
+
+# Packages: "a|b" is the first of them that this distribution has; "?a" is left out where it has none.
+readonly BUILD_PACKAGES=(
+  g++ cmake ninja-build pkg-config ccache python3-venv default-jdk-headless ca-certificates
+  libbullet-dev libtinyxml2-dev liburdfdom-dev libassimp-dev libembree-dev libtbb-dev libeigen3-dev
+  "libosmesa6-dev|libegl-dev" "libgl-dev" "?libegl-mesa0"
+  libopencv-core-dev libopencv-imgcodecs-dev libopencv-imgproc-dev
+  libcli11-dev libspdlog-dev libfmt-dev "libglib2.0-0t64|libglib2.0-0"
+)
+# libsdformat is the oracle of the world reader's tests; Debian has it up to 12.
+readonly TEST_PACKAGES=(
+  libgtest-dev libgmock-dev libbenchmark-dev libopencv-contrib-dev junit4 iproute2 "?libsdformat-dev"
+)
+
+say() { printf '%s: %s\n' "${0##*/}" "$*" >&2; }
+
+fail() {    # CODE MESSAGE...
+  local code=$1
+  shift
+  say "$*"
+  exit "$code"
+}
+
+is_installed() { [[ $(dpkg-query -W -f='${db:Status-Status}' "$1" 2>/dev/null) == installed ]]; }
+
+is_known_to_apt() { apt-cache show --no-all-versions "$1" >/dev/null 2>&1; }
+
+# Prints those of the given package specifications that have to be installed, as names for apt.
+missing_packages() {
+  local spec name alternatives
+  for spec in "$@"; do
+    IFS='|' read -ra alternatives <<<"${spec#\?}"
+    for name in "${alternatives[@]}"; do
+      is_installed "$name" && continue 2
+    done
+    for name in "${alternatives[@]}"; do
+      if is_known_to_apt "$name"; then
+        printf '%s\n' "$name"
+        continue 2
+      fi
+    done
+    # Unknown to apt (or apt's lists are not there yet): the last alternative stands for all, an optional one for none.
+    [[ $spec == \?* ]] || printf '%s\n' "${alternatives[-1]}"
+  done
+}
+
+# Installs what is missing of the given packages: one call of apt, only when there is something to install.
+ensure_packages() {
+  if ! command -v apt-get >/dev/null; then
+    say "no apt-get here: install what docs/getting-started.md lists, by your system's means"
+    return
+  fi
+  local missing
+  mapfile -t missing < <(missing_packages "$@")
+  ((${#missing[@]})) || return 0
+  local as_root=()
+  if ((EUID != 0)); then
+    if command -v sudo >/dev/null && { sudo -n true 2>/dev/null || { [[ -t 0 ]] && sudo -v; }; }; then
+      as_root=(sudo)
+    else
+      say "packages are missing, and there is neither root nor sudo. Ask for this line to be run:"
+      printf '    apt-get install --no-install-recommends -y %s\n' "${missing[*]}"
+      exit "$EXIT_ENVIRONMENT"
+    fi
+  fi
+  say "updating the package lists"
+  "${as_root[@]}" apt-get update -q >/dev/null || say "the package lists could not be updated; going on with the old ones"
+  mapfile -t missing < <(missing_packages "$@")
+  say "installing ${#missing[@]} packages: ${missing[*]}"
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install --no-install-recommends -y -q "${missing[@]}" >/dev/null ||
+    fail "$EXIT_ENVIRONMENT" "apt-get could not install the packages; the lines above say why"
+}
+
+# .venv with what requirements.txt asks for.
+ensure_venv() {
+  local wanted="$ruedo_root/scripts/requirements.txt" stamp="$ruedo_venv/ruedo-requirements.txt"
+  if cmp -s "$wanted" "$stamp" && "$ruedo_venv/bin/python" -c 'import lcm, numpy, pytest' 2>/dev/null; then
+    return
+  fi
+  if ! "$ruedo_venv/bin/python" -m pip --version >/dev/null 2>&1; then
+    say "making the virtual environment .venv"
+    python3 -m venv --clear "$ruedo_venv" || fail "$EXIT_ENVIRONMENT" "python3 -m venv failed (package python3-venv)"
+  fi
+  say "installing LCM and what the Python client needs into .venv"
+  "$ruedo_venv/bin/python" -m pip install --quiet --disable-pip-version-check -r "$wanted" ||
+    fail "$EXIT_ENVIRONMENT" "pip could not install scripts/requirements.txt; the lines above say why"
+  cp "$wanted" "$stamp"
+}
+
+# Compilers side by side: one for each core, and no more than one for each 1.5 GB of memory.
+build_jobs() {
+  local cores memory_mb
+  cores=$(nproc)
+  memory_mb=$(awk '/MemAvailable/ {print int($2 / 1024)}' /proc/meminfo)
+  local by_memory=$((memory_mb / 1500))
+  ((by_memory >= 1)) || by_memory=1
+  echo $((cores < by_memory ? cores : by_memory))
+}
+
+# build PRESET [CMAKE-OPTION...] [-- TARGET...]: configures when needed, then builds the targets (all, without any).
+build() {
+  local preset=$1 folder=$ruedo_root/build/$1 options=()
+  shift
+  while (($#)) && [[ $1 != -- ]]; do
+    options+=("$1")
+    shift
+  done
+  (($#)) && shift
+  if command -v ccache >/dev/null; then
+    options+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_C_COMPILER_LAUNCHER=ccache)
+  fi
+  local log=$folder/configure.log option
+  local configured=true
+  [[ -f $folder/build.ninja ]] || configured=false
+  for option in "${options[@]}"; do    # -DNAME=VALUE against the cache's NAME:TYPE=VALUE
+    local name=${option#-D}
+    grep -qs "^${name%%=*}:[A-Z]*=${option#*=}\$" "$folder/CMakeCache.txt" || configured=false
+  done
+  if ! $configured; then
+    mkdir -p "$folder"
+    say "configuring build/$preset"
+    (cd "$ruedo_root" && cmake --preset "$preset" "${options[@]}") >"$log" 2>&1 || {
+      cat "$log" >&2
+      fail "$EXIT_BUILD" "CMake failed; its output is above"
+    }
+  fi
+  local ninja=(ninja -C "$folder" -j "$(build_jobs)")
+  if [[ $("${ninja[@]}" -n "$@" 2>/dev/null) == *"no work to do"* ]]; then
+    return
+  fi
+  say "building build/$preset (the first time takes some minutes)"
+  if [[ -t 2 ]]; then
+    "${ninja[@]}" "$@" >&2
+  else
+    "${ninja[@]}" --quiet "$@" >&2
+  fi || fail "$EXIT_BUILD" "the build failed; the lines above say where"
+}
+
+# LCM's default multicast group has to be routed somewhere: most machines route it with everything else.
+has_multicast_route() {
+  "$ruedo_venv/bin/python" -c '
+import socket
+socket.socket(socket.AF_INET, socket.SOCK_DGRAM).connect(("239.255.76.67", 7667))' 2>/dev/null
+}
+
+# Gives LCM a route over the loopback interface where there is none and it may; says so. False when it may not.
+ensure_multicast_route() {
+  has_multicast_route && return
+  local as_root=()
+  ((EUID == 0)) || as_root=(sudo -n)
+  "${as_root[@]}" ip link set lo up 2>/dev/null
+  "${as_root[@]}" ip route add 239.255.76.67/32 dev lo 2>/dev/null
+  has_multicast_route && say "there was no multicast route: added one on the loopback interface (ip route add 239.255.76.67/32 dev lo)"
+}
