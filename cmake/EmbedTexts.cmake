@@ -1,0 +1,11 @@
+# Writes a C++ file that holds the texts of all message types: cmake -DOUT=x.cpp -DFOLDER=proto -P EmbedTexts.cmake
+file(GLOB FILES ${FOLDER}/*.lcm)
+list(SORT FILES)
+set(code "// Made from proto/*.lcm.\n#include <cstddef>\n\nnamespace ruedo {\nextern const char* const kLcmSources[];\nextern const size_t kLcmSourceCount;\nconst char* const kLcmSources[] = {\n")
+list(LENGTH FILES count)
+foreach(file ${FILES})
+  file(READ ${file} text)
+  string(APPEND code "R\"lcm(${text})lcm\",\n")
+endforeach()
+string(APPEND code "};\nconst size_t kLcmSourceCount = ${count};\n}  // namespace ruedo\n")
+file(WRITE ${OUT} "${code}")

@@ -1,0 +1,139 @@
+// The schemas against what lcm-gen made of the same files, and against bytes that lie.
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "ruedo/camera_info_t.hpp"
+#include "ruedo/contact_t.hpp"
+#include "ruedo/image_t.hpp"
+#include "ruedo/joint_state_t.hpp"
+#include "ruedo/move_command_t.hpp"
+#include "ruedo/planar_lidar_t.hpp"
+#include "ruedo/pose_t.hpp"
+#include "ruedo/reply_t.hpp"
+#include "ruedo/schema.h"
+#include "ruedo/sonar_t.hpp"
+#include "ruedo/tick_t.hpp"
+#include "ruedo/world_info_t.hpp"
+#include "ruedo/world_state_t.hpp"
+
+namespace ruedo {
+namespace {
+
+template <class Message>
+std::vector<uint8_t> encode(const Message& message) {
+  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
+  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  return bytes;
+}
+
+template <class Message>
+void expect_lcmgens_fingerprint() {
+  const Schema* schema = find_schema(Message::getTypeName());
+  ASSERT_NE(schema, nullptr) << Message::getTypeName();
+  EXPECT_EQ(schema->fingerprint, Message::getHash()) << schema->name;
+  EXPECT_EQ(find_schema(Message::getHash()), schema);
+}
+
+TEST(Schema, FingerprintsAreLcmGens) {
+  expect_lcmgens_fingerprint<camera_info_t>();
+  expect_lcmgens_fingerprint<contact_t>();
+  expect_lcmgens_fingerprint<image_t>();
+  expect_lcmgens_fingerprint<joint_state_t>();
+  expect_lcmgens_fingerprint<move_command_t>();
+  expect_lcmgens_fingerprint<planar_lidar_t>();
+  expect_lcmgens_fingerprint<pose_t>();
+  expect_lcmgens_fingerprint<reply_t>();
+  expect_lcmgens_fingerprint<sonar_t>();
+  expect_lcmgens_fingerprint<tick_t>();
+  expect_lcmgens_fingerprint<world_info_t>();
+  expect_lcmgens_fingerprint<world_state_t>();
+}
+
+TEST(Schema, BotCoresFingerprints) {
+  EXPECT_EQ(static_cast<uint64_t>(find_schema("planar_lidar_t")->fingerprint), 0xe3d17423180b5e8dULL);
+  EXPECT_EQ(static_cast<uint64_t>(find_schema("pose_t")->fingerprint), 0x2e16efb052b0105eULL);
+  EXPECT_EQ(static_cast<uint64_t>(find_schema("image_t")->fingerprint), 0x14739ffe13d5f5f0ULL);
+  EXPECT_EQ(static_cast<uint64_t>(find_schema("image_metadata_t")->fingerprint), 0x9a4b634d0577fb8eULL);
+}
+
+contact_t two_contacts() {
+  contact_t message;
+  message.utime = 1234567;
+  message.pressed = true;
+  message.n = 2;
+  message.points.resize(2);
+  message.points[0].body = "box/link";
+  message.points[1].body = "";
+  message.points[1].position[2] = -0.5;
+  message.points[1].depth = 0.25;
+  return message;
+}
+
+TEST(Schema, VisitsEveryValueByName) {
+  const auto bytes = encode(two_contacts());
+  std::map<std::string, std::string> values;
+  std::vector<std::string> order;
+  ASSERT_TRUE(visit_message(*find_schema("contact_t"), bytes, [&](const FieldPath& path, const FieldValue& value) {
+    values[path.str()] = to_string(value);
+    order.push_back(path.pattern());
+    return true;
+  }));
+  EXPECT_EQ(values.size(), 3u + 2u * 9u);
+  EXPECT_EQ(values["utime"], "1234567");
+  EXPECT_EQ(values["pressed"], "true");
+  EXPECT_EQ(values["points[0].body"], "\"box/link\"");
+  EXPECT_EQ(values["points[1].body"], "\"\"");
+  EXPECT_EQ(values["points[1].position[2]"], "-0.5");
+  EXPECT_EQ(values["points[1].depth"], "0.25");
+  EXPECT_EQ(order.front(), "utime");
+  EXPECT_EQ(order.back(), "points.depth");
+}
+
+TEST(Schema, AVisitorMayEndEarly) {
+  const auto bytes = encode(two_contacts());
+  int calls = 0;
+  EXPECT_TRUE(visit_message(*find_schema("contact_t"), bytes, [&](const FieldPath&, const FieldValue&) { return ++calls < 4; }));
+  EXPECT_EQ(calls, 4);
+}
+
+TEST(Schema, RefusesWhatIsNotOneWholeMessage) {
+  const Schema& schema = *find_schema("contact_t");
+  const auto good = encode(two_contacts());
+  ASSERT_TRUE(well_formed(schema, good));
+  for (size_t size = 0; size < good.size(); ++size) {
+    EXPECT_FALSE(well_formed(schema, std::span(good).first(size))) << size;
+  }
+  auto longer = good;
+  longer.push_back(0);
+  EXPECT_FALSE(well_formed(schema, longer));
+  auto other = good;
+  other[3] ^= 1;
+  EXPECT_FALSE(well_formed(schema, other)) << "another fingerprint";
+  // n is at 8 (fingerprint) + 8 (utime) + 1 (pressed).
+  for (const uint8_t top : {0x7f, 0x80, 0xff}) {
+    auto lying = good;
+    lying[17] = top;
+    EXPECT_FALSE(well_formed(schema, lying)) << "length with the top byte " << int{top};
+  }
+  auto unterminated = good;
+  unterminated[21 + 4 + 8] = 'x';
+  EXPECT_FALSE(well_formed(schema, unterminated));
+}
+
+// Every single-byte change must be survived (the sanitizers look on), and the two walks must agree.
+TEST(Schema, SurvivesEveryByteChange) {
+  const Schema& schema = *find_schema("contact_t");
+  const auto good = encode(two_contacts());
+  for (size_t at = 0; at < good.size(); ++at) {
+    for (const uint8_t value : {0x00, 0x01, 0x7f, 0x80, 0xff}) {
+      auto bytes = good;
+      bytes[at] = value;
+      const bool visited = visit_message(schema, bytes, [](const FieldPath&, const FieldValue&) { return true; });
+      EXPECT_EQ(visited, well_formed(schema, bytes)) << at;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ruedo
