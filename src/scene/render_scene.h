@@ -1,7 +1,8 @@
 // Pictures of the world without a display: OpenGL 3.3 core on OSMesa, or on surfaceless EGL.
 //
-// A Renderer owns one context and belongs to one thread at a time. Pixels are the same in every run on one
-// CPU type, with both backends.
+// A Renderer owns one context. It may move from thread to thread between draws, but serves one at a time: several
+// cameras use several cores with one renderer each (a pool of them). Pixels depend on nothing but the world, the
+// snapshot and the view; they are the same from every renderer, in every run on one CPU type, with both backends.
 #pragma once
 
 #include <array>
@@ -16,21 +17,29 @@
 
 namespace ruedo::scene {
 
-// A pinhole camera. X_WCamera is in SDF's camera convention: x ahead, y left, z up.
+// A pinhole camera. X_WCamera is in SDF's camera convention: x ahead, y left, z up. A point that is a metres ahead,
+// r to the right and d below is seen at column cx + fx r / a and row cy + fy d / a; whole numbers are the middles of
+// pixels, as for OpenCV.
 struct View {
   Pose X_WCamera;
   int width = 640, height = 480;       // pixels
   double fx = 0, fy = 0, cx = 0, cy = 0;    // pixels
   double near_m = 0.1, far_m = 100.0;
   bool orthographic = false;           // then fx and fy are pixels per metre
+  int samples = 1;                     // 4: smooth edges in the colour picture; depth and labels are never mixed
+  double exposure = 1.0;               // factor on the light
+
+  // Square pixels and the principal point at (width / 2, height / 2). hfov in rad.
+  static View pinhole(const Pose& X_WCamera, int width, int height, double hfov_rad);
 };
 
-// What to draw; each buffer that is wanted gets filled, rows from the top.
+// What to draw; each buffer that is wanted gets filled, rows from the top. Depth and labels look through what is
+// transparent.
 struct Picture {
   bool want_rgb = true, want_depth = false, want_labels = false;
   std::vector<uint8_t> rgb;            // width * height * 3
   std::vector<float> depth;            // m along the optical axis, +inf: nothing
-  std::vector<uint16_t> labels;        // link index + 1, 0: nothing
+  std::vector<uint16_t> labels;        // of moving bodies: BodyLayout's index + 1; then the static models; 0: nothing
 };
 
 // Coloured lines drawn over the world, for rays and cones in ruedo render.
@@ -42,7 +51,7 @@ struct Line {
 class Renderer {
  public:
   virtual ~Renderer() = default;
-  // Draws the world as in `snapshot`; the picture's vectors keep their capacity. ignored_link: as for rays.
+  // Draws the world as in `snapshot`; the picture's vectors keep their capacity.
   virtual void draw(const Snapshot& snapshot, const View& view, Picture& picture, std::span<const Line> lines = {}) = 0;
   virtual std::string description() const = 0;    // for ruedo doctor: backend, renderer, version
 };

@@ -1,0 +1,26 @@
+#include "scene/gl_context.h"
+
+#include <cstdlib>
+
+#include "ruedo/errors.h"
+
+namespace ruedo::scene {
+
+std::unique_ptr<GlContext> make_gl_context() {
+  const char* wanted = std::getenv("RUEDO_RENDERER");
+  const std::string choice = wanted == nullptr ? "" : wanted;
+  if (choice != "" && choice != "auto" && choice != "osmesa" && choice != "egl") {
+    throw EnvironmentError("RUEDO_RENDERER=" + choice + ": allowed are osmesa, egl and auto");
+  }
+  std::string why_not_osmesa = "not tried", why_not_egl = "not tried";
+  if (choice != "egl") {
+    if (auto context = make_osmesa_context(why_not_osmesa)) return context;
+  }
+  if (choice != "osmesa") {
+    if (auto context = make_egl_context(why_not_egl)) return context;
+  }
+  throw EnvironmentError("no renderer for cameras. OSMesa: " + why_not_osmesa + "; EGL: " + why_not_egl +
+                         ". Install libosmesa6, or libegl1 with libgl1-mesa-dri");
+}
+
+}  // namespace ruedo::scene

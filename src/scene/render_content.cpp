@@ -1,0 +1,255 @@
+#include "scene/render_content.h"
+
+#include <algorithm>
+#include <map>
+#include <tuple>
+
+namespace ruedo::scene {
+namespace {
+
+using model::Rgba;
+
+// Segments around round shapes, seen near and from afar.
+constexpr int kSegments = 32, kFewSegments = 10;
+
+// A level plane of at least so many metres is taken for the ground.
+constexpr double kGroundExtent = 20.0;
+
+// Builds the tables of a RenderContent; equal things get one entry.
+class Builder {
+ public:
+  explicit Builder(RenderContent& content) : content_(content) {}
+
+  RenderLinkKind link_kind(const model::Link& link) {
+    RenderLinkKind kind;
+    for (const model::Visual& visual : link.visuals) add(visual, kind.parts);
+    if (kind.parts.empty()) return kind;
+    Vec3 low = kind.parts[0].centre_L, high = low;
+    for (const RenderPart& part : kind.parts) {
+      low = low.cwiseMin(part.centre_L - Vec3::Constant(part.radius));
+      high = high.cwiseMax(part.centre_L + Vec3::Constant(part.radius));
+    }
+    kind.centre_L = 0.5 * (low + high);
+    for (const RenderPart& part : kind.parts) {
+      kind.radius = std::max(kind.radius, (part.centre_L - kind.centre_L).norm() + part.radius);
+    }
+    return kind;
+  }
+
+ private:
+  struct MeshPair {
+    int mesh, small_mesh;
+    Vec3 scale;
+    Quat rotation = Quat::Identity();
+  };
+
+  template <class Make>
+  int mesh(const std::tuple<const void*, int, double, double, int>& key, const Make& make) {
+    const auto [at, inserted] = meshes_.try_emplace(key, static_cast<int>(content_.meshes.size()));
+    if (inserted) content_.meshes.push_back(make());
+    return at->second;
+  }
+  template <class Make>
+  MeshPair round_mesh(model::Shape shape, const Vec3& scale, const Make& make, double a = 0, double b = 0) {
+    const auto one = [&](int segments) {
+      return mesh({nullptr, static_cast<int>(shape), a, b, segments}, [&] { return make(segments); });
+    };
+    return {one(kSegments), one(kFewSegments), scale};
+  }
+  MeshPair only_mesh(int index, const Vec3& scale) { return {index, index, scale}; }
+
+  MeshPair meshes_of(const model::Geometry& g) {
+    using model::Shape;
+    const double r = g.size.x(), length = g.size.y();
+    switch (g.shape) {
+      case Shape::box:
+        return only_mesh(mesh({nullptr, static_cast<int>(g.shape), 0, 0, 0}, box_mesh), g.size);
+      case Shape::sphere:
+        return round_mesh(Shape::sphere, {r, r, r}, sphere_mesh);
+      case Shape::ellipsoid:
+        return round_mesh(Shape::sphere, g.size, sphere_mesh);
+      case Shape::cylinder:
+        return round_mesh(g.shape, {r, r, length}, cylinder_mesh);
+      case Shape::cone:
+        return round_mesh(g.shape, {r, r, length}, cone_mesh);
+      case Shape::capsule:
+        return round_mesh(g.shape, Vec3::Ones(), [&](int segments) { return capsule_mesh(r, length, segments); }, r, length);
+      case Shape::plane: {
+        MeshPair pair = only_mesh(mesh({nullptr, static_cast<int>(g.shape), 0, 0, 0}, plane_mesh),
+                                  {g.extent.x(), g.extent.y(), 1.0});
+        pair.rotation = Quat::FromTwoVectors(Vec3::UnitZ(), g.normal);
+        return pair;
+      }
+      case Shape::mesh:
+        break;
+    }
+    return only_mesh(mesh({g.mesh.get(), 0, 0, 0, 0}, [&] { return file_mesh(*g.mesh); }), g.scale);
+  }
+
+  int texture(const std::shared_ptr<const model::Texture>& texture) {
+    if (!texture) return -1;
+    // Many materials name one file: it is uploaded once.
+    for (size_t i = 0; i < content_.textures.size(); ++i) {
+      const model::Texture& other = *content_.textures[i];
+      if (&other == texture.get() || (!texture->path.empty() && other.path == texture->path)) return static_cast<int>(i);
+    }
+    content_.textures.push_back(texture);
+    return static_cast<int>(content_.textures.size()) - 1;
+  }
+
+  int batch(const Batch& wanted) {
+    const auto [at, inserted] = batches_.try_emplace(wanted, static_cast<int>(content_.batches.size()));
+    if (inserted) content_.batches.push_back(wanted);
+    return at->second;
+  }
+
+  void add(const model::Visual& visual, std::vector<RenderPart>& parts) {
+    const model::Geometry& g = visual.geometry;
+    if (g.shape == model::Shape::mesh && !g.mesh) return;
+    const MeshPair pair = meshes_of(g);
+    const Affine M_LP = compose(to_affine(visual.X_LV * Pose{pair.rotation, Vec3::Zero()}),
+                                (Affine() << Eigen::Matrix3d(pair.scale.asDiagonal()), Vec3::Zero()).finished());
+    const auto& pieces = content_.meshes[static_cast<size_t>(pair.mesh)].pieces;
+    for (size_t i = 0; i < pieces.size(); ++i) {
+      const RenderMesh::Piece& piece = pieces[i];
+      if (piece.index_count == 0) continue;
+      const model::Material material = visual.material ? *visual.material : own_material(g, piece.material);
+      RenderPart part;
+      part.M_LP = M_LP;
+      part.centre_L = M_LP.leftCols<3>() * piece.centre + M_LP.col(3);
+      part.radius = piece.radius * pair.scale.cwiseAbs().maxCoeff();
+      shade(material, visual, part);
+      if (part.diffuse[3] < 0.004f) continue;    // invisible
+      Batch b{pair.mesh, piece.first_index, piece.index_count, texture(material.texture), 0};
+      if (b.texture >= 0) b.flags |= kTextured;
+      if (std::max({part.specular[0], part.specular[1], part.specular[2]}) > 0.02f) b.flags |= kSpecular;
+      if (material.double_sided) b.flags |= kDoubleSided;
+      if (M_LP.leftCols<3>().determinant() < 0.0) b.flags |= kMirrored;
+      if (g.shape == model::Shape::plane && b.texture < 0 && g.normal.z() > 0.999 && g.extent.minCoeff() >= kGroundExtent) {
+        b.flags |= kGround;
+      }
+      if (g.shape == model::Shape::plane) part.casts_shadow = false;
+      part.batch = batch(b);
+      if (pair.small_mesh != pair.mesh) {
+        const RenderMesh::Piece& small = content_.meshes[static_cast<size_t>(pair.small_mesh)].pieces[i];
+        b.mesh = pair.small_mesh;
+        b.first_index = small.first_index;
+        b.index_count = small.index_count;
+        part.small_batch = batch(b);
+      } else {
+        part.small_batch = part.batch;
+      }
+      parts.push_back(part);
+    }
+  }
+
+  static model::Material own_material(const model::Geometry& g, int index) {
+    if (g.mesh && index >= 0 && static_cast<size_t>(index) < g.mesh->materials.size()) {
+      return g.mesh->materials[static_cast<size_t>(index)];
+    }
+    return {};
+  }
+
+  static void shade(const model::Material& material, const model::Visual& visual, RenderPart& part) {
+    part.diffuse = material.diffuse;
+    // Old worlds often give the ambient colour only.
+    const auto black = [](const Rgba& c) { return c[0] + c[1] + c[2] < 0.003f; };
+    if (black(part.diffuse) && !black(material.ambient)) part.diffuse = material.ambient;
+    part.diffuse[3] = std::clamp(material.diffuse[3] * static_cast<float>(1.0 - visual.transparency), 0.0f, 1.0f);
+    part.transparent = part.diffuse[3] < 0.996f;
+    part.specular = material.specular;
+    part.specular[3] = std::clamp(material.shininess, 1.0f, 128.0f);
+    part.emissive = material.emissive;
+    part.casts_shadow = visual.cast_shadows && !part.transparent;
+  }
+
+  RenderContent& content_;
+  std::map<std::tuple<const void*, int, double, double, int>, int> meshes_;    // looked up only: its order shows nowhere
+  std::map<Batch, int> batches_;
+};
+
+}  // namespace
+
+Affine to_affine(const Pose& pose) {
+  Affine m;
+  m.leftCols<3>() = pose.rotation.toRotationMatrix();
+  m.col(3) = pose.translation;
+  return m;
+}
+
+Affine compose(const Affine& a, const Affine& b) {
+  Affine m;
+  m.leftCols<3>().noalias() = a.leftCols<3>() * b.leftCols<3>();
+  m.col(3) = a.leftCols<3>() * b.col(3) + a.col(3);
+  return m;
+}
+
+Pose link_pose(const model::WorldModel& world, const model::BodyLayout& layout, const Snapshot& snapshot, size_t link) {
+  const model::LinkPlacement& placement = layout.links[link];
+  if (placement.body < 0) return placement.X_BL;
+  Pose X_WL = snapshot.bodies[static_cast<size_t>(placement.body)] * placement.X_BL;
+  if (placement.wheel >= 0) {
+    const model::WheelPlacement& wheel = layout.wheels[static_cast<size_t>(placement.wheel)];
+    const model::Model& model = *world.models[static_cast<size_t>(placement.instance)].model;
+    const Quat turn(Eigen::AngleAxisd(snapshot.wheel_angles[static_cast<size_t>(placement.wheel)], wheel.axis_in_L));
+    // The axis goes through the joint's origin, which need not be the link's.
+    const Vec3 p_LJ = model.links[static_cast<size_t>(placement.link)].X_ML.inverse() *
+                      model.joints[static_cast<size_t>(wheel.joint)].X_MJ.translation;
+    X_WL = X_WL * Pose{turn, p_LJ - turn * p_LJ};
+  }
+  return X_WL;
+}
+
+RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLayout& layout) {
+  Builder builder(*this);
+  std::map<const model::Link*, int> kinds;    // looked up only
+  std::vector<int> static_rank(world.models.size(), -1);
+  int statics = 0;
+  bool first = true;
+  for (size_t i = 0; i < layout.links.size(); ++i) {
+    const model::LinkPlacement& placement = layout.links[i];
+    const auto instance = static_cast<size_t>(placement.instance);
+    const model::Link& link = world.models[instance].model->links[static_cast<size_t>(placement.link)];
+    const auto [at, inserted] = kinds.try_emplace(&link, -1);
+    if (inserted) {
+      RenderLinkKind kind = builder.link_kind(link);
+      if (!kind.parts.empty()) {
+        at->second = static_cast<int>(link_kinds.size());
+        link_kinds.push_back(std::move(kind));
+      }
+    }
+    kind_of_link.push_back(at->second);
+    for (const model::Light& light : link.lights) lights.push_back({light, static_cast<int>(i)});
+
+    int label = placement.body + 1;
+    if (placement.body < 0) {
+      if (static_rank[instance] < 0) static_rank[instance] = statics++;
+      label = static_cast<int>(layout.bodies.size()) + static_rank[instance] + 1;
+    }
+    label_of_link.push_back(static_cast<uint16_t>(std::min(label, 65535)));
+
+    if (at->second < 0) continue;
+    const Pose X_WL = placement.body < 0 ? placement.X_BL
+                                         : layout.bodies[static_cast<size_t>(placement.body)].X_WB * placement.X_BL;
+    for (const RenderPart& part : link_kinds[static_cast<size_t>(at->second)].parts) {
+      if ((batches[static_cast<size_t>(part.batch)].flags & kGround) != 0) continue;
+      const Vec3 centre = X_WL * part.centre_L, half = Vec3::Constant(part.radius);
+      low = first ? Vec3(centre - half) : low.cwiseMin(centre - half);
+      high = first ? Vec3(centre + half) : high.cwiseMax(centre + half);
+      first = false;
+    }
+  }
+  for (const model::Light& light : world.lights) lights.push_back({light, -1});
+  if (lights.empty()) {
+    // A world without a light gets a high afternoon sun, so that something can be seen.
+    model::Light sun;
+    sun.name = "default";
+    sun.type = model::Light::Type::directional;
+    sun.direction = Vec3(-0.5, 0.35, -0.9).normalized();
+    sun.diffuse = {0.8f, 0.8f, 0.8f, 1.0f};
+    sun.cast_shadows = true;
+    lights.push_back({sun, -1});
+  }
+}
+
+}  // namespace ruedo::scene

@@ -1,0 +1,77 @@
+// What there is to draw, worked out once from the world: meshes, surfaces, and for each kind of link its parts.
+// Plain data, without OpenGL. A thousand robots of one model share their parts; all boxes of a world share a mesh.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "model/body_layout.h"
+#include "scene/render_mesh.h"
+#include "ruedo/snapshot.h"
+
+namespace ruedo::scene {
+
+using Affine = Eigen::Matrix<double, 3, 4>;    // [M | t]: p' = M p + t
+
+Affine to_affine(const Pose& pose);
+Affine compose(const Affine& a, const Affine& b);    // first b, then a
+
+// How a batch is shaded; a set of these picks the program and the culling.
+enum BatchFlags : uint32_t {
+  kTextured = 1,       // a texture multiplies the diffuse colour
+  kSpecular = 2,       // has a highlight
+  kGround = 4,         // an untextured ground plane: grid, and fades out at its edge
+  kDoubleSided = 8,    // back faces are drawn
+  kMirrored = 16,      // the scale has an odd number of negative factors: clockwise is outside
+};
+
+// Triangles that can be drawn in one call with many instances.
+struct Batch {
+  int mesh = 0;
+  uint32_t first_index = 0, index_count = 0;
+  int texture = -1;
+  uint32_t flags = 0;
+  friend auto operator<=>(const Batch&, const Batch&) = default;
+};
+
+// A piece of a visual, in the frame of its link.
+struct RenderPart {
+  Affine M_LP;                          // from mesh coordinates to the link
+  Vec3 centre_L = Vec3::Zero();         // bounding sphere
+  double radius = 0.0;
+  int batch = 0, small_batch = 0;       // indices into RenderContent::batches; small: for a distant view
+  model::Rgba diffuse{}, specular{}, emissive{};    // specular[3] is the shininess; diffuse[3] the opacity
+  bool transparent = false;
+  bool casts_shadow = true;
+};
+
+struct RenderLinkKind {
+  std::vector<RenderPart> parts;
+  Vec3 centre_L = Vec3::Zero();
+  double radius = 0.0;
+};
+
+// A light and what carries it.
+struct RenderLight {
+  model::Light light;
+  int link = -1;           // index into BodyLayout::links; -1: the world
+};
+
+struct RenderContent {
+  std::vector<RenderMesh> meshes;
+  std::vector<std::shared_ptr<const model::Texture>> textures;
+  std::vector<Batch> batches;
+  std::vector<RenderLinkKind> link_kinds;
+  std::vector<int> kind_of_link;        // of each of BodyLayout::links; -1: nothing to draw
+  std::vector<uint16_t> label_of_link;
+  std::vector<RenderLight> lights;
+  Vec3 low = Vec3::Zero(), high = Vec3::Zero();    // bounds of all that is drawn at the start, but for planes; m, world
+
+  RenderContent(const model::WorldModel& world, const model::BodyLayout& layout);
+};
+
+// Where a link is in a snapshot, its wheel's turning included.
+Pose link_pose(const model::WorldModel& world, const model::BodyLayout& layout, const Snapshot& snapshot, size_t link);
+
+}  // namespace ruedo::scene

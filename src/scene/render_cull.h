@@ -1,0 +1,85 @@
+// Which parts of the world a view sees, as runs of instances in the order in which they are drawn.
+//
+// Everything depends on the snapshot and the view alone, never on what was drawn before.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "scene/render_content.h"
+#include "scene/render_scene.h"
+
+namespace ruedo::scene {
+
+// One part to draw: the vertex attributes 3 to 9 of the shaders.
+struct Instance {
+  float rows[3][4];         // mesh coordinates to the world's axes around the eye
+  model::Rgba diffuse, specular, emissive;
+  uint32_t label;
+  uint32_t padding[3];
+};
+
+struct Run {
+  int batch;
+  uint32_t first, count;    // of DrawList::instances
+};
+
+struct DrawList {
+  std::vector<Instance> instances;
+  std::vector<Run> opaque;         // by batch, near ones first
+  std::vector<Run> transparent;    // far ones first
+};
+
+// A convex region of planes n.p + d >= 0, n pointing inwards, world coordinates.
+struct Region {
+  struct Plane {
+    Vec3 normal;
+    double d;
+  };
+  std::vector<Plane> planes;
+  bool touches(const Vec3& centre, double radius) const {
+    for (const Plane& plane : planes) {
+      if (plane.normal.dot(centre) + plane.d < -radius) return false;
+    }
+    return true;
+  }
+};
+
+Region view_region(const View& view);
+
+enum class Movers { all, only_static, only_moving };
+
+class Culler {
+ public:
+  // All must outlive it.
+  Culler(const model::WorldModel& world, const model::BodyLayout& layout, const RenderContent& content);
+
+  void update(const Snapshot& snapshot);
+  const Affine& link_pose(size_t link) const { return M_WL_[link]; }
+
+  // Instances are relative to `origin`. pixels_per_radian: for leaving out what is smaller than a pixel and for
+  // coarser round shapes; 0: everything in full.
+  void collect(const Region& region, const Vec3& origin, double pixels_per_radian, bool orthographic, DrawList& list);
+  // What casts shadows in the region, relative to `origin`.
+  void collect_casters(const Region& region, const Vec3& origin, Movers movers, DrawList& list);
+
+ private:
+  struct Item {
+    int rank, batch;
+    float distance;
+    uint32_t link;
+    const RenderPart* part;
+  };
+  void append(std::vector<Item>& items, const Vec3& origin, std::vector<Run>& runs, std::vector<Instance>& instances) const;
+
+  const model::WorldModel& world_;
+  const model::BodyLayout& layout_;
+  const RenderContent& content_;
+  std::vector<int> rank_;          // of a batch: the drawing order
+  std::vector<Affine> M_WL_;
+  std::vector<uint32_t> visible_links_, moving_links_, static_links_;    // with something to draw
+  std::vector<Item> opaque_, transparent_;
+};
+
+}  // namespace ruedo::scene

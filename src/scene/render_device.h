@@ -1,0 +1,90 @@
+// The OpenGL side of the renderer: programs, uploaded meshes and textures, framebuffers, and the draw calls.
+// Its context must be current in the calling thread.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "scene/gl_context.h"
+#include "scene/gl_functions.h"
+#include "scene/render_content.h"
+#include "scene/render_cull.h"
+#include "scene/render_shaders.h"
+
+namespace ruedo::scene {
+
+class RenderDevice {
+ public:
+  // Makes the context current and leaves it so. Uploads the content's meshes and frees their arrays.
+  RenderDevice(std::unique_ptr<GlContext> context, RenderContent& content, const LightCounts& lights);
+
+  GlContext& context() { return *context_; }
+  std::string description() const;
+
+  void set_frame(const FrameBlock& frame);
+
+  // Where the following draws go, cleared: a colour picture (`samples` above 1: smoothed edges), labels, or the
+  // shadow map. Depths run from 1 at the near plane to 0 at the far one, but in the shadow map.
+  void begin_colour(int width, int height, int samples);
+  void begin_geometry(int width, int height);
+  void begin_shadow(int size);
+
+  void draw(Pass pass, const std::vector<Instance>& instances, std::span<const Run> opaque,
+            std::span<const Run> transparent = {});
+  // Fills what nothing was drawn on; corners are three clip positions and world directions, 7 floats each.
+  void draw_sky(const std::array<float, 21>& corners);
+  // Triangles of 8 floats a corner, over the picture where nothing hides them: clip position and colour.
+  void draw_overlay(const std::vector<float>& vertices);
+
+  // Rows from the top, of the last begin_colour() or begin_geometry().
+  void read_rgb(uint8_t* rgb);
+  void read_depth(float* depth);        // as OpenGL stores it
+  void read_labels(uint16_t* labels);
+
+ private:
+  struct MeshBuffers {
+    GLuint vertex_array = 0;
+  };
+  struct TextureState {
+    GLuint name = 0;
+    bool tried = false, holes = false;
+  };
+  struct Target {
+    GLuint framebuffer = 0, resolved = 0;
+  };
+  struct ProgramKey {
+    Pass pass;
+    uint32_t flags;
+    bool cutout;
+    auto operator<=>(const ProgramKey&) const = default;
+  };
+
+  GLuint compile(const std::string& vertex, const std::string& fragment);
+  GLuint program(Pass pass, uint32_t flags, bool cutout);
+  void upload(const RenderMesh& mesh);
+  const TextureState& texture(int index);
+  Target& target(int width, int height, int samples, bool labels);
+  void attach(GLenum attachment, GLenum format, int width, int height, int samples);
+  void draw_run(Pass pass, const Run& run);
+
+  std::unique_ptr<GlContext> context_;
+  GlFunctions gl;
+  RenderContent& content_;
+  LightCounts lights_;
+  std::vector<MeshBuffers> meshes_;
+  std::vector<TextureState> textures_;
+  std::map<ProgramKey, GLuint> programs_;
+  std::map<std::array<int, 4>, Target> targets_;
+  GLuint instance_buffer_ = 0, frame_buffer_ = 0, overlay_buffer_ = 0;
+  GLuint overlay_array_ = 0, sky_array_ = 0, sky_buffer_ = 0;
+  GLuint sky_program_ = 0, line_program_ = 0;
+  GLuint shadow_framebuffer_ = 0, shadow_texture_ = 0;
+  int width_ = 0, height_ = 0;
+  bool resolve_ = false;
+  Target* current_ = nullptr;
+};
+
+}  // namespace ruedo::scene

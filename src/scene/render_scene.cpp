@@ -1,0 +1,216 @@
+#include "scene/render_scene.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "scene/render_device.h"
+#include "scene/render_lights.h"
+
+namespace ruedo::scene {
+namespace {
+
+using Matrix4 = Eigen::Matrix4d;
+
+std::array<float, 16> to_floats(const Matrix4& m) {
+  std::array<float, 16> out;
+  Eigen::Map<Eigen::Matrix4f>(out.data()) = m.cast<float>();
+  return out;
+}
+
+// The camera's axes right, down, ahead as rows: world directions to the optical frame.
+Eigen::Matrix3d optical_from_world(const View& view) {
+  const Eigen::Matrix3d R = view.X_WCamera.rotation.toRotationMatrix();
+  Eigen::Matrix3d rows;
+  rows << -R.col(1).transpose(), -R.col(2).transpose(), R.col(0).transpose();
+  return rows;
+}
+
+// Depth is near / Z in perspective (a little less, so that the far plane is at 0), linear in a parallel view:
+// floats keep their precision at both ends.
+struct DepthCurve {
+  double a, b;    // perspective: d = a + b / Z; parallel: d = a + b Z
+  explicit DepthCurve(const View& v) {
+    const double n = v.near_m, f = v.far_m;
+    a = v.orthographic ? f / (f - n) : -n / (f - n);
+    b = v.orthographic ? -1.0 / (f - n) : n * f / (f - n);
+  }
+};
+
+Matrix4 clip_from_world(const View& v) {
+  const DepthCurve depth(v);
+  // OpenGL counts pixels from their corners: half a pixel more. Rows count downwards in both, as pictures are
+  // drawn upside down.
+  const double sx = 2.0 * v.fx / v.width, sy = 2.0 * v.fy / v.height;
+  const double ox = 2.0 * (v.cx + 0.5) / v.width - 1.0, oy = 2.0 * (v.cy + 0.5) / v.height - 1.0;
+  Matrix4 P = Matrix4::Zero();
+  if (v.orthographic) {
+    P << sx, 0, 0, ox, 0, sy, 0, oy, 0, 0, depth.b, depth.a, 0, 0, 0, 1;
+  } else {
+    P << sx, 0, ox, 0, 0, sy, oy, 0, 0, 0, depth.a, depth.b, 0, 0, 1, 0;
+  }
+  Matrix4 R = Matrix4::Identity();
+  R.topLeftCorner<3, 3>() = optical_from_world(v);
+  return P * R;
+}
+
+class GlRenderer : public Renderer {
+ public:
+  GlRenderer(const model::WorldModel& world, const model::BodyLayout& layout)
+      : content_(world, layout), culler_(world, layout, content_), lights_(world, content_),
+        device_(make_gl_context(), content_, lights_.counts()) {
+    description_ = device_.description();
+    device_.context().release();
+  }
+
+  void draw(const Snapshot& snapshot, const View& view, Picture& picture, std::span<const Line> lines) override {
+    device_.context().make_current();
+    culler_.update(snapshot);
+    const Vec3 eye = view.X_WCamera.translation;
+    culler_.collect(view_region(view), eye, std::max(view.fx, view.fy), view.orthographic, visible_);
+    FrameBlock frame{};
+    fill(view, frame);
+    lights_.fill(culler_, view, frame);
+
+    const size_t pixels = static_cast<size_t>(view.width) * static_cast<size_t>(view.height);
+    const int samples = std::max(view.samples, 1);
+    const bool depth_from_colour = picture.want_rgb && samples == 1 && !picture.want_labels;
+    if (picture.want_depth) picture.depth.resize(pixels);
+    if (picture.want_rgb) {
+      picture.rgb.resize(3 * pixels);
+      draw_shadows(frame, eye);
+      device_.set_frame(frame);
+      device_.begin_colour(view.width, view.height, samples);
+      device_.draw(Pass::colour, visible_.instances, visible_.opaque);
+      draw_sky(view);
+      if (!visible_.transparent.empty()) device_.draw(Pass::colour, visible_.instances, {}, visible_.transparent);
+      if (!lines.empty()) draw_lines(view, lines);
+      device_.read_rgb(picture.rgb.data());
+      if (picture.want_depth && depth_from_colour) device_.read_depth(picture.depth.data());
+    }
+    if (picture.want_labels || (picture.want_depth && !depth_from_colour)) {
+      device_.set_frame(frame);
+      device_.begin_geometry(view.width, view.height);
+      device_.draw(Pass::geometry, visible_.instances, visible_.opaque);
+      if (picture.want_depth) device_.read_depth(picture.depth.data());
+      if (picture.want_labels) {
+        picture.labels.resize(pixels);
+        device_.read_labels(picture.labels.data());
+      }
+    }
+    device_.context().release();
+    if (picture.want_depth) to_metres(view, picture.depth);
+  }
+
+  std::string description() const override { return description_; }
+
+ private:
+  static void fill(const View& view, FrameBlock& frame) {
+    frame.clip_from_world = to_floats(clip_from_world(view));
+    const Vec3 ahead = view.X_WCamera.rotation * Vec3::UnitX();
+    const Vec3 to_eye = view.orthographic ? Vec3(-ahead) : Vec3::Zero();
+    frame.eye = {static_cast<float>(to_eye.x()), static_cast<float>(to_eye.y()), static_cast<float>(to_eye.z()),
+                 view.orthographic ? 0.0f : 1.0f};
+    // The ground's pattern repeats every two metres.
+    const Vec3& p = view.X_WCamera.translation;
+    frame.origin = {static_cast<float>(p.x() - 2.0 * std::floor(0.5 * p.x())),
+                    static_cast<float>(p.y() - 2.0 * std::floor(0.5 * p.y())), static_cast<float>(view.exposure), 0.0f};
+  }
+
+  void draw_shadows(FrameBlock& frame, const Vec3& eye) {
+    if (!lights_.counts().shadow) return;
+    const ShadowRegion& shadow = lights_.shadow();
+    culler_.collect_casters(shadow.region, eye, Movers::all, casters_);
+    device_.set_frame(frame);
+    device_.begin_shadow(ShadowRegion::kSize);
+    device_.draw(Pass::shadow, casters_.instances, casters_.opaque);
+  }
+
+  void draw_sky(const View& view) {
+    // One triangle over the whole picture.
+    std::array<float, 21> corners;
+    const Eigen::Matrix3d world_from_optical = optical_from_world(view).transpose();
+    for (size_t i = 0; i < 3; ++i) {
+      const double x = i == 1 ? 3.0 : -1.0, y = i == 2 ? 3.0 : -1.0;
+      Vec3 direction = Vec3::UnitZ();
+      if (!view.orthographic) {
+        direction = Vec3(((x + 1.0) * 0.5 * view.width - 0.5 - view.cx) / view.fx,
+                         ((y + 1.0) * 0.5 * view.height - 0.5 - view.cy) / view.fy, 1.0);
+      }
+      direction = world_from_optical * direction;
+      const double values[7] = {x, y, 0.0, 1.0, direction.x(), direction.y(), direction.z()};
+      for (size_t k = 0; k < 7; ++k) corners[7 * i + k] = static_cast<float>(values[k]);
+    }
+    device_.draw_sky(corners);
+  }
+
+  // Lines as ribbons that face the viewer, so that their width is in pixels with every driver.
+  void draw_lines(const View& view, std::span<const Line> lines) {
+    const Matrix4 M = clip_from_world(view);
+    overlay_.clear();
+    for (const Line& line : lines) {
+      Eigen::Vector4d a, b;
+      a << line.from - view.X_WCamera.translation, 1.0;
+      b << line.to - view.X_WCamera.translation, 1.0;
+      a = M * a;
+      b = M * b;
+      if (!view.orthographic) {    // cut at the near plane
+        if (a.w() < view.near_m && b.w() < view.near_m) continue;
+        if (a.w() < view.near_m) a += (b - a) * ((view.near_m - a.w()) / (b.w() - a.w()));
+        if (b.w() < view.near_m) b += (a - b) * ((view.near_m - b.w()) / (a.w() - b.w()));
+      }
+      Eigen::Vector2d along(((b.x() / b.w()) - (a.x() / a.w())) * view.width,
+                            ((b.y() / b.w()) - (a.y() / a.w())) * view.height);
+      if (along.norm() < 1e-9) continue;
+      along.normalize();
+      const Eigen::Vector4d side(-along.y() * kLinePixels / view.width, along.x() * kLinePixels / view.height, 0, 0);
+      const Eigen::Vector4d corners[6] = {a - a.w() * side, a + a.w() * side, b + b.w() * side,
+                                          a - a.w() * side, b + b.w() * side, b - b.w() * side};
+      for (Eigen::Vector4d corner : corners) {
+        corner.z() += 1e-4 * std::abs(corner.z());    // before the surface that a ray ends on
+        for (int i = 0; i < 4; ++i) overlay_.push_back(static_cast<float>(corner[i]));
+        overlay_.insert(overlay_.end(), line.rgba.begin(), line.rgba.end());
+      }
+    }
+    if (!overlay_.empty()) device_.draw_overlay(overlay_);
+  }
+
+  static void to_metres(const View& view, std::vector<float>& depth) {
+    const DepthCurve curve(view);
+    const auto a = static_cast<float>(curve.a), b = static_cast<float>(curve.b);
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    if (view.orthographic) {
+      for (float& d : depth) d = d <= 0.0f ? kInfinity : (d - a) / b;
+    } else {
+      for (float& d : depth) d = d <= 0.0f ? kInfinity : b / (d - a);
+    }
+  }
+
+  static constexpr double kLinePixels = 1.5;
+
+  RenderContent content_;
+  Culler culler_;
+  RenderLights lights_;
+  RenderDevice device_;
+  std::string description_;
+  DrawList visible_, casters_;
+  std::vector<float> overlay_;
+};
+
+}  // namespace
+
+View View::pinhole(const Pose& X_WCamera, int width, int height, double hfov_rad) {
+  View view;
+  view.X_WCamera = X_WCamera;
+  view.width = width;
+  view.height = height;
+  view.fx = view.fy = width / (2.0 * std::tan(0.5 * hfov_rad));
+  view.cx = 0.5 * width;
+  view.cy = 0.5 * height;
+  return view;
+}
+
+std::unique_ptr<Renderer> make_renderer(const model::WorldModel& world, const model::BodyLayout& layout) {
+  return std::make_unique<GlRenderer>(world, layout);
+}
+
+}  // namespace ruedo::scene
