@@ -74,6 +74,9 @@ using ScenePtr = std::unique_ptr<std::remove_pointer_t<RTCScene>, ReleaseEmbree>
 // One thread: builds run in the caller's, and leave the cores to the modules.
 inline DevicePtr make_device() { return DevicePtr(rtcNewDevice("threads=1,set_affinity=0")); }
 
+// A float a little above t >= 0.
+inline float just_beyond(double t) { return static_cast<float>(t) * (1.0f + 2.5e-7f); }
+
 // The smallest float that is not below x, and the largest that is not above it.
 inline float round_up(double x) {
   const float f = static_cast<float>(x);
@@ -82,6 +85,24 @@ inline float round_up(double x) {
 inline float round_down(double x) {
   const float f = static_cast<float>(x);
   return f > x ? std::nextafterf(f, -std::numeric_limits<float>::infinity()) : f;
+}
+
+// The lanes (bits) that a callback is asked about.
+inline unsigned lanes_of(const RTCIntersectFunctionNArguments& arguments) {
+  RTCRayN* rays = RTCRayHitN_RayN(arguments.rayhit, arguments.N);
+  unsigned lanes = 0;
+  for (unsigned i = 0; i < arguments.N; ++i)
+    if (arguments.valid[i]) lanes |= 1u << RTCRayN_id(rays, arguments.N, i);
+  return lanes;
+}
+
+// Ends each ray at far(lane) >= 0, or just beyond: what is as near is still looked at.
+template <class Far>
+void shorten(const RTCIntersectFunctionNArguments& arguments, Far far) {
+  RTCRayN* rays = RTCRayHitN_RayN(arguments.rayhit, arguments.N);
+  for (unsigned i = 0; i < arguments.N; ++i)
+    if (arguments.valid[i])
+      RTCRayN_tfar(rays, arguments.N, i) = just_beyond(far(RTCRayN_id(rays, arguments.N, i)));
 }
 
 // An axis-aligned box, in double.
@@ -116,6 +137,7 @@ struct Box {
   }
   // Where the line enters the box, 0 when it starts inside; +inf when the ray misses it.
   double entry(const Vec3& o, const Vec3& d) const {
+    if (contains(o)) return 0.0;
     double enter = 0.0, exit = std::numeric_limits<double>::infinity();
     for (int axis = 0; axis < 3; ++axis) {
       if (d[axis] == 0.0) {
@@ -146,7 +168,7 @@ struct Packet {
   }
 
   void add(int lane, const Vec3& o, const Vec3& d, double enter, double far) {
-    const Vec3 p = o + enter * d;
+    const Vec3 p = enter == 0.0 ? o : Vec3(o + enter * d);
     RTCRay8& r = rays.ray;
     r.org_x[lane] = static_cast<float>(p.x());
     r.org_y[lane] = static_cast<float>(p.y());
@@ -155,7 +177,7 @@ struct Packet {
     r.dir_y[lane] = static_cast<float>(d.y());
     r.dir_z[lane] = static_cast<float>(d.z());
     r.tnear[lane] = 0.0f;
-    r.tfar[lane] = round_up(far - enter);
+    r.tfar[lane] = just_beyond(far - enter);
     r.time[lane] = 0.0f;
     r.mask[lane] = ~0u;
     r.id[lane] = static_cast<unsigned>(lane);

@@ -1,65 +1,37 @@
 #include "scene/ray_mesh.h"
 
-#include <bit>
-
 namespace ruedo::scene {
 
-ShearedRay::ShearedRay(const Vec3& o, const Vec3& d) : origin(o) {
-  d.cwiseAbs().maxCoeff(&kz);
-  kx = kz == 2 ? 0 : kz + 1;
-  ky = kx == 2 ? 0 : kx + 1;
-  if (d[kz] < 0.0) std::swap(kx, ky);    // keeps the winding
-  sx = d[kx] / d[kz];
-  sy = d[ky] / d[kz];
-  sz = 1.0 / d[kz];
-}
-
-namespace {
-
-// A triangle's corners in the ray's frame, and its edge functions.
-struct Sheared {
-  double ax, ay, az, bx, by, bz, cx, cy, cz;
-  double u, v, w;
-
-  Sheared(const ShearedRay& r, const Vec3& a0, const Vec3& b0, const Vec3& c0) {
-    const Vec3 a = a0 - r.origin, b = b0 - r.origin, c = c0 - r.origin;
-    az = a[r.kz];
-    bz = b[r.kz];
-    cz = c[r.kz];
-    ax = a[r.kx] - r.sx * az;
-    ay = a[r.ky] - r.sy * az;
-    bx = b[r.kx] - r.sx * bz;
-    by = b[r.ky] - r.sy * bz;
-    cx = c[r.kx] - r.sx * cz;
-    cy = c[r.ky] - r.sy * cz;
-    u = cx * by - cy * bx;
-    v = ax * cy - ay * cx;
-    w = bx * ay - by * ax;
-  }
-  double t(const ShearedRay& r) const { return r.sz * (u * az + v * bz + w * cz) / (u + v + w); }
-};
-
-}  // namespace
-
-// The context of one run through a tree; lanes are found by the ray's id.
+// The context of a packet's run through the tree; lanes are found by the ray's id.
 struct RayMesh::Query : EmbreeContext {
   const RayMesh* mesh;
-  MeshRay lanes[kLanes];
-  double start[kLanes];
-  bool counting = false;    // signed crossings of lane 0 instead of the nearest hit
+  const FrameRays* rays = nullptr;
+  ShapeHit* hits = nullptr;
+  const double* t_max = nullptr;
+  Packet packet;
+  const Vec3* counting_from = nullptr;    // not null: count signed crossings instead
   int crossings = 0;
+
+  // Keeps the nearer hit; of equals the lower triangle.
+  void offer(int lane, double t, int triangle) {
+    ShapeHit& hit = hits[lane];
+    if (t <= t_max[lane] && (t < hit.t || (t == hit.t && triangle < hit.feature))) hit = {t, triangle};
+  }
 };
 
-RayMesh::RayMesh(const model::Mesh& mesh, const Vec3& scale, RTCDevice device)
+RayMesh::RayMesh(const model::Mesh& mesh, const Vec3& scale, const Pose& X_FMesh)
     : triangles_(mesh.triangles), closed_(mesh.closed) {
+  const Eigen::Matrix3d rotation = X_FMesh.rotation.toRotationMatrix();
   positions_.reserve(mesh.positions.size());
-  for (const Eigen::Vector3f& p : mesh.positions) positions_.push_back(p.cast<double>().cwiseProduct(scale));
+  for (const Eigen::Vector3f& p : mesh.positions)
+    positions_.push_back(rotation * p.cast<double>().cwiseProduct(scale) + X_FMesh.translation);
   for (const auto& triangle : triangles_)
     for (const uint32_t corner : triangle) box_.add(positions_[corner]);
   margin_ = box_.margin();
   box_.grow(margin_);
-  if (!device || triangles_.empty()) return;
+}
 
+void RayMesh::build_tree(RTCDevice device) {
   const KeepFloatMode keep;
   scene_.reset(rtcNewScene(device));
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
@@ -73,117 +45,88 @@ RayMesh::RayMesh(const model::Mesh& mesh, const Vec3& scale, RTCDevice device)
   rtcCommitScene(scene_.get());
 }
 
+Box RayMesh::triangle_box(int triangle) const {
+  Box box;
+  for (int i = 0; i < 3; ++i) box.add(corner(triangle, i));
+  return box;
+}
+
 void RayMesh::bounds(const RTCBoundsFunctionArguments* arguments) {
   const RayMesh& mesh = *static_cast<const RayMesh*>(arguments->geometryUserPtr);
-  Box box;
-  for (const uint32_t corner : mesh.triangles_[arguments->primID]) box.add(mesh.positions_[corner]);
+  Box box = mesh.triangle_box(static_cast<int>(arguments->primID));
   box.grow(mesh.margin_);
   *arguments->bounds_o = box.bounds();
 }
 
-void RayMesh::test(int triangle, MeshRay& ray) const {
-  const auto& corners = triangles_[static_cast<size_t>(triangle)];
-  const Sheared s(ray.ray, positions_[corners[0]], positions_[corners[1]], positions_[corners[2]]);
-  if ((s.u < 0.0 || s.v < 0.0 || s.w < 0.0) && (s.u > 0.0 || s.v > 0.0 || s.w > 0.0)) return;
-  if (s.u + s.v + s.w == 0.0) return;    // edge on, or no area
-  const double t = s.t(ray.ray);
-  if (!(t >= 0.0)) return;
-  if (t < ray.t || (t == ray.t && (ray.triangle < 0 || triangle < ray.triangle))) {
-    ray.t = t;
-    ray.triangle = triangle;
-  }
-}
-
-// +1 where the ray leaves through the triangle, -1 where it enters, 0 where it misses. A ray through an edge or a
-// corner is moved aside by less than any number, the same way for all triangles: so each crossing counts once.
-int RayMesh::crossing(int triangle, const ShearedRay& ray) const {
-  const auto& corners = triangles_[static_cast<size_t>(triangle)];
-  const Sheared s(ray, positions_[corners[0]], positions_[corners[1]], positions_[corners[2]]);
-  const auto sign = [](double edge, double dy, double dx) {
-    const double first = edge != 0.0 ? edge : dy != 0.0 ? dy : dx;
-    return (first > 0.0) - (first < 0.0);
-  };
-  const int u = sign(s.u, s.cy - s.by, s.bx - s.cx);
-  const int v = sign(s.v, s.ay - s.cy, s.cx - s.ax);
-  const int w = sign(s.w, s.by - s.ay, s.ax - s.bx);
-  if (u == 0 || u != v || u != w) return 0;
-  const double det = s.u + s.v + s.w;
-  if (det == 0.0 || !(s.t(ray) > 0.0)) return 0;
-  return -u;    // seen from the front: the ray enters
-}
-
 void RayMesh::intersect_triangle(const RTCIntersectFunctionNArguments* arguments) {
   auto& query = *static_cast<Query*>(arguments->context);
-  RTCRayN* rays = RTCRayHitN_RayN(arguments->rayhit, arguments->N);
   const int triangle = static_cast<int>(arguments->primID);
-  if (query.counting) {
-    query.crossings += query.mesh->crossing(triangle, query.lanes[0].ray);
+  if (query.counting_from) {
+    query.crossings += query.mesh->crossing(triangle, *query.counting_from, way_out());
     return;
   }
-  for (unsigned i = 0; i < arguments->N; ++i) {
-    if (!arguments->valid[i]) continue;
-    const unsigned lane = RTCRayN_id(rays, arguments->N, i);
-    MeshRay& ray = query.lanes[lane];
-    const double before = ray.t;
-    query.mesh->test(triangle, ray);
-    if (ray.t < before) RTCRayN_tfar(rays, arguments->N, i) = round_up(ray.t - query.start[lane]);
-  }
+  query.mesh->test(triangle, lanes_of(*arguments), *query.rays, [&](int lane, double t) { query.offer(lane, t, triangle); });
+  shorten(*arguments, [&](unsigned lane) { return std::min(query.hits[lane].t, query.t_max[lane]) - query.packet.start[lane]; });
 }
 
-void RayMesh::intersect(unsigned lanes, const Vec3* o, const Vec3* d, const double* t_max, ShapeHit* hits) const {
+void RayMesh::intersect(unsigned lanes, const FrameRays& rays, const double* t_max, ShapeHit* hits) const {
   Query query;
-  Packet packet;
+  query.mesh = this;
+  query.rays = &rays;
+  query.hits = hits;
+  query.t_max = t_max;
   for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
     const int lane = std::countr_zero(rest);
-    hits[lane] = {};
-    const double enter = box_.entry(o[lane], d[lane]);
-    if (!(enter <= t_max[lane]) || enter == kNoHit) continue;
-    MeshRay& ray = query.lanes[lane];
-    ray.ray = ShearedRay(o[lane], d[lane]);
-    ray.t = t_max[lane];
-    ray.triangle = -1;
-    query.start[lane] = enter;
-    packet.add(lane, o[lane], d[lane], enter, t_max[lane]);
+    hits[lane] = {kNoHit, std::numeric_limits<int>::max()};
+    const double enter = box_.entry(rays.o[lane], rays.d[lane]);
+    if (enter <= t_max[lane] && enter < kNoHit) query.packet.add(lane, rays.o[lane], rays.d[lane], enter, t_max[lane]);
   }
-  if (packet.active == 0) return;
   if (scene_) {
     init_context(query);
-    query.mesh = this;
-    packet.cast(scene_.get(), query);
-  } else {
-    for (int lane = 0; lane < kLanes; ++lane)
-      if (packet.valid[lane])
-        for (size_t i = 0; i < triangles_.size(); ++i) test(static_cast<int>(i), query.lanes[lane]);
+    query.packet.cast(scene_.get(), query);
+    return;
   }
-  for (int lane = 0; lane < kLanes; ++lane)
-    if (packet.valid[lane] && query.lanes[lane].triangle >= 0) hits[lane] = {query.lanes[lane].t, query.lanes[lane].triangle};
+  for (int i = 0; i < static_cast<int>(size()); ++i)
+    test(i, lanes, rays, [&](int lane, double t) { query.offer(lane, t, i); });
+}
+
+int RayMesh::crossing(int triangle, const Vec3& o, const Vec3& d) const {
+  const Seen s = seen(triangle, o);
+  const auto sign = [&](const Vec3& plane) {
+    const double side = d.dot(plane);
+    const double first = side != 0.0 ? side : plane.x() != 0.0 ? plane.x() : plane.y() != 0.0 ? plane.y() : plane.z();
+    return (first > 0.0) - (first < 0.0);
+  };
+  const int u = sign(s.u), v = sign(s.v), w = sign(s.w);
+  if (u == 0 || u != v || u != w) return 0;
+  const Vec3 area = (s.b - s.a).cross(s.c - s.a);
+  if (area.dot(d) == 0.0 || !(distance(s, area, d) > 0.0)) return 0;
+  return u;    // all planes see the ray on their right: it leaves
+}
+
+const Vec3& RayMesh::way_out() {
+  static const Vec3 kUp = Vec3(0.0123, 0.0171, 1.0).normalized();    // along no face or edge that people draw
+  return kUp;
 }
 
 bool RayMesh::inside(const Vec3& point) const {
   if (!closed_ || !box_.contains(point)) return false;
-  static const Vec3 kUp = Vec3(0.0123, 0.0171, 1.0).normalized();    // along no face or edge that people draw
-  const ShearedRay ray(point, kUp);
-  int crossings = 0;
+  Query query;
+  query.mesh = this;
+  query.counting_from = &point;
   if (scene_) {
-    Query query;
     init_context(query);
-    query.mesh = this;
-    query.counting = true;
-    query.lanes[0].ray = ray;
-    Packet packet;
-    packet.add(0, point, kUp, 0.0, kNoHit);
-    packet.cast(scene_.get(), query);
-    crossings = query.crossings;
+    query.packet.add(0, point, way_out(), 0.0, kNoHit);
+    query.packet.cast(scene_.get(), query);
   } else {
-    for (size_t i = 0; i < triangles_.size(); ++i) crossings += crossing(static_cast<int>(i), ray);
+    for (int i = 0; i < static_cast<int>(size()); ++i) query.crossings += crossing(i, point, way_out());
   }
-  return crossings != 0;
+  return query.crossings != 0;
 }
 
 Vec3 RayMesh::normal(int triangle) const {
-  const auto& corners = triangles_[static_cast<size_t>(triangle)];
-  const Vec3& a = positions_[corners[0]];
-  return (positions_[corners[1]] - a).cross(positions_[corners[2]] - a).normalized();
+  const Vec3& a = corner(triangle, 0);
+  return (corner(triangle, 1) - a).cross(corner(triangle, 2) - a).normalized();
 }
 
 }  // namespace ruedo::scene

@@ -114,9 +114,8 @@ void EmbreeRayScene::test_mover(const Mover& mover, unsigned lanes, RayBatch& ba
 void EmbreeRayScene::test_primitive(const RTCIntersectFunctionNArguments* arguments) {
   auto& query = *static_cast<TreeQuery*>(arguments->context);
   const auto& scene = *static_cast<const EmbreeRayScene*>(query.owner);
-  run_callback(*arguments, query, [&](unsigned primitive, unsigned lanes) {
-    scene.test_mover(scene.bounded_[primitive], lanes, query.batch);
-  });
+  scene.test_mover(scene.bounded_[arguments->primID], lanes_of(*arguments), query.batch);
+  shorten(*arguments, [&](unsigned lane) { return query.batch.t[lane] - query.packet.start[lane]; });
 }
 
 void EmbreeRayScene::cast_batch(unsigned lanes, TreeQuery& query) const {
@@ -128,7 +127,6 @@ void EmbreeRayScene::cast_batch(unsigned lanes, TreeQuery& query) const {
 
 void EmbreeRayScene::cast(std::span<const Ray> rays, std::span<Hit> hits, int ignored_link) const {
   TreeQuery query;
-  init_context(query);
   RayBatch& batch = query.batch;
   batch.ignored_link = ignored_link;
   for (size_t first = 0; first < rays.size(); first += kLanes) {

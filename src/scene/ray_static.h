@@ -11,10 +11,16 @@ namespace ruedo::scene {
 struct TreeQuery : EmbreeContext {
   RayBatch batch;
   Packet packet;
-  const void* owner = nullptr;    // for the callback
+  const void* owner = nullptr;            // for the callback
+  const RayMesh* counting = nullptr;      // not null: count the signed crossings of this mesh instead
+  Vec3 counting_from = Vec3::Zero();
+  int crossings = 0;
+
+  TreeQuery() { init_context(*this); }
 };
 
-// An Embree tree over boxes of our own, with a callback that tests what is in them.
+// An Embree tree over boxes of our own, with a callback that tests what is in them, and over the triangles of
+// meshes that are given in the world's frame.
 class RayTree {
  public:
   // Embree keeps its address.
@@ -22,39 +28,35 @@ class RayTree {
   RayTree(const RayTree&) = delete;
   RayTree& operator=(const RayTree&) = delete;
 
-  // boxes: one a primitive; `moving`: they will change.
-  void build(RTCDevice device, std::vector<Box> boxes, RTCIntersectFunctionN callback, bool moving);
+  // boxes: one a primitive; `moving`: they will change. The shapes must outlive the tree.
+  void build(RTCDevice device, std::vector<Box> boxes, RTCIntersectFunctionN callback, bool moving,
+             const std::vector<std::pair<int, const RayShape*>>& meshes = {});
 
   Box& box(size_t primitive) { return boxes_[primitive]; }
-  // After boxes were changed.
-  void refit();
+  void refit();    // after boxes were changed
   // Casts the lanes (bits) of query.batch.
   void cast(unsigned lanes, TreeQuery& query) const;
+  // Is the point inside that mesh, one of those given to build()? As RayMesh::inside.
+  bool inside(const RayMesh& mesh, const Vec3& point) const;
 
  private:
+  struct Triangles {
+    const RayTree* tree;
+    const RayShape* shape;
+    int index;    // of the shape, in the table
+  };
   static void bounds(const RTCBoundsFunctionArguments* arguments);
+  static void triangle_bounds(const RTCBoundsFunctionArguments* arguments);
+  static void test_triangle(const RTCIntersectFunctionNArguments* arguments);
+  RTCGeometry attach(RTCDevice device, size_t primitives, void* user, RTCBoundsFunction bounds, RTCIntersectFunctionN callback);
 
   std::vector<Box> boxes_;
-  Box all_;
+  std::vector<Triangles> triangles_;
+  Box all_, meshes_;
   double margin_ = 0.0;
-  RTCGeometry geometry_ = nullptr;    // owned by the scene
+  RTCGeometry geometry_ = nullptr;    // of the boxes; owned by the scene
   ScenePtr scene_;
 };
-
-// Calls test(primitive, lanes) and shortens the packet's rays to the nearest hits after it.
-template <class Test>
-void run_callback(const RTCIntersectFunctionNArguments& arguments, TreeQuery& query, Test test) {
-  RTCRayN* rays = RTCRayHitN_RayN(arguments.rayhit, arguments.N);
-  unsigned lanes = 0;
-  for (unsigned i = 0; i < arguments.N; ++i)
-    if (arguments.valid[i]) lanes |= 1u << RTCRayN_id(rays, arguments.N, i);
-  test(arguments.primID, lanes);
-  for (unsigned i = 0; i < arguments.N; ++i) {
-    if (!arguments.valid[i]) continue;
-    const unsigned lane = RTCRayN_id(rays, arguments.N, i);
-    RTCRayN_tfar(rays, arguments.N, i) = round_up(query.batch.t[lane] - query.packet.start[lane]);
-  }
-}
 
 class StaticRayScene {
  public:
@@ -74,8 +76,12 @@ class StaticRayScene {
 
  private:
   static void test_primitive(const RTCIntersectFunctionNArguments* arguments);
-  std::vector<int> unbounded_, bounded_;    // indices into table.shapes
-  RayTree tree_;
+  static void test_closed(const RTCIntersectFunctionNArguments* arguments);
+  void cast_inside(unsigned lanes, TreeQuery& query) const;
+  const RayShape& shape(int index) const { return table.shapes[static_cast<size_t>(index)]; }
+
+  std::vector<int> unbounded_, bounded_, closed_;    // indices into table.shapes
+  RayTree tree_, closed_tree_;
 };
 
 // Is there a ray at all? Others hit nothing.

@@ -87,14 +87,22 @@ void RayTable::add(const model::LinkPlacement& link, int link_index, int shape_i
       break;
     case Shape::mesh: {
       if (!geometry.mesh || geometry.mesh->triangles.empty()) return;
-      auto& mesh = meshes_[{geometry.mesh.get(), geometry.scale.x(), geometry.scale.y(), geometry.scale.z()}];
-      if (!mesh) mesh = std::make_shared<RayMesh>(*geometry.mesh, geometry.scale, device);
-      shape.mesh = mesh;
+      if (link.body < 0) {
+        shape.mesh = std::make_shared<RayMesh>(*geometry.mesh, geometry.scale, (link.X_BL * X_LS).normalized());
+        break;
+      }
+      auto& shared = meshes_[{geometry.mesh.get(), geometry.scale.x(), geometry.scale.y(), geometry.scale.z()}];
+      if (!shared) {
+        const auto mesh = std::make_shared<RayMesh>(*geometry.mesh, geometry.scale, Pose());
+        if (device) mesh->build_tree(device);
+        shared = mesh;
+      }
+      shape.mesh = shared;
       break;
     }
   }
 
-  const Pose X_FL = link.X_BL, X_FS = (X_FL * X_LS).normalized();
+  const Pose X_FL = link.X_BL, X_FS = shape.mesh && link.body < 0 ? Pose() : (X_FL * X_LS).normalized();
   shape.into = IntoShape(X_FS);
   if (shape.kind == Shape::mesh) {
     for (const Vec3& p : shape.mesh->positions()) shape.box_F.add(X_FS * p);
@@ -160,7 +168,7 @@ void test_mesh(const RayShape& shape, int index, const IntoShape& into, unsigned
     else outside |= 1u << lane;
   }
   ShapeHit hits[kLanes];
-  shape.mesh->intersect(outside, local.o, local.d, batch.t, hits);
+  shape.mesh->intersect(outside, local, batch.t, hits);
   for (unsigned rest = outside; rest != 0; rest &= rest - 1) {
     const int lane = std::countr_zero(rest);
     batch.offer(lane, hits[lane], index);

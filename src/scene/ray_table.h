@@ -58,18 +58,14 @@ struct RayTable {
   std::vector<int> statics;              // indices into shapes
   std::vector<TurningShape> turning;
 
-  // device null: meshes without trees.
+  // Meshes of static links are given in the world's frame, without a tree. Those of movers are shared and have one;
+  // device null: none.
   RayTable(const model::WorldModel& world, const model::BodyLayout& layout, bool visuals, RTCDevice device);
 
  private:
   void add(const model::LinkPlacement& link, int link_index, int shape_index, const Pose& X_LS,
            const model::Geometry& geometry, const model::BodyLayout& layout, bool visuals, RTCDevice device);
   std::map<std::tuple<const model::Mesh*, double, double, double>, std::shared_ptr<const RayMesh>> meshes_;
-};
-
-// Eight rays in some frame.
-struct FrameRays {
-  Vec3 o[kLanes], d[kLanes];
 };
 
 // Eight rays, and the nearest hit of each so far.
@@ -82,9 +78,15 @@ struct RayBatch {
   int feature[kLanes];
   int ignored_link = -1;
 
-  // Keeps the nearer hit; of equals the one of the lower shape.
+  // The last origin that the static closed meshes were asked about, and the first that it is inside of.
+  bool asked_statics = false;
+  Vec3 asked_at = Vec3::Zero();
+  int inside_static = kNothing;
+
+  // Keeps the nearer hit; of equals the one of the lower shape and feature.
   void offer(int lane, const ShapeHit& hit, int index) {
-    if (hit.t < t[lane] || (hit.t == t[lane] && index < shape[lane] && hit.t < kNoHit)) {
+    if (hit.t < t[lane] || (hit.t == t[lane] && hit.t < kNoHit &&
+                            (index < shape[lane] || (index == shape[lane] && hit.feature < feature[lane])))) {
       t[lane] = hit.t;
       shape[lane] = index;
       feature[lane] = hit.feature;

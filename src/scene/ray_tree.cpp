@@ -1,0 +1,108 @@
+// Embree's side of the caster: which boxes and triangles a packet of rays may hit.
+#include "scene/ray_static.h"
+
+namespace ruedo::scene {
+
+RTCGeometry RayTree::attach(RTCDevice device, size_t primitives, void* user, RTCBoundsFunction bounds_function,
+                            RTCIntersectFunctionN callback) {
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
+  rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(primitives));
+  rtcSetGeometryUserData(geometry, user);
+  rtcSetGeometryBoundsFunction(geometry, bounds_function, nullptr);
+  rtcSetGeometryIntersectFunction(geometry, callback);
+  rtcAttachGeometry(scene_.get(), geometry);
+  rtcReleaseGeometry(geometry);    // the scene keeps it
+  return geometry;
+}
+
+void RayTree::build(RTCDevice device, std::vector<Box> boxes, RTCIntersectFunctionN callback, bool moving,
+                    const std::vector<std::pair<int, const RayShape*>>& meshes) {
+  boxes_ = std::move(boxes);
+  if (boxes_.empty() && meshes.empty()) return;
+  const KeepFloatMode keep;
+  scene_.reset(rtcNewScene(device));
+  if (!boxes_.empty()) geometry_ = attach(device, boxes_.size(), this, bounds, callback);
+  if (moving) {
+    rtcSetSceneFlags(scene_.get(), RTC_SCENE_FLAG_DYNAMIC);
+    rtcSetGeometryBuildQuality(geometry_, RTC_BUILD_QUALITY_REFIT);
+  }
+  for (const auto& [index, shape] : meshes) {
+    triangles_.push_back({this, shape, index});
+    meshes_.add(shape->mesh->box());
+  }
+  std::vector<RTCGeometry> geometries;
+  for (Triangles& part : triangles_)
+    geometries.push_back(attach(device, part.shape->mesh->size(), &part, triangle_bounds, test_triangle));
+  all_ = meshes_;
+  for (const Box& box : boxes_) all_.add(box);
+  margin_ = all_.margin();
+  for (RTCGeometry geometry : geometries) rtcCommitGeometry(geometry);
+  refit();
+}
+
+void RayTree::refit() {
+  if (!scene_) return;
+  const KeepFloatMode keep;
+  all_ = meshes_;
+  for (const Box& box : boxes_) all_.add(box);
+  margin_ = all_.margin();
+  all_.grow(margin_);
+  if (geometry_) rtcCommitGeometry(geometry_);
+  rtcCommitScene(scene_.get());
+}
+
+void RayTree::bounds(const RTCBoundsFunctionArguments* arguments) {
+  const RayTree& tree = *static_cast<const RayTree*>(arguments->geometryUserPtr);
+  Box box = tree.boxes_[arguments->primID];
+  box.grow(tree.margin_);
+  *arguments->bounds_o = box.bounds();
+}
+
+void RayTree::triangle_bounds(const RTCBoundsFunctionArguments* arguments) {
+  const Triangles& part = *static_cast<const Triangles*>(arguments->geometryUserPtr);
+  Box box = part.shape->mesh->triangle_box(static_cast<int>(arguments->primID));
+  box.grow(part.tree->margin_);
+  *arguments->bounds_o = box.bounds();
+}
+
+void RayTree::test_triangle(const RTCIntersectFunctionNArguments* arguments) {
+  auto& query = *static_cast<TreeQuery*>(arguments->context);
+  const Triangles& part = *static_cast<const Triangles*>(arguments->geometryUserPtr);
+  const RayMesh& mesh = *part.shape->mesh;
+  const int triangle = static_cast<int>(arguments->primID);
+  if (query.counting) {
+    if (query.counting == &mesh) query.crossings += mesh.crossing(triangle, query.counting_from, RayMesh::way_out());
+    return;
+  }
+  RayBatch& batch = query.batch;
+  if (part.shape->link == batch.ignored_link) return;
+  mesh.test(triangle, lanes_of(*arguments), batch.world,
+            [&](int lane, double t) { batch.offer(lane, {t, triangle}, part.index); });
+  shorten(*arguments, [&](unsigned lane) { return batch.t[lane] - query.packet.start[lane]; });
+}
+
+void RayTree::cast(unsigned lanes, TreeQuery& query) const {
+  if (!scene_) return;
+  Packet& packet = query.packet;
+  packet.clear();
+  for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
+    const int lane = std::countr_zero(rest);
+    const Vec3 &o = query.batch.world.o[lane], &d = query.batch.world.d[lane];
+    const double enter = all_.entry(o, d);
+    if (enter <= query.batch.t[lane] && enter < kNoHit) packet.add(lane, o, d, enter, query.batch.t[lane]);
+  }
+  packet.cast(scene_.get(), query);
+}
+
+bool RayTree::inside(const RayMesh& mesh, const Vec3& point) const {
+  if (!mesh.closed() || !mesh.box().contains(point)) return false;
+  TreeQuery query;
+  query.counting = &mesh;
+  query.counting_from = point;
+  const double height = mesh.box().upper.z() - point.z();
+  query.packet.add(0, point, RayMesh::way_out(), 0.0, height / RayMesh::way_out().z());
+  query.packet.cast(scene_.get(), query);
+  return query.crossings != 0;
+}
+
+}  // namespace ruedo::scene
