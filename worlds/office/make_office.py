@@ -52,7 +52,7 @@ def furniture():
                 things.append(("waste_bin", x - 0.1, y + 1.15, 0))
     things += [("sofa", 13.0, -13.7, 0), ("sofa", 16, -14.3, 90), ("plant", 19.3, -14.3, 0), ("plant", 19.3, -2.8, 0),
                ("meeting_table", 17.0, -7.0, 0), ("office_chair", 17.0, -6.0, -90), ("office_chair", 17.0, -8.0, 90)]
-    things += [("plant", -19.3, 1.2, 0), ("plant", 19.3, -1.2, 0), ("waste_bin", -7.5, 1.6, 0), ("waste_bin", 9.5, -1.6, 0)]
+    things += [("plant", -19.3, 1.2, 0), ("plant", 19.3, -1.2, 0), ("waste_bin", -5.5, 1.6, 0), ("waste_bin", 9.5, -1.6, 0)]
     return things
 
 

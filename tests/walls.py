@@ -1,0 +1,153 @@
+"""The walls between the layers, and other rules that every source keeps; run by pytest.
+
+The layers and what each may use are read from the ruedo_layer() lines of the top CMakeLists.txt, so that there is one list.
+Libraries that live in one layer alone are listed below. Each rule is also run on a small tree that breaks it.
+"""
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+MAX_LINES = 400
+SOURCES = (".cpp", ".h", ".py", ".java", ".sh", ".cmake", ".lcm")
+TEXTS = SOURCES + (".md", ".txt", ".sdf", ".config", ".xml", ".json", ".toml", ".cfg", ".in", ".supp", "")
+
+# What an include of a library begins with, and the layers that may have it.
+LIBRARIES = {
+    ("btBullet", "bullet/", "LinearMath/", "BulletCollision/", "BulletDynamics/"): {"physics"},
+    ("embree3/", "embree4/", "GL/", "EGL/"): {"scene"},
+    ("tinyxml2", "urdf_", "urdf/", "assimp/", "sdf/"): {"model"},
+    ("lcm/lcm.h", "lcm/lcm-cpp", "lcm/eventlog"): {"bus"},
+    ("CLI/",): {"cli"},
+    ("tbb/", "oneapi/tbb"): {"scene", "sensors", "server"},
+}
+
+# Nothing in the tree speaks of a machine it was made on, of package hosts, or of how it came to be.
+FORBIDDEN = [r"/work/(main|shared)", r"/tmp/(build|ccache|venv|chroot)", r"/home/\w", r"/root/", r"\b(pypi\.org|files\.pythonhosted|deb\.debian\.org|snapshot\.debian)",
+             r"\bissue\s+#?\d", r"\b(subagents?|claude|anthropic|openai|copilot)\b"]
+
+
+def layers(root):
+    """{layer: the layers it may include, itself among them}, from CMakeLists.txt; the command line may include all."""
+    text = (root / "CMakeLists.txt").read_text(encoding="utf-8")
+    found = {}
+    for name, links in re.findall(r"^ruedo_layer\((\w+)([^)]*)\)", text, re.MULTILINE):
+        below = set(re.findall(r"\bruedo_(\w+)", links)) & set(found)
+        found[name] = {name}.union(*(found[b] for b in below))
+    found["cli"] = {"cli", *found}
+    return found
+
+
+def includes(path):
+    """(line number, included name) of each #include."""
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        match = re.match(r'\s*#\s*include\s*[<"]([^>"]+)[>"]', line)
+        if match:
+            yield number, match.group(1)
+
+
+def broken_walls(root):
+    known = layers(root)
+    problems = []
+    for path in sorted(p for top in ("src", "include") for p in (root / top).rglob("*") if p.suffix in (".cpp", ".h")):
+        relative = path.relative_to(root)
+        layer = relative.parts[1] if relative.parts[0] == "src" else "include/ruedo"
+        allowed = known.get(layer, set())
+        if layer != "include/ruedo" and not allowed:
+            problems.append(f"{relative}: layer {layer} has no ruedo_layer() line in CMakeLists.txt")
+            continue
+        for number, name in includes(path):
+            target = name.split("/")[0]
+            if "/" in name and target in known and target not in allowed:
+                problems.append(f"{relative}:{number}: {layer} may not include {name}")
+            for prefixes, homes in LIBRARIES.items():
+                if name.startswith(prefixes) and layer not in homes:
+                    problems.append(f"{relative}:{number}: {name} belongs to {', '.join(sorted(homes))}, not to {layer}")
+    return problems
+
+
+def tracked(root):
+    """The files of the tree: those that git tracks, or all where there is no git."""
+    if (root / ".git").exists():
+        listed = subprocess.run(["git", "-C", root, "-c", f"safe.directory={root}", "ls-files", "-z"], capture_output=True, text=True, check=True).stdout
+        return [root / name for name in listed.split("\0") if name and (root / name).is_file()]
+    return [p for p in root.rglob("*") if p.is_file()]
+
+
+def long_sources(root):
+    problems = []
+    for path in tracked(root):
+        if path.suffix in SOURCES:
+            count = len(path.read_text(encoding="utf-8").splitlines())
+            if count > MAX_LINES:
+                problems.append(f"{path.relative_to(root)}: {count} lines, {MAX_LINES} are allowed")
+    return problems
+
+
+def forbidden_words(root):
+    pattern = re.compile("|".join(FORBIDDEN), re.IGNORECASE)
+    problems = []
+    for path in tracked(root):
+        if path.suffix not in TEXTS or path == Path(__file__).resolve():
+            continue
+        for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
+            match = pattern.search(line)
+            if match:
+                problems.append(f"{path.relative_to(root)}:{number}: '{match.group(0)}'")
+    return problems
+
+
+@pytest.mark.parametrize("rule", [broken_walls, long_sources, forbidden_words])
+def test_tree_keeps(rule):
+    problems = rule(ROOT)
+    assert not problems, "\n" + "\n".join(problems)
+
+
+def test_layers_are_those_of_the_design():
+    known = layers(ROOT)
+    assert set(known) == {"core", "model", "scene", "physics", "robot", "sensors", "server", "bus", "cli"}
+    for outsider in ("physics", "server", "bus", "robot"):
+        assert outsider not in known["sensors"]
+    assert "server" not in known["bus"] and "scene" not in known["physics"] and known["core"] == {"core"}
+
+
+# The rules themselves, on trees that break them.
+
+def tree(folder, files):
+    (folder / "CMakeLists.txt").write_text("ruedo_layer(core LINK Eigen3::Eigen)\nruedo_layer(scene LINK ruedo_core)\n"
+                                           "ruedo_layer(physics LINK ruedo_core)\nruedo_layer(sensors OBJECT LINK ruedo_scene)\n")
+    for name, text in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    return folder
+
+
+@pytest.mark.parametrize("name, include, good", [
+    ("src/sensors/lrf.cpp", '"scene/ray_scene.h"', True),
+    ("src/sensors/lrf.cpp", '"core/x.h"', True),
+    ("src/sensors/lrf.cpp", '"physics/physics_world.h"', False),
+    ("src/scene/ray.cpp", '"sensors/lrf.h"', False),
+    ("src/scene/ray.cpp", "<embree4/rtcore.h>", True),
+    ("src/sensors/lrf.cpp", "<embree4/rtcore.h>", False),
+    ("src/physics/world.cpp", "<btBulletDynamicsCommon.h>", True),
+    ("src/scene/ray.cpp", "<btBulletDynamicsCommon.h>", False),
+    ("src/cli/main.cpp", '"sensors/lrf.h"', True),
+    ("include/ruedo/pose.h", "<Eigen/Geometry>", True),
+    ("include/ruedo/pose.h", '"core/x.h"', False),
+    ("src/newlayer/x.cpp", '"core/x.h"', False),
+])
+def test_walls_are_seen(tmp_path, name, include, good):
+    assert (broken_walls(tree(tmp_path, {name: f"#pragma once\n#include {include}\n"})) == []) == good
+
+
+def test_long_sources_are_seen(tmp_path):
+    assert not long_sources(tree(tmp_path, {"src/core/a.cpp": "\n" * MAX_LINES}))
+    assert long_sources(tree(tmp_path, {"src/core/a.cpp": "\n" * (MAX_LINES + 1)}))
+
+
+@pytest.mark.parametrize("text, good", [("opens a session", True), ("in /wor" + "k/main/build", False), ("as iss" + "ue #2 says", False),
+                                        ("https://py" + "pi.org/x", False)])
+def test_forbidden_words_are_seen(tmp_path, text, good):
+    assert (forbidden_words(tree(tmp_path, {"docs/a.md": text})) == []) == good
