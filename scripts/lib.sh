@@ -107,15 +107,9 @@ build_jobs() {
   echo $((cores < by_memory ? cores : by_memory))
 }
 
-# build PRESET [CMAKE-OPTION...] [-- TARGET...]: configures when needed, then builds the targets (all, without any).
+# build PRESET [-DNAME=VALUE...]: configures where that is not done with these options yet, then builds.
 build() {
-  local preset=$1 folder=$ruedo_root/build/$1 options=()
-  shift
-  while (($#)) && [[ $1 != -- ]]; do
-    options+=("$1")
-    shift
-  done
-  (($#)) && shift
+  local preset=$1 folder=$ruedo_root/build/$1 options=("${@:2}")
   if command -v ccache >/dev/null; then
     options+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_C_COMPILER_LAUNCHER=ccache)
   fi
@@ -135,14 +129,14 @@ build() {
     }
   fi
   local ninja=(ninja -C "$folder" -j "$(build_jobs)")
-  if [[ $("${ninja[@]}" -n "$@" 2>/dev/null) == *"no work to do"* ]]; then
+  if [[ $("${ninja[@]}" -n 2>/dev/null) == *"no work to do"* ]]; then
     return
   fi
   say "building build/$preset (the first time takes some minutes)"
   if [[ -t 2 ]]; then
-    "${ninja[@]}" "$@" >&2
+    "${ninja[@]}" >&2
   else
-    "${ninja[@]}" --quiet "$@" >&2
+    "${ninja[@]}" --quiet >&2
   fi || fail "$EXIT_BUILD" "the build failed; the lines above say where"
 }
 
