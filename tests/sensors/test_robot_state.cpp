@@ -1,0 +1,137 @@
+// The sensors that show the robot's state as it is: true pose, motion status, joints.
+#include <algorithm>
+#include <tuple>
+
+#include <gtest/gtest.h>
+
+#include "ruedo/joint_state_t.hpp"
+#include "ruedo/motion_status_t.hpp"
+#include "ruedo/pose_t.hpp"
+#include "sensors/sensor_bench.h"
+
+namespace ruedo {
+namespace {
+
+using test::Device;
+using test::SensorBench;
+
+const char* const kWorld =
+    "<sdf version='1.9'><world name='w'>"
+    "<model name='rover'><pose>1 2 0 0 0 0</pose><link name='base'/>"
+    "<link name='l'><pose>0 0.2 0.1 0 0 0</pose></link><link name='r'><pose>0 -0.2 0.1 0 0 0</pose></link><link name='head'/><link name='lift'/>"
+    "<joint name='lj' type='revolute'><parent>base</parent><child>l</child><axis><xyz>0 1 0</xyz></axis></joint>"
+    "<joint name='rj' type='revolute'><parent>base</parent><child>r</child><axis><xyz>0 1 0</xyz></axis></joint>"
+    "<joint name='pan' type='revolute'><parent>base</parent><child>head</child><axis><xyz>0 0 1</xyz></axis></joint>"
+    "<joint name='mast' type='prismatic'><parent>base</parent><child>lift</child><axis><xyz>0 0 1</xyz></axis></joint>"
+    "<ruedo:drive><ruedo:left_joint>lj</ruedo:left_joint><ruedo:right_joint>rj</ruedo:right_joint><ruedo:wheel_radius>0.1</ruedo:wheel_radius>"
+    "<ruedo:pose_rate>25</ruedo:pose_rate><ruedo:status_rate>4</ruedo:status_rate></ruedo:drive></model>"
+    "</world></sdf>";
+
+TEST(TruePose, ShowsTheRobotsState) {
+  SensorBench bench(kWorld);
+  Device device = bench.make("rover", "pose");
+  EXPECT_EQ(device.rate, (Rate{25, 1}));
+  EXPECT_EQ(device.kind->name(), "pose");
+  EXPECT_FALSE(device.sensor->observes());
+  Snapshot now = bench.snapshot();
+  now.time = 40'000;
+  RobotState& robot = now.robots[0];
+  robot.X_WBase = {Quat(0.6, 0, 0, 0.8), {1, 2, 3}};
+  robot.twist = {{4, 5, 6}, {7, 8, 9}};
+  robot.acceleration = {10, 11, 12};
+  Outbox out;
+  test::step(device, now, out, 1);
+  const pose_t m = Device::decode<pose_t>(out).at(0);
+  EXPECT_EQ(m.utime, 40'000);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(m.pos[i], 1 + i);
+    EXPECT_EQ(m.vel[i], 4 + i);
+    EXPECT_EQ(m.rotation_rate[i], 7 + i);
+    EXPECT_EQ(m.accel[i], 10 + i);
+  }
+  const double expected[4] = {0.6, 0, 0, 0.8};    // w, x, y, z
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(m.orientation[i], expected[i]);
+}
+
+TEST(MotionStatus, AtItsRateAndAtOnceWhenItChanges) {
+  SensorBench bench(kWorld);
+  Device device = bench.make("rover", "motion");
+  EXPECT_EQ(device.rate, (Rate{4, 1}));
+  Snapshot now = bench.snapshot();
+  Outbox out;
+  test::step(device, now, out, 0);
+  const auto run = [&](int steps, bool due_at_end) {
+    for (int i = 1; i <= steps; ++i) {
+      ++now.step;
+      now.time += 5000;
+      test::step(device, now, out, due_at_end && i == steps ? 1 : -1);
+    }
+  };
+  run(3, false);
+  EXPECT_EQ(out.entries().size(), 1u);    // nothing happened, nothing is due
+  MotionState& motion = now.robots[0].motion;
+  motion = {.id = 42, .kind = 1, .state = motion_status_t::STATE_RUNNING, .reason = 0, .done = 0.25, .remaining = 0.75, .changes = 1};
+  now.robots[0].twist = {{0.5, 0, 0}, {0, 0, 0.1}};
+  run(1, false);    // step 4: at once
+  run(1, false);
+  run(1, true);     // step 6: its time
+  motion.state = motion_status_t::STATE_DONE;
+  motion.changes = 2;
+  run(1, true);     // step 7: both, told once
+  const auto messages = Device::decode<motion_status_t>(out);
+  ASSERT_EQ(messages.size(), 4u);
+  EXPECT_EQ(messages[0].utime, 0);
+  EXPECT_EQ(messages[1].utime, 20'000);
+  EXPECT_EQ(messages[1].id, 42);
+  EXPECT_EQ(messages[1].kind, 1);
+  EXPECT_EQ(messages[1].state, motion_status_t::STATE_RUNNING);
+  EXPECT_EQ(messages[1].done, 0.25);
+  EXPECT_EQ(messages[1].remaining, 0.75);
+  EXPECT_EQ(messages[1].v, 0.5);
+  EXPECT_EQ(messages[1].omega, 0.1);
+  EXPECT_EQ(messages[2].utime, 30'000);
+  EXPECT_EQ(messages[3].utime, 35'000);
+  EXPECT_EQ(messages[3].state, motion_status_t::STATE_DONE);
+  EXPECT_EQ(out.entries()[1].step, 4);
+}
+
+TEST(Joints, ThoseThatAreNoWheels) {
+  SensorBench bench(kWorld);
+  Device device = bench.make("rover", "joints");
+  Snapshot now = bench.snapshot();
+  ASSERT_EQ(now.joint_positions.size(), 2u);
+  now.time = 5000;
+  now.joint_positions = {0.5, 0.25};
+  now.joint_velocities = {1.5, -1};
+  now.joint_efforts = {2, 3};
+  Outbox out;
+  test::step(device, now, out, 0);
+  const joint_state_t m = Device::decode<joint_state_t>(out).at(0);
+  EXPECT_EQ(m.utime, 5000);
+  EXPECT_EQ(m.num_joints, 2);
+  EXPECT_EQ(m.joint_name, (std::vector<std::string>{"pan", "mast"}));
+  EXPECT_EQ(m.joint_position, (std::vector<float>{0.5f, 0.25f}));
+  EXPECT_EQ(m.joint_velocity, (std::vector<float>{1.5f, -1.0f}));
+  EXPECT_EQ(m.joint_effort, (std::vector<float>{2.0f, 3.0f}));
+}
+
+TEST(SensorKinds, AreSortedAndComplete) {
+  const std::vector<SensorKind>& kinds = sensor_kinds();
+  for (size_t i = 1; i < kinds.size(); ++i) {
+    EXPECT_LT(std::tie(kinds[i - 1].order, kinds[i - 1].module, kinds[i - 1].name()),
+              std::tie(kinds[i].order, kinds[i].module, kinds[i].name()));
+  }
+  std::vector<std::string> names;
+  for (const SensorKind& kind : kinds) names.push_back(kind.name());
+  for (const char* name : {"odometry", "pose", "motion", "joints", "imu", "contact"}) {
+    EXPECT_EQ(std::count(names.begin(), names.end(), name), 1) << name;
+  }
+  for (const SensorKind& kind : kinds) {
+    for (const SensorKind& other : kinds) {
+      if (kind.module == other.module) EXPECT_EQ(kind.order, other.order) << kind.name() << " and " << other.name();
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ruedo
