@@ -1,7 +1,4 @@
-# One layer of Ruedo: the library ruedo_<name> of all sources in src/<name>.
-#
-# OBJECT keeps every object file in what links the layer (sensors register themselves; from a static library
-# the linker would drop them).
+# One layer of Ruedo: the static library ruedo_<name> of all sources in src/<name>.
 
 add_library(ruedo_flags INTERFACE)
 # The same bytes everywhere: no contraction to FMA, no fast math, no -march=native.
@@ -15,7 +12,7 @@ if(RUEDO_SANITIZE)
 endif()
 
 function(ruedo_layer name)
-  cmake_parse_arguments(ARG "OBJECT" "" "LINK" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "LINK" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/src/${name}/*.cpp)
   list(FILTER sources EXCLUDE REGEX "_main\\.cpp$")
   if(NOT sources)
@@ -23,11 +20,7 @@ function(ruedo_layer name)
     target_link_libraries(ruedo_${name} INTERFACE ${ARG_LINK})
     return()
   endif()
-  if(ARG_OBJECT)
-    add_library(ruedo_${name} OBJECT ${sources})
-  else()
-    add_library(ruedo_${name} STATIC ${sources})
-  endif()
+  add_library(ruedo_${name} STATIC ${sources})
   target_include_directories(ruedo_${name} PUBLIC ${CMAKE_CURRENT_SOURCE_DIR}/src ${CMAKE_CURRENT_SOURCE_DIR}/include)
   target_link_libraries(ruedo_${name} PUBLIC ${ARG_LINK} PRIVATE ruedo_flags)
 endfunction()
