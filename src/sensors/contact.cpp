@@ -19,7 +19,7 @@ class ContactSensor : public Sensor {
  public:
   explicit ContactSensor(const SensorSetup& setup)
       : world_(setup.world), layout_(setup.layout), link_(setup.link), channel_(setup.channel<contact_t>()) {
-    setup.element.refuse_unknown({});
+    setup.element.refuse_unknown({"ruedo:phase"});    // the server reads it
     const Element* contact = setup.element.child("contact");
     if (!contact) return;
     const model::LinkPlacement& placement = layout_.links[static_cast<size_t>(link_)];

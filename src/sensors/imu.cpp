@@ -19,7 +19,7 @@ class Imu : public Sensor {
     const model::LinkPlacement& link = setup.layout.links[static_cast<size_t>(setup.link)];
     body_ = link.body;
     X_BS_ = link.X_BL * setup.X_LS;
-    setup.element.refuse_unknown({});
+    setup.element.refuse_unknown({"ruedo:phase"});    // the server reads it
     if (const Element* imu = setup.element.child("imu")) configure(*imu, setup);
   }
 
