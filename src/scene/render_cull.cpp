@@ -122,21 +122,19 @@ void Culler::collect(const Region& region, const Vec3& origin, double pixels_per
 
 void Culler::collect_casters(const Region& region, const Vec3& origin, Movers movers, DrawList& list) {
   opaque_.clear();
-  const auto add = [&](const std::vector<uint32_t>& links) {
-    for (const uint32_t link : links) {
-      const RenderLinkKind& kind = content_.link_kinds[static_cast<size_t>(content_.kind_of_link[link])];
-      const Affine& M = M_WL_[link];
-      if (!region.touches(M.leftCols<3>() * kind.centre_L + M.col(3), kind.radius)) continue;
-      for (const RenderPart& part : kind.parts) {
-        if (!part.casts_shadow) continue;
-        if (!region.touches(M.leftCols<3>() * part.centre_L + M.col(3), part.radius)) continue;
-        const int batch = part.radius < kCoarseShadowRadius ? part.small_batch : part.batch;
-        opaque_.push_back({rank_[static_cast<size_t>(batch)], batch, 0.0f, link, &part});
-      }
+  list.spheres.clear();
+  for (const uint32_t link : movers == Movers::only_static ? static_links_ : moving_links_) {
+    const RenderLinkKind& kind = content_.link_kinds[static_cast<size_t>(content_.kind_of_link[link])];
+    const Affine& M = M_WL_[link];
+    const Vec3 link_centre = M.leftCols<3>() * kind.centre_L + M.col(3);
+    if (!region.touches(link_centre, kind.radius)) continue;
+    list.spheres.emplace_back(link_centre, kind.radius);
+    for (const RenderPart& part : kind.parts) {
+      if (!part.casts_shadow || !region.touches(M.leftCols<3>() * part.centre_L + M.col(3), part.radius)) continue;
+      const int batch = part.radius < kCoarseShadowRadius ? part.small_batch : part.batch;
+      opaque_.push_back({rank_[static_cast<size_t>(batch)], batch, 0.0f, link, &part});
     }
-  };
-  if (movers != Movers::only_moving) add(static_links_);
-  if (movers != Movers::only_static) add(moving_links_);
+  }
   std::sort(opaque_.begin(), opaque_.end(), [](const Item& a, const Item& b) {
     return std::tie(a.rank, a.link, a.part) < std::tie(b.rank, b.link, b.part);
   });

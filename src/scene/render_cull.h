@@ -29,6 +29,7 @@ struct DrawList {
   std::vector<Instance> instances;
   std::vector<Run> opaque;         // by batch, near ones first
   std::vector<Run> transparent;    // far ones first
+  std::vector<std::pair<Vec3, double>> spheres;    // collect_casters() only: bounds of the links, m, world
 };
 
 // A convex region of planes n.p + d >= 0, n pointing inwards, world coordinates.
@@ -48,7 +49,7 @@ struct Region {
 
 Region view_region(const View& view);
 
-enum class Movers { all, only_static, only_moving };
+enum class Movers { only_static, only_moving };
 
 class Culler {
  public:

@@ -92,7 +92,7 @@ GLuint RenderDevice::compile(const std::string& vertex, const std::string& fragm
 GLuint RenderDevice::program(Pass pass, uint32_t flags, bool cutout) {
   // Flags that do not change the program, and textures that a pass does not look at, share one.
   uint32_t used = flags & (kTextured | kSpecular | kGround | kMirrored);
-  if (pass != Pass::colour) used = cutout && pass == Pass::geometry ? kTextured : 0;
+  if (pass != Pass::colour) used = cutout && pass == Pass::geometry ? uint32_t{kTextured} : 0u;
   const ProgramKey key{pass, used, cutout && (used & kTextured) != 0};
   const auto [at, inserted] = programs_.try_emplace(key, 0);
   if (inserted) at->second = compile(vertex_shader(pass, used), fragment_shader(pass, used, key.cutout, lights_));
@@ -214,33 +214,54 @@ void RenderDevice::begin_geometry(int width, int height) {
   gl.Disable(GL_POLYGON_OFFSET_FILL);
 }
 
-void RenderDevice::begin_shadow(int size) {
-  if (shadow_framebuffer_ == 0) {
-    gl.ActiveTexture(GL_TEXTURE1);
-    gl.GenTextures(1, &shadow_texture_);
-    gl.BindTexture(GL_TEXTURE_2D, shadow_texture_);
-    gl.TexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT16, size, size, 0, GL_DEPTH_COMPONENT, GL_UNSIGNED_SHORT, nullptr);
-    gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-    gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-    gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
-    gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
-    // Outside of the map there is no shadow.
-    const float lit[4] = {1.0f, 1.0f, 1.0f, 1.0f};
-    gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_BORDER);
-    gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_BORDER);
-    gl.TexParameterfv(GL_TEXTURE_2D, GL_TEXTURE_BORDER_COLOR, lit);
+void RenderDevice::make_shadow_map(ShadowMap& map, int size) {
+  gl.ActiveTexture(GL_TEXTURE1);
+  gl.GenTextures(1, &map.texture);
+  gl.BindTexture(GL_TEXTURE_2D, map.texture);
+  gl.TexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT16, size, size, 0, GL_DEPTH_COMPONENT, GL_UNSIGNED_SHORT, nullptr);
+  gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
+  gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
+  // Outside of the map there is no shadow.
+  const float lit[4] = {1.0f, 1.0f, 1.0f, 1.0f};
+  gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_BORDER);
+  gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_BORDER);
+  gl.TexParameterfv(GL_TEXTURE_2D, GL_TEXTURE_BORDER_COLOR, lit);
+  gl.GenFramebuffers(1, &map.framebuffer);
+  gl.BindFramebuffer(GL_FRAMEBUFFER, map.framebuffer);
+  gl.FramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, map.texture, 0);
+  gl.DrawBuffer(GL_NONE);
+  gl.ReadBuffer(GL_NONE);
+}
+
+void RenderDevice::begin_still_shadow(int size) {
+  if (still_shadow_.texture == 0) {
+    make_shadow_map(still_shadow_, size);
+    make_shadow_map(shadow_, size);    // the later one stays bound to unit 1
     gl.ActiveTexture(GL_TEXTURE0);
-    gl.GenFramebuffers(1, &shadow_framebuffer_);
-    gl.BindFramebuffer(GL_FRAMEBUFFER, shadow_framebuffer_);
-    gl.FramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, shadow_texture_, 0);
-    gl.DrawBuffer(GL_NONE);
-    gl.ReadBuffer(GL_NONE);
   }
-  gl.BindFramebuffer(GL_FRAMEBUFFER, shadow_framebuffer_);
-  gl.Viewport(0, 0, size, size);
+  gl.BindFramebuffer(GL_FRAMEBUFFER, still_shadow_.framebuffer);
   gl.DepthMask(GL_TRUE);
   const float far_depth = 1.0f;
   gl.ClearBufferfv(GL_DEPTH, 0, &far_depth);
+  set_shadow_state(size);
+}
+
+void RenderDevice::begin_shadow(int size, const PixelBox& stale) {
+  if (!stale.empty()) {
+    gl.BindFramebuffer(GL_READ_FRAMEBUFFER, still_shadow_.framebuffer);
+    gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, shadow_.framebuffer);
+    gl.BlitFramebuffer(stale.x0, stale.y0, stale.x1, stale.y1, stale.x0, stale.y0, stale.x1, stale.y1,
+                       GL_DEPTH_BUFFER_BIT, GL_NEAREST);
+  }
+  gl.BindFramebuffer(GL_FRAMEBUFFER, shadow_.framebuffer);
+  set_shadow_state(size);
+}
+
+void RenderDevice::set_shadow_state(int size) {
+  gl.Viewport(0, 0, size, size);
+  gl.DepthMask(GL_TRUE);
   gl.Enable(GL_DEPTH_TEST);
   gl.DepthFunc(GL_LESS);
   gl.Disable(GL_BLEND);

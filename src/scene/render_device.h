@@ -16,6 +16,11 @@
 
 namespace ruedo::scene {
 
+struct PixelBox {
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;    // the upper bounds are outside
+  bool empty() const { return x1 <= x0 || y1 <= y0; }
+};
+
 class RenderDevice {
  public:
   // Makes the context current and leaves it so. Uploads the content's meshes and frees their arrays.
@@ -30,7 +35,10 @@ class RenderDevice {
   // shadow map. Depths run from 1 at the near plane to 0 at the far one, but in the shadow map.
   void begin_colour(int width, int height, int samples);
   void begin_geometry(int width, int height);
-  void begin_shadow(int size);
+  // Shadow maps are square, of `size` texels: that of what stands still is kept, and the one in use is it with the
+  // movers drawn over. `stale`: where the one in use has to be taken from the other first.
+  void begin_still_shadow(int size);
+  void begin_shadow(int size, const PixelBox& stale);
 
   void draw(Pass pass, const std::vector<Instance>& instances, std::span<const Run> opaque,
             std::span<const Run> transparent = {});
@@ -55,6 +63,9 @@ class RenderDevice {
   struct Target {
     GLuint framebuffer = 0, resolved = 0;
   };
+  struct ShadowMap {
+    GLuint framebuffer = 0, texture = 0;
+  };
   struct ProgramKey {
     Pass pass;
     uint32_t flags;
@@ -68,6 +79,8 @@ class RenderDevice {
   const TextureState& texture(int index);
   Target& target(int width, int height, int samples, bool labels);
   void attach(GLenum attachment, GLenum format, int width, int height, int samples);
+  void make_shadow_map(ShadowMap& map, int size);
+  void set_shadow_state(int size);
   void draw_run(Pass pass, const Run& run);
 
   std::unique_ptr<GlContext> context_;
@@ -81,7 +94,7 @@ class RenderDevice {
   GLuint instance_buffer_ = 0, frame_buffer_ = 0, overlay_buffer_ = 0;
   GLuint overlay_array_ = 0, sky_array_ = 0, sky_buffer_ = 0;
   GLuint sky_program_ = 0, line_program_ = 0;
-  GLuint shadow_framebuffer_ = 0, shadow_texture_ = 0;
+  ShadowMap shadow_, still_shadow_;
   int width_ = 0, height_ = 0;
   bool resolve_ = false;
   Target* current_ = nullptr;

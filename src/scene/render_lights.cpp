@@ -28,6 +28,15 @@ constexpr double kShadowReach = 20.0;
 
 }  // namespace
 
+Eigen::Matrix4d ShadowRegion::map_from_world(const Vec3& origin) const {
+  const Vec3 offset = origin - centre;
+  Eigen::Matrix4d M = Eigen::Matrix4d::Identity();
+  M.row(0) << right.transpose() / half, right.dot(offset) / half;
+  M.row(1) << up.transpose() / half, up.dot(offset) / half;
+  M.row(2) << -to_sun.transpose() / (2.0 * reach), 0.5 - to_sun.dot(offset) / (2.0 * reach);
+  return M;
+}
+
 RenderLights::RenderLights(const model::WorldModel& world, const RenderContent& content) : world_(world), content_(content) {
   for (const RenderLight& light : content.lights) {
     auto& list = light.light.type == model::Light::Type::directional ? suns_ : lamps_;
@@ -63,7 +72,12 @@ void RenderLights::fill(const Culler& culler, const View& view, FrameBlock& fram
     const Vec3 to_sun = -(M.leftCols<3>() * suns_[i]->light.direction).normalized();
     frame.sun_direction[i] = vec4(to_sun, 0.0);
     frame.sun_colour[i] = light_colour(suns_[i]->light);
-    if (i == 0 && counts_.shadow) place_shadow(to_sun, view, frame);
+    if (i == 0 && counts_.shadow) {
+      place_shadow(to_sun, view);
+      Eigen::Map<Eigen::Matrix4f>(frame.shadow_from_world.data()) = shadow_.map_from_world(eye).cast<float>();
+      // Surfaces are looked up a texel and a half before them, so that they do not shade themselves.
+      frame.origin[3] = static_cast<float>(1.5 * 2.0 * shadow_.half / ShadowRegion::kSize);
+    }
   }
   for (size_t i = 0; i < lamps_.size(); ++i) {
     const model::Light& light = lamps_[i]->light;
@@ -76,7 +90,7 @@ void RenderLights::fill(const Culler& culler, const View& view, FrameBlock& fram
   }
 }
 
-void RenderLights::place_shadow(const Vec3& to_sun, const View& view, FrameBlock& frame) {
+void RenderLights::place_shadow(const Vec3& to_sun, const View& view) {
   // The whole world where it is small or seen from outside, else the surroundings of the camera.
   const Vec3 eye = view.X_WCamera.translation;
   const Vec3 middle = 0.5 * (content_.low + content_.high);
@@ -97,18 +111,12 @@ void RenderLights::place_shadow(const Vec3& to_sun, const View& view, FrameBlock
              to_sun * step * std::round(centre.dot(to_sun) / step);
   }
   const double reach = half + whole;    // along the rays: casters far above count too
-  Eigen::Matrix4d M = Eigen::Matrix4d::Identity();
-  M.block<1, 3>(0, 0) = right.transpose() / half;
-  M.block<1, 3>(1, 0) = up.transpose() / half;
-  M.block<1, 3>(2, 0) = -to_sun.transpose() / (2.0 * reach);
-  M(0, 3) = -right.dot(centre - eye) / half;
-  M(1, 3) = -up.dot(centre - eye) / half;
-  M(2, 3) = 0.5 + to_sun.dot(centre - eye) / (2.0 * reach);
-  Eigen::Map<Eigen::Matrix4f>(frame.shadow_from_world.data()) = M.cast<float>();
-  frame.origin[3] = static_cast<float>(1.5 * 2.0 * half / ShadowRegion::kSize);
-
   shadow_.centre = centre;
+  shadow_.right = right;
+  shadow_.up = up;
+  shadow_.to_sun = to_sun;
   shadow_.half = half;
+  shadow_.reach = reach;
   shadow_.region.planes.clear();
   for (const auto& [normal, size] : {std::pair{right, half}, {up, half}, {to_sun, reach}}) {
     shadow_.region.planes.push_back({normal, size - normal.dot(centre)});

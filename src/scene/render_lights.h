@@ -14,7 +14,15 @@ struct ShadowRegion {
   static constexpr int kSize = 2048;    // texels a side of the shadow map
   Region region;
   Vec3 centre = Vec3::Zero();           // m, world
+  Vec3 right = Vec3::UnitX(), up = Vec3::UnitY(), to_sun = Vec3::UnitZ();    // its axes
   double half = 1.0;                    // m, half a side
+  double reach = 1.0;                   // m, half its length along the rays
+
+  // From world coordinates relative to `origin` to the map: x and y in [-1, 1], depth in [0, 1].
+  Eigen::Matrix4d map_from_world(const Vec3& origin) const;
+  bool same_place(const ShadowRegion& other) const {
+    return centre == other.centre && to_sun == other.to_sun && half == other.half && reach == other.reach;
+  }
 };
 
 class RenderLights {
@@ -29,7 +37,7 @@ class RenderLights {
   const ShadowRegion& shadow() const { return shadow_; }    // of the last fill()
 
  private:
-  void place_shadow(const Vec3& to_sun, const View& view, FrameBlock& frame);
+  void place_shadow(const Vec3& to_sun, const View& view);
 
   const model::WorldModel& world_;
   const RenderContent& content_;

@@ -77,7 +77,7 @@ class GlRenderer : public Renderer {
     if (picture.want_depth) picture.depth.resize(pixels);
     if (picture.want_rgb) {
       picture.rgb.resize(3 * pixels);
-      draw_shadows(frame, eye);
+      draw_shadows();
       device_.set_frame(frame);
       device_.begin_colour(view.width, view.height, samples);
       device_.draw(Pass::colour, visible_.instances, visible_.opaque);
@@ -116,13 +116,39 @@ class GlRenderer : public Renderer {
                     static_cast<float>(p.y() - 2.0 * std::floor(0.5 * p.y())), static_cast<float>(view.exposure), 0.0f};
   }
 
-  void draw_shadows(FrameBlock& frame, const Vec3& eye) {
+  // The map of what stands still is drawn once for each place of the region, and the movers each time. Both are
+  // worked out around the region's centre, not the eye: what was drawn before must not show.
+  void draw_shadows() {
     if (!lights_.counts().shadow) return;
     const ShadowRegion& shadow = lights_.shadow();
-    culler_.collect_casters(shadow.region, eye, Movers::all, casters_);
+    constexpr int kSize = ShadowRegion::kSize;
+    FrameBlock frame{};
+    frame.shadow_from_world = to_floats(shadow.map_from_world(shadow.centre));
     device_.set_frame(frame);
-    device_.begin_shadow(ShadowRegion::kSize);
+    if (!shadow_drawn_ || !shadow.same_place(shadow_place_)) {
+      culler_.collect_casters(shadow.region, shadow.centre, Movers::only_static, casters_);
+      device_.begin_still_shadow(kSize);
+      device_.draw(Pass::shadow, casters_.instances, casters_.opaque);
+      shadow_place_ = shadow;
+      shadow_drawn_ = true;
+      stale_ = {0, 0, kSize, kSize};
+    }
+    culler_.collect_casters(shadow.region, shadow.centre, Movers::only_moving, casters_);
+    device_.begin_shadow(kSize, stale_);
+    stale_ = {};
+    if (casters_.opaque.empty()) return;
     device_.draw(Pass::shadow, casters_.instances, casters_.opaque);
+    Eigen::AlignedBox2d box;
+    for (const auto& [centre, radius] : casters_.spheres) {
+      const Eigen::Vector2d at(shadow.right.dot(centre - shadow.centre), shadow.up.dot(centre - shadow.centre));
+      box.extend(at.array().matrix() - Eigen::Vector2d::Constant(radius));
+      box.extend(at.array().matrix() + Eigen::Vector2d::Constant(radius));
+    }
+    const auto texel = [&](double metres, double rounding) {
+      const double t = (metres / shadow.half + 1.0) * 0.5 * kSize;
+      return static_cast<int>(std::clamp(std::floor(t) + rounding, 0.0, static_cast<double>(kSize)));
+    };
+    stale_ = {texel(box.min().x(), -1.0), texel(box.min().y(), -1.0), texel(box.max().x(), 2.0), texel(box.max().y(), 2.0)};
   }
 
   void draw_sky(const View& view) {
@@ -194,6 +220,9 @@ class GlRenderer : public Renderer {
   std::string description_;
   DrawList visible_, casters_;
   std::vector<float> overlay_;
+  ShadowRegion shadow_place_;      // of the kept shadow map
+  bool shadow_drawn_ = false;
+  PixelBox stale_;                 // where movers are in the shadow map in use
 };
 
 }  // namespace

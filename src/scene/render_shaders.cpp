@@ -127,7 +127,7 @@ std::string fragment_shader(Pass pass, uint32_t flags, bool cutout, const LightC
   s += R"(
   vec3 n = normalize(v_normal);
   if (!gl_FrontFacing) n = -n;
-  vec3 light = mix(ambient_down.rgb, ambient_up.rgb, 0.5 + 0.5 * n.z);
+  vec3 light = mix(ambient_down.rgb, ambient_up.rgb, 0.5 + 0.5 * dot(n, vec3(0.30, 0.20, 0.933)));
 )";
   const bool specular = (flags & kSpecular) != 0;
   if (specular) {
