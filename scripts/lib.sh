@@ -77,7 +77,9 @@ ensure_packages() {
   "${as_root[@]}" apt-get update -q >/dev/null || say "the package lists could not be updated; going on with the old ones"
   mapfile -t missing < <(missing_packages "$@")
   say "installing ${#missing[@]} packages: ${missing[*]}"
-  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install --no-install-recommends -y -q "${missing[@]}" >/dev/null ||
+  local progress=/dev/null
+  [[ ! -t 2 ]] || progress=/dev/stderr
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install --no-install-recommends -y -q "${missing[@]}" >"$progress" ||
     fail "$EXIT_ENVIRONMENT" "apt-get could not install the packages; the lines above say why"
 }
 
