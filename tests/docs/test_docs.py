@@ -61,6 +61,14 @@ def test_links_lead_somewhere(document):
             assert (document.parent / target).exists(), f"{document.name}: {target}"
 
 
+def test_packages_of_the_scripts_are_listed():
+    script = (ROOT / "scripts/lib.sh").read_text(encoding="utf-8")
+    page = (ROOT / "docs/getting-started.md").read_text(encoding="utf-8").split()
+    for group in re.findall(r"readonly (?:BUILD|TEST)_PACKAGES=\((.*?)\)", script, re.DOTALL):
+        for specification in group.replace('"', "").replace("?", "").split():
+            assert set(specification.split("|")) & set(page), specification
+
+
 def test_a_failing_block_is_seen(tmp_path):
     assert run_block("true | false\ntrue\n", tmp_path).returncode != 0
 
