@@ -13,7 +13,7 @@ readonly EXIT_BUILD=1 EXIT_ENVIRONMENT=4
 readonly BUILD_PACKAGES=(
   g++ cmake ninja-build pkg-config ccache python3-venv default-jdk-headless ca-certificates
   libbullet-dev libtinyxml2-dev liburdfdom-dev libassimp-dev libembree-dev libtbb-dev libeigen3-dev
-  "libosmesa6-dev|libegl-dev" "libgl-dev" "?libegl-mesa0"
+  "?libosmesa6-dev" libegl-dev libegl-mesa0 libgl-dev
   libopencv-core-dev libopencv-imgcodecs-dev libopencv-imgproc-dev
   libcli11-dev libspdlog-dev libfmt-dev "libglib2.0-0t64|libglib2.0-0"
 )
