@@ -1,11 +1,11 @@
 // Rays a second of Ruedo's caster, of bare Embree (native triangles, single precision) and of Bullet's rayTest
-// (double), in one program, scene and run: an office of 269 boxes, and the same as triangle meshes.
+// (double), in one program, scene and run: an office of boxes, and the same as triangle meshes.
 //
 //   bench_rays [repeats]      one core; medians; 181-ray scans of 180 degrees, 30 m
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <functional>
 #include <memory>
 #include <string>
@@ -48,11 +48,11 @@ std::vector<BoxAt> office() {
         wall(x, y, x, y + 5);
       } else {
         wall(x, y, x, y + 2);
-        if (boxes.size() < 168) wall(x, y + 3, x, y + 5);
+        if (i != 4) wall(x, y + 3, x, y + 5);
       }
     }
   RandomStream random = RandomSource(1, "office", "furniture").stream(0);
-  for (int i = 0; i < 100; ++i) {
+  for (int i = 0; i < 90; ++i) {
     const Vec3 half(0.1 + 0.4 * random.uniform(), 0.1 + 0.4 * random.uniform(), 0.2 + 0.6 * random.uniform());
     boxes.push_back({{1 + 38 * random.uniform(), 1 + 28 * random.uniform(), half.z()}, half});
   }
@@ -132,13 +132,20 @@ std::vector<scene::Ray> scans(const std::vector<BoxAt>& boxes, int count) {
   return rays;
 }
 
+// Of this thread alone, so that other programs disturb less.
+double cpu_time_us() {
+  timespec now;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return 1e6 * static_cast<double>(now.tv_sec) + 1e-3 * static_cast<double>(now.tv_nsec);
+}
+
 // Million rays a second: the median of some runs.
 double measure(size_t rays, int repeats, const std::function<void()>& run) {
   std::vector<double> rates;
   for (int i = 0; i < repeats; ++i) {
-    const auto start = std::chrono::steady_clock::now();
+    const double start = cpu_time_us();
     run();
-    rates.push_back(static_cast<double>(rays) / std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - start).count());
+    rates.push_back(static_cast<double>(rays) / (cpu_time_us() - start));
   }
   std::nth_element(rates.begin(), rates.begin() + repeats / 2, rates.end());
   return rates[static_cast<size_t>(repeats / 2)];

@@ -29,43 +29,57 @@ RayMesh::RayMesh(const model::Mesh& mesh, const Vec3& scale, const Pose& X_FMesh
     for (const uint32_t corner : triangle) box_.add(positions_[corner]);
   margin_ = box_.margin();
   box_.grow(margin_);
+
+  const auto share_edge = [&](int i, int j) {
+    int common = 0;
+    for (int k = 0; k < 9; ++k) common += corner(i, k / 3) == corner(j, k % 3);
+    return common >= 2;
+  };
+  const int n = static_cast<int>(size());
+  for (int i = 0; i < n;) {
+    pairs_.push_back(i);
+    i += i + 1 < n && share_edge(i, i + 1) ? 2 : 1;
+  }
+  pairs_.push_back(n);
 }
 
 void RayMesh::build_tree(RTCDevice device) {
   const KeepFloatMode keep;
   scene_.reset(rtcNewScene(device));
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
-  rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(triangles_.size()));
+  rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(pairs_.size() - 1));
   rtcSetGeometryUserData(geometry, this);
   rtcSetGeometryBoundsFunction(geometry, bounds, nullptr);
-  rtcSetGeometryIntersectFunction(geometry, intersect_triangle);
+  rtcSetGeometryIntersectFunction(geometry, intersect_pair);
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(scene_.get(), geometry);
   rtcReleaseGeometry(geometry);
   rtcCommitScene(scene_.get());
 }
 
-Box RayMesh::triangle_box(int triangle) const {
+Box RayMesh::pair_box(unsigned pair) const {
   Box box;
-  for (int i = 0; i < 3; ++i) box.add(corner(triangle, i));
+  for (int triangle = pairs_[pair]; triangle < pairs_[pair + 1]; ++triangle)
+    for (int i = 0; i < 3; ++i) box.add(corner(triangle, i));
   return box;
 }
 
 void RayMesh::bounds(const RTCBoundsFunctionArguments* arguments) {
   const RayMesh& mesh = *static_cast<const RayMesh*>(arguments->geometryUserPtr);
-  Box box = mesh.triangle_box(static_cast<int>(arguments->primID));
+  Box box = mesh.pair_box(arguments->primID);
   box.grow(mesh.margin_);
   *arguments->bounds_o = box.bounds();
 }
 
-void RayMesh::intersect_triangle(const RTCIntersectFunctionNArguments* arguments) {
+void RayMesh::intersect_pair(const RTCIntersectFunctionNArguments* arguments) {
   auto& query = *static_cast<Query*>(arguments->context);
-  const int triangle = static_cast<int>(arguments->primID);
-  if (query.counting_from) {
-    query.crossings += query.mesh->crossing(triangle, *query.counting_from, way_out());
-    return;
+  const RayMesh& mesh = *query.mesh;
+  const unsigned lanes = lanes_of(*arguments);
+  for (int i = mesh.pairs_[arguments->primID]; i < mesh.pairs_[arguments->primID + 1]; ++i) {
+    if (query.counting_from) query.crossings += mesh.crossing(i, *query.counting_from, way_out());
+    else mesh.test(i, lanes, *query.rays, [&](int lane, double t) { query.offer(lane, t, i); });
   }
-  query.mesh->test(triangle, lanes_of(*arguments), *query.rays, [&](int lane, double t) { query.offer(lane, t, triangle); });
+  if (query.counting_from) return;
   shorten(*arguments, [&](unsigned lane) { return std::min(query.hits[lane].t, query.t_max[lane]) - query.packet.start[lane]; });
 }
 

@@ -46,7 +46,10 @@ class RayMesh {
 
   Vec3 normal(int triangle) const;    // unit, by the winding
   size_t size() const { return triangles_.size(); }
-  Box triangle_box(int triangle) const;
+  // Neighbours in the list that share an edge are one primitive of the trees: half the leaves. Primitive i holds the
+  // triangles from pairs()[i] up to pairs()[i + 1].
+  const std::vector<int>& pairs() const { return pairs_; }
+  Box pair_box(unsigned pair) const;
   const Box& box() const { return box_; }    // grown by its margin()
   bool closed() const { return closed_; }
   const std::vector<Vec3>& positions() const { return positions_; }
@@ -64,10 +67,11 @@ class RayMesh {
   Seen seen(int triangle, const Vec3& o) const { return {corner(triangle, 0), corner(triangle, 1), corner(triangle, 2), o}; }
   static double distance(const Seen& seen, const Vec3& area, const Vec3& d);
   static void bounds(const RTCBoundsFunctionArguments* arguments);
-  static void intersect_triangle(const RTCIntersectFunctionNArguments* arguments);
+  static void intersect_pair(const RTCIntersectFunctionNArguments* arguments);
 
   std::vector<Vec3> positions_;
   std::vector<std::array<uint32_t, 3>> triangles_;
+  std::vector<int> pairs_;
   bool closed_ = false;
   Box box_;
   double margin_ = 0.0;

@@ -160,6 +160,11 @@ void EmbreeRayScene::write(const RayBatch& batch, int lane, Hit& hit) const {
     hit.normal = -d;
     return;
   }
+  if (shape.kind == model::Shape::mesh && shape.body < 0) {    // in the world's frame
+    const Vec3 normal = shape.mesh->normal(batch.feature[lane]);
+    hit.normal = normal.dot(d) <= 0.0 ? normal : Vec3(-normal);
+    return;
+  }
   const IntoShape* body = nullptr;
   if (shape.body >= 0) {
     const int mover = mover_of_body_[static_cast<size_t>(shape.body)];

@@ -46,8 +46,8 @@ class RayTree {
     int index;    // of the shape, in the table
   };
   static void bounds(const RTCBoundsFunctionArguments* arguments);
-  static void triangle_bounds(const RTCBoundsFunctionArguments* arguments);
-  static void test_triangle(const RTCIntersectFunctionNArguments* arguments);
+  static void pair_bounds(const RTCBoundsFunctionArguments* arguments);
+  static void test_pair(const RTCIntersectFunctionNArguments* arguments);
   RTCGeometry attach(RTCDevice device, size_t primitives, void* user, RTCBoundsFunction bounds, RTCIntersectFunctionN callback);
 
   std::vector<Box> boxes_;

@@ -32,7 +32,7 @@ void RayTree::build(RTCDevice device, std::vector<Box> boxes, RTCIntersectFuncti
   }
   std::vector<RTCGeometry> geometries;
   for (Triangles& part : triangles_)
-    geometries.push_back(attach(device, part.shape->mesh->size(), &part, triangle_bounds, test_triangle));
+    geometries.push_back(attach(device, part.shape->mesh->pairs().size() - 1, &part, pair_bounds, test_pair));
   all_ = meshes_;
   for (const Box& box : boxes_) all_.add(box);
   margin_ = all_.margin();
@@ -58,26 +58,26 @@ void RayTree::bounds(const RTCBoundsFunctionArguments* arguments) {
   *arguments->bounds_o = box.bounds();
 }
 
-void RayTree::triangle_bounds(const RTCBoundsFunctionArguments* arguments) {
+void RayTree::pair_bounds(const RTCBoundsFunctionArguments* arguments) {
   const Triangles& part = *static_cast<const Triangles*>(arguments->geometryUserPtr);
-  Box box = part.shape->mesh->triangle_box(static_cast<int>(arguments->primID));
+  Box box = part.shape->mesh->pair_box(arguments->primID);
   box.grow(part.tree->margin_);
   *arguments->bounds_o = box.bounds();
 }
 
-void RayTree::test_triangle(const RTCIntersectFunctionNArguments* arguments) {
+void RayTree::test_pair(const RTCIntersectFunctionNArguments* arguments) {
   auto& query = *static_cast<TreeQuery*>(arguments->context);
   const Triangles& part = *static_cast<const Triangles*>(arguments->geometryUserPtr);
   const RayMesh& mesh = *part.shape->mesh;
-  const int triangle = static_cast<int>(arguments->primID);
-  if (query.counting) {
-    if (query.counting == &mesh) query.crossings += mesh.crossing(triangle, query.counting_from, RayMesh::way_out());
-    return;
-  }
   RayBatch& batch = query.batch;
-  if (part.shape->link == batch.ignored_link) return;
-  mesh.test(triangle, lanes_of(*arguments), batch.world,
-            [&](int lane, double t) { batch.offer(lane, {t, triangle}, part.index); });
+  if (part.shape->link == batch.ignored_link && !query.counting) return;
+  if (query.counting && query.counting != &mesh) return;
+  const unsigned lanes = lanes_of(*arguments);
+  for (int i = mesh.pairs()[arguments->primID]; i < mesh.pairs()[arguments->primID + 1]; ++i) {
+    if (query.counting) query.crossings += mesh.crossing(i, query.counting_from, RayMesh::way_out());
+    else mesh.test(i, lanes, batch.world, [&](int lane, double t) { batch.offer(lane, {t, i}, part.index); });
+  }
+  if (query.counting) return;
   shorten(*arguments, [&](unsigned lane) { return batch.t[lane] - query.packet.start[lane]; });
 }
 
