@@ -31,20 +31,28 @@ fail() {    # CODE MESSAGE...
   exit "$code"
 }
 
-is_installed() { [[ $(dpkg-query -W -f='${db:Status-Status}' "$1" 2>/dev/null) == installed ]]; }
-
-is_known_to_apt() { apt-cache show --no-all-versions "$1" >/dev/null 2>&1; }
-
 # Prints those of the given package specifications that have to be installed, as names for apt.
 missing_packages() {
-  local spec name alternatives
+  local spec name wanted=() alternatives
+  local -A installed=() known=()
+  mapfile -t alternatives < <(printf '%s\n' "${@#\?}" | tr '|' '\n')
+  while read -r name; do installed[$name]=1; done < <(
+    dpkg-query -W -f='${db:Status-Status} ${Package}\n' "${alternatives[@]}" 2>/dev/null | sed -n 's/^installed //p')
   for spec in "$@"; do
     IFS='|' read -ra alternatives <<<"${spec#\?}"
     for name in "${alternatives[@]}"; do
-      is_installed "$name" && continue 2
+      [[ -z ${installed[$name]:-} ]] || continue 2
     done
+    wanted+=("$spec")
+  done
+  ((${#wanted[@]})) || return 0
+  mapfile -t alternatives < <(printf '%s\n' "${wanted[@]#\?}" | tr '|' '\n')
+  while read -r name; do known[$name]=1; done < <(
+    apt-cache show --no-all-versions "${alternatives[@]}" 2>/dev/null | sed -n 's/^Package: //p')
+  for spec in "${wanted[@]}"; do
+    IFS='|' read -ra alternatives <<<"${spec#\?}"
     for name in "${alternatives[@]}"; do
-      if is_known_to_apt "$name"; then
+      if [[ -n ${known[$name]:-} ]]; then
         printf '%s\n' "$name"
         continue 2
       fi
@@ -85,8 +93,8 @@ ensure_packages() {
 
 # .venv with what requirements.txt asks for.
 ensure_venv() {
-  local wanted="$ruedo_root/scripts/requirements.txt" stamp="$ruedo_venv/ruedo-requirements.txt"
-  if cmp -s "$wanted" "$stamp" && "$ruedo_venv/bin/python" -c 'import lcm, numpy, pytest' 2>/dev/null; then
+  local requirements="$ruedo_root/scripts/requirements.txt" stamp="$ruedo_venv/ruedo-requirements.txt"
+  if cmp -s "$requirements" "$stamp" && "$ruedo_venv/bin/python" -c 'import lcm, numpy, pytest' 2>/dev/null; then
     return
   fi
   if ! "$ruedo_venv/bin/python" -m pip --version >/dev/null 2>&1; then
@@ -94,9 +102,9 @@ ensure_venv() {
     python3 -m venv --clear "$ruedo_venv" || fail "$EXIT_ENVIRONMENT" "python3 -m venv failed (package python3-venv)"
   fi
   say "installing LCM and what the Python client needs into .venv"
-  "$ruedo_venv/bin/python" -m pip install --quiet --disable-pip-version-check -r "$wanted" ||
+  "$ruedo_venv/bin/python" -m pip install --quiet --disable-pip-version-check -r "$requirements" ||
     fail "$EXIT_ENVIRONMENT" "pip could not install scripts/requirements.txt; the lines above say why"
-  cp "$wanted" "$stamp"
+  cp "$requirements" "$stamp"
 }
 
 # Compilers side by side: one for each core, and no more than one for each 1.5 GB of memory.
