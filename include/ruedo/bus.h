@@ -19,7 +19,13 @@ class Bus {
   // Called from the bus's own thread for every message on one of the channels given to listen(). The bytes are
   // as they came: nothing about them is checked.
   using Handler = std::function<void(const std::string& channel, const uint8_t* data, size_t size)>;
-  virtual void listen(const std::vector<std::string>& channels, Handler handler) = 0;
+
+  // Starts to listen; once in a bus's life. `own` are the channels that this process publishes: a bus that hears
+  // itself can tell them from a stranger's.
+  virtual void listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own = {}) = 0;
+
+  // Messages that could not be sent so far.
+  virtual uint64_t failed() const { return 0; }
 };
 
 }  // namespace ruedo

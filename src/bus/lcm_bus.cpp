@@ -1,0 +1,120 @@
+// Sending and listening over LCM, with one thread of our own that listens.
+#include "bus/lcm_bus.h"
+
+#include <algorithm>
+#include <cctype>
+#include <set>
+
+#include <poll.h>
+#include <pthread.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <spdlog/spdlog.h>
+
+#include "ruedo/errors.h"
+
+namespace ruedo::bus {
+
+std::vector<std::string> channel_patterns(const std::vector<std::string>& names) {
+  std::set<std::string> patterns;
+  for (const std::string& name : names) {
+    std::string pattern;
+    for (size_t i = 0; i < name.size(); ++i) {
+      if (std::isdigit(static_cast<unsigned char>(name[i]))) {
+        if (i > 0 && std::isdigit(static_cast<unsigned char>(name[i - 1]))) continue;
+        pattern += "[0-9]{1,9}";
+      } else {
+        if (!std::isalnum(static_cast<unsigned char>(name[i])) && name[i] != '_' && name[i] != '/') pattern += '\\';
+        pattern += name[i];
+      }
+    }
+    patterns.insert(pattern);
+  }
+  return {patterns.begin(), patterns.end()};
+}
+
+LcmBus::LcmBus(const std::string& url) : url_(parse_url(url)) {
+  check_route(url_);
+  out_ = std::make_unique<lcm::LCM>(url_.str());
+  if (!out_->good()) throw EnvironmentError("LCM cannot open '" + url_.str() + "': run `ruedo doctor`");
+}
+
+LcmBus::~LcmBus() {
+  if (thread_.joinable()) {
+    const uint64_t one = 1;
+    [[maybe_unused]] const ssize_t written = ::write(stop_event_, &one, sizeof one);
+    thread_.join();
+  }
+  if (stop_event_ >= 0) ::close(stop_event_);
+}
+
+void LcmBus::publish(const std::string& channel, const uint8_t* data, size_t size) {
+  if (out_->publish(channel, data, static_cast<unsigned>(size)) != 0) ++failed_;
+}
+
+void LcmBus::listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own) {
+  handler_ = std::move(handler);
+  channels_.insert(channels.begin(), channels.end());
+  patterns_ = channel_patterns(channels);
+  std::vector<std::string> known = channels;
+  known.insert(known.end(), own.begin(), own.end());
+  unknown_pattern_ = "(?!(?:";
+  for (const std::string& pattern : channel_patterns(known)) unknown_pattern_ += pattern + "|";
+  unknown_pattern_ += "LCM_SELF_TEST)$).*";
+  // A slow reader is none of ours: the handler only checks and stores. Room for a burst from every robot.
+  queue_size_ = static_cast<int>(std::clamp<size_t>(4 * channels.size(), 64, 65536));
+  subscribe();
+  stop_event_ = ::eventfd(0, EFD_CLOEXEC);
+  thread_ = std::thread([this] { read(); });
+}
+
+void LcmBus::subscribe() {
+  if (url_.scheme == "memq") {
+    in_ = std::shared_ptr<lcm::LCM>(out_.get(), [](lcm::LCM*) {});    // messages stay inside of one instance
+  } else {
+    in_ = std::make_shared<lcm::LCM>(url_.str());
+    if (!in_->good()) throw EnvironmentError("LCM cannot open '" + url_.str() + "': run `ruedo doctor`");
+  }
+  for (const std::string& pattern : patterns_) {
+    lcm::Subscription* subscription = in_->subscribe(pattern, &LcmBus::on_message, this);
+    if (subscription) subscription->setQueueCapacity(queue_size_);
+  }
+  if (url_.scheme != "memq") {
+    lcm::Subscription* subscription = in_->subscribe(unknown_pattern_, &LcmBus::on_unknown, this);
+    if (subscription) subscription->setQueueCapacity(1024);
+  }
+  // LCM's subscribe succeeds even where nothing can be received.
+  if (in_->getFileno() < 0) throw EnvironmentError("LCM cannot listen on '" + url_.str() + "': run `ruedo doctor`");
+}
+
+void LcmBus::read() {
+  pthread_setname_np(pthread_self(), "bus");
+  for (;;) {
+    pollfd waiting[2] = {{in_->getFileno(), POLLIN, 0}, {stop_event_, POLLIN, 0}};
+    if (::poll(waiting, 2, -1) < 0) continue;    // a signal
+    if (waiting[1].revents != 0) return;
+    if (waiting[0].revents == 0) continue;
+    if (in_->handle() != 0) ++failed_;
+    if (unknown_.size() < kMostUnknownNames) continue;
+    unknown_.clear();
+    ++renewals_;
+    try {
+      subscribe();
+    } catch (const std::exception& error) {
+      spdlog::error("the bus is deaf: {}", error.what());
+      return;
+    }
+  }
+}
+
+void LcmBus::on_message(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
+  if (!channels_.contains(channel)) return on_unknown(buffer, channel);    // the patterns are wider than the list
+  handler_(channel, static_cast<const uint8_t*>(buffer->data), buffer->data_size);
+}
+
+void LcmBus::on_unknown(const lcm::ReceiveBuffer*, const std::string& channel) {
+  unknown_.insert(std::hash<std::string>()(channel));
+}
+
+}  // namespace ruedo::bus

@@ -1,0 +1,147 @@
+// Commands from the bus to the robots: decoded with every length checked, kept in order of arrival.
+#include "server/command_inbox.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include <spdlog/spdlog.h>
+
+namespace ruedo::server {
+
+DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size, robot::Command& command) {
+  DecodeFault fault = DecodeFault::none;
+  switch (kind) {
+    case Input::Kind::velocity: {
+      velocity_command_t message;
+      fault = decode_checked(data, size, message);
+      if (fault == DecodeFault::none) command.what = robot::VelocityCommand{message.vx, message.vy, message.omega};
+      break;
+    }
+    case Input::Kind::wheels: {
+      wheel_command_t message;
+      fault = decode_checked(data, size, message);
+      if (fault == DecodeFault::none) command.what = robot::WheelCommand{std::move(message.rate)};
+      break;
+    }
+    case Input::Kind::move: {
+      move_command_t message;
+      fault = decode_checked(data, size, message);
+      if (fault == DecodeFault::none) {
+        command.what = robot::MoveCommand{message.id,    message.kind,         message.value,       message.radius,
+                                          message.speed, message.acceleration, message.deceleration};
+      }
+      break;
+    }
+    case Input::Kind::joints: {
+      joint_command_t message;
+      fault = decode_checked(data, size, message);
+      if (fault == DecodeFault::none) {
+        command.what = robot::JointCommand{std::move(message.name), {message.mode.begin(), message.mode.end()},
+                                           std::move(message.value)};
+      }
+      break;
+    }
+    case Input::Kind::reset_odometry: {
+      name_request_t message;
+      fault = decode_checked(data, size, message);
+      if (fault == DecodeFault::none) command.what = robot::ResetOdometry{};
+      break;
+    }
+  }
+  return fault;
+}
+
+CommandInbox::CommandInbox(std::vector<Input> inputs, int robots)
+    : inputs_(std::move(inputs)), reset_input_(static_cast<size_t>(robots), -1), slots_(static_cast<size_t>(robots)) {
+  for (size_t i = 0; i < inputs_.size(); ++i) {
+    const Input& input = inputs_[i];
+    if (input.kind == Input::Kind::reset_odometry) {
+      reset_input_[static_cast<size_t>(input.robot)] = static_cast<int>(i);
+    } else {
+      by_channel_.emplace(input.channel, static_cast<int>(i));
+    }
+  }
+  waiting_.reserve(slots_.size());
+}
+
+void CommandInbox::receive(const std::string& channel, const uint8_t* data, size_t size) {
+  const auto found = by_channel_.find(channel);
+  if (found == by_channel_.end()) return;
+  if (size > kMaxMessageSize) return refuse(channel, "more than 64 kB");
+  const Input& input = inputs_[static_cast<size_t>(found->second)];
+  robot::Command command;
+  command.robot = input.robot;
+  const DecodeFault fault = decode_command(input.kind, data, size, command);
+  if (fault != DecodeFault::none) return refuse(channel, describe(fault));
+  keep(found->second, command, data, size);
+}
+
+void CommandInbox::reset_odometry(int robot, const std::vector<uint8_t>& body) {
+  robot::Command command{robot, robot::ResetOdometry{}};
+  keep(reset_input_[static_cast<size_t>(robot)], command, body.data(), body.size());
+}
+
+CommandInbox::Entry& CommandInbox::next_entry(int robot) {
+  Slots& slots = slots_[static_cast<size_t>(robot)];
+  if (slots.size == 0) waiting_.push_back(robot);
+  if (slots.size == kKeptPerRobot) {
+    slots.first = (slots.first + 1) % kKeptPerRobot;
+    --slots.size;
+    ++displaced_;
+  }
+  return slots.entries[(slots.first + slots.size++) % kKeptPerRobot];
+}
+
+void CommandInbox::keep(int input, robot::Command& command, const uint8_t* data, size_t size) {
+  std::lock_guard lock(mutex_);
+  Entry& entry = next_entry(command.robot);
+  entry.arrival = arrivals_++;
+  entry.input = input;
+  std::swap(entry.command, command);
+  entry.bytes.assign(data, data + size);
+  any_.store(true, std::memory_order_release);
+}
+
+void CommandInbox::refuse(const std::string& channel, const char* why) {
+  ++refused_;
+  const int64_t now_ns = std::chrono::steady_clock::now().time_since_epoch().count();
+  if (last_warning_ns_ != 0 && now_ns - last_warning_ns_ < 1'000'000'000) return;
+  last_warning_ns_ = now_ns;
+  spdlog::warn("{}: a message was ignored: {} ({} ignored so far)", channel, why, refused_.load());
+}
+
+void CommandInbox::apply(robot::Robots& robots, int64_t step, Batch& batch) {
+  if (!any_.load(std::memory_order_acquire)) return;
+  size_t count = 0;
+  {
+    std::lock_guard lock(mutex_);
+    any_.store(false, std::memory_order_relaxed);
+    for (int robot : waiting_) {
+      Slots& slots = slots_[static_cast<size_t>(robot)];
+      for (size_t i = 0; i < slots.size; ++i) {
+        if (count == taken_.size()) taken_.emplace_back();
+        std::swap(taken_[count++], slots.entries[(slots.first + i) % kKeptPerRobot]);
+      }
+      slots.size = 0;
+    }
+    waiting_.clear();
+  }
+  std::sort(taken_.begin(), taken_.begin() + static_cast<std::ptrdiff_t>(count),
+            [](const Entry& a, const Entry& b) { return a.arrival < b.arrival; });
+  for (size_t i = 0; i < count; ++i) {
+    robots.apply(taken_[i].command);
+    if (static_cast<size_t>(batch.applied_count) == batch.applied.size()) batch.applied.emplace_back();
+    AppliedCommand& applied = batch.applied[static_cast<size_t>(batch.applied_count++)];
+    applied.step = step;
+    applied.input = taken_[i].input;
+    std::swap(applied.bytes, taken_[i].bytes);
+  }
+}
+
+void CommandInbox::clear() {
+  std::lock_guard lock(mutex_);
+  for (Slots& slots : slots_) slots.size = 0;
+  waiting_.clear();
+}
+
+}  // namespace ruedo::server

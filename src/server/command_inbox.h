@@ -1,0 +1,84 @@
+// Where commands wait for the next step: received by the bus's thread, checked, and taken by the simulation
+// thread at a step boundary.
+//
+// Bounded: of each robot the newest few are kept, so that a flood costs nothing but the flooder's own commands.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <mutex>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "robot/robots.h"
+#include "ruedo/decode.h"
+#include "server/batch.h"
+
+namespace ruedo::server {
+
+// A channel on which a robot takes commands.
+struct Input {
+  enum class Kind { velocity, wheels, move, joints, reset_odometry };
+  std::string channel;    // on the bus
+  int robot = -1;         // index into BodyLayout::robots
+  Kind kind = Kind::velocity;
+};
+
+class CommandInbox {
+ public:
+  static constexpr size_t kKeptPerRobot = 4;
+  static constexpr size_t kMaxMessageSize = 65536;    // bytes
+
+  // inputs: at most one of each channel but for reset_odometry, which has none of its own.
+  CommandInbox(std::vector<Input> inputs, int robots);
+
+  // Checks a message and keeps it; a faulty one is counted, and logged once a second at most. Any thread.
+  void receive(const std::string& channel, const uint8_t* data, size_t size);
+
+  // Asks for a reset of a robot's odometry, with the request's body for the log. Any thread.
+  void reset_odometry(int robot, const std::vector<uint8_t>& body);
+
+  // Applies what waits, in the order of arrival, and notes it in the batch. The simulation thread's.
+  void apply(robot::Robots& robots, int64_t step, Batch& batch);
+
+  const std::vector<Input>& inputs() const { return inputs_; }
+  void clear();
+
+  uint64_t refused() const { return refused_; }       // faulty messages
+  uint64_t displaced() const { return displaced_; }   // commands that newer ones pushed out
+
+ private:
+  struct Entry {
+    uint64_t arrival = 0;
+    int input = -1;
+    robot::Command command;
+    std::vector<uint8_t> bytes;
+  };
+  struct Slots {    // a ring of the newest
+    std::array<Entry, kKeptPerRobot> entries;
+    size_t first = 0, size = 0;
+  };
+
+  Entry& next_entry(int robot);    // with the mutex held
+  void keep(int input, robot::Command& command, const uint8_t* data, size_t size);
+  void refuse(const std::string& channel, const char* why);
+
+  std::vector<Input> inputs_;
+  std::unordered_map<std::string, int> by_channel_;    // looked up only, never walked
+  std::vector<int> reset_input_;                       // of each robot
+  std::mutex mutex_;
+  std::vector<Slots> slots_;
+  std::vector<int> waiting_;                           // robots with entries
+  uint64_t arrivals_ = 0;
+  std::vector<Entry> taken_;                           // the simulation thread's
+  std::atomic<bool> any_{false};
+  std::atomic<uint64_t> refused_{0}, displaced_{0};
+  int64_t last_warning_ns_ = 0;                        // the bus thread's
+};
+
+// Decodes a command of that kind, or says why not.
+DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size, robot::Command& command);
+
+}  // namespace ruedo::server

@@ -1,0 +1,77 @@
+// The LCM log format: each event is sync word, number, timestamp, two lengths, channel and data, big-endian.
+#include "server/log_writer.h"
+
+#include <cerrno>
+#include <cstring>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "ruedo/errors.h"
+
+namespace ruedo::server {
+namespace {
+
+constexpr uint32_t kSync = 0xEDA1DA01;
+constexpr size_t kFlushSize = 1 << 20;    // bytes
+
+template <class Integer>
+void put(std::vector<uint8_t>& buffer, Integer value) {
+  for (int shift = static_cast<int>(sizeof value) * 8 - 8; shift >= 0; shift -= 8) {
+    buffer.push_back(static_cast<uint8_t>(value >> shift));
+  }
+}
+
+}  // namespace
+
+LogWriter::LogWriter(const std::string& path) : path_(path) {
+  file_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (file_ < 0) throw EnvironmentError("--record: cannot write '" + path + "': " + std::strerror(errno));
+  buffer_.reserve(2 * kFlushSize);
+  ends_.reserve(4096);
+}
+
+LogWriter::~LogWriter() {
+  flush();
+  ::close(file_);
+}
+
+void LogWriter::write(int64_t timestamp_us, const std::string& channel, const uint8_t* data, size_t size) {
+  if (!error_.empty()) return;
+  put(buffer_, kSync);
+  put(buffer_, static_cast<uint64_t>(events_++));
+  put(buffer_, static_cast<uint64_t>(timestamp_us));
+  put(buffer_, static_cast<uint32_t>(channel.size()));
+  put(buffer_, static_cast<uint32_t>(size));
+  buffer_.insert(buffer_.end(), channel.begin(), channel.end());
+  buffer_.insert(buffer_.end(), data, data + size);
+  ends_.push_back(buffer_.size());
+  if (buffer_.size() >= kFlushSize) flush();
+}
+
+void LogWriter::flush() {
+  size_t done = 0;
+  while (done < buffer_.size() && error_.empty()) {
+    const ssize_t count = ::write(file_, buffer_.data() + done, buffer_.size() - done);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) {
+      const int error_number = count < 0 ? errno : ENOSPC;
+      size_t whole = 0;
+      for (size_t end : ends_) whole = end <= done ? end : whole;
+      written_ += static_cast<int64_t>(whole);
+      fail(error_number);
+      break;
+    }
+    done += static_cast<size_t>(count);
+  }
+  if (error_.empty()) written_ += static_cast<int64_t>(buffer_.size());
+  buffer_.clear();
+  ends_.clear();
+}
+
+void LogWriter::fail(int error_number) {
+  error_ = std::strerror(error_number);
+  if (::ftruncate(file_, written_) != 0) error_ += "; its last event is cut off";
+}
+
+}  // namespace ruedo::server

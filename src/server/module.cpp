@@ -1,0 +1,144 @@
+// The thread of a module: takes batches in order, works its devices through them, says when it is done.
+// TBB splits the devices over the cores in pieces that the devices alone fix.
+#include "server/module.h"
+
+#include <algorithm>
+#include <cfenv>
+#include <future>
+
+#include <pthread.h>
+#include <tbb/parallel_for.h>
+
+namespace ruedo::server {
+
+void DueSteps::add(const SampleClock& clock) {
+  // A thousand devices of one rate are one entry: the first few samples tell clocks apart well enough, since a
+  // surplus entry costs time but changes nothing.
+  const auto same = [&](const Entry& entry) {
+    return entry.clock.every_step() == clock.every_step() && entry.clock.step_of(0) == clock.step_of(0) &&
+           entry.clock.step_of(1) == clock.step_of(1) && entry.clock.step_of(1'000'003) == clock.step_of(1'000'003);
+  };
+  if (std::none_of(entries_.begin(), entries_.end(), same)) entries_.push_back({clock, 0, clock.step_of(0)});
+  update();
+}
+
+void DueSteps::pass(int64_t step) {
+  if (next_ > step) return;
+  for (Entry& entry : entries_) {
+    while (entry.step <= step) entry.step = entry.clock.step_of(++entry.sample);
+  }
+  update();
+}
+
+void DueSteps::update() {
+  next_ = INT64_MAX;
+  for (const Entry& entry : entries_) next_ = std::min(next_, entry.step);
+}
+
+Module::Module(ModuleSetup setup, int index, Wakeup& finished)
+    : setup_(std::move(setup)), index_(index), finished_(finished), queue_(16) {
+  for (const Device& device : setup_.devices) {
+    const SampleClock clock(device.rate, setup_.step_us, device.phase_us);
+    slots_.push_back({clock, 0, clock.step_of(0), device.sensor->observes(), device.visual_rays});
+    observes_ |= slots_.back().observes;
+    to_hand_over_.add(clock);
+  }
+  to_sample_ = to_hand_over_;
+}
+
+Module::~Module() {
+  if (!thread_.joinable()) return;
+  queue_.push(nullptr);
+  thread_.join();
+}
+
+void Module::start(const SceneMakers& makers) {
+  std::promise<void> ready;
+  thread_ = std::thread([this, &ready, &makers] {
+    pthread_setname_np(pthread_self(), setup_.name.substr(0, 15).c_str());
+    std::fesetenv(FE_DFL_ENV);    // rounding and denormals as everywhere, whatever libraries did to the parent
+    try {
+      if (setup_.wants_rays) rays_ = makers.rays();
+      if (setup_.wants_visual_rays) visual_rays_ = makers.visual_rays();
+      if (setup_.wants_renderer) renderer_ = makers.renderer();
+      ready.set_value();
+    } catch (...) {
+      ready.set_exception(std::current_exception());
+      return;
+    }
+    work();
+    renderer_.reset();    // its context belongs to this thread
+  });
+  try {
+    ready.get_future().get();
+  } catch (...) {
+    thread_.join();
+    throw;
+  }
+}
+
+void Module::hand_over(Batch& batch, int64_t last_step) {
+  to_hand_over_.pass(last_step);
+  queue_.push(&batch);
+}
+
+void Module::work() {
+  while (Batch* batch = queue_.pop()) {
+    if (setup_.before_batch) setup_.before_batch(setup_.name);
+    try {
+      process(*batch);
+    } catch (const std::exception& error) {
+      if (!batch->failed.exchange(true)) batch->failure = "module " + setup_.name + ": " + error.what();
+    }
+    if (batch->pending.fetch_sub(1, std::memory_order_acq_rel) == 1) finished_.set();
+  }
+}
+
+void Module::process(Batch& batch) {
+  for (Outbox& outbox : batch.outputs[index_].pieces) outbox.clear();
+  if (!rays_ && !visual_rays_) {
+    process_pieces(batch, 0, batch.count);
+    to_sample_.pass(batch.first_step + batch.count - 1);
+    return;
+  }
+  // The scene of the movers stands at one step at a time, and only at those where somebody looks.
+  int begin = 0;
+  for (int i = 0; i < batch.count; ++i) {
+    if (to_sample_.next() != batch.first_step + i) continue;
+    if (rays_) rays_->update(batch.snapshots[i]);
+    if (visual_rays_) visual_rays_->update(batch.snapshots[i]);
+    process_pieces(batch, begin, i + 1);
+    begin = i + 1;
+    to_sample_.pass(batch.first_step + i);
+  }
+  if (observes_ && begin < batch.count) process_pieces(batch, begin, batch.count);
+}
+
+void Module::process_pieces(Batch& batch, int begin, int end) {
+  if (pieces() == 1 || renderer_) {    // a renderer serves one thread
+    for (int piece = 0; piece < pieces(); ++piece) process_piece(batch, piece, begin, end);
+    return;
+  }
+  tbb::parallel_for(0, pieces(), [&](int piece) { process_piece(batch, piece, begin, end); });
+}
+
+void Module::process_piece(Batch& batch, int piece, int begin, int end) {
+  Outbox& outbox = batch.outputs[index_].pieces[piece];
+  const size_t first = static_cast<size_t>(piece) * setup_.piece_size;
+  const size_t last = std::min(first + setup_.piece_size, slots_.size());
+  for (int i = begin; i < end; ++i) {
+    const Snapshot& snapshot = batch.snapshots[i];
+    outbox.begin_step(snapshot.step);
+    for (size_t k = first; k < last; ++k) {
+      Slot& slot = slots_[k];
+      Sensor& sensor = *setup_.devices[k].sensor;
+      if (slot.observes) sensor.observe(snapshot, outbox);
+      if (slot.step != snapshot.step) continue;
+      const scene::RayScene* rays = slot.visual_rays ? visual_rays_.get() : rays_.get();
+      sensor.sample({snapshot, slot.sample, rays, renderer_.get()}, outbox);
+      slot.step = slot.clock.step_of(++slot.sample);
+    }
+  }
+}
+
+}  // namespace ruedo::server

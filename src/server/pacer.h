@@ -1,0 +1,54 @@
+// When the next steps may be computed: real time, pause, single steps and the end of the run in one place.
+//
+// Step s of a run at rate r is due s dt / r after the start, by the monotonic clock: deadlines are absolute, so
+// that nothing drifts. None of this enters a result. Thread safe; wait() belongs to the simulation thread.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <mutex>
+
+namespace ruedo::server {
+
+class Pacer {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  // rate: simulated per real time, > 0; +inf: as fast as it goes. last_step: of the run, INT64_MAX: none.
+  Pacer(int64_t step_us, double rate, int64_t last_step);
+
+  // Waits until the state `step` may be computed and is due; returns how many may be computed now, at most `limit`,
+  // 0 when the run is over. Steps must be asked for in order.
+  int wait(int64_t step, int limit);
+
+  void stop();                       // wait() returns 0 from now on
+  int64_t pause();                   // returns the last state that will still be computed
+  void resume();
+  int64_t allow(int64_t steps);      // while paused: that many more; returns the last one of them
+  void set_rate(double rate);
+
+  bool paused() const;
+  double rate() const;
+  int64_t last_step() const { return last_step_; }
+
+ private:
+  Clock::time_point due(int64_t step) const;
+  void start_anew();
+
+  // A host that was held up catches up by at most this much; beyond it, the run is simply late from then on.
+  static constexpr auto kMostCatchUp = std::chrono::milliseconds(250);
+
+  const int64_t step_us_;
+  const int64_t last_step_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  double rate_;
+  bool stopped_ = false, paused_ = false;
+  int64_t until_;                    // last state that may be computed
+  int64_t granted_ = -1;             // last state that wait() let go
+  int64_t origin_step_ = 0;          // was due at origin_time_
+  Clock::time_point origin_time_;
+};
+
+}  // namespace ruedo::server

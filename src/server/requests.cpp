@@ -1,0 +1,154 @@
+// What each request of the simulation control does.
+#include <cmath>
+
+#include "ruedo/applied_t.hpp"
+#include "ruedo/state_reply_t.hpp"
+#include "server/server.h"
+#include "server/world_state.h"
+
+namespace ruedo::server {
+namespace {
+
+template <class Body>
+bool read_body(const request_t& request, Body& body) {
+  return decode_checked(request.body.data(), request.body.size(), body) == DecodeFault::none;
+}
+
+Outcome bad_body(const char* type) {
+  return Outcome::refuse(reply_t::BAD_REQUEST, std::string("the body is not a ") + type);
+}
+
+void put(const Pose& pose, const Twist& twist, state_reply_t& reply) {
+  const Quat& q = pose.rotation;
+  const double orientation[4] = {q.w(), q.x(), q.y(), q.z()};
+  for (int i = 0; i < 3; ++i) {
+    reply.position[i] = pose.translation[i];
+    reply.linear[i] = twist.linear[i];
+    reply.angular[i] = twist.angular[i];
+  }
+  std::copy(orientation, orientation + 4, reply.orientation);
+}
+
+}  // namespace
+
+int64_t Server::features() {
+  int64_t bits = 0;
+  constexpr int32_t kinds[] = {request_t::JOIN,  request_t::LEAVE,     request_t::PAUSE, request_t::RESUME,
+                               request_t::STEP,  request_t::RATE,      request_t::RESET, request_t::GET_STATE,
+                               request_t::INFO,  request_t::QUIT,      request_t::RESET_ODOMETRY};
+  for (int32_t kind : kinds) bits |= int64_t{1} << kind;
+  return bits;
+}
+
+Outcome Server::execute(const request_t& request) {
+  switch (request.kind) {
+    case request_t::PAUSE: return Outcome::after(pacer_->pause());
+    case request_t::RESUME: pacer_->resume(); return Outcome::with(encoded(state()));
+    case request_t::STEP: return step(request);
+    case request_t::RATE: return set_rate(request);
+    case request_t::RESET: return reset(request);
+    case request_t::GET_STATE: return get_state(request);
+    case request_t::INFO: publish_info(); return {};
+    case request_t::QUIT: stop(); return {};
+    case request_t::RESET_ODOMETRY: return reset_odometry(request);
+    default: break;
+  }
+  return Outcome::refuse(reply_t::NOT_SUPPORTED, "this server does not know requests of kind " + std::to_string(request.kind));
+}
+
+Outcome Server::step(const request_t& request) {
+  step_request_t body;
+  if (!read_body(request, body)) return bad_body("step_request_t");
+  if (body.steps < 1) return Outcome::refuse(reply_t::BAD_REQUEST, "steps is " + std::to_string(body.steps) + "; at least 1 is allowed");
+  if (!pacer_->paused()) return Outcome::refuse(reply_t::REFUSED, "steps are taken while paused: pause first");
+  return Outcome::after(pacer_->allow(body.steps));
+}
+
+Outcome Server::set_rate(const request_t& request) {
+  rate_request_t body;
+  if (!read_body(request, body)) return bad_body("rate_request_t");
+  if (!(body.rate > 0.0)) return Outcome::refuse(reply_t::BAD_REQUEST, "a rate is above 0, +inf for as fast as it goes");
+  pacer_->set_rate(body.rate);
+  return Outcome::with(encoded(state()));
+}
+
+Outcome Server::reset(const request_t& request) {
+  reset_request_t body;
+  if (!read_body(request, body)) return bad_body("reset_request_t");
+  if (body.what != reset_request_t::ALL) return Outcome::refuse(reply_t::NOT_SUPPORTED, "only a reset of everything is supported");
+  if (body.seed < -1) return Outcome::refuse(reply_t::BAD_REQUEST, "a seed is 0 or more, -1 for the one there is");
+  control_.cancel("the world was reset");
+  applied_t applied;
+  applied.utime = status_.time_us;
+  applied.step = status_.step;
+  applied.epoch = epoch_;
+  applied.sequence = request.sequence;
+  applied.channel = "ruedo/request";
+  applied.kind = request.kind;
+  applied.size = request.size;
+  applied.data = request.body;
+  record("ruedo/applied", applied.utime, applied);
+  log_base_us_ += status_.time_us;
+  ++epoch_;
+  if (body.seed >= 0) options_.simulation.fleet.seed = static_cast<uint64_t>(body.seed);
+  status_.step = -1;
+  status_.time_us = 0;
+  make_simulation();
+  simulation_->start(*pacer_);
+  return Outcome::after(0);
+}
+
+state_reply_t Server::state() const {
+  state_reply_t reply;
+  reply.utime = status_.time_us;
+  reply.step = status_.step;
+  reply.state_hash = latest_ ? state_hash(*latest_) : 0;
+  reply.paused = pacer_->paused();
+  reply.rate = pacer_->rate();
+  put(Pose{}, Twist{}, reply);
+  return reply;
+}
+
+Outcome Server::get_state(const request_t& request) {
+  name_request_t body;
+  if (!read_body(request, body)) return bad_body("name_request_t");
+  state_reply_t reply = state();
+  reply.name = body.name;
+  if (body.name.empty()) return Outcome::with(encoded(reply));
+  const model::BodyLayout& layout = simulation_->layout();
+  for (size_t i = 0; i < layout.links.size(); ++i) {
+    const model::LinkPlacement& placement = layout.links[i];
+    const model::ModelInstance& instance = world_->models[static_cast<size_t>(placement.instance)];
+    const model::Link& link = instance.model->links[static_cast<size_t>(placement.link)];
+    const bool whole_model = body.name == instance.name && placement.link == 0;
+    if (!whole_model && body.name != instance.name + "/" + link.name) continue;
+    Pose X_WL = placement.X_BL;
+    Twist twist;
+    if (placement.body >= 0) {
+      if (!latest_) return Outcome::refuse(reply_t::REFUSED, "there is no state yet");
+      const Pose& X_WB = latest_->bodies[static_cast<size_t>(placement.body)];
+      const Twist& body_twist = latest_->body_twists[static_cast<size_t>(placement.body)];
+      X_WL = X_WB * placement.X_BL;
+      const Pose X_WF = whole_model ? X_WL * link.X_ML.inverse() : X_WL;
+      twist.angular = body_twist.angular;
+      twist.linear = body_twist.linear + body_twist.angular.cross(X_WF.translation - X_WB.translation);
+    }
+    put(whole_model ? X_WL * link.X_ML.inverse() : X_WL, twist, reply);
+    return Outcome::with(encoded(reply));
+  }
+  return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no model or MODEL/LINK called '" + body.name + "'");
+}
+
+Outcome Server::reset_odometry(const request_t& request) {
+  name_request_t body;
+  if (!read_body(request, body)) return bad_body("name_request_t");
+  const model::BodyLayout& layout = simulation_->layout();
+  for (size_t i = 0; i < layout.robots.size(); ++i) {
+    if (world_->models[static_cast<size_t>(layout.robots[i].instance)].name != body.name) continue;
+    simulation_->inbox().reset_odometry(static_cast<int>(i), request.body);
+    return {};
+  }
+  return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no robot called '" + body.name + "'");
+}
+
+}  // namespace ruedo::server

@@ -1,0 +1,154 @@
+// The loop: pace, take commands, step, hand over; and the ring of batches between the threads.
+#include "server/simulation.h"
+
+#include <algorithm>
+#include <cfenv>
+#include <stdexcept>
+
+#include <pthread.h>
+#include <sys/prctl.h>
+
+namespace ruedo::server {
+namespace {
+
+constexpr size_t kMaxSnapshotMemory = 64u << 20;    // bytes of all batches together
+constexpr int kMaxBatchSteps = 32;
+
+// Large worlds gain nothing from many steps in flight, and their snapshots are large.
+int batch_steps(const model::BodyLayout& layout) {
+  const size_t snapshot = sizeof(Snapshot) + layout.bodies.size() * (sizeof(Pose) + sizeof(Twist) + sizeof(Vec3)) +
+                          layout.wheels.size() * 16 + layout.joints.size() * 24 + layout.robots.size() * sizeof(RobotState);
+  return static_cast<int>(std::clamp<size_t>(kMaxSnapshotMemory / snapshot / Simulation::kBatches, 1, kMaxBatchSteps));
+}
+
+}  // namespace
+
+Simulation::Simulation(std::shared_ptr<const model::WorldModel> world, const SimulationOptions& options, Channels& channels,
+                       Findings& findings, Wakeup& finished)
+    : world_(std::move(world)),
+      layout_(*world_),
+      before_batch_(options.before_batch),
+      finished_(finished),
+      fleet_(make_fleet(*world_, layout_, options.fleet, channels, findings)),
+      devices_(std::move(fleet_.devices)),
+      inbox_(std::move(fleet_.inputs), static_cast<int>(layout_.robots.size())),
+      physics_(std::make_unique<physics::PhysicsWorld>(*world_, layout_)),
+      robots_(std::make_unique<robot::Robots>(*world_, layout_, *physics_)),
+      batches_(kBatches) {
+  for (ModuleSetup& setup : fleet_.modules) {
+    setup.before_batch = before_batch_;
+    modules_.push_back(std::make_unique<Module>(std::move(setup), static_cast<int>(modules_.size()), finished_));
+    cursors_.emplace_back(static_cast<size_t>(modules_.back()->pieces()));
+  }
+  const int steps = options.batch_steps > 0 ? options.batch_steps : batch_steps(layout_);
+  for (Batch& batch : batches_) {
+    batch.snapshots.resize(static_cast<size_t>(steps));
+    for (const auto& module : modules_) batch.outputs.push_back({false, std::vector<Outbox>(static_cast<size_t>(module->pieces()))});
+  }
+}
+
+Simulation::~Simulation() {
+  if (!thread_.joinable()) return;
+  pacer_->stop();
+  while (!last_taken_) {    // the simulation thread needs free batches to come to its end
+    if (!advance()) finished_.wait();
+  }
+  thread_.join();
+}
+
+SceneMakers Simulation::scene_makers() {
+  SceneMakers makers;
+  // The static geometry is built once and shared by all modules.
+  const auto shared = [this](bool visuals) {
+    return [this, visuals, statics = std::shared_ptr<const scene::StaticRayScene>()]() mutable {
+      if (!statics) statics = scene::make_static_ray_scene(*world_, layout_, visuals);
+      return scene::make_ray_scene(statics);
+    };
+  };
+  makers.rays = shared(false);
+  makers.visual_rays = shared(true);
+  makers.renderer = [this] { return scene::make_renderer(*world_, layout_); };
+  return makers;
+}
+
+void Simulation::start(Pacer& pacer) {
+  pacer_ = &pacer;
+  const SceneMakers makers = scene_makers();
+  for (auto& module : modules_) module->start(makers);
+  thread_ = std::thread([this] { simulate(); });
+}
+
+void Simulation::simulate() {
+  pthread_setname_np(pthread_self(), "kinematics");
+  std::fesetenv(FE_DFL_ENV);
+  prctl(PR_SET_TIMERSLACK, 1);    // ns: the kernel may otherwise wake us 50 us late
+  const int limit = static_cast<int>(batches_[0].snapshots.size());
+  int64_t next_step = 0;
+  for (size_t round = 0;; ++round) {
+    const int count = pacer_->wait(next_step, limit);
+    Batch& batch = batches_[round % batches_.size()];
+    while (batch.pending.load(std::memory_order_acquire) != Batch::kFree) batch_freed_.wait();
+    batch.first_step = next_step;
+    batch.count = count;
+    batch.last = count == 0;
+    batch.applied_count = 0;
+    if (before_batch_) before_batch_("kinematics");
+    try {
+      for (int i = 0; i < count; ++i) step(batch, next_step++);
+    } catch (const std::exception& error) {
+      if (!batch.failed.exchange(true)) batch.failure = std::string("module kinematics: ") + error.what();
+      batch.count = 0;
+      batch.last = true;
+    }
+    dispatch(batch);
+    if (batch.last) return;
+  }
+}
+
+void Simulation::step(Batch& batch, int64_t step) {
+  if (step > 0) {
+    inbox_.apply(*robots_, step - 1, batch);    // on the state before
+    robots_->step();
+  }
+  Snapshot& snapshot = batch.snapshots[static_cast<size_t>(step - batch.first_step)];
+  robots_->read(snapshot);
+  snapshot.step = step;
+  snapshot.time = step * world_->step_us;
+}
+
+void Simulation::dispatch(Batch& batch) {
+  const int64_t last_step = batch.first_step + batch.count - 1;
+  int woken = 0;
+  for (size_t m = 0; m < modules_.size(); ++m) {
+    batch.outputs[m].woken = batch.count > 0 && modules_[m]->wants(last_step);
+    woken += batch.outputs[m].woken;
+  }
+  // One more than the modules: nobody finds it finished before all have it.
+  batch.pending.store(woken + 1, std::memory_order_release);
+  for (size_t m = 0; m < modules_.size(); ++m) {
+    if (batch.outputs[m].woken) modules_[m]->hand_over(batch, last_step);
+  }
+  if (batch.pending.fetch_sub(1, std::memory_order_acq_rel) == 1) finished_.set();
+}
+
+const Batch* Simulation::take() {
+  const Batch* batch = advance();
+  if (batch && batch->failed) throw std::runtime_error(batch->failure);
+  return batch;
+}
+
+const Batch* Simulation::advance() {
+  Batch& batch = batches_[next_batch_ % batches_.size()];
+  if (last_taken_ || batch.pending.load(std::memory_order_acquire) != 0) return nullptr;
+  if (taken_) {
+    taken_->pending.store(Batch::kFree, std::memory_order_release);
+    batch_freed_.set();
+  }
+  ++next_batch_;
+  taken_ = &batch;
+  last_taken_ = batch.last;
+  for (auto& cursors : cursors_) std::fill(cursors.begin(), cursors.end(), 0);
+  return taken_;
+}
+
+}  // namespace ruedo::server

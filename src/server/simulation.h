@@ -1,0 +1,106 @@
+// One epoch of a run: the world, its robots, its modules and their threads.
+//
+// The simulation thread (the module "kinematics") takes commands, drives the robots and steps Bullet; batches of
+// snapshots go to the modules that have something due; the publisher takes finished batches, in order. At most
+// kBatches batches are on their way: whoever is slow makes the others wait, and nothing is dropped.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "model/body_layout.h"
+#include "physics/physics_world.h"
+#include "robot/robots.h"
+#include "scene/ray_scene.h"
+#include "server/batch.h"
+#include "server/channels.h"
+#include "server/command_inbox.h"
+#include "server/fleet.h"
+#include "server/module.h"
+#include "server/pacer.h"
+
+namespace ruedo::server {
+
+struct SimulationOptions {
+  FleetOptions fleet;
+  int batch_steps = 0;    // most steps in a batch; 0: by the size of the world
+  // For tests: called in a module's thread ("kinematics" too) before each batch.
+  std::function<void(const std::string& module)> before_batch;
+};
+
+class Simulation {
+ public:
+  static constexpr int kBatches = 4;
+
+  // Makes everything but threads; channels are announced. finished: set whenever take() may have something.
+  // Throws InputError.
+  Simulation(std::shared_ptr<const model::WorldModel> world, const SimulationOptions& options, Channels& channels,
+             Findings& findings, Wakeup& finished);
+  ~Simulation();    // stops the pacer that start() was given, then waits for all threads
+
+  // Starts the threads. Throws EnvironmentError when a module cannot be served here. The pacer must outlive it.
+  void start(Pacer& pacer);
+
+  // The publisher's: the next finished batch in order, or null when there is none yet. The batch stays valid until
+  // the next call that returns one. Throws std::runtime_error when a module failed.
+  const Batch* take();
+
+  // Calls handler(step, channel index, bytes, size) for each message of one step of a batch, in the schedule's order.
+  // Steps of a batch must be asked for in order, from its first.
+  template <class Handler>
+  void messages(const Batch& batch, int64_t step, Handler&& handler);
+
+  const model::WorldModel& world() const { return *world_; }
+  const model::BodyLayout& layout() const { return layout_; }
+  const std::vector<device_info_t>& devices() const { return devices_; }
+  CommandInbox& inbox() { return inbox_; }
+  const physics::PhysicsWorld& physics() const { return *physics_; }
+
+ private:
+  const Batch* advance();
+  void simulate();
+  void step(Batch& batch, int64_t step);
+  void dispatch(Batch& batch);
+  SceneMakers scene_makers();
+
+  std::shared_ptr<const model::WorldModel> world_;
+  model::BodyLayout layout_;
+  std::function<void(const std::string&)> before_batch_;
+  Wakeup& finished_;
+  Fleet fleet_;                                  // its modules move into modules_
+  std::vector<device_info_t> devices_;
+  CommandInbox inbox_;
+  std::unique_ptr<physics::PhysicsWorld> physics_;
+  std::unique_ptr<robot::Robots> robots_;
+  std::vector<std::unique_ptr<Module>> modules_;    // in the order of the schedule
+  std::vector<Batch> batches_;
+  Wakeup batch_freed_;
+  Pacer* pacer_ = nullptr;
+  std::thread thread_;
+
+  // The publisher's.
+  size_t next_batch_ = 0;
+  Batch* taken_ = nullptr;
+  bool last_taken_ = false;
+  std::vector<std::vector<size_t>> cursors_;     // of each module's pieces in taken_
+};
+
+template <class Handler>
+void Simulation::messages(const Batch& batch, int64_t step, Handler&& handler) {
+  for (size_t m = 0; m < batch.outputs.size(); ++m) {
+    if (!batch.outputs[m].woken) continue;
+    for (size_t p = 0; p < batch.outputs[m].pieces.size(); ++p) {
+      const Outbox& outbox = batch.outputs[m].pieces[p];
+      size_t& cursor = cursors_[m][p];
+      for (; cursor < outbox.entries().size() && outbox.entries()[cursor].step == step; ++cursor) {
+        const Outbox::Entry& entry = outbox.entries()[cursor];
+        handler(step, entry.channel, outbox.data(entry), entry.size);
+      }
+    }
+  }
+}
+
+}  // namespace ruedo::server

@@ -1,0 +1,18 @@
+// The module "world": ruedo/world, the poses of all bodies that can move.
+#pragma once
+
+#include "model/body_layout.h"
+#include "server/channels.h"
+#include "server/module.h"
+
+namespace ruedo::server {
+
+inline constexpr size_t kMaxPartSize = 60'000;    // bytes of one part of a long message
+
+// A module like any other, with one device: the simulation.
+ModuleSetup world_state_module(const model::WorldModel& world, const model::BodyLayout& layout, int epoch, Channels& channels);
+
+// A hash of what a step's state is, for ruedo/tick: of every body's and robot's pose and motion, bit for bit.
+int64_t state_hash(const Snapshot& snapshot);
+
+}  // namespace ruedo::server
