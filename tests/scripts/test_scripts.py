@@ -1,0 +1,115 @@
+"""scripts/lib.sh with stand-ins for apt and dpkg: what is asked for, of whom, and when nothing is done."""
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SCRIPTS = [ROOT / "scripts/run", ROOT / "scripts/test", ROOT / "scripts/lib.sh", ROOT / ".ci/run"]
+NOBODY = 65534
+
+DPKG_QUERY = """#!/bin/bash
+for name in "${@:3}"; do grep -qx "$name" "$WORLD/installed" && echo "installed $name"; done
+"""
+APT_CACHE = """#!/bin/bash
+for name in "${@:3}"; do grep -qx "$name" "$WORLD/known" && echo "Package: $name"; done
+"""
+APT_GET = """#!/bin/bash
+echo "$*" >>"$WORLD/calls"
+if [[ $1 == update ]]; then cp "$WORLD/on_the_mirror" "$WORLD/known"; fi
+"""
+SUDO_REFUSED = "#!/bin/bash\nexit 1\n"
+
+
+class Machine:
+    """A folder with stand-ins for the package tools, and what they know."""
+
+    def __init__(self, installed, known, on_the_mirror):
+        self.folder = Path(tempfile.mkdtemp(prefix="ruedo-scripts-"))
+        self.folder.chmod(0o777)
+        shutil.copytree(ROOT / "scripts", self.folder / "scripts")
+        for name, text in {"dpkg-query": DPKG_QUERY, "apt-cache": APT_CACHE, "apt-get": APT_GET, "sudo": SUDO_REFUSED}.items():
+            path = self.folder / "bin" / name
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(text)
+            path.chmod(0o755)
+        for name, packages in {"installed": installed, "known": known, "on_the_mirror": on_the_mirror, "calls": []}.items():
+            (self.folder / name).write_text("".join(p + "\n" for p in packages))
+            (self.folder / name).chmod(0o666)
+
+    def ensure(self, *specifications, user=None):
+        """Runs ensure_packages and returns (exit code, output, calls of apt-get)."""
+        environment = {**os.environ, "PATH": f"{self.folder / 'bin'}:{os.environ['PATH']}", "WORLD": str(self.folder)}
+        command = ["bash", "-c", 'set -euo pipefail; source "$WORLD/scripts/lib.sh"; ensure_packages "$@"', "x", *specifications]
+        result = subprocess.run(command, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                stdin=subprocess.DEVNULL, user=user, cwd=self.folder)
+        return result.returncode, result.stdout, (self.folder / "calls").read_text().splitlines()
+
+
+@pytest.fixture
+def machine():
+    made = []
+
+    def make(installed=(), known=(), on_the_mirror=None):
+        made.append(Machine(installed, known, known if on_the_mirror is None else on_the_mirror))
+        return made[-1]
+
+    yield make
+    for each in made:
+        shutil.rmtree(each.folder)
+
+
+as_root = pytest.mark.skipif(os.geteuid() != 0, reason="needs root to be root and to become nobody")
+
+
+def test_nothing_is_asked_where_all_is_there(machine):
+    assert machine(installed=["a", "new_b", "c"]).ensure("a", "old_b|new_b", "?c") == (0, "", [])
+
+
+@as_root
+def test_one_call_installs_what_is_missing(machine):
+    code, _, calls = machine(installed=["a"], known=["a", "b", "c"]).ensure("a", "b", "c")
+    assert code == 0
+    assert calls == ["update -q", "install --no-install-recommends -y -q b c"]
+
+
+@as_root
+def test_alternatives_and_optional_ones_follow_the_distribution(machine):
+    _, _, calls = machine(known=["new_b"]).ensure("old_b|new_b", "?gone")
+    assert calls[-1].endswith("-q new_b")
+    _, _, calls = machine(known=["old_b", "new_b", "kept"]).ensure("old_b|new_b", "?kept")
+    assert calls[-1].endswith("-q old_b kept")
+
+
+@as_root
+def test_fresh_machine_learns_names_from_the_update(machine):
+    _, _, calls = machine(known=[], on_the_mirror=["old_b", "kept"]).ensure("old_b|new_b", "?kept", "?gone")
+    assert calls[-1].endswith("-q old_b kept")
+
+
+def test_optional_package_that_nobody_has_is_no_reason_to_ask(machine):
+    assert machine(installed=["a"], known=["a"]).ensure("a", "?gone") == (0, "", [])
+
+
+def test_without_rights_the_line_to_ask_for_is_printed(machine):
+    user = NOBODY if os.geteuid() == 0 else None
+    code, output, calls = machine(installed=["a"], known=["a", "b", "c"]).ensure("a", "b", "c", user=user)
+    assert code == 4
+    assert "    apt-get install --no-install-recommends -y b c\n" in output
+    assert calls == []
+
+
+def test_help_installs_nothing():
+    result = subprocess.run([ROOT / "scripts/test", "--help"], capture_output=True, text=True)
+    assert result.returncode == 0 and "--sanitizers" in result.stdout
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda p: p.name)
+def test_shellcheck(script):
+    if not shutil.which("shellcheck"):
+        pytest.skip("shellcheck is not installed")
+    result = subprocess.run(["shellcheck", "-x", script], capture_output=True, text=True)
+    assert result.returncode == 0, result.stdout
