@@ -46,7 +46,7 @@ class Device(Stream[T]):
 
 
 class Camera(Device[Image]):
-    """A camera; its further channels, where the world file asks for them: depth, labels, info."""
+    """A camera; its further channels, where the world file asks for them: depth, labels, intrinsics."""
 
     @property
     def depth(self) -> Stream[Image]:
@@ -57,7 +57,7 @@ class Camera(Device[Image]):
         return self._part("labels")
 
     @property
-    def info(self) -> Stream[CameraInfo]:
+    def intrinsics(self) -> Stream[CameraInfo]:
         return self._part("info")
 
     def _part(self, part: str) -> Stream[Any]:
@@ -284,7 +284,8 @@ class Robot:
 
     def _camera_part(self, camera: str, part: str) -> Any:
         for channel in self._channels:
-            if channel.device == f"{camera}/{part}":
+            named = channel.device == f"{camera}/{part}" or (channel.device == camera and channel.name.endswith("/" + part))
+            if named and not channel.input:
                 return self._plain(channel)
         raise UnknownName(f"{self.name}/{camera} publishes no {part}; <ruedo:{part}> in the world file switches it on")
 

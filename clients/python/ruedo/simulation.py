@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import atexit
-import binascii
 import math
 import os
 import struct
@@ -52,7 +51,7 @@ class Simulation:
         self._last_sign = time.monotonic()
         self._robots: dict[str, Robot] = {}
         self._session = Session(self, name)
-        self._ids = (binascii.crc32(name.encode()) & 0x7FFFFFFF) << 20
+        self._ids = _name_hash(name) << 20    # two clients number their primitives apart
         self._drivers: set[Driver] = set()
         self._wake = threading.Condition()
         self._repeater: threading.Thread | None = None
@@ -330,6 +329,14 @@ class Simulation:
             while self._known is before and time.monotonic() < deadline:
                 self._ask_info()
                 self._news.wait(0.1)
+
+
+def _name_hash(name: str) -> int:
+    """31 bits of FNV-1a."""
+    value = 2166136261
+    for byte in name.encode():
+        value = (value ^ byte) * 16777619 & 0xFFFFFFFF
+    return value & 0x7FFFFFFF
 
 
 def _name_body(name: str) -> Any:

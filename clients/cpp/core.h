@@ -1,0 +1,85 @@
+// A connection: what is known of the simulation, its streams, its robots' commands, and its session.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "driver.h"
+#include "lcm_bus.h"
+#include "ruedo/client.h"
+#include "session.h"
+#include "stream_core.h"
+#include "world_info.h"
+
+namespace ruedo::client {
+
+class ServerProcess;
+
+using Clock = std::chrono::steady_clock;
+Clock::time_point deadline_after(double seconds);    // kForever: never
+
+class Core : public std::enable_shared_from_this<Core> {
+ public:
+  // server: a private one, or nullptr. Throws NoServer.
+  Core(const std::string& url, const std::string& name, std::unique_ptr<ServerProcess> server);
+  ~Core();
+
+  void join(double timeout);    // waits for ruedo/info; throws NoServer
+  void close();
+
+  LcmBus& bus() { return bus_; }
+  Session& session() { return session_; }
+  const std::string& url() const { return url_; }
+  std::shared_ptr<const WorldInfo> info() const;
+  RobotInfo robot_info(const std::string& name) const;    // throws UnknownName
+  int64_t utime() const { return utime_; }
+  int64_t next_id() { return ++ids_; }
+
+  // The stream of a channel, made on first use.
+  std::shared_ptr<StreamCore> stream(const ChannelInfo& channel);
+  std::shared_ptr<Driver> driver(const std::string& robot);
+
+  void keep_repeating(const std::shared_ptr<Driver>& driver);
+  void note_time(int64_t utime);
+  void reset_time() { utime_ = 0; }
+  void sleep_until(int64_t utime);
+  void refresh_info();                              // after the set of models changed
+  void check_server();                              // throws NoServer when it is gone
+  std::string what_is_known(double rate) const;     // for timeouts
+
+ private:
+  void on_info(const uint8_t* bytes, size_t size);
+  void on_tick(const uint8_t* bytes, size_t size);
+  void ask_info();
+  void repeat();
+  double silence() const;    // s
+
+  const std::string url_;
+  std::unique_ptr<ServerProcess> server_;
+  mutable std::mutex mutex_;
+  std::condition_variable news_;
+  WorldInfoAssembler assembler_;                    // the receiving thread's
+  std::shared_ptr<const WorldInfo> known_;
+  std::exception_ptr fault_;
+  std::map<std::string, std::shared_ptr<StreamCore>> streams_;
+  std::map<std::string, std::shared_ptr<Driver>> drivers_;
+  std::set<std::shared_ptr<Driver>> repeating_;
+  std::atomic<int64_t> utime_{0}, ids_{0};
+  std::atomic<Clock::time_point::rep> last_sign_;
+  std::atomic<bool> closed_{false};
+  std::thread repeater_;
+  std::condition_variable wake_;
+  Session session_;
+  LcmBus bus_;                                      // last: its thread ends before the rest goes
+};
+
+}  // namespace ruedo::client

@@ -1,0 +1,54 @@
+// The LCM side of a client: one LCM instance, one thread that receives, raw bytes to handlers.
+//
+// The route is checked before the first subscription, because LCM's own self-test blocks for ten seconds where
+// multicast has no route.
+#pragma once
+
+#include <lcm/lcm.h>
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace ruedo::client {
+
+std::string resolve_url(const std::string& url);    // or LCM_DEFAULT_URL, or LCM's default with ttl 0
+bool has_multicast_route(const std::string& group = "239.255.76.67");
+
+// Thread safe. Handlers run in the receiving thread, one at a time.
+class LcmBus {
+ public:
+  using Handler = std::function<void(const uint8_t* bytes, size_t size)>;
+
+  explicit LcmBus(const std::string& url);    // throws NoServer, with the cure
+  ~LcmBus();
+
+  void start();    // begins to receive; at least one subscription comes first
+  void subscribe(const std::string& channel, Handler handler);
+  void publish(const std::string& channel, const uint8_t* bytes, size_t size);
+  void close();    // not from a handler
+
+  template <class Message>
+  void publish(const std::string& channel, const Message& message) {
+    std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
+    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    publish(channel, bytes.data(), bytes.size());
+  }
+
+ private:
+  void receive();
+
+  lcm_t* lcm_ = nullptr;
+  std::mutex mutex_;
+  std::map<std::string, std::vector<std::shared_ptr<Handler>>> handlers_;
+  std::atomic<bool> closed_{false};
+  std::thread thread_;
+};
+
+}  // namespace ruedo::client

@@ -1,0 +1,217 @@
+// A robot: its devices by what ruedo/info says of them, and its commands.
+#include <cmath>
+
+#include "core.h"
+#include "ruedo/move_command_t.hpp"
+#include "ruedo/velocity_command_t.hpp"
+#include "ruedo/wheel_command_t.hpp"
+
+namespace ruedo::client {
+namespace {
+
+// By what ruedo/info says, since names on the bus may be remapped.
+const std::vector<ChannelInfo>& channels_of(const WorldInfo& info, const std::string& robot) {
+  static const std::vector<ChannelInfo> none;
+  const auto found = info.channels.find(robot);
+  return found == info.channels.end() ? none : found->second;
+}
+
+const std::vector<DeviceInfo>& devices_of(const WorldInfo& info, const std::string& robot) {
+  static const std::vector<DeviceInfo> none;
+  const auto found = info.devices.find(robot);
+  return found == info.devices.end() ? none : found->second;
+}
+
+std::string names_of(const std::vector<DeviceInfo>& devices) {
+  std::string names;
+  for (const DeviceInfo& device : devices) names += (names.empty() ? "" : ", ") + device.name;
+  return names.empty() ? "none" : names;
+}
+
+std::shared_ptr<StreamCore> stream_of(Core& core, const std::string& robot, const std::string& channel) {
+  const auto info = core.info();
+  for (const ChannelInfo& found : channels_of(*info, robot)) {
+    if (found.name == channel) return core.stream(found);
+  }
+  throw UnknownName(robot + " has no channel '" + channel + "'");
+}
+
+template <class SampleType>
+Device<SampleType> first_device(Core& core, const std::string& robot, const char* what) {
+  core.robot_info(robot);
+  const auto info = core.info();
+  for (const DeviceInfo& device : devices_of(*info, robot)) {
+    if (device.type == message_type<SampleType>()) return {stream_of(core, robot, device.channel), device};
+  }
+  throw UnknownName(robot + " has no " + what + "; it has " + names_of(devices_of(*info, robot)));
+}
+
+template <class SampleType>
+Stream<SampleType> first_stream(Core& core, const std::string& robot, const char* what) {
+  core.robot_info(robot);
+  const auto info = core.info();
+  for (const ChannelInfo& channel : channels_of(*info, robot)) {
+    if (channel.type == message_type<SampleType>() && !channel.input) return Stream<SampleType>(core.stream(channel));
+  }
+  throw UnknownName(robot + " publishes no " + what);
+}
+
+template <class SampleType>
+Stream<SampleType> camera_part(Core& core, const DeviceInfo& camera, const std::string& part) {
+  const auto info = core.info();
+  for (const ChannelInfo& channel : channels_of(*info, camera.robot)) {
+    const bool named = channel.device == camera.name + "/" + part ||
+                       (channel.device == camera.name && channel.name.ends_with("/" + part));
+    if (named && channel.type == message_type<SampleType>()) {
+      return Stream<SampleType>(core.stream(channel));
+    }
+  }
+  throw UnknownName(camera.robot + "/" + camera.name + " publishes no " + part + "; <ruedo:" + part +
+                    "> in the world file switches it on");
+}
+
+std::string input_channel(Core& core, const std::string& robot, const std::string& type) {
+  if (core.robot_info(robot).drive.empty()) throw NotSupported(robot + " cannot be driven: its model has no drive");
+  const auto info = core.info();
+  for (const ChannelInfo& channel : channels_of(*info, robot)) {
+    if (channel.input && channel.type == type) return channel.name;
+  }
+  throw NotSupported(robot + " takes no " + type);
+}
+
+double finite(const char* name, double value) {
+  if (!std::isfinite(value)) {
+    throw std::invalid_argument(std::string(name) + " is " + std::to_string(value) + ": it must be a finite number");
+  }
+  return value;
+}
+
+double limit(const char* name, double value) {
+  if (!std::isfinite(value) || value < 0.0) {
+    throw std::invalid_argument(std::string(name) + " is " + std::to_string(value) +
+                                ": it must be a finite number >= 0; 0 is the robot's own limit");
+  }
+  return value;
+}
+
+void listen(Core& core, const std::string& robot, Driver& driver) {
+  const auto info = core.info();
+  for (const ChannelInfo& channel : channels_of(*info, robot)) {
+    if (channel.type == message_type<MotionStatus>() && !channel.input) return driver.listen(core.stream(channel));
+  }
+  throw NotSupported(robot + " publishes no motion status");
+}
+
+void hold(Core& core, const std::string& robot, const std::string& channel, std::vector<uint8_t> bytes) {
+  const auto driver = core.driver(robot);
+  listen(core, robot, *driver);
+  driver->hold(channel, std::move(bytes));
+  core.keep_repeating(driver);
+}
+
+Motion move(Core& core, const std::string& robot, const char* name, int8_t kind, double value, double radius, const Limits& limits) {
+  move_command_t command{};
+  command.utime = core.utime();
+  command.kind = kind;
+  command.value = finite("value", value);
+  command.radius = finite("radius", radius);
+  command.speed = limit("speed", limits.speed);
+  command.acceleration = limit("acceleration", limits.acceleration);
+  command.deceleration = limit("deceleration", limits.deceleration);
+  const std::string channel = input_channel(core, robot, "move_command_t");
+  const auto driver = core.driver(robot);
+  listen(core, robot, *driver);
+  command.id = core.next_id();
+  return Motion(driver->move(channel, command, name));
+}
+
+}  // namespace
+
+Camera::Camera(std::shared_ptr<Core> core, std::shared_ptr<StreamCore> stream, DeviceInfo info)
+    : Device<Image>(std::move(stream), std::move(info)), connection_(std::move(core)) {}
+Stream<Image> Camera::depth() const { return camera_part<Image>(*connection_, info(), "depth"); }
+Stream<Image> Camera::labels() const { return camera_part<Image>(*connection_, info(), "labels"); }
+Stream<CameraInfo> Camera::intrinsics() const { return camera_part<CameraInfo>(*connection_, info(), "info"); }
+
+RobotInfo Robot::info() const { return core_->robot_info(name_); }
+
+std::vector<DeviceInfo> Robot::devices() const {
+  core_->robot_info(name_);
+  return devices_of(*core_->info(), name_);
+}
+
+template <class SampleType>
+Device<SampleType> Robot::device(const std::string& name) const {
+  const std::vector<DeviceInfo> all = devices();
+  for (const DeviceInfo& device : all) {
+    if (device.name != name) continue;
+    if (device.type != message_type<SampleType>()) {
+      throw TypeMismatch(name_ + "/" + name + " sends " + device.type + ", not " + message_type<SampleType>());
+    }
+    return {stream_of(*core_, name_, device.channel), device};
+  }
+  throw UnknownName(name_ + " has no device '" + name + "'; it has " + names_of(all));
+}
+
+template Device<Scan> Robot::device(const std::string&) const;
+template Device<LidarScan> Robot::device(const std::string&) const;
+template Device<SonarReading> Robot::device(const std::string&) const;
+template Device<Odometry> Robot::device(const std::string&) const;
+template Device<Pose> Robot::device(const std::string&) const;
+template Device<Image> Robot::device(const std::string&) const;
+template Device<Imu> Robot::device(const std::string&) const;
+template Device<Contact> Robot::device(const std::string&) const;
+template Device<Joints> Robot::device(const std::string&) const;
+template Device<MotionStatus> Robot::device(const std::string&) const;
+
+Device<Scan> Robot::lrf() const { return first_device<Scan>(*core_, name_, "laser range finder"); }
+Device<LidarScan> Robot::lidar() const { return first_device<LidarScan>(*core_, name_, "laser scanner with several layers"); }
+Device<SonarReading> Robot::sonar() const { return first_device<SonarReading>(*core_, name_, "sonar"); }
+Device<Odometry> Robot::odometry() const { return first_device<Odometry>(*core_, name_, "odometry"); }
+Device<Imu> Robot::imu() const { return first_device<Imu>(*core_, name_, "IMU"); }
+Device<Contact> Robot::contact() const { return first_device<Contact>(*core_, name_, "contact sensor"); }
+Stream<Pose> Robot::pose() const { return first_stream<Pose>(*core_, name_, "true pose"); }
+Stream<MotionStatus> Robot::motion() const { return first_stream<MotionStatus>(*core_, name_, "motion status"); }
+Stream<Joints> Robot::joints() const { return first_stream<Joints>(*core_, name_, "joints"); }
+
+Camera Robot::camera() const {
+  const DeviceInfo camera = first_device<Image>(*core_, name_, "camera").info();
+  return Camera(core_, stream_of(*core_, name_, camera.channel), camera);
+}
+
+void Robot::set_velocity(double v, double omega) const {
+  velocity_command_t command{};
+  command.utime = core_->utime();
+  command.vx = finite("v", v);
+  command.omega = finite("omega", omega);
+  hold(*core_, name_, input_channel(*core_, name_, "velocity_command_t"), encoded(command));
+}
+
+void Robot::set_wheels(double left, double right) const {
+  wheel_command_t command{};
+  command.utime = core_->utime();
+  command.rate = {finite("left", left), finite("right", right)};
+  command.n = 2;
+  hold(*core_, name_, input_channel(*core_, name_, "wheel_command_t"), encoded(command));
+}
+
+Motion Robot::stop(double deceleration) const {
+  return move(*core_, name_, "stop", move_command_t::STOP, 0.0, 0.0, {0.0, 0.0, deceleration});
+}
+Motion Robot::advance(double distance, Limits limits) const {
+  return move(*core_, name_, "advance", move_command_t::ADVANCE, distance, 0.0, limits);
+}
+Motion Robot::rotate(double angle, Limits limits) const {
+  return move(*core_, name_, "rotate", move_command_t::ROTATE, angle, 0.0, limits);
+}
+Motion Robot::turn_to(double heading, Limits limits) const {
+  return move(*core_, name_, "turn_to", move_command_t::HEADING, heading, 0.0, limits);
+}
+Motion Robot::arc(double angle, double radius, Limits limits) const {
+  if (!(radius > 0.0)) {
+    throw std::invalid_argument("radius is " + std::to_string(radius) + ": it must be > 0 m; the sign of the angle says left or right");
+  }
+  return move(*core_, name_, "arc", move_command_t::ARC, angle, radius, limits);
+}
+
+}  // namespace ruedo::client

@@ -1,0 +1,252 @@
+// The samples: decoding, and what little they can compute.
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+
+#include "ruedo/camera_info_t.hpp"
+#include "ruedo/contact_t.hpp"
+#include "ruedo/image_t.hpp"
+#include "ruedo/imu_t.hpp"
+#include "ruedo/joint_state_t.hpp"
+#include "ruedo/lidar_t.hpp"
+#include "ruedo/motion_status_t.hpp"
+#include "ruedo/odometry_t.hpp"
+#include "ruedo/planar_lidar_t.hpp"
+#include "ruedo/pose_t.hpp"
+#include "ruedo/sonar_t.hpp"
+#include "sample_types.h"
+
+namespace ruedo::client {
+
+double Scan::nearest(double from_angle, double to_angle) const {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (size_t i = 0; i < ranges.size(); ++i) {
+    if (angle(i) >= from_angle && angle(i) <= to_angle) nearest = std::min(nearest, static_cast<double>(ranges[i]));
+  }
+  return nearest;
+}
+
+double Pose::heading() const {
+  const auto [w, x, y, z] = orientation;
+  return std::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z));
+}
+
+void Image::save(const std::string& path) const {
+  std::ofstream file(path, std::ios::binary);
+  if (format == Format::jpeg) {
+    file.write(reinterpret_cast<const char*>(data.data()), static_cast<std::streamsize>(data.size()));
+  } else if (format == Format::rgb || format == Format::bgr || format == Format::gray) {
+    const int channels = format == Format::gray ? 1 : 3;
+    const size_t row_bytes = static_cast<size_t>(std::max(width, 0)) * static_cast<size_t>(channels);
+    const size_t stride = row_stride > 0 ? static_cast<size_t>(row_stride) : row_bytes;
+    if (width <= 0 || height <= 0 || stride < row_bytes || data.size() / stride < static_cast<size_t>(height)) {
+      throw Error(path + ": the picture's size does not fit its " + std::to_string(data.size()) + " bytes");
+    }
+    file << (channels == 1 ? "P5 " : "P6 ") << width << ' ' << height << " 255\n";
+    std::string row(row_bytes, '\0');
+    for (size_t y = 0; y < static_cast<size_t>(height); ++y) {
+      std::copy_n(data.begin() + static_cast<std::ptrdiff_t>(y * stride), row_bytes, row.begin());
+      if (format == Format::bgr) {
+        for (size_t x = 0; x < row_bytes; x += 3) std::swap(row[x], row[x + 2]);
+      }
+      file << row;
+    }
+  } else {
+    throw Error(path + ": this kind of picture has no common file format");
+  }
+  file.close();
+  if (!file) throw Error(path + " cannot be written");
+}
+
+namespace {
+
+std::shared_ptr<const Sample> decode_scan(WireReader& in) {
+  auto s = std::make_shared<Scan>();
+  s->utime = in.int64();
+  s->ranges = in.floats(in.count(4));
+  s->intensities = in.floats(in.count(4));
+  s->angle_min = in.float32();
+  s->angle_step = in.float32();
+  return s;
+}
+
+std::shared_ptr<const Sample> decode_lidar(WireReader& in) {
+  auto s = std::make_shared<LidarScan>();
+  s->utime = in.int64();
+  s->layers = in.int32();
+  s->columns = in.int32();
+  s->ranges = in.floats(in.count(4));
+  s->intensities = in.floats(in.count(4));
+  s->azimuth_min = in.float32();
+  s->azimuth_step = in.float32();
+  s->elevation_min = in.float32();
+  s->elevation_step = in.float32();
+  const bool fits = s->layers >= 0 && s->columns >= 0 &&
+                    static_cast<size_t>(s->layers) * static_cast<size_t>(s->columns) == s->ranges.size() &&
+                    (s->intensities.empty() || s->intensities.size() == s->ranges.size());
+  if (!fits) throw WireError("sizes that do not fit each other");
+  return s;
+}
+
+std::shared_ptr<const Sample> decode_sonar(WireReader& in) {
+  auto s = std::make_shared<SonarReading>();
+  s->utime = in.int64();
+  const size_t n = in.count(4 + 8 + 1);
+  s->ranges = in.floats(n);
+  s->fired_utime = in.int64s(n);
+  s->fresh = in.booleans(n);
+  return s;
+}
+
+std::shared_ptr<const Sample> decode_odometry(WireReader& in) {
+  auto s = std::make_shared<Odometry>();
+  s->utime = in.int64();
+  for (double* value : {&s->x, &s->y, &s->theta, &s->v, &s->omega}) *value = in.float64();
+  const size_t n = in.count(8 + 8 + 8);
+  s->wheel_angles = in.doubles(n);
+  s->wheel_rates = in.doubles(n);
+  s->ticks = in.int64s(n);
+  s->resets = in.int32();
+  return s;
+}
+
+std::shared_ptr<const Sample> decode_pose(WireReader& in) {
+  auto s = std::make_shared<Pose>();
+  s->utime = in.int64();
+  s->position = in.array<3>();
+  s->velocity = in.array<3>();
+  s->orientation = in.array<4>();
+  s->rotation_rate = in.array<3>();
+  s->acceleration = in.array<3>();
+  return s;
+}
+
+Image::Format image_format(int32_t pixelformat) {
+  switch (pixelformat) {
+    case image_t::PIXEL_FORMAT_GRAY: return Image::Format::gray;
+    case image_t::PIXEL_FORMAT_RGB: return Image::Format::rgb;
+    case image_t::PIXEL_FORMAT_BGR: return Image::Format::bgr;
+    case image_t::PIXEL_FORMAT_MJPEG: return Image::Format::jpeg;
+    case image_t::PIXEL_FORMAT_LE_GRAY16: return Image::Format::gray16;
+    case image_t::PIXEL_FORMAT_FLOAT_GRAY32: return Image::Format::float32;
+    default: return Image::Format::unknown;
+  }
+}
+
+std::shared_ptr<const Sample> decode_image(WireReader& in) {
+  auto s = std::make_shared<Image>();
+  s->utime = in.int64();
+  s->width = in.int32();
+  s->height = in.int32();
+  s->row_stride = in.int32();
+  s->format = image_format(in.int32());
+  s->data = in.bytes(in.count(1));
+  return s;    // the metadata behind is not used
+}
+
+std::shared_ptr<const Sample> decode_camera_info(WireReader& in) {
+  auto s = std::make_shared<CameraInfo>();
+  s->utime = in.int64();
+  s->width = in.int32();
+  s->height = in.int32();
+  for (double* value : {&s->fx, &s->fy, &s->cx, &s->cy}) *value = in.float64();
+  s->distortion = in.array<5>();
+  return s;
+}
+
+std::shared_ptr<const Sample> decode_imu(WireReader& in) {
+  auto s = std::make_shared<Imu>();
+  s->utime = in.int64();
+  s->orientation = in.array<4>();
+  s->angular_velocity = in.array<3>();
+  s->linear_acceleration = in.array<3>();
+  return s;
+}
+
+std::shared_ptr<const Sample> decode_contact(WireReader& in) {
+  auto s = std::make_shared<Contact>();
+  s->utime = in.int64();
+  s->pressed = in.boolean();
+  s->points.resize(in.count(5 + 8 * 8));
+  for (ContactPoint& point : s->points) {
+    point.body = in.string();
+    point.position = in.array<3>();
+    point.normal = in.array<3>();
+    point.force = in.float64();
+    point.depth = in.float64();
+  }
+  return s;
+}
+
+std::shared_ptr<const Sample> decode_joints(WireReader& in) {
+  auto s = std::make_shared<Joints>();
+  s->utime = in.int64();
+  const size_t n = in.fits(in.int16(), 5 + 3 * 4);
+  s->names = in.strings(n);
+  s->positions = in.floats(n);
+  s->velocities = in.floats(n);
+  s->efforts = in.floats(n);
+  return s;
+}
+
+template <size_t n>
+std::string word(const char* const (&words)[n], int index) {
+  return index >= 0 && static_cast<size_t>(index) < n ? words[index] : std::to_string(index);
+}
+
+std::shared_ptr<const Sample> decode_motion(WireReader& in) {
+  static const char* const kinds[] = {"none", "advance", "rotate", "heading", "arc", "stop"};
+  static const char* const states[] = {"idle", "running", "done", "ended", "refused"};
+  static const char* const reasons[] = {"", "replaced", "blocked", "watchdog", "not finite", "bad kind", "bad value", "no drive"};
+  auto s = std::make_shared<MotionStatus>();
+  s->utime = in.int64();
+  s->id = in.int64();
+  const int kind = in.int8();
+  s->kind = kind == motion_status_t::KIND_VELOCITY ? "velocity"
+            : kind == motion_status_t::KIND_WHEELS ? "wheels"
+                                                   : word(kinds, kind);
+  s->state = word(states, in.int8());
+  s->reason = word(reasons, in.int8());
+  s->progress = in.float64();
+  s->remaining = in.float64();
+  s->v = in.float64();
+  s->omega = in.float64();
+  return s;
+}
+
+const SampleDecoder kDecoders[] = {
+    {"planar_lidar_t", planar_lidar_t::getHash(), decode_scan},
+    {"lidar_t", lidar_t::getHash(), decode_lidar},
+    {"sonar_t", sonar_t::getHash(), decode_sonar},
+    {"odometry_t", odometry_t::getHash(), decode_odometry},
+    {"pose_t", pose_t::getHash(), decode_pose},
+    {"image_t", image_t::getHash(), decode_image},
+    {"camera_info_t", camera_info_t::getHash(), decode_camera_info},
+    {"imu_t", imu_t::getHash(), decode_imu},
+    {"contact_t", contact_t::getHash(), decode_contact},
+    {"joint_state_t", joint_state_t::getHash(), decode_joints},
+    {"motion_status_t", motion_status_t::getHash(), decode_motion},
+};
+
+}  // namespace
+
+const SampleDecoder* find_decoder(const std::string& type) {
+  for (const SampleDecoder& decoder : kDecoders) {
+    if (type == decoder.type) return &decoder;
+  }
+  return nullptr;
+}
+
+template <> const char* message_type<Scan>() { return "planar_lidar_t"; }
+template <> const char* message_type<LidarScan>() { return "lidar_t"; }
+template <> const char* message_type<SonarReading>() { return "sonar_t"; }
+template <> const char* message_type<Odometry>() { return "odometry_t"; }
+template <> const char* message_type<Pose>() { return "pose_t"; }
+template <> const char* message_type<Image>() { return "image_t"; }
+template <> const char* message_type<CameraInfo>() { return "camera_info_t"; }
+template <> const char* message_type<Imu>() { return "imu_t"; }
+template <> const char* message_type<Contact>() { return "contact_t"; }
+template <> const char* message_type<Joints>() { return "joint_state_t"; }
+template <> const char* message_type<MotionStatus>() { return "motion_status_t"; }
+
+}  // namespace ruedo::client

@@ -1,0 +1,196 @@
+// Finding the program, a free port, and the life of the server process.
+#include "server_process.h"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <sstream>
+#include <thread>
+#include <utility>
+
+#include "lcm_bus.h"
+
+extern char** environ;
+
+namespace ruedo::client {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_program(const fs::path& path) {
+  std::error_code error;
+  return fs::is_regular_file(path, error) && access(path.c_str(), X_OK) == 0;
+}
+
+// RUEDO, else the PATH, else the bin/ or build/*/bin/ of a folder above this program.
+std::string find_ruedo() {
+  if (const char* named = std::getenv("RUEDO"); named && *named) {
+    if (!is_program(named)) throw LaunchError("the environment's RUEDO is '" + std::string(named) + "', which is no program");
+    return named;
+  }
+  std::istringstream path(std::getenv("PATH") ? std::getenv("PATH") : "");
+  for (std::string folder; std::getline(path, folder, ':');) {
+    if (is_program(fs::path(folder) / "ruedo")) return fs::path(folder) / "ruedo";
+  }
+  std::error_code error;
+  for (fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path(); !folder.empty(); folder = folder.parent_path()) {
+    std::vector<fs::path> candidates{folder / "bin/ruedo", folder / "build/bin/ruedo"};
+    for (const auto& build : fs::directory_iterator(folder / "build", error)) candidates.push_back(build.path() / "bin/ruedo");
+    for (const fs::path& candidate : candidates) {
+      if (is_program(candidate)) return candidate;
+    }
+    if (folder == folder.root_path()) break;
+  }
+  throw LaunchError("the program `ruedo` was not found: not in RUEDO, not on the PATH, not built beside this program "
+                    "(`scripts/run` builds it)");
+}
+
+int bound_socket(int type, const char* host, uint16_t port) {
+  const int fd = socket(AF_INET, type | SOCK_CLOEXEC, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(port);
+  inet_pton(AF_INET, host, &address.sin_addr);
+  if (fd >= 0 && bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) return fd;
+  if (fd >= 0) close(fd);
+  return -1;
+}
+
+uint16_t port_of(int fd) {
+  sockaddr_in address{};
+  socklen_t size = sizeof address;
+  getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size);
+  return ntohs(address.sin_port);
+}
+
+// A URL that nothing else uses. The TCP socket on the same port, kept open as `token`, keeps launches of any
+// process, in any language, apart from each other.
+std::string free_url(int& token) {
+  for (int i = 0; i < 100; ++i) {
+    token = bound_socket(SOCK_STREAM, "127.0.0.1", 0);
+    if (token < 0) break;
+    const uint16_t port = port_of(token);
+    if (!has_multicast_route()) {
+      close(std::exchange(token, -1));    // the server itself will listen on it
+      return "tcpq://127.0.0.1:" + std::to_string(port);
+    }
+    const int probe = bound_socket(SOCK_DGRAM, "0.0.0.0", port);    // fails when any LCM program uses the port
+    if (probe >= 0) {
+      close(probe);
+      return "udpm://239.255.76.67:" + std::to_string(port) + "?ttl=0";
+    }
+    close(std::exchange(token, -1));
+  }
+  throw LaunchError("no free UDP port was found in 100 tries");
+}
+
+}  // namespace
+
+ServerProcess::ServerProcess(const std::string& world, const LaunchOptions& options) {
+  const std::string program = find_ruedo();
+  url_ = options.url.empty() ? free_url(token_) : options.url;
+  std::vector<std::string> command{program, "run", world, "--lcm", url_, "--watch-stdin"};
+  if (options.seed >= 0) command.insert(command.end(), {"--seed", std::to_string(options.seed)});
+  std::ostringstream rate;
+  rate << options.rate;
+  command.insert(command.end(), {"--rate", std::isinf(options.rate) ? "max" : rate.str()});
+  command.insert(command.end(), options.args.begin(), options.args.end());
+  for (const std::string& word : command) command_ += (command_.empty() ? "" : " ") + word;
+  try {
+    start(command, options.verbose);
+  } catch (...) {
+    end();
+    throw;
+  }
+}
+
+ServerProcess::~ServerProcess() { end(); }
+
+void ServerProcess::start(const std::vector<std::string>& command, bool verbose) {
+  int ends[2];
+  if (pipe2(ends, O_CLOEXEC) != 0) throw LaunchError(std::string("no pipe for the server: ") + std::strerror(errno));
+  stdin_ = ends[1];
+  if (!verbose) {
+    const char* folder = std::getenv("TMPDIR");
+    std::string name = std::string(folder && *folder ? folder : "/tmp") + "/ruedo-XXXXXX";
+    output_ = mkostemp(name.data(), O_CLOEXEC);
+    if (output_ >= 0) unlink(name.c_str());
+  }
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, ends[0], 0);
+  if (output_ >= 0) {
+    posix_spawn_file_actions_adddup2(&actions, output_, 1);
+    posix_spawn_file_actions_adddup2(&actions, output_, 2);
+  }
+  // A session of its own: Ctrl-C in a terminal reaches this process alone, which may still use the server.
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID);
+  std::vector<char*> arguments;
+  for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
+  arguments.push_back(nullptr);
+  const int error = posix_spawn(&pid_, command[0].c_str(), &actions, &attributes, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  posix_spawnattr_destroy(&attributes);
+  close(ends[0]);
+  if (error != 0) {
+    pid_ = -1;
+    throw LaunchError(command[0] + " cannot be started: " + std::strerror(error));
+  }
+}
+
+bool ServerProcess::poll() {
+  if (!ended_ && pid_ > 0 && waitpid(pid_, &status_, WNOHANG) == pid_) ended_ = true;
+  return ended_ || pid_ <= 0;
+}
+
+std::optional<std::string> ServerProcess::ended() {
+  std::lock_guard lock(mutex_);
+  if (!poll()) return std::nullopt;
+  const std::string how = WIFEXITED(status_) ? "exit code " + std::to_string(WEXITSTATUS(status_))
+                                             : "signal " + std::to_string(WTERMSIG(status_));
+  const std::string said = last_lines();
+  return "the server ended (" + how + "): " + (said.empty() ? "it said nothing" : said) + "\n(`" + command_ + "`)";
+}
+
+void ServerProcess::end() {
+  std::lock_guard lock(mutex_);
+  if (stdin_ >= 0) close(std::exchange(stdin_, -1));
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+  while (!poll()) {
+    if (std::chrono::steady_clock::now() >= deadline) {
+      kill(pid_, SIGKILL);
+      waitpid(pid_, &status_, 0);
+      ended_ = true;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  if (output_ >= 0) close(std::exchange(output_, -1));
+  if (token_ >= 0) close(std::exchange(token_, -1));
+}
+
+std::string ServerProcess::last_lines() const {
+  if (output_ < 0) return "";
+  const off_t end = lseek(output_, 0, SEEK_END);
+  const off_t begin = std::max<off_t>(0, end - 4000);
+  std::string text(static_cast<size_t>(end - begin), '\0');
+  const ssize_t read = pread(output_, text.data(), text.size(), begin);
+  text.resize(read > 0 ? static_cast<size_t>(read) : 0);
+  while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back()))) text.pop_back();
+  size_t from = text.size();
+  for (int lines = 0; lines < 12 && from != std::string::npos && from > 0; ++lines) from = text.rfind('\n', from - 1);
+  return from == std::string::npos ? text : text.substr(from + (from < text.size() && text[from] == '\n'));
+}
+
+}  // namespace ruedo::client

@@ -1,0 +1,42 @@
+// A private server: on a free port, and ended when this process does, however that ends.
+//
+// The server watches its standard input (--watch-stdin) and ends when the pipe closes: the kernel closes it for a
+// process that was killed, too, and it does not depend on which thread started it, as PR_SET_PDEATHSIG does.
+#pragma once
+
+#include <sys/types.h>
+
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ruedo/client.h"
+
+namespace ruedo::client {
+
+class ServerProcess {
+ public:
+  ServerProcess(const std::string& world, const LaunchOptions& options);    // throws LaunchError
+  ~ServerProcess();
+
+  const std::string& url() const { return url_; }
+  // How the server ended, with the last lines it printed; nothing while it runs. Thread safe, as is end().
+  std::optional<std::string> ended();
+  // Closes the pipe, which ends the server; kills it when it has not ended after 5 s.
+  void end();
+
+ private:
+  void start(const std::vector<std::string>& command, bool verbose);
+  bool poll();    // true when it has ended; with the mutex held
+  std::string last_lines() const;
+
+  std::string url_, command_;
+  std::mutex mutex_;
+  pid_t pid_ = -1;
+  int status_ = 0;
+  bool ended_ = false;
+  int stdin_ = -1, output_ = -1, token_ = -1;    // file descriptors
+};
+
+}  // namespace ruedo::client

@@ -1,0 +1,60 @@
+// A client's session with the server: requests are repeated until they are answered, and executed once.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace ruedo {
+struct request_t;
+}
+
+namespace ruedo::client {
+
+class Core;
+
+struct Reply {
+  int64_t session = 0, sequence = 0;
+  int32_t kind = 0, code = 0;
+  std::string text;
+  std::vector<uint8_t> body;
+};
+
+class Session {
+ public:
+  Session(Core& core, std::string name) : core_(core), name_(std::move(name)) {}
+
+  // Joins on the first request. Throws NotSupported, RequestError, Timeout (after `timeout` seconds of real time).
+  Reply request(int32_t kind, const std::vector<uint8_t>& body, double timeout);
+  void leave();    // without waiting for an answer
+  void receive(const uint8_t* bytes, size_t size);    // a message of ruedo/reply
+
+ private:
+  void join(int64_t run_id, double timeout);
+  Reply exchange(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body, double timeout);
+  void publish(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body);
+
+  Core& core_;
+  const std::string name_;
+  std::mutex one_at_a_time_;
+  int64_t run_id_ = 0, sequence_ = 0;    // under one_at_a_time_
+
+  std::mutex mutex_;
+  std::condition_variable news_;
+  int64_t session_ = 0;
+  int32_t awaited_kind_ = 0;             // 0: none
+  int64_t awaited_sequence_ = 0;
+  std::optional<Reply> reply_;
+};
+
+template <class Message>
+std::vector<uint8_t> encoded(const Message& message) {
+  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
+  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  return bytes;
+}
+
+}  // namespace ruedo::client

@@ -1,0 +1,182 @@
+// connect(), launch(), and the requests of simulation control.
+#include <unistd.h>
+
+#include <cmath>
+
+#include "core.h"
+#include "ruedo/name_request_t.hpp"
+#include "ruedo/rate_request_t.hpp"
+#include "ruedo/request_t.hpp"
+#include "ruedo/reset_request_t.hpp"
+#include "ruedo/set_pose_request_t.hpp"
+#include "ruedo/set_twist_request_t.hpp"
+#include "ruedo/spawn_request_t.hpp"
+#include "ruedo/state_reply_t.hpp"
+#include "ruedo/step_request_t.hpp"
+#include "server_process.h"
+#include "wire_reader.h"
+
+namespace ruedo::client {
+namespace {
+
+constexpr double kReplyTime = 5.0, kSlowReplyTime = 60.0;    // s
+
+Quaternion about_z(double heading) { return {std::cos(heading / 2.0), 0.0, 0.0, std::sin(heading / 2.0)}; }
+
+std::vector<uint8_t> name_body(const std::string& name) {
+  name_request_t body;
+  body.name = name;
+  return encoded(body);
+}
+
+State state_of(const Reply& reply) {
+  try {
+    WireReader in(reply.body.data(), reply.body.size());
+    if (in.int64() != state_reply_t::getHash()) throw WireError("another version of the type");
+    State state;
+    state.utime = in.int64();
+    state.step = in.int64();
+    state.state_hash = in.int64();
+    state.paused = in.boolean();
+    state.rate = in.float64();
+    state.name = in.string();
+    state.position = in.array<3>();
+    state.orientation = in.array<4>();
+    state.linear = in.array<3>();
+    state.angular = in.array<3>();
+    return state;
+  } catch (const WireError& error) {
+    throw TypeMismatch(std::string("the reply's body is no state_reply_t of this client's version: ") + error.what());
+  }
+}
+
+}  // namespace
+
+Simulation connect(const std::string& url, const ConnectOptions& options) {
+  const std::string name = options.name.empty() ? "client-" + std::to_string(getpid()) : options.name;
+  auto core = std::make_shared<Core>(resolve_url(url), name, nullptr);
+  core->join(options.timeout);
+  return Simulation(std::move(core));
+}
+
+Simulation launch(const std::string& world, const LaunchOptions& options) {
+  auto server = std::make_unique<ServerProcess>(world, options);
+  ServerProcess& process = *server;
+  try {
+    auto core = std::make_shared<Core>(process.url(), options.name, std::move(server));
+    core->join(options.timeout);
+    return Simulation(std::move(core));
+  } catch (const NoServer& error) {
+    throw LaunchError(error.what());
+  }
+}
+
+Simulation::~Simulation() {
+  if (core_) core_->close();
+}
+
+Simulation& Simulation::operator=(Simulation&& other) noexcept {
+  if (this != &other) {
+    if (core_) core_->close();
+    core_ = std::move(other.core_);
+  }
+  return *this;
+}
+
+void Simulation::close() { core_->close(); }
+
+std::string Simulation::url() const { return core_->url(); }
+std::string Simulation::version() const { return core_->info()->version; }
+std::string Simulation::world() const { return core_->info()->world; }
+int64_t Simulation::seed() const { return core_->info()->seed; }
+double Simulation::step_size() const { return static_cast<double>(core_->info()->step_us) * 1e-6; }
+double Simulation::time() const { return static_cast<double>(core_->utime()) * 1e-6; }
+bool Simulation::paused() const { return core_->info()->paused; }
+
+std::vector<Robot> Simulation::robots() const {
+  std::vector<Robot> robots;
+  for (const RobotInfo& robot : core_->info()->robots) robots.emplace_back(core_, robot.name);
+  return robots;
+}
+
+Robot Simulation::robot(const std::string& name) const {
+  core_->robot_info(name);
+  return {core_, name};
+}
+
+void Simulation::sleep(double seconds) const { core_->sleep_until(core_->utime() + std::llround(seconds * 1e6)); }
+
+void Simulation::pause() const { core_->session().request(request_t::PAUSE, {}, kReplyTime); }
+void Simulation::resume() const { core_->session().request(request_t::RESUME, {}, kReplyTime); }
+
+State Simulation::step(int64_t n, double timeout) const {
+  step_request_t body;
+  body.steps = n;
+  return state_of(core_->session().request(request_t::STEP, encoded(body), timeout));
+}
+
+void Simulation::set_rate(double rate) const {
+  rate_request_t body;
+  body.rate = rate;
+  core_->session().request(request_t::RATE, encoded(body), kReplyTime);
+}
+
+void Simulation::reset(Reset what, int64_t seed) const {
+  reset_request_t body;
+  body.what = what == Reset::all ? reset_request_t::ALL : what == Reset::time ? reset_request_t::TIME : reset_request_t::POSES;
+  body.seed = seed;
+  core_->session().request(request_t::RESET, encoded(body), kSlowReplyTime);
+  core_->reset_time();
+}
+
+void Simulation::spawn(const std::string& model, double x, double y, const SpawnOptions& options) const {
+  spawn_request_t body{};
+  body.name = options.name;
+  body.model = model;
+  body.text = options.text;
+  body.on_ground = options.on_ground;
+  body.position[0] = x;
+  body.position[1] = y;
+  body.position[2] = options.z;
+  const Quaternion orientation = about_z(options.heading);
+  std::copy(orientation.begin(), orientation.end(), body.orientation);
+  core_->session().request(request_t::SPAWN, encoded(body), kSlowReplyTime);
+  core_->refresh_info();
+}
+
+void Simulation::remove(const std::string& name) const {
+  core_->session().request(request_t::REMOVE, name_body(name), kReplyTime);
+  core_->refresh_info();
+}
+
+void Simulation::set_pose(const std::string& name, const Vector3& position, const Quaternion& orientation) const {
+  set_pose_request_t body;
+  body.name = name;
+  std::copy(position.begin(), position.end(), body.position);
+  std::copy(orientation.begin(), orientation.end(), body.orientation);
+  core_->session().request(request_t::SET_POSE, encoded(body), kReplyTime);
+}
+
+void Simulation::set_pose(const std::string& name, double x, double y, double heading, double z) const {
+  set_pose(name, {x, y, z}, about_z(heading));
+}
+
+void Simulation::set_twist(const std::string& name, const Vector3& linear, const Vector3& angular) const {
+  set_twist_request_t body;
+  body.name = name;
+  std::copy(linear.begin(), linear.end(), body.linear);
+  std::copy(angular.begin(), angular.end(), body.angular);
+  core_->session().request(request_t::SET_TWIST, encoded(body), kReplyTime);
+}
+
+State Simulation::state(const std::string& name) const {
+  return state_of(core_->session().request(request_t::GET_STATE, name_body(name), kReplyTime));
+}
+
+void Simulation::reset_odometry(const std::string& robot) const {
+  core_->session().request(request_t::RESET_ODOMETRY, name_body(robot), kReplyTime);
+}
+
+void Simulation::quit() const { core_->session().request(request_t::QUIT, {}, kReplyTime); }
+
+}  // namespace ruedo::client

@@ -1,0 +1,84 @@
+// Reads an LCM message field by field, and never beyond its end: what a length promises must be there.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace ruedo::client {
+
+// The bytes are not what their type says.
+struct WireError : std::runtime_error { using std::runtime_error::runtime_error; };
+
+class WireReader {
+ public:
+  WireReader(const uint8_t* bytes, size_t size) : at_(bytes), end_(bytes + size) {}
+
+  int8_t int8() { return static_cast<int8_t>(take(1)[0]); }
+  bool boolean() { return int8() != 0; }
+  int16_t int16() { return static_cast<int16_t>(big_endian(take(2), 2)); }
+  int32_t int32() { return static_cast<int32_t>(big_endian(take(4), 4)); }
+  int64_t int64() { return static_cast<int64_t>(big_endian(take(8), 8)); }
+  float float32() { return std::bit_cast<float>(static_cast<uint32_t>(big_endian(take(4), 4))); }
+  double float64() { return std::bit_cast<double>(big_endian(take(8), 8)); }
+
+  std::string string() {
+    const size_t length = count(1);    // with its closing zero
+    if (length == 0) throw WireError("a string without an end");
+    const uint8_t* bytes = take(length);
+    return {reinterpret_cast<const char*>(bytes), length - 1};
+  }
+
+  // An int32_t that counts elements of at least `element_size` bytes each, which must still fit.
+  size_t count(size_t element_size) { return fits(int32(), element_size); }
+  size_t fits(int64_t n, size_t element_size) const {
+    if (n < 0 || static_cast<uint64_t>(n) > static_cast<size_t>(end_ - at_) / element_size) {
+      throw WireError("a length of " + std::to_string(n) + " with " + std::to_string(end_ - at_) + " bytes left");
+    }
+    return static_cast<size_t>(n);
+  }
+
+  std::vector<float> floats(size_t n) { return many<float>(n, 4, [this] { return float32(); }); }
+  std::vector<double> doubles(size_t n) { return many<double>(n, 8, [this] { return float64(); }); }
+  std::vector<int64_t> int64s(size_t n) { return many<int64_t>(n, 8, [this] { return int64(); }); }
+  std::vector<std::string> strings(size_t n) { return many<std::string>(n, 5, [this] { return string(); }); }
+  std::vector<bool> booleans(size_t n) { return many<bool>(n, 1, [this] { return boolean(); }); }
+  std::vector<uint8_t> bytes(size_t n) {
+    const uint8_t* from = take(n);
+    return {from, from + n};
+  }
+  template <size_t n>
+  std::array<double, n> array() {
+    std::array<double, n> values;
+    for (double& value : values) value = float64();
+    return values;
+  }
+
+ private:
+  template <class Value, class Read>
+  std::vector<Value> many(size_t n, size_t element_size, Read read) {
+    fits(static_cast<int64_t>(n), element_size);
+    std::vector<Value> values(n);
+    for (size_t i = 0; i < n; ++i) values[i] = read();
+    return values;
+  }
+  static uint64_t big_endian(const uint8_t* bytes, int n) {
+    uint64_t value = 0;
+    for (int i = 0; i < n; ++i) value = value << 8 | bytes[i];
+    return value;
+  }
+  const uint8_t* take(size_t n) {
+    if (n > static_cast<size_t>(end_ - at_)) throw WireError("it is too short");
+    at_ += n;
+    return at_ - n;
+  }
+
+  const uint8_t* at_;
+  const uint8_t* end_;
+};
+
+}  // namespace ruedo::client

@@ -1,0 +1,146 @@
+// ruedo/info: the assembly of its parts, and their decoding.
+#include "world_info.h"
+
+#include <cstdio>
+
+#include "ruedo/world_info_t.hpp"
+#include "wire_reader.h"
+
+namespace ruedo::client {
+namespace {
+
+RobotInfo read_robot(WireReader& in) {
+  RobotInfo robot;
+  robot.name = in.string();
+  robot.model = in.string();
+  robot.drive = in.string();
+  in.int32();    // body
+  for (double* value : {&robot.wheel_radius, &robot.track, &robot.max_speed, &robot.max_turn_rate, &robot.acceleration,
+                        &robot.deceleration, &robot.turn_acceleration}) {
+    *value = in.float64();
+  }
+  robot.watchdog = static_cast<double>(in.int64()) * 1e-6;
+  const size_t n = in.count(5 + 1);
+  robot.wheels = in.strings(n);
+  in.booleans(n);    // which are on the left
+  return robot;
+}
+
+DeviceInfo read_device(WireReader& in) {
+  DeviceInfo device;
+  device.robot = in.string();
+  device.name = in.string();
+  device.kind = in.string();
+  device.rate = in.float64();
+  device.position = in.array<3>();
+  device.orientation = in.array<4>();
+  for (double* value : {&device.range_min, &device.range_max, &device.fov_horizontal, &device.fov_vertical}) {
+    *value = in.float64();
+  }
+  device.width = in.int32();
+  device.height = in.int32();
+  device.elements.resize(in.count(6 * 8));
+  for (auto& element : device.elements) element = in.array<6>();
+  return device;
+}
+
+ChannelInfo read_channel(WireReader& in) {
+  ChannelInfo channel;
+  channel.name = in.string();
+  channel.robot = in.string();
+  channel.device = in.string();
+  channel.type = in.string();
+  channel.fingerprint = in.int64();
+  channel.rate = in.float64();
+  channel.input = in.boolean();
+  return channel;
+}
+
+// The head of every part is the same.
+void read_part(WireReader& in, WorldInfo& info) {
+  in.int64();    // utime
+  info.run_id = in.int64();
+  info.epoch = in.int32();
+  in.int16();    // part
+  in.int16();    // nparts
+  info.version = in.string();
+  info.world = in.string();
+  info.seed = in.int64();
+  info.step_us = in.int64();
+  info.features = in.int64();
+  info.paused = in.boolean();
+  for (size_t n = in.count(80); n > 0; --n) info.robots.push_back(read_robot(in));
+  for (size_t n = in.count(100); n > 0; --n) {
+    DeviceInfo device = read_device(in);
+    info.devices[device.robot].push_back(std::move(device));
+  }
+  for (size_t n = in.count(30); n > 0; --n) {
+    ChannelInfo channel = read_channel(in);
+    info.channels[channel.robot].push_back(std::move(channel));
+  }
+}
+
+std::string hex(int64_t fingerprint) {
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(fingerprint));
+  return text;
+}
+
+}  // namespace
+
+const RobotInfo* WorldInfo::robot(const std::string& name) const {
+  const auto found = robot_index.find(name);
+  return found == robot_index.end() ? nullptr : &robots[found->second];
+}
+
+std::shared_ptr<const WorldInfo> WorldInfoAssembler::add(const uint8_t* bytes, size_t size) {
+  constexpr size_t kHead = 8 + 8 + 8 + 4 + 2 + 2;
+  if (size < kHead) return nullptr;
+  WireReader head(bytes, size);
+  const int64_t fingerprint = head.int64();
+  if (fingerprint != world_info_t::getHash()) {
+    throw TypeMismatch("ruedo/info carries another version of world_info_t (fingerprint " + hex(fingerprint) + ") than this "
+                       "client reads (" + hex(world_info_t::getHash()) + "): use the client of the server's version");
+  }
+  const int64_t utime = head.int64(), run_id = head.int64();
+  const int32_t epoch = head.int32();
+  const int part = head.int16(), nparts = head.int16();
+  if (part < 0 || part >= nparts) return nullptr;
+  const Key key{utime, run_id, epoch, nparts};
+  if (key != key_) parts_.clear();
+  key_ = key;
+  parts_[part].assign(bytes + 16, bytes + size);
+  if (parts_.size() < static_cast<size_t>(nparts)) return nullptr;
+  if (parts_ == last_) {
+    parts_.clear();
+    return nullptr;
+  }
+  auto info = std::make_shared<WorldInfo>();
+  try {
+    for (const auto& [index, content] : parts_) {
+      std::vector<uint8_t> whole(8, 0);    // utime has no meaning here
+      whole.insert(whole.end(), content.begin(), content.end());
+      WireReader in(whole.data(), whole.size());
+      read_part(in, *info);
+    }
+  } catch (const WireError& error) {
+    parts_.clear();
+    throw TypeMismatch(std::string("a message on ruedo/info is no valid world_info_t: ") + error.what());
+  }
+  for (size_t i = 0; i < info->robots.size(); ++i) info->robot_index.emplace(info->robots[i].name, i);
+  // A device's channel is the one that carries its samples.
+  for (auto& [robot, devices] : info->devices) {
+    for (DeviceInfo& device : devices) {
+      for (const ChannelInfo& channel : info->channels[robot]) {
+        if (channel.device != device.name || channel.input || !device.channel.empty()) continue;
+        device.channel = channel.name;
+        device.type = channel.type;
+      }
+    }
+  }
+  last_ = std::move(parts_);
+  parts_.clear();
+  return info;
+}
+
+}  // namespace ruedo::client

@@ -1,0 +1,51 @@
+// Puts the parts of ruedo/info together.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "ruedo/client.h"
+
+namespace ruedo::client {
+
+struct ChannelInfo {
+  std::string name, robot, device, type;
+  int64_t fingerprint = 0;
+  double rate = 0.0;
+  bool input = false;
+};
+
+// One complete ruedo/info.
+struct WorldInfo {
+  int64_t run_id = 0;
+  int32_t epoch = 0;
+  std::string version, world;
+  int64_t seed = 0, step_us = 0, features = 0;
+  bool paused = false;
+  std::vector<RobotInfo> robots;
+  std::map<std::string, size_t> robot_index;
+  std::map<std::string, std::vector<DeviceInfo>> devices;      // by robot
+  std::map<std::string, std::vector<ChannelInfo>> channels;    // by robot
+
+  const RobotInfo* robot(const std::string& name) const;
+};
+
+// Takes messages of ruedo/info as they come. The parts of one info share run, epoch and utime. An info that says
+// again what the last one said, which is the rule, is known by its bytes and not decoded.
+class WorldInfoAssembler {
+ public:
+  // The info, when this message completed a new one. Throws TypeMismatch for another version of the type.
+  std::shared_ptr<const WorldInfo> add(const uint8_t* bytes, size_t size);
+
+ private:
+  using Key = std::tuple<int64_t, int64_t, int32_t, int>;    // utime, run, epoch, nparts
+  Key key_{};
+  std::map<int, std::vector<uint8_t>> parts_;
+  std::map<int, std::vector<uint8_t>> last_;                 // without fingerprint and utime
+};
+
+}  // namespace ruedo::client

@@ -1,0 +1,122 @@
+import java.nio.file.Path;
+import java.util.HashMap;
+import java.util.Map;
+import ruedo.Device;
+import ruedo.Odometry;
+import ruedo.Pose;
+import ruedo.Robot;
+import ruedo.Ruedo;
+import ruedo.RuedoException;
+import ruedo.Scan;
+import ruedo.Simulation;
+import ruedo.SonarReading;
+
+/**
+ * Wanders without bumping into things, by laser range finder and sonar; saves a camera picture and compares odometry with
+ * the true pose at the end.
+ *
+ * <pre>java -cp ruedo.jar:ruedo-examples.jar Wander [--robot NAME] [--duration SECONDS] [--url URL] [--launch WORLD]
+ *     [--picture FILE]</pre>
+ */
+public final class Wander {
+    private static final double CLEARANCE = 0.7;    // m, from here on it turns away
+    private static final double SPEED = 0.35;       // m/s
+    private static final double TURN_RATE = 0.6;    // rad/s
+    private static volatile boolean interrupted;
+    private static volatile boolean finished;
+
+    private Wander() {}
+
+    /** The nearest echo (m) of the transducers that look ahead, on the left or the right. */
+    private static double nearestEcho(SonarReading reading, double[][] elements, boolean left) {
+        double nearest = Double.POSITIVE_INFINITY;
+        for (int i = 0; i < Math.min(reading.ranges.length, elements.length); i++) {
+            double heading = elements[i][5];
+            boolean ahead = Math.abs(heading) < 1.0 && (heading >= 0.0) == left;
+            if (ahead && reading.firedUtime[i] >= 0) nearest = Math.min(nearest, reading.ranges[i]);
+        }
+        return nearest;
+    }
+
+    private static boolean has(Robot robot, String type) {
+        for (Device<?> device : robot.devices()) {
+            if (device.type.equals(type)) return true;
+        }
+        return false;
+    }
+
+    private static void wander(Robot robot, double duration) {
+        boolean hasSonar = has(robot, "sonar_t");
+        double start = robot.lrf().latest().time();
+        double now = start;
+        double turning = 0.0;    // rad/s while it turns away; it keeps to one side, or it would get stuck in corners
+        while (!interrupted && now - start < duration) {
+            Scan scan = robot.lrf().next();
+            now = scan.time();
+            double left = scan.nearest(0.0, 1.2);
+            double right = scan.nearest(-1.2, 0.0);
+            if (hasSonar) {
+                SonarReading reading = robot.sonar().latest();
+                left = Math.min(left, nearestEcho(reading, robot.sonar().elements, true));
+                right = Math.min(right, nearestEcho(reading, robot.sonar().elements, false));
+            }
+            if (Math.min(left, right) > CLEARANCE) {
+                turning = 0.0;
+                robot.setVelocity(SPEED, 0.0);
+            } else {
+                if (turning == 0.0) turning = left > right ? TURN_RATE : -TURN_RATE;
+                robot.setVelocity(0.0, turning);
+            }
+        }
+    }
+
+    private static void run(Map<String, String> options) throws java.io.IOException {
+        String world = options.get("--launch");
+        try (Simulation sim = world != null ? Ruedo.launch(world) : Ruedo.connect(options.get("--url"))) {
+            Robot robot = options.containsKey("--robot") ? sim.robot(options.get("--robot")) : sim.robots().get(0);
+            double duration = Double.parseDouble(options.getOrDefault("--duration", "Infinity"));
+            Pose start = robot.pose().latest();
+            System.out.println(robot.name + " wanders in " + sim.world() + (Double.isInfinite(duration) ? "; Ctrl-C ends it" : ""));
+
+            wander(robot, duration);
+            robot.stop().await(10.0);
+
+            if (has(robot, "image_t")) {
+                String file = options.getOrDefault("--picture", "wander.jpg");
+                robot.camera().latest().save(Path.of(file));
+                System.out.println("camera    " + file);
+            }
+            // Odometry starts at zero where the robot starts; the example began at `start`.
+            Pose truth = robot.pose().next();
+            Odometry odometry = robot.odometry().next();
+            System.out.printf("true pose x %.3f m, y %.3f m, heading %.3f rad; it began at x %.3f m, y %.3f m%n", truth.x(), truth.y(),
+                    truth.heading(), start.x(), start.y());
+            System.out.printf("odometry  x %.3f m, y %.3f m, theta %.3f rad, since the robot's start%n", odometry.x, odometry.y,
+                    odometry.theta);
+        }
+    }
+
+    /** See the class. */
+    public static void main(String[] args) throws Exception {
+        Map<String, String> options = new HashMap<>();
+        for (int i = 0; i + 1 < args.length; i += 2) options.put(args[i], args[i + 1]);
+        Thread main = Thread.currentThread();
+        Runtime.getRuntime().addShutdownHook(new Thread(() -> {    // Ctrl-C: wait until the robot stands
+            interrupted = true;
+            try {
+                if (!finished) main.join(15000);
+            } catch (InterruptedException error) {
+                Thread.currentThread().interrupt();
+            }
+        }));
+        int code = 0;
+        try {
+            run(options);
+        } catch (RuedoException error) {
+            System.err.println("wander: " + error.getMessage());
+            code = 1;
+        }
+        finished = true;
+        System.exit(code);
+    }
+}

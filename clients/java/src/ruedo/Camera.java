@@ -1,0 +1,26 @@
+package ruedo;
+
+import ruedo.lcmtypes.channel_info_t;
+import ruedo.lcmtypes.device_info_t;
+
+/** A camera; its further channels, where the world file asks for them. They throw UnknownName where it does not. */
+public final class Camera extends Device<Image> {
+    Camera(Simulation sim, device_info_t info, channel_info_t channel) {
+        super(sim, info, channel);
+    }
+
+    /** Depth pictures: "float32", m along the optical axis. */
+    public Stream<Image> depth() {
+        return sim.robot(robot).cameraPart(name, "depth", "image_t");
+    }
+
+    /** Label pictures: "gray16", body index + 1. */
+    public Stream<Image> labels() {
+        return sim.robot(robot).cameraPart(name, "labels", "image_t");
+    }
+
+    /** The intrinsics. */
+    public Stream<CameraInfo> intrinsics() {
+        return sim.robot(robot).cameraPart(name, "info", "camera_info_t");
+    }
+}

@@ -1,0 +1,95 @@
+package ruedo;
+
+/** A motion primitive under way. Thread safe. */
+public final class Motion {
+    // A primitive that no status has shown after this many statuses and seconds was lost or replaced at once.
+    private static final int UNSEEN_STATUSES = 20;
+    private static final double UNSEEN_SECONDS = 1.0;
+
+    /** As {@link MotionStatus#id} shows it. */
+    public final long id;
+    private final Simulation sim;
+    private final String robot;
+    private final String kind;
+    private final Deadline unseenUntil = new Deadline(UNSEEN_SECONDS);
+    private String state = "sent";
+    private String reason = "";
+    private double progress;
+    private double remaining;
+    private int unseen;
+
+    Motion(Simulation sim, String robot, long id, String kind, double amount) {
+        this.sim = sim;
+        this.robot = robot;
+        this.id = id;
+        this.kind = kind;
+        remaining = amount;
+    }
+
+    /** True when the robot is not executing it any more, for whatever reason. */
+    public synchronized boolean done() {
+        return state.equals("done") || state.equals("ended") || state.equals("refused");
+    }
+
+    /** "sent", then as in {@link MotionStatus#state}. */
+    public synchronized String state() {
+        return state;
+    }
+
+    /** Why it ended early or was refused, as in {@link MotionStatus#reason}. */
+    public synchronized String reason() {
+        return reason;
+    }
+
+    /** m or rad done. */
+    public synchronized double progress() {
+        return progress;
+    }
+
+    /** m or rad. */
+    public synchronized double remaining() {
+        return remaining;
+    }
+
+    /** {@link #await(double)}, however long it takes. Java's Object has the name wait. */
+    public Motion await() {
+        return await(Double.POSITIVE_INFINITY);
+    }
+
+    /**
+     * Waits until it is done, at most timeout seconds of real time.
+     *
+     * @throws RuedoException.MotionError when it ended early or was refused
+     * @throws RuedoException.Timeout when it still runs; the robot goes on then
+     */
+    public synchronized Motion await(double timeout) {
+        Deadline deadline = new Deadline(timeout);
+        while (!done()) {
+            if (deadline.passed()) {
+                throw new RuedoException.Timeout(String.format("%s: %s was not done within %s s (%.3f remain)", robot, kind,
+                        Deadline.text(timeout), remaining));
+            }
+            deadline.waitOn(this, 500);
+            sim.checkServer();
+        }
+        if (!state.equals("done")) {
+            throw new RuedoException.MotionError(String.format("%s: %s %s: %s, %.3f remain", robot, kind,
+                    state.equals("refused") ? "was refused" : "ended", reason, remaining), reason);
+        }
+        return this;
+    }
+
+    synchronized void update(MotionStatus status) {
+        if (done()) return;
+        if (status.id == id) {
+            progress = status.progress;
+            remaining = status.remaining;
+            state = status.state;
+            reason = status.reason;
+        } else if (!state.equals("sent") || (++unseen >= UNSEEN_STATUSES && unseenUntil.passed())) {
+            state = "ended";    // its own end fell between two statuses
+            reason = "replaced";
+        }
+        notifyAll();
+    }
+}

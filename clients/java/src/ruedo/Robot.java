@@ -1,0 +1,312 @@
+package ruedo;
+
+import java.util.ArrayList;
+import java.util.HashMap;
+import java.util.List;
+import java.util.Map;
+import ruedo.lcmtypes.channel_info_t;
+import ruedo.lcmtypes.device_info_t;
+import ruedo.lcmtypes.move_command_t;
+import ruedo.lcmtypes.robot_info_t;
+import ruedo.lcmtypes.velocity_command_t;
+import ruedo.lcmtypes.wheel_command_t;
+
+/** A robot of the simulation. Lengths in m, angles in rad, counter-clockwise is positive. Thread safe. */
+public final class Robot {
+    /** As in the world file. */
+    public final String name;
+    final Simulation sim;
+    private final Map<String, Stream<?>> streams = new HashMap<>();    // by channel
+    private final Driver driver = new Driver(this);
+
+    Robot(Simulation sim, String name) {
+        this.sim = sim;
+        this.name = name;
+    }
+
+    // What it is.
+
+    private robot_info_t info() {
+        return sim.robotInfo(name);
+    }
+
+    /** Name of the model that it was made from. */
+    public String model() {
+        return info().model;
+    }
+
+    /** "kinematic", "wheels", or "" for a robot that only senses. */
+    public String drive() {
+        return info().drive;
+    }
+
+    /** m. */
+    public double wheelRadius() {
+        return info().wheel_radius;
+    }
+
+    /** m, between the left and the right wheels. */
+    public double track() {
+        return info().track;
+    }
+
+    /** m/s. */
+    public double maxSpeed() {
+        return info().max_speed;
+    }
+
+    /** rad/s. */
+    public double maxTurnRate() {
+        return info().max_turn_rate;
+    }
+
+    /** s of sim time without a command after which it stops; 0: never. */
+    public double watchdog() {
+        return info().watchdog_us * 1e-6;
+    }
+
+    /** Names of the wheel joints. */
+    public List<String> wheels() {
+        return List.of(info().wheels);
+    }
+
+    // Its devices.
+
+    /** All devices, in the order of the world file. */
+    public List<Device<?>> devices() {
+        info();
+        WorldInfo known = sim.info();
+        List<Device<?>> found = new ArrayList<>();
+        for (device_info_t device : known.devices(name)) {
+            for (channel_info_t channel : known.channels(name)) {
+                if (channel.input || !channel.device.equals(device.name)) continue;
+                found.add(device(device, channel));
+                break;
+            }
+        }
+        return found;
+    }
+
+    /** The device of that name. Throws UnknownName, which lists those that exist. */
+    public Device<?> device(String name) {
+        List<Device<?>> all = devices();
+        for (Device<?> device : all) {
+            if (device.name.equals(name)) return device;
+        }
+        throw new RuedoException.UnknownName(this.name + " has no device '" + name + "'; it has " + names(all));
+    }
+
+    /** The first laser range finder with one layer. */
+    @SuppressWarnings("unchecked")
+    public Device<Scan> lrf() {
+        return (Device<Scan>) first("planar_lidar_t", "laser range finder");
+    }
+
+    /** The first laser scanner with several layers. */
+    @SuppressWarnings("unchecked")
+    public Device<LidarScan> lidar() {
+        return (Device<LidarScan>) first("lidar_t", "laser scanner with several layers");
+    }
+
+    /** The first sonar array. */
+    @SuppressWarnings("unchecked")
+    public Device<SonarReading> sonar() {
+        return (Device<SonarReading>) first("sonar_t", "sonar");
+    }
+
+    /** What its wheels say. */
+    @SuppressWarnings("unchecked")
+    public Device<Odometry> odometry() {
+        return (Device<Odometry>) first("odometry_t", "odometry");
+    }
+
+    /** The first camera. */
+    public Camera camera() {
+        return (Camera) first("image_t", "camera");
+    }
+
+    /** The first inertial measurement unit. */
+    @SuppressWarnings("unchecked")
+    public Device<Imu> imu() {
+        return (Device<Imu>) first("imu_t", "IMU");
+    }
+
+    /** The first bumper. */
+    @SuppressWarnings("unchecked")
+    public Device<Contact> contact() {
+        return (Device<Contact>) first("contact_t", "contact sensor");
+    }
+
+    /** The true pose. */
+    @SuppressWarnings("unchecked")
+    public Stream<Pose> pose() {
+        return (Stream<Pose>) firstStream("pose_t", "true pose");
+    }
+
+    /** What it is executing. */
+    @SuppressWarnings("unchecked")
+    public Stream<MotionStatus> motion() {
+        return (Stream<MotionStatus>) firstStream("motion_status_t", "motion status");
+    }
+
+    /** Its joints. */
+    @SuppressWarnings("unchecked")
+    public Stream<Joints> joints() {
+        return (Stream<Joints>) firstStream("joint_state_t", "joints");
+    }
+
+    // Driving.
+
+    /**
+     * Drives with v (m/s ahead) and omega (rad/s), within the robot's limits, until the next command of any kind: the
+     * command is repeated in the background, so that the watchdog does not stop the robot.
+     */
+    public void setVelocity(double v, double omega) {
+        velocity_command_t command = new velocity_command_t();
+        command.utime = sim.utime();
+        command.vx = finite("v", v);
+        command.omega = finite("omega", omega);
+        driver.hold(input("velocity_command_t"), Bus.encode(command));
+    }
+
+    /** The same with the rates of the left and the right wheels, rad/s, positive ahead. */
+    public void setWheels(double left, double right) {
+        wheel_command_t command = new wheel_command_t();
+        command.utime = sim.utime();
+        command.n = 2;
+        command.rate = new double[] {finite("left", left), finite("right", right)};
+        driver.hold(input("wheel_command_t"), Bus.encode(command));
+    }
+
+    /** Comes to rest. Like all primitives it returns at once; await() on what it returns waits for the end. */
+    public Motion stop() {
+        return move("stop", move_command_t.STOP, 0.0, 0.0, Limits.NONE);
+    }
+
+    /** {@link #advance(double, Limits)} with the robot's own limits. */
+    public Motion advance(double distance) {
+        return advance(distance, Limits.NONE);
+    }
+
+    /** Drives straight on by a distance (m, negative: back), and comes to rest. */
+    public Motion advance(double distance, Limits limits) {
+        return move("advance", move_command_t.ADVANCE, distance, 0.0, limits);
+    }
+
+    /** {@link #rotate(double, Limits)} with the robot's own limits. */
+    public Motion rotate(double angle) {
+        return rotate(angle, Limits.NONE);
+    }
+
+    /** Turns on the spot by an angle (rad, more than a turn is allowed). */
+    public Motion rotate(double angle, Limits limits) {
+        return move("rotate", move_command_t.ROTATE, angle, 0.0, limits);
+    }
+
+    /** {@link #turnTo(double, Limits)} with the robot's own limits. */
+    public Motion turnTo(double heading) {
+        return turnTo(heading, Limits.NONE);
+    }
+
+    /** Turns on the spot, the shorter way, to a heading (rad, in the frame odom). */
+    public Motion turnTo(double heading, Limits limits) {
+        return move("turn_to", move_command_t.HEADING, heading, 0.0, limits);
+    }
+
+    /** {@link #arc(double, double, Limits)} with the robot's own limits. */
+    public Motion arc(double angle, double radius) {
+        return arc(angle, radius, Limits.NONE);
+    }
+
+    /** Drives ahead along a circle of a radius (m, > 0) until it has turned by an angle (rad; positive: to the left). */
+    public Motion arc(double angle, double radius, Limits limits) {
+        if (!(radius > 0.0)) {
+            throw new IllegalArgumentException("radius is " + radius + ": it must be > 0 m; the sign of the angle says left or right");
+        }
+        return move("arc", move_command_t.ARC, angle, radius, limits);
+    }
+
+    private Motion move(String kindName, byte kind, double value, double radius, Limits limits) {
+        move_command_t command = new move_command_t();
+        command.utime = sim.utime();
+        command.kind = kind;
+        command.value = finite("value", value);
+        command.radius = finite("radius", radius);
+        command.speed = limits.speed;
+        command.acceleration = limits.acceleration;
+        command.deceleration = limits.deceleration;
+        String channel = input("move_command_t");
+        command.id = sim.nextId();
+        return driver.move(channel, command, kindName);
+    }
+
+    // Channels, by what info says of them: names on the bus may be remapped.
+
+    private String input(String type) {
+        if (drive().isEmpty()) {
+            throw new RuedoException.NotSupported(name + " cannot be driven: its model has no drive");
+        }
+        for (channel_info_t channel : sim.info().channels(name)) {
+            if (channel.input && channel.type.equals(type)) return channel.name;
+        }
+        throw new RuedoException.NotSupported(name + " takes no " + type);
+    }
+
+    private Device<?> first(String type, String what) {
+        List<Device<?>> all = devices();
+        for (Device<?> device : all) {
+            if (device.type.equals(type)) return device;
+        }
+        throw new RuedoException.UnknownName(name + " has no " + what + "; it has " + names(all));
+    }
+
+    private Stream<?> firstStream(String type, String what) {
+        for (Device<?> device : devices()) {
+            if (device.type.equals(type)) return device;
+        }
+        for (channel_info_t channel : sim.info().channels(name)) {
+            if (!channel.input && channel.type.equals(type)) return stream(channel);
+        }
+        throw new RuedoException.UnknownName(name + " publishes no " + what);
+    }
+
+    @SuppressWarnings("unchecked")
+    <T extends Sample> Stream<T> cameraPart(String camera, String part, String type) {
+        for (channel_info_t channel : sim.info().channels(name)) {
+            boolean named = channel.device.equals(camera + "/" + part)
+                    || (channel.device.equals(camera) && channel.name.endsWith("/" + part));
+            if (named && channel.type.equals(type)) return (Stream<T>) stream(channel);
+        }
+        throw new RuedoException.UnknownName(name + "/" + camera + " publishes no " + part + "; <ruedo:" + part
+                + "> in the world file switches it on");
+    }
+
+    private Stream<?> stream(channel_info_t channel) {
+        synchronized (streams) {
+            return streams.computeIfAbsent(channel.name, key -> new Stream<>(sim, channel));
+        }
+    }
+
+    private Device<?> device(device_info_t info, channel_info_t channel) {
+        synchronized (streams) {
+            return (Device<?>) streams.computeIfAbsent(channel.name, key ->
+                    channel.type.equals("image_t") ? new Camera(sim, info, channel) : new Device<>(sim, info, channel));
+        }
+    }
+
+    private static String names(List<Device<?>> devices) {
+        List<String> names = new ArrayList<>();
+        for (Device<?> device : devices) names.add(device.name);
+        return names.isEmpty() ? "none" : String.join(", ", names);
+    }
+
+    private static double finite(String name, double value) {
+        if (Double.isFinite(value)) return value;
+        throw new IllegalArgumentException(name + " is " + value + ": it must be a finite number");
+    }
+
+    @Override
+    public String toString() {
+        return name + ": " + names(devices());
+    }
+}

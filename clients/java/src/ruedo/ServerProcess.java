@@ -1,0 +1,146 @@
+package ruedo;
+
+import java.io.File;
+import java.io.IOException;
+import java.net.DatagramSocket;
+import java.net.InetAddress;
+import java.net.InetSocketAddress;
+import java.net.ServerSocket;
+import java.net.URISyntaxException;
+import java.nio.charset.StandardCharsets;
+import java.nio.file.Files;
+import java.nio.file.Path;
+import java.util.ArrayList;
+import java.util.Arrays;
+import java.util.List;
+import java.util.concurrent.TimeUnit;
+
+/**
+ * A private server: on a free port, and ended when this process is, however that ends. The server watches its standard
+ * input (--watch-stdin) and ends when the pipe closes: the kernel closes it for a process that was killed, too.
+ */
+final class ServerProcess {
+    final String url;
+    private final List<String> command;
+    private final Process process;
+    private final Path output;    // null when verbose
+    private ServerSocket token;   // see freeUrl()
+
+    ServerProcess(String world, LaunchOptions options) {
+        String program = findRuedo();
+        System.setProperty("java.net.preferIPv4Stack", "true");
+        url = options.url.isEmpty() ? freeUrl() : options.url;
+        command = new ArrayList<>(List.of(program, "run", world, "--lcm", url, "--watch-stdin"));
+        if (options.seed != null) command.addAll(List.of("--seed", Long.toString(options.seed)));
+        command.addAll(List.of("--rate", Double.isInfinite(options.rate) ? "max" : Double.toString(options.rate)));
+        command.addAll(options.args);
+        try {
+            output = options.verbose ? null : Files.createTempFile("ruedo-", ".log");
+            ProcessBuilder builder = new ProcessBuilder(command);
+            if (output == null) {
+                builder.redirectOutput(ProcessBuilder.Redirect.INHERIT).redirectError(ProcessBuilder.Redirect.INHERIT);
+            } else {
+                builder.redirectErrorStream(true).redirectOutput(output.toFile());
+            }
+            process = builder.start();
+        } catch (IOException error) {
+            throw new RuedoException.LaunchError(program + " cannot be started: " + error.getMessage());
+        }
+    }
+
+    /** How the server ended, with the last lines it printed; null while it runs. */
+    synchronized String ended() {
+        if (process.isAlive()) return null;
+        String said = lastLines();
+        return "the server ended (exit code " + process.exitValue() + "): " + (said.isEmpty() ? "it said nothing" : said)
+                + "\n(`" + String.join(" ", command) + "`)";
+    }
+
+    /** Closes the pipe, which ends the server; kills it when it has not ended after 5 s. */
+    synchronized void end() {
+        try {
+            process.getOutputStream().close();
+            if (!process.waitFor(5, TimeUnit.SECONDS)) process.destroyForcibly().waitFor();
+            if (token != null) token.close();
+            if (output != null) Files.deleteIfExists(output);
+        } catch (IOException error) {
+            // it is gone already
+        } catch (InterruptedException error) {
+            process.destroyForcibly();
+            Thread.currentThread().interrupt();
+        }
+    }
+
+    private String lastLines() {
+        try {
+            if (output == null || !Files.exists(output)) return "";
+            String[] lines = new String(Files.readAllBytes(output), StandardCharsets.UTF_8).trim().split("\n");
+            return String.join("\n", Arrays.copyOfRange(lines, Math.max(0, lines.length - 12), lines.length));
+        } catch (IOException error) {
+            return "";
+        }
+    }
+
+    /** RUEDO, else the PATH, else the bin/ or build/{any}/bin/ of a folder above this jar. */
+    private static String findRuedo() {
+        String named = System.getenv("RUEDO");
+        if (named != null && !named.isEmpty()) {
+            if (isProgram(new File(named))) return named;
+            throw new RuedoException.LaunchError("the environment's RUEDO is '" + named + "', which is no program");
+        }
+        String path = System.getenv("PATH");
+        for (String folder : (path == null ? "" : path).split(File.pathSeparator)) {
+            File candidate = new File(folder, "ruedo");
+            if (isProgram(candidate)) return candidate.getPath();
+        }
+        try {
+            File here = new File(Ruedo.class.getProtectionDomain().getCodeSource().getLocation().toURI());
+            for (File folder = here.getParentFile(); folder != null; folder = folder.getParentFile()) {
+                List<File> candidates = new ArrayList<>(List.of(new File(folder, "bin/ruedo"), new File(folder, "build/bin/ruedo")));
+                File[] builds = new File(folder, "build").listFiles(File::isDirectory);
+                if (builds != null) {
+                    Arrays.sort(builds);
+                    for (File build : builds) candidates.add(new File(build, "bin/ruedo"));
+                }
+                for (File candidate : candidates) {
+                    if (isProgram(candidate)) return candidate.getPath();
+                }
+            }
+        } catch (URISyntaxException error) {
+            // a jar in a strange place: say that nothing was found
+        }
+        throw new RuedoException.LaunchError("the program `ruedo` was not found: not in RUEDO, not on the PATH, not built "
+                + "beside this jar (`scripts/run` builds it)");
+    }
+
+    private static boolean isProgram(File file) {
+        return file.isFile() && file.canExecute();
+    }
+
+    /**
+     * A URL that nothing else uses. The TCP socket on the same port, kept open, is the token by which launches of any
+     * process, in any language, stay apart from each other.
+     */
+    private String freeUrl() {
+        for (int i = 0; i < 100; i++) {
+            try {
+                token = new ServerSocket(0, 1, InetAddress.getByName("127.0.0.1"));
+                int port = token.getLocalPort();
+                if (!Bus.hasMulticastRoute("239.255.76.67")) {
+                    token.close();    // the server itself will listen on it
+                    return "tcpq://127.0.0.1:" + port;
+                }
+                try (DatagramSocket probe = new DatagramSocket(null)) {
+                    probe.setReuseAddress(false);
+                    probe.bind(new InetSocketAddress("0.0.0.0", port));    // fails when any LCM program uses the port
+                    return "udpm://239.255.76.67:" + port + "?ttl=0";
+                } catch (IOException error) {
+                    token.close();
+                }
+            } catch (IOException error) {
+                throw new RuedoException.LaunchError("no port for the server: " + error.getMessage());
+            }
+        }
+        throw new RuedoException.LaunchError("no free UDP port was found in 100 tries");
+    }
+}

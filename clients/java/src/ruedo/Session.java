@@ -1,0 +1,122 @@
+package ruedo;
+
+import java.io.IOException;
+import java.security.SecureRandom;
+import lcm.lcm.LCMDataInputStream;
+import lcm.lcm.LCMEncodable;
+import ruedo.lcmtypes.join_t;
+import ruedo.lcmtypes.reply_t;
+import ruedo.lcmtypes.request_t;
+
+/** A client's session with the server: requests are repeated until they are answered, and executed once. */
+final class Session {
+    private static final long REPEAT_MILLIS = 100;
+    private static final String[] KINDS = {"", "JOIN", "LEAVE", "PAUSE", "RESUME", "STEP", "RATE", "RESET", "SPAWN", "REMOVE",
+        "SET_POSE", "SET_TWIST", "GET_STATE", "INFO", "QUIT", "GRANT", "RESEND", "SNAPSHOT", "RESTORE", "RESET_ODOMETRY"};
+
+    private final Simulation sim;
+    private final String name;
+    private final Object news = new Object();
+    private long runId;             // these two under this object's monitor
+    private long sequence;
+    private volatile long session;
+    private int awaitedKind;        // these under news; 0: none
+    private long awaitedSequence;
+    private reply_t reply;
+
+    Session(Simulation sim, String name) {
+        this.sim = sim;
+        this.name = name;
+    }
+
+    /** Joins on the first request. body: null for none. timeout: s of real time. */
+    synchronized reply_t request(int kind, LCMEncodable body, double timeout) {
+        WorldInfo info = sim.info();
+        if (!info.supports(kind)) {
+            throw new RuedoException.NotSupported("this server (Ruedo " + info.head.version + ") has no " + KINDS[kind] + " request");
+        }
+        byte[] encoded = body == null ? new byte[0] : Bus.encode(body);
+        for (int attempt = 1;; attempt++) {
+            if (session == 0 || runId != info.head.run_id) join(info.head.run_id, timeout);
+            reply_t answer = exchange(kind, session, ++sequence, encoded, timeout);
+            if (answer.code != reply_t.UNKNOWN_SESSION || attempt == 2) return checked(answer);
+            session = 0;    // its place went to another: join again
+        }
+    }
+
+    /** Gives the session back, without waiting for an answer. */
+    synchronized void leave() {
+        if (session == 0 || !sim.info().supports(request_t.LEAVE)) return;
+        publish(request_t.LEAVE, session, ++sequence, new byte[0]);
+        session = 0;
+    }
+
+    /** A message of ruedo/reply. */
+    void receive(LCMDataInputStream in) {
+        reply_t received;
+        try {
+            if (in.readLong() != reply_t.LCM_FINGERPRINT) return;
+            in.reset();
+            received = new reply_t(in);
+        } catch (IOException | RuntimeException error) {
+            return;
+        }
+        synchronized (news) {
+            boolean ours = received.kind == request_t.JOIN || received.session == session;
+            if (!ours || received.kind != awaitedKind || received.sequence != awaitedSequence) return;
+            reply = received;
+            news.notifyAll();
+        }
+    }
+
+    private void join(long run, double timeout) {
+        join_t body = new join_t();
+        body.client = name;
+        long number = (new SecureRandom().nextLong() >>> 2) + 1;
+        session = checked(exchange(request_t.JOIN, 0, number, Bus.encode(body), timeout)).session;
+        runId = run;
+        sequence = 0;
+    }
+
+    private reply_t exchange(int kind, long toSession, long number, byte[] body, double timeout) {
+        Deadline deadline = new Deadline(timeout);
+        synchronized (news) {
+            awaitedKind = kind;
+            awaitedSequence = number;
+            reply = null;
+            while (reply == null) {
+                if (deadline.passed()) {
+                    awaitedKind = 0;
+                    throw new RuedoException.Timeout("no reply to " + KINDS[kind] + " on ruedo/reply within "
+                            + Deadline.text(timeout) + " s");
+                }
+                publish(kind, toSession, number, body);
+                deadline.waitOn(news, REPEAT_MILLIS);
+                sim.checkServer();
+            }
+            awaitedKind = 0;
+            return reply;
+        }
+    }
+
+    private void publish(int kind, long toSession, long number, byte[] body) {
+        request_t request = new request_t();
+        request.utime = sim.utime();
+        request.run_id = sim.info().head.run_id;
+        request.epoch = -1;
+        request.session = toSession;
+        request.sequence = number;
+        request.kind = kind;
+        request.size = body.length;
+        request.body = body;
+        sim.bus.publish("ruedo/request", request);
+    }
+
+    private static reply_t checked(reply_t reply) {
+        if (reply.code == reply_t.OK) return reply;
+        String kind = reply.kind > 0 && reply.kind < KINDS.length ? KINDS[reply.kind] : Integer.toString(reply.kind);
+        String text = kind + ": " + (reply.text.isEmpty() ? "refused with code " + reply.code : reply.text);
+        if (reply.code == reply_t.NOT_SUPPORTED) throw new RuedoException.NotSupported(text);
+        throw new RuedoException.RequestError(text, reply.code);
+    }
+}

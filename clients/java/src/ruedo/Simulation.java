@@ -1,0 +1,424 @@
+package ruedo;
+
+import java.io.IOException;
+import java.util.ArrayList;
+import java.util.HashMap;
+import java.util.List;
+import java.util.Map;
+import java.util.Set;
+import java.util.concurrent.ConcurrentHashMap;
+import java.util.concurrent.atomic.AtomicLong;
+import lcm.lcm.LCMDataInputStream;
+import lcm.lcm.LCMEncodable;
+import ruedo.lcmtypes.name_request_t;
+import ruedo.lcmtypes.rate_request_t;
+import ruedo.lcmtypes.reply_t;
+import ruedo.lcmtypes.request_t;
+import ruedo.lcmtypes.reset_request_t;
+import ruedo.lcmtypes.robot_info_t;
+import ruedo.lcmtypes.set_pose_request_t;
+import ruedo.lcmtypes.set_twist_request_t;
+import ruedo.lcmtypes.spawn_request_t;
+import ruedo.lcmtypes.state_reply_t;
+import ruedo.lcmtypes.step_request_t;
+import ruedo.lcmtypes.tick_t;
+
+/**
+ * A running simulation. Made by {@link Ruedo#connect} or {@link Ruedo#launch}; thread safe. close() ends a server that
+ * launch() started. Requests throw NotSupported where the server does not have them, RequestError when it refuses.
+ */
+public final class Simulation implements AutoCloseable {
+    private static final double SILENCE_SECONDS = 30.0;    // without any message: the server is gone
+    private static final double REPLY_SECONDS = 5.0;
+    private static final double SLOW_REPLY_SECONDS = 60.0;
+
+    /** Where it is. */
+    public final String url;
+    final Bus bus;
+    private final ServerProcess server;    // null: not ours
+    private final Session session;
+    private final WorldInfo.Assembler assembler = new WorldInfo.Assembler();
+    private final Map<String, Robot> robots = new HashMap<>();
+    private final Set<Driver> repeating = ConcurrentHashMap.newKeySet();
+    private final AtomicLong ids;
+    private final Thread closer = new Thread(this::close, "ruedo-close");
+    private WorldInfo known;               // these under this object's monitor
+    private RuedoException fault;
+    private Thread repeater;
+    private volatile long utime;
+    private volatile long lastSign = System.nanoTime();
+    private volatile boolean closed;
+
+    Simulation(String url, String name, double timeout, ServerProcess server) {
+        this.url = url;
+        this.server = server;
+        int hash = 0x811c9dc5;    // FNV-1a of the name: two clients number their primitives apart
+        for (byte b : name.getBytes(java.nio.charset.StandardCharsets.UTF_8)) hash = (hash ^ (b & 255)) * 16777619;
+        ids = new AtomicLong((long) (hash & 0x7fffffff) << 20);
+        session = new Session(this, name);
+        bus = new Bus(url);
+        bus.subscribe("ruedo/info", this::onInfo);
+        bus.subscribe("ruedo/tick", this::onTick);
+        bus.subscribe("ruedo/reply", session::receive);
+        awaitInfo(timeout);
+        Runtime.getRuntime().addShutdownHook(closer);
+    }
+
+    // What there is.
+
+    /** Of the server. */
+    public String version() {
+        return info().head.version;
+    }
+
+    /** Name of the world. */
+    public String world() {
+        return info().head.world;
+    }
+
+    /** Of the random numbers. */
+    public long seed() {
+        return info().head.seed;
+    }
+
+    /** Length of a step, s. */
+    public double stepSize() {
+        return info().head.step_us * 1e-6;
+    }
+
+    /** Sim time of the newest message that came, s. */
+    public double time() {
+        return utime * 1e-6;
+    }
+
+    /** As ruedo/info last said it. */
+    public boolean paused() {
+        return info().head.paused;
+    }
+
+    /** All robots, in the order of the world file. */
+    public List<Robot> robots() {
+        List<Robot> all = new ArrayList<>();
+        for (String name : info().robots.keySet()) all.add(robot(name));
+        return all;
+    }
+
+    /** The robot of that name. Throws UnknownName, which lists those that exist. */
+    public Robot robot(String name) {
+        robotInfo(name);
+        synchronized (robots) {
+            return robots.computeIfAbsent(name, key -> new Robot(this, key));
+        }
+    }
+
+    /** Waits until so many seconds of sim time have passed. */
+    public synchronized void sleep(double seconds) {
+        long until = utime + Math.round(seconds * 1e6);
+        Deadline never = new Deadline(Double.POSITIVE_INFINITY);
+        while (utime < until) {
+            never.waitOn(this, 500);
+            checkServer();
+        }
+    }
+
+    // Control.
+
+    /** Stops sim time after the current step. */
+    public void pause() {
+        session.request(request_t.PAUSE, null, REPLY_SECONDS);
+    }
+
+    /** Goes on. */
+    public void resume() {
+        session.request(request_t.RESUME, null, REPLY_SECONDS);
+    }
+
+    /** Takes n steps of a paused simulation and returns the state after them. */
+    public State step(long n) {
+        step_request_t body = new step_request_t();
+        body.steps = n;
+        return state(session.request(request_t.STEP, body, SLOW_REPLY_SECONDS));
+    }
+
+    /** Sim time per real time, > 0; {@link Double#POSITIVE_INFINITY}: as fast as it goes. */
+    public void setRate(double rate) {
+        rate_request_t body = new rate_request_t();
+        body.rate = rate;
+        session.request(request_t.RATE, body, REPLY_SECONDS);
+    }
+
+    /** What a reset resets. */
+    public enum Reset {
+        /** What follows equals a fresh run. */
+        ALL,
+        /** Sim time alone. */
+        TIME,
+        /** Everything back to where it started, at rest. */
+        POSES
+    }
+
+    /** Starts everything anew, with the same seed. */
+    public void reset() {
+        reset(Reset.ALL, -1);
+    }
+
+    /** Starts anew. seed: of what follows, -1: the same again. */
+    public void reset(Reset what, long seed) {
+        reset_request_t body = new reset_request_t();
+        body.what = what == Reset.ALL ? reset_request_t.ALL : what == Reset.TIME ? reset_request_t.TIME : reset_request_t.POSES;
+        body.seed = seed;
+        session.request(request_t.RESET, body, SLOW_REPLY_SECONDS);
+        utime = 0;
+    }
+
+    /** Adds one of Ruedo's models ("p3at"), or a file in the server's search folders, on the ground below x, y (m). */
+    public void spawn(String model, double x, double y, double heading, String name) {
+        spawn(model, "", name, new double[] {x, y, 0.0}, aboutZ(heading), true);
+    }
+
+    /**
+     * Adds a model. model: a name, or "" for SDF or URDF in text. name: "" is the model's own. position: m; orientation:
+     * w, x, y, z. onGround: it stands on the ground below. The server refuses to put it into something.
+     */
+    public void spawn(String model, String text, String name, double[] position, double[] orientation, boolean onGround) {
+        spawn_request_t body = new spawn_request_t();
+        body.model = model;
+        body.text = text;
+        body.name = name;
+        body.position = position;
+        body.orientation = orientation;
+        body.on_ground = onGround;
+        session.request(request_t.SPAWN, body, SLOW_REPLY_SECONDS);
+        refreshInfo();
+    }
+
+    /** Takes a model away. */
+    public void remove(String name) {
+        session.request(request_t.REMOVE, nameBody(name), REPLY_SECONDS);
+        refreshInfo();
+    }
+
+    /** Puts a model at x, y, z (m) with a heading (rad), at rest. */
+    public void setPose(String name, double x, double y, double heading, double z) {
+        setPose(name, new double[] {x, y, z}, aboutZ(heading));
+    }
+
+    /** Puts a model somewhere, at rest. position: m; orientation: w, x, y, z. */
+    public void setPose(String name, double[] position, double[] orientation) {
+        set_pose_request_t body = new set_pose_request_t();
+        body.name = name;
+        body.position = position;
+        body.orientation = orientation;
+        session.request(request_t.SET_POSE, body, REPLY_SECONDS);
+    }
+
+    /** Gives a model a velocity (m/s) and a turn rate (rad/s), in the world. */
+    public void setTwist(String name, double[] linear, double[] angular) {
+        set_twist_request_t body = new set_twist_request_t();
+        body.name = name;
+        body.linear = linear;
+        body.angular = angular;
+        session.request(request_t.SET_TWIST, body, REPLY_SECONDS);
+    }
+
+    /** Time, step and state hash. */
+    public State state() {
+        return state("");
+    }
+
+    /** The same, with pose and twist of a model or MODEL/LINK. */
+    public State state(String name) {
+        return state(session.request(request_t.GET_STATE, nameBody(name), REPLY_SECONDS));
+    }
+
+    /** Sets a robot's odometry to zero where it stands. */
+    public void resetOdometry(String robot) {
+        session.request(request_t.RESET_ODOMETRY, nameBody(robot), REPLY_SECONDS);
+    }
+
+    /** Ends the server. */
+    public void quit() {
+        session.request(request_t.QUIT, null, REPLY_SECONDS);
+    }
+
+    /** Ends repeated commands, and a server that launch() started. */
+    @Override
+    public void close() {
+        synchronized (this) {
+            if (closed) return;
+            closed = true;
+            notifyAll();
+        }
+        session.leave();
+        bus.close();
+        if (server != null) server.end();
+        try {
+            Runtime.getRuntime().removeShutdownHook(closer);
+        } catch (IllegalStateException error) {
+            // the process is ending, which is why we are here
+        }
+    }
+
+    @Override
+    public String toString() {
+        return world() + " at " + url + ": " + String.join(", ", info().robots.keySet());
+    }
+
+    // For the package's other classes.
+
+    synchronized WorldInfo info() {
+        return known;
+    }
+
+    robot_info_t robotInfo(String name) {
+        Map<String, robot_info_t> all = info().robots;
+        robot_info_t robot = all.get(name);
+        if (robot != null) return robot;
+        throw new RuedoException.UnknownName("there is no robot '" + name + "'; there is "
+                + (all.isEmpty() ? "none" : String.join(", ", all.keySet())));
+    }
+
+    long utime() {
+        return utime;
+    }
+
+    long nextId() {
+        return ids.incrementAndGet();
+    }
+
+    synchronized void noteTime(long now) {
+        utime = Math.max(utime, now);
+        lastSign = System.nanoTime();
+        notifyAll();
+    }
+
+    void checkServer() {
+        if (closed) throw new RuedoException.NoServer("this simulation was closed");
+        String ended = server == null ? null : server.ended();
+        if (ended != null) throw new RuedoException.NoServer(ended);
+        if (silence() > SILENCE_SECONDS) {
+            throw new RuedoException.NoServer("nothing was heard from the server at " + url + " for 30 s");
+        }
+    }
+
+    String whatIsKnown(double rate) {
+        if (silence() > 3.0) return String.format("nothing at all was heard from the server for %.1f s", silence());
+        if (paused()) return "the simulation is paused";
+        return rate > 0.0 ? String.format("its rate is %s Hz of sim time, which is now %.2f s", Deadline.text(rate), time())
+                : "it sends when something happens";
+    }
+
+    synchronized void keepRepeating(Driver driver) {
+        repeating.add(driver);
+        if (repeater != null) return;
+        repeater = new Thread(this::repeat, "ruedo-repeat");
+        repeater.setDaemon(true);
+        repeater.start();
+    }
+
+    private double silence() {
+        return (System.nanoTime() - lastSign) * 1e-9;
+    }
+
+    /** Feeds the watchdogs in real time. */
+    private void repeat() {
+        while (!closed) {
+            long period = 100;
+            for (Driver driver : repeating) {
+                driver.repeat();
+                period = Math.min(period, driver.periodMillis());
+            }
+            try {
+                Thread.sleep(period);
+            } catch (InterruptedException error) {
+                return;
+            }
+        }
+    }
+
+    private void onInfo(LCMDataInputStream in) {
+        WorldInfo info = null;
+        RuedoException wrong = null;
+        try {
+            info = assembler.add(in);
+        } catch (RuedoException error) {
+            wrong = error;
+        } catch (IOException error) {
+            return;
+        }
+        synchronized (this) {
+            fault = wrong;
+            if (wrong == null) lastSign = System.nanoTime();
+            if (info != null) {
+                boolean anew = known != null && (known.head.run_id != info.head.run_id || known.head.epoch != info.head.epoch);
+                if (anew) utime = 0;
+                known = info;
+            }
+            notifyAll();
+        }
+    }
+
+    private void onTick(LCMDataInputStream in) {
+        try {
+            if (in.readLong() != tick_t.LCM_FINGERPRINT) return;
+            noteTime(in.readLong());
+        } catch (IOException error) {
+            return;
+        }
+        // Sim time may run a hundred times faster than real time: the watchdog is fed by its beat, too.
+        for (Driver driver : repeating) driver.repeat();
+    }
+
+    private synchronized void awaitInfo(double timeout) {
+        Deadline deadline = new Deadline(timeout);
+        while (known == null) {
+            if (fault != null) throw fault;
+            String ended = server == null ? null : server.ended();
+            if (ended != null) throw new RuedoException.NoServer(ended);
+            if (deadline.passed()) {
+                bus.close();
+                throw new RuedoException.NoServer("no Ruedo server answered at " + url + " within " + Deadline.text(timeout)
+                        + " s. Is `ruedo run` started, with the same --lcm or LCM_DEFAULT_URL? `ruedo doctor` looks for what "
+                        + "is wrong");
+            }
+            askInfo();
+            deadline.waitOn(this, 100);
+        }
+    }
+
+    private void askInfo() {
+        request_t request = new request_t();
+        request.epoch = -1;
+        request.kind = request_t.INFO;
+        request.body = new byte[0];
+        bus.publish("ruedo/request", request);
+    }
+
+    private synchronized void refreshInfo() {
+        WorldInfo before = known;
+        Deadline deadline = new Deadline(2.0);
+        while (known == before && !deadline.passed()) {
+            askInfo();
+            deadline.waitOn(this, 100);
+        }
+    }
+
+    private static State state(reply_t reply) {
+        try {
+            state_reply_t m = new state_reply_t(reply.body);
+            return new State(m.utime, m.step, m.state_hash, m.paused, m.rate, m.name, m.position, m.orientation, m.linear, m.angular);
+        } catch (IOException | RuntimeException error) {
+            throw new RuedoException.TypeMismatch("the reply's body is no state_reply_t of this client's version");
+        }
+    }
+
+    private static LCMEncodable nameBody(String name) {
+        name_request_t body = new name_request_t();
+        body.name = name;
+        return body;
+    }
+
+    private static double[] aboutZ(double heading) {
+        return new double[] {Math.cos(heading / 2.0), 0.0, 0.0, Math.sin(heading / 2.0)};
+    }
+}

@@ -1,0 +1,37 @@
+package ruedo;
+
+/** The state of the simulation, and of the model or MODEL/LINK that was asked for (else name is ""). */
+public final class State extends Sample {
+    /** Number of the state. */
+    public final long step;
+    /** Of all bodies' and robots' state. */
+    public final long stateHash;
+    /** True when paused. */
+    public final boolean paused;
+    /** Sim time per real time that is asked for; +inf: as fast as it goes. */
+    public final double rate;
+    /** As asked for. */
+    public final String name;
+    /** m, world. */
+    public final double[] position;
+    /** w, x, y, z: to world. */
+    public final double[] orientation;
+    /** m/s, world. */
+    public final double[] linear;
+    /** rad/s, world. */
+    public final double[] angular;
+
+    State(long utime, long step, long stateHash, boolean paused, double rate, String name, double[] position,
+        double[] orientation, double[] linear, double[] angular) {
+        super(utime);
+        this.step = step;
+        this.stateHash = stateHash;
+        this.paused = paused;
+        this.rate = rate;
+        this.name = name;
+        this.position = position;
+        this.orientation = orientation;
+        this.linear = linear;
+        this.angular = angular;
+    }
+}

@@ -1,0 +1,378 @@
+// Ruedo's client for C++: connect to a robot simulation, read its sensors, drive its robots.
+//
+// SI units, radians; x ahead, y left, z up; quaternions w, x, y, z. utime is sim time in microseconds. Everything
+// here is safe to use from any thread. Link with ruedo::client.
+//
+//     auto sim = ruedo::client::connect();
+//     auto robot = sim.robot("p3at");
+//     robot.set_velocity(0.3, 0.0);               // m/s, rad/s; holds until changed
+//     while (robot.lrf().next().nearest(-0.5, 0.5) > 0.8) {}
+//     robot.stop().wait();
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace ruedo::client {
+
+inline constexpr double kForever = std::numeric_limits<double>::infinity();
+inline constexpr double kFast = std::numeric_limits<double>::infinity();    // a rate: as fast as it goes
+
+using Vector3 = std::array<double, 3>;
+using Quaternion = std::array<double, 4>;    // w, x, y, z
+
+// ---- What can go wrong. Bad arguments (NaN, a radius of 0) are std::invalid_argument.
+
+struct Error : std::runtime_error { using std::runtime_error::runtime_error; };
+struct NoServer : Error { using Error::Error; };         // none answered, or it fell silent or ended
+struct LaunchError : Error { using Error::Error; };      // a private server could not be started
+struct UnknownName : Error { using Error::Error; };      // the text lists the names that exist
+struct Timeout : Error { using Error::Error; };
+struct TypeMismatch : Error { using Error::Error; };     // a channel carries another version of a type
+struct NotSupported : Error { using Error::Error; };     // the server or the robot cannot do that
+struct MotionError : Error {                             // a primitive ended early or was refused
+  MotionError(const std::string& text, std::string why) : Error(text), reason(std::move(why)) {}
+  std::string reason;                                    // as in MotionStatus
+};
+struct RequestError : Error {                            // the server refused a request
+  RequestError(const std::string& text, int32_t reply_code) : Error(text), code(reply_code) {}
+  int32_t code;                                          // of reply_t
+};
+
+// ---- Samples.
+
+struct Sample {
+  int64_t utime = 0;                                     // us, sim time of the state shown
+  double time() const { return static_cast<double>(utime) * 1e-6; }    // s
+};
+
+// A scan of a planar laser range finder, in the device's frame.
+struct Scan : Sample {
+  std::vector<float> ranges;         // m; +inf: no return, -inf: nearer than the minimum range
+  std::vector<float> intensities;    // 0 to 1; empty when the device has none
+  double angle_min = 0.0;            // rad, of ray 0, from the device's x axis towards y (left)
+  double angle_step = 0.0;           // rad
+  double angle(size_t ray) const { return angle_min + angle_step * static_cast<double>(ray); }
+  // The smallest range between two angles (rad); +inf when nothing is there.
+  double nearest(double from_angle, double to_angle) const;
+};
+
+// A scan of a laser scanner with several layers: element layer * columns + column.
+struct LidarScan : Sample {
+  int layers = 0, columns = 0;
+  std::vector<float> ranges;         // m, lowest layer first; as in Scan
+  std::vector<float> intensities;    // 0 to 1, or empty
+  double azimuth_min = 0.0, azimuth_step = 0.0;        // rad, left is positive
+  double elevation_min = 0.0, elevation_step = 0.0;    // rad, up is positive
+};
+
+// The last reading of each of an array's transducers; their poses are DeviceInfo::elements.
+struct SonarReading : Sample {
+  std::vector<float> ranges;           // m from the transducer's face; without an echo: the maximum range
+  std::vector<int64_t> fired_utime;    // us, when each fired last; -1: not yet
+  std::vector<bool> fresh;             // true where the reading is of this very message
+};
+
+// What the robot believes of its motion from its wheels; pose of base_link in the frame odom.
+struct Odometry : Sample {
+  double x = 0.0, y = 0.0;             // m
+  double theta = 0.0;                  // rad, not wrapped
+  double v = 0.0, omega = 0.0;         // m/s, rad/s
+  std::vector<double> wheel_angles;    // rad since the start, positive ahead; order of RobotInfo::wheels
+  std::vector<double> wheel_rates;     // rad/s
+  std::vector<int64_t> ticks;          // encoder counts
+  int32_t resets = 0;                  // how often the pose was reset
+};
+
+// The true pose of base_link in the world; velocities are expressed in base_link.
+struct Pose : Sample {
+  Vector3 position{};         // m
+  Quaternion orientation{};
+  Vector3 velocity{};         // m/s
+  Vector3 rotation_rate{};    // rad/s
+  Vector3 acceleration{};     // m/s^2, without gravity
+  double x() const { return position[0]; }
+  double y() const { return position[1]; }
+  double heading() const;     // rad, counter-clockwise from the world's x axis, in (-pi, pi]
+};
+
+struct Image : Sample {
+  enum class Format { unknown, jpeg, rgb, bgr, gray, gray16, float32 };
+  int width = 0, height = 0;    // pixels
+  Format format = Format::unknown;    // gray16: labels (body index + 1); float32: depth, m, +inf: nothing
+  int row_stride = 0;           // bytes in a row, 0 for jpeg
+  std::vector<uint8_t> data;    // as they came: rows from the top, or a JPEG file
+  // Writes a JPEG's bytes as they are, rgb, bgr and gray as PPM or PGM. Throws Error.
+  void save(const std::string& path) const;
+};
+
+// A pinhole with OpenCV's distortion.
+struct CameraInfo : Sample {
+  int width = 0, height = 0;                          // pixels
+  double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;      // pixels
+  std::array<double, 5> distortion{};                 // k1, k2, p1, p2, k3
+};
+
+struct Imu : Sample {               // in the device's frame
+  Quaternion orientation{};         // device to world
+  Vector3 angular_velocity{};       // rad/s
+  Vector3 linear_acceleration{};    // m/s^2, specific force: at rest gravity upwards
+};
+
+struct ContactPoint {
+  std::string body;       // the other body
+  Vector3 position{};     // m, world
+  Vector3 normal{};       // unit vector, world, towards the sensor's body
+  double force = 0.0;     // N
+  double depth = 0.0;     // m
+};
+struct Contact : Sample {
+  bool pressed = false;
+  std::vector<ContactPoint> points;
+};
+
+struct Joints : Sample {
+  std::vector<std::string> names;
+  std::vector<float> positions, velocities, efforts;    // rad or m, rad/s or m/s, N m or N
+};
+
+// What a robot is executing.
+struct MotionStatus : Sample {
+  int64_t id = 0;                            // of the primitive; 0 for velocity and wheel commands
+  std::string kind;      // "none", "advance", "rotate", "heading", "arc", "stop", "velocity", "wheels"
+  std::string state;     // "idle", "running", "done", "ended", "refused"
+  std::string reason;    // "", "replaced", "blocked", "watchdog", "not finite", "bad kind", "bad value", "no drive"
+  double progress = 0.0, remaining = 0.0;    // m or rad
+  double v = 0.0, omega = 0.0;               // m/s, rad/s
+};
+
+// ---- What there is.
+
+struct RobotInfo {
+  std::string name, model;
+  std::string drive;                                   // "kinematic", "wheels", "": it only senses
+  double wheel_radius = 0.0, track = 0.0;              // m
+  double max_speed = 0.0, max_turn_rate = 0.0;         // m/s, rad/s
+  double acceleration = 0.0, deceleration = 0.0;       // m/s^2
+  double turn_acceleration = 0.0;                      // rad/s^2
+  double watchdog = 0.0;                               // s of sim time, 0: off
+  std::vector<std::string> wheels;                     // joint names
+};
+
+struct DeviceInfo {
+  std::string robot, name;
+  std::string kind;                                    // "lrf", "sonar", "odometry", "camera", "pose", ...
+  std::string channel, type;                           // on the bus
+  double rate = 0.0;                                   // Hz of sim time; 0: every step
+  Vector3 position{};                                  // m, in base_link at the start
+  Quaternion orientation{};                            // device to base_link
+  double range_min = 0.0, range_max = 0.0;             // m
+  double fov_horizontal = 0.0, fov_vertical = 0.0;     // rad
+  int width = 0, height = 0;                           // rays and layers, transducers, or pixels
+  std::vector<std::array<double, 6>> elements;         // a sonar's transducers: x, y, z, roll, pitch, yaw in its frame
+};
+
+// The state of the simulation, and of the model or MODEL/LINK that was asked for (else name is "").
+struct State : Sample {
+  int64_t step = 0, state_hash = 0;
+  bool paused = false;
+  double rate = 0.0;            // sim time per real time that is asked for; kFast: as fast as it goes
+  std::string name;
+  Vector3 position{};           // m, world
+  Quaternion orientation{};     // to world
+  Vector3 linear{}, angular{};  // m/s, rad/s, world
+};
+
+class Core;          // a connection; clients/cpp/core.h
+class StreamCore;    // a subscription; clients/cpp/stream_core.h
+struct MotionCore;
+
+// A stream of samples from one channel. The first use subscribes. Copies share everything.
+template <class SampleType>
+class Stream {
+ public:
+  explicit Stream(std::shared_ptr<StreamCore> core) : core_(std::move(core)) {}
+  const std::string& channel() const;
+
+  // The newest sample. Before the first one it waits, at most `timeout` seconds of real time. Throws Timeout,
+  // TypeMismatch, NoServer.
+  SampleType latest(double timeout = 5.0) const;
+  // The newest sample that neither latest() nor next() of this channel has returned yet; waits for one. A reader
+  // slower than the rate skips samples; on_sample() skips none.
+  SampleType next(double timeout = 5.0) const;
+  // Calls `callback` in the receiving thread for every sample from now on. It must be quick, and must not wait for
+  // other samples or replies.
+  void on_sample(std::function<void(const SampleType&)> callback) const;
+
+ private:
+  std::shared_ptr<StreamCore> core_;
+};
+
+// A sensor of a robot.
+template <class SampleType>
+class Device : public Stream<SampleType> {
+ public:
+  Device(std::shared_ptr<StreamCore> core, DeviceInfo info) : Stream<SampleType>(std::move(core)), info_(std::move(info)) {}
+  const DeviceInfo& info() const { return info_; }
+  const std::string& name() const { return info_.name; }
+
+ private:
+  DeviceInfo info_;
+};
+
+// A camera; its further channels, where the world file asks for them. They throw UnknownName where it does not.
+class Camera : public Device<Image> {
+ public:
+  Camera(std::shared_ptr<Core> core, std::shared_ptr<StreamCore> stream, DeviceInfo info);
+  Stream<Image> depth() const;
+  Stream<Image> labels() const;
+  Stream<CameraInfo> intrinsics() const;
+
+ private:
+  std::shared_ptr<Core> connection_;
+};
+
+// A motion primitive under way. Copies share everything.
+class Motion {
+ public:
+  explicit Motion(std::shared_ptr<MotionCore> core) : core_(std::move(core)) {}
+  int64_t id() const;
+  bool done() const;            // true when the robot is not executing it any more, for whatever reason
+  std::string state() const;    // "sent", then as in MotionStatus
+  std::string reason() const;   // why it ended early or was refused, as in MotionStatus
+  double progress() const;      // m or rad
+  double remaining() const;     // m or rad
+  // Waits until it is done, at most `timeout` seconds of real time. Throws MotionError when it ended early or was
+  // refused, Timeout when it still runs; the robot goes on then.
+  const Motion& wait(double timeout = kForever) const;
+
+ private:
+  std::shared_ptr<MotionCore> core_;
+};
+
+// Limits of a primitive: m/s and m/s^2, for turns on the spot rad/s and rad/s^2. 0: the robot's own.
+struct Limits {
+  double speed = 0.0, acceleration = 0.0, deceleration = 0.0;
+};
+
+class Robot {
+ public:
+  Robot(std::shared_ptr<Core> core, std::string name) : core_(std::move(core)), name_(std::move(name)) {}
+  const std::string& name() const { return name_; }
+  RobotInfo info() const;
+
+  std::vector<DeviceInfo> devices() const;    // in the order of the world file
+  // The device of that name. Throws UnknownName, which lists those that exist, and TypeMismatch when its samples
+  // are of another kind.
+  template <class SampleType>
+  Device<SampleType> device(const std::string& name) const;
+  // The first device of a kind; UnknownName when there is none.
+  Device<Scan> lrf() const;
+  Device<LidarScan> lidar() const;
+  Device<SonarReading> sonar() const;
+  Device<Odometry> odometry() const;
+  Camera camera() const;
+  Device<Imu> imu() const;
+  Device<Contact> contact() const;
+  Stream<Pose> pose() const;              // the true pose
+  Stream<MotionStatus> motion() const;    // what it is executing
+  Stream<Joints> joints() const;
+
+  // Drives with v (m/s ahead) and omega (rad/s), within the robot's limits, until the next command of any kind: the
+  // command is repeated in the background, so that the watchdog does not stop the robot.
+  void set_velocity(double v, double omega) const;
+  // The same with the rates of the left and the right wheels, rad/s, positive ahead.
+  void set_wheels(double left, double right) const;
+
+  // Each returns at once; wait() on what it returns waits for the end.
+  Motion stop(double deceleration = 0.0) const;
+  Motion advance(double distance, Limits limits = {}) const;              // m, negative: back
+  Motion rotate(double angle, Limits limits = {}) const;                  // rad, on the spot
+  Motion turn_to(double heading, Limits limits = {}) const;               // rad in odom, the shorter way
+  Motion arc(double angle, double radius, Limits limits = {}) const;      // rad turned (positive: left), m > 0
+
+ private:
+  std::shared_ptr<Core> core_;
+  std::string name_;
+};
+
+struct SpawnOptions {
+  double heading = 0.0;         // rad
+  std::string name;             // "": the model's own
+  std::string text;             // SDF or URDF sent along, instead of a model's name
+  bool on_ground = true;        // stands on the ground below; false: at z
+  double z = 0.0;               // m
+};
+
+enum class Reset { all, time, poses };
+
+// A running simulation. Move-only; its destructor closes it.
+class Simulation {
+ public:
+  explicit Simulation(std::shared_ptr<Core> core) : core_(std::move(core)) {}
+  Simulation(Simulation&&) = default;
+  Simulation& operator=(Simulation&& other) noexcept;
+  ~Simulation();
+
+  std::string url() const;
+  std::string version() const;      // of the server
+  std::string world() const;
+  int64_t seed() const;
+  double step_size() const;         // s
+  double time() const;              // s, sim time of the newest message that came
+  bool paused() const;              // as ruedo/info last said it
+  std::vector<Robot> robots() const;
+  Robot robot(const std::string& name) const;    // UnknownName lists those that exist
+  void sleep(double seconds) const;              // of sim time
+
+  // Each throws NotSupported where the server has no such request, RequestError when it refuses.
+  void pause() const;
+  void resume() const;
+  State step(int64_t n = 1, double timeout = 60.0) const;    // while paused; the state after n steps
+  void set_rate(double rate) const;
+  void reset(Reset what = Reset::all, int64_t seed = -1) const;    // seed -1: the same again
+  void spawn(const std::string& model, double x, double y, const SpawnOptions& options = {}) const;
+  void remove(const std::string& name) const;
+  void set_pose(const std::string& name, const Vector3& position, const Quaternion& orientation) const;
+  void set_pose(const std::string& name, double x, double y, double heading = 0.0, double z = 0.0) const;
+  void set_twist(const std::string& name, const Vector3& linear, const Vector3& angular = {}) const;
+  State state(const std::string& name = "") const;
+  void reset_odometry(const std::string& robot) const;
+  void quit() const;                // ends the server
+
+  void close();                     // ends repeated commands, and a server that launch() started
+
+ private:
+  std::shared_ptr<Core> core_;
+};
+
+struct ConnectOptions {
+  std::string name;         // of this client; "": "client-PID"
+  double timeout = 2.0;     // s of real time to wait for a server
+};
+
+// Joins the simulation at an LCM URL; "": LCM_DEFAULT_URL, else LCM's default group and port with ttl 0.
+// Throws NoServer.
+Simulation connect(const std::string& url = "", const ConnectOptions& options = {});
+
+struct LaunchOptions {
+  int64_t seed = -1;                  // -1: the server's default
+  double rate = 1.0;                  // sim time per real time; kFast: as fast as it goes
+  std::vector<std::string> args;      // further options of `ruedo run`
+  std::string url;                    // "": a free port of this machine
+  std::string name = "client";
+  double timeout = 30.0;              // s of real time until the world is loaded
+  bool verbose = false;               // show what the server prints; else it is shown in errors alone
+};
+
+// Starts `ruedo run WORLD` (found by RUEDO, the PATH, or above this program) and joins it. The server ends with the
+// Simulation, and with this process however that ends. Throws LaunchError with what the server said.
+Simulation launch(const std::string& world, const LaunchOptions& options = {});
+
+}  // namespace ruedo::client
