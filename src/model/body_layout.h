@@ -26,6 +26,7 @@ struct WheelPlacement {
   int link = -1;            // index into BodyLayout::links
   bool left = false;
   Vec3 axis_in_L = Vec3::UnitY();    // unit; a positive angle about it rolls the robot ahead
+  Vec3 center_in_L = Vec3::Zero();   // a point on the axis: the joint, which need not be the link's origin
 };
 
 struct BodyPlacement {
@@ -60,6 +61,9 @@ struct BodyLayout {
   std::vector<RobotPlacement> robots;    // instances that are robots, in world order
 
   explicit BodyLayout(const WorldModel& world);
+
+  // X_BL of a link, with the wheel that turns it at its angle in wheel_angles (rad, as in Snapshot).
+  Pose link_in_body(int link, const std::vector<double>& wheel_angles) const;
 };
 
 }  // namespace ruedo::model

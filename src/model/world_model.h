@@ -179,6 +179,7 @@ struct WorldModel {
   std::vector<ModelInstance> models;     // in file order; --spawn's after them
   std::vector<Finding> findings;         // what was unsupported or repaired
   std::vector<std::string> files_read;   // absolute paths, in the order of first reading
+  std::vector<std::string> disabled;     // "ROBOT/odometry", ...: channels of a robot itself that are switched off
 };
 
 }  // namespace ruedo::model

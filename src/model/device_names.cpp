@@ -1,0 +1,64 @@
+// Names of devices and robots: unique, and fit for channels.
+#include <algorithm>
+#include <map>
+
+#include "model/sdf_reader.h"
+
+namespace ruedo::model {
+namespace {
+
+constexpr size_t kMaxChannel = 63;    // bytes; LCM's limit
+
+constexpr const char* kFixedDevices[] = {"odometry", "pose", "motion", "velocity", "wheels", "move", "joints", "joint_command"};
+
+bool fit_for_channel(const std::string& name) {
+  return std::all_of(name.begin(), name.end(), [](char c) { return static_cast<unsigned char>(c) > 0x20 && c != 0x7f && c != '/'; });
+}
+
+}  // namespace
+
+void make_sensor_names_unique(Model& model) {
+  std::map<std::string, int> uses;
+  for (const SensorDescription& sensor : model.sensors) ++uses[sensor.name];
+  for (SensorDescription& sensor : model.sensors) {
+    if (uses[sensor.name] < 2) continue;
+    // "arm.laser" twice becomes "arm.wrist-laser": the link's name has the scope already.
+    const size_t dot = sensor.name.rfind('.');
+    const std::string own = dot == std::string::npos ? sensor.name : sensor.name.substr(dot + 1);
+    sensor.name = model.links[static_cast<size_t>(sensor.link)].name + "-" + own;
+  }
+  std::map<std::string, const SensorDescription*> seen;
+  for (const SensorDescription& sensor : model.sensors) {
+    if (const auto [at, is_new] = seen.try_emplace(sensor.name, &sensor); !is_new) {
+      sensor.element->fail("a second sensor of the name '" + sensor.name + "'; the first is in " + at->second->element->source.str());
+    }
+  }
+}
+
+void check_channel_names(const ModelInstance& instance, const Source& source) {
+  if (!instance.is_robot()) return;
+  const auto refuse = [](const Source& at, const std::string& what) { throw InputError(at, what); };
+  if (instance.name == "ruedo") refuse(source, "the model name 'ruedo' is kept for Ruedo's own channels; choose another");
+  if (!fit_for_channel(instance.name)) {
+    refuse(source, "the model name '" + instance.name + "' is not fit for a channel: it has a '/', a space or a control character");
+  }
+  const auto check_length = [&](const std::string& device, const Source& at) {
+    const std::string channel = instance.name + "/" + device;
+    if (channel.size() > kMaxChannel) {
+      refuse(at, "the channel '" + channel + "' has " + std::to_string(channel.size()) + " characters; allowed are 63");
+    }
+  };
+  check_length("joint_command", source);
+  for (const SensorDescription& sensor : instance.model->sensors) {
+    const Source& at = sensor.element->source;
+    if (std::find(std::begin(kFixedDevices), std::end(kFixedDevices), sensor.name) != std::end(kFixedDevices)) {
+      refuse(at, "the sensor name '" + sensor.name + "' is kept for the robot's own channel; choose another");
+    }
+    if (!fit_for_channel(sensor.name)) {
+      refuse(at, "the sensor name '" + sensor.name + "' is not fit for a channel: it has a '/', a space or a control character");
+    }
+    check_length(sensor.name + (sensor.type.find("camera") != std::string::npos ? "/labels" : ""), at);
+  }
+}
+
+}  // namespace ruedo::model

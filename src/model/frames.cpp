@@ -1,0 +1,139 @@
+// The graph of frames, resolved on demand, each frame once.
+#include "model/frames.h"
+
+#include <algorithm>
+
+namespace ruedo::model {
+
+void FrameGraph::add(Node node) {
+  if (const auto taken = by_name_.find(node.name); taken != by_name_.end()) {
+    node.element->fail("the name '" + node.name + "' is taken by <" + nodes_[taken->second].element->name + "> in " +
+                       nodes_[taken->second].element->source.str() + "; names are unique in " + scope_name_);
+  }
+  if (node.merged) {
+    for (const auto& [name, frame] : node.scope->frames) {
+      Found other;
+      if (name.find("::") == std::string::npos && find(name, other)) {
+        node.element->fail("merges '" + name + "', a name that is taken in " + scope_name_);
+      }
+    }
+    merged_.push_back(nodes_.size());
+  } else {
+    for (const size_t m : merged_) {
+      if (nodes_[m].scope->frames.count(node.name)) {
+        node.element->fail("the name '" + node.name + "' is taken by what <include> merges in " + nodes_[m].element->source.str());
+      }
+    }
+  }
+  by_name_[node.name] = nodes_.size();
+  nodes_.push_back(std::move(node));
+  states_.push_back(State::unknown);
+  poses_.emplace_back();
+}
+
+bool FrameGraph::find(const std::string& name, Found& found) const {
+  if (const auto at = by_name_.find(name); at != by_name_.end()) {
+    found = {at->second};
+    return true;
+  }
+  // A nested model's own name may hold "::" only by nesting, so the first one ends the node's name.
+  if (const size_t colons = name.find("::"); colons != std::string::npos) {
+    const auto at = by_name_.find(name.substr(0, colons));
+    if (at != by_name_.end() && nodes_[at->second].scope) {
+      const std::string rest = name.substr(colons + 2);
+      const auto& frames = nodes_[at->second].scope->frames;
+      if (rest == "__model__") {
+        found = {at->second};
+        return true;
+      }
+      if (const auto inner = frames.find(rest); inner != frames.end()) {
+        found = {at->second, &inner->second};
+        return true;
+      }
+    }
+  }
+  for (const size_t m : merged_) {
+    const auto inner = nodes_[m].scope->frames.find(name);
+    if (inner != nodes_[m].scope->frames.end()) {
+      found = {m, &inner->second};
+      return true;
+    }
+  }
+  return false;
+}
+
+FrameGraph::Found FrameGraph::require(const std::string& name, const Element& asker) const {
+  Found found;
+  if (find(name, found)) return found;
+  const std::string near = nearest_word(name, names());
+  asker.fail("there is no frame '" + name + "' in " + scope_name_ + (near.empty() ? "" : "; did you mean '" + near + "'?"));
+}
+
+std::vector<std::string> FrameGraph::names() const {
+  std::vector<std::string> list;
+  for (const Node& node : nodes_) {
+    if (!by_name_.count(node.name)) continue;    // dropped
+    if (!node.merged) list.push_back(node.name);
+    if (node.scope) {
+      for (const auto& [name, frame] : node.scope->frames) list.push_back(node.merged ? name : node.name + "::" + name);
+    }
+  }
+  return list;
+}
+
+bool FrameGraph::has(const std::string& name) {
+  Found found;
+  return find(name, found);
+}
+
+bool FrameGraph::is_from(const std::string& name, const Element& element) const {
+  const auto at = by_name_.find(name);
+  return at != by_name_.end() && nodes_[at->second].element == &element;
+}
+
+Pose FrameGraph::node_pose(size_t index) {
+  if (states_[index] == State::known) return poses_[index];
+  const Node& node = nodes_[index];
+  if (states_[index] == State::asked) {
+    node.element->fail("'" + node.name + "' is placed relative to itself, through other frames");
+  }
+  states_[index] = State::asked;
+  Pose placed = node.pose;
+  if (!node.relative_to.empty()) placed = pose(node.relative_to, *node.element) * node.pose;
+  if (node.scope && !node.placement_frame.empty()) {
+    const auto& frames = node.scope->frames;
+    const auto inner = frames.find(node.placement_frame);
+    if (inner != frames.end()) {
+      placed = placed * inner->second.X_MF.inverse();
+    } else if (node.placement_frame != "__model__") {
+      node.element->fail("placement_frame '" + node.placement_frame + "' is no frame of the model '" + node.scope->model->name + "'");
+    }
+  }
+  states_[index] = State::known;
+  return poses_[index] = placed.normalized();
+}
+
+Pose FrameGraph::pose(const std::string& name, const Element& asker) {
+  if (name.empty() || name == "__model__" || name == "world") return {};
+  const Found found = require(name, asker);
+  const Pose outer = node_pose(found.node);
+  return found.inner ? outer * found.inner->X_MF : outer;
+}
+
+int FrameGraph::node_link(size_t index, int depth) {
+  const Node& node = nodes_[index];
+  if (depth > static_cast<int>(nodes_.size())) node.element->fail("'" + node.name + "' is attached to itself, through other frames");
+  if (node.scope) return node.first_link;    // a model moves with its canonical link
+  if (node.link >= 0) return node.link;
+  if (node.attached_to.empty() || node.attached_to == "__model__" || node.attached_to == "world") return -1;
+  const Found found = require(node.attached_to, *node.element);
+  return found.inner ? nodes_[found.node].first_link + found.inner->link : node_link(found.node, depth + 1);
+}
+
+int FrameGraph::link(const std::string& name, const Element& asker) {
+  if (name.empty() || name == "__model__" || name == "world") return -1;
+  const Found found = require(name, asker);
+  return found.inner ? nodes_[found.node].first_link + std::max(found.inner->link, 0) : node_link(found.node, 0);
+}
+
+}  // namespace ruedo::model

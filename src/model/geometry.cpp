@@ -1,0 +1,167 @@
+// <geometry> to Geometry.
+#include "model/geometry.h"
+
+#include <stdexcept>
+
+namespace ruedo::model {
+namespace {
+
+std::optional<Geometry> read_mesh(const Element& mesh, const std::string& where, ReadContext& context) {
+  report_other_children(mesh, {"uri", "scale", "submesh"}, {"convex_decomposition"}, where, context.findings);
+  Geometry geometry;
+  geometry.shape = Shape::mesh;
+  geometry.scale = mesh.vector3("scale", Vec3::Ones());
+  for (int i = 0; i < 3; ++i) {
+    if (geometry.scale[i] == 0) mesh.child("scale")->fail("'" + mesh.child("scale")->text + "' has a zero; a mesh cannot be flat");
+  }
+  const std::string uri = mesh.string("uri", "");
+  if (uri.empty()) mesh.fail("has no <uri>");
+  const auto path = context.resources.find(uri, mesh.source.file);
+  if (!path) {
+    context.findings.error(mesh.source, where, "the mesh '" + uri + "' is not found; the shape is left out");
+    return std::nullopt;
+  }
+  try {
+    if (const Element* submesh = mesh.child("submesh")) {
+      geometry.mesh = context.meshes.load_submesh(*path, submesh->string("name", ""), submesh->boolean("center", false));
+    } else {
+      geometry.mesh = context.meshes.load(*path);
+    }
+  } catch (const std::runtime_error& error) {
+    context.findings.error(mesh.source, where, "the mesh '" + uri + "' cannot be used: " + error.what() + "; the shape is left out");
+    return std::nullopt;
+  }
+  return geometry;
+}
+
+std::optional<Geometry> read_polyline(const Element& geometry_element, const Element& first, const std::string& where,
+                                      ReadContext& context) {
+  std::vector<std::vector<Eigen::Vector2d>> polygons;
+  for (const Element* polyline : geometry_element.all("polyline")) {
+    std::vector<Eigen::Vector2d> polygon;
+    for (const Element* point : polyline->all("point")) {
+      const std::vector<double> v = point->as_numbers();
+      if (v.size() != 2) point->fail("'" + point->text + "' has " + std::to_string(v.size()) + " numbers; allowed are x y");
+      polygon.emplace_back(v[0], v[1]);
+    }
+    polygons.push_back(std::move(polygon));
+  }
+  const double height = first.number("height", 1.0, Allowed::positive());
+  try {
+    auto mesh = std::make_shared<Mesh>(extruded(polygons, height));
+    mesh->name = first.source.str();
+    Geometry geometry;
+    geometry.shape = Shape::mesh;
+    geometry.mesh = std::move(mesh);
+    return geometry;
+  } catch (const std::runtime_error& error) {
+    context.findings.error(first.source, where, std::string("the polyline cannot be used: ") + error.what() + "; the shape is left out");
+    return std::nullopt;
+  }
+}
+
+std::optional<Geometry> read_heightmap(const Element& element, const std::string& where, ReadContext& context) {
+  report_other_children(element, {"uri", "size", "pos"}, {"texture", "blend", "use_terrain_paging", "sampling"}, where, context.findings);
+  const std::string uri = element.string("uri", "");
+  if (uri.empty()) element.fail("has no <uri>");
+  const Vec3 size = element.vector3("size", Vec3::Ones());
+  if (size.minCoeff() <= 0) element.child("size")->fail("'" + element.child("size")->text + "' is not allowed; sizes are above 0");
+  const auto path = context.resources.find(uri, element.source.file);
+  if (!path) {
+    context.findings.error(element.source, where, "the heightmap '" + uri + "' is not found; the shape is left out");
+    return std::nullopt;
+  }
+  try {
+    auto mesh = std::make_shared<Mesh>(heightmap(*path, size));
+    const Vec3 at = element.vector3("pos", Vec3::Zero());
+    for (auto& p : mesh->positions) p += at.cast<float>();
+    mesh->name = *path;
+    Geometry geometry;
+    geometry.shape = Shape::mesh;
+    geometry.mesh = std::move(mesh);
+    return geometry;
+  } catch (const std::runtime_error& error) {
+    context.findings.error(element.source, where, "the heightmap '" + uri + "' cannot be used: " + error.what() + "; the shape is left out");
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
+std::optional<Geometry> read_geometry(const Element& element, const std::string& where, ReadContext& context) {
+  const Element* shape = nullptr;
+  for (const auto& child : element.children) {
+    if (child->name == "empty") return std::nullopt;
+    if (child->name.find(':') != std::string::npos) child->fail("is not allowed here; <geometry> has no elements of ruedo:");
+    if (shape && child->name != "polyline") child->fail("is a second shape; <geometry> holds one");
+    if (!shape) shape = child.get();
+  }
+  if (!shape) return std::nullopt;
+  const Allowed positive = Allowed::positive();
+  const auto required = [&](const char* name) {
+    if (!shape->has(name)) shape->fail(std::string("has no <") + name + ">");
+    return shape->number(name, 0, positive);
+  };
+  const std::string& kind = shape->name;
+  Geometry g;
+  if (kind == "box") {
+    g.shape = Shape::box;
+    if (!shape->has("size")) shape->fail("has no <size>");
+    g.size = shape->vector3("size", Vec3::Ones());
+    if (g.size.minCoeff() <= 0) shape->child("size")->fail("'" + shape->child("size")->text + "' is not allowed; sizes are above 0");
+  } else if (kind == "sphere") {
+    g.shape = Shape::sphere;
+    g.size = Vec3::Constant(required("radius"));
+  } else if (kind == "cylinder" || kind == "capsule" || kind == "cone") {
+    g.shape = kind == "cylinder" ? Shape::cylinder : kind == "cone" ? Shape::cone : Shape::capsule;
+    g.size = {required("radius"), required("length"), 0};
+  } else if (kind == "ellipsoid") {
+    g.shape = Shape::ellipsoid;
+    if (!shape->has("radii")) shape->fail("has no <radii>");
+    g.size = shape->vector3("radii", Vec3::Ones());
+    if (g.size.minCoeff() <= 0) shape->child("radii")->fail("'" + shape->child("radii")->text + "' is not allowed; radii are above 0");
+  } else if (kind == "plane") {
+    g.shape = Shape::plane;
+    const Vec3 normal = shape->vector3("normal", Vec3::UnitZ());
+    if (!(normal.norm() > 1e-9)) shape->child("normal")->fail("'" + shape->child("normal")->text + "' is not allowed; a normal is not zero");
+    g.normal = normal.normalized();
+    if (const Element* size = shape->child("size")) {
+      const std::vector<double> v = size->as_numbers();
+      if (v.size() != 2 || v[0] <= 0 || v[1] <= 0) size->fail("'" + size->text + "' is not allowed; allowed are two numbers above 0");
+      g.extent = {v[0], v[1]};
+    }
+  } else if (kind == "mesh") {
+    return read_mesh(*shape, where, context);
+  } else if (kind == "polyline") {
+    return read_polyline(element, *shape, where, context);
+  } else if (kind == "heightmap") {
+    return read_heightmap(*shape, where, context);
+  } else {
+    const std::string near = nearest_word(kind, {"box", "sphere", "cylinder", "capsule", "cone", "ellipsoid", "plane", "mesh", "polyline", "heightmap"});
+    context.findings.unsupported(shape->source, where, "the shape <" + kind + "> is not supported and left out" +
+                                                           (near.empty() ? "" : "; did you mean <" + near + ">?"));
+    return std::nullopt;
+  }
+  return g;
+}
+
+Eigen::AlignedBox3d bounds(const Geometry& g) {
+  Vec3 half = Vec3::Zero();
+  switch (g.shape) {
+    case Shape::box: half = g.size / 2; break;
+    case Shape::sphere: half = Vec3::Constant(g.size.x()); break;
+    case Shape::ellipsoid: half = g.size; break;
+    case Shape::cylinder:
+    case Shape::cone: half = {g.size.x(), g.size.x(), g.size.y() / 2}; break;
+    case Shape::capsule: half = {g.size.x(), g.size.x(), g.size.y() / 2 + g.size.x()}; break;
+    case Shape::plane: return {};
+    case Shape::mesh: {
+      Eigen::AlignedBox3d box;
+      for (const auto& p : g.mesh->positions) box.extend(g.scale.cwiseProduct(p.cast<double>()));
+      return box;
+    }
+  }
+  return {-half, half};
+}
+
+}  // namespace ruedo::model

@@ -1,0 +1,178 @@
+// From a file, or a text, to the world: SDF or URDF, then the options of the command line.
+#include "model/load.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "model/placement.h"
+#include "model/sdf_reader.h"
+#include "model/settings.h"
+#include "model/urdf.h"
+
+namespace fs = std::filesystem;
+
+namespace ruedo::model {
+namespace {
+
+// Where a robot or a model stands that is loaded without a world.
+constexpr const char* kEmptyWorld = R"(<sdf version="1.9"><world name="empty">
+  <light name="sun" type="directional"><cast_shadows>true</cast_shadows><pose>0 0 10 0 0 0</pose>
+    <diffuse>0.8 0.8 0.8 1</diffuse><specular>0.2 0.2 0.2 1</specular><direction>-0.5 0.1 -0.9</direction></light>
+  <model name="ground_plane"><static>true</static><link name="link">
+    <collision name="collision"><geometry><plane><normal>0 0 1</normal><size>100 100</size></plane></geometry></collision>
+    <visual name="visual"><geometry><plane><normal>0 0 1</normal><size>100 100</size></plane></geometry>
+      <material><ambient>0.8 0.8 0.8 1</ambient><diffuse>0.8 0.8 0.8 1</diffuse></material></visual>
+  </link></model></world></sdf>)";
+
+class Loader {
+ public:
+  Loader(const std::string& path, bool allow_absolute)
+      : resources_(path, allow_absolute), meshes_(resources_), context_{findings_, resources_, documents_, meshes_}, reader_(context_), path_(path) {}
+
+  std::shared_ptr<const WorldModel> load(const Element& root, const LoadOptions& options) {
+    world_.file = path_;
+    reader_.enter(path_, root);
+    if (root.name == "robot") read_robot(root);
+    else read_sdf(root);
+    reader_.leave();
+    for (const Spawn& spawn : options.spawns) place(spawn);
+    apply_settings(options.settings, world_);
+    apply_disabled(options.disabled, world_);
+    world_.findings = findings_.list();
+    world_.files_read = documents_.files_read();
+    return std::make_shared<const WorldModel>(std::move(world_));
+  }
+
+  DocumentStore& documents() { return documents_; }
+
+ private:
+  void read_empty_world() {
+    const auto root = parse_document(kEmptyWorld, path_);
+    reader_.read_world(*root->child("world"), {1, 9}, world_);
+  }
+
+  void add(const std::string& name, const Pose& X_WM, std::shared_ptr<const Model> model, const Source& source) {
+    world_.models.push_back({name, X_WM, std::move(model)});
+    check_channel_names(world_.models.back(), source);
+  }
+
+  void read_sdf(const Element& root) {
+    const SdfVersion version = reader_.version_of(root);
+    const auto worlds = root.all("world");
+    if (!worlds.empty()) {
+      if (worlds.size() > 1) findings_.unsupported(worlds[1]->source, "sdf", "a second world in one file is left out");
+      reader_.read_world(*worlds[0], version, world_);
+      return;
+    }
+    report_other_children(root, {"model", "light", "actor"}, {}, "sdf", findings_);
+    read_empty_world();
+    bool any = false;
+    for (const auto& child : root.children) {
+      if (child->name == "model") {
+        any = true;
+        if (const auto scope = reader_.read_model(*child, version)) {
+          const std::string name = required_name(*child);
+          for (const ModelInstance& other : world_.models) {
+            if (other.name == name) child->fail("a second model of the name '" + name + "'");
+          }
+          add(name, scope->pose, scope->model, child->source);
+        }
+      } else if (child->name == "actor") {
+        any = true;
+        Pose X_WM;
+        auto model = SdfReader::actor_model(*child, X_WM, context_);
+        add(required_name(*child), X_WM, std::move(model), child->source);
+      }
+    }
+    if (!any) root.fail("holds no <world> and no <model>");
+    world_.name = world_.models.back().name;
+  }
+
+  void read_robot(const Element& root) {
+    const auto sdf = urdf_as_sdf(root, findings_);
+    read_empty_world();
+    const auto scope = reader_.read_model(*sdf, {1, 9});
+    if (!scope) root.fail("the robot has no link");
+    add(scope->model->name, standing_on(world_, *scope->model, 0, 0, 0), scope->model, root.source);
+    world_.name = scope->model->name;
+  }
+
+  void place(const Spawn& spawn) {
+    const std::string what = "--spawn " + spawn.model;
+    const Element asker = [&] {
+      Element e;
+      e.name = what;
+      return e;
+    }();
+    auto path = resources_.find_model(spawn.model, path_);
+    if (!path && spawn.model.find("://") == std::string::npos) {
+      const fs::path here = fs::absolute(spawn.model);
+      std::error_code error;
+      if (fs::exists(here, error)) path = resources_.find_model(here.string(), path_);
+    }
+    if (!path) throw InputError({}, what + ": there is no such file, and no model of that name in the search path");
+    std::shared_ptr<const Model> model;
+    std::string name;
+    const auto document = documents_.read(*path);
+    if (document->name == "robot") {
+      const auto sdf = urdf_as_sdf(*document, findings_);
+      const auto scope = reader_.read_model(*sdf, {1, 9});
+      if (scope) model = scope->model, name = model->name;
+    } else {
+      const auto included = reader_.read_file(*path, asker);
+      if (included.model) model = included.model->model, name = included.name;
+    }
+    if (!model) throw InputError({*path, 0}, what + ": the file holds no model");
+    const auto taken = [&](const std::string& wanted) {
+      return std::any_of(world_.models.begin(), world_.models.end(), [&](const auto& each) { return each.name == wanted; });
+    };
+    if (!spawn.name.empty()) {
+      name = spawn.name;
+      if (taken(name)) throw InputError({}, what + ": the name '" + name + "' is taken by another model of the world");
+    } else if (taken(name)) {
+      int number = 2;
+      while (taken(name + "_" + std::to_string(number))) ++number;
+      name += "_" + std::to_string(number);
+    }
+    const Pose X_WM = standing_on(world_, *model, spawn.x, spawn.y, spawn.yaw);
+    if (const std::string other = overlapped(world_, *model, X_WM); !other.empty()) {
+      throw InputError({}, what + "@" + shown(spawn.x) + "," + shown(spawn.y) + ": there is no room, it would stand in '" + other + "'");
+    }
+    add(name, X_WM, std::move(model), {});
+  }
+
+  Findings findings_;
+  ResourceFinder resources_;
+  DocumentStore documents_;
+  MeshLoader meshes_;
+  ReadContext context_;
+  SdfReader reader_;
+  std::string path_;
+  WorldModel world_;
+};
+
+}  // namespace
+
+std::shared_ptr<const WorldModel> load_world(const std::string& path, const LoadOptions& options) {
+  std::error_code error;
+  fs::path full = fs::weakly_canonical(fs::absolute(path), error);
+  if (error) full = fs::absolute(path);
+  if (full.extension() == ".xacro") {
+    throw InputError({path, 0}, "is a xacro file; expand it first: xacro " + full.filename().string() + " > robot.urdf");
+  }
+  if (!fs::exists(full, error)) throw InputError({path, 0}, "no such file");
+  Loader loader(full.string(), true);
+  const auto root = loader.documents().read(full.string());
+  return loader.load(*root, options);
+}
+
+std::shared_ptr<const WorldModel> load_world_text(const std::string& text, const std::string& path, const LoadOptions& options) {
+  std::error_code error;
+  const std::string full = fs::weakly_canonical(fs::absolute(path), error).string();
+  Loader loader(full, false);
+  std::shared_ptr<const Element> root = parse_document(text, full);
+  loader.documents().add(full, root);
+  return loader.load(*root, options);
+}
+
+}  // namespace ruedo::model

@@ -1,0 +1,280 @@
+// The cache of meshes and the child process that fills it.
+#include "model/mesh_loader.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <chrono>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+#include <thread>
+
+#include <Eigen/Geometry>
+
+#include "model/document.h"
+#include "model/mesh_format.h"
+
+namespace fs = std::filesystem;
+
+namespace ruedo::model {
+namespace {
+
+std::string default_importer() {
+  std::error_code error;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  if (!error) {
+    const fs::path beside = program.parent_path() / "ruedo-import-mesh";
+    if (fs::exists(beside, error)) return beside.string();
+  }
+  return std::string(RUEDO_BIN_DIR) + "/ruedo-import-mesh";
+}
+
+std::string default_cache_folder() {
+  if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache && *cache == '/') return std::string(cache) + "/ruedo";
+  if (const char* home = std::getenv("HOME"); home && *home == '/') return std::string(home) + "/.cache/ruedo";
+  return "";
+}
+
+// A folder for one import's result; removed with all that is in it.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string name = (fs::temp_directory_path() / "ruedo-mesh-XXXXXX").string();
+    if (!::mkdtemp(name.data())) throw std::runtime_error(std::string("no temporary folder: ") + std::strerror(errno));
+    path_ = name;
+  }
+  ~TemporaryFolder() {
+    std::error_code error;
+    fs::remove_all(path_, error);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  std::string operator/(const char* name) const { return path_ + "/" + name; }
+
+ private:
+  std::string path_;
+};
+
+std::string first_line(const std::string& file) {
+  std::ifstream in(file);
+  std::string line;
+  std::getline(in, line);
+  if (line.size() > 300) line.resize(300);
+  for (char& c : line) {
+    if (static_cast<unsigned char>(c) < 0x20) c = ' ';
+  }
+  return line;
+}
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kLimitAddressSpace = false;    // sanitizers reserve terabytes of addresses
+#else
+constexpr bool kLimitAddressSpace = true;
+#endif
+
+void set_limit(decltype(RLIMIT_AS) which, rlim_t value) {
+  const rlimit limit{value, value};
+  ::setrlimit(which, &limit);
+}
+
+// Runs the importer; throws what is wrong. Between fork and exec only system calls are made.
+void run_importer(const MeshImport& import, const std::string& input, const std::string& output, const std::string& log) {
+  const char* arguments[] = {import.importer.c_str(), input.c_str(), output.c_str(), nullptr};
+  const pid_t child = ::fork();
+  if (child < 0) throw std::runtime_error(std::string("the importer cannot be started: ") + std::strerror(errno));
+  if (child == 0) {
+    ::setpgid(0, 0);
+    set_limit(RLIMIT_CORE, 0);
+    set_limit(RLIMIT_CPU, static_cast<rlim_t>(import.cpu_limit_s));
+    set_limit(RLIMIT_FSIZE, rlim_t{1} << 30);
+    if (kLimitAddressSpace) set_limit(RLIMIT_AS, import.memory_limit_bytes);
+    const int nothing = ::open("/dev/null", O_RDWR);
+    const int messages = ::open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    ::dup2(nothing, 0);
+    ::dup2(nothing, 1);
+    ::dup2(messages, 2);
+    ::execv(arguments[0], const_cast<char**>(arguments));
+    ::_exit(127);
+  }
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(import.wall_limit_s);
+  int status = 0;
+  for (auto pause = std::chrono::microseconds(200);; pause = std::min(pause * 2, std::chrono::microseconds(20'000))) {
+    const pid_t ended = ::waitpid(child, &status, WNOHANG);
+    if (ended == child) break;
+    if (ended < 0 && errno != EINTR) throw std::runtime_error(std::string("the importer is lost: ") + std::strerror(errno));
+    if (std::chrono::steady_clock::now() > deadline) {
+      ::kill(-child, SIGKILL);
+      ::kill(child, SIGKILL);
+      ::waitpid(child, &status, 0);
+      throw std::runtime_error("the importer took longer than " + std::to_string(import.wall_limit_s) + " s");
+    }
+    std::this_thread::sleep_for(pause);
+  }
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 127) {
+    throw std::runtime_error("the importer " + import.importer + " cannot be run");
+  }
+  if (WIFSIGNALED(status)) {
+    const int signal = WTERMSIG(status);
+    if (signal == SIGXCPU || signal == SIGKILL) {
+      throw std::runtime_error("the importer needed more than " + std::to_string(import.cpu_limit_s) + " s of CPU time");
+    }
+    throw std::runtime_error("the importer died of signal " + std::to_string(signal) + "; the file is malformed");
+  }
+  const std::string message = first_line(log);
+  throw std::runtime_error(message.empty() ? "the importer failed" : message);
+}
+
+std::string bytes_of(const std::string& path, size_t most) {
+  try {
+    return read_text_file(path, most);
+  } catch (const InputError& error) {
+    throw std::runtime_error(error.message());
+  }
+}
+
+bool dependencies_hold(const MeshPackage& package, const fs::path& folder) {
+  return std::all_of(package.dependencies.begin(), package.dependencies.end(), [&](const MeshDependency& each) {
+    std::error_code error;
+    const fs::path path = folder / each.path;
+    if (!fs::is_regular_file(path, error)) return each.hash == 0;
+    try {
+      return content_hash(read_text_file(path.string(), MeshLimits::kFileBytes)) == each.hash;
+    } catch (const InputError&) {
+      return false;
+    }
+  });
+}
+
+// Into the cache by renaming, so that no other process reads half an entry. A cache that cannot be written is
+// no fault.
+void store(const std::string& folder, const std::string& name, const std::string& bytes) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  std::string temporary = folder + "/new-XXXXXX";
+  const int file = ::mkstemp(temporary.data());
+  if (file < 0) return;
+  size_t written = 0;
+  while (written < bytes.size()) {
+    const ssize_t n = ::write(file, bytes.data() + written, bytes.size() - written);
+    if (n <= 0) break;
+    written += static_cast<size_t>(n);
+  }
+  ::close(file);
+  if (written == bytes.size()) fs::rename(temporary, folder + "/" + name, error);
+  else error = std::make_error_code(std::errc::io_error);
+  if (error) fs::remove(temporary, error);
+}
+
+}  // namespace
+
+MeshLoader::MeshLoader(const ResourceFinder& resources, MeshImport import) : resources_(resources), import_(std::move(import)) {
+  if (import_.importer.empty()) import_.importer = default_importer();
+  if (import_.cache_folder.empty()) import_.cache_folder = default_cache_folder();
+  if (import_.cache_folder.empty()) import_.cache = false;
+}
+
+Mesh MeshLoader::import_or_cached(const std::string& path) const {
+  const fs::path file = path;
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  constexpr const char* kKnown[] = {".obj", ".dae", ".stl", ".ply", ".gltf", ".glb", ".3ds", ".fbx"};
+  if (std::find(std::begin(kKnown), std::end(kKnown), extension) == std::end(kKnown)) {
+    throw std::runtime_error("'" + extension + "' is no known kind of mesh; known are obj, dae, stl, ply, gltf, glb, 3ds, fbx");
+  }
+  const std::string content = bytes_of(path, MeshLimits::kFileBytes);
+  const std::string name =
+      content_key(content) + extension.substr(1) + "-" + std::to_string(kMeshFormatVersion) + ".mesh";
+  constexpr size_t kMostBytes = size_t{1} << 30;
+  if (import_.cache) {
+    const std::string entry = import_.cache_folder + "/" + name;
+    std::error_code error;
+    if (fs::is_regular_file(entry, error)) {
+      try {
+        MeshPackage package = unpack_mesh(bytes_of(entry, kMostBytes));
+        if (dependencies_hold(package, file.parent_path())) return std::move(package.mesh);
+      } catch (const std::runtime_error&) {
+        // A broken entry is imported again, and replaced.
+      }
+    }
+  }
+  TemporaryFolder folder;
+  run_importer(import_, path, folder / "mesh", folder / "log");
+  const std::string bytes = bytes_of(folder / "mesh", kMostBytes);
+  MeshPackage package = unpack_mesh(bytes);
+  if (import_.cache) store(import_.cache_folder, name, bytes);
+  return std::move(package.mesh);
+}
+
+std::shared_ptr<const Mesh> MeshLoader::load(const std::string& path) {
+  const auto [at, is_new] = meshes_.try_emplace(path);
+  Entry& entry = at->second;
+  if (is_new) {
+    try {
+      auto mesh = std::make_shared<Mesh>(import_or_cached(path));
+      mesh->name = path;
+      for (auto& material : mesh->materials) {
+        if (!material.texture || !material.texture->embedded.empty()) continue;
+        const auto found = resources_.find_texture(material.texture->path, path);
+        material.texture = found ? std::make_shared<Texture>(Texture{*found, {}}) : nullptr;
+      }
+      entry.mesh = std::move(mesh);
+    } catch (const std::runtime_error& error) {
+      entry.fault = error.what();
+    }
+  }
+  if (!entry.mesh) throw std::runtime_error(entry.fault);
+  return entry.mesh;
+}
+
+std::shared_ptr<const Mesh> MeshLoader::load_submesh(const std::string& path, const std::string& submesh, bool center) {
+  const std::string key = path + "\n" + submesh + (center ? "\ncenter" : "");
+  if (const auto known = meshes_.find(key); known != meshes_.end() && known->second.mesh) return known->second.mesh;
+  const auto whole = load(path);
+  auto mesh = std::make_shared<Mesh>();
+  mesh->name = path + ", submesh " + submesh;
+  std::vector<uint32_t> number(whole->positions.size(), UINT32_MAX);
+  for (const auto& part : whole->parts) {
+    if (part.name != submesh) continue;
+    Mesh::Part copy = part;
+    copy.first_triangle = static_cast<uint32_t>(mesh->triangles.size());
+    for (uint32_t t = 0; t < part.triangle_count; ++t) {
+      std::array<uint32_t, 3> triangle = whole->triangles[part.first_triangle + t];
+      for (uint32_t& index : triangle) {
+        if (number[index] == UINT32_MAX) {
+          number[index] = static_cast<uint32_t>(mesh->positions.size());
+          mesh->positions.push_back(whole->positions[index]);
+          if (!whole->normals.empty()) mesh->normals.push_back(whole->normals[index]);
+          if (!whole->uvs.empty()) mesh->uvs.push_back(whole->uvs[index]);
+        }
+        index = number[index];
+      }
+      mesh->triangles.push_back(triangle);
+    }
+    mesh->parts.push_back(copy);
+  }
+  if (mesh->triangles.empty()) {
+    std::string names;
+    for (const auto& part : whole->parts) names += (names.empty() ? "" : ", ") + part.name;
+    throw std::runtime_error("it has no submesh '" + submesh + "'; there are " + names);
+  }
+  mesh->materials = whole->materials;
+  if (center) {
+    Eigen::AlignedBox3f box;
+    for (const auto& p : mesh->positions) box.extend(p);
+    for (auto& p : mesh->positions) p -= box.center();
+  }
+  mesh->closed = is_closed(*mesh);
+  meshes_[key].mesh = mesh;
+  return mesh;
+}
+
+}  // namespace ruedo::model

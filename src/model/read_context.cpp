@@ -1,0 +1,44 @@
+// Small helpers of all readers: names, elements that nobody reads, numbers in messages.
+#include "model/read_context.h"
+
+#include <algorithm>
+#include <charconv>
+
+namespace ruedo::model {
+
+std::string required_name(const Element& element) {
+  const std::string* name = element.attribute("name");
+  if (!name) element.fail("has no name; the attribute name is required");
+  if (name->empty()) element.fail("has an empty name");
+  const bool reserved = name->size() >= 4 && name->substr(0, 2) == "__" && name->substr(name->size() - 2) == "__";
+  if (reserved || *name == "world") element.fail("'" + *name + "' is a reserved name; choose another");
+  return *name;
+}
+
+void report_other_children(const Element& element, const std::vector<std::string>& known,
+                           const std::vector<std::string>& silent, const std::string& where, Findings& findings) {
+  const auto in = [](const std::vector<std::string>& list, const std::string& name) {
+    return std::find(list.begin(), list.end(), name) != list.end();
+  };
+  element.refuse_unknown(known, true);
+  for (const auto& child : element.children) {
+    if (in(known, child->name) || in(silent, child->name) || child->name.find(':') != std::string::npos) continue;
+    const std::string near = nearest_word(child->name, known);
+    findings.unsupported(child->source, where,
+                         "<" + child->name + "> is not supported and left out" + (near.empty() ? "" : "; did you mean <" + near + ">?"));
+  }
+}
+
+std::string dotted(const std::string& scoped) {
+  std::string result = scoped;
+  for (size_t at = result.find("::"); at != std::string::npos; at = result.find("::", at)) result.replace(at, 2, ".");
+  return result;
+}
+
+std::string shown(double value) {
+  char buffer[32];
+  const auto end = std::to_chars(buffer, buffer + sizeof buffer, value).ptr;
+  return {buffer, end};
+}
+
+}  // namespace ruedo::model

@@ -1,0 +1,257 @@
+// The search for files, in a fixed order: the naming file's own surroundings, the top file's, Ruedo's own
+// worlds, then the variables that Ruedo's and Gazebo's users set.
+#include "model/resources.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdlib>
+#include <filesystem>
+
+#include "model/document.h"
+#include "model/sdf_version.h"
+
+namespace fs = std::filesystem;
+
+namespace ruedo::model {
+namespace {
+
+bool is_there(const fs::path& path) {
+  std::error_code error;
+  return fs::exists(path, error);
+}
+
+bool is_folder(const fs::path& path) {
+  std::error_code error;
+  return fs::is_directory(path, error);
+}
+
+std::string full_path(const fs::path& path) {
+  std::error_code error;
+  fs::path result = fs::weakly_canonical(path, error);
+  return error ? path.lexically_normal().string() : result.string();
+}
+
+void add_folder(std::vector<std::string>& folders, const fs::path& folder) {
+  if (!is_folder(folder)) return;
+  const std::string path = full_path(folder);
+  if (std::find(folders.begin(), folders.end(), path) == folders.end()) folders.push_back(path);
+}
+
+// A file's folder, `models` in and beside it, and the folder above, in which a model's neighbours are.
+void add_surroundings(std::vector<std::string>& folders, const fs::path& folder) {
+  add_folder(folders, folder);
+  add_folder(folders, folder / "models");
+  add_folder(folders, folder / ".." / "models");
+  if (folder.has_relative_path() && folder.parent_path().has_relative_path()) add_folder(folders, folder / "..");
+}
+
+void add_variable(std::vector<std::string>& folders, const char* name) {
+  const char* value = std::getenv(name);
+  if (!value) return;
+  std::string rest = value;
+  while (!rest.empty()) {
+    const size_t colon = rest.find(':');
+    if (const std::string folder = rest.substr(0, colon); !folder.empty()) add_folder(folders, folder);
+    rest = colon == std::string::npos ? "" : rest.substr(colon + 1);
+  }
+}
+
+// "Ground Plane" and "ground_plane" are one name.
+std::string plain_name(const std::string& name) {
+  std::string plain;
+  for (const unsigned char c : name) {
+    if (c != ' ' && c != '_' && c != '-') plain += static_cast<char>(std::tolower(c));
+  }
+  return plain;
+}
+
+std::string decoded(const std::string& uri) {
+  std::string text;
+  for (size_t i = 0; i < uri.size(); ++i) {
+    if (uri[i] == '%' && i + 2 < uri.size() && std::isxdigit(static_cast<unsigned char>(uri[i + 1])) &&
+        std::isxdigit(static_cast<unsigned char>(uri[i + 2]))) {
+      text += static_cast<char>(std::stoi(uri.substr(i + 1, 2), nullptr, 16));
+      i += 2;
+    } else {
+      text += uri[i];
+    }
+  }
+  return text;
+}
+
+bool starts_with(const std::string& text, const char* prefix) { return text.rfind(prefix, 0) == 0; }
+
+// A path without "." and "..", without leading and trailing slashes.
+std::string tidy(const std::string& path) {
+  std::string text = fs::path(path).lexically_normal().string();
+  while (!text.empty() && text.front() == '/') text.erase(0, 1);
+  while (!text.empty() && text.back() == '/') text.pop_back();
+  return text;
+}
+
+}  // namespace
+
+std::string shipped_worlds() {
+  std::error_code error;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  if (!error) {
+    const fs::path installed = program.parent_path().parent_path() / "share/ruedo/worlds";
+    if (is_folder(installed)) return full_path(installed);
+  }
+  return is_folder(RUEDO_WORLDS_DIR) ? full_path(RUEDO_WORLDS_DIR) : "";
+}
+
+ResourceFinder::ResourceFinder(const std::string& top_file, bool allow_absolute) : allow_absolute_(allow_absolute) {
+  add_surroundings(near_, fs::path(full_path(top_file)).parent_path());
+  if (const std::string worlds = shipped_worlds(); !worlds.empty()) {
+    add_folder(far_, worlds);
+    add_folder(far_, fs::path(worlds) / "robots");
+    add_folder(far_, fs::path(worlds) / "models");
+  }
+  for (const char* name : {"RUEDO_PATH", "GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "IGN_GAZEBO_RESOURCE_PATH",
+                           "SDF_PATH", "ROS_PACKAGE_PATH"}) {
+    add_variable(far_, name);
+  }
+  if (const char* prefixes = std::getenv("AMENT_PREFIX_PATH")) {
+    std::string rest = prefixes;
+    while (!rest.empty()) {
+      const size_t colon = rest.find(':');
+      add_folder(far_, fs::path(rest.substr(0, colon)) / "share");
+      rest = colon == std::string::npos ? "" : rest.substr(colon + 1);
+    }
+  }
+  if (const char* home = std::getenv("HOME")) add_folder(far_, fs::path(home) / ".gazebo/models");
+}
+
+std::vector<std::string> ResourceFinder::roots_for(const std::string& from) const {
+  std::vector<std::string> roots;
+  add_surroundings(roots, fs::path(from).parent_path());
+  for (const auto& each : near_) add_folder(roots, each);
+  for (const auto& each : far_) add_folder(roots, each);
+  return roots;
+}
+
+bool ResourceFinder::allowed(const std::string& path, const std::string& from) const {
+  if (allow_absolute_) return true;
+  for (const auto& root : roots_for(from)) {
+    if (path == root || starts_with(path, (root + "/").c_str())) return true;
+  }
+  return false;
+}
+
+// ROS packages may live in a folder of another name: an ancestor whose package.xml has the name counts too.
+std::optional<std::string> ResourceFinder::in_package(const std::string& package, const std::string& rest,
+                                                      const std::string& from) const {
+  for (fs::path folder = fs::path(from).parent_path(); folder.has_relative_path(); folder = folder.parent_path()) {
+    const fs::path manifest = folder / "package.xml";
+    if (!is_there(manifest)) continue;
+    try {
+      const auto root = parse_document(read_text_file(manifest.string(), 1 << 20), manifest.string());
+      if (root->string("name", "") == package && is_there(folder / rest)) return full_path(folder / rest);
+    } catch (const InputError&) {
+      // A manifest that cannot be read names no package.
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> ResourceFinder::find(const std::string& written, const std::string& from) const {
+  const std::string uri = decoded(written);
+  if (uri.empty() || uri.find('\0') != std::string::npos) return std::nullopt;
+
+  if (starts_with(uri, "http://") || starts_with(uri, "https://")) {
+    // Fuel: .../OWNER/models/NAME[/VERSION][/files/PATH]
+    const size_t models = uri.find("/models/");
+    if (models == std::string::npos) return std::nullopt;
+    std::string name = uri.substr(models + 8), rest;
+    if (const size_t files = name.find("/files/"); files != std::string::npos) rest = tidy(name.substr(files + 7));
+    name = plain_name(name.substr(0, name.find('/')));
+    if (name.empty() || starts_with(rest, "..")) return std::nullopt;
+    for (const auto& root : roots_for(from)) {
+      std::vector<std::string> matches;
+      std::error_code error;
+      for (const auto& entry : fs::directory_iterator(root, error)) {
+        if (plain_name(entry.path().filename().string()) == name) matches.push_back((entry.path() / rest).string());
+      }
+      std::sort(matches.begin(), matches.end());
+      for (const auto& match : matches) {
+        if (is_there(match)) return full_path(match);
+      }
+    }
+    return std::nullopt;
+  }
+
+  for (const char* scheme : {"model://", "package://"}) {
+    if (!starts_with(uri, scheme)) continue;
+    const std::string path = tidy(uri.substr(std::string(scheme).size()));
+    if (path.empty() || starts_with(path, "..")) return std::nullopt;
+    for (const auto& root : roots_for(from)) {
+      const std::string found = full_path(fs::path(root) / path);
+      if (is_there(found)) return found;
+    }
+    const size_t slash = path.find('/');
+    return in_package(path.substr(0, slash), slash == std::string::npos ? "" : path.substr(slash + 1), from);
+  }
+
+  std::string path = uri;
+  if (starts_with(path, "file://")) path = path.substr(7);
+  else if (path.find("://") != std::string::npos) return std::nullopt;
+
+  if (fs::path(path).is_absolute()) {
+    const std::string found = full_path(path);
+    return is_there(found) && allowed(found, from) ? std::optional(found) : std::nullopt;
+  }
+  const std::string beside = full_path(fs::path(from).parent_path() / path);
+  if (is_there(beside) && allowed(beside, from)) return beside;
+  const std::string tidied = tidy(path);
+  if (tidied.empty() || starts_with(tidied, "..")) return std::nullopt;
+  for (const auto& root : roots_for(from)) {
+    const std::string found = full_path(fs::path(root) / tidied);
+    if (is_there(found)) return found;
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> ResourceFinder::find_model(const std::string& uri, const std::string& from) const {
+  const auto found = find(uri, from);
+  if (!found || !is_folder(*found)) return found;
+  const fs::path folder = *found;
+  const fs::path config = folder / "model.config";
+  if (is_there(config)) {
+    const auto root = parse_document(read_text_file(config.string(), 1 << 20), config.string());
+    // The newest that Ruedo reads; a version that cannot be read counts as the oldest.
+    std::string best;
+    SdfVersion best_version{0, 0};
+    for (const Element* sdf : root->all("sdf")) {
+      const std::string* written = sdf->attribute("version");
+      const SdfVersion version = written ? SdfVersion::parse(*written).value_or(SdfVersion{0, 1}) : SdfVersion{0, 1};
+      const std::string name = tidy(sdf->text);
+      if (name.empty() || starts_with(name, "..") || !is_there(folder / name)) continue;
+      if (best.empty() || best_version < version) {
+        best = (folder / name).string();
+        best_version = version;
+      }
+    }
+    if (!best.empty()) return best;
+  }
+  if (is_there(folder / "model.sdf")) return (folder / "model.sdf").string();
+  if (is_there(config)) throw InputError({config.string(), 0}, "<sdf> names no file that is in the folder");
+  return std::nullopt;
+}
+
+std::optional<std::string> ResourceFinder::find_texture(const std::string& name, const std::string& from) const {
+  if (auto found = find(name, from); found && !is_folder(*found)) return found;
+  // Exporters write paths of their own machine; the picture is then beside the mesh or in the model's folders.
+  std::string slashes = name;
+  std::replace(slashes.begin(), slashes.end(), '\\', '/');
+  const fs::path file = fs::path(slashes).filename();
+  if (file.empty() || file == "..") return std::nullopt;
+  const fs::path folder = fs::path(from).parent_path();
+  for (const char* place : {".", "textures", "materials/textures", "../textures", "../materials/textures", "../../materials/textures"}) {
+    const fs::path candidate = folder / place / file;
+    if (is_there(candidate) && !is_folder(candidate)) return full_path(candidate);
+  }
+  return std::nullopt;
+}
+
+}  // namespace ruedo::model

@@ -1,0 +1,41 @@
+// Where the files that a world names are: model://, package://, file://, Fuel addresses, absolute and relative
+// paths. Nothing is ever fetched from a network, and no address leads out of the folders that are searched.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ruedo/errors.h"
+
+namespace ruedo::model {
+
+class ResourceFinder {
+ public:
+  // `top_file` is the file on the command line; its folder, the `models` folder in and beside it are searched
+  // first. allow_absolute: absolute paths and file:// may lead anywhere.
+  ResourceFinder(const std::string& top_file, bool allow_absolute);
+
+  // The absolute path of what `uri`, written in the file `from`, names: a file or a folder.
+  std::optional<std::string> find(const std::string& uri, const std::string& from) const;
+
+  // The SDF file of the model that `uri` names: a file itself, or a folder's newest by its model.config. Throws
+  // InputError for a folder with a model.config that names no file that is there.
+  std::optional<std::string> find_model(const std::string& uri, const std::string& from) const;
+
+  // A texture, named in `from`: as find(), then by its file name in the usual folders beside.
+  std::optional<std::string> find_texture(const std::string& name, const std::string& from) const;
+
+ private:
+  std::vector<std::string> roots_for(const std::string& from) const;
+  std::optional<std::string> in_package(const std::string& package, const std::string& rest, const std::string& from) const;
+  bool allowed(const std::string& path, const std::string& from) const;
+
+  std::vector<std::string> near_, far_;    // folders searched before and after those of the naming file
+  bool allow_absolute_;
+};
+
+// The folder of the worlds and robots that come with Ruedo; "" when there is none.
+std::string shipped_worlds();
+
+}  // namespace ruedo::model

@@ -1,0 +1,118 @@
+// <joint>: type, frames, axes and limits.
+#include <cmath>
+
+#include "model/sdf_reader.h"
+
+namespace ruedo::model {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+JointAxis read_axis(const Element& element, SdfVersion version, const Pose& X_MJ, FrameGraph& frames, const Joint& joint,
+                    const std::string& where, ReadContext& context) {
+  report_other_children(element, {"xyz", "limit", "dynamics", "use_parent_model_frame", "mimic"}, {"initial_position"}, where, context.findings);
+  JointAxis axis;
+  Vec3 xyz = element.vector3("xyz", Vec3::UnitZ());
+  if (!(xyz.norm() > 1e-9)) element.child("xyz")->fail("'" + element.child("xyz")->text + "' is not allowed; an axis is not zero");
+  xyz.normalize();
+  const Element* written = element.child("xyz");
+  const std::string* frame = written ? written->attribute("expressed_in") : nullptr;
+  // Before SDF 1.5 an axis was written in the model's frame; 1.5 and 1.6 have a switch for that.
+  const bool in_model = version < SdfVersion{1, 5} || element.boolean("use_parent_model_frame", false);
+  if (frame && !frame->empty()) {
+    xyz = X_MJ.rotation.conjugate() * (frames.pose(*frame, element).rotation * xyz);
+  } else if (in_model) {
+    xyz = X_MJ.rotation.conjugate() * xyz;
+  }
+  axis.axis_in_J = xyz;
+  const auto limit = [&](const char* path, double fallback) {
+    const double value = element.number(path, fallback, {-kInfinity, kInfinity, false, true});
+    return std::abs(value) >= 1e16 ? std::copysign(kInfinity, value) : value;
+  };
+  axis.lower = limit("limit/lower", -kInfinity);
+  axis.upper = limit("limit/upper", kInfinity);
+  if (joint.type == JointType::continuous) axis.lower = -kInfinity, axis.upper = kInfinity;
+  if (axis.lower > axis.upper) {
+    element.child("limit")->fail("lower " + shown(axis.lower) + " is above upper " + shown(axis.upper));
+  }
+  // Negative: no limit.
+  const double effort = limit("limit/effort", kInfinity), velocity = limit("limit/velocity", kInfinity);
+  axis.effort = effort < 0 ? kInfinity : effort;
+  axis.velocity = velocity < 0 ? kInfinity : velocity;
+  axis.damping = element.number("dynamics/damping", 0, Allowed::not_negative());
+  axis.friction = element.number("dynamics/friction", 0, Allowed::not_negative());
+  if (const Element* mimic = element.child("mimic")) {
+    context.findings.unsupported(mimic->source, where, "<mimic> is not supported; the joint moves freely");
+  }
+  return axis;
+}
+
+}  // namespace
+
+Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames, const std::vector<Link>& links,
+                 const std::string& where, ReadContext& context) {
+  report_other_children(element, {"parent", "child", "pose", "axis", "axis2", "sensor"},
+                        {"physics", "thread_pitch", "screw_thread_pitch", "gearbox_ratio", "gearbox_reference_body"}, where, context.findings);
+  Joint joint;
+  joint.name = dotted(required_name(element));
+  joint.source = element.source;
+  const std::string* type = element.attribute("type");
+  if (!type) element.fail("has no type");
+  static const std::vector<std::pair<std::string, JointType>> kTypes = {
+      {"fixed", JointType::fixed},           {"revolute", JointType::revolute}, {"continuous", JointType::continuous},
+      {"prismatic", JointType::prismatic},   {"ball", JointType::ball},         {"universal", JointType::universal},
+      {"revolute2", JointType::universal}};
+  bool known = false;
+  for (const auto& [name, value] : kTypes) {
+    if (*type == name) joint.type = value, known = true;
+  }
+  if (!known) {
+    if (*type != "screw" && *type != "gearbox" && *type != "planar" && *type != "floating") {
+      std::vector<std::string> names;
+      for (const auto& each : kTypes) names.push_back(each.first);
+      const std::string near = nearest_word(*type, names);
+      element.fail("type '" + *type + "' is not allowed; allowed are fixed, revolute, continuous, prismatic, ball, universal" +
+                   (near.empty() ? "" : "; did you mean '" + near + "'?"));
+    }
+    context.findings.unsupported(element.source, where, "joints of type '" + *type + "' are not supported; this one is held fixed");
+  }
+
+  const auto end = [&](const char* which) -> const Element& {
+    const Element* found = element.child(which);
+    if (!found) element.fail(std::string("has no <") + which + ">");
+    if (found->text.empty() && !found->has("link_name")) found->fail("is empty; the name of a link is needed");
+    return *found;
+  };
+  const Element &parent = end("parent"), &child = end("child");
+  if (child.text == "world") child.fail("'world' is not allowed as the child of a joint");
+  joint.parent = parent.text == "world" ? -1 : frames.link(parent.text, parent);
+  joint.child = frames.link(child.text, child);
+  if (joint.child < 0) child.fail("'" + child.text + "' is not part of a link");
+  if (joint.parent < 0 && parent.text != "world") parent.fail("'" + parent.text + "' is not part of a link");
+  if (joint.parent == joint.child) {
+    element.fail("joins the link '" + links[static_cast<size_t>(joint.child)].name + "' to itself");
+  }
+  joint.X_MJ = frames.pose(required_name(element), element);
+
+  if (const Element* sensor = element.child("sensor")) {
+    context.findings.unsupported(sensor->source, where, "sensors on joints are not supported");
+  }
+  const bool needs_axis = joint.type == JointType::revolute || joint.type == JointType::continuous || joint.type == JointType::prismatic;
+  if (const Element* axis = element.child("axis")) {
+    if (joint.type != JointType::fixed && joint.type != JointType::ball) {
+      joint.axis = read_axis(*axis, version, joint.X_MJ, frames, joint, where + "/axis", context);
+    }
+  } else if (needs_axis) {
+    element.fail("has no <axis>; joints of type '" + *type + "' need one");
+  }
+  if (joint.type == JointType::universal) {
+    if (const Element* axis2 = element.child("axis2")) {
+      joint.axis2 = read_axis(*axis2, version, joint.X_MJ, frames, joint, where + "/axis2", context);
+    } else {
+      joint.axis2.axis_in_J = Vec3::UnitX();
+    }
+  }
+  return joint;
+}
+
+}  // namespace ruedo::model

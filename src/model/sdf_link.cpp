@@ -1,0 +1,206 @@
+// Links. Inertias that no body can have are replaced by those of a box as large as the collisions, and told.
+#include "model/sdf_link.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+#include "model/geometry.h"
+#include "model/material.h"
+
+namespace ruedo::model {
+namespace {
+
+Surface read_surface(const Element& surface, const std::string& where, ReadContext& context) {
+  report_other_children(surface, {"friction", "bounce", "ruedo:laser_reflectance", "ruedo:laser_mirror", "ruedo:acoustic_reflectance"},
+                        {"contact", "soft_contact"}, where, context.findings);
+  Surface s;
+  const Allowed part = Allowed::between(0, 1), not_negative = Allowed::not_negative();
+  // gz-sim reads friction/ode; friction/bullet is what an author gave for Bullet alone.
+  const char* engine = !surface.has("friction/ode") && surface.has("friction/bullet") ? "friction/bullet/" : "friction/ode/";
+  const std::string first = engine + std::string(engine[9] == 'b' ? "friction" : "mu");
+  const std::string second = engine + std::string(engine[9] == 'b' ? "friction2" : "mu2");
+  s.friction = surface.number(first, s.friction, not_negative);
+  s.friction2 = surface.number(second, surface.has(second) ? s.friction2 : s.friction, not_negative);
+  s.restitution = surface.number("bounce/restitution_coefficient", 0, part);
+  s.laser_reflectance = surface.number("ruedo:laser_reflectance", 1, part);
+  s.laser_mirror = surface.number("ruedo:laser_mirror", 0, part);
+  s.acoustic_reflectance = surface.number("ruedo:acoustic_reflectance", 1, part);
+  return s;
+}
+
+Collision read_collision(const Element& element, const Pose& X_LC, Geometry geometry, const std::string& where, ReadContext& context) {
+  report_other_children(element, {"pose", "geometry", "surface"}, {"laser_retro", "max_contacts", "density", "auto_inertia_params"},
+                        where, context.findings);
+  Collision c;
+  c.name = required_name(element);
+  c.X_LC = X_LC;
+  c.geometry = std::move(geometry);
+  if (const Element* surface = element.child("surface")) c.surface = read_surface(*surface, where, context);
+  c.source = element.source;
+  return c;
+}
+
+Visual read_visual(const Element& element, const Pose& X_LV, Geometry geometry, const std::string& where, ReadContext& context) {
+  report_other_children(element, {"pose", "geometry", "material", "transparency", "cast_shadows"},
+                        {"laser_retro", "meta", "visibility_flags", "plugin"}, where, context.findings);
+  Visual v;
+  v.name = required_name(element);
+  v.X_LV = X_LV;
+  v.geometry = std::move(geometry);
+  if (const Element* material = element.child("material")) v.material = read_material(*material, where, context);
+  v.transparency = element.number("transparency", 0, Allowed::between(0, 1));
+  v.cast_shadows = element.boolean("cast_shadows", true);
+  return v;
+}
+
+// What is wrong with an inertia, "" when a body can have it. A thousandth is left for rounded figures.
+std::string inertia_fault(const Inertial& inertial) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(inertial.inertia);
+  const Vec3 moments = solver.eigenvalues();    // ascending
+  if (!(moments[0] > 0)) return "the moments of inertia are not all positive";
+  if (moments[0] + moments[1] < moments[2] * (1 - 1e-3)) return "one moment of inertia is larger than the sum of the two others";
+  return "";
+}
+
+// The inertia of a box around the collisions, or of 0.1 m where there are none.
+Eigen::Matrix3d box_inertia(double mass, const Link& link, Vec3& size) {
+  Eigen::AlignedBox3d box;
+  for (const Collision& c : link.collisions) {
+    const Eigen::AlignedBox3d shape = bounds(c.geometry);
+    if (shape.isEmpty()) continue;
+    for (int corner = 0; corner < 8; ++corner) {
+      box.extend(c.X_LC * shape.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner)));
+    }
+  }
+  size = box.isEmpty() ? Vec3(Vec3::Constant(0.1)) : Vec3(box.sizes().cwiseMax(0.01));
+  const Vec3 s2 = size.cwiseProduct(size);
+  return Vec3(mass / 12 * (s2.y() + s2.z()), mass / 12 * (s2.x() + s2.z()), mass / 12 * (s2.x() + s2.y())).asDiagonal();
+}
+
+Inertial read_inertial(const Element& element, const Link& link, const Pose& X_LI, const std::string& where, ReadContext& context) {
+  report_other_children(element, {"pose", "mass", "inertia", "density"}, {"fluid_added_mass", "auto_inertia_params"}, where, context.findings);
+  Inertial inertial;
+  inertial.X_LI = X_LI;
+  inertial.mass = element.number("mass", 1.0);
+  if (!(inertial.mass > 0)) {
+    context.findings.repaired(element.child("mass")->source, where, "the mass " + shown(inertial.mass) + " kg is not above 0; it is taken as 1 kg");
+    inertial.mass = 1.0;
+  }
+  const std::string* automatic = element.attribute("auto");
+  if (automatic && (*automatic == "true" || *automatic == "1")) {
+    Vec3 size;
+    inertial.inertia = box_inertia(inertial.mass, link, size);
+    context.findings.repaired(element.source, where, "auto=\"true\" is not computed from the shapes; the inertia is that of a box of " +
+                                                         shown(size.x()) + " x " + shown(size.y()) + " x " + shown(size.z()) + " m");
+    return inertial;
+  }
+  if (const Element* i = element.child("inertia")) {
+    report_other_children(*i, {"ixx", "iyy", "izz", "ixy", "ixz", "iyz"}, {}, where, context.findings);
+    const double ixx = i->number("ixx", 1), iyy = i->number("iyy", 1), izz = i->number("izz", 1);
+    const double ixy = i->number("ixy", 0), ixz = i->number("ixz", 0), iyz = i->number("iyz", 0);
+    inertial.inertia << ixx, ixy, ixz, ixy, iyy, iyz, ixz, iyz, izz;
+    if (const std::string fault = inertia_fault(inertial); !fault.empty()) {
+      Vec3 size;
+      inertial.inertia = box_inertia(inertial.mass, link, size);
+      context.findings.repaired(i->source, where, fault + "; the inertia of a box of " + shown(size.x()) + " x " + shown(size.y()) +
+                                                      " x " + shown(size.z()) + " m is taken instead");
+    }
+  }
+  return inertial;
+}
+
+}  // namespace
+
+Light read_light(const Element& element, const Pose& pose, const std::string& where, ReadContext& context) {
+  report_other_children(element, {"pose", "diffuse", "specular", "attenuation", "direction", "spot", "intensity", "cast_shadows", "light_on"},
+                        {"visualize"}, where, context.findings);
+  Light light;
+  light.name = required_name(element);
+  const std::string* type = element.attribute("type");
+  const std::string kind = type ? *type : "point";
+  if (kind == "directional") light.type = Light::Type::directional;
+  else if (kind == "spot") light.type = Light::Type::spot;
+  else if (kind != "point") element.fail("type '" + kind + "' is not allowed; allowed are directional, point, spot");
+  light.pose = pose;
+  light.direction = element.vector3("direction", -Vec3::UnitZ());
+  if (!(light.direction.norm() > 1e-9)) element.child("direction")->fail("'" + element.child("direction")->text + "' is not allowed; a direction is not zero");
+  light.direction.normalize();
+  if (const Element* colour = element.child("diffuse")) light.diffuse = read_colour(*colour);
+  if (const Element* colour = element.child("specular")) light.specular = read_colour(*colour);
+  const Allowed not_negative = Allowed::not_negative();
+  light.range = element.number("attenuation/range", light.range, not_negative);
+  light.constant = element.number("attenuation/constant", light.constant, not_negative);
+  light.linear = element.number("attenuation/linear", light.linear, not_negative);
+  light.quadratic = element.number("attenuation/quadratic", light.quadratic, not_negative);
+  light.inner_angle = element.number("spot/inner_angle", 0, not_negative);
+  light.outer_angle = element.number("spot/outer_angle", 0, not_negative);
+  light.falloff = element.number("spot/falloff", 0, not_negative);
+  light.intensity = element.boolean("light_on", true) ? element.number("intensity", 1, not_negative) : 0.0;
+  light.cast_shadows = element.boolean("cast_shadows", false);
+  return light;
+}
+
+SensorDescription read_sensor(const Element& element, int link, const Pose& X_LS) {
+  SensorDescription sensor;
+  sensor.name = dotted(required_name(element));
+  const std::string* type = element.attribute("type");
+  if (!type || type->empty()) element.fail("has no type");
+  sensor.type = *type;
+  sensor.link = link;
+  sensor.X_LS = X_LS;
+  sensor.element = element.clone();
+  return sensor;
+}
+
+void collect_plugins(const Element& element, std::vector<const Element*>& plugins) {
+  for (const auto& child : element.children) {
+    if (child->name == "plugin") plugins.push_back(child.get());
+    else if (child->name == "link" || child->name == "sensor" || child->name == "visual" || child->name == "camera") {
+      collect_plugins(*child, plugins);
+    }
+  }
+}
+
+Link read_link(const Element& element, const PoseInLink& pose_in_link, const std::string& where, ReadContext& context,
+               int index, std::vector<SensorDescription>& sensors) {
+  report_other_children(element, {"pose", "inertial", "collision", "visual", "sensor", "light", "gravity", "kinematic"},
+                        {"self_collide", "enable_wind", "velocity_decay", "must_be_base_link", "plugin", "battery"}, where,
+                        context.findings);
+  Link link;
+  link.name = required_name(element);
+  link.source = element.source;
+  link.gravity = element.boolean("gravity", true);
+  link.kinematic = element.boolean("kinematic", false);
+  std::vector<std::string> names;
+  const auto unique = [&](const Element& child) {
+    const std::string name = child.name + " " + required_name(child);
+    if (std::find(names.begin(), names.end(), name) != names.end()) child.fail("a second <" + child.name + "> named '" + required_name(child) + "' in this link");
+    names.push_back(name);
+  };
+  for (const auto& child : element.children) {
+    if (child->name == "collision" || child->name == "visual") {
+      unique(*child);
+      const std::string here = where + "/" + child->name + " " + required_name(*child);
+      const Element* shape = child->child("geometry");
+      if (!shape) child->fail("has no <geometry>");
+      auto geometry = read_geometry(*shape, here, context);
+      if (!geometry) continue;
+      Pose pose = pose_in_link(*child);
+      if (child->name == "collision") link.collisions.push_back(read_collision(*child, pose, std::move(*geometry), here, context));
+      else link.visuals.push_back(read_visual(*child, pose, std::move(*geometry), here, context));
+    } else if (child->name == "light") {
+      link.lights.push_back(read_light(*child, pose_in_link(*child), where + "/light", context));
+    } else if (child->name == "sensor") {
+      unique(*child);
+      sensors.push_back(read_sensor(*child, index, pose_in_link(*child)));
+    }
+  }
+  if (const Element* inertial = element.child("inertial")) {
+    link.inertial = read_inertial(*inertial, link, pose_in_link(*inertial), where + "/inertial", context);
+  }
+  return link;
+}
+
+}  // namespace ruedo::model

@@ -1,0 +1,383 @@
+// <model>: its frames, links and joints; nested models flattened into it; includes.
+#include <algorithm>
+#include <filesystem>
+
+#include "model/drive.h"
+#include "model/sdf_link.h"
+#include "model/sdf_reader.h"
+
+namespace ruedo::model {
+namespace {
+
+constexpr size_t kMaxLinks = 20'000;    // of one model: includes of includes cannot grow without end
+
+// The frame in <pose relative_to=""> (SDF 1.7 on) or <pose frame=""> (before).
+std::string relative_to(const Element& owner) {
+  const Element* pose = owner.child("pose");
+  if (!pose) return "";
+  if (const std::string* frame = pose->attribute("relative_to")) return *frame;
+  if (const std::string* frame = pose->attribute("frame")) return *frame;
+  return "";
+}
+
+struct Nested {
+  std::shared_ptr<const ScopedModel> scope;
+  std::string name, where;
+  size_t first_link = 0;
+  bool merged = false;
+};
+
+// A joint that keeps what a static nested model brings from moving with the rest.
+Joint anchor(const std::string& name, int link, const Pose& X_MJ, const Source& source) {
+  Joint joint;
+  joint.name = name + ".anchor";
+  joint.type = JointType::fixed;
+  joint.parent = -1;
+  joint.child = link;
+  joint.X_MJ = X_MJ;
+  joint.source = source;
+  return joint;
+}
+
+// Takes over a nested model: links, joints and sensors with the scoped name.
+void append_nested(const Nested& nested, const Pose& X_MN, Model& into) {
+  const Model& from = *nested.scope->model;
+  const std::string prefix = nested.merged ? "" : dotted(nested.name) + ".";
+  const int first_link = static_cast<int>(nested.first_link), first_joint = static_cast<int>(into.joints.size());
+  for (Link link : from.links) {
+    link.name = prefix + link.name;
+    link.X_ML = X_MN * link.X_ML;
+    into.links.push_back(std::move(link));
+  }
+  for (Joint joint : from.joints) {
+    joint.name = prefix + joint.name;
+    joint.X_MJ = X_MN * joint.X_MJ;
+    if (joint.parent >= 0) joint.parent += first_link;
+    joint.child += first_link;
+    into.joints.push_back(std::move(joint));
+  }
+  for (SensorDescription sensor : from.sensors) {
+    sensor.name = prefix + sensor.name;
+    sensor.link += first_link;
+    into.sensors.push_back(std::move(sensor));
+  }
+  if (from.drive && !into.drive) {
+    into.drive = from.drive;
+    for (auto* joints : {&into.drive->left_joints, &into.drive->right_joints}) {
+      for (int& joint : *joints) joint += first_joint;
+    }
+    into.drive->X_MBase = X_MN * into.drive->X_MBase;
+  }
+  if (from.path && !into.path && into.links.size() == from.links.size()) into.path = from.path;
+}
+
+// Makes `canonical` link 0; every index follows.
+void bring_to_front(int canonical, ScopedModel& scope, Model& model) {
+  if (canonical <= 0) return;
+  std::rotate(model.links.begin(), model.links.begin() + canonical, model.links.begin() + canonical + 1);
+  const auto moved = [&](int& link) {
+    if (link == canonical) link = 0;
+    else if (link >= 0 && link < canonical) ++link;
+  };
+  for (Joint& joint : model.joints) moved(joint.parent), moved(joint.child);
+  for (SensorDescription& sensor : model.sensors) moved(sensor.link);
+  for (auto& [name, frame] : scope.frames) moved(frame.link);
+}
+
+}  // namespace
+
+SdfVersion SdfReader::version_of(const Element& root) {
+  if (root.name == "gazebo") root.fail("this is the format of Gazebo before 1.0; Ruedo reads SDF 1.4 to 1.12 (gz sdf -p converts it)");
+  if (root.name != "sdf") root.fail("is no SDF: the root element is not <sdf>");
+  const std::string* written = root.attribute("version");
+  if (!written) root.fail("has no version; the attribute version is required, as in version=\"1.9\"");
+  const auto version = SdfVersion::parse(*written);
+  if (!version) root.fail("version '" + *written + "' is no version; allowed are 1.4 to 1.12");
+  if (*version < SdfVersion{1, 3}) root.fail("version '" + *written + "' is too old; allowed are 1.4 to 1.12");
+  if (version->major > 1) root.fail("version '" + *written + "' is not known; allowed are 1.4 to 1.12");
+  if (*version > SdfVersion{1, 12}) {
+    context_.findings.unsupported(root.source, "sdf", "version " + *written + " is newer than 1.12; what it adds is left out");
+  }
+  return *version;
+}
+
+void SdfReader::enter(const std::string& path, const Element& asker) {
+  if (std::find(files_.begin(), files_.end(), path) != files_.end()) {
+    std::string circle;
+    for (auto at = std::find(files_.begin(), files_.end(), path); at != files_.end(); ++at) {
+      circle += std::filesystem::path(*at).filename().string() + " includes ";
+    }
+    asker.fail("an include that never ends: " + circle + std::filesystem::path(path).filename().string());
+  }
+  files_.push_back(path);
+}
+
+SdfReader::Included SdfReader::read_file(const std::string& path, const Element& asker) {
+  enter(path, asker);
+  if (const auto known = cache_.find(path); known != cache_.end()) {
+    leave();
+    return known->second;
+  }
+  Included result;
+  result.document = context_.documents.read(path);
+  result.version = version_of(*result.document);
+  for (const auto& child : result.document->children) {
+    if (child->name == "model") {
+      result.model = read_model(*child, result.version);
+      result.name = required_name(*child);
+      break;
+    }
+    if (child->name == "light" || child->name == "actor") {
+      (child->name == "light" ? result.light : result.actor) = child.get();
+      result.name = required_name(*child);
+      break;
+    }
+    if (child->name == "world") child->fail("is a world; only models, lights and actors can be included");
+  }
+  if (result.name.empty()) result.document->fail("holds no <model>, <light> or <actor>");
+  leave();
+  return cache_[path] = result;
+}
+
+// Reads the model again with what <include> says beside its own elements: static, plugins, sensors, ruedo:.
+std::shared_ptr<const ScopedModel> SdfReader::read_overridden(const Element& model, const Element& include, SdfVersion version) {
+  const auto copy = model.clone();
+  const auto remove = [&](const std::string& name) {
+    std::erase_if(copy->children, [&](const auto& child) { return child->name == name; });
+  };
+  for (const auto& child : include.children) {
+    if (child->name == "static" || child->name.rfind("ruedo:", 0) == 0) remove(child->name);
+  }
+  for (const auto& child : include.children) {
+    if (child->name == "static" || child->name == "plugin" || child->name.rfind("ruedo:", 0) == 0) {
+      copy->children.push_back(child->clone());
+    } else if (child->name == "sensor") {
+      Element* link = copy->child("link");
+      if (!link) child->fail("the included model has no link of its own that could carry a sensor");
+      link->children.push_back(child->clone());
+    }
+  }
+  return read_model(*copy, version);
+}
+
+std::optional<SdfReader::Included> SdfReader::include(const Element& element, const std::string& where) {
+  report_other_children(element, {"uri", "name", "pose", "static", "placement_frame", "plugin", "sensor", "ruedo:drive", "ruedo:odometry", "ruedo:path"},
+                        {"allow_auto_disable", "enable_wind"}, where, context_.findings);
+  const Element* uri = element.child("uri");
+  if (!uri || uri->text.empty()) element.fail("has no <uri>");
+  const auto path = context_.resources.find_model(uri->text, element.source.file);
+  if (!path) {
+    context_.findings.error(element.source, where, "'" + uri->text + "' is not found; the world goes on without it");
+    return std::nullopt;
+  }
+  Included result = read_file(*path, element);
+  const bool overridden = std::any_of(element.children.begin(), element.children.end(), [](const auto& child) {
+    return child->name == "static" || child->name == "plugin" || child->name == "sensor" || child->name.rfind("ruedo:", 0) == 0;
+  });
+  if (overridden && result.model) {
+    // <static> alone, with the value that the model has: nothing to read again.
+    const bool only_static = element.has("static") && !element.has("plugin") && !element.has("sensor") &&
+                             element.boolean("static", false) == result.model->model->is_static &&
+                             std::none_of(element.children.begin(), element.children.end(),
+                                          [](const auto& child) { return child->name.rfind("ruedo:", 0) == 0; });
+    if (!only_static) {
+      enter(*path, element);
+      // Equal overrides (a fleet's) share one model, too.
+      std::string key = *path;
+      for (const auto& child : element.children) {
+        if (child->name == "static") key += "\nstatic " + child->text;
+        else if (child->name == "plugin" || child->name == "sensor" || child->name.rfind("ruedo:", 0) == 0) key += "\n" + child->source.str();
+      }
+      if (const auto known = cache_.find(key); known != cache_.end()) {
+        result = known->second;
+      } else {
+        result.model = read_overridden(*result.document->child("model"), element, result.version);
+        cache_[key] = result;
+      }
+      leave();
+    }
+  }
+  if (const Element* name = element.child("name")) {
+    if (name->text.empty()) name->fail("is empty");
+    result.name = name->text;
+  }
+  if (result.model && (element.has("pose") || element.has("placement_frame"))) {
+    auto placed = std::make_shared<ScopedModel>(*result.model);
+    if (element.has("pose")) {
+      placed->pose = element.pose("pose");
+      placed->relative_to = relative_to(element);
+    }
+    placed->placement_frame = element.string("placement_frame", result.model->placement_frame);
+    if (element.has("placement_frame") && !element.has("pose")) element.child("placement_frame")->fail("needs a <pose> beside it");
+    result.model = std::move(placed);
+  }
+  return result;
+}
+
+std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element, SdfVersion version) {
+  auto scope = std::make_shared<ScopedModel>();
+  auto model = std::make_shared<Model>();
+  model->name = required_name(element);
+  const std::string where = "model " + model->name;
+  report_other_children(element,
+                        {"link", "joint", "frame", "model", "include", "pose", "static", "self_collide", "plugin", "ruedo:drive",
+                         "ruedo:odometry", "ruedo:path"},
+                        {"allow_auto_disable", "enable_wind"}, where, context_.findings);
+  model->source = element.source;
+  model->is_static = element.boolean("static", false);
+  model->self_collide = element.boolean("self_collide", false);
+  scope->pose = element.pose("pose");
+  scope->relative_to = relative_to(element);
+  if (const std::string* frame = element.attribute("placement_frame")) scope->placement_frame = *frame;
+
+  // First all names, then poses: frames may be written in any order.
+  FrameGraph frames(where);
+  std::vector<const Element*> links;
+  std::vector<Nested> nested;
+  size_t link_count = 0;
+  int first_own_link = -1;
+  bool parts_missing = false;
+  for (const auto& child : element.children) {
+    FrameGraph::Node node;
+    node.element = child.get();
+    if (child->name == "link") {
+      node.name = required_name(*child);
+      node.pose = child->pose("pose");
+      node.relative_to = relative_to(*child);
+      node.link = static_cast<int>(link_count++);
+      if (first_own_link < 0) first_own_link = node.link;
+    } else if (child->name == "joint") {
+      node.name = required_name(*child);
+      node.pose = child->pose("pose");
+      node.relative_to = relative_to(*child);
+      node.attached_to = child->string("child", "");
+      if (node.relative_to.empty()) node.relative_to = node.attached_to;
+    } else if (child->name == "frame") {
+      node.name = required_name(*child);
+      node.pose = child->pose("pose");
+      node.relative_to = relative_to(*child);
+      if (const std::string* frame = child->attribute("attached_to")) node.attached_to = *frame;
+      if (node.relative_to.empty()) node.relative_to = node.attached_to;
+    } else if (child->name == "model" || child->name == "include") {
+      Nested part;
+      part.where = where;
+      if (child->name == "model") {
+        part.scope = read_model(*child, version);
+        part.name = required_name(*child);
+      } else {
+        auto included = include(*child, where + "/include");
+        if (included && !included->model) child->fail("is no model; a model can include models only");
+        if (included) part.scope = included->model, part.name = included->name;
+        const std::string* merge = child->attribute("merge");
+        part.merged = merge && (*merge == "true" || *merge == "1");
+      }
+      if (!part.scope) {
+        parts_missing = true;
+        continue;
+      }
+      part.first_link = link_count;
+      node.name = part.merged ? "__merged " + std::to_string(nested.size()) + "__" : part.name;
+      node.pose = part.scope->pose;
+      node.relative_to = part.scope->relative_to;
+      node.placement_frame = part.scope->placement_frame;
+      node.scope = part.scope;
+      node.first_link = static_cast<int>(link_count);
+      node.merged = part.merged;
+      part.name = node.name;
+      link_count += part.scope->model->links.size();
+      nested.push_back(std::move(part));
+    } else {
+      continue;
+    }
+    frames.add(std::move(node));
+    if (link_count > kMaxLinks) child->fail("the model has more than " + std::to_string(kMaxLinks) + " links");
+  }
+  if (link_count == 0) {
+    context_.findings.error(element.source, where, "it has no link; the model is left out");
+    return nullptr;
+  }
+
+  // Links and nested models in the file's order, as the indices were given.
+  std::vector<Joint> anchors;
+  size_t next_nested = 0;
+  bool all_static = true;
+  for (const auto& child : element.children) {
+    if (child->name == "link") {
+      all_static = false;
+      const Pose X_ML = frames.pose(required_name(*child), *child);
+      const auto in_link = [&](const Element& owner) {
+        const std::string frame = relative_to(owner);
+        const Pose pose = owner.pose("pose");
+        return frame.empty() ? pose : X_ML.inverse() * (frames.pose(frame, owner) * pose);
+      };
+      const int index = static_cast<int>(model->links.size());
+      Link link = read_link(*child, in_link, where + "/link " + required_name(*child), context_, index, model->sensors);
+      link.name = dotted(link.name);
+      link.X_ML = X_ML;
+      model->links.push_back(std::move(link));
+    } else if (next_nested < nested.size() && (child->name == "model" || child->name == "include") &&
+               model->links.size() == nested[next_nested].first_link) {
+      const Nested& part = nested[next_nested];
+      // A part that is missing left no entry: this one is told by whose element it is.
+      if (!frames.is_from(part.name, *child)) continue;
+      ++next_nested;
+      const Pose X_MN = frames.pose(part.name, *child);
+      append_nested(part, X_MN, *model);
+      if (part.scope->model->is_static) {
+        for (size_t i = 0; i < part.scope->model->links.size(); ++i) {
+          const int link = static_cast<int>(part.first_link + i);
+          anchors.push_back(anchor(model->links[static_cast<size_t>(link)].name, link, model->links[static_cast<size_t>(link)].X_ML, child->source));
+        }
+      } else {
+        all_static = false;
+      }
+    }
+  }
+  if (all_static) model->is_static = true;
+
+  read_joints(element, version, frames, parts_missing, where, *model);
+  if (!model->is_static) model->joints.insert(model->joints.end(), anchors.begin(), anchors.end());
+
+  // Every name's pose and link, for whoever nests or places this model.
+  for (const std::string& name : frames.names()) {
+    scope->frames[name] = {frames.pose(name, element), frames.link(name, element)};
+  }
+  int canonical = first_own_link >= 0 ? first_own_link : 0;
+  if (const std::string* name = element.attribute("canonical_link"); name && !name->empty()) {
+    canonical = frames.link(*name, element);
+    if (canonical < 0) element.fail("canonical_link '" + *name + "' is no link");
+  }
+  bring_to_front(canonical, *scope, *model);
+  make_sensor_names_unique(*model);
+  read_drive_of(element, where, context_, *model);
+  if (const Element* path = element.child("ruedo:path")) {
+    path->refuse_unknown({"ruedo:waypoint", "ruedo:loop"}, false);
+    model->path = path->clone();
+    model->is_static = false;
+  }
+  if (model->path) {
+    for (Link& link : model->links) link.kinematic = true;
+  }
+  scope->model = std::move(model);
+  return scope;
+}
+
+void SdfReader::read_joints(const Element& element, SdfVersion version, FrameGraph& frames, bool parts_missing,
+                            const std::string& where, Model& model) {
+  for (const auto& child : element.children) {
+    if (child->name != "joint") continue;
+    const std::string here = where + "/joint " + required_name(*child);
+    if (parts_missing) {
+      // What was not found may have held its links.
+      const std::string parent = child->string("parent", ""), end = child->string("child", "");
+      if ((parent != "world" && !frames.has(parent)) || !frames.has(end)) {
+        context_.findings.error(child->source, here, "it joins a link of a part that was not found; the joint is left out");
+        frames.drop(required_name(*child));
+        continue;
+      }
+    }
+    model.joints.push_back(read_joint(*child, version, frames, model.links, here, context_));
+  }
+}
+
+}  // namespace ruedo::model

@@ -1,0 +1,71 @@
+// SDF 1.3 to 1.12: worlds and models, includes, nested models, joints. The element tree in, models out.
+//
+// What is wrong throws InputError; what can be gone on from is in the context's findings. One reader serves one
+// load; a file that is included a thousand times is read once.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "model/frames.h"
+#include "model/read_context.h"
+#include "model/sdf_version.h"
+#include "model/world_model.h"
+
+namespace ruedo::model {
+
+class SdfReader {
+ public:
+  explicit SdfReader(ReadContext& context) : context_(context) {}
+
+  // The file's <sdf> element, checked: its version, and that it is one.
+  SdfVersion version_of(const Element& root);
+
+  // Adds the world's physics, scene, lights and models.
+  void read_world(const Element& world, SdfVersion version, WorldModel& result);
+
+  // A model, as its own element says. nullptr: it has no link (told as a finding).
+  std::shared_ptr<const ScopedModel> read_model(const Element& element, SdfVersion version);
+
+  // The model of a file, or of the folder that holds one: for --spawn and includes.
+  struct Included {
+    std::shared_ptr<const ScopedModel> model;    // null: `light` it is, or an actor
+    std::shared_ptr<const Element> document;
+    const Element* light = nullptr;
+    const Element* actor = nullptr;
+    SdfVersion version;
+    std::string name;                            // <include>'s, or the file's
+  };
+  Included read_file(const std::string& path, const Element& asker);
+
+  // Files that are being read, from the outermost: a file that is in it already includes itself.
+  void enter(const std::string& path, const Element& asker);
+  void leave() { files_.pop_back(); }
+
+  static std::shared_ptr<const Model> actor_model(const Element& actor, Pose& X_WM, ReadContext& context);
+
+ private:
+  std::optional<Included> include(const Element& element, const std::string& where);
+  std::shared_ptr<const ScopedModel> read_overridden(const Element& model, const Element& include, SdfVersion version);
+  void read_joints(const Element& model, SdfVersion version, FrameGraph& frames, bool parts_missing, const std::string& where, Model& result);
+
+  ReadContext& context_;
+  std::vector<std::string> files_;
+  std::map<std::string, Included> cache_;
+};
+
+// Makes the devices' names unique: of two sensors with one name, each becomes LINK-SENSOR. Throws InputError for
+// names that Ruedo's own channels have, and for two that stay the same.
+void make_sensor_names_unique(Model& model);
+
+// Checks that the names of an instance and of its devices are fit for channels.
+void check_channel_names(const ModelInstance& instance, const Source& source);
+
+// <joint> to Joint; the frames are those of its model.
+Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames, const std::vector<Link>& links,
+                 const std::string& where, ReadContext& context);
+
+}  // namespace ruedo::model

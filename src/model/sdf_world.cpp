@@ -1,0 +1,226 @@
+// <world>: physics, scene, lights, and the models with their poses.
+#include <cmath>
+#include <map>
+
+#include "model/material.h"
+#include "model/sdf_link.h"
+#include "model/sdf_reader.h"
+
+namespace ruedo::model {
+namespace {
+
+constexpr size_t kMaxModels = 100'000;
+
+void read_step(const Element& physics, WorldModel& world, Findings& findings) {
+  const Element* step = physics.child("max_step_size");
+  if (!step) return;
+  const double seconds = step->as_number(Allowed{1e-6, 1.0, false});
+  world.step_us = std::llround(seconds * 1e6);
+  if (std::abs(static_cast<double>(world.step_us) - seconds * 1e6) > 1e-6) {
+    findings.repaired(step->source, "world/physics", "the step " + step->text + " s is not a whole number of microseconds; it is " +
+                                                         std::to_string(world.step_us) + " us instead");
+  }
+}
+
+void read_physics(const Element& world_element, WorldModel& world, Findings& findings) {
+  const auto all = world_element.all("physics");
+  const Element* chosen = all.empty() ? nullptr : all[0];
+  for (const Element* each : all) {
+    const std::string* is_default = each->attribute("default");
+    if (is_default && (*is_default == "1" || *is_default == "true")) {
+      chosen = each;
+      break;
+    }
+  }
+  if (chosen) {
+    report_other_children(*chosen, {"max_step_size", "real_time_factor", "real_time_update_rate", "gravity"},
+                          {"ode", "bullet", "simbody", "dart", "max_contacts", "magnetic_field", "update_rate"}, "world/physics", findings);
+    read_step(*chosen, world, findings);
+    world.gravity = chosen->vector3("gravity", world.gravity);    // SDF before 1.6
+  }
+  world.gravity = world_element.vector3("gravity", world.gravity);
+  if (world.gravity.norm() > 1000) world_element.child("gravity")->fail("'" + world_element.child("gravity")->text + "' is not allowed; allowed are up to 1000 m/s^2");
+}
+
+void read_scene(const Element& scene, Sky& sky, Findings& findings) {
+  report_other_children(scene, {"ambient", "background", "sky", "shadows"}, {"grid", "origin_visual", "fog"}, "world/scene", findings);
+  if (const Element* colour = scene.child("ambient")) sky.ambient = read_colour(*colour);
+  if (const Element* colour = scene.child("background")) sky.background = read_colour(*colour);
+  sky.sky = scene.has("sky");
+  sky.shadows = scene.boolean("shadows", true);
+}
+
+void add_child(Element& parent, const char* name, const std::string& text) {
+  auto child = std::make_unique<Element>();
+  child->name = name;
+  child->text = text;
+  child->source = parent.source;
+  parent.children.push_back(std::move(child));
+}
+
+}  // namespace
+
+// An actor is a person: a cylinder that stands on the ground and moves along the trajectory, without a skin.
+std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& X_WM, ReadContext& context) {
+  constexpr double kHeight = 1.7, kRadius = 0.25;    // m
+  auto model = std::make_shared<Model>();
+  model->name = required_name(actor);
+  model->source = actor.source;
+  context.findings.unsupported(actor.source, "actor " + model->name, "actors move as cylinders of 1.7 m; skins and animations are not shown");
+  X_WM = actor.pose("pose");
+  auto path = std::make_shared<Element>();
+  path->name = "ruedo:path";
+  path->source = actor.source;
+  bool loop = true;
+  double height = X_WM.translation.z();
+  if (const Element* script = actor.child("script")) {
+    loop = script->boolean("loop", true);
+    const double delay = script->number("delay_start", 0, Allowed::not_negative());
+    if (const Element* trajectory = script->child("trajectory")) {
+      double last = -1;
+      for (const Element* waypoint : trajectory->all("waypoint")) {
+        const double time = delay + waypoint->number("time", 0, Allowed::not_negative());
+        if (time <= last) waypoint->fail("the time " + shown(time) + " s is not after that of the waypoint before");
+        const std::vector<double> numbers = waypoint->has("pose") ? waypoint->child("pose")->as_numbers() : std::vector<double>(6, 0.0);
+        if (numbers.size() != 6) waypoint->child("pose")->fail("'" + waypoint->child("pose")->text + "' is not allowed; allowed are x y z roll pitch yaw");
+        // Skins lie on their back in their own frame; a person walks upright.
+        const double values[] = {time, numbers[0], numbers[1], 0, 0, 0, numbers[5]};
+        std::string text;
+        for (const double value : values) text += (text.empty() ? "" : " ") + shown(value);
+        add_child(*path, "ruedo:waypoint", text);
+        if (last < 0) X_WM = Pose::from_xyz_rpy({numbers[0], numbers[1], 0}, {0, 0, numbers[5]});
+        last = time;
+        height = 0;
+      }
+    }
+  }
+  X_WM.translation.z() = std::min(height, 0.0);
+  X_WM.rotation = Quat(Eigen::AngleAxisd(heading(X_WM.rotation), Vec3::UnitZ()));
+  if (!path->children.empty()) {
+    add_child(*path, "ruedo:loop", loop ? "true" : "false");
+    model->path = path;
+  }
+  Link link;
+  link.name = "link";
+  link.source = actor.source;
+  link.kinematic = true;
+  link.inertial.mass = 75;
+  Collision collision;
+  collision.name = "body";
+  collision.X_LC.translation.z() = kHeight / 2;
+  collision.geometry.shape = Shape::cylinder;
+  collision.geometry.size = {kRadius, kHeight, 0};
+  collision.source = actor.source;
+  Visual visual;
+  visual.name = "body";
+  visual.X_LV = collision.X_LC;
+  visual.geometry = collision.geometry;
+  link.collisions.push_back(std::move(collision));
+  link.visuals.push_back(std::move(visual));
+  model->links.push_back(std::move(link));
+  model->is_static = !model->path;
+  return model;
+}
+
+void SdfReader::read_world(const Element& element, SdfVersion version, WorldModel& world) {
+  Findings& findings = context_.findings;
+  world.name = required_name(element);
+  report_other_children(element, {"model", "include", "light", "frame", "physics", "gravity", "scene", "actor", "joint"},
+                        {"gui", "atmosphere", "magnetic_field", "spherical_coordinates", "wind", "audio", "plugin", "state"},
+                        "world " + world.name, findings);
+  read_physics(element, world, findings);
+  if (const Element* scene = element.child("scene")) read_scene(*scene, world.sky, findings);
+
+  std::string plugins;
+  const Element* first_plugin = nullptr;
+  for (const Element* plugin : element.all("plugin")) {
+    const std::string* file = plugin->attribute("filename");
+    plugins += (plugins.empty() ? "" : ", ") + (file ? *file : std::string("(without a filename)"));
+    if (!first_plugin) first_plugin = plugin;
+  }
+  if (first_plugin) findings.unsupported(first_plugin->source, "world " + world.name, "plugins of Gazebo's server are not loaded: " + plugins);
+  if (const Element* joint = element.child("joint")) {
+    findings.unsupported(joint->source, "world " + world.name, "joints between models are not supported and left out");
+  }
+
+  FrameGraph frames("the world");
+  struct Placed {
+    std::string name;
+    const Element* element;
+    std::shared_ptr<const ScopedModel> scope;
+  };
+  std::vector<Placed> placed;
+  const auto relative_to = [](const Element& owner) -> std::string {
+    const Element* pose = owner.child("pose");
+    const std::string* frame = pose ? pose->attribute("relative_to") : nullptr;
+    if (pose && !frame) frame = pose->attribute("frame");
+    return frame ? *frame : "";
+  };
+  const auto place_actor = [&](const Element& actor, const std::string& name, const Element& by) {
+    auto scope = std::make_shared<ScopedModel>();
+    scope->model = actor_model(actor, scope->pose, context_);
+    FrameGraph::Node node;
+    node.name = name;
+    node.element = &by;
+    node.pose = scope->pose;
+    node.scope = scope;
+    frames.add(node);
+    placed.push_back({name, &by, scope});
+  };
+  for (const auto& child : element.children) {
+    FrameGraph::Node node;
+    node.element = child.get();
+    if (child->name == "model" || child->name == "include") {
+      if (child->name == "model") {
+        node.scope = read_model(*child, version);
+        node.name = required_name(*child);
+      } else {
+        const auto included = include(*child, "world/include");
+        if (!included) continue;
+        if (included->light) {
+          world.lights.push_back(read_light(*included->light, child->pose("pose", included->light->pose("pose")), "world/light", context_));
+          world.lights.back().name = included->name;
+          continue;
+        }
+        if (included->actor) {
+          place_actor(*included->actor, included->name, *child);
+          continue;
+        }
+        node.scope = included->model;
+        node.name = included->name;
+      }
+      if (!node.scope) continue;
+      if (placed.size() >= kMaxModels) child->fail("the world has more than " + std::to_string(kMaxModels) + " models");
+      node.pose = node.scope->pose;
+      node.relative_to = node.scope->relative_to;
+      node.placement_frame = node.scope->placement_frame;
+      placed.push_back({node.name, child.get(), node.scope});
+    } else if (child->name == "frame") {
+      node.name = required_name(*child);
+      node.pose = child->pose("pose");
+      node.relative_to = relative_to(*child);
+      if (const std::string* frame = child->attribute("attached_to")) node.attached_to = *frame;
+      if (node.relative_to.empty()) node.relative_to = node.attached_to;
+    } else if (child->name == "actor") {
+      place_actor(*child, required_name(*child), *child);
+      continue;
+    } else {
+      continue;
+    }
+    frames.add(std::move(node));
+  }
+  for (const Placed& each : placed) {
+    ModelInstance instance;
+    instance.name = dotted(each.name);
+    instance.X_WM = frames.pose(each.name, *each.element);
+    instance.model = each.scope->model;
+    check_channel_names(instance, each.element->source);
+    world.models.push_back(std::move(instance));
+  }
+  for (const Element* light : element.all("light")) {
+    const Pose pose = frames.pose(relative_to(*light), *light) * light->pose("pose");
+    world.lights.push_back(read_light(*light, pose, "world/light", context_));
+  }
+}
+
+}  // namespace ruedo::model

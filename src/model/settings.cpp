@@ -1,0 +1,200 @@
+// Settings edit a copy of a sensor's or a drive's element, which its own reader then reads as if the file said so.
+#include "model/settings.h"
+
+#include <algorithm>
+
+#include "model/drive.h"
+
+namespace ruedo::model {
+namespace {
+
+constexpr const char* kDriveDevices[] = {"velocity", "wheels", "odometry", "pose", "motion", "move"};
+constexpr const char* kFixedDevices[] = {"velocity", "wheels", "odometry", "pose", "motion", "move", "joints", "joint_command"};
+
+template <class List>
+bool contains(const List& list, const std::string& what) {
+  return std::find(std::begin(list), std::end(list), what) != std::end(list);
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text.empty() ? "none" : text;
+}
+
+std::vector<std::string> devices_of(const Model& model) {
+  std::vector<std::string> names;
+  if (model.drive) names.assign(std::begin(kDriveDevices), std::end(kDriveDevices));
+  for (const auto& sensor : model.sensors) names.push_back(sensor.name);
+  return names;
+}
+
+ModelInstance& robot_of(WorldModel& world, const std::string& name, const std::string& option) {
+  std::vector<std::string> robots;
+  for (ModelInstance& instance : world.models) {
+    if (!instance.is_robot()) continue;
+    if (instance.name == name) return instance;
+    robots.push_back(instance.name);
+  }
+  const std::string near = nearest_word(name, robots);
+  throw InputError({}, option + ": there is no robot '" + name + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") +
+                           "; there are " + listed(robots));
+}
+
+// Keys that a kind of sensor reads, so that what a file leaves out can be set, too.
+std::vector<std::string> known_keys(const std::string& type) {
+  std::vector<std::string> keys = {"update_rate", "always_on", "pose"};
+  const auto noise = [&](const std::string& at) {
+    for (const char* each : {"type", "mean", "stddev"}) keys.push_back(at + "." + each);
+  };
+  if (type == "ray" || type == "gpu_ray" || type == "lidar" || type == "gpu_lidar") {
+    const std::string top = type.find("ray") != std::string::npos ? "ray" : "lidar";
+    for (const char* plane : {"horizontal", "vertical"}) {
+      for (const char* each : {"samples", "resolution", "min_angle", "max_angle"}) keys.push_back(top + ".scan." + plane + "." + each);
+    }
+    for (const char* each : {"min", "max", "resolution"}) keys.push_back(top + ".range." + std::string(each));
+    noise(top + ".noise");
+    for (const char* each : {"own_link", "hits", "intensities", "sweep_time", "bearing_noise", "phase"}) keys.push_back(std::string("ruedo:") + each);
+  } else if (type == "sonar") {
+    for (const char* each : {"min", "max", "radius", "geometry"}) keys.push_back(std::string("sonar.") + each);
+    for (const char* each : {"horizontal_aperture", "vertical_aperture", "rays", "reading", "firing", "order", "specular_angle", "cross_talk"}) {
+      keys.push_back(std::string("ruedo:sonar.ruedo:") + each);
+    }
+    noise("ruedo:sonar.noise");
+  } else if (type.find("camera") != std::string::npos) {
+    for (const char* each : {"horizontal_fov", "image.width", "image.height", "image.format", "clip.near", "clip.far"}) keys.push_back(std::string("camera.") + each);
+    noise("camera.noise");
+    for (const char* each : {"encoding", "quality", "depth", "labels", "exposure", "vignetting"}) keys.push_back(std::string("ruedo:") + each);
+  }
+  return keys;
+}
+
+// Every path below the element that ends in a text.
+void collect_keys(const Element& element, const std::string& prefix, std::vector<std::string>& keys) {
+  for (const auto& child : element.children) {
+    if (child->name == "plugin" || child->name == "ruedo:transducer") continue;
+    const std::string key = prefix + child->name;
+    if (child->children.empty()) {
+      if (!contains(keys, key)) keys.push_back(key);
+    } else {
+      collect_keys(*child, key + ".", keys);
+    }
+  }
+}
+
+std::string without_prefixes(std::string key) {
+  for (size_t at = key.find("ruedo:"); at != std::string::npos; at = key.find("ruedo:")) key.erase(at, 6);
+  return key;
+}
+
+// The one key that is meant: in full, or by an ending ("range.max"), "ruedo:" left out as one likes.
+std::string resolved(const std::string& wanted, const std::vector<std::string>& keys, const std::string& option) {
+  const std::string plain = without_prefixes(wanted);
+  std::vector<std::string> matches;
+  for (const std::string& key : keys) {
+    if (key == wanted) return key;
+    const std::string candidate = without_prefixes(key);
+    const bool ends = candidate == plain || (candidate.size() > plain.size() && candidate.compare(candidate.size() - plain.size(), plain.size(), plain) == 0 &&
+                                             candidate[candidate.size() - plain.size() - 1] == '.');
+    if (candidate == plain) return key;
+    if (ends) matches.push_back(key);
+  }
+  if (matches.size() == 1) return matches[0];
+  if (matches.size() > 1) throw InputError({}, option + ": '" + wanted + "' could be " + listed(matches));
+  const std::string near = nearest_word(wanted, keys);
+  throw InputError({}, option + ": there is no '" + wanted + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") + "; there are " + listed(keys));
+}
+
+void set_text(Element& element, const std::string& key, const std::string& value, const Source& source) {
+  Element* at = &element;
+  std::string rest = key;
+  while (!rest.empty()) {
+    const size_t dot = rest.find('.');
+    const std::string name = rest.substr(0, dot);
+    Element* next = at->child(name);
+    if (!next) {
+      at->children.push_back(std::make_unique<Element>());
+      next = at->children.back().get();
+      next->name = name;
+    }
+    at = next;
+    rest = dot == std::string::npos ? "" : rest.substr(dot + 1);
+  }
+  at->text = value;
+  at->source = source;
+}
+
+void set_in_drive(Model& model, const Setting& setting, const std::string& option, const Source& source) {
+  const bool odometry = setting.device == "odometry";
+  std::vector<std::string> keys = odometry ? odometry_elements() : drive_elements();
+  std::shared_ptr<const Element> original = odometry ? model.drive->odometry : model.drive->element;
+  std::unique_ptr<Element> copy;
+  if (original) copy = original->clone();
+  else copy = std::make_unique<Element>();
+  copy->name = odometry ? "ruedo:odometry" : "ruedo:drive";
+  set_text(*copy, resolved(setting.key, keys, option), setting.value, source);
+  std::shared_ptr<const Element> edited = std::move(copy);
+  // base_link may have been moved by nesting, which the drive's own element does not know.
+  const Pose X_MBase = model.drive->X_MBase;
+  auto drive = read_drive(odometry ? model.drive->element : edited, odometry ? edited : model.drive->odometry, model);
+  if (setting.key.find("base") == std::string::npos && setting.key.find("wheel_radius") == std::string::npos) drive.X_MBase = X_MBase;
+  model.drive = std::move(drive);
+}
+
+}  // namespace
+
+void apply_settings(const std::vector<Setting>& settings, WorldModel& world) {
+  for (const Setting& setting : settings) {
+    const std::string option = "--set " + setting.robot + "/" + setting.device + "." + setting.key;
+    ModelInstance& instance = robot_of(world, setting.robot, option);
+    auto model = std::make_shared<Model>(*instance.model);
+    const Source source{option, 0};
+    const auto sensor = std::find_if(model->sensors.begin(), model->sensors.end(), [&](const auto& each) { return each.name == setting.device; });
+    if (sensor != model->sensors.end()) {
+      std::unique_ptr<Element> copy = sensor->element->clone();
+      std::vector<std::string> keys;
+      collect_keys(*copy, "", keys);
+      for (const std::string& key : known_keys(sensor->type)) {
+        if (!contains(keys, key)) keys.push_back(key);
+      }
+      const std::string key = resolved(setting.key, keys, option);
+      set_text(*copy, key, setting.value, source);
+      if (key == "pose") sensor->X_LS = copy->pose("pose");
+      sensor->element = std::move(copy);
+    } else if (model->drive && contains(kDriveDevices, setting.device)) {
+      set_in_drive(*model, setting, option, source);
+    } else {
+      const std::vector<std::string> devices = devices_of(*model);
+      const std::string near = nearest_word(setting.device, devices);
+      throw InputError({}, option + ": the robot has no device '" + setting.device + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") +
+                               "; there are " + listed(devices));
+    }
+    instance.model = std::move(model);
+  }
+}
+
+void apply_disabled(const std::vector<std::string>& disabled, WorldModel& world) {
+  for (const std::string& each : disabled) {
+    const std::string option = "--disable " + each;
+    const size_t slash = each.find('/');
+    if (slash == std::string::npos) throw InputError({}, option + ": allowed is ROBOT/DEVICE");
+    ModelInstance& instance = robot_of(world, each.substr(0, slash), option);
+    const std::string device = each.substr(slash + 1);
+    const auto is_it = [&](const auto& sensor) { return sensor.name == device; };
+    if (std::any_of(instance.model->sensors.begin(), instance.model->sensors.end(), is_it)) {
+      // A robot whose last sensor goes, and which has no drive, is no robot any more.
+      auto model = std::make_shared<Model>(*instance.model);
+      std::erase_if(model->sensors, is_it);
+      instance.model = std::move(model);
+    } else if (contains(kFixedDevices, device)) {
+      world.disabled.push_back(each);
+    } else {
+      const std::vector<std::string> devices = devices_of(*instance.model);
+      const std::string near = nearest_word(device, devices);
+      throw InputError({}, option + ": the robot has no device '" + device + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") +
+                               "; there are " + listed(devices));
+    }
+  }
+}
+
+}  // namespace ruedo::model

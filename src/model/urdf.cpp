@@ -1,0 +1,299 @@
+// URDF to SDF elements. urdfdom says what the robot is; the tree of elements says in which lines.
+#include "model/urdf.h"
+
+#include <algorithm>
+#include <map>
+#include <vector>
+
+#include <console_bridge/console.h>
+#include <urdf_model/model.h>
+#include <urdf_parser/urdf_parser.h>
+
+#include "model/read_context.h"
+
+namespace ruedo::model {
+namespace {
+
+// What urdfdom logs instead of throwing.
+class Listener : public console_bridge::OutputHandler {
+ public:
+  Listener() { console_bridge::useOutputHandler(this); }
+  ~Listener() override { console_bridge::restorePreviousOutputHandler(); }
+  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
+    if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR && first.empty()) first = text;
+  }
+  std::string first;
+};
+
+std::string escaped(const std::string& text) {
+  std::string result;
+  for (const char c : text) {
+    switch (c) {
+      case '<': result += "&lt;"; break;
+      case '&': result += "&amp;"; break;
+      case '"': result += "&quot;"; break;
+      default: result += c;
+    }
+  }
+  return result;
+}
+
+// Back to text for urdfdom, without what it does not read.
+void write_xml(const Element& element, std::string& out) {
+  if (element.name == "gazebo" || element.name == "transmission") return;
+  out += "<" + element.name;
+  for (const auto& [name, value] : element.attributes) out += " " + name + "=\"" + escaped(value) + "\"";
+  out += ">" + escaped(element.text);
+  for (const auto& child : element.children) write_xml(*child, out);
+  out += "</" + element.name + ">";
+}
+
+Element& add(Element& parent, const char* name, const Source& source, const std::string& text = "") {
+  auto child = std::make_unique<Element>();
+  child->name = name;
+  child->text = text;
+  child->source = source;
+  parent.children.push_back(std::move(child));
+  return *parent.children.back();
+}
+
+std::string numbers(std::initializer_list<double> values) {
+  std::string text;
+  for (const double value : values) text += (text.empty() ? "" : " ") + shown(value);
+  return text;
+}
+
+void add_pose(Element& parent, const urdf::Pose& pose, const Source& source, const std::string& relative_to = "") {
+  const auto& p = pose.position;
+  const auto& q = pose.rotation;
+  Element& element = add(parent, "pose", source, numbers({p.x, p.y, p.z, q.x, q.y, q.z, q.w}));
+  element.attributes.emplace_back("rotation_format", "quat_xyzw");
+  if (!relative_to.empty()) element.attributes.emplace_back("relative_to", relative_to);
+}
+
+void add_geometry(Element& parent, const urdf::Geometry* geometry, const Source& source) {
+  Element& element = add(parent, "geometry", source);
+  if (!geometry) return;
+  switch (geometry->type) {
+    case urdf::Geometry::BOX: {
+      const auto& dim = static_cast<const urdf::Box*>(geometry)->dim;
+      add(add(element, "box", source), "size", source, numbers({dim.x, dim.y, dim.z}));
+      break;
+    }
+    case urdf::Geometry::SPHERE:
+      add(add(element, "sphere", source), "radius", source, shown(static_cast<const urdf::Sphere*>(geometry)->radius));
+      break;
+    case urdf::Geometry::CYLINDER: {
+      const auto* cylinder = static_cast<const urdf::Cylinder*>(geometry);
+      Element& shape = add(element, "cylinder", source);
+      add(shape, "radius", source, shown(cylinder->radius));
+      add(shape, "length", source, shown(cylinder->length));
+      break;
+    }
+    case urdf::Geometry::MESH: {
+      const auto* mesh = static_cast<const urdf::Mesh*>(geometry);
+      Element& shape = add(element, "mesh", source);
+      add(shape, "uri", source, mesh->filename);
+      add(shape, "scale", source, numbers({mesh->scale.x, mesh->scale.y, mesh->scale.z}));
+      break;
+    }
+  }
+}
+
+// What <gazebo reference="NAME"> blocks say of a link.
+struct GazeboLink {
+  std::vector<const Element*> sensors;
+  std::string material;
+  const Element* mu1 = nullptr;
+  const Element* mu2 = nullptr;
+  const Element* gravity_off = nullptr;
+};
+
+struct Converter {
+  const Element& robot;
+  Findings& findings;
+  const urdf::ModelInterface& urdf;
+  std::map<std::string, GazeboLink> gazebo;
+  std::unique_ptr<Element> model = std::make_unique<Element>();
+
+  void read_gazebo() {
+    for (const Element* block : robot.all("gazebo")) {
+      const std::string* reference = block->attribute("reference");
+      for (const auto& child : block->children) {
+        const std::string& name = child->name;
+        if (!reference || reference->empty()) {
+          if (name == "plugin" || name == "static" || name == "self_collide" || name.rfind("ruedo:", 0) == 0) {
+            model->children.push_back(child->clone());
+          } else if (name.find(':') == std::string::npos) {
+            findings.unsupported(child->source, "robot " + urdf.getName(), "<" + name + "> in <gazebo> is not supported and left out");
+          }
+          continue;
+        }
+        if (!urdf.getLink(*reference)) continue;    // settings of a joint
+        GazeboLink& link = gazebo[*reference];
+        if (name == "sensor") link.sensors.push_back(child.get());
+        else if (name == "material") link.material = child->attribute("value") ? *child->attribute("value") : child->text;
+        else if (name == "mu1") link.mu1 = child.get();
+        else if (name == "mu2") link.mu2 = child.get();
+        else if (name == "turnGravityOff") link.gravity_off = child.get();
+        else if (name == "plugin") model->children.push_back(child->clone());
+      }
+      if (reference && !reference->empty() && !urdf.getLink(*reference) && !urdf.getJoint(*reference)) {
+        findings.error(block->source, "robot " + urdf.getName(), "<gazebo reference=\"" + *reference + "\">: there is no link or joint of that name");
+      }
+    }
+  }
+
+  void add_inertial(Element& link, const urdf::Link& from, const Source& source) {
+    // A link without mass is a frame: light enough not to matter, heavy enough for the physics.
+    constexpr double kFrameMass_kg = 1e-3, kFrameInertia = 1e-6;
+    Element& inertial = add(link, "inertial", source);
+    double mass = kFrameMass_kg;
+    double ixx = kFrameInertia, iyy = kFrameInertia, izz = kFrameInertia, ixy = 0, ixz = 0, iyz = 0;
+    if (from.inertial && from.inertial->mass > 0) {
+      const urdf::Inertial& i = *from.inertial;
+      add_pose(inertial, i.origin, source);
+      mass = i.mass;
+      ixx = i.ixx, iyy = i.iyy, izz = i.izz, ixy = i.ixy, ixz = i.ixz, iyz = i.iyz;
+    }
+    add(inertial, "mass", source, shown(mass));
+    Element& inertia = add(inertial, "inertia", source);
+    const std::pair<const char*, double> moments[] = {{"ixx", ixx}, {"iyy", iyy}, {"izz", izz}, {"ixy", ixy}, {"ixz", ixz}, {"iyz", iyz}};
+    for (const auto& [name, value] : moments) add(inertia, name, source, shown(value));
+  }
+
+  void add_material(Element& visual, const urdf::Visual& from, const GazeboLink& block, const Source& source) {
+    if (!block.material.empty()) {
+      add(add(add(visual, "material", source), "script", source), "name", source, block.material);
+      return;
+    }
+    if (!from.material) return;
+    const auto& c = from.material->color;
+    Element& material = add(visual, "material", source);
+    const std::string& texture = from.material->texture_filename;
+    const std::string colour = texture.empty() ? numbers({c.r, c.g, c.b, c.a}) : "1 1 1 1";
+    add(material, "ambient", source, colour);
+    add(material, "diffuse", source, colour);
+    if (!texture.empty()) add(add(add(material, "pbr", source), "metal", source), "albedo_map", source, texture);
+  }
+
+  void add_link(const Element& written) {
+    const urdf::LinkConstSharedPtr from = urdf.getLink(required_name(written));
+    if (!from) return;
+    const GazeboLink& block = gazebo[from->name];
+    Element& link = add(*model, "link", written.source);
+    link.attributes.emplace_back("name", from->name);
+    if (from->parent_joint) {
+      add_pose(link, from->parent_joint->parent_to_joint_origin_transform, written.source, from->parent_joint->parent_link_name);
+    }
+    if (block.gravity_off) add(link, "gravity", block.gravity_off->source, block.gravity_off->as_boolean() ? "false" : "true");
+    add_inertial(link, *from, written.child("inertial") ? written.child("inertial")->source : written.source);
+    const auto lines = [&](const char* name, size_t i) {
+      const auto all = written.all(name);
+      return i < all.size() ? all[i]->source : written.source;
+    };
+    for (size_t i = 0; i < from->collision_array.size(); ++i) {
+      const Source source = lines("collision", i);
+      Element& collision = add(link, "collision", source);
+      collision.attributes.emplace_back("name", i == 0 ? "collision" : "collision_" + std::to_string(i));
+      add_pose(collision, from->collision_array[i]->origin, source);
+      add_geometry(collision, from->collision_array[i]->geometry.get(), source);
+      if (block.mu1 || block.mu2) {
+        Element& ode = add(add(add(collision, "surface", source), "friction", source), "ode", source);
+        if (block.mu1) add(ode, "mu", block.mu1->source, block.mu1->attribute("value") ? *block.mu1->attribute("value") : block.mu1->text);
+        if (block.mu2) add(ode, "mu2", block.mu2->source, block.mu2->attribute("value") ? *block.mu2->attribute("value") : block.mu2->text);
+      }
+    }
+    for (size_t i = 0; i < from->visual_array.size(); ++i) {
+      const Source source = lines("visual", i);
+      Element& visual = add(link, "visual", source);
+      visual.attributes.emplace_back("name", i == 0 ? "visual" : "visual_" + std::to_string(i));
+      add_pose(visual, from->visual_array[i]->origin, source);
+      add_geometry(visual, from->visual_array[i]->geometry.get(), source);
+      add_material(visual, *from->visual_array[i], block, source);
+    }
+    for (const Element* sensor : block.sensors) link.children.push_back(sensor->clone());
+  }
+
+  void add_joint(const Element& written) {
+    const urdf::JointConstSharedPtr from = urdf.getJoint(required_name(written));
+    if (!from) return;
+    static const std::map<int, const char*> kTypes = {
+        {urdf::Joint::FIXED, "fixed"},         {urdf::Joint::REVOLUTE, "revolute"}, {urdf::Joint::CONTINUOUS, "continuous"},
+        {urdf::Joint::PRISMATIC, "prismatic"}, {urdf::Joint::PLANAR, "planar"}};
+    const auto type = kTypes.find(from->type);
+    if (type == kTypes.end()) return;    // floating: nothing ties the two
+    const Source& source = written.source;
+    Element& joint = add(*model, "joint", source);
+    joint.attributes.emplace_back("name", from->name);
+    joint.attributes.emplace_back("type", type->second);
+    add(joint, "parent", source, from->parent_link_name);
+    add(joint, "child", source, from->child_link_name);
+    if (from->type == urdf::Joint::FIXED) return;
+    Element& axis = add(joint, "axis", source);
+    add(axis, "xyz", source, numbers({from->axis.x, from->axis.y, from->axis.z}));
+    if (from->limits) {
+      Element& limit = add(axis, "limit", source);
+      if (from->type != urdf::Joint::CONTINUOUS) {
+        add(limit, "lower", source, shown(from->limits->lower));
+        add(limit, "upper", source, shown(from->limits->upper));
+      }
+      // URDF requires both; robots that never moved in a simulator have zeroes there.
+      if (from->limits->effort > 0) add(limit, "effort", source, shown(from->limits->effort));
+      if (from->limits->velocity > 0) add(limit, "velocity", source, shown(from->limits->velocity));
+    }
+    if (from->dynamics) {
+      Element& dynamics = add(axis, "dynamics", source);
+      add(dynamics, "damping", source, shown(std::max(from->dynamics->damping, 0.0)));
+      add(dynamics, "friction", source, shown(std::max(from->dynamics->friction, 0.0)));
+    }
+    if (const Element* mimic = written.child("mimic")) add(axis, "mimic", mimic->source);
+  }
+};
+
+void refuse_xacro(const Element& element) {
+  if (element.name.rfind("xacro:", 0) == 0) {
+    element.fail("is xacro; expand it first: xacro FILE > robot.urdf");
+  }
+  for (const auto& child : element.children) refuse_xacro(*child);
+}
+
+}  // namespace
+
+std::unique_ptr<Element> urdf_as_sdf(const Element& robot, Findings& findings) {
+  refuse_xacro(robot);
+  const std::string name = required_name(robot);
+  for (const char* kind : {"link", "joint"}) {
+    std::map<std::string, const Element*> seen;
+    for (const Element* each : robot.all(kind)) {
+      if (!seen.try_emplace(required_name(*each), each).second) each->fail("a second <" + std::string(kind) + "> of the name '" + required_name(*each) + "'");
+    }
+  }
+  std::string text;
+  write_xml(robot, text);
+  urdf::ModelInterfaceSharedPtr urdf;
+  std::string fault;
+  {
+    Listener listener;
+    try {
+      urdf = urdf::parseURDF(text);
+    } catch (const std::exception& error) {
+      fault = error.what();
+    }
+    if (fault.empty()) fault = listener.first;
+  }
+  if (!urdf || !urdf->getRoot()) robot.fail("is no URDF that can be read: " + (fault.empty() ? "unknown reason" : fault));
+
+  Converter converter{robot, findings, *urdf, {}};
+  Element& model = *converter.model;
+  model.name = "model";
+  model.source = robot.source;
+  model.attributes.emplace_back("name", name);
+  model.attributes.emplace_back("canonical_link", urdf->getRoot()->name);
+  converter.read_gazebo();
+  for (const Element* link : robot.all("link")) converter.add_link(*link);
+  for (const Element* joint : robot.all("joint")) converter.add_joint(*joint);
+  return std::move(converter.model);
+}
+
+}  // namespace ruedo::model
