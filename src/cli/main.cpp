@@ -1,1 +1,86 @@
-int main(){return 0;}
+// ruedo: reads the command line, runs one command, and turns what went wrong into one line and an exit code.
+#include <cstdio>
+#include <exception>
+
+#include <fmt/format.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include "cli/commands.h"
+#include "ruedo/element.h"
+#include "ruedo/errors.h"
+#include "server/version.h"
+
+namespace {
+
+using namespace ruedo::cli;
+
+void say(const std::string& text) {
+  const Style style = style_of(stderr);
+  fmt::print(stderr, "{}{}ruedo: {}{}{}\n", style.bold, style.red, style.off, text, style.off);
+}
+
+// A hint for what CLI11 did not know: the nearest command or option.
+std::string suggestion(const CLI::App& app, int argc, char** argv) {
+  const CLI::App* command = &app;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    std::vector<std::string> known;
+    if (word.rfind("--", 0) == 0) {
+      for (const CLI::Option* option : command->get_options()) {
+        for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+      }
+    } else if (command == &app) {
+      for (const CLI::App* subcommand : app.get_subcommands([](const CLI::App*) { return true; })) {
+        if (subcommand->get_name() == word) command = subcommand;
+        known.push_back(subcommand->get_name());
+      }
+    } else {
+      continue;
+    }
+    const std::string name = word.substr(0, word.find('='));
+    if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+    const std::string near = ruedo::nearest_word(name, known);
+    if (!near.empty()) return "; did you mean '" + near + "'?";
+  }
+  return "";
+}
+
+int run(int argc, char** argv) {
+  CLI::App app{"Ruedo: a simulation server for mobile robots. Robots are data servers; LCM carries commands in and sensor streams out.",
+               "ruedo"};
+  app.set_version_flag("--version", std::string("ruedo ") + ruedo::server::version());
+  app.require_subcommand(1);
+  app.failure_message(CLI::FailureMessage::simple);
+  app.footer("Exit codes: 0 good, 1 the check failed, 2 wrong usage, 3 bad input file, 4 environment.");
+  Action action;
+  for (const RegisterCommand::Add add : registered_commands()) add(app, action);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);    // --help, --version
+    say(std::string(error.what()) + suggestion(app, argc, argv));
+    fmt::print(stderr, "Run `ruedo --help`, or `ruedo COMMAND --help`.\n");
+    return kWrongUsage;
+  }
+  return action();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  spdlog::set_default_logger(spdlog::stderr_color_mt("ruedo"));
+  spdlog::set_pattern("%^ruedo: %l:%$ %v");
+  try {
+    return run(argc, argv);
+  } catch (const ruedo::InputError& error) {
+    say(error.what());
+    return error.source().file.empty() ? kWrongUsage : kBadInput;
+  } catch (const ruedo::EnvironmentError& error) {
+    say(error.what());
+    return kEnvironment;
+  } catch (const std::exception& error) {
+    say(error.what());
+    return kEnvironment;
+  }
+}

@@ -6,6 +6,13 @@
 
 #include <spdlog/spdlog.h>
 
+#include "ruedo/decode.h"
+#include "ruedo/joint_command_t.hpp"
+#include "ruedo/move_command_t.hpp"
+#include "ruedo/name_request_t.hpp"
+#include "ruedo/velocity_command_t.hpp"
+#include "ruedo/wheel_command_t.hpp"
+
 namespace ruedo::server {
 
 DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size, robot::Command& command) {

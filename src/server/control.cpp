@@ -3,6 +3,9 @@
 
 #include <algorithm>
 
+#include "ruedo/decode.h"
+#include "ruedo/join_t.hpp"
+
 namespace ruedo::server {
 
 bool Control::receive(const uint8_t* data, size_t size) {

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "ruedo/decode.h"
 #include "ruedo/reply_t.hpp"
+#include "ruedo/request_t.hpp"
 #include "server/sessions.h"
 
 namespace ruedo::server {

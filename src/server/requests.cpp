@@ -2,7 +2,12 @@
 #include <cmath>
 
 #include "ruedo/applied_t.hpp"
+#include "ruedo/decode.h"
+#include "ruedo/name_request_t.hpp"
+#include "ruedo/rate_request_t.hpp"
+#include "ruedo/reset_request_t.hpp"
 #include "ruedo/state_reply_t.hpp"
+#include "ruedo/step_request_t.hpp"
 #include "server/server.h"
 #include "server/world_state.h"
 

@@ -55,6 +55,7 @@ class Server {
   void stop();    // any thread
 
   const Channels& channels() const { return channels_; }
+  const std::vector<world_info_t>& info() const { return info_; }
   const Findings& findings() const { return findings_; }
   int64_t run_id() const { return run_id_; }
   const CommandInbox& inbox() const { return simulation_->inbox(); }

@@ -1,0 +1,173 @@
+// Options that several commands share, read strictly: a wrong one says what it should look like.
+#include "cli/commands.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <map>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "ruedo/errors.h"
+#include "ruedo/sim_time.h"
+
+namespace ruedo::cli {
+namespace {
+
+std::vector<std::pair<int, RegisterCommand::Add>>& commands() {
+  static std::vector<std::pair<int, RegisterCommand::Add>> list;
+  return list;
+}
+
+[[noreturn]] void wrong(const std::string& option, const std::string& text, const std::string& allowed) {
+  throw InputError({}, option + " '" + text + "': " + allowed);
+}
+
+bool read_number(std::string_view text, double& value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
+}
+
+}  // namespace
+
+RegisterCommand::RegisterCommand(int order, Add add) { commands().emplace_back(order, add); }
+
+std::vector<RegisterCommand::Add> registered_commands() {
+  auto sorted = commands();
+  std::sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<RegisterCommand::Add> list;
+  for (const auto& [order, add] : sorted) list.push_back(add);
+  return list;
+}
+
+void add_world_arguments(CLI::App& command, WorldArguments& arguments) {
+  command.add_option("WORLD", arguments.world, "SDF world or model, or URDF robot")->required();
+  command.add_option("--spawn", arguments.spawns, "place a model on the ground: MODEL[:NAME]@X,Y[,YAW] (m, rad); a file, or one of ours (p3at)")
+      ->type_name("SPAWN")->allow_extra_args(false);
+  command.add_option("--set", arguments.settings, "change a device: ROBOT/DEVICE.KEY=VALUE")->type_name("SETTING")->allow_extra_args(false);
+  command.add_option("--disable", arguments.disabled, "leave a device out: ROBOT/DEVICE")->type_name("DEVICE")->allow_extra_args(false);
+  command.add_flag("--no-noise", arguments.no_noise, "sensors give their ideal values");
+}
+
+model::Spawn parse_spawn(const std::string& text) {
+  const std::string allowed = "it looks like MODEL[:NAME]@X,Y[,YAW], for example p3at:rover@1,2.5,1.57";
+  const size_t at = text.rfind('@');
+  if (at == std::string::npos || at == 0) wrong("--spawn", text, allowed);
+  model::Spawn spawn;
+  spawn.model = text.substr(0, at);
+  if (const size_t colon = spawn.model.rfind(':'); colon != std::string::npos && spawn.model.find('/', colon) == std::string::npos) {
+    spawn.name = spawn.model.substr(colon + 1);
+    spawn.model.resize(colon);
+    if (spawn.name.empty() || spawn.model.empty()) wrong("--spawn", text, allowed);
+  }
+  double numbers[3] = {0.0, 0.0, 0.0};
+  int count = 0;
+  for (size_t begin = at + 1; begin <= text.size(); ++count) {
+    const size_t end = std::min(text.find(',', begin), text.size());
+    if (count == 3 || !read_number(std::string_view(text).substr(begin, end - begin), numbers[count])) wrong("--spawn", text, allowed);
+    begin = end + 1;
+  }
+  if (count < 2) wrong("--spawn", text, allowed);
+  spawn.x = numbers[0];
+  spawn.y = numbers[1];
+  spawn.yaw = numbers[2];
+  return spawn;
+}
+
+model::Setting parse_setting(const std::string& text) {
+  const std::string allowed = "it looks like ROBOT/DEVICE.KEY=VALUE, for example p3at/LRF.update_rate=20";
+  const size_t slash = text.find('/');
+  const size_t dot = text.find('.', slash == std::string::npos ? 0 : slash);
+  const size_t equals = text.find('=');
+  if (slash == std::string::npos || dot == std::string::npos || equals == std::string::npos || !(slash < dot && dot < equals) ||
+      slash == 0 || dot == slash + 1 || equals == dot + 1) {
+    wrong("--set", text, allowed);
+  }
+  return {text.substr(0, slash), text.substr(slash + 1, dot - slash - 1), text.substr(dot + 1, equals - dot - 1), text.substr(equals + 1)};
+}
+
+std::pair<std::string, std::string> parse_remap(const std::string& text) {
+  const size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0 || equals + 1 == text.size()) {
+    wrong("--remap", text, "it looks like CHANNEL=NAME, for example p3at/LRF=LASER");
+  }
+  return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
+double parse_rate(const std::string& text) {
+  double rate = 0.0;
+  if (text == "max") return std::numeric_limits<double>::infinity();
+  if (!read_number(text, rate) || rate <= 0.0) wrong("--rate", text, "a number above 0 (1 is real time), or max");
+  return rate;
+}
+
+int64_t parse_duration_us(const std::string& text) {
+  double seconds = 0.0;
+  if (!read_number(text, seconds) || seconds < 0.0 || seconds > 1e9) wrong("--duration", text, "seconds of sim time, 0 to 1e9");
+  return std::llround(seconds * 1e6);
+}
+
+model::LoadOptions load_options(const WorldArguments& arguments) {
+  model::LoadOptions options;
+  for (const std::string& text : arguments.spawns) options.spawns.push_back(parse_spawn(text));
+  for (const std::string& text : arguments.settings) options.settings.push_back(parse_setting(text));
+  for (const std::string& text : arguments.disabled) {
+    if (text.find('/') == std::string::npos) wrong("--disable", text, "it looks like ROBOT/DEVICE, for example p3at/CAMERA");
+  }
+  options.disabled = arguments.disabled;
+  return options;
+}
+
+std::shared_ptr<const model::WorldModel> load(const WorldArguments& arguments) {
+  return model::load_world(arguments.world, load_options(arguments));
+}
+
+std::vector<std::string> result_options(const WorldArguments& arguments) {
+  std::vector<std::string> options;
+  for (const std::string& text : arguments.spawns) options.push_back("--spawn=" + text);
+  for (const std::string& text : arguments.settings) options.push_back("--set=" + text);
+  for (const std::string& text : arguments.disabled) options.push_back("--disable=" + text);
+  if (arguments.no_noise) options.push_back("--no-noise");
+  return options;
+}
+
+const char* kind_name(Finding::Kind kind) {
+  switch (kind) {
+    case Finding::Kind::unsupported: return "unsupported";
+    case Finding::Kind::repaired: return "repaired";
+    case Finding::Kind::error: return "error";
+  }
+  return "";
+}
+
+std::vector<FindingGroup> group(const std::vector<Finding>& findings) {
+  std::vector<FindingGroup> groups;
+  std::map<std::pair<int, std::string>, size_t> index;
+  for (const Finding& finding : findings) {
+    const auto [found, added] = index.try_emplace({static_cast<int>(finding.kind), finding.text}, groups.size());
+    if (added) groups.push_back({finding.kind, finding.text, {}});
+    groups[found->second].places.push_back(&finding);
+  }
+  return groups;
+}
+
+void print_findings(const std::vector<Finding>& findings) {
+  const Style style = style_of(stderr);
+  for (const FindingGroup& group : group(findings)) {
+    const Finding& first = *group.places.front();
+    const std::string more = group.places.size() > 1 ? fmt::format(" (and {} more places; see ruedo check)", group.places.size() - 1) : "";
+    const char* colour = group.kind == Finding::Kind::error ? style.red : style.yellow;
+    fmt::print(stderr, "{}{}{}: {}: {}: {}{}{}{}\n", colour, kind_name(group.kind), style.off, first.source.str(), first.element, group.text,
+               style.dim, more, style.off);
+  }
+}
+
+Style style_of(FILE* stream) {
+  if (!isatty(fileno(stream)) || std::getenv("NO_COLOR")) return {};
+  return {"\033[1m", "\033[2m", "\033[31m", "\033[33m", "\033[32m", "\033[36m", "\033[0m"};
+}
+
+}  // namespace ruedo::cli

@@ -1,0 +1,159 @@
+// ruedo run: loads a world and serves it until the end, Ctrl-C, or a client's QUIT.
+#include <csignal>
+#include <cstdlib>
+#include <thread>
+
+#include <fmt/format.h>
+#include <pthread.h>
+#include <spdlog/spdlog.h>
+#include <tbb/global_control.h>
+#include <unistd.h>
+
+#include "bus/lcm_bus.h"
+#include "cli/commands.h"
+#include "cli/listing.h"
+#include "ruedo/errors.h"
+#include "server/server.h"
+
+namespace ruedo::cli {
+namespace {
+
+struct RunArguments {
+  WorldArguments world;
+  uint64_t seed = 1;
+  std::string rate = "1", duration, lcm, record, control = "on";
+  std::vector<std::string> remaps;
+  bool paused = false, quiet = false;
+  int threads = 0;
+};
+
+// Takes SIGINT and SIGTERM in a thread of its own: a handler could do next to nothing. Make it before any other
+// thread, which then inherits that the signals are blocked.
+class SignalThread {
+ public:
+  SignalThread() {
+    sigemptyset(&signals_);
+    sigaddset(&signals_, SIGINT);
+    sigaddset(&signals_, SIGTERM);
+    pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
+    thread_ = std::thread([this] { wait(); });
+  }
+  ~SignalThread() {
+    done_ = true;
+    pthread_kill(thread_.native_handle(), SIGTERM);
+    thread_.join();
+  }
+  void serve(server::Server* server) { server_ = server; }
+
+ private:
+  void wait() {
+    for (int signal = 0; sigwait(&signals_, &signal) == 0;) {
+      if (done_) return;
+      server::Server* server = server_;
+      if (!server || asked_) std::_Exit(128 + signal);    // nothing to end cleanly, or it does not end
+      asked_ = true;
+      server->stop();
+    }
+  }
+
+  sigset_t signals_;
+  std::atomic<bool> done_{false};
+  std::atomic<server::Server*> server_{nullptr};
+  bool asked_ = false;
+  std::thread thread_;
+};
+
+class StatusLine {
+ public:
+  StatusLine() : shown_(isatty(STDERR_FILENO) != 0) {}
+  ~StatusLine() {
+    if (drawn_) fmt::print(stderr, "\n");
+  }
+
+  void draw(const server::Status& status) {
+    const auto now = std::chrono::steady_clock::now();
+    const double real_s = std::chrono::duration<double>(now - last_time_).count();
+    const double factor = static_cast<double>(status.time_us - last_.time_us) * 1e-6 / real_s;
+    const double messages = static_cast<double>(status.messages - last_.messages) / real_s;
+    last_ = status;
+    last_time_ = now;
+    if (!shown_) return;
+    fmt::print(stderr, "\r\033[K{:.2f} s   {}   {:.0f} messages/s", static_cast<double>(status.time_us) * 1e-6,
+               status.paused ? std::string("paused") : fmt::format("x {:.3g} real time", factor), messages);
+    std::fflush(stderr);
+    drawn_ = true;
+  }
+
+ private:
+  bool shown_, drawn_ = false;
+  server::Status last_;
+  std::chrono::steady_clock::time_point last_time_ = std::chrono::steady_clock::now();
+};
+
+server::ServerOptions server_options(const RunArguments& arguments) {
+  server::ServerOptions options;
+  options.rate = parse_rate(arguments.rate);
+  if (!arguments.duration.empty()) options.duration_us = parse_duration_us(arguments.duration);
+  options.paused = arguments.paused;
+  options.control = arguments.control == "on";
+  options.record = arguments.record;
+  options.result_options = result_options(arguments.world);
+  for (const std::string& text : arguments.remaps) {
+    options.remaps.push_back(parse_remap(text));
+    options.result_options.push_back("--remap=" + text);
+  }
+  options.simulation.fleet.seed = arguments.seed;
+  options.simulation.fleet.noise = !arguments.world.no_noise;
+  options.simulation.fleet.disabled = arguments.world.disabled;
+  return options;
+}
+
+int run(const RunArguments& arguments) {
+  server::ServerOptions options = server_options(arguments);
+  SignalThread signals;
+  std::unique_ptr<tbb::global_control> threads;
+  if (arguments.threads > 0) {
+    threads = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(arguments.threads));
+  }
+  const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
+  bus::LcmBus bus(arguments.lcm);
+  server::Server server(world, std::move(options), bus);
+  std::vector<Finding> findings = world->findings;
+  findings.insert(findings.end(), server.findings().list().begin(), server.findings().list().end());
+  print_findings(findings);
+  if (!arguments.quiet) {
+    const Style style = style_of(stdout);
+    fmt::print("{}{}{}: steps of {:g} ms, seed {}, on {}\n", style.bold, world->name, style.off, static_cast<double>(world->step_us) * 1e-3,
+               arguments.seed, bus.url().str());
+    print_channels(stdout, server.info());
+    std::fflush(stdout);
+  }
+  StatusLine status;
+  server.on_status([&](const server::Status& now) { status.draw(now); });
+  signals.serve(&server);
+  server.run();
+  signals.serve(nullptr);
+  return kGood;
+}
+
+void add_run(CLI::App& app, Action& chosen) {
+  CLI::App* command = app.add_subcommand("run", "serve a world: step it, publish its sensors, take commands");
+  const auto arguments = std::make_shared<RunArguments>();
+  add_world_arguments(*command, arguments->world);
+  command->add_option("--seed", arguments->seed, "of all noise")->capture_default_str()->check(CLI::NonNegativeNumber);
+  command->add_option("--rate", arguments->rate, "sim time per real time, or max")->type_name("R|max")->capture_default_str();
+  command->add_option("--duration", arguments->duration, "end after so many seconds of sim time")->type_name("S");
+  command->add_option("--lcm", arguments->lcm, "LCM address (default: $LCM_DEFAULT_URL, or LCM's group with ttl 0)")->type_name("URL");
+  command->add_option("--record", arguments->record, "write a standard LCM log")->type_name("FILE");
+  command->add_option("--remap", arguments->remaps, "give a channel another name: CHANNEL=NAME")->type_name("REMAP")->allow_extra_args(false);
+  command->add_flag("--paused", arguments->paused, "start paused, at step 0");
+  command->add_option("--threads", arguments->threads, "most threads inside a module (default: one a core)")->type_name("N")->check(CLI::Range(1, 1024));
+  command->add_option("--control", arguments->control, "serve requests: on or off")->capture_default_str()->check(CLI::IsMember({"on", "off"}));
+  command->add_flag("--quiet", arguments->quiet, "do not list the channels");
+  command->callback([arguments, &chosen] { chosen = [arguments] { return run(*arguments); }; });
+}
+
+const RegisterCommand kRegister{10, add_run};
+
+}  // namespace
+}  // namespace ruedo::cli
