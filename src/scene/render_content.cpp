@@ -203,7 +203,6 @@ Pose link_pose(const model::WorldModel& world, const model::BodyLayout& layout, 
 RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLayout& layout) {
   Builder builder(*this);
   std::map<const model::Link*, int> kinds;    // looked up only
-  std::vector<int> static_rank(world.models.size(), -1);
   int statics = 0;
   bool first = true;
   for (size_t i = 0; i < layout.links.size(); ++i) {
@@ -221,11 +220,9 @@ RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLa
     kind_of_link.push_back(at->second);
     for (const model::Light& light : link.lights) lights.push_back({light, static_cast<int>(i)});
 
-    int label = placement.body + 1;
-    if (placement.body < 0) {
-      if (static_rank[instance] < 0) static_rank[instance] = statics++;
-      label = static_cast<int>(layout.bodies.size()) + static_rank[instance] + 1;
-    }
+    // The order of ruedo/info's bodies: what moves, then the links that do not.
+    const int body = placement.body >= 0 ? placement.body : static_cast<int>(layout.bodies.size()) + statics++;
+    const int label = body + 1;
     label_of_link.push_back(static_cast<uint16_t>(std::min(label, 65535)));
 
     if (at->second < 0) continue;

@@ -39,7 +39,7 @@ struct Picture {
   bool want_rgb = true, want_depth = false, want_labels = false;
   std::vector<uint8_t> rgb;            // width * height * 3
   std::vector<float> depth;            // m along the optical axis, +inf: nothing
-  std::vector<uint16_t> labels;        // of moving bodies: BodyLayout's index + 1; then the static models; 0: nothing
+  std::vector<uint16_t> labels;        // place in ruedo/info's bodies + 1: the moving bodies, then the static links; 0: nothing
 };
 
 // Coloured lines drawn over the world, for rays and cones in ruedo render.

@@ -1,6 +1,7 @@
 #include "scene/render_texture.h"
 
 #include <algorithm>
+#include <filesystem>
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -29,6 +30,8 @@ cv::Mat to_rgba(cv::Mat image) {
 
 TexturePixels decode_texture(const model::Texture& texture) {
   TexturePixels out;
+  std::error_code error;
+  if (!texture.path.empty() && !std::filesystem::is_regular_file(texture.path, error)) return out;
   try {
     cv::Mat image = texture.path.empty() ? cv::imdecode(texture.embedded, cv::IMREAD_UNCHANGED)
                                          : cv::imread(texture.path, cv::IMREAD_UNCHANGED);

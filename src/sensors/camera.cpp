@@ -1,0 +1,227 @@
+// Cameras: colour or grey pictures on ROBOT/CAMERA, depth on /depth, labels on /labels, intrinsics on /info.
+//
+// A pinhole with square pixels, fx = width / (2 tan(hfov / 2)), bent by its lens (camera_lens.h), then developed: light
+// lost in the corners and noise in each pixel (pixel_noise.h). Depth is along the optical axis and has neither.
+// Pictures are drawn from visuals, by the renderer that the module gives.
+#include "ruedo/camera_info_t.hpp"
+#include "ruedo/device_info_t.hpp"
+#include "ruedo/image_t.hpp"
+#include "ruedo/sensor.h"
+
+#include <cmath>
+#include <optional>
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "model/body_layout.h"
+#include "scene/render_scene.h"
+#include "sensors/camera_lens.h"
+#include "sensors/pixel_noise.h"
+
+namespace ruedo {
+namespace {
+
+// A message that fits one datagram, with room for LCM's head.
+constexpr size_t kMaxMessage = 60000;
+constexpr int kMinQuality = 10, kQualityStep = 8;
+
+enum class Encoding { jpeg, rgb, grey };
+
+bool wants_depth(const std::string& type) {
+  return type == "depth" || type == "depth_camera" || type == "rgbd" || type == "rgbd_camera";
+}
+
+const Element& camera_of(const SensorSetup& setup) {
+  const Element* camera = setup.element.child("camera");
+  if (!camera) setup.element.fail("a camera needs a <camera> element");
+  return *camera;
+}
+
+class Camera : public Sensor {
+ public:
+  explicit Camera(const SensorSetup& setup)
+      : random_(setup.random), lens_(camera_of(setup)), noise_(0, 0), vignette_(0, 0, 0),
+        channel_(setup.channel<image_t>()), info_channel_(setup.channel<camera_info_t>("info")) {
+    const Element& element = setup.element;
+    const Element& camera = camera_of(setup);
+    element.refuse_unknown({"ruedo:encoding", "ruedo:quality", "ruedo:depth", "ruedo:labels", "ruedo:exposure",
+                            "ruedo:vignetting", "ruedo:phase"});
+    const model::LinkPlacement& link = setup.layout.links[static_cast<size_t>(setup.link)];
+    body_ = link.body;
+    X_BC_ = link.X_BL * setup.X_LS * camera.pose("pose");
+    read_format(camera, setup);
+    read_noise(camera, setup);
+    vignette_ = Vignette(element.number("ruedo:vignetting", 0.0, Allowed::between(0.0, 1.0)), lens_.width, lens_.height);
+    const std::string* type = element.attribute("type");
+    const bool depth = element.boolean("ruedo:depth", type && wants_depth(*type));
+    if (depth) depth_channel_ = setup.channel<image_t>("depth");
+    const bool labels = element.boolean("ruedo:labels", false);
+    if (labels) labels_channel_ = setup.channel<image_t>("labels");
+    picture_.want_depth = depth;
+    picture_.want_labels = labels;
+
+    if (lens_.distorts()) map_.emplace(lens_);
+    if (map_) {
+      view_ = map_->ideal();
+    } else {
+      view_ = scene::View{{}, lens_.width, lens_.height, lens_.fx, lens_.fy, lens_.cx, lens_.cy, lens_.near_m, lens_.far_m};
+    }
+    view_.exposure = std::exp2(element.number("ruedo:exposure", 0.0, Allowed::between(-10.0, 10.0)));
+    view_.samples = camera.integer("image/anti_aliasing", 1, Allowed::not_negative()) > 1 ? 4 : 1;
+    fill_info();
+  }
+
+  void sample(const SampleInput& input, Outbox& out) override {
+    view_.X_WCamera = body_ < 0 ? X_BC_ : input.snapshot.bodies[static_cast<size_t>(body_)] * X_BC_;
+    input.renderer->draw(input.snapshot, view_, picture_);
+    publish_picture(input, out);
+    if (depth_channel_ >= 0) publish_plane(input, out, depth_channel_, image_t::PIXEL_FORMAT_FLOAT_GRAY32, CV_32F, picture_.depth.data());
+    if (labels_channel_ >= 0) publish_plane(input, out, labels_channel_, image_t::PIXEL_FORMAT_LE_GRAY16, CV_16U, picture_.labels.data());
+    info_.utime = input.snapshot.time;
+    out.publish(info_channel_, info_);
+  }
+
+  void describe(device_info_t& info) const override {
+    info.width = lens_.width;
+    info.height = lens_.height;
+    info.fov_horizontal = lens_.hfov;
+    info.fov_vertical = std::atan((lens_.cy + 0.5) / lens_.fy) + std::atan((lens_.height - 0.5 - lens_.cy) / lens_.fy);
+    info.range_min = lens_.near_m;
+    info.range_max = lens_.far_m;
+  }
+
+ private:
+  void read_format(const Element& camera, const SensorSetup& setup) {
+    const std::string encoding = setup.element.choice("ruedo:encoding", "jpeg", {"jpeg", "rgb", "grey"});
+    encoding_ = encoding == "jpeg" ? Encoding::jpeg : encoding == "rgb" ? Encoding::rgb : Encoding::grey;
+    quality_ = first_quality_ = static_cast<int>(setup.element.integer("ruedo:quality", 85, Allowed::between(kMinQuality, 100)));
+    const std::string format = camera.string("image/format", "R8G8B8");
+    grey_ = encoding_ == Encoding::grey || format == "L8" || format == "L_INT8";
+    const bool colour = format == "R8G8B8" || format == "RGB_INT8" || format == "B8G8R8" || format == "BGR_INT8";
+    if (!grey_ && !colour && setup.findings) {
+      setup.findings->unsupported(camera.child("image/format")->source, "sensor " + setup.device + "/camera/image/format",
+                                  "the format '" + format + "' is not supported: the camera gives R8G8B8");
+    }
+    if (const Element* lens = camera.child("lens/type"); lens && lens->text != "gnomonical" && lens->text != "custom" && setup.findings) {
+      setup.findings->unsupported(lens->source, "sensor " + setup.device + "/camera/lens/type",
+                                  "the projection '" + lens->text + "' is not supported: the camera is a pinhole");
+    }
+  }
+
+  void read_noise(const Element& camera, const SensorSetup& setup) {
+    const Element* noise = camera.child("noise");
+    if (!noise) return;
+    const std::string* attribute = noise->attribute("type");
+    const std::string type = attribute ? *attribute : noise->string("type", "none");
+    if (type != "none" && type != "gaussian") noise->fail("type '" + type + "' is not allowed; allowed: none, gaussian");
+    const double mean = noise->number("mean", 0.0), stddev = noise->number("stddev", 0.0, Allowed::not_negative());
+    if (setup.noise && type == "gaussian") noise_ = PixelNoise(mean, stddev);
+  }
+
+  void fill_info() {
+    info_.width = lens_.width;
+    info_.height = lens_.height;
+    info_.fx = lens_.fx;
+    info_.fy = lens_.fy;
+    info_.cx = lens_.cx;
+    info_.cy = lens_.cy;
+    std::copy(lens_.distortion.begin(), lens_.distortion.end(), info_.distortion);
+    info_.near_clip = lens_.near_m;
+    info_.far_clip = lens_.far_m;
+    image_.nmetadata = plane_.nmetadata = 0;
+    image_.width = plane_.width = lens_.width;
+    image_.height = plane_.height = lens_.height;
+  }
+
+  void publish_picture(const SampleInput& input, Outbox& out) {
+    cv::Mat pixels(view_.height, view_.width, CV_8UC3, picture_.rgb.data());
+    if (map_) {
+      map_->blend(pixels, bent_);
+      pixels = bent_;
+    }
+    if (grey_) {
+      cv::cvtColor(pixels, grey_picture_, cv::COLOR_RGB2GRAY);
+      pixels = grey_picture_;
+    }
+    const std::span<uint8_t> bytes(pixels.data, pixels.total() * pixels.elemSize());
+    vignette_.apply(bytes, pixels.channels());
+    noise_.apply(random_.stream(static_cast<uint64_t>(input.sample)), bytes);
+
+    image_.utime = input.snapshot.time;
+    if (encoding_ == Encoding::jpeg) {
+      encode_jpeg(pixels);
+    } else {
+      image_.data.assign(bytes.begin(), bytes.end());
+      image_.row_stride = static_cast<int32_t>(lens_.width * pixels.channels());
+      image_.pixelformat = grey_ ? int32_t{image_t::PIXEL_FORMAT_GRAY} : int32_t{image_t::PIXEL_FORMAT_RGB};
+    }
+    image_.size = static_cast<int32_t>(image_.data.size());
+    out.publish(channel_, image_);
+  }
+
+  // Lowers the quality until the picture fits a datagram, and comes back towards the wanted one picture by picture.
+  void encode_jpeg(const cv::Mat& pixels) {
+    const cv::Mat* source = &pixels;
+    if (!grey_) {
+      cv::cvtColor(pixels, bgr_, cv::COLOR_RGB2BGR);    // OpenCV's order
+      source = &bgr_;
+    }
+    quality_ = std::min(quality_ + kQualityStep / 2, first_quality_);
+    for (;;) {
+      jpeg_parameters_ = {cv::IMWRITE_JPEG_QUALITY, quality_};
+      cv::imencode(".jpg", *source, image_.data, jpeg_parameters_);
+      if (image_.data.size() <= kMaxMessage || quality_ <= kMinQuality) break;
+      quality_ = std::max(quality_ - kQualityStep, kMinQuality);
+    }
+    image_.row_stride = 0;
+    image_.pixelformat = image_t::PIXEL_FORMAT_MJPEG;
+  }
+
+  void publish_plane(const SampleInput& input, Outbox& out, int channel, int32_t format, int cv_type, void* values) {
+    cv::Mat pixels(view_.height, view_.width, cv_type, values);
+    if (map_) {
+      map_->pick(pixels, bent_plane_, cv_type == CV_32F ? std::numeric_limits<double>::infinity() : 0.0);
+      pixels = bent_plane_;
+    }
+    plane_.utime = input.snapshot.time;
+    plane_.pixelformat = format;
+    plane_.row_stride = static_cast<int32_t>(static_cast<size_t>(lens_.width) * pixels.elemSize());
+    plane_.data.assign(pixels.data, pixels.data + pixels.total() * pixels.elemSize());
+    plane_.size = static_cast<int32_t>(plane_.data.size());
+    out.publish(channel, plane_);
+  }
+
+  RandomSource random_;
+  Lens lens_;
+  PixelNoise noise_;
+  Vignette vignette_;
+  int channel_, info_channel_, depth_channel_ = -1, labels_channel_ = -1;
+  int body_ = -1;               // into BodyLayout::bodies; -1: does not move
+  Pose X_BC_;                   // X_WC when it does not move
+  Encoding encoding_ = Encoding::jpeg;
+  bool grey_ = false;
+  int quality_ = 85, first_quality_ = 85;
+  std::optional<LensMap> map_;
+  scene::View view_;
+
+  // Kept from sample to sample, so that nothing is allocated.
+  scene::Picture picture_;
+  cv::Mat bent_, bent_plane_, grey_picture_, bgr_;
+  image_t image_, plane_;
+  camera_info_t info_;
+  std::vector<int> jpeg_parameters_;
+};
+
+const RegisterSensor kRegister{
+    {.module = "camera",
+     .order = 4,
+     .types = {"camera", "depth", "depth_camera", "rgbd", "rgbd_camera"},
+     .attach_to = "",
+     .device_name = "",
+     .default_rate = {30, 1},
+     .needs_renderer = true,
+     .make = [](const SensorSetup& setup) { return std::make_unique<Camera>(setup); }}};
+
+}  // namespace
+}  // namespace ruedo
