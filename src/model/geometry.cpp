@@ -97,10 +97,15 @@ std::optional<Geometry> read_geometry(const Element& element, const std::string&
     if (!shape) shape = child.get();
   }
   if (!shape) return std::nullopt;
-  const Allowed positive = Allowed::positive();
+  // Converters write shapes of size zero for what has none: they are nothing. Negative sizes are errors.
+  const Allowed not_negative = Allowed::not_negative();
+  const auto nothing = [&](const char* name) {
+    context.findings.repaired(shape->source, where, "a <" + shape->name + "> whose <" + name + "> is 0; the shape is left out");
+    return std::nullopt;
+  };
   const auto required = [&](const char* name) {
     if (!shape->has(name)) shape->fail(std::string("has no <") + name + ">");
-    return shape->number(name, 0, positive);
+    return shape->number(name, 0, not_negative);
   };
   const std::string& kind = shape->name;
   Geometry g;
@@ -108,18 +113,23 @@ std::optional<Geometry> read_geometry(const Element& element, const std::string&
     g.shape = Shape::box;
     if (!shape->has("size")) shape->fail("has no <size>");
     g.size = shape->vector3("size", Vec3::Ones());
-    if (g.size.minCoeff() <= 0) shape->child("size")->fail("'" + shape->child("size")->text + "' is not allowed; sizes are above 0");
+    if (g.size.minCoeff() < 0) shape->child("size")->fail("'" + shape->child("size")->text + "' is not allowed; sizes are above 0");
+    if (g.size.minCoeff() == 0) return nothing("size");
   } else if (kind == "sphere") {
     g.shape = Shape::sphere;
     g.size = Vec3::Constant(required("radius"));
+    if (g.size.x() == 0) return nothing("radius");
   } else if (kind == "cylinder" || kind == "capsule" || kind == "cone") {
     g.shape = kind == "cylinder" ? Shape::cylinder : kind == "cone" ? Shape::cone : Shape::capsule;
     g.size = {required("radius"), required("length"), 0};
+    if (g.size.x() == 0) return nothing("radius");
+    if (g.size.y() == 0 && kind != "capsule") return nothing("length");
   } else if (kind == "ellipsoid") {
     g.shape = Shape::ellipsoid;
     if (!shape->has("radii")) shape->fail("has no <radii>");
     g.size = shape->vector3("radii", Vec3::Ones());
-    if (g.size.minCoeff() <= 0) shape->child("radii")->fail("'" + shape->child("radii")->text + "' is not allowed; radii are above 0");
+    if (g.size.minCoeff() < 0) shape->child("radii")->fail("'" + shape->child("radii")->text + "' is not allowed; radii are above 0");
+    if (g.size.minCoeff() == 0) return nothing("radii");
   } else if (kind == "plane") {
     g.shape = Shape::plane;
     const Vec3 normal = shape->vector3("normal", Vec3::UnitZ());

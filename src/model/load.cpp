@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "model/placement.h"
+#include "model/sdf_link.h"
 #include "model/sdf_reader.h"
 #include "model/settings.h"
 #include "model/urdf.h"
@@ -66,17 +67,23 @@ class Loader {
     }
     report_other_children(root, {"model", "light", "actor"}, {}, "sdf", findings_);
     read_empty_world();
-    bool any = false;
+    bool any = false, own_light = false;
     for (const auto& child : root.children) {
       if (child->name == "model") {
-        any = true;
         if (const auto scope = reader_.read_model(*child, version)) {
           const std::string name = required_name(*child);
           for (const ModelInstance& other : world_.models) {
-            if (other.name == name) child->fail("a second model of the name '" + name + "'");
+            if (other.name == name && any) child->fail("a second model of the name '" + name + "'");
           }
+          // A ground plane of the user's own stands in for ours.
+          std::erase_if(world_.models, [&](const auto& other) { return other.name == name; });
           add(name, scope->pose, scope->model, child->source);
         }
+        any = true;
+      } else if (child->name == "light") {
+        if (!own_light) world_.lights.clear();    // it stands in for our sun
+        own_light = any = true;
+        world_.lights.push_back(read_light(*child, child->pose("pose"), "light", context_));
       } else if (child->name == "actor") {
         any = true;
         Pose X_WM;
@@ -84,8 +91,8 @@ class Loader {
         add(required_name(*child), X_WM, std::move(model), child->source);
       }
     }
-    if (!any) root.fail("holds no <world> and no <model>");
-    world_.name = world_.models.back().name;
+    if (!any) root.fail("holds no <world>, <model>, <light> or <actor>");
+    if (!world_.models.empty()) world_.name = world_.models.back().name;
   }
 
   void read_robot(const Element& root) {

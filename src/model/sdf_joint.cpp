@@ -33,7 +33,9 @@ JointAxis read_axis(const Element& element, SdfVersion version, const Pose& X_MJ
   axis.upper = limit("limit/upper", kInfinity);
   if (joint.type == JointType::continuous) axis.lower = -kInfinity, axis.upper = kInfinity;
   if (axis.lower > axis.upper) {
-    element.child("limit")->fail("lower " + shown(axis.lower) + " is above upper " + shown(axis.upper));
+    context.findings.repaired(element.child("limit")->source, where, "the lower limit " + shown(axis.lower) + " is above the upper limit " +
+                                                                         shown(axis.upper) + "; they are taken the other way round");
+    std::swap(axis.lower, axis.upper);
   }
   // Negative: no limit.
   const double effort = limit("limit/effort", kInfinity), velocity = limit("limit/velocity", kInfinity);

@@ -55,13 +55,26 @@ Visual read_visual(const Element& element, const Pose& X_LV, Geometry geometry, 
   return v;
 }
 
+// A moment of inertia; NaN where exporters wrote nan.
+double moment(const Element& inertia, const char* name, double fallback) {
+  const std::string text = inertia.string(name, "");
+  if (text == "nan" || text == "-nan" || text == "NaN") return std::numeric_limits<double>::quiet_NaN();
+  return inertia.number(name, fallback);
+}
+
 // What is wrong with an inertia, "" when a body can have it. A thousandth is left for rounded figures.
 std::string inertia_fault(const Inertial& inertial) {
+  if (!inertial.inertia.allFinite()) return "a moment of inertia is not a number";
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(inertial.inertia);
   const Vec3 moments = solver.eigenvalues();    // ascending
   if (!(moments[0] > 0)) return "the moments of inertia are not all positive";
   if (moments[0] + moments[1] < moments[2] * (1 - 1e-3)) return "one moment of inertia is larger than the sum of the two others";
   return "";
+}
+
+std::string in_words(const Vec3& size) {
+  const auto rounded = [](double v) { return shown(std::round(v * 1000) / 1000); };
+  return rounded(size.x()) + " x " + rounded(size.y()) + " x " + rounded(size.z()) + " m";
 }
 
 // The inertia of a box around the collisions, or of 0.1 m where there are none.
@@ -92,20 +105,18 @@ Inertial read_inertial(const Element& element, const Link& link, const Pose& X_L
   if (automatic && (*automatic == "true" || *automatic == "1")) {
     Vec3 size;
     inertial.inertia = box_inertia(inertial.mass, link, size);
-    context.findings.repaired(element.source, where, "auto=\"true\" is not computed from the shapes; the inertia is that of a box of " +
-                                                         shown(size.x()) + " x " + shown(size.y()) + " x " + shown(size.z()) + " m");
+    context.findings.repaired(element.source, where, "auto=\"true\" is not computed from the shapes; the inertia is that of a box of " + in_words(size));
     return inertial;
   }
   if (const Element* i = element.child("inertia")) {
     report_other_children(*i, {"ixx", "iyy", "izz", "ixy", "ixz", "iyz"}, {}, where, context.findings);
-    const double ixx = i->number("ixx", 1), iyy = i->number("iyy", 1), izz = i->number("izz", 1);
-    const double ixy = i->number("ixy", 0), ixz = i->number("ixz", 0), iyz = i->number("iyz", 0);
+    const double ixx = moment(*i, "ixx", 1), iyy = moment(*i, "iyy", 1), izz = moment(*i, "izz", 1);
+    const double ixy = moment(*i, "ixy", 0), ixz = moment(*i, "ixz", 0), iyz = moment(*i, "iyz", 0);
     inertial.inertia << ixx, ixy, ixz, ixy, iyy, iyz, ixz, iyz, izz;
     if (const std::string fault = inertia_fault(inertial); !fault.empty()) {
       Vec3 size;
       inertial.inertia = box_inertia(inertial.mass, link, size);
-      context.findings.repaired(i->source, where, fault + "; the inertia of a box of " + shown(size.x()) + " x " + shown(size.y()) +
-                                                      " x " + shown(size.z()) + " m is taken instead");
+      context.findings.repaired(i->source, where, fault + "; the inertia of a box of " + in_words(size) + " is taken instead");
     }
   }
   return inertial;

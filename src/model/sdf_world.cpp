@@ -50,6 +50,8 @@ void read_scene(const Element& scene, Sky& sky, Findings& findings) {
   sky.shadows = scene.boolean("shadows", true);
 }
 
+bool is_robot(const std::shared_ptr<const Model>& model) { return ModelInstance{"", {}, model}.is_robot(); }
+
 void add_child(Element& parent, const char* name, const std::string& text) {
   auto child = std::make_unique<Element>();
   child->name = name;
@@ -190,6 +192,12 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
         node.name = included->name;
       }
       if (!node.scope) continue;
+      if (frames.has(node.name) && !is_robot(node.scope->model)) {
+        std::string name;
+        for (int number = 2; frames.has(name = node.name + "_" + std::to_string(number)); ++number) {}
+        findings.error(child->source, "model " + node.name, "a second thing of the name '" + node.name + "'; this one is called '" + name + "'");
+        node.name = name;
+      }
       if (placed.size() >= kMaxModels) child->fail("the world has more than " + std::to_string(kMaxModels) + " models");
       node.pose = node.scope->pose;
       node.relative_to = node.scope->relative_to;
