@@ -10,6 +10,7 @@ struct RayMesh::Query : EmbreeContext {
   const double* t_max = nullptr;
   Packet packet;
   const Vec3* counting_from = nullptr;    // not null: count signed crossings instead
+  Shear shear;
   int crossings = 0;
 
   // Keeps the nearer hit; of equals the lower triangle.
@@ -76,7 +77,7 @@ void RayMesh::intersect_pair(const RTCIntersectFunctionNArguments* arguments) {
   const RayMesh& mesh = *query.mesh;
   const unsigned lanes = lanes_of(*arguments);
   for (int i = mesh.pairs_[arguments->primID]; i < mesh.pairs_[arguments->primID + 1]; ++i) {
-    if (query.counting_from) query.crossings += mesh.crossing(i, *query.counting_from, way_out());
+    if (query.counting_from) query.crossings += mesh.crossing(i, *query.counting_from, query.shear);
     else mesh.test(i, lanes, *query.rays, [&](int lane, double t) { query.offer(lane, t, i); });
   }
   if (query.counting_from) return;
@@ -104,18 +105,17 @@ void RayMesh::intersect(unsigned lanes, const FrameRays& rays, const double* t_m
     test(i, lanes, rays, [&](int lane, double t) { query.offer(lane, t, i); });
 }
 
-int RayMesh::crossing(int triangle, const Vec3& o, const Vec3& d) const {
-  const Seen s = seen(triangle, o);
-  const auto sign = [&](const Vec3& plane) {
-    const double side = d.dot(plane);
-    const double first = side != 0.0 ? side : plane.x() != 0.0 ? plane.x() : plane.y() != 0.0 ? plane.y() : plane.z();
+int RayMesh::crossing(int triangle, const Vec3& o, const Shear& shear) const {
+  const Seen s = seen(triangle, o, shear);
+  const auto sign = [](double edge, double dy, double dx) {    // a tie is broken as if the ray were moved by (e, e^2)
+    const double first = edge != 0.0 ? edge : dy != 0.0 ? dy : dx;
     return (first > 0.0) - (first < 0.0);
   };
-  const int u = sign(s.u), v = sign(s.v), w = sign(s.w);
-  if (u == 0 || u != v || u != w) return 0;
-  const Vec3 area = (s.b - s.a).cross(s.c - s.a);
-  if (area.dot(d) == 0.0 || !(distance(s, area, d) > 0.0)) return 0;
-  return u;    // all planes see the ray on their right: it leaves
+  const int u = sign(s.u, s.cy - s.by, s.bx - s.cx);
+  const int v = sign(s.v, s.ay - s.cy, s.cx - s.ax);
+  const int w = sign(s.w, s.by - s.ay, s.ax - s.bx);
+  if (u == 0 || u != v || u != w || s.u + s.v + s.w == 0.0 || !(s.t(shear) > 0.0)) return 0;
+  return -u;    // positive when seen from the front: the ray enters
 }
 
 const Vec3& RayMesh::way_out() {
@@ -128,12 +128,13 @@ bool RayMesh::inside(const Vec3& point) const {
   Query query;
   query.mesh = this;
   query.counting_from = &point;
+  query.shear = Shear(way_out());
   if (scene_) {
     init_context(query);
     query.packet.add(0, point, way_out(), 0.0, kNoHit);
     query.packet.cast(scene_.get(), query);
   } else {
-    for (int i = 0; i < static_cast<int>(size()); ++i) query.crossings += crossing(i, point, way_out());
+    for (int i = 0; i < static_cast<int>(size()); ++i) query.crossings += crossing(i, point, query.shear);
   }
   return query.crossings != 0;
 }

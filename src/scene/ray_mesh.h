@@ -1,8 +1,7 @@
 // A triangle mesh for rays: a watertight test in double precision, and an Embree tree over the triangles.
 //
-// The test takes the sign of d . (p x q) for each edge pq seen from the ray's origin (Pluecker coordinates, as in
-// Davidovic et al., "3D rasterization", SCCG 2012). In the two triangles that share an edge it is the same
-// number but for its sign, bit by bit, so no ray slips through between them.
+// The test is that of Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2013: corners are taken into
+// a plane across the ray, the same in all triangles, so no ray slips through at an edge or a corner.
 #pragma once
 
 #include <array>
@@ -16,9 +15,27 @@
 
 namespace ruedo::scene {
 
-// Eight rays in some frame.
+// How a ray sees the world: sheared so that it points along one axis.
+struct Shear {
+  int kx, ky, kz;
+  double sx, sy, sz;
+
+  Shear() = default;
+  explicit Shear(const Vec3& d) {
+    d.cwiseAbs().maxCoeff(&kz);
+    kx = kz == 2 ? 0 : kz + 1;
+    ky = kx == 2 ? 0 : kx + 1;
+    if (d[kz] < 0.0) std::swap(kx, ky);    // keeps the winding
+    sz = 1.0 / d[kz];
+    sx = d[kx] * sz;
+    sy = d[ky] * sz;
+  }
+};
+
+// Eight rays in some frame; the shears are for meshes only.
 struct FrameRays {
   Vec3 o[kLanes], d[kLanes];
+  Shear shear[kLanes];
 };
 
 class RayMesh {
@@ -40,8 +57,8 @@ class RayMesh {
   template <class Found>
   void test(int triangle, unsigned lanes, const FrameRays& rays, Found found) const;
   // +1 where the ray leaves through the triangle, -1 where it enters, 0 where it misses. A ray through an edge or
-  // corner is turned aside by less than any number, the same way for all triangles: each crossing counts once.
-  int crossing(int triangle, const Vec3& o, const Vec3& d) const;
+  // corner is moved aside by less than any number, the same way for all triangles: each crossing counts once.
+  int crossing(int triangle, const Vec3& o, const Shear& shear) const;
   static const Vec3& way_out();    // direction in which inside() counts
 
   Vec3 normal(int triangle) const;    // unit, by the winding
@@ -56,16 +73,28 @@ class RayMesh {
 
  private:
   struct Query;
-  // A triangle seen from a point: the planes through the point and each edge.
+  // A triangle as a ray sees it: corners across and along the ray, and the edge functions.
   struct Seen {
-    Vec3 a, b, c, u, v, w;
-    Seen() = default;
-    Seen(const Vec3& a0, const Vec3& b0, const Vec3& c0, const Vec3& o)
-        : a(a0 - o), b(b0 - o), c(c0 - o), u(b.cross(c)), v(c.cross(a)), w(a.cross(b)) {}
+    double ax, ay, az, bx, by, bz, cx, cy, cz, u, v, w;
+    Seen(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& o, const Shear& s) {
+      const auto see = [&](const Vec3& p, double& x, double& y, double& z) {
+        z = p[s.kz] - o[s.kz];
+        x = (p[s.kx] - o[s.kx]) - s.sx * z;
+        y = (p[s.ky] - o[s.ky]) - s.sy * z;
+      };
+      see(a, ax, ay, az);
+      see(b, bx, by, bz);
+      see(c, cx, cy, cz);
+      u = cx * by - cy * bx;
+      v = ax * cy - ay * cx;
+      w = bx * ay - by * ax;
+    }
+    double t(const Shear& s) const { return s.sz * ((u * az + v * bz + w * cz) / (u + v + w)); }
   };
   const Vec3& corner(int triangle, int i) const { return positions_[triangles_[static_cast<size_t>(triangle)][static_cast<size_t>(i)]]; }
-  Seen seen(int triangle, const Vec3& o) const { return {corner(triangle, 0), corner(triangle, 1), corner(triangle, 2), o}; }
-  static double distance(const Seen& seen, const Vec3& area, const Vec3& d);
+  Seen seen(int triangle, const Vec3& o, const Shear& shear) const {
+    return {corner(triangle, 0), corner(triangle, 1), corner(triangle, 2), o, shear};
+  }
   static void bounds(const RTCBoundsFunctionArguments* arguments);
   static void intersect_pair(const RTCIntersectFunctionNArguments* arguments);
 
@@ -78,29 +107,14 @@ class RayMesh {
   ScenePtr scene_;
 };
 
-// Along the ray to the triangle's plane, but within the triangle: edge on, the plane says nothing.
-inline double RayMesh::distance(const Seen& seen, const Vec3& area, const Vec3& d) {
-  const double a = seen.a.dot(d), b = seen.b.dot(d), c = seen.c.dot(d);
-  const double t = area.dot(seen.a) / area.dot(d);
-  return std::clamp(t, std::min({a, b, c}), std::max({a, b, c}));
-}
-
 template <class Found>
-void RayMesh::test(int triangle, unsigned lanes, const FrameRays& rays, Found found) const {
-  Seen seen_from;
-  const Vec3* from = nullptr;    // rays of one device start in one point
+inline void RayMesh::test(int triangle, unsigned lanes, const FrameRays& rays, Found found) const {
   for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
     const int lane = std::countr_zero(rest);
-    const Vec3 &o = rays.o[lane], &d = rays.d[lane];
-    if (!from || *from != o) {
-      seen_from = seen(triangle, o);
-      from = &o;
-    }
-    const double u = d.dot(seen_from.u), v = d.dot(seen_from.v), w = d.dot(seen_from.w);
-    if ((u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0)) continue;
-    const Vec3 area = (corner(triangle, 1) - corner(triangle, 0)).cross(corner(triangle, 2) - corner(triangle, 0));
-    if (area.dot(d) == 0.0) continue;    // edge on, or no area
-    const double t = distance(seen_from, area, d);
+    const Seen s = seen(triangle, rays.o[lane], rays.shear[lane]);
+    if ((s.u < 0.0 || s.v < 0.0 || s.w < 0.0) && (s.u > 0.0 || s.v > 0.0 || s.w > 0.0)) continue;
+    if (s.u + s.v + s.w == 0.0) continue;    // edge on, or no area
+    const double t = s.t(rays.shear[lane]);
     if (t >= 0.0) found(lane, t);
   }
 }

@@ -138,6 +138,7 @@ void EmbreeRayScene::cast(std::span<const Ray> rays, std::span<Hit> hits, int ig
       if (!usable(ray)) continue;
       batch.world.o[lane] = ray.origin;
       batch.world.d[lane] = ray.direction;
+      if (statics_->has_meshes()) batch.world.shear[lane] = Shear(ray.direction);
       batch.t[lane] = ray.max_range;
       lanes |= 1u << lane;
     }

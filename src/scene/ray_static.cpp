@@ -27,6 +27,7 @@ StaticRayScene::StaticRayScene(const model::WorldModel& world, const model::Body
       boxes.push_back(s.box_F);
     }
   }
+  has_meshes_ = !meshes.empty();
   tree_.build(device(), std::move(boxes), test_primitive, false, meshes);
   closed_tree_.build(device(), std::move(closed_boxes), test_closed, false);
 }

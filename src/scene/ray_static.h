@@ -14,6 +14,7 @@ struct TreeQuery : EmbreeContext {
   const void* owner = nullptr;            // for the callback
   const RayMesh* counting = nullptr;      // not null: count the signed crossings of this mesh instead
   Vec3 counting_from = Vec3::Zero();
+  Shear shear;                            // of the way out
   int crossings = 0;
 
   TreeQuery() { init_context(*this); }
@@ -71,6 +72,7 @@ class StaticRayScene {
  public:
   const RayTable table;
   RTCDevice device() const { return device_.get(); }
+  bool has_meshes() const { return has_meshes_; }    // rays in the world's frame need their shear
   // Static shapes, for the lanes (bits) of query.batch.
   void cast(unsigned lanes, TreeQuery& query) const;
 
@@ -82,6 +84,7 @@ class StaticRayScene {
 
   std::vector<int> unbounded_, bounded_, closed_;    // indices into table.shapes
   RayTree tree_, closed_tree_;
+  bool has_meshes_ = false;
 };
 
 // Is there a ray at all? Others hit nothing.

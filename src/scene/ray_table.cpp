@@ -166,6 +166,7 @@ void test_mesh(const RayShape& shape, int index, const IntoShape& into, unsigned
     local.d[lane] = into.vector(rays.d[lane]);
     if (batch.inside_mesh(shape, index, rays.o[lane], local.o[lane])) batch.offer(lane, {0.0, kInside}, index);
     else outside |= 1u << lane;
+    local.shear[lane] = Shear(local.d[lane]);
   }
   ShapeHit hits[kLanes];
   shape.mesh->intersect(outside, local, batch.t, hits);

@@ -74,7 +74,7 @@ void RayTree::test_pair(const RTCIntersectFunctionNArguments* arguments) {
   if (query.counting && query.counting != &mesh) return;
   const unsigned lanes = lanes_of(*arguments);
   for (int i = mesh.pairs()[arguments->primID]; i < mesh.pairs()[arguments->primID + 1]; ++i) {
-    if (query.counting) query.crossings += mesh.crossing(i, query.counting_from, RayMesh::way_out());
+    if (query.counting) query.crossings += mesh.crossing(i, query.counting_from, query.shear);
     else mesh.test(i, lanes, batch.world, [&](int lane, double t) { batch.offer(lane, {t, i}, part.index); });
   }
   if (query.counting) return;
@@ -99,6 +99,7 @@ bool RayTree::inside(const RayMesh& mesh, const Vec3& point) const {
   TreeQuery query;
   query.counting = &mesh;
   query.counting_from = point;
+  query.shear = Shear(RayMesh::way_out());
   const double height = mesh.box().upper.z() - point.z();
   query.packet.add(0, point, RayMesh::way_out(), 0.0, height / RayMesh::way_out().z());
   query.packet.cast(scene_.get(), query);
