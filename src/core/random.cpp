@@ -42,9 +42,11 @@ double natural_log(double x) {
   return e * 6.93147180369123816490e-01 + (2.0 * s + (2.0 * s * s2 * tail + e * 1.90821492927058770002e-10));
 }
 
-// Polynomials of degree 7, the coefficients from the lowest power up.
+// Polynomials of degree 7, the coefficients from the lowest power up. By halves (Estrin): the products do not wait
+// for each other as in Horner's scheme.
 double polynomial(const double (&c)[8], double r) {
-  return ((((((c[7] * r + c[6]) * r + c[5]) * r + c[4]) * r + c[3]) * r + c[2]) * r + c[1]) * r + c[0];
+  const double r2 = r * r;
+  return ((c[0] + c[1] * r) + (c[2] + c[3] * r) * r2) + ((c[4] + c[5] * r) + (c[6] + c[7] * r) * r2) * (r2 * r2);
 }
 
 // AS 241's PPND16: centre, near tails, far tails.
