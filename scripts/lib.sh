@@ -150,6 +150,13 @@ build() {
   fi || fail "$EXIT_BUILD" "the build failed; the lines above say where"
 }
 
+# Makes "import ruedo" of the virtual environment find the Python client that the release build made.
+ensure_python_client() {
+  local packages
+  packages=$("$ruedo_venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
+  [[ $(cat "$packages/ruedo-build.pth" 2>/dev/null) == "$ruedo_build/python" ]] || echo "$ruedo_build/python" >"$packages/ruedo-build.pth"
+}
+
 # LCM's default multicast group has to be routed somewhere: most machines route it with everything else.
 has_multicast_route() {
   "$ruedo_venv/bin/python" -c '
