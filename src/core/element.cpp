@@ -26,8 +26,9 @@ std::string in_lower_case(std::string_view text) {
   return lower;
 }
 
-// A number in words: 0.5, not 0.500000.
+// A number in words: 0.5, not 0.500000; 1000000000, not 1e+09.
 std::string shown(double value) {
+  if (value == std::floor(value) && std::abs(value) < 1e15) return std::to_string(static_cast<int64_t>(value));
   char buffer[32];
   const auto result = std::to_chars(buffer, buffer + sizeof buffer, value);
   return {buffer, result.ptr};

@@ -84,14 +84,14 @@ TEST(MotionStatus, AtItsRateAndAtOnceWhenItChanges) {
   EXPECT_EQ(messages[1].utime, 20'000);
   EXPECT_EQ(messages[1].id, 42);
   EXPECT_EQ(messages[1].kind, 1);
-  EXPECT_EQ(messages[1].state, motion_status_t::STATE_RUNNING);
+  EXPECT_EQ(messages[1].state, +motion_status_t::STATE_RUNNING);
   EXPECT_EQ(messages[1].done, 0.25);
   EXPECT_EQ(messages[1].remaining, 0.75);
   EXPECT_EQ(messages[1].v, 0.5);
   EXPECT_EQ(messages[1].omega, 0.1);
   EXPECT_EQ(messages[2].utime, 30'000);
   EXPECT_EQ(messages[3].utime, 35'000);
-  EXPECT_EQ(messages[3].state, motion_status_t::STATE_DONE);
+  EXPECT_EQ(messages[3].state, +motion_status_t::STATE_DONE);
   EXPECT_EQ(out.entries()[1].step, 4);
 }
 
