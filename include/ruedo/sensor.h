@@ -97,6 +97,8 @@ class Sensor {
   virtual void observe(const Snapshot&, Outbox&) {}
   virtual bool observes() const { return false; }
   virtual void sample(const SampleInput& input, Outbox& out) = 0;
+  // True: SampleInput::rays is the scene of the visuals, for a kind that has it from the file.
+  virtual bool wants_visual_rays() const { return false; }
   // Fills in what ruedo/info says of the device; robot, name, kind, rate and pose are filled in already.
   virtual void describe(device_info_t&) const {}
 };

@@ -122,6 +122,7 @@ class FleetMaker {
       const size_t first = wanted.size() * i / threads, last = wanted.size() * (i + 1) / threads;
       ModuleSetup module = setup.without_devices();
       for (size_t k = first; k < last; ++k) module.devices.push_back(make_device(wanted[k]));
+      for (const Device& device : module.devices) module.wants_visual_rays |= device.visual_rays;
       fleet_.modules.push_back(std::move(module));
     }
   }
@@ -151,6 +152,7 @@ class FleetMaker {
       return channels_.add({robot + "/" + device, "", robot, wanted.name, type, fingerprint, wanted.rate, false});
     };
     Device device{wanted.kind->make(setup), wanted.rate, static_cast<int64_t>(phase_s * 1e6 + 0.5), wanted.kind->needs_visual_rays};
+    device.visual_rays |= device.sensor->wants_visual_rays();
     describe(wanted, *device.sensor);
     return device;
   }

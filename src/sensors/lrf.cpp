@@ -1,0 +1,275 @@
+// A laser range finder, flat (planar_lidar_t) or of several layers (lidar_t), on ROBOT/LRF. docs/world-files.md lists
+// its elements.
+//
+// Model: each ray has its own exact range from the collision shapes. A surface with laser reflectance rho, of which the
+// part m leaves as from a mirror, returns the intensity m_way rho (1 - m) cos(incidence), m_way being the loss at mirrors
+// passed before, there and back; below kFaintest nothing comes back and the mirrored part, if any, goes on. Noise is
+// drawn for every ray, so that what one ray meets changes no other's noise; then follow the resolution and the limits.
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "ruedo/device_info_t.hpp"
+#include "ruedo/lidar_t.hpp"
+#include "ruedo/planar_lidar_t.hpp"
+#include "sensors/noise.h"
+#include "sensors/ray_device.h"
+
+namespace ruedo {
+namespace {
+
+using scene::Hit;
+using scene::Ray;
+
+constexpr double kFaintest = 0.02;     // part of the light; less is not seen
+constexpr int kMirrors = 4;            // that a ray follows, one after another
+constexpr int64_t kMaxRays = 1'000'000;
+
+// One of SDF's <horizontal> and <vertical>: evenly spaced angles, the ends included.
+struct Sweep {
+  int64_t count = 1;
+  double first = 0.0, step = 0.0;    // rad
+
+  Sweep() = default;
+  // limit_rad: of the angles; whole_rad: of their span.
+  Sweep(const Element& e, int64_t samples_if_absent, double limit_rad, double whole_rad) {
+    const int64_t samples = e.integer("samples", samples_if_absent, Allowed::between(1, static_cast<double>(kMaxRays)));
+    const double resolution = e.number("resolution", 1.0, Allowed::positive());
+    const double rays = std::round(static_cast<double>(samples) * resolution);
+    if (rays < 1.0 || rays > static_cast<double>(kMaxRays)) {
+      e.fail("<samples> times <resolution> is " + std::to_string(rays) + " rays; allowed: 1 to " + std::to_string(kMaxRays));
+    }
+    count = static_cast<int64_t>(rays);
+    const double low = e.number("min_angle", 0.0, Allowed::between(-limit_rad, limit_rad));
+    const double high = e.number("max_angle", 0.0, Allowed::between(-limit_rad, limit_rad));
+    if (high < low) e.fail("<max_angle> " + std::to_string(high) + " is below <min_angle> " + std::to_string(low));
+    if (high - low > whole_rad + 1e-3) e.fail("from <min_angle> to <max_angle> is more than a full turn");
+    if (count == 1) {
+      first = 0.5 * (low + high);    // a lone ray looks along the middle
+    } else {
+      first = low;
+      step = (high - low) / static_cast<double>(count - 1);
+    }
+  }
+  double angle(int64_t i) const { return first + static_cast<double>(i) * step; }
+};
+
+class Lrf : public Sensor {
+ public:
+  explicit Lrf(const SensorSetup& setup) : mount_(setup), random_(setup.random) {
+    const Element& e = setup.element;
+    e.refuse_unknown({"ruedo:own_link", "ruedo:hits", "ruedo:intensities", "ruedo:sweep_time", "ruedo:bearing_noise", "ruedo:phase"});
+    const Element* laser = e.child("lidar") ? e.child("lidar") : e.child("ray");
+    if (!laser) e.fail("a laser range finder needs a <lidar> (or <ray>) with <scan> and <range>");
+    const Element* horizontal = laser->child("scan/horizontal");
+    if (!horizontal) laser->fail("needs <scan><horizontal>");
+    columns_ = Sweep(*horizontal, 640, 2.0 * M_PI + 1e-3, 2.0 * M_PI);
+    if (const Element* vertical = laser->child("scan/vertical")) layers_ = Sweep(*vertical, 1, M_PI / 2 + 1e-3, M_PI);
+    if (columns_.count * layers_.count > kMaxRays) {
+      laser->fail(std::to_string(layers_.count) + " layers of " + std::to_string(columns_.count) + " rays; allowed: " +
+                  std::to_string(kMaxRays) + " rays in all");
+    }
+    read_range(*laser);
+    ignored_link_ = e.boolean("ruedo:own_link", false) ? -1 : setup.link;
+    visuals_ = e.choice("ruedo:hits", "collisions", {"collisions", "visuals"}) == "visuals";
+    intensities_ = e.boolean("ruedo:intensities", true);
+    sweep_us_ = std::llround(1e6 * e.number("ruedo:sweep_time", 0.0, Allowed::between(0.0, 60.0)));
+    bearing_noise_ = e.number("ruedo:bearing_noise", 0.0, Allowed::not_negative());
+    noise_ = Noise(laser->child("noise"));
+    RandomStream constants = random_.stream(kConstantDraws);
+    noise_.draw_bias(constants);
+    if (!setup.noise) {    // the ideal value
+      noise_ = Noise();
+      bearing_noise_ = resolution_ = 0.0;
+    }
+    prepare(setup);
+  }
+
+  bool wants_visual_rays() const override { return visuals_; }
+
+  // The way that the device took during the sweep.
+  bool observes() const override { return sweep_us_ > 0; }
+  void observe(const Snapshot& now, Outbox&) override {
+    track_.push_back({now.time, mount_.X_WS(now)});
+    while (track_.size() > 2 && track_[1].time <= now.time - sweep_us_) track_.erase(track_.begin());
+  }
+
+  void sample(const SampleInput& input, Outbox& out) override {
+    RandomStream stream = random_.stream(static_cast<uint64_t>(input.sample));
+    aim(input.snapshot, stream);
+    input.rays->cast(rays_, hits_, ignored_link_);
+    const double dt_s = sampled_ ? 1e-6 * static_cast<double>(input.snapshot.time - sample_time_) : 0.0;
+    sampled_ = true;
+    sample_time_ = input.snapshot.time;
+    for (size_t i = 0; i < rays_.size(); ++i) {
+      const Return back = returned(*input.rays, rays_[i], hits_[i]);
+      const double measured = noise_.apply(back.range, i == 0 ? dt_s : 0.0, stream);
+      ranges()[i] = report(back.range, measured);
+      if (intensities_) brightness()[i] = std::isfinite(ranges()[i]) ? static_cast<float>(back.intensity) : 0.0f;
+    }
+    if (flat()) {
+      planar_.utime = input.snapshot.time;
+      out.publish(channel_, planar_);
+    } else {
+      layered_.utime = input.snapshot.time;
+      out.publish(channel_, layered_);
+    }
+  }
+
+  void describe(device_info_t& info) const override {
+    info.range_min = min_;
+    info.range_max = max_;
+    info.fov_horizontal = columns_.step * static_cast<double>(columns_.count - 1);
+    info.fov_vertical = layers_.step * static_cast<double>(layers_.count - 1);
+    info.width = static_cast<int32_t>(columns_.count);
+    info.height = static_cast<int32_t>(layers_.count);
+  }
+
+ private:
+  struct Return {
+    double range = std::numeric_limits<double>::infinity();    // m, along the ray's way
+    double intensity = 0.0;                                     // 0 to 1
+  };
+  struct Place {
+    SimTime time;
+    Pose X_WS;
+  };
+
+  bool flat() const { return layers_.count == 1; }
+  std::vector<float>& ranges() { return flat() ? planar_.ranges : layered_.ranges; }
+  std::vector<float>& brightness() { return flat() ? planar_.intensities : layered_.intensities; }
+
+  void read_range(const Element& laser) {
+    const Element* range = laser.child("range");
+    if (!range || !range->has("max")) laser.fail("needs <range> with <max>, the largest range in m");
+    min_ = range->number("min", 0.0, Allowed::not_negative());
+    max_ = range->number("max", 0.0, Allowed::positive());
+    if (max_ <= min_) range->fail("<max> " + std::to_string(max_) + " must be above <min> " + std::to_string(min_));
+    resolution_ = range->number("resolution", 0.0, Allowed::not_negative());
+  }
+
+  // Directions in the device's frame, and messages of their final size: nothing grows later.
+  void prepare(const SensorSetup& setup) {
+    for (int64_t layer = 0; layer < layers_.count; ++layer)
+      for (int64_t column = 0; column < columns_.count; ++column) directions_.push_back(direction(layer, columns_.angle(column)));
+    const size_t n = directions_.size();
+    rays_.resize(n);
+    hits_.resize(n);
+    for (Ray& ray : rays_) ray.max_range = max_;
+    ranges().resize(n);
+    if (intensities_) brightness().resize(n);
+    const auto n32 = static_cast<int32_t>(n);
+    if (flat()) {
+      channel_ = setup.channel<planar_lidar_t>();
+      planar_.nranges = n32;
+      planar_.nintensities = intensities_ ? n32 : 0;
+      planar_.rad0 = static_cast<float>(columns_.first);
+      planar_.radstep = static_cast<float>(columns_.step);
+    } else {
+      channel_ = setup.channel<lidar_t>();
+      layered_.nlayers = static_cast<int32_t>(layers_.count);
+      layered_.ncolumns = static_cast<int32_t>(columns_.count);
+      layered_.nranges = n32;
+      layered_.nintensities = intensities_ ? n32 : 0;
+      layered_.azimuth0 = static_cast<float>(columns_.first);
+      layered_.azimuth_step = static_cast<float>(columns_.step);
+      layered_.elevation0 = static_cast<float>(layers_.first);
+      layered_.elevation_step = static_cast<float>(layers_.step);
+    }
+  }
+
+  Vec3 direction(int64_t layer, double azimuth) const {
+    const double elevation = layers_.angle(layer);
+    return {std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth), std::sin(elevation)};
+  }
+
+  // Puts the rays into the world. All layers of a column are taken at once.
+  void aim(const Snapshot& now, RandomStream& stream) {
+    Pose X_WS = mount_.X_WS(now);
+    Eigen::Matrix3d R_WS = X_WS.rotation.toRotationMatrix();
+    for (size_t i = 0; i < rays_.size(); ++i) {
+      const auto column = static_cast<int64_t>(i) % columns_.count, layer = static_cast<int64_t>(i) / columns_.count;
+      if (sweep_us_ > 0 && columns_.count > 1) {
+        X_WS = place(now.time - sweep_us_ * (columns_.count - 1 - column) / (columns_.count - 1));
+        R_WS = X_WS.rotation.toRotationMatrix();
+      }
+      rays_[i].origin = X_WS.translation;
+      if (bearing_noise_ > 0.0) {
+        rays_[i].direction = R_WS * direction(layer, columns_.angle(column) + bearing_noise_ * stream.gaussian());
+      } else {
+        rays_[i].direction = R_WS * directions_[i];
+      }
+    }
+  }
+
+  // Where the device was, between two steps on the straight way; before the start it stood still.
+  Pose place(SimTime time) const {
+    if (time <= track_.front().time) return track_.front().X_WS;
+    size_t after = track_.size() - 1;
+    while (after > 0 && track_[after - 1].time >= time) --after;
+    const Place& b = track_[after];
+    if (after == 0 || b.time == time) return b.X_WS;
+    const Place& a = track_[after - 1];
+    const double part = static_cast<double>(time - a.time) / static_cast<double>(b.time - a.time);
+    return {a.X_WS.rotation.slerp(part, b.X_WS.rotation), (1.0 - part) * a.X_WS.translation + part * b.X_WS.translation};
+  }
+
+  Return returned(const scene::RayScene& scene, const Ray& first, const Hit& first_hit) const {
+    Ray ray = first;
+    Hit hit = first_hit;
+    double way = 0.0, mirrored = 1.0;
+    for (int mirrors = 0; hit.hit(); ++mirrors) {
+      way += hit.range;
+      const model::Surface& surface = mount_.surface(hit, visuals_);
+      const double part = mirrored * surface.laser_reflectance * (1.0 - surface.laser_mirror);
+      if (part >= kFaintest) return {way, part * std::abs(hit.normal.dot(ray.direction))};
+      mirrored *= surface.laser_mirror * surface.laser_mirror;
+      if (mirrored < kFaintest || mirrors == kMirrors || hit.range == 0.0) break;
+      ray.origin += hit.range * ray.direction + 1e-9 * hit.normal;    // off the mirror, or it would be met again
+      ray.direction -= 2.0 * ray.direction.dot(hit.normal) * hit.normal;
+      ray.max_range = max_ - way;
+      hit = scene.cast(ray, ignored_link_);
+    }
+    return {};
+  }
+
+  float report(double ideal, double measured) const {
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    if (ideal == std::numeric_limits<double>::infinity()) return kInfinity;
+    if (resolution_ > 0.0) measured = std::round(measured / resolution_) * resolution_;
+    if (ideal < min_ || measured < min_) return -kInfinity;
+    return measured > max_ ? kInfinity : static_cast<float>(measured);
+  }
+
+  RayMount mount_;
+  RandomSource random_;
+  Sweep columns_, layers_;
+  double min_ = 0.0, max_ = 0.0, resolution_ = 0.0;    // m
+  double bearing_noise_ = 0.0;                         // rad
+  Noise noise_;
+  int ignored_link_ = -1;
+  bool visuals_ = false, intensities_ = true;
+  int64_t sweep_us_ = 0;
+  int channel_ = -1;
+
+  std::vector<Place> track_;    // over the sweep time
+  SimTime sample_time_ = 0;
+  bool sampled_ = false;
+  std::vector<Vec3> directions_;    // in S, layer by layer
+  std::vector<Ray> rays_;
+  std::vector<Hit> hits_;
+  planar_lidar_t planar_{};
+  lidar_t layered_{};
+};
+
+const RegisterSensor kRegister{{.module = "lrf",
+                                .order = 3,
+                                .types = {"ray", "gpu_ray", "lidar", "gpu_lidar"},
+                                .attach_to = "",
+                                .device_name = "",
+                                .default_rate = {10, 1},
+                                .needs_rays = true,
+                                .make = [](const SensorSetup& setup) { return std::make_unique<Lrf>(setup); }}};
+
+}  // namespace
+}  // namespace ruedo

@@ -1,0 +1,40 @@
+// What sensors that cast rays have in common: where the device is, and what the surfaces that it sees are like.
+#pragma once
+
+#include "model/body_layout.h"
+#include "ruedo/sensor.h"
+#include "scene/ray_scene.h"
+
+namespace ruedo {
+
+// A device's place on its robot.
+class RayMount {
+ public:
+  explicit RayMount(const SensorSetup& setup)
+      : world_(&setup.world), layout_(&setup.layout), link_(setup.link) {
+    const model::LinkPlacement& link = setup.layout.links[static_cast<size_t>(setup.link)];
+    body_ = link.body;
+    X_BS_ = link.X_BL * setup.X_LS;
+  }
+
+  int link() const { return link_; }    // into BodyLayout::links
+  Pose X_WS(const Snapshot& now) const { return body_ < 0 ? X_BS_ : now.bodies[static_cast<size_t>(body_)] * X_BS_; }
+
+  // The surface that a ray struck; visuals have none, they are as if of the default surface.
+  const model::Surface& surface(const scene::Hit& hit, bool visuals = false) const {
+    static const model::Surface kDefault;
+    if (visuals) return kDefault;
+    const model::LinkPlacement& link = layout_->links[static_cast<size_t>(hit.link)];
+    const model::Model& model = *world_->models[static_cast<size_t>(link.instance)].model;
+    return model.links[static_cast<size_t>(link.link)].collisions[static_cast<size_t>(hit.shape)].surface;
+  }
+
+ private:
+  const model::WorldModel* world_;
+  const model::BodyLayout* layout_;
+  int link_ = -1;
+  int body_ = -1;     // into BodyLayout::bodies; -1: does not move, X_BS_ is then X_WS
+  Pose X_BS_;
+};
+
+}  // namespace ruedo

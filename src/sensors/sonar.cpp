@@ -1,0 +1,237 @@
+// An array of sonar transducers, on ROBOT/SONAR-ARRAY. docs/world-files.md lists its elements.
+//
+// Model: a transducer's cone is sampled by rays in a fixed pattern, see cone(). A ray hears an echo where it meets
+// a surface of acoustic reflectance of at least kQuietest, at an incidence of at most the specular angle. The
+// reading is the average of all rays, those without echo counting as the maximum range (Hernandez-Belmonte,
+// Ayala-Ramirez, Sanchez-Yanez, ROSSUM 2011), or the nearest echo, as real sonars give it. It is not below the minimum
+// range, in which a transducer still rings. Noise is added to readings with an echo.
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "ruedo/device_info_t.hpp"
+#include "ruedo/sonar_t.hpp"
+#include "sensors/noise.h"
+#include "sensors/ray_device.h"
+
+namespace ruedo {
+namespace {
+
+using scene::Hit;
+using scene::Ray;
+
+constexpr double kQuietest = 0.05;    // acoustic reflectance; less is not heard
+
+// Directions of n rays in a cone about x, each for an equal part of its solid angle: one along the axis, the
+// others on K rings, K = round((sqrt(1 + 4 (n - 1) / 3) - 1) / 2) but at least 1, with rays in proportion to the rings'
+// numbers, the first ray of odd rings on top, of even ones half a ray further. A ring halves the solid angle of its
+// part of the cone. Full angles in rad; where they differ, the cone is elliptic and the parts are equal for small angles.
+std::vector<Vec3> cone(int64_t n, double horizontal_rad, double vertical_rad) {
+  std::vector<Vec3> directions{Vec3::UnitX()};
+  const int64_t rest = n - 1;
+  const int64_t rings = std::max<int64_t>(1, std::llround((std::sqrt(1.0 + 4.0 * static_cast<double>(rest) / 3.0) - 1.0) / 2.0));
+  int64_t placed = 0;
+  for (int64_t ring = 1; ring <= rings && rest > 0; ++ring) {
+    const int64_t until = rest * ring * (ring + 1) / (rings * (rings + 1));
+    const int64_t on_ring = until - placed;
+    const double part = (1.0 + 0.5 * static_cast<double>(placed + until)) / static_cast<double>(n);    // inside the ring
+    for (int64_t i = 0; i < on_ring; ++i) {
+      const double turn = 2.0 * M_PI * (static_cast<double>(i) + (ring % 2 ? 0.0 : 0.5)) / static_cast<double>(on_ring);
+      const double left = -0.5 * horizontal_rad * std::sin(turn), up = 0.5 * vertical_rad * std::cos(turn);
+      const double edge = std::hypot(left, up);    // rad from the axis to the cone's edge
+      if (edge == 0.0) {
+        directions.push_back(Vec3::UnitX());
+        continue;
+      }
+      const double cosine = 1.0 - part * (1.0 - std::cos(edge)), sine = std::sqrt(1.0 - cosine * cosine);
+      directions.push_back({cosine, sine * left / edge, sine * up / edge});
+    }
+    placed = until;
+  }
+  return directions;
+}
+
+class Sonar : public Sensor {
+ public:
+  explicit Sonar(const SensorSetup& setup) : mount_(setup), random_(setup.random), channel_(setup.channel<sonar_t>()) {
+    static const Element kNothing;
+    const Element& e = setup.element;
+    e.refuse_unknown({"ruedo:sonar", "ruedo:phase"});
+    const Element* sonar = e.child("sonar");
+    if (!sonar) e.fail("needs a <sonar> with <max>, the largest range in m");
+    if (!sonar->has("max")) sonar->fail("needs <max>, the largest range in m");
+    min_ = sonar->number("min", 0.0, Allowed::not_negative());
+    max_ = sonar->number("max", 1.0, Allowed::positive());
+    if (max_ <= min_) sonar->fail("<max> " + std::to_string(max_) + " must be above <min> " + std::to_string(min_));
+    if (sonar->choice("geometry", "cone", {"cone", "sphere"}) == "sphere" && setup.findings) {
+      setup.findings->unsupported(sonar->source, "sensor " + setup.device + "/sonar/geometry", "a sphere is not supported; a cone instead");
+    }
+    const double aperture = 2.0 * std::atan(sonar->number("radius", 0.5, Allowed::not_negative()) / max_);
+    const Element* ours = e.child("ruedo:sonar");
+    configure(ours ? *ours : kNothing, aperture, setup);
+  }
+
+  void sample(const SampleInput& input, Outbox& out) override {
+    const Pose X_WS = mount_.X_WS(input.snapshot);
+    RandomStream stream = random_.stream(static_cast<uint64_t>(input.sample));
+    std::fill(message_.fresh.begin(), message_.fresh.end(), 0);
+    message_.utime = input.snapshot.time;
+    if (all_) {
+      for (const int transducer : order_) fire(transducer, X_WS, input, stream);
+    } else {
+      fire(order_[static_cast<size_t>(input.sample) % order_.size()], X_WS, input, stream);
+    }
+    out.publish(channel_, message_);
+  }
+
+  void describe(device_info_t& info) const override {
+    info.range_min = min_;
+    info.range_max = max_;
+    info.fov_horizontal = horizontal_;
+    info.fov_vertical = vertical_;
+    info.width = info.nelements = static_cast<int32_t>(transducers_.size());
+    info.height = 1;
+    info.element_pose.clear();
+    for (const Transducer& transducer : transducers_) {
+      const Vec3& p = transducer.X_ST.translation;
+      const Eigen::Matrix3d R = transducer.X_ST.rotation.toRotationMatrix();
+      const double pitch = std::atan2(-R(2, 0), std::hypot(R(0, 0), R(1, 0)));
+      info.element_pose.push_back({p.x(), p.y(), p.z(), std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0))});
+    }
+  }
+
+ private:
+  struct Transducer {
+    Pose X_ST;    // x is the axis of the cone
+    Noise noise;
+  };
+
+  void configure(const Element& ours, double aperture, const SensorSetup& setup) {
+    ours.refuse_unknown({"ruedo:transducer", "ruedo:horizontal_aperture", "ruedo:vertical_aperture", "ruedo:rays", "ruedo:reading",
+                         "ruedo:firing", "ruedo:order", "ruedo:specular_angle", "ruedo:cross_talk"});
+    for (const Element* each : ours.all("ruedo:transducer")) transducers_.push_back({each->as_pose(), {}});
+    if (transducers_.empty()) transducers_.emplace_back();
+    const int n = static_cast<int>(transducers_.size());
+
+    const Allowed angle = Allowed::between(0.0, M_PI);
+    horizontal_ = ours.number("ruedo:horizontal_aperture", aperture, angle);
+    vertical_ = ours.number("ruedo:vertical_aperture", aperture, angle);
+    const int64_t rays = ours.integer("ruedo:rays", 9, Allowed::between(1, 10000));
+    const std::vector<Vec3> directions = cone(rays, horizontal_, vertical_);
+    for (const Transducer& transducer : transducers_)
+      for (const Vec3& direction : directions) directions_.push_back(transducer.X_ST.rotation * direction);
+    rays_.resize(directions.size());
+    hits_.resize(directions.size());
+    for (Ray& ray : rays_) ray.max_range = max_;
+
+    nearest_ = ours.choice("ruedo:reading", "average", {"average", "nearest"}) == "nearest";
+    all_ = ours.choice("ruedo:firing", "sequence", {"sequence", "all"}) == "all";
+    read_order(ours, n);
+    const double specular = ours.number("ruedo:specular_angle", M_PI / 2, Allowed::between(0.0, M_PI / 2 + 1e-6));
+    least_cosine_ = specular >= M_PI / 2 - 1e-9 ? 0.0 : std::cos(specular);
+    cross_talk_ = setup.noise ? ours.number("ruedo:cross_talk", 0.0, Allowed::between(0.0, 1.0)) : 0.0;
+    RandomStream constants = random_.stream(kConstantDraws);
+    for (Transducer& transducer : transducers_) {
+      transducer.noise = Noise(ours.child("noise"));
+      transducer.noise.draw_bias(constants);
+      if (!setup.noise) transducer.noise = Noise();
+    }
+
+    message_.n = n;
+    message_.range.assign(transducers_.size(), static_cast<float>(max_));
+    message_.fired_utime.assign(transducers_.size(), -1);
+    message_.fresh.assign(transducers_.size(), 0);
+  }
+
+  void read_order(const Element& ours, int n) {
+    const Element* order = ours.child("ruedo:order");
+    if (!order) {
+      for (int i = 0; i < n; ++i) order_.push_back(i);
+      return;
+    }
+    std::vector<bool> named(static_cast<size_t>(n), false);
+    for (const double index : order->as_numbers()) {
+      if (index != std::floor(index) || index < 0 || index >= n) {
+        order->fail("'" + order->text + "': allowed are the transducers' numbers, 0 to " + std::to_string(n - 1));
+      }
+      order_.push_back(static_cast<int>(index));
+      named[static_cast<size_t>(index)] = true;
+    }
+    for (int i = 0; i < n; ++i)
+      if (!named[static_cast<size_t>(i)]) order->fail("transducer " + std::to_string(i) + " never fires; name every one of 0 to " + std::to_string(n - 1));
+  }
+
+  void fire(int index, const Pose& X_WS, const SampleInput& input, RandomStream& stream) {
+    const auto i = static_cast<size_t>(index);
+    Transducer& transducer = transducers_[i];
+    const Vec3 origin = X_WS * transducer.X_ST.translation;
+    const Eigen::Matrix3d R_WS = X_WS.rotation.toRotationMatrix();
+    for (size_t k = 0; k < rays_.size(); ++k) {
+      rays_[k].origin = origin;
+      rays_[k].direction = R_WS * directions_[i * rays_.size() + k];
+    }
+    input.rays->cast(rays_, hits_, mount_.link());
+
+    const bool fired = message_.fired_utime[i] >= 0;
+    const double dt_s = fired ? 1e-6 * static_cast<double>(input.snapshot.time - message_.fired_utime[i]) : 0.0;
+    double range = reading();
+    const double measured = transducer.noise.apply(range, dt_s, stream);    // drawn with an echo or without
+    if (range < max_) range = std::clamp(measured, min_, max_);
+    if (cross_talk_ > 0.0) {
+      // The echo of the one that fired before, heard by this one, is taken for its own when it comes first.
+      const bool heard = stream.uniform() < cross_talk_;
+      if (heard && last_fired_ >= 0 && last_fired_ != index) range = std::min(range, static_cast<double>(message_.range[static_cast<size_t>(last_fired_)]));
+    }
+    last_fired_ = index;
+    message_.range[i] = static_cast<float>(range);
+    message_.fired_utime[i] = input.snapshot.time;
+    message_.fresh[i] = 1;
+  }
+
+  // Of the cone's rays, without noise; max_ without an echo.
+  double reading() const {
+    double sum = 0.0, nearest = max_;
+    for (size_t k = 0; k < rays_.size(); ++k) {
+      const double echo = hears(rays_[k], hits_[k]) ? hits_[k].range : max_;
+      sum += echo;
+      nearest = std::min(nearest, echo);
+    }
+    const double range = nearest_ || nearest == max_ ? nearest : sum / static_cast<double>(rays_.size());
+    return std::max(range, min_);
+  }
+
+  bool hears(const Ray& ray, const Hit& hit) const {
+    if (!hit.hit() || mount_.surface(hit).acoustic_reflectance < kQuietest) return false;
+    return least_cosine_ == 0.0 || -hit.normal.dot(ray.direction) >= least_cosine_;
+  }
+
+  RayMount mount_;
+  RandomSource random_;
+  int channel_;
+  double min_ = 0.0, max_ = 0.0;                   // m
+  double horizontal_ = 0.0, vertical_ = 0.0;       // rad
+  std::vector<Transducer> transducers_;
+  std::vector<int> order_;
+  bool nearest_ = false, all_ = false;
+  double least_cosine_ = 0.0;                      // of the incidence that is still heard; 0: every one
+  double cross_talk_ = 0.0;
+
+  std::vector<Vec3> directions_;    // in S, transducer by transducer
+  std::vector<Ray> rays_;           // of one cone
+  std::vector<Hit> hits_;
+  int last_fired_ = -1;
+  sonar_t message_{};
+};
+
+const RegisterSensor kRegister{{.module = "sonar",
+                                .order = 2,
+                                .types = {"sonar"},
+                                .attach_to = "",
+                                .device_name = "",
+                                .default_rate = {25, 1},
+                                .needs_rays = true,
+                                .make = [](const SensorSetup& setup) { return std::make_unique<Sonar>(setup); }}};
+
+}  // namespace
+}  // namespace ruedo
