@@ -6,7 +6,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
-#include <sstream>
+#include <string_view>
 
 #include <tinyxml2.h>
 
@@ -97,6 +97,8 @@ std::unique_ptr<Element> parse_document(const std::string& text, const std::stri
   }
   if (text.find('\0') != std::string::npos) throw InputError({file, 1}, "not a text file: it holds zero bytes");
   if (trimmed(text).empty()) throw InputError({file, 0}, "the file is empty");
+  const std::string_view start = text.rfind("\xEF\xBB\xBF", 0) == 0 ? std::string_view(text).substr(3) : std::string_view(text);
+  if (start[start.find_first_not_of(" \t\r\n\f\v")] != '<') throw InputError({file, 1}, "not XML: the text does not begin with '<'");
   tinyxml2::XMLDocument xml;
   xml.Parse(text.data(), text.size());
   if (xml.Error()) throw InputError({file, xml.ErrorLineNum()}, what_is_wrong(xml));
