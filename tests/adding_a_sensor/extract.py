@@ -1,5 +1,5 @@
 # Takes the files of docs/adding-a-sensor.md out of the page: each code block that follows a "file:" comment.
-#   extract_example.py PAGE FOLDER
+#   extract.py PAGE FOLDER
 import pathlib
 import re
 import sys
