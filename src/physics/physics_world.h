@@ -20,6 +20,8 @@ enum class Support {
   plane        // moves in its plane only (x, y, yaw of the world); no pair with the static planes
 };
 
+// Deterministic: the same calls give the same bits. A step is divided into equal substeps of 5 ms at most, 1 ms where
+// robots have wheels in friction contact.
 class PhysicsWorld {
  public:
   // world and layout must outlive it.
@@ -30,27 +32,50 @@ class PhysicsWorld {
   void step();
 
   // Poses and twists are of the body's frame B, expressed in the world.
-  Pose pose(int body) const;
-  Twist twist(int body) const;
+  const Pose& pose(int body) const;
+  const Twist& twist(int body) const;
   void set_pose(int body, const Pose& X_WB);
   void set_twist(int body, const Twist& twist);
   void set_support(int body, Support support);
 
+  // For the coming step only: the body starts it with `mean`, and where it touches nothing it ends at `X_WB`
+  // exactly. A body with nothing near costs no collision detection and no solver. A kinematic body (a mover) ends
+  // there whatever it touches.
+  void guide(int body, const Twist& mean, const Pose& X_WB);
+  // For the coming step only: the body starts it with `twist`, and Bullet says where it ends.
+  void drive(int body, const Twist& twist);
+  // Acceleration by gravity of one body from now on, m/s^2, world.
+  void set_gravity(int body, const Vec3& gravity);
+
   double mass(int body) const;                  // kg
   Vec3 center_of_mass(int body) const;          // m, world
+  Eigen::Matrix3d inertia(int body) const;      // kg m^2, about the centre of mass, world axes
   // Changes the velocity at once, by an impulse in N s and N m s about the centre of mass, world.
   void apply_impulse(int body, const Vec3& linear, const Vec3& angular);
   // Contacts of that body in the last step; valid until the next. The body is always `a` here.
   std::span<const Contact> contacts(int body) const;
+  // The same and the places where it is about to touch, within 20 mm: these have no force and a negative depth.
+  std::span<const Contact> nearby(int body) const;
+  // True when no other thing is near that the body could touch.
+  bool alone(int body) const;
   void wake(int body);
+  void sleep(int body);                         // at once, with velocity 0; a contact or wake() ends it
   bool sleeping(int body) const;
 
-  // Motors of joints that are not wheels of a kinematic drive; joint as in BodyLayout::joints.
-  double joint_position(int joint) const;
-  double joint_velocity(int joint) const;
-  double joint_effort(int joint) const;
+  // Motors of joints that are not wheels of a drive; joint as in BodyLayout::joints.
+  double joint_position(int joint) const;       // rad or m, not wrapped; 0 at the start
+  double joint_velocity(int joint) const;       // rad/s or m/s
+  double joint_effort(int joint) const;         // N m or N: what its motor gave in the last step
   void drive_joint_velocity(int joint, double rate, double max_effort);    // rad/s or m/s; N m or N
   void apply_joint_effort(int joint, double effort);
+
+  // Wheels that are bodies of their own (the wheels drive); wheel as in BodyLayout::wheels. Positive rolls ahead.
+  double wheel_angle(int wheel) const;          // rad, not wrapped
+  double wheel_rate(int wheel) const;           // rad/s
+  void drive_wheel(int wheel, double rate, double max_torque);
+
+  // Shapes that Bullet can only approximate.
+  const std::vector<Finding>& findings() const;
 
   // Writes poses, twists, accelerations, joints and contacts (not robots and wheels) of the current state.
   void read(Snapshot& snapshot) const;

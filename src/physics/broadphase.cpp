@@ -1,0 +1,149 @@
+// The two trees, and the pairs that overlapping boxes make.
+#include "physics/broadphase.h"
+
+#include <algorithm>
+
+namespace ruedo::physics {
+
+namespace {
+
+constexpr double kSlack_m = 0.05;
+
+btDbvtVolume widened(const btVector3& low, const btVector3& high, double by) {
+  btDbvtVolume volume = btDbvtVolume::FromMM(low, high);
+  volume.Expand({by, by, by});
+  return volume;
+}
+
+// A plane has half a space inside: a box overlaps it when its lowest corner along the normal is below.
+bool reaches_plane(const btDbvtVolume& box, const btCollisionObject& object) {
+  const auto* plane = static_cast<const btStaticPlaneShape*>(object.getCollisionShape());
+  const btVector3 normal = object.getWorldTransform().getBasis() * plane->getPlaneNormal();
+  const btVector3 on_plane = object.getWorldTransform() * (plane->getPlaneNormal() * plane->getPlaneConstant());
+  const btVector3 half = box.Extents();
+  return normal.dot(box.Center() - on_plane) <= normal.absolute().dot(half);
+}
+
+template <class Proxy>
+struct Collect : btDbvt::ICollide {
+  std::vector<Proxy*>& into;
+  explicit Collect(std::vector<Proxy*>& to) : into(to) {}
+  void Process(const btDbvtNode* leaf) override { into.push_back(static_cast<Proxy*>(leaf->data)); }
+};
+
+}  // namespace
+
+Broadphase::~Broadphase() = default;
+
+btBroadphaseProxy* Broadphase::createProxy(const btVector3& low, const btVector3& high, int shape_type, void* object,
+                                           int group, int mask, btDispatcher* dispatcher) {
+  proxies_.push_back(std::make_unique<Proxy>());
+  Proxy& proxy = *proxies_.back();
+  const bool empty = low.x() > high.x();    // of a compound without shapes
+  proxy.m_aabbMin = empty ? btVector3(0, 0, 0) : low;
+  proxy.m_aabbMax = empty ? btVector3(0, 0, 0) : high;
+  proxy.m_clientObject = object;
+  proxy.m_collisionFilterGroup = group;
+  proxy.m_collisionFilterMask = mask;
+  proxy.m_uniqueId = static_cast<int>(proxies_.size());
+  proxy.moves = group != btBroadphaseProxy::StaticFilter;
+  if (btBroadphaseProxy::isInfinite(shape_type)) {
+    planes_.push_back(&proxy);
+    return &proxy;
+  }
+  proxy.leaf = proxy.moves ? moving_.insert(widened(proxy.m_aabbMin, proxy.m_aabbMax, kSlack_m), &proxy)
+                           : fixed_.insert(btDbvtVolume::FromMM(proxy.m_aabbMin, proxy.m_aabbMax), &proxy);
+  if (proxy.moves) find_pairs(proxy, dispatcher);
+  return &proxy;
+}
+
+void Broadphase::destroyProxy(btBroadphaseProxy* base, btDispatcher* dispatcher) {
+  auto* proxy = static_cast<Proxy*>(base);
+  while (!proxy->partners.empty()) remove_pair(*proxy, *proxy->partners.back(), dispatcher);
+  if (proxy->leaf) (proxy->moves ? moving_ : fixed_).remove(proxy->leaf);
+  std::erase(planes_, proxy);
+  std::erase_if(proxies_, [proxy](const auto& owned) { return owned.get() == proxy; });
+}
+
+void Broadphase::setAabb(btBroadphaseProxy* base, const btVector3& low, const btVector3& high, btDispatcher* dispatcher) {
+  auto& proxy = *static_cast<Proxy*>(base);
+  proxy.m_aabbMin = low;
+  proxy.m_aabbMax = high;
+  if (!proxy.moves || proxy.leaf->volume.Contain(btDbvtVolume::FromMM(low, high))) return;
+  btDbvtVolume volume = widened(low, high, kSlack_m);
+  moving_.update(proxy.leaf, volume);
+  find_pairs(proxy, dispatcher);
+}
+
+void Broadphase::refilter(btBroadphaseProxy* base, btDispatcher* dispatcher) {
+  auto& proxy = *static_cast<Proxy*>(base);
+  const auto& object = *static_cast<btCollisionObject*>(proxy.m_clientObject);
+  for (size_t i = proxy.partners.size(); i-- > 0;) {
+    Proxy& partner = *proxy.partners[i];
+    if (!filter_.may_touch(object, *static_cast<btCollisionObject*>(partner.m_clientObject))) {
+      remove_pair(proxy, partner, dispatcher);
+    }
+  }
+  find_pairs(proxy, dispatcher);
+}
+
+bool Broadphase::overlap(const Proxy& a, const Proxy& b) const {
+  if (!b.leaf) return reaches_plane(a.leaf->volume, *static_cast<btCollisionObject*>(b.m_clientObject));
+  return Intersect(a.leaf->volume, b.leaf->volume);
+}
+
+void Broadphase::find_pairs(Proxy& proxy, btDispatcher* dispatcher) {
+  for (size_t i = proxy.partners.size(); i-- > 0;) {
+    Proxy& partner = *proxy.partners[i];
+    if (!overlap(proxy, partner)) remove_pair(proxy, partner, dispatcher);
+  }
+  found_.clear();
+  Collect<Proxy> collect(found_);
+  fixed_.collideTV(fixed_.m_root, proxy.leaf->volume, collect);
+  moving_.collideTV(moving_.m_root, proxy.leaf->volume, collect);
+  for (Proxy* plane : planes_) {
+    if (overlap(proxy, *plane)) found_.push_back(plane);
+  }
+  const auto& object = *static_cast<btCollisionObject*>(proxy.m_clientObject);
+  for (Proxy* other : found_) {
+    if (other == &proxy || std::find(proxy.partners.begin(), proxy.partners.end(), other) != proxy.partners.end()) continue;
+    if (filter_.may_touch(object, *static_cast<btCollisionObject*>(other->m_clientObject))) add_pair(proxy, *other);
+  }
+}
+
+// Only moving bodies keep partners: a wall need not know who is near it.
+void Broadphase::add_pair(Proxy& a, Proxy& b) {
+  pairs_.addOverlappingPair(&a, &b);
+  a.partners.push_back(&b);
+  if (b.moves) b.partners.push_back(&a);
+}
+
+void Broadphase::remove_pair(Proxy& a, Proxy& b, btDispatcher* dispatcher) {
+  pairs_.removeOverlappingPair(&a, &b, dispatcher);
+  std::erase(a.partners, &b);
+  if (b.moves) std::erase(b.partners, &a);
+}
+
+void Broadphase::getAabb(btBroadphaseProxy* proxy, btVector3& low, btVector3& high) const {
+  low = proxy->m_aabbMin;
+  high = proxy->m_aabbMax;
+}
+
+void Broadphase::aabbTest(const btVector3& low, const btVector3& high, btBroadphaseAabbCallback& callback) {
+  for (const auto& proxy : proxies_) {
+    if (TestAabbAgainstAabb2(low, high, proxy->m_aabbMin, proxy->m_aabbMax)) callback.process(proxy.get());
+  }
+}
+
+// Rays are cast by the scene, never here; this only keeps the interface whole.
+void Broadphase::rayTest(const btVector3&, const btVector3&, btBroadphaseRayCallback& callback, const btVector3&,
+                         const btVector3&) {
+  for (const auto& proxy : proxies_) callback.process(proxy.get());
+}
+
+void Broadphase::getBroadphaseAabb(btVector3& low, btVector3& high) const {
+  low = btVector3(-BT_LARGE_FLOAT, -BT_LARGE_FLOAT, -BT_LARGE_FLOAT);
+  high = -low;
+}
+
+}  // namespace ruedo::physics

@@ -1,0 +1,123 @@
+// Manifolds to contacts. The order is by links and then by place, and does not depend on Bullet's.
+#include "physics/contact_book.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "physics/rigid_bodies.h"
+
+namespace ruedo::physics {
+
+namespace {
+
+// The contacts of several substeps are one where they are so near each other.
+constexpr double kSamePlace_m = 5e-3;
+
+int link_of(const ObjectInfo& info, int child) {
+  if (info.body < 0 || child < 0 || static_cast<size_t>(child) >= info.links.size()) {
+    return info.links.empty() ? -1 : info.links.front();
+  }
+  return info.links[static_cast<size_t>(child)];
+}
+
+bool earlier(const Contact& a, const Contact& b) {
+  const auto key = [](const Contact& c) {
+    return std::tuple(c.body_a, c.link_a, c.body_b, c.link_b, c.position.x(), c.position.y(), c.position.z(), c.depth);
+  };
+  return key(a) < key(b);
+}
+
+Contact swapped(const Contact& contact) {
+  Contact other = contact;
+  std::swap(other.link_a, other.link_b);
+  std::swap(other.body_a, other.body_b);
+  other.normal = -contact.normal;
+  return other;
+}
+
+}  // namespace
+
+void ContactBook::ByBody::clear() {
+  for (const Contact& contact : entries_) ranges_[static_cast<size_t>(contact.body_a)] = {0, 0};
+  entries_.clear();
+}
+
+void ContactBook::ByBody::fill(const std::vector<Contact>& contacts) {
+  for (const Contact& contact : contacts) {
+    if (contact.body_a >= 0) entries_.push_back(contact);
+    if (contact.body_b >= 0) entries_.push_back(swapped(contact));
+  }
+  std::sort(entries_.begin(), entries_.end(), earlier);
+  for (size_t i = 0; i < entries_.size(); ++i) {
+    auto& range = ranges_[static_cast<size_t>(entries_[i].body_a)];
+    if (range.second++ == 0) range.first = i;
+  }
+}
+
+void ContactBook::clear(double step_s) {
+  step_s_ = step_s;
+  substeps_ = 0;
+  contacts_.clear();
+  near_only_.clear();
+  touching_.clear();
+  near_.clear();
+}
+
+void ContactBook::add(btDispatcher& dispatcher) {
+  ++substeps_;
+  near_only_.clear();
+  for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
+    const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(m);
+    if (manifold.getNumContacts() == 0) continue;
+    const ObjectInfo& a = info_of(*manifold.getBody0());
+    const ObjectInfo& b = info_of(*manifold.getBody1());
+    for (int p = 0; p < manifold.getNumContacts(); ++p) {
+      const btManifoldPoint& point = manifold.getContactPoint(p);
+      Contact contact;
+      contact.body_a = a.body;
+      contact.body_b = b.body;
+      contact.link_a = link_of(a, point.m_index0);
+      contact.link_b = link_of(b, point.m_index1);
+      contact.position = from_bt(point.getPositionWorldOnB());
+      contact.normal = from_bt(point.m_normalWorldOnB);
+      contact.depth = -point.getDistance();
+      const bool touches = point.getAppliedImpulse() > 0.0 || contact.depth >= 0.0;
+      if (touches) contact.force = point.getAppliedImpulse() / step_s_;
+      // Static things come second; of two bodies the lower number comes first.
+      if (contact.body_a < 0 || (contact.body_b >= 0 && contact.body_b < contact.body_a)) contact = swapped(contact);
+      (touches ? contacts_ : near_only_).push_back(contact);
+    }
+  }
+}
+
+// The same place in several substeps: their impulses add up.
+void ContactBook::merge() {
+  merged_.clear();
+  size_t first = 0;    // of the same two links
+  for (const Contact& contact : contacts_) {
+    if (!merged_.empty() && (merged_.back().link_a != contact.link_a || merged_.back().link_b != contact.link_b)) {
+      first = merged_.size();
+    }
+    const auto same = std::find_if(merged_.begin() + static_cast<std::ptrdiff_t>(first), merged_.end(), [&](const Contact& other) {
+      return (other.position - contact.position).norm() < kSamePlace_m;
+    });
+    if (same == merged_.end()) {
+      merged_.push_back(contact);
+    } else {
+      same->force += contact.force;
+      same->depth = std::max(same->depth, contact.depth);
+    }
+  }
+  contacts_.swap(merged_);
+}
+
+void ContactBook::finish() {
+  if (contacts_.empty() && near_only_.empty()) return;
+  std::sort(contacts_.begin(), contacts_.end(), earlier);
+  if (substeps_ > 1) merge();
+  touching_.fill(contacts_);
+  near_only_.insert(near_only_.end(), contacts_.begin(), contacts_.end());
+  near_.fill(near_only_);
+}
+
+}  // namespace ruedo::physics

@@ -1,0 +1,55 @@
+// The contacts of a step: read from Bullet's manifolds after each substep, put into a fixed order, and sorted by
+// the bodies that take part.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "physics/bullet.h"
+#include "ruedo/snapshot.h"
+
+namespace ruedo::physics {
+
+class ContactBook {
+ public:
+  explicit ContactBook(size_t bodies) : touching_(bodies), near_(bodies) {}
+
+  // Starts a step of that length (s).
+  void clear(double step_s);
+  // Adds what the dispatcher's manifolds hold after a substep.
+  void add(btDispatcher& dispatcher);
+  // Ends the step.
+  void finish();
+
+  const std::vector<Contact>& all() const { return contacts_; }    // those that touched
+  std::span<const Contact> touching(int body) const { return touching_.of(body); }
+  std::span<const Contact> near(int body) const { return near_.of(body); }
+
+ private:
+  // Contacts grouped by body, that body always first in them.
+  class ByBody {
+   public:
+    explicit ByBody(size_t bodies) : ranges_(bodies, {0, 0}) {}
+    void clear();
+    void fill(const std::vector<Contact>& contacts);
+    std::span<const Contact> of(int body) const {
+      const auto& range = ranges_[static_cast<size_t>(body)];
+      return {entries_.data() + range.first, range.second};
+    }
+
+   private:
+    std::vector<Contact> entries_;
+    std::vector<std::pair<size_t, size_t>> ranges_;    // first, count
+  };
+
+  void merge();
+
+  double step_s_ = 0.0;
+  int substeps_ = 0;
+  std::vector<Contact> contacts_;
+  std::vector<Contact> near_only_;    // of the last substep
+  std::vector<Contact> merged_;       // scratch
+  ByBody touching_, near_;
+};
+
+}  // namespace ruedo::physics

@@ -1,0 +1,57 @@
+// Convex shapes that Bullet lacks: an exact ellipsoid, and a tyre, which touches the ground in one point as a
+// sphere does but is no wider than the wheel.
+//
+// Both are given to Bullet's GJK by their support function.
+#pragma once
+
+#include "physics/bullet.h"
+
+namespace ruedo::physics {
+
+class ConvexShape : public btConvexInternalShape {
+ public:
+  ConvexShape() { m_shapeType = CUSTOM_CONVEX_SHAPE_TYPE; }
+
+  void batchedUnitVectorGetSupportingVertexWithoutMargin(const btVector3* directions, btVector3* supports,
+                                                         int count) const override {
+    for (int i = 0; i < count; ++i) supports[i] = localGetSupportingVertexWithoutMargin(directions[i]);
+  }
+  void getAabb(const btTransform& X, btVector3& low, btVector3& high) const override { getAabbSlow(X, low, high); }
+  // Moments of inertia come from the world file, never from shapes.
+  void calculateLocalInertia(btScalar, btVector3& inertia) const override { inertia.setZero(); }
+};
+
+// The ellipsoid of the given radii (m).
+class EllipsoidShape final : public ConvexShape {
+ public:
+  explicit EllipsoidShape(const btVector3& radii) : radii_(radii) { m_collisionMargin = 0.0; }
+  btVector3 localGetSupportingVertexWithoutMargin(const btVector3& direction) const override {
+    const btVector3 scaled = direction * radii_;
+    const btScalar length = scaled.length();
+    return length > 0.0 ? scaled * radii_ / length : btVector3(radii_.x(), 0, 0);
+  }
+  const char* getName() const override { return "Ellipsoid"; }
+
+ private:
+  btVector3 radii_;
+};
+
+// All points within width / 2 of a disc: the shape of a wheel with a round tyre. The axis is z; radius and width
+// (m) are the outer ones. The tyre's roundness is Bullet's collision margin, the disc its core.
+class TyreShape final : public ConvexShape {
+ public:
+  TyreShape(btScalar radius, btScalar width) : core_(radius - btMin(width / 2, radius)) {
+    m_collisionMargin = btMin(width / 2, radius);
+  }
+  btVector3 localGetSupportingVertexWithoutMargin(const btVector3& direction) const override {
+    const btScalar length = btSqrt(direction.x() * direction.x() + direction.y() * direction.y());
+    if (length < 1e-12) return {0, 0, 0};
+    return {core_ * direction.x() / length, core_ * direction.y() / length, 0};
+  }
+  const char* getName() const override { return "Tyre"; }
+
+ private:
+  btScalar core_;
+};
+
+}  // namespace ruedo::physics

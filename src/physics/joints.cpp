@@ -1,0 +1,166 @@
+// Hinges, sliders, balls and universal joints. Damping and friction act through the motor row of the constraint
+// with the rate 0 and a bounded impulse: however large they are, they never reverse a motion.
+#include "physics/joints.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ruedo::physics {
+
+namespace {
+
+bool limited(const model::JointAxis& axis) { return std::isfinite(axis.lower) && std::isfinite(axis.upper) && axis.lower <= axis.upper; }
+
+// A frame at J whose x or z axis is the joint's.
+Pose along(const Pose& X, const Vec3& axis_in_J, const Vec3& unit) {
+  return {X.rotation * Quat::FromTwoVectors(unit, axis_in_J), X.translation};
+}
+
+double bounded(double value, double limit) { return std::clamp(value, -limit, limit); }
+
+}  // namespace
+
+JointConstraint::JointConstraint(const model::Joint& joint, btRigidBody& parent, btRigidBody& child, const Pose& X_PJ,
+                                 const Pose& X_CJ)
+    : type_(joint.type), limits_(joint.axis), parent_(parent), child_(child), X_PJ_(X_PJ), X_CJ_(X_CJ) {
+  switch (type_) {
+    case model::JointType::revolute:
+    case model::JointType::continuous: {
+      auto hinge = std::make_unique<btHingeConstraint>(parent_, child_, to_bt(along(X_PJ, limits_.axis_in_J, Vec3::UnitZ())),
+                                                       to_bt(along(X_CJ, limits_.axis_in_J, Vec3::UnitZ())), true);
+      const bool bounded_range = type_ == model::JointType::revolute && limited(limits_) &&
+                                 limits_.lower > -M_PI && limits_.upper < M_PI;
+      if (bounded_range) {
+        hinge->setLimit(limits_.lower, limits_.upper, 1.0, 0.3, 0.0);
+      } else {
+        hinge->setLimit(1.0, -1.0);    // none
+      }
+      constraint_ = std::move(hinge);
+      break;
+    }
+    case model::JointType::prismatic: {
+      auto slider = std::make_unique<btSliderConstraint>(parent_, child_, to_bt(along(X_PJ, limits_.axis_in_J, Vec3::UnitX())),
+                                                         to_bt(along(X_CJ, limits_.axis_in_J, Vec3::UnitX())), true);
+      slider->setLowerLinLimit(limited(limits_) ? limits_.lower : 1.0);
+      slider->setUpperLinLimit(limited(limits_) ? limits_.upper : -1.0);
+      slider->setLowerAngLimit(0.0);
+      slider->setUpperAngLimit(0.0);
+      constraint_ = std::move(slider);
+      break;
+    }
+    case model::JointType::ball:
+      constraint_ = std::make_unique<btPoint2PointConstraint>(parent_, child_, to_bt(X_PJ.translation), to_bt(X_CJ.translation));
+      break;
+    case model::JointType::universal: {
+      // Bullet wants the two axes square to each other; in world coordinates at the start.
+      const Pose X_WJ = from_bt(parent_.getWorldTransform()) * X_PJ;
+      const Vec3 first = X_WJ.rotation * joint.axis.axis_in_J;
+      Vec3 second = X_WJ.rotation * joint.axis2.axis_in_J;
+      second -= first * first.dot(second);
+      if (second.norm() < 1e-6) second = first.unitOrthogonal();
+      btVector3 anchor = to_bt(X_WJ.translation), axis1 = to_bt(first), axis2 = to_bt(Vec3(second.normalized()));
+      constraint_ = std::make_unique<btUniversalConstraint>(parent_, child_, anchor, axis1, axis2);
+      break;
+    }
+    case model::JointType::fixed:
+      constraint_ = std::make_unique<btFixedConstraint>(parent_, child_, to_bt(X_PJ), to_bt(X_CJ));
+      break;
+  }
+  if (constraint_) constraint_->setJointFeedback(feedback_.get());
+}
+
+Vec3 JointConstraint::axis_in_world() const {
+  return from_bt(parent_.getWorldTransform().getRotation()) * (X_PJ_.rotation * limits_.axis_in_J);
+}
+
+double JointConstraint::velocity() const {
+  const Vec3 axis = axis_in_world();
+  const Vec3 turn = from_bt(child_.getAngularVelocity() - parent_.getAngularVelocity());
+  switch (type_) {
+    case model::JointType::revolute:
+    case model::JointType::continuous:
+    case model::JointType::universal:
+      return axis.dot(turn);
+    case model::JointType::prismatic: {
+      const btVector3 arm = child_.getWorldTransform() * to_bt(X_CJ_.translation);
+      return axis.dot(from_bt(child_.getVelocityInLocalPoint(arm - child_.getCenterOfMassPosition()) -
+                              parent_.getVelocityInLocalPoint(arm - parent_.getCenterOfMassPosition())));
+    }
+    default:
+      return 0.0;
+  }
+}
+
+void JointConstraint::set_motor(double rate, double max_effort) {
+  mode_ = Mode::motor;
+  command_ = bounded(rate, limits_.velocity);
+  max_effort_ = std::min(max_effort, limits_.effort);
+}
+
+void JointConstraint::set_effort(double effort) {
+  mode_ = Mode::effort;
+  command_ = bounded(effort, limits_.effort);
+}
+
+void JointConstraint::move_by_motor(double rate, double max_effort, double substep_s) {
+  const double effort = std::min(max_effort, 1e9);    // Bullet wants it finite
+  if (type_ == model::JointType::prismatic) {
+    auto& slider = static_cast<btSliderConstraint&>(*constraint_);
+    slider.setPoweredLinMotor(effort > 0.0);
+    slider.setTargetLinMotorVelocity(rate);
+    slider.setMaxLinMotorForce(effort);
+  } else if (type_ == model::JointType::revolute || type_ == model::JointType::continuous) {
+    static_cast<btHingeConstraint&>(*constraint_).enableAngularMotor(effort > 0.0, rate, effort * substep_s);
+  }
+}
+
+void JointConstraint::push(double effort) {
+  const btVector3 along_axis = to_bt(Vec3(axis_in_world() * effort));
+  if (type_ == model::JointType::prismatic) {
+    const btVector3 at = child_.getWorldTransform() * to_bt(X_CJ_.translation);
+    child_.applyForce(along_axis, at - child_.getCenterOfMassPosition());
+    parent_.applyForce(-along_axis, at - parent_.getCenterOfMassPosition());
+  } else if (type_ == model::JointType::revolute || type_ == model::JointType::continuous) {
+    child_.applyTorque(along_axis);
+    parent_.applyTorque(-along_axis);
+  }
+}
+
+void JointConstraint::before_substep(double substep_s) {
+  if (!constraint_) return;
+  if (mode_ == Mode::motor) {
+    move_by_motor(command_, max_effort_, substep_s);
+    return;
+  }
+  if (mode_ == Mode::effort) push(command_);
+  move_by_motor(0.0, limits_.friction + limits_.damping * std::abs(velocity()), substep_s);
+}
+
+double JointConstraint::measured_effort() const {
+  const bool linear = type_ == model::JointType::prismatic;
+  return axis_in_world().dot(from_bt(linear ? feedback_->m_appliedForceBodyB : feedback_->m_appliedTorqueBodyB));
+}
+
+void JointConstraint::after_substep(double substep_s) {
+  if (!constraint_) return;
+  effort_ = mode_ == Mode::motor ? measured_effort() : mode_ == Mode::effort ? command_ : 0.0;
+  switch (type_) {
+    case model::JointType::revolute:
+    case model::JointType::continuous: {
+      const double angle = static_cast<btHingeConstraint&>(*constraint_)
+                               .getHingeAngle(parent_.getWorldTransform(), child_.getWorldTransform());
+      position_ += wrap_angle(angle - position_);
+      break;
+    }
+    case model::JointType::prismatic: {
+      const btVector3 from = parent_.getWorldTransform() * to_bt(X_PJ_.translation);
+      const btVector3 to = child_.getWorldTransform() * to_bt(X_CJ_.translation);
+      position_ = axis_in_world().dot(from_bt(to - from));
+      break;
+    }
+    default:
+      position_ += velocity() * substep_s;
+  }
+}
+
+}  // namespace ruedo::physics

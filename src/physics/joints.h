@@ -1,0 +1,52 @@
+// Joints between bodies as Bullet's constraints: limits, damping, friction, motors.
+//
+// A joint's position is 0 at the start and is positive as the child turns or moves about or along the axis.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "model/body_layout.h"
+#include "physics/rigid_bodies.h"
+
+namespace ruedo::physics {
+
+class JointConstraint {
+ public:
+  // X_PJ, X_CJ: the joint's frame in Bullet's frames I of parent and child.
+  JointConstraint(const model::Joint& joint, btRigidBody& parent, btRigidBody& child, const Pose& X_PJ, const Pose& X_CJ);
+
+  btTypedConstraint* constraint() { return constraint_.get(); }    // null: nothing to hold (no such joint)
+
+  double position() const { return position_; }    // rad or m; of a universal joint the first axis; ball: 0
+  double velocity() const;
+  double effort() const { return effort_; }
+
+  // Holds that rate with at most that effort until another command (rad/s or m/s; N m or N).
+  void set_motor(double rate, double max_effort);
+  void set_effort(double effort);                  // gives that effort until another command
+  bool commanded() const { return mode_ != Mode::passive; }
+
+  void before_substep(double substep_s);
+  void after_substep(double substep_s);
+
+ private:
+  enum class Mode { passive, motor, effort };
+  Vec3 axis_in_world() const;
+  void move_by_motor(double rate, double max_effort, double substep_s);
+  void push(double effort);                        // for one substep
+  double measured_effort() const;
+
+  model::JointType type_;
+  model::JointAxis limits_;
+  btRigidBody& parent_;
+  btRigidBody& child_;
+  Pose X_PJ_, X_CJ_;
+  std::unique_ptr<btTypedConstraint> constraint_;
+  std::unique_ptr<btJointFeedback> feedback_ = std::make_unique<btJointFeedback>();
+  Mode mode_ = Mode::passive;
+  double command_ = 0.0, max_effort_ = 0.0;
+  double position_ = 0.0, effort_ = 0.0;
+};
+
+}  // namespace ruedo::physics

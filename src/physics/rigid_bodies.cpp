@@ -1,0 +1,199 @@
+// Mass properties and compounds. Inertia is that of the links about the common centre of mass (parallel axes).
+#include "physics/rigid_bodies.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+namespace ruedo::physics {
+
+namespace {
+
+constexpr double kSmallestMass_kg = 1e-6;
+// Lateral friction of a driven wheel relative to the rolling one, where the file does not say otherwise: tyres of
+// skid-steered robots slip sideways (with 1, half of the turn rate is lost; measured).
+constexpr double kLateralFriction = 0.3;
+// Velocities below which a body may fall asleep (after 2 s).
+constexpr double kSleepSpeed_m_s = 0.005, kSleepRate_rad_s = 0.01;
+
+struct MassProperties {
+  double mass = 0.0;
+  Vec3 center = Vec3::Zero();                               // in B
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();        // about the centre, axes of B
+};
+
+MassProperties mass_of(const model::Model& model, const model::BodyLayout& layout, const model::BodyPlacement& body) {
+  MassProperties sum;
+  for (const int index : body.links) {
+    const auto& placement = layout.links[static_cast<size_t>(index)];
+    const auto& inertial = model.links[static_cast<size_t>(placement.link)].inertial;
+    sum.mass += inertial.mass;
+    sum.center += inertial.mass * (placement.X_BL * inertial.X_LI.translation);
+  }
+  sum.mass = std::max(sum.mass, kSmallestMass_kg);
+  sum.center /= sum.mass;
+  for (const int index : body.links) {
+    const auto& placement = layout.links[static_cast<size_t>(index)];
+    const auto& inertial = model.links[static_cast<size_t>(placement.link)].inertial;
+    const Pose X_BI = placement.X_BL * inertial.X_LI;
+    const Eigen::Matrix3d R = X_BI.rotation.toRotationMatrix();
+    const Vec3 d = X_BI.translation - sum.center;
+    sum.inertia += R * inertial.inertia * R.transpose() +
+                   inertial.mass * (d.squaredNorm() * Eigen::Matrix3d::Identity() - d * d.transpose());
+  }
+  return sum;
+}
+
+// Principal axes as a rotation; the axes of B where they are principal already, so that no rounding creeps in.
+Quat principal_axes(const Eigen::Matrix3d& inertia, Vec3& moments) {
+  Eigen::Matrix3d off = inertia;
+  off.diagonal().setZero();
+  moments = inertia.diagonal();
+  if (off.cwiseAbs().maxCoeff() <= 1e-9 * inertia.trace()) return Quat::Identity();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(inertia);
+  moments = solver.eigenvalues();
+  Eigen::Matrix3d axes = solver.eigenvectors();
+  if (axes.determinant() < 0) axes.col(2) = -axes.col(2);
+  return Quat(axes).normalized();
+}
+
+// The wheel of a wheels drive that this body is, or -1.
+int driven_wheel(const model::BodyLayout& layout, int index) {
+  for (size_t i = 0; i < layout.wheels.size(); ++i) {
+    const auto& wheel = layout.wheels[i];
+    if (layout.links[static_cast<size_t>(wheel.link)].body != index) continue;
+    if (layout.robots[static_cast<size_t>(wheel.robot)].body != index) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+bool carries_kinematic_drive(const model::WorldModel& world, const model::BodyLayout& layout, int index) {
+  for (const auto& robot : layout.robots) {
+    if (robot.body != index) continue;
+    const auto& drive = world.models[static_cast<size_t>(robot.instance)].model->drive;
+    return drive && drive->kind == model::DriveDescription::Kind::kinematic;
+  }
+  return false;
+}
+
+}  // namespace
+
+RigidBodies::RigidBodies(const model::WorldModel& world, const model::BodyLayout& layout) {
+  make_statics(world, layout);
+  bodies.resize(layout.bodies.size());
+  for (size_t i = 0; i < bodies.size(); ++i) make_body(world, layout, static_cast<int>(i));
+}
+
+void RigidBodies::make_statics(const model::WorldModel& world, const model::BodyLayout& layout) {
+  for (size_t index = 0; index < layout.links.size(); ++index) {
+    const auto& placement = layout.links[index];
+    if (placement.body >= 0) continue;
+    const auto& model = *world.models[static_cast<size_t>(placement.instance)].model;
+    for (const auto& collision : model.links[static_cast<size_t>(placement.link)].collisions) {
+      btCollisionShape* shape = shapes_.fixed(collision.geometry);
+      if (!shape) continue;
+      auto object = std::make_unique<StaticObject>();
+      object->bullet = std::make_unique<btCollisionObject>();
+      btCollisionObject& bullet = *object->bullet;
+      bullet.setCollisionShape(shape);
+      bullet.setWorldTransform(to_bt((placement.X_BL * collision.X_LC).normalized()));
+      bullet.setCollisionFlags(btCollisionObject::CF_STATIC_OBJECT);
+      bullet.setFriction(collision.surface.friction);
+      bullet.setRestitution(collision.surface.restitution);
+      object->info.instance = placement.instance;
+      object->info.plane = collision.geometry.shape == model::Shape::plane;
+      object->info.links.push_back(static_cast<int>(index));
+      bullet.setUserPointer(&object->info);
+      statics.push_back(std::move(object));
+    }
+  }
+}
+
+void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLayout& layout, int index) {
+  const auto& placement = layout.bodies[static_cast<size_t>(index)];
+  const auto& instance = world.models[static_cast<size_t>(placement.instance)];
+  const model::Model& model = *instance.model;
+  RigidBody& body = bodies[static_cast<size_t>(index)];
+  const int wheel = driven_wheel(layout, index);
+
+  const MassProperties mass = mass_of(model, layout, placement);
+  Vec3 moments;
+  if (wheel >= 0) {    // y of I is the wheel's axis, which lateral friction refers to
+    const auto& of_wheel = layout.wheels[static_cast<size_t>(wheel)];
+    const Vec3 axis = layout.links[static_cast<size_t>(of_wheel.link)].X_BL.rotation * of_wheel.axis_in_L;
+    body.X_BI.rotation = Quat::FromTwoVectors(Vec3::UnitY(), axis);
+    const Eigen::Matrix3d R = body.X_BI.rotation.toRotationMatrix();
+    moments = (R.transpose() * mass.inertia * R).diagonal();
+  } else {
+    body.X_BI.rotation = principal_axes(mass.inertia, moments);
+  }
+  body.X_BI.translation = mass.center;
+  const Pose X_IB = body.X_BI.inverse();
+
+  bool gravity = false, kinematic = model.path != nullptr;
+  const model::Surface* surface = nullptr;
+  body.compound = std::make_unique<btCompoundShape>();
+  std::vector<btCollisionShape*> shapes;
+  for (const int link_index : placement.links) {
+    const auto& link_placement = layout.links[static_cast<size_t>(link_index)];
+    const model::Link& link = model.links[static_cast<size_t>(link_placement.link)];
+    gravity |= link.gravity;
+    kinematic |= link.kinematic;
+    for (const auto& collision : link.collisions) {
+      shapes.clear();
+      if (wheel >= 0 && collision.geometry.shape == model::Shape::cylinder) {
+        shapes.push_back(shapes_.tyre(collision.geometry.size.x(), collision.geometry.size.y()));
+      } else if (!shapes_.moving(collision.geometry, shapes)) {
+        findings.push_back({Finding::Kind::unsupported, collision.source,
+                            "model " + instance.name + "/link " + link.name + "/collision " + collision.name,
+                            "a concave or open mesh on a body that moves: it collides as " + std::to_string(shapes.size()) +
+                                " convex piece(s), the hulls of its connected parts"});
+      }
+      const Pose X_IC = (X_IB * link_placement.X_BL * collision.X_LC).normalized();
+      for (btCollisionShape* shape : shapes) {
+        body.compound->addChildShape(to_bt(X_IC), shape);
+        body.info.links.push_back(link_index);
+      }
+      if (!shapes.empty() && !surface) surface = &collision.surface;
+    }
+  }
+
+  const double smallest = 1e-9 + 1e-6 * mass.mass;    // a moment of 0 would let a torque turn it at any speed
+  btRigidBody::btRigidBodyConstructionInfo settings(kinematic ? 0.0 : mass.mass, nullptr, body.compound.get(),
+                                                    kinematic ? btVector3(0, 0, 0) : to_bt(Vec3(moments.cwiseMax(smallest))));
+  settings.m_startWorldTransform = to_bt((placement.X_WB * body.X_BI).normalized());
+  settings.m_linearSleepingThreshold = kSleepSpeed_m_s;
+  settings.m_angularSleepingThreshold = kSleepRate_rad_s;
+  if (surface) {
+    settings.m_friction = surface->friction;
+    settings.m_restitution = surface->restitution;
+  }
+  // The drive's force stands for the friction of the wheels.
+  if (carries_kinematic_drive(world, layout, index)) settings.m_friction = 0.0;
+  body.bullet = std::make_unique<btRigidBody>(settings);
+  btRigidBody& bullet = *body.bullet;
+  if (wheel >= 0) {
+    const bool given = surface && surface->friction > 0.0 && surface->friction2 != surface->friction;
+    const double lateral = given ? surface->friction2 / surface->friction : kLateralFriction;
+    bullet.setAnisotropicFriction({1, lateral, 1}, btCollisionObject::CF_ANISOTROPIC_FRICTION);
+  }
+  if (kinematic) bullet.setCollisionFlags(bullet.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+  bullet.setFlags(bullet.getFlags() | BT_DISABLE_WORLD_GRAVITY);    // gravity is set for each body
+  bullet.setGravity(gravity && !kinematic ? to_bt(world.gravity) : btVector3(0, 0, 0));
+
+  body.info.body = index;
+  body.info.instance = placement.instance;
+  body.info.self_collide = model.self_collide;
+  body.info.moved = kinematic;
+  bullet.setUserPointer(&body.info);
+
+  if (body.compound->getNumChildShapes() > 0) {
+    btVector3 low, high;
+    body.compound->getAabb(to_bt(X_IB.inverse().normalized()), low, high);
+    body.box_center = from_bt((low + high) / 2);
+    body.box_half = from_bt((high - low) / 2);
+  }
+}
+
+}  // namespace ruedo::physics

@@ -1,0 +1,66 @@
+// Frames and published state of a drive.
+#include "robot/drive.h"
+
+namespace ruedo::robot {
+
+namespace {
+
+const model::DriveDescription& description_of(const model::WorldModel& world, const model::BodyLayout& layout, int robot) {
+  const int instance = layout.robots[static_cast<size_t>(robot)].instance;
+  return *world.models[static_cast<size_t>(instance)].model->drive;
+}
+
+}  // namespace
+
+Drive::Drive(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics, int robot)
+    : physics_(physics),
+      robot_(robot),
+      body_(layout.robots[static_cast<size_t>(robot)].body),
+      step_us_(world.step_us),
+      step_s_(static_cast<double>(world.step_us) * 1e-6),
+      X_BBase_(layout.robots[static_cast<size_t>(robot)].X_BBase),
+      X_BaseB_(X_BBase_.inverse()),
+      wheels_(layout.robots[static_cast<size_t>(robot)].wheels),
+      description_(description_of(world, layout, robot)),
+      motion_(description_),
+      X_WBase_(base_pose().normalized()) {
+  odom_heading_ = heading(X_WBase_.rotation);
+}
+
+Twist Drive::base_twist(const Pose& X_WBase) const {
+  const Twist& of_body = physics_.twist(body_);
+  const Vec3 arm = physics_.pose(body_).rotation * X_BBase_.translation;
+  const Quat to_base = X_WBase.rotation.conjugate();
+  return {to_base * (of_body.linear + of_body.angular.cross(arm)), to_base * of_body.angular};
+}
+
+Twist Drive::body_twist(const Pose& X_WBase, const Twist& of_base) const {
+  const Vec3 angular = X_WBase.rotation * of_base.angular;
+  const Vec3 arm = X_WBase.rotation * X_BaseB_.translation;
+  return {X_WBase.rotation * of_base.linear + angular.cross(arm), angular};
+}
+
+void Drive::set_state(const Pose& X_WBase, const Twist& twist) {
+  X_WBase_ = X_WBase;
+  twist_ = twist;
+  const Vec3 velocity = X_WBase.rotation * twist.linear;
+  acceleration_ = X_WBase.rotation.conjugate() * Vec3((velocity - velocity_) / step_s_);
+  velocity_ = velocity;
+}
+
+void Drive::reset_odometry() {
+  ++resets_;
+  odom_heading_ = heading(X_WBase_.rotation);
+}
+
+void Drive::read(RobotState& state) const {
+  state.X_WBase = X_WBase_;
+  state.twist = twist_;
+  state.acceleration = acceleration_;
+  state.wheel_v = wheel_v_;
+  state.wheel_omega = wheel_omega_;
+  state.motion = motion_.state();
+  state.odometry_resets = resets_;
+}
+
+}  // namespace ruedo::robot

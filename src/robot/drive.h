@@ -1,0 +1,58 @@
+// What drives have in common: a robot's motion (what it was asked to do), and what it publishes about itself.
+#pragma once
+
+#include <cstdint>
+
+#include "model/body_layout.h"
+#include "physics/physics_world.h"
+#include "robot/motion.h"
+#include "ruedo/snapshot.h"
+
+namespace ruedo::robot {
+
+class Drive {
+ public:
+  Drive(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics, int robot);
+  virtual ~Drive() = default;
+  Drive(const Drive&) = delete;
+  Drive& operator=(const Drive&) = delete;
+
+  // Before and after physics.step(), which leads from sim time now to now + one step.
+  virtual void before_step(SimTime now) = 0;
+  virtual void after_step(SimTime now) = 0;
+  // The robot's wheels, in the order of RobotPlacement::wheels.
+  virtual void read_wheels(Snapshot& snapshot) const = 0;
+  // A command came: what sleeps must wake.
+  virtual void wake() = 0;
+
+  Motion& motion() { return motion_; }
+  void read(RobotState& state) const;
+  double heading_in_odom() const { return wrap_angle(heading(X_WBase_.rotation) - odom_heading_); }
+  void reset_odometry();
+
+ protected:
+  // base_link as the physics has it, and the twist of base_link expressed in it.
+  Pose base_pose() const { return physics_.pose(body_) * X_BBase_; }
+  Twist base_twist(const Pose& X_WBase) const;
+  // The other way round: the twist of the body's frame B in the world.
+  Twist body_twist(const Pose& X_WBase, const Twist& of_base) const;
+  void set_state(const Pose& X_WBase, const Twist& twist);    // after a step
+
+  physics::PhysicsWorld& physics_;
+  const int robot_, body_;
+  const int64_t step_us_;
+  const double step_s_;
+  const Pose X_BBase_, X_BaseB_;
+  const std::vector<int>& wheels_;
+  const model::DriveDescription& description_;
+  Motion motion_;
+  Pose X_WBase_;
+  Twist twist_;                          // of base_link in base_link
+  Vec3 velocity_ = Vec3::Zero();         // of base_link in the world
+  Vec3 acceleration_ = Vec3::Zero();     // of base_link in base_link
+  double odom_heading_ = 0.0;            // of odom in the world
+  int32_t resets_ = 0;
+  double wheel_v_ = 0.0, wheel_omega_ = 0.0;
+};
+
+}  // namespace ruedo::robot

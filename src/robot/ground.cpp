@@ -1,0 +1,88 @@
+// Support heights of shapes, in closed form.
+#include "robot/ground.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace ruedo::robot {
+
+std::vector<double> level_planes(const model::WorldModel& world, const model::BodyLayout& layout) {
+  std::vector<double> heights;
+  for (const auto& placement : layout.links) {
+    if (placement.body >= 0) continue;
+    const auto& model = *world.models[static_cast<size_t>(placement.instance)].model;
+    for (const auto& collision : model.links[static_cast<size_t>(placement.link)].collisions) {
+      if (collision.geometry.shape != model::Shape::plane) continue;
+      const Pose X_WC = placement.X_BL * collision.X_LC;
+      const Vec3 normal = X_WC.rotation * collision.geometry.normal;
+      if (normal.z() > 1.0 - 1e-12) heights.push_back(X_WC.translation.z());
+    }
+  }
+  return heights;
+}
+
+std::optional<double> nearest_plane(const std::vector<double>& planes, double height) {
+  std::optional<double> nearest;
+  for (const double plane : planes) {
+    if (!nearest || std::abs(plane - height) < std::abs(*nearest - height)) nearest = plane;
+  }
+  return nearest;
+}
+
+double lowest_point(const model::Geometry& geometry, const Pose& X_FC) {
+  const Vec3 down = X_FC.rotation.conjugate() * -Vec3::UnitZ();    // in C
+  const Vec3& size = geometry.size;
+  const double across = std::hypot(down.x(), down.y());
+  double reach = 0.0;
+  switch (geometry.shape) {
+    case model::Shape::box:
+      reach = 0.5 * down.cwiseAbs().dot(size);
+      break;
+    case model::Shape::sphere:
+      reach = size.x();
+      break;
+    case model::Shape::cylinder:
+      reach = size.x() * across + 0.5 * size.y() * std::abs(down.z());
+      break;
+    case model::Shape::capsule:
+      reach = size.x() + 0.5 * size.y() * std::abs(down.z());
+      break;
+    case model::Shape::ellipsoid:
+      reach = down.cwiseProduct(size).norm();
+      break;
+    case model::Shape::cone:
+      reach = std::max(0.5 * size.y() * down.z(), size.x() * across - 0.5 * size.y() * down.z());
+      break;
+    case model::Shape::plane:
+      break;
+    case model::Shape::mesh:
+      reach = -std::numeric_limits<double>::infinity();
+      if (!geometry.mesh) break;
+      for (const auto& position : geometry.mesh->positions) {
+        reach = std::max(reach, down.dot(position.cast<double>().cwiseProduct(geometry.scale)));
+      }
+      break;
+  }
+  return X_FC.translation.z() - reach;
+}
+
+double lowest_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout, int robot) {
+  const auto& placement = layout.robots[static_cast<size_t>(robot)];
+  const auto& model = *world.models[static_cast<size_t>(placement.instance)].model;
+  const Pose X_BaseB = placement.X_BBase.inverse();
+  const Pose X_BaseW = X_BaseB * layout.bodies[static_cast<size_t>(placement.body)].X_WB.inverse();
+  double lowest = std::numeric_limits<double>::infinity();
+  for (const int wheel : placement.wheels) {
+    const auto& link = layout.links[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].link)];
+    const Pose X_BaseL = X_BaseW * layout.bodies[static_cast<size_t>(link.body)].X_WB * link.X_BL;
+    const auto& collisions = model.links[static_cast<size_t>(link.link)].collisions;
+    for (const auto& collision : collisions) {
+      lowest = std::min(lowest, lowest_point(collision.geometry, X_BaseL * collision.X_LC));
+    }
+    if (collisions.empty()) lowest = std::min(lowest, X_BaseL.translation.z() - model.drive->wheel_radius);
+  }
+  return std::isfinite(lowest) ? lowest : 0.0;
+}
+
+}  // namespace ruedo::robot

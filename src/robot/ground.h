@@ -1,0 +1,24 @@
+// Where a robot stands: the level planes of a world, and the lowest points of a robot's wheels.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "model/body_layout.h"
+
+namespace ruedo::robot {
+
+// Heights (m, world) of the static planes whose normal points straight up.
+std::vector<double> level_planes(const model::WorldModel& world, const model::BodyLayout& layout);
+
+// The plane nearest to that height.
+std::optional<double> nearest_plane(const std::vector<double>& planes, double height);
+
+// Height of the lowest point of a shape at X_FC, along z of F.
+double lowest_point(const model::Geometry& geometry, const Pose& X_FC);
+
+// Height of the lowest point of a robot's wheels, along z of base_link and from its origin. Of wheels without
+// collision shapes, the drive's wheel radius below the wheel's centre.
+double lowest_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout, int robot);
+
+}  // namespace ruedo::robot

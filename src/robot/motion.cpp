@@ -1,0 +1,332 @@
+// Commands to plans. The plan's clock is whole microseconds; what happens inside a step (the watchdog's end) splits it.
+#include "robot/motion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <ruedo/motion_status_t.hpp>
+#include <ruedo/move_command_t.hpp>
+
+namespace ruedo::robot {
+
+namespace {
+
+using Status = ruedo::motion_status_t;
+using Move = ruedo::move_command_t;
+
+constexpr SimTime kNever = std::numeric_limits<SimTime>::max();
+// A drive without limits of its own still has these.
+constexpr double kFastest_m_s = 100.0, kFastest_rad_s = 100.0, kSlowestChange = 1e-6;
+// Speeds of a primitive on a robot that has no limits and is given none.
+constexpr double kUsualSpeed_m_s = 0.5, kUsualRate_rad_s = 1.0;
+constexpr double kLargestValue = 1e6;           // m or rad
+constexpr double kDone = 1e-6;                  // m or rad: a touched primitive is done when so near
+// A primitive is blocked when in so long a time something touched and less than this part of the plan was done.
+constexpr SimTime kBlockWindow_us = 500'000;
+constexpr double kBlockedPart = 0.1;
+
+Limits sane(double speed, double acceleration, double deceleration, double fastest) {
+  return {std::clamp(speed, 0.0, fastest), std::max(acceleration, kSlowestChange), std::max(deceleration, kSlowestChange)};
+}
+
+bool all_finite(std::initializer_list<double> values) {
+  return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+}
+
+}  // namespace
+
+Motion::Motion(const model::DriveDescription& drive)
+    : deadline_(kNever),
+      drive_(drive),
+      way_limits_(sane(drive.max_speed, drive.acceleration, drive.deceleration, kFastest_m_s)),
+      angle_limits_(sane(drive.max_turn_rate, drive.turn_acceleration, drive.turn_acceleration, kFastest_rad_s)) {
+  if (drive.max_wheel_rate * drive.wheel_radius < way_limits_.speed) way_limits_.speed = drive.max_wheel_rate * drive.wheel_radius;
+  const double turning = 2.0 * drive.max_wheel_rate * drive.wheel_radius / drive.track;
+  if (turning < angle_limits_.speed) angle_limits_.speed = turning;
+}
+
+void Motion::show(int64_t id, int8_t kind, int8_t state, int8_t reason) {
+  MotionState shown;
+  shown.id = id;
+  shown.kind = kind;
+  shown.state = state;
+  shown.reason = reason;
+  log_.set(shown);
+  publish_progress();
+}
+
+void Motion::refuse(int64_t id, int8_t kind, int8_t reason) {
+  MotionState refused;
+  refused.id = id;
+  refused.kind = kind;
+  refused.state = Status::STATE_REFUSED;
+  refused.reason = reason;
+  log_.mention(refused);
+}
+
+void Motion::replace_running() {
+  if (primitive_.axis == Axis::none) return;
+  MotionState ended = log_.current();
+  ended.state = Status::STATE_ENDED;
+  ended.reason = Status::REASON_REPLACED;
+  log_.mention(ended);
+  primitive_ = {};
+}
+
+void Motion::command(const VelocityCommand& command, SimTime now) {
+  if (!all_finite({command.vx, command.vy, command.omega})) return refuse(0, Status::KIND_VELOCITY, Status::REASON_NOT_FINITE);
+  if (command.vy != 0.0) return refuse(0, Status::KIND_VELOCITY, Status::REASON_BAD_VALUE);
+  hold(command.vx, command.omega, now, Status::KIND_VELOCITY);
+}
+
+void Motion::command(const WheelCommand& command, SimTime now) {
+  const size_t left = drive_.left_joints.size(), right = drive_.right_joints.size(), n = command.rates.size();
+  if ((n != 2 && n != left + right) || !(drive_.wheel_radius > 0.0) || !(drive_.track > 0.0)) {
+    return refuse(0, Status::KIND_WHEELS, Status::REASON_BAD_VALUE);
+  }
+  for (const double rate : command.rates) {
+    if (!std::isfinite(rate)) return refuse(0, Status::KIND_WHEELS, Status::REASON_NOT_FINITE);
+  }
+  // The wheels of a side are tied together: their mean counts.
+  const size_t of_left = n == 2 ? 1 : left;
+  double left_rate = 0.0, right_rate = 0.0;
+  for (size_t i = 0; i < n; ++i) (i < of_left ? left_rate : right_rate) += command.rates[i];
+  left_rate /= static_cast<double>(of_left);
+  right_rate /= static_cast<double>(n - of_left);
+  hold(0.5 * drive_.wheel_radius * (right_rate + left_rate), drive_.wheel_radius * (right_rate - left_rate) / drive_.track,
+       now, Status::KIND_WHEELS);
+}
+
+void Motion::hold(double v, double omega, SimTime now, int8_t kind) {
+  v = std::clamp(v, -way_limits_.speed, way_limits_.speed);
+  omega = std::clamp(omega, -angle_limits_.speed, angle_limits_.speed);
+  if (std::isfinite(drive_.max_wheel_rate)) {    // both together may still be too fast for a wheel: keep the curvature
+    const double fastest = std::abs(v) + 0.5 * drive_.track * std::abs(omega);
+    const double allowed = drive_.max_wheel_rate * drive_.wheel_radius;
+    if (fastest > allowed) {
+      v *= allowed / fastest;
+      omega *= allowed / fastest;
+    }
+  }
+  replace_running();
+  const bool same = holding_ && v == target_v_ && omega == target_omega_;
+  holding_ = true;
+  deadline_ = drive_.watchdog_us > 0 ? now + drive_.watchdog_us : kNever;
+  show(0, kind, Status::STATE_RUNNING);
+  if (same) return;    // a repeated command only feeds the watchdog
+  target_v_ = v;
+  target_omega_ = omega;
+  set_plan(Profile::to_velocity(v_, v, way_limits_), Profile::to_velocity(omega_, omega, angle_limits_), now);
+}
+
+Limits Motion::stricter(const Limits& own, const MoveCommand& command, double fallback_speed) {
+  Limits limits = own;
+  if (command.speed > 0.0) limits.speed = std::min(limits.speed, command.speed);
+  if (command.speed == 0.0 && limits.speed >= kFastest_m_s) limits.speed = fallback_speed;
+  if (command.acceleration > 0.0) limits.acceleration = std::min(limits.acceleration, command.acceleration);
+  const double deceleration = command.deceleration > 0.0 ? command.deceleration : command.acceleration;
+  if (deceleration > 0.0) limits.deceleration = std::min(limits.deceleration, deceleration);
+  return limits;
+}
+
+void Motion::command(const MoveCommand& command, SimTime now, double heading) {
+  const auto refused = [&](int8_t reason) { refuse(command.id, command.kind, reason); };
+  if (command.kind < Move::ADVANCE || command.kind > Move::STOP) return refused(Status::REASON_BAD_KIND);
+  if (!all_finite({command.value, command.radius, command.speed, command.acceleration, command.deceleration})) {
+    return refused(Status::REASON_NOT_FINITE);
+  }
+  if (command.speed < 0.0 || command.acceleration < 0.0 || command.deceleration < 0.0) return refused(Status::REASON_BAD_VALUE);
+  Primitive next;
+  switch (command.kind) {
+    case Move::ADVANCE:
+      next.axis = Axis::way;
+      next.target = command.value;
+      next.limits = stricter(way_limits_, command, kUsualSpeed_m_s);
+      break;
+    case Move::ROTATE:
+    case Move::HEADING:
+      next.axis = Axis::angle;
+      next.target = command.kind == Move::ROTATE ? command.value : wrap_angle(command.value - heading);
+      next.limits = stricter(angle_limits_, command, kUsualRate_rad_s);
+      break;
+    case Move::ARC:
+      if (!(command.radius > 0.0)) return refused(Status::REASON_BAD_VALUE);
+      next.axis = Axis::arc;
+      next.target = std::abs(command.value) * command.radius;
+      next.unit = command.value < 0.0 ? -1.0 / command.radius : 1.0 / command.radius;
+      next.curvature = next.unit;
+      next.limits = stricter(way_limits_, command, kUsualSpeed_m_s);
+      next.limits.speed = std::min(next.limits.speed, angle_limits_.speed * command.radius);
+      next.limits.acceleration = std::min(next.limits.acceleration, angle_limits_.acceleration * command.radius);
+      next.limits.deceleration = std::min(next.limits.deceleration, angle_limits_.deceleration * command.radius);
+      if (std::isfinite(drive_.max_wheel_rate)) {
+        const double outer = 1.0 + 0.5 * drive_.track / command.radius;
+        next.limits.speed = std::min(next.limits.speed, drive_.max_wheel_rate * drive_.wheel_radius / outer);
+      }
+      break;
+    default:
+      break;    // STOP
+  }
+  const bool measured = next.axis != Axis::none;
+  if (measured && (std::abs(next.target) > kLargestValue || std::abs(command.value) > kLargestValue ||
+                   command.radius > kLargestValue || next.limits.speed < kSlowestChange ||
+                   next.limits.acceleration < kSlowestChange || next.limits.deceleration < kSlowestChange)) {
+    return refused(Status::REASON_BAD_VALUE);
+  }
+  replace_running();
+  holding_ = false;
+  deadline_ = kNever;
+  primitive_ = next;
+  show(command.id, command.kind, Status::STATE_RUNNING);
+  if (measured) {
+    plan_primitive(now);
+  } else {
+    Limits stopping = way_limits_;
+    if (command.deceleration > 0.0) stopping.deceleration = std::min(stopping.deceleration, command.deceleration);
+    set_plan(Profile::to_velocity(v_, 0.0, stopping), Profile::to_velocity(omega_, 0.0, angle_limits_), now);
+  }
+  window_start_ = now;
+  window_done_ = window_fastest_ = 0.0;
+  window_touched_ = false;
+}
+
+void Motion::set_plan(const Profile& v, const Profile& omega, SimTime now) {
+  start_ = now;
+  plan_v_ = v;
+  plan_omega_ = omega;
+  move_on(now);
+}
+
+// Takes the plan's velocities at that time; an unlimited acceleration is over at once.
+void Motion::move_on(SimTime to) {
+  const double t = seconds(to);
+  v_ = plan_v_.velocity(t);
+  omega_ = plan_omega_.velocity(t);
+  steady_ = t >= plan_v_.end() && t >= plan_omega_.end();
+  const bool stopping = log_.current().kind == Move::STOP && log_.current().state == Status::STATE_RUNNING;
+  resting_ = steady_ && v_ == 0.0 && omega_ == 0.0 && deadline_ == kNever && primitive_.axis == Axis::none && !stopping;
+}
+
+void Motion::plan_primitive(SimTime now) {
+  Primitive& p = primitive_;
+  const double rest = p.target - p.done;
+  p.done_before_plan = p.done;
+  p.begins = p.begins_at = 0.0;
+  Profile v, omega;
+  if (p.axis == Axis::way) {
+    v = Profile::to_distance(v_, rest, p.limits);
+    omega = Profile::to_velocity(omega_, 0.0, angle_limits_);
+  } else if (p.axis == Axis::angle) {
+    v = Profile::to_velocity(v_, 0.0, way_limits_);
+    omega = Profile::to_distance(omega_, rest, p.limits);
+  } else if (std::abs(omega_ - p.curvature * v_) <= 1e-12 * (1.0 + std::abs(omega_))) {
+    v = Profile::to_distance(v_, rest, p.limits);
+    omega = v.scaled(p.curvature);
+  } else {    // an arc begins where its curvature can: at rest
+    v = Profile::to_velocity(v_, 0.0, way_limits_);
+    omega = Profile::to_velocity(omega_, 0.0, angle_limits_);
+    p.begins = std::max(v.end(), omega.end());
+    p.begins_at = v.position(p.begins);
+    const Profile along = Profile::to_distance(0.0, rest, p.limits);
+    v.append(along, p.begins);
+    omega.append(along.scaled(p.curvature), p.begins);
+  }
+  set_plan(v, omega, now);
+}
+
+void Motion::brake(SimTime now) {
+  primitive_ = {};
+  holding_ = false;
+  deadline_ = kNever;
+  set_plan(Profile::to_velocity(v_, 0.0, way_limits_), Profile::to_velocity(omega_, 0.0, angle_limits_), now);
+}
+
+Displacement Motion::step(SimTime now, int64_t step_us) {
+  if (resting_) return {};
+  const SimTime end = now + step_us;
+  if (steady_ && end < deadline_) {
+    const double step_s = static_cast<double>(step_us) * 1e-6;
+    return along_arc(v_ * step_s, omega_ * step_s);
+  }
+  Displacement way;
+  if (deadline_ < end) {    // the watchdog ends the command within this step
+    const SimTime deadline = std::max(deadline_, now);
+    way = integrate(plan_v_, plan_omega_, seconds(now), seconds(deadline));
+    move_on(deadline);
+    const int8_t kind = log_.current().kind;
+    const bool moving = target_v_ != 0.0 || target_omega_ != 0.0 || v_ != 0.0 || omega_ != 0.0;
+    if (moving) {
+      show(0, kind, Status::STATE_ENDED, Status::REASON_WATCHDOG);
+    } else {
+      show(0, kind, Status::STATE_DONE);
+    }
+    brake(deadline);
+    way = chained(way, integrate(plan_v_, plan_omega_, seconds(deadline), seconds(end)));
+  } else {
+    way = integrate(plan_v_, plan_omega_, seconds(now), seconds(end));
+  }
+  move_on(end);
+  return way;
+}
+
+void Motion::finish(SimTime now, double way, double angle, bool touched) {
+  if (resting_) return;
+  Primitive& p = primitive_;
+  if (p.axis == Axis::none) {
+    const bool stopping = log_.current().kind == Move::STOP && log_.current().state == Status::STATE_RUNNING;
+    if (stopping && steady_) {
+      show(log_.current().id, Move::STOP, Status::STATE_DONE);
+      move_on(now);
+    }
+    return;
+  }
+  const double t = seconds(now);
+  const Profile& profile = p.axis == Axis::angle ? plan_omega_ : plan_v_;
+  const double planned = t < p.begins ? 0.0 : profile.position(t) - p.begins_at;
+  if (!touched) {
+    p.done = p.done_before_plan + planned;
+  } else if (t >= p.begins) {
+    p.done += p.axis == Axis::angle ? angle : way;
+  }
+  const bool over = t >= profile.end() && steady_;
+  if (over && (!touched || std::abs(p.target - p.done) <= kDone)) {
+    p.done = touched ? p.done : p.target;
+    publish_progress();
+    const MotionState state = log_.current();
+    p = {};
+    show(state.id, state.kind, Status::STATE_DONE);
+    log_.progress(state.done, state.remaining);
+    move_on(now);
+    return;
+  }
+  watch_for_block(now, touched);
+  publish_progress();
+  if (touched && p.axis != Axis::none && t >= p.begins) plan_primitive(now);    // what is left, from where it really is
+}
+
+void Motion::watch_for_block(SimTime now, bool touched) {
+  window_touched_ |= touched;
+  window_fastest_ = std::max(window_fastest_, std::abs(primitive_.axis == Axis::angle ? omega_ : v_));
+  if (now - window_start_ < kBlockWindow_us) return;
+  const double wanted = window_fastest_ * static_cast<double>(now - window_start_) * 1e-6;
+  if (window_touched_ && std::abs(primitive_.done - window_done_) < kBlockedPart * wanted) {
+    publish_progress();
+    const MotionState state = log_.current();
+    brake(now);
+    show(state.id, state.kind, Status::STATE_ENDED, Status::REASON_BLOCKED);
+    log_.progress(state.done, state.remaining);
+    return;
+  }
+  window_start_ = now;
+  window_done_ = primitive_.done;
+  window_fastest_ = 0.0;
+  window_touched_ = false;
+}
+
+void Motion::publish_progress() {
+  if (primitive_.axis == Axis::none) return;
+  log_.progress(primitive_.done * primitive_.unit, (primitive_.target - primitive_.done) * primitive_.unit);
+}
+
+}  // namespace ruedo::robot

@@ -1,0 +1,85 @@
+// What one robot has been asked to do: commands and motion primitives become a plan of speed and turn rate, which
+// keeps the robot's limits, and a state to be published.
+//
+// A plan starts at a whole microsecond and is evaluated in closed form, so that a robot's way does not depend on
+// the step size. A new command plans anew from the velocities of that moment, so that nothing jumps beyond the limits.
+#pragma once
+
+#include <cstdint>
+
+#include "model/world_model.h"
+#include "robot/motion_log.h"
+#include "robot/robots.h"
+#include "robot/unicycle.h"
+
+namespace ruedo::robot {
+
+class Motion {
+ public:
+  explicit Motion(const model::DriveDescription& drive);
+
+  // Commands, at sim time now. Bad values are refused, and nothing changes but the log.
+  void command(const VelocityCommand& command, SimTime now);
+  void command(const WheelCommand& command, SimTime now);
+  // heading: of base_link in odom (rad).
+  void command(const MoveCommand& command, SimTime now, double heading);
+  void refuse(int64_t id, int8_t kind, int8_t reason);
+
+  // The way that the plan makes from now to now + step_us.
+  Displacement step(SimTime now, int64_t step_us);
+  // After step(): how it came out, with the way (m) and angle (rad) that base_link really made. `touched`: by
+  // something that may have changed them. Ends primitives.
+  void finish(SimTime now, double way, double angle, bool touched);
+
+  double v() const { return v_; }            // m/s and rad/s at the end of the last step, as planned
+  double omega() const { return omega_; }
+  bool resting() const { return resting_; }  // stands still, and nothing happens until a command comes
+  const MotionState& state() const { return log_.shown(); }
+  void show_next() { log_.advance(); }
+
+ private:
+  enum class Axis { none, way, angle, arc };
+  struct Primitive {
+    Axis axis = Axis::none;      // none: nothing runs
+    double target = 0.0;         // m; rad for angle; an arc's way in m
+    double unit = 1.0;           // published measure for each m or rad of `target`
+    double curvature = 0.0;      // arc: 1/m
+    double done = 0.0;           // what was really done, m or rad
+    double done_before_plan = 0.0;
+    double begins = 0.0;         // s since the start of the plan, after which the primitive itself runs
+    double begins_at = 0.0;      // position of the profile then
+    Limits limits;
+  };
+
+  double seconds(SimTime now) const { return static_cast<double>(now - start_) * 1e-6; }
+  void hold(double v, double omega, SimTime now, int8_t kind);
+  void brake(SimTime now);
+  void move_on(SimTime to);
+  void set_plan(const Profile& v, const Profile& omega, SimTime now);
+  void plan_primitive(SimTime now);
+  void replace_running();
+  void show(int64_t id, int8_t kind, int8_t state, int8_t reason = 0);
+  void publish_progress();
+  void watch_for_block(SimTime now, bool touched);
+  static Limits stricter(const Limits& own, const MoveCommand& command, double fallback_speed);
+
+  // Hot: what a step of steady motion needs.
+  double v_ = 0.0, omega_ = 0.0;
+  bool steady_ = true, resting_ = true;
+  SimTime deadline_;             // of the watchdog; far away when it does not run
+  const model::DriveDescription& drive_;
+  Limits way_limits_, angle_limits_;
+  // The plan.
+  SimTime start_ = 0;
+  Profile plan_v_, plan_omega_;
+  double target_v_ = 0.0, target_omega_ = 0.0;
+  bool holding_ = false;         // a velocity or wheel command is in force
+  Primitive primitive_;
+  // Watching for a block: since when, what was done then, the fastest that the plan was since, whether anything touched.
+  SimTime window_start_ = 0;
+  double window_done_ = 0.0, window_fastest_ = 0.0;
+  bool window_touched_ = false;
+  MotionLog log_;
+};
+
+}  // namespace ruedo::robot

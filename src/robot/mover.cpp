@@ -1,0 +1,69 @@
+// Waypoints to poses. Times are whole microseconds, so that a loop repeats exactly.
+#include "robot/mover.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ruedo::robot {
+
+Mover::Mover(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics, int instance)
+    : physics_(physics), step_us_(world.step_us) {
+  const auto& placed = world.models[static_cast<size_t>(instance)];
+  read(*placed.model->path);
+  for (size_t i = 0; i < layout.bodies.size(); ++i) {
+    if (layout.bodies[i].instance != instance) continue;
+    parts_.push_back({static_cast<int>(i), placed.X_WM.inverse() * layout.bodies[i].X_WB});
+  }
+  const Pose X_WM = pose_at(0);
+  for (const Part& part : parts_) physics_.set_pose(part.body, (X_WM * part.X_MB).normalized());
+}
+
+void Mover::read(const Element& path) {
+  const bool ours = path.name.starts_with("ruedo:");
+  loop_ = path.boolean(ours ? "ruedo:loop" : "loop", true);
+  const auto add = [this](const Element& element, double time_s, const Pose& pose) {
+    if (time_s < 0.0 || time_s > 1e9) element.fail("the time " + std::to_string(time_s) + " is not within 0 and 1e9 s");
+    const auto time = static_cast<SimTime>(std::llround(time_s * 1e6));
+    if (!waypoints_.empty() && time <= waypoints_.back().time) element.fail("its time is not after the one before");
+    waypoints_.push_back({time, pose});
+  };
+  if (ours) {
+    for (const Element* waypoint : path.all("ruedo:waypoint")) {
+      const std::vector<double> v = waypoint->as_numbers();
+      if (v.size() != 7) waypoint->fail("has " + std::to_string(v.size()) + " numbers, needs time x y z roll pitch yaw");
+      add(*waypoint, v[0], Pose::from_xyz_rpy({v[1], v[2], v[3]}, {v[4], v[5], v[6]}));
+    }
+  } else {
+    const Element* trajectory = path.name == "trajectory" ? &path : path.child("trajectory");
+    for (const Element* waypoint : trajectory ? trajectory->all("waypoint") : std::vector<const Element*>{}) {
+      add(*waypoint, waypoint->number("time", 0.0), waypoint->pose("pose"));
+    }
+  }
+  if (waypoints_.empty()) path.fail("has no waypoint");
+}
+
+Pose Mover::pose_at(SimTime time) const {
+  const SimTime first = waypoints_.front().time, last = waypoints_.back().time;
+  if (loop_ && time > last && last > first) time = first + (time - first) % (last - first);
+  if (time <= first) return waypoints_.front().X_WM;
+  if (time >= last) return waypoints_.back().X_WM;
+  const auto next = std::upper_bound(waypoints_.begin(), waypoints_.end(), time,
+                                     [](SimTime t, const Waypoint& waypoint) { return t < waypoint.time; });
+  const Waypoint& from = *(next - 1);
+  const double part = static_cast<double>(time - from.time) / static_cast<double>(next->time - from.time);
+  return {from.X_WM.rotation.slerp(part, next->X_WM.rotation),
+          from.X_WM.translation + part * (next->X_WM.translation - from.X_WM.translation)};
+}
+
+void Mover::before_step(SimTime now) {
+  const Pose X_WM = pose_at(now + step_us_);
+  const double step_s = static_cast<double>(step_us_) * 1e-6;
+  for (const Part& part : parts_) {
+    const Pose end = (X_WM * part.X_MB).normalized();
+    const Pose& begin = physics_.pose(part.body);
+    const Eigen::AngleAxisd turn(end.rotation * begin.rotation.conjugate());
+    physics_.guide(part.body, {(end.translation - begin.translation) / step_s, turn.axis() * (turn.angle() / step_s)}, end);
+  }
+}
+
+}  // namespace ruedo::robot

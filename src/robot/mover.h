@@ -1,0 +1,41 @@
+// A model that moves along waypoints (<ruedo:path>, or an actor's trajectory), whatever it meets.
+#pragma once
+
+#include <vector>
+
+#include "model/body_layout.h"
+#include "physics/physics_world.h"
+
+namespace ruedo::robot {
+
+class Mover {
+ public:
+  // Throws InputError for waypoints that are not numbers, or whose times do not grow.
+  Mover(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics, int instance);
+
+  // The model's pose in the world at a time: linear between waypoints, rotations by slerp. Before the first one it
+  // is there already; after the last one it stays, or begins again where the path is a loop.
+  Pose pose_at(SimTime time) const;
+
+  // Sends its bodies to where they are one step later.
+  void before_step(SimTime now);
+
+ private:
+  struct Waypoint {
+    SimTime time;
+    Pose X_WM;
+  };
+  struct Part {
+    int body;
+    Pose X_MB;
+  };
+
+  void read(const Element& path);
+  physics::PhysicsWorld& physics_;
+  int64_t step_us_;
+  bool loop_ = true;
+  std::vector<Waypoint> waypoints_;
+  std::vector<Part> parts_;
+};
+
+}  // namespace ruedo::robot

@@ -1,0 +1,48 @@
+// The same world and commands give the same bits, also after the world is made again in other memory.
+#include <cstring>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "sim.h"
+
+namespace ruedo::robot::testing {
+namespace {
+
+std::vector<Pose> ram(const std::string& type) {
+  std::string text = plane_sdf();
+  for (int i = 0; i < 30; ++i) {
+    const std::string n = std::to_string(i);
+    text += robot_sdf("r" + n, std::to_string(i % 6) + " " + std::to_string(i / 6) + " 0 0 0 " + std::to_string(0.7 * i), "", type);
+    text += box_sdf("b" + n, std::to_string(i % 6 + 0.5) + " " + std::to_string(i / 6 + 0.5) + " 0.1 0 0 0", "0.2 0.2 0.2", i % 3 == 0 ? 0.0 : 4.0);
+  }
+  Sim sim(text);
+  std::vector<Pose> poses;
+  for (int step = 0; step < 1000; ++step) {
+    if (step % 50 == 0) {
+      for (int i = 0; i < 30; ++i) sim.velocity(0.3 + 0.02 * i, (i + step / 50) % 3 - 1.0, i);
+    }
+    sim.step();
+    poses.insert(poses.end(), sim.state.bodies.begin(), sim.state.bodies.end());
+  }
+  return poses;
+}
+
+void expect_same_bits(const std::string& type) {
+  const std::vector<Pose> first = ram(type);
+  std::vector<std::unique_ptr<char[]>> other_memory;
+  for (int i = 0; i < 5000; ++i) other_memory.push_back(std::make_unique<char[]>(static_cast<size_t>(16 + 37 * (i % 50))));
+  for (size_t i = 0; i < other_memory.size(); i += 3) other_memory[i].reset();
+  const std::vector<Pose> second = ram(type);
+  ASSERT_EQ(first.size(), second.size());
+  EXPECT_EQ(std::memcmp(first.data(), second.data(), first.size() * sizeof(Pose)), 0);
+  double way = 0.0;    // something happened at all
+  for (size_t i = 0; i < 60; ++i) way += (first[first.size() - 60 + i].translation - first[i].translation).norm();
+  EXPECT_GT(way, 10.0);
+}
+
+TEST(Determinism, KinematicRobotsRammingThings) { expect_same_bits("kinematic"); }
+TEST(Determinism, WheeledRobotsRammingThings) { expect_same_bits("wheels"); }
+
+}  // namespace
+}  // namespace ruedo::robot::testing

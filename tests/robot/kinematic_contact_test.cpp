@@ -1,0 +1,205 @@
+// The kinematic drive against the world: walls, boxes, other robots, ramps, steps, falls.
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "sim.h"
+
+namespace ruedo::robot::testing {
+namespace {
+
+const std::string kNoWatchdog = "<ruedo:watchdog>0</ruedo:watchdog>";
+constexpr double kFront_m = 0.25;    // of the chassis before base_link
+
+class AnyStep : public ::testing::TestWithParam<int64_t> {};
+
+TEST_P(AnyStep, AWallStopsTheRobotAtFullSpeed) {
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) + box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"), GetParam());
+  sim.velocity(1.2, 0.0);
+  double furthest = 0.0;
+  for (int i = 0; i < 2'000'000 / GetParam(); ++i) {
+    sim.step();
+    furthest = std::max(furthest, sim.position().x());
+  }
+  EXPECT_NEAR(sim.position().x() + kFront_m, 1.0, 2e-3);
+  EXPECT_LT(furthest + kFront_m, 1.005);
+  EXPECT_NEAR(sim.yaw(), 0.0, 1e-3);
+  EXPECT_NEAR(sim.position().z(), 0.0, 1e-12);
+  EXPECT_NEAR(sim.robot().twist.linear.x(), 0.0, 0.02);
+  // The wheels turn as commanded: 1.2 m/s on 0.1 m for 2 s.
+  EXPECT_EQ(sim.robot().wheel_v, 1.2);
+  EXPECT_NEAR(sim.state.wheel_angles[0], 24.0, 1e-9);
+  ASSERT_FALSE(sim.state.contacts.empty());
+  EXPECT_NEAR(sim.state.contacts[0].normal.x(), -1.0, 1e-6);    // from the wall towards the robot
+}
+
+TEST_P(AnyStep, AwayFromTheWallItIsFreeAgain) {
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) + box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"), GetParam());
+  sim.velocity(0.8, 0.0);
+  sim.run(1.5);
+  sim.velocity(-0.5, 0.0);
+  sim.run(0.5);
+  const double x = sim.position().x();
+  sim.run(1.0);
+  EXPECT_NEAR(sim.position().x(), x - 0.5, 1e-12);
+}
+
+INSTANTIATE_TEST_SUITE_P(Steps, AnyStep, ::testing::Values(1000, 5000, 10000, 20000, 50000));
+
+TEST(KinematicContact, TheForceOnAWallIsTheDrivesLimit) {
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog + "<ruedo:max_force>60</ruedo:max_force>") +
+          box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"));
+  sim.velocity(1.0, 0.0);
+  sim.run(3.0);
+  double force = 0.0;
+  for (const Contact& contact : sim.state.contacts) force += contact.force;
+  EXPECT_NEAR(force, 60.0, 1.0);
+}
+
+TEST(KinematicContact, SlidesAlongASlantedWall) {
+  // A wall turned by 30 degrees to the robot's way.
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) + box_sdf("wall", "2 0.2 0.5 0 0 0.5236", "8 0.2 1"));
+  sim.velocity(0.5, 0.0);
+  sim.run(10.0);
+  EXPECT_GT(sim.position().x(), 1.5);
+}
+
+TEST(KinematicContact, PushesALightBoxNotAHeavyOne) {
+  const auto push = [](double mass) {
+    Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) + box_sdf("box", "0.6 0 0.15 0 0 0", "0.3 0.3 0.3", mass, 0.6));
+    sim.velocity(0.3, 0.0);
+    sim.run(4.0);
+    return sim.state.bodies[1].translation.x() - 0.6;
+  };
+  EXPECT_NEAR(push(5.0), 1.2 - 0.2, 0.05);       // 5 kg, 29 N of friction: pushed nearly as fast as commanded
+  EXPECT_LT(push(100.0), 0.01);                  // 590 N of friction against the robot's weight of 196 N
+}
+
+TEST(KinematicContact, AnotherRobotStopsIt) {
+  Sim sim(plane_sdf() + robot_sdf("a", "0 0 0 0 0 0", kNoWatchdog) + robot_sdf("b", "1.5 0 0 0 0 3.14159265358979", kNoWatchdog));
+  sim.velocity(0.5, 0.0, 0);
+  sim.velocity(0.5, 0.0, 1);
+  sim.run(4.0);
+  EXPECT_NEAR(sim.position(1).x() - sim.position(0).x(), 2 * kFront_m, 5e-3);
+  EXPECT_NEAR(sim.position(0).x(), 0.5, 0.03);    // alike, they hold each other in the middle
+}
+
+TEST(KinematicContact, APrimitiveBlockedByAWallEnds) {
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", limits(0.6, 1.0, 0.5, 0.5, 1.0)) + box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"));
+  sim.move(Move::ADVANCE, 3.0, 0, 0, 0, 0, 0, 9);
+  sim.run(6.0);
+  EXPECT_EQ(sim.robot().motion.id, 9);
+  EXPECT_EQ(sim.robot().motion.state, Status::STATE_ENDED);
+  EXPECT_EQ(sim.robot().motion.reason, Status::REASON_BLOCKED);
+  EXPECT_NEAR(sim.robot().motion.done, 0.75, 5e-3);
+  EXPECT_NEAR(sim.robot().motion.remaining, 2.25, 5e-3);
+  EXPECT_EQ(sim.robot().wheel_v, 0.0);
+}
+
+TEST(KinematicContact, APrimitiveThatPushesABoxStillEndsAtItsDistance) {
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", limits(0.5, 1.0, 0.5, 0.5, 1.0)) + box_sdf("box", "0.6 0 0.15 0 0 0", "0.3 0.3 0.3", 5.0));
+  sim.move(Move::ADVANCE, 1.0);
+  sim.run(8.0);
+  EXPECT_EQ(sim.robot().motion.state, Status::STATE_DONE);
+  EXPECT_NEAR(sim.position().x(), 1.0, 1e-3);
+}
+
+// A ramp of 15 degrees, 3 m long, its lower edge in the ground at x = 1.
+std::string ramp_sdf() { return box_sdf("ramp", "2.435 0 0.2872 0 -0.2618 0", "3 3 0.2"); }
+
+TEST(KinematicContact, ClimbsARampAndHoldsThere) {
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog + limits(1.0, 1.0, 1.0, 1.0, 1.0)) + ramp_sdf());
+  sim.velocity(0.5, 0.0);
+  sim.run(4.5);
+  EXPECT_GT(sim.position().z(), 0.15);
+  EXPECT_NEAR(std::asin((sim.robot().X_WBase.rotation * Vec3::UnitX()).z()), 0.2618, 5e-3);
+  sim.velocity(0.0, 0.0);
+  sim.run(3.0);
+  const Pose held = sim.robot().X_WBase;
+  sim.run(600.0);
+  EXPECT_LT((sim.robot().X_WBase.translation - held.translation).norm(), 1e-6);
+  EXPECT_LT(sim.robot().X_WBase.rotation.angularDistance(held.rotation), 1e-6);
+}
+
+TEST(KinematicContact, TheWayOnARampIsTheCommandedOne) {
+  Sim sim(plane_sdf() + robot_sdf("r", "2.2 0 0.4 0 -0.2618 0", limits(1.0, 1.0, 1.0, 1.0, 1.0)) + ramp_sdf());
+  sim.run(2.0);    // falls onto the ramp
+  const Vec3 before = sim.position();
+  sim.move(Move::ADVANCE, 0.8);
+  sim.run(3.0);
+  EXPECT_NEAR((sim.position() - before).norm(), 0.8, 1e-3);
+  sim.move(Move::ADVANCE, -0.8);
+  sim.run(3.0);
+  EXPECT_LT((sim.position() - before).norm(), 2e-3);
+}
+
+TEST(KinematicContact, BackOnThePlaneItIsAnalyticAgain) {
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog + limits(1.0, 1.0, 1.0, 1.0, 1.0)) + ramp_sdf());
+  sim.velocity(0.5, 0.0);
+  sim.run(4.0);
+  EXPECT_GT(sim.position().z(), 0.1);
+  sim.velocity(-0.5, 0.0);
+  sim.run(6.0);
+  EXPECT_EQ(sim.position().z(), 0.0);
+  EXPECT_EQ(sim.robot().X_WBase.rotation.x(), 0.0);
+}
+
+TEST(KinematicContact, DrivesOverALowStep) {
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog + limits(1.0, 1.0, 1.0, 1.0, 1.0)) +
+          box_sdf("step", "2 0 0.01 0 0 0", "1 3 0.02"));
+  sim.velocity(0.5, 0.0);
+  sim.run(4.0);
+  EXPECT_NEAR(sim.position().x(), 1.75, 0.1);
+  EXPECT_NEAR(sim.position().z(), 0.02, 2e-3);
+  sim.run(4.0);
+  EXPECT_NEAR(sim.position().z(), 0.0, 1e-9);
+}
+
+TEST(KinematicContact, OnABoxFloorItDrivesTheClosedForm) {
+  Sim sim(box_sdf("floor", "0 0 -0.5 0 0 0", "20 20 1") + robot_sdf("r", "0 0 0.001 0 0 0", limits(1.0, 1.0, 0.5, 1.0, 1.0)));
+  sim.run(1.0);
+  sim.move(Move::ADVANCE, 1.0);
+  sim.run(4.0);
+  EXPECT_NEAR(sim.position().x(), 1.0, 1e-4);
+  EXPECT_NEAR(sim.position().z(), 0.0, 1e-3);
+}
+
+TEST(KinematicContact, FallsFreelyAndLands) {
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 1 0 0 0", kNoWatchdog));
+  sim.velocity(0.5, 0.0);
+  sim.run(0.3);
+  EXPECT_NEAR(sim.position().z(), 1.0 - 0.5 * 9.8 * 0.09, 0.01);
+  EXPECT_NEAR(sim.position().x(), 0.0, 1e-9);    // wheels in the air drive nothing
+  sim.run(3.0);
+  EXPECT_NEAR(sim.position().z(), 0.0, 1e-9);
+  EXPECT_GT(sim.position().x(), 0.5);
+}
+
+TEST(KinematicContact, APlaneThatIsNotLevelIsARamp) {
+  // 0.1 rad about y: x goes down.
+  const std::string slope =
+      "<model name='ground'><static>true</static><pose>0 0 0 0 0.1 0</pose><link name='l'><collision name='c'><geometry><plane>"
+      "<normal>0 0 1</normal><size>100 100</size></plane></geometry></collision></link></model>";
+  Sim sim(slope + robot_sdf("r", "0 0 0.002 0 0.1 0", limits(1.0, 1.0, 0.5, 1.0, 1.0)));
+  sim.run(2.0);
+  const Vec3 start = sim.position();
+  sim.run(10.0);
+  EXPECT_LT((sim.position() - start).norm(), 1e-6);
+  sim.move(Move::ADVANCE, 1.0);
+  sim.run(4.0);
+  EXPECT_NEAR(sim.position().x() - start.x(), std::cos(0.1), 1e-4);
+  EXPECT_NEAR(sim.position().z() - start.z(), -std::sin(0.1), 1e-4);
+}
+
+TEST(KinematicContact, AMoverPushesARestingRobot) {
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", "<ruedo:max_force>20</ruedo:max_force>") +
+          "<model name='mover'><link name='l'><collision name='c'><geometry><box><size>0.4 0.4 0.4</size></box></geometry></collision></link>"
+          "<ruedo:path><ruedo:waypoint>0 -1 0 0.25 0 0 0</ruedo:waypoint><ruedo:waypoint>4 0 0 0.25 0 0 0</ruedo:waypoint>"
+          "<ruedo:loop>false</ruedo:loop></ruedo:path></model>");
+  sim.run(5.0);
+  EXPECT_NEAR(sim.state.bodies[1].translation.x(), 0.0, 1e-12);    // wherever the path says
+  EXPECT_NEAR(sim.position().x(), 0.45, 0.02);
+}
+
+}  // namespace
+}  // namespace ruedo::robot::testing

@@ -1,0 +1,86 @@
+// The wheels drive: distances, turn rates, rest, walls, ramps.
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "sim.h"
+
+namespace ruedo::robot::testing {
+namespace {
+
+const std::string kNoWatchdog = "<ruedo:watchdog>0</ruedo:watchdog>";
+
+std::string wheeled(const std::string& pose, const std::string& drive = limits(0.7, 1.0, 0.5, 0.5, 1.5)) {
+  return robot_sdf("r", pose, kNoWatchdog + drive, "wheels");
+}
+
+TEST(Wheels, AdvancesOneMetre) {
+  for (const double heading : {0.0, 0.6, 2.5}) {
+    Sim sim(plane_sdf() + wheeled("0 0 0 0 0 " + std::to_string(heading)));
+    sim.run(1.0);
+    const Vec3 start = sim.position();
+    sim.move(Move::ADVANCE, 1.0);
+    sim.run(6.0);
+    EXPECT_NEAR((sim.position() - start).norm(), 1.0, 2e-3);
+    EXPECT_NEAR(sim.yaw(), heading, 2e-3);
+    EXPECT_EQ(sim.robot().motion.state, Status::STATE_DONE);
+  }
+}
+
+TEST(Wheels, TurnsAtTheCommandedRateWhateverItsHeading) {
+  for (const double heading : {0.0, 0.8, 2.0}) {
+    Sim sim(plane_sdf() + wheeled("0 0 0 0 0 " + std::to_string(heading)));
+    sim.velocity(0.0, 0.5);
+    sim.run(2.0);
+    const double before = sim.yaw();
+    sim.run(4.0);
+    EXPECT_NEAR(wrap_angle(sim.yaw() - before), 2.0, 0.04);
+    // Skid steering slips: the wheels turn faster than they would have to.
+    EXPECT_GT(sim.robot().wheel_omega, 0.52);
+  }
+}
+
+TEST(Wheels, DrivesACircle) {
+  Sim sim(plane_sdf() + wheeled("0 0 0 0 0 0"));
+  sim.velocity(0.4, 0.4);
+  sim.run(3.0);
+  const double before = sim.yaw();
+  sim.run(5.0);
+  EXPECT_NEAR(wrap_angle(sim.yaw() - before), 2.0, 0.04);
+  EXPECT_NEAR(sim.robot().twist.linear.x(), 0.4, 0.02);
+}
+
+TEST(Wheels, RestsWithoutDrift) {
+  for (const bool ramp : {false, true}) {
+    Sim sim(plane_sdf() + wheeled(ramp ? "2.4 0 0.5 0 -0.2618 0" : "0 0 0.005 0 0 0") +
+            (ramp ? box_sdf("ramp", "2.435 0 0.2872 0 -0.2618 0", "3 3 0.2", 0.0, 1.0) : ""));
+    sim.run(4.0);
+    const Vec3 rest = sim.position();
+    EXPECT_GT(rest.z(), ramp ? 0.2 : -0.01);
+    sim.run(600.0);
+    EXPECT_LT((sim.position() - rest).norm(), 1e-6);
+    sim.velocity(0.3, 0.0);    // and it wakes
+    sim.run(2.0);
+    EXPECT_GT((sim.position() - rest).norm(), 0.3);
+  }
+}
+
+TEST(Wheels, AWallStopsIt) {
+  Sim sim(plane_sdf() + wheeled("0 0 0 0 0 0", limits(0.7, 1.0, 0.5, 0.5, 1.5) + "<ruedo:max_wheel_torque>5</ruedo:max_wheel_torque>") +
+          box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"));
+  sim.velocity(0.7, 0.0);
+  sim.run(4.0);
+  EXPECT_LT(sim.position().x() + 0.25, 1.01);
+  EXPECT_GT(sim.position().x() + 0.25, 0.97);
+}
+
+TEST(Wheels, AnotherRobotPushesIt) {
+  Sim sim(plane_sdf() + wheeled("0.8 0 0 0 0 0") + robot_sdf("k", "0 0 0 0 0 0", kNoWatchdog));
+  sim.run(1.0);
+  sim.velocity(0.5, 0.0, 1);
+  sim.run(3.0);
+  EXPECT_GT(sim.position(0).x(), 0.9);
+}
+
+}  // namespace
+}  // namespace ruedo::robot::testing
