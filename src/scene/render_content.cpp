@@ -118,6 +118,8 @@ class Builder {
       part.M_LP = M_LP;
       part.centre_L = M_LP.leftCols<3>() * piece.centre + M_LP.col(3);
       part.radius = piece.radius * pair.scale.cwiseAbs().maxCoeff();
+      part.low = piece.low;
+      part.high = piece.high;
       shade(material, visual, part);
       if (part.diffuse[3] < 0.004f) continue;    // invisible
       Batch b{pair.mesh, piece.first_index, piece.index_count, texture(material.texture), 0};
@@ -230,10 +232,15 @@ RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLa
                                          : layout.bodies[static_cast<size_t>(placement.body)].X_WB * placement.X_BL;
     for (const RenderPart& part : link_kinds[static_cast<size_t>(at->second)].parts) {
       if ((batches[static_cast<size_t>(part.batch)].flags & kGround) != 0) continue;
-      const Vec3 centre = X_WL * part.centre_L, half = Vec3::Constant(part.radius);
-      low = first ? Vec3(centre - half) : low.cwiseMin(centre - half);
-      high = first ? Vec3(centre + half) : high.cwiseMax(centre + half);
-      first = false;
+      for (int corner = 0; corner < 8; ++corner) {
+        const Vec3 p((corner & 1) != 0 ? part.high.x() : part.low.x(), (corner & 2) != 0 ? part.high.y() : part.low.y(),
+                     (corner & 4) != 0 ? part.high.z() : part.low.z());
+        const Vec3 p_W = X_WL * Vec3(part.M_LP.leftCols<3>() * p + part.M_LP.col(3));
+        if (first) bounds = {p_W, p_W};
+        bounds.low = bounds.low.cwiseMin(p_W);
+        bounds.high = bounds.high.cwiseMax(p_W);
+        first = false;
+      }
     }
   }
   for (const model::Light& light : world.lights) lights.push_back({light, -1});

@@ -8,6 +8,7 @@
 
 #include "model/body_layout.h"
 #include "scene/render_mesh.h"
+#include "scene/render_scene.h"
 #include "ruedo/snapshot.h"
 
 namespace ruedo::scene {
@@ -40,6 +41,7 @@ struct RenderPart {
   Affine M_LP;                          // from mesh coordinates to the link
   Vec3 centre_L = Vec3::Zero();         // bounding sphere
   double radius = 0.0;
+  Vec3 low = Vec3::Zero(), high = Vec3::Zero();    // bounding box, in mesh coordinates
   int batch = 0, small_batch = 0;       // indices into RenderContent::batches; small: for a distant view
   model::Rgba diffuse{}, specular{}, emissive{};    // specular[3] is the shininess; diffuse[3] the opacity
   bool transparent = false;
@@ -66,7 +68,7 @@ struct RenderContent {
   std::vector<int> kind_of_link;        // of each of BodyLayout::links; -1: nothing to draw
   std::vector<uint16_t> label_of_link;
   std::vector<RenderLight> lights;
-  Vec3 low = Vec3::Zero(), high = Vec3::Zero();    // bounds of all that is drawn at the start, but for planes; m, world
+  Bounds bounds{Vec3::Constant(-3.0), Vec3::Constant(3.0)};    // of all that is drawn at the start, but for the ground
 
   RenderContent(const model::WorldModel& world, const model::BodyLayout& layout);
 };

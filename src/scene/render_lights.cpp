@@ -93,14 +93,14 @@ void RenderLights::fill(const Culler& culler, const View& view, FrameBlock& fram
 void RenderLights::place_shadow(const Vec3& to_sun, const View& view) {
   // The whole world where it is small or seen from outside, else the surroundings of the camera.
   const Vec3 eye = view.X_WCamera.translation;
-  const Vec3 middle = 0.5 * (content_.low + content_.high);
-  const double whole = std::max(0.5 * (content_.high - content_.low).norm(), 1.0);
-  const double outside = (eye - eye.cwiseMax(content_.low).cwiseMin(content_.high)).norm();
+  const Vec3 middle = 0.5 * (content_.bounds.low + content_.bounds.high);
+  const double whole = std::max(0.5 * (content_.bounds.high - content_.bounds.low).norm(), 1.0);
+  const double outside = (eye - eye.cwiseMax(content_.bounds.low).cwiseMin(content_.bounds.high)).norm();
   const double half = std::min(whole, std::max(kShadowReach, outside));
   Vec3 centre = middle;
   if (half < whole) {
     centre = eye + 0.6 * half * (view.X_WCamera.rotation * Vec3::UnitX());
-    centre = centre.cwiseMax(content_.low).cwiseMin(content_.high);
+    centre = centre.cwiseMax(content_.bounds.low).cwiseMin(content_.bounds.high);
   }
   const Vec3 right = (std::abs(to_sun.z()) > 0.99 ? Vec3::UnitX() : Vec3::UnitZ()).cross(to_sun).normalized();
   const Vec3 up = to_sun.cross(right);

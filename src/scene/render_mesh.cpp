@@ -25,10 +25,12 @@ void bound(const RenderMesh& mesh, RenderMesh::Piece& piece) {
   for (auto i = begin; i != end; ++i) radius2 = std::max(radius2, (mesh.vertices[*i].position - centre).squaredNorm());
   piece.centre = centre.cast<double>();
   piece.radius = std::sqrt(static_cast<double>(radius2));
+  piece.low = low.cast<double>();
+  piece.high = high.cast<double>();
 }
 
 RenderMesh finish(RenderMesh mesh) {
-  mesh.pieces.push_back({0, static_cast<uint32_t>(mesh.indices.size()), -1, Vec3::Zero(), 0.0});
+  mesh.pieces.emplace_back().index_count = static_cast<uint32_t>(mesh.indices.size());
   bound(mesh, mesh.pieces.back());
   return mesh;
 }

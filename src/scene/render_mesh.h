@@ -23,6 +23,7 @@ struct RenderMesh {
     int material = -1;              // index into the model::Mesh's materials; -1: none
     Vec3 centre = Vec3::Zero();     // of the bounding sphere
     double radius = 0.0;
+    Vec3 low = Vec3::Zero(), high = Vec3::Zero();    // bounding box
   };
   std::vector<RenderVertex> vertices;
   std::vector<uint32_t> indices;    // three a triangle, counter-clockwise seen from outside

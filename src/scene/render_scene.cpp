@@ -101,6 +101,7 @@ class GlRenderer : public Renderer {
     if (picture.want_depth) to_metres(view, picture.depth);
   }
 
+  Bounds bounds() const override { return content_.bounds; }
   std::string description() const override { return description_; }
 
  private:

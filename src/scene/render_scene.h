@@ -48,11 +48,18 @@ struct Line {
   std::array<float, 4> rgba;
 };
 
+// A box along the world's axes, m.
+struct Bounds {
+  Vec3 low = Vec3::Zero(), high = Vec3::Zero();
+};
+
 class Renderer {
  public:
   virtual ~Renderer() = default;
   // Draws the world as in `snapshot`; the picture's vectors keep their capacity.
   virtual void draw(const Snapshot& snapshot, const View& view, Picture& picture, std::span<const Line> lines = {}) = 0;
+  // Of all that is drawn, at the start, but for the ground; around the origin where there is nothing.
+  virtual Bounds bounds() const = 0;
   virtual std::string description() const = 0;    // for ruedo doctor: backend, renderer, version
 };
 

@@ -1,0 +1,132 @@
+// ruedo render: one picture of a world at its start, from anywhere or as one of its cameras sees it.
+#include <filesystem>
+
+#include <fmt/format.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "cli/commands.h"
+#include "cli/render_devices.h"
+#include "cli/render_view.h"
+#include "ruedo/errors.h"
+#include "ruedo/image_t.hpp"
+
+namespace ruedo::cli {
+namespace {
+
+struct RenderArguments {
+  WorldArguments world;
+  std::string output, camera, view = "iso", size;
+  bool rays = false;
+};
+
+// Drawn at twice the size with smooth edges, then reduced, where memory allows.
+constexpr int kMaxSupersampledSide = 4096;
+
+cv::Mat picture_of_world(const RenderArguments& arguments, const model::WorldModel& world, const model::BodyLayout& layout) {
+  const auto renderer = scene::make_renderer(world, layout);
+  const Size size = arguments.size.empty() ? Size{} : parse_size(arguments.size);
+  scene::View view = parse_view(arguments.view, size, renderer->bounds());
+  const int factor = std::max(view.width, view.height) <= kMaxSupersampledSide ? 2 : 1;
+  const cv::Size wanted(view.width, view.height);
+  view.width *= factor;
+  view.height *= factor;
+  view.fx *= factor;
+  view.fy *= factor;
+  view.cx *= factor;
+  view.cy *= factor;
+  view.samples = 4;
+  scene::Picture picture;
+  const std::vector<scene::Line> lines = arguments.rays ? device_rays(world, layout) : std::vector<scene::Line>();
+  renderer->draw(initial_snapshot(layout), view, picture, lines);
+  cv::Mat rgb(view.height, view.width, CV_8UC3, picture.rgb.data()), reduced, bgr;
+  cv::resize(rgb, reduced, wanted, 0, 0, cv::INTER_AREA);
+  cv::cvtColor(reduced, bgr, cv::COLOR_RGB2BGR);
+  return bgr;
+}
+
+// What the camera itself gives: with its lens, noise and exposure, but not compressed.
+cv::Mat picture_of_camera(const RenderArguments& arguments, const model::WorldModel& world, const model::BodyLayout& layout) {
+  const auto device = make_lone_device(world, layout, arguments.camera, !arguments.world.no_noise);
+  if (!device || !device->kind->needs_renderer) {
+    std::vector<std::string> cameras;
+    for (const std::string& name : device_names(world, layout)) {
+      const auto other = make_lone_device(world, layout, name, false);
+      if (other && other->kind->needs_renderer) cameras.push_back(name);
+    }
+    const std::string near = nearest_word(arguments.camera, cameras);
+    throw InputError({}, fmt::format("--camera {}: there is no such camera; {}", arguments.camera,
+                                     cameras.empty() ? "the world has none" : fmt::format("there are: {}", fmt::join(cameras, ", "))) +
+                             (near.empty() ? "" : "; did you mean " + near + "?"));
+  }
+  const auto renderer = scene::make_renderer(world, layout);
+  Outbox out;
+  device->sensor->sample({initial_snapshot(layout), 0, nullptr, renderer.get()}, out);
+  for (const Outbox::Entry& entry : out.entries()) {
+    if (device->channels[static_cast<size_t>(entry.channel)] != arguments.camera) continue;
+    image_t image;
+    if (image.decode(out.data(entry), 0, static_cast<int>(entry.size)) < 0) break;
+    if (image.pixelformat == image_t::PIXEL_FORMAT_MJPEG) return cv::imdecode(image.data, cv::IMREAD_COLOR);
+    const bool grey = image.pixelformat == image_t::PIXEL_FORMAT_GRAY;
+    cv::Mat bgr, pixels(image.height, image.width, grey ? CV_8UC1 : CV_8UC3, image.data.data(), static_cast<size_t>(image.row_stride));
+    if (grey) return pixels.clone();
+    cv::cvtColor(pixels, bgr, cv::COLOR_RGB2BGR);
+    return bgr;
+  }
+  throw EnvironmentError("the camera gave no picture");
+}
+
+// Colour pictures of that camera come raw, in the size that is asked for.
+model::LoadOptions options_of(const RenderArguments& arguments) {
+  model::LoadOptions options = load_options(arguments.world);
+  if (arguments.camera.empty()) return options;
+  const size_t slash = arguments.camera.find('/');
+  if (slash == std::string::npos) throw InputError({}, "--camera " + arguments.camera + ": allowed is ROBOT/DEVICE");
+  const std::string robot = arguments.camera.substr(0, slash), device = arguments.camera.substr(slash + 1);
+  const Size size = arguments.size.empty() ? Size{} : parse_size(arguments.size);
+  if (size.width == 0) return options;
+  options.settings.push_back({robot, device, "camera.image.width", std::to_string(size.width)});
+  options.settings.push_back({robot, device, "camera.image.height", std::to_string(size.height)});
+  return options;
+}
+
+int render(const RenderArguments& arguments) {
+  if (!arguments.camera.empty() && arguments.rays) {
+    throw InputError({}, "--rays goes with --view, not with --camera: a camera does not see the rays");
+  }
+  std::string extension = std::filesystem::path(arguments.output).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (extension != ".png" && extension != ".jpg" && extension != ".jpeg") {
+    throw InputError({}, "-o " + arguments.output + ": allowed are names that end in .png, .jpg or .jpeg");
+  }
+  const auto world = model::load_world(arguments.world.world, options_of(arguments));
+  print_findings(world->findings);
+  const model::BodyLayout layout(*world);
+  const cv::Mat bgr = arguments.camera.empty() ? picture_of_world(arguments, *world, layout) : picture_of_camera(arguments, *world, layout);
+  bool written = false;
+  try {
+    written = cv::imwrite(arguments.output, bgr);
+  } catch (const cv::Exception&) {
+  }
+  if (!written) throw EnvironmentError("cannot write " + arguments.output);
+  fmt::print("{}: {} x {} pixels\n", arguments.output, bgr.cols, bgr.rows);
+  return kGood;
+}
+
+void add_render(CLI::App& app, Action& chosen) {
+  CLI::App* command = app.add_subcommand("render", "draw a picture of a world at its start");
+  const auto arguments = std::make_shared<RenderArguments>();
+  add_world_arguments(*command, arguments->world);
+  command->add_option("-o,--output", arguments->output, "the picture: .png or .jpg")->type_name("FILE")->required();
+  auto* camera = command->add_option("--camera", arguments->camera, "as this camera sees it")->type_name("ROBOT/DEVICE");
+  command->add_option("--view", arguments->view, "top, iso, or x,y,z,roll,pitch,yaw (m, rad; x looks ahead)")
+      ->type_name("VIEW")->capture_default_str()->excludes(camera);
+  command->add_option("--size", arguments->size, "of the picture, in pixels")->type_name("WxH");
+  command->add_flag("--rays", arguments->rays, "draw the rays of laser scanners and the cones of sonars");
+  command->callback([arguments, &chosen] { chosen = [arguments] { return render(*arguments); }; });
+}
+
+const RegisterCommand kRegister{40, add_render};
+
+}  // namespace
+}  // namespace ruedo::cli

@@ -1,0 +1,22 @@
+// Where ruedo render looks from: a pose on the command line, or one that frames the whole world.
+#pragma once
+
+#include <string>
+
+#include "ruedo/pose.h"
+#include "scene/render_scene.h"
+
+namespace ruedo::cli {
+
+struct Size {
+  int width = 0, height = 0;    // pixels; 0: not given
+};
+
+// "WxH". Throws InputError.
+Size parse_size(const std::string& text);
+
+// text: "top" (parallel, from above, x to the right), "iso" (from above at an angle), or "x,y,z,roll,pitch,yaw"
+// (m, rad; x ahead). bounds: of what there is to see. A size that is not given is chosen. Throws InputError.
+scene::View parse_view(const std::string& text, Size size, const scene::Bounds& bounds);
+
+}  // namespace ruedo::cli
