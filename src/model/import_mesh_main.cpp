@@ -177,13 +177,16 @@ aiMatrix4x4 to_z_up(const aiScene& scene, const std::string& extension) {
   turn.c2 = 1;
   if (extension == "gltf" || extension == "glb" || extension == "3ds") return turn;
   if (extension == "fbx") {
-    double centimetres = 1.0;    // FBX's own unit
+    float centimetres = 1.0f;    // in one of the file's units
     int up = 1;
     if (scene.mMetaData) {
-      scene.mMetaData->Get("UnitScaleFactor", centimetres);
+      double wide = 0;
+      if (!scene.mMetaData->Get("UnitScaleFactor", centimetres) && scene.mMetaData->Get("UnitScaleFactor", wide)) {
+        centimetres = static_cast<float>(wide);
+      }
       scene.mMetaData->Get("UpAxis", up);
     }
-    aiMatrix4x4::Scaling(aiVector3D(static_cast<float>(centimetres / 100.0)), scale);
+    aiMatrix4x4::Scaling(aiVector3D(centimetres / 100.0f), scale);
     return up == 1 ? turn * scale : scale;
   }
   return {};

@@ -1,0 +1,333 @@
+// Models and worlds from text: poses by hand, includes, drives, names, findings, body layout, fleets.
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "model/body_layout.h"
+#include "model/load.h"
+#include "temporary_folder.h"
+
+namespace ruedo::model {
+namespace {
+
+std::shared_ptr<const WorldModel> world_of(const std::string& inside) {
+  return load_world_text("<sdf version='1.9'><world name='w'>" + inside + "</world></sdf>", "/nowhere/world.sdf");
+}
+
+const Link& link_of(const Model& model, const std::string& name) {
+  const auto at = std::find_if(model.links.begin(), model.links.end(), [&](const Link& link) { return link.name == name; });
+  if (at == model.links.end()) throw std::runtime_error("no link " + name);
+  return *at;
+}
+
+std::vector<std::string> texts(const WorldModel& world) {
+  std::vector<std::string> list;
+  for (const Finding& finding : world.findings) list.push_back(finding.text);
+  return list;
+}
+
+// A cart: base 0.4 m up; wheels of radius 0.1 at x 0.2, y +-0.25, on joints that are not at their links' origins.
+std::string cart(const std::string& extra, const std::string& name = "cart") {
+  const auto wheel = [](const std::string& side, const std::string& y) {
+    return "<link name='" + side + "'><pose>0 0 0.1 0 0 0</pose><inertial><mass>1</mass></inertial><collision name='c'><pose>0.2 " + y +
+           " 0 1.5707963267948966 0 0</pose><geometry><cylinder><radius>0.1</radius><length>0.05</length></cylinder></geometry></collision></link>"
+           "<joint name='" + side + "_joint' type='revolute'><pose>0.2 " + y + " 0 0 0 0</pose><parent>base</parent><child>" + side +
+           "</child><axis><xyz>0 1 0</xyz></axis></joint>";
+  };
+  return "<model name='" + name + "'><link name='base'><pose>0 0 0.4 0 0 0</pose><inertial><mass>10</mass></inertial></link>" + wheel("left", "0.25") +
+         wheel("right", "-0.25") + extra + "</model>";
+}
+const char* kDrive = "<ruedo:drive><ruedo:left_joint>left_joint</ruedo:left_joint><ruedo:right_joint>right_joint</ruedo:right_joint>";
+
+TEST(Poses, RelativeFramesByHand) {
+  // frame f: 1 m ahead of a, turned left by a right angle; b is 2 m ahead of f, so 2 m to the left of it.
+  const auto world = world_of(
+      "<model name='m'><pose>10 0 0 0 0 1.5707963267948966</pose><link name='a'><pose>0 0 1 0 0 0</pose></link>"
+      "<frame name='f' attached_to='a'><pose>1 0 0 0 0 1.5707963267948966</pose></frame>"
+      "<link name='b'><pose relative_to='f'>2 0 0 0 0 0</pose></link></model>");
+  const ModelInstance& m = world->models.at(0);
+  const Link& b = link_of(*m.model, "b");
+  EXPECT_LT((b.X_ML.translation - Vec3(1, 2, 1)).norm(), 1e-12);
+  EXPECT_NEAR(heading(b.X_ML.rotation), M_PI / 2, 1e-12);
+  // The model itself is turned: its (1, 2) is (-2, 1) in the world.
+  EXPECT_LT(((m.X_WM * b.X_ML).translation - Vec3(8, 1, 1)).norm(), 1e-12);
+}
+
+TEST(Poses, OldFrameAttributeMeansRelativeTo) {
+  const auto world = load_world_text(
+      "<sdf version='1.4'><world name='w'><model name='m'><link name='a'><pose>0 0 1 0 0 0</pose></link>"
+      "<link name='b'><pose frame='a'>0 0 1 0 0 0</pose></link></model></world></sdf>", "/nowhere/world.sdf");
+  EXPECT_DOUBLE_EQ(link_of(*world->models.at(0).model, "b").X_ML.translation.z(), 2.0);
+}
+
+TEST(Poses, CanonicalLinkComesFirstAndIndicesFollow) {
+  const auto world = world_of(
+      "<model name='m' canonical_link='c'><link name='a'/><link name='b'/><link name='c'><sensor name='s' type='imu'/></link>"
+      "<joint name='j' type='ball'><parent>a</parent><child>c</child></joint></model>");
+  const Model& m = *world->models.at(0).model;
+  EXPECT_EQ(m.links[0].name, "c");
+  EXPECT_EQ(m.links[static_cast<size_t>(m.joints[0].parent)].name, "a");
+  EXPECT_EQ(m.links[static_cast<size_t>(m.joints[0].child)].name, "c");
+  EXPECT_EQ(m.sensors[0].link, 0);
+}
+
+TEST(Includes, OverridesAndNames) {
+  TemporaryFolder folder;
+  folder.write("models/cone/model.config", "<model><sdf version='1.4'>old.sdf</sdf><sdf version='1.9'>new.sdf</sdf></model>");
+  folder.write("models/cone/new.sdf", "<sdf version='1.9'><model name='cone'><pose>0 0 5 0 0 0</pose><link name='l'/></model></sdf>");
+  folder.write("models/cone/old.sdf", "<sdf version='1.4'><model name='old'><link name='l'/></model></sdf>");
+  const std::string file = folder.write("worlds/w.sdf",
+      "<sdf version='1.9'><world name='w'><include><uri>model://cone</uri></include>"
+      "<include><uri>model://cone</uri><name>second</name><pose>1 2 3 0 0 0</pose><static>true</static></include>"
+      "<include><uri>model://cone</uri><name>robot</name><sensor name='eye' type='imu'/><plugin filename='libx.so' name='x'/></include>"
+      "<include><uri>https://fuel.gazebosim.org/1.0/Somebody/models/Cone</uri><name>fuel</name></include>"
+      "<include><uri>model://none</uri></include></world></sdf>");
+  const auto world = load_world(file);
+  ASSERT_EQ(world->models.size(), 4u);
+  EXPECT_EQ(world->models[0].name, "cone");
+  EXPECT_EQ(world->models[0].X_WM.translation.z(), 5);
+  EXPECT_EQ(world->models[1].X_WM.translation, Vec3(1, 2, 3));
+  EXPECT_TRUE(world->models[1].model->is_static);
+  EXPECT_FALSE(world->models[0].model->is_static);
+  ASSERT_EQ(world->models[2].model->sensors.size(), 1u);
+  EXPECT_EQ(world->models[2].model->sensors[0].name, "eye");
+  EXPECT_TRUE(world->models[0].model->sensors.empty());
+  EXPECT_EQ(world->models[3].model, world->models[0].model);
+  EXPECT_EQ(texts(*world), (std::vector<std::string>{"plugins are not loaded: libx.so", "'model://none' is not found; the world goes on without it"}));
+  EXPECT_EQ(world->findings.back().source.line, 1);
+  EXPECT_EQ(world->files_read.size(), 2u);
+}
+
+TEST(Includes, AThousandShareOneModel) {
+  TemporaryFolder folder;
+  folder.write("robot.sdf", "<sdf version='1.9'>" + cart(std::string(kDrive) + "</ruedo:drive>") + "</sdf>");
+  std::string text = "<sdf version='1.9'><world name='w'>";
+  for (int i = 0; i < 1000; ++i) {
+    text += "<include><uri>robot.sdf</uri><name>r" + std::to_string(i) + "</name><pose>" + std::to_string(i) + " 0 0 0 0 0</pose><static>false</static></include>";
+  }
+  const auto world = load_world(folder.write("fleet.sdf", text + "</world></sdf>"));
+  ASSERT_EQ(world->models.size(), 1000u);
+  for (const ModelInstance& each : world->models) EXPECT_EQ(each.model, world->models[0].model);
+  EXPECT_EQ(world->files_read.size(), 2u);
+  const BodyLayout layout(*world);
+  EXPECT_EQ(layout.bodies.size(), 1000u);
+  EXPECT_EQ(layout.wheels.size(), 2000u);
+}
+
+TEST(Names, OfSensors) {
+  const auto world = world_of(
+      "<model name='m'><link name='a'><sensor name='eye' type='imu'/><sensor name='x::y' type='imu'/></link><link name='b'><sensor name='eye' type='imu'/></link>"
+      "<model name='arm'><link name='hand'><sensor name='eye' type='imu'/></link></model></model>");
+  std::vector<std::string> names;
+  for (const auto& sensor : world->models.at(0).model->sensors) names.push_back(sensor.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"a-eye", "x.y", "b-eye", "arm.eye"}));
+  EXPECT_NO_THROW(link_of(*world->models.at(0).model, "arm.hand"));
+}
+
+TEST(Names, ASecondThingIsRenamedAndTold) {
+  const auto world = world_of("<model name='box'><link name='l'/></model><model name='box'><link name='l'/></model>");
+  ASSERT_EQ(world->models.size(), 2u);
+  EXPECT_EQ(world->models[1].name, "box_2");
+  EXPECT_EQ(texts(*world), (std::vector<std::string>{"a second thing of the name 'box'; this one is called 'box_2'"}));
+}
+
+TEST(Findings, WhatIsNotSupportedIsNamedOnce) {
+  const auto world = world_of(
+      "<gui><camera name='c'/></gui><road name='r'/><physics type='ode'><max_step_size>0.0033333333</max_step_size></physics>"
+      "<model name='m'><link name='l'><colision/><inertial><mass>1</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>5</izz></inertia></inertial>"
+      "<collision name='c'><geometry><box><size>1 2 3</size></box></geometry></collision>"
+      "<visual name='v'><geometry><mesh><uri>model://x/y.dae</uri></mesh></geometry></visual></link></model>");
+  EXPECT_EQ(world->step_us, 3333);
+  EXPECT_EQ(texts(*world), (std::vector<std::string>{
+      "<road> is not supported and left out",
+      "the step 0.0033333333 s is not a whole number of microseconds; it is 3333 us instead",
+      "<colision> is not supported and left out; did you mean <collision>?",
+      "the mesh 'model://x/y.dae' is not found; the shape is left out",
+      "one moment of inertia is larger than the sum of the two others; the inertia of a box of 1 x 2 x 3 m is taken instead"}));
+  // A box of 1 kg: m/12 (b^2 + c^2).
+  const Eigen::Matrix3d I = world->models.at(0).model->links[0].inertial.inertia;
+  EXPECT_NEAR(I(0, 0), 13.0 / 12, 1e-12);
+  EXPECT_NEAR(I(2, 2), 5.0 / 12, 1e-12);
+}
+
+TEST(Scene, LightsMaterialsAndSurfaces) {
+  const auto world = world_of(
+      "<gravity>0 0 -1.6</gravity><scene><ambient>0.1 0.2 0.3 1</ambient><shadows>false</shadows><sky/></scene>"
+      "<light name='s' type='spot'><pose>0 0 4 0 0 0</pose><direction>0 0 -2</direction><spot><outer_angle>0.6</outer_angle></spot>"
+      "<attenuation><range>7</range></attenuation></light>"
+      "<model name='m'><link name='l'><collision name='c'><geometry><sphere><radius>1</radius></sphere></geometry><surface><friction><ode><mu>0.4</mu></ode></friction>"
+      "<bounce><restitution_coefficient>0.3</restitution_coefficient></bounce><ruedo:laser_reflectance>0.5</ruedo:laser_reflectance></surface></collision>"
+      "<visual name='v'><geometry><sphere><radius>1</radius></sphere></geometry><material><script><name>Gazebo/RedTransparent</name></script></material></visual>"
+      "</link></model>");
+  EXPECT_EQ(world->gravity, Vec3(0, 0, -1.6));
+  EXPECT_FLOAT_EQ(world->sky.ambient[1], 0.2f);
+  EXPECT_TRUE(world->sky.sky);
+  EXPECT_FALSE(world->sky.shadows);
+  EXPECT_EQ(world->lights.at(0).type, Light::Type::spot);
+  EXPECT_EQ(world->lights[0].direction, Vec3(0, 0, -1));
+  EXPECT_EQ(world->lights[0].range, 7);
+  const Link& link = world->models.at(0).model->links[0];
+  EXPECT_EQ(link.collisions.at(0).surface.friction, 0.4);
+  EXPECT_EQ(link.collisions[0].surface.friction2, 0.4);
+  EXPECT_EQ(link.collisions[0].surface.restitution, 0.3);
+  EXPECT_EQ(link.collisions[0].surface.laser_reflectance, 0.5);
+  EXPECT_EQ(link.visuals.at(0).material->diffuse, (Rgba{1, 0, 0, 0.5f}));
+}
+
+TEST(Scene, ActorsWalkAsCylinders) {
+  const auto world = world_of(
+      "<actor name='p'><skin><filename>walk.dae</filename></skin><script><loop>false</loop><delay_start>1</delay_start><trajectory id='0' type='walk'>"
+      "<waypoint><time>0</time><pose>1 2 1.1 1.57 0 0</pose></waypoint><waypoint><time>4</time><pose>5 2 1.1 1.57 0 0.5</pose></waypoint>"
+      "</trajectory></script></actor>");
+  const ModelInstance& p = world->models.at(0);
+  ASSERT_TRUE(p.model->path);
+  const auto waypoints = p.model->path->all("ruedo:waypoint");
+  ASSERT_EQ(waypoints.size(), 2u);
+  EXPECT_EQ(waypoints[1]->text, "5 5 2 0 0 0 0.5");
+  EXPECT_FALSE(p.model->path->boolean("ruedo:loop", true));
+  EXPECT_EQ(p.X_WM.translation, Vec3(1, 2, 0));
+  EXPECT_FALSE(p.model->is_static);
+}
+
+TEST(Drive, DefaultsComeFromTheWheels) {
+  const auto world = world_of(cart(std::string(kDrive) + "<ruedo:max_speed>1.5</ruedo:max_speed><ruedo:acceleration>2</ruedo:acceleration>"
+                                                         "<ruedo:watchdog>0.25</ruedo:watchdog></ruedo:drive><ruedo:odometry><ruedo:rate>12.5</ruedo:rate></ruedo:odometry>"));
+  const DriveDescription& d = *world->models.at(0).model->drive;
+  EXPECT_DOUBLE_EQ(d.wheel_radius, 0.1);
+  EXPECT_DOUBLE_EQ(d.track, 0.5);
+  EXPECT_LT((d.X_MBase.translation - Vec3(0.2, 0, 0)).norm(), 1e-12);
+  EXPECT_EQ(d.max_speed, 1.5);
+  EXPECT_EQ(d.deceleration, 2);    // as the acceleration
+  EXPECT_EQ(d.watchdog_us, 250'000);
+  EXPECT_EQ(d.odometry_rate, (Rate{25, 2}));
+  EXPECT_NEAR(d.max_force, 12 * 9.80665, 1e-9);
+}
+
+TEST(Drive, SidesThatAreSwappedAreSwappedBack) {
+  const auto world = world_of(cart("<plugin filename='libgazebo_ros_diff_drive.so' name='d'><leftJoint>right_joint</leftJoint><rightJoint>left_joint</rightJoint></plugin>"));
+  const Model& m = *world->models.at(0).model;
+  EXPECT_EQ(m.joints[static_cast<size_t>(m.drive->left_joints[0])].name, "left_joint");
+  EXPECT_NEAR(heading(m.drive->X_MBase.rotation), 0, 1e-12);
+}
+
+TEST(Drive, GazeboPlugins) {
+  struct Plugin {
+    const char* attributes;
+    const char* inside;
+    double radius, track, speed;
+  };
+  const double none = std::numeric_limits<double>::infinity();
+  const Plugin plugins[] = {
+      {"filename='gz-sim-diff-drive-system' name='gz::sim::systems::DiffDrive'",
+       "<left_joint>left_joint</left_joint><right_joint>right_joint</right_joint><wheel_separation>0.6</wheel_separation><wheel_radius>0.2</wheel_radius>"
+       "<max_linear_velocity>0.7</max_linear_velocity>", 0.2, 0.6, 0.7},
+      {"filename='libignition-gazebo6-diff-drive-system.so' name='ignition::gazebo::systems::DiffDrive'",
+       "<left_joint>left_joint</left_joint><right_joint>right_joint</right_joint>", 0.1, 0.5, none},
+      {"filename='libgazebo_ros_diff_drive.so' name='d'",
+       "<left_joint>left_joint</left_joint><right_joint>right_joint</right_joint><wheel_separation>0.55</wheel_separation><wheel_diameter>0.3</wheel_diameter>", 0.15, 0.55, none},
+      {"filename='libDiffDrivePlugin.so' name='d'", "<left_joint>cart::left_joint</left_joint><right_joint>right_joint</right_joint><torque>5</torque>", 0.1, 0.5, none},
+      {"filename='libSkidSteerDrivePlugin.so' name='d'", "<left_front>left_joint</left_front><right_front>right_joint</right_front><MaxForce>5</MaxForce>", 0.1, 0.5, none},
+      {"filename='libgazebo_ros_skid_steer_drive.so' name='d'",
+       "<leftFrontJoint>left_joint</leftFrontJoint><rightFrontJoint>right_joint</rightFrontJoint><wheelSeparation>0.4</wheelSeparation><wheelDiameter>0.215</wheelDiameter>",
+       0.1075, 0.4, none},
+  };
+  for (const Plugin& plugin : plugins) {
+    SCOPED_TRACE(plugin.attributes);
+    const auto world = world_of(cart(std::string("<plugin ") + plugin.attributes + ">" + plugin.inside + "</plugin>"));
+    EXPECT_TRUE(world->findings.empty());
+    ASSERT_TRUE(world->models.at(0).model->drive);
+    const DriveDescription& d = *world->models[0].model->drive;
+    EXPECT_DOUBLE_EQ(d.wheel_radius, plugin.radius);
+    EXPECT_DOUBLE_EQ(d.track, plugin.track);
+    EXPECT_EQ(d.max_speed, plugin.speed);
+  }
+  const auto other = world_of(cart("<plugin filename='libgazebo_ros_planar_move.so' name='p'/>"));
+  EXPECT_FALSE(other->models.at(0).model->drive);
+  EXPECT_EQ(texts(*other), (std::vector<std::string>{"plugins are not loaded: libgazebo_ros_planar_move.so"}));
+}
+
+TEST(Layout, KinematicRobotIsOneBody) {
+  const std::string caster =
+      "<link name='caster'><pose>-0.3 0 0.05 0 0 0</pose><collision name='c'><geometry><sphere><radius>0.05</radius></sphere></geometry></collision></link>"
+      "<joint name='caster_joint' type='ball'><parent>base</parent><child>caster</child></joint>"
+      "<link name='pan'><pose>0 0 0.8 0 0 0</pose><collision name='c'><geometry><box><size>0.1 0.1 0.1</size></box></geometry></collision></link>"
+      "<joint name='pan_joint' type='continuous'><parent>base</parent><child>pan</child><axis><xyz>0 0 1</xyz></axis></joint>";
+  const auto world = world_of("<model name='wall'><static>true</static><pose>0 0 7 0 0 0</pose><link name='w'/></model>" +
+                              cart(std::string(kDrive) + "</ruedo:drive>" + caster));
+  const BodyLayout layout(*world);
+  // The base with both wheels and the caster; the pan on its joint.
+  ASSERT_EQ(layout.bodies.size(), 2u);
+  EXPECT_EQ(layout.bodies[0].name, "cart/base");
+  EXPECT_EQ(layout.bodies[1].name, "cart/pan");
+  EXPECT_EQ(layout.bodies[0].links.size(), 4u);
+  ASSERT_EQ(layout.joints.size(), 1u);
+  EXPECT_EQ(layout.joints[0].parent_body, 0);
+  EXPECT_EQ(layout.joints[0].child_body, 1);
+  EXPECT_EQ(layout.links[0].body, -1);
+  EXPECT_EQ(layout.links[0].X_BL.translation.z(), 7);    // static: in the world
+  ASSERT_EQ(layout.robots.size(), 1u);
+  EXPECT_EQ(layout.robots[0].body, 0);
+  EXPECT_LT((layout.robots[0].X_BBase.translation - Vec3(0.2, 0, -0.4)).norm(), 1e-12);
+  ASSERT_EQ(layout.wheels.size(), 2u);
+  EXPECT_TRUE(layout.wheels[0].left);
+  EXPECT_EQ(layout.wheels[0].axis_in_L, Vec3(0, 1, 0));
+  EXPECT_LT((layout.wheels[0].center_in_L - Vec3(0.2, 0.25, 0)).norm(), 1e-12);
+  // A wheel's axle stays where it is however the wheel turns.
+  const int left = layout.wheels[0].link;
+  for (const double angle : {0.0, 1.0, 10.0}) {
+    const Pose X_BL = layout.link_in_body(left, {angle, 0});
+    EXPECT_LT((X_BL * Vec3(0.2, 0.25, 0) - Vec3(0.2, 0.25, -0.3)).norm(), 1e-12);
+  }
+  // A quarter turn ahead brings the foremost point to the bottom.
+  const Pose X_BL = layout.link_in_body(left, {M_PI / 2, 0});
+  EXPECT_LT((X_BL * Vec3(0.3, 0.25, 0) - Vec3(0.2, 0.25, -0.4)).norm(), 1e-12);
+}
+
+TEST(Layout, WheelsDriveHasABodyForEachWheel) {
+  std::string drive = kDrive;
+  drive.insert(drive.find('>'), " type='wheels'");
+  const auto world = world_of(cart(drive + "</ruedo:drive>"));
+  const BodyLayout layout(*world);
+  EXPECT_EQ(layout.bodies.size(), 3u);
+  EXPECT_TRUE(layout.joints.empty());
+  EXPECT_EQ(layout.wheels.size(), 2u);
+  EXPECT_EQ(layout.links[static_cast<size_t>(layout.wheels[0].link)].wheel, -1);
+}
+
+TEST(Layout, StaticPartOfAMovingModelStays) {
+  const auto world = world_of(
+      "<model name='gate'><link name='bar'/><model name='post'><static>true</static><link name='p'/></model>"
+      "<joint name='hinge' type='revolute'><parent>post::p</parent><child>bar</child><axis><xyz>0 0 1</xyz></axis></joint></model>");
+  const BodyLayout layout(*world);
+  ASSERT_EQ(layout.bodies.size(), 1u);
+  EXPECT_EQ(layout.bodies[0].name, "gate/bar");
+  ASSERT_EQ(layout.joints.size(), 1u);
+  EXPECT_EQ(layout.joints[0].parent_body, -1);
+}
+
+TEST(Corpus, TheTwoWorldsLoadWithTheirMeshes) {
+  const std::string corpus = std::string(RUEDO_SOURCE_DIR) + "/../shared/corpus";
+  if (!std::filesystem::exists(corpus)) GTEST_SKIP() << "the corpus of real worlds is not here: " << corpus;
+  const auto house = load_world(corpus + "/turtlebot3/worlds/turtlebot3_house.world");
+  ASSERT_EQ(house->models.size(), 2u);
+  EXPECT_EQ(house->models[0].name, "ground_plane");
+  EXPECT_EQ(house->models[1].model->links.size(), 34u);
+  EXPECT_TRUE(house->models[1].model->is_static);
+  const auto warehouse = load_world(corpus + "/small_warehouse/worlds/no_roof_small_warehouse.world");
+  EXPECT_EQ(warehouse->models.size(), 25u);
+  ASSERT_EQ(warehouse->findings.size(), 1u);
+  EXPECT_EQ(warehouse->findings[0].kind, Finding::Kind::repaired);
+  // The authors' boxes say how large their shelves are: COLLADA's centimetres have become metres.
+  for (const ModelInstance& each : warehouse->models) {
+    for (const Visual& visual : each.model->links[0].visuals) {
+      Eigen::AlignedBox3f box;
+      for (const auto& p : visual.geometry.mesh->positions) box.extend(p);
+      EXPECT_LT(box.sizes().maxCoeff(), 25.0f) << each.name;
+      EXPECT_GT(box.sizes().maxCoeff(), 0.2f) << each.name;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ruedo::model
