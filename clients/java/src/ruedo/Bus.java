@@ -8,7 +8,6 @@ import java.net.URI;
 import java.nio.channels.DatagramChannel;
 import java.util.regex.Pattern;
 import lcm.lcm.LCM;
-import lcm.lcm.LCMDataInputStream;
 import lcm.lcm.LCMDataOutputStream;
 import lcm.lcm.LCMEncodable;
 
@@ -17,8 +16,8 @@ final class Bus {
     static final String DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0";
 
     interface Handler {
-        /** in: at the first byte of the message. */
-        void receive(LCMDataInputStream in);
+        /** message: all of its bytes. */
+        void receive(byte[] message);
     }
 
     private final LCM lcm;
@@ -81,8 +80,10 @@ final class Bus {
         lcm.subscribe(Pattern.quote(channel), (from, name, in) -> {
             if (closed) return;
             try {
-                handler.receive(in);
-            } catch (RuntimeException | OutOfMemoryError error) {    // whatever came, the receiving thread lives
+                byte[] message = new byte[in.available()];
+                in.readFully(message);
+                handler.receive(message);
+            } catch (IOException | RuntimeException error) {    // whatever came, the receiving thread lives
                 System.err.println("ruedo: a handler of " + name + " failed: " + error);
             }
         });

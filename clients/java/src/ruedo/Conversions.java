@@ -4,9 +4,7 @@ import java.io.IOException;
 import java.util.ArrayList;
 import java.util.List;
 import java.util.Map;
-import lcm.lcm.LCMDataInputStream;
 import ruedo.lcmtypes.camera_info_t;
-import ruedo.lcmtypes.contact_point_t;
 import ruedo.lcmtypes.contact_t;
 import ruedo.lcmtypes.image_t;
 import ruedo.lcmtypes.imu_t;
@@ -18,7 +16,7 @@ import ruedo.lcmtypes.planar_lidar_t;
 import ruedo.lcmtypes.pose_t;
 import ruedo.lcmtypes.sonar_t;
 
-/** How each message type becomes a sample. */
+/** How each message type becomes a sample. Arguments are evaluated from left to right, which is the order on the wire. */
 final class Conversions {
     /** A message type: its fingerprint, and how its bytes become a sample. */
     static final class Conversion {
@@ -32,7 +30,7 @@ final class Conversions {
     }
 
     interface Decoder {
-        Sample decode(LCMDataInputStream in) throws IOException;
+        Sample decode(WireReader in) throws IOException;
     }
 
     private static final Map<String, Conversion> ALL = Map.ofEntries(
@@ -60,38 +58,46 @@ final class Conversions {
         return ALL.get(type);
     }
 
-    private static Sample scan(LCMDataInputStream in) throws IOException {
-        planar_lidar_t m = new planar_lidar_t(in);
-        return new Scan(m.utime, m.ranges, m.intensities, m.rad0, m.radstep);
+    private static Sample scan(WireReader in) throws IOException {
+        return new Scan(in.int64(), in.floats(in.count(4)), in.floats(in.count(4)), in.float32(), in.float32());
     }
 
-    private static Sample lidar(LCMDataInputStream in) throws IOException {
-        lidar_t m = new lidar_t(in);
-        if ((long) m.nlayers * m.ncolumns != m.nranges || (m.nintensities != 0 && m.nintensities != m.nranges)) {
-            throw new IOException("sizes that do not fit each other");
-        }
-        return new LidarScan(m.utime, m.nlayers, m.ncolumns, m.ranges, m.intensities, m.azimuth0, m.azimuth_step,
-                m.elevation0, m.elevation_step);
+    private static Sample lidar(WireReader in) throws IOException {
+        LidarScan scan = new LidarScan(in.int64(), in.int32(), in.int32(), in.floats(in.count(4)), in.floats(in.count(4)),
+                in.float32(), in.float32(), in.float32(), in.float32());
+        boolean fits = (long) scan.layers * scan.columns == scan.ranges.length
+                && (scan.intensities.length == 0 || scan.intensities.length == scan.ranges.length);
+        if (!fits) throw new IOException("sizes that do not fit each other");
+        return scan;
     }
 
-    private static Sample sonar(LCMDataInputStream in) throws IOException {
-        sonar_t m = new sonar_t(in);
-        return new SonarReading(m.utime, m.range, m.fired_utime, m.fresh);
+    private static Sample sonar(WireReader in) throws IOException {
+        long utime = in.int64();
+        int n = in.count(4 + 8 + 1);
+        return new SonarReading(utime, in.floats(n), in.int64s(n), in.bools(n));
     }
 
-    private static Sample odometry(LCMDataInputStream in) throws IOException {
-        odometry_t m = new odometry_t(in);
-        return new Odometry(m.utime, m.x, m.y, m.theta, m.v, m.omega, m.angle, m.rate, m.ticks, m.resets);
+    private static Sample odometry(WireReader in) throws IOException {
+        long utime = in.int64();
+        double[] pose = in.doubles(5);
+        int n = in.count(8 + 8 + 8);
+        return new Odometry(utime, pose[0], pose[1], pose[2], pose[3], pose[4], in.doubles(n), in.doubles(n), in.int64s(n), in.int32());
     }
 
-    private static Sample pose(LCMDataInputStream in) throws IOException {
-        pose_t m = new pose_t(in);
-        return new Pose(m.utime, m.pos, m.orientation, m.vel, m.rotation_rate, m.accel);
+    private static Sample pose(WireReader in) throws IOException {
+        long utime = in.int64();
+        double[] position = in.doubles(3);
+        double[] velocity = in.doubles(3);
+        return new Pose(utime, position, in.doubles(4), velocity, in.doubles(3), in.doubles(3));
     }
 
-    private static Sample image(LCMDataInputStream in) throws IOException {
-        image_t m = new image_t(in);
-        return new Image(m.utime, m.width, m.height, pixelFormat(m.pixelformat), m.row_stride, m.data);
+    private static Sample image(WireReader in) throws IOException {
+        long utime = in.int64();
+        int width = in.int32();
+        int height = in.int32();
+        int stride = in.int32();
+        String format = pixelFormat(in.int32());
+        return new Image(utime, width, height, format, stride, in.bytes(in.count(1)));    // the metadata behind is not used
     }
 
     private static String pixelFormat(int format) {
@@ -106,34 +112,39 @@ final class Conversions {
         }
     }
 
-    private static Sample cameraInfo(LCMDataInputStream in) throws IOException {
-        camera_info_t m = new camera_info_t(in);
-        return new CameraInfo(m.utime, m.width, m.height, m.fx, m.fy, m.cx, m.cy, m.distortion);
+    private static Sample cameraInfo(WireReader in) throws IOException {
+        return new CameraInfo(in.int64(), in.int32(), in.int32(), in.float64(), in.float64(), in.float64(), in.float64(),
+                in.doubles(5));
     }
 
-    private static Sample imu(LCMDataInputStream in) throws IOException {
-        imu_t m = new imu_t(in);
-        return new Imu(m.utime, m.orientation, m.angular_velocity, m.linear_acceleration);
+    private static Sample imu(WireReader in) throws IOException {
+        return new Imu(in.int64(), in.doubles(4), in.doubles(3), in.doubles(3));
     }
 
-    private static Sample contact(LCMDataInputStream in) throws IOException {
-        contact_t m = new contact_t(in);
+    private static Sample contact(WireReader in) throws IOException {
+        long utime = in.int64();
+        boolean pressed = in.bool();
         List<Contact.Point> points = new ArrayList<>();
-        for (contact_point_t p : m.points) points.add(new Contact.Point(p.body, p.position, p.normal, p.force, p.depth));
-        return new Contact(m.utime, m.pressed, List.copyOf(points));
+        for (int n = in.count(5 + 8 * 8); n > 0; n--) {
+            points.add(new Contact.Point(in.string(), in.doubles(3), in.doubles(3), in.float64(), in.float64()));
+        }
+        return new Contact(utime, pressed, List.copyOf(points));
     }
 
-    private static Sample joints(LCMDataInputStream in) throws IOException {
-        joint_state_t m = new joint_state_t(in);
-        return new Joints(m.utime, List.of(m.joint_name), m.joint_position, m.joint_velocity, m.joint_effort);
+    private static Sample joints(WireReader in) throws IOException {
+        long utime = in.int64();
+        int n = in.fits(in.int16(), 5 + 3 * 4);
+        return new Joints(utime, List.copyOf(in.strings(n)), in.floats(n), in.floats(n), in.floats(n));
     }
 
-    private static Sample motion(LCMDataInputStream in) throws IOException {
-        motion_status_t m = new motion_status_t(in);
-        String kind = m.kind == motion_status_t.KIND_VELOCITY ? "velocity"
-                : m.kind == motion_status_t.KIND_WHEELS ? "wheels" : word(KINDS, m.kind);
-        return new MotionStatus(m.utime, m.id, kind, word(STATES, m.state), word(REASONS, m.reason), m.done, m.remaining,
-                m.v, m.omega);
+    private static Sample motion(WireReader in) throws IOException {
+        long utime = in.int64();
+        long id = in.int64();
+        byte kind = in.int8();
+        String kindName = kind == motion_status_t.KIND_VELOCITY ? "velocity"
+                : kind == motion_status_t.KIND_WHEELS ? "wheels" : word(KINDS, kind);
+        return new MotionStatus(utime, id, kindName, word(STATES, in.int8()), word(REASONS, in.int8()), in.float64(),
+                in.float64(), in.float64(), in.float64());
     }
 
     private static String word(String[] words, int index) {

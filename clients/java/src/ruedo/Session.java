@@ -2,7 +2,6 @@ package ruedo;
 
 import java.io.IOException;
 import java.security.SecureRandom;
-import lcm.lcm.LCMDataInputStream;
 import lcm.lcm.LCMEncodable;
 import ruedo.lcmtypes.join_t;
 import ruedo.lcmtypes.reply_t;
@@ -52,13 +51,21 @@ final class Session {
     }
 
     /** A message of ruedo/reply. */
-    void receive(LCMDataInputStream in) {
-        reply_t received;
+    void receive(byte[] message) {
+        reply_t received = new reply_t();
         try {
-            if (in.readLong() != reply_t.LCM_FINGERPRINT) return;
-            in.reset();
-            received = new reply_t(in);
-        } catch (IOException | RuntimeException error) {
+            WireReader in = new WireReader(message);
+            if (in.int64() != reply_t.LCM_FINGERPRINT) return;
+            in.int64();    // utime
+            in.int64();    // run
+            in.int32();    // epoch
+            received.session = in.int64();
+            received.sequence = in.int64();
+            received.kind = in.int32();
+            received.code = in.int32();
+            received.text = in.string();
+            received.body = in.bytes(in.count(1));
+        } catch (IOException error) {
             return;
         }
         synchronized (news) {

@@ -8,7 +8,6 @@ import java.util.Map;
 import java.util.Set;
 import java.util.concurrent.ConcurrentHashMap;
 import java.util.concurrent.atomic.AtomicLong;
-import lcm.lcm.LCMDataInputStream;
 import lcm.lcm.LCMEncodable;
 import ruedo.lcmtypes.name_request_t;
 import ruedo.lcmtypes.rate_request_t;
@@ -336,15 +335,13 @@ public final class Simulation implements AutoCloseable {
         }
     }
 
-    private void onInfo(LCMDataInputStream in) {
+    private void onInfo(byte[] message) {
         WorldInfo info = null;
         RuedoException wrong = null;
         try {
-            info = assembler.add(in);
+            info = assembler.add(message);
         } catch (RuedoException error) {
             wrong = error;
-        } catch (IOException error) {
-            return;
         }
         synchronized (this) {
             fault = wrong;
@@ -358,10 +355,11 @@ public final class Simulation implements AutoCloseable {
         }
     }
 
-    private void onTick(LCMDataInputStream in) {
+    private void onTick(byte[] message) {
         try {
-            if (in.readLong() != tick_t.LCM_FINGERPRINT) return;
-            noteTime(in.readLong());
+            WireReader in = new WireReader(message);
+            if (in.int64() != tick_t.LCM_FINGERPRINT) return;
+            noteTime(in.int64());
         } catch (IOException error) {
             return;
         }
@@ -405,10 +403,13 @@ public final class Simulation implements AutoCloseable {
 
     private static State state(reply_t reply) {
         try {
-            state_reply_t m = new state_reply_t(reply.body);
-            return new State(m.utime, m.step, m.state_hash, m.paused, m.rate, m.name, m.position, m.orientation, m.linear, m.angular);
-        } catch (IOException | RuntimeException error) {
-            throw new RuedoException.TypeMismatch("the reply's body is no state_reply_t of this client's version");
+            WireReader in = new WireReader(reply.body);
+            if (in.int64() != state_reply_t.LCM_FINGERPRINT) throw new IOException("another version of the type");
+            return new State(in.int64(), in.int64(), in.int64(), in.bool(), in.float64(), in.string(), in.doubles(3), in.doubles(4),
+                    in.doubles(3), in.doubles(3));
+        } catch (IOException error) {
+            throw new RuedoException.TypeMismatch("the reply's body is no state_reply_t of this client's version: "
+                    + error.getMessage());
         }
     }
 

@@ -1,9 +1,9 @@
 package ruedo;
 
+import java.io.IOException;
 import java.util.List;
 import java.util.concurrent.CopyOnWriteArrayList;
 import java.util.function.Consumer;
-import lcm.lcm.LCMDataInputStream;
 import ruedo.lcmtypes.channel_info_t;
 
 /**
@@ -92,20 +92,19 @@ public class Stream<T extends Sample> {
     }
 
     @SuppressWarnings("unchecked")
-    private void receive(LCMDataInputStream in) {
-        int size = in.available();
+    private void receive(byte[] message) {
         T received = null;
         RuedoException wrong = null;
         try {
-            long found = in.readLong();
+            WireReader in = new WireReader(message);
+            long found = in.int64();
             if (found != conversion.fingerprint) throw mismatch(found);
-            in.reset();
             received = (T) conversion.decoder.decode(in);
         } catch (RuedoException error) {
             wrong = error;
-        } catch (java.io.IOException | RuntimeException | OutOfMemoryError error) {    // lengths that lie
-            wrong = new RuedoException.TypeMismatch(channel + ": a message of " + size + " bytes is no valid " + type + " ("
-                    + error + ")");
+        } catch (IOException error) {
+            wrong = new RuedoException.TypeMismatch(channel + ": a message of " + message.length + " bytes is no valid " + type
+                    + ": " + error.getMessage());
         }
         synchronized (this) {
             fault = wrong;

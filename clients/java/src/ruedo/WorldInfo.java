@@ -1,13 +1,13 @@
 package ruedo;
 
 import java.io.IOException;
+import java.nio.ByteBuffer;
 import java.util.ArrayList;
 import java.util.Arrays;
 import java.util.HashMap;
 import java.util.LinkedHashMap;
 import java.util.List;
 import java.util.Map;
-import lcm.lcm.LCMDataInputStream;
 import ruedo.lcmtypes.channel_info_t;
 import ruedo.lcmtypes.device_info_t;
 import ruedo.lcmtypes.robot_info_t;
@@ -45,32 +45,102 @@ final class WorldInfo {
         return (head.features >> kind & 1) != 0;
     }
 
+    private static world_info_t readPart(WireReader in) throws IOException {
+        world_info_t part = new world_info_t();
+        in.int64();    // fingerprint
+        part.utime = in.int64();
+        part.run_id = in.int64();
+        part.epoch = in.int32();
+        part.part = in.int16();
+        part.nparts = in.int16();
+        part.version = in.string();
+        part.world = in.string();
+        part.seed = in.int64();
+        part.step_us = in.int64();
+        part.features = in.int64();
+        part.paused = in.bool();
+        part.robots = new robot_info_t[in.count(80)];
+        for (int i = 0; i < part.robots.length; i++) part.robots[i] = readRobot(in);
+        part.devices = new device_info_t[in.count(100)];
+        for (int i = 0; i < part.devices.length; i++) part.devices[i] = readDevice(in);
+        part.channels = new channel_info_t[in.count(30)];
+        for (int i = 0; i < part.channels.length; i++) part.channels[i] = readChannel(in);
+        return part;    // the bodies behind are not used
+    }
+
+    private static robot_info_t readRobot(WireReader in) throws IOException {
+        robot_info_t robot = new robot_info_t();
+        robot.name = in.string();
+        robot.model = in.string();
+        robot.drive = in.string();
+        robot.body = in.int32();
+        robot.wheel_radius = in.float64();
+        robot.track = in.float64();
+        robot.max_speed = in.float64();
+        robot.max_turn_rate = in.float64();
+        robot.acceleration = in.float64();
+        robot.deceleration = in.float64();
+        robot.turn_acceleration = in.float64();
+        robot.watchdog_us = in.int64();
+        int n = in.count(5 + 1);
+        robot.wheels = in.strings(n).toArray(new String[0]);
+        robot.left = in.bools(n);
+        return robot;
+    }
+
+    private static device_info_t readDevice(WireReader in) throws IOException {
+        device_info_t device = new device_info_t();
+        device.robot = in.string();
+        device.name = in.string();
+        device.kind = in.string();
+        device.rate = in.float64();
+        device.position = in.doubles(3);
+        device.orientation = in.doubles(4);
+        device.range_min = in.float64();
+        device.range_max = in.float64();
+        device.fov_horizontal = in.float64();
+        device.fov_vertical = in.float64();
+        device.width = in.int32();
+        device.height = in.int32();
+        device.element_pose = new double[in.count(6 * 8)][];
+        for (int i = 0; i < device.element_pose.length; i++) device.element_pose[i] = in.doubles(6);
+        return device;
+    }
+
+    private static channel_info_t readChannel(WireReader in) throws IOException {
+        channel_info_t channel = new channel_info_t();
+        channel.name = in.string();
+        channel.robot = in.string();
+        channel.device = in.string();
+        channel.type = in.string();
+        channel.fingerprint = in.int64();
+        channel.rate = in.float64();
+        channel.input = in.bool();
+        return channel;
+    }
+
     /**
      * Takes messages of ruedo/info as they come. The parts of one info share run, epoch and utime. An info that says again
      * what the last one said, which is the rule, is known by its bytes and not decoded.
      */
     static final class Assembler {
+        private static final int HEAD = 8 + 8 + 8 + 4 + 2 + 2;    // bytes: fingerprint, utime, run, epoch, part, nparts
         private byte[] key = {};
         private Map<Integer, byte[]> parts = new HashMap<>();
         private List<byte[]> last = List.of();
 
         /** The info, when this message completed a new one, else null. Throws TypeMismatch for another version. */
-        WorldInfo add(LCMDataInputStream in) throws IOException {
-            byte[] bytes = new byte[in.available()];
-            in.readFully(bytes);
-            if (bytes.length < 32) return null;
-            LCMDataInputStream head = new LCMDataInputStream(bytes);
-            long fingerprint = head.readLong();
+        WorldInfo add(byte[] bytes) {
+            if (bytes.length < HEAD) return null;
+            ByteBuffer head = ByteBuffer.wrap(bytes);
+            long fingerprint = head.getLong();
             if (fingerprint != world_info_t.LCM_FINGERPRINT) {
                 throw new RuedoException.TypeMismatch(String.format("ruedo/info carries another version of world_info_t "
                         + "(fingerprint %016x) than this client reads (%016x): use the client of the server's version",
                         fingerprint, world_info_t.LCM_FINGERPRINT));
             }
-            head.readLong();    // utime
-            head.readLong();    // run
-            head.readInt();     // epoch
-            int part = head.readShort();
-            int nparts = head.readShort();
+            int part = head.getShort(28);
+            int nparts = head.getShort(30);
             if (part < 0 || part >= nparts) return null;
             byte[] found = Arrays.copyOfRange(bytes, 8, 28);    // utime, run, epoch
             if (!Arrays.equals(found, key)) parts = new HashMap<>();
@@ -88,9 +158,9 @@ final class WorldInfo {
             if (same(content, last)) return null;
             List<world_info_t> decoded = new ArrayList<>();
             try {
-                for (byte[] message : whole) decoded.add(new world_info_t(message));
-            } catch (IOException | RuntimeException | OutOfMemoryError error) {
-                throw new RuedoException.TypeMismatch("a message on ruedo/info is no valid world_info_t (" + error + ")");
+                for (byte[] message : whole) decoded.add(readPart(new WireReader(message)));
+            } catch (IOException error) {
+                throw new RuedoException.TypeMismatch("a message on ruedo/info is no valid world_info_t: " + error.getMessage());
             }
             last = content;
             return new WorldInfo(decoded);

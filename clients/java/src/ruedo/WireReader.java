@@ -1,0 +1,116 @@
+package ruedo;
+
+import java.io.IOException;
+import java.nio.BufferUnderflowException;
+import java.nio.ByteBuffer;
+import java.nio.charset.StandardCharsets;
+import java.util.ArrayList;
+import java.util.List;
+
+/**
+ * Reads an LCM message field by field: what a length promises must be there before memory is taken for it. (lcm-gen's own
+ * decoders allocate first, 8 GB for a length that lies.) Every method throws IOException for bytes that are too few.
+ */
+final class WireReader {
+    private final ByteBuffer bytes;    // big endian, as LCM writes
+
+    WireReader(byte[] message) {
+        bytes = ByteBuffer.wrap(message);
+    }
+
+    private interface Read<T> {
+        T read();
+    }
+
+    private <T> T get(Read<T> read) throws IOException {
+        try {
+            return read.read();
+        } catch (BufferUnderflowException error) {
+            throw new IOException("it is too short");
+        }
+    }
+
+    byte int8() throws IOException {
+        return get(bytes::get);
+    }
+
+    boolean bool() throws IOException {
+        return int8() != 0;
+    }
+
+    short int16() throws IOException {
+        return get(bytes::getShort);
+    }
+
+    int int32() throws IOException {
+        return get(bytes::getInt);
+    }
+
+    long int64() throws IOException {
+        return get(bytes::getLong);
+    }
+
+    float float32() throws IOException {
+        return get(bytes::getFloat);
+    }
+
+    double float64() throws IOException {
+        return get(bytes::getDouble);
+    }
+
+    /** An int32_t that counts elements of at least so many bytes each, which must still be there. */
+    int count(int elementSize) throws IOException {
+        return fits(int32(), elementSize);
+    }
+
+    int fits(int n, int elementSize) throws IOException {
+        if (n < 0 || n > bytes.remaining() / elementSize) {
+            throw new IOException("a length of " + n + " with " + bytes.remaining() + " bytes left");
+        }
+        return n;
+    }
+
+    String string() throws IOException {
+        int length = count(1);    // with its closing zero
+        if (length == 0) throw new IOException("a string without an end");
+        byte[] text = bytes(length);
+        return new String(text, 0, length - 1, StandardCharsets.UTF_8);
+    }
+
+    byte[] bytes(int n) throws IOException {
+        byte[] values = new byte[fits(n, 1)];
+        bytes.get(values);
+        return values;
+    }
+
+    float[] floats(int n) throws IOException {
+        float[] values = new float[fits(n, 4)];
+        for (int i = 0; i < n; i++) values[i] = bytes.getFloat();
+        return values;
+    }
+
+    double[] doubles(int n) throws IOException {
+        double[] values = new double[fits(n, 8)];
+        for (int i = 0; i < n; i++) values[i] = bytes.getDouble();
+        return values;
+    }
+
+    long[] int64s(int n) throws IOException {
+        long[] values = new long[fits(n, 8)];
+        for (int i = 0; i < n; i++) values[i] = bytes.getLong();
+        return values;
+    }
+
+    boolean[] bools(int n) throws IOException {
+        boolean[] values = new boolean[fits(n, 1)];
+        for (int i = 0; i < n; i++) values[i] = bytes.get() != 0;
+        return values;
+    }
+
+    List<String> strings(int n) throws IOException {
+        fits(n, 5);
+        List<String> values = new ArrayList<>();
+        for (int i = 0; i < n; i++) values.add(string());
+        return values;
+    }
+}

@@ -1,0 +1,128 @@
+"""What the wire tests share: the programs under test, a port for each server, servers that end with their test.
+
+Each server has a URL of its own, so that the tests of one file may run beside each other.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).resolve().parent
+SOURCE = Path(os.environ.get("RUEDO_SOURCE_DIR", HERE.parent.parent))
+BUILD = Path(os.environ.get("RUEDO_BUILD_DIR", SOURCE / "build/release"))
+RUEDO = os.environ.setdefault("RUEDO", str(BUILD / "bin/ruedo"))
+os.environ["PYTHONPATH"] = f"{BUILD / 'python'}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
+sys.path.insert(0, str(BUILD / "python"))
+ARENA = str(SOURCE / "worlds/arena.sdf")
+
+PROBES = {"python": [sys.executable, str(HERE / "probe/probe.py")]}
+if "RUEDO_PROBE_CPP" in os.environ:
+    PROBES["cpp"] = [os.environ["RUEDO_PROBE_CPP"]]
+if "RUEDO_PROBE_JAVA" in os.environ:
+    PROBES["java"] = ["java", "-Xshare:auto", "-XX:TieredStopAtLevel=1", "-cp", f"{BUILD}/java/ruedo.jar:{os.environ['RUEDO_PROBE_JAVA']}", "Probe"]
+
+_taken: list[socket.socket] = []
+
+
+def free_url() -> str:
+    """A multicast URL on a port of its own, kept from others for the life of the test program."""
+    while True:
+        token = socket.socket()
+        token.bind(("127.0.0.1", 0))
+        port = token.getsockname()[1]
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.bind(("", port))
+            except OSError:
+                token.close()
+                continue
+        _taken.append(token)
+        return f"udpm://239.255.76.67:{port}?ttl=0"
+
+
+class Server:
+    """`ruedo run`, or another program that serves a URL; ends with the with-block."""
+
+    def __init__(self, command: list[str], url: str):
+        self.url = url
+        self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+    def __enter__(self) -> Server:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
+
+    def end(self) -> str:
+        """Its output."""
+        if self.process.poll() is None:
+            self.process.terminate()
+        try:
+            return self.process.communicate(timeout=20)[0]
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            return self.process.communicate()[0]
+
+
+def ruedo_run(*args: str, world: str = ARENA, url: str | None = None) -> Server:
+    url = url or free_url()
+    server = Server([RUEDO, "run", world, "--lcm", url, *args], url)
+    import ruedo
+
+    deadline = time.monotonic() + 60.0
+    while True:
+        try:
+            ruedo.connect(url).close()
+            return server
+        except ruedo.NoServer:
+            if server.process.poll() is not None or time.monotonic() > deadline:
+                pytest.fail(f"the server did not come up: {server.end()}")
+
+
+class Said:
+    """What a probe printed: the words behind each first word."""
+
+    def __init__(self, text: str):
+        self.text = text
+        self.lines = [line.split(" ", 1) for line in text.splitlines() if line]
+
+    def all(self, key: str) -> list[str]:
+        return [line[1] for line in self.lines if line[0] == key and len(line) == 2]
+
+    def one(self, key: str) -> str:
+        found = self.all(key)
+        assert len(found) == 1, f"{len(found)} lines begin with {key!r} in:\n{self.text}"
+        return found[0]
+
+    def words(self, key: str) -> list[str]:
+        return self.one(key).split()
+
+    def numbers(self, key: str) -> list[float]:
+        return [float(word) for word in self.words(key)]
+
+
+def probe(language: str, url: str, *command: str, timeout: float = 120.0) -> Said:
+    done = subprocess.run([*PROBES[language], url, *command], capture_output=True, text=True, timeout=timeout)
+    said = Said(done.stdout)
+    if "Traceback" in done.stderr or "Exception in thread" in done.stderr or (done.returncode and not said.all("failed")):
+        pytest.fail(f"the {language} probe broke: {done.stdout}\n{done.stderr}")
+    return said
+
+
+@pytest.fixture(params=list(PROBES))
+def language(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
+@pytest.fixture(scope="session", autouse=True)
+def needs_ruedo() -> None:
+    if not shutil.which(RUEDO):
+        pytest.fail(f"{RUEDO} is not built")

@@ -1,0 +1,198 @@
+import java.util.Arrays;
+import java.util.Locale;
+import java.util.function.Supplier;
+import ruedo.Device;
+import ruedo.Image;
+import ruedo.LaunchOptions;
+import ruedo.Limits;
+import ruedo.Motion;
+import ruedo.MotionStatus;
+import ruedo.Odometry;
+import ruedo.Pose;
+import ruedo.Robot;
+import ruedo.Ruedo;
+import ruedo.RuedoException;
+import ruedo.Scan;
+import ruedo.Simulation;
+import ruedo.SonarReading;
+import ruedo.State;
+
+/**
+ * The Java probe: does what a test asks of a client and prints what came of it. probe.py and probe.cpp are its twins:
+ * same commands, same output.
+ */
+public final class Probe {
+    private Probe() {}
+
+    private static void say(Object... words) {
+        StringBuilder line = new StringBuilder();
+        for (Object word : words) {
+            String text = String.valueOf(word);
+            if (word instanceof Double) text = String.format(Locale.ROOT, "%.6f", word);
+            if (word instanceof Boolean) text = (Boolean) word ? "True" : "False";
+            line.append(line.length() == 0 ? "" : " ").append(text.replace('\n', ' '));
+        }
+        System.out.println(line);
+    }
+
+    private static void attempt(String what, Runnable call) {
+        try {
+            call.run();
+            say(what, "none");
+        } catch (RuedoException error) {
+            say(what, error.getClass().getSimpleName() + ":", error.getMessage());
+        } catch (IllegalArgumentException error) {
+            say(what, "ValueError:", error.getMessage());
+        }
+    }
+
+    private static void listAll(Simulation sim) {
+        say("world", sim.world(), sim.seed(), sim.stepSize());
+        for (Robot robot : sim.robots()) {
+            say("robot", robot.name, robot.drive().isEmpty() ? "-" : robot.drive(), robot.watchdog(), robot.track());
+            for (Device<?> d : robot.devices()) {
+                say("device", robot.name, d.name, d.kind, d.type, d.rate, d.rangeMax, d.elements.length);
+            }
+        }
+    }
+
+    private static void read(Simulation sim, String name) {
+        Robot robot = sim.robot(name);
+        Scan scan = robot.lrf().latest();
+        say("scan", scan.ranges.length, scan.angle(0), scan.angle(scan.ranges.length - 1), scan.nearest(-Math.PI, Math.PI),
+                scan.intensities.length);
+        SonarReading reading = robot.sonar().latest();
+        double largest = 0.0;
+        for (float range : reading.ranges) largest = Math.max(largest, range);
+        say("sonar", reading.ranges.length, largest, reading.firedUtime.length, reading.fresh.length);
+        Odometry odometry = robot.odometry().latest();
+        say("odometry", odometry.x, odometry.y, odometry.theta, odometry.wheelAngles.length);
+        Pose pose = robot.pose().latest();
+        say("pose", pose.x(), pose.y(), pose.heading());
+        long first = robot.lrf().next().utime;
+        long second = robot.lrf().next().utime;
+        say("next", second - first);
+        for (Device<?> device : robot.devices()) {
+            if (!device.type.equals("image_t")) continue;
+            Image image = robot.camera().latest();
+            say("image", image.width, image.height, image.format, image.data.length > 0);
+            break;
+        }
+    }
+
+    private static void drive(Simulation sim, String[] a, boolean wheels) {
+        Robot robot = sim.robot(a[0]);
+        Pose begin = robot.pose().latest();
+        double first = Double.parseDouble(a[1]);
+        double second = Double.parseDouble(a[2]);
+        if (wheels) {
+            robot.setWheels(first, second);
+        } else {
+            robot.setVelocity(first, second);
+        }
+        sim.sleep(Double.parseDouble(a[3]));
+        MotionStatus status = robot.motion().latest();
+        say("status", status.kind, status.state, status.v, status.omega);
+        Pose end = robot.pose().next();
+        say("moved", Math.hypot(end.x() - begin.x(), end.y() - begin.y()), end.heading() - begin.heading());
+        robot.stop().await(20.0);
+        say("stopped", robot.motion().next().v);
+    }
+
+    private static void run(Robot robot, String what, Supplier<Motion> start) {
+        Pose begin = robot.pose().next();
+        Motion motion = start.get();
+        boolean early = motion.done();
+        motion.await(60.0);
+        Pose end = robot.pose().next();
+        say(what, early, motion.done(), motion.state(), motion.reason().isEmpty() ? "-" : motion.reason(),
+                Math.hypot(end.x() - begin.x(), end.y() - begin.y()),
+                Math.IEEEremainder(end.heading() - begin.heading(), 2 * Math.PI));
+    }
+
+    private static void primitives(Simulation sim, String name) {
+        Robot robot = sim.robot(name);
+        robot.stop().await(20.0);
+        run(robot, "advance", () -> robot.advance(0.4, new Limits(0.5, 0.0, 0.0)));
+        run(robot, "rotate", () -> robot.rotate(1.2));
+        run(robot, "turn_to", () -> robot.turnTo(0.0));
+        run(robot, "arc", () -> robot.arc(0.8, 0.5));
+        Motion replaced = robot.advance(5.0);
+        sim.sleep(0.5);
+        robot.stop().await(20.0);
+        attempt("replaced", () -> replaced.await());
+        Motion running = robot.advance(5.0);
+        attempt("too_long", () -> running.await(0.3));
+        robot.stop().await(20.0);
+    }
+
+    private static void errors(Simulation sim, String name) {
+        attempt("robot", () -> sim.robot("nobody"));
+        Robot robot = sim.robot(name);
+        attempt("device", () -> robot.device("nothing"));
+        attempt("nan", () -> robot.setVelocity(Double.NaN, 0.0));
+        attempt("radius", () -> robot.arc(1.0, 0.0));
+        attempt("limit", () -> robot.advance(1.0, new Limits(-1.0, 0.0, 0.0)));
+        attempt("spawn", () -> sim.spawn("no such model", 0.0, 0.0, 0.0, ""));
+    }
+
+    private static void streams(Simulation sim, String name, double timeout) {
+        Robot robot = sim.robot(name);
+        attempt("lrf", () -> robot.lrf().latest(timeout));
+        attempt("odometry", () -> robot.odometry().latest(timeout));
+    }
+
+    private static void control(Simulation sim, String name) throws InterruptedException {
+        sim.pause();
+        State before = sim.state();
+        Thread.sleep(200);
+        say("paused", before.paused, sim.state().step == before.step);
+        say("step", sim.step(7).step - before.step);
+        say("name", sim.state(name).name, sim.state(name).position[0]);
+        sim.setRate(2.0);
+        sim.resume();
+        sim.sleep(0.2);
+        say("rate", sim.state().rate);
+        sim.reset();
+        say("reset", sim.state().time() < 5.0);
+        attempt("unknown", () -> sim.state("nobody"));
+        attempt("steps", () -> sim.step(0));
+    }
+
+    private static void launched(String[] a) throws InterruptedException {
+        LaunchOptions options = new LaunchOptions().seed(3).args(Arrays.copyOfRange(a, 1, a.length));
+        Simulation sim = Ruedo.launch(a[0], options);
+        say("url", sim.url);
+        say("ready", sim.robots().get(0).odometry().latest().time() >= 0.0);
+        while (true) Thread.sleep(1000);
+    }
+
+    private static void act(String url, String command, String[] a) throws InterruptedException {
+        if (command.equals("launch")) launched(a);
+        try (Simulation sim = Ruedo.connect(url)) {
+            switch (command) {
+                case "connect": say("connected", sim.world()); break;
+                case "list": listAll(sim); break;
+                case "read": read(sim, a[0]); break;
+                case "velocity": drive(sim, a, false); break;
+                case "wheels": drive(sim, a, true); break;
+                case "primitives": primitives(sim, a[0]); break;
+                case "errors": errors(sim, a[0]); break;
+                case "streams": streams(sim, a[0], Double.parseDouble(a[1])); break;
+                case "control": control(sim, a[0]); break;
+                case "quit": sim.quit(); say("quit", true); break;
+                default: throw new IllegalArgumentException(command);
+            }
+        }
+    }
+
+    public static void main(String[] args) throws InterruptedException {
+        try {
+            act(args[0], args[1], Arrays.copyOfRange(args, 2, args.length));
+            System.exit(0);
+        } catch (RuedoException error) {
+            say("failed", error.getClass().getSimpleName() + ":", error.getMessage());
+            System.exit(1);
+        }
+    }
+}

@@ -1,0 +1,203 @@
+// The C++ probe: does what a test asks of a client and prints what came of it. probe.py and Probe.java are its twins:
+// same commands, same output.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "ruedo/client.h"
+
+namespace rc = ruedo::client;
+
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+std::string word(const std::string& text) { return text; }
+std::string word(const char* text) { return text; }
+std::string word(bool value) { return value ? "True" : "False"; }
+std::string word(double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.6f", value);
+  return text;
+}
+template <class Integer>
+std::string word(Integer value) { return std::to_string(value); }
+
+template <class... Words>
+void say(const Words&... words) {
+  std::string line;
+  ((line += (line.empty() ? "" : " ") + word(words)), ...);
+  std::replace(line.begin(), line.end(), '\n', ' ');
+  std::puts(line.c_str());
+  std::fflush(stdout);
+}
+
+void report(const std::string& what, const std::function<void()>& call) {
+  try {
+    call();
+    say(what, "none");
+  } catch (const rc::NoServer& e) { say(what, "NoServer:", e.what());
+  } catch (const rc::LaunchError& e) { say(what, "LaunchError:", e.what());
+  } catch (const rc::UnknownName& e) { say(what, "UnknownName:", e.what());
+  } catch (const rc::Timeout& e) { say(what, "Timeout:", e.what());
+  } catch (const rc::TypeMismatch& e) { say(what, "TypeMismatch:", e.what());
+  } catch (const rc::NotSupported& e) { say(what, "NotSupported:", e.what());
+  } catch (const rc::MotionError& e) { say(what, "MotionError:", e.what());
+  } catch (const rc::RequestError& e) { say(what, "RequestError:", e.what());
+  } catch (const std::invalid_argument& e) { say(what, "ValueError:", e.what());
+  }
+}
+
+void list_all(const rc::Simulation& sim) {
+  say("world", sim.world(), sim.seed(), sim.step_size());
+  for (const rc::Robot& robot : sim.robots()) {
+    const rc::RobotInfo info = robot.info();
+    say("robot", robot.name(), info.drive.empty() ? "-" : info.drive, info.watchdog, info.track);
+    for (const rc::DeviceInfo& d : robot.devices()) {
+      say("device", robot.name(), d.name, d.kind, d.type, d.rate, d.range_max, d.elements.size());
+    }
+  }
+}
+
+void read(const rc::Simulation& sim, const std::string& name) {
+  const rc::Robot robot = sim.robot(name);
+  const auto scan = robot.lrf().latest();
+  say("scan", scan.ranges.size(), scan.angle(0), scan.angle(scan.ranges.size() - 1), scan.nearest(-kPi, kPi), scan.intensities.size());
+  const auto reading = robot.sonar().latest();
+  say("sonar", reading.ranges.size(), static_cast<double>(*std::max_element(reading.ranges.begin(), reading.ranges.end())),
+      reading.fired_utime.size(), reading.fresh.size());
+  const auto odometry = robot.odometry().latest();
+  say("odometry", odometry.x, odometry.y, odometry.theta, odometry.wheel_angles.size());
+  const auto pose = robot.pose().latest();
+  say("pose", pose.x(), pose.y(), pose.heading());
+  const int64_t first = robot.lrf().next().utime;
+  const int64_t second = robot.lrf().next().utime;
+  say("next", second - first);
+  for (const auto& device : robot.devices()) {
+    if (device.type != "image_t") continue;
+    const auto image = robot.camera().latest();
+    say("image", image.width, image.height, image.format == rc::Image::Format::jpeg ? "jpeg" : "other", !image.data.empty());
+    break;
+  }
+}
+
+void drive(const rc::Simulation& sim, const std::vector<std::string>& a, bool wheels) {
+  const rc::Robot robot = sim.robot(a[0]);
+  const auto begin = robot.pose().latest();
+  if (wheels) {
+    robot.set_wheels(std::stod(a[1]), std::stod(a[2]));
+  } else {
+    robot.set_velocity(std::stod(a[1]), std::stod(a[2]));
+  }
+  sim.sleep(std::stod(a[3]));
+  const auto status = robot.motion().latest();
+  say("status", status.kind, status.state, status.v, status.omega);
+  const auto end = robot.pose().next();
+  say("moved", std::hypot(end.x() - begin.x(), end.y() - begin.y()), end.heading() - begin.heading());
+  robot.stop().wait(20.0);
+  say("stopped", robot.motion().next().v);
+}
+
+void primitives(const rc::Simulation& sim, const std::string& name) {
+  const rc::Robot robot = sim.robot(name);
+  robot.stop().wait(20.0);
+  const auto run = [&](const char* what, const std::function<rc::Motion()>& start) {
+    const auto begin = robot.pose().next();
+    const rc::Motion motion = start();
+    const bool early = motion.done();
+    motion.wait(60.0);
+    const auto end = robot.pose().next();
+    say(what, early, motion.done(), motion.state(), motion.reason().empty() ? "-" : motion.reason(),
+        std::hypot(end.x() - begin.x(), end.y() - begin.y()), std::remainder(end.heading() - begin.heading(), 2 * kPi));
+  };
+  run("advance", [&] { return robot.advance(0.4, {.speed = 0.5}); });
+  run("rotate", [&] { return robot.rotate(1.2); });
+  run("turn_to", [&] { return robot.turn_to(0.0); });
+  run("arc", [&] { return robot.arc(0.8, 0.5); });
+  const rc::Motion replaced = robot.advance(5.0);
+  sim.sleep(0.5);
+  robot.stop().wait(20.0);
+  report("replaced", [&] { replaced.wait(); });
+  const rc::Motion running = robot.advance(5.0);
+  report("too_long", [&] { running.wait(0.3); });
+  robot.stop().wait(20.0);
+}
+
+void errors(const rc::Simulation& sim, const std::string& name) {
+  report("robot", [&] { sim.robot("nobody"); });
+  const rc::Robot robot = sim.robot(name);
+  report("device", [&] { robot.device<rc::Scan>("nothing"); });
+  report("nan", [&] { robot.set_velocity(std::nan(""), 0.0); });
+  report("radius", [&] { robot.arc(1.0, 0.0); });
+  report("limit", [&] { robot.advance(1.0, {.speed = -1.0}); });
+  report("spawn", [&] { sim.spawn("no such model", 0.0, 0.0); });
+}
+
+void streams(const rc::Simulation& sim, const std::string& name, double timeout) {
+  const rc::Robot robot = sim.robot(name);
+  report("lrf", [&] { robot.lrf().latest(timeout); });
+  report("odometry", [&] { robot.odometry().latest(timeout); });
+}
+
+void control(const rc::Simulation& sim, const std::string& name) {
+  sim.pause();
+  const auto before = sim.state();
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  say("paused", before.paused, sim.state().step == before.step);
+  say("step", sim.step(7).step - before.step);
+  say("name", sim.state(name).name, sim.state(name).position[0]);
+  sim.set_rate(2.0);
+  sim.resume();
+  sim.sleep(0.2);
+  say("rate", sim.state().rate);
+  sim.reset();
+  say("reset", sim.state().time() < 5.0);
+  report("unknown", [&] { sim.state("nobody"); });
+  report("steps", [&] { sim.step(0); });
+}
+
+[[noreturn]] void launched(const std::vector<std::string>& a) {
+  rc::LaunchOptions options;
+  options.seed = 3;
+  options.args.assign(a.begin() + 1, a.end());
+  const rc::Simulation sim = rc::launch(a[0], options);
+  say("url", sim.url());
+  say("ready", sim.robots().at(0).odometry().latest().time() >= 0.0);
+  while (true) std::this_thread::sleep_for(std::chrono::seconds(1));
+}
+
+void act(const std::string& url, const std::string& command, const std::vector<std::string>& a) {
+  if (command == "launch") launched(a);
+  const rc::Simulation sim = rc::connect(url);
+  if (command == "connect") say("connected", sim.world());
+  if (command == "list") list_all(sim);
+  if (command == "read") read(sim, a[0]);
+  if (command == "velocity") drive(sim, a, false);
+  if (command == "wheels") drive(sim, a, true);
+  if (command == "primitives") primitives(sim, a[0]);
+  if (command == "errors") errors(sim, a[0]);
+  if (command == "streams") streams(sim, a[0], std::stod(a[1]));
+  if (command == "control") control(sim, a[0]);
+  if (command == "quit") {
+    sim.quit();
+    say("quit", true);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 3) return 2;
+  bool failed = true;
+  report("failed", [&] {
+    act(argv[1], argv[2], {argv + 3, argv + argc});
+    failed = false;
+    std::exit(0);
+  });
+  return failed;
+}

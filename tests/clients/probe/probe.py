@@ -1,0 +1,144 @@
+"""The Python probe: does what a test asks of a client and prints what came of it. probe.cpp and Probe.java are its
+twins: same commands, same output."""
+
+import math
+import sys
+import time
+
+import ruedo
+
+
+def say(*words):
+    print(*(f"{w:.6f}" if isinstance(w, float) else w for w in words), flush=True)
+
+
+def attempt(what, call):
+    try:
+        call()
+        say(what, "none")
+    except (ruedo.RuedoError, ValueError) as error:
+        say(what, f"{type(error).__name__}:", str(error).replace("\n", " "))
+
+
+def list_all(sim):
+    say("world", sim.world, sim.seed, sim.step_size)
+    for robot in sim.robots:
+        say("robot", robot.name, robot.drive or "-", robot.watchdog, robot.track)
+        for device in robot.devices:
+            say("device", robot.name, device.name, device.kind, device.type, device.rate, device.range_max, len(device.elements))
+
+
+def read(sim, name):
+    robot = sim.robot(name)
+    scan = robot.lrf.latest()
+    say("scan", len(scan.ranges), float(scan.angles[0]), float(scan.angles[-1]), scan.nearest(-math.pi, math.pi), len(scan.intensities))
+    reading = robot.sonar.latest()
+    say("sonar", len(reading.ranges), float(reading.ranges.max()), len(reading.fired_utime), len(reading.fresh))
+    odometry = robot.odometry.latest()
+    say("odometry", odometry.x, odometry.y, odometry.theta, len(odometry.wheel_angles))
+    pose = robot.pose.latest()
+    say("pose", pose.x, pose.y, pose.heading)
+    first = robot.lrf.next().utime
+    second = robot.lrf.next().utime
+    say("next", second - first)
+    if any(d.type == "image_t" for d in robot.devices):
+        image = robot.camera.latest()
+        say("image", image.width, image.height, image.format, len(image.data) > 0)
+
+
+def drive(sim, name, first, second, seconds, wheels):
+    robot = sim.robot(name)
+    begin = robot.pose.latest()
+    (robot.set_wheels if wheels else robot.set_velocity)(float(first), float(second))
+    sim.sleep(float(seconds))
+    status = robot.motion.latest()
+    say("status", status.kind, status.state, status.v, status.omega)
+    end = robot.pose.next()
+    say("moved", math.hypot(end.x - begin.x, end.y - begin.y), end.heading - begin.heading)
+    robot.stop().wait(20.0)
+    say("stopped", robot.motion.next().v)
+
+
+def primitives(sim, name):
+    robot = sim.robot(name)
+    robot.stop().wait(20.0)
+
+    def run(what, motion):
+        begin = robot.pose.next()
+        motion = motion()
+        early = motion.done
+        motion.wait(60.0)
+        end = robot.pose.next()
+        say(what, early, motion.done, motion.state, motion.reason or "-", math.hypot(end.x - begin.x, end.y - begin.y),
+            math.remainder(end.heading - begin.heading, 2 * math.pi))
+
+    run("advance", lambda: robot.advance(0.4, speed=0.5))
+    run("rotate", lambda: robot.rotate(1.2))
+    run("turn_to", lambda: robot.turn_to(0.0))
+    run("arc", lambda: robot.arc(0.8, 0.5))
+    replaced = robot.advance(5.0)
+    sim.sleep(0.5)
+    robot.stop().wait(20.0)
+    attempt("replaced", replaced.wait)
+    running = robot.advance(5.0)
+    attempt("too_long", lambda: running.wait(0.3))
+    robot.stop().wait(20.0)
+
+
+def errors(sim, name):
+    attempt("robot", lambda: sim.robot("nobody"))
+    robot = sim.robot(name)
+    attempt("device", lambda: robot.device("nothing"))
+    attempt("nan", lambda: robot.set_velocity(math.nan, 0.0))
+    attempt("radius", lambda: robot.arc(1.0, 0.0))
+    attempt("limit", lambda: robot.advance(1.0, speed=-1.0))
+    attempt("spawn", lambda: sim.spawn("no such model", 0.0, 0.0))
+
+
+def streams(sim, name, timeout):
+    robot = sim.robot(name)
+    attempt("lrf", lambda: robot.lrf.latest(float(timeout)))
+    attempt("odometry", lambda: robot.odometry.latest(float(timeout)))
+
+
+def control(sim, name):
+    sim.pause()
+    before = sim.state()
+    time.sleep(0.2)
+    say("paused", before.paused, sim.state().step == before.step)
+    say("step", sim.step(7).step - before.step)
+    say("name", sim.state(name).name, sim.state(name).position[0])
+    sim.set_rate(2.0)
+    sim.resume()
+    sim.sleep(0.2)
+    say("rate", sim.state().rate)
+    sim.reset()
+    say("reset", sim.state().time < 5.0)
+    attempt("unknown", lambda: sim.state("nobody"))
+    attempt("steps", lambda: sim.step(0))
+
+
+def launched(sim):
+    say("url", sim.url)
+    say("ready", sim.robots[0].odometry.latest().time >= 0.0)
+    while True:
+        time.sleep(1.0)
+
+
+def main():
+    url, command, *rest = sys.argv[1:]
+    try:
+        if command == "launch":
+            launched(ruedo.launch(rest[0], seed=3, args=rest[1:]))
+        with ruedo.connect(url) as sim:
+            actions = {"connect": lambda: say("connected", sim.world), "list": lambda: list_all(sim), "read": lambda: read(sim, *rest),
+                       "velocity": lambda: drive(sim, *rest, False), "wheels": lambda: drive(sim, *rest, True),
+                       "primitives": lambda: primitives(sim, *rest), "errors": lambda: errors(sim, *rest),
+                       "streams": lambda: streams(sim, *rest), "control": lambda: control(sim, *rest),
+                       "quit": lambda: (sim.quit(), say("quit", True))}
+            actions[command]()
+    except ruedo.RuedoError as error:
+        say("failed", f"{type(error).__name__}:", str(error).replace("\n", " "))
+
+
+main()
