@@ -260,6 +260,53 @@ void compare(const std::string& name, const std::vector<BoxAt>& boxes, const std
               theirs, scan / theirs, bare_packets / scan, embree_error, bullet_error);
 }
 
+// Robots of seven shapes among the walls: what it costs to bring them up to date, and scans from the first 100 of them.
+void fleet(int robots, const std::vector<BoxAt>& boxes, int repeats) {
+  model::WorldModel world = world_of(boxes, nullptr);
+  auto robot = std::make_shared<model::Model>();
+  robot->links.resize(1);
+  const auto add = [&](const Vec3& at, const Vec3& rpy, model::Shape shape, const Vec3& size) {
+    model::Collision collision;
+    collision.X_LC = Pose::from_xyz_rpy(at, rpy);
+    collision.geometry.shape = shape;
+    collision.geometry.size = size;
+    robot->links[0].collisions.push_back(collision);
+  };
+  add({0, 0, 0.18}, {}, model::Shape::box, {0.5, 0.28, 0.19});
+  add({0, 0, 0.275}, {}, model::Shape::box, {0.5, 0.38, 0.01});
+  add({0.16, 0, 0.36}, {}, model::Shape::box, {0.15, 0.15, 0.18});
+  for (const double x : {0.135, -0.134})
+    for (const double y : {0.197, -0.197}) add({x, y, 0.111}, {M_PI / 2, 0, 0}, model::Shape::cylinder, {0.111, 0.075, 0});
+  RandomStream random = RandomSource(1, "office", "fleet").stream(0);
+  const double size = 2.0 * std::sqrt(static_cast<double>(robots));
+  for (int i = 0; i < robots; ++i) {
+    const Vec3 at(size * random.uniform(), size * random.uniform(), 0);
+    world.models.push_back({"robot" + std::to_string(i), Pose::from_xyz_rpy(at, {0, 0, 6.28 * random.uniform()}), robot});
+  }
+  const model::BodyLayout layout(world);
+  const auto scene = scene::make_ray_scene(scene::make_static_ray_scene(world, layout));
+  Snapshot snapshot;
+  for (const auto& body : layout.bodies) snapshot.bodies.push_back(body.X_WB);
+  snapshot.wheel_angles.resize(layout.wheels.size());
+  const double updates = 1.0 / measure(1, 20 * repeats + 1, [&] {
+    for (Pose& pose : snapshot.bodies) pose.translation.x() += 1e-3;
+    scene->update(snapshot);
+  });
+  std::vector<scene::Ray> rays;
+  const int scanners = std::min(robots, 100);
+  for (int r = 0; r < scanners; ++r)
+    for (int i = 0; i < 181; ++i) {
+      const double angle = (i - 90) * M_PI / 180.0;
+      const Pose& X_WB = snapshot.bodies[static_cast<size_t>(r)];
+      rays.push_back({X_WB * Vec3(0.16, 0, 0.5), X_WB.rotation * Vec3(std::cos(angle), std::sin(angle), 0.0), 8.0});
+    }
+  std::vector<scene::Hit> hits(rays.size());
+  const double scans = measure(rays.size(), repeats, [&] {
+    for (size_t i = 0; i < rays.size(); i += 181) scene->cast(std::span(&rays[i], 181), std::span(&hits[i], 181));
+  });
+  std::printf("%6d robots: update %8.1f us, scans %6.2f million rays a second\n", robots, updates, scans);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -272,4 +319,5 @@ int main(int argc, char** argv) {
   compare(std::to_string(boxes.size()) + " boxes", boxes, nullptr, repeats);
   compare("mesh, " + std::to_string(mesh->triangles.size()), boxes, mesh, repeats);
   compare("mesh, " + std::to_string(fine->triangles.size()), boxes, fine, repeats);
+  for (const int robots : {1, 100, 1000, 10000}) fleet(robots, boxes, repeats);
 }
