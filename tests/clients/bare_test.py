@@ -1,0 +1,145 @@
+"""LCM programs that know nothing of the client libraries: the bare clients of docs/protocol.md, in Python and C, the
+latter on LCM 1.5.3 and on Debian's 1.3.1; and what the protocol promises them."""
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import lcm
+import pytest
+from conftest import HERE, SOURCE, ruedo_run
+from docs_code import blocks
+
+HALL = str(HERE / "hall.sdf")
+LCM_GEN = shutil.which("lcm-gen", path=f"{Path(sys.executable).parent}:{os.environ['PATH']}")
+WHEEL = Path(lcm.__file__).resolve().parent.parent    # headers and liblcm.so of LCM 1.5.3
+
+
+def run_in(folder, script):
+    """A shell block of the docs, in a folder with proto/ in it."""
+    if not (folder / "proto").exists():
+        (folder / "proto").symlink_to(SOURCE / "proto")
+    environment = {**os.environ, "PATH": f"{Path(LCM_GEN).parent}:{os.environ['PATH']}"}
+    subprocess.run(["sh", "-e", "-c", script], cwd=folder, check=True, env=environment)
+
+
+def check_scans(text):
+    lines = [line.split() for line in text.splitlines()]
+    assert len(lines) == 20
+    return lines
+
+
+def bare(server, **more):
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    return {**environment, "LCM_DEFAULT_URL": server.url, **more}
+
+
+def test_python(tmp_path):
+    page = blocks("protocol.md")
+    run_in(tmp_path, page["bare_python_types"].replace("pip install lcm==1.5.3", "true"))
+    (tmp_path / "client.py").write_text(page["bare_python"])
+    with ruedo_run("--no-noise", "--disable", "p3at/camera", world=HALL) as server:
+        done = subprocess.run([sys.executable, "client.py"], cwd=tmp_path, env=bare(server), capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    lines = check_scans(done.stdout)
+    assert all(line[1] == "181" for line in lines)
+    assert float(lines[0][2]) > float(lines[-1][2]) + 0.1    # it drove towards the wall
+
+
+def c_client(folder, headers, library):
+    page = blocks("protocol.md")
+    (folder / "client.c").write_text(page["bare_c"])
+    flags = f"-Wall -Wextra -Werror -Wno-unused-parameter -I{headers} -I. {library} -Wl,-rpath,{Path(library).parent}"
+    run_in(folder, page["bare_c_build"].replace("$(pkg-config --cflags --libs lcm)", flags))
+
+
+@pytest.mark.parametrize("version", ["1.5.3", "1.3.1"])
+def test_c(tmp_path, version):
+    if version == "1.5.3":
+        headers, library = WHEEL / "include", WHEEL / "lib/liblcm.so"
+        if not library.exists():
+            library = next(WHEEL.glob("**/liblcm.so"))
+            headers = next(WHEEL.glob("**/lcm/lcm.h")).parent.parent
+    else:
+        root = Path(os.environ.get("RUEDO_LCM_131", "/nonexistent"))
+        libraries = [*root.glob("usr/lib/*/liblcm.so.1.3*"), *Path("/usr/lib").glob("*/liblcm.so.1.3*")]
+        if not libraries:
+            pytest.skip("no LCM 1.3.1 here: neither liblcm-dev is installed nor could fetch_lcm131.sh get it")
+        library = libraries[0]
+        headers = root / "usr/include" if root.exists() else Path("/usr/include")
+    c_client(tmp_path, headers, library)
+    linked = subprocess.run(["ldd", str(tmp_path / "client")], capture_output=True, text=True).stdout
+    assert str(library.parent) in linked
+    with ruedo_run("--no-noise", "--disable", "p3at/camera", world=HALL) as server:
+        done = subprocess.run([str(tmp_path / "client")], env=bare(server), capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    lines = check_scans(done.stdout)
+    assert lines[0][0] == "p3at/lrf" and lines[0][2] == "181"
+    assert float(lines[0][3]) > float(lines[-1][3]) + 0.1
+
+
+class Bare:
+    """A bus, and the newest message of each kind that was asked for."""
+
+    def __init__(self, url):
+        self.bus = lcm.LCM(url)
+        self.heard = []
+
+    def listen(self, channel, message):
+        self.bus.subscribe(channel, lambda _, data: self.heard.append(message.decode(data)))
+
+    def until(self, ready, seconds=20.0):
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            self.bus.handle_timeout(100)
+            if any(ready(message) for message in self.heard):
+                return
+        pytest.fail(f"it did not happen within {seconds} s; the last message was {self.heard and vars_of(self.heard[-1])}")
+
+
+def vars_of(message):
+    return {name: getattr(message, name) for name in message.__slots__}
+
+
+def test_the_watchdog_stops_a_command_that_is_not_repeated():
+    from ruedo.lcmtypes import motion_status_t, velocity_command_t
+
+    with ruedo_run("--disable", "p3at/camera", world=HALL) as server:
+        bare = Bare(server.url)
+        bare.listen("p3at/motion", motion_status_t)
+        command = velocity_command_t()
+        command.vx = 0.2
+        bare.bus.publish("p3at/velocity", command.encode())
+        bare.until(lambda m: m.kind == m.KIND_VELOCITY and m.state == m.STATE_RUNNING)
+        bare.until(lambda m: m.state == m.STATE_ENDED and m.reason == m.REASON_WATCHDOG)
+        output = server.end()
+    assert output.count("watchdog") == 1, output    # said once on the terminal
+
+
+def test_a_primitive_needs_no_repeating():
+    from ruedo.lcmtypes import motion_status_t, move_command_t
+
+    with ruedo_run("--disable", "p3at/camera", world=HALL) as server:
+        bare = Bare(server.url)
+        bare.listen("p3at/motion", motion_status_t)
+        command = move_command_t()
+        command.id, command.kind, command.value = 77, move_command_t.ROTATE, 1.0
+        bare.bus.publish("p3at/move", command.encode())
+        bare.until(lambda m: m.id == 77 and m.state == m.STATE_DONE and abs(m.done - 1.0) < 1e-6)
+
+
+def test_a_refused_primitive_says_why():
+    from ruedo.lcmtypes import motion_status_t, move_command_t
+
+    with ruedo_run("--disable", "p3at/camera", world=HALL) as server:
+        bare = Bare(server.url)
+        bare.listen("p3at/motion", motion_status_t)
+        for id, kind, value, reason in ((5, move_command_t.ADVANCE, float("nan"), motion_status_t.REASON_NOT_FINITE),
+                                        (6, 99, 1.0, motion_status_t.REASON_BAD_KIND)):
+            command = move_command_t()
+            command.id, command.kind, command.value = id, kind, value
+            bare.bus.publish("p3at/move", command.encode())
+            bare.until(lambda m: m.id == id and m.state == m.STATE_REFUSED and m.reason == reason)

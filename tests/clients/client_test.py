@@ -1,0 +1,117 @@
+"""The vocabulary, in each language, against the real server: the probes print what they saw, the numbers are known."""
+
+import math
+import time
+
+import pytest
+from conftest import HERE, probe, ruedo_run
+
+HALL = str(HERE / "hall.sdf")
+WALL = 6.0                # m, the wall's face
+LRF_AHEAD = 0.16          # m, where the P3-AT carries its LRF
+WHEEL_RADIUS = 0.111      # m
+
+
+@pytest.fixture(scope="module")
+def server():
+    """A quiet hall without noise, in real time; tests leave the robot at rest."""
+    with ruedo_run("--no-noise", "--disable", "p3at/camera", world=HALL) as server:
+        yield server
+
+
+def test_list(language, server):
+    said = probe(language, server.url, "list")
+    assert said.words("world") == ["hall", "1", "0.005000"]
+    name, drive, watchdog, track = said.words("robot")
+    assert (name, drive) == ("p3at", "kinematic") and (float(watchdog), float(track)) == (0.6, 0.394)
+    devices = {words[1]: words[2:] for words in (line.split() for line in said.all("device"))}
+    assert devices["lrf"][:3] == ["lrf", "planar_lidar_t", "10.000000"]
+    assert devices["sonar_front"][:2] == ["sonar", "sonar_t"] and devices["sonar_front"][3:] == ["5.000000", "8"]
+    assert devices["odometry"][:3] == ["odometry", "odometry_t", "50.000000"]
+    assert devices["pose"][1] == "pose_t" and devices["motion"][1] == "motion_status_t"
+    assert "camera" not in devices
+
+
+def test_read(language):
+    with ruedo_run("--no-noise", world=HALL) as server:
+        said = probe(language, server.url, "read", "p3at")
+    rays, first, last, nearest, intensities = said.numbers("scan")
+    assert (rays, intensities) == (181, 181)
+    assert (first, last) == pytest.approx((-math.pi / 2, math.pi / 2), abs=1e-5)
+    assert nearest == pytest.approx(WALL - LRF_AHEAD, abs=1e-4)
+    assert said.numbers("sonar") == [8, 5.0, 8, 8]    # the wall is beyond the sonar's 5 m
+    assert said.numbers("odometry") == [0.0, 0.0, 0.0, 4]
+    assert said.numbers("pose") == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
+    gap = int(said.one("next"))
+    assert gap > 0 and gap % 100000 == 0    # us: a multiple of the LRF's period
+    width, height, format, data = said.words("image")
+    assert int(width) > 0 and int(height) > 0 and (format, data) == ("jpeg", "True")
+
+
+def test_velocity_holds_until_stopped(language, server):
+    """3 s: five times the watchdog's time."""
+    said = probe(language, server.url, "velocity", "p3at", "0.3", "0.5", "3")
+    kind, state, v, omega = said.words("status")
+    assert (kind, state) == ("velocity", "running") and (float(v), float(omega)) == pytest.approx((0.3, 0.5), abs=1e-6)
+    moved, turned = said.numbers("moved")
+    # Along a circle of v / omega, after 1 s of gaining speed; what the host's delay adds is a few samples.
+    assert 0.5 < moved < 2 * 0.3 / 0.5 and 1.0 < turned < 2.2
+    assert said.numbers("stopped") == pytest.approx([0.0], abs=1e-9)
+
+
+def test_wheels(language, server):
+    said = probe(language, server.url, "wheels", "p3at", "2", "2", "2")
+    kind, state, v, omega = said.words("status")
+    assert (kind, state) == ("wheels", "running") and (float(v), float(omega)) == pytest.approx((2 * WHEEL_RADIUS, 0.0), abs=1e-6)
+    assert said.numbers("stopped") == pytest.approx([0.0], abs=1e-9)
+
+
+def test_velocity_holds_at_full_speed(language):
+    """As fast as it goes, real time cannot feed the watchdog; the ticks do."""
+    with ruedo_run("--rate", "max", "--disable", "p3at/camera", "--duration", "36000", world=HALL) as server:
+        said = probe(language, server.url, "velocity", "p3at", "0.0", "0.4", "60")
+        assert said.words("status")[:2] == ["velocity", "running"], said.text
+
+
+def test_primitives(language, server):
+    said = probe(language, server.url, "primitives", "p3at")
+    for name, moved, turned in (("advance", 0.4, 0.0), ("rotate", 0.0, 1.2), ("arc", 2 * 0.5 * math.sin(0.8 / 2), 0.8)):
+        early, done, state, reason, distance, angle = said.words(name)
+        assert (early, done, state, reason) == ("False", "True", "done", "-"), name
+        assert (float(distance), float(angle)) == pytest.approx((moved, turned), abs=2e-6), name
+    assert said.words("turn_to")[1:4] == ["True", "done", "-"]
+    assert said.one("replaced").startswith("MotionError: p3at: advance ended: replaced, 4.")
+    assert said.one("too_long").startswith("Timeout: p3at: advance was not done within 0.3 s (")
+
+
+def test_errors_name_what_exists(language, server):
+    said = probe(language, server.url, "errors", "p3at")
+    assert said.one("robot") == "UnknownName: there is no robot 'nobody'; there is p3at"
+    device = said.one("device")
+    assert device.startswith("UnknownName: p3at has no device 'nothing'; it has ") and "lrf" in device and "sonar_rear" in device
+    assert said.one("nan").startswith("ValueError: v is ")
+    assert said.one("radius").startswith("ValueError: radius is 0")
+    assert said.one("limit").startswith("ValueError: speed is -1")
+    assert said.one("spawn").split(":")[0] in ("NotSupported", "RequestError")
+
+
+def test_control(language):
+    with ruedo_run("--disable", "p3at/camera", world=HALL) as server:
+        said = probe(language, server.url, "control", "p3at")
+        assert said.words("paused") == ["True", "True"]
+        assert said.words("step") == ["7"]
+        assert said.words("name")[0] == "p3at" and abs(float(said.words("name")[1])) < 1e-3
+        assert said.numbers("rate") == [2.0]
+        assert said.words("reset") == ["True"]
+        assert said.one("unknown").startswith("RequestError: GET_STATE: ")
+        assert said.one("steps").startswith("RequestError: STEP: ")
+        assert probe(language, server.url, "quit").words("quit") == ["True"]
+        deadline = time.monotonic() + 20.0
+        while server.process.poll() is None and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert server.process.returncode == 0
+
+
+def test_paused_simulation_is_joined(language):
+    with ruedo_run("--paused", "--disable", "p3at/camera", world=HALL) as server:
+        assert probe(language, server.url, "connect").one("connected") == "hall"

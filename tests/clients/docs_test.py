@@ -1,0 +1,58 @@
+"""The programs of docs/clients.md run as they stand there."""
+
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+from conftest import BUILD, HERE, SOURCE, ruedo_run
+from docs_code import blocks
+
+
+@pytest.fixture(scope="module")
+def server():
+    with ruedo_run("--disable", "p3at/camera", world=str(HERE / "hall.sdf")) as server:
+        yield server
+
+
+def run(command, server, folder):
+    done = subprocess.run(command, env={**os.environ, "LCM_DEFAULT_URL": server.url}, cwd=folder, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_python(server, tmp_path):
+    (tmp_path / "ten.py").write_text(blocks("clients.md")["python"])
+    assert "Odometry(" in run([sys.executable, "ten.py"], server, tmp_path)
+
+
+def test_python_docstring_of_the_package(server, tmp_path):
+    """The example in `help(ruedo)`."""
+    import ruedo
+
+    lines = [line[4:] for line in ruedo.__doc__.splitlines() if line.startswith("    ")]
+    (tmp_path / "doc.py").write_text("\n".join(lines).replace("> 0.8", "> 5.0"))    # the hall's wall is far
+    run([sys.executable, "doc.py"], server, tmp_path)
+
+
+def test_cpp(server, tmp_path):
+    """Compiled against the header and the library alone, as a user's program is."""
+    import lcm
+    from pathlib import Path
+
+    (tmp_path / "ten.cpp").write_text(blocks("clients.md")["cpp"])
+    library = next(Path(lcm.__file__).resolve().parent.parent.glob("**/liblcm.so"))
+    subprocess.run([os.environ.get("CXX", "c++"), "-std=c++20", "-Wall", "-Wextra", "-Werror", "-I", str(SOURCE / "include"), "ten.cpp",
+                    str(BUILD / "clients/cpp/libruedo_client.a"), str(library), f"-Wl,-rpath,{library.parent}", "-pthread", "-o", "ten"],
+                   cwd=tmp_path, check=True)
+    assert run(["./ten"], server, tmp_path).startswith("181 rays, 5.")
+
+
+def test_java(server, tmp_path):
+    if not shutil.which("javac"):
+        pytest.skip("no JDK here")
+    (tmp_path / "Ten.java").write_text(blocks("clients.md")["java"])
+    jar = f"{BUILD}/java/ruedo.jar"
+    subprocess.run(["javac", "--release", "11", "-cp", jar, "Ten.java"], cwd=tmp_path, check=True)
+    assert run(["java", "-cp", f"{jar}:.", "Ten"], server, tmp_path).startswith("181 rays, 5.")

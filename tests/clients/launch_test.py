@@ -1,0 +1,112 @@
+"""launch(): a private server that ends with its client, however that ends."""
+
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from conftest import HERE, PROBES, probe
+
+HALL = str(HERE / "hall.sdf")
+
+
+def servers_of(url):
+    """Process ids of the programs that have the URL in their command line."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            words = (folder / "cmdline").read_bytes().decode().split("\0")
+            state = (folder / "stat").read_text().rsplit(")", 1)[1].split()[0]
+        except OSError:
+            continue
+        if url in words and state != "Z":
+            found.append(int(folder.name))
+    return found
+
+
+def gone(url, seconds=15.0):
+    deadline = time.monotonic() + seconds
+    while servers_of(url) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    return not servers_of(url)
+
+
+def start(language):
+    """A probe that has launched a server, and the server's URL."""
+    client = subprocess.Popen([*PROBES[language], "-", "launch", HALL, "--disable", "p3at/camera"], stdout=subprocess.PIPE, text=True)
+    url = client.stdout.readline().split()[1]
+    assert client.stdout.readline().split() == ["ready", "True"]
+    return client, url
+
+
+@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_the_server_ends_with_its_client(language, end):
+    client, url = start(language)
+    try:
+        assert len(servers_of(url)) == 1
+        client.send_signal(end)
+        client.wait(20.0)
+        assert gone(url)
+    finally:
+        client.kill()
+        client.wait()
+
+
+def test_two_launches_do_not_meet(language):
+    first, url = start(language)
+    second, other = start(language)
+    try:
+        assert url != other and url.startswith("udpm://") and url.endswith("?ttl=0")
+    finally:
+        for client in (first, second):
+            client.kill()
+            client.wait()
+    assert gone(url) and gone(other)
+
+
+def test_what_the_server_says_is_in_the_error(language, tmp_path):
+    wrong = tmp_path / "wrong.sdf"
+    wrong.write_text("<sdf version='1.9'>\n<world name='w'>\n")
+    said = probe(language, "-", "launch", str(wrong)).one("failed")
+    assert said.startswith("LaunchError: the server ended (exit code 3)") and "wrong.sdf:" in said
+
+
+def test_the_program_is_looked_for(language, monkeypatch):
+    monkeypatch.setenv("RUEDO", "/no/such/program")
+    assert probe(language, "-", "launch", HALL).one("failed").startswith("LaunchError: the environment's RUEDO is '/no/such/program'")
+
+
+def test_python_closes_it_at_the_end_of_the_block():
+    import ruedo
+
+    with ruedo.launch(HALL, seed=5, rate="max", args=["--disable", "p3at/camera"]) as sim:
+        assert sim.seed == 5 and len(servers_of(sim.url)) == 1
+        url = sim.url
+    assert gone(url, 0.0)
+
+
+def test_python_in_a_thread_that_ends():
+    """PR_SET_PDEATHSIG would end the server with the thread."""
+    import threading
+
+    import ruedo
+
+    made = []
+    thread = threading.Thread(target=lambda: made.append(ruedo.launch(HALL, args=["--disable", "p3at/camera"])))
+    thread.start()
+    thread.join()
+    with made[0] as sim:
+        time.sleep(0.5)
+        assert sim.robots[0].odometry.next().time >= 0.0
+
+
+def test_a_server_that_dies_is_said():
+    import ruedo
+
+    with ruedo.launch(HALL, args=["--disable", "p3at/camera"]) as sim:
+        os.kill(servers_of(sim.url)[0], signal.SIGKILL)
+        with pytest.raises(ruedo.NoServer, match="the server ended \\(signal SIGKILL\\)"):
+            for _ in range(1000):
+                sim.robots[0].lrf.next(2.0)

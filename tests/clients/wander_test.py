@@ -1,0 +1,48 @@
+"""The example of each language, 20 s of sim time in the arena without touching anything."""
+
+import os
+import subprocess
+import sys
+
+import lcm
+import pytest
+from conftest import ARENA, BUILD, SOURCE, ruedo_run
+
+EXAMPLES = {
+    "python": [sys.executable, str(SOURCE / "clients/python/examples/wander.py")],
+    "cpp": [str(BUILD / "bin/ruedo-wander-cpp")],
+    "java": ["java", "-cp", f"{BUILD}/java/ruedo.jar:{BUILD}/java/ruedo-examples.jar", "Wander"],
+}
+
+
+def numbers(line):
+    return [float(word.strip(",;")) for word in line.split() if word.strip(",;").replace(".", "").replace("-", "").isdigit()]
+
+
+@pytest.mark.parametrize("language", list(EXAMPLES))
+def test_wander(language, tmp_path):
+    log, picture = tmp_path / "run.log", tmp_path / "seen.jpg"
+    with ruedo_run("--record", str(log), world=ARENA) as server:
+        done = subprocess.run([*EXAMPLES[language], "--url", server.url, "--duration", "20", "--picture", str(picture)],
+                              capture_output=True, text=True, timeout=400)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert picture.read_bytes()[:3] == b"\xff\xd8\xff"    # a JPEG
+    lines = {line.split("  ")[0].split(" x")[0].strip(): line for line in done.stdout.splitlines()}
+    truth, odometry = numbers(lines["true pose"]), numbers(lines["odometry"])
+    assert odometry[:2] == pytest.approx(truth[:2], abs=0.05)    # the robot started at the world's origin
+
+    from ruedo import lcmtypes
+
+    way, last, reasons, heard = 0.0, None, set(), 0
+    for event in lcm.EventLog(str(log), "r"):
+        if event.channel == "p3at/pose":
+            pose = lcmtypes.pose_t.decode(event.data)
+            way += abs(pose.vel[0]) * 0.02
+            heard += 1
+        elif event.channel == "p3at/motion":
+            reasons.add(lcmtypes.motion_status_t.decode(event.data).reason)
+    assert heard >= 1000 and way > 2.0    # it did move
+    # Nothing blocked it, and its watchdog never had to stop it.
+    assert reasons <= {lcmtypes.motion_status_t.REASON_NONE, lcmtypes.motion_status_t.REASON_REPLACED}
+    # An untouched kinematic drive follows its wheels exactly, so a bump would show as odometry that is off.
+    assert odometry[2] == pytest.approx(truth[2], abs=0.05) or abs(abs(odometry[2] - truth[2]) - 6.2832) < 0.05
