@@ -26,7 +26,13 @@ constexpr int kMaxSupersampledSide = 4096;
 cv::Mat picture_of_world(const RenderArguments& arguments, const model::WorldModel& world, const model::BodyLayout& layout) {
   const auto renderer = scene::make_renderer(world, layout);
   const Size size = arguments.size.empty() ? Size{} : parse_size(arguments.size);
-  scene::View view = parse_view(arguments.view, size, renderer->bounds());
+  Vec3 sunlight(1, 1, -1);
+  for (const model::Light& light : world.lights) {
+    if (light.type != model::Light::Type::directional) continue;
+    sunlight = light.pose.rotation * light.direction;
+    break;
+  }
+  scene::View view = parse_view(arguments.view, size, renderer->bounds(), sunlight);
   const int factor = std::max(view.width, view.height) <= kMaxSupersampledSide ? 2 : 1;
   const cv::Size wanted(view.width, view.height);
   view.width *= factor;

@@ -13,6 +13,7 @@ namespace {
 constexpr int kMaxSide = 8192;
 constexpr Size kDefaultSize{1280, 960};
 constexpr double kHfov = 0.9;      // rad
+constexpr double kIsoYaw = 1.1;    // rad, or a quarter, half, ... turn more
 constexpr double kMargin = 1.06;    // around what is framed
 
 std::vector<double> numbers(const std::string& text) {
@@ -45,14 +46,24 @@ scene::View from_above(Size size, const scene::Bounds& bounds) {
   return view;
 }
 
-scene::View at_an_angle(Size size, const scene::Bounds& bounds) {
+scene::View at_an_angle(Size size, const scene::Bounds& bounds, const Vec3& sunlight) {
   if (size.width == 0) size = kDefaultSize;
   const Vec3 middle = 0.5 * (bounds.low + bounds.high);
-  const Quat rotation = Pose::from_xyz_rpy(Vec3::Zero(), {0, 0.75, 1.1}).rotation;    // looks down at 43 degrees, to the north-east
+  // Down at 43 degrees, and across the axes: of four directions the one that goes best with the light.
+  double yaw = kIsoYaw, best = -2.0;
+  for (int quarter = 0; quarter < 4; ++quarter) {
+    const double candidate = kIsoYaw + quarter * M_PI / 2;
+    const double along = std::cos(candidate - std::atan2(sunlight.y(), sunlight.x()));
+    if (along > best + 1e-9) {
+      best = along;
+      yaw = candidate;
+    }
+  }
+  const Quat rotation = Pose::from_xyz_rpy(Vec3::Zero(), {0, 0.75, yaw}).rotation;
   scene::View view = scene::View::pinhole({rotation, middle}, size.width, size.height, kHfov);
   // As near as all corners of the bounds allow.
   const double tan_h = 0.5 * size.width / view.fx / kMargin, tan_v = 0.5 * size.height / view.fy / kMargin;
-  double distance = 1.0;
+  double distance = 0.1;
   for (int corner = 0; corner < 8; ++corner) {
     const Vec3 p((corner & 1) != 0 ? bounds.high.x() : bounds.low.x(), (corner & 2) != 0 ? bounds.high.y() : bounds.low.y(),
                  (corner & 4) != 0 ? bounds.high.z() : bounds.low.z());
@@ -60,7 +71,7 @@ scene::View at_an_angle(Size size, const scene::Bounds& bounds) {
     distance = std::max({distance, std::abs(q.y()) / tan_h - q.x(), std::abs(q.z()) / tan_v - q.x()});
   }
   view.X_WCamera.translation = middle - rotation * Vec3(distance, 0, 0);
-  view.near_m = std::max(0.02, 0.02 * distance);
+  view.near_m = 0.02 * distance;
   view.far_m = 20.0 * distance + 500.0;
   return view;
 }
@@ -80,9 +91,9 @@ Size parse_size(const std::string& text) {
   throw InputError({}, "--size " + text + ": allowed is WIDTHxHEIGHT in pixels, each from 1 to " + std::to_string(kMaxSide));
 }
 
-scene::View parse_view(const std::string& text, Size size, const scene::Bounds& bounds) {
+scene::View parse_view(const std::string& text, Size size, const scene::Bounds& bounds, const Vec3& sunlight) {
   if (text == "top") return from_above(size, bounds);
-  if (text == "iso") return at_an_angle(size, bounds);
+  if (text == "iso") return at_an_angle(size, bounds, sunlight);
   const std::vector<double> v = numbers(text);
   if (v.size() != 6) throw InputError({}, "--view " + text + ": allowed are top, iso and x,y,z,roll,pitch,yaw (m, rad)");
   if (size.width == 0) size = kDefaultSize;

@@ -157,7 +157,10 @@ class Builder {
     // Old worlds often give the ambient colour only.
     const auto black = [](const Rgba& c) { return c[0] + c[1] + c[2] < 0.003f; };
     if (black(part.diffuse) && !black(material.ambient)) part.diffuse = material.ambient;
-    part.diffuse[3] = std::clamp(material.diffuse[3] * static_cast<float>(1.0 - visual.transparency), 0.0f, 1.0f);
+    // Many files write the opacity 0 and mean 1 (COLLADA has two opposite conventions); what is to be invisible has
+    // SDF's transparency.
+    const float opacity = material.diffuse[3] < 0.004f ? 1.0f : material.diffuse[3];
+    part.diffuse[3] = std::clamp(opacity * static_cast<float>(1.0 - visual.transparency), 0.0f, 1.0f);
     part.transparent = part.diffuse[3] < 0.996f;
     part.specular = material.specular;
     part.specular[3] = std::clamp(material.shininess, 1.0f, 128.0f);

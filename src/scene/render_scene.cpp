@@ -212,7 +212,7 @@ class GlRenderer : public Renderer {
     }
   }
 
-  static constexpr double kLinePixels = 1.5;
+  static constexpr double kLinePixels = 2.5;
 
   RenderContent content_;
   Culler culler_;

@@ -168,7 +168,7 @@ std::string fragment_shader(Pass pass, uint32_t flags, bool cutout, const LightC
   light = min(light, vec3(0.8)) + over / (1.0 + over);
   vec3 colour = to_light(albedo) * light + to_light(v_emissive.rgb);
 )";
-  if (specular) s += "  colour += to_light(v_specular.rgb) * shine;\n";
+  if (specular) s += "  colour += 0.4 * to_light(v_specular.rgb) * shine;\n";
   if ((flags & kGround) != 0) {
     s += "  float edge = smoothstep(0.55, 1.0, length(v_plane));\n"
          "  colour = mix(colour, sky_horizon.rgb, edge);\n";
