@@ -89,6 +89,9 @@ model::LoadOptions options_of(const RenderArguments& arguments) {
   const size_t slash = arguments.camera.find('/');
   if (slash == std::string::npos) throw InputError({}, "--camera " + arguments.camera + ": allowed is ROBOT/DEVICE");
   const std::string robot = arguments.camera.substr(0, slash), device = arguments.camera.substr(slash + 1);
+  const std::vector<model::Setting> given = std::move(options.settings);    // what the user sets comes last and holds
+  options.settings = {{robot, device, "ruedo:encoding", "rgb"}};
+  options.settings.insert(options.settings.end(), given.begin(), given.end());
   const Size size = arguments.size.empty() ? Size{} : parse_size(arguments.size);
   if (size.width == 0) return options;
   options.settings.push_back({robot, device, "camera.image.width", std::to_string(size.width)});

@@ -16,7 +16,7 @@ struct FrameBlock {
   std::array<float, 16> clip_from_world;     // column by column
   std::array<float, 16> shadow_from_world;
   Vec4 eye;                 // towards the eye: eye.xyz - eye.w * position
-  Vec4 origin;              // xy: the camera's position modulo the ground grid, m; z: 1 / exposure's inverse (a factor); w: shadow bias, m
+  Vec4 origin;              // xy: the camera's position modulo the ground grid, m; z: exposure; w: shadow bias, m
   Vec4 ambient_up, ambient_down;       // light from above and below; linear
   Vec4 sky_top, sky_horizon, sky_ground;
   std::array<Vec4, kMaxDirectionalLights> sun_direction, sun_colour;    // towards the light
