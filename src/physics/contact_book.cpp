@@ -63,7 +63,7 @@ void ContactBook::clear(double step_s) {
   near_.clear();
 }
 
-void ContactBook::add(btDispatcher& dispatcher) {
+void ContactBook::add(btDispatcher& dispatcher, int substeps) {
   ++substeps_;
   near_only_.clear();
   for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
@@ -82,7 +82,7 @@ void ContactBook::add(btDispatcher& dispatcher) {
       contact.normal = from_bt(point.m_normalWorldOnB);
       contact.depth = -point.getDistance();
       const bool touches = point.getAppliedImpulse() > 0.0 || contact.depth >= 0.0;
-      if (touches) contact.force = point.getAppliedImpulse() / step_s_;
+      if (touches) contact.force = point.getAppliedImpulse() * substeps / step_s_;
       // Static things come second; of two bodies the lower number comes first.
       if (contact.body_a < 0 || (contact.body_b >= 0 && contact.body_b < contact.body_a)) contact = swapped(contact);
       (touches ? contacts_ : near_only_).push_back(contact);

@@ -16,8 +16,8 @@ class ContactBook {
 
   // Starts a step of that length (s).
   void clear(double step_s);
-  // Adds what the dispatcher's manifolds hold after a substep.
-  void add(btDispatcher& dispatcher);
+  // Adds what the dispatcher's manifolds hold after a substep. Where everything sleeps, one call stands for `substeps`.
+  void add(btDispatcher& dispatcher, int substeps = 1);
   // Ends the step.
   void finish();
 

@@ -309,7 +309,8 @@ void PhysicsWorld::Impl::step() {
   dynamics_.take(simulated_);
   const double step_s = static_cast<double>(step_us_) * 1e-6;
   contacts_.clear(step_s);
-  const int substeps = simulated_.empty() ? 0 : substeps_;
+  const bool awake = std::any_of(simulated_.begin(), simulated_.end(), [](const btRigidBody* body) { return body->isActive(); });
+  const int substeps = awake ? substeps_ : 0;
   const double substep_s = step_s / substeps_;
   for (int s = 0; s < substeps; ++s) {
     for (JointConstraint& joint : joints_) joint.before_substep(substep_s);
@@ -328,11 +329,12 @@ void PhysicsWorld::Impl::step() {
       mover.setWorldTransform(next);
     }
   }
+  if (!awake && dispatcher_.getNumManifolds() > 0) contacts_.add(dispatcher_, substeps_);    // what rests still touches
   contacts_.finish();
   for (int i = 0; i < static_cast<int>(motions_.size()); ++i) {
     Motion& motion = motions_[index(i)];
     const bool moved = rigid_.bodies[index(i)].info.moved;
-    if (motion.simulated && !moved) pull_from_bullet(i);
+    if (awake && motion.simulated && !moved) pull_from_bullet(i);
     if (motion.kind == Motion::Kind::guided && (moved || contacts_.touching(i).empty())) {
       poses_[index(i)] = motion.end;
       twists_[index(i)] = motion.mean;

@@ -11,9 +11,6 @@ namespace ruedo::physics {
 namespace {
 
 constexpr double kSmallestMass_kg = 1e-6;
-// Lateral friction of a driven wheel relative to the rolling one, where the file does not say otherwise: tyres of
-// skid-steered robots slip sideways (with 1, half of the turn rate is lost; measured).
-constexpr double kLateralFriction = 0.3;
 // Velocities below which a body may fall asleep (after 2 s).
 constexpr double kSleepSpeed_m_s = 0.005, kSleepRate_rad_s = 0.01;
 
@@ -174,8 +171,7 @@ void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLay
   body.bullet = std::make_unique<btRigidBody>(settings);
   btRigidBody& bullet = *body.bullet;
   if (wheel >= 0) {
-    const bool given = surface && surface->friction > 0.0 && surface->friction2 != surface->friction;
-    const double lateral = given ? surface->friction2 / surface->friction : kLateralFriction;
+    const double lateral = surface && surface->friction > 0.0 ? surface->friction2 / surface->friction : 1.0;
     bullet.setAnisotropicFriction({1, lateral, 1}, btCollisionObject::CF_ANISOTROPIC_FRICTION);
   }
   if (kinematic) bullet.setCollisionFlags(bullet.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);

@@ -102,9 +102,14 @@ void KinematicDrive::before_step(SimTime now) {
   }
 }
 
-bool KinematicDrive::servo(Twist& twist, bool bounded) const {
+bool KinematicDrive::servo(Twist& twist, bool bounded) {
   double dx = way_.x / step_s_ - twist.linear.x(), dy = way_.y / step_s_ - twist.linear.y();
   double turn = way_.angle / step_s_ - twist.angular.z();
+  if (touched_ && held_) {    // what contacts took in the last step they will take again: the servo gives it in advance
+    dx += sent_.x() - twist.linear.x();
+    dy += sent_.y() - twist.linear.y();
+    turn += sent_.z() - twist.angular.z();
+  }
   bool reached = true;
   if (bounded) {
     const double change = std::hypot(dx, dy), allowed = max_force_ * step_s_ / mass_;
@@ -122,6 +127,7 @@ bool KinematicDrive::servo(Twist& twist, bool bounded) const {
   twist.linear.x() += dx;
   twist.linear.y() += dy;
   twist.angular.z() += turn;
+  sent_ = {twist.linear.x(), twist.linear.y(), twist.angular.z()};
   return reached;
 }
 
@@ -177,6 +183,7 @@ void KinematicDrive::after_step(SimTime now) {
 }
 
 void KinematicDrive::after_on_plane(SimTime now) {
+  held_ = touched_;
   touched_ = !physics_.contacts(body_).empty();
   if (!touched_ && !behind_) {
     heading_ += way_.angle;
@@ -205,6 +212,7 @@ void KinematicDrive::after_on_plane(SimTime now) {
 
 void KinematicDrive::after_on_contacts(SimTime now) {
   const Vec3 up = X_WBase_.rotation * Vec3::UnitZ();
+  held_ = touched_;
   touched_ = false;
   for (const Contact& contact : physics_.contacts(body_)) touched_ |= !is_support(contact, up);
   Pose X_WBase = base_pose().normalized();

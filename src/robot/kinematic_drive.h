@@ -35,13 +35,15 @@ class KinematicDrive final : public Drive {
   void fall_asleep_when_still(bool still);
   // Brings `twist` (of base_link, in it) to the plan's mean velocities in the plane, as far as the force allows
   // when `bounded`. Returns whether it got there.
-  bool servo(Twist& twist, bool bounded) const;
+  bool servo(Twist& twist, bool bounded);
   bool is_support(const Contact& contact, const Vec3& up) const;
   double plane_gap(double height) const { return X_WBase_.translation.z() + lowest_ - height; }
 
   bool on_plane_ = false, asleep_ = false;
   bool touched_ = false;         // by more than the support, in the last step
+  bool held_ = false;            // ... and in the step before
   bool behind_ = false;          // the servo did not reach the plan's velocities
+  Vec3 sent_ = Vec3::Zero();     // what the servo gave last: m/s ahead, m/s to the left, rad/s
   bool supported_ = false;       // on contacts: wheels stand on something
   Displacement way_;             // that the plan makes in this step
   double heading_ = 0.0;         // of base_link on a plane, rad

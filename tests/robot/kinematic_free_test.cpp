@@ -13,11 +13,11 @@ std::string free_robot(const std::string& drive = limits(2.0, 2.0, 0.5, 1.0, 1.5
   return plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", drive);
 }
 
-class AnyStep : public ::testing::TestWithParam<int64_t> {};
+class FreeAtAnyStep : public ::testing::TestWithParam<int64_t> {};
 
 // E1 of the paper: 1 m with a triangular profile, the acceleration limit above the deceleration limit and the other
 // way round. The paper's simulator made 1126.40 mm and 1016.96 mm of it.
-TEST_P(AnyStep, AdvanceOneMetreByTriangles) {
+TEST_P(FreeAtAnyStep, AdvanceOneMetreByTriangles) {
   for (const auto& [a, d] : {std::pair(4.2, 0.27), std::pair(0.27, 4.2)}) {
     Sim sim(free_robot(limits(5.0, 2.0, a, d, 1.0)), GetParam());
     sim.move(Move::ADVANCE, 1.0);
@@ -32,7 +32,7 @@ TEST_P(AnyStep, AdvanceOneMetreByTriangles) {
 }
 
 // The same commands at the same times: the same way, to rounding. Commands come on multiples of 50 ms.
-TEST_P(AnyStep, FreeMotionDoesNotDependOnTheStep) {
+TEST_P(FreeAtAnyStep, FreeMotionDoesNotDependOnTheStep) {
   const auto drive = [](int64_t step_us) {
     Sim sim(free_robot(), step_us);
     sim.velocity(0.7, 1.1);
@@ -54,7 +54,7 @@ TEST_P(AnyStep, FreeMotionDoesNotDependOnTheStep) {
   EXPECT_NEAR(wrap_angle(heading(pose.rotation) - heading(reference.rotation)), 0.0, 1e-10);
 }
 
-INSTANTIATE_TEST_SUITE_P(Steps, AnyStep, ::testing::Values(100, 1000, 2000, 5000, 12500, 25000, 50000));
+INSTANTIATE_TEST_SUITE_P(Steps, FreeAtAnyStep, ::testing::Values(100, 1000, 2000, 5000, 12500, 25000, 50000));
 
 TEST(KinematicFree, CircleOfConstantTwist) {
   Sim sim(free_robot(""));    // no limits: full speed at once
