@@ -272,9 +272,9 @@ void fleet(int robots, const std::vector<BoxAt>& boxes, int repeats) {
     collision.geometry.size = size;
     robot->links[0].collisions.push_back(collision);
   };
-  add({0, 0, 0.18}, {}, model::Shape::box, {0.5, 0.28, 0.19});
-  add({0, 0, 0.275}, {}, model::Shape::box, {0.5, 0.38, 0.01});
-  add({0.16, 0, 0.36}, {}, model::Shape::box, {0.15, 0.15, 0.18});
+  add({0, 0, 0.18}, Vec3::Zero(), model::Shape::box, {0.5, 0.28, 0.19});
+  add({0, 0, 0.275}, Vec3::Zero(), model::Shape::box, {0.5, 0.38, 0.01});
+  add({0.16, 0, 0.36}, Vec3::Zero(), model::Shape::box, {0.15, 0.15, 0.18});
   for (const double x : {0.135, -0.134})
     for (const double y : {0.197, -0.197}) add({x, y, 0.111}, {M_PI / 2, 0, 0}, model::Shape::cylinder, {0.111, 0.075, 0});
   RandomStream random = RandomSource(1, "office", "fleet").stream(0);

@@ -266,6 +266,11 @@ TEST(Lrf, NoiseIsTheDevicesOwnAndOfItsSample) {
   EXPECT_LT(with_post[0], 2.6f);
   with_post[0] = first[0];
   EXPECT_EQ(with_post, first);
+  // Nor does one that returns nothing.
+  auto with_black = scan(room + solid("black", "2 -1.0926 0 0 0 0", box(0.1, 0.1, 2), "<ruedo:laser_reflectance>0</ruedo:laser_reflectance>"), 1, "LRF", 0);
+  EXPECT_EQ(with_black[0], kInfinity);
+  with_black[0] = first[0];
+  EXPECT_EQ(with_black, first);
 }
 
 TEST(Lrf, ManyRaysEqualSingleRays) {
