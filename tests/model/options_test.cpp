@@ -193,6 +193,7 @@ TEST(Urdf, RobotInAnEmptyWorld) {
   EXPECT_EQ(bot.links[0].name, "base_footprint");
   EXPECT_LT(bot.links[0].inertial.mass, 0.01);
   EXPECT_EQ(bot.links[1].inertial.mass, 5);
+  EXPECT_EQ(bot.links[1].inertial.X_LI.translation, Vec3(0.1, 0, 0));
   EXPECT_EQ(bot.links[1].source.line, 4);
   EXPECT_LT((bot.links[2].X_ML.translation - Vec3(0, 0.2, 0.1)).norm(), 1e-12);
   EXPECT_NEAR(heading(bot.links[2].X_ML.rotation), 0.5, 1e-12);
