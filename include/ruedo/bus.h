@@ -24,6 +24,9 @@ class Bus {
   // itself can tell them from a stranger's.
   virtual void listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own = {}) = 0;
 
+  // Ends listening: once it returns, the handler is not called any more.
+  virtual void stop() {}
+
   // Messages that could not be sent so far.
   virtual uint64_t failed() const { return 0; }
 };

@@ -40,13 +40,14 @@ LcmBus::LcmBus(const std::string& url) : url_(parse_url(url)) {
   if (!out_->good()) throw EnvironmentError("LCM cannot open '" + url_.str() + "': run `ruedo doctor`");
 }
 
-LcmBus::~LcmBus() {
-  if (thread_.joinable()) {
-    const uint64_t one = 1;
-    [[maybe_unused]] const ssize_t written = ::write(stop_event_, &one, sizeof one);
-    thread_.join();
-  }
-  if (stop_event_ >= 0) ::close(stop_event_);
+LcmBus::~LcmBus() { stop(); }
+
+void LcmBus::stop() {
+  if (!thread_.joinable()) return;
+  const uint64_t one = 1;
+  [[maybe_unused]] const ssize_t written = ::write(stop_event_, &one, sizeof one);
+  thread_.join();
+  ::close(stop_event_);
 }
 
 void LcmBus::publish(const std::string& channel, const uint8_t* data, size_t size) {

@@ -29,6 +29,7 @@ class LcmBus : public Bus {
 
   void publish(const std::string& channel, const uint8_t* data, size_t size) override;
   void listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own = {}) override;
+  void stop() override;
   uint64_t failed() const override { return failed_; }
 
   const LcmUrl& url() const { return url_; }

@@ -1,12 +1,13 @@
 // ruedo run: loads a world and serves it until the end, Ctrl-C, or a client's QUIT.
+#include <cerrno>
+#include <atomic>
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <thread>
 
 #include <fmt/format.h>
 #include <pthread.h>
-#include <spdlog/spdlog.h>
-#include <tbb/global_control.h>
 #include <unistd.h>
 
 #include "bus/lcm_bus.h"
@@ -14,6 +15,7 @@
 #include "cli/listing.h"
 #include "ruedo/errors.h"
 #include "server/server.h"
+#include "server/thread_limit.h"
 
 namespace ruedo::cli {
 namespace {
@@ -23,7 +25,7 @@ struct RunArguments {
   uint64_t seed = 1;
   std::string rate = "1", duration, lcm, record, control = "on";
   std::vector<std::string> remaps;
-  bool paused = false, quiet = false;
+  bool paused = false, quiet = false, watch_stdin = false;
   int threads = 0;
 };
 
@@ -62,6 +64,19 @@ class SignalThread {
   bool asked_ = false;
   std::thread thread_;
 };
+
+// Ends the run, as SIGTERM would, when standard input ends: the client that started this server holds the other end of
+// the pipe, and the kernel closes it however that client ends. The thread waits in read() for as long as the process lives.
+void watch_stdin() {
+  std::thread([] {
+    char bytes[256];
+    ssize_t count = 0;
+    do {
+      count = read(STDIN_FILENO, bytes, sizeof bytes);
+    } while (count > 0 || (count < 0 && errno == EINTR));
+    kill(getpid(), SIGTERM);
+  }).detach();
+}
 
 class StatusLine {
  public:
@@ -111,10 +126,8 @@ server::ServerOptions server_options(const RunArguments& arguments) {
 int run(const RunArguments& arguments) {
   server::ServerOptions options = server_options(arguments);
   SignalThread signals;
-  std::unique_ptr<tbb::global_control> threads;
-  if (arguments.threads > 0) {
-    threads = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(arguments.threads));
-  }
+  if (arguments.watch_stdin) watch_stdin();
+  const server::ThreadLimit limit(arguments.threads);
   const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
   bus::LcmBus bus(arguments.lcm);
   server::Server server(world, std::move(options), bus);
@@ -149,6 +162,7 @@ void add_run(CLI::App& app, Action& chosen) {
   command->add_flag("--paused", arguments->paused, "start paused, at step 0");
   command->add_option("--threads", arguments->threads, "most threads inside a module (default: one a core)")->type_name("N")->check(CLI::Range(1, 1024));
   command->add_option("--control", arguments->control, "serve requests: on or off")->capture_default_str()->check(CLI::IsMember({"on", "off"}));
+  command->add_flag("--watch-stdin", arguments->watch_stdin, "end when standard input does: for programs that start a server");
   command->add_flag("--quiet", arguments->quiet, "do not list the channels");
   command->callback([arguments, &chosen] { chosen = [arguments] { return run(*arguments); }; });
 }

@@ -5,6 +5,10 @@
 
 #include "ruedo/element.h"
 #include "ruedo/errors.h"
+#include "ruedo/reply_t.hpp"
+#include "ruedo/request_t.hpp"
+#include "ruedo/tick_t.hpp"
+#include "ruedo/world_info_t.hpp"
 
 namespace ruedo::server {
 
@@ -35,6 +39,17 @@ void Channels::check_remaps() const {
     const std::string near = nearest_word(name, names);
     throw InputError({}, "--remap: there is no channel '" + name + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?"));
   }
+}
+
+SimulationChannels add_simulation_channels(Channels& channels, bool control) {
+  SimulationChannels indices;
+  indices.tick = channels.add<tick_t>("ruedo/tick", "", "", kTickRate);
+  indices.info = channels.add<world_info_t>("ruedo/info", "", "", kInfoRate);
+  if (control) {
+    indices.request = channels.add<request_t>("ruedo/request", "", "", Rate{}, true);
+    indices.reply = channels.add<reply_t>("ruedo/reply", "", "", Rate{});
+  }
+  return indices;
 }
 
 }  // namespace ruedo::server

@@ -48,4 +48,11 @@ class Channels {
   std::vector<Channel> channels_;
 };
 
+// The channels of the simulation itself, but for ruedo/world, which its module announces.
+struct SimulationChannels {
+  int tick = -1, info = -1, request = -1, reply = -1;    // request and reply: -1 without control
+};
+inline constexpr Rate kTickRate{10, 1}, kInfoRate{1, 1};
+SimulationChannels add_simulation_channels(Channels& channels, bool control);
+
 }  // namespace ruedo::server

@@ -121,9 +121,18 @@ class FleetMaker {
     for (size_t i = 0; i < threads; ++i) {
       const size_t first = wanted.size() * i / threads, last = wanted.size() * (i + 1) / threads;
       ModuleSetup module = setup.without_devices();
-      for (size_t k = first; k < last; ++k) module.devices.push_back(make_device(wanted[k]));
+      for (size_t k = first; k < last; ++k) add_device(wanted[k], module);
       for (const Device& device : module.devices) module.wants_visual_rays |= device.visual_rays;
       fleet_.modules.push_back(std::move(module));
+    }
+  }
+
+  void add_device(const Wanted& wanted, ModuleSetup& module) {
+    try {
+      module.devices.push_back(make_device(wanted));
+    } catch (const InputError& error) {
+      if (!options_.keep_going) throw;
+      findings_.error(error.source(), instance(wanted.robot).name + "/" + wanted.name, error.message());
     }
   }
 

@@ -19,6 +19,7 @@ struct FleetOptions {
   bool noise = true;
   std::vector<std::string> disabled;    // "ROBOT/DEVICE"
   int epoch = 0;
+  bool keep_going = false;              // a device that is configured wrongly is an error finding, and left out
 };
 
 struct Fleet {

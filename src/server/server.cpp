@@ -12,7 +12,6 @@
 namespace ruedo::server {
 namespace {
 
-constexpr Rate kTickRate{10, 1}, kInfoRate{1, 1};
 constexpr auto kStatusPeriod = std::chrono::milliseconds(500);
 constexpr auto kPausedInfoPeriod = std::chrono::seconds(1);
 
@@ -28,7 +27,7 @@ Server::Server(std::shared_ptr<const model::WorldModel> world, ServerOptions opt
       info_clock_(kInfoRate, world_->step_us),
       control_(run_id_, {.execute = [this](const request_t& request, const Session&) { return execute(request); },
                          .state = [this] { return encoded(state()); },
-                         .publish = [this](const reply_t& reply) { send(reply_channel_, reply); },
+                         .publish = [this](const reply_t& reply) { send(own_.reply, reply); },
                          .utime = [this] { return status_.time_us; },
                          .epoch = [this] { return epoch_; }}) {
   make_simulation();
@@ -36,7 +35,7 @@ Server::Server(std::shared_ptr<const model::WorldModel> world, ServerOptions opt
   if (!options_.record.empty()) begin_log();
 }
 
-Server::~Server() { simulation_.reset(); }
+Server::~Server() { bus_.stop(); }
 
 // Builds the world anew. What follows equals a fresh run: everything that has a state is made here.
 void Server::make_simulation() {
@@ -46,12 +45,7 @@ void Server::make_simulation() {
     std::lock_guard lock(simulation_mutex_);
     simulation_.reset();
     channels_.clear();
-    tick_channel_ = channels_.add<tick_t>("ruedo/tick", "", "", kTickRate);
-    info_channel_ = channels_.add<world_info_t>("ruedo/info", "", "", kInfoRate);
-    if (options_.control) {
-      request_channel_ = channels_[channels_.add<request_t>("ruedo/request", "", "", Rate{}, true)].bus_name;
-      reply_channel_ = channels_.add<reply_t>("ruedo/reply", "", "", Rate{});
-    }
+    own_ = add_simulation_channels(channels_, options_.control);
     options_.simulation.fleet.epoch = epoch_;
     findings_ = Findings();
     simulation_ = std::make_unique<Simulation>(world_, options_.simulation, channels_, findings_, wakeup_);
@@ -84,16 +78,17 @@ void Server::begin_log() {
 
 void Server::listen() {
   std::vector<std::string> inputs, outputs;
+  const std::string request_channel = own_.request >= 0 ? channels_[own_.request].bus_name : "";
   for (const Channel& channel : channels_.list()) (channel.input ? inputs : outputs).push_back(channel.bus_name);
   bus_.listen(
       inputs,
-      [this](const std::string& channel, const uint8_t* data, size_t size) {
-        if (channel == request_channel_ && options_.control) {
+      [this, request_channel](const std::string& channel, const uint8_t* data, size_t size) {
+        if (channel == request_channel) {
           if (control_.receive(data, size)) wakeup_.set();
           return;
         }
         std::lock_guard lock(simulation_mutex_);
-        if (simulation_) simulation_->inbox().receive(channel, data, size);
+        simulation_->inbox().receive(channel, data, size);
       },
       outputs);
 }
@@ -134,6 +129,7 @@ void Server::run() {
     }
     if (over) break;
     control_.serve();
+    control_.published(status_.step);    // a PAUSE may wait for a state that was out already
     Clock::time_point deadline = next_status;
     if (pacer_->paused()) {
       if (Clock::now() >= last_info_ + kPausedInfoPeriod) publish_info();
@@ -154,6 +150,11 @@ void Server::run() {
 void Server::stop() {
   stop_ = true;
   wakeup_.set();
+}
+
+void Server::command(const std::string& channel, const std::vector<uint8_t>& bytes) {
+  std::lock_guard lock(simulation_mutex_);
+  simulation_->inbox().receive(channel, bytes.data(), bytes.size());
 }
 
 void Server::check_log() const {
@@ -185,7 +186,7 @@ void Server::publish_step(const Batch& batch, const Snapshot& snapshot) {
   status_.time_us = snapshot.time;
   if (tick) {
     for (const Session& session : control_.sessions().list()) tick_.add_applied(session.client, session.last_sequence);
-    tick_.finish([this](const tick_t& part) { send(tick_channel_, part); });
+    tick_.finish([this](const tick_t& part) { send(own_.tick, part); });
     next_tick_ = tick_clock_.step_of(++ticks_);
   }
   if (step == next_info_) {
@@ -219,7 +220,7 @@ void Server::publish_info() {
   for (world_info_t& part : info_) {
     part.utime = status_.time_us;
     part.paused = paused;
-    send(info_channel_, part);
+    send(own_.info, part);
   }
   last_info_ = Clock::now();
 }

@@ -54,6 +54,9 @@ class Server {
 
   void stop();    // any thread
 
+  // As if it had come over the bus: a command on one of the input channels. Any thread.
+  void command(const std::string& channel, const std::vector<uint8_t>& bytes);
+
   const Channels& channels() const { return channels_; }
   const std::vector<world_info_t>& info() const { return info_; }
   const Findings& findings() const { return findings_; }
@@ -95,8 +98,7 @@ class Server {
   const int64_t run_id_;
   int32_t epoch_ = 0;
   Channels channels_;
-  int tick_channel_ = -1, info_channel_ = -1, reply_channel_ = -1;
-  std::string request_channel_;
+  SimulationChannels own_;
   Findings findings_;
   Wakeup wakeup_;                              // a batch is finished, a request has come, or the end
   std::atomic<bool> stop_{false};

@@ -35,6 +35,13 @@ Simulation::Simulation(std::shared_ptr<const model::WorldModel> world, const Sim
       physics_(std::make_unique<physics::PhysicsWorld>(*world_, layout_)),
       robots_(std::make_unique<robot::Robots>(*world_, layout_, *physics_)),
       batches_(kBatches) {
+  for (const Finding& finding : physics_->findings()) {
+    switch (finding.kind) {
+      case Finding::Kind::unsupported: findings.unsupported(finding.source, finding.element, finding.text); break;
+      case Finding::Kind::repaired: findings.repaired(finding.source, finding.element, finding.text); break;
+      case Finding::Kind::error: findings.error(finding.source, finding.element, finding.text); break;
+    }
+  }
   for (ModuleSetup& setup : fleet_.modules) {
     setup.before_batch = before_batch_;
     modules_.push_back(std::make_unique<Module>(std::move(setup), static_cast<int>(modules_.size()), finished_));

@@ -1,0 +1,97 @@
+// ruedo check: everything that is wrong or not supported in a world file, with its place.
+#include <fmt/format.h>
+
+#include "cli/commands.h"
+#include "cli/json.h"
+#include "model/body_layout.h"
+#include "ruedo/errors.h"
+#include "server/fleet.h"
+
+namespace ruedo::cli {
+namespace {
+
+struct CheckArguments {
+  WorldArguments world;
+  bool json = false, strict = false;
+};
+
+// What the readers and the devices found. A file that cannot be read at all is one finding.
+std::vector<Finding> find_all(const CheckArguments& arguments, bool& loaded) {
+  loaded = false;
+  try {
+    const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
+    loaded = true;
+    std::vector<Finding> findings = world->findings;
+    const model::BodyLayout layout(*world);
+    server::Channels channels;
+    Findings of_devices;
+    server::FleetOptions options;
+    options.disabled = arguments.world.disabled;
+    options.keep_going = true;
+    server::make_fleet(*world, layout, options, channels, of_devices);
+    findings.insert(findings.end(), of_devices.list().begin(), of_devices.list().end());
+    return findings;
+  } catch (const InputError& error) {
+    if (error.source().file.empty() && !loaded) throw;    // wrong usage
+    return {{Finding::Kind::error, error.source(), "", error.message()}};
+  }
+}
+
+void print_json(const std::vector<Finding>& findings) {
+  JsonWriter json;
+  json.open('[');
+  for (const Finding& finding : findings) {
+    json.open('{').member("kind", kind_name(finding.kind)).member("file", finding.source.file).member("line", finding.source.line);
+    json.member("element", finding.element).member("text", finding.text).close('}');
+  }
+  fmt::print("{}\n", json.close(']').text());
+}
+
+void print_text(const std::vector<Finding>& findings) {
+  const Style style = style_of(stdout);
+  for (const Finding::Kind kind : {Finding::Kind::error, Finding::Kind::unsupported, Finding::Kind::repaired}) {
+    for (const FindingGroup& group : group(findings)) {
+      if (group.kind != kind) continue;
+      const char* colour = kind == Finding::Kind::error ? style.red : kind == Finding::Kind::unsupported ? style.yellow : style.cyan;
+      fmt::print("{}{}{}{}: {}\n", style.bold, colour, kind_name(kind), style.off, group.text);
+      for (const Finding* place : group.places) {
+        fmt::print("    {}{}{}{}\n", place->source.str(), style.dim, place->element.empty() ? "" : "  " + place->element, style.off);
+      }
+    }
+  }
+}
+
+int check(const CheckArguments& arguments) {
+  bool loaded = false;
+  const std::vector<Finding> findings = find_all(arguments, loaded);
+  int counts[3] = {0, 0, 0};
+  for (const Finding& finding : findings) ++counts[static_cast<int>(finding.kind)];
+  const int errors = counts[static_cast<int>(Finding::Kind::error)];
+  if (arguments.json) {
+    print_json(findings);
+  } else {
+    print_text(findings);
+    const Style style = style_of(stdout);
+    fmt::print("{}{}: {}{}\n", findings.empty() ? style.green : style.bold, arguments.world.world,
+               findings.empty() ? "good"
+                                : fmt::format("{} errors, {} not supported, {} repaired", errors, counts[static_cast<int>(Finding::Kind::unsupported)],
+                                              counts[static_cast<int>(Finding::Kind::repaired)]),
+               style.off);
+  }
+  if (!loaded) return kBadInput;
+  return errors > 0 || (arguments.strict && !findings.empty()) ? kCheckFailed : kGood;
+}
+
+void add_check(CLI::App& app, Action& chosen) {
+  CLI::App* command = app.add_subcommand("check", "name everything wrong or unsupported in a world file, with file and line");
+  const auto arguments = std::make_shared<CheckArguments>();
+  add_world_arguments(*command, arguments->world);
+  command->add_flag("--json", arguments->json, "print a JSON list");
+  command->add_flag("--strict", arguments->strict, "what is repaired or not supported fails the check too");
+  command->callback([arguments, &chosen] { chosen = [arguments] { return check(*arguments); }; });
+}
+
+const RegisterCommand kRegister{20, add_check};
+
+}  // namespace
+}  // namespace ruedo::cli

@@ -1,0 +1,91 @@
+// ruedo doctor: what this machine lacks, each fault in one line with its cure, in less than a second.
+#include <fmt/format.h>
+
+#include <lcm/lcm_version.h>
+
+#include "bus/lcm_url.h"
+#include "cli/commands.h"
+#include "model/body_layout.h"
+#include "ruedo/errors.h"
+#include "scene/render_scene.h"
+#include "server/log_header.h"
+#include "server/version.h"
+
+namespace ruedo::cli {
+namespace {
+
+constexpr int64_t kGoodBuffer = 2'097'152;    // bytes: a raw VGA picture passes
+constexpr int kSelfTestMs = 300;
+
+class Report {
+ public:
+  void good(const std::string& what, const std::string& text) { line(style_.green, "ok", what, text); }
+  void hint(const std::string& what, const std::string& text) { line(style_.yellow, "hint", what, text); }
+  void fault(const std::string& what, const std::string& text) {
+    line(style_.red, "FAULT", what, text);
+    faulty_ = true;
+  }
+  bool faulty() const { return faulty_; }
+
+ private:
+  void line(const char* colour, const char* verdict, const std::string& what, const std::string& text) {
+    fmt::print("{}{:<5}{}  {:<16} {}\n", colour, verdict, style_.off, what, text);
+  }
+  Style style_ = style_of(stdout);
+  bool faulty_ = false;
+};
+
+void check_bus(Report& report, const std::string& text) {
+  const bus::LcmUrl url = bus::parse_url(text);
+  try {
+    bus::check_route(url);
+  } catch (const EnvironmentError& error) {
+    return report.fault("multicast", error.what());
+  }
+  if (bus::hears_itself(url, kSelfTestMs)) {
+    report.good("multicast", url.str() + ": a datagram to the group comes back");
+  } else {
+    report.fault("multicast", url.str() + ": a datagram to the group does not come back: run: sudo ip link set lo multicast on; sudo ip route add " +
+                                  url.host + "/32 dev lo; or let the firewall pass UDP port " + std::to_string(url.port));
+  }
+}
+
+void check_buffers(Report& report) {
+  const int64_t limit = bus::receive_buffer_limit();
+  if (limit < 0) return report.hint("receive buffers", "not known on this system");
+  if (limit >= kGoodBuffer) return report.good("receive buffers", fmt::format("up to {} bytes", limit));
+  report.hint("receive buffers", fmt::format("at most {} bytes: raw pictures get lost (JPEG passes). For raw ones run: sudo sysctl -w net.core.rmem_max={}",
+                                             limit, kGoodBuffer));
+}
+
+void check_renderer(Report& report) {
+  try {
+    const model::WorldModel world;
+    const model::BodyLayout layout(world);
+    report.good("renderer", scene::make_renderer(world, layout)->description());
+  } catch (const EnvironmentError& error) {
+    report.fault("renderer", error.what());
+  }
+}
+
+int doctor(const std::string& url) {
+  Report report;
+  report.good("version", fmt::format("ruedo {}, LCM {}.{}.{}, {}, CPU with {}", server::version(), LCM_VERSION_MAJOR, LCM_VERSION_MINOR,
+                                     LCM_VERSION_PATCH, server::libc_version(), server::cpu_features()));
+  check_bus(report, url);
+  check_buffers(report);
+  check_renderer(report);
+  return report.faulty() ? kEnvironment : kGood;
+}
+
+void add_doctor(CLI::App& app, Action& chosen) {
+  CLI::App* command = app.add_subcommand("doctor", "check this machine: multicast route, buffers, renderer, versions; each fault with its cure");
+  const auto url = std::make_shared<std::string>();
+  command->add_option("--lcm", *url, "LCM address to check")->type_name("URL");
+  command->callback([url, &chosen] { chosen = [url] { return doctor(*url); }; });
+}
+
+const RegisterCommand kRegister{70, add_doctor};
+
+}  // namespace
+}  // namespace ruedo::cli
