@@ -135,13 +135,16 @@ struct Box {
     return {round_down(lower.x()), round_down(lower.y()), round_down(lower.z()), 0.0f,
             round_up(upper.x()),   round_up(upper.y()),   round_up(upper.z()),   0.0f};
   }
-  // Where the line enters the box, 0 when it starts inside; +inf when the ray misses it.
-  double entry(const Vec3& o, const Vec3& d) const {
-    if (contains(o)) return 0.0;
-    double enter = 0.0, exit = std::numeric_limits<double>::infinity();
+  // Of coordinates of this size, generously; what is grown by it is not missed in double precision.
+  double rounding() const { return 1e-9 + 1e-12 * std::max(lower.cwiseAbs().maxCoeff(), upper.cwiseAbs().maxCoeff()); }
+  bool overlaps(const Box& other) const {
+    return (lower.array() <= other.upper.array()).all() && (other.lower.array() <= upper.array()).all();
+  }
+  // Narrows [enter, exit] of the line to what is in the box; false when nothing is left.
+  bool clip(const Vec3& o, const Vec3& d, double& enter, double& exit) const {
     for (int axis = 0; axis < 3; ++axis) {
       if (d[axis] == 0.0) {
-        if (o[axis] < lower[axis] || o[axis] > upper[axis]) return std::numeric_limits<double>::infinity();
+        if (o[axis] < lower[axis] || o[axis] > upper[axis]) return false;
         continue;
       }
       const double inverse = 1.0 / d[axis];
@@ -149,7 +152,13 @@ struct Box {
       enter = std::max(enter, std::min(a, b));
       exit = std::min(exit, std::max(a, b));
     }
-    return enter <= exit ? enter : std::numeric_limits<double>::infinity();
+    return enter <= exit;
+  }
+  // Where the ray enters the box, 0 when it starts inside; +inf when it misses.
+  double entry(const Vec3& o, const Vec3& d) const {
+    if (contains(o)) return 0.0;
+    double enter = 0.0, exit = std::numeric_limits<double>::infinity();
+    return clip(o, d, enter, exit) ? enter : std::numeric_limits<double>::infinity();
   }
 };
 

@@ -1,7 +1,8 @@
-// The fast caster: Embree finds the boxes that a ray may run through, the tests in double decide. Movers are one
-// box a body, so that bringing a thousand robots up to date means a thousand boxes.
+// The fast caster: trees find the boxes that a ray may run through, the tests in double decide. Movers are one box
+// a body, so that bringing a thousand robots up to date means a thousand boxes.
 #include "scene/ray_scene.h"
 
+#include "scene/ray_mover_tree.h"
 #include "scene/ray_static.h"
 
 namespace ruedo::scene {
@@ -23,7 +24,6 @@ class EmbreeRayScene : public RayScene {
     bool there = false;             // false: its pose is not finite
   };
 
-  static void test_primitive(const RTCIntersectFunctionNArguments* arguments);
   void test_mover(const Mover& mover, unsigned lanes, RayBatch& batch) const;
   void cast_batch(unsigned lanes, TreeQuery& query) const;
   void write(const RayBatch& batch, int lane, Hit& hit) const;
@@ -32,7 +32,7 @@ class EmbreeRayScene : public RayScene {
   std::vector<Mover> bounded_, unbounded_;
   std::vector<int> mover_of_body_;    // index into bounded_, or ~index into unbounded_
   std::vector<IntoShape> turning_;    // as RayTable::turning, at the snapshot's wheel angles
-  RayTree tree_;
+  MoverTree tree_;
 };
 
 EmbreeRayScene::EmbreeRayScene(std::shared_ptr<const StaticRayScene> statics) : statics_(std::move(statics)) {
@@ -57,7 +57,7 @@ EmbreeRayScene::EmbreeRayScene(std::shared_ptr<const StaticRayScene> statics) : 
     if (fits) boxes.push_back(box);
   }
   for (const TurningShape& shape : table.turning) turning_.push_back(shape.at(0.0));
-  tree_.build(statics_->device(), std::move(boxes), test_primitive, true);
+  tree_.build(std::move(boxes));
   Snapshot start;
   for (const model::BodyPlacement& body : statics_->layout.bodies) start.bodies.push_back(body.X_WB);
   start.wheel_angles.resize(statics_->layout.wheels.size());
@@ -78,8 +78,7 @@ void EmbreeRayScene::update(const Snapshot& snapshot) {
     const Vec3 center = snapshot.bodies[static_cast<size_t>(mover.body)].translation + R_WB * mover.center_B;
     const Vec3 half = R_WB.cwiseAbs() * mover.half_B;
     const Box box{center - half, center + half};
-    mover.there = mover.there && fits_tree(box);
-    tree_.box(i) = mover.there ? box : Box{Vec3::Zero(), Vec3::Zero()};
+    tree_.box(i) = mover.there ? box : Box{};
   }
   for (size_t i = 0; i < turning_.size(); ++i) {
     const TurningShape& shape = statics_->table.turning[i];
@@ -111,18 +110,11 @@ void EmbreeRayScene::test_mover(const Mover& mover, unsigned lanes, RayBatch& ba
   }
 }
 
-void EmbreeRayScene::test_primitive(const RTCIntersectFunctionNArguments* arguments) {
-  auto& query = *static_cast<TreeQuery*>(arguments->context);
-  const auto& scene = *static_cast<const EmbreeRayScene*>(query.owner);
-  scene.test_mover(scene.bounded_[arguments->primID], lanes_of(*arguments), query.batch);
-  shorten(*arguments, [&](unsigned lane) { return query.batch.t[lane] - query.packet.start[lane]; });
-}
-
 void EmbreeRayScene::cast_batch(unsigned lanes, TreeQuery& query) const {
   statics_->cast(lanes, query);
   for (const Mover& mover : unbounded_) test_mover(mover, lanes, query.batch);
-  query.owner = this;
-  tree_.cast(lanes, query);
+  tree_.visit(lanes, query.batch.world, query.batch.t,
+              [&](size_t mover, unsigned near) { test_mover(bounded_[mover], near, query.batch); });
 }
 
 void EmbreeRayScene::cast(std::span<const Ray> rays, std::span<Hit> hits, int ignored_link) const {

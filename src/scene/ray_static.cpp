@@ -28,8 +28,8 @@ StaticRayScene::StaticRayScene(const model::WorldModel& world, const model::Body
     }
   }
   has_meshes_ = !meshes.empty();
-  tree_.build(device(), std::move(boxes), test_primitive, false, meshes);
-  closed_tree_.build(device(), std::move(closed_boxes), test_closed, false);
+  tree_.build(device(), std::move(boxes), test_primitive, meshes);
+  closed_tree_.build(device(), std::move(closed_boxes), test_closed);
 }
 
 void StaticRayScene::cast(unsigned lanes, TreeQuery& query) const {

@@ -29,12 +29,10 @@ class RayTree {
   RayTree(const RayTree&) = delete;
   RayTree& operator=(const RayTree&) = delete;
 
-  // boxes: one a primitive; `moving`: they will change. The shapes must outlive the tree.
-  void build(RTCDevice device, std::vector<Box> boxes, RTCIntersectFunctionN callback, bool moving,
+  // boxes: one a primitive. meshes: with their index in the table; they must outlive the tree.
+  void build(RTCDevice device, std::vector<Box> boxes, RTCIntersectFunctionN callback,
              const std::vector<std::pair<int, const RayShape*>>& meshes = {});
 
-  Box& box(size_t primitive) { return boxes_[primitive]; }
-  void refit();    // after boxes were changed
   // Casts the lanes (bits) of query.batch.
   void cast(unsigned lanes, TreeQuery& query) const;
   // Is the point inside that mesh, one of those given to build()? As RayMesh::inside.
@@ -49,13 +47,12 @@ class RayTree {
   static void bounds(const RTCBoundsFunctionArguments* arguments);
   static void pair_bounds(const RTCBoundsFunctionArguments* arguments);
   static void test_pair(const RTCIntersectFunctionNArguments* arguments);
-  RTCGeometry attach(RTCDevice device, size_t primitives, void* user, RTCBoundsFunction bounds, RTCIntersectFunctionN callback);
+  void attach(RTCDevice device, size_t primitives, void* user, RTCBoundsFunction bounds, RTCIntersectFunctionN callback);
 
   std::vector<Box> boxes_;
   std::vector<Triangles> triangles_;
-  Box all_, meshes_;
+  Box all_;
   double margin_ = 0.0;
-  RTCGeometry geometry_ = nullptr;    // of the boxes; owned by the scene
   ScenePtr scene_;
 };
 

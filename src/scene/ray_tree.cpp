@@ -3,51 +3,33 @@
 
 namespace ruedo::scene {
 
-RTCGeometry RayTree::attach(RTCDevice device, size_t primitives, void* user, RTCBoundsFunction bounds_function,
-                            RTCIntersectFunctionN callback) {
+void RayTree::attach(RTCDevice device, size_t primitives, void* user, RTCBoundsFunction bounds_function,
+                     RTCIntersectFunctionN callback) {
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
   rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(primitives));
   rtcSetGeometryUserData(geometry, user);
   rtcSetGeometryBoundsFunction(geometry, bounds_function, nullptr);
   rtcSetGeometryIntersectFunction(geometry, callback);
+  rtcCommitGeometry(geometry);
   rtcAttachGeometry(scene_.get(), geometry);
   rtcReleaseGeometry(geometry);    // the scene keeps it
-  return geometry;
 }
 
-void RayTree::build(RTCDevice device, std::vector<Box> boxes, RTCIntersectFunctionN callback, bool moving,
+void RayTree::build(RTCDevice device, std::vector<Box> boxes, RTCIntersectFunctionN callback,
                     const std::vector<std::pair<int, const RayShape*>>& meshes) {
-  boxes_ = std::move(boxes);
-  if (boxes_.empty() && meshes.empty()) return;
+  if (boxes.empty() && meshes.empty()) return;
   const KeepFloatMode keep;
-  scene_.reset(rtcNewScene(device));
-  if (!boxes_.empty()) geometry_ = attach(device, boxes_.size(), this, bounds, callback);
-  if (moving) {
-    rtcSetSceneFlags(scene_.get(), RTC_SCENE_FLAG_DYNAMIC);
-    rtcSetGeometryBuildQuality(geometry_, RTC_BUILD_QUALITY_REFIT);
-  }
+  boxes_ = std::move(boxes);
+  for (const Box& box : boxes_) all_.add(box);
   for (const auto& [index, shape] : meshes) {
     triangles_.push_back({this, shape, index});
-    meshes_.add(shape->mesh->box());
+    all_.add(shape->mesh->box());
   }
-  std::vector<RTCGeometry> geometries;
-  for (Triangles& part : triangles_)
-    geometries.push_back(attach(device, part.shape->mesh->pairs().size() - 1, &part, pair_bounds, test_pair));
-  all_ = meshes_;
-  for (const Box& box : boxes_) all_.add(box);
-  margin_ = all_.margin();
-  for (RTCGeometry geometry : geometries) rtcCommitGeometry(geometry);
-  refit();
-}
-
-void RayTree::refit() {
-  if (!scene_) return;
-  const KeepFloatMode keep;
-  all_ = meshes_;
-  for (const Box& box : boxes_) all_.add(box);
   margin_ = all_.margin();
   all_.grow(margin_);
-  if (geometry_) rtcCommitGeometry(geometry_);
+  scene_.reset(rtcNewScene(device));
+  if (!boxes_.empty()) attach(device, boxes_.size(), this, bounds, callback);
+  for (Triangles& part : triangles_) attach(device, part.shape->mesh->pairs().size() - 1, &part, pair_bounds, test_pair);
   rtcCommitScene(scene_.get());
 }
 
