@@ -16,6 +16,9 @@ Pose along(const Pose& X, const Vec3& axis_in_J, const Vec3& unit) {
   return {X.rotation * Quat::FromTwoVectors(unit, axis_in_J), X.translation};
 }
 
+// A motor's rate that changes by less (m/s or rad/s) wakes nothing that sleeps.
+constexpr double kNewRate = 1e-3;
+
 double bounded(double value, double limit) { return std::clamp(value, -limit, limit); }
 
 }  // namespace
@@ -92,14 +95,26 @@ double JointConstraint::velocity() const {
 }
 
 void JointConstraint::set_motor(double rate, double max_effort) {
+  rate = bounded(rate, limits_.velocity);
+  max_effort = std::min(max_effort, limits_.effort);
+  const bool news = mode_ != Mode::motor || std::abs(rate - command_) > kNewRate || max_effort != max_effort_;
   mode_ = Mode::motor;
-  command_ = bounded(rate, limits_.velocity);
-  max_effort_ = std::min(max_effort, limits_.effort);
+  command_ = rate;
+  max_effort_ = max_effort;
+  if (news) wake();
 }
 
 void JointConstraint::set_effort(double effort) {
+  effort = bounded(effort, limits_.effort);
+  const bool news = mode_ != Mode::effort || effort != command_;
   mode_ = Mode::effort;
-  command_ = bounded(effort, limits_.effort);
+  command_ = effort;
+  if (news) wake();
+}
+
+void JointConstraint::wake() {
+  if (!parent_.isStaticObject()) parent_.activate(true);
+  if (!child_.isStaticObject()) child_.activate(true);
 }
 
 void JointConstraint::move_by_motor(double rate, double max_effort, double substep_s) {
@@ -137,8 +152,11 @@ void JointConstraint::before_substep(double substep_s) {
 }
 
 double JointConstraint::measured_effort() const {
-  const bool linear = type_ == model::JointType::prismatic;
-  return axis_in_world().dot(from_bt(linear ? feedback_->m_appliedForceBodyB : feedback_->m_appliedTorqueBodyB));
+  const Vec3 force = from_bt(feedback_->m_appliedForceBodyB);
+  if (type_ == model::JointType::prismatic) return axis_in_world().dot(force);
+  // Bullet's torque is about the child's centre of mass, and holds the moment of the force at the joint.
+  const Vec3 arm = from_bt(child_.getWorldTransform() * to_bt(X_CJ_.translation) - child_.getCenterOfMassPosition());
+  return axis_in_world().dot(from_bt(feedback_->m_appliedTorqueBodyB) - arm.cross(force));
 }
 
 void JointConstraint::after_substep(double substep_s) {

@@ -33,6 +33,7 @@ class JointConstraint {
  private:
   enum class Mode { passive, motor, effort };
   Vec3 axis_in_world() const;
+  void wake();
   void move_by_motor(double rate, double max_effort, double substep_s);
   void push(double effort);                        // for one substep
   double measured_effort() const;

@@ -11,6 +11,10 @@ namespace ruedo::physics {
 namespace {
 
 constexpr double kSmallestMass_kg = 1e-6;
+// Driven wheels: the tyre gives way by about so much under the robot's weight, which spreads the weight over all wheels (four
+// rigid ones on a rigid floor stand on any two), and slips more easily sideways than ahead where the file does
+// not say otherwise (a file that gives both directions the same says nothing).
+constexpr double kTyreGives_m = 5e-4, kTyreDamping = 1.0, kLateralFriction = 0.3;
 // Velocities below which a body may fall asleep (after 2 s).
 constexpr double kSleepSpeed_m_s = 0.005, kSleepRate_rad_s = 0.01;
 
@@ -63,6 +67,12 @@ int driven_wheel(const model::BodyLayout& layout, int index) {
     if (layout.robots[static_cast<size_t>(wheel.robot)].body != index) return static_cast<int>(i);
   }
   return -1;
+}
+
+double mass_on_each_wheel(const model::Model& model, const model::RobotPlacement& robot) {
+  double mass = 0.0;
+  for (const auto& link : model.links) mass += link.inertial.mass;
+  return mass / static_cast<double>(std::max<size_t>(robot.wheels.size(), 1));
 }
 
 bool carries_kinematic_drive(const model::WorldModel& world, const model::BodyLayout& layout, int index) {
@@ -171,8 +181,13 @@ void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLay
   body.bullet = std::make_unique<btRigidBody>(settings);
   btRigidBody& bullet = *body.bullet;
   if (wheel >= 0) {
-    const double lateral = surface && surface->friction > 0.0 ? surface->friction2 / surface->friction : 1.0;
+    const bool given = surface && surface->friction > 0.0 && surface->friction2 != surface->friction;
+    const double lateral = given ? surface->friction2 / surface->friction : kLateralFriction;
     bullet.setAnisotropicFriction({1, lateral, 1}, btCollisionObject::CF_ANISOTROPIC_FRICTION);
+    const int robot = layout.wheels[static_cast<size_t>(wheel)].robot;
+    const double share = mass_on_each_wheel(model, layout.robots[static_cast<size_t>(robot)]);
+    const double stiffness = share * world.gravity.norm() / kTyreGives_m;
+    bullet.setContactStiffnessAndDamping(stiffness, kTyreDamping * 2.0 * std::sqrt(stiffness * share));
   }
   if (kinematic) bullet.setCollisionFlags(bullet.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
   bullet.setFlags(bullet.getFlags() | BT_DISABLE_WORLD_GRAVITY);    // gravity is set for each body

@@ -1,0 +1,291 @@
+// The physics world without robots: shapes, mass, friction, joints, contacts, kinematic bodies.
+#include "physics/physics_world.h"
+
+#include <cmath>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "model/load.h"
+
+namespace ruedo::physics {
+namespace {
+
+class World {
+ public:
+  explicit World(const std::string& models, int64_t step_us = 2000)
+      : world(model::load_world_text("<sdf version='1.9' xmlns:ruedo='https://ruedo.org'><world name='w'><gravity>0 0 -10</gravity>"
+                                     "<physics type='x'><max_step_size>" + std::to_string(static_cast<double>(step_us) * 1e-6) +
+                                     "</max_step_size></physics>" + models + "</world></sdf>", "test.sdf")),
+        layout(*world),
+        physics(*world, layout) {}
+  void run(double seconds) {
+    const auto steps = static_cast<int64_t>(std::llround(seconds * 1e6)) / world->step_us;
+    for (int64_t i = 0; i < steps; ++i) physics.step();
+  }
+  int body(const std::string& name) const {
+    for (size_t i = 0; i < layout.bodies.size(); ++i) {
+      if (layout.bodies[i].name == name) return static_cast<int>(i);
+    }
+    return -1;
+  }
+  std::shared_ptr<const model::WorldModel> world;
+  model::BodyLayout layout;
+  PhysicsWorld physics;
+};
+
+const std::string kPlane = "<model name='ground'><static>true</static><link name='l'><collision name='c'><geometry><plane><normal>0 0 1"
+                           "</normal></plane></geometry></collision></link></model>";
+
+std::string thing(const std::string& name, const std::string& pose, const std::string& geometry, double mass, double mu = 0.5,
+                  double inertia = 0.01) {
+  const std::string i = std::to_string(inertia);
+  return "<model name='" + name + "'><pose>" + pose + "</pose>" + (mass > 0 ? "" : "<static>true</static>") + "<link name='l'>" +
+         (mass > 0 ? "<inertial><mass>" + std::to_string(mass) + "</mass><inertia><ixx>" + i + "</ixx><iyy>" + i + "</iyy><izz>" + i +
+                         "</izz></inertia></inertial>"
+                   : "") +
+         "<collision name='c'><geometry>" + geometry + "</geometry><surface><friction><ode><mu>" + std::to_string(mu) + "</mu><mu2>" +
+         std::to_string(mu) + "</mu2></ode></friction></surface></collision></link></model>";
+}
+
+const std::string kBall = "<sphere><radius>0.1</radius></sphere>";
+const std::string kBox = "<box><size>0.2 0.2 0.2</size></box>";
+
+struct ShapeCase {
+  const char* geometry;
+  double top;       // height above its centre where a ball on the z axis rests
+  double bottom;    // depth below its centre on which it rests
+};
+
+class EachShape : public ::testing::TestWithParam<ShapeCase> {};
+
+TEST_P(EachShape, CarriesABallAtItsExactHeight) {
+  World w(thing("s", "0 0 1 0 0 0", GetParam().geometry, 0) + thing("ball", "0 0 " + std::to_string(1.11 + GetParam().top) + " 0 0 0", kBall, 1));
+  w.run(0.3);
+  EXPECT_NEAR(w.physics.pose(0).translation.z(), 1.1 + GetParam().top, 1e-3);
+}
+
+TEST_P(EachShape, RestsOnThePlaneAtItsExactHeight) {
+  World w(kPlane + thing("s", "0 0 " + std::to_string(GetParam().bottom + 0.01) + " 0 0 0", GetParam().geometry, 1));
+  w.run(0.5);
+  EXPECT_NEAR(w.physics.pose(0).translation.z(), GetParam().bottom, 1e-3);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Shapes, EachShape,
+    ::testing::Values(ShapeCase{"<box><size>0.4 0.6 0.2</size></box>", 0.1, 0.1}, ShapeCase{"<sphere><radius>0.3</radius></sphere>", 0.3, 0.3},
+                      ShapeCase{"<cylinder><radius>0.3</radius><length>0.4</length></cylinder>", 0.2, 0.2},
+                      ShapeCase{"<capsule><radius>0.2</radius><length>0.4</length></capsule>", 0.4, 0.4},
+                      ShapeCase{"<ellipsoid><radii>0.3 0.4 0.2</radii></ellipsoid>", 0.2, 0.2}));
+
+TEST(Physics, ABallFallsFreely) {
+  World w(thing("ball", "0 0 5 0 0 0", kBall, 1));
+  w.run(0.5);
+  EXPECT_NEAR(w.physics.pose(0).translation.z(), 5.0 - 0.5 * 10 * 0.25, 0.01);
+  EXPECT_NEAR(w.physics.twist(0).linear.z(), -5.0, 0.01);
+}
+
+TEST(Physics, TheGroundCarriesTheWeight) {
+  for (const int64_t step_us : {1000, 5000, 20000}) {
+    World w(kPlane + thing("box", "0 0 0.1 0 0 0", kBox, 3), step_us);
+    w.run(1.0);
+    double force = 0.0;
+    for (const Contact& contact : w.physics.contacts(0)) {
+      EXPECT_NEAR(contact.normal.z(), 1.0, 1e-9);    // towards the box
+      EXPECT_EQ(contact.body_b, -1);
+      EXPECT_NEAR(contact.position.z(), 0.0, 1e-3);
+      force += contact.force;
+    }
+    EXPECT_NEAR(force, 30.0, 0.5);
+  }
+}
+
+TEST(Physics, FrictionIsTheLowerOfBoth) {
+  // On a plane, 1 m/s: stops after v^2 / (2 mu g).
+  for (const auto& [of_box, of_floor] : {std::pair(0.2, 1.0), std::pair(1.0, 0.2)}) {
+    World w(thing("floor", "0 0 -0.5 0 0 0", "<box><size>20 20 1</size></box>", 0, of_floor) + thing("box", "0 0 0.1 0 0 0", kBox, 1, of_box));
+    w.run(0.2);
+    w.physics.set_twist(0, {{1, 0, 0}, {}});
+    w.run(2.0);
+    EXPECT_NEAR(w.physics.pose(0).translation.x(), 0.25, 0.02);
+  }
+}
+
+TEST(Physics, ThingsAtRestSleepAndStay) {
+  World w(kPlane + thing("a", "0 0 0.1 0 0 0", kBox, 1) + thing("b", "0 0 0.3 0 0 0", kBox, 1), 5000);
+  w.run(5.0);
+  EXPECT_TRUE(w.physics.sleeping(0));
+  const Vec3 rest = w.physics.pose(1).translation;
+  w.run(10.0);
+  EXPECT_EQ(w.physics.pose(1).translation, rest);
+  EXPECT_FALSE(w.physics.contacts(0).empty());    // and still touch
+  w.physics.apply_impulse(1, {0.5, 0, 0}, {0, 0, 0});
+  w.run(0.1);
+  EXPECT_GT(w.physics.pose(1).translation.x(), rest.x() + 0.005);
+}
+
+TEST(Physics, MassCentreAndInertiaOfJoinedLinks) {
+  // 1 kg at the origin and 3 kg at x = 2: centre at 1.5; Izz = 0.1 + 0.3 + 1 * 1.5^2 + 3 * 0.5^2 = 3.4.
+  World w("<model name='m'><link name='a'><inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></inertial></link>"
+          "<link name='b'><pose>1 0 0 0 0 0</pose><inertial><pose>1 0 0 0 0 0</pose><mass>3</mass><inertia><ixx>0.3</ixx><iyy>0.3</iyy><izz>0.3</izz>"
+          "</inertia></inertial></link><joint name='j' type='fixed'><parent>a</parent><child>b</child></joint></model>");
+  EXPECT_NEAR(w.physics.mass(0), 4.0, 1e-12);
+  EXPECT_NEAR(w.physics.center_of_mass(0).x(), 1.5, 1e-12);
+  EXPECT_NEAR(w.physics.inertia(0)(2, 2), 3.4, 1e-12);
+  EXPECT_NEAR(w.physics.inertia(0)(0, 0), 0.4, 1e-12);
+  // An impulse through the centre turns nothing; the frame's origin moves with it.
+  w.physics.apply_impulse(0, {0, 4, 0}, {0, 0, 0});
+  EXPECT_NEAR(w.physics.twist(0).linear.y(), 1.0, 1e-12);
+  w.physics.apply_impulse(0, {0, 0, 0}, {0, 0, 3.4});
+  EXPECT_NEAR(w.physics.twist(0).angular.z(), 1.0, 1e-12);
+  EXPECT_NEAR(w.physics.twist(0).linear.y(), 1.0 - 1.5, 1e-12);    // omega x (origin - centre)
+}
+
+TEST(Physics, ARotatedInertiaKeepsItsAxes) {
+  World w("<model name='m'><link name='a'><inertial><pose>0 0 0 0.3 0.2 0.9</pose><mass>1</mass><inertia><ixx>1</ixx><iyy>2</iyy><izz>2.5</izz>"
+          "</inertia></inertial></link></model>");
+  const Pose X = Pose::from_xyz_rpy({0, 0, 0}, {0.3, 0.2, 0.9});
+  const Eigen::Matrix3d R = X.rotation.toRotationMatrix();
+  const Eigen::Matrix3d expected = R * Vec3(1, 2, 2.5).asDiagonal() * R.transpose();
+  EXPECT_LT((w.physics.inertia(0) - expected).norm(), 1e-9);
+}
+
+std::string hinged(const std::string& axis, const std::string& type = "revolute", const std::string& more = "") {
+  return "<model name='m'><link name='post'><inertial><mass>1</mass></inertial></link><joint name='w' type='fixed'><parent>world</parent><child>post</child></joint>"
+         "<link name='arm'><pose>0 0 1 0 0 0</pose><inertial><pose>0.5 0 0 0 0 0</pose><mass>2</mass><inertia><ixx>0.01</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></inertial></link>"
+         "<joint name='j' type='" + type + "'><parent>post</parent><child>arm</child><axis><xyz>" + axis + "</xyz>" + more + "</axis></joint></model>";
+}
+
+TEST(Joints, AMotorTurnsTheChildPositivelyAboutTheAxis) {
+  World w(hinged("0 0 1"));
+  ASSERT_EQ(w.layout.joints.size(), 1u);
+  w.physics.drive_joint_velocity(0, 2.0, 100.0);
+  w.run(4.0);
+  EXPECT_NEAR(w.physics.joint_velocity(0), 2.0, 1e-3);
+  EXPECT_NEAR(w.physics.joint_position(0), 8.0, 0.02);    // not wrapped
+  EXPECT_NEAR(heading(w.physics.pose(w.body("m/arm")).rotation), wrap_angle(8.0), 0.02);
+}
+
+TEST(Joints, APendulumKeepsItsPeriod) {
+  // Physical pendulum: T = 2 pi sqrt((I + m r^2) / (m g r)), small angles about hanging down.
+  World w("<model name='m'><link name='arm'><pose>0 0 1 0 1.4708 0</pose><inertial><pose>0.5 0 0 0 0 0</pose><mass>2</mass><inertia><ixx>0.01</ixx><iyy>0.1</iyy>"
+          "<izz>0.1</izz></inertia></inertial></link><joint name='j' type='revolute'><parent>world</parent><child>arm</child><axis><xyz>0 1 0</xyz></axis></joint></model>", 1000);
+  const double period = 2 * M_PI * std::sqrt((0.1 + 2 * 0.25) / (2 * 10 * 0.5));
+  w.run(period / 2);
+  EXPECT_NEAR(w.physics.joint_position(0), 0.2, 5e-3);    // from 0.1 rad on one side to the other
+}
+
+TEST(Joints, LimitsHold) {
+  World w(hinged("0 0 1", "revolute", "<limit><lower>-0.5</lower><upper>0.7</upper></limit>"));
+  w.physics.drive_joint_velocity(0, 1.0, 20.0);
+  w.run(3.0);
+  EXPECT_NEAR(w.physics.joint_position(0), 0.7, 0.02);
+  w.physics.drive_joint_velocity(0, -1.0, 20.0);
+  w.run(3.0);
+  EXPECT_NEAR(w.physics.joint_position(0), -0.5, 0.02);
+}
+
+TEST(Joints, EffortAccelerates) {
+  // 0.6 N m on I + m r^2 = 0.6 kg m^2: 1 rad/s^2.
+  World w(hinged("0 0 1"));
+  w.physics.apply_joint_effort(0, 0.6);
+  w.run(1.0);
+  EXPECT_NEAR(w.physics.joint_velocity(0), 1.0, 0.01);
+  EXPECT_EQ(w.physics.joint_effort(0), 0.6);
+}
+
+TEST(Joints, AMotorHoldsAgainstGravityAndSaysItsEffort) {
+  World w(hinged("0 1 0"));    // the arm lies along x: 2 kg * 10 * 0.5 m = 10 N m, which y turns down
+  w.physics.drive_joint_velocity(0, 0.0, 100.0);
+  w.run(0.5);
+  EXPECT_NEAR(w.physics.joint_position(0), 0.0, 0.01);
+  EXPECT_NEAR(w.physics.joint_effort(0), -10.0, 0.3);
+}
+
+TEST(Joints, DampingSlowsDownAndNeverReverses) {
+  // I = 0.6, damping 0.6: the rate falls by 1/e in 1 s.
+  World w(hinged("0 0 1", "continuous", "<dynamics><damping>0.6</damping></dynamics>"));
+  w.physics.apply_joint_effort(0, 6.0);
+  w.run(0.2);
+  const double rate = w.physics.joint_velocity(0);
+  w.physics.apply_joint_effort(0, 0.0);
+  w.run(1.0);
+  EXPECT_NEAR(w.physics.joint_velocity(0) / rate, std::exp(-1.0), 0.02);
+  World stiff(hinged("0 0 1", "continuous", "<dynamics><damping>1e6</damping></dynamics>"));
+  stiff.physics.apply_joint_effort(0, 1.0);
+  stiff.run(1.0);
+  EXPECT_GE(stiff.physics.joint_velocity(0), -1e-9);
+  EXPECT_LT(stiff.physics.joint_velocity(0), 0.01);
+}
+
+TEST(Joints, ASliderGoesAlongItsAxis) {
+  World w(hinged("0 1 0", "prismatic", "<limit><lower>-0.2</lower><upper>0.6</upper></limit>"));
+  w.physics.drive_joint_velocity(0, 0.5, 100.0);
+  w.run(0.8);
+  EXPECT_NEAR(w.physics.joint_position(0), 0.4, 0.01);
+  EXPECT_NEAR(w.physics.joint_velocity(0), 0.5, 0.01);
+  EXPECT_NEAR(w.physics.pose(w.body("m/arm")).translation.y(), 0.4, 0.01);
+  EXPECT_NEAR(w.physics.pose(w.body("m/arm")).translation.z(), 1.0, 0.01);
+  w.run(1.0);
+  EXPECT_NEAR(w.physics.joint_position(0), 0.6, 0.01);
+}
+
+TEST(Joints, LinksOfAModelCollideOnlyWhenItSaysSo) {
+  const auto gap = [](bool self_collide) {
+    const std::string box = "<inertial><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia></inertial>"
+                            "<collision name='c'><geometry>" + kBox + "</geometry></collision>";
+    World w(kPlane + "<model name='m'><self_collide>" + (self_collide ? "true" : "false") + "</self_collide><link name='low'><pose>0 0 0.1 0 0 0</pose>" + box +
+            "</link><link name='high'><pose>0 0 0.31 0 0 0</pose>" + box + "</link></model>");
+    w.run(1.0);
+    return w.physics.pose(1).translation.z() - w.physics.pose(0).translation.z();
+  };
+  EXPECT_NEAR(gap(true), 0.2, 2e-3);
+  EXPECT_NEAR(gap(false), 0.0, 2e-3);
+}
+
+TEST(Physics, AGuidedBodyEndsExactlyThereUnlessItTouches) {
+  World w(kPlane + thing("box", "0 0 0.5 0 0 0", kBox, 1) + thing("wall", "1 0 0.5 0 0 0", "<box><size>0.2 1 1</size></box>", 0), 10000);
+  const int box = w.body("box/l");
+  for (int i = 1; i <= 60; ++i) {
+    const Pose end{Quat::Identity(), {0.01 * i, 0, 0.5}};
+    w.physics.guide(box, {{1, 0, 0}, {}}, end);
+    w.physics.step();
+    EXPECT_EQ(w.physics.pose(box).translation, end.translation);
+  }
+  for (int i = 61; i <= 120; ++i) {
+    w.physics.guide(box, {{1, 0, 0}, {}}, {Quat::Identity(), {w.physics.pose(box).translation.x() + 0.01, 0, 0.5}});
+    w.physics.step();
+    EXPECT_LT(w.physics.pose(box).translation.x(), 0.801);    // the wall's face at 0.9, half a box before it
+  }
+}
+
+TEST(Physics, ConcaveMovingMeshesAreNamed) {
+  // An L of two boxes as one polyline: extruded, it is a mesh.
+  const std::string l = "<polyline><point>0 0</point><point>1 0</point><point>1 0.2</point><point>0.2 0.2</point><point>0.2 1</point><point>0 1</point><height>0.2</height></polyline>";
+  const std::string square = "<polyline><point>0 0</point><point>1 0</point><point>1 1</point><point>0 1</point><height>0.2</height></polyline>";
+  EXPECT_EQ(World(thing("m", "0 0 1 0 0 0", l, 1)).physics.findings().size(), 1u);
+  EXPECT_EQ(World(thing("m", "0 0 1 0 0 0", square, 1)).physics.findings().size(), 0u);
+  EXPECT_EQ(World(thing("m", "0 0 1 0 0 0", l, 0)).physics.findings().size(), 0u);
+}
+
+TEST(Physics, AStaticMeshCarriesAtItsExactHeight) {
+  const std::string slab = "<polyline><point>-1 -1</point><point>1 -1</point><point>1 1</point><point>-1 1</point><height>0.2</height></polyline>";
+  World w(thing("m", "0 0 1 0 0 0", slab, 0) + thing("ball", "0.3 0.2 1.31 0 0 0", kBall, 1) + thing("box", "-0.3 0.2 1.31 0 0 0", kBox, 1));
+  w.run(0.5);
+  EXPECT_NEAR(w.physics.pose(0).translation.z(), 1.3, 1e-3);
+  EXPECT_NEAR(w.physics.pose(1).translation.z(), 1.3, 1e-3);
+}
+
+TEST(Physics, ContactsComeInAFixedOrder) {
+  std::string models = kPlane;
+  for (int i = 0; i < 20; ++i) models += thing("b" + std::to_string(i), std::to_string(i % 5 * 0.25) + " " + std::to_string(i / 5 * 0.25) + " 0.1 0 0 0", kBox, 1);
+  World w(models);
+  w.run(0.3);
+  Snapshot snapshot;
+  w.physics.read(snapshot);
+  ASSERT_GE(snapshot.contacts.size(), 20u);
+  for (size_t i = 1; i < snapshot.contacts.size(); ++i) EXPECT_LE(snapshot.contacts[i - 1].body_a, snapshot.contacts[i].body_a);
+}
+
+}  // namespace
+}  // namespace ruedo::physics
