@@ -54,7 +54,8 @@ std::string page(const std::vector<Outcome>& outcomes) {
           "## E2: a square of one metre, five times (Fig. 9)\n\n"
           "The paper's measure: the mean, over the run, of the difference between the true pose and the odometry. In the paper's\n"
           "setting the trapezoid runs half a frame behind the robot: that is the difference, and it vanishes at every stop, while the\n"
-          "path itself turns with each corner. A wheel in contact slips, most of all while it turns.\n\n";
+          "path itself turns with each corner. Wheels in contact slip: a robot that steers by skidding turns less than its wheels\n"
+          "say, so that its odometry needs a wider track than the real one.\n\n";
   text += table(outcomes, "E2");
   text += "![Square, late braking](experiments/e2_late_braking.svg)\n\n"
           "![Square, kinematic drive](experiments/e2_kinematic.svg)\n\n"

@@ -19,6 +19,7 @@ using Kind = model::DriveDescription::Kind;
 
 constexpr int64_t kPaperStep_us = 20'000;
 constexpr double kHigh = 4.2, kLow = 0.27;    // m/s^2
+constexpr double kFast = 2.0;                 // m/s: more than the triangle's peak
 constexpr int kLaps = 5;
 
 // The paper's loop: `way` and `v` along a primitive, from rest to rest, at limits a and d. done() tells the way so far,
@@ -57,7 +58,7 @@ Advance advance(double a, double d, int64_t step_us, Kind drive) {
   ExperimentRig rig({.step_us = step_us, .drive = drive, .limits = false, .odometry = {}});
   Advance run;
   const double start = rig.robot().X_WBase.translation.x();
-  rig.move({1, move_command_t::ADVANCE, 1.0, 0.0, 0.0, a, d},
+  rig.move({1, move_command_t::ADVANCE, 1.0, 0.0, kFast, a, d},
            [&] { run.speed.push_back({rig.time_s(), rig.robot().twist.linear.x()}); });
   run.way_m = rig.robot().X_WBase.translation.x() - start;
   return run;
@@ -80,10 +81,14 @@ struct Square {
     theta_rad += (dtheta - theta_rad) / n;
     worst_m = std::max({worst_m, dx, dy});
     worst_rad = std::max(worst_rad, dtheta);
-    if (steps % 5 == 0) {
-      true_path.push_back({X.translation.x(), X.translation.y()});
-      believed_path.push_back({o.x, o.y});
-    }
+    add(true_path, X.translation.x(), X.translation.y());
+    add(believed_path, o.x, o.y);
+  }
+
+ private:
+  // A point of the plot each centimetre is enough.
+  static void add(Points& path, double x, double y) {
+    if (path.empty() || std::hypot(x - path.back().first, y - path.back().second) > 0.01) path.push_back({x, y});
   }
   int steps = 0;
 };
@@ -119,6 +124,19 @@ Square square(Kind drive, const std::vector<std::pair<std::string, std::string>>
     rig.move({++id, move_command_t::ROTATE, M_PI / 2, 0, 0, 0, 0}, [&] { square.look(rig); });
   }
   return square;
+}
+
+// How much wider the track seems to the wheels of a robot that turns on the spot, skidding: the turn by the wheels
+// over the true one, less one.
+double seeming_track_error() {
+  ExperimentRig rig({.drive = Kind::wheels, .odometry = {}});
+  double turned = 0, last = heading(rig.robot().X_WBase.rotation);
+  rig.move({1, move_command_t::ROTATE, 4 * M_PI, 0, 0, 0, 0}, [&] {
+    const double now = heading(rig.robot().X_WBase.rotation);
+    turned += wrap_angle(now - last);
+    last = now;
+  });
+  return rig.odometry().theta / turned - 1.0;
 }
 
 void plot_square(const Experiments& all, const std::string& file, const std::string& title, const Square& square) {
@@ -157,34 +175,41 @@ void advance_experiment(Experiments& all) {
 }
 
 void square_experiment(Experiments& all) {
-  const auto report = [&](const std::string& what, const Square& s, const std::string& target, bool met) {
+  struct Target { std::string text; bool met = true; };
+  const auto report = [&](const std::string& what, const Square& s, const Target& way, const Target& turn) {
     const bool paper = what.find("late") != std::string::npos;
-    all.report({"E2", what + ": mean |x - odometry|", paper ? "5.9728 mm" : "", 1000 * s.x_m, "mm", target, met});
-    all.report({"E2", what + ": mean |y - odometry|", paper ? "5.5326 mm" : "", 1000 * s.y_m, "mm", target, met});
-    all.report({"E2", what + ": mean |heading - odometry|", paper ? "0.0124 rad" : "", s.theta_rad, "rad", target, met});
+    all.report({"E2", what + ": mean |x - odometry|", paper ? "5.9728 mm" : "", 1000 * s.x_m, "mm", way.text, way.met});
+    all.report({"E2", what + ": mean |y - odometry|", paper ? "5.5326 mm" : "", 1000 * s.y_m, "mm", way.text, way.met});
+    all.report({"E2", what + ": mean |heading - odometry|", paper ? "0.0124 rad" : "", s.theta_rad, "rad", turn.text, turn.met});
   };
   all.progress("E2: square path, late braking at 50 Hz, trapezoidal odometry");
   const Square late = square_late();
-  report("square of 1 m, 5 times, late braking at 50 Hz, trapezoid", late, "", true);
+  report("square of 1 m, 5 times, late braking at 50 Hz, trapezoid", late, {}, {});
   plot_square(all, "e2_late_braking.svg", "Square of 1 m, five times: late braking at 50 Hz, trapezoidal odometry", late);
 
   all.progress("E2: square path, arc odometry");
   const Square arc = square(Kind::kinematic, {{"ruedo:integrator", "arc"}});
-  report("square of 1 m, 5 times, kinematic drive, arc", arc, "at every step below 0.001 mm and 1e-9 rad",
-         arc.worst_m < 1e-6 && arc.worst_rad < 1e-9);
+  report("square of 1 m, 5 times, kinematic drive, arc", arc, {"at every step below 0.001 mm", arc.worst_m < 1e-6},
+         {"at every step below 1e-9 rad", arc.worst_rad < 1e-9});
   plot_square(all, "e2_kinematic.svg", "Square of 1 m, five times: Ruedo's primitives, kinematic drive, arc odometry", arc);
 
   all.progress("E2: square path, trapezoidal odometry");
-  report("square of 1 m, 5 times, kinematic drive, trapezoid", square(Kind::kinematic, {{"ruedo:integrator", "trapezoid"}}), "", true);
+  report("square of 1 m, 5 times, kinematic drive, trapezoid", square(Kind::kinematic, {{"ruedo:integrator", "trapezoid"}}), {}, {});
 
   all.progress("E2: square path, encoders of 34 000 ticks");
   const Square ticks = square(Kind::kinematic, {{"ruedo:ticks_per_turn", "34000"}, {"ruedo:counter_bits", "16"}});
-  report("square of 1 m, 5 times, kinematic drive, arc, 34 000 ticks a turn", ticks, "below 0.5 mm", ticks.x_m < 5e-4 && ticks.y_m < 5e-4);
+  report("square of 1 m, 5 times, kinematic drive, arc, 34 000 ticks a turn", ticks,
+         {"below 0.5 mm", ticks.x_m < 5e-4 && ticks.y_m < 5e-4}, {});
 
   all.progress("E2: square path, wheels in contact");
   const Square wheels = square(Kind::wheels, {});
-  report("square of 1 m, 5 times, wheels drive, arc", wheels, "", true);
+  report("square of 1 m, 5 times, wheels drive, arc", wheels, {}, {});
   plot_square(all, "e2_wheels.svg", "Square of 1 m, five times: wheels in contact, slip and all", wheels);
+
+  all.progress("E2: square path, wheels in contact, calibrated track");
+  const double error = seeming_track_error();
+  const Square calibrated = square(Kind::wheels, {{"ruedo:track_error", fmt::format("{:.9f}", error)}});
+  report(fmt::format("square of 1 m, 5 times, wheels drive, arc, track {:+.1f} % as two turns on the spot measure it", 100 * error), calibrated, {}, {});
 }
 
 }  // namespace ruedo::cli

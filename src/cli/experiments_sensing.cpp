@@ -191,7 +191,7 @@ void laser_experiment(Experiments& all) {
     worst = std::max(worst, std::isinf(range) && std::isinf(seen) ? 0.0 : std::abs(range - seen));
     const double x = expected.x + seen * std::cos(angle), y = expected.y + seen * std::sin(angle);
     plot.line({{expected.x, expected.y}, {x, y}}, "#d62728", "", false, 0.7);
-    lines.push_back({{expected.x, expected.y, 0.39}, {x, y, 0.39}, {1.0f, 0.1f, 0.1f, 0.8f}});
+    lines.push_back({{expected.x, expected.y, 0.39}, {x, y, 0.39}, {1.0f, 0.1f, 0.1f, 0.35f}});
   }
   for (const Obstacle& o : kObstacles) plot.area(outline(o), "#4a6fa5");
   plot.area(outline({false, kRobotX, kRobotY, kRobotYaw, 0.5, 0.38}), "#333333");

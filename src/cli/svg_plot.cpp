@@ -9,7 +9,7 @@
 namespace ruedo::cli {
 namespace {
 
-constexpr double kWidth = 720, kHeight = 440, kLeft = 68, kRight = 18, kTop = 40, kBottom = 52;    // pixels
+constexpr double kWidth = 720, kHeight = 440, kLeft = 68, kRight = 18, kTop = 40, kBottom = 52, kRow = 19;    // pixels
 
 // An axis from data to pixels.
 struct Axis {
@@ -53,8 +53,10 @@ void SvgPlot::line(Points points, std::string colour, std::string label, bool da
 void SvgPlot::area(Points points, std::string colour) { curves_.push_back({std::move(points), std::move(colour), "", false, true, 0}); }
 
 std::string SvgPlot::svg() const {
-  const double height = equal_axes_ ? 640 : kHeight;
-  Axis x{1e300, -1e300, kLeft, kWidth - kRight}, y{1e300, -1e300, height - kBottom, kTop};
+  const double bottom = equal_axes_ ? 640 : kHeight;    // of the plot; the legend comes below
+  const auto labels = std::count_if(curves_.begin(), curves_.end(), [](const Curve& curve) { return !curve.label.empty(); });
+  const double height = bottom + (labels > 0 ? kRow * static_cast<double>(labels) + 10 : 0);
+  Axis x{1e300, -1e300, kLeft, kWidth - kRight}, y{1e300, -1e300, bottom - kBottom, kTop};
   for (const Curve& curve : curves_) {
     for (const auto& [px, py] : curve.points) {
       x.low = std::min(x.low, px);
@@ -102,7 +104,7 @@ std::string SvgPlot::svg() const {
   }
   stroke(x.from, y.from, x.to, y.from, "#404040");
   stroke(x.from, y.from, x.from, y.to, "#404040");
-  text(0.5 * (x.from + x.to), height - 12, "middle", x_label_);
+  text(0.5 * (x.from + x.to), bottom - 12, "middle", x_label_);
   out += fmt::format("<text transform=\"translate(18 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n", 0.5 * (y.from + y.to),
                      escaped(y_label_));
   for (const Curve& curve : curves_) {
@@ -115,14 +117,14 @@ std::string SvgPlot::svg() const {
                          curve.width, curve.dashed ? " stroke-dasharray=\"6 4\"" : "");
     }
   }
-  double row = kTop + 14;
+  double row = bottom + 14;
   for (const Curve& curve : curves_) {
     if (curve.label.empty()) continue;
-    const double from = x.to - 250;
+    const double from = x.from + 20;
     out += fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"{}\" stroke-width=\"2\"{}/>\n", from, row - 4,
                        from + 26, row - 4, curve.colour, curve.dashed ? " stroke-dasharray=\"6 4\"" : "");
     text(from + 32, row, "start", curve.label);
-    row += 18;
+    row += kRow;
   }
   return out + "</svg>\n";
 }
