@@ -1,0 +1,53 @@
+// ruedo diff: compares a log with a golden one, field by field.
+#include <fstream>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "cli/commands.h"
+#include "ruedo/errors.h"
+#include "server/log_diff.h"
+
+namespace ruedo::cli {
+namespace {
+
+struct DiffArguments {
+  std::string golden, other, junit, html;
+  std::vector<std::string> tolerances, ignored;
+};
+
+void write_file(const std::string& path, const std::string& text) {
+  std::ofstream file(path);
+  file << text;
+  if (!file.flush()) throw EnvironmentError(path + " cannot be written");
+}
+
+int diff(const DiffArguments& arguments) {
+  std::vector<server::DiffRule> rules;
+  for (const std::string& text : arguments.tolerances) rules.push_back(server::DiffRule::parse(text, false));
+  for (const std::string& text : arguments.ignored) rules.push_back(server::DiffRule::parse(text, true));
+  const server::LogDiff result = server::diff_logs(arguments.golden, arguments.other, rules);
+  fmt::print("{}", server::diff_text(result));
+  if (!arguments.junit.empty()) write_file(arguments.junit, server::diff_junit(result));
+  if (!arguments.html.empty()) write_file(arguments.html, server::diff_html(result, arguments.golden, arguments.other));
+  return result.same() ? kGood : kCheckFailed;
+}
+
+void add_diff(CLI::App& app, Action& chosen) {
+  CLI::App* command = app.add_subcommand("diff", "compare a log with a golden one, field by field");
+  const auto arguments = std::make_shared<DiffArguments>();
+  command->add_option("GOLDEN", arguments->golden, "the log to compare with")->required();
+  command->add_option("NEW", arguments->other, "the log to judge")->required();
+  command->add_option("--tolerance", arguments->tolerances,
+                      "CHANNEL:FIELD=abs:1e-3,rel:0.01,angle:0.02; shell patterns; the last that fits counts")
+      ->type_name("RULE")->allow_extra_args(false);
+  command->add_option("--ignore", arguments->ignored, "CHANNEL or CHANNEL:FIELD")->type_name("PATTERN")->allow_extra_args(false);
+  command->add_option("--junit", arguments->junit, "write JUnit XML")->type_name("FILE");
+  command->add_option("--html", arguments->html, "write a page with plots of what differs")->type_name("FILE");
+  command->callback([arguments, &chosen] { chosen = [arguments] { return diff(*arguments); }; });
+}
+
+const RegisterCommand kRegister{50, add_diff};
+
+}  // namespace
+}  // namespace ruedo::cli
