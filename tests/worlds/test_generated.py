@@ -63,5 +63,6 @@ def test_doors_let_a_pioneer_through():
     for x0, y0, x1, y1, doors in office.WALLS:
         for door in doors:
             x, y = (x0 + door, y0) if y0 == y1 else (x0, y0 + door)
-            blocked = [model for model, mx, my, _ in office.furniture() if abs(mx - x) < 1.0 and abs(my - y) < 1.0]
+            things = [t[:3] for t in office.furniture()] + [("poster", *t[:2]) for t in office.POSTERS]
+            blocked = [thing for thing, tx, ty in things if abs(tx - x) < 1.0 and abs(ty - y) < 1.0]
             assert not blocked, f"door at ({x}, {y}): {blocked}"
