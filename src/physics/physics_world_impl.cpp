@@ -1,0 +1,314 @@
+// A step of the physics world.
+//
+// Settings for repeatable runs (measured): pairs in the order of their numbers, no random order in the solver,
+// objects added in world order, and a broadphase that knows no addresses. A world that is made again gives the
+// same bits.
+#include "physics/physics_world_impl.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ruedo::physics {
+
+namespace {
+
+// Motorised wheels in friction contact want shorter substeps: at 1 ms a wheel on the ground does not jitter.
+constexpr int64_t kLongestSubstep_us = 5000, kLongestSubstepOfWheels_us = 1000;
+constexpr int kSolverIterations = 30;
+// Distance at which Bullet begins to see a contact: a body may come so near in one substep without touching.
+constexpr double kContactReach_m = 0.02;
+
+// Coulomb friction between two surfaces: the lower of both, as in ODE and Gazebo (Bullet multiplies).
+btScalar lower_friction(const btCollisionObject* a, const btCollisionObject* b) {
+  return std::min(a->getFriction(), b->getFriction());
+}
+
+}  // namespace
+
+bool MayTouch::may_touch(const btCollisionObject& object_a, const btCollisionObject& object_b) const {
+  const ObjectInfo& a = info_of(object_a);
+  const ObjectInfo& b = info_of(object_b);
+  if (a.links.empty() || b.links.empty()) return false;    // no shapes
+  if ((a.moved || a.body < 0) && (b.moved || b.body < 0)) return false;
+  if ((a.on_plane && b.plane) || (b.on_plane && a.plane)) return false;
+  if (a.instance != b.instance) return true;
+  // As SDF has it: links of one model collide when it says self_collide, but never across a joint.
+  return a.self_collide && std::find(a.joined.begin(), a.joined.end(), b.body) == a.joined.end();
+}
+
+PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout& layout)
+    : rigid_(world, layout),
+      contacts_(layout.bodies.size()),
+      step_us_(world.step_us),
+      ground_(btRigidBody::btRigidBodyConstructionInfo(0.0, nullptr, nullptr)),
+      dispatcher_(&configuration_),
+      broadphase_(filter_),
+      dynamics_(&dispatcher_, &broadphase_, &solver_, &configuration_) {
+  gCalculateCombinedFrictionCallback = lower_friction;    // Bullet's globals: the same in every world
+  gContactBreakingThreshold = kContactReach_m;
+  gDisableDeactivation = false;
+  dispatcher_.setDispatcherFlags(dispatcher_.getDispatcherFlags() &
+                                 ~btCollisionDispatcher::CD_USE_RELATIVE_CONTACT_BREAKING_THRESHOLD);
+  dynamics_.getDispatchInfo().m_deterministicOverlappingPairs = true;
+  dynamics_.setForceUpdateAllAabbs(false);
+  btContactSolverInfo& solver = dynamics_.getSolverInfo();
+  solver.m_numIterations = kSolverIterations;
+  solver.m_solverMode = SOLVER_USE_WARMSTARTING | SOLVER_SIMD | SOLVER_USE_2_FRICTION_DIRECTIONS;
+  solver.m_splitImpulsePenetrationThreshold = 0.0;        // penetration is undone without adding velocity
+  solver.m_jointFeedbackInWorldSpace = true;
+
+  for (const auto& object : rigid_.statics) {
+    dynamics_.addCollisionObject(object->bullet.get(), btBroadphaseProxy::StaticFilter,
+                                 btBroadphaseProxy::AllFilter ^ btBroadphaseProxy::StaticFilter);
+  }
+  const size_t n = layout.bodies.size();
+  motions_.resize(n);
+  twists_.resize(n);
+  for (const auto& body : layout.bodies) poses_.push_back(body.X_WB.normalized());
+  add_joints(world, layout);
+  for (size_t i = 0; i < n; ++i) {
+    dynamics_.addRigidBody(rigid_.bodies[i].bullet.get(), btBroadphaseProxy::DefaultFilter, btBroadphaseProxy::AllFilter);
+    update_box(static_cast<int>(i));
+  }
+  for (JointConstraint& joint : joints_) if (joint.constraint()) dynamics_.addConstraint(joint.constraint(), true);
+  for (JointConstraint& joint : wheels_) if (joint.constraint()) dynamics_.addConstraint(joint.constraint(), true);
+  last_twists_ = twists_;
+  const int64_t longest = wheels_.empty() ? kLongestSubstep_us : kLongestSubstepOfWheels_us;
+  substeps_ = static_cast<int>((step_us_ + longest - 1) / longest);
+}
+
+PhysicsWorld::Impl::~Impl() {
+  for (JointConstraint& joint : joints_) if (joint.constraint()) dynamics_.removeConstraint(joint.constraint());
+  for (JointConstraint& joint : wheels_) if (joint.constraint()) dynamics_.removeConstraint(joint.constraint());
+  dynamics_.take({});
+  for (size_t i = rigid_.bodies.size(); i-- > 0;) {
+    broadphase_.destroyProxy(rigid_.bodies[i].bullet->getBroadphaseHandle(), &dispatcher_);
+  }
+  for (size_t i = rigid_.statics.size(); i-- > 0;) {
+    broadphase_.destroyProxy(rigid_.statics[i]->bullet->getBroadphaseHandle(), &dispatcher_);
+  }
+}
+
+JointConstraint PhysicsWorld::Impl::make_joint(const model::WorldModel& world, const model::BodyLayout& layout,
+                                               int instance, int joint_index) {
+  const auto& placed = world.models[index(instance)];
+  const model::Joint& joint = placed.model->joints[index(joint_index)];
+  const auto body_of = [&](int link) {
+    return link < 0 ? -1 : layout.links[index(layout.first_link[index(instance)] + link)].body;
+  };
+  const int parent = body_of(joint.parent), child = body_of(joint.child);
+  const Pose X_WJ = placed.X_WM * joint.X_MJ;
+  const auto in_body = [&](int body) {
+    return body < 0 ? X_WJ : rigid_.bodies[index(body)].X_BI.inverse() * poses_[index(body)].inverse() * X_WJ;
+  };
+  if (child >= 0) {
+    tie(child, parent);
+  } else {
+    tie(parent, child);    // what the joint carries is fixed to the world
+  }
+  return {joint, parent < 0 ? ground_ : bullet(parent), child < 0 ? ground_ : bullet(child), in_body(parent), in_body(child)};
+}
+
+void PhysicsWorld::Impl::add_joints(const model::WorldModel& world, const model::BodyLayout& layout) {
+  joints_.reserve(layout.joints.size());
+  for (const auto& joint : layout.joints) joints_.push_back(make_joint(world, layout, joint.instance, joint.joint));
+  wheel_joint_.assign(layout.wheels.size(), -1);
+  wheel_sign_.assign(layout.wheels.size(), 1.0);
+  wheels_.reserve(layout.wheels.size());
+  for (size_t i = 0; i < layout.wheels.size(); ++i) {
+    const auto& wheel = layout.wheels[i];
+    const auto& robot = layout.robots[index(wheel.robot)];
+    const auto& link = layout.links[index(wheel.link)];
+    if (link.body < 0 || link.body == robot.body) continue;
+    wheel_joint_[i] = static_cast<int>(wheels_.size());
+    wheels_.push_back(make_joint(world, layout, robot.instance, wheel.joint));
+    const auto& model = *world.models[index(robot.instance)].model;
+    const model::Joint& joint = model.joints[index(wheel.joint)];
+    const Vec3 axis_in_M = joint.X_MJ.rotation * joint.axis.axis_in_J;
+    const Vec3 ahead_in_M = model.links[index(link.link)].X_ML.rotation * wheel.axis_in_L;
+    wheel_sign_[i] = axis_in_M.dot(ahead_in_M) < 0.0 ? -1.0 : 1.0;
+  }
+}
+
+void PhysicsWorld::Impl::tie(int body, int other) {
+  motions_[index(body)].tied = true;
+  if (other < 0) return;
+  motions_[index(other)].tied = true;
+  rigid_.bodies[index(body)].info.joined.push_back(other);
+  rigid_.bodies[index(other)].info.joined.push_back(body);
+}
+
+void PhysicsWorld::Impl::push_to_bullet(int body) {
+  RigidBody& rigid = rigid_.bodies[index(body)];
+  btRigidBody& bullet = *rigid.bullet;
+  const Pose& X_WB = poses_[index(body)];
+  const btTransform X_WI = to_bt((X_WB * rigid.X_BI).normalized());
+  bullet.setWorldTransform(X_WI);
+  bullet.setInterpolationWorldTransform(X_WI);
+  bullet.updateInertiaTensor();
+  const Twist& twist = twists_[index(body)];
+  const Vec3 arm = X_WB.rotation * rigid.X_BI.translation;
+  bullet.setLinearVelocity(to_bt(Vec3(twist.linear + twist.angular.cross(arm))));
+  bullet.setAngularVelocity(to_bt(twist.angular));
+  motions_[index(body)].dirty = false;
+}
+
+void PhysicsWorld::Impl::pull_from_bullet(int body) {
+  const RigidBody& rigid = rigid_.bodies[index(body)];
+  const Pose X_WB = (from_bt(rigid.bullet->getWorldTransform()) * rigid.X_BI.inverse()).normalized();
+  poses_[index(body)] = X_WB;
+  const Vec3 arm = X_WB.rotation * rigid.X_BI.translation;
+  Twist& twist = twists_[index(body)];
+  twist.angular = from_bt(rigid.bullet->getAngularVelocity());
+  twist.linear = from_bt(rigid.bullet->getLinearVelocity()) - twist.angular.cross(arm);
+}
+
+// The box that the body may be in during the step, with the reach of its contacts.
+void PhysicsWorld::Impl::update_box(int body) {
+  const RigidBody& rigid = rigid_.bodies[index(body)];
+  btBroadphaseProxy* proxy = rigid.bullet->getBroadphaseHandle();
+  if (!proxy || rigid.info.links.empty()) return;
+  const Motion& motion = motions_[index(body)];
+  const double step_s = static_cast<double>(step_us_) * 1e-6;
+  const auto half_of = [&rigid](const Pose& X) {
+    return Vec3(X.rotation.toRotationMatrix().cwiseAbs() * rigid.box_half + Vec3::Constant(kContactReach_m));
+  };
+  const Pose& from = poses_[index(body)];
+  const Vec3 center = from * rigid.box_center, half = half_of(from);
+  Vec3 low = center - half, high = center + half;
+  if (motion.kind == Motion::Kind::guided) {
+    const Vec3 end_center = motion.end * rigid.box_center, end_half = half_of(motion.end);
+    low = low.cwiseMin(end_center - end_half);
+    high = high.cwiseMax(end_center + end_half);
+  } else {
+    const Twist& twist = motion.kind == Motion::Kind::driven ? motion.mean : twists_[index(body)];
+    const Vec3 way = twist.linear * step_s;
+    low += way.cwiseMin(0.0);
+    high += way.cwiseMax(0.0);
+  }
+  broadphase_.setAabb(proxy, to_bt(low), to_bt(high), &dispatcher_);
+}
+
+void PhysicsWorld::Impl::start(int body) {
+  Motion& motion = motions_[index(body)];
+  if (motion.kind == Motion::Kind::free) {
+    if (motion.dirty) push_to_bullet(body);
+    return;
+  }
+  const Twist now = twists_[index(body)];
+  twists_[index(body)] = motion.mean;
+  push_to_bullet(body);
+  twists_[index(body)] = now;
+}
+
+void PhysicsWorld::Impl::choose_simulated() {
+  const int n = static_cast<int>(motions_.size());
+  for (int i = 0; i < n; ++i) {
+    if (motions_[index(i)].kind != Motion::Kind::free) {
+      if (sleeping(i)) bullet(i).activate(true);
+      bullet(i).setDeactivationTime(0.0);
+      bullet(i).setActivationState(ACTIVE_TAG);
+      update_box(i);
+    } else if (!sleeping(i) && !rigid_.bodies[index(i)].info.moved) {
+      update_box(i);
+    }
+  }
+  simulated_.clear();
+  for (int i = 0; i < n; ++i) {
+    Motion& motion = motions_[index(i)];
+    const bool alone_now = alone(i);
+    motion.simulated = motion.tied || !alone_now ||
+                       (motion.kind != Motion::Kind::guided && !sleeping(i) && !rigid_.bodies[index(i)].info.moved);
+    if (!motion.simulated) continue;
+    start(i);
+    simulated_.push_back(&bullet(i));
+  }
+}
+
+void PhysicsWorld::Impl::step() {
+  last_twists_ = twists_;
+  choose_simulated();
+  dynamics_.take(simulated_);
+  const double step_s = static_cast<double>(step_us_) * 1e-6;
+  contacts_.clear(step_s);
+  const bool awake = std::any_of(simulated_.begin(), simulated_.end(), [](const btRigidBody* body) { return body->isActive(); });
+  const int substeps = awake ? substeps_ : 0;
+  const double substep_s = step_s / substeps_;
+  for (int s = 0; s < substeps; ++s) {
+    for (JointConstraint& joint : joints_) joint.before_substep(substep_s);
+    for (JointConstraint& joint : wheels_) joint.before_substep(substep_s);
+    dynamics_.substep(substep_s);
+    for (JointConstraint& joint : joints_) joint.after_substep(substep_s);
+    for (JointConstraint& joint : wheels_) joint.after_substep(substep_s);
+    contacts_.add(dispatcher_);
+    // A mover goes on along its way; Bullet leaves it where it is.
+    for (size_t i = 0; i < motions_.size(); ++i) {
+      if (!motions_[i].simulated || !rigid_.bodies[i].info.moved || motions_[i].kind == Motion::Kind::free) continue;
+      btTransform next;
+      btRigidBody& mover = *rigid_.bodies[i].bullet;
+      btTransformUtil::integrateTransform(mover.getWorldTransform(), mover.getLinearVelocity(), mover.getAngularVelocity(),
+                                          substep_s, next);
+      mover.setWorldTransform(next);
+    }
+  }
+  if (!awake && dispatcher_.getNumManifolds() > 0) contacts_.add(dispatcher_, substeps_);    // what rests still touches
+  contacts_.finish();
+  for (int i = 0; i < static_cast<int>(motions_.size()); ++i) {
+    Motion& motion = motions_[index(i)];
+    const bool moved = rigid_.bodies[index(i)].info.moved;
+    if (awake && motion.simulated && !moved) pull_from_bullet(i);
+    if (motion.kind == Motion::Kind::guided && (moved || contacts_.touching(i).empty())) {
+      poses_[index(i)] = motion.end;
+      twists_[index(i)] = motion.mean;
+      motion.dirty = true;
+    }
+    motion.kind = Motion::Kind::free;
+  }
+}
+
+void PhysicsWorld::Impl::set_support(int body, Support support) {
+  RigidBody& rigid = rigid_.bodies[index(body)];
+  const bool plane = support == Support::plane;
+  if (rigid.info.on_plane == plane) return;
+  rigid.info.on_plane = plane;
+  rigid.bullet->setLinearFactor(plane ? btVector3(1, 1, 0) : btVector3(1, 1, 1));
+  rigid.bullet->setAngularFactor(plane ? btVector3(0, 0, 1) : btVector3(1, 1, 1));
+  broadphase_.refilter(rigid.bullet->getBroadphaseHandle(), &dispatcher_);
+}
+
+void PhysicsWorld::Impl::apply_impulse(int body, const Vec3& linear, const Vec3& angular) {
+  if (motions_[index(body)].dirty) push_to_bullet(body);
+  bullet(body).activate(true);
+  bullet(body).applyCentralImpulse(to_bt(linear));
+  bullet(body).applyTorqueImpulse(to_bt(angular));
+  const Pose pose = poses_[index(body)];
+  pull_from_bullet(body);
+  poses_[index(body)] = pose;
+}
+
+void PhysicsWorld::Impl::sleep(int body) {
+  twists_[index(body)] = Twist{};
+  push_to_bullet(body);
+  bullet(body).setActivationState(ISLAND_SLEEPING);
+}
+
+void PhysicsWorld::Impl::read(Snapshot& snapshot) const {
+  const double step_s = static_cast<double>(step_us_) * 1e-6;
+  snapshot.bodies = poses_;
+  snapshot.body_twists = twists_;
+  snapshot.body_accelerations.resize(twists_.size());
+  for (size_t i = 0; i < twists_.size(); ++i) {
+    snapshot.body_accelerations[i] = (twists_[i].linear - last_twists_[i].linear) / step_s;
+  }
+  snapshot.joint_positions.resize(joints_.size());
+  snapshot.joint_velocities.resize(joints_.size());
+  snapshot.joint_efforts.resize(joints_.size());
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    snapshot.joint_positions[i] = joints_[i].position();
+    snapshot.joint_velocities[i] = joints_[i].velocity();
+    snapshot.joint_efforts[i] = joints_[i].effort();
+  }
+  snapshot.contacts = contacts_.all();
+}
+
+}  // namespace ruedo::physics

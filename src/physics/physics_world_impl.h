@@ -1,0 +1,92 @@
+// Inside of PhysicsWorld: bodies, joints, broadphase and Bullet's solver, and which bodies need a step of Bullet.
+//
+// Included by physics_world.cpp and physics_world_impl.cpp only.
+#pragma once
+
+#include <vector>
+
+#include "physics/broadphase.h"
+#include "physics/contact_book.h"
+#include "physics/dynamics.h"
+#include "physics/joints.h"
+#include "physics/physics_world.h"
+#include "physics/rigid_bodies.h"
+
+namespace ruedo::physics {
+
+// Which pairs of objects may touch at all: as SDF has it, and as set_support() says.
+class MayTouch final : public PairFilter {
+ public:
+  bool may_touch(const btCollisionObject& object_a, const btCollisionObject& object_b) const override;
+};
+
+// How a body goes through the coming step.
+struct Motion {
+  enum class Kind : uint8_t { free, driven, guided };
+  Kind kind = Kind::free;
+  bool dirty = false;         // our pose and twist are newer than Bullet's
+  bool tied = false;          // by a joint: always simulated while awake
+  bool simulated = false;     // in this step
+  Twist mean;
+  Pose end;
+};
+
+class PhysicsWorld::Impl {
+ public:
+  Impl(const model::WorldModel& world, const model::BodyLayout& layout);
+  ~Impl();
+
+  void step();
+  void read(Snapshot& snapshot) const;
+
+  void set_pose(int body, const Pose& pose) {
+    poses_[index(body)] = pose;
+    motions_[index(body)].dirty = true;
+    update_box(body);
+  }
+  void set_twist(int body, const Twist& twist) {
+    twists_[index(body)] = twist;
+    motions_[index(body)].dirty = true;
+  }
+  void set_support(int body, Support support);
+  void apply_impulse(int body, const Vec3& linear, const Vec3& angular);
+  btRigidBody& bullet(int body) { return *rigid_.bodies[index(body)].bullet; }
+  bool alone(int body) const { return broadphase_.alone(rigid_.bodies[index(body)].bullet->getBroadphaseHandle()); }
+  bool sleeping(int body) const { return rigid_.bodies[index(body)].bullet->getActivationState() == ISLAND_SLEEPING; }
+  void sleep(int body);
+
+  static size_t index(int body) { return static_cast<size_t>(body); }
+
+  RigidBodies rigid_;
+  std::vector<Pose> poses_;
+  std::vector<Twist> twists_, last_twists_;
+  std::vector<Motion> motions_;
+  ContactBook contacts_;
+  std::vector<JointConstraint> joints_;       // as in the layout
+  std::vector<JointConstraint> wheels_;       // those that are bodies of their own
+  std::vector<int> wheel_joint_;              // of each wheel, into wheels_; -1: none
+  std::vector<double> wheel_sign_;            // axis of the joint against that of the wheel
+
+ private:
+  void add_joints(const model::WorldModel& world, const model::BodyLayout& layout);
+  JointConstraint make_joint(const model::WorldModel& world, const model::BodyLayout& layout, int instance, int joint);
+  void tie(int body, int other);
+  void push_to_bullet(int body);      // our pose and twist
+  void pull_from_bullet(int body);
+  void start(int body);               // the velocity it begins the step with
+  void update_box(int body);
+  void choose_simulated();
+
+  int64_t step_us_;
+  int substeps_ = 1;
+  MayTouch filter_;
+  btRigidBody ground_;                // what joints to the world hold on to
+  btDefaultCollisionConfiguration configuration_;
+  btCollisionDispatcher dispatcher_;
+  Broadphase broadphase_;
+  btSequentialImpulseConstraintSolver solver_;
+  Dynamics dynamics_;
+  std::vector<btRigidBody*> simulated_;
+};
+
+}  // namespace ruedo::physics
