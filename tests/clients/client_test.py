@@ -54,6 +54,7 @@ def test_velocity_holds_until_stopped(language, server):
     kind, state, v, omega = said.words("status")
     assert (kind, state) == ("velocity", "running") and (float(v), float(omega)) == pytest.approx((0.3, 0.5), abs=1e-6)
     moved, turned = said.numbers("moved")
+    turned = math.remainder(turned, 2 * math.pi)    # the tests before left it somewhere
     # Along a circle of v / omega, after 1 s of gaining speed; what the host's delay adds is a few samples.
     assert 0.5 < moved < 2 * 0.3 / 0.5 and 1.0 < turned < 2.2
     assert said.numbers("stopped") == pytest.approx([0.0], abs=1e-9)
@@ -66,10 +67,11 @@ def test_wheels(language, server):
     assert said.numbers("stopped") == pytest.approx([0.0], abs=1e-9)
 
 
-def test_velocity_holds_at_full_speed(language):
-    """As fast as it goes, real time cannot feed the watchdog; the ticks do."""
-    with ruedo_run("--rate", "max", "--disable", "p3at/camera", "--duration", "36000", world=HALL) as server:
-        said = probe(language, server.url, "velocity", "p3at", "0.0", "0.4", "60")
+def test_velocity_holds_faster_than_real_time(language):
+    """At eight times real time a repetition every 100 ms would come 800 ms of sim time apart, and the watchdog stops the
+    robot after 600: the ticks of the server set the pace."""
+    with ruedo_run("--rate", "8", "--disable", "p3at/camera", world=HALL) as server:
+        said = probe(language, server.url, "velocity", "p3at", "0.0", "0.4", "30")
         assert said.words("status")[:2] == ["velocity", "running"], said.text
 
 

@@ -61,10 +61,9 @@ def launch(world: str | os.PathLike[str], *, seed: int | None = None, rate: floa
     server = _Server(command + list(args), token, verbose)
     try:
         return Simulation(url, name, timeout, server.ended, server.end)
-    except NoServer as error:
-        said = server.ended()
+    except NoServer as error:    # with what the server said, when it ended
         server.end()
-        raise LaunchError(said or f"`{' '.join(command)}` did not answer within {timeout:g} s: {error}") from None
+        raise LaunchError(str(error)) from None
     except BaseException:
         server.end()
         raise

@@ -99,11 +99,12 @@ public final class Probe {
         say("stopped", robot.motion().next().v);
     }
 
-    private static void run(Robot robot, String what, Supplier<Motion> start) {
+    private static void run(Simulation sim, Robot robot, String what, Supplier<Motion> start) {
         Pose begin = robot.pose().next();
         Motion motion = start.get();
         boolean early = motion.done();
         motion.await(60.0);
+        sim.sleep(0.1);    // poses come at 50 Hz, the end of a motion at its step
         Pose end = robot.pose().next();
         say(what, early, motion.done(), motion.state(), motion.reason().isEmpty() ? "-" : motion.reason(),
                 Math.hypot(end.x() - begin.x(), end.y() - begin.y()),
@@ -113,10 +114,10 @@ public final class Probe {
     private static void primitives(Simulation sim, String name) {
         Robot robot = sim.robot(name);
         robot.stop().await(20.0);
-        run(robot, "advance", () -> robot.advance(0.4, new Limits(0.5, 0.0, 0.0)));
-        run(robot, "rotate", () -> robot.rotate(1.2));
-        run(robot, "turn_to", () -> robot.turnTo(0.0));
-        run(robot, "arc", () -> robot.arc(0.8, 0.5));
+        run(sim, robot, "advance", () -> robot.advance(0.4, new Limits(0.5, 0.0, 0.0)));
+        run(sim, robot, "rotate", () -> robot.rotate(1.2));
+        run(sim, robot, "turn_to", () -> robot.turnTo(0.0));
+        run(sim, robot, "arc", () -> robot.arc(0.8, 0.5));
         Motion replaced = robot.advance(5.0);
         sim.sleep(0.5);
         robot.stop().await(20.0);

@@ -111,6 +111,7 @@ void primitives(const rc::Simulation& sim, const std::string& name) {
     const rc::Motion motion = start();
     const bool early = motion.done();
     motion.wait(60.0);
+    sim.sleep(0.1);    // poses come at 50 Hz, the end of a motion at its step
     const auto end = robot.pose().next();
     say(what, early, motion.done(), motion.state(), motion.reason().empty() ? "-" : motion.reason(),
         std::hypot(end.x() - begin.x(), end.y() - begin.y()), std::remainder(end.heading() - begin.heading(), 2 * kPi));

@@ -68,6 +68,7 @@ def primitives(sim, name):
         motion = motion()
         early = motion.done
         motion.wait(60.0)
+        sim.sleep(0.1)    # poses come at 50 Hz, the end of a motion at its step
         end = robot.pose.next()
         say(what, early, motion.done, motion.state, motion.reason or "-", math.hypot(end.x - begin.x, end.y - begin.y),
             math.remainder(end.heading - begin.heading, 2 * math.pi))

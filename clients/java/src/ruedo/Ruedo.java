@@ -46,9 +46,8 @@ public final class Ruedo {
         try {
             return new Simulation(server.url, options.name, options.timeout, server);
         } catch (RuedoException.NoServer error) {
-            String said = server.ended();
             server.end();
-            throw new RuedoException.LaunchError(said != null ? said : error.getMessage());
+            throw new RuedoException.LaunchError(error.getMessage());    // with what the server said, when it ended
         } catch (RuntimeException error) {
             server.end();
             throw error;
