@@ -198,10 +198,22 @@ struct Packet {
     last = lane;
   }
 
+  // Without AVX, Embree looks at all lanes, in other groups: a ray that ends before it starts.
+  void blank(int lane) {
+    add(lane, Vec3::Zero(), Vec3::UnitX(), 0.0, 0.0);
+    rays.ray.tfar[lane] = -1.0f;
+    valid[lane] = 0;
+    --active;
+  }
+
   // Casts what was added; a lone ray goes singly, which is faster and gives the same.
   void cast(RTCScene scene, EmbreeContext& context) {
     if (active == 0) return;
-    if (active > 1) return intersect(scene, context, valid, rays);
+    if (active > 1) {
+      for (int lane = 0; active < kLanes && lane < kLanes; ++lane)
+        if (!valid[lane]) blank(lane);
+      return intersect(scene, context, valid, rays);
+    }
     const RTCRay8& r = rays.ray;
     RTCRayHit one;
     one.ray = {r.org_x[last], r.org_y[last], r.org_z[last], 0.0f,     r.dir_x[last],   r.dir_y[last],

@@ -14,6 +14,7 @@
 
 namespace ruedo::scene {
 
+// A ray that is none (not finite, a direction that is no unit vector within 0.1 %) hits nothing.
 struct Ray {
   Vec3 origin = Vec3::Zero();         // m, world
   Vec3 direction = Vec3::UnitX();     // unit, world

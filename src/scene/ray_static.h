@@ -84,14 +84,17 @@ class StaticRayScene {
   bool has_meshes_ = false;
 };
 
+// Embree's limit on coordinates is 1.8e18.
+inline constexpr double kFarthest = 1e15;    // m
+
 // Is there a ray at all? Others hit nothing.
 inline bool usable(const Ray& ray) {
-  return ray.origin.allFinite() && ray.direction.allFinite() && ray.direction != Vec3::Zero() && ray.max_range >= 0.0;
+  return ray.origin.cwiseAbs().maxCoeff() <= kFarthest && ray.origin.allFinite() && ray.max_range >= 0.0 &&
+         std::abs(ray.direction.squaredNorm() - 1.0) <= 1e-3;
 }
 
-// Embree's limit on coordinates, with room to spare.
 inline bool fits_tree(const Box& box) {
-  return !box.empty() && box.lower.minCoeff() > -1e15 && box.upper.maxCoeff() < 1e15;
+  return !box.empty() && box.lower.minCoeff() > -kFarthest && box.upper.maxCoeff() < kFarthest;
 }
 
 std::unique_ptr<RayScene> make_reference_ray_scene(std::shared_ptr<const StaticRayScene> statics);

@@ -169,6 +169,8 @@ TEST(RayScene, BadRaysHitNothing) {
   rays.push_back({{-5, 0, 0}, {1, 0, 0}, nan});
   rays.push_back({{-5, 0, 0}, {1, 0, 0}, -1.0});
   rays.push_back({{-5, 0, 0}, {0, 0, 0}});
+  rays.push_back({{-5, 0, 0}, {1e200, 0, 0}});
+  rays.push_back({{-1e200, 0, 0}, {1, 0, 0}});
   rays.push_back({{-5, 0, 0}, {1, 0, 0}});    // a good one among them
   std::vector<Hit> hits(rays.size());
   scenes.fast->cast(rays, hits);
@@ -214,6 +216,47 @@ TEST(RayScene, WheelsTurn) {
     const Hit hit = scene->cast({{-2, 0, 0}, Vec3::UnitX()});
     EXPECT_NEAR(hit.range, 1.5, 1e-12);
     EXPECT_NEAR((hit.normal + Vec3::UnitX()).norm(), 0.0, 1e-12);
+  }
+}
+
+// A bar that turns about its middle, 1 m ahead of its link's origin, and a cube fixed to it, whose link is turned left by
+// a right angle. The wheel's quarter turn about y takes what is above the axis ahead of it.
+TEST(RayScene, WheelsTurnAboutTheirAxisWhereverTheirLinksAre) {
+  World world;
+  world.add({}, {{at({1, 0, 0}), geometry(Shape::box, {0.1, 0.1, 1.0})}}, false);
+  auto model = std::make_shared<model::Model>(*world.model.models[0].model);
+  model::Link cap;
+  cap.name = "cap";
+  cap.X_ML = {Quat(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ())), Vec3(1, 0, 0)};
+  cap.collisions.emplace_back();
+  cap.collisions[0].X_LC = at({2, 0, 0.5});    // in the model: (1, 2, 0.5)
+  cap.collisions[0].geometry = geometry(Shape::box, {0.2, 0.2, 0.2});
+  model->links.push_back(cap);
+  model::Joint joint;
+  joint.type = model::JointType::fixed;
+  joint.parent = 0;
+  joint.child = 1;
+  model->joints.push_back(joint);
+  world.model.models[0].model = model;
+  model::BodyLayout layout(world.model);
+  ASSERT_EQ(layout.bodies.size(), 1u);
+  layout.links[0].wheel = layout.links[1].wheel = 0;
+  model::WheelPlacement wheel;
+  wheel.link = 0;
+  wheel.center_in_L = Vec3(1, 0, 0);
+  layout.wheels.push_back(wheel);
+  for (const Backend backend : {Backend::embree, Backend::reference}) {
+    const auto scene = make_ray_scene(make_static_ray_scene(world.model, layout, false, backend));
+    Snapshot snapshot;
+    snapshot.bodies.resize(1);
+    snapshot.wheel_angles = {0.0};
+    scene->update(snapshot);
+    EXPECT_NEAR(scene->cast({{-2, 0, 0}, Vec3::UnitX()}).range, 2.95, 1e-12);
+    EXPECT_NEAR(scene->cast({{-2, 2, 0.5}, Vec3::UnitX()}).range, 2.9, 1e-12);
+    snapshot.wheel_angles = {M_PI / 2};
+    scene->update(snapshot);
+    EXPECT_NEAR(scene->cast({{-2, 0, 0}, Vec3::UnitX()}).range, 2.5, 1e-12);
+    EXPECT_NEAR(scene->cast({{-2, 2, 0}, Vec3::UnitX()}).range, 3.4, 1e-12);
   }
 }
 
