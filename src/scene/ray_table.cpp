@@ -28,15 +28,15 @@ Quat turned_to(const Vec3& n) {
   return Quat(1.0 + n.z(), -n.y(), n.x(), 0.0).normalized();
 }
 
-// Does turning about that axis of the link leave the shape as it is?
-bool round_about(const RayShape& shape, const Pose& X_LS, const Vec3& axis_in_L) {
-  const auto on_axis = [&](const Vec3& p) { return p.cross(axis_in_L).norm() <= 1e-9; };
-  if (!on_axis(X_LS.translation)) return false;
+// Does turning about the axis through that point of the link leave the shape as it is?
+bool round_about(const RayShape& shape, const Pose& X_LS, const Vec3& center_in_L, const Vec3& axis_in_L) {
+  const auto along_axis = [&](const Vec3& v) { return v.cross(axis_in_L).norm() <= 1e-9; };
+  if (!along_axis(X_LS.translation - center_in_L)) return false;
   switch (shape.kind) {
     case Shape::sphere: return true;
     case Shape::cylinder:
     case Shape::capsule:
-    case Shape::cone: return on_axis(X_LS.rotation * Vec3::UnitZ());
+    case Shape::cone: return along_axis(X_LS.rotation * Vec3::UnitZ());
     default: return false;
   }
 }
@@ -116,14 +116,17 @@ void RayTable::add(const model::LinkPlacement& link, int link_index, int shape_i
     shape.radius = 0.5 * (shape.box_F.upper - shape.box_F.lower).norm();
   }
   if (link.wheel >= 0 && shape.kind != Shape::plane) {
-    const Vec3 axis_in_L = layout.wheels[static_cast<size_t>(link.wheel)].axis_in_L.normalized();
-    if (!round_about(shape, X_LS, axis_in_L)) {
+    // Parts fixed to the wheel's own link turn about the same axis, seen from their frame.
+    const model::WheelPlacement& wheel = layout.wheels[static_cast<size_t>(link.wheel)];
+    const Pose X_LWheel = X_FL.inverse() * layout.links[static_cast<size_t>(wheel.link)].X_BL;
+    const Vec3 axis_in_L = (X_LWheel.rotation * wheel.axis_in_L).normalized(), center_in_L = X_LWheel * wheel.center_in_L;
+    if (!round_about(shape, X_LS, center_in_L, axis_in_L)) {
       shape.turning = static_cast<int>(turning.size());
-      turning.push_back({link.wheel, X_FL, X_LS, axis_in_L});
+      turning.push_back({link.wheel, X_FL, X_LS, axis_in_L, center_in_L});
       // The ball around all it sweeps: about the point of the axis that is nearest to its centre.
       const Vec3 axis_in_F = X_FL.rotation * axis_in_L;
-      const Vec3 arm = shape.center_F - X_FL.translation;
-      const Vec3 on_axis = X_FL.translation + axis_in_F * axis_in_F.dot(arm);
+      const Vec3 center_in_F = X_FL * center_in_L;
+      const Vec3 on_axis = center_in_F + axis_in_F * axis_in_F.dot(shape.center_F - center_in_F);
       shape.radius += (shape.center_F - on_axis).norm();
       shape.center_F = on_axis;
       shape.box_F.add(on_axis - Vec3::Constant(shape.radius));

@@ -46,9 +46,11 @@ struct TurningShape {
   int wheel = -1;                // index into BodyLayout::wheels
   Pose X_FL, X_LS;               // at angle 0
   Vec3 axis_in_L = Vec3::UnitY();
+  Vec3 center_in_L = Vec3::Zero();    // a point on the axis
 
   IntoShape at(double angle_rad) const {
-    return IntoShape(X_FL * Pose{Quat(Eigen::AngleAxisd(angle_rad, axis_in_L)), Vec3::Zero()} * X_LS);
+    const Quat turn(Eigen::AngleAxisd(angle_rad, axis_in_L));
+    return IntoShape(X_FL * Pose{turn, center_in_L - turn * center_in_L} * X_LS);
   }
 };
 

@@ -189,20 +189,10 @@ Affine compose(const Affine& a, const Affine& b) {
   return m;
 }
 
-Pose link_pose(const model::WorldModel& world, const model::BodyLayout& layout, const Snapshot& snapshot, size_t link) {
+Pose link_pose(const model::BodyLayout& layout, const Snapshot& snapshot, size_t link) {
   const model::LinkPlacement& placement = layout.links[link];
   if (placement.body < 0) return placement.X_BL;
-  Pose X_WL = snapshot.bodies[static_cast<size_t>(placement.body)] * placement.X_BL;
-  if (placement.wheel >= 0) {
-    const model::WheelPlacement& wheel = layout.wheels[static_cast<size_t>(placement.wheel)];
-    const model::Model& model = *world.models[static_cast<size_t>(placement.instance)].model;
-    const Quat turn(Eigen::AngleAxisd(snapshot.wheel_angles[static_cast<size_t>(placement.wheel)], wheel.axis_in_L));
-    // The axis goes through the joint's origin, which need not be the link's.
-    const Vec3 p_LJ = model.links[static_cast<size_t>(placement.link)].X_ML.inverse() *
-                      model.joints[static_cast<size_t>(wheel.joint)].X_MJ.translation;
-    X_WL = X_WL * Pose{turn, p_LJ - turn * p_LJ};
-  }
-  return X_WL;
+  return snapshot.bodies[static_cast<size_t>(placement.body)] * layout.link_in_body(static_cast<int>(link), snapshot.wheel_angles);
 }
 
 RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLayout& layout) {

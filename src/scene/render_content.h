@@ -74,6 +74,6 @@ struct RenderContent {
 };
 
 // Where a link is in a snapshot, its wheel's turning included.
-Pose link_pose(const model::WorldModel& world, const model::BodyLayout& layout, const Snapshot& snapshot, size_t link);
+Pose link_pose(const model::BodyLayout& layout, const Snapshot& snapshot, size_t link);
 
 }  // namespace ruedo::scene

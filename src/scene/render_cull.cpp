@@ -40,8 +40,8 @@ Region view_region(const View& view) {
   return region;
 }
 
-Culler::Culler(const model::WorldModel& world, const model::BodyLayout& layout, const RenderContent& content)
-    : world_(world), layout_(layout), content_(content), rank_(content.batches.size()), M_WL_(layout.links.size()) {
+Culler::Culler(const model::BodyLayout& layout, const RenderContent& content)
+    : layout_(layout), content_(content), rank_(content.batches.size()), M_WL_(layout.links.size()) {
   for (size_t i = 0; i < layout.links.size(); ++i) {
     const bool is_static = layout.links[i].body < 0;
     if (is_static) M_WL_[i] = to_affine(layout.links[i].X_BL);
@@ -62,7 +62,7 @@ Culler::Culler(const model::WorldModel& world, const model::BodyLayout& layout, 
 
 void Culler::update(const Snapshot& snapshot) {
   for (size_t i = 0; i < layout_.links.size(); ++i) {
-    if (layout_.links[i].body >= 0) M_WL_[i] = to_affine(scene::link_pose(world_, layout_, snapshot, i));
+    if (layout_.links[i].body >= 0) M_WL_[i] = to_affine(scene::link_pose(layout_, snapshot, i));
   }
 }
 

@@ -54,7 +54,7 @@ enum class Movers { only_static, only_moving };
 class Culler {
  public:
   // All must outlive it.
-  Culler(const model::WorldModel& world, const model::BodyLayout& layout, const RenderContent& content);
+  Culler(const model::BodyLayout& layout, const RenderContent& content);
 
   void update(const Snapshot& snapshot);
   const Affine& link_pose(size_t link) const { return M_WL_[link]; }
@@ -74,7 +74,6 @@ class Culler {
   };
   void append(std::vector<Item>& items, const Vec3& origin, std::vector<Run>& runs, std::vector<Instance>& instances) const;
 
-  const model::WorldModel& world_;
   const model::BodyLayout& layout_;
   const RenderContent& content_;
   std::vector<int> rank_;          // of a batch: the drawing order

@@ -56,7 +56,7 @@ Matrix4 clip_from_world(const View& v) {
 class GlRenderer : public Renderer {
  public:
   GlRenderer(const model::WorldModel& world, const model::BodyLayout& layout)
-      : content_(world, layout), culler_(world, layout, content_), lights_(world, content_),
+      : content_(world, layout), culler_(layout, content_), lights_(world, content_),
         device_(make_gl_context(), content_, lights_.counts()) {
     description_ = device_.description();
     device_.context().release();

@@ -129,6 +129,48 @@ TEST(RenderScene, PlacesInThePicture) {
   EXPECT_NEAR(v / n, view.cy + view.fy * 0.5 / 4.0, 0.6);
 }
 
+// A bar that turns about its middle, 3 m ahead of its link's origin, and a cube fixed to it, whose link is turned left by
+// a right angle. The quarter turn about y takes what is above the axis ahead of it.
+TEST(RenderScene, WheelsTurnAboutTheirAxisWhereverTheirLinksAre) {
+  World w;
+  w.box("wheel", {0, 0, 0}, {0.1, 0.1, 1.6}, kRed, false).X_LV.translation = Vec3(3, 0, 1);
+  auto model = std::make_shared<model::Model>(*w.world.models[0].model);
+  model->links.emplace_back();
+  model::Link& cap = model->links.back();
+  cap.name = "cap";
+  cap.X_ML = {Quat(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ())), Vec3(3, 0, 1)};
+  World::show(cap, Shape::box, {0.2, 0.2, 0.2}, kGreen).X_LV.translation = Vec3(1, 0, 0.5);    // in the model: (3, 1, 1.5)
+  model::Joint joint;
+  joint.type = model::JointType::fixed;
+  joint.parent = 0;
+  joint.child = 1;
+  model->joints.push_back(joint);
+  w.world.models[0].model = model;
+  model::BodyLayout layout(w.world);
+  layout.links[0].wheel = layout.links[1].wheel = 0;
+  model::WheelPlacement wheel;
+  wheel.link = 0;
+  wheel.center_in_L = Vec3(3, 0, 1);
+  layout.wheels.push_back(wheel);
+  Snapshot snapshot = start(layout);
+  const View view = ahead();
+  const auto renderer = make_renderer(w.world, layout);
+  const auto depth_of = [&](const Vec3& p) {    // of what is seen in the direction of that point
+    Picture picture;
+    picture.want_depth = true;
+    renderer->draw(snapshot, view, picture);
+    const int u = static_cast<int>(std::lround(view.cx - view.fx * p.y() / p.x()));
+    const int v = static_cast<int>(std::lround(view.cy - view.fy * (p.z() - 1) / p.x()));
+    return picture.depth[at(view, u, v)];
+  };
+  EXPECT_NEAR(depth_of({2.95, 0, 1.6}), 2.95, 1e-5);
+  EXPECT_NEAR(depth_of({2.9, 1, 1.5}), 2.9, 1e-5);
+  snapshot.wheel_angles[0] = M_PI / 2;
+  EXPECT_EQ(depth_of({2.95, 0, 1.6}), std::numeric_limits<float>::infinity());
+  EXPECT_NEAR(depth_of({2.2, 0, 1.0}), 2.2, 1e-5);
+  EXPECT_NEAR(depth_of({3.4, 1, 1.0}), 3.4, 1e-5);
+}
+
 TEST(RenderScene, AnOddPictureIsCentredOnWholePixels) {
   // A wall's vertical edge at y = 0 falls between the pixel left of cx and the one right of it, exactly.
   World w;
