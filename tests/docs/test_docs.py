@@ -1,7 +1,8 @@
-"""The documentation's commands, run as they stand: every fenced block that begins with ```sh test.
+"""The documentation's examples, run as they stand: every fenced block that begins with ```sh test or ```python test.
 
-A block runs under bash -eu in an empty folder that has the tree's worlds/ and clients/ in it, the built ruedo in the path and a
-network of its own, so that nothing leaves the machine and documents can be tested side by side. Links to files are followed, too.
+A block runs in an empty folder that has the tree's worlds/ and clients/ in it, the built ruedo in the path and a network of its
+own, so that nothing leaves the machine. Commands run under bash -eu; a Python program finds a server with worlds/arena.sdf,
+and goes to pytest when it is a test. Links to files are followed, too.
 """
 import os
 import re
@@ -18,10 +19,18 @@ TIMEOUT_S = 120
 NETWORK = "ip link set lo up; ip route add 224.0.0.0/4 dev lo; "
 
 
+# Serves the arena until the program ends, which begins once the server answers.
+SERVED = """ruedo run worlds/arena.sdf --quiet & server=$!
+trap 'kill $server; wait $server || true' EXIT
+until python -c 'import ruedo; ruedo.connect().close()'; do kill -0 $server; done
+python block.py
+"""
+
+
 def blocks(text):
-    """(line number, commands) of each tested block."""
-    for match in re.finditer(r"^```sh test\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
-        yield text.count("\n", 0, match.start()) + 1, match.group(1)
+    """(line number, language, content) of each tested block."""
+    for match in re.finditer(r"^```(sh|python) test\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
+        yield text.count("\n", 0, match.start()) + 1, match.group(1), match.group(2)
 
 
 def isolated():
@@ -33,30 +42,35 @@ def isolated():
     return []
 
 
-def run_block(commands, folder):
+def run_block(language, content, folder):
     for name in ("worlds", "clients", "docs"):
         (folder / name).symlink_to(ROOT / name)
-    environment = {**os.environ, "PATH": f"{BINARIES}:{ROOT / '.venv/bin'}:{os.environ['PATH']}", "RUEDO_SOURCE": str(ROOT)}
-    return subprocess.run([*isolated(), "bash", "-euo", "pipefail", "-c", commands], cwd=folder, env=environment, text=True,
+    if language == "python":
+        (folder / "block.py").write_text(content, encoding="utf-8")
+        content = "python -m pytest -q block.py" if "def test_" in content else SERVED
+    environment = {**os.environ, "PATH": f"{BINARIES}:{ROOT / '.venv/bin'}:{os.environ['PATH']}",
+                   "PYTHONPATH": str(BINARIES.parent / "python")}
+    return subprocess.run([*isolated(), "bash", "-euo", "pipefail", "-c", content], cwd=folder, env=environment, text=True,
                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=TIMEOUT_S)
 
 
-CASES = [pytest.param(commands, id=f"{document.name}:{line}") for document in DOCUMENTS if document.exists()
-         for line, commands in blocks(document.read_text(encoding="utf-8"))]
+CASES = [pytest.param(language, content, id=f"{document.name}:{line}") for document in DOCUMENTS if document.exists()
+         for line, language, content in blocks(document.read_text(encoding="utf-8"))]
 
 
-@pytest.mark.parametrize("commands", CASES)
-def test_commands_of_the_documentation(commands, tmp_path):
+@pytest.mark.parametrize("language, content", CASES)
+def test_examples_of_the_documentation(language, content, tmp_path):
     if not isolated():
         pytest.skip("no network namespaces here (unshare -n and -rn are refused)")
     assert (BINARIES / "ruedo").exists(), f"build it first: {BINARIES}/ruedo"
-    result = run_block(commands, tmp_path)
-    assert result.returncode == 0, f"{commands}\n{result.stdout}"
+    result = run_block(language, content, tmp_path)
+    assert result.returncode == 0, f"{content}\n{result.stdout}"
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda d: d.name)
 def test_links_lead_somewhere(document):
-    for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", document.read_text(encoding="utf-8")):
+    prose = re.sub(r"^```.*?^```", "", document.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", prose):
         if "://" not in target:
             assert (document.parent / target).exists(), f"{document.name}: {target}"
 
@@ -70,10 +84,14 @@ def test_packages_of_the_scripts_are_listed():
 
 
 def test_a_failing_block_is_seen(tmp_path):
-    assert run_block("true | false\ntrue\n", tmp_path).returncode != 0
+    assert run_block("sh", "true | false\ntrue\n", tmp_path).returncode != 0
+
+
+def test_a_failing_test_is_seen(tmp_path):
+    assert run_block("python", "def test_it():\n    assert False\n", tmp_path).returncode != 0
 
 
 def test_blocks_are_found():
     text = "a\n```sh test\nls x\n```\nb\n```sh\nnot this\n```\n"
-    assert list(blocks(text)) == [(2, "ls x\n")]
+    assert list(blocks(text)) == [(2, "sh", "ls x\n")]
     assert shutil.which("bash")
