@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string_view>
 
 namespace ruedo {
@@ -28,6 +29,8 @@ class RandomStream {
   // Normal with mean 0 and sigma 1, by the inverse of the normal distribution (Wichura's AS 241): one
   // uniform gives one value, with no state between draws.
   double gaussian();
+  // The same values as a call of gaussian() for each; many at once cost less.
+  void gaussians(std::span<double> values);
 
  private:
   uint64_t key_;

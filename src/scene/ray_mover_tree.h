@@ -1,7 +1,7 @@
 // The tree over the boxes of the movers: a binary tree of our own in double precision, because it is brought up to date
 // in a twentieth of the time that Embree takes (which builds user geometry anew, whatever quality is asked for).
 //
-// What it gives does not depend on its shape: every box that a ray meets is visited.
+// What it gives does not depend on its shape: every mover whose box a ray meets is visited.
 #pragma once
 
 #include <vector>
@@ -17,9 +17,13 @@ class MoverTree {
   Box& box(size_t mover) { return boxes_[mover]; }
   void refit();    // after boxes were changed
 
-  // Calls visit(mover, lanes) with the lanes (bits) that meet the mover's box before t[lane], which visit may lessen.
+  // Calls visit(mover, lanes, beam) for the movers whose boxes meet `beam`, the box around the pieces of these lanes
+  // (bits) up to t that lie within the box of all movers. Whether a lane meets the mover's own box is left to meeting().
   template <class Visit>
   void visit(unsigned lanes, const FrameRays& rays, const double* t, Visit visit) const;
+
+  // The lanes (bits) that meet the mover's box before t[lane].
+  unsigned meeting(size_t mover, unsigned lanes, const FrameRays& rays, const double* t) const;
 
  private:
   // In depth-first order: the first child of node i is i + 1.
@@ -41,19 +45,26 @@ class MoverTree {
 template <class Visit>
 void MoverTree::visit(unsigned lanes, const FrameRays& rays, const double* t, Visit visit) const {
   if (nodes_.empty()) return;
-  // The box around the pieces of the rays within the root: rays of one packet run side by side.
+  // Rays of one packet run side by side.
+  const Box& root = nodes_[0].box;
   Box beam;
   unsigned within = 0;
   for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
     const int lane = std::countr_zero(rest);
+    const Vec3 &o = rays.o[lane], &d = rays.d[lane];
     double enter = 0.0, exit = t[lane];
-    if (!nodes_[0].box.clip(rays.o[lane], rays.d[lane], enter, exit)) continue;
-    beam.add(rays.o[lane] + enter * rays.d[lane]);
-    beam.add(rays.o[lane] + exit * rays.d[lane]);
+    Vec3 begin = o, end = o + exit * d;
+    if (!root.contains(begin) || !root.contains(end)) {
+      if (!root.clip(o, d, enter, exit)) continue;
+      begin = o + enter * d;
+      end = o + exit * d;
+    }
+    beam.add(begin);
+    beam.add(end);
     within |= 1u << lane;
   }
   if (within == 0) return;
-  beam.grow(nodes_[0].box.rounding());
+  beam.grow(root.rounding());
   int stack[64];    // a tree of median splits is as deep as the binary logarithm of its leaves
   int depth = 0;
   stack[depth++] = 0;
@@ -61,19 +72,25 @@ void MoverTree::visit(unsigned lanes, const FrameRays& rays, const double* t, Vi
     const int index = stack[--depth];
     const Node& node = nodes_[static_cast<size_t>(index)];
     if (!node.box.overlaps(beam)) continue;
-    if (node.second >= 0) {
-      stack[depth++] = node.second;
-      stack[depth++] = index + 1;
+    if (node.second < 0) {
+      visit(static_cast<size_t>(node.mover), within, beam);
       continue;
     }
-    unsigned meeting = 0;
-    for (unsigned rest = within; rest != 0; rest &= rest - 1) {
-      const int lane = std::countr_zero(rest);
-      double enter = 0.0, exit = t[lane];
-      if (node.box.clip(rays.o[lane], rays.d[lane], enter, exit)) meeting |= 1u << lane;
-    }
-    if (meeting) visit(static_cast<size_t>(node.mover), meeting);
+    stack[depth++] = node.second;
+    stack[depth++] = index + 1;
   }
+}
+
+inline unsigned MoverTree::meeting(size_t mover, unsigned lanes, const FrameRays& rays, const double* t) const {
+  Box box = boxes_[mover];
+  box.grow(box.rounding());
+  unsigned meeting = 0;
+  for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
+    const int lane = std::countr_zero(rest);
+    double enter = 0.0, exit = t[lane];
+    if (box.clip(rays.o[lane], rays.d[lane], enter, exit)) meeting |= 1u << lane;
+  }
+  return meeting;
 }
 
 }  // namespace ruedo::scene

@@ -24,7 +24,10 @@ class EmbreeRayScene : public RayScene {
     bool there = false;             // false: its pose is not finite
   };
 
-  void test_mover(const Mover& mover, unsigned lanes, RayBatch& batch) const;
+  static void into_body(const Mover& mover, unsigned lanes, const FrameRays& world, FrameRays& body);
+  void test_near(int index, unsigned lanes, const FrameRays& body, RayBatch& batch) const;
+  void test_unbounded(const Mover& mover, unsigned lanes, RayBatch& batch) const;
+  void test_bounded(size_t bounded, unsigned lanes, const Box& beam, RayBatch& batch) const;
   void cast_batch(unsigned lanes, TreeQuery& query) const;
   void write(const RayBatch& batch, int lane, Hit& hit) const;
 
@@ -87,34 +90,62 @@ void EmbreeRayScene::update(const Snapshot& snapshot) {
   tree_.refit();
 }
 
-void EmbreeRayScene::test_mover(const Mover& mover, unsigned lanes, RayBatch& batch) const {
-  if (!mover.there) return;
-  FrameRays body;
+void EmbreeRayScene::into_body(const Mover& mover, unsigned lanes, const FrameRays& world, FrameRays& body) {
   for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
     const int lane = std::countr_zero(rest);
-    body.o[lane] = mover.into.point(batch.world.o[lane]);
-    body.d[lane] = mover.into.vector(batch.world.d[lane]);
+    body.o[lane] = mover.into.point(world.o[lane]);
+    body.d[lane] = mover.into.vector(world.d[lane]);
   }
+}
+
+void EmbreeRayScene::test_near(int index, unsigned lanes, const FrameRays& body, RayBatch& batch) const {
+  const RayShape& shape = statics_->table.shapes[static_cast<size_t>(index)];
+  unsigned near = lanes;
+  if (shape.kind != model::Shape::plane) {
+    near = 0;
+    for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
+      const int lane = std::countr_zero(rest);
+      if (near_ball(shape, body.o[lane], body.d[lane])) near |= 1u << lane;
+    }
+  }
+  const IntoShape& into = shape.turning < 0 ? shape.into : turning_[static_cast<size_t>(shape.turning)];
+  if (near) test_shape(shape, index, into, near, body, batch);
+}
+
+void EmbreeRayScene::test_unbounded(const Mover& mover, unsigned lanes, RayBatch& batch) const {
+  if (!mover.there) return;
+  FrameRays body;
+  into_body(mover, lanes, batch.world, body);
+  for (const int index : statics_->table.bodies[static_cast<size_t>(mover.body)]) test_near(index, lanes, body, batch);
+}
+
+// Most packets that come near a mover start on it and pass over its wheels: the beam's box in the body's frame says so
+// for all lanes at once, before any ray is turned into that frame.
+void EmbreeRayScene::test_bounded(size_t bounded, unsigned lanes, const Box& beam, RayBatch& batch) const {
+  const Mover& mover = bounded_[bounded];
+  const Vec3 center = mover.into.point(0.5 * (beam.lower + beam.upper));
+  const Vec3 half = mover.into.rotation.cwiseAbs() * (0.5 * (beam.upper - beam.lower));
+  const Box beam_B{center - half, center + half};
+  FrameRays body;
+  bool turned = false;
   for (const int index : statics_->table.bodies[static_cast<size_t>(mover.body)]) {
     const RayShape& shape = statics_->table.shapes[static_cast<size_t>(index)];
-    unsigned near = lanes;
-    if (shape.kind != model::Shape::plane) {
-      near = 0;
-      for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
-        const int lane = std::countr_zero(rest);
-        if (near_ball(shape, body.o[lane], body.d[lane])) near |= 1u << lane;
-      }
+    if (shape.link == batch.ignored_link || !shape.box_F.overlaps(beam_B)) continue;
+    if (!turned) {
+      turned = true;
+      lanes = tree_.meeting(bounded, lanes, batch.world, batch.t);
+      if (!lanes) return;
+      into_body(mover, lanes, batch.world, body);
     }
-    const IntoShape& into = shape.turning < 0 ? shape.into : turning_[static_cast<size_t>(shape.turning)];
-    if (near) test_shape(shape, index, into, near, body, batch);
+    test_near(index, lanes, body, batch);
   }
 }
 
 void EmbreeRayScene::cast_batch(unsigned lanes, TreeQuery& query) const {
   statics_->cast(lanes, query);
-  for (const Mover& mover : unbounded_) test_mover(mover, lanes, query.batch);
+  for (const Mover& mover : unbounded_) test_unbounded(mover, lanes, query.batch);
   tree_.visit(lanes, query.batch.world, query.batch.t,
-              [&](size_t mover, unsigned near) { test_mover(bounded_[mover], near, query.batch); });
+              [&](size_t mover, unsigned within, const Box& beam) { test_bounded(mover, within, beam, query.batch); });
 }
 
 void EmbreeRayScene::cast(std::span<const Ray> rays, std::span<Hit> hits, int ignored_link) const {

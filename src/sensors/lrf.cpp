@@ -101,9 +101,11 @@ class Lrf : public Sensor {
     const double dt_s = sampled_ ? 1e-6 * static_cast<double>(input.snapshot.time - sample_time_) : 0.0;
     sampled_ = true;
     sample_time_ = input.snapshot.time;
+    const bool drawn = !noise_.none() && !noise_.wanders();    // one draw a ray, all at once
+    if (drawn) stream.gaussians(draws_);
     for (size_t i = 0; i < rays_.size(); ++i) {
       const Return back = returned(*input.rays, rays_[i], hits_[i]);
-      const double measured = noise_.apply(back.range, i == 0 ? dt_s : 0.0, stream);
+      const double measured = drawn ? noise_.apply_draw(back.range, draws_[i]) : noise_.apply(back.range, i == 0 ? dt_s : 0.0, stream);
       ranges()[i] = report(back.range, measured);
       if (intensities_) brightness()[i] = std::isfinite(ranges()[i]) ? static_cast<float>(back.intensity) : 0.0f;
     }
@@ -155,6 +157,7 @@ class Lrf : public Sensor {
     const size_t n = directions_.size();
     rays_.resize(n);
     hits_.resize(n);
+    draws_.resize(n);
     for (Ray& ray : rays_) ray.max_range = max_;
     ranges().resize(n);
     if (intensities_) brightness().resize(n);
@@ -187,6 +190,7 @@ class Lrf : public Sensor {
   void aim(const Snapshot& now, RandomStream& stream) {
     Pose X_WS = mount_.X_WS(now);
     Eigen::Matrix3d R_WS = X_WS.rotation.toRotationMatrix();
+    if (bearing_noise_ > 0.0) stream.gaussians(draws_);
     for (size_t i = 0; i < rays_.size(); ++i) {
       const auto column = static_cast<int64_t>(i) % columns_.count, layer = static_cast<int64_t>(i) / columns_.count;
       if (sweep_us_ > 0 && columns_.count > 1) {
@@ -195,7 +199,7 @@ class Lrf : public Sensor {
       }
       rays_[i].origin = X_WS.translation;
       if (bearing_noise_ > 0.0) {
-        rays_[i].direction = R_WS * direction(layer, columns_.angle(column) + bearing_noise_ * stream.gaussian());
+        rays_[i].direction = R_WS * direction(layer, columns_.angle(column) + bearing_noise_ * draws_[i]);
       } else {
         rays_[i].direction = R_WS * directions_[i];
       }
@@ -258,6 +262,7 @@ class Lrf : public Sensor {
   std::vector<Vec3> directions_;    // in S, layer by layer
   std::vector<Ray> rays_;
   std::vector<Hit> hits_;
+  std::vector<double> draws_;       // of the bearings, then of the ranges
   planar_lidar_t planar_{};
   lidar_t layered_{};
 };

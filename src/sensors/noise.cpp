@@ -58,8 +58,7 @@ double Noise::apply(double ideal, double dt_s, RandomStream& stream) {
     }
     walk_ = decay_ * walk_ + drive_ * stream.gaussian();
   }
-  value += bias_ + walk_;
-  return quantized_ ? std::round(value / precision_) * precision_ : value;
+  return rounded(value + (bias_ + walk_));
 }
 
 }  // namespace ruedo

@@ -8,6 +8,8 @@
 // with s^2 = sigma^2 dt.
 #pragma once
 
+#include <cmath>
+
 #include "ruedo/element.h"
 #include "ruedo/random.h"
 
@@ -29,6 +31,7 @@ class Noise {
 
   bool none() const { return none_; }
   double stddev() const { return stddev_; }
+  bool wanders() const { return walk_stddev_ > 0.0; }
 
   // Draws the constant bias; once, from the device's stream kConstantDraws. Without it the bias is its mean.
   void draw_bias(RandomStream& constants);
@@ -37,7 +40,12 @@ class Noise {
   // Gaussian, and a second one where the bias wanders; none() draws nothing and returns `ideal` itself.
   double apply(double ideal, double dt_s, RandomStream& stream);
 
+  // The same with the draw given, for noise that is there and does not wander.
+  double apply_draw(double ideal, double gaussian) const { return rounded(ideal + mean_ + stddev_ * gaussian + (bias_ + walk_)); }
+
  private:
+  double rounded(double value) const { return quantized_ ? std::round(value / precision_) * precision_ : value; }
+
   bool none_ = true;
   bool quantized_ = false;
   double mean_ = 0.0, stddev_ = 0.0;

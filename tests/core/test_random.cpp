@@ -80,6 +80,20 @@ TEST(NormalQuantile, IsOddAboutOneHalf) {
   for (double p = 0x1p-12; p < 0.5; p += 0x1p-12) EXPECT_EQ(normal_quantile(p), -normal_quantile(1.0 - p)) << p;
 }
 
+// Many at once are the same draws, wherever in the stream they begin and end; the stream goes on as if nothing was.
+TEST(RandomStream, ManyGaussiansAreTheSameOneByOne) {
+  for (const int before : {0, 1, 2, 3, 4, 5}) {
+    for (const size_t count : {0u, 1u, 2u, 3u, 31u, 32u, 33u, 64u, 181u, 1000u}) {
+      RandomStream singly(0x1234567890abcdefu, ~uint64_t{6}), many(0x1234567890abcdefu, ~uint64_t{6});
+      for (int i = 0; i < before; ++i) EXPECT_EQ(singly.bits(), many.bits());
+      std::vector<double> draws(count);
+      many.gaussians(draws);
+      for (size_t i = 0; i < count; ++i) ASSERT_EQ(singly.gaussian(), draws[i]) << before << " bits before, draw " << i << " of " << count;
+      EXPECT_EQ(singly.bits(), many.bits());
+    }
+  }
+}
+
 // Kolmogorov-Smirnov against the normal distribution, and the first four moments.
 TEST(RandomStream, GaussianIsNormal) {
   constexpr int kDraws = 100000;
