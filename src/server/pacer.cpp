@@ -29,7 +29,7 @@ int Pacer::wait(int64_t step, int limit) {
       changed_.wait(lock);
       continue;
     }
-    int64_t count = std::min<int64_t>(limit, until_ - step + 1);
+    int64_t count = std::min<int64_t>(limit - 1, until_ - step) + 1;    // until_ may be the largest number there is
     if (std::isfinite(rate_) && !paused_) {    // single steps are taken at once
       const Clock::time_point now = Clock::now();
       const Clock::time_point due_now = due(step);

@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include "ruedo/applied_t.hpp"
+#include "ruedo/motion_status_t.hpp"
 #include "ruedo/request_t.hpp"
 #include "server/log_header.h"
 #include "server/version.h"
@@ -185,6 +186,7 @@ void Server::publish_step(const Batch& batch, const Snapshot& snapshot) {
   status_.step = step;
   status_.time_us = snapshot.time;
   if (tick) {
+    tell_watchdogs(snapshot);
     for (const Session& session : control_.sessions().list()) tick_.add_applied(session.client, session.last_sequence);
     tick_.finish([this](const tick_t& part) { send(own_.tick, part); });
     next_tick_ = tick_clock_.step_of(++ticks_);
@@ -192,6 +194,17 @@ void Server::publish_step(const Batch& batch, const Snapshot& snapshot) {
   if (step == next_info_) {
     publish_info();
     next_info_ = info_clock_.step_of(++infos_);
+  }
+}
+
+void Server::tell_watchdogs(const Snapshot& snapshot) {
+  watchdog_told_.resize(snapshot.robots.size(), false);
+  for (size_t i = 0; i < snapshot.robots.size(); ++i) {
+    if (snapshot.robots[i].motion.reason != motion_status_t::REASON_WATCHDOG || watchdog_told_[i]) continue;
+    watchdog_told_[i] = true;
+    const model::ModelInstance& robot = world_->models[static_cast<size_t>(simulation_->layout().robots[i].instance)];
+    spdlog::warn("{} was stopped by its watchdog: no command came for {:g} s of sim time. A velocity or wheel command "
+                 "wants repeating (this is said once)", robot.name, static_cast<double>(robot.model->drive->watchdog_us) * 1e-6);
   }
 }
 

@@ -74,6 +74,7 @@ class Server {
   void listen();
   void publish(const Batch& batch);
   void publish_step(const Batch& batch, const Snapshot& snapshot);
+  void tell_watchdogs(const Snapshot& snapshot);    // on the terminal, once a robot
   void record_applied(const Batch& batch, int64_t step);
   void publish_info();
   void check_log() const;
@@ -115,6 +116,7 @@ class Server {
   std::vector<int64_t> sequences_;             // messages on each channel in this epoch
   TickWriter tick_;
   std::vector<uint8_t> buffer_;
+  std::vector<bool> watchdog_told_;            // of each robot
   const Snapshot* latest_ = nullptr;           // newest published state
   Status status_;
   std::function<void(const Status&)> on_status_;
