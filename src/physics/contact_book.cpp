@@ -13,11 +13,10 @@ namespace {
 // The contacts of several substeps are one where they are so near each other.
 constexpr double kSamePlace_m = 5e-3;
 
-int link_of(const ObjectInfo& info, int child) {
-  if (info.body < 0 || child < 0 || static_cast<size_t>(child) >= info.links.size()) {
-    return info.links.empty() ? -1 : info.links.front();
-  }
-  return info.links[static_cast<size_t>(child)];
+// The entry of a child shape in one of ObjectInfo's lists; Bullet says no child for what is a single shape.
+int entry_of(const ObjectInfo& info, const std::vector<int>& list, int child) {
+  if (info.body < 0 || child < 0 || static_cast<size_t>(child) >= list.size()) return list.empty() ? -1 : list.front();
+  return list[static_cast<size_t>(child)];
 }
 
 bool earlier(const Contact& a, const Contact& b) {
@@ -30,6 +29,7 @@ bool earlier(const Contact& a, const Contact& b) {
 Contact swapped(const Contact& contact) {
   Contact other = contact;
   std::swap(other.link_a, other.link_b);
+  std::swap(other.shape_a, other.shape_b);
   std::swap(other.body_a, other.body_b);
   other.normal = -contact.normal;
   return other;
@@ -76,8 +76,10 @@ void ContactBook::add(btDispatcher& dispatcher, int substeps) {
       Contact contact;
       contact.body_a = a.body;
       contact.body_b = b.body;
-      contact.link_a = link_of(a, point.m_index0);
-      contact.link_b = link_of(b, point.m_index1);
+      contact.link_a = entry_of(a, a.links, point.m_index0);
+      contact.link_b = entry_of(b, b.links, point.m_index1);
+      contact.shape_a = entry_of(a, a.collisions, point.m_index0);
+      contact.shape_b = entry_of(b, b.collisions, point.m_index1);
       contact.position = from_bt(point.getPositionWorldOnB());
       contact.normal = from_bt(point.m_normalWorldOnB);
       contact.depth = -point.getDistance();

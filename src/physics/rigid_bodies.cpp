@@ -97,7 +97,9 @@ void RigidBodies::make_statics(const model::WorldModel& world, const model::Body
     const auto& placement = layout.links[index];
     if (placement.body >= 0) continue;
     const auto& model = *world.models[static_cast<size_t>(placement.instance)].model;
-    for (const auto& collision : model.links[static_cast<size_t>(placement.link)].collisions) {
+    const auto& collisions = model.links[static_cast<size_t>(placement.link)].collisions;
+    for (size_t c = 0; c < collisions.size(); ++c) {
+      const auto& collision = collisions[c];
       btCollisionShape* shape = shapes_.fixed(collision.geometry);
       if (!shape) continue;
       auto object = std::make_unique<StaticObject>();
@@ -111,6 +113,7 @@ void RigidBodies::make_statics(const model::WorldModel& world, const model::Body
       object->info.instance = placement.instance;
       object->info.plane = collision.geometry.shape == model::Shape::plane;
       object->info.links.push_back(static_cast<int>(index));
+      object->info.collisions.push_back(static_cast<int>(c));
       bullet.setUserPointer(&object->info);
       statics.push_back(std::move(object));
     }
@@ -147,7 +150,8 @@ void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLay
     const model::Link& link = model.links[static_cast<size_t>(link_placement.link)];
     gravity |= link.gravity;
     kinematic |= link.kinematic;
-    for (const auto& collision : link.collisions) {
+    for (size_t c = 0; c < link.collisions.size(); ++c) {
+      const auto& collision = link.collisions[c];
       shapes.clear();
       if (wheel >= 0 && collision.geometry.shape == model::Shape::cylinder) {
         shapes.push_back(shapes_.tyre(collision.geometry.size.x(), collision.geometry.size.y()));
@@ -161,6 +165,7 @@ void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLay
       for (btCollisionShape* shape : shapes) {
         body.compound->addChildShape(to_bt(X_IC), shape);
         body.info.links.push_back(link_index);
+        body.info.collisions.push_back(static_cast<int>(c));
       }
       if (!shapes.empty() && !surface) surface = &collision.surface;
     }

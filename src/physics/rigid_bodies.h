@@ -20,6 +20,7 @@ struct ObjectInfo {
   bool on_plane = false;           // held up by a plane without a contact pair
   bool moved = false;              // kinematic: moved from outside, never by contacts
   std::vector<int> links;          // of each child shape; one entry for a single shape
+  std::vector<int> collisions;     // of each child shape, in its link
   std::vector<int> joined;         // bodies that a joint ties to this one
 };
 

@@ -276,6 +276,27 @@ TEST(Physics, AStaticMeshCarriesAtItsExactHeight) {
   EXPECT_NEAR(w.physics.pose(1).translation.z(), 1.3, 1e-3);
 }
 
+TEST(Physics, ContactsNameTheShapesThatTouch) {
+  const auto two_boxes = [](const std::string& name, double height) {
+    const std::string z = std::to_string(height);
+    const std::string rest = " 0 0 0 0 0</pose><geometry>" + kBox + "</geometry></collision>";
+    return "<model name='" + name + "'><pose>0 0 " + z + " 0 0 0</pose>" + (height > 0 ? "" : "<static>true</static>") +
+           "<link name='l'><inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></inertial>"
+           "<collision name='left'><pose>-0.5" + rest + "<collision name='right'><pose>0.5" + rest + "</link></model>";
+  };
+  World w(two_boxes("below", 0) + two_boxes("above", 0.21));
+  w.run(0.5);
+  int left = 0, right = 0;
+  for (const Contact& contact : w.physics.contacts(w.body("above/l"))) {
+    const int expected = contact.position.x() < 0 ? 0 : 1;
+    EXPECT_EQ(contact.shape_a, expected);
+    EXPECT_EQ(contact.shape_b, expected);
+    ++(expected == 0 ? left : right);
+  }
+  EXPECT_GT(left, 0);
+  EXPECT_GT(right, 0);
+}
+
 TEST(Physics, ContactsComeInAFixedOrder) {
   std::string models = kPlane;
   for (int i = 0; i < 20; ++i) models += thing("b" + std::to_string(i), std::to_string(i % 5 * 0.25) + " " + std::to_string(i / 5 * 0.25) + " 0.1 0 0 0", kBox, 1);
