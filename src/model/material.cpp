@@ -64,7 +64,10 @@ std::optional<OgreMaterial> read_ogre_script(const std::string& script, const st
       std::string name;
       words >> name;
       if (const size_t brace = name.find('{'); brace != std::string::npos) name.resize(brace);
-      if (name == wanted) result.emplace();
+      if (name == wanted) {
+        result.emplace();
+        result->material.diffuse = {1, 1, 1, 1};    // OGRE's default, which leaves a texture as it is
+      }
     } else if (result && word == "pass") {
       ++passes;
     } else if (result && passes <= 1) {
@@ -131,10 +134,7 @@ std::optional<Material> scripted_material(const Element& script, const std::stri
         if (!texture && fs::is_regular_file(candidate, error)) texture = candidate.string();
       }
       if (!texture) texture = context.resources.find_texture(found->texture, script.source.file);
-      if (texture) {
-        found->material.texture = std::make_shared<Texture>(Texture{*texture, {}});
-        found->material.diffuse = {1, 1, 1, 1};
-      }
+      if (texture) found->material.texture = std::make_shared<Texture>(Texture{*texture, {}});
     }
     return found->material;
   }

@@ -89,6 +89,17 @@ std::string tidy(const std::string& path) {
   return text;
 }
 
+// The name that a ROS package's manifest gives; "" when there is none that can be read.
+std::string package_name(const fs::path& folder) {
+  const fs::path manifest = folder / "package.xml";
+  if (!is_there(manifest)) return "";
+  try {
+    return parse_document(read_text_file(manifest.string(), 1 << 20), manifest.string())->string("name", "");
+  } catch (const InputError&) {
+    return "";
+  }
+}
+
 }  // namespace
 
 std::string shipped_worlds() {
@@ -139,18 +150,26 @@ bool ResourceFinder::allowed(const std::string& path, const std::string& from) c
   return false;
 }
 
-// ROS packages may live in a folder of another name: an ancestor whose package.xml has the name counts too.
+// ROS packages may live in a folder of another name: one whose package.xml has the name counts too, be it above the
+// naming file, a folder that is searched, or in one.
 std::optional<std::string> ResourceFinder::in_package(const std::string& package, const std::string& rest,
                                                       const std::string& from) const {
   for (fs::path folder = fs::path(from).parent_path(); folder.has_relative_path(); folder = folder.parent_path()) {
-    const fs::path manifest = folder / "package.xml";
-    if (!is_there(manifest)) continue;
-    try {
-      const auto root = parse_document(read_text_file(manifest.string(), 1 << 20), manifest.string());
-      if (root->string("name", "") == package && is_there(folder / rest)) return full_path(folder / rest);
-    } catch (const InputError&) {
-      // A manifest that cannot be read names no package.
+    if (is_there(folder / rest) && package_name(folder) == package) return full_path(folder / rest);
+  }
+  for (const auto& root : roots_for(from)) {
+    const auto [at, inserted] = packages_.try_emplace(root);
+    if (inserted) {
+      std::vector<fs::path> folders{root};
+      std::error_code error;
+      for (const auto& entry : fs::directory_iterator(root, error)) folders.push_back(entry.path());
+      std::sort(folders.begin() + 1, folders.end());
+      for (const auto& folder : folders) {
+        if (const std::string name = package_name(folder); !name.empty()) at->second.emplace(name, folder.string());
+      }
     }
+    const auto folder = at->second.find(package);
+    if (folder != at->second.end() && is_there(fs::path(folder->second) / rest)) return full_path(fs::path(folder->second) / rest);
   }
   return std::nullopt;
 }

@@ -2,6 +2,7 @@
 // paths. Nothing is ever fetched from a network, and no address leads out of the folders that are searched.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 
 namespace ruedo::model {
 
+// Not for several threads at once.
 class ResourceFinder {
  public:
   // `top_file` is the file on the command line; its folder, the `models` folder in and beside it are searched
@@ -33,6 +35,7 @@ class ResourceFinder {
 
   std::vector<std::string> near_, far_;    // folders searched before and after those of the naming file
   bool allow_absolute_;
+  mutable std::map<std::string, std::map<std::string, std::string>> packages_;    // in each folder: by name, once looked for
 };
 
 // The folder of the worlds and robots that come with Ruedo; "" when there is none.

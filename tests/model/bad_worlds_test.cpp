@@ -238,7 +238,7 @@ TEST(BadFiles, IncludesThatMultiplyAreRefused) {
 TEST(BadFiles, TextFromElsewhereReadsNoFileOutsideTheSearchPath) {
   TemporaryFolder folder;
   const std::string secret = folder.write("secret/model.sdf", "<sdf version='1.9'><model name='secret'><link name='l'/></model></sdf>");
-  for (const std::string uri : {secret, "file://" + secret, std::string("model://../secret"), std::string("../secret/model.sdf")}) {
+  for (const std::string& uri : {secret, "file://" + secret, std::string("model://../secret"), std::string("../secret/model.sdf")}) {
     const auto world = load_world_text("<sdf version='1.9'><world name='w'><include><uri>" + uri + "</uri></include></world></sdf>", "/nowhere/in/world.sdf");
     EXPECT_TRUE(world->models.empty()) << uri;
     ASSERT_EQ(world->findings.size(), 1u) << uri;

@@ -99,6 +99,44 @@ TEST(Includes, OverridesAndNames) {
   EXPECT_EQ(world->files_read.size(), 2u);
 }
 
+// The mast's frame is 1 m ahead of the cart's and turned left by a right angle: its sensor is 1.2 m ahead, looking left.
+TEST(Includes, MergedModelsBringTheirSensors) {
+  TemporaryFolder folder;
+  folder.write("models/mast/model.sdf",
+               "<sdf version='1.9'><model name='mast'><link name='pole'><pose>0 -0.2 0.5 0 0 0</pose><sensor name='LRF' type='lidar'><pose>0 0 0.1 0 0 0</pose>"
+               "<update_rate>7</update_rate></sensor></link></model></sdf>");
+  const auto world = load_world(folder.write("w.sdf",
+      "<sdf version='1.9'><world name='w'><model name='cart'><link name='base'/><include merge='true'><uri>model://mast</uri>"
+      "<pose>1 0 0 0 0 1.5707963267948966</pose></include><joint name='j' type='fixed'><parent>base</parent><child>pole</child></joint></model></world></sdf>"));
+  const Model& cart = *world->models.at(0).model;
+  ASSERT_EQ(cart.sensors.size(), 1u);
+  const SensorDescription& lrf = cart.sensors[0];
+  EXPECT_EQ(lrf.name, "LRF");
+  EXPECT_EQ(lrf.element->string("update_rate", ""), "7");
+  const Link& pole = cart.links[static_cast<size_t>(lrf.link)];
+  EXPECT_EQ(pole.name, "pole");
+  const Pose X_MS = pole.X_ML * lrf.X_LS;
+  EXPECT_LT((X_MS.translation - Vec3(1.2, 0, 0.6)).norm(), 1e-12);
+  EXPECT_NEAR(heading(X_MS.rotation), M_PI / 2, 1e-12);
+  EXPECT_EQ(BodyLayout(*world).bodies.size(), 1u);
+  EXPECT_TRUE(texts(*world).empty());
+}
+
+TEST(Includes, PackagesGoByTheirManifests) {
+  TemporaryFolder folder;
+  folder.write("models/somebodys-checkout/package.xml", "<package format='2'><name>cart_description</name></package>");
+  folder.write("models/somebodys-checkout/sdf/cart.sdf", "<sdf version='1.9'><model name='cart'><link name='l'/></model></sdf>");
+  folder.write("models/broken/package.xml", "<package><name>cart_desc");
+  const auto world = load_world(folder.write("w.sdf",
+      "<sdf version='1.9'><world name='w'><include><uri>package://cart_description/sdf/cart.sdf</uri></include>"
+      "<include><uri>model://cart_description/sdf/cart.sdf</uri><name>second</name></include>"
+      "<include><uri>package://cart_description/sdf/none.sdf</uri></include><include><uri>package://cart_desc/sdf/cart.sdf</uri></include></world></sdf>"));
+  ASSERT_EQ(world->models.size(), 2u);
+  EXPECT_EQ(world->models[0].model, world->models[1].model);
+  EXPECT_EQ(texts(*world), (std::vector<std::string>{"'package://cart_description/sdf/none.sdf' is not found; the world goes on without it",
+                                                     "'package://cart_desc/sdf/cart.sdf' is not found; the world goes on without it"}));
+}
+
 TEST(Includes, AThousandShareOneModel) {
   TemporaryFolder folder;
   folder.write("robot.sdf", "<sdf version='1.9'>" + cart(std::string(kDrive) + "</ruedo:drive>") + "</sdf>");
@@ -173,6 +211,65 @@ TEST(Scene, LightsMaterialsAndSurfaces) {
   EXPECT_EQ(link.collisions[0].surface.restitution, 0.3);
   EXPECT_EQ(link.collisions[0].surface.laser_reflectance, 0.5);
   EXPECT_EQ(link.visuals.at(0).material->diffuse, (Rgba{1, 0, 0, 0.5f}));
+}
+
+TEST(Scene, LightsOfLinksAreInTheirLinksFrames) {
+  const auto world = world_of(
+      "<model name='m'><pose>10 0 0 0 0 0</pose><link name='l'><pose>0 0 1 0 0 0</pose><light name='lamp' type='point'><pose>0.5 0 0.25 0 0 0</pose>"
+      "<diffuse>1 0.5 0 1</diffuse><attenuation><range>3</range></attenuation></light></link></model>");
+  EXPECT_TRUE(world->lights.empty());
+  const Link& link = link_of(*world->models.at(0).model, "l");
+  ASSERT_EQ(link.lights.size(), 1u);
+  EXPECT_EQ(link.lights[0].name, "lamp");
+  EXPECT_EQ(link.lights[0].type, Light::Type::point);
+  EXPECT_EQ(link.lights[0].pose.translation, Vec3(0.5, 0, 0.25));
+  EXPECT_EQ(link.lights[0].diffuse, (Rgba{1, 0.5f, 0, 1}));
+  EXPECT_EQ(link.lights[0].range, 3);
+  EXPECT_TRUE(texts(*world).empty());
+}
+
+TEST(Scene, OgreScriptsGiveColourAndTexture) {
+  TemporaryFolder folder;
+  folder.write("models/crate/materials/scripts/crate.material",
+               "// two materials, one a prefix of the other\nmaterial Crate/Side2\n{\n technique\n {\n  pass\n  {\n   diffuse 1 0 0\n  }\n }\n}\n"
+               "material Crate/Side\n{\n technique\n {\n  pass\n  {\n   ambient 0.1 0.2 0.3\n   diffuse 0.25 0.5 0.75 1.0\n"
+               "   specular 0.5 0.5 0.5 1.0 12\n   texture_unit\n   {\n    texture planks.png\n   }\n  }\n }\n}\n");
+  folder.write("models/crate/materials/textures/planks.png", "not decoded here");
+  folder.write("models/crate/model.sdf",
+               "<sdf version='1.6'><model name='crate'><link name='l'><visual name='v'><geometry><box><size>1 1 1</size></box></geometry><material><script>"
+               "<uri>model://crate/materials/scripts</uri><uri>model://crate/materials/textures</uri><name>Crate/Side</name></script></material></visual></link></model></sdf>");
+  const auto world = load_world(folder.write("w.sdf", "<sdf version='1.6'><world name='w'><include><uri>model://crate</uri></include></world></sdf>"));
+  const Visual& visual = world->models.at(0).model->links[0].visuals.at(0);
+  ASSERT_TRUE(visual.material);
+  EXPECT_EQ(visual.material->diffuse, (Rgba{0.25f, 0.5f, 0.75f, 1}));
+  EXPECT_EQ(visual.material->ambient, (Rgba{0.1f, 0.2f, 0.3f, 1}));
+  EXPECT_FLOAT_EQ(visual.material->shininess, 12);
+  ASSERT_TRUE(visual.material->texture);
+  EXPECT_EQ(visual.material->texture->path, folder / "models/crate/materials/textures/planks.png");
+  EXPECT_TRUE(texts(*world).empty());
+}
+
+// Three by three heights of which the middle one is full: a pyramid of 2 m on a square of 4 m.
+TEST(Scene, HeightmapsStandAtTheirPlaces) {
+  TemporaryFolder folder;
+  folder.write("hill.pgm", std::string("P5\n3 3\n255\n") + std::string("\0\0\0\0\xff\0\0\0\0", 9));
+  const auto world = load_world(folder.write("w.sdf",
+      "<sdf version='1.9'><world name='w'><model name='m'><static>true</static><link name='l'><collision name='c'><geometry><heightmap><uri>hill.pgm</uri>"
+      "<size>4 4 2</size><pos>1 0 0</pos></heightmap></geometry></collision></link></model></world></sdf>"));
+  const Link& link = world->models.at(0).model->links[0];
+  ASSERT_EQ(link.collisions.size(), 1u);
+  const Geometry& hill = link.collisions[0].geometry;
+  ASSERT_TRUE(hill.mesh);
+  Eigen::AlignedBox3d box;
+  Vec3 top = Vec3::Zero();
+  for (const Eigen::Vector3f& p : hill.mesh->positions) {
+    const Vec3 p_L = link.collisions[0].X_LC * Vec3(p.cast<double>().cwiseProduct(hill.scale));
+    box.extend(p_L);
+    if (p_L.z() > top.z()) top = p_L;
+  }
+  EXPECT_LT((box.min() - Vec3(-1, -2, 0)).norm(), 1e-6);
+  EXPECT_LT((box.max() - Vec3(3, 2, 2)).norm(), 1e-6);
+  EXPECT_LT((top - Vec3(1, 0, 2)).norm(), 1e-6);
 }
 
 TEST(Scene, ActorsWalkAsCylinders) {
