@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <set>
+#include <string_view>
 
 #include <gnu/libc-version.h>
 #include <link.h>
@@ -12,6 +13,19 @@
 #include "server/version.h"
 
 namespace ruedo::server {
+namespace {
+
+// Libraries that compute what goes into messages: arithmetic, physics, rays, pictures, readers of files. Others are
+// loaded as the machine and the options have it, and change nothing.
+constexpr std::string_view kThatMatter[] = {"libc.so",      "libm.so",   "libstdc++", "libBullet", "libLinearMath",
+                                            "libembree",    "libOSMesa", "libEGL",    "libLLVM",   "libgallium",
+                                            "libopencv_im", "libjpeg",   "libassimp", "libtinyxml2", "liburdfdom"};
+
+bool matters(std::string_view name) {
+  return std::any_of(std::begin(kThatMatter), std::end(kThatMatter), [&](std::string_view start) { return name.starts_with(start); });
+}
+
+}  // namespace
 
 std::string cpu_features() {
 #if defined(__x86_64__) || defined(__i386__)
@@ -33,15 +47,14 @@ std::string cpu_features() {
 
 std::string libc_version() { return std::string("glibc ") + gnu_get_libc_version(); }
 
-std::vector<std::string> loaded_libraries() {
+std::vector<std::string> libraries_that_matter() {
   std::set<std::string> names;
   dl_iterate_phdr(
       [](dl_phdr_info* info, size_t, void* data) {
         std::error_code error;
         const std::filesystem::path path = std::filesystem::canonical(info->dlpi_name, error);
-        if (!error && path.filename().string().find(".so") != std::string::npos) {
-          static_cast<std::set<std::string>*>(data)->insert(path.filename().string());
-        }
+        const std::string name = path.filename().string();
+        if (!error && matters(name)) static_cast<std::set<std::string>*>(data)->insert(name);
         return 0;
       },
       &names);
@@ -62,7 +75,7 @@ log_header_t make_log_header(const model::WorldModel& world, uint64_t seed, cons
   header.nfiles = static_cast<int32_t>(header.files.size());
   header.cpu = cpu_features();
   header.libc = libc_version();
-  header.libraries = loaded_libraries();
+  header.libraries = libraries_that_matter();
   header.nlibraries = static_cast<int32_t>(header.libraries.size());
   return header;
 }

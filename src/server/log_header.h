@@ -12,8 +12,8 @@ namespace ruedo::server {
 // The vector extensions of this CPU that glibc or the renderer choose code by.
 std::string cpu_features();
 std::string libc_version();
-// The shared libraries of this process by file name with version, sorted.
-std::vector<std::string> loaded_libraries();
+// Those shared libraries of this process that compute what goes into messages, by file name with version, sorted.
+std::vector<std::string> libraries_that_matter();
 
 // options: those that change the result, as on the command line.
 log_header_t make_log_header(const model::WorldModel& world, uint64_t seed, const std::vector<std::string>& options);

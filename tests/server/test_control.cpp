@@ -287,7 +287,7 @@ TEST_F(ControlTest, SurvivesHostileMessages) {
   bus_.send("", {});
   bus_.send("r/joint_command", with_bytes(joints, 20, {0x7f, 0xff, 0xff, 0xff}));
   // Values that are none are refused by the robot; its last good command stays.
-  for (const double bad : {std::nan(""), INFINITY, -INFINITY}) {
+  for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
     velocity_command_t command = good;
     command.vx = bad;
     bus_.send("r/velocity", encoded(command));

@@ -1,7 +1,5 @@
 // The order of messages, sample counts over an hour, slow sinks, and allocations in the steady state.
 #include <atomic>
-#include <cstdlib>
-#include <new>
 
 #include <gtest/gtest.h>
 
@@ -11,18 +9,8 @@
 #include "ruedo/tick_t.hpp"
 #include "ruedo/world_info_t.hpp"
 #include "ruedo/world_state_t.hpp"
+#include "counting_new.h"
 #include "running.h"
-
-namespace {
-std::atomic<uint64_t> g_allocations{0};
-}
-void* operator new(size_t size) {
-  ++g_allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, size_t) noexcept { std::free(memory); }
 
 namespace ruedo::server {
 namespace {
@@ -131,8 +119,8 @@ TEST(Schedule, SteadyStateAllocatesNothing) {
   bus.on_publish = [&](const std::string& channel) {
     if (channel != "ruedo/world") return;
     ++worlds;    // 30 a second
-    if (worlds == 301) at_start = g_allocations;
-    if (worlds == 451) at_end = g_allocations;    // 5 s, 1000 steps later
+    if (worlds == 301) at_start = allocations();
+    if (worlds == 451) at_end = allocations();    // 5 s, 1000 steps later
   };
   ServerOptions options = fast(20.0);
   options.control = false;

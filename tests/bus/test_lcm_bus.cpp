@@ -1,0 +1,89 @@
+// Addresses, channel patterns, and the bus on memq. What needs the network is tested in tests/cli, in a namespace.
+#include "bus/lcm_bus.h"
+
+#include <condition_variable>
+#include <mutex>
+#include <regex>
+
+#include <gtest/gtest.h>
+
+#include "ruedo/errors.h"
+
+namespace ruedo::bus {
+namespace {
+
+TEST(LcmUrl, DefaultsAndOptions) {
+  const LcmUrl url = parse_url("udpm://239.1.2.3:7777?recv_buf_size=100");
+  EXPECT_EQ(url.host, "239.1.2.3");
+  EXPECT_EQ(url.port, 7777);
+  EXPECT_EQ(url.str(), "udpm://239.1.2.3:7777?recv_buf_size=100&ttl=0");    // nothing leaves unless asked to
+  EXPECT_EQ(url.option("recv_buf_size", ""), "100");
+  EXPECT_EQ(url.option("nothing", "x"), "x");
+  EXPECT_EQ(parse_url("udpm://").str(), "udpm://239.255.76.67:7667?ttl=0");
+  EXPECT_EQ(parse_url("udpm://239.255.76.67:7667?ttl=1").str(), "udpm://239.255.76.67:7667?ttl=1");
+  EXPECT_EQ(parse_url("memq://").str(), "memq://");
+}
+
+TEST(LcmUrl, RefusesWithAnExample) {
+  for (const char* text : {"foo", "http://x", "udpm://1.2.3.4:7667", "udpm://239.255.76.67:0", "udpm://239.255.76.67:99999",
+                           "udpm://239.255.76.67:7667x", "udpm://host:7667"}) {
+    try {
+      parse_url(text);
+      ADD_FAILURE() << text;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("udpm://239.255.76.67:7667"), std::string::npos) << error.what();
+    }
+  }
+}
+
+TEST(ChannelPatterns, OneForNamesThatCountUp) {
+  std::vector<std::string> names;
+  for (int i = 0; i < 1000; ++i) names.push_back("r" + std::to_string(i) + "/velocity");
+  names.push_back("odd.name/move");
+  const std::vector<std::string> patterns = channel_patterns(names);
+  ASSERT_EQ(patterns.size(), 2u);
+  for (const std::string& name : names) {
+    bool matched = false;
+    for (const std::string& pattern : patterns) matched |= std::regex_match(name, std::regex(pattern));
+    EXPECT_TRUE(matched) << name;
+  }
+  for (const std::string& pattern : patterns) EXPECT_FALSE(std::regex_match("oddxname/move", std::regex(pattern)));
+}
+
+TEST(LcmBus, HearsItsChannelsOnly) {
+  LcmBus bus("memq://");
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<std::pair<std::string, std::vector<uint8_t>>> heard;
+  bus.listen({"r1/velocity", "r2/move"}, [&](const std::string& channel, const uint8_t* data, size_t size) {
+    {
+      std::lock_guard lock(mutex);
+      heard.push_back({channel, {data, data + size}});
+    }
+    changed.notify_all();
+  });
+  const uint8_t bytes[] = {7, 8, 9};
+  bus.publish("r3/velocity", bytes, 3);    // matches the pattern, is not in the list
+  bus.publish("other", bytes, 3);
+  bus.publish("r1/velocity", bytes, 3);
+  bus.publish("r2/move", bytes, 0);
+  std::unique_lock lock(mutex);
+  changed.wait(lock, [&] { return heard.size() == 2; });
+  EXPECT_EQ(heard[0].first, "r1/velocity");
+  EXPECT_EQ(heard[0].second, (std::vector<uint8_t>{7, 8, 9}));
+  EXPECT_EQ(heard[1].first, "r2/move");
+  EXPECT_EQ(bus.failed(), 0u);
+}
+
+TEST(LcmBus, StopsAtOnce) {
+  LcmBus bus("memq://");
+  int count = 0;
+  bus.listen({"a"}, [&](const std::string&, const uint8_t*, size_t) { ++count; });
+  bus.stop();
+  const uint8_t byte = 0;
+  bus.publish("a", &byte, 1);
+  EXPECT_EQ(count, 0);
+}
+
+}  // namespace
+}  // namespace ruedo::bus

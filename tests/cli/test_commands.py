@@ -1,0 +1,187 @@
+"""The program as its users start it: exit codes, messages, signals, logs, and the bus."""
+import json
+import os
+import select
+import signal
+import subprocess
+from pathlib import Path
+
+import lcm
+import pytest
+
+RUEDO = os.environ["RUEDO"]
+WORLDS = Path(os.environ["RUEDO_SOURCE_DIR"]) / "worlds"
+ARENA = str(WORLDS / "arena.sdf")
+QUICK = ["--disable", "p3at/camera", "--quiet"]
+
+
+def url(port):
+    return f"udpm://239.255.76.67:{port}?ttl=0"
+
+
+def ruedo(*arguments, **options):
+    return subprocess.run([RUEDO, *arguments], capture_output=True, text=True, timeout=60, **options)
+
+
+def one_line(text):
+    return text.strip().count("\n") == 0 and text.startswith("ruedo: ")
+
+
+@pytest.mark.parametrize(
+    "arguments, code, words",
+    [
+        (["rn"], 2, "did you mean 'run'"),
+        (["run"], 2, "WORLD"),
+        (["run", ARENA, "--spwan", "x"], 2, "did you mean '--spawn'"),
+        (["run", ARENA, "--rate", "-1"], 2, "or max"),
+        (["run", ARENA, "--rate", "fast"], 2, "or max"),
+        (["run", ARENA, "--duration", "x"], 2, "seconds"),
+        (["run", ARENA, "--lcm", "foo"], 2, "udpm://"),
+        (["run", ARENA, "--spawn", "p3at"], 2, "MODEL[:NAME]@X,Y[,YAW]"),
+        (["run", ARENA, "--spawn", "p3at@1"], 2, "MODEL[:NAME]@X,Y[,YAW]"),
+        (["run", ARENA, "--set", "p3at.rate=1"], 2, "ROBOT/DEVICE.KEY=VALUE"),
+        (["run", ARENA, "--disable", "camera"], 2, "ROBOT/DEVICE"),
+        (["run", ARENA, "--remap", "p3at/lrff=LASER"], 2, "did you mean 'p3at/lrf'"),
+        (["run", ARENA, "--remap", "p3at/lrf=" + "x" * 64], 2, "63"),
+        (["run", ARENA, "--remap", "p3at/lrf=p3at/pose"], 2, "p3at/pose"),
+        (["run", ARENA, "--control", "maybe"], 2, "control"),
+        (["run", "/nowhere.sdf"], 3, "/nowhere.sdf"),
+        (["run", ARENA, "--record", "/nowhere/at.all"], 4, "/nowhere/at.all"),
+        (["check", "/nowhere.sdf"], 3, ""),
+    ],
+)
+def test_says_what_is_wrong(arguments, code, words):
+    result = ruedo(*arguments)
+    assert result.returncode == code, result.stderr
+    assert words in result.stderr
+
+
+def test_version_and_help():
+    assert ruedo("--version").stdout.startswith("ruedo ")
+    text = ruedo("--help").stdout
+    for command in ("run", "check", "info", "doctor"):
+        assert f"  {command} " in text
+
+
+def test_no_route_is_one_line_with_its_cure():
+    result = subprocess.run(["unshare", "-rn", RUEDO, "run", ARENA], capture_output=True, text=True, timeout=5)
+    if "unshare" in result.stderr:
+        pytest.skip("no network namespaces here")
+    assert result.returncode == 4
+    assert one_line(result.stderr) and "ip route add" in result.stderr
+    result = subprocess.run(["unshare", "-rn", RUEDO, "doctor"], capture_output=True, text=True, timeout=5)
+    assert result.returncode == 4
+    faults = [line for line in result.stdout.splitlines() if line.startswith("FAULT")]
+    assert len(faults) == 1 and "ip route add" in faults[0]
+
+
+def test_doctor_is_content_here():
+    result = ruedo("doctor", "--lcm", url(7801))
+    assert result.returncode == 0, result.stdout
+    assert "LCM 1.5.3" in result.stdout
+
+
+def test_info_as_json():
+    info = json.loads(ruedo("info", ARENA, "--json").stdout)
+    assert [robot["name"] for robot in info["robots"]] == ["p3at"]
+    channels = {channel["name"]: channel for channel in info["channels"]}
+    assert channels["p3at/lrf"]["type"] == "planar_lidar_t"
+    assert channels["p3at/lrf"]["fingerprint"] == "e3d17423180b5e8d"    # bot_core's
+    assert channels["p3at/odometry"]["rate"] == 50
+    assert channels["p3at/velocity"]["input"] is True
+    lrf = next(device for device in info["devices"] if device["name"] == "lrf")
+    assert lrf["width"] == 181 and abs(lrf["fov_horizontal"] - 3.14159265) < 1e-6
+
+
+def test_check_finds_all_with_lines(tmp_path):
+    world = tmp_path / "bad.sdf"
+    world.write_text(
+        """<?xml version="1.0"?>
+<sdf version="1.9">
+  <world name="w">
+    <include><uri>model://p3at</uri></include>
+    <model name="m"><link name="l">
+      <sensor name="s1" type="lidar"><lidar><scan><horizontal><samples>-1</samples></horizontal></scan></lidar></sensor>
+      <sensor name="s2" type="air_pressure"/>
+    </link></model>
+  </world>
+</sdf>
+"""
+    )
+    result = ruedo("check", str(world), "--json")
+    findings = json.loads(result.stdout)
+    assert result.returncode == 1
+    kinds = {(finding["kind"], finding["line"]) for finding in findings}
+    assert ("error", 6) in kinds and ("unsupported", 7) in kinds
+    result = ruedo("check", str(world))
+    assert f"{world}:6" in result.stdout and "samples" in result.stdout
+    assert ruedo("check", ARENA, "--strict").returncode == 0
+
+
+def events(path):
+    log = lcm.EventLog(str(path), "r")
+    return [(event.timestamp, event.channel, event.data) for event in log]
+
+
+def test_two_runs_write_the_same_bytes(tmp_path):
+    logs = [tmp_path / name for name in ("a", "b", "c")]
+    for log, threads in zip(logs, ("1", "2", "8")):
+        result = ruedo("run", ARENA, *QUICK, "--lcm", url(7802), "--rate", "max", "--duration", "5", "--record", str(log), "--threads", threads)
+        assert result.returncode == 0, result.stderr
+    assert logs[0].read_bytes() == logs[1].read_bytes() == logs[2].read_bytes()
+    assert events(logs[0])[0][1] == "ruedo/header"
+    other = tmp_path / "other"
+    ruedo("run", ARENA, *QUICK, "--lcm", url(7802), "--rate", "max", "--duration", "5", "--record", str(other), "--seed", "2")
+    assert other.read_bytes() != logs[0].read_bytes()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signals_end_it_cleanly(tmp_path, number):
+    log = tmp_path / "log"
+    with subprocess.Popen([RUEDO, "run", ARENA, "--disable", "p3at/camera", "--lcm", url(7803), "--record", str(log)], stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE, text=True) as process:
+        assert select.select([process.stdout], [], [], 30)[0]    # the channels: it runs
+        receiver = lcm.LCM(url(7803))
+        seen = []
+        receiver.subscribe("p3at/pose", lambda channel, data: seen.append(data))
+        while len(seen) < 10:
+            assert receiver.handle_timeout(5000) > 0
+        process.send_signal(number)
+        _, errors = process.communicate(timeout=10)
+    assert process.returncode == 0, errors
+    recorded = events(log)
+    assert len([1 for event in recorded if event[1] == "p3at/pose"]) >= 10
+    stamps = [event[0] for event in recorded]
+    assert stamps == sorted(stamps)
+    # The log is whole: it ends with its last event.
+    assert sum(28 + len(channel) + len(data) for _, channel, data in recorded) == log.stat().st_size
+
+
+def test_survives_a_flood_of_channel_names():
+    with subprocess.Popen([RUEDO, "run", ARENA, *QUICK, "--lcm", url(7804)], stderr=subprocess.PIPE, text=True) as process:
+        sender = lcm.LCM(url(7804))
+        seen = []
+        sender.subscribe("p3at/pose", lambda channel, data: seen.append(data))
+        while not seen:
+            assert sender.handle_timeout(20000) > 0
+
+        def resident_kb():
+            status = Path(f"/proc/{process.pid}/status").read_text()
+            return int(status.split("VmRSS:")[1].split()[0])
+
+        def flood(count, start):
+            for i in range(start, start + count):
+                sender.publish(f"unknown/{i:040x}", b"x" * 8)
+                if i % 200 == 0:
+                    sender.handle_timeout(1)
+
+        flood(20_000, 0)
+        before = resident_kb()
+        flood(60_000, 20_000)
+        assert resident_kb() < before + 16_000
+        seen.clear()
+        while len(seen) < 5:
+            assert sender.handle_timeout(5000) > 0
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=10)
+    assert process.returncode == 0

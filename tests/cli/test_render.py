@@ -1,0 +1,113 @@
+"""ruedo render: pictures of the right size that show something, and what it says of wrong options."""
+import os
+import struct
+import subprocess
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+RUEDO = os.environ["RUEDO"]
+ARENA = str(Path(os.environ["RUEDO_SOURCE_DIR"]) / "worlds/arena.sdf")
+
+
+def render(*arguments):
+    return subprocess.run([RUEDO, "render", *arguments], capture_output=True, text=True, timeout=120)
+
+
+def read_png(path):
+    """The pixels, rows x columns x RGB, of a PNG of 8 bits a colour that is not interlaced."""
+    data = Path(path).read_bytes()
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    at, packed = 8, b""
+    while at < len(data):
+        length, kind = struct.unpack(">I4s", data[at : at + 8])
+        body = data[at + 8 : at + 8 + length]
+        if kind == b"IHDR":
+            width, height, depth, colour, *_, interlaced = struct.unpack(">IIBBBBB", body)
+            assert (depth, colour, interlaced) == (8, 2, 0)
+        if kind == b"IDAT":
+            packed += body
+        at += 12 + length
+    lines = np.frombuffer(zlib.decompress(packed), np.uint8).reshape(height, 1 + 3 * width)
+    rows = np.zeros((height + 1, 3 * width + 3), int)    # a row above and a pixel to the left, both black
+    for y in range(height):
+        kind, above, row = lines[y, 0], rows[y], rows[y + 1]
+        for x in range(3 * width):
+            a, b, c = int(row[x]), int(above[x + 3]), int(above[x])
+            nearest = min((a, b, c), key=lambda v: abs(a + b - c - v))
+            row[x + 3] = (int(lines[y, x + 1]) + (0, a, b, (a + b) // 2, nearest)[kind]) % 256
+    return rows[1:, 3:].reshape(height, width, 3)
+
+
+def test_world_from_above_and_its_rays(tmp_path):
+    pictures = {}
+    for name, options in {"plain": [], "again": [], "rays": ["--rays"]}.items():
+        path = tmp_path / f"{name}.png"
+        result = render(ARENA, "--view", "top", "--size", "160x120", "-o", str(path), *options)
+        assert result.returncode == 0, result.stderr
+        assert result.stderr == ""
+        pictures[name] = read_png(path)
+        assert pictures[name].shape == (120, 160, 3)
+    assert len(np.unique(pictures["plain"].reshape(-1, 3), axis=0)) > 50
+    assert (pictures["plain"] == pictures["again"]).all()
+    changed = (pictures["plain"] != pictures["rays"]).any(axis=2)
+    # The laser's half disc and the cones cover much of the arena, and nothing outside.
+    assert 0.02 < changed.mean() < 0.7
+    red, green, blue = (pictures["rays"][changed] - pictures["plain"][changed]).mean(axis=0)
+    assert red > green + 10 and red > blue + 10
+
+
+def test_a_box_where_it_must_be(tmp_path):
+    # 2 m wide, its near face 4 m ahead of an eye that sees 0.9 rad across, on the picture's middle.
+    world = tmp_path / "box.sdf"
+    world.write_text(
+        """<sdf version="1.9"><world name="w"><scene><background>0 0 1 1</background><shadows>false</shadows></scene>
+  <model name="box"><static>true</static><pose>5 0 1 0 0 0</pose><link name="l"><visual name="v">
+    <geometry><box><size>2 2 2</size></box></geometry>
+    <material><diffuse>0 1 0 1</diffuse><ambient>0 1 0 1</ambient></material></visual></link></model>
+</world></sdf>"""
+    )
+    path = tmp_path / "box.png"
+    result = render(str(world), "--view", "0,0,1,0,0,0", "--size", "120x120", "-o", str(path))
+    assert result.returncode == 0, result.stderr
+    pixels = read_png(path)
+    green = (pixels[..., 1] > pixels[..., 2]) & (pixels[..., 1] > pixels[..., 0])
+    rows, columns = np.nonzero(green)
+    assert abs(rows.mean() - 59.5) < 1 and abs(columns.mean() - 59.5) < 1
+    side = rows.max() - rows.min() + 1
+    assert side == columns.max() - columns.min() + 1 and green.sum() == side * side
+    assert abs(side - 120 * (1 / 4) / np.tan(0.45)) < 1.5
+    assert (pixels[0, 0] == (0, 0, 255)).all()
+
+
+def test_picture_of_a_camera(tmp_path):
+    path = tmp_path / "camera.png"
+    result = render(ARENA, "--camera", "p3at/camera", "--size", "96x72", "-o", str(path))
+    assert result.returncode == 0, result.stderr
+    pixels = read_png(path)
+    assert pixels.shape == (72, 96, 3)
+    assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 20
+    sky, ground = pixels[0].mean(axis=0), pixels[-1].mean(axis=0)
+    assert sky[2] > sky[0] + 20 and ground[2] <= ground[0] + 5    # blue above, not below
+
+
+@pytest.mark.parametrize(
+    "arguments, code, words",
+    [
+        ([], 2, "--output"),
+        (["-o", "x.bmp"], 2, ".png"),
+        (["-o", "/nowhere/x.png"], 4, "/nowhere/x.png"),
+        (["-o", "x.png", "--camera", "p3at"], 2, "ROBOT/DEVICE"),
+        (["-o", "x.png", "--camera", "p3at/lrf"], 2, "--camera p3at/lrf: there is no such camera; there are: p3at/camera"),
+        (["-o", "x.png", "--camera", "p3at/camrea"], 2, "did you mean p3at/camera"),
+        (["-o", "x.png", "--camera", "p3at/camera", "--rays"], 2, "--rays"),
+        (["-o", "x.png", "--view", "below"], 2, "top, iso"),
+        (["-o", "x.png", "--size", "0x9"], 2, "WIDTHxHEIGHT"),
+    ],
+)
+def test_says_what_is_wrong(arguments, code, words):
+    result = render(ARENA, *arguments)
+    assert result.returncode == code, result.stderr
+    assert words in result.stderr
