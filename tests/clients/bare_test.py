@@ -115,6 +115,8 @@ def test_the_watchdog_stops_a_command_that_is_not_repeated():
         bare.bus.publish("p3at/velocity", command.encode())
         bare.until(lambda m: m.kind == m.KIND_VELOCITY and m.state == m.STATE_RUNNING)
         bare.until(lambda m: m.state == m.STATE_ENDED and m.reason == m.REASON_WATCHDOG)
+        end = bare.heard[-1].utime
+        bare.until(lambda m: m.utime > end + 300000)    # the terminal hears of it with the next tick, and not again
         output = server.end()
     assert output.count("watchdog") == 1, output    # said once on the terminal
 

@@ -10,7 +10,7 @@ from conftest import BUILD, HERE, SOURCE, ruedo_run
 from docs_code import blocks
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def server():
     with ruedo_run("--disable", "p3at/camera", world=str(HERE / "hall.sdf")) as server:
         yield server

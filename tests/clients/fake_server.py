@@ -53,6 +53,7 @@ def garbage(utime):
 def main():
     url, options = sys.argv[1], sys.argv[2:]
     bus = lcm.LCM(url)
+    print("up", flush=True)
     start, utime = time.monotonic(), 0
     while True:
         if utime % 200000 == 0:

@@ -9,7 +9,9 @@ from conftest import HERE, Server, free_url, probe
 
 def fake(*options):
     url = free_url()
-    return Server([sys.executable, str(HERE / "fake_server.py"), url, *options], url)
+    server = Server([sys.executable, str(HERE / "fake_server.py"), url, *options], url)
+    assert server.process.stdout.readline() == "up\n"    # a client waits 2 s, an interpreter may take longer to start
+    return server
 
 
 def test_no_server_is_said_within_two_seconds_with_the_url(language):
