@@ -14,7 +14,8 @@ struct Fleet {
   model::LoadOptions load;
 };
 
-// Two columns of walls among robots on a grid of 3 m, so that rays meet walls, robots and nothing.
+// Two columns of walls among robots on a grid of 3 m, so that rays meet walls, robots and nothing; circles of 1 m touch
+// nothing.
 Fleet fleet(int robots) {
   Fleet fleet;
   std::string sdf = "<sdf version='1.9'><world name='w'><physics type='bullet'><max_step_size>0.005</max_step_size></physics>"
@@ -71,7 +72,8 @@ TEST(Hundred, SameBytesForOneTwoAndEightThreads) {
   EXPECT_TRUE(one == log_of(robots, 8));
 }
 
-// operator new in 1 000 steps, counted between two messages that only the publisher sends.
+// operator new in 1 000 steps, counted between two messages that only the publisher sends. Nothing is touched: lists of
+// contacts grow when there are more of them than ever before.
 uint64_t allocations_in_thousand_steps(int robots) {
   const Fleet all = fleet(robots);
   MemoryBus bus;
