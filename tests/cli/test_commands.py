@@ -178,7 +178,7 @@ def test_survives_a_flood_of_channel_names():
         flood(20_000, 0)
         before = resident_kb()
         flood(60_000, 20_000)
-        assert resident_kb() < before + 16_000
+        assert resident_kb() < before + 4_000    # without renewal it would be 12 MB
         seen.clear()
         while len(seen) < 5:
             assert sender.handle_timeout(5000) > 0
