@@ -40,7 +40,7 @@ std::string what_text(const device_info_t& device) {
   if (device.width > 0 && device.height > 1) {
     text = fmt::format("{} x {}", device.width, device.height);
   } else if (device.width > 0) {
-    text = fmt::format("{}", device.width);
+    text = fmt::format("{} {}", device.width, device.nelements > 0 ? "transducers" : "rays");
   }
   if (device.fov_horizontal > 0.0) text += fmt::format("{}{:.4g} deg", text.empty() ? "" : ", ", device.fov_horizontal * degrees);
   if (device.range_max > 0.0) text += fmt::format("{}{:g} to {:g} m", text.empty() ? "" : ", ", device.range_min, device.range_max);
