@@ -49,6 +49,10 @@ void Control::serve(const request_t& request) {
     sessions_.leave(request.session);
     return refuse(reply_t::OK, "");
   }
+  if (request.kind == request_t::INFO && request.session == 0) {    // who has not joined yet may ask what there is to join
+    server_.execute(request, Session{});
+    return;
+  }
   Session* session = sessions_.find(request.session);
   if (!session) return refuse(reply_t::UNKNOWN_SESSION, "no such session: join first");
   session->last_heard = std::chrono::steady_clock::now();

@@ -117,3 +117,10 @@ def test_control(language):
 def test_paused_simulation_is_joined(language):
     with ruedo_run("--paused", "--disable", "p3at/camera", world=HALL) as server:
         assert probe(language, server.url, "connect").one("connected") == "hall"
+
+
+def test_a_slow_simulation_is_joined_as_fast(language):
+    """ruedo/info comes once a second of sim time, which is 20 s here: a client asks for it."""
+    with ruedo_run("--rate", "0.05", "--disable", "p3at/camera", world=HALL) as server:
+        time.sleep(1.0)
+        assert probe(language, server.url, "connect").one("connected") == "hall"
