@@ -42,6 +42,7 @@ std::string suggestion(const CLI::App& app, int argc, char** argv) {
     if (std::find(known.begin(), known.end(), name) != known.end()) continue;
     const std::string near = ruedo::nearest_word(name, known);
     if (!near.empty()) return "; did you mean '" + near + "'?";
+    if (command == &app && word[0] != '-') return fmt::format("; there is no '{}', there are {}", word, fmt::join(known, ", "));
   }
   return "";
 }

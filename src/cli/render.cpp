@@ -1,4 +1,5 @@
 // ruedo render: one picture of a world at its start, from anywhere or as one of its cameras sees it.
+#include <algorithm>
 #include <filesystem>
 
 #include <fmt/format.h>
@@ -8,6 +9,7 @@
 #include "cli/commands.h"
 #include "cli/render_devices.h"
 #include "cli/render_view.h"
+#include "model/settings.h"
 #include "ruedo/errors.h"
 #include "ruedo/image_t.hpp"
 
@@ -51,20 +53,23 @@ cv::Mat picture_of_world(const RenderArguments& arguments, const model::WorldMod
   return bgr;
 }
 
+void require_camera(const std::string& camera, const model::WorldModel& world) {
+  const model::BodyLayout layout(world);
+  std::vector<std::string> cameras;
+  for (const std::string& name : device_names(world, layout)) {
+    const auto device = make_lone_device(world, layout, name, false);
+    if (device && device->kind->needs_renderer) cameras.push_back(name);
+  }
+  if (std::find(cameras.begin(), cameras.end(), camera) != cameras.end()) return;
+  const std::string near = nearest_word(camera, cameras);
+  throw InputError({}, fmt::format("--camera {}: there is no such camera; {}", camera,
+                                   cameras.empty() ? "the world has none" : fmt::format("there are: {}", fmt::join(cameras, ", "))) +
+                           (near.empty() ? "" : "; did you mean " + near + "?"));
+}
+
 // What the camera itself gives: with its lens, noise and exposure, but not compressed.
 cv::Mat picture_of_camera(const RenderArguments& arguments, const model::WorldModel& world, const model::BodyLayout& layout) {
   const auto device = make_lone_device(world, layout, arguments.camera, !arguments.world.no_noise);
-  if (!device || !device->kind->needs_renderer) {
-    std::vector<std::string> cameras;
-    for (const std::string& name : device_names(world, layout)) {
-      const auto other = make_lone_device(world, layout, name, false);
-      if (other && other->kind->needs_renderer) cameras.push_back(name);
-    }
-    const std::string near = nearest_word(arguments.camera, cameras);
-    throw InputError({}, fmt::format("--camera {}: there is no such camera; {}", arguments.camera,
-                                     cameras.empty() ? "the world has none" : fmt::format("there are: {}", fmt::join(cameras, ", "))) +
-                             (near.empty() ? "" : "; did you mean " + near + "?"));
-  }
   const auto renderer = scene::make_renderer(world, layout);
   Outbox out;
   device->sensor->sample({initial_snapshot(layout), 0, nullptr, renderer.get()}, out);
@@ -82,21 +87,25 @@ cv::Mat picture_of_camera(const RenderArguments& arguments, const model::WorldMo
   throw EnvironmentError("the camera gave no picture");
 }
 
-// Colour pictures of that camera come raw, in the size that is asked for.
-model::LoadOptions options_of(const RenderArguments& arguments) {
+// Colour pictures of the camera that is asked for come raw, in the size that is asked for.
+std::shared_ptr<const model::WorldModel> load(const RenderArguments& arguments) {
   model::LoadOptions options = load_options(arguments.world);
-  if (arguments.camera.empty()) return options;
+  if (arguments.camera.empty()) return model::load_world(arguments.world.world, options);
   const size_t slash = arguments.camera.find('/');
   if (slash == std::string::npos) throw InputError({}, "--camera " + arguments.camera + ": allowed is ROBOT/DEVICE");
   const std::string robot = arguments.camera.substr(0, slash), device = arguments.camera.substr(slash + 1);
-  const std::vector<model::Setting> given = std::move(options.settings);    // what the user sets comes last and holds
-  options.settings = {{robot, device, "ruedo:encoding", "rgb"}};
-  options.settings.insert(options.settings.end(), given.begin(), given.end());
   const Size size = arguments.size.empty() ? Size{} : parse_size(arguments.size);
-  if (size.width == 0) return options;
-  options.settings.push_back({robot, device, "camera.image.width", std::to_string(size.width)});
-  options.settings.push_back({robot, device, "camera.image.height", std::to_string(size.height)});
-  return options;
+  std::vector<model::Setting> settings{{robot, device, "ruedo:encoding", "rgb"}};
+  settings.insert(settings.end(), options.settings.begin(), options.settings.end());    // what the user sets comes later and holds
+  if (size.width != 0) {
+    settings.push_back({robot, device, "camera.image.width", std::to_string(size.width)});
+    settings.push_back({robot, device, "camera.image.height", std::to_string(size.height)});
+  }
+  options.settings.clear();
+  const auto world = std::make_shared<model::WorldModel>(*model::load_world(arguments.world.world, options));
+  require_camera(arguments.camera, *world);
+  model::apply_settings(settings, *world);
+  return world;
 }
 
 int render(const RenderArguments& arguments) {
@@ -108,7 +117,7 @@ int render(const RenderArguments& arguments) {
   if (extension != ".png" && extension != ".jpg" && extension != ".jpeg") {
     throw InputError({}, "-o " + arguments.output + ": allowed are names that end in .png, .jpg or .jpeg");
   }
-  const auto world = model::load_world(arguments.world.world, options_of(arguments));
+  const auto world = load(arguments);
   print_findings(world->findings);
   const model::BodyLayout layout(*world);
   const cv::Mat bgr = arguments.camera.empty() ? picture_of_world(arguments, *world, layout) : picture_of_camera(arguments, *world, layout);
@@ -128,7 +137,7 @@ void add_render(CLI::App& app, Action& chosen) {
   add_world_arguments(*command, arguments->world);
   command->add_option("-o,--output", arguments->output, "the picture: .png or .jpg")->type_name("FILE")->required();
   auto* camera = command->add_option("--camera", arguments->camera, "as this camera sees it")->type_name("ROBOT/DEVICE");
-  command->add_option("--view", arguments->view, "top, iso, or x,y,z,roll,pitch,yaw (m, rad; x looks ahead)")
+  command->add_option("--view", arguments->view, "top, iso, or x,y,z,roll,pitch,yaw (m, rad; x looks ahead, 1.2 rad wide)")
       ->type_name("VIEW")->capture_default_str()->excludes(camera);
   command->add_option("--size", arguments->size, "of the picture, in pixels")->type_name("WxH");
   command->add_flag("--rays", arguments->rays, "draw the rays of laser scanners and the cones of sonars");

@@ -13,6 +13,7 @@ namespace {
 constexpr int kMaxSide = 8192;
 constexpr Size kDefaultSize{1280, 960};
 constexpr double kHfov = 0.9;      // rad
+constexpr double kPlacedHfov = 1.2;    // rad, of an eye whose place is given
 constexpr double kIsoYaw = 1.1;    // rad, or a quarter, half, ... turn more
 constexpr double kMargin = 1.06;    // around what is framed
 
@@ -97,7 +98,8 @@ scene::View parse_view(const std::string& text, Size size, const scene::Bounds& 
   const std::vector<double> v = numbers(text);
   if (v.size() != 6) throw InputError({}, "--view " + text + ": allowed are top, iso and x,y,z,roll,pitch,yaw (m, rad)");
   if (size.width == 0) size = kDefaultSize;
-  scene::View view = scene::View::pinhole(Pose::from_xyz_rpy({v[0], v[1], v[2]}, {v[3], v[4], v[5]}), size.width, size.height, 1.2);
+  scene::View view = scene::View::pinhole(Pose::from_xyz_rpy({v[0], v[1], v[2]}, {v[3], v[4], v[5]}), size.width, size.height,
+                                          kPlacedHfov);
   view.near_m = 0.02;
   view.far_m = 1000.0;
   return view;

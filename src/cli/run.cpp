@@ -1,6 +1,7 @@
 // ruedo run: loads a world and serves it until the end, Ctrl-C, or a client's QUIT.
 #include <cerrno>
 #include <atomic>
+#include <charconv>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -153,7 +154,11 @@ void add_run(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand("run", "serve a world: step it, publish its sensors, take commands");
   const auto arguments = std::make_shared<RunArguments>();
   add_world_arguments(*command, arguments->world);
-  command->add_option("--seed", arguments->seed, "of all noise")->capture_default_str()->check(CLI::NonNegativeNumber);
+  command->add_option("--seed", arguments->seed, "of all noise")->type_name("N")->capture_default_str()->check([](const std::string& text) {
+    uint64_t seed = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
+    return error == std::errc() && end == text.data() + text.size() ? "" : "'" + text + "' is not allowed; a seed is a whole number from 0 to 18446744073709551615";
+  });
   command->add_option("--rate", arguments->rate, "sim time per real time, or max")->type_name("R|max")->capture_default_str();
   command->add_option("--duration", arguments->duration, "end after so many seconds of sim time")->type_name("S");
   command->add_option("--lcm", arguments->lcm, "LCM address (default: $LCM_DEFAULT_URL, or LCM's group with ttl 0)")->type_name("URL");

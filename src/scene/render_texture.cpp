@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string_view>
+#include <vector>
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -26,6 +30,29 @@ cv::Mat to_rgba(cv::Mat image) {
   return rgba;
 }
 
+std::vector<uint8_t> read_bytes(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+// libpng complains on stderr of colour profiles that many programs write, and that are not used here.
+void remove_png_profile(std::vector<uint8_t>& bytes) {
+  constexpr std::string_view kSignature = "\x89PNG\r\n\x1a\n";
+  const auto text = [&](size_t at, size_t length) { return std::string_view(reinterpret_cast<const char*>(bytes.data()) + at, length); };
+  if (bytes.size() < kSignature.size() || text(0, kSignature.size()) != kSignature) return;
+  for (size_t at = kSignature.size(); at + 12 <= bytes.size();) {    // a chunk: length, kind, data, checksum
+    const size_t length = static_cast<size_t>(bytes[at]) << 24 | static_cast<size_t>(bytes[at + 1]) << 16 |
+                          static_cast<size_t>(bytes[at + 2]) << 8 | bytes[at + 3];
+    const std::string_view kind = text(at + 4, 4);
+    if (kind == "IDAT" || length > bytes.size() - at - 12) return;
+    if (kind == "iCCP") {
+      bytes.erase(bytes.begin() + static_cast<std::ptrdiff_t>(at), bytes.begin() + static_cast<std::ptrdiff_t>(at + 12 + length));
+      return;
+    }
+    at += 12 + length;
+  }
+}
+
 }  // namespace
 
 TexturePixels decode_texture(const model::Texture& texture) {
@@ -33,8 +60,10 @@ TexturePixels decode_texture(const model::Texture& texture) {
   std::error_code error;
   if (!texture.path.empty() && !std::filesystem::is_regular_file(texture.path, error)) return out;
   try {
-    cv::Mat image = texture.path.empty() ? cv::imdecode(texture.embedded, cv::IMREAD_UNCHANGED)
-                                         : cv::imread(texture.path, cv::IMREAD_UNCHANGED);
+    std::vector<uint8_t> bytes = texture.path.empty() ? texture.embedded : read_bytes(texture.path);
+    remove_png_profile(bytes);
+    if (bytes.empty()) return out;
+    cv::Mat image = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
     if (image.empty()) return out;
     const int side = std::max(image.cols, image.rows);
     if (side > kMaxSide) {

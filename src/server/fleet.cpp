@@ -63,7 +63,8 @@ class FleetMaker {
 
   bool disabled(int robot, const std::string& device) const {
     const std::string name = instance(robot).name + "/" + device;
-    return std::find(options_.disabled.begin(), options_.disabled.end(), name) != options_.disabled.end();
+    const auto in = [&](const std::vector<std::string>& list) { return std::find(list.begin(), list.end(), name) != list.end(); };
+    return in(options_.disabled) || in(world_.disabled);
   }
 
   // The devices of a kind on a robot, in the order of its file.

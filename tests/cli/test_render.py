@@ -60,7 +60,7 @@ def test_world_from_above_and_its_rays(tmp_path):
 
 
 def test_a_box_where_it_must_be(tmp_path):
-    # 2 m wide, its near face 4 m ahead of an eye that sees 0.9 rad across, on the picture's middle.
+    # 2 m wide, its near face 4 m ahead of an eye that sees 1.2 rad across, on the picture's middle.
     world = tmp_path / "box.sdf"
     world.write_text(
         """<sdf version="1.9"><world name="w"><scene><background>0 0 1 1</background><shadows>false</shadows></scene>
@@ -78,7 +78,7 @@ def test_a_box_where_it_must_be(tmp_path):
     assert abs(rows.mean() - 59.5) < 1 and abs(columns.mean() - 59.5) < 1
     side = rows.max() - rows.min() + 1
     assert side == columns.max() - columns.min() + 1 and green.sum() == side * side
-    assert abs(side - 120 * (1 / 4) / np.tan(0.45)) < 1.5
+    assert abs(side - 120 * (1 / 4) / np.tan(0.6)) < 1.5
     assert (pixels[0, 0] == (0, 0, 255)).all()
 
 
