@@ -138,16 +138,14 @@ build() {
       fail "$EXIT_BUILD" "CMake failed; its output is above"
     }
   fi
+  [[ -e $folder/built ]] || say "building build/$preset (the first time takes some minutes)"
   local ninja=(ninja -C "$folder" -j "$(build_jobs)")
-  if [[ $("${ninja[@]}" -n 2>/dev/null) == *"no work to do"* ]]; then
-    return
-  fi
-  say "building build/$preset (the first time takes some minutes)"
   if [[ -t 2 ]]; then
     "${ninja[@]}" >&2
   else
-    "${ninja[@]}" --quiet >&2
+    "${ninja[@]}" --quiet 2>&1 | sed '/^ninja: no work to do/d' >&2
   fi || fail "$EXIT_BUILD" "the build failed; the lines above say where"
+  touch "$folder/built"
 }
 
 # Makes "import ruedo" of the virtual environment find the Python client that the release build made.
