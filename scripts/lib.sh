@@ -11,7 +11,7 @@ readonly EXIT_BUILD=1 EXIT_ENVIRONMENT=4
 
 # Packages: "a|b" is the first of them that this distribution has; "?a" is left out where it has none.
 readonly BUILD_PACKAGES=(
-  g++ cmake ninja-build pkg-config ccache python3-venv default-jdk-headless ca-certificates
+  g++ cmake ninja-build pkg-config ccache python3-venv default-jdk-headless ca-certificates iproute2
   libbullet-dev libtinyxml2-dev liburdfdom-dev libassimp-dev libembree-dev libtbb-dev libeigen3-dev
   "?libosmesa6-dev" libegl-dev libegl-mesa0 libgl-dev
   libopencv-core-dev libopencv-imgcodecs-dev libopencv-imgproc-dev
@@ -19,7 +19,7 @@ readonly BUILD_PACKAGES=(
 )
 # libsdformat is the oracle of the world reader's tests; Debian has it up to 12.
 readonly TEST_PACKAGES=(
-  libgtest-dev libgmock-dev libbenchmark-dev libopencv-contrib-dev junit4 iproute2 "?libsdformat-dev"
+  libgtest-dev libgmock-dev libbenchmark-dev libopencv-contrib-dev "?libsdformat-dev"
 )
 
 say() { printf '%s: %s\n' "${0##*/}" "$*" >&2; }
