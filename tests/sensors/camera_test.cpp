@@ -88,9 +88,8 @@ TEST(Camera, AMarkersPoseComesBack) {
   cv::Mat marker, board;
   cv::aruco::drawMarker(cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50), 7, 600, marker);
   cv::copyMakeBorder(marker, board, 100, 100, 100, 100, cv::BORDER_CONSTANT, 255);
-  const std::string file = testing::TempDir() + "/marker.png";
-  ASSERT_TRUE(cv::imwrite(file, board));
-  const std::string poster = "<diffuse>1 1 1 1</diffuse><pbr><metal><albedo_map>" + file + "</albedo_map></metal></pbr>";
+  ASSERT_TRUE(cv::imwrite(testing::TempDir() + "/marker.png", board));
+  const std::string poster = "<diffuse>1 1 1 1</diffuse><pbr><metal><albedo_map>marker.png</albedo_map></metal></pbr>";
   for (const std::string& distortion : {std::string(), std::string("<distortion><k1>-0.2</k1><k2>0.05</k2><p1>0.001</p1></distortion>")}) {
     Shot shot(world_with(box("board", "2 0.3 1.1 0 0.2 0.3", "0.01 0.4 0.4", poster), distortion));
     const image_t image = shot.image();

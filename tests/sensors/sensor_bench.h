@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include <gtest/gtest.h>
+
 #include "model/body_layout.h"
 #include "model/load.h"
 #include "ruedo/sensor.h"
@@ -44,9 +46,9 @@ class SensorBench {
     std::string named_device;
   };
 
-  // `sdf` is a whole SDF file.
+  // `sdf` is a whole SDF file, as if it lay in the folder for temporary files.
   explicit SensorBench(const std::string& sdf)
-      : world(model::load_world_text(sdf, "bench.sdf")), layout(*world) {}
+      : world(model::load_world_text(sdf, testing::TempDir() + "/bench.sdf")), layout(*world) {}
 
   // The state at the start: everything where the file has it, at rest.
   Snapshot snapshot() const {
