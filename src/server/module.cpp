@@ -7,7 +7,8 @@
 #include <future>
 
 #include <pthread.h>
-#include <tbb/parallel_for.h>
+
+#include "server/parallel.h"
 
 namespace ruedo::server {
 
@@ -119,7 +120,7 @@ void Module::process_pieces(Batch& batch, int begin, int end) {
     for (int piece = 0; piece < pieces(); ++piece) process_piece(batch, piece, begin, end);
     return;
   }
-  tbb::parallel_for(0, pieces(), [&](int piece) { process_piece(batch, piece, begin, end); });
+  parallel_pieces(pieces(), [&](int piece) { process_piece(batch, piece, begin, end); });
 }
 
 void Module::process_piece(Batch& batch, int piece, int begin, int end) {
