@@ -83,7 +83,7 @@ std::map<std::string, std::vector<Row>> rows_by_robot(const Whole& whole) {
     const device_info_t* device = found == devices.end() ? nullptr : found->second;
     const bool main_channel = device && channel.name == channel.robot + "/" + channel.device;
     rows[channel.robot].push_back({channel.name, channel.type, rate_text(channel, device ? device->kind : ""),
-                                   channel.input ? "commands" : main_channel ? what_text(*device) : "", channel.input});
+                                   channel.input ? "commands" : main_channel ? what_text(*device) : "", channel.input != 0});
   }
   for (auto& [robot, list] : rows) {
     std::stable_sort(list.begin(), list.end(), [](const Row& a, const Row& b) { return a.input < b.input; });
