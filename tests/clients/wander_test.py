@@ -1,6 +1,6 @@
-"""The example of each language, 20 s of sim time in the arena without touching anything."""
+"""The example of each language, 20 s of sim time in the arena without touching anything; and as its user ends it."""
 
-import os
+import signal
 import subprocess
 import sys
 
@@ -46,3 +46,26 @@ def test_wander(language, tmp_path):
     assert reasons <= {lcmtypes.motion_status_t.REASON_NONE, lcmtypes.motion_status_t.REASON_REPLACED}
     # An untouched kinematic drive follows its wheels exactly, so a bump would show as odometry that is off.
     assert odometry[2] == pytest.approx(truth[2], abs=0.05) or abs(abs(odometry[2] - truth[2]) - 6.2832) < 0.05
+
+
+@pytest.mark.parametrize("language", list(EXAMPLES))
+def test_ctrl_c_ends_the_example_in_order(language, tmp_path):
+    picture = tmp_path / "seen.jpg"
+    with ruedo_run(world=ARENA) as server:
+        example = subprocess.Popen([*EXAMPLES[language], "--url", server.url, "--picture", str(picture)], stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True)
+        assert "Ctrl-C ends it" in example.stdout.readline()
+        example.send_signal(signal.SIGINT)
+        said, errors = example.communicate(timeout=60)
+    assert [line.split()[0] for line in said.splitlines()] == ["camera", "true", "odometry"], said + errors
+    assert picture.read_bytes()[:3] == b"\xff\xd8\xff"
+    assert not [line for line in errors.splitlines() if not line.startswith("LCM: ")], errors    # LCM's Java talks
+    assert example.returncode == (130 if language == "java" else 0)    # a JVM that a signal ends says so
+
+
+@pytest.mark.parametrize("language", list(EXAMPLES))
+def test_options_are_explained(language):
+    asked = subprocess.run([*EXAMPLES[language], "--help"], capture_output=True, text=True, timeout=60)
+    wrong = subprocess.run([*EXAMPLES[language], "--robbot", "p3at"], capture_output=True, text=True, timeout=60)
+    assert asked.returncode == 0 and "--picture" in asked.stdout + asked.stderr
+    assert wrong.returncode == 2 and "--robot" in wrong.stderr

@@ -1,13 +1,12 @@
 // Wanders without bumping into things, by laser range finder and sonar; saves a camera picture and compares
 // odometry with the true pose at the end.
-//
-//     ruedo-wander-cpp [--robot NAME] [--duration SECONDS] [--url URL] [--launch WORLD] [--picture FILE]
 #include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <limits>
 #include <map>
+#include <set>
 #include <string>
 
 #include "ruedo/client.h"
@@ -22,6 +21,15 @@ constexpr double kClearance = 0.7;    // m, from here on it turns away
 constexpr double kSpeed = 0.35;       // m/s
 constexpr double kTurnRate = 0.6;     // rad/s
 
+constexpr const char* kUsage =
+    "ruedo-wander-cpp [OPTION VALUE]...\n"
+    "  --robot NAME        default: the first\n"
+    "  --duration SECONDS  of sim time; default: until Ctrl-C\n"
+    "  --url URL           of the server; default: LCM_DEFAULT_URL\n"
+    "  --launch WORLD      start a private server with this world\n"
+    "  --picture FILE      default: wander.jpg\n";
+const std::set<std::string> kOptions = {"--robot", "--duration", "--url", "--launch", "--picture"};
+
 // The nearest echo (m) of the transducers that look ahead, on the left (positive heading) or the right.
 double nearest_echo(const rc::SonarReading& reading, const rc::DeviceInfo& sonar, bool left) {
   double nearest = std::numeric_limits<double>::infinity();
@@ -33,7 +41,7 @@ double nearest_echo(const rc::SonarReading& reading, const rc::DeviceInfo& sonar
   return nearest;
 }
 
-void wander(const rc::Simulation& sim, const rc::Robot& robot, double duration) {
+void wander(const rc::Robot& robot, double duration) {
   const auto lrf = robot.lrf();
   const auto devices = robot.devices();
   const bool has_sonar = std::any_of(devices.begin(), devices.end(), [](const auto& d) { return d.type == "sonar_t"; });
@@ -58,7 +66,6 @@ void wander(const rc::Simulation& sim, const rc::Robot& robot, double duration) 
       robot.set_velocity(0.0, turning);
     }
   }
-  (void)sim;
 }
 
 int run(std::map<std::string, std::string>& options) {
@@ -69,7 +76,7 @@ int run(std::map<std::string, std::string>& options) {
   std::printf("%s wanders in %s%s\n", robot.name().c_str(), sim.world().c_str(), duration < rc::kForever ? "" : "; Ctrl-C ends it");
   std::fflush(stdout);
 
-  wander(sim, robot, duration);
+  wander(robot, duration);
   robot.stop().wait(10.0);
 
   for (const auto& device : robot.devices()) {
@@ -93,7 +100,13 @@ int run(std::map<std::string, std::string>& options) {
 int main(int argc, char** argv) {
   std::signal(SIGINT, [](int) { interrupted = 1; });
   std::map<std::string, std::string> options;
-  for (int i = 1; i + 1 < argc; i += 2) options[argv[i]] = argv[i + 1];
+  for (int i = 1; i < argc; i += 2) {
+    if (!kOptions.contains(argv[i]) || i + 1 == argc) {
+      std::fputs(kUsage, stderr);
+      return std::string(argv[i]) == "--help" ? 0 : 2;
+    }
+    options[argv[i]] = argv[i + 1];
+  }
   try {
     return run(options);
   } catch (const std::exception& error) {

@@ -1,6 +1,8 @@
 import java.nio.file.Path;
 import java.util.HashMap;
+import java.util.List;
 import java.util.Map;
+import java.util.Set;
 import ruedo.Device;
 import ruedo.Odometry;
 import ruedo.Pose;
@@ -14,16 +16,20 @@ import ruedo.SonarReading;
 /**
  * Wanders without bumping into things, by laser range finder and sonar; saves a camera picture and compares odometry with
  * the true pose at the end.
- *
- * <pre>java -cp ruedo.jar:ruedo-examples.jar Wander [--robot NAME] [--duration SECONDS] [--url URL] [--launch WORLD]
- *     [--picture FILE]</pre>
  */
 public final class Wander {
     private static final double CLEARANCE = 0.7;    // m, from here on it turns away
     private static final double SPEED = 0.35;       // m/s
     private static final double TURN_RATE = 0.6;    // rad/s
+    private static final String USAGE = String.join(System.lineSeparator(),
+            "java -cp ruedo.jar:ruedo-examples.jar Wander [OPTION VALUE]...",
+            "  --robot NAME        default: the first",
+            "  --duration SECONDS  of sim time; default: until Ctrl-C",
+            "  --url URL           of the server; default: LCM_DEFAULT_URL",
+            "  --launch WORLD      start a private server with this world",
+            "  --picture FILE      default: wander.jpg");
+    private static final Set<String> OPTIONS = Set.of("--robot", "--duration", "--url", "--launch", "--picture");
     private static volatile boolean interrupted;
-    private static volatile boolean finished;
 
     private Wander() {}
 
@@ -96,27 +102,37 @@ public final class Wander {
         }
     }
 
+    /** The options by their names; null when they are not those of USAGE. */
+    private static Map<String, String> read(String[] args) {
+        Map<String, String> options = new HashMap<>();
+        for (int i = 0; i < args.length; i += 2) {
+            if (!OPTIONS.contains(args[i]) || i + 1 == args.length) return null;
+            options.put(args[i], args[i + 1]);
+        }
+        return options;
+    }
+
     /** See the class. */
     public static void main(String[] args) throws Exception {
-        Map<String, String> options = new HashMap<>();
-        for (int i = 0; i + 1 < args.length; i += 2) options.put(args[i], args[i + 1]);
+        Map<String, String> options = read(args);
+        if (options == null) {
+            System.err.println(USAGE);
+            System.exit(List.of(args).contains("--help") ? 0 : 2);
+        }
         Thread main = Thread.currentThread();
         Runtime.getRuntime().addShutdownHook(new Thread(() -> {    // Ctrl-C: wait until the robot stands
             interrupted = true;
             try {
-                if (!finished) main.join(15000);
+                main.join(15000);
             } catch (InterruptedException error) {
                 Thread.currentThread().interrupt();
             }
         }));
-        int code = 0;
         try {
             run(options);
         } catch (RuedoException error) {
             System.err.println("wander: " + error.getMessage());
-            code = 1;
+            Runtime.getRuntime().halt(1);    // exit() would wait for the hook, which waits for this thread
         }
-        finished = true;
-        System.exit(code);
     }
 }

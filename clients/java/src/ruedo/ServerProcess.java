@@ -36,6 +36,7 @@ final class ServerProcess {
         command.addAll(options.args);
         try {
             output = options.verbose ? null : Files.createTempFile("ruedo-", ".log");
+            if (output != null) output.toFile().deleteOnExit();
             ProcessBuilder builder = new ProcessBuilder(command);
             if (output == null) {
                 builder.redirectOutput(ProcessBuilder.Redirect.INHERIT).redirectError(ProcessBuilder.Redirect.INHERIT);

@@ -40,7 +40,6 @@ public final class Simulation implements AutoCloseable {
     private final Map<String, Robot> robots = new HashMap<>();
     private final Set<Driver> repeating = ConcurrentHashMap.newKeySet();
     private final AtomicLong ids;
-    private final Thread closer = new Thread(this::close, "ruedo-close");
     private WorldInfo known;               // these under this object's monitor
     private RuedoException fault;
     private Thread repeater;
@@ -60,7 +59,6 @@ public final class Simulation implements AutoCloseable {
         bus.subscribe("ruedo/tick", this::onTick);
         bus.subscribe("ruedo/reply", session::receive);
         awaitInfo(timeout);
-        Runtime.getRuntime().addShutdownHook(closer);
     }
 
     // What there is.
@@ -240,7 +238,10 @@ public final class Simulation implements AutoCloseable {
         session.request(request_t.QUIT, null, REPLY_SECONDS);
     }
 
-    /** Ends repeated commands, and a server that launch() started. */
+    /**
+     * Ends repeated commands, and a server that launch() started. A program that ends without it leaves nothing behind
+     * either: the watchdog stops its robots, and its server ends with the pipe to it.
+     */
     @Override
     public void close() {
         synchronized (this) {
@@ -251,11 +252,6 @@ public final class Simulation implements AutoCloseable {
         session.leave();
         bus.close();
         if (server != null) server.end();
-        try {
-            Runtime.getRuntime().removeShutdownHook(closer);
-        } catch (IllegalStateException error) {
-            // the process is ending, which is why we are here
-        }
     }
 
     @Override
