@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <tuple>
 
 #include <spdlog/spdlog.h>
 
@@ -106,7 +107,28 @@ void CommandInbox::keep(int input, robot::Command& command, const uint8_t* data,
   entry.input = input;
   std::swap(entry.command, command);
   entry.bytes.assign(data, data + size);
-  any_.store(true, std::memory_order_release);
+}
+
+bool CommandInbox::later(const Entry& a, const Entry& b) { return std::tie(a.step, a.arrival) > std::tie(b.step, b.arrival); }
+
+CommandInbox::Scheduled CommandInbox::schedule(int64_t step, int input, const uint8_t* data, size_t size) {
+  if (input < 0 || static_cast<size_t>(input) >= inputs_.size() || size > kMaxMessageSize) return Scheduled::faulty;
+  robot::Command command;
+  command.robot = inputs_[static_cast<size_t>(input)].robot;
+  if (decode_command(inputs_[static_cast<size_t>(input)].kind, data, size, command) != DecodeFault::none) return Scheduled::faulty;
+  std::lock_guard lock(mutex_);
+  if (step < next_step_) return Scheduled::late;
+  if (scheduled_count_ == kMostScheduled || scheduled_bytes_ + size > kMostScheduledBytes) return Scheduled::full;
+  if (scheduled_count_ == scheduled_.size()) scheduled_.emplace_back();
+  Entry& entry = scheduled_[scheduled_count_++];
+  entry.step = step;
+  entry.arrival = arrivals_++;
+  entry.input = input;
+  std::swap(entry.command, command);
+  entry.bytes.assign(data, data + size);
+  scheduled_bytes_ += size;
+  std::push_heap(scheduled_.begin(), scheduled_.begin() + static_cast<std::ptrdiff_t>(scheduled_count_), later);
+  return Scheduled::kept;
 }
 
 void CommandInbox::refuse(const std::string& channel, const char* why) {
@@ -117,23 +139,31 @@ void CommandInbox::refuse(const std::string& channel, const char* why) {
   spdlog::warn("{}: a message was ignored: {} ({} ignored so far)", channel, why, refused_.load());
 }
 
+CommandInbox::Entry& CommandInbox::next_taken(size_t& count) {
+  if (count == taken_.size()) taken_.emplace_back();
+  return taken_[count++];
+}
+
 void CommandInbox::apply(robot::Robots& robots, int64_t step, Batch& batch) {
-  if (!any_.load(std::memory_order_acquire)) return;
-  size_t count = 0;
+  size_t scheduled = 0, count = 0;
   {
     std::lock_guard lock(mutex_);
-    any_.store(false, std::memory_order_relaxed);
+    next_step_ = step + 1;
+    // Buffers are swapped, never copied, and what is taken leaves its buffers behind for what comes.
+    for (; scheduled_count_ > 0 && scheduled_.front().step <= step; ++scheduled) {
+      std::pop_heap(scheduled_.begin(), scheduled_.begin() + static_cast<std::ptrdiff_t>(scheduled_count_), later);
+      Entry& entry = scheduled_[--scheduled_count_];
+      scheduled_bytes_ -= entry.bytes.size();
+      std::swap(next_taken(count), entry);
+    }
     for (int robot : waiting_) {
       Slots& slots = slots_[static_cast<size_t>(robot)];
-      for (size_t i = 0; i < slots.size; ++i) {
-        if (count == taken_.size()) taken_.emplace_back();
-        std::swap(taken_[count++], slots.entries[(slots.first + i) % kKeptPerRobot]);
-      }
+      for (size_t i = 0; i < slots.size; ++i) std::swap(next_taken(count), slots.entries[(slots.first + i) % kKeptPerRobot]);
       slots.size = 0;
     }
     waiting_.clear();
   }
-  std::sort(taken_.begin(), taken_.begin() + static_cast<std::ptrdiff_t>(count),
+  std::sort(taken_.begin() + static_cast<std::ptrdiff_t>(scheduled), taken_.begin() + static_cast<std::ptrdiff_t>(count),
             [](const Entry& a, const Entry& b) { return a.arrival < b.arrival; });
   for (size_t i = 0; i < count; ++i) {
     robots.apply(taken_[i].command);
@@ -149,6 +179,7 @@ void CommandInbox::clear() {
   std::lock_guard lock(mutex_);
   for (Slots& slots : slots_) slots.size = 0;
   waiting_.clear();
+  scheduled_count_ = scheduled_bytes_ = 0;
 }
 
 }  // namespace ruedo::server
