@@ -56,6 +56,7 @@ struct ShapeCase {
   double top;       // height above its centre where a ball on the z axis rests
   double bottom;    // depth below its centre on which it rests
 };
+void PrintTo(const ShapeCase& shape, std::ostream* out) { *out << shape.geometry; }
 
 class EachShape : public ::testing::TestWithParam<ShapeCase> {};
 

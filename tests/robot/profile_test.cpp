@@ -48,6 +48,7 @@ TEST(Profile, Trapezoid) {
 }
 
 struct Start { double velocity, distance; };
+void PrintTo(const Start& start, std::ostream* out) { *out << start.velocity << " m/s, " << start.distance << " m to go"; }
 class FromAnyVelocity : public ::testing::TestWithParam<Start> {};
 
 TEST_P(FromAnyVelocity, EndsAtRestThereWithinTheLimits) {
