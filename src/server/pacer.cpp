@@ -25,11 +25,12 @@ int Pacer::wait(int64_t step, int limit) {
   if (step == 0) start_anew();
   for (;;) {
     if (stopped_ || step > last_step_) return 0;
-    if (step > until_) {
+    const int64_t until = std::min(until_, limit_);
+    if (step > until) {
       changed_.wait(lock);
       continue;
     }
-    int64_t count = std::min<int64_t>(limit - 1, until_ - step) + 1;    // until_ may be the largest number there is
+    int64_t count = std::min<int64_t>(limit - 1, until - step) + 1;    // until may be the largest number there is
     if (std::isfinite(rate_) && !paused_) {    // single steps are taken at once
       const Clock::time_point now = Clock::now();
       const Clock::time_point due_now = due(step);
@@ -93,6 +94,14 @@ void Pacer::set_rate(double rate) {
     std::lock_guard lock(mutex_);
     rate_ = rate;
     start_anew();
+  }
+  changed_.notify_all();
+}
+
+void Pacer::set_limit(int64_t step) {
+  {
+    std::lock_guard lock(mutex_);
+    limit_ = step;
   }
   changed_.notify_all();
 }

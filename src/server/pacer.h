@@ -27,6 +27,8 @@ class Pacer {
   void resume();
   int64_t allow(int64_t steps);      // while paused: that many more; returns the last one of them
   void set_rate(double rate);
+  // No state after `step` is computed until a higher limit is set; the step that waits for it is due at once then.
+  void set_limit(int64_t step);
 
   bool paused() const;
   double rate() const;
@@ -45,7 +47,8 @@ class Pacer {
   std::condition_variable changed_;
   double rate_;
   bool stopped_ = false, paused_ = false;
-  int64_t until_;                    // last state that may be computed
+  int64_t until_;                    // last state that may be computed: by the end of the run, pause() and allow(),
+  int64_t limit_ = INT64_MAX;        // and by set_limit()
   int64_t granted_ = -1;             // last state that wait() let go
   int64_t origin_step_ = 0;          // was due at origin_time_
   Clock::time_point origin_time_;
