@@ -3,8 +3,8 @@
 The layers and what each may use are read from the ruedo_layer() lines of the top CMakeLists.txt, so that there is one list.
 Libraries that live in one layer alone are listed below. Each rule is also run on a small tree that breaks it.
 """
+import os
 import re
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -69,17 +69,19 @@ def broken_walls(root):
     return problems
 
 
-def tracked(root):
-    """The files of the tree: those that git tracks, or all where there is no git."""
-    if (root / ".git").exists():
-        listed = subprocess.run(["git", "-C", root, "-c", f"safe.directory={root}", "ls-files", "-z"], capture_output=True, text=True, check=True).stdout
-        return [root / name for name in listed.split("\0") if name and (root / name).is_file()]
-    return [p for p in root.rglob("*") if p.is_file()]
+MADE = {".git", "build", ".venv", ".ccache", "__pycache__", ".pytest_cache", "node_modules"}    # folders that hold no source
+
+
+def files(root):
+    """The files of the tree, without what is made from them. (No git: a machine need not have it.)"""
+    for folder, folders, names in os.walk(root):
+        folders[:] = sorted(name for name in folders if name not in MADE and not name.endswith(".egg-info"))
+        yield from (Path(folder) / name for name in sorted(names) if (Path(folder) / name).is_file())
 
 
 def long_sources(root):
     problems = []
-    for path in tracked(root):
+    for path in files(root):
         if path.suffix in SOURCES:
             count = len(path.read_text(encoding="utf-8").splitlines())
             relative = path.relative_to(root)
@@ -92,7 +94,7 @@ def long_sources(root):
 def forbidden_words(root):
     pattern = re.compile("|".join(FORBIDDEN), re.IGNORECASE)
     problems = []
-    for path in tracked(root):
+    for path in files(root):
         if path.suffix not in TEXTS or path == Path(__file__).resolve():
             continue
         for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
