@@ -24,6 +24,12 @@ class Bus {
   // itself can tell them from a stranger's.
   virtual void listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own = {}) = 0;
 
+  // After listen(): from now on these are the channels, and `own` those that this process publishes. Messages on channels
+  // that stay are not lost. Returns when the bus has taken them up. Any thread but the bus's own.
+  virtual void listen_to(const std::vector<std::string>& channels, const std::vector<std::string>& own = {}) {
+    static_cast<void>(channels), static_cast<void>(own);
+  }
+
   // Ends listening: once it returns, the handler is not called any more.
   virtual void stop() {}
 

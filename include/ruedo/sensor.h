@@ -99,6 +99,9 @@ class Sensor {
   virtual void sample(const SampleInput& input, Outbox& out) = 0;
   // True: SampleInput::rays is the scene of the visuals, for a kind that has it from the file.
   virtual bool wants_visual_rays() const { return false; }
+  // Sim time was set back by `us` between two steps (a reset of the time alone): what the sensor keeps of times goes
+  // with it. The step that follows shows the same state as the last one, at time 0, and samples count from 0 again.
+  virtual void shift_time(SimTime us) { static_cast<void>(us); }
   // Fills in what ruedo/info says of the device; robot, name, kind, rate and pose are filled in already.
   virtual void describe(device_info_t&) const {}
 };

@@ -119,96 +119,140 @@ Pose BodyLayout::link_in_body(int link, const std::vector<double>& wheel_angles)
   return X_BWheel * X_turn * X_BWheel.inverse() * placement.X_BL;
 }
 
-BodyLayout::BodyLayout(const WorldModel& world) {
-  std::vector<std::pair<const Model*, Grouping>> groupings;    // of the last models seen: fleets follow one another
-  for (size_t i = 0; i < world.models.size(); ++i) {
-    const ModelInstance& instance = world.models[i];
-    const Model& model = *instance.model;
-    const int first = static_cast<int>(links.size());
-    first_link.push_back(first);
+// Of the last models seen: fleets follow one another.
+struct BodyLayout::Known {
+  std::vector<std::pair<const Model*, Grouping>> groupings;
+
+  const Grouping& of(const Model& model) {
     auto known = std::find_if(groupings.begin(), groupings.end(), [&](const auto& each) { return each.first == &model; });
     if (known == groupings.end()) {
       if (groupings.size() >= 16) groupings.clear();
       groupings.emplace_back(&model, group(model));
       known = groupings.end() - 1;
     }
-    const Grouping& grouping = known->second;
-
-    std::vector<int> body_of_group(model.links.size(), -1);
-    for (size_t l = 0; l < model.links.size(); ++l) {
-      const int root = grouping.links.find(static_cast<int>(l));
-      const Pose& X_ML = model.links[l].X_ML;
-      LinkPlacement link;
-      link.instance = static_cast<int>(i);
-      link.link = static_cast<int>(l);
-      if (model.is_static || grouping.is_static[static_cast<size_t>(root)]) {
-        link.X_BL = instance.X_WM * X_ML;
-      } else {
-        const Pose& X_MB = model.links[static_cast<size_t>(root)].X_ML;
-        int& body = body_of_group[static_cast<size_t>(root)];
-        if (body < 0) {
-          body = static_cast<int>(bodies.size());
-          bodies.push_back({static_cast<int>(i), root, {}, instance.X_WM * X_MB,
-                            instance.name + "/" + model.links[static_cast<size_t>(root)].name});
-        }
-        link.body = body;
-        link.X_BL = static_cast<int>(l) == root ? Pose{} : X_MB.inverse() * X_ML;
-        bodies[static_cast<size_t>(body)].links.push_back(first + static_cast<int>(l));
-      }
-      links.push_back(link);
-    }
-
-    const int robot = instance.is_robot() ? static_cast<int>(robots.size()) : -1;
-    RobotPlacement placement;
-    placement.instance = static_cast<int>(i);
-    if (robot >= 0) {
-      int carrier = 0;
-      Pose X_MBase;
-      if (model.drive) {
-        carrier = std::max(model.joints[static_cast<size_t>(model.drive->left_joints[0])].parent, 0);
-        X_MBase = model.drive->X_MBase;
-      }
-      const LinkPlacement& link = links[static_cast<size_t>(first + carrier)];
-      placement.body = link.body;
-      placement.X_BBase = link.X_BL * model.links[static_cast<size_t>(carrier)].X_ML.inverse() * X_MBase;
-    }
-    if (model.drive) {
-      const bool kinematic = model.drive->kind == DriveDescription::Kind::kinematic;
-      for (const bool left : {true, false}) {
-        for (const int j : left ? model.drive->left_joints : model.drive->right_joints) {
-          const Joint& joint = model.joints[static_cast<size_t>(j)];
-          const Pose X_LM = model.links[static_cast<size_t>(joint.child)].X_ML.inverse();
-          WheelPlacement wheel;
-          wheel.robot = robot;
-          wheel.joint = j;
-          wheel.link = first + joint.child;
-          wheel.left = left;
-          const Vec3 axis_M = joint.X_MJ.rotation * joint.axis.axis_in_J;
-          const Vec3 left_M = model.drive->X_MBase.rotation * Vec3::UnitY();
-          wheel.axis_in_L = (X_LM.rotation * (axis_M.dot(left_M) < 0 ? Vec3(-axis_M) : axis_M)).normalized();
-          wheel.center_in_L = X_LM * joint.X_MJ.translation;
-          const int index = static_cast<int>(wheels.size());
-          if (kinematic) {
-            for (const int below : subtree(model, joint.child)) links[static_cast<size_t>(first + below)].wheel = index;
-          }
-          placement.wheels.push_back(index);
-          wheels.push_back(wheel);
-        }
-      }
-    }
-    if (!model.is_static) {
-      for (size_t j = 0; j < model.joints.size(); ++j) {
-        const Joint& joint = model.joints[j];
-        if (grouping.joined[j] || is_drive_wheel(model, static_cast<int>(j))) continue;
-        const auto body = [&](int link) { return link < 0 ? -1 : links[static_cast<size_t>(first + link)].body; };
-        const int parent = body(joint.parent), child = body(joint.child);
-        if (parent == child) continue;    // both static, or joined another way
-        placement.joints.push_back(static_cast<int>(joints.size()));
-        joints.push_back({static_cast<int>(i), static_cast<int>(j), parent, child});
-      }
-    }
-    if (robot >= 0) robots.push_back(std::move(placement));
+    return known->second;
   }
+};
+
+BodyLayout::BodyLayout(const WorldModel& world) {
+  Known known;
+  for (size_t i = 0; i < world.models.size(); ++i) add(world, static_cast<int>(i), known);
+  list(0, 0);
+}
+
+void BodyLayout::append(const WorldModel& world) {
+  Known known;
+  const size_t first_body = bodies.size(), first_link = links.size();
+  add(world, static_cast<int>(world.models.size()) - 1, known);
+  list(first_body, first_link);
+}
+
+void BodyLayout::list(size_t first_body, size_t first_link) {
+  for (size_t body = first_body; body < bodies.size(); ++body) listed.push_back({static_cast<int>(body), bodies[body].links.front()});
+  for (size_t link = first_link; link < links.size(); ++link) {
+    if (links[link].body < 0) listed.push_back({-1, static_cast<int>(link)});
+  }
+}
+
+void BodyLayout::place_again(const WorldModel& world, int instance) {
+  const ModelInstance& placed = world.models[static_cast<size_t>(instance)];
+  const Model& model = *placed.model;
+  for (LinkPlacement& link : links) {
+    if (link.instance == instance && link.body < 0) link.X_BL = placed.X_WM * model.links[static_cast<size_t>(link.link)].X_ML;
+  }
+  for (BodyPlacement& body : bodies) {
+    if (body.instance != instance) continue;
+    const Link& root = model.links[static_cast<size_t>(body.root_link)];
+    body.X_WB = placed.X_WM * root.X_ML;
+    body.name = placed.name + "/" + root.name;
+  }
+  for (RobotPlacement& robot : robots) {
+    if (robot.instance != instance || robot.body >= 0) continue;
+    robot.X_BBase = placed.X_WM * (model.drive ? model.drive->X_MBase : Pose{});
+  }
+}
+
+void BodyLayout::add(const WorldModel& world, int i, Known& known) {
+  const ModelInstance& instance = world.models[static_cast<size_t>(i)];
+  const Model& model = *instance.model;
+  const int first = static_cast<int>(links.size());
+  first_link.push_back(first);
+  const Grouping& grouping = known.of(model);
+
+  std::vector<int> body_of_group(model.links.size(), -1);
+  for (size_t l = 0; l < model.links.size(); ++l) {
+    const int root = grouping.links.find(static_cast<int>(l));
+    const Pose& X_ML = model.links[l].X_ML;
+    LinkPlacement link;
+    link.instance = i;
+    link.link = static_cast<int>(l);
+    if (model.is_static || grouping.is_static[static_cast<size_t>(root)]) {
+      link.X_BL = instance.X_WM * X_ML;
+    } else {
+      const Pose& X_MB = model.links[static_cast<size_t>(root)].X_ML;
+      int& body = body_of_group[static_cast<size_t>(root)];
+      if (body < 0) {
+        body = static_cast<int>(bodies.size());
+        bodies.push_back({i, root, {}, instance.X_WM * X_MB,
+                          instance.name + "/" + model.links[static_cast<size_t>(root)].name});
+      }
+      link.body = body;
+      link.X_BL = static_cast<int>(l) == root ? Pose{} : X_MB.inverse() * X_ML;
+      bodies[static_cast<size_t>(body)].links.push_back(first + static_cast<int>(l));
+    }
+    links.push_back(link);
+  }
+
+  const int robot = instance.is_robot() ? static_cast<int>(robots.size()) : -1;
+  RobotPlacement placement;
+  placement.instance = i;
+  if (robot >= 0) {
+    int carrier = 0;
+    Pose X_MBase;
+    if (model.drive) {
+      carrier = std::max(model.joints[static_cast<size_t>(model.drive->left_joints[0])].parent, 0);
+      X_MBase = model.drive->X_MBase;
+    }
+    const LinkPlacement& link = links[static_cast<size_t>(first + carrier)];
+    placement.body = link.body;
+    placement.X_BBase = link.X_BL * model.links[static_cast<size_t>(carrier)].X_ML.inverse() * X_MBase;
+  }
+  if (model.drive) {
+    const bool kinematic = model.drive->kind == DriveDescription::Kind::kinematic;
+    for (const bool left : {true, false}) {
+      for (const int j : left ? model.drive->left_joints : model.drive->right_joints) {
+        const Joint& joint = model.joints[static_cast<size_t>(j)];
+        const Pose X_LM = model.links[static_cast<size_t>(joint.child)].X_ML.inverse();
+        WheelPlacement wheel;
+        wheel.robot = robot;
+        wheel.joint = j;
+        wheel.link = first + joint.child;
+        wheel.left = left;
+        const Vec3 axis_M = joint.X_MJ.rotation * joint.axis.axis_in_J;
+        const Vec3 left_M = model.drive->X_MBase.rotation * Vec3::UnitY();
+        wheel.axis_in_L = (X_LM.rotation * (axis_M.dot(left_M) < 0 ? Vec3(-axis_M) : axis_M)).normalized();
+        wheel.center_in_L = X_LM * joint.X_MJ.translation;
+        const int index = static_cast<int>(wheels.size());
+        if (kinematic) {
+          for (const int below : subtree(model, joint.child)) links[static_cast<size_t>(first + below)].wheel = index;
+        }
+        placement.wheels.push_back(index);
+        wheels.push_back(wheel);
+      }
+    }
+  }
+  if (!model.is_static) {
+    for (size_t j = 0; j < model.joints.size(); ++j) {
+      const Joint& joint = model.joints[j];
+      if (grouping.joined[j] || is_drive_wheel(model, static_cast<int>(j))) continue;
+      const auto body = [&](int link) { return link < 0 ? -1 : links[static_cast<size_t>(first + link)].body; };
+      const int parent = body(joint.parent), child = body(joint.child);
+      if (parent == child) continue;    // both static, or joined another way
+      placement.joints.push_back(static_cast<int>(joints.size()));
+      joints.push_back({i, static_cast<int>(j), parent, child});
+    }
+  }
+  if (robot >= 0) robots.push_back(std::move(placement));
 }
 
 }  // namespace ruedo::model

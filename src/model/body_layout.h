@@ -52,6 +52,12 @@ struct RobotPlacement {
   std::vector<int> joints;  // indices into BodyLayout::joints
 };
 
+// What ruedo/info lists as a body, and pictures label with its place in that list + 1.
+struct ListedBody {
+  int body = -1;            // index into BodyLayout::bodies; -1: a static link
+  int link = -1;            // index into BodyLayout::links; of a body its first
+};
+
 struct BodyLayout {
   std::vector<LinkPlacement> links;      // all links of all models, in world order
   std::vector<int> first_link;           // of each instance
@@ -59,11 +65,22 @@ struct BodyLayout {
   std::vector<WheelPlacement> wheels;
   std::vector<JointPlacement> joints;
   std::vector<RobotPlacement> robots;    // instances that are robots, in world order
+  std::vector<ListedBody> listed;        // movable bodies, then static links; of instances that were added the same
 
   explicit BodyLayout(const WorldModel& world);
 
+  // The world has a new instance at its end. All that there was keeps its numbers.
+  void append(const WorldModel& world);
+  // An instance that was removed stands somewhere else now, with another name: the same model, the same numbers.
+  void place_again(const WorldModel& world, int instance);
+
   // X_BL of a link, with the wheel that turns it at its angle in wheel_angles (rad, as in Snapshot).
   Pose link_in_body(int link, const std::vector<double>& wheel_angles) const;
+
+ private:
+  struct Known;    // what was worked out of models
+  void add(const WorldModel& world, int instance, Known& known);
+  void list(size_t first_body, size_t first_link);
 };
 
 }  // namespace ruedo::model

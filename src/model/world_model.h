@@ -159,6 +159,7 @@ struct ModelInstance {
   std::string name;                      // unique in the world, fit for a channel
   Pose X_WM;
   std::shared_ptr<const Model> model;
+  bool removed = false;                  // while the world runs: its place in all lists stays, and it is nowhere
   bool is_robot() const { return model->drive.has_value() || !model->sensors.empty(); }
 };
 

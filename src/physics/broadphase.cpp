@@ -45,7 +45,7 @@ btBroadphaseProxy* Broadphase::createProxy(const btVector3& low, const btVector3
   proxy.m_clientObject = object;
   proxy.m_collisionFilterGroup = group;
   proxy.m_collisionFilterMask = mask;
-  proxy.m_uniqueId = static_cast<int>(proxies_.size());
+  proxy.m_uniqueId = ++made_;
   proxy.moves = group != btBroadphaseProxy::StaticFilter;
   if (btBroadphaseProxy::isInfinite(shape_type)) {
     planes_.push_back(&proxy);

@@ -26,9 +26,15 @@ class Broadphase final : public btBroadphaseInterface {
   explicit Broadphase(const PairFilter& filter) : filter_(filter) {}
   ~Broadphase() override;
 
+  // Calls visit(object) for all that a body could touch.
+  template <class Visit>
+  void for_each_partner(const btBroadphaseProxy* proxy, Visit visit) const {
+    for (const Proxy* partner : static_cast<const Proxy*>(proxy)->partners) visit(*static_cast<btCollisionObject*>(partner->m_clientObject));
+  }
   // True when nothing is near that the body could touch.
   bool alone(const btBroadphaseProxy* proxy) const { return static_cast<const Proxy*>(proxy)->partners.empty(); }
-  // Finds the pairs of a body again, after the filter's answer about it changed.
+  // Finds the pairs of a body again, after the filter's answer about it, or what is static, changed. An object that goes
+  // must be refused by the filter, and its neighbours be refiltered, before its proxy is destroyed.
   void refilter(btBroadphaseProxy* proxy, btDispatcher* dispatcher);
 
   // What btBroadphaseInterface asks for. Objects of the static filter group never move; boxes of the others are
@@ -63,6 +69,7 @@ class Broadphase final : public btBroadphaseInterface {
   std::vector<std::unique_ptr<Proxy>> proxies_;
   std::vector<Proxy*> planes_;
   std::vector<Proxy*> found_;          // scratch
+  int made_ = 0;
   btHashedOverlappingPairCache pairs_;
 };
 

@@ -14,6 +14,8 @@ class ContactBook {
  public:
   explicit ContactBook(size_t bodies) : touching_(bodies), near_(bodies) {}
 
+  void resize(size_t bodies) { touching_.resize(bodies), near_.resize(bodies); }
+
   // Starts a step of that length (s).
   void clear(double step_s);
   // Adds what the dispatcher's manifolds hold after a substep. Where everything sleeps, one call stands for `substeps`.
@@ -30,6 +32,7 @@ class ContactBook {
   class ByBody {
    public:
     explicit ByBody(size_t bodies) : ranges_(bodies, {0, 0}) {}
+    void resize(size_t bodies) { ranges_.resize(bodies, {0, 0}); }
     void clear();
     void fill(const std::vector<Contact>& contacts);
     std::span<const Contact> of(int body) const {

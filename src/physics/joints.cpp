@@ -9,7 +9,18 @@ namespace ruedo::physics {
 
 namespace {
 
-bool limited(const model::JointAxis& axis) { return std::isfinite(axis.lower) && std::isfinite(axis.upper) && axis.lower <= axis.upper; }
+// A limit of SDF's that is so large is none.
+constexpr double kNoLimit = 1e9;
+
+bool limited(const model::JointAxis& axis) {
+  return (axis.lower > -kNoLimit || axis.upper < kNoLimit) && axis.lower <= axis.upper;
+}
+
+// Bullet's hinge knows its angle within a turn. Limits beyond that, or on one side only, are held by a window of so
+// much (rad) to both sides of where the joint is, cut off at the limits.
+constexpr double kWindow = 1.5;
+
+bool within_a_turn(const model::JointAxis& axis) { return axis.lower > -M_PI && axis.upper < M_PI; }
 
 // A frame at J whose x or z axis is the joint's.
 Pose along(const Pose& X, const Vec3& axis_in_J, const Vec3& unit) {
@@ -31,12 +42,10 @@ JointConstraint::JointConstraint(const model::Joint& joint, btRigidBody& parent,
     case model::JointType::continuous: {
       auto hinge = std::make_unique<btHingeConstraint>(parent_, child_, to_bt(along(X_PJ, limits_.axis_in_J, Vec3::UnitZ())),
                                                        to_bt(along(X_CJ, limits_.axis_in_J, Vec3::UnitZ())), true);
-      const bool bounded_range = type_ == model::JointType::revolute && limited(limits_) &&
-                                 limits_.lower > -M_PI && limits_.upper < M_PI;
-      if (bounded_range) {
+      if (type_ == model::JointType::revolute && limited(limits_) && within_a_turn(limits_)) {
         hinge->setLimit(limits_.lower, limits_.upper, 1.0, 0.3, 0.0);
       } else {
-        hinge->setLimit(1.0, -1.0);    // none
+        hinge->setLimit(1.0, -1.0);    // none, or a window at each substep
       }
       constraint_ = std::move(hinge);
       break;
@@ -44,8 +53,8 @@ JointConstraint::JointConstraint(const model::Joint& joint, btRigidBody& parent,
     case model::JointType::prismatic: {
       auto slider = std::make_unique<btSliderConstraint>(parent_, child_, to_bt(along(X_PJ, limits_.axis_in_J, Vec3::UnitX())),
                                                          to_bt(along(X_CJ, limits_.axis_in_J, Vec3::UnitX())), true);
-      slider->setLowerLinLimit(limited(limits_) ? limits_.lower : 1.0);
-      slider->setUpperLinLimit(limited(limits_) ? limits_.upper : -1.0);
+      slider->setLowerLinLimit(limited(limits_) ? std::max(limits_.lower, -kNoLimit) : 1.0);
+      slider->setUpperLinLimit(limited(limits_) ? std::min(limits_.upper, kNoLimit) : -1.0);
       slider->setLowerAngLimit(0.0);
       slider->setUpperAngLimit(0.0);
       constraint_ = std::move(slider);
@@ -142,7 +151,11 @@ void JointConstraint::push(double effort) {
 }
 
 void JointConstraint::before_substep(double substep_s) {
-  if (!constraint_) return;
+  if (!constraint_ || !constraint_->isEnabled()) return;
+  if (type_ == model::JointType::revolute && limited(limits_) && !within_a_turn(limits_)) {
+    static_cast<btHingeConstraint&>(*constraint_)
+        .setLimit(std::max(limits_.lower, position_ - kWindow), std::min(limits_.upper, position_ + kWindow), 1.0, 0.3, 0.0);
+  }
   if (mode_ == Mode::motor) {
     move_by_motor(command_, max_effort_, substep_s);
     return;
@@ -160,7 +173,7 @@ double JointConstraint::measured_effort() const {
 }
 
 void JointConstraint::after_substep(double substep_s) {
-  if (!constraint_) return;
+  if (!constraint_ || !constraint_->isEnabled()) return;
   effort_ = mode_ == Mode::motor ? measured_effort() : mode_ == Mode::effort ? command_ : 0.0;
   switch (type_) {
     case model::JointType::revolute:

@@ -27,6 +27,17 @@ class JointConstraint {
   void set_effort(double effort);                  // gives that effort until another command
   bool commanded() const { return mode_ != Mode::passive; }
 
+  // The bodies were put back to where they started: the position is 0, and no command holds.
+  void start_again() {
+    position_ = effort_ = command_ = 0.0;
+    mode_ = Mode::passive;
+  }
+
+  void disable() {    // it holds nothing any more
+    if (constraint_) constraint_->setEnabled(false);
+    start_again();
+  }
+
   void before_substep(double substep_s);
   void after_substep(double substep_s);
 

@@ -75,6 +75,11 @@ void PhysicsWorld::drive_wheel(int wheel, double rate, double max_torque) {
   if (joint >= 0) impl_->wheels_[Impl::index(joint)].set_motor(impl_->wheel_sign_[Impl::index(wheel)] * rate, max_torque);
 }
 
+void PhysicsWorld::add(int instance) { impl_->add(instance); }
+void PhysicsWorld::remove(int instance) { impl_->remove(instance); }
+void PhysicsWorld::disturb(int body) { impl_->disturb(body); }
+void PhysicsWorld::start_again(int joint) { impl_->joints_[Impl::index(joint)].start_again(); }
+
 const std::vector<Finding>& PhysicsWorld::findings() const { return impl_->rigid_.findings; }
 void PhysicsWorld::read(Snapshot& snapshot) const { impl_->read(snapshot); }
 

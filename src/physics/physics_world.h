@@ -74,6 +74,16 @@ class PhysicsWorld {
   double wheel_rate(int wheel) const;           // rad/s
   void drive_wheel(int wheel, double rate, double max_torque);
 
+  // Between two steps. `instance` is new at the end of the world and the layout, or was removed and placed again:
+  // its bodies are where the layout has them, at rest.
+  void add(int instance);
+  // Takes an instance out: its bodies touch nothing and stay where they are. What rested on it wakes.
+  void remove(int instance);
+  // Wakes a body and all that it could touch: before it is put elsewhere, and after.
+  void disturb(int body);
+  // Its bodies were put back to where they started: a joint that is no wheel of a drive is at 0, and no command holds.
+  void start_again(int joint);
+
   // Shapes that Bullet can only approximate.
   const std::vector<Finding>& findings() const;
 

@@ -29,6 +29,7 @@ bool MayTouch::may_touch(const btCollisionObject& object_a, const btCollisionObj
   const ObjectInfo& a = info_of(object_a);
   const ObjectInfo& b = info_of(object_b);
   if (a.links.empty() || b.links.empty()) return false;    // no shapes
+  if (a.gone || b.gone) return false;
   if ((a.moved || a.body < 0) && (b.moved || b.body < 0)) return false;
   if ((a.on_plane && b.plane) || (b.on_plane && a.plane)) return false;
   if (a.instance != b.instance) return true;
@@ -39,6 +40,8 @@ bool MayTouch::may_touch(const btCollisionObject& object_a, const btCollisionObj
 PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout& layout)
     : rigid_(world, layout),
       contacts_(layout.bodies.size()),
+      world_(world),
+      layout_(layout),
       step_us_(world.step_us),
       ground_(btRigidBody::btRigidBodyConstructionInfo(0.0, nullptr, nullptr)),
       dispatcher_(&configuration_),
@@ -57,15 +60,12 @@ PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout
   solver.m_splitImpulsePenetrationThreshold = 0.0;        // penetration is undone without adding velocity
   solver.m_jointFeedbackInWorldSpace = true;
 
-  for (const auto& object : rigid_.statics) {
-    dynamics_.addCollisionObject(object->bullet.get(), btBroadphaseProxy::StaticFilter,
-                                 btBroadphaseProxy::AllFilter ^ btBroadphaseProxy::StaticFilter);
-  }
+  for (const auto& object : rigid_.statics) add_static(*object);
   const size_t n = layout.bodies.size();
   motions_.resize(n);
   twists_.resize(n);
   for (const auto& body : layout.bodies) poses_.push_back(body.X_WB.normalized());
-  add_joints(world, layout);
+  add_joints();
   for (size_t i = 0; i < n; ++i) {
     dynamics_.addRigidBody(rigid_.bodies[i].bullet.get(), btBroadphaseProxy::DefaultFilter, btBroadphaseProxy::AllFilter);
     update_box(static_cast<int>(i));
@@ -73,28 +73,35 @@ PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout
   for (JointConstraint& joint : joints_) if (joint.constraint()) dynamics_.addConstraint(joint.constraint(), true);
   for (JointConstraint& joint : wheels_) if (joint.constraint()) dynamics_.addConstraint(joint.constraint(), true);
   last_twists_ = twists_;
+  choose_substeps();
+}
+
+void PhysicsWorld::Impl::choose_substeps() {
   const int64_t longest = wheels_.empty() ? kLongestSubstep_us : kLongestSubstepOfWheels_us;
   substeps_ = static_cast<int>((step_us_ + longest - 1) / longest);
 }
 
 PhysicsWorld::Impl::~Impl() {
-  for (JointConstraint& joint : joints_) if (joint.constraint()) dynamics_.removeConstraint(joint.constraint());
-  for (JointConstraint& joint : wheels_) if (joint.constraint()) dynamics_.removeConstraint(joint.constraint());
+  for (auto* joints : {&joints_, &wheels_}) {
+    for (JointConstraint& joint : *joints) {
+      if (joint.constraint() && joint.constraint()->isEnabled()) dynamics_.removeConstraint(joint.constraint());
+    }
+  }
   dynamics_.take({});
   for (size_t i = rigid_.bodies.size(); i-- > 0;) {
     broadphase_.destroyProxy(rigid_.bodies[i].bullet->getBroadphaseHandle(), &dispatcher_);
   }
   for (size_t i = rigid_.statics.size(); i-- > 0;) {
-    broadphase_.destroyProxy(rigid_.statics[i]->bullet->getBroadphaseHandle(), &dispatcher_);
+    btBroadphaseProxy* proxy = rigid_.statics[i]->bullet->getBroadphaseHandle();
+    if (proxy) broadphase_.destroyProxy(proxy, &dispatcher_);
   }
 }
 
-JointConstraint PhysicsWorld::Impl::make_joint(const model::WorldModel& world, const model::BodyLayout& layout,
-                                               int instance, int joint_index) {
-  const auto& placed = world.models[index(instance)];
+JointConstraint PhysicsWorld::Impl::make_joint(int instance, int joint_index) {
+  const auto& placed = world_.models[index(instance)];
   const model::Joint& joint = placed.model->joints[index(joint_index)];
   const auto body_of = [&](int link) {
-    return link < 0 ? -1 : layout.links[index(layout.first_link[index(instance)] + link)].body;
+    return link < 0 ? -1 : layout_.links[index(layout_.first_link[index(instance)] + link)].body;
   };
   const int parent = body_of(joint.parent), child = body_of(joint.child);
   const Pose X_WJ = placed.X_WM * joint.X_MJ;
@@ -109,25 +116,27 @@ JointConstraint PhysicsWorld::Impl::make_joint(const model::WorldModel& world, c
   return {joint, parent < 0 ? ground_ : bullet(parent), child < 0 ? ground_ : bullet(child), in_body(parent), in_body(child)};
 }
 
-void PhysicsWorld::Impl::add_joints(const model::WorldModel& world, const model::BodyLayout& layout) {
-  joints_.reserve(layout.joints.size());
-  for (const auto& joint : layout.joints) joints_.push_back(make_joint(world, layout, joint.instance, joint.joint));
-  wheel_joint_.assign(layout.wheels.size(), -1);
-  wheel_sign_.assign(layout.wheels.size(), 1.0);
-  wheels_.reserve(layout.wheels.size());
-  for (size_t i = 0; i < layout.wheels.size(); ++i) {
-    const auto& wheel = layout.wheels[i];
-    const auto& robot = layout.robots[index(wheel.robot)];
-    const auto& link = layout.links[index(wheel.link)];
-    if (link.body < 0 || link.body == robot.body) continue;
-    wheel_joint_[i] = static_cast<int>(wheels_.size());
-    wheels_.push_back(make_joint(world, layout, robot.instance, wheel.joint));
-    const auto& model = *world.models[index(robot.instance)].model;
-    const model::Joint& joint = model.joints[index(wheel.joint)];
-    const Vec3 axis_in_M = joint.X_MJ.rotation * joint.axis.axis_in_J;
-    const Vec3 ahead_in_M = model.links[index(link.link)].X_ML.rotation * wheel.axis_in_L;
-    wheel_sign_[i] = axis_in_M.dot(ahead_in_M) < 0.0 ? -1.0 : 1.0;
+void PhysicsWorld::Impl::add_joints() {
+  for (size_t i = joints_.size(); i < layout_.joints.size(); ++i) {
+    joints_.push_back(make_joint(layout_.joints[i].instance, layout_.joints[i].joint));
   }
+  for (size_t i = wheel_joint_.size(); i < layout_.wheels.size(); ++i) add_wheel(i);
+}
+
+void PhysicsWorld::Impl::add_wheel(size_t i) {
+  const auto& wheel = layout_.wheels[i];
+  const auto& robot = layout_.robots[index(wheel.robot)];
+  const auto& link = layout_.links[index(wheel.link)];
+  wheel_joint_.push_back(-1);
+  wheel_sign_.push_back(1.0);
+  if (link.body < 0 || link.body == robot.body) return;
+  wheel_joint_[i] = static_cast<int>(wheels_.size());
+  wheels_.push_back(make_joint(robot.instance, wheel.joint));
+  const auto& model = *world_.models[index(robot.instance)].model;
+  const model::Joint& joint = model.joints[index(wheel.joint)];
+  const Vec3 axis_in_M = joint.X_MJ.rotation * joint.axis.axis_in_J;
+  const Vec3 ahead_in_M = model.links[index(link.link)].X_ML.rotation * wheel.axis_in_L;
+  wheel_sign_[i] = axis_in_M.dot(ahead_in_M) < 0.0 ? -1.0 : 1.0;
 }
 
 void PhysicsWorld::Impl::tie(int body, int other) {
@@ -204,6 +213,7 @@ void PhysicsWorld::Impl::start(int body) {
 void PhysicsWorld::Impl::choose_simulated() {
   const int n = static_cast<int>(motions_.size());
   for (int i = 0; i < n; ++i) {
+    if (rigid_.bodies[index(i)].info.gone) continue;
     if (motions_[index(i)].kind != Motion::Kind::free) {
       if (sleeping(i)) bullet(i).activate(true);
       bullet(i).setDeactivationTime(0.0);
@@ -216,6 +226,8 @@ void PhysicsWorld::Impl::choose_simulated() {
   simulated_.clear();
   for (int i = 0; i < n; ++i) {
     Motion& motion = motions_[index(i)];
+    motion.simulated = false;
+    if (rigid_.bodies[index(i)].info.gone) continue;
     const bool alone_now = alone(i);
     motion.simulated = motion.tied || !alone_now ||
                        (motion.kind != Motion::Kind::guided && !sleeping(i) && !rigid_.bodies[index(i)].info.moved);

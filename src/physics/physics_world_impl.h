@@ -50,6 +50,9 @@ class PhysicsWorld::Impl {
   }
   void set_support(int body, Support support);
   void apply_impulse(int body, const Vec3& linear, const Vec3& angular);
+  void add(int instance);
+  void remove(int instance);
+  void disturb(int body);
   btRigidBody& bullet(int body) { return *rigid_.bodies[index(body)].bullet; }
   bool alone(int body) const { return broadphase_.alone(rigid_.bodies[index(body)].bullet->getBroadphaseHandle()); }
   bool sleeping(int body) const { return rigid_.bodies[index(body)].bullet->getActivationState() == ISLAND_SLEEPING; }
@@ -68,8 +71,14 @@ class PhysicsWorld::Impl {
   std::vector<double> wheel_sign_;            // axis of the joint against that of the wheel
 
  private:
-  void add_joints(const model::WorldModel& world, const model::BodyLayout& layout);
-  JointConstraint make_joint(const model::WorldModel& world, const model::BodyLayout& layout, int instance, int joint);
+  void add_joints();                  // those that are new
+  void add_wheel(size_t wheel);
+  JointConstraint make_joint(int instance, int joint);
+  void add_joints(int instance);      // in the simulation, too
+  void add_static(StaticObject& object);
+  void begin_again(int body);
+  void refilter_all();
+  void choose_substeps();
   void tie(int body, int other);
   void push_to_bullet(int body);      // our pose and twist
   void pull_from_bullet(int body);
@@ -77,6 +86,8 @@ class PhysicsWorld::Impl {
   void update_box(int body);
   void choose_simulated();
 
+  const model::WorldModel& world_;
+  const model::BodyLayout& layout_;
   int64_t step_us_;
   int substeps_ = 1;
   MayTouch filter_;

@@ -6,6 +6,8 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "physics/simplifications.h"
+
 namespace ruedo::physics {
 
 namespace {
@@ -86,37 +88,46 @@ bool carries_kinematic_drive(const model::WorldModel& world, const model::BodyLa
 
 }  // namespace
 
-RigidBodies::RigidBodies(const model::WorldModel& world, const model::BodyLayout& layout) {
-  make_statics(world, layout);
+RigidBodies::RigidBodies(const model::WorldModel& world, const model::BodyLayout& layout)
+    : findings(simplifications(world, layout)) {
+  for (size_t link = 0; link < layout.links.size(); ++link) make_statics(world, layout, link);
   bodies.resize(layout.bodies.size());
   for (size_t i = 0; i < bodies.size(); ++i) make_body(world, layout, static_cast<int>(i));
 }
 
-void RigidBodies::make_statics(const model::WorldModel& world, const model::BodyLayout& layout) {
-  for (size_t index = 0; index < layout.links.size(); ++index) {
-    const auto& placement = layout.links[index];
-    if (placement.body >= 0) continue;
-    const auto& model = *world.models[static_cast<size_t>(placement.instance)].model;
-    const auto& collisions = model.links[static_cast<size_t>(placement.link)].collisions;
-    for (size_t c = 0; c < collisions.size(); ++c) {
-      const auto& collision = collisions[c];
-      btCollisionShape* shape = shapes_.fixed(collision.geometry);
-      if (!shape) continue;
-      auto object = std::make_unique<StaticObject>();
-      object->bullet = std::make_unique<btCollisionObject>();
-      btCollisionObject& bullet = *object->bullet;
-      bullet.setCollisionShape(shape);
-      bullet.setWorldTransform(to_bt((placement.X_BL * collision.X_LC).normalized()));
-      bullet.setCollisionFlags(btCollisionObject::CF_STATIC_OBJECT);
-      bullet.setFriction(collision.surface.friction);
-      bullet.setRestitution(collision.surface.restitution);
-      object->info.instance = placement.instance;
-      object->info.plane = collision.geometry.shape == model::Shape::plane;
-      object->info.links.push_back(static_cast<int>(index));
-      object->info.collisions.push_back(static_cast<int>(c));
-      bullet.setUserPointer(&object->info);
-      statics.push_back(std::move(object));
-    }
+void RigidBodies::append(const model::WorldModel& world, const model::BodyLayout& layout, int instance) {
+  const size_t first = bodies.size();
+  for (size_t link = 0; link < layout.links.size(); ++link) {
+    if (layout.links[link].instance == instance) make_statics(world, layout, link);
+  }
+  bodies.resize(layout.bodies.size());
+  for (size_t i = 0; i < first; ++i) bodies[i].bullet->setUserPointer(&bodies[i].info);    // they may have moved
+  for (size_t i = first; i < bodies.size(); ++i) make_body(world, layout, static_cast<int>(i));
+}
+
+void RigidBodies::make_statics(const model::WorldModel& world, const model::BodyLayout& layout, size_t index) {
+  const auto& placement = layout.links[index];
+  if (placement.body >= 0) return;
+  const auto& model = *world.models[static_cast<size_t>(placement.instance)].model;
+  const auto& collisions = model.links[static_cast<size_t>(placement.link)].collisions;
+  for (size_t c = 0; c < collisions.size(); ++c) {
+    const auto& collision = collisions[c];
+    btCollisionShape* shape = shapes_.fixed(collision.geometry);
+    if (!shape) continue;
+    auto object = std::make_unique<StaticObject>();
+    object->bullet = std::make_unique<btCollisionObject>();
+    btCollisionObject& bullet = *object->bullet;
+    bullet.setCollisionShape(shape);
+    bullet.setWorldTransform(to_bt((placement.X_BL * collision.X_LC).normalized()));
+    bullet.setCollisionFlags(btCollisionObject::CF_STATIC_OBJECT);
+    bullet.setFriction(collision.surface.friction);
+    bullet.setRestitution(collision.surface.restitution);
+    object->info.instance = placement.instance;
+    object->info.plane = collision.geometry.shape == model::Shape::plane;
+    object->info.links.push_back(static_cast<int>(index));
+    object->info.collisions.push_back(static_cast<int>(c));
+    bullet.setUserPointer(&object->info);
+    statics.push_back(std::move(object));
   }
 }
 
@@ -196,7 +207,8 @@ void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLay
   }
   if (kinematic) bullet.setCollisionFlags(bullet.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
   bullet.setFlags(bullet.getFlags() | BT_DISABLE_WORLD_GRAVITY);    // gravity is set for each body
-  bullet.setGravity(gravity && !kinematic ? to_bt(world.gravity) : btVector3(0, 0, 0));
+  body.gravity = gravity && !kinematic ? world.gravity : Vec3(0, 0, 0);
+  bullet.setGravity(to_bt(body.gravity));
 
   body.info.body = index;
   body.info.instance = placement.instance;

@@ -19,6 +19,7 @@ struct ObjectInfo {
   bool plane = false;
   bool on_plane = false;           // held up by a plane without a contact pair
   bool moved = false;              // kinematic: moved from outside, never by contacts
+  bool gone = false;               // its model was removed: it is nowhere
   std::vector<int> links;          // of each child shape; one entry for a single shape
   std::vector<int> collisions;     // of each child shape, in its link
   std::vector<int> joined;         // bodies that a joint ties to this one
@@ -34,6 +35,7 @@ struct RigidBody {
   std::unique_ptr<btRigidBody> bullet;
   ObjectInfo info;
   Pose X_BI;
+  Vec3 gravity = Vec3::Zero();     // at the start
   Vec3 box_center = Vec3::Zero(), box_half = Vec3::Zero();    // bounds of the shapes, in B
 };
 
@@ -46,12 +48,15 @@ class RigidBodies {
  public:
   RigidBodies(const model::WorldModel& world, const model::BodyLayout& layout);
 
+  // Makes what the layout has of a new instance, at the end of the lists.
+  void append(const model::WorldModel& world, const model::BodyLayout& layout, int instance);
+
   std::vector<RigidBody> bodies;                           // as in the layout
   std::vector<std::unique_ptr<StaticObject>> statics;      // in world order
   std::vector<Finding> findings;
 
  private:
-  void make_statics(const model::WorldModel& world, const model::BodyLayout& layout);
+  void make_statics(const model::WorldModel& world, const model::BodyLayout& layout, size_t link);
   void make_body(const model::WorldModel& world, const model::BodyLayout& layout, int index);
   ShapeFactory shapes_;
 };

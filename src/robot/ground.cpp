@@ -10,8 +10,9 @@ namespace ruedo::robot {
 std::vector<double> level_planes(const model::WorldModel& world, const model::BodyLayout& layout) {
   std::vector<double> heights;
   for (const auto& placement : layout.links) {
-    if (placement.body >= 0) continue;
-    const auto& model = *world.models[static_cast<size_t>(placement.instance)].model;
+    const auto& instance = world.models[static_cast<size_t>(placement.instance)];
+    if (placement.body >= 0 || instance.removed) continue;
+    const auto& model = *instance.model;
     for (const auto& collision : model.links[static_cast<size_t>(placement.link)].collisions) {
       if (collision.geometry.shape != model::Shape::plane) continue;
       const Pose X_WC = placement.X_BL * collision.X_LC;

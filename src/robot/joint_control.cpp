@@ -62,6 +62,10 @@ int8_t JointControl::apply(int robot, const JointCommand& command) {
   return motion_status_t::REASON_NONE;
 }
 
+void JointControl::forget(int instance) {
+  std::erase_if(targets_, [&](const Target& target) { return layout_.joints[static_cast<size_t>(target.joint)].instance == instance; });
+}
+
 void JointControl::before_step() {
   for (const Target& target : targets_) {
     const double error = target.position - physics_.joint_position(target.joint);

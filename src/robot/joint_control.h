@@ -18,6 +18,7 @@ class JointControl {
   // modes, numbers that are not finite.
   int8_t apply(int robot, const JointCommand& command);
   void before_step();
+  void forget(int instance);    // no command holds for its joints
 
  private:
   struct Target {

@@ -7,13 +7,18 @@
 namespace ruedo::robot {
 
 Mover::Mover(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics, int instance)
-    : physics_(physics), step_us_(world.step_us) {
+    : physics_(physics), instance_(instance), step_us_(world.step_us) {
   const auto& placed = world.models[static_cast<size_t>(instance)];
   read(*placed.model->path);
   for (size_t i = 0; i < layout.bodies.size(); ++i) {
     if (layout.bodies[i].instance != instance) continue;
     parts_.push_back({static_cast<int>(i), placed.X_WM.inverse() * layout.bodies[i].X_WB});
   }
+  start_again(0);
+}
+
+void Mover::start_again(SimTime now) {
+  offset_ = -now;
   const Pose X_WM = pose_at(0);
   for (const Part& part : parts_) physics_.set_pose(part.body, (X_WM * part.X_MB).normalized());
 }
@@ -56,7 +61,7 @@ Pose Mover::pose_at(SimTime time) const {
 }
 
 void Mover::before_step(SimTime now) {
-  const Pose X_WM = pose_at(now + step_us_);
+  const Pose X_WM = pose_at(now + offset_ + step_us_);
   const double step_s = static_cast<double>(step_us_) * 1e-6;
   for (const Part& part : parts_) {
     const Pose end = (X_WM * part.X_MB).normalized();

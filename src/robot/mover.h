@@ -17,6 +17,11 @@ class Mover {
   // is there already; after the last one it stays, or begins again where the path is a loop.
   Pose pose_at(SimTime time) const;
 
+  int instance() const { return instance_; }
+  // The path begins anew at that sim time.
+  void start_again(SimTime now);
+  void shift_time(SimTime us) { offset_ += us; }    // sim time was set back by so much; the path goes on
+
   // Sends its bodies to where they are one step later.
   void before_step(SimTime now);
 
@@ -32,7 +37,9 @@ class Mover {
 
   void read(const Element& path);
   physics::PhysicsWorld& physics_;
+  int instance_;
   int64_t step_us_;
+  SimTime offset_ = 0;    // time of the path less sim time
   bool loop_ = true;
   std::vector<Waypoint> waypoints_;
   std::vector<Part> parts_;

@@ -47,7 +47,9 @@ RayTable::RayTable(const model::WorldModel& world, const model::BodyLayout& layo
     : bodies(layout.bodies.size()) {
   for (size_t i = 0; i < layout.links.size(); ++i) {
     const model::LinkPlacement& placement = layout.links[i];
-    const model::Link& link = world.models[static_cast<size_t>(placement.instance)].model->links[static_cast<size_t>(placement.link)];
+    const model::ModelInstance& instance = world.models[static_cast<size_t>(placement.instance)];
+    if (instance.removed) continue;
+    const model::Link& link = instance.model->links[static_cast<size_t>(placement.link)];
     const int link_index = static_cast<int>(i);
     if (visuals) {
       for (size_t v = 0; v < link.visuals.size(); ++v)

@@ -198,11 +198,21 @@ Pose link_pose(const model::BodyLayout& layout, const Snapshot& snapshot, size_t
 RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLayout& layout) {
   Builder builder(*this);
   std::map<const model::Link*, int> kinds;    // looked up only
-  int statics = 0;
+  std::vector<size_t> label_of_body(layout.bodies.size()), label_of_static(layout.links.size());
+  for (size_t i = 0; i < layout.listed.size(); ++i) {
+    const model::ListedBody& listed = layout.listed[i];
+    if (listed.body >= 0) label_of_body[static_cast<size_t>(listed.body)] = i + 1;
+    else label_of_static[static_cast<size_t>(listed.link)] = i + 1;
+  }
   bool first = true;
   for (size_t i = 0; i < layout.links.size(); ++i) {
     const model::LinkPlacement& placement = layout.links[i];
     const auto instance = static_cast<size_t>(placement.instance);
+    if (world.models[instance].removed) {
+      kind_of_link.push_back(-1);
+      label_of_link.push_back(0);
+      continue;
+    }
     const model::Link& link = world.models[instance].model->links[static_cast<size_t>(placement.link)];
     const auto [at, inserted] = kinds.try_emplace(&link, -1);
     if (inserted) {
@@ -215,10 +225,8 @@ RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLa
     kind_of_link.push_back(at->second);
     for (const model::Light& light : link.lights) lights.push_back({light, static_cast<int>(i)});
 
-    // The order of ruedo/info's bodies: what moves, then the links that do not.
-    const int body = placement.body >= 0 ? placement.body : static_cast<int>(layout.bodies.size()) + statics++;
-    const int label = body + 1;
-    label_of_link.push_back(static_cast<uint16_t>(std::min(label, 65535)));
+    const size_t label = placement.body >= 0 ? label_of_body[static_cast<size_t>(placement.body)] : label_of_static[i];
+    label_of_link.push_back(static_cast<uint16_t>(std::min<size_t>(label, 65535)));
 
     if (at->second < 0) continue;
     const Pose X_WL = placement.body < 0 ? placement.X_BL

@@ -28,9 +28,14 @@ class Imu : public Sensor {
 
   void observe(const Snapshot& now, Outbox&) override {
     const Vec3& omega = now.body_twists[static_cast<size_t>(body_)].angular;
-    if (time_ >= 0) alpha_ = (omega - omega_before_) / (1e-6 * static_cast<double>(now.time - time_));
+    if (time_ >= 0 && now.time > time_) alpha_ = (omega - omega_before_) / (1e-6 * static_cast<double>(now.time - time_));
     omega_before_ = omega;
     time_ = now.time;
+  }
+
+  void shift_time(SimTime us) override {
+    time_ -= us;
+    sample_time_ -= us;
   }
 
   void sample(const SampleInput& input, Outbox& out) override {

@@ -94,6 +94,11 @@ class Lrf : public Sensor {
     while (track_.size() > 2 && track_[1].time <= now.time - sweep_us_) track_.erase(track_.begin());
   }
 
+  void shift_time(SimTime us) override {
+    for (Place& place : track_) place.time -= us;
+    sample_time_ -= us;
+  }
+
   void sample(const SampleInput& input, Outbox& out) override {
     RandomStream stream = random_.stream(static_cast<uint64_t>(input.sample));
     aim(input.snapshot, stream);

@@ -83,7 +83,7 @@ class Odometry : public Sensor {
     if (time_ < 0) {
       for (Wheel& wheel : wheels_) start(wheel, now);
       side_rates(speed_before_);
-    } else {
+    } else if (now.time > time_) {
       const double dt_s = 1e-6 * static_cast<double>(now.time - time_);
       turn_wheels(now, dt_s);
       configuration_.trapezoid ? integrate_trapezoid(dt_s) : integrate_arc();
@@ -93,6 +93,11 @@ class Odometry : public Sensor {
       resets_ = robot.odometry_resets;
       x_ = y_ = theta_ = 0.0;
     }
+  }
+
+  void shift_time(SimTime us) override {
+    time_ -= us;
+    sample_time_ -= us;
   }
 
   void sample(const SampleInput& input, Outbox& out) override {

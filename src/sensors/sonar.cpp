@@ -72,6 +72,11 @@ class Sonar : public Sensor {
     configure(ours ? *ours : kNothing, aperture, setup);
   }
 
+  // What fired before the time began anew has fired at its beginning.
+  void shift_time(SimTime us) override {
+    for (int64_t& fired : message_.fired_utime) fired = fired < 0 ? -1 : std::max<int64_t>(0, fired - us);
+  }
+
   void sample(const SampleInput& input, Outbox& out) override {
     const Pose X_WS = mount_.X_WS(input.snapshot);
     RandomStream stream = random_.stream(static_cast<uint64_t>(input.sample));

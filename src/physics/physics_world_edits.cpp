@@ -1,0 +1,137 @@
+// Instances that come and go between two steps.
+//
+// What is removed keeps its place in the lists, so that all numbers stay; the broadphase refuses all its pairs, and no
+// step looks at it. The same model may be put into that place again.
+#include "physics/physics_world_impl.h"
+
+namespace ruedo::physics {
+
+void PhysicsWorld::Impl::disturb(int body) {
+  btRigidBody& itself = bullet(body);
+  broadphase_.for_each_partner(itself.getBroadphaseHandle(), [](btCollisionObject& partner) { partner.activate(true); });
+  itself.activate(true);
+}
+
+void PhysicsWorld::Impl::refilter_all() {
+  for (RigidBody& rigid : rigid_.bodies) broadphase_.refilter(rigid.bullet->getBroadphaseHandle(), &dispatcher_);
+}
+
+void PhysicsWorld::Impl::add_static(StaticObject& object) {
+  dynamics_.addCollisionObject(object.bullet.get(), btBroadphaseProxy::StaticFilter,
+                               btBroadphaseProxy::AllFilter ^ btBroadphaseProxy::StaticFilter);
+}
+
+void PhysicsWorld::Impl::add(int instance) {
+  const auto is_of = [instance](const ObjectInfo& info) { return info.instance == instance; };
+  bool again = false, has_statics = false;
+  for (const auto& object : rigid_.statics) again |= is_of(object->info);
+  for (const RigidBody& rigid : rigid_.bodies) again |= is_of(rigid.info);
+  const size_t first = rigid_.bodies.size();
+  if (!again) rigid_.append(world_, layout_, instance);
+
+  for (const auto& object : rigid_.statics) {
+    if (!is_of(object->info)) continue;
+    object->info.gone = false;
+    const auto& link = layout_.links[index(object->info.links.front())];
+    const auto& collision = world_.models[index(instance)].model->links[index(link.link)].collisions[index(object->info.collisions.front())];
+    object->bullet->setWorldTransform(to_bt((link.X_BL * collision.X_LC).normalized()));
+    add_static(*object);
+    has_statics = true;
+  }
+  for (size_t i = first; i < rigid_.bodies.size(); ++i) {
+    motions_.emplace_back();
+    poses_.push_back(layout_.bodies[i].X_WB.normalized());
+    twists_.emplace_back();
+    last_twists_.emplace_back();
+  }
+  contacts_.resize(rigid_.bodies.size());
+  for (int i = 0; i < static_cast<int>(rigid_.bodies.size()); ++i) {
+    if (is_of(rigid_.bodies[index(i)].info)) begin_again(i);
+  }
+  add_joints(instance);
+  for (size_t i = first; i < rigid_.bodies.size(); ++i) {
+    dynamics_.addRigidBody(rigid_.bodies[i].bullet.get(), btBroadphaseProxy::DefaultFilter, btBroadphaseProxy::AllFilter);
+  }
+  for (int i = 0; i < static_cast<int>(rigid_.bodies.size()); ++i) {
+    if (!is_of(rigid_.bodies[index(i)].info)) continue;
+    update_box(i);
+    broadphase_.refilter(bullet(i).getBroadphaseHandle(), &dispatcher_);
+  }
+  if (has_statics) refilter_all();
+  choose_substeps();
+}
+
+// As a new body where the layout has it.
+void PhysicsWorld::Impl::begin_again(int body) {
+  RigidBody& rigid = rigid_.bodies[index(body)];
+  rigid.info.gone = rigid.info.on_plane = false;
+  rigid.info.joined.clear();
+  motions_[index(body)] = {};
+  poses_[index(body)] = layout_.bodies[index(body)].X_WB.normalized();
+  twists_[index(body)] = last_twists_[index(body)] = {};
+  rigid.bullet->setLinearFactor({1, 1, 1});
+  rigid.bullet->setAngularFactor(btVector3(1, 1, 1));
+  rigid.bullet->setGravity(to_bt(rigid.gravity));
+  push_to_bullet(body);
+  rigid.bullet->clearForces();
+  rigid.bullet->activate(true);
+}
+
+void PhysicsWorld::Impl::add_joints(int instance) {
+  const auto again = [&](JointConstraint& joint, int joint_of_model) {
+    std::destroy_at(&joint);
+    std::construct_at(&joint, make_joint(instance, joint_of_model));
+    if (joint.constraint()) dynamics_.addConstraint(joint.constraint(), true);
+  };
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    if (layout_.joints[i].instance == instance) again(joints_[i], layout_.joints[i].joint);
+  }
+  for (size_t i = 0; i < wheel_joint_.size(); ++i) {
+    const auto& wheel = layout_.wheels[i];
+    if (wheel_joint_[i] >= 0 && layout_.robots[index(wheel.robot)].instance == instance) again(wheels_[index(wheel_joint_[i])], wheel.joint);
+  }
+  const size_t joints = joints_.size(), wheels = wheels_.size();
+  add_joints();
+  for (size_t i = joints; i < joints_.size(); ++i) if (joints_[i].constraint()) dynamics_.addConstraint(joints_[i].constraint(), true);
+  for (size_t i = wheels; i < wheels_.size(); ++i) if (wheels_[i].constraint()) dynamics_.addConstraint(wheels_[i].constraint(), true);
+}
+
+void PhysicsWorld::Impl::remove(int instance) {
+  const auto is_of = [instance](const ObjectInfo& info) { return info.instance == instance; };
+  for (int i = 0; i < static_cast<int>(rigid_.bodies.size()); ++i) {
+    RigidBody& rigid = rigid_.bodies[index(i)];
+    bool neighbour = is_of(rigid.info);
+    broadphase_.for_each_partner(rigid.bullet->getBroadphaseHandle(), [&](btCollisionObject& partner) { neighbour |= is_of(info_of(partner)); });
+    if (neighbour && !rigid.info.gone) rigid.bullet->activate(true);
+  }
+  const auto let_go = [&](JointConstraint& joint) {
+    if (joint.constraint() && joint.constraint()->isEnabled()) dynamics_.removeConstraint(joint.constraint());
+    joint.disable();
+  };
+  for (size_t i = 0; i < joints_.size(); ++i) if (layout_.joints[i].instance == instance) let_go(joints_[i]);
+  for (size_t i = 0; i < wheel_joint_.size(); ++i) {
+    if (wheel_joint_[i] >= 0 && layout_.robots[index(layout_.wheels[i].robot)].instance == instance) let_go(wheels_[index(wheel_joint_[i])]);
+  }
+  bool has_statics = false;
+  for (const auto& object : rigid_.statics) {
+    if (!is_of(object->info)) continue;
+    object->info.gone = true;
+    has_statics = true;
+  }
+  for (int i = 0; i < static_cast<int>(rigid_.bodies.size()); ++i) {
+    RigidBody& rigid = rigid_.bodies[index(i)];
+    if (!is_of(rigid.info)) continue;
+    rigid.info.gone = true;
+    twists_[index(i)] = last_twists_[index(i)] = {};
+    broadphase_.refilter(rigid.bullet->getBroadphaseHandle(), &dispatcher_);
+  }
+  if (!has_statics) return;
+  refilter_all();    // nobody may know them when their boxes go
+  for (const auto& object : rigid_.statics) {
+    if (!is_of(object->info)) continue;
+    broadphase_.destroyProxy(object->bullet->getBroadphaseHandle(), &dispatcher_);
+    object->bullet->setBroadphaseHandle(nullptr);
+  }
+}
+
+}  // namespace ruedo::physics

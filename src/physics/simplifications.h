@@ -1,0 +1,13 @@
+// What of a world the physics does more simply than its file says, by file and line.
+#pragma once
+
+#include <vector>
+
+#include "model/body_layout.h"
+
+namespace ruedo::physics {
+
+// Ball and universal joints (they hold; their state and motors are partial), and bodies whose shapes have different friction.
+std::vector<Finding> simplifications(const model::WorldModel& world, const model::BodyLayout& layout);
+
+}  // namespace ruedo::physics
