@@ -68,11 +68,24 @@ void wander(const rc::Robot& robot, double duration) {
   }
 }
 
+struct Place {
+  double x, y, heading;    // m, rad
+};
+
+// From one place to another, seen from the first.
+Place moved(const Place& start, const Place& end) {
+  const double x = end.x - start.x, y = end.y - start.y, c = std::cos(start.heading), s = std::sin(start.heading);
+  return {c * x + s * y, c * y - s * x, std::remainder(end.heading - start.heading, 2.0 * M_PI)};
+}
+
+Place place(const rc::Pose& pose) { return {pose.x(), pose.y(), pose.heading()}; }
+Place place(const rc::Odometry& odometry) { return {odometry.x, odometry.y, odometry.theta}; }
+
 int run(std::map<std::string, std::string>& options) {
   rc::Simulation sim = options.count("--launch") ? rc::launch(options["--launch"]) : rc::connect(options["--url"]);
   const rc::Robot robot = options.count("--robot") ? sim.robot(options["--robot"]) : sim.robots().at(0);
   const double duration = options.count("--duration") ? std::stod(options["--duration"]) : rc::kForever;
-  const auto start = robot.pose().latest();
+  const Place pose_start = place(robot.pose().latest()), odometry_start = place(robot.odometry().latest());
   std::printf("%s wanders in %s%s\n", robot.name().c_str(), sim.world().c_str(), duration < rc::kForever ? "" : "; Ctrl-C ends it");
   std::fflush(stdout);
 
@@ -86,12 +99,11 @@ int run(std::map<std::string, std::string>& options) {
     std::printf("camera    %s\n", file.c_str());
     break;
   }
-  // Odometry starts at zero where the robot starts; the example began at `start`.
-  const auto truth = robot.pose().next();
-  const auto odometry = robot.odometry().next();
-  std::printf("true pose x %.3f m, y %.3f m, heading %.3f rad; it began at x %.3f m, y %.3f m\n", truth.x(), truth.y(),
-              truth.heading(), start.x(), start.y());
-  std::printf("odometry  x %.3f m, y %.3f m, theta %.3f rad, since the robot's start\n", odometry.x, odometry.y, odometry.theta);
+  const Place truth = moved(pose_start, place(robot.pose().next()));
+  const Place belief = moved(odometry_start, place(robot.odometry().next()));
+  std::printf("true pose x %.3f m, y %.3f m, heading %.3f rad from where it began\n", truth.x, truth.y, truth.heading);
+  std::printf("odometry  x %.3f m, y %.3f m, heading %.3f rad, which is %.3f m off\n", belief.x, belief.y, belief.heading,
+              std::hypot(truth.x - belief.x, truth.y - belief.y));
   return 0;
 }
 

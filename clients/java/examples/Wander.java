@@ -76,12 +76,30 @@ public final class Wander {
         }
     }
 
+    private static double[] place(Pose pose) {
+        return new double[] {pose.x(), pose.y(), pose.heading()};
+    }
+
+    private static double[] place(Odometry odometry) {
+        return new double[] {odometry.x, odometry.y, odometry.theta};
+    }
+
+    /** From one x, y, heading (m, rad) to another, seen from the first. */
+    private static double[] moved(double[] start, double[] end) {
+        double x = end[0] - start[0];
+        double y = end[1] - start[1];
+        double cos = Math.cos(start[2]);
+        double sin = Math.sin(start[2]);
+        return new double[] {cos * x + sin * y, cos * y - sin * x, Math.IEEEremainder(end[2] - start[2], 2.0 * Math.PI)};
+    }
+
     private static void run(Map<String, String> options) throws java.io.IOException {
         String world = options.get("--launch");
         try (Simulation sim = world != null ? Ruedo.launch(world) : Ruedo.connect(options.get("--url"))) {
             Robot robot = options.containsKey("--robot") ? sim.robot(options.get("--robot")) : sim.robots().get(0);
             double duration = Double.parseDouble(options.getOrDefault("--duration", "Infinity"));
-            Pose start = robot.pose().latest();
+            double[] poseStart = place(robot.pose().latest());
+            double[] odometryStart = place(robot.odometry().latest());
             System.out.println(robot.name + " wanders in " + sim.world() + (Double.isInfinite(duration) ? "; Ctrl-C ends it" : ""));
 
             wander(robot, duration);
@@ -92,13 +110,11 @@ public final class Wander {
                 robot.camera().latest().save(Path.of(file));
                 System.out.println("camera    " + file);
             }
-            // Odometry starts at zero where the robot starts; the example began at `start`.
-            Pose truth = robot.pose().next();
-            Odometry odometry = robot.odometry().next();
-            System.out.printf("true pose x %.3f m, y %.3f m, heading %.3f rad; it began at x %.3f m, y %.3f m%n", truth.x(), truth.y(),
-                    truth.heading(), start.x(), start.y());
-            System.out.printf("odometry  x %.3f m, y %.3f m, theta %.3f rad, since the robot's start%n", odometry.x, odometry.y,
-                    odometry.theta);
+            double[] truth = moved(poseStart, place(robot.pose().next()));
+            double[] belief = moved(odometryStart, place(robot.odometry().next()));
+            System.out.printf("true pose x %.3f m, y %.3f m, heading %.3f rad from where it began%n", truth[0], truth[1], truth[2]);
+            System.out.printf("odometry  x %.3f m, y %.3f m, heading %.3f rad, which is %.3f m off%n", belief[0], belief[1], belief[2],
+                    Math.hypot(truth[0] - belief[0], truth[1] - belief[1]));
         }
     }
 

@@ -41,6 +41,13 @@ def wander(robot: ruedo.Robot, duration: float) -> None:
             robot.set_velocity(0.0, turning)
 
 
+def moved(start: tuple[float, float, float], end: tuple[float, float, float]) -> tuple[float, float, float]:
+    """From one x, y, heading (m, rad) to another, seen from the first."""
+    x, y, turned = (b - a for a, b in zip(start, end))
+    cos, sin = math.cos(start[2]), math.sin(start[2])
+    return cos * x + sin * y, cos * y - sin * x, math.remainder(turned, math.tau)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--robot", help="default: the first")
@@ -52,9 +59,10 @@ def main() -> None:
 
     with ruedo.launch(options.launch) if options.launch else ruedo.connect(options.url) as sim:
         robot = sim.robot(options.robot) if options.robot else sim.robots[0]
-        start = robot.pose.latest()
-        print(f"{robot.name} wanders in {sim.world}{'; Ctrl-C ends it' if options.duration == math.inf else ''}", flush=True)
+        pose, odometry = robot.pose.latest(), robot.odometry.latest()
+        pose_start, odometry_start = (pose.x, pose.y, pose.heading), (odometry.x, odometry.y, odometry.theta)
         try:
+            print(f"{robot.name} wanders in {sim.world}{'; Ctrl-C ends it' if options.duration == math.inf else ''}", flush=True)
             wander(robot, options.duration)
         except KeyboardInterrupt:
             pass
@@ -63,11 +71,12 @@ def main() -> None:
         if any(d.type == "image_t" for d in robot.devices):
             robot.camera.latest().save(options.picture)
             print(f"camera    {options.picture}")
-        # Odometry starts at zero where the robot starts; the example began at `start`.
-        truth, odometry = robot.pose.next(), robot.odometry.next()
-        print(f"true pose x {truth.x:.3f} m, y {truth.y:.3f} m, heading {truth.heading:.3f} rad; "
-              f"it began at x {start.x:.3f} m, y {start.y:.3f} m")
-        print(f"odometry  x {odometry.x:.3f} m, y {odometry.y:.3f} m, theta {odometry.theta:.3f} rad, since the robot's start")
+        pose, odometry = robot.pose.next(), robot.odometry.next()
+        truth = moved(pose_start, (pose.x, pose.y, pose.heading))
+        belief = moved(odometry_start, (odometry.x, odometry.y, odometry.theta))
+        print(f"true pose x {truth[0]:.3f} m, y {truth[1]:.3f} m, heading {truth[2]:.3f} rad from where it began")
+        print(f"odometry  x {belief[0]:.3f} m, y {belief[1]:.3f} m, heading {belief[2]:.3f} rad, "
+              f"which is {math.dist(truth[:2], belief[:2]):.3f} m off")
 
 
 if __name__ == "__main__":
