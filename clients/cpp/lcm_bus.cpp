@@ -83,7 +83,16 @@ void dispatch(const lcm_recv_buf_t* buffer, const char*, void* handler) {
 std::string resolve_url(const std::string& url) {
   if (!url.empty()) return url;
   const char* named = std::getenv("LCM_DEFAULT_URL");
-  return named && *named ? named : "udpm://239.255.76.67:7667?ttl=0";
+  if (named && *named) return named;
+  // What `ruedo run` serves by itself: TCP where multicast has no route.
+  return has_multicast_route() ? "udpm://239.255.76.67:7667?ttl=0" : "tcpq://127.0.0.1:7700";
+}
+
+bool is_served(const std::string& url) {
+  const Address address = split(url);
+  std::string why;
+  return address.scheme != "tcpq" || can_connect(address.host.empty() ? "127.0.0.1" : address.host,
+                                                 address.port.empty() ? "7700" : address.port, SOCK_STREAM, why);
 }
 
 bool has_multicast_route(const std::string& group) {

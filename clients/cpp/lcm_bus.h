@@ -18,8 +18,10 @@
 
 namespace ruedo::client {
 
-std::string resolve_url(const std::string& url);    // or LCM_DEFAULT_URL, or LCM's default with ttl 0
+// Or LCM_DEFAULT_URL, or LCM's default with ttl 0, or TCP where multicast has no route.
+std::string resolve_url(const std::string& url);
 bool has_multicast_route(const std::string& group = "239.255.76.67");
+bool is_served(const std::string& url);    // false for a tcpq address where nobody listens
 
 // Thread safe. Handlers run in the receiving thread, one at a time.
 class LcmBus {

@@ -82,6 +82,10 @@ std::string free_url(int& token) {
     const uint16_t port = port_of(token);
     if (!has_multicast_route()) {
       close(std::exchange(token, -1));    // the server itself will listen on it
+      static std::once_flag said;
+      std::call_once(said, [&] {
+        std::fprintf(stderr, "ruedo: no multicast route here: launch() speaks LCM over TCP, LCM_DEFAULT_URL=tcpq://127.0.0.1:%d\n", port);
+      });
       return "tcpq://127.0.0.1:" + std::to_string(port);
     }
     const int probe = bound_socket(SOCK_DGRAM, "0.0.0.0", port);    // fails when any LCM program uses the port
@@ -108,6 +112,7 @@ ServerProcess::ServerProcess(const std::string& world, const LaunchOptions& opti
   for (const std::string& word : command) command_ += (command_.empty() ? "" : " ") + word;
   try {
     start(command, options.verbose);
+    await_port(options.timeout);
   } catch (...) {
     end();
     throw;
@@ -148,6 +153,15 @@ void ServerProcess::start(const std::vector<std::string>& command, bool verbose)
     pid_ = -1;
     throw LaunchError(command[0] + " cannot be started: " + std::strerror(error));
   }
+}
+
+// A tcpq server listens once its world is loaded; who ends before that is found out by the connection.
+void ServerProcess::await_port(double timeout) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(timeout);
+  while (!is_served(url_) && !ended() && std::chrono::steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  if (const auto how = ended()) throw LaunchError(*how);
 }
 
 bool ServerProcess::poll() {

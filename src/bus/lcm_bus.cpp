@@ -16,6 +16,12 @@
 
 namespace ruedo::bus {
 
+namespace {
+
+constexpr int kConnectMs = 2000;
+
+}  // namespace
+
 std::vector<std::string> channel_patterns(const std::vector<std::string>& names) {
   std::set<std::string> patterns;
   for (const std::string& name : names) {
@@ -36,6 +42,10 @@ std::vector<std::string> channel_patterns(const std::vector<std::string>& names)
 
 LcmBus::LcmBus(const std::string& url) : url_(parse_url(url)) {
   check_route(url_);
+  if (url_.scheme == "tcpq" && !is_served(url_, kConnectMs)) {
+    throw EnvironmentError("nothing listens at " + url_.str() + ": start `ruedo run` with that --lcm first");
+  }
+  receive_buffer_ = static_cast<size_t>(receive_buffer(url_));    // -1 becomes the largest
   out_ = std::make_unique<lcm::LCM>(url_.str());
   if (!out_->good()) throw EnvironmentError("LCM cannot open '" + url_.str() + "': run `ruedo doctor`");
 }
@@ -51,6 +61,11 @@ void LcmBus::stop() {
 }
 
 void LcmBus::publish(const std::string& channel, const uint8_t* data, size_t size) {
+  if (size > receive_buffer_ && !told_large_.exchange(true)) {
+    spdlog::warn("a message of {} bytes on {} does not fit into a receive buffer of {} bytes: LCM clients on this host may miss it. Use JPEG, or "
+                 "--lcm tcpq://127.0.0.1:7700, or run: sudo sysctl -w net.core.rmem_max=2097152, with recv_buf_size=2097152 in the URL",
+                 size, channel, receive_buffer_);
+  }
   if (out_->publish(channel, data, static_cast<unsigned>(size)) != 0) ++failed_;
 }
 
@@ -81,7 +96,7 @@ void LcmBus::subscribe() {
     lcm::Subscription* subscription = in_->subscribe(pattern, &LcmBus::on_message, this);
     if (subscription) subscription->setQueueCapacity(queue_size_);
   }
-  if (url_.scheme != "memq") {
+  if (url_.scheme == "udpm") {
     lcm::Subscription* subscription = in_->subscribe(unknown_pattern_, &LcmBus::on_unknown, this);
     if (subscription) subscription->setQueueCapacity(1024);
   }

@@ -22,8 +22,9 @@ class LcmBus : public Bus {
  public:
   static constexpr size_t kMostUnknownNames = 10'000;
 
-  // Opens the bus; "": $LCM_DEFAULT_URL, or LCM's default group with ttl 0. Throws InputError for a bad address and
-  // EnvironmentError, with the cure, when this machine has no multicast route.
+  // Opens the bus; "": $LCM_DEFAULT_URL, or LCM's default group with ttl 0. A tcpq address is that
+  // of a server which is there already (tcpq_server.h makes one). Throws InputError for a bad address and EnvironmentError,
+  // with the cure, when this machine has no multicast route or the server is not there.
   explicit LcmBus(const std::string& url);
   ~LcmBus() override;
 
@@ -44,6 +45,8 @@ class LcmBus : public Bus {
   LcmUrl url_;
   std::unique_ptr<lcm::LCM> out_;
   std::shared_ptr<lcm::LCM> in_;
+  size_t receive_buffer_;                    // of clients with this address
+  std::atomic<bool> told_large_{false};      // that a message is larger
   Handler handler_;
   std::unordered_set<std::string> channels_;
   std::vector<std::string> patterns_;        // of the channels listened to

@@ -1,6 +1,7 @@
 // Address parsing and the checks of the multicast route.
 #include "bus/lcm_url.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <cstdlib>
@@ -8,29 +9,18 @@
 #include <fstream>
 
 #include <arpa/inet.h>
+#include <netdb.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
+#include "bus/file_handle.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::bus {
 namespace {
 
-class Socket {
- public:
-  Socket() : file_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {}
-  ~Socket() {
-    if (file_ >= 0) ::close(file_);
-  }
-  Socket(const Socket&) = delete;
-  Socket& operator=(const Socket&) = delete;
-  int get() const { return file_; }
-
- private:
-  int file_;
-};
+FileHandle datagram_socket() { return FileHandle(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)); }
 
 sockaddr_in address_of(const LcmUrl& url) {
   sockaddr_in address{};
@@ -40,8 +30,20 @@ sockaddr_in address_of(const LcmUrl& url) {
   return address;
 }
 
+// A host's IPv4 address; "" when there is none.
+std::string resolved(const std::string& host) {
+  addrinfo hints{}, *found = nullptr;
+  hints.ai_family = AF_INET;
+  hints.ai_socktype = SOCK_STREAM;
+  if (::getaddrinfo(host.c_str(), nullptr, &hints, &found) != 0) return "";
+  char text[INET_ADDRSTRLEN] = "";
+  ::inet_ntop(AF_INET, &reinterpret_cast<const sockaddr_in*>(found->ai_addr)->sin_addr, text, sizeof text);
+  ::freeaddrinfo(found);
+  return text;
+}
+
 [[noreturn]] void refuse(const std::string& text, const std::string& why) {
-  throw InputError({}, "--lcm '" + text + "': " + why + "; an address looks like " + kDefaultUrl);
+  throw InputError({}, "--lcm '" + text + "': " + why + "; an address looks like " + kDefaultUrl + " or tcpq://127.0.0.1:7700");
 }
 
 }  // namespace
@@ -72,7 +74,7 @@ LcmUrl parse_url(const std::string& text) {
   const size_t scheme_end = text.find("://");
   if (scheme_end == std::string::npos) refuse(text, "it has no scheme");
   url.scheme = text.substr(0, scheme_end);
-  if (url.scheme != "udpm" && url.scheme != "memq") refuse(text, "the schemes udpm and memq are supported");
+  if (url.scheme != "udpm" && url.scheme != "tcpq" && url.scheme != "memq") refuse(text, "the schemes udpm, tcpq and memq are supported");
   std::string rest = text.substr(scheme_end + 3);
   if (const size_t question = rest.find('?'); question != std::string::npos) {
     url.options = rest.substr(question + 1);
@@ -85,6 +87,12 @@ LcmUrl parse_url(const std::string& text) {
     if (error != std::errc() || end != digits.data() + digits.size() || url.port == 0) refuse(text, "'" + digits + "' is no port");
     rest.resize(colon);
   }
+  if (url.scheme == "tcpq") {
+    if (url.port == 0) url.port = kDefaultTcpPort;
+    url.host = rest.empty() ? "127.0.0.1" : resolved(rest);
+    if (url.host.empty()) refuse(text, "'" + rest + "' is no host that this machine knows");
+    return url;
+  }
   url.host = rest.empty() ? "239.255.76.67" : rest;
   if (url.port == 0) url.port = 7667;
   in_addr group{};
@@ -95,19 +103,33 @@ LcmUrl parse_url(const std::string& text) {
   return url;
 }
 
-void check_route(const LcmUrl& url) {
-  if (url.scheme != "udpm") return;
-  const Socket socket;
+bool has_route(const LcmUrl& url) {
+  const FileHandle socket = datagram_socket();
   const sockaddr_in address = address_of(url);
-  if (socket.get() >= 0 && ::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) return;
+  return socket && ::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+}
+
+void check_route(const LcmUrl& url) {
+  if (url.scheme != "udpm" || has_route(url)) return;
   throw EnvironmentError("no route to the multicast group " + url.host + " (" + std::strerror(errno) +
                          "): connect to a network, or run: sudo ip link set lo up multicast on; sudo ip route add " + url.host +
                          "/32 dev lo");
 }
 
+bool is_served(const LcmUrl& url, int timeout_ms) {
+  const FileHandle socket(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  const sockaddr_in address = address_of(url);
+  if (::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) return true;
+  if (errno != EINPROGRESS) return false;
+  pollfd waiting{socket.get(), POLLOUT, 0};
+  int error = 0;
+  socklen_t size = sizeof error;
+  return ::poll(&waiting, 1, timeout_ms) == 1 && ::getsockopt(socket.get(), SOL_SOCKET, SO_ERROR, &error, &size) == 0 && error == 0;
+}
+
 bool hears_itself(const LcmUrl& url, int timeout_ms) {
   if (url.scheme != "udpm") return true;
-  const Socket receiver, sender;
+  const FileHandle receiver = datagram_socket(), sender = datagram_socket();
   const int on = 1;
   ::setsockopt(receiver.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
   ::setsockopt(receiver.get(), SOL_SOCKET, SO_REUSEPORT, &on, sizeof on);
@@ -133,10 +155,22 @@ bool hears_itself(const LcmUrl& url, int timeout_ms) {
   }
 }
 
-int64_t receive_buffer_limit() {
-  std::ifstream file("/proc/sys/net/core/rmem_max");
-  int64_t limit = -1;
-  return file >> limit ? limit : -1;
+namespace {
+
+int64_t kernel_setting(const char* path) {
+  std::ifstream file(path);
+  int64_t value = -1;
+  return file >> value ? value : -1;
+}
+
+}  // namespace
+
+int64_t receive_buffer_limit() { return kernel_setting("/proc/sys/net/core/rmem_max"); }
+
+int64_t receive_buffer(const LcmUrl& url) {
+  if (url.scheme != "udpm") return -1;
+  const int64_t asked = std::atoll(url.option("recv_buf_size", "0").c_str());
+  return asked > 0 ? std::min(asked, receive_buffer_limit()) : kernel_setting("/proc/sys/net/core/rmem_default");
 }
 
 }  // namespace ruedo::bus

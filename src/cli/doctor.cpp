@@ -1,9 +1,12 @@
 // ruedo doctor: what this machine lacks, each fault in one line with its cure, in less than a second.
+#include <cstdlib>
+
 #include <fmt/format.h>
 
 #include <lcm/lcm_version.h>
 
 #include "bus/lcm_url.h"
+#include "bus/url_claim.h"
 #include "cli/commands.h"
 #include "model/body_layout.h"
 #include "ruedo/errors.h"
@@ -35,12 +38,11 @@ class Report {
   bool faulty_ = false;
 };
 
-void check_bus(Report& report, const std::string& text) {
-  const bus::LcmUrl url = bus::parse_url(text);
+void check_multicast(Report& report, const bus::LcmUrl& url) {
   try {
     bus::check_route(url);
   } catch (const EnvironmentError& error) {
-    return report.fault("multicast", error.what());
+    return report.fault("multicast", std::string(error.what()) + "; or do without: ruedo run WORLD --lcm tcpq://127.0.0.1:7700");
   }
   if (bus::hears_itself(url, kSelfTestMs)) {
     report.good("multicast", url.str() + ": a datagram to the group comes back");
@@ -48,6 +50,23 @@ void check_bus(Report& report, const std::string& text) {
     report.fault("multicast", url.str() + ": a datagram to the group does not come back: run: sudo ip link set lo multicast on; sudo ip route add " +
                                   url.host + "/32 dev lo; or let the firewall pass UDP port " + std::to_string(url.port));
   }
+}
+
+// Who serves the address, or would. Where the environment names none and there is no multicast, that is TCP.
+void check_server(Report& report, const bus::LcmUrl& url) {
+  if (url.scheme == "memq") return report.good("server", url.str() + " stays inside of one process");
+  const std::string owner = bus::claimed_by(url);
+  if (!owner.empty()) return report.good("server", url.str() + ": " + owner);
+  if (url.scheme == "tcpq" && bus::is_served(url, kSelfTestMs)) return report.good("server", url.str() + ": something listens there, not a server of this machine's Ruedo");
+  report.hint("server", "none on " + url.str() + " from this machine: `ruedo run WORLD` starts one; where it is on another address, its LCM_DEFAULT_URL is wanted here");
+}
+
+void check_bus(Report& report, const std::string& text) {
+  const bus::LcmUrl url = bus::parse_url(text);
+  if (url.scheme == "udpm") check_multicast(report, url);
+  const char* environment = std::getenv("LCM_DEFAULT_URL");
+  const bool asked = !text.empty() || (environment && *environment);
+  check_server(report, asked || bus::has_route(url) ? url : bus::parse_url("tcpq://"));
 }
 
 void check_buffers(Report& report) {

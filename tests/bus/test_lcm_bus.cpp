@@ -22,11 +22,13 @@ TEST(LcmUrl, DefaultsAndOptions) {
   EXPECT_EQ(parse_url("udpm://").str(), "udpm://239.255.76.67:7667?ttl=0");
   EXPECT_EQ(parse_url("udpm://239.255.76.67:7667?ttl=1").str(), "udpm://239.255.76.67:7667?ttl=1");
   EXPECT_EQ(parse_url("memq://").str(), "memq://");
+  EXPECT_EQ(parse_url("tcpq://").str(), "tcpq://127.0.0.1:7700");
+  EXPECT_EQ(parse_url("tcpq://localhost:80").str(), "tcpq://127.0.0.1:80");
 }
 
 TEST(LcmUrl, RefusesWithAnExample) {
   for (const char* text : {"foo", "http://x", "udpm://1.2.3.4:7667", "udpm://239.255.76.67:0", "udpm://239.255.76.67:99999",
-                           "udpm://239.255.76.67:7667x", "udpm://host:7667"}) {
+                           "udpm://239.255.76.67:7667x", "udpm://host:7667", "tcpq://no.such.host.invalid:1", "tcpq://127.0.0.1:x"}) {
     try {
       parse_url(text);
       ADD_FAILURE() << text;

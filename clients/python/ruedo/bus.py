@@ -18,13 +18,14 @@ import lcm
 from .errors import NoServer
 
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0"
+FALLBACK_URL = "tcpq://127.0.0.1:7700"    # what `ruedo run` serves where there is no multicast route
 
 Handler = Callable[[bytes], None]
 
 
 def resolve_url(url: str | None) -> str:
-    """url, or LCM_DEFAULT_URL, or LCM's default group and port with ttl 0."""
-    return url or os.environ.get("LCM_DEFAULT_URL") or DEFAULT_URL
+    """url, or LCM_DEFAULT_URL, or LCM's default group and port with ttl 0, or TCP where multicast has no route."""
+    return url or os.environ.get("LCM_DEFAULT_URL") or (DEFAULT_URL if has_multicast_route() else FALLBACK_URL)
 
 
 def has_multicast_route(group: str = "239.255.76.67") -> bool:

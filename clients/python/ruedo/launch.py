@@ -12,8 +12,11 @@ import shutil
 import signal
 import socket
 import subprocess
+import sys
 import tempfile
+import time
 from pathlib import Path
+from urllib.parse import urlsplit
 from typing import IO, Sequence
 
 from .bus import has_multicast_route
@@ -60,7 +63,9 @@ def launch(world: str | os.PathLike[str], *, seed: int | None = None, rate: floa
         command += ["--rate", "max" if rate == "max" or rate == math.inf else str(rate)]
     server = _Server(command + list(args), token, verbose)
     try:
-        return Simulation(url, name, timeout, server.ended, server.end)
+        until = time.monotonic() + timeout
+        server.await_port(url, until)
+        return Simulation(url, name, max(until - time.monotonic(), 1.0), server.ended, server.end)
     except NoServer as error:    # with what the server said, when it ended
         server.end()
         raise LaunchError(str(error)) from None
@@ -78,6 +83,7 @@ def _free_url() -> tuple[socket.socket, str]:
         port = token.getsockname()[1]
         if not has_multicast_route():
             token.close()    # the server itself will listen on it
+            _say_once(f"ruedo: no multicast route here: launch() speaks LCM over TCP, LCM_DEFAULT_URL=tcpq://127.0.0.1:{port}")
             return token, f"tcpq://127.0.0.1:{port}"
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             try:
@@ -87,6 +93,16 @@ def _free_url() -> tuple[socket.socket, str]:
                 continue
         return token, f"udpm://239.255.76.67:{port}?ttl=0"
     raise LaunchError("no free UDP port was found in 100 tries")
+
+
+_said = False
+
+
+def _say_once(line: str) -> None:
+    global _said
+    if not _said:
+        print(line, file=sys.stderr)
+    _said = True
 
 
 class _Server:
@@ -110,6 +126,21 @@ class _Server:
             return None
         how = f"exit code {code}" if code >= 0 else f"signal {signal.Signals(-code).name}"
         return f"the server ended ({how}): {self._last_lines() or 'it said nothing'}\n(`{' '.join(self._command)}`)"
+
+    def await_port(self, url: str, until: float) -> None:
+        """Waits for a tcpq server to listen; one that does not until then is the connection's affair."""
+        parts = urlsplit(url)
+        if parts.scheme != "tcpq":
+            return
+        while time.monotonic() < until and self._process.poll() is None:
+            try:
+                socket.create_connection((parts.hostname or "127.0.0.1", parts.port or 7700), 1.0).close()
+                return
+            except OSError:
+                time.sleep(0.02)
+        ended = self.ended()
+        if ended:
+            raise NoServer(ended)
 
     def end(self) -> None:
         """Closes the pipe, which ends the server; kills it when it has not ended after 5 s."""

@@ -15,6 +15,9 @@ import lcm.lcm.LCMEncodable;
 final class Bus {
     static final String DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0";
 
+    /** What `ruedo run` serves where there is no multicast route. */
+    static final String FALLBACK_URL = "tcpq://127.0.0.1:7700";
+
     interface Handler {
         /** message: all of its bytes. */
         void receive(byte[] message);
@@ -38,7 +41,10 @@ final class Bus {
 
     static String resolveUrl(String url) {
         String named = System.getenv("LCM_DEFAULT_URL");
-        return url != null && !url.isEmpty() ? url : named != null && !named.isEmpty() ? named : DEFAULT_URL;
+        if (url != null && !url.isEmpty()) return url;
+        if (named != null && !named.isEmpty()) return named;
+        System.setProperty("java.net.preferIPv4Stack", "true");    // before the first socket; see the constructor
+        return hasMulticastRoute("239.255.76.67") ? DEFAULT_URL : FALLBACK_URL;
     }
 
     static boolean hasMulticastRoute(String group) {
@@ -64,15 +70,32 @@ final class Bus {
                         + "sudo ip route add 224.0.0.0/4 dev lo; `ruedo doctor` tells more");
             }
         } else if (scheme.equals("tcpq")) {
-            String host = address.getHost() == null ? "127.0.0.1" : address.getHost();
-            try (Socket probe = new Socket()) {
-                probe.connect(new InetSocketAddress(host, address.getPort() < 0 ? 7700 : address.getPort()), 2000);
+            try {
+                probe(address);
             } catch (IOException error) {
                 throw new RuedoException.NoServer("no Ruedo server at " + url + " (" + error.getMessage() + "). Is `ruedo run` "
                         + "started with this --lcm? `ruedo doctor` looks for what is wrong");
             }
         } else if (!scheme.equals("memq") && !scheme.equals("file")) {
             throw new RuedoException.NoServer(url + ": not an LCM URL; udpm://GROUP:PORT?ttl=0 or tcpq://HOST:PORT is");
+        }
+    }
+
+    private static void probe(URI address) throws IOException {
+        String host = address.getHost() == null ? "127.0.0.1" : address.getHost();
+        try (Socket probe = new Socket()) {
+            probe.connect(new InetSocketAddress(host, address.getPort() < 0 ? 7700 : address.getPort()), 2000);
+        }
+    }
+
+    /** False for a tcpq address where nobody listens. */
+    static boolean isServed(String url) {
+        if (!url.startsWith("tcpq:")) return true;
+        try {
+            probe(URI.create(url));
+            return true;
+        } catch (IOException | IllegalArgumentException error) {
+            return false;
         }
     }
 

@@ -44,6 +44,7 @@ public final class Ruedo {
     public static Simulation launch(String world, LaunchOptions options) {
         ServerProcess server = new ServerProcess(world, options);
         try {
+            server.awaitPort(options.timeout);
             return new Simulation(server.url, options.name, options.timeout, server);
         } catch (RuedoException.NoServer error) {
             server.end();

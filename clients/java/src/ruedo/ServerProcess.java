@@ -14,6 +14,7 @@ import java.util.ArrayList;
 import java.util.Arrays;
 import java.util.List;
 import java.util.concurrent.TimeUnit;
+import java.util.concurrent.atomic.AtomicBoolean;
 
 /**
  * A private server: on a free port, and ended when this process is, however that ends. The server watches its standard
@@ -47,6 +48,27 @@ final class ServerProcess {
         } catch (IOException error) {
             throw new RuedoException.LaunchError(program + " cannot be started: " + error.getMessage());
         }
+    }
+
+    /** Waits for a tcpq server to listen, which it does once its world is loaded; timeout: s. */
+    void awaitPort(double timeout) {
+        Deadline deadline = new Deadline(timeout);
+        while (!Bus.isServed(url) && !deadline.passed()) {
+            String how = ended();
+            if (how != null) throw new RuedoException.LaunchError(how);
+            try {
+                Thread.sleep(20);
+            } catch (InterruptedException error) {
+                Thread.currentThread().interrupt();
+                return;
+            }
+        }
+    }
+
+    private static final AtomicBoolean said = new AtomicBoolean();
+
+    private static void sayOnce(String line) {
+        if (said.compareAndSet(false, true)) System.err.println(line);
     }
 
     /** How the server ended, with the last lines it printed; null while it runs. */
@@ -129,6 +151,7 @@ final class ServerProcess {
                 int port = token.getLocalPort();
                 if (!Bus.hasMulticastRoute("239.255.76.67")) {
                     token.close();    // the server itself will listen on it
+                    sayOnce("ruedo: no multicast route here: launch() speaks LCM over TCP, LCM_DEFAULT_URL=tcpq://127.0.0.1:" + port);
                     return "tcpq://127.0.0.1:" + port;
                 }
                 try (DatagramSocket probe = new DatagramSocket(null)) {

@@ -1,0 +1,111 @@
+// The bus as a tcpq server: LCM programs connect to it over TCP, and need no multicast.
+//
+// One thread does all the network. publish() copies a message into a bounded queue and returns; the thread moves it to a
+// ring from which each client is served at its own pace. A client that falls a ring behind loses messages. What
+// clients publish goes to the simulation and to all clients that subscribed to it, as on any LCM bus.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <list>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
+
+#include "bus/file_handle.h"
+#include "bus/lcm_url.h"
+#include "bus/message_ring.h"
+#include "bus/tcpq_wire.h"
+#include "ruedo/bus.h"
+
+namespace ruedo::bus {
+
+class TcpqServer : public Bus {
+ public:
+  static constexpr size_t kMostClients = 512;
+  static constexpr size_t kMostWaiting = 16 << 20;       // bytes between publish() and the thread
+  static constexpr size_t kRing = 16 << 20;              // bytes
+  static constexpr size_t kMostReceived = 64 << 20;      // bytes of frames that are not whole yet, all clients together
+
+  // Listens at the address of a tcpq URL, and nowhere else. Throws EnvironmentError when it is taken.
+  explicit TcpqServer(const LcmUrl& url);
+  ~TcpqServer() override;
+
+  // With port 0 in the URL: the port that the system gave.
+  uint16_t port() const;
+
+  void publish(const std::string& channel, const uint8_t* data, size_t size) override;
+  void listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own = {}) override;
+  void listen_to(const std::vector<std::string>& channels, const std::vector<std::string>& own = {}) override;
+  // Sends what was published so far to clients that take it, waits half a second at most, and closes all connections.
+  void stop() override;
+  uint64_t failed() const override { return failed_; }
+
+  // Counts since the start.
+  uint64_t connections() const { return connections_; }
+  uint64_t dropped_clients() const { return dropped_clients_; }
+  uint64_t skipped() const { return skipped_; }          // times that a slow client lost messages
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  struct Client {
+    FileHandle socket;
+    Clock::time_point since;
+    tcpq::Reader reader;
+    tcpq::Filter filter;
+    std::vector<int8_t> wants;       // by channel number: 0 not known yet, 1 yes, -1 no
+    uint64_t place = 0;              // in the ring
+    std::vector<uint8_t> rest;       // of a message that was sent in part
+    size_t rest_sent = 0;
+    bool blocked = false;            // waits for room in the socket
+    bool spoke = false;              // published or subscribed
+    bool gone = false;
+  };
+
+  void serve();
+  void accept_all();
+  void make_place();
+  void receive(Client& client);
+  void take(Client& client, const tcpq::Frame& frame);
+  bool is_heard(const std::string& channel);
+  void drop(Client& client, const std::string& why);
+  void collect();
+  void send_all();
+  void send(Client& client);
+  bool send_rest(Client& client);
+  bool wants(Client& client, const MessageRing::Message& message);
+  uint32_t number_of(std::string_view channel);
+  void sweep();
+  void watch(Client& client, bool for_room);
+  bool drained() const;
+
+  LcmUrl url_;
+  FileHandle listener_, poll_, wake_;
+  Handler handler_;
+
+  std::mutex mutex_;                                     // of the next three
+  std::unordered_set<std::string> channels_;             // listened to
+  std::vector<uint8_t> waiting_;                         // frames, each behind its size
+  bool woken_ = false;
+  std::atomic<int> listeners_{0};                        // clients with a subscription
+  std::atomic<bool> stop_{false};
+  std::atomic<uint64_t> failed_{0}, connections_{0}, dropped_clients_{0}, skipped_{0};
+
+  // The thread's own.
+  std::vector<uint8_t> collected_;
+  MessageRing ring_{kRing};
+  std::unordered_map<std::string, uint32_t> numbers_;    // of channels; beyond a bound all others share number 0
+  std::list<Client> clients_;
+  size_t received_ = 0;                                  // bytes that the readers hold
+  Clock::time_point accept_again_{};                     // when the system had no room for one more
+  Clock::time_point complained_{};
+  uint64_t silent_drops_ = 0;                            // since it last complained
+  std::vector<uint8_t> frame_;
+  std::thread thread_;
+};
+
+}  // namespace ruedo::bus

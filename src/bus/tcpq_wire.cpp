@@ -1,0 +1,120 @@
+// Frames of tcpq, and LCM's channel patterns as names and beginnings of names.
+#include "bus/tcpq_wire.h"
+
+#include <algorithm>
+#include <cctype>
+
+namespace ruedo::bus::tcpq {
+namespace {
+
+constexpr uint32_t kPublish = 1, kSubscribe = 2, kUnsubscribe = 3;
+constexpr size_t kKept = 256 * 1024;    // bytes of memory that an idle client's buffer may keep
+
+void append_number(std::vector<uint8_t>& out, uint32_t number) {
+  for (int shift = 24; shift >= 0; shift -= 8) out.push_back(static_cast<uint8_t>(number >> shift));
+}
+
+}  // namespace
+
+std::vector<uint8_t> server_hello() {
+  std::vector<uint8_t> bytes;
+  append_number(bytes, kServerMagic);
+  append_number(bytes, kVersion);
+  return bytes;
+}
+
+void append_publish(std::vector<uint8_t>& out, std::string_view channel, std::span<const uint8_t> data) {
+  append_number(out, kPublish);
+  append_number(out, static_cast<uint32_t>(channel.size()));
+  out.insert(out.end(), channel.begin(), channel.end());
+  append_number(out, static_cast<uint32_t>(data.size()));
+  out.insert(out.end(), data.begin(), data.end());
+}
+
+uint32_t Reader::number(size_t at) const {
+  const uint8_t* b = &buffer_[read_ + at];
+  return uint32_t{b[0]} << 24 | uint32_t{b[1]} << 16 | uint32_t{b[2]} << 8 | b[3];
+}
+
+Reader::Result Reader::next(Frame& frame) {
+  if (!greeted_) {
+    if (buffer_.size() < 8) return Result::more;
+    if (number(0) != kClientMagic || number(4) != kVersion) return Result::broken;
+    greeted_ = true;
+    read_ = 8;
+  }
+  const size_t left = buffer_.size() - read_;
+  if (left < 8) return Result::more;
+  const uint32_t kind = number(0), length = number(4);
+  if (kind < kPublish || kind > kUnsubscribe) return Result::broken;
+  if (length > (kind == kPublish ? kLongestChannel : kLongestPattern)) return Result::broken;
+  const size_t text_end = size_t{8} + length;
+  size_t end = text_end;
+  if (kind == kPublish) {
+    if (left < text_end + 4) return Result::more;
+    const uint32_t size = number(text_end);
+    if (size > kLargestMessage) return Result::broken;
+    end = text_end + 4 + size;
+  }
+  if (left < end) return Result::more;
+  const uint8_t* begin = buffer_.data() + read_;
+  frame.kind = kind == kPublish ? Frame::Kind::publish : kind == kSubscribe ? Frame::Kind::subscribe : Frame::Kind::unsubscribe;
+  frame.channel = {reinterpret_cast<const char*>(begin + 8), length};
+  frame.data = kind == kPublish ? std::span(begin + text_end + 4, begin + end) : std::span<const uint8_t>();
+  read_ += end;
+  return Result::frame;
+}
+
+void Reader::tidy() {
+  buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(read_));
+  read_ = 0;
+  if (buffer_.capacity() > kKept && buffer_.size() < kKept / 2) buffer_.shrink_to_fit();
+}
+
+Pattern read_pattern(std::string_view pattern) {
+  Pattern read{"", true};
+  for (size_t i = 0; i < pattern.size(); ++i) {
+    const char c = pattern[i];
+    if (c == '\\' && i + 1 < pattern.size() && pattern[i + 1] == 'Q') {    // Java quotes so
+      const size_t end = std::min(pattern.find("\\E", i + 2), pattern.size());
+      read.text += pattern.substr(i + 2, end - i - 2);
+      i = end + 1;
+    } else if (c == '\\' && i + 1 < pattern.size() && !std::isalnum(static_cast<unsigned char>(pattern[i + 1]))) {
+      read.text += pattern[++i];
+    } else if (std::string_view(".^$*+?{}[]\\|()").find(c) == std::string_view::npos) {
+      read.text += c;
+    } else {
+      // A quantifier may take the character before it away; an alternative, everything.
+      if ((c == '*' || c == '?' || c == '{') && !read.text.empty()) read.text.pop_back();
+      if (pattern.find('|', i) != std::string_view::npos) read.text.clear();
+      read.whole = false;
+      return read;
+    }
+  }
+  return read;
+}
+
+void Filter::subscribe(std::string_view pattern) {
+  Pattern read = read_pattern(pattern);
+  auto& kept = read.whole ? names_ : beginnings_;
+  const size_t most = read.whole ? kMostNames : kMostBeginnings;
+  if (kept.size() >= most && !kept.contains(read.text)) {    // who wants so much gets everything, for good
+    ++beginnings_[""];
+    return;
+  }
+  ++kept[std::move(read.text)];
+}
+
+void Filter::unsubscribe(std::string_view pattern) {
+  const Pattern read = read_pattern(pattern);
+  auto& kept = read.whole ? names_ : beginnings_;
+  const auto found = kept.find(read.text);
+  if (found != kept.end() && --found->second == 0) kept.erase(found);
+}
+
+bool Filter::passes(std::string_view channel) const {
+  if (names_.contains(std::string(channel))) return true;
+  return std::any_of(beginnings_.begin(), beginnings_.end(), [&](const auto& one) { return channel.starts_with(one.first); });
+}
+
+}  // namespace ruedo::bus::tcpq

@@ -1,0 +1,267 @@
+// The tcpq server over loopback, against LCM's own client and against connections that mean harm.
+#include "bus/tcpq_server.h"
+
+#include <chrono>
+#include <functional>
+#include <thread>
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <lcm/lcm-cpp.hpp>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include "ruedo/errors.h"
+
+namespace ruedo::bus {
+namespace {
+
+const LcmUrl kAnyPort{"tcpq", "127.0.0.1", 0, ""};
+
+bool soon(const std::function<bool()>& holds, int seconds = 20) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(seconds);
+  while (!holds()) {
+    if (std::chrono::steady_clock::now() > end) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return true;
+}
+
+// A server that counts what it hears on "in".
+struct Served {
+  TcpqServer server{kAnyPort};
+  std::atomic<int> heard{0};
+  std::string url = "tcpq://127.0.0.1:" + std::to_string(server.port());
+  Served() {
+    server.listen({"in"}, [this](const std::string& channel, const uint8_t*, size_t) { heard += channel == "in" ? 1 : 1000; });
+  }
+  void publish(const std::string& channel, const std::vector<uint8_t>& data) { server.publish(channel, data.data(), data.size()); }
+};
+
+// LCM's client, with a thread.
+struct Stock {
+  lcm::LCM lcm;
+  std::atomic<int> count{0};
+  std::atomic<size_t> bytes{0};
+  std::atomic<bool> end{false};
+  std::thread thread;
+  explicit Stock(const std::string& url, const std::string& pattern = "") : lcm(url) {
+    if (!pattern.empty()) lcm.subscribe(pattern, &Stock::on, this)->setQueueCapacity(0);
+    thread = std::thread([this] {
+      while (!end) lcm.handleTimeout(20);
+    });
+  }
+  ~Stock() {
+    end = true;
+    thread.join();
+  }
+  void on(const lcm::ReceiveBuffer* buffer, const std::string&) {
+    bytes += buffer->data_size;
+    ++count;
+  }
+};
+
+struct Raw {
+  FileHandle socket{::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)};
+  bool connected = false;
+  explicit Raw(uint16_t port) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(port);
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    connected = ::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+  }
+  bool send(const std::vector<uint8_t>& bytes) const { return ::send(socket.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL) >= 0; }
+  // Reads what comes until nothing does for so long (ms, above 0); true at the end of the connection.
+  bool closed(int ms) const {
+    timeval time{ms / 1000, ms % 1000 * 1000};
+    ::setsockopt(socket.get(), SOL_SOCKET, SO_RCVTIMEO, &time, sizeof time);
+    char bytes[4096];
+    for (;;) {
+      const ssize_t size = ::recv(socket.get(), bytes, sizeof bytes, 0);
+      if (size == 0 || (size < 0 && errno == ECONNRESET)) return true;
+      if (size < 0) return false;
+    }
+  }
+};
+
+const std::vector<uint8_t> &hello() {
+  static const std::vector<uint8_t> bytes{0x28, 0x76, 0x17, 0xfb, 0, 0, 1, 0};
+  return bytes;
+}
+
+std::vector<uint8_t> subscription(uint8_t kind, const std::string& pattern) {
+  std::vector<uint8_t> bytes{0, 0, 0, kind, 0, 0, 0, static_cast<uint8_t>(pattern.size())};
+  bytes.insert(bytes.end(), pattern.begin(), pattern.end());
+  return bytes;
+}
+
+TEST(TcpqServer, ServesStockClientsBothWays) {
+  Served served;
+  Stock listener(served.url, "out/.*"), speaker(served.url);
+  ASSERT_TRUE(soon([&] { return served.publish("out/1", {1, 2, 3}), listener.count > 0; }));
+  EXPECT_EQ(listener.bytes % 3, 0u);
+  const int before = listener.count;
+  served.publish("other", {1});
+  speaker.lcm.publish("in", "x", 1);
+  speaker.lcm.publish("out/2", "four", 4);                          // from client to client
+  ASSERT_TRUE(soon([&] { return served.heard == 1 && listener.count > before; }));
+  EXPECT_EQ(served.server.failed(), 0u);
+}
+
+TEST(TcpqServer, PassesRawPictures) {
+  Served served;
+  Stock listener(served.url, "camera");
+  const std::vector<uint8_t> picture(921'600, 7);
+  ASSERT_TRUE(soon([&] { return served.publish("camera", {1}), listener.count > 0; }));
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  const int before = listener.count;
+  for (int i = 1; i <= 150; ++i) {                                  // at a camera's pace: each arrives before the next
+    served.publish("camera", picture);
+    ASSERT_TRUE(soon([&] { return listener.count == before + i; })) << i;
+  }
+}
+
+TEST(TcpqServer, ListensAnew) {
+  Served served;
+  Stock speaker(served.url);
+  speaker.lcm.publish("in", "x", 1);
+  ASSERT_TRUE(soon([&] { return served.heard == 1; }));
+  served.server.listen_to({"spawned"});
+  speaker.lcm.publish("in", "x", 1);
+  speaker.lcm.publish("spawned", "x", 1);
+  ASSERT_TRUE(soon([&] { return served.heard == 1001; }));
+}
+
+TEST(TcpqServer, ASlowClientLosesMessagesAndHoldsNobodyUp) {
+  Served served;
+  Raw slow(served.server.port());
+  ASSERT_TRUE(slow.send(hello()) && slow.send(subscription(2, ".*")));
+  Stock quick(served.url, "out");
+  ASSERT_TRUE(soon([&] { return served.publish("out", {1}), quick.count > 0; }));
+  const std::vector<uint8_t> block(60'000);
+  std::chrono::steady_clock::duration longest{};
+  for (int i = 0; i < 2000; ++i) {                                  // 120 MB: more than the kernel and the ring hold
+    const auto begin = std::chrono::steady_clock::now();
+    served.publish("bulk", block);
+    longest = std::max(longest, std::chrono::steady_clock::now() - begin);
+    if (i % 10 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  ASSERT_TRUE(soon([&] { return slow.closed(100) || served.server.skipped() > 0; }));    // it reads again
+  EXPECT_LT(longest, std::chrono::seconds(1));                      // it would be for ever
+  const int before = quick.count;
+  served.publish("out", {1});
+  EXPECT_TRUE(soon([&] { return quick.count > before; }));
+  EXPECT_FALSE(slow.closed(1));
+}
+
+TEST(TcpqServer, StopDeliversWhatWasPublishedLast) {
+  for (int round = 0; round < 5; ++round) {
+    Served served;
+    Stock listener(served.url, "out");
+    ASSERT_TRUE(soon([&] { return served.publish("out", {1}), listener.count > 0; }));
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    const int before = listener.count;
+    for (int i = 0; i < 1000; ++i) served.publish("out", {1, 2});
+    served.server.stop();
+    EXPECT_TRUE(soon([&] { return listener.count >= before + 1000; })) << listener.count - before;
+  }
+}
+
+TEST(TcpqServer, BindsToItsHostAlone) {
+  TcpqServer server(kAnyPort);
+  LcmUrl other{"tcpq", "127.0.0.2", server.port(), ""};
+  EXPECT_NO_THROW(TcpqServer{other});                               // free: the first is not on all interfaces
+  other.host = "127.0.0.1";
+  try {
+    TcpqServer second(other);
+    FAIL();
+  } catch (const EnvironmentError& error) {
+    EXPECT_NE(std::string(error.what()).find("--lcm auto"), std::string::npos);
+  }
+}
+
+// Those that mean harm. After each, a stock client still gets what it asks for.
+class TcpqHostile : public ::testing::Test {
+ protected:
+  void TearDown() override {
+    Stock client(served.url, "out");
+    EXPECT_TRUE(soon([&] { return served.publish("out", {1}), client.count > 0; }));
+    const int before = served.heard;
+    client.lcm.publish("in", "x", 1);
+    EXPECT_TRUE(soon([&] { return served.heard == before + 1; }));
+  }
+  Served served;
+};
+
+TEST_F(TcpqHostile, Garbage) {
+  uint32_t state = 1;
+  for (int i = 0; i < 2000; ++i) {
+    Raw raw(served.server.port());
+    if (i % 2 == 0) raw.send(hello());
+    std::vector<uint8_t> noise(1 + i % 500);
+    for (uint8_t& byte : noise) byte = static_cast<uint8_t>((state = state * 1664525 + 1013904223) >> 24);
+    raw.send(noise);
+  }
+  EXPECT_TRUE(soon([&] { return served.server.connections() == 2000; }));
+}
+
+TEST_F(TcpqHostile, HugeLengthsAreRefused) {
+  Raw raw(served.server.port());
+  raw.send(hello());
+  raw.send({0, 0, 0, 1, 0, 0, 0, 1, 'x', 0x7f, 0xff, 0xff, 0xff});
+  EXPECT_TRUE(raw.closed(5000));
+  EXPECT_EQ(served.server.dropped_clients(), 1u);
+}
+
+TEST_F(TcpqHostile, HalfMessages) {
+  std::vector<Raw> many;
+  for (int i = 0; i < 100; ++i) {
+    many.emplace_back(served.server.port());
+    many.back().send(hello());
+    many.back().send({0, 0, 0, 1, 0, 0, 0, 1, 'x', 0, 0x10, 0, 0, 1, 2, 3});    // of a megabyte, three bytes
+  }
+}
+
+TEST_F(TcpqHostile, UnfinishedMessagesHaveABound) {
+  std::vector<Raw> many;
+  const std::vector<uint8_t> most(3 << 20);
+  for (int i = 0; i < 30; ++i) {                                    // 90 MB in all
+    many.emplace_back(served.server.port());
+    many.back().send(hello());
+    many.back().send({0, 0, 0, 1, 0, 0, 0, 1, 'x', 0, 0x3f, 0, 0});
+    many.back().send(most);
+  }
+  EXPECT_TRUE(soon([&] { return served.server.dropped_clients() >= 5; }));
+}
+
+TEST_F(TcpqHostile, AThousandSilentConnections) {
+  std::vector<Raw> many;
+  for (int i = 0; i < 1000; ++i) {
+    many.emplace_back(served.server.port());
+    if (i % 2 == 0 && many.back().connected) many.back().send(hello());
+    if (many.size() > 600) many.erase(many.begin());                // this process has a thousand files at most
+  }
+  EXPECT_TRUE(soon([&] { return served.server.connections() == 1000; }));
+}
+
+TEST_F(TcpqHostile, WhoDoesNotGreetIsSentAway) {
+  Raw raw(served.server.port());
+  EXPECT_TRUE(raw.closed(10'000));
+}
+
+TEST_F(TcpqHostile, AFloodOfCommandsAndOfSubscriptions) {
+  Raw raw(served.server.port());
+  raw.send(hello());
+  std::vector<uint8_t> commands, patterns;
+  for (int i = 0; i < 1000; ++i) {
+    commands.insert(commands.end(), {0, 0, 0, 1, 0, 0, 0, 2, 'i', 'n', 0, 0, 0, 1, 'x'});
+    const std::vector<uint8_t> one = subscription(2, std::to_string(i) + "(a+)+.*");
+    patterns.insert(patterns.end(), one.begin(), one.end());
+  }
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(raw.send(commands) && raw.send(patterns));
+  EXPECT_TRUE(soon([&] { return served.heard == 100'000; }));
+}
+
+}  // namespace
+}  // namespace ruedo::bus
