@@ -28,7 +28,13 @@ struct MotionState {
   int64_t id = 0;
   int8_t kind = 0, state = 0, reason = 0;
   double done = 0.0, remaining = 0.0;
-  int64_t changes = 0;             // counts the changes of id, kind, state and reason
+  int64_t changes = 0;             // counts the changes of id, kind, state and reason, and the MotionEnds
+};
+
+// What came to its end by a command in this step: a primitive that it replaced, or the command itself, refused.
+struct MotionEnd {
+  int robot = -1;                  // index into BodyLayout::robots
+  MotionState state;
 };
 
 struct RobotState {
@@ -52,6 +58,7 @@ struct Snapshot {
   std::vector<double> joint_velocities;
   std::vector<double> joint_efforts;
   std::vector<RobotState> robots;
+  std::vector<MotionEnd> motion_ends;    // by robot, then in the order of the commands
   std::vector<Contact> contacts;         // in a fixed order
 };
 

@@ -94,6 +94,9 @@ bool ExperimentRig::moved(int64_t id) const {
   const MotionState& motion = now_.robots[0].motion;
   if (motion.id == id && motion.state == motion_status_t::STATE_DONE) return true;
   const bool ended = motion.id == id && motion.state > motion_status_t::STATE_DONE;
+  for (const MotionEnd& end : now_.motion_ends) {
+    if (end.state.id == id) throw std::runtime_error(fmt::format("the primitive {} was refused, reason {}", id, end.state.reason));
+  }
   if (ended || now_.time > give_up_) {
     throw std::runtime_error(fmt::format("the primitive {} ended with state {}, reason {}", id, motion.state, motion.reason));
   }

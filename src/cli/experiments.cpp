@@ -53,8 +53,10 @@ std::string page(const std::vector<Outcome>& outcomes) {
           "![Speed over time, high deceleration](experiments/e1_high_deceleration.svg)\n\n"
           "## E2: a square of one metre, five times (Fig. 9)\n\n"
           "The paper's measure: the mean, over the run, of the difference between the true pose and the odometry. In the paper's\n"
-          "setting the trapezoid runs half a frame behind the robot: that is the difference, and it vanishes at every stop, while the\n"
-          "path itself turns with each corner. Wheels in contact slip: a robot that steers by skidding turns less than its wheels\n"
+          "setting the trapezoid runs half a frame behind the robot: that is a difference, and it vanishes at every stop, while the\n"
+          "path itself turns with each corner. Half a frame alone is a fifth of the paper's numbers. Its text does not say at which speeds\n"
+          "the square was driven, nor how old the odometry was when it was compared; with the P3-AT's own limits, and odometry that\n"
+          "comes as from the real robot (ARIA's status packets, one each 100 ms), the difference has the paper's size. Wheels in contact slip: a robot that steers by skidding turns less than its wheels\n"
           "say, so that its odometry needs a wider track than the real one.\n\n";
   text += table(outcomes, "E2");
   text += "![Square, late braking](experiments/e2_late_braking.svg)\n\n"

@@ -53,14 +53,33 @@ void Drive::reset_odometry() {
   odom_heading_ = heading(X_WBase_.rotation);
 }
 
-void Drive::read(RobotState& state) const {
+void Drive::placed(SimTime now) {
+  const double before = heading(X_WBase_.rotation);
+  X_WBase_ = base_pose().normalized();
+  odom_heading_ = wrap_angle(odom_heading_ + heading(X_WBase_.rotation) - before);
+  twist_ = {};
+  velocity_.setZero();
+  acceleration_.setZero();
+  wheel_v_ = wheel_omega_ = 0.0;
+  motion_.stand_still(now);
+  wake();
+  begin_at_rest();
+}
+
+void read_motion(const MotionLog& log, int robot, Snapshot& snapshot) {
+  snapshot.robots[static_cast<size_t>(robot)].motion = log.shown();
+  for (const MotionState& end : log.ends()) snapshot.motion_ends.push_back({robot, end});
+}
+
+void Drive::read(Snapshot& snapshot) const {
+  RobotState& state = snapshot.robots[static_cast<size_t>(robot_)];
   state.X_WBase = X_WBase_;
   state.twist = twist_;
   state.acceleration = acceleration_;
   state.wheel_v = wheel_v_;
   state.wheel_omega = wheel_omega_;
-  state.motion = motion_.state();
   state.odometry_resets = resets_;
+  read_motion(motion_.log(), robot_, snapshot);
 }
 
 }  // namespace ruedo::robot

@@ -10,6 +10,9 @@
 
 namespace ruedo::robot {
 
+// Writes what a robot's motion shows at this step.
+void read_motion(const MotionLog& log, int robot, Snapshot& snapshot);
+
 class Drive {
  public:
   Drive(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics, int robot);
@@ -26,11 +29,19 @@ class Drive {
   virtual void wake() = 0;
 
   Motion& motion() { return motion_; }
-  void read(RobotState& state) const;
+  // The robot's state in the snapshot, and what of its motion came to an end.
+  void read(Snapshot& snapshot) const;
   double heading_in_odom() const { return wrap_angle(heading(X_WBase_.rotation) - odom_heading_); }
   void reset_odometry();
 
+  // The robot was put somewhere else, at rest: the physics has it there already. Its odometry knows nothing of that.
+  void placed(SimTime now);
+  // The level planes are others now.
+  virtual void ground_changed() {}
+
  protected:
+  // What the drive keeps of its motion begins anew.
+  virtual void begin_at_rest() = 0;
   // base_link as the physics has it, and the twist of base_link expressed in it.
   Pose base_pose() const { return physics_.pose(body_) * X_BBase_; }
   Twist base_twist(const Pose& X_WBase) const;
@@ -43,7 +54,7 @@ class Drive {
   const int64_t step_us_;
   const double step_s_;
   const Pose X_BBase_, X_BaseB_;
-  const std::vector<int>& wheels_;
+  const std::vector<int> wheels_;
   const model::DriveDescription& description_;
   Motion motion_;
   Pose X_WBase_;

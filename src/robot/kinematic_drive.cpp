@@ -32,6 +32,10 @@ KinematicDrive::KinematicDrive(const model::WorldModel& world, const model::Body
       yaw_inertia_((X_WBase_.rotation * Vec3::UnitZ()).dot(physics.inertia(body_) * (X_WBase_.rotation * Vec3::UnitZ()))),
       max_force_(std::min(description_.max_force, mass_ * world.gravity.norm())),
       gravity_(world.gravity) {
+  stand_on_near_plane();
+}
+
+void KinematicDrive::stand_on_near_plane() {
   const auto plane = nearest_plane(planes_, X_WBase_.translation.z() + lowest_);
   const Vec3 up = X_WBase_.rotation * Vec3::UnitZ();
   if (plane && std::abs(plane_gap(*plane)) < kNearAtStart_m && up.z() > std::cos(kLevel_rad)) stand_on_plane(*plane);
@@ -45,6 +49,25 @@ void KinematicDrive::stand_on_plane(double height) {
   physics_.set_support(body_, physics::Support::plane);
   physics_.set_gravity(body_, Vec3::Zero());
   physics_.set_pose(body_, X_WBase_ * X_BaseB_);
+}
+
+void KinematicDrive::begin_at_rest() {
+  touched_ = held_ = behind_ = false;
+  sent_.setZero();
+  way_ = {};
+  if (on_plane_) leave_plane();
+  supported_ = false;
+  stand_on_near_plane();
+}
+
+// The plane that it stands on may be gone.
+void KinematicDrive::ground_changed() {
+  if (!on_plane_) return;
+  const auto plane = nearest_plane(planes_, X_WBase_.translation.z() + lowest_);
+  if (plane && std::abs(plane_gap(*plane)) < kNear_m) return;
+  leave_plane();
+  supported_ = false;
+  wake();
 }
 
 void KinematicDrive::leave_plane() {
@@ -169,7 +192,7 @@ void KinematicDrive::after_step(SimTime now) {
   if (asleep_) {
     velocity_.setZero();
     acceleration_.setZero();
-    motion_.show_next();
+    motion_.show_step();
     return;
   }
   if (on_plane_) {
@@ -179,7 +202,7 @@ void KinematicDrive::after_step(SimTime now) {
   }
   wheel_v_ = motion_.v();
   wheel_omega_ = motion_.omega();
-  motion_.show_next();
+  motion_.show_step();
 }
 
 void KinematicDrive::after_on_plane(SimTime now) {

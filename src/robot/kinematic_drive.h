@@ -23,8 +23,11 @@ class KinematicDrive final : public Drive {
   void after_step(SimTime now) override;
   void read_wheels(Snapshot& snapshot) const override;
   void wake() override;
+  void ground_changed() override;
 
  private:
+  void begin_at_rest() override;
+  void stand_on_near_plane();
   void choose_support();
   void stand_on_plane(double height);
   void leave_plane();

@@ -25,6 +25,10 @@ constexpr double kDone = 1e-6;                  // m or rad: a touched primitive
 // A primitive is blocked when in so long a time something touched and less than this part of the plan was done.
 constexpr SimTime kBlockWindow_us = 500'000;
 constexpr double kBlockedPart = 0.1;
+// Behind its plan by less, a robot has settled. One that does not within this time after the plan's end (a slope that it
+// slides on) is done as far as it came.
+constexpr double kSettled_m = 5e-4, kSettled_rad = 1e-3;
+constexpr double kSettling_s = 1.0;
 
 Limits sane(double speed, double acceleration, double deceleration, double fastest) {
   return {std::clamp(speed, 0.0, fastest), std::max(acceleration, kSlowestChange), std::max(deceleration, kSlowestChange)};
@@ -242,6 +246,22 @@ void Motion::brake(SimTime now) {
   set_plan(Profile::to_velocity(v_, 0.0, way_limits_), Profile::to_velocity(omega_, 0.0, angle_limits_), now);
 }
 
+void Motion::stand_still(SimTime now) {
+  const MotionState state = log_.current();
+  v_ = omega_ = target_v_ = target_omega_ = 0.0;
+  brake(now);
+  if (state.state != Status::STATE_RUNNING) return;
+  show(state.id, state.kind, Status::STATE_ENDED, Status::REASON_REPLACED);
+  log_.progress(state.done, state.remaining);
+  move_on(now);    // at rest for good
+}
+
+void Motion::shift_time(SimTime us) {
+  start_ -= us;
+  window_start_ -= us;
+  if (deadline_ != kNever) deadline_ -= us;
+}
+
 Displacement Motion::step(SimTime now, int64_t step_us) {
   if (resting_) return {};
   const SimTime end = now + step_us;
@@ -270,12 +290,17 @@ Displacement Motion::step(SimTime now, int64_t step_us) {
   return way;
 }
 
-void Motion::finish(SimTime now, double way, double angle, bool touched) {
+bool Motion::settled(SimTime now, const Lag& lag) const {
+  const bool near = std::abs(lag.way) < kSettled_m && std::abs(lag.angle) < kSettled_rad;
+  return (near && !lag.moving) || seconds(now) > std::max(plan_v_.end(), plan_omega_.end()) + kSettling_s;
+}
+
+void Motion::finish(SimTime now, double way, double angle, bool touched, const Lag& lag) {
   if (resting_) return;
   Primitive& p = primitive_;
   if (p.axis == Axis::none) {
     const bool stopping = log_.current().kind == Move::STOP && log_.current().state == Status::STATE_RUNNING;
-    if (stopping && steady_) {
+    if (stopping && steady_ && settled(now, lag)) {
       show(log_.current().id, Move::STOP, Status::STATE_DONE);
       move_on(now);
     }
@@ -285,13 +310,13 @@ void Motion::finish(SimTime now, double way, double angle, bool touched) {
   const Profile& profile = p.axis == Axis::angle ? plan_omega_ : plan_v_;
   const double planned = t < p.begins ? 0.0 : profile.position(t) - p.begins_at;
   if (!touched) {
-    p.done = p.done_before_plan + planned;
+    p.done = p.done_before_plan + planned - (p.axis == Axis::angle ? lag.angle : lag.way);
   } else if (t >= p.begins) {
     p.done += p.axis == Axis::angle ? angle : way;
   }
   const bool over = t >= profile.end() && steady_;
-  if (over && (!touched || std::abs(p.target - p.done) <= kDone)) {
-    p.done = touched ? p.done : p.target;
+  if (over && (touched ? std::abs(p.target - p.done) <= kDone : settled(now, lag))) {
+    if (!touched && !lag.moving && lag.way == 0.0 && lag.angle == 0.0) p.done = p.target;
     publish_progress();
     const MotionState state = log_.current();
     p = {};

@@ -14,6 +14,12 @@
 
 namespace ruedo::robot {
 
+// How far a robot is behind its plan. A drive that follows its plan exactly never is.
+struct Lag {
+  double way = 0.0, angle = 0.0;    // m, rad
+  bool moving = false;              // faster than a robot that has come to rest
+};
+
 class Motion {
  public:
   explicit Motion(const model::DriveDescription& drive);
@@ -25,17 +31,22 @@ class Motion {
   void command(const MoveCommand& command, SimTime now, double heading);
   void refuse(int64_t id, int8_t kind, int8_t reason);
 
+  // The robot was put somewhere, at rest: whatever it was asked to do is replaced by nothing.
+  void stand_still(SimTime now);
+  void shift_time(SimTime us);    // sim time was set back by so much
+
   // The way that the plan makes from now to now + step_us.
   Displacement step(SimTime now, int64_t step_us);
   // After step(): how it came out, with the way (m) and angle (rad) that base_link really made. `touched`: by
-  // something that may have changed them. Ends primitives.
-  void finish(SimTime now, double way, double angle, bool touched);
+  // something that may have changed them. Ends primitives: when the plan is over and the robot has settled, too.
+  void finish(SimTime now, double way, double angle, bool touched, const Lag& lag = {});
 
   double v() const { return v_; }            // m/s and rad/s at the end of the last step, as planned
   double omega() const { return omega_; }
+  bool has_primitive() const { return primitive_.axis != Axis::none; }
   bool resting() const { return resting_; }  // stands still, and nothing happens until a command comes
-  const MotionState& state() const { return log_.shown(); }
-  void show_next() { log_.advance(); }
+  const MotionLog& log() const { return log_; }
+  void show_step() { log_.advance(); }
 
  private:
   enum class Axis { none, way, angle, arc };
@@ -61,6 +72,7 @@ class Motion {
   void show(int64_t id, int8_t kind, int8_t state, int8_t reason = 0);
   void publish_progress();
   void watch_for_block(SimTime now, bool touched);
+  bool settled(SimTime now, const Lag& lag) const;
   static Limits stricter(const Limits& own, const MoveCommand& command, double fallback_speed);
 
   // Hot: what a step of steady motion needs.

@@ -9,7 +9,7 @@ namespace ruedo::robot {
 Mover::Mover(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics, int instance)
     : physics_(physics), instance_(instance), step_us_(world.step_us) {
   const auto& placed = world.models[static_cast<size_t>(instance)];
-  read(*placed.model->path);
+  path_ = read(*placed.model->path);
   for (size_t i = 0; i < layout.bodies.size(); ++i) {
     if (layout.bodies[i].instance != instance) continue;
     parts_.push_back({static_cast<int>(i), placed.X_WM.inverse() * layout.bodies[i].X_WB});
@@ -23,14 +23,18 @@ void Mover::start_again(SimTime now) {
   for (const Part& part : parts_) physics_.set_pose(part.body, (X_WM * part.X_MB).normalized());
 }
 
-void Mover::read(const Element& path) {
+void check_path(const Element& path) { Mover::read(path); }
+
+Mover::Path Mover::read(const Element& path) {
+  Path result;
+  std::vector<Waypoint>& waypoints = result.waypoints;
   const bool ours = path.name.starts_with("ruedo:");
-  loop_ = path.boolean(ours ? "ruedo:loop" : "loop", true);
-  const auto add = [this](const Element& element, double time_s, const Pose& pose) {
+  result.loop = path.boolean(ours ? "ruedo:loop" : "loop", true);
+  const auto add = [&waypoints](const Element& element, double time_s, const Pose& pose) {
     if (time_s < 0.0 || time_s > 1e9) element.fail("the time " + std::to_string(time_s) + " is not within 0 and 1e9 s");
     const auto time = static_cast<SimTime>(std::llround(time_s * 1e6));
-    if (!waypoints_.empty() && time <= waypoints_.back().time) element.fail("its time is not after the one before");
-    waypoints_.push_back({time, pose});
+    if (!waypoints.empty() && time <= waypoints.back().time) element.fail("its time is not after the one before");
+    waypoints.push_back({time, pose});
   };
   if (ours) {
     for (const Element* waypoint : path.all("ruedo:waypoint")) {
@@ -44,15 +48,17 @@ void Mover::read(const Element& path) {
       add(*waypoint, waypoint->number("time", 0.0), waypoint->pose("pose"));
     }
   }
-  if (waypoints_.empty()) path.fail("has no waypoint");
+  if (waypoints.empty()) path.fail("has no waypoint");
+  return result;
 }
 
 Pose Mover::pose_at(SimTime time) const {
-  const SimTime first = waypoints_.front().time, last = waypoints_.back().time;
-  if (loop_ && time > last && last > first) time = first + (time - first) % (last - first);
-  if (time <= first) return waypoints_.front().X_WM;
-  if (time >= last) return waypoints_.back().X_WM;
-  const auto next = std::upper_bound(waypoints_.begin(), waypoints_.end(), time,
+  const std::vector<Waypoint>& waypoints = path_.waypoints;
+  const SimTime first = waypoints.front().time, last = waypoints.back().time;
+  if (path_.loop && time > last && last > first) time = first + (time - first) % (last - first);
+  if (time <= first) return waypoints.front().X_WM;
+  if (time >= last) return waypoints.back().X_WM;
+  const auto next = std::upper_bound(waypoints.begin(), waypoints.end(), time,
                                      [](SimTime t, const Waypoint& waypoint) { return t < waypoint.time; });
   const Waypoint& from = *(next - 1);
   const double part = static_cast<double>(time - from.time) / static_cast<double>(next->time - from.time);

@@ -25,23 +25,28 @@ class Mover {
   // Sends its bodies to where they are one step later.
   void before_step(SimTime now);
 
- private:
   struct Waypoint {
     SimTime time;
     Pose X_WM;
   };
+  struct Path {
+    bool loop = true;
+    std::vector<Waypoint> waypoints;
+  };
+  // Throws InputError for waypoints that are not numbers, or whose times do not grow.
+  static Path read(const Element& path);
+
+ private:
   struct Part {
     int body;
     Pose X_MB;
   };
 
-  void read(const Element& path);
   physics::PhysicsWorld& physics_;
   int instance_;
   int64_t step_us_;
   SimTime offset_ = 0;    // time of the path less sim time
-  bool loop_ = true;
-  std::vector<Waypoint> waypoints_;
+  Path path_;
   std::vector<Part> parts_;
 };
 

@@ -20,10 +20,28 @@ class Robots::Impl {
   void apply(const Command& command);
   void step();
   void read(Snapshot& snapshot) const;
+  void add(int instance);
+  void remove(int instance);
+  Pose model_pose(int instance) const;
+  void set_pose(int instance, const Pose& X_WM);
+  void set_twist(int instance, const Twist& twist);
+  void start_again(int instance);
+  SimTime set_time_to_zero();
 
   int64_t step_ = 0;
 
  private:
+  std::unique_ptr<Drive> make_drive(int robot);
+  void change_ground();
+  template <class Visit>
+  void for_each_body(int instance, Visit visit) const {
+    for (size_t i = 0; i < layout_.bodies.size(); ++i) {
+      if (layout_.bodies[i].instance == instance) visit(static_cast<int>(i));
+    }
+  }
+  int robot_of(int instance) const;    // -1: it is none
+  void put(int body, const Pose& X_WB);
+  void end_put(int instance);
   void read_driveless(size_t robot, RobotState& state) const;
   SimTime now() const { return step_ * world_.step_us; }
 
@@ -33,7 +51,7 @@ class Robots::Impl {
   std::vector<double> planes_;
   std::vector<std::unique_ptr<Drive>> drives_;    // of each robot; null: it has none, or cannot move
   std::vector<MotionLog> driveless_;              // refusals of those
-  std::vector<Mover> movers_;
+  std::vector<std::unique_ptr<Mover>> movers_;
   JointControl joints_;
 };
 
@@ -44,20 +62,18 @@ Robots::Impl::Impl(const model::WorldModel& world, const model::BodyLayout& layo
       planes_(level_planes(world, layout)),
       driveless_(layout.robots.size()),
       joints_(world, layout, physics) {
-  for (size_t i = 0; i < layout.robots.size(); ++i) {
-    const auto& drive = world.models[static_cast<size_t>(layout.robots[i].instance)].model->drive;
-    const int index = static_cast<int>(i);
-    if (!drive || layout.robots[i].body < 0) {
-      drives_.push_back(nullptr);
-    } else if (drive->kind == model::DriveDescription::Kind::wheels) {
-      drives_.push_back(std::make_unique<WheelsDrive>(world, layout, physics, index));
-    } else {
-      drives_.push_back(std::make_unique<KinematicDrive>(world, layout, physics, index, planes_));
-    }
-  }
+  for (size_t i = 0; i < layout.robots.size(); ++i) drives_.push_back(make_drive(static_cast<int>(i)));
   for (size_t i = 0; i < world.models.size(); ++i) {
-    if (world.models[i].model->path) movers_.emplace_back(world, layout, physics, static_cast<int>(i));
+    if (world.models[i].model->path) movers_.push_back(std::make_unique<Mover>(world, layout, physics, static_cast<int>(i)));
   }
+}
+
+std::unique_ptr<Drive> Robots::Impl::make_drive(int robot) {
+  const model::RobotPlacement& placement = layout_.robots[static_cast<size_t>(robot)];
+  const auto& drive = world_.models[static_cast<size_t>(placement.instance)].model->drive;
+  if (!drive || placement.body < 0) return nullptr;
+  if (drive->kind == model::DriveDescription::Kind::wheels) return std::make_unique<WheelsDrive>(world_, layout_, physics_, robot);
+  return std::make_unique<KinematicDrive>(world_, layout_, physics_, robot, planes_);
 }
 
 void Robots::Impl::apply(const Command& command) {
@@ -96,7 +112,7 @@ void Robots::Impl::apply(const Command& command) {
 }
 
 void Robots::Impl::step() {
-  for (Mover& mover : movers_) mover.before_step(now());
+  for (auto& mover : movers_) mover->before_step(now());
   for (auto& drive : drives_) if (drive) drive->before_step(now());
   joints_.before_step();
   physics_.step();
@@ -110,14 +126,16 @@ void Robots::Impl::read(Snapshot& snapshot) const {
   snapshot.step = step_;
   snapshot.time = now();
   snapshot.robots.resize(drives_.size());
+  snapshot.motion_ends.clear();
   snapshot.wheel_angles.resize(layout_.wheels.size());
   snapshot.wheel_rates.resize(layout_.wheels.size());
   for (size_t i = 0; i < drives_.size(); ++i) {
     if (drives_[i]) {
-      drives_[i]->read(snapshot.robots[i]);
+      drives_[i]->read(snapshot);
       drives_[i]->read_wheels(snapshot);
     } else {
       read_driveless(i, snapshot.robots[i]);
+      read_motion(driveless_[i], static_cast<int>(i), snapshot);
     }
   }
 }
@@ -126,7 +144,6 @@ void Robots::Impl::read(Snapshot& snapshot) const {
 void Robots::Impl::read_driveless(size_t robot, RobotState& state) const {
   const auto& placement = layout_.robots[robot];
   state = {};
-  state.motion = driveless_[robot].shown();
   state.X_WBase = placement.X_BBase;
   if (placement.body < 0) return;
   state.X_WBase = physics_.pose(placement.body) * placement.X_BBase;
@@ -136,6 +153,104 @@ void Robots::Impl::read_driveless(size_t robot, RobotState& state) const {
   state.twist = {to_base * (twist.linear + twist.angular.cross(arm)), to_base * twist.angular};
 }
 
+// ---- Changes between two steps.
+
+int Robots::Impl::robot_of(int instance) const {
+  for (size_t i = 0; i < layout_.robots.size(); ++i) {
+    if (layout_.robots[i].instance == instance) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+void Robots::Impl::change_ground() {
+  planes_ = level_planes(world_, layout_);
+  for (auto& drive : drives_) if (drive) drive->ground_changed();
+}
+
+void Robots::Impl::add(int instance) {
+  change_ground();
+  drives_.resize(layout_.robots.size());
+  driveless_.resize(layout_.robots.size());
+  if (const int robot = robot_of(instance); robot >= 0) {
+    drives_[static_cast<size_t>(robot)] = make_drive(robot);
+    driveless_[static_cast<size_t>(robot)] = {};
+  }
+  if (!world_.models[static_cast<size_t>(instance)].model->path) return;
+  movers_.push_back(std::make_unique<Mover>(world_, layout_, physics_, instance));
+  movers_.back()->start_again(now());
+}
+
+void Robots::Impl::remove(int instance) {
+  if (const int robot = robot_of(instance); robot >= 0) drives_[static_cast<size_t>(robot)].reset();
+  std::erase_if(movers_, [instance](const auto& mover) { return mover->instance() == instance; });
+  joints_.forget(instance);
+  change_ground();
+}
+
+Pose Robots::Impl::model_pose(int instance) const {
+  const auto& link = layout_.links[static_cast<size_t>(layout_.first_link[static_cast<size_t>(instance)])];
+  const Pose X_WL = link.body < 0 ? link.X_BL : physics_.pose(link.body) * link.X_BL;
+  return X_WL * world_.models[static_cast<size_t>(instance)].model->links[static_cast<size_t>(link.link)].X_ML.inverse();
+}
+
+void Robots::Impl::put(int body, const Pose& X_WB) {
+  physics_.disturb(body);    // what leaned on it
+  physics_.set_twist(body, {});
+  physics_.set_pose(body, X_WB.normalized());
+}
+
+void Robots::Impl::end_put(int instance) {
+  if (const int robot = robot_of(instance); robot >= 0) {
+    if (Drive* drive = drives_[static_cast<size_t>(robot)].get()) drive->placed(now());
+  }
+  for_each_body(instance, [&](int body) { physics_.disturb(body); });
+}
+
+void Robots::Impl::set_pose(int instance, const Pose& X_WM) {
+  const Pose X_MW = model_pose(instance).inverse();
+  for_each_body(instance, [&](int body) { put(body, X_WM * X_MW * physics_.pose(body)); });
+  end_put(instance);
+}
+
+void Robots::Impl::set_twist(int instance, const Twist& twist) {
+  const Vec3 p_M = model_pose(instance).translation;
+  for_each_body(instance, [&](int body) {
+    physics_.set_twist(body, {twist.linear + twist.angular.cross(physics_.pose(body).translation - p_M), twist.angular});
+    physics_.disturb(body);
+  });
+}
+
+// A drive's wheels keep the angle that they have turned: encoders do not jump.
+void Robots::Impl::start_again(int instance) {
+  const int robot = robot_of(instance);
+  const int base = robot >= 0 && drives_[static_cast<size_t>(robot)] ? layout_.robots[static_cast<size_t>(robot)].body : -1;
+  const auto is_wheel = [&](int body) {
+    const auto& wheels = layout_.robots[static_cast<size_t>(robot)].wheels;
+    return body != base && std::any_of(wheels.begin(), wheels.end(), [&](int wheel) {
+      return layout_.links[static_cast<size_t>(layout_.wheels[static_cast<size_t>(wheel)].link)].body == body;
+    });
+  };
+  const Pose X_BaseW = base >= 0 ? physics_.pose(base).inverse() : Pose{};
+  for_each_body(instance, [&](int body) {
+    const bool wheel = base >= 0 && is_wheel(body);
+    put(body, wheel ? layout_.bodies[static_cast<size_t>(base)].X_WB * X_BaseW * physics_.pose(body) : layout_.bodies[static_cast<size_t>(body)].X_WB);
+  });
+  for (size_t i = 0; i < layout_.joints.size(); ++i) {
+    if (layout_.joints[i].instance == instance) physics_.start_again(static_cast<int>(i));
+  }
+  joints_.forget(instance);
+  for (auto& mover : movers_) if (mover->instance() == instance) mover->start_again(now());
+  end_put(instance);
+}
+
+SimTime Robots::Impl::set_time_to_zero() {
+  const SimTime was = now();
+  for (auto& drive : drives_) if (drive) drive->motion().shift_time(was);
+  for (auto& mover : movers_) mover->shift_time(was);
+  step_ = 0;
+  return was;
+}
+
 Robots::Robots(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics)
     : impl_(std::make_unique<Impl>(world, layout, physics)) {}
 Robots::~Robots() = default;
@@ -143,5 +258,12 @@ void Robots::apply(const Command& command) { impl_->apply(command); }
 void Robots::step() { impl_->step(); }
 void Robots::read(Snapshot& snapshot) const { impl_->read(snapshot); }
 int64_t Robots::current_step() const { return impl_->step_; }
+void Robots::add(int instance) { impl_->add(instance); }
+void Robots::remove(int instance) { impl_->remove(instance); }
+Pose Robots::model_pose(int instance) const { return impl_->model_pose(instance); }
+void Robots::set_pose(int instance, const Pose& X_WM) { impl_->set_pose(instance, X_WM); }
+void Robots::set_twist(int instance, const Twist& twist) { impl_->set_twist(instance, twist); }
+void Robots::start_again(int instance) { impl_->start_again(instance); }
+SimTime Robots::set_time_to_zero() { return impl_->set_time_to_zero(); }
 
 }  // namespace ruedo::robot

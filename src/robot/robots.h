@@ -26,6 +26,9 @@ struct Command {
   std::variant<VelocityCommand, WheelCommand, MoveCommand, JointCommand, ResetOdometry> what;
 };
 
+// Throws InputError for a <ruedo:path> or trajectory with waypoints that are not numbers, or whose times do not grow.
+void check_path(const Element& path);
+
 class Robots {
  public:
   // All must outlive it.
@@ -42,6 +45,16 @@ class Robots {
   void read(Snapshot& snapshot) const;
 
   int64_t current_step() const;
+
+  // Changes between two steps; instance is an index into WorldModel::models.
+  void add(int instance);       // the physics has it; the layout, too
+  void remove(int instance);    // the physics has it no more
+  Pose model_pose(int instance) const;                     // X_WM, of a model that can move
+  // Puts a model there, at rest: its joints stand as they stood, what it was asked to do ends, its odometry stays.
+  void set_pose(int instance, const Pose& X_WM);
+  void set_twist(int instance, const Twist& twist);        // of the model's frame, expressed in the world
+  void start_again(int instance);                          // back where it started, at rest; paths begin anew
+  SimTime set_time_to_zero();                              // nothing moves; returns what the time was
 
  private:
   class Impl;

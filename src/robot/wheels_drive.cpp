@@ -15,6 +15,7 @@ constexpr double kYawGain_per_s = 8.0, kYawIntegral_per_s2 = 16.0;
 constexpr double kLargestWayError_m = 0.02, kLargestYawError_rad = 0.15;
 constexpr double kSupportNormal = 0.5;       // cosine between a support's normal and the robot's up
 constexpr SimTime kFallAsleep_us = 500'000;
+constexpr double kSettled_m_s = 2e-3, kSettled_rad_s = 1e-2;    // a primitive ends below these
 constexpr double kStill_m_s = 5e-3, kStill_rad_s = 2e-2;
 
 }  // namespace
@@ -37,6 +38,11 @@ double WheelsDrive::way_of_wheels() const {
   for (size_t i = 0; i < wheels_.size(); ++i) (i < of_left ? left : right) += physics_.wheel_angle(wheels_[i]);
   return 0.5 * description_.wheel_radius *
          (left / static_cast<double>(of_left) + right / static_cast<double>(wheels_.size() - of_left));
+}
+
+void WheelsDrive::begin_at_rest() {
+  planned_way_ = way_of_wheels();
+  heading_error_ = slip_correction_ = turned_ = 0.0;
 }
 
 void WheelsDrive::wake() {
@@ -73,7 +79,7 @@ void WheelsDrive::after_step(SimTime now) {
   if (asleep_) {
     velocity_.setZero();
     acceleration_.setZero();
-    motion_.show_next();
+    motion_.show_step();
     return;
   }
   const Pose X_WBase = base_pose().normalized();
@@ -87,8 +93,23 @@ void WheelsDrive::after_step(SimTime now) {
   }
   heading_error_ -= angle;
   set_state(X_WBase, base_twist(X_WBase));
-  motion_.finish(now, moved.x(), angle, touched);
+  read_wheel_rates();
+  motion_.finish(now, moved.x(), angle, touched, lag());
+  if (touched && motion_.has_primitive()) {    // it was planned anew, from where the robot really is
+    planned_way_ = way_of_wheels();
+    heading_error_ = 0.0;
+  }
+  fall_asleep_when_still();
+  motion_.show_step();
+}
 
+Lag WheelsDrive::lag() const {
+  const bool moving = std::abs(twist_.linear.x()) > kSettled_m_s || std::abs(wheel_v_) > kSettled_m_s ||
+                      std::abs(twist_.angular.z()) > kSettled_rad_s;
+  return {planned_way_ - way_of_wheels(), heading_error_, moving};
+}
+
+void WheelsDrive::read_wheel_rates() {
   double left = 0.0, right = 0.0;
   const size_t of_left = description_.left_joints.size();
   for (size_t i = 0; i < wheels_.size(); ++i) (i < of_left ? left : right) += physics_.wheel_rate(wheels_[i]);
@@ -96,8 +117,6 @@ void WheelsDrive::after_step(SimTime now) {
   right *= description_.wheel_radius / static_cast<double>(wheels_.size() - of_left);
   wheel_v_ = 0.5 * (left + right);
   wheel_omega_ = (right - left) / description_.track;
-  fall_asleep_when_still();
-  motion_.show_next();
 }
 
 void WheelsDrive::fall_asleep_when_still() {

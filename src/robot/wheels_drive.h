@@ -22,7 +22,10 @@ class WheelsDrive final : public Drive {
   void wake() override;
 
  private:
+  void begin_at_rest() override;
   double way_of_wheels() const;          // m, from the mean of the wheels' angles
+  Lag lag() const;
+  void read_wheel_rates();
   void fall_asleep_when_still();
 
   std::vector<int> bodies_;              // the robot's own: chassis and wheels

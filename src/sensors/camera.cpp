@@ -49,7 +49,10 @@ class Camera : public Sensor {
                             "ruedo:vignetting", "ruedo:phase"});
     const model::LinkPlacement& link = setup.layout.links[static_cast<size_t>(setup.link)];
     body_ = link.body;
-    X_BC_ = link.X_BL * setup.X_LS * camera.pose("pose");
+    X_LC_ = setup.X_LS * camera.pose("pose");
+    X_BC_ = link.X_BL * X_LC_;
+    layout_ = &setup.layout;
+    link_ = setup.link;
     read_format(camera, setup);
     read_noise(camera, setup);
     vignette_ = Vignette(element.number("ruedo:vignetting", 0.0, Allowed::between(0.0, 1.0)), lens_.width, lens_.height);
@@ -73,7 +76,7 @@ class Camera : public Sensor {
   }
 
   void sample(const SampleInput& input, Outbox& out) override {
-    view_.X_WCamera = body_ < 0 ? X_BC_ : input.snapshot.bodies[static_cast<size_t>(body_)] * X_BC_;
+    view_.X_WCamera = X_WC(input.snapshot);
     input.renderer->draw(input.snapshot, view_, picture_);
     publish_picture(input, out);
     if (depth_channel_ >= 0) publish_plane(input, out, depth_channel_, image_t::PIXEL_FORMAT_FLOAT_GRAY32, CV_32F, picture_.depth.data());
@@ -92,6 +95,13 @@ class Camera : public Sensor {
   }
 
  private:
+  Pose X_WC(const Snapshot& now) const {
+    if (body_ < 0) return X_BC_;
+    const Pose& X_WB = now.bodies[static_cast<size_t>(body_)];
+    const bool on_wheel = layout_->links[static_cast<size_t>(link_)].wheel >= 0;
+    return on_wheel ? X_WB * layout_->link_in_body(link_, now.wheel_angles) * X_LC_ : X_WB * X_BC_;
+  }
+
   void read_format(const Element& camera, const SensorSetup& setup) {
     const std::string encoding = setup.element.choice("ruedo:encoding", "jpeg", {"jpeg", "rgb", "grey"});
     encoding_ = encoding == "jpeg" ? Encoding::jpeg : encoding == "rgb" ? Encoding::rgb : Encoding::grey;
@@ -199,6 +209,9 @@ class Camera : public Sensor {
   int channel_, info_channel_, depth_channel_ = -1, labels_channel_ = -1;
   int body_ = -1;               // into BodyLayout::bodies; -1: does not move
   Pose X_BC_;                   // X_WC when it does not move
+  const model::BodyLayout* layout_ = nullptr;
+  int link_ = -1;               // into BodyLayout::links
+  Pose X_LC_;
   Encoding encoding_ = Encoding::jpeg;
   bool grey_ = false;
   int quality_ = 85, first_quality_ = 85;

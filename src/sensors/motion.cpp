@@ -1,5 +1,7 @@
 // What a robot is executing, on ROBOT/motion: at the drive's status rate, and at once when a command or a
-// primitive begins, ends or is refused.
+// primitive begins, ends or is refused. The last message of a step shows what holds; ends and refusals come before it.
+#include <algorithm>
+
 #include "model/body_layout.h"
 #include "ruedo/motion_status_t.hpp"
 #include "ruedo/sensor.h"
@@ -14,28 +16,37 @@ class MotionStatus : public Sensor {
   bool observes() const override { return true; }
 
   void observe(const Snapshot& now, Outbox& out) override {
-    const int64_t changes = now.robots[static_cast<size_t>(robot_)].motion.changes;
-    if (changes == changes_) return;
-    changes_ = changes;
-    if (now.step > 0) publish(now, out);    // the initial state is a sample anyway
+    const MotionState& motion = now.robots[static_cast<size_t>(robot_)].motion;
+    if (motion.changes == changes_) return;
+    changes_ = motion.changes;
+    const auto ends = std::equal_range(now.motion_ends.begin(), now.motion_ends.end(), MotionEnd{robot_, {}},
+                                       [](const MotionEnd& a, const MotionEnd& b) { return a.robot < b.robot; });
+    for (auto end = ends.first; end != ends.second; ++end) publish(now, end->state, out);
+    if (now.step > 0) show(now, out);    // the initial state is a sample anyway
   }
 
+  void shift_time(SimTime) override { shown_step_ = -1; }
+
   void sample(const SampleInput& input, Outbox& out) override {
-    if (input.snapshot.step != published_step_) publish(input.snapshot, out);
+    if (input.snapshot.step != shown_step_) show(input.snapshot, out);
   }
 
  private:
-  void publish(const Snapshot& now, Outbox& out) {
-    published_step_ = now.step;
+  void show(const Snapshot& now, Outbox& out) {
+    shown_step_ = now.step;
+    publish(now, now.robots[static_cast<size_t>(robot_)].motion, out);
+  }
+
+  void publish(const Snapshot& now, const MotionState& motion, Outbox& out) {
     const RobotState& robot = now.robots[static_cast<size_t>(robot_)];
     motion_status_t message;
     message.utime = now.time;
-    message.id = robot.motion.id;
-    message.kind = robot.motion.kind;
-    message.state = robot.motion.state;
-    message.reason = robot.motion.reason;
-    message.done = robot.motion.done;
-    message.remaining = robot.motion.remaining;
+    message.id = motion.id;
+    message.kind = motion.kind;
+    message.state = motion.state;
+    message.reason = motion.reason;
+    message.done = motion.done;
+    message.remaining = motion.remaining;
     message.v = robot.twist.linear.x();
     message.omega = robot.twist.angular.z();
     out.publish(channel_, message);
@@ -44,7 +55,7 @@ class MotionStatus : public Sensor {
   int robot_;
   int channel_;
   int64_t changes_ = 0;
-  int64_t published_step_ = -1;
+  int64_t shown_step_ = -1;
 };
 
 const RegisterSensor kRegister{{.module = "odometry",

@@ -14,11 +14,17 @@ class RayMount {
       : world_(&setup.world), layout_(&setup.layout), link_(setup.link) {
     const model::LinkPlacement& link = setup.layout.links[static_cast<size_t>(setup.link)];
     body_ = link.body;
+    X_LS_ = setup.X_LS;
     X_BS_ = link.X_BL * setup.X_LS;
+    turns_ = link.wheel >= 0;
   }
 
   int link() const { return link_; }    // into BodyLayout::links
-  Pose X_WS(const Snapshot& now) const { return body_ < 0 ? X_BS_ : now.bodies[static_cast<size_t>(body_)] * X_BS_; }
+  Pose X_WS(const Snapshot& now) const {
+    if (body_ < 0) return X_BS_;
+    const Pose& X_WB = now.bodies[static_cast<size_t>(body_)];
+    return turns_ ? X_WB * layout_->link_in_body(link_, now.wheel_angles) * X_LS_ : X_WB * X_BS_;
+  }
 
   // The surface that a ray struck; visuals have none, they are as if of the default surface.
   const model::Surface& surface(const scene::Hit& hit, bool visuals = false) const {
@@ -34,6 +40,8 @@ class RayMount {
   const model::BodyLayout* layout_;
   int link_ = -1;
   int body_ = -1;     // into BodyLayout::bodies; -1: does not move, X_BS_ is then X_WS
+  bool turns_ = false;    // with a wheel that is part of that body
+  Pose X_LS_;
   Pose X_BS_;
 };
 

@@ -247,12 +247,15 @@ TEST(Commands, RefusedOnesChangeNothingAndSayWhy) {
     const int64_t changes = sim.robot().motion.changes;
     sim.robots.apply(refused.command);
     sim.step();
-    EXPECT_EQ(sim.robot().motion.state, Status::STATE_REFUSED);
-    EXPECT_EQ(sim.robot().motion.reason, refused.reason) << "row " << (&refused - table);
+    ASSERT_EQ(sim.state.motion_ends.size(), 1u) << "row " << (&refused - table);
+    EXPECT_EQ(sim.state.motion_ends[0].robot, 0);
+    EXPECT_EQ(sim.state.motion_ends[0].state.state, Status::STATE_REFUSED);
+    EXPECT_EQ(sim.state.motion_ends[0].state.reason, refused.reason) << "row " << (&refused - table);
     EXPECT_EQ(sim.robot().motion.changes, changes + 1);
+    EXPECT_EQ(sim.robot().motion.state, Status::STATE_RUNNING);
     sim.step();
     calm.step(2);
-    EXPECT_EQ(sim.robot().motion.state, Status::STATE_RUNNING);
+    EXPECT_TRUE(sim.state.motion_ends.empty());
     EXPECT_EQ(sim.position(), calm.position());
   }
 }
@@ -265,28 +268,34 @@ TEST(Commands, UnknownRobotsAndThoseWithoutADriveAreNotHarmed) {
   ASSERT_EQ(sim.layout.robots.size(), 2u);
   sim.velocity(1, 0, 1);
   sim.step();
-  EXPECT_EQ(sim.robot(1).motion.state, Status::STATE_REFUSED);
-  EXPECT_EQ(sim.robot(1).motion.reason, Status::REASON_NO_DRIVE);
+  ASSERT_EQ(sim.state.motion_ends.size(), 1u);
+  EXPECT_EQ(sim.state.motion_ends[0].robot, 1);
+  EXPECT_EQ(sim.state.motion_ends[0].state.state, Status::STATE_REFUSED);
+  EXPECT_EQ(sim.state.motion_ends[0].state.reason, Status::REASON_NO_DRIVE);
 }
 
-TEST(Commands, AReplacedPrimitiveSaysSoBeforeItsSuccessorShows) {
+TEST(Commands, AReplacedPrimitiveAndItsSuccessorShowAtTheSameStep) {
   Sim sim(free_robot());
   sim.move(Move::ADVANCE, 5.0, 0, 0, 0, 0, 0, 41);
+  sim.step();
+  EXPECT_EQ(sim.robot().motion.id, 41);
   sim.run(1.0);
-  EXPECT_EQ(sim.robot().motion.id, 41);
-  EXPECT_EQ(sim.robot().motion.state, Status::STATE_RUNNING);
+  sim.move(Move::ARC, 1.0, 1.0, 0, 0, 0, 0, 42);    // replaced before it began
+  sim.move(Move::ROTATE, 1.0, 0, 0, 0, 0, 0, 43);
   const double done = sim.robot().motion.done;
-  EXPECT_NEAR(done, 0.25, 1e-12);    // half of 0.5 m/s^2 times 1 s^2
-  sim.move(Move::ROTATE, 1.0, 0, 0, 0, 0, 0, 42);
+  EXPECT_NEAR(done, 0.25 * 1.005 * 1.005, 1e-12);    // half of 0.5 m/s^2 times the time's square
   sim.step();
-  EXPECT_EQ(sim.robot().motion.id, 41);
-  EXPECT_EQ(sim.robot().motion.state, Status::STATE_ENDED);
-  EXPECT_EQ(sim.robot().motion.reason, Status::REASON_REPLACED);
-  EXPECT_EQ(sim.robot().motion.done, done);
-  sim.step();
-  EXPECT_EQ(sim.robot().motion.id, 42);
+  EXPECT_EQ(sim.robot().motion.id, 43);
   EXPECT_EQ(sim.robot().motion.state, Status::STATE_RUNNING);
-  EXPECT_EQ(sim.robot().motion.changes, 3);
+  EXPECT_EQ(sim.robot().motion.changes, 4);          // 41 began; 41 and 42 ended, 43 began
+  ASSERT_EQ(sim.state.motion_ends.size(), 2u);
+  for (const int64_t i : {0, 1}) {
+    const MotionState& end = sim.state.motion_ends[static_cast<size_t>(i)].state;
+    EXPECT_EQ(end.id, 41 + i);
+    EXPECT_EQ(end.state, Status::STATE_ENDED);
+    EXPECT_EQ(end.reason, Status::REASON_REPLACED);
+    EXPECT_EQ(end.done, i == 0 ? done : 0.0);
+  }
 }
 
 }  // namespace

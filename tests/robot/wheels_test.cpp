@@ -27,6 +27,42 @@ TEST(Wheels, AdvancesOneMetre) {
   }
 }
 
+// Steps until the primitive is done; s that it took, 0 when it was not.
+double run_until_done(Sim& sim) {
+  for (int i = 1; i < 4000; ++i) {
+    sim.step();
+    if (sim.robot().motion.state == Status::STATE_DONE) return 0.005 * i;
+  }
+  return 0.0;
+}
+
+// What a client sees that takes the primitive's end for its end: the robot is there, and stands.
+TEST(Wheels, IsAtItsGoalAndAtRestWhenItSaysDone) {
+  struct Case { double acceleration, deceleration, seconds; };    // of the plan: sqrt(2 s (1/a + 1/d))
+  for (const Case& c : {Case{4.2, 0.27, 2.808}, Case{0.27, 4.2, 2.808}, Case{0.3, 0.6, 3.162}}) {
+    Sim sim(plane_sdf() + wheeled("0 0 0 0 0 0", limits(2.0, 2.0, 5.0, 5.0, 1.74)));
+    sim.run(1.0);
+    const Vec3 start = sim.position();
+    sim.move(Move::ADVANCE, 1.0, 0, 2.0, c.acceleration, c.deceleration);
+    const double took = run_until_done(sim);
+    EXPECT_GE(took, c.seconds);
+    EXPECT_LE(took, c.seconds + 0.6);
+    EXPECT_NEAR((sim.position() - start).norm(), 1.0, 2e-3) << c.acceleration;
+    EXPECT_LT(sim.robot().twist.linear.norm(), 5e-3);
+    EXPECT_NEAR(sim.robot().motion.remaining, 0.0, 5e-4);
+    EXPECT_NEAR(sim.robot().motion.done + sim.robot().motion.remaining, 1.0, 1e-12);
+    sim.run(1.0);    // nor does it move on afterwards
+    EXPECT_NEAR((sim.position() - start).norm(), 1.0, 2e-3) << c.acceleration;
+
+    const double before = sim.yaw();
+    sim.move(Move::ROTATE, M_PI / 2);
+    EXPECT_GT(run_until_done(sim), 0.0);
+    EXPECT_NEAR(wrap_angle(sim.yaw() - before), M_PI / 2, 2e-3);
+    sim.run(1.0);
+    EXPECT_NEAR(wrap_angle(sim.yaw() - before), M_PI / 2, 2e-3);
+  }
+}
+
 TEST(Wheels, TurnsAtTheCommandedRateWhateverItsHeading) {
   for (const double heading : {0.0, 0.8, 2.0}) {
     Sim sim(plane_sdf() + wheeled("0 0 0 0 0 " + std::to_string(heading)));

@@ -95,6 +95,28 @@ TEST(MotionStatus, AtItsRateAndAtOnceWhenItChanges) {
   EXPECT_EQ(out.entries()[1].step, 4);
 }
 
+// A command replaces a primitive: its step shows how that ended, then what runs now.
+TEST(MotionStatus, TheSuccessorShowsAtTheStepOfItsCommand) {
+  SensorBench bench(kWorld);
+  Device device = bench.make("rover", "motion");
+  Snapshot now = bench.snapshot();
+  Outbox out;
+  now.step = 7;
+  now.time = 35'000;
+  now.robots[0].motion = {.id = 43, .kind = 2, .state = motion_status_t::STATE_RUNNING, .changes = 2};
+  now.motion_ends = {{0, {.id = 42, .kind = 1, .state = motion_status_t::STATE_ENDED, .reason = motion_status_t::REASON_REPLACED, .done = 0.5}},
+                     {1, {.id = 99, .kind = 1, .state = motion_status_t::STATE_REFUSED}}};    // another robot's
+  test::step(device, now, out, 1);    // also due: told once
+  const auto messages = Device::decode<motion_status_t>(out);
+  ASSERT_EQ(messages.size(), 2u);
+  EXPECT_EQ(messages[0].id, 42);
+  EXPECT_EQ(messages[0].reason, +motion_status_t::REASON_REPLACED);
+  EXPECT_EQ(messages[0].done, 0.5);
+  EXPECT_EQ(messages[1].id, 43);
+  EXPECT_EQ(messages[1].state, +motion_status_t::STATE_RUNNING);
+  for (const auto& message : messages) EXPECT_EQ(message.utime, 35'000);
+}
+
 TEST(Joints, ThoseThatAreNoWheels) {
   SensorBench bench(kWorld);
   Device device = bench.make("rover", "joints");
