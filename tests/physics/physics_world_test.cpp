@@ -186,6 +186,37 @@ TEST(Joints, LimitsHold) {
   EXPECT_NEAR(w.physics.joint_position(0), -0.5, 0.02);
 }
 
+// A limit on one side only, and limits beyond a turn, hold as well.
+TEST(Joints, LimitsHoldOnOneSideAndBeyondATurn) {
+  World one(hinged("0 0 1", "revolute", "<limit><lower>-0.5</lower></limit>"));
+  one.physics.drive_joint_velocity(0, -1.0, 20.0);
+  one.run(2.0);
+  EXPECT_NEAR(one.physics.joint_position(0), -0.5, 0.02);
+  one.physics.drive_joint_velocity(0, 2.0, 20.0);
+  one.run(5.0);
+  EXPECT_GT(one.physics.joint_position(0), 7.0);    // more than a turn
+  World wide(hinged("0 0 1", "revolute", "<limit><lower>-4</lower><upper>8</upper></limit>"));
+  wide.physics.drive_joint_velocity(0, 2.0, 20.0);
+  wide.run(6.0);
+  EXPECT_NEAR(wide.physics.joint_position(0), 8.0, 0.02);
+  wide.physics.drive_joint_velocity(0, -2.0, 20.0);
+  wide.run(8.0);
+  EXPECT_NEAR(wide.physics.joint_position(0), -4.0, 0.02);
+}
+
+// What is held more simply than the file says is told, once and with its name.
+TEST(Physics, SimplerJointsAndFrictionAreNamed) {
+  const auto shape = [](const std::string& name, const std::string& mu) {
+    return "<collision name='" + name + "'><geometry>" + kBall + "</geometry><surface><friction><ode><mu>" + mu + "</mu><mu2>" + mu +
+           "</mu2></ode></friction></surface></collision>";
+  };
+  World w("<model name='m'><link name='a'>" + shape("one", "0.5") + shape("two", "0.9") + "</link><link name='b'>" + shape("c", "1") +
+          shape("d", "1") + "</link><joint name='j' type='ball'><parent>a</parent><child>b</child></joint></model>");
+  ASSERT_EQ(w.physics.findings().size(), 2u);
+  EXPECT_EQ(w.physics.findings()[0].element, "model m/joint j");
+  EXPECT_EQ(w.physics.findings()[1].element, "body m/a/collision two");
+}
+
 TEST(Joints, EffortAccelerates) {
   // 0.6 N m on I + m r^2 = 0.6 kg m^2: 1 rad/s^2.
   World w(hinged("0 0 1"));

@@ -62,6 +62,8 @@ class Motion:
             if status.id == self.id:
                 self.progress, self.remaining = status.progress, status.remaining
                 self.state, self.reason = status.state, status.reason
+            elif status.state == "refused":
+                pass                             # another command, which changed nothing
             elif self.state != "sent":
                 self.state, self.reason = "ended", "replaced"    # its own end fell between two statuses
             else:
@@ -71,7 +73,8 @@ class Motion:
             self._news.notify_all()
 
     def __repr__(self) -> str:
-        return f"<Motion {self.kind} of {self._robot.name}: {self.state} {self.reason}, {self.remaining:.3f} remain>"
+        state = f"{self.state} ({self.reason})" if self.reason else self.state
+        return f"<Motion {self.kind} of {self._robot.name}: {state}, {self.progress:.3f} done, {self.remaining:.3f} remain>"
 
 
 class Driver:
