@@ -22,7 +22,7 @@ Clock::time_point deadline_after(double seconds) {
 
 Core::Core(const std::string& url, const std::string& name, std::unique_ptr<ServerProcess> server)
     : url_(url), server_(std::move(server)), last_sign_(Clock::now().time_since_epoch().count()), session_(*this, name),
-      bus_(url) {
+      stepper_(*this), bus_(url) {
   uint32_t hash = 2166136261u;    // FNV-1a of the name: two clients number their primitives apart
   for (unsigned char c : name) hash = (hash ^ c) * 16777619u;
   ids_ = static_cast<int64_t>(hash & 0x7fffffffu) << 20;
@@ -200,6 +200,10 @@ void Core::on_tick(const uint8_t* bytes, size_t size) {
   WireReader in(bytes, size);
   if (in.int64() != tick_t::getHash()) return;
   note_time(in.int64());
+  try {
+    stepper_.on_tick(bytes, size);
+  } catch (const WireError&) {
+  }
   // Sim time may run a hundred times faster than real time: the watchdog is fed by its beat, too.
   std::vector<std::shared_ptr<Driver>> drivers;
   {

@@ -17,6 +17,7 @@
 #include "lcm_bus.h"
 #include "ruedo/client.h"
 #include "session.h"
+#include "stepper.h"
 #include "stream_core.h"
 #include "world_info.h"
 
@@ -38,6 +39,7 @@ class Core : public std::enable_shared_from_this<Core> {
 
   LcmBus& bus() { return bus_; }
   Session& session() { return session_; }
+  Stepper& stepper() { return stepper_; }
   const std::string& url() const { return url_; }
   std::shared_ptr<const WorldInfo> info() const;
   RobotInfo robot_info(const std::string& name) const;    // throws UnknownName
@@ -79,6 +81,7 @@ class Core : public std::enable_shared_from_this<Core> {
   std::thread repeater_;
   std::condition_variable wake_;
   Session session_;
+  Stepper stepper_;
   LcmBus bus_;                                      // last: its thread ends before the rest goes
 };
 

@@ -109,7 +109,7 @@ void hold(Core& core, const std::string& robot, const std::string& channel, std:
   core.keep_repeating(driver);
 }
 
-Motion move(Core& core, const std::string& robot, const char* name, int8_t kind, double value, double radius, const Limits& limits) {
+move_command_t move_message(Core& core, int8_t kind, double value, double radius, const Limits& limits) {
   move_command_t command{};
   command.utime = core.utime();
   command.kind = kind;
@@ -118,11 +118,32 @@ Motion move(Core& core, const std::string& robot, const char* name, int8_t kind,
   command.speed = limit("speed", limits.speed);
   command.acceleration = limit("acceleration", limits.acceleration);
   command.deceleration = limit("deceleration", limits.deceleration);
+  return command;
+}
+
+Motion move(Core& core, const std::string& robot, const char* name, int8_t kind, double value, double radius, const Limits& limits) {
+  move_command_t command = move_message(core, kind, value, radius, limits);
   const std::string channel = input_channel(core, robot, "move_command_t");
   const auto driver = core.driver(robot);
   listen(core, robot, *driver);
   command.id = core.next_id();
   return Motion(driver->move(channel, command, name));
+}
+
+velocity_command_t velocity_message(Core& core, double v, double omega) {
+  velocity_command_t command{};
+  command.utime = core.utime();
+  command.vx = finite("v", v);
+  command.omega = finite("omega", omega);
+  return command;
+}
+
+wheel_command_t wheel_message(Core& core, double left, double right) {
+  wheel_command_t command{};
+  command.utime = core.utime();
+  command.rate = {finite("left", left), finite("right", right)};
+  command.n = 2;
+  return command;
 }
 
 }  // namespace
@@ -180,19 +201,32 @@ Camera Robot::camera() const {
 }
 
 void Robot::set_velocity(double v, double omega) const {
-  velocity_command_t command{};
-  command.utime = core_->utime();
-  command.vx = finite("v", v);
-  command.omega = finite("omega", omega);
-  hold(*core_, name_, input_channel(*core_, name_, "velocity_command_t"), encoded(command));
+  hold(*core_, name_, input_channel(*core_, name_, "velocity_command_t"), encoded(velocity_message(*core_, v, omega)));
 }
 
 void Robot::set_wheels(double left, double right) const {
-  wheel_command_t command{};
-  command.utime = core_->utime();
-  command.rate = {finite("left", left), finite("right", right)};
-  command.n = 2;
-  hold(*core_, name_, input_channel(*core_, name_, "wheel_command_t"), encoded(command));
+  hold(*core_, name_, input_channel(*core_, name_, "wheel_command_t"), encoded(wheel_message(*core_, left, right)));
+}
+
+Command Robot::velocity_command(double v, double omega) const {
+  return {input_channel(*core_, name_, "velocity_command_t"), encoded(velocity_message(*core_, v, omega))};
+}
+
+Command Robot::wheel_command(double left, double right) const {
+  return {input_channel(*core_, name_, "wheel_command_t"), encoded(wheel_message(*core_, left, right))};
+}
+
+Command Robot::move_command(const std::string& kind, double value, Limits limits, double radius) const {
+  static const std::pair<const char*, int8_t> kinds[] = {{"advance", move_command_t::ADVANCE}, {"rotate", move_command_t::ROTATE},
+                                                         {"heading", move_command_t::HEADING}, {"arc", move_command_t::ARC},
+                                                         {"stop", move_command_t::STOP}};
+  for (const auto& [name, number] : kinds) {
+    if (kind != name) continue;
+    move_command_t command = move_message(*core_, number, value, radius, limits);
+    command.id = core_->next_id();
+    return {input_channel(*core_, name_, "move_command_t"), encoded(command)};
+  }
+  throw std::invalid_argument("kind is '" + kind + "': it must be advance, rotate, heading, arc or stop");
 }
 
 Motion Robot::stop(double deceleration) const {

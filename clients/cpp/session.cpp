@@ -32,11 +32,15 @@ Reply checked(Reply reply) {
 }  // namespace
 
 Reply Session::request(int32_t kind, const std::vector<uint8_t>& body, double timeout) {
+  const auto turn = this->turn();
+  return request_in_turn(kind, body, timeout);
+}
+
+Reply Session::request_in_turn(int32_t kind, const std::vector<uint8_t>& body, double timeout) {
   const auto info = core_.info();
   if (!(static_cast<uint64_t>(info->features) >> kind & 1)) {
     throw NotSupported("this server (Ruedo " + info->version + ") has no " + kind_name(kind) + " request");
   }
-  std::lock_guard lock(one_at_a_time_);
   for (int attempt = 1;; ++attempt) {
     if (session_ == 0 || run_id_ != info->run_id) join(info->run_id, timeout);
     Reply reply = exchange(kind, session_, ++sequence_, body, timeout);
@@ -82,11 +86,11 @@ Reply Session::exchange(int32_t kind, int64_t session, int64_t sequence, const s
   return std::move(*reply_);
 }
 
-void Session::publish(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body) {
+void Session::publish(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body, int32_t epoch) {
   request_t request;
   request.utime = core_.utime();
   request.run_id = core_.info()->run_id;
-  request.epoch = -1;
+  request.epoch = epoch;
   request.session = session;
   request.sequence = sequence;
   request.kind = kind;
@@ -102,7 +106,7 @@ void Session::receive(const uint8_t* bytes, size_t size) {
     if (in.int64() != reply_t::getHash()) return;
     in.int64();    // utime
     in.int64();    // run
-    in.int32();    // epoch
+    reply.epoch = in.int32();
     reply.session = in.int64();
     reply.sequence = in.int64();
     reply.kind = in.int32();
@@ -112,11 +116,15 @@ void Session::receive(const uint8_t* bytes, size_t size) {
   } catch (const WireError&) {
     return;
   }
-  std::lock_guard lock(mutex_);
-  const bool ours = reply.kind == request_t::JOIN || reply.session == session_;
-  if (!ours || reply.kind != awaited_kind_ || reply.sequence != awaited_sequence_) return;
-  reply_ = std::move(reply);
-  news_.notify_all();
+  if (reply.kind != request_t::JOIN && reply.session != session_) return;
+  std::unique_lock lock(mutex_);
+  if (reply.kind == awaited_kind_ && reply.sequence == awaited_sequence_) {
+    reply_ = std::move(reply);
+    news_.notify_all();
+  } else if (reply.kind == request_t::GRANT || reply.kind == request_t::RESEND) {
+    lock.unlock();
+    core_.stepper().on_reply(reply);
+  }
 }
 
 }  // namespace ruedo::client

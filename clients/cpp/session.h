@@ -1,6 +1,7 @@
 // A client's session with the server: requests are repeated until they are answered, and executed once.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <cstdint>
 #include <mutex>
@@ -17,6 +18,7 @@ namespace ruedo::client {
 class Core;
 
 struct Reply {
+  int32_t epoch = 0;
   int64_t session = 0, sequence = 0;
   int32_t kind = 0, code = 0;
   std::string text;
@@ -29,13 +31,19 @@ class Session {
 
   // Joins on the first request. Throws NotSupported, RequestError, Timeout (after `timeout` seconds of real time).
   Reply request(int32_t kind, const std::vector<uint8_t>& body, double timeout);
+  // For grants, which are not answered by replies: keeps other requests waiting while the lock lives.
+  std::unique_lock<std::mutex> turn() { return std::unique_lock(one_at_a_time_); }
+  Reply request_in_turn(int32_t kind, const std::vector<uint8_t>& body, double timeout);
+  int64_t next_sequence() { return ++sequence_; }
+  int64_t id() const { return session_; }
+  void publish(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body, int32_t epoch = -1);
+
   void leave();    // without waiting for an answer
   void receive(const uint8_t* bytes, size_t size);    // a message of ruedo/reply
 
  private:
   void join(int64_t run_id, double timeout);
   Reply exchange(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body, double timeout);
-  void publish(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body);
 
   Core& core_;
   const std::string name_;
@@ -44,7 +52,7 @@ class Session {
 
   std::mutex mutex_;
   std::condition_variable news_;
-  int64_t session_ = 0;
+  std::atomic<int64_t> session_ = 0;
   int32_t awaited_kind_ = 0;             // 0: none
   int64_t awaited_sequence_ = 0;
   std::optional<Reply> reply_;

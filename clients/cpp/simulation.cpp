@@ -109,11 +109,17 @@ void Simulation::sleep(double seconds) const { core_->sleep_until(core_->utime()
 void Simulation::pause() const { core_->session().request(request_t::PAUSE, {}, kReplyTime); }
 void Simulation::resume() const { core_->session().request(request_t::RESUME, {}, kReplyTime); }
 
-State Simulation::step(int64_t n, double timeout) const {
+Observations Simulation::step(int64_t n, const std::vector<Command>& commands, double timeout) const {
+  if (lockstep()) return core_->stepper().step(n, commands, timeout);
+  if (!commands.empty()) {
+    throw NotSupported("commands go with steps where the server runs in lockstep: start it with `ruedo run --lockstep N`");
+  }
   step_request_t body;
   body.steps = n;
-  return state_of(core_->session().request(request_t::STEP, encoded(body), timeout));
+  return {state_of(core_->session().request(request_t::STEP, encoded(body), timeout)), {}};
 }
+
+bool Simulation::lockstep() const { return static_cast<uint64_t>(core_->info()->features) >> request_t::GRANT & 1; }
 
 void Simulation::set_rate(double rate) const {
   rate_request_t body;
@@ -127,6 +133,7 @@ void Simulation::reset(Reset what, int64_t seed) const {
   body.seed = seed;
   core_->session().request(request_t::RESET, encoded(body), kSlowReplyTime);
   core_->reset_time();
+  core_->stepper().forget();
 }
 
 void Simulation::spawn(const std::string& model, double x, double y, const SpawnOptions& options) const {

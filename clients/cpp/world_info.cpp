@@ -76,6 +76,8 @@ void read_part(WireReader& in, WorldInfo& info) {
   }
   for (size_t n = in.count(30); n > 0; --n) {
     ChannelInfo channel = read_channel(in);
+    if (channel.type == "tick_t") info.tick_channel = static_cast<int32_t>(info.channel_list.size());
+    info.channel_list.push_back(channel);
     info.channels[channel.robot].push_back(std::move(channel));
   }
 }

@@ -46,6 +46,7 @@ void Control::serve(const request_t& request) {
   if (request.run_id != 0 && request.run_id != run_id_) return refuse(reply_t::WRONG_RUN, "this is another run of the server");
   if (request.kind == request_t::JOIN) return join(request, reply);
   if (request.kind == request_t::LEAVE) {    // as often as one likes
+    if (server_.left) server_.left(request.session);
     sessions_.leave(request.session);
     return refuse(reply_t::OK, "");
   }
@@ -56,6 +57,12 @@ void Control::serve(const request_t& request) {
   Session* session = sessions_.find(request.session);
   if (!session) return refuse(reply_t::UNKNOWN_SESSION, "no such session: join first");
   session->last_heard = std::chrono::steady_clock::now();
+  if (request.kind == request_t::RESEND) {    // changes nothing: it may come as often as one likes, in any order
+    Outcome outcome = server_.execute(request, *session);
+    reply.body = std::move(outcome.body);
+    reply.size = static_cast<int32_t>(reply.body.size());
+    return refuse(outcome.code, std::move(outcome.text));
+  }
   const reply_t* kept = nullptr;
   switch (sessions_.judge(*session, request.sequence, kept)) {
     case Sessions::Verdict::answer_again: return server_.publish(*kept);
@@ -63,6 +70,7 @@ void Control::serve(const request_t& request) {
     case Sessions::Verdict::too_old: return refuse(reply_t::OLD_SEQUENCE, "a later request was executed already");
     case Sessions::Verdict::execute: break;
   }
+  if (server_.early && request.kind == request_t::GRANT && server_.early(request, *session)) return;
   // After the sequence: a repeated RESET, of the epoch that it ended, gets its answer again.
   if (request.epoch != -1 && request.epoch != reply.epoch) return refuse(reply_t::WRONG_EPOCH, "the world was reset since");
   sessions_.begin(*session, request.sequence);
@@ -73,7 +81,7 @@ void Control::serve(const request_t& request) {
   if (outcome.after_step >= 0) {
     waiting_.push_back({std::move(reply), outcome.after_step});
   } else {
-    answer(reply);
+    answer(reply, outcome.quiet);
   }
 }
 
@@ -93,12 +101,12 @@ void Control::join(const request_t& request, reply_t& reply) {
   server_.publish(reply);
 }
 
-void Control::answer(reply_t& reply) {
+void Control::answer(reply_t& reply, bool quiet) {
   reply.utime = server_.utime();
   reply.epoch = server_.epoch();
   reply.size = static_cast<int32_t>(reply.body.size());
   sessions_.keep(reply);
-  server_.publish(reply);
+  if (!quiet) server_.publish(reply);
 }
 
 void Control::published(int64_t step) {

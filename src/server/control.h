@@ -23,9 +23,10 @@ struct Outcome {
   std::string text;                  // what went wrong
   std::vector<uint8_t> body;
   int64_t after_step = -1;           // answer when this state was published; -1: at once
+  bool quiet = false;                // the reply goes out only if the request is repeated
 
-  static Outcome refuse(int32_t code, std::string text) { return {code, std::move(text), {}, -1}; }
-  static Outcome with(std::vector<uint8_t> body) { return {reply_t::OK, {}, std::move(body), -1}; }
+  static Outcome refuse(int32_t code, std::string text) { return {code, std::move(text), {}}; }
+  static Outcome with(std::vector<uint8_t> body) { return {reply_t::OK, {}, std::move(body)}; }
   static Outcome after(int64_t step) { return {reply_t::OK, {}, {}, step}; }
 };
 
@@ -48,6 +49,9 @@ class Control {
     std::function<void(const reply_t& reply)> publish;
     std::function<int64_t()> utime;
     std::function<int32_t()> epoch;
+    // Lockstep's; may be empty. early: the request waits, unanswered, until it is repeated in its turn.
+    std::function<bool(const request_t& request, const Session& session)> early = {};
+    std::function<void(int64_t session)> left = {};
   };
 
   Control(int64_t run_id, Server server) : run_id_(run_id), server_(std::move(server)) {}
@@ -63,6 +67,7 @@ class Control {
   void cancel(const std::string& why);
 
   const Sessions& sessions() const { return sessions_; }
+  void drop(int64_t session) { sessions_.leave(session); }
   uint64_t refused() const { return refused_; }
 
  private:
@@ -73,7 +78,7 @@ class Control {
 
   void serve(const request_t& request);
   void join(const request_t& request, reply_t& reply);
-  void answer(reply_t& reply);
+  void answer(reply_t& reply, bool quiet = false);
 
   int64_t run_id_;
   Server server_;

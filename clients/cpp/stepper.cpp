@@ -1,0 +1,214 @@
+// Grants and the repair of what was lost.
+#include "stepper.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <utility>
+
+#include "core.h"
+#include "ruedo/grant_request_t.hpp"
+#include "ruedo/reply_t.hpp"
+#include "ruedo/request_t.hpp"
+#include "ruedo/resend_request_t.hpp"
+#include "world_info.h"
+
+namespace ruedo::client {
+namespace {
+
+constexpr auto kFirstRepeat = std::chrono::milliseconds(5), kLastRepeat = std::chrono::milliseconds(100);
+constexpr size_t kMostWanted = 256;              // messages asked for at once
+
+}  // namespace
+
+Observations Stepper::step(int64_t n, const std::vector<Command>& commands, double timeout) {
+  if (n < 0) throw std::invalid_argument("n is " + std::to_string(n) + ": it must be at least 0");
+  for (const Command& command : commands) {
+    if (command.after >= 0 && command.after < n) continue;
+    throw std::invalid_argument("a command is for " + std::to_string(command.after) + " steps on; of " + std::to_string(n) +
+                                " steps 0 to " + std::to_string(n - 1) + " is allowed");
+  }
+  std::lock_guard one_at_a_time(one_at_a_time_);
+  const auto turn = core_.session().turn();
+  std::unique_lock lock(mutex_);
+  if (part_ && core_.info()->run_id != run_id_) {
+    part_ = false;
+    throw NoServer("the run that this client took part in has ended; another is at " + core_.url() + " now");
+  }
+  if (!part_) {
+    lock.unlock();
+    take_part(timeout);
+    lock.lock();
+  }
+  wait(lock, granted_, timeout);    // all but nothing, unless the call before gave up
+  const int64_t until = n > INT64_MAX - granted_ ? INT64_MAX : granted_ + n;
+  if (n > 0) {
+    grant_ = {core_.session().next_sequence(), granted_, grant_body(until, commands), false};
+    granted_ = until;
+    grant_again();
+  }
+  wait(lock, until, timeout);
+  Observations observations;
+  collect(observations);
+  lock.unlock();
+  core_.note_time(observations.utime);
+  return observations;
+}
+
+void Stepper::forget() {
+  std::lock_guard lock(mutex_);
+  part_ = false;
+}
+
+void Stepper::take_part(double timeout) {
+  subscribe();
+  grant_request_t body{};
+  body.granted = -1;
+  body.received = -1;
+  const Reply reply = core_.session().request_in_turn(request_t::GRANT, encoded(body), timeout);
+  std::lock_guard lock(mutex_);
+  try {
+    WireReader in(reply.body.data(), reply.body.size());
+    in.int64();    // fingerprint
+    granted_ = in.int64();
+    have_ = in.int64();
+    newest_ = in.int64();
+  } catch (const WireError& error) {
+    throw TypeMismatch(std::string("the reply to GRANT is no grant_reply_t of this client's version: ") + error.what());
+  }
+  run_id_ = core_.info()->run_id;
+  epoch_ = reply.epoch;
+  collected_ = acknowledged_ = have_;
+  grant_ = {};
+  steps_.clear();
+  waits_for_.clear();
+  fault_ = nullptr;
+  part_ = true;
+}
+
+// All that the simulation publishes: a manifest names any of it.
+void Stepper::subscribe() {
+  const auto info = core_.info();
+  if (info_ == info) return;
+  {
+    std::lock_guard lock(mutex_);
+    early_.resize(std::max(early_.size(), info->channel_list.size()));
+  }
+  for (size_t i = 0; i < info->channel_list.size(); ++i) {
+    const ChannelInfo& channel = info->channel_list[i];
+    if (info_ && i < info_->channel_list.size() && info_->channel_list[i].name == channel.name) continue;
+    if (channel.input || (channel.robot.empty() && channel.type != "world_state_t")) continue;
+    const auto index = static_cast<int32_t>(i);
+    core_.bus().subscribe(channel.name, [this, index](const uint8_t* bytes, size_t size) { on_message(index, bytes, size); });
+  }
+  info_ = info;
+}
+
+std::vector<uint8_t> Stepper::grant_body(int64_t until, const std::vector<Command>& commands) const {
+  grant_request_t body;
+  body.granted = granted_;
+  body.step_until = until;
+  body.received = have_;
+  for (const Command& command : commands) {
+    grant_command_t& sent = body.commands.emplace_back();
+    sent.step = granted_ + command.after;
+    sent.channel = command.channel;
+    sent.size = static_cast<int32_t>(command.bytes.size());
+    sent.data = command.bytes;
+  }
+  body.ncommands = static_cast<int32_t>(body.commands.size());
+  return encoded(body);
+}
+
+// Until the states up to `until` are here with all their messages. After a silence the grant, or the request for what is
+// missing, goes out again, sooner at first.
+void Stepper::wait(std::unique_lock<std::mutex>& lock, int64_t until, double timeout) {
+  Clock::duration repeat = kFirstRepeat;
+  Clock::time_point deadline = deadline_after(timeout);
+  wanted_until_ = until;
+  const auto done = [&] { return have_ >= until && grant_.taken; };
+  while (!done()) {
+    const int64_t had = have_;
+    const bool news = news_.wait_for(lock, repeat, [&] {
+      return done() || fault_ || ask_now_ || have_ - acknowledged_ >= kAcknowledgedTogether;
+    });
+    if (fault_) {
+      part_ = false;
+      std::rethrow_exception(std::exchange(fault_, nullptr));
+    }
+    if (done()) return;
+    const bool silence = !news && have_ == had;
+    if (!grant_.taken) {
+      if (silence) grant_again();
+    } else if (silence || ask_now_) {
+      ask_for_lost(until);
+    } else if (have_ - acknowledged_ >= kAcknowledgedTogether) {
+      ask_for_lost(have_);    // for nothing: it says what is here
+    }
+    ask_now_ = false;
+    repeat = silence ? std::min<Clock::duration>(2 * repeat, kLastRepeat) : Clock::duration(kFirstRepeat);
+    if (have_ > had) deadline = deadline_after(timeout);
+    if (!silence) continue;
+    lock.unlock();
+    core_.check_server();
+    lock.lock();
+    if (Clock::now() < deadline) continue;
+    char text[32];
+    std::snprintf(text, sizeof text, "%g", timeout);
+    throw Timeout("step " + std::to_string(have_ + 1) + " did not come within " + text + " s" +
+                  (waits_for_.empty() ? "" : ": the run waits for " + waits_for_));
+  }
+}
+
+void Stepper::grant_again() {
+  core_.session().publish(request_t::GRANT, core_.session().id(), grant_.sequence, grant_.body, epoch_);
+}
+
+void Stepper::ask_for_lost(int64_t until) {
+  resend_request_t body;
+  body.received = acknowledged_ = have_;
+  const auto want = [&](int64_t step, int32_t channel, int64_t sequence, size_t offset) {
+    if (body.wanted.size() == kMostWanted) return;
+    resend_wanted_t& wanted = body.wanted.emplace_back();
+    wanted.step = step;
+    wanted.channel_index = channel;
+    wanted.sequence = sequence;
+    wanted.offset = static_cast<int32_t>(offset);
+  };
+  const int64_t last = std::min(until, std::max({newest_, have_ + 1, steps_.empty() ? have_ : steps_.rbegin()->first}));
+  for (int64_t step = have_ + 1; step <= last && body.wanted.size() < kMostWanted; ++step) {
+    const auto found = steps_.find(step);
+    if (found == steps_.end()) {
+      want(step, info_->tick_channel, 0, 0);
+      continue;
+    }
+    for (size_t part = 0; part < found->second.nparts; ++part) {
+      if (!found->second.part_here[part]) want(step, info_->tick_channel, static_cast<int64_t>(part), 0);
+      for (const Entry& entry : found->second.parts[part]) {
+        if (!entry.here()) want(step, entry.channel, entry.sequence, entry.bytes.size());
+      }
+    }
+  }
+  body.nwanted = static_cast<int32_t>(body.wanted.size());
+  core_.session().publish(request_t::RESEND, core_.session().id(), ++resend_sequence_, encoded(body), epoch_);
+}
+
+void Stepper::collect(Observations& observations) {
+  for (auto step = steps_.begin(); step != steps_.end() && step->first <= have_; step = steps_.erase(step)) {
+    observations.step = collected_ = step->first;
+    observations.utime = step->second.utime;
+    observations.state_hash = step->second.state_hash;
+    for (std::vector<Entry>& part : step->second.parts) {
+      for (Entry& entry : part) {
+        observations.messages.push_back({step->first, info_->channel_list[static_cast<size_t>(entry.channel)].name, std::move(entry.bytes)});
+      }
+    }
+    last_utime_ = observations.utime;
+    last_hash_ = observations.state_hash;
+  }
+  observations.step = collected_;    // n = 0: the state of the call before
+  observations.utime = last_utime_;
+  observations.state_hash = last_hash_;
+  observations.rate = kFast;
+}
+
+}  // namespace ruedo::client

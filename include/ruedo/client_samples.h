@@ -1,0 +1,150 @@
+// What Ruedo's client for C++ delivers and throws: samples and errors. ruedo/client.h includes it.
+//
+// SI units, radians; x ahead, y left, z up; quaternions w, x, y, z. utime is sim time in microseconds.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace ruedo::client {
+
+inline constexpr double kForever = std::numeric_limits<double>::infinity();
+inline constexpr double kFast = std::numeric_limits<double>::infinity();    // a rate: as fast as it goes
+
+using Vector3 = std::array<double, 3>;
+using Quaternion = std::array<double, 4>;    // w, x, y, z
+
+// ---- What can go wrong. Bad arguments (NaN, a radius of 0) are std::invalid_argument.
+
+struct Error : std::runtime_error { using std::runtime_error::runtime_error; };
+struct NoServer : Error { using Error::Error; };         // none answered, or it fell silent or ended
+struct LaunchError : Error { using Error::Error; };      // a private server could not be started
+struct UnknownName : Error { using Error::Error; };      // the text lists the names that exist
+struct Timeout : Error { using Error::Error; };
+struct TypeMismatch : Error { using Error::Error; };     // a channel carries another version of a type
+struct NotSupported : Error { using Error::Error; };     // the server or the robot cannot do that
+struct MotionError : Error {                             // a primitive ended early or was refused
+  MotionError(const std::string& text, std::string why) : Error(text), reason(std::move(why)) {}
+  std::string reason;                                    // as in MotionStatus
+};
+struct RequestError : Error {                            // the server refused a request
+  RequestError(const std::string& text, int32_t reply_code) : Error(text), code(reply_code) {}
+  int32_t code;                                          // of reply_t
+};
+struct LeaseLost : RequestError {                        // lockstep goes on without this client, which was silent too long;
+  using RequestError::RequestError;                      // the next step() takes part again
+};
+
+// ---- Samples.
+
+struct Sample {
+  int64_t utime = 0;                                     // us, sim time of the state shown
+  double time() const { return static_cast<double>(utime) * 1e-6; }    // s
+};
+
+// A scan of a planar laser range finder, in the device's frame.
+struct Scan : Sample {
+  std::vector<float> ranges;         // m; +inf: no return, -inf: nearer than the minimum range
+  std::vector<float> intensities;    // 0 to 1; empty when the device has none
+  double angle_min = 0.0;            // rad, of ray 0, from the device's x axis towards y (left)
+  double angle_step = 0.0;           // rad
+  double angle(size_t ray) const { return angle_min + angle_step * static_cast<double>(ray); }
+  // The smallest range between two angles (rad); +inf when nothing is there.
+  double nearest(double from_angle, double to_angle) const;
+};
+
+// A scan of a laser scanner with several layers: element layer * columns + column.
+struct LidarScan : Sample {
+  int layers = 0, columns = 0;
+  std::vector<float> ranges;         // m, lowest layer first; as in Scan
+  std::vector<float> intensities;    // 0 to 1, or empty
+  double azimuth_min = 0.0, azimuth_step = 0.0;        // rad, left is positive
+  double elevation_min = 0.0, elevation_step = 0.0;    // rad, up is positive
+};
+
+// The last reading of each of an array's transducers; their poses are DeviceInfo::elements.
+struct SonarReading : Sample {
+  std::vector<float> ranges;           // m from the transducer's face; without an echo: the maximum range
+  std::vector<int64_t> fired_utime;    // us, when each fired last; -1: not yet
+  std::vector<bool> fresh;             // true where the reading is of this very message
+};
+
+// What the robot believes of its motion from its wheels; pose of base_link in the frame odom.
+struct Odometry : Sample {
+  double x = 0.0, y = 0.0;             // m
+  double theta = 0.0;                  // rad, not wrapped
+  double v = 0.0, omega = 0.0;         // m/s, rad/s
+  std::vector<double> wheel_angles;    // rad since the start, positive ahead; order of RobotInfo::wheels
+  std::vector<double> wheel_rates;     // rad/s
+  std::vector<int64_t> ticks;          // encoder counts
+  int32_t resets = 0;                  // how often the pose was reset
+};
+
+// The true pose of base_link in the world; velocities are expressed in base_link.
+struct Pose : Sample {
+  Vector3 position{};         // m
+  Quaternion orientation{};
+  Vector3 velocity{};         // m/s
+  Vector3 rotation_rate{};    // rad/s
+  Vector3 acceleration{};     // m/s^2, without gravity
+  double x() const { return position[0]; }
+  double y() const { return position[1]; }
+  double heading() const;     // rad, counter-clockwise from the world's x axis, in (-pi, pi]
+};
+
+struct Image : Sample {
+  enum class Format { unknown, jpeg, rgb, bgr, gray, gray16, float32 };
+  int width = 0, height = 0;    // pixels
+  Format format = Format::unknown;    // gray16: labels (body index + 1); float32: depth, m, +inf: nothing
+  int row_stride = 0;           // bytes in a row, 0 for jpeg
+  std::vector<uint8_t> data;    // as they came: rows from the top, or a JPEG file
+  // Writes a JPEG's bytes as they are, rgb, bgr and gray as PPM or PGM. Throws Error.
+  void save(const std::string& path) const;
+};
+
+// A pinhole with OpenCV's distortion.
+struct CameraInfo : Sample {
+  int width = 0, height = 0;                          // pixels
+  double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;      // pixels
+  std::array<double, 5> distortion{};                 // k1, k2, p1, p2, k3
+};
+
+struct Imu : Sample {               // in the device's frame
+  Quaternion orientation{};         // device to world
+  Vector3 angular_velocity{};       // rad/s
+  Vector3 linear_acceleration{};    // m/s^2, specific force: at rest gravity upwards
+};
+
+struct ContactPoint {
+  std::string body;       // the other body
+  Vector3 position{};     // m, world
+  Vector3 normal{};       // unit vector, world, towards the sensor's body
+  double force = 0.0;     // N
+  double depth = 0.0;     // m
+};
+struct Contact : Sample {
+  bool pressed = false;
+  std::vector<ContactPoint> points;
+};
+
+struct Joints : Sample {
+  std::vector<std::string> names;
+  std::vector<float> positions, velocities, efforts;    // rad or m, rad/s or m/s, N m or N
+};
+
+// What a robot is executing.
+struct MotionStatus : Sample {
+  int64_t id = 0;                            // of the primitive; 0 for velocity and wheel commands
+  std::string kind;      // "none", "advance", "rotate", "heading", "arc", "stop", "velocity", "wheels"
+  std::string state;     // "idle", "running", "done", "ended", "refused"
+  std::string reason;    // "", "replaced", "blocked", "watchdog", "not finite", "bad kind", "bad value", "no drive"
+  double progress = 0.0, remaining = 0.0;    // m or rad
+  double v = 0.0, omega = 0.0;               // m/s, rad/s
+};
+
+}  // namespace ruedo::client
