@@ -22,13 +22,28 @@ int Channels::add(Channel channel) {
                              " characters; 1 to " + std::to_string(kMaxChannelName) +
                              " are allowed: give the robot or the device a shorter name, or use --remap");
   }
-  for (const Channel& other : channels_) {
-    if (other.bus_name == channel.bus_name) {
-      throw InputError({}, "two channels are called '" + channel.bus_name + "': '" + other.name + "' and '" + channel.name + "'");
-    }
+  const auto free = [&](const Channel& old) { return old.gone && old.type == channel.type && old.input == channel.input; };
+  auto place = std::find_if(channels_.begin(), channels_.end(), [&](const Channel& old) { return free(old) && old.name == channel.name; });
+  if (place == channels_.end()) place = std::find_if(channels_.begin(), channels_.end(), free);
+  const int index = static_cast<int>(place - channels_.begin());
+  if (const auto [other, added] = by_bus_name_.try_emplace(channel.bus_name, index); !added) {
+    throw InputError({}, "two channels are called '" + channel.bus_name + "': '" + channels_[static_cast<size_t>(other->second)].name +
+                             "' and '" + channel.name + "'");
   }
-  channels_.push_back(std::move(channel));
-  return static_cast<int>(channels_.size()) - 1;
+  if (place == channels_.end()) {
+    channels_.push_back(std::move(channel));
+  } else {
+    *place = std::move(channel);
+  }
+  return index;
+}
+
+void Channels::remove(const std::string& robot) {
+  for (Channel& channel : channels_) {
+    if (channel.robot != robot || channel.gone) continue;
+    channel.gone = true;
+    by_bus_name_.erase(channel.bus_name);
+  }
 }
 
 void Channels::check_remaps() const {

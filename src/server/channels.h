@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -21,6 +22,7 @@ struct Channel {
   int64_t fingerprint = 0;
   Rate rate;                 // 0: every step, or when something happens
   bool input = false;        // clients publish on it
+  bool gone = false;         // its robot was removed; the next channel of the type takes its place
 };
 
 class Channels {
@@ -39,13 +41,20 @@ class Channels {
   const std::vector<Channel>& list() const { return channels_; }
   const Channel& operator[](int index) const { return channels_[static_cast<size_t>(index)]; }
 
+  // A robot is gone. The indices of all other channels stay.
+  void remove(const std::string& robot);
+
   // Throws InputError, with a suggestion, when a remap names no channel.
   void check_remaps() const;
-  void clear() { channels_.clear(); }
+  void clear() {
+    channels_.clear();
+    by_bus_name_.clear();
+  }
 
  private:
   std::vector<std::pair<std::string, std::string>> remaps_;
   std::vector<Channel> channels_;
+  std::unordered_map<std::string, int> by_bus_name_;    // looked up only, never walked through
 };
 
 // The channels of the simulation itself, but for ruedo/world, which its module announces.

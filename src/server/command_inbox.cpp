@@ -11,6 +11,7 @@
 #include "ruedo/joint_command_t.hpp"
 #include "ruedo/move_command_t.hpp"
 #include "ruedo/name_request_t.hpp"
+#include "ruedo/pose_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
 #include "ruedo/wheel_command_t.hpp"
 
@@ -20,6 +21,13 @@ DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size, r
   DecodeFault fault = DecodeFault::none;
   switch (kind) {
     case Input::Kind::velocity: {
+      // Programs that know bot_core's types and no others have a velocity in pose_t.
+      if (fingerprint_of({data, size}) == pose_t::getHash()) {
+        pose_t pose;
+        fault = decode_checked(data, size, pose);
+        if (fault == DecodeFault::none) command.what = robot::VelocityCommand{pose.vel[0], pose.vel[1], pose.rotation_rate[2]};
+        break;
+      }
       velocity_command_t message;
       fault = decode_checked(data, size, message);
       if (fault == DecodeFault::none) command.what = robot::VelocityCommand{message.vx, message.vy, message.omega};
@@ -61,15 +69,53 @@ DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size, r
 
 CommandInbox::CommandInbox(std::vector<Input> inputs, int robots)
     : inputs_(std::move(inputs)), reset_input_(static_cast<size_t>(robots), -1), slots_(static_cast<size_t>(robots)) {
-  for (size_t i = 0; i < inputs_.size(); ++i) {
-    const Input& input = inputs_[i];
-    if (input.kind == Input::Kind::reset_odometry) {
-      reset_input_[static_cast<size_t>(input.robot)] = static_cast<int>(i);
-    } else {
-      by_channel_.emplace(input.channel, static_cast<int>(i));
-    }
-  }
+  for (size_t i = 0; i < inputs_.size(); ++i) listen(static_cast<int>(i));
   waiting_.reserve(slots_.size());
+}
+
+void CommandInbox::listen(int index) {
+  const Input& input = inputs_[static_cast<size_t>(index)];
+  if (input.kind == Input::Kind::reset_odometry) {
+    reset_input_[static_cast<size_t>(input.robot)] = index;
+  } else {
+    by_channel_.insert_or_assign(input.channel, index);
+  }
+}
+
+void CommandInbox::add(const std::vector<Input>& inputs, int robots) {
+  std::lock_guard lock(mutex_);
+  reset_input_.resize(static_cast<size_t>(robots), -1);
+  slots_.resize(static_cast<size_t>(robots));
+  for (const Input& input : inputs) {
+    // A robot in the place of one that was removed has the same inputs.
+    auto at = std::find_if(inputs_.begin(), inputs_.end(), [&](const Input& old) { return old.robot == input.robot && old.kind == input.kind; });
+    if (at == inputs_.end()) at = inputs_.insert(at, input);
+    at->channel = input.channel;
+    listen(static_cast<int>(at - inputs_.begin()));
+  }
+}
+
+void CommandInbox::remove(int robot) {
+  std::lock_guard lock(mutex_);
+  for (Input& input : inputs_) {
+    if (input.robot != robot) continue;
+    by_channel_.erase(input.channel);
+    input.channel.clear();
+  }
+  slots_[static_cast<size_t>(robot)].size = 0;
+  std::erase(waiting_, robot);
+  const auto is_of = [robot](const Entry& entry) { return entry.command.robot == robot; };
+  const auto end = scheduled_.begin() + static_cast<std::ptrdiff_t>(scheduled_count_);
+  const auto kept = std::stable_partition(scheduled_.begin(), end, [&](const Entry& entry) { return !is_of(entry); });
+  for (auto entry = kept; entry != end; ++entry) scheduled_bytes_ -= entry->bytes.size();
+  scheduled_count_ = static_cast<size_t>(kept - scheduled_.begin());
+  std::make_heap(scheduled_.begin(), kept, later);
+}
+
+void CommandInbox::begin_time_anew() {
+  std::lock_guard lock(mutex_);
+  scheduled_count_ = scheduled_bytes_ = 0;
+  next_step_ = 0;
 }
 
 void CommandInbox::receive(const std::string& channel, const uint8_t* data, size_t size) {

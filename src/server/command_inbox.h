@@ -55,7 +55,17 @@ class CommandInbox {
   void apply(robot::Robots& robots, int64_t step, Batch& batch);
 
   const std::vector<Input>& inputs() const { return inputs_; }
+  // The first state that commands may still act on. Any thread.
+  int64_t next_step() const {
+    const std::lock_guard lock(mutex_);
+    return next_step_;
+  }
   void clear();
+
+  // Robots that come and go; while nothing is received or applied. `inputs` are all of one robot.
+  void add(const std::vector<Input>& inputs, int robots);
+  void remove(int robot);
+  void begin_time_anew();    // steps count from 0: what was scheduled is dropped
 
   uint64_t refused() const { return refused_; }       // faulty messages
   uint64_t displaced() const { return displaced_; }   // commands that newer ones pushed out
@@ -73,6 +83,7 @@ class CommandInbox {
     size_t first = 0, size = 0;
   };
 
+  void listen(int input);
   Entry& next_entry(int robot);    // with the mutex held
   void keep(int input, robot::Command& command, const uint8_t* data, size_t size);
   void refuse(const std::string& channel, const char* why);
@@ -82,7 +93,7 @@ class CommandInbox {
   std::vector<Input> inputs_;
   std::unordered_map<std::string, int> by_channel_;    // looked up only, never walked
   std::vector<int> reset_input_;                       // of each robot
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::vector<Slots> slots_;
   std::vector<int> waiting_;                           // robots with entries
   uint64_t arrivals_ = 0;

@@ -42,12 +42,12 @@ class FleetMaker {
     const std::vector<SensorKind>& kinds = sensor_kinds();    // those of a module are neighbours
     for (auto first = kinds.begin(); first != kinds.end();) {
       const auto last = std::find_if(first, kinds.end(), [&](const SensorKind& kind) { return kind.module != first->module; });
-      add_module({first, last});
+      add_module({first, last}, static_cast<int>(first - kinds.begin()));
       first = last;
     }
     name_unserved(kinds);
     add_inputs();
-    fleet_.modules.push_back(world_state_module(world_, layout_, options_.epoch, channels_));
+    if (options_.only_robot < 0) fleet_.modules.push_back(world_state_module(world_, layout_, options_.epoch, channels_));
     for (auto& devices : devices_of_) {
       for (device_info_t& device : devices) fleet_.devices.push_back(std::move(device));
     }
@@ -55,6 +55,12 @@ class FleetMaker {
   }
 
  private:
+  // The robots whose devices are made.
+  std::pair<int, int> robots() const {
+    if (options_.only_robot >= 0) return {options_.only_robot, options_.only_robot + 1};
+    return {0, static_cast<int>(layout_.robots.size())};
+  }
+
   const model::ModelInstance& instance(int robot) const {
     return world_.models[static_cast<size_t>(layout_.robots[static_cast<size_t>(robot)].instance)];
   }
@@ -100,15 +106,16 @@ class FleetMaker {
     return placement.body >= 0 ? layout_.bodies[static_cast<size_t>(placement.body)].X_WB * placement.X_BBase : placement.X_BBase;
   }
 
-  void add_module(std::span<const SensorKind> kinds) {
+  void add_module(std::span<const SensorKind> kinds, int rank) {
     std::vector<Wanted> wanted;
-    for (int robot = 0; robot < static_cast<int>(layout_.robots.size()); ++robot) {
+    for (int robot = robots().first; robot < robots().second; ++robot) {
       for (const SensorKind& kind : kinds) collect(kind, robot, wanted);
     }
     if (wanted.empty()) return;
     ModuleSetup setup;
     setup.name = kinds.front().module;
     setup.step_us = world_.step_us;
+    setup.rank = rank;
     for (const SensorKind& kind : kinds) {
       setup.wants_rays |= kind.needs_rays;
       setup.wants_visual_rays |= kind.needs_visual_rays;
@@ -118,7 +125,7 @@ class FleetMaker {
     // Pictures: each renderer has a thread of its own, with a stretch of the cameras. Which renderer draws which
     // camera changes no pixel.
     const size_t cores = std::max(1u, std::thread::hardware_concurrency());
-    const size_t threads = setup.wants_renderer ? std::min({wanted.size(), cores, size_t{8}}) : 1;
+    const size_t threads = setup.wants_renderer && options_.only_robot < 0 ? std::min({wanted.size(), cores, size_t{8}}) : 1;
     for (size_t i = 0; i < threads; ++i) {
       const size_t first = wanted.size() * i / threads, last = wanted.size() * (i + 1) / threads;
       ModuleSetup module = setup.without_devices();
@@ -161,7 +168,8 @@ class FleetMaker {
       const std::string device = suffix.empty() ? wanted.name : wanted.name + "/" + suffix;
       return channels_.add({robot + "/" + device, "", robot, wanted.name, type, fingerprint, wanted.rate, false});
     };
-    Device device{wanted.kind->make(setup), wanted.rate, static_cast<int64_t>(phase_s * 1e6 + 0.5), wanted.kind->needs_visual_rays};
+    Device device{wanted.kind->make(setup), wanted.rate, static_cast<int64_t>(phase_s * 1e6 + 0.5), wanted.kind->needs_visual_rays,
+                  wanted.robot, options_.first_step};
     device.visual_rays |= device.sensor->wants_visual_rays();
     describe(wanted, *device.sensor);
     return device;
@@ -187,7 +195,8 @@ class FleetMaker {
 
   void name_unserved(const std::vector<SensorKind>& kinds) {
     std::set<const model::Model*> seen;
-    for (const model::RobotPlacement& robot : layout_.robots) {
+    for (int i = robots().first; i < robots().second; ++i) {
+      const model::RobotPlacement& robot = layout_.robots[static_cast<size_t>(i)];
       const model::Model* model = world_.models[static_cast<size_t>(robot.instance)].model.get();
       if (!seen.insert(model).second) continue;
       for (const model::SensorDescription& sensor : model->sensors) {
@@ -209,7 +218,7 @@ class FleetMaker {
   }
 
   void add_inputs() {
-    for (int robot = 0; robot < static_cast<int>(layout_.robots.size()); ++robot) {
+    for (int robot = robots().first; robot < robots().second; ++robot) {
       if (instance(robot).model->drive) {
         add_input<velocity_command_t>(robot, "velocity", Input::Kind::velocity);
         add_input<wheel_command_t>(robot, "wheels", Input::Kind::wheels);

@@ -20,6 +20,8 @@ struct FleetOptions {
   std::vector<std::string> disabled;    // "ROBOT/DEVICE"
   int epoch = 0;
   bool keep_going = false;              // a device that is configured wrongly is an error finding, and left out
+  int only_robot = -1;                  // index into BodyLayout::robots: one that joins a world that runs
+  int64_t first_step = 0;               // samples count from its time
 };
 
 struct Fleet {

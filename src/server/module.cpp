@@ -12,21 +12,21 @@
 
 namespace ruedo::server {
 
-void DueSteps::add(const SampleClock& clock) {
+void DueSteps::add(const SampleClock& clock, int64_t first, int64_t sample) {
   // A thousand devices of one rate are one entry: the first few samples tell clocks apart well enough, since a
   // surplus entry costs time but changes nothing.
   const auto same = [&](const Entry& entry) {
-    return entry.clock.every_step() == clock.every_step() && entry.clock.step_of(0) == clock.step_of(0) &&
+    return entry.first == first && entry.sample == sample && entry.clock.every_step() == clock.every_step() && entry.clock.step_of(0) == clock.step_of(0) &&
            entry.clock.step_of(1) == clock.step_of(1) && entry.clock.step_of(1'000'003) == clock.step_of(1'000'003);
   };
-  if (std::none_of(entries_.begin(), entries_.end(), same)) entries_.push_back({clock, 0, clock.step_of(0)});
+  if (std::none_of(entries_.begin(), entries_.end(), same)) entries_.push_back({clock, first, sample, first + clock.step_of(sample)});
   update();
 }
 
 void DueSteps::pass(int64_t step) {
   if (next_ > step) return;
   for (Entry& entry : entries_) {
-    while (entry.step <= step) entry.step = entry.clock.step_of(++entry.sample);
+    while (entry.step <= step) entry.step = entry.first + entry.clock.step_of(++entry.sample);
   }
   update();
 }
@@ -38,13 +38,71 @@ void DueSteps::update() {
 
 Module::Module(ModuleSetup setup, int index, Wakeup& finished)
     : setup_(std::move(setup)), index_(index), finished_(finished), queue_(16) {
-  for (const Device& device : setup_.devices) {
-    const SampleClock clock(device.rate, setup_.step_us, device.phase_us);
-    slots_.push_back({clock, 0, clock.step_of(0), device.sensor->observes(), device.visual_rays});
-    observes_ |= slots_.back().observes;
-    to_hand_over_.add(clock);
+  for (const Device& device : setup_.devices) slots_.push_back(slot_of(device));
+  count_due();
+}
+
+Module::Slot Module::slot_of(const Device& device) const {
+  const SampleClock clock(device.rate, setup_.step_us, device.phase_us);
+  return {clock, 0, device.first_step + clock.step_of(0), device.sensor->observes(), device.visual_rays};
+}
+
+// From what is due of each device; of all batches so far each has been handed over and finished.
+void Module::count_due() {
+  observes_ = false;
+  to_hand_over_.clear();
+  for (size_t i = 0; i < slots_.size(); ++i) {
+    observes_ |= slots_[i].observes;
+    to_hand_over_.add(slots_[i].clock, setup_.devices[i].first_step, slots_[i].sample);
   }
   to_sample_ = to_hand_over_;
+}
+
+void Module::add(ModuleSetup more) {
+  for (Device& device : more.devices) {
+    const auto after = std::find_if(setup_.devices.begin(), setup_.devices.end(), [&](const Device& other) { return other.robot > device.robot; });
+    slots_.insert(slots_.begin() + (after - setup_.devices.begin()), slot_of(device));
+    setup_.wants_visual_rays |= device.visual_rays;
+    setup_.devices.insert(after, std::move(device));
+  }
+  count_due();
+}
+
+void Module::remove(int robot) {
+  for (size_t i = setup_.devices.size(); i-- > 0;) {
+    if (setup_.devices[i].robot != robot) continue;
+    setup_.devices.erase(setup_.devices.begin() + static_cast<std::ptrdiff_t>(i));
+    slots_.erase(slots_.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  count_due();
+}
+
+void Module::replace_sensor(std::unique_ptr<Sensor> sensor) { setup_.devices[0].sensor = std::move(sensor); }
+
+void Module::begin_time_anew(SimTime us) {
+  for (size_t i = 0; i < slots_.size(); ++i) {
+    setup_.devices[i].first_step = 0;
+    setup_.devices[i].sensor->shift_time(us);
+    slots_[i] = slot_of(setup_.devices[i]);
+  }
+  count_due();
+}
+
+void Module::make_scenes(const SceneMakers& makers) {
+  if (setup_.wants_rays) rays_ = makers.rays();
+  if (setup_.wants_visual_rays) visual_rays_ = makers.visual_rays();
+  if (!setup_.wants_renderer) return;
+  renderer_.reset();    // one context at a time
+  renderer_ = makers.renderer();
+}
+
+void Module::renew_scenes(const SceneMakers& makers) {
+  if (!setup_.wants_rays && !setup_.wants_visual_rays && !setup_.wants_renderer) return;
+  std::promise<void> made;
+  makers_ = &makers;
+  made_ = &made;
+  queue_.push(&renewal_);
+  made.get_future().get();
 }
 
 Module::~Module() {
@@ -59,9 +117,7 @@ void Module::start(const SceneMakers& makers) {
     pthread_setname_np(pthread_self(), setup_.name.substr(0, 15).c_str());
     std::fesetenv(FE_DFL_ENV);    // rounding and denormals as everywhere, whatever libraries did to the parent
     try {
-      if (setup_.wants_rays) rays_ = makers.rays();
-      if (setup_.wants_visual_rays) visual_rays_ = makers.visual_rays();
-      if (setup_.wants_renderer) renderer_ = makers.renderer();
+      make_scenes(makers);
       ready.set_value();
     } catch (...) {
       ready.set_exception(std::current_exception());
@@ -85,6 +141,16 @@ void Module::hand_over(Batch& batch, int64_t last_step) {
 
 void Module::work() {
   while (Batch* batch = queue_.pop()) {
+    if (batch == &renewal_) {
+      std::promise<void>* made = made_;
+      try {
+        make_scenes(*makers_);
+        made->set_value();
+      } catch (...) {
+        made->set_exception(std::current_exception());
+      }
+      continue;
+    }
     if (setup_.before_batch) setup_.before_batch(setup_.name);
     try {
       process(*batch);
@@ -137,7 +203,7 @@ void Module::process_piece(Batch& batch, int piece, int begin, int end) {
       if (slot.step != snapshot.step) continue;
       const scene::RayScene* rays = slot.visual_rays ? visual_rays_.get() : rays_.get();
       sensor.sample({snapshot, slot.sample, rays, renderer_.get()}, outbox);
-      slot.step = slot.clock.step_of(++slot.sample);
+      slot.step = setup_.devices[k].first_step + slot.clock.step_of(++slot.sample);
     }
   }
 }

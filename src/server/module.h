@@ -5,6 +5,7 @@
 #pragma once
 
 #include <functional>
+#include <future>
 #include <memory>
 #include <string>
 #include <thread>
@@ -20,12 +21,14 @@ namespace ruedo::server {
 // The steps at which any of some devices takes a sample.
 class DueSteps {
  public:
-  void add(const SampleClock& clock);
+  // first: the step that the clock counts from; sample: the next one.
+  void add(const SampleClock& clock, int64_t first = 0, int64_t sample = 0);
+  void clear() { entries_.clear(), update(); }
   int64_t next() const { return next_; }    // INT64_MAX: never
   void pass(int64_t step);                  // everything up to and with `step` is done
 
  private:
-  struct Entry { SampleClock clock; int64_t sample, step; };
+  struct Entry { SampleClock clock; int64_t first, sample, step; };
   void update();
   std::vector<Entry> entries_;
   int64_t next_ = INT64_MAX;
@@ -37,6 +40,8 @@ struct Device {
   Rate rate;
   int64_t phase_us = 0;
   bool visual_rays = false;                // its rays hit visuals, not collisions
+  int robot = -1;                          // index into BodyLayout::robots; -1: the simulation's
+  int64_t first_step = 0;                  // its samples count from the time of this one
 };
 
 struct ModuleSetup {
@@ -44,12 +49,13 @@ struct ModuleSetup {
   std::vector<Device> devices;             // in world order: robot, then device
   int piece_size = 16;                     // devices that are worked through one after the other
   int64_t step_us = 5000;
+  int rank = 0;                            // in the schedule; modules of one kind share it
   bool wants_rays = false, wants_visual_rays = false, wants_renderer = false;
   // For tests: called in the module's thread before each batch.
   std::function<void(const std::string& module)> before_batch;
 
   ModuleSetup without_devices() const {
-    return {name, {}, piece_size, step_us, wants_rays, wants_visual_rays, wants_renderer, before_batch};
+    return {name, {}, piece_size, step_us, rank, wants_rays, wants_visual_rays, wants_renderer, before_batch};
   }
 };
 
@@ -69,6 +75,18 @@ class Module {
   // Starts the thread and waits until its scenes are made. Throws what making them threw.
   void start(const SceneMakers& makers);
 
+  // Changes between two batches, while it has none; the caller's thread and the module's take turns through its queue.
+  void add(ModuleSetup more);              // its devices, in the order of robots
+  void remove(int robot);
+  void replace_sensor(std::unique_ptr<Sensor> sensor);    // of the only device, whose samples go on
+  void renew_scenes(const SceneMakers& makers);    // waits until they are made; throws what making them threw
+  void begin_time_anew(SimTime us);        // sim time was set back by so much, and steps count from 0
+  void set_index(int index) { index_ = index; }
+
+  int rank() const { return setup_.rank; }
+  bool wants_visual_rays() const { return setup_.wants_visual_rays; }
+  // True when it serves a robot that comes after that one.
+  bool robots_after(int robot) const { return !setup_.devices.empty() && setup_.devices.back().robot > robot; }
   const std::string& name() const { return setup_.name; }
   int pieces() const { return static_cast<int>((setup_.devices.size() + setup_.piece_size - 1) / setup_.piece_size); }
   bool observes() const { return observes_; }
@@ -80,6 +98,9 @@ class Module {
  private:
   struct Slot { SampleClock clock; int64_t sample, step; bool observes, visual_rays; };
 
+  Slot slot_of(const Device& device) const;
+  void count_due();
+  void make_scenes(const SceneMakers& makers);
   void work();
   void process(Batch& batch);
   void process_pieces(Batch& batch, int begin, int end);
@@ -94,6 +115,9 @@ class Module {
   std::unique_ptr<scene::RayScene> rays_, visual_rays_;
   std::unique_ptr<scene::Renderer> renderer_;
   Queue<Batch*> queue_;
+  Batch renewal_;                          // in the queue: makers_ wait
+  const SceneMakers* makers_ = nullptr;
+  std::promise<void>* made_ = nullptr;
   std::thread thread_;
 };
 

@@ -20,11 +20,26 @@ void Pacer::start_anew() {
   origin_time_ = Clock::now();
 }
 
-int Pacer::wait(int64_t step, int limit) {
+int Pacer::wait(int64_t& step, int limit) {
   std::unique_lock lock(mutex_);
   if (step == 0) start_anew();
   for (;;) {
-    if (stopped_ || step > last_step_) return 0;
+    if (hold_ && !stopped_) {
+      held_ = true;
+      changed_.notify_all();
+      changed_.wait(lock);
+      held_ = false;
+      continue;
+    }
+    if (anew_) {
+      anew_ = false;
+      step = 0;
+    }
+    if (stopped_ || step > last_step_) {
+      over_ = true;
+      changed_.notify_all();
+      return 0;
+    }
     const int64_t until = std::min(until_, limit_);
     if (step > until) {
       changed_.wait(lock);
@@ -49,6 +64,39 @@ int Pacer::wait(int64_t step, int limit) {
     granted_ = step + count - 1;
     return static_cast<int>(count);
   }
+}
+
+int64_t Pacer::hold() {
+  int64_t last;
+  {
+    std::lock_guard lock(mutex_);
+    hold_ = true;
+    last = granted_;
+  }
+  changed_.notify_all();
+  return last;
+}
+
+bool Pacer::wait_until_held() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] { return held_ || over_; });
+  return !over_;
+}
+
+void Pacer::release() {
+  {
+    std::lock_guard lock(mutex_);
+    hold_ = false;
+  }
+  changed_.notify_all();
+}
+
+void Pacer::begin_time_anew() {
+  std::lock_guard lock(mutex_);
+  anew_ = true;
+  granted_ = -1;
+  until_ = paused_ ? 0 : last_step_;
+  start_anew();
 }
 
 void Pacer::stop() {

@@ -19,8 +19,8 @@ class Pacer {
   Pacer(int64_t step_us, double rate, int64_t last_step);
 
   // Waits until the state `step` may be computed and is due; returns how many may be computed now, at most `limit`,
-  // 0 when the run is over. Steps must be asked for in order.
-  int wait(int64_t step, int limit);
+  // 0 when the run is over. Steps must be asked for in order; where the time began anew, `step` is 0 afterwards.
+  int wait(int64_t& step, int limit);
 
   void stop();                       // wait() returns 0 from now on
   int64_t pause();                   // returns the last state that will still be computed
@@ -29,6 +29,13 @@ class Pacer {
   void set_rate(double rate);
   // No state after `step` is computed until a higher limit is set; the step that waits for it is due at once then.
   void set_limit(int64_t step);
+
+  // Standing still for a change of the world. hold(): wait() lets nothing more go; returns the last state that it let go.
+  // wait_until_held(), when that state is done: until the simulation thread waits; false when the run is over.
+  int64_t hold();
+  bool wait_until_held();
+  void release();
+  void begin_time_anew();            // while held: the next state is 0
 
   bool paused() const;
   double rate() const;
@@ -47,6 +54,7 @@ class Pacer {
   std::condition_variable changed_;
   double rate_;
   bool stopped_ = false, paused_ = false;
+  bool hold_ = false, held_ = false, over_ = false, anew_ = false;
   int64_t until_;                    // last state that may be computed: by the end of the run, pause() and allow(),
   int64_t limit_ = INT64_MAX;        // and by set_limit()
   int64_t granted_ = -1;             // last state that wait() let go

@@ -25,15 +25,16 @@ int batch_steps(const model::BodyLayout& layout) {
 
 Simulation::Simulation(std::shared_ptr<const model::WorldModel> world, const SimulationOptions& options, Channels& channels,
                        Findings& findings, Wakeup& finished)
-    : world_(std::move(world)),
-      layout_(*world_),
+    : world_(*world),
+      layout_(world_),
+      fleet_options_(options.fleet),
       before_batch_(options.before_batch),
       finished_(finished),
-      fleet_(make_fleet(*world_, layout_, options.fleet, channels, findings)),
+      fleet_(make_fleet(world_, layout_, options.fleet, channels, findings)),
       devices_(std::move(fleet_.devices)),
       inbox_(std::move(fleet_.inputs), static_cast<int>(layout_.robots.size())),
-      physics_(std::make_unique<physics::PhysicsWorld>(*world_, layout_)),
-      robots_(std::make_unique<robot::Robots>(*world_, layout_, *physics_)),
+      physics_(std::make_unique<physics::PhysicsWorld>(world_, layout_)),
+      robots_(std::make_unique<robot::Robots>(world_, layout_, *physics_)),
       batches_(kBatches) {
   for (const Finding& finding : physics_->findings()) {
     switch (finding.kind) {
@@ -46,6 +47,9 @@ Simulation::Simulation(std::shared_ptr<const model::WorldModel> world, const Sim
     setup.before_batch = before_batch_;
     modules_.push_back(std::make_unique<Module>(std::move(setup), static_cast<int>(modules_.size()), finished_));
     cursors_.emplace_back(static_cast<size_t>(modules_.back()->pieces()));
+  }
+  for (size_t i = 0; i < channels.list().size(); ++i) {
+    if (channels.list()[i].name == "ruedo/world") world_channel_ = static_cast<int>(i);
   }
   const int steps = options.batch_steps > 0 ? options.batch_steps : batch_steps(layout_);
   for (Batch& batch : batches_) {
@@ -68,19 +72,20 @@ SceneMakers Simulation::scene_makers() {
   // The static geometry is built once and shared by all modules.
   const auto shared = [this](bool visuals) {
     return [this, visuals, statics = std::shared_ptr<const scene::StaticRayScene>()]() mutable {
-      if (!statics) statics = scene::make_static_ray_scene(*world_, layout_, visuals);
+      if (!statics) statics = scene::make_static_ray_scene(world_, layout_, visuals);
       return scene::make_ray_scene(statics);
     };
   };
   makers.rays = shared(false);
   makers.visual_rays = shared(true);
-  makers.renderer = [this] { return scene::make_renderer(*world_, layout_); };
+  makers.renderer = [this] { return scene::make_renderer(world_, layout_); };
   return makers;
 }
 
 void Simulation::start(Pacer& pacer) {
   pacer_ = &pacer;
   const SceneMakers makers = scene_makers();
+  started_ = true;
   for (auto& module : modules_) module->start(makers);
   thread_ = std::thread([this] { simulate(); });
 }
@@ -120,7 +125,7 @@ void Simulation::step(Batch& batch, int64_t step) {
   Snapshot& snapshot = batch.snapshots[static_cast<size_t>(step - batch.first_step)];
   robots_->read(snapshot);
   snapshot.step = step;
-  snapshot.time = step * world_->step_us;
+  snapshot.time = step * world_.step_us;
 }
 
 void Simulation::dispatch(Batch& batch) {

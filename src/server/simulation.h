@@ -53,11 +53,24 @@ class Simulation {
   template <class Handler>
   void messages(const Batch& batch, int64_t step, Handler&& handler);
 
-  const model::WorldModel& world() const { return *world_; }
+  const model::WorldModel& world() const { return world_; }
   const model::BodyLayout& layout() const { return layout_; }
   const std::vector<device_info_t>& devices() const { return devices_; }
   CommandInbox& inbox() { return inbox_; }
   const physics::PhysicsWorld& physics() const { return *physics_; }
+
+  // ---- Changes of the world, while it stands still: the pacer holds, all batches are taken, every thread waits. In
+  // simulation_edits.cpp.
+
+  // Puts a model in, which is seen from the next state on; `step` is that state's number. Returns its index in
+  // world().models. Throws InputError and EnvironmentError; the world is then as it was.
+  int add_model(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model, int64_t step,
+                Channels& channels, Findings& findings);
+  // Takes one out. Its numbers stay free until the same model comes again.
+  void remove_model(int instance, Channels& channels);
+  // The state that there is becomes state 0. Returns what the time was.
+  SimTime begin_time_anew(int epoch);
+  robot::Robots& robots() { return *robots_; }
 
  private:
   const Batch* advance();
@@ -66,8 +79,17 @@ class Simulation {
   void dispatch(Batch& batch);
   SceneMakers scene_makers();
 
-  std::shared_ptr<const model::WorldModel> world_;
+  int place(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model);
+  void join(Fleet fleet);
+  void join(ModuleSetup setup);
+  void fit_batches();
+  void renew_scenes();
+  void renew_world_state();
+
+  model::WorldModel world_;
   model::BodyLayout layout_;
+  FleetOptions fleet_options_;
+  bool started_ = false;
   std::function<void(const std::string&)> before_batch_;
   Wakeup& finished_;
   Fleet fleet_;                                  // its modules move into modules_
@@ -75,6 +97,7 @@ class Simulation {
   CommandInbox inbox_;
   std::unique_ptr<physics::PhysicsWorld> physics_;
   std::unique_ptr<robot::Robots> robots_;
+  int world_channel_ = -1;                       // of ruedo/world
   std::vector<std::unique_ptr<Module>> modules_;    // in the order of the schedule
   std::vector<Batch> batches_;
   Wakeup batch_freed_;

@@ -83,12 +83,18 @@ const model::Link& link_of(const model::WorldModel& world, const model::LinkPlac
 std::vector<world_info_t> make_world_info(const world_info_t& head, const model::WorldModel& world, const model::BodyLayout& layout,
                                           const std::vector<device_info_t>& devices, const Channels& channels) {
   Parts parts(head);
+  const auto removed = [&](int instance) { return world.models[static_cast<size_t>(instance)].removed; };
   for (const model::RobotPlacement& robot : layout.robots) {
+    if (removed(robot.instance)) continue;
     parts.add(&world_info_t::robots, &world_info_t::nrobots, robot_info(world, layout, robot));
   }
   for (const device_info_t& device : devices) parts.add(&world_info_t::devices, &world_info_t::ndevices, device);
   for (const Channel& channel : channels.list()) {
-    channel_info_t info;
+    channel_info_t info{};
+    if (channel.gone) {    // its place counts: ticks name channels by it
+      parts.add(&world_info_t::channels, &world_info_t::nchannels, info);
+      continue;
+    }
     info.name = channel.bus_name;
     info.robot = channel.robot;
     info.device = channel.device;
@@ -98,24 +104,21 @@ std::vector<world_info_t> make_world_info(const world_info_t& head, const model:
     info.input = channel.input;
     parts.add(&world_info_t::channels, &world_info_t::nchannels, info);
   }
-  for (size_t i = 0; i < layout.bodies.size(); ++i) {
-    const model::BodyPlacement& body = layout.bodies[i];
-    double mass = 0.0;
-    for (int link : body.links) mass += link_of(world, layout.links[static_cast<size_t>(link)]).inertial.mass;
-    body_info_t info{};
-    info.index = static_cast<int32_t>(i);
-    info.name = body.name;
-    info.is_static = false;
-    info.mass = mass;
-    parts.add(&world_info_t::bodies, &world_info_t::nbodies, info);
-  }
-  for (const model::LinkPlacement& link : layout.links) {
-    if (link.body >= 0) continue;
+  for (const model::ListedBody& listed : layout.listed) {    // their places count: pictures label by them
+    const model::LinkPlacement& link = layout.links[static_cast<size_t>(listed.link)];
     body_info_t info{};
     info.index = -1;
-    info.name = world.models[static_cast<size_t>(link.instance)].name + "/" + link_of(world, link).name;
-    info.is_static = true;
-    info.mass = 0.0;
+    info.is_static = listed.body < 0;
+    if (removed(link.instance)) {
+      // no name
+    } else if (listed.body < 0) {
+      info.name = world.models[static_cast<size_t>(link.instance)].name + "/" + link_of(world, link).name;
+    } else {
+      const model::BodyPlacement& body = layout.bodies[static_cast<size_t>(listed.body)];
+      info.index = listed.body;
+      info.name = body.name;
+      for (int each : body.links) info.mass += link_of(world, layout.links[static_cast<size_t>(each)]).inertial.mass;
+    }
     parts.add(&world_info_t::bodies, &world_info_t::nbodies, info);
   }
   return parts.take();

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
 
 #include "ruedo/world_state_t.hpp"
 
@@ -15,7 +16,8 @@ constexpr size_t kBodiesInPart = (kMaxPartSize - 64) / kBytesOfBody;
 
 class WorldState : public Sensor {
  public:
-  WorldState(size_t bodies, int epoch, int channel) : channel_(channel) {
+  WorldState(const std::vector<int32_t>& indices, int epoch, int channel) : channel_(channel) {
+    const size_t bodies = indices.size();
     const size_t nparts = std::max<size_t>(1, (bodies + kBodiesInPart - 1) / kBodiesInPart);
     for (size_t part = 0; part < nparts; ++part) {
       const size_t first = part * kBodiesInPart, last = std::min(bodies, first + kBodiesInPart);
@@ -24,7 +26,7 @@ class WorldState : public Sensor {
       message.part = static_cast<int16_t>(part);
       message.nparts = static_cast<int16_t>(nparts);
       message.n = static_cast<int32_t>(last - first);
-      for (size_t body = first; body < last; ++body) message.index.push_back(static_cast<int32_t>(body));
+      for (size_t body = first; body < last; ++body) message.index.push_back(indices[body]);
       message.position.assign(last - first, std::vector<double>(3));
       message.orientation.assign(last - first, std::vector<double>(4));
     }
@@ -69,12 +71,21 @@ class Hash {
 
 }  // namespace
 
+std::unique_ptr<Sensor> world_state_sensor(const model::WorldModel& world, const model::BodyLayout& layout, int epoch, int channel) {
+  std::vector<int32_t> there;
+  for (size_t i = 0; i < layout.bodies.size(); ++i) {
+    if (!world.models[static_cast<size_t>(layout.bodies[i].instance)].removed) there.push_back(static_cast<int32_t>(i));
+  }
+  return std::make_unique<WorldState>(there, epoch, channel);
+}
+
 ModuleSetup world_state_module(const model::WorldModel& world, const model::BodyLayout& layout, int epoch, Channels& channels) {
   const int channel = channels.add<world_state_t>("ruedo/world", "", "", kWorldRate);
   ModuleSetup module;
   module.name = "world";
   module.step_us = world.step_us;
-  module.devices.push_back({std::make_unique<WorldState>(layout.bodies.size(), epoch, channel), kWorldRate});
+  module.rank = std::numeric_limits<int>::max();
+  module.devices.push_back({world_state_sensor(world, layout, epoch, channel), kWorldRate});
   return module;
 }
 

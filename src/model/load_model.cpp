@@ -1,0 +1,62 @@
+// The readers of a world file, for one model of it. Absolute paths lead nowhere: who asks may be anybody.
+#include "model/load_model.h"
+
+#include <filesystem>
+
+#include "model/sdf_reader.h"
+
+namespace fs = std::filesystem;
+
+namespace ruedo::model {
+namespace {
+
+// A file of the world's folder that is not there.
+std::string path_of_text(const std::string& world_file) { return (fs::path(world_file).parent_path() / "the text").string(); }
+
+LoadedModel read(const std::string& path, const std::string& world_file, std::shared_ptr<const Element> document) {
+  Findings findings;
+  const ResourceFinder resources(world_file, false);
+  DocumentStore documents;
+  MeshLoader meshes(resources);
+  ReadContext context{findings, resources, documents, meshes};
+  SdfReader reader(context);
+  if (document) documents.add(path, std::move(document));
+  Element asker;
+  asker.name = "SPAWN";
+  const auto included = reader.read_file(path, asker);
+  if (!included.model || !included.model->model) throw InputError({path, 0}, "holds no <model>, or one without a link");
+  LoadedModel loaded{included.model->model, included.name, findings.list(), documents.files_read()};
+  if (loaded.model->links.size() > kMostLinksOfSpawned) {
+    throw InputError(loaded.model->source, "the model '" + loaded.name + "' has " + std::to_string(loaded.model->links.size()) +
+                                               " links; allowed are " + std::to_string(kMostLinksOfSpawned));
+  }
+  return loaded;
+}
+
+}  // namespace
+
+std::string model_file(const std::string& name, const std::string& world_file) {
+  const ResourceFinder resources(world_file, false);
+  const auto path = resources.find_model(name, world_file);
+  if (!path) throw InputError({}, "'" + name + "' is no model of Ruedo's and no file in the folders that are searched");
+  return *path;
+}
+
+LoadedModel load_model(const std::string& name, const std::string& world_file) {
+  return read(model_file(name, world_file), world_file, nullptr);
+}
+
+LoadedModel load_model_text(const std::string& text, const std::string& world_file) {
+  const std::string path = path_of_text(world_file);
+  try {
+    std::shared_ptr<const Element> document = parse_document(text, path);
+    LoadedModel loaded = read(path, world_file, std::move(document));
+    std::erase(loaded.files_read, path);
+    return loaded;
+  } catch (const InputError& error) {
+    if (error.source().file != path) throw;
+    throw InputError({"the text", error.source().line}, error.message());
+  }
+}
+
+}  // namespace ruedo::model

@@ -1,0 +1,31 @@
+// A model alone, for a world that runs already.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "model/world_model.h"
+
+namespace ruedo::model {
+
+inline constexpr size_t kMostLinksOfSpawned = 1000;
+
+struct LoadedModel {
+  std::shared_ptr<const Model> model;
+  std::string name;                       // as the file says
+  std::vector<Finding> findings;
+  std::vector<std::string> files_read;    // absolute paths
+};
+
+// Of a file or by a name, SDF or URDF, from the folders that are searched for a world, and from nowhere else. Throws
+// InputError, with file and line.
+LoadedModel load_model(const std::string& name, const std::string& world_file);
+
+// Of a text. What it names is searched as if it stood in the world's folder; errors call it "the text".
+LoadedModel load_model_text(const std::string& text, const std::string& world_file);
+
+// The file that load_model() would read. Throws InputError when there is none.
+std::string model_file(const std::string& name, const std::string& world_file);
+
+}  // namespace ruedo::model
