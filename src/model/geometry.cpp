@@ -18,7 +18,7 @@ std::optional<Geometry> read_mesh(const Element& mesh, const std::string& where,
   if (uri.empty()) mesh.fail("has no <uri>");
   const auto path = context.resources.find(uri, mesh.source.file);
   if (!path) {
-    context.findings.error(mesh.source, where, "the mesh '" + uri + "' is not found; the shape is left out");
+    context.findings.error(mesh.source, where, "the mesh '" + uri + "' " + context.resources.why_not(uri, mesh.source.file) + "; the shape is left out");
     return std::nullopt;
   }
   try {
@@ -68,7 +68,7 @@ std::optional<Geometry> read_heightmap(const Element& element, const std::string
   if (size.minCoeff() <= 0) element.child("size")->fail("'" + element.child("size")->text + "' is not allowed; sizes are above 0");
   const auto path = context.resources.find(uri, element.source.file);
   if (!path) {
-    context.findings.error(element.source, where, "the heightmap '" + uri + "' is not found; the shape is left out");
+    context.findings.error(element.source, where, "the heightmap '" + uri + "' " + context.resources.why_not(uri, element.source.file) + "; the shape is left out");
     return std::nullopt;
   }
   try {

@@ -36,7 +36,11 @@ class Loader {
     if (root.name == "robot") read_robot(root);
     else read_sdf(root);
     reader_.leave();
-    for (const Spawn& spawn : options.spawns) place(spawn);
+    if (!options.spawns.empty()) {
+      Room room(world_);
+      for (const Spawn& spawn : options.spawns) place(spawn, room);
+    }
+    apply_drives(options.drives, world_);
     apply_settings(options.settings, world_);
     apply_disabled(options.disabled, world_);
     world_.findings = findings_.list();
@@ -104,7 +108,7 @@ class Loader {
     world_.name = scope->model->name;
   }
 
-  void place(const Spawn& spawn) {
+  void place(const Spawn& spawn, Room& room) {
     const std::string what = "--spawn " + spawn.model;
     const Element asker = [&] {
       Element e;
@@ -115,20 +119,13 @@ class Loader {
     if (!path && spawn.model.find("://") == std::string::npos) {
       const fs::path here = fs::absolute(spawn.model);
       std::error_code error;
-      if (fs::exists(here, error)) path = resources_.find_model(here.string(), path_);
+      if (fs::exists(here, error)) path = ResourceFinder::model_file(fs::weakly_canonical(here, error).string());
     }
     if (!path) throw InputError({}, what + ": there is no such file, and no model of that name in the search path");
     std::shared_ptr<const Model> model;
     std::string name;
-    const auto document = documents_.read(*path);
-    if (document->name == "robot") {
-      const auto sdf = urdf_as_sdf(*document, findings_);
-      const auto scope = reader_.read_model(*sdf, {1, 9});
-      if (scope) model = scope->model, name = model->name;
-    } else {
-      const auto included = reader_.read_file(*path, asker);
-      if (included.model) model = included.model->model, name = included.name;
-    }
+    const auto included = reader_.read_file(*path, asker);
+    if (included.model) model = included.model->model, name = included.name;
     if (!model) throw InputError({*path, 0}, what + ": the file holds no model");
     const auto taken = [&](const std::string& wanted) {
       return std::any_of(world_.models.begin(), world_.models.end(), [&](const auto& each) { return each.name == wanted; });
@@ -141,11 +138,12 @@ class Loader {
       while (taken(name + "_" + std::to_string(number))) ++number;
       name += "_" + std::to_string(number);
     }
-    const Pose X_WM = standing_on(world_, *model, spawn.x, spawn.y, spawn.yaw);
-    if (const std::string other = overlapped(world_, *model, X_WM); !other.empty()) {
-      throw InputError({}, what + "@" + shown(spawn.x) + "," + shown(spawn.y) + ": there is no room, it would stand in '" + other + "'");
+    const Pose X_WM = room.standing_on(*model, spawn.x, spawn.y, spawn.yaw);
+    if (const std::string other = room.overlapped(*model, X_WM); !other.empty()) {
+      throw InputError({}, what + "@" + shown(spawn.x) + "," + shown(spawn.y) + (spawn.yaw != 0 ? "," + shown(spawn.yaw) : "") + ": there is no room, it would stand in '" + other + "'");
     }
     add(name, X_WM, std::move(model), {});
+    room.add(world_.models.back());
   }
 
   Findings findings_;
@@ -168,7 +166,7 @@ std::shared_ptr<const WorldModel> load_world(const std::string& path, const Load
     throw InputError({path, 0}, "is a xacro file; expand it first: xacro " + full.filename().string() + " > robot.urdf");
   }
   if (!fs::exists(full, error)) throw InputError({path, 0}, "no such file");
-  Loader loader(full.string(), true);
+  Loader loader(full.string(), options.allow_absolute);
   const auto root = loader.documents().read(full.string());
   return loader.load(*root, options);
 }
@@ -176,7 +174,7 @@ std::shared_ptr<const WorldModel> load_world(const std::string& path, const Load
 std::shared_ptr<const WorldModel> load_world_text(const std::string& text, const std::string& path, const LoadOptions& options) {
   std::error_code error;
   const std::string full = fs::weakly_canonical(fs::absolute(path), error).string();
-  Loader loader(full, false);
+  Loader loader(full, options.allow_absolute);
   std::shared_ptr<const Element> root = parse_document(text, full);
   loader.documents().add(full, root);
   return loader.load(*root, options);

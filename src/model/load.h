@@ -22,11 +22,18 @@ struct Setting {
   std::string robot, device, key, value;
 };
 
+// --drive ROBOT=LEFT[+LEFT...],RIGHT[+RIGHT...]: a kinematic drive for a model that has none, by its wheel joints.
+struct DriveOption {
+  std::string robot;
+  std::vector<std::string> left_joints, right_joints;
+};
+
 struct LoadOptions {
   std::vector<Spawn> spawns;
   std::vector<Setting> settings;
   std::vector<std::string> disabled;     // "ROBOT/DEVICE"
-  std::string drive_for_spawned;         // reserved for --spawn's drive option; empty: the model's own
+  std::vector<DriveOption> drives;
+  bool allow_absolute = false;           // absolute paths in the files may lead out of the search folders
 };
 
 // Loads an SDF world, an SDF model or a URDF robot (the latter two in an empty world with a ground plane).

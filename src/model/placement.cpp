@@ -1,9 +1,12 @@
-// Heights by vertical lines through the static collisions, room by GJK against every collision of the world.
+// Heights by vertical lines through the static collisions, room by GJK against the collisions nearby.
 #include "model/placement.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <optional>
+#include <unordered_map>
 #include <vector>
 
 #include "model/convex.h"
@@ -15,24 +18,17 @@ namespace {
 constexpr double kStep_m = 0.5;         // what counts as ground above the lowest surface
 constexpr double kClearance_m = 0.02;   // what a model may sink into bumps of the ground
 constexpr double kFar_m = 1e5;
+constexpr double kCell_m = 2;           // of the grid over what stands in the world
+constexpr double kMostCells = 64;       // a thing that covers more is kept in a list of its own
 
-// The corners of a shape's bounding box in the world.
-Eigen::AlignedBox3d world_box(const Geometry& g, const Pose& X_WG) {
-  const Eigen::AlignedBox3d box = bounds(g);
-  Eigen::AlignedBox3d result;
+using Box = Eigen::AlignedBox3d;
+
+// The box of a shape that is turned and moved.
+Box placed(const Box& box, const Pose& X_WG) {
+  Box result;
   if (box.isEmpty()) return result;
-  for (int corner = 0; corner < 8; ++corner) {
-    result.extend(X_WG * box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner)));
-  }
+  for (int corner = 0; corner < 8; ++corner) result.extend(X_WG * box.corner(static_cast<Box::CornerType>(corner)));
   return result;
-}
-
-std::array<Vec3, 3> triangle_of(const Geometry& g, const Pose& X_WG, size_t index) {
-  std::array<Vec3, 3> corners;
-  for (size_t k = 0; k < 3; ++k) {
-    corners[k] = X_WG * g.scale.cwiseProduct(g.mesh->positions[g.mesh->triangles[index][k]].cast<double>());
-  }
-  return corners;
 }
 
 // Where the vertical line through (x, y) meets a triangle.
@@ -48,10 +44,7 @@ std::optional<double> height_of(const std::array<Vec3, 3>& t, double x, double y
 
 // The top of a convex shape over (x, y): the highest z at which a thin vertical needle from far above meets it, by
 // halving.
-std::optional<double> top_of(const Geometry& g, const Pose& X_WG, double x, double y) {
-  const Eigen::AlignedBox3d box = world_box(g, X_WG);
-  if (x < box.min().x() || x > box.max().x() || y < box.min().y() || y > box.max().y()) return std::nullopt;
-  const Convex shape{&g, X_WG, {}};
+std::optional<double> top_of(const Convex& shape, const Box& box, double x, double y) {
   const auto meets_above = [&](double z) {
     const Vec3 needle[2] = {{x, y, z}, {x, y, box.max().z() + 1}};
     return overlap(shape, {nullptr, {}, needle});
@@ -65,36 +58,185 @@ std::optional<double> top_of(const Geometry& g, const Pose& X_WG, double x, doub
   return low;
 }
 
-template <class Visit>
-void for_each_collision(const Model& model, const Pose& X_WM, Visit visit) {
-  for (const Link& link : model.links) {
-    for (const Collision& c : link.collisions) visit(c.geometry, X_WM * link.X_ML * c.X_LC);
+// The triangles of a mesh, by the column of the world in which they are.
+class TriangleGrid {
+ public:
+  TriangleGrid(const Geometry& g, const Pose& X_WG) {
+    std::vector<Vec3> points;
+    points.reserve(g.mesh->positions.size());
+    for (const auto& p : g.mesh->positions) {
+      points.push_back(X_WG * g.scale.cwiseProduct(p.cast<double>()));
+      box_.extend(points.back());
+    }
+    side_ = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(g.mesh->triangles.size()) / 2)));
+    side_ = std::min(side_, 512);
+    cells_.resize(static_cast<size_t>(side_) * static_cast<size_t>(side_));
+    for (const auto& t : g.mesh->triangles) {
+      triangles_.push_back({points[t[0]], points[t[1]], points[t[2]]});
+      Box around;
+      for (const Vec3& corner : triangles_.back()) around.extend(corner);
+      for_each_cell(around, [&](std::vector<uint32_t>& cell) { cell.push_back(static_cast<uint32_t>(triangles_.size() - 1)); });
+    }
   }
-}
+
+  // Every triangle whose box may meet that one; some more than once. Ends when `visit` returns true.
+  template <class Visit>
+  bool any(const Box& box, Visit visit) {
+    bool found = false;
+    for_each_cell(box, [&](const std::vector<uint32_t>& cell) {
+      for (const uint32_t t : cell) {
+        if (found) return;
+        found = visit(triangles_[t]);
+      }
+    });
+    return found;
+  }
+
+ private:
+  template <class Visit>
+  void for_each_cell(const Box& box, Visit visit) {
+    const auto cell = [&](double at, int axis) {
+      const double size = std::max(box_.sizes()[axis], 1e-9);
+      return static_cast<int>(std::clamp((at - box_.min()[axis]) / size * side_, 0.0, side_ - 1.0));
+    };
+    const int y1 = cell(box.max().y(), 1), x1 = cell(box.max().x(), 0);
+    for (int y = cell(box.min().y(), 1); y <= y1; ++y) {
+      for (int x = cell(box.min().x(), 0); x <= x1; ++x) visit(cells_[static_cast<size_t>(y * side_ + x)]);
+    }
+  }
+
+  Box box_;
+  int side_ = 1;
+  std::vector<std::array<Vec3, 3>> triangles_;
+  std::vector<std::vector<uint32_t>> cells_;
+};
 
 }  // namespace
 
-double ground_height(const WorldModel& world, double x, double y) {
-  std::vector<double> heights;
-  for (const ModelInstance& instance : world.models) {
-    if (!instance.model->is_static) continue;
-    for_each_collision(*instance.model, instance.X_WM, [&](const Geometry& g, const Pose& X_WG) {
-      if (g.shape == Shape::plane) {
-        const Vec3 n = X_WG.rotation * g.normal;
-        if (n.z() > 1e-6) {
-          const Vec3& at = X_WG.translation;
-          heights.push_back(at.z() - (n.x() * (x - at.x()) + n.y() * (y - at.y())) / n.z());
+struct Room::Index {
+  struct Solid {
+    const Geometry* geometry;
+    Pose X_WG;
+    Box box;
+    int instance;
+    bool is_static;
+  };
+
+  std::vector<std::pair<std::string, std::shared_ptr<const Model>>> instances;
+  std::vector<Solid> solids;
+  std::vector<int> planes, large;    // indices into solids
+  std::unordered_map<uint64_t, std::vector<int>> cells;    // looked up only, never walked through
+  std::unordered_map<const Geometry*, Box> boxes;          // likewise
+  std::map<int, TriangleGrid> triangles;                   // of the solids that were asked for
+
+  static int64_t cell_of(double at) { return static_cast<int64_t>(std::floor(std::clamp(at, -1e7, 1e7) / kCell_m)); }
+  static uint64_t key(int64_t x, int64_t y) { return static_cast<uint64_t>(x) << 32 ^ (static_cast<uint64_t>(y) & 0xffffffffu); }
+
+  const Box& box_of(const Geometry& g) {
+    const auto [at, is_new] = boxes.try_emplace(&g);
+    if (is_new) at->second = bounds(g);
+    return at->second;
+  }
+
+  // The same of a model that may live shorter than this index.
+  Box known_box_of(const Geometry& g) const {
+    const auto at = boxes.find(&g);
+    return at == boxes.end() ? bounds(g) : at->second;
+  }
+
+  template <class PoseOf>
+  void add(const std::string& name, const std::shared_ptr<const Model>& model, PoseOf X_WL) {
+    instances.emplace_back(name, model);
+    for (size_t l = 0; l < model->links.size(); ++l) {
+      const Pose X = X_WL(l);
+      for (const Collision& c : model->links[l].collisions) {
+        const Pose X_WG = X * c.X_LC;
+        const int solid = static_cast<int>(solids.size());
+        solids.push_back({&c.geometry, X_WG, placed(box_of(c.geometry), X_WG), static_cast<int>(instances.size()) - 1, model->is_static});
+        const Box& box = solids.back().box;
+        if (c.geometry.shape == Shape::plane) {
+          planes.push_back(solid);
+        } else if (!box.isEmpty()) {
+          const int64_t x0 = cell_of(box.min().x()), x1 = cell_of(box.max().x()), y0 = cell_of(box.min().y()), y1 = cell_of(box.max().y());
+          if (static_cast<double>(x1 - x0 + 1) * static_cast<double>(y1 - y0 + 1) > kMostCells) {
+            large.push_back(solid);
+            continue;
+          }
+          for (int64_t x = x0; x <= x1; ++x) {
+            for (int64_t y = y0; y <= y1; ++y) cells[key(x, y)].push_back(solid);
+          }
         }
-      } else if (g.shape == Shape::mesh) {
-        const Eigen::AlignedBox3d box = world_box(g, X_WG);
-        if (x < box.min().x() || x > box.max().x() || y < box.min().y() || y > box.max().y()) return;
-        for (size_t t = 0; t < g.mesh->triangles.size(); ++t) {
-          if (const auto z = height_of(triangle_of(g, X_WG, t), x, y)) heights.push_back(*z);
-        }
-      } else if (const auto z = top_of(g, X_WG, x, y)) {
-        heights.push_back(*z);
       }
+    }
+  }
+
+  // The solids whose boxes meet that one, planes left out, in the order of the world.
+  std::vector<int> near(const Box& box) const {
+    std::vector<int> found = large;
+    for (int64_t x = cell_of(box.min().x()); x <= cell_of(box.max().x()); ++x) {
+      for (int64_t y = cell_of(box.min().y()); y <= cell_of(box.max().y()); ++y) {
+        if (const auto cell = cells.find(key(x, y)); cell != cells.end()) found.insert(found.end(), cell->second.begin(), cell->second.end());
+      }
+    }
+    std::erase_if(found, [&](int solid) { return !solids[static_cast<size_t>(solid)].box.intersects(box); });
+    std::sort(found.begin(), found.end());
+    found.erase(std::unique(found.begin(), found.end()), found.end());
+    return found;
+  }
+
+  TriangleGrid& triangles_of(int solid) {
+    const Solid& s = solids[static_cast<size_t>(solid)];
+    return triangles.try_emplace(solid, *s.geometry, s.X_WG).first->second;
+  }
+
+  // Whether a convex thing with that box shares space with a solid.
+  bool meets(const Convex& thing, const Box& box, int solid) {
+    const Solid& s = solids[static_cast<size_t>(solid)];
+    if (!s.box.intersects(box)) return false;
+    if (s.geometry->shape != Shape::mesh) return overlap(thing, {s.geometry, s.X_WG, {}});
+    return triangles_of(solid).any(box, [&](const std::array<Vec3, 3>& corners) {
+      Box around;
+      for (const Vec3& corner : corners) around.extend(corner);
+      return around.intersects(box) && overlap(thing, {nullptr, {}, corners});
     });
+  }
+};
+
+Room::Room() : index_(std::make_unique<Index>()) {}
+Room::~Room() = default;
+
+Room::Room(const WorldModel& world, const LinkPose& now) : Room() {
+  for (size_t i = 0; i < world.models.size(); ++i) {
+    const ModelInstance& instance = world.models[i];
+    if (instance.removed) continue;
+    index_->add(instance.name, instance.model, [&](size_t l) { return now ? now(i, l) : instance.X_WM * instance.model->links[l].X_ML; });
+  }
+}
+
+void Room::add(const ModelInstance& instance) {
+  index_->add(instance.name, instance.model, [&](size_t l) { return instance.X_WM * instance.model->links[l].X_ML; });
+}
+
+double Room::ground_height(double x, double y) const {
+  std::vector<double> heights;
+  for (const int plane : index_->planes) {
+    const Index::Solid& s = index_->solids[static_cast<size_t>(plane)];
+    const Vec3 n = s.X_WG.rotation * s.geometry->normal;
+    const Vec3& at = s.X_WG.translation;
+    if (s.is_static && n.z() > 1e-6) heights.push_back(at.z() - (n.x() * (x - at.x()) + n.y() * (y - at.y())) / n.z());
+  }
+  const Box line(Vec3(x, y, -kFar_m), Vec3(x, y, kFar_m));
+  for (const int solid : index_->near(line)) {
+    const Index::Solid& s = index_->solids[static_cast<size_t>(solid)];
+    if (!s.is_static) continue;
+    if (s.geometry->shape == Shape::mesh) {
+      index_->triangles_of(solid).any(line, [&](const std::array<Vec3, 3>& corners) {
+        if (const auto z = height_of(corners, x, y)) heights.push_back(*z);
+        return false;
+      });
+    } else if (const auto z = top_of({s.geometry, s.X_WG, {}}, s.box, x, y)) {
+      heights.push_back(*z);
+    }
   }
   std::erase_if(heights, [](double z) { return !(std::abs(z) < kFar_m); });
   if (heights.empty()) return 0;
@@ -106,65 +248,78 @@ double ground_height(const WorldModel& world, double x, double y) {
   return ground;
 }
 
-Pose standing_on(const WorldModel& world, const Model& model, double x, double y, double yaw) {
+Pose Room::standing_on(const Model& model, double x, double y, double yaw) const {
   Pose X_WM{Quat(Eigen::AngleAxisd(yaw, Vec3::UnitZ())), {x, y, 0}};
   double lowest = std::numeric_limits<double>::infinity();
-  for_each_collision(model, X_WM, [&](const Geometry& g, const Pose& X_WG) {
-    if (g.shape == Shape::plane) return;
-    lowest = std::min(lowest, Convex{&g, X_WG, {}}.support(-Vec3::UnitZ()).z());
-  });
+  for (const Link& link : model.links) {
+    for (const Collision& c : link.collisions) {
+      if (c.geometry.shape == Shape::plane) continue;
+      lowest = std::min(lowest, Convex{&c.geometry, X_WM * link.X_ML * c.X_LC, {}}.support(-Vec3::UnitZ()).z());
+    }
+  }
   // A drive says better where the ground is than a wheel's shape, which may be a little larger or smaller.
   if (model.drive) lowest = std::min(lowest, model.drive->X_MBase.translation.z());
-  X_WM.translation.z() = ground_height(world, x, y) - (std::isfinite(lowest) ? lowest : 0.0);
+  X_WM.translation.z() = ground_height(x, y) - (std::isfinite(lowest) ? lowest : 0.0);
   return X_WM;
 }
 
-std::string overlapped(const WorldModel& world, const Model& model, const Pose& X_WM) {
+std::string Room::overlapped(const Model& model, const Pose& X_WM) const {
   const Pose lifted{X_WM.rotation, X_WM.translation + Vec3(0, 0, kClearance_m)};
   struct Part {
-    const Geometry* geometry;
-    Pose X_WG;
-    Eigen::AlignedBox3d box;
+    Convex shape;
+    Box box;
   };
   std::vector<Part> parts;
-  Eigen::AlignedBox3d whole;
-  for_each_collision(model, lifted, [&](const Geometry& g, const Pose& X_WG) {
-    if (g.shape == Shape::plane) return;
-    parts.push_back({&g, X_WG, world_box(g, X_WG)});
-    whole.extend(parts.back().box);
-  });
+  Box whole;
+  for (const Link& link : model.links) {
+    for (const Collision& c : link.collisions) {
+      if (c.geometry.shape == Shape::plane) continue;
+      const Pose X_WG = lifted * link.X_ML * c.X_LC;
+      parts.push_back({{&c.geometry, X_WG, {}}, placed(index_->known_box_of(c.geometry), X_WG)});
+      whole.extend(parts.back().box);
+    }
+  }
   if (parts.empty()) return "";
-  for (const ModelInstance& instance : world.models) {
-    bool hit = false;
-    for_each_collision(*instance.model, instance.X_WM, [&](const Geometry& g, const Pose& X_WG) {
-      if (hit) return;
-      if (g.shape == Shape::plane) {
-        const Vec3 n = X_WG.rotation * g.normal;
-        for (const Part& part : parts) {
-          hit |= n.dot(Convex{part.geometry, part.X_WG, {}}.support(-n) - X_WG.translation) < 0;
-        }
-        return;
-      }
-      const Eigen::AlignedBox3d box = world_box(g, X_WG);
-      if (!box.intersects(whole)) return;
-      for (const Part& part : parts) {
-        if (hit || !box.intersects(part.box)) continue;
-        const Convex mine{part.geometry, part.X_WG, {}};
-        if (g.shape != Shape::mesh) {
-          hit = overlap(mine, {&g, X_WG, {}});
-          continue;
-        }
-        for (size_t t = 0; t < g.mesh->triangles.size() && !hit; ++t) {
-          const std::array<Vec3, 3> corners = triangle_of(g, X_WG, t);
-          Eigen::AlignedBox3d around;
-          for (const Vec3& corner : corners) around.extend(corner);
-          if (around.intersects(part.box)) hit = overlap(mine, {nullptr, {}, corners});
-        }
-      }
-    });
-    if (hit) return instance.name;
+  const auto name = [&](int solid) {
+    return index_->instances[static_cast<size_t>(index_->solids[static_cast<size_t>(solid)].instance)].first;
+  };
+  for (const int plane : index_->planes) {
+    const Index::Solid& s = index_->solids[static_cast<size_t>(plane)];
+    const Vec3 n = s.X_WG.rotation * s.geometry->normal;
+    for (const Part& part : parts) {
+      if (n.dot(part.shape.support(-n) - s.X_WG.translation) < 0) return name(plane);
+    }
+  }
+  for (const int solid : index_->near(whole)) {
+    for (const Part& part : parts) {
+      if (index_->meets(part.shape, part.box, solid)) return name(solid);
+    }
   }
   return "";
+}
+
+double ground_height(const WorldModel& world, double x, double y) { return Room(world).ground_height(x, y); }
+
+Pose standing_on(const WorldModel& world, const Model& model, double x, double y, double yaw) {
+  return Room(world).standing_on(model, x, y, yaw);
+}
+
+std::string overlapped(const WorldModel& world, const Model& model, const Pose& X_WM, const LinkPose& now) {
+  return Room(world, now).overlapped(model, X_WM);
+}
+
+double footprint_radius(const Model& model) {
+  const Pose X_BaseM = model.drive ? model.drive->X_MBase.inverse() : Pose{};
+  double radius = 0;
+  for (const Link& link : model.links) {
+    for (const Collision& c : link.collisions) {
+      const Box box = placed(bounds(c.geometry), X_BaseM * link.X_ML * c.X_LC);
+      if (box.isEmpty()) continue;
+      radius = std::max(radius, std::hypot(std::max(std::abs(box.min().x()), std::abs(box.max().x())),
+                                           std::max(std::abs(box.min().y()), std::abs(box.max().y()))));
+    }
+  }
+  return radius;
 }
 
 }  // namespace ruedo::model

@@ -1,21 +1,50 @@
-// Putting a model into a world by hand: on the ground, and not into something else.
+// Putting models into a world by hand: on the ground, and not into something else.
 #pragma once
 
+#include <functional>
+#include <memory>
 #include <string>
 
 #include "model/world_model.h"
 
 namespace ruedo::model {
 
-// The height of the ground at (x, y), metres: the highest static surface that lies at most 0.5 m above the lowest
-// one there, so that ramps and steps count and tables, walls and roofs do not. 0 where there is nothing.
+// The pose of a link of an instance now, by their indices; empty: where the world file puts it.
+using LinkPose = std::function<Pose(size_t instance, size_t link)>;
+
+// What stands where in a world. A question costs what is near the place, so that thousands of models can be placed
+// one after another. Not for several threads at once.
+class Room {
+ public:
+  Room();
+  explicit Room(const WorldModel& world, const LinkPose& now = {});
+  ~Room();
+
+  void add(const ModelInstance& instance);    // one that stands where it was put
+
+  // The height of the ground at (x, y), metres: the highest static surface that lies at most 0.5 m above the lowest
+  // one there, so that ramps and steps count and tables, walls and roofs do not. 0 where there is nothing.
+  double ground_height(double x, double y) const;
+
+  // The pose of a model at (x, y) with that yaw, its lowest collision point on the ground.
+  Pose standing_on(const Model& model, double x, double y, double yaw) const;
+
+  // The name of a model whose collisions the model would share space with, 2 cm of it from the ground up left out;
+  // "" when there is room. Meshes of the placed model count as their convex hulls.
+  std::string overlapped(const Model& model, const Pose& X_WM) const;
+
+ private:
+  struct Index;
+  std::unique_ptr<Index> index_;
+};
+
+// The same for a single question.
 double ground_height(const WorldModel& world, double x, double y);
-
-// The pose of a model at (x, y) with that yaw, its lowest collision point on the ground.
 Pose standing_on(const WorldModel& world, const Model& model, double x, double y, double yaw);
+std::string overlapped(const WorldModel& world, const Model& model, const Pose& X_WM, const LinkPose& now = {});
 
-// The name of a model of the world whose collisions the model would share space with, 2 cm of it from the ground up
-// left out; "" when there is room. Meshes of the placed model count as their convex hulls.
-std::string overlapped(const WorldModel& world, const Model& model, const Pose& X_WM);
+// The radius of the smallest upright cylinder about the model's base (its origin, without a drive) that holds its
+// collisions, metres.
+double footprint_radius(const Model& model);
 
 }  // namespace ruedo::model

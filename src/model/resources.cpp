@@ -142,8 +142,8 @@ std::vector<std::string> ResourceFinder::roots_for(const std::string& from) cons
   return roots;
 }
 
+// Links are followed where they lead: they were made by the user, not by the world file.
 bool ResourceFinder::allowed(const std::string& path, const std::string& from) const {
-  if (allow_absolute_) return true;
   for (const auto& root : roots_for(from)) {
     if (path == root || starts_with(path, (root + "/").c_str())) return true;
   }
@@ -216,12 +216,10 @@ std::optional<std::string> ResourceFinder::find(const std::string& written, cons
   if (starts_with(path, "file://")) path = path.substr(7);
   else if (path.find("://") != std::string::npos) return std::nullopt;
 
-  if (fs::path(path).is_absolute()) {
-    const std::string found = full_path(path);
-    return is_there(found) && allowed(found, from) ? std::optional(found) : std::nullopt;
-  }
-  const std::string beside = full_path(fs::path(from).parent_path() / path);
-  if (is_there(beside) && allowed(beside, from)) return beside;
+  const bool absolute = fs::path(path).is_absolute();
+  const std::string beside = (absolute ? fs::path(path) : fs::path(from).parent_path() / path).lexically_normal().string();
+  if (is_there(beside) && ((absolute && allow_absolute_) || allowed(beside, from))) return full_path(beside);
+  if (absolute) return std::nullopt;
   const std::string tidied = tidy(path);
   if (tidied.empty() || starts_with(tidied, "..")) return std::nullopt;
   for (const auto& root : roots_for(from)) {
@@ -231,10 +229,27 @@ std::optional<std::string> ResourceFinder::find(const std::string& written, cons
   return std::nullopt;
 }
 
+std::string ResourceFinder::why_not(const std::string& uri, const std::string& from) const {
+  const std::string path = decoded(starts_with(uri, "file://") ? uri.substr(7) : uri);
+  if (path.empty() || path.find('\0') != std::string::npos || path.find("://") != std::string::npos) return "is not found";
+  const bool absolute = fs::path(path).is_absolute();
+  const fs::path full = (absolute ? fs::path(path) : fs::path(from).parent_path() / path).lexically_normal();
+  if (!is_there(full) || allowed(full.string(), from)) return "is not found";
+  return absolute ? "lies outside the folders that are searched (--allow-absolute lets it in)" : "leads out of the folders that are searched";
+}
+
 std::optional<std::string> ResourceFinder::find_model(const std::string& uri, const std::string& from) const {
-  const auto found = find(uri, from);
-  if (!found || !is_folder(*found)) return found;
-  const fs::path folder = *found;
+  const auto [at, is_new] = models_.try_emplace(uri + "\n" + fs::path(from).parent_path().string());
+  if (is_new) {
+    const auto found = find(uri, from);
+    at->second = found ? model_file(*found) : std::nullopt;
+  }
+  return at->second;
+}
+
+std::optional<std::string> ResourceFinder::model_file(const std::string& path) {
+  if (!is_folder(path)) return path;
+  const fs::path folder = path;
   const fs::path config = folder / "model.config";
   if (is_there(config)) {
     const auto root = parse_document(read_text_file(config.string(), 1 << 20), config.string());

@@ -15,7 +15,7 @@ namespace ruedo::model {
 class ResourceFinder {
  public:
   // `top_file` is the file on the command line; its folder, the `models` folder in and beside it are searched
-  // first. allow_absolute: absolute paths and file:// may lead anywhere.
+  // first. allow_absolute: absolute paths and file:// may lead anywhere; else only into the folders that are searched.
   ResourceFinder(const std::string& top_file, bool allow_absolute);
 
   // The absolute path of what `uri`, written in the file `from`, names: a file or a folder.
@@ -24,6 +24,12 @@ class ResourceFinder {
   // The SDF file of the model that `uri` names: a file itself, or a folder's newest by its model.config. Throws
   // InputError for a folder with a model.config that names no file that is there.
   std::optional<std::string> find_model(const std::string& uri, const std::string& from) const;
+
+  // The same of a file or folder that the user named, wherever it is.
+  static std::optional<std::string> model_file(const std::string& path);
+
+  // Why find() gave nothing, for messages: "is not found", or that it leads out of the folders that are searched.
+  std::string why_not(const std::string& uri, const std::string& from) const;
 
   // A texture, named in `from`: as find(), then by its file name in the usual folders beside.
   std::optional<std::string> find_texture(const std::string& name, const std::string& from) const;
@@ -35,6 +41,7 @@ class ResourceFinder {
 
   std::vector<std::string> near_, far_;    // folders searched before and after those of the naming file
   bool allow_absolute_;
+  mutable std::map<std::string, std::optional<std::string>> models_;              // by uri and naming file
   mutable std::map<std::string, std::map<std::string, std::string>> packages_;    // in each folder: by name, once looked for
 };
 

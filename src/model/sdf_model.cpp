@@ -5,6 +5,7 @@
 #include "model/drive.h"
 #include "model/sdf_link.h"
 #include "model/sdf_reader.h"
+#include "model/urdf.h"
 
 namespace ruedo::model {
 namespace {
@@ -120,7 +121,17 @@ SdfReader::Included SdfReader::read_file(const std::string& path, const Element&
   }
   Included result;
   result.document = context_.documents.read(path);
-  result.version = version_of(*result.document);
+  if (result.document->name == "robot") {
+    // A URDF: as the SDF file that says the same, so that an <include> can change it.
+    auto converted = std::make_shared<Element>();
+    converted->name = "sdf";
+    converted->source = result.document->source;
+    converted->children.push_back(urdf_as_sdf(*result.document, context_.findings));
+    result.document = converted;
+    result.version = {1, 9};
+  } else {
+    result.version = version_of(*result.document);
+  }
   for (const auto& child : result.document->children) {
     if (child->name == "model") {
       result.model = read_model(*child, result.version);
@@ -167,7 +178,7 @@ std::optional<SdfReader::Included> SdfReader::include(const Element& element, co
   if (!uri || uri->text.empty()) element.fail("has no <uri>");
   const auto path = context_.resources.find_model(uri->text, element.source.file);
   if (!path) {
-    context_.findings.error(element.source, where, "'" + uri->text + "' is not found; the world goes on without it");
+    context_.findings.error(element.source, where, "'" + uri->text + "' " + context_.resources.why_not(uri->text, element.source.file) + "; the world goes on without it");
     return std::nullopt;
   }
   Included result = read_file(*path, element);

@@ -50,6 +50,8 @@ class SdfReader {
  private:
   std::optional<Included> include(const Element& element, const std::string& where);
   std::shared_ptr<const ScopedModel> read_overridden(const Element& model, const Element& include, SdfVersion version);
+  // The instances of a <ruedo:fleet>, after what the world has already.
+  void read_fleet(const Element& element, WorldModel& world, size_t most_models);
   void read_joints(const Element& model, SdfVersion version, FrameGraph& frames, bool parts_missing, const std::string& where, Model& result);
 
   ReadContext& context_;

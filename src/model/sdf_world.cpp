@@ -127,7 +127,7 @@ std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& 
 void SdfReader::read_world(const Element& element, SdfVersion version, WorldModel& world) {
   Findings& findings = context_.findings;
   world.name = required_name(element);
-  report_other_children(element, {"model", "include", "light", "frame", "physics", "gravity", "scene", "actor", "joint"},
+  report_other_children(element, {"model", "include", "light", "frame", "physics", "gravity", "scene", "actor", "joint", "ruedo:fleet"},
                         {"gui", "atmosphere", "magnetic_field", "spherical_coordinates", "wind", "audio", "plugin", "state"},
                         "world " + world.name, findings);
   read_physics(element, world, findings);
@@ -225,6 +225,7 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     check_channel_names(instance, each.element->source);
     world.models.push_back(std::move(instance));
   }
+  for (const Element* fleet : element.all("ruedo:fleet")) read_fleet(*fleet, world, kMaxModels);
   for (const Element* light : element.all("light")) {
     const Pose pose = frames.pose(relative_to(*light), *light) * light->pose("pose");
     world.lights.push_back(read_light(*light, pose, "world/light", context_));

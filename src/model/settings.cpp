@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "model/drive.h"
+#include "model/sdf_reader.h"
 
 namespace ruedo::model {
 namespace {
@@ -142,6 +143,41 @@ void set_in_drive(Model& model, const Setting& setting, const std::string& optio
 }
 
 }  // namespace
+
+void apply_drives(const std::vector<DriveOption>& drives, WorldModel& world) {
+  for (const DriveOption& each : drives) {
+    const std::string option = "--drive " + each.robot;
+    std::vector<std::string> names;
+    ModelInstance* instance = nullptr;
+    for (ModelInstance& candidate : world.models) {
+      names.push_back(candidate.name);
+      if (candidate.name == each.robot) instance = &candidate;
+    }
+    if (!instance) {
+      const std::string near = nearest_word(each.robot, names);
+      throw InputError({}, option + ": there is no model '" + each.robot + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") +
+                               "; there are " + listed(names));
+    }
+    if (instance->model->is_static) throw InputError({}, option + ": the model is static; what drives is not");
+    auto drive = std::make_shared<Element>();
+    drive->name = "ruedo:drive";
+    drive->source = {option, 0};
+    const auto add = [&](const char* name, const std::string& joint) {
+      drive->children.push_back(std::make_unique<Element>());
+      Element& child = *drive->children.back();
+      child.name = name;
+      child.text = joint;
+      child.source = drive->source;
+    };
+    for (const std::string& joint : each.left_joints) add("ruedo:left_joint", joint);
+    for (const std::string& joint : each.right_joints) add("ruedo:right_joint", joint);
+    auto model = std::make_shared<Model>(*instance->model);
+    const auto odometry = model->drive ? model->drive->odometry : nullptr;
+    model->drive = read_drive(std::move(drive), odometry, *model);
+    instance->model = std::move(model);
+    check_channel_names(*instance, {option, 0});
+  }
+}
 
 void apply_settings(const std::vector<Setting>& settings, WorldModel& world) {
   for (const Setting& setting : settings) {

@@ -235,14 +235,32 @@ TEST(BadFiles, IncludesThatMultiplyAreRefused) {
   EXPECT_NE(error_of(folder / "m0.sdf").find("the model has more than 20000 links"), std::string::npos);
 }
 
-TEST(BadFiles, TextFromElsewhereReadsNoFileOutsideTheSearchPath) {
+// From a file as from a text: two folders up is out, by whatever way, unless the user lets absolute paths in.
+TEST(BadFiles, NothingIsReadOutsideTheSearchPath) {
   TemporaryFolder folder;
-  const std::string secret = folder.write("secret/model.sdf", "<sdf version='1.9'><model name='secret'><link name='l'/></model></sdf>");
-  for (const std::string& uri : {secret, "file://" + secret, std::string("model://../secret"), std::string("../secret/model.sdf")}) {
-    const auto world = load_world_text("<sdf version='1.9'><world name='w'><include><uri>" + uri + "</uri></include></world></sdf>", "/nowhere/in/world.sdf");
-    EXPECT_TRUE(world->models.empty()) << uri;
-    ASSERT_EQ(world->findings.size(), 1u) << uri;
-    EXPECT_EQ(world->findings[0].text, "'" + uri + "' is not found; the world goes on without it");
+  const std::string model = "<sdf version='1.9'><model name='secret'><link name='l'/></model></sdf>";
+  const std::string secret = folder.write("secret/model.sdf", model);
+  folder.write("a/b/near.sdf", model);
+  const std::string out = "leads out of the folders that are searched", absolute = "lies outside the folders that are searched (--allow-absolute lets it in)";
+  const std::pair<std::string, std::string> cases[] = {
+      {secret, absolute}, {"file://" + secret, absolute}, {"model://../../secret", "is not found"}, {"model://b/../../secret", "is not found"},
+      {"../../secret/model.sdf", out}, {"%2e%2e/%2e%2e/secret/model.sdf", out}, {"../b/../../secret/model.sdf", out}, {"secret/model.sdf", "is not found"}};
+  for (const auto& [uri, why] : cases) {
+    const std::string text = "<sdf version='1.9'><world name='w'><include><uri>" + uri + "</uri></include></world></sdf>";
+    const std::string path = folder.write("a/b/world.sdf", text);
+    for (const auto& world : {load_world(path), load_world_text(text, path)}) {
+      EXPECT_TRUE(world->models.empty()) << uri;
+      ASSERT_EQ(world->findings.size(), 1u) << uri;
+      EXPECT_EQ(world->findings[0].text, "'" + uri + "' " + why + "; the world goes on without it");
+    }
+    LoadOptions options;
+    options.allow_absolute = true;
+    EXPECT_EQ(load_world(path, options)->models.size(), why == absolute ? 1u : 0u) << uri;
+  }
+  // Absolute paths into the search folders, and links that lead out, are the user's own.
+  std::filesystem::create_symlink(secret, folder / "a/b/link.sdf");
+  for (const std::string& uri : {folder / "a/b/near.sdf", std::string("link.sdf")}) {
+    EXPECT_EQ(load_world(folder.write("a/b/world.sdf", "<sdf version='1.9'><world name='w'><include><uri>" + uri + "</uri></include></world></sdf>"))->models.size(), 1u);
   }
 }
 
