@@ -47,9 +47,12 @@ void add_world_arguments(CLI::App& command, WorldArguments& arguments) {
   command.add_option("WORLD", arguments.world, "SDF world or model, or URDF robot")->required();
   command.add_option("--spawn", arguments.spawns, "place a model on the ground: MODEL[:NAME]@X,Y[,YAW] (m, rad); a file, or one of ours (p3at)")
       ->type_name("SPAWN")->allow_extra_args(false);
+  command.add_option("--drive", arguments.drives, "give a model a drive by its wheel joints: ROBOT=LEFT[+LEFT...],RIGHT[+RIGHT...]")
+      ->type_name("DRIVE")->allow_extra_args(false);
   command.add_option("--set", arguments.settings, "change a device: ROBOT/DEVICE.KEY=VALUE")->type_name("SETTING")->allow_extra_args(false);
   command.add_option("--disable", arguments.disabled, "leave a device out: ROBOT/DEVICE")->type_name("DEVICE")->allow_extra_args(false);
   command.add_flag("--no-noise", arguments.no_noise, "sensors give their ideal values");
+  command.add_flag("--allow-absolute", arguments.allow_absolute, "absolute paths in the files may lead out of the folders that are searched");
 }
 
 model::Spawn parse_spawn(const std::string& text) {
@@ -75,6 +78,23 @@ model::Spawn parse_spawn(const std::string& text) {
   spawn.y = numbers[1];
   spawn.yaw = numbers[2];
   return spawn;
+}
+
+model::DriveOption parse_drive(const std::string& text) {
+  const std::string allowed = "it looks like ROBOT=LEFT[+LEFT...],RIGHT[+RIGHT...], for example rover=left_wheel_joint,right_wheel_joint";
+  const size_t equals = text.find('='), comma = text.find(',', equals == std::string::npos ? 0 : equals);
+  if (equals == std::string::npos || equals == 0 || comma == std::string::npos) wrong("--drive", text, allowed);
+  const auto joints = [&](size_t begin, size_t end) {
+    std::vector<std::string> names;
+    while (begin <= end) {
+      const size_t plus = std::min(text.find('+', begin), end);
+      names.push_back(text.substr(begin, plus - begin));
+      if (names.back().empty() || names.back().find(',') != std::string::npos) wrong("--drive", text, allowed);
+      begin = plus + 1;
+    }
+    return names;
+  };
+  return {text.substr(0, equals), joints(equals + 1, comma), joints(comma + 1, text.size())};
 }
 
 model::Setting parse_setting(const std::string& text) {
@@ -113,6 +133,8 @@ int64_t parse_duration_us(const std::string& text) {
 model::LoadOptions load_options(const WorldArguments& arguments) {
   model::LoadOptions options;
   for (const std::string& text : arguments.spawns) options.spawns.push_back(parse_spawn(text));
+  for (const std::string& text : arguments.drives) options.drives.push_back(parse_drive(text));
+  options.allow_absolute = arguments.allow_absolute;
   for (const std::string& text : arguments.settings) options.settings.push_back(parse_setting(text));
   for (const std::string& text : arguments.disabled) {
     if (text.find('/') == std::string::npos) wrong("--disable", text, "it looks like ROBOT/DEVICE, for example p3at/CAMERA");
@@ -128,6 +150,8 @@ std::shared_ptr<const model::WorldModel> load(const WorldArguments& arguments) {
 std::vector<std::string> result_options(const WorldArguments& arguments) {
   std::vector<std::string> options;
   for (const std::string& text : arguments.spawns) options.push_back("--spawn=" + text);
+  for (const std::string& text : arguments.drives) options.push_back("--drive=" + text);
+  if (arguments.allow_absolute) options.push_back("--allow-absolute");
   for (const std::string& text : arguments.settings) options.push_back("--set=" + text);
   for (const std::string& text : arguments.disabled) options.push_back("--disable=" + text);
   if (arguments.no_noise) options.push_back("--no-noise");

@@ -35,10 +35,10 @@ int run_experiments(const std::string& out);    // ruedo experiments
 // The world and what is changed in it, for every command that loads one.
 struct WorldArguments {
   std::string world;
-  std::vector<std::string> spawns, settings, disabled;
-  bool no_noise = false;
+  std::vector<std::string> spawns, drives, settings, disabled;
+  bool no_noise = false, allow_absolute = false;
 };
-// WORLD, --spawn, --set, --disable, --no-noise.
+// WORLD, --spawn, --drive, --set, --disable, --no-noise, --allow-absolute.
 void add_world_arguments(CLI::App& command, WorldArguments& arguments);
 // Throws InputError; without a file in it for wrong usage.
 model::LoadOptions load_options(const WorldArguments& arguments);
@@ -47,6 +47,7 @@ std::shared_ptr<const model::WorldModel> load(const WorldArguments& arguments);
 std::vector<std::string> result_options(const WorldArguments& arguments);
 
 model::Spawn parse_spawn(const std::string& text);                              // MODEL[:NAME]@X,Y[,YAW]
+model::DriveOption parse_drive(const std::string& text);                        // ROBOT=LEFT[+LEFT...],RIGHT[+RIGHT...]
 model::Setting parse_setting(const std::string& text);                          // ROBOT/DEVICE.KEY=VALUE
 std::pair<std::string, std::string> parse_remap(const std::string& text);       // CHANNEL=NAME
 double parse_rate(const std::string& text);                                     // a number above 0, or "max": +inf
