@@ -56,8 +56,8 @@ def c_client(folder, headers, library):
     run_in(folder, page["bare_c_build"].replace("$(pkg-config --cflags --libs lcm)", flags))
 
 
-@pytest.mark.parametrize("version", ["1.5.3", "1.3.1"])
-def test_c(tmp_path, version):
+def library_of(version):
+    """Headers and library of an LCM; skips where there is none."""
     if version == "1.5.3":
         headers, library = WHEEL / "include", WHEEL / "lib/liblcm.so"
         if not library.exists():
@@ -70,6 +70,12 @@ def test_c(tmp_path, version):
             pytest.skip("no LCM 1.3.1 here: neither liblcm-dev is installed nor could fetch_lcm131.sh get it")
         library = libraries[0]
         headers = root / "usr/include" if root.exists() else Path("/usr/include")
+    return headers, library
+
+
+@pytest.mark.parametrize("version", ["1.5.3", "1.3.1"])
+def test_c(tmp_path, version):
+    headers, library = library_of(version)
     c_client(tmp_path, headers, library)
     linked = subprocess.run(["ldd", str(tmp_path / "client")], capture_output=True, text=True).stdout
     assert str(library.parent) in linked

@@ -1,0 +1,224 @@
+"""Networks as they are: LCM over TCP from the server itself, no multicast route, one server an address, two hosts."""
+
+import os
+import re
+import shlex
+import statistics
+import subprocess
+import sys
+import time
+
+import lcm
+import pytest
+from bare_test import bare, c_client, check_scans
+from conftest import HERE, PROBES, RUEDO, Server, free_url, probe, ruedo_run
+from docs_code import blocks
+
+HALL = str(HERE / "hall.sdf")
+QUICK = ["--disable", "p3at/camera"]
+PLAIN = {key: value for key, value in os.environ.items() if key != "LCM_DEFAULT_URL"}
+
+
+def tcp_url():
+    return free_url().replace("udpm://239.255.76.67", "tcpq://127.0.0.1").replace("?ttl=0", "")
+
+
+def unrouted(*command):
+    """The command, in a network without multicast; skips where that cannot be had."""
+    for flags in ("-n", "-rn"):
+        wrapped = ["unshare", flags, "sh", "-c", "ip link set lo up && exec \"$@\"", "sh"]
+        if subprocess.run([*wrapped, "true"], capture_output=True).returncode == 0:
+            return [*wrapped, *command]
+    pytest.skip("no network namespaces here")
+
+
+def tcp_server(*args, world=HALL):
+    import conftest
+
+    url = tcp_url()
+    conftest._taken.pop().close()    # the token: the server itself listens there
+    return ruedo_run(*args, world=world, url=url)
+
+
+def test_the_libraries_work_over_tcp(language):
+    with tcp_server("--no-noise", *QUICK) as server:
+        assert server.url.startswith("tcpq://")
+        said = probe(language, server.url, "velocity", "p3at", "0.3", "0.2", "2")
+        x, turn = said.numbers("moved")
+        assert 0.3 < x < 0.9 and 0.2 < turn < 0.6
+        assert abs(said.numbers("stopped")[0]) < 1e-6
+
+
+def test_requests_are_answered_at_once_over_tcp():
+    """Delayed acknowledgements would make it 40 ms and more."""
+    import ruedo
+
+    with tcp_server(*QUICK) as server, ruedo.connect(server.url, timeout=20.0) as sim:
+        times = []
+        for _ in range(50):
+            begin = time.monotonic()
+            sim.state()
+            times.append(time.monotonic() - begin)
+    assert statistics.median(times) < 0.03
+
+
+def test_bare_python_over_tcp(tmp_path):
+    page = blocks("protocol.md")
+    (tmp_path / "client.py").write_text(page["bare_python"].replace("from ruedo import", "from ruedo.lcmtypes import"))
+    with tcp_server("--no-noise", *QUICK) as server:
+        done = subprocess.run([sys.executable, "client.py"], cwd=tmp_path, env={**os.environ, "LCM_DEFAULT_URL": server.url},
+                              capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    lines = check_scans("\n".join(line for line in done.stdout.splitlines() if not line.startswith("LCM")))
+    assert float(lines[0][2]) > float(lines[-1][2]) + 0.1
+
+
+@pytest.mark.parametrize("version", ["1.5.3", "1.3.1"])
+def test_bare_c_over_tcp(tmp_path, version):
+    from bare_test import library_of
+
+    c_client(tmp_path, *library_of(version))
+    with tcp_server("--no-noise", *QUICK) as server:
+        done = subprocess.run([str(tmp_path / "client")], env=bare(server), capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    lines = check_scans("\n".join(line for line in done.stdout.splitlines() if not line.startswith("LCM")))
+    assert float(lines[0][3]) > float(lines[-1][3]) + 0.1
+
+
+def test_raw_pictures_over_tcp():
+    """921 600 bytes each; over multicast, with the buffers that Linux gives, none arrives."""
+    import ruedo
+
+    settings = ["--set", "p3at/camera.encoding=rgb", "--set", "p3at/camera.camera/image/width=640", "--set",
+                "p3at/camera.camera/image/height=480"]
+    with tcp_server(*settings) as server, ruedo.connect(server.url, timeout=20.0) as sim:
+        camera = sim.robot("p3at").camera
+        for _ in range(5):
+            image = camera.next(20.0)
+            assert image.format == "rgb" and len(image.data) == 3 * 640 * 480
+
+
+def test_without_multicast_the_server_takes_tcp_and_clients_find_it(language):
+    script = f"""
+        {shlex.quote(RUEDO)} run {HALL} --disable p3at/camera > out 2> err & server=$!
+        trap 'kill $server; wait $server' EXIT
+        until grep -q '^hall' out; do kill -0 $server; sleep 0.05; done
+        {shlex.join(PROBES[language])} '' list
+    """
+    folder = subprocess.run(["mktemp", "-d"], capture_output=True, text=True).stdout.strip()
+    done = subprocess.run(unrouted("sh", "-ec", script), cwd=folder, env=PLAIN, capture_output=True, text=True, timeout=90)
+    said, warned = open(f"{folder}/out").read(), open(f"{folder}/err").read()
+    assert done.returncode == 0, done.stdout + done.stderr + warned
+    assert "world hall" in done.stdout
+    assert said.splitlines()[0] == "export LCM_DEFAULT_URL='tcpq://127.0.0.1:7700'"
+    assert len([line for line in warned.splitlines() if "no multicast route" in line]) == 1
+
+
+def test_launch_takes_tcp_where_there_is_no_multicast(language):
+    command = [*PROBES[language], "-", "launch", HALL, "--disable", "p3at/camera"]
+    with subprocess.Popen(unrouted(*command), env=PLAIN, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as client:
+        words = next(line for line in client.stdout if line.startswith("url")).split()
+        assert words[1].startswith("tcpq://127.0.0.1:")
+        assert client.stdout.readline().split() == ["ready", "True"]
+        client.terminate()
+        said = client.stderr.read()
+    assert len([line for line in said.splitlines() if "no multicast route" in line]) == 1, said
+
+
+@pytest.mark.parametrize("scheme", ["udpm", "tcpq"])
+def test_a_second_server_refuses_and_names_the_first(scheme):
+    with (ruedo_run(*QUICK, world=HALL) if scheme == "udpm" else tcp_server(*QUICK)) as first:
+        second = subprocess.run([RUEDO, "run", HALL, "--lcm", first.url], capture_output=True, text=True, timeout=60)
+        assert second.returncode == 4
+        [line] = second.stderr.splitlines()
+        assert first.url in line and f"pid {first.process.pid}, world hall, run " in line and "--lcm auto" in line
+        import ruedo
+
+        run = re.search(r"run (-?\d+)", line).group(1)
+        with ruedo.connect(first.url, timeout=20.0) as sim:
+            assert str(sim._info.run_id) == run
+    with ruedo_run(*QUICK, world=HALL, url=first.url):    # and once that has ended, it is free
+        pass
+
+
+def auto_url(process):
+    line = process.stdout.readline()
+    match = re.fullmatch(r"export LCM_DEFAULT_URL='(\S+)'\n", line)
+    assert match, line
+    return match.group(1)
+
+
+def test_auto_takes_a_port_of_its_own():
+    import ruedo
+
+    def start():
+        return subprocess.Popen([RUEDO, "run", HALL, "--quiet", "--lcm", "auto", *QUICK], stdout=subprocess.PIPE, text=True)
+
+    servers = [start() for _ in range(3)]
+    try:
+        urls = [auto_url(server) for server in servers]
+        assert len(set(urls)) == 3 and all(url.startswith("udpm://239.255.76.67:") and url.endswith("?ttl=0") for url in urls)
+        for url in urls:
+            with ruedo.connect(url, timeout=20.0) as sim:
+                assert sim.world == "hall"
+    finally:
+        for server in servers:
+            server.terminate()
+            server.wait(20)
+
+
+def test_auto_without_multicast_is_tcp():
+    command = unrouted(RUEDO, "run", HALL, "--quiet", "--lcm", "auto", "--duration", "0.1", *QUICK)
+    said = subprocess.run(command, env=PLAIN, capture_output=True, text=True, timeout=60)
+    assert re.match(r"export LCM_DEFAULT_URL='tcpq://127\.0\.0\.1:\d+'\n", said.stdout), said.stdout + said.stderr
+
+
+def test_two_hosts_that_share_an_address_both_say_so():
+    """Two network namespaces and a cable between them."""
+    script = """
+        ip link set lo up
+        unshare -n sh -c 'ip link set lo up; echo ready; read go; ip link set vb up; ip addr add 10.0.0.2/24 dev vb; ip route add 224.0.0.0/4 dev vb; exec "$@"' \
+            sh "$@" < pipe > second & other=$!
+        exec 3> pipe
+        until grep -q ready second; do sleep 0.02; done
+        ip link add va type veth peer name vb netns $other
+        ip link set va up; ip addr add 10.0.0.1/24 dev va; ip route add 224.0.0.0/4 dev va
+        echo go >&3
+        "$@" > first
+        wait $other
+    """
+    folder = subprocess.run(["mktemp", "-d"], capture_output=True, text=True).stdout.strip()
+    os.mkfifo(f"{folder}/pipe")
+    command = ["sh", "-c", f'exec {shlex.quote(RUEDO)} run {HALL} --quiet --disable p3at/camera --duration 6 --lcm "udpm://239.255.76.67:7667?ttl=1" 2>&1', "sh"]
+    flags = "-n" if os.geteuid() == 0 else "-rn"
+    done = subprocess.run(["unshare", flags, "sh", "-ec", script, "sh", *command], cwd=folder, env=PLAIN, capture_output=True, text=True, timeout=60)
+    if "Operation not" in done.stderr or "unshare" in done.stderr:
+        pytest.skip("no network namespaces with a cable here: " + done.stderr)
+    assert done.returncode == 0, done.stderr
+    runs = []
+    for name in ("first", "second"):
+        said = [line for line in open(f"{folder}/{name}").read().splitlines() if "another server" in line]
+        assert len(said) == 1, (name, open(f"{folder}/{name}").read())
+        runs.append(re.search(r"run (-?\d+), world hall; this one is run (-?\d+)", said[0]).groups())
+    assert runs[0] == runs[1][::-1]
+
+
+def test_a_message_that_fits_no_buffer_is_said_once():
+    buffer = int(open("/proc/sys/net/core/rmem_default").read())
+    if buffer > 900_000:
+        pytest.skip(f"receive buffers of {buffer} bytes: a raw picture fits")
+    settings = ["--set", "p3at/camera.encoding=rgb", "--set", "p3at/camera.camera/image/width=640", "--set",
+                "p3at/camera.camera/image/height=480", "--duration", "2"]
+    url = free_url()
+    with Server([RUEDO, "run", HALL, "--quiet", "--lcm", url, *settings], url) as server:
+        server.process.wait(60)
+        said = [line for line in server.end().splitlines() if "receive buffer" in line]
+    assert len(said) == 1 and "921" in said[0] and "sysctl -w net.core.rmem_max" in said[0] and "p3at/camera" in said[0]
+
+
+def test_doctor_names_who_serves():
+    with ruedo_run(*QUICK, world=HALL) as server:
+        done = subprocess.run([RUEDO, "doctor", "--lcm", server.url], capture_output=True, text=True, timeout=20)
+        assert re.search(rf"^ok +server +{re.escape(server.url)}: pid {server.process.pid}, world hall, run ", done.stdout, re.MULTILINE)
+    done = subprocess.run([RUEDO, "doctor", "--lcm", server.url], capture_output=True, text=True, timeout=20)
+    assert re.search(r"^hint +server +none on udpm://.*ruedo run", done.stdout, re.MULTILINE)
