@@ -25,6 +25,9 @@ LoadedModel load_model(const std::string& name, const std::string& world_file);
 // Of a text. What it names is searched as if it stood in the world's folder; errors call it "the text".
 LoadedModel load_model_text(const std::string& text, const std::string& world_file);
 
+// Checks that the names of an instance and of its devices are fit for channels. Throws InputError.
+void check_channel_names(const ModelInstance& instance, const Source& source);
+
 // The file that load_model() would read. Throws InputError when there is none.
 std::string model_file(const std::string& name, const std::string& world_file);
 
