@@ -71,8 +71,9 @@ struct ReleaseEmbree {
 using DevicePtr = std::unique_ptr<std::remove_pointer_t<RTCDevice>, ReleaseEmbree>;
 using ScenePtr = std::unique_ptr<std::remove_pointer_t<RTCScene>, ReleaseEmbree>;
 
-// One thread: builds run in the caller's, and leave the cores to the modules.
-inline DevicePtr make_device() { return DevicePtr(rtcNewDevice("threads=1,set_affinity=0")); }
+// Not with "threads=1", though only builds would use more: Embree would limit TBB in the whole process by it, and the
+// modules' pieces would find no second core.
+inline DevicePtr make_device() { return DevicePtr(rtcNewDevice("set_affinity=0")); }
 
 // A float a little above t >= 0.
 inline float just_beyond(double t) { return static_cast<float>(t) * (1.0f + 2.5e-7f); }

@@ -4,6 +4,7 @@
 #include <thread>
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include "ray_worlds.h"
 
@@ -304,6 +305,16 @@ TEST(RayScene, ThreadsCastTheSame) {
   for (std::thread& thread : threads) thread.join();
   for (size_t k = 1; k < hits.size(); ++k)
     for (size_t i = 0; i < rays.size(); ++i) ASSERT_TRUE(same_bits(hits[0][i], hits[k][i])) << i;
+}
+
+// Embree takes its threads from TBB, as the modules do for their pieces: it must not keep them from those.
+TEST(RayScene, LeavesTbbItsThreads) {
+  constexpr auto kThreads = tbb::global_control::max_allowed_parallelism;
+  const tbb::global_control four(kThreads, 4);    // on one core, too
+  Scenes scenes;
+  scenes.world.add(at({1, 0, 0}), geometry(model::Shape::box, {1, 1, 1}));
+  scenes.make();
+  EXPECT_EQ(tbb::global_control::active_value(kThreads), 4u);
 }
 
 #if defined(__SSE2__)
