@@ -18,9 +18,10 @@ except ImportError as _error:
     raise ImportError("ruedo's message types were not generated: install the package (pip install clients/python) or "
                       "build the target python_types and use BUILD/python") from _error
 from .control import State
-from .errors import (LaunchError, MotionError, NoServer, NotSupported, RequestError, RuedoError, Timeout, TypeMismatch,
+from .errors import (LaunchError, LeaseLost, MotionError, NoServer, NotSupported, RequestError, RuedoError, Timeout, TypeMismatch,
                      UnknownName)
 from .launch import find_ruedo, launch
+from .lockstep import Command, Message, Observations
 from .motion import Motion
 from .robot import Camera, Device, Robot
 from .samples import (CameraInfo, Contact, ContactPoint, Image, Imu, Joints, LidarScan, MotionStatus, Odometry, Pose, Sample,
@@ -31,8 +32,8 @@ from .stream import Stream
 __version__ = "0.1.0"
 
 __all__ = [
-    "Camera", "CameraInfo", "Contact", "ContactPoint", "Device", "Image", "Imu", "Joints", "LaunchError", "LidarScan",
-    "Motion", "MotionError", "MotionStatus", "NoServer", "NotSupported", "Odometry", "Pose", "RequestError", "Robot",
+    "Camera", "CameraInfo", "Command", "Contact", "ContactPoint", "Device", "Image", "Imu", "Joints", "LaunchError", "LeaseLost",
+    "LidarScan", "Message", "Motion", "MotionError", "MotionStatus", "NoServer", "NotSupported", "Observations", "Odometry", "Pose", "RequestError", "Robot",
     "RuedoError", "Sample", "Scan", "Simulation", "SonarReading", "State", "Stream", "Timeout", "TypeMismatch",
     "UnknownName", "connect", "find_ruedo", "launch", "lcmtypes",
 ]

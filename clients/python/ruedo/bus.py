@@ -6,11 +6,13 @@ where multicast has no route.
 
 from __future__ import annotations
 
+import math
 import os
 import socket
 import threading
 import time
-from typing import Callable
+from contextlib import contextmanager
+from typing import Callable, Iterator
 from urllib.parse import urlsplit
 
 import lcm
@@ -21,6 +23,7 @@ DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0"
 FALLBACK_URL = "tcpq://127.0.0.1:7700"    # what `ruedo run` serves where there is no multicast route
 
 Handler = Callable[[bytes], None]
+_LEND_SECONDS = 0.02
 
 
 def resolve_url(url: str | None) -> str:
@@ -68,6 +71,8 @@ class Bus:
         self._closed = threading.Event()
         self._handlers: dict[str, list[Handler]] = {}
         self._lock = threading.Lock()
+        self._turn = threading.Lock()    # to receive
+        self._lent_until = 0.0           # until then the thread leaves it to who has received last
         self._thread = threading.Thread(target=self._receive, name="ruedo-receive", daemon=True)
 
     def start(self) -> None:
@@ -96,9 +101,29 @@ class Bus:
         for handler in self._handlers.get(channel, ()):
             handler(data)
 
+    @contextmanager
+    def receiving(self) -> Iterator[Callable[[float], bool]]:
+        """The caller receives instead of the thread: calls what it is given, which handles one message, or waits for it
+        at most so many seconds and returns False."""
+        self._lent_until = math.inf
+        with self._turn:
+            try:
+                yield self._handle
+            finally:
+                self._lent_until = time.monotonic() + _LEND_SECONDS
+
+    def _handle(self, seconds: float) -> bool:
+        try:
+            return bool(self._lcm.handle_timeout(math.ceil(seconds * 1e3)))
+        except OSError:    # tcpq: the server is gone; those who wait find out by their timeouts
+            time.sleep(min(seconds, 0.1))
+            return False
+
     def _receive(self) -> None:
         while not self._closed.is_set():
-            try:
-                self._lcm.handle_timeout(100)
-            except OSError:    # tcpq: the server is gone; those who wait find out by their timeouts
-                time.sleep(0.1)
+            with self._turn:
+                if time.monotonic() >= self._lent_until:
+                    self._handle(0.1)
+            lent = self._lent_until - time.monotonic()
+            if lent > 0.0:
+                self._closed.wait(min(lent, _LEND_SECONDS))

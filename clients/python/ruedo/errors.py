@@ -48,3 +48,7 @@ class RequestError(RuedoError):
     def __init__(self, text: str, code: str):
         super().__init__(text)
         self.code = code
+
+
+class LeaseLost(RequestError):
+    """Lockstep goes on without this client, which was silent for too long; the next step() takes part again."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from . import lcmtypes
 from .errors import NotSupported, UnknownName
+from .lockstep import Command
 from .motion import Driver, Motion
 from .samples import (CameraInfo, Contact, Floats, Image, Imu, Joints, LidarScan, MotionStatus, Odometry, Pose, Scan,
                       SonarReading)
@@ -197,16 +198,36 @@ class Robot:
     def set_velocity(self, v: float, omega: float) -> None:
         """Drives with v (m/s ahead) and omega (rad/s), within the robot's limits, until the next command of any
         kind: the command is repeated in the background, so that the watchdog does not stop the robot."""
-        command = lcmtypes.velocity_command_t()
-        command.utime, command.vx, command.omega = self._sim._utime, _finite("v", v), _finite("omega", omega)
-        self._driver.hold(self._input("velocity_command_t"), command.encode())
+        command = self.velocity_command(v, omega)
+        self._driver.hold(command.channel, command.data)
 
     def set_wheels(self, left: float, right: float) -> None:
         """Turns the wheels of the left and right side (rad/s, positive ahead), until the next command."""
+        command = self.wheel_command(left, right)
+        self._driver.hold(command.channel, command.data)
+
+    def velocity_command(self, v: float, omega: float) -> Command:
+        """What set_velocity() sends, once, for Simulation.step()."""
+        command = lcmtypes.velocity_command_t()
+        command.utime, command.vx, command.omega = self._sim._utime, _finite("v", v), _finite("omega", omega)
+        return Command(self._input("velocity_command_t"), command.encode())
+
+    def wheel_command(self, left: float, right: float) -> Command:
+        """What set_wheels() sends, once, for Simulation.step()."""
         command = lcmtypes.wheel_command_t()
         command.utime, command.n = self._sim._utime, 2
         command.rate = [_finite("left", left), _finite("right", right)]
-        self._driver.hold(self._input("wheel_command_t"), command.encode())
+        return Command(self._input("wheel_command_t"), command.encode())
+
+    def move_command(self, kind: str, value: float, speed: float = 0.0, acceleration: float = 0.0, deceleration: float = 0.0,
+                     radius: float = 0.0) -> Command:
+        """A motion primitive for Simulation.step(). kind: "advance", "rotate", "heading", "arc" or "stop"; value in m or
+        rad, of a stop 0; limits and radius as in advance() and its like."""
+        kinds = {name: getattr(lcmtypes.move_command_t, name.upper()) for name in ("advance", "rotate", "heading", "arc", "stop")}
+        if kind not in kinds:
+            raise ValueError(f"kind is {kind!r}: it must be one of {', '.join(map(repr, kinds))}")
+        command = self._move_message(kinds[kind], value, radius, speed, acceleration, deceleration)
+        return Command(self._input("move_command_t"), command.encode())
 
     def stop(self, deceleration: float = 0.0) -> Motion:
         """Comes to rest. deceleration: limit in m/s^2, 0: the robot's own."""
@@ -234,13 +255,17 @@ class Robot:
 
     def _move(self, name: str, kind: int, value: float, radius: float = 0.0, speed: float = 0.0, acceleration: float = 0.0,
               deceleration: float = 0.0) -> Motion:
+        command = self._move_message(kind, value, radius, speed, acceleration, deceleration)
+        return self._driver.move(self._input("move_command_t"), command, name)
+
+    def _move_message(self, kind: int, value: float, radius: float, speed: float, acceleration: float, deceleration: float) -> Any:
         command = lcmtypes.move_command_t()
         command.utime, command.id, command.kind = self._sim._utime, self._sim._next_id(), kind
         command.value, command.radius = _finite("value", value), _finite("radius", radius)
         command.speed = _limit("speed", speed)
         command.acceleration = _limit("acceleration", acceleration)
         command.deceleration = _limit("deceleration", deceleration)
-        return self._driver.move(self._input("move_command_t"), command, name)
+        return command
 
     # Channels, by what info says of them: names on the bus may be remapped.
 

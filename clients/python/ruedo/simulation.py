@@ -14,7 +14,8 @@ from typing import Any, Callable, Sequence
 from . import control, lcmtypes
 from .bus import Bus, resolve_url
 from .control import Session, State
-from .errors import NoServer, RuedoError, Timeout, UnknownName
+from .errors import NoServer, NotSupported, RuedoError, Timeout, UnknownName
+from .lockstep import Command, Observations, Stepper, observed
 from .motion import Driver
 from .robot import Robot
 from .world_info import WorldInfo, WorldInfoAssembler
@@ -51,6 +52,7 @@ class Simulation:
         self._last_sign = time.monotonic()
         self._robots: dict[str, Robot] = {}
         self._session = Session(self, name)
+        self._stepper = Stepper(self)
         self._ids = _name_hash(name) << 20    # two clients number their primitives apart
         self._drivers: set[Driver] = set()
         self._wake = threading.Condition()
@@ -126,11 +128,27 @@ class Simulation:
     def resume(self) -> None:
         self._session.request(lcmtypes.request_t.RESUME)
 
-    def step(self, n: int = 1, timeout: float = 60.0) -> State:
-        """Takes n steps of a paused simulation and returns the state after them. timeout: s of real time."""
+    def step(self, n: int = 1, commands: Sequence[Command] = (), timeout: float = 60.0) -> Observations:
+        """Takes n steps, at most timeout seconds of real time each time that nothing goes on, and returns what was seen.
+
+        In lockstep (`ruedo run --lockstep N`): takes part from the first call on, grants n steps with their commands,
+        and has every message of every step; the first call's observations begin with those of the state it found.
+        n = 0 takes no step. Raises LeaseLost. Else: steps a paused simulation; there are no commands, and the messages
+        are in the streams."""
+        if self.lockstep:
+            observations = self._stepper.step(n, commands, timeout)
+            self._note_time(observations.utime)
+            return observations
+        if commands:
+            raise NotSupported("commands go with steps where the server runs in lockstep: start it with `ruedo run --lockstep N`")
         body = lcmtypes.step_request_t()
         body.steps = n
-        return control.state_of(self._session.request(lcmtypes.request_t.STEP, body, timeout))
+        return observed(control.state_of(self._session.request(lcmtypes.request_t.STEP, body, timeout)), [])
+
+    @property
+    def lockstep(self) -> bool:
+        """Whether the server runs in lockstep."""
+        return bool(self._info.features >> lcmtypes.request_t.GRANT & 1)
 
     def set_rate(self, rate: float) -> None:
         """Sim time per real time, > 0; math.inf: as fast as it goes."""
@@ -148,6 +166,7 @@ class Simulation:
         body.what, body.seed = kinds[what], -1 if seed is None else seed
         self._session.request(lcmtypes.request_t.RESET, body, 60.0)
         self._utime = 0
+        self._stepper.forget()
 
     def spawn(self, model: str = "", x: float = 0.0, y: float = 0.0, heading: float = 0.0, *, name: str = "", text: str = "",
               z: float | None = None) -> None:
@@ -299,6 +318,7 @@ class Simulation:
         if len(data) < 16 or data[:8] != lcmtypes.tick_t._get_packed_fingerprint():
             return
         self._note_time(struct.unpack_from(">q", data, 8)[0])
+        self._stepper.on_tick(data)
         # Sim time may run a hundred times faster than real time: the watchdog is fed by its beat, too.
         for driver in tuple(self._drivers):
             driver.repeat()

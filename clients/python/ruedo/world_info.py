@@ -28,6 +28,8 @@ class WorldInfo:
         self.robots: dict[str, Any] = {r.name: r for p in parts for r in p.robots}
         self.devices: dict[str, list[Any]] = defaultdict(list)     # by robot
         self.channels: dict[str, list[Any]] = defaultdict(list)    # by robot
+        self.channel_list: list[Any] = [c for p in parts for c in p.channels]    # as ruedo/tick counts them
+        self.tick_channel = next((i for i, c in enumerate(self.channel_list) if c.type == "tick_t"), -1)
         for part in parts:
             for device in part.devices:
                 self.devices[device.robot].append(device)

@@ -1,0 +1,437 @@
+"""The client's side of lockstep: grants, and the messages of every step, whatever is lost on the way.
+
+The caller of step() receives for itself meanwhile: handing each message from thread to thread would take longer
+than the step.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import time
+import zlib
+from collections import deque
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple, Sequence, TypeVar
+
+import numpy as np
+
+from . import lcmtypes, samples
+from .control import State
+from .errors import LeaseLost, NoServer, RequestError, RuedoError, Timeout, TypeMismatch
+from .stream import Stream
+
+if TYPE_CHECKING:
+    from .simulation import Simulation
+
+T = TypeVar("T")
+
+_FIRST_REPEAT, _LAST_REPEAT = 0.005, 0.1    # s
+_ACKNOWLEDGED_TOGETHER = 32                 # steps
+_MOST_WANTED = 256                          # messages asked for at once
+_MOST_EARLY = 512                           # messages of one channel that wait for their ticks
+_MOST_AHEAD = 1024                          # steps beyond what is here: no server is that far
+_LONGEST = 2**63 - 1
+
+_TICK = struct.Struct(">8sqqiqqhh")         # fingerprint, utime, run_id, epoch, step, state_hash, part, nparts
+_ENTRY = struct.Struct(">iqiI")             # channel_index, sequence, size, crc
+_INT = struct.Struct(">i")
+_TICK_FINGERPRINT = lcmtypes.tick_t._get_packed_fingerprint()
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command for Simulation.step(), as Robot.velocity_command() and its like make it."""
+
+    channel: str      # one of the command channels of ruedo/info
+    data: bytes       # the encoded message
+    after: int = 0    # steps from where the call begins to the state that it acts on
+
+    def at(self, steps: int) -> Command:
+        """The same, for the state so many steps on."""
+        return Command(self.channel, self.data, steps)
+
+
+class Message(NamedTuple):
+    """A sensor message as it came."""
+
+    step: int
+    channel: str
+    data: bytes
+
+
+class Observations(State):
+    """What step() saw: the state after its last step, and the sensor messages of all its steps.
+
+    messages: in the order in which the simulation made them; empty when a paused simulation is stepped.
+    """
+
+    messages: list[Message]
+
+    def all(self, stream: Stream[T]) -> list[T]:
+        """The samples of a device or stream, decoded, in order; none when none was due. Raises TypeMismatch."""
+        return [_sample(m.data, stream) for m in self.messages if m.channel == stream.channel]
+
+    def latest(self, stream: Stream[T]) -> T | None:
+        """The last of them."""
+        for message in reversed(self.messages):
+            if message.channel == stream.channel:
+                return _sample(message.data, stream)
+        return None
+
+
+_NOTHING = np.zeros(3)
+_NOTHING.setflags(write=False)
+_LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
+_LEVEL.setflags(write=False)
+
+
+def observed(state: State | tuple[int, int, int], messages: list[Message]) -> Observations:
+    """state: of a STEP's reply, or utime, step and state hash."""
+    made = Observations.__new__(Observations)
+    values = made.__dict__
+    if isinstance(state, State):
+        values.update(state.__dict__)
+    else:
+        values["utime"], values["step"], values["state_hash"] = state
+        values.update(paused=False, rate=math.inf, name="", position=_NOTHING, orientation=_LEVEL, linear=_NOTHING, angular=_NOTHING)
+    values["messages"] = messages
+    return made
+
+
+def _sample(data: bytes, stream: Stream[T]) -> T:
+    message, convert = samples.CONVERSIONS.get(stream.type, (None, None))
+    if message is None or convert is None or data[:8] != message._get_packed_fingerprint():
+        raise TypeMismatch(f"{stream.channel} carries another type than {stream.type}, or another version of it")
+    try:
+        sample: T = convert(message.decode(data))
+    except Exception as error:
+        raise TypeMismatch(f"{stream.channel}: a message is no valid {stream.type} ({error})") from None
+    return sample
+
+
+class _Entry:
+    """Of a manifest. data: as much as is here; None: nothing."""
+
+    __slots__ = ("channel", "sequence", "size", "crc", "data", "here")
+
+    def __init__(self, channel: int, sequence: int, size: int, crc: int, data: bytes | None):
+        self.channel, self.sequence, self.size, self.crc = channel, sequence, size, crc
+        self.data, self.here = data or b"", data is not None
+
+
+class _Step:
+    __slots__ = ("utime", "state_hash", "nparts", "parts", "missing")
+
+    def __init__(self, utime: int, state_hash: int, nparts: int):
+        self.utime, self.state_hash, self.nparts = utime, state_hash, nparts
+        self.parts: dict[int, list[_Entry]] = {}
+        self.missing = 0
+
+    def complete(self) -> bool:
+        return not self.missing and len(self.parts) == self.nparts
+
+
+class Stepper:
+    """Called with the simulation's turn: one step() at a time."""
+
+    def __init__(self, sim: Simulation):
+        self._sim = sim
+        self._part = False                        # takes part
+        self._info: Any = None                    # whose channels are subscribed
+        self._run_id = self._epoch = 0
+        self._granted, self._have = 0, -1         # all of the states up to _have are here
+        self._acknowledged = self._newest = -1
+        self._last = (0, -1, 0)                   # utime, step and hash of what was collected
+        self._grant: tuple[int, int, bytes] = (0, -1, b"")    # the one under way: sequence, from, body
+        self._taken = True
+        self._resends = 0
+        self._steps: dict[int, _Step] = {}        # those not collected yet
+        self._early: dict[int, deque[tuple[int, int, int, bytes]]] = {}    # of each channel: crc, size, utime, message
+        self._waits_for = ""
+        self._fault: RuedoError | None = None
+        self._ask_now = False                     # without waiting for a silence
+
+    def step(self, n: int, commands: Sequence[Command], timeout: float) -> Observations:
+        if n < 0:
+            raise ValueError(f"n is {n}: it must be at least 0")
+        for command in commands:
+            if not 0 <= command.after < n:
+                raise ValueError(f"a command is for {command.after} steps on; of {n} steps 0 to {n - 1} is allowed")
+        session = self._sim._session
+        with session.turn():
+            if self._part and self._sim._info.run_id != self._run_id:
+                self._part = False
+                raise NoServer(f"the run that this client took part in has ended; another is at {self._sim.url} now")
+            if not self._part:
+                self._take_part(timeout)
+            until = min(self._granted + n, _LONGEST)
+            if not self._taken or self._have < self._granted:    # the call before gave up
+                self._wait(self._granted, timeout)
+            if n > 0:
+                self._grant = (session.next_sequence(), self._granted, self._grant_body(until, commands))
+                self._granted, self._taken = until, False
+                self._grant_again()
+            self._wait(until, timeout)
+            return self._collect()
+
+    def forget(self) -> None:
+        """The client has reset the world: the next step takes part anew."""
+        self._part = False
+
+    def _take_part(self, timeout: float) -> None:
+        self._subscribe()
+        body = lcmtypes.grant_request_t()
+        body.granted = body.received = -1
+        reply = self._sim._session.request_in_turn(lcmtypes.request_t.GRANT, body, timeout)
+        try:
+            stands = lcmtypes.grant_reply_t.decode(reply.body)
+        except Exception:
+            raise TypeMismatch("the reply to GRANT is no grant_reply_t of this client's version") from None
+        self._run_id, self._epoch = self._sim._info.run_id, reply.epoch
+        self._granted, self._have, self._newest = stands.granted, stands.received, stands.step
+        self._acknowledged = self._have
+        self._steps.clear()
+        self._taken, self._fault, self._waits_for = True, None, ""
+        self._part = True
+
+    def _subscribe(self) -> None:
+        """To all that the simulation publishes: a manifest names any of it."""
+        info = self._sim._info
+        if self._info is info:
+            return
+        before = self._info.channel_list if self._info else []
+        for index, channel in enumerate(info.channel_list):
+            known = index < len(before) and before[index].name == channel.name
+            if known or channel.input or (not channel.robot and channel.type != "world_state_t"):
+                continue
+            self._early[index] = deque(maxlen=_MOST_EARLY)
+            self._sim._bus.subscribe(channel.name, lambda data, index=index: self._on_message(index, data))
+        self._info = info
+
+    def _grant_body(self, until: int, commands: Sequence[Command]) -> bytes:
+        body = lcmtypes.grant_request_t()
+        body.granted, body.step_until, body.received = self._granted, until, self._have
+        for command in commands:
+            sent = lcmtypes.grant_command_t()
+            sent.step, sent.channel = self._granted + command.after, command.channel
+            sent.size, sent.data = len(command.data), command.data
+            body.commands.append(sent)
+        body.ncommands = len(body.commands)
+        encoded: bytes = body.encode()
+        return encoded
+
+    def _wait(self, until: int, timeout: float) -> None:
+        """Until the states up to `until` are here with all their messages. After a silence the grant, or the request
+        for what is missing, goes out again, sooner at first."""
+        if self._taken and self._have >= until:
+            return
+        repeat, deadline = _FIRST_REPEAT, time.monotonic() + timeout
+        with self._sim._bus.receiving() as receive:
+            while True:
+                had, quiet_at = self._have, time.monotonic() + repeat
+                heard = True
+                while heard and not self._fault and not self._ask_now and self._have - self._acknowledged < _ACKNOWLEDGED_TOGETHER:
+                    if self._taken and self._have >= until:
+                        return
+                    heard = receive(max(0.0, quiet_at - time.monotonic()))
+                if self._fault:
+                    fault, self._fault, self._part = self._fault, None, False
+                    raise fault
+                silence = not heard and self._have == had
+                if not self._taken:
+                    if silence:
+                        self._grant_again()
+                elif silence or self._ask_now:
+                    self._ask_for_lost(until)
+                elif self._have - self._acknowledged >= _ACKNOWLEDGED_TOGETHER:
+                    self._ask_for_lost(self._have)    # for nothing: it says what is here
+                self._ask_now = False
+                repeat = min(2.0 * repeat, _LAST_REPEAT) if silence else _FIRST_REPEAT
+                if self._have > had:
+                    deadline = time.monotonic() + timeout
+                elif silence:
+                    self._sim._check_server()
+                    if time.monotonic() >= deadline:
+                        waits = f": the run waits for {self._waits_for}" if self._waits_for else ""
+                        raise Timeout(f"step {self._have + 1} did not come within {timeout:g} s{waits}")
+
+    def _grant_again(self) -> None:
+        session = self._sim._session
+        session.publish(lcmtypes.request_t.GRANT, session.id, self._grant[0], self._grant[2], self._epoch)
+
+    def _ask_for_lost(self, until: int) -> None:
+        body = lcmtypes.resend_request_t()
+        body.received = self._acknowledged = self._have
+        last = min(until, max(self._newest, self._have + 1))
+        tick = self._info.tick_channel
+        for number in range(self._have + 1, last + 1):
+            step = self._steps.get(number)
+            if step is None:
+                body.wanted.append(_wanted(number, tick, 0, 0))
+            else:
+                body.wanted += [_wanted(number, tick, part, 0) for part in range(step.nparts) if part not in step.parts]
+                body.wanted += [_wanted(number, entry.channel, entry.sequence, len(entry.data))
+                                for part in step.parts.values() for entry in part if not entry.here]
+            if len(body.wanted) >= _MOST_WANTED:
+                break
+        body.nwanted = len(body.wanted)
+        self._resends += 1
+        session = self._sim._session
+        session.publish(lcmtypes.request_t.RESEND, session.id, self._resends, body.encode(), self._epoch)
+
+    def _collect(self) -> Observations:
+        messages = []
+        for number in sorted(n for n in self._steps if n <= self._have):
+            step = self._steps.pop(number)
+            self._last = (step.utime, number, step.state_hash)
+            for part in range(step.nparts):
+                messages += [Message(number, self._info.channel_list[e.channel].name, e.data) for e in step.parts[part]]
+        return observed(self._last, messages)
+
+    # Putting ticks and messages together, as they come: in any order, twice, or not at all.
+
+    def _on_message(self, channel: int, data: bytes) -> None:
+        if not self._part or len(data) < 16:
+            return
+        crc, size = zlib.crc32(data), len(data)
+        for step in self._steps.values():    # a tick may come before its messages
+            if step.missing and self._fill(step, channel, crc, data):
+                return self._progress()
+        self._early[channel].append((crc, size, int.from_bytes(data[8:16], "big", signed=True), data))
+
+    @staticmethod
+    def _fill(step: _Step, channel: int, crc: int, data: bytes) -> bool:
+        for part in step.parts.values():
+            for entry in part:
+                if not entry.here and entry.channel == channel and entry.crc == crc and entry.size == len(data):
+                    entry.data, entry.here = data, True
+                    step.missing -= 1
+                    return True
+        return False
+
+    def on_tick(self, data: bytes) -> None:
+        if not self._part or len(data) < _TICK.size:
+            return
+        fingerprint, utime, run_id, epoch, number, state_hash, part, nparts = _TICK.unpack_from(data)
+        if fingerprint != _TICK_FINGERPRINT or run_id != self._run_id or not 0 <= part < nparts:
+            return
+        if epoch != self._epoch:
+            if epoch > self._epoch and not self._fault:
+                self._fault = RuedoError("the world was reset by another client: the next step begins anew")
+            return
+        if number > self._grant[1]:
+            self._taken = True    # it could not be here otherwise
+        self._newest = max(self._newest, number)
+        if not 0 < number - self._have <= _MOST_AHEAD:
+            return
+        step = self._steps.get(number)
+        if step is None:
+            step = self._steps[number] = _Step(utime, state_hash, nparts)
+        if part in step.parts:
+            return
+        try:
+            entries, missing = self._manifest(data)
+        except (struct.error, ValueError):
+            return
+        step.parts[part] = entries
+        step.missing += missing
+        self._progress()
+
+    def _manifest(self, data: bytes) -> tuple[list[_Entry], int]:
+        at = _TICK.size
+        applied, = _INT.unpack_from(data, at)
+        at += 4
+        for _ in range(applied):
+            at += 4 + _INT.unpack_from(data, at)[0] + 8
+        count, = _INT.unpack_from(data, at)
+        at += 4
+        if count < 0 or at + count * _ENTRY.size != len(data):
+            raise ValueError("the manifest's length")
+        entries, missing = [], 0
+        for channel, sequence, size, crc in _ENTRY.iter_unpack(data[at:]):
+            early = self._early.get(channel)
+            if early is None:
+                continue    # of a model that came since
+            found = None
+            for i, one in enumerate(early):
+                if one[0] == crc and one[1] == size:
+                    found = one[3]
+                    del early[i]
+                    break
+            missing += found is None
+            entries.append(_Entry(channel, sequence, size, crc, found))
+        return entries, missing
+
+    def _progress(self) -> None:
+        step = self._steps.get(self._have + 1)
+        while step is not None and step.complete():
+            self._have += 1
+            for part in step.parts.values():
+                for entry in part:    # what is left of the time before came twice
+                    early = self._early[entry.channel]
+                    while early and early[0][2] <= step.utime:
+                        early.popleft()
+            step = self._steps.get(self._have + 1)
+
+    def on_reply(self, reply: Any) -> None:
+        """To GRANT or RESEND."""
+        if not self._part:
+            return
+        granting = reply.kind == lcmtypes.request_t.GRANT
+        if reply.code != lcmtypes.reply_t.OK:
+            if reply.sequence == (self._grant[0] if granting else self._resends) and not (granting and self._taken):
+                self._fault = self._fault or _fault_of(reply)
+        elif not granting:
+            try:
+                self._take_pieces(lcmtypes.resend_reply_t.decode(reply.body))
+            except Exception:
+                return    # broken: it is asked for again
+        elif reply.sequence == self._grant[0] and not self._taken:
+            self._taken = self._ask_now = True    # it was repeated: its ticks may be lost
+
+    def _take_pieces(self, reply: Any) -> None:
+        self._newest, self._waits_for = max(self._newest, reply.step), reply.waits_for
+        ticks = []
+        for piece in reply.parts:
+            step = self._steps.get(piece.step)
+            if piece.channel_index == self._info.tick_channel:
+                ticks.append(bytes(piece.data))
+            elif step is not None:
+                for part in step.parts.values():
+                    for entry in part:
+                        if (entry.channel, entry.sequence, len(entry.data)) == (piece.channel_index, piece.sequence, piece.offset):
+                            self._add_piece(step, entry, bytes(piece.data))
+        for tick in ticks:
+            self.on_tick(tick)
+        self._progress()
+        self._ask_now = bool(reply.parts)    # more may be missing than goes into one reply
+
+    @staticmethod
+    def _add_piece(step: _Step, entry: _Entry, data: bytes) -> None:
+        if entry.here or len(entry.data) + len(data) > entry.size:
+            return
+        entry.data += data
+        if len(entry.data) < entry.size:
+            return
+        if zlib.crc32(entry.data) == entry.crc:
+            entry.here = True
+            step.missing -= 1
+        else:
+            entry.data = b""    # from the start again
+
+
+def _wanted(step: int, channel: int, sequence: int, offset: int) -> Any:
+    wanted = lcmtypes.resend_wanted_t()
+    wanted.step, wanted.channel_index, wanted.sequence, wanted.offset = step, channel, sequence, offset
+    return wanted
+
+
+def _fault_of(reply: Any) -> RuedoError:
+    codes = lcmtypes.reply_t
+    text = f"{'GRANT' if reply.kind == lcmtypes.request_t.GRANT else 'RESEND'}: {reply.text}"
+    if reply.code == codes.UNKNOWN_SESSION:
+        return LeaseLost(text, "UNKNOWN_SESSION")
+    if reply.code in (codes.WRONG_RUN, codes.REFUSED):
+        return NoServer(text)
+    return RequestError(text, next((k for k, v in vars(codes).items() if k.isupper() and v == reply.code), str(reply.code)))
