@@ -1,0 +1,85 @@
+"""What people bring: ruedo import, ruedo map, --drive, --allow-absolute and ruedo check, as their users call them."""
+import json
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+RUEDO = os.environ["RUEDO"]
+ARENA = str(Path(os.environ["RUEDO_SOURCE_DIR"]) / "worlds" / "arena.sdf")
+
+URDF = """<robot name="cart"><link name="base"><collision><origin xyz="0 0 0.2"/><geometry><box size="0.4 0.3 0.2"/></geometry></collision></link>
+<link name="wl"><collision><origin rpy="1.5707963 0 0"/><geometry><cylinder radius="0.1" length="0.04"/></geometry></collision></link>
+<link name="wr"><collision><origin rpy="1.5707963 0 0"/><geometry><cylinder radius="0.1" length="0.04"/></geometry></collision></link>
+<joint name="jl" type="continuous"><parent link="base"/><child link="wl"/><origin xyz="0 0.2 0.1"/><axis xyz="0 1 0"/></joint>
+<joint name="jr" type="continuous"><parent link="base"/><child link="wr"/><origin xyz="0 -0.2 0.1"/><axis xyz="0 1 0"/></joint></robot>"""
+
+
+def ruedo(*arguments):
+    return subprocess.run([RUEDO, *map(str, arguments)], capture_output=True, text=True, timeout=60)
+
+
+def test_round_trip_of_a_map(tmp_path):
+    one = ruedo("map", ARENA, "-o", tmp_path / "one.yaml", "--resolution", "0.1")
+    assert one.returncode == 0 and re.search(r"\d+ x \d+ cells of 0.1 m, \d+ occupied", one.stdout), one
+    assert ruedo("import", tmp_path / "one.yaml", "-o", tmp_path / "walls.sdf").returncode == 0
+    assert ruedo("map", tmp_path / "walls.sdf", "-o", tmp_path / "two.yaml", "--resolution", "0.1").returncode == 0
+    assert (tmp_path / "two.pgm").read_bytes() == (tmp_path / "one.pgm").read_bytes()
+    assert ruedo("check", tmp_path / "walls.sdf", "--strict").returncode == 0
+
+
+def test_import_of_a_bitmap_needs_its_size(tmp_path):
+    (tmp_path / "cave.pgm").write_bytes(b"P5\n4 2\n255\n" + bytes([0, 255, 255, 0] * 2))
+    assert "--resolution or --width" in ruedo("import", tmp_path / "cave.pgm").stderr
+    sdf = ruedo("import", tmp_path / "cave.pgm", "--width", "16").stdout    # 4 m a pixel
+    assert "<pose>-6 0 0.5 0 0 0</pose><geometry><box><size>4 8 1</size>" in sdf
+    assert sdf.count("<collision") == 2
+
+
+def test_import_says_what_is_left_out(tmp_path):
+    (tmp_path / "lab.map").write_text("2D-Map\nCairn: Goal 0 0 0\nLINES\n0 0 1000 0\nDATA\n")
+    done = ruedo("import", tmp_path / "lab.map", "-o", tmp_path / "lab.sdf")
+    assert done.stdout.endswith("lab.sdf: 1 walls; left out: 1 Goal\n")
+
+
+@pytest.mark.parametrize("text", ["cart", "cart=jl", "=jl,jr", "cart=jl,", "cart=jl+,jr", "cart=jl,jr,x"])
+def test_a_drive_option_says_what_it_looks_like(text):
+    done = ruedo("info", ARENA, "--drive", text)
+    assert done.returncode == 2 and "ROBOT=LEFT[+LEFT...],RIGHT[+RIGHT...]" in done.stderr
+
+
+def test_a_urdf_without_a_plugin_gets_a_drive(tmp_path):
+    (tmp_path / "cart.urdf").write_text(URDF)
+    assert json.loads(ruedo("info", tmp_path / "cart.urdf", "--json").stdout)["robots"] == []
+    robots = json.loads(ruedo("info", tmp_path / "cart.urdf", "--drive", "cart=jl,jr", "--json").stdout)["robots"]
+    assert [(robot["name"], robot["drive"], robot["wheels"]) for robot in robots] == [("cart", "kinematic", ["jl", "jr"])]
+    assert abs(robots[0]["track"] - 0.4) < 1e-9
+
+
+def test_absolute_paths_are_let_in_by_the_user_only(tmp_path):
+    far = tmp_path / "far" / "away"
+    far.mkdir(parents=True)
+    (far / "cart.urdf").write_text(URDF)
+    world = tmp_path / "a" / "b" / "w.sdf"
+    world.parent.mkdir(parents=True)
+    world.write_text(f"<sdf version='1.9'><world name='w'><include><uri>{far}/cart.urdf</uri></include></world></sdf>")
+    refused = json.loads(ruedo("check", world, "--json").stdout)
+    assert len(refused) == 1 and "--allow-absolute" in refused[0]["text"] and refused[0]["line"] == 1
+    assert json.loads(ruedo("check", world, "--json", "--allow-absolute").stdout) == []
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="needs root to become a user without rights")
+def test_a_file_without_permission_is_named(tmp_path):
+    """Root may read all, so an ordinary user asks."""
+    world = Path("/tmp") / f"ruedo-denied-{os.getpid()}.sdf"
+    world.write_text("<sdf version='1.9'/>")
+    world.chmod(0)
+    try:
+        done = subprocess.run([RUEDO, "check", world], capture_output=True, text=True, timeout=60, preexec_fn=lambda: os.setuid(65534))
+    except PermissionError:
+        pytest.skip("the program lies where nobody may run it")
+    finally:
+        world.unlink()
+    assert done.returncode == 3 and f"{world}" in done.stdout and "Permission denied" in done.stdout, done
