@@ -1,0 +1,75 @@
+"""ruedo bench: every table has its rows, and the workload is the one that is described. No figure of speed is judged."""
+import json
+import os
+import subprocess
+
+import pytest
+
+RUEDO = os.environ["RUEDO"]
+
+
+def bench(*arguments):
+    return subprocess.run([RUEDO, "bench", *arguments], capture_output=True, text=True, timeout=200)
+
+
+def rows_of(*arguments):
+    result = bench("--json", *arguments)
+    assert result.returncode == 0, result.stderr
+    return [json.loads(line) for line in result.stdout.splitlines()]
+
+
+def test_all_tables_run_by_themselves():
+    rows = rows_of("--duration", "0.5")
+    counts = {}
+    for row in rows:
+        counts[row["table"]] = counts.get(row["table"], 0) + 1
+    assert counts == {"robots": 4, "lcm": 4, "camera": 3, "latency": 2, "pacing": 1}
+    for row in rows:
+        if row["table"] in ("robots", "lcm", "camera"):
+            assert row["real_time_factor"] > 0 and row["memory_mb"] > 1
+            assert row["real_time_factor"] == pytest.approx(row["sim_s"] / row["wall_s"], rel=1e-3)
+        else:
+            assert row["lost"] == 0 and row["count"] > 0
+            assert 0 <= row["median_ms"] <= row["p99_ms"] <= row["max_ms"]
+    for table in ("robots", "lcm"):
+        assert [row["robots"] for row in rows if row["table"] == table] == [1, 10, 100, 1000]
+
+
+def test_the_workload_is_the_one_described():
+    (row,) = rows_of("--robots", "7", "--duration", "4")
+    # A second of a robot: 10 scans, 25 of each of two sonar arrays, 50 odometry, 50 poses, 10 motions. Beside them the
+    # world's: 30 states, 10 ticks, 1 info. Each starts at 0, so there may be one more of each, and of motions at once two.
+    assert 170 * 7 + 40 <= row["messages_per_sim_s"] <= 170 * 7 + 45 + 7 * 9 / 4
+    # Each scan has two lists of 181 floats, so that is its least.
+    assert row["bytes_per_sim_s"] > 7 * 10 * 2 * 181 * 4
+    (with_cameras,) = rows_of("--only", "camera", "--robots", "2", "--duration", "2")
+    assert with_cameras["pictures_per_s"] * with_cameras["wall_s"] == pytest.approx(2 * 15 * 2 + 2, abs=1)
+
+
+def test_several_robots_give_several_rows_of_one_table():
+    rows = rows_of("--robots", "1", "3", "--duration", "0.5")
+    assert [(row["table"], row["robots"]) for row in rows] == [("robots", 1), ("robots", 3)]
+    rows = rows_of("--robots", "3", "--duration", "0.5", "--lcm", "memq://")
+    assert [(row["table"], row["robots"]) for row in rows] == [("lcm", 3)]
+
+
+def test_a_table_that_cannot_be_measured_is_named_and_the_others_go_on():
+    result = bench("--only", "robots", "lcm", "--robots", "1", "--duration", "0.5", "--lcm", "tcpq://127.0.0.1:1")
+    assert result.returncode == 4
+    assert "'lcm'" in result.stderr
+    assert "messages encoded and counted" in result.stdout and "1" in result.stdout
+
+
+def test_wrong_arguments_say_what_is_allowed():
+    assert bench("--robots", "0").returncode == 2
+    wrong = bench("--only", "robot")
+    assert wrong.returncode == 2 and "latency" in wrong.stderr
+
+
+def test_the_world_can_be_written(tmp_path):
+    path = tmp_path / "rooms.sdf"
+    assert bench("--robots", "20", "--write-world", str(path)).returncode == 0
+    text = path.read_text()
+    assert text.count("model://p3at") == 20
+    # 5 rooms a side: 4 outer walls, and 2 pieces beside the door of each of 2 x 4 x 5 inner walls.
+    assert text.count("<collision") == 4 + 2 * 2 * 4 * 5
