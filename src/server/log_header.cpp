@@ -2,13 +2,16 @@
 #include "server/log_header.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
+#include <iterator>
 #include <set>
 #include <string_view>
 
 #include <gnu/libc-version.h>
 #include <link.h>
 
+#include "ruedo/errors.h"
 #include "server/sha256.h"
 #include "server/version.h"
 
@@ -23,6 +26,42 @@ constexpr std::string_view kThatMatter[] = {"libc.so",      "libm.so",   "libstd
 
 bool matters(std::string_view name) {
   return std::any_of(std::begin(kThatMatter), std::end(kThatMatter), [&](std::string_view start) { return name.starts_with(start); });
+}
+
+std::string joined(const std::vector<std::string>& texts) {
+  std::string all;
+  for (const std::string& text : texts) all += (all.empty() ? "" : " ") + text;
+  return all.empty() ? "none" : all;
+}
+
+// Of the program itself: what the linker made of its bytes. "" where it makes nothing.
+std::string build_id() {
+  std::string id;
+  dl_iterate_phdr(
+      [](dl_phdr_info* info, size_t, void* data) {
+        constexpr size_t kAlign = 4;
+        for (int i = 0; i < info->dlpi_phnum; ++i) {
+          const ElfW(Phdr)& header = info->dlpi_phdr[i];
+          if (header.p_type != PT_NOTE) continue;
+          const auto* at = reinterpret_cast<const char*>(info->dlpi_addr + header.p_vaddr);
+          for (const char* end = at + header.p_memsz; at + sizeof(ElfW(Nhdr)) <= end;) {
+            const auto* note = reinterpret_cast<const ElfW(Nhdr)*>(at);
+            const char* name = at + sizeof *note;
+            const auto* bytes = reinterpret_cast<const unsigned char*>(name + (note->n_namesz + kAlign - 1) / kAlign * kAlign);
+            if (note->n_type == NT_GNU_BUILD_ID && std::string_view(name, note->n_namesz) == std::string_view("GNU", 4)) {
+              char digits[3];
+              for (size_t k = 0; k < note->n_descsz; ++k) {
+                std::snprintf(digits, sizeof digits, "%02x", bytes[k]);
+                *static_cast<std::string*>(data) += digits;
+              }
+            }
+            at = reinterpret_cast<const char*>(bytes) + (note->n_descsz + kAlign - 1) / kAlign * kAlign;
+          }
+        }
+        return 1;    // the first is the program
+      },
+      &id);
+  return id;
 }
 
 }  // namespace
@@ -65,6 +104,7 @@ log_header_t make_log_header(const model::WorldModel& world, uint64_t seed, cons
   log_header_t header;
   header.utime = 0;
   header.version = version();
+  if (const std::string id = build_id(); !id.empty()) header.version += " (build " + id + ")";
   header.world = world.name;
   header.world_file = world.file;
   header.seed = static_cast<int64_t>(seed);
@@ -78,6 +118,42 @@ log_header_t make_log_header(const model::WorldModel& world, uint64_t seed, cons
   header.libraries = libraries_that_matter();
   header.nlibraries = static_cast<int32_t>(header.libraries.size());
   return header;
+}
+
+void check_files(const log_header_t& header, const std::string& log) {
+  for (const log_file_t& file : header.files) {
+    const std::string now = sha256_of_file(file.path);
+    if (now == file.sha256) continue;
+    throw InputError({file.path}, now.empty() ? "cannot be read; " + log + " was made from it"
+                                              : "was changed since " + log + " was made from it (sha256 then " + file.sha256 + ", now " + now + ")");
+  }
+}
+
+std::vector<std::string> machine_differences(const log_header_t& log, const log_header_t& here) {
+  std::vector<std::string> lines;
+  const auto compare = [&](const char* what, const std::string& then, const std::string& now) {
+    if (then != now) lines.push_back(std::string(what) + ": the log has " + then + ", here it is " + now);
+  };
+  compare("Ruedo", log.version, here.version);
+  compare("CPU features", log.cpu, here.cpu);
+  compare("C library", log.libc, here.libc);
+  std::vector<std::string> only_log, only_here;
+  std::set_difference(log.libraries.begin(), log.libraries.end(), here.libraries.begin(), here.libraries.end(), std::back_inserter(only_log));
+  std::set_difference(here.libraries.begin(), here.libraries.end(), log.libraries.begin(), log.libraries.end(), std::back_inserter(only_here));
+  compare("libraries", joined(only_log), joined(only_here));
+  return lines;
+}
+
+void check_same_run(const log_header_t& log, const log_header_t& here, const std::string& path) {
+  const auto refuse = [&](const std::string& text) { throw InputError({path}, "is of another run: " + text); };
+  for (size_t i = 0; i < std::max(log.files.size(), here.files.size()); ++i) {
+    if (i >= here.files.size()) refuse("it was made from " + log.files[i].path + ", too");
+    if (i >= log.files.size()) refuse("it was not made from " + here.files[i].path);
+    if (log.files[i].path != here.files[i].path) refuse("it was made from " + log.files[i].path + ", not from " + here.files[i].path);
+    if (log.files[i].sha256 != here.files[i].sha256) refuse(here.files[i].path + " was changed since");
+  }
+  if (log.options != here.options) refuse("its options are " + joined(log.options) + "; here they are " + joined(here.options));
+  if (log.step_us != here.step_us) refuse("its steps are " + std::to_string(log.step_us) + " us long");
 }
 
 }  // namespace ruedo::server

@@ -18,4 +18,14 @@ std::vector<std::string> libraries_that_matter();
 // options: those that change the result, as on the command line.
 log_header_t make_log_header(const model::WorldModel& world, uint64_t seed, const std::vector<std::string>& options);
 
+// Throws InputError when a file that the log was made from is gone or was changed: names the first.
+void check_files(const log_header_t& header, const std::string& log);
+
+// What determines a run's bytes beside its log and is not the same here, a line each: Ruedo's version and build, the CPU,
+// the C library, other libraries.
+std::vector<std::string> machine_differences(const log_header_t& log, const log_header_t& here);
+
+// Throws InputError when a run with the header `here` is another one than the log's: other files, options or steps.
+void check_same_run(const log_header_t& log, const log_header_t& here, const std::string& path);
+
 }  // namespace ruedo::server

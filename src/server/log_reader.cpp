@@ -45,7 +45,13 @@ bool LogReader::read(void* into, size_t size) {
   return got == size;
 }
 
-bool LogReader::next(LogEvent& event) {
+bool LogReader::skip(size_t size) {
+  if (std::fseek(file_.get(), static_cast<long>(size), SEEK_CUR) != 0) return false;
+  offset_ += static_cast<int64_t>(size);
+  return true;
+}
+
+bool LogReader::next(LogEvent& event, const std::function<bool(const std::string&)>& wanted) {
   if (!fault_.empty()) return false;
   const int64_t begin = offset_;
   std::array<uint8_t, kHeadSize> head{};
@@ -65,9 +71,13 @@ bool LogReader::next(LogEvent& event) {
   event.number = read64(head.data() + 4);
   event.timestamp_us = read64(head.data() + 12);
   event.channel.resize(channel_size);
+  if (!read(event.channel.data(), channel_size)) return cut_off();
+  if (wanted && !wanted(event.channel)) {
+    event.data.clear();
+    return skip(data_size) || cut_off();
+  }
   event.data.resize(data_size);
-  if (!read(event.channel.data(), channel_size) || !read(event.data.data(), data_size)) return cut_off();
-  return true;
+  return read(event.data.data(), data_size) || cut_off();
 }
 
 }  // namespace ruedo::server

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -24,8 +25,8 @@ class LogReader {
   explicit LogReader(const std::string& path);
 
   // Reads the next whole event; false at the end, or where the log was cut off or is damaged: see fault().
-  // The event's buffers are reused.
-  bool next(LogEvent& event);
+  // The event's buffers are reused. wanted: of other channels the data is passed over, and left empty.
+  bool next(LogEvent& event, const std::function<bool(const std::string& channel)>& wanted = {});
 
   // After next() returned false: "" at a proper end, else what is wrong and at which byte.
   const std::string& fault() const { return fault_; }
@@ -35,6 +36,7 @@ class LogReader {
 
  private:
   bool read(void* into, size_t size);
+  bool skip(size_t size);
 
   struct Close { void operator()(std::FILE* file) const { std::fclose(file); } };
   std::string path_;

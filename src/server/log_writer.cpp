@@ -24,9 +24,11 @@ void put(std::vector<uint8_t>& buffer, Integer value) {
 
 }  // namespace
 
-LogWriter::LogWriter(const std::string& path) : path_(path) {
-  file_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+LogWriter::LogWriter(const std::string& path) : LogWriter(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666), path) {
   if (file_ < 0) throw EnvironmentError("--record: cannot write '" + path + "': " + std::strerror(errno));
+}
+
+LogWriter::LogWriter(int file, std::string name) : path_(std::move(name)), file_(file) {
   buffer_.reserve(2 * kFlushSize);
   ends_.reserve(4096);
 }
@@ -67,6 +69,31 @@ void LogWriter::flush() {
   if (error_.empty()) written_ += static_cast<int64_t>(buffer_.size());
   buffer_.clear();
   ends_.clear();
+}
+
+void LogWriter::truncate() {
+  buffer_.clear();
+  ends_.clear();
+  written_ = events_ = 0;
+  error_.clear();
+  if (::ftruncate(file_, 0) != 0 || ::lseek(file_, 0, SEEK_SET) != 0) error_ = std::strerror(errno);
+}
+
+std::string LogWriter::append(const LogWriter& other) {
+  std::vector<uint8_t> piece(kFlushSize);
+  for (int64_t done = 0; done < other.written_;) {
+    const ssize_t got = ::pread(other.file_, piece.data(), piece.size(), done);
+    if (got <= 0) return got < 0 ? std::strerror(errno) : other.path_ + " is shorter than it was";
+    for (ssize_t put = 0; put < got;) {
+      const ssize_t count = ::write(file_, piece.data() + put, static_cast<size_t>(got - put));
+      if (count <= 0) return std::strerror(count < 0 ? errno : ENOSPC);
+      put += count;
+    }
+    done += got;
+  }
+  written_ = other.written_;
+  events_ = other.events_;
+  return "";
 }
 
 void LogWriter::fail(int error_number) {

@@ -13,6 +13,8 @@ class LogWriter {
  public:
   // Creates or empties the file. Throws EnvironmentError when that fails.
   explicit LogWriter(const std::string& path);
+  // Takes over an open, empty file. name: for messages.
+  LogWriter(int file, std::string name);
   ~LogWriter();
   LogWriter(const LogWriter&) = delete;
   LogWriter& operator=(const LogWriter&) = delete;
@@ -22,6 +24,12 @@ class LogWriter {
 
   // Hands everything so far to the operating system.
   void flush();
+
+  // Begins anew with an empty file, whatever went wrong before.
+  void truncate();
+
+  // Adds the events of another log that was written from its beginning and flushed, to an empty one. What went wrong, or "".
+  std::string append(const LogWriter& other);
 
   // What went wrong ("no space left on device"), or "". The file then ends with the last whole event that had room.
   const std::string& error() const { return error_; }

@@ -1,7 +1,6 @@
 // What each request of the simulation control does.
 #include <cmath>
 
-#include "ruedo/applied_t.hpp"
 #include "ruedo/decode.h"
 #include "ruedo/name_request_t.hpp"
 #include "ruedo/rate_request_t.hpp"
@@ -36,13 +35,25 @@ void put(const Pose& pose, const Twist& twist, state_reply_t& reply) {
 
 }  // namespace
 
-int64_t Server::features() {
+int64_t Server::features() const {
   int64_t bits = 0;
   constexpr int32_t kinds[] = {request_t::JOIN,  request_t::LEAVE,     request_t::PAUSE, request_t::RESUME,
                                request_t::STEP,  request_t::RATE,      request_t::RESET, request_t::GET_STATE,
-                               request_t::INFO,  request_t::QUIT,      request_t::RESET_ODOMETRY};
+                               request_t::INFO,  request_t::QUIT,      request_t::RESET_ODOMETRY, request_t::SPAWN,
+                               request_t::REMOVE, request_t::SET_POSE, request_t::SET_TWIST};
   for (int32_t kind : kinds) bits |= int64_t{1} << kind;
+  if (lockstep_) bits |= int64_t{1} << request_t::GRANT | int64_t{1} << request_t::RESEND;
+  if (recorder_.has_journal()) bits |= int64_t{1} << request_t::SNAPSHOT | int64_t{1} << request_t::RESTORE;
   return bits;
+}
+
+// What is repeated must not be disturbed: only who looks is answered meanwhile.
+Outcome Server::ask(const request_t& request, const Session& session) {
+  const bool looks = request.kind == request_t::GET_STATE || request.kind == request_t::INFO || request.kind == request_t::QUIT;
+  if (replay_ && !looks) return Outcome::refuse(reply_t::REFUSED, "a snapshot is being restored: ask again when that is done");
+  if (lockstep_ && request.kind == request_t::GRANT) return lockstep_->grant(request, session);
+  if (lockstep_ && request.kind == request_t::RESEND) return lockstep_->resend(request, session);
+  return execute(request);
 }
 
 Outcome Server::execute(const request_t& request) {
@@ -56,6 +67,12 @@ Outcome Server::execute(const request_t& request) {
     case request_t::INFO: publish_info(); return {};
     case request_t::QUIT: stop(); return {};
     case request_t::RESET_ODOMETRY: return reset_odometry(request);
+    case request_t::SPAWN:
+    case request_t::REMOVE:
+    case request_t::SET_POSE:
+    case request_t::SET_TWIST: return edit(request);
+    case request_t::SNAPSHOT: return snapshot(request);
+    case request_t::RESTORE: return restore(request);
     default: break;
   }
   return Outcome::refuse(reply_t::NOT_SUPPORTED, "this server does not know requests of kind " + std::to_string(request.kind));
@@ -65,6 +82,7 @@ Outcome Server::step(const request_t& request) {
   step_request_t body;
   if (!read_body(request, body)) return bad_body("step_request_t");
   if (body.steps < 1) return Outcome::refuse(reply_t::BAD_REQUEST, "steps is " + std::to_string(body.steps) + "; at least 1 is allowed");
+  if (lockstep_) return Outcome::refuse(reply_t::REFUSED, "in lockstep it is the clients' grants that step");
   if (!pacer_->paused()) return Outcome::refuse(reply_t::REFUSED, "steps are taken while paused: pause first");
   return Outcome::after(pacer_->allow(body.steps));
 }
@@ -80,9 +98,22 @@ Outcome Server::set_rate(const request_t& request) {
 Outcome Server::reset(const request_t& request) {
   reset_request_t body;
   if (!read_body(request, body)) return bad_body("reset_request_t");
-  if (body.what != reset_request_t::ALL) return Outcome::refuse(reply_t::NOT_SUPPORTED, "only a reset of everything is supported");
+  if (body.what != reset_request_t::ALL && body.what != reset_request_t::TIME && body.what != reset_request_t::POSES) {
+    return Outcome::refuse(reply_t::BAD_REQUEST, "a reset of kind " + std::to_string(body.what) + "; there are 0 (all), 1 (time) and 2 (poses)");
+  }
+  if (body.what != reset_request_t::ALL) {
+    if (body.seed != -1) return Outcome::refuse(reply_t::BAD_REQUEST, "another seed goes with a reset of everything; -1 is allowed here");
+    return body.what == reset_request_t::TIME ? reset_time(request) : reset_poses(request);
+  }
   if (body.seed < -1) return Outcome::refuse(reply_t::BAD_REQUEST, "a seed is 0 or more, -1 for the one there is");
-  control_.cancel("the world was reset");
+  if (!replay_) control_.cancel("the world was reset");
+  note(request);
+  if (body.seed >= 0) options_.simulation.fleet.seed = static_cast<uint64_t>(body.seed);
+  begin_epoch();
+  return Outcome::after(0);
+}
+
+void Server::note(const request_t& request) {
   applied_t applied;
   applied.utime = status_.time_us;
   applied.step = status_.step;
@@ -92,15 +123,18 @@ Outcome Server::reset(const request_t& request) {
   applied.kind = request.kind;
   applied.size = request.size;
   applied.data = request.body;
-  record("ruedo/applied", applied.utime, applied);
-  log_base_us_ += status_.time_us;
-  ++epoch_;
-  if (body.seed >= 0) options_.simulation.fleet.seed = static_cast<uint64_t>(body.seed);
+  recorder_.applied(applied);
+}
+
+void Server::begin_epoch() {
+  header_.epoch = ++epoch_;
+  header_.seed = static_cast<int64_t>(options_.simulation.fleet.seed);
+  recorder_.begin_anew(status_.time_us, header_);
   status_.step = -1;
   status_.time_us = 0;
+  if (lockstep_) lockstep_->restart();
   make_simulation();
   simulation_->start(*pacer_);
-  return Outcome::after(0);
 }
 
 state_reply_t Server::state() const {
@@ -124,6 +158,7 @@ Outcome Server::get_state(const request_t& request) {
   for (size_t i = 0; i < layout.links.size(); ++i) {
     const model::LinkPlacement& placement = layout.links[i];
     const model::ModelInstance& instance = world_->models[static_cast<size_t>(placement.instance)];
+    if (instance.removed) continue;
     const model::Link& link = instance.model->links[static_cast<size_t>(placement.link)];
     const bool whole_model = body.name == instance.name && placement.link == 0;
     if (!whole_model && body.name != instance.name + "/" + link.name) continue;

@@ -15,36 +15,60 @@ namespace {
 
 constexpr auto kStatusPeriod = std::chrono::milliseconds(500);
 constexpr auto kPausedInfoPeriod = std::chrono::seconds(1);
+constexpr auto kDrainPeriod = std::chrono::milliseconds(50);
+constexpr auto kPatience = std::chrono::seconds(1);
+constexpr Rate kHashRate{1, 1};
 
 }  // namespace
 
 Server::Server(std::shared_ptr<const model::WorldModel> world, ServerOptions options, Bus& bus)
-    : world_(std::move(world)),
+    : first_world_(std::move(world)),
+      world_(first_world_),
       options_(std::move(options)),
       bus_(bus),
       run_id_(random_id()),
       channels_(options_.remaps),
+      recorder_(options_.record, options_.snapshots, options_.watcher),
       tick_clock_(kTickRate, world_->step_us),
       info_clock_(kInfoRate, world_->step_us),
-      control_(run_id_, {.execute = [this](const request_t& request, const Session&) { return execute(request); },
+      hash_clock_(kHashRate, world_->step_us),
+      control_(run_id_, {.execute = [this](const request_t& request, const Session& session) { return ask(request, session); },
                          .state = [this] { return encoded(state()); },
                          .publish = [this](const reply_t& reply) { send(own_.reply, reply); },
                          .utime = [this] { return status_.time_us; },
-                         .epoch = [this] { return epoch_; }}) {
+                         .epoch = [this] { return epoch_; },
+                         .early = [this](const request_t& request, const Session& session) { return lockstep_ && lockstep_->early(request, session); },
+                         .left = [this](int64_t session) { if (lockstep_) lockstep_->leave(session); }}) {
+  if (options_.lockstep.clients > 0) {
+    lockstep_ = std::make_unique<Lockstep>(options_.lockstep, [this](applied_t applied) {
+      applied.utime = status_.time_us;
+      applied.epoch = epoch_;
+      recorder_.applied(applied);
+    });
+  }
+  if (!options_.wait_for.empty()) wait_for_ = std::make_unique<WaitFor>(options_.wait_for, world_->step_us);
+  if (!options_.repeat.empty()) begin_repeat(options_.repeat);
   make_simulation();
   channels_.check_remaps();
-  if (!options_.record.empty()) begin_log();
+  if (recorder_.wants_messages() || recorder_.has_journal() || replay_) {
+    header_ = make_log_header(*world_, options_.simulation.fleet.seed, options_.result_options);
+    header_.epoch = epoch_;
+    recorder_.begin(header_);
+  }
+  if (replay_ && !options_.end_with_repeat) check_same_run(replay_->header(), header_, options_.repeat);
 }
 
 Server::~Server() { bus_.stop(); }
 
 // Builds the world anew. What follows equals a fresh run: everything that has a state is made here.
 void Server::make_simulation() {
-  const bool paused = pacer_ ? pacer_->paused() : options_.paused;
-  const double rate = pacer_ ? pacer_->rate() : options_.rate;
+  const bool paused = replay_ ? false : pacer_ ? pacer_->paused() : options_.paused;
+  const double rate = replay_ ? std::numeric_limits<double>::infinity() : pacer_ ? pacer_->rate() : options_.rate;
   {
     std::lock_guard lock(simulation_mutex_);
+    if (wait_for_) wait_for_->detach();
     simulation_.reset();
+    world_ = first_world_;
     channels_.clear();
     own_ = add_simulation_channels(channels_, options_.control);
     options_.simulation.fleet.epoch = epoch_;
@@ -54,7 +78,20 @@ void Server::make_simulation() {
   const int64_t last_step = options_.duration_us < 0 ? std::numeric_limits<int64_t>::max() : options_.duration_us / world_->step_us;
   pacer_ = std::make_unique<Pacer>(world_->step_us, rate, last_step);
   if (paused) pacer_->pause();
+  if (replay_) pacer_->set_limit(-1);
+  if (wait_for_ && !replay_) {
+    const std::lock_guard lock(simulation_mutex_);
+    wait_for_->attach(channels_, simulation_->inbox(), *pacer_, 0);
+  }
+  if (lockstep_) lockstep_->attach(simulation_->inbox(), *pacer_);
 
+  make_info();
+  sequences_.assign(channels_.list().size(), 0);
+  next_tick_ = next_info_ = next_hash_ = ticks_ = infos_ = hashes_ = 0;
+  latest_ = nullptr;
+}
+
+void Server::make_info() {
   world_info_t head;
   head.utime = 0;
   head.run_id = run_id_;
@@ -64,17 +101,8 @@ void Server::make_simulation() {
   head.seed = static_cast<int64_t>(options_.simulation.fleet.seed);
   head.step_us = world_->step_us;
   head.features = options_.control ? features() : 0;
-  head.paused = paused;
+  head.paused = pacer_->paused();
   info_ = make_world_info(head, *world_, simulation_->layout(), simulation_->devices(), channels_);
-  sequences_.assign(channels_.list().size(), 0);
-  next_tick_ = next_info_ = ticks_ = infos_ = 0;
-  latest_ = nullptr;
-}
-
-void Server::begin_log() {
-  log_ = std::make_unique<LogWriter>(options_.record);
-  const log_header_t header = make_log_header(*world_, options_.simulation.fleet.seed, options_.result_options);
-  record("ruedo/header", 0, header);
 }
 
 void Server::listen() {
@@ -88,7 +116,9 @@ void Server::listen() {
           if (control_.receive(data, size)) wakeup_.set();
           return;
         }
+        if (repeating_) return;
         std::lock_guard lock(simulation_mutex_);
+        if (wait_for_ && wait_for_->receive(channel, data, size)) return;
         simulation_->inbox().receive(channel, data, size);
       },
       outputs);
@@ -102,40 +132,37 @@ void Server::send(int channel, const Message& message) {
   ++status_.messages;
 }
 
-template <class Message>
-void Server::record(const std::string& channel, int64_t utime, const Message& message) {
-  if (!log_) return;
-  buffer_.resize(static_cast<size_t>(message.getEncodedSize()));
-  message.encode(buffer_.data(), 0, static_cast<int>(buffer_.size()));
-  log_->write(log_base_us_ + utime, channel, buffer_.data(), buffer_.size());
-}
-
 void Server::run() {
   listen();
   simulation_->start(*pacer_);
+  repeat();
   Clock::time_point next_status = Clock::now() + kStatusPeriod;
   Clock::time_point next_flush = Clock::now() + kPausedInfoPeriod;
   for (bool over = false; !over;) {
     if (stop_) pacer_->stop();
-    while (const Batch* batch = simulation_->take()) {
+    while (const Batch* batch = lockstep_ && lockstep_->full() ? nullptr : simulation_->take()) {
       publish(*batch);
       over = batch->last;
       const Clock::time_point now = Clock::now();
       if (on_status_ && now >= next_status) on_status_(status_), next_status = now + kStatusPeriod;
-      if (log_ && now >= next_flush) log_->flush(), next_flush = now + kPausedInfoPeriod;
-      check_log();
-      control_.published(status_.step);
+      if (now >= next_flush) recorder_.flush(), next_flush = now + kPausedInfoPeriod;
+      recorder_.check(status_.time_us);
+      repeat();
+      if (!replay_) control_.published(status_.step);
       control_.serve();
       if (stop_) pacer_->stop();
     }
     if (over) break;
     control_.serve();
-    control_.published(status_.step);    // a PAUSE may wait for a state that was out already
+    if (lockstep_) check_leases();
+    if (!replay_) control_.published(status_.step);    // a PAUSE may wait for a state that was out already
     Clock::time_point deadline = next_status;
     if (pacer_->paused()) {
       if (Clock::now() >= last_info_ + kPausedInfoPeriod) publish_info();
       deadline = std::min(deadline, last_info_ + kPausedInfoPeriod);
     }
+    if (lockstep_) deadline = std::min(deadline, lockstep_->next_check());
+    if (wait_for_ && !replay_) tell_wait();
     const bool woken = wakeup_.wait_until(deadline);
     if (!woken && Clock::now() >= next_status) {
       status_.paused = pacer_->paused();
@@ -143,9 +170,23 @@ void Server::run() {
       next_status = Clock::now() + kStatusPeriod;
     }
   }
+  if (lockstep_) drain();
   control_.cancel("the run has ended");
-  if (log_) log_->flush();
-  check_log();
+  if (latest_) recorder_.state_hash(hash_of_state(true));
+  recorder_.flush();
+  recorder_.check(status_.time_us);
+}
+
+void Server::check_leases() {
+  for (const int64_t session : lockstep_->check_leases(control_.sessions().list(), Clock::now())) control_.drop(session);
+}
+
+void Server::drain() {
+  lockstep_->end();
+  while (!stop_ && !lockstep_->drained(control_.sessions().list(), Clock::now())) {
+    wakeup_.wait_until(Clock::now() + kDrainPeriod);
+    control_.serve();
+  }
 }
 
 void Server::stop() {
@@ -155,14 +196,8 @@ void Server::stop() {
 
 void Server::command(const std::string& channel, const std::vector<uint8_t>& bytes) {
   std::lock_guard lock(simulation_mutex_);
+  if (wait_for_ && wait_for_->receive(channel, bytes.data(), bytes.size())) return;
   simulation_->inbox().receive(channel, bytes.data(), bytes.size());
-}
-
-void Server::check_log() const {
-  if (log_ && !log_->error().empty()) {
-    throw EnvironmentError("--record: " + log_->path() + ": " + log_->error() + ". The log is readable up to " +
-                           std::to_string(status_.time_us / 1000000) + " s of sim time: make room, or record elsewhere");
-  }
 }
 
 void Server::publish(const Batch& batch) {
@@ -172,29 +207,49 @@ void Server::publish(const Batch& batch) {
 void Server::publish_step(const Batch& batch, const Snapshot& snapshot) {
   const int64_t step = snapshot.step;
   record_applied(batch, step - 1);    // on the state before this one, whose messages are out
-  const bool tick = step == next_tick_;
+  if (lockstep_) lockstep_->begin_step(step);
+  const bool tick = lockstep_ || step == next_tick_, aloud = !replay_, recorded = recorder_.wants_messages();
   if (tick) tick_.begin(snapshot.time, run_id_, epoch_, step, state_hash(snapshot));
   simulation_->messages(batch, step, [&](int64_t, int index, const uint8_t* data, size_t size) {
     const Channel& channel = channels_[index];
-    bus_.publish(channel.bus_name, data, size);
-    if (log_) log_->write(log_base_us_ + snapshot.time, channel.bus_name, data, size);
+    if (aloud) bus_.publish(channel.bus_name, data, size);
+    if (recorded) recorder_.message(snapshot.time, channel.bus_name, data, size);
     if (tick) tick_.add_message(index, sequences_[static_cast<size_t>(index)], data, size);
+    if (lockstep_) lockstep_->keep(index, sequences_[static_cast<size_t>(index)], data, size);
     ++sequences_[static_cast<size_t>(index)];
     ++status_.messages;
   });
   latest_ = &snapshot;
+  if (on_state_) on_state_(snapshot);
   status_.step = step;
   status_.time_us = snapshot.time;
+  if (step == next_hash_) {
+    if (recorded) recorder_.state_hash(hash_of_state(false));
+    next_hash_ = hash_clock_.step_of(++hashes_);
+  }
   if (tick) {
-    tell_watchdogs(snapshot);
-    for (const Session& session : control_.sessions().list()) tick_.add_applied(session.client, session.last_sequence);
-    tick_.finish([this](const tick_t& part) { send(own_.tick, part); });
+    if (aloud) tell_watchdogs(snapshot);
+    if (aloud) finish_tick(step);
     next_tick_ = tick_clock_.step_of(++ticks_);
   }
   if (step == next_info_) {
-    publish_info();
+    if (aloud) publish_info();
     next_info_ = info_clock_.step_of(++infos_);
   }
+}
+
+void Server::finish_tick(int64_t step) {
+  const std::vector<Session>& sessions = control_.sessions().list();
+  if (!lockstep_) {
+    for (const Session& session : sessions) tick_.add_applied(session.client, session.last_sequence);
+    return tick_.finish([this](const tick_t& part) { send(own_.tick, part); });
+  }
+  lockstep_->add_applied(tick_, step, sessions);
+  tick_.finish([this](const tick_t& part) {
+    send(own_.tick, part);
+    lockstep_->keep(own_.tick, part.part, buffer_.data(), buffer_.size());
+  });
+  lockstep_->published(step);
 }
 
 void Server::tell_watchdogs(const Snapshot& snapshot) {
@@ -209,7 +264,7 @@ void Server::tell_watchdogs(const Snapshot& snapshot) {
 }
 
 void Server::record_applied(const Batch& batch, int64_t step) {
-  if (!log_) return;
+  if (!recorder_.wants_messages() && !recorder_.has_journal()) return;
   for (int i = 0; i < batch.applied_count; ++i) {
     const AppliedCommand& command = batch.applied[static_cast<size_t>(i)];
     if (command.step != step) continue;
@@ -224,8 +279,33 @@ void Server::record_applied(const Batch& batch, int64_t step) {
     applied.kind = request ? request_t::RESET_ODOMETRY : 0;
     applied.size = static_cast<int32_t>(command.bytes.size());
     applied.data = command.bytes;
-    record("ruedo/applied", applied.utime, applied);
+    recorder_.applied(applied);
   }
+}
+
+state_hash_t Server::hash_of_state(bool last) const {
+  state_hash_t hash;
+  hash.utime = status_.time_us;
+  hash.step = status_.step;
+  hash.epoch = epoch_;
+  hash.state_hash = server::state_hash(*latest_);
+  hash.last = last;
+  return hash;
+}
+
+void Server::tell_wait() {
+  if (status_.step != wait_step_ || pacer_->paused()) {
+    wait_step_ = status_.step;
+    wait_begin_ = Clock::now();
+    wait_told_ = false;
+  }
+  if (wait_told_ || Clock::now() < wait_begin_ + kPatience) return;
+  const std::lock_guard lock(simulation_mutex_);
+  const std::string missing = wait_for_->waits_for(status_.step);
+  if (missing.empty()) return;
+  wait_told_ = true;
+  spdlog::warn("the run waits at step {} ({:g} s): --wait-for wants {}, and nothing came for a second. Does its sender run, and did it "
+               "before this server started?", status_.step, static_cast<double>(status_.time_us) * 1e-6, missing);
 }
 
 void Server::publish_info() {

@@ -16,9 +16,13 @@
 #include "ruedo/bus.h"
 #include "ruedo/state_reply_t.hpp"
 #include "server/control.h"
-#include "server/log_writer.h"
+#include "server/edits.h"
+#include "server/lockstep.h"
+#include "server/recorder.h"
+#include "server/replay.h"
 #include "server/simulation.h"
 #include "server/tick.h"
+#include "server/wait_for.h"
 #include "server/world_info.h"
 
 namespace ruedo::server {
@@ -29,7 +33,13 @@ struct ServerOptions {
   int64_t duration_us = -1;                // sim time; -1: without end
   bool paused = false;
   bool control = true;                     // serve ruedo/request
+  LockstepOptions lockstep;                // wants control
   std::string record;                      // file; "": none
+  std::string snapshots;                   // folder that SNAPSHOT and RESTORE use; "": none
+  std::vector<WaitForOption> wait_for;
+  std::string repeat;                      // log or snapshot to begin with: what acted on that run acts again
+  bool end_with_repeat = false;            // and then end; else go on, and publish from there on
+  Recorder::Watcher watcher;               // sees what a log would get
   std::vector<std::string> result_options; // for the log's header
   std::vector<std::pair<std::string, std::string>> remaps;
 };
@@ -49,7 +59,7 @@ class Server {
   ~Server();
 
   // Runs until the duration is over, stop(), or QUIT. Throws EnvironmentError when the log cannot be written any
-  // more; the log is then whole up to there.
+  // more, and LeaseEnded; the log is then whole up to there.
   void run();
 
   void stop();    // any thread
@@ -60,8 +70,16 @@ class Server {
   const Channels& channels() const { return channels_; }
   const std::vector<world_info_t>& info() const { return info_; }
   const Findings& findings() const { return findings_; }
+  // The world as it is now: another object when models have come or gone. Any thread.
+  std::shared_ptr<const model::WorldModel> world() {
+    const std::lock_guard lock(simulation_mutex_);
+    return world_;
+  }
   int64_t run_id() const { return run_id_; }
   const CommandInbox& inbox() const { return simulation_->inbox(); }
+
+  // Called by run() with each state that is published. Set before run().
+  void on_state(std::function<void(const Snapshot&)> handler) { on_state_ = std::move(handler); }
 
   // Called by run() every half second of real time.
   void on_status(std::function<void(const Status&)> handler) { on_status_ = std::move(handler); }
@@ -70,29 +88,55 @@ class Server {
   using Clock = std::chrono::steady_clock;
 
   void make_simulation();
-  void begin_log();
+  void make_info();
   void listen();
   void publish(const Batch& batch);
   void publish_step(const Batch& batch, const Snapshot& snapshot);
+  void finish_tick(int64_t step);
+  void check_leases();    // of lockstep
+  void drain();           // lets clients in lockstep fetch what they have lost
   void tell_watchdogs(const Snapshot& snapshot);    // on the terminal, once a robot
   void record_applied(const Batch& batch, int64_t step);
   void publish_info();
-  void check_log() const;
+  void tell_wait();                                 // for whom the run waits, once a second has passed
   template <class Message>
   void send(int channel, const Message& message);
-  template <class Message>
-  void record(const std::string& channel, int64_t utime, const Message& message);
+  state_hash_t hash_of_state(bool last) const;
+
+  // Repeating what is in a log; in repeat.cpp.
+  void begin_repeat(const std::string& path);    // throws InputError
+  void repeat();                                 // after each state: what acts on it, and the end
+  void repeat_request(const applied_t& applied);
+  void end_repeat();
+  void go_on(bool paused);
+  int input_of(const applied_t& applied) const;
+  Outcome snapshot(const request_t& request);
+  Outcome restore(const request_t& request);
 
   // Requests; in requests.cpp.
+  Outcome ask(const request_t& request, const Session& session);
   Outcome execute(const request_t& request);
+  void note(const request_t& request);           // in the log: it changed the state
+  void begin_epoch();                            // the world is made anew
   Outcome step(const request_t& request);
   Outcome set_rate(const request_t& request);
   Outcome reset(const request_t& request);
   Outcome get_state(const request_t& request);
   Outcome reset_odometry(const request_t& request);
+  // Changes between two steps; in edit_requests.cpp.
+  bool stand_still();                            // false: the run is over
+  void move_on();
+  // Applies a change to the world that stands still, and notes it. models: some come or go.
+  Outcome change(const request_t& request, bool models, const std::function<Outcome()>& apply);
+  Outcome edit(const request_t& request);
+  Outcome spawn(const request_t& request);
+  Outcome reset_poses(const request_t& request);
+  Outcome reset_time(const request_t& request);
+  void renew_info();
   state_reply_t state() const;
-  static int64_t features();
+  int64_t features() const;
 
+  const std::shared_ptr<const model::WorldModel> first_world_;    // as it was loaded
   std::shared_ptr<const model::WorldModel> world_;
   ServerOptions options_;
   Bus& bus_;
@@ -103,23 +147,35 @@ class Server {
   Findings findings_;
   Wakeup wakeup_;                              // a batch is finished, a request has come, or the end
   std::atomic<bool> stop_{false};
-  std::unique_ptr<LogWriter> log_;
-  SimTime log_base_us_ = 0;                    // log stamps never run backwards, whatever is reset
+  Recorder recorder_;
+  log_header_t header_;                        // of this epoch
+  std::unique_ptr<Replay> replay_;             // while something is repeated: commands and requests wait outside
+  std::atomic<bool> repeating_{false};         // the same for the bus's thread
+  SimTime repeat_begin_us_ = 0;                // stamp at which it began
+  struct { double rate; bool paused; } after_repeat_{};
   std::unique_ptr<Pacer> pacer_;
   std::mutex simulation_mutex_;                // the bus's thread reaches the inbox through it
   std::unique_ptr<Simulation> simulation_;
+  std::unique_ptr<WaitFor> wait_for_;          // null: for nobody
+  int64_t wait_step_ = -1;                     // the run has been at this step
+  Clock::time_point wait_begin_;               // since then
+  bool wait_told_ = false;
   std::vector<world_info_t> info_;
-  SampleClock tick_clock_, info_clock_;
-  int64_t next_tick_ = 0, next_info_ = 0;      // steps
-  int64_t ticks_ = 0, infos_ = 0;
+  SampleClock tick_clock_, info_clock_, hash_clock_;
+  int64_t next_tick_ = 0, next_info_ = 0, next_hash_ = 0;    // steps
+  int64_t ticks_ = 0, infos_ = 0, hashes_ = 0;
   Clock::time_point last_info_;
   std::vector<int64_t> sequences_;             // messages on each channel in this epoch
   TickWriter tick_;
   std::vector<uint8_t> buffer_;
   std::vector<bool> watchdog_told_;            // of each robot
-  const Snapshot* latest_ = nullptr;           // newest published state
+  const Snapshot* latest_ = nullptr;           // newest published state, with the changes since
+  Snapshot changed_;
+  ModelStore models_{first_world_->file};
   Status status_;
   std::function<void(const Status&)> on_status_;
+  std::function<void(const Snapshot&)> on_state_;
+  std::unique_ptr<Lockstep> lockstep_;         // null: the run goes by itself
   Control control_;
 };
 

@@ -1,0 +1,80 @@
+// ruedo play: publishes a log's messages again, with the times between them.
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <memory>
+#include <thread>
+
+#include <fmt/format.h>
+
+#include "bus/lcm_bus.h"
+#include "cli/commands.h"
+#include "server/log_reader.h"
+
+namespace ruedo::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kLongestSleep = std::chrono::milliseconds(100);    // Ctrl-C is seen after that
+
+volatile std::sig_atomic_t interrupted = 0;
+
+struct PlayArguments {
+  std::string log, speed = "1", lcm;
+};
+
+// Channels that a log has for those who read it, and that nobody published.
+bool in_logs_only(const std::string& channel) {
+  return channel == "ruedo/header" || channel == "ruedo/applied" || channel == "ruedo/state_hash";
+}
+
+bool sleep_until(Clock::time_point time) {
+  while (!interrupted) {
+    const auto now = Clock::now();
+    if (now >= time) return true;
+    std::this_thread::sleep_until(std::min(time, now + kLongestSleep));
+  }
+  return false;
+}
+
+int play(const PlayArguments& arguments) {
+  const double speed = parse_rate(arguments.speed);
+  server::LogReader log(arguments.log);
+  bus::LcmBus bus(arguments.lcm);
+  std::signal(SIGINT, [](int) { interrupted = 1; });
+  std::signal(SIGTERM, [](int) { interrupted = 1; });
+  server::LogEvent event;
+  int64_t messages = 0;
+  SimTime first_us = 0;
+  Clock::time_point begin;
+  while (!interrupted && log.next(event)) {
+    if (in_logs_only(event.channel)) continue;
+    if (messages == 0) first_us = event.timestamp_us, begin = Clock::now();
+    if (std::isfinite(speed)) {
+      const double after_s = static_cast<double>(event.timestamp_us - first_us) * 1e-6 / speed;
+      if (!sleep_until(begin + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(after_s)))) break;
+    }
+    bus.publish(event.channel, event.data.data(), event.data.size());
+    ++messages;
+  }
+  if (!log.fault().empty()) fmt::print(stderr, "ruedo: {}: {}\n", arguments.log, log.fault());
+  const double seconds = messages == 0 ? 0.0 : static_cast<double>(event.timestamp_us - first_us) * 1e-6;
+  fmt::print("{}: {} messages, {:g} s, on {}{}\n", arguments.log, messages, seconds, bus.url().str(), interrupted ? "; interrupted" : "");
+  return kGood;
+}
+
+void add_play(CLI::App& app, Action& chosen) {
+  CLI::App* command = app.add_subcommand("play", "publish a log's messages again");
+  const auto arguments = std::make_shared<PlayArguments>();
+  command->add_option("LOG", arguments->log, "a standard LCM log")->required();
+  command->add_option("--speed", arguments->speed, "log time per real time, or max")->type_name("S|max")->capture_default_str();
+  command->add_option("--lcm", arguments->lcm, "LCM address (default: $LCM_DEFAULT_URL, or LCM's group)")->type_name("URL");
+  command->callback([arguments, &chosen] { chosen = [arguments] { return play(*arguments); }; });
+}
+
+const RegisterCommand kRegister{52, add_play};
+
+}  // namespace
+}  // namespace ruedo::cli
