@@ -80,6 +80,7 @@ class Simulation {
   SceneMakers scene_makers();
 
   int place(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model);
+  void show_beginning(Fleet& fleet, int64_t step) const;
   void join(Fleet fleet);
   void join(ModuleSetup setup);
   void fit_batches();

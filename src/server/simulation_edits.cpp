@@ -63,6 +63,7 @@ int Simulation::add_model(const std::string& name, const Pose& X_WM, std::shared
   physics_->add(instance);
   robots_->add(instance);
   if (robot >= 0) inbox_.add(fleet.inputs, static_cast<int>(layout_.robots.size()));
+  if (step > 0) show_beginning(fleet, step - 1);
   try {
     renew_scenes();
     join(std::move(fleet));
@@ -72,6 +73,20 @@ int Simulation::add_model(const std::string& name, const Pose& X_WM, std::shared
   }
   renew_world_state();
   return instance;
+}
+
+// The state that a model came into is its beginning: an odometry counts from there.
+void Simulation::show_beginning(Fleet& fleet, int64_t step) const {
+  Snapshot beginning;
+  robots_->read(beginning);
+  beginning.step = step;
+  beginning.time = step * world_.step_us;
+  Outbox unheard;
+  for (ModuleSetup& setup : fleet.modules) {
+    for (Device& device : setup.devices) {
+      if (device.sensor->observes()) device.sensor->observe(beginning, unheard);
+    }
+  }
 }
 
 void Simulation::remove_model(int instance, Channels& channels) {
