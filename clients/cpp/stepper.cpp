@@ -39,7 +39,7 @@ Observations Stepper::step(int64_t n, const std::vector<Command>& commands, doub
     take_part(timeout);
     lock.lock();
   }
-  wait(lock, granted_, timeout);    // all but nothing, unless the call before gave up
+  wait(lock, have_, timeout);    // for nothing, unless the call before gave up
   const int64_t until = n > INT64_MAX - granted_ ? INT64_MAX : granted_ + n;
   if (n > 0) {
     grant_ = {core_.session().next_sequence(), granted_, grant_body(until, commands), false};

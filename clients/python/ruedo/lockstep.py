@@ -166,8 +166,7 @@ class Stepper:
             if not self._part:
                 self._take_part(timeout)
             until = min(self._granted + n, _LONGEST)
-            if not self._taken or self._have < self._granted:    # the call before gave up
-                self._wait(self._granted, timeout)
+            self._wait(self._have, timeout)    # for nothing, unless the call before gave up
             if n > 0:
                 self._grant = (session.next_sequence(), self._granted, self._grant_body(until, commands))
                 self._granted, self._taken = until, False

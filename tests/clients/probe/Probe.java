@@ -1,12 +1,18 @@
+import java.nio.charset.StandardCharsets;
+import java.util.ArrayList;
 import java.util.Arrays;
+import java.util.List;
 import java.util.Locale;
 import java.util.function.Supplier;
+import java.util.zip.CRC32;
+import ruedo.Command;
 import ruedo.Device;
 import ruedo.Image;
 import ruedo.LaunchOptions;
 import ruedo.Limits;
 import ruedo.Motion;
 import ruedo.MotionStatus;
+import ruedo.Observations;
 import ruedo.Odometry;
 import ruedo.Pose;
 import ruedo.Robot;
@@ -160,6 +166,35 @@ public final class Probe {
         attempt("steps", () -> sim.step(0));
     }
 
+    private static void lockstep(Simulation sim, String[] a) {
+        Robot robot = sim.robot(a[1]);
+        int steps = Integer.parseInt(a[2]);
+        int chunk = Integer.parseInt(a[3]);
+        CRC32 digest = new CRC32();
+        int messages = 0;
+        int poses = 0;
+        Odometry odometry = null;
+        Observations last = sim.step(0);
+        say("begin", last.step, last.time());
+        for (int step = -1; step < steps; step = step < 0 ? 0 : step + chunk) {
+            if (step >= 0) {
+                List<Command> commands = new ArrayList<>();
+                for (int k = 0; k < chunk; k++) commands.add(robot.velocityCommand(Double.parseDouble(a[4]), 0.1 * k).at(k));
+                last = sim.step(chunk, commands);
+            }
+            for (Observations.Message message : last.messages) {
+                digest.update(message.channel.getBytes(StandardCharsets.UTF_8));
+                digest.update(message.data);
+                messages++;
+            }
+            poses += last.all(robot.pose()).size();
+            if (last.latest(robot.odometry()) != null) odometry = last.latest(robot.odometry());
+        }
+        say("end", last.step, last.stateHash, messages, poses, digest.getValue());
+        say("odometry", odometry.utime, odometry.x);
+        attempt("past", () -> sim.step(1, List.of(robot.velocityCommand(0.1, 0.0).at(1))));
+    }
+
     private static void launched(String[] a) throws InterruptedException {
         LaunchOptions options = new LaunchOptions().seed(3).args(Arrays.copyOfRange(a, 1, a.length));
         Simulation sim = Ruedo.launch(a[0], options);
@@ -170,8 +205,10 @@ public final class Probe {
 
     private static void act(String url, String command, String[] a) throws InterruptedException {
         if (command.equals("launch")) launched(a);
-        try (Simulation sim = Ruedo.connect(url)) {
+        boolean named = command.equals("lockstep");
+        try (Simulation sim = named ? Ruedo.connect(url, a[0], 10.0) : Ruedo.connect(url)) {
             switch (command) {
+                case "lockstep": lockstep(sim, a); break;
                 case "connect": say("connected", sim.world()); break;
                 case "list": listAll(sim); break;
                 case "read": read(sim, a[0]); break;

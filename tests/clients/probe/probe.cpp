@@ -48,6 +48,7 @@ void report(const std::string& what, const std::function<void()>& call) {
   } catch (const rc::TypeMismatch& e) { say(what, "TypeMismatch:", e.what());
   } catch (const rc::NotSupported& e) { say(what, "NotSupported:", e.what());
   } catch (const rc::MotionError& e) { say(what, "MotionError:", e.what());
+  } catch (const rc::LeaseLost& e) { say(what, "LeaseLost:", e.what());
   } catch (const rc::RequestError& e) { say(what, "RequestError:", e.what());
   } catch (const std::invalid_argument& e) { say(what, "ValueError:", e.what());
   }
@@ -162,6 +163,47 @@ void control(const rc::Simulation& sim, const std::string& name) {
   report("steps", [&] { sim.step(0); });
 }
 
+// CRC-32, as zlib's.
+uint32_t crc32(uint32_t crc, const uint8_t* bytes, size_t size) {
+  crc = ~crc;
+  for (size_t i = 0; i < size; ++i) {
+    crc ^= bytes[i];
+    for (int bit = 0; bit < 8; ++bit) crc = crc & 1 ? crc >> 1 ^ 0xEDB88320u : crc >> 1;
+  }
+  return ~crc;
+}
+
+void lockstep(const rc::Simulation& sim, const std::vector<std::string>& a) {
+  const rc::Robot robot = sim.robot(a[1]);
+  const int64_t steps = std::stol(a[2]), chunk = std::stol(a[3]);
+  const auto pose = robot.pose();
+  const auto odometry_device = robot.odometry();
+  uint32_t digest = 0;
+  size_t messages = 0, poses = 0;
+  rc::Odometry odometry;
+  const auto take = [&](const rc::Observations& observations) {
+    for (const auto& message : observations.messages) {
+      digest = crc32(digest, reinterpret_cast<const uint8_t*>(message.channel.data()), message.channel.size());
+      digest = crc32(digest, message.bytes.data(), message.bytes.size());
+      ++messages;
+    }
+    poses += observations.all(pose).size();
+    if (const auto latest = observations.latest(odometry_device)) odometry = *latest;
+  };
+  rc::Observations last = sim.step(0);
+  say("begin", last.step, last.time());
+  take(last);
+  for (int64_t step = 0; step < steps; step += chunk) {
+    std::vector<rc::Command> commands;
+    for (int64_t k = 0; k < chunk; ++k) commands.push_back(robot.velocity_command(std::stod(a[4]), 0.1 * static_cast<double>(k)).at(k));
+    last = sim.step(chunk, commands);
+    take(last);
+  }
+  say("end", last.step, last.state_hash, messages, poses, digest);
+  say("odometry", odometry.utime, odometry.x);
+  report("past", [&] { sim.step(1, {robot.velocity_command(0.1, 0.0).at(1)}); });
+}
+
 [[noreturn]] void launched(const std::vector<std::string>& a) {
   rc::LaunchOptions options;
   options.seed = 3;
@@ -174,7 +216,8 @@ void control(const rc::Simulation& sim, const std::string& name) {
 
 void act(const std::string& url, const std::string& command, const std::vector<std::string>& a) {
   if (command == "launch") launched(a);
-  const rc::Simulation sim = rc::connect(url);
+  const rc::Simulation sim = rc::connect(url, {.name = command == "lockstep" ? a[0] : ""});
+  if (command == "lockstep") lockstep(sim, a);
   if (command == "connect") say("connected", sim.world());
   if (command == "list") list_all(sim);
   if (command == "read") read(sim, a[0]);

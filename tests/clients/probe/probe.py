@@ -4,6 +4,7 @@ twins: same commands, same output."""
 import math
 import sys
 import time
+import zlib
 
 import ruedo
 
@@ -119,6 +120,24 @@ def control(sim, name):
     attempt("steps", lambda: sim.step(0))
 
 
+def lockstep(sim, name, steps, chunk, speed):
+    robot, chunk = sim.robot(name), int(chunk)
+    digest, messages, poses, odometry, seen = 0, 0, 0, None, sim.step(0)
+    say("begin", seen.step, seen.time)
+    for step in range(0, int(steps), chunk):
+        commands = [robot.velocity_command(float(speed), 0.1 * k).at(k) for k in range(chunk)]
+        last = sim.step(chunk, commands)
+        for observations in (seen, last) if step == 0 else (last,):
+            for message in observations.messages:
+                digest = zlib.crc32(message.data, zlib.crc32(message.channel.encode(), digest))
+                messages += 1
+            poses += len(observations.all(robot.pose))
+            odometry = observations.latest(robot.odometry) or odometry
+    say("end", last.step, last.state_hash, messages, poses, digest)
+    say("odometry", odometry.utime, odometry.x)
+    attempt("past", lambda: sim.step(1, [robot.velocity_command(0.1, 0.0).at(1)]))
+
+
 def launched(sim):
     say("url", sim.url)
     say("ready", sim.robots[0].odometry.latest().time >= 0.0)
@@ -131,8 +150,8 @@ def main():
     try:
         if command == "launch":
             launched(ruedo.launch(rest[0], seed=3, args=rest[1:]))
-        with ruedo.connect(url) as sim:
-            actions = {"connect": lambda: say("connected", sim.world), "list": lambda: list_all(sim), "read": lambda: read(sim, *rest),
+        with ruedo.connect(url, name=rest[0] if command == "lockstep" else None) as sim:
+            actions = {"lockstep": lambda: lockstep(sim, *rest[1:]), "connect": lambda: say("connected", sim.world), "list": lambda: list_all(sim), "read": lambda: read(sim, *rest),
                        "velocity": lambda: drive(sim, *rest, False), "wheels": lambda: drive(sim, *rest, True),
                        "primitives": lambda: primitives(sim, *rest), "errors": lambda: errors(sim, *rest),
                        "streams": lambda: streams(sim, *rest), "control": lambda: control(sim, *rest),

@@ -162,20 +162,43 @@ public final class Robot {
      * command is repeated in the background, so that the watchdog does not stop the robot.
      */
     public void setVelocity(double v, double omega) {
-        velocity_command_t command = new velocity_command_t();
-        command.utime = sim.utime();
-        command.vx = finite("v", v);
-        command.omega = finite("omega", omega);
-        driver.hold(input("velocity_command_t"), Bus.encode(command));
+        Command command = velocityCommand(v, omega);
+        driver.hold(command.channel, command.data);
     }
 
     /** The same with the rates of the left and the right wheels, rad/s, positive ahead. */
     public void setWheels(double left, double right) {
+        Command command = wheelCommand(left, right);
+        driver.hold(command.channel, command.data);
+    }
+
+    /** What {@link #setVelocity} sends, once, for {@link Simulation#step(long, List)}. */
+    public Command velocityCommand(double v, double omega) {
+        velocity_command_t command = new velocity_command_t();
+        command.utime = sim.utime();
+        command.vx = finite("v", v);
+        command.omega = finite("omega", omega);
+        return new Command(input("velocity_command_t"), Bus.encode(command));
+    }
+
+    /** What {@link #setWheels} sends, once, for {@link Simulation#step(long, List)}. */
+    public Command wheelCommand(double left, double right) {
         wheel_command_t command = new wheel_command_t();
         command.utime = sim.utime();
         command.n = 2;
         command.rate = new double[] {finite("left", left), finite("right", right)};
-        driver.hold(input("wheel_command_t"), Bus.encode(command));
+        return new Command(input("wheel_command_t"), Bus.encode(command));
+    }
+
+    /**
+     * A motion primitive for {@link Simulation#step(long, List)}. kind: "advance", "rotate", "heading", "arc" or "stop";
+     * value in m or rad, of a stop 0; radius, of an arc, in m.
+     */
+    public Command moveCommand(String kind, double value, Limits limits, double radius) {
+        int index = List.of("advance", "rotate", "heading", "arc", "stop").indexOf(kind);
+        if (index < 0) throw new IllegalArgumentException("kind is '" + kind + "': it must be advance, rotate, heading, arc or stop");
+        byte[] kinds = {move_command_t.ADVANCE, move_command_t.ROTATE, move_command_t.HEADING, move_command_t.ARC, move_command_t.STOP};
+        return new Command(input("move_command_t"), Bus.encode(moveMessage(kinds[index], value, radius, limits)));
     }
 
     /** Comes to rest. Like all primitives it returns at once; await() on what it returns waits for the end. */
@@ -227,6 +250,11 @@ public final class Robot {
     }
 
     private Motion move(String kindName, byte kind, double value, double radius, Limits limits) {
+        move_command_t command = moveMessage(kind, value, radius, limits);
+        return driver.move(input("move_command_t"), command, kindName);
+    }
+
+    private move_command_t moveMessage(byte kind, double value, double radius, Limits limits) {
         move_command_t command = new move_command_t();
         command.utime = sim.utime();
         command.kind = kind;
@@ -235,9 +263,8 @@ public final class Robot {
         command.speed = limits.speed;
         command.acceleration = limits.acceleration;
         command.deceleration = limits.deceleration;
-        String channel = input("move_command_t");
         command.id = sim.nextId();
-        return driver.move(channel, command, kindName);
+        return command;
     }
 
     // Channels, by what info says of them: names on the bus may be remapped.

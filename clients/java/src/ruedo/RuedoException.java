@@ -75,7 +75,7 @@ public class RuedoException extends RuntimeException {
     }
 
     /** The server refused a request. */
-    public static final class RequestError extends RuedoException {
+    public static class RequestError extends RuedoException {
         private static final long serialVersionUID = 1L;
         /** Of reply_t. */
         public final int code;
@@ -83,6 +83,15 @@ public class RuedoException extends RuntimeException {
         RequestError(String text, int code) {
             super(text);
             this.code = code;
+        }
+    }
+
+    /** Lockstep goes on without this client, which was silent for too long; the next step() takes part again. */
+    public static final class LeaseLost extends RequestError {
+        private static final long serialVersionUID = 1L;
+
+        LeaseLost(String text, int code) {
+            super(text, code);
         }
     }
 

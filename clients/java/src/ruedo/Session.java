@@ -58,7 +58,7 @@ final class Session {
             if (in.int64() != reply_t.LCM_FINGERPRINT) return;
             in.int64();    // utime
             in.int64();    // run
-            in.int32();    // epoch
+            received.epoch = in.int32();
             received.session = in.int64();
             received.sequence = in.int64();
             received.kind = in.int32();
@@ -70,10 +70,14 @@ final class Session {
         }
         synchronized (news) {
             boolean ours = received.kind == request_t.JOIN || received.session == session;
-            if (!ours || received.kind != awaitedKind || received.sequence != awaitedSequence) return;
-            reply = received;
-            news.notifyAll();
+            if (!ours) return;
+            if (received.kind == awaitedKind && received.sequence == awaitedSequence) {
+                reply = received;
+                news.notifyAll();
+                return;
+            }
         }
+        if (received.kind == request_t.GRANT || received.kind == request_t.RESEND) sim.stepper().onReply(received);
     }
 
     private void join(long run, double timeout) {
@@ -106,11 +110,24 @@ final class Session {
         }
     }
 
+    /** For grants, which are not answered by replies. Under this object's monitor. */
+    long nextSequence() {
+        return ++sequence;
+    }
+
+    long id() {
+        return session;
+    }
+
     private void publish(int kind, long toSession, long number, byte[] body) {
+        publish(kind, toSession, number, body, -1);
+    }
+
+    void publish(int kind, long toSession, long number, byte[] body, int epoch) {
         request_t request = new request_t();
         request.utime = sim.utime();
         request.run_id = sim.info().head.run_id;
-        request.epoch = -1;
+        request.epoch = epoch;
         request.session = toSession;
         request.sequence = number;
         request.kind = kind;

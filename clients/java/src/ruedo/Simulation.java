@@ -36,6 +36,7 @@ public final class Simulation implements AutoCloseable {
     final Bus bus;
     private final ServerProcess server;    // null: not ours
     private final Session session;
+    private final Stepper stepper;
     private final WorldInfo.Assembler assembler = new WorldInfo.Assembler();
     private final Map<String, Robot> robots = new HashMap<>();
     private final Set<Driver> repeating = ConcurrentHashMap.newKeySet();
@@ -54,6 +55,7 @@ public final class Simulation implements AutoCloseable {
         for (byte b : name.getBytes(java.nio.charset.StandardCharsets.UTF_8)) hash = (hash ^ (b & 255)) * 16777619;
         ids = new AtomicLong((long) (hash & 0x7fffffff) << 20);
         session = new Session(this, name);
+        stepper = new Stepper(this, session);
         bus = new Bus(url);
         bus.subscribe("ruedo/info", this::onInfo);
         bus.subscribe("ruedo/tick", this::onTick);
@@ -130,11 +132,40 @@ public final class Simulation implements AutoCloseable {
         session.request(request_t.RESUME, null, REPLY_SECONDS);
     }
 
-    /** Takes n steps of a paused simulation and returns the state after them. */
-    public State step(long n) {
+    /** {@link #step(long, List)} without commands. */
+    public Observations step(long n) {
+        return step(n, List.of());
+    }
+
+    /** {@link #step(long, List, double)}, at most 60 s. */
+    public Observations step(long n, List<Command> commands) {
+        return step(n, commands, SLOW_REPLY_SECONDS);
+    }
+
+    /**
+     * Takes n steps, at most timeout seconds of real time each time that nothing goes on, and returns what was seen. In
+     * lockstep (`ruedo run --lockstep N`): takes part from the first call on, grants n steps with their commands, and has
+     * every message of every step; the first call's observations begin with those of the state it found. n = 0 takes no
+     * step. Throws LeaseLost. Else: steps a paused simulation; there are no commands, and the messages are in the streams.
+     */
+    public Observations step(long n, List<Command> commands, double timeout) {
+        if (lockstep()) {
+            Observations observations = stepper.step(n, commands, timeout);
+            noteTime(observations.utime);
+            return observations;
+        }
+        if (!commands.isEmpty()) {
+            throw new RuedoException.NotSupported("commands go with steps where the server runs in lockstep: start it with "
+                    + "`ruedo run --lockstep N`");
+        }
         step_request_t body = new step_request_t();
         body.steps = n;
-        return state(session.request(request_t.STEP, body, SLOW_REPLY_SECONDS));
+        return new Observations(state(session.request(request_t.STEP, body, timeout)), List.of());
+    }
+
+    /** Whether the server runs in lockstep. */
+    public boolean lockstep() {
+        return info().supports(request_t.GRANT);
     }
 
     /** Sim time per real time, > 0; {@link Double#POSITIVE_INFINITY}: as fast as it goes. */
@@ -166,6 +197,7 @@ public final class Simulation implements AutoCloseable {
         body.seed = seed;
         session.request(request_t.RESET, body, SLOW_REPLY_SECONDS);
         utime = 0;
+        stepper.forget();
     }
 
     /** Adds one of Ruedo's models ("p3at"), or a file in the server's search folders, on the ground below x, y (m). */
@@ -233,6 +265,22 @@ public final class Simulation implements AutoCloseable {
         session.request(request_t.RESET_ODOMETRY, nameBody(robot), REPLY_SECONDS);
     }
 
+    /** Saves the state under a name, in the folder that the server was started with (--snapshots FOLDER), and returns it. */
+    public State snapshot(String name) {
+        return State.of(session.request(request_t.SNAPSHOT, nameBody(name), SLOW_REPLY_SECONDS));
+    }
+
+    /**
+     * Puts the world back to a snapshot; what follows equals what followed it. The server runs there from the beginning of
+     * the snapshot's run, in silence: this takes as long as that part takes at rate max. A new epoch.
+     */
+    public State restore(String name) {
+        State state = State.of(session.request(request_t.RESTORE, nameBody(name), RESTORE_SECONDS));
+        utime = state.utime;
+        stepper.forget();
+        return state;
+    }
+
     /** Ends the server. */
     public void quit() {
         session.request(request_t.QUIT, null, REPLY_SECONDS);
@@ -275,6 +323,10 @@ public final class Simulation implements AutoCloseable {
 
     long utime() {
         return utime;
+    }
+
+    Stepper stepper() {
+        return stepper;
     }
 
     long nextId() {
@@ -356,6 +408,7 @@ public final class Simulation implements AutoCloseable {
             WireReader in = new WireReader(message);
             if (in.int64() != tick_t.LCM_FINGERPRINT) return;
             noteTime(in.int64());
+            stepper.onTick(message);
         } catch (IOException error) {
             return;
         }

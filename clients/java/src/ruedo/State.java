@@ -1,7 +1,7 @@
 package ruedo;
 
 /** The state of the simulation, and of the model or MODEL/LINK that was asked for (else name is ""). */
-public final class State extends Sample {
+public class State extends Sample {
     /** Number of the state. */
     public final long step;
     /** Of all bodies' and robots' state. */

@@ -17,11 +17,14 @@ import ruedo.lcmtypes.world_info_t;
 final class WorldInfo {
     final world_info_t head;
     final Map<String, robot_info_t> robots = new LinkedHashMap<>();
+    final List<channel_info_t> channelList = new ArrayList<>();    // as ruedo/tick counts them
+    final int tickChannel;                                         // in that list; -1: there is none
     private final Map<String, List<device_info_t>> devices = new HashMap<>();
     private final Map<String, List<channel_info_t>> channels = new HashMap<>();
 
     private WorldInfo(List<world_info_t> parts) {
         head = parts.get(0);
+        int tick = -1;
         for (world_info_t part : parts) {
             for (robot_info_t robot : part.robots) robots.put(robot.name, robot);
             for (device_info_t device : part.devices) {
@@ -29,8 +32,11 @@ final class WorldInfo {
             }
             for (channel_info_t channel : part.channels) {
                 channels.computeIfAbsent(channel.robot, key -> new ArrayList<>()).add(channel);
+                if (channel.type.equals("tick_t")) tick = channelList.size();
+                channelList.add(channel);
             }
         }
+        tickChannel = tick;
     }
 
     List<device_info_t> devices(String robot) {

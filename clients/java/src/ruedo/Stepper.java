@@ -1,0 +1,470 @@
+package ruedo;
+
+import java.io.IOException;
+import java.util.ArrayDeque;
+import java.util.ArrayList;
+import java.util.Iterator;
+import java.util.List;
+import java.util.TreeMap;
+import java.util.zip.CRC32;
+import ruedo.lcmtypes.channel_info_t;
+import ruedo.lcmtypes.grant_command_t;
+import ruedo.lcmtypes.grant_request_t;
+import ruedo.lcmtypes.reply_t;
+import ruedo.lcmtypes.request_t;
+import ruedo.lcmtypes.resend_request_t;
+import ruedo.lcmtypes.resend_wanted_t;
+import ruedo.lcmtypes.tick_t;
+
+/**
+ * The client's side of lockstep: grants, and the messages of every step, whatever is lost on the way. The receiving thread
+ * puts ticks and messages together; the caller of step() grants, waits, and asks again.
+ */
+final class Stepper {
+    private static final long FIRST_REPEAT_MILLIS = 5;
+    private static final long LAST_REPEAT_MILLIS = 100;
+    private static final long ACKNOWLEDGED_TOGETHER = 32;    // steps
+    private static final int MOST_WANTED = 256;              // messages asked for at once
+    private static final int MOST_EARLY = 512;               // messages of one channel that wait for their ticks
+    private static final long MOST_AHEAD = 1024;             // steps beyond what is here: no server is that far
+
+    /** Of a manifest. */
+    private static final class Entry {
+        int channel;
+        long sequence;
+        int size;
+        int crc;
+        byte[] data = {};    // as much as is here
+        boolean here;
+    }
+
+    private static final class Step {
+        long utime;
+        long stateHash;
+        int missing;
+        int partsHere;
+        List<List<Entry>> parts = new ArrayList<>();    // null where one is missing
+
+        boolean complete() {
+            return missing == 0 && partsHere == parts.size();
+        }
+    }
+
+    /** A message whose tick has not come yet. */
+    private static final class Early {
+        final long utime;
+        final int crc;
+        final byte[] data;
+
+        Early(long utime, int crc, byte[] data) {
+            this.utime = utime;
+            this.crc = crc;
+            this.data = data;
+        }
+    }
+
+    private final Simulation sim;
+    private final Session session;
+    // All under this object's monitor.
+    private boolean part;                       // takes part
+    private WorldInfo info;                     // whose channels are subscribed
+    private long runId;
+    private int epoch;
+    private long granted;
+    private long have = -1;                     // all of the states up to that one are here
+    private long acknowledged = -1;
+    private long newest = -1;
+    private long wantedUntil = -1;
+    private long[] last = {0, -1, 0};           // utime, step and hash of what was collected
+    private long grantSequence;                 // the grant under way
+    private long grantFrom = -1;
+    private byte[] grantBody = {};
+    private boolean taken = true;
+    private long resends;
+    private final TreeMap<Long, Step> steps = new TreeMap<>();    // those not collected yet
+    private final List<ArrayDeque<Early>> early = new ArrayList<>();    // of each channel
+    private String waitsFor = "";
+    private RuedoException fault;
+    private boolean askNow;                     // without waiting for a silence
+
+    Stepper(Simulation sim, Session session) {
+        this.sim = sim;
+        this.session = session;
+    }
+
+    Observations step(long n, List<Command> commands, double timeout) {
+        if (n < 0) throw new IllegalArgumentException("n is " + n + ": it must be at least 0");
+        for (Command command : commands) {
+            if (command.after >= 0 && command.after < n) continue;
+            throw new IllegalArgumentException("a command is for " + command.after + " steps on; of " + n + " steps 0 to " + (n - 1)
+                    + " is allowed");
+        }
+        synchronized (session) {    // its turn: other requests wait
+            if (!takesPart()) takePart(timeout);
+            synchronized (this) {
+                await(have, timeout);    // for nothing, unless the call before gave up
+                long until = n > Long.MAX_VALUE - granted ? Long.MAX_VALUE : granted + n;
+                if (n > 0) {
+                    grantBody = body(until, commands);
+                    grantSequence = session.nextSequence();
+                    grantFrom = granted;
+                    granted = until;
+                    taken = false;
+                    grantAgain();
+                }
+                await(until, timeout);
+                return collect();
+            }
+        }
+    }
+
+    /** The client has reset the world: the next step takes part anew. */
+    synchronized void forget() {
+        part = false;
+    }
+
+    private synchronized boolean takesPart() {
+        if (!part || sim.info().head.run_id == runId) return part;
+        part = false;
+        throw new RuedoException.NoServer("the run that this client took part in has ended; another is at " + sim.url + " now");
+    }
+
+    private void takePart(double timeout) {
+        subscribe();
+        grant_request_t body = new grant_request_t();
+        body.granted = -1;
+        body.received = -1;
+        body.commands = new grant_command_t[0];
+        reply_t reply = session.request(request_t.GRANT, body, timeout);
+        synchronized (this) {
+            try {
+                WireReader in = new WireReader(reply.body);
+                in.int64();    // fingerprint
+                granted = in.int64();
+                have = in.int64();
+                newest = in.int64();
+            } catch (IOException error) {
+                throw new RuedoException.TypeMismatch("the reply to GRANT is no grant_reply_t of this client's version");
+            }
+            runId = sim.info().head.run_id;
+            epoch = reply.epoch;
+            acknowledged = have;
+            steps.clear();
+            taken = true;
+            fault = null;
+            waitsFor = "";
+            part = true;
+        }
+    }
+
+    /** To all that the simulation publishes: a manifest names any of it. */
+    private void subscribe() {
+        WorldInfo found = sim.info();
+        if (info == found) return;
+        for (int i = 0; i < found.channelList.size(); i++) {
+            channel_info_t channel = found.channelList.get(i);
+            synchronized (this) {
+                if (early.size() == i) early.add(new ArrayDeque<>());
+            }
+            boolean known = info != null && i < info.channelList.size() && info.channelList.get(i).name.equals(channel.name);
+            if (known || channel.input || (channel.robot.isEmpty() && !channel.type.equals("world_state_t"))) continue;
+            int index = i;
+            sim.bus.subscribe(channel.name, message -> onMessage(index, message));
+        }
+        info = found;
+    }
+
+    private byte[] body(long until, List<Command> commands) {
+        grant_request_t body = new grant_request_t();
+        body.granted = granted;
+        body.step_until = until;
+        body.received = have;
+        body.ncommands = commands.size();
+        body.commands = new grant_command_t[commands.size()];
+        for (int i = 0; i < body.ncommands; i++) {
+            Command command = commands.get(i);
+            grant_command_t sent = new grant_command_t();
+            sent.step = granted + command.after;
+            sent.channel = command.channel;
+            sent.size = command.data.length;
+            sent.data = command.data;
+            body.commands[i] = sent;
+        }
+        return Bus.encode(body);
+    }
+
+    /**
+     * Until the states up to `until` are here with all their messages. After a silence the grant, or the request for what
+     * is missing, goes out again, sooner at first.
+     */
+    private void await(long until, double timeout) {
+        long repeat = FIRST_REPEAT_MILLIS;
+        Deadline deadline = new Deadline(timeout);
+        wantedUntil = until;
+        while (have < until || !taken) {
+            long had = have;
+            long quietAt = System.nanoTime() + repeat * 1_000_000;
+            Deadline never = new Deadline(Double.POSITIVE_INFINITY);
+            long left = repeat;
+            while (left > 0 && !(have >= until && taken) && fault == null && !askNow && have - acknowledged < ACKNOWLEDGED_TOGETHER) {
+                never.waitOn(this, left);
+                left = (quietAt - System.nanoTime() + 999_999) / 1_000_000;
+            }
+            if (fault != null) {
+                RuedoException thrown = fault;
+                fault = null;
+                part = false;
+                throw thrown;
+            }
+            if (have >= until && taken) return;
+            boolean silence = left <= 0 && have == had;
+            if (!taken) {
+                if (silence) grantAgain();
+            } else if (silence || askNow) {
+                askForLost(until);
+            } else if (have - acknowledged >= ACKNOWLEDGED_TOGETHER) {
+                askForLost(have);    // for nothing: it says what is here
+            }
+            askNow = false;
+            repeat = silence ? Math.min(2 * repeat, LAST_REPEAT_MILLIS) : FIRST_REPEAT_MILLIS;
+            if (have > had) {
+                deadline = new Deadline(timeout);
+            } else if (silence) {
+                sim.checkServer();
+                if (!deadline.passed()) continue;
+                throw new RuedoException.Timeout("step " + (have + 1) + " did not come within " + Deadline.text(timeout) + " s"
+                        + (waitsFor.isEmpty() ? "" : ": the run waits for " + waitsFor));
+            }
+        }
+    }
+
+    private void grantAgain() {
+        session.publish(request_t.GRANT, session.id(), grantSequence, grantBody, epoch);
+    }
+
+    private void askForLost(long until) {
+        acknowledged = have;
+        List<resend_wanted_t> wanted = new ArrayList<>();
+        long to = Math.min(until, Math.max(newest, have + 1));
+        for (long number = have + 1; number <= to && wanted.size() < MOST_WANTED; number++) {
+            Step step = steps.get(number);
+            if (step == null) {
+                wanted.add(wanted(number, info.tickChannel, 0, 0));
+                continue;
+            }
+            for (int i = 0; i < step.parts.size(); i++) {
+                if (step.parts.get(i) == null) {
+                    wanted.add(wanted(number, info.tickChannel, i, 0));
+                    continue;
+                }
+                for (Entry entry : step.parts.get(i)) {
+                    if (!entry.here) wanted.add(wanted(number, entry.channel, entry.sequence, entry.data.length));
+                }
+            }
+        }
+        resend_request_t body = new resend_request_t();
+        body.received = have;
+        body.nwanted = wanted.size();
+        body.wanted = wanted.toArray(new resend_wanted_t[0]);
+        session.publish(request_t.RESEND, session.id(), ++resends, Bus.encode(body), epoch);
+    }
+
+    private static resend_wanted_t wanted(long step, int channel, long sequence, int offset) {
+        resend_wanted_t wanted = new resend_wanted_t();
+        wanted.step = step;
+        wanted.channel_index = channel;
+        wanted.sequence = sequence;
+        wanted.offset = offset;
+        return wanted;
+    }
+
+    private Observations collect() {
+        List<Observations.Message> messages = new ArrayList<>();
+        for (Iterator<java.util.Map.Entry<Long, Step>> all = steps.headMap(have, true).entrySet().iterator(); all.hasNext(); all.remove()) {
+            java.util.Map.Entry<Long, Step> next = all.next();
+            Step step = next.getValue();
+            last = new long[] {step.utime, next.getKey(), step.stateHash};
+            for (List<Entry> entries : step.parts) {
+                for (Entry entry : entries) {
+                    messages.add(new Observations.Message(next.getKey(), info.channelList.get(entry.channel).name, entry.data));
+                }
+            }
+        }
+        return new Observations(last[0], last[1], last[2], messages);
+    }
+
+    // Putting ticks and messages together, as they come: in any order, twice, or not at all.
+
+    private static int crc(byte[] data) {
+        CRC32 crc = new CRC32();
+        crc.update(data);
+        return (int) crc.getValue();
+    }
+
+    private synchronized void onMessage(int channel, byte[] data) {
+        if (!part || data.length < 16) return;
+        int crc = crc(data);
+        for (Step step : steps.values()) {    // a tick may come before its messages
+            if (step.missing == 0) continue;
+            for (List<Entry> entries : step.parts) {
+                if (entries == null) continue;
+                for (Entry entry : entries) {
+                    if (entry.here || entry.channel != channel || entry.crc != crc || entry.size != data.length) continue;
+                    entry.data = data;
+                    entry.here = true;
+                    step.missing--;
+                    progress();
+                    return;
+                }
+            }
+        }
+        ArrayDeque<Early> queue = early.get(channel);
+        if (queue.size() == MOST_EARLY) queue.removeFirst();
+        queue.addLast(new Early(java.nio.ByteBuffer.wrap(data).getLong(8), crc, data));
+    }
+
+    synchronized void onTick(byte[] message) {
+        try {
+            if (part) takeTick(message);
+        } catch (IOException error) {
+            // broken: it is asked for
+        }
+    }
+
+    private void takeTick(byte[] message) throws IOException {
+        WireReader in = new WireReader(message);
+        if (in.int64() != tick_t.LCM_FINGERPRINT) return;
+        long utime = in.int64();
+        long run = in.int64();
+        int tickEpoch = in.int32();
+        long number = in.int64();
+        long hash = in.int64();
+        int index = in.int16();
+        int nparts = in.int16();
+        if (run != runId || index < 0 || index >= nparts) return;
+        if (tickEpoch != epoch) {
+            if (tickEpoch > epoch && fault == null) {
+                fault = new RuedoException("the world was reset by another client: the next step begins anew");
+            }
+            notifyAll();
+            return;
+        }
+        if (number > grantFrom) taken = true;    // it could not be here otherwise
+        newest = Math.max(newest, number);
+        if (number <= have || number - have > MOST_AHEAD) return;
+        for (int n = in.count(13); n > 0; n--) {    // applied
+            in.string();
+            in.int64();
+        }
+        Step step = steps.computeIfAbsent(number, key -> new Step());
+        while (step.parts.size() < nparts) step.parts.add(null);
+        step.utime = utime;
+        step.stateHash = hash;
+        if (step.parts.get(index) != null) return;
+        List<Entry> entries = new ArrayList<>();
+        for (int n = in.count(20); n > 0; n--) {
+            Entry entry = new Entry();
+            entry.channel = in.int32();
+            entry.sequence = in.int64();
+            entry.size = in.int32();
+            entry.crc = in.int32();
+            if (entry.channel < 0 || entry.channel >= early.size()) continue;    // of a model that came since
+            for (Iterator<Early> all = early.get(entry.channel).iterator(); all.hasNext() && !entry.here;) {
+                Early one = all.next();
+                if (one.crc != entry.crc || one.data.length != entry.size) continue;
+                entry.data = one.data;
+                entry.here = true;
+                all.remove();
+            }
+            if (!entry.here) step.missing++;
+            entries.add(entry);
+        }
+        step.parts.set(index, entries);
+        step.partsHere++;
+        progress();
+    }
+
+    private void progress() {
+        for (Step step = steps.get(have + 1); step != null && step.complete(); step = steps.get(have + 1)) {
+            have++;
+            for (List<Entry> entries : step.parts) {
+                for (Entry entry : entries) {    // what is left of the time before came twice
+                    ArrayDeque<Early> queue = early.get(entry.channel);
+                    while (!queue.isEmpty() && queue.peekFirst().utime <= step.utime) queue.removeFirst();
+                }
+            }
+        }
+        if (have >= wantedUntil || have - acknowledged >= ACKNOWLEDGED_TOGETHER) notifyAll();
+    }
+
+    /** To GRANT or RESEND. */
+    synchronized void onReply(reply_t reply) {
+        if (!part) return;
+        boolean granting = reply.kind == request_t.GRANT;
+        if (reply.code != reply_t.OK) {
+            if (reply.sequence != (granting ? grantSequence : resends) || (granting && taken)) return;
+            if (fault == null) fault = faultOf(reply);
+        } else if (!granting) {
+            try {
+                takePieces(new WireReader(reply.body));
+            } catch (IOException error) {
+                return;    // broken: it is asked for again
+            }
+        } else if (reply.sequence == grantSequence && !taken) {
+            taken = true;    // it was repeated: its ticks may be lost
+            askNow = true;
+        }
+        notifyAll();
+    }
+
+    private void takePieces(WireReader in) throws IOException {
+        in.int64();    // fingerprint
+        newest = Math.max(newest, in.int64());
+        waitsFor = in.string();
+        int count = in.count(32);
+        List<byte[]> ticks = new ArrayList<>();
+        for (int n = count; n > 0; n--) {
+            Step step = steps.get(in.int64());
+            int channel = in.int32();
+            long sequence = in.int64();
+            in.int32();    // total
+            int offset = in.int32();
+            byte[] piece = in.bytes(in.count(1));
+            if (channel == info.tickChannel) {
+                ticks.add(piece);
+            } else if (step != null) {
+                addPiece(step, channel, sequence, offset, piece);
+            }
+        }
+        for (byte[] tick : ticks) takeTick(tick);
+        progress();
+        askNow = count > 0;    // more may be missing than goes into one reply
+    }
+
+    private static void addPiece(Step step, int channel, long sequence, int offset, byte[] piece) {
+        for (List<Entry> entries : step.parts) {
+            if (entries == null) continue;
+            for (Entry entry : entries) {
+                if (entry.here || entry.channel != channel || entry.sequence != sequence || entry.data.length != offset) continue;
+                if (piece.length > entry.size - offset) continue;
+                byte[] longer = java.util.Arrays.copyOf(entry.data, offset + piece.length);
+                System.arraycopy(piece, 0, longer, offset, piece.length);
+                entry.data = longer;
+                if (longer.length < entry.size) continue;
+                if (crc(longer) == entry.crc) {
+                    entry.here = true;
+                    step.missing--;
+                } else {
+                    entry.data = new byte[0];    // from the start again
+                }
+            }
+        }
+    }
+
+    private static RuedoException faultOf(reply_t reply) {
+        String text = (reply.kind == request_t.GRANT ? "GRANT: " : "RESEND: ") + reply.text;
+        if (reply.code == reply_t.UNKNOWN_SESSION) return new RuedoException.LeaseLost(text, reply.code);
+        if (reply.code == reply_t.WRONG_RUN || reply.code == reply_t.REFUSED) return new RuedoException.NoServer(text);
+        return new RuedoException.RequestError(text, reply.code);
+    }
+}

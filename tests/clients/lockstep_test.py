@@ -1,0 +1,128 @@
+"""Lockstep over the wire, each client behind a network that loses, doubles and reorders; and its errors."""
+
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from urllib.parse import urlsplit
+
+import pytest
+from conftest import HERE, PROBES, SOURCE, free_url, probe, ruedo_run
+from docs_code import blocks
+
+HALL = str(HERE / "hall.sdf")
+STEPS = 300    # of 5 ms
+
+
+@contextmanager
+def bad_network(server_url, clients, loss):
+    """URLs, one for each client, from which the server is reached with losses."""
+    urls = [free_url() for _ in range(clients)]
+    ports = ",".join(str(urlsplit(url).port) for url in urls)
+    relay = subprocess.Popen([sys.executable, str(HERE / "lossy_relay.py"), str(urlsplit(server_url).port), ports, str(loss), "0.1", "0.1", "4"],
+                             stdout=subprocess.PIPE, text=True)
+    try:
+        assert relay.stdout.readline() == "ready\n"
+        yield urls
+    finally:
+        relay.kill()
+        relay.wait()
+
+
+def run(languages, loss):
+    """What each client saw at its end: step, hash, messages, poses, digest. Both drive the same robot."""
+    with ruedo_run("--lockstep", str(len(languages)), "--lease", "60", "--disable", "p3at/camera", world=HALL) as server:
+        with bad_network(server.url, len(languages), loss) as urls, ThreadPoolExecutor() as pool:
+            said = list(pool.map(lambda i: probe(languages[i], urls[i], "lockstep", f"client{i}", "p3at", str(STEPS), str(1 + 5 * i), str(0.2 + 0.1 * i)),
+                                 range(len(languages))))
+    for one in said:
+        assert one.words("begin") == ["0", "0.000000"]
+        assert one.words("odometry")[0] == "1500000"
+    return [one.words("end") for one in said]
+
+
+def test_the_same_whatever_is_lost():
+    languages = sorted(PROBES)
+    good = run(languages, 0.0)
+    step, state_hash, messages, poses, digest = good[0]
+    assert (step, poses) == (str(STEPS), "76")    # 50 Hz, from 0 to 1.5 s
+    assert all(end == good[0] for end in good)
+    for loss in (0.1, 0.3):
+        assert run(languages, loss) == good, loss
+
+
+def test_commands_beside_the_steps_are_refused(language):
+    with ruedo_run("--lockstep", "1", "--disable", "p3at/camera", world=HALL) as server:
+        said = probe(language, server.url, "lockstep", "one", "p3at", "4", "2", "0.3")
+    assert said.words("end")[0] == "4"
+    assert said.one("past").startswith("ValueError: a command is for 1 steps on; of 1 steps 0 to 0 is allowed")
+
+
+def test_without_lockstep_there_are_no_commands():
+    import ruedo
+
+    with ruedo_run("--paused", world=HALL) as server, ruedo.connect(server.url) as sim:
+        assert not sim.lockstep
+        with pytest.raises(ruedo.NotSupported, match="--lockstep N"):
+            sim.step(1, [sim.robot("p3at").velocity_command(0.1, 0.0)])
+        seen = sim.step(3)
+        assert (seen.step, seen.messages) == (3, [])
+
+
+def test_waiting_says_for_whom():
+    import ruedo
+
+    with ruedo_run("--lockstep", "2", world=HALL) as server, ruedo.connect(server.url, name="first") as sim:
+        with pytest.raises(ruedo.Timeout, match="the run waits for 1 more of 2 clients"):
+            sim.step(1, timeout=0.5)
+        with ruedo.connect(server.url, name="second") as other:
+            with pytest.raises(ruedo.Timeout, match="the run waits for 'first'"):
+                other.step(5, timeout=0.5)
+            assert sim.step(2).step == 3    # goes on after the timeout: the step granted then, and two more
+            assert sim.step(0).step == 3
+
+
+def test_a_lost_lease():
+    """By policy drop; the client takes part anew. And by policy fail, with the exit code."""
+    import ruedo
+
+    with ruedo_run("--lockstep", "1", "--lease", "0.3", "--lease-policy", "drop", world=HALL) as server, ruedo.connect(server.url) as sim:
+        sim.step(5)
+        time.sleep(1.0)
+        with pytest.raises(ruedo.LeaseLost):
+            sim.step(1)
+        assert sim.step(2).step == 7
+    server = ruedo_run("--lockstep", "1", "--lease", "0.3", "--lease-policy", "fail", world=HALL)
+    with ruedo.connect(server.url) as sim:
+        sim.step(5)
+        assert server.process.wait(20) == 1
+    assert "nothing was heard from" in server.end()
+
+
+def test_the_run_ends_when_all_have_everything():
+    import ruedo
+
+    with ruedo_run("--lockstep", "1", "--duration", "0.1", world=HALL) as server, ruedo.connect(server.url) as sim:
+        assert sim.step(15).step == 15
+        with pytest.raises(ruedo.NoServer, match="ended at step 20"):
+            sim.step(10, timeout=20.0)
+        assert server.process.wait(20) == 0
+
+
+def test_a_reset_begins_anew():
+    import ruedo
+
+    with ruedo_run("--lockstep", "1", world=HALL) as server, ruedo.connect(server.url) as sim:
+        robot = sim.robot("p3at")
+        first = [sim.step(1, [robot.velocity_command(0.3, 0.2)]).state_hash for _ in range(30)]
+        sim.reset()
+        again = [sim.step(1, [robot.velocity_command(0.3, 0.2)]).state_hash for _ in range(30)]
+        assert again == first and len(set(first)) == 30
+
+
+def test_the_program_of_the_docs():
+    source = blocks("clients.md")["lockstep_python"]
+    said = [subprocess.run([sys.executable, "-c", source], cwd=SOURCE, capture_output=True, text=True, timeout=120) for _ in range(2)]
+    assert said[0].stdout.startswith("400 "), said[0].stderr    # 2 s of 5 ms
+    assert said[0].stdout == said[1].stdout
