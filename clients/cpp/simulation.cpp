@@ -19,7 +19,7 @@
 namespace ruedo::client {
 namespace {
 
-constexpr double kReplyTime = 5.0, kSlowReplyTime = 60.0;    // s
+constexpr double kReplyTime = 5.0, kSlowReplyTime = 60.0, kRestoreTime = 3600.0;    // s
 
 Quaternion about_z(double heading) { return {std::cos(heading / 2.0), 0.0, 0.0, std::sin(heading / 2.0)}; }
 
@@ -182,6 +182,17 @@ State Simulation::state(const std::string& name) const {
 
 void Simulation::reset_odometry(const std::string& robot) const {
   core_->session().request(request_t::RESET_ODOMETRY, name_body(robot), kReplyTime);
+}
+
+State Simulation::snapshot(const std::string& name) const {
+  return state_of(core_->session().request(request_t::SNAPSHOT, name_body(name), kSlowReplyTime));
+}
+
+State Simulation::restore(const std::string& name) const {
+  const State state = state_of(core_->session().request(request_t::RESTORE, name_body(name), kRestoreTime));
+  core_->reset_time();
+  core_->stepper().forget();
+  return state;
 }
 
 void Simulation::quit() const { core_->session().request(request_t::QUIT, {}, kReplyTime); }

@@ -251,6 +251,11 @@ class Simulation {
   void set_twist(const std::string& name, const Vector3& linear, const Vector3& angular = {}) const;
   State state(const std::string& name = "") const;
   void reset_odometry(const std::string& robot) const;
+  // Saves the state under a name, in the folder that the server was started with (--snapshots FOLDER), and returns it.
+  State snapshot(const std::string& name) const;
+  // Puts the world back to a snapshot; what follows equals what followed it. The server runs there from the beginning of
+  // the snapshot's run, in silence: this takes as long as that part takes at rate max. A new epoch.
+  State restore(const std::string& name) const;
   void quit() const;                // ends the server
 
   void close();                     // ends repeated commands, and a server that launch() started

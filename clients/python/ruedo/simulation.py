@@ -206,6 +206,19 @@ class Simulation:
         """Sets a robot's odometry to zero where it stands."""
         self._session.request(lcmtypes.request_t.RESET_ODOMETRY, _name_body(robot))
 
+    def snapshot(self, name: str) -> State:
+        """Saves the state under a name, in the folder that the server was started with (`--snapshots FOLDER`), and
+        returns it. A snapshot is what acted on the world so far."""
+        return control.state_of(self._session.request(lcmtypes.request_t.SNAPSHOT, _name_body(name), 60.0))
+
+    def restore(self, name: str) -> State:
+        """Puts the world back to a snapshot; what follows equals what followed it. The server runs there from the
+        beginning of the snapshot's run, in silence: this takes as long as that part takes at rate max. A new epoch."""
+        state = control.state_of(self._session.request(lcmtypes.request_t.RESTORE, _name_body(name), 3600.0))
+        self._utime = state.utime
+        self._stepper.forget()
+        return state
+
     def quit(self) -> None:
         """Ends the server."""
         self._session.request(lcmtypes.request_t.QUIT)
