@@ -30,6 +30,7 @@ public final class Simulation implements AutoCloseable {
     private static final double SILENCE_SECONDS = 30.0;    // without any message: the server is gone
     private static final double REPLY_SECONDS = 5.0;
     private static final double SLOW_REPLY_SECONDS = 60.0;
+    private static final double RESTORE_SECONDS = 3600.0;
 
     /** Where it is. */
     public final String url;
@@ -267,7 +268,7 @@ public final class Simulation implements AutoCloseable {
 
     /** Saves the state under a name, in the folder that the server was started with (--snapshots FOLDER), and returns it. */
     public State snapshot(String name) {
-        return State.of(session.request(request_t.SNAPSHOT, nameBody(name), SLOW_REPLY_SECONDS));
+        return state(session.request(request_t.SNAPSHOT, nameBody(name), SLOW_REPLY_SECONDS));
     }
 
     /**
@@ -275,7 +276,7 @@ public final class Simulation implements AutoCloseable {
      * the snapshot's run, in silence: this takes as long as that part takes at rate max. A new epoch.
      */
     public State restore(String name) {
-        State state = State.of(session.request(request_t.RESTORE, nameBody(name), RESTORE_SECONDS));
+        State state = state(session.request(request_t.RESTORE, nameBody(name), RESTORE_SECONDS));
         utime = state.utime;
         stepper.forget();
         return state;
