@@ -22,6 +22,7 @@ LIBRARIES = {
     ("tinyxml2", "urdf_", "urdf/", "assimp/", "sdf/"): {"model"},
     ("lcm/lcm.h", "lcm/lcm-cpp", "lcm/eventlog"): {"bus"},
     ("CLI/",): {"cli"},
+    ("libwebsockets",): {"console"},
     ("tbb/", "oneapi/tbb"): {"scene", "sensors", "server"},
 }
 
@@ -34,7 +35,7 @@ def layers(root):
     """{layer: the layers it may include, itself among them}, from CMakeLists.txt; the command line may include all."""
     text = (root / "CMakeLists.txt").read_text(encoding="utf-8")
     found = {}
-    for name, links in re.findall(r"^ruedo_layer\((\w+)([^)]*)\)", text, re.MULTILINE):
+    for name, links in re.findall(r"^\s*ruedo_layer\((\w+)([^)]*)\)", text, re.MULTILINE):
         below = set(re.findall(r"\bruedo_(\w+)", links)) & set(found)
         found[name] = {name}.union(*(found[b] for b in below))
     found["cli"] = {"cli", *found}
@@ -112,7 +113,7 @@ def test_tree_keeps(rule):
 
 def test_layers_are_those_of_the_design():
     known = layers(ROOT)
-    assert set(known) == {"core", "model", "scene", "physics", "robot", "sensors", "server", "bus", "cli"}
+    assert set(known) == {"core", "model", "scene", "physics", "robot", "sensors", "server", "bus", "console", "cli"}
     for outsider in ("physics", "server", "bus", "robot"):
         assert outsider not in known["sensors"]
     assert "server" not in known["bus"] and "scene" not in known["physics"] and known["core"] == {"core"}

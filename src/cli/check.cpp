@@ -2,7 +2,7 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
-#include "cli/json.h"
+#include "core/json.h"
 #include "model/body_layout.h"
 #include "ruedo/errors.h"
 #include "server/fleet.h"

@@ -2,7 +2,7 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
-#include "cli/json.h"
+#include "core/json.h"
 #include "cli/listing.h"
 #include "ruedo/errors.h"
 #include "server/fleet.h"

@@ -14,6 +14,7 @@
 #include "bus/lcm_bus.h"
 #include "cli/commands.h"
 #include "cli/listing.h"
+#include "cli/view.h"
 #include "ruedo/errors.h"
 #include "server/server.h"
 #include "server/thread_limit.h"
@@ -26,6 +27,8 @@ struct RunArguments {
   uint64_t seed = 1;
   std::string rate = "1", duration, lcm, record, control = "on";
   std::vector<std::string> remaps;
+  std::string view;
+  bool viewed = false;
   bool paused = false, quiet = false, watch_stdin = false;
   int threads = 0;
 };
@@ -131,7 +134,8 @@ int run(const RunArguments& arguments) {
   const server::ThreadLimit limit(arguments.threads);
   const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
   bus::LcmBus bus(arguments.lcm);
-  server::Server server(world, std::move(options), bus);
+  ViewedBus viewed(bus, arguments.viewed, arguments.view);
+  server::Server server(world, std::move(options), viewed.bus());
   std::vector<Finding> findings = world->findings;
   findings.insert(findings.end(), server.findings().list().begin(), server.findings().list().end());
   print_findings(findings);
@@ -142,6 +146,7 @@ int run(const RunArguments& arguments) {
     print_channels(stdout, server.info());
     std::fflush(stdout);
   }
+  const std::shared_ptr<void> view = viewed.open(server, world->name);
   StatusLine status;
   server.on_status([&](const server::Status& now) { status.draw(now); });
   signals.serve(&server);
@@ -164,12 +169,17 @@ void add_run(CLI::App& app, Action& chosen) {
   command->add_option("--lcm", arguments->lcm, "LCM address (default: $LCM_DEFAULT_URL, or LCM's group with ttl 0)")->type_name("URL");
   command->add_option("--record", arguments->record, "write a standard LCM log")->type_name("FILE");
   command->add_option("--remap", arguments->remaps, "give a channel another name: CHANNEL=NAME")->type_name("REMAP")->allow_extra_args(false);
+  CLI::Option* view = command->add_option("--view", arguments->view, "serve the web console (default: 127.0.0.1:8080)");
+  view->type_name("[ADDRESS:PORT]")->expected(0, 1);
   command->add_flag("--paused", arguments->paused, "start paused, at step 0");
   command->add_option("--threads", arguments->threads, "most threads inside a module (default: one a core)")->type_name("N")->check(CLI::Range(1, 1024));
   command->add_option("--control", arguments->control, "serve requests: on or off")->capture_default_str()->check(CLI::IsMember({"on", "off"}));
   command->add_flag("--watch-stdin", arguments->watch_stdin, "end when standard input does: for programs that start a server");
   command->add_flag("--quiet", arguments->quiet, "do not list the channels");
-  command->callback([arguments, &chosen] { chosen = [arguments] { return run(*arguments); }; });
+  command->callback([arguments, view, &chosen] {
+    arguments->viewed = view->count() > 0;
+    chosen = [arguments] { return run(*arguments); };
+  });
 }
 
 const RegisterCommand kRegister{10, add_run};

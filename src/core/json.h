@@ -1,4 +1,4 @@
-// Writes JSON text: what the commands print with --json.
+// Writes JSON text: what the commands print with --json, and what the console serves.
 #pragma once
 
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-namespace ruedo::cli {
+namespace ruedo {
 
 // Values and names in the order of the calls; commas and quotes are seen to here.
 class JsonWriter {
@@ -69,4 +69,4 @@ class JsonWriter {
   bool first_ = true;
 };
 
-}  // namespace ruedo::cli
+}  // namespace ruedo

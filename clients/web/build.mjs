@@ -1,0 +1,28 @@
+// Bundles the page and writes it as one C++ file of compressed bytes, which the program serves.
+// Usage: node build.mjs OUTPUT.cpp, in a folder with src, generated and node_modules.
+import { readFileSync, writeFileSync } from "node:fs";
+import { gzipSync } from "node:zlib";
+import { build } from "esbuild";
+
+const [output] = process.argv.slice(2);
+const bundle = await build({
+  entryPoints: { main: "src/main.ts" },
+  outdir: "out", write: false, bundle: true, minify: true, format: "esm", target: "es2022",
+  legalComments: "eof", preserveSymlinks: true, logLevel: "warning",
+});
+const kTypes = { js: "text/javascript; charset=utf-8", css: "text/css; charset=utf-8", html: "text/html; charset=utf-8", svg: "image/svg+xml" };
+const files = [["/", "src/index.html"], ["/icon.svg", "src/icon.svg"]].map(([path, name]) => ({ path, name, bytes: readFileSync(name) }));
+for (const file of bundle.outputFiles) {
+  const name = file.path.replace(/^.*[/\\]/, "");
+  files.push({ path: `/${name}`, name, bytes: Buffer.from(file.contents) });
+}
+let code = "// The web page, made by clients/web/build.mjs.\n#include \"console/assets.h\"\n\nnamespace ruedo::console {\nnamespace {\n";
+const entries = files.map(({ path, name, bytes }, index) => {
+  const packed = gzipSync(bytes, { level: 9 });
+  const rows = [];
+  for (let at = 0; at < packed.length; at += 32) rows.push([...packed.subarray(at, at + 32)].join(","));
+  code += `const uint8_t kFile${index}[] = {\n${rows.join(",\n")}};\n`;
+  return `    {"${path}", "${kTypes[name.replace(/^.*\./, "")]}", kFile${index}, sizeof kFile${index}},\n`;
+});
+code += `}  // namespace\n\nconst Asset kAssets[] = {\n${entries.join("")}};\nconst size_t kAssetCount = ${entries.length};\n\n}  // namespace ruedo::console\n`;
+writeFileSync(output, code);

@@ -1,0 +1,174 @@
+// Turns the description into instanced meshes: all links of a kind are one mesh for each of its surfaces, so that a
+// thousand robots are a few draw calls.
+import * as THREE from "three";
+import { Flag, type LinkData, type Part, type SceneFiles } from "./description";
+
+const kManyLinks = 150;    // of a kind: round shapes get fewer segments then
+
+// Links of one kind that move, and the meshes that show them.
+export interface Movers { links: LinkData[]; indices: number[]; meshes: THREE.InstancedMesh[] }
+export interface Built {
+  still: THREE.Group;
+  moving: THREE.Group;
+  movers: Movers[];
+  grounds: THREE.Mesh[];
+}
+
+interface Surface { geometry: THREE.BufferGeometry; material: THREE.Material; shadow: boolean; ground: boolean }
+
+const sRGB = (rgb: number[]) => new THREE.Color().setRGB(rgb[0]!, rgb[1]!, rgb[2]!, THREE.SRGBColorSpace);
+
+function gridTexture(): THREE.Texture {
+  const size = 256;
+  const canvas = document.createElement("canvas");
+  canvas.width = canvas.height = size;
+  const pen = canvas.getContext("2d")!;
+  pen.fillStyle = "#ffffff";
+  pen.fillRect(0, 0, size, size);
+  pen.strokeStyle = "rgba(0, 0, 0, 0.16)";
+  pen.lineWidth = 3;
+  pen.strokeRect(0, 0, size, size);
+  const texture = new THREE.CanvasTexture(canvas);
+  texture.wrapS = texture.wrapT = THREE.RepeatWrapping;
+  texture.colorSpace = THREE.SRGBColorSpace;
+  texture.anisotropy = 8;
+  return texture;
+}
+
+export class SceneBuilder {
+  private readonly textures = new Map<number, THREE.Texture>();
+
+  constructor(private readonly files: SceneFiles) {}
+
+  build(): Built {
+    const still = new THREE.Group(), moving = new THREE.Group();
+    const built: Built = { still, moving, movers: [], grounds: [] };
+    this.files.description.kinds.forEach((parts, kind) => {
+      const indices: number[] = [];
+      this.files.links.forEach((link, index) => { if (link.kind === kind) indices.push(index); });
+      if (indices.length === 0) return;
+      const surfaces = this.surfaces(parts, indices.length > kManyLinks);
+      const place = (moves: boolean, into: THREE.Group): Movers | undefined => {
+        const chosen = indices.filter((index) => (this.files.links[index]!.body >= 0) === moves);
+        if (chosen.length === 0) return undefined;
+        const links = chosen.map((index) => this.files.links[index]!);
+        const meshes = surfaces.map((surface) => {
+          const mesh = new THREE.InstancedMesh(surface.geometry, surface.material, links.length);
+          mesh.castShadow = surface.shadow;
+          mesh.receiveShadow = true;
+          mesh.frustumCulled = !moves;
+          mesh.userData = { links: chosen, ground: surface.ground };
+          if (moves) mesh.instanceMatrix.setUsage(THREE.DynamicDrawUsage);
+          into.add(mesh);
+          if (surface.ground) built.grounds.push(mesh);
+          return mesh;
+        });
+        return { links, indices: chosen, meshes };
+      };
+      const stillOnes = place(false, still);
+      if (stillOnes) {
+        const matrix = new THREE.Matrix4(), one = new THREE.Vector3(1, 1, 1), position = new THREE.Vector3(), turn = new THREE.Quaternion();
+        for (const mesh of stillOnes.meshes) {
+          stillOnes.links.forEach(({ pose }, i) => {
+            position.set(pose[0]!, pose[1]!, pose[2]!);
+            turn.set(pose[4]!, pose[5]!, pose[6]!, pose[3]!);
+            mesh.setMatrixAt(i, matrix.compose(position, turn, one));
+          });
+          mesh.computeBoundingSphere();
+        }
+      }
+      const movers = place(true, moving);
+      if (movers) built.movers.push(movers);
+    });
+    return built;
+  }
+
+  // What a kind of link looks like, in the link's frame: all plain opaque parts are one surface with coloured corners.
+  private surfaces(parts: Part[], many: boolean): Surface[] {
+    const groups = new Map<string, Part[]>();
+    for (const part of parts) {
+      const flags = this.batch(part, many)[4];
+      const alone = part.diffuse[3]! < 0.996 || flags & (Flag.textured | Flag.ground);
+      const key = alone ? `alone ${groups.size}` : `${flags & Flag.doubleSided} ${part.specular[0]! > 0.3} ${part.emissive.join()} ${part.shadow}`;
+      groups.set(key, [...(groups.get(key) ?? []), part]);
+    }
+    return [...groups.values()].map((group) => {
+      const first = group[0]!;
+      const [, , , texture, flags] = this.batch(first, many);
+      return { geometry: this.merge(group, many), material: this.material(first, texture, flags), shadow: first.shadow, ground: (flags & Flag.ground) !== 0 };
+    });
+  }
+
+  private batch(part: Part, many: boolean) { return this.files.description.batches[many ? part.small : part.batch]!; }
+
+  private merge(parts: Part[], many: boolean): THREE.BufferGeometry {
+    const positions: number[] = [], normals: number[] = [], uvs: number[] = [], colours: number[] = [], indices: number[] = [];
+    const p = new THREE.Vector3(), matrix = new THREE.Matrix4(), normalMatrix = new THREE.Matrix3();
+    for (const part of parts) {
+      const [meshIndex, first, count, , flags] = this.batch(part, many);
+      const mesh = this.files.meshes[meshIndex]!;
+      const m = part.matrix;
+      matrix.set(m[0]!, m[1]!, m[2]!, m[3]!, m[4]!, m[5]!, m[6]!, m[7]!, m[8]!, m[9]!, m[10]!, m[11]!, 0, 0, 0, 1);
+      normalMatrix.getNormalMatrix(matrix);
+      const colour = sRGB(part.diffuse);
+      const places = new Map<number, number>();
+      for (let i = first; i < first + count; ++i) {
+        // A scale with an odd number of negative factors turns triangles inside out.
+        const corner = flags & Flag.mirrored ? [0, 2, 1][(i - first) % 3]! - ((i - first) % 3) : 0;
+        const vertex = mesh.indices[i + corner]!;
+        let place = places.get(vertex);
+        if (place === undefined) {
+          place = positions.length / 3;
+          places.set(vertex, place);
+          const at = 8 * vertex, v = mesh.vertices;
+          p.set(v[at]!, v[at + 1]!, v[at + 2]!).applyMatrix4(matrix);
+          positions.push(p.x, p.y, p.z);
+          p.set(v[at + 3]!, v[at + 4]!, v[at + 5]!).applyMatrix3(normalMatrix).normalize();
+          normals.push(p.x, p.y, p.z);
+          uvs.push(v[at + 6]!, v[at + 7]!);
+          colours.push(colour.r, colour.g, colour.b);
+        }
+        indices.push(place);
+      }
+    }
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.Float32BufferAttribute(positions, 3));
+    geometry.setAttribute("normal", new THREE.Float32BufferAttribute(normals, 3));
+    geometry.setAttribute("uv", new THREE.Float32BufferAttribute(uvs, 2));
+    geometry.setAttribute("color", new THREE.Float32BufferAttribute(colours, 3));
+    geometry.setIndex(indices);
+    return geometry;
+  }
+
+  private texture(index: number): THREE.Texture | null {
+    if (index < 0 || !this.files.description.textures[index]) return null;
+    let texture = this.textures.get(index);
+    if (!texture) {
+      texture = new THREE.TextureLoader().load(`/scene/textures/${index}`);
+      texture.colorSpace = THREE.SRGBColorSpace;
+      texture.wrapS = texture.wrapT = THREE.RepeatWrapping;
+      texture.anisotropy = 8;
+      this.textures.set(index, texture);
+    }
+    return texture;
+  }
+
+  private material(part: Part, textureIndex: number, flags: number): THREE.Material {
+    const opacity = part.diffuse[3]!;
+    const shiny = Math.max(...part.specular.slice(0, 3)) > 0.3;
+    const material = new THREE.MeshStandardMaterial({
+      vertexColors: true, roughness: shiny ? 0.45 : 0.85, metalness: 0, emissive: sRGB(part.emissive),
+      side: flags & Flag.doubleSided ? THREE.DoubleSide : THREE.FrontSide, shadowSide: THREE.DoubleSide,
+      transparent: opacity < 0.996, opacity, depthWrite: opacity >= 0.996,
+    });
+    if (flags & Flag.ground) {
+      material.map = gridTexture();
+      const extent = Math.hypot(part.matrix[0]!, part.matrix[4]!, part.matrix[8]!), across = Math.hypot(part.matrix[1]!, part.matrix[5]!, part.matrix[9]!);
+      material.map.repeat.set(extent, across);
+    } else if (flags & Flag.textured) {
+      material.map = this.texture(textureIndex);
+      material.alphaTest = 0.4;
+    }
+    return material;
+  }
+}

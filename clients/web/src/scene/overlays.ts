@@ -1,0 +1,240 @@
+// What robots sense and where they have been, drawn over the scene: rays and points of range finders, sonar cones, trails,
+// contacts and frames. Of the chosen robot, or of all while they are few.
+import * as THREE from "three";
+import type { contact_t, device_info_t, odometry_t, planar_lidar_t, pose_t, sonar_t } from "../../generated/messages";
+import { matrixOf } from "./stage";
+
+export const kLayers = ["rays", "points", "sonar", "trail", "odometry", "contacts", "frames"] as const;
+export type Layer = (typeof kLayers)[number];
+
+const kColours = { rays: 0xff5a4d, points: 0xffd24a, sonar: 0x3fb6ff, trail: 0x27c46b, odometry: 0xff9d2e, contacts: 0xff2d8a };
+const kMostTrail = 20000;         // points
+const kTrailStep_m = 0.02;
+
+function devicePose(device: device_info_t, into: THREE.Matrix4): THREE.Matrix4 {
+  return matrixOf([...device.position, ...device.orientation], 0, into);
+}
+
+// Vertices of a geometry that changes its length.
+class Strip<T extends THREE.Object3D & { geometry: THREE.BufferGeometry }> {
+  private capacity = 0;
+  constructor(readonly object: T) { object.frustumCulled = false; }
+  write(count: number, fill: (positions: Float32Array) => void): void {
+    if (count > this.capacity) {
+      this.capacity = Math.max(256, 2 * count);
+      this.object.geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(3 * this.capacity), 3).setUsage(THREE.DynamicDrawUsage));
+    }
+    const attribute = this.object.geometry.getAttribute("position") as THREE.BufferAttribute | undefined;
+    if (attribute) {
+      fill(attribute.array as Float32Array);
+      attribute.needsUpdate = true;
+    }
+    this.object.geometry.setDrawRange(0, count);
+  }
+}
+
+const glow = (colour: number, opacity: number) =>
+  new THREE.MeshBasicMaterial({ color: colour, transparent: true, opacity, side: THREE.DoubleSide, depthWrite: false, fog: false, toneMapped: false });
+
+class ScanView {
+  readonly group = new THREE.Group();
+  private readonly fan = new Strip(new THREE.Mesh(new THREE.BufferGeometry(), glow(kColours.rays, 0.1)));
+  private readonly lines = new Strip(new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: kColours.rays, transparent: true, opacity: 0.35, toneMapped: false, fog: false })));
+  private readonly points = new Strip(new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ color: kColours.points, size: 4, sizeAttenuation: false, toneMapped: false, fog: false })));
+  private readonly mount = new THREE.Matrix4();
+
+  constructor(private readonly device: device_info_t) {
+    devicePose(device, this.mount);
+    this.group.add(this.fan.object, this.lines.object, this.points.object);
+    this.group.matrixAutoUpdate = false;
+  }
+
+  show(scan: planar_lidar_t): void {
+    const { ranges, rad0, radstep } = scan, limit = this.device.range_max, n = ranges.length;
+    const end = (i: number) => { const r = ranges[i]!; return r === -Infinity ? 0 : Math.min(r, limit); };
+    let hits = 0;
+    this.points.write(n, (p) => {
+      for (let i = 0; i < n; ++i) {
+        const r = ranges[i]!;
+        if (!Number.isFinite(r)) continue;
+        const a = rad0 + i * radstep;
+        p[3 * hits] = r * Math.cos(a); p[3 * hits + 1] = r * Math.sin(a); p[3 * hits + 2] = 0;
+        ++hits;
+      }
+    });
+    this.points.object.geometry.setDrawRange(0, hits);
+    const every = Math.max(1, Math.round(n / 180));
+    const shown = Math.ceil(n / every);
+    this.lines.write(2 * shown, (p) => {
+      for (let k = 0; k < shown; ++k) {
+        const i = k * every, a = rad0 + i * radstep, r = end(i);
+        p.fill(0, 6 * k, 6 * k + 6);
+        p[6 * k + 3] = r * Math.cos(a); p[6 * k + 4] = r * Math.sin(a);
+      }
+    });
+    this.fan.write(3 * Math.max(0, n - 1), (p) => {
+      for (let i = 0; i + 1 < n; ++i) {
+        const a = rad0 + i * radstep, b = a + radstep, r = end(i), s = end(i + 1);
+        p.fill(0, 9 * i, 9 * i + 9);
+        p[9 * i + 3] = r * Math.cos(a); p[9 * i + 4] = r * Math.sin(a);
+        p[9 * i + 6] = s * Math.cos(b); p[9 * i + 7] = s * Math.sin(b);
+      }
+    });
+  }
+
+  place(base: THREE.Matrix4, layers: Set<Layer>): void {
+    this.group.matrix.multiplyMatrices(base, this.mount);
+    this.lines.object.visible = this.fan.object.visible = layers.has("rays");
+    this.points.object.visible = layers.has("points");
+  }
+}
+
+class SonarView {
+  readonly group = new THREE.Group();
+  private readonly cones = new Strip(new THREE.Mesh(new THREE.BufferGeometry(), glow(kColours.sonar, 0.16)));
+  private readonly arcs = new Strip(new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: kColours.sonar, transparent: true, opacity: 0.9, toneMapped: false, fog: false })));
+  private readonly mount = new THREE.Matrix4();
+
+  constructor(private readonly device: device_info_t) {
+    devicePose(device, this.mount);
+    this.group.add(this.cones.object, this.arcs.object);
+    this.group.matrixAutoUpdate = false;
+  }
+
+  show(sonar: sonar_t): void {
+    const pieces = 8, half = this.device.fov_horizontal / 2;
+    const shown: number[] = [];
+    for (let i = 0; i < Math.min(sonar.n, this.device.nelements); ++i) {
+      if (Number(sonar.fired_utime[i]!) >= 0) shown.push(i);
+    }
+    const arc = (element: number, share: number, p: Float32Array, at: number) => {
+      const pose = this.device.element_pose, yaw = pose[6 * element + 5]! + half * (2 * share - 1), r = sonar.range[element]!;
+      p[at] = pose[6 * element]! + r * Math.cos(yaw);
+      p[at + 1] = pose[6 * element + 1]! + r * Math.sin(yaw);
+      p[at + 2] = pose[6 * element + 2]!;
+    };
+    this.cones.write(3 * pieces * shown.length, (p) => {
+      shown.forEach((element, s) => {
+        for (let k = 0; k < pieces; ++k) {
+          const at = 9 * (s * pieces + k);
+          for (let c = 0; c < 3; ++c) p[at + c] = this.device.element_pose[6 * element + c]!;
+          arc(element, k / pieces, p, at + 3);
+          arc(element, (k + 1) / pieces, p, at + 6);
+        }
+      });
+    });
+    const echoes = shown.filter((element) => sonar.range[element]! < this.device.range_max - 1e-3);
+    this.arcs.write(2 * pieces * echoes.length, (p) => {
+      echoes.forEach((element, s) => {
+        for (let k = 0; k < pieces; ++k) {
+          arc(element, k / pieces, p, 6 * (s * pieces + k));
+          arc(element, (k + 1) / pieces, p, 6 * (s * pieces + k) + 3);
+        }
+      });
+    });
+  }
+
+  place(base: THREE.Matrix4, layers: Set<Layer>): void {
+    this.group.matrix.multiplyMatrices(base, this.mount);
+    this.group.visible = layers.has("sonar");
+  }
+}
+
+class Trail {
+  readonly strip: Strip<THREE.Line>;
+  private points: number[] = [];
+  constructor(colour: number) {
+    this.strip = new Strip(new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: colour, toneMapped: false, fog: false })));
+  }
+  add(x: number, y: number, z: number): void {
+    const n = this.points.length;
+    if (n >= 3 && Math.hypot(x - this.points[n - 3]!, y - this.points[n - 2]!) < kTrailStep_m) return;
+    this.points.push(x, y, z);
+    if (this.points.length > 3 * kMostTrail) this.points.splice(0, 3 * (kMostTrail / 4));
+    this.strip.write(this.points.length / 3, (p) => p.set(this.points));
+  }
+  clear(): void {
+    this.points = [];
+    this.strip.write(0, () => undefined);
+  }
+}
+
+// All of one robot.
+export class RobotOverlay {
+  readonly group = new THREE.Group();
+  private readonly scans = new Map<string, ScanView>();
+  private readonly sonars = new Map<string, SonarView>();
+  private readonly truth = new Trail(kColours.trail);
+  private readonly odometry = new Trail(kColours.odometry);
+  private readonly contacts = new Strip(new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ color: kColours.contacts, size: 9, sizeAttenuation: false, depthTest: false, toneMapped: false })));
+  private readonly frames = new THREE.Group();
+  private readonly baseFrame = new THREE.AxesHelper(0.5);
+  private readonly odom = new THREE.Matrix4();    // odom in the world
+  private readonly point = new THREE.Vector3();
+  private changed = true;
+
+  constructor(devices: device_info_t[], start: number[]) {
+    matrixOf(start, 0, this.odom);
+    const odomFrame = new THREE.AxesHelper(0.35);
+    odomFrame.applyMatrix4(this.odom);
+    this.frames.add(this.baseFrame, odomFrame);
+    this.baseFrame.matrixAutoUpdate = false;
+    for (const device of devices) {
+      const axes = new THREE.AxesHelper(0.14);
+      if (!["odometry", "pose", "motion", "joints"].includes(device.kind)) {
+        axes.applyMatrix4(devicePose(device, new THREE.Matrix4()));
+        this.baseFrame.add(axes);
+      }
+    }
+    this.group.add(this.truth.strip.object, this.odometry.strip.object, this.contacts.object, this.frames);
+  }
+
+  scan(device: device_info_t, message: planar_lidar_t): void {
+    this.view(this.scans, device, ScanView).show(message);
+    this.changed = true;
+  }
+  sonar(device: device_info_t, message: sonar_t): void {
+    this.view(this.sonars, device, SonarView).show(message);
+    this.changed = true;
+  }
+  pose(message: pose_t): void {
+    this.truth.add(message.pos[0]!, message.pos[1]!, message.pos[2]! + 0.02);
+    this.changed = true;
+  }
+  odometer(message: odometry_t): void {
+    this.point.set(message.x, message.y, 0.025).applyMatrix4(this.odom);
+    this.odometry.add(this.point.x, this.point.y, this.point.z);
+    this.changed = true;
+  }
+  contact(message: contact_t): void {
+    this.contacts.write(message.n, (p) => message.points.forEach(({ position }, i) => p.set(position, 3 * i)));
+    this.changed = true;
+  }
+  clearTrails(): void {
+    this.truth.clear();
+    this.odometry.clear();
+    this.changed = true;
+  }
+
+  place(base: THREE.Matrix4, layers: Set<Layer>): boolean {
+    for (const view of [...this.scans.values(), ...this.sonars.values()]) view.place(base, layers);
+    this.baseFrame.matrix.copy(base);
+    this.truth.strip.object.visible = layers.has("trail");
+    this.odometry.strip.object.visible = layers.has("odometry");
+    this.contacts.object.visible = layers.has("contacts");
+    this.frames.visible = layers.has("frames");
+    const changed = this.changed;
+    this.changed = false;
+    return changed;
+  }
+
+  private view<V extends ScanView | SonarView>(views: Map<string, V>, device: device_info_t, Make: new (device: device_info_t) => V): V {
+    let view = views.get(device.name);
+    if (!view) {
+      view = new Make(device);
+      views.set(device.name, view);
+      this.group.add(view.group);
+    }
+    return view;
+  }
+}

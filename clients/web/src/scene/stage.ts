@@ -1,0 +1,309 @@
+// The 3-D view: renderer, camera, lights and the bodies at their poses. Draws only when something has changed.
+import * as THREE from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { SceneBuilder, type Built, type Movers } from "./build";
+import type { Description, LightDescription, SceneFiles } from "./description";
+import type { Poses } from "../state/poses";
+
+export type ViewMode = "orbit" | "follow" | "top";
+const kShadowReach_m = 14;
+const kMostLamps = 6;
+
+export class Stage {
+  readonly scene = new THREE.Scene();
+  readonly camera = new THREE.PerspectiveCamera(50, 1, 0.05, 400);
+  readonly renderer: THREE.WebGLRenderer;
+  readonly controls: OrbitControls;
+  description: Description | null = null;
+  mode: ViewMode = "orbit";
+  frames = 0;                        // drawn so far
+  frameCost_ms = 0;                  // of this thread, smoothed
+  shadows = true;
+  private built: Built | null = null;
+  private lights = new THREE.Group();
+  private sun: THREE.DirectionalLight | null = null;
+  private dirty = true;
+  private moved = false;
+  private linkWheel = new Map<number, { robot: number; place: number; axis: THREE.Vector3; centre: THREE.Vector3 }>();
+  private readonly followed = new THREE.Vector3();
+  private following = -1;            // index into the description's bases
+  private lastBase: THREE.Vector3 | null = null;
+  wheelAngles = new Map<number, Float64Array>();    // of robots whose odometry is known
+
+  constructor(private readonly canvas: HTMLCanvasElement, readonly poses: Poses) {
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.type = THREE.PCFShadowMap;
+    this.renderer.shadowMap.autoUpdate = false;
+    this.renderer.toneMapping = THREE.NeutralToneMapping;
+    this.camera.up.set(0, 0, 1);
+    this.camera.position.set(-4, -5, 4);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.enableDamping = true;
+    this.controls.dampingFactor = 0.15;
+    this.controls.maxPolarAngle = Math.PI / 2 - 0.02;
+    this.controls.addEventListener("change", () => this.touch());
+    this.scene.add(this.lights);
+    new ResizeObserver(() => this.resize()).observe(canvas.parentElement!);
+    this.resize();
+  }
+
+  touch(): void { this.dirty = true; }
+
+  setTheme(dark: boolean): void {
+    const colour = new THREE.Color(dark ? 0x171b21 : 0xdde4ec);
+    this.scene.background = colour;
+    this.scene.fog = new THREE.Fog(colour, 35, 130);
+    this.touch();
+  }
+
+  setShadows(on: boolean): void {
+    this.shadows = on;
+    if (this.sun) this.sun.castShadow = on;
+    this.moved = true;
+    this.touch();
+  }
+
+  show(files: SceneFiles | null): void {
+    if (this.built) {
+      this.scene.remove(this.built.still, this.built.moving);
+      for (const group of [this.built.still, this.built.moving]) {
+        group.traverse((object) => {
+          if (!(object instanceof THREE.InstancedMesh)) return;
+          object.geometry.dispose();
+          (object.material as THREE.Material).dispose();
+          object.dispose();
+        });
+      }
+    }
+    const first = this.description === null;
+    this.built = null;
+    this.description = files?.description ?? null;
+    this.lights.clear();
+    this.linkWheel.clear();
+    if (files) {
+      this.built = new SceneBuilder(files).build();
+      this.scene.add(this.built.still, this.built.moving);
+      for (const [link, robot, place, x, y, z, ax, ay, az] of files.description.wheels as [number, number, number, number, number, number, number, number, number][]) {
+        this.linkWheel.set(link, { robot, place, centre: new THREE.Vector3(x, y, z), axis: new THREE.Vector3(ax, ay, az) });
+      }
+      this.makeLights(files.description);
+      if (first) this.home();
+    } else {
+      this.scene.add(this.lights);
+      this.lights.add(new THREE.HemisphereLight(0xffffff, 0x8899aa, 2.5));
+      const grid = new THREE.GridHelper(40, 40, 0x888888, 0x555555);
+      grid.rotation.x = Math.PI / 2;
+      this.lights.add(grid);
+    }
+    this.place(true);
+    this.touch();
+  }
+
+  private makeLights(description: Description): void {
+    const ambient = Math.max(0.25, (description.ambient[0]! + description.ambient[1]! + description.ambient[2]!) / 3);
+    this.lights.add(new THREE.HemisphereLight(0xf4f7ff, 0xa8a098, 2.6 * ambient + 0.7));
+    this.sun = null;
+    let lamps = 0;
+    for (const light of description.lights) {
+      const made = this.makeLight(light);
+      if (!(made instanceof THREE.DirectionalLight) && ++lamps > kMostLamps) continue;
+      this.lights.add(made);
+      if ("target" in made) this.lights.add((made as THREE.DirectionalLight).target);
+      if (made instanceof THREE.DirectionalLight && !this.sun) this.beSun(made);
+    }
+  }
+
+  private makeLight(light: LightDescription): THREE.Light {
+    const colour = new THREE.Color().setRGB(light.colour[0]!, light.colour[1]!, light.colour[2]!, THREE.SRGBColorSpace);
+    const position = new THREE.Vector3().fromArray(light.position), direction = new THREE.Vector3().fromArray(light.direction);
+    if (light.type === "directional") {
+      const sun = new THREE.DirectionalLight(colour, 2.2 * light.intensity);
+      sun.userData.direction = direction.normalize();
+      sun.position.copy(direction).multiplyScalar(-20);
+      return sun;
+    }
+    const strength = 4 * light.intensity / Math.max(0.3, light.constant);
+    if (light.type === "point") {
+      const lamp = new THREE.PointLight(colour, strength, 2 * light.range, 1);
+      lamp.position.copy(position);
+      return lamp;
+    }
+    const spot = new THREE.SpotLight(colour, strength, 2 * light.range, Math.min(1.5, light.outer_angle / 2 || 0.6), 0.4, 1);
+    spot.position.copy(position);
+    spot.target.position.copy(position).add(direction);
+    return spot;
+  }
+
+  // The first directional light casts the shadows, around what is looked at.
+  private beSun(sun: THREE.DirectionalLight): void {
+    this.sun = sun;
+    sun.castShadow = this.shadows;
+    sun.shadow.mapSize.set(2048, 2048);
+    sun.shadow.bias = -0.0004;
+    sun.shadow.normalBias = 0.02;
+    sun.shadow.intensity = 0.85;
+    Object.assign(sun.shadow.camera, { left: -kShadowReach_m, right: kShadowReach_m, top: kShadowReach_m, bottom: -kShadowReach_m, near: 1, far: 80 });
+    this.moved = true;
+  }
+
+  // All of the world in view.
+  home(): void {
+    const low = this.description?.low ?? [-3, -3, 0], high = this.description?.high ?? [3, 3, 1];
+    const centre = new THREE.Vector3((low[0]! + high[0]!) / 2, (low[1]! + high[1]!) / 2, 0);
+    const reach = Math.max(3, Math.min(60, 0.5 * Math.hypot(high[0]! - low[0]!, high[1]! - low[1]!)));
+    const back = reach * 1.9 * Math.max(1, 1.1 / this.camera.aspect);
+    this.controls.target.copy(centre);
+    this.camera.position.set(centre.x - 0.5 * back, centre.y - 0.62 * back, 0.62 * back);
+    this.controls.update();
+    this.touch();
+  }
+
+  setMode(mode: ViewMode): void {
+    this.mode = mode;
+    this.lastBase = null;
+    this.controls.enableRotate = mode !== "top";
+    if (mode === "top") {
+      const height = Math.max(4, this.camera.position.distanceTo(this.controls.target));
+      this.camera.position.set(this.controls.target.x, this.controls.target.y - 0.001 * height, this.controls.target.z + height);
+    }
+    this.controls.minPolarAngle = 0;
+    this.controls.update();
+    this.touch();
+  }
+
+  follow(robot: number): void {
+    this.following = robot;
+    this.lastBase = null;
+    this.touch();
+  }
+
+  // Where a robot's base_link is; false when that is not known.
+  base(robot: number, into: THREE.Matrix4): boolean {
+    const base = this.description?.bases[robot];
+    if (!base) return false;
+    matrixOf(base.pose, 0, into);
+    if (base.body < 0) return true;
+    if (base.body >= this.poses.size) {
+      matrixOf(base.start, 0, into);
+      return true;
+    }
+    into.premultiply(matrixOf(this.poses.now, 7 * base.body, kScratch));
+    return true;
+  }
+
+  // The robot under a point of the canvas; -1 for none. Else where the ground is there.
+  pick(x: number, y: number): { robot: number; ground: THREE.Vector3 | null } {
+    const caster = new THREE.Raycaster();
+    caster.setFromCamera(this.ndc(x, y), this.camera);
+    const ground = caster.ray.intersectPlane(new THREE.Plane(new THREE.Vector3(0, 0, 1), 0), new THREE.Vector3());
+    let robot = -1, nearest = 0.45;
+    const place = new THREE.Matrix4(), at = new THREE.Vector3();
+    for (let i = 0; i < (this.description?.bases.length ?? 0); ++i) {
+      if (!this.base(i, place)) continue;
+      at.setFromMatrixPosition(place);
+      at.z += 0.2;
+      const away = caster.ray.distanceToPoint(at);
+      if (away < nearest) [robot, nearest] = [i, away];
+    }
+    return { robot, ground };
+  }
+
+  private ndc(x: number, y: number): THREE.Vector2 {
+    const box = this.canvas.getBoundingClientRect();
+    return new THREE.Vector2(2 * (x - box.left) / box.width - 1, 1 - 2 * (y - box.top) / box.height);
+  }
+
+  private resize(): void {
+    const box = this.canvas.parentElement!.getBoundingClientRect();
+    if (box.width === 0 || box.height === 0) return;
+    this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
+    this.renderer.setSize(box.width, box.height, false);
+    this.camera.aspect = box.width / box.height;
+    this.camera.updateProjectionMatrix();
+    this.touch();
+  }
+
+  // One frame at that moment; overlays: called when bodies may have moved.
+  frame(at_ms: number, overlays: () => boolean): void {
+    if (this.poses.advance(at_ms)) {
+      this.place(false);
+      this.touch();
+    }
+    if (overlays()) this.touch();
+    this.track();
+    this.controls.update();
+    if (!this.dirty) return;
+    this.dirty = false;
+    const begun = performance.now();
+    this.aimSun();
+    this.renderer.render(this.scene, this.camera);
+    ++this.frames;
+    this.frameCost_ms += 0.1 * (performance.now() - begun - this.frameCost_ms);
+  }
+
+  private place(all: boolean): void {
+    if (!this.built || (this.poses.size === 0 && !all)) return;
+    for (const movers of this.built.movers) this.placeMovers(movers);
+    this.moved = true;
+  }
+
+  private placeMovers({ links, indices, meshes }: Movers): void {
+    const array = meshes[0]!.instanceMatrix.array as Float32Array;
+    for (let i = 0; i < links.length; ++i) {
+      const link = links[i]!;
+      matrixOf(link.pose, 0, kLocal);
+      const wheel = this.linkWheel.get(indices[i]!);
+      const angle = wheel && this.wheelAngles.get(wheel.robot)?.[wheel.place];
+      if (wheel && angle) {
+        kTurn.makeTranslation(wheel.centre).multiply(kSpin.makeRotationAxis(wheel.axis, angle)).multiply(kBack.makeTranslation(-wheel.centre.x, -wheel.centre.y, -wheel.centre.z));
+        kLocal.multiply(kTurn);
+      }
+      if (link.body < this.poses.size) kLocal.premultiply(matrixOf(this.poses.now, 7 * link.body, kScratch));
+      else kLocal.multiplyScalar(0);
+      kLocal.toArray(array, 16 * i);
+    }
+    for (const mesh of meshes) {
+      if (mesh !== meshes[0]) (mesh.instanceMatrix.array as Float32Array).set(array);
+      mesh.instanceMatrix.needsUpdate = true;
+    }
+  }
+
+  private track(): void {
+    if (this.mode !== "follow" || !this.base(this.following, kScratch2)) return;
+    this.followed.setFromMatrixPosition(kScratch2);
+    if (!this.lastBase) {
+      const offset = this.camera.position.clone().sub(this.controls.target);
+      if (offset.length() > 7) offset.setLength(5);
+      this.controls.target.copy(this.followed);
+      this.camera.position.copy(this.followed).add(offset);
+      this.lastBase = this.followed.clone();
+      return;
+    }
+    const shift = this.followed.clone().sub(this.lastBase);
+    this.controls.target.add(shift);
+    this.camera.position.add(shift);
+    this.lastBase.copy(this.followed);
+    if (shift.lengthSq() > 0) this.touch();
+  }
+
+  private aimSun(): void {
+    if (!this.sun || !this.shadows) return;
+    const target = this.controls.target;
+    if (!this.moved && this.sun.target.position.distanceToSquared(target) < 0.25) return;
+    this.sun.target.position.copy(target);
+    this.sun.position.copy(target).addScaledVector(this.sun.userData.direction as THREE.Vector3, -30);
+    this.renderer.shadowMap.needsUpdate = true;
+    this.moved = false;
+  }
+}
+
+const kScratch = new THREE.Matrix4(), kScratch2 = new THREE.Matrix4(), kLocal = new THREE.Matrix4(), kTurn = new THREE.Matrix4(), kSpin = new THREE.Matrix4(), kBack = new THREE.Matrix4();
+const kPosition = new THREE.Vector3(), kRotation = new THREE.Quaternion(), kOne = new THREE.Vector3(1, 1, 1);
+
+// The matrix of a pose x, y, z, qw, qx, qy, qz at that place of an array.
+export function matrixOf(pose: ArrayLike<number>, at: number, into: THREE.Matrix4): THREE.Matrix4 {
+  kPosition.set(pose[at]!, pose[at + 1]!, pose[at + 2]!);
+  kRotation.set(pose[at + 4]!, pose[at + 5]!, pose[at + 6]!, pose[at + 3]!);
+  return into.compose(kPosition, kRotation, kOne);
+}

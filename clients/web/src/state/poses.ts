@@ -1,0 +1,77 @@
+// Where the bodies are, at the display's rate: between the last two states, one interval behind the newest.
+import type { world_state_t } from "../../generated/messages";
+
+const kJump_m = 1.5;    // further in one interval is no motion but a new place
+
+export class Poses {
+  size = 0;                             // bodies known
+  now = new Float32Array(0);            // x, y, z, qw, qx, qy, qz of each body
+  utime = 0;                            // us, of the newest state
+  private from = new Float32Array(0);
+  private to = new Float32Array(0);
+  private known = new Uint8Array(0);
+  private arrived = 0;
+  private interval = 33;
+  private epoch = -1;
+  settled = false;
+
+  private grow(size: number): void {
+    if (size <= this.size) return;
+    const larger = (old: Float32Array) => { const next = new Float32Array(7 * size); next.set(old); return next; };
+    this.now = larger(this.now);
+    this.from = larger(this.from);
+    this.to = larger(this.to);
+    const known = new Uint8Array(size);
+    known.set(this.known);
+    this.known = known;
+    this.size = size;
+  }
+
+  // A state, or a part of one.
+  add(state: world_state_t, at_ms: number): void {
+    let highest = -1;
+    for (const index of state.index) highest = Math.max(highest, index);
+    this.grow(highest + 1);
+    const utime = Number(state.utime);
+    const fresh = state.epoch !== this.epoch || utime < this.utime;
+    if (state.part === 0) {
+      if (!fresh && at_ms > this.arrived) this.interval += 0.2 * (Math.min(500, at_ms - this.arrived) - this.interval);
+      this.arrived = at_ms;
+      this.from.set(this.now);
+    }
+    this.epoch = state.epoch;
+    this.utime = utime;
+    this.settled = false;
+    for (let i = 0; i < state.index.length; ++i) {
+      const body = state.index[i]!, at = 7 * body;
+      for (let k = 0; k < 3; ++k) this.to[at + k] = state.position[3 * i + k]!;
+      for (let k = 0; k < 4; ++k) this.to[at + 3 + k] = state.orientation[4 * i + k]!;
+      const moved = Math.hypot(this.to[at]! - this.from[at]!, this.to[at + 1]! - this.from[at + 1]!, this.to[at + 2]! - this.from[at + 2]!);
+      if (fresh || !this.known[body] || moved > kJump_m) this.from.set(this.to.subarray(at, at + 7), at);
+      this.known[body] = 1;
+    }
+  }
+
+  // Brings `now` to the moment; false when nothing has moved since.
+  advance(at_ms: number): boolean {
+    if (this.settled) return false;
+    const t = Math.max(0, Math.min(1, (at_ms - this.arrived) / this.interval));
+    const { from, to, now } = this;
+    for (let at = 0; at < now.length; at += 7) {
+      for (let k = 0; k < 3; ++k) now[at + k] = from[at + k]! + t * (to[at + k]! - from[at + k]!);
+      let dot = 0;
+      for (let k = 3; k < 7; ++k) dot += from[at + k]! * to[at + k]!;
+      const sign = dot < 0 ? -1 : 1;
+      let norm = 0;
+      for (let k = 3; k < 7; ++k) {
+        const value = sign * from[at + k]! + t * (to[at + k]! - sign * from[at + k]!);
+        now[at + k] = value;
+        norm += value * value;
+      }
+      const scale = norm > 0 ? 1 / Math.sqrt(norm) : 1;
+      for (let k = 3; k < 7; ++k) now[at + k]! *= scale;
+    }
+    if (t >= 1) this.settled = true;
+    return true;
+  }
+}

@@ -1,0 +1,31 @@
+// Small helpers to make elements.
+type Child = Node | string | null | undefined | false;
+type Attributes = Record<string, string | number | boolean | ((event: Event) => void) | undefined>;
+
+export function h<K extends keyof HTMLElementTagNameMap>(tag: K, attributes: Attributes = {}, ...children: Child[]): HTMLElementTagNameMap[K] {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (typeof value === "function") element.addEventListener(name, value);
+    else if (value === true) element.setAttribute(name, "");
+    else if (value !== false && value !== undefined) element.setAttribute(name, String(value));
+  }
+  element.append(...children.filter((child): child is Node | string => child !== null && child !== undefined && child !== false));
+  return element;
+}
+
+// Sets a text only when it is another one: most values do not change.
+export function say(element: Element, text: string): void {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+const kToast_ms = 6000;
+export function toast(text: string, kind: "info" | "error" = "info"): void {
+  const place = document.getElementById("toasts")!;
+  for (const old of place.children) if (old.textContent === text) return;
+  const note = h("div", { class: `toast ${kind}`, role: "status" }, text);
+  place.append(note);
+  setTimeout(() => note.remove(), kToast_ms);
+}
+
+export const remember = (key: string, value: string) => { try { localStorage.setItem(`ruedo.${key}`, value); } catch { /* private mode */ } };
+export const recall = (key: string) => { try { return localStorage.getItem(`ruedo.${key}`); } catch { return null; } };

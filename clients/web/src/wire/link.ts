@@ -1,0 +1,138 @@
+// The WebSocket to the program: texts, frames of messages, and what this page asks for. Comes back by itself when the
+// connection is lost.
+export interface Hello { mode: "live" | "log"; title: string; version: string; info: string; fault: string }
+export interface Playback { begin: number; end: number; now: number; speed: number; playing: boolean }
+export type LinkState = "connecting" | "open" | "lost" | "ended";
+
+export interface LinkHandler {
+  state(state: LinkState, words: string): void;
+  hello(hello: Hello): void;
+  scene(): void;
+  playback(playback: Playback): void;
+  message(channel: string, bytes: Uint8Array): void;
+  frame(): void;                         // after the messages of one frame
+  traffic(channels: string[], messages: Uint32Array, sizes: Uint32Array): void;
+  refused(channel: string): void;
+}
+
+const enum Operation { seen = 1, want = 2, command = 3, traffic = 4, play = 5, seek = 6 }
+const enum Frame { messages = 1, traffic = 2 }
+
+export class Link {
+  private socket: WebSocket | undefined;
+  private channels: string[] = [];
+  private wanted = new Set<string>();
+  private wantsTraffic = false;
+  private retry_ms = 300;
+  private over = false;
+
+  constructor(private readonly handler: LinkHandler) {}
+
+  connect(): void {
+    const address = new URL("/socket", location.href);
+    address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+    const socket = new WebSocket(address);
+    socket.binaryType = "arraybuffer";
+    this.socket = socket;
+    this.channels = [];
+    socket.onopen = () => {
+      this.retry_ms = 300;
+      this.over = false;
+      this.handler.state("open", "");
+      this.sendWanted();
+      if (this.wantsTraffic) this.send([Operation.traffic, 1]);
+    };
+    socket.onmessage = (event: MessageEvent<ArrayBuffer | string>) => {
+      if (typeof event.data === "string") this.onText(event.data);
+      else this.onFrame(event.data);
+    };
+    socket.onclose = () => {
+      if (this.socket !== socket) return;
+      if (!this.over) this.handler.state("lost", "The connection to the server is lost. Trying again …");
+      setTimeout(() => this.connect(), this.retry_ms);
+      this.retry_ms = Math.min(3000, this.retry_ms * 1.5);
+    };
+  }
+
+  want(channels: Iterable<string>): void {
+    const wanted = new Set(channels);
+    if (wanted.size === this.wanted.size && [...wanted].every((name) => this.wanted.has(name))) return;
+    this.wanted = wanted;
+    this.sendWanted();
+  }
+
+  watchTraffic(on: boolean): void {
+    this.wantsTraffic = on;
+    this.send([Operation.traffic, on ? 1 : 0]);
+  }
+
+  // A message onto a channel, as any client's. False when there is no connection.
+  command(channel: string, message: Uint8Array): boolean {
+    const name = new TextEncoder().encode(channel);
+    return this.send([Operation.command, name.length, ...name], message);
+  }
+
+  play(on: boolean, speed: number): void {
+    const bytes = new DataView(new ArrayBuffer(8));
+    bytes.setFloat64(0, speed, true);
+    this.send([Operation.play, on ? 1 : 0], new Uint8Array(bytes.buffer));
+  }
+
+  seek(time_s: number): void {
+    const bytes = new DataView(new ArrayBuffer(8));
+    bytes.setFloat64(0, time_s, true);
+    this.send([Operation.seek], new Uint8Array(bytes.buffer));
+  }
+
+  private sendWanted(): void {
+    const names = new TextEncoder().encode([...this.wanted].join("\n"));
+    this.send([Operation.want], names);
+  }
+
+  private send(head: number[], rest: Uint8Array = new Uint8Array()): boolean {
+    if (this.socket?.readyState !== WebSocket.OPEN) return false;
+    const bytes = new Uint8Array(head.length + rest.length);
+    bytes.set(head);
+    bytes.set(rest, head.length);
+    this.socket.send(bytes);
+    return true;
+  }
+
+  private onText(text: string): void {
+    const said = JSON.parse(text) as {
+      hello?: Hello; scene?: number; playback?: Playback; first?: number; channels?: string[]; ended?: string; refused?: string;
+    };
+    if (said.hello) this.handler.hello(said.hello);
+    if (said.scene !== undefined) this.handler.scene();
+    if (said.playback) this.handler.playback(said.playback);
+    if (said.channels) said.channels.forEach((name, i) => { this.channels[said.first! + i] = name; });
+    if (said.refused !== undefined) this.handler.refused(said.refused);
+    if (said.ended !== undefined) {
+      this.over = true;
+      this.handler.state("ended", said.ended);
+    }
+  }
+
+  private onFrame(buffer: ArrayBuffer): void {
+    const view = new DataView(buffer);
+    if (view.getUint32(0, true) === Frame.traffic) {
+      const count = (buffer.byteLength - 4) / 8;
+      const messages = new Uint32Array(count), sizes = new Uint32Array(count);
+      for (let i = 0; i < count; ++i) {
+        messages[i] = view.getUint32(4 + 8 * i, true);
+        sizes[i] = view.getUint32(8 + 8 * i, true);
+      }
+      this.handler.traffic(this.channels, messages, sizes);
+      return;
+    }
+    for (let at = 4; at + 8 <= buffer.byteLength;) {
+      const channel = this.channels[view.getUint32(at, true)];
+      const size = view.getUint32(at + 4, true);
+      if (channel !== undefined) this.handler.message(channel, new Uint8Array(buffer, at + 8, size));
+      at += 8 + size;
+    }
+    this.handler.frame();
+    // Answered when the page has drawn: who is slow gets fewer frames, not a queue of them.
+    requestAnimationFrame(() => this.send([Operation.seen]));
+  }
+}

@@ -1,0 +1,34 @@
+// --view: the web console beside a run or a log. Without the console in this build it says what is missing.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "ruedo/bus.h"
+
+namespace ruedo::server {
+class Server;
+}
+
+namespace ruedo::cli {
+
+// The bus of a server that is viewed. Made before the server; without --view it is the bus itself.
+class ViewedBus {
+ public:
+  // Throws InputError for a bad address, EnvironmentError when this build has no console.
+  ViewedBus(Bus& bus, bool viewed, const std::string& address);
+  ~ViewedBus();
+
+  Bus& bus();
+
+  // Serves the console for as long as the returned object lives, and prints where. Null without --view. Throws
+  // EnvironmentError when the address cannot be had. The server must outlive it.
+  std::shared_ptr<void> open(server::Server& server, const std::string& title);
+
+ private:
+  struct Impl;
+  Bus& inner_;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace ruedo::cli

@@ -1,0 +1,67 @@
+// What belongs together is told from the message types' description: a type with a field `part` comes in parts.
+#include "console/board.h"
+
+#include "ruedo/schema.h"
+
+namespace ruedo::console {
+namespace {
+
+int bytes_of(Primitive primitive) {
+  switch (primitive) {
+    case Primitive::boolean:
+    case Primitive::byte:
+    case Primitive::int8: return 1;
+    case Primitive::int16: return 2;
+    case Primitive::int32:
+    case Primitive::float32: return 4;
+    case Primitive::int64:
+    case Primitive::float64: return 8;
+    default: return 0;
+  }
+}
+
+// Where the field `part`, an int16, stands in a message; -1 where there is none, or not always at one place.
+int part_offset(const Schema& schema) {
+  int at = 8;    // after the fingerprint
+  for (const Field& field : schema.fields) {
+    if (field.name == "part" && field.primitive == Primitive::int16) return at;
+    const int size = bytes_of(field.primitive);
+    if (size == 0 || !field.dimensions.empty()) return -1;
+    at += size;
+  }
+  return -1;
+}
+
+}  // namespace
+
+void Board::name(size_t channel, const std::string& name) {
+  if (channel >= channels_.size()) channels_.resize(channel + 1);
+  channels_[channel].name = name;
+}
+
+void Board::put(size_t index, std::vector<uint8_t> message) {
+  Channel& channel = channels_[index];
+  const int64_t fingerprint = fingerprint_of(message);
+  if (fingerprint != channel.fingerprint) {
+    channel.fingerprint = fingerprint;
+    const Schema* schema = find_schema(fingerprint);
+    channel.part_at = schema ? part_offset(*schema) : -1;
+    channel.replies = schema && schema->name == "reply_t";
+    channel.newest.clear();
+  }
+  const auto at = static_cast<size_t>(channel.part_at);
+  const bool later_part = channel.part_at >= 0 && message.size() >= at + 2 && (message[at] != 0 || message[at + 1] != 0);
+  if (channel.replies) {
+    if (channel.newest.size() >= kKeptReplies) channel.newest.erase(channel.newest.begin());
+  } else if (!later_part || channel.newest.size() >= kMostParts) {
+    channel.newest.clear();
+  }
+  channel.last_number = ++number_;
+  channel.newest.push_back({number_, std::make_shared<const std::vector<uint8_t>>(std::move(message))});
+}
+
+void Board::forget() {
+  for (Channel& channel : channels_) channel.newest.clear();
+}
+
+}  // namespace ruedo::console

@@ -1,0 +1,49 @@
+// The newest messages of each channel, as the console's viewers are to see them. The console thread's alone.
+//
+// Of most channels one message is kept. Messages in parts are kept together, and so are the last few replies, so that
+// nobody misses his own.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace ruedo::console {
+
+using Bytes = std::shared_ptr<const std::vector<uint8_t>>;
+
+class Board {
+ public:
+  static constexpr size_t kKeptReplies = 64;
+  static constexpr size_t kMostParts = 256;
+
+  struct Message {
+    uint64_t number;    // counts all messages that came to this board
+    Bytes bytes;
+  };
+  struct Channel {
+    std::string name;
+    std::vector<Message> newest;
+    uint64_t last_number = 0;     // of the newest message; 0: none yet
+    int64_t fingerprint = 0;
+    int part_at = -1;             // byte at which the number of the part stands; -1: it has none
+    bool replies = false;
+    int watchers = 0;             // viewers that want it
+  };
+
+  // Makes room up to that channel.
+  void name(size_t channel, const std::string& name);
+  void put(size_t channel, std::vector<uint8_t> message);
+  void forget();    // all messages; what comes next is new to every viewer
+
+  std::vector<Channel>& channels() { return channels_; }
+  const std::vector<Channel>& channels() const { return channels_; }
+  uint64_t newest() const { return number_; }
+
+ private:
+  std::vector<Channel> channels_;
+  uint64_t number_ = 0;
+};
+
+}  // namespace ruedo::console

@@ -1,0 +1,48 @@
+// A running server, as the console sees it: what goes over its bus, and its world.
+#pragma once
+
+#include <functional>
+
+#include "console/source.h"
+#include "console/tee_bus.h"
+
+namespace ruedo::console {
+
+using WorldOf = std::function<std::shared_ptr<const model::WorldModel>()>;    // safe from any thread
+
+class LiveSource : public Source {
+ public:
+  // The bus must outlive it.
+  LiveSource(TeeBus& bus, WorldOf world, std::string info_channel)
+      : bus_(bus), world_(std::move(world)), info_channel_(std::move(info_channel)) {}
+  ~LiveSource() override { bus_.watch(false); }
+
+  void pump(Board& board, bool viewers) override {
+    bus_.watch(viewers);
+    const size_t count = bus_.channel_count();
+    for (size_t i = board.channels().size(); i < count; ++i) board.name(i, bus_.channel(i).name);
+    bus_.ring().drain([&](uint32_t channel, std::vector<uint8_t> message) {
+      if (channel < board.channels().size()) board.put(channel, std::move(message));
+    });
+    for (size_t i = 0; i < board.channels().size(); ++i) {
+      bus_.channel(i).wanted.store(board.channels()[i].watchers > 0, std::memory_order_relaxed);
+    }
+  }
+
+  Count traffic(size_t channel) const override {
+    const Traffic& traffic = bus_.channel(channel);
+    return {traffic.messages.load(std::memory_order_relaxed), traffic.size.load(std::memory_order_relaxed)};
+  }
+  bool command(const std::string& channel, std::span<const uint8_t> message) override {
+    return bus_.command(channel, message.data(), message.size());
+  }
+  std::shared_ptr<const model::WorldModel> world() override { return world_(); }
+  std::string info_channel() const override { return info_channel_; }
+
+ private:
+  TeeBus& bus_;
+  WorldOf world_;
+  std::string info_channel_;
+};
+
+}  // namespace ruedo::console

@@ -1,0 +1,51 @@
+// What a console shows: a running server, or a recorded log. The console's thread alone calls it.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "console/board.h"
+#include "model/world_model.h"
+
+namespace ruedo::console {
+
+// Where the player of a log is.
+struct Playback {
+  double begin_s = 0, end_s = 0, now_s = 0;    // log time
+  double speed = 1;                            // log time per real time
+  bool playing = false;
+  friend bool operator==(const Playback&, const Playback&) = default;
+};
+
+class Source {
+ public:
+  virtual ~Source() = default;
+
+  // Brings what is new to the board. viewers: whether anybody watches.
+  virtual void pump(Board& board, bool viewers) = 0;
+
+  struct Count {
+    uint64_t messages = 0;
+    uint32_t size = 0;    // bytes of the newest message
+  };
+  virtual Count traffic(size_t channel) const = 0;
+
+  // A viewer's message to the simulation; false where nobody takes it.
+  virtual bool command(const std::string& channel, std::span<const uint8_t> message) = 0;
+
+  // The world to show, another pointer when it has changed; null when there is none.
+  virtual std::shared_ptr<const model::WorldModel> world() = 0;
+  // "" or why there is no world.
+  virtual std::string fault() const { return {}; }
+  // The channel of world_info_t.
+  virtual std::string info_channel() const = 0;
+
+  // Of logs.
+  virtual const Playback* playback() const { return nullptr; }
+  virtual void play(bool on, double speed) { static_cast<void>(on), static_cast<void>(speed); }
+  virtual void seek(Board& board, double time_s) { static_cast<void>(board), static_cast<void>(time_s); }
+};
+
+}  // namespace ruedo::console

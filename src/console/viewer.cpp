@@ -1,0 +1,189 @@
+// Frames are made when the socket can take one, from what is newest then.
+#include "console/viewer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "core/json.h"
+
+namespace ruedo::console {
+namespace {
+
+constexpr auto kTrafficPeriod = std::chrono::milliseconds(500);
+constexpr size_t kMostNames = 2000;    // of channels in one message
+
+template <class Value>
+void append(std::vector<uint8_t>& bytes, Value value) {    // little endian, as browsers are
+  const auto* from = reinterpret_cast<const uint8_t*>(&value);
+  bytes.insert(bytes.end(), from, from + sizeof value);
+}
+
+double read_double(std::span<const uint8_t> bytes) {
+  double value = 0;
+  std::memcpy(&value, bytes.data(), sizeof value);
+  return value;
+}
+
+}  // namespace
+
+Viewer::Viewer(Stage& stage) : stage_(stage), told_world_(stage.world_version) { ++stage_.viewers; }
+
+Viewer::~Viewer() {
+  --stage_.viewers;
+  want("");
+}
+
+bool Viewer::receive(std::span<const uint8_t> message) {
+  if (message.empty()) return false;
+  const std::span<const uint8_t> rest = message.subspan(1);
+  switch (static_cast<Operation>(message[0])) {
+    case Operation::seen:
+      unseen_ = std::max(0, unseen_ - 1);
+      return true;
+    case Operation::want:
+      want({reinterpret_cast<const char*>(rest.data()), rest.size()});
+      return true;
+    case Operation::command: {
+      if (rest.empty() || rest.size() < size_t{1} + rest[0]) return false;
+      const std::string channel(reinterpret_cast<const char*>(rest.data()) + 1, rest[0]);
+      if (stage_.source->command(channel, rest.subspan(size_t{1} + rest[0]))) return true;
+      JsonWriter json;
+      json.open('{').member("refused", channel).close('}');
+      note_ = json.text();
+      return true;
+    }
+    case Operation::traffic:
+      traffic_ = !rest.empty() && rest[0] != 0;
+      next_traffic_ = {};
+      return true;
+    case Operation::play:
+      if (rest.size() != 9) return false;
+      if (const double speed = read_double(rest.subspan(1)); std::isfinite(speed) && speed > 0.0) stage_.source->play(rest[0] != 0, speed);
+      return true;
+    case Operation::seek:
+      if (rest.size() != 8) return false;
+      if (const double time_s = read_double(rest); std::isfinite(time_s)) stage_.source->seek(stage_.board, time_s);
+      return true;
+  }
+  return false;
+}
+
+void Viewer::want(std::string_view names) {
+  for (size_t i = 0; i < sights_.size(); ++i) {
+    if (sights_[i].wanted) --stage_.board.channels()[i].watchers;
+  }
+  wanted_names_.clear();
+  while (!names.empty() && wanted_names_.size() < kMostWanted) {
+    const size_t end = std::min(names.find('\n'), names.size());
+    wanted_names_.emplace_back(names.substr(0, end));
+    names.remove_prefix(std::min(end + 1, names.size()));
+  }
+  std::sort(wanted_names_.begin(), wanted_names_.end());
+  const std::vector<Sight> before = std::move(sights_);
+  sights_.clear();
+  if (wanted_names_.empty()) return;
+  match_names();
+  for (size_t i = 0; i < std::min(before.size(), sights_.size()); ++i) sights_[i].sent = before[i].wanted ? before[i].sent : 0;
+}
+
+void Viewer::match_names() {
+  auto& channels = stage_.board.channels();
+  for (size_t i = sights_.size(); i < channels.size(); ++i) {
+    Sight& sight = sights_.emplace_back();
+    sight.wanted = std::binary_search(wanted_names_.begin(), wanted_names_.end(), channels[i].name);
+    if (sight.wanted) ++channels[i].watchers;
+  }
+}
+
+bool Viewer::next(std::vector<uint8_t>& message, bool& text) {
+  std::string words;
+  text = next_text(words);
+  if (text) {
+    message.insert(message.end(), words.begin(), words.end());
+    return true;
+  }
+  if (parted_) return false;
+  if (const auto now = std::chrono::steady_clock::now(); traffic_ && now >= next_traffic_) {
+    next_traffic_ = now + kTrafficPeriod;
+    add_traffic(message);
+    return true;
+  }
+  return unseen_ < kMostUnseen && next_messages(message);
+}
+
+bool Viewer::next_text(std::string& text) {
+  if (!greeted_) {
+    greeted_ = true;
+    text = stage_.greeting;
+    return true;
+  }
+  if (!note_.empty()) {
+    text = std::move(note_);
+    note_.clear();
+    return true;
+  }
+  if (!stage_.farewell.empty()) {
+    text = stage_.farewell;
+    return !std::exchange(parted_, true);
+  }
+  if (told_world_ != stage_.world_version) {
+    told_world_ = stage_.world_version;
+    text = "{\"scene\": " + std::to_string(told_world_) + "}";
+    return true;
+  }
+  if (const Playback* playback = stage_.source->playback(); playback && told_playback_ != stage_.playback_version) {
+    told_playback_ = stage_.playback_version;
+    JsonWriter json;
+    json.open('{').name("playback").open('{').member("begin", playback->begin_s).member("end", playback->end_s).member("now", playback->now_s);
+    json.member("speed", playback->speed).member("playing", playback->playing).close('}').close('}');
+    text = json.text();
+    return true;
+  }
+  const auto& channels = stage_.board.channels();
+  if (told_channels_ < channels.size()) {
+    JsonWriter json;
+    json.open('{').member("first", static_cast<int64_t>(told_channels_)).name("channels").open('[');
+    const size_t end = std::min(channels.size(), told_channels_ + kMostNames);
+    for (; told_channels_ < end; ++told_channels_) json.value(channels[told_channels_].name);
+    json.close(']').close('}');
+    text = json.text();
+    return true;
+  }
+  return false;
+}
+
+// A frame: its kind (4 bytes), then of each message channel (4 bytes), size (4 bytes), bytes.
+bool Viewer::next_messages(std::vector<uint8_t>& frame) {
+  if (wanted_names_.empty()) return false;
+  match_names();
+  const size_t begin = frame.size();
+  const auto& channels = stage_.board.channels();
+  for (size_t i = 0; i < sights_.size() && frame.size() - begin < kMostFrame; ++i) {
+    Sight& sight = sights_[i];
+    if (!sight.wanted || sight.sent == channels[i].last_number) continue;
+    for (const Board::Message& message : channels[i].newest) {
+      if (message.number <= sight.sent) continue;
+      if (frame.size() == begin) append(frame, uint32_t{static_cast<uint8_t>(Frame::messages)});
+      append(frame, static_cast<uint32_t>(i));
+      append(frame, static_cast<uint32_t>(message.bytes->size()));
+      frame.insert(frame.end(), message.bytes->begin(), message.bytes->end());
+    }
+    sight.sent = channels[i].last_number;
+  }
+  if (frame.size() == begin) return false;
+  ++unseen_;
+  return true;
+}
+
+// Its kind (4 bytes), then of each channel the count of messages (4 bytes, wraps) and the newest one's size (4 bytes).
+void Viewer::add_traffic(std::vector<uint8_t>& frame) {
+  append(frame, uint32_t{static_cast<uint8_t>(Frame::traffic)});
+  for (size_t i = 0; i < stage_.board.channels().size(); ++i) {
+    const Source::Count count = stage_.source->traffic(i);
+    append(frame, static_cast<uint32_t>(count.messages));
+    append(frame, count.size);
+  }
+}
+
+}  // namespace ruedo::console

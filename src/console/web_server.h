@@ -1,0 +1,66 @@
+// HTTP and WebSocket for the console, over libwebsockets: one thread, one port, everything bounded.
+//
+// Why libwebsockets: a small C library that every distribution has, with one event loop for HTTP and WebSocket.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "console/board.h"
+#include "console/guard.h"
+
+namespace ruedo::console {
+
+struct HttpResponse {
+  int status = 200;
+  std::string type = "text/plain; charset=utf-8";
+  Bytes body;
+  bool gzip = false;         // the body is compressed
+  bool lasting = false;      // may be kept by the browser
+};
+
+// One browser's WebSocket.
+class Connection {
+ public:
+  virtual ~Connection() = default;
+  // A whole message; false ends the connection.
+  virtual bool receive(std::span<const uint8_t> message) = 0;
+  // The next message to send, into `message`; false when there is none now.
+  virtual bool next(std::vector<uint8_t>& message, bool& text) = 0;
+};
+
+struct WebHandler {
+  std::function<HttpResponse(std::string_view path)> get;
+  std::function<std::unique_ptr<Connection>()> open;    // null: there are too many
+  std::function<void()> end;                            // before the last messages are sent
+  std::function<bool()> tick;                           // every few milliseconds while there are connections; true: they may have something to send
+};
+
+class WebServer {
+ public:
+  static constexpr size_t kMostConnections = 320;             // HTTP and WebSocket together
+  static constexpr size_t kMostMessage = size_t{1} << 20;     // bytes that a browser may send as one message
+  static constexpr size_t kMostHeaders = 4096;                // bytes of a request's headers
+
+  // Binds the port. Throws EnvironmentError, with the cure, when that cannot be had.
+  WebServer(const Address& address, const std::string& token, WebHandler handler);
+  ~WebServer();
+  WebServer(const WebServer&) = delete;
+  WebServer& operator=(const WebServer&) = delete;
+
+  int port() const;
+  // Serves until stop(); then gives what waits a moment to be sent.
+  void run();
+  void stop();    // any thread
+
+  struct Impl;
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace ruedo::console
