@@ -8,6 +8,7 @@ namespace ruedo::physics {
 namespace {
 
 constexpr double kSlack_m = 0.05;
+constexpr size_t kPartners = 8, kFound = 64;    // room for so many beforehand: the running loop allocates none
 
 btDbvtVolume widened(const btVector3& low, const btVector3& high, double by) {
   btDbvtVolume volume = btDbvtVolume::FromMM(low, high);
@@ -47,6 +48,8 @@ btBroadphaseProxy* Broadphase::createProxy(const btVector3& low, const btVector3
   proxy.m_collisionFilterMask = mask;
   proxy.m_uniqueId = ++made_;
   proxy.moves = group != btBroadphaseProxy::StaticFilter;
+  if (proxy.moves) proxy.partners.reserve(kPartners);
+  found_.reserve(kFound);
   if (btBroadphaseProxy::isInfinite(shape_type)) {
     planes_.push_back(&proxy);
     return &proxy;

@@ -12,6 +12,8 @@ namespace {
 
 // The contacts of several substeps are one where they are so near each other.
 constexpr double kSamePlace_m = 5e-3;
+// Room beforehand: a face has four points, and most bodies touch two others at most.
+constexpr size_t kRoom = 64, kRoomPerBody = 8;
 
 // The entry of a child shape in one of ObjectInfo's lists; Bullet says no child for what is a single shape.
 int entry_of(const ObjectInfo& info, const std::vector<int>& list, int child) {
@@ -52,6 +54,13 @@ void ContactBook::ByBody::fill(const std::vector<Contact>& contacts) {
     auto& range = ranges_[static_cast<size_t>(entries_[i].body_a)];
     if (range.second++ == 0) range.first = i;
   }
+}
+
+void ContactBook::make_room(size_t bodies) {
+  const size_t contacts = kRoom + kRoomPerBody * bodies;
+  for (auto* list : {&contacts_, &near_only_, &merged_}) list->reserve(contacts);
+  touching_.reserve(2 * contacts);
+  near_.reserve(2 * contacts);
 }
 
 void ContactBook::clear(double step_s) {

@@ -12,9 +12,12 @@ namespace ruedo::physics {
 
 class ContactBook {
  public:
-  explicit ContactBook(size_t bodies) : touching_(bodies), near_(bodies) {}
+  explicit ContactBook(size_t bodies) : touching_(bodies), near_(bodies) { make_room(bodies); }
 
-  void resize(size_t bodies) { touching_.resize(bodies), near_.resize(bodies); }
+  void resize(size_t bodies) { touching_.resize(bodies), near_.resize(bodies), make_room(bodies); }
+  // For so many contacts memory is taken beforehand, so that new ones do not allocate in the running loop. What is not
+  // used costs addresses only.
+  size_t room() const { return contacts_.capacity(); }
 
   // Starts a step of that length (s).
   void clear(double step_s);
@@ -33,6 +36,7 @@ class ContactBook {
    public:
     explicit ByBody(size_t bodies) : ranges_(bodies, {0, 0}) {}
     void resize(size_t bodies) { ranges_.resize(bodies, {0, 0}); }
+    void reserve(size_t contacts) { entries_.reserve(contacts); }
     void clear();
     void fill(const std::vector<Contact>& contacts);
     std::span<const Contact> of(int body) const {
@@ -45,6 +49,7 @@ class ContactBook {
     std::vector<std::pair<size_t, size_t>> ranges_;    // first, count
   };
 
+  void make_room(size_t bodies);
   void merge();
 
   double step_s_ = 0.0;

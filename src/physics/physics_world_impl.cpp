@@ -63,6 +63,7 @@ PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout
   for (const auto& object : rigid_.statics) add_static(*object);
   const size_t n = layout.bodies.size();
   motions_.resize(n);
+  simulated_.reserve(n);
   twists_.resize(n);
   for (const auto& body : layout.bodies) poses_.push_back(body.X_WB.normalized());
   add_joints();
@@ -320,6 +321,7 @@ void PhysicsWorld::Impl::read(Snapshot& snapshot) const {
     snapshot.joint_velocities[i] = joints_[i].velocity();
     snapshot.joint_efforts[i] = joints_[i].effort();
   }
+  snapshot.contacts.reserve(contacts_.room());
   snapshot.contacts = contacts_.all();
 }
 

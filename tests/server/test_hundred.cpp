@@ -72,9 +72,17 @@ TEST(Hundred, SameBytesForOneTwoAndEightThreads) {
   EXPECT_TRUE(one == log_of(robots, 8));
 }
 
-// operator new in 1 000 steps, counted between two messages that only the publisher sends. Nothing is touched: lists of
-// contacts grow when there are more of them than ever before.
-uint64_t allocations_in_thousand_steps(int robots) {
+// Straight on, into the walls and into those who stand there already.
+void drive_into_walls(Server& server, int robots) {
+  move_command_t command{};
+  command.kind = move_command_t::ADVANCE;
+  command.value = 1e6;
+  command.speed = 0.4;
+  for (int i = 0; i < robots; ++i) server.command("r" + std::to_string(i) + "/move", encoded(command));
+}
+
+// operator new in 1 000 steps, from 5 s to 10 s of sim time, counted between two messages that only the publisher sends.
+uint64_t allocations_in_thousand_steps(int robots, void (*drive)(Server&, int)) {
   const Fleet all = fleet(robots);
   MemoryBus bus;
   bus.keep = false;
@@ -87,19 +95,28 @@ uint64_t allocations_in_thousand_steps(int robots) {
     if (poses == 501) at_end = allocations();
   };
   Server server(all.world, options_for(all, 11.0), bus);
-  drive_circles(server, robots);
+  drive(server, robots);
   server.run();
   EXPECT_GE(poses, 501);
   EXPECT_GT(at_start, 0u);
   return at_end - at_start;
 }
 
-TEST(Hundred, OneSteadyRobotAllocatesNothing) { EXPECT_EQ(allocations_in_thousand_steps(1), 0u); }
+TEST(Hundred, OneSteadyRobotAllocatesNothing) { EXPECT_EQ(allocations_in_thousand_steps(1, drive_circles), 0u); }
 TEST(Hundred, AHundredSteadyRobotsAllocateNothing) {
 #if defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "with the thread sanitizer a parallel loop starts threads, which allocates";
 #endif
-  EXPECT_EQ(allocations_in_thousand_steps(100), 0u);
+  EXPECT_EQ(allocations_in_thousand_steps(100, drive_circles), 0u);
+}
+
+// 0.4 m/s brings the robots at x = 6 m to the first column of walls after 2.6 s, and those at 3 m to their backs after about
+// 8.5 s: there are more contacts then than ever before.
+TEST(Hundred, NewContactsAllocateNothing) {
+#if defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "with the thread sanitizer a parallel loop starts threads, which allocates";
+#endif
+  EXPECT_EQ(allocations_in_thousand_steps(10, drive_into_walls), 0u);
 }
 
 }  // namespace
