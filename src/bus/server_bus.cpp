@@ -66,8 +66,8 @@ ServerBus open_server_bus(const std::string& text, const std::string& world) {
   const char* environment = std::getenv("LCM_DEFAULT_URL");
   const bool asked = !text.empty() || (environment && *environment);
   const bool routed = has_route(parse_url(kDefaultUrl));
-  if (text == "auto") {
-    ServerBus made = routed ? on_free_multicast_port(world) : on_free_tcp_port(world);
+  if (text == "auto" || text == "auto-tcp") {
+    ServerBus made = routed && text == "auto" ? on_free_multicast_port(world) : on_free_tcp_port(world);
     made.announce = true;
     return made;
   }

@@ -22,7 +22,7 @@ struct ServerBus {
   std::unique_ptr<Bus> bus;             // last: it is closed first
 };
 
-// `text` is an LCM URL; "auto": a free port of this machine; "": $LCM_DEFAULT_URL, else LCM's default group, else, where
+// `text` is an LCM URL; "auto": a free port of this machine; "auto-tcp": the same, and tcpq in any case; "": $LCM_DEFAULT_URL, else LCM's default group, else, where
 // that has no route, tcpq://127.0.0.1:7700. `world` is what others are told of this server. Throws InputError for a bad
 // address and EnvironmentError, with the cure, when it cannot be served or another server has it.
 ServerBus open_server_bus(const std::string& text, const std::string& world);

@@ -64,7 +64,7 @@ def test_version_and_help():
 
 
 def test_no_route_is_one_line_with_its_cure():
-    result = subprocess.run(["unshare", "-rn", RUEDO, "run", ARENA], capture_output=True, text=True, timeout=5)
+    result = subprocess.run(["unshare", "-rn", RUEDO, "run", ARENA, "--lcm", url(7800)], capture_output=True, text=True, timeout=5)
     if "unshare" in result.stderr:
         pytest.skip("no network namespaces here")
     assert result.returncode == 4

@@ -1,0 +1,99 @@
+"""pytest's fixture `ruedo_regression`: runs a world with a client as fast as it goes, on a port of its own, and
+fails with the first thing that is not as expected. It is there once the package `ruedo` is installed.
+
+    def test_drives_to_the_door(ruedo_regression):
+        ruedo_regression("office.sdf", client=["python3", "drive.py"], duration=60, goal=(3.0, 2.0), radius=0.3, by=50.0,
+                         no_contact=True, golden="goldens/door.lcm", tolerances=["*/pose:pos=abs:1e-3"])
+
+RUEDO_RENEW=1 in the environment writes the golden logs anew.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Callable, Sequence
+
+import pytest
+
+from .errors import RuedoError
+from .launch import find_ruedo
+
+_PathLike = str | os.PathLike[str]
+
+
+class RegressionFailed(RuedoError, AssertionError):
+    """The run is not as expected; the text says the first difference."""
+
+
+@dataclass(frozen=True)
+class Regression:
+    """A run that was as expected."""
+
+    log: Path          # of the whole run, a standard LCM log
+    output: str        # what the client and `ruedo regress` printed
+
+
+def run_regression(world: _PathLike, *, client: Sequence[_PathLike] | str | None = None, duration: float, seed: int = 1,
+                   record: _PathLike = "run.lcm", robot: str | None = None, goal: tuple[float, float] | None = None,
+                   radius: float | None = None, by: float | None = None, no_contact: bool = False, clearance: float | None = None,
+                   odometry_error: float | None = None, golden: _PathLike | None = None, keep: Sequence[str] = (),
+                   tolerances: Sequence[str] = (), ignore: Sequence[str] = (), lockstep: int = 0, wait_for: Sequence[str] = (),
+                   script: Sequence[_PathLike] | str | None = None, options: Sequence[str] = (), folder: _PathLike | None = None,
+                   timeout: float = 300.0) -> Regression:
+    """`ruedo regress` with these options; raises RegressionFailed.
+
+    client, script: words, or a line for a shell; the client finds the run by LCM_DEFAULT_URL, the script its log by
+    RUEDO_LOG. duration, by: s of sim time; goal, radius, clearance, odometry_error: m. lockstep: clients to wait for.
+    options: more of `ruedo regress`, such as ["--spawn", "p3at@1,2"]. folder: where client and script run. timeout: s of
+    real time.
+    """
+    command = [find_ruedo(), "regress", os.fspath(world), "--duration", str(duration), "--seed", str(seed),
+               "--record", os.path.abspath(record)]
+    if goal is not None:
+        if radius is None or by is None:
+            raise ValueError("a goal needs its radius (m) and by (s)")
+        command.append(f"--goal={goal[0]!r},{goal[1]!r},{radius!r},{by!r}")
+    for name, value in (("client", client), ("script", script)):
+        if value is not None:
+            command += [f"--{name}", value if isinstance(value, str) else shlex.join(os.fspath(word) for word in value)]
+    for name, one in (("robot", robot), ("clearance", clearance), ("odometry-error", odometry_error), ("lockstep", lockstep or None)):
+        if one is not None:
+            command += [f"--{name}", str(one)]
+    if golden is not None:
+        command += ["--golden", os.path.abspath(golden)]
+    for name, several in (("keep", keep), ("tolerance", tolerances), ("ignore", ignore), ("wait-for", wait_for)):
+        for item in several:
+            command += [f"--{name}", item]
+    if no_contact:
+        command.append("--no-contact")
+    try:
+        done = subprocess.run([*command, *options], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=timeout)
+    except subprocess.TimeoutExpired as error:
+        raise RegressionFailed(f"the regression took more than {timeout:g} s of real time; {shlex.join(command)}\n{error.output or ''}") from None
+    if done.returncode != 0:
+        raise RegressionFailed(f"{done.stdout}\n(exit code {done.returncode} of {shlex.join(command)})")
+    return Regression(Path(record).absolute(), done.stdout)
+
+
+@pytest.fixture
+def ruedo_regression(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[..., Regression]:
+    """run_regression() with the log in the test's temporary folder; world and golden are relative to the test's file,
+    and client and script run beside it."""
+    here = request.path.parent
+
+    def run(world: _PathLike, **options: object) -> Regression:
+        options.setdefault("record", tmp_path / "run.lcm")
+        options.setdefault("folder", here)
+        if options.get("golden") is not None:
+            options["golden"] = here / str(options["golden"])
+        beside = here / world
+        result = run_regression(beside if beside.exists() else world, **options)    # type: ignore[arg-type]
+        print(result.output, file=sys.stderr)
+        return result
+
+    return run

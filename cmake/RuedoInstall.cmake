@@ -1,0 +1,28 @@
+# What `cmake --install` puts where. The whole may be moved afterwards: the programs find worlds and libraries relative
+# to themselves, and find_package(ruedo) takes its paths from where it lies.
+include(CMakePackageConfigHelpers)
+set(package ${CMAKE_INSTALL_LIBDIR}/cmake/ruedo)
+
+set_target_properties(ruedo ruedo-import-mesh PROPERTIES INSTALL_RPATH "\$ORIGIN/../${CMAKE_INSTALL_LIBDIR}/ruedo")
+install(TARGETS ruedo ruedo-import-mesh RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(DIRECTORY ${CMAKE_SOURCE_DIR}/worlds DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo)
+install(DIRECTORY ${CMAKE_SOURCE_DIR}/proto DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo FILES_MATCHING PATTERN "*.lcm")
+
+# LCM, which came from a wheel and may not be there where this is moved to.
+get_target_property(lcm_library lcm LOCATION)
+install(FILES ${lcm_library} DESTINATION ${CMAKE_INSTALL_LIBDIR}/ruedo RENAME liblcm.so.1)
+
+# find_package(ruedo)
+install(EXPORT ruedo FILE ruedoTargets.cmake NAMESPACE ruedo:: DESTINATION ${package})
+configure_package_config_file(cmake/ruedoConfig.cmake.in ${CMAKE_BINARY_DIR}/cmake/ruedoConfig.cmake INSTALL_DESTINATION ${package})
+write_basic_package_version_file(${CMAKE_BINARY_DIR}/cmake/ruedoConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_BINARY_DIR}/cmake/ruedoConfig.cmake ${CMAKE_BINARY_DIR}/cmake/ruedoConfigVersion.cmake
+  cmake/RuedoRegression.cmake DESTINATION ${package})
+
+# The Python client with its pytest fixture, to put on PYTHONPATH; the metadata let pytest find the fixture there.
+set(python ${CMAKE_INSTALL_DATADIR}/ruedo/python)
+install(DIRECTORY ${CMAKE_BINARY_DIR}/python/ruedo DESTINATION ${python} PATTERN __pycache__ EXCLUDE)
+set(metadata ${CMAKE_BINARY_DIR}/cmake/ruedo-${PROJECT_VERSION}.dist-info)
+file(WRITE ${metadata}/METADATA "Metadata-Version: 2.1\nName: ruedo\nVersion: ${PROJECT_VERSION}\nRequires-Dist: lcm==1.5.3\nRequires-Dist: numpy\n")
+file(WRITE ${metadata}/entry_points.txt "[pytest11]\nruedo = ruedo.regression\n")
+install(DIRECTORY ${metadata} DESTINATION ${python})

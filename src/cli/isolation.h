@@ -1,0 +1,10 @@
+// A network of this program's own: nobody else's messages come in, and none of its go out.
+#pragma once
+
+namespace ruedo::cli {
+
+// Starts this program again, with its arguments, in a network namespace in which multicast goes over the loopback device;
+// there it returns true. False where the system has no namespaces for this user. Call it before any thread is made.
+bool isolate();
+
+}  // namespace ruedo::cli

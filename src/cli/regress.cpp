@@ -1,0 +1,187 @@
+// ruedo regress: one regression of a user's: a world, a client, and what must come of it. ctest and pytest run it.
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+
+#include <fmt/format.h>
+#include <fnmatch.h>
+#include <spdlog/spdlog.h>
+
+#include "bus/rival_watch.h"
+#include "bus/server_bus.h"
+#include "cli/client_process.h"
+#include "cli/commands.h"
+#include "cli/isolation.h"
+#include "cli/judge.h"
+#include "ruedo/errors.h"
+#include "server/log_diff.h"
+#include "server/log_reader.h"
+#include "server/log_writer.h"
+#include "server/server.h"
+
+namespace ruedo::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct RegressArguments {
+  WorldArguments world;
+  uint64_t seed = 1;
+  std::string duration, rate = "max", client, golden, record, script, junit, html;
+  std::vector<std::string> remaps, wait_for, goals, tolerances, ignored, keep;
+  Expectations expected;
+  double clearance = -1.0, odometry_error = -1.0;
+  int lockstep = 0;
+  bool renew = false, shared_network = false;
+};
+
+server::ServerOptions server_options(const RegressArguments& arguments) {
+  server::ServerOptions options;
+  options.rate = parse_rate(arguments.rate);
+  options.duration_us = parse_duration_us(arguments.duration);
+  options.lockstep = {arguments.lockstep, 30.0, server::LockstepOptions::Policy::fail};
+  options.record = arguments.record;
+  options.result_options = result_options(arguments.world);
+  for (const std::string& text : arguments.remaps) {
+    options.remaps.push_back(parse_remap(text));
+    options.result_options.push_back("--remap=" + text);
+  }
+  for (const std::string& text : arguments.wait_for) options.wait_for.push_back(parse_wait_for(text));
+  options.simulation.fleet.seed = arguments.seed;
+  options.simulation.fleet.noise = !arguments.world.no_noise;
+  options.simulation.fleet.disabled = arguments.world.disabled;
+  return options;
+}
+
+// The run. What went wrong besides expectations, or "".
+std::string run(const RegressArguments& arguments, const std::shared_ptr<const model::WorldModel>& world, bool isolated, Judge& judge) {
+  bus::ServerBus place = bus::open_server_bus(isolated ? "auto" : "auto-tcp", world->name);
+  bus::RivalWatch bus(std::move(place.bus), [](const std::string& line) { spdlog::warn(line); });
+  server::Server server(world, server_options(arguments), bus);
+  server.on_state([&](const Snapshot& snapshot) { judge.see(snapshot); });
+  std::unique_ptr<ClientProcess> client;
+  if (!arguments.client.empty()) {
+    client = std::make_unique<ClientProcess>(arguments.client, std::vector<std::string>{"LCM_DEFAULT_URL=" + place.url.str()},
+                                             [&server] { server.stop(); });
+  }
+  std::string fault;
+  try {
+    server.run();
+  } catch (const server::LeaseEnded& ended) {
+    fault = ended.what();
+  }
+  if (client && client->end() && !client->fault().empty()) return "the client ended with " + client->fault();
+  return fault;
+}
+
+// A log's events on the channels that are kept.
+void keep_channels(const std::string& from, const std::string& to, const std::vector<std::string>& patterns) {
+  const auto kept = [&](const std::string& channel) {
+    return std::any_of(patterns.begin(), patterns.end(), [&](const std::string& pattern) { return fnmatch(pattern.c_str(), channel.c_str(), 0) == 0; });
+  };
+  server::LogReader log(from);
+  server::LogWriter writer(to);
+  server::LogEvent event;
+  int64_t count = 0;
+  while (log.next(event)) {
+    if (!kept(event.channel)) continue;
+    writer.write(event.timestamp_us, event.channel, event.data.data(), event.data.size());
+    ++count;
+  }
+  writer.flush();
+  if (!writer.error().empty()) throw EnvironmentError(to + ": " + writer.error());
+  if (count == 0) throw InputError({}, fmt::format("--keep {}: no message is on such a channel", fmt::join(patterns, " ")));
+}
+
+void write_file(const std::string& path, const std::string& text) {
+  std::FILE* file = std::fopen(path.c_str(), "w");
+  if (!file || std::fwrite(text.data(), 1, text.size(), file) != text.size() || std::fclose(file) != 0) throw EnvironmentError(path + " cannot be written");
+}
+
+// What differs from the golden log, or "".
+std::string compare(const RegressArguments& arguments, const std::string& kept) {
+  if (!fs::exists(arguments.golden)) return "there is no golden log " + arguments.golden + " yet: run this once with RUEDO_RENEW=1";
+  std::vector<server::DiffRule> rules;
+  for (const std::string& text : arguments.tolerances) rules.push_back(server::DiffRule::parse(text, false));
+  for (const std::string& text : arguments.ignored) rules.push_back(server::DiffRule::parse(text, true));
+  const server::LogDiff result = server::diff_logs(arguments.golden, kept, rules);
+  if (!arguments.junit.empty()) write_file(arguments.junit, server::diff_junit(result));
+  if (!arguments.html.empty()) write_file(arguments.html, server::diff_html(result, arguments.golden, kept));
+  return result.same() ? "" : "the run differs from " + arguments.golden + ":\n" + server::diff_text(result);
+}
+
+std::string run_script(const RegressArguments& arguments) {
+  ClientProcess script(arguments.script, {"RUEDO_LOG=" + fs::absolute(arguments.record).string(), "RUEDO_WORLD=" + fs::absolute(arguments.world.world).string()}, [] {});
+  script.wait();
+  return script.fault().empty() ? "" : "the script ended with " + script.fault() + ": " + arguments.script;
+}
+
+int regress(RegressArguments arguments) {
+  const bool isolated = !arguments.shared_network && isolate();
+  Expectations& expected = arguments.expected;
+  for (const std::string& text : arguments.goals) expected.goals.push_back(parse_goal(text));
+  if (arguments.clearance >= 0.0) expected.clearance = arguments.clearance;
+  if (arguments.odometry_error >= 0.0) expected.odometry_error = arguments.odometry_error;
+  if (arguments.keep.empty()) arguments.keep = {"*/pose"};
+  const char* environment = std::getenv("RUEDO_RENEW");
+  const bool renew = arguments.renew || (environment && *environment && std::string(environment) != "0");
+  const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
+  print_findings(world->findings);
+  Judge judge(*world, expected);
+  std::vector<std::string> failures;
+  if (std::string fault = run(arguments, world, isolated, judge); !fault.empty()) failures.push_back(fault);
+  for (std::string& line : judge.failures(arguments.record)) failures.push_back(std::move(line));
+  if (!arguments.golden.empty()) {
+    const std::string kept = arguments.record + ".kept";
+    keep_channels(arguments.record, renew && failures.empty() ? arguments.golden : kept, arguments.keep);
+    if (renew && failures.empty()) {
+      fmt::print("renewed {}\n", arguments.golden);
+    } else if (std::string difference = compare(arguments, kept); !difference.empty()) {
+      failures.push_back(difference);
+    }
+  }
+  if (!arguments.script.empty()) {
+    if (std::string fault = run_script(arguments); !fault.empty()) failures.push_back(fault);
+  }
+  for (const std::string& line : failures) fmt::print(stderr, "FAILED: {}\n", line);
+  if (failures.empty()) fmt::print("passed; the run is in {}\n", arguments.record);
+  return failures.empty() ? kGood : kCheckFailed;
+}
+
+void add_regress(CLI::App& app, Action& chosen) {
+  CLI::App* command = app.add_subcommand("regress", "run a world with a client on a port of its own, and hold the run against what is expected of it");
+  const auto a = std::make_shared<RegressArguments>();
+  const auto list = [&](const char* name, std::vector<std::string>& to, const char* text, const char* type) {
+    command->add_option(name, to, text)->type_name(type)->allow_extra_args(false);
+  };
+  add_world_arguments(*command, a->world);
+  command->add_option("--client", a->client, "command line of the client, for a shell; LCM_DEFAULT_URL says where the run is")->type_name("COMMAND");
+  command->add_option("--seed", a->seed, "of all noise")->type_name("N")->capture_default_str();
+  command->add_option("--duration", a->duration, "end after so many seconds of sim time, or when the client ends")->type_name("S")->required();
+  command->add_option("--rate", a->rate, "sim time per real time, or max")->type_name("R|max")->capture_default_str();
+  command->add_option("--record", a->record, "the log of the run")->type_name("FILE")->required();
+  command->add_option("--lockstep", a->lockstep, "wait for so many clients, then go as far as all of them grant")->type_name("N")->check(CLI::Range(1, 64));
+  list("--wait-for", a->wait_for, "do not pass a step at which a message on that channel is due: CHANNEL@HZ", "WAIT");
+  list("--remap", a->remaps, "give a channel another name: CHANNEL=NAME", "REMAP");
+  command->add_option("--robot", a->expected.robot, "whom the expectations are about (default: the first of the world)")->type_name("NAME");
+  list("--goal", a->goals, "base_link gets within RADIUS of X, Y by a time: X,Y,RADIUS,BY (m, s)", "GOAL");
+  command->add_flag("--no-contact", a->expected.no_contact, "the robot touches nothing but the ground");
+  command->add_option("--clearance", a->clearance, "at least so far from everything (m)")->type_name("M")->check(CLI::Range(0.0, 100.0));
+  command->add_option("--odometry-error", a->odometry_error, "odometry at most so far from the truth (m)")->type_name("M")->check(CLI::Range(0.0, 1e6));
+  command->add_option("--golden", a->golden, "log to compare with")->type_name("FILE");
+  list("--keep", a->keep, "channels that golden logs hold; shell patterns (default: */pose)", "PATTERN");
+  list("--tolerance", a->tolerances, "as of ruedo diff", "RULE");
+  list("--ignore", a->ignored, "as of ruedo diff", "PATTERN");
+  command->add_option("--junit", a->junit, "write how the golden log compares as JUnit XML")->type_name("FILE");
+  command->add_option("--html", a->html, "write it as a page with plots")->type_name("FILE");
+  command->add_option("--script", a->script, "command line that judges too, by its exit code; RUEDO_LOG is the run's log")->type_name("COMMAND");
+  command->add_flag("--shared-network", a->shared_network, "no network of its own: for a client that needs other machines");
+  command->add_flag("--renew", a->renew, "write the golden log anew, when all else holds; or set RUEDO_RENEW=1");
+  command->callback([a, &chosen] { chosen = [a] { return regress(*a); }; });
+}
+
+const RegisterCommand kRegister{55, add_regress};
+
+}  // namespace
+}  // namespace ruedo::cli

@@ -1,0 +1,122 @@
+"""Installs Ruedo into a folder, moves that, and runs docs/example-project against it; then what each of a regression's
+expectations says when it does not hold."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SOURCE = Path(os.environ["RUEDO_SOURCE_DIR"])
+BUILD = Path(os.environ["RUEDO_BINARY_DIR"])
+CMAKE = os.environ.get("CMAKE_COMMAND", "cmake")
+EXAMPLE = SOURCE / "docs/example-project"
+CLEAN = {k: v for k, v in os.environ.items() if not k.startswith("RUEDO") and k not in ("LCM_DEFAULT_URL", "PYTHONPATH", "LD_LIBRARY_PATH")}
+
+
+def run(*command, good=True, **options):
+    done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                          env={**CLEAN, **options.pop("more", {})}, timeout=600, **options)
+    assert not good or done.returncode == 0, done.stdout
+    return done
+
+
+@pytest.fixture(scope="module")
+def prefix(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("ruedo")
+    run(CMAKE, "--install", BUILD, "--prefix", folder / "first")
+    (folder / "first").rename(folder / "moved")
+    return folder / "moved"
+
+
+@pytest.fixture(scope="module")
+def project(prefix, tmp_path_factory):
+    """The example, built."""
+    folder = tmp_path_factory.mktemp("project")
+    shutil.copytree(EXAMPLE, folder / "gate")
+    build = folder / "gate/build"
+    run(CMAKE, "-S", folder / "gate", "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}", f"-DPython3_EXECUTABLE={sys.executable}",
+        "-DCMAKE_BUILD_TYPE=Release")
+    run(CMAKE, "--build", build)
+    return folder / "gate"
+
+
+def ctest(project, *options, good=True):
+    return run("ctest", "--test-dir", project / "build", "--output-on-failure", *options, good=good).stdout
+
+
+def regress(prefix, *options, good=True, folder=None, world=EXAMPLE / "gate.sdf", client=True, more={}):
+    words = [prefix / "bin/ruedo", "regress", world, "--record", folder / "run.lcm", "--seed", "7", "--duration", "12", *options]
+    if client:
+        words += ["--lockstep", "1", "--client", f"{sys.executable} {EXAMPLE}/through_the_gate.py"]
+    return run(*words, good=good, more={"PYTHONPATH": f"{prefix}/share/ruedo/python", **more})
+
+
+def test_the_moved_program_finds_its_own(prefix):
+    said = run("ldd", prefix / "bin/ruedo").stdout
+    assert re.search(rf"liblcm.so.1 => {re.escape(str(prefix))}", said), said
+    run(prefix / "bin/ruedo", "check", prefix / "share/ruedo/worlds/arena.sdf", cwd="/")
+    # Worlds and importer come from beside the program, not from where it was built.
+    traced = subprocess.run(["strings", prefix / "bin/ruedo"], capture_output=True, text=True)
+    if traced.returncode == 0:
+        said = run(prefix / "bin/ruedo", "info", EXAMPLE / "gate.sdf", "--json", cwd="/", good=False).stdout
+        assert str(SOURCE / "worlds") not in said
+
+
+def test_the_example_from_nothing_to_green(project):
+    """Without goldens it says what to do; renewed, all is green, in parallel; twice gives the same."""
+    said = ctest(project, "-R", "^gate$", good=False)
+    assert "there is no golden log" in said and "RUEDO_RENEW=1" in said
+    said = run(CMAKE, "--build", project / "build", "--target", "renew-goldens").stdout
+    golden = project / "goldens/gate.lcm"
+    first = golden.read_bytes()
+    assert 1_000 < len(first) < 400_000
+    assert "100% tests passed" in ctest(project, "-j", "3")
+    run(CMAKE, "--build", project / "build", "--target", "renew-goldens")
+    assert golden.read_bytes() == first    # repeatable: byte by byte
+
+
+def test_another_way_is_the_first_difference(prefix, project, tmp_path):
+    golden = tmp_path / "golden.lcm"
+    keep = ["--golden", golden, "--keep", "p3at/pose", "--tolerance", "p3at/pose:*=abs:1e-6"]
+    regress(prefix, *keep, "--renew", folder=tmp_path)
+    regress(prefix, *keep, folder=tmp_path)
+    said = regress(prefix, *keep, folder=tmp_path, good=False, more={"SPEED": "0.41"})
+    assert said.returncode == 1 and "the run differs from" in said.stdout and "p3at/pose" in said.stdout
+
+
+@pytest.mark.parametrize("options, words", [
+    (["--goal", "4,0,0.3,5"], r"5\.000 s: p3at was not within 0.3 m of \(4, 0\) by 5 s"),
+    (["--clearance", "0.6"], r"s: p3at was 0\.5\d\d m from (left|right)_post/link, at least 0\.6 m"),
+    (["--odometry-error", "0.0000001"], r"s: p3at's odometry was 0\.0\d\d m off"),
+    (["--script", "test -s $RUEDO_LOG && exit 7"], r"the script ended with exit code 7"),
+    (["--robot", "nobody"], r"--robot 'nobody': the world has p3at"),
+    (["--goal", "4,0,0.3"], r"X,Y,RADIUS,BY"),
+    (["--keep", "nothing/*", "--golden", "never.lcm"], r"no message is on such a channel"),
+])
+def test_what_does_not_hold_is_said(prefix, options, words, tmp_path):
+    said = regress(prefix, *options, folder=tmp_path, good=False)
+    assert said.returncode in (1, 2) and re.search(words, said.stdout), said.stdout
+
+
+def test_contact_is_said(prefix, tmp_path):
+    """Straight ahead into a wall, by a client without lockstep."""
+    world = SOURCE / "tests/clients/hall.sdf"
+    client = 'import ruedo\nsim = ruedo.connect(timeout=30)\nrobot = sim.robot("p3at")\nrobot.set_velocity(0.7, 0)\nsim.sleep(100)\n'
+    (tmp_path / "blind.py").write_text(client)
+    said = regress(prefix, "--no-contact", "--client", f"{sys.executable} {tmp_path}/blind.py", folder=tmp_path, world=world, client=False, good=False)
+    assert said.returncode == 1 and re.search(r"p3at/\w+ touched wall/link at \(6\.0", said.stdout), said.stdout
+
+
+def test_a_client_that_fails_fails_the_regression(prefix, tmp_path):
+    said = regress(prefix, "--client", "exit 3", folder=tmp_path, client=False, good=False)
+    assert said.returncode == 1 and "the client ended with exit code 3" in said.stdout
+
+
+def test_without_namespaces_it_is_tcp(prefix, tmp_path):
+    """The client is told an address of this machine's loopback device."""
+    said = regress(prefix, "--shared-network", "--client", "echo url $LCM_DEFAULT_URL", folder=tmp_path, client=False)
+    assert re.search(r"url tcpq://127\.0\.0\.1:\d+", said.stdout), said.stdout
