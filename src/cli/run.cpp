@@ -9,9 +9,11 @@
 
 #include <fmt/format.h>
 #include <pthread.h>
+#include <spdlog/spdlog.h>
 #include <unistd.h>
 
-#include "bus/lcm_bus.h"
+#include "bus/rival_watch.h"
+#include "bus/server_bus.h"
 #include "cli/commands.h"
 #include "cli/listing.h"
 #include "cli/view.h"
@@ -25,8 +27,11 @@ namespace {
 struct RunArguments {
   WorldArguments world;
   uint64_t seed = 1;
-  std::string rate = "1", duration, lcm, record, control = "on";
-  std::vector<std::string> remaps;
+  std::string rate, duration, lcm, record, control = "on", lease_policy = "pause";
+  int lockstep = 0;
+  double lease = 10.0;
+  std::string snapshots, restore;
+  std::vector<std::string> remaps, wait_for;
   std::string view;
   bool viewed = false;
   bool paused = false, quiet = false, watch_stdin = false;
@@ -109,11 +114,19 @@ class StatusLine {
   std::chrono::steady_clock::time_point last_time_ = std::chrono::steady_clock::now();
 };
 
+server::LockstepOptions lockstep_options(const RunArguments& arguments) {
+  using Policy = server::LockstepOptions::Policy;
+  if (arguments.lockstep > 0 && arguments.control == "off") throw InputError({}, "--lockstep needs requests: not with --control off");
+  const Policy policy = arguments.lease_policy == "drop" ? Policy::drop : arguments.lease_policy == "fail" ? Policy::fail : Policy::pause;
+  return {arguments.lockstep, arguments.lease, policy};
+}
+
 server::ServerOptions server_options(const RunArguments& arguments) {
   server::ServerOptions options;
-  options.rate = parse_rate(arguments.rate);
+  options.rate = parse_rate(!arguments.rate.empty() ? arguments.rate : arguments.lockstep > 0 ? "max" : "1");
   if (!arguments.duration.empty()) options.duration_us = parse_duration_us(arguments.duration);
   options.paused = arguments.paused;
+  options.lockstep = lockstep_options(arguments);
   options.control = arguments.control == "on";
   options.record = arguments.record;
   options.result_options = result_options(arguments.world);
@@ -121,10 +134,23 @@ server::ServerOptions server_options(const RunArguments& arguments) {
     options.remaps.push_back(parse_remap(text));
     options.result_options.push_back("--remap=" + text);
   }
+  for (const std::string& text : arguments.wait_for) options.wait_for.push_back(parse_wait_for(text));
+  if (arguments.lockstep > 0 && !(arguments.wait_for.empty() && arguments.restore.empty())) {
+    throw InputError({}, "--lockstep goes neither with --wait-for nor with --restore");
+  }
+  options.snapshots = arguments.snapshots;
+  options.repeat = arguments.restore;
   options.simulation.fleet.seed = arguments.seed;
   options.simulation.fleet.noise = !arguments.world.no_noise;
   options.simulation.fleet.disabled = arguments.world.disabled;
   return options;
+}
+
+// What clients need to find this server, where they would not find it by themselves.
+void announce(const bus::ServerBus& place) {
+  if (!place.note.empty()) spdlog::warn(place.note);
+  if (place.announce) fmt::print("{}\n", bus::export_line(place.url));
+  std::fflush(stdout);
 }
 
 int run(const RunArguments& arguments) {
@@ -133,16 +159,19 @@ int run(const RunArguments& arguments) {
   if (arguments.watch_stdin) watch_stdin();
   const server::ThreadLimit limit(arguments.threads);
   const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
-  bus::LcmBus bus(arguments.lcm);
+  bus::ServerBus place = bus::open_server_bus(arguments.lcm, world->name);
+  bus::RivalWatch bus(std::move(place.bus), [](const std::string& line) { spdlog::warn(line); });
   ViewedBus viewed(bus, arguments.viewed, arguments.view);
   server::Server server(world, std::move(options), viewed.bus());
+  place.claim->describe(fmt::format("pid {}, world {}, run {}", getpid(), world->name, server.run_id()));
+  announce(place);
   std::vector<Finding> findings = world->findings;
   findings.insert(findings.end(), server.findings().list().begin(), server.findings().list().end());
   print_findings(findings);
   if (!arguments.quiet) {
     const Style style = style_of(stdout);
     fmt::print("{}{}{}: steps of {:g} ms, seed {}, on {}\n", style.bold, world->name, style.off, static_cast<double>(world->step_us) * 1e-3,
-               arguments.seed, bus.url().str());
+               static_cast<uint64_t>(server.info().front().seed), place.url.str());
     print_channels(stdout, server.info());
     std::fflush(stdout);
   }
@@ -150,7 +179,13 @@ int run(const RunArguments& arguments) {
   StatusLine status;
   server.on_status([&](const server::Status& now) { status.draw(now); });
   signals.serve(&server);
-  server.run();
+  try {
+    server.run();
+  } catch (const server::LeaseEnded& ended) {
+    fmt::print(stderr, "ruedo: {}\n", ended.what());
+    signals.serve(nullptr);
+    return kCheckFailed;
+  }
   signals.serve(nullptr);
   return kGood;
 }
@@ -164,14 +199,23 @@ void add_run(CLI::App& app, Action& chosen) {
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
     return error == std::errc() && end == text.data() + text.size() ? "" : "'" + text + "' is not allowed; a seed is a whole number from 0 to 18446744073709551615";
   });
-  command->add_option("--rate", arguments->rate, "sim time per real time, or max")->type_name("R|max")->capture_default_str();
+  command->add_option("--rate", arguments->rate, "sim time per real time, or max (default: 1, in lockstep max)")->type_name("R|max");
   command->add_option("--duration", arguments->duration, "end after so many seconds of sim time")->type_name("S");
-  command->add_option("--lcm", arguments->lcm, "LCM address (default: $LCM_DEFAULT_URL, or LCM's group with ttl 0)")->type_name("URL");
+  command->add_option("--lcm", arguments->lcm, "LCM address, or auto for a free port (default: $LCM_DEFAULT_URL, or LCM's group with ttl 0)")->type_name("URL|auto");
   command->add_option("--record", arguments->record, "write a standard LCM log")->type_name("FILE");
   command->add_option("--remap", arguments->remaps, "give a channel another name: CHANNEL=NAME")->type_name("REMAP")->allow_extra_args(false);
   CLI::Option* view = command->add_option("--view", arguments->view, "serve the web console (default: 127.0.0.1:8080)");
   view->type_name("[ADDRESS:PORT]")->expected(0, 1);
+  command->add_option("--wait-for", arguments->wait_for, "wait at each step where a command is due: CHANNEL@HZ")
+      ->type_name("INPUT")->allow_extra_args(false);
+  command->add_option("--snapshots", arguments->snapshots, "the folder where clients may save the state, and restore it")->type_name("FOLDER");
+  command->add_option("--restore", arguments->restore, "begin with the state of a snapshot of the same world and options")->type_name("FILE");
   command->add_flag("--paused", arguments->paused, "start paused, at step 0");
+  command->add_option("--lockstep", arguments->lockstep, "wait for so many clients, then go as far as all of them grant")->type_name("N")->check(CLI::Range(1, 64));
+  command->add_option("--lease", arguments->lease, "seconds of real time after which a silent client of lockstep has lost its lease")
+      ->type_name("S")->capture_default_str()->check(CLI::Range(0.01, 1e6));
+  command->add_option("--lease-policy", arguments->lease_policy, "then: pause the run, drop the client, or fail the run with exit code 1")
+      ->capture_default_str()->check(CLI::IsMember({"pause", "drop", "fail"}));
   command->add_option("--threads", arguments->threads, "most threads inside a module (default: one a core)")->type_name("N")->check(CLI::Range(1, 1024));
   command->add_option("--control", arguments->control, "serve requests: on or off")->capture_default_str()->check(CLI::IsMember({"on", "off"}));
   command->add_flag("--watch-stdin", arguments->watch_stdin, "end when standard input does: for programs that start a server");
