@@ -54,7 +54,8 @@ class Core : public std::enable_shared_from_this<Core> {
   void note_time(int64_t utime);
   void reset_time() { utime_ = 0; }
   void sleep_until(int64_t utime);
-  void refresh_info();                              // after the set of models changed
+  // After the set of models changed; before: the info from before that, null: the one that is known now.
+  void refresh_info(std::shared_ptr<const WorldInfo> before = nullptr);
   void check_server();                              // throws NoServer when it is gone
   std::string what_is_known(double rate) const;     // for timeouts
 

@@ -132,6 +132,7 @@ void Simulation::reset(Reset what, int64_t seed) const {
   body.what = what == Reset::all ? reset_request_t::ALL : what == Reset::time ? reset_request_t::TIME : reset_request_t::POSES;
   body.seed = seed;
   core_->session().request(request_t::RESET, encoded(body), kSlowReplyTime);
+  if (what == Reset::poses) return;
   core_->reset_time();
   core_->stepper().forget();
 }
@@ -147,13 +148,15 @@ void Simulation::spawn(const std::string& model, double x, double y, const Spawn
   body.position[2] = options.z;
   const Quaternion orientation = about_z(options.heading);
   std::copy(orientation.begin(), orientation.end(), body.orientation);
+  const auto before = core_->info();
   core_->session().request(request_t::SPAWN, encoded(body), kSlowReplyTime);
-  core_->refresh_info();
+  core_->refresh_info(before);
 }
 
 void Simulation::remove(const std::string& name) const {
+  const auto before = core_->info();
   core_->session().request(request_t::REMOVE, name_body(name), kReplyTime);
-  core_->refresh_info();
+  core_->refresh_info(before);
 }
 
 void Simulation::set_pose(const std::string& name, const Vector3& position, const Quaternion& orientation) const {

@@ -165,7 +165,8 @@ class Simulation:
             raise ValueError(f"what is {what!r}: it must be one of {', '.join(map(repr, kinds))}")
         body.what, body.seed = kinds[what], -1 if seed is None else seed
         self._session.request(lcmtypes.request_t.RESET, body, 60.0)
-        self._utime = 0
+        if what != "poses":
+            self._utime = 0
         self._stepper.forget()
 
     def spawn(self, model: str = "", x: float = 0.0, y: float = 0.0, heading: float = 0.0, *, name: str = "", text: str = "",
@@ -176,13 +177,15 @@ class Simulation:
         body = lcmtypes.spawn_request_t()
         body.name, body.model, body.text, body.on_ground = name, model, text, z is None
         body.position, body.orientation = [x, y, z or 0.0], _about_z(heading)
+        before = self._known
         self._session.request(lcmtypes.request_t.SPAWN, body, 60.0)
-        self._refresh_info()
+        self._refresh_info(before)
 
     def remove(self, name: str) -> None:
         """Takes a model away."""
+        before = self._known
         self._session.request(lcmtypes.request_t.REMOVE, _name_body(name))
-        self._refresh_info()
+        self._refresh_info(before)
 
     def set_pose(self, name: str, x: float, y: float, heading: float = 0.0, z: float = 0.0,
                  orientation: Sequence[float] | None = None) -> None:
@@ -356,8 +359,9 @@ class Simulation:
         request.epoch, request.kind = -1, lcmtypes.request_t.INFO
         self._bus.publish("ruedo/request", request.encode())
 
-    def _refresh_info(self) -> None:
-        before, deadline = self._known, time.monotonic() + 2.0
+    def _refresh_info(self, before: WorldInfo | None = None) -> None:
+        """Waits for another info than `before`, by default than the one that is known. The new one may be there already."""
+        before, deadline = before or self._known, time.monotonic() + 2.0
         with self._news:
             while self._known is before and time.monotonic() < deadline:
                 self._ask_info()

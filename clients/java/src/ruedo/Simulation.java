@@ -197,6 +197,7 @@ public final class Simulation implements AutoCloseable {
         body.what = what == Reset.ALL ? reset_request_t.ALL : what == Reset.TIME ? reset_request_t.TIME : reset_request_t.POSES;
         body.seed = seed;
         session.request(request_t.RESET, body, SLOW_REPLY_SECONDS);
+        if (what == Reset.POSES) return;
         utime = 0;
         stepper.forget();
     }
@@ -218,14 +219,16 @@ public final class Simulation implements AutoCloseable {
         body.position = position;
         body.orientation = orientation;
         body.on_ground = onGround;
+        WorldInfo before = known;
         session.request(request_t.SPAWN, body, SLOW_REPLY_SECONDS);
-        refreshInfo();
+        refreshInfo(before);
     }
 
     /** Takes a model away. */
     public void remove(String name) {
+        WorldInfo before = known;
         session.request(request_t.REMOVE, nameBody(name), REPLY_SECONDS);
-        refreshInfo();
+        refreshInfo(before);
     }
 
     /** Puts a model at x, y, z (m) with a heading (rad), at rest. */
@@ -442,8 +445,12 @@ public final class Simulation implements AutoCloseable {
         bus.publish("ruedo/request", request);
     }
 
-    private synchronized void refreshInfo() {
-        WorldInfo before = known;
+    void refreshInfo() {
+        refreshInfo(known);
+    }
+
+    /** Waits for another info than that, which may be there already. */
+    synchronized void refreshInfo(WorldInfo before) {
         Deadline deadline = new Deadline(2.0);
         while (known == before && !deadline.passed()) {
             askInfo();
