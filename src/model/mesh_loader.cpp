@@ -74,6 +74,11 @@ std::string first_line(const std::string& file) {
   return line;
 }
 
+#ifdef __has_feature    // clang
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define __SANITIZE_ADDRESS__ 1
+#endif
+#endif
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr bool kLimitAddressSpace = false;    // sanitizers reserve terabytes of addresses
 #else

@@ -49,10 +49,10 @@ class Cut {
       for (const Vec3& corner : t) box.extend(corner);
       mark({nullptr, {}, t}, box, grid);
     }
-    for (const auto& [normal, at] : planes_) {
+    for (const auto& plane : planes_) {
       for_each_cell(bounds_of(grid), grid, [&](Cell& cell, const std::array<Vec3, 4>& square) {
         for (const Vec3& corner : square) {
-          if (normal.dot(corner - at) < 0) cell = Cell::occupied;
+          if (plane.first.dot(corner - plane.second) < 0) cell = Cell::occupied;
         }
       });
     }
