@@ -98,16 +98,15 @@ def test_raw_pictures_over_tcp():
             assert image.format == "rgb" and len(image.data) == 3 * 640 * 480
 
 
-def test_without_multicast_the_server_takes_tcp_and_clients_find_it(language):
+def test_without_multicast_the_server_takes_tcp_and_clients_find_it(language, tmp_path):
     script = f"""
         {shlex.quote(RUEDO)} run {HALL} --disable p3at/camera > out 2> err & server=$!
         trap 'kill $server; wait $server' EXIT
         until grep -q '^hall' out; do kill -0 $server; sleep 0.05; done
         {shlex.join(PROBES[language])} '' list
     """
-    folder = subprocess.run(["mktemp", "-d"], capture_output=True, text=True).stdout.strip()
-    done = subprocess.run(unrouted("sh", "-ec", script), cwd=folder, env=PLAIN, capture_output=True, text=True, timeout=90)
-    said, warned = open(f"{folder}/out").read(), open(f"{folder}/err").read()
+    done = subprocess.run(unrouted("sh", "-ec", script), cwd=tmp_path, env=PLAIN, capture_output=True, text=True, timeout=90)
+    said, warned = (tmp_path / "out").read_text(), (tmp_path / "err").read_text()
     assert done.returncode == 0, done.stdout + done.stderr + warned
     assert "world hall" in done.stdout
     assert said.splitlines()[0] == "export LCM_DEFAULT_URL='tcpq://127.0.0.1:7700'"
@@ -173,7 +172,7 @@ def test_auto_without_multicast_is_tcp():
     assert re.match(r"export LCM_DEFAULT_URL='tcpq://127\.0\.0\.1:\d+'\n", said.stdout), said.stdout + said.stderr
 
 
-def test_two_hosts_that_share_an_address_both_say_so():
+def test_two_hosts_that_share_an_address_both_say_so(tmp_path):
     """Two network namespaces and a cable between them."""
     script = """
         ip link set lo up
@@ -187,18 +186,18 @@ def test_two_hosts_that_share_an_address_both_say_so():
         "$@" > first
         wait $other
     """
-    folder = subprocess.run(["mktemp", "-d"], capture_output=True, text=True).stdout.strip()
-    os.mkfifo(f"{folder}/pipe")
+    os.mkfifo(tmp_path / "pipe")
     command = ["sh", "-c", f'exec {shlex.quote(RUEDO)} run {HALL} --quiet --disable p3at/camera --duration 6 --lcm "udpm://239.255.76.67:7667?ttl=1" 2>&1', "sh"]
     flags = "-n" if os.geteuid() == 0 else "-rn"
-    done = subprocess.run(["unshare", flags, "sh", "-ec", script, "sh", *command], cwd=folder, env=PLAIN, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(["unshare", flags, "sh", "-ec", script, "sh", *command], cwd=tmp_path, env=PLAIN, capture_output=True, text=True, timeout=60)
     if "Operation not" in done.stderr or "unshare" in done.stderr:
         pytest.skip("no network namespaces with a cable here: " + done.stderr)
     assert done.returncode == 0, done.stderr
     runs = []
     for name in ("first", "second"):
-        said = [line for line in open(f"{folder}/{name}").read().splitlines() if "another server" in line]
-        assert len(said) == 1, (name, open(f"{folder}/{name}").read())
+        text = (tmp_path / name).read_text()
+        said = [line for line in text.splitlines() if "another server" in line]
+        assert len(said) == 1, (name, text)
         runs.append(re.search(r"run (-?\d+), world hall; this one is run (-?\d+)", said[0]).groups())
     assert runs[0] == runs[1][::-1]
 
