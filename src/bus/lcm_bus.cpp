@@ -54,6 +54,7 @@ LcmBus::~LcmBus() { stop(); }
 
 void LcmBus::stop() {
   if (!thread_.joinable()) return;
+  stopping_ = true;
   const uint64_t one = 1;
   [[maybe_unused]] const ssize_t written = ::write(stop_event_, &one, sizeof one);
   thread_.join();
@@ -71,7 +72,34 @@ void LcmBus::publish(const std::string& channel, const uint8_t* data, size_t siz
 
 void LcmBus::listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own) {
   handler_ = std::move(handler);
-  channels_.insert(channels.begin(), channels.end());
+  know(channels, own);
+  subscribe();
+  stop_event_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  thread_ = std::thread([this] { read(); });
+}
+
+void LcmBus::listen_to(const std::vector<std::string>& channels, const std::vector<std::string>& own) {
+  if (!thread_.joinable() || stopping_) return;
+  std::unique_lock lock(mutex_);
+  wanted_ = {channels, own};
+  waits_ = true;
+  const uint64_t one = 1;
+  [[maybe_unused]] const ssize_t written = ::write(stop_event_, &one, sizeof one);
+  taken_up_.wait(lock, [this] { return !waits_; });
+}
+
+// LCM is subscribed to in the thread that handles its messages, and the instance stays: nothing that is on its way is lost.
+void LcmBus::take_up() {
+  std::lock_guard lock(mutex_);
+  if (!waits_) return;
+  know(wanted_.first, wanted_.second);
+  subscribe_missing();
+  waits_ = false;
+  taken_up_.notify_all();
+}
+
+void LcmBus::know(const std::vector<std::string>& channels, const std::vector<std::string>& own) {
+  channels_ = {channels.begin(), channels.end()};
   patterns_ = channel_patterns(channels);
   std::vector<std::string> known = channels;
   known.insert(known.end(), own.begin(), own.end());
@@ -80,9 +108,6 @@ void LcmBus::listen(const std::vector<std::string>& channels, Handler handler, c
   unknown_pattern_ += "LCM_SELF_TEST)$).*";
   // A slow reader is none of ours: the handler only checks and stores. Room for a burst from every robot.
   queue_size_ = static_cast<int>(std::clamp<size_t>(4 * channels.size(), 64, 65536));
-  subscribe();
-  stop_event_ = ::eventfd(0, EFD_CLOEXEC);
-  thread_ = std::thread([this] { read(); });
 }
 
 void LcmBus::subscribe() {
@@ -92,16 +117,25 @@ void LcmBus::subscribe() {
     in_ = std::make_shared<lcm::LCM>(url_.str());
     if (!in_->good()) throw EnvironmentError("LCM cannot open '" + url_.str() + "': run `ruedo doctor`");
   }
+  subscribed_.clear();
+  unknown_subscription_ = nullptr;
+  unknown_subscribed_.clear();
+  subscribe_missing();
+  // LCM's subscribe succeeds even where nothing can be received.
+  if (in_->getFileno() < 0) throw EnvironmentError("LCM cannot listen on '" + url_.str() + "': run `ruedo doctor`");
+}
+
+void LcmBus::subscribe_missing() {
   for (const std::string& pattern : patterns_) {
+    if (!subscribed_.insert(pattern).second) continue;
     lcm::Subscription* subscription = in_->subscribe(pattern, &LcmBus::on_message, this);
     if (subscription) subscription->setQueueCapacity(queue_size_);
   }
-  if (url_.scheme == "udpm") {
-    lcm::Subscription* subscription = in_->subscribe(unknown_pattern_, &LcmBus::on_unknown, this);
-    if (subscription) subscription->setQueueCapacity(1024);
-  }
-  // LCM's subscribe succeeds even where nothing can be received.
-  if (in_->getFileno() < 0) throw EnvironmentError("LCM cannot listen on '" + url_.str() + "': run `ruedo doctor`");
+  if (url_.scheme != "udpm" || unknown_subscribed_ == unknown_pattern_) return;
+  if (unknown_subscription_) in_->unsubscribe(unknown_subscription_);
+  unknown_subscribed_ = unknown_pattern_;
+  unknown_subscription_ = in_->subscribe(unknown_pattern_, &LcmBus::on_unknown, this);
+  if (unknown_subscription_) unknown_subscription_->setQueueCapacity(1024);
 }
 
 void LcmBus::read() {
@@ -109,7 +143,12 @@ void LcmBus::read() {
   for (;;) {
     pollfd waiting[2] = {{in_->getFileno(), POLLIN, 0}, {stop_event_, POLLIN, 0}};
     if (::poll(waiting, 2, -1) < 0) continue;    // a signal
-    if (waiting[1].revents != 0) return;
+    if (waiting[1].revents != 0) {
+      if (stopping_) return;
+      uint64_t count;
+      [[maybe_unused]] const ssize_t got = ::read(stop_event_, &count, sizeof count);
+      take_up();
+    }
     if (waiting[0].revents == 0) continue;
     if (in_->handle() != 0) ++failed_;
     if (unknown_.size() < kMostUnknownNames) continue;
@@ -119,6 +158,8 @@ void LcmBus::read() {
       subscribe();
     } catch (const std::exception& error) {
       spdlog::error("the bus is deaf: {}", error.what());
+      stopping_ = true;
+      take_up();
       return;
     }
   }

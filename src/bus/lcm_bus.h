@@ -5,7 +5,10 @@
 #pragma once
 
 #include <atomic>
+#include <condition_variable>
 #include <memory>
+#include <mutex>
+#include <set>
 #include <string>
 #include <thread>
 #include <unordered_set>
@@ -30,6 +33,7 @@ class LcmBus : public Bus {
 
   void publish(const std::string& channel, const uint8_t* data, size_t size) override;
   void listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own = {}) override;
+  void listen_to(const std::vector<std::string>& channels, const std::vector<std::string>& own = {}) override;
   void stop() override;
   uint64_t failed() const override { return failed_; }
 
@@ -37,7 +41,10 @@ class LcmBus : public Bus {
   uint64_t renewals() const { return renewals_; }
 
  private:
+  void know(const std::vector<std::string>& channels, const std::vector<std::string>& own);
   void subscribe();
+  void subscribe_missing();
+  void take_up();    // what listen_to() left
   void read();
   void on_message(const lcm::ReceiveBuffer* buffer, const std::string& channel);
   void on_unknown(const lcm::ReceiveBuffer* buffer, const std::string& channel);
@@ -51,9 +58,17 @@ class LcmBus : public Bus {
   std::unordered_set<std::string> channels_;
   std::vector<std::string> patterns_;        // of the channels listened to
   std::string unknown_pattern_;              // of all but those and our own
+  std::set<std::string> subscribed_;         // patterns, by in_
+  lcm::Subscription* unknown_subscription_ = nullptr;
+  std::string unknown_subscribed_;
   int queue_size_ = 0;
   std::unordered_set<size_t> unknown_;       // hashes of names
-  int stop_event_ = -1;
+  int stop_event_ = -1;                      // to end, or to take up
+  std::atomic<bool> stopping_{false};
+  std::mutex mutex_;
+  std::condition_variable taken_up_;
+  bool waits_ = false;                       // wanted_ is to be taken up
+  std::pair<std::vector<std::string>, std::vector<std::string>> wanted_;    // channels, own
   std::thread thread_;
   std::atomic<uint64_t> failed_{0}, renewals_{0};
 };

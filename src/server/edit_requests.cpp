@@ -111,7 +111,11 @@ Outcome Server::spawn(const request_t& request) {
     const Finding& finding = loaded.findings[i];
     spdlog::warn("{}: {}: {}", finding.source.str(), finding.element, finding.text);
   }
-  return outcome;
+  name_request_t which;    // the answer says what its name is, and where it stands
+  which.name = name;
+  request_t look = request;
+  look.body = encoded(which);
+  return latest_ ? get_state(look) : outcome;
 }
 
 Outcome Server::reset_poses(const request_t& request) {

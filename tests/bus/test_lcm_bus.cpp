@@ -1,6 +1,7 @@
 // Addresses, channel patterns, and the bus on memq. What needs the network is tested in tests/cli, in a namespace.
 #include "bus/lcm_bus.h"
 
+#include <algorithm>
 #include <condition_variable>
 #include <mutex>
 #include <regex>
@@ -50,6 +51,30 @@ TEST(ChannelPatterns, OneForNamesThatCountUp) {
     EXPECT_TRUE(matched) << name;
   }
   for (const std::string& pattern : patterns) EXPECT_FALSE(std::regex_match("oddxname/move", std::regex(pattern)));
+}
+
+TEST(LcmBus, TakesUpOtherChannels) {
+  LcmBus bus("memq://");
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<std::string> heard;
+  bus.listen({"r1/velocity"}, [&](const std::string& channel, const uint8_t*, size_t) {
+    {
+      std::lock_guard lock(mutex);
+      heard.push_back(channel);
+    }
+    changed.notify_all();
+  });
+  const auto say = [&] {
+    for (const char* channel : {"guest/velocity", "r1/velocity", "end"}) bus.publish(channel, nullptr, 0);
+  };
+  bus.listen_to({"r1/velocity", "guest/velocity", "end"});
+  say();
+  bus.listen_to({"r1/velocity", "end"});
+  say();
+  std::unique_lock lock(mutex);
+  changed.wait(lock, [&] { return std::count(heard.begin(), heard.end(), "end") == 2; });
+  EXPECT_EQ(heard, (std::vector<std::string>{"guest/velocity", "r1/velocity", "end", "r1/velocity", "end"}));
 }
 
 TEST(LcmBus, HearsItsChannelsOnly) {

@@ -76,6 +76,10 @@ class MemoryBus : public Bus {
     std::lock_guard lock(mutex_);
     return messages_;
   }
+  void forget() {    // what was published so far
+    std::lock_guard lock(mutex_);
+    messages_.clear();
+  }
   size_t count() {
     std::lock_guard lock(mutex_);
     return count_;

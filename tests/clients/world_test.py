@@ -1,0 +1,29 @@
+"""Models that come and go, over the wire, in each language: what the probes saw has known numbers."""
+
+import pytest
+from conftest import HERE, probe, ruedo_run
+
+HALL = str(HERE / "hall.sdf")
+BALL = (
+    "<sdf version='1.9'><model name='ball'><link name='link'><inertial><mass>1</mass></inertial>"
+    "<collision name='c'><geometry><sphere><radius>0.1</radius></sphere></geometry></collision></link></model></sdf>"
+)
+
+
+def test_models_come_and_go(language):
+    with ruedo_run("--no-noise", "--disable", "p3at/camera", world=HALL) as server:
+        said = probe(language, server.url, "world", BALL)
+    x, robots = said.numbers("there")
+    assert (x, robots) == (pytest.approx(3.0, abs=1e-9), 2)
+    assert said.words("drives") == ["True", "181"]    # the new robot takes commands, and its scans come
+    assert said.numbers("put") == pytest.approx([2.0], abs=1e-9)
+    assert said.words("rolls") == ["True"]
+    assert said.one("taken").startswith("RequestError: SPAWN: ") and "'guest' is taken" in said.one("taken")
+    assert "it would stand in 'guest'" in said.one("room")
+    assert "the text" in said.one("text")
+    assert "has a drive" in said.one("driven")
+    y, goes_on = said.words("poses")
+    assert (float(y), goes_on) == (pytest.approx(1.0, abs=1e-9), "True")
+    assert said.words("time") == ["True", "2"]
+    assert said.words("gone") == ["1"]
+    assert "no model called 'guest'" in said.one("unknown")
