@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
+#include "cli/listing.h"
 #include "core/json.h"
 #include "model/body_layout.h"
 #include "ruedo/errors.h"
@@ -74,7 +75,7 @@ int check(const CheckArguments& arguments) {
     const Style style = style_of(stdout);
     fmt::print("{}{}: {}{}\n", findings.empty() ? style.green : style.bold, arguments.world.world,
                findings.empty() ? "good"
-                                : fmt::format("{} errors, {} not supported, {} repaired", errors, counts[static_cast<int>(Finding::Kind::unsupported)],
+                                : fmt::format("{}, {} not supported, {} repaired", counted(static_cast<size_t>(errors), "error"), counts[static_cast<int>(Finding::Kind::unsupported)],
                                               counts[static_cast<int>(Finding::Kind::repaired)]),
                style.off);
   }

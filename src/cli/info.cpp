@@ -2,8 +2,8 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
-#include "core/json.h"
 #include "cli/listing.h"
+#include "core/json.h"
 #include "ruedo/errors.h"
 #include "server/fleet.h"
 #include "server/version.h"
@@ -73,8 +73,9 @@ int info(const InfoArguments& arguments) {
     return kGood;
   }
   const Style style = style_of(stdout);
-  fmt::print("{}{}{}: {}, steps of {:g} ms; {} models, {} bodies that move, {} robots\n\n", style.bold, world->name, style.off, world->file,
-             static_cast<double>(world->step_us) * 1e-3, world->models.size(), layout.bodies.size(), layout.robots.size());
+  fmt::print("{}{}{}: {}, steps of {:g} ms; {}, {}, {}\n\n", style.bold, world->name, style.off, world->file,
+             static_cast<double>(world->step_us) * 1e-3, counted(world->models.size(), "model"),
+             layout.bodies.size() == 1 ? "1 body that moves" : fmt::format("{} bodies that move", layout.bodies.size()), counted(layout.robots.size(), "robot"));
   print_devices(stdout, parts);
   fmt::print("\n{}Channels{} (-> published by the server, <- taken by it)\n", style.bold, style.off);
   print_channels(stdout, parts);
