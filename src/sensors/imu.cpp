@@ -3,7 +3,8 @@
 //
 // Ideal values, in the device's frame S at p = p_BS in the body B: the gyroscope shows omega; the accelerometer
 // the specific force a_S - g, with a_S = a_B + alpha x p + omega x (omega x p). a_B comes from the snapshot; alpha is
-// the change of omega over the last step. At rest it shows gravity upwards, on a ramp along the ramp's axes.
+// the change of omega over the last step. At rest it shows gravity upwards, on a ramp along the ramp's axes. A wheel that
+// is part of B turns the device about its hub H: the same from B to H, then from H to S with the wheel's own omega.
 #include "model/body_layout.h"
 #include "ruedo/imu_t.hpp"
 #include "ruedo/sensor.h"
@@ -18,7 +19,17 @@ class Imu : public Sensor {
       : random_(setup.random), gravity_(setup.world.gravity), channel_(setup.channel<imu_t>()) {
     const model::LinkPlacement& link = setup.layout.links[static_cast<size_t>(setup.link)];
     body_ = link.body;
-    X_BS_ = link.X_BL * setup.X_LS;
+    X_LS_ = setup.X_LS;
+    X_BS_ = link.X_BL * X_LS_;
+    if (body_ >= 0 && link.wheel >= 0) {
+      layout_ = &setup.layout;
+      link_ = setup.link;
+      wheel_ = static_cast<size_t>(link.wheel);
+      const model::WheelPlacement& wheel = layout_->wheels[wheel_];
+      const Pose& X_BWheel = layout_->links[static_cast<size_t>(wheel.link)].X_BL;
+      hub_B_ = X_BWheel * wheel.center_in_L;
+      axis_B_ = X_BWheel.rotation * wheel.axis_in_L;
+    }
     setup.element.refuse_unknown({"ruedo:phase"});    // the server reads it
     if (const Element* imu = setup.element.child("imu")) configure(*imu, setup);
   }
@@ -27,9 +38,15 @@ class Imu : public Sensor {
   bool observes() const override { return body_ >= 0; }
 
   void observe(const Snapshot& now, Outbox&) override {
-    const Vec3& omega = now.body_twists[static_cast<size_t>(body_)].angular;
-    if (time_ >= 0 && now.time > time_) alpha_ = (omega - omega_before_) / (1e-6 * static_cast<double>(now.time - time_));
+    const Vec3& of_body = now.body_twists[static_cast<size_t>(body_)].angular;
+    const Vec3 omega = of_body + of_wheel(now);
+    if (time_ >= 0 && now.time > time_) {
+      const double dt_s = 1e-6 * static_cast<double>(now.time - time_);
+      alpha_ = (omega - omega_before_) / dt_s;
+      alpha_of_body_ = (of_body - omega_of_body_before_) / dt_s;
+    }
     omega_before_ = omega;
+    omega_of_body_before_ = of_body;
     time_ = now.time;
   }
 
@@ -45,10 +62,17 @@ class Imu : public Sensor {
     if (body_ >= 0) {
       const size_t body = static_cast<size_t>(body_);
       const Pose& X_WB = now.bodies[body];
-      X_WS = X_WB * X_BS_;
-      const Vec3 arm = X_WB.rotation * X_BS_.translation;
+      const Pose X_BS = layout_ ? layout_->link_in_body(link_, now.wheel_angles) * X_LS_ : X_BS_;
+      X_WS = X_WB * X_BS;
+      acceleration = now.body_accelerations[body];
       omega = now.body_twists[body].angular;
-      acceleration = now.body_accelerations[body] + alpha_.cross(arm) + omega.cross(omega.cross(arm));
+      if (layout_) {
+        const Vec3 hub = X_WB.rotation * hub_B_;
+        acceleration += alpha_of_body_.cross(hub) + omega.cross(omega.cross(hub));
+        omega += of_wheel(now);
+      }
+      const Vec3 arm = X_WB.rotation * Vec3(X_BS.translation - hub_B_);
+      acceleration += alpha_.cross(arm) + omega.cross(omega.cross(arm));
     }
     const Quat R_SW = X_WS.rotation.conjugate();
     const Vec3 rate = R_SW * omega;
@@ -69,6 +93,12 @@ class Imu : public Sensor {
   }
 
  private:
+  // rad/s, world: what the wheel turns the device more than the body does.
+  Vec3 of_wheel(const Snapshot& now) const {
+    if (!layout_) return Vec3::Zero();
+    return now.bodies[static_cast<size_t>(body_)].rotation * (now.wheel_rates[wheel_] * axis_B_);
+  }
+
   void configure(const Element& imu, const SensorSetup& setup) {
     has_orientation_ = imu.boolean("enable_orientation", true);
     if (const Element* frame = imu.child("orientation_reference_frame")) {
@@ -101,13 +131,18 @@ class Imu : public Sensor {
   Vec3 gravity_;
   int channel_;
   int body_ = -1;          // into BodyLayout::bodies; -1: does not move
-  Pose X_BS_;              // X_WS when it does not move
+  Pose X_LS_, X_BS_;       // X_BS_: X_WS when it does not move
+  const model::BodyLayout* layout_ = nullptr;    // only when a wheel of that body turns the device
+  int link_ = -1;
+  size_t wheel_ = 0;
+  Vec3 hub_B_ = Vec3::Zero(), axis_B_ = Vec3::Zero();    // p_BH; unit
   bool has_orientation_ = true;
   Noise gyroscope_[3], accelerometer_[3];
 
   SimTime time_ = -1, sample_time_ = 0;
   bool sampled_ = false;
   Vec3 omega_before_ = Vec3::Zero(), alpha_ = Vec3::Zero();    // rad/s, rad/s^2, world
+  Vec3 omega_of_body_before_ = Vec3::Zero(), alpha_of_body_ = Vec3::Zero();
 };
 
 const RegisterSensor kRegister{{.module = "imu",

@@ -171,6 +171,15 @@ TEST(Sonar, CrossTalkGivesTheNearerEchoOfTheOneBefore) {
   EXPECT_NEAR(heard, 0.3 * rounds, 3.29 * std::sqrt(0.3 * 0.7 * rounds));
 }
 
+TEST(Sonar, CrossTalkIsOffByDefault) {
+  RayBench bench(robot_world(kRoom, array(kThree)), "SONAR");
+  for (int k = 0; k < 900; ++k) {
+    const auto m = bench.sample<sonar_t>(k);
+    if (k % 3 != 1) continue;
+    EXPECT_EQ(m.range[1], 2.8f);    // the one that fired before has its echo at 2 m
+  }
+}
+
 TEST(Sonar, NoiseAgainstItsDistribution) {
   const std::string noise = "<noise><type>gaussian</type><mean>0.02</mean><stddev>0.05</stddev></noise>";
   RayBench bench(robot_world(wall_at(2), array(cone(0.1, 0.1, 1, "nearest") + noise)), "SONAR");

@@ -150,7 +150,8 @@ TEST(SensorKinds, AreSortedAndComplete) {
   }
   for (const SensorKind& kind : kinds) {
     for (const SensorKind& other : kinds) {
-      if (kind.module == other.module) EXPECT_EQ(kind.order, other.order) << kind.name() << " and " << other.name();
+      if (kind.module != other.module) continue;
+      EXPECT_EQ(kind.order, other.order) << kind.name() << " and " << other.name();
     }
   }
 }
