@@ -26,6 +26,8 @@ void MotionCore::update(const MotionStatus& status) {
     remaining = status.remaining;
     state = status.state;
     reason = status.reason;
+  } else if (status.state == "refused") {
+    // another command, which changed nothing
   } else if (state != "sent" || (++unseen >= kUnseenStatuses && Clock::now() - sent >= kUnseenTime)) {
     state = "ended";    // its own end fell between two statuses
     reason = "replaced";

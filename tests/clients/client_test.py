@@ -83,6 +83,7 @@ def test_primitives(language, server):
         assert (float(distance), float(angle)) == pytest.approx((moved, turned), abs=2e-6), name
     assert said.words("turn_to")[1:4] == ["True", "done", "-"]
     assert said.one("replaced").startswith("MotionError: p3at: advance ended: replaced, 4.")
+    assert said.one("refused").startswith("MotionError: p3at: advance was refused: bad value, ")
     assert said.one("too_long").startswith("Timeout: p3at: advance was not done within 0.3 s (")
 
 

@@ -126,6 +126,7 @@ void primitives(const rc::Simulation& sim, const std::string& name) {
   robot.stop().wait(20.0);
   report("replaced", [&] { replaced.wait(); });
   const rc::Motion running = robot.advance(5.0);
+  report("refused", [&] { robot.advance(2e6).wait(); });    // further than the server allows: what runs goes on
   report("too_long", [&] { running.wait(0.3); });
   robot.stop().wait(20.0);
 }
@@ -161,6 +162,32 @@ void control(const rc::Simulation& sim, const std::string& name) {
   say("reset", sim.state().time() < 5.0);
   report("unknown", [&] { sim.state("nobody"); });
   report("steps", [&] { sim.step(0); });
+}
+
+void world(const rc::Simulation& sim, const std::string& text) {
+  sim.spawn("p3at", 3.0, 1.0, {.name = "guest"});
+  const rc::Robot guest = sim.robot("guest");
+  say("there", sim.state("guest").position[0], sim.robots().size());
+  guest.set_velocity(0.3, 0.0);
+  sim.sleep(1.0);
+  say("drives", sim.state("guest").position[0] > 3.05, guest.lrf().latest().ranges.size());
+  sim.set_pose("guest", 3.0, 2.0, 1.0);
+  say("put", sim.state("guest").position[1]);
+  sim.spawn("", -3.0, 2.0, {.name = "ball", .text = text});
+  sim.set_twist("ball", {0.0, 1.0, 0.0});
+  sim.sleep(0.3);
+  say("rolls", sim.state("ball").position[1] > 2.05);
+  report("taken", [&] { sim.spawn("p3at", -3.0, -2.0, {.name = "guest"}); });
+  report("room", [&] { sim.spawn("p3at", 3.0, 2.0); });
+  report("text", [&] { sim.spawn("", 0.0, -3.0, {.text = "<sdf"}); });
+  report("driven", [&] { sim.set_twist("guest", {1.0, 0.0, 0.0}); });
+  sim.reset(rc::Reset::poses);
+  say("poses", sim.state("guest").position[1], sim.state().time() > 1.0);
+  sim.reset(rc::Reset::time);
+  say("time", sim.state().time() < 1.0, sim.robots().size());
+  sim.remove("guest");
+  say("gone", sim.robots().size());
+  report("unknown", [&] { sim.remove("guest"); });
 }
 
 // CRC-32, as zlib's.
@@ -227,6 +254,7 @@ void act(const std::string& url, const std::string& command, const std::vector<s
   if (command == "errors") errors(sim, a[0]);
   if (command == "streams") streams(sim, a[0], std::stod(a[1]));
   if (command == "control") control(sim, a[0]);
+  if (command == "world") world(sim, a[0]);
   if (command == "quit") {
     sim.quit();
     say("quit", true);

@@ -86,6 +86,8 @@ public final class Motion {
             remaining = status.remaining;
             state = status.state;
             reason = status.reason;
+        } else if (status.state.equals("refused")) {
+            return;    // another command, which changed nothing
         } else if (!state.equals("sent") || (++unseen >= UNSEEN_STATUSES && unseenUntil.passed())) {
             state = "ended";    // its own end fell between two statuses
             reason = "replaced";
