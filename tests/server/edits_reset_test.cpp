@@ -11,6 +11,7 @@
 #include "ruedo/pose_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
 #include "server/log_reader.h"
+#include "server/verify.h"
 
 namespace ruedo::server {
 namespace {
@@ -126,6 +127,45 @@ TEST_F(EditsResetTest, TheLogHasWhatWasChangedAndWhen) {
   const std::vector<std::tuple<int32_t, int32_t, int64_t>> expected = {
       {request_t::SPAWN, 0, 10}, {request_t::SET_POSE, 0, 15}, {request_t::RESET, 0, 15}, {request_t::REMOVE, 1, 5}};
   EXPECT_EQ(applied, expected);
+}
+
+// Spawns, commands to guests, poses, twists, resets of parts and of all: repeated from the log, the same bytes.
+TEST_F(EditsResetTest, ARunWithChangesIsRepeatedFromItsLog) {
+  const std::string models = robot_sdf("r", 0, 0, imu()) + box_sdf("box", "0.2 0.2 0.2", false, 2, 0, 0.1);
+  const TemporaryFile log("repeat.lcm");
+  ServerOptions options = paused_server();
+  options.record = log.path();
+  begin(options, models);
+  for (int epoch = 0; epoch < 2; ++epoch) {
+    drive("r", 0.4);
+    step(33);
+    spawn(as_file(robot_sdf("guest", 0, 0, imu())), -3, 1);
+    drive("guest", 0.3);
+    step(50);
+    set_twist("box", {0.5, 0.5, 2});
+    step(20);
+    set_pose("guest", {-4, 1, 0});
+    drive("guest", 0.2);
+    step(20);
+    reset(reset_request_t::TIME);
+    step(30);
+    reset(reset_request_t::POSES);
+    drive("guest", 0.1);
+    step(30);
+    remove("guest");
+    spawn(as_file(robot_sdf("guest", 0, 0, imu())), 5, 1, "late");
+    step(30);
+    if (epoch == 0) reset(reset_request_t::ALL, 7);
+  }
+  end();
+  ServerOptions again;
+  again.simulation.fleet.seed = 1;
+  const Verification verification = Verifier(log.path(), load_text(models), again).run();
+  EXPECT_EQ(verification.fault, "");
+  EXPECT_FALSE(verification.difference) << verification.difference->channel << " at step " << verification.difference->step << ": "
+                                        << verification.difference->field << " " << verification.difference->logged << " / "
+                                        << verification.difference->repeated;
+  EXPECT_GT(verification.messages, 300);
 }
 
 // Each is answered with what is wrong; nothing stops, and nothing changes.
