@@ -6,14 +6,18 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
+#include <limits>
 
 #include "ruedo/client.h"
 
 namespace ruedo::client {
 namespace {
+
+constexpr std::chrono::milliseconds kLendTime(20);
 
 struct Address { std::string scheme, host, port; };
 
@@ -131,11 +135,37 @@ void LcmBus::close() {
   if (thread_.joinable()) thread_.join();
 }
 
+void LcmBus::handle(int timeout_ms) {
+  // tcpq: when the server is gone, those who wait find out by their timeouts.
+  if (lcm_handle_timeout(lcm_, timeout_ms) < 0) std::this_thread::sleep_for(std::chrono::milliseconds(std::min(timeout_ms, 100)));
+}
+
 void LcmBus::receive() {
   while (!closed_) {
-    // tcpq: when the server is gone, those who wait find out by their timeouts.
-    if (lcm_handle_timeout(lcm_, 100) < 0) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    const auto now = std::chrono::steady_clock::now().time_since_epoch();
+    const std::chrono::steady_clock::duration lent(lent_until_);
+    if (now < lent) {
+      std::this_thread::sleep_for(std::min<std::chrono::steady_clock::duration>(lent - now, kLendTime));
+    } else {
+      std::lock_guard turn(receiving_);
+      handle(100);
+    }
   }
+}
+
+LcmBus::Turn::Turn(LcmBus& bus) : bus_(bus) {
+  bus_.lent_until_ = std::numeric_limits<std::chrono::steady_clock::rep>::max();
+  bus_.receiving_.lock();
+}
+
+LcmBus::Turn::~Turn() {
+  bus_.lent_until_ = (std::chrono::steady_clock::now() + kLendTime).time_since_epoch().count();
+  bus_.receiving_.unlock();
+}
+
+void LcmBus::Turn::handle(std::chrono::steady_clock::duration timeout) {
+  const auto rounded = std::chrono::ceil<std::chrono::milliseconds>(timeout).count();
+  bus_.handle(static_cast<int>(std::clamp<int64_t>(rounded, 0, 1000)));
 }
 
 }  // namespace ruedo::client

@@ -7,6 +7,7 @@
 #include <lcm/lcm.h>
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -36,6 +37,18 @@ class LcmBus {
   void publish(const std::string& channel, const uint8_t* bytes, size_t size);
   void close();    // not from a handler
 
+  // Who waits for much may receive for himself: handing each message from thread to thread takes as long as getting it.
+  // While one of these lives, and a moment longer, the receiving thread sleeps, and handle() runs the handlers.
+  class Turn {
+   public:
+    explicit Turn(LcmBus& bus);
+    ~Turn();
+    void handle(std::chrono::steady_clock::duration timeout);    // one message, or until the time is over
+
+   private:
+    LcmBus& bus_;
+  };
+
   template <class Message>
   void publish(const std::string& channel, const Message& message) {
     std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
@@ -45,11 +58,14 @@ class LcmBus {
 
  private:
   void receive();
+  void handle(int timeout_ms);
 
   lcm_t* lcm_ = nullptr;
   std::mutex mutex_;
   std::map<std::string, std::vector<std::shared_ptr<Handler>>> handlers_;
   std::atomic<bool> closed_{false};
+  std::mutex receiving_;
+  std::atomic<std::chrono::steady_clock::rep> lent_until_{0};
   std::thread thread_;
 };
 

@@ -47,6 +47,12 @@ Observations Stepper::step(int64_t n, const std::vector<Command>& commands, doub
     grant_again();
   }
   wait(lock, until, timeout);
+  if (early_.size() > info_->channel_list.size() || core_.info() != info_) {    // a model came on the way
+    lock.unlock();
+    if (early_.size() > core_.info()->channel_list.size()) core_.refresh_info();
+    subscribe();
+    lock.lock();
+  }
   Observations observations;
   collect(observations);
   lock.unlock();
@@ -100,6 +106,7 @@ void Stepper::subscribe() {
     const auto index = static_cast<int32_t>(i);
     core_.bus().subscribe(channel.name, [this, index](const uint8_t* bytes, size_t size) { on_message(index, bytes, size); });
   }
+  std::lock_guard lock(mutex_);
   info_ = info;
 }
 
@@ -124,13 +131,21 @@ std::vector<uint8_t> Stepper::grant_body(int64_t until, const std::vector<Comman
 void Stepper::wait(std::unique_lock<std::mutex>& lock, int64_t until, double timeout) {
   Clock::duration repeat = kFirstRepeat;
   Clock::time_point deadline = deadline_after(timeout);
-  wanted_until_ = until;
   const auto done = [&] { return have_ >= until && grant_.taken; };
+  if (done()) return;
+  lock.unlock();
+  LcmBus::Turn turn(core_.bus());
+  lock.lock();
   while (!done()) {
     const int64_t had = have_;
-    const bool news = news_.wait_for(lock, repeat, [&] {
-      return done() || fault_ || ask_now_ || have_ - acknowledged_ >= kAcknowledgedTogether;
-    });
+    const auto news_here = [&] { return done() || fault_ || ask_now_ || have_ - acknowledged_ >= kAcknowledgedTogether; };
+    const Clock::time_point quiet_at = Clock::now() + repeat;
+    for (Clock::time_point now = quiet_at - repeat; !news_here() && now < quiet_at; now = Clock::now()) {
+      lock.unlock();
+      turn.handle(quiet_at - now);
+      lock.lock();
+    }
+    const bool news = news_here();
     if (fault_) {
       part_ = false;
       std::rethrow_exception(std::exchange(fault_, nullptr));
@@ -199,7 +214,9 @@ void Stepper::collect(Observations& observations) {
     observations.state_hash = step->second.state_hash;
     for (std::vector<Entry>& part : step->second.parts) {
       for (Entry& entry : part) {
-        observations.messages.push_back({step->first, info_->channel_list[static_cast<size_t>(entry.channel)].name, std::move(entry.bytes)});
+        const auto channel = static_cast<size_t>(entry.channel);
+        const bool known = channel < info_->channel_list.size();
+        observations.messages.push_back({step->first, known ? info_->channel_list[channel].name : "", std::move(entry.bytes)});
       }
     }
     last_utime_ = observations.utime;

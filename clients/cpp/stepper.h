@@ -1,10 +1,9 @@
 // The client's side of lockstep: grants, and the messages of every step, whatever is lost on the way.
 //
-// The receiving thread puts ticks and messages together; the caller of step() grants, waits, and asks again.
+// The caller of step() grants, receives for himself while he waits, and asks again for what does not come.
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <exception>
@@ -82,13 +81,12 @@ class Stepper {
   std::mutex one_at_a_time_;
 
   std::mutex mutex_;    // everything below
-  std::condition_variable news_;
   bool part_ = false;                     // takes part
   int64_t run_id_ = 0;
   int32_t epoch_ = 0;
   std::shared_ptr<const WorldInfo> info_; // whose channels are subscribed
   int64_t granted_ = 0, have_ = -1;       // all of the states up to that one are here
-  int64_t collected_ = -1, acknowledged_ = -1, wanted_until_ = -1, newest_ = -1;
+  int64_t collected_ = -1, acknowledged_ = -1, newest_ = -1;
   Grant grant_;
   int64_t resend_sequence_ = 0;
   std::map<int64_t, Step> steps_;         // those not collected yet

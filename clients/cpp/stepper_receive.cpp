@@ -15,6 +15,7 @@ namespace ruedo::client {
 namespace {
 
 constexpr size_t kMostEarly = 512;       // messages of one channel that wait for their ticks
+constexpr int32_t kMostChannels = 1 << 20;
 constexpr int64_t kMostAhead = 1024;     // steps beyond what is here: no server is that far
 
 }  // namespace
@@ -84,7 +85,7 @@ void Stepper::take_tick(const uint8_t* bytes, size_t size) {
   if (run_id != run_id_ || part < 0 || part >= nparts) return;
   if (epoch != epoch_) {
     if (epoch > epoch_ && !fault_) fault_ = std::make_exception_ptr(Error("the world was reset by another client: the next step begins anew"));
-    return news_.notify_all();
+    return;
   }
   if (number > grant_.from) grant_.taken = true;    // it could not be here otherwise
   newest_ = std::max(newest_, number);
@@ -99,26 +100,27 @@ void Stepper::take_tick(const uint8_t* bytes, size_t size) {
     step.state_hash = state_hash;
   }
   if (step.nparts != static_cast<size_t>(nparts) || step.part_here[static_cast<size_t>(part)]) return;
-  std::vector<Entry>& entries = step.parts[static_cast<size_t>(part)];
+  std::vector<Entry> entries;
+  size_t missing = 0;
   for (size_t n = in.count(20); n > 0; --n) {
     Entry& entry = entries.emplace_back();
     entry.channel = in.int32();
     entry.sequence = in.int64();
     entry.size = static_cast<size_t>(in.int32());
     entry.crc = static_cast<uint32_t>(in.int32());
-    if (entry.channel < 0 || static_cast<size_t>(entry.channel) >= early_.size()) {
-      entries.pop_back();    // of a model that came since
-      continue;
-    }
+    if (entry.channel < 0 || entry.channel >= kMostChannels) throw WireError("a channel's index");
+    if (static_cast<size_t>(entry.channel) >= early_.size()) early_.resize(static_cast<size_t>(entry.channel) + 1);    // of a model that came
     std::deque<Early>& early = early_[static_cast<size_t>(entry.channel)];
     const auto found = std::find_if(early.begin(), early.end(), [&](const Early& one) { return one.size == entry.size && one.crc == entry.crc; });
     if (found == early.end()) {
-      ++step.missing;
+      ++missing;
     } else {
       entry.bytes = std::move(found->bytes);
       early.erase(found);
     }
   }
+  step.parts[static_cast<size_t>(part)] = std::move(entries);
+  step.missing += missing;
   step.part_here[static_cast<size_t>(part)] = true;
   ++step.parts_here;
   progress();
@@ -135,7 +137,6 @@ void Stepper::progress() {
       }
     }
   }
-  if (have_ >= wanted_until_ || have_ - acknowledged_ >= kAcknowledgedTogether) news_.notify_all();
 }
 
 void Stepper::on_reply(const Reply& reply) {
@@ -144,13 +145,12 @@ void Stepper::on_reply(const Reply& reply) {
   if (reply.code != reply_t::OK) {
     if (reply.kind == request_t::GRANT ? (grant_.taken || reply.sequence != grant_.sequence) : reply.sequence != resend_sequence_) return;
     if (!fault_) fault_ = fault_of(reply);
-    return news_.notify_all();
+    return;
   }
   try {
     if (reply.kind == request_t::RESEND) return take_pieces(reply.body);
     if (reply.sequence != grant_.sequence || grant_.taken) return;
     grant_.taken = ask_now_ = true;    // it was repeated: its ticks may be lost
-    news_.notify_all();
   } catch (const WireError&) {
   }
 }
@@ -199,9 +199,7 @@ void Stepper::take_pieces(const std::vector<uint8_t>& body) {
   }
   for (const std::vector<uint8_t>& tick : ticks) take_tick(tick.data(), tick.size());
   progress();
-  if (!any || have_ >= wanted_until_) return;
-  ask_now_ = true;    // more may be missing than goes into one reply
-  news_.notify_all();
+  ask_now_ = any;    // more may be missing than goes into one reply
 }
 
 }  // namespace ruedo::client

@@ -157,7 +157,7 @@ void Server::run() {
     if (lockstep_) check_leases();
     if (!replay_) control_.published(status_.step);    // a PAUSE may wait for a state that was out already
     Clock::time_point deadline = next_status;
-    if (pacer_->paused()) {
+    if (pacer_->paused() || lockstep_) {    // it may stand still: a sign of life
       if (Clock::now() >= last_info_ + kPausedInfoPeriod) publish_info();
       deadline = std::min(deadline, last_info_ + kPausedInfoPeriod);
     }

@@ -172,6 +172,10 @@ class Stepper:
                 self._granted, self._taken = until, False
                 self._grant_again()
             self._wait(until, timeout)
+            if max(self._early, default=0) >= len(self._info.channel_list) or self._info is not self._sim._info:    # a model came
+                if max(self._early, default=0) >= len(self._sim._info.channel_list):
+                    self._sim._refresh_info()
+                self._subscribe()
             return self._collect()
 
     def forget(self) -> None:
@@ -204,7 +208,7 @@ class Stepper:
             known = index < len(before) and before[index].name == channel.name
             if known or channel.input or (not channel.robot and channel.type != "world_state_t"):
                 continue
-            self._early[index] = deque(maxlen=_MOST_EARLY)
+            self._early.setdefault(index, deque(maxlen=_MOST_EARLY))
             self._sim._bus.subscribe(channel.name, lambda data, index=index: self._on_message(index, data))
         self._info = info
 
@@ -285,8 +289,12 @@ class Stepper:
             step = self._steps.pop(number)
             self._last = (step.utime, number, step.state_hash)
             for part in range(step.nparts):
-                messages += [Message(number, self._info.channel_list[e.channel].name, e.data) for e in step.parts[part]]
+                messages += [Message(number, self._name(e.channel), e.data) for e in step.parts[part]]
         return observed(self._last, messages)
+
+    def _name(self, channel: int) -> str:
+        known: list[Any] = self._info.channel_list
+        return known[channel].name if channel < len(known) else ""
 
     # Putting ticks and messages together, as they come: in any order, twice, or not at all.
 
@@ -350,8 +358,8 @@ class Stepper:
         entries, missing = [], 0
         for channel, sequence, size, crc in _ENTRY.iter_unpack(data[at:]):
             early = self._early.get(channel)
-            if early is None:
-                continue    # of a model that came since
+            if early is None:    # of a model that came since
+                early = self._early[channel] = deque(maxlen=_MOST_EARLY)
             found = None
             for i, one in enumerate(early):
                 if one[0] == crc and one[1] == size:

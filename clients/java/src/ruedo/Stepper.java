@@ -113,8 +113,12 @@ final class Stepper {
                     grantAgain();
                 }
                 await(until, timeout);
-                return collect();
             }
+            if (early.size() > info.channelList.size() || info != sim.info()) {    // a model came on the way
+                if (early.size() > sim.info().channelList.size()) sim.refreshInfo();
+                subscribe();
+            }
+            return collect();
         }
     }
 
@@ -278,7 +282,7 @@ final class Stepper {
         return wanted;
     }
 
-    private Observations collect() {
+    private synchronized Observations collect() {
         List<Observations.Message> messages = new ArrayList<>();
         for (Iterator<java.util.Map.Entry<Long, Step>> all = steps.headMap(have, true).entrySet().iterator(); all.hasNext(); all.remove()) {
             java.util.Map.Entry<Long, Step> next = all.next();
@@ -286,7 +290,8 @@ final class Stepper {
             last = new long[] {step.utime, next.getKey(), step.stateHash};
             for (List<Entry> entries : step.parts) {
                 for (Entry entry : entries) {
-                    messages.add(new Observations.Message(next.getKey(), info.channelList.get(entry.channel).name, entry.data));
+                    String name = entry.channel < info.channelList.size() ? info.channelList.get(entry.channel).name : "";
+                    messages.add(new Observations.Message(next.getKey(), name, entry.data));
                 }
             }
         }
@@ -362,13 +367,15 @@ final class Stepper {
         step.stateHash = hash;
         if (step.parts.get(index) != null) return;
         List<Entry> entries = new ArrayList<>();
+        int missing = 0;
         for (int n = in.count(20); n > 0; n--) {
             Entry entry = new Entry();
             entry.channel = in.int32();
             entry.sequence = in.int64();
             entry.size = in.int32();
             entry.crc = in.int32();
-            if (entry.channel < 0 || entry.channel >= early.size()) continue;    // of a model that came since
+            if (entry.channel < 0 || entry.channel >= 1 << 20) throw new IOException("a channel's index");
+            while (entry.channel >= early.size()) early.add(new ArrayDeque<>());    // of a model that came since
             for (Iterator<Early> all = early.get(entry.channel).iterator(); all.hasNext() && !entry.here;) {
                 Early one = all.next();
                 if (one.crc != entry.crc || one.data.length != entry.size) continue;
@@ -376,10 +383,11 @@ final class Stepper {
                 entry.here = true;
                 all.remove();
             }
-            if (!entry.here) step.missing++;
+            if (!entry.here) missing++;
             entries.add(entry);
         }
         step.parts.set(index, entries);
+        step.missing += missing;
         step.partsHere++;
         progress();
     }
