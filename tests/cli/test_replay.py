@@ -82,15 +82,15 @@ def driven(tmp_path_factory):
     """A log with commands at times of the client's own, a reset with another seed, and models that come and go."""
     log = tmp_path_factory.mktemp("driven") / "driven.lcm"
     server = Server(7822, "--rate", "20", "--record", log)
-    with ruedo.Simulation(server.url) as simulation:
-        simulation.robots["p3at"].set_velocity(0.4, 0.3)
+    with ruedo.connect(server.url) as simulation:
+        simulation.robot("p3at").set_velocity(0.4, 0.3)
         time.sleep(0.15)
         simulation.reset_odometry("p3at")
         time.sleep(0.1)
-        simulation.spawn(text=BOX, x=2.5, y=-1.5)
+        simulation.spawn(text=BOX, x=2.5, y=-1.5, z=1.5)
         time.sleep(0.1)
         simulation.reset(seed=5)
-        simulation.robots["p3at"].set_velocity(0.2, -0.4)
+        simulation.robot("p3at").set_velocity(0.2, -0.4)
         time.sleep(0.15)
         simulation.pause()
         simulation.step(7)
@@ -138,7 +138,8 @@ def test_names_the_first_channel_step_and_field(tmp_path):
     write(tmp_path / "short.lcm", found)
     result = program("verify", tmp_path / "short.lcm")
     assert result.returncode == 1
-    assert f"p3at/lrf at step {stamp // step_us} (" in result.stdout and "the log has a message on" in result.stdout
+    assert f" at step {stamp // step_us} (" in result.stdout and "the log has a message on" in result.stdout
+    assert f"the repetition a message on p3at/lrf at stamp {stamp} us" in result.stdout
 
 
 def test_another_command_is_another_run(driven, tmp_path):
@@ -285,10 +286,10 @@ def test_a_snapshot_in_another_process(tmp_path):
     """The restored run's log is the log of the run that was never interrupted."""
     arguments = ["--rate", "max", "--paused", "--snapshots", tmp_path, "--duration", "3"]
     server = Server(7828, *arguments, "--record", tmp_path / "one.lcm")
-    with ruedo.Simulation(server.url) as simulation:
+    with ruedo.connect(server.url) as simulation:
         command(server.url, 0.5, 0.4)
         simulation.step(150)
-        simulation.spawn(text=BOX, x=2.5, y=-1.5)
+        simulation.spawn(text=BOX, x=2.5, y=-1.5, z=1.5)
         simulation.step(100)
         saved = simulation.snapshot("here")
         assert saved.step == 250
@@ -317,7 +318,7 @@ def test_a_snapshot_in_another_process(tmp_path):
 
 def test_a_snapshot_in_the_same_process(tmp_path):
     server = Server(7830, "--rate", "max", "--paused", "--snapshots", tmp_path, "--record", tmp_path / "a.lcm")
-    with ruedo.Simulation(server.url) as simulation:
+    with ruedo.connect(server.url) as simulation:
         def go_on():
             simulation.step(200)
             return simulation.state().state_hash
@@ -420,3 +421,16 @@ def test_a_controller_that_dies_is_said(bot_core):
 def test_wait_for_is_read_strictly(value, words):
     result = program("run", ARENA, *QUICK, "--wait-for", value, "--lcm", url(7834))
     assert result.returncode == 2 and words in result.stderr
+
+
+def test_a_lockstep_log_verifies(tmp_path):
+    server = Server(7835, "--lockstep", "1", "--record", tmp_path / "a.lcm")
+    with ruedo.connect(server.url) as simulation:
+        robot = simulation.robot("p3at")
+        for k in range(40):
+            simulation.step(5, [robot.velocity_command(0.3, 0.02 * k)])
+        simulation.quit()
+    assert server.end(None)[0] == 0
+    assert sum(channel == "ruedo/applied" for _, channel, _ in events(tmp_path / "a.lcm")) >= 40
+    result = program("verify", tmp_path / "a.lcm")
+    assert result.returncode == 0, result.stdout + result.stderr
