@@ -19,6 +19,6 @@ int main() {
     v = 0.4;
     omega = std::clamp(0.5 * (left - right) - 0.8 * odometry->theta, -0.5, 0.5);
   }
-  sim.step(200, {robot.velocity_command(0.0, 0.0)});
+  sim.step(100, {robot.velocity_command(0.0, 0.0)});
   std::cout << "through\n";
 }

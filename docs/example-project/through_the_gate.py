@@ -17,5 +17,5 @@ with ruedo.connect(name="gate", timeout=30.0) as sim:
         left, right = min(scan.nearest(0.2, 1.5), 3.0), min(scan.nearest(-1.5, -0.2), 3.0)
         v = float(os.environ.get("SPEED", "0.4"))
         omega = max(-0.5, min(0.5, 0.5 * (left - right) - 0.8 * odometry.theta))
-    sim.step(200, [robot.velocity_command(0.0, 0.0)])
+    sim.step(100, [robot.velocity_command(0.0, 0.0)])
     print("through")

@@ -134,6 +134,10 @@ int regress(RegressArguments arguments) {
   for (std::string& line : judge.failures(arguments.record)) failures.push_back(std::move(line));
   if (!arguments.golden.empty()) {
     const std::string kept = arguments.record + ".kept";
+    if (const fs::path folder = fs::path(arguments.golden).parent_path(); renew && !folder.empty()) {
+      std::error_code error;    // the log's own opening says what is wrong
+      fs::create_directories(folder, error);
+    }
     keep_channels(arguments.record, renew && failures.empty() ? arguments.golden : kept, arguments.keep);
     if (renew && failures.empty()) {
       fmt::print("renewed {}\n", arguments.golden);

@@ -79,7 +79,7 @@ def test_the_example_from_nothing_to_green(project):
     assert golden.read_bytes() == first    # repeatable: byte by byte
 
 
-def test_another_way_is_the_first_difference(prefix, project, tmp_path):
+def test_another_way_is_the_first_difference(prefix, tmp_path):
     golden = tmp_path / "golden.lcm"
     keep = ["--golden", golden, "--keep", "p3at/pose", "--tolerance", "p3at/pose:*=abs:1e-6"]
     regress(prefix, *keep, "--renew", folder=tmp_path)
@@ -103,11 +103,11 @@ def test_what_does_not_hold_is_said(prefix, options, words, tmp_path):
 
 
 def test_contact_is_said(prefix, tmp_path):
-    """Straight ahead into a wall, by a client without lockstep."""
+    """Straight ahead into a wall."""
     world = SOURCE / "tests/clients/hall.sdf"
-    client = 'import ruedo\nsim = ruedo.connect(timeout=30)\nrobot = sim.robot("p3at")\nrobot.set_velocity(0.7, 0)\nsim.sleep(100)\n'
+    client = 'import ruedo\nsim = ruedo.connect(timeout=30)\nsim.step(2300, [sim.robot("p3at").move_command("advance", 7.0)])\n'
     (tmp_path / "blind.py").write_text(client)
-    said = regress(prefix, "--no-contact", "--client", f"{sys.executable} {tmp_path}/blind.py", folder=tmp_path, world=world, client=False, good=False)
+    said = regress(prefix, "--no-contact", "--lockstep", "1", "--client", f"{sys.executable} {tmp_path}/blind.py", folder=tmp_path, world=world, client=False, good=False)
     assert said.returncode == 1 and re.search(r"p3at/\w+ touched wall/link at \(6\.0", said.stdout), said.stdout
 
 
