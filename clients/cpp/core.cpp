@@ -190,6 +190,12 @@ void Core::on_info(const uint8_t* bytes, size_t size) {
     if (info) {
       if (known_ && (info->run_id != known_->run_id || info->epoch != known_->epoch)) utime_ = 0;
       known_ = std::move(info);
+      // No command is repeated to a robot that is gone, nor to the next one of its name.
+      for (auto it = drivers_.begin(); it != drivers_.end();) {
+        const bool gone = !known_->robot(it->first);
+        if (gone) repeating_.erase(it->second);
+        it = gone ? drivers_.erase(it) : std::next(it);
+      }
     }
   }
   news_.notify_all();

@@ -105,7 +105,10 @@ class Driver:
 
     def period(self) -> float:
         """s of real time between repetitions: a quarter of the watchdog's time, at most 0.1."""
-        watchdog = self._robot.watchdog
+        robots = self._robot._sim._info.robots
+        if self._robot.name not in robots:    # removed meanwhile
+            return 0.1
+        watchdog = float(robots[self._robot.name].watchdog_us) * 1e-6
         return min(0.1, max(0.01, watchdog / 4.0)) if watchdog > 0.0 else 0.1
 
     def move(self, channel: str, command: lcmtypes.move_command_t, kind: str) -> Motion:

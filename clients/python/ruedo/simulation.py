@@ -310,7 +310,14 @@ class Simulation:
                 drivers = tuple(self._drivers)
             for driver in drivers:
                 driver.repeat()
-            period = min(driver.period() for driver in drivers)
+            period = min((driver.period() for driver in drivers), default=0.1)
+
+    def _forget_removed(self, info: WorldInfo) -> None:
+        """No command is repeated to a robot that is gone, nor to the next one of its name."""
+        for name in [name for name in self._robots if name not in info.robots]:
+            robot = self._robots.pop(name)
+            with self._wake:
+                self._drivers.discard(robot._driver)
 
     # The receiving thread.
 
@@ -328,6 +335,7 @@ class Simulation:
                 if self._known and (info.run_id, info.epoch) != (self._known.run_id, self._known.epoch):
                     self._utime = 0
                 self._known = info
+                self._forget_removed(info)
             self._news.notify_all()
 
     def _on_tick(self, data: bytes) -> None:

@@ -19,6 +19,10 @@ public final class Robot {
     private final Map<String, Stream<?>> streams = new HashMap<>();    // by channel
     private final Driver driver = new Driver(this);
 
+    Driver driver() {
+        return driver;
+    }
+
     Robot(Simulation sim, String name) {
         this.sim = sim;
         this.name = name;

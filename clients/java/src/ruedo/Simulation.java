@@ -376,14 +376,29 @@ public final class Simulation implements AutoCloseable {
         while (!closed) {
             long period = 100;
             for (Driver driver : repeating) {
-                driver.repeat();
-                period = Math.min(period, driver.periodMillis());
+                try {
+                    driver.repeat();
+                    period = Math.min(period, driver.periodMillis());
+                } catch (RuedoException gone) {    // its robot was removed meanwhile
+                    repeating.remove(driver);
+                }
             }
             try {
                 Thread.sleep(period);
             } catch (InterruptedException error) {
                 return;
             }
+        }
+    }
+
+    /** No command is repeated to a robot that is gone, nor to the next one of its name. */
+    private void forgetRemoved(WorldInfo info) {
+        synchronized (robots) {
+            robots.entrySet().removeIf(entry -> {
+                boolean gone = !info.robots.containsKey(entry.getKey());
+                if (gone) repeating.remove(entry.getValue().driver());
+                return gone;
+            });
         }
     }
 
@@ -402,6 +417,7 @@ public final class Simulation implements AutoCloseable {
                 boolean anew = known != null && (known.head.run_id != info.head.run_id || known.head.epoch != info.head.epoch);
                 if (anew) utime = 0;
                 known = info;
+                forgetRemoved(info);
             }
             notifyAll();
         }
