@@ -173,7 +173,8 @@ public final class Probe {
         Robot guest = sim.robot("guest");
         say("there", sim.state("guest").position[0], sim.robots().size());
         guest.setVelocity(0.3, 0.0);
-        sim.sleep(1.0);
+        sim.sleep(0.1);
+        sim.sleep(2.0);
         say("drives", sim.state("guest").position[0] > 3.05, guest.lrf().latest().ranges.length);
         sim.setPose("guest", 3.0, 2.0, 1.0, 0.0);
         say("put", sim.state("guest").position[1]);

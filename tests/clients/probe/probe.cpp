@@ -169,7 +169,8 @@ void world(const rc::Simulation& sim, const std::string& text) {
   const rc::Robot guest = sim.robot("guest");
   say("there", sim.state("guest").position[0], sim.robots().size());
   guest.set_velocity(0.3, 0.0);
-  sim.sleep(1.0);
+  sim.sleep(0.1);
+  sim.sleep(2.0);
   say("drives", sim.state("guest").position[0] > 3.05, guest.lrf().latest().ranges.size());
   sim.set_pose("guest", 3.0, 2.0, 1.0);
   say("put", sim.state("guest").position[1]);
