@@ -195,33 +195,6 @@ public final class Probe {
         attempt("unknown", () -> sim.remove("guest"));
     }
 
-    private static void world(Simulation sim, String text) {
-        double[] ahead = {1.0, 0.0, 0.0, 0.0};
-        sim.spawn("p3at", 3.0, 1.0, 0.0, "guest");
-        Robot guest = sim.robot("guest");
-        say("there", sim.state("guest").position[0], sim.robots().size());
-        guest.setVelocity(0.3, 0.0);
-        sim.sleep(1.0);
-        say("drives", sim.state("guest").position[0] > 3.05, guest.lrf().latest().ranges.length);
-        sim.setPose("guest", 3.0, 2.0, 1.0, 0.0);
-        say("put", sim.state("guest").position[1]);
-        sim.spawn("", text, "ball", new double[] {-3.0, 2.0, 0.0}, ahead, true);
-        sim.setTwist("ball", new double[] {0.0, 1.0, 0.0}, new double[3]);
-        sim.sleep(0.3);
-        say("rolls", sim.state("ball").position[1] > 2.05);
-        attempt("taken", () -> sim.spawn("p3at", -3.0, -2.0, 0.0, "guest"));
-        attempt("room", () -> sim.spawn("p3at", 3.0, 2.0, 0.0, ""));
-        attempt("text", () -> sim.spawn("", "<sdf", "", new double[] {0.0, -3.0, 0.0}, ahead, true));
-        attempt("driven", () -> sim.setTwist("guest", new double[] {1.0, 0.0, 0.0}, new double[3]));
-        sim.reset(Simulation.Reset.POSES, -1);
-        say("poses", sim.state("guest").position[1], sim.state().time() > 1.0);
-        sim.reset(Simulation.Reset.TIME, -1);
-        say("time", sim.state().time() < 1.0, sim.robots().size());
-        sim.remove("guest");
-        say("gone", sim.robots().size());
-        attempt("unknown", () -> sim.remove("guest"));
-    }
-
     private static void lockstep(Simulation sim, String[] a) {
         Robot robot = sim.robot(a[1]);
         int steps = Integer.parseInt(a[2]);
@@ -274,7 +247,6 @@ public final class Probe {
                 case "errors": errors(sim, a[0]); break;
                 case "streams": streams(sim, a[0], Double.parseDouble(a[1])); break;
                 case "control": control(sim, a[0]); break;
-                case "world": world(sim, a[0]); break;
                 case "world": world(sim, a[0]); break;
                 case "quit": sim.quit(); say("quit", true); break;
                 default: throw new IllegalArgumentException(command);

@@ -191,32 +191,6 @@ void world(const rc::Simulation& sim, const std::string& text) {
   report("unknown", [&] { sim.remove("guest"); });
 }
 
-void world(const rc::Simulation& sim, const std::string& text) {
-  sim.spawn("p3at", 3.0, 1.0, {.name = "guest"});
-  const rc::Robot guest = sim.robot("guest");
-  say("there", sim.state("guest").position[0], sim.robots().size());
-  guest.set_velocity(0.3, 0.0);
-  sim.sleep(1.0);
-  say("drives", sim.state("guest").position[0] > 3.05, guest.lrf().latest().ranges.size());
-  sim.set_pose("guest", 3.0, 2.0, 1.0);
-  say("put", sim.state("guest").position[1]);
-  sim.spawn("", -3.0, 2.0, {.name = "ball", .text = text});
-  sim.set_twist("ball", {0.0, 1.0, 0.0});
-  sim.sleep(0.3);
-  say("rolls", sim.state("ball").position[1] > 2.05);
-  report("taken", [&] { sim.spawn("p3at", -3.0, -2.0, {.name = "guest"}); });
-  report("room", [&] { sim.spawn("p3at", 3.0, 2.0); });
-  report("text", [&] { sim.spawn("", 0.0, -3.0, {.text = "<sdf"}); });
-  report("driven", [&] { sim.set_twist("guest", {1.0, 0.0, 0.0}); });
-  sim.reset(rc::Reset::poses);
-  say("poses", sim.state("guest").position[1], sim.state().time() > 1.0);
-  sim.reset(rc::Reset::time);
-  say("time", sim.state().time() < 1.0, sim.robots().size());
-  sim.remove("guest");
-  say("gone", sim.robots().size());
-  report("unknown", [&] { sim.remove("guest"); });
-}
-
 // CRC-32, as zlib's.
 uint32_t crc32(uint32_t crc, const uint8_t* bytes, size_t size) {
   crc = ~crc;
@@ -281,7 +255,6 @@ void act(const std::string& url, const std::string& command, const std::vector<s
   if (command == "errors") errors(sim, a[0]);
   if (command == "streams") streams(sim, a[0], std::stod(a[1]));
   if (command == "control") control(sim, a[0]);
-  if (command == "world") world(sim, a[0]);
   if (command == "world") world(sim, a[0]);
   if (command == "quit") {
     sim.quit();

@@ -148,32 +148,6 @@ def world(sim, text):
     attempt("unknown", lambda: sim.remove("guest"))
 
 
-def world(sim, text):
-    sim.spawn("p3at", 3.0, 1.0, name="guest")
-    guest = sim.robot("guest")
-    say("there", sim.state("guest").position[0], len(sim.robots))
-    guest.set_velocity(0.3, 0.0)
-    sim.sleep(1.0)
-    say("drives", sim.state("guest").position[0] > 3.05, len(guest.lrf.latest().ranges))
-    sim.set_pose("guest", 3.0, 2.0, 1.0)
-    say("put", sim.state("guest").position[1])
-    sim.spawn("", -3.0, 2.0, text=text, name="ball")
-    sim.set_twist("ball", [0.0, 1.0, 0.0])
-    sim.sleep(0.3)
-    say("rolls", sim.state("ball").position[1] > 2.05)
-    attempt("taken", lambda: sim.spawn("p3at", -3.0, -2.0, name="guest"))
-    attempt("room", lambda: sim.spawn("p3at", 3.0, 2.0))
-    attempt("text", lambda: sim.spawn("", 0.0, -3.0, text="<sdf"))
-    attempt("driven", lambda: sim.set_twist("guest", [1.0, 0.0, 0.0]))
-    sim.reset("poses")
-    say("poses", sim.state("guest").position[1], sim.state().time > 1.0)
-    sim.reset("time")
-    say("time", sim.state().time < 1.0, len(sim.robots))
-    sim.remove("guest")
-    say("gone", len(sim.robots))
-    attempt("unknown", lambda: sim.remove("guest"))
-
-
 def lockstep(sim, name, steps, chunk, speed):
     robot, chunk = sim.robot(name), int(chunk)
     digest, messages, poses, odometry, seen = 0, 0, 0, None, sim.step(0)
@@ -208,7 +182,7 @@ def main():
             actions = {"lockstep": lambda: lockstep(sim, *rest[1:]), "connect": lambda: say("connected", sim.world), "list": lambda: list_all(sim), "read": lambda: read(sim, *rest),
                        "velocity": lambda: drive(sim, *rest, False), "wheels": lambda: drive(sim, *rest, True),
                        "primitives": lambda: primitives(sim, *rest), "errors": lambda: errors(sim, *rest),
-                       "streams": lambda: streams(sim, *rest), "control": lambda: control(sim, *rest), "world": lambda: world(sim, *rest), "world": lambda: world(sim, *rest),
+                       "streams": lambda: streams(sim, *rest), "control": lambda: control(sim, *rest), "world": lambda: world(sim, *rest),
                        "quit": lambda: (sim.quit(), say("quit", True))}
             actions[command]()
     except ruedo.RuedoError as error:
