@@ -82,7 +82,7 @@ def driven(tmp_path_factory):
     """A log with commands at times of the client's own, a reset with another seed, and models that come and go."""
     log = tmp_path_factory.mktemp("driven") / "driven.lcm"
     server = Server(7822, "--rate", "20", "--record", log)
-    with ruedo.connect(server.url) as simulation:
+    with ruedo.connect(server.url, timeout=60) as simulation:
         simulation.robot("p3at").set_velocity(0.4, 0.3)
         time.sleep(0.15)
         simulation.reset_odometry("p3at")
@@ -275,9 +275,12 @@ def test_plays_again(tmp_path, stock):
 
 def test_play_is_interrupted_cleanly(tmp_path):
     record(tmp_path / "a.lcm", seconds=2)
+    listener = Listener(7827)
     process = subprocess.Popen([RUEDO, "play", str(tmp_path / "a.lcm"), "--speed", "0.01", "--lcm", url(7827)], stdout=subprocess.PIPE, text=True)
-    time.sleep(1.0)
+    while not listener.got and process.poll() is None:
+        time.sleep(0.05)
     process.send_signal(signal.SIGINT)
+    listener.end()
     out, _ = process.communicate(timeout=10)
     assert process.returncode == 0 and "interrupted" in out
 
@@ -286,7 +289,7 @@ def test_a_snapshot_in_another_process(tmp_path):
     """The restored run's log is the log of the run that was never interrupted."""
     arguments = ["--rate", "max", "--paused", "--snapshots", tmp_path, "--duration", "3"]
     server = Server(7828, *arguments, "--record", tmp_path / "one.lcm")
-    with ruedo.connect(server.url) as simulation:
+    with ruedo.connect(server.url, timeout=60) as simulation:
         command(server.url, 0.5, 0.4)
         simulation.step(150)
         simulation.spawn(text=BOX, x=2.5, y=-1.5, z=1.5)
@@ -318,7 +321,7 @@ def test_a_snapshot_in_another_process(tmp_path):
 
 def test_a_snapshot_in_the_same_process(tmp_path):
     server = Server(7830, "--rate", "max", "--paused", "--snapshots", tmp_path, "--record", tmp_path / "a.lcm")
-    with ruedo.connect(server.url) as simulation:
+    with ruedo.connect(server.url, timeout=60) as simulation:
         def go_on():
             simulation.step(200)
             return simulation.state().state_hash
@@ -425,7 +428,7 @@ def test_wait_for_is_read_strictly(value, words):
 
 def test_a_lockstep_log_verifies(tmp_path):
     server = Server(7835, "--lockstep", "1", "--record", tmp_path / "a.lcm")
-    with ruedo.connect(server.url) as simulation:
+    with ruedo.connect(server.url, timeout=60) as simulation:
         robot = simulation.robot("p3at")
         for k in range(40):
             simulation.step(5, [robot.velocity_command(0.3, 0.02 * k)])
