@@ -17,7 +17,7 @@ int main(int argc, char** argv) {
   }
   const int steps = argc > 2 ? std::atoi(argv[2]) : 10'000;
   const int rounds = argc > 3 ? std::atoi(argv[3]) : 5;
-  auto sim = ruedo::client::launch(argv[1], {.args = {"--lockstep", "1", "--disable", "p3at/camera"}});
+  auto sim = ruedo::client::launch(argv[1], {.rate = ruedo::client::kFast, .args = {"--lockstep", "1", "--disable", "p3at/camera"}});
   const auto robot = sim.robot("p3at");
   sim.step(200);
   std::vector<double> rates;

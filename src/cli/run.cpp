@@ -123,7 +123,7 @@ server::LockstepOptions lockstep_options(const RunArguments& arguments) {
 
 server::ServerOptions server_options(const RunArguments& arguments) {
   server::ServerOptions options;
-  options.rate = parse_rate(!arguments.rate.empty() ? arguments.rate : arguments.lockstep > 0 ? "max" : "1");
+  options.rate = parse_rate(arguments.lockstep > 0 ? "max" : arguments.rate.empty() ? "1" : arguments.rate);
   if (!arguments.duration.empty()) options.duration_us = parse_duration_us(arguments.duration);
   options.paused = arguments.paused;
   options.lockstep = lockstep_options(arguments);
@@ -199,7 +199,7 @@ void add_run(CLI::App& app, Action& chosen) {
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
     return error == std::errc() && end == text.data() + text.size() ? "" : "'" + text + "' is not allowed; a seed is a whole number from 0 to 18446744073709551615";
   });
-  command->add_option("--rate", arguments->rate, "sim time per real time, or max (default: 1, in lockstep max)")->type_name("R|max");
+  command->add_option("--rate", arguments->rate, "sim time per real time, or max (default: 1); in lockstep the grants alone pace it")->type_name("R|max");
   command->add_option("--duration", arguments->duration, "end after so many seconds of sim time")->type_name("S");
   command->add_option("--lcm", arguments->lcm, "LCM address, or auto for a free port (default: $LCM_DEFAULT_URL, or LCM's group with ttl 0)")->type_name("URL|auto");
   command->add_option("--record", arguments->record, "write a standard LCM log")->type_name("FILE");
