@@ -63,10 +63,12 @@ Quat principal_axes(const Eigen::Matrix3d& inertia, Vec3& moments) {
 
 // The wheel of a wheels drive that this body is, or -1.
 int driven_wheel(const model::BodyLayout& layout, int index) {
-  for (size_t i = 0; i < layout.wheels.size(); ++i) {
-    const auto& wheel = layout.wheels[i];
-    if (layout.links[static_cast<size_t>(wheel.link)].body != index) continue;
-    if (layout.robots[static_cast<size_t>(wheel.robot)].body != index) return static_cast<int>(i);
+  const int instance = layout.bodies[static_cast<size_t>(index)].instance;
+  const auto robot = std::lower_bound(layout.robots.begin(), layout.robots.end(), instance,
+                                      [](const model::RobotPlacement& a, int b) { return a.instance < b; });
+  if (robot == layout.robots.end() || robot->instance != instance || robot->body == index) return -1;
+  for (const int wheel : robot->wheels) {
+    if (layout.links[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].link)].body == index) return wheel;
   }
   return -1;
 }

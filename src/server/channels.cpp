@@ -23,8 +23,11 @@ int Channels::add(Channel channel) {
                              " are allowed: give the robot or the device a shorter name, or use --remap");
   }
   const auto free = [&](const Channel& old) { return old.gone && old.type == channel.type && old.input == channel.input; };
-  auto place = std::find_if(channels_.begin(), channels_.end(), [&](const Channel& old) { return free(old) && old.name == channel.name; });
-  if (place == channels_.end()) place = std::find_if(channels_.begin(), channels_.end(), free);
+  auto place = channels_.end();
+  if (by_bus_name_.size() < channels_.size()) {    // some are gone; nobody looks for them while a world is loaded
+    place = std::find_if(channels_.begin(), channels_.end(), [&](const Channel& old) { return free(old) && old.name == channel.name; });
+    if (place == channels_.end()) place = std::find_if(channels_.begin(), channels_.end(), free);
+  }
   const int index = static_cast<int>(place - channels_.begin());
   if (const auto [other, added] = by_bus_name_.try_emplace(channel.bus_name, index); !added) {
     throw InputError({}, "two channels are called '" + channel.bus_name + "': '" + channels_[static_cast<size_t>(other->second)].name +
