@@ -15,12 +15,16 @@ readonly BUILD_PACKAGES=(
   libbullet-dev libtinyxml2-dev liburdfdom-dev libassimp-dev libembree-dev libtbb-dev libeigen3-dev
   "?libosmesa6-dev" libegl-dev libegl-mesa0 libgl-dev
   libopencv-core-dev libopencv-imgcodecs-dev libopencv-imgproc-dev
-  libcli11-dev libspdlog-dev libfmt-dev libssl-dev "libglib2.0-0t64|libglib2.0-0"
+  libcli11-dev libspdlog-dev libfmt-dev libssl-dev "libglib2.0-0t64|libglib2.0-0" libwebsockets-dev
 )
 # libsdformat is the oracle of the world reader's tests; Debian has it up to 12.
 readonly TEST_PACKAGES=(
-  libgtest-dev libgmock-dev libbenchmark-dev libopencv-contrib-dev "?libsdformat-dev"
+  libgtest-dev libgmock-dev libbenchmark-dev libopencv-contrib-dev "?libsdformat-dev" "?chromium"
 )
+
+# The web console's page is built by node and npm; a machine that has an npm of another origin keeps it.
+console_packages=()
+command -v npm >/dev/null || console_packages=(nodejs npm)
 
 say() { printf '%s: %s\n' "${0##*/}" "$*" >&2; }
 

@@ -151,6 +151,7 @@ void WebServer::Impl::on_timer(lws_sorted_usec_list_t* entry) {
   Impl& impl = *reinterpret_cast<Timer*>(entry)->owner;
   if (impl.stopping) {
     impl.over = true;
+    lws_cancel_service(impl.context);    // or this very call of lws_service goes on to wait for something else
     return;
   }
   if (impl.handler.tick()) {

@@ -1,0 +1,256 @@
+"""The web console from outside: its pages and its socket in right and wrong hands, and its page in a headless browser."""
+import base64
+import gzip
+import http.client
+import os
+import re
+import shutil
+import socket
+import struct
+import subprocess
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+SOURCE = Path(__file__).resolve().parents[2]
+BUILD = Path(os.environ["RUEDO_BINARY_DIR"])
+RUEDO = BUILD / "bin" / "ruedo"
+ARENA = SOURCE / "worlds" / "arena.sdf"
+NODE = os.environ.get("RUEDO_NODE") or shutil.which("node")
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+SEEN, WANT, COMMAND, TRAFFIC, PLAY, SEEK = range(1, 7)
+
+
+@contextmanager
+def running(*arguments, view="127.0.0.1:0", world=ARENA):
+    """A viewed run, and the addresses that it prints."""
+    command = [RUEDO, "run", world, "--lcm", "memq://", "--quiet", "--view", view, *arguments]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        urls = []
+        for line in process.stdout:
+            found = re.match(r"View it at (http://\S+)", line)
+            if found:
+                urls.append(found.group(1))
+                break
+        assert urls, process.stderr.read()
+        process.url = urls[0]
+        process.port = int(re.search(r":(\d+)/", urls[0]).group(1))
+        yield process
+    finally:
+        process.terminate()
+        process.wait(30)
+
+
+def get(port, path, method="GET", **headers):
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+    connection.putrequest(method, path, skip_host="Host" in headers)
+    for name, value in headers.items():
+        connection.putheader(name.replace("_", "-"), value)
+    connection.endheaders()
+    answer = connection.getresponse()
+    body = answer.read()
+    return answer.status, gzip.decompress(body) if answer.headers.get("Content-Encoding") == "gzip" else body, answer.headers
+
+
+class Socket:
+    """A WebSocket of few words."""
+
+    def __init__(self, port, path="/socket", **headers):
+        self.socket = socket.create_connection(("127.0.0.1", port), timeout=20)
+        lines = [f"GET {path} HTTP/1.1", "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13",
+                 "Sec-WebSocket-Key: " + base64.b64encode(os.urandom(16)).decode()]
+        lines += [f"{name}: {value}" for name, value in ({"Host": f"localhost:{port}"} | headers).items()]
+        self.socket.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
+        self.file = self.socket.makefile("rb")
+        self.status = int((self.file.readline() or b"x 0").split()[1])
+        while self.status == 101 and self.file.readline() not in (b"\r\n", b""):
+            pass
+
+    def send(self, payload, opcode=2):
+        size = struct.pack("!B", 0x80 | len(payload)) if len(payload) < 126 else struct.pack("!BQ", 0xFF, len(payload))
+        self.socket.sendall(bytes([0x80 | opcode]) + size + bytes(4) + payload)
+
+    def receive(self):
+        opcode, size = self.file.read(2)
+        if size == 126:
+            size, = struct.unpack("!H", self.file.read(2))
+        elif size == 127:
+            size, = struct.unpack("!Q", self.file.read(8))
+        return opcode & 15, self.file.read(size)
+
+    def frame(self):
+        """{channel number: bytes} of the next frame of messages."""
+        while True:
+            opcode, data = self.receive()
+            if opcode == 2 and data[0] == 1:
+                self.send(bytes([SEEN]))
+                break
+        found, at = {}, 4
+        while at < len(data):
+            channel, size = struct.unpack_from("<II", data, at)
+            found[channel] = data[at + 8:at + 8 + size]
+            at += 8 + size
+        return found
+
+    def close(self):
+        self.socket.close()
+
+
+@pytest.fixture(scope="module")
+def server():
+    with running("--disable", "p3at/camera") as process:
+        yield process
+
+
+def test_pages_are_served_from_the_program(server):
+    status, page, headers = get(server.port, "/")
+    assert status == 200 and b"<title>Ruedo</title>" in page
+    assert "default-src 'self'" in headers["Content-Security-Policy"]
+    for path in re.findall(rb'(?:src|href)="(/[^"]+)"', page):
+        assert get(server.port, path.decode())[0] == 200
+    status, scene, _ = get(server.port, "/scene.json")
+    assert status == 200 and b'"world": "arena"' in scene
+    assert get(server.port, "/scene/links")[0] == 200
+
+
+@pytest.mark.parametrize("path", ["/../../etc/passwd", "/scene/textures/../../etc/passwd", "/scene/textures/99999999999999999999",
+                                  "/scene/textures/-1", "/%2e%2e/%2e%2e/etc/passwd", "//etc/passwd", "/scene/", "/main.js/x"])
+def test_no_path_escapes(server, path):
+    status, body, _ = get(server.port, path)
+    assert status in (400, 403, 404) and b"root:" not in body
+
+
+def test_only_local_names_and_its_own_pages(server):
+    assert get(server.port, "/", Host="evil.example")[0] == 403
+    assert get(server.port, "/", method="POST")[0] == 405
+    assert Socket(server.port, Host="evil.example").status != 101
+    assert Socket(server.port, Origin="http://evil.example").status != 101
+    assert Socket(server.port, path="/elsewhere").status != 101
+    own = Socket(server.port, Origin=f"http://localhost:{server.port}")
+    assert own.status == 101 and b'"hello"' in own.receive()[1]
+    own.close()
+
+
+def test_elsewhere_a_token_is_needed():
+    with running("--disable", "p3at/camera", view="0.0.0.0:0") as process:
+        token = process.url.split("token=")[1]
+        assert get(process.port, "/")[0] == 403
+        assert get(process.port, "/scene.json")[0] == 403
+        assert get(process.port, "/?token=" + "0" * 32)[0] == 403
+        assert Socket(process.port).status != 101
+        status, _, headers = get(process.port, f"/?token={token}")
+        assert status == 200 and "HttpOnly" in headers["Set-Cookie"] and "SameSite=Strict" in headers["Set-Cookie"]
+        assert get(process.port, "/scene.json", Cookie=f"ruedo_token={token}")[0] == 200
+        assert Socket(process.port, Cookie=f"ruedo_token={token}").status == 101
+
+
+def test_messages_come_as_they_are_published(server):
+    viewer = Socket(server.port)
+    viewer.send(bytes([WANT]) + b"p3at/pose\nruedo/world")
+    times = []
+    while len(times) < 10:
+        for message in viewer.frame().values():
+            times.append(struct.unpack_from("!q", message, 8)[0])
+    assert sorted(times) == times or len(set(times)) > 3
+    viewer.close()
+
+
+def test_a_slow_viewer_gets_no_more_than_it_takes(server):
+    slow = Socket(server.port)
+    slow.send(bytes([WANT]) + b"p3at/pose")
+    slow.socket.settimeout(3)
+    frames = 0
+    with pytest.raises(TimeoutError):
+        while True:
+            opcode, data = slow.receive()
+            frames += opcode == 2
+    assert frames == 2    # and none after that, for none was taken
+    slow.close()
+
+
+def test_garbage_and_a_hundred_viewers_do_not_hurt(server):
+    viewers = [Socket(server.port) for _ in range(100)]
+    assert all(viewer.status == 101 for viewer in viewers)
+    for viewer in viewers:
+        viewer.send(bytes([WANT]) + b"p3at/pose\np3at/lrf\nruedo/world\n" + b"x" * 50)
+    garbage = [b"", b"\0", b"\xff" * 100, bytes([COMMAND]), bytes([COMMAND, 255]), bytes([COMMAND, 3]) + b"abc" + b"\0" * 70000,
+               bytes([PLAY, 1]), bytes([PLAY, 1]) + b"\xff" * 8, bytes([SEEK]) + b"\xff" * 8, bytes([WANT]) + b"\n" * 100000,
+               bytes([COMMAND, 13]) + b"p3at/velocity" + b"junk", bytes([COMMAND, 13]) + b"ruedo/request" + os.urandom(5000)]
+    for payload in garbage:
+        wild = Socket(server.port)
+        wild.send(payload)
+        wild.close()
+    big = Socket(server.port)
+    with pytest.raises((ConnectionError, TimeoutError, ValueError, BrokenPipeError)):
+        big.send(b"\2" * (2 << 20))
+        while True:
+            big.receive()
+    for raw in (b"\0" * 1000, b"GET " + b"a" * 20000, b"GET / HTTP/9.9\r\n\r\n", os.urandom(4000)):
+        with socket.create_connection(("127.0.0.1", server.port), timeout=20) as plain:
+            plain.sendall(raw)
+    for viewer in viewers[::10]:
+        assert viewer.frame()
+    for viewer in viewers:
+        viewer.close()
+    assert server.poll() is None and get(server.port, "/")[0] == 200
+
+
+def test_viewers_change_no_byte(tmp_path):
+    """The log of a run without the console, and of one with viewers that watch everything, one of them slow."""
+    common = ["--duration", "3", "--seed", "7", "--record"]
+    subprocess.run([RUEDO, "run", ARENA, "--lcm", "memq://", "--quiet", "--rate", "max", *common, tmp_path / "alone.lcm"], check=True, timeout=120)
+    with running("--rate", "2", *common, tmp_path / "viewed.lcm") as process:
+        viewers = [Socket(process.port) for _ in range(3)]
+        for viewer in viewers:
+            viewer.send(bytes([TRAFFIC, 1]))
+            viewer.send(bytes([WANT]) + b"p3at/pose\np3at/lrf\np3at/camera\np3at/odometry\np3at/sonar_front\nruedo/world\nruedo/tick")
+        ended = b""
+        try:
+            while b'"ended"' not in ended:
+                opcode, ended = viewers[0].receive()
+                if opcode == 2:
+                    viewers[0].send(bytes([SEEN]))
+        except (ValueError, OSError):
+            pass
+        assert process.wait(60) == 0
+        assert b'"ended"' in ended    # in words, before the connection ends
+    assert (tmp_path / "alone.lcm").read_bytes() == (tmp_path / "viewed.lcm").read_bytes()
+
+
+def test_wrong_addresses_are_said():
+    for address, code in (("nonsense:x", 2), ("192.0.2.1:80", 4)):
+        done = subprocess.run([RUEDO, "run", ARENA, "--lcm", "memq://", "--view", address], capture_output=True, text=True, timeout=60)
+        assert done.returncode == code and "--view" in done.stderr
+
+
+@pytest.mark.skipif(not (NODE and CHROMIUM), reason="needs node and chromium")
+def test_page_in_a_browser(tmp_path):
+    with running() as process:
+        done = subprocess.run([NODE, SOURCE / "tests/console/browser.mjs", process.url, tmp_path, "live"], cwd=BUILD / "web",
+                              env=os.environ | {"CHROMIUM": CHROMIUM}, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
+    assert "error:" not in done.stdout, done.stdout
+    for seen in ("robots are listed", "rays have appeared", "the robot moved when driven", "a picture has come", "pause holds the clock", "a step moves the clock"):
+        assert seen in done.stdout, done.stdout
+
+
+def test_types_decode_in_typescript_as_in_python(tmp_path):
+    """The description made of proto/*.lcm gives the fingerprints that lcm-gen's code has, for every type."""
+    import sys
+    sys.path.insert(0, str(BUILD / "python"))
+    import ruedo.lcmtypes as types
+    script = tmp_path / "prints.mjs"
+    script.write_text(f"""import {{ build }} from "{BUILD}/web/node_modules/esbuild/lib/main.js";
+const out = await build({{ stdin: {{ contents: 'import {{fingerprint}} from "./src/wire/lcm"; import {{kTypes}} from "./generated/messages"; for (const t in kTypes) console.log(t, BigInt.asUintN(64, fingerprint(t)).toString());',
+  resolveDir: "{BUILD}/web", loader: "ts" }}, bundle: true, write: false, preserveSymlinks: true, format: "esm" }});
+await import("data:text/javascript," + encodeURIComponent(out.outputFiles[0].text));
+""")
+    lines = subprocess.run([NODE, script], capture_output=True, text=True, check=True, timeout=60).stdout.split("\n")[:-1]
+    assert len(lines) > 30
+    for line in lines:
+        name, value = line.split()
+        kind = getattr(types, name)
+        assert int(value) == struct.unpack(">Q", kind._get_packed_fingerprint())[0], name
