@@ -44,6 +44,7 @@ Observations Stepper::step(int64_t n, const std::vector<Command>& commands, doub
   if (n > 0) {
     grant_ = {core_.session().next_sequence(), granted_, grant_body(until, commands), false};
     granted_ = until;
+    acknowledged_ = have_;    // the grant says it
     grant_again();
   }
   wait(lock, until, timeout);

@@ -169,7 +169,7 @@ class Stepper:
             self._wait(self._have, timeout)    # for nothing, unless the call before gave up
             if n > 0:
                 self._grant = (session.next_sequence(), self._granted, self._grant_body(until, commands))
-                self._granted, self._taken = until, False
+                self._granted, self._taken, self._acknowledged = until, False, self._have    # the grant says what is here
                 self._grant_again()
             self._wait(until, timeout)
             if max(self._early, default=0) >= len(self._info.channel_list) or self._info is not self._sim._info:    # a model came

@@ -109,6 +109,7 @@ final class Stepper {
                     grantSequence = session.nextSequence();
                     grantFrom = granted;
                     granted = until;
+                    acknowledged = have;    // the grant says it
                     taken = false;
                     grantAgain();
                 }
