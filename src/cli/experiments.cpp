@@ -43,21 +43,25 @@ std::string page(const std::vector<Outcome>& outcomes) {
       "Ruedo began with Hernandez-Belmonte, Ayala-Ramirez and Sanchez-Yanez, \"A Mobile Robot Simulator Using a Game\n"
       "Development Engine\", ROSSUM 2011. This page is written by `ruedo experiments --out docs`, which runs the paper's\n"
       "experiments again on a P3-AT: in the paper's setting, and in Ruedo's.\n\n"
-      "The paper's setting is a loop at 50 Hz that starts to brake when v^2 / (2 d) has reached the rest of the way. It notices\n"
-      "that up to a frame late, and a frame late is up to v dt too far. With the limits that Fig. 8 shows, 4.2 and 0.27 m/s^2, such\n"
-      "a loop gives the paper's numbers. Ruedo plans a primitive in closed form and evaluates it exactly at every step, so that\n"
-      "the way does not depend on the step.\n\n"
+      "The paper's setting is taken to be a loop at 50 Hz that starts to brake when v^2 / (2 d) has reached the rest of the way.\n"
+      "It notices that up to a frame late, and a frame late is up to v dt too far. The paper prints neither the loop nor its limits:\n"
+      "4.2 and 0.27 m/s^2 are chosen so that a loop of this kind nearly gives the paper's two numbers, so its agreement in E1 shows that late braking\n"
+      "can explain them, not that it did. Ruedo plans a primitive in closed form and evaluates it exactly at every step, so that the way\n"
+      "does not depend on the step. The way is that at the step at which the primitive says that it is done.\n\n"
       "## E1: advance by one metre (the paper's Fig. 8)\n\n";
   text += table(outcomes, "E1");
   text += "![Speed over time, high acceleration](experiments/e1_high_acceleration.svg)\n\n"
           "![Speed over time, high deceleration](experiments/e1_high_deceleration.svg)\n\n"
           "## E2: a square of one metre, five times (Fig. 9)\n\n"
-          "The paper's measure: the mean, over the run, of the difference between the true pose and the odometry. In the paper's\n"
-          "setting the trapezoid runs half a frame behind the robot: that is a difference, and it vanishes at every stop, while the\n"
-          "path itself turns with each corner. Half a frame alone is a fifth of the paper's numbers. Its text does not say at which speeds\n"
-          "the square was driven, nor how old the odometry was when it was compared; with the P3-AT's own limits, and odometry that\n"
-          "comes as from the real robot (ARIA's status packets, one each 100 ms), the difference has the paper's size. Wheels in contact slip: a robot that steers by skidding turns less than its wheels\n"
-          "say, so that its odometry needs a wider track than the real one.\n\n";
+          "The paper's measure: the mean, over the run, of the difference between the true pose and the odometry; here of its absolute\n"
+          "value, at every step. The paper says: a square of 1000 mm, \"several times\", odometry by the trapezoidal rule. It does not say how\n"
+          "many times, at which speeds and limits, at which rate, how old the odometry was when it was compared, and whether signs\n"
+          "cancelled. Assumed are five times, 50 Hz, the loop of E1, and the P3-AT's usual limits: 0.6 m/s, 0.75 rad/s, acceleration 0.3 and\n"
+          "deceleration 0.6 m/s^2, 1.74 rad/s^2 (AMRISim's parameters; those that the model in worlds/robots/p3at has). They were not fitted, and these rows have\n"
+          "no target. Once the odometry is that of the same step: the trapezoid then runs half a frame behind the robot. Once it is that of\n"
+          "the last status packet, which the real robot sends each 0.1 s. Which of both the paper did is not known.\n\n"
+          "In Ruedo's setting the kinematic drive runs the primitives. With the wheels drive the wheels slip: a robot that steers by\n"
+          "skidding turns less than its wheels say, so that its odometry needs a wider track than the real one.\n\n";
   text += table(outcomes, "E2");
   text += "![Square, late braking](experiments/e2_late_braking.svg)\n\n"
           "![Square, kinematic drive](experiments/e2_kinematic.svg)\n\n"
@@ -68,7 +72,7 @@ std::string page(const std::vector<Outcome>& outcomes) {
   text += "![The scene with the rays](experiments/e3_picture.png)\n\n"
           "![The rays from above](experiments/e3_rays.svg)\n\n"
           "## E4: an overloaded host\n\n"
-          "The paper blames errors on the load of the host. Ruedo runs once on an idle host, and once beside four threads a core that\n"
+          "The paper blames errors on the load of the host. Ruedo runs once on the host as it is, and once beside four threads a core that\n"
           "do nothing but burn time, with every module held up at random.\n\n";
   text += table(outcomes, "E4");
   text += "## E5: noise on and off\n\n"
