@@ -7,6 +7,7 @@
 
 #include "model/geometry.h"
 #include "model/mesh_format.h"
+#include "model/picture.h"
 
 namespace ruedo::model {
 namespace {
@@ -156,6 +157,8 @@ Mesh extruded(const std::vector<Polygon>& written, double height) {
 
 Mesh heightmap(const std::string& picture, const Vec3& size) {
   const std::string bytes = read_text_file(picture, 64 << 20);
+  constexpr int kMost = 1025;
+  if (const std::string fault = picture_fault(bytes, kMost); !fault.empty()) throw std::runtime_error(fault);
   cv::Mat grey;
   try {
     grey = cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data())),
@@ -165,7 +168,6 @@ Mesh heightmap(const std::string& picture, const Vec3& size) {
   }
   if (grey.empty()) throw std::runtime_error("it is no picture that can be read (png, jpeg, bmp, tiff)");
   if (grey.depth() != CV_8U && grey.depth() != CV_16U) throw std::runtime_error("its pixels are neither of 8 nor of 16 bits");
-  constexpr int kMost = 1025;
   if (grey.cols < 2 || grey.rows < 2 || grey.cols > kMost || grey.rows > kMost) {
     throw std::runtime_error("it has " + std::to_string(grey.cols) + " x " + std::to_string(grey.rows) +
                              " pixels; allowed are 2 to 1025 each way");

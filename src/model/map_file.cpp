@@ -11,6 +11,7 @@
 
 #include "model/document.h"
 #include "model/occupancy.h"
+#include "model/picture.h"
 #include "model/read_context.h"
 
 namespace fs = std::filesystem;
@@ -100,6 +101,7 @@ class FlatYaml {
 cv::Mat read_picture(const std::string& path) {
   const std::string bytes = read_text_file(path, 256u << 20);
   if (bytes.empty()) throw InputError({path, 0}, "the file is empty");
+  if (const std::string fault = picture_fault(bytes, kMostPixels); !fault.empty()) throw InputError({path, 0}, fault);
   cv::Mat grey;
   try {
     grey = cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data())), cv::IMREAD_GRAYSCALE);
@@ -107,9 +109,6 @@ cv::Mat read_picture(const std::string& path) {
     throw InputError({path, 0}, "the picture is broken");
   }
   if (grey.empty()) throw InputError({path, 0}, "is no picture that can be read (pgm, png, jpeg, bmp, tiff)");
-  if (grey.cols > kMostPixels || grey.rows > kMostPixels) {
-    throw InputError({path, 0}, "has " + std::to_string(grey.cols) + " x " + std::to_string(grey.rows) + " pixels; allowed are 20000 each way");
-  }
   return grey;
 }
 

@@ -10,11 +10,14 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "model/picture.h"
+
 namespace ruedo::scene {
 namespace {
 
 // Larger pictures are reduced: finer than any camera sees, and slow to draw from.
 constexpr int kMaxSide = 2048;
+constexpr int kMostPixels = 16384;    // each way; a larger one is not decoded
 
 cv::Mat to_rgba(cv::Mat image) {
   if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / 257.0);
@@ -62,7 +65,7 @@ TexturePixels decode_texture(const model::Texture& texture) {
   try {
     std::vector<uint8_t> bytes = texture.path.empty() ? texture.embedded : read_bytes(texture.path);
     remove_png_profile(bytes);
-    if (bytes.empty()) return out;
+    if (bytes.empty() || !model::picture_fault(bytes, kMostPixels).empty()) return out;
     cv::Mat image = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
     if (image.empty()) return out;
     const int side = std::max(image.cols, image.rows);

@@ -10,6 +10,7 @@
 #include "model/load.h"
 #include "model/mesh_format.h"
 #include "model/mesh_loader.h"
+#include "model/picture.h"
 #include "temporary_folder.h"
 
 namespace ruedo::model {
@@ -374,6 +375,22 @@ TEST(MadeMeshes, HeightmapOfTwoByTwo) {
     EXPECT_GT((mesh.positions[t[1]] - mesh.positions[t[0]]).cross(mesh.positions[t[2]] - mesh.positions[t[0]]).z(), 0);
   }
   EXPECT_THROW(heightmap(folder.write("x.png", "no picture"), {1, 1, 1}), std::runtime_error);
+}
+
+// A few bytes that ask for gigabytes: the head is read before anything is decoded.
+TEST(Pictures, TooLargeByTheirHeads) {
+  const std::string big("\x00\x00\xEA\x60", 4), small("\x00\x00\x00\x10", 4);    // 60000 and 16
+  const auto png = [](const std::string& w, const std::string& h) { return std::string("\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR", 16) + w + h; };
+  EXPECT_EQ(picture_fault(png(big, small), 1000), "it has 60000 x 16 pixels; allowed are 1000 each way");
+  EXPECT_EQ(picture_fault(png(small, big), 1000), "it has 16 x 60000 pixels; allowed are 1000 each way");
+  EXPECT_EQ(picture_fault(png(small, small), 1000), "");
+  const std::string jpeg = std::string("\xFF\xD8\xFF\xE0\x00\x04" "ab" "\xFF\xC0\x00\x11\x08", 13) + "\xEA\x60" + std::string("\x00\x10\x03", 3);
+  EXPECT_EQ(picture_fault(jpeg, 1000), "it has 16 x 60000 pixels; allowed are 1000 each way");
+  EXPECT_EQ(picture_fault(std::string("P5 # wide\n60000\n16 255\n"), 1000), "it has 60000 x 16 pixels; allowed are 1000 each way");
+  std::string bmp(30, '\0');
+  bmp.replace(0, 2, "BM").replace(18, 4, std::string("\x10\0\0\0", 4)).replace(22, 4, std::string("\xA0\x15\xFF\xFF", 4));    // -60000: from the top
+  EXPECT_EQ(picture_fault(bmp, 1000), "it has 16 x 60000 pixels; allowed are 1000 each way");
+  EXPECT_EQ(picture_fault(std::string("hello"), 1000), "");
 }
 
 }  // namespace

@@ -1,0 +1,80 @@
+// Width and height of PNG (its IHDR), JPEG (its first SOF), BMP (its information header) and the portable maps.
+#include "model/picture.h"
+
+#include <algorithm>
+#include <cstring>
+
+namespace ruedo::model {
+namespace {
+
+struct Size {
+  int64_t width = 0, height = 0;    // 0: not found
+};
+
+class Bytes {
+ public:
+  explicit Bytes(std::span<const uint8_t> bytes) : bytes_(bytes) {}
+  size_t size() const { return bytes_.size(); }
+  int64_t at(size_t i) const { return i < bytes_.size() ? bytes_[i] : 0; }
+  int64_t big16(size_t i) const { return at(i) << 8 | at(i + 1); }
+  int64_t big32(size_t i) const { return big16(i) << 16 | big16(i + 2); }
+  int64_t little32(size_t i) const { return at(i) | at(i + 1) << 8 | at(i + 2) << 16 | at(i + 3) << 24; }
+  bool begins(const char* text, size_t length) const { return bytes_.size() >= length && std::memcmp(bytes_.data(), text, length) == 0; }
+
+ private:
+  std::span<const uint8_t> bytes_;
+};
+
+Size jpeg_size(const Bytes& bytes) {
+  for (size_t i = 2; i + 9 < bytes.size();) {
+    if (bytes.at(i) != 0xFF) return {};
+    const int64_t marker = bytes.at(i + 1);
+    if (marker == 0xFF) {    // padding
+      ++i;
+      continue;
+    }
+    const bool frame = marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC;
+    if (frame) return {bytes.big16(i + 7), bytes.big16(i + 5)};
+    if (marker == 0xDA) return {};
+    i += 2 + static_cast<size_t>(std::max<int64_t>(bytes.big16(i + 2), 2));
+  }
+  return {};
+}
+
+// Two numbers after "P1" to "P6", with comments between.
+Size portable_size(const Bytes& bytes) {
+  int64_t numbers[2] = {0, 0};
+  size_t i = 2;
+  for (int64_t& number : numbers) {
+    while (i < bytes.size() && (bytes.at(i) == '#' || bytes.at(i) <= ' ')) {
+      if (bytes.at(i) == '#') {
+        while (i < bytes.size() && bytes.at(i) != '\n') ++i;
+      } else {
+        ++i;
+      }
+    }
+    for (; i < bytes.size() && bytes.at(i) >= '0' && bytes.at(i) <= '9'; ++i) number = std::min<int64_t>(number * 10 + bytes.at(i) - '0', int64_t{1} << 40);
+  }
+  return {numbers[0], numbers[1]};
+}
+
+Size size_of(const Bytes& bytes) {
+  if (bytes.begins("\x89PNG\r\n\x1a\n", 8)) return {bytes.big32(16), bytes.big32(20)};
+  if (bytes.begins("\xFF\xD8", 2)) return jpeg_size(bytes);
+  if (bytes.begins("BM", 2)) {
+    const int64_t height = bytes.little32(22);    // negative: from the top down
+    return {bytes.little32(18), height > INT32_MAX ? (int64_t{1} << 32) - height : height};
+  }
+  if (bytes.size() > 2 && bytes.at(0) == 'P' && bytes.at(1) >= '1' && bytes.at(1) <= '6') return portable_size(bytes);
+  return {};
+}
+
+}  // namespace
+
+std::string picture_fault(std::span<const uint8_t> span, int64_t most) {
+  const Size size = size_of(Bytes(span));
+  if (size.width <= most && size.height <= most) return "";
+  return "it has " + std::to_string(size.width) + " x " + std::to_string(size.height) + " pixels; allowed are " + std::to_string(most) + " each way";
+}
+
+}  // namespace ruedo::model

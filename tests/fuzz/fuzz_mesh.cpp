@@ -1,0 +1,28 @@
+// Meshes: the first byte says what the others are. 0 to 7: a file of one of the known kinds, through the importer in its
+// child process; else: an entry of the cache, as it is unpacked in the server.
+#include <stdexcept>
+
+#include "model/mesh_format.h"
+#include "model/mesh_loader.h"
+#include "scratch_file.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  static const ScratchFolder folder;
+  constexpr const char* kKinds[] = {"obj", "dae", "stl", "ply", "gltf", "glb", "3ds", "fbx"};
+  if (size < 1) return 0;
+  try {
+    if (data[0] < 8) {
+      const std::string path = folder.write(std::string("mesh.") + kKinds[data[0]], data + 1, size - 1);
+      const ruedo::model::ResourceFinder finder(path, false);
+      ruedo::model::MeshImport import;
+      import.cache = false;
+      import.wall_limit_s = 5;
+      import.cpu_limit_s = 2;
+      ruedo::model::MeshLoader(finder, import).load(path);
+    } else {
+      ruedo::model::unpack_mesh({reinterpret_cast<const char*>(data + 1), size - 1});
+    }
+  } catch (const std::runtime_error&) {
+  }
+  return 0;
+}

@@ -1,0 +1,16 @@
+// Any text as a robot: the same, with <robot> around what does not begin so, that the mutations stay in the URDF reader.
+#include <string>
+
+#include "model/body_layout.h"
+#include "model/load.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  std::string text(reinterpret_cast<const char*>(data), size);
+  if (text.find("<robot") == std::string::npos) text = "<robot name='r'><link name='base'/>" + text + "</robot>";
+  try {
+    const auto world = ruedo::model::load_world_text(text, "/nowhere/in/a/robot.urdf");
+    const ruedo::model::BodyLayout layout(*world);
+  } catch (const ruedo::InputError&) {
+  }
+  return 0;
+}

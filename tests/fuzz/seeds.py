@@ -1,0 +1,47 @@
+"""Collects seeds for the fuzzers: seeds.py OUT FOLDER... copies what is small among the files of the folders (worlds,
+robots, meshes, pictures, maps), each where its fuzzer takes it, with the byte before it that says what it is."""
+import shutil
+import sys
+from pathlib import Path
+
+MESHES = [".obj", ".dae", ".stl", ".ply", ".gltf", ".glb", ".3ds", ".fbx"]
+MOST_BYTES = 64 * 1024
+
+HAND_MADE = {
+    "map": [b"\x02image: map.pgm\nresolution: 0.05\norigin: [-1.0, -2.0, 0.5]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
+            b"\x032D-Map\nLineMinPos: 0 0\nResolution: 20\nCairn: Goal 0 0 0\nLINES\n0 0 1000 0\nDATA\n5 5\n",
+            b"\x00P5\n3 3\n255\nabcdefghi", b"\x01P5\n3 3\n255\n\x00\xff\x00\x00\x00\xff\xff\x00\x00"],
+    "messages": [bytes([kind]) + bytes(size) for kind in range(17) for size in (16, 32, 40, 64)],
+    "mesh": [b"\x00v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", b"\x02solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+             b"endloop\nendfacet\nendsolid s\n"],
+}
+
+
+def target_of(path):
+    """The fuzzer that takes a file, and the byte before it; None for others."""
+    kind = path.suffix.lower()
+    if kind in (".sdf", ".world"):
+        return "world", b""
+    if kind == ".urdf":
+        return "urdf", b""
+    if kind in MESHES:
+        return "mesh", bytes([MESHES.index(kind)])
+    if kind in (".png", ".jpg", ".pgm", ".bmp"):
+        return "map", b"\x00"
+    return None
+
+
+def main(out, *folders):
+    shutil.rmtree(out, ignore_errors=True)
+    for name in ("world", "urdf", "mesh", "map", "messages"):
+        (out / name).mkdir(parents=True)
+        for number, seed in enumerate(HAND_MADE.get(name, [])):
+            (out / name / f"hand_{number}").write_bytes(seed)
+    for folder in folders:
+        for number, path in enumerate(sorted(Path(folder).rglob("*"))):
+            target = target_of(path)
+            if target and path.is_file() and path.stat().st_size <= MOST_BYTES:
+                (out / target[0] / f"{Path(folder).name}_{number}").write_bytes(target[1] + path.read_bytes())
+
+
+main(Path(sys.argv[1]), *sys.argv[2:])
