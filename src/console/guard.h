@@ -22,7 +22,7 @@ std::string make_token();
 
 // What a request says of itself.
 struct Visit {
-  std::string host, origin, cookie, token;    // headers Host, Origin and Cookie; the address's ?token=
+  std::string host{}, origin{}, cookie{}, token{};    // headers Host, Origin and Cookie; the address's ?token=
   bool socket = false;                        // asks for a WebSocket
 };
 

@@ -41,6 +41,7 @@ async function live() {
   seen("the robot moved when driven");
   await until("a picture has come", () => document.querySelector("img.picture")?.naturalWidth > 0);
   await page.screenshot({ path: join(folder, "laptop.png") });
+  await page.setViewportSize({ width: 900, height: 480 });    // software draws every pixel
   await page.getByRole("tab", { name: "Plots" }).click();
   await page.waitForTimeout(2500);
   await page.screenshot({ path: join(folder, "plots.png") });
