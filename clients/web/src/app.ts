@@ -327,7 +327,11 @@ export class App {
   async request(kind: number, body?: Uint8Array): Promise<boolean> {
     try {
       const reply = await this.session.ask(kind, body);
-      if (reply.body.length > 0) this.setPaused(this.session.state(reply).paused);
+      if (reply.body.length > 0) {
+        const state = this.session.state(reply);
+        this.setPaused(state.paused);
+        this.onTime(Number(state.utime) * 1e-6, reply.epoch);
+      }
       return true;
     } catch (error) {
       toast((error as Error).message, "error");
