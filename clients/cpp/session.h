@@ -36,6 +36,7 @@ class Session {
   Reply request_in_turn(int32_t kind, const std::vector<uint8_t>& body, double timeout);
   int64_t next_sequence() { return ++sequence_; }
   int64_t id() const { return session_; }
+  const std::string& name() const { return name_; }
   void publish(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body, int32_t epoch = -1);
 
   void leave();    // without waiting for an answer

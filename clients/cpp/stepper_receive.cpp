@@ -87,10 +87,12 @@ void Stepper::take_tick(const uint8_t* bytes, size_t size) {
     if (epoch > epoch_ && !fault_) fault_ = std::make_exception_ptr(Error("the world was reset by another client: the next step begins anew"));
     return;
   }
-  if (number > grant_.from) grant_.taken = true;    // it could not be here otherwise
   newest_ = std::max(newest_, number);
+  for (size_t n = in.count(13); n > 0; --n) {    // applied: only this says that the grant was executed
+    const std::string client = in.string();
+    if (in.int64() >= grant_.sequence && number > grant_.from && client == core_.session().name()) grant_.taken = true;
+  }
   if (number <= have_ || number - have_ > kMostAhead) return;
-  for (size_t n = in.count(13); n > 0; --n) in.string(), in.int64();    // applied
   Step& step = steps_[number];
   if (step.nparts == 0) {
     step.nparts = static_cast<size_t>(nparts);

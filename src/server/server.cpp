@@ -140,7 +140,7 @@ void Server::run() {
   Clock::time_point next_flush = Clock::now() + kPausedInfoPeriod;
   for (bool over = false; !over;) {
     if (stop_) pacer_->stop();
-    while (const Batch* batch = lockstep_ && lockstep_->full() ? nullptr : simulation_->take()) {
+    while (const Batch* batch = lockstep_ && lockstep_->full() && !stop_ ? nullptr : simulation_->take()) {
       publish(*batch);
       over = batch->last;
       const Clock::time_point now = Clock::now();

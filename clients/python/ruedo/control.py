@@ -58,6 +58,7 @@ class Session:
     def __init__(self, sim: Simulation, name: str):
         self._sim = sim
         self._name = name
+        self.name = name.encode()
         self._one_at_a_time = threading.Lock()
         self._news = threading.Condition()
         self._session = 0

@@ -327,30 +327,37 @@ class Stepper:
             if epoch > self._epoch and not self._fault:
                 self._fault = RuedoError("the world was reset by another client: the next step begins anew")
             return
-        if number > self._grant[1]:
-            self._taken = True    # it could not be here otherwise
         self._newest = max(self._newest, number)
-        if not 0 < number - self._have <= _MOST_AHEAD:
-            return
-        step = self._steps.get(number)
-        if step is None:
-            step = self._steps[number] = _Step(utime, state_hash, nparts)
-        if part in step.parts:
-            return
         try:
-            entries, missing = self._manifest(data)
+            at = self._applied(data, number)
+            if not 0 < number - self._have <= _MOST_AHEAD:
+                return
+            step = self._steps.get(number)
+            if step is None:
+                step = self._steps[number] = _Step(utime, state_hash, nparts)
+            if part in step.parts:
+                return
+            entries, missing = self._manifest(data, at)
         except (struct.error, ValueError):
             return
         step.parts[part] = entries
         step.missing += missing
         self._progress()
 
-    def _manifest(self, data: bytes) -> tuple[list[_Entry], int]:
-        at = _TICK.size
-        applied, = _INT.unpack_from(data, at)
-        at += 4
-        for _ in range(applied):
-            at += 4 + _INT.unpack_from(data, at)[0] + 8
+    def _applied(self, data: bytes, number: int) -> int:
+        """Only this says that the grant was executed. Returns where the manifest begins."""
+        at = _TICK.size + 4
+        for _ in range(_INT.unpack_from(data, at - 4)[0]):
+            size, = _INT.unpack_from(data, at)
+            if size < 1:
+                raise ValueError("a string without an end")
+            at += 4 + size
+            if not self._taken and number > self._grant[1] and data[at - size:at - 1] == self._sim._session.name:
+                self._taken = int.from_bytes(data[at:at + 8], "big", signed=True) >= self._grant[0]
+            at += 8
+        return at
+
+    def _manifest(self, data: bytes, at: int) -> tuple[list[_Entry], int]:
         count, = _INT.unpack_from(data, at)
         at += 4
         if count < 0 or at + count * _ENTRY.size != len(data):

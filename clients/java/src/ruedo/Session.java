@@ -115,6 +115,10 @@ final class Session {
         return ++sequence;
     }
 
+    String name() {
+        return name;
+    }
+
     long id() {
         return session;
     }

@@ -355,13 +355,12 @@ final class Stepper {
             notifyAll();
             return;
         }
-        if (number > grantFrom) taken = true;    // it could not be here otherwise
         newest = Math.max(newest, number);
-        if (number <= have || number - have > MOST_AHEAD) return;
-        for (int n = in.count(13); n > 0; n--) {    // applied
-            in.string();
-            in.int64();
+        for (int n = in.count(13); n > 0; n--) {    // applied: only this says that the grant was executed
+            boolean mine = in.string().equals(session.name());
+            if (in.int64() >= grantSequence && mine && number > grantFrom) taken = true;
         }
+        if (number <= have || number - have > MOST_AHEAD) return;
         Step step = steps.computeIfAbsent(number, key -> new Step());
         while (step.parts.size() < nparts) step.parts.add(null);
         step.utime = utime;
