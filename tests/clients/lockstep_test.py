@@ -34,7 +34,7 @@ def run(languages, loss):
     """What each client saw at its end: step, hash, messages, poses, digest. Both drive the same robot."""
     with ruedo_run("--lockstep", str(len(languages)), "--lease", "60", "--disable", "p3at/camera", world=HALL) as server:
         with bad_network(server.url, len(languages), loss) as urls, ThreadPoolExecutor() as pool:
-            said = list(pool.map(lambda i: probe(languages[i], urls[i], "lockstep", f"client{i}", "p3at", str(STEPS), str(1 + 5 * i), str(0.2 + 0.1 * i)),
+            said = list(pool.map(lambda i: probe(languages[i], urls[i], "lockstep", f"client{i}", "p3at", str(STEPS), str((1, 6, 15)[i]), str(0.2 + 0.1 * i)),
                                  range(len(languages))))
     for one in said:
         assert one.words("begin") == ["0", "0.000000"]
