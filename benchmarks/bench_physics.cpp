@@ -40,7 +40,7 @@ std::shared_ptr<model::Model> robot_model() {
       model::Link wheel;
       wheel.name = "wheel" + std::to_string(robot->links.size());
       wheel.X_ML = {Quat(Eigen::AngleAxisd(-M_PI / 2, Vec3::UnitX())), {x, y, 0.111}};
-      wheel.inertial = {1.5, {}, Vec3(0.005, 0.005, 0.009).asDiagonal()};
+      wheel.inertial = {1.5, Pose(), Vec3(0.005, 0.005, 0.009).asDiagonal()};
       wheel.collisions.push_back({"c", {}, shape(model::Shape::cylinder, {0.111, 0.075, 0}), {}, {}});
       model::Joint joint;
       joint.name = wheel.name + "_joint";

@@ -23,7 +23,7 @@ namespace {
 
 constexpr auto kGreetingTime = std::chrono::seconds(3);     // until a client must have said that it is one
 constexpr auto kAcceptPause = std::chrono::milliseconds(200);
-constexpr auto kFarewellTime = std::chrono::milliseconds(500);
+constexpr auto kFarewellTime = std::chrono::seconds(2);
 constexpr size_t kChunk = 64 * 1024;                        // bytes received from one client at a time
 constexpr int kMostChunks = 4;                              // and then the others have their turn
 constexpr size_t kMostNumbers = 32768;

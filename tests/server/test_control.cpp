@@ -161,7 +161,6 @@ TEST_F(ControlTest, RefusesOtherRunsEpochsAndSessions) {
   other = request(request_t::PAUSE);
   other.session ^= 1;
   EXPECT_EQ(ask(other).code, reply_t::UNKNOWN_SESSION);
-  EXPECT_EQ(ask(request_t::SNAPSHOT).code, reply_t::NOT_SUPPORTED);
   EXPECT_EQ(ask(999).code, reply_t::NOT_SUPPORTED);
   EXPECT_EQ(ask(request_t::STEP, {1, 2, 3}).code, reply_t::BAD_REQUEST);
   rate_request_t rate;
