@@ -113,7 +113,7 @@ class LockstepClient {
         if (message->channel != "ruedo/reply") {
           take(*message, 0);
         } else if (decode_checked(message->bytes.data(), message->bytes.size(), reply) == DecodeFault::none &&
-                   reply.kind == kind && reply.sequence == sequence) {
+                   reply.kind == kind && reply.sequence == sequence && (kind == request_t::JOIN || reply.session == session_)) {
           return reply;
         }
       }
