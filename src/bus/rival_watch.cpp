@@ -53,6 +53,7 @@ void RivalWatch::listen_to(const std::vector<std::string>& channels, const std::
 }
 
 void RivalWatch::heard(const uint8_t* data, size_t size) {
+  if (run_id_ == 0) return;    // the rival says it again when there is our own to tell
   const int64_t id = run_id_of(data, size);
   if (id == run_id_ || rivals_.size() >= kMostRivals || std::find(rivals_.begin(), rivals_.end(), id) != rivals_.end()) return;
   world_info_t info;

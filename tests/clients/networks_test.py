@@ -89,8 +89,8 @@ def test_raw_pictures_over_tcp():
     """921 600 bytes each; over multicast, with the buffers that Linux gives, none arrives."""
     import ruedo
 
-    settings = ["--set", "p3at/camera.encoding=rgb", "--set", "p3at/camera.camera/image/width=640", "--set",
-                "p3at/camera.camera/image/height=480"]
+    settings = ["--set", "p3at/camera.encoding=rgb", "--set", "p3at/camera.camera.image.width=640", "--set",
+                "p3at/camera.camera.image.height=480"]
     with tcp_server(*settings) as server, ruedo.connect(server.url, timeout=20.0) as sim:
         camera = sim.robot("p3at").camera
         for _ in range(5):
@@ -206,12 +206,12 @@ def test_a_message_that_fits_no_buffer_is_said_once():
     buffer = int(open("/proc/sys/net/core/rmem_default").read())
     if buffer > 900_000:
         pytest.skip(f"receive buffers of {buffer} bytes: a raw picture fits")
-    settings = ["--set", "p3at/camera.encoding=rgb", "--set", "p3at/camera.camera/image/width=640", "--set",
-                "p3at/camera.camera/image/height=480", "--duration", "2"]
+    settings = ["--set", "p3at/camera.encoding=rgb", "--set", "p3at/camera.camera.image.width=640", "--set",
+                "p3at/camera.camera.image.height=480", "--duration", "2"]
     url = free_url()
     with Server([RUEDO, "run", HALL, "--quiet", "--lcm", url, *settings], url) as server:
         server.process.wait(60)
-        said = [line for line in server.end().splitlines() if "receive buffer" in line]
+        said = [line for line in server.end().splitlines() if "does not fit into a receive buffer" in line]
     assert len(said) == 1 and "921" in said[0] and "sysctl -w net.core.rmem_max" in said[0] and "p3at/camera" in said[0]
 
 

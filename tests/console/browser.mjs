@@ -16,7 +16,8 @@ const page = await context.newPage();
 const errors = [];
 page.on("console", (message) => { if (message.type() === "error") errors.push(message.text()); });
 page.on("pageerror", (error) => errors.push(String(error)));
-page.on("requestfailed", (request) => errors.push(`${request.url()}: ${request.failure()?.errorText}`));
+// A picture that the next one replaces while it is read is no error.
+page.on("requestfailed", (request) => { if (!request.url().startsWith("blob:")) errors.push(`${request.url()}: ${request.failure()?.errorText}`); });
 page.on("request", (request) => { if (!request.url().startsWith(new URL(url).origin) && !request.url().startsWith("blob:")) errors.push(`asked ${request.url()}`); });
 page.setDefaultTimeout(90_000);
 
