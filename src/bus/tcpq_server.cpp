@@ -114,7 +114,8 @@ void TcpqServer::serve() {
   Clock::time_point end{};
   epoll_event events[64];
   for (;;) {
-    const int count = ::epoll_wait(poll_.get(), events, 64, stop_ ? 10 : 500);
+    const bool stopping = stop_;    // read before collect(): all that was published before stop() is taken over
+    const int count = ::epoll_wait(poll_.get(), events, 64, stopping ? 10 : 500);
     bool newcomers = false;    // after the others: making place for them ends old ones
     for (int i = 0; i < count; ++i) {
       if (events[i].data.ptr == &wake_) {
@@ -132,7 +133,7 @@ void TcpqServer::serve() {
     collect();
     send_all();
     sweep();
-    if (!stop_) continue;
+    if (!stopping) continue;
     if (end == Clock::time_point{}) end = Clock::now() + kFarewellTime;
     if (drained() || Clock::now() >= end) break;
   }

@@ -19,13 +19,30 @@ bool Control::receive(const uint8_t* data, size_t size) {
   return true;
 }
 
+namespace {
+
+// Who reads or changes the world waits for its first state. Grants are what lockstep's own order is about.
+bool needs_state(int32_t kind) {
+  return kind != request_t::JOIN && kind != request_t::LEAVE && kind != request_t::INFO && kind != request_t::QUIT &&
+         kind != request_t::GRANT && kind != request_t::RESEND;
+}
+
+}  // namespace
+
+bool Control::serve_taken() {
+  size_t served = 0;
+  while (served < taken_.size() && (server_.has_state() || !needs_state(taken_[served].kind))) serve(taken_[served++]);
+  taken_.erase(taken_.begin(), taken_.begin() + static_cast<std::ptrdiff_t>(served));
+  return taken_.empty();
+}
+
 void Control::serve() {
+  if (!serve_taken()) return;    // what a missing state held up
   {
     std::lock_guard lock(mutex_);
     std::swap(inbox_, taken_);
   }
-  for (const request_t& request : taken_) serve(request);
-  taken_.clear();
+  serve_taken();
 }
 
 void Control::serve(const request_t& request) {

@@ -49,6 +49,7 @@ class Control {
     std::function<void(const reply_t& reply)> publish;
     std::function<int64_t()> utime;
     std::function<int32_t()> epoch;
+    std::function<bool()> has_state;    // false from the start, or a reset, until state 0 was published
     // Lockstep's; may be empty. early: the request waits, unanswered, until it is repeated in its turn.
     std::function<bool(const request_t& request, const Session& session)> early = {};
     std::function<void(int64_t session)> left = {};
@@ -76,6 +77,7 @@ class Control {
     int64_t after_step;
   };
 
+  bool serve_taken();                  // false when some have to wait for a state
   void serve(const request_t& request);
   void join(const request_t& request, reply_t& reply);
   void answer(reply_t& reply, bool quiet = false);

@@ -115,7 +115,6 @@ Outcome Server::snapshot(const request_t& request) {
   if (recorder_.snapshot_path(body.name).empty()) {
     return Outcome::refuse(reply_t::BAD_REQUEST, "'" + body.name + "' is no name of a snapshot: 1 to 63 letters, digits, '_', '-' and '.', not first a '.'");
   }
-  if (!latest_) return Outcome::refuse(reply_t::REFUSED, "there is no state yet");
   const std::string fault = recorder_.save_snapshot(body.name, hash_of_state(true));
   if (!fault.empty()) return Outcome::refuse(reply_t::REFUSED, "the snapshot was not saved: " + fault);
   return Outcome::with(encoded(state()));

@@ -165,7 +165,6 @@ Outcome Server::get_state(const request_t& request) {
     Pose X_WL = placement.X_BL;
     Twist twist;
     if (placement.body >= 0) {
-      if (!latest_) return Outcome::refuse(reply_t::REFUSED, "there is no state yet");
       const Pose& X_WB = latest_->bodies[static_cast<size_t>(placement.body)];
       const Twist& body_twist = latest_->body_twists[static_cast<size_t>(placement.body)];
       X_WL = X_WB * placement.X_BL;

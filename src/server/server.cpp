@@ -37,6 +37,7 @@ Server::Server(std::shared_ptr<const model::WorldModel> world, ServerOptions opt
                          .publish = [this](const reply_t& reply) { send(own_.reply, reply); },
                          .utime = [this] { return status_.time_us; },
                          .epoch = [this] { return epoch_; },
+                         .has_state = [this] { return latest_ != nullptr; },
                          .early = [this](const request_t& request, const Session& session) { return lockstep_ && lockstep_->early(request, session); },
                          .left = [this](int64_t session) { if (lockstep_) lockstep_->leave(session); }}) {
   if (options_.lockstep.clients > 0) {

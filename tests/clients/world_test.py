@@ -5,7 +5,8 @@ from conftest import HERE, probe, ruedo_run
 
 HALL = str(HERE / "hall.sdf")
 BALL = (
-    "<sdf version='1.9'><model name='ball'><link name='link'><inertial><mass>1</mass></inertial>"
+    "<sdf version='1.9'><model name='ball'><link name='link'><inertial><mass>1</mass>"
+    "<inertia><ixx>0.004</ixx><iyy>0.004</iyy><izz>0.004</izz></inertia></inertial>"
     "<collision name='c'><geometry><sphere><radius>0.1</radius></sphere></geometry></collision></link></model></sdf>"
 )
 

@@ -38,7 +38,7 @@ def project(prefix, tmp_path_factory):
     folder = tmp_path_factory.mktemp("project")
     shutil.copytree(EXAMPLE, folder / "gate")
     build = folder / "gate/build"
-    run(CMAKE, "-S", folder / "gate", "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}", f"-DPython3_EXECUTABLE={sys.executable}",
+    run(CMAKE, "-G", "Ninja", "-S", folder / "gate", "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}", f"-DPython3_EXECUTABLE={sys.executable}",
         "-DCMAKE_BUILD_TYPE=Release")
     run(CMAKE, "--build", build)
     return folder / "gate"

@@ -338,5 +338,45 @@ TEST_F(ControlTest, ControlOff) {
   for (const Message& message : bus_.messages()) EXPECT_NE(message.channel, "ruedo/reply");
 }
 
+// Without a server: the world's first state is late, and who asks for it waits in order.
+TEST(Control, WaitsForTheFirstState) {
+  bool has_state = false;
+  std::vector<int32_t> executed;
+  std::vector<reply_t> replies;
+  Control control(7, {.execute = [&](const request_t& request, const Session&) { executed.push_back(request.kind); return Outcome{}; },
+                      .state = [] { return std::vector<uint8_t>{}; },
+                      .publish = [&](const reply_t& reply) { replies.push_back(reply); },
+                      .utime = [] { return int64_t{0}; },
+                      .epoch = [] { return 1; },
+                      .has_state = [&] { return has_state; }});
+  request_t request{};
+  request.epoch = -1;
+  const auto ask = [&](int32_t kind, const std::vector<uint8_t>& body = {}) {
+    request.kind = kind;
+    request.body = body;
+    request.size = static_cast<int32_t>(body.size());
+    ++request.sequence;
+    const std::vector<uint8_t> bytes = encoded(request);
+    EXPECT_TRUE(control.receive(bytes.data(), bytes.size()));
+  };
+  join_t joining;
+  joining.client = "early";
+  ask(request_t::JOIN, encoded(joining));
+  control.serve();
+  ASSERT_EQ(replies.size(), 1U);
+  request.session = replies[0].session;
+  request.sequence = 0;
+  ask(request_t::GET_STATE);
+  ask(request_t::QUIT);
+  control.serve();
+  ask(request_t::SPAWN);
+  control.serve();
+  EXPECT_EQ(executed, std::vector<int32_t>{});
+  has_state = true;
+  control.serve();
+  EXPECT_EQ(executed, (std::vector<int32_t>{request_t::GET_STATE, request_t::QUIT, request_t::SPAWN}));
+  EXPECT_EQ(replies.size(), 4U);
+}
+
 }  // namespace
 }  // namespace ruedo::server

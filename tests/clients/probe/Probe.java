@@ -176,6 +176,7 @@ public final class Probe {
         sim.sleep(0.1);
         sim.sleep(2.0);
         say("drives", sim.state("guest").position[0] > 3.05, guest.lrf().latest().ranges.length);
+        guest.stop().await(20.0);
         sim.setPose("guest", 3.0, 2.0, 1.0, 0.0);
         say("put", sim.state("guest").position[1]);
         sim.spawn("", text, "ball", new double[] {-3.0, 2.0, 0.0}, ahead, true);

@@ -129,6 +129,7 @@ def world(sim, text):
     sim.sleep(0.1)
     sim.sleep(2.0)
     say("drives", sim.state("guest").position[0] > 3.05, len(guest.lrf.latest().ranges))
+    guest.stop().wait(20.0)
     sim.set_pose("guest", 3.0, 2.0, 1.0)
     say("put", sim.state("guest").position[1])
     sim.spawn("", -3.0, 2.0, text=text, name="ball")
