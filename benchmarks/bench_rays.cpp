@@ -13,8 +13,8 @@
 
 #include <btBulletCollisionCommon.h>
 
+#include "cli/bare_embree.h"
 #include "ruedo/random.h"
-#include "scene/ray_embree.h"
 #include "scene/ray_scene.h"
 
 namespace {
@@ -193,52 +193,13 @@ struct BulletOffice {
   }
 };
 
-// Embree's own triangles and nothing of ours.
-struct BareEmbree {
-  scene::DevicePtr device = scene::make_device();
-  scene::ScenePtr scene{rtcNewScene(device.get())};
-
-  explicit BareEmbree(const model::Mesh& mesh) {
-    RTCGeometry geometry = rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* p = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, mesh.positions.size()));
-    auto* t = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, mesh.triangles.size()));
-    for (const auto& v : mesh.positions) p = std::copy(v.data(), v.data() + 3, p);
-    for (const auto& v : mesh.triangles) t = std::copy(v.begin(), v.end(), t);
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometry(scene.get(), geometry);
-    rtcReleaseGeometry(geometry);
-    rtcCommitScene(scene.get());
-  }
-  void cast(const std::vector<scene::Ray>& rays, std::vector<double>& ranges, bool packets) const {
-    scene::EmbreeContext context;
-    scene::init_context(context);
-    for (size_t first = 0; first < rays.size(); first += packets ? scene::kLanes : 1) {
-      scene::Packet packet;
-      const size_t last = packets ? std::min(rays.size(), first + scene::kLanes) : first + 1;
-      for (size_t i = first; i < last; ++i)
-        packet.add(static_cast<int>(i - first), rays[i].origin, rays[i].direction, 0.0, rays[i].max_range);
-      if (packets) {
-        scene::intersect(scene.get(), context, packet.valid, packet.rays);
-        for (size_t i = first; i < last; ++i) ranges[i] = static_cast<double>(packet.rays.ray.tfar[i - first]);
-      } else {
-        const RTCRay8& r = packet.rays.ray;
-        RTCRayHit one;
-        one.ray = {r.org_x[0], r.org_y[0], r.org_z[0], 0, r.dir_x[0], r.dir_y[0], r.dir_z[0], 0, r.tfar[0], ~0u, 0, 0};
-        one.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-        scene::intersect(scene.get(), context, one);
-        ranges[first] = static_cast<double>(one.ray.tfar);
-      }
-    }
-  }
-};
-
 void compare(const std::string& name, const std::vector<BoxAt>& boxes, const std::shared_ptr<model::Mesh>& mesh, int repeats) {
   const std::vector<scene::Ray> rays = scans(boxes, 200);
   const model::WorldModel world = world_of(boxes, mesh);
   const model::BodyLayout layout(world);
   const auto ours = scene::make_ray_scene(scene::make_static_ray_scene(world, layout));
   const BulletOffice bullet(boxes, mesh.get());
-  const BareEmbree bare(mesh ? *mesh : *as_mesh(boxes, 1));
+  const cli::BareEmbree bare(mesh ? *mesh : *as_mesh(boxes, 1));
   std::vector<scene::Hit> hits(rays.size());
   std::vector<double> ranges(rays.size());
 

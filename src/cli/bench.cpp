@@ -1,5 +1,5 @@
 // ruedo bench: what this machine does. Robots against real time, each with an LRF, sixteen sonars and odometry in rooms
-// with contacts; the same with the messages on LCM; cameras; the latency of commands and the pacing of the loop.
+// with contacts; the same with the messages on LCM; cameras; the latency of commands and the pacing of the loop; rays.
 // docs/performance.md says what the figures mean.
 #include <spawn.h>
 #include <sys/wait.h>
@@ -56,6 +56,7 @@ std::vector<BenchTask> tasks_of(const BenchArguments& arguments) {
   add(Table::lcm, {1, 10, 100, 1000});
   add(Table::camera, {1, 2, 4});
   add(Table::latency, {1});
+  add(Table::rays, {1, 100, 1000});
   return tasks;
 }
 
@@ -65,6 +66,7 @@ std::string heading_of(Table table) {
     case Table::lcm: return "Robots, messages on LCM";
     case Table::camera: return "Robots with a camera each, 640 x 480 at 15 Hz";
     case Table::latency: return "One robot at --rate 1, step 5 ms, over LCM";
+    case Table::rays: return "Rays on one core: scans of 181, 8 m, in the rooms of so many robots; bare Embree in the same run";
   }
   return "";
 }
@@ -73,6 +75,8 @@ void print_head(Table table) {
   fmt::print("{}\n", heading_of(table));
   if (table == Table::latency) {
     fmt::print("  {:<42} {:>7} {:>10} {:>10} {:>10}\n", "", "count", "median ms", "99 % ms", "largest");
+  } else if (table == Table::rays) {
+    fmt::print("  {:>7} {:>14} {:>14} {:>9} {:>14}\n", "robots", "million rays/s", "bare Embree", "ratio", "difference m");
   } else {
     fmt::print("  {:>7} {:>12} {:>9} {:>9} {:>9} {:>11} {:>10} {:>9}\n", "robots", "x real time", "sim s", "wall s", "CPU s",
                table == Table::camera ? "pictures/s" : "messages/s", "loading s", "memory");
@@ -86,6 +90,9 @@ void print_row(Table table, const std::string& row) {
     fmt::print("  {:<42} {:>7.0f} {:>10.3g} {:>10.3g} {:>10.3g}\n", row.substr(from, row.find('"', from) - from), value("count"), value("median_ms"),
                value("p99_ms"), value("max_ms"));
     if (value("lost") > 0) fmt::print("  {:.0f} of them were lost\n", value("lost"));
+  } else if (table == Table::rays) {
+    fmt::print("  {:>7.0f} {:>14.3g} {:>14.3g} {:>9.3g} {:>14.2g}\n", value("robots"), 1e-6 * value("rays_per_s"), 1e-6 * value("embree_rays_per_s"),
+               value("ratio_to_embree"), value("largest_difference_m"));
   } else {
     fmt::print("  {:>7.0f} {:>12.4g} {:>9.4g} {:>9.3g} {:>9.3g} {:>11.4g} {:>10.3g} {:>6.0f} MB\n", value("robots"), value("real_time_factor"),
                value("sim_s"), value("wall_s"), value("cpu_s"),
@@ -156,12 +163,12 @@ int run_bench(const BenchArguments& arguments) {
 }
 
 void add_bench(CLI::App& app, Action& chosen) {
-  CLI::App* command = app.add_subcommand("bench", "measure this machine: robots against real time, LCM, cameras, latency");
+  CLI::App* command = app.add_subcommand("bench", "measure this machine: robots against real time, LCM, cameras, latency, rays");
   const auto arguments = std::make_shared<BenchArguments>();
   command->add_option("--robots", arguments->robots, "how many; several give several rows, of the first table alone (default: all tables, 1 10 100 1000)")
       ->type_name("N")->check(CLI::Range(1, 100'000));
-  command->add_option("--only", arguments->only, "tables to measure: robots, lcm, camera, latency")
-      ->type_name("TABLE")->check(CLI::IsMember({"robots", "lcm", "camera", "latency"}));
+  command->add_option("--only", arguments->only, "tables to measure: robots, lcm, camera, latency, rays")
+      ->type_name("TABLE")->check(CLI::IsMember({"robots", "lcm", "camera", "latency", "rays"}));
   command->add_option("--duration", arguments->duration_s, "simulated seconds (default: by the number of robots)")
       ->type_name("S")->check(CLI::Range(0.1, 1e6));
   command->add_option("--threads", arguments->threads, "most threads inside a module (default: one a core)")->type_name("N")->check(CLI::Range(1, 1024));

@@ -81,12 +81,13 @@ double default_duration_s(const BenchTask& task) {
 }  // namespace
 
 const char* name_of(Table table) {
-  constexpr const char* kNames[] = {"robots", "lcm", "camera", "latency"};
+  constexpr const char* kNames[] = {"robots", "lcm", "camera", "latency", "rays"};
   return kNames[static_cast<int>(table)];
 }
 
 std::vector<std::string> measure(const BenchTask& task) {
   if (task.table == Table::latency) return measure_latency(task);
+  if (task.table == Table::rays) return measure_rays(task);
   const server::ThreadLimit limit(task.threads);
   const double sim_s = task.duration_s > 0.0 ? task.duration_s : default_duration_s(task);
 

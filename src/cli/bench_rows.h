@@ -9,8 +9,8 @@ namespace ruedo::cli {
 
 struct BenchTask {
   // robots: messages to a sink that counts; lcm: onto LCM; camera: with the robots' cameras on; latency: of commands at
-  // --rate 1, and the pacing of the loop.
-  enum class Table { robots, lcm, camera, latency };
+  // --rate 1, and the pacing of the loop; rays: of the caster alone, in the rooms of so many robots.
+  enum class Table { robots, lcm, camera, latency, rays };
   Table table = Table::robots;
   int robots = 1;             // of latency: always one
   double duration_s = 0.0;    // sim time; 0: by the task
@@ -23,6 +23,7 @@ const char* name_of(BenchTask::Table table);
 // Measures in this process. Throws EnvironmentError.
 std::vector<std::string> measure(const BenchTask& task);
 std::vector<std::string> measure_latency(const BenchTask& task);    // before any thread has started: it forks
+std::vector<std::string> measure_rays(const BenchTask& task);
 
 // The same in a child process. Throws EnvironmentError.
 std::vector<std::string> measure_apart(const BenchTask& task);

@@ -23,11 +23,16 @@ def test_all_tables_run_by_themselves():
     counts = {}
     for row in rows:
         counts[row["table"]] = counts.get(row["table"], 0) + 1
-    assert counts == {"robots": 4, "lcm": 4, "camera": 3, "latency": 2, "pacing": 1}
+    assert counts == {"robots": 4, "lcm": 4, "camera": 3, "latency": 2, "pacing": 1, "rays": 3}
     for row in rows:
         if row["table"] in ("robots", "lcm", "camera"):
             assert row["real_time_factor"] > 0 and row["memory_mb"] > 1
             assert row["real_time_factor"] == pytest.approx(row["sim_s"] / row["wall_s"], rel=1e-3)
+        elif row["table"] == "rays":
+            # The same ranges as Embree's own, within single precision at 190 m, so both did the same work.
+            assert row["largest_difference_m"] < 1e-3
+            assert row["rays"] == 181 * max(200, row["robots"])
+            assert row["ratio_to_embree"] == pytest.approx(row["embree_rays_per_s"] / row["rays_per_s"], rel=1e-3)
         else:
             assert row["lost"] == 0 and row["count"] > 0
             assert 0 <= row["median_ms"] <= row["p99_ms"] <= row["max_ms"]
