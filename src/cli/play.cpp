@@ -1,4 +1,4 @@
-// ruedo play: publishes a log's messages again, with the times between them.
+// ruedo play: publishes a log's messages again, with the times between them; or shows them in the web console.
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -10,6 +10,8 @@
 
 #include "bus/lcm_bus.h"
 #include "cli/commands.h"
+#include "cli/view.h"
+#include "ruedo/errors.h"
 #include "server/log_reader.h"
 
 namespace ruedo::cli {
@@ -22,7 +24,8 @@ constexpr auto kLongestSleep = std::chrono::milliseconds(100);    // Ctrl-C is s
 volatile std::sig_atomic_t interrupted = 0;
 
 struct PlayArguments {
-  std::string log, speed = "1", lcm;
+  std::string log, speed = "1", lcm, view;
+  bool viewed = false;
 };
 
 // Channels that a log has for those who read it, and that nobody published.
@@ -39,12 +42,21 @@ bool sleep_until(Clock::time_point time) {
   return false;
 }
 
+int view(const PlayArguments& arguments, double speed) {
+  if (!std::isfinite(speed)) throw InputError({}, "--speed max: with --view a number is wanted");
+  if (!arguments.lcm.empty()) throw InputError({}, "--lcm goes not with --view: the page shows the log, and nothing is published");
+  const auto serving = view_log(arguments.log, arguments.view, speed);
+  while (!interrupted) std::this_thread::sleep_for(kLongestSleep);
+  return kGood;
+}
+
 int play(const PlayArguments& arguments) {
   const double speed = parse_rate(arguments.speed);
-  server::LogReader log(arguments.log);
-  bus::LcmBus bus(arguments.lcm);
   std::signal(SIGINT, [](int) { interrupted = 1; });
   std::signal(SIGTERM, [](int) { interrupted = 1; });
+  if (arguments.viewed) return view(arguments, speed);
+  server::LogReader log(arguments.log);
+  bus::LcmBus bus(arguments.lcm);
   server::LogEvent event;
   int64_t messages = 0;
   SimTime first_us = 0;
@@ -66,12 +78,17 @@ int play(const PlayArguments& arguments) {
 }
 
 void add_play(CLI::App& app, Action& chosen) {
-  CLI::App* command = app.add_subcommand("play", "publish a log's messages again");
+  CLI::App* command = app.add_subcommand("play", "publish a log's messages again, or show them in the web console");
   const auto arguments = std::make_shared<PlayArguments>();
   command->add_option("LOG", arguments->log, "a standard LCM log")->required();
   command->add_option("--speed", arguments->speed, "log time per real time, or max")->type_name("S|max")->capture_default_str();
+  CLI::Option* view = command->add_option("--view", arguments->view, "show it in the web console instead (default: 127.0.0.1:8080)");
+  view->type_name("[ADDRESS:PORT]")->expected(0, 1);
   command->add_option("--lcm", arguments->lcm, "LCM address (default: $LCM_DEFAULT_URL, or LCM's group)")->type_name("URL");
-  command->callback([arguments, &chosen] { chosen = [arguments] { return play(*arguments); }; });
+  command->callback([arguments, view, &chosen] {
+    arguments->viewed = view->count() > 0;
+    chosen = [arguments] { return play(*arguments); };
+  });
 }
 
 const RegisterCommand kRegister{52, add_play};

@@ -5,7 +5,7 @@
 #include <fmt/ranges.h>
 
 #include "cli/commands.h"
-#include "ruedo/errors.h"
+#include "cli/logged_run.h"
 #include "server/log_header.h"
 #include "server/thread_limit.h"
 #include "server/verify.h"
@@ -18,26 +18,6 @@ struct VerifyArguments {
   int threads = 0;
 };
 
-// What the options in a log's header say, as the command line of that run did.
-void read_options(const log_header_t& header, const std::string& log, WorldArguments& world, server::ServerOptions& options) {
-  for (const std::string& option : header.options) {
-    const size_t equals = option.find('=');
-    const std::string name = option.substr(0, equals), value = equals == std::string::npos ? "" : option.substr(equals + 1);
-    if (name == "--spawn") world.spawns.push_back(value);
-    else if (name == "--drive") world.drives.push_back(value);
-    else if (name == "--allow-absolute") world.allow_absolute = true;
-    else if (name == "--set") world.settings.push_back(value);
-    else if (name == "--disable") world.disabled.push_back(value);
-    else if (name == "--no-noise") world.no_noise = true;
-    else if (name == "--remap") options.remaps.push_back(parse_remap(value));
-    else throw InputError({log}, "its run had the option " + option + ", which this version does not know");
-  }
-  options.simulation.fleet.seed = static_cast<uint64_t>(header.seed);
-  options.simulation.fleet.noise = !world.no_noise;
-  options.simulation.fleet.disabled = world.disabled;
-  options.result_options = header.options;
-}
-
 std::string describe(const server::FirstDifference& difference) {
   const std::string where = fmt::format("{} at step {} ({:g} s{})", difference.channel, difference.step,
                                         static_cast<double>(difference.time_us) * 1e-6,
@@ -49,13 +29,15 @@ std::string describe(const server::FirstDifference& difference) {
 int verify(const VerifyArguments& arguments) {
   const log_header_t header = server::read_header(arguments.log);
   server::check_files(header, arguments.log);
-  if (header.files.empty()) throw InputError({arguments.log}, "names no file that its world was made from");
-  WorldArguments world;
+  LoggedOptions logged = read_options(header, arguments.log);
   server::ServerOptions options;
-  world.world = header.files.front().path;
-  read_options(header, arguments.log, world, options);
+  options.remaps = std::move(logged.remaps);
+  options.simulation.fleet.seed = static_cast<uint64_t>(header.seed);
+  options.simulation.fleet.noise = !logged.world.no_noise;
+  options.simulation.fleet.disabled = logged.world.disabled;
+  options.result_options = header.options;
   const server::ThreadLimit limit(arguments.threads);
-  server::Verifier verifier(arguments.log, load(world), std::move(options));
+  server::Verifier verifier(arguments.log, load(logged.world), std::move(options));
   const bool same_machine = verifier.machine_differences().empty();
   for (const std::string& line : verifier.machine_differences()) fmt::print("not as in the log: {}\n", line);
   std::fflush(stdout);

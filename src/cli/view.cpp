@@ -7,13 +7,25 @@
 
 #ifdef RUEDO_CONSOLE
 
+#include <filesystem>
+
+#include "cli/logged_run.h"
 #include "console/console.h"
 #include "console/live_source.h"
+#include "console/log_source.h"
 #include "console/tee_bus.h"
 #include "ruedo/world_info_t.hpp"
 #include "server/server.h"
 
 namespace ruedo::cli {
+namespace {
+
+void print_urls(const console::Console& serving) {
+  for (const std::string& url : serving.urls()) fmt::print("View it at {}\n", url);
+  std::fflush(stdout);
+}
+
+}  // namespace
 
 struct ViewedBus::Impl {
   console::Address address;
@@ -36,8 +48,18 @@ std::shared_ptr<void> ViewedBus::open(server::Server& server, const std::string&
   }
   auto source = std::make_unique<console::LiveSource>(impl_->tee, [&server] { return server.world(); }, info);
   auto serving = std::make_shared<console::Console>(impl_->address, std::move(source), "live", title);
-  for (const std::string& url : serving->urls()) fmt::print("View it at {}\n", url);
-  std::fflush(stdout);
+  print_urls(*serving);
+  return serving;
+}
+
+std::shared_ptr<void> view_log(const std::string& log, const std::string& address, double speed) {
+  const console::Address where = console::parse_address(address);
+  auto source = std::make_unique<console::LogSource>(log, [&](const log_header_t& header) { return load_run(header, log); }, speed);
+  const std::string fault = source->fault();
+  auto serving = std::make_shared<console::Console>(where, std::move(source), "log", std::filesystem::path(log).filename().string());
+  serving->end("ruedo play has ended.");
+  if (!fault.empty()) fmt::print(stderr, "ruedo: {}: {}\n", log, fault);
+  print_urls(*serving);
   return serving;
 }
 
@@ -47,13 +69,19 @@ std::shared_ptr<void> ViewedBus::open(server::Server& server, const std::string&
 
 namespace ruedo::cli {
 
+namespace {
+
+[[noreturn]] void no_console() {
+  throw EnvironmentError("--view: this ruedo was built without the web console. Install nodejs, npm and libwebsockets-dev, then "
+                         "configure with -DRUEDO_CONSOLE=ON and build again");
+}
+
+}  // namespace
+
 struct ViewedBus::Impl {};
 
 ViewedBus::ViewedBus(Bus& bus, bool viewed, const std::string&) : inner_(bus) {
-  if (viewed) {
-    throw EnvironmentError("--view: this ruedo was built without the web console. Install nodejs, npm and libwebsockets-dev, then "
-                           "configure with -DRUEDO_CONSOLE=ON and build again");
-  }
+  if (viewed) no_console();
 }
 
 ViewedBus::~ViewedBus() = default;
@@ -61,6 +89,8 @@ ViewedBus::~ViewedBus() = default;
 Bus& ViewedBus::bus() { return inner_; }
 
 std::shared_ptr<void> ViewedBus::open(server::Server&, const std::string&) { return nullptr; }
+
+std::shared_ptr<void> view_log(const std::string&, const std::string&, double) { no_console(); }
 
 }  // namespace ruedo::cli
 

@@ -31,4 +31,8 @@ class ViewedBus {
   std::unique_ptr<Impl> impl_;
 };
 
+// Serves the console with a recorded run for as long as the returned object lives, and prints where. speed: log time per
+// real time. Throws InputError for what is no log, and as ViewedBus does.
+std::shared_ptr<void> view_log(const std::string& log, const std::string& address, double speed);
+
 }  // namespace ruedo::cli

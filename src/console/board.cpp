@@ -1,6 +1,7 @@
 // What belongs together is told from the message types' description: a type with a field `part` comes in parts.
 #include "console/board.h"
 
+#include "core/utf8.h"
 #include "ruedo/schema.h"
 
 namespace ruedo::console {
@@ -36,7 +37,7 @@ int part_offset(const Schema& schema) {
 
 void Board::name(size_t channel, const std::string& name) {
   if (channel >= channels_.size()) channels_.resize(channel + 1);
-  channels_[channel].name = name;
+  channels_[channel].name = printable(name);
 }
 
 void Board::put(size_t index, std::vector<uint8_t> message) {
@@ -60,8 +61,11 @@ void Board::put(size_t index, std::vector<uint8_t> message) {
   channel.newest.push_back({number_, std::make_shared<const std::vector<uint8_t>>(std::move(message))});
 }
 
-void Board::forget() {
-  for (Channel& channel : channels_) channel.newest.clear();
+bool Board::is_later_part(std::span<const uint8_t> message) {
+  const Schema* schema = find_schema(fingerprint_of(message));
+  const int offset = schema ? part_offset(*schema) : -1;
+  const auto at = static_cast<size_t>(offset);
+  return offset >= 0 && message.size() >= at + 2 && (message[at] != 0 || message[at + 1] != 0);
 }
 
 }  // namespace ruedo::console

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -32,10 +33,12 @@ class Board {
     int watchers = 0;             // viewers that want it
   };
 
-  // Makes room up to that channel.
+  // Makes room up to that channel. Names that are not UTF-8 are shown with '?'.
   void name(size_t channel, const std::string& name);
   void put(size_t channel, std::vector<uint8_t> message);
-  void forget();    // all messages; what comes next is new to every viewer
+
+  // Whether it belongs to the message before it: a part of one, but not its first.
+  static bool is_later_part(std::span<const uint8_t> message);
 
   std::vector<Channel>& channels() { return channels_; }
   const std::vector<Channel>& channels() const { return channels_; }

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <charconv>
+#include <chrono>
 #include <mutex>
 #include <thread>
 
@@ -14,10 +15,13 @@
 #include "console/viewer.h"
 #include "console/web_server.h"
 #include "core/json.h"
+#include "core/utf8.h"
 #include "server/version.h"
 
 namespace ruedo::console {
 namespace {
+
+constexpr auto kPlaybackPeriod = std::chrono::milliseconds(100);
 
 Bytes bytes_of(std::string_view text) { return std::make_shared<const std::vector<uint8_t>>(text.begin(), text.end()); }
 
@@ -35,6 +39,7 @@ struct Console::Impl {
   std::shared_ptr<const model::WorldModel> world;
   std::unique_ptr<SceneData> scene;      // of that world; null: not made yet
   Playback told;                         // to the viewers
+  std::chrono::steady_clock::time_point told_at;
   std::unique_ptr<WebServer> web;
   std::thread thread;
   std::mutex words_mutex;
@@ -92,8 +97,15 @@ bool Console::Impl::tick() {
     ++stage.world_version;
   }
   if (const Playback* playback = stage.source->playback(); playback && *playback != told) {
-    told = *playback;
-    ++stage.playback_version;
+    // A time that goes on is told now and then, and everything else at once.
+    const auto now = std::chrono::steady_clock::now();
+    Playback but_for_time = *playback;
+    but_for_time.now_s = told.now_s;
+    if (but_for_time != told || now - told_at >= kPlaybackPeriod) {
+      told = *playback;
+      told_at = now;
+      ++stage.playback_version;
+    }
   }
   return stage.viewers > 0 || before != stage.board.newest();
 }
@@ -104,8 +116,8 @@ Console::Console(const Address& address, std::unique_ptr<Source> source, const s
   impl.stage.source = std::move(source);
   impl.world = impl.stage.source->world();
   JsonWriter json;
-  json.open('{').name("hello").open('{').member("mode", mode).member("title", title).member("version", server::version());
-  json.member("info", impl.stage.source->info_channel()).member("fault", impl.stage.source->fault()).close('}').close('}');
+  json.open('{').name("hello").open('{').member("mode", mode).member("title", printable(title)).member("version", server::version());
+  json.member("info", impl.stage.source->info_channel()).member("fault", printable(impl.stage.source->fault())).close('}').close('}');
   impl.stage.greeting = json.text();
   const std::string token = address.loopback() ? "" : make_token();
   WebHandler handler;

@@ -16,6 +16,7 @@ struct Playback {
   double begin_s = 0, end_s = 0, now_s = 0;    // log time
   double speed = 1;                            // log time per real time
   bool playing = false;
+  int64_t jumps = 0;                           // counts what is no playing on: what was drawn along the way does not hold
   friend bool operator==(const Playback&, const Playback&) = default;
 };
 

@@ -136,7 +136,7 @@ bool Viewer::next_text(std::string& text) {
     told_playback_ = stage_.playback_version;
     JsonWriter json;
     json.open('{').name("playback").open('{').member("begin", playback->begin_s).member("end", playback->end_s).member("now", playback->now_s);
-    json.member("speed", playback->speed).member("playing", playback->playing).close('}').close('}');
+    json.member("speed", playback->speed).member("playing", playback->playing).member("jumps", playback->jumps).close('}').close('}');
     text = json.text();
     return true;
   }

@@ -38,14 +38,16 @@ class JsonWriter {
   JsonWriter& value(int number) { return value(int64_t{number}); }
   template <class Value>
   JsonWriter& member(std::string_view key, const Value& of_it) { return name(key).value(of_it); }
-  const std::string& text() const { return text_; }
-
- private:
+  // A value that is JSON already.
   JsonWriter& raw(std::string_view text) {
     separate();
     text_ += text;
     return *this;
   }
+  const std::string& text() const { return text_; }
+  void clear() { text_.clear(), first_ = true; }
+
+ private:
   void separate() {
     if (!first_) text_ += ", ";
     first_ = false;

@@ -78,13 +78,6 @@ std::string why_immovable(const Simulation& simulation, int instance) {
   return stands ? "is fixed to the world by a joint" : "";
 }
 
-std::string unused_name(const model::WorldModel& world, const std::string& name) {
-  if (find_model(world, name) < 0) return name;
-  int number = 2;
-  while (find_model(world, name + "_" + std::to_string(number)) >= 0) ++number;
-  return name + "_" + std::to_string(number);
-}
-
 Pose link_now(const Simulation& simulation, size_t instance, size_t link) {
   const model::BodyLayout& layout = simulation.layout();
   const model::LinkPlacement& placement = layout.links[static_cast<size_t>(layout.first_link[instance]) + link];
@@ -92,6 +85,13 @@ Pose link_now(const Simulation& simulation, size_t instance, size_t link) {
 }
 
 }  // namespace
+
+std::string unused_name(const model::WorldModel& world, const std::string& name) {
+  if (find_model(world, name) < 0) return name;
+  int number = 2;
+  while (find_model(world, name + "_" + std::to_string(number)) >= 0) ++number;
+  return name + "_" + std::to_string(number);
+}
 
 model::LoadedModel ModelStore::load(const spawn_request_t& request) {
   std::string key;

@@ -40,6 +40,9 @@ class ModelStore {
   std::map<std::string, Known> known_;
 };
 
+// That name, or with _2, _3, ... when it is taken: of a spawned model that was given none.
+std::string unused_name(const model::WorldModel& world, const std::string& name);
+
 // What can be said before the model is read; OK: nothing is wrong.
 Outcome check_spawn(const spawn_request_t& request);
 // step: of the first state that shows it. name: becomes the model's.

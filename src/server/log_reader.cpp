@@ -51,6 +51,12 @@ bool LogReader::skip(size_t size) {
   return true;
 }
 
+void LogReader::seek(int64_t offset) {
+  std::clearerr(file_.get());
+  fault_ = std::fseek(file_.get(), static_cast<long>(offset), SEEK_SET) == 0 ? "" : "cannot be read at byte " + std::to_string(offset);
+  offset_ = offset;
+}
+
 bool LogReader::next(LogEvent& event, const std::function<bool(const std::string&)>& wanted) {
   if (!fault_.empty()) return false;
   const int64_t begin = offset_;

@@ -28,6 +28,9 @@ class LogReader {
   // The event's buffers are reused. wanted: of other channels the data is passed over, and left empty.
   bool next(LogEvent& event, const std::function<bool(const std::string& channel)>& wanted = {});
 
+  // The next event is that at this byte, where offset() was before one.
+  void seek(int64_t offset);
+
   // After next() returned false: "" at a proper end, else what is wrong and at which byte.
   const std::string& fault() const { return fault_; }
   const std::string& path() const { return path_; }

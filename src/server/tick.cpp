@@ -27,8 +27,8 @@ constexpr CrcTables kCrc = [] {
 }  // namespace
 
 // Eight bytes at a time ("slicing by 8"; Kounavis, Berry, IEEE Transactions on Computers 57, 2008).
-uint32_t crc32(const uint8_t* data, size_t size) {
-  uint32_t crc = ~0u;
+uint32_t crc32(const uint8_t* data, size_t size, uint32_t before) {
+  uint32_t crc = ~before;
   for (; size >= 8; data += 8, size -= 8) {
     const uint32_t low = crc ^ (data[0] | data[1] << 8 | data[2] << 16 | uint32_t{data[3]} << 24);
     crc = kCrc[7][low & 0xff] ^ kCrc[6][low >> 8 & 0xff] ^ kCrc[5][low >> 16 & 0xff] ^ kCrc[4][low >> 24] ^

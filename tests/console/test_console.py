@@ -1,102 +1,13 @@
-"""The web console from outside: its pages and its socket in right and wrong hands, and its page in a headless browser."""
-import base64
-import gzip
-import http.client
+"""The web console from outside: its pages and its socket in right and wrong hands."""
 import os
 import re
-import shutil
 import socket
 import struct
 import subprocess
-import time
-from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
 
-SOURCE = Path(__file__).resolve().parents[2]
-BUILD = Path(os.environ["RUEDO_BINARY_DIR"])
-RUEDO = BUILD / "bin" / "ruedo"
-ARENA = SOURCE / "worlds" / "arena.sdf"
-NODE = os.environ.get("RUEDO_NODE") or shutil.which("node")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-SEEN, WANT, COMMAND, TRAFFIC, PLAY, SEEK = range(1, 7)
-
-
-@contextmanager
-def running(*arguments, view="127.0.0.1:0", world=ARENA):
-    """A viewed run, and the addresses that it prints."""
-    command = [RUEDO, "run", world, "--lcm", "memq://", "--quiet", "--view", view, *arguments]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    try:
-        urls = []
-        for line in process.stdout:
-            found = re.match(r"View it at (http://\S+)", line)
-            if found:
-                urls.append(found.group(1))
-                break
-        assert urls, process.stderr.read()
-        process.url = urls[0]
-        process.port = int(re.search(r":(\d+)/", urls[0]).group(1))
-        yield process
-    finally:
-        process.terminate()
-        process.wait(30)
-
-
-def get(port, path, method="GET", **headers):
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
-    connection.putrequest(method, path, skip_host="Host" in headers)
-    for name, value in headers.items():
-        connection.putheader(name.replace("_", "-"), value)
-    connection.endheaders()
-    answer = connection.getresponse()
-    body = answer.read()
-    return answer.status, gzip.decompress(body) if answer.headers.get("Content-Encoding") == "gzip" else body, answer.headers
-
-
-class Socket:
-    """A WebSocket of few words."""
-
-    def __init__(self, port, path="/socket", **headers):
-        self.socket = socket.create_connection(("127.0.0.1", port), timeout=20)
-        lines = [f"GET {path} HTTP/1.1", "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13",
-                 "Sec-WebSocket-Key: " + base64.b64encode(os.urandom(16)).decode()]
-        lines += [f"{name}: {value}" for name, value in ({"Host": f"localhost:{port}"} | headers).items()]
-        self.socket.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
-        self.file = self.socket.makefile("rb")
-        self.status = int((self.file.readline() or b"x 0").split()[1])
-        while self.status == 101 and self.file.readline() not in (b"\r\n", b""):
-            pass
-
-    def send(self, payload, opcode=2):
-        size = struct.pack("!B", 0x80 | len(payload)) if len(payload) < 126 else struct.pack("!BQ", 0xFF, len(payload))
-        self.socket.sendall(bytes([0x80 | opcode]) + size + bytes(4) + payload)
-
-    def receive(self):
-        opcode, size = self.file.read(2)
-        if size == 126:
-            size, = struct.unpack("!H", self.file.read(2))
-        elif size == 127:
-            size, = struct.unpack("!Q", self.file.read(8))
-        return opcode & 15, self.file.read(size)
-
-    def frame(self):
-        """{channel number: bytes} of the next frame of messages."""
-        while True:
-            opcode, data = self.receive()
-            if opcode == 2 and data[0] == 1:
-                self.send(bytes([SEEN]))
-                break
-        found, at = {}, 4
-        while at < len(data):
-            channel, size = struct.unpack_from("<II", data, at)
-            found[channel] = data[at + 8:at + 8 + size]
-            at += 8 + size
-        return found
-
-    def close(self):
-        self.socket.close()
+from harness import ARENA, BUILD, COMMAND, NODE, PLAY, RUEDO, SEEK, SEEN, TRAFFIC, WANT, Socket, get, running
 
 
 @pytest.fixture(scope="module")
@@ -224,17 +135,6 @@ def test_wrong_addresses_are_said():
     for address, code in (("nonsense:x", 2), ("192.0.2.1:80", 4)):
         done = subprocess.run([RUEDO, "run", ARENA, "--lcm", "memq://", "--view", address], capture_output=True, text=True, timeout=60)
         assert done.returncode == code and "--view" in done.stderr
-
-
-@pytest.mark.skipif(not (NODE and CHROMIUM), reason="needs node and chromium")
-def test_page_in_a_browser(tmp_path):
-    with running() as process:
-        done = subprocess.run([NODE, SOURCE / "tests/console/browser.mjs", process.url, tmp_path, "live"], cwd=BUILD / "web",
-                              env=os.environ | {"CHROMIUM": CHROMIUM}, capture_output=True, text=True, timeout=600)
-    assert done.returncode == 0, done.stderr
-    assert "error:" not in done.stdout, done.stdout
-    for seen in ("robots are listed", "rays have appeared", "the robot moved when driven", "a picture has come", "pause holds the clock", "a step moves the clock"):
-        assert seen in done.stdout, done.stdout
 
 
 def test_types_decode_in_typescript_as_in_python(tmp_path):

@@ -47,6 +47,7 @@ export class App {
   private lastClock = { wall: 0, sim: 0 };
   private motionId = BigInt(Date.now());
   private epoch = -1;
+  private jumps = -1;                           // of the log's player; -1: not known yet
 
   constructor() {
     this.link = new Link({
@@ -78,6 +79,7 @@ export class App {
     this.legend();
     this.setTheme(recall("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"));
     if (innerWidth < 860 || recall("panel") === "closed") byId("app").classList.add("closed");
+    byId("notice").addEventListener("click", () => this.notice(""));
     this.keys();
     this.clicks();
     void this.loadScene();
@@ -88,13 +90,18 @@ export class App {
   // ---- what comes in
 
   private onState(state: LinkState, words: string): void {
-    const notice = byId("notice");
-    notice.hidden = words === "";
-    say(notice, words);
+    this.notice(words);
     if (state === "open") {
       if (this.lastClock.wall > 0) toast("Connected again.");
       this.bar.showState("connected", true);
     } else this.bar.showState(state === "ended" ? "ended" : state === "lost" ? "no connection" : "connecting", false);
+  }
+
+  // Words that stay until they do not hold any more, or are clicked away; "" for none.
+  private notice(words: string): void {
+    const notice = byId("notice");
+    notice.hidden = words === "";
+    say(notice, words);
   }
 
   private onHello(hello: Hello): void {
@@ -105,13 +112,17 @@ export class App {
     this.bar.title(hello.title);
     document.body.dataset.mode = hello.mode;
     if (hello.mode === "log") this.bar.onlyClock();
-    if (hello.fault) toast(hello.fault, "error");
+    if (hello.fault) this.notice(hello.fault);
     if (other) this.robot = -1;
     this.want();
     if (hello.mode === "live") this.session.askForInfo("ruedo/request");
   }
 
   private onPlayback(playback: Playback): void {
+    if (playback.jumps !== this.jumps) {
+      if (this.jumps >= 0) this.forgetPast();
+      this.jumps = playback.jumps;
+    }
     this.paused = !playback.playing;
     this.timeline.show(playback);
     this.bar.showPaused(this.paused);
@@ -206,8 +217,7 @@ export class App {
   private onTime(time_s: number, epoch: number): void {
     if (epoch !== this.epoch || time_s < this.time_s - 0.5) {
       this.epoch = epoch;
-      for (const overlay of this.overlays.values()) overlay.clearTrails();
-      this.lastClock = { wall: 0, sim: 0 };
+      this.forgetPast();
     }
     this.time_s = time_s;
     this.bar.showClock(time_s);
@@ -215,6 +225,14 @@ export class App {
     if (wall - this.lastClock.wall < 1) return;
     if (this.lastClock.wall > 0) this.bar.showFactor((time_s - this.lastClock.sim) / (wall - this.lastClock.wall));
     this.lastClock = { wall, sim: time_s };
+  }
+
+  // What was drawn along the way is not of this moment.
+  private forgetPast(): void {
+    for (const overlay of this.overlays.values()) overlay.forget();
+    this.pages.forget();
+    this.poses.jump();
+    this.lastClock = { wall: 0, sim: 0 };
   }
 
   // ---- what is shown

@@ -210,9 +210,11 @@ export class RobotOverlay {
     this.contacts.write(message.n, (p) => message.points.forEach(({ position }, i) => p.set(position, 3 * i)));
     this.changed = true;
   }
-  clearTrails(): void {
+  // Trails begin anew, and contacts are none until some are told.
+  forget(): void {
     this.truth.clear();
     this.odometry.clear();
+    this.contacts.write(0, () => undefined);
     this.changed = true;
   }
 

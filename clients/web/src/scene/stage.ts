@@ -18,6 +18,7 @@ export class Stage {
   mode: ViewMode = "orbit";
   frames = 0;                        // drawn so far
   frameCost_ms = 0;                  // of this thread, smoothed
+  firstDrawn_ms = 0;                 // when the world was drawn first, since the page was asked for
   shadows = true;
   private built: Built | null = null;
   private lights = new THREE.Group();
@@ -239,6 +240,7 @@ export class Stage {
     this.aimSun();
     this.renderer.render(this.scene, this.camera);
     ++this.frames;
+    if (this.built && this.firstDrawn_ms === 0) this.firstDrawn_ms = performance.now();
     this.frameCost_ms += 0.1 * (performance.now() - begun - this.frameCost_ms);
   }
 

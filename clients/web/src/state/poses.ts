@@ -1,6 +1,7 @@
 // Where the bodies are, at the display's rate: between the last two states, one interval behind the newest.
 import type { world_state_t } from "../../generated/messages";
 
+const kMostBodies = 1_000_000;
 const kJump_m = 1.5;    // further in one interval is no motion but a new place
 
 export class Poses {
@@ -13,7 +14,11 @@ export class Poses {
   private arrived = 0;
   private interval = 33;
   private epoch = -1;
+  private jumped = false;
   settled = false;
+
+  // What comes next is another moment, not the next one: nothing moves there.
+  jump(): void { this.jumped = true; }
 
   private grow(size: number): void {
     if (size <= this.size) return;
@@ -31,14 +36,16 @@ export class Poses {
   add(state: world_state_t, at_ms: number): void {
     let highest = -1;
     for (const index of state.index) highest = Math.max(highest, index);
+    if (highest >= kMostBodies) throw new RangeError(`body ${highest} of ${kMostBodies} at most`);
     this.grow(highest + 1);
     const utime = Number(state.utime);
-    const fresh = state.epoch !== this.epoch || utime < this.utime;
+    const fresh = state.epoch !== this.epoch || utime < this.utime || this.jumped;
     if (state.part === 0) {
       if (!fresh && at_ms > this.arrived) this.interval += 0.2 * (Math.min(500, at_ms - this.arrived) - this.interval);
       this.arrived = at_ms;
       this.from.set(this.now);
     }
+    if (state.part === state.nparts - 1) this.jumped = false;
     this.epoch = state.epoch;
     this.utime = utime;
     this.settled = false;

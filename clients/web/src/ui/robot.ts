@@ -128,6 +128,12 @@ export class RobotPages {
     this.pictureList.replaceChildren(cameras.length === 0 ? h("p", { class: "dim" }, "This robot has no camera.") : "");
   }
 
+  // Plots begin anew.
+  forget(): void {
+    this.truth = null;
+    for (const plot of [this.speed, this.path, this.error]) plot.clear();
+  }
+
   private fact(name: string, text: string): void {
     let value = this.values.get(name);
     if (!value) {

@@ -39,6 +39,9 @@ export class Timeline {
     this.slider.max = String(playback.end);
     if (!this.held) this.slider.value = String(playback.now);
     say(this.time, `${(playback.now - playback.begin).toFixed(1)} / ${(playback.end - playback.begin).toFixed(1)} s`);
+    const speed = String(playback.speed);
+    if (![...this.speed.options].some((option) => option.value === speed)) this.speed.append(h("option", { value: speed }, `× ${speed}`));
+    if (document.activeElement !== this.speed) this.speed.value = speed;
     this.button.replaceChildren(icon(playback.playing ? "pause" : "play"));
   }
 }

@@ -1,7 +1,7 @@
 // The WebSocket to the program: texts, frames of messages, and what this page asks for. Comes back by itself when the
 // connection is lost.
 export interface Hello { mode: "live" | "log"; title: string; version: string; info: string; fault: string }
-export interface Playback { begin: number; end: number; now: number; speed: number; playing: boolean }
+export interface Playback { begin: number; end: number; now: number; speed: number; playing: boolean; jumps: number }
 export type LinkState = "connecting" | "open" | "lost" | "ended";
 
 export interface LinkHandler {

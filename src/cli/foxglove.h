@@ -1,0 +1,49 @@
+// A log's messages as Foxglove shows them: frames, scans, pictures, poses, the scene. What it has no type for, and what its
+// type leaves out, goes along as JSON of Ruedo's own types.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "cli/foxglove_schemas.h"
+#include "cli/mcap_writer.h"
+#include "model/world_model.h"
+#include "ruedo/world_info_t.hpp"
+#include "server/log_worlds.h"
+
+namespace ruedo::cli {
+
+class FoxgloveExport {
+ public:
+  explicit FoxgloveExport(McapWriter& out) : out_(out) {}
+
+  // What runs from now on: frames of robots and devices, and what the world looks like.
+  void begin_scene(const server::LogWorlds::Scene& scene, uint64_t time_ns);
+  // A message as it came. One that is none of Ruedo's types, or damaged, is left out and counted.
+  void add(const std::string& channel, uint64_t time_ns, std::span<const uint8_t> message);
+
+  uint64_t left_out() const { return left_out_; }
+
+ private:
+  uint16_t channel(const std::string& topic, const std::string& name, const std::string& schema);
+  void send(const std::string& topic, const foxglove::Type& type, uint64_t time_ns, const std::string& json);
+  void send_frames(const server::LogWorlds::Scene& scene, uint64_t time_ns);
+  void send_scene(const model::WorldModel& world, uint64_t time_ns);
+  std::string device_frame(const std::string& channel) const;
+  // Whether Foxglove has a type for it; all: that type says all that the message does.
+  bool convert(const std::string& channel, uint64_t time_ns, std::span<const uint8_t> message, bool& all);
+
+  McapWriter& out_;
+  std::map<std::string, uint16_t> schemas_, channels_;
+  std::map<std::string, std::string> device_of_channel_;    // "p3at/camera/info": "p3at/camera"
+  std::map<int, std::string> bodies_;                       // names, by index
+  std::set<std::string> body_names_;
+  bool scene_sent_ = false;
+  uint64_t left_out_ = 0;
+};
+
+}  // namespace ruedo::cli

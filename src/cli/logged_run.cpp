@@ -1,0 +1,43 @@
+// The inverse of result_options(), and of what ruedo run adds to them.
+#include "cli/logged_run.h"
+
+#include "ruedo/errors.h"
+#include "server/log_header.h"
+
+namespace ruedo::cli {
+
+LoggedOptions read_options(const log_header_t& header, const std::string& log) {
+  if (header.files.empty()) throw InputError({log}, "names no file that its world was made from");
+  LoggedOptions options;
+  WorldArguments& world = options.world;
+  world.world = header.files.front().path;
+  for (const std::string& option : header.options) {
+    const size_t equals = option.find('=');
+    const std::string name = option.substr(0, equals), value = equals == std::string::npos ? "" : option.substr(equals + 1);
+    if (name == "--spawn") world.spawns.push_back(value);
+    else if (name == "--drive") world.drives.push_back(value);
+    else if (name == "--allow-absolute") world.allow_absolute = true;
+    else if (name == "--set") world.settings.push_back(value);
+    else if (name == "--disable") world.disabled.push_back(value);
+    else if (name == "--no-noise") world.no_noise = true;
+    else if (name == "--remap") options.remaps.push_back(parse_remap(value));
+    else throw InputError({log}, "its run had the option " + option + ", which this version does not know");
+  }
+  return options;
+}
+
+server::LoggedRun load_run(const log_header_t& header, const std::string& log) {
+  LoggedOptions options = read_options(header, log);
+  server::LoggedRun run;
+  try {
+    server::check_files(header, log);
+  } catch (const InputError& error) {
+    run.warning = std::string("The world may not be the recorded one: ") + error.what();
+  }
+  run.world = load(options.world);
+  run.disabled = std::move(options.world.disabled);
+  run.remaps = std::move(options.remaps);
+  return run;
+}
+
+}  // namespace ruedo::cli

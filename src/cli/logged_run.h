@@ -1,0 +1,26 @@
+// The run that a log was made by: the options in its header, as its command line had them.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cli/commands.h"
+#include "ruedo/log_header_t.hpp"
+#include "server/log_worlds.h"
+
+namespace ruedo::cli {
+
+struct LoggedOptions {
+  WorldArguments world;
+  std::vector<std::pair<std::string, std::string>> remaps;
+};
+
+// log: names it in messages. Throws InputError for a header without a world, or with an option that is not known.
+LoggedOptions read_options(const log_header_t& header, const std::string& log);
+
+// The run to show. A world whose files were changed is shown as it is now, with a warning. Throws InputError, too, when the
+// world cannot be read.
+server::LoggedRun load_run(const log_header_t& header, const std::string& log);
+
+}  // namespace ruedo::cli

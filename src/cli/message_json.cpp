@@ -1,0 +1,170 @@
+// A message is checked as a whole first; then it is walked by its type without a further look at lengths.
+#include "cli/message_json.h"
+
+#include <cmath>
+#include <cstring>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "core/json.h"
+#include "core/utf8.h"
+
+namespace ruedo::cli {
+namespace {
+
+template <class Number>
+std::string number_text(Number value) {
+  if (std::isnan(value)) return "null";
+  if (std::isinf(value)) return value > 0 ? "1e999" : "-1e999";
+  return fmt::format("{}", value);
+}
+
+const char* type_of(Primitive primitive) {
+  switch (primitive) {
+    case Primitive::boolean: return "boolean";
+    case Primitive::string: return "string";
+    case Primitive::float32:
+    case Primitive::float64: return "number";
+    default: return "integer";
+  }
+}
+
+void write_type(const Schema& schema, JsonWriter& json);
+
+void write_type(const Field& field, size_t dimension, JsonWriter& json) {
+  if (dimension < field.dimensions.size()) {
+    json.open('{');
+    if (field.primitive == Primitive::byte && dimension + 1 == field.dimensions.size()) {
+      json.member("type", "string").member("contentEncoding", "base64");
+    } else {
+      json.member("type", "array").name("items");
+      write_type(field, dimension + 1, json);
+    }
+    json.close('}');
+  } else if (field.type) {
+    write_type(*field.type, json);
+  } else {
+    json.open('{').member("type", type_of(field.primitive)).close('}');
+  }
+}
+
+void write_type(const Schema& schema, JsonWriter& json) {
+  json.open('{').member("title", schema.name).member("type", "object").name("properties").open('{');
+  for (const Field& field : schema.fields) {
+    json.name(field.name);
+    write_type(field, 0, json);
+  }
+  json.close('}').close('}');
+}
+
+class Walk {
+ public:
+  explicit Walk(std::span<const uint8_t> bytes) : bytes_(bytes) {}
+
+  void object(const Schema& schema, JsonWriter& json) {
+    std::vector<int64_t> counts(schema.fields.size());    // of fields that are numbers: those of array lengths are
+    json.open('{');
+    for (size_t i = 0; i < schema.fields.size(); ++i) {
+      const Field& field = schema.fields[i];
+      json.name(field.name);
+      array(field, 0, counts, json, counts[i]);
+    }
+    json.close('}');
+  }
+
+  void skip(size_t size) { at_ += size; }
+
+ private:
+  uint64_t take(size_t size) {
+    uint64_t value = 0;
+    for (size_t i = 0; i < size; ++i) value = value << 8 | bytes_[at_++];
+    return value;
+  }
+
+  void array(const Field& field, size_t dimension, const std::vector<int64_t>& counts, JsonWriter& json, int64_t& integer) {
+    if (dimension == field.dimensions.size()) return one(field, json, integer);
+    const Dimension& of = field.dimensions[dimension];
+    const auto count = static_cast<size_t>(of.counted_by < 0 ? of.size : counts[static_cast<size_t>(of.counted_by)]);
+    if (field.primitive == Primitive::byte && dimension + 1 == field.dimensions.size()) {
+      json.value(base64(bytes_.subspan(at_, count)));
+      at_ += count;
+      return;
+    }
+    json.open('[');
+    for (size_t i = 0; i < count; ++i) array(field, dimension + 1, counts, json, integer);
+    json.close(']');
+  }
+
+  void one(const Field& field, JsonWriter& json, int64_t& integer) {
+    switch (field.primitive) {
+      case Primitive::none: object(*field.type, json); return;
+      case Primitive::boolean: json.value(take(1) != 0); return;
+      case Primitive::byte: json.value(integer = static_cast<int64_t>(take(1))); return;
+      case Primitive::int8: json.value(integer = static_cast<int8_t>(take(1))); return;
+      case Primitive::int16: json.value(integer = static_cast<int16_t>(take(2))); return;
+      case Primitive::int32: json.value(integer = static_cast<int32_t>(take(4))); return;
+      case Primitive::int64: json.value(integer = static_cast<int64_t>(take(8))); return;
+      case Primitive::float32: {
+        const auto bits = static_cast<uint32_t>(take(4));
+        float value = 0;
+        std::memcpy(&value, &bits, sizeof value);
+        json.raw(json_number(value));
+        return;
+      }
+      case Primitive::float64: {
+        const uint64_t bits = take(8);
+        double value = 0;
+        std::memcpy(&value, &bits, sizeof value);
+        json.raw(json_number(value));
+        return;
+      }
+      case Primitive::string: {
+        const size_t size = static_cast<size_t>(take(4));    // with the 0 at its end
+        json.value(printable({reinterpret_cast<const char*>(bytes_.data()) + at_, size - 1}));
+        at_ += size;
+        return;
+      }
+    }
+  }
+
+  std::span<const uint8_t> bytes_;
+  size_t at_ = 0;
+};
+
+}  // namespace
+
+std::string base64(std::span<const uint8_t> bytes) {
+  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (size_t i = 0; i < bytes.size(); i += 3) {
+    const size_t left = bytes.size() - i;
+    const uint32_t three = uint32_t{bytes[i]} << 16 | (left > 1 ? uint32_t{bytes[i + 1]} << 8 : 0u) | (left > 2 ? uint32_t{bytes[i + 2]} : 0u);
+    text += kDigits[three >> 18];
+    text += kDigits[three >> 12 & 63];
+    text += left > 1 ? kDigits[three >> 6 & 63] : '=';
+    text += left > 2 ? kDigits[three & 63] : '=';
+  }
+  return text;
+}
+
+std::string json_number(double value) { return number_text(value); }
+std::string json_number(float value) { return number_text(value); }
+
+std::string json_schema(const Schema& schema) {
+  JsonWriter json;
+  write_type(schema, json);
+  return json.text();
+}
+
+std::string json_message(const Schema& schema, std::span<const uint8_t> message) {
+  if (!well_formed(schema, message)) return "";
+  JsonWriter json;
+  Walk walk(message);
+  walk.skip(sizeof(int64_t));    // the fingerprint
+  walk.object(schema, json);
+  return json.text();
+}
+
+}  // namespace ruedo::cli

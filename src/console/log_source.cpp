@@ -1,0 +1,120 @@
+// Playing and seeking are one thing: the time is another one, and channels whose newest message has changed are read.
+#include "console/log_source.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/utf8.h"
+#include "ruedo/world_info_t.hpp"
+
+namespace ruedo::console {
+namespace {
+
+constexpr double kLongestPause_s = 0.5;    // between two looks at the clock; after a longer one the log does not jump
+constexpr double kSlowest = 0.01, kFastest = 1000.0;
+
+}  // namespace
+
+LogSource::LogSource(const std::string& path, const server::LoadRun& load, double speed)
+    : index_(path), worlds_(index_, load), reader_(path), scene_(&worlds_.at(index_.begin_us())), shown_(index_.channels().size(), kNothing) {
+  playback_.begin_s = static_cast<double>(index_.begin_us()) * 1e-6;
+  playback_.end_s = static_cast<double>(index_.end_us()) * 1e-6;
+  playback_.now_s = playback_.begin_s;
+  playback_.speed = std::clamp(speed, kSlowest, kFastest);
+  playback_.playing = true;
+  for (const server::LogIndex::Channel& channel : index_.channels()) {
+    if (channel.fingerprint == world_info_t::getHash()) info_channel_ = printable(channel.name);
+  }
+  makes_info_ = info_channel_.empty();
+  if (makes_info_) info_channel_ = "ruedo/info";
+}
+
+std::string LogSource::fault() const {
+  const std::string log = index_.fault().empty() ? "" : "The log is not whole: " + index_.fault() + ".";
+  return log + (log.empty() || worlds_.fault().empty() ? "" : " ") + worlds_.fault();
+}
+
+SimTime LogSource::now_us() const {
+  if (playback_.now_s >= playback_.end_s) return index_.end_us();
+  return std::max(index_.begin_us(), static_cast<SimTime>(std::llround(playback_.now_s * 1e6)));
+}
+
+void LogSource::pump(Board& board, bool viewers) {
+  if (board.channels().empty()) {
+    for (size_t i = 0; i < index_.channels().size(); ++i) board.name(i, index_.channels()[i].name);
+    if (makes_info_) board.name(index_.channels().size(), info_channel_);
+  }
+  const auto now = std::chrono::steady_clock::now();
+  const double passed_s = std::min(kLongestPause_s, std::chrono::duration<double>(now - last_).count());
+  last_ = now;
+  if (viewers && playback_.playing) {
+    playback_.now_s = std::min(playback_.end_s, playback_.now_s + passed_s * playback_.speed);
+    playback_.playing = playback_.now_s < playback_.end_s;
+  }
+  show(board);
+}
+
+void LogSource::show(Board& board) {
+  const SimTime time_us = now_us();
+  scene_ = &worlds_.at(time_us);
+  const auto& channels = index_.channels();
+  for (size_t i = 0; i < channels.size(); ++i) {
+    if (board.channels()[i].watchers == 0) {
+      shown_[i] = kNothing;    // it is read again when somebody wants it
+      continue;
+    }
+    size_t count = channels[i].count_until(time_us);
+    if (count == 0 && channels[i].fingerprint == world_info_t::getHash()) count = 1;
+    if (count == shown_[i]) continue;
+    shown_[i] = count;
+    if (count > 0) load(board, i, count);
+  }
+  if (makes_info_ && told_ != scene_) {
+    told_ = scene_;
+    for (const auto& part : scene_->info) board.put(channels.size(), part);
+  }
+}
+
+// The newest of so many messages; of one that comes in parts, the parts before it, too.
+void LogSource::load(Board& board, size_t channel, size_t count) {
+  std::vector<std::vector<uint8_t>> parts;
+  for (size_t entry = count; entry > 0 && parts.size() < Board::kMostParts; --entry) {
+    if (!read(channel, entry - 1)) break;
+    parts.push_back(event_.data);
+    if (!board.is_later_part(parts.back())) break;
+  }
+  for (auto part = parts.rbegin(); part != parts.rend(); ++part) board.put(channel, std::move(*part));
+}
+
+bool LogSource::read(size_t channel, size_t entry) {
+  const server::LogIndex::Entry& wanted = index_.channels()[channel].entries[entry];
+  if (wanted.size > kMostMessage) return false;
+  reader_.seek(wanted.offset);
+  return reader_.next(event_);    // false when the file is no longer what it was
+}
+
+Source::Count LogSource::traffic(size_t channel) const {
+  if (channel >= index_.channels().size()) return {};
+  const server::LogIndex::Channel& of = index_.channels()[channel];
+  const size_t count = of.count_until(now_us());
+  if (count == 0) return {};
+  constexpr uint32_t kEventHead = 28;    // bytes before channel and data
+  return {count, of.entries[count - 1].size - kEventHead - static_cast<uint32_t>(of.name.size())};
+}
+
+void LogSource::play(bool on, double speed) {
+  playback_.speed = std::clamp(speed, kSlowest, kFastest);
+  if (on && playback_.now_s >= playback_.end_s) {
+    playback_.now_s = playback_.begin_s;
+    ++playback_.jumps;
+  }
+  playback_.playing = on;
+}
+
+void LogSource::seek(Board& board, double time_s) {
+  playback_.now_s = std::clamp(time_s, playback_.begin_s, playback_.end_s);
+  ++playback_.jumps;
+  show(board);
+}
+
+}  // namespace ruedo::console

@@ -1,0 +1,54 @@
+// A recorded run, as the console sees it: at each moment the newest message of every channel that somebody watches.
+//
+// All viewers see the same moment. Time stands still while nobody watches.
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+#include "console/source.h"
+#include "server/log_index.h"
+#include "server/log_worlds.h"
+
+namespace ruedo::console {
+
+class LogSource : public Source {
+ public:
+  static constexpr uint32_t kMostMessage = 64u << 20;    // bytes; a larger one is not shown
+
+  // Throws InputError for what is no log. speed: log time per real time.
+  LogSource(const std::string& path, const server::LoadRun& load, double speed);
+
+  void pump(Board& board, bool viewers) override;
+  Count traffic(size_t channel) const override;
+  bool command(const std::string&, std::span<const uint8_t>) override { return false; }
+  std::shared_ptr<const model::WorldModel> world() override { return scene_->world; }
+  std::string fault() const override;
+  std::string info_channel() const override { return info_channel_; }
+  const Playback* playback() const override { return &playback_; }
+  void play(bool on, double speed) override;
+  void seek(Board& board, double time_s) override;
+
+ private:
+  static constexpr size_t kNothing = static_cast<size_t>(-1);
+
+  SimTime now_us() const;
+  void show(Board& board);
+  void load(Board& board, size_t channel, size_t count);
+  bool read(size_t channel, size_t entry);
+
+  server::LogIndex index_;
+  server::LogWorlds worlds_;
+  server::LogReader reader_;
+  server::LogEvent event_;
+  const server::LogWorlds::Scene* scene_;
+  std::string info_channel_;
+  bool makes_info_ = false;             // the log has none: it is the channel after all of the log's
+  const server::LogWorlds::Scene* told_ = nullptr;    // whose info is on the board
+  std::vector<size_t> shown_;           // of each channel, how many messages there were when one was put on the board
+  Playback playback_;
+  std::chrono::steady_clock::time_point last_;
+};
+
+}  // namespace ruedo::console

@@ -1,0 +1,40 @@
+// The table of well-formed byte sequences of the Unicode standard (table 3-7), as conditions.
+#include "core/utf8.h"
+
+#include <algorithm>
+#include <cstdint>
+
+namespace ruedo {
+namespace {
+
+// Bytes of the UTF-8 character that begins there; 0 where none does.
+size_t character_size(std::string_view text) {
+  const auto byte = [&](size_t i) { return i < text.size() ? static_cast<uint8_t>(text[i]) : uint8_t{0}; };
+  const auto follows = [&](size_t i) { return (byte(i) & 0xc0) == 0x80; };
+  const uint8_t first = byte(0), second = byte(1);
+  if (first < 0x80) return 1;
+  if (first >= 0xc2 && first < 0xe0) return follows(1) ? 2 : 0;
+  if (first >= 0xe0 && first < 0xf0) {    // neither longer than needed nor a half of a UTF-16 pair
+    const bool fits = follows(1) && (first != 0xe0 || second >= 0xa0) && (first != 0xed || second < 0xa0);
+    return fits && follows(2) ? 3 : 0;
+  }
+  if (first < 0xf0 || first > 0xf4) return 0;
+  const bool fits = follows(1) && (first != 0xf0 || second >= 0x90) && (first != 0xf4 || second < 0x90);
+  return fits && follows(2) && follows(3) ? 4 : 0;
+}
+
+}  // namespace
+
+std::string printable(std::string_view text) {
+  std::string result;
+  result.reserve(text.size());
+  while (!text.empty()) {
+    const size_t size = character_size(text);
+    if (size == 0) result += '?';
+    else result += text.substr(0, size);
+    text.remove_prefix(std::max<size_t>(1, size));
+  }
+  return result;
+}
+
+}  // namespace ruedo

@@ -1,0 +1,145 @@
+"""The console's page in a headless browser: a run, all that steers it, the page itself, and recorded runs."""
+import shutil
+import json
+import re
+import shutil
+import socket
+import subprocess
+import time
+
+import pytest
+
+from harness import RUEDO, SOURCE, Socket, browse, browser, needs_browser, playing, running
+
+BUMPER = SOURCE / "tests" / "console" / "bumper.sdf"
+pytestmark = needs_browser
+
+
+def events(log):
+    """(channel, time in us, bytes) of each event of an LCM log."""
+    import lcm
+    return [(event.channel, event.timestamp, event.data) for event in lcm.EventLog(str(log))]
+
+
+def states(log, body):
+    """(log time in s, sim time in s, x, y of the body, how many bodies there are) of each ruedo/world of a log."""
+    from ruedo.lcmtypes import world_state_t
+    for channel, time_us, data in events(log):
+        if channel == "ruedo/world":
+            state = world_state_t.decode(data)
+            yield time_us * 1e-6, state.utime * 1e-6, *state.position[list(state.index).index(body)][:2], state.n
+
+
+def test_a_run_is_shown_and_steered(tmp_path):
+    with running() as process:
+        seen = browse(process.url, tmp_path, "live")
+    for what in ("robots are listed", "rays have appeared", "the robot moved when driven", "a picture has come", "pause holds the clock", "a step moves the clock"):
+        assert what in seen
+    for name in ("laptop", "plots", "channels", "phone"):
+        assert (tmp_path / f"{name}.png").stat().st_size > 20_000
+
+
+def test_the_page_loads_fast_fits_and_says_what_is_wrong(tmp_path):
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+
+    def server():
+        return running("--disable", "p3at/camera", view=f"127.0.0.1:{port}")
+
+    said, context = [], server()
+    process = context.__enter__()
+    try:
+        with browser(process.url, tmp_path, "page") as page:
+            for line in page.stdout:
+                said.append(line.rstrip())
+                if line.startswith(("end the server", "kill the server")):
+                    (process.terminate if "end" in line else process.kill)()
+                    process.wait(30)
+                elif line.startswith("begin the server"):
+                    context = server()
+                    process = context.__enter__()
+                else:
+                    continue
+                page.stdin.write("done\n")
+                page.stdin.flush()
+            page.wait(60)
+    finally:
+        context.__exit__(None, None, None)
+    assert not any("error:" in line for line in said), "\n".join(said)
+    assert {"the world is drawn within two seconds", "nothing is wider than a phone", "and drives the new run", "and pauses it"} <= set(said)
+
+
+@pytest.fixture(scope="module")
+def steered(tmp_path_factory):
+    """What was seen while everything was steered, and the run's log."""
+    folder = tmp_path_factory.mktemp("steered")
+    with running("--record", folder / "run.lcm", world=BUMPER) as process:
+        seen = browse(process.url, folder, "controls")
+    return seen, folder / "run.lcm"
+
+
+@pytest.mark.parametrize("what", [
+    "the up arrow drives ahead", "S drives back", "A turns left", "D turns right", "the stick drives ahead", "the stick turns left",
+    "the stick let go stops the robot", "a gamepad drives ahead", "a gamepad turns left", "typing does not drive", "a motion primitive is done",
+    "it went as far as was asked", "both trails have grown", "contact points are where the pad touches the ground",
+    *(f"{layer} can be switched" for layer in ("rays", "points", "sonar", "trail", "odometry", "contacts", "frames")),
+    *(f"{layer} make a difference to the picture" for layer in ("rays", "points", "sonar", "trail", "odometry", "contacts", "frames")),
+    "a box was placed", "the box stands where the click was", "a robot was placed", "where there is no room, it says so",
+    "the server has the rate that was chosen", "at a quarter of the rate the clock goes a quarter as fast", "a reset sets the clock back",
+    "a reset takes away what was placed", "a reset puts the robot back"])
+def test_steering(steered, what):
+    assert what in steered[0]
+
+
+def test_a_recorded_run_is_scrubbed(tmp_path):
+    """An arena run with a camera, driven along a curve; at each of ten moments the page shows the log's pose."""
+    from ruedo.lcmtypes import velocity_command_t
+    log = tmp_path / "run.lcm"
+    with running("--record", log, "--duration", "6") as process:
+        driver = Socket(process.port)
+        while process.poll() is None:
+            driver.command("p3at/velocity", velocity_command_t(vx=0.5, omega=0.4))
+            time.sleep(0.1)
+    found = list(states(log, 0))
+    assert abs(found[-1][2]) + abs(found[-1][3]) > 0.5    # it has moved
+    moments = [found[round(share * (len(found) - 1))] for share in (0.9, 0.1, 0.5, 1.0, 0.3, 0.0, 0.7, 0.2, 0.95, 0.6)]
+    given = {"rays": True, "moments": [{"time": t, "sim_time": sim, "body": 0, "pose": [x, y], "bodies": n} for t, sim, x, y, n in moments]}
+    with playing(log) as process:
+        seen = browse(process.url, tmp_path, "log", given)
+    assert "the time line scrubs" in seen and "the robot is where the log has it, at each of many moments" in seen
+
+
+def test_what_was_placed_and_reset_is_in_the_log_too(steered, tmp_path):
+    """The log of the steered run: a box and a robot that come on the way, and are gone after the reset."""
+    found = list(states(steered[1], 0))
+    most = max(state[4] for state in found)
+    assert most >= found[0][4] + 2    # box and robot
+    with_all = [state for state in found if state[4] == most]
+    moments = [found[0], with_all[len(with_all) // 2], found[-1], found[len(found) // 3], with_all[0]]
+    given = {"moments": [{"time": t, "sim_time": sim, "body": 0, "pose": [x, y], "bodies": n} for t, sim, x, y, n in moments]}
+    with playing(steered[1]) as process:
+        browse(process.url, tmp_path, "log", given)
+
+
+def thousand_robots(path):
+    """A log of 1 000 robots in 25 rows, with their bodies and wheels but without sensors."""
+    model = (SOURCE / "worlds/robots/p3dx/model.sdf").read_text()
+    shutil.copytree(SOURCE / "worlds/robots/p3dx/meshes", path / "meshes")
+    (path / "plain.sdf").write_text(re.sub(r"<sensor.*?</sensor>", "", model, flags=re.DOTALL))
+    robots = "".join(f"<include><uri>plain.sdf</uri><name>r{i}</name><pose>{1.2 * (i % 40) - 24} {1.2 * (i // 40) - 15} 0 0 0 {i % 7}</pose></include>" for i in range(1000))
+    (path / "thousand.sdf").write_text(f"""<?xml version="1.0"?><sdf version="1.9"><world name="thousand"><include><uri>model://sun</uri></include>
+<include><uri>model://ground_plane</uri></include>{robots}</world></sdf>""")
+    log = path / "thousand.lcm"
+    subprocess.run([RUEDO, "run", path / "thousand.sdf", "--lcm", "memq://", "--quiet", "--rate", "max", "--duration", "4", "--record", log], check=True, timeout=500)
+    return log
+
+
+def test_a_thousand_robots_are_shown(tmp_path):
+    """From a log, so that what is measured is the page and not the simulation beside it. What it says is in docs/console.md."""
+    with playing(thousand_robots(tmp_path)) as process:
+        seen = browse(process.url, tmp_path, "fleet", {"robots": 1000, "seconds": 5})
+    measured = [json.loads(line.split(": ", 1)[1]) for line in seen if line.startswith("measured: ")]
+    assert "they are a few draw calls" in seen
+    # Without software that draws every pixel: what this page's thread needs for a frame leaves room for 20 a second.
+    assert min(each["own_ms_per_frame"] for each in measured if "own_ms_per_frame" in each) < 50
