@@ -3,6 +3,7 @@
 
 #include <arpa/inet.h>
 #include <netdb.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -10,7 +11,9 @@
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
 #include <limits>
+#include <system_error>
 
 #include "ruedo/client.h"
 
@@ -19,7 +22,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kLendTime(20);
 
-struct Address { std::string scheme, host, port; };
+struct Address { std::string scheme, host, port, options; };
 
 Address split(const std::string& url) {
   Address address;
@@ -30,6 +33,7 @@ Address split(const std::string& url) {
   const size_t colon = network.rfind(':');
   address.host = network.substr(0, colon);
   if (colon != std::string::npos) address.port = network.substr(colon + 1);
+  if (const size_t options = url.find('?'); options != std::string::npos) address.options = url.substr(options);
   return address;
 }
 
@@ -99,31 +103,63 @@ bool is_served(const std::string& url) {
                                                  address.port.empty() ? "7700" : address.port, SOCK_STREAM, why);
 }
 
+bool is_claimed(const std::string& url) {
+  const Address address = split(url);
+  const bool udpm = address.scheme == "udpm";
+  const std::string host = address.host.empty() ? (udpm ? "239.255.76.67" : "127.0.0.1") : address.host;
+  const std::string port = address.port.empty() ? (udpm ? "7667" : "7700") : address.port;
+  const std::string claim = " @ruedo/" + address.scheme + "/" + host + ":" + port;
+  std::ifstream sockets("/proc/net/unix");
+  for (std::string line; std::getline(sockets, line);) {
+    if (line.ends_with(claim)) return true;
+  }
+  return false;
+}
+
 bool has_multicast_route(const std::string& group) {
   std::string why;
   return can_connect(group, "7667", SOCK_DGRAM, why);
 }
 
-LcmBus::LcmBus(const std::string& url) {
+LcmBus::LcmBus(const std::string& url) : url_(url) {
   check_reachable(url);
   lcm_ = lcm_create(url.c_str());
-  if (!lcm_) throw NoServer(url + ": LCM cannot use it; `ruedo doctor` looks for what is wrong");
+  receiver_ = lcm_ && split(url).scheme == "udpm" ? lcm_create(url.c_str()) : lcm_;
+  if (receiver_) return;
+  if (lcm_) lcm_destroy(lcm_);
+  throw NoServer(url + ": LCM cannot use it; `ruedo doctor` looks for what is wrong");
 }
 
 LcmBus::~LcmBus() {
   close();
+  if (receiver_ && receiver_ != lcm_) lcm_destroy(receiver_);
   lcm_destroy(lcm_);
+}
+
+void LcmBus::receive_directly() {
+  if (direct_ || receiver_ == lcm_) return;
+  const Address address = split(url_);
+  const size_t buffer = address.options.find("recv_buf_size=");
+  const Turn turn(*this);
+  const std::lock_guard lock(mutex_);
+  try {
+    direct_ = std::make_unique<bus::MulticastReceiver>(address.host.empty() ? "239.255.76.67" : address.host,
+                                                       static_cast<uint16_t>(std::atoi(address.port.empty() ? "7667" : address.port.c_str())),
+                                                       buffer == std::string::npos ? 0 : std::atoi(address.options.c_str() + buffer + 14));
+  } catch (const std::system_error&) {
+    return;    // as it was
+  }
+  lcm_destroy(receiver_);
+  receiver_ = nullptr;
 }
 
 void LcmBus::start() { thread_ = std::thread([this] { receive(); }); }
 
 void LcmBus::subscribe(const std::string& channel, Handler handler) {
   auto kept = std::make_shared<Handler>(std::move(handler));
-  {
-    std::lock_guard lock(mutex_);
-    handlers_[channel].push_back(kept);
-  }
-  lcm_subscribe(lcm_, escaped(channel).c_str(), dispatch, kept.get());
+  const std::lock_guard lock(mutex_);
+  handlers_[channel].push_back(kept);
+  if (receiver_) lcm_subscribe(receiver_, escaped(channel).c_str(), dispatch, kept.get());
 }
 
 void LcmBus::publish(const std::string& channel, const uint8_t* bytes, size_t size) {
@@ -135,9 +171,28 @@ void LcmBus::close() {
   if (thread_.joinable()) thread_.join();
 }
 
+void LcmBus::deliver(std::string_view channel, const uint8_t* bytes, size_t size) {
+  for (size_t i = 0;; ++i) {    // a handler may subscribe
+    Handler* handler;
+    {
+      const std::lock_guard lock(mutex_);
+      const auto found = handlers_.find(channel);
+      if (found == handlers_.end() || i >= found->second.size()) return;
+      handler = found->second[i].get();
+    }
+    (*handler)(bytes, size);
+  }
+}
+
 void LcmBus::handle(int timeout_ms) {
+  if (direct_) {
+    if (direct_->take([this](std::string_view channel, const uint8_t* bytes, size_t size) { deliver(channel, bytes, size); })) return;
+    pollfd waiting{direct_->file(), POLLIN, 0};
+    ::poll(&waiting, 1, timeout_ms);
+    return;
+  }
   // tcpq: when the server is gone, those who wait find out by their timeouts.
-  if (lcm_handle_timeout(lcm_, timeout_ms) < 0) std::this_thread::sleep_for(std::chrono::milliseconds(std::min(timeout_ms, 100)));
+  if (lcm_handle_timeout(receiver_, timeout_ms) < 0) std::this_thread::sleep_for(std::chrono::milliseconds(std::min(timeout_ms, 100)));
 }
 
 void LcmBus::receive() {

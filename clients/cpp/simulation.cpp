@@ -137,7 +137,7 @@ void Simulation::reset(Reset what, int64_t seed) const {
   core_->stepper().forget();
 }
 
-void Simulation::spawn(const std::string& model, double x, double y, const SpawnOptions& options) const {
+std::string Simulation::spawn(const std::string& model, double x, double y, const SpawnOptions& options) const {
   spawn_request_t body{};
   body.name = options.name;
   body.model = model;
@@ -149,8 +149,9 @@ void Simulation::spawn(const std::string& model, double x, double y, const Spawn
   const Quaternion orientation = about_z(options.heading);
   std::copy(orientation.begin(), orientation.end(), body.orientation);
   const auto before = core_->info();
-  core_->session().request(request_t::SPAWN, encoded(body), kSlowReplyTime);
+  const Reply reply = core_->session().request(request_t::SPAWN, encoded(body), kSlowReplyTime);
   core_->refresh_info(before);
+  return state_of(reply).name;
 }
 
 void Simulation::remove(const std::string& name) const {

@@ -67,6 +67,7 @@ void Stepper::forget() {
 }
 
 void Stepper::take_part(double timeout) {
+  core_.bus().receive_directly();
   subscribe();
   grant_request_t body{};
   body.granted = -1;

@@ -244,7 +244,8 @@ class Simulation {
   bool lockstep() const;                                     // whether the server runs in lockstep
   void set_rate(double rate) const;
   void reset(Reset what = Reset::all, int64_t seed = -1) const;    // seed -1: the same again
-  void spawn(const std::string& model, double x, double y, const SpawnOptions& options = {}) const;
+  // Returns the model's name: the server numbers one that is taken, unless it was asked for.
+  std::string spawn(const std::string& model, double x, double y, const SpawnOptions& options = {}) const;
   void remove(const std::string& name) const;
   void set_pose(const std::string& name, const Vector3& position, const Quaternion& orientation) const;
   void set_pose(const std::string& name, double x, double y, double heading = 0.0, double z = 0.0) const;

@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cctype>
-#include <set>
+#include <chrono>
+#include <cstdlib>
+#include <random>
+#include <system_error>
 
 #include <poll.h>
 #include <pthread.h>
@@ -19,6 +22,9 @@ namespace ruedo::bus {
 namespace {
 
 constexpr int kConnectMs = 2000;
+constexpr int kTakenTogether = 64;    // messages, before it is looked whether the bus ends
+constexpr const char* kSelfTest = "LCM_SELF_TEST";
+constexpr auto kSelfTestTime = std::chrono::milliseconds(50);
 
 }  // namespace
 
@@ -70,18 +76,18 @@ void LcmBus::publish(const std::string& channel, const uint8_t* data, size_t siz
   if (out_->publish(channel, data, static_cast<unsigned>(size)) != 0) ++failed_;
 }
 
-void LcmBus::listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own) {
+void LcmBus::listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>&) {
   handler_ = std::move(handler);
-  know(channels, own);
-  subscribe();
+  know(channels);
+  open();
   stop_event_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   thread_ = std::thread([this] { read(); });
 }
 
-void LcmBus::listen_to(const std::vector<std::string>& channels, const std::vector<std::string>& own) {
+void LcmBus::listen_to(const std::vector<std::string>& channels, const std::vector<std::string>&) {
   if (!thread_.joinable() || stopping_) return;
   std::unique_lock lock(mutex_);
-  wanted_ = {channels, own};
+  wanted_ = channels;
   waits_ = true;
   const uint64_t one = 1;
   [[maybe_unused]] const ssize_t written = ::write(stop_event_, &one, sizeof one);
@@ -92,56 +98,68 @@ void LcmBus::listen_to(const std::vector<std::string>& channels, const std::vect
 void LcmBus::take_up() {
   std::lock_guard lock(mutex_);
   if (!waits_) return;
-  know(wanted_.first, wanted_.second);
-  subscribe_missing();
+  know(wanted_);
+  if (in_) subscribe_missing();
   waits_ = false;
   taken_up_.notify_all();
 }
 
-void LcmBus::know(const std::vector<std::string>& channels, const std::vector<std::string>& own) {
-  channels_ = {channels.begin(), channels.end()};
-  patterns_ = channel_patterns(channels);
-  std::vector<std::string> known = channels;
-  known.insert(known.end(), own.begin(), own.end());
-  unknown_pattern_ = "(?!(?:";
-  for (const std::string& pattern : channel_patterns(known)) unknown_pattern_ += pattern + "|";
-  unknown_pattern_ += "LCM_SELF_TEST)$).*";
-  // A slow reader is none of ours: the handler only checks and stores. Room for a burst from every robot.
-  queue_size_ = static_cast<int>(std::clamp<size_t>(4 * channels.size(), 64, 65536));
-}
+void LcmBus::know(const std::vector<std::string>& channels) { channels_ = {channels.begin(), channels.end()}; }
 
-void LcmBus::subscribe() {
+void LcmBus::open() {
+  if (url_.scheme == "udpm") {
+    try {
+      multicast_ = std::make_unique<MulticastReceiver>(url_.host, url_.port, std::atoi(url_.option("recv_buf_size", "0").c_str()));
+    } catch (const std::system_error& error) {
+      throw EnvironmentError("cannot listen on '" + url_.str() + "' (" + error.what() + "): run `ruedo doctor`");
+    }
+    return ignore_own();
+  }
   if (url_.scheme == "memq") {
     in_ = std::shared_ptr<lcm::LCM>(out_.get(), [](lcm::LCM*) {});    // messages stay inside of one instance
   } else {
     in_ = std::make_shared<lcm::LCM>(url_.str());
     if (!in_->good()) throw EnvironmentError("LCM cannot open '" + url_.str() + "': run `ruedo doctor`");
   }
-  subscribed_.clear();
-  unknown_subscription_ = nullptr;
-  unknown_subscribed_.clear();
   subscribe_missing();
   // LCM's subscribe succeeds even where nothing can be received.
   if (in_->getFileno() < 0) throw EnvironmentError("LCM cannot listen on '" + url_.str() + "': run `ruedo doctor`");
 }
 
+// Our first message comes back and tells from where LCM sends. Where it does not, all of them come back, and are passed over.
+void LcmBus::ignore_own() {
+  uint8_t mark[16];
+  std::random_device random;
+  std::generate(std::begin(mark), std::end(mark), [&] { return static_cast<uint8_t>(random()); });
+  publish(kSelfTest, mark, sizeof mark);
+  bool own = false;
+  const auto look = [&](std::string_view channel, const uint8_t* data, size_t size) {
+    own = channel == kSelfTest && std::equal(data, data + size, std::begin(mark), std::end(mark));
+    if (!own) deliver(channel, data, size);
+  };
+  const auto until = std::chrono::steady_clock::now() + kSelfTestTime;
+  while (!own && std::chrono::steady_clock::now() < until) {
+    pollfd waiting{multicast_->file(), POLLIN, 0};
+    if (::poll(&waiting, 1, 1) > 0) multicast_->take(look);
+  }
+  if (own) multicast_->ignore(multicast_->sender());
+}
+
 void LcmBus::subscribe_missing() {
-  for (const std::string& pattern : patterns_) {
+  // A slow reader is none of ours: the handler only checks and stores. Room for a burst from every robot.
+  const int queue_size = static_cast<int>(std::clamp<size_t>(4 * channels_.size(), 64, 65536));
+  for (const std::string& pattern : channel_patterns({channels_.begin(), channels_.end()})) {
     if (!subscribed_.insert(pattern).second) continue;
     lcm::Subscription* subscription = in_->subscribe(pattern, &LcmBus::on_message, this);
-    if (subscription) subscription->setQueueCapacity(queue_size_);
+    if (subscription) subscription->setQueueCapacity(queue_size);
   }
-  if (url_.scheme != "udpm" || unknown_subscribed_ == unknown_pattern_) return;
-  if (unknown_subscription_) in_->unsubscribe(unknown_subscription_);
-  unknown_subscribed_ = unknown_pattern_;
-  unknown_subscription_ = in_->subscribe(unknown_pattern_, &LcmBus::on_unknown, this);
-  if (unknown_subscription_) unknown_subscription_->setQueueCapacity(1024);
 }
 
 void LcmBus::read() {
   pthread_setname_np(pthread_self(), "bus");
+  const int file = multicast_ ? multicast_->file() : in_->getFileno();
   for (;;) {
-    pollfd waiting[2] = {{in_->getFileno(), POLLIN, 0}, {stop_event_, POLLIN, 0}};
+    pollfd waiting[2] = {{file, POLLIN, 0}, {stop_event_, POLLIN, 0}};
     if (::poll(waiting, 2, -1) < 0) continue;    // a signal
     if (waiting[1].revents != 0) {
       if (stopping_) return;
@@ -149,29 +167,27 @@ void LcmBus::read() {
       [[maybe_unused]] const ssize_t got = ::read(stop_event_, &count, sizeof count);
       take_up();
     }
-    if (waiting[0].revents == 0) continue;
+    if (waiting[0].revents != 0) handle();
+  }
+}
+
+void LcmBus::handle() {
+  if (!multicast_) {
     if (in_->handle() != 0) ++failed_;
-    if (unknown_.size() < kMostUnknownNames) continue;
-    unknown_.clear();
-    ++renewals_;
-    try {
-      subscribe();
-    } catch (const std::exception& error) {
-      spdlog::error("the bus is deaf: {}", error.what());
-      stopping_ = true;
-      take_up();
-      return;
-    }
+    return;
+  }
+  const auto take = [this](std::string_view channel, const uint8_t* data, size_t size) { deliver(channel, data, size); };
+  for (int i = 0; i < kTakenTogether && multicast_->take(take); ++i) {
   }
 }
 
 void LcmBus::on_message(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
-  if (!channels_.contains(channel)) return on_unknown(buffer, channel);    // the patterns are wider than the list
-  handler_(channel, static_cast<const uint8_t*>(buffer->data), buffer->data_size);
+  deliver(channel, static_cast<const uint8_t*>(buffer->data), buffer->data_size);
 }
 
-void LcmBus::on_unknown(const lcm::ReceiveBuffer*, const std::string& channel) {
-  unknown_.insert(std::hash<std::string>()(channel));
+void LcmBus::deliver(std::string_view channel, const uint8_t* data, size_t size) {
+  const auto known = channels_.find(channel);    // LCM's patterns are wider than the list
+  if (known != channels_.end()) handler_(*known, data, size);
 }
 
 }  // namespace ruedo::bus

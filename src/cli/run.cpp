@@ -135,9 +135,7 @@ server::ServerOptions server_options(const RunArguments& arguments) {
     options.result_options.push_back("--remap=" + text);
   }
   for (const std::string& text : arguments.wait_for) options.wait_for.push_back(parse_wait_for(text));
-  if (arguments.lockstep > 0 && !(arguments.wait_for.empty() && arguments.restore.empty())) {
-    throw InputError({}, "--lockstep goes neither with --wait-for nor with --restore");
-  }
+  if (arguments.lockstep > 0 && !arguments.wait_for.empty()) throw InputError({}, "--lockstep does not go with --wait-for");
   options.snapshots = arguments.snapshots;
   options.repeat = arguments.restore;
   options.simulation.fleet.seed = arguments.seed;

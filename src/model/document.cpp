@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <set>
 #include <string_view>
 
 #include <tinyxml2.h>
@@ -96,9 +97,11 @@ std::unique_ptr<Element> parse_document(const std::string& text, const std::stri
     throw InputError({file, 1}, "the text is UTF-16; save the file as UTF-8");
   }
   if (text.find('\0') != std::string::npos) throw InputError({file, 1}, "not a text file: it holds zero bytes");
-  if (trimmed(text).empty()) throw InputError({file, 0}, "the file is empty");
-  const std::string_view start = text.rfind("\xEF\xBB\xBF", 0) == 0 ? std::string_view(text).substr(3) : std::string_view(text);
-  if (start[start.find_first_not_of(" \t\r\n\f\v")] != '<') throw InputError({file, 1}, "not XML: the text does not begin with '<'");
+  std::string_view start = text;
+  if (start.starts_with("\xEF\xBB\xBF")) start.remove_prefix(3);    // UTF-8's mark
+  const size_t begin = start.find_first_not_of(" \t\r\n\f\v");
+  if (begin == std::string_view::npos) throw InputError({file, 0}, "the file is empty");
+  if (start[begin] != '<') throw InputError({file, 1}, "not XML: the text does not begin with '<'");
   tinyxml2::XMLDocument xml;
   xml.Parse(text.data(), text.size());
   if (xml.Error()) throw InputError({file, xml.ErrorLineNum()}, what_is_wrong(xml));
@@ -136,6 +139,15 @@ std::shared_ptr<const Element> DocumentStore::read(const std::string& path) {
     files_.push_back(path);
   }
   return document;
+}
+
+std::vector<std::string> DocumentStore::files_read() const {
+  std::vector<std::string> files;
+  std::set<std::string_view> known;
+  for (const std::string& file : files_) {
+    if (known.insert(file).second) files.push_back(file);
+  }
+  return files;
 }
 
 void DocumentStore::add(const std::string& path, std::shared_ptr<const Element> root) {

@@ -23,7 +23,10 @@ class DocumentStore {
  public:
   std::shared_ptr<const Element> read(const std::string& path);
   void add(const std::string& path, std::shared_ptr<const Element> root);
-  const std::vector<std::string>& files_read() const { return files_; }
+  // What else was read for the world: pictures, scripts.
+  void note(const std::string& path) { files_.push_back(path); }
+  // In the order of first reading, each once.
+  std::vector<std::string> files_read() const;
 
  private:
   std::map<std::string, std::shared_ptr<const Element>> documents_;

@@ -61,7 +61,7 @@ std::optional<Geometry> read_polyline(const Element& geometry_element, const Ele
 }
 
 std::optional<Geometry> read_heightmap(const Element& element, const std::string& where, ReadContext& context) {
-  report_other_children(element, {"uri", "size", "pos"}, {"texture", "blend", "use_terrain_paging", "sampling"}, where, context.findings);
+  report_other_children(element, {"uri", "size", "pos"}, {"use_terrain_paging", "sampling"}, where, context.findings);
   const std::string uri = element.string("uri", "");
   if (uri.empty()) element.fail("has no <uri>");
   const Vec3 size = element.vector3("size", Vec3::Ones());
@@ -71,6 +71,7 @@ std::optional<Geometry> read_heightmap(const Element& element, const std::string
     context.findings.error(element.source, where, "the heightmap '" + uri + "' " + context.resources.why_not(uri, element.source.file) + "; the shape is left out");
     return std::nullopt;
   }
+  context.documents.note(*path);
   try {
     auto mesh = std::make_shared<Mesh>(heightmap(*path, size));
     const Vec3 at = element.vector3("pos", Vec3::Zero());

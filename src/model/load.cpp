@@ -44,6 +44,7 @@ class Loader {
     apply_settings(options.settings, world_);
     apply_disabled(options.disabled, world_);
     world_.findings = findings_.list();
+    for (const std::string& file : meshes_.files_read()) documents_.note(file);
     world_.files_read = documents_.files_read();
     return std::make_shared<const WorldModel>(std::move(world_));
   }

@@ -25,6 +25,7 @@ LoadedModel read(const std::string& path, const std::string& world_file, std::sh
   asker.name = "SPAWN";
   const auto included = reader.read_file(path, asker);
   if (!included.model || !included.model->model) throw InputError({path, 0}, "holds no <model>, or one without a link");
+  for (const std::string& file : meshes.files_read()) documents.note(file);
   LoadedModel loaded{included.model->model, included.name, findings.list(), documents.files_read()};
   if (loaded.model->links.size() > kMostLinksOfSpawned) {
     throw InputError(loaded.model->source, "the model '" + loaded.name + "' has " + std::to_string(loaded.model->links.size()) +

@@ -15,7 +15,7 @@ struct LoadedModel {
   std::shared_ptr<const Model> model;
   std::string name;                       // as the file says
   std::vector<Finding> findings;
-  std::vector<std::string> files_read;    // absolute paths
+  std::vector<std::string> files_read;    // absolute paths: its own, meshes, pictures
 };
 
 // Of a file or by a name, SDF or URDF, from the folders that are searched for a world, and from nowhere else. Throws

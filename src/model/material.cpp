@@ -122,6 +122,7 @@ std::optional<Material> scripted_material(const Element& script, const std::stri
     std::optional<OgreMaterial> found;
     try {
       found = read_ogre_script(read_text_file(file, 4 << 20), name);
+      context.documents.note(file);
     } catch (const InputError&) {
       continue;
     }
@@ -134,7 +135,10 @@ std::optional<Material> scripted_material(const Element& script, const std::stri
         if (!texture && fs::is_regular_file(candidate, error)) texture = candidate.string();
       }
       if (!texture) texture = context.resources.find_texture(found->texture, script.source.file);
-      if (texture) found->material.texture = std::make_shared<Texture>(Texture{*texture, {}});
+      if (texture) {
+        context.documents.note(*texture);
+        found->material.texture = std::make_shared<Texture>(Texture{*texture, {}});
+      }
     }
     return found->material;
   }
@@ -211,6 +215,7 @@ std::optional<Material> read_material(const Element& element, const std::string&
     if (!map || map->text.empty() || map->text == "__default__") continue;
     const auto path = context.resources.find_texture(map->text, map->source.file);
     if (path) {
+      context.documents.note(*path);
       material.texture = std::make_shared<Texture>(Texture{*path, {}});
       said = true;
     } else {

@@ -69,7 +69,7 @@ std::string first_line(const std::string& file) {
   std::getline(in, line);
   if (line.size() > 300) line.resize(300);
   for (char& c : line) {
-    if (static_cast<unsigned char>(c) < 0x20) c = ' ';
+    if (static_cast<unsigned char>(c) < 0x20 || static_cast<unsigned char>(c) >= 0x7f) c = '?';    // bytes of the file, perhaps
   }
   return line;
 }
@@ -187,15 +187,28 @@ MeshLoader::MeshLoader(const ResourceFinder& resources, MeshImport import) : res
   if (import_.cache_folder.empty()) import_.cache = false;
 }
 
-Mesh MeshLoader::import_or_cached(const std::string& path) const {
+Mesh MeshLoader::taken(MeshPackage package, const std::string& path) {
+  for (const MeshDependency& each : package.dependencies) {
+    std::error_code error;
+    const fs::path file = fs::weakly_canonical(fs::path(path).parent_path() / each.path, error);
+    if (fs::is_regular_file(file, error)) files_.push_back(file.string());
+  }
+  return std::move(package.mesh);
+}
+
+Mesh MeshLoader::import_or_cached(const std::string& path) {
   const fs::path file = path;
   std::string extension = file.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
   constexpr const char* kKnown[] = {".obj", ".dae", ".stl", ".ply", ".gltf", ".glb", ".3ds", ".fbx"};
   if (std::find(std::begin(kKnown), std::end(kKnown), extension) == std::end(kKnown)) {
-    throw std::runtime_error("'" + extension + "' is no known kind of mesh; known are obj, dae, stl, ply, gltf, glb, 3ds, fbx");
+    std::error_code error;
+    if (fs::is_directory(file, error)) throw std::runtime_error("it is a folder; a file is needed");
+    throw std::runtime_error((extension.empty() ? "a name without an extension" : "'" + extension + "'") +
+                             " is no known kind of mesh; known are obj, dae, stl, ply, gltf, glb, 3ds, fbx");
   }
   const std::string content = bytes_of(path, MeshLimits::kFileBytes);
+  files_.push_back(path);
   const std::string name =
       content_key(content) + extension.substr(1) + "-" + std::to_string(kMeshFormatVersion) + ".mesh";
   constexpr size_t kMostBytes = size_t{1} << 30;
@@ -205,7 +218,7 @@ Mesh MeshLoader::import_or_cached(const std::string& path) const {
     if (fs::is_regular_file(entry, error)) {
       try {
         MeshPackage package = unpack_mesh(bytes_of(entry, kMostBytes));
-        if (dependencies_hold(package, file.parent_path())) return std::move(package.mesh);
+        if (dependencies_hold(package, file.parent_path())) return taken(std::move(package), path);
       } catch (const std::runtime_error&) {
         // A broken entry is imported again, and replaced.
       }
@@ -216,7 +229,7 @@ Mesh MeshLoader::import_or_cached(const std::string& path) const {
   const std::string bytes = bytes_of(folder / "mesh", kMostBytes);
   MeshPackage package = unpack_mesh(bytes);
   if (import_.cache) store(import_.cache_folder, name, bytes);
-  return std::move(package.mesh);
+  return taken(std::move(package), path);
 }
 
 std::shared_ptr<const Mesh> MeshLoader::load(const std::string& path) {
@@ -229,6 +242,7 @@ std::shared_ptr<const Mesh> MeshLoader::load(const std::string& path) {
       for (auto& material : mesh->materials) {
         if (!material.texture || !material.texture->embedded.empty()) continue;
         const auto found = resources_.find_texture(material.texture->path, path);
+        if (found) files_.push_back(*found);
         material.texture = found ? std::make_shared<Texture>(Texture{*found, {}}) : nullptr;
       }
       entry.mesh = std::move(mesh);

@@ -8,11 +8,14 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "model/mesh.h"
 #include "model/resources.h"
 
 namespace ruedo::model {
+
+struct MeshPackage;
 
 struct MeshImport {
   std::string importer;                   // the program; empty: beside this program, or where it was built
@@ -33,16 +36,21 @@ class MeshLoader {
   // One submesh by name, moved so that its bounding box is centred at the origin when `center`.
   std::shared_ptr<const Mesh> load_submesh(const std::string& path, const std::string& submesh, bool center);
 
+  // What was read so far: meshes, what they name, and their textures. A mesh file that is broken, too.
+  const std::vector<std::string>& files_read() const { return files_; }
+
  private:
   struct Entry {
     std::shared_ptr<const Mesh> mesh;
     std::string fault;    // why there is none
   };
-  Mesh import_or_cached(const std::string& path) const;
+  Mesh import_or_cached(const std::string& path);
+  Mesh taken(MeshPackage package, const std::string& path);
 
   const ResourceFinder& resources_;
   MeshImport import_;
   std::map<std::string, Entry> meshes_;
+  std::vector<std::string> files_;
 };
 
 }  // namespace ruedo::model

@@ -121,6 +121,9 @@ SdfReader::Included SdfReader::read_file(const std::string& path, const Element&
   }
   Included result;
   result.document = context_.documents.read(path);
+  std::error_code none;    // it says which file of its folder is the model's
+  const auto config = std::filesystem::path(path).parent_path() / "model.config";
+  if (std::filesystem::is_regular_file(config, none)) context_.documents.note(config.string());
   if (result.document->name == "robot") {
     // A URDF: as the SDF file that says the same, so that an <include> can change it.
     auto converted = std::make_shared<Element>();

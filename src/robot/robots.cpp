@@ -127,8 +127,8 @@ void Robots::Impl::read(Snapshot& snapshot) const {
   snapshot.time = now();
   snapshot.robots.resize(drives_.size());
   snapshot.motion_ends.clear();
-  snapshot.wheel_angles.resize(layout_.wheels.size());
-  snapshot.wheel_rates.resize(layout_.wheels.size());
+  snapshot.wheel_angles.assign(layout_.wheels.size(), 0.0);    // of a robot that is gone, too: a snapshot is used again
+  snapshot.wheel_rates.assign(layout_.wheels.size(), 0.0);
   for (size_t i = 0; i < drives_.size(); ++i) {
     if (drives_[i]) {
       drives_[i]->read(snapshot);

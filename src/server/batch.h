@@ -34,6 +34,7 @@ struct Batch {
 
   struct Output {
     bool woken = false;                    // false: the rest is of an earlier round
+    bool here = false;                     // worked through by who computed the batch
     std::vector<Outbox> pieces;
   };
   std::vector<Output> outputs;             // one per module, in the order of the schedule

@@ -105,6 +105,7 @@ Outcome Server::spawn(const request_t& request) {
   const Outcome outcome = change(request, true, [&] {
     return server::spawn(body, loaded, status_.step + 1, *simulation_, channels_, name);
   });
+  if (outcome.code == reply_t::OK) note_files(loaded.files_read);
   if (outcome.code != reply_t::OK || replay_) return outcome;
   spdlog::info("{} was spawned at step {}", name, status_.step);
   for (size_t i = 0; i < std::min(loaded.findings.size(), kFindingsTold); ++i) {

@@ -115,6 +115,7 @@ model::LoadedModel ModelStore::load(const spawn_request_t& request) {
   known.model = loaded.model;
   known.rest = loaded;
   known.rest.model.reset();
+  known.rest.files_read.clear();    // the log has them once
   return loaded;
 }
 

@@ -48,6 +48,11 @@ void Lockstep::restart() {
   }
 }
 
+void Lockstep::begin_at(int64_t step) {
+  limit_ = published_ = step;
+  pacer_->set_limit(limit_);
+}
+
 Lockstep::Member* Lockstep::find(int64_t session) {
   const auto found = std::find_if(members_.begin(), members_.end(), [&](const Member& member) { return member.session == session; });
   return found == members_.end() ? nullptr : &*found;
@@ -77,7 +82,7 @@ Outcome Lockstep::take_part(const Session& session) {
   member.session = session.id;
   member.name = session.client;
   member.granted = std::max<int64_t>(limit_, 0);
-  member.received = started_ ? limit_ : -1;
+  member.received = limit_;
   const Member& added = *members_.insert(place, std::move(member));
   if (started_) note(request_t::JOIN, added);
   const Outcome outcome = stands(added);
@@ -169,7 +174,7 @@ void Lockstep::advance() {
   if (until <= limit_) return;
   schedule(until);
   limit_ = until;
-  pacer_->set_limit(limit_);
+  pacer_->set_limit_quietly(limit_);    // the publisher goes on from here
 }
 
 // Commands of one step go in the order of the clients' names, each client's in the order of its grants.

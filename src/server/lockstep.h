@@ -54,6 +54,8 @@ class Lockstep {
   void attach(CommandInbox& inbox, Pacer& pacer);
   // The world was reset: everyone's grants stand at 0 again.
   void restart();
+  // The run goes on from a snapshot: everyone's grants stand at its step. Before anyone takes part.
+  void begin_at(int64_t step);
 
   // GRANT and RESEND.
   Outcome grant(const request_t& request, const Session& session);

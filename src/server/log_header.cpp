@@ -7,11 +7,14 @@
 #include <iterator>
 #include <set>
 #include <string_view>
+#include <utility>
 
 #include <gnu/libc-version.h>
 #include <link.h>
 
+#include "ruedo/decode.h"
 #include "ruedo/errors.h"
+#include "server/log_reader.h"
 #include "server/sha256.h"
 #include "server/version.h"
 
@@ -111,13 +114,30 @@ log_header_t make_log_header(const model::WorldModel& world, uint64_t seed, cons
   header.step_us = world.step_us;
   header.options = options;
   header.noptions = static_cast<int32_t>(options.size());
-  for (const std::string& path : world.files_read) header.files.push_back({path, sha256_of_file(path)});
+  header.files = hashed_files(world.files_read);
   header.nfiles = static_cast<int32_t>(header.files.size());
   header.cpu = cpu_features();
   header.libc = libc_version();
   header.libraries = libraries_that_matter();
   header.nlibraries = static_cast<int32_t>(header.libraries.size());
   return header;
+}
+
+std::vector<log_file_t> hashed_files(const std::vector<std::string>& paths) {
+  std::vector<log_file_t> files;
+  for (const std::string& path : paths) files.push_back({path, sha256_of_file(path)});
+  return files;
+}
+
+void check_files_of_spawned(const std::string& log) {
+  LogReader reader(log);
+  LogEvent event;
+  bool first = true;
+  while (reader.next(event, [](const std::string& channel) { return channel == "ruedo/header"; })) {
+    log_header_t header;
+    if (event.channel != "ruedo/header" || std::exchange(first, false)) continue;
+    if (decode_checked(event.data.data(), event.data.size(), header) == DecodeFault::none) check_files(header, log);
+  }
 }
 
 void check_files(const log_header_t& header, const std::string& log) {

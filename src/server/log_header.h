@@ -18,8 +18,13 @@ std::vector<std::string> libraries_that_matter();
 // options: those that change the result, as on the command line.
 log_header_t make_log_header(const model::WorldModel& world, uint64_t seed, const std::vector<std::string>& options);
 
+// With their SHA-256.
+std::vector<log_file_t> hashed_files(const std::vector<std::string>& paths);
+
 // Throws InputError when a file that the log was made from is gone or was changed: names the first.
 void check_files(const log_header_t& header, const std::string& log);
+// The same for the models that came later in the log.
+void check_files_of_spawned(const std::string& log);
 
 // What determines a run's bytes beside its log and is not the same here, a line each: Ruedo's version and build, the CPU,
 // the C library, other libraries.

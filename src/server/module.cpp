@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cfenv>
+#include <chrono>
 #include <future>
 
 #include <pthread.h>
@@ -11,6 +12,11 @@
 #include "server/parallel.h"
 
 namespace ruedo::server {
+namespace {
+
+constexpr int64_t kQuickNs = 50'000;
+
+}  // namespace
 
 void DueSteps::add(const SampleClock& clock, int64_t first, int64_t sample) {
   // A thousand devices of one rate are one entry: the first few samples tell clocks apart well enough, since a
@@ -136,7 +142,18 @@ void Module::start(const SceneMakers& makers) {
 
 void Module::hand_over(Batch& batch, int64_t last_step) {
   to_hand_over_.pass(last_step);
+  in_hand_.fetch_add(1, std::memory_order_relaxed);
   queue_.push(&batch);
+}
+
+// A renderer's context belongs to the module's thread.
+bool Module::is_quick() const {
+  return !renderer_ && in_hand_.load(std::memory_order_acquire) == 0 && cost_ns_.load(std::memory_order_relaxed) < kQuickNs;
+}
+
+void Module::work_here(Batch& batch, int64_t last_step) {
+  to_hand_over_.pass(last_step);
+  work_through(batch);
 }
 
 void Module::work() {
@@ -151,14 +168,23 @@ void Module::work() {
       }
       continue;
     }
-    if (setup_.before_batch) setup_.before_batch(setup_.name);
-    try {
-      process(*batch);
-    } catch (const std::exception& error) {
-      if (!batch->failed.exchange(true)) batch->failure = "module " + setup_.name + ": " + error.what();
-    }
-    if (batch->pending.fetch_sub(1, std::memory_order_acq_rel) == 1) finished_.set();
+    work_through(*batch);
+    in_hand_.fetch_sub(1, std::memory_order_release);
   }
+}
+
+void Module::work_through(Batch& batch) {
+  if (setup_.before_batch) setup_.before_batch(setup_.name);
+  const bool due = to_sample_.next() < batch.first_step + batch.count;
+  const auto begin = std::chrono::steady_clock::now();
+  try {
+    process(batch);
+  } catch (const std::exception& error) {
+    if (!batch.failed.exchange(true)) batch.failure = "module " + setup_.name + ": " + error.what();
+  }
+  if (due) cost_ns_.store((std::chrono::steady_clock::now() - begin) / std::chrono::nanoseconds(1), std::memory_order_relaxed);
+  const bool last = batch.pending.fetch_sub(1, std::memory_order_acq_rel) == 1;
+  if (last) finished_.set();
 }
 
 void Module::process(Batch& batch) {
@@ -201,6 +227,7 @@ void Module::process_piece(Batch& batch, int piece, int begin, int end) {
       Sensor& sensor = *setup_.devices[k].sensor;
       if (slot.observes) sensor.observe(snapshot, outbox);
       if (slot.step != snapshot.step) continue;
+      if (setup_.left_off->load(std::memory_order_relaxed)) return;    // a thousand pictures may be in the batch
       const scene::RayScene* rays = slot.visual_rays ? visual_rays_.get() : rays_.get();
       sensor.sample({snapshot, slot.sample, rays, renderer_.get()}, outbox);
       slot.step = setup_.devices[k].first_step + slot.clock.step_of(++slot.sample);

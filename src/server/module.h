@@ -4,6 +4,7 @@
 // its own, and the publisher reads them in order, whichever was finished first.
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <future>
 #include <memory>
@@ -53,9 +54,10 @@ struct ModuleSetup {
   bool wants_rays = false, wants_visual_rays = false, wants_renderer = false;
   // For tests: called in the module's thread before each batch.
   std::function<void(const std::string& module)> before_batch;
+  const std::atomic<bool>* left_off = nullptr;    // once it is true nobody wants samples any more
 
   ModuleSetup without_devices() const {
-    return {name, {}, piece_size, step_us, rank, wants_rays, wants_visual_rays, wants_renderer, before_batch};
+    return {name, {}, piece_size, step_us, rank, wants_rays, wants_visual_rays, wants_renderer, before_batch, left_off};
   }
 };
 
@@ -94,6 +96,10 @@ class Module {
   // For the simulation thread: whether a batch up to `last_step` has work for it, and handing that batch over.
   bool wants(int64_t last_step) const { return observes_ || to_hand_over_.next() <= last_step; }
   void hand_over(Batch& batch, int64_t last_step);
+  // For whoever dispatches a batch of a few steps: whether working through it takes less than waking the module's thread,
+  // by how long the last took, and doing so in the caller's thread.
+  bool is_quick() const;
+  void work_here(Batch& batch, int64_t last_step);
 
  private:
   struct Slot { SampleClock clock; int64_t sample, step; bool observes, visual_rays; };
@@ -102,6 +108,7 @@ class Module {
   void count_due();
   void make_scenes(const SceneMakers& makers);
   void work();
+  void work_through(Batch& batch);
   void process(Batch& batch);
   void process_pieces(Batch& batch, int begin, int end);
   void process_piece(Batch& batch, int piece, int begin, int end);
@@ -118,6 +125,8 @@ class Module {
   Batch renewal_;                          // in the queue: makers_ wait
   const SceneMakers* makers_ = nullptr;
   std::promise<void>* made_ = nullptr;
+  std::atomic<int> in_hand_{0};            // batches that its thread has
+  std::atomic<int64_t> cost_ns_{INT64_MAX};    // of the last batch in which something was due
   std::thread thread_;
 };
 

@@ -20,20 +20,27 @@ void Pacer::start_anew() {
   origin_time_ = Clock::now();
 }
 
+void Pacer::sleep(std::unique_lock<std::mutex>& lock) {
+  asleep_ = true;
+  changed_.wait(lock);
+  asleep_ = false;
+}
+
 int Pacer::wait(int64_t& step, int limit) {
   std::unique_lock lock(mutex_);
-  if (step == 0) start_anew();
+  if (granted_ < 0) start_anew();
   for (;;) {
+    if (lent_) {
+      sleep(lock);
+      continue;
+    }
+    step = granted_ + 1;    // some may have been borrowed
     if (hold_ && !stopped_) {
       held_ = true;
       changed_.notify_all();
       changed_.wait(lock);
       held_ = false;
       continue;
-    }
-    if (anew_) {
-      anew_ = false;
-      step = 0;
     }
     if (stopped_ || step > last_step_) {
       over_ = true;
@@ -42,7 +49,7 @@ int Pacer::wait(int64_t& step, int limit) {
     }
     const int64_t until = std::min(until_, limit_);
     if (step > until) {
-      changed_.wait(lock);
+      sleep(lock);
       continue;
     }
     int64_t count = std::min<int64_t>(limit - 1, until - step) + 1;    // until may be the largest number there is
@@ -64,6 +71,32 @@ int Pacer::wait(int64_t& step, int limit) {
     granted_ = step + count - 1;
     return static_cast<int>(count);
   }
+}
+
+int Pacer::borrow(int64_t& step, int limit) {
+  std::lock_guard lock(mutex_);
+  const int64_t until = std::min(until_, limit_);
+  if (lent_ || granted_ >= until) return 0;
+  const bool paced = std::isfinite(rate_) && !paused_;    // it is real time that says when
+  if (!asleep_ || hold_ || stopped_ || paced || until - granted_ > limit) {
+    changed_.notify_all();
+    return 0;
+  }
+  lent_ = true;
+  step = granted_ + 1;
+  granted_ = until;
+  return static_cast<int>(until - step + 1);
+}
+
+void Pacer::give_back(int unused) {
+  bool told;
+  {
+    std::lock_guard lock(mutex_);
+    granted_ -= unused;
+    lent_ = false;
+    told = hold_ || stopped_ || granted_ >= last_step_ || std::min(until_, limit_) > granted_;
+  }
+  if (told) changed_.notify_all();
 }
 
 int64_t Pacer::hold() {
@@ -93,7 +126,6 @@ void Pacer::release() {
 
 void Pacer::begin_time_anew() {
   std::lock_guard lock(mutex_);
-  anew_ = true;
   granted_ = -1;
   until_ = paused_ ? 0 : last_step_;
   start_anew();
@@ -146,11 +178,13 @@ void Pacer::set_rate(double rate) {
   changed_.notify_all();
 }
 
+void Pacer::set_limit_quietly(int64_t step) {
+  std::lock_guard lock(mutex_);
+  limit_ = step;
+}
+
 void Pacer::set_limit(int64_t step) {
-  {
-    std::lock_guard lock(mutex_);
-    limit_ = step;
-  }
+  set_limit_quietly(step);
   changed_.notify_all();
 }
 

@@ -18,9 +18,14 @@ class Pacer {
   // rate: simulated per real time, > 0; +inf: as fast as it goes. last_step: of the run, INT64_MAX: none.
   Pacer(int64_t step_us, double rate, int64_t last_step);
 
-  // Waits until the state `step` may be computed and is due; returns how many may be computed now, at most `limit`,
-  // 0 when the run is over. Steps must be asked for in order; where the time began anew, `step` is 0 afterwards.
+  // Waits until the next state may be computed and is due; returns how many may be computed now, at most `limit`,
+  // 0 when the run is over. `step` becomes the first of them.
   int wait(int64_t& step, int limit);
+  // For another thread that would rather compute the next steps itself than wake the one that sleeps in wait(): how many may
+  // be computed now, if at most `limit`; 0: none, or more, and then that thread is woken for them. Until give_back() it sleeps
+  // on. unused: the last so many were not computed.
+  int borrow(int64_t& step, int limit);
+  void give_back(int unused);
 
   void stop();                       // wait() returns 0 from now on
   int64_t pause();                   // returns the last state that will still be computed
@@ -29,6 +34,8 @@ class Pacer {
   void set_rate(double rate);
   // No state after `step` is computed until a higher limit is set; the step that waits for it is due at once then.
   void set_limit(int64_t step);
+  // The same, for who calls borrow() next.
+  void set_limit_quietly(int64_t step);
 
   // Standing still for a change of the world. hold(): wait() lets nothing more go; returns the last state that it let go.
   // wait_until_held(), when that state is done: until the simulation thread waits; false when the run is over.
@@ -44,6 +51,7 @@ class Pacer {
  private:
   Clock::time_point due(int64_t step) const;
   void start_anew();
+  void sleep(std::unique_lock<std::mutex>& lock);
 
   // A host that was held up catches up by at most this much; beyond it, the run is simply late from then on.
   static constexpr auto kMostCatchUp = std::chrono::milliseconds(250);
@@ -54,7 +62,8 @@ class Pacer {
   std::condition_variable changed_;
   double rate_;
   bool stopped_ = false, paused_ = false;
-  bool hold_ = false, held_ = false, over_ = false, anew_ = false;
+  bool hold_ = false, held_ = false, over_ = false;
+  bool asleep_ = false, lent_ = false;    // wait() waits for a higher limit; its steps are another thread's
   int64_t until_;                    // last state that may be computed: by the end of the run, pause() and allow(),
   int64_t limit_ = INT64_MAX;        // and by set_limit()
   int64_t granted_ = -1;             // last state that wait() let go

@@ -76,6 +76,11 @@ void Recorder::applied(const applied_t& applied) {
   if (journal_) journal_->write(base_us_ - journal_base_us_ + applied.utime, kApplied, buffer_.data(), buffer_.size());
 }
 
+void Recorder::files(const log_header_t& header) {
+  record(kHeader, header);
+  if (journal_) journal_->write(base_us_ - journal_base_us_ + header.utime, kHeader, buffer_.data(), buffer_.size());
+}
+
 void Recorder::state_hash(const state_hash_t& hash) { record(kStateHash, hash); }
 
 void Recorder::flush() {

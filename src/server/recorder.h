@@ -43,6 +43,8 @@ class Recorder {
 
   void message(SimTime utime, const std::string& channel, const uint8_t* data, size_t size);
   void applied(const applied_t& applied);
+  // Of a model that came since the first header: the same header with the files that it was read from.
+  void files(const log_header_t& header);
   void state_hash(const state_hash_t& hash);
 
   void flush();

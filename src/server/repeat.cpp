@@ -18,6 +18,7 @@ namespace ruedo::server {
 
 void Server::begin_repeat(const std::string& path) {
   auto replay = std::make_unique<Replay>(path);
+  check_files_of_spawned(path);
   after_repeat_ = {pacer_ ? pacer_->rate() : options_.rate, pacer_ ? pacer_->paused() : options_.paused};
   options_.simulation.fleet.seed = static_cast<uint64_t>(replay->header().seed);
   if (!pacer_) epoch_ = replay->header().epoch;
@@ -79,7 +80,8 @@ void Server::go_on(bool paused) {
   repeating_ = false;
   pacer_->set_rate(after_repeat_.rate);
   if (paused) pacer_->pause();
-  pacer_->set_limit(std::numeric_limits<int64_t>::max());
+  if (lockstep_) lockstep_->begin_at(status_.step);
+  else pacer_->set_limit(std::numeric_limits<int64_t>::max());
   if (wait_for_) {
     const std::lock_guard lock(simulation_mutex_);
     wait_for_->attach(channels_, simulation_->inbox(), *pacer_, status_.step);

@@ -7,6 +7,7 @@
 #include "ruedo/reset_request_t.hpp"
 #include "ruedo/state_reply_t.hpp"
 #include "ruedo/step_request_t.hpp"
+#include "server/log_header.h"
 #include "server/server.h"
 #include "server/world_state.h"
 
@@ -124,6 +125,15 @@ void Server::note(const request_t& request) {
   applied.size = request.size;
   applied.data = request.body;
   recorder_.applied(applied);
+}
+
+void Server::note_files(const std::vector<std::string>& files) {
+  if (files.empty() || !(recorder_.wants_messages() || recorder_.has_journal())) return;
+  log_header_t header = header_;
+  header.utime = status_.time_us;
+  header.files = hashed_files(files);
+  header.nfiles = static_cast<int32_t>(header.files.size());
+  recorder_.files(header);
 }
 
 void Server::begin_epoch() {

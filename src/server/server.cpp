@@ -1,6 +1,8 @@
 // The publisher's loop, and the making of a simulation for each epoch.
 #include "server/server.h"
 
+#include <cfenv>
+
 #include <spdlog/spdlog.h>
 
 #include "ruedo/applied_t.hpp"
@@ -38,7 +40,7 @@ Server::Server(std::shared_ptr<const model::WorldModel> world, ServerOptions opt
                          .utime = [this] { return status_.time_us; },
                          .epoch = [this] { return epoch_; },
                          .has_state = [this] { return latest_ != nullptr; },
-                         .early = [this](const request_t& request, const Session& session) { return lockstep_ && lockstep_->early(request, session); },
+                         .early = [this](const request_t& request, const Session& session) { return lockstep_ && (replay_ || lockstep_->early(request, session)); },
                          .left = [this](int64_t session) { if (lockstep_) lockstep_->leave(session); }}) {
   if (options_.lockstep.clients > 0) {
     lockstep_ = std::make_unique<Lockstep>(options_.lockstep, [this](applied_t applied) {
@@ -134,13 +136,15 @@ void Server::send(int channel, const Message& message) {
 }
 
 void Server::run() {
+  std::fesetenv(FE_DFL_ENV);    // as in the threads that compute: in lockstep this is one of them
   listen();
   simulation_->start(*pacer_);
+  last_tick_ = Clock::now();
   repeat();
   Clock::time_point next_status = Clock::now() + kStatusPeriod;
   Clock::time_point next_flush = Clock::now() + kPausedInfoPeriod;
   for (bool over = false; !over;) {
-    if (stop_) pacer_->stop();
+    if (stop_) simulation_->leave_off();
     while (const Batch* batch = lockstep_ && lockstep_->full() && !stop_ ? nullptr : simulation_->take()) {
       publish(*batch);
       over = batch->last;
@@ -151,17 +155,19 @@ void Server::run() {
       repeat();
       if (!replay_) control_.published(status_.step);
       control_.serve();
-      if (stop_) pacer_->stop();
+      if (stop_) simulation_->leave_off();
+      if (lockstep_ && !lockstep_->full()) simulation_->go();
     }
     if (over) break;
     control_.serve();
     if (lockstep_) check_leases();
+    if (lockstep_ && !lockstep_->full() && simulation_->go()) continue;
     if (!replay_) control_.published(status_.step);    // a PAUSE may wait for a state that was out already
     Clock::time_point deadline = next_status;
-    if (pacer_->paused() || lockstep_) {    // it may stand still: a sign of life
-      if (Clock::now() >= last_info_ + kPausedInfoPeriod) publish_info();
-      deadline = std::min(deadline, last_info_ + kPausedInfoPeriod);
-    }
+    // A sign of life each second, also while the run stands still, a step takes long, or a snapshot is restored.
+    const Clock::time_point last_sign = std::max(last_info_, last_tick_);
+    if (Clock::now() >= last_sign + kPausedInfoPeriod) publish_info();
+    deadline = std::min(deadline, std::max(last_info_, last_tick_) + kPausedInfoPeriod);
     if (lockstep_) deadline = std::min(deadline, lockstep_->next_check());
     if (wait_for_ && !replay_) tell_wait();
     const bool woken = wakeup_.wait_until(deadline);
@@ -208,15 +214,16 @@ void Server::publish(const Batch& batch) {
 void Server::publish_step(const Batch& batch, const Snapshot& snapshot) {
   const int64_t step = snapshot.step;
   record_applied(batch, step - 1);    // on the state before this one, whose messages are out
-  if (lockstep_) lockstep_->begin_step(step);
-  const bool tick = lockstep_ || step == next_tick_, aloud = !replay_, recorded = recorder_.wants_messages();
+  const bool aloud = !replay_, recorded = recorder_.wants_messages();
+  if (lockstep_ && aloud) lockstep_->begin_step(step);
+  const bool tick = lockstep_ || step == next_tick_;
   if (tick) tick_.begin(snapshot.time, run_id_, epoch_, step, state_hash(snapshot));
   simulation_->messages(batch, step, [&](int64_t, int index, const uint8_t* data, size_t size) {
     const Channel& channel = channels_[index];
     if (aloud) bus_.publish(channel.bus_name, data, size);
     if (recorded) recorder_.message(snapshot.time, channel.bus_name, data, size);
     if (tick) tick_.add_message(index, sequences_[static_cast<size_t>(index)], data, size);
-    if (lockstep_) lockstep_->keep(index, sequences_[static_cast<size_t>(index)], data, size);
+    if (lockstep_ && aloud) lockstep_->keep(index, sequences_[static_cast<size_t>(index)], data, size);
     ++sequences_[static_cast<size_t>(index)];
     ++status_.messages;
   });
@@ -230,7 +237,7 @@ void Server::publish_step(const Batch& batch, const Snapshot& snapshot) {
   }
   if (tick) {
     if (aloud) tell_watchdogs(snapshot);
-    if (aloud) finish_tick(step);
+    if (aloud) finish_tick(step), last_tick_ = Clock::now();
     next_tick_ = tick_clock_.step_of(++ticks_);
   }
   if (step == next_info_) {

@@ -117,6 +117,7 @@ class Server {
   Outcome ask(const request_t& request, const Session& session);
   Outcome execute(const request_t& request);
   void note(const request_t& request);           // in the log: it changed the state
+  void note_files(const std::vector<std::string>& files);    // that a model was read from which came since the start
   void begin_epoch();                            // the world is made anew
   Outcome step(const request_t& request);
   Outcome set_rate(const request_t& request);
@@ -164,7 +165,7 @@ class Server {
   SampleClock tick_clock_, info_clock_, hash_clock_;
   int64_t next_tick_ = 0, next_info_ = 0, next_hash_ = 0;    // steps
   int64_t ticks_ = 0, infos_ = 0, hashes_ = 0;
-  Clock::time_point last_info_;
+  Clock::time_point last_info_, last_tick_;
   std::vector<int64_t> sequences_;             // messages on each channel in this epoch
   TickWriter tick_;
   std::vector<uint8_t> buffer_;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cfenv>
+#include <chrono>
 #include <stdexcept>
 
 #include <pthread.h>
@@ -13,6 +14,8 @@ namespace {
 
 constexpr size_t kMaxSnapshotMemory = 64u << 20;    // bytes of all batches together
 constexpr int kMaxBatchSteps = 32;
+constexpr int kFewSteps = 4;
+constexpr int64_t kQuickNs = 1'000'000;    // of a step that the publisher may wait for: it gives the signs of life
 
 // Large worlds gain nothing from many steps in flight, and their snapshots are large.
 int batch_steps(const model::BodyLayout& layout) {
@@ -45,6 +48,7 @@ Simulation::Simulation(std::shared_ptr<const model::WorldModel> world, const Sim
   }
   for (ModuleSetup& setup : fleet_.modules) {
     setup.before_batch = before_batch_;
+    setup.left_off = &left_off_;
     modules_.push_back(std::make_unique<Module>(std::move(setup), static_cast<int>(modules_.size()), finished_));
     cursors_.emplace_back(static_cast<size_t>(modules_.back()->pieces()));
   }
@@ -54,13 +58,13 @@ Simulation::Simulation(std::shared_ptr<const model::WorldModel> world, const Sim
   const int steps = options.batch_steps > 0 ? options.batch_steps : batch_steps(layout_);
   for (Batch& batch : batches_) {
     batch.snapshots.resize(static_cast<size_t>(steps));
-    for (const auto& module : modules_) batch.outputs.push_back({false, std::vector<Outbox>(static_cast<size_t>(module->pieces()))});
+    for (const auto& module : modules_) batch.outputs.push_back({false, false, std::vector<Outbox>(static_cast<size_t>(module->pieces()))});
   }
 }
 
 Simulation::~Simulation() {
   if (!thread_.joinable()) return;
-  pacer_->stop();
+  leave_off();
   while (!last_taken_) {    // the simulation thread needs free batches to come to its end
     if (!advance()) finished_.wait();
   }
@@ -95,26 +99,54 @@ void Simulation::simulate() {
   std::fesetenv(FE_DFL_ENV);
   prctl(PR_SET_TIMERSLACK, 1);    // ns: the kernel may otherwise wake us 50 us late
   const int limit = static_cast<int>(batches_[0].snapshots.size());
-  int64_t next_step = 0;
-  for (size_t round = 0;; ++round) {
-    const int count = pacer_->wait(next_step, limit);
-    Batch& batch = batches_[round % batches_.size()];
+  for (int64_t first_step = 0;;) {
+    const int count = pacer_->wait(first_step, limit);
+    Batch& batch = batches_[round_ % batches_.size()];
     while (batch.pending.load(std::memory_order_acquire) != Batch::kFree) batch_freed_.wait();
-    batch.first_step = next_step;
-    batch.count = count;
-    batch.last = count == 0;
-    batch.applied_count = 0;
     if (before_batch_) before_batch_("kinematics");
-    try {
-      for (int i = 0; i < count; ++i) step(batch, next_step++);
-    } catch (const std::exception& error) {
-      if (!batch.failed.exchange(true)) batch.failure = std::string("module kinematics: ") + error.what();
-      batch.count = 0;
-      batch.last = true;
-    }
-    dispatch(batch);
-    if (batch.last) return;
+    compute(batch, first_step, count);
+    const bool last = batch.last;
+    dispatch(batch, false);
+    if (last) return;
   }
+}
+
+bool Simulation::go() {
+  int64_t first_step = 0;
+  const int limit = step_ns_ > kQuickNs ? 0 : std::min(kFewSteps, static_cast<int>(batches_[0].snapshots.size()));
+  const int count = pacer_->borrow(first_step, limit);
+  if (count == 0) return false;
+  Batch& batch = batches_[round_ % batches_.size()];
+  if (batch.pending.load(std::memory_order_acquire) != Batch::kFree) {
+    pacer_->give_back(count);
+    return false;
+  }
+  if (before_batch_) before_batch_("kinematics");
+  compute(batch, first_step, count);
+  dispatch(batch, true);
+  pacer_->give_back(0);
+  return true;
+}
+
+void Simulation::compute(Batch& batch, int64_t first_step, int count) {
+  ++round_;
+  batch.first_step = first_step;
+  batch.count = count;
+  batch.last = count == 0;
+  batch.applied_count = 0;
+  const auto begin = std::chrono::steady_clock::now();
+  try {
+    for (int i = 0; i < count; ++i) {
+      if (left_off_) batch.count = 0;    // the publisher still holds the last state, in a batch that is free already
+      if (batch.count == 0) break;
+      step(batch, first_step + i);
+    }
+  } catch (const std::exception& error) {
+    if (!batch.failed.exchange(true)) batch.failure = std::string("module kinematics: ") + error.what();
+    batch.count = 0;
+    batch.last = true;
+  }
+  if (count > 0) step_ns_ = (std::chrono::steady_clock::now() - begin) / std::chrono::nanoseconds(count);
 }
 
 void Simulation::step(Batch& batch, int64_t step) {
@@ -128,7 +160,7 @@ void Simulation::step(Batch& batch, int64_t step) {
   snapshot.time = step * world_.step_us;
 }
 
-void Simulation::dispatch(Batch& batch) {
+void Simulation::dispatch(Batch& batch, bool here) {
   const int64_t last_step = batch.first_step + batch.count - 1;
   int woken = 0;
   for (size_t m = 0; m < modules_.size(); ++m) {
@@ -137,10 +169,22 @@ void Simulation::dispatch(Batch& batch) {
   }
   // One more than the modules: nobody finds it finished before all have it.
   batch.pending.store(woken + 1, std::memory_order_release);
+  bool any_here = false;
   for (size_t m = 0; m < modules_.size(); ++m) {
-    if (batch.outputs[m].woken) modules_[m]->hand_over(batch, last_step);
+    Batch::Output& output = batch.outputs[m];
+    output.here = here && output.woken && modules_[m]->is_quick();
+    any_here |= output.here;
+    if (output.woken && !output.here) modules_[m]->hand_over(batch, last_step);
+  }
+  for (size_t m = 0; any_here && m < modules_.size(); ++m) {    // beside those that were woken
+    if (batch.outputs[m].here) modules_[m]->work_here(batch, last_step);
   }
   if (batch.pending.fetch_sub(1, std::memory_order_acq_rel) == 1) finished_.set();
+}
+
+void Simulation::leave_off() {
+  left_off_ = true;
+  pacer_->stop();
 }
 
 const Batch* Simulation::take() {
@@ -156,6 +200,7 @@ const Batch* Simulation::advance() {
     taken_->pending.store(Batch::kFree, std::memory_order_release);
     batch_freed_.set();
   }
+  if (left_off_) batch.count = 0;
   ++next_batch_;
   taken_ = &batch;
   last_taken_ = batch.last;

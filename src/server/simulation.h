@@ -5,6 +5,8 @@
 // kBatches batches are on their way: whoever is slow makes the others wait, and nothing is dropped.
 #pragma once
 
+#include <atomic>
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <string>
@@ -39,14 +41,22 @@ class Simulation {
   // Throws InputError.
   Simulation(std::shared_ptr<const model::WorldModel> world, const SimulationOptions& options, Channels& channels,
              Findings& findings, Wakeup& finished);
-  ~Simulation();    // stops the pacer that start() was given, then waits for all threads
+  ~Simulation();    // leaves off, then waits for all threads
 
   // Starts the threads. Throws EnvironmentError when a module cannot be served here. The pacer must outlive it.
   void start(Pacer& pacer);
 
+  // Computes the next steps in the caller's thread, the publisher's, where they are few, may be computed now, and the
+  // simulation thread waits for them: waking it, and waiting for it, takes longer than a small world's step. Else wakes it,
+  // and returns false.
+  bool go();
+
   // The publisher's: the next finished batch in order, or null when there is none yet. The batch stays valid until
   // the next call that returns one. Throws std::runtime_error when a module failed.
   const Batch* take();
+
+  // Ends the run here: what was not taken yet is left unfinished, so that the last batch comes soon, and no steps with it.
+  void leave_off();
 
   // Calls handler(step, channel index, bytes, size) for each message of one step of a batch, in the schedule's order.
   // Steps of a batch must be asked for in order, from its first.
@@ -75,8 +85,9 @@ class Simulation {
  private:
   const Batch* advance();
   void simulate();
+  void compute(Batch& batch, int64_t first_step, int count);
   void step(Batch& batch, int64_t step);
-  void dispatch(Batch& batch);
+  void dispatch(Batch& batch, bool here);
   SceneMakers scene_makers();
 
   int place(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model);
@@ -102,7 +113,10 @@ class Simulation {
   std::vector<std::unique_ptr<Module>> modules_;    // in the order of the schedule
   std::vector<Batch> batches_;
   Wakeup batch_freed_;
+  std::atomic<int64_t> step_ns_{INT64_MAX};      // what the last step took of real time
+  size_t round_ = 0;                             // of the batches; whoever computes one counts it
   Pacer* pacer_ = nullptr;
+  std::atomic<bool> left_off_{false};
   std::thread thread_;
 
   // The publisher's.

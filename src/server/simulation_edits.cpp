@@ -115,6 +115,7 @@ void Simulation::join(Fleet fleet) {
 // To the last module of its kind, so that devices stay in the order of robots; or as a new one, in its place.
 void Simulation::join(ModuleSetup setup) {
   setup.before_batch = before_batch_;
+  setup.left_off = &left_off_;
   auto after = std::find_if(modules_.begin(), modules_.end(), [&](const auto& module) { return module->rank() > setup.rank; });
   const auto same = [&](const auto& module) { return module->rank() == setup.rank; };
   const auto known = static_cast<unsigned>(std::count_if(modules_.begin(), modules_.end(), same));

@@ -61,6 +61,17 @@ def check_reachable(url: str) -> None:
         raise NoServer(f"{url}: not an LCM URL; udpm://GROUP:PORT?ttl=0 or tcpq://HOST:PORT is")
 
 
+def is_claimed(url: str) -> bool:
+    """Whether a server on this machine has the address: its claim goes with its process."""
+    parts = urlsplit(url)
+    host, port = (parts.hostname, parts.port) if parts.hostname else ("239.255.76.67", 7667) if parts.scheme == "udpm" else ("127.0.0.1", 7700)
+    try:
+        with open("/proc/net/unix", encoding="ascii", errors="replace") as sockets:
+            return any(line.rstrip("\n").endswith(f" @ruedo/{parts.scheme}/{host}:{port}") for line in sockets)
+    except OSError:
+        return False
+
+
 class Bus:
     """Safe to use from any thread. Handlers run in the receiving thread, one at a time."""
 

@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Any, Callable, Sequence
 
 from . import control, lcmtypes
-from .bus import Bus, resolve_url
+from .bus import Bus, is_claimed, resolve_url
 from .control import Session, State
 from .errors import NoServer, NotSupported, RuedoError, Timeout, UnknownName
 from .lockstep import Command, Observations, Stepper, observed
@@ -20,7 +20,7 @@ from .motion import Driver
 from .robot import Robot
 from .world_info import WorldInfo, WorldInfoAssembler
 
-_SILENCE_SECONDS = 30.0
+_SILENCE_SECONDS = 5.0
 
 
 def connect(url: str | None = None, *, name: str | None = None, timeout: float = 2.0) -> Simulation:
@@ -170,16 +170,18 @@ class Simulation:
         self._stepper.forget()
 
     def spawn(self, model: str = "", x: float = 0.0, y: float = 0.0, heading: float = 0.0, *, name: str = "", text: str = "",
-              z: float | None = None) -> None:
+              z: float | None = None) -> str:
         """Adds a model: one of Ruedo's ("p3at"), a file in the server's search folders, or SDF or URDF sent along
         as text. It stands on the ground below x, y (m), or at z (m) where that is given; heading in rad. The server
-        refuses to put it into something."""
+        refuses to put it into something. Returns the model's name: the server numbers one that is taken, unless it
+        was asked for."""
         body = lcmtypes.spawn_request_t()
         body.name, body.model, body.text, body.on_ground = name, model, text, z is None
         body.position, body.orientation = [x, y, z or 0.0], _about_z(heading)
         before = self._known
-        self._session.request(lcmtypes.request_t.SPAWN, body, 60.0)
+        reply = self._session.request(lcmtypes.request_t.SPAWN, body, 60.0)
         self._refresh_info(before)
+        return control.state_of(reply).name
 
     def remove(self, name: str) -> None:
         """Takes a model away."""
@@ -267,13 +269,14 @@ class Simulation:
             return self._ids
 
     def _check_server(self) -> None:
-        """Raises NoServer when the private server ended, or nothing was heard for long."""
+        """Raises NoServer when the private server ended, or nothing was heard for long; a server gives a sign of life each
+        second. One of this machine that is stopped, or in a debugger, is waited for."""
         if self._closed:
             raise NoServer("this simulation was closed")
         ended = self._server_ended()
         if ended:
             raise NoServer(ended)
-        if time.monotonic() - self._last_sign > _SILENCE_SECONDS:
+        if time.monotonic() - self._last_sign > _SILENCE_SECONDS and not is_claimed(self.url):
             raise NoServer(f"nothing was heard from the server at {self.url} for {_SILENCE_SECONDS:g} s")
 
     def _what_is_known(self, rate: float) -> str:

@@ -6,7 +6,11 @@ import java.net.InetSocketAddress;
 import java.net.Socket;
 import java.net.URI;
 import java.nio.channels.DatagramChannel;
+import java.nio.charset.StandardCharsets;
+import java.nio.file.Files;
+import java.nio.file.Path;
 import java.util.regex.Pattern;
+import java.util.stream.Stream;
 import lcm.lcm.LCM;
 import lcm.lcm.LCMDataOutputStream;
 import lcm.lcm.LCMEncodable;
@@ -52,6 +56,20 @@ final class Bus {
             probe.connect(new InetSocketAddress(InetAddress.getByName(group), 7667));
             return true;
         } catch (IOException error) {
+            return false;
+        }
+    }
+
+    /** Whether a server on this machine has the address: its claim goes with its process. */
+    static boolean isClaimed(String url) {
+        URI address = URI.create(url);
+        boolean udpm = "udpm".equals(address.getScheme());
+        String host = address.getHost() == null ? udpm ? "239.255.76.67" : "127.0.0.1" : address.getHost();
+        int port = address.getPort() < 0 ? udpm ? 7667 : 7700 : address.getPort();
+        String claim = " @ruedo/" + address.getScheme() + "/" + host + ":" + port;
+        try (Stream<String> sockets = Files.lines(Path.of("/proc/net/unix"), StandardCharsets.ISO_8859_1)) {
+            return sockets.anyMatch(line -> line.endsWith(claim));
+        } catch (IOException | java.io.UncheckedIOException error) {
             return false;
         }
     }

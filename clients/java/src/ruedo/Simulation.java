@@ -27,7 +27,7 @@ import ruedo.lcmtypes.tick_t;
  * launch() started. Requests throw NotSupported where the server does not have them, RequestError when it refuses.
  */
 public final class Simulation implements AutoCloseable {
-    private static final double SILENCE_SECONDS = 30.0;    // without any message: the server is gone
+    private static final double SILENCE_SECONDS = 5.0;    // without any message: a server gives a sign of life each second
     private static final double REPLY_SECONDS = 5.0;
     private static final double SLOW_REPLY_SECONDS = 60.0;
     private static final double RESTORE_SECONDS = 3600.0;
@@ -203,15 +203,16 @@ public final class Simulation implements AutoCloseable {
     }
 
     /** Adds one of Ruedo's models ("p3at"), or a file in the server's search folders, on the ground below x, y (m). */
-    public void spawn(String model, double x, double y, double heading, String name) {
-        spawn(model, "", name, new double[] {x, y, 0.0}, aboutZ(heading), true);
+    public String spawn(String model, double x, double y, double heading, String name) {
+        return spawn(model, "", name, new double[] {x, y, 0.0}, aboutZ(heading), true);
     }
 
     /**
      * Adds a model. model: a name, or "" for SDF or URDF in text. name: "" is the model's own. position: m; orientation:
-     * w, x, y, z. onGround: it stands on the ground below. The server refuses to put it into something.
+     * w, x, y, z. onGround: it stands on the ground below. The server refuses to put it into something. Returns the
+     * model's name: the server numbers one that is taken, unless it was asked for.
      */
-    public void spawn(String model, String text, String name, double[] position, double[] orientation, boolean onGround) {
+    public String spawn(String model, String text, String name, double[] position, double[] orientation, boolean onGround) {
         spawn_request_t body = new spawn_request_t();
         body.model = model;
         body.text = text;
@@ -220,8 +221,9 @@ public final class Simulation implements AutoCloseable {
         body.orientation = orientation;
         body.on_ground = onGround;
         WorldInfo before = known;
-        session.request(request_t.SPAWN, body, SLOW_REPLY_SECONDS);
+        String given = state(session.request(request_t.SPAWN, body, SLOW_REPLY_SECONDS)).name;
         refreshInfo(before);
+        return given;
     }
 
     /** Takes a model away. */
@@ -347,8 +349,8 @@ public final class Simulation implements AutoCloseable {
         if (closed) throw new RuedoException.NoServer("this simulation was closed");
         String ended = server == null ? null : server.ended();
         if (ended != null) throw new RuedoException.NoServer(ended);
-        if (silence() > SILENCE_SECONDS) {
-            throw new RuedoException.NoServer("nothing was heard from the server at " + url + " for 30 s");
+        if (silence() > SILENCE_SECONDS && !Bus.isClaimed(url)) {    // one that is stopped, or in a debugger, is waited for
+            throw new RuedoException.NoServer("nothing was heard from the server at " + url + " for 5 s");
         }
     }
 

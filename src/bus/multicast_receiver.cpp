@@ -1,0 +1,143 @@
+// LCM's multicast on the wire. All numbers are big endian.
+//
+//   short:    magic, sequence, channel and a 0, data
+//   fragment: magic, sequence, size of the message, offset, number of the fragment (16 bits), of how many; the first has
+//             channel and a 0 before its data
+#include "bus/multicast_receiver.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+
+#include <arpa/inet.h>
+#include <linux/filter.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+namespace ruedo::bus {
+namespace {
+
+constexpr uint32_t kShort = 0x4c433032, kFragment = 0x4c433033;
+constexpr size_t kShortHead = 8, kFragmentHead = 20, kLargestDatagram = 65536;
+
+uint32_t number32(const uint8_t* at) { return uint32_t{at[0]} << 24 | uint32_t{at[1]} << 16 | uint32_t{at[2]} << 8 | at[3]; }
+uint32_t number16(const uint8_t* at) { return uint32_t{at[0]} << 8 | at[1]; }
+
+// The channel's name at the beginning of `bytes`; size() + 1 of them are its. Empty: there is none.
+std::string_view channel_at(const uint8_t* bytes, size_t size) {
+  const auto* end = static_cast<const uint8_t*>(std::memchr(bytes, 0, std::min(size, MulticastReceiver::kLongestChannel + 1)));
+  return end ? std::string_view(reinterpret_cast<const char*>(bytes), static_cast<size_t>(end - bytes)) : std::string_view();
+}
+
+}  // namespace
+
+MulticastReceiver::MulticastReceiver(const std::string& group, uint16_t port, int buffer)
+    : socket_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)), datagram_(kLargestDatagram) {
+  const auto check = [this](bool good, const char* what) {
+    if (good) return;
+    const int error = errno;
+    if (socket_ >= 0) ::close(socket_);
+    throw std::system_error(error, std::generic_category(), what);
+  };
+  check(socket_ >= 0, "socket");
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(port);
+  check(::inet_pton(AF_INET, group.c_str(), &address.sin_addr) == 1, "inet_pton");
+  const int on = 1;
+  check(::setsockopt(socket_, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) == 0, "SO_REUSEADDR");
+  check(::setsockopt(socket_, SOL_SOCKET, SO_REUSEPORT, &on, sizeof on) == 0, "SO_REUSEPORT");
+  if (buffer > 0) ::setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &buffer, sizeof buffer);    // as much as may be
+  check(::bind(socket_, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0, "bind");
+  ip_mreq membership{};
+  membership.imr_multiaddr = address.sin_addr;
+  membership.imr_interface.s_addr = htonl(INADDR_ANY);
+  check(::setsockopt(socket_, IPPROTO_IP, IP_ADD_MEMBERSHIP, &membership, sizeof membership) == 0, "IP_ADD_MEMBERSHIP");
+}
+
+MulticastReceiver::~MulticastReceiver() { ::close(socket_); }
+
+bool MulticastReceiver::take(const Handler& handler) {
+  sockaddr_in from{};
+  socklen_t from_size = sizeof from;
+  const ssize_t got = ::recvfrom(socket_, datagram_.data(), datagram_.size(), MSG_DONTWAIT, reinterpret_cast<sockaddr*>(&from), &from_size);
+  if (got < 0) return false;
+  read(datagram_.data(), static_cast<size_t>(got), {ntohl(from.sin_addr.s_addr), ntohs(from.sin_port)}, handler);
+  return true;
+}
+
+void MulticastReceiver::read(const uint8_t* bytes, size_t size, Sender sender, const Handler& handler) {
+  sender_ = sender;
+  if (size <= kShortHead) return;
+  const uint32_t magic = number32(bytes);
+  if (magic == kFragment) return take_fragment(bytes, size, handler);
+  if (magic != kShort) return;
+  const std::string_view channel = channel_at(bytes + kShortHead, size - kShortHead);
+  const size_t head = kShortHead + channel.size() + 1;
+  if (!channel.empty()) handler(channel, bytes + head, size - head);
+}
+
+void MulticastReceiver::take_fragment(const uint8_t* bytes, size_t size, const Handler& handler) {
+  if (size <= kFragmentHead) return;
+  const size_t total = number32(bytes + 8), offset = number32(bytes + 12), number = number16(bytes + 16), of = number16(bytes + 18);
+  const uint8_t* data = bytes + kFragmentHead;
+  size_t length = size - kFragmentHead;
+  std::string_view channel;
+  if (number == 0) {
+    channel = channel_at(data, length);
+    if (channel.empty()) return;
+    data += channel.size() + 1;
+    length -= channel.size() + 1;
+  }
+  if (number >= of || total > kMostPartial || offset > total || length > total - offset) return;
+  Partial* partial = partial_of(number32(bytes + 4), total, of);
+  if (!partial || partial->here[number]) return;
+  partial->here[number] = true;
+  --partial->missing;
+  std::memcpy(partial->data.data() + offset, data, length);
+  if (number == 0) partial->channel = channel;
+  if (partial->missing > 0) return;
+  handler(partial->channel, partial->data.data(), partial->data.size());
+  partial_bytes_ -= total;
+  partials_.remove_if([&](const Partial& one) { return &one == partial; });
+}
+
+// Null when a fragment contradicts those before it.
+MulticastReceiver::Partial* MulticastReceiver::partial_of(uint32_t sequence, size_t size, size_t fragments) {
+  const auto known = std::find_if(partials_.begin(), partials_.end(), [&](const Partial& one) { return one.sender == sender_; });
+  if (known != partials_.end()) {
+    if (known->sequence == sequence) return known->data.size() == size && known->here.size() == fragments ? &*known : nullptr;
+    partial_bytes_ -= known->data.size();
+    partials_.erase(known);
+  }
+  while (!partials_.empty() && (partials_.size() >= kMostSenders || partial_bytes_ + size > kMostPartial)) {
+    partial_bytes_ -= partials_.front().data.size();
+    partials_.pop_front();
+  }
+  Partial& made = partials_.emplace_back();
+  made.sender = sender_;
+  made.sequence = sequence;
+  made.data.resize(size);
+  made.here.resize(fragments);
+  made.missing = fragments;
+  partial_bytes_ += size;
+  return &made;
+}
+
+// A filter in the kernel (BPF), which sees the datagram from its UDP header on.
+bool MulticastReceiver::ignore(Sender sender) {
+  sock_filter code[] = {
+      {BPF_LD | BPF_H | BPF_ABS, 0, 0, 0},
+      {BPF_JMP | BPF_JEQ | BPF_K, 0, 3, sender.port},
+      {BPF_LD | BPF_W | BPF_ABS, 0, 0, static_cast<uint32_t>(SKF_NET_OFF) + 12},
+      {BPF_JMP | BPF_JEQ | BPF_K, 0, 1, sender.address},
+      {BPF_RET | BPF_K, 0, 0, 0},
+      {BPF_RET | BPF_K, 0, 0, 0xffffffff},
+  };
+  const sock_fprog program{static_cast<unsigned short>(std::size(code)), code};
+  return ::setsockopt(socket_, SOL_SOCKET, SO_ATTACH_FILTER, &program, sizeof program) == 0;
+}
+
+}  // namespace ruedo::bus

@@ -1,0 +1,141 @@
+// LCM's multicast taken apart: datagrams written by hand after LCM's format, and others that mean harm.
+//
+// Messages of LCM's own to and from a server come in the wire tests (tests/clients, tests/cli).
+#include "bus/multicast_receiver.h"
+
+#include <algorithm>
+#include <cstring>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace ruedo::bus {
+namespace {
+
+using Bytes = std::vector<uint8_t>;
+
+void put(Bytes& out, uint32_t value, int bytes) {
+  for (int i = bytes - 1; i >= 0; --i) out.push_back(static_cast<uint8_t>(value >> 8 * i));
+}
+
+Bytes short_message(const std::string& channel, const Bytes& data) {
+  Bytes out = {'L', 'C', '0', '2', 0, 0, 0, 7};
+  out.insert(out.end(), channel.begin(), channel.end());
+  out.push_back(0);
+  out.insert(out.end(), data.begin(), data.end());
+  return out;
+}
+
+// A message in fragments of `length` bytes of data.
+std::vector<Bytes> fragments(const std::string& channel, const Bytes& data, uint32_t sequence, size_t length) {
+  std::vector<Bytes> all;
+  const size_t count = (data.size() + length - 1) / length;
+  for (size_t i = 0; i < count; ++i) {
+    Bytes out = {'L', 'C', '0', '3'};
+    put(out, sequence, 4);
+    put(out, static_cast<uint32_t>(data.size()), 4);
+    put(out, static_cast<uint32_t>(i * length), 4);
+    put(out, static_cast<uint32_t>(i), 2);
+    put(out, static_cast<uint32_t>(count), 2);
+    if (i == 0) {
+      out.insert(out.end(), channel.begin(), channel.end());
+      out.push_back(0);
+    }
+    out.insert(out.end(), data.begin() + static_cast<std::ptrdiff_t>(i * length),
+               data.begin() + static_cast<std::ptrdiff_t>(std::min(data.size(), (i + 1) * length)));
+    all.push_back(std::move(out));
+  }
+  return all;
+}
+
+class Multicast : public testing::Test {
+ protected:
+  Multicast() {
+    try {
+      receiver_ = std::make_unique<MulticastReceiver>("239.255.76.67", 7868, 0);
+    } catch (const std::system_error&) {
+    }
+  }
+  void SetUp() override {
+    if (!receiver_) GTEST_SKIP() << "no multicast route here";
+  }
+  void read(const Bytes& datagram, MulticastReceiver::Sender sender = {0x7f000001, 4000}) {
+    receiver_->read(datagram.data(), datagram.size(), sender, [&](std::string_view channel, const uint8_t* data, size_t size) {
+      heard_.emplace_back(channel, Bytes(data, data + size));
+    });
+  }
+  std::unique_ptr<MulticastReceiver> receiver_;
+  std::vector<std::pair<std::string, Bytes>> heard_;
+};
+
+TEST_F(Multicast, ShortMessages) {
+  read(short_message("p3at/LRF", {1, 2, 3}));
+  read(short_message("x", {}));
+  read(short_message(std::string(63, 'n'), {9}));
+  ASSERT_EQ(heard_.size(), 3u);
+  EXPECT_EQ(heard_[0], (std::pair<std::string, Bytes>("p3at/LRF", {1, 2, 3})));
+  EXPECT_EQ(heard_[1], (std::pair<std::string, Bytes>("x", {})));
+  EXPECT_EQ(heard_[2].first.size(), 63u);
+}
+
+TEST_F(Multicast, LongMessagesInAnyOrderAndTwice) {
+  Bytes data(200'000);
+  std::minstd_rand random(1);
+  for (uint8_t& byte : data) byte = static_cast<uint8_t>(random() >> 8);
+  std::vector<Bytes> parts = fragments("r/camera", data, 5, 65'000);
+  ASSERT_EQ(parts.size(), 4u);
+  for (const Bytes& part : parts) read(part);
+  std::reverse(parts.begin(), parts.end());
+  for (Bytes& part : parts) {
+    part[7] = 6;    // the next message
+    read(part);
+    if (&part != &parts.back()) read(part);
+  }
+  ASSERT_EQ(heard_.size(), 2u);
+  for (const auto& [channel, bytes] : heard_) {
+    EXPECT_EQ(channel, "r/camera");
+    EXPECT_TRUE(bytes == data);
+  }
+}
+
+TEST_F(Multicast, SendersApartAndTheNewestMessageOfEach) {
+  const Bytes data(100, 1), other(100, 2);
+  const std::vector<Bytes> a = fragments("a", data, 1, 60), b = fragments("b", other, 1, 60), later = fragments("a", other, 2, 60);
+  read(a[0], {1, 1});
+  read(b[1], {1, 2});
+  read(later[0], {1, 1});    // a's second part was lost
+  read(a[1], {1, 1});        // and now it is too late: this begins it anew, without its first part
+  read(b[0], {1, 2});
+  ASSERT_EQ(heard_.size(), 1u);
+  EXPECT_EQ(heard_[0], (std::pair<std::string, Bytes>("b", other)));
+}
+
+TEST_F(Multicast, WhatIsNotLcmIsPassedOver) {
+  for (const Bytes& bad : {Bytes{}, Bytes{'L', 'C', '0', '2'}, Bytes(8, 0), Bytes(100, 0xff), short_message("", {1}),
+                           short_message(std::string(64, 'n'), {1})}) {
+    read(bad);
+  }
+  const Bytes good = fragments("c", Bytes(100, 3), 1, 100)[0];    // one part, whole
+  for (size_t at = 8; at < 20; ++at) {    // sizes, offsets and numbers that contradict one another
+    for (const uint8_t value : {0x00, 0x01, 0x7f, 0x80, 0xff}) {
+      Bytes bad = good;
+      if (bad[at] == value) continue;
+      bad[at] = value;
+      heard_.clear();
+      read(bad);
+      for (const auto& [channel, bytes] : heard_) EXPECT_GE(bytes.size(), 100u) << at;
+    }
+  }
+  std::minstd_rand random(2);
+  for (int i = 0; i < 20'000; ++i) {
+    Bytes bad = {'L', 'C', '0', static_cast<uint8_t>(random() % 2 ? '2' : '3')};
+    for (size_t n = random() % 60; n > 0; --n) bad.push_back(static_cast<uint8_t>(random() % 4 ? 0 : random() >> 8));
+    read(bad, {static_cast<uint32_t>(random()), 1});
+  }
+  heard_.clear();
+  read(good);
+  ASSERT_EQ(heard_.size(), 1u);
+}
+
+}  // namespace
+}  // namespace ruedo::bus
