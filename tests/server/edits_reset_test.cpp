@@ -267,7 +267,9 @@ TEST_F(EditsResetTest, ModelsComeAndGoWithoutGrowth) {
   EXPECT_EQ(now.nbodies, then.nbodies);
   EXPECT_EQ(now.nchannels, then.nchannels);
   EXPECT_EQ(now.nrobots, 1);
+#if !defined(__SANITIZE_ADDRESS__)    // which keeps what was freed for a while
   EXPECT_LT(resident_kB(), memory_then + 4096);
+#endif
 }
 
 }  // namespace
