@@ -1,4 +1,6 @@
 // ruedo check: everything that is wrong or not supported in a world file, with its place.
+#include <set>
+
 #include <fmt/format.h>
 
 #include "cli/commands.h"
@@ -6,6 +8,7 @@
 #include "core/json.h"
 #include "model/body_layout.h"
 #include "ruedo/errors.h"
+#include "scene/render_texture.h"
 #include "server/fleet.h"
 
 namespace ruedo::cli {
@@ -15,6 +18,28 @@ struct CheckArguments {
   WorldArguments world;
   bool json = false, strict = false;
 };
+
+// Pictures that are there and cannot be decoded. Readers leave that to who draws: it takes long.
+void check_textures(const model::WorldModel& world, std::vector<Finding>& findings) {
+  std::set<std::string> seen;
+  const auto look = [&](const model::Material& material, const std::string& owner) {
+    const model::Texture* texture = material.texture.get();
+    if (!texture || !seen.insert(texture->path.empty() ? owner : texture->path).second) return;
+    if (scene::decode_texture(*texture).width > 0) return;
+    findings.push_back({Finding::Kind::unsupported, {texture->path.empty() ? owner : texture->path, 0}, "",
+                        "the texture is no picture that can be read; the plain colour is shown instead"});
+  };
+  for (const model::ModelInstance& instance : world.models) {
+    for (const model::Link& link : instance.model->links) {
+      for (const model::Visual& visual : link.visuals) {
+        if (visual.material) look(*visual.material, "");
+        const model::Mesh* mesh = visual.geometry.mesh.get();
+        if (!mesh || visual.material) continue;
+        for (const model::Material& material : mesh->materials) look(material, mesh->name);
+      }
+    }
+  }
+}
 
 // What the readers and the devices found. A file that cannot be read at all is one finding.
 std::vector<Finding> find_all(const CheckArguments& arguments, bool& loaded) {
@@ -30,6 +55,7 @@ std::vector<Finding> find_all(const CheckArguments& arguments, bool& loaded) {
     options.disabled = arguments.world.disabled;
     options.keep_going = true;
     server::make_fleet(*world, layout, options, channels, of_devices);
+    check_textures(*world, findings);
     findings.insert(findings.end(), of_devices.list().begin(), of_devices.list().end());
     return findings;
   } catch (const InputError& error) {

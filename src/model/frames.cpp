@@ -66,7 +66,9 @@ FrameGraph::Found FrameGraph::require(const std::string& name, const Element& as
   Found found;
   if (find(name, found)) return found;
   const std::string near = nearest_word(name, names());
-  asker.fail("there is no frame '" + name + "' in " + scope_name_ + (near.empty() ? "" : "; did you mean '" + near + "'?"));
+  std::string help = near.empty() ? "" : "; did you mean '" + near + "'?";
+  if (near.empty() && name.find("::") != std::string::npos) help = "; it can be of this model or of one that is nested in it";
+  asker.fail("there is no frame '" + name + "' in " + scope_name_ + help);
 }
 
 std::vector<std::string> FrameGraph::names() const {

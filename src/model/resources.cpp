@@ -234,6 +234,7 @@ std::string ResourceFinder::why_not(const std::string& uri, const std::string& f
   if (path.empty() || path.find('\0') != std::string::npos || path.find("://") != std::string::npos) return "is not found";
   const bool absolute = fs::path(path).is_absolute();
   const fs::path full = (absolute ? fs::path(path) : fs::path(from).parent_path() / path).lexically_normal();
+  if (is_folder(full.string()) && allowed(full.string(), from)) return "is a folder without model.config or model.sdf";
   if (!is_there(full) || allowed(full.string(), from)) return "is not found";
   return absolute ? "lies outside the folders that are searched (--allow-absolute lets it in)" : "leads out of the folders that are searched";
 }

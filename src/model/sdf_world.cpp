@@ -142,7 +142,7 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
   }
   if (first_plugin) findings.unsupported(first_plugin->source, "world " + world.name, "plugins of Gazebo's server are not loaded: " + plugins);
   if (const Element* joint = element.child("joint")) {
-    findings.unsupported(joint->source, "world " + world.name, "joints between models are not supported and left out");
+    findings.unsupported(joint->source, "world " + world.name, "joints between models are not supported and left out; put both models, and the joint, into one <model>");
   }
 
   FrameGraph frames("the world");

@@ -258,6 +258,19 @@ void refuse_xacro(const Element& element) {
   for (const auto& child : element.children) refuse_xacro(*child);
 }
 
+// urdfdom names what it stumbles over, without the line: the link or joint whose name its message has in brackets or quotes.
+const Element& whom_it_names(const std::string& fault, const Element& robot) {
+  for (const char* kind : {"joint", "link"}) {
+    for (const Element* each : robot.all(kind)) {
+      const std::string name = required_name(*each);
+      for (const char* quotes : {"[]", "''", "\"\""}) {
+        if (fault.find(quotes[0] + name + quotes[1]) != std::string::npos) return *each;
+      }
+    }
+  }
+  return robot;
+}
+
 }  // namespace
 
 std::unique_ptr<Element> urdf_as_sdf(const Element& robot, Findings& findings) {
@@ -282,7 +295,7 @@ std::unique_ptr<Element> urdf_as_sdf(const Element& robot, Findings& findings) {
     }
     if (fault.empty()) fault = listener.first;
   }
-  if (!urdf || !urdf->getRoot()) robot.fail("is no URDF that can be read: " + (fault.empty() ? "unknown reason" : fault));
+  if (!urdf || !urdf->getRoot()) whom_it_names(fault, robot).fail("urdfdom cannot read it: " + (fault.empty() ? "unknown reason" : fault));
 
   Converter converter{robot, findings, *urdf, {}};
   Element& model = *converter.model;

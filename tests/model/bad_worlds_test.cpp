@@ -42,6 +42,7 @@ const std::vector<BadWorld>& table() {
       // The file as a whole.
       {"Empty", "", ": the file is empty"},
       {"OnlySpace", " \n\t\n", ": the file is empty"},
+      {"OnlyAMark", "\xEF\xBB\xBF\n", ": the file is empty"},
       {"NoXml", "hello", ":1: not XML: the text does not begin with '<'"},
       {"NotClosed", "<sdf version='1.9'>\n<world name='w'>\n</sdf>", ":2: not XML: this element is closed by another name, or not at all"},
       {"AttributeWithoutQuotes", "<sdf version=1.9/>", ":1: not XML: an attribute that is not complete"},
@@ -150,7 +151,13 @@ const std::vector<BadWorld>& table() {
                               "<surface><ruedo:laser_reflectance>2</ruedo:laser_reflectance></surface></collision>"),
        ":6: <surface/ruedo:laser_reflectance>: '2' is not allowed; allowed is a number from 0 to 1"},
       {"UrdfWithXacro", "<robot name='r'>\n<xacro:include filename='x'/></robot>", ":2: <xacro:include>: is xacro; expand it first: xacro FILE > robot.urdf"},
-      {"UrdfWithoutLinks", "<robot name='r'/>", ":1: <robot>: is no URDF that can be read: No link elements found in urdf file"},
+      {"UrdfWithoutLinks", "<robot name='r'/>", ":1: <robot>: urdfdom cannot read it: No link elements found in urdf file"},
+      {"UrdfJointWithoutLimits", "<robot name='r'><link name='a'/><link name='b'/>\n<joint name='j' type='revolute'><parent link='a'/><child link='b'/></joint></robot>",
+       ":2: <joint>: urdfdom cannot read it: Joint [j] is of type REVOLUTE but it does not specify limits"},
+      {"UrdfTwoRoots", "<robot name='r'>\n<link name='a'/><link name='b'/></robot>",
+       ":2: <link>: urdfdom cannot read it: Failed to find root link: Two root links found: [a] and [b]"},
+      {"JointToAnotherModel", joint("<joint name='j' type='fixed'><parent>table::top</parent><child>a</child></joint>"),
+       ":5: <parent>: there is no frame 'table::top' in model m; it can be of this model or of one that is nested in it"},
       {"UrdfTwoLinks", "<robot name='r'><link name='a'/>\n<link name='a'/></robot>", ":2: <link>: a second <link> of the name 'a'"},
   };
   return worlds;

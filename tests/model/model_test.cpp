@@ -96,7 +96,7 @@ TEST(Includes, OverridesAndNames) {
   EXPECT_EQ(world->models[3].model, world->models[0].model);
   EXPECT_EQ(texts(*world), (std::vector<std::string>{"plugins are not loaded: libx.so", "'model://none' is not found; the world goes on without it"}));
   EXPECT_EQ(world->findings.back().source.line, 1);
-  EXPECT_EQ(world->files_read.size(), 2u);
+  EXPECT_EQ(world->files_read.size(), 3u);    // its model.config says which file is the model's
 }
 
 // The mast's frame is 1 m ahead of the cart's and turned left by a right angle: its sensor is 1.2 m ahead, looking left.
@@ -401,6 +401,19 @@ TEST(Layout, StaticPartOfAMovingModelStays) {
   EXPECT_EQ(layout.bodies[0].name, "gate/bar");
   ASSERT_EQ(layout.joints.size(), 1u);
   EXPECT_EQ(layout.joints[0].parent_body, -1);
+}
+
+TEST(Layout, AJointOfTheOuterModelTiesLinksOfTwoNestedOnes) {
+  const auto world = world_of(
+      "<model name='crane'><model name='tower'><link name='top'/></model><model name='arm'><pose>1 0 2 0 0 0</pose><link name='beam'/></model>"
+      "<joint name='slew' type='continuous'><parent>tower::top</parent><child>arm::beam</child><axis><xyz>0 0 1</xyz></axis></joint></model>");
+  const BodyLayout layout(*world);
+  ASSERT_EQ(layout.bodies.size(), 2u);
+  ASSERT_EQ(layout.joints.size(), 1u);
+  EXPECT_EQ(layout.bodies[static_cast<size_t>(layout.joints[0].parent_body)].name, "crane/tower.top");
+  EXPECT_EQ(layout.bodies[static_cast<size_t>(layout.joints[0].child_body)].name, "crane/arm.beam");
+  const Joint& joint = world->models[0].model->joints[0];
+  EXPECT_NEAR((joint.X_MJ.translation - Vec3(1, 0, 2)).norm(), 0, 1e-12);    // at its child
 }
 
 TEST(Corpus, TheTwoWorldsLoadWithTheirMeshes) {

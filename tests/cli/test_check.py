@@ -1,0 +1,108 @@
+"""ruedo check, as its users call it: what hostile and broken files give, the JSON list, exit codes, and colour on a terminal."""
+import json
+import os
+import pty
+import struct
+import subprocess
+
+import pytest
+
+RUEDO = os.environ["RUEDO"]
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+def check(file, *options):
+    return subprocess.run([RUEDO, "check", str(file), *options], capture_output=True, timeout=60)
+
+
+def world(inside):
+    return f"<sdf version='1.9'>\n<world name='w'>\n{inside}\n</world></sdf>"
+
+
+def in_link(inside):
+    """In line 4 of a world of one static model."""
+    return world(f"<model name='m'><static>true</static><link name='l'>\n{inside}\n</link></model>")
+
+
+def mesh(name):
+    return in_link(f"<collision name='c'><geometry><mesh><uri>{name}</uri></mesh></geometry></collision>")
+
+
+def heightmap(name):
+    return in_link(f"<collision name='c'><geometry><heightmap><uri>{name}</uri><size>1 1 1</size></heightmap></geometry></collision>")
+
+
+def texture(name):
+    return in_link(f"<visual name='v'><geometry><box><size>1 1 1</size></box></geometry><material><pbr><metal><albedo_map>{name}</albedo_map></metal></pbr></material></visual>")
+
+
+def png(width, height):
+    return PNG + struct.pack(">I", 13) + b"IHDR" + struct.pack(">II", width, height) + b"\x08\x02\0\0\0" + bytes(8)
+
+
+COLLISION = "model m/link l/collision c"
+# What the world says; other files beside it; the exit code; the finding's kind, line and element, and a part of its text.
+FILES = {
+    "broken mesh": (mesh("a.dae"), {"a.dae": b"<COLLADA>no"}, 1, ("error", 4, COLLISION, "the mesh 'a.dae' cannot be used: ")),
+    "bytes of the mesh in the importer's message": (mesh("a.stl"), {"a.stl": b"solid\xff\xfe" + bytes(range(256))}, 1,
+                                                    ("error", 4, COLLISION, "the mesh 'a.stl' cannot be used: ")),
+    "empty mesh": (mesh("a.stl"), {"a.stl": b""}, 1, ("error", 4, COLLISION, "the mesh 'a.stl' cannot be used: ")),
+    "unknown mesh": (mesh("a.blend"), {"a.blend": b"x"}, 1, ("error", 4, COLLISION, "'.blend' is no known kind of mesh; known are obj, dae")),
+    "folder as mesh": (mesh("sub"), {"sub/x": b""}, 1, ("error", 4, COLLISION, "the mesh 'sub' cannot be used: it is a folder; a file is needed")),
+    "missing mesh": (mesh("none.dae"), {}, 1, ("error", 4, COLLISION, "the mesh 'none.dae' is not found; the shape is left out")),
+    "missing picture": (heightmap("none.png"), {}, 1, ("error", 4, COLLISION, "the heightmap 'none.png' is not found")),
+    "broken picture": (heightmap("a.png"), {"a.png": PNG + bytes(40)}, 1, ("error", 4, COLLISION, "it is no picture that can be read (png, jpeg, bmp, tiff)")),
+    "huge picture": (heightmap("a.png"), {"a.png": png(200000, 200000)}, 1, ("error", 4, COLLISION, "200000 x 200000 pixels; allowed are 1025 each way")),
+    "missing texture": (texture("none.png"), {}, 0, ("unsupported", 4, "model m/link l/visual v", "the texture 'none.png' is not found")),
+    "broken texture": (texture("a.png"), {"a.png": PNG + bytes(40)}, 0, ("unsupported", 0, "", "the texture is no picture that can be read")),
+    "include of a folder": (world("<include><uri>sub</uri></include>"), {"sub/x": b""}, 1,
+                            ("error", 3, "world/include", "'sub' is a folder without model.config or model.sdf")),
+    "joint between models": (world("<joint name='j' type='fixed'><parent>a::l</parent><child>b::l</child></joint>\n" +
+                                   "".join(f"<model name='{name}'><link name='l'/></model>" for name in "ab")), {}, 0,
+                             ("unsupported", 3, "world w", "put both models, and the joint, into one <model>")),
+    "circle": (world("<include><uri>a.sdf</uri></include>"), {"a.sdf": b"<sdf version='1.9'><model name='a'><include><uri>a.sdf</uri></include></model></sdf>"}, 3,
+               ("error", 1, "", "an include that never ends: a.sdf includes a.sdf")),
+    "number": (in_link("<pose>1e999 0 0 0 0 0</pose>"), {}, 3, ("error", 4, "", "'1e999' is too large for a number")),
+    "not a number": (in_link("<pose>nan 0 0 0 0 0</pose>"), {}, 3, ("error", 4, "", "'nan' is not finite; allowed is a number")),
+    "only a mark": ("\ufeff", {}, 3, ("error", 0, "", "the file is empty")),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_files_that_are_wrong(name, tmp_path):
+    text, others, code, (kind, line, element, part) = FILES[name]
+    for other, content in others.items():
+        (tmp_path / other).parent.mkdir(exist_ok=True)
+        (tmp_path / other).write_bytes(content)
+    (tmp_path / "w.sdf").write_text(text, encoding="utf-8")
+    done = check(tmp_path / "w.sdf", "--json")
+    findings = json.loads(done.stdout.decode("utf-8"))
+    assert done.returncode == code and len(findings) == 1, findings
+    found = findings[0]
+    assert set(found) == {"kind", "file", "line", "element", "text"}
+    assert found["file"].startswith(str(tmp_path)) and part in found["text"]
+    assert (found["kind"], found["line"], found["element"]) == (kind, line, element)
+    text = check(tmp_path / "w.sdf").stdout.decode()
+    place = found["file"] + (f":{line}" if line else "")
+    assert part in text and place in text and "\x1b" not in text
+    assert check(tmp_path / "w.sdf", "--strict").returncode == (code or 1)
+
+
+def test_equal_findings_are_one_with_all_its_places(tmp_path):
+    boxes = "\n".join(f"<collision name='{i}'><geometry><bx/></geometry></collision>" for i in range(3))
+    (tmp_path / "w.sdf").write_text(in_link(boxes))
+    lines = check(tmp_path / "w.sdf").stdout.decode().splitlines()
+    assert lines[0].startswith("unsupported: ") and "did you mean <box>?" in lines[0]
+    assert [line.split(":")[1].split()[0] for line in lines[1:4]] == ["4", "5", "6"]
+    assert lines[4].endswith("w.sdf: 0 errors, 3 not supported, 0 repaired") and len(lines) == 5
+
+
+def test_a_terminal_has_colours_and_no_one_else(tmp_path):
+    (tmp_path / "w.sdf").write_text(mesh("none.dae"))
+    ours, theirs = pty.openpty()
+    environment = {name: value for name, value in os.environ.items() if name != "NO_COLOR"}
+    done = subprocess.run([RUEDO, "check", tmp_path / "w.sdf"], stdout=theirs, env={**environment, "TERM": "xterm"}, timeout=60)
+    os.close(theirs)
+    shown = os.read(ours, 65536).decode()
+    os.close(ours)
+    assert done.returncode == 1 and "\x1b[" in shown and "error" in shown
