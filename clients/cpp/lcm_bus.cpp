@@ -21,6 +21,7 @@ namespace ruedo::client {
 namespace {
 
 constexpr std::chrono::milliseconds kLendTime(20);
+constexpr std::chrono::microseconds kLookTime(50);
 
 struct Address { std::string scheme, host, port, options; };
 
@@ -186,7 +187,13 @@ void LcmBus::deliver(std::string_view channel, const uint8_t* bytes, size_t size
 
 void LcmBus::handle(int timeout_ms) {
   if (direct_) {
-    if (direct_->take([this](std::string_view channel, const uint8_t* bytes, size_t size) { deliver(channel, bytes, size); })) return;
+    const auto take = [this](std::string_view channel, const uint8_t* bytes, size_t size) { deliver(channel, bytes, size); };
+    // Being woken takes as long as a small world's step: it is mostly there before one would sleep.
+    static const bool may_look_again = std::thread::hardware_concurrency() > 1;
+    const auto sleep_at = std::chrono::steady_clock::now() + kLookTime;
+    do {
+      if (direct_->take(take)) return;
+    } while (may_look_again && timeout_ms > 0 && std::chrono::steady_clock::now() < sleep_at);
     pollfd waiting{direct_->file(), POLLIN, 0};
     ::poll(&waiting, 1, timeout_ms);
     return;

@@ -28,3 +28,12 @@ def test_models_come_and_go(language):
     assert said.words("time") == ["True", "2"]
     assert said.words("gone") == ["1"]
     assert "no model called 'guest'" in said.one("unknown")
+
+
+def test_snapshots_and_the_names_of_spawned_models(language, tmp_path):
+    with ruedo_run("--paused", "--disable", "p3at/camera", "--snapshots", str(tmp_path), world=HALL) as server:
+        said = probe(language, server.url, "snapshots")
+    assert said.words("names") == ["p3at_2", "p3at_3", "guest"]
+    assert said.words("same") == ["True", "True", "True"]
+    first, last = (int(word) for word in said.words("steps"))
+    assert last - first == 60

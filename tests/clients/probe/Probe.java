@@ -167,6 +167,17 @@ public final class Probe {
         attempt("steps", () -> sim.step(0));
     }
 
+    private static void snapshots(Simulation sim) {
+        String first = sim.spawn("p3at", 3.0, 1.0, 0.0, ""), second = sim.spawn("p3at", 3.0, -1.0, 0.0, "");
+        say("names", first, second, sim.spawn("p3at", -3.0, 1.0, 0.0, "guest"));
+        sim.step(40);
+        State saved = sim.snapshot("here");
+        State later = sim.step(60);
+        State back = sim.restore("here");
+        say("same", back.step == saved.step, back.stateHash == saved.stateHash, sim.step(60).stateHash == later.stateHash);
+        say("steps", saved.step, later.step);
+    }
+
     private static void world(Simulation sim, String text) {
         double[] ahead = {1.0, 0.0, 0.0, 0.0};
         sim.spawn("p3at", 3.0, 1.0, 0.0, "guest");
@@ -249,6 +260,7 @@ public final class Probe {
                 case "streams": streams(sim, a[0], Double.parseDouble(a[1])); break;
                 case "control": control(sim, a[0]); break;
                 case "world": world(sim, a[0]); break;
+                case "snapshots": snapshots(sim); break;
                 case "quit": sim.quit(); say("quit", true); break;
                 default: throw new IllegalArgumentException(command);
             }

@@ -164,6 +164,17 @@ void control(const rc::Simulation& sim, const std::string& name) {
   report("steps", [&] { sim.step(0); });
 }
 
+void snapshots(const rc::Simulation& sim) {
+  const std::string first = sim.spawn("p3at", 3.0, 1.0), second = sim.spawn("p3at", 3.0, -1.0);
+  say("names", first, second, sim.spawn("p3at", -3.0, 1.0, {.name = "guest"}));
+  sim.step(40);
+  const rc::State saved = sim.snapshot("here");
+  const rc::State later = sim.step(60);
+  const rc::State back = sim.restore("here");
+  say("same", back.step == saved.step, back.state_hash == saved.state_hash, sim.step(60).state_hash == later.state_hash);
+  say("steps", saved.step, later.step);
+}
+
 void world(const rc::Simulation& sim, const std::string& text) {
   sim.spawn("p3at", 3.0, 1.0, {.name = "guest"});
   const rc::Robot guest = sim.robot("guest");
@@ -257,6 +268,7 @@ void act(const std::string& url, const std::string& command, const std::vector<s
   if (command == "streams") streams(sim, a[0], std::stod(a[1]));
   if (command == "control") control(sim, a[0]);
   if (command == "world") world(sim, a[0]);
+  if (command == "snapshots") snapshots(sim);
   if (command == "quit") {
     sim.quit();
     say("quit", true);

@@ -121,6 +121,16 @@ def control(sim, name):
     attempt("steps", lambda: sim.step(0))
 
 
+def snapshots(sim):
+    say("names", sim.spawn("p3at", 3.0, 1.0), sim.spawn("p3at", 3.0, -1.0), sim.spawn("p3at", -3.0, 1.0, name="guest"))
+    sim.step(40)
+    saved = sim.snapshot("here")
+    later = sim.step(60)
+    back = sim.restore("here")
+    say("same", back.step == saved.step, back.state_hash == saved.state_hash, sim.step(60).state_hash == later.state_hash)
+    say("steps", saved.step, later.step)
+
+
 def world(sim, text):
     sim.spawn("p3at", 3.0, 1.0, name="guest")
     guest = sim.robot("guest")
@@ -183,7 +193,7 @@ def main():
             actions = {"lockstep": lambda: lockstep(sim, *rest[1:]), "connect": lambda: say("connected", sim.world), "list": lambda: list_all(sim), "read": lambda: read(sim, *rest),
                        "velocity": lambda: drive(sim, *rest, False), "wheels": lambda: drive(sim, *rest, True),
                        "primitives": lambda: primitives(sim, *rest), "errors": lambda: errors(sim, *rest),
-                       "streams": lambda: streams(sim, *rest), "control": lambda: control(sim, *rest), "world": lambda: world(sim, *rest),
+                       "streams": lambda: streams(sim, *rest), "control": lambda: control(sim, *rest), "world": lambda: world(sim, *rest), "snapshots": lambda: snapshots(sim),
                        "quit": lambda: (sim.quit(), say("quit", True))}
             actions[command]()
     except ruedo.RuedoError as error:
