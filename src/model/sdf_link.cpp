@@ -1,8 +1,8 @@
 // Links. Inertias that no body can have are replaced by those of a box as large as the collisions, and told.
 #include "model/sdf_link.h"
 
-#include <algorithm>
 #include <cmath>
+#include <set>
 
 #include <Eigen/Eigenvalues>
 
@@ -184,11 +184,10 @@ Link read_link(const Element& element, const PoseInLink& pose_in_link, const std
   link.source = element.source;
   link.gravity = element.boolean("gravity", true);
   link.kinematic = element.boolean("kinematic", false);
-  std::vector<std::string> names;
+  std::set<std::string> names;
   const auto unique = [&](const Element& child) {
-    const std::string name = child.name + " " + required_name(child);
-    if (std::find(names.begin(), names.end(), name) != names.end()) child.fail("a second <" + child.name + "> named '" + required_name(child) + "' in this link");
-    names.push_back(name);
+    if (names.insert(child.name + " " + required_name(child)).second) return;
+    child.fail("a second <" + child.name + "> named '" + required_name(child) + "' in this link");
   };
   for (const auto& child : element.children) {
     if (child->name == "collision" || child->name == "visual") {

@@ -2,6 +2,7 @@
 #include "model/settings.h"
 
 #include <algorithm>
+#include <map>
 
 #include "model/drive.h"
 #include "model/sdf_reader.h"
@@ -30,17 +31,28 @@ std::vector<std::string> devices_of(const Model& model) {
   return names;
 }
 
-ModelInstance& robot_of(WorldModel& world, const std::string& name, const std::string& option) {
-  std::vector<std::string> robots;
-  for (ModelInstance& instance : world.models) {
-    if (!instance.is_robot()) continue;
-    if (instance.name == name) return instance;
-    robots.push_back(instance.name);
+// The robots of a world by name.
+class RobotsByName {
+ public:
+  explicit RobotsByName(WorldModel& world) {
+    for (ModelInstance& instance : world.models) {
+      if (instance.is_robot()) robots_.emplace(instance.name, &instance);
+    }
   }
-  const std::string near = nearest_word(name, robots);
-  throw InputError({}, option + ": there is no robot '" + name + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") +
-                           "; there are " + listed(robots));
-}
+
+  ModelInstance& at(const std::string& name, const std::string& option) const {
+    const auto found = robots_.find(name);
+    if (found != robots_.end()) return *found->second;
+    std::vector<std::string> names;
+    for (const auto& [robot, instance] : robots_) names.push_back(robot);
+    const std::string near = nearest_word(name, names);
+    throw InputError({}, option + ": there is no robot '" + name + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") +
+                             "; there are " + listed(names));
+  }
+
+ private:
+  std::map<std::string, ModelInstance*> robots_;
+};
 
 // Keys that a kind of sensor reads, so that what a file leaves out can be set, too.
 std::vector<std::string> known_keys(const std::string& type) {
@@ -180,9 +192,10 @@ void apply_drives(const std::vector<DriveOption>& drives, WorldModel& world) {
 }
 
 void apply_settings(const std::vector<Setting>& settings, WorldModel& world) {
+  const RobotsByName robots(world);
   for (const Setting& setting : settings) {
     const std::string option = "--set " + setting.robot + "/" + setting.device + "." + setting.key;
-    ModelInstance& instance = robot_of(world, setting.robot, option);
+    ModelInstance& instance = robots.at(setting.robot, option);
     auto model = std::make_shared<Model>(*instance.model);
     const Source source{option, 0};
     const auto sensor = std::find_if(model->sensors.begin(), model->sensors.end(), [&](const auto& each) { return each.name == setting.device; });
@@ -210,18 +223,24 @@ void apply_settings(const std::vector<Setting>& settings, WorldModel& world) {
 }
 
 void apply_disabled(const std::vector<std::string>& disabled, WorldModel& world) {
+  const RobotsByName robots(world);
+  std::map<std::pair<std::shared_ptr<const Model>, std::string>, std::shared_ptr<const Model>> without;    // equal robots share a model
   for (const std::string& each : disabled) {
     const std::string option = "--disable " + each;
     const size_t slash = each.find('/');
     if (slash == std::string::npos) throw InputError({}, option + ": allowed is ROBOT/DEVICE");
-    ModelInstance& instance = robot_of(world, each.substr(0, slash), option);
+    ModelInstance& instance = robots.at(each.substr(0, slash), option);
     const std::string device = each.substr(slash + 1);
     const auto is_it = [&](const auto& sensor) { return sensor.name == device; };
     if (std::any_of(instance.model->sensors.begin(), instance.model->sensors.end(), is_it)) {
       // A robot whose last sensor goes, and which has no drive, is no robot any more.
-      auto model = std::make_shared<Model>(*instance.model);
-      std::erase_if(model->sensors, is_it);
-      instance.model = std::move(model);
+      auto& less = without[{instance.model, device}];
+      if (!less) {
+        auto model = std::make_shared<Model>(*instance.model);
+        std::erase_if(model->sensors, is_it);
+        less = std::move(model);
+      }
+      instance.model = less;
     } else if (contains(kFixedDevices, device)) {
       world.disabled.push_back(each);
     } else {

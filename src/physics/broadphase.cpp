@@ -38,15 +38,15 @@ Broadphase::~Broadphase() = default;
 
 btBroadphaseProxy* Broadphase::createProxy(const btVector3& low, const btVector3& high, int shape_type, void* object,
                                            int group, int mask, btDispatcher* dispatcher) {
-  proxies_.push_back(std::make_unique<Proxy>());
-  Proxy& proxy = *proxies_.back();
+  const int id = ++made_;
+  Proxy& proxy = proxies_[id];
   const bool empty = low.x() > high.x();    // of a compound without shapes
   proxy.m_aabbMin = empty ? btVector3(0, 0, 0) : low;
   proxy.m_aabbMax = empty ? btVector3(0, 0, 0) : high;
   proxy.m_clientObject = object;
   proxy.m_collisionFilterGroup = group;
   proxy.m_collisionFilterMask = mask;
-  proxy.m_uniqueId = ++made_;
+  proxy.m_uniqueId = id;
   proxy.moves = group != btBroadphaseProxy::StaticFilter;
   if (proxy.moves) proxy.partners.reserve(kPartners);
   found_.reserve(kFound);
@@ -65,7 +65,7 @@ void Broadphase::destroyProxy(btBroadphaseProxy* base, btDispatcher* dispatcher)
   while (!proxy->partners.empty()) remove_pair(*proxy, *proxy->partners.back(), dispatcher);
   if (proxy->leaf) (proxy->moves ? moving_ : fixed_).remove(proxy->leaf);
   std::erase(planes_, proxy);
-  std::erase_if(proxies_, [proxy](const auto& owned) { return owned.get() == proxy; });
+  proxies_.erase(proxy->m_uniqueId);
 }
 
 void Broadphase::setAabb(btBroadphaseProxy* base, const btVector3& low, const btVector3& high, btDispatcher* dispatcher) {
@@ -133,15 +133,15 @@ void Broadphase::getAabb(btBroadphaseProxy* proxy, btVector3& low, btVector3& hi
 }
 
 void Broadphase::aabbTest(const btVector3& low, const btVector3& high, btBroadphaseAabbCallback& callback) {
-  for (const auto& proxy : proxies_) {
-    if (TestAabbAgainstAabb2(low, high, proxy->m_aabbMin, proxy->m_aabbMax)) callback.process(proxy.get());
+  for (auto& [id, proxy] : proxies_) {
+    if (TestAabbAgainstAabb2(low, high, proxy.m_aabbMin, proxy.m_aabbMax)) callback.process(&proxy);
   }
 }
 
 // Rays are cast by the scene, never here; this only keeps the interface whole.
 void Broadphase::rayTest(const btVector3&, const btVector3&, btBroadphaseRayCallback& callback, const btVector3&,
                          const btVector3&) {
-  for (const auto& proxy : proxies_) callback.process(proxy.get());
+  for (auto& [id, proxy] : proxies_) callback.process(&proxy);
 }
 
 void Broadphase::getBroadphaseAabb(btVector3& low, btVector3& high) const {

@@ -5,7 +5,7 @@
 // at once when a body is alone, which then needs no collision detection and no solver at all.
 #pragma once
 
-#include <memory>
+#include <map>
 #include <vector>
 
 #include <BulletCollision/BroadphaseCollision/btDbvt.h>
@@ -66,7 +66,7 @@ class Broadphase final : public btBroadphaseInterface {
 
   const PairFilter& filter_;
   btDbvt fixed_, moving_;
-  std::vector<std::unique_ptr<Proxy>> proxies_;
+  std::map<int, Proxy> proxies_;       // by unique id, which is the order of making
   std::vector<Proxy*> planes_;
   std::vector<Proxy*> found_;          // scratch
   int made_ = 0;

@@ -36,7 +36,9 @@ class FleetMaker {
   FleetMaker(const model::WorldModel& world, const model::BodyLayout& layout, const FleetOptions& options, Channels& channels,
              Findings& findings)
       : world_(world), layout_(layout), options_(options), channels_(channels), findings_(findings),
-        devices_of_(layout.robots.size()) {}
+        disabled_(world.disabled.begin(), world.disabled.end()), devices_of_(layout.robots.size()) {
+    disabled_.insert(options.disabled.begin(), options.disabled.end());
+  }
 
   Fleet make() {
     const std::vector<SensorKind>& kinds = sensor_kinds();    // those of a module are neighbours
@@ -67,11 +69,7 @@ class FleetMaker {
 
   int first_link(int robot) const { return layout_.first_link[static_cast<size_t>(layout_.robots[static_cast<size_t>(robot)].instance)]; }
 
-  bool disabled(int robot, const std::string& device) const {
-    const std::string name = instance(robot).name + "/" + device;
-    const auto in = [&](const std::vector<std::string>& list) { return std::find(list.begin(), list.end(), name) != list.end(); };
-    return in(options_.disabled) || in(world_.disabled);
-  }
+  bool disabled(int robot, const std::string& device) const { return disabled_.contains(instance(robot).name + "/" + device); }
 
   // The devices of a kind on a robot, in the order of its file.
   void collect(const SensorKind& kind, int robot, std::vector<Wanted>& wanted) const {
@@ -237,6 +235,7 @@ class FleetMaker {
   Channels& channels_;
   Findings& findings_;
   Fleet fleet_;
+  std::set<std::string> disabled_;    // "ROBOT/DEVICE"
   std::vector<std::vector<device_info_t>> devices_of_;    // each robot
 };
 

@@ -136,6 +136,18 @@ TEST_F(Options, Disable) {
   EXPECT_NE(error_of(options).find("--disable bot/SONAR: the robot has no device 'SONAR'"), std::string::npos);
 }
 
+TEST_F(Options, RobotsThatAreLeftTheSameStillShareTheirModel) {
+  LoadOptions options;
+  for (const char* name : {"a", "b", "c"}) options.spawns.push_back({"bot.sdf", name, 0, 0, 0});
+  for (size_t i = 0; i < 3; ++i) options.spawns[i].y = -2.0 * static_cast<double>(i);
+  options.disabled = {"a/LRF", "c/LRF"};
+  const auto models = load_world(world, options)->models;
+  const size_t first = models.size() - 3;
+  EXPECT_EQ(models[first].model, models[first + 2].model);
+  EXPECT_TRUE(models[first].model->sensors.empty());
+  EXPECT_EQ(models[first + 1].model->sensors.size(), 1u);
+}
+
 TEST(Convex, OverlapByHand) {
   const auto shape = [](Shape kind, const Vec3& size) {
     Geometry g;
