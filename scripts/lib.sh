@@ -17,9 +17,9 @@ readonly BUILD_PACKAGES=(
   libopencv-core-dev libopencv-imgcodecs-dev libopencv-imgproc-dev
   libcli11-dev libspdlog-dev libfmt-dev libssl-dev "libglib2.0-0t64|libglib2.0-0" libwebsockets-dev
 )
-# libsdformat is the oracle of the world reader's tests; Debian has it up to 12.
+# libsdformat is the oracle of the world reader's tests; Debian has it up to 12. clang builds the fuzzers.
 readonly TEST_PACKAGES=(
-  libgtest-dev libgmock-dev libbenchmark-dev libopencv-contrib-dev "?libsdformat-dev" "?chromium"
+  libgtest-dev libgmock-dev libbenchmark-dev libopencv-contrib-dev "?libsdformat-dev" "?chromium" clang "?libclang-rt-dev"
 )
 
 # The web console's page is built by node and npm; a machine that has an npm of another origin keeps it.

@@ -119,6 +119,9 @@ TEST(Schema, RefusesWhatIsNotOneWholeMessage) {
   auto unterminated = good;
   unterminated[21 + 4 + 8] = 'x';
   EXPECT_FALSE(well_formed(schema, unterminated));
+  auto cut = good;
+  cut[21 + 4 + 2] = 0;
+  EXPECT_FALSE(well_formed(schema, cut)) << "a zero within a string";
 }
 
 // Every single-byte change must be survived (the sanitizers look on), and the two walks must agree.

@@ -15,6 +15,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       const std::string path = folder.write(std::string("mesh.") + kKinds[data[0]], data + 1, size - 1);
       const ruedo::model::ResourceFinder finder(path, false);
       ruedo::model::MeshImport import;
+      import.importer = RUEDO_IMPORTER;
       import.cache = false;
       import.wall_limit_s = 5;
       import.cpu_limit_s = 2;
