@@ -54,10 +54,10 @@ TEST(ChannelPatterns, OneForNamesThatCountUp) {
 }
 
 TEST(LcmBus, TakesUpOtherChannels) {
-  LcmBus bus("memq://");
   std::mutex mutex;
   std::condition_variable changed;
   std::vector<std::string> heard;
+  LcmBus bus("memq://");    // ends first: its thread uses the above
   bus.listen({"r1/velocity"}, [&](const std::string& channel, const uint8_t*, size_t) {
     {
       std::lock_guard lock(mutex);
@@ -78,10 +78,10 @@ TEST(LcmBus, TakesUpOtherChannels) {
 }
 
 TEST(LcmBus, HearsItsChannelsOnly) {
-  LcmBus bus("memq://");
   std::mutex mutex;
   std::condition_variable changed;
   std::vector<std::pair<std::string, std::vector<uint8_t>>> heard;
+  LcmBus bus("memq://");    // ends first: its thread uses the above
   bus.listen({"r1/velocity", "r2/move"}, [&](const std::string& channel, const uint8_t* data, size_t size) {
     {
       std::lock_guard lock(mutex);
@@ -103,8 +103,8 @@ TEST(LcmBus, HearsItsChannelsOnly) {
 }
 
 TEST(LcmBus, StopsAtOnce) {
-  LcmBus bus("memq://");
   int count = 0;
+  LcmBus bus("memq://");
   bus.listen({"a"}, [&](const std::string&, const uint8_t*, size_t) { ++count; });
   bus.stop();
   const uint8_t byte = 0;
