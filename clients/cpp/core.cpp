@@ -138,7 +138,7 @@ void Core::sleep_until(int64_t utime) {
 
 void Core::refresh_info(std::shared_ptr<const WorldInfo> before) {
   if (!before) before = info();
-  const Clock::time_point deadline = deadline_after(2.0);
+  const Clock::time_point deadline = deadline_after(10.0);
   std::unique_lock lock(mutex_);
   while (known_ == before && Clock::now() < deadline) {
     lock.unlock();

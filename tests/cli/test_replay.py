@@ -13,13 +13,14 @@ from pathlib import Path
 import lcm
 import pytest
 import ruedo
-from ruedo.lcmtypes import applied_t, log_header_t, planar_lidar_t, state_hash_t, velocity_command_t
+from ruedo.lcmtypes import applied_t, log_header_t, planar_lidar_t, state_hash_t, velocity_command_t, world_state_t
 
 RUEDO = os.environ["RUEDO"]
 SOURCE = Path(os.environ["RUEDO_SOURCE_DIR"])
 ARENA = str(SOURCE / "worlds" / "arena.sdf")
 QUICK = ["--disable", "p3at/camera", "--quiet"]
 LOG_ONLY = {"ruedo/header", "ruedo/applied", "ruedo/state_hash"}
+PATIENCE = 400    # s, for what comes sooner or later, on a machine that does much else too
 
 
 def url(port):
@@ -27,7 +28,14 @@ def url(port):
 
 
 def program(*arguments, **options):
-    return subprocess.run([RUEDO, *map(str, arguments)], capture_output=True, text=True, timeout=120, **options)
+    return subprocess.run([RUEDO, *map(str, arguments)], capture_output=True, text=True, timeout=PATIENCE, **options)
+
+
+def until(condition):
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
 
 
 def events(path):
@@ -56,21 +64,38 @@ class Server:
     def __init__(self, port, *arguments, world=ARENA):
         self.url = url(port)
         self.process = subprocess.Popen([RUEDO, "run", world, *QUICK, "--lcm", self.url, *map(str, arguments)],
-                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                                        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        STARTED.append(self.process)
 
-    def end(self, how=signal.SIGTERM, timeout=60):
+    def connect(self):
+        return ruedo.connect(self.url, timeout=PATIENCE)
+
+    def end(self, how=None):
+        """Its exit code, and what it said that was not read yet."""
         if how:
             self.process.send_signal(how)
-        out, errors = self.process.communicate(timeout=timeout)
+        _, errors = self.process.communicate(timeout=PATIENCE)
         return self.process.returncode, errors
 
 
-def command(address, vx, omega):
-    """One command, on its way; the server is paused, and has it before the next request."""
+STARTED = []
+
+
+@pytest.fixture(autouse=True)
+def no_process_outlives_its_test():
+    yield
+    for process in STARTED:
+        process.kill()
+        process.wait()
+    STARTED.clear()
+
+
+def command(simulation, vx, omega):
+    """One command to a paused server, which has it when it answers a request that was sent behind it."""
     message = velocity_command_t()
     message.vx, message.omega = vx, omega
-    lcm.LCM(address).publish("p3at/velocity", message.encode())
-    time.sleep(0.2)
+    lcm.LCM(simulation.url).publish("p3at/velocity", message.encode())
+    simulation.state()
 
 
 BOX = ("<sdf version='1.9'><model name='crate'><link name='link'><inertial><mass>3</mass></inertial><collision name='c'><geometry>"
@@ -82,20 +107,27 @@ def driven(tmp_path_factory):
     """A log with commands at times of the client's own, a reset with another seed, and models that come and go."""
     log = tmp_path_factory.mktemp("driven") / "driven.lcm"
     server = Server(7822, "--rate", "20", "--record", log)
-    with ruedo.connect(server.url, timeout=60) as simulation:
-        simulation.robot("p3at").set_velocity(0.4, 0.3)
-        time.sleep(0.15)
+    with server.connect() as simulation:
+        robot = simulation.robot("p3at")
+
+        def drive(vx, omega):
+            robot.set_velocity(vx, omega)
+            while abs(robot.motion.next(PATIENCE).omega - omega) > 1e-6:
+                pass
+
+        drive(0.4, 0.3)
+        simulation.sleep(2.0)
         simulation.reset_odometry("p3at")
-        time.sleep(0.1)
+        simulation.sleep(2.0)
         simulation.spawn(text=BOX, x=2.5, y=-1.5, z=1.5)
-        time.sleep(0.1)
+        simulation.sleep(2.0)
         simulation.reset(seed=5)
-        simulation.robot("p3at").set_velocity(0.2, -0.4)
-        time.sleep(0.15)
+        drive(0.2, -0.4)
+        simulation.sleep(2.0)
         simulation.pause()
         simulation.step(7)
         simulation.quit()
-    assert server.end(None)[0] == 0
+    assert server.end()[0] == 0
     return log
 
 
@@ -192,9 +224,7 @@ def test_another_machine_is_said_first_and_is_no_nondeterminism(tmp_path):
 def test_killed_in_the_middle(tmp_path):
     log = tmp_path / "killed.lcm"
     server = Server(7823, "--rate", "max", "--record", log)
-    deadline = time.monotonic() + 60
-    while (not log.exists() or log.stat().st_size < 3_000_000) and time.monotonic() < deadline:
-        time.sleep(0.05)
+    until(lambda: log.exists() and log.stat().st_size > 3_000_000)
     assert server.end(signal.SIGKILL)[0] == -signal.SIGKILL
     with open(log, "r+b") as file:
         file.truncate(2_000_001)    # and cut within an event, wherever the kill was
@@ -212,7 +242,7 @@ def test_a_full_disk(tmp_path):
     log = tmp_path / "full.lcm"
     command = f"ulimit -f 2000; exec {RUEDO} run {ARENA} {' '.join(QUICK)} --rate max --duration 600 --record {log} --lcm '{url(7824)}'"
     # Python ignores SIGXFSZ; its child does too, and is told by the write that there is no room.
-    result = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=120, restore_signals=False)
+    result = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=PATIENCE, restore_signals=False)
     assert result.returncode == 4 and "readable up to" in result.stderr
     result = program("verify", log)
     assert result.returncode == 0 and "verified up to there" in result.stdout, result.stdout + result.stderr
@@ -240,9 +270,11 @@ def test_damaged_logs_are_answered(tmp_path):
 
 
 class Listener:
-    def __init__(self, port):
+    """All messages of a bus. Over TCP: multicast may lose some where the listener gets no time to listen."""
+
+    def __init__(self, address):
         self.got, self.stop = [], False
-        self.bus = lcm.LCM(url(port))
+        self.bus = lcm.LCM(address)
         self.bus.subscribe(".*", lambda channel, data: self.got.append((channel, bytes(data)))).set_queue_capacity(0)
         self.thread = threading.Thread(target=self.listen)
         self.thread.start()
@@ -252,39 +284,61 @@ class Listener:
             self.bus.handle_timeout(50)
 
     def end(self):
-        time.sleep(0.3)
         self.stop = True
         self.thread.join()
-        return self.got
+
+
+@pytest.fixture
+def exchange(tmp_path):
+    """The address of a server of LCM over TCP, which passes on what the tests send. It serves a world without a body."""
+    world = tmp_path / "empty.sdf"
+    world.write_text("<sdf version='1.9'><world name='empty'/></sdf>")
+    process = subprocess.Popen([RUEDO, "run", world, "--quiet", "--paused", "--lcm", "auto-tcp"], stdout=subprocess.PIPE, text=True)
+    STARTED.append(process)
+    yield process.stdout.readline().split("'")[1]
+
+
+def of_nothing(channel, data):
+    return channel == "ruedo/world" and world_state_t.decode(data).n == 0
 
 
 @pytest.mark.parametrize("stock", [False, True])
-def test_plays_again(tmp_path, stock):
+def test_plays_again(tmp_path, exchange, stock):
     found = record(tmp_path / "a.lcm", seconds=2)
     wanted = [(channel, data) for _, channel, data in found if stock or channel not in LOG_ONLY]
-    port = 7826 if stock else 7825
-    listener = Listener(port)
-    begin = time.monotonic()
-    if stock:    # LCM's own player reads the log
-        player = shutil.which("lcm-logplayer", path=str(Path(sys.executable).parent)) or "lcm-logplayer"
-        result = subprocess.run([player, "-s", "4", "-l", url(port), str(tmp_path / "a.lcm")], capture_output=True, timeout=60)
-        assert result.returncode == 0
-    else:
-        result = program("play", tmp_path / "a.lcm", "--speed", "4", "--lcm", url(port))
-        assert result.returncode == 0 and f"{len(wanted)} messages, 2 s" in result.stdout
-    assert time.monotonic() - begin > 0.49    # 2 s, four times as fast
-    assert listener.end() == wanted
+    listener = Listener(exchange)
+    try:
+        until(lambda: ("mark", b"x") in listener.got or lcm.LCM(exchange).publish("mark", b"x"))    # it listens from here on
+        begin = time.monotonic()
+        if stock:    # LCM's own player reads the log
+            player = shutil.which("lcm-logplayer", path=str(Path(sys.executable).parent)) or "lcm-logplayer"
+            result = subprocess.run([player, "-s", "4", "-l", exchange, str(tmp_path / "a.lcm")], capture_output=True, timeout=PATIENCE)
+            assert result.returncode == 0
+        else:
+            result = program("play", tmp_path / "a.lcm", "--speed", "4", "--lcm", exchange)
+            assert result.returncode == 0 and f"{len(wanted)} messages, 2 s" in result.stdout
+        assert time.monotonic() - begin > 0.49    # 2 s, four times as fast
+
+        def played():
+            return [one for one in list(listener.got) if one[0] not in ("mark", "ruedo/info", "ruedo/tick") and not of_nothing(*one)]
+
+        until(lambda: len(played()) >= len(wanted))
+        assert played() == wanted
+    finally:
+        listener.end()
 
 
 def test_play_is_interrupted_cleanly(tmp_path):
     record(tmp_path / "a.lcm", seconds=2)
-    listener = Listener(7827)
+    listener = Listener(url(7827))
     process = subprocess.Popen([RUEDO, "play", str(tmp_path / "a.lcm"), "--speed", "0.01", "--lcm", url(7827)], stdout=subprocess.PIPE, text=True)
-    while not listener.got and process.poll() is None:
-        time.sleep(0.05)
+    STARTED.append(process)
+    try:
+        until(lambda: listener.got)
+    finally:
+        listener.end()
     process.send_signal(signal.SIGINT)
-    listener.end()
-    out, _ = process.communicate(timeout=10)
+    out, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0 and "interrupted" in out
 
 
@@ -292,20 +346,20 @@ def test_a_snapshot_in_another_process(tmp_path):
     """The restored run's log is the log of the run that was never interrupted."""
     arguments = ["--rate", "max", "--paused", "--snapshots", tmp_path, "--duration", "3"]
     server = Server(7828, *arguments, "--record", tmp_path / "one.lcm")
-    with ruedo.connect(server.url, timeout=60) as simulation:
-        command(server.url, 0.5, 0.4)
+    with server.connect() as simulation:
+        command(simulation, 0.5, 0.4)
         simulation.step(150)
         simulation.spawn(text=BOX, x=2.5, y=-1.5, z=1.5)
         simulation.step(100)
         saved = simulation.snapshot("here")
         assert saved.step == 250
-        command(server.url, 0.1, -0.4)
+        command(simulation, 0.1, -0.4)
         with pytest.raises(ruedo.RuedoError):
             simulation.snapshot("../there")
         with pytest.raises(ruedo.RuedoError):
             simulation.restore("nowhere")
         simulation.resume()
-    assert server.end(None)[0] == 0
+    assert server.end()[0] == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["here.snapshot", "one.lcm"]
 
     snapshot = tmp_path / "here.snapshot"
@@ -324,12 +378,12 @@ def test_a_snapshot_in_another_process(tmp_path):
 
 def test_a_snapshot_in_the_same_process(tmp_path):
     server = Server(7830, "--rate", "max", "--paused", "--snapshots", tmp_path, "--record", tmp_path / "a.lcm")
-    with ruedo.connect(server.url, timeout=60) as simulation:
+    with server.connect() as simulation:
         def go_on():
             simulation.step(200)
             return simulation.state().state_hash
 
-        command(server.url, 0.5, 0.4)
+        command(simulation, 0.5, 0.4)
         simulation.step(100)
         saved = simulation.snapshot("here")
         after = go_on()
@@ -339,7 +393,7 @@ def test_a_snapshot_in_the_same_process(tmp_path):
         assert (restored.step, restored.state_hash) == (saved.step, saved.state_hash)
         assert go_on() == after
         simulation.quit()
-    assert server.end(None)[0] == 0
+    assert server.end()[0] == 0
     result = program("verify", tmp_path / "a.lcm")    # without the snapshot's file, which the log does not need
     assert result.returncode == 0, result.stdout + result.stderr
 
@@ -359,6 +413,8 @@ def on_scan(channel, data):
     command.vel = [0.4 if ahead > 0.8 else 0.0, 0.0, 0.0]
     command.rotation_rate = [0.0, 0.0, 0.0 if ahead > 0.8 else 0.7]
     bus.publish("VELOCITY", command.encode())
+    if scan.utime == 1000000:
+        print("a second of scans", flush=True)
 
 bus.subscribe("LASER", on_scan)
 print("ready", flush=True)
@@ -382,6 +438,7 @@ def bot_core(tmp_path_factory):
 
 def start_controller(bot_core, port):
     controller = subprocess.Popen([sys.executable, str(bot_core / "controller.py"), url(port), str(bot_core)], stdout=subprocess.PIPE, text=True)
+    STARTED.append(controller)
     assert controller.stdout.readline() == "ready\n"
     return controller
 
@@ -393,14 +450,10 @@ WAITING = ["--remap", "p3at/lrf=LASER", "--remap", "p3at/velocity=VELOCITY", "--
 def test_an_unmodified_controller_runs_repeatably(tmp_path, bot_core):
     logs = []
     for run in range(2):
-        controller = start_controller(bot_core, 7831 + run)
-        try:
-            logs.append(tmp_path / f"{run}.lcm")
-            result = program("run", ARENA, *QUICK, *WAITING, "--duration", 20, "--record", logs[-1], "--lcm", url(7831 + run))
-            assert result.returncode == 0, result.stderr
-        finally:
-            controller.kill()
-            controller.communicate()
+        start_controller(bot_core, 7831 + run)
+        logs.append(tmp_path / f"{run}.lcm")
+        result = program("run", ARENA, *QUICK, *WAITING, "--duration", 20, "--record", logs[-1], "--lcm", url(7831 + run))
+        assert result.returncode == 0, result.stderr
     assert logs[0].read_bytes() == logs[1].read_bytes()
     found = events(logs[0])
     applied = [stamp for stamp, channel, _ in found if channel == "ruedo/applied"]
@@ -412,14 +465,17 @@ def test_an_unmodified_controller_runs_repeatably(tmp_path, bot_core):
 def test_a_controller_that_dies_is_said(bot_core):
     controller = start_controller(bot_core, 7833)
     server = Server(7833, *WAITING)
-    time.sleep(2.0)
+    assert controller.stdout.readline() == "a second of scans\n"
     controller.kill()
-    controller.communicate()
-    time.sleep(3.0)
-    code, errors = server.end(signal.SIGINT, timeout=10)
+    said = []
+    while not said or "--wait-for wants message" not in said[-1]:
+        said.append(server.process.stderr.readline())
+        assert said[-1], said
+    assert "VELOCITY" in said[-1]
+    time.sleep(2.0)    # time enough to say it again
+    code, errors = server.end(signal.SIGINT)
     assert code == 0
-    said = [line for line in errors.splitlines() if "--wait-for wants message" in line]
-    assert len(said) == 1 and "VELOCITY" in said[0]
+    assert "--wait-for wants message" not in errors
 
 
 @pytest.mark.parametrize("value, words", [("p3at/velocty@10", "did you mean 'p3at/velocity'"), ("p3at/velocity", "CHANNEL@HZ"),
@@ -431,12 +487,12 @@ def test_wait_for_is_read_strictly(value, words):
 
 def test_a_lockstep_log_verifies(tmp_path):
     server = Server(7835, "--lockstep", "1", "--record", tmp_path / "a.lcm")
-    with ruedo.connect(server.url, timeout=60) as simulation:
+    with server.connect() as simulation:
         robot = simulation.robot("p3at")
         for k in range(40):
             simulation.step(5, [robot.velocity_command(0.3, 0.02 * k)])
         simulation.quit()
-    assert server.end(None)[0] == 0
+    assert server.end()[0] == 0
     assert sum(channel == "ruedo/applied" for _, channel, _ in events(tmp_path / "a.lcm")) >= 40
     result = program("verify", tmp_path / "a.lcm")
     assert result.returncode == 0, result.stdout + result.stderr

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import lcm
 import pytest
-from conftest import HERE, SOURCE, ruedo_run
+from conftest import HERE, PATIENCE, SOURCE, ruedo_run
 from docs_code import blocks
 
 HALL = str(HERE / "hall.sdf")
@@ -42,7 +42,7 @@ def test_python(tmp_path):
     run_in(tmp_path, page["bare_python_types"].replace("pip install lcm==1.5.3", "true"))
     (tmp_path / "client.py").write_text(page["bare_python"])
     with ruedo_run("--no-noise", "--disable", "p3at/camera", world=HALL) as server:
-        done = subprocess.run([sys.executable, "client.py"], cwd=tmp_path, env=bare(server), capture_output=True, text=True, timeout=60)
+        done = subprocess.run([sys.executable, "client.py"], cwd=tmp_path, env=bare(server), capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stderr
     lines = check_scans(done.stdout)
     assert all(line[1] == "181" for line in lines)
@@ -80,7 +80,7 @@ def test_c(tmp_path, version):
     linked = subprocess.run(["ldd", str(tmp_path / "client")], capture_output=True, text=True).stdout
     assert str(library.parent) in linked
     with ruedo_run("--no-noise", "--disable", "p3at/camera", world=HALL) as server:
-        done = subprocess.run([str(tmp_path / "client")], env=bare(server), capture_output=True, text=True, timeout=60)
+        done = subprocess.run([str(tmp_path / "client")], env=bare(server), capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stderr
     lines = check_scans(done.stdout)
     assert lines[0][0] == "p3at/lrf" and lines[0][2] == "181"
@@ -97,7 +97,7 @@ class Bare:
     def listen(self, channel, message):
         self.bus.subscribe(channel, lambda _, data: self.heard.append(message.decode(data)))
 
-    def until(self, ready, seconds=20.0):
+    def until(self, ready, seconds=PATIENCE):
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
             self.bus.handle_timeout(100)

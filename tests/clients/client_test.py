@@ -1,10 +1,9 @@
 """The vocabulary, in each language, against the real server: the probes print what they saw, the numbers are known."""
 
 import math
-import time
 
 import pytest
-from conftest import HERE, probe, ruedo_run
+from conftest import HERE, PATIENCE, probe, ruedo_run
 
 HALL = str(HERE / "hall.sdf")
 WALL = 6.0                # m, the wall's face
@@ -82,7 +81,7 @@ def test_primitives(language, server):
         assert (early, done, state, reason) == ("False", "True", "done", "-"), name
         assert (float(distance), float(angle)) == pytest.approx((moved, turned), abs=2e-6), name
     assert said.words("turn_to")[1:4] == ["True", "done", "-"]
-    assert said.one("replaced").startswith("MotionError: p3at: advance ended: replaced, 4.")
+    assert said.one("replaced").startswith("MotionError: p3at: advance ended: replaced, ")
     assert said.one("refused").startswith("MotionError: p3at: advance was refused: bad value, ")
     assert said.one("too_long").startswith("Timeout: p3at: advance was not done within 0.3 s (")
 
@@ -105,14 +104,11 @@ def test_control(language):
         assert said.words("step") == ["7"]
         assert said.words("name")[0] == "p3at" and abs(float(said.words("name")[1])) < 1e-3
         assert said.numbers("rate") == [2.0]
-        assert said.words("reset") == ["True"]
+        assert said.words("reset") == ["0"]
         assert said.one("unknown").startswith("RequestError: GET_STATE: ")
         assert said.one("steps").startswith("RequestError: STEP: ")
         assert probe(language, server.url, "quit").words("quit") == ["True"]
-        deadline = time.monotonic() + 20.0
-        while server.process.poll() is None and time.monotonic() < deadline:
-            time.sleep(0.05)
-        assert server.process.returncode == 0
+        assert server.process.wait(PATIENCE) == 0
 
 
 def test_paused_simulation_is_joined(language):
@@ -123,5 +119,4 @@ def test_paused_simulation_is_joined(language):
 def test_a_slow_simulation_is_joined_as_fast(language):
     """ruedo/info comes once a second of sim time, which is 20 s here: a client asks for it."""
     with ruedo_run("--rate", "0.05", "--disable", "p3at/camera", world=HALL) as server:
-        time.sleep(1.0)
         assert probe(language, server.url, "connect").one("connected") == "hall"

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+PATIENCE = 400.0    # s, for what comes sooner or later, on a machine that does much else too
 HERE = Path(__file__).resolve().parent
 SOURCE = Path(os.environ.get("RUEDO_SOURCE_DIR", HERE.parent.parent))
 BUILD = Path(os.environ.get("RUEDO_BUILD_DIR", SOURCE / "build/release"))
@@ -66,7 +67,7 @@ class Server:
         if self.process.poll() is None:
             self.process.terminate()
         try:
-            return self.process.communicate(timeout=20)[0]
+            return self.process.communicate(timeout=PATIENCE)[0]
         except subprocess.TimeoutExpired:
             self.process.kill()
             return self.process.communicate()[0]
@@ -77,7 +78,7 @@ def ruedo_run(*args: str, world: str = ARENA, url: str | None = None) -> Server:
     server = Server([RUEDO, "run", world, "--lcm", url, *args], url)
     import ruedo
 
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + PATIENCE
     while True:
         try:
             ruedo.connect(url).close()
@@ -109,7 +110,7 @@ class Said:
         return [float(word) for word in self.words(key)]
 
 
-def probe(language: str, url: str, *command: str, timeout: float = 120.0) -> Said:
+def probe(language: str, url: str, *command: str, timeout: float = PATIENCE) -> Said:
     done = subprocess.run([*PROBES[language], url, *command], capture_output=True, text=True, timeout=timeout)
     said = Said(done.stdout)
     if "Traceback" in done.stderr or "Exception in thread" in done.stderr or (done.returncode and not said.all("failed")):

@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from conftest import BUILD, HERE, SOURCE, ruedo_run
+from conftest import BUILD, HERE, PATIENCE, SOURCE, ruedo_run
 from docs_code import blocks
 
 
@@ -17,7 +17,7 @@ def server():
 
 
 def run(command, server, folder):
-    done = subprocess.run(command, env={**os.environ, "LCM_DEFAULT_URL": server.url}, cwd=folder, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command, env={**os.environ, "LCM_DEFAULT_URL": server.url}, cwd=folder, capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

@@ -7,17 +7,19 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import HERE, PROBES, probe
+from conftest import HERE, PATIENCE, PROBES, probe
 
 HALL = str(HERE / "hall.sdf")
 
 
 def servers_of(url):
-    """Process ids of the programs that have the URL in their command line."""
-    found = []
+    """Process ids of the programs that have the URL in their command line; another network's ports are others."""
+    found, network = [], os.readlink("/proc/self/ns/net")
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             words = (folder / "cmdline").read_bytes().decode().split("\0")
+            if url in words and os.readlink(folder / "ns/net") != network:
+                continue
             state = (folder / "stat").read_text().rsplit(")", 1)[1].split()[0]
         except OSError:
             continue
@@ -26,7 +28,7 @@ def servers_of(url):
     return found
 
 
-def gone(url, seconds=15.0):
+def gone(url, seconds=PATIENCE):
     deadline = time.monotonic() + seconds
     while servers_of(url) and time.monotonic() < deadline:
         time.sleep(0.02)
@@ -47,7 +49,7 @@ def test_the_server_ends_with_its_client(language, end):
     try:
         assert len(servers_of(url)) == 1
         client.send_signal(end)
-        client.wait(20.0)
+        client.wait(PATIENCE)
         assert gone(url)
     finally:
         client.kill()

@@ -3,7 +3,6 @@
 import os
 import re
 import shlex
-import statistics
 import subprocess
 import sys
 import time
@@ -11,7 +10,7 @@ import time
 import lcm
 import pytest
 from bare_test import bare, c_client, check_scans
-from conftest import HERE, PROBES, RUEDO, Server, free_url, probe, ruedo_run
+from conftest import HERE, PATIENCE, PROBES, RUEDO, Server, free_url, probe, ruedo_run
 from docs_code import blocks
 
 HALL = str(HERE / "hall.sdf")
@@ -50,16 +49,16 @@ def test_the_libraries_work_over_tcp(language):
 
 
 def test_requests_are_answered_at_once_over_tcp():
-    """Delayed acknowledgements would make it 40 ms and more."""
+    """Delayed acknowledgements would make each of them 40 ms and more, a busy machine some."""
     import ruedo
 
-    with tcp_server(*QUICK) as server, ruedo.connect(server.url, timeout=20.0) as sim:
+    with tcp_server(*QUICK) as server, ruedo.connect(server.url, timeout=PATIENCE) as sim:
         times = []
-        for _ in range(50):
+        for _ in range(100):
             begin = time.monotonic()
             sim.state()
             times.append(time.monotonic() - begin)
-    assert statistics.median(times) < 0.03
+    assert sorted(times)[25] < 0.03
 
 
 def test_bare_python_over_tcp(tmp_path):
@@ -67,7 +66,7 @@ def test_bare_python_over_tcp(tmp_path):
     (tmp_path / "client.py").write_text(page["bare_python"].replace("from ruedo import", "from ruedo.lcmtypes import"))
     with tcp_server("--no-noise", *QUICK) as server:
         done = subprocess.run([sys.executable, "client.py"], cwd=tmp_path, env={**os.environ, "LCM_DEFAULT_URL": server.url},
-                              capture_output=True, text=True, timeout=60)
+                              capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stderr
     lines = check_scans("\n".join(line for line in done.stdout.splitlines() if not line.startswith("LCM")))
     assert float(lines[0][2]) > float(lines[-1][2]) + 0.1
@@ -79,7 +78,7 @@ def test_bare_c_over_tcp(tmp_path, version):
 
     c_client(tmp_path, *library_of(version))
     with tcp_server("--no-noise", *QUICK) as server:
-        done = subprocess.run([str(tmp_path / "client")], env=bare(server), capture_output=True, text=True, timeout=60)
+        done = subprocess.run([str(tmp_path / "client")], env=bare(server), capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stderr
     lines = check_scans("\n".join(line for line in done.stdout.splitlines() if not line.startswith("LCM")))
     assert float(lines[0][3]) > float(lines[-1][3]) + 0.1
@@ -91,10 +90,10 @@ def test_raw_pictures_over_tcp():
 
     settings = ["--set", "p3at/camera.encoding=rgb", "--set", "p3at/camera.camera.image.width=640", "--set",
                 "p3at/camera.camera.image.height=480"]
-    with tcp_server(*settings) as server, ruedo.connect(server.url, timeout=20.0) as sim:
+    with tcp_server(*settings) as server, ruedo.connect(server.url, timeout=PATIENCE) as sim:
         camera = sim.robot("p3at").camera
         for _ in range(5):
-            image = camera.next(20.0)
+            image = camera.next(PATIENCE)
             assert image.format == "rgb" and len(image.data) == 3 * 640 * 480
 
 
@@ -105,7 +104,7 @@ def test_without_multicast_the_server_takes_tcp_and_clients_find_it(language, tm
         until grep -q '^hall' out; do kill -0 $server; sleep 0.05; done
         {shlex.join(PROBES[language])} '' list
     """
-    done = subprocess.run(unrouted("sh", "-ec", script), cwd=tmp_path, env=PLAIN, capture_output=True, text=True, timeout=90)
+    done = subprocess.run(unrouted("sh", "-ec", script), cwd=tmp_path, env=PLAIN, capture_output=True, text=True, timeout=PATIENCE)
     said, warned = (tmp_path / "out").read_text(), (tmp_path / "err").read_text()
     assert done.returncode == 0, done.stdout + done.stderr + warned
     assert "world hall" in done.stdout
@@ -127,14 +126,14 @@ def test_launch_takes_tcp_where_there_is_no_multicast(language):
 @pytest.mark.parametrize("scheme", ["udpm", "tcpq"])
 def test_a_second_server_refuses_and_names_the_first(scheme):
     with (ruedo_run(*QUICK, world=HALL) if scheme == "udpm" else tcp_server(*QUICK)) as first:
-        second = subprocess.run([RUEDO, "run", HALL, "--lcm", first.url], capture_output=True, text=True, timeout=60)
+        second = subprocess.run([RUEDO, "run", HALL, "--lcm", first.url], capture_output=True, text=True, timeout=PATIENCE)
         assert second.returncode == 4
         [line] = second.stderr.splitlines()
         assert first.url in line and f"pid {first.process.pid}, world hall, run " in line and "--lcm auto" in line
         import ruedo
 
         run = re.search(r"run (-?\d+)", line).group(1)
-        with ruedo.connect(first.url, timeout=20.0) as sim:
+        with ruedo.connect(first.url, timeout=PATIENCE) as sim:
             assert str(sim._info.run_id) == run
     with ruedo_run(*QUICK, world=HALL, url=first.url):    # and once that has ended, it is free
         pass
@@ -158,17 +157,17 @@ def test_auto_takes_a_port_of_its_own():
         urls = [auto_url(server) for server in servers]
         assert len(set(urls)) == 3 and all(url.startswith("udpm://239.255.76.67:") and url.endswith("?ttl=0") for url in urls)
         for url in urls:
-            with ruedo.connect(url, timeout=20.0) as sim:
+            with ruedo.connect(url, timeout=PATIENCE) as sim:
                 assert sim.world == "hall"
     finally:
         for server in servers:
             server.terminate()
-            server.wait(20)
+            server.wait(PATIENCE)
 
 
 def test_auto_without_multicast_is_tcp():
     command = unrouted(RUEDO, "run", HALL, "--quiet", "--lcm", "auto", "--duration", "0.1", *QUICK)
-    said = subprocess.run(command, env=PLAIN, capture_output=True, text=True, timeout=60)
+    said = subprocess.run(command, env=PLAIN, capture_output=True, text=True, timeout=PATIENCE)
     assert re.match(r"export LCM_DEFAULT_URL='tcpq://127\.0\.0\.1:\d+'\n", said.stdout), said.stdout + said.stderr
 
 
@@ -183,13 +182,17 @@ def test_two_hosts_that_share_an_address_both_say_so(tmp_path):
         ip link add va type veth peer name vb netns $other
         ip link set va up; ip addr add 10.0.0.1/24 dev va; ip route add 224.0.0.0/4 dev va
         echo go >&3
-        "$@" > first
+        "$@" > first & this=$!
+        until grep -q 'another server' first && grep -q 'another server' second; do kill -0 $this $other; sleep 0.05; done
+        sleep 2    # to say it again, if they would
+        kill $this $other
+        wait $this
         wait $other
     """
     os.mkfifo(tmp_path / "pipe")
-    command = ["sh", "-c", f'exec {shlex.quote(RUEDO)} run {HALL} --quiet --disable p3at/camera --duration 6 --lcm "udpm://239.255.76.67:7667?ttl=1" 2>&1', "sh"]
+    command = ["sh", "-c", f'exec {shlex.quote(RUEDO)} run {HALL} --quiet --disable p3at/camera --lcm "udpm://239.255.76.67:7667?ttl=1" 2>&1', "sh"]
     flags = "-n" if os.geteuid() == 0 else "-rn"
-    done = subprocess.run(["unshare", flags, "sh", "-ec", script, "sh", *command], cwd=tmp_path, env=PLAIN, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(["unshare", flags, "sh", "-ec", script, "sh", *command], cwd=tmp_path, env=PLAIN, capture_output=True, text=True, timeout=PATIENCE)
     if "Operation not" in done.stderr or "unshare" in done.stderr:
         pytest.skip("no network namespaces with a cable here: " + done.stderr)
     assert done.returncode == 0, done.stderr
@@ -210,14 +213,14 @@ def test_a_message_that_fits_no_buffer_is_said_once():
                 "p3at/camera.camera.image.height=480", "--duration", "2"]
     url = free_url()
     with Server([RUEDO, "run", HALL, "--quiet", "--lcm", url, *settings], url) as server:
-        server.process.wait(60)
+        server.process.wait(PATIENCE)
         said = [line for line in server.end().splitlines() if "does not fit into a receive buffer" in line]
     assert len(said) == 1 and "921" in said[0] and "sysctl -w net.core.rmem_max" in said[0] and "p3at/camera" in said[0]
 
 
 def test_doctor_names_who_serves():
     with ruedo_run(*QUICK, world=HALL) as server:
-        done = subprocess.run([RUEDO, "doctor", "--lcm", server.url], capture_output=True, text=True, timeout=20)
+        done = subprocess.run([RUEDO, "doctor", "--lcm", server.url], capture_output=True, text=True, timeout=PATIENCE)
         assert re.search(rf"^ok +server +{re.escape(server.url)}: pid {server.process.pid}, world hall, run ", done.stdout, re.MULTILINE)
-    done = subprocess.run([RUEDO, "doctor", "--lcm", server.url], capture_output=True, text=True, timeout=20)
+    done = subprocess.run([RUEDO, "doctor", "--lcm", server.url], capture_output=True, text=True, timeout=PATIENCE)
     assert re.search(r"^hint +server +none on udpm://.*ruedo run", done.stdout, re.MULTILINE)

@@ -16,7 +16,7 @@ def test_wheel(tmp_path):
     shutil.copytree(SOURCE / "proto", tmp_path / "proto")
     shutil.copytree(SOURCE / "clients/python", tmp_path / "clients/python")
     subprocess.run([sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--no-index", "-w", str(tmp_path),
-                    str(tmp_path / "clients/python")], check=True, timeout=300)
+                    str(tmp_path / "clients/python")], check=True, timeout=600)
     [wheel] = tmp_path.glob("*.whl")
     assert wheel.name.startswith("ruedo-") and wheel.name.endswith("-py3-none-any.whl")
     with zipfile.ZipFile(wheel) as archive:

@@ -6,7 +6,7 @@ import sys
 
 import lcm
 import pytest
-from conftest import ARENA, BUILD, SOURCE, ruedo_run
+from conftest import ARENA, BUILD, PATIENCE, SOURCE, ruedo_run
 
 EXAMPLES = {
     "python": [sys.executable, str(SOURCE / "clients/python/examples/wander.py")],
@@ -24,7 +24,7 @@ def test_wander(language, tmp_path):
     log, picture = tmp_path / "run.log", tmp_path / "seen.jpg"
     with ruedo_run("--record", str(log), world=ARENA) as server:
         done = subprocess.run([*EXAMPLES[language], "--url", server.url, "--duration", "20", "--picture", str(picture)],
-                              capture_output=True, text=True, timeout=400)
+                              capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stdout + done.stderr
     assert picture.read_bytes()[:3] == b"\xff\xd8\xff"    # a JPEG
     lines = {line.split("  ")[0].split(" x")[0].strip(): line for line in done.stdout.splitlines()}
@@ -56,7 +56,7 @@ def test_ctrl_c_ends_the_example_in_order(language, tmp_path):
                                    stderr=subprocess.PIPE, text=True)
         assert "Ctrl-C ends it" in example.stdout.readline()
         example.send_signal(signal.SIGINT)
-        said, errors = example.communicate(timeout=60)
+        said, errors = example.communicate(timeout=PATIENCE)
     assert [line.split()[0] for line in said.splitlines()] == ["camera", "true", "odometry"], said + errors
     assert picture.read_bytes()[:3] == b"\xff\xd8\xff"
     assert not [line for line in errors.splitlines() if not line.startswith("LCM: ")], errors    # LCM's Java talks
@@ -65,7 +65,7 @@ def test_ctrl_c_ends_the_example_in_order(language, tmp_path):
 
 @pytest.mark.parametrize("language", list(EXAMPLES))
 def test_options_are_explained(language):
-    asked = subprocess.run([*EXAMPLES[language], "--help"], capture_output=True, text=True, timeout=60)
-    wrong = subprocess.run([*EXAMPLES[language], "--robbot", "p3at"], capture_output=True, text=True, timeout=60)
+    asked = subprocess.run([*EXAMPLES[language], "--help"], capture_output=True, text=True, timeout=PATIENCE)
+    wrong = subprocess.run([*EXAMPLES[language], "--robbot", "p3at"], capture_output=True, text=True, timeout=PATIENCE)
     assert asked.returncode == 0 and "--picture" in asked.stdout + asked.stderr
     assert wrong.returncode == 2 and "--robot" in wrong.stderr

@@ -372,7 +372,7 @@ class Simulation:
 
     def _refresh_info(self, before: WorldInfo | None = None) -> None:
         """Waits for another info than `before`, by default than the one that is known. The new one may be there already."""
-        before, deadline = before or self._known, time.monotonic() + 2.0
+        before, deadline = before or self._known, time.monotonic() + 10.0
         with self._news:
             while self._known is before and time.monotonic() < deadline:
                 self._ask_info()

@@ -161,8 +161,9 @@ public final class Probe {
         sim.resume();
         sim.sleep(0.2);
         say("rate", sim.state().rate);
+        sim.pause();
         sim.reset();
-        say("reset", sim.state().time() < 5.0);
+        say("reset", sim.state().step);
         attempt("unknown", () -> sim.state("nobody"));
         attempt("steps", () -> sim.step(0));
     }
@@ -247,7 +248,7 @@ public final class Probe {
     private static void act(String url, String command, String[] a) throws InterruptedException {
         if (command.equals("launch")) launched(a);
         boolean named = command.equals("lockstep");
-        try (Simulation sim = named ? Ruedo.connect(url, a[0], 10.0) : Ruedo.connect(url)) {
+        try (Simulation sim = command.equals("connect") ? Ruedo.connect(url) : Ruedo.connect(url, named ? a[0] : "probe", 60.0)) {
             switch (command) {
                 case "lockstep": lockstep(sim, a); break;
                 case "connect": say("connected", sim.world()); break;

@@ -158,8 +158,9 @@ void control(const rc::Simulation& sim, const std::string& name) {
   sim.resume();
   sim.sleep(0.2);
   say("rate", sim.state().rate);
+  sim.pause();
   sim.reset();
-  say("reset", sim.state().time() < 5.0);
+  say("reset", sim.state().step);
   report("unknown", [&] { sim.state("nobody"); });
   report("steps", [&] { sim.step(0); });
 }
@@ -256,7 +257,7 @@ void lockstep(const rc::Simulation& sim, const std::vector<std::string>& a) {
 
 void act(const std::string& url, const std::string& command, const std::vector<std::string>& a) {
   if (command == "launch") launched(a);
-  const rc::Simulation sim = rc::connect(url, {.name = command == "lockstep" ? a[0] : ""});
+  const rc::Simulation sim = rc::connect(url, {.name = command == "lockstep" ? a[0] : "", .timeout = command == "connect" ? 2.0 : 60.0});
   if (command == "lockstep") lockstep(sim, a);
   if (command == "connect") say("connected", sim.world());
   if (command == "list") list_all(sim);

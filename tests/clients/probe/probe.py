@@ -115,8 +115,9 @@ def control(sim, name):
     sim.resume()
     sim.sleep(0.2)
     say("rate", sim.state().rate)
+    sim.pause()
     sim.reset()
-    say("reset", sim.state().time < 5.0)
+    say("reset", sim.state().step)
     attempt("unknown", lambda: sim.state("nobody"))
     attempt("steps", lambda: sim.step(0))
 
@@ -189,7 +190,7 @@ def main():
     try:
         if command == "launch":
             launched(ruedo.launch(rest[0], seed=3, args=rest[1:]))
-        with ruedo.connect(url, name=rest[0] if command == "lockstep" else None) as sim:
+        with ruedo.connect(url, name=rest[0] if command == "lockstep" else None, timeout=2.0 if command == "connect" else 60.0) as sim:
             actions = {"lockstep": lambda: lockstep(sim, *rest[1:]), "connect": lambda: say("connected", sim.world), "list": lambda: list_all(sim), "read": lambda: read(sim, *rest),
                        "velocity": lambda: drive(sim, *rest, False), "wheels": lambda: drive(sim, *rest, True),
                        "primitives": lambda: primitives(sim, *rest), "errors": lambda: errors(sim, *rest),

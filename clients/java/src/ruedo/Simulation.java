@@ -469,7 +469,7 @@ public final class Simulation implements AutoCloseable {
 
     /** Waits for another info than that, which may be there already. */
     synchronized void refreshInfo(WorldInfo before) {
-        Deadline deadline = new Deadline(2.0);
+        Deadline deadline = new Deadline(10.0);
         while (known == before && !deadline.passed()) {
             askInfo();
             deadline.waitOn(this, 100);
