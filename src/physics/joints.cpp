@@ -30,13 +30,29 @@ Pose along(const Pose& X, const Vec3& axis_in_J, const Vec3& unit) {
 // A motor's rate that changes by less (m/s or rad/s) wakes nothing that sleeps.
 constexpr double kNewRate = 1e-3;
 
+// Bullet's universal joint counts its angles the other way round; the first is about its frame's z, the second about y.
+constexpr int kFirst = 2, kSecond = 1;
+constexpr double kSquare = M_PI / 2 - 1e-3;    // further it cannot turn about the second: there the first axis lies in line
+constexpr double kForced = 0.01;
+
+void set_turns(btRotationalLimitMotor& turns, double lower, double upper) {
+  turns.m_loLimit = -upper;
+  turns.m_hiLimit = -lower;
+}
+
+void set_motor_of(btRotationalLimitMotor& turns, double rate, double effort) {
+  turns.m_enableMotor = effort > 0.0;
+  turns.m_targetVelocity = -rate;
+  turns.m_maxMotorForce = effort;
+}
+
 double bounded(double value, double limit) { return std::clamp(value, -limit, limit); }
 
 }  // namespace
 
 JointConstraint::JointConstraint(const model::Joint& joint, btRigidBody& parent, btRigidBody& child, const Pose& X_PJ,
                                  const Pose& X_CJ)
-    : type_(joint.type), limits_(joint.axis), parent_(parent), child_(child), X_PJ_(X_PJ), X_CJ_(X_CJ) {
+    : type_(joint.type), limits_(joint.axis), limits2_(joint.axis2), parent_(parent), child_(child), X_PJ_(X_PJ), X_CJ_(X_CJ) {
   switch (type_) {
     case model::JointType::revolute:
     case model::JointType::continuous: {
@@ -71,7 +87,11 @@ JointConstraint::JointConstraint(const model::Joint& joint, btRigidBody& parent,
       second -= first * first.dot(second);
       if (second.norm() < 1e-6) second = first.unitOrthogonal();
       btVector3 anchor = to_bt(X_WJ.translation), axis1 = to_bt(first), axis2 = to_bt(Vec3(second.normalized()));
-      constraint_ = std::make_unique<btUniversalConstraint>(parent_, child_, anchor, axis1, axis2);
+      axis2_in_C_ = (from_bt(child_.getWorldTransform()).rotation.conjugate() * second).normalized();
+      auto universal = std::make_unique<btUniversalConstraint>(parent_, child_, anchor, axis1, axis2);
+      set_turns(*universal->getRotationalLimitMotor(kFirst), 1.0, -1.0);    // none, or a window at each substep
+      set_turns(*universal->getRotationalLimitMotor(kSecond), std::max(limits2_.lower, -kSquare), std::min(limits2_.upper, kSquare));
+      constraint_ = std::move(universal);
       break;
     }
     case model::JointType::fixed:
@@ -135,6 +155,8 @@ void JointConstraint::move_by_motor(double rate, double max_effort, double subst
     slider.setMaxLinMotorForce(effort);
   } else if (type_ == model::JointType::revolute || type_ == model::JointType::continuous) {
     static_cast<btHingeConstraint&>(*constraint_).enableAngularMotor(effort > 0.0, rate, effort * substep_s);
+  } else if (type_ == model::JointType::universal) {
+    set_motor_of(*static_cast<btUniversalConstraint&>(*constraint_).getRotationalLimitMotor(kFirst), rate, effort);
   }
 }
 
@@ -144,10 +166,27 @@ void JointConstraint::push(double effort) {
     const btVector3 at = child_.getWorldTransform() * to_bt(X_CJ_.translation);
     child_.applyForce(along_axis, at - child_.getCenterOfMassPosition());
     parent_.applyForce(-along_axis, at - parent_.getCenterOfMassPosition());
-  } else if (type_ == model::JointType::revolute || type_ == model::JointType::continuous) {
+  } else if (type_ != model::JointType::ball && type_ != model::JointType::fixed) {
     child_.applyTorque(along_axis);
     parent_.applyTorque(-along_axis);
   }
+}
+
+// At a limit this constraint of Bullet's has no motor: the one that the motor leads away from is not there, unless the
+// joint was forced beyond it.
+void JointConstraint::limit_first_axis() {
+  double lower = std::max(limits_.lower, position_ - kWindow), upper = std::min(limits_.upper, position_ + kWindow);
+  if (mode_ == Mode::motor && command_ > 0.0 && position_ > lower - kForced) lower = position_ - kWindow;
+  if (mode_ == Mode::motor && command_ < 0.0 && position_ < upper + kForced) upper = position_ + kWindow;
+  const double turned = position_ - wrap_angle(position_);    // whole turns, which Bullet does not count
+  set_turns(*static_cast<btUniversalConstraint&>(*constraint_).getRotationalLimitMotor(kFirst), lower - turned, upper - turned);
+}
+
+void JointConstraint::brake_second_axis() {
+  const Vec3 axis = from_bt(child_.getWorldTransform().getRotation()) * axis2_in_C_;
+  const double rate = axis.dot(from_bt(child_.getAngularVelocity() - parent_.getAngularVelocity()));
+  set_motor_of(*static_cast<btUniversalConstraint&>(*constraint_).getRotationalLimitMotor(kSecond), 0.0,
+               std::min(limits2_.friction + limits2_.damping * std::abs(rate), 1e9));
 }
 
 void JointConstraint::before_substep(double substep_s) {
@@ -155,6 +194,10 @@ void JointConstraint::before_substep(double substep_s) {
   if (type_ == model::JointType::revolute && limited(limits_) && !within_a_turn(limits_)) {
     static_cast<btHingeConstraint&>(*constraint_)
         .setLimit(std::max(limits_.lower, position_ - kWindow), std::min(limits_.upper, position_ + kWindow), 1.0, 0.3, 0.0);
+  }
+  if (type_ == model::JointType::universal) {
+    brake_second_axis();
+    if (limited(limits_)) limit_first_axis();
   }
   if (mode_ == Mode::motor) {
     move_by_motor(command_, max_effort_, substep_s);
@@ -189,8 +232,15 @@ void JointConstraint::after_substep(double substep_s) {
       position_ = axis_in_world().dot(from_bt(to - from));
       break;
     }
-    default:
-      position_ += velocity() * substep_s;
+    case model::JointType::universal: {
+      // A turn about the parent's axis, then one about the child's: where the child's second axis points, seen along the first.
+      const Quat R_PC = from_bt(parent_.getWorldTransform().getRotation()).conjugate() * from_bt(child_.getWorldTransform().getRotation());
+      const Vec3 first = X_PJ_.rotation * limits_.axis_in_J;
+      const Vec3 then = X_PJ_.rotation * (X_CJ_.rotation.conjugate() * axis2_in_C_), now = R_PC * axis2_in_C_;
+      position_ += wrap_angle(std::atan2(first.dot(then.cross(now)), then.dot(now)) - position_);
+      break;
+    }
+    default: break;
   }
 }
 

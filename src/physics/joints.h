@@ -18,7 +18,8 @@ class JointConstraint {
 
   btTypedConstraint* constraint() { return constraint_.get(); }    // null: nothing to hold (no such joint)
 
-  double position() const { return position_; }    // rad or m; of a universal joint the first axis; ball: 0
+  // Of a universal joint these, and what it is told, are about its first axis; a ball joint has none: 0.
+  double position() const { return position_; }    // rad or m
   double velocity() const;
   double effort() const { return effort_; }
 
@@ -47,13 +48,16 @@ class JointConstraint {
   void wake();
   void move_by_motor(double rate, double max_effort, double substep_s);
   void push(double effort);                        // for one substep
+  void limit_first_axis();                         // of a universal joint, for one substep
+  void brake_second_axis();
   double measured_effort() const;
 
   model::JointType type_;
-  model::JointAxis limits_;
+  model::JointAxis limits_, limits2_;              // of the second axis: universal only
   btRigidBody& parent_;
   btRigidBody& child_;
   Pose X_PJ_, X_CJ_;
+  Vec3 axis2_in_C_ = Vec3::UnitY();                // universal only
   std::unique_ptr<btTypedConstraint> constraint_;
   std::unique_ptr<btJointFeedback> feedback_ = std::make_unique<btJointFeedback>();
   Mode mode_ = Mode::passive;

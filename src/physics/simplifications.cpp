@@ -19,8 +19,7 @@ void look_at_joints(const model::WorldModel& world, const model::BodyLayout& lay
     findings.push_back({Finding::Kind::unsupported, joint.source,
                         "model " + world.models[static_cast<size_t>(placement.instance)].name + "/joint " + joint.name,
                         ball ? "a ball joint holds its links together; it takes no commands, and its position is published as 0"
-                             : "a universal joint turns freely about both axes; it takes no commands and has no limits, and the "
-                               "position published is that about the first axis"});
+                             : "a universal joint takes commands for its first axis, and publishes that one's position"});
   }
 }
 

@@ -250,6 +250,101 @@ TEST(Joints, DampingSlowsDownAndNeverReverses) {
   EXPECT_LT(stiff.physics.joint_velocity(0), 0.01);
 }
 
+TEST(Joints, FrictionHoldsUpToItsEffortAndStopsEvenly) {
+  // I = 0.6, friction 0.6: 6 N m for 0.2 s give (6 - 0.6) / 0.6 * 0.2 = 1.8 rad/s, which end after 1.8 s.
+  const std::string dry = "<dynamics><friction>0.6</friction></dynamics>";
+  World w(hinged("0 0 1", "continuous", dry));
+  w.physics.apply_joint_effort(0, 0.5);
+  w.run(1.0);
+  EXPECT_NEAR(w.physics.joint_position(0), 0.0, 1e-6);
+  w.physics.apply_joint_effort(0, 6.0);
+  w.run(0.2);
+  EXPECT_NEAR(w.physics.joint_velocity(0), 1.8, 0.03);
+  w.physics.apply_joint_effort(0, 0.0);
+  w.run(1.0);
+  EXPECT_NEAR(w.physics.joint_velocity(0), 0.8, 0.03);
+  w.run(2.0);
+  EXPECT_NEAR(w.physics.joint_velocity(0), 0.0, 1e-6);
+}
+
+// An arm that hangs from a ball or a universal joint, 0.1 rad off in the plane of x and z, or in that of y and z.
+std::string pendulum(const std::string& type, const std::string& tilt) {
+  return "<model name='m'><link name='arm'><pose>0 0 1 " + tilt + "</pose><inertial><pose>0 0 -0.5 0 0 0</pose><mass>2</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy>"
+         "<izz>0.01</izz></inertia></inertial></link><joint name='j' type='" + type + "'><parent>world</parent><child>arm</child>" +
+         (type == "ball" ? "" : "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 1 0</xyz></axis2>") + "</joint></model>";
+}
+
+TEST(Joints, ABallAndAUniversalJointSwingBothWays) {
+  const double period = 2 * M_PI * std::sqrt((0.1 + 2 * 0.25) / (2 * 10 * 0.5));
+  for (const char* const type : {"ball", "universal"}) {
+    for (const bool along_x : {true, false}) {
+      World w(pendulum(type, along_x ? "0 -0.1 0" : "0.1 0 0"), 1000);
+      const auto centre = [&] { return Vec3(w.physics.pose(0) * Vec3(0, 0, -0.5)); };
+      const Vec3 start = centre();
+      EXPECT_NEAR(along_x ? start.x() : start.y(), 0.5 * std::sin(0.1), 1e-9);
+      w.run(period / 2);
+      EXPECT_NEAR(centre().x(), -start.x(), 2e-3) << type << along_x;
+      EXPECT_NEAR(centre().y(), -start.y(), 2e-3) << type << along_x;
+      EXPECT_LT((w.physics.pose(0).translation - Vec3(0, 0, 1)).norm(), 1e-3) << type << along_x;
+    }
+  }
+}
+
+// An arm along x that turns about z and then about itself. Its weight pulls about y, which is held.
+std::string cardan(const std::string& first = "", const std::string& second = "") {
+  std::string text = hinged("0 0 1", "universal", first);
+  return text.replace(text.find("</joint></model>"), 8, "<axis2><xyz>1 0 0</xyz>" + second + "</axis2></joint>");
+}
+
+TEST(Joints, AUniversalJointTakesCommandsForItsFirstAxis) {
+  World w(cardan());
+  w.physics.drive_joint_velocity(0, 2.0, 100.0);
+  w.run(4.0);
+  EXPECT_NEAR(w.physics.joint_velocity(0), 2.0, 5e-3);
+  EXPECT_NEAR(w.physics.joint_position(0), 8.0, 0.02);    // through more than a turn
+  EXPECT_NEAR(heading(w.physics.pose(w.body("m/arm")).rotation), wrap_angle(8.0), 0.02);
+  EXPECT_NEAR((w.physics.pose(w.body("m/arm")) * Vec3(0.5, 0, 0)).z(), 1.0, 2e-3);
+  World pushed(cardan());
+  pushed.physics.apply_joint_effort(0, 0.6);    // on 0.6 kg m^2
+  pushed.run(1.0);
+  EXPECT_NEAR(pushed.physics.joint_velocity(0), 1.0, 0.01);
+}
+
+TEST(Joints, LimitsAndBrakesOfAUniversalJoint) {
+  World w(cardan("<limit><lower>-0.5</lower><upper>0.7</upper></limit>"));
+  w.physics.drive_joint_velocity(0, 1.0, 20.0);
+  w.run(3.0);
+  EXPECT_NEAR(w.physics.joint_position(0), 0.7, 0.02);
+  w.physics.drive_joint_velocity(0, -1.0, 20.0);
+  w.run(3.0);
+  EXPECT_NEAR(w.physics.joint_position(0), -0.5, 0.02);
+  World wide(cardan("<limit><lower>-4</lower><upper>8</upper></limit>"));
+  wide.physics.drive_joint_velocity(0, 2.0, 20.0);
+  wide.run(6.0);
+  EXPECT_NEAR(wide.physics.joint_position(0), 8.0, 0.02);
+  // I = 0.6, damping 0.6, as for a hinge.
+  World damped(cardan("<dynamics><damping>0.6</damping></dynamics>"));
+  damped.physics.apply_joint_effort(0, 6.0);
+  damped.run(0.2);
+  const double rate = damped.physics.joint_velocity(0);
+  damped.physics.apply_joint_effort(0, 0.0);
+  damped.run(1.0);
+  EXPECT_NEAR(damped.physics.joint_velocity(0) / rate, std::exp(-1.0), 0.02);
+}
+
+// The second axis is along y, and the arm's weight of 10 N m turns about it: to its limit, and not at all against more friction.
+TEST(Joints, TheSecondAxisOfAUniversalJointHasItsOwnLimits) {
+  const auto fallen = [](const std::string& more) {
+    std::string text = hinged("0 0 1", "universal");
+    World w(text.replace(text.find("</joint></model>"), 8, "<axis2><xyz>0 1 0</xyz>" + more + "</axis2></joint>"));
+    w.run(3.0);
+    return std::asin((1.0 - (w.physics.pose(w.body("m/arm")) * Vec3(0.5, 0, 0)).z()) / 0.5);    // positive about y is down
+  };
+  EXPECT_NEAR(fallen("<limit><lower>-0.2</lower><upper>0.3</upper></limit>"), 0.3, 0.02);
+  EXPECT_NEAR(fallen("<dynamics><friction>12</friction></dynamics>"), 0.0, 0.01);
+  EXPECT_GT(fallen("<dynamics><damping>5</damping></dynamics>"), 0.8);
+}
+
 TEST(Joints, ASliderGoesAlongItsAxis) {
   World w(hinged("0 1 0", "prismatic", "<limit><lower>-0.2</lower><upper>0.6</upper></limit>"));
   w.physics.drive_joint_velocity(0, 0.5, 100.0);
