@@ -29,13 +29,13 @@ struct Gimbal : ::testing::Test {
   void tell(const std::string& joint, int8_t mode, double value) { sim.robots.apply({0, JointCommand{{joint}, {mode}, {value}}}); }
   size_t index(const std::string& joint) const {
     for (size_t i = 0; i < sim.layout.joints.size(); ++i) {
-      if (sim.world->models[0].model->joints[static_cast<size_t>(sim.layout.joints[i].joint)].name == joint) return i;
+      if (sim.world->models[1].model->joints[static_cast<size_t>(sim.layout.joints[i].joint)].name == joint) return i;
     }
     throw std::logic_error("no joint " + joint);
   }
   double position(const std::string& joint) const { return sim.state.joint_positions.at(index(joint)); }
   double rate(const std::string& joint) const { return sim.state.joint_velocities.at(index(joint)); }
-  Sim sim{gimbal()};
+  Sim sim{plane_sdf() + gimbal()};
 };
 
 TEST_F(Gimbal, GoesToItsPositionsWhileItDrives) {
