@@ -100,6 +100,12 @@ std::string package_name(const fs::path& folder) {
   }
 }
 
+// Where a package's own files lie, its folder is above them; that of the user holds more than a package.
+bool may_be_package(const fs::path& folder) {
+  const char* home = std::getenv("HOME");
+  return folder.parent_path().has_relative_path() && (!home || !starts_with(full_path(home) + "/", (folder.string() + "/").c_str()));
+}
+
 }  // namespace
 
 std::string shipped_worlds() {
@@ -151,11 +157,12 @@ bool ResourceFinder::allowed(const std::string& path, const std::string& from) c
 }
 
 // ROS packages may live in a folder of another name: one whose package.xml has the name counts too, be it above the
-// naming file, a folder that is searched, or in one.
+// naming file, a folder that is searched, or in one. Above it the folder's own name will do.
 std::optional<std::string> ResourceFinder::in_package(const std::string& package, const std::string& rest,
                                                       const std::string& from) const {
   for (fs::path folder = fs::path(from).parent_path(); folder.has_relative_path(); folder = folder.parent_path()) {
-    if (is_there(folder / rest) && package_name(folder) == package) return full_path(folder / rest);
+    if (!is_there(folder / rest)) continue;
+    if ((folder.filename() == package && may_be_package(folder)) || package_name(folder) == package) return full_path(folder / rest);
   }
   for (const auto& root : roots_for(from)) {
     const auto [at, inserted] = packages_.try_emplace(root);

@@ -109,6 +109,20 @@ struct GazeboLink {
   const Element* gravity_off = nullptr;
 };
 
+// The root link of this name stands for the world: what hangs on it is fixed to the world by its joint, as Gazebo has it.
+constexpr const char* kWorld = "world";
+
+std::string name_of(const Element& link_or_joint) {
+  const std::string* name = link_or_joint.attribute("name");
+  return link_or_joint.name == "link" && name && *name == kWorld ? kWorld : required_name(link_or_joint);
+}
+
+// In <gazebo> a value is an attribute or the text.
+std::string value_of(const Element& element) {
+  const std::string* value = element.attribute("value");
+  return value ? *value : element.text;
+}
+
 struct Converter {
   const Element& robot;
   Findings& findings;
@@ -132,7 +146,7 @@ struct Converter {
         if (!urdf.getLink(*reference)) continue;    // settings of a joint
         GazeboLink& link = gazebo[*reference];
         if (name == "sensor") link.sensors.push_back(child.get());
-        else if (name == "material") link.material = child->attribute("value") ? *child->attribute("value") : child->text;
+        else if (name == "material") link.material = value_of(*child);
         else if (name == "mu1") link.mu1 = child.get();
         else if (name == "mu2") link.mu2 = child.get();
         else if (name == "turnGravityOff") link.gravity_off = child.get();
@@ -178,15 +192,27 @@ struct Converter {
   }
 
   void add_link(const Element& written) {
-    const urdf::LinkConstSharedPtr from = urdf.getLink(required_name(written));
+    const urdf::LinkConstSharedPtr from = urdf.getLink(name_of(written));
     if (!from) return;
+    if (from->name == kWorld) {
+      if (from->parent_joint) written.fail("'world' is a reserved name; only the root of all links may have it, which then is the world");
+      if (!from->collision_array.empty() || !from->visual_array.empty() || !gazebo[kWorld].sensors.empty()) {
+        findings.unsupported(written.source, "robot " + urdf.getName(), "the link 'world' is the world itself; its shapes and sensors are left out");
+      }
+      return;
+    }
     const GazeboLink& block = gazebo[from->name];
     Element& link = add(*model, "link", written.source);
     link.attributes.emplace_back("name", from->name);
     if (from->parent_joint) {
-      add_pose(link, from->parent_joint->parent_to_joint_origin_transform, written.source, from->parent_joint->parent_link_name);
+      const std::string& parent = from->parent_joint->parent_link_name;
+      add_pose(link, from->parent_joint->parent_to_joint_origin_transform, written.source, parent == kWorld ? "" : parent);
     }
-    if (block.gravity_off) add(link, "gravity", block.gravity_off->source, block.gravity_off->as_boolean() ? "false" : "true");
+    if (block.gravity_off) {
+      const auto off = block.gravity_off->clone();
+      off->text = value_of(*off);
+      add(link, "gravity", off->source, off->as_boolean() ? "false" : "true");
+    }
     add_inertial(link, *from, written.child("inertial") ? written.child("inertial")->source : written.source);
     const auto lines = [&](const char* name, size_t i) {
       const auto all = written.all(name);
@@ -200,8 +226,8 @@ struct Converter {
       add_geometry(collision, from->collision_array[i]->geometry.get(), source);
       if (block.mu1 || block.mu2) {
         Element& ode = add(add(add(collision, "surface", source), "friction", source), "ode", source);
-        if (block.mu1) add(ode, "mu", block.mu1->source, block.mu1->attribute("value") ? *block.mu1->attribute("value") : block.mu1->text);
-        if (block.mu2) add(ode, "mu2", block.mu2->source, block.mu2->attribute("value") ? *block.mu2->attribute("value") : block.mu2->text);
+        if (block.mu1) add(ode, "mu", block.mu1->source, value_of(*block.mu1));
+        if (block.mu2) add(ode, "mu2", block.mu2->source, value_of(*block.mu2));
       }
     }
     for (size_t i = 0; i < from->visual_array.size(); ++i) {
@@ -262,7 +288,7 @@ void refuse_xacro(const Element& element) {
 const Element& whom_it_names(const std::string& fault, const Element& robot) {
   for (const char* kind : {"joint", "link"}) {
     for (const Element* each : robot.all(kind)) {
-      const std::string name = required_name(*each);
+      const std::string name = name_of(*each);
       for (const char* quotes : {"[]", "''", "\"\""}) {
         if (fault.find(quotes[0] + name + quotes[1]) != std::string::npos) return *each;
       }
@@ -279,7 +305,7 @@ std::unique_ptr<Element> urdf_as_sdf(const Element& robot, Findings& findings) {
   for (const char* kind : {"link", "joint"}) {
     std::map<std::string, const Element*> seen;
     for (const Element* each : robot.all(kind)) {
-      if (!seen.try_emplace(required_name(*each), each).second) each->fail("a second <" + std::string(kind) + "> of the name '" + required_name(*each) + "'");
+      if (!seen.try_emplace(name_of(*each), each).second) each->fail("a second <" + std::string(kind) + "> of the name '" + name_of(*each) + "'");
     }
   }
   std::string text;
@@ -302,7 +328,7 @@ std::unique_ptr<Element> urdf_as_sdf(const Element& robot, Findings& findings) {
   model.name = "model";
   model.source = robot.source;
   model.attributes.emplace_back("name", name);
-  model.attributes.emplace_back("canonical_link", urdf->getRoot()->name);
+  if (urdf->getRoot()->name != kWorld) model.attributes.emplace_back("canonical_link", urdf->getRoot()->name);
   converter.read_gazebo();
   for (const Element* link : robot.all("link")) converter.add_link(*link);
   for (const Element* joint : robot.all("joint")) converter.add_joint(*joint);

@@ -170,6 +170,15 @@ TEST(Names, ASecondThingIsRenamedAndTold) {
   EXPECT_EQ(texts(*world), (std::vector<std::string>{"a second thing of the name 'box'; this one is called 'box_2'"}));
 }
 
+TEST(Findings, SpringsOfJointsAreNamed) {
+  const auto with = [](const std::string& dynamics) {
+    return texts(*world_of("<model name='m'><link name='a'/><link name='b'/><joint name='j' type='prismatic'><parent>a</parent><child>b</child><axis><xyz>0 0 1</xyz><dynamics>" +
+                           dynamics + "</dynamics></axis></joint></model>"));
+  };
+  EXPECT_EQ(with("<spring_stiffness>100</spring_stiffness>"), (std::vector<std::string>{"springs of joints are not supported; the joint has none"}));
+  EXPECT_EQ(with("<spring_reference>0</spring_reference><spring_stiffness>0</spring_stiffness>"), std::vector<std::string>{});
+}
+
 TEST(Findings, WhatIsNotSupportedIsNamedOnce) {
   const auto world = world_of(
       "<gui><camera name='c'/></gui><road name='r'/><physics type='ode'><max_step_size>0.0033333333</max_step_size></physics>"
