@@ -3,6 +3,9 @@
 add_library(ruedo_flags INTERFACE)
 # The same bytes everywhere: no contraction to FMA, no fast math, no -march=native.
 target_compile_options(ruedo_flags INTERFACE -ffp-contract=off -Wall -Wextra -Wpedantic)
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_GREATER_EQUAL 13)
+  target_compile_options(ruedo_flags INTERFACE -Wno-maybe-uninitialized)    # it takes a moved std::variant for one that holds all at once
+endif()
 
 # Sanitizers: -DRUEDO_SANITIZE=address,undefined or thread (see CMakePresets.json).
 set(RUEDO_SANITIZE "" CACHE STRING "Sanitizers for everything that is built here")

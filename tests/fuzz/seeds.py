@@ -5,7 +5,8 @@ import sys
 from pathlib import Path
 
 MESHES = [".obj", ".dae", ".stl", ".ply", ".gltf", ".glb", ".3ds", ".fbx"]
-MOST_BYTES = 64 * 1024
+PICTURES = [".png", ".jpg", ".pgm", ".bmp"]
+MOST_BYTES = {"world": 64 * 1024, "urdf": 64 * 1024, "mesh": 16 * 1024, "map": 8 * 1024}    # larger ones only take time to decode
 
 HAND_MADE = {
     "map": [b"\x02image: map.pgm\nresolution: 0.05\norigin: [-1.0, -2.0, 0.5]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
@@ -26,7 +27,7 @@ def target_of(path):
         return "urdf", b""
     if kind in MESHES:
         return "mesh", bytes([MESHES.index(kind)])
-    if kind in (".png", ".jpg", ".pgm", ".bmp"):
+    if kind in PICTURES:
         return "map", b"\x00"
     return None
 
@@ -40,7 +41,7 @@ def main(out, *folders):
     for folder in folders:
         for number, path in enumerate(sorted(Path(folder).rglob("*"))):
             target = target_of(path)
-            if target and path.is_file() and path.stat().st_size <= MOST_BYTES:
+            if target and path.is_file() and path.stat().st_size <= MOST_BYTES[target[0]]:
                 (out / target[0] / f"{Path(folder).name}_{number}").write_bytes(target[1] + path.read_bytes())
 
 
