@@ -51,6 +51,20 @@ def test_the_same_whatever_is_lost():
         assert run(languages, loss) == good, loss
 
 
+def test_a_guest_comes_and_goes_whatever_is_lost():
+    """In the three languages, two of them behind a network that loses every fifth datagram."""
+    ends = []
+    for language in sorted(PROBES):
+        with ruedo_run("--lockstep", "1", "--lease", str(PATIENCE), "--disable", "p3at/camera", world=HALL) as server:
+            with bad_network(server.url, 1, 0.0 if language == "cpp" else 0.2) as [url]:
+                said = probe(language, url, "visited", "client", "p3at")
+        assert said.one("guest") == "p3at_2"
+        ends.append(said.words("end"))
+    assert all(end == ends[0] for end in ends), ends
+    step, _, _, of_guest, _ = ends[0]
+    assert step == "90" and int(of_guest) > 20
+
+
 def test_commands_beside_the_steps_are_refused(language):
     with ruedo_run("--lockstep", "1", "--disable", "p3at/camera", world=HALL) as server:
         said = probe(language, server.url, "lockstep", "one", "p3at", "4", "2", "0.3")

@@ -237,6 +237,32 @@ public final class Probe {
         attempt("past", () -> sim.step(1, List.of(robot.velocityCommand(0.1, 0.0).at(1))));
     }
 
+    private static void visited(Simulation sim, String[] a) {
+        Robot robot = sim.robot(a[1]);
+        CRC32 digest = new CRC32();
+        int messages = 0;
+        int ofGuest = 0;
+        String guest = "";
+        Observations last = null;
+        for (int turn = 0; turn < 9; turn++) {
+            if (turn == 3) {
+                guest = sim.spawn("p3at", 3.0, 1.0, 0.0, "");
+                say("guest", guest);
+            }
+            if (turn == 6) sim.remove(guest);
+            List<Command> commands = new ArrayList<>(List.of(robot.velocityCommand(0.3, 0.2)));
+            if (turn >= 3 && turn < 6) commands.add(sim.robot(guest).velocityCommand(0.2, -0.3).at(5));
+            last = sim.step(10, commands);
+            for (Observations.Message message : last.messages) {
+                digest.update(message.channel.getBytes(StandardCharsets.UTF_8));
+                digest.update(message.data);
+                messages++;
+                if (message.channel.startsWith("p3at_2/")) ofGuest++;
+            }
+        }
+        say("end", last.step, last.stateHash, messages, ofGuest, digest.getValue());
+    }
+
     private static void launched(String[] a) throws InterruptedException {
         LaunchOptions options = new LaunchOptions().seed(3).args(Arrays.copyOfRange(a, 1, a.length));
         Simulation sim = Ruedo.launch(a[0], options);
@@ -247,10 +273,11 @@ public final class Probe {
 
     private static void act(String url, String command, String[] a) throws InterruptedException {
         if (command.equals("launch")) launched(a);
-        boolean named = command.equals("lockstep");
+        boolean named = command.equals("lockstep") || command.equals("visited");
         try (Simulation sim = command.equals("connect") ? Ruedo.connect(url) : Ruedo.connect(url, named ? a[0] : "probe", 60.0)) {
             switch (command) {
                 case "lockstep": lockstep(sim, a); break;
+                case "visited": visited(sim, a); break;
                 case "connect": say("connected", sim.world()); break;
                 case "list": listAll(sim); break;
                 case "read": read(sim, a[0]); break;

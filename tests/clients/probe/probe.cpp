@@ -245,6 +245,31 @@ void lockstep(const rc::Simulation& sim, const std::vector<std::string>& a) {
   report("past", [&] { sim.step(1, {robot.velocity_command(0.1, 0.0).at(1)}); });
 }
 
+void visited(const rc::Simulation& sim, const std::vector<std::string>& a) {
+  const rc::Robot robot = sim.robot(a[1]);
+  uint32_t digest = 0;
+  size_t messages = 0, of_guest = 0;
+  std::string guest;
+  rc::Observations last;
+  for (int turn = 0; turn < 9; ++turn) {
+    if (turn == 3) {
+      guest = sim.spawn("p3at", 3.0, 1.0);
+      say("guest", guest);
+    }
+    if (turn == 6) sim.remove(guest);
+    std::vector<rc::Command> commands{robot.velocity_command(0.3, 0.2)};
+    if (turn >= 3 && turn < 6) commands.push_back(sim.robot(guest).velocity_command(0.2, -0.3).at(5));
+    last = sim.step(10, commands);
+    for (const auto& message : last.messages) {
+      digest = crc32(digest, reinterpret_cast<const uint8_t*>(message.channel.data()), message.channel.size());
+      digest = crc32(digest, message.bytes.data(), message.bytes.size());
+      ++messages;
+      of_guest += message.channel.rfind("p3at_2/", 0) == 0;
+    }
+  }
+  say("end", last.step, last.state_hash, messages, of_guest, digest);
+}
+
 [[noreturn]] void launched(const std::vector<std::string>& a) {
   rc::LaunchOptions options;
   options.seed = 3;
@@ -257,8 +282,9 @@ void lockstep(const rc::Simulation& sim, const std::vector<std::string>& a) {
 
 void act(const std::string& url, const std::string& command, const std::vector<std::string>& a) {
   if (command == "launch") launched(a);
-  const rc::Simulation sim = rc::connect(url, {.name = command == "lockstep" ? a[0] : "", .timeout = command == "connect" ? 2.0 : 60.0});
+  const rc::Simulation sim = rc::connect(url, {.name = command == "lockstep" || command == "visited" ? a[0] : "", .timeout = command == "connect" ? 2.0 : 60.0});
   if (command == "lockstep") lockstep(sim, a);
+  if (command == "visited") visited(sim, a);
   if (command == "connect") say("connected", sim.world());
   if (command == "list") list_all(sim);
   if (command == "read") read(sim, a[0]);

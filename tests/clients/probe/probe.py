@@ -178,6 +178,26 @@ def lockstep(sim, name, steps, chunk, speed):
     attempt("past", lambda: sim.step(1, [robot.velocity_command(0.1, 0.0).at(1)]))
 
 
+def visited(sim, name):
+    """Lockstep in which a robot comes, drives and goes."""
+    robot, digest, messages, of_guest, guest, last = sim.robot(name), 0, 0, 0, "", None
+    for turn in range(9):
+        if turn == 3:
+            guest = sim.spawn("p3at", 3.0, 1.0)
+            say("guest", guest)
+        if turn == 6:
+            sim.remove(guest)
+        commands = [robot.velocity_command(0.3, 0.2)]
+        if 3 <= turn < 6:
+            commands.append(sim.robot(guest).velocity_command(0.2, -0.3).at(5))
+        last = sim.step(10, commands)
+        for message in last.messages:
+            digest = zlib.crc32(message.data, zlib.crc32(message.channel.encode(), digest))
+            messages += 1
+            of_guest += message.channel.startswith("p3at_2/")
+    say("end", last.step, last.state_hash, messages, of_guest, digest)
+
+
 def launched(sim):
     say("url", sim.url)
     say("ready", sim.robots[0].odometry.latest().time >= 0.0)
@@ -190,8 +210,8 @@ def main():
     try:
         if command == "launch":
             launched(ruedo.launch(rest[0], seed=3, args=rest[1:]))
-        with ruedo.connect(url, name=rest[0] if command == "lockstep" else None, timeout=2.0 if command == "connect" else 60.0) as sim:
-            actions = {"lockstep": lambda: lockstep(sim, *rest[1:]), "connect": lambda: say("connected", sim.world), "list": lambda: list_all(sim), "read": lambda: read(sim, *rest),
+        with ruedo.connect(url, name=rest[0] if command in ("lockstep", "visited") else None, timeout=2.0 if command == "connect" else 60.0) as sim:
+            actions = {"lockstep": lambda: lockstep(sim, *rest[1:]), "visited": lambda: visited(sim, *rest[1:]), "connect": lambda: say("connected", sim.world), "list": lambda: list_all(sim), "read": lambda: read(sim, *rest),
                        "velocity": lambda: drive(sim, *rest, False), "wheels": lambda: drive(sim, *rest, True),
                        "primitives": lambda: primitives(sim, *rest), "errors": lambda: errors(sim, *rest),
                        "streams": lambda: streams(sim, *rest), "control": lambda: control(sim, *rest), "world": lambda: world(sim, *rest), "snapshots": lambda: snapshots(sim),
