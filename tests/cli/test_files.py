@@ -83,3 +83,16 @@ def test_a_file_without_permission_is_named(tmp_path):
     finally:
         world.unlink()
     assert done.returncode == 3 and f"{world}" in done.stdout and "Permission denied" in done.stdout, done
+
+
+def test_a_thousand_robots_load_at_once(tmp_path):
+    """1 000 P3-AT up to their first step: time of the processor, and memory."""
+    (tmp_path / "w.sdf").write_text("<sdf version='1.9'><world name='w'><include><uri>model://ground_plane</uri></include><ruedo:fleet name='r'>"
+                                    "<include><uri>model://p3at</uri></include><ruedo:count>1000</ruedo:count></ruedo:fleet></world></sdf>")
+    no_pictures = [word for i in range(1000) for word in ("--disable", f"r_{i + 1}/camera")]
+    process = subprocess.Popen([RUEDO, "run", str(tmp_path / "w.sdf"), "--lcm", "memq://", "--rate", "max", "--duration", "0.005", "--quiet", *no_pictures])
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    assert process.returncode == 0
+    assert used.ru_utime + used.ru_stime < 3.0    # s
+    assert used.ru_maxrss < 1_000_000             # kB
