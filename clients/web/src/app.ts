@@ -25,7 +25,7 @@ interface Route { type: TypeName; robot: string; device: string }
 
 export class App {
   readonly poses = new Poses();
-  readonly stage = new Stage(byId("canvas") as HTMLCanvasElement, this.poses);
+  readonly stage = new Stage(byId("canvas") as HTMLCanvasElement, this.poses, recall("detail") === "full");
   readonly link: Link;
   readonly session: Session;
   world: World | null = null;
@@ -156,12 +156,12 @@ export class App {
     if (type === "world_state_t") {
       const state = read(type);
       this.poses.add(state, performance.now());
-      this.onTime(Number(state.utime) * 1e-6, state.epoch);
+      this.onTime(Number(state.utime) * 1e-6, state.epoch, true);
       return;
     }
     if (type === "tick_t") {
       const tick = read(type);
-      return this.onTime(Number(tick.utime) * 1e-6, tick.epoch);
+      return this.onTime(Number(tick.utime) * 1e-6, tick.epoch, !this.world || !channelOfType(this.world, "world_state_t"));
     }
     if (type === "reply_t") return this.session.onReply(bytes);
     if (!route?.robot || !this.world) return;
@@ -214,11 +214,12 @@ export class App {
     this.choose(Math.max(0, world.robots.findIndex((r) => r.name === name)));
   }
 
-  private onTime(time_s: number, epoch: number): void {
-    if (epoch !== this.epoch || time_s < this.time_s - 0.5) {
+  // A time that a message tells. Only states say that the past is over: of what else comes, some is older than they are.
+  private onTime(time_s: number, epoch: number, isState = false): void {
+    if (isState && (epoch !== this.epoch || time_s < this.time_s - 0.5)) {
       this.epoch = epoch;
       this.forgetPast();
-    }
+    } else if (epoch !== this.epoch || time_s < this.time_s) return;
     this.time_s = time_s;
     this.bar.showClock(time_s);
     const wall = performance.now() / 1000;
@@ -243,19 +244,21 @@ export class App {
     return robots.length <= kOverlaidRobots ? robots : robots.slice(this.robot, this.robot + 1);
   }
 
+  // An overlay, with its trails, stays as long as its robot is the same one.
   private makeOverlays(): void {
-    const wanted = new Set(this.overlaid());
-    for (const [name, overlay] of this.overlays) {
-      this.stage.scene.remove(overlay.group);
-      this.overlays.delete(name);
-    }
-    for (const name of wanted) {
+    const before = new Map(this.overlays);
+    this.overlays.clear();
+    for (const name of this.overlaid()) {
       const devices = this.world!.devices.filter((d) => d.robot === name);
       const start = this.stage.description?.bases.find((b) => b.robot === name)?.start ?? [0, 0, 0, 1, 0, 0, 0];
-      const overlay = new RobotOverlay(devices, start);
+      const key = [...start, ...devices.flatMap((d) => [d.name, d.kind, ...d.position, ...d.orientation])].join();
+      const old = before.get(name);
+      const overlay = old?.key === key ? old : new RobotOverlay(devices, start, key);
+      if (overlay !== old) this.stage.scene.add(overlay.group);
+      else before.delete(name);
       this.overlays.set(name, overlay);
-      this.stage.scene.add(overlay.group);
     }
+    for (const overlay of before.values()) this.stage.scene.remove(overlay.group);
     this.stage.touch();
   }
 

@@ -173,7 +173,7 @@ export class RobotOverlay {
   private readonly point = new THREE.Vector3();
   private changed = true;
 
-  constructor(devices: device_info_t[], start: number[]) {
+  constructor(devices: device_info_t[], start: number[], readonly key: string) {
     matrixOf(start, 0, this.odom);
     const odomFrame = new THREE.AxesHelper(0.35);
     odomFrame.applyMatrix4(this.odom);

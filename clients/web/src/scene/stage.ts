@@ -3,6 +3,7 @@ import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { SceneBuilder, type Built, type Movers } from "./build";
 import type { Description, LightDescription, SceneFiles } from "./description";
+import { drawnBySoftware, Quality } from "./quality";
 import type { Poses } from "../state/poses";
 
 export type ViewMode = "orbit" | "follow" | "top";
@@ -14,6 +15,7 @@ export class Stage {
   readonly camera = new THREE.PerspectiveCamera(50, 1, 0.05, 400);
   readonly renderer: THREE.WebGLRenderer;
   readonly controls: OrbitControls;
+  readonly quality: Quality;
   description: Description | null = null;
   mode: ViewMode = "orbit";
   frames = 0;                        // drawn so far
@@ -31,8 +33,11 @@ export class Stage {
   private lastBase: THREE.Vector3 | null = null;
   wheelAngles = new Map<number, Float64Array>();    // of robots whose odometry is known
 
-  constructor(private readonly canvas: HTMLCanvasElement, readonly poses: Poses) {
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+  // full: in full detail even where the processor draws.
+  constructor(private readonly canvas: HTMLCanvasElement, readonly poses: Poses, full: boolean) {
+    const software = !full && drawnBySoftware();
+    this.quality = new Quality(software);
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !software, powerPreference: "high-performance" });
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = THREE.PCFShadowMap;
     this.renderer.shadowMap.autoUpdate = false;
@@ -60,9 +65,21 @@ export class Stage {
 
   setShadows(on: boolean): void {
     this.shadows = on;
-    if (this.sun) this.sun.castShadow = on;
+    this.refine();
+  }
+
+  // Whether less is drawn where drawing is slow.
+  setAutomatic(on: boolean): void {
+    this.quality.automatic = on;
+    this.refine();
+  }
+
+  private get casts(): boolean { return this.shadows && this.quality.now.shadows; }
+
+  private refine(): void {
+    if (this.sun) this.sun.castShadow = this.casts;
     this.moved = true;
-    this.touch();
+    this.resize();
   }
 
   show(files: SceneFiles | null): void {
@@ -139,7 +156,7 @@ export class Stage {
   // The first directional light casts the shadows, around what is looked at.
   private beSun(sun: THREE.DirectionalLight): void {
     this.sun = sun;
-    sun.castShadow = this.shadows;
+    sun.castShadow = this.casts;
     sun.shadow.mapSize.set(2048, 2048);
     sun.shadow.bias = -0.0004;
     sun.shadow.normalBias = 0.02;
@@ -218,7 +235,7 @@ export class Stage {
   private resize(): void {
     const box = this.canvas.parentElement!.getBoundingClientRect();
     if (box.width === 0 || box.height === 0) return;
-    this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
+    this.renderer.setPixelRatio(Math.min(this.quality.now.ratio, devicePixelRatio));
     this.renderer.setSize(box.width, box.height, false);
     this.camera.aspect = box.width / box.height;
     this.camera.updateProjectionMatrix();
@@ -234,8 +251,9 @@ export class Stage {
     if (overlays()) this.touch();
     this.track();
     this.controls.update();
-    if (!this.dirty) return;
+    if (!this.dirty) return this.quality.idle();
     this.dirty = false;
+    if (this.quality.drawn(at_ms)) this.refine();
     const begun = performance.now();
     this.aimSun();
     this.renderer.render(this.scene, this.camera);
@@ -290,7 +308,7 @@ export class Stage {
   }
 
   private aimSun(): void {
-    if (!this.sun || !this.shadows) return;
+    if (!this.sun || !this.casts) return;
     const target = this.controls.target;
     if (!this.moved && this.sun.target.position.distanceToSquared(target) < 0.25) return;
     this.sun.target.position.copy(target);

@@ -41,6 +41,7 @@ export class Bar {
     this.stepButton = iconButton("step", "one step while paused (.)", () => actions.step());
     this.resetButton = iconButton("reset", "reset the world (R)", () => actions.reset());
     this.rate.value = "1";
+    this.rate.addEventListener("change", () => this.rate.blur());
     this.rate.addEventListener("change", () => actions.rate(this.rate.value === "max" ? Infinity : Number(this.rate.value)));
     const view = h("span", { class: "row", style: "flex-wrap: nowrap; gap: 4px" });
     for (const [mode, key] of [["orbit", "1"], ["follow", "2"], ["top", "3"]] as const) {

@@ -38,9 +38,15 @@ export class Panel {
     this.robots.addEventListener("change", () => app.choose(this.robots.selectedIndex));
     const shadows = h("input", { type: "checkbox", checked: true });
     shadows.addEventListener("change", () => app.stage.setShadows(shadows.checked));
+    const less = h("input", { type: "checkbox", checked: recall("detail") !== "full" });
+    less.addEventListener("change", () => {
+      remember("detail", less.checked ? "automatic" : "full");
+      app.stage.setAutomatic(less.checked);
+    });
+    app.stage.setAutomatic(less.checked);
     this.world = h("section", {}, h("h2", {}, "Place"), h("div", { class: "row" }, this.thing, this.place),
       h("p", { class: "dim" }, "Then click on the ground."),
-      h("h2", {}, "View"), h("label", { class: "check" }, shadows, "shadows"),
+      h("h2", {}, "View"), h("label", { class: "check" }, shadows, "shadows"), h("label", { class: "check" }, less, "less detail where drawing is slow"),
       h("div", { class: "row" }, h("button", { click: () => app.stage.home() }, "Whole world (Home)")));
     element.append(tabs, this.page);
     this.show(kPages.includes(this.open) ? this.open : "Robot", true);

@@ -90,6 +90,7 @@ export class RobotPages {
     { label: "distance, m", colour: "--rays" }, { label: "heading, °", colour: "--sonar", scale: "w" }]);
   private start = [0, 0, 0];      // x, y, heading of odom in the world
   private truth: pose_t | null = null;
+  private reckoned: odometry_t | null = null;
 
   constructor(move: (command: Omit<move_command_t, "utime" | "id">) => void, stop: () => void) {
     const kind = h("select", { "aria-label": "motion primitive" }, ...[[1, "advance"], [2, "rotate"], [3, "turn to heading"], [4, "arc"]].map(([value, text]) => h("option", { value: value! }, text as string)));
@@ -120,7 +121,7 @@ export class RobotPages {
     this.facts.replaceChildren();
     this.pictures.clear();
     this.start = [start[0]!, start[1]!, yawOf(start.slice(3))];
-    this.truth = null;
+    this.truth = this.reckoned = null;
     this.polar.clear();
     for (const plot of [this.speed, this.path, this.error]) plot.clear();
     this.fact("drive", `${robot.model}, ${robot.drive || "no drive"}`);
@@ -130,7 +131,7 @@ export class RobotPages {
 
   // Plots begin anew.
   forget(): void {
-    this.truth = null;
+    this.truth = this.reckoned = null;
     for (const plot of [this.speed, this.path, this.error]) plot.clear();
   }
 
@@ -153,22 +154,35 @@ export class RobotPages {
     this.speed.add(2, t, m.rotation_rate[2]!);
     this.path.add(0, t, m.pos[0]!);
     this.path.add(2, t, m.pos[1]!);
+    this.compare();
   }
 
   odometry(m: odometry_t): void {
-    const t = Number(m.utime) * 1e-6, [x0, y0, a0] = this.start as [number, number, number];
-    const x = x0 + m.x * Math.cos(a0) - m.y * Math.sin(a0), y = y0 + m.x * Math.sin(a0) + m.y * Math.cos(a0);
+    const t = Number(m.utime) * 1e-6, [x, y] = this.inWorld(m);
     this.fact("odometry", `${m.x.toFixed(3)} m, ${m.y.toFixed(3)} m, ${degrees(m.theta)}`);
     this.speed.add(1, t, m.v);
     this.speed.add(3, t, m.omega);
     this.path.add(1, t, x);
     this.path.add(3, t, y);
-    if (this.truth && this.truth.utime === m.utime) {
-      const away = Math.hypot(x - this.truth.pos[0]!, y - this.truth.pos[1]!), turn = wrap(a0 + m.theta - yawOf(this.truth.orientation));
-      this.error.add(0, t, away);
-      this.error.add(1, t, turn * 180 / Math.PI);
-      this.fact("odometry error", `${away.toFixed(3)} m, ${degrees(turn)}`);
-    }
+    this.reckoned = m;
+    this.compare();
+  }
+
+  // Where odometry has the robot, x, y and heading, in the world.
+  private inWorld(m: odometry_t): [number, number, number] {
+    const [x0, y0, a0] = this.start as [number, number, number];
+    return [x0 + m.x * Math.cos(a0) - m.y * Math.sin(a0), y0 + m.x * Math.sin(a0) + m.y * Math.cos(a0), a0 + m.theta];
+  }
+
+  // Odometry against the pose of the same moment, whichever comes last.
+  private compare(): void {
+    const { truth, reckoned } = this;
+    if (!truth || !reckoned || truth.utime !== reckoned.utime) return;
+    const t = Number(truth.utime) * 1e-6, [x, y, heading] = this.inWorld(reckoned);
+    const away = Math.hypot(x - truth.pos[0]!, y - truth.pos[1]!), turn = wrap(heading - yawOf(truth.orientation));
+    this.error.add(0, t, away);
+    this.error.add(1, t, turn * 180 / Math.PI);
+    this.fact("odometry error", `${away.toFixed(3)} m, ${degrees(turn)}`);
   }
 
   motion(m: motion_status_t): void {

@@ -15,9 +15,12 @@ export class Timeline {
   constructor(private readonly place: HTMLElement, private readonly play: (on: boolean, speed: number) => void, private readonly seek: (time_s: number) => void) {
     this.button = iconButton("play", "play or pause (space)", () => this.toggle());
     this.speed.value = "1";
-    this.speed.addEventListener("change", () => this.play(this.playback?.playing ?? false, Number(this.speed.value)));
+    this.speed.addEventListener("change", () => {
+      this.speed.blur();    // space is for playing
+      this.play(this.playback?.playing ?? false, Number(this.speed.value));
+    });
     this.slider.addEventListener("pointerdown", () => { this.held = true; });
-    this.slider.addEventListener("pointerup", () => { this.held = false; });
+    this.slider.addEventListener("pointerup", () => { this.held = false; this.slider.blur(); });
     this.slider.addEventListener("change", () => { this.held = false; this.go(true); });
     this.slider.addEventListener("input", () => this.go(false));
     place.append(this.button, this.slider, this.time, this.speed);

@@ -1,0 +1,55 @@
+// How finely is drawn: as finely as the display can, and less where a frame takes too long, as on machines without a GPU.
+// Without it, a page that draws by software answers keys late, and the robot's watchdog stops it between two commands.
+export interface Level { ratio: number; shadows: boolean }    // pixels of the canvas per pixel of the page, at most
+
+const kLevels: Level[] = [{ ratio: 2, shadows: true }, { ratio: 1, shadows: false }, { ratio: 0.6, shadows: false }, { ratio: 0.4, shadows: false }];
+const kSlow_ms = 50;          // a frame: less than 20 a second
+const kQuick_ms = 25;
+const kFrames = 5;            // frames in a row of which the median counts
+const kFirstWait_ms = 10_000; // until a finer level is tried; each time twice as long
+
+// Whether WebGL is done by the processor here.
+export function drawnBySoftware(): boolean {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const names = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = gl ? String(gl.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER)) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+}
+
+export class Quality {
+  automatic = true;           // false: always the finest
+  private level: number;
+  private last_ms = -1;
+  private intervals: number[] = [];
+  private finer_ms = 0;       // when a finer level is tried
+  private wait_ms = kFirstWait_ms;
+
+  constructor(software: boolean) { this.level = software ? 2 : 0; }
+
+  get now(): Level { return kLevels[this.automatic ? this.level : 0]!; }
+
+  // Nothing was drawn: the next frame's interval says nothing.
+  idle(): void { this.last_ms = -1; }
+
+  // A frame was drawn. True when what comes next is drawn at another level.
+  drawn(at_ms: number): boolean {
+    if (this.last_ms >= 0 && this.automatic) this.intervals.push(at_ms - this.last_ms);
+    this.last_ms = at_ms;
+    if (this.intervals.length < kFrames) return false;
+    const median = this.intervals.sort((a, b) => a - b)[kFrames >> 1]!;
+    this.intervals = [];
+    if (median > kSlow_ms && this.level + 1 < kLevels.length) {
+      ++this.level;
+      this.finer_ms = at_ms + this.wait_ms;
+      this.wait_ms *= 2;
+      return true;
+    }
+    if (median < kQuick_ms && this.level > 0 && at_ms > this.finer_ms) {
+      --this.level;
+      this.finer_ms = at_ms + this.wait_ms;
+      return true;
+    }
+    return false;
+  }
+}
