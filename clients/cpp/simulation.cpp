@@ -93,6 +93,8 @@ double Simulation::step_size() const { return static_cast<double>(core_->info()-
 double Simulation::time() const { return static_cast<double>(core_->utime()) * 1e-6; }
 bool Simulation::paused() const { return core_->info()->paused; }
 
+std::vector<BodyInfo> Simulation::bodies() const { return core_->info()->bodies; }
+
 std::vector<Robot> Simulation::robots() const {
   std::vector<Robot> robots;
   for (const RobotInfo& robot : core_->info()->robots) robots.emplace_back(core_, robot.name);

@@ -56,6 +56,15 @@ ChannelInfo read_channel(WireReader& in) {
   return channel;
 }
 
+BodyInfo read_body(WireReader& in) {
+  BodyInfo body;
+  in.int32();    // its place in ruedo/world
+  body.name = in.string();
+  body.is_static = in.boolean();
+  body.mass = in.float64();
+  return body;
+}
+
 // The head of every part is the same.
 void read_part(WireReader& in, WorldInfo& info) {
   in.int64();    // utime
@@ -79,6 +88,10 @@ void read_part(WireReader& in, WorldInfo& info) {
     if (channel.type == "tick_t") info.tick_channel = static_cast<int32_t>(info.channel_list.size());
     info.channel_list.push_back(channel);
     info.channels[channel.robot].push_back(std::move(channel));
+  }
+  for (size_t n = in.count(4 + 4 + 1 + 1 + 8); n > 0; --n) {
+    BodyInfo body = read_body(in);
+    if (!body.name.empty()) info.bodies.push_back(std::move(body));    // else it was removed
   }
 }
 

@@ -31,6 +31,7 @@ struct WorldInfo {
   std::map<std::string, std::vector<DeviceInfo>> devices;      // by robot
   std::map<std::string, std::vector<ChannelInfo>> channels;    // by robot
   std::vector<ChannelInfo> channel_list;                       // as ruedo/tick counts them
+  std::vector<BodyInfo> bodies;                                // that are there now
   int32_t tick_channel = -1;                                   // in that list
 
   const RobotInfo* robot(const std::string& name) const;

@@ -36,6 +36,13 @@ struct RobotInfo {
   std::vector<std::string> wheels;                     // joint names
 };
 
+// A set of links that do not move against each other.
+struct BodyInfo {
+  std::string name;                                    // MODEL/LINK: what Simulation::state() takes
+  bool is_static = false;                              // it never moves
+  double mass = 0.0;                                   // kg; 0 of what never moves
+};
+
 struct DeviceInfo {
   std::string robot, name;
   std::string kind;                                    // "lrf", "sonar", "odometry", "camera", "pose", ...
@@ -229,6 +236,7 @@ class Simulation {
   double time() const;              // s, sim time of the newest message that came
   bool paused() const;              // as ruedo/info last said it
   std::vector<Robot> robots() const;
+  std::vector<BodyInfo> bodies() const;          // all that there are
   Robot robot(const std::string& name) const;    // UnknownName lists those that exist
   void sleep(double seconds) const;              // of sim time
 

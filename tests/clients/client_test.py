@@ -29,6 +29,10 @@ def test_list(language, server):
     assert devices["odometry"][:3] == ["odometry", "odometry_t", "50.000000"]
     assert devices["pose"][1] == "pose_t" and devices["motion"][1] == "motion_status_t"
     assert "camera" not in devices
+    bodies = {name: (static, float(mass)) for name, static, mass in (line.split() for line in said.all("body"))}
+    assert bodies["wall/link"] == ("True", 0.0) and bodies["ground_plane/link"] == ("True", 0.0)
+    assert bodies["p3at/base_link"][0] == "False"
+    assert sum(mass for name, (_, mass) in bodies.items() if name.startswith("p3at/")) == pytest.approx(14 + 4 * 1.5)
 
 
 def test_read(language):

@@ -28,11 +28,12 @@ from .samples import (CameraInfo, Contact, ContactPoint, Image, Imu, Joints, Lid
                       Scan, SonarReading)
 from .simulation import Simulation, connect
 from .stream import Stream
+from .world_info import Body
 
 __version__ = "0.1.0"
 
 __all__ = [
-    "Camera", "CameraInfo", "Command", "Contact", "ContactPoint", "Device", "Image", "Imu", "Joints", "LaunchError", "LeaseLost",
+    "Body", "Camera", "CameraInfo", "Command", "Contact", "ContactPoint", "Device", "Image", "Imu", "Joints", "LaunchError", "LeaseLost",
     "LidarScan", "Message", "Motion", "MotionError", "MotionStatus", "NoServer", "NotSupported", "Observations", "Odometry", "Pose", "RequestError", "Robot",
     "RuedoError", "Sample", "Scan", "Simulation", "SonarReading", "State", "Stream", "Timeout", "TypeMismatch",
     "UnknownName", "connect", "find_ruedo", "launch", "lcmtypes",

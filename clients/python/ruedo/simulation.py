@@ -18,7 +18,7 @@ from .errors import NoServer, NotSupported, RuedoError, Timeout, UnknownName
 from .lockstep import Command, Observations, Stepper, observed
 from .motion import Driver
 from .robot import Robot
-from .world_info import WorldInfo, WorldInfoAssembler
+from .world_info import Body, WorldInfo, WorldInfoAssembler
 
 _SILENCE_SECONDS = 5.0
 
@@ -104,6 +104,11 @@ class Simulation:
     def robots(self) -> list[Robot]:
         """All robots, in the order of the world file."""
         return [self.robot(name) for name in self._info.robots]
+
+    @property
+    def bodies(self) -> list[Body]:
+        """All bodies that there are."""
+        return list(self._info.bodies)
 
     def robot(self, name: str) -> Robot:
         """The robot of that name; UnknownName lists those that exist."""

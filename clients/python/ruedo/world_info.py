@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import struct
 from collections import defaultdict
+from dataclasses import dataclass
 from typing import Any
 
 from . import lcmtypes
 from .errors import TypeMismatch
 
 _HEAD = struct.Struct(">qqqihh")    # fingerprint, utime, run_id, epoch, part, nparts
+
+
+@dataclass(frozen=True)
+class Body:
+    """A set of links that do not move against each other, as ruedo/info lists it."""
+
+    name: str          # MODEL/LINK: what Simulation.state() takes
+    is_static: bool    # it never moves
+    mass: float        # kg; 0 of what never moves
 
 
 class WorldInfo:
@@ -30,6 +40,8 @@ class WorldInfo:
         self.channels: dict[str, list[Any]] = defaultdict(list)    # by robot
         self.channel_list: list[Any] = [c for p in parts for c in p.channels]    # as ruedo/tick counts them
         self.tick_channel = next((i for i, c in enumerate(self.channel_list) if c.type == "tick_t"), -1)
+        # One that was removed has no name.
+        self.bodies: list[Body] = [Body(b.name, b.is_static, b.mass) for p in parts for b in p.bodies if b.name]
         for part in parts:
             for device in part.devices:
                 self.devices[device.robot].append(device)

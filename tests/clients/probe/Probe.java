@@ -5,6 +5,7 @@ import java.util.List;
 import java.util.Locale;
 import java.util.function.Supplier;
 import java.util.zip.CRC32;
+import ruedo.Body;
 import ruedo.Command;
 import ruedo.Device;
 import ruedo.Image;
@@ -52,6 +53,10 @@ public final class Probe {
         }
     }
 
+    private static long bodiesOfGuest(Simulation sim) {
+        return sim.bodies().stream().filter(body -> body.name.startsWith("guest/")).count();
+    }
+
     private static void listAll(Simulation sim) {
         say("world", sim.world(), sim.seed(), sim.stepSize());
         for (Robot robot : sim.robots()) {
@@ -60,6 +65,7 @@ public final class Probe {
                 say("device", robot.name, d.name, d.kind, d.type, d.rate, d.rangeMax, d.elements.length);
             }
         }
+        for (Body body : sim.bodies()) say("body", body.name, body.isStatic, body.mass);
     }
 
     private static void read(Simulation sim, String name) {
@@ -183,7 +189,7 @@ public final class Probe {
         double[] ahead = {1.0, 0.0, 0.0, 0.0};
         sim.spawn("p3at", 3.0, 1.0, 0.0, "guest");
         Robot guest = sim.robot("guest");
-        say("there", sim.state("guest").position[0], sim.robots().size());
+        say("there", sim.state("guest").position[0], sim.robots().size(), bodiesOfGuest(sim));
         guest.setVelocity(0.3, 0.0);
         sim.sleep(0.1);
         sim.sleep(2.0);
@@ -204,7 +210,7 @@ public final class Probe {
         sim.reset(Simulation.Reset.TIME, -1);
         say("time", sim.state().time() < 1.0, sim.robots().size());
         sim.remove("guest");
-        say("gone", sim.robots().size());
+        say("gone", sim.robots().size(), bodiesOfGuest(sim));
         attempt("unknown", () -> sim.remove("guest"));
     }
 

@@ -54,6 +54,12 @@ void report(const std::string& what, const std::function<void()>& call) {
   }
 }
 
+size_t bodies_of_guest(const rc::Simulation& sim) {
+  size_t count = 0;
+  for (const rc::BodyInfo& body : sim.bodies()) count += body.name.rfind("guest/", 0) == 0;
+  return count;
+}
+
 void list_all(const rc::Simulation& sim) {
   say("world", sim.world(), sim.seed(), sim.step_size());
   for (const rc::Robot& robot : sim.robots()) {
@@ -63,6 +69,7 @@ void list_all(const rc::Simulation& sim) {
       say("device", robot.name(), d.name, d.kind, d.type, d.rate, d.range_max, d.elements.size());
     }
   }
+  for (const rc::BodyInfo& body : sim.bodies()) say("body", body.name, body.is_static, body.mass);
 }
 
 void read(const rc::Simulation& sim, const std::string& name) {
@@ -179,7 +186,7 @@ void snapshots(const rc::Simulation& sim) {
 void world(const rc::Simulation& sim, const std::string& text) {
   sim.spawn("p3at", 3.0, 1.0, {.name = "guest"});
   const rc::Robot guest = sim.robot("guest");
-  say("there", sim.state("guest").position[0], sim.robots().size());
+  say("there", sim.state("guest").position[0], sim.robots().size(), bodies_of_guest(sim));
   guest.set_velocity(0.3, 0.0);
   sim.sleep(0.1);
   sim.sleep(2.0);
@@ -200,7 +207,7 @@ void world(const rc::Simulation& sim, const std::string& text) {
   sim.reset(rc::Reset::time);
   say("time", sim.state().time() < 1.0, sim.robots().size());
   sim.remove("guest");
-  say("gone", sim.robots().size());
+  say("gone", sim.robots().size(), bodies_of_guest(sim));
   report("unknown", [&] { sim.remove("guest"); });
 }
 

@@ -27,6 +27,8 @@ def list_all(sim):
         say("robot", robot.name, robot.drive or "-", robot.watchdog, robot.track)
         for device in robot.devices:
             say("device", robot.name, device.name, device.kind, device.type, device.rate, device.range_max, len(device.elements))
+    for body in sim.bodies:
+        say("body", body.name, body.is_static, float(body.mass))
 
 
 def read(sim, name):
@@ -135,7 +137,7 @@ def snapshots(sim):
 def world(sim, text):
     sim.spawn("p3at", 3.0, 1.0, name="guest")
     guest = sim.robot("guest")
-    say("there", sim.state("guest").position[0], len(sim.robots))
+    say("there", sim.state("guest").position[0], len(sim.robots), sum(body.name.startswith("guest/") for body in sim.bodies))
     guest.set_velocity(0.3, 0.0)
     sim.sleep(0.1)
     sim.sleep(2.0)
@@ -156,7 +158,7 @@ def world(sim, text):
     sim.reset("time")
     say("time", sim.state().time < 1.0, len(sim.robots))
     sim.remove("guest")
-    say("gone", len(sim.robots))
+    say("gone", len(sim.robots), sum(body.name.startswith("guest/") for body in sim.bodies))
     attempt("unknown", lambda: sim.remove("guest"))
 
 

@@ -11,14 +11,12 @@ import java.util.concurrent.atomic.AtomicLong;
 import lcm.lcm.LCMEncodable;
 import ruedo.lcmtypes.name_request_t;
 import ruedo.lcmtypes.rate_request_t;
-import ruedo.lcmtypes.reply_t;
 import ruedo.lcmtypes.request_t;
 import ruedo.lcmtypes.reset_request_t;
 import ruedo.lcmtypes.robot_info_t;
 import ruedo.lcmtypes.set_pose_request_t;
 import ruedo.lcmtypes.set_twist_request_t;
 import ruedo.lcmtypes.spawn_request_t;
-import ruedo.lcmtypes.state_reply_t;
 import ruedo.lcmtypes.step_request_t;
 import ruedo.lcmtypes.tick_t;
 
@@ -103,6 +101,11 @@ public final class Simulation implements AutoCloseable {
         return all;
     }
 
+    /** All bodies that there are. */
+    public List<Body> bodies() {
+        return info().bodies;
+    }
+
     /** The robot of that name. Throws UnknownName, which lists those that exist. */
     public Robot robot(String name) {
         robotInfo(name);
@@ -161,7 +164,7 @@ public final class Simulation implements AutoCloseable {
         }
         step_request_t body = new step_request_t();
         body.steps = n;
-        return new Observations(state(session.request(request_t.STEP, body, timeout)), List.of());
+        return new Observations(State.of(session.request(request_t.STEP, body, timeout)), List.of());
     }
 
     /** Whether the server runs in lockstep. */
@@ -221,7 +224,7 @@ public final class Simulation implements AutoCloseable {
         body.orientation = orientation;
         body.on_ground = onGround;
         WorldInfo before = known;
-        String given = state(session.request(request_t.SPAWN, body, SLOW_REPLY_SECONDS)).name;
+        String given = State.of(session.request(request_t.SPAWN, body, SLOW_REPLY_SECONDS)).name;
         refreshInfo(before);
         return given;
     }
@@ -263,7 +266,7 @@ public final class Simulation implements AutoCloseable {
 
     /** The same, with pose and twist of a model or MODEL/LINK. */
     public State state(String name) {
-        return state(session.request(request_t.GET_STATE, nameBody(name), REPLY_SECONDS));
+        return State.of(session.request(request_t.GET_STATE, nameBody(name), REPLY_SECONDS));
     }
 
     /** Sets a robot's odometry to zero where it stands. */
@@ -273,7 +276,7 @@ public final class Simulation implements AutoCloseable {
 
     /** Saves the state under a name, in the folder that the server was started with (--snapshots FOLDER), and returns it. */
     public State snapshot(String name) {
-        return state(session.request(request_t.SNAPSHOT, nameBody(name), SLOW_REPLY_SECONDS));
+        return State.of(session.request(request_t.SNAPSHOT, nameBody(name), SLOW_REPLY_SECONDS));
     }
 
     /**
@@ -281,7 +284,7 @@ public final class Simulation implements AutoCloseable {
      * the snapshot's run, in silence: this takes as long as that part takes at rate max. A new epoch.
      */
     public State restore(String name) {
-        State state = state(session.request(request_t.RESTORE, nameBody(name), RESTORE_SECONDS));
+        State state = State.of(session.request(request_t.RESTORE, nameBody(name), RESTORE_SECONDS));
         utime = state.utime;
         stepper.forget();
         return state;
@@ -473,18 +476,6 @@ public final class Simulation implements AutoCloseable {
         while (known == before && !deadline.passed()) {
             askInfo();
             deadline.waitOn(this, 100);
-        }
-    }
-
-    private static State state(reply_t reply) {
-        try {
-            WireReader in = new WireReader(reply.body);
-            if (in.int64() != state_reply_t.LCM_FINGERPRINT) throw new IOException("another version of the type");
-            return new State(in.int64(), in.int64(), in.int64(), in.bool(), in.float64(), in.string(), in.doubles(3), in.doubles(4),
-                    in.doubles(3), in.doubles(3));
-        } catch (IOException error) {
-            throw new RuedoException.TypeMismatch("the reply's body is no state_reply_t of this client's version: "
-                    + error.getMessage());
         }
     }
 

@@ -1,5 +1,9 @@
 package ruedo;
 
+import java.io.IOException;
+import ruedo.lcmtypes.reply_t;
+import ruedo.lcmtypes.state_reply_t;
+
 /** The state of the simulation, and of the model or MODEL/LINK that was asked for (else name is ""). */
 public class State extends Sample {
     /** Number of the state. */
@@ -33,5 +37,17 @@ public class State extends Sample {
         this.orientation = orientation;
         this.linear = linear;
         this.angular = angular;
+    }
+
+    static State of(reply_t reply) {
+        try {
+            WireReader in = new WireReader(reply.body);
+            if (in.int64() != state_reply_t.LCM_FINGERPRINT) throw new IOException("another version of the type");
+            return new State(in.int64(), in.int64(), in.int64(), in.bool(), in.float64(), in.string(), in.doubles(3), in.doubles(4),
+                    in.doubles(3), in.doubles(3));
+        } catch (IOException error) {
+            throw new RuedoException.TypeMismatch("the reply's body is no state_reply_t of this client's version: "
+                    + error.getMessage());
+        }
     }
 }

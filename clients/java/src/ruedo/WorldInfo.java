@@ -8,6 +8,7 @@ import java.util.HashMap;
 import java.util.LinkedHashMap;
 import java.util.List;
 import java.util.Map;
+import ruedo.lcmtypes.body_info_t;
 import ruedo.lcmtypes.channel_info_t;
 import ruedo.lcmtypes.device_info_t;
 import ruedo.lcmtypes.robot_info_t;
@@ -18,6 +19,7 @@ final class WorldInfo {
     final world_info_t head;
     final Map<String, robot_info_t> robots = new LinkedHashMap<>();
     final List<channel_info_t> channelList = new ArrayList<>();    // as ruedo/tick counts them
+    final List<Body> bodies;                                       // that are there now
     final int tickChannel;                                         // in that list; -1: there is none
     private final Map<String, List<device_info_t>> devices = new HashMap<>();
     private final Map<String, List<channel_info_t>> channels = new HashMap<>();
@@ -25,10 +27,14 @@ final class WorldInfo {
     private WorldInfo(List<world_info_t> parts) {
         head = parts.get(0);
         int tick = -1;
+        List<Body> there = new ArrayList<>();
         for (world_info_t part : parts) {
             for (robot_info_t robot : part.robots) robots.put(robot.name, robot);
             for (device_info_t device : part.devices) {
                 devices.computeIfAbsent(device.robot, key -> new ArrayList<>()).add(device);
+            }
+            for (body_info_t body : part.bodies) {    // one that was removed has no name
+                if (!body.name.isEmpty()) there.add(new Body(body.name, body.is_static, body.mass));
             }
             for (channel_info_t channel : part.channels) {
                 channels.computeIfAbsent(channel.robot, key -> new ArrayList<>()).add(channel);
@@ -37,6 +43,7 @@ final class WorldInfo {
             }
         }
         tickChannel = tick;
+        bodies = List.copyOf(there);
     }
 
     List<device_info_t> devices(String robot) {
@@ -71,7 +78,9 @@ final class WorldInfo {
         for (int i = 0; i < part.devices.length; i++) part.devices[i] = readDevice(in);
         part.channels = new channel_info_t[in.count(30)];
         for (int i = 0; i < part.channels.length; i++) part.channels[i] = readChannel(in);
-        return part;    // the bodies behind are not used
+        part.bodies = new body_info_t[in.count(4 + 4 + 1 + 1 + 8)];
+        for (int i = 0; i < part.bodies.length; i++) part.bodies[i] = readBody(in);
+        return part;
     }
 
     private static robot_info_t readRobot(WireReader in) throws IOException {
@@ -111,6 +120,15 @@ final class WorldInfo {
         device.element_pose = new double[in.count(6 * 8)][];
         for (int i = 0; i < device.element_pose.length; i++) device.element_pose[i] = in.doubles(6);
         return device;
+    }
+
+    private static body_info_t readBody(WireReader in) throws IOException {
+        body_info_t body = new body_info_t();
+        body.index = in.int32();
+        body.name = in.string();
+        body.is_static = in.bool();
+        body.mass = in.float64();
+        return body;
     }
 
     private static channel_info_t readChannel(WireReader in) throws IOException {
