@@ -24,6 +24,11 @@ LoadedModel read(const std::string& path, const std::string& world_file, std::sh
   Element asker;
   asker.name = "SPAWN";
   const auto included = reader.read_file(path, asker);
+  if (included.light || included.actor) {
+    throw InputError({path, (included.light ? included.light : included.actor)->source.line},
+                     included.light ? "holds a <light> and no <model>: lights stand in the world's file, or in a link"
+                                    : "holds an <actor> and no <model>: actors stand in the world's file");
+  }
   if (!included.model || !included.model->model) throw InputError({path, 0}, "holds no <model>, or one without a link");
   for (const std::string& file : meshes.files_read()) documents.note(file);
   LoadedModel loaded{included.model->model, included.name, findings.list(), documents.files_read()};

@@ -109,11 +109,11 @@ int Server::input_of(const applied_t& applied) const {
 }
 
 Outcome Server::snapshot(const request_t& request) {
+  if (!recorder_.has_journal()) return Outcome::refuse(reply_t::NOT_SUPPORTED, "start the server with --snapshots FOLDER");
   name_request_t body;
   if (decode_checked(request.body.data(), request.body.size(), body) != DecodeFault::none) {
     return Outcome::refuse(reply_t::BAD_REQUEST, "the body is not a name_request_t");
   }
-  if (!recorder_.has_journal()) return Outcome::refuse(reply_t::NOT_SUPPORTED, "start the server with --snapshots FOLDER");
   if (recorder_.snapshot_path(body.name).empty()) {
     return Outcome::refuse(reply_t::BAD_REQUEST, "'" + body.name + "' is no name of a snapshot: 1 to 63 letters, digits, '_', '-' and '.', not first a '.'");
   }
@@ -124,12 +124,12 @@ Outcome Server::snapshot(const request_t& request) {
 
 // In the log it is a reset, and the run up to the snapshot's step: so the log needs no other file to be repeated.
 Outcome Server::restore(const request_t& request) {
+  if (!recorder_.has_journal()) return Outcome::refuse(reply_t::NOT_SUPPORTED, "start the server with --snapshots FOLDER");
   name_request_t body;
   if (decode_checked(request.body.data(), request.body.size(), body) != DecodeFault::none) {
     return Outcome::refuse(reply_t::BAD_REQUEST, "the body is not a name_request_t");
   }
-  if (!recorder_.has_journal()) return Outcome::refuse(reply_t::NOT_SUPPORTED, "start the server with --snapshots FOLDER");
-  if (lockstep_) return Outcome::refuse(reply_t::NOT_SUPPORTED, "a run in lockstep cannot be set to a snapshot: start one with --restore");
+  if (lockstep_) return Outcome::refuse(reply_t::REFUSED, "a run in lockstep cannot be set to a snapshot: start one with --restore");
   const std::string path = recorder_.snapshot_path(body.name);
   if (path.empty() || !std::filesystem::exists(path)) {
     return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no snapshot '" + body.name + "'");

@@ -195,6 +195,8 @@ TEST_F(EditsResetTest, HostileRequestsAreAnsweredInWords) {
       {spawn("<sdf version='1.9'>\n<model name='m'>\n<link></link></model></sdf>", 5, 5), reply_t::BAD_REQUEST, "the text:3"},
       {spawn("<sdf version='1.9'></sdf>", 5, 5), reply_t::BAD_REQUEST, "holds no <model>"},
       {spawn("<sdf version='1.9'><world name='w'/></sdf>", 5, 5), reply_t::BAD_REQUEST, "is a world"},
+      {spawn(as_file("<light name='lamp' type='point'/>"), 5, 5), reply_t::BAD_REQUEST, "holds a <light> and no <model>"},
+      {spawn(as_file("<actor name='walker'/>"), 5, 5), reply_t::BAD_REQUEST, "holds an <actor> and no <model>"},
       {spawn("<html/>", 5, 5), reply_t::BAD_REQUEST, "the text:1"},
       {spawn("<robot name='r'><link name='a'/><joint name='j' type='sideways'><parent link='a'/><child link='b'/></joint></robot>", 5, 5), reply_t::BAD_REQUEST, "the text"},
       {spawn("<!DOCTYPE a [<!ENTITY b 'cc'>]><sdf version='1.9'>&b;</sdf>", 5, 5), reply_t::BAD_REQUEST, "the text"},
