@@ -399,7 +399,7 @@ def test_a_snapshot_in_the_same_process(tmp_path):
 
 
 CONTROLLER = '''
-import sys, lcm, math
+import sys, lcm, time
 sys.path.insert(0, sys.argv[2])
 import bot_core
 
@@ -409,7 +409,7 @@ def on_scan(channel, data):
     scan = bot_core.planar_lidar_t.decode(data)
     ahead = min(scan.ranges[len(scan.ranges) // 3 : -len(scan.ranges) // 3])
     command = bot_core.pose_t()
-    command.utime = 0
+    command.utime = int(time.time() * 1e6) if "wall" in sys.argv else 0
     command.vel = [0.4 if ahead > 0.8 else 0.0, 0.0, 0.0]
     command.rotation_rate = [0.0, 0.0, 0.0 if ahead > 0.8 else 0.7]
     bus.publish("VELOCITY", command.encode())
@@ -436,8 +436,9 @@ def bot_core(tmp_path_factory):
     return folder
 
 
-def start_controller(bot_core, port):
-    controller = subprocess.Popen([sys.executable, str(bot_core / "controller.py"), url(port), str(bot_core)], stdout=subprocess.PIPE, text=True)
+def start_controller(bot_core, port, *clock):
+    words = [sys.executable, str(bot_core / "controller.py"), url(port), str(bot_core), *clock]
+    controller = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
     STARTED.append(controller)
     assert controller.stdout.readline() == "ready\n"
     return controller
@@ -449,12 +450,14 @@ WAITING = ["--remap", "p3at/lrf=LASER", "--remap", "p3at/velocity=VELOCITY", "--
 
 def test_an_unmodified_controller_runs_repeatably(tmp_path, bot_core):
     logs = []
-    for run in range(2):
-        start_controller(bot_core, 7831 + run)
+    for run, clock in enumerate(([], [], ["wall"])):    # the last one stamps its commands by the wall clock
+        start_controller(bot_core, 7836 + run, *clock)
         logs.append(tmp_path / f"{run}.lcm")
-        result = program("run", ARENA, *QUICK, *WAITING, "--duration", 20, "--record", logs[-1], "--lcm", url(7831 + run))
+        result = program("run", ARENA, *QUICK, *WAITING, "--duration", 20, "--record", logs[-1], "--lcm", url(7836 + run))
         assert result.returncode == 0, result.stderr
     assert logs[0].read_bytes() == logs[1].read_bytes()
+    seen = [[event for event in events(log) if event[1] != "ruedo/applied"] for log in logs]
+    assert seen[0] == seen[2] and logs[0].read_bytes() != logs[2].read_bytes()
     found = events(logs[0])
     applied = [stamp for stamp, channel, _ in found if channel == "ruedo/applied"]
     assert applied == [k * 100_000 for k in range(200)]    # message k acts on the state of its own scan
@@ -474,8 +477,7 @@ def test_a_controller_that_dies_is_said(bot_core):
     assert "VELOCITY" in said[-1]
     time.sleep(2.0)    # time enough to say it again
     code, errors = server.end(signal.SIGINT)
-    assert code == 0
-    assert "--wait-for wants message" not in errors
+    assert code == 0 and "--wait-for wants message" not in errors
 
 
 @pytest.mark.parametrize("value, words", [("p3at/velocty@10", "did you mean 'p3at/velocity'"), ("p3at/velocity", "CHANNEL@HZ"),

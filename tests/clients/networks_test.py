@@ -139,6 +139,25 @@ def test_a_second_server_refuses_and_names_the_first(scheme):
         pass
 
 
+def test_users_of_one_machine_do_not_meet():
+    """Another user's server on the same address is refused, too, and names the first; --lcm auto finds its own place."""
+    import pwd
+
+    other = pwd.getpwnam("nobody").pw_uid
+    try:
+        done = subprocess.run([RUEDO, "check", HALL], user=other, capture_output=True, timeout=PATIENCE)
+    except PermissionError:
+        pytest.skip("no right to become another user, or that one may not read this build")
+    if done.returncode != 0:
+        pytest.skip("another user may not read this tree")
+    with ruedo_run(*QUICK, world=HALL) as first:
+        second = subprocess.run([RUEDO, "run", HALL, "--lcm", first.url], user=other, capture_output=True, text=True, timeout=PATIENCE)
+        assert second.returncode == 4 and f"pid {first.process.pid}, world hall, run " in second.stderr
+        command = [RUEDO, "run", HALL, "--quiet", "--lcm", "auto", "--duration", "0.1", *QUICK]
+        third = subprocess.run(command, user=other, capture_output=True, text=True, timeout=PATIENCE)
+        assert third.returncode == 0 and "export LCM_DEFAULT_URL='" in third.stdout and first.url not in third.stdout
+
+
 def auto_url(process):
     line = process.stdout.readline()
     match = re.fullmatch(r"export LCM_DEFAULT_URL='(\S+)'\n", line)
