@@ -1,6 +1,7 @@
 // Names of devices and robots: unique, and fit for channels.
 #include <algorithm>
 #include <map>
+#include <string_view>
 
 #include "model/sdf_reader.h"
 
@@ -11,13 +12,27 @@ constexpr size_t kMaxChannel = 63;    // bytes; LCM's limit
 
 constexpr const char* kFixedDevices[] = {"odometry", "pose", "motion", "velocity", "wheels", "move", "joints", "joint_command"};
 
-bool fit_for_channel(const std::string& name) {
+bool fit_for_channel(std::string_view name) {
   return std::all_of(name.begin(), name.end(), [](char c) { return static_cast<unsigned char>(c) > 0x20 && c != 0x7f && c != '/'; });
 }
 
 }  // namespace
 
-void make_sensor_names_unique(Model& model) {
+std::string made_fit_for_channel(const std::string& name) {
+  std::string result = name;
+  for (char& c : result) {
+    if (!fit_for_channel({&c, 1})) c = '_';
+  }
+  return result;
+}
+
+void make_sensor_names_unique(Model& model, const std::string& where, Findings& findings) {
+  for (SensorDescription& sensor : model.sensors) {
+    const std::string fit = made_fit_for_channel(sensor.name);
+    if (fit == sensor.name) continue;
+    findings.repaired(sensor.element->source, where, "the sensor name '" + sensor.name + "' is not fit for a channel; it is called '" + fit + "'");
+    sensor.name = fit;
+  }
   std::map<std::string, int> uses;
   for (const SensorDescription& sensor : model.sensors) ++uses[sensor.name];
   for (SensorDescription& sensor : model.sensors) {

@@ -185,6 +185,11 @@ void read_drive_of(const Element& model_element, const std::string& where, ReadC
       }
       continue;
     }
+    model.commanded |= commands_joints(*plugin);
+    if (const char* why = unsupported_drive(*plugin); why && !model_element.has("ruedo:drive")) {
+      context.findings.unsupported(plugin->source, where, why);
+      continue;
+    }
     const std::string* file = plugin->attribute("filename");
     const std::string name = file ? *file : "(without a filename)";
     if (others.find(name) != std::string::npos) continue;

@@ -44,17 +44,18 @@ constexpr Parameter kParameters[] = {
 constexpr const char* kLeft[] = {"left_joint", "leftJoint", "left_front", "leftFrontJoint", "left_rear", "leftRearJoint"};
 constexpr const char* kRight[] = {"right_joint", "rightJoint", "right_front", "rightFrontJoint", "right_rear", "rightRearJoint"};
 
-bool is_drive(const Element& plugin) {
+bool is_one_of(const Element& plugin, std::initializer_list<const char*> known) {
   std::string name;
   for (const char* key : {"filename", "name"}) {
     if (const std::string* value = plugin.attribute(key)) name += *value + " ";
   }
   for (char& c : name) c = c == '-' || c == '_' ? ' ' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  for (const char* known : {"gazebo ros diff drive", "diffdriveplugin", "diff drive system", "systems::diffdrive",
-                            "skidsteerdriveplugin", "skid steer drive"}) {
-    if (name.find(known) != std::string::npos) return true;
-  }
-  return false;
+  return std::any_of(known.begin(), known.end(), [&](const char* each) { return name.find(each) != std::string::npos; });
+}
+
+bool is_drive(const Element& plugin) {
+  return is_one_of(plugin, {"gazebo ros diff drive", "diffdriveplugin", "diff drive system", "systems::diffdrive", "skidsteerdriveplugin",
+                            "skid steer drive"});
 }
 
 void add(Element& drive, const char* name, const std::string& text, const Source& source) {
@@ -66,6 +67,19 @@ void add(Element& drive, const char* name, const std::string& text, const Source
 }
 
 }  // namespace
+
+bool commands_joints(const Element& plugin) {
+  return is_one_of(plugin, {"joint controller", "joint position controller", "joint trajectory controller", "joint state publisher",
+                            "joint pose trajectory", "ros control", "ros2 control"});
+}
+
+const char* unsupported_drive(const Element& plugin) {
+  if (is_one_of(plugin, {"ackermann"})) return "an Ackermann drive is not supported, only differential ones are: the robot stands still";
+  if (is_one_of(plugin, {"mecanum", "omni", "planar move", "tricycle"})) {
+    return "an omnidirectional or tricycle drive is not supported, only differential ones are: the robot stands still";
+  }
+  return nullptr;
+}
 
 std::unique_ptr<Element> drive_from_plugin(const Element& plugin) {
   if (!is_drive(plugin)) return nullptr;

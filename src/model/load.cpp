@@ -57,6 +57,13 @@ class Loader {
     reader_.read_world(*root->child("world"), {1, 9}, world_);
   }
 
+  // The name of a file's robot, as its channels can have it.
+  std::string name_in_world(const std::string& name, const std::shared_ptr<const Model>& model, const Source& source) {
+    const std::string fit = ModelInstance{name, {}, model}.is_robot() ? made_fit_for_channel(name) : name;
+    if (fit != name) findings_.repaired(source, "model " + name, "the name is not fit for a channel; the robot is called '" + fit + "'");
+    return fit;
+  }
+
   void add(const std::string& name, const Pose& X_WM, std::shared_ptr<const Model> model, const Source& source) {
     world_.models.push_back({name, X_WM, std::move(model)});
     check_channel_names(world_.models.back(), source);
@@ -76,7 +83,7 @@ class Loader {
     for (const auto& child : root.children) {
       if (child->name == "model") {
         if (const auto scope = reader_.read_model(*child, version)) {
-          const std::string name = required_name(*child);
+          const std::string name = name_in_world(required_name(*child), scope->model, child->source);
           for (const ModelInstance& other : world_.models) {
             if (other.name == name && any) child->fail("a second model of the name '" + name + "'");
           }
@@ -105,8 +112,8 @@ class Loader {
     read_empty_world();
     const auto scope = reader_.read_model(*sdf, {1, 9});
     if (!scope) root.fail("the robot has no link");
-    add(scope->model->name, standing_on(world_, *scope->model, 0, 0, 0), scope->model, root.source);
-    world_.name = scope->model->name;
+    world_.name = name_in_world(scope->model->name, scope->model, root.source);
+    add(world_.name, standing_on(world_, *scope->model, 0, 0, 0), scope->model, root.source);
   }
 
   void place(const Spawn& spawn, Room& room) {
@@ -134,10 +141,10 @@ class Loader {
     if (!spawn.name.empty()) {
       name = spawn.name;
       if (taken(name)) throw InputError({}, what + ": the name '" + name + "' is taken by another model of the world");
-    } else if (taken(name)) {
-      int number = 2;
-      while (taken(name + "_" + std::to_string(number))) ++number;
-      name += "_" + std::to_string(number);
+    } else {
+      name = name_in_world(name, model, model->source);
+      const std::string own = name;
+      for (int number = 2; taken(name); ++number) name = own + "_" + std::to_string(number);
     }
     const Pose X_WM = room.standing_on(*model, spawn.x, spawn.y, spawn.yaw);
     if (const std::string other = room.overlapped(*model, X_WM); !other.empty()) {

@@ -185,7 +185,7 @@ std::optional<Material> read_material(const Element& element, const std::string&
   Material material;
   bool said = false;
   if (const Element* script = element.child("script")) {
-    const std::string name = script->string("name", "");
+    const std::string name = script->string("name", script->text);    // old files: <script>NAME</script>
     if (const auto known = gazebo_material(name)) {
       material = *known;
       said = true;

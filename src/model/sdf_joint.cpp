@@ -54,6 +54,10 @@ JointAxis read_axis(const Element& element, SdfVersion version, const Pose& X_MJ
 
 }  // namespace
 
+std::string joint_end(const Element& joint, const char* which) {
+  return joint.string(which, "").empty() ? joint.string(std::string(which) + "/link_name", "") : joint.string(which, "");
+}
+
 Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames, const std::vector<Link>& links,
                  const std::string& where, ReadContext& context) {
   report_other_children(element, {"parent", "child", "pose", "axis", "axis2", "sensor"},
@@ -85,15 +89,16 @@ Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
   const auto end = [&](const char* which) -> const Element& {
     const Element* found = element.child(which);
     if (!found) element.fail(std::string("has no <") + which + ">");
-    if (found->text.empty() && !found->has("link_name")) found->fail("is empty; the name of a link is needed");
+    if (joint_end(element, which).empty()) found->fail("is empty; the name of a link is needed");
     return *found;
   };
   const Element &parent = end("parent"), &child = end("child");
-  if (child.text == "world") child.fail("'world' is not allowed as the child of a joint");
-  joint.parent = parent.text == "world" ? -1 : frames.link(parent.text, parent);
-  joint.child = frames.link(child.text, child);
-  if (joint.child < 0) child.fail("'" + child.text + "' is not part of a link");
-  if (joint.parent < 0 && parent.text != "world") parent.fail("'" + parent.text + "' is not part of a link");
+  const std::string parent_name = joint_end(element, "parent"), child_name = joint_end(element, "child");
+  if (child_name == "world") child.fail("'world' is not allowed as the child of a joint");
+  joint.parent = parent_name == "world" ? -1 : frames.link(parent_name, parent);
+  joint.child = frames.link(child_name, child);
+  if (joint.child < 0) child.fail("'" + child_name + "' is not part of a link");
+  if (joint.parent < 0 && parent_name != "world") parent.fail("'" + parent_name + "' is not part of a link");
   if (joint.parent == joint.child) {
     element.fail("joins the link '" + links[static_cast<size_t>(joint.child)].name + "' to itself");
   }

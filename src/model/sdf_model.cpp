@@ -62,6 +62,7 @@ void append_nested(const Nested& nested, const Pose& X_MN, Model& into) {
     sensor.link += first_link;
     into.sensors.push_back(std::move(sensor));
   }
+  into.commanded |= from.commanded;
   if (from.drive && !into.drive) {
     into.drive = from.drive;
     for (auto* joints : {&into.drive->left_joints, &into.drive->right_joints}) {
@@ -175,7 +176,7 @@ std::shared_ptr<const ScopedModel> SdfReader::read_overridden(const Element& mod
 }
 
 std::optional<SdfReader::Included> SdfReader::include(const Element& element, const std::string& where) {
-  report_other_children(element, {"uri", "name", "pose", "static", "placement_frame", "plugin", "sensor", "ruedo:drive", "ruedo:odometry", "ruedo:path"},
+  report_other_children(element, {"uri", "name", "pose", "static", "placement_frame", "plugin", "sensor", "ruedo:drive", "ruedo:joints", "ruedo:odometry", "ruedo:path"},
                         {"allow_auto_disable", "enable_wind"}, where, context_.findings);
   const Element* uri = element.child("uri");
   if (!uri || uri->text.empty()) element.fail("has no <uri>");
@@ -235,7 +236,7 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
   const std::string where = "model " + model->name;
   report_other_children(element,
                         {"link", "joint", "frame", "model", "include", "pose", "static", "self_collide", "plugin", "ruedo:drive",
-                         "ruedo:odometry", "ruedo:path"},
+                         "ruedo:joints", "ruedo:odometry", "ruedo:path"},
                         {"allow_auto_disable", "enable_wind"}, where, context_.findings);
   model->source = element.source;
   model->is_static = element.boolean("static", false);
@@ -264,7 +265,7 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
       node.name = required_name(*child);
       node.pose = child->pose("pose");
       node.relative_to = relative_to(*child);
-      node.attached_to = child->string("child", "");
+      node.attached_to = joint_end(*child, "child");
       if (node.relative_to.empty()) node.relative_to = node.attached_to;
     } else if (child->name == "frame") {
       node.name = required_name(*child);
@@ -362,8 +363,10 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
     if (canonical < 0) element.fail("canonical_link '" + *name + "' is no link");
   }
   bring_to_front(canonical, *scope, *model);
-  make_sensor_names_unique(*model);
+  make_sensor_names_unique(*model, where, context_.findings);
   read_drive_of(element, where, context_, *model);
+  model->commanded |= element.has("ruedo:joints");
+  model->commanded &= !model->is_static && std::any_of(model->joints.begin(), model->joints.end(), [](const Joint& joint) { return joint.type != JointType::fixed; });
   if (const Element* path = element.child("ruedo:path")) {
     path->refuse_unknown({"ruedo:waypoint", "ruedo:loop"}, false);
     model->path = path->clone();
@@ -383,7 +386,7 @@ void SdfReader::read_joints(const Element& element, SdfVersion version, FrameGra
     const std::string here = where + "/joint " + required_name(*child);
     if (parts_missing) {
       // What was not found may have held its links.
-      const std::string parent = child->string("parent", ""), end = child->string("child", "");
+      const std::string parent = joint_end(*child, "parent"), end = joint_end(*child, "child");
       if ((parent != "world" && !frames.has(parent)) || !frames.has(end)) {
         context_.findings.error(child->source, here, "it joins a link of a part that was not found; the joint is left out");
         frames.drop(required_name(*child));

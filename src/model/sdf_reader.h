@@ -59,12 +59,18 @@ class SdfReader {
   std::map<std::string, Included> cache_;
 };
 
-// Makes the devices' names unique: of two sensors with one name, each becomes LINK-SENSOR. Throws InputError for
-// names that Ruedo's own channels have, and for two that stay the same.
-void make_sensor_names_unique(Model& model);
+// A name without '/', spaces and control characters: '_' stands for each.
+std::string made_fit_for_channel(const std::string& name);
+
+// Makes the devices' names fit for channels and unique: of two sensors with one name, each becomes LINK-SENSOR. Throws
+// InputError for names that Ruedo's own channels have, and for two that stay the same.
+void make_sensor_names_unique(Model& model, const std::string& where, Findings& findings);
 
 // Checks that the names of an instance and of its devices are fit for channels.
 void check_channel_names(const ModelInstance& instance, const Source& source);
+
+// The name in a joint's <parent> or <child>, which old files write in <link_name>; "" when there is none.
+std::string joint_end(const Element& joint, const char* which);
 
 // <joint> to Joint; the frames are those of its model.
 Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames, const std::vector<Link>& links,

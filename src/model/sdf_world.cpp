@@ -1,4 +1,5 @@
 // <world>: physics, scene, lights, and the models with their poses.
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -169,6 +170,7 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     frames.add(node);
     placed.push_back({name, &by, scope});
   };
+  std::map<std::string, int> numbers;    // of the next thing of a name
   for (const auto& child : element.children) {
     FrameGraph::Node node;
     node.element = child.get();
@@ -194,7 +196,8 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
       if (!node.scope) continue;
       if (frames.has(node.name) && !is_robot(node.scope->model)) {
         std::string name;
-        for (int number = 2; frames.has(name = node.name + "_" + std::to_string(number)); ++number) {}
+        int& number = numbers.try_emplace(node.name, 2).first->second;
+        while (frames.has(name = node.name + "_" + std::to_string(number))) ++number;
         findings.error(child->source, "model " + node.name, "a second thing of the name '" + node.name + "'; this one is called '" + name + "'");
         node.name = name;
       }
@@ -222,6 +225,18 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     instance.name = dotted(each.name);
     instance.X_WM = frames.pose(each.name, *each.element);
     instance.model = each.scope->model;
+    if (instance.is_robot()) {
+      const std::string fit = made_fit_for_channel(instance.name);
+      std::string name = fit;
+      const auto taken = [&] {
+        return frames.has(name) || std::any_of(world.models.begin(), world.models.end(), [&](const auto& other) { return other.name == name; });
+      };
+      for (int number = 2; name != instance.name && taken(); ++number) name = fit + "_" + std::to_string(number);
+      if (name != instance.name) {
+        findings.repaired(each.element->source, "model " + instance.name, "the name is not fit for a channel; the robot is called '" + name + "'");
+        instance.name = name;
+      }
+    }
     check_channel_names(instance, each.element->source);
     world.models.push_back(std::move(instance));
   }

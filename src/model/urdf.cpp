@@ -332,6 +332,7 @@ std::unique_ptr<Element> urdf_as_sdf(const Element& robot, Findings& findings) {
   converter.read_gazebo();
   for (const Element* link : robot.all("link")) converter.add_link(*link);
   for (const Element* joint : robot.all("joint")) converter.add_joint(*joint);
+  if (!model.has("ruedo:joints")) add(model, "ruedo:joints", robot.source);    // a <robot> is one, be it an arm without sensors
   return std::move(converter.model);
 }
 

@@ -151,6 +151,7 @@ struct Model {
   std::vector<Joint> joints;
   std::vector<SensorDescription> sensors;
   std::optional<DriveDescription> drive;
+  bool commanded = false;                // its joints take commands, which makes a robot of an arm without sensors
   std::shared_ptr<const Element> path;   // <ruedo:path> or an actor's trajectory; null: none
   Source source;
 };
@@ -160,7 +161,7 @@ struct ModelInstance {
   Pose X_WM;
   std::shared_ptr<const Model> model;
   bool removed = false;                  // while the world runs: its place in all lists stays, and it is nowhere
-  bool is_robot() const { return model->drive.has_value() || !model->sensors.empty(); }
+  bool is_robot() const { return model->drive.has_value() || !model->sensors.empty() || model->commanded; }
 };
 
 struct Sky {

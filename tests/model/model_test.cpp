@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <ctime>
+
 #include <gtest/gtest.h>
 
 #include "model/body_layout.h"
@@ -168,6 +170,17 @@ TEST(Names, ASecondThingIsRenamedAndTold) {
   ASSERT_EQ(world->models.size(), 2u);
   EXPECT_EQ(world->models[1].name, "box_2");
   EXPECT_EQ(texts(*world), (std::vector<std::string>{"a second thing of the name 'box'; this one is called 'box_2'"}));
+}
+
+// What grows with the square of their number would take minutes.
+TEST(Names, ManyThingsOfOneNameLoadAtOnce) {
+  std::string boxes;
+  for (int i = 0; i < 20'000; ++i) boxes += "<model name='box'><link name='l'/></model>";
+  const std::clock_t before = std::clock();
+  const auto world = world_of(boxes);
+  EXPECT_LT(static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC, 20.0);
+  ASSERT_EQ(world->models.size(), 20'000u);
+  EXPECT_EQ(world->models.back().name, "box_20000");
 }
 
 TEST(Findings, SpringsOfJointsAreNamed) {
@@ -348,9 +361,9 @@ TEST(Drive, GazeboPlugins) {
     EXPECT_DOUBLE_EQ(d.track, plugin.track);
     EXPECT_EQ(d.max_speed, plugin.speed);
   }
-  const auto other = world_of(cart("<plugin filename='libgazebo_ros_planar_move.so' name='p'/>"));
+  const auto other = world_of(cart("<plugin filename='libgazebo_ros_camera.so' name='p'/>"));
   EXPECT_FALSE(other->models.at(0).model->drive);
-  EXPECT_EQ(texts(*other), (std::vector<std::string>{"plugins are not loaded: libgazebo_ros_planar_move.so"}));
+  EXPECT_EQ(texts(*other), (std::vector<std::string>{"plugins are not loaded: libgazebo_ros_camera.so"}));
 }
 
 TEST(Layout, KinematicRobotIsOneBody) {

@@ -1,4 +1,5 @@
-// URDF as robots of all kinds write it: roots named world, values as attributes, packages found by the folder they are in.
+// What robots' files do in the wild: URDF with a root named world, values as attributes, packages found by the folder
+// they are in; arms without sensors; names with spaces; SDF with the elements of its first versions.
 #include <cstdlib>
 
 #include <gtest/gtest.h>
@@ -64,6 +65,76 @@ TEST(Urdf, GravityIsTurnedOffByTextOrAttribute) {
   EXPECT_FALSE(bot.links.at(0).gravity);
   EXPECT_FALSE(bot.links.at(1).gravity);
   EXPECT_TRUE(bot.links.at(2).gravity);
+}
+
+constexpr const char* kHinged =
+    "<link name='a'/><link name='b'/><joint name='j' type='revolute'><parent>a</parent><child>b</child><axis><xyz>0 0 1</xyz></axis></joint>";
+
+std::shared_ptr<const WorldModel> world_with(const TemporaryFolder& folder, const std::string& models) {
+  return load_world(folder.write("w.sdf", "<sdf version='1.9'><world name='w'>" + models + "</world></sdf>"));
+}
+
+// An arm without sensors is a robot: its joints can be told what to do. A door is none, until somebody says so.
+TEST(Robots, AreModelsWhoseJointsTakeCommands) {
+  TemporaryFolder folder;
+  const std::string links = R"(<link name="a"/><link name="b"/><joint name="j" type=")", ends = R"("><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint></robot>)";
+  EXPECT_TRUE(load_world(folder.write("arm.urdf", "<robot name='arm'>" + links + "continuous" + ends))->models.back().is_robot());
+  EXPECT_FALSE(load_world(folder.write("box.urdf", "<robot name='box'>" + links + "fixed" + ends))->models.back().is_robot());
+  const auto is_robot = [&](const std::string& inside) { return world_with(folder, "<model name='m'>" + inside + "</model>")->models.at(0).is_robot(); };
+  const std::string hinged = kHinged;
+  EXPECT_FALSE(is_robot(hinged));
+  EXPECT_TRUE(is_robot(hinged + "<ruedo:joints/>"));
+  EXPECT_FALSE(is_robot(hinged + "<ruedo:joints/><static>true</static>"));
+  EXPECT_FALSE(is_robot("<link name='a'/><ruedo:joints/>"));
+  EXPECT_TRUE(is_robot("<model name='arm'>" + hinged + "<ruedo:joints/></model>"));
+  for (const char* plugin : {"gz-sim-joint-position-controller-system", "libignition-gazebo-joint-controller-system.so", "libgazebo_ros_control.so",
+                             "libgz_ros2_control-system.so", "gz-sim-joint-state-publisher-system", "libgazebo_ros_joint_pose_trajectory.so"}) {
+    EXPECT_TRUE(is_robot(hinged + "<plugin name='p' filename='" + plugin + "'/>")) << plugin;
+  }
+  EXPECT_FALSE(is_robot(hinged + "<plugin name='p' filename='gz-sim-wind-effects-system'/>"));
+}
+
+// Names that no channel can have are no reason to refuse a file that runs elsewhere.
+TEST(Robots, NamesAreMadeFitForChannels) {
+  TemporaryFolder folder;
+  const std::string eye = "<link name='l'><sensor name='front eye' type='imu'/></link>";
+  const auto world = world_with(folder, "<model name='cart 1'>" + eye + "</model><model name='cart/1'>" + eye + "</model><model name='a box'><link name='l'/></model>");
+  ASSERT_EQ(world->models.size(), 3u);
+  EXPECT_EQ(world->models[0].name, "cart_1");
+  EXPECT_EQ(world->models[1].name, "cart_1_2");
+  EXPECT_EQ(world->models[2].name, "a box");    // no robot: no channel
+  EXPECT_EQ(world->models[0].model->sensors.at(0).name, "front_eye");
+  EXPECT_EQ(texts(*world), (std::vector<std::string>{"the sensor name 'front eye' is not fit for a channel; it is called 'front_eye'",
+                                                     "the sensor name 'front eye' is not fit for a channel; it is called 'front_eye'",
+                                                     "the name is not fit for a channel; the robot is called 'cart_1'",
+                                                     "the name is not fit for a channel; the robot is called 'cart_1_2'"}));
+  folder.write("cart.sdf", "<sdf version='1.9'><model name='cart 1'>" + eye + "</model></sdf>");
+  LoadOptions options;
+  options.spawns = {{folder / "cart.sdf", "", 3, 3, 0}};
+  EXPECT_EQ(load_world(folder / "w.sdf", options)->models.back().name, "cart_1_3");
+  EXPECT_EQ(load_world(folder / "cart.sdf")->models.back().name, "cart_1");
+}
+
+TEST(OldSdf, JointsNameLinksInAnElement) {
+  TemporaryFolder folder;
+  const auto world = world_with(folder, "<model name='m'><link name='a'/><link name='b'><pose>0 0 2 0 0 0</pose></link>"
+      "<joint name='j' type='revolute'><pose>0 0 1 0 0 0</pose><parent><link_name>world</link_name></parent><child><link_name>b</link_name></child><axis><xyz>1 0 0</xyz></axis></joint></model>");
+  EXPECT_EQ(texts(*world), std::vector<std::string>{});
+  const Joint& joint = world->models.at(0).model->joints.at(0);
+  EXPECT_EQ(joint.parent, -1);
+  EXPECT_EQ(joint.child, 1);
+  EXPECT_LT((joint.X_MJ.translation - Vec3(0, 0, 3)).norm(), 1e-12);    // in the child's frame
+}
+
+TEST(OldSdf, MaterialScriptsAreTexts) {
+  TemporaryFolder folder;
+  const auto colours = [&](const std::string& script) {
+    return world_with(folder, "<model name='m'><link name='l'><visual name='v'><geometry><box><size>1 1 1</size></box></geometry><material>" + script + "</material></visual></link></model>");
+  };
+  const auto red = colours("<script>Gazebo/Red</script>");
+  EXPECT_EQ(texts(*red), std::vector<std::string>{});
+  EXPECT_EQ(red->models.at(0).model->links[0].visuals[0].material->diffuse, colours("<script><name>Gazebo/Red</name></script>")->models.at(0).model->links[0].visuals[0].material->diffuse);
+  EXPECT_EQ(texts(*colours("<script>Gazebo/Unheard</script>")), (std::vector<std::string>{"the material script 'Gazebo/Unheard' is not known; the colour is grey instead"}));
 }
 
 constexpr const char* kTetrahedron =

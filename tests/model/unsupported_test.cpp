@@ -1,0 +1,77 @@
+// What Ruedo does not simulate, as the files have it: each is named, and the rest of the world is there.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "model/load.h"
+
+namespace ruedo::model {
+namespace {
+
+struct Part {
+  const char* name;
+  std::string inside;     // of a model with the links a and b
+  const char* finding;
+};
+std::ostream& operator<<(std::ostream& out, const Part& part) { return out << part.name; }
+
+std::string joint(const std::string& type, const std::string& inside = "") {
+  return "<joint name='j' type='" + type + "'><parent>a</parent><child>b</child><axis><xyz>0 0 1</xyz>" + inside + "</axis></joint>";
+}
+std::string plugin(const std::string& file, const std::string& name) { return "<plugin filename='" + file + "' name='" + name + "'><left_joint>x</left_joint></plugin>"; }
+
+class Unsupported : public testing::TestWithParam<Part> {};
+
+TEST_P(Unsupported, IsNamedOnceWithItsLine) {
+  const auto world = load_world_text("<sdf version='1.9'><world name='w'>\n<model name='m'><link name='a'/><link name='b'/>\n" + GetParam().inside + "</model></world></sdf>", "/nowhere/w.sdf");
+  ASSERT_EQ(world->findings.size(), 1u);
+  EXPECT_EQ(world->findings[0].text, GetParam().finding);
+  EXPECT_EQ(world->findings[0].kind, Finding::Kind::unsupported);
+  EXPECT_EQ(world->findings[0].source.line, 3);
+  EXPECT_EQ(world->models.at(0).model->links.size(), 2u);
+  EXPECT_FALSE(world->models[0].model->drive);
+}
+
+constexpr const char* kAckermann = "an Ackermann drive is not supported, only differential ones are: the robot stands still";
+constexpr const char* kOther = "an omnidirectional or tricycle drive is not supported, only differential ones are: the robot stands still";
+
+INSTANTIATE_TEST_SUITE_P(Table, Unsupported, testing::Values(
+    Part{"AckermannOfGzSim", plugin("gz-sim-ackermann-steering-system", "gz::sim::systems::AckermannSteering"), kAckermann},
+    Part{"AckermannOfClassic", plugin("libgazebo_ros_ackermann_drive.so", "d"), kAckermann},
+    Part{"Mecanum", plugin("gz-sim-mecanum-drive-system", "gz::sim::systems::MecanumDrive"), kOther},
+    Part{"PlanarMove", plugin("libgazebo_ros_planar_move.so", "d"), kOther},
+    Part{"OtherPlugin", plugin("libx.so", "x") + plugin("liby.so", "y"), "plugins are not loaded: libx.so, liby.so"},
+    Part{"Screw", joint("screw"), "joints of type 'screw' are not supported; this one is held fixed"},
+    Part{"Gearbox", joint("gearbox"), "joints of type 'gearbox' are not supported; this one is held fixed"},
+    Part{"Mimic", joint("revolute", "<mimic joint='k'><multiplier>1</multiplier></mimic>"), "<mimic> is not supported; the joint moves freely"},
+    Part{"SensorOnAJoint", "<joint name='j' type='fixed'><parent>a</parent><child>b</child><sensor name='s' type='force_torque'/></joint>",
+         "sensors on joints are not supported"}),
+    [](const auto& info) { return std::string(info.param.name); });
+
+TEST(UnsupportedOfUrdf, MimicJoints) {
+  const auto world = load_world_text(
+      "<robot name='r'><link name='a'/><link name='b'/><link name='c'/>\n"
+      "<joint name='j' type='continuous'><parent link='a'/><child link='b'/></joint>\n"
+      "<joint name='k' type='continuous'><parent link='a'/><child link='c'/><mimic joint='j'/></joint></robot>", "/nowhere/r.urdf");
+  ASSERT_EQ(world->findings.size(), 1u);
+  EXPECT_EQ(world->findings[0].text, "<mimic> is not supported; the joint moves freely");
+  EXPECT_EQ(world->findings[0].source.line, 3);
+}
+
+// An axis by another frame's directions, in the model's (before SDF 1.5), and by the switch of 1.5 and 1.6.
+TEST(JointAxes, AreWrittenInSeveralFrames) {
+  const auto axis = [](const std::string& version, const std::string& xyz, const std::string& more = "") {
+    const auto world = load_world_text("<sdf version='" + version + "'><world name='w'><model name='m'><link name='a'/><link name='b'><pose>0 0 0 0 0 1.5707963267948966</pose></link>"
+                                       "<joint name='j' type='continuous'><parent>a</parent><child>b</child><axis>" + xyz + more + "</axis></joint></model></world></sdf>", "/nowhere/w.sdf");
+    const Joint& j = world->models.at(0).model->joints.at(0);
+    return Vec3(j.X_MJ.rotation * j.axis.axis_in_J);    // in the model's frame
+  };
+  EXPECT_LT((axis("1.9", "<xyz>1 0 0</xyz>") - Vec3(0, 1, 0)).norm(), 1e-12);    // the joint's frame is that of b
+  EXPECT_LT((axis("1.9", "<xyz expressed_in='a'>1 0 0</xyz>") - Vec3(1, 0, 0)).norm(), 1e-12);
+  EXPECT_LT((axis("1.9", "<xyz expressed_in='__model__'>0 3 0</xyz>") - Vec3(0, 1, 0)).norm(), 1e-12);
+  EXPECT_LT((axis("1.4", "<xyz>1 0 0</xyz>") - Vec3(1, 0, 0)).norm(), 1e-12);
+  EXPECT_LT((axis("1.6", "<xyz>1 0 0</xyz>", "<use_parent_model_frame>true</use_parent_model_frame>") - Vec3(1, 0, 0)).norm(), 1e-12);
+  EXPECT_LT((axis("1.6", "<xyz>1 0 0</xyz>") - Vec3(0, 1, 0)).norm(), 1e-12);
+}
+
+}  // namespace
+}  // namespace ruedo::model
