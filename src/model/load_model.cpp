@@ -32,6 +32,7 @@ LoadedModel read(const std::string& path, const std::string& world_file, std::sh
   if (!included.model || !included.model->model) throw InputError({path, 0}, "holds no <model>, or one without a link");
   for (const std::string& file : meshes.files_read()) documents.note(file);
   LoadedModel loaded{included.model->model, included.name, findings.list(), documents.files_read()};
+  if (ModelInstance{loaded.name, {}, loaded.model}.is_robot()) loaded.name = made_fit_for_channel(loaded.name);
   if (loaded.model->links.size() > kMostLinksOfSpawned) {
     throw InputError(loaded.model->source, "the model '" + loaded.name + "' has " + std::to_string(loaded.model->links.size()) +
                                                " links; allowed are " + std::to_string(kMostLinksOfSpawned));

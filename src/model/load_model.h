@@ -13,7 +13,7 @@ inline constexpr size_t kMostLinksOfSpawned = 1000;
 
 struct LoadedModel {
   std::shared_ptr<const Model> model;
-  std::string name;                       // as the file says
+  std::string name;                       // as the file says; a robot's is fit for channels
   std::vector<Finding> findings;
   std::vector<std::string> files_read;    // absolute paths: its own, meshes, pictures
 };

@@ -6,6 +6,7 @@
 
 #include "model/body_layout.h"
 #include "model/load.h"
+#include "model/load_model.h"
 #include "temporary_folder.h"
 
 namespace ruedo::model {
@@ -113,6 +114,7 @@ TEST(Robots, NamesAreMadeFitForChannels) {
   options.spawns = {{folder / "cart.sdf", "", 3, 3, 0}};
   EXPECT_EQ(load_world(folder / "w.sdf", options)->models.back().name, "cart_1_3");
   EXPECT_EQ(load_world(folder / "cart.sdf")->models.back().name, "cart_1");
+  EXPECT_EQ(load_model(folder / "cart.sdf", folder / "w.sdf").name, "cart_1");
 }
 
 TEST(OldSdf, JointsNameLinksInAnElement) {
