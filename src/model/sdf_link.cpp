@@ -2,6 +2,7 @@
 #include "model/sdf_link.h"
 
 #include <cmath>
+#include <optional>
 #include <set>
 
 #include <Eigen/Eigenvalues>
@@ -92,7 +93,52 @@ Eigen::Matrix3d box_inertia(double mass, const Link& link, Vec3& size) {
   return Vec3(mass / 12 * (s2.y() + s2.z()), mass / 12 * (s2.x() + s2.z()), mass / 12 * (s2.x() + s2.y())).asDiagonal();
 }
 
-Inertial read_inertial(const Element& element, const Link& link, const Pose& X_LI, const std::string& where, ReadContext& context) {
+// Volume, and the moments about the middle for a density of 1; nullopt: a shape of which they are not known.
+std::optional<std::pair<double, Vec3>> solid(const Geometry& geometry) {
+  const double x = geometry.size.x(), y = geometry.size.y(), z = geometry.size.z();
+  const auto with = [](double volume, double xx, double yy, double zz) { return std::pair(volume, Vec3(volume * Vec3(xx, yy, zz))); };
+  switch (geometry.shape) {
+    case Shape::box: return with(x * y * z, (y * y + z * z) / 12, (x * x + z * z) / 12, (x * x + y * y) / 12);
+    case Shape::sphere: return with(4.0 / 3 * M_PI * x * x * x, 0.4 * x * x, 0.4 * x * x, 0.4 * x * x);
+    case Shape::cylinder: return with(M_PI * x * x * y, x * x / 4 + y * y / 12, x * x / 4 + y * y / 12, x * x / 2);
+    case Shape::ellipsoid: return with(4.0 / 3 * M_PI * x * y * z, (y * y + z * z) / 5, (x * x + z * z) / 5, (x * x + y * y) / 5);
+    default: return std::nullopt;
+  }
+}
+
+// auto="true": mass, centre and moments of the collisions' solids (of SDF's default density, 1000 kg/m^3, where none is
+// written), scaled to <mass> if there is one. False when a shape is none of those that are known.
+bool computed_inertial(const Element& element, const Element& link_element, const Link& link, Inertial& inertial) {
+  const std::vector<const Element*> written = link_element.all("collision");
+  const double usual = element.number("density", 1000.0, Allowed::positive());
+  double mass = 0;
+  Vec3 moment = Vec3::Zero();
+  Eigen::Matrix3d about_link = Eigen::Matrix3d::Zero();
+  for (const Collision& c : link.collisions) {
+    const auto shape = solid(c.geometry);
+    if (!shape) return false;
+    double density = usual;
+    for (const Element* each : written) {
+      if (required_name(*each) == c.name) density = each->number("density", usual, Allowed::positive());
+    }
+    const double m = density * shape->first;
+    const Vec3 at = c.X_LC.translation;
+    const Eigen::Matrix3d R = c.X_LC.rotation.toRotationMatrix();
+    mass += m;
+    moment += m * at;
+    about_link += R * Vec3(density * shape->second).asDiagonal() * R.transpose() + m * (at.squaredNorm() * Eigen::Matrix3d::Identity() - at * at.transpose());
+  }
+  if (!(mass > 0)) return false;
+  const Vec3 centre = moment / mass;
+  const double scale = element.has("mass") ? inertial.mass / mass : 1.0;
+  inertial.mass = mass * scale;
+  inertial.X_LI = Pose{};
+  inertial.X_LI.translation = centre;
+  inertial.inertia = scale * (about_link - mass * (centre.squaredNorm() * Eigen::Matrix3d::Identity() - centre * centre.transpose()));
+  return true;
+}
+
+Inertial read_inertial(const Element& element, const Element& link_element, const Link& link, const Pose& X_LI, const std::string& where, ReadContext& context) {
   report_other_children(element, {"pose", "mass", "inertia", "density"}, {"fluid_added_mass", "auto_inertia_params"}, where, context.findings);
   Inertial inertial;
   inertial.X_LI = X_LI;
@@ -103,6 +149,7 @@ Inertial read_inertial(const Element& element, const Link& link, const Pose& X_L
   }
   const std::string* automatic = element.attribute("auto");
   if (automatic && (*automatic == "true" || *automatic == "1")) {
+    if (computed_inertial(element, link_element, link, inertial)) return inertial;
     Vec3 size;
     inertial.inertia = box_inertia(inertial.mass, link, size);
     context.findings.repaired(element.source, where, "auto=\"true\" is not computed from the shapes; the inertia is that of a box of " + in_words(size));
@@ -208,7 +255,7 @@ Link read_link(const Element& element, const PoseInLink& pose_in_link, const std
     }
   }
   if (const Element* inertial = element.child("inertial")) {
-    link.inertial = read_inertial(*inertial, link, pose_in_link(*inertial), where + "/inertial", context);
+    link.inertial = read_inertial(*inertial, element, link, pose_in_link(*inertial), where + "/inertial", context);
   }
   return link;
 }

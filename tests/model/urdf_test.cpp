@@ -117,6 +117,40 @@ TEST(Robots, NamesAreMadeFitForChannels) {
   EXPECT_EQ(load_model(folder / "cart.sdf", folder / "w.sdf").name, "cart_1");
 }
 
+// auto="true": a box of 0.2 x 0.4 x 0.6 m and 500 kg/m^3, 1 m up; two spheres on a line; a cylinder that lies.
+TEST(AutoInertia, IsThatOfTheSolids) {
+  TemporaryFolder folder;
+  const auto world = [&](const std::string& inertial, const std::string& collisions) {
+    return world_with(folder, "<model name='m'><link name='l'>" + inertial + collisions + "</link></model>");
+  };
+  const auto of = [&](const std::string& inertial, const std::string& collisions) { return world(inertial, collisions)->models.at(0).model->links[0].inertial; };
+  const auto moments = [](const Inertial& i) { return Vec3(i.inertia.diagonal()); };
+  const std::string sphere = "<geometry><sphere><radius>0.1</radius></sphere></geometry></collision>";
+  const std::string box = "<collision name='a'><density>500</density><pose>0 0 1 0 0 0</pose><geometry><box><size>0.2 0.4 0.6</size></box></geometry></collision>";
+  const Inertial one = of("<inertial auto='true'/>", box);
+  EXPECT_NEAR(one.mass, 24, 1e-9);
+  EXPECT_LT((one.X_LI.translation - Vec3(0, 0, 1)).norm(), 1e-12);
+  EXPECT_LT((moments(one) - Vec3(1.04, 0.8, 0.4)).norm(), 1e-9);
+  const Inertial told = of("<inertial auto='true'><mass>12</mass></inertial>", box);
+  EXPECT_EQ(told.mass, 12);
+  EXPECT_LT((moments(told) - Vec3(0.52, 0.4, 0.2)).norm(), 1e-9);
+
+  const Inertial pair = of("<inertial auto='true'><density>3000</density></inertial>", "<collision name='a'><density>1000</density><pose>-0.5 0 0 0 0 0</pose>" + sphere +
+                           "<collision name='b'><pose>0.5 0 0 0 0 0</pose>" + sphere);
+  const double light = 1000 * 4.0 / 3 * M_PI * 1e-3;
+  EXPECT_NEAR(pair.mass, 4 * light, 1e-9);
+  EXPECT_LT((pair.X_LI.translation - Vec3(0.25, 0, 0)).norm(), 1e-12);
+  EXPECT_NEAR(pair.inertia(0, 0), 4 * light * 0.4 * 0.01, 1e-9);
+  EXPECT_NEAR(pair.inertia(1, 1), 4 * light * 0.4 * 0.01 + light * 0.75 * 0.75 + 3 * light * 0.25 * 0.25, 1e-9);
+
+  const Inertial lying = of("<inertial auto='true'/>", "<collision name='a'><pose>0 0 0 0 1.5707963267948966 0</pose><geometry><cylinder><radius>0.1</radius><length>1</length></cylinder></geometry></collision>");
+  EXPECT_NEAR(lying.mass, 10 * M_PI, 1e-9);
+  EXPECT_NEAR(lying.inertia(0, 0), 10 * M_PI * 0.005, 1e-9);
+  EXPECT_NEAR(lying.inertia(2, 2), 10 * M_PI * (0.0025 + 1.0 / 12), 1e-9);
+  EXPECT_EQ(texts(*world("<inertial auto='true'/>", box)), std::vector<std::string>{});
+  EXPECT_EQ(texts(*world("<inertial auto='true'/>", "")).size(), 1u);    // nothing to compute it from
+}
+
 TEST(OldSdf, JointsNameLinksInAnElement) {
   TemporaryFolder folder;
   const auto world = world_with(folder, "<model name='m'><link name='a'/><link name='b'><pose>0 0 2 0 0 0</pose></link>"
