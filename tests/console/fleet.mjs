@@ -11,9 +11,9 @@ export default async function fleet({ page, given, until, check, still, picture 
     window.costs = [];
     poses.add = (state, at) => { const begun = performance.now(); add(state, at); adding += performance.now() - begun; if (state.part === 0) ++window.states; };
     stage.frame = (at, overlays) => {
-      const begun = performance.now(), before = stage.frames;
+      const begun = performance.now(), moving = !poses.settled;
       frame(at, overlays);
-      if (stage.frames === before) return;
+      if (!moving) return;    // what is drawn again without motion is cheaper
       window.costs.push(adding + performance.now() - begun);
       adding = 0;
     };
@@ -29,7 +29,7 @@ export default async function fleet({ page, given, until, check, still, picture 
       window.costs = [];
       window.states = 0;
       const look = () => {    // for so long, and so many frames
-        if (performance.now() - from.at < s * 1000 || stage.frames < from.frames + 4) return void setTimeout(look, 50);
+        if (performance.now() - from.at < s * 1000 || window.costs.length < 4) return void setTimeout(look, 50);
         done({ frames: stage.frames - from.frames, wall: performance.now() - from.at, costs: window.costs, states: window.states, level: stage.quality.now });
       };
       look();

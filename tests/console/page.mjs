@@ -22,7 +22,7 @@ export default async function looks({ page, url, seen, told, until, check, ready
   }
   const best = loads.sort((a, b) => a.drawn_ms - b.drawn_ms)[0];
   console.log(`measured: ${JSON.stringify(best)}`);
-  check("the page is small", best.requests > 4 && best.requests < 20 && best.kilobytes < 4000, JSON.stringify(best));
+  check("the page is small", best.requests > 4 && best.requests < 20 && best.kilobytes < 1000, JSON.stringify(best));
   check("the world is drawn soon", best.drawn_ms < 60_000, `${best.drawn_ms} ms`);
   await page.setViewportSize({ width: 900, height: 520 });
   await ready();
