@@ -52,7 +52,8 @@ def test_a_drive_option_says_what_it_looks_like(text):
 
 def test_a_urdf_without_a_plugin_gets_a_drive(tmp_path):
     (tmp_path / "cart.urdf").write_text(URDF)
-    assert json.loads(ruedo("info", tmp_path / "cart.urdf", "--json").stdout)["robots"] == []
+    robots = json.loads(ruedo("info", tmp_path / "cart.urdf", "--json").stdout)["robots"]
+    assert [(robot["name"], robot["drive"]) for robot in robots] == [("cart", "")]    # its joints take commands, as an arm's do
     robots = json.loads(ruedo("info", tmp_path / "cart.urdf", "--drive", "cart=jl,jr", "--json").stdout)["robots"]
     assert [(robot["name"], robot["drive"], robot["wheels"]) for robot in robots] == [("cart", "kinematic", ["jl", "jr"])]
     assert abs(robots[0]["track"] - 0.4) < 1e-9

@@ -2,6 +2,7 @@
 #include <filesystem>
 
 #include "control_client.h"
+#include "ruedo/grant_request_t.hpp"
 
 namespace ruedo::server {
 namespace {
@@ -11,6 +12,12 @@ class Features : public testing::Test, protected Controlled {
   // Requests with an empty body: what is served finds something wrong with it, or does it.
   void expect_truth(const ServerOptions& options) {
     begin(options, robot_sdf("r", 0, 0));
+    if (options.lockstep.clients > 0) {    // step 0 waits for its client
+      grant_request_t taking_part;
+      taking_part.granted = taking_part.step_until = taking_part.received = -1;
+      taking_part.ncommands = 0;
+      EXPECT_EQ(ask(request_t::GRANT, encoded(taking_part)).code, reply_t::OK);
+    }
     const int64_t features = info().features;
     EXPECT_TRUE(features >> request_t::LEAVE & 1);
     EXPECT_TRUE(features >> request_t::QUIT & 1);
@@ -31,6 +38,14 @@ TEST_F(Features, OfAPlainServer) {
   EXPECT_TRUE(served_ >> request_t::SPAWN & 1);
   EXPECT_FALSE(served_ >> request_t::GRANT & 1);
   EXPECT_FALSE(served_ >> request_t::SNAPSHOT & 1);
+}
+
+TEST_F(Features, OfLockstep) {
+  ServerOptions options;
+  options.lockstep.clients = 1;
+  expect_truth(options);
+  EXPECT_TRUE(served_ >> request_t::GRANT & 1);
+  EXPECT_TRUE(served_ >> request_t::RESEND & 1);
 }
 
 TEST_F(Features, OfOneThatSavesSnapshots) {
