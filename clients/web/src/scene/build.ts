@@ -1,12 +1,16 @@
 // Turns the description into instanced meshes: all links of a kind are one mesh for each of its surfaces, so that a
 // thousand robots are a few draw calls.
 import * as THREE from "three";
+import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 import { Flag, type LinkData, type Part, type SceneFiles } from "./description";
 
-const kManyLinks = 150;    // of a kind: round shapes get fewer segments then
+const kManyLinks = 150;    // of a kind: round shapes get fewer segments then, and those far away are boxes
+const kSmall = 0.5;        // of a link's largest part: smaller ones are left out far away
 
 // Links of one kind that move, and the meshes that show them.
-export interface Movers { links: LinkData[]; indices: number[]; meshes: THREE.InstancedMesh[] }
+export interface Movers { links: LinkData[]; indices: number[]; meshes: THREE.InstancedMesh[]; far: Far | null }
+// Of many links: what shows those far away, and the matrices of all of them.
+export interface Far { mesh: THREE.InstancedMesh; matrices: Float32Array }
 export interface Built {
   still: THREE.Group;
   moving: THREE.Group;
@@ -63,7 +67,7 @@ export class SceneBuilder {
           if (surface.ground) built.grounds.push(mesh);
           return mesh;
         });
-        return { links, indices: chosen, meshes };
+        return { links, indices: chosen, meshes, far: moves && indices.length > kManyLinks ? this.far(parts, links.length, into) : null };
       };
       const stillOnes = place(false, still);
       if (stillOnes) {
@@ -97,6 +101,33 @@ export class SceneBuilder {
       const [, , , texture, flags] = this.batch(first, many);
       return { geometry: this.merge(group, many), material: this.material(first, texture, flags), shadow: first.shadow, ground: (flags & Flag.ground) !== 0 };
     });
+  }
+
+  // The boxes around the larger parts: a dozen triangles each, for links of a few pixels.
+  private far(parts: Part[], links: number, into: THREE.Group): Far | null {
+    const boxes = parts.map((part) => {
+      const [meshIndex, first, count] = this.batch(part, true);
+      const { vertices, indices } = this.files.meshes[meshIndex]!;
+      const box = new THREE.Box3(), point = new THREE.Vector3(), m = part.matrix;
+      for (let i = first; i < first + count; ++i) box.expandByPoint(point.fromArray(vertices, 8 * indices[i]!));
+      const matrix = new THREE.Matrix4().set(m[0]!, m[1]!, m[2]!, m[3]!, m[4]!, m[5]!, m[6]!, m[7]!, m[8]!, m[9]!, m[10]!, m[11]!, 0, 0, 0, 1);
+      const size = box.getSize(new THREE.Vector3()), centre = box.getCenter(new THREE.Vector3());
+      const geometry = new THREE.BoxGeometry(size.x, size.y, size.z).translate(centre.x, centre.y, centre.z).applyMatrix4(matrix);
+      const colour = sRGB(part.diffuse), corners = geometry.getAttribute("position").count;
+      geometry.setAttribute("color", new THREE.Float32BufferAttribute(Array.from({ length: corners }, () => colour.toArray()).flat(), 3));
+      geometry.computeBoundingSphere();
+      geometry.computeBoundingBox();
+      return geometry;
+    }).sort((a, b) => b.boundingSphere!.radius - a.boundingSphere!.radius);
+    const seen = boxes.filter((box, i) => box.boundingSphere!.radius >= kSmall * boxes[0]!.boundingSphere!.radius &&
+      !boxes.slice(0, i).some((larger) => larger.boundingBox!.containsBox(box.boundingBox!)));
+    const geometry = seen.length > 0 ? mergeGeometries(seen) : null;
+    if (!geometry) return null;
+    const mesh = new THREE.InstancedMesh(geometry, new THREE.MeshLambertMaterial({ vertexColors: true, side: THREE.DoubleSide }), links);
+    mesh.instanceMatrix.setUsage(THREE.DynamicDrawUsage);
+    mesh.frustumCulled = false;
+    into.add(mesh);
+    return { mesh, matrices: new Float32Array(16 * links) };
   }
 
   private batch(part: Part, many: boolean) { return this.files.description.batches[many ? part.small : part.batch]!; }

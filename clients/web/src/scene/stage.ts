@@ -9,6 +9,8 @@ import type { Poses } from "../state/poses";
 export type ViewMode = "orbit" | "follow" | "top";
 const kShadowReach_m = 14;
 const kMostLamps = 6;
+const kFar_m = 18;    // from the camera; a robot of half a metre is then some 24 pixels of a laptop's screen
+const kNoWheels_m = 50;
 
 export class Stage {
   readonly scene = new THREE.Scene();
@@ -27,6 +29,7 @@ export class Stage {
   private sun: THREE.DirectionalLight | null = null;
   private dirty = true;
   private moved = false;
+  private regroup = false;           // what is near and what is far has changed
   private linkWheel = new Map<number, { robot: number; place: number; axis: THREE.Vector3; centre: THREE.Vector3 }>();
   private readonly followed = new THREE.Vector3();
   private following = -1;            // index into the description's bases
@@ -48,7 +51,10 @@ export class Stage {
     this.controls.enableDamping = true;
     this.controls.dampingFactor = 0.15;
     this.controls.maxPolarAngle = Math.PI / 2 - 0.02;
-    this.controls.addEventListener("change", () => this.touch());
+    this.controls.addEventListener("change", () => {
+      this.regroup = true;
+      this.touch();
+    });
     this.scene.add(this.lights);
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement!);
     this.resize();
@@ -255,6 +261,8 @@ export class Stage {
     this.dirty = false;
     if (this.quality.drawn(at_ms)) this.refine();
     const begun = performance.now();
+    if (this.regroup) for (const movers of this.built?.movers ?? []) this.group(movers);
+    this.regroup = false;
     this.aimSun();
     this.renderer.render(this.scene, this.camera);
     ++this.frames;
@@ -265,11 +273,11 @@ export class Stage {
   private place(all: boolean): void {
     if (!this.built || (this.poses.size === 0 && !all)) return;
     for (const movers of this.built.movers) this.placeMovers(movers);
-    this.moved = true;
+    this.moved = this.regroup = true;
   }
 
-  private placeMovers({ links, indices, meshes }: Movers): void {
-    const array = meshes[0]!.instanceMatrix.array as Float32Array;
+  private placeMovers({ links, indices, meshes, far }: Movers): void {
+    const array = far?.matrices ?? meshes[0]!.instanceMatrix.array as Float32Array;
     for (let i = 0; i < links.length; ++i) {
       const link = links[i]!;
       matrixOf(link.pose, 0, kLocal);
@@ -283,10 +291,26 @@ export class Stage {
       else kLocal.multiplyScalar(0);
       kLocal.toArray(array, 16 * i);
     }
-    for (const mesh of meshes) {
-      if (mesh !== meshes[0]) (mesh.instanceMatrix.array as Float32Array).set(array);
-      mesh.instanceMatrix.needsUpdate = true;
+    if (!far) spread(meshes);
+  }
+
+  // Shares many links out: those far from the camera are shown as boxes, wheels still farther not at all.
+  private group({ links, indices, meshes, far }: Movers): void {
+    if (!far) return;
+    const near = meshes[0]!.instanceMatrix.array as Float32Array, away = far.mesh.instanceMatrix.array as Float32Array;
+    const { matrices } = far, eye = this.camera.position;
+    let nearOnes = 0, farOnes = 0;
+    for (let i = 0; i < links.length; ++i) {
+      const at = 16 * i, dx = matrices[at + 12]! - eye.x, dy = matrices[at + 13]! - eye.y, dz = matrices[at + 14]! - eye.z;
+      const away_m = Math.hypot(dx, dy, dz);
+      if (away_m > kNoWheels_m && this.linkWheel.has(indices[i]!)) continue;
+      const isFar = away_m > kFar_m, into = isFar ? away : near, place = 16 * (isFar ? farOnes++ : nearOnes++);
+      for (let k = 0; k < 16; ++k) into[place + k] = matrices[at + k]!;
     }
+    far.mesh.count = farOnes;
+    far.mesh.instanceMatrix.needsUpdate = true;
+    for (const mesh of meshes) mesh.count = nearOnes;
+    spread(meshes);
   }
 
   private track(): void {
@@ -320,6 +344,14 @@ export class Stage {
 
 const kScratch = new THREE.Matrix4(), kScratch2 = new THREE.Matrix4(), kLocal = new THREE.Matrix4(), kTurn = new THREE.Matrix4(), kSpin = new THREE.Matrix4(), kBack = new THREE.Matrix4();
 const kPosition = new THREE.Vector3(), kRotation = new THREE.Quaternion(), kOne = new THREE.Vector3(1, 1, 1);
+
+// Gives the first mesh's matrices to the others.
+function spread(meshes: THREE.InstancedMesh[]): void {
+  for (const mesh of meshes) {
+    if (mesh !== meshes[0]) (mesh.instanceMatrix.array as Float32Array).set(meshes[0]!.instanceMatrix.array);
+    mesh.instanceMatrix.needsUpdate = true;
+  }
+}
 
 // The matrix of a pose x, y, z, qw, qx, qy, qz at that place of an array.
 export function matrixOf(pose: ArrayLike<number>, at: number, into: THREE.Matrix4): THREE.Matrix4 {
