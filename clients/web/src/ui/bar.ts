@@ -31,6 +31,7 @@ export class Bar {
   private readonly stepButton: HTMLButtonElement;
   private readonly resetButton: HTMLButtonElement;
   private readonly rate = h("select", { class: "roomy", title: "sim time per real time that is asked for", "aria-label": "rate" },
+    h("option", { value: "", hidden: true }, "rate"),    // nobody has asked for one here; what it is stands beside
     ...["0.1", "0.25", "0.5", "1", "2", "5", "10", "max"].map((value) => h("option", { value }, value === "max" ? "max" : `× ${value}`)));
   private readonly modes = new Map<string, HTMLButtonElement>();
   private paused: boolean | null = null;
@@ -40,7 +41,7 @@ export class Bar {
     this.pause.id = "pause";
     this.stepButton = iconButton("step", "one step while paused (.)", () => actions.step());
     this.resetButton = iconButton("reset", "reset the world (R)", () => actions.reset());
-    this.rate.value = "1";
+    this.rate.value = "";
     this.rate.addEventListener("change", () => this.rate.blur());
     this.rate.addEventListener("change", () => actions.rate(this.rate.value === "max" ? Infinity : Number(this.rate.value)));
     const view = h("span", { class: "row", style: "flex-wrap: nowrap; gap: 4px" });
