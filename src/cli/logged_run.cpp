@@ -20,7 +20,7 @@ LoggedOptions read_options(const log_header_t& header, const std::string& log) {
     else if (name == "--set") world.settings.push_back(value);
     else if (name == "--disable") world.disabled.push_back(value);
     else if (name == "--no-noise") world.no_noise = true;
-    else if (name == "--remap") options.remaps.push_back(parse_remap(value));
+    else if (name == "--remap") options.remaps.push_back(with_options_of(log, [&] { return parse_remap(value); }));
     else throw InputError({log}, "its run had the option " + option + ", which this version does not know");
   }
   return options;
@@ -34,7 +34,7 @@ server::LoggedRun load_run(const log_header_t& header, const std::string& log) {
   } catch (const InputError& error) {
     run.warning = std::string("The world may not be the recorded one: ") + error.what();
   }
-  run.world = load(options.world);
+  run.world = with_options_of(log, [&] { return load(options.world); });
   run.disabled = std::move(options.world.disabled);
   run.remaps = std::move(options.remaps);
   return run;

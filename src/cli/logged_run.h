@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cli/commands.h"
+#include "ruedo/errors.h"
 #include "ruedo/log_header_t.hpp"
 #include "server/log_worlds.h"
 
@@ -18,6 +19,18 @@ struct LoggedOptions {
 
 // log: names it in messages. Throws InputError for a header without a world, or with an option that is not known.
 LoggedOptions read_options(const log_header_t& header, const std::string& log);
+
+// What `repeat` returns. An option that is wrong there was not typed by the user, it stands in the log: the InputError that
+// it makes names the log.
+template <typename Repeat>
+auto with_options_of(const std::string& log, Repeat repeat) {
+  try {
+    return repeat();
+  } catch (const InputError& error) {
+    if (!error.source().file.empty()) throw;
+    throw InputError({log}, "its run had " + error.message());
+  }
+}
 
 // The run to show. A world whose files were changed is shown as it is now, with a warning. Throws InputError, too, when the
 // world cannot be read.

@@ -26,9 +26,7 @@ std::string describe(const server::FirstDifference& difference) {
   return fmt::format("{}: {} is {} in the log, {} in the repetition", where, difference.field, difference.logged, difference.repeated);
 }
 
-int verify(const VerifyArguments& arguments) {
-  const log_header_t header = server::read_header(arguments.log);
-  server::check_files(header, arguments.log);
+int repeat(const VerifyArguments& arguments, const log_header_t& header) {
   LoggedOptions logged = read_options(header, arguments.log);
   server::ServerOptions options;
   options.remaps = std::move(logged.remaps);
@@ -54,6 +52,12 @@ int verify(const VerifyArguments& arguments) {
   fmt::print("{}: repeated byte for byte: {}\n", arguments.log, so_far);
   if (!result.fault.empty()) fmt::print("{}: {}; verified up to there\n", arguments.log, result.fault);
   return kGood;
+}
+
+int verify(const VerifyArguments& arguments) {
+  const log_header_t header = server::read_header(arguments.log);
+  server::check_files(header, arguments.log);
+  return with_options_of(arguments.log, [&] { return repeat(arguments, header); });
 }
 
 void add_verify(CLI::App& app, Action& chosen) {

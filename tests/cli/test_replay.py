@@ -269,6 +269,21 @@ def test_damaged_logs_are_answered(tmp_path):
         assert program("verify", tmp_path / "bad.lcm").returncode in (0, 1, 3, 4)
 
 
+@pytest.mark.parametrize("option, words", [("--disable=p3at/ca}era", "no device 'ca}era'"), ("--disable=P3at/camera", "no robot 'P3at'"),
+                                           ("--set=p3at/lrf.update_rate", "--set 'p3at/lrf.update_rate'"), ("--remap=x", "--remap 'x'"),
+                                           ("--remap=p3at/nothing=A", "p3at/nothing"), ("--spawn=p3at@1", "--spawn 'p3at@1'")])
+def test_a_damaged_option_is_the_logs_fault(tmp_path, option, words):
+    found = record(tmp_path / "good.lcm", seconds=1)
+    header = log_header_t.decode(found[0][2])
+    header.options = [*header.options, option]
+    header.noptions += 1
+    found[0] = (*found[0][:2], header.encode())
+    write(tmp_path / "bad.lcm", found)
+    result = program("verify", tmp_path / "bad.lcm")
+    assert result.returncode == 3, result.stderr
+    assert "bad.lcm: its run had " in result.stderr and words in result.stderr
+
+
 class Listener:
     """All messages of a bus. Over TCP: multicast may lose some where the listener gets no time to listen."""
 

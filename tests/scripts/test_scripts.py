@@ -2,6 +2,7 @@
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
@@ -113,3 +114,18 @@ def test_shellcheck(script):
         pytest.skip("shellcheck is not installed")
     result = subprocess.run(["shellcheck", "-x", script], capture_output=True, text=True)
     assert result.returncode == 0, result.stdout
+
+
+def test_failed_tests_are_told_again_at_the_end(tmp_path):
+    (tmp_path / "CTestTestfile.cmake").write_text("""
+add_test(good "true")
+add_test(bad "sh" "-c" "seq 100; printf 'red <&]]>'; exit 3")
+add_test(late "sh" "-c" "echo begun; sleep 9")
+set_tests_properties(late PROPERTIES TIMEOUT 1)
+""")
+    report = tmp_path / "tests.xml"
+    assert subprocess.run(["ctest", "--output-junit", report], cwd=tmp_path, capture_output=True).returncode != 0
+    told = subprocess.run([sys.executable, ROOT / "scripts/failed_tests.py", report], capture_output=True, text=True, check=True).stdout
+    first, *output = told.splitlines()
+    assert first.startswith("--- bad failed after ") and output[:2] == ["42", "43"] and output[59] == "red <&]]>"
+    assert output[60].startswith("--- late failed after 1") and output[61:] == ["begun", "---"]
