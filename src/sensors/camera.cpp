@@ -53,7 +53,6 @@ class Camera : public Sensor {
     X_BC_ = link.X_BL * X_LC_;
     layout_ = &setup.layout;
     link_ = setup.link;
-    read_format(camera, setup);
     read_noise(camera, setup);
     vignette_ = Vignette(element.number("ruedo:vignetting", 0.0, Allowed::between(0.0, 1.0)), lens_.width, lens_.height);
     const std::string* type = element.attribute("type");
@@ -61,6 +60,7 @@ class Camera : public Sensor {
     if (depth) depth_channel_ = setup.channel<image_t>("depth");
     const bool labels = element.boolean("ruedo:labels", false);
     if (labels) labels_channel_ = setup.channel<image_t>("labels");
+    read_format(camera, setup);
     picture_.want_depth = depth;
     picture_.want_labels = labels;
 
@@ -109,7 +109,8 @@ class Camera : public Sensor {
     const std::string format = camera.string("image/format", "R8G8B8");
     grey_ = encoding_ == Encoding::grey || format == "L8" || format == "L_INT8";
     const bool colour = format == "R8G8B8" || format == "RGB_INT8" || format == "B8G8R8" || format == "BGR_INT8";
-    if (!grey_ && !colour && setup.findings) {
+    const bool depth = depth_channel_ >= 0 && (format == "R_FLOAT32" || format == "FLOAT32");    // as it is published beside
+    if (!grey_ && !colour && !depth && setup.findings) {
       setup.findings->unsupported(camera.child("image/format")->source, "sensor " + setup.device + "/camera/image/format",
                                   "the format '" + format + "' is not supported: the camera gives R8G8B8");
     }

@@ -88,6 +88,23 @@ def test_files_that_are_wrong(name, tmp_path):
     assert check(tmp_path / "w.sdf", "--strict").returncode == (code or 1)
 
 
+SERVED = ["camera", "depth", "depth_camera", "rgbd", "rgbd_camera", "ray", "lidar", "gpu_ray", "gpu_lidar", "sonar", "imu", "contact"]
+NOT_SERVED = ["air_pressure", "air_speed", "altimeter", "boundingbox_camera", "custom", "dvl", "gps", "logical_camera", "magnetometer", "multicamera",
+              "navsat", "rfid", "rfidtag", "segmentation_camera", "thermal_camera", "wideanglecamera", "wireless_receiver", "wireless_transmitter"]
+
+
+def test_every_kind_of_sensor_is_served_or_named(tmp_path):
+    kinds = SERVED + NOT_SERVED
+    sensors = "\n".join(f"<sensor name='s{i}' type='{kind}'><update_rate>10</update_rate></sensor>" for i, kind in enumerate(kinds))
+    joint = "<link name='arm'/><joint name='j' type='fixed'><parent>l</parent><child>arm</child>\n<sensor name='f' type='force_torque'/></joint>"
+    (tmp_path / "w.sdf").write_text(world(f"<model name='m'><link name='l'>\n{sensors}\n</link>{joint}</model>"))
+    named = {(f["line"], f["element"]): f["text"] for f in json.loads(check(tmp_path / "w.sdf", "--json").stdout) if f["kind"] == "unsupported"}
+    wanted = {(4 + i, f"model m/sensor s{i}"): f"sensors of type '{kind}' are not supported; the robot runs without it"
+              for i, kind in enumerate(kinds) if kind in NOT_SERVED}
+    wanted[5 + len(kinds), "model m/joint j"] = "sensors on joints are not supported"
+    assert named == wanted
+
+
 def test_equal_findings_are_one_with_all_its_places(tmp_path):
     boxes = "\n".join(f"<collision name='{i}'><geometry><bx/></geometry></collision>" for i in range(3))
     (tmp_path / "w.sdf").write_text(in_link(boxes))

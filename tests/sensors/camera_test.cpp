@@ -197,6 +197,20 @@ TEST(Camera, DepthOfAWallAndOfTheFloor) {
   EXPECT_EQ(Shot(world_with(floor)).channel("/depth"), -1);
 }
 
+TEST(Camera, AFormatThatIsNotGivenIsNamed) {
+  const auto named = [](const std::string& type, const std::string& format) {
+    std::string sdf = world_with("", "", "", type);
+    sdf.replace(sdf.find("</image>"), 8, "<format>" + format + "</format></image>");
+    SensorBench bench(sdf);
+    bench.make("eye", "camera");
+    return bench.findings.list().size();
+  };
+  EXPECT_EQ(named("camera", "R8G8B8"), 0u);
+  EXPECT_EQ(named("camera", "BAYER_RGGB8"), 1u);
+  EXPECT_EQ(named("camera", "R_FLOAT32"), 1u);
+  EXPECT_EQ(named("depth_camera", "R_FLOAT32"), 0u);    // that is what its depth is
+}
+
 TEST(Camera, Labels) {
   Shot shot(world_with(box("left", "4 1 1 0 0 0", "1 1 1", "") + box("right", "4 -1 1 0 0 0", "1 1 1", ""), "",
                        "<ruedo:labels>true</ruedo:labels>"));
