@@ -60,8 +60,33 @@ std::optional<Geometry> read_polyline(const Element& geometry_element, const Ele
   }
 }
 
+// The first <texture>'s diffuse picture, tiled over the ground. Gazebo blends further ones in by height; here they are named.
+void cover_with_texture(const Element& element, const Vec3& size, Mesh& mesh, const std::string& where, ReadContext& context) {
+  const Element* texture = element.child("texture");
+  const Element* picture = texture ? texture->child("diffuse") : nullptr;
+  if (!picture) return;
+  for (const auto& child : element.children) {
+    if (child->name != "texture" || child.get() == texture) continue;
+    context.findings.unsupported(child->source, where, "a heightmap has one <texture>; this one is not blended in");
+  }
+  const double tile_m = texture->number("size", 10.0, Allowed::positive());
+  const auto path = context.resources.find_texture(picture->text, picture->source.file);
+  if (!path) {
+    context.findings.unsupported(picture->source, where, "the texture '" + picture->text + "' is not found; the ground is plain");
+    return;
+  }
+  context.documents.note(*path);
+  Material ground;
+  ground.ambient = ground.diffuse = {1.0f, 1.0f, 1.0f, 1.0f};
+  ground.texture = std::make_shared<Texture>(Texture{*path, {}});
+  mesh.materials.push_back(std::move(ground));
+  for (Mesh::Part& part : mesh.parts) part.material = 0;
+  const Eigen::Vector2f tiles = (size.head<2>() / tile_m).cast<float>();
+  for (Eigen::Vector2f& uv : mesh.uvs) uv = uv.cwiseProduct(tiles);
+}
+
 std::optional<Geometry> read_heightmap(const Element& element, const std::string& where, ReadContext& context) {
-  report_other_children(element, {"uri", "size", "pos"}, {"use_terrain_paging", "sampling"}, where, context.findings);
+  report_other_children(element, {"uri", "size", "pos", "texture"}, {"use_terrain_paging", "sampling", "blend"}, where, context.findings);
   const std::string uri = element.string("uri", "");
   if (uri.empty()) element.fail("has no <uri>");
   const Vec3 size = element.vector3("size", Vec3::Ones());
@@ -72,19 +97,21 @@ std::optional<Geometry> read_heightmap(const Element& element, const std::string
     return std::nullopt;
   }
   context.documents.note(*path);
+  auto mesh = std::make_shared<Mesh>();
   try {
-    auto mesh = std::make_shared<Mesh>(heightmap(*path, size));
-    const Vec3 at = element.vector3("pos", Vec3::Zero());
-    for (auto& p : mesh->positions) p += at.cast<float>();
-    mesh->name = *path;
-    Geometry geometry;
-    geometry.shape = Shape::mesh;
-    geometry.mesh = std::move(mesh);
-    return geometry;
+    *mesh = heightmap(*path, size);
   } catch (const std::runtime_error& error) {
     context.findings.error(element.source, where, "the heightmap '" + uri + "' cannot be used: " + error.what() + "; the shape is left out");
     return std::nullopt;
   }
+  cover_with_texture(element, size, *mesh, where, context);
+  const Vec3 at = element.vector3("pos", Vec3::Zero());
+  for (auto& p : mesh->positions) p += at.cast<float>();
+  mesh->name = *path;
+  Geometry geometry;
+  geometry.shape = Shape::mesh;
+  geometry.mesh = std::move(mesh);
+  return geometry;
 }
 
 }  // namespace

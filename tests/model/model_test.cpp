@@ -4,6 +4,7 @@
 
 #include <ctime>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "model/body_layout.h"
@@ -292,6 +293,28 @@ TEST(Scene, HeightmapsStandAtTheirPlaces) {
   EXPECT_LT((box.min() - Vec3(-1, -2, 0)).norm(), 1e-6);
   EXPECT_LT((box.max() - Vec3(3, 2, 2)).norm(), 1e-6);
   EXPECT_LT((top - Vec3(1, 0, 2)).norm(), 1e-6);
+}
+
+// A picture of 2 m by 2 m over 4 m: two tiles each way. Gazebo's own media path names a file that the model has itself.
+TEST(Scene, HeightmapsAreCoveredByTheirFirstTexture) {
+  TemporaryFolder folder;
+  folder.write("hill.pgm", std::string("P5\n2 2\n255\n") + std::string(4, '\0'));
+  const std::string grass = folder.write("materials/textures/grass.ppm", std::string("P6\n1 1\n255\n") + "\1\2\3");
+  const auto heightmap = [&](const std::string& textures) {
+    return load_world(folder.write("w.sdf", "<sdf version='1.9'><world name='w'><model name='m'><static>true</static><link name='l'><visual name='v'>"
+        "<geometry><heightmap><uri>hill.pgm</uri><size>4 4 2</size>" + textures + "</heightmap></geometry></visual></link></model></world></sdf>"));
+  };
+  const std::string texture = "<texture><size>2</size><diffuse>file://media/materials/textures/grass.ppm</diffuse></texture>";
+  const auto world = heightmap(texture);
+  EXPECT_TRUE(world->findings.empty());
+  const Mesh& mesh = *world->models.at(0).model->links[0].visuals.at(0).geometry.mesh;
+  ASSERT_EQ(mesh.materials.size(), 1u);
+  EXPECT_EQ(mesh.materials[0].texture->path, grass);
+  EXPECT_EQ(mesh.parts.at(0).material, 0);
+  EXPECT_EQ(mesh.uvs.at(1), Eigen::Vector2f(2, 2));    // the far right corner
+  EXPECT_THAT(texts(*heightmap(texture + texture)), testing::ElementsAre(testing::HasSubstr("not blended in")));
+  EXPECT_THAT(texts(*heightmap("<texture><diffuse>none.ppm</diffuse></texture>")), testing::ElementsAre(testing::HasSubstr("'none.ppm' is not found")));
+  EXPECT_THROW(heightmap("<texture><size>0</size><diffuse>grass.ppm</diffuse></texture>"), InputError);
 }
 
 TEST(Scene, ActorsWalkAsCylinders) {
