@@ -17,6 +17,8 @@ namespace {
 
 constexpr double kStep_m = 0.5;         // what counts as ground above the lowest surface
 constexpr double kClearance_m = 0.02;   // what a model may sink into bumps of the ground
+constexpr double kSteepest = 0.7;        // slope that something is put on: 35 degrees
+constexpr double kBump_m = 0.05;        // what ground under a model may differ from a plane
 constexpr double kFar_m = 1e5;
 constexpr double kCell_m = 2;           // of the grid over what stands in the world
 constexpr double kMostCells = 64;       // a thing that covers more is kept in a list of its own
@@ -200,6 +202,41 @@ struct Room::Index {
       return around.intersects(box) && overlap(thing, {nullptr, {}, corners});
     });
   }
+
+  // As Room::overlapped, of all models or of the static ones.
+  std::string overlapped(const Model& model, const Pose& X_WM, bool of_static) {
+    const Pose lifted{X_WM.rotation, X_WM.translation + Vec3(0, 0, kClearance_m)};
+    struct Part {
+      Convex shape;
+      Box box;
+    };
+    std::vector<Part> parts;
+    Box whole;
+    for (const Link& link : model.links) {
+      for (const Collision& c : link.collisions) {
+        if (c.geometry.shape == Shape::plane) continue;
+        const Pose X_WG = lifted * link.X_ML * c.X_LC;
+        parts.push_back({{&c.geometry, X_WG, {}}, placed(known_box_of(c.geometry), X_WG)});
+        whole.extend(parts.back().box);
+      }
+    }
+    if (parts.empty()) return "";
+    const auto counts = [&](int solid) { return !of_static || solids[static_cast<size_t>(solid)].is_static; };
+    const auto name = [&](int solid) { return instances[static_cast<size_t>(solids[static_cast<size_t>(solid)].instance)].first; };
+    for (const int plane : planes) {
+      const Solid& s = solids[static_cast<size_t>(plane)];
+      const Vec3 n = s.X_WG.rotation * s.geometry->normal;
+      for (const Part& part : parts) {
+        if (counts(plane) && n.dot(part.shape.support(-n) - s.X_WG.translation) < 0) return name(plane);
+      }
+    }
+    for (const int solid : near(whole)) {
+      for (const Part& part : parts) {
+        if (counts(solid) && meets(part.shape, part.box, solid)) return name(solid);
+      }
+    }
+    return "";
+  }
 };
 
 Room::Room() : index_(std::make_unique<Index>()) {}
@@ -248,6 +285,35 @@ double Room::ground_height(double x, double y) const {
   return ground;
 }
 
+// The ground under a model at its level pose, as a plane: z = c[0] + c[1] (x - x0) + c[2] (y - y0) about the place (x0, y0).
+// nullopt: it is level, too steep, or no plane.
+std::optional<Pose> Room::on_slope(const Model& model, const Pose& X_WM, double lowest) const {
+  Box foot;
+  for (const Link& link : model.links) {
+    for (const Collision& c : link.collisions) foot.extend(placed(index_->known_box_of(c.geometry), link.X_ML * c.X_LC));
+  }
+  if (foot.isEmpty()) return std::nullopt;
+  const Vec3 place(X_WM.translation.x(), X_WM.translation.y(), 0);
+  constexpr int kSamples = 3;    // each way
+  Eigen::Matrix<double, kSamples * kSamples, 3> A;
+  Eigen::Matrix<double, kSamples * kSamples, 1> heights;
+  for (int i = 0; i < kSamples * kSamples; ++i) {
+    const Vec3 part(i % kSamples / (kSamples - 1.0), i / kSamples / (kSamples - 1.0), 0);
+    const Vec3 at = X_WM.rotation * Vec3(foot.min() + part.cwiseProduct(foot.sizes()));
+    A.row(i) << 1, at.x(), at.y();
+    heights[i] = ground_height(place.x() + at.x(), place.y() + at.y());
+  }
+  const Vec3 c = A.colPivHouseholderQr().solve(heights);
+  const Eigen::Matrix<double, kSamples * kSamples, 1> bumps = heights - A * c;
+  const double slope = std::hypot(c[1], c[2]);
+  if (slope < 1e-6 || slope > kSteepest || bumps.cwiseAbs().maxCoeff() > kBump_m) return std::nullopt;
+  const Vec3 up = Vec3(-c[1], -c[2], 1).normalized(), level_ahead = X_WM.rotation * Vec3::UnitX();
+  const Vec3 ahead = (level_ahead + Vec3(0, 0, c[1] * level_ahead.x() + c[2] * level_ahead.y())).normalized();    // of the same heading
+  Eigen::Matrix3d axes;
+  axes << ahead, up.cross(ahead), up;
+  return Pose{Quat(axes), place + Vec3(0, 0, c[0]) + up * (bumps.maxCoeff() - lowest)};
+}
+
 Pose Room::standing_on(const Model& model, double x, double y, double yaw) const {
   Pose X_WM{Quat(Eigen::AngleAxisd(yaw, Vec3::UnitZ())), {x, y, 0}};
   double lowest = std::numeric_limits<double>::infinity();
@@ -259,44 +325,13 @@ Pose Room::standing_on(const Model& model, double x, double y, double yaw) const
   }
   // A drive says better where the ground is than a wheel's shape, which may be a little larger or smaller.
   if (model.drive) lowest = std::min(lowest, model.drive->X_MBase.translation.z());
-  X_WM.translation.z() = ground_height(x, y) - (std::isfinite(lowest) ? lowest : 0.0);
-  return X_WM;
+  if (!std::isfinite(lowest)) lowest = 0;
+  X_WM.translation.z() = ground_height(x, y) - lowest;
+  if (index_->overlapped(model, X_WM, true).empty()) return X_WM;
+  return on_slope(model, X_WM, lowest).value_or(X_WM);
 }
 
-std::string Room::overlapped(const Model& model, const Pose& X_WM) const {
-  const Pose lifted{X_WM.rotation, X_WM.translation + Vec3(0, 0, kClearance_m)};
-  struct Part {
-    Convex shape;
-    Box box;
-  };
-  std::vector<Part> parts;
-  Box whole;
-  for (const Link& link : model.links) {
-    for (const Collision& c : link.collisions) {
-      if (c.geometry.shape == Shape::plane) continue;
-      const Pose X_WG = lifted * link.X_ML * c.X_LC;
-      parts.push_back({{&c.geometry, X_WG, {}}, placed(index_->known_box_of(c.geometry), X_WG)});
-      whole.extend(parts.back().box);
-    }
-  }
-  if (parts.empty()) return "";
-  const auto name = [&](int solid) {
-    return index_->instances[static_cast<size_t>(index_->solids[static_cast<size_t>(solid)].instance)].first;
-  };
-  for (const int plane : index_->planes) {
-    const Index::Solid& s = index_->solids[static_cast<size_t>(plane)];
-    const Vec3 n = s.X_WG.rotation * s.geometry->normal;
-    for (const Part& part : parts) {
-      if (n.dot(part.shape.support(-n) - s.X_WG.translation) < 0) return name(plane);
-    }
-  }
-  for (const int solid : index_->near(whole)) {
-    for (const Part& part : parts) {
-      if (index_->meets(part.shape, part.box, solid)) return name(solid);
-    }
-  }
-  return "";
-}
+std::string Room::overlapped(const Model& model, const Pose& X_WM) const { return index_->overlapped(model, X_WM, false); }
 
 double ground_height(const WorldModel& world, double x, double y) { return Room(world).ground_height(x, y); }
 

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "model/world_model.h"
@@ -26,7 +27,8 @@ class Room {
   // one there, so that ramps and steps count and tables, walls and roofs do not. 0 where there is nothing.
   double ground_height(double x, double y) const;
 
-  // The pose of a model at (x, y) with that yaw, its lowest collision point on the ground.
+  // The pose of a model at (x, y) with that yaw, its lowest collision point on the ground. Level, or where it would stick in
+  // the ground then and that is as good as a plane, tilted as the ground is.
   Pose standing_on(const Model& model, double x, double y, double yaw) const;
 
   // The name of a model whose collisions the model would share space with, 2 cm of it from the ground up left out;
@@ -34,6 +36,8 @@ class Room {
   std::string overlapped(const Model& model, const Pose& X_WM) const;
 
  private:
+  std::optional<Pose> on_slope(const Model& model, const Pose& level, double lowest) const;
+
   struct Index;
   std::unique_ptr<Index> index_;
 };

@@ -67,6 +67,26 @@ TEST_F(Options, SpawnStandsOnTheGround) {
   EXPECT_NEAR(spawned(5, 0)->models.back().X_WM.translation.z(), 0.2, 1e-7);    // on the stage, under the roof
 }
 
+// A ramp that rises by 0.3 rad along x, its top at 0.25 m over (20, 0); and with a wall of 1 m on it.
+TEST_F(Options, SpawnIsTiltedAsTheGround) {
+  const std::string ramp = "<model name='ramp'><static>true</static><pose>20.029552 0 0.154466 0 -0.3 0</pose><link name='l'><collision name='c'><geometry>"
+                           "<box><size>1.6 4 0.2</size></box></geometry></collision>WALL</link></model></world>";
+  const auto in_world = [&](const std::string& wall) {
+    std::string text = kWorld, model = ramp;
+    model.replace(model.find("WALL"), 4, wall);
+    world = folder.write("world.sdf", text.replace(text.find("</world>"), 8, model));
+  };
+  in_world("");
+  const Pose X_WM = spawned(20, 0, 0.5)->models.back().X_WM;
+  EXPECT_LT((X_WM.translation - Vec3(20, 0, 0.25)).norm(), 1e-6);
+  EXPECT_LT((X_WM.rotation * Vec3::UnitZ() - Vec3(-std::sin(0.3), 0, std::cos(0.3))).norm(), 1e-6);
+  EXPECT_NEAR(heading(X_WM.rotation), 0.5, 1e-9);
+  in_world("<collision name='s'><pose>0.3 0 0.6 0 0 0</pose><geometry><box><size>0.4 4 1</size></box></geometry></collision>");
+  LoadOptions options;
+  options.spawns.push_back({"bot.sdf", "", 20, 0, 0});
+  EXPECT_EQ(error_of(options), "--spawn bot.sdf@20,0: there is no room, it would stand in 'ramp'");
+}
+
 TEST_F(Options, SpawnRefusesToStandInSomething) {
   LoadOptions options;
   options.spawns.push_back({"bot.sdf", "", 9.9, 0, 0});
