@@ -20,8 +20,8 @@ namespace {
 
 constexpr size_t kMostPictureBytes = size_t{32} << 20;    // of a file that is served as it is
 
-template <class Numbers>
-void list(JsonWriter& json, const Numbers& numbers, size_t count) {
+template <class Number>
+void list(JsonWriter& json, const Number* numbers, size_t count) {
   json.open('[');
   for (size_t i = 0; i < count; ++i) json.value(static_cast<double>(static_cast<float>(numbers[i])));
   json.close(']');
@@ -79,9 +79,9 @@ void write_light(JsonWriter& json, const scene::RenderLight& light) {
   const model::Light& l = light.light;
   const Vec3 direction = l.pose.rotation * l.direction;    // in the world, or in the link
   json.open('{').member("type", kTypes[static_cast<int>(l.type)]).member("link", light.link);
-  list(json.name("position"), l.pose.translation, 3);
-  list(json.name("direction"), direction, 3);
-  list(json.name("colour"), l.diffuse, 3);
+  list(json.name("position"), l.pose.translation.data(), 3);
+  list(json.name("direction"), direction.data(), 3);
+  list(json.name("colour"), l.diffuse.data(), 3);
   json.member("range", l.range).member("outer_angle", l.outer_angle).member("inner_angle", l.inner_angle);
   json.member("intensity", l.intensity).member("constant", l.constant).member("linear", l.linear).member("quadratic", l.quadratic);
   json.member("shadows", l.cast_shadows).close('}');
@@ -94,10 +94,10 @@ SceneData::SceneData(const model::WorldModel& world, int version) {
   const scene::RenderContent content(world, layout);
   JsonWriter out;
   out.open('{').member("version", version).member("world", world.name).member("sky", world.sky.sky).member("shadows", world.sky.shadows);
-  list(out.name("ambient"), world.sky.ambient, 3);
-  list(out.name("background"), world.sky.background, 3);
-  list(out.name("low"), content.bounds.low, 3);
-  list(out.name("high"), content.bounds.high, 3);
+  list(out.name("ambient"), world.sky.ambient.data(), 3);
+  list(out.name("background"), world.sky.background.data(), 3);
+  list(out.name("low"), content.bounds.low.data(), 3);
+  list(out.name("high"), content.bounds.high.data(), 3);
 
   Blob blob;
   out.name("meshes").open('[');
@@ -124,10 +124,10 @@ SceneData::SceneData(const model::WorldModel& world, int version) {
       out.open('{').member("batch", part.batch).member("small", part.small_batch).member("shadow", part.casts_shadow);
       std::array<double, 12> rows{};    // of [M | t]
       for (int i = 0; i < 12; ++i) rows[static_cast<size_t>(i)] = part.M_LP(i / 4, i % 4);
-      list(out.name("matrix"), rows, 12);
-      list(out.name("diffuse"), part.diffuse, 4);
-      list(out.name("specular"), part.specular, 4);
-      list(out.name("emissive"), part.emissive, 3);
+      list(out.name("matrix"), rows.data(), 12);
+      list(out.name("diffuse"), part.diffuse.data(), 4);
+      list(out.name("specular"), part.specular.data(), 4);
+      list(out.name("emissive"), part.emissive.data(), 3);
       out.close('}');
     }
     out.close(']');
@@ -156,8 +156,8 @@ SceneData::SceneData(const model::WorldModel& world, int version) {
   for (const model::RobotPlacement& robot : layout.robots) {
     out.open('{').member("robot", world.models[static_cast<size_t>(robot.instance)].name).member("body", robot.body);
     const Pose start = robot.body < 0 ? robot.X_BBase : layout.bodies[static_cast<size_t>(robot.body)].X_WB * robot.X_BBase;
-    list(out.name("pose"), numbers(robot.X_BBase), 7);
-    list(out.name("start"), numbers(start), 7);
+    list(out.name("pose"), numbers(robot.X_BBase).data(), 7);
+    list(out.name("start"), numbers(start).data(), 7);
     out.close('}');
   }
   out.close(']').close('}');

@@ -215,7 +215,7 @@ double JointConstraint::measured_effort() const {
   return axis_in_world().dot(from_bt(feedback_->m_appliedTorqueBodyB) - arm.cross(force));
 }
 
-void JointConstraint::after_substep(double substep_s) {
+void JointConstraint::after_substep() {
   if (!constraint_ || !constraint_->isEnabled()) return;
   effort_ = mode_ == Mode::motor ? measured_effort() : mode_ == Mode::effort ? command_ : 0.0;
   switch (type_) {

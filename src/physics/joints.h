@@ -40,7 +40,7 @@ class JointConstraint {
   }
 
   void before_substep(double substep_s);
-  void after_substep(double substep_s);
+  void after_substep();
 
  private:
   enum class Mode { passive, motor, effort };

@@ -251,8 +251,8 @@ void PhysicsWorld::Impl::step() {
     for (JointConstraint& joint : joints_) joint.before_substep(substep_s);
     for (JointConstraint& joint : wheels_) joint.before_substep(substep_s);
     dynamics_.substep(substep_s);
-    for (JointConstraint& joint : joints_) joint.after_substep(substep_s);
-    for (JointConstraint& joint : wheels_) joint.after_substep(substep_s);
+    for (JointConstraint& joint : joints_) joint.after_substep();
+    for (JointConstraint& joint : wheels_) joint.after_substep();
     contacts_.add(dispatcher_);
     // A mover goes on along its way; Bullet leaves it where it is.
     for (size_t i = 0; i < motions_.size(); ++i) {

@@ -18,9 +18,9 @@ std::shared_ptr<const WorldModel> world_of(const std::string& inside) {
   return load_world_text("<sdf version='1.9'><world name='w'>" + inside + "</world></sdf>", "/nowhere/world.sdf");
 }
 
-const Link& link_of(const Model& model, const std::string& name) {
+const Link& link_of(const Model& model, const char* name) {
   const auto at = std::find_if(model.links.begin(), model.links.end(), [&](const Link& link) { return link.name == name; });
-  if (at == model.links.end()) throw std::runtime_error("no link " + name);
+  if (at == model.links.end()) throw std::runtime_error(std::string("no link ") + name);
   return *at;
 }
 

@@ -7,8 +7,13 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #ifdef RUEDO_ARUCO
-#include <opencv2/aruco.hpp>
 #include <opencv2/calib3d.hpp>
+#if __has_include(<opencv2/objdetect/aruco_detector.hpp>)    // from 4.7 on
+#define RUEDO_ARUCO_DETECTOR
+#include <opencv2/objdetect/aruco_detector.hpp>
+#else
+#include <opencv2/aruco.hpp>
+#endif
 #endif
 
 #include "ruedo/camera_info_t.hpp"
@@ -83,10 +88,26 @@ struct Shot {
 };
 
 #ifdef RUEDO_ARUCO
+#ifdef RUEDO_ARUCO_DETECTOR
+void draw_marker(int id, int pixels, cv::Mat& picture) {
+  cv::aruco::generateImageMarker(cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50), id, pixels, picture);
+}
+void find_markers(const cv::Mat& picture, std::vector<std::vector<cv::Point2f>>& corners, std::vector<int>& ids) {
+  cv::aruco::ArucoDetector(cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50)).detectMarkers(picture, corners, ids);
+}
+#else
+void draw_marker(int id, int pixels, cv::Mat& picture) {
+  cv::aruco::drawMarker(cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50), id, pixels, picture);
+}
+void find_markers(const cv::Mat& picture, std::vector<std::vector<cv::Point2f>>& corners, std::vector<int>& ids) {
+  cv::aruco::detectMarkers(picture, cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50), corners, ids);
+}
+#endif
+
 TEST(Camera, AMarkersPoseComesBack) {
   // A marker of 0.3 m with a white margin of a sixth, on a board that is turned a little.
   cv::Mat marker, board;
-  cv::aruco::drawMarker(cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50), 7, 600, marker);
+  draw_marker(7, 600, marker);
   cv::copyMakeBorder(marker, board, 100, 100, 100, 100, cv::BORDER_CONSTANT, 255);
   ASSERT_TRUE(cv::imwrite(testing::TempDir() + "/marker.png", board));
   const std::string poster = "<diffuse>1 1 1 1</diffuse><pbr><metal><albedo_map>marker.png</albedo_map></metal></pbr>";
@@ -99,21 +120,23 @@ TEST(Camera, AMarkersPoseComesBack) {
     const cv::Mat D(1, 5, CV_64F, const_cast<double*>(info.distortion));
     std::vector<int> ids;
     std::vector<std::vector<cv::Point2f>> corners;
-    cv::aruco::detectMarkers(picture, cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50), corners, ids);
+    find_markers(picture, corners, ids);
     ASSERT_EQ(ids, std::vector<int>{7});
-    std::vector<cv::Vec3d> rotations, translations;
     cv::cornerSubPix([&] { cv::Mat grey; cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY); return grey; }(), corners[0],
                      cv::Size(3, 3), cv::Size(-1, -1), cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30, 0.01));
-    cv::aruco::estimatePoseSingleMarkers(corners, 0.3f, K, D, rotations, translations);
+    // The marker's own frame: x to its right, y up, from its middle; corners from the upper left one, clockwise.
+    const std::vector<cv::Point3d> square{{-0.15, 0.15, 0}, {0.15, 0.15, 0}, {0.15, -0.15, 0}, {-0.15, -0.15, 0}};
+    cv::Vec3d rotation, translation;
+    ASSERT_TRUE(cv::solvePnP(square, corners[0], K, D, rotation, translation));
     // The near face's middle, 5 mm before the board's: in the optical frame x right, y down, z ahead.
     const Pose X_WBoard = Pose::from_xyz_rpy({2, 0.3, 1.1}, {0, 0.2, 0.3});
     const Vec3 p = X_WBoard * Vec3(-0.005, 0, 0) - Vec3(0, 0, 1);
-    EXPECT_NEAR(translations[0][0], -p.y(), 0.01);
-    EXPECT_NEAR(translations[0][1], -p.z(), 0.01);
-    EXPECT_NEAR(translations[0][2], p.x(), 0.01);
+    EXPECT_NEAR(translation[0], -p.y(), 0.01);
+    EXPECT_NEAR(translation[1], -p.z(), 0.01);
+    EXPECT_NEAR(translation[2], p.x(), 0.01);
     // The marker's z axis leaves the board towards the camera.
     cv::Mat R;
-    cv::Rodrigues(rotations[0], R);
+    cv::Rodrigues(rotation, R);
     const Vec3 normal = X_WBoard.rotation * -Vec3::UnitX();
     EXPECT_NEAR(R.at<double>(0, 2), -normal.y(), 0.06);
     EXPECT_NEAR(R.at<double>(1, 2), -normal.z(), 0.06);
