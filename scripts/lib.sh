@@ -17,9 +17,11 @@ readonly BUILD_PACKAGES=(
   libopencv-core-dev libopencv-imgcodecs-dev libopencv-imgproc-dev
   libcli11-dev libspdlog-dev libfmt-dev libssl-dev "libglib2.0-0t64|libglib2.0-0" libwebsockets-dev
 )
-# libsdformat is the oracle of the world reader's tests; Debian has it up to 12. clang builds the fuzzers.
+# libsdformat is the oracle of the world reader's tests; Debian has it up to 12. clang builds the fuzzers; nftables
+# is the firewall that a test runs into.
 readonly TEST_PACKAGES=(
   libgtest-dev libgmock-dev libbenchmark-dev libopencv-contrib-dev "?libsdformat-dev" "?chromium" clang "?libclang-rt-dev"
+  nftables
 )
 
 # The web console's page is built by node and npm; a machine that has an npm of another origin keeps it.

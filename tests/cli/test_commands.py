@@ -77,6 +77,20 @@ def test_no_route_is_one_line_with_its_cure():
     assert len(faults) == 1 and "ip route add" in faults[0]
 
 
+def test_a_firewall_is_one_line_with_its_cure():
+    closed = ("ip link set lo up; ip link set lo multicast on; ip route add 239.255.76.67/32 dev lo; nft add table inet f; "
+              "nft add chain inet f in '{ type filter hook input priority 0; }'; nft add rule inet f in udp dport 7667 drop; ")
+    isolated = ["unshare", "-rn", "sh", "-ec"]
+    if subprocess.run([*isolated, closed], capture_output=True).returncode != 0:
+        pytest.skip("no network namespaces, or no nftables here")
+    for port, faults in ((7667, ["FAULT  multicast"]), (7668, [])):
+        address = f"udpm://239.255.76.67:{port}?ttl=0"
+        result = subprocess.run([*isolated, closed + f"{RUEDO} doctor --lcm '{address}'"], capture_output=True, text=True, timeout=PATIENCE)
+        found = [line for line in result.stdout.splitlines() if line.startswith("FAULT")]
+        assert [line[:16] for line in found] == faults and result.returncode == (4 if faults else 0)
+        assert all("does not come back" in line and f"let the firewall pass UDP port {port}" in line for line in found)
+
+
 def needs(*command):
     """s of real time, of the best of some tries, since on a busy machine each may have to wait; s of processors' time."""
     took, used = 1e9, 0.0
