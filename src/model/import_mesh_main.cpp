@@ -167,7 +167,8 @@ void fill_missing_normals(Mesh& mesh) {
 }
 
 // What brings the scene to metres and z up. COLLADA's unit is in its root node, and its up axis is left alone, as
-// Gazebo leaves it. glTF is y up by its specification; assimp turns 3DS to y up, and FBX as its own settings say.
+// Gazebo leaves it. glTF is y up by its specification; assimp turns 3DS to y up, and FBX from 5.4 on, by its root node. Before,
+// FBX is as its own settings say.
 aiMatrix4x4 to_z_up(const aiScene& scene, const std::string& extension) {
   aiMatrix4x4 turn, scale;
   aiMatrix4x4::RotationX(static_cast<float>(M_PI / 2), turn);
@@ -187,7 +188,7 @@ aiMatrix4x4 to_z_up(const aiScene& scene, const std::string& extension) {
       scene.mMetaData->Get("UpAxis", up);
     }
     aiMatrix4x4::Scaling(aiVector3D(centimetres / 100.0f), scale);
-    return up == 1 ? turn * scale : scale;
+    return up == 1 || !scene.mRootNode->mTransformation.IsIdentity() ? turn * scale : scale;
   }
   return {};
 }
