@@ -1,6 +1,7 @@
 // A client of lockstep from the protocol's page alone: it knows the message types, and nothing of the client libraries.
 #pragma once
 
+#include <chrono>
 #include <map>
 #include <random>
 #include <stdexcept>
@@ -74,14 +75,15 @@ class LockstepClient {
     const int64_t from = std::exchange(granted_, grant.step_until);
     bool taken = false;
     send(request_t::GRANT, sequence, body);
-    while (have_ < granted_) {
-      const std::optional<Message> message = listener_->receive(std::chrono::milliseconds(3));
-      if (message) {
+    for (Clock::time_point again = Clock::now() + kAgain; have_ < granted_;) {
+      if (const std::optional<Message> message = listener_->receive(kAgain)) {
         taken |= take(*message, sequence);
         taken |= newest_ > from;
-      } else {
+      }
+      if (Clock::now() >= again) {    // others are heard all the time: not after silence
         if (!taken) send(request_t::GRANT, sequence, body);
         ask_for_lost();
+        again = Clock::now() + kAgain;
       }
       if (have_ - acknowledged_ >= 32) ask_for_lost();
     }
@@ -108,7 +110,9 @@ class LockstepClient {
   reply_t ask(int32_t kind, int64_t sequence, const std::vector<uint8_t>& body) {
     for (;;) {
       send(kind, sequence, body);
-      while (const std::optional<Message> message = listener_->receive(std::chrono::milliseconds(20))) {
+      for (const Clock::time_point again = Clock::now() + 5 * kAgain; Clock::now() < again;) {
+        const std::optional<Message> message = listener_->receive(kAgain);
+        if (!message) continue;
         reply_t reply;
         if (message->channel != "ruedo/reply") {
           take(*message, 0);
@@ -122,6 +126,9 @@ class LockstepClient {
   int64_t next_sequence() { return ++sequence_; }
 
  private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::milliseconds kAgain{4};    // until what was not answered is said again
+
   struct Step {
     std::map<int, tick_t> parts;
     std::map<std::pair<int32_t, int64_t>, std::vector<uint8_t>> resent;

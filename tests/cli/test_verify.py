@@ -1,0 +1,206 @@
+"""ruedo verify: a recorded run is repeated, and what is not the same is named; logs that are damaged, cut off or no logs."""
+import random
+import signal
+import struct
+import subprocess
+from pathlib import Path
+
+import pytest
+from recorded import ARENA, BOX, PATIENCE, QUICK, RUEDO, Server, events, program, record, until, url, write
+from recorded import no_process_outlives_its_test    # a fixture of every test here
+from ruedo.lcmtypes import applied_t, log_header_t, planar_lidar_t, state_hash_t
+
+
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory):
+    """A log with commands at times of the client's own, a reset with another seed, and models that come and go."""
+    log = tmp_path_factory.mktemp("driven") / "driven.lcm"
+    server = Server(7822, "--rate", "20", "--record", log)
+    with server.connect() as simulation:
+        robot = simulation.robot("p3at")
+
+        def drive(vx, omega):
+            robot.set_velocity(vx, omega)
+            while abs(robot.motion.next(PATIENCE).omega - omega) > 1e-6:
+                pass
+
+        drive(0.4, 0.3)
+        simulation.sleep(2.0)
+        simulation.reset_odometry("p3at")
+        simulation.sleep(2.0)
+        simulation.spawn(text=BOX, x=2.5, y=-1.5, z=1.5)
+        simulation.sleep(2.0)
+        simulation.reset(seed=5)
+        drive(0.2, -0.4)
+        simulation.sleep(2.0)
+        simulation.pause()
+        simulation.step(7)
+        simulation.quit()
+    assert server.end()[0] == 0
+    return log
+
+
+@pytest.mark.parametrize("threads", [1, 8])
+def test_verifies_a_driven_run(driven, threads):
+    result = program("verify", driven, "--threads", threads)
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "repeated byte for byte" in result.stdout and "cut off" not in result.stdout
+    channels = [channel for _, channel, _ in events(driven)]
+    compared = sum(channel not in {"ruedo/header", "ruedo/applied"} for channel in channels)
+    assert f" {compared} messages" in result.stdout
+    assert channels.count("ruedo/applied") > 4
+
+
+def test_state_hash_each_second_and_at_the_end(tmp_path):
+    found = record(tmp_path / "a.lcm", seconds=2.5)
+    hashes = [state_hash_t.decode(data) for _, channel, data in found if channel == "ruedo/state_hash"]
+    assert [h.utime for h in hashes] == [0, 1_000_000, 2_000_000, 2_500_000]
+    assert [h.last for h in hashes] == [False, False, False, True]
+    assert len({h.state_hash for h in hashes}) == 4
+
+
+def test_names_the_first_channel_step_and_field(tmp_path):
+    found = record(tmp_path / "good.lcm")
+    at = max(i for i, (stamp, channel, _) in enumerate(found) if channel == "p3at/lrf" and stamp <= 1_500_000)
+    stamp, channel, data = found[at]
+    scan = planar_lidar_t.decode(data)
+    ranges = list(scan.ranges)
+    ranges[17] = struct.unpack(">f", struct.pack(">f", ranges[17] + 0.25))[0]
+    scan.ranges = ranges
+    found[at] = (stamp, channel, scan.encode())
+    write(tmp_path / "bad.lcm", found)
+    result = program("verify", tmp_path / "bad.lcm")
+    assert result.returncode == 1
+    step_us = log_header_t.decode(found[0][2]).step_us
+    assert f"p3at/lrf at step {stamp // step_us} (" in result.stdout
+    assert "ranges[17] is " in result.stdout and f"{ranges[17]:.4g}"[:4] in result.stdout
+
+    del found[at]
+    write(tmp_path / "short.lcm", found)
+    result = program("verify", tmp_path / "short.lcm")
+    assert result.returncode == 1
+    assert f" at step {stamp // step_us} (" in result.stdout and "the log has a message on" in result.stdout
+    assert f"the repetition a message on p3at/lrf at stamp {stamp} us" in result.stdout
+
+
+def test_another_command_is_another_run(driven, tmp_path):
+    def drives(channel, data):
+        return channel == "ruedo/applied" and applied_t.decode(data).channel == "p3at/velocity"
+
+    found = events(driven)
+    less = [event for event in found if not drives(*event[1:])]
+    assert len(less) < len(found)
+    write(tmp_path / "less.lcm", less)
+    assert program("verify", tmp_path / "less.lcm").returncode == 1
+
+
+def test_a_changed_file_is_named_first(tmp_path):
+    world = tmp_path / "arena.sdf"
+    text = Path(ARENA).read_text()
+    world.write_text(text)
+    record(tmp_path / "a.lcm", world=str(world), seconds=1)
+    assert program("verify", tmp_path / "a.lcm").returncode == 0
+    world.write_text(text + "\n")
+    result = program("verify", tmp_path / "a.lcm")
+    assert result.returncode == 3 and str(world) in result.stderr and "was changed" in result.stderr
+    world.unlink()
+    result = program("verify", tmp_path / "a.lcm")
+    assert result.returncode == 3 and str(world) in result.stderr
+
+
+def test_another_machine_is_said_first_and_is_no_nondeterminism(tmp_path):
+    found = record(tmp_path / "a.lcm", seconds=1)
+    header = log_header_t.decode(found[0][2])
+    header.cpu, header.libc = "sse4.2", "glibc 2.19"
+    header.libraries = ["libBulletCollision.so.1.0", *header.libraries]
+    header.nlibraries += 1
+    found[0] = (*found[0][:2], header.encode())
+    write(tmp_path / "other.lcm", found)
+    result = program("verify", tmp_path / "other.lcm")
+    assert result.returncode == 0
+    lines = result.stdout.splitlines()
+    assert [line.split(":")[1].strip() for line in lines[:3]] == ["CPU features", "C library", "libraries"]
+    assert "glibc 2.19" in lines[1] and "libBulletCollision.so.1.0" in lines[2] and "byte for byte" in lines[3]
+
+    at = next(i for i, (_, channel, _) in enumerate(found) if channel == "p3at/odometry")
+    found[at] = (*found[at][:2], found[at][2][:-1] + bytes([found[at][2][-1] ^ 1]))
+    write(tmp_path / "both.lcm", found)
+    result = program("verify", tmp_path / "both.lcm")
+    assert result.returncode == 4
+    assert result.stdout.startswith("not as in the log: ") and "may be why" in result.stdout
+
+
+def test_killed_in_the_middle(tmp_path):
+    log = tmp_path / "killed.lcm"
+    server = Server(7823, "--rate", "max", "--record", log)
+    until(lambda: log.exists() and log.stat().st_size > 3_000_000)
+    assert server.end(signal.SIGKILL)[0] == -signal.SIGKILL
+    with open(log, "r+b") as file:
+        file.truncate(2_000_001)    # and cut within an event, wherever the kill was
+    result = program("verify", log)
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "cut off" in result.stdout and "verified up to there" in result.stdout
+
+    whole = events(log)    # a kill between two events leaves no damage; that the end is missing is seen all the same
+    write(tmp_path / "whole.lcm", whole)
+    result = program("verify", tmp_path / "whole.lcm")
+    assert result.returncode == 0 and "the end of the run is not in it; verified up to there" in result.stdout
+
+
+def test_a_full_disk(tmp_path):
+    log = tmp_path / "full.lcm"
+    command = f"ulimit -f 2000; exec {RUEDO} run {ARENA} {' '.join(QUICK)} --rate max --duration 600 --record {log} --lcm '{url(7824)}'"
+    # Python ignores SIGXFSZ; its child does too, and is told by the write that there is no room.
+    result = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=PATIENCE, restore_signals=False)
+    assert result.returncode == 4 and "readable up to" in result.stderr
+    result = program("verify", log)
+    assert result.returncode == 0 and "verified up to there" in result.stdout, result.stdout + result.stderr
+
+
+def test_what_is_no_recording(tmp_path):
+    (tmp_path / "empty.lcm").write_bytes(b"")
+    (tmp_path / "text.lcm").write_text("hello, world")
+    write(tmp_path / "other.lcm", [(0, "A", b"x")])
+    for name in ("empty", "text", "other", "nowhere"):
+        result = program("verify", tmp_path / f"{name}.lcm")
+        assert result.returncode == 3 and f"{name}.lcm" in result.stderr
+
+
+def test_damaged_logs_are_answered(tmp_path):
+    record(tmp_path / "good.lcm", seconds=1)
+    good = (tmp_path / "good.lcm").read_bytes()
+    dice = random.Random(3)
+    for _ in range(20):
+        bad = bytearray(good)
+        for _ in range(dice.choice([1, 3])):
+            bad[dice.randrange(len(bad))] ^= 1 << dice.randrange(8)
+        (tmp_path / "bad.lcm").write_bytes(bad)
+        assert program("verify", tmp_path / "bad.lcm").returncode in (0, 1, 3, 4)
+
+
+@pytest.mark.parametrize("option, words", [("--disable=p3at/ca}era", "no device 'ca}era'"), ("--disable=P3at/camera", "no robot 'P3at'"),
+                                           ("--set=p3at/lrf.update_rate", "--set 'p3at/lrf.update_rate'"), ("--remap=x", "--remap 'x'"),
+                                           ("--remap=p3at/nothing=A", "p3at/nothing"), ("--spawn=p3at@1", "--spawn 'p3at@1'")])
+def test_a_damaged_option_is_the_logs_fault(tmp_path, option, words):
+    found = record(tmp_path / "good.lcm", seconds=1)
+    header = log_header_t.decode(found[0][2])
+    header.options = [*header.options, option]
+    header.noptions += 1
+    found[0] = (*found[0][:2], header.encode())
+    write(tmp_path / "bad.lcm", found)
+    result = program("verify", tmp_path / "bad.lcm")
+    assert result.returncode == 3, result.stderr
+    assert "bad.lcm: its run had " in result.stderr and words in result.stderr
+
+
+def test_a_lockstep_log_verifies(tmp_path):
+    server = Server(7835, "--lockstep", "1", "--record", tmp_path / "a.lcm")
+    with server.connect() as simulation:
+        robot = simulation.robot("p3at")
+        for k in range(40):
+            simulation.step(5, [robot.velocity_command(0.3, 0.02 * k)])
+        simulation.quit()
+    assert server.end()[0] == 0
+    assert sum(channel == "ruedo/applied" for _, channel, _ in events(tmp_path / "a.lcm")) >= 40
+    result = program("verify", tmp_path / "a.lcm")
+    assert result.returncode == 0, result.stdout + result.stderr
