@@ -6,6 +6,7 @@
 #include "cli/commands.h"
 #include "cli/listing.h"
 #include "core/json.h"
+#include "core/utf8.h"
 #include "model/body_layout.h"
 #include "ruedo/errors.h"
 #include "scene/render_texture.h"
@@ -80,9 +81,9 @@ void print_text(const std::vector<Finding>& findings) {
     for (const FindingGroup& group : group(findings)) {
       if (group.kind != kind) continue;
       const char* colour = kind == Finding::Kind::error ? style.red : kind == Finding::Kind::unsupported ? style.yellow : style.cyan;
-      fmt::print("{}{}{}{}: {}\n", style.bold, colour, kind_name(kind), style.off, group.text);
+      fmt::print("{}{}{}{}: {}\n", style.bold, colour, kind_name(kind), style.off, for_terminal(group.text));
       for (const Finding* place : group.places) {
-        fmt::print("    {}{}{}{}\n", place->source.str(), style.dim, place->element.empty() ? "" : "  " + place->element, style.off);
+        fmt::print("    {}{}{}{}\n", for_terminal(place->source.str()), style.dim, place->element.empty() ? "" : "  " + for_terminal(place->element), style.off);
       }
     }
   }

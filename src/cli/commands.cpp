@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "core/utf8.h"
 #include "ruedo/errors.h"
 #include "ruedo/sim_time.h"
 
@@ -198,8 +199,8 @@ void print_findings(const std::vector<Finding>& findings) {
     const Finding& first = *group.places.front();
     const std::string more = group.places.size() > 1 ? fmt::format(" (and {} more places; see ruedo check)", group.places.size() - 1) : "";
     const char* colour = group.kind == Finding::Kind::error ? style.red : style.yellow;
-    fmt::print(stderr, "{}{}{}: {}: {}: {}{}{}{}\n", colour, kind_name(group.kind), style.off, first.source.str(), first.element, group.text,
-               style.dim, more, style.off);
+    fmt::print(stderr, "{}{}{}: {}: {}: {}{}{}{}\n", colour, kind_name(group.kind), style.off, for_terminal(first.source.str()),
+               for_terminal(first.element), for_terminal(group.text), style.dim, more, style.off);
   }
 }
 

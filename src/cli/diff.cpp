@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
+#include "core/utf8.h"
 #include "ruedo/errors.h"
 #include "server/log_diff.h"
 
@@ -27,7 +28,7 @@ int diff(const DiffArguments& arguments) {
   for (const std::string& text : arguments.tolerances) rules.push_back(server::DiffRule::parse(text, false));
   for (const std::string& text : arguments.ignored) rules.push_back(server::DiffRule::parse(text, true));
   const server::LogDiff result = server::diff_logs(arguments.golden, arguments.other, rules);
-  fmt::print("{}", server::diff_text(result));
+  fmt::print("{}", for_terminal(server::diff_text(result)));
   if (!arguments.junit.empty()) write_file(arguments.junit, server::diff_junit(result));
   if (!arguments.html.empty()) write_file(arguments.html, server::diff_html(result, arguments.golden, arguments.other));
   return result.same() ? kGood : kCheckFailed;

@@ -12,6 +12,7 @@
 
 #include "bus/lcm_bus.h"
 #include "cli/commands.h"
+#include "core/utf8.h"
 #include "ruedo/schema.h"
 
 namespace ruedo::cli {
@@ -75,7 +76,7 @@ class Printer {
       ++hidden_;
       return true;
     }
-    fmt::print("  {} = {}\n", path.str(), to_string(value));
+    fmt::print("  {} = {}\n", path.str(), for_terminal(to_string(value)));
     return true;
   }
   void end_field() {
@@ -90,11 +91,12 @@ class Printer {
 
 void print(const Message& message) {
   const Schema* schema = find_schema(fingerprint_of(message.bytes));
+  const std::string channel = for_terminal(message.channel);
   if (schema == nullptr) {
-    fmt::print("{}: {} bytes of a type that Ruedo does not know\n", message.channel, message.bytes.size());
+    fmt::print("{}: {} bytes of a type that Ruedo does not know\n", channel, message.bytes.size());
     return;
   }
-  fmt::print("{} ({}, {} bytes)\n", message.channel, schema->name, message.bytes.size());
+  fmt::print("{} ({}, {} bytes)\n", channel, schema->name, message.bytes.size());
   Printer printer;
   const bool whole = visit_message(*schema, message.bytes, [&](const FieldPath& path, const FieldValue& value) { return printer(path, value); });
   printer.end_field();

@@ -4,6 +4,7 @@
 #include "cli/commands.h"
 #include "cli/listing.h"
 #include "core/json.h"
+#include "core/utf8.h"
 #include "ruedo/errors.h"
 #include "server/fleet.h"
 #include "server/version.h"
@@ -73,7 +74,7 @@ int info(const InfoArguments& arguments) {
     return kGood;
   }
   const Style style = style_of(stdout);
-  fmt::print("{}{}{}: {}, steps of {:g} ms; {}, {}, {}\n\n", style.bold, world->name, style.off, world->file,
+  fmt::print("{}{}{}: {}, steps of {:g} ms; {}, {}, {}\n\n", style.bold, for_terminal(world->name), style.off, world->file,
              static_cast<double>(world->step_us) * 1e-3, counted(world->models.size(), "model"),
              layout.bodies.size() == 1 ? "1 body that moves" : fmt::format("{} bodies that move", layout.bodies.size()), counted(layout.robots.size(), "robot"));
   print_devices(stdout, parts);

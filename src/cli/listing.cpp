@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
+#include "core/utf8.h"
 
 namespace ruedo::cli {
 namespace {
@@ -114,7 +115,7 @@ void print_channels(FILE* out, const std::vector<world_info_t>& info) {
     else kinds[found->second].second.push_back(robot.name);
   }
   for (const auto& [robot, others] : kinds) {
-    fmt::print(out, "{}{}{} ({}; {})", style.bold, robot->name, style.off, robot->model, drive_text(*robot));
+    fmt::print(out, "{}{}{} ({}; {})", style.bold, robot->name, style.off, for_terminal(robot->model), drive_text(*robot));
     if (!others.empty()) {
       fmt::print(out, ", and alike: ");
       for (size_t i = 0; i < others.size() && i < 3; ++i) fmt::print(out, "{}{}", i > 0 ? ", " : "", others[i]);
@@ -131,7 +132,7 @@ void print_devices(FILE* out, const std::vector<world_info_t>& info) {
   const Style style = style_of(out);
   const Whole whole(info);
   for (const robot_info_t& robot : whole.robots) {
-    fmt::print(out, "{}{}{} ({}; {})\n", style.bold, robot.name, style.off, robot.model, drive_text(robot));
+    fmt::print(out, "{}{}{} ({}; {})\n", style.bold, robot.name, style.off, for_terminal(robot.model), drive_text(robot));
     if (!robot.drive.empty()) {
       std::string wheels;
       for (size_t i = 0; i < robot.wheels.size(); ++i) wheels += fmt::format("{}{} ({})", i > 0 ? ", " : "", robot.wheels[i], robot.left[i] ? "left" : "right");

@@ -7,6 +7,7 @@
 #include <spdlog/spdlog.h>
 
 #include "cli/commands.h"
+#include "core/utf8.h"
 #include "ruedo/element.h"
 #include "ruedo/errors.h"
 #include "server/version.h"
@@ -17,7 +18,7 @@ using namespace ruedo::cli;
 
 void say(const std::string& text) {
   const Style style = style_of(stderr);
-  fmt::print(stderr, "{}{}ruedo: {}{}{}\n", style.bold, style.red, style.off, text, style.off);
+  fmt::print(stderr, "{}{}ruedo: {}{}{}\n", style.bold, style.red, style.off, ruedo::for_terminal(text), style.off);
 }
 
 // A hint for what CLI11 did not know: the nearest command or option.

@@ -17,6 +17,7 @@
 #include "cli/commands.h"
 #include "cli/listing.h"
 #include "cli/view.h"
+#include "core/utf8.h"
 #include "ruedo/errors.h"
 #include "server/server.h"
 #include "server/thread_limit.h"
@@ -168,7 +169,7 @@ int run(const RunArguments& arguments) {
   print_findings(findings);
   if (!arguments.quiet) {
     const Style style = style_of(stdout);
-    fmt::print("{}{}{}: steps of {:g} ms, seed {}, on {}\n", style.bold, world->name, style.off, static_cast<double>(world->step_us) * 1e-3,
+    fmt::print("{}{}{}: steps of {:g} ms, seed {}, on {}\n", style.bold, for_terminal(world->name), style.off, static_cast<double>(world->step_us) * 1e-3,
                static_cast<uint64_t>(server.info().front().seed), place.url.str());
     print_channels(stdout, server.info());
     std::fflush(stdout);

@@ -6,6 +6,7 @@
 
 #include "cli/commands.h"
 #include "cli/logged_run.h"
+#include "core/utf8.h"
 #include "server/log_header.h"
 #include "server/thread_limit.h"
 #include "server/verify.h"
@@ -37,20 +38,20 @@ int repeat(const VerifyArguments& arguments, const log_header_t& header) {
   const server::ThreadLimit limit(arguments.threads);
   server::Verifier verifier(arguments.log, load(logged.world), std::move(options));
   const bool same_machine = verifier.machine_differences().empty();
-  for (const std::string& line : verifier.machine_differences()) fmt::print("not as in the log: {}\n", line);
+  for (const std::string& line : verifier.machine_differences()) fmt::print("not as in the log: {}\n", for_terminal(line));
   std::fflush(stdout);
   verifier.check_same_run();
   const server::Verification result = verifier.run();
   const std::string so_far = fmt::format("{} messages, {} bytes, {:g} s of {}, seed {}", result.messages, result.bytes,
                                          static_cast<double>(result.time_us) * 1e-6, header.world, static_cast<uint64_t>(header.seed));
   if (result.difference) {
-    fmt::print("{}: {}\nBefore it, {} were repeated byte for byte.\n", arguments.log, describe(*result.difference), so_far);
+    fmt::print("{}: {}\nBefore it, {} were repeated byte for byte.\n", arguments.log, for_terminal(describe(*result.difference)), for_terminal(so_far));
     if (same_machine) return kCheckFailed;
     fmt::print("What is not as in the log may be why: bytes hold for one build on one kind of CPU. Repeat it there.\n");
     return kEnvironment;
   }
-  fmt::print("{}: repeated byte for byte: {}\n", arguments.log, so_far);
-  if (!result.fault.empty()) fmt::print("{}: {}; verified up to there\n", arguments.log, result.fault);
+  fmt::print("{}: repeated byte for byte: {}\n", arguments.log, for_terminal(so_far));
+  if (!result.fault.empty()) fmt::print("{}: {}; verified up to there\n", arguments.log, for_terminal(result.fault));
   return kGood;
 }
 

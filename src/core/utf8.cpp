@@ -23,18 +23,30 @@ size_t character_size(std::string_view text) {
   return fits && follows(2) && follows(3) ? 4 : 0;
 }
 
-}  // namespace
+// Whether the character is one of the codes U+0000 to U+001F or U+007F to U+009F, but no line end or tab.
+bool is_control(std::string_view character) {
+  const auto byte = [&](size_t i) { return static_cast<uint8_t>(character[i]); };
+  if (character.size() == 2) return byte(0) == 0xc2 && byte(1) < 0xa0;
+  return character.size() == 1 && (byte(0) < 0x20 || byte(0) == 0x7f) && byte(0) != '\n' && byte(0) != '\t';
+}
 
-std::string printable(std::string_view text) {
+std::string cleaned(std::string_view text, bool of_controls) {
   std::string result;
   result.reserve(text.size());
   while (!text.empty()) {
     const size_t size = character_size(text);
-    if (size == 0) result += '?';
-    else result += text.substr(0, size);
+    const std::string_view character = text.substr(0, size);
+    if (size == 0 || (of_controls && is_control(character))) result += '?';
+    else result += character;
     text.remove_prefix(std::max<size_t>(1, size));
   }
   return result;
 }
+
+}  // namespace
+
+std::string printable(std::string_view text) { return cleaned(text, false); }
+
+std::string for_terminal(std::string_view text) { return cleaned(text, true); }
 
 }  // namespace ruedo

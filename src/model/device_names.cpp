@@ -3,6 +3,7 @@
 #include <map>
 #include <string_view>
 
+#include "core/utf8.h"
 #include "model/sdf_reader.h"
 
 namespace ruedo::model {
@@ -12,18 +13,18 @@ constexpr size_t kMaxChannel = 63;    // bytes; LCM's limit
 
 constexpr const char* kFixedDevices[] = {"odometry", "pose", "motion", "velocity", "wheels", "move", "joints", "joint_command"};
 
-bool fit_for_channel(std::string_view name) {
-  return std::all_of(name.begin(), name.end(), [](char c) { return static_cast<unsigned char>(c) > 0x20 && c != 0x7f && c != '/'; });
-}
+bool is_fit(char c) { return static_cast<unsigned char>(c) > 0x20 && c != 0x7f && c != '/'; }
+
+bool fit_for_channel(std::string_view name) { return std::all_of(name.begin(), name.end(), is_fit) && for_terminal(name) == name; }
 
 }  // namespace
 
 std::string made_fit_for_channel(const std::string& name) {
   std::string result = name;
   for (char& c : result) {
-    if (!fit_for_channel({&c, 1})) c = '_';
+    if (!is_fit(c)) c = '_';
   }
-  return result;
+  return for_terminal(result);
 }
 
 void make_sensor_names_unique(Model& model, const std::string& where, Findings& findings) {

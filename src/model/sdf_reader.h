@@ -59,7 +59,7 @@ class SdfReader {
   std::map<std::string, Included> cache_;
 };
 
-// A name without '/', spaces and control characters: '_' stands for each.
+// A name without '/', spaces and control characters: '_' stands for each, '?' for what is not UTF-8 and for its control characters.
 std::string made_fit_for_channel(const std::string& name);
 
 // Makes the devices' names fit for channels and unique: of two sensors with one name, each becomes LINK-SENSOR. Throws

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/utf8.h"
 #include "ruedo/decode.h"
 #include "ruedo/join_t.hpp"
 
@@ -105,9 +106,9 @@ void Control::serve(const request_t& request) {
 void Control::join(const request_t& request, reply_t& reply) {
   join_t body;
   if (decode_checked(request.body.data(), request.body.size(), body) != DecodeFault::none || body.client.empty() ||
-      body.client.size() > 63 || request.sequence <= 0) {
+      body.client.size() > 63 || for_terminal(body.client) != body.client || request.sequence <= 0) {
     reply.code = reply_t::BAD_REQUEST;
-    reply.text = "JOIN wants a join_t with a name of 1 to 63 characters, and a sequence above 0";
+    reply.text = "JOIN wants a join_t with a name of 1 to 63 bytes of UTF-8 without control characters, and a sequence above 0";
   } else if (const Session* session = sessions_.join(body.client, request.sequence, std::chrono::steady_clock::now())) {
     reply.session = session->id;
   } else {

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "core/utf8.h"
 #include "server/log_diff.h"
 
 namespace ruedo::server {
@@ -16,7 +17,7 @@ std::string seconds(SimTime time) { return fmt::format("{}.{:06d} s", time / 1'0
 // Names and values come from files: nothing of them may become markup.
 std::string escaped(std::string_view text) {
   std::string out;
-  for (const char c : text) {
+  for (const char c : printable(text)) {
     switch (c) {
       case '&': out += "&amp;"; break;
       case '<': out += "&lt;"; break;

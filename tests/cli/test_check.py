@@ -114,6 +114,18 @@ def test_equal_findings_are_one_with_all_its_places(tmp_path):
     assert lines[4].endswith("w.sdf: 0 errors, 3 not supported, 0 repaired") and len(lines) == 5
 
 
+def test_names_cannot_speak_to_the_terminal(tmp_path):
+    """ESC, and the control character that some terminals take for ESC and '['."""
+    hostile = "&#27;[31m&#155;0m"
+    link = f"<link name='l{hostile}'><inertial><mass>-1</mass></inertial><sensor name='s{hostile}' type='x{hostile}'/></link>"
+    (tmp_path / "w.sdf").write_text(f"<sdf version='1.9'><world name='w{hostile}'><model name='m{hostile}'>{link}</model></world></sdf>")
+    for command in (["check"], ["info"], ["run", "--duration", "0.1", "--lcm", "memq://"], ["run", "--spawn", "p3at\x1b[0m@0,0"]):
+        done = subprocess.run([RUEDO, command[0], str(tmp_path / "w.sdf"), *command[1:]], capture_output=True, timeout=60)
+        said = (done.stdout + done.stderr).decode()
+        assert "?[31m?0m" in said or "p3at?[0m" in said, said
+        assert not any(ord(letter) < 32 and letter != "\n" or 127 <= ord(letter) < 160 for letter in said)
+
+
 def test_a_terminal_has_colours_and_no_one_else(tmp_path):
     (tmp_path / "w.sdf").write_text(mesh("none.dae"))
     ours, theirs = pty.openpty()
