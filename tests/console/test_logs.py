@@ -100,7 +100,8 @@ def test_the_log_is_not_steered(log):
 
 def test_a_log_that_was_cut_off_is_shown_up_to_there(log, tmp_path):
     whole = log.read_bytes()
-    (tmp_path / "cut.lcm").write_bytes(whole[:len(whole) // 2 + 5])
+    begin = whole.index(b"\xed\xa1\xda\x01", len(whole) // 2)    # of an event
+    (tmp_path / "cut.lcm").write_bytes(whole[:begin + 5])
     with playing(tmp_path / "cut.lcm") as process:
         viewer, hello = greeting(process.port)
         assert "cut off in the event that begins at byte" in hello["fault"]
