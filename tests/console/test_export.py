@@ -201,7 +201,8 @@ def test_everything_else_goes_along(exported, topics):
 
 def test_logs_that_are_cut_off_or_strange(exported, tmp_path):
     whole = (exported / "run.lcm").read_bytes()
-    (tmp_path / "cut.lcm").write_bytes(whole[:len(whole) // 2 + 3])
+    begin = whole.index(b"\xed\xa1\xda\x01", len(whole) // 2)    # of an event
+    (tmp_path / "cut.lcm").write_bytes(whole[:begin + 3])
     done = subprocess.run([RUEDO, "export", tmp_path / "cut.lcm", tmp_path / "cut.mcap"], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0 and "cut off" in done.stderr
     assert len(messages(tmp_path / "cut.mcap")["p3at/lrf"]) > 3
