@@ -125,6 +125,33 @@ std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& 
   return model;
 }
 
+namespace {
+
+// Where Gazebo Classic's <state> has the models: a world that was saved is as it was then, not as its models' own poses say.
+std::map<std::string, Pose> saved_poses(const Element& world, Findings& findings) {
+  std::map<std::string, Pose> poses;
+  for (const Element* state : world.all("state")) {
+    for (const Element* model : state->all("model")) {
+      const std::string* name = model->attribute("name");
+      if (!name || !model->has("pose")) continue;
+      try {
+        poses.insert_or_assign(*name, model->pose("pose"));
+        if ((model->vector3("scale", Vec3::Ones()) - Vec3::Ones()).norm() > 1e-9) {
+          findings.unsupported(model->child("scale")->source, "state/model " + *name, "models are not scaled; it has its own size");
+        }
+      } catch (const InputError& error) {    // a simulation that went wrong saves such numbers; the models have poses of their own
+        findings.error(error.source(), "state/model " + *name, error.message());
+      }
+    }
+    for (const char* change : {"insertions", "deletions"}) {
+      if (const Element* it = state->child(change)) findings.unsupported(it->source, "state", "<" + it->name + "> are not supported and left out");
+    }
+  }
+  return poses;
+}
+
+}  // namespace
+
 void SdfReader::read_world(const Element& element, SdfVersion version, WorldModel& world) {
   Findings& findings = context_.findings;
   world.name = required_name(element);
@@ -220,11 +247,13 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     }
     frames.add(std::move(node));
   }
+  const std::map<std::string, Pose> saved = saved_poses(element, findings);
   for (const Placed& each : placed) {
     ModelInstance instance;
     instance.name = dotted(each.name);
     instance.X_WM = frames.pose(each.name, *each.element);
     instance.model = each.scope->model;
+    if (const auto state = saved.find(each.name); state != saved.end() && !instance.model->path) instance.X_WM = state->second;
     if (instance.is_robot()) {
       const std::string fit = made_fit_for_channel(instance.name);
       std::string name = fit;

@@ -272,6 +272,20 @@ TEST(Scene, OgreScriptsGiveColourAndTexture) {
   EXPECT_TRUE(texts(*world).empty());
 }
 
+// As Gazebo Classic saves a world whose models were moved. Names that the world lacks, and numbers that are none, change nothing.
+TEST(Scene, ASavedStateMovesItsModels) {
+  const std::string model = "<link name='l'/></model>";
+  const auto world = world_of("<model name='moved'><pose>1 2 3 0 0 0</pose>" + model + "<model name='same'><pose>4 5 6 0 0 0</pose>" + model +
+                              "<state world_name='default'><sim_time>116 345000000</sim_time><model name='moved'><pose frame=''>7 8 9 0 0 1</pose><scale>1 1 1</scale>"
+                              "<link name='l'><pose>7 8 9 0 0 1</pose></link></model><model name='gone'><pose>0 0 0 0 0 0</pose></model>"
+                              "<model name='same'><pose>nan 0 0 0 0 0</pose></model></state>");
+  ASSERT_EQ(world->models.size(), 2u);
+  EXPECT_EQ(world->models[0].X_WM.translation, Vec3(7, 8, 9));
+  EXPECT_NEAR(heading(world->models[0].X_WM.rotation), 1.0, 1e-12);
+  EXPECT_EQ(world->models[1].X_WM.translation, Vec3(4, 5, 6));
+  EXPECT_THAT(texts(*world), testing::ElementsAre(testing::HasSubstr("'nan' is not finite")));
+}
+
 // Three by three heights of which the middle one is full: a pyramid of 2 m on a square of 4 m.
 TEST(Scene, HeightmapsStandAtTheirPlaces) {
   TemporaryFolder folder;

@@ -280,7 +280,13 @@ bool compare_file(const fs::path& path, Counts& counts) {
   if (const sdf::World* world = root.WorldByIndex(0)) {
     for (uint64_t i = 0; i < world->ModelCount(); ++i) {
       const sdf::Model& theirs = *world->ModelByIndex(i);
-      compare(theirs, resolved(theirs.SemanticPose(), "world"), theirs.Name());
+      Pose X_WM = resolved(theirs.SemanticPose(), "world");
+      if (world->Element()->HasElement("state")) {    // libsdformat reads it, and leaves it to its users
+        for (auto state = world->Element()->FindElement("state")->FindElement("model"); state; state = state->GetNextElement("model")) {
+          if (state->Get<std::string>("name") == theirs.Name()) X_WM = pose_of(state->Get<ignition::math::Pose3d>("pose"));
+        }
+      }
+      compare(theirs, X_WM, theirs.Name());
     }
     EXPECT_LT((ours->gravity - vec(world->Gravity())).norm(), kTolerance);
     if (world->Element()->HasElement("physics")) {
