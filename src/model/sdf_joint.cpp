@@ -11,6 +11,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 JointAxis read_axis(const Element& element, SdfVersion version, const Pose& X_MJ, FrameGraph& frames, const Joint& joint,
                     const std::string& where, ReadContext& context) {
   report_other_children(element, {"xyz", "limit", "dynamics", "use_parent_model_frame", "mimic"}, {"initial_position"}, where, context.findings);
+  if (const Element* start = element.child("initial_position"); start && start->as_number() != 0.0) {
+    context.findings.unsupported(start->source, where, "<initial_position> is not supported: the joint begins at 0");
+  }
   JointAxis axis;
   Vec3 xyz = element.vector3("xyz", Vec3::UnitZ());
   if (!(xyz.norm() > 1e-9)) element.child("xyz")->fail("'" + element.child("xyz")->text + "' is not allowed; an axis is not zero");

@@ -231,6 +231,12 @@ Link read_link(const Element& element, const PoseInLink& pose_in_link, const std
   link.source = element.source;
   link.gravity = element.boolean("gravity", true);
   link.kinematic = element.boolean("kinematic", false);
+  if (const Element* decay = element.child("velocity_decay"); decay && (decay->number("linear", 0.0) != 0.0 || decay->number("angular", 0.0) != 0.0)) {
+    context.findings.unsupported(decay->source, where, "<velocity_decay> is not supported: nothing slows the link in the air");
+  }
+  if (element.boolean("self_collide", false)) {
+    context.findings.unsupported(element.child("self_collide")->source, where, "<self_collide> of a link is not supported; a model may have it");
+  }
   std::set<std::string> names;
   const auto unique = [&](const Element& child) {
     if (names.insert(child.name + " " + required_name(child)).second) return;

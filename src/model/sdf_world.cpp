@@ -49,6 +49,9 @@ void read_scene(const Element& scene, Sky& sky, Findings& findings) {
   if (const Element* colour = scene.child("background")) sky.background = read_colour(*colour);
   sky.sky = scene.has("sky");
   sky.shadows = scene.boolean("shadows", true);
+  if (const Element* fog = scene.child("fog"); fog && fog->string("type", "none") != "none") {
+    findings.unsupported(fog->source, "world/scene", "<fog> is not supported: the air is clear");
+  }
 }
 
 bool is_robot(const std::shared_ptr<const Model>& model) { return ModelInstance{"", {}, model}.is_robot(); }
