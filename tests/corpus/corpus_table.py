@@ -18,9 +18,9 @@ HEAD = """# Real files, and what Ruedo makes of them
 
 Made by `tests/corpus/corpus_table.py RUEDO FOLDER -o docs/corpus.md` from public files: TurtleBot3's simulations, AWS RoboMaker's small warehouse,
 Gazebo's models, and MobileRobots' descriptions of their robots. They are not part of Ruedo. Every file is run for a simulated minute (`ruedo run FILE --rate
-max --duration 60`). "Took" is the wall time of that minute, loading included, on a server's two cores; or "not within" the
-seconds after which it was given up: the camera of TurtleBot3's waffles has 1920 x 1080 pixels at 30 Hz, drawn without a GPU (two minutes on cores that nobody
-else uses, ten on busy ones); or the exit code, and the error beside it says why the file cannot run.
+max --duration 60`). "Took" is the wall time of that minute, loading included, on a server's two cores (the camera of TurtleBot3's
+waffles has 1920 x 1080 pixels at 30 Hz, drawn without a GPU); or "not within" the seconds after which it was given up;
+or the exit code, and the error beside it says why the file cannot run.
 """
 
 
