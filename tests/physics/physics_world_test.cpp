@@ -386,6 +386,24 @@ TEST(Physics, AGuidedBodyEndsExactlyThereUnlessItTouches) {
   }
 }
 
+// A barrel lies on its side; pushed, it rolls on as fast as it was pushed, for nothing brakes it and nothing drives it.
+TEST(Physics, ARollingCylinderKeepsItsSpeed) {
+  const std::string barrel = "<cylinder><radius>0.15</radius><length>0.5</length></cylinder>";
+  const std::string floor = thing("floor", "0 0 -0.1 0 0 0", "<box><size>20 20 0.2</size></box>", 0);
+  for (const std::string& ground : {kPlane, floor}) {
+    for (const int64_t step_us : {1000, 5000}) {
+      World w(ground + thing("barrel", "0 0 0.15 1.5707963267948966 0 0", barrel, 10, 0.5, 0.2), step_us);
+      w.run(0.5);
+      const int body = w.body("barrel/l");
+      w.physics.set_twist(body, {{0.3, 0, 0}, {0, 2, 0}});
+      w.run(10);
+      EXPECT_NEAR(w.physics.twist(body).linear.x(), 0.3, 1e-3) << step_us;
+      EXPECT_NEAR(w.physics.pose(body).translation.x(), 3.0, 1e-2) << step_us;
+      EXPECT_NEAR(w.physics.pose(body).translation.y(), 0.0, 1e-2) << step_us;
+    }
+  }
+}
+
 TEST(Physics, ConcaveMovingMeshesAreNamed) {
   // An L of two boxes as one polyline: extruded, it is a mesh.
   const std::string l = "<polyline><point>0 0</point><point>1 0</point><point>1 0.2</point><point>0.2 0.2</point><point>0.2 1</point><point>0 1</point><height>0.2</height></polyline>";
