@@ -8,6 +8,7 @@
 #include "core/json.h"
 #include "core/utf8.h"
 #include "model/body_layout.h"
+#include "physics/physics_world.h"
 #include "ruedo/errors.h"
 #include "scene/render_texture.h"
 #include "server/fleet.h"
@@ -56,8 +57,11 @@ std::vector<Finding> find_all(const CheckArguments& arguments, bool& loaded) {
     options.disabled = arguments.world.disabled;
     options.keep_going = true;
     server::make_fleet(*world, layout, options, channels, of_devices);
+    const auto is_error = [](const Finding& finding) { return finding.kind == Finding::Kind::error; };
+    loaded = std::none_of(of_devices.list().begin(), of_devices.list().end(), is_error);    // ruedo run stops at the first
+    const physics::PhysicsWorld physics(*world, layout);
     check_textures(*world, findings);
-    findings.insert(findings.end(), of_devices.list().begin(), of_devices.list().end());
+    for (const std::vector<Finding>* more : {&of_devices.list(), &physics.findings()}) findings.insert(findings.end(), more->begin(), more->end());
     return findings;
   } catch (const InputError& error) {
     if (error.source().file.empty() && !loaded) throw;    // wrong usage

@@ -127,7 +127,7 @@ OccupancyGrid grid_of(const cv::Mat& grey, double resolution, CellOf cell_of) {
 
 }  // namespace
 
-// The rules of map_server's "trinary" mode, which is also what "scale" and "raw" maps are cut by here.
+// The rules of map_server's "trinary" mode, by which "scale" maps are cut here, too; a "raw" map has the per cent themselves.
 OccupancyGrid read_map(const std::string& path) {
   const FlatYaml yaml(path);
   const double resolution = yaml.real("resolution");
@@ -138,10 +138,13 @@ OccupancyGrid read_map(const std::string& path) {
   const double free = yaml.has("free_thresh") ? yaml.real("free_thresh") : 0.25;
   const std::string negate = yaml.has("negate") ? yaml.text("negate") : "0";
   const bool negated = negate == "1" || negate == "true";
+  const std::string mode = yaml.has("mode") ? yaml.text("mode") : "trinary";
+  if (mode != "trinary" && mode != "scale" && mode != "raw") throw InputError(yaml.source("mode"), "mode: '" + mode + "' is not allowed; allowed are trinary, scale and raw");
   const fs::path named = yaml.text("image");
   const std::string picture = (named.is_absolute() ? named : fs::path(path).parent_path() / named).string();
   OccupancyGrid grid = grid_of(read_picture(picture), resolution, [&](uint8_t value) {
-    const double p = (negated ? value : 255 - value) / 255.0;
+    if (mode == "raw" && value > 100) return Cell::unknown;
+    const double p = mode == "raw" ? value / 100.0 : (negated ? value : 255 - value) / 255.0;
     return p > occupied ? Cell::occupied : p < free ? Cell::free : Cell::unknown;
   });
   grid.x = origin[0];

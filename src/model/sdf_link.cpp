@@ -13,6 +13,24 @@
 namespace ruedo::model {
 namespace {
 
+// Of a surface, what changes how things move in Gazebo and does not here.
+void name_what_has_no_effect(const Element& surface, const std::string& where, Findings& findings) {
+  const auto name = [&](const char* path, const std::string& text) {
+    findings.unsupported(surface.child(path)->source, where, "<" + surface.child(path)->name + "> is not supported: " + text);
+  };
+  constexpr const char* kMask = "contact/collide_bitmask";
+  if (surface.has(kMask)) {
+    const std::string mask = surface.string(kMask, "");
+    const bool all = mask.find_first_not_of("0x1fF") == std::string::npos && mask.find_first_of("1fF") != std::string::npos;
+    if (!all && mask != "65535") name(kMask, "the shape collides with everything");
+  }
+  if (surface.boolean("contact/collide_without_contact", false)) name("contact/collide_without_contact", "the shape collides as others do");
+  for (const char* path : {"friction/ode/slip1", "friction/ode/slip2"}) {
+    if (surface.number(path, 0.0) != 0.0) name(path, "friction does not yield");
+  }
+  if (surface.vector3("friction/ode/fdir1", Vec3::Zero()) != Vec3::Zero()) name("friction/ode/fdir1", "friction is the same in all directions");
+}
+
 Surface read_surface(const Element& surface, const std::string& where, ReadContext& context) {
   report_other_children(surface, {"friction", "bounce", "ruedo:laser_reflectance", "ruedo:laser_mirror", "ruedo:acoustic_reflectance"},
                         {"contact", "soft_contact"}, where, context.findings);
@@ -28,6 +46,7 @@ Surface read_surface(const Element& surface, const std::string& where, ReadConte
   s.laser_reflectance = surface.number("ruedo:laser_reflectance", 1, part);
   s.laser_mirror = surface.number("ruedo:laser_mirror", 0, part);
   s.acoustic_reflectance = surface.number("ruedo:acoustic_reflectance", 1, part);
+  name_what_has_no_effect(surface, where, context.findings);
   return s;
 }
 
@@ -38,6 +57,9 @@ Collision read_collision(const Element& element, const Pose& X_LC, Geometry geom
   c.name = required_name(element);
   c.X_LC = X_LC;
   c.geometry = std::move(geometry);
+  if (element.number("laser_retro", 0.0) != 0.0) {
+    context.findings.unsupported(element.child("laser_retro")->source, where, "<laser_retro> is not supported: <ruedo:laser_reflectance> gives intensities");
+  }
   if (const Element* surface = element.child("surface")) c.surface = read_surface(*surface, where, context);
   c.source = element.source;
   return c;

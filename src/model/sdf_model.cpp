@@ -41,7 +41,7 @@ Joint anchor(const std::string& name, int link, const Pose& X_MJ, const Source& 
 }
 
 // Takes over a nested model: links, joints and sensors with the scoped name.
-void append_nested(const Nested& nested, const Pose& X_MN, Model& into) {
+void append_nested(const Nested& nested, const Pose& X_MN, Model& into, Findings& findings) {
   const Model& from = *nested.scope->model;
   const std::string prefix = nested.merged ? "" : dotted(nested.name) + ".";
   const int first_link = static_cast<int>(nested.first_link), first_joint = static_cast<int>(into.joints.size());
@@ -69,6 +69,8 @@ void append_nested(const Nested& nested, const Pose& X_MN, Model& into) {
       for (int& joint : *joints) joint += first_joint;
     }
     into.drive->X_MBase = X_MN * into.drive->X_MBase;
+  } else if (from.drive) {
+    findings.unsupported(from.source, "model " + into.name, "a second drive, of the nested model '" + from.name + "', is not supported: its wheels turn freely");
   }
   if (from.path && !into.path && into.links.size() == from.links.size()) into.path = from.path;
 }
@@ -178,6 +180,9 @@ std::shared_ptr<const ScopedModel> SdfReader::read_overridden(const Element& mod
 std::optional<SdfReader::Included> SdfReader::include(const Element& element, const std::string& where) {
   report_other_children(element, {"uri", "name", "pose", "static", "placement_frame", "plugin", "sensor", "ruedo:drive", "ruedo:joints", "ruedo:odometry", "ruedo:path"},
                         {"allow_auto_disable", "enable_wind"}, where, context_.findings);
+  if (const Element* changes = element.child("experimental:params")) {
+    context_.findings.unsupported(changes->source, where, "<experimental:params> is not supported: the model is included as it is");
+  }
   const Element* uri = element.child("uri");
   if (!uri || uri->text.empty()) element.fail("has no <uri>");
   const auto path = context_.resources.find_model(uri->text, element.source.file);
@@ -337,7 +342,7 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
       if (!frames.is_from(part.name, *child)) continue;
       ++next_nested;
       const Pose X_MN = frames.pose(part.name, *child);
-      append_nested(part, X_MN, *model);
+      append_nested(part, X_MN, *model, context_.findings);
       if (part.scope->model->is_static) {
         for (size_t i = 0; i < part.scope->model->links.size(); ++i) {
           const int link = static_cast<int>(part.first_link + i);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <map>
+#include <string_view>
 #include <vector>
 
 #include <console_bridge/console.h>
@@ -20,9 +21,10 @@ class Listener : public console_bridge::OutputHandler {
   Listener() { console_bridge::useOutputHandler(this); }
   ~Listener() override { console_bridge::restorePreviousOutputHandler(); }
   void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
-    if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR && first.empty()) first = text;
+    constexpr size_t kMost = 1000;
+    if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR && errors.size() < kMost) errors.push_back(text);
   }
-  std::string first;
+  std::vector<std::string> errors;
 };
 
 std::string escaped(const std::string& text) {
@@ -143,7 +145,18 @@ struct Converter {
           }
           continue;
         }
-        if (!urdf.getLink(*reference)) continue;    // settings of a joint
+        // Settings of Gazebo's contact and joint solvers, for which there is nothing to set here.
+        constexpr std::string_view kOfSolvers[] = {"kp", "kd", "minDepth", "min_depth", "maxVel", "max_vel", "maxContacts", "max_contacts",
+                                                   "implicitSpringDamper", "provideFeedback", "stopCfm", "stopErp", "stopKd", "stopKp",
+                                                   "fudgeFactor", "fudge_factor", "cfmDamping", "preserveFixedJoint", "disableFixedJointLumping"};
+        if (std::find(std::begin(kOfSolvers), std::end(kOfSolvers), name) != std::end(kOfSolvers)) continue;
+        const auto leave_out = [&] {
+          findings.unsupported(child->source, "robot " + urdf.getName(), "<" + name + "> in <gazebo reference=\"" + *reference + "\"> is not supported and left out");
+        };
+        if (!urdf.getLink(*reference)) {
+          if (urdf.getJoint(*reference)) leave_out();
+          continue;
+        }
         GazeboLink& link = gazebo[*reference];
         if (name == "sensor") link.sensors.push_back(child.get());
         else if (name == "material") link.material = value_of(*child);
@@ -151,6 +164,7 @@ struct Converter {
         else if (name == "mu2") link.mu2 = child.get();
         else if (name == "turnGravityOff") link.gravity_off = child.get();
         else if (name == "plugin") model->children.push_back(child->clone());
+        else leave_out();
       }
       if (reference && !reference->empty() && !urdf.getLink(*reference) && !urdf.getJoint(*reference)) {
         findings.error(block->source, "robot " + urdf.getName(), "<gazebo reference=\"" + *reference + "\">: there is no link or joint of that name");
@@ -297,9 +311,61 @@ const Element& whom_it_names(const std::string& fault, const Element& robot) {
   return robot;
 }
 
+struct Parsed {
+  urdf::ModelInterfaceSharedPtr model;    // null: urdfdom gave up
+  std::vector<std::string> errors;        // what it said
+};
+
+Parsed parse(const Element& robot) {
+  std::string text;
+  write_xml(robot, text);
+  Parsed parsed;
+  Listener listener;
+  try {
+    parsed.model = urdf::parseURDF(text);
+  } catch (const std::exception& error) {
+    listener.errors.insert(listener.errors.begin(), error.what());
+  }
+  parsed.errors = std::move(listener.errors);
+  return parsed;
+}
+
+// The part of a link at which urdfdom stopped, for it leaves out what comes after a fault; null: it read all of them. It
+// reads the inertia first, then what is seen, then what collides.
+const Element* faulty_part(const Element& link, const urdf::Link& read, const std::vector<std::string>& errors) {
+  const std::string here = "[" + name_of(link) + "]";
+  for (const std::string& error : errors) {
+    if (error.find("inertial") != std::string::npos && error.find(here) != std::string::npos && link.has("inertial")) return link.child("inertial");
+  }
+  const auto seen = link.all("visual"), solid = link.all("collision");
+  if (read.visual_array.size() < seen.size()) return seen[read.visual_array.size()];
+  if (read.collision_array.size() < solid.size()) return solid[read.collision_array.size()];
+  return nullptr;
+}
+
+// Takes the parts out that urdfdom cannot read, so that it reads the others; true when there were any.
+bool leave_out_faults(Element& robot, const Parsed& parsed, Findings& findings) {
+  bool any = false;
+  for (const auto& link : robot.children) {
+    const urdf::LinkConstSharedPtr read = link->name == "link" ? parsed.model->getLink(name_of(*link)) : nullptr;
+    const Element* fault = read ? faulty_part(*link, *read, parsed.errors) : nullptr;
+    if (!fault) continue;
+    std::string said;
+    for (const std::string& error : parsed.errors) said += (said.empty() ? "" : "; ") + error;
+    constexpr size_t kMostSaid = 300;
+    if (said.size() > kMostSaid) said.replace(kMostSaid, std::string::npos, " ...");
+    findings.error(fault->source, "link " + name_of(*link), "this <" + fault->name + "> is left out, urdfdom cannot read it: " + (said.empty() ? "it does not say why" : said));
+    std::erase_if(link->children, [&](const auto& child) { return child.get() == fault; });
+    any = true;
+  }
+  return any;
+}
+
 }  // namespace
 
-std::unique_ptr<Element> urdf_as_sdf(const Element& robot, Findings& findings) {
+std::unique_ptr<Element> urdf_as_sdf(const Element& written, Findings& findings) {
+  const std::unique_ptr<Element> kept = written.clone();
+  Element& robot = *kept;
   refuse_xacro(robot);
   const std::string name = required_name(robot);
   for (const char* kind : {"link", "joint"}) {
@@ -308,20 +374,14 @@ std::unique_ptr<Element> urdf_as_sdf(const Element& robot, Findings& findings) {
       if (!seen.try_emplace(name_of(*each), each).second) each->fail("a second <" + std::string(kind) + "> of the name '" + name_of(*each) + "'");
     }
   }
-  std::string text;
-  write_xml(robot, text);
-  urdf::ModelInterfaceSharedPtr urdf;
-  std::string fault;
-  {
-    Listener listener;
-    try {
-      urdf = urdf::parseURDF(text);
-    } catch (const std::exception& error) {
-      fault = error.what();
-    }
-    if (fault.empty()) fault = listener.first;
+  Parsed parsed = parse(robot);
+  constexpr int kMostFaults = 20;    // in one link
+  for (int i = 0; i < kMostFaults && parsed.model && parsed.model->getRoot() && leave_out_faults(robot, parsed, findings); ++i) parsed = parse(robot);
+  const urdf::ModelInterfaceSharedPtr& urdf = parsed.model;
+  if (!urdf || !urdf->getRoot()) {
+    const std::string fault = parsed.errors.empty() ? "unknown reason" : parsed.errors.front();
+    whom_it_names(fault, robot).fail("urdfdom cannot read it: " + fault);
   }
-  if (!urdf || !urdf->getRoot()) whom_it_names(fault, robot).fail("urdfdom cannot read it: " + (fault.empty() ? "unknown reason" : fault));
 
   Converter converter{robot, findings, *urdf, {}};
   Element& model = *converter.model;

@@ -33,17 +33,19 @@ struct Sweep {
   Sweep() = default;
   // limit_rad: of the angles; whole_rad: of their span.
   Sweep(const Element& e, int64_t samples_if_absent, double limit_rad, double whole_rad) {
-    const int64_t samples = e.integer("samples", samples_if_absent, Allowed::between(1, static_cast<double>(kMaxRays)));
-    const double resolution = e.number("resolution", 1.0, Allowed::positive());
-    const double rays = std::round(static_cast<double>(samples) * resolution);
-    if (rays < 1.0 || rays > static_cast<double>(kMaxRays)) {
+    const int64_t samples = e.integer("samples", samples_if_absent, Allowed::between(0, static_cast<double>(kMaxRays)));
+    const double resolution = e.number("resolution", 1.0, Allowed::not_negative());
+    // A widespread lidar has one layer, and a resolution of 0.01 for it: one ray at least, as in Gazebo.
+    const double rays = std::max(1.0, std::round(static_cast<double>(samples) * resolution));
+    if (rays > static_cast<double>(kMaxRays)) {
       e.fail("<samples> times <resolution> is " + std::to_string(rays) + " rays; allowed: 1 to " + std::to_string(kMaxRays));
     }
     count = static_cast<int64_t>(rays);
     const double low = e.number("min_angle", 0.0, Allowed::between(-limit_rad, limit_rad));
     const double high = e.number("max_angle", 0.0, Allowed::between(-limit_rad, limit_rad));
     if (high < low) e.fail("<max_angle> " + std::to_string(high) + " is below <min_angle> " + std::to_string(low));
-    if (high - low > whole_rad + 1e-3) e.fail("from <min_angle> to <max_angle> is more than a full turn");
+    constexpr double kOverlap_rad = 0.1;    // -3.15 to 3.15 is a full turn, too
+    if (high - low > whole_rad + kOverlap_rad) e.fail("from <min_angle> to <max_angle> is more than a full turn");
     if (count == 1) {
       first = 0.5 * (low + high);    // a lone ray looks along the middle
     } else {

@@ -94,6 +94,10 @@ TEST(Map, MapServerFile) {
   EXPECT_NEAR(walls[0].y, 20.25, 1e-12);
   EXPECT_NEAR(walls[0].length, 0.5, 1e-12);
   EXPECT_NEAR(walls[0].width, 1.0, 1e-12);
+  // A raw map has the per cent of being occupied, and 255 for what is unknown.
+  folder.write("raw.pgm", std::string("P5\n3 1\n255\n") + "\x64\xff" + std::string(1, '\0'));
+  EXPECT_EQ(drawn(read_map(folder.write("raw.yaml", "image: raw.pgm\nresolution: 1\norigin: [0, 0, 0]\nmode: raw\nnegate: 0\n"))), "#?.\n");
+  EXPECT_THROW(read_map(folder.write("odd.yaml", "image: raw.pgm\nresolution: 1\norigin: [0, 0, 0]\nmode: row\n")), InputError);
   const OccupancyGrid bitmap = read_bitmap(folder / "m.pgm", 2);
   EXPECT_EQ(drawn(bitmap), "#..\n#..\n");
   EXPECT_EQ(bitmap.x, -3);

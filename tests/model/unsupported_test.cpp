@@ -19,6 +19,17 @@ std::string joint(const std::string& type, const std::string& inside = "") {
 }
 std::string plugin(const std::string& file, const std::string& name) { return "<plugin filename='" + file + "' name='" + name + "'><left_joint>x</left_joint></plugin>"; }
 
+std::string surface(const std::string& inside) {
+  return "<link name='c'><collision name='c'><geometry><sphere><radius>1</radius></sphere></geometry><surface>" + inside + "</surface></collision></link>";
+}
+std::string driven() {
+  const auto wheel = [](const std::string& name, const std::string& y) {
+    return "<link name='" + name + "'><pose>0 " + y + " 0.1 0 0 0</pose><collision name='c'><geometry><sphere><radius>0.1</radius></sphere></geometry></collision></link>"
+           "<joint name='j" + name + "' type='revolute'><parent>b</parent><child>" + name + "</child><axis><xyz>0 1 0</xyz></axis></joint>";
+  };
+  return "<link name='b'/>" + wheel("l", "0.2") + wheel("r", "-0.2") + "<ruedo:drive><ruedo:left_joint>jl</ruedo:left_joint><ruedo:right_joint>jr</ruedo:right_joint></ruedo:drive>";
+}
+
 class Unsupported : public testing::TestWithParam<Part> {};
 
 TEST_P(Unsupported, IsNamedOnceWithItsLine) {
@@ -28,7 +39,7 @@ TEST_P(Unsupported, IsNamedOnceWithItsLine) {
   EXPECT_EQ(world->findings[0].kind, Finding::Kind::unsupported);
   EXPECT_EQ(world->findings[0].source.line, 3);
   EXPECT_GE(world->models.at(0).model->links.size(), 2u);
-  EXPECT_FALSE(world->models[0].model->drive);
+  EXPECT_EQ(world->models[0].model->drive.has_value(), GetParam().inside.find("<ruedo:drive>") != std::string::npos);
 }
 
 constexpr const char* kAckermann = "an Ackermann drive is not supported, only differential ones are: the robot stands still";
@@ -49,6 +60,13 @@ INSTANTIATE_TEST_SUITE_P(Table, Unsupported, testing::Values(
     Part{"VelocityDecay", "<link name='c'><velocity_decay/></link><link name='d'><velocity_decay><linear>0.1</linear></velocity_decay></link>",
          "<velocity_decay> is not supported: nothing slows the link in the air"},
     Part{"SelfCollideOfALink", "<link name='c'><self_collide>1</self_collide></link>", "<self_collide> of a link is not supported; a model may have it"},
+    Part{"CollideBitmask", surface("<contact><collide_bitmask>0x00</collide_bitmask></contact>"), "<collide_bitmask> is not supported: the shape collides with everything"},
+    Part{"CollideWithoutContact", surface("<contact><collide_bitmask>0xffff</collide_bitmask><collide_without_contact>1</collide_without_contact></contact>"),
+         "<collide_without_contact> is not supported: the shape collides as others do"},
+    Part{"Slip", surface("<friction><ode><mu>1</mu><slip1>0.1</slip1><slip2>0</slip2><fdir1>0 0 0</fdir1></ode></friction>"), "<slip1> is not supported: friction does not yield"},
+    Part{"FrictionDirection", surface("<friction><ode><fdir1>1 0 0</fdir1></ode></friction>"), "<fdir1> is not supported: friction is the same in all directions"},
+    Part{"SecondDrive", "<model name='n'>" + driven() + "</model><model name='k'>" + driven() + "</model>",
+         "a second drive, of the nested model 'k', is not supported: its wheels turn freely"},
     Part{"SensorOnAJoint", "<joint name='j' type='fixed'><parent>a</parent><child>b</child><sensor name='s' type='force_torque'/></joint>",
          "sensors on joints are not supported"}),
     [](const auto& info) { return std::string(info.param.name); });

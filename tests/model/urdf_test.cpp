@@ -190,6 +190,37 @@ TEST(Urdf, PackagesGoByTheFolderThatTheFileIsIn) {
   EXPECT_EQ(texts(*load_world(folder / "bot_description/robots/eu/urdf/bot.urdf")), std::vector<std::string>{});
 }
 
+// urdfdom leaves out what comes after a fault in a link; here only the faulty part is.
+TEST(Urdf, AFaultInALinkCostsThatPartAlone) {
+  const std::string box = "<geometry><box size='1 1 1'/></geometry>", mass = "<mass value='2'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/>";
+  const auto world = load_world_text("<robot name='r'><link name='a'>\n<inertial>" + mass + "</inertial>\n<visual><origin xyz='0 0 0,5'/>" + box +
+                                     "</visual>\n<visual>" + box + "</visual>\n<visual><geometry/></visual>\n<collision>" + box +
+                                     "</collision>\n<collision><geometry><box size='1 1 ${h}'/></geometry></collision></link></robot>", "/nowhere/r.urdf");
+  const Link& link = world->models.back().model->links.at(0);
+  EXPECT_EQ(link.visuals.size(), 1u);
+  EXPECT_EQ(link.collisions.size(), 1u);
+  EXPECT_EQ(link.inertial.mass, 2.0);
+  std::vector<int> lines;
+  for (const Finding& finding : world->findings) {
+    EXPECT_EQ(finding.kind, Finding::Kind::error);
+    lines.push_back(finding.source.line);
+  }
+  EXPECT_EQ(lines, (std::vector<int>{3, 5, 7}));
+  const auto heavy = load_world_text("<robot name='r'><link name='a'>\n<inertial><mass value='${m}'/></inertial>\n<collision>" + box + "</collision></link></robot>",
+                                     "/nowhere/r.urdf");
+  EXPECT_EQ(heavy->models.back().model->links.at(0).collisions.size(), 1u);
+  ASSERT_FALSE(heavy->findings.empty());
+  EXPECT_EQ(heavy->findings[0].source.line, 2);
+}
+
+TEST(Urdf, WhatGazebosBlocksHaveBesidesIsNamed) {
+  const auto world = load_world_text("<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='continuous'><parent link='a'/><child link='b'/></joint>"
+                                     "<gazebo reference='a'><mu1>0.5</mu1><kp>1e6</kp><colision/></gazebo>"
+                                     "<gazebo reference='j'><springStiffness>5</springStiffness><provideFeedback>true</provideFeedback></gazebo></robot>", "/nowhere/r.urdf");
+  EXPECT_EQ(texts(*world), (std::vector<std::string>{"<colision> in <gazebo reference=\"a\"> is not supported and left out",
+                                                     "<springStiffness> in <gazebo reference=\"j\"> is not supported and left out"}));
+}
+
 // The user's own folder is no package, whatever a file calls it.
 TEST(Urdf, TheHomeFolderIsNoPackage) {
   TemporaryFolder folder;

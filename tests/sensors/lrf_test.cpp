@@ -180,6 +180,13 @@ TEST(Lrf, ResolutionMultipliesTheRays) {
   EXPECT_FLOAT_EQ(scan.radstep, 2.0 / 24);
 }
 
+// As in much copied files: one layer of a hundredth of a ray, and a little more than a full turn.
+TEST(Lrf, OneRayAtLeast) {
+  RayBench bench(robot_world("", lrf(horizontal(90, -3.15, 3.15) + "<vertical><samples>1</samples><resolution>0.01</resolution><min_angle>0</min_angle>"
+                                     "<max_angle>0</max_angle></vertical>")), "LRF");
+  EXPECT_EQ(bench.sample<planar_lidar_t>().nranges, 90);
+}
+
 TEST(Lrf, FullCircle) {
   RayBench bench(robot_world(solid("ring", "0 0 0 0 0 0", "<sphere><radius>0.2</radius></sphere>") + solid("wall", "-2.5 0 0 0 0 0", box(1, 1, 1)),
                              "<sensor name='LRF' type='lidar'><pose>0 0 0 0 0 0</pose><lidar><scan>" + horizontal(360, 0, 6.2657) +
@@ -297,10 +304,10 @@ TEST(Lrf, RefusesWhatCannotBe) {
       {"no lidar", "<sensor name='LRF' type='lidar'/>", "needs a <lidar>"},
       {"no scan", lrf(""), "needs <scan><horizontal>"},
       {"no range", lrf(kAhead, ""), "needs <range> with <max>"},
-      {"no rays", lrf(horizontal(0, -1, 1)), "samples"},
+      {"fewer than no rays", lrf(horizontal(-1, -1, 1)), "samples"},
       {"too many", lrf(horizontal(1000001, -1, 1)), "samples"},
       {"too many in all", lrf(horizontal(5000, -1, 1) + "<vertical><samples>5000</samples><min_angle>0</min_angle><max_angle>1</max_angle></vertical>"), "1000000 rays"},
-      {"half a ray", lrf(horizontal(1, -1, 1, "<resolution>0.1</resolution>")), "resolution"},
+      {"resolution below 0", lrf(horizontal(1, -1, 1, "<resolution>-0.1</resolution>")), "resolution"},
       {"angles swapped", lrf(horizontal(5, 1, -1)), "is below <min_angle>"},
       {"two turns", lrf(horizontal(5, -6, 6)), "more than a full turn"},
       {"angle in degrees", lrf(horizontal(5, -90, 90)), "min_angle"},
