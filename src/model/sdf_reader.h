@@ -59,6 +59,9 @@ class SdfReader {
   std::map<std::string, Included> cache_;
 };
 
+// The frame in <pose relative_to=""> (SDF 1.7 on) or <pose frame=""> (before); "": none.
+std::string relative_to(const Element& owner);
+
 // A name without '/', spaces and control characters: '_' stands for each, '?' for what is not UTF-8 and for its control characters.
 std::string made_fit_for_channel(const std::string& name);
 

@@ -183,12 +183,6 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     std::shared_ptr<const ScopedModel> scope;
   };
   std::vector<Placed> placed;
-  const auto relative_to = [](const Element& owner) -> std::string {
-    const Element* pose = owner.child("pose");
-    const std::string* frame = pose ? pose->attribute("relative_to") : nullptr;
-    if (pose && !frame) frame = pose->attribute("frame");
-    return frame ? *frame : "";
-  };
   const auto place_actor = [&](const Element& actor, const std::string& name, const Element& by) {
     auto scope = std::make_shared<ScopedModel>();
     scope->model = actor_model(actor, scope->pose, context_);
