@@ -82,13 +82,24 @@ std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& 
   if (const Element* script = actor.child("script")) {
     loop = script->boolean("loop", true);
     const double delay = script->number("delay_start", 0, Allowed::not_negative());
-    if (const Element* trajectory = script->child("trajectory")) {
+    const std::string where = "actor " + model->name;
+    const auto trajectories = script->all("trajectory");
+    if (trajectories.size() > 1) {
+      context.findings.unsupported(trajectories[1]->source, where, "an actor has one <trajectory>; this one is not walked");
+    }
+    if (!trajectories.empty()) {
+      const Element* trajectory = trajectories[0];
       double last = -1;
       for (const Element* waypoint : trajectory->all("waypoint")) {
         const double time = delay + waypoint->number("time", 0, Allowed::not_negative());
-        if (time <= last) waypoint->fail("the time " + shown(time) + " s is not after that of the waypoint before");
+        if (time <= last) {
+          context.findings.error(waypoint->source, where, "the time " + shown(time) + " s is not after that of the waypoint before; this one is left out");
+          continue;
+        }
         const std::vector<double> numbers = waypoint->has("pose") ? waypoint->child("pose")->as_numbers() : std::vector<double>(6, 0.0);
         if (numbers.size() != 6) waypoint->child("pose")->fail("'" + waypoint->child("pose")->text + "' is not allowed; allowed are x y z roll pitch yaw");
+        constexpr double kUpstairs_m = 2;    // above any skin's own origin
+        if (numbers[2] > kUpstairs_m) context.findings.unsupported(waypoint->source, where, "actors walk on z = 0, not above it");
         // Skins lie on their back in their own frame; a person walks upright.
         const double values[] = {time, numbers[0], numbers[1], 0, 0, 0, numbers[5]};
         std::string text;
@@ -130,15 +141,28 @@ std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& 
 
 namespace {
 
+constexpr double kMoved_m = 0.01;    // from where a link is in its model, by a joint
+
+struct SavedModel {
+  Pose X_WM;
+  Source source;
+  std::vector<std::pair<std::string, Vec3>> links;    // where they were, world
+};
+
 // Where Gazebo Classic's <state> has the models: a world that was saved is as it was then, not as its models' own poses say.
-std::map<std::string, Pose> saved_poses(const Element& world, Findings& findings) {
-  std::map<std::string, Pose> poses;
+std::map<std::string, SavedModel> saved_models(const Element& world, Findings& findings) {
+  std::map<std::string, SavedModel> models;
   for (const Element* state : world.all("state")) {
     for (const Element* model : state->all("model")) {
       const std::string* name = model->attribute("name");
       if (!name || !model->has("pose")) continue;
       try {
-        poses.insert_or_assign(*name, model->pose("pose"));
+        SavedModel saved{model->pose("pose"), model->source, {}};
+        for (const Element* link : model->all("link")) {
+          const std::string* own = link->attribute("name");
+          if (own && link->has("pose")) saved.links.emplace_back(dotted(*own), link->pose("pose").translation);
+        }
+        models.insert_or_assign(*name, std::move(saved));
         if ((model->vector3("scale", Vec3::Ones()) - Vec3::Ones()).norm() > 1e-9) {
           findings.unsupported(model->child("scale")->source, "state/model " + *name, "models are not scaled; it has its own size");
         }
@@ -150,7 +174,7 @@ std::map<std::string, Pose> saved_poses(const Element& world, Findings& findings
       if (const Element* it = state->child(change)) findings.unsupported(it->source, "state", "<" + it->name + "> are not supported and left out");
     }
   }
-  return poses;
+  return models;
 }
 
 }  // namespace
@@ -244,13 +268,21 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     }
     frames.add(std::move(node));
   }
-  const std::map<std::string, Pose> saved = saved_poses(element, findings);
+  const std::map<std::string, SavedModel> saved = saved_models(element, findings);
   for (const Placed& each : placed) {
     ModelInstance instance;
     instance.name = dotted(each.name);
     instance.X_WM = frames.pose(each.name, *each.element);
     instance.model = each.scope->model;
-    if (const auto state = saved.find(each.name); state != saved.end() && !instance.model->path) instance.X_WM = state->second;
+    if (const auto state = saved.find(each.name); state != saved.end() && !instance.model->path) {
+      instance.X_WM = state->second.X_WM;
+      for (const auto& [link, at] : state->second.links) {
+        const auto own = std::find_if(instance.model->links.begin(), instance.model->links.end(), [&](const Link& one) { return one.name == link; });
+        if (own == instance.model->links.end() || (at - (instance.X_WM * own->X_ML).translation).norm() < kMoved_m) continue;
+        findings.unsupported(state->second.source, "state/model " + each.name, "its link '" + link + "' was moved by a joint; it stands where the model has it");
+        break;
+      }
+    }
     if (instance.is_robot()) {
       const std::string fit = made_fit_for_channel(instance.name);
       std::string name = fit;

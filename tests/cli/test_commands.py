@@ -149,7 +149,7 @@ def test_check_finds_all_with_lines(tmp_path):
     )
     result = ruedo("check", str(world), "--json")
     findings = json.loads(result.stdout)
-    assert result.returncode == 1
+    assert result.returncode == 3 == ruedo("run", str(world), "--lcm", "memq://").returncode
     kinds = {(finding["kind"], finding["line"]) for finding in findings}
     assert ("error", 6) in kinds and ("unsupported", 7) in kinds
     result = ruedo("check", str(world))

@@ -82,6 +82,9 @@ TEST(Scene, ASavedStateMovesItsModels) {
   EXPECT_NEAR(heading(world->models[0].X_WM.rotation), 1.0, 1e-12);
   EXPECT_EQ(world->models[1].X_WM.translation, Vec3(4, 5, 6));
   EXPECT_THAT(texts(*world), testing::ElementsAre(testing::HasSubstr("'nan' is not finite")));
+  const auto door = world_of("<model name='door'><link name='frame'/><link name='leaf'><pose>1 0 0 0 0 0</pose></link></model><state><model name='door'>"
+                             "<pose>2 0 0 0 0 0</pose><link name='frame'><pose>2 0 0 0 0 0</pose></link><link name='leaf'><pose>2 1 0 0 0 1.57</pose></link></model></state>");
+  EXPECT_EQ(texts(*door), std::vector<std::string>{"its link 'leaf' was moved by a joint; it stands where the model has it"});
 }
 
 // Three by three heights of which the middle one is full: a pyramid of 2 m on a square of 4 m.
@@ -142,6 +145,10 @@ TEST(Scene, ActorsWalkAsCylinders) {
   EXPECT_FALSE(p.model->path->boolean("ruedo:loop", true));
   EXPECT_EQ(p.X_WM.translation, Vec3(1, 2, 0));
   EXPECT_FALSE(p.model->is_static);
+  const auto odd = world_of("<actor name='p'><script><trajectory id='0'><waypoint><time>1</time><pose>1 2 1 0 0 0</pose></waypoint><waypoint><time>1</time><pose>0 0 1 0 0 0</pose>"
+                            "</waypoint><waypoint><time>2</time><pose>3 2 4 0 0 0</pose></waypoint></trajectory><trajectory id='1'/></script></actor>");
+  EXPECT_EQ(odd->models.at(0).model->path->all("ruedo:waypoint").size(), 2u);
+  EXPECT_THAT(texts(*odd), testing::IsSupersetOf({testing::HasSubstr("one <trajectory>"), testing::HasSubstr("this one is left out"), testing::HasSubstr("walk on z = 0")}));
 }
 
 }  // namespace
