@@ -144,9 +144,13 @@ namespace {
 constexpr double kMoved_m = 0.01;    // from where a link is in its model, by a joint
 
 struct SavedModel {
+  struct Link {
+    std::string name;
+    Vec3 p_W;
+  };
   Pose X_WM;
   Source source;
-  std::vector<std::pair<std::string, Vec3>> links;    // where they were, world
+  std::vector<Link> links;
 };
 
 // Where Gazebo Classic's <state> has the models: a world that was saved is as it was then, not as its models' own poses say.
@@ -160,7 +164,7 @@ std::map<std::string, SavedModel> saved_models(const Element& world, Findings& f
         SavedModel saved{model->pose("pose"), model->source, {}};
         for (const Element* link : model->all("link")) {
           const std::string* own = link->attribute("name");
-          if (own && link->has("pose")) saved.links.emplace_back(dotted(*own), link->pose("pose").translation);
+          if (own && link->has("pose")) saved.links.push_back({dotted(*own), link->pose("pose").translation});
         }
         models.insert_or_assign(*name, std::move(saved));
         if ((model->vector3("scale", Vec3::Ones()) - Vec3::Ones()).norm() > 1e-9) {
@@ -276,10 +280,10 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     instance.model = each.scope->model;
     if (const auto state = saved.find(each.name); state != saved.end() && !instance.model->path) {
       instance.X_WM = state->second.X_WM;
-      for (const auto& [link, at] : state->second.links) {
-        const auto own = std::find_if(instance.model->links.begin(), instance.model->links.end(), [&](const Link& one) { return one.name == link; });
-        if (own == instance.model->links.end() || (at - (instance.X_WM * own->X_ML).translation).norm() < kMoved_m) continue;
-        findings.unsupported(state->second.source, "state/model " + each.name, "its link '" + link + "' was moved by a joint; it stands where the model has it");
+      for (const SavedModel::Link& link : state->second.links) {
+        const auto own = std::find_if(instance.model->links.begin(), instance.model->links.end(), [&](const Link& one) { return one.name == link.name; });
+        if (own == instance.model->links.end() || (link.p_W - (instance.X_WM * own->X_ML).translation).norm() < kMoved_m) continue;
+        findings.unsupported(state->second.source, "state/model " + each.name, "its link '" + link.name + "' was moved by a joint; it stands where the model has it");
         break;
       }
     }
