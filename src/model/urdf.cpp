@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <string_view>
 #include <vector>
 
@@ -332,11 +333,8 @@ Parsed parse(const Element& robot) {
 
 // The part of a link at which urdfdom stopped, for it leaves out what comes after a fault; null: it read all of them. It
 // reads the inertia first, then what is seen, then what collides.
-const Element* faulty_part(const Element& link, const urdf::Link& read, const std::vector<std::string>& errors) {
-  const std::string here = "[" + name_of(link) + "]";
-  for (const std::string& error : errors) {
-    if (error.find("inertial") != std::string::npos && error.find(here) != std::string::npos && link.has("inertial")) return link.child("inertial");
-  }
+const Element* faulty_part(const Element& link, const urdf::Link& read, const std::set<std::string>& of_bad_inertia) {
+  if (link.has("inertial") && of_bad_inertia.count(name_of(link)) > 0) return link.child("inertial");
   const auto seen = link.all("visual"), solid = link.all("collision");
   if (read.visual_array.size() < seen.size()) return seen[read.visual_array.size()];
   if (read.collision_array.size() < solid.size()) return solid[read.collision_array.size()];
@@ -345,15 +343,20 @@ const Element* faulty_part(const Element& link, const urdf::Link& read, const st
 
 // Takes the parts out that urdfdom cannot read, so that it reads the others; true when there were any.
 bool leave_out_faults(Element& robot, const Parsed& parsed, Findings& findings) {
+  constexpr size_t kMostSaid = 300;
+  std::string said;
+  std::set<std::string> of_bad_inertia;    // links: "... inertial element for Link [NAME]"
+  for (const std::string& error : parsed.errors) {
+    if (said.size() <= kMostSaid) said += (said.empty() ? "" : "; ") + error;
+    const size_t open = error.rfind('['), close = error.rfind(']');
+    if (error.find("inertial") != std::string::npos && open < close) of_bad_inertia.insert(error.substr(open + 1, close - open - 1));
+  }
+  if (said.size() > kMostSaid) said.replace(kMostSaid, std::string::npos, " ...");
   bool any = false;
   for (const auto& link : robot.children) {
     const urdf::LinkConstSharedPtr read = link->name == "link" ? parsed.model->getLink(name_of(*link)) : nullptr;
-    const Element* fault = read ? faulty_part(*link, *read, parsed.errors) : nullptr;
+    const Element* fault = read ? faulty_part(*link, *read, of_bad_inertia) : nullptr;
     if (!fault) continue;
-    std::string said;
-    for (const std::string& error : parsed.errors) said += (said.empty() ? "" : "; ") + error;
-    constexpr size_t kMostSaid = 300;
-    if (said.size() > kMostSaid) said.replace(kMostSaid, std::string::npos, " ...");
     findings.error(fault->source, "link " + name_of(*link), "this <" + fault->name + "> is left out, urdfdom cannot read it: " + (said.empty() ? "it does not say why" : said));
     std::erase_if(link->children, [&](const auto& child) { return child.get() == fault; });
     any = true;
@@ -378,10 +381,8 @@ std::unique_ptr<Element> urdf_as_sdf(const Element& written, Findings& findings)
   constexpr int kMostFaults = 20;    // in one link
   for (int i = 0; i < kMostFaults && parsed.model && parsed.model->getRoot() && leave_out_faults(robot, parsed, findings); ++i) parsed = parse(robot);
   const urdf::ModelInterfaceSharedPtr& urdf = parsed.model;
-  if (!urdf || !urdf->getRoot()) {
-    const std::string fault = parsed.errors.empty() ? "unknown reason" : parsed.errors.front();
-    whom_it_names(fault, robot).fail("urdfdom cannot read it: " + fault);
-  }
+  const std::string fault = parsed.errors.empty() ? "unknown reason" : parsed.errors.front();
+  if (!urdf || !urdf->getRoot()) whom_it_names(fault, robot).fail("urdfdom cannot read it: " + fault);
 
   Converter converter{robot, findings, *urdf, {}};
   Element& model = *converter.model;
