@@ -10,18 +10,30 @@ void TeeBus::publish(const std::string& channel, const uint8_t* data, size_t siz
 
 void TeeBus::listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own) {
   allow(channels);
-  inner_.listen(
-      channels,
-      [this, handler = std::move(handler)](const std::string& channel, const uint8_t* data, size_t size) {
-        handler(channel, data, size);
-        offer(channel, data, size);
-      },
-      own);
+  {
+    const std::lock_guard lock(handler_mutex_);
+    handler_ = std::move(handler);
+  }
+  inner_.listen(channels, [this](const std::string& channel, const uint8_t* data, size_t size) { receive(channel, data, size); }, own);
 }
 
 void TeeBus::listen_to(const std::vector<std::string>& channels, const std::vector<std::string>& own) {
   allow(channels);
   inner_.listen_to(channels, own);
+}
+
+void TeeBus::stop() {
+  inner_.stop();
+  const std::lock_guard lock(handler_mutex_);
+  handler_ = nullptr;
+}
+
+void TeeBus::receive(const std::string& channel, const uint8_t* data, size_t size) {
+  {
+    const std::lock_guard lock(handler_mutex_);
+    if (handler_) handler_(channel, data, size);
+  }
+  offer(channel, data, size);
 }
 
 void TeeBus::allow(const std::vector<std::string>& channels) {
@@ -34,7 +46,7 @@ bool TeeBus::command(const std::string& channel, const uint8_t* data, size_t siz
     const std::lock_guard lock(inputs_mutex_);
     if (!inputs_.contains(channel)) return false;
   }
-  inner_.publish(channel, data, size);
+  receive(channel, data, size);
   return true;
 }
 

@@ -37,11 +37,11 @@ class TeeBus : public Bus {
   void publish(const std::string& channel, const uint8_t* data, size_t size) override;
   void listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own = {}) override;
   void listen_to(const std::vector<std::string>& channels, const std::vector<std::string>& own = {}) override;
-  void stop() override { inner_.stop(); }
+  void stop() override;
   uint64_t failed() const override { return inner_.failed(); }
 
-  // The console's. A command or request of a viewer's, onto the bus, as any client's; false for a channel on which
-  // nobody listens.
+  // The console's. A command or request of a viewer's goes straight to who listens to the bus: a bus need not hear what
+  // this process sends. False for a channel on which nobody listens.
   bool command(const std::string& channel, const uint8_t* data, size_t size);
 
   // Whether anybody watches; without that, messages are only counted.
@@ -52,6 +52,7 @@ class TeeBus : public Bus {
   OfferRing& ring() { return ring_; }
 
  private:
+  void receive(const std::string& channel, const uint8_t* data, size_t size);
   void offer(const std::string& channel, const uint8_t* data, size_t size);
   Traffic* find(const std::string& channel);
   void allow(const std::vector<std::string>& channels);
@@ -68,6 +69,9 @@ class TeeBus : public Bus {
 
   std::mutex inputs_mutex_;
   std::unordered_set<std::string> inputs_;
+
+  std::mutex handler_mutex_;    // the bus's thread and the console's take turns
+  Handler handler_;
 };
 
 }  // namespace ruedo::console

@@ -13,7 +13,7 @@ const bundle = await require("esbuild").build({ entryPoints: ["src/wire/lcm.ts"]
 const { encode } = await import(`data:text/javascript,${encodeURIComponent(bundle.outputFiles[0].text)}`);
 const kAnyBody = [...encode("name_request_t", { name: "" })];
 const [url, folder, scenario, given] = process.argv.slice(2);
-const kPatience_ms = 180_000;    // software draws every pixel, on a machine that does other things, too
+const kPatience_ms = Number(process.env.RUEDO_PATIENCE_S ?? 180) * 1000;    // software draws every pixel, on a machine that does other things, too
 const profile = mkdtempSync(join(tmpdir(), "ruedo-browser-"));
 const context = await chromium.launchPersistentContext(profile, {
   executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", headless: true, viewport: { width: 900, height: 520 }, timeout: kPatience_ms,

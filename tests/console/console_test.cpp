@@ -155,9 +155,27 @@ TEST(TeeBus, ForwardsAllAndOffersWhatIsWanted) {
   EXPECT_EQ(offered(), 1);
   EXPECT_EQ(tee.channel(0).messages, 3u);
   EXPECT_THAT(inner.published, testing::ElementsAre("a", "a", "b", "a"));
+}
+
+// On a bus that does not hear itself, as over the network, and on one that does, a command arrives once.
+TEST(TeeBus, ACommandGoesToTheListenerAndNotOverTheBus) {
+  FakeBus inner;
+  TeeBus tee(inner);
+  std::vector<std::string> heard;
+  const uint8_t byte = 1;
+  EXPECT_FALSE(tee.command("p3at/velocity", &byte, 1));    // nobody listens yet
+  tee.listen({"p3at/velocity"}, [&](const std::string& channel, const uint8_t* data, size_t size) {
+    heard.push_back(channel + std::to_string(data[0]) + std::to_string(size));
+  });
+  tee.watch(true);
   EXPECT_TRUE(tee.command("p3at/velocity", &byte, 1));
   EXPECT_FALSE(tee.command("ruedo/world", &byte, 1));    // nobody listens there
-  EXPECT_EQ(inner.published.back(), "p3at/velocity");
+  EXPECT_THAT(heard, testing::ElementsAre("p3at/velocity11"));
+  EXPECT_THAT(inner.published, testing::IsEmpty());
+  EXPECT_EQ(tee.channel(0).messages, 1u);    // and it is shown, as what others send
+  tee.stop();
+  tee.command("p3at/velocity", &byte, 1);
+  EXPECT_EQ(heard.size(), 1u);
 }
 
 }  // namespace

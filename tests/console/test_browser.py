@@ -40,6 +40,13 @@ def test_a_run_is_shown_and_steered(tmp_path):
         assert (tmp_path / f"{name}.png").stat().st_size > 20_000
 
 
+@pytest.mark.parametrize("transport", [(), ("--lcm", "auto"), ("--lcm", "tcpq://127.0.0.1:7700"), ("--lcm", "memq://")], ids=["default", "auto", "tcpq", "memq"])
+def test_every_transport_can_be_steered(tmp_path, transport):
+    with running(*transport, "--disable", "p3at/camera") as process:
+        seen = browse(process.url, tmp_path, "steer")
+    assert seen == ["space pauses", "a step is taken", "space goes on", "W drives", "a rate is taken", "a box is placed", "reset takes it away"]
+
+
 def test_the_page_loads_fast_fits_and_says_what_is_wrong(tmp_path):
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

@@ -46,7 +46,7 @@ def test_only_local_names_and_its_own_pages(server):
 
 
 def test_elsewhere_a_token_is_needed():
-    with running("--disable", "p3at/camera", view="0.0.0.0:0") as process:
+    with running("--lcm", "auto", "--disable", "p3at/camera", view="0.0.0.0:0") as process:
         token = process.url.split("token=")[1]
         assert get(process.port, "/")[0] == 403
         assert get(process.port, "/scene.json")[0] == 403
@@ -113,7 +113,7 @@ def test_viewers_change_no_byte(tmp_path):
     """The log of a run without the console, and of one with viewers that watch everything, one of them slow."""
     common = ["--duration", "3", "--seed", "7", "--record"]
     subprocess.run([RUEDO, "run", ARENA, "--lcm", "memq://", "--quiet", "--rate", "max", *common, tmp_path / "alone.lcm"], check=True, timeout=120)
-    with running("--rate", "2", *common, tmp_path / "viewed.lcm") as process:
+    with running("--lcm", "auto", "--rate", "2", *common, tmp_path / "viewed.lcm") as process:
         viewers = [Socket(process.port) for _ in range(3)]
         for viewer in viewers:
             viewer.send(bytes([TRAFFIC, 1]))

@@ -1,0 +1,32 @@
+// What everybody does first, in short: pause, step, drive, place, rate, reset. For each transport; controls.mjs has the details.
+export default async function steer({ page, seen, until, ready, server, check }) {
+  await page.setViewportSize({ width: 900, height: 300 });    // software draws every pixel
+  await ready();
+  await page.locator("#canvas").focus();
+  const state = (text) => until(`(it is ${text})`, (wanted) => document.getElementById("state").textContent === wanted, text);
+  await page.keyboard.press(" ");
+  await state("paused");
+  seen("space pauses");
+  const held = await server();
+  await page.keyboard.press(".");
+  await until("(a step)", (t) => window.ruedo.time_s > t, held.utime * 1e-6);
+  check("a step is taken", (await server()).step === held.step + 1);
+  await page.keyboard.press(" ");
+  await state("running");
+  seen("space goes on");
+  const x = () => parseFloat(document.querySelector('[data-fact="pose"]')?.textContent ?? "NaN");
+  const begin = await page.evaluate(x);
+  await page.keyboard.down("KeyW");
+  await until("W drives", (from) => parseFloat(document.querySelector('[data-fact="pose"]').textContent) > from + 0.2, begin);
+  await page.keyboard.up("KeyW");
+  await page.getByLabel("rate").selectOption("0.25");
+  let is = await server();
+  for (let i = 0; i < 50 && is.rate !== 0.25; ++i) is = await server();
+  check("a rate is taken", is.rate === 0.25, is.rate);
+  await page.keyboard.press("b");
+  await page.locator("#canvas").click({ position: { x: 330, y: 200 } });
+  await until("a box is placed", () => window.ruedo.world.bodies.some((b) => b.name === "box/link"));
+  await page.locator("#canvas").focus();
+  await page.keyboard.press("r");
+  await until("reset takes it away", () => !window.ruedo.world.bodies.some((b) => b.name === "box/link"));
+}
