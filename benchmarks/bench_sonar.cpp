@@ -14,7 +14,7 @@
 #include "model/load.h"
 #include "ruedo/sensor.h"
 #include "scene/ray_scene.h"
-#include "server/fleet.h"
+#include "engine/fleet.h"
 
 namespace {
 
@@ -32,11 +32,11 @@ double measure(const std::string& file, int rays, int repeats) {
   options.settings.push_back({"p3at", "sonar_front", "ruedo:sonar.ruedo:rays", std::to_string(rays)});
   const auto world = model::load_world(file, options);
   const model::BodyLayout layout(*world);
-  server::Channels channels;
+  engine::Channels channels;
   Findings findings;
-  server::Fleet fleet = server::make_fleet(*world, layout, {}, channels, findings);
+  engine::Fleet fleet = engine::make_fleet(*world, layout, {}, channels, findings);
   Sensor* sonar = nullptr;
-  for (server::ModuleSetup& module : fleet.modules) {
+  for (engine::ModuleSetup& module : fleet.modules) {
     if (module.name == "sonar") sonar = module.devices.at(0).sensor.get();
   }
   if (!sonar) return 0.0;

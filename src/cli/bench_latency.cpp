@@ -18,7 +18,7 @@
 #include "ruedo/errors.h"
 #include "ruedo/motion_status_t.hpp"
 #include "ruedo/move_command_t.hpp"
-#include "server/server.h"
+#include "run/server.h"
 
 namespace ruedo::cli {
 namespace {
@@ -163,12 +163,12 @@ std::vector<std::string> measure_latency(const BenchTask& task) {
 
   model::LoadOptions load;
   load.disabled = {"r/camera"};
-  server::ServerOptions options;
+  run::ServerOptions options;
   options.control = false;
   options.simulation.fleet.disabled = load.disabled;
   bus::LcmBus lcm(task.lcm);
   TimedBus bus(lcm, 1'000'000);
-  server::Server server(world_with_reports_at_every_step(load), std::move(options), bus);
+  run::Server server(world_with_reports_at_every_step(load), std::move(options), bus);
   std::string text;
   int status = 0;
   std::thread ender([&] {

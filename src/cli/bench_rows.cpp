@@ -14,8 +14,8 @@
 #include "cli/bench_world.h"
 #include "model/load.h"
 #include "ruedo/move_command_t.hpp"
-#include "server/server.h"
-#include "server/thread_limit.h"
+#include "run/server.h"
+#include "engine/thread_limit.h"
 
 namespace ruedo::cli {
 namespace {
@@ -88,12 +88,12 @@ const char* name_of(Table table) {
 std::vector<std::string> measure(const BenchTask& task) {
   if (task.table == Table::latency) return measure_latency(task);
   if (task.table == Table::rays) return measure_rays(task);
-  const server::ThreadLimit limit(task.threads);
+  const engine::ThreadLimit limit(task.threads);
   const double sim_s = task.duration_s > 0.0 ? task.duration_s : default_duration_s(task);
 
   const auto load_begin = std::chrono::steady_clock::now();
   model::LoadOptions load_options;
-  server::ServerOptions options;
+  run::ServerOptions options;
   if (task.table != Table::camera) {
     for (int robot = 0; robot < task.robots; ++robot) load_options.disabled.push_back(fmt::format("r{}/camera", robot));
   }
@@ -105,7 +105,7 @@ std::vector<std::string> measure(const BenchTask& task) {
   std::unique_ptr<bus::LcmBus> lcm;
   if (task.table == Table::lcm) lcm = std::make_unique<bus::LcmBus>(task.lcm);
   CountingBus sink(lcm.get());
-  server::Server server(world, std::move(options), sink);
+  run::Server server(world, std::move(options), sink);
   const std::vector<uint8_t> circle = circle_command();
   for (int robot = 0; robot < task.robots; ++robot) server.command(fmt::format("r{}/move", robot), circle);
   const double load_s = seconds_since(load_begin);

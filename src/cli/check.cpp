@@ -11,7 +11,7 @@
 #include "physics/physics_world.h"
 #include "ruedo/errors.h"
 #include "scene/render_texture.h"
-#include "server/fleet.h"
+#include "engine/fleet.h"
 
 namespace ruedo::cli {
 namespace {
@@ -51,12 +51,12 @@ std::vector<Finding> find_all(const CheckArguments& arguments, bool& loaded) {
     loaded = true;
     std::vector<Finding> findings = world->findings;
     const model::BodyLayout layout(*world);
-    server::Channels channels;
+    engine::Channels channels;
     Findings of_devices;
-    server::FleetOptions options;
+    engine::FleetOptions options;
     options.disabled = arguments.world.disabled;
     options.keep_going = true;
-    server::make_fleet(*world, layout, options, channels, of_devices);
+    engine::make_fleet(*world, layout, options, channels, of_devices);
     const auto is_error = [](const Finding& finding) { return finding.kind == Finding::Kind::error; };
     loaded = std::none_of(of_devices.list().begin(), of_devices.list().end(), is_error);    // ruedo run stops at the first
     const physics::PhysicsWorld physics(*world, layout);

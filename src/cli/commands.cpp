@@ -118,11 +118,11 @@ std::pair<std::string, std::string> parse_remap(const std::string& text) {
   return {text.substr(0, equals), text.substr(equals + 1)};
 }
 
-server::WaitForOption parse_wait_for(const std::string& text) {
+run::WaitForOption parse_wait_for(const std::string& text) {
   const char* allowed = "it looks like CHANNEL@HZ, for example p3at/velocity@10, with a rate above 0";
   const size_t at = text.rfind('@');
   if (at == std::string::npos || at == 0) wrong("--wait-for", text, allowed);
-  server::WaitForOption option{text.substr(0, at), {}};
+  run::WaitForOption option{text.substr(0, at), {}};
   try {
     option.rate = Rate::parse(text.substr(at + 1));
   } catch (const std::invalid_argument&) {

@@ -13,7 +13,7 @@
 #include <CLI/CLI.hpp>
 
 #include "model/load.h"
-#include "server/wait_for.h"
+#include "run/wait_for.h"
 
 namespace ruedo::cli {
 
@@ -51,7 +51,7 @@ model::Spawn parse_spawn(const std::string& text);                              
 model::DriveOption parse_drive(const std::string& text);                        // ROBOT=LEFT[+LEFT...],RIGHT[+RIGHT...]
 model::Setting parse_setting(const std::string& text);                          // ROBOT/DEVICE.KEY=VALUE
 std::pair<std::string, std::string> parse_remap(const std::string& text);       // CHANNEL=NAME
-server::WaitForOption parse_wait_for(const std::string& text);                  // CHANNEL@HZ
+run::WaitForOption parse_wait_for(const std::string& text);                  // CHANNEL@HZ
 double parse_rate(const std::string& text);                                     // a number above 0, or "max": +inf
 int64_t parse_duration_us(const std::string& text);                             // seconds
 

@@ -7,7 +7,7 @@
 #include "cli/commands.h"
 #include "core/utf8.h"
 #include "ruedo/errors.h"
-#include "server/log_diff.h"
+#include "log/diff.h"
 
 namespace ruedo::cli {
 namespace {
@@ -24,13 +24,13 @@ void write_file(const std::string& path, const std::string& text) {
 }
 
 int diff(const DiffArguments& arguments) {
-  std::vector<server::DiffRule> rules;
-  for (const std::string& text : arguments.tolerances) rules.push_back(server::DiffRule::parse(text, false));
-  for (const std::string& text : arguments.ignored) rules.push_back(server::DiffRule::parse(text, true));
-  const server::LogDiff result = server::diff_logs(arguments.golden, arguments.other, rules);
-  fmt::print("{}", for_terminal(server::diff_text(result)));
-  if (!arguments.junit.empty()) write_file(arguments.junit, server::diff_junit(result));
-  if (!arguments.html.empty()) write_file(arguments.html, server::diff_html(result, arguments.golden, arguments.other));
+  std::vector<log::DiffRule> rules;
+  for (const std::string& text : arguments.tolerances) rules.push_back(log::DiffRule::parse(text, false));
+  for (const std::string& text : arguments.ignored) rules.push_back(log::DiffRule::parse(text, true));
+  const log::Diff result = log::diff_logs(arguments.golden, arguments.other, rules);
+  fmt::print("{}", for_terminal(log::diff_text(result)));
+  if (!arguments.junit.empty()) write_file(arguments.junit, log::diff_junit(result));
+  if (!arguments.html.empty()) write_file(arguments.html, log::diff_html(result, arguments.golden, arguments.other));
   return result.same() ? kGood : kCheckFailed;
 }
 

@@ -11,8 +11,8 @@
 #include "model/body_layout.h"
 #include "ruedo/errors.h"
 #include "scene/render_scene.h"
-#include "server/log_header.h"
-#include "server/version.h"
+#include "log/header.h"
+#include "core/version.h"
 
 namespace ruedo::cli {
 namespace {
@@ -89,8 +89,8 @@ void check_renderer(Report& report) {
 
 int doctor(const std::string& url) {
   Report report;
-  report.good("version", fmt::format("ruedo {}, LCM {}.{}.{}, {}, CPU with {}", server::version(), LCM_VERSION_MAJOR, LCM_VERSION_MINOR,
-                                     LCM_VERSION_PATCH, server::libc_version(), server::cpu_features()));
+  report.good("version", fmt::format("ruedo {}, LCM {}.{}.{}, {}, CPU with {}", version(), LCM_VERSION_MAJOR, LCM_VERSION_MINOR,
+                                     LCM_VERSION_PATCH, log::libc_version(), log::cpu_features()));
   check_bus(report, url);
   check_buffers(report);
   check_renderer(report);

@@ -54,8 +54,8 @@ ExperimentRig::ExperimentRig(const RigOptions& options) : world_(make_world(opti
   layout_ = std::make_unique<model::BodyLayout>(*world_);
   physics_ = std::make_unique<physics::PhysicsWorld>(*world_, *layout_);
   robots_ = std::make_unique<robot::Robots>(*world_, *layout_, *physics_);
-  server::Fleet fleet = server::make_fleet(*world_, *layout_, {}, channels_, findings_);
-  for (server::ModuleSetup& module : fleet.modules) {
+  engine::Fleet fleet = engine::make_fleet(*world_, *layout_, {}, channels_, findings_);
+  for (engine::ModuleSetup& module : fleet.modules) {
     if (module.name == "odometry") module_ = std::move(module);
   }
   for (size_t i = 0; i < channels_.list().size(); ++i) {
@@ -74,7 +74,7 @@ void ExperimentRig::step() {
 void ExperimentRig::look() {
   out_.clear();
   out_.begin_step(now_.step);
-  for (server::Device& device : module_.devices) {
+  for (engine::Device& device : module_.devices) {
     if (device.sensor->observes()) device.sensor->observe(now_, out_);
     device.sensor->sample({now_, samples_, nullptr, nullptr}, out_);
   }

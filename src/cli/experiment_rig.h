@@ -11,7 +11,7 @@
 #include "physics/physics_world.h"
 #include "robot/robots.h"
 #include "ruedo/odometry_t.hpp"
-#include "server/fleet.h"
+#include "engine/fleet.h"
 
 namespace ruedo::cli {
 
@@ -54,9 +54,9 @@ class ExperimentRig {
   std::unique_ptr<model::BodyLayout> layout_;
   std::unique_ptr<physics::PhysicsWorld> physics_;
   std::unique_ptr<robot::Robots> robots_;
-  server::Channels channels_;
+  engine::Channels channels_;
   Findings findings_;
-  server::ModuleSetup module_;    // odometry's
+  engine::ModuleSetup module_;    // odometry's
   int channel_ = -1;              // of odometry_t
   Snapshot now_;
   Outbox out_;

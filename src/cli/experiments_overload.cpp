@@ -10,7 +10,8 @@
 #include "cli/experiments.h"
 #include "model/load.h"
 #include "ruedo/move_command_t.hpp"
-#include "server/simulation.h"
+#include "engine/simulation.h"
+#include "run/pacer.h"
 
 namespace ruedo::cli {
 namespace {
@@ -42,15 +43,15 @@ struct Run {
 
 Run run_world(std::function<void(const std::string&)> before_batch) {
   const auto world = make_world();
-  server::Channels channels;
+  engine::Channels channels;
   Findings findings;
-  server::Wakeup finished;
-  server::SimulationOptions options;
+  engine::Wakeup finished;
+  engine::SimulationOptions options;
   options.fleet.disabled = {"p3at/camera"};
   options.before_batch = std::move(before_batch);
-  server::Pacer pacer(world->step_us, std::numeric_limits<double>::infinity(),
+  run::Pacer pacer(world->step_us, std::numeric_limits<double>::infinity(),
                       static_cast<int64_t>(kDuration_s * 1e6) / world->step_us);
-  server::Simulation simulation(world, options, channels, findings, finished);
+  engine::Simulation simulation(world, options, channels, findings, finished);
 
   move_command_t command{};
   command.id = 1;
@@ -64,7 +65,7 @@ Run run_world(std::function<void(const std::string&)> before_batch) {
   Run run;
   simulation.start(pacer);
   for (bool last = false; !last;) {
-    const server::Batch* batch = simulation.take();
+    const engine::Batch* batch = simulation.take();
     if (!batch) {
       finished.wait();
       continue;

@@ -15,7 +15,7 @@
 #include "ruedo/planar_lidar_t.hpp"
 #include "scene/ray_scene.h"
 #include "scene/render_scene.h"
-#include "server/fleet.h"
+#include "engine/fleet.h"
 
 namespace ruedo::cli {
 namespace {
@@ -111,12 +111,12 @@ struct LaserBench {
   }
 
   planar_lidar_t scan(uint64_t seed, bool noise) {
-    server::Channels channels;
+    engine::Channels channels;
     Findings findings;
-    server::Fleet fleet = server::make_fleet(*world, *layout, {.seed = seed, .noise = noise, .disabled = {}}, channels, findings);
+    engine::Fleet fleet = engine::make_fleet(*world, *layout, {.seed = seed, .noise = noise, .disabled = {}}, channels, findings);
     Outbox out;
     planar_lidar_t message;
-    for (server::ModuleSetup& module : fleet.modules) {
+    for (engine::ModuleSetup& module : fleet.modules) {
       if (module.name != "lrf") continue;
       Sensor& sensor = *module.devices.at(0).sensor;
       if (sensor.observes()) sensor.observe(start, out);

@@ -9,8 +9,8 @@
 #include "cli/foxglove.h"
 #include "cli/logged_run.h"
 #include "ruedo/errors.h"
-#include "server/log_reader.h"
-#include "server/log_worlds.h"
+#include "log/reader.h"
+#include "run/log_worlds.h"
 
 namespace ruedo::cli {
 namespace {
@@ -27,13 +27,13 @@ uint64_t nanoseconds(SimTime time_us) {
 int export_log(const ExportArguments& arguments) {
   std::error_code error;
   if (std::filesystem::equivalent(arguments.log, arguments.out, error)) throw InputError({}, "OUT is the log itself: " + arguments.out);
-  const server::LogIndex index(arguments.log);
-  const server::LogWorlds worlds(index, [&](const log_header_t& header) { return load_run(header, arguments.log); });
-  server::LogReader log(arguments.log);
+  const log::Index index(arguments.log);
+  const run::LogWorlds worlds(index, [&](const log_header_t& header) { return load_run(header, arguments.log); });
+  log::Reader log(arguments.log);
   McapWriter out(arguments.out);
   FoxgloveExport foxglove(out);
-  const server::LogWorlds::Scene* scene = nullptr;
-  server::LogEvent event;
+  const run::LogWorlds::Scene* scene = nullptr;
+  log::Event event;
   SimTime now_us = index.begin_us();
   uint64_t read = 0;
   while (log.next(event)) {

@@ -177,7 +177,7 @@ void FoxgloveExport::send(const std::string& topic, const foxglove::Type& type, 
   out_.add_message(channel(topic, type.name, type.schema), time_ns, json);
 }
 
-void FoxgloveExport::begin_scene(const server::LogWorlds::Scene& scene, uint64_t time_ns) {
+void FoxgloveExport::begin_scene(const run::LogWorlds::Scene& scene, uint64_t time_ns) {
   device_of_channel_.clear();
   bodies_.clear();
   body_names_.clear();
@@ -204,7 +204,7 @@ std::string FoxgloveExport::device_frame(const std::string& channel) const {
   return body_names_.contains(name) ? name + "/device" : name;
 }
 
-void FoxgloveExport::send_frames(const server::LogWorlds::Scene& scene, uint64_t time_ns) {
+void FoxgloveExport::send_frames(const run::LogWorlds::Scene& scene, uint64_t time_ns) {
   const model::BodyLayout layout(*scene.world);
   JsonWriter json;
   json.open('{').name("transforms").open('[');

@@ -13,7 +13,7 @@
 #include "cli/mcap_writer.h"
 #include "model/world_model.h"
 #include "ruedo/world_info_t.hpp"
-#include "server/log_worlds.h"
+#include "run/log_worlds.h"
 
 namespace ruedo::cli {
 
@@ -22,7 +22,7 @@ class FoxgloveExport {
   explicit FoxgloveExport(McapWriter& out) : out_(out) {}
 
   // What runs from now on: frames of robots and devices, and what the world looks like.
-  void begin_scene(const server::LogWorlds::Scene& scene, uint64_t time_ns);
+  void begin_scene(const run::LogWorlds::Scene& scene, uint64_t time_ns);
   // A message as it came. One that is none of Ruedo's types, or damaged, is left out and counted.
   void add(const std::string& channel, uint64_t time_ns, std::span<const uint8_t> message);
 
@@ -31,7 +31,7 @@ class FoxgloveExport {
  private:
   uint16_t channel(const std::string& topic, const std::string& name, const std::string& schema);
   void send(const std::string& topic, const foxglove::Type& type, uint64_t time_ns, const std::string& json);
-  void send_frames(const server::LogWorlds::Scene& scene, uint64_t time_ns);
+  void send_frames(const run::LogWorlds::Scene& scene, uint64_t time_ns);
   void send_scene(const model::WorldModel& world, uint64_t time_ns);
   std::string device_frame(const std::string& channel) const;
   // Whether Foxglove has a type for it; all: that type says all that the message does.

@@ -6,9 +6,9 @@
 #include "core/json.h"
 #include "core/utf8.h"
 #include "ruedo/errors.h"
-#include "server/fleet.h"
-#include "server/version.h"
-#include "server/world_info.h"
+#include "engine/fleet.h"
+#include "core/version.h"
+#include "engine/world_info.h"
 
 namespace ruedo::cli {
 namespace {
@@ -57,18 +57,18 @@ void print_json(const model::WorldModel& world, const std::vector<world_info_t>&
 int info(const InfoArguments& arguments) {
   const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
   const model::BodyLayout layout(*world);
-  server::Channels channels;
+  engine::Channels channels;
   Findings findings;
-  server::FleetOptions options;
+  engine::FleetOptions options;
   options.disabled = arguments.world.disabled;
   options.noise = !arguments.world.no_noise;
-  server::add_simulation_channels(channels, true);
-  const server::Fleet fleet = server::make_fleet(*world, layout, options, channels, findings);
+  engine::add_simulation_channels(channels, true);
+  const engine::Fleet fleet = engine::make_fleet(*world, layout, options, channels, findings);
   world_info_t head{};
-  head.version = server::version();
+  head.version = version();
   head.world = world->name;
   head.step_us = world->step_us;
-  const std::vector<world_info_t> parts = server::make_world_info(head, *world, layout, fleet.devices, channels);
+  const std::vector<world_info_t> parts = engine::make_world_info(head, *world, layout, fleet.devices, channels);
   if (arguments.json) {
     print_json(*world, parts);
     return kGood;

@@ -12,7 +12,7 @@
 #include "ruedo/errors.h"
 #include "ruedo/odometry_t.hpp"
 #include "ruedo/pose_t.hpp"
-#include "server/log_reader.h"
+#include "log/reader.h"
 
 namespace ruedo::cli {
 namespace {
@@ -102,8 +102,8 @@ void Judge::see_contacts(const Snapshot& snapshot) {
 
 // Odometry starts at zero where the robot starts: the truth is looked at from its first pose.
 void Judge::check_odometry(const std::string& record) {
-  server::LogReader log(record);
-  server::LogEvent event;
+  log::Reader log(record);
+  log::Event event;
   std::optional<pose_t> start, pose;
   bool compared = false;
   const std::string pose_channel = expected_.robot + "/pose", odometry_channel = expected_.robot + "/odometry";

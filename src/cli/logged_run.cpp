@@ -2,7 +2,7 @@
 #include "cli/logged_run.h"
 
 #include "ruedo/errors.h"
-#include "server/log_header.h"
+#include "log/header.h"
 
 namespace ruedo::cli {
 
@@ -26,11 +26,11 @@ LoggedOptions read_options(const log_header_t& header, const std::string& log) {
   return options;
 }
 
-server::LoggedRun load_run(const log_header_t& header, const std::string& log) {
+run::LoggedRun load_run(const log_header_t& header, const std::string& log) {
   LoggedOptions options = read_options(header, log);
-  server::LoggedRun run;
+  run::LoggedRun run;
   try {
-    server::check_files(header, log);
+    log::check_files(header, log);
   } catch (const InputError& error) {
     run.warning = std::string("The world may not be the recorded one: ") + error.what();
   }

@@ -8,7 +8,7 @@
 #include "cli/commands.h"
 #include "ruedo/errors.h"
 #include "ruedo/log_header_t.hpp"
-#include "server/log_worlds.h"
+#include "run/log_worlds.h"
 
 namespace ruedo::cli {
 
@@ -34,6 +34,6 @@ auto with_options_of(const std::string& log, Repeat repeat) {
 
 // The run to show. A world whose files were changed is shown as it is now, with a warning. Throws InputError, too, when the
 // world cannot be read.
-server::LoggedRun load_run(const log_header_t& header, const std::string& log);
+run::LoggedRun load_run(const log_header_t& header, const std::string& log);
 
 }  // namespace ruedo::cli

@@ -10,7 +10,7 @@
 #include "core/utf8.h"
 #include "ruedo/element.h"
 #include "ruedo/errors.h"
-#include "server/version.h"
+#include "core/version.h"
 
 namespace {
 
@@ -51,7 +51,7 @@ std::string suggestion(const CLI::App& app, int argc, char** argv) {
 int run(int argc, char** argv) {
   CLI::App app{"Ruedo: a simulation server for mobile robots. Robots are data servers; LCM carries commands in and sensor streams out.",
                "ruedo"};
-  app.set_version_flag("--version", std::string("ruedo ") + ruedo::server::version());
+  app.set_version_flag("--version", std::string("ruedo ") + ruedo::version());
   app.require_subcommand(1);
   app.failure_message(CLI::FailureMessage::simple);
   app.footer("Exit codes: 0 good, 1 the check failed, 2 wrong usage, 3 bad input file, 4 environment.");

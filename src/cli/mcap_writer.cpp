@@ -8,8 +8,8 @@
 #include <filesystem>
 
 #include "ruedo/errors.h"
-#include "server/tick.h"
-#include "server/version.h"
+#include "run/tick.h"
+#include "core/version.h"
 
 namespace ruedo::cli {
 namespace {
@@ -43,7 +43,7 @@ std::string record(Op op, std::string_view fields) {
 
 // CRC-32 goes on from a part to the next.
 uint32_t crc_of(std::string_view bytes, uint32_t before = 0) {
-  return server::crc32(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size(), before);
+  return run::crc32(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size(), before);
 }
 
 }  // namespace
@@ -53,7 +53,7 @@ McapWriter::McapWriter(const std::string& path) : path_(path), file_(std::fopen(
   write(kMagic);
   std::string fields;
   put_text(fields, "");    // no profile
-  put_text(fields, std::string("Ruedo ") + server::version());
+  put_text(fields, std::string("Ruedo ") + version());
   write(record(Op::header, fields));
 }
 

@@ -12,7 +12,7 @@
 #include "cli/commands.h"
 #include "cli/view.h"
 #include "ruedo/errors.h"
-#include "server/log_reader.h"
+#include "log/reader.h"
 
 namespace ruedo::cli {
 namespace {
@@ -55,9 +55,9 @@ int play(const PlayArguments& arguments) {
   std::signal(SIGINT, [](int) { interrupted = 1; });
   std::signal(SIGTERM, [](int) { interrupted = 1; });
   if (arguments.viewed) return view(arguments, speed);
-  server::LogReader log(arguments.log);
+  log::Reader log(arguments.log);
   bus::LcmBus bus(arguments.lcm);
-  server::LogEvent event;
+  log::Event event;
   int64_t messages = 0;
   SimTime first_us = 0;
   Clock::time_point begin;

@@ -15,10 +15,10 @@
 #include "cli/isolation.h"
 #include "cli/judge.h"
 #include "ruedo/errors.h"
-#include "server/log_diff.h"
-#include "server/log_reader.h"
-#include "server/log_writer.h"
-#include "server/server.h"
+#include "log/diff.h"
+#include "log/reader.h"
+#include "log/writer.h"
+#include "run/server.h"
 
 namespace ruedo::cli {
 namespace {
@@ -36,11 +36,11 @@ struct RegressArguments {
   bool renew = false, shared_network = false;
 };
 
-server::ServerOptions server_options(const RegressArguments& arguments) {
-  server::ServerOptions options;
+run::ServerOptions server_options(const RegressArguments& arguments) {
+  run::ServerOptions options;
   options.rate = parse_rate(arguments.rate);
   options.duration_us = parse_duration_us(arguments.duration);
-  options.lockstep = {arguments.lockstep, 30.0, server::LockstepOptions::Policy::fail};
+  options.lockstep = {arguments.lockstep, 30.0, run::LockstepOptions::Policy::fail};
   options.record = arguments.record;
   options.result_options = result_options(arguments.world);
   for (const std::string& text : arguments.remaps) {
@@ -58,7 +58,7 @@ server::ServerOptions server_options(const RegressArguments& arguments) {
 std::string run(const RegressArguments& arguments, const std::shared_ptr<const model::WorldModel>& world, bool isolated, Judge& judge) {
   bus::ServerBus place = bus::open_server_bus(isolated ? "auto" : "auto-tcp", world->name);
   bus::RivalWatch bus(std::move(place.bus), [](const std::string& line) { spdlog::warn(line); });
-  server::Server server(world, server_options(arguments), bus);
+  run::Server server(world, server_options(arguments), bus);
   server.on_state([&](const Snapshot& snapshot) { judge.see(snapshot); });
   std::unique_ptr<ClientProcess> client;
   if (!arguments.client.empty()) {
@@ -68,7 +68,7 @@ std::string run(const RegressArguments& arguments, const std::shared_ptr<const m
   std::string fault;
   try {
     server.run();
-  } catch (const server::LeaseEnded& ended) {
+  } catch (const run::LeaseEnded& ended) {
     fault = ended.what();
   }
   if (client && client->end() && !client->fault().empty()) return "the client ended with " + client->fault();
@@ -80,9 +80,9 @@ void keep_channels(const std::string& from, const std::string& to, const std::ve
   const auto kept = [&](const std::string& channel) {
     return std::any_of(patterns.begin(), patterns.end(), [&](const std::string& pattern) { return fnmatch(pattern.c_str(), channel.c_str(), 0) == 0; });
   };
-  server::LogReader log(from);
-  server::LogWriter writer(to);
-  server::LogEvent event;
+  log::Reader log(from);
+  log::Writer writer(to);
+  log::Event event;
   int64_t count = 0;
   while (log.next(event)) {
     if (!kept(event.channel)) continue;
@@ -102,13 +102,13 @@ void write_file(const std::string& path, const std::string& text) {
 // What differs from the golden log, or "".
 std::string compare(const RegressArguments& arguments, const std::string& kept) {
   if (!fs::exists(arguments.golden)) return "there is no golden log " + arguments.golden + " yet: run this once with RUEDO_RENEW=1";
-  std::vector<server::DiffRule> rules;
-  for (const std::string& text : arguments.tolerances) rules.push_back(server::DiffRule::parse(text, false));
-  for (const std::string& text : arguments.ignored) rules.push_back(server::DiffRule::parse(text, true));
-  const server::LogDiff result = server::diff_logs(arguments.golden, kept, rules);
-  if (!arguments.junit.empty()) write_file(arguments.junit, server::diff_junit(result));
-  if (!arguments.html.empty()) write_file(arguments.html, server::diff_html(result, arguments.golden, kept));
-  return result.same() ? "" : "the run differs from " + arguments.golden + ":\n" + server::diff_text(result);
+  std::vector<log::DiffRule> rules;
+  for (const std::string& text : arguments.tolerances) rules.push_back(log::DiffRule::parse(text, false));
+  for (const std::string& text : arguments.ignored) rules.push_back(log::DiffRule::parse(text, true));
+  const log::Diff result = log::diff_logs(arguments.golden, kept, rules);
+  if (!arguments.junit.empty()) write_file(arguments.junit, log::diff_junit(result));
+  if (!arguments.html.empty()) write_file(arguments.html, log::diff_html(result, arguments.golden, kept));
+  return result.same() ? "" : "the run differs from " + arguments.golden + ":\n" + log::diff_text(result);
 }
 
 std::string run_script(const RegressArguments& arguments) {

@@ -19,8 +19,8 @@
 #include "cli/view.h"
 #include "core/utf8.h"
 #include "ruedo/errors.h"
-#include "server/server.h"
-#include "server/thread_limit.h"
+#include "run/server.h"
+#include "engine/thread_limit.h"
 
 namespace ruedo::cli {
 namespace {
@@ -55,13 +55,13 @@ class SignalThread {
     pthread_kill(thread_.native_handle(), SIGTERM);
     thread_.join();
   }
-  void serve(server::Server* server) { server_ = server; }
+  void serve(run::Server* server) { server_ = server; }
 
  private:
   void wait() {
     for (int signal = 0; sigwait(&signals_, &signal) == 0;) {
       if (done_) return;
-      server::Server* server = server_;
+      run::Server* server = server_;
       if (!server || asked_) std::_Exit(128 + signal);    // nothing to end cleanly, or it does not end
       asked_ = true;
       server->stop();
@@ -70,7 +70,7 @@ class SignalThread {
 
   sigset_t signals_;
   std::atomic<bool> done_{false};
-  std::atomic<server::Server*> server_{nullptr};
+  std::atomic<run::Server*> server_{nullptr};
   bool asked_ = false;
   std::thread thread_;
 };
@@ -95,7 +95,7 @@ class StatusLine {
     if (drawn_) fmt::print(stderr, "\n");
   }
 
-  void draw(const server::Status& status) {
+  void draw(const run::Status& status) {
     const auto now = std::chrono::steady_clock::now();
     const double real_s = std::chrono::duration<double>(now - last_time_).count();
     const double factor = static_cast<double>(status.time_us - last_.time_us) * 1e-6 / real_s;
@@ -111,19 +111,19 @@ class StatusLine {
 
  private:
   bool shown_, drawn_ = false;
-  server::Status last_;
+  run::Status last_;
   std::chrono::steady_clock::time_point last_time_ = std::chrono::steady_clock::now();
 };
 
-server::LockstepOptions lockstep_options(const RunArguments& arguments) {
-  using Policy = server::LockstepOptions::Policy;
+run::LockstepOptions lockstep_options(const RunArguments& arguments) {
+  using Policy = run::LockstepOptions::Policy;
   if (arguments.lockstep > 0 && arguments.control == "off") throw InputError({}, "--lockstep needs requests: not with --control off");
   const Policy policy = arguments.lease_policy == "drop" ? Policy::drop : arguments.lease_policy == "fail" ? Policy::fail : Policy::pause;
   return {arguments.lockstep, arguments.lease, policy};
 }
 
-server::ServerOptions server_options(const RunArguments& arguments) {
-  server::ServerOptions options;
+run::ServerOptions server_options(const RunArguments& arguments) {
+  run::ServerOptions options;
   options.rate = parse_rate(arguments.lockstep > 0 ? "max" : arguments.rate.empty() ? "1" : arguments.rate);
   if (!arguments.duration.empty()) options.duration_us = parse_duration_us(arguments.duration);
   options.paused = arguments.paused;
@@ -153,15 +153,15 @@ void announce(const bus::ServerBus& place) {
 }
 
 int run(const RunArguments& arguments) {
-  server::ServerOptions options = server_options(arguments);
+  run::ServerOptions options = server_options(arguments);
   SignalThread signals;
   if (arguments.watch_stdin) watch_stdin();
-  const server::ThreadLimit limit(arguments.threads);
+  const engine::ThreadLimit limit(arguments.threads);
   const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
   bus::ServerBus place = bus::open_server_bus(arguments.lcm, world->name);
   bus::RivalWatch bus(std::move(place.bus), [](const std::string& line) { spdlog::warn(line); });
   ViewedBus viewed(bus, arguments.viewed, arguments.view);
-  server::Server server(world, std::move(options), viewed.bus());
+  run::Server server(world, std::move(options), viewed.bus());
   place.claim->describe(fmt::format("pid {}, world {}, run {}", getpid(), world->name, server.run_id()));
   announce(place);
   std::vector<Finding> findings = world->findings;
@@ -176,11 +176,11 @@ int run(const RunArguments& arguments) {
   }
   const std::shared_ptr<void> view = viewed.open(server, world->name);
   StatusLine status;
-  server.on_status([&](const server::Status& now) { status.draw(now); });
+  server.on_status([&](const run::Status& now) { status.draw(now); });
   signals.serve(&server);
   try {
     server.run();
-  } catch (const server::LeaseEnded& ended) {
+  } catch (const run::LeaseEnded& ended) {
     fmt::print(stderr, "ruedo: {}\n", ended.what());
     signals.serve(nullptr);
     return kCheckFailed;

@@ -7,9 +7,9 @@
 #include "cli/commands.h"
 #include "cli/logged_run.h"
 #include "core/utf8.h"
-#include "server/log_header.h"
-#include "server/thread_limit.h"
-#include "server/verify.h"
+#include "log/header.h"
+#include "engine/thread_limit.h"
+#include "run/verify.h"
 
 namespace ruedo::cli {
 namespace {
@@ -19,7 +19,7 @@ struct VerifyArguments {
   int threads = 0;
 };
 
-std::string describe(const server::FirstDifference& difference) {
+std::string describe(const run::FirstDifference& difference) {
   const std::string where = fmt::format("{} at step {} ({:g} s{})", difference.channel, difference.step,
                                         static_cast<double>(difference.time_us) * 1e-6,
                                         difference.epoch > 0 ? fmt::format(", epoch {}", difference.epoch) : "");
@@ -29,19 +29,19 @@ std::string describe(const server::FirstDifference& difference) {
 
 int repeat(const VerifyArguments& arguments, const log_header_t& header) {
   LoggedOptions logged = read_options(header, arguments.log);
-  server::ServerOptions options;
+  run::ServerOptions options;
   options.remaps = std::move(logged.remaps);
   options.simulation.fleet.seed = static_cast<uint64_t>(header.seed);
   options.simulation.fleet.noise = !logged.world.no_noise;
   options.simulation.fleet.disabled = logged.world.disabled;
   options.result_options = header.options;
-  const server::ThreadLimit limit(arguments.threads);
-  server::Verifier verifier(arguments.log, load(logged.world), std::move(options));
+  const engine::ThreadLimit limit(arguments.threads);
+  run::Verifier verifier(arguments.log, load(logged.world), std::move(options));
   const bool same_machine = verifier.machine_differences().empty();
   for (const std::string& line : verifier.machine_differences()) fmt::print("not as in the log: {}\n", for_terminal(line));
   std::fflush(stdout);
   verifier.check_same_run();
-  const server::Verification result = verifier.run();
+  const run::Verification result = verifier.run();
   const std::string so_far = fmt::format("{} messages, {} bytes, {:g} s of {}, seed {}", result.messages, result.bytes,
                                          static_cast<double>(result.time_us) * 1e-6, header.world, static_cast<uint64_t>(header.seed));
   if (result.difference) {
@@ -56,8 +56,8 @@ int repeat(const VerifyArguments& arguments, const log_header_t& header) {
 }
 
 int verify(const VerifyArguments& arguments) {
-  const log_header_t header = server::read_header(arguments.log);
-  server::check_files(header, arguments.log);
+  const log_header_t header = run::read_header(arguments.log);
+  log::check_files(header, arguments.log);
   return with_options_of(arguments.log, [&] { return repeat(arguments, header); });
 }
 

@@ -15,7 +15,7 @@
 #include "console/log_source.h"
 #include "console/tee_bus.h"
 #include "ruedo/world_info_t.hpp"
-#include "server/server.h"
+#include "run/server.h"
 
 namespace ruedo::cli {
 namespace {
@@ -40,10 +40,10 @@ ViewedBus::~ViewedBus() = default;
 
 Bus& ViewedBus::bus() { return impl_ ? impl_->tee : inner_; }
 
-std::shared_ptr<void> ViewedBus::open(server::Server& server, const std::string& title) {
+std::shared_ptr<void> ViewedBus::open(run::Server& server, const std::string& title) {
   if (!impl_) return nullptr;
   std::string info;
-  for (const server::Channel& channel : server.channels().list()) {
+  for (const engine::Channel& channel : server.channels().list()) {
     if (channel.name == "ruedo/info") info = channel.bus_name;
   }
   auto source = std::make_unique<console::LiveSource>(impl_->tee, [&server] { return server.world(); }, info);
@@ -88,7 +88,7 @@ ViewedBus::~ViewedBus() = default;
 
 Bus& ViewedBus::bus() { return inner_; }
 
-std::shared_ptr<void> ViewedBus::open(server::Server&, const std::string&) { return nullptr; }
+std::shared_ptr<void> ViewedBus::open(run::Server&, const std::string&) { return nullptr; }
 
 std::shared_ptr<void> view_log(const std::string&, const std::string&, double) { no_console(); }
 

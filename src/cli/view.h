@@ -6,7 +6,7 @@
 
 #include "ruedo/bus.h"
 
-namespace ruedo::server {
+namespace ruedo::run {
 class Server;
 }
 
@@ -23,7 +23,7 @@ class ViewedBus {
 
   // Serves the console for as long as the returned object lives, and prints where. Null without --view. Throws
   // EnvironmentError when the address cannot be had. The server must outlive it.
-  std::shared_ptr<void> open(server::Server& server, const std::string& title);
+  std::shared_ptr<void> open(run::Server& server, const std::string& title);
 
  private:
   struct Impl;

@@ -16,7 +16,7 @@
 #include "console/web_server.h"
 #include "core/json.h"
 #include "core/utf8.h"
-#include "server/version.h"
+#include "core/version.h"
 
 namespace ruedo::console {
 namespace {
@@ -116,7 +116,7 @@ Console::Console(const Address& address, std::unique_ptr<Source> source, const s
   impl.stage.source = std::move(source);
   impl.world = impl.stage.source->world();
   JsonWriter json;
-  json.open('{').name("hello").open('{').member("mode", mode).member("title", printable(title)).member("version", server::version());
+  json.open('{').name("hello").open('{').member("mode", mode).member("title", printable(title)).member("version", version());
   json.member("info", impl.stage.source->info_channel()).member("fault", printable(impl.stage.source->fault())).close('}').close('}');
   impl.stage.greeting = json.text();
   const std::string token = address.loopback() ? "" : make_token();

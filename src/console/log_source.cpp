@@ -15,14 +15,14 @@ constexpr double kSlowest = 0.01, kFastest = 1000.0;
 
 }  // namespace
 
-LogSource::LogSource(const std::string& path, const server::LoadRun& load, double speed)
+LogSource::LogSource(const std::string& path, const run::LoadRun& load, double speed)
     : index_(path), worlds_(index_, load), reader_(path), scene_(&worlds_.at(index_.begin_us())), shown_(index_.channels().size(), kNothing) {
   playback_.begin_s = static_cast<double>(index_.begin_us()) * 1e-6;
   playback_.end_s = static_cast<double>(index_.end_us()) * 1e-6;
   playback_.now_s = playback_.begin_s;
   playback_.speed = std::clamp(speed, kSlowest, kFastest);
   playback_.playing = true;
-  for (const server::LogIndex::Channel& channel : index_.channels()) {
+  for (const log::Index::Channel& channel : index_.channels()) {
     if (channel.fingerprint == world_info_t::getHash()) info_channel_ = printable(channel.name);
   }
   makes_info_ = info_channel_.empty();
@@ -87,7 +87,7 @@ void LogSource::load(Board& board, size_t channel, size_t count) {
 }
 
 bool LogSource::read(size_t channel, size_t entry) {
-  const server::LogIndex::Entry& wanted = index_.channels()[channel].entries[entry];
+  const log::Index::Entry& wanted = index_.channels()[channel].entries[entry];
   if (wanted.size > kMostMessage) return false;
   reader_.seek(wanted.offset);
   return reader_.next(event_);    // false when the file is no longer what it was
@@ -95,7 +95,7 @@ bool LogSource::read(size_t channel, size_t entry) {
 
 Source::Count LogSource::traffic(size_t channel) const {
   if (channel >= index_.channels().size()) return {};
-  const server::LogIndex::Channel& of = index_.channels()[channel];
+  const log::Index::Channel& of = index_.channels()[channel];
   const size_t count = of.count_until(now_us());
   if (count == 0) return {};
   constexpr uint32_t kEventHead = 28;    // bytes before channel and data

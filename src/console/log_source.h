@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "console/source.h"
-#include "server/log_index.h"
-#include "server/log_worlds.h"
+#include "log/index.h"
+#include "run/log_worlds.h"
 
 namespace ruedo::console {
 
@@ -18,7 +18,7 @@ class LogSource : public Source {
   static constexpr uint32_t kMostMessage = 64u << 20;    // bytes; a larger one is not shown
 
   // Throws InputError for what is no log. speed: log time per real time.
-  LogSource(const std::string& path, const server::LoadRun& load, double speed);
+  LogSource(const std::string& path, const run::LoadRun& load, double speed);
 
   void pump(Board& board, bool viewers) override;
   Count traffic(size_t channel) const override;
@@ -38,14 +38,14 @@ class LogSource : public Source {
   void load(Board& board, size_t channel, size_t count);
   bool read(size_t channel, size_t entry);
 
-  server::LogIndex index_;
-  server::LogWorlds worlds_;
-  server::LogReader reader_;
-  server::LogEvent event_;
-  const server::LogWorlds::Scene* scene_;
+  log::Index index_;
+  run::LogWorlds worlds_;
+  log::Reader reader_;
+  log::Event event_;
+  const run::LogWorlds::Scene* scene_;
   std::string info_channel_;
   bool makes_info_ = false;             // the log has none: it is the channel after all of the log's
-  const server::LogWorlds::Scene* told_ = nullptr;    // whose info is on the board
+  const run::LogWorlds::Scene* told_ = nullptr;    // whose info is on the board
   std::vector<size_t> shown_;           // of each channel, how many messages there were when one was put on the board
   Playback playback_;
   std::chrono::steady_clock::time_point last_;

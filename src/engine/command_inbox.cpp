@@ -1,0 +1,231 @@
+// Commands from the bus to the robots: decoded with every length checked, kept in order of arrival.
+#include "engine/command_inbox.h"
+
+#include <algorithm>
+#include <chrono>
+#include <tuple>
+
+#include <spdlog/spdlog.h>
+
+#include "ruedo/decode.h"
+#include "ruedo/joint_command_t.hpp"
+#include "ruedo/move_command_t.hpp"
+#include "ruedo/name_request_t.hpp"
+#include "ruedo/pose_t.hpp"
+#include "ruedo/velocity_command_t.hpp"
+#include "ruedo/wheel_command_t.hpp"
+
+namespace ruedo::engine {
+
+DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size, robot::Command& command) {
+  DecodeFault fault = DecodeFault::none;
+  switch (kind) {
+    case Input::Kind::velocity: {
+      // Programs that know bot_core's types and no others have a velocity in pose_t.
+      if (fingerprint_of({data, size}) == pose_t::getHash()) {
+        pose_t pose;
+        fault = decode_checked(data, size, pose);
+        if (fault == DecodeFault::none) command.what = robot::VelocityCommand{pose.vel[0], pose.vel[1], pose.rotation_rate[2]};
+        break;
+      }
+      velocity_command_t message;
+      fault = decode_checked(data, size, message);
+      if (fault == DecodeFault::none) command.what = robot::VelocityCommand{message.vx, message.vy, message.omega};
+      break;
+    }
+    case Input::Kind::wheels: {
+      wheel_command_t message;
+      fault = decode_checked(data, size, message);
+      if (fault == DecodeFault::none) command.what = robot::WheelCommand{std::move(message.rate)};
+      break;
+    }
+    case Input::Kind::move: {
+      move_command_t message;
+      fault = decode_checked(data, size, message);
+      if (fault == DecodeFault::none) {
+        command.what = robot::MoveCommand{message.id,    message.kind,         message.value,       message.radius,
+                                          message.speed, message.acceleration, message.deceleration};
+      }
+      break;
+    }
+    case Input::Kind::joints: {
+      joint_command_t message;
+      fault = decode_checked(data, size, message);
+      if (fault == DecodeFault::none) {
+        command.what = robot::JointCommand{std::move(message.name), {message.mode.begin(), message.mode.end()},
+                                           std::move(message.value)};
+      }
+      break;
+    }
+    case Input::Kind::reset_odometry: {
+      name_request_t message;
+      fault = decode_checked(data, size, message);
+      if (fault == DecodeFault::none) command.what = robot::ResetOdometry{};
+      break;
+    }
+  }
+  return fault;
+}
+
+CommandInbox::CommandInbox(std::vector<Input> inputs, int robots)
+    : inputs_(std::move(inputs)), reset_input_(static_cast<size_t>(robots), -1), slots_(static_cast<size_t>(robots)) {
+  for (size_t i = 0; i < inputs_.size(); ++i) listen(static_cast<int>(i));
+  waiting_.reserve(slots_.size());
+}
+
+void CommandInbox::listen(int index) {
+  const Input& input = inputs_[static_cast<size_t>(index)];
+  if (input.kind == Input::Kind::reset_odometry) {
+    reset_input_[static_cast<size_t>(input.robot)] = index;
+  } else {
+    by_channel_.insert_or_assign(input.channel, index);
+  }
+}
+
+void CommandInbox::add(const std::vector<Input>& inputs, int robots) {
+  std::lock_guard lock(mutex_);
+  reset_input_.resize(static_cast<size_t>(robots), -1);
+  slots_.resize(static_cast<size_t>(robots));
+  for (const Input& input : inputs) {
+    // A robot in the place of one that was removed has the same inputs.
+    auto at = std::find_if(inputs_.begin(), inputs_.end(), [&](const Input& old) { return old.robot == input.robot && old.kind == input.kind; });
+    if (at == inputs_.end()) at = inputs_.insert(at, input);
+    at->channel = input.channel;
+    listen(static_cast<int>(at - inputs_.begin()));
+  }
+}
+
+void CommandInbox::remove(int robot) {
+  std::lock_guard lock(mutex_);
+  for (Input& input : inputs_) {
+    if (input.robot != robot) continue;
+    by_channel_.erase(input.channel);
+    input.channel.clear();
+  }
+  slots_[static_cast<size_t>(robot)].size = 0;
+  std::erase(waiting_, robot);
+  const auto is_of = [robot](const Entry& entry) { return entry.command.robot == robot; };
+  const auto end = scheduled_.begin() + static_cast<std::ptrdiff_t>(scheduled_count_);
+  const auto kept = std::stable_partition(scheduled_.begin(), end, [&](const Entry& entry) { return !is_of(entry); });
+  for (auto entry = kept; entry != end; ++entry) scheduled_bytes_ -= entry->bytes.size();
+  scheduled_count_ = static_cast<size_t>(kept - scheduled_.begin());
+  std::make_heap(scheduled_.begin(), kept, later);
+}
+
+void CommandInbox::begin_time_anew() {
+  std::lock_guard lock(mutex_);
+  scheduled_count_ = scheduled_bytes_ = 0;
+  next_step_ = 0;
+}
+
+void CommandInbox::receive(const std::string& channel, const uint8_t* data, size_t size) {
+  const auto found = by_channel_.find(channel);
+  if (found == by_channel_.end()) return;
+  if (size > kMaxMessageSize) return refuse(channel, "more than 64 kB");
+  const Input& input = inputs_[static_cast<size_t>(found->second)];
+  robot::Command command;
+  command.robot = input.robot;
+  const DecodeFault fault = decode_command(input.kind, data, size, command);
+  if (fault != DecodeFault::none) return refuse(channel, describe(fault));
+  keep(found->second, command, data, size);
+}
+
+void CommandInbox::reset_odometry(int robot, const std::vector<uint8_t>& body) {
+  robot::Command command{robot, robot::ResetOdometry{}};
+  keep(reset_input_[static_cast<size_t>(robot)], command, body.data(), body.size());
+}
+
+CommandInbox::Entry& CommandInbox::next_entry(int robot) {
+  Slots& slots = slots_[static_cast<size_t>(robot)];
+  if (slots.size == 0) waiting_.push_back(robot);
+  if (slots.size == kKeptPerRobot) {
+    slots.first = (slots.first + 1) % kKeptPerRobot;
+    --slots.size;
+    ++displaced_;
+  }
+  return slots.entries[(slots.first + slots.size++) % kKeptPerRobot];
+}
+
+void CommandInbox::keep(int input, robot::Command& command, const uint8_t* data, size_t size) {
+  std::lock_guard lock(mutex_);
+  Entry& entry = next_entry(command.robot);
+  entry.arrival = arrivals_++;
+  entry.input = input;
+  std::swap(entry.command, command);
+  entry.bytes.assign(data, data + size);
+}
+
+bool CommandInbox::later(const Entry& a, const Entry& b) { return std::tie(a.step, a.arrival) > std::tie(b.step, b.arrival); }
+
+CommandInbox::Scheduled CommandInbox::schedule(int64_t step, int input, const uint8_t* data, size_t size) {
+  if (input < 0 || static_cast<size_t>(input) >= inputs_.size() || size > kMaxMessageSize) return Scheduled::faulty;
+  robot::Command command;
+  command.robot = inputs_[static_cast<size_t>(input)].robot;
+  if (decode_command(inputs_[static_cast<size_t>(input)].kind, data, size, command) != DecodeFault::none) return Scheduled::faulty;
+  std::lock_guard lock(mutex_);
+  if (step < next_step_) return Scheduled::late;
+  if (scheduled_count_ == kMostScheduled || scheduled_bytes_ + size > kMostScheduledBytes) return Scheduled::full;
+  if (scheduled_count_ == scheduled_.size()) scheduled_.emplace_back();
+  Entry& entry = scheduled_[scheduled_count_++];
+  entry.step = step;
+  entry.arrival = arrivals_++;
+  entry.input = input;
+  std::swap(entry.command, command);
+  entry.bytes.assign(data, data + size);
+  scheduled_bytes_ += size;
+  std::push_heap(scheduled_.begin(), scheduled_.begin() + static_cast<std::ptrdiff_t>(scheduled_count_), later);
+  return Scheduled::kept;
+}
+
+void CommandInbox::refuse(const std::string& channel, const char* why) {
+  ++refused_;
+  const int64_t now_ns = std::chrono::steady_clock::now().time_since_epoch().count();
+  if (last_warning_ns_ != 0 && now_ns - last_warning_ns_ < 1'000'000'000) return;
+  last_warning_ns_ = now_ns;
+  spdlog::warn("{}: a message was ignored: {} ({} ignored so far)", channel, why, refused_.load());
+}
+
+CommandInbox::Entry& CommandInbox::next_taken(size_t& count) {
+  if (count == taken_.size()) taken_.emplace_back();
+  return taken_[count++];
+}
+
+void CommandInbox::apply(robot::Robots& robots, int64_t step, Batch& batch) {
+  size_t scheduled = 0, count = 0;
+  {
+    std::lock_guard lock(mutex_);
+    next_step_ = step + 1;
+    // Buffers are swapped, never copied, and what is taken leaves its buffers behind for what comes.
+    for (; scheduled_count_ > 0 && scheduled_.front().step <= step; ++scheduled) {
+      std::pop_heap(scheduled_.begin(), scheduled_.begin() + static_cast<std::ptrdiff_t>(scheduled_count_), later);
+      Entry& entry = scheduled_[--scheduled_count_];
+      scheduled_bytes_ -= entry.bytes.size();
+      std::swap(next_taken(count), entry);
+    }
+    for (int robot : waiting_) {
+      Slots& slots = slots_[static_cast<size_t>(robot)];
+      for (size_t i = 0; i < slots.size; ++i) std::swap(next_taken(count), slots.entries[(slots.first + i) % kKeptPerRobot]);
+      slots.size = 0;
+    }
+    waiting_.clear();
+  }
+  std::sort(taken_.begin() + static_cast<std::ptrdiff_t>(scheduled), taken_.begin() + static_cast<std::ptrdiff_t>(count),
+            [](const Entry& a, const Entry& b) { return a.arrival < b.arrival; });
+  for (size_t i = 0; i < count; ++i) {
+    robots.apply(taken_[i].command);
+    if (static_cast<size_t>(batch.applied_count) == batch.applied.size()) batch.applied.emplace_back();
+    AppliedCommand& applied = batch.applied[static_cast<size_t>(batch.applied_count++)];
+    applied.step = step;
+    applied.input = taken_[i].input;
+    std::swap(applied.bytes, taken_[i].bytes);
+  }
+}
+
+void CommandInbox::clear() {
+  std::lock_guard lock(mutex_);
+  for (Slots& slots : slots_) slots.size = 0;
+  waiting_.clear();
+  scheduled_count_ = scheduled_bytes_ = 0;
+}
+
+}  // namespace ruedo::engine

@@ -1,0 +1,200 @@
+// Checks come first, all of them; what throws after them leaves the world as it was.
+#include "engine/edits.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <span>
+
+#include "model/placement.h"
+#include "model/read_context.h"
+#include "core/sha256.h"
+
+namespace ruedo::engine {
+namespace {
+
+Outcome bad(const std::string& text) { return Outcome::refuse(reply_t::BAD_REQUEST, text); }
+Outcome refused(const std::string& text) { return Outcome::refuse(reply_t::REFUSED, text); }
+
+std::string list_of(std::span<const double> values) {
+  std::string text;
+  for (const double value : values) text += (text.empty() ? "" : ", ") + model::shown(value);
+  return "(" + text + ")";
+}
+
+// "": they are all numbers, none beyond `most`.
+std::string fault_of(const char* what, std::span<const double> values, double most, const char* unit) {
+  for (const double value : values) {
+    if (!std::isfinite(value)) return std::string(what) + " is " + list_of(values) + ": only finite numbers are allowed";
+    if (std::abs(value) > most) {
+      return std::string(what) + " is " + list_of(values) + ": allowed is up to " + model::shown(most) + " " + unit;
+    }
+  }
+  return "";
+}
+
+std::string fault_of_pose(const double (&position)[3], const double (&orientation)[4]) {
+  if (std::string fault = fault_of("position", position, kFarthest_m, "m"); !fault.empty()) return fault;
+  double squared = 0.0;
+  for (const double part : orientation) squared += part * part;
+  if (!(std::abs(squared - 1.0) <= 2e-3)) {    // not for NaN either
+    return "orientation is " + list_of(orientation) + ": a unit quaternion w, x, y, z is wanted";
+  }
+  return "";
+}
+
+Pose pose_of(const double (&position)[3], const double (&orientation)[4]) {
+  return Pose{Quat(orientation[0], orientation[1], orientation[2], orientation[3]).normalized(), Vec3(position[0], position[1], position[2])};
+}
+
+// "": it may be a model's. Names go into channels, logs and terminals.
+std::string fault_of_name(const std::string& name) {
+  if (name.empty() || name.size() > 63) return "has " + std::to_string(name.size()) + " characters; allowed are 1 to 63";
+  const bool fit = std::all_of(name.begin(), name.end(), [](char c) { return c > 0x20 && c < 0x7f && c != '/'; });
+  if (!fit) return "is not fit for a channel: letters, digits and signs but '/' are allowed";
+  if (name == "ruedo" || name == "world") return "is kept for Ruedo itself; choose another";
+  return "";
+}
+
+int find_model(const model::WorldModel& world, const std::string& name) {
+  const auto found = std::find_if(world.models.begin(), world.models.end(), [&](const model::ModelInstance& instance) {
+    return !instance.removed && instance.name == name;
+  });
+  return found == world.models.end() ? -1 : static_cast<int>(found - world.models.begin());
+}
+
+Outcome unknown(const std::string& name) { return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no model called '" + name + "'"); }
+
+// Why a model cannot be put elsewhere or pushed; "": it can.
+std::string why_immovable(const Simulation& simulation, int instance) {
+  const model::Model& model = *simulation.world().models[static_cast<size_t>(instance)].model;
+  if (model.path) return "moves along its path";
+  const model::BodyLayout& layout = simulation.layout();
+  const size_t first = static_cast<size_t>(layout.first_link[static_cast<size_t>(instance)]);
+  bool moves = false, stands = false;
+  for (size_t link = first; link < first + model.links.size(); ++link) (layout.links[link].body >= 0 ? moves : stands) = true;
+  for (const model::Joint& joint : model.joints) stands |= joint.parent < 0;
+  if (!moves) return "is static: remove it, and spawn it where it should stand";
+  return stands ? "is fixed to the world by a joint" : "";
+}
+
+Pose link_now(const Simulation& simulation, size_t instance, size_t link) {
+  const model::BodyLayout& layout = simulation.layout();
+  const model::LinkPlacement& placement = layout.links[static_cast<size_t>(layout.first_link[instance]) + link];
+  return placement.body < 0 ? placement.X_BL : simulation.physics().pose(placement.body) * placement.X_BL;
+}
+
+}  // namespace
+
+std::string unused_name(const model::WorldModel& world, const std::string& name) {
+  if (find_model(world, name) < 0) return name;
+  int number = 2;
+  while (find_model(world, name + "_" + std::to_string(number)) >= 0) ++number;
+  return name + "_" + std::to_string(number);
+}
+
+model::LoadedModel ModelStore::load(const spawn_request_t& request) {
+  std::string key;
+  if (request.model.empty()) {
+    key = "text " + sha256(reinterpret_cast<const uint8_t*>(request.text.data()), request.text.size());
+  } else {
+    const std::string path = model::model_file(request.model, world_file_);
+    std::error_code error;
+    const auto written = std::filesystem::last_write_time(path, error).time_since_epoch().count();
+    key = "file " + std::to_string(written) + " " + path;
+  }
+  std::erase_if(known_, [](const auto& entry) { return entry.second.model.expired(); });
+  if (const auto known = known_.find(key); known != known_.end()) {
+    model::LoadedModel loaded = known->second.rest;
+    loaded.model = known->second.model.lock();
+    return loaded;
+  }
+  model::LoadedModel loaded = request.model.empty() ? model::load_model_text(request.text, world_file_)
+                                                    : model::load_model(request.model, world_file_);
+  Known& known = known_[key];
+  known.model = loaded.model;
+  known.rest = loaded;
+  known.rest.model.reset();
+  known.rest.files_read.clear();    // the log has them once
+  return loaded;
+}
+
+Outcome check_spawn(const spawn_request_t& request) {
+  if (request.model.empty() == request.text.empty()) return bad("a SPAWN has either a model's name or file, or a text");
+  if (std::string fault = fault_of_pose(request.position, request.orientation); !fault.empty()) return bad(fault);
+  if (request.name.empty()) return {};
+  const std::string fault = fault_of_name(request.name);
+  return fault.empty() ? Outcome{} : bad("the name '" + request.name.substr(0, 80) + "' " + fault);
+}
+
+Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, int64_t step, Simulation& simulation,
+              Channels& channels, std::string& name) {
+  const model::WorldModel& world = simulation.world();
+  if (world.models.size() >= kMostModels) {
+    return refused("the world has " + std::to_string(kMostModels) + " models, those that were removed included; a reset makes room");
+  }
+  if (!request.name.empty() && find_model(world, request.name) >= 0) return refused("the name '" + request.name + "' is taken");
+  name = request.name.empty() ? unused_name(world, loaded.name) : request.name;
+  if (const std::string fault = fault_of_name(name); !fault.empty()) return bad("the model's name '" + name + "' " + fault);
+  Pose X_WM = pose_of(request.position, request.orientation);
+  const Vec3 ahead = X_WM.rotation * Vec3::UnitX();
+  if (request.on_ground) {
+    X_WM = model::standing_on(world, *loaded.model, request.position[0], request.position[1], std::atan2(ahead.y(), ahead.x()));
+  }
+  const auto now = [&](size_t instance, size_t link) { return link_now(simulation, instance, link); };
+  if (const std::string other = model::overlapped(world, *loaded.model, X_WM, now); !other.empty()) {
+    return refused("there is no room for '" + name + "' at " + list_of({{X_WM.translation.x(), X_WM.translation.y(), X_WM.translation.z()}}) +
+                   ": it would stand in '" + other + "'");
+  }
+  try {
+    Findings findings;
+    model::check_channel_names({name, X_WM, loaded.model}, loaded.model->source);
+    simulation.add_model(name, X_WM, loaded.model, step, channels, findings);
+  } catch (const InputError& error) {
+    return bad(error.what());
+  } catch (const EnvironmentError& error) {
+    return refused(error.what());
+  }
+  return {};
+}
+
+Outcome remove(const std::string& name, Simulation& simulation, Channels& channels) {
+  const int instance = find_model(simulation.world(), name);
+  if (instance < 0) return unknown(name);
+  simulation.remove_model(instance, channels);
+  return {};
+}
+
+Outcome set_pose(const set_pose_request_t& request, Simulation& simulation) {
+  if (const std::string fault = fault_of_pose(request.position, request.orientation); !fault.empty()) return bad(fault);
+  const int instance = find_model(simulation.world(), request.name);
+  if (instance < 0) return unknown(request.name);
+  if (const std::string why = why_immovable(simulation, instance); !why.empty()) return refused("'" + request.name + "' " + why);
+  simulation.robots().set_pose(instance, pose_of(request.position, request.orientation));
+  return {};
+}
+
+Outcome set_twist(const set_twist_request_t& request, Simulation& simulation) {
+  if (const std::string fault = fault_of("linear", request.linear, kFastest_m_s, "m/s"); !fault.empty()) return bad(fault);
+  if (const std::string fault = fault_of("angular", request.angular, kFastest_rad_s, "rad/s"); !fault.empty()) return bad(fault);
+  const int instance = find_model(simulation.world(), request.name);
+  if (instance < 0) return unknown(request.name);
+  std::string why = why_immovable(simulation, instance);
+  const model::Model& model = *simulation.world().models[static_cast<size_t>(instance)].model;
+  const bool kinematic = std::any_of(model.links.begin(), model.links.end(), [](const model::Link& link) { return link.kinematic; });
+  if (why.empty() && model.drive) why = "has a drive: send it a velocity command";
+  if (why.empty() && kinematic) why = "is kinematic: it stays where it is put";
+  if (!why.empty()) return refused("'" + request.name + "' " + why);
+  const auto vec = [](const double (&v)[3]) { return Vec3(v[0], v[1], v[2]); };
+  simulation.robots().set_twist(instance, {vec(request.linear), vec(request.angular)});
+  return {};
+}
+
+void reset_poses(Simulation& simulation) {
+  const std::vector<model::ModelInstance>& models = simulation.world().models;
+  for (size_t i = 0; i < models.size(); ++i) {
+    if (!models[i].removed && !models[i].model->is_static) simulation.robots().start_again(static_cast<int>(i));
+  }
+}
+
+}  // namespace ruedo::engine

@@ -1,0 +1,238 @@
+// The thread of a module: takes batches in order, works its devices through them, says when it is done.
+// TBB splits the devices over the cores in pieces that the devices alone fix.
+#include "engine/module.h"
+
+#include <algorithm>
+#include <cfenv>
+#include <chrono>
+#include <future>
+
+#include <pthread.h>
+
+#include "engine/parallel.h"
+
+namespace ruedo::engine {
+namespace {
+
+constexpr int64_t kQuickNs = 50'000;
+
+}  // namespace
+
+void DueSteps::add(const SampleClock& clock, int64_t first, int64_t sample) {
+  // A thousand devices of one rate are one entry: the first few samples tell clocks apart well enough, since a
+  // surplus entry costs time but changes nothing.
+  const auto same = [&](const Entry& entry) {
+    return entry.first == first && entry.sample == sample && entry.clock.every_step() == clock.every_step() && entry.clock.step_of(0) == clock.step_of(0) &&
+           entry.clock.step_of(1) == clock.step_of(1) && entry.clock.step_of(1'000'003) == clock.step_of(1'000'003);
+  };
+  if (std::none_of(entries_.begin(), entries_.end(), same)) entries_.push_back({clock, first, sample, first + clock.step_of(sample)});
+  update();
+}
+
+void DueSteps::pass(int64_t step) {
+  if (next_ > step) return;
+  for (Entry& entry : entries_) {
+    while (entry.step <= step) entry.step = entry.first + entry.clock.step_of(++entry.sample);
+  }
+  update();
+}
+
+void DueSteps::update() {
+  next_ = INT64_MAX;
+  for (const Entry& entry : entries_) next_ = std::min(next_, entry.step);
+}
+
+Module::Module(ModuleSetup setup, int index, Wakeup& finished)
+    : setup_(std::move(setup)), index_(index), finished_(finished), queue_(16) {
+  for (const Device& device : setup_.devices) slots_.push_back(slot_of(device));
+  count_due();
+}
+
+Module::Slot Module::slot_of(const Device& device) const {
+  const SampleClock clock(device.rate, setup_.step_us, device.phase_us);
+  return {clock, 0, device.first_step + clock.step_of(0), device.sensor->observes(), device.visual_rays};
+}
+
+// From what is due of each device; of all batches so far each has been handed over and finished.
+void Module::count_due() {
+  observes_ = false;
+  to_hand_over_.clear();
+  for (size_t i = 0; i < slots_.size(); ++i) {
+    observes_ |= slots_[i].observes;
+    to_hand_over_.add(slots_[i].clock, setup_.devices[i].first_step, slots_[i].sample);
+  }
+  to_sample_ = to_hand_over_;
+}
+
+void Module::add(ModuleSetup more) {
+  for (Device& device : more.devices) {
+    const auto after = std::find_if(setup_.devices.begin(), setup_.devices.end(), [&](const Device& other) { return other.robot > device.robot; });
+    slots_.insert(slots_.begin() + (after - setup_.devices.begin()), slot_of(device));
+    setup_.wants_visual_rays |= device.visual_rays;
+    setup_.devices.insert(after, std::move(device));
+  }
+  count_due();
+}
+
+void Module::remove(int robot) {
+  for (size_t i = setup_.devices.size(); i-- > 0;) {
+    if (setup_.devices[i].robot != robot) continue;
+    setup_.devices.erase(setup_.devices.begin() + static_cast<std::ptrdiff_t>(i));
+    slots_.erase(slots_.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  count_due();
+}
+
+void Module::replace_sensor(std::unique_ptr<Sensor> sensor) { setup_.devices[0].sensor = std::move(sensor); }
+
+void Module::begin_time_anew(SimTime us) {
+  for (size_t i = 0; i < slots_.size(); ++i) {
+    setup_.devices[i].first_step = 0;
+    setup_.devices[i].sensor->shift_time(us);
+    slots_[i] = slot_of(setup_.devices[i]);
+  }
+  count_due();
+}
+
+void Module::make_scenes(const SceneMakers& makers) {
+  if (setup_.wants_rays) rays_ = makers.rays();
+  if (setup_.wants_visual_rays) visual_rays_ = makers.visual_rays();
+  if (!setup_.wants_renderer) return;
+  renderer_.reset();    // one context at a time
+  renderer_ = makers.renderer();
+}
+
+void Module::renew_scenes(const SceneMakers& makers) {
+  if (!setup_.wants_rays && !setup_.wants_visual_rays && !setup_.wants_renderer) return;
+  std::promise<void> made;
+  makers_ = &makers;
+  made_ = &made;
+  queue_.push(&renewal_);
+  made.get_future().get();
+}
+
+Module::~Module() {
+  if (!thread_.joinable()) return;
+  queue_.push(nullptr);
+  thread_.join();
+}
+
+void Module::start(const SceneMakers& makers) {
+  std::promise<void> ready;
+  thread_ = std::thread([this, &ready, &makers] {
+    pthread_setname_np(pthread_self(), setup_.name.substr(0, 15).c_str());
+    std::fesetenv(FE_DFL_ENV);    // rounding and denormals as everywhere, whatever libraries did to the parent
+    try {
+      make_scenes(makers);
+      ready.set_value();
+    } catch (...) {
+      ready.set_exception(std::current_exception());
+      return;
+    }
+    work();
+    renderer_.reset();    // its context belongs to this thread
+  });
+  try {
+    ready.get_future().get();
+  } catch (...) {
+    thread_.join();
+    throw;
+  }
+}
+
+void Module::hand_over(Batch& batch, int64_t last_step) {
+  to_hand_over_.pass(last_step);
+  in_hand_.fetch_add(1, std::memory_order_relaxed);
+  queue_.push(&batch);
+}
+
+// A renderer's context belongs to the module's thread.
+bool Module::is_quick() const {
+  return !renderer_ && in_hand_.load(std::memory_order_acquire) == 0 && cost_ns_.load(std::memory_order_relaxed) < kQuickNs;
+}
+
+void Module::work_here(Batch& batch, int64_t last_step) {
+  to_hand_over_.pass(last_step);
+  work_through(batch);
+}
+
+void Module::work() {
+  while (Batch* batch = queue_.pop()) {
+    if (batch == &renewal_) {
+      std::promise<void>* made = made_;
+      try {
+        make_scenes(*makers_);
+        made->set_value();
+      } catch (...) {
+        made->set_exception(std::current_exception());
+      }
+      continue;
+    }
+    work_through(*batch);
+    in_hand_.fetch_sub(1, std::memory_order_release);
+  }
+}
+
+void Module::work_through(Batch& batch) {
+  if (setup_.before_batch) setup_.before_batch(setup_.name);
+  const bool due = to_sample_.next() < batch.first_step + batch.count;
+  const auto begin = std::chrono::steady_clock::now();
+  try {
+    process(batch);
+  } catch (const std::exception& error) {
+    if (!batch.failed.exchange(true)) batch.failure = "module " + setup_.name + ": " + error.what();
+  }
+  if (due) cost_ns_.store((std::chrono::steady_clock::now() - begin) / std::chrono::nanoseconds(1), std::memory_order_relaxed);
+  const bool last = batch.pending.fetch_sub(1, std::memory_order_acq_rel) == 1;
+  if (last) finished_.set();
+}
+
+void Module::process(Batch& batch) {
+  for (Outbox& outbox : batch.outputs[index_].pieces) outbox.clear();
+  if (!rays_ && !visual_rays_) {
+    process_pieces(batch, 0, batch.count);
+    to_sample_.pass(batch.first_step + batch.count - 1);
+    return;
+  }
+  // The scene of the movers stands at one step at a time, and only at those where somebody looks.
+  int begin = 0;
+  for (int i = 0; i < batch.count; ++i) {
+    if (to_sample_.next() != batch.first_step + i) continue;
+    if (rays_) rays_->update(batch.snapshots[i]);
+    if (visual_rays_) visual_rays_->update(batch.snapshots[i]);
+    process_pieces(batch, begin, i + 1);
+    begin = i + 1;
+    to_sample_.pass(batch.first_step + i);
+  }
+  if (observes_ && begin < batch.count) process_pieces(batch, begin, batch.count);
+}
+
+void Module::process_pieces(Batch& batch, int begin, int end) {
+  if (pieces() == 1 || renderer_) {    // a renderer serves one thread
+    for (int piece = 0; piece < pieces(); ++piece) process_piece(batch, piece, begin, end);
+    return;
+  }
+  parallel_pieces(pieces(), [&](int piece) { process_piece(batch, piece, begin, end); });
+}
+
+void Module::process_piece(Batch& batch, int piece, int begin, int end) {
+  Outbox& outbox = batch.outputs[index_].pieces[piece];
+  const size_t first = static_cast<size_t>(piece) * setup_.piece_size;
+  const size_t last = std::min(first + setup_.piece_size, slots_.size());
+  for (int i = begin; i < end; ++i) {
+    const Snapshot& snapshot = batch.snapshots[i];
+    outbox.begin_step(snapshot.step);
+    for (size_t k = first; k < last; ++k) {
+      Slot& slot = slots_[k];
+      Sensor& sensor = *setup_.devices[k].sensor;
+      if (slot.observes) sensor.observe(snapshot, outbox);
+      if (slot.step != snapshot.step) continue;
+      if (setup_.left_off->load(std::memory_order_relaxed)) return;    // a thousand pictures may be in the batch
+      const scene::RayScene* rays = slot.visual_rays ? visual_rays_.get() : rays_.get();
+      sensor.sample({snapshot, slot.sample, rays, renderer_.get()}, outbox);
+      slot.step = setup_.devices[k].first_step + slot.clock.step_of(++slot.sample);
+    }
+  }
+}
+
+}  // namespace ruedo::engine

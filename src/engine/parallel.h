@@ -1,0 +1,32 @@
+// A parallel loop over pieces, by TBB.
+//
+// TBB is not instrumented for the thread sanitizer, which would take every body for a race. A build with the sanitizer
+// runs the bodies in plain threads, so that it sees all that they do, and a race between them shows.
+#pragma once
+
+#if defined(__SANITIZE_THREAD__)
+#include <atomic>
+#include <thread>
+#else
+#include <tbb/parallel_for.h>
+#endif
+
+namespace ruedo::engine {
+
+// Calls body(0), ..., body(count - 1), in any order and from any threads, and returns when all are done.
+template <class Body>
+void parallel_pieces(int count, const Body& body) {
+#if defined(__SANITIZE_THREAD__)
+  std::atomic<int> next{0};
+  const auto work = [&] {
+    for (int piece = next++; piece < count; piece = next++) body(piece);
+  };
+  std::thread helper(work);
+  work();
+  helper.join();
+#else
+  tbb::parallel_for(0, count, body);
+#endif
+}
+
+}  // namespace ruedo::engine

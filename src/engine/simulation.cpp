@@ -1,0 +1,211 @@
+// The loop: pace, take commands, step, hand over; and the ring of batches between the threads.
+#include "engine/simulation.h"
+
+#include <algorithm>
+#include <cfenv>
+#include <chrono>
+#include <stdexcept>
+
+#include <pthread.h>
+#include <sys/prctl.h>
+
+namespace ruedo::engine {
+namespace {
+
+constexpr size_t kMaxSnapshotMemory = 64u << 20;    // bytes of all batches together
+constexpr int kMaxBatchSteps = 32;
+constexpr int kFewSteps = 4;
+constexpr int64_t kQuickNs = 1'000'000;    // of a step that the publisher may wait for: it gives the signs of life
+
+// Large worlds gain nothing from many steps in flight, and their snapshots are large.
+int batch_steps(const model::BodyLayout& layout) {
+  const size_t snapshot = sizeof(Snapshot) + layout.bodies.size() * (sizeof(Pose) + sizeof(Twist) + sizeof(Vec3)) +
+                          layout.wheels.size() * 16 + layout.joints.size() * 24 + layout.robots.size() * sizeof(RobotState);
+  return static_cast<int>(std::clamp<size_t>(kMaxSnapshotMemory / snapshot / Simulation::kBatches, 1, kMaxBatchSteps));
+}
+
+}  // namespace
+
+Simulation::Simulation(std::shared_ptr<const model::WorldModel> world, const SimulationOptions& options, Channels& channels,
+                       Findings& findings, Wakeup& finished)
+    : world_(*world),
+      layout_(world_),
+      fleet_options_(options.fleet),
+      before_batch_(options.before_batch),
+      finished_(finished),
+      fleet_(make_fleet(world_, layout_, options.fleet, channels, findings)),
+      devices_(std::move(fleet_.devices)),
+      inbox_(std::move(fleet_.inputs), static_cast<int>(layout_.robots.size())),
+      physics_(std::make_unique<physics::PhysicsWorld>(world_, layout_)),
+      robots_(std::make_unique<robot::Robots>(world_, layout_, *physics_)),
+      batches_(kBatches) {
+  for (const Finding& finding : physics_->findings()) {
+    switch (finding.kind) {
+      case Finding::Kind::unsupported: findings.unsupported(finding.source, finding.element, finding.text); break;
+      case Finding::Kind::repaired: findings.repaired(finding.source, finding.element, finding.text); break;
+      case Finding::Kind::error: findings.error(finding.source, finding.element, finding.text); break;
+    }
+  }
+  for (ModuleSetup& setup : fleet_.modules) {
+    setup.before_batch = before_batch_;
+    setup.left_off = &left_off_;
+    modules_.push_back(std::make_unique<Module>(std::move(setup), static_cast<int>(modules_.size()), finished_));
+    cursors_.emplace_back(static_cast<size_t>(modules_.back()->pieces()));
+  }
+  for (size_t i = 0; i < channels.list().size(); ++i) {
+    if (channels.list()[i].name == "ruedo/world") world_channel_ = static_cast<int>(i);
+  }
+  const int steps = options.batch_steps > 0 ? options.batch_steps : batch_steps(layout_);
+  for (Batch& batch : batches_) {
+    batch.snapshots.resize(static_cast<size_t>(steps));
+    for (const auto& module : modules_) batch.outputs.push_back({false, false, std::vector<Outbox>(static_cast<size_t>(module->pieces()))});
+  }
+}
+
+Simulation::~Simulation() {
+  if (!thread_.joinable()) return;
+  leave_off();
+  while (!last_taken_) {    // the simulation thread needs free batches to come to its end
+    if (!advance()) finished_.wait();
+  }
+  thread_.join();
+}
+
+SceneMakers Simulation::scene_makers() {
+  SceneMakers makers;
+  // The static geometry is built once and shared by all modules.
+  const auto shared = [this](bool visuals) {
+    return [this, visuals, statics = std::shared_ptr<const scene::StaticRayScene>()]() mutable {
+      if (!statics) statics = scene::make_static_ray_scene(world_, layout_, visuals);
+      return scene::make_ray_scene(statics);
+    };
+  };
+  makers.rays = shared(false);
+  makers.visual_rays = shared(true);
+  makers.renderer = [this] { return scene::make_renderer(world_, layout_); };
+  return makers;
+}
+
+void Simulation::start(Pace& pace) {
+  pace_ = &pace;
+  const SceneMakers makers = scene_makers();
+  started_ = true;
+  for (auto& module : modules_) module->start(makers);
+  thread_ = std::thread([this] { simulate(); });
+}
+
+void Simulation::simulate() {
+  pthread_setname_np(pthread_self(), "kinematics");
+  std::fesetenv(FE_DFL_ENV);
+  prctl(PR_SET_TIMERSLACK, 1);    // ns: the kernel may otherwise wake us 50 us late
+  const int limit = static_cast<int>(batches_[0].snapshots.size());
+  for (int64_t first_step = 0;;) {
+    const int count = pace_->wait(first_step, limit);
+    Batch& batch = batches_[round_ % batches_.size()];
+    while (batch.pending.load(std::memory_order_acquire) != Batch::kFree) batch_freed_.wait();
+    if (before_batch_) before_batch_("kinematics");
+    compute(batch, first_step, count);
+    const bool last = batch.last;
+    dispatch(batch, false);
+    if (last) return;
+  }
+}
+
+bool Simulation::go() {
+  int64_t first_step = 0;
+  const int limit = step_ns_ > kQuickNs ? 0 : std::min(kFewSteps, static_cast<int>(batches_[0].snapshots.size()));
+  const int count = pace_->borrow(first_step, limit);
+  if (count == 0) return false;
+  Batch& batch = batches_[round_ % batches_.size()];
+  if (batch.pending.load(std::memory_order_acquire) != Batch::kFree) {
+    pace_->give_back(count);
+    return false;
+  }
+  if (before_batch_) before_batch_("kinematics");
+  compute(batch, first_step, count);
+  dispatch(batch, true);
+  pace_->give_back(0);
+  return true;
+}
+
+void Simulation::compute(Batch& batch, int64_t first_step, int count) {
+  ++round_;
+  batch.first_step = first_step;
+  batch.count = count;
+  batch.last = count == 0;
+  batch.applied_count = 0;
+  const auto begin = std::chrono::steady_clock::now();
+  try {
+    for (int i = 0; i < count; ++i) {
+      if (left_off_) batch.count = 0;    // the publisher still holds the last state, in a batch that is free already
+      if (batch.count == 0) break;
+      step(batch, first_step + i);
+    }
+  } catch (const std::exception& error) {
+    if (!batch.failed.exchange(true)) batch.failure = std::string("module kinematics: ") + error.what();
+    batch.count = 0;
+    batch.last = true;
+  }
+  if (count > 0) step_ns_ = (std::chrono::steady_clock::now() - begin) / std::chrono::nanoseconds(count);
+}
+
+void Simulation::step(Batch& batch, int64_t step) {
+  if (step > 0) {
+    inbox_.apply(*robots_, step - 1, batch);    // on the state before
+    robots_->step();
+  }
+  Snapshot& snapshot = batch.snapshots[static_cast<size_t>(step - batch.first_step)];
+  robots_->read(snapshot);
+  snapshot.step = step;
+  snapshot.time = step * world_.step_us;
+}
+
+void Simulation::dispatch(Batch& batch, bool here) {
+  const int64_t last_step = batch.first_step + batch.count - 1;
+  int woken = 0;
+  for (size_t m = 0; m < modules_.size(); ++m) {
+    batch.outputs[m].woken = batch.count > 0 && modules_[m]->wants(last_step);
+    woken += batch.outputs[m].woken;
+  }
+  // One more than the modules: nobody finds it finished before all have it.
+  batch.pending.store(woken + 1, std::memory_order_release);
+  bool any_here = false;
+  for (size_t m = 0; m < modules_.size(); ++m) {
+    Batch::Output& output = batch.outputs[m];
+    output.here = here && output.woken && modules_[m]->is_quick();
+    any_here |= output.here;
+    if (output.woken && !output.here) modules_[m]->hand_over(batch, last_step);
+  }
+  for (size_t m = 0; any_here && m < modules_.size(); ++m) {    // beside those that were woken
+    if (batch.outputs[m].here) modules_[m]->work_here(batch, last_step);
+  }
+  if (batch.pending.fetch_sub(1, std::memory_order_acq_rel) == 1) finished_.set();
+}
+
+void Simulation::leave_off() {
+  left_off_ = true;
+  pace_->stop();
+}
+
+const Batch* Simulation::take() {
+  const Batch* batch = advance();
+  if (batch && batch->failed) throw std::runtime_error(batch->failure);
+  return batch;
+}
+
+const Batch* Simulation::advance() {
+  Batch& batch = batches_[next_batch_ % batches_.size()];
+  if (last_taken_ || batch.pending.load(std::memory_order_acquire) != 0) return nullptr;
+  if (taken_) {
+    taken_->pending.store(Batch::kFree, std::memory_order_release);
+    batch_freed_.set();
+  }
+  if (left_off_) batch.count = 0;
+  ++next_batch_;
+  taken_ = &batch;
+  last_taken_ = batch.last;
+  for (auto& cursors : cursors_) std::fill(cursors.begin(), cursors.end(), 0);
+  return taken_;
+}
+
+}  // namespace ruedo::engine

@@ -1,0 +1,176 @@
+// Models that come and go. Nothing here runs beside the simulation's threads: they wait, and what is written here is
+// handed to them by the locks of the pace and of the modules' queues.
+#include <algorithm>
+
+#include "engine/simulation.h"
+#include "engine/world_state.h"
+
+namespace ruedo::engine {
+namespace {
+
+int robot_of(const model::BodyLayout& layout, int instance) {
+  for (size_t i = 0; i < layout.robots.size(); ++i) {
+    if (layout.robots[i].instance == instance) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+constexpr unsigned kMostDrawers = 8;    // threads that draw
+
+}  // namespace
+
+// At the end of all lists, or in the place of a removed instance of the model: whoever lets models come and go for days
+// has lists that do not grow.
+int Simulation::place(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model) {
+  const auto free = std::find_if(world_.models.begin(), world_.models.end(), [&](const model::ModelInstance& instance) {
+    return instance.removed && instance.model == model;
+  });
+  if (free == world_.models.end()) {
+    world_.models.push_back({name, X_WM, std::move(model)});
+    layout_.append(world_);
+    return static_cast<int>(world_.models.size()) - 1;
+  }
+  const int instance = static_cast<int>(free - world_.models.begin());
+  free->name = name;
+  free->X_WM = X_WM;
+  free->removed = false;
+  layout_.place_again(world_, instance);
+  return instance;
+}
+
+int Simulation::add_model(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model, int64_t step,
+                          Channels& channels, Findings& findings) {
+  const model::BodyLayout layout_before = layout_;
+  const std::vector<model::ModelInstance> models_before = world_.models;
+  const Channels channels_before = channels;
+  if (model->path) robot::check_path(*model->path);
+  const int instance = place(name, X_WM, std::move(model));
+  const int robot = robot_of(layout_, instance);
+  Fleet fleet;
+  try {
+    if (robot >= 0) {
+      FleetOptions options = fleet_options_;
+      options.only_robot = robot;
+      options.first_step = step;
+      fleet = make_fleet(world_, layout_, options, channels, findings);
+    }
+  } catch (...) {
+    layout_ = layout_before;
+    world_.models = models_before;
+    channels = channels_before;
+    throw;
+  }
+  physics_->add(instance);
+  robots_->add(instance);
+  if (robot >= 0) inbox_.add(fleet.inputs, static_cast<int>(layout_.robots.size()));
+  if (step > 0) show_beginning(fleet, step - 1);
+  try {
+    renew_scenes();
+    join(std::move(fleet));
+  } catch (...) {
+    remove_model(instance, channels);
+    throw;
+  }
+  renew_world_state();
+  return instance;
+}
+
+// The state that a model came into is its beginning: an odometry counts from there.
+void Simulation::show_beginning(Fleet& fleet, int64_t step) const {
+  Snapshot beginning;
+  robots_->read(beginning);
+  beginning.step = step;
+  beginning.time = step * world_.step_us;
+  Outbox unheard;
+  for (ModuleSetup& setup : fleet.modules) {
+    for (Device& device : setup.devices) {
+      if (device.sensor->observes()) device.sensor->observe(beginning, unheard);
+    }
+  }
+}
+
+void Simulation::remove_model(int instance, Channels& channels) {
+  model::ModelInstance& removed = world_.models[static_cast<size_t>(instance)];
+  if (const int robot = robot_of(layout_, instance); robot >= 0) {
+    for (auto& module : modules_) module->remove(robot);
+    std::erase_if(devices_, [&](const device_info_t& device) { return device.robot == removed.name; });
+    inbox_.remove(robot);
+    channels.remove(removed.name);
+  }
+  removed.removed = true;
+  removed.name.clear();
+  physics_->remove(instance);
+  robots_->remove(instance);
+  renew_scenes();
+  renew_world_state();
+  fit_batches();
+}
+
+void Simulation::join(Fleet fleet) {
+  for (ModuleSetup& setup : fleet.modules) join(std::move(setup));
+  devices_.insert(devices_.end(), std::make_move_iterator(fleet.devices.begin()), std::make_move_iterator(fleet.devices.end()));
+  fit_batches();
+}
+
+// To the last module of its kind, so that devices stay in the order of robots; or as a new one, in its place.
+void Simulation::join(ModuleSetup setup) {
+  setup.before_batch = before_batch_;
+  setup.left_off = &left_off_;
+  auto after = std::find_if(modules_.begin(), modules_.end(), [&](const auto& module) { return module->rank() > setup.rank; });
+  const auto same = [&](const auto& module) { return module->rank() == setup.rank; };
+  const auto known = static_cast<unsigned>(std::count_if(modules_.begin(), modules_.end(), same));
+  const bool last_place = setup.devices.empty() || known == 0 || !(*(after - 1))->robots_after(setup.devices.front().robot);
+  const unsigned most = setup.wants_renderer ? std::min(kMostDrawers, std::max(1u, std::thread::hardware_concurrency())) : 1;
+  if (known > 0 && (known >= most || !last_place)) {
+    // A robot in the place of a removed one may belong before the last module's first.
+    auto into = std::find_if(modules_.begin(), after, [&](const auto& module) {
+      return same(module) && module->robots_after(setup.devices.front().robot);
+    });
+    Module& module = into == after ? **(after - 1) : **into;
+    const bool had_visual_rays = module.wants_visual_rays();
+    module.add(std::move(setup));
+    if (module.wants_visual_rays() != had_visual_rays) module.renew_scenes(scene_makers());
+    return;
+  }
+  auto module = std::make_unique<Module>(std::move(setup), 0, finished_);
+  if (started_) module->start(scene_makers());
+  const auto index = after - modules_.begin();
+  modules_.insert(after, std::move(module));
+  cursors_.insert(cursors_.begin() + index, std::vector<size_t>());
+  for (Batch& batch : batches_) batch.outputs.insert(batch.outputs.begin() + index, Batch::Output{});
+}
+
+void Simulation::fit_batches() {
+  for (size_t m = 0; m < modules_.size(); ++m) {
+    const auto pieces = static_cast<size_t>(modules_[m]->pieces());
+    modules_[m]->set_index(static_cast<int>(m));
+    cursors_[m].assign(pieces, 0);
+    for (Batch& batch : batches_) {
+      batch.outputs[m].pieces.resize(pieces);
+      batch.outputs[m].woken = false;
+    }
+  }
+}
+
+void Simulation::renew_scenes() {
+  if (!started_) return;
+  const SceneMakers makers = scene_makers();
+  for (auto& module : modules_) module->renew_scenes(makers);
+}
+
+void Simulation::renew_world_state() {
+  for (auto& module : modules_) {
+    if (module->name() == "world") module->replace_sensor(world_state_sensor(world_, layout_, fleet_options_.epoch, world_channel_));
+  }
+}
+
+SimTime Simulation::begin_time_anew(int epoch) {
+  fleet_options_.epoch = epoch;
+  const SimTime was = robots_->set_time_to_zero();
+  inbox_.begin_time_anew();
+  for (auto& module : modules_) module->begin_time_anew(was);
+  renew_world_state();
+  return was;
+}
+
+}  // namespace ruedo::engine

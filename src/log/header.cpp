@@ -1,0 +1,179 @@
+// Versions and features are read from the process itself, so that no other layer is asked for them.
+#include "log/header.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <iterator>
+#include <set>
+#include <string_view>
+#include <utility>
+
+#include <gnu/libc-version.h>
+#include <link.h>
+
+#include "ruedo/decode.h"
+#include "ruedo/errors.h"
+#include "log/reader.h"
+#include "core/sha256.h"
+#include "core/version.h"
+
+namespace ruedo::log {
+namespace {
+
+// Libraries that compute what goes into messages: arithmetic, physics, rays, pictures, readers of files. Others are
+// loaded as the machine and the options have it, and change nothing.
+constexpr std::string_view kThatMatter[] = {"libc.so",      "libm.so",   "libstdc++", "libBullet", "libLinearMath",
+                                            "libembree",    "libOSMesa", "libEGL",    "libLLVM",   "libgallium",
+                                            "libopencv_im", "libjpeg",   "libassimp", "libtinyxml2", "liburdfdom"};
+
+bool matters(std::string_view name) {
+  return std::any_of(std::begin(kThatMatter), std::end(kThatMatter), [&](std::string_view start) { return name.starts_with(start); });
+}
+
+std::string joined(const std::vector<std::string>& texts) {
+  std::string all;
+  for (const std::string& text : texts) all += (all.empty() ? "" : " ") + text;
+  return all.empty() ? "none" : all;
+}
+
+// Of the program itself: what the linker made of its bytes. "" where it makes nothing.
+std::string build_id() {
+  std::string id;
+  dl_iterate_phdr(
+      [](dl_phdr_info* info, size_t, void* data) {
+        constexpr size_t kAlign = 4;
+        for (int i = 0; i < info->dlpi_phnum; ++i) {
+          const ElfW(Phdr)& header = info->dlpi_phdr[i];
+          if (header.p_type != PT_NOTE) continue;
+          const auto* at = reinterpret_cast<const char*>(info->dlpi_addr + header.p_vaddr);
+          for (const char* end = at + header.p_memsz; at + sizeof(ElfW(Nhdr)) <= end;) {
+            const auto* note = reinterpret_cast<const ElfW(Nhdr)*>(at);
+            const char* name = at + sizeof *note;
+            const auto* bytes = reinterpret_cast<const unsigned char*>(name + (note->n_namesz + kAlign - 1) / kAlign * kAlign);
+            if (note->n_type == NT_GNU_BUILD_ID && std::string_view(name, note->n_namesz) == std::string_view("GNU", 4)) {
+              char digits[3];
+              for (size_t k = 0; k < note->n_descsz; ++k) {
+                std::snprintf(digits, sizeof digits, "%02x", bytes[k]);
+                *static_cast<std::string*>(data) += digits;
+              }
+            }
+            at = reinterpret_cast<const char*>(bytes) + (note->n_descsz + kAlign - 1) / kAlign * kAlign;
+          }
+        }
+        return 1;    // the first is the program
+      },
+      &id);
+  return id;
+}
+
+}  // namespace
+
+std::string cpu_features() {
+#if defined(__x86_64__) || defined(__i386__)
+  std::string text;
+  const auto add = [&](bool present, const char* name) {
+    if (present) text += (text.empty() ? "" : " ") + std::string(name);
+  };
+  __builtin_cpu_init();
+  add(__builtin_cpu_supports("sse4.2"), "sse4.2");
+  add(__builtin_cpu_supports("avx"), "avx");
+  add(__builtin_cpu_supports("fma"), "fma");
+  add(__builtin_cpu_supports("avx2"), "avx2");
+  add(__builtin_cpu_supports("avx512f"), "avx512f");
+  return text;
+#else
+  return "unknown";
+#endif
+}
+
+std::string libc_version() { return std::string("glibc ") + gnu_get_libc_version(); }
+
+std::vector<std::string> libraries_that_matter() {
+  std::set<std::string> names;
+  dl_iterate_phdr(
+      [](dl_phdr_info* info, size_t, void* data) {
+        std::error_code error;
+        const std::filesystem::path path = std::filesystem::canonical(info->dlpi_name, error);
+        const std::string name = path.filename().string();
+        if (!error && matters(name)) static_cast<std::set<std::string>*>(data)->insert(name);
+        return 0;
+      },
+      &names);
+  return {names.begin(), names.end()};
+}
+
+log_header_t make_log_header(const model::WorldModel& world, uint64_t seed, const std::vector<std::string>& options) {
+  log_header_t header;
+  header.utime = 0;
+  header.version = version();
+  if (const std::string id = build_id(); !id.empty()) header.version += " (build " + id + ")";
+  header.world = world.name;
+  header.world_file = world.file;
+  header.seed = static_cast<int64_t>(seed);
+  header.step_us = world.step_us;
+  header.options = options;
+  header.noptions = static_cast<int32_t>(options.size());
+  header.files = hashed_files(world.files_read);
+  header.nfiles = static_cast<int32_t>(header.files.size());
+  header.cpu = cpu_features();
+  header.libc = libc_version();
+  header.libraries = libraries_that_matter();
+  header.nlibraries = static_cast<int32_t>(header.libraries.size());
+  return header;
+}
+
+std::vector<log_file_t> hashed_files(const std::vector<std::string>& paths) {
+  std::vector<log_file_t> files;
+  for (const std::string& path : paths) files.push_back({path, sha256_of_file(path)});
+  return files;
+}
+
+void check_files_of_spawned(const std::string& log) {
+  Reader reader(log);
+  Event event;
+  bool first = true;
+  while (reader.next(event, [](const std::string& channel) { return channel == "ruedo/header"; })) {
+    log_header_t header;
+    if (event.channel != "ruedo/header" || std::exchange(first, false)) continue;
+    if (decode_checked(event.data.data(), event.data.size(), header) == DecodeFault::none) check_files(header, log);
+  }
+}
+
+void check_files(const log_header_t& header, const std::string& log) {
+  for (const log_file_t& file : header.files) {
+    const std::string now = sha256_of_file(file.path);
+    if (now == file.sha256) continue;
+    throw InputError({file.path}, now.empty() ? "cannot be read; " + log + " was made from it"
+                                              : "was changed since " + log + " was made from it (sha256 then " + file.sha256 + ", now " + now + ")");
+  }
+}
+
+std::vector<std::string> machine_differences(const log_header_t& log, const log_header_t& here) {
+  std::vector<std::string> lines;
+  const auto compare = [&](const char* what, const std::string& then, const std::string& now) {
+    if (then != now) lines.push_back(std::string(what) + ": the log has " + then + ", here it is " + now);
+  };
+  compare("Ruedo", log.version, here.version);
+  compare("CPU features", log.cpu, here.cpu);
+  compare("C library", log.libc, here.libc);
+  std::vector<std::string> only_log, only_here;
+  std::set_difference(log.libraries.begin(), log.libraries.end(), here.libraries.begin(), here.libraries.end(), std::back_inserter(only_log));
+  std::set_difference(here.libraries.begin(), here.libraries.end(), log.libraries.begin(), log.libraries.end(), std::back_inserter(only_here));
+  compare("libraries", joined(only_log), joined(only_here));
+  return lines;
+}
+
+void check_same_run(const log_header_t& log, const log_header_t& here, const std::string& path) {
+  const auto refuse = [&](const std::string& text) { throw InputError({path}, "is of another run: " + text); };
+  for (size_t i = 0; i < std::max(log.files.size(), here.files.size()); ++i) {
+    if (i >= here.files.size()) refuse("it was made from " + log.files[i].path + ", too");
+    if (i >= log.files.size()) refuse("it was not made from " + here.files[i].path);
+    if (log.files[i].path != here.files[i].path) refuse("it was made from " + log.files[i].path + ", not from " + here.files[i].path);
+    if (log.files[i].sha256 != here.files[i].sha256) refuse(here.files[i].path + " was changed since");
+  }
+  if (log.options != here.options) refuse("its options are " + joined(log.options) + "; here they are " + joined(here.options));
+  if (log.step_us != here.step_us) refuse("its steps are " + std::to_string(log.step_us) + " us long");
+}
+
+}  // namespace ruedo::log

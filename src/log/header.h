@@ -1,0 +1,36 @@
+// The header of a log: what the run was made from, and the machine's part in its bytes.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "model/world_model.h"
+#include "ruedo/log_header_t.hpp"
+
+namespace ruedo::log {
+
+// The vector extensions of this CPU that glibc or the renderer choose code by.
+std::string cpu_features();
+std::string libc_version();
+// Those shared libraries of this process that compute what goes into messages, by file name with version, sorted.
+std::vector<std::string> libraries_that_matter();
+
+// options: those that change the result, as on the command line.
+log_header_t make_log_header(const model::WorldModel& world, uint64_t seed, const std::vector<std::string>& options);
+
+// With their SHA-256.
+std::vector<log_file_t> hashed_files(const std::vector<std::string>& paths);
+
+// Throws InputError when a file that the log was made from is gone or was changed: names the first.
+void check_files(const log_header_t& header, const std::string& log);
+// The same for the models that came later in the log.
+void check_files_of_spawned(const std::string& log);
+
+// What determines a run's bytes beside its log and is not the same here, a line each: Ruedo's version and build, the CPU,
+// the C library, other libraries.
+std::vector<std::string> machine_differences(const log_header_t& log, const log_header_t& here);
+
+// Throws InputError when a run with the header `here` is another one than the log's: other files, options or steps.
+void check_same_run(const log_header_t& log, const log_header_t& here, const std::string& path);
+
+}  // namespace ruedo::log

@@ -1,0 +1,89 @@
+// The format of an event, big endian: sync word, event number, timestamp, lengths of channel and data, channel, data.
+#include "log/reader.h"
+
+#include <sys/stat.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+
+#include "ruedo/errors.h"
+
+namespace ruedo::log {
+namespace {
+
+constexpr uint32_t kSync = 0xEDA1DA01;
+constexpr size_t kHeadSize = 28;
+constexpr uint32_t kMaxChannel = 1000;
+constexpr uint32_t kMaxData = 1u << 30;
+
+uint32_t read32(const uint8_t* bytes) {
+  return uint32_t{bytes[0]} << 24 | uint32_t{bytes[1]} << 16 | uint32_t{bytes[2]} << 8 | bytes[3];
+}
+int64_t read64(const uint8_t* bytes) { return static_cast<int64_t>(uint64_t{read32(bytes)} << 32 | read32(bytes + 4)); }
+
+}  // namespace
+
+Reader::Reader(const std::string& path) : path_(path) {
+  struct stat status {};
+  if (stat(path.c_str(), &status) != 0) throw InputError({path}, std::string("cannot be read: ") + std::strerror(errno));
+  if (!S_ISREG(status.st_mode)) throw InputError({path}, "is not a file; an LCM log is expected");
+  size_ = status.st_size;
+  file_.reset(std::fopen(path.c_str(), "rb"));
+  if (!file_) throw InputError({path}, std::string("cannot be read: ") + std::strerror(errno));
+  std::array<uint8_t, 4> sync{};
+  if (size_ > 0 && (!read(sync.data(), sync.size()) || read32(sync.data()) != kSync)) {
+    throw InputError({path}, "is not an LCM log: it does not begin with the sync word EDA1DA01");
+  }
+  std::rewind(file_.get());
+  offset_ = 0;
+}
+
+bool Reader::read(void* into, size_t size) {
+  const size_t got = std::fread(into, 1, size, file_.get());
+  offset_ += static_cast<int64_t>(got);
+  return got == size;
+}
+
+bool Reader::skip(size_t size) {
+  if (std::fseek(file_.get(), static_cast<long>(size), SEEK_CUR) != 0) return false;
+  offset_ += static_cast<int64_t>(size);
+  return true;
+}
+
+void Reader::seek(int64_t offset) {
+  std::clearerr(file_.get());
+  fault_ = std::fseek(file_.get(), static_cast<long>(offset), SEEK_SET) == 0 ? "" : "cannot be read at byte " + std::to_string(offset);
+  offset_ = offset;
+}
+
+bool Reader::next(Event& event, const std::function<bool(const std::string&)>& wanted) {
+  if (!fault_.empty()) return false;
+  const int64_t begin = offset_;
+  std::array<uint8_t, kHeadSize> head{};
+  const auto cut_off = [&] {
+    fault_ = "cut off in the event that begins at byte " + std::to_string(begin);
+    return false;
+  };
+  if (!read(head.data(), head.size())) return offset_ == begin ? false : cut_off();
+  const uint32_t channel_size = read32(head.data() + 20);
+  const uint32_t data_size = read32(head.data() + 24);
+  if (read32(head.data()) != kSync || channel_size > kMaxChannel || data_size > kMaxData) {
+    fault_ = "damaged at byte " + std::to_string(begin);
+    return false;
+  }
+  // A length that lies must not make memory run out: no event is longer than what is left.
+  if (int64_t{channel_size} + data_size > size_ - offset_) return cut_off();
+  event.number = read64(head.data() + 4);
+  event.timestamp_us = read64(head.data() + 12);
+  event.channel.resize(channel_size);
+  if (!read(event.channel.data(), channel_size)) return cut_off();
+  if (wanted && !wanted(event.channel)) {
+    event.data.clear();
+    return skip(data_size) || cut_off();
+  }
+  event.data.resize(data_size);
+  return read(event.data.data(), data_size) || cut_off();
+}
+
+}  // namespace ruedo::log

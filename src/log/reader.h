@@ -1,0 +1,52 @@
+// Reads standard LCM logs, event by event, those that were cut off included.
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ruedo/sim_time.h"
+
+namespace ruedo::log {
+
+struct Event {
+  int64_t number = 0;
+  SimTime timestamp_us = 0;
+  std::string channel;
+  std::vector<uint8_t> data;
+};
+
+class Reader {
+ public:
+  // Throws InputError when the file cannot be opened, or is not an LCM log.
+  explicit Reader(const std::string& path);
+
+  // Reads the next whole event; false at the end, or where the log was cut off or is damaged: see fault().
+  // The event's buffers are reused. wanted: of other channels the data is passed over, and left empty.
+  bool next(Event& event, const std::function<bool(const std::string& channel)>& wanted = {});
+
+  // The next event is that at this byte, where offset() was before one.
+  void seek(int64_t offset);
+
+  // After next() returned false: "" at a proper end, else what is wrong and at which byte.
+  const std::string& fault() const { return fault_; }
+  const std::string& path() const { return path_; }
+  int64_t size() const { return size_; }        // bytes of the file
+  int64_t offset() const { return offset_; }    // bytes read so far
+
+ private:
+  bool read(void* into, size_t size);
+  bool skip(size_t size);
+
+  struct Close { void operator()(std::FILE* file) const { std::fclose(file); } };
+  std::string path_;
+  std::unique_ptr<std::FILE, Close> file_;
+  int64_t size_ = 0;
+  int64_t offset_ = 0;
+  std::string fault_;
+};
+
+}  // namespace ruedo::log

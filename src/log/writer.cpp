@@ -1,0 +1,104 @@
+// The LCM log format: each event is sync word, number, timestamp, two lengths, channel and data, big-endian.
+#include "log/writer.h"
+
+#include <cerrno>
+#include <cstring>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "ruedo/errors.h"
+
+namespace ruedo::log {
+namespace {
+
+constexpr uint32_t kSync = 0xEDA1DA01;
+constexpr size_t kFlushSize = 1 << 20;    // bytes
+
+template <class Integer>
+void put(std::vector<uint8_t>& buffer, Integer value) {
+  for (int shift = static_cast<int>(sizeof value) * 8 - 8; shift >= 0; shift -= 8) {
+    buffer.push_back(static_cast<uint8_t>(value >> shift));
+  }
+}
+
+}  // namespace
+
+Writer::Writer(const std::string& path) : Writer(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666), path) {
+  if (file_ < 0) throw EnvironmentError("--record: cannot write '" + path + "': " + std::strerror(errno));
+}
+
+Writer::Writer(int file, std::string name) : path_(std::move(name)), file_(file) {
+  buffer_.reserve(2 * kFlushSize);
+  ends_.reserve(4096);
+}
+
+Writer::~Writer() {
+  flush();
+  ::close(file_);
+}
+
+void Writer::write(int64_t timestamp_us, const std::string& channel, const uint8_t* data, size_t size) {
+  if (!error_.empty()) return;
+  put(buffer_, kSync);
+  put(buffer_, static_cast<uint64_t>(events_++));
+  put(buffer_, static_cast<uint64_t>(timestamp_us));
+  put(buffer_, static_cast<uint32_t>(channel.size()));
+  put(buffer_, static_cast<uint32_t>(size));
+  buffer_.insert(buffer_.end(), channel.begin(), channel.end());
+  buffer_.insert(buffer_.end(), data, data + size);
+  ends_.push_back(buffer_.size());
+  if (buffer_.size() >= kFlushSize) flush();
+}
+
+void Writer::flush() {
+  size_t done = 0;
+  while (done < buffer_.size() && error_.empty()) {
+    const ssize_t count = ::write(file_, buffer_.data() + done, buffer_.size() - done);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) {
+      const int error_number = count < 0 ? errno : ENOSPC;
+      size_t whole = 0;
+      for (size_t end : ends_) whole = end <= done ? end : whole;
+      written_ += static_cast<int64_t>(whole);
+      fail(error_number);
+      break;
+    }
+    done += static_cast<size_t>(count);
+  }
+  if (error_.empty()) written_ += static_cast<int64_t>(buffer_.size());
+  buffer_.clear();
+  ends_.clear();
+}
+
+void Writer::truncate() {
+  buffer_.clear();
+  ends_.clear();
+  written_ = events_ = 0;
+  error_.clear();
+  if (::ftruncate(file_, 0) != 0 || ::lseek(file_, 0, SEEK_SET) != 0) error_ = std::strerror(errno);
+}
+
+std::string Writer::append(const Writer& other) {
+  std::vector<uint8_t> piece(kFlushSize);
+  for (int64_t done = 0; done < other.written_;) {
+    const ssize_t got = ::pread(other.file_, piece.data(), piece.size(), done);
+    if (got <= 0) return got < 0 ? std::strerror(errno) : other.path_ + " is shorter than it was";
+    for (ssize_t put = 0; put < got;) {
+      const ssize_t count = ::write(file_, piece.data() + put, static_cast<size_t>(got - put));
+      if (count <= 0) return std::strerror(count < 0 ? errno : ENOSPC);
+      put += count;
+    }
+    done += got;
+  }
+  written_ = other.written_;
+  events_ = other.events_;
+  return "";
+}
+
+void Writer::fail(int error_number) {
+  error_ = std::strerror(error_number);
+  if (::ftruncate(file_, written_) != 0) error_ += "; its last event is cut off";
+}
+
+}  // namespace ruedo::log

@@ -1,0 +1,50 @@
+// Writes a standard LCM log: what lcm-logplayer, lcm-spy and lcm::LogFile read.
+//
+// Buffered, and flushed at whole events: a log that was cut off by a full disk or a kill is readable up to there.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace ruedo::log {
+
+class Writer {
+ public:
+  // Creates or empties the file. Throws EnvironmentError when that fails.
+  explicit Writer(const std::string& path);
+  // Takes over an open, empty file. name: for messages.
+  Writer(int file, std::string name);
+  ~Writer();
+  Writer(const Writer&) = delete;
+  Writer& operator=(const Writer&) = delete;
+
+  // Adds an event. After a failure this does nothing: see error().
+  void write(int64_t timestamp_us, const std::string& channel, const uint8_t* data, size_t size);
+
+  // Hands everything so far to the operating system.
+  void flush();
+
+  // Begins anew with an empty file, whatever went wrong before.
+  void truncate();
+
+  // Adds the events of another log that was written from its beginning and flushed, to an empty one. What went wrong, or "".
+  std::string append(const Writer& other);
+
+  // What went wrong ("no space left on device"), or "". The file then ends with the last whole event that had room.
+  const std::string& error() const { return error_; }
+  const std::string& path() const { return path_; }
+
+ private:
+  void fail(int error_number);
+
+  std::string path_;
+  int file_ = -1;
+  std::vector<uint8_t> buffer_;
+  std::vector<size_t> ends_;    // where the events in the buffer end
+  int64_t written_ = 0;         // bytes of whole events in the file
+  int64_t events_ = 0;
+  std::string error_;
+};
+
+}  // namespace ruedo::log

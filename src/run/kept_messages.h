@@ -1,0 +1,45 @@
+// The messages of the last steps, for those who have lost some: kept until all have received them.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <span>
+#include <vector>
+
+namespace ruedo::run {
+
+class KeptMessages {
+ public:
+  static constexpr size_t kMostSteps = 128;
+  static constexpr size_t kMostBytes = 32u << 20;
+
+  // Steps follow on one another. keep() belongs to the last one.
+  void begin_step(int64_t step);
+  void keep(int channel, int64_t sequence, const uint8_t* data, size_t size);
+
+  void forget(int64_t step);    // all up to and with that one
+  void clear() { forget(INT64_MAX); }
+
+  // A batch of steps may go beyond: who asks stops before the next.
+  bool full() const { return steps_.size() >= kMostSteps || bytes_ >= kMostBytes; }
+  bool empty() const { return steps_.empty(); }
+  size_t bytes() const { return bytes_; }
+
+  // Empty when it is not there; valid until the next call that changes something.
+  std::span<const uint8_t> find(int64_t step, int channel, int64_t sequence) const;
+
+ private:
+  struct Entry { int channel; int64_t sequence; size_t offset, size; };
+  struct Step {
+    int64_t step = 0;
+    std::vector<Entry> entries;
+    std::vector<uint8_t> bytes;
+  };
+  static constexpr size_t kSpareBytes = 64u << 10;    // a buffer larger than this goes back to the system
+
+  std::deque<Step> steps_;
+  std::vector<Step> spare_;    // their memory is used again
+  size_t bytes_ = 0;
+};
+
+}  // namespace ruedo::run

@@ -1,0 +1,57 @@
+// The repair of lost messages: RESEND.
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "ruedo/decode.h"
+#include "ruedo/resend_reply_t.hpp"
+#include "ruedo/resend_request_t.hpp"
+#include "run/lockstep.h"
+#include "engine/world_state.h"
+
+namespace ruedo::run {
+
+// What fits into a part goes whole; only what is larger than a part by itself goes in pieces.
+engine::Outcome Lockstep::resend(const request_t& request, const Session& session) {
+  resend_request_t body;
+  if (decode_checked(request.body.data(), request.body.size(), body) != DecodeFault::none) {
+    return engine::Outcome::refuse(reply_t::BAD_REQUEST, "the body is not a resend_request_t");
+  }
+  if (body.wanted.size() > kMostWanted) {
+    return engine::Outcome::refuse(reply_t::BAD_REQUEST, fmt::format("{} messages are wanted; {} is allowed", body.wanted.size(), kMostWanted));
+  }
+  Member* member = find(session.id);
+  if (!member) return engine::Outcome::refuse(reply_t::UNKNOWN_SESSION, "this client does not take part in lockstep (any more)");
+  if (body.received > published_) {
+    return engine::Outcome::refuse(reply_t::BAD_REQUEST, fmt::format("received is {}, but the newest state is {}", body.received, published_));
+  }
+  member->received = std::max(member->received, body.received);
+  forget();
+  if (over_ && member->received == published_) {
+    return engine::Outcome::refuse(reply_t::REFUSED, fmt::format("the run has ended at step {}", published_));
+  }
+  resend_reply_t reply;
+  reply.step = published_;
+  reply.waits_for = waits_for();
+  size_t room = engine::kMaxPartSize;
+  for (const resend_wanted_t& wanted : body.wanted) {
+    const std::span<const uint8_t> bytes = kept_.find(wanted.step, wanted.channel_index, wanted.sequence);
+    if (wanted.offset < 0 || static_cast<size_t>(wanted.offset) >= bytes.size()) continue;
+    const size_t left = bytes.size() - static_cast<size_t>(wanted.offset);
+    if (left > room && !reply.parts.empty()) break;
+    const std::span<const uint8_t> piece = bytes.subspan(static_cast<size_t>(wanted.offset), std::min(left, room));
+    resend_part_t& part = reply.parts.emplace_back();
+    part.step = wanted.step;
+    part.channel_index = wanted.channel_index;
+    part.sequence = wanted.sequence;
+    part.total = static_cast<int32_t>(bytes.size());
+    part.offset = wanted.offset;
+    part.size = static_cast<int32_t>(piece.size());
+    part.data.assign(piece.begin(), piece.end());
+    room -= piece.size();
+  }
+  reply.nparts = static_cast<int32_t>(reply.parts.size());
+  return engine::Outcome::with(engine::encoded(reply));
+}
+
+}  // namespace ruedo::run

@@ -1,0 +1,70 @@
+// When the next steps may be computed: real time, pause, single steps and the end of the run in one place.
+//
+// Step s of a run at rate r is due s dt / r after the start, by the monotonic clock: deadlines are absolute, so
+// that nothing drifts. None of this enters a result. Thread safe; wait() belongs to the simulation thread.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <mutex>
+
+#include "engine/pace.h"
+
+namespace ruedo::run {
+
+class Pacer : public engine::Pace {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  // rate: simulated per real time, > 0; +inf: as fast as it goes. last_step: of the run, INT64_MAX: none.
+  Pacer(int64_t step_us, double rate, int64_t last_step);
+
+  int wait(int64_t& step, int limit) override;
+  int borrow(int64_t& step, int limit) override;
+  void give_back(int unused) override;
+  void stop() override;
+  int64_t pause();                   // returns the last state that will still be computed
+  void resume();
+  int64_t allow(int64_t steps);      // while paused: that many more; returns the last one of them
+  void set_rate(double rate);
+  // No state after `step` is computed until a higher limit is set; the step that waits for it is due at once then.
+  void set_limit(int64_t step);
+  // The same, for who calls borrow() next.
+  void set_limit_quietly(int64_t step);
+
+  // Standing still for a change of the world. hold(): wait() lets nothing more go; returns the last state that it let go.
+  // wait_until_held(), when that state is done: until the simulation thread waits; false when the run is over.
+  int64_t hold();
+  bool wait_until_held();
+  void release();
+  void begin_time_anew();            // while held: the next state is 0
+
+  bool paused() const;
+  double rate() const;
+  int64_t last_step() const { return last_step_; }
+
+ private:
+  Clock::time_point due(int64_t step) const;
+  void start_anew();
+  void sleep(std::unique_lock<std::mutex>& lock);
+
+  // A host that was held up catches up by at most this much; beyond it, the run is simply late from then on.
+  static constexpr auto kMostCatchUp = std::chrono::milliseconds(250);
+
+  const int64_t step_us_;
+  const int64_t last_step_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  double rate_;
+  bool stopped_ = false, paused_ = false;
+  bool hold_ = false, held_ = false, over_ = false;
+  bool asleep_ = false, lent_ = false;    // wait() waits for a higher limit; its steps are another thread's
+  int64_t until_;                    // last state that may be computed: by the end of the run, pause() and allow(),
+  int64_t limit_ = INT64_MAX;        // and by set_limit()
+  int64_t granted_ = -1;             // last state that wait() let go
+  int64_t origin_step_ = 0;          // was due at origin_time_
+  Clock::time_point origin_time_;
+};
+
+}  // namespace ruedo::run

@@ -1,0 +1,70 @@
+// A run that is repeated: what acted on it is read from its log, or from a snapshot, and acts again on the same steps.
+//
+// Commands go to the inbox ahead of time; the pacer lets the run go as far as is known what acts on it, and to the step
+// of a request, which the server then executes. The publisher's, all of it.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "ruedo/applied_t.hpp"
+#include "ruedo/log_header_t.hpp"
+#include "ruedo/state_hash_t.hpp"
+#include "engine/command_inbox.h"
+#include "log/reader.h"
+#include "run/pacer.h"
+
+namespace ruedo::run {
+
+class Replay {
+ public:
+  // What the epoch that runs now is driven by.
+  struct Target {
+    engine::CommandInbox& inbox;
+    Pacer& pacer;
+    // The input that takes it; -1: it is a request. Throws InputError for a channel that there is not.
+    std::function<int(const applied_t&)> input_of;
+    SimTime begin_us;    // of the epoch, in stamps of the log: what went on before sim time was last set to 0
+  };
+
+  // Throws InputError for what is no log, or has no header of a run at its beginning.
+  explicit Replay(const std::string& path);
+
+  const log_header_t& header() const { return header_; }
+  const std::string& path() const { return reader_.path(); }
+
+  // To be called when state `step` is out, or none is yet (-1). Returns a request that acts on that state: execute it,
+  // then call executed(), then this again. Null: the run goes on, or is at its end. Throws InputError for a log that
+  // does not fit what runs.
+  const applied_t* advance(int64_t step, const Target& target);
+  void executed();
+
+  // After advance() returned null: whether that was all.
+  bool at_end(int64_t step) const { return ended_ && !waits_ && step >= end_step_; }
+  // Then: whether the log says how the run ended. If so, in what state; if not, why it breaks off.
+  bool complete() const { return end_.last; }
+  const state_hash_t& end() const { return end_; }
+  std::string fault() const;
+
+ private:
+  static constexpr int64_t kAhead = 1024;    // steps that are read ahead of what runs
+
+  void read(const Target& target);
+  [[noreturn]] void damaged(const std::string& what) const;
+
+  log::Reader reader_;
+  log::Event event_;
+  log_header_t header_;
+  applied_t applied_;          // the next thing that acted, if waits_
+  bool waits_ = false;
+  bool ended_ = false;
+  int64_t known_ = -1;         // everything is known that acts on states before this one
+  int64_t end_step_ = -1;
+  state_hash_t end_{};
+};
+
+// The header of a log. Throws InputError as Replay does.
+log_header_t read_header(const std::string& path);
+
+}  // namespace ruedo::run

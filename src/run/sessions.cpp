@@ -1,0 +1,59 @@
+// Sessions of the clients of the simulation control.
+#include "run/sessions.h"
+
+#include <algorithm>
+#include <random>
+
+namespace ruedo::run {
+
+int64_t random_id() {
+  std::random_device device;
+  const uint64_t bits = uint64_t{device()} << 32 | device();
+  return static_cast<int64_t>(bits >> 1 | 1);
+}
+
+Session* Sessions::find(int64_t id) {
+  const auto found = std::find_if(sessions_.begin(), sessions_.end(), [&](const Session& session) { return session.id == id; });
+  return found == sessions_.end() ? nullptr : &*found;
+}
+
+Session* Sessions::join(const std::string& client, int64_t sequence, Time now) {
+  for (Session& session : sessions_) {
+    if (session.join_sequence == sequence && session.client == client) return &session;
+  }
+  if (sessions_.size() == kMostSessions) {
+    const auto oldest = std::min_element(sessions_.begin(), sessions_.end(),
+                                         [](const Session& a, const Session& b) { return a.last_heard < b.last_heard; });
+    if (now - oldest->last_heard < kMaySilence) return nullptr;
+    sessions_.erase(oldest);
+  }
+  Session& session = sessions_.emplace_back();
+  session.id = random_id();
+  session.client = client;
+  session.join_sequence = sequence;
+  session.last_heard = now;
+  return &session;
+}
+
+void Sessions::leave(int64_t id) {
+  std::erase_if(sessions_, [&](const Session& session) { return session.id == id; });
+}
+
+Sessions::Verdict Sessions::judge(const Session& session, int64_t sequence, const reply_t*& reply) const {
+  if (sequence > session.last_sequence) return Verdict::execute;
+  for (const reply_t& kept : session.replies) {
+    if (kept.sequence != sequence) continue;
+    reply = &kept;
+    return Verdict::answer_again;
+  }
+  return sequence == session.last_sequence ? Verdict::wait : Verdict::too_old;
+}
+
+void Sessions::keep(const reply_t& reply) {
+  Session* session = find(reply.session);
+  if (!session) return;
+  if (session->replies.size() == kKeptReplies) session->replies.pop_front();
+  session->replies.push_back(reply);
+}
+
+}  // namespace ruedo::run

@@ -1,0 +1,54 @@
+// Who has joined, and which of their requests were executed: each request once, however often it is repeated.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "ruedo/reply_t.hpp"
+
+namespace ruedo::run {
+
+struct Session {
+  int64_t id = 0;                    // random
+  std::string client;
+  int64_t join_sequence = 0;         // the client's own random number
+  int64_t last_sequence = 0;         // executed, or being executed
+  std::deque<reply_t> replies;       // the last ones, oldest first
+  std::chrono::steady_clock::time_point last_heard;
+};
+
+// Not thread safe.
+class Sessions {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+  static constexpr size_t kMostSessions = 64;
+  static constexpr size_t kKeptReplies = 32;
+  static constexpr auto kMaySilence = std::chrono::minutes(1);    // then its place may go to another
+
+  // What is to be done with a request of a session.
+  enum class Verdict { execute, answer_again, wait, too_old };
+
+  Session* find(int64_t id);
+  // The session of a client that joins, the same one for a repeated JOIN; null when there is no place.
+  Session* join(const std::string& client, int64_t sequence, Time now);
+  void leave(int64_t id);
+
+  // answer_again: `reply` is the one to send.
+  Verdict judge(const Session& session, int64_t sequence, const reply_t*& reply) const;
+  void begin(Session& session, int64_t sequence) { session.last_sequence = sequence; }
+  void keep(const reply_t& reply);    // by its session; nothing when that has left
+
+  const std::vector<Session>& list() const { return sessions_; }
+
+ private:
+  std::vector<Session> sessions_;
+};
+
+// A random number in [1, 2^63), from the operating system.
+int64_t random_id();
+
+}  // namespace ruedo::run

@@ -1,0 +1,57 @@
+// Input channels that the run waits for: a program that answers each sensor message with a command, and knows nothing of
+// steps, then drives a run that can be repeated, as fast as it can.
+//
+// Message k of such a channel (from 0) acts on the state of the first step at or after k / rate; the run goes no further
+// than that state before the message is there. Guarded by the server's lock of the simulation.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "ruedo/sim_time.h"
+#include "engine/channels.h"
+#include "engine/command_inbox.h"
+#include "run/pacer.h"
+
+namespace ruedo::run {
+
+struct WaitForOption {
+  std::string channel;    // its own name, or the one that --remap gives it
+  Rate rate;
+};
+
+class WaitFor {
+ public:
+  // Messages that may be there before the run is where the first of them acts.
+  static constexpr int64_t kMostAhead = 64;
+
+  WaitFor(std::vector<WaitForOption> options, int64_t step_us);
+
+  // For a simulation that was made anew, or is at `step` for another reason. Throws InputError for what is no input.
+  void attach(const engine::Channels& channels, engine::CommandInbox& inbox, Pacer& pacer, int64_t step);
+  void detach() { inbox_ = nullptr; }
+
+  // False: the channel is none of these.
+  bool receive(const std::string& channel, const uint8_t* data, size_t size);
+
+  // What has to come before the state after `step` can be computed, in words; "": nothing.
+  std::string waits_for(int64_t step) const;
+
+ private:
+  struct Waited {
+    WaitForOption option;
+    SampleClock clock;
+    int input = -1;
+    std::string channel;     // on the bus
+    int64_t next = 0;        // number of the message that comes next
+    bool told = false;
+  };
+
+  void limit();
+
+  std::vector<Waited> waited_;
+  engine::CommandInbox* inbox_ = nullptr;
+  Pacer* pacer_ = nullptr;
+};
+
+}  // namespace ruedo::run

@@ -1,8 +1,0 @@
-// The version of Ruedo, as CMakeLists.txt has it.
-#pragma once
-
-namespace ruedo::server {
-
-const char* version();    // "0.1.0"
-
-}  // namespace ruedo::server

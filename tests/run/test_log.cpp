@@ -1,0 +1,121 @@
+// Logs: the format, the header, the commands that took effect, and a full disk.
+#include <gtest/gtest.h>
+#include <lcm/lcm-cpp.hpp>
+
+#include "ruedo/applied_t.hpp"
+#include "ruedo/decode.h"
+#include "ruedo/errors.h"
+#include "ruedo/log_header_t.hpp"
+#include "ruedo/velocity_command_t.hpp"
+#include "running.h"
+#include "log/writer.h"
+#include "core/sha256.h"
+
+namespace ruedo::run {
+namespace {
+
+TEST(Sha256, KnownAnswers) {
+  const auto of = [](const std::string& text) { return sha256(reinterpret_cast<const uint8_t*>(text.data()), text.size()); };
+  // The examples of FIPS 180-4.
+  EXPECT_EQ(of(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  EXPECT_EQ(of("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(of("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq"),
+            "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1");
+  EXPECT_EQ(of(std::string(1'000'000, 'a')), "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
+}
+
+TEST(Writer, LcmReadsItsEvents) {
+  const TemporaryFile file("events.lcmlog");
+  {
+    log::Writer log(file.path());
+    const uint8_t bytes[] = {1, 2, 3};
+    log.write(0, "first", bytes, 3);
+    log.write(1'234'567'890'123, "second", bytes, 0);
+  }
+  lcm::LogFile log(file.path(), "r");
+  ASSERT_TRUE(log.good());
+  const lcm::LogEvent* event = log.readNextEvent();
+  ASSERT_NE(event, nullptr);
+  EXPECT_EQ(event->eventnum, 0);
+  EXPECT_EQ(event->timestamp, 0);
+  EXPECT_EQ(event->channel, "first");
+  ASSERT_EQ(event->datalen, 3);
+  EXPECT_EQ(static_cast<const uint8_t*>(event->data)[2], 3);
+  event = log.readNextEvent();
+  ASSERT_NE(event, nullptr);
+  EXPECT_EQ(event->eventnum, 1);
+  EXPECT_EQ(event->timestamp, 1'234'567'890'123);
+  EXPECT_EQ(event->channel, "second");
+  EXPECT_EQ(log.readNextEvent(), nullptr);
+}
+
+TEST(Writer, AFullDiskIsSaid) {
+  log::Writer log("/dev/full");
+  const uint8_t bytes[1000] = {};
+  log.write(0, "channel", bytes, sizeof bytes);
+  EXPECT_EQ(log.error(), "");
+  log.flush();
+  EXPECT_NE(log.error().find("No space left on device"), std::string::npos);
+  EXPECT_THROW(log::Writer("/nowhere/at/all.lcmlog"), EnvironmentError);
+}
+
+TEST(Recording, AFullDiskEndsTheRun) {
+  ServerOptions options = fast(600.0);
+  options.record = "/dev/full";
+  MemoryBus bus;
+  bus.keep = false;
+  Server server(load_text(robot_sdf("r", 0, 0)), options, bus);
+  try {
+    server.run();
+    FAIL() << "it ran on";
+  } catch (const EnvironmentError& error) {
+    EXPECT_NE(std::string(error.what()).find("No space left"), std::string::npos);
+  }
+}
+
+TEST(Recording, HoldsWhatARepetitionNeeds) {
+  const TemporaryFile file("run.lcmlog");
+  ServerOptions options = fast(1.0, 42);
+  options.record = file.path();
+  options.result_options = {"--no-noise"};
+  MemoryBus bus;
+  velocity_command_t command{};
+  command.vx = 0.3;
+  {
+    Server server(load_text(robot_sdf("r", 0, 0)), options, bus);
+    server.command("r/velocity", engine::encoded(command));
+    server.run();
+  }
+  lcm::LogFile log(file.path(), "r");
+  int64_t last = 0, number = 0, applied_count = 0;
+  while (const lcm::LogEvent* event = log.readNextEvent()) {
+    const auto* data = static_cast<const uint8_t*>(event->data);
+    const auto size = static_cast<size_t>(event->datalen);
+    EXPECT_GE(event->timestamp, last);
+    last = event->timestamp;
+    EXPECT_NE(event->channel, "ruedo/tick");
+    EXPECT_NE(event->channel, "ruedo/info");
+    if (number++ == 0) {
+      EXPECT_EQ(event->channel, "ruedo/header");
+      log_header_t header;
+      ASSERT_EQ(decode_checked(data, size, header), DecodeFault::none);
+      EXPECT_EQ(header.seed, 42);
+      EXPECT_EQ(header.step_us, 5000);
+      ASSERT_EQ(header.noptions, 1);
+      EXPECT_EQ(header.options[0], "--no-noise");
+      EXPECT_GT(header.nlibraries, 3);
+    }
+    if (event->channel != "ruedo/applied") continue;
+    ++applied_count;
+    applied_t applied;
+    ASSERT_EQ(decode_checked(data, size, applied), DecodeFault::none);
+    EXPECT_EQ(applied.step, 0);    // it acted on the initial state
+    EXPECT_EQ(applied.channel, "r/velocity");
+    EXPECT_EQ(std::vector<uint8_t>(applied.data.begin(), applied.data.end()), engine::encoded(command));
+  }
+  EXPECT_EQ(applied_count, 1);
+  EXPECT_EQ(last, 1'000'000);
+}
+
+}  // namespace
+}  // namespace ruedo::run
