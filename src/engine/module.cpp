@@ -1,22 +1,11 @@
-// The thread of a module: takes batches in order, works its devices through them, says when it is done.
 // TBB splits the devices over the cores in pieces that the devices alone fix.
 #include "engine/module.h"
 
 #include <algorithm>
-#include <cfenv>
-#include <chrono>
-#include <future>
-
-#include <pthread.h>
 
 #include "engine/parallel.h"
 
 namespace ruedo::engine {
-namespace {
-
-constexpr int64_t kQuickNs = 50'000;
-
-}  // namespace
 
 void DueSteps::add(const SampleClock& clock, int64_t first, int64_t sample) {
   // A thousand devices of one rate are one entry: the first few samples tell clocks apart well enough, since a
@@ -42,8 +31,7 @@ void DueSteps::update() {
   for (const Entry& entry : entries_) next_ = std::min(next_, entry.step);
 }
 
-Module::Module(ModuleSetup setup, int index, Wakeup& finished)
-    : setup_(std::move(setup)), index_(index), finished_(finished), queue_(16) {
+Module::Module(ModuleSetup setup) : setup_(std::move(setup)) {
   for (const Device& device : setup_.devices) slots_.push_back(slot_of(device));
   count_due();
 }
@@ -102,95 +90,10 @@ void Module::make_scenes(const SceneMakers& makers) {
   renderer_ = makers.renderer();
 }
 
-void Module::renew_scenes(const SceneMakers& makers) {
-  if (!setup_.wants_rays && !setup_.wants_visual_rays && !setup_.wants_renderer) return;
-  std::promise<void> made;
-  makers_ = &makers;
-  made_ = &made;
-  queue_.push(&renewal_);
-  made.get_future().get();
-}
-
-Module::~Module() {
-  if (!thread_.joinable()) return;
-  queue_.push(nullptr);
-  thread_.join();
-}
-
-void Module::start(const SceneMakers& makers) {
-  std::promise<void> ready;
-  thread_ = std::thread([this, &ready, &makers] {
-    pthread_setname_np(pthread_self(), setup_.name.substr(0, 15).c_str());
-    std::fesetenv(FE_DFL_ENV);    // rounding and denormals as everywhere, whatever libraries did to the parent
-    try {
-      make_scenes(makers);
-      ready.set_value();
-    } catch (...) {
-      ready.set_exception(std::current_exception());
-      return;
-    }
-    work();
-    renderer_.reset();    // its context belongs to this thread
-  });
-  try {
-    ready.get_future().get();
-  } catch (...) {
-    thread_.join();
-    throw;
-  }
-}
-
-void Module::hand_over(Batch& batch, int64_t last_step) {
-  to_hand_over_.pass(last_step);
-  in_hand_.fetch_add(1, std::memory_order_relaxed);
-  queue_.push(&batch);
-}
-
-// A renderer's context belongs to the module's thread.
-bool Module::is_quick() const {
-  return !renderer_ && in_hand_.load(std::memory_order_acquire) == 0 && cost_ns_.load(std::memory_order_relaxed) < kQuickNs;
-}
-
-void Module::work_here(Batch& batch, int64_t last_step) {
-  to_hand_over_.pass(last_step);
-  work_through(batch);
-}
-
-void Module::work() {
-  while (Batch* batch = queue_.pop()) {
-    if (batch == &renewal_) {
-      std::promise<void>* made = made_;
-      try {
-        make_scenes(*makers_);
-        made->set_value();
-      } catch (...) {
-        made->set_exception(std::current_exception());
-      }
-      continue;
-    }
-    work_through(*batch);
-    in_hand_.fetch_sub(1, std::memory_order_release);
-  }
-}
-
-void Module::work_through(Batch& batch) {
-  if (setup_.before_batch) setup_.before_batch(setup_.name);
-  const bool due = to_sample_.next() < batch.first_step + batch.count;
-  const auto begin = std::chrono::steady_clock::now();
-  try {
-    process(batch);
-  } catch (const std::exception& error) {
-    if (!batch.failed.exchange(true)) batch.failure = "module " + setup_.name + ": " + error.what();
-  }
-  if (due) cost_ns_.store((std::chrono::steady_clock::now() - begin) / std::chrono::nanoseconds(1), std::memory_order_relaxed);
-  const bool last = batch.pending.fetch_sub(1, std::memory_order_acq_rel) == 1;
-  if (last) finished_.set();
-}
-
-void Module::process(Batch& batch) {
-  for (Outbox& outbox : batch.outputs[index_].pieces) outbox.clear();
+void Module::process(const Batch& batch, Batch::Output& output, const std::atomic<bool>& left_off) {
+  for (Outbox& outbox : output.pieces) outbox.clear();
   if (!rays_ && !visual_rays_) {
-    process_pieces(batch, 0, batch.count);
+    process_pieces(batch, output, 0, batch.count, left_off);
     to_sample_.pass(batch.first_step + batch.count - 1);
     return;
   }
@@ -200,23 +103,25 @@ void Module::process(Batch& batch) {
     if (to_sample_.next() != batch.first_step + i) continue;
     if (rays_) rays_->update(batch.snapshots[i]);
     if (visual_rays_) visual_rays_->update(batch.snapshots[i]);
-    process_pieces(batch, begin, i + 1);
+    process_pieces(batch, output, begin, i + 1, left_off);
     begin = i + 1;
     to_sample_.pass(batch.first_step + i);
   }
-  if (observes_ && begin < batch.count) process_pieces(batch, begin, batch.count);
+  if (observes_ && begin < batch.count) process_pieces(batch, output, begin, batch.count, left_off);
 }
 
-void Module::process_pieces(Batch& batch, int begin, int end) {
+void Module::process_pieces(const Batch& batch, Batch::Output& output, int begin, int end, const std::atomic<bool>& left_off) {
+  const auto process_one = [&](int piece) {
+    process_piece(batch, output.pieces[static_cast<size_t>(piece)], piece, begin, end, left_off);
+  };
   if (pieces() == 1 || renderer_) {    // a renderer serves one thread
-    for (int piece = 0; piece < pieces(); ++piece) process_piece(batch, piece, begin, end);
+    for (int piece = 0; piece < pieces(); ++piece) process_one(piece);
     return;
   }
-  parallel_pieces(pieces(), [&](int piece) { process_piece(batch, piece, begin, end); });
+  parallel_pieces(pieces(), process_one);
 }
 
-void Module::process_piece(Batch& batch, int piece, int begin, int end) {
-  Outbox& outbox = batch.outputs[index_].pieces[piece];
+void Module::process_piece(const Batch& batch, Outbox& outbox, int piece, int begin, int end, const std::atomic<bool>& left_off) {
   const size_t first = static_cast<size_t>(piece) * setup_.piece_size;
   const size_t last = std::min(first + setup_.piece_size, slots_.size());
   for (int i = begin; i < end; ++i) {
@@ -227,7 +132,7 @@ void Module::process_piece(Batch& batch, int piece, int begin, int end) {
       Sensor& sensor = *setup_.devices[k].sensor;
       if (slot.observes) sensor.observe(snapshot, outbox);
       if (slot.step != snapshot.step) continue;
-      if (setup_.left_off->load(std::memory_order_relaxed)) return;    // a thousand pictures may be in the batch
+      if (left_off.load(std::memory_order_relaxed)) return;    // a thousand pictures may be in the batch
       const scene::RayScene* rays = slot.visual_rays ? visual_rays_.get() : rays_.get();
       sensor.sample({snapshot, slot.sample, rays, renderer_.get()}, outbox);
       slot.step = setup_.devices[k].first_step + slot.clock.step_of(++slot.sample);

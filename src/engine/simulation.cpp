@@ -28,38 +28,13 @@ int batch_steps(const model::BodyLayout& layout) {
 
 Simulation::Simulation(std::shared_ptr<const model::WorldModel> world, const SimulationOptions& options, Channels& channels,
                        Findings& findings, Wakeup& finished)
-    : world_(*world),
-      layout_(world_),
-      fleet_options_(options.fleet),
+    : world_(std::move(world), options.fleet, channels, findings),
       before_batch_(options.before_batch),
       finished_(finished),
-      fleet_(make_fleet(world_, layout_, options.fleet, channels, findings)),
-      devices_(std::move(fleet_.devices)),
-      inbox_(std::move(fleet_.inputs), static_cast<int>(layout_.robots.size())),
-      physics_(std::make_unique<physics::PhysicsWorld>(world_, layout_)),
-      robots_(std::make_unique<robot::Robots>(world_, layout_, *physics_)),
       batches_(kBatches) {
-  for (const Finding& finding : physics_->findings()) {
-    switch (finding.kind) {
-      case Finding::Kind::unsupported: findings.unsupported(finding.source, finding.element, finding.text); break;
-      case Finding::Kind::repaired: findings.repaired(finding.source, finding.element, finding.text); break;
-      case Finding::Kind::error: findings.error(finding.source, finding.element, finding.text); break;
-    }
-  }
-  for (ModuleSetup& setup : fleet_.modules) {
-    setup.before_batch = before_batch_;
-    setup.left_off = &left_off_;
-    modules_.push_back(std::make_unique<Module>(std::move(setup), static_cast<int>(modules_.size()), finished_));
-    cursors_.emplace_back(static_cast<size_t>(modules_.back()->pieces()));
-  }
-  for (size_t i = 0; i < channels.list().size(); ++i) {
-    if (channels.list()[i].name == "ruedo/world") world_channel_ = static_cast<int>(i);
-  }
-  const int steps = options.batch_steps > 0 ? options.batch_steps : batch_steps(layout_);
-  for (Batch& batch : batches_) {
-    batch.snapshots.resize(static_cast<size_t>(steps));
-    for (const auto& module : modules_) batch.outputs.push_back({false, false, std::vector<Outbox>(static_cast<size_t>(module->pieces()))});
-  }
+  const int steps = options.batch_steps > 0 ? options.batch_steps : batch_steps(layout());
+  for (Batch& batch : batches_) batch.snapshots.resize(static_cast<size_t>(steps));
+  fit_threads();
 }
 
 Simulation::~Simulation() {
@@ -71,27 +46,57 @@ Simulation::~Simulation() {
   thread_.join();
 }
 
-SceneMakers Simulation::scene_makers() {
-  SceneMakers makers;
-  // The static geometry is built once and shared by all modules.
-  const auto shared = [this](bool visuals) {
-    return [this, visuals, statics = std::shared_ptr<const scene::StaticRayScene>()]() mutable {
-      if (!statics) statics = scene::make_static_ray_scene(world_, layout_, visuals);
-      return scene::make_ray_scene(statics);
-    };
-  };
-  makers.rays = shared(false);
-  makers.visual_rays = shared(true);
-  makers.renderer = [this] { return scene::make_renderer(world_, layout_); };
-  return makers;
-}
-
 void Simulation::start(Pace& pace) {
   pace_ = &pace;
-  const SceneMakers makers = scene_makers();
+  const SceneMakers makers = world_.scene_makers();
   started_ = true;
-  for (auto& module : modules_) module->start(makers);
+  for (auto& thread : threads_) thread->start(makers);
   thread_ = std::thread([this] { simulate(); });
+}
+
+void Simulation::fit_threads() {
+  std::vector<std::unique_ptr<ModuleThread>> threads;
+  for (auto& module : world_.modules()) {
+    const auto known = std::find_if(threads_.begin(), threads_.end(), [&](const auto& thread) { return thread && &thread->module() == module.get(); });
+    threads.push_back(known == threads_.end() ? std::make_unique<ModuleThread>(*module, ModuleThread::Host{finished_, left_off_, before_batch_}) : std::move(*known));
+  }
+  threads_ = std::move(threads);
+  cursors_.resize(threads_.size());
+  for (Batch& batch : batches_) batch.outputs.resize(threads_.size());
+  for (size_t m = 0; m < threads_.size(); ++m) {
+    const auto pieces = static_cast<size_t>(threads_[m]->module().pieces());
+    threads_[m]->set_index(m);
+    cursors_[m].assign(pieces, 0);
+    for (Batch& batch : batches_) {
+      batch.outputs[m].pieces.resize(pieces);
+      batch.outputs[m].woken = false;
+    }
+  }
+}
+
+int Simulation::add_model(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model, int64_t step,
+                          Channels& channels, Findings& findings) {
+  const int instance = world_.add_model(name, X_WM, std::move(model), step, channels, findings);
+  fit_threads();
+  if (!started_) return instance;
+  try {
+    const SceneMakers makers = world_.scene_makers();
+    for (auto& thread : threads_) thread->running() ? thread->renew_scenes(makers) : thread->start(makers);
+  } catch (...) {
+    remove_model(instance, channels);
+    throw;
+  }
+  return instance;
+}
+
+void Simulation::remove_model(int instance, Channels& channels) {
+  world_.remove_model(instance, channels);
+  fit_threads();
+  if (!started_) return;
+  const SceneMakers makers = world_.scene_makers();
+  for (auto& thread : threads_) {
+    if (thread->running()) thread->renew_scenes(makers);
+  }
 }
 
 void Simulation::simulate() {
@@ -139,7 +144,7 @@ void Simulation::compute(Batch& batch, int64_t first_step, int count) {
     for (int i = 0; i < count; ++i) {
       if (left_off_) batch.count = 0;    // the publisher still holds the last state, in a batch that is free already
       if (batch.count == 0) break;
-      step(batch, first_step + i);
+      world_.advance(first_step + i, batch.snapshots[static_cast<size_t>(i)], batch);
     }
   } catch (const std::exception& error) {
     if (!batch.failed.exchange(true)) batch.failure = std::string("module kinematics: ") + error.what();
@@ -149,35 +154,24 @@ void Simulation::compute(Batch& batch, int64_t first_step, int count) {
   if (count > 0) step_ns_ = (std::chrono::steady_clock::now() - begin) / std::chrono::nanoseconds(count);
 }
 
-void Simulation::step(Batch& batch, int64_t step) {
-  if (step > 0) {
-    inbox_.apply(*robots_, step - 1, batch);    // on the state before
-    robots_->step();
-  }
-  Snapshot& snapshot = batch.snapshots[static_cast<size_t>(step - batch.first_step)];
-  robots_->read(snapshot);
-  snapshot.step = step;
-  snapshot.time = step * world_.step_us;
-}
-
 void Simulation::dispatch(Batch& batch, bool here) {
   const int64_t last_step = batch.first_step + batch.count - 1;
   int woken = 0;
-  for (size_t m = 0; m < modules_.size(); ++m) {
-    batch.outputs[m].woken = batch.count > 0 && modules_[m]->wants(last_step);
+  for (size_t m = 0; m < threads_.size(); ++m) {
+    batch.outputs[m].woken = batch.count > 0 && threads_[m]->module().wants(last_step);
     woken += batch.outputs[m].woken;
   }
   // One more than the modules: nobody finds it finished before all have it.
   batch.pending.store(woken + 1, std::memory_order_release);
   bool any_here = false;
-  for (size_t m = 0; m < modules_.size(); ++m) {
+  for (size_t m = 0; m < threads_.size(); ++m) {
     Batch::Output& output = batch.outputs[m];
-    output.here = here && output.woken && modules_[m]->is_quick();
+    output.here = here && output.woken && threads_[m]->is_quick();
     any_here |= output.here;
-    if (output.woken && !output.here) modules_[m]->hand_over(batch, last_step);
+    if (output.woken && !output.here) threads_[m]->hand_over(batch, last_step);
   }
-  for (size_t m = 0; any_here && m < modules_.size(); ++m) {    // beside those that were woken
-    if (batch.outputs[m].here) modules_[m]->work_here(batch, last_step);
+  for (size_t m = 0; any_here && m < threads_.size(); ++m) {    // beside those that were woken
+    if (batch.outputs[m].here) threads_[m]->work_here(batch, last_step);
   }
   if (batch.pending.fetch_sub(1, std::memory_order_acq_rel) == 1) finished_.set();
 }

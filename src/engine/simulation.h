@@ -1,4 +1,4 @@
-// One epoch of a run: the world, its robots, its modules and their threads.
+// A world on threads, for one epoch of a run.
 //
 // The simulation thread (the module "kinematics") takes commands, drives the robots and steps Bullet; batches of
 // snapshots go to the modules that have something due; the publisher takes finished batches, in order. At most
@@ -12,16 +12,10 @@
 #include <thread>
 #include <vector>
 
-#include "model/body_layout.h"
-#include "physics/physics_world.h"
-#include "robot/robots.h"
-#include "scene/ray_scene.h"
 #include "engine/batch.h"
-#include "engine/channels.h"
-#include "engine/command_inbox.h"
-#include "engine/fleet.h"
-#include "engine/module.h"
+#include "engine/module_thread.h"
 #include "engine/pace.h"
+#include "engine/world.h"
 
 namespace ruedo::engine {
 
@@ -62,60 +56,40 @@ class Simulation {
   template <class Handler>
   void messages(const Batch& batch, int64_t step, Handler&& handler);
 
-  const model::WorldModel& world() const { return world_; }
-  const model::BodyLayout& layout() const { return layout_; }
-  const std::vector<device_info_t>& devices() const { return devices_; }
-  CommandInbox& inbox() { return inbox_; }
-  const physics::PhysicsWorld& physics() const { return *physics_; }
+  const model::WorldModel& world() const { return world_.model(); }
+  const model::BodyLayout& layout() const { return world_.layout(); }
+  const std::vector<device_info_t>& devices() const { return world_.devices(); }
+  CommandInbox& inbox() { return world_.inbox(); }
+  const physics::PhysicsWorld& physics() const { return world_.physics(); }
+  robot::Robots& robots() { return world_.robots(); }
 
-  // ---- Changes of the world, while it stands still: its pace holds, all batches are taken, every thread waits. In
-  // simulation_edits.cpp.
+  // ---- Changes of the world, while it stands still: its pace holds, all batches are taken, every thread waits. What is
+  // written then is handed to the threads by the locks of the pace and of the modules' queues.
 
-  // Puts a model in, which is seen from the next state on; `step` is that state's number. Returns its index in
-  // world().models. Throws InputError and EnvironmentError; the world is then as it was.
+  // As World's. Throws EnvironmentError, too, when a module cannot be served here; the world is then as it was.
   int add_model(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model, int64_t step,
                 Channels& channels, Findings& findings);
-  // Takes one out. Its numbers stay free until the same model comes again.
   void remove_model(int instance, Channels& channels);
-  // The state that there is becomes state 0. Returns what the time was.
-  SimTime begin_time_anew(int epoch);
-  robot::Robots& robots() { return *robots_; }
+  SimTime begin_time_anew(int epoch) { return world_.begin_time_anew(epoch); }
 
  private:
   const Batch* advance();
   void simulate();
   void compute(Batch& batch, int64_t first_step, int count);
-  void step(Batch& batch, int64_t step);
   void dispatch(Batch& batch, bool here);
-  SceneMakers scene_makers();
+  void fit_threads();    // to the world's modules, and the batches to them
 
-  int place(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model);
-  void show_beginning(Fleet& fleet, int64_t step) const;
-  void join(Fleet fleet);
-  void join(ModuleSetup setup);
-  void fit_batches();
-  void renew_scenes();
-  void renew_world_state();
-
-  model::WorldModel world_;
-  model::BodyLayout layout_;
-  FleetOptions fleet_options_;
+  World world_;
   bool started_ = false;
   std::function<void(const std::string&)> before_batch_;
   Wakeup& finished_;
-  Fleet fleet_;                                  // its modules move into modules_
-  std::vector<device_info_t> devices_;
-  CommandInbox inbox_;
-  std::unique_ptr<physics::PhysicsWorld> physics_;
-  std::unique_ptr<robot::Robots> robots_;
-  int world_channel_ = -1;                       // of ruedo/world
-  std::vector<std::unique_ptr<Module>> modules_;    // in the order of the schedule
+  std::atomic<bool> left_off_{false};
+  std::vector<std::unique_ptr<ModuleThread>> threads_;    // of the world's modules, in their order
   std::vector<Batch> batches_;
   Wakeup batch_freed_;
   std::atomic<int64_t> step_ns_{INT64_MAX};      // what the last step took of real time
   size_t round_ = 0;                             // of the batches; whoever computes one counts it
   Pace* pace_ = nullptr;
-  std::atomic<bool> left_off_{false};
   std::thread thread_;
 
   // The publisher's.

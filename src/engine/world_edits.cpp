@@ -1,8 +1,8 @@
-// Models that come and go. Nothing here runs beside the simulation's threads: they wait, and what is written here is
-// handed to them by the locks of the pace and of the modules' queues.
+// Models that come and go, and time that begins anew.
 #include <algorithm>
+#include <thread>
 
-#include "engine/simulation.h"
+#include "engine/world.h"
 #include "engine/world_state.h"
 
 namespace ruedo::engine {
@@ -21,27 +21,27 @@ constexpr unsigned kMostDrawers = 8;    // threads that draw
 
 // At the end of all lists, or in the place of a removed instance of the model: whoever lets models come and go for days
 // has lists that do not grow.
-int Simulation::place(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model) {
-  const auto free = std::find_if(world_.models.begin(), world_.models.end(), [&](const model::ModelInstance& instance) {
+int World::place(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model) {
+  const auto free = std::find_if(model_.models.begin(), model_.models.end(), [&](const model::ModelInstance& instance) {
     return instance.removed && instance.model == model;
   });
-  if (free == world_.models.end()) {
-    world_.models.push_back({name, X_WM, std::move(model)});
-    layout_.append(world_);
-    return static_cast<int>(world_.models.size()) - 1;
+  if (free == model_.models.end()) {
+    model_.models.push_back({name, X_WM, std::move(model)});
+    layout_.append(model_);
+    return static_cast<int>(model_.models.size()) - 1;
   }
-  const int instance = static_cast<int>(free - world_.models.begin());
+  const int instance = static_cast<int>(free - model_.models.begin());
   free->name = name;
   free->X_WM = X_WM;
   free->removed = false;
-  layout_.place_again(world_, instance);
+  layout_.place_again(model_, instance);
   return instance;
 }
 
-int Simulation::add_model(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model, int64_t step,
+int World::add_model(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model, int64_t step,
                           Channels& channels, Findings& findings) {
   const model::BodyLayout layout_before = layout_;
-  const std::vector<model::ModelInstance> models_before = world_.models;
+  const std::vector<model::ModelInstance> models_before = model_.models;
   const Channels channels_before = channels;
   if (model->path) robot::check_path(*model->path);
   const int instance = place(name, X_WM, std::move(model));
@@ -49,14 +49,14 @@ int Simulation::add_model(const std::string& name, const Pose& X_WM, std::shared
   Fleet fleet;
   try {
     if (robot >= 0) {
-      FleetOptions options = fleet_options_;
+      FleetOptions options = options_;
       options.only_robot = robot;
       options.first_step = step;
-      fleet = make_fleet(world_, layout_, options, channels, findings);
+      fleet = make_fleet(model_, layout_, options, channels, findings);
     }
   } catch (...) {
     layout_ = layout_before;
-    world_.models = models_before;
+    model_.models = models_before;
     channels = channels_before;
     throw;
   }
@@ -64,23 +64,18 @@ int Simulation::add_model(const std::string& name, const Pose& X_WM, std::shared
   robots_->add(instance);
   if (robot >= 0) inbox_.add(fleet.inputs, static_cast<int>(layout_.robots.size()));
   if (step > 0) show_beginning(fleet, step - 1);
-  try {
-    renew_scenes();
-    join(std::move(fleet));
-  } catch (...) {
-    remove_model(instance, channels);
-    throw;
-  }
+  join(std::move(fleet));
+  statics_ = std::make_shared<StaticScenes>();
   renew_world_state();
   return instance;
 }
 
 // The state that a model came into is its beginning: an odometry counts from there.
-void Simulation::show_beginning(Fleet& fleet, int64_t step) const {
+void World::show_beginning(Fleet& fleet, int64_t step) const {
   Snapshot beginning;
   robots_->read(beginning);
   beginning.step = step;
-  beginning.time = step * world_.step_us;
+  beginning.time = step * model_.step_us;
   Outbox unheard;
   for (ModuleSetup& setup : fleet.modules) {
     for (Device& device : setup.devices) {
@@ -89,8 +84,8 @@ void Simulation::show_beginning(Fleet& fleet, int64_t step) const {
   }
 }
 
-void Simulation::remove_model(int instance, Channels& channels) {
-  model::ModelInstance& removed = world_.models[static_cast<size_t>(instance)];
+void World::remove_model(int instance, Channels& channels) {
+  model::ModelInstance& removed = model_.models[static_cast<size_t>(instance)];
   if (const int robot = robot_of(layout_, instance); robot >= 0) {
     for (auto& module : modules_) module->remove(robot);
     std::erase_if(devices_, [&](const device_info_t& device) { return device.robot == removed.name; });
@@ -101,21 +96,17 @@ void Simulation::remove_model(int instance, Channels& channels) {
   removed.name.clear();
   physics_->remove(instance);
   robots_->remove(instance);
-  renew_scenes();
+  statics_ = std::make_shared<StaticScenes>();
   renew_world_state();
-  fit_batches();
 }
 
-void Simulation::join(Fleet fleet) {
+void World::join(Fleet fleet) {
   for (ModuleSetup& setup : fleet.modules) join(std::move(setup));
   devices_.insert(devices_.end(), std::make_move_iterator(fleet.devices.begin()), std::make_move_iterator(fleet.devices.end()));
-  fit_batches();
 }
 
 // To the last module of its kind, so that devices stay in the order of robots; or as a new one, in its place.
-void Simulation::join(ModuleSetup setup) {
-  setup.before_batch = before_batch_;
-  setup.left_off = &left_off_;
+void World::join(ModuleSetup setup) {
   auto after = std::find_if(modules_.begin(), modules_.end(), [&](const auto& module) { return module->rank() > setup.rank; });
   const auto same = [&](const auto& module) { return module->rank() == setup.rank; };
   const auto known = static_cast<unsigned>(std::count_if(modules_.begin(), modules_.end(), same));
@@ -126,46 +117,20 @@ void Simulation::join(ModuleSetup setup) {
     auto into = std::find_if(modules_.begin(), after, [&](const auto& module) {
       return same(module) && module->robots_after(setup.devices.front().robot);
     });
-    Module& module = into == after ? **(after - 1) : **into;
-    const bool had_visual_rays = module.wants_visual_rays();
-    module.add(std::move(setup));
-    if (module.wants_visual_rays() != had_visual_rays) module.renew_scenes(scene_makers());
+    (into == after ? **(after - 1) : **into).add(std::move(setup));
     return;
   }
-  auto module = std::make_unique<Module>(std::move(setup), 0, finished_);
-  if (started_) module->start(scene_makers());
-  const auto index = after - modules_.begin();
-  modules_.insert(after, std::move(module));
-  cursors_.insert(cursors_.begin() + index, std::vector<size_t>());
-  for (Batch& batch : batches_) batch.outputs.insert(batch.outputs.begin() + index, Batch::Output{});
+  modules_.insert(after, std::make_unique<Module>(std::move(setup)));
 }
 
-void Simulation::fit_batches() {
-  for (size_t m = 0; m < modules_.size(); ++m) {
-    const auto pieces = static_cast<size_t>(modules_[m]->pieces());
-    modules_[m]->set_index(static_cast<int>(m));
-    cursors_[m].assign(pieces, 0);
-    for (Batch& batch : batches_) {
-      batch.outputs[m].pieces.resize(pieces);
-      batch.outputs[m].woken = false;
-    }
-  }
-}
-
-void Simulation::renew_scenes() {
-  if (!started_) return;
-  const SceneMakers makers = scene_makers();
-  for (auto& module : modules_) module->renew_scenes(makers);
-}
-
-void Simulation::renew_world_state() {
+void World::renew_world_state() {
   for (auto& module : modules_) {
-    if (module->name() == "world") module->replace_sensor(world_state_sensor(world_, layout_, fleet_options_.epoch, world_channel_));
+    if (module->name() == "world") module->replace_sensor(world_state_sensor(model_, layout_, options_.epoch, world_channel_));
   }
 }
 
-SimTime Simulation::begin_time_anew(int epoch) {
-  fleet_options_.epoch = epoch;
+SimTime World::begin_time_anew(int epoch) {
+  options_.epoch = epoch;
   const SimTime was = robots_->set_time_to_zero();
   inbox_.begin_time_anew();
   for (auto& module : modules_) module->begin_time_anew(was);

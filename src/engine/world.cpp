@@ -1,0 +1,55 @@
+// The making of a world, and its step.
+#include "engine/world.h"
+
+namespace ruedo::engine {
+
+std::shared_ptr<const scene::StaticRayScene> StaticScenes::get(const model::WorldModel& world, const model::BodyLayout& layout, bool visuals) {
+  const std::lock_guard lock(mutex_);
+  auto& scene = visuals ? visuals_ : collisions_;
+  if (!scene) scene = scene::make_static_ray_scene(world, layout, visuals);
+  return scene;
+}
+
+World::World(std::shared_ptr<const model::WorldModel> world, const FleetOptions& options, Channels& channels, Findings& findings,
+             std::shared_ptr<StaticScenes> statics)
+    : model_(*world),
+      layout_(model_),
+      options_(options),
+      fleet_(make_fleet(model_, layout_, options, channels, findings)),
+      devices_(std::move(fleet_.devices)),
+      inbox_(std::move(fleet_.inputs), static_cast<int>(layout_.robots.size())),
+      physics_(std::make_unique<physics::PhysicsWorld>(model_, layout_)),
+      robots_(std::make_unique<robot::Robots>(model_, layout_, *physics_)),
+      statics_(statics ? std::move(statics) : std::make_shared<StaticScenes>()) {
+  for (const Finding& finding : physics_->findings()) {
+    switch (finding.kind) {
+      case Finding::Kind::unsupported: findings.unsupported(finding.source, finding.element, finding.text); break;
+      case Finding::Kind::repaired: findings.repaired(finding.source, finding.element, finding.text); break;
+      case Finding::Kind::error: findings.error(finding.source, finding.element, finding.text); break;
+    }
+  }
+  for (ModuleSetup& setup : fleet_.modules) modules_.push_back(std::make_unique<Module>(std::move(setup)));
+  for (size_t i = 0; i < channels.list().size(); ++i) {
+    if (channels.list()[i].name == "ruedo/world") world_channel_ = static_cast<int>(i);
+  }
+}
+
+void World::advance(int64_t step, Snapshot& snapshot, Batch& batch) {
+  if (step > 0) {
+    inbox_.apply(*robots_, step - 1, batch);    // on the state before
+    robots_->step();
+  }
+  robots_->read(snapshot);
+  snapshot.step = step;
+  snapshot.time = step * model_.step_us;
+}
+
+SceneMakers World::scene_makers() const {
+  SceneMakers makers;
+  makers.rays = [this] { return scene::make_ray_scene(statics_->get(model_, layout_, false)); };
+  makers.visual_rays = [this] { return scene::make_ray_scene(statics_->get(model_, layout_, true)); };
+  makers.renderer = [this] { return scene::make_renderer(model_, layout_); };
+  return makers;
+}
+
+}  // namespace ruedo::engine
