@@ -1,0 +1,283 @@
+// Each copy is computed by one task, modules and all; arrays are written by the task of the copy that they show.
+#include "engine/engine.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cfenv>
+#include <cmath>
+#include <stdexcept>
+
+#include <tbb/task_arena.h>
+
+#include "engine/outcome.h"
+#include "engine/parallel.h"
+#include "engine/world_state.h"
+#include "ruedo/errors.h"
+#include "ruedo/velocity_command_t.hpp"
+
+namespace ruedo::engine {
+namespace {
+
+constexpr int64_t kBatchSteps = 32;
+const std::atomic<bool> kNeverLeftOff{false};
+
+// Rounding and denormals as in every thread that computes, whatever the caller's program has set; put back at the end.
+class DefaultFloatingPoint {
+ public:
+  DefaultFloatingPoint() {
+    std::fegetenv(&before_);
+    std::fesetenv(FE_DFL_ENV);
+  }
+  ~DefaultFloatingPoint() { std::fesetenv(&before_); }
+
+ private:
+  std::fenv_t before_;
+};
+
+bool same_name(const std::string& a, const std::string& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+}
+
+}  // namespace
+
+struct Engine::Arena {
+  tbb::task_arena tasks;
+};
+
+struct Engine::Copy {
+  Channels channels;
+  std::unique_ptr<World> world;
+  Batch batch;
+  int64_t step = -1;    // of the state that there is
+  bool scenes_made = false;
+  std::vector<std::vector<uint8_t>> newest;    // message of each channel; empty: none yet
+  struct Place { const Outbox* outbox; const Outbox::Entry* entry; };
+  std::vector<Place> places;                   // of the newest messages of a batch
+
+  void keep_newest();
+};
+
+struct Engine::Observer {
+  std::string device, field;
+  FieldReader reader;
+  std::vector<int> channels;      // of the robots, in their order
+  FieldArray array;
+  size_t count = 0;               // values of one robot
+};
+
+Engine::Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions options)
+    : world_(std::move(world)), options_(std::move(options)), arena_(std::make_unique<Arena>()) {
+  if (options_.worlds < 1) throw InputError({}, "an engine has 1 world or more, not " + std::to_string(options_.worlds));
+  arena_->tasks.initialize(options_.threads > 0 ? options_.threads : tbb::task_arena::automatic);
+  const DefaultFloatingPoint floating_point;
+  copies_.resize(static_cast<size_t>(options_.worlds));
+  copies_[0] = make_copy(options_.fleet.seed);    // the first says what is wrong, and builds what all share
+  for_each_copy([this](size_t i) {
+    if (i > 0) copies_[i] = make_copy(options_.fleet.seed + i);
+  });
+  const std::vector<Input>& inputs = copies_[0]->world->inbox().inputs();
+  for (size_t i = 0; i < inputs.size(); ++i) {
+    if (inputs[i].kind != Input::Kind::velocity) continue;
+    const int instance = copies_[0]->world->layout().robots[static_cast<size_t>(inputs[i].robot)].instance;
+    driven_.push_back(world_->models[static_cast<size_t>(instance)].name);
+    velocity_inputs_.push_back(static_cast<int>(i));
+  }
+  for_each_copy([this](size_t i) { compute(i, 1); });
+}
+
+Engine::~Engine() = default;
+
+std::unique_ptr<Engine::Copy> Engine::make_copy(uint64_t seed) {
+  auto copy = std::make_unique<Copy>();
+  FleetOptions fleet = options_.fleet;
+  fleet.seed = seed;
+  Findings findings;
+  copy->world = std::make_unique<World>(world_, fleet, copy->channels, copies_[0] ? findings : findings_, statics_);
+  copy->batch.snapshots.resize(kBatchSteps);
+  for (const auto& module : copy->world->modules()) {
+    copy->batch.outputs.push_back({false, false, std::vector<Outbox>(static_cast<size_t>(module->pieces()))});
+  }
+  return copy;
+}
+
+void Engine::for_each_copy(const std::function<void(size_t)>& body) {
+  if (handler_ || copies_.size() == 1) {
+    for (size_t i = 0; i < copies_.size(); ++i) body(i);
+    return;
+  }
+  arena_->tasks.execute([&] {
+    parallel_pieces(static_cast<int>(copies_.size()), [&](int i) {
+      const DefaultFloatingPoint floating_point;
+      body(static_cast<size_t>(i));
+    });
+  });
+}
+
+void Engine::compute(size_t index, int64_t steps) {
+  Copy& copy = *copies_[index];
+  World& world = *copy.world;
+  Batch& batch = copy.batch;
+  if (!copy.scenes_made) {
+    const SceneMakers makers = world.scene_makers();
+    for (auto& module : world.modules()) module->make_scenes(makers);
+    copy.scenes_made = true;
+  }
+  for (int64_t left = steps; left > 0; left -= batch.count) {
+    batch.first_step = copy.step + 1;
+    batch.count = static_cast<int>(std::min(left, kBatchSteps));
+    batch.applied_count = 0;
+    for (int i = 0; i < batch.count; ++i) world.advance(batch.first_step + i, batch.snapshots[static_cast<size_t>(i)], batch);
+    copy.step += batch.count;
+    for (size_t m = 0; m < world.modules().size(); ++m) {
+      Module& module = *world.modules()[m];
+      batch.outputs[m].woken = module.wants(copy.step);
+      if (!batch.outputs[m].woken) continue;
+      module.pass(copy.step);
+      module.process(batch, batch.outputs[m], kNeverLeftOff);
+    }
+    copy.keep_newest();
+    if (handler_) tell(index);
+  }
+  for (auto& observer : observers_) update(*observer, index);
+}
+
+void Engine::Copy::keep_newest() {
+  newest.resize(channels.list().size());
+  places.assign(newest.size(), {});
+  for (const Batch::Output& output : batch.outputs) {
+    if (!output.woken) continue;
+    for (const Outbox& outbox : output.pieces) {
+      for (const Outbox::Entry& entry : outbox.entries()) places[static_cast<size_t>(entry.channel)] = {&outbox, &entry};
+    }
+  }
+  for (size_t channel = 0; channel < places.size(); ++channel) {
+    if (!places[channel].entry) continue;
+    const uint8_t* bytes = places[channel].outbox->data(*places[channel].entry);
+    newest[channel].assign(bytes, bytes + places[channel].entry->size);
+  }
+}
+
+// In the order in which a server publishes them: step by step, then by the schedule.
+void Engine::tell(size_t index) {
+  const Copy& copy = *copies_[index];
+  for (int64_t step = copy.batch.first_step; step < copy.batch.first_step + copy.batch.count; ++step) {
+    for (const Batch::Output& output : copy.batch.outputs) {
+      if (!output.woken) continue;
+      for (const Outbox& outbox : output.pieces) {
+        for (const Outbox::Entry& entry : outbox.entries()) {
+          if (entry.step == step) handler_(static_cast<int>(index), step, copy.channels[entry.channel], {outbox.data(entry), entry.size});
+        }
+      }
+    }
+  }
+}
+
+void Engine::update(Observer& observer, size_t world) {
+  const size_t row_size = observer.count * observer.reader.value_size();
+  for (size_t robot = 0; robot < observer.channels.size(); ++robot) {
+    const std::vector<uint8_t>& message = copies_[world]->newest[static_cast<size_t>(observer.channels[robot])];
+    std::byte* row = observer.array.values.data() + (world * observer.channels.size() + robot) * row_size;
+    if (message.empty() || observer.reader.read(message, row, observer.count)) continue;
+    throw std::runtime_error("the number of values in " + observer.device + "." + observer.field +
+                             " changes from message to message: an array cannot hold them");
+  }
+}
+
+void Engine::step(int64_t steps) {
+  if (steps < 1) throw InputError({}, "step() takes 1 step or more, not " + std::to_string(steps));
+  const DefaultFloatingPoint floating_point;
+  for_each_copy([&](size_t i) { compute(i, steps); });
+}
+
+void Engine::drive(std::span<const double> velocities) {
+  const size_t rows = copies_.size() * velocity_inputs_.size();
+  if (velocities.size() != 3 * rows) throw InputError({}, "velocities are " + std::to_string(rows) + " rows of 3, one for each driven robot of each world");
+  uint8_t bytes[64];
+  for (size_t row = 0; row < rows; ++row) {
+    const double* v = velocities.data() + 3 * row;
+    if (std::isnan(v[0]) || std::isnan(v[1]) || std::isnan(v[2])) continue;
+    velocity_command_t command;
+    command.utime = 0;
+    command.vx = v[0];
+    command.vy = v[1];
+    command.omega = v[2];
+    const int size = command.encode(bytes, 0, sizeof bytes);
+    Copy& copy = *copies_[row / velocity_inputs_.size()];
+    copy.world->inbox().schedule(copy.step, velocity_inputs_[row % velocity_inputs_.size()], bytes, static_cast<size_t>(size));
+  }
+}
+
+void Engine::command(int world, const std::string& channel, std::span<const uint8_t> message) {
+  Copy& copy = *copies_.at(static_cast<size_t>(world));
+  CommandInbox& inbox = copy.world->inbox();
+  const auto input = std::find_if(inbox.inputs().begin(), inbox.inputs().end(), [&](const Input& one) { return one.channel == channel; });
+  if (channel.empty() || input == inbox.inputs().end()) throw InputError({}, "no robot takes commands on '" + channel + "'");
+  switch (inbox.schedule(copy.step, static_cast<int>(input - inbox.inputs().begin()), message.data(), message.size())) {
+    case CommandInbox::Scheduled::kept: return;
+    case CommandInbox::Scheduled::full: throw InputError({}, "more commands wait than a world keeps: step it first");
+    case CommandInbox::Scheduled::late:
+    case CommandInbox::Scheduled::faulty: throw InputError({}, "that is no message for " + channel);
+  }
+}
+
+void Engine::reset(int world, uint64_t seed) {
+  const DefaultFloatingPoint floating_point;
+  const auto index = static_cast<size_t>(world);
+  copies_.at(index) = make_copy(seed);
+  compute(index, 1);
+}
+
+std::vector<int> Engine::channels_of(const std::string& device) const {
+  std::vector<int> channels;
+  const std::vector<device_info_t>& devices = copies_[0]->world->devices();
+  for (const bool by_kind : {false, true}) {
+    std::string last_robot;
+    for (const device_info_t& one : devices) {
+      if (!same_name(by_kind ? one.kind : one.name, device)) continue;
+      if (one.robot == last_robot) throw InputError({}, "robot " + one.robot + " has several devices of kind '" + device + "': give one's name");
+      last_robot = one.robot;
+      const std::vector<Channel>& list = copies_[0]->channels.list();
+      const auto found = std::find_if(list.begin(), list.end(), [&](const Channel& channel) { return channel.name == one.robot + "/" + one.name; });
+      if (found != list.end()) channels.push_back(static_cast<int>(found - list.begin()));
+    }
+    if (!channels.empty()) return channels;
+  }
+  std::string names;
+  for (const device_info_t& one : devices) names += (names.empty() ? "" : ", ") + one.robot + "/" + one.name;
+  throw InputError({}, "no robot has a device '" + device + "'; there are " + names);
+}
+
+const FieldArray& Engine::observe(const std::string& device, const std::string& field) {
+  for (const auto& known : observers_) {
+    if (known->device == device && known->field == field) return known->array;
+  }
+  const std::vector<int> channels = channels_of(device);
+  const Schema* schema = find_schema(copies_[0]->channels[channels[0]].fingerprint);
+  if (!schema) throw InputError({}, "the messages of '" + device + "' are of a type without a description");
+  auto observer = std::make_unique<Observer>(Observer{device, field, FieldReader(*schema, field), channels, {}, 0});
+  const std::vector<uint8_t>& sample = copies_[0]->newest[static_cast<size_t>(channels[0])];
+  if (sample.empty()) throw InputError({}, device + "." + field + " has no sample yet: step the engine first");
+  FieldArray& array = observer->array;
+  array.type = observer->reader.type();
+  array.shape = {static_cast<int64_t>(copies_.size()), static_cast<int64_t>(channels.size())};
+  observer->count = 1;
+  for (const int64_t size : observer->reader.shape(sample)) {
+    array.shape.push_back(size);
+    observer->count *= static_cast<size_t>(size);
+  }
+  array.values.resize(copies_.size() * channels.size() * observer->count * observer->reader.value_size());
+  observers_.push_back(std::move(observer));
+  for (size_t i = 0; i < copies_.size(); ++i) update(*observers_.back(), i);
+  return array;
+}
+
+int64_t Engine::current_step(int world) const { return copies_.at(static_cast<size_t>(world))->step; }
+const std::vector<device_info_t>& Engine::devices() const { return copies_[0]->world->devices(); }
+const std::vector<Channel>& Engine::channels() const { return copies_[0]->channels.list(); }
+
+uint64_t Engine::state_hash(int world) const {
+  const Copy& copy = *copies_.at(static_cast<size_t>(world));
+  return static_cast<uint64_t>(engine::state_hash(copy.batch.snapshots[static_cast<size_t>(copy.batch.count - 1)]));
+}
+
+}  // namespace ruedo::engine

@@ -1,0 +1,101 @@
+// Many copies of one world in the caller's process, stepped together over all cores.
+//
+// The same code as a server's run, and the same bytes: copy i with the seed s + i, given the same commands at the same
+// steps, makes the messages of `ruedo run --lockstep --seed s+i`. What never moves is shared between the copies.
+// Not thread safe: one thread at a time.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/field_reader.h"
+#include "engine/world.h"
+
+namespace ruedo::engine {
+
+struct EngineOptions {
+  int worlds = 1;
+  FleetOptions fleet;    // its seed is that of copy 0
+  int threads = 0;       // 0: one a core
+};
+
+// A field of one device on all robots that have it, in all copies. It follows the runs: after each step it holds what the
+// newest message of each said.
+struct FieldArray {
+  Primitive type = Primitive::none;
+  std::vector<int64_t> shape;        // copies, robots, then the field's own
+  std::vector<std::byte> values;     // row by row, in the host's byte order
+};
+
+class Engine {
+ public:
+  // A message of a copy: step, channel, bytes.
+  using MessageHandler = std::function<void(int world, int64_t step, const Channel& channel, std::span<const uint8_t> bytes)>;
+
+  // Computes state 0 of each copy. Throws InputError and EnvironmentError.
+  Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions options);
+  ~Engine();
+
+  int worlds() const { return static_cast<int>(copies_.size()); }
+  int64_t step_us() const { return world_->step_us; }
+  int64_t current_step(int world) const;
+  const model::WorldModel& model() const { return *world_; }
+  const std::vector<device_info_t>& devices() const;
+  const std::vector<Channel>& channels() const;
+  // Robots with a drive, in the order of the world file: the second axis of drive().
+  const std::vector<std::string>& driven() const { return driven_; }
+  const Findings& findings() const { return findings_; }
+
+  // Computes that many states of every copy, 1 or more. Throws std::runtime_error when a module failed.
+  void step(int64_t steps);
+
+  // A velocity for every driven robot of every copy, on the states that there are: copies x driven robots x (m/s ahead, m/s
+  // left, rad/s), row by row. A row with a NaN gives no command: what was commanded before holds.
+  void drive(std::span<const double> velocities);
+
+  // A message as it would come over the bus, on the state that there is. Throws InputError for a channel that takes no
+  // commands, or bytes that are no such message.
+  void command(int world, const std::string& channel, std::span<const uint8_t> message);
+
+  // Makes a copy as it was at the beginning, with that seed: what follows equals a fresh run.
+  void reset(int world, uint64_t seed);
+
+  // The array of a field, kept up to date from now on; valid as long as the engine. device: the name of one ("LRF"), or of its kind
+  // ("lrf") where each robot has at most one of them. Throws InputError.
+  const FieldArray& observe(const std::string& device, const std::string& field);
+
+  uint64_t state_hash(int world) const;
+
+  // Called in step() and reset() with each message, copies and messages in order; nothing is computed in parallel then.
+  void on_message(MessageHandler handler) { handler_ = std::move(handler); }
+
+ private:
+  struct Copy;
+  struct Observer;
+
+  std::unique_ptr<Copy> make_copy(uint64_t seed);
+  void compute(size_t world, int64_t steps);
+  void tell(size_t world);
+  void update(Observer& observer, size_t world);
+  void for_each_copy(const std::function<void(size_t)>& body);
+  std::vector<int> channels_of(const std::string& device) const;
+
+  std::shared_ptr<const model::WorldModel> world_;
+  EngineOptions options_;
+  std::shared_ptr<StaticScenes> statics_ = std::make_shared<StaticScenes>();
+  Findings findings_;
+  std::vector<std::unique_ptr<Copy>> copies_;
+  std::vector<std::string> driven_;
+  std::vector<int> velocity_inputs_;                     // of the driven robots
+  std::vector<std::unique_ptr<Observer>> observers_;
+  MessageHandler handler_;
+  struct Arena;
+  std::unique_ptr<Arena> arena_;
+};
+
+}  // namespace ruedo::engine

@@ -1,0 +1,195 @@
+// The engine in the process against a server in lockstep: the same messages, byte for byte.
+#include "engine/engine.h"
+
+#include <cmath>
+#include <cstring>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "lockstep_client.h"
+#include "ruedo/velocity_command_t.hpp"
+
+namespace ruedo::run {
+namespace {
+
+using engine::Engine;
+
+struct Command {
+  int64_t step;
+  std::string channel;
+  double vx, omega;
+
+  std::vector<uint8_t> bytes() const {
+    velocity_command_t command;
+    command.utime = 0;
+    command.vx = vx;
+    command.vy = 0.0;
+    command.omega = omega;
+    return engine::encoded(command);
+  }
+};
+
+// One message as both sides tell it.
+using Told = std::vector<std::pair<std::string, std::vector<uint8_t>>>;
+
+const char* const kScan = R"(<sensor name='scan' type='ray'><update_rate>40</update_rate><ray><scan><horizontal><samples>31</samples>
+  <min_angle>-1.5</min_angle><max_angle>1.5</max_angle></horizontal></scan><range><min>0.1</min><max>8</max></range>
+  <noise><type>gaussian</type><stddev>0.01</stddev></noise></ray></sensor>
+  <sensor name='imu' type='imu'><update_rate>100</update_rate></sensor>)";
+
+// Robots that meet boxes, which move, and walls, which do not.
+std::string random_models(std::mt19937& random, int robots) {
+  const auto between = [&](double low, double high) { return low + (high - low) * static_cast<double>(random()) / 4294967296.0; };
+  std::string models;
+  for (int i = 0; i < robots; ++i) models += robot_sdf("r" + std::to_string(i), 0.0, 1.5 * i, kScan);
+  for (int i = 0; i < 6; ++i) {
+    const std::string place = std::to_string(0.7 + 0.5 * i) + " " + std::to_string(between(-0.5, 1.5 * robots)) + " 0.1 0 0 " + std::to_string(between(-3, 3));
+    models += "<model name='box" + std::to_string(i) + "'>" + (i % 2 ? "<static>true</static>" : "") + "<pose>" + place +
+              "</pose><link name='link'><inertial><mass>0.4</mass></inertial><collision name='c'><geometry><box><size>0.2 0.3 0.2</size></box>"
+              "</geometry></collision></link></model>";
+  }
+  return models;
+}
+
+std::vector<Command> random_commands(std::mt19937& random, int robots, int64_t steps) {
+  std::vector<Command> commands;
+  for (int64_t step = 0; step < steps; step += 1 + static_cast<int64_t>(random() % 25)) {
+    commands.push_back({step, "r" + std::to_string(random() % static_cast<unsigned>(robots)) + "/velocity",
+                        0.01 * static_cast<double>(random() % 100) - 0.2, 0.01 * static_cast<double>(random() % 200) - 1.0});
+  }
+  return commands;
+}
+
+std::map<int64_t, Told> by_server(const std::shared_ptr<const model::WorldModel>& world, uint64_t seed, const std::vector<Command>& commands, int64_t steps) {
+  LossyBus bus({}, 1);
+  ServerOptions options = fast(1e6, seed);
+  options.lockstep.clients = 1;
+  options.lockstep.lease_s = 60.0;
+  Server server(world, options, bus);
+  std::thread running([&] { server.run(); });
+  LockstepClient client(bus, server.channels(), "test");
+  client.take_part();
+  for (const Command& command : commands) client.command(command.step, command.channel, command.bytes());
+  client.step(steps);
+  server.stop();
+  running.join();
+  std::map<int64_t, Told> told;
+  for (const auto& [step, seen] : client.seen()) {
+    if (!seen.messages.empty()) told[step] = seen.messages;
+  }
+  return told;
+}
+
+// Each copy of the world, with the same commands.
+std::vector<std::map<int64_t, Told>> by_engine(Engine& engine, const std::vector<Command>& commands, int64_t steps) {
+  std::vector<std::map<int64_t, Told>> told(static_cast<size_t>(engine.worlds()));
+  engine.on_message([&](int world, int64_t step, const engine::Channel& channel, std::span<const uint8_t> bytes) {
+    told[static_cast<size_t>(world)][step].emplace_back(channel.bus_name, std::vector<uint8_t>(bytes.begin(), bytes.end()));
+  });
+  size_t next = 0;
+  for (int64_t step = 0; step < steps;) {
+    for (; next < commands.size() && commands[next].step == step; ++next) {
+      for (int world = 0; world < engine.worlds(); ++world) engine.command(world, commands[next].channel, commands[next].bytes());
+    }
+    const int64_t until = next < commands.size() ? commands[next].step : steps;
+    engine.step(until - step);
+    step = until;
+  }
+  engine.on_message({});
+  return told;
+}
+
+class EngineEqualsServer : public testing::TestWithParam<unsigned> {};
+
+TEST_P(EngineEqualsServer, ByteForByte) {
+  std::mt19937 random(GetParam());
+  const int robots = 1 + static_cast<int>(random() % 3);
+  constexpr int64_t kSteps = 400;
+  const auto world = load_text(random_models(random, robots));
+  const std::vector<Command> commands = random_commands(random, robots, kSteps);
+  engine::EngineOptions options;
+  options.worlds = 3;
+  options.fleet.seed = 7;
+  Engine engine(world, options);
+  const auto told = by_engine(engine, commands, kSteps);
+  for (const int copy : {0, 2}) {
+    auto expected = by_server(world, 7 + static_cast<uint64_t>(copy), commands, kSteps);
+    expected.erase(0);    // which the engine computed before anybody listened
+    ASSERT_EQ(told[static_cast<size_t>(copy)].size(), expected.size());
+    EXPECT_TRUE(told[static_cast<size_t>(copy)] == expected) << "copy " << copy;
+  }
+  EXPECT_FALSE(told[0] == told[2]) << "other seeds have other noise";
+}
+
+INSTANTIATE_TEST_SUITE_P(Worlds, EngineEqualsServer, testing::Range(1u, 9u));
+
+TEST(Engine, ACopyThatIsResetIsAFreshOne) {
+  std::mt19937 random(3);
+  const auto world = load_text(random_models(random, 2));
+  const std::vector<Command> before = random_commands(random, 2, 300), after = random_commands(random, 2, 200);
+  engine::EngineOptions options;
+  options.worlds = 2;
+  Engine used(world, options), fresh(world, options);
+  by_engine(used, before, 300);
+  for (int copy = 0; copy < 2; ++copy) {
+    used.reset(copy, 1 + static_cast<uint64_t>(copy));
+    EXPECT_EQ(used.current_step(copy), 0);
+    EXPECT_EQ(used.state_hash(copy), fresh.state_hash(copy));
+  }
+  EXPECT_TRUE(by_engine(used, after, 200) == by_engine(fresh, after, 200));
+}
+
+double value_of(const engine::FieldArray& array, size_t index) {
+  double value;
+  std::memcpy(&value, array.values.data() + index * sizeof value, sizeof value);
+  return value;
+}
+
+// 0.3 m/s from the first step on, without limits: 0.3 m after one second. The first axis is the copy, the second the robot.
+TEST(Engine, ArraysFollowTheRuns) {
+  engine::EngineOptions options;
+  options.worlds = 2;
+  Engine engine(load_text(robot_sdf("a", 0, 0) + robot_sdf("b", 0, 2)), options);
+  const engine::FieldArray& position = engine.observe("pose", "pos");
+  EXPECT_EQ(position.type, Primitive::float64);
+  EXPECT_EQ(position.shape, (std::vector<int64_t>{2, 2, 3}));
+  const double none = std::nan("");
+  const double velocities[] = {0.3, 0, 0, none, none, none,    // copy 0: a drives, b is told nothing
+                               0, 0, 0, -0.2, 0, 0};
+  engine.drive(velocities);
+  engine.step(200);
+  EXPECT_NEAR(value_of(position, 0), 0.3, 1e-12);
+  EXPECT_NEAR(value_of(position, 3), 0.0, 1e-12);
+  EXPECT_NEAR(value_of(position, 4), 2.0, 1e-12);
+  EXPECT_NEAR(value_of(position, 6), 0.0, 1e-12);
+  EXPECT_NEAR(value_of(position, 9), -0.2, 1e-12);
+  engine.reset(0, 1);
+  EXPECT_EQ(value_of(position, 0), 0.0);
+}
+
+TEST(Engine, SaysWhatCannotBe) {
+  engine::EngineOptions options;
+  Engine engine(load_text(robot_sdf("a", 0, 0)), options);
+  const auto message = [](const auto& call) {
+    try {
+      call();
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("nothing");
+  };
+  EXPECT_THAT(message([&] { engine.step(0); }), testing::HasSubstr("1 step or more, not 0"));
+  EXPECT_THAT(message([&] { engine.observe("lrf", "ranges"); }), testing::HasSubstr("no robot has a device 'lrf'; there are a/motion, a/odometry, a/pose"));
+  EXPECT_THAT(message([&] { engine.observe("pose", "position"); }), testing::HasSubstr("'position' is no field of numbers in pose_t; there are utime, pos,"));
+  EXPECT_THAT(message([&] { engine.command(0, "a/pose", {}); }), testing::HasSubstr("no robot takes commands on 'a/pose'"));
+  EXPECT_THAT(message([&] { engine.command(0, "a/velocity", {}); }), testing::HasSubstr("no message for a/velocity"));
+  const double two[] = {0, 0};
+  EXPECT_THAT(message([&] { engine.drive(two); }), testing::HasSubstr("1 rows of 3"));
+  options.worlds = 0;
+  EXPECT_THAT(message([&] { Engine(load_text(""), options); }), testing::HasSubstr("1 world or more, not 0"));
+}
+
+}  // namespace
+}  // namespace ruedo::run
