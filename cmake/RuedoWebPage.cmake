@@ -4,6 +4,8 @@ set(web ${CMAKE_SOURCE_DIR}/clients/web)
 set(page ${CMAKE_BINARY_DIR}/web)
 file(MAKE_DIRECTORY ${page}/generated)
 file(CREATE_LINK ${web}/src ${page}/src SYMBOLIC)
+file(CREATE_LINK ${web}/tests ${page}/tests SYMBOLIC)
+file(CREATE_LINK ${web}/vitest.config.mjs ${page}/vitest.config.mjs SYMBOLIC)
 
 add_custom_command(OUTPUT ${page}/packages.stamp
   COMMAND ${CMAKE_COMMAND} -E copy ${web}/package.json ${web}/package-lock.json ${web}/.npmrc ${web}/tsconfig.json ${page}

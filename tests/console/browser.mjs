@@ -42,7 +42,7 @@ await page.addInitScript(() => {
 const shown = () => page.evaluate(() => {
   const text = (selector) => document.querySelector(selector)?.textContent ?? "";
   const facts = [...document.querySelectorAll("[data-fact]")].map((fact) => `${fact.dataset.fact} ${fact.textContent}`);
-  const { playback } = window.ruedo?.timeline ?? {};
+  const { playback } = window.ruedo?.page.now ?? {};
   return [`state ${text("#state")}`, `clock ${text("#clock")}`, `${window.ruedo?.stage.frames} frames drawn`, ...facts, text("#notice"),
     ...window.notes.slice(-3), playback ? `playback ${JSON.stringify(playback)}` : ""].filter(Boolean).join("; ");
 }).catch((error) => `no page: ${error.message.split("\n")[0]}`);
@@ -72,7 +72,7 @@ const tools = {
     window.camera = is;
     return is === was;
   }),
-  ready: () => tools.until("(the world is drawn)", () => window.ruedo?.world?.robots.length > 0 && window.ruedo.stage.description && window.ruedo.stage.frames > 1),
+  ready: () => tools.until("(the world is drawn)", () => window.ruedo?.page.now.world?.robots.length > 0 && window.ruedo.stage.description && window.ruedo.stage.frames > 1),
 };
 try {
   await page.goto(url, { waitUntil: "load" });

@@ -22,16 +22,17 @@ export default async function controls(tools) {
   });
   const moved = (what, name, sign) => until(what, ([n, s]) => Math.max(...window.speeds[n].map((v) => s * v)) > 0.05, [name, sign]);
   const stands = (what) => until(what, () => window.stands);
-  await page.evaluate(() => window.ruedo.choose(window.ruedo.world.robots.findIndex((r) => r.name === "p3dx")));
+  await page.evaluate(() => window.ruedo.choose(window.ruedo.page.now.world.robots.findIndex((r) => r.name === "p3dx")));
   await page.locator("#canvas").focus();
 
   // From the start, whatever the last drive came to while a busy machine looked away.
   const again = async () => {
     await stands("(it stands)");
-    const epoch = await page.evaluate(() => window.ruedo.epoch);
+    const epoch = await page.evaluate(() => window.ruedo.clock.epoch);
     await page.locator("#canvas").focus();
     await page.keyboard.press("r");
-    await until("(a reset)", (e) => window.ruedo.epoch > e && window.stands, epoch);
+    await page.keyboard.press("Enter");    // it asks
+    await until("(a reset)", (e) => window.ruedo.clock.epoch > e && window.stands, epoch);
     await page.evaluate(() => window.mark());
   };
 
@@ -71,17 +72,17 @@ export default async function controls(tools) {
   check("it went as far as was asked", Math.abs(went - 0.4) < 0.02, `${went} m`);
 
   // ---- layers
-  const chosen = await page.evaluate(() => [...window.ruedo.layers]);
+  const chosen = await page.evaluate(() => [...window.ruedo.page.now.layers]);
   check("frames are off at first, all else is on", chosen.length === 6 && !chosen.includes("frames"), chosen);
   await until("both trails lead to where the robot is", ([x, y]) => {
-    const { truth, odometry } = window.ruedo.overlays.get("p3dx");
+    const { truth, odometry } = window.ruedo.overlays.of.get("p3dx");
     return [truth, odometry].every(({ strip: { object: { geometry } } }) => {
       const n = geometry.drawRange.count, p = geometry.getAttribute("position")?.array;
       return n >= 2 && Math.hypot(p[3 * n - 3] - x, p[3 * n - 2] - y) < 0.05 && Math.hypot(p[3 * n - 3] - p[0], p[3 * n - 2] - p[1]) > 0.2;
     });
   }, after);
   await until("contact points are where the pad touches the ground", () => {
-    const { geometry } = window.ruedo.overlays.get("pad").contacts.object, p = geometry.getAttribute("position")?.array ?? [], n = geometry.drawRange.count;
+    const { geometry } = window.ruedo.overlays.of.get("pad").contacts.object, p = geometry.getAttribute("position")?.array ?? [], n = geometry.drawRange.count;
     return n >= 3 && Array.from({ length: n }, (_, i) => Math.abs(p[3 * i] - 1.5) < 0.26 && Math.abs(p[3 * i + 1] - 1) < 0.26 && Math.abs(p[3 * i + 2]) < 0.02).every(Boolean);
   });
   await page.locator("#pause").click();
@@ -101,7 +102,7 @@ export default async function controls(tools) {
   });
   await until("(nothing is left to draw)", () => { const { stage } = window.ruedo, was = window.drawn; window.drawn = stage.frames; return was === stage.frames; });
   for (const [layer, objects] of Object.entries(kLayers)) {
-    const visible = () => page.evaluate(`(() => { const of = ${objects}; return [...window.ruedo.overlays.values()].flatMap(of).map((o) => o.visible); })()`);
+    const visible = () => page.evaluate(`(() => { const of = ${objects}; return [...window.ruedo.overlays.of.values()].flatMap(of).map((o) => o.visible); })()`);
     const click = async () => {
       const frames = await page.evaluate(() => window.ruedo.stage.frames);
       await page.locator(`[data-layer="${layer}"]`).click();
@@ -139,13 +140,13 @@ export default async function controls(tools) {
     return [gx, gy];
   };
   const clicked = await put("a box", [-1.5, 1]);
-  await until("a box was placed", () => window.ruedo.world.bodies.some((b) => b.name === "box/link") && window.ruedo.stage.description.models.some((m) => m.name === "box"));
+  await until("a box was placed", () => window.ruedo.page.now.world.bodies.some((b) => b.name === "box/link") && window.ruedo.stage.description.models.some((m) => m.name === "box"));
   await until("the box stands where the click was", ([x, y]) => {
-    const { world, poses } = window.ruedo, index = world.bodies.find((b) => b.name === "box/link").index;
+    const { page: { now: { world } }, poses } = window.ruedo, index = world.bodies.find((b) => b.name === "box/link").index;
     return Math.hypot(poses.now[7 * index] - x, poses.now[7 * index + 1] - y) < 0.01 && Math.abs(poses.now[7 * index + 2] - 0.2) < 0.01;
   }, clicked);
   await put("Pioneer 3-DX", [-1.5, -1]);
-  await until("a robot was placed", () => window.ruedo.world.robots.some((r) => r.name === "p3dx_2"));
+  await until("a robot was placed", () => window.ruedo.page.now.world.robots.some((r) => r.name === "p3dx_2"));
   await put("a box", [-1.5, -1]);
   await until("where there is no room, it says so", () => window.notes.some((note) => /there is no room for/.test(note)));
   await picture("placed");
@@ -167,11 +168,12 @@ export default async function controls(tools) {
   await rated("(a rate of one)", "1", 1);
 
   // ---- reset
-  const epoch = await page.evaluate(() => window.ruedo.epoch);
+  const epoch = await page.evaluate(() => window.ruedo.clock.epoch);
   await page.locator("#canvas").focus();
   await page.keyboard.press("r");
-  await until("a reset sets the clock back", (e) => window.ruedo.epoch > e, epoch);
-  await until("a reset takes away what was placed", () => !window.ruedo.world.bodies.some((b) => b.name === "box/link") && window.ruedo.stage.description.models.every((m) => m.name !== "box") && window.ruedo.world.robots.length === 2);
+  await page.keyboard.press("Enter");    // it asks
+  await until("a reset sets the clock back", (e) => window.ruedo.clock.epoch > e, epoch);
+  await until("a reset takes away what was placed", () => !window.ruedo.page.now.world.bodies.some((b) => b.name === "box/link") && window.ruedo.stage.description.models.every((m) => m.name !== "box") && window.ruedo.page.now.world.robots.length === 2);
   await page.getByRole("tab", { name: "Robot" }).click();
   await until("a reset puts the robot back", () => { const [a, b] = document.querySelector('[data-fact="pose"]')?.textContent.split(/[^-.0-9]+/).map(Number) ?? [9, 9]; return Math.hypot(a, b) < 0.01; });
   seen("all was steered");

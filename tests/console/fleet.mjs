@@ -1,10 +1,10 @@
 // A thousand robots: frames a second, and what a frame costs this page's own thread: states taken, matrices made, draw calls
 // given. The rest of a frame is the rasteriser's. Given: {"robots": how many there must be, "seconds": of each measurement}.
 export default async function fleet({ page, given, until, check, still, picture }) {
-  await until("robots are listed", (n) => window.ruedo?.world?.robots.length >= n, given.robots);
+  await until("robots are listed", (n) => window.ruedo?.page.now.world?.robots.length >= n, given.robots);
   await until("the world is drawn", () => window.ruedo.stage.description && window.ruedo.stage.frames > 2);
   // The log's beginning again and again: it always moves on.
-  await page.evaluate(() => setInterval(() => { window.ruedo.link.seek(0); if (window.ruedo.paused) window.ruedo.link.play(true, 1); }, 3000));
+  await page.evaluate(() => setInterval(() => { window.ruedo.link.seek(0); if (window.ruedo.page.now.paused) window.ruedo.link.play(true, 1); }, 3000));
   await page.evaluate(() => {
     const { stage, poses } = window.ruedo, frame = stage.frame.bind(stage), add = poses.add.bind(poses);
     let adding = 0;

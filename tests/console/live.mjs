@@ -3,7 +3,7 @@ export default async function live({ page, seen, until, fact, clock, picture, ch
   await page.setViewportSize({ width: 1366, height: 820 });
   await ready();
   seen("robots are listed");
-  await until("rays have appeared", () => [...window.ruedo.overlays.values()].some((o) => [...o.scans.values()].some((s) => s.lines.object.geometry.drawRange.count > 100)));
+  await until("rays have appeared", () => [...window.ruedo.overlays.of.values()].some((o) => [...o.scans.values()].some((s) => s.lines.object.geometry.drawRange.count > 100)));
   await page.locator("canvas#canvas").focus();
   const before = parseFloat(await fact("pose"));
   await page.keyboard.down("KeyW");
@@ -24,12 +24,12 @@ export default async function live({ page, seen, until, fact, clock, picture, ch
   await page.locator("#pause").click();
   await until("it says that it is paused", () => document.getElementById("state").textContent === "paused");
   const held = await server();
-  await until("(the page shows the last state)", (t) => Math.abs(window.ruedo.time_s - t) < 1e-6, held.utime * 1e-6);
+  await until("(the page shows the last state)", (t) => Math.abs(window.ruedo.page.now.time_s - t) < 1e-6, held.utime * 1e-6);
   await page.waitForTimeout(1500);
   const later = await server();
   check("pause holds the clock", held.paused && later.paused && later.utime === held.utime && Math.abs(await clock() - held.utime * 1e-6) < 0.006, JSON.stringify([held, later, await clock()]));
   await page.keyboard.press(".");
-  await until("a step moves the clock", (t) => window.ruedo.time_s > t, held.utime * 1e-6);
+  await until("a step moves the clock", (t) => window.ruedo.page.now.time_s > t, held.utime * 1e-6);
   check("(by one step)", (await server()).step === held.step + 1, JSON.stringify([held, await server()]));
   await page.locator("#pause").click();
   await until("it goes on", () => document.getElementById("state").textContent === "running");

@@ -7,7 +7,8 @@ function contrast(a, b) {    // of WCAG
   return (high + 0.05) / (low + 0.05);
 }
 
-export default async function looks({ page, url, seen, told, until, check, ready, picture, expect }) {
+export default async function looks(tools) {
+  const { page, url, seen, told, until, check, ready, picture, expect } = tools;
   // ---- from the address to the first drawn frame, best of three. It is said and not judged: this machine draws by software, and
   // does other things, too. Judged is what makes a page slow anywhere.
   await page.setViewportSize({ width: 640, height: 400 });
@@ -76,7 +77,22 @@ export default async function looks({ page, url, seen, told, until, check, ready
   check("and it is remembered", await page.evaluate(() => document.documentElement.dataset.theme) === "light");
   await page.keyboard.press("?");
   check("the keys are shown", /arrow keys/.test(await page.locator("#help").innerText()));
-  await page.getByRole("button", { name: "Close" }).click();
+  // ---- dialogs: keys are theirs alone
+  const open = () => page.evaluate(() => document.querySelectorAll("dialog[open]").length);
+  const { step } = await tools.server();
+  await page.keyboard.down("KeyW");
+  for (const key of [".", "r", "2", "n", " "]) await page.keyboard.press(key);
+  await page.keyboard.up("KeyW");
+  check("no key acts behind a dialog", await page.evaluate(() => document.getElementById("readout").textContent === "" && window.ruedo.page.now.mode === "orbit" && !window.ruedo.page.now.paused) && await open() <= 1);
+  if (await open() === 0) await page.keyboard.press("?");    // space was on its button
+  await page.keyboard.press("Escape");
+  check("Esc closes the keys", await open() === 0);
+  await page.locator("#canvas").focus();
+  await page.keyboard.press("r");
+  check("a reset is asked about", /Reset the world/i.test(await page.locator("dialog[open]").innerText()));
+  await picture("reset");
+  await page.keyboard.press("Escape");
+  check("Esc says no", await open() === 0 && (await tools.server()).step > step);
 
   // ---- the server ends, and comes back
   expect(/WebSocket|ERR_CONNECTION|Failed to load|socket/);

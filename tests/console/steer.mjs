@@ -9,7 +9,7 @@ export default async function steer({ page, seen, until, ready, server, check })
   seen("space pauses");
   const held = await server();
   await page.keyboard.press(".");
-  await until("(a step)", (t) => window.ruedo.time_s > t, held.utime * 1e-6);
+  await until("(a step)", (t) => window.ruedo.page.now.time_s > t, held.utime * 1e-6);
   check("a step is taken", (await server()).step === held.step + 1);
   await page.keyboard.press(" ");
   await state("running");
@@ -25,8 +25,9 @@ export default async function steer({ page, seen, until, ready, server, check })
   check("a rate is taken", is.rate === 0.25, is.rate);
   await page.keyboard.press("b");
   await page.locator("#canvas").click({ position: { x: 330, y: 200 } });
-  await until("a box is placed", () => window.ruedo.world.bodies.some((b) => b.name === "box/link"));
+  await until("a box is placed", () => window.ruedo.page.now.world.bodies.some((b) => b.name === "box/link"));
   await page.locator("#canvas").focus();
   await page.keyboard.press("r");
-  await until("reset takes it away", () => !window.ruedo.world.bodies.some((b) => b.name === "box/link"));
+  await page.keyboard.press("Enter");    // it asks
+  await until("reset takes it away", () => !window.ruedo.page.now.world.bodies.some((b) => b.name === "box/link"));
 }

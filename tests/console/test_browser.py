@@ -47,6 +47,14 @@ def test_every_transport_can_be_steered(tmp_path, transport):
     assert seen == ["space pauses", "a step is taken", "space goes on", "W drives", "a rate is taken", "a box is placed", "reset takes it away"]
 
 
+def test_the_order_of_loading_is_one(tmp_path):
+    """Greeting, messages, names of channels, and each file of the scene held back in turn: nothing that is shown depends on it."""
+    with running(world=SOURCE / "tests/console/aside.sdf") as process:
+        seen = browse(process.url, tmp_path, "order")
+    parts = ("greeting", "messages", "names", "/scene.json", "/scene/meshes", "/scene/links")
+    assert {f"the odometry is right with {part} last" for part in parts} == set(seen) - {"the order is the same"} and len(seen) == len(parts) + 1
+
+
 def test_the_page_loads_fast_fits_and_says_what_is_wrong(tmp_path):
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

@@ -2,10 +2,8 @@
 // contacts and frames. Of the chosen robot, or of all while they are few.
 import * as THREE from "three";
 import type { contact_t, device_info_t, odometry_t, planar_lidar_t, pose_t, sonar_t } from "../../generated/messages";
-import { matrixOf } from "./stage";
-
-export const kLayers = ["rays", "points", "sonar", "trail", "odometry", "contacts", "frames"] as const;
-export type Layer = (typeof kLayers)[number];
+import type { Layer } from "./layers";
+import { matrixOf } from "./matrix";
 
 const kColours = { rays: 0xff5a4d, points: 0xffd24a, sonar: 0x3fb6ff, trail: 0x27c46b, odometry: 0xff9d2e, contacts: 0xff2d8a };
 const kMostTrail = 20000;         // points
@@ -82,7 +80,7 @@ class ScanView {
     });
   }
 
-  place(base: THREE.Matrix4, layers: Set<Layer>): void {
+  place(base: THREE.Matrix4, layers: ReadonlySet<Layer>): void {
     this.group.matrix.multiplyMatrices(base, this.mount);
     this.lines.object.visible = this.fan.object.visible = layers.has("rays");
     this.points.object.visible = layers.has("points");
@@ -134,7 +132,7 @@ class SonarView {
     });
   }
 
-  place(base: THREE.Matrix4, layers: Set<Layer>): void {
+  place(base: THREE.Matrix4, layers: ReadonlySet<Layer>): void {
     this.group.matrix.multiplyMatrices(base, this.mount);
     this.group.visible = layers.has("sonar");
   }
@@ -210,6 +208,13 @@ export class RobotOverlay {
     this.contacts.write(message.n, (p) => message.points.forEach(({ position }, i) => p.set(position, 3 * i)));
     this.changed = true;
   }
+  dispose(): void {
+    this.group.traverse((object) => {
+      if (!(object instanceof THREE.Mesh || object instanceof THREE.Line || object instanceof THREE.Points)) return;
+      object.geometry.dispose();
+      (object.material as THREE.Material).dispose();
+    });
+  }
   // Trails begin anew, and contacts are none until some are told.
   forget(): void {
     this.truth.clear();
@@ -218,7 +223,7 @@ export class RobotOverlay {
     this.changed = true;
   }
 
-  place(base: THREE.Matrix4, layers: Set<Layer>): boolean {
+  place(base: THREE.Matrix4, layers: ReadonlySet<Layer>): boolean {
     for (const view of [...this.scans.values(), ...this.sonars.values()]) view.place(base, layers);
     this.baseFrame.matrix.copy(base);
     this.truth.strip.object.visible = layers.has("trail");

@@ -3,6 +3,7 @@ import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { SceneBuilder, type Built, type Movers } from "./build";
 import type { Description, LightDescription, SceneFiles } from "./description";
+import { matrixOf } from "./matrix";
 import { drawnBySoftware, Quality } from "./quality";
 import type { Poses } from "../state/poses";
 
@@ -95,7 +96,9 @@ export class Stage {
         group.traverse((object) => {
           if (!(object instanceof THREE.InstancedMesh)) return;
           object.geometry.dispose();
-          (object.material as THREE.Material).dispose();
+          const material = object.material as THREE.MeshStandardMaterial;
+          material.map?.dispose();
+          material.dispose();
           object.dispose();
         });
       }
@@ -197,6 +200,7 @@ export class Stage {
   }
 
   follow(robot: number): void {
+    if (robot === this.following) return;
     this.following = robot;
     this.lastBase = null;
     this.touch();
@@ -343,7 +347,6 @@ export class Stage {
 }
 
 const kScratch = new THREE.Matrix4(), kScratch2 = new THREE.Matrix4(), kLocal = new THREE.Matrix4(), kTurn = new THREE.Matrix4(), kSpin = new THREE.Matrix4(), kBack = new THREE.Matrix4();
-const kPosition = new THREE.Vector3(), kRotation = new THREE.Quaternion(), kOne = new THREE.Vector3(1, 1, 1);
 
 // Gives the first mesh's matrices to the others.
 function spread(meshes: THREE.InstancedMesh[]): void {
@@ -351,11 +354,4 @@ function spread(meshes: THREE.InstancedMesh[]): void {
     if (mesh !== meshes[0]) (mesh.instanceMatrix.array as Float32Array).set(meshes[0]!.instanceMatrix.array);
     mesh.instanceMatrix.needsUpdate = true;
   }
-}
-
-// The matrix of a pose x, y, z, qw, qx, qy, qz at that place of an array.
-export function matrixOf(pose: ArrayLike<number>, at: number, into: THREE.Matrix4): THREE.Matrix4 {
-  kPosition.set(pose[at]!, pose[at + 1]!, pose[at + 2]!);
-  kRotation.set(pose[at + 4]!, pose[at + 5]!, pose[at + 6]!, pose[at + 3]!);
-  return into.compose(kPosition, kRotation, kOne);
 }

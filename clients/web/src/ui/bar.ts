@@ -1,4 +1,7 @@
 // The bar at the top: what runs, its clock, and the control of the simulation.
+import { clockText } from "../state/clock";
+import { stateWords, type Page } from "../state/page";
+import type { ViewMode } from "../scene/stage";
 import { h, say } from "./dom";
 
 const kIcons = {
@@ -18,7 +21,7 @@ export const iconButton = (name: keyof typeof kIcons, title: string, click: () =
   h("button", { class: `icon ${more}`, title, "aria-label": title, click }, icon(name));
 
 export interface BarActions {
-  pauseOrResume(): void; step(): void; rate(rate: number): void; reset(): void; mode(mode: "orbit" | "follow" | "top"): void;
+  pauseOrResume(): void; step(): void; rate(rate: number): void; reset(): void; mode(mode: ViewMode): void;
   theme(): void; help(): void; panel(): void;
 }
 
@@ -34,9 +37,8 @@ export class Bar {
     h("option", { value: "", hidden: true }, "rate"),    // nobody has asked for one here; what it is stands beside
     ...["0.1", "0.25", "0.5", "1", "2", "5", "10", "max"].map((value) => h("option", { value }, value === "max" ? "max" : `× ${value}`)));
   private readonly modes = new Map<string, HTMLButtonElement>();
-  private paused: boolean | null = null;
 
-  constructor(place: HTMLElement, actions: BarActions) {
+  constructor(place: HTMLElement, private readonly page: Page, actions: BarActions) {
     this.pause = iconButton("pause", "pause (space)", () => actions.pauseOrResume());
     this.pause.id = "pause";
     this.stepButton = iconButton("step", "one step while paused (.)", () => actions.step());
@@ -53,28 +55,35 @@ export class Bar {
     place.append(h("div", { class: "name" }, h("img", { src: "/icon.svg", alt: "Ruedo" }), this.name), this.state, h("span", { class: "grow" }),
       this.clock, this.factor, this.pause, this.stepButton, this.rate, this.resetButton, view,
       iconButton("theme", "dark or light (T)", () => actions.theme(), "roomy"), iconButton("help", "keys (?)", () => actions.help()), iconButton("panel", "panel (P)", () => actions.panel()));
-    this.showMode("orbit");
+    this.show();
   }
 
-  title(text: string): void { say(this.name, text); }
-  showState(text: string, good: boolean | null): void {
-    say(this.state, text);
-    this.state.className = `pill ${good === null ? "" : good ? "good" : "bad"}`;
+  // What the page knows, in the bar.
+  private show(): void {
+    const { page } = this;
+    page.watch(["hello"], ({ hello }) => {
+      say(this.name, hello?.title ?? "");
+      if (hello?.mode === "log") for (const element of [this.stepButton, this.rate, this.resetButton, this.factor]) element.remove();
+    });
+    page.watch(["link", "hello", "world", "paused", "playback"], (state) => {
+      const [words, good] = stateWords(state);
+      say(this.state, words);
+      this.state.className = `pill ${good === null ? "" : good ? "good" : "bad"}`;
+    });
+    page.watch(["time_s", "world"], ({ time_s, world }) => { if (world) say(this.clock, clockText(time_s, world.step_us)); });
+    page.watch(["factor"], ({ factor }) => say(this.factor, factor === null ? "–" : `× ${factor >= 9.95 ? factor.toFixed(0) : factor.toFixed(2)}`));
+    page.watch(["mode"], ({ mode }) => {
+      for (const [name, button] of this.modes) {
+        button.classList.toggle("on", name === mode);
+        button.setAttribute("aria-pressed", name === mode ? "true" : "false");
+      }
+    });
+    page.watch(["paused", "controlled"], ({ paused, controlled }) => {
+      this.pause.replaceChildren(icon(paused ? "play" : "pause"));
+      this.pause.title = paused ? "go on (space)" : "pause (space)";
+      this.pause.setAttribute("aria-label", this.pause.title);
+      for (const element of [this.pause, this.rate, this.resetButton]) element.disabled = !controlled;
+      this.stepButton.disabled = !controlled || !paused;
+    });
   }
-  showClock(time_s: number): void { say(this.clock, `${time_s.toFixed(2)} s`); }
-  showFactor(factor: number): void { say(this.factor, `× ${factor >= 9.95 ? factor.toFixed(0) : factor.toFixed(2)}`); }
-  showMode(mode: string): void { for (const [name, button] of this.modes) button.classList.toggle("on", name === mode); }
-  showPaused(paused: boolean): void {
-    if (paused === this.paused) return;
-    this.paused = paused;
-    this.pause.replaceChildren(icon(paused ? "play" : "pause"));
-    this.pause.title = paused ? "go on (space)" : "pause (space)";
-    this.pause.setAttribute("aria-label", this.pause.title);
-    this.stepButton.disabled = !paused;
-  }
-  allow(control: boolean): void {
-    for (const element of [this.pause, this.rate, this.resetButton]) element.disabled = !control;
-    if (!control) this.stepButton.disabled = true;
-  }
-  onlyClock(): void { for (const element of [this.stepButton, this.rate, this.resetButton, this.factor]) element.remove(); }
 }

@@ -1,5 +1,6 @@
 // Driving by keyboard, gamepad and an on-screen stick: all of them give a share of the robot's speed and turn rate, which
 // is sent as velocity commands ten times a second, and a stop when it is let go.
+import { dialogIsOpen } from "./confirm";
 import { h } from "./dom";
 
 const kPeriod_ms = 100;
@@ -17,7 +18,7 @@ export class Drive {
   // send: a share of speed ahead and of turn rate to the left, each from -1 to 1.
   constructor(private readonly send: (ahead: number, left: number) => void) {
     addEventListener("keydown", (event) => {
-      if (!(event.code in kKeys) || event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) return;
+      if (!(event.code in kKeys) || event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target) || dialogIsOpen()) return;
       this.held.add(event.code);
       event.preventDefault();
       this.tick();
@@ -58,6 +59,10 @@ export class Drive {
       const value = (axis: number) => { const v = pad.axes[axis] ?? 0; return Math.abs(v) > kDeadZone ? v : 0; };
       ahead -= value(1);
       left -= value(0) || value(2);
+    }
+    if (dialogIsOpen()) {
+      this.held.clear();
+      ahead = left = 0;
     }
     const clamp = (v: number) => Math.max(-1, Math.min(1, v));
     const moving = ahead !== 0 || left !== 0;

@@ -1,12 +1,14 @@
 // The panel's pages about one robot: its state, pictures, ranges, motion primitives, and its plots.
-import { image_t, motion_status_t, move_command_t, type camera_info_t, type contact_t, type device_info_t, type imu_t, type odometry_t, type planar_lidar_t, type pose_t, type robot_info_t, type sonar_t } from "../../generated/messages";
+import { image_t, motion_status_t, move_command_t, type contact_t, type device_info_t, type imu_t, type odometry_t, type planar_lidar_t, type pose_t, type robot_info_t, type sonar_t } from "../../generated/messages";
 import { h, say } from "./dom";
+import { inWorld, type Heading } from "./odometry";
 import { PolarPlot, TimePlot } from "./plots";
 
 const kStates = ["idle", "running", "done", "ended", "refused"];
 const kReasons = ["", "replaced by a newer command", "blocked by contact", "stopped by the watchdog: no command came", "refused: not a finite number", "refused: unknown kind", "refused: value out of range", "refused: the robot cannot move"];
 const kKinds: Record<number, string> = { 1: "advance", 2: "rotate", 3: "heading", 4: "arc", 5: "stop", [motion_status_t.KIND_VELOCITY]: "velocity", [motion_status_t.KIND_WHEELS]: "wheels" };
 const degrees = (rad: number) => `${(rad * 180 / Math.PI).toFixed(1)}°`;
+const heading = (rad: number) => degrees(wrap(rad));    // all headings alike, from -180 to 180
 const yawOf = (q: ArrayLike<number>) => Math.atan2(2 * (q[0]! * q[3]! + q[1]! * q[2]!), 1 - 2 * (q[2]! ** 2 + q[3]! ** 2));
 const wrap = (angle: number) => Math.atan2(Math.sin(angle), Math.cos(angle));
 
@@ -88,7 +90,7 @@ export class RobotPages {
     { label: "y true", colour: "--sonar" }, { label: "y odometry", colour: "--rays", dash: [5, 3] }]);
   private readonly error = new TimePlot("Odometry error", "m, degrees", [
     { label: "distance, m", colour: "--rays" }, { label: "heading, °", colour: "--sonar", scale: "w" }]);
-  private start = [0, 0, 0];      // x, y, heading of odom in the world
+  private start: Heading | null = null;    // odom in the world; null: not known
   private truth: pose_t | null = null;
   private reckoned: odometry_t | null = null;
 
@@ -116,11 +118,13 @@ export class RobotPages {
     this.plotPage = h("section", {}, this.speed.element, this.path.element, this.error.element);
   }
 
-  show(robot: robot_info_t, devices: device_info_t[], start: number[]): void {
+  // Where odometry begins, as a pose; undefined: not known yet.
+  beginAt(start: number[] | undefined): void { this.start = start ? [start[0]!, start[1]!, yawOf(start.slice(3))] : null; }
+
+  show(robot: robot_info_t, devices: device_info_t[]): void {
     this.values.clear();
     this.facts.replaceChildren();
     this.pictures.clear();
-    this.start = [start[0]!, start[1]!, yawOf(start.slice(3))];
     this.truth = this.reckoned = null;
     this.polar.clear();
     for (const plot of [this.speed, this.path, this.error]) plot.clear();
@@ -148,7 +152,7 @@ export class RobotPages {
   pose(m: pose_t): void {
     this.truth = m;
     const t = Number(m.utime) * 1e-6;
-    this.fact("pose", `${m.pos[0]!.toFixed(3)} m, ${m.pos[1]!.toFixed(3)} m, ${degrees(yawOf(m.orientation))}`);
+    this.fact("pose", `${m.pos[0]!.toFixed(3)} m, ${m.pos[1]!.toFixed(3)} m, ${heading(yawOf(m.orientation))}`);
     this.fact("speed", `${m.vel[0]!.toFixed(3)} m/s, ${m.rotation_rate[2]!.toFixed(3)} rad/s`);
     this.speed.add(0, t, m.vel[0]!);
     this.speed.add(2, t, m.rotation_rate[2]!);
@@ -158,27 +162,23 @@ export class RobotPages {
   }
 
   odometry(m: odometry_t): void {
-    const t = Number(m.utime) * 1e-6, [x, y] = this.inWorld(m);
-    this.fact("odometry", `${m.x.toFixed(3)} m, ${m.y.toFixed(3)} m, ${degrees(m.theta)}`);
+    const t = Number(m.utime) * 1e-6;
+    this.fact("odometry", `${m.x.toFixed(3)} m, ${m.y.toFixed(3)} m, ${heading(m.theta)}`);
     this.speed.add(1, t, m.v);
     this.speed.add(3, t, m.omega);
+    this.reckoned = m;
+    if (!this.start) return;
+    const [x, y] = inWorld(m, this.start);
     this.path.add(1, t, x);
     this.path.add(3, t, y);
-    this.reckoned = m;
     this.compare();
-  }
-
-  // Where odometry has the robot, x, y and heading, in the world.
-  private inWorld(m: odometry_t): [number, number, number] {
-    const [x0, y0, a0] = this.start as [number, number, number];
-    return [x0 + m.x * Math.cos(a0) - m.y * Math.sin(a0), y0 + m.x * Math.sin(a0) + m.y * Math.cos(a0), a0 + m.theta];
   }
 
   // Odometry against the pose of the same moment, whichever comes last.
   private compare(): void {
     const { truth, reckoned } = this;
-    if (!truth || !reckoned || truth.utime !== reckoned.utime) return;
-    const t = Number(truth.utime) * 1e-6, [x, y, heading] = this.inWorld(reckoned);
+    if (!this.start || !truth || !reckoned || truth.utime !== reckoned.utime) return;
+    const t = Number(truth.utime) * 1e-6, [x, y, heading] = inWorld(reckoned, this.start);
     const away = Math.hypot(x - truth.pos[0]!, y - truth.pos[1]!), turn = wrap(heading - yawOf(truth.orientation));
     this.error.add(0, t, away);
     this.error.add(1, t, turn * 180 / Math.PI);
@@ -207,7 +207,6 @@ export class RobotPages {
     }
     picture.show(m);
   }
-  cameraInfo(_: camera_info_t): void { /* shown among the channels */ }
 
   draw(): void {
     if (this.statePage.isConnected) this.polar.draw();

@@ -1,4 +1,5 @@
 // The time line of a recorded run: play, scrub, speed.
+import type { Page } from "../state/page";
 import type { Playback } from "../wire/link";
 import { h, say } from "./dom";
 import { icon, iconButton } from "./bar";
@@ -8,22 +9,23 @@ export class Timeline {
   private readonly time = h("span", { class: "clock", id: "logtime" });
   private readonly button: HTMLButtonElement;
   private readonly speed = h("select", { "aria-label": "speed" }, ...["0.25", "0.5", "1", "2", "5", "10"].map((value) => h("option", { value }, `× ${value}`)));
-  private playback: Playback | null = null;
   private held = false;
   private lastSeek = 0;
 
-  constructor(private readonly place: HTMLElement, private readonly play: (on: boolean, speed: number) => void, private readonly seek: (time_s: number) => void) {
-    this.button = iconButton("play", "play or pause (space)", () => this.toggle());
+  constructor(private readonly place: HTMLElement, page: Page, play: (on: boolean, speed: number) => void, private readonly seek: (time_s: number) => void) {
+    const playback = () => page.now.playback;
+    this.button = iconButton("play", "play or pause (space)", () => play(!playback()?.playing, Number(this.speed.value)));
     this.speed.value = "1";
     this.speed.addEventListener("change", () => {
       this.speed.blur();    // space is for playing
-      this.play(this.playback?.playing ?? false, Number(this.speed.value));
+      play(playback()?.playing ?? false, Number(this.speed.value));
     });
     this.slider.addEventListener("pointerdown", () => { this.held = true; });
     this.slider.addEventListener("pointerup", () => { this.held = false; this.slider.blur(); });
     this.slider.addEventListener("change", () => { this.held = false; this.go(true); });
     this.slider.addEventListener("input", () => this.go(false));
     place.append(this.button, this.slider, this.time, this.speed);
+    page.watch(["playback"], (state) => { if (state.playback) this.show(state.playback); });
   }
 
   private go(now: boolean): void {
@@ -32,11 +34,7 @@ export class Timeline {
     this.seek(Number(this.slider.value));
   }
 
-  toggle(): void { if (this.playback) this.play(!this.playback.playing, Number(this.speed.value)); }
-  shift(seconds: number): void { if (this.playback) this.seek(this.playback.now + seconds); }
-
-  show(playback: Playback): void {
-    this.playback = playback;
+  private show(playback: Playback): void {
     this.place.hidden = false;
     this.slider.min = String(playback.begin);
     this.slider.max = String(playback.end);

@@ -10,7 +10,6 @@ export interface LinkHandler {
   scene(): void;
   playback(playback: Playback): void;
   message(channel: string, bytes: Uint8Array): void;
-  frame(): void;                         // after the messages of one frame
   traffic(channels: string[], messages: Uint32Array, sizes: Uint32Array): void;
   refused(channel: string): void;
 }
@@ -38,8 +37,8 @@ export class Link {
     socket.onopen = () => {
       this.retry_ms = 300;
       this.over = false;
+      this.wanted.clear();    // what is wanted of whom comes with the greeting
       this.handler.state("open", "");
-      this.sendWanted();
       if (this.wantsTraffic) this.send([Operation.traffic, 1]);
     };
     socket.onmessage = (event: MessageEvent<ArrayBuffer | string>) => {
@@ -131,7 +130,6 @@ export class Link {
       if (channel !== undefined) this.handler.message(channel, new Uint8Array(buffer, at + 8, size));
       at += 8 + size;
     }
-    this.handler.frame();
     // Answered when the page has drawn: who is slow gets fewer frames, not a queue of them.
     requestAnimationFrame(() => this.send([Operation.seen]));
   }

@@ -1,0 +1,57 @@
+// The page's state: what runs, what is shown of it, and how.
+import type { Hello, LinkState, Playback } from "../wire/link";
+import type { Description } from "../scene/description";
+import { kLayers, type Layer } from "../scene/layers";
+import type { ViewMode } from "../scene/stage";
+import { recall } from "../ui/dom";
+import { Store } from "./store";
+import type { World } from "./world";
+
+export const kTabs = ["Robot", "Plots", "Channels", "World"] as const;
+export type Tab = (typeof kTabs)[number];
+
+export interface PageState {
+  link: LinkState;
+  hello: Hello | null;
+  controlled: boolean;              // the run takes requests
+  world: World | null;              // and its scene: both of one moment, by Loading
+  scene: Description | null;
+  robot: number;                    // chosen, index into world.robots; -1 for none
+  paused: boolean;
+  time_s: number;                   // sim time
+  factor: number | null;            // sim time per real time
+  playback: Playback | null;        // of a log
+  layers: ReadonlySet<Layer>;
+  mode: ViewMode;
+  theme: string;
+  tab: Tab;
+  panel: boolean;                   // is open
+}
+
+export type Page = Store<PageState>;
+
+export function makePage(): Page {
+  const layers = recall("layers")?.split(",") ?? kLayers.filter((layer) => layer !== "frames");
+  const tab = recall("page");
+  return new Store<PageState>({
+    link: "connecting", hello: null, controlled: false, world: null, scene: null, robot: -1, paused: false, time_s: 0, factor: null, playback: null,
+    layers: new Set(kLayers.filter((layer) => layers.includes(layer))), mode: "orbit",
+    theme: recall("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"),
+    tab: kTabs.find((name) => name === tab) ?? "Robot", panel: innerWidth >= 860 && recall("panel") !== "closed",
+  });
+}
+
+// What is said of the run in the bar, and whether that is good; null: neither.
+export function stateWords({ link, hello, world, paused, playback }: Readonly<PageState>): [words: string, good: boolean | null] {
+  if (link !== "open") return [link === "ended" ? "ended" : link === "lost" ? "no connection" : "connecting", false];
+  if (hello?.mode === "log" && playback) return [playback.playing ? "log" : "log, paused", null];
+  if (!world) return ["connected", true];
+  return paused ? ["paused", false] : ["running", true];
+}
+
+// The robots that show what they sense in the view: all while they are few, else the chosen one.
+export const kShownRobots = 4;
+export function shownRobots({ world, robot }: Readonly<PageState>): string[] {
+  const names = world?.robots.map(({ name }) => name) ?? [];
+  return names.length <= kShownRobots ? names : names.slice(robot, robot + 1);
+}

@@ -1,0 +1,22 @@
+// The chips that switch what is drawn over the scene.
+import { kLayerColours, kLayers, type Layer } from "../scene/layers";
+import type { Page } from "../state/page";
+import { h, remember } from "./dom";
+
+export function makeLegend(place: HTMLElement, page: Page): void {
+  const chips = new Map(kLayers.map((layer) => [layer, h("button", { class: "chip", "data-layer": layer, style: `--colour: ${kLayerColours[layer]}`, click: () => toggle(page, layer) }, h("i"), layer)]));
+  place.append(...chips.values());
+  page.watch(["layers"], ({ layers }) => {
+    for (const [layer, chip] of chips) {
+      chip.classList.toggle("on", layers.has(layer));
+      chip.setAttribute("aria-pressed", layers.has(layer) ? "true" : "false");
+    }
+  });
+}
+
+function toggle(page: Page, layer: Layer): void {
+  const layers = new Set(page.now.layers);
+  if (!layers.delete(layer)) layers.add(layer);
+  remember("layers", [...layers].join());
+  page.set({ layers });
+}

@@ -1,0 +1,26 @@
+// Words that stay until they do not hold any more, or are clicked away.
+import type { Page } from "../state/page";
+import type { LinkState } from "../wire/link";
+import { say, toast } from "./dom";
+
+export class Notice {
+  private wasOpen = false;
+
+  constructor(private readonly element: HTMLElement, private readonly page: Page) {
+    element.addEventListener("click", () => this.show(""));
+  }
+
+  // "" for none.
+  show(words: string): void {
+    this.element.hidden = words === "";
+    say(this.element, words);
+  }
+
+  onLink(link: LinkState, words: string): void {
+    this.page.set({ link });
+    this.show(words);
+    if (link !== "open") return;
+    if (this.wasOpen) toast("Connected again.");
+    this.wasOpen = true;
+  }
+}
