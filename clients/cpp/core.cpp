@@ -2,7 +2,9 @@
 #include "core.h"
 
 #include <cstdio>
+#include <utility>
 
+#include "address.h"
 #include "ruedo/request_t.hpp"
 #include "ruedo/tick_t.hpp"
 #include "server_process.h"
@@ -11,30 +13,42 @@
 namespace ruedo::client {
 namespace {
 
+constexpr auto kAskAgain = std::chrono::milliseconds(100);
 constexpr double kSilence = 5.0;    // s of real time without any message: a server gives a sign of life each second
 
 }  // namespace
 
-Clock::time_point deadline_after(double seconds) {
-  if (!(seconds < 1e9)) return Clock::time_point::max();
-  return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+Clock::time_point deadline_after(Duration time) {
+  if (!(time.count() < 1e9)) return Clock::time_point::max();
+  return Clock::now() + std::chrono::duration_cast<Clock::duration>(time);
 }
 
-Core::Core(const std::string& url, const std::string& name, std::unique_ptr<ServerProcess> server)
+std::string text_of(Duration time) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", time.count());
+  return text;
+}
+
+Core::Core(const std::string& url, const std::string& name, std::unique_ptr<ServerProcess> server, std::unique_ptr<Transport> transport)
     : url_(url), server_(std::move(server)), last_sign_(Clock::now().time_since_epoch().count()), session_(*this, name),
-      stepper_(*this), bus_(url) {
+      stepper_(*this), bus_(transport ? std::move(transport) : open_transport(url)) {
   uint32_t hash = 2166136261u;    // FNV-1a of the name: two clients number their primitives apart
   for (unsigned char c : name) hash = (hash ^ c) * 16777619u;
   ids_ = static_cast<int64_t>(hash & 0x7fffffffu) << 20;
-  bus_.subscribe("ruedo/info", [this](const uint8_t* bytes, size_t size) { on_info(bytes, size); });
-  bus_.subscribe("ruedo/tick", [this](const uint8_t* bytes, size_t size) { on_tick(bytes, size); });
-  bus_.subscribe("ruedo/reply", [this](const uint8_t* bytes, size_t size) { session_.receive(bytes, size); });
-  bus_.start();
 }
 
 Core::~Core() { close(); }
 
-void Core::join(double timeout) {
+void Core::join(Duration timeout) {
+  const auto handler = [this](auto method) {
+    return [self = weak_from_this(), method](const uint8_t* bytes, size_t size) {
+      if (const auto core = self.lock()) method(*core, bytes, size);
+    };
+  };
+  info_source_ = bus_.subscribe("ruedo/info", handler([](Core& core, const uint8_t* bytes, size_t size) { core.on_info(bytes, size); }));
+  tick_source_ = bus_.subscribe("ruedo/tick", handler([](Core& core, const uint8_t* bytes, size_t size) { core.on_tick(bytes, size); }));
+  reply_source_ = bus_.subscribe("ruedo/reply", handler([](Core& core, const uint8_t* bytes, size_t size) { core.session_.receive(bytes, size); }));
+  bus_.start();
   const Clock::time_point deadline = deadline_after(timeout);
   std::unique_lock lock(mutex_);
   while (!known_) {
@@ -43,9 +57,7 @@ void Core::join(double timeout) {
       if (const auto ended = server_->ended()) throw NoServer(*ended);
     }
     if (Clock::now() >= deadline) {
-      char text[32];
-      std::snprintf(text, sizeof text, "%g", timeout);
-      throw NoServer("no Ruedo server answered at " + url_ + " within " + text + " s. Is `ruedo run` started, with the same "
+      throw NoServer("no Ruedo server answered at " + url_ + " within " + text_of(timeout) + " s. Is `ruedo run` started, with the same "
                      "--lcm or LCM_DEFAULT_URL? `ruedo doctor` looks for what is wrong");
     }
     ask_info();
@@ -54,16 +66,20 @@ void Core::join(double timeout) {
 }
 
 void Core::close() {
-  if (closed_.exchange(true)) return;
   {
-    std::lock_guard lock(mutex_);
+    const std::lock_guard lock(mutex_);
+    if (closed_.exchange(true)) return;
     wake_.notify_all();
+    news_.notify_all();
   }
   if (repeater_.joinable()) repeater_.join();
   if (info()) session_.leave();
   bus_.close();
   if (server_) server_->end();
-  news_.notify_all();
+}
+
+void Core::check_open() const {
+  if (closed_) throw NoServer(kClosed);
 }
 
 std::shared_ptr<const WorldInfo> Core::info() const {
@@ -80,24 +96,25 @@ RobotInfo Core::robot_info(const std::string& name) const {
 }
 
 std::shared_ptr<StreamCore> Core::stream(const ChannelInfo& channel) {
-  std::lock_guard lock(mutex_);
+  const std::lock_guard lock(mutex_);
   auto& stream = streams_[channel.name];
-  if (!stream) stream = std::make_shared<StreamCore>(*this, channel);
+  if (!stream || stream->type() != channel.type) stream = std::make_shared<StreamCore>(weak_from_this(), channel);    // the next run's may be another
   return stream;
 }
 
 std::shared_ptr<Driver> Core::driver(const std::string& robot) {
+  check_open();
   const double watchdog = robot_info(robot).watchdog;
-  std::lock_guard lock(mutex_);
+  const std::lock_guard lock(mutex_);
   auto& driver = drivers_[robot];
-  if (!driver) driver = std::make_shared<Driver>(*this, robot, watchdog);
+  if (!driver) driver = std::make_shared<Driver>(weak_from_this(), robot, watchdog);
   return driver;
 }
 
 void Core::keep_repeating(const std::shared_ptr<Driver>& driver) {
-  std::lock_guard lock(mutex_);
+  const std::lock_guard lock(mutex_);
   repeating_.insert(driver);
-  if (!repeater_.joinable() && !closed_) repeater_ = std::thread([this] { repeat(); });
+  if (!repeater_.joinable() && !closed_) repeater_ = std::thread([this] { repeat(); });    // close() awaits its end
   wake_.notify_all();
 }
 
@@ -110,11 +127,64 @@ void Core::repeat() {    // feeds the watchdogs in real time
     lock.unlock();
     period = 0.1;
     for (const auto& driver : drivers) {
-      driver->repeat();
+      if (!another_run_) driver->repeat(bus_);
       period = std::min(period, driver->period());
     }
     lock.lock();
   }
+}
+
+Subscription Core::on_new_run(std::function<void()> callback) {
+  check_open();
+  return Subscription(new_run_->add("a new run", std::move(callback)));
+}
+
+// With the mutex free: nothing is repeated by them any more.
+void Core::end_drivers(const std::vector<std::shared_ptr<Driver>>& drivers, MotionReason reason) {
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& driver : drivers) repeating_.erase(driver);
+  }
+  for (const auto& driver : drivers) driver->end(reason);
+}
+
+// No command is repeated to a robot that is gone, nor to the next one of its name.
+void Core::forget_removed(const WorldInfo& info) {
+  std::set<std::string> channels;
+  for (const ChannelInfo& channel : info.channel_list) channels.insert(channel.name);
+  std::vector<std::shared_ptr<Driver>> drivers;
+  std::vector<std::shared_ptr<StreamCore>> streams;
+  {
+    const std::lock_guard lock(mutex_);
+    for (auto it = drivers_.begin(); it != drivers_.end();) {
+      const bool gone = !info.robot(it->first);
+      if (gone) drivers.push_back(it->second);
+      it = gone ? drivers_.erase(it) : std::next(it);
+    }
+    for (auto it = streams_.begin(); it != streams_.end();) {
+      const bool gone = !channels.count(it->first);
+      if (gone) streams.push_back(it->second);
+      it = gone ? streams_.erase(it) : std::next(it);
+    }
+  }
+  end_drivers(drivers, MotionReason::removed);
+  for (const auto& stream : streams) stream->end();
+}
+
+// The server was started anew, or another has taken its place.
+void Core::begin_run() {
+  std::vector<std::shared_ptr<Driver>> drivers;
+  std::vector<std::shared_ptr<StreamCore>> streams;
+  {
+    const std::lock_guard lock(mutex_);
+    utime_ = 0;
+    for (const auto& [name, driver] : std::exchange(drivers_, {})) drivers.push_back(driver);
+    for (const auto& [name, stream] : streams_) streams.push_back(stream);
+  }
+  end_drivers(drivers, MotionReason::new_run);
+  for (const auto& stream : streams) stream->forget();
+  std::fprintf(stderr, "ruedo: another run has begun at %s: commands are not repeated into it\n", url_.c_str());
+  new_run_->call();
 }
 
 void Core::note_time(int64_t utime) {
@@ -127,6 +197,7 @@ void Core::note_time(int64_t utime) {
 }
 
 void Core::sleep_until(int64_t utime) {
+  check_open();
   std::unique_lock lock(mutex_);
   while (utime_ < utime) {
     news_.wait_for(lock, std::chrono::milliseconds(500));
@@ -149,7 +220,7 @@ void Core::refresh_info(std::shared_ptr<const WorldInfo> before) {
 }
 
 void Core::check_server() {
-  if (closed_) throw NoServer("this simulation was closed");
+  check_open();
   if (server_) {
     if (const auto ended = server_->ended()) throw NoServer(*ended);
   }
@@ -184,29 +255,37 @@ void Core::on_info(const uint8_t* bytes, size_t size) {
   } catch (const TypeMismatch&) {
     fault = std::current_exception();
   }
+  std::shared_ptr<const WorldInfo> before;
   {
-    std::lock_guard lock(mutex_);
+    const std::lock_guard lock(mutex_);
+    before = known_;
     fault_ = fault;
     if (!fault) last_sign_ = Clock::now().time_since_epoch().count();
     if (info) {
-      if (known_ && (info->run_id != known_->run_id || info->epoch != known_->epoch)) utime_ = 0;
-      known_ = std::move(info);
-      // No command is repeated to a robot that is gone, nor to the next one of its name.
-      for (auto it = drivers_.begin(); it != drivers_.end();) {
-        const bool gone = !known_->robot(it->first);
-        if (gone) repeating_.erase(it->second);
-        it = gone ? drivers_.erase(it) : std::next(it);
-      }
+      if (before && info->epoch != before->epoch) utime_ = 0;
+      known_ = info;
+      another_run_ = false;
     }
   }
   news_.notify_all();
+  if (!info) return;
+  forget_removed(*info);
+  if (before && info->run_id != before->run_id) begin_run();
 }
 
 void Core::on_tick(const uint8_t* bytes, size_t size) {
-  if (size < 16) return;
+  if (size < 24) return;
   WireReader in(bytes, size);
   if (in.int64() != tick_t::getHash()) return;
-  note_time(in.int64());
+  const int64_t utime = in.int64();
+  const auto known = info();
+  if (!known) return;
+  another_run_ = in.int64() != known->run_id;
+  if (another_run_) {    // it may be the server's next one
+    if (Clock::now().time_since_epoch() - Clock::duration(asked_.load()) > kAskAgain) ask_info();
+    return;
+  }
+  note_time(utime);
   try {
     stepper_.on_tick(bytes, size);
   } catch (const WireError&) {
@@ -214,13 +293,14 @@ void Core::on_tick(const uint8_t* bytes, size_t size) {
   // Sim time may run a hundred times faster than real time: the watchdog is fed by its beat, too.
   std::vector<std::shared_ptr<Driver>> drivers;
   {
-    std::lock_guard lock(mutex_);
+    const std::lock_guard lock(mutex_);
     drivers.assign(repeating_.begin(), repeating_.end());
   }
-  for (const auto& driver : drivers) driver->repeat();
+  for (const auto& driver : drivers) driver->repeat(bus_);
 }
 
 void Core::ask_info() {
+  asked_ = Clock::now().time_since_epoch().count();
   request_t request{};
   request.epoch = -1;
   request.kind = request_t::INFO;

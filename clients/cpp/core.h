@@ -13,8 +13,9 @@
 #include <thread>
 #include <vector>
 
+#include "bus.h"
+#include "callbacks.h"
 #include "driver.h"
-#include "lcm_bus.h"
 #include "ruedo/client.h"
 #include "session.h"
 #include "stepper.h"
@@ -26,18 +27,21 @@ namespace ruedo::client {
 class ServerProcess;
 
 using Clock = std::chrono::steady_clock;
-Clock::time_point deadline_after(double seconds);    // kForever: never
+Clock::time_point deadline_after(Duration time);    // kForever: never
+std::string text_of(Duration time);                 // seconds as a user wrote them: 5, not 5.000000
+inline constexpr const char* kClosed = "this simulation was closed";
 
 class Core : public std::enable_shared_from_this<Core> {
  public:
-  // server: a private one, or nullptr. Throws NoServer.
-  Core(const std::string& url, const std::string& name, std::unique_ptr<ServerProcess> server);
+  // server: a private one, or nullptr. transport: nullptr opens the URL's, which throws NoServer.
+  Core(const std::string& url, const std::string& name, std::unique_ptr<ServerProcess> server, std::unique_ptr<Transport> transport = nullptr);
   ~Core();
 
-  void join(double timeout);    // waits for ruedo/info; throws NoServer
-  void close();
+  void join(Duration timeout);    // begins to receive, and waits for ruedo/info; throws NoServer
+  void close();                   // in a callback, too
+  void check_open() const;        // throws NoServer
 
-  LcmBus& bus() { return bus_; }
+  Bus& bus() { return bus_; }
   Session& session() { return session_; }
   Stepper& stepper() { return stepper_; }
   const std::string& url() const { return url_; }
@@ -56,12 +60,16 @@ class Core : public std::enable_shared_from_this<Core> {
   void sleep_until(int64_t utime);
   // After the set of models changed; before: the info from before that, null: the one that is known now.
   void refresh_info(std::shared_ptr<const WorldInfo> before = nullptr);
-  void check_server();                              // throws NoServer when it is gone
+  void check_server();                              // throws NoServer when it is gone, or this was closed
+  Subscription on_new_run(std::function<void()> callback);
   std::string what_is_known(double rate) const;     // for timeouts
 
  private:
   void on_info(const uint8_t* bytes, size_t size);
   void on_tick(const uint8_t* bytes, size_t size);
+  void forget_removed(const WorldInfo& info);
+  void begin_run();
+  void end_drivers(const std::vector<std::shared_ptr<Driver>>& drivers, MotionReason reason);
   void ask_info();
   void repeat();
   double silence() const;    // s
@@ -78,12 +86,16 @@ class Core : public std::enable_shared_from_this<Core> {
   std::set<std::shared_ptr<Driver>> repeating_;
   std::atomic<int64_t> utime_{0}, ids_{0};
   std::atomic<Clock::time_point::rep> last_sign_;
+  std::atomic<Clock::time_point::rep> asked_{0};    // for info
+  std::atomic<bool> another_run_{false};            // is what the last tick was of
   std::atomic<bool> closed_{false};
+  const std::shared_ptr<CallbackList<>> new_run_ = std::make_shared<CallbackList<>>();
   std::thread repeater_;
   std::condition_variable wake_;
   Session session_;
   Stepper stepper_;
-  LcmBus bus_;                                      // last: its thread ends before the rest goes
+  Bus bus_;
+  Subscription info_source_, tick_source_, reply_source_;
 };
 
 }  // namespace ruedo::client

@@ -19,74 +19,106 @@ constexpr auto kUnseenTime = std::chrono::seconds(1);
 }  // namespace
 
 void MotionCore::update(const MotionStatus& status) {
-  std::lock_guard lock(mutex);
+  const std::lock_guard lock(mutex);
   if (done()) return;
   if (status.id == id) {
     progress = status.progress;
     remaining = status.remaining;
     state = status.state;
     reason = status.reason;
-  } else if (status.state == "refused") {
+  } else if (status.state == MotionState::refused) {
     // another command, which changed nothing
-  } else if (state != "sent" || (++unseen >= kUnseenStatuses && Clock::now() - sent >= kUnseenTime)) {
-    state = "ended";    // its own end fell between two statuses
-    reason = "replaced";
+  } else if (state != MotionState::sent || (++unseen >= kUnseenStatuses && Clock::now() - sent >= kUnseenTime)) {
+    state = MotionState::ended;    // its own end fell between two statuses
+    reason = MotionReason::replaced;
   }
   news.notify_all();
 }
 
-Driver::Driver(Core& core, std::string robot, double watchdog) : core_(core), robot_(std::move(robot)), watchdog_(watchdog) {}
+void MotionCore::end(MotionReason why) {
+  const std::lock_guard lock(mutex);
+  if (done()) return;
+  state = MotionState::ended;
+  reason = why;
+  news.notify_all();
+}
+
+Driver::Driver(std::weak_ptr<Core> core, std::string robot, double watchdog)
+    : core_(std::move(core)), robot_(std::move(robot)), watchdog_(watchdog) {}
 
 void Driver::listen(const std::shared_ptr<StreamCore>& motion) {
   {
-    std::lock_guard lock(mutex_);
-    if (std::exchange(listening_, true)) return;
+    const std::lock_guard lock(mutex_);
+    if (ended_ != MotionReason::none) throw UnknownName(robot_ + " is gone: " + to_string(ended_));    // while the command was being made
   }
-  motion->on_sample([this](const Sample& sample) { on_status(static_cast<const MotionStatus&>(sample)); });
+  const std::lock_guard lock(listening_);
+  if (statuses_.open()) return;
+  statuses_ = motion->on_sample([self = weak_from_this()](const Sample& sample) {
+    if (const auto driver = self.lock()) driver->on_status(static_cast<const MotionStatus&>(sample));
+  });
 }
 
-void Driver::hold(const std::string& channel, std::vector<uint8_t> bytes) {
-  std::lock_guard lock(mutex_);
+void Driver::hold(Bus& bus, const std::string& channel, std::vector<uint8_t> bytes) {
+  const std::lock_guard lock(mutex_);
+  if (ended_ != MotionReason::none) return;
   held_channel_ = channel;
   held_ = std::move(bytes);
   running_ = false;
-  core_.bus().publish(held_channel_, held_.data(), held_.size());
+  bus.publish(held_channel_, held_.data(), held_.size());
 }
 
-void Driver::repeat() {
-  std::lock_guard lock(mutex_);
-  if (!held_.empty()) core_.bus().publish(held_channel_, held_.data(), held_.size());
+void Driver::repeat(Bus& bus) {
+  const std::lock_guard lock(mutex_);
+  if (!held_.empty()) bus.publish(held_channel_, held_.data(), held_.size());
 }
 
 double Driver::period() const { return watchdog_ > 0.0 ? std::clamp(watchdog_ / 4.0, 0.01, 0.1) : 0.1; }
 
-std::shared_ptr<MotionCore> Driver::move(const std::string& channel, const move_command_t& command, const std::string& kind) {
+std::shared_ptr<MotionCore> Driver::move(Bus& bus, const std::string& channel, const move_command_t& command, const std::string& kind) {
   auto motion = std::make_shared<MotionCore>();
-  motion->connection = core_.weak_from_this();
+  motion->connection = core_;
   motion->robot = robot_;
   motion->kind = kind;
   motion->id = command.id;
   motion->remaining = std::abs(command.value);
   motion->sent = Clock::now();
-  std::lock_guard lock(mutex_);
+  const std::lock_guard lock(mutex_);
   held_.clear();    // a repetition after this would replace the primitive
-  std::erase_if(motions_, [](const auto& other) {
-    std::lock_guard other_lock(other->mutex);
+  motions_.erase(std::remove_if(motions_.begin(), motions_.end(), [](const auto& other) {
+    const std::lock_guard other_lock(other->mutex);
     return other->done();
-  });
+  }), motions_.end());
   motions_.push_back(motion);
-  core_.bus().publish(channel, command);
+  if (ended_ != MotionReason::none) motion->end(ended_);
+  bus.publish(channel, command);
   return motion;
+}
+
+void Driver::end(MotionReason reason) {
+  std::vector<std::shared_ptr<MotionCore>> motions;
+  {
+    const std::lock_guard lock(mutex_);
+    ended_ = reason;
+    held_.clear();
+    motions = std::move(motions_);
+    motions_.clear();
+  }
+  Subscription statuses;
+  {
+    const std::lock_guard lock(listening_);
+    statuses = std::move(statuses_);
+  }
+  for (const auto& motion : motions) motion->end(reason);
 }
 
 void Driver::on_status(const MotionStatus& status) {
   std::vector<std::shared_ptr<MotionCore>> motions;
   bool stopped = false;
   {
-    std::lock_guard lock(mutex_);
+    const std::lock_guard lock(mutex_);
     motions = motions_;
-    running_ = running_ || (!held_.empty() && status.id == 0 && status.state == "running");
-    stopped = running_ && !held_.empty() && status.reason == "watchdog" && !watchdog_told_;
+    running_ = running_ || (!held_.empty() && status.id == 0 && status.state == MotionState::running);
+    stopped = running_ && !held_.empty() && status.reason == MotionReason::watchdog && !watchdog_told_;
     watchdog_told_ = watchdog_told_ || stopped;
   }
   if (stopped) {
@@ -100,11 +132,11 @@ bool Motion::done() const {
   std::lock_guard lock(core_->mutex);
   return core_->done();
 }
-std::string Motion::state() const {
+MotionState Motion::state() const {
   std::lock_guard lock(core_->mutex);
   return core_->state;
 }
-std::string Motion::reason() const {
+MotionReason Motion::reason() const {
   std::lock_guard lock(core_->mutex);
   return core_->reason;
 }
@@ -117,25 +149,27 @@ double Motion::remaining() const {
   return core_->remaining;
 }
 
-const Motion& Motion::wait(double timeout) const {
+const Motion& Motion::wait(Duration timeout) const {
   const Clock::time_point deadline = deadline_after(timeout);
   MotionCore& motion = *core_;
-  char text[64];
+  char remain[32];
+  const auto remaining_text = [&] {
+    std::snprintf(remain, sizeof remain, "%.3f remain", motion.remaining);
+    return std::string(remain);
+  };
   std::unique_lock lock(motion.mutex);
   while (!motion.done()) {
     if (Clock::now() >= deadline) {
-      std::snprintf(text, sizeof text, "%g s (%.3f remain)", timeout, motion.remaining);
-      throw Timeout(motion.robot + ": " + motion.kind + " was not done within " + text);
+      throw Timeout(motion.robot + ": " + motion.kind + " was not done within " + text_of(timeout) + " s (" + remaining_text() + ")");
     }
     motion.news.wait_until(lock, std::min(deadline, Clock::now() + std::chrono::milliseconds(500)));
     const auto connection = motion.connection.lock();
-    if (!connection) throw NoServer("this simulation was closed");
+    if (!connection) throw NoServer(kClosed);
     connection->check_server();
   }
-  if (motion.state != "done") {
-    std::snprintf(text, sizeof text, ", %.3f remain", motion.remaining);
-    throw MotionError(motion.robot + ": " + motion.kind + (motion.state == "refused" ? " was refused: " : " ended: ") +
-                          motion.reason + text, motion.reason);
+  if (motion.state != MotionState::done) {
+    throw MotionError(motion.robot + ": " + motion.kind + (motion.state == MotionState::refused ? " was refused: " : " ended: ") +
+                          to_string(motion.reason) + ", " + remaining_text(), motion.reason);
   }
   return *this;
 }

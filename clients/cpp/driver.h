@@ -17,6 +17,8 @@ struct move_command_t;
 
 namespace ruedo::client {
 
+class Bus;
+
 // A primitive under way.
 struct MotionCore {
   std::weak_ptr<Core> connection;
@@ -26,37 +28,45 @@ struct MotionCore {
 
   std::mutex mutex;
   std::condition_variable news;
-  std::string state = "sent", reason;
+  MotionState state = MotionState::sent;
+  MotionReason reason = MotionReason::none;
   double progress = 0.0, remaining = 0.0;
   int unseen = 0;    // statuses that did not show it
 
-  bool done() const { return state == "done" || state == "ended" || state == "refused"; }    // with the mutex held
+  // With the mutex held.
+  bool done() const { return state == MotionState::done || state == MotionState::ended || state == MotionState::refused; }
   void update(const MotionStatus& status);
+  void end(MotionReason why);
 };
 
-class Driver {
+// The connection has one for each robot that was driven.
+class Driver : public std::enable_shared_from_this<Driver> {
  public:
-  Driver(Core& core, std::string robot, double watchdog);
+  Driver(std::weak_ptr<Core> core, std::string robot, double watchdog);
 
   // Publishes the command now, and again until the next one.
-  void hold(const std::string& channel, std::vector<uint8_t> bytes);
-  void repeat();
+  void hold(Bus& bus, const std::string& channel, std::vector<uint8_t> bytes);
+  void repeat(Bus& bus);
   double period() const;    // s of real time between repetitions
 
-  std::shared_ptr<MotionCore> move(const std::string& channel, const move_command_t& command, const std::string& kind);
-  void listen(const std::shared_ptr<StreamCore>& motion);
+  std::shared_ptr<MotionCore> move(Bus& bus, const std::string& channel, const move_command_t& command, const std::string& kind);
+  void listen(const std::shared_ptr<StreamCore>& motion);    // throws UnknownName when the robot is gone
+  void end(MotionReason reason);    // its robot, or its run, is gone: nothing is repeated to the next one of that name
 
  private:
   void on_status(const MotionStatus& status);
 
-  Core& core_;
+  const std::weak_ptr<Core> core_;
   const std::string robot_;
   const double watchdog_;    // s
+  std::mutex listening_;     // statuses_
+  Subscription statuses_;
   std::mutex mutex_;
   std::string held_channel_;
   std::vector<uint8_t> held_;    // empty: nothing
   std::vector<std::shared_ptr<MotionCore>> motions_;
-  bool listening_ = false, running_ = false, watchdog_told_ = false;
+  MotionReason ended_ = MotionReason::none;
+  bool running_ = false, watchdog_told_ = false;
 };
 
 }  // namespace ruedo::client

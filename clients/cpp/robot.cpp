@@ -105,7 +105,7 @@ void listen(Core& core, const std::string& robot, Driver& driver) {
 void hold(Core& core, const std::string& robot, const std::string& channel, std::vector<uint8_t> bytes) {
   const auto driver = core.driver(robot);
   listen(core, robot, *driver);
-  driver->hold(channel, std::move(bytes));
+  driver->hold(core.bus(), channel, std::move(bytes));
   core.keep_repeating(driver);
 }
 
@@ -127,7 +127,7 @@ Motion move(Core& core, const std::string& robot, const char* name, int8_t kind,
   const auto driver = core.driver(robot);
   listen(core, robot, *driver);
   command.id = core.next_id();
-  return Motion(driver->move(channel, command, name));
+  return Motion(driver->move(core.bus(), channel, command, name));
 }
 
 velocity_command_t velocity_message(Core& core, double v, double omega) {
@@ -216,17 +216,13 @@ Command Robot::wheel_command(double left, double right) const {
   return {input_channel(*core_, name_, "wheel_command_t"), encoded(wheel_message(*core_, left, right))};
 }
 
-Command Robot::move_command(const std::string& kind, double value, Limits limits, double radius) const {
-  static const std::pair<const char*, int8_t> kinds[] = {{"advance", move_command_t::ADVANCE}, {"rotate", move_command_t::ROTATE},
-                                                         {"heading", move_command_t::HEADING}, {"arc", move_command_t::ARC},
-                                                         {"stop", move_command_t::STOP}};
-  for (const auto& [name, number] : kinds) {
-    if (kind != name) continue;
-    move_command_t command = move_message(*core_, number, value, radius, limits);
-    command.id = core_->next_id();
-    return {input_channel(*core_, name_, "move_command_t"), encoded(command)};
+Command Robot::move_command(MotionKind kind, double value, Limits limits, double radius) const {
+  if (kind < MotionKind::advance || kind > MotionKind::stop) {
+    throw std::invalid_argument(std::string("kind is ") + to_string(kind) + ": it must be advance, rotate, heading, arc or stop");
   }
-  throw std::invalid_argument("kind is '" + kind + "': it must be advance, rotate, heading, arc or stop");
+  move_command_t command = move_message(*core_, static_cast<int8_t>(kind), value, radius, limits);
+  command.id = core_->next_id();
+  return {input_channel(*core_, name_, "move_command_t"), encoded(command)};
 }
 
 Motion Robot::stop(double deceleration) const {

@@ -60,6 +60,41 @@ void Image::save(const std::string& path) const {
 
 namespace {
 
+template <class Enum>
+struct Word { Enum value; const char* text; };
+
+constexpr Word<MotionKind> kKinds[] = {
+    {MotionKind::none, "none"}, {MotionKind::advance, "advance"}, {MotionKind::rotate, "rotate"}, {MotionKind::heading, "heading"},
+    {MotionKind::arc, "arc"}, {MotionKind::stop, "stop"}, {MotionKind::velocity, "velocity"}, {MotionKind::wheels, "wheels"}};
+constexpr Word<MotionState> kStates[] = {
+    {MotionState::idle, "idle"}, {MotionState::running, "running"}, {MotionState::done, "done"}, {MotionState::ended, "ended"},
+    {MotionState::refused, "refused"}, {MotionState::sent, "sent"}};
+constexpr Word<MotionReason> kReasons[] = {
+    {MotionReason::none, ""}, {MotionReason::replaced, "replaced"}, {MotionReason::blocked, "blocked"},
+    {MotionReason::watchdog, "watchdog"}, {MotionReason::not_finite, "not finite"}, {MotionReason::bad_kind, "bad kind"},
+    {MotionReason::bad_value, "bad value"}, {MotionReason::no_drive, "no drive"}, {MotionReason::removed, "removed"},
+    {MotionReason::new_run, "new run"}};
+
+const Word<MotionKind>* words(MotionKind) { return std::begin(kKinds); }
+const Word<MotionState>* words(MotionState) { return std::begin(kStates); }
+const Word<MotionReason>* words(MotionReason) { return std::begin(kReasons); }
+size_t count(MotionKind) { return std::size(kKinds); }
+size_t count(MotionState) { return std::size(kStates); }
+size_t count(MotionReason) { return std::size(kReasons); }
+
+template <class Enum>
+const Word<Enum>* word_of(Enum value) {
+  const Word<Enum>* const end = words(value) + count(value);
+  const Word<Enum>* const found = std::find_if(words(value), end, [&](const Word<Enum>& word) { return word.value == value; });
+  return found == end ? nullptr : found;
+}
+
+// Of a later server's message a value may be unknown here.
+template <class Enum>
+Enum known(int8_t value) {
+  return word_of(static_cast<Enum>(value)) ? static_cast<Enum>(value) : Enum::unknown;
+}
+
 std::shared_ptr<const Sample> decode_scan(WireReader& in) {
   auto s = std::make_shared<Scan>();
   s->utime = in.int64();
@@ -189,24 +224,13 @@ std::shared_ptr<const Sample> decode_joints(WireReader& in) {
   return s;
 }
 
-template <size_t n>
-std::string word(const char* const (&words)[n], int index) {
-  return index >= 0 && static_cast<size_t>(index) < n ? words[index] : std::to_string(index);
-}
-
 std::shared_ptr<const Sample> decode_motion(WireReader& in) {
-  static const char* const kinds[] = {"none", "advance", "rotate", "heading", "arc", "stop"};
-  static const char* const states[] = {"idle", "running", "done", "ended", "refused"};
-  static const char* const reasons[] = {"", "replaced", "blocked", "watchdog", "not finite", "bad kind", "bad value", "no drive"};
   auto s = std::make_shared<MotionStatus>();
   s->utime = in.int64();
   s->id = in.int64();
-  const int kind = in.int8();
-  s->kind = kind == motion_status_t::KIND_VELOCITY ? "velocity"
-            : kind == motion_status_t::KIND_WHEELS ? "wheels"
-                                                   : word(kinds, kind);
-  s->state = word(states, in.int8());
-  s->reason = word(reasons, in.int8());
+  s->kind = known<MotionKind>(in.int8());
+  s->state = known<MotionState>(in.int8());
+  s->reason = known<MotionReason>(in.int8());
   s->progress = in.float64();
   s->remaining = in.float64();
   s->v = in.float64();
@@ -229,6 +253,15 @@ const SampleDecoder kDecoders[] = {
 };
 
 }  // namespace
+
+template <class Enum>
+static const char* text_of(Enum value) {
+  const Word<Enum>* const word = word_of(value);
+  return word ? word->text : "unknown";
+}
+const char* to_string(MotionKind kind) { return text_of(kind); }
+const char* to_string(MotionState state) { return text_of(state); }
+const char* to_string(MotionReason reason) { return text_of(reason); }
 
 const SampleDecoder* find_decoder(const std::string& type) {
   for (const SampleDecoder& decoder : kDecoders) {

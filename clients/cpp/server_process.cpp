@@ -18,7 +18,8 @@
 #include <thread>
 #include <utility>
 
-#include "lcm_bus.h"
+#include "address.h"
+#include "core.h"
 
 extern char** environ;
 
@@ -156,8 +157,8 @@ void ServerProcess::start(const std::vector<std::string>& command, bool verbose)
 }
 
 // A tcpq server listens once its world is loaded; who ends before that is found out by the connection.
-void ServerProcess::await_port(double timeout) {
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(timeout);
+void ServerProcess::await_port(Duration timeout) {
+  const auto deadline = deadline_after(timeout);
   while (!is_served(url_) && !ended() && std::chrono::steady_clock::now() < deadline) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }

@@ -28,7 +28,7 @@ class ServerProcess {
 
  private:
   void start(const std::vector<std::string>& command, bool verbose);
-  void await_port(double timeout);
+  void await_port(Duration timeout);
   bool poll();    // true when it has ended; with the mutex held
   std::string last_lines() const;
 

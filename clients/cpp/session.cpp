@@ -26,17 +26,18 @@ Reply checked(Reply reply) {
   const std::string text = kind_name(reply.kind) + ": " +
                            (reply.text.empty() ? "refused with code " + std::to_string(reply.code) : reply.text);
   if (reply.code == reply_t::NOT_SUPPORTED) throw NotSupported(text);
-  throw RequestError(text, reply.code);
+  throw RequestError(text, static_cast<ReplyCode>(reply.code));
 }
 
 }  // namespace
 
-Reply Session::request(int32_t kind, const std::vector<uint8_t>& body, double timeout) {
+Reply Session::request(int32_t kind, const std::vector<uint8_t>& body, Duration timeout) {
   const auto turn = this->turn();
   return request_in_turn(kind, body, timeout);
 }
 
-Reply Session::request_in_turn(int32_t kind, const std::vector<uint8_t>& body, double timeout) {
+Reply Session::request_in_turn(int32_t kind, const std::vector<uint8_t>& body, Duration timeout) {
+  core_.check_open();
   const auto info = core_.info();
   if (!(static_cast<uint64_t>(info->features) >> kind & 1)) {
     throw NotSupported("this server (Ruedo " + info->version + ") has no " + kind_name(kind) + " request");
@@ -56,7 +57,7 @@ void Session::leave() {
   session_ = 0;
 }
 
-void Session::join(int64_t run_id, double timeout) {
+void Session::join(int64_t run_id, Duration timeout) {
   join_t body;
   body.client = name_;
   std::random_device random;
@@ -67,7 +68,7 @@ void Session::join(int64_t run_id, double timeout) {
   sequence_ = 0;
 }
 
-Reply Session::exchange(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body, double timeout) {
+Reply Session::exchange(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body, Duration timeout) {
   const Clock::time_point deadline = deadline_after(timeout);
   std::unique_lock lock(mutex_);
   awaited_kind_ = kind;
@@ -76,7 +77,7 @@ Reply Session::exchange(int32_t kind, int64_t session, int64_t sequence, const s
   while (!reply_) {
     if (Clock::now() >= deadline) {
       awaited_kind_ = 0;
-      throw Timeout("no reply to " + kind_name(kind) + " on ruedo/reply within " + std::to_string(timeout) + " s");
+      throw Timeout("no reply to " + kind_name(kind) + " on ruedo/reply within " + text_of(timeout) + " s");
     }
     publish(kind, session, sequence, body);
     news_.wait_for(lock, kRepeatTime, [this] { return reply_.has_value(); });

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "ruedo/client.h"
+
 namespace ruedo {
 struct request_t;
 }
@@ -29,11 +31,11 @@ class Session {
  public:
   Session(Core& core, std::string name) : core_(core), name_(std::move(name)) {}
 
-  // Joins on the first request. Throws NotSupported, RequestError, Timeout (after `timeout` seconds of real time).
-  Reply request(int32_t kind, const std::vector<uint8_t>& body, double timeout);
+  // Joins on the first request. Throws NotSupported, RequestError, Timeout (after `timeout` of real time).
+  Reply request(int32_t kind, const std::vector<uint8_t>& body, Duration timeout);
   // For grants, which are not answered by replies: keeps other requests waiting while the lock lives.
   std::unique_lock<std::mutex> turn() { return std::unique_lock(one_at_a_time_); }
-  Reply request_in_turn(int32_t kind, const std::vector<uint8_t>& body, double timeout);
+  Reply request_in_turn(int32_t kind, const std::vector<uint8_t>& body, Duration timeout);
   int64_t next_sequence() { return ++sequence_; }
   int64_t id() const { return session_; }
   const std::string& name() const { return name_; }
@@ -43,8 +45,8 @@ class Session {
   void receive(const uint8_t* bytes, size_t size);    // a message of ruedo/reply
 
  private:
-  void join(int64_t run_id, double timeout);
-  Reply exchange(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body, double timeout);
+  void join(int64_t run_id, Duration timeout);
+  Reply exchange(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body, Duration timeout);
 
   Core& core_;
   const std::string name_;

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "address.h"
 #include "core.h"
 #include "ruedo/name_request_t.hpp"
 #include "ruedo/rate_request_t.hpp"
@@ -19,7 +20,7 @@
 namespace ruedo::client {
 namespace {
 
-constexpr double kReplyTime = 5.0, kSlowReplyTime = 60.0, kRestoreTime = 3600.0;    // s
+constexpr Duration kReplyTime = 5.0, kSlowReplyTime = 60.0, kRestoreTime = 3600.0;
 
 Quaternion about_z(double heading) { return {std::cos(heading / 2.0), 0.0, 0.0, std::sin(heading / 2.0)}; }
 
@@ -83,60 +84,74 @@ Simulation& Simulation::operator=(Simulation&& other) noexcept {
   return *this;
 }
 
-void Simulation::close() { core_->close(); }
+Simulation::Simulation(std::shared_ptr<Core> core) : core_(std::move(core)) {}
 
-std::string Simulation::url() const { return core_->url(); }
-std::string Simulation::version() const { return core_->info()->version; }
-std::string Simulation::world() const { return core_->info()->world; }
-int64_t Simulation::seed() const { return core_->info()->seed; }
-double Simulation::step_size() const { return static_cast<double>(core_->info()->step_us) * 1e-6; }
-double Simulation::time() const { return static_cast<double>(core_->utime()) * 1e-6; }
-bool Simulation::paused() const { return core_->info()->paused; }
+std::shared_ptr<Core> Simulation::core() const {
+  if (!core_) throw NoServer(kClosed);
+  return core_;
+}
 
-std::vector<BodyInfo> Simulation::bodies() const { return core_->info()->bodies; }
+void Simulation::close() {
+  if (core_) core_->close();
+}
+
+std::string Simulation::url() const { return core()->url(); }
+std::string Simulation::version() const { return core()->info()->version; }
+std::string Simulation::world() const { return core()->info()->world; }
+int64_t Simulation::seed() const { return core()->info()->seed; }
+double Simulation::step_size() const { return static_cast<double>(core()->info()->step_us) * 1e-6; }
+double Simulation::time() const { return static_cast<double>(core()->utime()) * 1e-6; }
+bool Simulation::paused() const { return core()->info()->paused; }
+
+std::vector<BodyInfo> Simulation::bodies() const { return core()->info()->bodies; }
 
 std::vector<Robot> Simulation::robots() const {
   std::vector<Robot> robots;
-  for (const RobotInfo& robot : core_->info()->robots) robots.emplace_back(core_, robot.name);
+  for (const RobotInfo& robot : core()->info()->robots) robots.emplace_back(core(), robot.name);
   return robots;
 }
 
 Robot Simulation::robot(const std::string& name) const {
-  core_->robot_info(name);
-  return {core_, name};
+  core()->robot_info(name);
+  return {core(), name};
 }
 
-void Simulation::sleep(double seconds) const { core_->sleep_until(core_->utime() + std::llround(seconds * 1e6)); }
+void Simulation::sleep(Duration time) const {
+  const auto core = this->core();
+  core->sleep_until(core->utime() + std::llround(time.count() * 1e6));
+}
 
-void Simulation::pause() const { core_->session().request(request_t::PAUSE, {}, kReplyTime); }
-void Simulation::resume() const { core_->session().request(request_t::RESUME, {}, kReplyTime); }
+Subscription Simulation::on_new_run(std::function<void()> callback) const { return core()->on_new_run(std::move(callback)); }
 
-Observations Simulation::step(int64_t n, const std::vector<Command>& commands, double timeout) const {
-  if (lockstep()) return core_->stepper().step(n, commands, timeout);
+void Simulation::pause() const { core()->session().request(request_t::PAUSE, {}, kReplyTime); }
+void Simulation::resume() const { core()->session().request(request_t::RESUME, {}, kReplyTime); }
+
+Observations Simulation::step(int64_t n, const std::vector<Command>& commands, Duration timeout) const {
+  if (lockstep()) return core()->stepper().step(n, commands, timeout);
   if (!commands.empty()) {
     throw NotSupported("commands go with steps where the server runs in lockstep: start it with `ruedo run --lockstep N`");
   }
   step_request_t body;
   body.steps = n;
-  return {state_of(core_->session().request(request_t::STEP, encoded(body), timeout)), {}};
+  return {state_of(core()->session().request(request_t::STEP, encoded(body), timeout)), {}};
 }
 
-bool Simulation::lockstep() const { return static_cast<uint64_t>(core_->info()->features) >> request_t::GRANT & 1; }
+bool Simulation::lockstep() const { return static_cast<uint64_t>(core()->info()->features) >> request_t::GRANT & 1; }
 
 void Simulation::set_rate(double rate) const {
   rate_request_t body;
   body.rate = rate;
-  core_->session().request(request_t::RATE, encoded(body), kReplyTime);
+  core()->session().request(request_t::RATE, encoded(body), kReplyTime);
 }
 
 void Simulation::reset(Reset what, int64_t seed) const {
   reset_request_t body;
   body.what = what == Reset::all ? reset_request_t::ALL : what == Reset::time ? reset_request_t::TIME : reset_request_t::POSES;
   body.seed = seed;
-  core_->session().request(request_t::RESET, encoded(body), kSlowReplyTime);
+  core()->session().request(request_t::RESET, encoded(body), kSlowReplyTime);
   if (what == Reset::poses) return;
-  core_->reset_time();
-  core_->stepper().forget();
+  core()->reset_time();
+  core()->stepper().forget();
 }
 
 std::string Simulation::spawn(const std::string& model, double x, double y, const SpawnOptions& options) const {
@@ -150,16 +165,16 @@ std::string Simulation::spawn(const std::string& model, double x, double y, cons
   body.position[2] = options.z;
   const Quaternion orientation = about_z(options.heading);
   std::copy(orientation.begin(), orientation.end(), body.orientation);
-  const auto before = core_->info();
-  const Reply reply = core_->session().request(request_t::SPAWN, encoded(body), kSlowReplyTime);
-  core_->refresh_info(before);
+  const auto before = core()->info();
+  const Reply reply = core()->session().request(request_t::SPAWN, encoded(body), kSlowReplyTime);
+  core()->refresh_info(before);
   return state_of(reply).name;
 }
 
 void Simulation::remove(const std::string& name) const {
-  const auto before = core_->info();
-  core_->session().request(request_t::REMOVE, name_body(name), kReplyTime);
-  core_->refresh_info(before);
+  const auto before = core()->info();
+  core()->session().request(request_t::REMOVE, name_body(name), kReplyTime);
+  core()->refresh_info(before);
 }
 
 void Simulation::set_pose(const std::string& name, const Vector3& position, const Quaternion& orientation) const {
@@ -167,7 +182,7 @@ void Simulation::set_pose(const std::string& name, const Vector3& position, cons
   body.name = name;
   std::copy(position.begin(), position.end(), body.position);
   std::copy(orientation.begin(), orientation.end(), body.orientation);
-  core_->session().request(request_t::SET_POSE, encoded(body), kReplyTime);
+  core()->session().request(request_t::SET_POSE, encoded(body), kReplyTime);
 }
 
 void Simulation::set_pose(const std::string& name, double x, double y, double heading, double z) const {
@@ -179,28 +194,28 @@ void Simulation::set_twist(const std::string& name, const Vector3& linear, const
   body.name = name;
   std::copy(linear.begin(), linear.end(), body.linear);
   std::copy(angular.begin(), angular.end(), body.angular);
-  core_->session().request(request_t::SET_TWIST, encoded(body), kReplyTime);
+  core()->session().request(request_t::SET_TWIST, encoded(body), kReplyTime);
 }
 
 State Simulation::state(const std::string& name) const {
-  return state_of(core_->session().request(request_t::GET_STATE, name_body(name), kReplyTime));
+  return state_of(core()->session().request(request_t::GET_STATE, name_body(name), kReplyTime));
 }
 
 void Simulation::reset_odometry(const std::string& robot) const {
-  core_->session().request(request_t::RESET_ODOMETRY, name_body(robot), kReplyTime);
+  core()->session().request(request_t::RESET_ODOMETRY, name_body(robot), kReplyTime);
 }
 
 State Simulation::snapshot(const std::string& name) const {
-  return state_of(core_->session().request(request_t::SNAPSHOT, name_body(name), kSlowReplyTime));
+  return state_of(core()->session().request(request_t::SNAPSHOT, name_body(name), kSlowReplyTime));
 }
 
 State Simulation::restore(const std::string& name) const {
-  const State state = state_of(core_->session().request(request_t::RESTORE, name_body(name), kRestoreTime));
-  core_->reset_time();
-  core_->stepper().forget();
+  const State state = state_of(core()->session().request(request_t::RESTORE, name_body(name), kRestoreTime));
+  core()->reset_time();
+  core()->stepper().forget();
   return state;
 }
 
-void Simulation::quit() const { core_->session().request(request_t::QUIT, {}, kReplyTime); }
+void Simulation::quit() const { core()->session().request(request_t::QUIT, {}, kReplyTime); }
 
 }  // namespace ruedo::client

@@ -2,7 +2,6 @@
 #include "stepper.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <utility>
 
 #include "core.h"
@@ -20,7 +19,7 @@ constexpr size_t kMostWanted = 256;              // messages asked for at once
 
 }  // namespace
 
-Observations Stepper::step(int64_t n, const std::vector<Command>& commands, double timeout) {
+Observations Stepper::step(int64_t n, const std::vector<Command>& commands, Duration timeout) {
   if (n < 0) throw std::invalid_argument("n is " + std::to_string(n) + ": it must be at least 0");
   for (const Command& command : commands) {
     if (command.after >= 0 && command.after < n) continue;
@@ -29,6 +28,7 @@ Observations Stepper::step(int64_t n, const std::vector<Command>& commands, doub
   }
   std::lock_guard one_at_a_time(one_at_a_time_);
   const auto turn = core_.session().turn();
+  core_.check_open();
   std::unique_lock lock(mutex_);
   if (part_ && core_.info()->run_id != run_id_) {
     part_ = false;
@@ -66,7 +66,7 @@ void Stepper::forget() {
   part_ = false;
 }
 
-void Stepper::take_part(double timeout) {
+void Stepper::take_part(Duration timeout) {
   core_.bus().receive_directly();
   subscribe();
   grant_request_t body{};
@@ -101,12 +101,17 @@ void Stepper::subscribe() {
     std::lock_guard lock(mutex_);
     early_.resize(std::max(early_.size(), info->channel_list.size()));
   }
-  for (size_t i = 0; i < info->channel_list.size(); ++i) {
+  const auto wanted = [&](size_t i) {
+    if (i >= info->channel_list.size()) return std::string();
     const ChannelInfo& channel = info->channel_list[i];
-    if (info_ && i < info_->channel_list.size() && info_->channel_list[i].name == channel.name) continue;
-    if (channel.input || (channel.robot.empty() && channel.type != "world_state_t")) continue;
+    return channel.input || (channel.robot.empty() && channel.type != "world_state_t") ? std::string() : channel.name;
+  };
+  for (auto it = sources_.begin(); it != sources_.end();) it = it->second.first == wanted(it->first) ? std::next(it) : sources_.erase(it);
+  for (size_t i = 0; i < info->channel_list.size(); ++i) {
+    const std::string channel = wanted(i);
+    if (channel.empty() || sources_.count(i)) continue;
     const auto index = static_cast<int32_t>(i);
-    core_.bus().subscribe(channel.name, [this, index](const uint8_t* bytes, size_t size) { on_message(index, bytes, size); });
+    sources_[i] = {channel, core_.bus().subscribe(channel, [this, index](const uint8_t* bytes, size_t size) { on_message(index, bytes, size); })};
   }
   std::lock_guard lock(mutex_);
   info_ = info;
@@ -130,13 +135,13 @@ std::vector<uint8_t> Stepper::grant_body(int64_t until, const std::vector<Comman
 
 // Until the states up to `until` are here with all their messages. After a silence the grant, or the request for what is
 // missing, goes out again, sooner at first.
-void Stepper::wait(std::unique_lock<std::mutex>& lock, int64_t until, double timeout) {
+void Stepper::wait(std::unique_lock<std::mutex>& lock, int64_t until, Duration timeout) {
   Clock::duration repeat = kFirstRepeat;
   Clock::time_point deadline = deadline_after(timeout);
   const auto done = [&] { return have_ >= until && grant_.taken; };
   if (done()) return;
   lock.unlock();
-  LcmBus::Turn turn(core_.bus());
+  Bus::Turn turn(core_.bus());
   lock.lock();
   while (!done()) {
     const int64_t had = have_;
@@ -144,6 +149,7 @@ void Stepper::wait(std::unique_lock<std::mutex>& lock, int64_t until, double tim
     const Clock::time_point quiet_at = Clock::now() + repeat;
     for (Clock::time_point now = quiet_at - repeat; !news_here() && now < quiet_at; now = Clock::now()) {
       lock.unlock();
+      core_.check_open();
       turn.handle(quiet_at - now);
       lock.lock();
     }
@@ -169,9 +175,7 @@ void Stepper::wait(std::unique_lock<std::mutex>& lock, int64_t until, double tim
     core_.check_server();
     lock.lock();
     if (Clock::now() < deadline) continue;
-    char text[32];
-    std::snprintf(text, sizeof text, "%g", timeout);
-    throw Timeout("step " + std::to_string(have_ + 1) + " did not come within " + text + " s" +
+    throw Timeout("step " + std::to_string(have_ + 1) + " did not come within " + text_of(timeout) + " s" +
                   (waits_for_.empty() ? "" : ": the run waits for " + waits_for_));
   }
 }

@@ -11,6 +11,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "ruedo/client.h"
@@ -25,7 +26,7 @@ class Stepper {
  public:
   explicit Stepper(Core& core) : core_(core) {}
 
-  Observations step(int64_t n, const std::vector<Command>& commands, double timeout);
+  Observations step(int64_t n, const std::vector<Command>& commands, Duration timeout);
   void forget();    // the client has reset the world, or left: the next step takes part anew
 
   // The receiving thread's.
@@ -63,10 +64,10 @@ class Stepper {
     bool taken = true;
   };
 
-  void take_part(double timeout);
+  void take_part(Duration timeout);
   void subscribe();
   std::vector<uint8_t> grant_body(int64_t until, const std::vector<Command>& commands) const;
-  void wait(std::unique_lock<std::mutex>& lock, int64_t until, double timeout);
+  void wait(std::unique_lock<std::mutex>& lock, int64_t until, Duration timeout);
   void grant_again();
   void ask_for_lost(int64_t until);
   void collect(Observations& observations);
@@ -85,6 +86,7 @@ class Stepper {
   int64_t run_id_ = 0;
   int32_t epoch_ = 0;
   std::shared_ptr<const WorldInfo> info_; // whose channels are subscribed
+  std::map<size_t, std::pair<std::string, Subscription>> sources_;    // by the channel's index; the caller's of step()
   int64_t granted_ = 0, have_ = -1;       // all of the states up to that one are here
   int64_t collected_ = -1, acknowledged_ = -1, newest_ = -1;
   Grant grant_;

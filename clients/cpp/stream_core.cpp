@@ -17,38 +17,51 @@ std::string hex(int64_t fingerprint) {
 
 }  // namespace
 
-StreamCore::StreamCore(Core& core, const ChannelInfo& channel)
-    : core_(core), channel_(channel.name), type_(channel.type), fingerprint_(channel.fingerprint), rate_(channel.rate),
+StreamCore::StreamCore(std::weak_ptr<Core> core, const ChannelInfo& channel)
+    : core_(std::move(core)), channel_(channel.name), type_(channel.type), fingerprint_(channel.fingerprint), rate_(channel.rate),
       decoder_(find_decoder(channel.type)) {}
 
-std::shared_ptr<Core> StreamCore::owner() const { return core_.shared_from_this(); }
+std::shared_ptr<Core> StreamCore::connection() const {
+  auto core = core_.lock();
+  if (!core) throw NoServer(kClosed);
+  core->check_open();
+  return core;
+}
 
-std::shared_ptr<const Sample> StreamCore::latest(double timeout) { return wait(false, timeout); }
-std::shared_ptr<const Sample> StreamCore::next(double timeout) { return wait(true, timeout); }
-
-void StreamCore::on_sample(std::function<void(const Sample&)> callback) {
-  {
-    std::lock_guard lock(mutex_);
-    callbacks_.push_back(std::move(callback));
-  }
-  subscribe();
+Subscription StreamCore::on_sample(std::function<void(const Sample&)> callback) {
+  subscribe(*connection());
+  return Subscription(callbacks_->add(channel_, std::move(callback)));
 }
 
 TypeMismatch StreamCore::mismatch(int64_t fingerprint) const {
+  const auto core = core_.lock();
   return TypeMismatch(channel_ + " carries another version of " + type_ + " (fingerprint " + hex(fingerprint) +
-                      ") than this client reads (" + hex(decoder_->fingerprint) + "): the server is Ruedo " +
-                      core_.info()->version + "; use the client of the same version");
+                      ") than this client reads (" + hex(decoder_->fingerprint) + ")" +
+                      (core ? ": the server is Ruedo " + core->info()->version + "; use the client of the same version" : ""));
 }
 
-void StreamCore::subscribe() {
+void StreamCore::subscribe(Core& core) {
+  const std::lock_guard lock(opening_);
+  if (source_.open()) return;
+  if (!decoder_) throw TypeMismatch(channel_ + ": this client does not know the type " + type_);
+  if (fingerprint_ != decoder_->fingerprint) throw mismatch(fingerprint_);
+  source_ = core.bus().subscribe(channel_, [self = weak_from_this()](const uint8_t* bytes, size_t size) {
+    if (const auto stream = self.lock()) stream->receive(bytes, size);
+  });
+}
+
+void StreamCore::forget() {
+  const std::lock_guard lock(mutex_);
+  sample_ = nullptr;
+  fault_ = nullptr;
+}
+
+void StreamCore::end() {
+  Subscription source;
   {
-    std::lock_guard lock(mutex_);
-    if (open_) return;
-    if (!decoder_) throw TypeMismatch(channel_ + ": this client does not know the type " + type_);
-    if (fingerprint_ != decoder_->fingerprint) throw mismatch(fingerprint_);
-    open_ = true;
+    const std::lock_guard lock(opening_);
+    source = std::move(source_);
   }
-  core_.bus().subscribe(channel_, [this](const uint8_t* bytes, size_t size) { receive(bytes, size); });
 }
 
 void StreamCore::receive(const uint8_t* bytes, size_t size) {
@@ -65,62 +78,56 @@ void StreamCore::receive(const uint8_t* bytes, size_t size) {
   } catch (const TypeMismatch&) {
     fault = std::current_exception();
   }
-  std::vector<std::function<void(const Sample&)>> callbacks;
   {
-    std::lock_guard lock(mutex_);
+    const std::lock_guard lock(mutex_);
     fault_ = fault;
     if (sample) {
       sample_ = sample;
       ++count_;
-      callbacks = callbacks_;
     }
   }
   news_.notify_all();
   if (!sample) return;
-  core_.note_time(sample->utime);
-  for (const auto& callback : callbacks) {
-    try {
-      callback(*sample);
-    } catch (const std::exception& error) {    // the receiving thread lives on
-      std::fprintf(stderr, "ruedo: a callback on %s failed: %s\n", channel_.c_str(), error.what());
-    }
-  }
+  if (const auto core = core_.lock()) core->note_time(sample->utime);
+  callbacks_->call(*sample);
 }
 
-std::shared_ptr<const Sample> StreamCore::wait(bool new_one, double timeout) {
-  subscribe();
+std::shared_ptr<const Sample> StreamCore::read(std::atomic<int64_t>& seen, bool new_one, Duration timeout) {
+  const auto core = connection();
+  subscribe(*core);
   const Clock::time_point deadline = deadline_after(timeout);
   std::unique_lock lock(mutex_);
-  while (new_one ? count_ == seen_ : count_ == 0) {
+  while (!sample_ || (new_one && count_ == seen)) {
     if (fault_) std::rethrow_exception(std::exchange(fault_, nullptr));
     if (Clock::now() >= deadline) {
-      char text[32];
-      std::snprintf(text, sizeof text, "%g", timeout);
-      throw Timeout("no sample on " + channel_ + " within " + text + " s (" + core_.what_is_known(rate_) + ")");
+      throw Timeout("no sample on " + channel_ + " within " + text_of(timeout) + " s (" + core->what_is_known(rate_) + ")");
     }
     news_.wait_until(lock, std::min(deadline, Clock::now() + std::chrono::milliseconds(500)));
-    core_.check_server();
+    core->check_server();
   }
-  seen_ = count_;
+  last_read_ = seen = count_;
   return sample_;
 }
+
+template <class SampleType>
+Stream<SampleType>::Stream(std::shared_ptr<StreamCore> core) : core_(std::move(core)), seen_(core_->last_read()) {}
 
 template <class SampleType>
 const std::string& Stream<SampleType>::channel() const { return core_->channel(); }
 
 template <class SampleType>
-SampleType Stream<SampleType>::latest(double timeout) const {
-  return static_cast<const SampleType&>(*core_->latest(timeout));
+SampleType Stream<SampleType>::latest(Duration timeout) const {
+  return static_cast<const SampleType&>(*core_->read(seen_, false, timeout));
 }
 
 template <class SampleType>
-SampleType Stream<SampleType>::next(double timeout) const {
-  return static_cast<const SampleType&>(*core_->next(timeout));
+SampleType Stream<SampleType>::next(Duration timeout) const {
+  return static_cast<const SampleType&>(*core_->read(seen_, true, timeout));
 }
 
 template <class SampleType>
-void Stream<SampleType>::on_sample(std::function<void(const SampleType&)> callback) const {
-  core_->on_sample([callback = std::move(callback)](const Sample& sample) { callback(static_cast<const SampleType&>(sample)); });
+Subscription Stream<SampleType>::on_sample(std::function<void(const SampleType&)> callback) const {
+  return core_->on_sample([callback = std::move(callback)](const Sample& sample) { callback(static_cast<const SampleType&>(sample)); });
 }
 
 template class Stream<Scan>;

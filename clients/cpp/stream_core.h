@@ -1,6 +1,7 @@
 // A subscription to one channel: the newest sample, those who wait for it, and what went wrong.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <exception>
 #include <functional>
@@ -9,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "callbacks.h"
 #include "ruedo/client.h"
 #include "sample_types.h"
 
@@ -16,39 +18,43 @@ namespace ruedo::client {
 
 struct ChannelInfo;
 
-// Thread safe. Lives as long as its connection, which outlives every call.
-class StreamCore {
+// Thread safe. The connection has one for each channel that was asked for; handles may outlive it.
+class StreamCore : public std::enable_shared_from_this<StreamCore> {
  public:
-  StreamCore(Core& core, const ChannelInfo& channel);
+  StreamCore(std::weak_ptr<Core> core, const ChannelInfo& channel);
 
   const std::string& channel() const { return channel_; }
   const std::string& type() const { return type_; }
-  std::shared_ptr<const Sample> latest(double timeout);
-  std::shared_ptr<const Sample> next(double timeout);
-  void on_sample(std::function<void(const Sample&)> callback);
-
-  std::shared_ptr<Core> owner() const;    // keeps the connection while a handle is in use
+  int64_t last_read() const { return last_read_; }    // where a new reader begins
+  // seen: the reader's. new_one: waits for a sample that it has not seen. Throws Timeout, TypeMismatch, NoServer.
+  std::shared_ptr<const Sample> read(std::atomic<int64_t>& seen, bool new_one, Duration timeout);
+  Subscription on_sample(std::function<void(const Sample&)> callback);
+  void forget();    // what came is of a run that has ended
+  void end();       // its robot is gone
 
  private:
-  void subscribe();
+  using Callbacks = CallbackList<const Sample&>;
+
+  std::shared_ptr<Core> connection() const;    // throws NoServer once it was closed
+  void subscribe(Core& core);
   void receive(const uint8_t* bytes, size_t size);
-  std::shared_ptr<const Sample> wait(bool new_one, double timeout);
   TypeMismatch mismatch(int64_t fingerprint) const;
 
-  Core& core_;
+  const std::weak_ptr<Core> core_;
   const std::string channel_, type_;
   const int64_t fingerprint_;    // as ruedo/info says
   const double rate_;
   const SampleDecoder* decoder_;
+  const std::shared_ptr<Callbacks> callbacks_ = std::make_shared<Callbacks>();
 
-  std::mutex mutex_;
+  std::mutex opening_;           // source_
+  Subscription source_;
+  std::mutex mutex_;             // what follows
   std::condition_variable news_;
-  bool open_ = false;
   std::shared_ptr<const Sample> sample_;
-  int64_t count_ = 0;    // samples received
-  int64_t seen_ = 0;     // of those, the newest that a call has returned
+  int64_t count_ = 0;            // samples received
+  std::atomic<int64_t> last_read_{0};
   std::exception_ptr fault_;
-  std::vector<std::function<void(const Sample&)>> callbacks_;
 };
 
 }  // namespace ruedo::client

@@ -1,7 +1,11 @@
-// Ruedo's client for C++: connect to a robot simulation, read its sensors, drive its robots.
-//
-// SI units, radians; x ahead, y left, z up; quaternions w, x, y, z. utime is sim time in microseconds. Everything
-// here is safe to use from any thread. Link with ruedo::client.
+/// @file
+/// Ruedo's client for C++17: connect to a robot simulation, read its sensors, drive its robots.
+///
+/// SI units, radians; x ahead, y left, z up; quaternions w, x, y, z. utime is sim time in microseconds. Everything
+/// here is safe to use from any thread. Link with ruedo::client.
+///
+/// Handles (Robot, Stream, Device, Motion) may outlive their Simulation. Once it was closed, destroyed or moved from, whatever
+/// needs the server throws NoServer ("this simulation was closed").
 //
 //     auto sim = ruedo::client::connect();
 //     auto robot = sim.robot("p3at");
@@ -11,6 +15,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -75,29 +80,64 @@ struct Command {
   Command at(int64_t steps) const { return {channel, bytes, steps}; }
 };
 
+class CallbackCore;  // clients/cpp/callbacks.h
 class Core;          // a connection; clients/cpp/core.h
 class StreamCore;    // a subscription; clients/cpp/stream_core.h
 struct MotionCore;
 
-// A stream of samples from one channel. The first use subscribes. Copies share everything.
+/// A callback that is called until this is closed or destroyed, or the Simulation is closed. Move-only.
+///
+/// Once close() has returned, or the destructor, the callback is not called any more, and no call of it is under way (but for
+/// the one that closes it itself): what it refers to may go. What a callback throws is said on the terminal once, and hurts
+/// nobody else.
+class [[nodiscard]] Subscription {
+ public:
+  Subscription() = default;
+  explicit Subscription(std::shared_ptr<CallbackCore> core) : core_(std::move(core)) {}
+  Subscription(Subscription&&) noexcept = default;
+  Subscription& operator=(Subscription&& other) noexcept;
+  ~Subscription();
+  void close();
+  void keep();                         ///< The callback stays for as long as the Simulation, without this.
+  [[nodiscard]] bool open() const;
+
+ private:
+  std::shared_ptr<CallbackCore> core_;
+};
+
+/// A stream of samples from one channel. The first use subscribes.
+///
+/// Each Stream is a reader of its own: next() goes by what this object has returned, not by what others have. A new one begins
+/// where the channel was last read, so that `robot.lrf().next()` in a loop returns each sample once.
 template <class SampleType>
 class Stream {
  public:
-  explicit Stream(std::shared_ptr<StreamCore> core) : core_(std::move(core)) {}
-  const std::string& channel() const;
+  explicit Stream(std::shared_ptr<StreamCore> core);
+  Stream(const Stream& other) : core_(other.core_), seen_(other.seen_.load()) {}
+  Stream& operator=(const Stream& other) {
+    core_ = other.core_;
+    seen_ = other.seen_.load();
+    return *this;
+  }
+  [[nodiscard]] const std::string& channel() const;
 
-  // The newest sample. Before the first one it waits, at most `timeout` seconds of real time. Throws Timeout,
-  // TypeMismatch, NoServer.
-  SampleType latest(double timeout = 5.0) const;
-  // The newest sample that neither latest() nor next() of this channel has returned yet; waits for one. A reader
-  // slower than the rate skips samples; on_sample() skips none.
-  SampleType next(double timeout = 5.0) const;
-  // Calls `callback` in the receiving thread for every sample from now on. It must be quick, and must not wait for
-  // other samples or replies.
-  void on_sample(std::function<void(const SampleType&)> callback) const;
+  /// The newest sample; before the first one it waits.
+  /// @param timeout of real time
+  /// @throws Timeout, TypeMismatch, NoServer
+  [[nodiscard]] SampleType latest(Duration timeout = 5.0) const;
+  /// The newest sample that neither latest() nor next() of this object has returned yet; waits for one. A reader slower than
+  /// the rate skips samples; on_sample() skips none.
+  /// @param timeout of real time
+  /// @throws Timeout, TypeMismatch, NoServer
+  SampleType next(Duration timeout = 5.0) const;
+  /// Calls back in the receiving thread for every sample from now on. The callback must be quick, and must not wait for other
+  /// samples or replies.
+  /// @throws TypeMismatch, NoServer
+  Subscription on_sample(std::function<void(const SampleType&)> callback) const;
 
  private:
   std::shared_ptr<StreamCore> core_;
+  mutable std::atomic<int64_t> seen_;    // of the samples received, the newest that a call has returned
 };
 
 // What step() saw: the state after its last step, and the sensor messages of all its steps.
@@ -146,13 +186,14 @@ class Motion {
   explicit Motion(std::shared_ptr<MotionCore> core) : core_(std::move(core)) {}
   int64_t id() const;
   bool done() const;            // true when the robot is not executing it any more, for whatever reason
-  std::string state() const;    // "sent", then as in MotionStatus
-  std::string reason() const;   // why it ended early or was refused, as in MotionStatus
+  MotionState state() const;
+  MotionReason reason() const;  // why it ended early or was refused
   double progress() const;      // m or rad
   double remaining() const;     // m or rad
-  // Waits until it is done, at most `timeout` seconds of real time. Throws MotionError when it ended early or was
-  // refused, Timeout when it still runs; the robot goes on then.
-  const Motion& wait(double timeout = kForever) const;
+  /// Waits until it is done.
+  /// @param timeout of real time
+  /// @throws MotionError when it ended early or was refused; Timeout when it still runs: the robot goes on then; NoServer
+  const Motion& wait(Duration timeout = kForever) const;
 
  private:
   std::shared_ptr<MotionCore> core_;
@@ -199,11 +240,11 @@ class Robot {
   Motion turn_to(double heading, Limits limits = {}) const;               // rad in odom, the shorter way
   Motion arc(double angle, double radius, Limits limits = {}) const;      // rad turned (positive: left), m > 0
 
-  // The same as commands for Simulation::step(), which sends them; nothing repeats these. kind: "advance", "rotate",
-  // "heading", "arc" or "stop"; value in m or rad, of a stop 0.
-  Command velocity_command(double v, double omega) const;
-  Command wheel_command(double left, double right) const;
-  Command move_command(const std::string& kind, double value, Limits limits = {}, double radius = 0.0) const;
+  // The same as commands for Simulation::step(), which sends them; nothing repeats these. kind: a primitive; value in m or rad,
+  // of a stop 0.
+  [[nodiscard]] Command velocity_command(double v, double omega) const;
+  [[nodiscard]] Command wheel_command(double left, double right) const;
+  [[nodiscard]] Command move_command(MotionKind kind, double value, Limits limits = {}, double radius = 0.0) const;
 
  private:
   std::shared_ptr<Core> core_;
@@ -220,35 +261,38 @@ struct SpawnOptions {
 
 enum class Reset { all, time, poses };
 
-// A running simulation. Move-only; its destructor closes it.
-class Simulation {
+/// A running simulation. Move-only; its destructor closes it. In lockstep, or while paused, step() drives time.
+class [[nodiscard]] Simulation {
  public:
-  explicit Simulation(std::shared_ptr<Core> core) : core_(std::move(core)) {}
-  Simulation(Simulation&&) = default;
+  explicit Simulation(std::shared_ptr<Core> core);
+  Simulation(Simulation&&) noexcept = default;
   Simulation& operator=(Simulation&& other) noexcept;
   ~Simulation();
 
-  std::string url() const;
-  std::string version() const;      // of the server
-  std::string world() const;
+  [[nodiscard]] std::string url() const;
+  [[nodiscard]] std::string version() const;      // of the server
+  [[nodiscard]] std::string world() const;
   int64_t seed() const;
   double step_size() const;         // s
   double time() const;              // s, sim time of the newest message that came
   bool paused() const;              // as ruedo/info last said it
-  std::vector<Robot> robots() const;
-  std::vector<BodyInfo> bodies() const;          // all that there are
-  Robot robot(const std::string& name) const;    // UnknownName lists those that exist
-  void sleep(double seconds) const;              // of sim time
+  [[nodiscard]] std::vector<Robot> robots() const;
+  [[nodiscard]] std::vector<BodyInfo> bodies() const;          // all that there are
+  [[nodiscard]] Robot robot(const std::string& name) const;    // UnknownName lists those that exist
+  void sleep(Duration time) const;               // of sim time
+  /// Calls back in the receiving thread when another server, or the same one started anew, answers at this address. Commands
+  /// are not repeated into the new run, and primitives under way have ended.
+  Subscription on_new_run(std::function<void()> callback) const;
 
   // Each throws NotSupported where the server has no such request, RequestError when it refuses.
   void pause() const;
   void resume() const;
-  // Takes n steps, at most `timeout` seconds of real time each time that nothing goes on, and returns what was seen.
+  // Takes n steps, at most `timeout` of real time each time that nothing goes on, and returns what was seen.
   // In lockstep (`ruedo run --lockstep N`): takes part from the first call on, grants n steps with their commands, and
   // has every message of every step; the first call's observations begin with those of the state it found. n = 0 takes
   // no step. Throws LeaseLost. Else: steps a paused simulation; there are no commands, and the messages are in the
   // streams.
-  Observations step(int64_t n = 1, const std::vector<Command>& commands = {}, double timeout = 60.0) const;
+  Observations step(int64_t n = 1, const std::vector<Command>& commands = {}, Duration timeout = 60.0) const;
   bool lockstep() const;                                     // whether the server runs in lockstep
   void set_rate(double rate) const;
   void reset(Reset what = Reset::all, int64_t seed = -1) const;    // seed -1: the same again
@@ -258,7 +302,7 @@ class Simulation {
   void set_pose(const std::string& name, const Vector3& position, const Quaternion& orientation) const;
   void set_pose(const std::string& name, double x, double y, double heading = 0.0, double z = 0.0) const;
   void set_twist(const std::string& name, const Vector3& linear, const Vector3& angular = {}) const;
-  State state(const std::string& name = "") const;
+  [[nodiscard]] State state(const std::string& name = "") const;
   void reset_odometry(const std::string& robot) const;
   // Saves the state under a name, in the folder that the server was started with (--snapshots FOLDER), and returns it.
   State snapshot(const std::string& name) const;
@@ -267,15 +311,16 @@ class Simulation {
   State restore(const std::string& name) const;
   void quit() const;                // ends the server
 
-  void close();                     // ends repeated commands, and a server that launch() started
+  void close();                     // ends repeated commands, and a server that launch() started; a second time nothing
 
  private:
+  std::shared_ptr<Core> core() const;    // throws NoServer once it was moved from
   std::shared_ptr<Core> core_;
 };
 
 struct ConnectOptions {
   std::string name;         // of this client; "": "client-PID"
-  double timeout = 2.0;     // s of real time to wait for a server
+  Duration timeout = 2.0;   // of real time to wait for a server
 };
 
 // Joins the simulation at an LCM URL; "": LCM_DEFAULT_URL, else LCM's default group and port with ttl 0.
@@ -288,7 +333,7 @@ struct LaunchOptions {
   std::vector<std::string> args;      // further options of `ruedo run`
   std::string url;                    // "": a free port of this machine
   std::string name = "client";
-  double timeout = 30.0;              // s of real time until the world is loaded
+  Duration timeout = 30.0;            // of real time until the world is loaded
   bool verbose = false;               // show what the server prints; else it is shown in errors alone
 };
 

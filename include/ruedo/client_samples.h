@@ -4,8 +4,10 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <limits>
+#include <ostream>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -13,28 +15,61 @@
 
 namespace ruedo::client {
 
+/// A span of time: any of std::chrono's, or a number of seconds. kForever has no end.
+class Duration : public std::chrono::duration<double> {
+ public:
+  constexpr Duration(double seconds) : std::chrono::duration<double>(seconds) {}    // NOLINT: both are meant to convert
+  template <class Rep, class Period>
+  constexpr Duration(std::chrono::duration<Rep, Period> time) : std::chrono::duration<double>(time) {}    // NOLINT
+};
+
 inline constexpr double kForever = std::numeric_limits<double>::infinity();
 inline constexpr double kFast = std::numeric_limits<double>::infinity();    // a rate: as fast as it goes
 
 using Vector3 = std::array<double, 3>;
 using Quaternion = std::array<double, 4>;    // w, x, y, z
 
+// ---- What a robot executes.
+
+/// What a command asks for. heading: turn to a heading in odom; velocity and wheels are no primitives.
+enum class MotionKind : int8_t { none = 0, advance = 1, rotate = 2, heading = 3, arc = 4, stop = 5, velocity = 16, wheels = 17, unknown = 127 };
+/// sent: no status has shown it yet; ended: before it was done, its reason says why.
+enum class MotionState : int8_t { idle = 0, running = 1, done = 2, ended = 3, refused = 4, sent = 64, unknown = 127 };
+/// removed: the robot is gone; new_run: the server was started anew.
+enum class MotionReason : int8_t {
+  none = 0, replaced = 1, blocked = 2, watchdog = 3, not_finite = 4, bad_kind = 5, bad_value = 6, no_drive = 7,
+  removed = 64, new_run = 65, unknown = 127
+};
+/// How the server answers a request, as in reply_t.
+enum class ReplyCode : int32_t {
+  ok = 0, bad_request = 1, unknown_name = 2, refused = 3, wrong_run = 4, wrong_epoch = 5, old_sequence = 6, unknown_session = 7,
+  not_supported = 8
+};
+
+/// The words that messages use: "advance", "running", "not finite"; "" for MotionReason::none.
+[[nodiscard]] const char* to_string(MotionKind kind);
+[[nodiscard]] const char* to_string(MotionState state);
+[[nodiscard]] const char* to_string(MotionReason reason);
+inline std::ostream& operator<<(std::ostream& out, MotionKind kind) { return out << to_string(kind); }
+inline std::ostream& operator<<(std::ostream& out, MotionState state) { return out << to_string(state); }
+inline std::ostream& operator<<(std::ostream& out, MotionReason reason) { return out << to_string(reason); }
+
 // ---- What can go wrong. Bad arguments (NaN, a radius of 0) are std::invalid_argument.
 
 struct Error : std::runtime_error { using std::runtime_error::runtime_error; };
-struct NoServer : Error { using Error::Error; };         // none answered, or it fell silent or ended
+struct NoServer : Error { using Error::Error; };         // none answered, it fell silent or ended, or the Simulation was closed
 struct LaunchError : Error { using Error::Error; };      // a private server could not be started
 struct UnknownName : Error { using Error::Error; };      // the text lists the names that exist
 struct Timeout : Error { using Error::Error; };
 struct TypeMismatch : Error { using Error::Error; };     // a channel carries another version of a type
 struct NotSupported : Error { using Error::Error; };     // the server or the robot cannot do that
 struct MotionError : Error {                             // a primitive ended early or was refused
-  MotionError(const std::string& text, std::string why) : Error(text), reason(std::move(why)) {}
-  std::string reason;                                    // as in MotionStatus
+  MotionError(const std::string& text, MotionReason why) : Error(text), reason(why) {}
+  MotionReason reason;
 };
 struct RequestError : Error {                            // the server refused a request
-  RequestError(const std::string& text, int32_t reply_code) : Error(text), code(reply_code) {}
-  int32_t code;                                          // of reply_t
+  RequestError(const std::string& text, ReplyCode reply_code) : Error(text), code(reply_code) {}
+  ReplyCode code;
 };
 struct LeaseLost : RequestError {                        // lockstep goes on without this client, which was silent too long;
   using RequestError::RequestError;                      // the next step() takes part again
@@ -55,7 +90,7 @@ struct Scan : Sample {
   double angle_step = 0.0;           // rad
   double angle(size_t ray) const { return angle_min + angle_step * static_cast<double>(ray); }
   // The smallest range between two angles (rad); +inf when nothing is there.
-  double nearest(double from_angle, double to_angle) const;
+  [[nodiscard]] double nearest(double from_angle, double to_angle) const;
 };
 
 // A scan of a laser scanner with several layers: element layer * columns + column.
@@ -140,9 +175,9 @@ struct Joints : Sample {
 // What a robot is executing.
 struct MotionStatus : Sample {
   int64_t id = 0;                            // of the primitive; 0 for velocity and wheel commands
-  std::string kind;      // "none", "advance", "rotate", "heading", "arc", "stop", "velocity", "wheels"
-  std::string state;     // "idle", "running", "done", "ended", "refused"
-  std::string reason;    // "", "replaced", "blocked", "watchdog", "not finite", "bad kind", "bad value", "no drive"
+  MotionKind kind = MotionKind::none;
+  MotionState state = MotionState::idle;
+  MotionReason reason = MotionReason::none;  // why it ended or was refused
   double progress = 0.0, remaining = 0.0;    // m or rad
   double v = 0.0, omega = 0.0;               // m/s, rad/s
 };

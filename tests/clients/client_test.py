@@ -52,14 +52,14 @@ def test_read(language):
 
 
 def test_velocity_holds_until_stopped(language, server):
-    """3 s: five times the watchdog's time."""
+    """3 s: five times the watchdog's time. The probe says once it was at its speed for so long."""
     said = probe(language, server.url, "velocity", "p3at", "0.3", "0.5", "3")
     kind, state, v, omega = said.words("status")
     assert (kind, state) == ("velocity", "running") and (float(v), float(omega)) == pytest.approx((0.3, 0.5), abs=1e-6)
-    moved, turned = said.numbers("moved")
-    turned = math.remainder(turned, 2 * math.pi)    # the tests before left it somewhere
-    # Along a circle of v / omega, after 1 s of gaining speed; what the host's delay adds is a few samples.
-    assert 0.5 < moved < 2 * 0.3 / 0.5 and 1.0 < turned < 2.2
+    moved, turned, time = said.numbers("moved")
+    assert time > 2.5    # poses come at 50 Hz
+    assert moved == pytest.approx(abs(2 * 0.3 / 0.5 * math.sin(0.5 * time / 2)), abs=1e-3)    # a chord of a circle of v / omega
+    assert math.remainder(turned - 0.5 * time, 2 * math.pi) == pytest.approx(0.0, abs=1e-3)
     assert said.numbers("stopped") == pytest.approx([0.0], abs=1e-9)
 
 
@@ -74,7 +74,7 @@ def test_velocity_holds_faster_than_real_time(language):
     """At eight times real time a repetition every 100 ms would come 800 ms of sim time apart, and the watchdog stops the
     robot after 600: the ticks of the server set the pace."""
     with ruedo_run("--rate", "8", "--disable", "p3at/camera", world=HALL) as server:
-        said = probe(language, server.url, "velocity", "p3at", "0.0", "0.4", "30")
+        said = probe(language, server.url, "velocity", "p3at", "0.0", "0.4", "2")
         assert said.words("status")[:2] == ["velocity", "running"], said.text
 
 

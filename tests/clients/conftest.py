@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -23,6 +24,7 @@ RUEDO = os.environ.setdefault("RUEDO", str(BUILD / "bin/ruedo"))
 os.environ["PYTHONPATH"] = f"{BUILD / 'python'}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
 sys.path.insert(0, str(BUILD / "python"))
 ARENA = str(SOURCE / "worlds/arena.sdf")
+HALL = str(HERE / "hall.sdf")
 
 PROBES = {"python": [sys.executable, str(HERE / "probe/probe.py")]}
 if "RUEDO_PROBE_CPP" in os.environ:
@@ -31,6 +33,11 @@ if "RUEDO_PROBE_JAVA" in os.environ:
     PROBES["java"] = ["java", "-Xshare:auto", "-XX:TieredStopAtLevel=1", "-cp", f"{BUILD}/java/ruedo.jar:{os.environ['RUEDO_PROBE_JAVA']}", "Probe"]
 
 _taken: list[socket.socket] = []
+
+
+def heed_ctrl_c() -> None:
+    """For a child process: a shell that starts the tests in the background has it ignore Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def free_url() -> str:
@@ -86,6 +93,13 @@ def ruedo_run(*args: str, world: str = ARENA, url: str | None = None) -> Server:
         except ruedo.NoServer:
             if server.process.poll() is not None or time.monotonic() > deadline:
                 pytest.fail(f"the server did not come up: {server.end()}")
+
+
+def tcp_server(*args: str, world: str = HALL) -> Server:
+    """`ruedo run` over TCP."""
+    url = free_url().replace("udpm://239.255.76.67", "tcpq://127.0.0.1").replace("?ttl=0", "")
+    _taken.pop().close()    # the token: the server itself listens there
+    return ruedo_run(*args, world=world, url=url)
 
 
 class Said:

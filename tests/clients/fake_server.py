@@ -61,7 +61,7 @@ def main():
             bus.publish("ruedo/info", b"\0" * 8 + encoded[8:] if "--wrong-info" in options else encoded)
         bus.publish("p3at/LRF", garbage(utime) if "--garbage" in options else scan(utime))
         tick = lcmtypes.tick_t()
-        tick.utime = utime
+        tick.utime, tick.run_id = utime, 7
         bus.publish("ruedo/tick", tick.encode())
         utime += 50000
         time.sleep(max(0.0, start + utime * 1e-6 - time.monotonic()))

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import HERE, PATIENCE, PROBES, probe
+from conftest import HERE, PATIENCE, PROBES, heed_ctrl_c, probe
 
 HALL = str(HERE / "hall.sdf")
 
@@ -37,7 +37,7 @@ def gone(url, seconds=PATIENCE):
 
 def start(language):
     """A probe that has launched a server, and the server's URL."""
-    client = subprocess.Popen([*PROBES[language], "-", "launch", HALL, "--disable", "p3at/camera"], stdout=subprocess.PIPE, text=True)
+    client = subprocess.Popen([*PROBES[language], "-", "launch", HALL, "--disable", "p3at/camera"], stdout=subprocess.PIPE, text=True, preexec_fn=heed_ctrl_c)
     url = client.stdout.readline().split()[1]
     assert client.stdout.readline().split() == ["ready", "True"]
     return client, url

@@ -1,7 +1,5 @@
 """The Python client's Motion: what each status makes of it, and its text. No server."""
 
-import types
-
 from ruedo.motion import Motion
 from ruedo.samples import MotionStatus
 
@@ -11,7 +9,7 @@ def status(id, state, reason="", progress=0.0, remaining=0.0):
 
 
 def motion():
-    return Motion(types.SimpleNamespace(name="p3at"), 7, "advance", 2.0)
+    return Motion(None, "p3at", 7, "advance", 2.0)
 
 
 def test_its_text_says_how_far_it_got_and_why_it_ended():

@@ -1,4 +1,5 @@
-// Sends a server everything that it should not get, at a given rate, and counts it: hostile URL SECONDS RATE [SEED]
+// Sends a server everything that it should not get, so often and at most at a given rate, and counts it: hostile URL COUNT RATE [SEED]
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
@@ -130,14 +131,13 @@ int main(int argc, char** argv) {
   random_bits.seed(argc > 4 ? std::strtoull(argv[4], nullptr, 10) : 1);
   const double rate = std::atof(argv[3]);
   const auto begin = std::chrono::steady_clock::now();
-  const auto end = begin + std::chrono::duration<double>(std::atof(argv[2]));
+  const int64_t count = std::atoll(argv[2]);
   std::string channel;
   Bytes bytes;
   int64_t sent = 0;
-  while (true) {
+  while (sent < count) {
     const auto now = std::chrono::steady_clock::now();
-    if (now >= end) break;
-    const auto due = static_cast<int64_t>(std::chrono::duration<double>(now - begin).count() * rate);
+    const auto due = std::min(count, static_cast<int64_t>(std::chrono::duration<double>(now - begin).count() * rate));
     for (int i = 0; i < 1000 && sent < due; ++i, ++sent) {
       Case& one = cases[random_bits() % std::size(cases)];
       one.make(channel, bytes);

@@ -19,7 +19,9 @@ RUEDO = str(BUILD / "bin/ruedo")
 HOSTILE = os.environ["RUEDO_HOSTILE"]
 HALL = str(Path(os.environ["RUEDO_SOURCE_DIR"]) / "tests/clients/hall.sdf")
 SECONDS = float(os.environ.get("RUEDO_SOAK_SECONDS", "60"))
-FLOOD_SECONDS, FLOOD_RATE, RATE = 5.0, 100_000, 4_000    # messages/s: at the start, and then for long
+FLOOD, FLOOD_RATE, RATE = 300_000, 100_000, 4_000    # messages, messages/s: at the start; then for long, in half of the time for each network
+LOAD = int(RATE * SECONDS / 2)
+PATIENCE = 400.0    # s, for what comes sooner or later, on a machine that does much else too
 MOST_GROWTH_KB = 8_000
 sys.path.insert(0, str(BUILD / "python"))
 
@@ -79,22 +81,23 @@ def test_nothing_stops_and_nothing_grows(scheme, record_property):
     with subprocess.Popen([RUEDO, "run", HALL, "--quiet", "--disable", "p3at/camera", "--lcm", url], stderr=subprocess.PIPE, text=True) as server:
         said = []
         threading.Thread(target=lambda: said.extend(server.stderr), daemon=True).start()
+        begin = time.monotonic()
         try:
             count, sizes = soak(server, url, scheme, port)
         finally:
             server.terminate()
-            server.wait(20)
+            server.wait(PATIENCE)
     assert server.returncode == 0
     third = len(sizes) // 3
     first, last = max(sizes[:third]), max(sizes[-third:])
     print(f"{scheme}: {count} bad inputs; {first} kB at first, {last} kB at the end; {len(said)} lines")
-    assert count > 30_000
+    assert count >= FLOOD + LOAD
     assert last < first + MOST_GROWTH_KB, sizes
-    assert len(said) < 30 + 4 * SECONDS    # what is wrong is said once a second at most, by each who says it
+    assert len(said) < 30 + 4 * (time.monotonic() - begin)    # what is wrong is said once a second at most, by each who says it
 
 
 def soak(server, url, scheme, port):
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + PATIENCE
     while True:
         try:
             sim = ruedo.connect(url, timeout=5.0)
@@ -107,22 +110,19 @@ def soak(server, url, scheme, port):
     sizes, count, refused = [], 0, 0
     try:
         lrf = sim.robot("p3at").lrf
-        end = time.monotonic() + SECONDS / 2    # of each of the two tests
-        flood = subprocess.Popen([HOSTILE, url, str(FLOOD_SECONDS), str(FLOOD_RATE)], stdout=subprocess.PIPE, text=True)
-        count += sent_by(flood, 5 * FLOOD_SECONDS + 20)
-        left = max(end - time.monotonic(), 5.0)
-        load = subprocess.Popen([HOSTILE, url, str(left), str(RATE), "2"], stdout=subprocess.PIPE, text=True)
+        count += sent_by(subprocess.Popen([HOSTILE, url, str(FLOOD), str(FLOOD_RATE)], stdout=subprocess.PIPE, text=True))
+        load = subprocess.Popen([HOSTILE, url, str(LOAD), str(RATE), "2"], stdout=subprocess.PIPE, text=True)
         while load.poll() is None:
             assert server.poll() is None, "the server ended"
-            lrf.next(10.0)
+            lrf.next(PATIENCE)
             try:
                 sim.state()
             except ruedo.RequestError:    # its session went to one of the many that joined
                 refused += 1
             sizes.append(resident_kb(server))
             time.sleep(0.1)
-        count += sent_by(load, 20)
-        sim.robot("p3at").rotate(0.3).wait(60.0)    # with the load gone, it does as it is told
+        count += sent_by(load)
+        sim.robot("p3at").rotate(0.3).wait(PATIENCE)    # with the load gone, it does as it is told
     finally:
         harm.end = True
         if scheme == "tcpq":
@@ -133,5 +133,5 @@ def soak(server, url, scheme, port):
     return count, sizes
 
 
-def sent_by(process, seconds):
-    return sum(int(line.split()[0]) for line in process.communicate(timeout=seconds)[0].splitlines() if line[0].isdigit())
+def sent_by(process):
+    return sum(int(line.split()[0]) for line in process.communicate(timeout=2 * SECONDS + PATIENCE)[0].splitlines() if line[0].isdigit())

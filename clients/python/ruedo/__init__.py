@@ -17,6 +17,7 @@ try:
 except ImportError as _error:
     raise ImportError("ruedo's message types were not generated: install the package (pip install clients/python) or "
                       "build the target python_types and use BUILD/python") from _error
+from .bus import Subscription
 from .control import State
 from .errors import (LaunchError, LeaseLost, MotionError, NoServer, NotSupported, RequestError, RuedoError, Timeout, TypeMismatch,
                      UnknownName)
@@ -27,14 +28,14 @@ from .robot import Camera, Device, Robot
 from .samples import (CameraInfo, Contact, ContactPoint, Image, Imu, Joints, LidarScan, MotionStatus, Odometry, Pose, Sample,
                       Scan, SonarReading)
 from .simulation import Simulation, connect
-from .stream import Stream
+from .stream import Reader, Stream
 from .world_info import Body
 
 __version__ = "0.1.0"
 
 __all__ = [
     "Body", "Camera", "CameraInfo", "Command", "Contact", "ContactPoint", "Device", "Image", "Imu", "Joints", "LaunchError", "LeaseLost",
-    "LidarScan", "Message", "Motion", "MotionError", "MotionStatus", "NoServer", "NotSupported", "Observations", "Odometry", "Pose", "RequestError", "Robot",
-    "RuedoError", "Sample", "Scan", "Simulation", "SonarReading", "State", "Stream", "Timeout", "TypeMismatch",
+    "LidarScan", "Message", "Motion", "MotionError", "MotionStatus", "NoServer", "NotSupported", "Observations", "Odometry", "Pose", "Reader", "RequestError", "Robot",
+    "RuedoError", "Sample", "Scan", "Simulation", "SonarReading", "State", "Stream", "Subscription", "Timeout", "TypeMismatch",
     "UnknownName", "connect", "find_ruedo", "launch", "lcmtypes",
 ]

@@ -73,6 +73,7 @@ class Session:
             return self.request_in_turn(kind, body, timeout)
 
     def request_in_turn(self, kind: int, body: Any = None, timeout: float = 5.0) -> Any:
+        self._sim._check_open()
         info = self._sim._info
         if not info.features >> kind & 1:
             raise NotSupported(f"this server (Ruedo {info.version}) has no {_KINDS[kind]} request")

@@ -19,7 +19,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 from typing import IO, Sequence
 
-from .bus import has_multicast_route
+from .address import has_multicast_route
 from .errors import LaunchError, NoServer
 from .simulation import Simulation
 

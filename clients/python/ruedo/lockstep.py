@@ -22,6 +22,7 @@ from .errors import LeaseLost, NoServer, RequestError, RuedoError, Timeout, Type
 from .stream import Stream
 
 if TYPE_CHECKING:
+    from .bus import Subscription
     from .simulation import Simulation
 
 T = TypeVar("T")
@@ -139,6 +140,7 @@ class Stepper:
         self._sim = sim
         self._part = False                        # takes part
         self._info: Any = None                    # whose channels are subscribed
+        self._sources: dict[int, tuple[str, Subscription]] = {}    # of each channel
         self._run_id = self._epoch = 0
         self._granted, self._have = 0, -1         # all of the states up to _have are here
         self._acknowledged = self._newest = -1
@@ -160,6 +162,7 @@ class Stepper:
                 raise ValueError(f"a command is for {command.after} steps on; of {n} steps 0 to {n - 1} is allowed")
         session = self._sim._session
         with session.turn():
+            self._sim._check_open()
             if self._part and self._sim._info.run_id != self._run_id:
                 self._part = False
                 raise NoServer(f"the run that this client took part in has ended; another is at {self._sim.url} now")
@@ -203,13 +206,17 @@ class Stepper:
         info = self._sim._info
         if self._info is info:
             return
-        before = self._info.channel_list if self._info else []
-        for index, channel in enumerate(info.channel_list):
-            known = index < len(before) and before[index].name == channel.name
-            if known or channel.input or (not channel.robot and channel.type != "world_state_t"):
-                continue
+        wanted = {index: channel.name for index, channel in enumerate(info.channel_list)
+                  if not channel.input and (channel.robot or channel.type == "world_state_t")}
+        for index, (name, source) in list(self._sources.items()):
+            if wanted.get(index) != name:
+                source.close()
+                del self._sources[index]
+        for index, name in wanted.items():
             self._early.setdefault(index, deque(maxlen=_MOST_EARLY))
-            self._sim._bus.subscribe(channel.name, lambda data, index=index: self._on_message(index, data))
+            if index not in self._sources:
+                source = self._sim._bus.subscribe(name, lambda data, index=index: self._on_message(index, data))
+                self._sources[index] = (name, source)
         self._info = info
 
     def _grant_body(self, until: int, commands: Sequence[Command]) -> bytes:
@@ -278,6 +285,7 @@ class Stepper:
                                 for part in step.parts.values() for entry in part if not entry.here]
             if len(body.wanted) >= _MOST_WANTED:
                 break
+        del body.wanted[_MOST_WANTED:]    # the rest when these have come
         body.nwanted = len(body.wanted)
         self._resends += 1
         session = self._sim._session

@@ -8,11 +8,12 @@ import time
 from typing import TYPE_CHECKING
 
 from . import lcmtypes
-from .errors import MotionError, Timeout
+from .errors import MotionError, Timeout, UnknownName
 from .samples import MotionStatus
 
 if TYPE_CHECKING:
-    from .robot import Robot
+    from .bus import Subscription
+    from .simulation import Simulation
 
 log = logging.getLogger("ruedo")
 
@@ -24,13 +25,13 @@ _UNSEEN_SECONDS = 1.0
 class Motion:
     """A motion primitive under way. state: "sent", then the states of MotionStatus."""
 
-    def __init__(self, robot: Robot, id: int, kind: str, amount: float):
+    def __init__(self, sim: Simulation, robot: str, id: int, kind: str, amount: float):
         self.id, self.kind = id, kind
         self.state = "sent"
         self.progress = 0.0               # m or rad done
         self.remaining = amount           # m or rad
-        self.reason = ""                  # why it ended early or was refused: MotionStatus's reasons
-        self._robot = robot
+        self.reason = ""                  # why it ended early or was refused: MotionStatus's, "removed", "new run"
+        self._sim, self._robot = sim, robot
         self._unseen = 0
         self._sent = time.monotonic()
         self._news = threading.Condition()
@@ -47,13 +48,13 @@ class Motion:
         with self._news:
             while not self.done:
                 if deadline is not None and time.monotonic() >= deadline:
-                    raise Timeout(f"{self._robot.name}: {self.kind} was not done within {timeout:g} s "
+                    raise Timeout(f"{self._robot}: {self.kind} was not done within {timeout:g} s "
                                   f"({self.remaining:.3f} remain)")
                 left = 0.5 if deadline is None else max(0.0, min(0.5, deadline - time.monotonic()))
                 self._news.wait(left)
-                self._robot._sim._check_server()
+                self._sim._check_server()
         if self.state != "done":
-            raise MotionError(f"{self._robot.name}: {self.kind} {'was refused' if self.state == 'refused' else 'ended'}: "
+            raise MotionError(f"{self._robot}: {self.kind} {'was refused' if self.state == 'refused' else 'ended'}: "
                               f"{self.reason}, {self.remaining:.3f} remain", self.reason)
         return self
 
@@ -72,60 +73,79 @@ class Motion:
                     self.state, self.reason = "ended", "replaced"
             self._news.notify_all()
 
+    def _end(self, reason: str) -> None:
+        with self._news:
+            if not self.done:
+                self.state, self.reason = "ended", reason
+            self._news.notify_all()
+
     def __repr__(self) -> str:
         state = f"{self.state} ({self.reason})" if self.reason else self.state
-        return f"<Motion {self.kind} of {self._robot.name}: {state}, {self.progress:.3f} done, {self.remaining:.3f} remain>"
+        return f"<Motion {self.kind} of {self._robot}: {state}, {self.progress:.3f} done, {self.remaining:.3f} remain>"
 
 
 class Driver:
-    """The commands of one robot: what is repeated, and the primitives under way."""
+    """The commands to one robot: what is repeated, and the primitives under way. The simulation has one for each name."""
 
-    def __init__(self, robot: Robot):
-        self._robot = robot
+    def __init__(self, sim: Simulation, robot: str):
+        self._sim, self._robot = sim, robot
         self._lock = threading.Lock()
         self._held: tuple[str, bytes] | None = None
         self._motions: list[Motion] = []
-        self._listening = False
+        self._statuses: Subscription | None = None
         self._running = False          # a status has shown the held command
         self._watchdog_told = False
+        self._ended = ""
 
     def hold(self, channel: str, data: bytes) -> None:
         """Publishes the command now, and again until the next one."""
         self._listen()
         with self._lock:
-            self._held = (channel, data)
+            self._held = (channel, data) if not self._ended else None
             self._running = False
-            self._robot._sim._bus.publish(channel, data)
-        self._robot._sim._keep_repeating(self)
+            self._sim._bus.publish(channel, data)
+        self._sim._keep_repeating(self)
 
     def repeat(self) -> None:
         with self._lock:
             if self._held:
-                self._robot._sim._bus.publish(*self._held)
+                self._sim._bus.publish(*self._held)
 
     def period(self) -> float:
         """s of real time between repetitions: a quarter of the watchdog's time, at most 0.1."""
-        robots = self._robot._sim._info.robots
-        if self._robot.name not in robots:    # removed meanwhile
-            return 0.1
-        watchdog = float(robots[self._robot.name].watchdog_us) * 1e-6
+        watchdog = self._watchdog()
         return min(0.1, max(0.01, watchdog / 4.0)) if watchdog > 0.0 else 0.1
 
     def move(self, channel: str, command: lcmtypes.move_command_t, kind: str) -> Motion:
         self._listen()
-        motion = Motion(self._robot, command.id, kind, abs(command.value))
+        motion = Motion(self._sim, self._robot, command.id, kind, abs(command.value))
         with self._lock:
             self._held = None    # a repetition after this would replace the primitive
             self._motions = [m for m in self._motions if not m.done] + [motion]
-            self._robot._sim._bus.publish(channel, command.encode())
+            self._sim._bus.publish(channel, command.encode())
         return motion
+
+    def end(self, reason: str) -> None:
+        """Its robot, or its run, is gone: nothing is repeated to the next one of that name."""
+        with self._lock:
+            self._ended, self._held = reason, None
+            motions, self._motions = self._motions, []
+            statuses, self._statuses = self._statuses, None
+        if statuses:
+            statuses.close()
+        for motion in motions:
+            motion._end(reason)
+
+    def _watchdog(self) -> float:
+        robot = self._sim._info.robots.get(self._robot)    # None: removed meanwhile
+        return float(robot.watchdog_us) * 1e-6 if robot else 0.0
 
     def _listen(self) -> None:
         with self._lock:
-            if self._listening:
-                return
-            self._listening = True
-        self._robot.motion.on_sample(self._on_status)
+            if self._ended:    # while the command was being made
+                raise UnknownName(f"{self._robot} is gone: {self._ended}")
+            if self._statuses is None:
+                self._statuses = self._sim.robot(self._robot).motion.on_sample(self._on_status)
 
     def _on_status(self, status: MotionStatus) -> None:
         with self._lock:
@@ -134,8 +154,7 @@ class Driver:
             stopped = self._running and self._held is not None and status.reason == "watchdog" and not self._watchdog_told
             self._watchdog_told = self._watchdog_told or stopped
         if stopped:
-            log.warning("%s: stopped by its watchdog: no command came for %g s of sim time", self._robot.name,
-                        self._robot.watchdog)
+            log.warning("%s: stopped by its watchdog: no command came for %g s of sim time", self._robot, self._watchdog())
         for motion in motions:
             if not motion.done:
                 motion._update(status)

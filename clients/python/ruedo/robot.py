@@ -10,7 +10,7 @@ import numpy as np
 from . import lcmtypes
 from .errors import NotSupported, UnknownName
 from .lockstep import Command
-from .motion import Driver, Motion
+from .motion import Motion
 from .samples import (CameraInfo, Contact, Floats, Image, Imu, Joints, LidarScan, MotionStatus, Odometry, Pose, Scan,
                       SonarReading)
 from .stream import Stream
@@ -75,10 +75,8 @@ class Robot:
     def __init__(self, sim: Simulation, name: str):
         self.name = name
         self._sim = sim
-        self._streams: dict[str, Stream[Any]] = {}
         self._devices_of: Any = None    # the info that _devices_now was made from
         self._devices_now: list[Device[Any]] = []
-        self._driver = Driver(self)
 
     def __repr__(self) -> str:
         return f"<Robot {self.name}: {', '.join(d.name for d in self.devices)}>"
@@ -199,12 +197,12 @@ class Robot:
         """Drives with v (m/s ahead) and omega (rad/s), within the robot's limits, until the next command of any
         kind: the command is repeated in the background, so that the watchdog does not stop the robot."""
         command = self.velocity_command(v, omega)
-        self._driver.hold(command.channel, command.data)
+        self._sim._driver(self.name).hold(command.channel, command.data)
 
     def set_wheels(self, left: float, right: float) -> None:
         """Turns the wheels of the left and right side (rad/s, positive ahead), until the next command."""
         command = self.wheel_command(left, right)
-        self._driver.hold(command.channel, command.data)
+        self._sim._driver(self.name).hold(command.channel, command.data)
 
     def velocity_command(self, v: float, omega: float) -> Command:
         """What set_velocity() sends, once, for Simulation.step()."""
@@ -256,7 +254,7 @@ class Robot:
     def _move(self, name: str, kind: int, value: float, radius: float = 0.0, speed: float = 0.0, acceleration: float = 0.0,
               deceleration: float = 0.0) -> Motion:
         command = self._move_message(kind, value, radius, speed, acceleration, deceleration)
-        return self._driver.move(self._input("move_command_t"), command, name)
+        return self._sim._driver(self.name).move(self._input("move_command_t"), command, name)
 
     def _move_message(self, kind: int, value: float, radius: float, speed: float, acceleration: float, deceleration: float) -> Any:
         command = lcmtypes.move_command_t()
@@ -284,10 +282,8 @@ class Robot:
     def _device(self, info: Any) -> Device[Any] | None:
         for channel in self._channels:
             if channel.device == info.name and not channel.input:
-                if channel.name not in self._streams:
-                    make = Camera if channel.type == "image_t" else Device
-                    self._streams[channel.name] = make(self._sim, self.name, info, channel)
-                stream = self._streams[channel.name]
+                make = Camera if channel.type == "image_t" else Device
+                stream = self._sim._stream(channel, lambda: make(self._sim, self.name, info, channel))
                 return stream if isinstance(stream, Device) else None
         return None
 
@@ -315,9 +311,7 @@ class Robot:
         raise UnknownName(f"{self.name}/{camera} publishes no {part}; <ruedo:{part}> in the world file switches it on")
 
     def _plain(self, channel: Any) -> Stream[Any]:
-        if channel.name not in self._streams:
-            self._streams[channel.name] = Stream(self._sim, channel.name, channel.type, channel.fingerprint, channel.rate)
-        return self._streams[channel.name]
+        return self._sim._stream(channel, lambda: Stream(self._sim, channel.name, channel.type, channel.fingerprint, channel.rate))
 
 
 def _finite(name: str, value: float) -> float:

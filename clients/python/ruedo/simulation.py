@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import logging
 import math
 import os
 import struct
@@ -12,15 +13,22 @@ from types import TracebackType
 from typing import Any, Callable, Sequence
 
 from . import control, lcmtypes
-from .bus import Bus, is_claimed, resolve_url
+from .address import is_claimed, resolve_url
+from .bus import Bus, Subscription
 from .control import Session, State
 from .errors import NoServer, NotSupported, RuedoError, Timeout, UnknownName
 from .lockstep import Command, Observations, Stepper, observed
 from .motion import Driver
 from .robot import Robot
+from .stream import Stream
+from .transport import Transport, open_transport
 from .world_info import Body, WorldInfo, WorldInfoAssembler
 
 _SILENCE_SECONDS = 5.0
+_CLOSED = "this simulation was closed"
+_TICK = struct.Struct(">8sqq")    # fingerprint, utime, run_id
+_TICK_FINGERPRINT = lcmtypes.tick_t._get_packed_fingerprint()
+log = logging.getLogger("ruedo")
 
 
 def connect(url: str | None = None, *, name: str | None = None, timeout: float = 2.0) -> Simulation:
@@ -40,7 +48,7 @@ class Simulation:
     """
 
     def __init__(self, url: str, name: str, timeout: float, server_ended: Callable[[], str | None] = lambda: None,
-                 end_server: Callable[[], None] = lambda: None):
+                 end_server: Callable[[], None] = lambda: None, transport: Transport | None = None):
         self.url = url
         self._server_ended = server_ended    # why a private server is gone, None while it runs
         self._end_server = end_server
@@ -54,11 +62,16 @@ class Simulation:
         self._session = Session(self, name)
         self._stepper = Stepper(self)
         self._ids = _name_hash(name) << 20    # two clients number their primitives apart
-        self._drivers: set[Driver] = set()
+        self._streams: dict[str, Stream[Any]] = {}    # by channel
+        self._drivers: dict[str, Driver] = {}         # by robot
+        self._repeating: set[Driver] = set()
+        self._another_run = False    # is what the last tick was of
+        self._asked = 0.0            # for info, s of time.monotonic()
+        self._on_new_run: tuple[Subscription, ...] = ()
         self._wake = threading.Condition()
         self._repeater: threading.Thread | None = None
-        self._closed = False
-        self._bus = Bus(url)
+        self._closed = ""    # why: what every call says
+        self._bus = Bus(transport or open_transport(url))
         atexit.register(self.close)
         try:
             self._bus.subscribe("ruedo/info", self._on_info)
@@ -116,8 +129,22 @@ class Simulation:
         with self._news:
             return self._robots.setdefault(name, Robot(self, name))
 
+    def on_new_run(self, callback: Callable[[Simulation], None]) -> Subscription:
+        """Calls callback(simulation) in the receiving thread when another server, or the same one started anew, answers
+        at this address. Commands are not repeated into the new run, and primitives under way have ended."""
+        subscription = Subscription(callback, "a new run", self._leave_new_run)
+        self._check_open()
+        with self._news:
+            self._on_new_run += (subscription,)
+        return subscription
+
+    def _leave_new_run(self, subscription: Subscription) -> None:
+        with self._news:
+            self._on_new_run = tuple(one for one in self._on_new_run if one is not subscription)
+
     def sleep(self, seconds: float) -> None:
         """Waits until so much sim time has passed."""
+        self._check_open()
         until = self._utime + round(seconds * 1e6)
         with self._news:
             while self._utime < until:
@@ -235,10 +262,10 @@ class Simulation:
 
     def close(self) -> None:
         """Leaves the simulation: repeated commands end, and so does a server that launch() started."""
-        if self._closed:
-            return
         with self._wake:
-            self._closed = True
+            if self._closed:
+                return
+            self._closed = _CLOSED
             self._wake.notify_all()
         if self._known:
             self._session.leave()
@@ -253,7 +280,7 @@ class Simulation:
         self.close()
 
     def __repr__(self) -> str:
-        return f"<Simulation {self.world} at {self.url}: {', '.join(self._info.robots)}>"
+        return f"<Simulation {self.world} at {self.url}: {self._closed or ', '.join(self._info.robots) or 'no robots'}>"
 
     # For the package's other files.
 
@@ -273,11 +300,14 @@ class Simulation:
             self._ids += 1
             return self._ids
 
+    def _check_open(self) -> None:
+        if self._closed:
+            raise NoServer(self._closed)
+
     def _check_server(self) -> None:
         """Raises NoServer when the private server ended, or nothing was heard for long; a server gives a sign of life each
         second. One of this machine that is stopped, or in a debugger, is waited for."""
-        if self._closed:
-            raise NoServer("this simulation was closed")
+        self._check_open()
         ended = self._server_ended()
         if ended:
             raise NoServer(ended)
@@ -298,9 +328,22 @@ class Simulation:
             self._last_sign = time.monotonic()
             self._news.notify_all()
 
+    def _stream(self, channel: Any, make: Callable[[], Stream[Any]]) -> Stream[Any]:
+        """The stream of a channel, made on first use."""
+        with self._news:
+            known = self._streams.get(channel.name)
+            if known is None or known.type != channel.type:    # the next run's may be another
+                known = self._streams[channel.name] = make()
+            return known
+
+    def _driver(self, robot: str) -> Driver:
+        self._check_open()
+        with self._news:
+            return self._drivers.setdefault(robot, Driver(self, robot))
+
     def _keep_repeating(self, driver: Driver) -> None:
         with self._wake:
-            self._drivers.add(driver)
+            self._repeating.add(driver)
             if self._repeater is None:
                 self._repeater = threading.Thread(target=self._repeat, name="ruedo-repeat", daemon=True)
                 self._repeater.start()
@@ -315,17 +358,42 @@ class Simulation:
                     self._wake.wait(period)
                 if self._closed:
                     return
-                drivers = tuple(self._drivers)
-            for driver in drivers:
+                drivers = tuple(self._repeating)
+            for driver in drivers if not self._another_run else ():
                 driver.repeat()
             period = min((driver.period() for driver in drivers), default=0.1)
 
+    def _end_drivers(self, names: list[str], reason: str) -> None:
+        with self._news:
+            drivers = [self._drivers.pop(name) for name in names]
+        with self._wake:
+            self._repeating.difference_update(drivers)
+        for driver in drivers:
+            driver.end(reason)
+
     def _forget_removed(self, info: WorldInfo) -> None:
         """No command is repeated to a robot that is gone, nor to the next one of its name."""
-        for name in [name for name in self._robots if name not in info.robots]:
-            robot = self._robots.pop(name)
-            with self._wake:
-                self._drivers.discard(robot._driver)
+        with self._news:
+            channels = {channel.name for channel in info.channel_list}
+            gone = [name for name in self._drivers if name not in info.robots]
+            streams = [self._streams.pop(name) for name in list(self._streams) if name not in channels]
+            for name in [name for name in self._robots if name not in info.robots]:
+                del self._robots[name]
+        self._end_drivers(gone, "removed")
+        for stream in streams:
+            stream._end()
+
+    def _begin_run(self) -> None:
+        """The server was started anew, or another has taken its place."""
+        with self._news:
+            self._utime = 0
+            drivers, streams, callbacks = list(self._drivers), list(self._streams.values()), self._on_new_run
+        self._end_drivers(drivers, "new run")
+        for stream in streams:
+            stream._forget()
+        log.warning("another run has begun at %s: commands are not repeated into it", self.url)
+        for callback in callbacks:
+            callback._call(self)
 
     # The receiving thread.
 
@@ -338,21 +406,35 @@ class Simulation:
                 self._news.notify_all()
             return
         with self._news:
+            before = self._known
             self._last_sign = time.monotonic()
             if info:
-                if self._known and (info.run_id, info.epoch) != (self._known.run_id, self._known.epoch):
-                    self._utime = 0
                 self._known = info
-                self._forget_removed(info)
+                self._another_run = False
+                if before and info.epoch != before.epoch:
+                    self._utime = 0
             self._news.notify_all()
+        if info:
+            self._forget_removed(info)
+            if before and info.run_id != before.run_id:
+                self._begin_run()
 
     def _on_tick(self, data: bytes) -> None:
-        if len(data) < 16 or data[:8] != lcmtypes.tick_t._get_packed_fingerprint():
+        if len(data) < _TICK.size:
             return
-        self._note_time(struct.unpack_from(">q", data, 8)[0])
+        fingerprint, utime, run_id = _TICK.unpack_from(data)
+        known = self._known
+        if fingerprint != _TICK_FINGERPRINT or known is None:
+            return
+        self._another_run = run_id != known.run_id
+        if self._another_run:    # it may be the server's next one
+            if time.monotonic() - self._asked > 0.1:
+                self._ask_info()
+            return
+        self._note_time(utime)
         self._stepper.on_tick(data)
         # Sim time may run a hundred times faster than real time: the watchdog is fed by its beat, too.
-        for driver in tuple(self._drivers):
+        for driver in tuple(self._repeating):
             driver.repeat()
 
     def _await_info(self, timeout: float) -> None:
@@ -371,6 +453,7 @@ class Simulation:
                 self._news.wait(0.1)
 
     def _ask_info(self) -> None:
+        self._asked = time.monotonic()
         request = lcmtypes.request_t()
         request.epoch, request.kind = -1, lcmtypes.request_t.INFO
         self._bus.publish("ruedo/request", request.encode())

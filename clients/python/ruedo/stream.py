@@ -2,59 +2,77 @@
 
 from __future__ import annotations
 
-import logging
 import threading
 import time
 from typing import TYPE_CHECKING, Any, Callable, Generic, TypeVar
 
 from . import samples
+from .bus import Subscription
 from .errors import RuedoError, Timeout, TypeMismatch
 
 if TYPE_CHECKING:
     from .simulation import Simulation
 
 T = TypeVar("T")
-log = logging.getLogger("ruedo")
 
 
-class Stream(Generic[T]):
+class Reader(Generic[T]):
+    """Reads a stream at a pace of its own, which other readers of the stream do not change."""
+
+    def __init__(self, stream: Stream[T]):
+        self._stream = stream
+        self._seen = 0    # of the samples received, the newest that a call has returned
+
+    def latest(self, timeout: float = 5.0) -> T:
+        """The newest sample. Before the first one it waits, at most timeout seconds of real time."""
+        return self._stream._read(self, False, timeout)
+
+    def next(self, timeout: float = 5.0) -> T:
+        """The newest sample that neither latest() nor next() has returned yet; waits for one, at most timeout seconds
+        of real time. A reader slower than the rate skips samples; on_sample() skips none."""
+        return self._stream._read(self, True, timeout)
+
+
+class Stream(Reader[T]):
     """Safe to use from any thread; the first use subscribes.
 
     channel: its name on the bus. type: its message type. rate: Hz of sim time, 0: every step or when
-    something happens.
+    something happens. It is a reader of itself; who reads beside it takes a reader() of its own.
     """
 
     def __init__(self, sim: Simulation, channel: str, type: str, fingerprint: int, rate: float):
+        super().__init__(self)
         self.channel, self.type, self.rate = channel, type, rate
         self._sim = sim
         self._fingerprint = fingerprint & 0xFFFFFFFFFFFFFFFF
         self._news = threading.Condition()
-        self._open = False
+        self._source: Subscription | None = None
         self._sample: T | None = None
         self._count = 0    # samples received
-        self._seen = 0     # of those, the newest that a call has returned
         self._fault: RuedoError | None = None
-        self._callbacks: list[Callable[[T], None]] = []
+        self._callbacks: tuple[Subscription, ...] = ()
 
-    def latest(self, timeout: float = 5.0) -> T:
-        """The newest sample. Before the first one it waits, at most timeout seconds of real time."""
-        return self._wait(lambda: self._count > 0, timeout)
+    def reader(self) -> Reader[T]:
+        """A reader that has seen nothing yet."""
+        return Reader(self)
 
-    def next(self, timeout: float = 5.0) -> T:
-        """The newest sample that neither latest() nor next() of this stream has returned yet; waits for one, at
-        most timeout seconds of real time. A reader slower than the rate skips samples; on_sample() skips none."""
-        return self._wait(lambda: self._count > self._seen, timeout)
-
-    def on_sample(self, callback: Callable[[T], None]) -> None:
-        """Calls callback(sample) in the receiving thread for every sample from now on. It must be quick, and must
-        not wait for other samples or replies."""
+    def on_sample(self, callback: Callable[[T], None]) -> Subscription:
+        """Calls callback(sample) in the receiving thread for every sample from now on, until close() of what it returns
+        (or of the simulation). It must be quick, and must not wait for other samples or replies."""
+        subscription = Subscription(callback, self.channel, self._leave)
         self._subscribe()
         with self._news:
-            self._callbacks.append(callback)
+            self._callbacks += (subscription,)
+        return subscription
+
+    def _leave(self, subscription: Subscription) -> None:
+        with self._news:
+            self._callbacks = tuple(one for one in self._callbacks if one is not subscription)
 
     def _subscribe(self) -> None:
+        self._sim._check_open()
         with self._news:
-            if self._open:
+            if self._source:
                 return
             if self.type not in samples.CONVERSIONS:
                 raise TypeMismatch(f"{self.channel}: this client does not know the type {self.type} of the server's "
@@ -64,8 +82,19 @@ class Stream(Generic[T]):
             self._expected: bytes = message._get_packed_fingerprint()
             if self._fingerprint != int.from_bytes(self._expected, "big"):
                 raise self._mismatch(self._fingerprint)
-            self._open = True
-        self._sim._bus.subscribe(self.channel, self._receive)
+            self._source = self._sim._bus.subscribe(self.channel, self._receive)
+
+    def _end(self) -> None:
+        """Its robot is gone."""
+        with self._news:
+            source, self._source = self._source, None
+        if source:
+            source.close()
+
+    def _forget(self) -> None:
+        """What came is of a run that has ended."""
+        with self._news:
+            self._sample = self._fault = None
 
     def _mismatch(self, fingerprint: int) -> TypeMismatch:
         return TypeMismatch(f"{self.channel} carries another version of {self.type} (fingerprint {fingerprint:016x}) than "
@@ -87,19 +116,16 @@ class Stream(Generic[T]):
             self._sample, self._fault = sample, None
             self._count += 1
             self._news.notify_all()
-            callbacks = list(self._callbacks)
+            callbacks = self._callbacks
         self._sim._note_time(sample.utime)
         for callback in callbacks:
-            try:
-                callback(sample)
-            except Exception:
-                log.exception("a callback on %s failed", self.channel)
+            callback._call(sample)
 
-    def _wait(self, ready: Callable[[], bool], timeout: float) -> T:
+    def _read(self, reader: Reader[T], a_new_one: bool, timeout: float) -> T:
         self._subscribe()
         deadline = time.monotonic() + timeout
         with self._news:
-            while not ready():
+            while self._sample is None or (a_new_one and reader._seen == self._count):
                 if self._fault:
                     fault, self._fault = self._fault, None
                     raise fault
@@ -108,8 +134,7 @@ class Stream(Generic[T]):
                     raise Timeout(f"no sample on {self.channel} within {timeout:g} s ({self._sim._what_is_known(self.rate)})")
                 self._news.wait(min(left, 0.5))
                 self._sim._check_server()
-            self._seen = self._count
-            assert self._sample is not None
+            reader._seen = self._count
             return self._sample
 
     def __repr__(self) -> str:

@@ -29,6 +29,8 @@ import ruedo.State;
  * same commands, same output.
  */
 public final class Probe {
+    private static final double PATIENCE = 300.0;    // s, for what comes sooner or later
+
     private Probe() {}
 
     private static void say(Object... words) {
@@ -92,9 +94,13 @@ public final class Probe {
         }
     }
 
+    private static double chord(double v, double omega, double time) {
+        return Math.abs(omega == 0.0 ? v * time : 2.0 * v / omega * Math.sin(omega * time / 2.0));
+    }
+
+    /** At its speed, and for so long without an interruption: a client that gets no time for long has to begin anew. */
     private static void drive(Simulation sim, String[] a, boolean wheels) {
         Robot robot = sim.robot(a[0]);
-        Pose begin = robot.pose().latest();
         double first = Double.parseDouble(a[1]);
         double second = Double.parseDouble(a[2]);
         if (wheels) {
@@ -102,22 +108,36 @@ public final class Probe {
         } else {
             robot.setVelocity(first, second);
         }
-        sim.sleep(Double.parseDouble(a[3]));
-        MotionStatus status = robot.motion().latest();
-        say("status", status.kind, status.state, status.v, status.omega);
-        Pose end = robot.pose().next();
-        say("moved", Math.hypot(end.x() - begin.x(), end.y() - begin.y()), end.heading() - begin.heading());
-        robot.stop().await(20.0);
-        say("stopped", robot.motion().next().v);
+        double v = wheels ? robot.wheelRadius() * first : first;    // both sides alike
+        double omega = wheels ? 0.0 : second;
+        robot.pose().latest(PATIENCE);
+        while (true) {
+            MotionStatus status = robot.motion().next(PATIENCE);
+            if (Math.abs(status.v - v) > 1e-6 || Math.abs(status.omega - omega) > 1e-6) continue;
+            Pose begin = robot.pose().next(PATIENCE);
+            sim.sleep(Double.parseDouble(a[3]));
+            Pose end = robot.pose().next(PATIENCE);
+            double time = end.time() - begin.time();
+            double moved = Math.hypot(end.x() - begin.x(), end.y() - begin.y());
+            double turned = Math.IEEEremainder(end.heading() - begin.heading(), 2 * Math.PI);
+            if (Math.abs(moved - chord(v, omega, time)) > 1e-3) continue;
+            if (Math.abs(Math.IEEEremainder(turned - omega * time, 2 * Math.PI)) > 1e-3) continue;
+            say("status", status.kind, status.state, status.v, status.omega);
+            say("moved", moved, turned, time);
+            break;
+        }
+        robot.stop().await(PATIENCE);
+        say("stopped", robot.motion().next(PATIENCE).v);
     }
 
     private static void run(Simulation sim, Robot robot, String what, Supplier<Motion> start) {
-        Pose begin = robot.pose().next();
+        Pose begin = robot.pose().next(PATIENCE);
         Motion motion = start.get();
         boolean early = motion.done();
-        motion.await(60.0);
-        sim.sleep(0.1);    // poses come at 50 Hz, the end of a motion at its step
-        Pose end = robot.pose().next();
+        motion.await(PATIENCE);
+        double stood = sim.time();
+        Pose end = robot.pose().next(PATIENCE);
+        while (end.time() < stood) end = robot.pose().next(PATIENCE);    // poses come at 50 Hz, the end of a motion at its step
         say(what, early, motion.done(), motion.state(), motion.reason().isEmpty() ? "-" : motion.reason(),
                 Math.hypot(end.x() - begin.x(), end.y() - begin.y()),
                 Math.IEEEremainder(end.heading() - begin.heading(), 2 * Math.PI));
@@ -125,19 +145,19 @@ public final class Probe {
 
     private static void primitives(Simulation sim, String name) {
         Robot robot = sim.robot(name);
-        robot.stop().await(20.0);
+        robot.stop().await(PATIENCE);
         run(sim, robot, "advance", () -> robot.advance(0.4, new Limits(0.5, 0.0, 0.0)));
         run(sim, robot, "rotate", () -> robot.rotate(1.2));
         run(sim, robot, "turn_to", () -> robot.turnTo(0.0));
         run(sim, robot, "arc", () -> robot.arc(0.8, 0.5));
-        Motion replaced = robot.advance(5.0);
+        Motion replaced = robot.advance(5.0, new Limits(0.05, 0.0, 0.0));    // slowly: whoever is late finds it under way
         sim.sleep(0.5);
-        robot.stop().await(20.0);
+        robot.stop().await(PATIENCE);
         attempt("replaced", () -> replaced.await());
-        Motion running = robot.advance(5.0);
+        Motion running = robot.advance(5.0, new Limits(0.05, 0.0, 0.0));
         attempt("refused", () -> robot.advance(2e6).await());    // further than the server allows: what runs goes on
         attempt("too_long", () -> running.await(0.3));
-        robot.stop().await(20.0);
+        robot.stop().await(PATIENCE);
     }
 
     private static void errors(Simulation sim, String name) {
@@ -191,10 +211,9 @@ public final class Probe {
         Robot guest = sim.robot("guest");
         say("there", sim.state("guest").position[0], sim.robots().size(), bodiesOfGuest(sim));
         guest.setVelocity(0.3, 0.0);
-        sim.sleep(0.1);
-        sim.sleep(2.0);
-        say("drives", sim.state("guest").position[0] > 3.05, guest.lrf().latest().ranges.length);
-        guest.stop().await(20.0);
+        while (sim.state("guest").position[0] <= 3.05) sim.sleep(0.1);
+        say("drives", true, guest.lrf().latest().ranges.length);
+        guest.stop().await(PATIENCE);
         sim.setPose("guest", 3.0, 2.0, 1.0, 0.0);
         say("put", sim.state("guest").position[1]);
         sim.spawn("", text, "ball", new double[] {-3.0, 2.0, 0.0}, ahead, true);

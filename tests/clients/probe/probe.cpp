@@ -16,10 +16,14 @@ namespace rc = ruedo::client;
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
+constexpr double kPatience = 300.0;    // s, for what comes sooner or later
 
 std::string word(const std::string& text) { return text; }
 std::string word(const char* text) { return text; }
 std::string word(bool value) { return value ? "True" : "False"; }
+std::string word(rc::MotionKind value) { return to_string(value); }
+std::string word(rc::MotionState value) { return to_string(value); }
+std::string word(rc::MotionReason value) { return value == rc::MotionReason::none ? "-" : to_string(value); }
 std::string word(double value) {
   char text[64];
   std::snprintf(text, sizeof text, "%.6f", value);
@@ -94,54 +98,68 @@ void read(const rc::Simulation& sim, const std::string& name) {
   }
 }
 
+double chord(double v, double omega, double time) {
+  return std::abs(omega == 0.0 ? v * time : 2.0 * v / omega * std::sin(omega * time / 2.0));
+}
+
+// At its speed, and for so long without an interruption: a client that gets no time for long has to begin anew.
 void drive(const rc::Simulation& sim, const std::vector<std::string>& a, bool wheels) {
   const rc::Robot robot = sim.robot(a[0]);
-  const auto begin = robot.pose().latest();
-  if (wheels) {
-    robot.set_wheels(std::stod(a[1]), std::stod(a[2]));
-  } else {
-    robot.set_velocity(std::stod(a[1]), std::stod(a[2]));
+  const double first = std::stod(a[1]), second = std::stod(a[2]);
+  wheels ? robot.set_wheels(first, second) : robot.set_velocity(first, second);
+  const double v = wheels ? robot.info().wheel_radius * first : first, omega = wheels ? 0.0 : second;    // both sides alike
+  (void)robot.pose().latest(kPatience);
+  rc::MotionStatus status;
+  double moved = 0.0, turned = 0.0, time = 0.0;
+  for (bool steady = false; !steady;) {
+    status = robot.motion().next(kPatience);
+    if (std::abs(status.v - v) > 1e-6 || std::abs(status.omega - omega) > 1e-6) continue;
+    const auto begin = robot.pose().next(kPatience);
+    sim.sleep(std::stod(a[3]));
+    const auto end = robot.pose().next(kPatience);
+    time = end.time() - begin.time();
+    moved = std::hypot(end.x() - begin.x(), end.y() - begin.y());
+    turned = std::remainder(end.heading() - begin.heading(), 2 * kPi);
+    steady = std::abs(moved - chord(v, omega, time)) < 1e-3 && std::abs(std::remainder(turned - omega * time, 2 * kPi)) < 1e-3;
   }
-  sim.sleep(std::stod(a[3]));
-  const auto status = robot.motion().latest();
   say("status", status.kind, status.state, status.v, status.omega);
-  const auto end = robot.pose().next();
-  say("moved", std::hypot(end.x() - begin.x(), end.y() - begin.y()), end.heading() - begin.heading());
-  robot.stop().wait(20.0);
-  say("stopped", robot.motion().next().v);
+  say("moved", moved, turned, time);
+  robot.stop().wait(kPatience);
+  say("stopped", robot.motion().next(kPatience).v);
 }
 
 void primitives(const rc::Simulation& sim, const std::string& name) {
   const rc::Robot robot = sim.robot(name);
-  robot.stop().wait(20.0);
+  robot.stop().wait(kPatience);
   const auto run = [&](const char* what, const std::function<rc::Motion()>& start) {
-    const auto begin = robot.pose().next();
+    const auto begin = robot.pose().next(kPatience);
     const rc::Motion motion = start();
     const bool early = motion.done();
-    motion.wait(60.0);
-    sim.sleep(0.1);    // poses come at 50 Hz, the end of a motion at its step
-    const auto end = robot.pose().next();
-    say(what, early, motion.done(), motion.state(), motion.reason().empty() ? "-" : motion.reason(),
+    motion.wait(kPatience);
+    const double stood = sim.time();
+    auto end = robot.pose().next(kPatience);
+    while (end.time() < stood) end = robot.pose().next(kPatience);    // poses come at 50 Hz, the end of a motion at its step
+    say(what, early, motion.done(), motion.state(), motion.reason(),
         std::hypot(end.x() - begin.x(), end.y() - begin.y()), std::remainder(end.heading() - begin.heading(), 2 * kPi));
   };
   run("advance", [&] { return robot.advance(0.4, {.speed = 0.5}); });
   run("rotate", [&] { return robot.rotate(1.2); });
   run("turn_to", [&] { return robot.turn_to(0.0); });
   run("arc", [&] { return robot.arc(0.8, 0.5); });
-  const rc::Motion replaced = robot.advance(5.0);
+  const rc::Motion replaced = robot.advance(5.0, {.speed = 0.05});    // slowly: whoever is late finds it under way
   sim.sleep(0.5);
-  robot.stop().wait(20.0);
+  robot.stop().wait(kPatience);
   report("replaced", [&] { replaced.wait(); });
-  const rc::Motion running = robot.advance(5.0);
+  const rc::Motion running = robot.advance(5.0, {.speed = 0.05});
   report("refused", [&] { robot.advance(2e6).wait(); });    // further than the server allows: what runs goes on
   report("too_long", [&] { running.wait(0.3); });
-  robot.stop().wait(20.0);
+  robot.stop().wait(kPatience);
 }
 
 void errors(const rc::Simulation& sim, const std::string& name) {
-  report("robot", [&] { sim.robot("nobody"); });
+  report("robot", [&] { (void)sim.robot("nobody"); });
   const rc::Robot robot = sim.robot(name);
-  report("device", [&] { robot.device<rc::Scan>("nothing"); });
+  report("device", [&] { (void)robot.device<rc::Scan>("nothing"); });
   report("nan", [&] { robot.set_velocity(std::nan(""), 0.0); });
   report("radius", [&] { robot.arc(1.0, 0.0); });
   report("limit", [&] { robot.advance(1.0, {.speed = -1.0}); });
@@ -150,8 +168,8 @@ void errors(const rc::Simulation& sim, const std::string& name) {
 
 void streams(const rc::Simulation& sim, const std::string& name, double timeout) {
   const rc::Robot robot = sim.robot(name);
-  report("lrf", [&] { robot.lrf().latest(timeout); });
-  report("odometry", [&] { robot.odometry().latest(timeout); });
+  report("lrf", [&] { (void)robot.lrf().latest(timeout); });
+  report("odometry", [&] { (void)robot.odometry().latest(timeout); });
 }
 
 void control(const rc::Simulation& sim, const std::string& name) {
@@ -168,7 +186,7 @@ void control(const rc::Simulation& sim, const std::string& name) {
   sim.pause();
   sim.reset();
   say("reset", sim.state().step);
-  report("unknown", [&] { sim.state("nobody"); });
+  report("unknown", [&] { (void)sim.state("nobody"); });
   report("steps", [&] { sim.step(0); });
 }
 
@@ -188,10 +206,9 @@ void world(const rc::Simulation& sim, const std::string& text) {
   const rc::Robot guest = sim.robot("guest");
   say("there", sim.state("guest").position[0], sim.robots().size(), bodies_of_guest(sim));
   guest.set_velocity(0.3, 0.0);
-  sim.sleep(0.1);
-  sim.sleep(2.0);
-  say("drives", sim.state("guest").position[0] > 3.05, guest.lrf().latest().ranges.size());
-  guest.stop().wait(20.0);
+  while (sim.state("guest").position[0] <= 3.05) sim.sleep(0.1);
+  say("drives", true, guest.lrf().latest().ranges.size());
+  guest.stop().wait(kPatience);
   sim.set_pose("guest", 3.0, 2.0, 1.0);
   say("put", sim.state("guest").position[1]);
   sim.spawn("", -3.0, 2.0, {.name = "ball", .text = text});

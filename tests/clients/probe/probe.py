@@ -8,6 +8,8 @@ import zlib
 
 import ruedo
 
+PATIENCE = 300.0    # s, for what comes sooner or later
+
 
 def say(*words):
     print(*(f"{w:.6f}" if isinstance(w, float) else w for w in words), flush=True)
@@ -50,29 +52,45 @@ def read(sim, name):
 
 
 def drive(sim, name, first, second, seconds, wheels):
+    """At its speed, and for so long without an interruption: a client that gets no time for long has to begin anew."""
     robot = sim.robot(name)
-    begin = robot.pose.latest()
-    (robot.set_wheels if wheels else robot.set_velocity)(float(first), float(second))
-    sim.sleep(float(seconds))
-    status = robot.motion.latest()
+    first, second = float(first), float(second)
+    (robot.set_wheels if wheels else robot.set_velocity)(first, second)
+    v, omega = (robot.wheel_radius * first, 0.0) if wheels else (first, second)    # both sides alike
+    robot.pose.latest(PATIENCE)
+    while True:
+        status = robot.motion.next(PATIENCE)
+        if abs(status.v - v) > 1e-6 or abs(status.omega - omega) > 1e-6:
+            continue
+        begin = robot.pose.next(PATIENCE)
+        sim.sleep(float(seconds))
+        end = robot.pose.next(PATIENCE)
+        time = end.time - begin.time
+        moved, turned = math.hypot(end.x - begin.x, end.y - begin.y), math.remainder(end.heading - begin.heading, 2 * math.pi)
+        if abs(moved - chord(v, omega, time)) < 1e-3 and abs(math.remainder(turned - omega * time, 2 * math.pi)) < 1e-3:
+            break
     say("status", status.kind, status.state, status.v, status.omega)
-    end = robot.pose.next()
-    say("moved", math.hypot(end.x - begin.x, end.y - begin.y), end.heading - begin.heading)
-    robot.stop().wait(20.0)
-    say("stopped", robot.motion.next().v)
+    say("moved", moved, turned, time)
+    robot.stop().wait(PATIENCE)
+    say("stopped", robot.motion.next(PATIENCE).v)
+
+
+def chord(v, omega, time):
+    return abs(v * time if omega == 0.0 else 2.0 * v / omega * math.sin(omega * time / 2.0))
 
 
 def primitives(sim, name):
     robot = sim.robot(name)
-    robot.stop().wait(20.0)
+    robot.stop().wait(PATIENCE)
 
     def run(what, motion):
-        begin = robot.pose.next()
+        begin = robot.pose.next(PATIENCE)
         motion = motion()
         early = motion.done
-        motion.wait(60.0)
-        sim.sleep(0.1)    # poses come at 50 Hz, the end of a motion at its step
-        end = robot.pose.next()
+        motion.wait(PATIENCE)
+        stood, end = sim.time, robot.pose.next(PATIENCE)
+        while end.time < stood:    # poses come at 50 Hz, the end of a motion at its step
+            end = robot.pose.next(PATIENCE)
         say(what, early, motion.done, motion.state, motion.reason or "-", math.hypot(end.x - begin.x, end.y - begin.y),
             math.remainder(end.heading - begin.heading, 2 * math.pi))
 
@@ -80,14 +98,14 @@ def primitives(sim, name):
     run("rotate", lambda: robot.rotate(1.2))
     run("turn_to", lambda: robot.turn_to(0.0))
     run("arc", lambda: robot.arc(0.8, 0.5))
-    replaced = robot.advance(5.0)
+    replaced = robot.advance(5.0, speed=0.05)    # slowly: whoever is late finds it under way
     sim.sleep(0.5)
-    robot.stop().wait(20.0)
+    robot.stop().wait(PATIENCE)
     attempt("replaced", replaced.wait)
-    running = robot.advance(5.0)
+    running = robot.advance(5.0, speed=0.05)
     attempt("refused", robot.advance(2e6).wait)    # further than the server allows: what runs goes on
     attempt("too_long", lambda: running.wait(0.3))
-    robot.stop().wait(20.0)
+    robot.stop().wait(PATIENCE)
 
 
 def errors(sim, name):
@@ -139,10 +157,10 @@ def world(sim, text):
     guest = sim.robot("guest")
     say("there", sim.state("guest").position[0], len(sim.robots), sum(body.name.startswith("guest/") for body in sim.bodies))
     guest.set_velocity(0.3, 0.0)
-    sim.sleep(0.1)
-    sim.sleep(2.0)
-    say("drives", sim.state("guest").position[0] > 3.05, len(guest.lrf.latest().ranges))
-    guest.stop().wait(20.0)
+    while sim.state("guest").position[0] <= 3.05:
+        sim.sleep(0.1)
+    say("drives", True, len(guest.lrf.latest().ranges))
+    guest.stop().wait(PATIENCE)
     sim.set_pose("guest", 3.0, 2.0, 1.0)
     say("put", sim.state("guest").position[1])
     sim.spawn("", -3.0, 2.0, text=text, name="ball")

@@ -3,18 +3,22 @@ package ruedo;
 import java.util.ArrayList;
 import java.util.List;
 import ruedo.lcmtypes.move_command_t;
+import ruedo.lcmtypes.robot_info_t;
 
-/** The commands of one robot: what is repeated until changed, and the primitives under way. */
+/** The commands to one robot: what is repeated, and the primitives under way. The simulation has one for each name. */
 final class Driver {
-    private final Robot robot;
+    private final Simulation sim;
+    private final String robot;
     private String heldChannel;
     private byte[] held;
     private List<Motion> motions = new ArrayList<>();
-    private boolean listening;
+    private Subscription statuses;
     private boolean running;          // a status has shown the held command
     private boolean watchdogTold;
+    private String ended = "";
 
-    Driver(Robot robot) {
+    Driver(Simulation sim, String robot) {
+        this.sim = sim;
         this.robot = robot;
     }
 
@@ -22,27 +26,34 @@ final class Driver {
     void hold(String channel, byte[] bytes) {
         listen();
         synchronized (this) {
+            if (!ended.isEmpty()) return;
             heldChannel = channel;
             held = bytes;
             running = false;
-            robot.sim.bus.publish(channel, bytes);
+            sim.bus.publish(channel, bytes);
         }
-        robot.sim.keepRepeating(this);
+        sim.keepRepeating(this);
     }
 
     synchronized void repeat() {
-        if (held != null) robot.sim.bus.publish(heldChannel, held);
+        if (held != null) sim.bus.publish(heldChannel, held);
     }
 
     /** ms of real time between repetitions: a quarter of the watchdog's time, at most 100. */
     long periodMillis() {
-        double watchdog = robot.watchdog();
+        double watchdog = watchdog();
         return watchdog > 0.0 ? Math.round(Math.min(100.0, Math.max(10.0, watchdog * 250.0))) : 100L;
+    }
+
+    /** s; 0: none, or the robot was removed meanwhile. */
+    private double watchdog() {
+        robot_info_t info = sim.info().robots.get(robot);
+        return info == null ? 0.0 : info.watchdog_us * 1e-6;
     }
 
     Motion move(String channel, move_command_t command, String kind) {
         listen();
-        Motion motion = new Motion(robot.sim, robot.name, command.id, kind, Math.abs(command.value));
+        Motion motion = new Motion(sim, robot, command.id, kind, Math.abs(command.value));
         synchronized (this) {
             held = null;    // a repetition after this would replace the primitive
             List<Motion> underWay = new ArrayList<>();
@@ -51,17 +62,31 @@ final class Driver {
             }
             underWay.add(motion);
             motions = underWay;
-            robot.sim.bus.publish(channel, command);
+            if (!ended.isEmpty()) motion.end(ended);
+            sim.bus.publish(channel, command);
         }
         return motion;
     }
 
-    private void listen() {
+    /** Its robot, or its run, is gone: nothing is repeated to the next one of that name. */
+    void end(String reason) {
+        List<Motion> underWay;
+        Subscription listening;
         synchronized (this) {
-            if (listening) return;
-            listening = true;
+            ended = reason;
+            held = null;
+            underWay = motions;
+            motions = new ArrayList<>();
+            listening = statuses;
+            statuses = null;
         }
-        robot.motion().onSample(this::onStatus);
+        if (listening != null) listening.close();
+        for (Motion motion : underWay) motion.end(reason);
+    }
+
+    private synchronized void listen() {
+        if (!ended.isEmpty()) throw new RuedoException.UnknownName(robot + " is gone: " + ended);    // while the command was made
+        if (statuses == null) statuses = sim.robot(robot).motion().onSample(this::onStatus);
     }
 
     private void onStatus(MotionStatus status) {
@@ -74,7 +99,7 @@ final class Driver {
             watchdogTold = watchdogTold || stopped;
         }
         if (stopped) {
-            System.err.println("ruedo: " + robot.name + ": stopped by its watchdog: no command came for " + robot.watchdog()
+            System.err.println("ruedo: " + robot + ": stopped by its watchdog: no command came for " + watchdog()
                     + " s of sim time");
         }
         for (Motion motion : underWay) motion.update(status);

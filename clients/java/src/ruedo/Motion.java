@@ -36,7 +36,7 @@ public final class Motion {
         return state;
     }
 
-    /** Why it ended early or was refused, as in {@link MotionStatus#reason}. */
+    /** Why it ended early or was refused, as in {@link MotionStatus#reason}; "removed", "new run": its robot, its run is gone. */
     public synchronized String reason() {
         return reason;
     }
@@ -77,6 +77,13 @@ public final class Motion {
                     state.equals("refused") ? "was refused" : "ended", reason, remaining), reason);
         }
         return this;
+    }
+
+    synchronized void end(String why) {
+        if (done()) return;
+        state = "ended";
+        reason = why;
+        notifyAll();
     }
 
     synchronized void update(MotionStatus status) {

@@ -1,9 +1,7 @@
 package ruedo;
 
 import java.util.ArrayList;
-import java.util.HashMap;
 import java.util.List;
-import java.util.Map;
 import ruedo.lcmtypes.channel_info_t;
 import ruedo.lcmtypes.device_info_t;
 import ruedo.lcmtypes.move_command_t;
@@ -16,12 +14,6 @@ public final class Robot {
     /** As in the world file. */
     public final String name;
     final Simulation sim;
-    private final Map<String, Stream<?>> streams = new HashMap<>();    // by channel
-    private final Driver driver = new Driver(this);
-
-    Driver driver() {
-        return driver;
-    }
 
     Robot(Simulation sim, String name) {
         this.sim = sim;
@@ -167,13 +159,13 @@ public final class Robot {
      */
     public void setVelocity(double v, double omega) {
         Command command = velocityCommand(v, omega);
-        driver.hold(command.channel, command.data);
+        sim.driver(name).hold(command.channel, command.data);
     }
 
     /** The same with the rates of the left and the right wheels, rad/s, positive ahead. */
     public void setWheels(double left, double right) {
         Command command = wheelCommand(left, right);
-        driver.hold(command.channel, command.data);
+        sim.driver(name).hold(command.channel, command.data);
     }
 
     /** What {@link #setVelocity} sends, once, for {@link Simulation#step(long, List)}. */
@@ -255,7 +247,7 @@ public final class Robot {
 
     private Motion move(String kindName, byte kind, double value, double radius, Limits limits) {
         move_command_t command = moveMessage(kind, value, radius, limits);
-        return driver.move(input("move_command_t"), command, kindName);
+        return sim.driver(name).move(input("move_command_t"), command, kindName);
     }
 
     private move_command_t moveMessage(byte kind, double value, double radius, Limits limits) {
@@ -313,16 +305,12 @@ public final class Robot {
     }
 
     private Stream<?> stream(channel_info_t channel) {
-        synchronized (streams) {
-            return streams.computeIfAbsent(channel.name, key -> new Stream<>(sim, channel));
-        }
+        return sim.stream(channel, () -> new Stream<>(sim, channel));
     }
 
     private Device<?> device(device_info_t info, channel_info_t channel) {
-        synchronized (streams) {
-            return (Device<?>) streams.computeIfAbsent(channel.name, key ->
-                    channel.type.equals("image_t") ? new Camera(sim, info, channel) : new Device<>(sim, info, channel));
-        }
+        return (Device<?>) sim.stream(channel,
+                () -> channel.type.equals("image_t") ? new Camera(sim, info, channel) : new Device<>(sim, info, channel));
     }
 
     private static String names(List<Device<?>> devices) {

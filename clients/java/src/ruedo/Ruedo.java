@@ -29,7 +29,7 @@ public final class Ruedo {
 
     /** The same with a name of this client, and the seconds of real time to wait for a server. */
     public static Simulation connect(String url, String name, double timeout) {
-        return new Simulation(Bus.resolveUrl(url), name, timeout, null);
+        return new Simulation(Address.resolve(url), name, timeout, null);
     }
 
     /** {@link #launch(String, LaunchOptions)} in real time. */

@@ -53,7 +53,8 @@ final class ServerProcess {
     /** Waits for a tcpq server to listen, which it does once its world is loaded; timeout: s. */
     void awaitPort(double timeout) {
         Deadline deadline = new Deadline(timeout);
-        while (!Bus.isServed(url) && !deadline.passed()) {
+        Address address = new Address(url);
+        while (!address.isServed() && !deadline.passed()) {
             String how = ended();
             if (how != null) throw new RuedoException.LaunchError(how);
             try {
@@ -149,7 +150,7 @@ final class ServerProcess {
             try {
                 token = new ServerSocket(0, 1, InetAddress.getByName("127.0.0.1"));
                 int port = token.getLocalPort();
-                if (!Bus.hasMulticastRoute("239.255.76.67")) {
+                if (!Address.hasMulticastRoute("239.255.76.67")) {
                     token.close();    // the server itself will listen on it
                     sayOnce("ruedo: no multicast route here: launch() speaks LCM over TCP, LCM_DEFAULT_URL=tcpq://127.0.0.1:" + port);
                     return "tcpq://127.0.0.1:" + port;

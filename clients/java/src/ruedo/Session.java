@@ -30,6 +30,7 @@ final class Session {
 
     /** Joins on the first request. body: null for none. timeout: s of real time. */
     synchronized reply_t request(int kind, LCMEncodable body, double timeout) {
+        sim.checkOpen();
         WorldInfo info = sim.info();
         if (!info.supports(kind)) {
             throw new RuedoException.NotSupported("this server (Ruedo " + info.head.version + ") has no " + KINDS[kind] + " request");

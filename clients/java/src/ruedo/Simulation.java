@@ -3,12 +3,15 @@ package ruedo;
 import java.io.IOException;
 import java.util.ArrayList;
 import java.util.HashMap;
+import java.util.HashSet;
 import java.util.List;
 import java.util.Map;
 import java.util.Set;
 import java.util.concurrent.ConcurrentHashMap;
 import java.util.concurrent.atomic.AtomicLong;
+import java.util.function.Supplier;
 import lcm.lcm.LCMEncodable;
+import ruedo.lcmtypes.channel_info_t;
 import ruedo.lcmtypes.name_request_t;
 import ruedo.lcmtypes.rate_request_t;
 import ruedo.lcmtypes.request_t;
@@ -27,39 +30,58 @@ import ruedo.lcmtypes.tick_t;
 public final class Simulation implements AutoCloseable {
     private static final double SILENCE_SECONDS = 5.0;    // without any message: a server gives a sign of life each second
     private static final double REPLY_SECONDS = 5.0;
+    private static final long ASK_AGAIN_NANOS = 100_000_000;
     private static final double SLOW_REPLY_SECONDS = 60.0;
     private static final double RESTORE_SECONDS = 3600.0;
 
     /** Where it is. */
     public final String url;
     final Bus bus;
+    private final Address address;
     private final ServerProcess server;    // null: not ours
     private final Session session;
     private final Stepper stepper;
     private final WorldInfo.Assembler assembler = new WorldInfo.Assembler();
     private final Map<String, Robot> robots = new HashMap<>();
+    private final Map<String, Stream<?>> streams = new HashMap<>();    // by channel; robots, streams, drivers under robots' monitor
+    private final Map<String, Driver> drivers = new HashMap<>();        // by robot
     private final Set<Driver> repeating = ConcurrentHashMap.newKeySet();
+    private final Set<Subscription> newRun = ConcurrentHashMap.newKeySet();
     private final AtomicLong ids;
     private WorldInfo known;               // these under this object's monitor
     private RuedoException fault;
     private Thread repeater;
     private volatile long utime;
     private volatile long lastSign = System.nanoTime();
+    private volatile long asked = System.nanoTime();    // for info
+    private volatile boolean anotherRun;                // is what the last tick was of
     private volatile boolean closed;
 
     Simulation(String url, String name, double timeout, ServerProcess server) {
-        this.url = url;
+        this(new Address(url), name, timeout, server, null);
+    }
+
+    /** transport: null opens the address's. */
+    Simulation(Address address, String name, double timeout, ServerProcess server, Transport transport) {
+        this.address = address;
+        url = address.url;
         this.server = server;
         int hash = 0x811c9dc5;    // FNV-1a of the name: two clients number their primitives apart
         for (byte b : name.getBytes(java.nio.charset.StandardCharsets.UTF_8)) hash = (hash ^ (b & 255)) * 16777619;
         ids = new AtomicLong((long) (hash & 0x7fffffff) << 20);
         session = new Session(this, name);
         stepper = new Stepper(this, session);
-        bus = new Bus(url);
+        bus = new Bus(transport == null ? Transport.open(address) : transport);
         bus.subscribe("ruedo/info", this::onInfo);
         bus.subscribe("ruedo/tick", this::onTick);
         bus.subscribe("ruedo/reply", session::receive);
-        awaitInfo(timeout);
+        bus.start();
+        try {
+            awaitInfo(timeout);
+        } catch (RuntimeException error) {
+            bus.close();
+            throw error;
+        }
     }
 
     // What there is.
@@ -114,8 +136,20 @@ public final class Simulation implements AutoCloseable {
         }
     }
 
+    /**
+     * Calls back in the receiving thread when another server, or the same one started anew, answers at this address. Commands
+     * are not repeated into the new run, and primitives under way have ended.
+     */
+    public Subscription onNewRun(Runnable callback) {
+        checkOpen();
+        Subscription subscription = Subscription.of("a new run", callback, newRun::remove);
+        newRun.add(subscription);
+        return subscription;
+    }
+
     /** Waits until so many seconds of sim time have passed. */
     public synchronized void sleep(double seconds) {
+        checkOpen();
         long until = utime + Math.round(seconds * 1e6);
         Deadline never = new Deadline(Double.POSITIVE_INFINITY);
         while (utime < until) {
@@ -348,11 +382,15 @@ public final class Simulation implements AutoCloseable {
         notifyAll();
     }
 
-    void checkServer() {
+    void checkOpen() {
         if (closed) throw new RuedoException.NoServer("this simulation was closed");
+    }
+
+    void checkServer() {
+        checkOpen();
         String ended = server == null ? null : server.ended();
         if (ended != null) throw new RuedoException.NoServer(ended);
-        if (silence() > SILENCE_SECONDS && !Bus.isClaimed(url)) {    // one that is stopped, or in a debugger, is waited for
+        if (silence() > SILENCE_SECONDS && !address.isClaimed()) {    // one that is stopped, or in a debugger, is waited for
             throw new RuedoException.NoServer("nothing was heard from the server at " + url + " for 5 s");
         }
     }
@@ -381,12 +419,8 @@ public final class Simulation implements AutoCloseable {
         while (!closed) {
             long period = 100;
             for (Driver driver : repeating) {
-                try {
-                    driver.repeat();
-                    period = Math.min(period, driver.periodMillis());
-                } catch (RuedoException gone) {    // its robot was removed meanwhile
-                    repeating.remove(driver);
-                }
+                if (!anotherRun) driver.repeat();
+                period = Math.min(period, driver.periodMillis());
             }
             try {
                 Thread.sleep(period);
@@ -396,15 +430,65 @@ public final class Simulation implements AutoCloseable {
         }
     }
 
+    /** The stream of a channel, made on first use. */
+    Stream<?> stream(channel_info_t channel, Supplier<Stream<?>> make) {
+        synchronized (robots) {
+            Stream<?> known = streams.get(channel.name);
+            if (known == null || !known.type.equals(channel.type)) {    // the next run's may be another
+                known = make.get();
+                streams.put(channel.name, known);
+            }
+            return known;
+        }
+    }
+
+    Driver driver(String robot) {
+        checkOpen();
+        synchronized (robots) {
+            return drivers.computeIfAbsent(robot, key -> new Driver(this, key));
+        }
+    }
+
     /** No command is repeated to a robot that is gone, nor to the next one of its name. */
     private void forgetRemoved(WorldInfo info) {
+        Set<String> channels = new HashSet<>();
+        for (channel_info_t channel : info.channelList) channels.add(channel.name);
+        List<Driver> gone = new ArrayList<>();
+        List<Stream<?>> ended = new ArrayList<>();
         synchronized (robots) {
-            robots.entrySet().removeIf(entry -> {
-                boolean gone = !info.robots.containsKey(entry.getKey());
-                if (gone) repeating.remove(entry.getValue().driver());
-                return gone;
+            robots.keySet().retainAll(info.robots.keySet());
+            drivers.forEach((name, driver) -> {
+                if (!info.robots.containsKey(name)) gone.add(driver);
             });
+            drivers.keySet().retainAll(info.robots.keySet());
+            streams.forEach((name, stream) -> {
+                if (!channels.contains(name)) ended.add(stream);
+            });
+            streams.keySet().retainAll(channels);
         }
+        endDrivers(gone, "removed");
+        for (Stream<?> stream : ended) stream.end();
+    }
+
+    private void endDrivers(List<Driver> gone, String reason) {
+        repeating.removeAll(gone);
+        for (Driver driver : gone) driver.end(reason);
+    }
+
+    /** The server was started anew, or another has taken its place. */
+    private void beginRun() {
+        List<Driver> all;
+        List<Stream<?>> known;
+        utime = 0;
+        synchronized (robots) {
+            all = new ArrayList<>(drivers.values());
+            known = new ArrayList<>(streams.values());
+            drivers.clear();
+        }
+        endDrivers(all, "new run");
+        for (Stream<?> stream : known) stream.forget();
+        System.err.println("ruedo: another run has begun at " + url + ": commands are not repeated into it");
+        for (Subscription callback : newRun) callback.call(null);
     }
 
     private void onInfo(byte[] message) {
@@ -415,24 +499,36 @@ public final class Simulation implements AutoCloseable {
         } catch (RuedoException error) {
             wrong = error;
         }
+        WorldInfo before;
         synchronized (this) {
+            before = known;
             fault = wrong;
             if (wrong == null) lastSign = System.nanoTime();
             if (info != null) {
-                boolean anew = known != null && (known.head.run_id != info.head.run_id || known.head.epoch != info.head.epoch);
-                if (anew) utime = 0;
+                if (before != null && before.head.epoch != info.head.epoch) utime = 0;
                 known = info;
-                forgetRemoved(info);
+                anotherRun = false;
             }
             notifyAll();
         }
+        if (info == null) return;
+        forgetRemoved(info);
+        if (before != null && before.head.run_id != info.head.run_id) beginRun();
     }
 
     private void onTick(byte[] message) {
         try {
             WireReader in = new WireReader(message);
             if (in.int64() != tick_t.LCM_FINGERPRINT) return;
-            noteTime(in.int64());
+            long now = in.int64();
+            WorldInfo known = info();
+            if (known == null) return;
+            anotherRun = in.int64() != known.head.run_id;
+            if (anotherRun) {    // it may be the server's next one
+                if (System.nanoTime() - asked > ASK_AGAIN_NANOS) askInfo();
+                return;
+            }
+            noteTime(now);
             stepper.onTick(message);
         } catch (IOException error) {
             return;
@@ -448,7 +544,6 @@ public final class Simulation implements AutoCloseable {
             String ended = server == null ? null : server.ended();
             if (ended != null) throw new RuedoException.NoServer(ended);
             if (deadline.passed()) {
-                bus.close();
                 throw new RuedoException.NoServer("no Ruedo server answered at " + url + " within " + Deadline.text(timeout)
                         + " s. Is `ruedo run` started, with the same --lcm or LCM_DEFAULT_URL? `ruedo doctor` looks for what "
                         + "is wrong");
@@ -459,6 +554,7 @@ public final class Simulation implements AutoCloseable {
     }
 
     private void askInfo() {
+        asked = System.nanoTime();
         request_t request = new request_t();
         request.epoch = -1;
         request.kind = request_t.INFO;

@@ -68,6 +68,8 @@ final class Stepper {
     // All under this object's monitor.
     private boolean part;                       // takes part
     private WorldInfo info;                     // whose channels are subscribed
+    private final List<String> names = new ArrayList<>();              // of what is subscribed, by the channel's index; "": not
+    private final List<Subscription> sources = new ArrayList<>();
     private long runId;
     private int epoch;
     private long granted;
@@ -100,6 +102,7 @@ final class Stepper {
                     + " is allowed");
         }
         synchronized (session) {    // its turn: other requests wait
+            sim.checkOpen();
             if (!takesPart()) takePart(timeout);
             synchronized (this) {
                 await(have, timeout);    // for nothing, unless the call before gave up
@@ -171,10 +174,21 @@ final class Stepper {
             synchronized (this) {
                 if (early.size() == i) early.add(new ArrayDeque<>());
             }
-            boolean known = info != null && i < info.channelList.size() && info.channelList.get(i).name.equals(channel.name);
-            if (known || channel.input || (channel.robot.isEmpty() && !channel.type.equals("world_state_t"))) continue;
+            String wanted = channel.input || (channel.robot.isEmpty() && !channel.type.equals("world_state_t")) ? "" : channel.name;
+            if (names.size() == i) {
+                names.add("");
+                sources.add(null);
+            }
+            if (names.get(i).equals(wanted)) continue;
+            if (sources.get(i) != null) sources.get(i).close();
             int index = i;
-            sim.bus.subscribe(channel.name, message -> onMessage(index, message));
+            names.set(i, wanted);
+            sources.set(i, wanted.isEmpty() ? null : sim.bus.subscribe(wanted, (byte[] message) -> onMessage(index, message)));
+        }
+        for (int i = names.size() - 1; i >= found.channelList.size(); i--) {
+            if (sources.get(i) != null) sources.get(i).close();
+            names.remove(i);
+            sources.remove(i);
         }
         info = found;
     }
@@ -207,6 +221,7 @@ final class Stepper {
         Deadline deadline = new Deadline(timeout);
         wantedUntil = until;
         while (have < until || !taken) {
+            sim.checkOpen();
             long had = have;
             long quietAt = System.nanoTime() + repeat * 1_000_000;
             Deadline never = new Deadline(Double.POSITIVE_INFINITY);
@@ -267,6 +282,7 @@ final class Stepper {
                 }
             }
         }
+        if (wanted.size() > MOST_WANTED) wanted = wanted.subList(0, MOST_WANTED);    // the rest when these have come
         resend_request_t body = new resend_request_t();
         body.received = have;
         body.nwanted = wanted.size();

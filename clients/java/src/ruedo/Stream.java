@@ -7,13 +7,12 @@ import java.util.function.Consumer;
 import ruedo.lcmtypes.channel_info_t;
 
 /**
- * A stream of samples from one channel. Thread safe; the first use subscribes.
+ * A stream of samples from one channel. Thread safe; the first use subscribes. It is a reader of itself; who reads beside it
+ * takes a {@link #reader()} of its own.
  *
  * @param <T> kind of sample
  */
-public class Stream<T extends Sample> {
-    static final double DEFAULT_TIMEOUT = 5.0;    // s
-
+public class Stream<T extends Sample> extends Reader<T> {
     /** Its name on the bus. */
     public final String channel;
     /** Its message type. */
@@ -24,14 +23,14 @@ public class Stream<T extends Sample> {
     final Simulation sim;
     private final long fingerprint;
     private final Conversions.Conversion conversion;
-    private final List<Consumer<? super T>> callbacks = new CopyOnWriteArrayList<>();
-    private boolean open;
+    private final List<Subscription> callbacks = new CopyOnWriteArrayList<>();
+    private Subscription source;    // these under this object's monitor
     private T sample;
-    private long count;    // samples received
-    private long seen;     // of those, the newest that a call has returned
+    private long count;             // samples received
     private RuedoException fault;
 
     Stream(Simulation sim, channel_info_t info) {
+        super(null);
         this.sim = sim;
         channel = info.name;
         type = info.type;
@@ -40,49 +39,49 @@ public class Stream<T extends Sample> {
         conversion = Conversions.of(type);
     }
 
-    /** {@link #latest(double)}, at most 5 s. */
-    public T latest() {
-        return latest(DEFAULT_TIMEOUT);
-    }
-
-    /** The newest sample. Before the first one it waits, at most timeout seconds of real time. */
-    public T latest(double timeout) {
-        return await(false, timeout);
-    }
-
-    /** {@link #next(double)}, at most 5 s. */
-    public T next() {
-        return next(DEFAULT_TIMEOUT);
+    /** A reader that has seen nothing yet. */
+    public Reader<T> reader() {
+        return new Reader<>(this);
     }
 
     /**
-     * The newest sample that neither latest() nor next() of this channel has returned yet; waits for one, at most timeout
-     * seconds of real time. A reader slower than the rate skips samples; onSample() skips none.
+     * Calls back in the receiving thread for every sample from now on, until what it returns is closed (or the simulation).
+     * The callback must be quick, and must not wait for other samples or replies.
      */
-    public T next(double timeout) {
-        return await(true, timeout);
-    }
-
-    /**
-     * Calls back in the receiving thread for every sample from now on. The callback must be quick, and must not wait for
-     * other samples or replies.
-     */
-    public void onSample(Consumer<? super T> callback) {
-        callbacks.add(callback);
+    public Subscription onSample(Consumer<? super T> callback) {
+        Subscription subscription = Subscription.of(channel, callback, callbacks::remove);
         subscribe();
+        callbacks.add(subscription);
+        return subscription;
     }
 
     private void subscribe() {
+        sim.checkOpen();
         synchronized (this) {
-            if (open) return;
+            if (source != null) return;
             if (conversion == null) {
                 throw new RuedoException.TypeMismatch(channel + ": this client does not know the type " + type
                         + " of the server's Ruedo " + sim.version());
             }
             if (fingerprint != conversion.fingerprint) throw mismatch(fingerprint);
-            open = true;
+            source = sim.bus.subscribe(channel, this::receive);
         }
-        sim.bus.subscribe(channel, this::receive);
+    }
+
+    /** Its robot is gone. */
+    void end() {
+        Subscription ended;
+        synchronized (this) {
+            ended = source;
+            source = null;
+        }
+        if (ended != null) ended.close();
+    }
+
+    /** What came is of a run that has ended. */
+    synchronized void forget() {
+        sample = null;
+        fault = null;
     }
 
     private RuedoException.TypeMismatch mismatch(long found) {
@@ -116,20 +115,14 @@ public class Stream<T extends Sample> {
         }
         if (received == null) return;
         sim.noteTime(received.utime);
-        for (Consumer<? super T> callback : callbacks) {
-            try {
-                callback.accept(received);
-            } catch (RuntimeException error) {    // the receiving thread lives on
-                System.err.println("ruedo: a callback on " + channel + " failed: " + error);
-            }
-        }
+        for (Subscription callback : callbacks) callback.call(received);
     }
 
-    private T await(boolean newOne, double timeout) {
+    T read(Reader<T> reader, boolean newOne, double timeout) {
         subscribe();
         Deadline deadline = new Deadline(timeout);
         synchronized (this) {
-            while (newOne ? count == seen : count == 0) {
+            while (sample == null || (newOne && count == reader.seen)) {
                 if (fault != null) {
                     RuedoException thrown = fault;
                     fault = null;
@@ -142,7 +135,7 @@ public class Stream<T extends Sample> {
                 deadline.waitOn(this, 500);
                 sim.checkServer();
             }
-            seen = count;
+            reader.seen = count;
             return sample;
         }
     }

@@ -1,0 +1,99 @@
+// LCM URLs.
+#include "address.h"
+
+#include <netdb.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+
+#include "ruedo/client.h"
+
+namespace ruedo::client {
+namespace {
+
+bool can_connect(const std::string& host, const std::string& port, int type, std::string& why) {
+  addrinfo hints{}, *found = nullptr;
+  hints.ai_family = AF_INET;
+  hints.ai_socktype = type;
+  if (const int error = getaddrinfo(host.c_str(), port.c_str(), &hints, &found)) {
+    why = gai_strerror(error);
+    return false;
+  }
+  const int fd = socket(found->ai_family, found->ai_socktype | SOCK_CLOEXEC, 0);
+  const bool connected = fd >= 0 && connect(fd, found->ai_addr, found->ai_addrlen) == 0;
+  if (!connected) why = std::strerror(errno);
+  if (fd >= 0) ::close(fd);
+  freeaddrinfo(found);
+  return connected;
+}
+
+}  // namespace
+
+Address split(const std::string& url) {
+  Address address;
+  const size_t scheme_end = url.find("://");
+  if (scheme_end == std::string::npos) return address;
+  address.scheme = url.substr(0, scheme_end);
+  const size_t options = url.find('?');
+  if (options != std::string::npos) address.options = url.substr(options);
+  const std::string network = url.substr(scheme_end + 3, options == std::string::npos ? options : options - scheme_end - 3);
+  const size_t colon = network.rfind(':');
+  address.host = network.substr(0, colon);
+  if (colon != std::string::npos) address.port = network.substr(colon + 1);
+  const bool udpm = address.scheme == "udpm";
+  if (address.host.empty()) address.host = udpm ? "239.255.76.67" : "127.0.0.1";
+  if (address.port.empty()) address.port = udpm ? "7667" : "7700";
+  return address;
+}
+
+std::string resolve_url(const std::string& url) {
+  if (!url.empty()) return url;
+  const char* named = std::getenv("LCM_DEFAULT_URL");
+  if (named && *named) return named;
+  // What `ruedo run` serves by itself: TCP where multicast has no route.
+  return has_multicast_route() ? "udpm://239.255.76.67:7667?ttl=0" : "tcpq://127.0.0.1:7700";
+}
+
+bool has_multicast_route(const std::string& group) {
+  std::string why;
+  return can_connect(group, "7667", SOCK_DGRAM, why);
+}
+
+bool is_served(const std::string& url) {
+  const Address address = split(url);
+  std::string why;
+  return address.scheme != "tcpq" || can_connect(address.host, address.port, SOCK_STREAM, why);
+}
+
+bool is_claimed(const std::string& url) {
+  const Address address = split(url);
+  const std::string claim = " @ruedo/" + address.scheme + "/" + address.host + ":" + address.port;
+  std::ifstream sockets("/proc/net/unix");
+  for (std::string line; std::getline(sockets, line);) {
+    if (line.size() >= claim.size() && line.compare(line.size() - claim.size(), claim.size(), claim) == 0) return true;
+  }
+  return false;
+}
+
+void check_reachable(const std::string& url) {
+  const Address address = split(url);
+  std::string why;
+  if (address.scheme == "udpm") {
+    if (has_multicast_route(address.host)) return;
+    throw NoServer(url + ": this machine has no route for multicast. On Linux: sudo ip route add 224.0.0.0/4 dev lo; "
+                         "`ruedo doctor` tells more");
+  }
+  if (address.scheme == "tcpq") {
+    if (can_connect(address.host, address.port, SOCK_STREAM, why)) return;
+    throw NoServer("no Ruedo server at " + url + " (" + why + "). Is `ruedo run` started with this --lcm? `ruedo doctor` "
+                   "looks for what is wrong");
+  }
+  if (address.scheme == "memq" || address.scheme == "file") return;
+  throw NoServer(url + ": not an LCM URL; udpm://GROUP:PORT?ttl=0 or tcpq://HOST:PORT is");
+}
+
+}  // namespace ruedo::client

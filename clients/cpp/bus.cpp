@@ -1,0 +1,123 @@
+// Handlers by channel, and the receiving thread.
+#include "bus.h"
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <mutex>
+#include <string_view>
+
+namespace ruedo::client {
+namespace {
+
+constexpr std::chrono::milliseconds kLendTime(20);
+
+}  // namespace
+
+struct Bus::State : std::enable_shared_from_this<Bus::State> {
+  using Handlers = CallbackList<const uint8_t*, size_t>;
+
+  explicit State(std::unique_ptr<Transport> carrier) : transport(std::move(carrier)) {}
+
+  void receive();
+  void handle(std::chrono::milliseconds timeout);
+  void leave(const std::string& channel);
+
+  const std::unique_ptr<Transport> transport;
+  std::mutex mutex;
+  std::map<std::string, std::shared_ptr<Handlers>, std::less<>> handlers;
+  std::atomic<bool> closed{false};
+  std::mutex receiving;
+  std::atomic<std::chrono::steady_clock::rep> lent_until{0};
+};
+
+Bus::Bus(std::unique_ptr<Transport> transport) : state_(std::make_shared<State>(std::move(transport))) {}
+
+Bus::~Bus() { close(); }
+
+void Bus::start() {
+  thread_ = std::thread([state = state_] { state->receive(); });
+}
+
+Subscription Bus::subscribe(const std::string& channel, Handler handler) {
+  const std::lock_guard lock(state_->mutex);
+  auto& handlers = state_->handlers[channel];
+  if (!handlers) {
+    handlers = std::make_shared<State::Handlers>();
+    state_->transport->subscribe(channel);
+  }
+  auto callback = handlers->add(channel, std::move(handler));
+  callback->at_close([state = state_->weak_from_this(), list = std::weak_ptr(handlers), channel, raw = callback.get()] {
+    if (const auto here = list.lock()) here->remove(raw);
+    if (const auto bus = state.lock()) bus->leave(channel);
+  });
+  return Subscription(std::move(callback));
+}
+
+void Bus::State::leave(const std::string& channel) {
+  const std::lock_guard lock(mutex);
+  const auto found = handlers.find(channel);
+  if (found == handlers.end() || !found->second->empty()) return;
+  handlers.erase(found);
+  transport->unsubscribe(channel);
+}
+
+void Bus::publish(const std::string& channel, const uint8_t* bytes, size_t size) {
+  if (!state_->closed) state_->transport->publish(channel, bytes, size);
+}
+
+void Bus::receive_directly() {
+  const Turn turn(*this);
+  state_->transport->receive_directly();
+}
+
+void Bus::close() {
+  state_->closed = true;
+  if (!thread_.joinable()) return;
+  if (thread_.get_id() == std::this_thread::get_id()) {
+    thread_.detach();
+  } else {
+    thread_.join();
+  }
+}
+
+void Bus::State::handle(std::chrono::milliseconds timeout) {
+  transport->receive(timeout, [this](std::string_view channel, const uint8_t* bytes, size_t size) {
+    std::shared_ptr<Handlers> called;
+    {
+      const std::lock_guard lock(mutex);
+      if (const auto found = handlers.find(channel); found != handlers.end()) called = found->second;
+    }
+    if (called && !closed) called->call(bytes, size);
+  });
+}
+
+void Bus::State::receive() {
+  while (!closed) {
+    const auto now = std::chrono::steady_clock::now().time_since_epoch();
+    const std::chrono::steady_clock::duration lent(lent_until);
+    if (now < lent) {
+      std::this_thread::sleep_for(std::min<std::chrono::steady_clock::duration>(lent - now, kLendTime));
+    } else {
+      const std::lock_guard turn(receiving);
+      handle(std::chrono::milliseconds(100));
+    }
+  }
+}
+
+Bus::Turn::Turn(Bus& bus) : state_(bus.state_) {
+  state_->lent_until = std::numeric_limits<std::chrono::steady_clock::rep>::max();
+  state_->receiving.lock();
+}
+
+Bus::Turn::~Turn() {
+  state_->lent_until = (std::chrono::steady_clock::now() + kLendTime).time_since_epoch().count();
+  state_->receiving.unlock();
+}
+
+void Bus::Turn::handle(std::chrono::steady_clock::duration timeout) {
+  const auto rounded = std::chrono::ceil<std::chrono::milliseconds>(timeout).count();
+  state_->handle(std::chrono::milliseconds(std::clamp<int64_t>(rounded, 0, 1000)));
+}
+
+}  // namespace ruedo::client

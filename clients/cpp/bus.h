@@ -1,0 +1,59 @@
+// The messages of a client: one thread that receives, raw bytes to handlers.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "callbacks.h"
+#include "ruedo/client.h"
+#include "transport.h"
+
+namespace ruedo::client {
+
+// Thread safe. Handlers run in the receiving thread, one at a time.
+class Bus {
+  struct State;
+
+ public:
+  using Handler = std::function<void(const uint8_t* bytes, size_t size)>;
+
+  explicit Bus(std::unique_ptr<Transport> transport);
+  ~Bus();
+
+  void start();    // begins to receive; at least one subscription comes first: LCM's socket is made by it
+  [[nodiscard]] Subscription subscribe(const std::string& channel, Handler handler);
+  void publish(const std::string& channel, const uint8_t* bytes, size_t size);
+  void receive_directly();    // as Transport's
+  void close();               // in a handler, too: the thread ends when that returns
+
+  // Who waits for much may receive for himself: handing each message from thread to thread takes as long as getting it.
+  // While one of these lives, and a moment longer, the receiving thread sleeps, and handle() runs the handlers.
+  class Turn {
+   public:
+    explicit Turn(Bus& bus);
+    ~Turn();
+    void handle(std::chrono::steady_clock::duration timeout);    // what has come, or until the time is over
+
+   private:
+    const std::shared_ptr<State> state_;
+  };
+
+  template <class Message>
+  void publish(const std::string& channel, const Message& message) {
+    std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
+    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    publish(channel, bytes.data(), bytes.size());
+  }
+
+ private:
+  const std::shared_ptr<State> state_;    // the thread has one, too: a handler may destroy the bus
+  std::thread thread_;
+};
+
+}  // namespace ruedo::client

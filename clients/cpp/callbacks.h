@@ -1,0 +1,104 @@
+// Callbacks that can be taken back while other threads call them.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "ruedo/client.h"
+
+namespace ruedo::client {
+
+// What a Subscription holds.
+class CallbackCore {
+ public:
+  explicit CallbackCore(std::string what) : what_(std::move(what)) {}
+  virtual ~CallbackCore() = default;
+
+  // From the return on it is not called any more: waits for a call in another thread. May be called from the callback itself.
+  void close();
+  bool closed() const { return closed_; }
+  // What is to be done when it was taken back.
+  void at_close(std::function<void()> leave) { leave_ = std::move(leave); }
+
+ protected:
+  void say_failed(const char* why);
+
+  const std::string what_;    // is called on what
+  std::recursive_mutex running_;
+  std::atomic<bool> closed_{false};
+
+ private:
+  bool failed_ = false;
+  std::function<void()> leave_;
+};
+
+template <class... Arguments>
+class Callback : public CallbackCore {
+ public:
+  using Function = std::function<void(Arguments...)>;
+  Callback(std::string what, Function function) : CallbackCore(std::move(what)), function_(std::move(function)) {}
+
+  // What the callback throws is said once, and hurts nobody else.
+  void call(Arguments... arguments) {
+    const std::lock_guard lock(running_);
+    if (closed_) return;
+    try {
+      function_(arguments...);
+    } catch (const std::exception& error) {
+      say_failed(error.what());
+    } catch (...) {
+      say_failed("what it threw is no std::exception");
+    }
+  }
+
+ private:
+  const Function function_;
+};
+
+// Those who are called together. Thread safe; who comes or goes meanwhile is not called or called once more.
+template <class... Arguments>
+class CallbackList : public std::enable_shared_from_this<CallbackList<Arguments...>> {
+ public:
+  using One = Callback<Arguments...>;
+
+  std::shared_ptr<One> add(std::string what, typename One::Function function) {
+    auto one = std::make_shared<One>(std::move(what), std::move(function));
+    one->at_close([list = this->weak_from_this(), raw = one.get()] {
+      if (const auto here = list.lock()) here->remove(raw);
+    });
+    const std::lock_guard lock(mutex_);
+    auto next = std::make_shared<std::vector<std::shared_ptr<One>>>(*all_);
+    next->push_back(one);
+    all_ = std::move(next);
+    return one;
+  }
+  void remove(const One* gone) {
+    const std::lock_guard lock(mutex_);
+    auto next = std::make_shared<std::vector<std::shared_ptr<One>>>(*all_);
+    next->erase(std::remove_if(next->begin(), next->end(), [&](const auto& one) { return one.get() == gone; }), next->end());
+    all_ = std::move(next);
+  }
+  bool empty() const { return snapshot()->empty(); }
+  void call(Arguments... arguments) const {
+    const All all = snapshot();    // one that leaves meanwhile lives on until the loop's end
+    for (const auto& one : *all) one->call(arguments...);
+  }
+
+ private:
+  using All = std::shared_ptr<const std::vector<std::shared_ptr<One>>>;
+  All snapshot() const {
+    const std::lock_guard lock(mutex_);
+    return all_;
+  }
+  mutable std::mutex mutex_;
+  All all_ = std::make_shared<const std::vector<std::shared_ptr<One>>>();
+};
+
+}  // namespace ruedo::client

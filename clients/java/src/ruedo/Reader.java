@@ -1,0 +1,42 @@
+package ruedo;
+
+/**
+ * Reads a stream at a pace of its own, which other readers of the stream do not change. Thread safe.
+ *
+ * @param <T> kind of sample
+ */
+public class Reader<T extends Sample> {
+    static final double DEFAULT_TIMEOUT = 5.0;    // s
+
+    private final Stream<T> stream;
+    long seen;    // of the samples received, the newest that a call has returned; under the stream's monitor
+
+    /** stream: null for a stream, which is a reader of itself. */
+    @SuppressWarnings("unchecked")
+    Reader(Stream<T> stream) {
+        this.stream = stream == null ? (Stream<T>) this : stream;
+    }
+
+    /** {@link #latest(double)}, at most 5 s. */
+    public T latest() {
+        return latest(DEFAULT_TIMEOUT);
+    }
+
+    /** The newest sample. Before the first one it waits, at most timeout seconds of real time. */
+    public T latest(double timeout) {
+        return stream.read(this, false, timeout);
+    }
+
+    /** {@link #next(double)}, at most 5 s. */
+    public T next() {
+        return next(DEFAULT_TIMEOUT);
+    }
+
+    /**
+     * The newest sample that neither latest() nor next() has returned yet; waits for one, at most timeout seconds of real
+     * time. A reader slower than the rate skips samples; onSample() skips none.
+     */
+    public T next(double timeout) {
+        return stream.read(this, true, timeout);
+    }
+}

@@ -1,0 +1,32 @@
+package ruedo;
+
+/** What carries messages. Thread safe, also within the receiver. */
+interface Transport {
+    /** Called by the transport's own thread, one message at a time. What it throws does not end that thread. */
+    interface Receiver {
+        /** Whether anybody listens to that channel: else its messages are passed over. */
+        boolean wants(String channel);
+
+        /** message: all of its bytes, the receiver's from now on. */
+        void receive(String channel, byte[] message);
+    }
+
+    /** Throws NoServer, with the cure, when nothing can come from there. */
+    static Transport open(Address address) {
+        address.checkReachable();
+        return address.multicast ? new UdpmTransport(address) : new TcpqTransport(address);
+    }
+
+    /** Begins to receive. */
+    void start(Receiver receiver);
+
+    /** From the return on, every message of that channel is received. */
+    void subscribe(String channel);
+
+    void unsubscribe(String channel);
+
+    /** What cannot be sent is lost, as any datagram may be; who waits for an answer repeats. */
+    void publish(String channel, byte[] message);
+
+    void close();
+}

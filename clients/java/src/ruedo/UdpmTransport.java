@@ -1,0 +1,197 @@
+package ruedo;
+
+import java.io.IOException;
+import java.net.DatagramPacket;
+import java.net.InetAddress;
+import java.net.InetSocketAddress;
+import java.net.MulticastSocket;
+import java.net.SocketAddress;
+import java.net.StandardSocketOptions;
+import java.nio.ByteBuffer;
+import java.nio.charset.StandardCharsets;
+import java.util.Arrays;
+import java.util.BitSet;
+import java.util.LinkedHashMap;
+import java.util.Map;
+
+/**
+ * LCM over multicast: short messages in one datagram, long ones in fragments. LCM's own class for it is not used: its reader
+ * thread ends at the first broken datagram, and at an Error in a callback; it holds a lock while callbacks run; it cannot be
+ * closed in silence.
+ */
+final class UdpmTransport implements Transport {
+    private static final int SHORT = 0x4c433032;          // "LC02"
+    private static final int LONG = 0x4c433033;           // "LC03"
+    private static final int MOST_IN_A_DATAGRAM = 64000;  // bytes of channel and message
+    private static final int LONGEST = 64 << 20;          // bytes of a message that is put together
+    private static final int MOST_SENDERS = 32;           // of messages that are not whole yet
+
+    /** Of each sender the newest message that is not whole yet. */
+    private static final class Partial {
+        final int sequence;
+        final byte[] data;
+        final BitSet here = new BitSet();
+        String channel;
+        int missing;
+
+        Partial(int sequence, int size, int fragments) {
+            this.sequence = sequence;
+            data = new byte[size];
+            missing = fragments;
+        }
+    }
+
+    private final InetSocketAddress group;
+    private final MulticastSocket socket;
+    private int sequence;    // under this object's monitor
+    private volatile boolean closed;
+    private final Map<SocketAddress, Partial> partials = new LinkedHashMap<>() {    // the receiving thread's
+        private static final long serialVersionUID = 1L;
+
+        @Override
+        protected boolean removeEldestEntry(Map.Entry<SocketAddress, Partial> eldest) {
+            return size() > MOST_SENDERS;
+        }
+    };
+
+    UdpmTransport(Address address) {
+        try {
+            group = new InetSocketAddress(InetAddress.getByName(address.host), address.port);
+            socket = new MulticastSocket(address.port);
+            int buffer = address.option("recv_buf_size", 0);
+            if (buffer > 0) socket.setReceiveBufferSize(buffer);
+            socket.setOption(StandardSocketOptions.IP_MULTICAST_LOOP, true);
+            socket.setTimeToLive(Math.max(0, Math.min(255, address.option("ttl", 0))));
+            socket.joinGroup(group, null);
+        } catch (IOException | RuntimeException error) {
+            throw new RuedoException.NoServer(address.url + ": it cannot be used (" + error.getMessage()
+                    + "); `ruedo doctor` looks for what is wrong");
+        }
+    }
+
+    @Override
+    public void start(Receiver receiver) {
+        Thread thread = new Thread(() -> run(receiver), "ruedo-receive");
+        thread.setDaemon(true);
+        thread.start();
+    }
+
+    @Override
+    public void subscribe(String channel) {}    // all come
+
+    @Override
+    public void unsubscribe(String channel) {}
+
+    @Override
+    public void close() {
+        closed = true;
+        socket.close();
+    }
+
+    @Override
+    public void publish(String channel, byte[] message) {
+        byte[] name = (channel + "\0").getBytes(StandardCharsets.US_ASCII);
+        try {
+            synchronized (this) {
+                sequence++;
+                if (name.length + message.length <= MOST_IN_A_DATAGRAM) {
+                    send(ByteBuffer.allocate(8 + name.length + message.length).putInt(SHORT).putInt(sequence).put(name).put(message));
+                } else {
+                    sendFragments(name, message);
+                }
+            }
+        } catch (IOException error) {
+            // lost
+        }
+    }
+
+    private void sendFragments(byte[] name, byte[] message) throws IOException {
+        int first = MOST_IN_A_DATAGRAM - name.length;
+        int fragments = 1 + (message.length - first + MOST_IN_A_DATAGRAM - 1) / MOST_IN_A_DATAGRAM;
+        for (int i = 0, at = 0; i < fragments; i++) {
+            int size = Math.min(i == 0 ? first : MOST_IN_A_DATAGRAM, message.length - at);
+            ByteBuffer out = ByteBuffer.allocate(20 + name.length + size).putInt(LONG).putInt(sequence).putInt(message.length)
+                    .putInt(at).putShort((short) i).putShort((short) fragments);
+            if (i == 0) out.put(name);
+            send(out.put(message, at, size));
+            at += size;
+        }
+    }
+
+    private void send(ByteBuffer bytes) throws IOException {
+        socket.send(new DatagramPacket(bytes.array(), bytes.position(), group));
+    }
+
+    private void run(Receiver receiver) {
+        DatagramPacket packet = new DatagramPacket(new byte[65536], 65536);
+        while (!closed) {
+            try {
+                socket.receive(packet);
+                take(packet, receiver);
+            } catch (IOException error) {
+                if (!closed) pause();
+            } catch (Throwable error) {    // whatever came, the receiving thread lives
+                System.err.println("ruedo: a message was passed over: " + error);
+            }
+        }
+    }
+
+    private static void pause() {
+        try {
+            Thread.sleep(10);
+        } catch (InterruptedException error) {
+            Thread.currentThread().interrupt();
+        }
+    }
+
+    private void take(DatagramPacket packet, Receiver receiver) {
+        ByteBuffer in = ByteBuffer.wrap(packet.getData(), packet.getOffset(), packet.getLength());
+        if (in.remaining() < 8) return;
+        int magic = in.getInt();
+        int number = in.getInt();
+        if (magic == LONG) {
+            takeFragment(packet.getSocketAddress(), number, in, receiver);
+        } else if (magic == SHORT) {
+            String channel = channel(in);
+            if (channel == null || !receiver.wants(channel)) return;
+            byte[] message = new byte[in.remaining()];
+            in.get(message);
+            receiver.receive(channel, message);
+        }
+    }
+
+    private void takeFragment(SocketAddress sender, int number, ByteBuffer in, Receiver receiver) {
+        if (in.remaining() < 12) return;
+        int size = in.getInt();
+        int offset = in.getInt();
+        int fragment = in.getShort() & 0xffff;
+        int fragments = in.getShort() & 0xffff;
+        if (size < 0 || size > LONGEST || fragment >= fragments) return;
+        String channel = fragment == 0 ? channel(in) : null;
+        if (fragment == 0 && (channel == null || !receiver.wants(channel))) return;
+        if (offset < 0 || offset > size - in.remaining()) return;
+        Partial partial = partials.get(sender);
+        if (partial == null || partial.sequence != number || partial.data.length != size) {
+            partials.remove(sender);
+            partial = new Partial(number, size, fragments);
+            partials.put(sender, partial);
+        }
+        if (partial.here.get(fragment)) return;
+        partial.here.set(fragment);
+        if (channel != null) partial.channel = channel;
+        in.get(partial.data, offset, in.remaining());
+        if (--partial.missing > 0) return;
+        partials.remove(sender);
+        if (partial.channel != null) receiver.receive(partial.channel, partial.data);
+    }
+
+    /** The name in front of a message; null where it has no end. */
+    private static String channel(ByteBuffer in) {
+        int from = in.position();
+        int end = from;
+        while (end < in.limit() && in.get(end) != 0) end++;
+        if (end == in.limit()) return null;
+        in.position(end + 1);
+        return new String(Arrays.copyOfRange(in.array(), from, end), StandardCharsets.US_ASCII);
+    }
+}

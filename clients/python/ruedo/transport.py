@@ -1,0 +1,106 @@
+"""What carries messages: the interface, and LCM behind it."""
+
+from __future__ import annotations
+
+import math
+import select
+import threading
+import time
+from contextlib import nullcontext
+from typing import Any, Callable, ContextManager, Protocol
+
+import lcm
+
+from .address import check_reachable
+
+Receiver = Callable[[str, bytes], None]    # channel, message
+
+
+class Transport(Protocol):
+    """receive() is called by one thread at a time, the rest by any, also while receive() waits or its receiver runs."""
+
+    def subscribe(self, channel: str) -> None:
+        """From the return on, every message of that channel is received."""
+
+    def unsubscribe(self, channel: str) -> None: ...
+
+    def publish(self, channel: str, data: bytes) -> None: ...
+
+    def receive(self, seconds: float, receiver: Receiver) -> bool:
+        """Hands over what has come, or waits for it at most so long and returns False."""
+
+    def close(self) -> None:
+        """receive() returns soon, and nothing is sent any more."""
+
+
+def open_transport(url: str) -> Transport:
+    """Raises NoServer, with the cure, when nothing can come from that URL."""
+    check_reachable(url)
+    return LcmTransport(url)
+
+
+class LcmTransport:
+    """LCM, which forbids most of what Transport promises:
+
+    - Its module runs callbacks from handle() without the interpreter's lock until it has read its subscription. Beside
+      that, subscribe() has a subscription called before its fields are set, and unsubscribe() frees it: both crash.
+    - lcm_unsubscribe() changes the list that a dispatch in another thread walks through.
+    - Over TCP publish(), subscribe() and handle() use one socket without a lock: they mix their bytes, and one closes what
+      another writes to.
+
+    So one lock is around every call; what comes is handed over after it was released, and waiting is done outside.
+    """
+
+    def __init__(self, url: str):
+        self._lcm = lcm.LCM(url)
+        self._lock = threading.Lock()
+        self._sending: ContextManager[Any] = nullcontext() if url.startswith("udpm:") else self._lock    # multicast has a lock of its own
+        self._subscriptions: dict[str, Any] = {}
+        self._arrived: list[tuple[str, bytes]] = []
+        self._poll = select.poll()
+        self._polled = -1
+        self._closed = False
+
+    def subscribe(self, channel: str) -> None:
+        escaped = "".join("\\" + c if c in ".^$*+?{}[]\\|()" else c for c in channel)    # LCM takes a regex
+        with self._lock:
+            self._subscriptions[channel] = self._lcm.subscribe(escaped, self._arrive)
+
+    def unsubscribe(self, channel: str) -> None:
+        with self._lock:
+            self._lcm.unsubscribe(self._subscriptions.pop(channel))
+
+    def publish(self, channel: str, data: bytes) -> None:
+        with self._sending:
+            if not self._closed:
+                self._lcm.publish(channel, data)
+
+    def receive(self, seconds: float, receiver: Receiver) -> bool:
+        try:
+            if self._wait(seconds):
+                with self._lock:
+                    self._lcm.handle_timeout(0)
+        except OSError:    # TCP: the server is gone; those who wait find out by their timeouts
+            time.sleep(min(seconds, 0.1))
+        arrived, self._arrived = self._arrived, []
+        for channel, data in arrived:
+            receiver(channel, data)
+        return bool(arrived)
+
+    def close(self) -> None:
+        self._closed = True
+
+    def _arrive(self, channel: str, data: bytes) -> None:
+        self._arrived.append((channel, data))
+
+    def _wait(self, seconds: float) -> bool:
+        file = self._lcm.fileno()
+        if file != self._polled:    # TCP: connected again
+            if self._polled >= 0:
+                self._poll.unregister(self._polled)
+            if file >= 0:
+                self._poll.register(file, select.POLLIN)
+            self._polled = file
+        if file < 0:    # TCP without a server: publish() tries to connect
+            raise OSError
+        return bool(self._poll.poll(math.ceil(seconds * 1e3)))

@@ -1,0 +1,200 @@
+// A server in memory, as far as a client needs one: it says what there is, takes sessions, and notes what it hears.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core.h"
+#include "ruedo/channel_info_t.hpp"
+#include "ruedo/motion_status_t.hpp"
+#include "ruedo/odometry_t.hpp"
+#include "ruedo/reply_t.hpp"
+#include "ruedo/request_t.hpp"
+#include "ruedo/tick_t.hpp"
+#include "ruedo/velocity_command_t.hpp"
+#include "ruedo/world_info_t.hpp"
+#include "server_process.h"
+#include "transport.h"
+
+namespace ruedo::client {
+
+// What the test and the client's transport share.
+class FakeServer {
+ public:
+  using Bytes = std::vector<uint8_t>;
+
+  int64_t run_id = 7;
+  std::vector<std::string> robots{"p3at"};
+
+  template <class Message>
+  void send(const std::string& channel, const Message& message) {
+    Bytes bytes(static_cast<size_t>(message.getEncodedSize()));
+    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    send_bytes(channel, std::move(bytes));
+  }
+  void send_bytes(const std::string& channel, Bytes bytes) {
+    const std::lock_guard lock(mutex_);
+    to_client_.emplace_back(channel, std::move(bytes));
+    news_.notify_all();
+  }
+
+  void send_info() {
+    world_info_t info{};
+    info.run_id = run_id;
+    info.nparts = 1;
+    info.version = "1";
+    info.world = "memory";
+    info.step_us = 5000;
+    info.features = -1;
+    for (const std::string& name : robots) {
+      robot_info_t robot{};
+      robot.name = name;
+      robot.drive = "kinematic";
+      robot.watchdog_us = 40'000;
+      info.robots.push_back(robot);
+      add(info, name, "odometry", "odometry_t", odometry_t::getHash(), false);
+      add(info, name, "motion", "motion_status_t", motion_status_t::getHash(), false);
+      add(info, name, "velocity", "velocity_command_t", velocity_command_t::getHash(), true);
+      add(info, name, "move", "move_command_t", 0, true);
+    }
+    info.nrobots = static_cast<int32_t>(info.robots.size());
+    info.ndevices = static_cast<int32_t>(info.devices.size());
+    info.nchannels = static_cast<int32_t>(info.channels.size());
+    send("ruedo/info", info);
+  }
+  void send_tick(int64_t utime) {
+    tick_t tick{};
+    tick.utime = utime;
+    tick.run_id = run_id;
+    tick.nparts = 1;
+    send("ruedo/tick", tick);
+  }
+  void send_odometry(const std::string& robot, int64_t utime, double x) {
+    odometry_t odometry{};
+    odometry.utime = utime;
+    odometry.x = x;
+    send(robot + "/odometry", odometry);
+  }
+  void send_motion(const std::string& robot, int64_t utime, int64_t id, int8_t state, int8_t reason = 0) {
+    motion_status_t status{};
+    status.utime = utime;
+    status.id = id;
+    status.kind = 1;
+    status.state = state;
+    status.reason = reason;
+    send(robot + "/motion", status);
+  }
+
+  // How many messages of a channel came from the client so far.
+  int64_t heard(const std::string& channel) {
+    const std::lock_guard lock(mutex_);
+    return heard_[channel];
+  }
+  void await(const std::function<bool()>& ready) {
+    while (!ready()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  // All that was sent so far has been handed to the client's handlers.
+  void await_delivery() {
+    std::unique_lock lock(mutex_);
+    news_.wait(lock, [&] { return to_client_.empty() && !delivering_; });
+  }
+
+ private:
+  friend class FakeTransport;
+
+  static void add(world_info_t& info, const std::string& robot, const std::string& name, const std::string& type, int64_t fingerprint, bool input) {
+    channel_info_t channel{};
+    channel.name = robot + "/" + name;
+    channel.robot = robot;
+    channel.device = name;
+    channel.type = type;
+    channel.fingerprint = fingerprint;
+    channel.rate = 50.0;
+    channel.input = input;
+    info.channels.push_back(channel);
+    if (input) return;
+    device_info_t device{};
+    device.robot = robot;
+    device.name = device.kind = name;
+    info.devices.push_back(device);
+  }
+
+  void hear(const std::string& channel, const uint8_t* bytes, size_t size) {
+    {
+      const std::lock_guard lock(mutex_);
+      ++heard_[channel];
+      news_.notify_all();
+    }
+    if (channel != "ruedo/request") return;
+    request_t request;
+    if (request.decode(bytes, 0, static_cast<int>(size)) < 0) return;
+    if (request.kind == request_t::INFO) return send_info();
+    reply_t reply{};
+    reply.run_id = run_id;
+    reply.session = request.kind == request_t::JOIN ? 5 : request.session;
+    reply.sequence = request.sequence;
+    reply.kind = request.kind;
+    send("ruedo/reply", reply);
+  }
+
+  std::mutex mutex_;
+  std::condition_variable news_;
+  std::deque<std::pair<std::string, Bytes>> to_client_;
+  std::map<std::string, int64_t> heard_;
+  bool delivering_ = false;
+};
+
+class FakeTransport : public Transport {
+ public:
+  explicit FakeTransport(std::shared_ptr<FakeServer> server) : server_(std::move(server)) {}
+
+  void subscribe(const std::string& channel) override {
+    const std::lock_guard lock(mutex_);
+    ++subscribed_[channel];
+  }
+  void unsubscribe(const std::string& channel) override {
+    const std::lock_guard lock(mutex_);
+    subscribed_.erase(channel);
+  }
+  void publish(const std::string& channel, const uint8_t* bytes, size_t size) override { server_->hear(channel, bytes, size); }
+  bool receive(std::chrono::milliseconds timeout, const Receiver& receiver) override {
+    std::unique_lock lock(server_->mutex_);
+    if (!server_->news_.wait_for(lock, timeout, [&] { return !server_->to_client_.empty(); })) return false;
+    auto [channel, bytes] = std::move(server_->to_client_.front());
+    server_->to_client_.pop_front();
+    server_->delivering_ = true;
+    lock.unlock();
+    if (wanted(channel)) receiver(channel, bytes.data(), bytes.size());
+    lock.lock();
+    server_->delivering_ = false;
+    server_->news_.notify_all();
+    return true;
+  }
+
+ private:
+  bool wanted(const std::string& channel) {
+    const std::lock_guard lock(mutex_);
+    return subscribed_.count(channel) > 0;
+  }
+
+  const std::shared_ptr<FakeServer> server_;
+  std::mutex mutex_;
+  std::map<std::string, int> subscribed_;
+};
+
+// A simulation that is served from memory.
+inline Simulation simulation(const std::shared_ptr<FakeServer>& server) {
+  auto core = std::make_shared<Core>("memq://", "test", nullptr, std::make_unique<FakeTransport>(server));
+  core->join(300.0);
+  return Simulation(std::move(core));
+}
+
+}  // namespace ruedo::client

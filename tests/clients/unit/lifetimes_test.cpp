@@ -1,0 +1,291 @@
+// Handles and callbacks that outlive what they belong to, or go before it. Under the sanitizers: nothing is used once it is freed.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <future>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "fake_transport.h"
+
+using namespace ruedo::client;
+using namespace std::chrono_literals;
+
+namespace {
+
+constexpr Duration kPatience = 300.0;
+
+class Lifetimes : public testing::Test {
+ protected:
+  // The text of the error; "" when there is none.
+  static std::string error_of(const std::function<void()>& call) {
+    try {
+      call();
+    } catch (const NoServer& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  std::shared_ptr<FakeServer> server = std::make_shared<FakeServer>();
+};
+
+TEST_F(Lifetimes, HandlesOutliveTheirSimulation) {
+  std::optional<Simulation> sim(simulation(server));
+  const Robot robot = sim->robot("p3at");
+  const Device<Odometry> odometry = robot.odometry();
+  const Stream<MotionStatus> motion = robot.motion();
+  server->send_odometry("p3at", 1000, 1.5);
+  const auto first = [&] {
+    auto got = std::async(std::launch::async, [&] { return odometry.latest(kPatience); });
+    while (got.wait_for(1ms) != std::future_status::ready) server->send_odometry("p3at", 1000, 1.5);
+    return got.get();
+  }();
+  EXPECT_EQ(first.x, 1.5);
+  const Motion under_way = robot.advance(1.0);
+  sim.reset();
+
+  const std::string closed = "this simulation was closed";
+  EXPECT_EQ(error_of([&] { (void)odometry.latest(); }), closed);    // though one is there
+  EXPECT_EQ(error_of([&] { odometry.next(); }), closed);
+  EXPECT_EQ(error_of([&] { (void)odometry.on_sample([](const Odometry&) {}); }), closed);
+  EXPECT_EQ(error_of([&] { motion.next(); }), closed);
+  EXPECT_EQ(error_of([&] { robot.set_velocity(0.1, 0.0); }), closed);
+  EXPECT_EQ(error_of([&] { robot.advance(1.0); }), closed);
+  EXPECT_EQ(error_of([&] { under_way.wait(); }), closed);
+  EXPECT_EQ(robot.info().name, "p3at");    // what is known stays known
+  EXPECT_EQ(odometry.channel(), "p3at/odometry");
+}
+
+TEST_F(Lifetimes, AfterCloseEveryRequestSaysSo) {
+  Simulation sim = simulation(server);
+  sim.close();
+  sim.close();
+  const std::vector<std::function<void()>> calls = {
+      [&] { sim.pause(); }, [&] { sim.resume(); }, [&] { sim.step(); }, [&] { sim.set_rate(1.0); }, [&] { sim.reset(); },
+      [&] { sim.spawn("p3at", 0.0, 0.0); }, [&] { sim.remove("p3at"); }, [&] { sim.set_pose("p3at", 0.0, 0.0); },
+      [&] { sim.set_twist("p3at", {}); }, [&] { (void)sim.state(); }, [&] { sim.reset_odometry("p3at"); },
+      [&] { sim.snapshot("s"); }, [&] { sim.restore("s"); }, [&] { sim.quit(); }, [&] { sim.sleep(1.0); },
+      [&] { (void)sim.on_new_run([] {}); }};
+  for (size_t i = 0; i < calls.size(); ++i) EXPECT_EQ(error_of(calls[i]), "this simulation was closed") << i;
+  EXPECT_EQ(sim.world(), "memory");
+}
+
+TEST_F(Lifetimes, OneThatWasMovedFromSaysTheSame) {
+  Simulation sim = simulation(server);
+  Simulation other = std::move(sim);
+  EXPECT_EQ(error_of([&] { (void)sim.world(); }), "this simulation was closed");    // NOLINT: moved from on purpose
+  EXPECT_EQ(error_of([&] { sim.pause(); }), "this simulation was closed");
+  EXPECT_EQ(error_of([&] { (void)sim.robot("p3at"); }), "this simulation was closed");
+  sim.close();
+  sim = std::move(other);
+  EXPECT_EQ(sim.world(), "memory");
+}
+
+TEST_F(Lifetimes, CloseWakesThoseWhoWait) {
+  Simulation sim = simulation(server);
+  auto waiting = std::async(std::launch::async, [&] { return error_of([&] { sim.robot("p3at").odometry().next(kPatience); }); });
+  auto sleeping = std::async(std::launch::async, [&] { return error_of([&] { sim.sleep(1e6); }); });
+  std::this_thread::sleep_for(1ms);
+  sim.close();
+  EXPECT_EQ(waiting.get(), "this simulation was closed");
+  EXPECT_EQ(sleeping.get(), "this simulation was closed");
+}
+
+TEST_F(Lifetimes, ACallbackIsNotCalledOnceItsSubscriptionWent) {
+  const Simulation sim = simulation(server);
+  const auto odometry = sim.robot("p3at").odometry();
+  auto count = std::make_unique<std::atomic<int>>(0);
+  int others = 0;
+  Subscription kept = odometry.on_sample([&](const Odometry&) { ++others; });
+  {
+    const Subscription own = odometry.on_sample([raw = count.get()](const Odometry&) { ++*raw; });
+    server->send_odometry("p3at", 1000, 0.0);
+    server->await_delivery();
+    EXPECT_EQ(*count, 1);
+  }
+  count.reset();    // a call after this would be seen
+  server->send_odometry("p3at", 2000, 0.0);
+  server->await_delivery();
+  kept.close();
+  EXPECT_EQ(others, 2);
+}
+
+TEST_F(Lifetimes, ClosingWaitsForACallUnderWay) {
+  const Simulation sim = simulation(server);
+  std::promise<void> begun, go_on;
+  std::atomic<bool> ended{false};
+  Subscription subscription = sim.robot("p3at").odometry().on_sample([&](const Odometry&) {
+    begun.set_value();
+    go_on.get_future().wait();
+    ended = true;
+  });
+  server->send_odometry("p3at", 1000, 0.0);
+  begun.get_future().wait();
+  std::thread later([&] {
+    std::this_thread::sleep_for(20ms);
+    go_on.set_value();
+  });
+  subscription.close();
+  EXPECT_TRUE(ended);
+  later.join();
+}
+
+TEST_F(Lifetimes, ACallbackMayTakeItselfBack) {
+  const Simulation sim = simulation(server);
+  const auto odometry = sim.robot("p3at").odometry();
+  int count = 0;
+  Subscription subscription = odometry.on_sample([&](const Odometry&) {
+    ++count;
+    subscription.close();
+  });
+  for (int i = 1; i <= 3; ++i) server->send_odometry("p3at", 1000 * i, 0.0);
+  server->await_delivery();
+  EXPECT_EQ(count, 1);
+  EXPECT_FALSE(subscription.open());
+}
+
+TEST_F(Lifetimes, ACallbackMayDestroyTheSimulation) {
+  std::optional<Simulation> sim(simulation(server));
+  std::promise<void> done;
+  sim->robot("p3at").odometry().on_sample([&](const Odometry&) {
+    sim.reset();
+    done.set_value();
+  }).keep();
+  server->send_odometry("p3at", 1000, 0.0);
+  done.get_future().wait();
+  EXPECT_FALSE(sim);
+}
+
+TEST_F(Lifetimes, WhatACallbackThrowsIsSaidOnceAndHurtsNobody) {
+  const Simulation sim = simulation(server);
+  const auto odometry = sim.robot("p3at").odometry();
+  int heard = 0;
+  testing::internal::CaptureStderr();
+  const Subscription first = odometry.on_sample([](const Odometry&) { throw std::runtime_error("a fault of the user's"); });
+  const Subscription second = odometry.on_sample([](const Odometry&) { throw 42; });
+  const Subscription third = odometry.on_sample([&](const Odometry&) { ++heard; });
+  for (int i = 1; i <= 3; ++i) server->send_odometry("p3at", 1000 * i, 0.0);
+  server->await_delivery();
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "ruedo: a callback on p3at/odometry failed: a fault of the user's; it is called on, and this is said once\n"
+            "ruedo: a callback on p3at/odometry failed: what it threw is no std::exception; it is called on, and this is said once\n");
+  EXPECT_EQ(heard, 3);
+}
+
+TEST_F(Lifetimes, EachReaderHasACursorOfItsOwn) {
+  const Simulation sim = simulation(server);
+  const Robot robot = sim.robot("p3at");
+  const auto first = robot.odometry(), second = robot.odometry();
+  const auto told = robot.odometry().on_sample([](const Odometry&) {});
+  server->send_odometry("p3at", 1000, 1.0);
+  server->await_delivery();
+  EXPECT_EQ(first.next(kPatience).x, 1.0);
+  EXPECT_EQ(second.next(kPatience).x, 1.0);                       // it is not stolen
+  EXPECT_THROW(robot.odometry().next(0.01), Timeout);             // a new one begins where the channel was last read
+  EXPECT_EQ(robot.odometry().latest(kPatience).x, 1.0);
+  server->send_odometry("p3at", 2000, 2.0);
+  server->await_delivery();
+  EXPECT_EQ(robot.odometry().next(kPatience).x, 2.0);
+  EXPECT_EQ(first.next(kPatience).x, 2.0);
+}
+
+TEST_F(Lifetimes, ANewRobotOfTheSameNameDoesNotGetTheOldCommands) {
+  const Simulation sim = simulation(server);
+  const Robot robot = sim.robot("p3at");
+  robot.set_velocity(0.1, 0.0);
+  const Motion motion = robot.advance(1.0);
+  robot.set_velocity(0.2, 0.0);
+  server->await([&] { return server->heard("p3at/velocity") >= 4; });    // it is repeated
+  server->robots = {"other"};
+  server->send_info();
+  server->await_delivery();
+  EXPECT_EQ(motion.state(), MotionState::ended);
+  EXPECT_EQ(motion.reason(), MotionReason::removed);
+  server->robots = {"p3at"};
+  server->send_info();
+  server->await_delivery();
+  const int64_t before = server->heard("p3at/velocity");
+  for (int i = 1; i <= 20; ++i) server->send_tick(1000 * i);    // each was a repetition
+  for (int i = 1; i <= 20; ++i) server->send_motion("p3at", 1000 * i, 0, ruedo::motion_status_t::STATE_RUNNING);
+  server->await_delivery();
+  EXPECT_EQ(server->heard("p3at/velocity"), before);
+  robot.set_velocity(0.3, 0.0);    // the old handle drives the new robot
+  server->send_motion("p3at", 30'000, 0, ruedo::motion_status_t::STATE_RUNNING);
+  server->await([&] { return server->heard("p3at/velocity") >= before + 3; });
+}
+
+TEST_F(Lifetimes, ANewRunIsNoticedAndNotDriven) {
+  const Simulation sim = simulation(server);
+  const Robot robot = sim.robot("p3at");
+  const auto odometry = robot.odometry();
+  std::atomic<int> events{0};
+  const Subscription event = sim.on_new_run([&] { ++events; });
+  const Subscription told = odometry.on_sample([](const Odometry&) {});
+  server->send_odometry("p3at", 5'000'000, 1.0);
+  server->await_delivery();
+  const Motion motion = robot.advance(1.0);
+  robot.set_velocity(0.2, 0.0);
+  testing::internal::CaptureStderr();
+  server->run_id = 8;
+  server->await([&] {
+    server->send_tick(1000);    // it asks who that is
+    return events == 1;
+  });
+  server->await_delivery();
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "ruedo: another run has begun at memq://: commands are not repeated into it\n");
+  const int64_t before = server->heard("p3at/velocity");
+  for (int i = 2; i <= 20; ++i) server->send_tick(1000 * i);
+  server->await_delivery();
+  EXPECT_EQ(server->heard("p3at/velocity"), before);
+  EXPECT_EQ(motion.reason(), MotionReason::new_run);
+  EXPECT_THROW((void)odometry.latest(0.01), Timeout);    // what is known is of the run before
+  EXPECT_LT(sim.time(), 1.0);
+  sim.pause();    // it joins anew
+}
+
+TEST_F(Lifetimes, WhatALaterServerSaysOfAMotionIsUnknown) {
+  const Simulation sim = simulation(server);
+  const auto motion = sim.robot("p3at").motion();
+  const Subscription told = motion.on_sample([](const MotionStatus&) {});
+  server->send_motion("p3at", 1000, 0, 99, 98);
+  server->await_delivery();
+  const MotionStatus status = motion.latest(kPatience);
+  EXPECT_EQ(status.state, MotionState::unknown);
+  EXPECT_STREQ(to_string(status.reason), "unknown");
+  EXPECT_STREQ(to_string(MotionReason::not_finite), "not finite");
+}
+
+TEST_F(Lifetimes, EightThreadsAndAllThatAClientMayDo) {
+  auto sim = std::make_shared<Simulation>(simulation(server));
+  std::vector<std::thread> threads;
+  std::atomic<int> unexpected{0};
+  for (int number = 0; number < 8; ++number) {
+    threads.emplace_back([&, number, sim = sim] {
+      const Robot robot = sim->robot("p3at");
+      for (int i = 0; i < 60; ++i) {
+        try {
+          const Subscription one = robot.odometry().on_sample([](const Odometry&) {});
+          server->send_odometry("p3at", 1000 * i, i);
+          robot.set_velocity(0.1, 0.0);
+          if (number == 0 && i % 10 == 5) server->send_info();
+          if (number == 1) (void)sim->robots();
+          if (number == 2) sim->pause();
+          if (number == 3) robot.advance(0.1);
+          if (number == 7 && i == 50) sim->close();
+        } catch (const NoServer&) {    // once it was closed
+        } catch (...) {
+          ++unexpected;
+        }
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(unexpected, 0);
+}
+
+}  // namespace
