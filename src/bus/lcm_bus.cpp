@@ -11,6 +11,7 @@
 #include <poll.h>
 #include <pthread.h>
 #include <sys/eventfd.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <spdlog/spdlog.h>
@@ -25,6 +26,12 @@ constexpr int kConnectMs = 2000;
 constexpr int kTakenTogether = 64;    // messages, before it is looked whether the bus ends
 constexpr const char* kSelfTest = "LCM_SELF_TEST";
 constexpr auto kSelfTestTime = std::chrono::milliseconds(50);
+constexpr std::chrono::milliseconds kFirstPause{50}, kLongestPause{1000};    // between connections to a server that is gone
+
+bool is_at_end(int file) {
+  char byte;
+  return file < 0 || ::recv(file, &byte, 1, MSG_PEEK | MSG_DONTWAIT) == 0;
+}
 
 }  // namespace
 
@@ -157,28 +164,39 @@ void LcmBus::subscribe_missing() {
 
 void LcmBus::read() {
   pthread_setname_np(pthread_self(), "bus");
-  const int file = multicast_ ? multicast_->file() : in_->getFileno();
+  bool lost = false;    // tcpq: the server
+  auto pause = kFirstPause;
   for (;;) {
-    pollfd waiting[2] = {{file, POLLIN, 0}, {stop_event_, POLLIN, 0}};
-    if (::poll(waiting, 2, -1) < 0) continue;    // a signal
+    const int file = multicast_ ? multicast_->file() : in_->getFileno();    // another one for each connection
+    pollfd waiting[2] = {{lost ? -1 : file, POLLIN, 0}, {stop_event_, POLLIN, 0}};
+    if (::poll(waiting, 2, lost ? static_cast<int>(pause.count()) : -1) < 0) continue;    // a signal
     if (waiting[1].revents != 0) {
       if (stopping_) return;
       uint64_t count;
       [[maybe_unused]] const ssize_t got = ::read(stop_event_, &count, sizeof count);
       take_up();
     }
-    if (waiting[0].revents != 0) handle();
+    if (!lost && waiting[0].revents == 0) continue;
+    const bool was_lost = lost;
+    lost = !handle();
+    if (!lost) pause = kFirstPause;
+    else if (was_lost) pause = std::min(2 * pause, kLongestPause);
+    else spdlog::warn("{}: the server has closed the connection; it is looked for again", url_.str());
   }
 }
 
-void LcmBus::handle() {
+// False when the connection was lost: LCM connects again when it is next asked for a message.
+bool LcmBus::handle() {
   if (!multicast_) {
-    if (in_->handle() != 0) ++failed_;
-    return;
+    const bool at_end = is_at_end(in_->getFileno());
+    if (in_->handle() == 0) return !at_end;
+    ++failed_;
+    return false;
   }
   const auto take = [this](std::string_view channel, const uint8_t* data, size_t size) { deliver(channel, data, size); };
   for (int i = 0; i < kTakenTogether && multicast_->take(take); ++i) {
   }
+  return true;
 }
 
 void LcmBus::on_message(const lcm::ReceiveBuffer* buffer, const std::string& channel) {

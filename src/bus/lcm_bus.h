@@ -46,7 +46,7 @@ class LcmBus : public Bus {
   void subscribe_missing();
   void take_up();    // what listen_to() left
   void read();
-  void handle();     // what is there
+  bool handle();     // what is there
   void on_message(const lcm::ReceiveBuffer* buffer, const std::string& channel);
   void deliver(std::string_view channel, const uint8_t* data, size_t size);
 

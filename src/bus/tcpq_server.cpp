@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <map>
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -16,6 +17,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "bus/peer_owners.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::bus {
@@ -24,15 +26,14 @@ namespace {
 constexpr auto kGreetingTime = std::chrono::seconds(3);     // until a client must have said that it is one
 constexpr auto kAcceptPause = std::chrono::milliseconds(200);
 constexpr auto kFarewellTime = std::chrono::seconds(2);
+constexpr auto kStuckTime = std::chrono::seconds(30);       // that a client may take nothing of what waits for it
+constexpr int kKeepAlive_s = 30, kKeepAliveAgain_s = 10, kKeepAlives = 3;    // until a machine that is gone is noticed
 constexpr size_t kChunk = 64 * 1024;                        // bytes received from one client at a time
 constexpr int kMostChunks = 4;                              // and then the others have their turn
 constexpr size_t kMostNumbers = 32768;
 constexpr int kMostPieces = 64;                             // messages in one call of the system
 
-void set(int socket, int level, int option) {
-  const int on = 1;
-  ::setsockopt(socket, level, option, &on, sizeof on);
-}
+void set(int socket, int level, int option, int value = 1) { ::setsockopt(socket, level, option, &value, sizeof value); }
 
 }  // namespace
 
@@ -157,23 +158,23 @@ void TcpqServer::accept_all() {
     FileHandle socket(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
     if (!socket) {
       if (errno == EINTR || errno == ECONNABORTED) continue;
-      if (errno != EAGAIN) {    // no file descriptors, no memory: the sweep looks again
-        accept_again_ = Clock::now() + kAcceptPause;
-        ::epoll_ctl(poll_.get(), EPOLL_CTL_DEL, listener_.get(), nullptr);
-      }
+      if (errno != EAGAIN) look_again_soon();    // no file descriptors, no memory
       return;
     }
     ++connections_;
-    if (clients_.size() >= kMostClients) make_place();
-    if (clients_.size() >= kMostClients) {
+    if (clients_.size() >= kMostClients && !make_place(socket)) {
       ++dropped_clients_;
       continue;    // closes it
     }
     set(socket.get(), IPPROTO_TCP, TCP_NODELAY);
     set(socket.get(), IPPROTO_TCP, TCP_QUICKACK);
+    set(socket.get(), SOL_SOCKET, SO_KEEPALIVE);
+    set(socket.get(), IPPROTO_TCP, TCP_KEEPIDLE, kKeepAlive_s);
+    set(socket.get(), IPPROTO_TCP, TCP_KEEPINTVL, kKeepAliveAgain_s);
+    set(socket.get(), IPPROTO_TCP, TCP_KEEPCNT, kKeepAlives);
     Client& client = clients_.emplace_back();
     client.socket = std::move(socket);
-    client.since = Clock::now();
+    client.since = client.moved = Clock::now();
     epoll_event event{};
     event.events = EPOLLIN;
     event.data.ptr = &client;
@@ -181,16 +182,42 @@ void TcpqServer::accept_all() {
   }
 }
 
-// All places are taken: the oldest that has not greeted goes, else the oldest that greeted and said nothing more.
-void TcpqServer::make_place() {
+// The sweep does; until then newcomers wait in the kernel.
+void TcpqServer::look_again_soon() {
+  accept_again_ = Clock::now() + kAcceptPause;
+  ::epoll_ctl(poll_.get(), EPOLL_CTL_DEL, listener_.get(), nullptr);
+}
+
+// All places are taken: the oldest that has not greeted goes, else the oldest that greeted and said nothing more, else one
+// of who has most. False when the newcomer is one of too many itself.
+bool TcpqServer::make_place(const FileHandle& newcomer) {
   for (const bool greeted : {false, true}) {
     for (Client& client : clients_) {
       if (client.gone || client.spoke || client.reader.greeted() != greeted) continue;
       drop(client, "there are too many, and this one said nothing");
       sweep();
-      return;
+      return true;
     }
   }
+  Client* client = of_largest_share(newcomer);
+  look_again_soon();    // finding out who has how many takes a while: a flood of newcomers must not stop the bus
+  if (!client) return false;
+  drop(*client, "there are too many, and its process has most of them");
+  sweep();
+  return true;
+}
+
+TcpqServer::Client* TcpqServer::of_largest_share(const FileHandle& newcomer) {
+  const PeerOwners owners(port());
+  std::map<std::string, std::pair<size_t, Client*>> shares;    // how many, and the newest
+  for (Client& client : clients_) {
+    auto& [count, newest] = shares[owners.owner_of(client.socket.get())];
+    ++count;
+    newest = &client;
+  }
+  const size_t own = shares[owners.owner_of(newcomer.get())].first + 1;
+  const auto largest = std::max_element(shares.begin(), shares.end(), [](const auto& a, const auto& b) { return a.second.first < b.second.first; });
+  return largest->second.first > own ? largest->second.second : nullptr;
 }
 
 void TcpqServer::receive(Client& client) {
@@ -307,6 +334,7 @@ bool TcpqServer::send_rest(Client& client) {
     const ssize_t sent = ::send(client.socket.get(), &client.rest[client.rest_sent], client.rest.size() - client.rest_sent, MSG_NOSIGNAL);
     if (sent >= 0) {
       client.rest_sent += static_cast<size_t>(sent);
+      client.moved = Clock::now();
     } else if (errno == EAGAIN) {
       watch(client, true);
       return false;
@@ -317,31 +345,31 @@ bool TcpqServer::send_rest(Client& client) {
   }
   std::vector<uint8_t>().swap(client.rest);
   client.rest_sent = 0;
-  watch(client, false);
   return true;
 }
 
 void TcpqServer::send(Client& client) {
   if (!client.rest.empty() && !send_rest(client)) return;
-  if (client.filter.empty()) return;
-  while (client.place < ring_.end()) {
+  while (!client.filter.empty() && client.place < ring_.end()) {
     if (client.place < ring_.begin()) {    // overtaken
       ++skipped_;
       client.place = ring_.end();
-      return;
+      break;
     }
     iovec pieces[kMostPieces];
+    uint64_t places[kMostPieces];
     int count = 0;
     size_t total = 0;
     while (client.place < ring_.end() && count < kMostPieces) {
       const MessageRing::Message message = ring_.at(client.place);
       if (wants(client, message)) {
+        places[count] = client.place;
         pieces[count++] = {const_cast<uint8_t*>(message.bytes.data()), message.bytes.size()};
         total += message.bytes.size();
       }
       client.place = message.next;
     }
-    if (count == 0) return;
+    if (count == 0) break;
     msghdr header{};
     header.msg_iov = pieces;
     header.msg_iovlen = static_cast<size_t>(count);
@@ -351,22 +379,27 @@ void TcpqServer::send(Client& client) {
       return;
     }
     size_t sent = result < 0 ? 0 : static_cast<size_t>(result);
+    if (sent > 0) client.moved = Clock::now();
     if (sent == total) continue;
-    // What is left of these few goes to the client's own buffer; the ring may turn.
-    for (const iovec& piece : std::span(pieces, static_cast<size_t>(count))) {
-      const size_t done = std::min(sent, piece.iov_len);
-      const auto* bytes = static_cast<const uint8_t*>(piece.iov_base);
-      client.rest.insert(client.rest.end(), bytes + done, bytes + piece.iov_len);
-      sent -= done;
+    // What is left of a message that was begun goes to the client's own buffer: the ring may turn.
+    int begun = 0;
+    for (; sent >= pieces[begun].iov_len; ++begun) sent -= pieces[begun].iov_len;
+    client.place = places[begun];
+    if (sent > 0) {
+      const auto* bytes = static_cast<const uint8_t*>(pieces[begun].iov_base);
+      client.rest.assign(bytes + sent, bytes + pieces[begun].iov_len);
+      client.place = ring_.at(client.place).next;
     }
     watch(client, true);
     return;
   }
+  watch(client, false);
 }
 
 void TcpqServer::watch(Client& client, bool for_room) {
   if (client.blocked == for_room) return;
   client.blocked = for_room;
+  client.moved = Clock::now();
   epoll_event event{};
   event.events = for_room ? EPOLLIN | EPOLLOUT : EPOLLIN;
   event.data.ptr = &client;
@@ -378,6 +411,7 @@ void TcpqServer::sweep() {
   const Clock::time_point now = Clock::now();
   for (auto client = clients_.begin(); client != clients_.end();) {
     if (!client->gone && !client->reader.greeted() && now - client->since > kGreetingTime) drop(*client, "it did not greet");
+    if (!client->gone && client->blocked && now - client->moved > kStuckTime) drop(*client, "it took nothing for half a minute");
     if (!client->gone) {
       ++client;
       continue;

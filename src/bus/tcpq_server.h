@@ -3,6 +3,9 @@
 // One thread does all the network. publish() copies a message into a bounded queue and returns; the thread moves it to a
 // ring from which each client is served at its own pace. A client that falls a ring behind loses messages. What
 // clients publish goes to the simulation and to all clients that subscribed to it, as on any LCM bus.
+//
+// Where all places are taken, who connects gets that of a connection that said nothing, else of the process (of another
+// machine: the address) that has most of them, if that has more than the newcomer's own would have.
 #pragma once
 
 #include <atomic>
@@ -62,13 +65,15 @@ class TcpqServer : public Bus {
     std::vector<uint8_t> rest;       // of a message that was sent in part
     size_t rest_sent = 0;
     bool blocked = false;            // waits for room in the socket
+    Clock::time_point moved;         // when the socket last took something, or nothing was left
     bool spoke = false;              // published or subscribed
     bool gone = false;
   };
 
   void serve();
   void accept_all();
-  void make_place();
+  bool make_place(const FileHandle& newcomer);
+  Client* of_largest_share(const FileHandle& newcomer);
   void receive(Client& client);
   void take(Client& client, const tcpq::Frame& frame);
   bool is_heard(const std::string& channel);
@@ -82,6 +87,7 @@ class TcpqServer : public Bus {
   void sweep();
   void watch(Client& client, bool for_room);
   bool drained() const;
+  void look_again_soon();
 
   LcmUrl url_;
   FileHandle listener_, poll_, wake_;
@@ -101,7 +107,7 @@ class TcpqServer : public Bus {
   std::unordered_map<std::string, uint32_t> numbers_;    // of channels; beyond a bound all others share number 0
   std::list<Client> clients_;
   size_t received_ = 0;                                  // bytes that the readers hold
-  Clock::time_point accept_again_{};                     // when the system had no room for one more
+  Clock::time_point accept_again_{};                     // when there was no room for one more
   Clock::time_point complained_{};
   uint64_t silent_drops_ = 0;                            // since it last complained
   std::vector<uint8_t> frame_;

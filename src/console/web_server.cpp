@@ -10,6 +10,7 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <deque>
 #include <map>
 
 #include <libwebsockets.h>
@@ -72,6 +73,7 @@ struct WebServer::Impl {
   std::map<lws*, Transfer> transfers;    // looked up only
   std::map<lws*, Socket> sockets;
   size_t open = 0;                       // connections of any kind
+  std::deque<lws*> silent;               // of them, those that have asked for nothing yet: oldest first
   std::vector<uint8_t> message;
   std::atomic<bool> stopping{false};
   bool over = false;
@@ -112,16 +114,26 @@ int WebServer::Impl::dispatch(lws* wsi, lws_callback_reasons reason, void* in, s
     case LWS_CALLBACK_WSI_CREATE:
       ++open;
       return 0;
+    case LWS_CALLBACK_SERVER_NEW_CLIENT_INSTANTIATED:
+      silent.push_back(wsi);
+      if (silent.size() > kMostSilent) {
+        lws_set_timeout(silent.front(), PENDING_TIMEOUT_USER_OK, LWS_TO_KILL_ASYNC);
+        silent.pop_front();
+      }
+      return 0;
     case LWS_CALLBACK_WSI_DESTROY:
       --open;
+      std::erase(silent, wsi);
       transfers.erase(wsi);
       sockets.erase(wsi);
       return 0;
     case LWS_CALLBACK_HTTP:
+      std::erase(silent, wsi);
       return request(wsi, {static_cast<const char*>(in), length});
     case LWS_CALLBACK_HTTP_WRITEABLE:
       return send_chunk(wsi);
     case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
+      std::erase(silent, wsi);
       if (header(wsi, WSI_TOKEN_GET_URI) != "/socket" || !refusal(wsi, true).empty()) {
         lws_return_http_status(wsi, HTTP_STATUS_FORBIDDEN, nullptr);
         return 1;

@@ -43,6 +43,7 @@ struct WebHandler {
 class WebServer {
  public:
   static constexpr size_t kMostConnections = 320;             // HTTP and WebSocket together
+  static constexpr size_t kMostSilent = 64;                   // of them that have asked for nothing yet; beyond, the oldest goes
   static constexpr size_t kMostMessage = size_t{1} << 20;     // bytes that a browser may send as one message
   static constexpr size_t kMostHeaders = 4096;                // bytes of a request's headers
 

@@ -10,6 +10,8 @@
 #include <lcm/lcm-cpp.hpp>
 #include <netinet/in.h>
 #include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "ruedo/errors.h"
 
@@ -192,6 +194,7 @@ class TcpqHostile : public ::testing::Test {
     EXPECT_TRUE(soon([&] { return served.heard == before + 1; }));
   }
   Served served;
+  std::shared_ptr<void> crowd;
 };
 
 TEST_F(TcpqHostile, Garbage) {
@@ -243,6 +246,45 @@ TEST_F(TcpqHostile, AThousandSilentConnections) {
     if (many.size() > 600) many.erase(many.begin());                // this process has a thousand files at most
   }
   EXPECT_TRUE(soon([&] { return served.server.connections() == 1000; }));
+}
+
+// A process that holds all places, as subscribers that read nothing; ends with its object.
+struct Crowd {
+  FileHandle end;
+  pid_t process = -1;
+  explicit Crowd(uint16_t port) {
+    int ready[2], over[2];
+    if (::pipe(ready) != 0 || ::pipe(over) != 0) return;
+    process = ::fork();
+    if (process == 0) {
+      ::close(over[1]);
+      std::vector<Raw> all;
+      for (size_t i = 0; i < TcpqServer::kMostClients; ++i) {
+        all.emplace_back(port);
+        all.back().send(hello());
+        all.back().send(subscription(2, "nothing"));
+      }
+      char byte = 0;
+      [[maybe_unused]] ssize_t count = ::write(ready[1], &byte, 1);
+      count = ::read(over[0], &byte, 1);
+      ::_exit(0);
+    }
+    ::close(ready[1]);
+    ::close(over[0]);
+    end = FileHandle(over[1]);
+    const FileHandle is_ready(ready[0]);
+    char byte = 0;
+    EXPECT_EQ(::read(is_ready.get(), &byte, 1), 1);
+  }
+  ~Crowd() {
+    end = FileHandle();
+    ::waitpid(process, nullptr, 0);
+  }
+};
+
+TEST_F(TcpqHostile, OneProcessHasNotAllPlaces) {
+  crowd = std::make_shared<Crowd>(served.server.port());
+  ASSERT_TRUE(soon([&] { return served.server.connections() == TcpqServer::kMostClients; }));
 }
 
 TEST_F(TcpqHostile, WhoDoesNotGreetIsSentAway) {

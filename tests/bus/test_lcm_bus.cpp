@@ -2,12 +2,21 @@
 #include "bus/lcm_bus.h"
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <mutex>
 #include <regex>
+#include <thread>
+
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <gtest/gtest.h>
 
+#include "bus/file_handle.h"
+#include "bus/tcpq_wire.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::bus {
@@ -51,6 +60,42 @@ TEST(ChannelPatterns, OneForNamesThatCountUp) {
     EXPECT_TRUE(matched) << name;
   }
   for (const std::string& pattern : patterns) EXPECT_FALSE(std::regex_match("oddxname/move", std::regex(pattern)));
+}
+
+// Somebody accepts, and ends each connection at once: between one and the next there is a pause, which grows.
+TEST(LcmBus, LooksForALostServerWithPauses) {
+  const FileHandle listener(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof address;
+  ASSERT_EQ(::bind(listener.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  ASSERT_EQ(::listen(listener.get(), 16), 0);
+  ::getsockname(listener.get(), reinterpret_cast<sockaddr*>(&address), &size);
+  std::atomic<int> connections{0};
+  std::thread serving([&] {
+    // LCM waits for the hello before its constructor returns.
+    const std::vector<uint8_t> hello = tcpq::server_hello();
+    std::vector<FileHandle> ended;    // no reset, which would take back what was sent
+    for (;;) {
+      FileHandle socket(::accept(listener.get(), nullptr, nullptr));
+      if (!socket) return;
+      [[maybe_unused]] const ssize_t sent = ::send(socket.get(), hello.data(), hello.size(), MSG_NOSIGNAL);
+      ::shutdown(socket.get(), SHUT_WR);
+      ended.push_back(std::move(socket));
+      ++connections;
+    }
+  });
+  {
+    LcmBus bus("tcpq://127.0.0.1:" + std::to_string(ntohs(address.sin_port)));
+    bus.listen({"x"}, [](const std::string&, const uint8_t*, size_t) {});
+    const int before = connections;
+    const auto begin = std::chrono::steady_clock::now();
+    while (connections < before + 6) std::this_thread::yield();
+    EXPECT_GE(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(50 + 100 + 200));
+  }
+  ::shutdown(listener.get(), SHUT_RDWR);
+  serving.join();
 }
 
 TEST(LcmBus, TakesUpOtherChannels) {

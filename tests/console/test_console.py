@@ -1,4 +1,5 @@
 """The web console from outside: its pages and its socket in right and wrong hands."""
+import contextlib
 import os
 import re
 import socket
@@ -107,6 +108,20 @@ def test_garbage_and_a_hundred_viewers_do_not_hurt(server):
     for viewer in viewers:
         viewer.close()
     assert server.poll() is None and get(server.port, "/")[0] == 200
+
+
+def test_half_open_connections_give_way(server):
+    """More than the console has places for; each has sent the beginning of a request, or nothing."""
+    waiting = [socket.create_connection(("127.0.0.1", server.port), timeout=20) for _ in range(400)]
+    for one in waiting[::2]:
+        with contextlib.suppress(OSError):    # it has given way
+            one.sendall(b"GET / HT")
+    assert get(server.port, "/")[0] == 200
+    viewer = Socket(server.port)
+    assert viewer.status == 101
+    viewer.close()
+    for one in waiting:
+        one.close()
 
 
 def test_viewers_change_no_byte(tmp_path):
