@@ -4,7 +4,10 @@
 #include <charconv>
 #include <chrono>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
+#include <functional>
+#include <system_error>
 #include <thread>
 
 #include <fmt/format.h>
@@ -39,14 +42,18 @@ struct RunArguments {
   int threads = 0;
 };
 
-// Takes SIGINT and SIGTERM in a thread of its own: a handler could do next to nothing. Make it before any other
-// thread, which then inherits that the signals are blocked.
+// Takes SIGINT, SIGTERM, and SIGHUP where it is not ignored (nohup), in a thread of its own: a handler could do next to nothing.
+// Make it before any other thread, which then inherits that the signals are blocked. A pipe that nobody reads is no
+// signal here, but an error of who writes.
 class SignalThread {
  public:
   SignalThread() {
     sigemptyset(&signals_);
     sigaddset(&signals_, SIGINT);
     sigaddset(&signals_, SIGTERM);
+    struct sigaction hang_up {};
+    if (sigaction(SIGHUP, nullptr, &hang_up) == 0 && hang_up.sa_handler != SIG_IGN) sigaddset(&signals_, SIGHUP);
+    std::signal(SIGPIPE, SIG_IGN);
     pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
     thread_ = std::thread([this] { wait(); });
   }
@@ -88,11 +95,21 @@ void watch_stdin() {
   }).detach();
 }
 
+// False when nobody reads it: a closed pipe, a terminal that is gone.
+bool is_printed(const std::function<void()>& print) {
+  try {
+    print();
+    return std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+  } catch (const std::system_error&) {
+    return false;
+  }
+}
+
 class StatusLine {
  public:
   StatusLine() : shown_(isatty(STDERR_FILENO) != 0) {}
   ~StatusLine() {
-    if (drawn_) fmt::print(stderr, "\n");
+    if (drawn_) is_printed([] { fmt::print(stderr, "\n"); });
   }
 
   void draw(const run::Status& status) {
@@ -103,10 +120,11 @@ class StatusLine {
     last_ = status;
     last_time_ = now;
     if (!shown_) return;
-    fmt::print(stderr, "\r\033[K{:.2f} s   {}   {:.0f} messages/s", static_cast<double>(status.time_us) * 1e-6,
-               status.paused ? std::string("paused") : fmt::format("x {:.3g} real time", factor), messages);
-    std::fflush(stderr);
-    drawn_ = true;
+    shown_ = drawn_ = is_printed([&] {
+      fmt::print(stderr, "\r\033[K{:.2f} s   {}   {:.0f} messages/s", static_cast<double>(status.time_us) * 1e-6,
+                 status.paused ? std::string("paused") : fmt::format("x {:.3g} real time", factor), messages);
+      std::fflush(stderr);
+    });
   }
 
  private:
@@ -152,6 +170,14 @@ void announce(const bus::ServerBus& place) {
   std::fflush(stdout);
 }
 
+void print_world(const run::Server& server, const model::WorldModel& world, const bus::LcmUrl& url) {
+  const Style style = style_of(stdout);
+  fmt::print("{}{}{}: steps of {:g} ms, seed {}, on {}\n", style.bold, for_terminal(world.name), style.off, static_cast<double>(world.step_us) * 1e-3,
+             static_cast<uint64_t>(server.info().front().seed), url.str());
+  print_channels(stdout, server.info());
+  std::fflush(stdout);
+}
+
 int run(const RunArguments& arguments) {
   run::ServerOptions options = server_options(arguments);
   SignalThread signals;
@@ -163,18 +189,16 @@ int run(const RunArguments& arguments) {
   ViewedBus viewed(bus, arguments.viewed, arguments.view);
   run::Server server(world, std::move(options), viewed.bus());
   place.claim->describe(fmt::format("pid {}, world {}, run {}", getpid(), world->name, server.run_id()));
-  announce(place);
-  std::vector<Finding> findings = world->findings;
-  findings.insert(findings.end(), server.findings().list().begin(), server.findings().list().end());
-  print_findings(findings);
-  if (!arguments.quiet) {
-    const Style style = style_of(stdout);
-    fmt::print("{}{}{}: steps of {:g} ms, seed {}, on {}\n", style.bold, for_terminal(world->name), style.off, static_cast<double>(world->step_us) * 1e-3,
-               static_cast<uint64_t>(server.info().front().seed), place.url.str());
-    print_channels(stdout, server.info());
-    std::fflush(stdout);
-  }
-  const std::shared_ptr<void> view = viewed.open(server, world->name);
+  std::shared_ptr<void> view;
+  const bool is_read = is_printed([&] {
+    announce(place);
+    std::vector<Finding> findings = world->findings;
+    findings.insert(findings.end(), server.findings().list().begin(), server.findings().list().end());
+    print_findings(findings);
+    if (!arguments.quiet) print_world(server, *world, place.url);
+    view = viewed.open(server, world->name);
+  });
+  if (!is_read) server.stop();    // as by SIGTERM: the log gets its end
   StatusLine status;
   server.on_status([&](const run::Status& now) { status.draw(now); });
   signals.serve(&server);

@@ -12,6 +12,7 @@ namespace {
 
 log_header_t first_event(log::Reader& reader, log::Event& event) {
   log_header_t header;
+  if (reader.size() == 0) throw InputError({reader.path()}, "is empty: nothing was recorded");
   if (!reader.next(event) || event.channel != "ruedo/header") {
     throw InputError({reader.path()}, "does not begin with ruedo/header: it was not recorded by ruedo run --record");
   }

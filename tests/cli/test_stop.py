@@ -49,3 +49,51 @@ def test_it_does_not_wait_for_pictures(told, tmp_path):
         finally:
             if server.returncode is None:
                 server.kill()
+
+
+EMPTY = """<sdf version='1.9'><world name='w'><include><uri>model://ground_plane</uri></include><include><uri>model://p3at</uri></include></world></sdf>"""
+
+
+def verified(log, world):
+    """A log that has its end repeats as a whole."""
+    repeated = subprocess.run([RUEDO, "verify", log], capture_output=True, text=True, cwd=world.parent)
+    assert repeated.returncode == 0, repeated.stdout + repeated.stderr
+    assert "the end of the run is not in it" not in repeated.stdout + repeated.stderr
+
+
+def test_a_closed_terminal_leaves_a_whole_log(tmp_path):
+    world, said, log = tmp_path / "w.sdf", tmp_path / "said", tmp_path / "run.lcm"
+    world.write_text(EMPTY)
+    with said.open("w") as out, subprocess.Popen([RUEDO, "run", world, "--lcm", "memq://", "--disable", "p3at/camera", "--record", log], stdout=out) as server:
+        until(lambda: said.read_text().count("\n") > 3, server)
+        server.send_signal(signal.SIGHUP)
+        assert server.wait(PATIENCE) == 0
+    verified(log, world)
+
+
+def test_nohup_outlives_its_terminal(tmp_path):
+    world, said = tmp_path / "w.sdf", tmp_path / "said"
+    world.write_text(EMPTY)
+    with said.open("w") as out, subprocess.Popen(["nohup", RUEDO, "run", world, "--lcm", "memq://", "--duration", "2"], stdout=out) as server:
+        until(lambda: said.read_text().count("\n") > 3, server)
+        server.send_signal(signal.SIGHUP)
+        assert server.wait(PATIENCE) == 0
+    assert "Hangup" not in said.read_text()
+
+
+def test_a_pipe_that_nobody_reads_leaves_a_whole_log(tmp_path):
+    world, log = tmp_path / "w.sdf", tmp_path / "run.lcm"
+    world.write_text(EMPTY)
+    read, write = os.pipe()
+    os.close(read)
+    server = subprocess.Popen([RUEDO, "run", world, "--lcm", "memq://", "--disable", "p3at/camera", "--record", log], stdout=write)
+    os.close(write)
+    assert server.wait(PATIENCE) == 0
+    verified(log, world)
+
+
+def test_an_empty_log_is_called_empty(tmp_path):
+    log = tmp_path / "run.lcm"
+    log.write_bytes(b"")
+    told = subprocess.run([RUEDO, "verify", log], capture_output=True, text=True)
+    assert told.returncode != 0 and "is empty: nothing was recorded" in told.stderr
