@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <span>
 #include <tuple>
+#include <variant>
 
 #include <spdlog/spdlog.h>
 
@@ -65,6 +68,21 @@ DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size, r
     }
   }
   return fault;
+}
+
+bool is_finite(const robot::Command& command) {
+  const auto all = [](std::span<const double> values) {
+    return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+  };
+  struct Values {
+    decltype(all)& finite;
+    bool operator()(const robot::VelocityCommand& c) const { return finite({{c.vx, c.vy, c.omega}}); }
+    bool operator()(const robot::WheelCommand& c) const { return finite(c.rates); }
+    bool operator()(const robot::MoveCommand& c) const { return finite({{c.value, c.radius, c.speed, c.acceleration, c.deceleration}}); }
+    bool operator()(const robot::JointCommand& c) const { return finite(c.values); }
+    bool operator()(const robot::ResetOdometry&) const { return true; }
+  };
+  return std::visit(Values{all}, command.what);
 }
 
 CommandInbox::CommandInbox(std::vector<Input> inputs, int robots)

@@ -105,6 +105,9 @@ class CommandInbox {
   int64_t last_warning_ns_ = 0;                        // the bus thread's
 };
 
+// Whether all of its values are numbers.
+bool is_finite(const robot::Command& command);
+
 // Decodes a command of that kind, or says why not.
 DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size, robot::Command& command);
 

@@ -93,7 +93,7 @@ std::string unused_name(const model::WorldModel& world, const std::string& name)
   return name + "_" + std::to_string(number);
 }
 
-model::LoadedModel ModelStore::load(const spawn_request_t& request) {
+model::LoadedModel ModelStore::load(const spawn_request_t& request, model::LoadBudget* budget) {
   std::string key;
   if (request.model.empty()) {
     key = "text " + sha256(reinterpret_cast<const uint8_t*>(request.text.data()), request.text.size());
@@ -103,14 +103,18 @@ model::LoadedModel ModelStore::load(const spawn_request_t& request) {
     const auto written = std::filesystem::last_write_time(path, error).time_since_epoch().count();
     key = "file " + std::to_string(written) + " " + path;
   }
-  std::erase_if(known_, [](const auto& entry) { return entry.second.model.expired(); });
-  if (const auto known = known_.find(key); known != known_.end()) {
-    model::LoadedModel loaded = known->second.rest;
-    loaded.model = known->second.model.lock();
-    return loaded;
+  {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(known_, [](const auto& entry) { return entry.second.model.expired(); });
+    if (const auto known = known_.find(key); known != known_.end()) {
+      model::LoadedModel loaded = known->second.rest;
+      loaded.model = known->second.model.lock();
+      if (loaded.model) return loaded;
+    }
   }
-  model::LoadedModel loaded = request.model.empty() ? model::load_model_text(request.text, world_file_)
-                                                    : model::load_model(request.model, world_file_);
+  model::LoadedModel loaded = request.model.empty() ? model::load_model_text(request.text, world_file_, budget)
+                                                    : model::load_model(request.model, world_file_, budget);
+  const std::lock_guard lock(mutex_);
   Known& known = known_[key];
   known.model = loaded.model;
   known.rest = loaded;

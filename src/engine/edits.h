@@ -8,6 +8,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -24,12 +25,12 @@ inline constexpr double kFarthest_m = 1e6, kFastest_m_s = 1e3, kFastest_rad_s = 
 inline constexpr size_t kMostModels = 10'000;    // of a world, the places of removed ones included
 
 // Models that came with requests. A file that was not touched since, or the same text, is read once as long as any model
-// of a world is of it.
+// of a world is of it. Thread safe.
 class ModelStore {
  public:
   explicit ModelStore(std::string world_file) : world_file_(std::move(world_file)) {}
-  // Throws InputError.
-  model::LoadedModel load(const spawn_request_t& request);
+  // Throws InputError. budget: may be null.
+  model::LoadedModel load(const spawn_request_t& request, model::LoadBudget* budget = nullptr);
 
  private:
   struct Known {
@@ -37,6 +38,7 @@ class ModelStore {
     model::LoadedModel rest;    // without the model
   };
   std::string world_file_;
+  std::mutex mutex_;
   std::map<std::string, Known> known_;
 };
 

@@ -13,11 +13,13 @@ namespace {
 // A file of the world's folder that is not there.
 std::string path_of_text(const std::string& world_file) { return (fs::path(world_file).parent_path() / "the text").string(); }
 
-LoadedModel read(const std::string& path, const std::string& world_file, std::shared_ptr<const Element> document) {
+LoadedModel read(const std::string& path, const std::string& world_file, std::shared_ptr<const Element> document, LoadBudget* budget) {
   Findings findings;
   const ResourceFinder resources(world_file, false);
   DocumentStore documents;
-  MeshLoader meshes(resources);
+  MeshImport import;
+  import.budget = budget;
+  MeshLoader meshes(resources, import);
   ReadContext context{findings, resources, documents, meshes};
   SdfReader reader(context);
   if (document) documents.add(path, std::move(document));
@@ -49,15 +51,15 @@ std::string model_file(const std::string& name, const std::string& world_file) {
   return *path;
 }
 
-LoadedModel load_model(const std::string& name, const std::string& world_file) {
-  return read(model_file(name, world_file), world_file, nullptr);
+LoadedModel load_model(const std::string& name, const std::string& world_file, LoadBudget* budget) {
+  return read(model_file(name, world_file), world_file, nullptr, budget);
 }
 
-LoadedModel load_model_text(const std::string& text, const std::string& world_file) {
+LoadedModel load_model_text(const std::string& text, const std::string& world_file, LoadBudget* budget) {
   const std::string path = path_of_text(world_file);
   try {
     std::shared_ptr<const Element> document = parse_document(text, path);
-    LoadedModel loaded = read(path, world_file, std::move(document));
+    LoadedModel loaded = read(path, world_file, std::move(document), budget);
     std::erase(loaded.files_read, path);
     return loaded;
   } catch (const InputError& error) {

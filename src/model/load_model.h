@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "model/load_budget.h"
 #include "model/world_model.h"
 
 namespace ruedo::model {
@@ -20,10 +21,11 @@ struct LoadedModel {
 
 // Of a file or by a name, SDF or URDF, from the folders that are searched for a world, and from nowhere else. Throws
 // InputError, with file and line.
-LoadedModel load_model(const std::string& name, const std::string& world_file);
+// budget: may be null; who gives one asks it for its fault afterwards.
+LoadedModel load_model(const std::string& name, const std::string& world_file, LoadBudget* budget = nullptr);
 
 // Of a text. What it names is searched as if it stood in the world's folder; errors call it "the text".
-LoadedModel load_model_text(const std::string& text, const std::string& world_file);
+LoadedModel load_model_text(const std::string& text, const std::string& world_file, LoadBudget* budget = nullptr);
 
 // Checks that the names of an instance and of its devices are fit for channels. Throws InputError.
 void check_channel_names(const ModelInstance& instance, const Source& source);

@@ -115,10 +115,12 @@ void run_importer(const MeshImport& import, const std::string& input, const std:
     const pid_t ended = ::waitpid(child, &status, WNOHANG);
     if (ended == child) break;
     if (ended < 0 && errno != EINTR) throw std::runtime_error(std::string("the importer is lost: ") + std::strerror(errno));
-    if (std::chrono::steady_clock::now() > deadline) {
+    const bool too_long = std::chrono::steady_clock::now() > deadline;
+    if (too_long || (import.budget && import.budget->is_over())) {
       ::kill(-child, SIGKILL);
       ::kill(child, SIGKILL);
       ::waitpid(child, &status, 0);
+      if (!too_long) import.budget->take_time();
       throw std::runtime_error("the importer took longer than " + std::to_string(import.wall_limit_s) + " s");
     }
     std::this_thread::sleep_for(pause);
@@ -144,6 +146,11 @@ std::string bytes_of(const std::string& path, size_t most) {
   } catch (const InputError& error) {
     throw std::runtime_error(error.message());
   }
+}
+
+size_t bytes_of(const Mesh& mesh) {
+  const auto size = [](const auto& list) { return list.size() * sizeof(list[0]); };
+  return size(mesh.positions) + size(mesh.normals) + size(mesh.uvs) + size(mesh.triangles);
 }
 
 bool dependencies_hold(const MeshPackage& package, const fs::path& folder) {
@@ -237,7 +244,9 @@ std::shared_ptr<const Mesh> MeshLoader::load(const std::string& path) {
   Entry& entry = at->second;
   if (is_new) {
     try {
+      if (import_.budget) import_.budget->take_time();
       auto mesh = std::make_shared<Mesh>(import_or_cached(path));
+      if (import_.budget) import_.budget->take_mesh(bytes_of(*mesh));
       mesh->name = path;
       for (auto& material : mesh->materials) {
         if (!material.texture || !material.texture->embedded.empty()) continue;

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "model/load_budget.h"
 #include "model/mesh.h"
 #include "model/resources.h"
 
@@ -24,6 +25,7 @@ struct MeshImport {
   int wall_limit_s = 60;
   int cpu_limit_s = 30;
   size_t memory_limit_bytes = size_t{3} << 30;
+  LoadBudget* budget = nullptr;           // of all meshes together; null: none
 };
 
 class MeshLoader {

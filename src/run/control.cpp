@@ -1,7 +1,8 @@
-// The order of checks: run, epoch, session, sequence; then the request itself.
+// The order of checks: run, session, sequence, epoch; then the request itself.
 #include "run/control.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/utf8.h"
 #include "ruedo/decode.h"
@@ -16,34 +17,39 @@ bool Control::receive(const uint8_t* data, size_t size) {
     return false;
   }
   std::lock_guard lock(mutex_);
-  if (inbox_.size() < kMostWaiting) inbox_.push_back(std::move(request));
+  if (inbox_.size() >= kMostWaiting || inbox_bytes_ + size > kMostWaitingBytes) return true;
+  inbox_bytes_ += size;
+  inbox_.push_back(std::move(request));
   return true;
 }
 
 namespace {
 
-// Who reads or changes the world waits for its first state. Grants are what lockstep's own order is about.
+// Who reads or changes the world does so in a state. Grants are what lockstep's own order is about.
 bool needs_state(int32_t kind) {
   return kind != request_t::JOIN && kind != request_t::LEAVE && kind != request_t::INFO && kind != request_t::QUIT &&
          kind != request_t::GRANT && kind != request_t::RESEND;
 }
 
-}  // namespace
-
-bool Control::serve_taken() {
-  size_t served = 0;
-  while (served < taken_.size() && (server_.has_state() || !needs_state(taken_[served].kind))) serve(taken_[served++]);
-  taken_.erase(taken_.begin(), taken_.begin() + static_cast<std::ptrdiff_t>(served));
-  return taken_.empty();
+// Names in it may be anybody's: clients show it, and replies are kept.
+std::string fit_text(const std::string& text) {
+  if (text.size() <= Control::kLongestText) return for_terminal(text);
+  return for_terminal(text.substr(0, Control::kLongestText)) + "...";
 }
 
+}  // namespace
+
 void Control::serve() {
-  if (!serve_taken()) return;    // what a missing state held up
+  if (!held_.empty() && !server_.state_comes()) {
+    for (const request_t& request : std::exchange(held_, {})) serve(request);
+  }
   {
     std::lock_guard lock(mutex_);
     std::swap(inbox_, taken_);
+    inbox_bytes_ = 0;
   }
-  serve_taken();
+  for (const request_t& request : taken_) serve(request);
+  taken_.clear();
 }
 
 void Control::serve(const request_t& request) {
@@ -58,15 +64,14 @@ void Control::serve(const request_t& request) {
   const auto refuse = [&](int32_t code, std::string text) {
     reply.code = code;
     reply.text = std::move(text);
-    reply.utime = server_.utime();
-    server_.publish(reply);
+    publish(reply);
   };
   if (request.run_id != 0 && request.run_id != run_id_) return refuse(reply_t::WRONG_RUN, "this is another run of the server");
   if (request.kind == request_t::JOIN) return join(request, reply);
   if (request.kind == request_t::LEAVE) {    // as often as one likes
     if (server_.left) server_.left(request.session);
     sessions_.leave(request.session);
-    return refuse(reply_t::OK, "");
+    return publish(reply);
   }
   if (request.kind == request_t::INFO && request.session == 0) {    // who has not joined yet may ask what there is to join
     server_.execute(request, Session{});
@@ -75,32 +80,80 @@ void Control::serve(const request_t& request) {
   Session* session = sessions_.find(request.session);
   if (!session) return refuse(reply_t::UNKNOWN_SESSION, "no such session: join first");
   session->last_heard = std::chrono::steady_clock::now();
+  session->spoke = true;
   if (request.kind == request_t::RESEND) {    // changes nothing: it may come as often as one likes, in any order
     engine::Outcome outcome = server_.execute(request, *session);
     reply.body = std::move(outcome.body);
     reply.size = static_cast<int32_t>(reply.body.size());
     return refuse(outcome.code, std::move(outcome.text));
   }
-  const reply_t* kept = nullptr;
-  switch (sessions_.judge(*session, request.sequence, kept)) {
-    case Sessions::Verdict::answer_again: return server_.publish(*kept);
-    case Sessions::Verdict::wait: return;
-    case Sessions::Verdict::too_old: return refuse(reply_t::OLD_SEQUENCE, "a later request was executed already");
-    case Sessions::Verdict::execute: break;
-  }
+  if (judge(request, *session, reply) != Sessions::Verdict::execute) return;
   if (server_.early && request.kind == request_t::GRANT && server_.early(request, *session)) return;
   // After the sequence: a repeated RESET, of the epoch that it ended, gets its answer again.
   if (request.epoch != -1 && request.epoch != reply.epoch) return refuse(reply_t::WRONG_EPOCH, "the world was reset since");
-  sessions_.begin(*session, request.sequence);
-  engine::Outcome outcome = server_.execute(request, *session);
+  if (must_wait(request)) return hold(request);
+  execute(request, *session, reply);
+}
+
+// Answers what is not to be executed.
+Sessions::Verdict Control::judge(const request_t& request, const Session& session, reply_t& reply) {
+  const reply_t* kept = nullptr;
+  if (is_waiting(request.session, request.sequence)) return Sessions::Verdict::wait;    // later ones may have been executed
+  const Sessions::Verdict verdict = sessions_.judge(session, request.sequence, kept);
+  const std::string last = std::to_string(session.last_sequence);
+  switch (verdict) {
+    case Sessions::Verdict::answer_again: server_.publish(*kept); return verdict;
+    case Sessions::Verdict::wait:
+    case Sessions::Verdict::execute: return verdict;
+    case Sessions::Verdict::too_old:
+      reply.code = reply_t::OLD_SEQUENCE;
+      reply.text = "a later request was executed already: the last is " + last;
+      break;
+    case Sessions::Verdict::too_far:
+      reply.code = reply_t::BAD_REQUEST;
+      reply.text = "the sequence is " + std::to_string(request.sequence) + ", and the last request was " + last + ": 1 to " +
+                   std::to_string(session.last_sequence + Sessions::kMostJump) + " is allowed";
+      break;
+  }
+  publish(reply);
+  return verdict;
+}
+
+void Control::execute(const request_t& request, Session& session, reply_t& reply) {
+  sessions_.begin(session, request.sequence);
+  engine::Outcome outcome = has_too_many(request)
+                        ? engine::Outcome::refuse(reply_t::REFUSED, "too many requests of this client wait for their steps: wait for the answers")
+                        : server_.execute(request, session);
   reply.code = outcome.code;
   reply.text = std::move(outcome.text);
   reply.body = std::move(outcome.body);
-  if (outcome.after_step >= 0) {
-    waiting_.push_back({std::move(reply), outcome.after_step});
+  if (outcome.pending || outcome.after_step >= 0) {
+    waiting_.push_back({std::move(reply), outcome.pending ? kPending : outcome.after_step});
   } else {
     answer(reply, outcome.quiet);
   }
+}
+
+// Behind one that waits, all of its session do: they are executed in their order.
+bool Control::must_wait(const request_t& request) const {
+  if (needs_state(request.kind) && server_.state_comes()) return true;
+  return std::any_of(held_.begin(), held_.end(), [&](const request_t& held) { return held.session == request.session; });
+}
+
+// Beyond its share a client repeats what it asks for.
+void Control::hold(const request_t& request) {
+  const auto of_session = [&](const request_t& held) { return held.session == request.session; };
+  const auto same = [&](const request_t& held) { return of_session(held) && held.sequence >= request.sequence; };
+  if (std::any_of(held_.begin(), held_.end(), same)) return;
+  if (static_cast<size_t>(std::count_if(held_.begin(), held_.end(), of_session)) < kMostHeld) held_.push_back(request);
+}
+
+// There is room for a PAUSE when there is none for a STEP.
+bool Control::has_too_many(const request_t& request) const {
+  const auto waiting = static_cast<size_t>(std::count_if(waiting_.begin(), waiting_.end(), [&](const Waiting& each) {
+    return each.reply.session == request.session;
+  }));
+  return waiting >= (request.kind == request_t::STEP ? kMostSteppings : kMostUnanswered);
 }
 
 void Control::join(const request_t& request, reply_t& reply) {
@@ -109,19 +162,26 @@ void Control::join(const request_t& request, reply_t& reply) {
       body.client.size() > 63 || for_terminal(body.client) != body.client || request.sequence <= 0) {
     reply.code = reply_t::BAD_REQUEST;
     reply.text = "JOIN wants a join_t with a name of 1 to 63 bytes of UTF-8 without control characters, and a sequence above 0";
-  } else if (const Session* session = sessions_.join(body.client, request.sequence, std::chrono::steady_clock::now())) {
+  } else if (const Session* session = sessions_.join(body.client, request.sequence, std::chrono::steady_clock::now(), server_.keeps)) {
     reply.session = session->id;
   } else {
     reply.code = reply_t::REFUSED;
-    reply.text = "64 clients have joined already";
+    reply.text = std::to_string(Sessions::kMostSessions) + " clients have joined, and each was heard within the last " +
+                 std::to_string(Sessions::kMaySilence.count()) + " s or takes part in lockstep: try again";
   }
+  publish(reply);
+}
+
+void Control::publish(reply_t& reply) {
   reply.utime = server_.utime();
+  reply.text = fit_text(reply.text);
   server_.publish(reply);
 }
 
 void Control::answer(reply_t& reply, bool quiet) {
   reply.utime = server_.utime();
   reply.epoch = server_.epoch();
+  reply.text = fit_text(reply.text);
   reply.size = static_cast<int32_t>(reply.body.size());
   sessions_.keep(reply);
   if (!quiet) server_.publish(reply);
@@ -130,7 +190,7 @@ void Control::answer(reply_t& reply, bool quiet) {
 void Control::published(int64_t step) {
   if (waiting_.empty()) return;
   const auto ready = std::stable_partition(waiting_.begin(), waiting_.end(),
-                                           [&](const Waiting& waiting) { return waiting.after_step > step; });
+                                           [&](const Waiting& waiting) { return waiting.after_step > step || waiting.after_step == kPending; });
   for (auto it = ready; it != waiting_.end(); ++it) {
     it->reply.body = server_.state();
     answer(it->reply);
@@ -138,14 +198,49 @@ void Control::published(int64_t step) {
   waiting_.erase(ready, waiting_.end());
 }
 
-void Control::cancel(const std::string& why) {
-  for (Waiting& waiting : waiting_) {
-    waiting.reply.code = reply_t::REFUSED;
-    waiting.reply.text = why;
-    waiting.reply.body.clear();
-    answer(waiting.reply);
+template <class Condition>
+void Control::refuse_waiting(const std::string& why, Condition condition) {
+  const auto refused = std::stable_partition(waiting_.begin(), waiting_.end(), [&](const Waiting& waiting) { return !condition(waiting); });
+  for (auto waiting = refused; waiting != waiting_.end(); ++waiting) {
+    waiting->reply.code = reply_t::REFUSED;
+    waiting->reply.text = why;
+    waiting->reply.body.clear();
+    answer(waiting->reply);
   }
-  waiting_.clear();
+  waiting_.erase(refused, waiting_.end());
+}
+
+void Control::cancel(const std::string& why) {
+  refuse_waiting(why, [](const Waiting&) { return true; });
+}
+
+void Control::cancel_after(int64_t step, const std::string& why) {
+  refuse_waiting(why, [step](const Waiting& waiting) { return waiting.after_step > step && waiting.after_step != kPending; });
+}
+
+bool Control::is_waiting(int64_t session, int64_t sequence) const {
+  return std::any_of(waiting_.begin(), waiting_.end(), [&](const Waiting& waiting) {
+    return waiting.reply.session == session && waiting.reply.sequence == sequence;
+  });
+}
+
+bool Control::is_pending(int64_t session, int64_t sequence) const {
+  return std::any_of(waiting_.begin(), waiting_.end(), [&](const Waiting& waiting) {
+    return waiting.after_step == kPending && waiting.reply.session == session && waiting.reply.sequence == sequence;
+  });
+}
+
+void Control::finish(int64_t session, int64_t sequence, engine::Outcome outcome) {
+  const auto found = std::find_if(waiting_.begin(), waiting_.end(), [&](const Waiting& waiting) {
+    return waiting.after_step == kPending && waiting.reply.session == session && waiting.reply.sequence == sequence;
+  });
+  if (found == waiting_.end()) return;
+  reply_t reply = std::move(found->reply);
+  waiting_.erase(found);
+  reply.code = outcome.code;
+  reply.text = std::move(outcome.text);
+  reply.body = std::move(outcome.body);
+  answer(reply);
 }
 
 }  // namespace ruedo::run

@@ -95,12 +95,31 @@ engine::Outcome Server::spawn(const request_t& request) {
   spawn_request_t body;
   if (!read_body(request, body)) return bad_body("spawn_request_t");
   if (engine::Outcome outcome = engine::check_spawn(body); outcome.code != reply_t::OK) return outcome;
-  model::LoadedModel loaded;
+  if (!replay_) return worker_.add({request, std::move(body)});
   try {
-    loaded = models_.load(body);    // before anything stands still
+    return put_in(request, body, models_.load(body));
   } catch (const InputError& error) {
     return engine::Outcome::refuse(reply_t::BAD_REQUEST, error.what());
   }
+}
+
+// In lockstep what is granted is computed first: so who waits for the answer knows the step.
+void Server::spawn_ready() {
+  for (;; made_.reset()) {
+    if (!made_) {
+      made_ = worker_.take();
+      if (!made_) return;
+      enters_at_ = lockstep_ ? lockstep_->limit() : -1;
+    }
+    const request_t& request = made_->request;
+    if (!control_.is_pending(request.session, request.sequence)) continue;    // the world was reset meanwhile
+    if (status_.step < enters_at_ && !pacer_->paused()) return;
+    control_.finish(request.session, request.sequence,
+                    made_->fault.empty() ? put_in(request, made_->body, made_->loaded) : engine::Outcome::refuse(reply_t::BAD_REQUEST, made_->fault));
+  }
+}
+
+engine::Outcome Server::put_in(const request_t& request, const spawn_request_t& body, const model::LoadedModel& loaded) {
   std::string name;
   const engine::Outcome outcome = change(request, true, [&] {
     return engine::spawn(body, loaded, status_.step + 1, *simulation_, channels_, name);

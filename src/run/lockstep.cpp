@@ -95,6 +95,7 @@ bool Lockstep::early(const request_t& request, const Session& session) const {
   grant_request_t grant;
   if (!member || !read_grant(request, grant)) return false;
   if (grant.granted > member->granted) return true;
+  if (grant.granted == member->granted && member->grants.size() >= kMostGrants) return true;
   size_t bytes = 0;
   for (const grant_command_t& command : grant.commands) bytes += command.data.size();
   return grant.granted == member->granted && !member->held.empty() && !has_room(*member, grant.commands.size(), bytes);
@@ -104,6 +105,16 @@ bool Lockstep::early(const request_t& request, const Session& session) const {
 bool Lockstep::has_room(const Member& member, size_t count, size_t bytes) const {
   const size_t share = std::max<size_t>(members_.size(), 1);
   return member.held.size() + count <= kMostHeld / share && member.held_bytes + bytes <= kMostHeldBytes / share;
+}
+
+std::string Lockstep::fault_of(const grant_request_t& grant, const Member& member) const {
+  if (grant.granted != member.granted) return fmt::format("granted is {}, but this client's grants stand at {}", grant.granted, member.granted);
+  if (grant.step_until < grant.granted) return fmt::format("step_until is {}, below granted, {}", grant.step_until, grant.granted);
+  if (grant.step_until - grant.granted > kMostSteps) {
+    return fmt::format("step_until is {}, and granted {}: at most {} steps at once are allowed", grant.step_until, grant.granted, kMostSteps);
+  }
+  if (grant.received > published_) return fmt::format("received is {}, but the newest state is {}", grant.received, published_);
+  return "";
 }
 
 std::string Lockstep::take_commands(const grant_request_t& grant, std::vector<Held>& held) const {
@@ -120,6 +131,7 @@ std::string Lockstep::take_commands(const grant_request_t& grant, std::vector<He
     if (command.data.size() > engine::CommandInbox::kMaxMessageSize) return which + " is larger than 64 kB";
     const DecodeFault fault = engine::decode_command(input->kind, command.data.data(), command.data.size(), decoded);
     if (fault != DecodeFault::none) return which + ": " + describe(fault);
+    if (!engine::is_finite(decoded)) return which + ": a value is not finite";
     held.push_back({command.step, static_cast<int>(input - inputs.begin()), command.data});
   }
   std::stable_sort(held.begin(), held.end(), [](const Held& a, const Held& b) { return a.step < b.step; });
@@ -133,15 +145,7 @@ engine::Outcome Lockstep::grant(const request_t& request, const Session& session
   Member* member = find(session.id);
   if (!member) return engine::Outcome::refuse(reply_t::BAD_REQUEST, "this client does not take part: a grant of granted -1 comes first");
   if (over_) return engine::Outcome::refuse(reply_t::REFUSED, fmt::format("the run has ended at step {}", published_));
-  if (grant.granted != member->granted) {
-    return engine::Outcome::refuse(reply_t::BAD_REQUEST, fmt::format("granted is {}, but this client's grants stand at {}", grant.granted, member->granted));
-  }
-  if (grant.step_until < grant.granted) {
-    return engine::Outcome::refuse(reply_t::BAD_REQUEST, fmt::format("step_until is {}, below granted, {}", grant.step_until, grant.granted));
-  }
-  if (grant.received > published_) {
-    return engine::Outcome::refuse(reply_t::BAD_REQUEST, fmt::format("received is {}, but the newest state is {}", grant.received, published_));
-  }
+  if (std::string wrong = fault_of(grant, *member); !wrong.empty()) return engine::Outcome::refuse(reply_t::BAD_REQUEST, std::move(wrong));
   std::vector<Held> held;
   if (std::string wrong = take_commands(grant, held); !wrong.empty()) return engine::Outcome::refuse(reply_t::BAD_REQUEST, std::move(wrong));
   size_t bytes = 0;
@@ -227,7 +231,13 @@ void Lockstep::add_applied(TickWriter& tick, int64_t step, const std::vector<Ses
   }
 }
 
+bool Lockstep::counts_on(int64_t session) const {
+  const Member* member = find(session);
+  return member && !member->silent;
+}
+
 std::string Lockstep::waits_for() const {
+  if (begun() && pacer_->paused()) return "a RESUME: it is paused";
   if (!started_) return fmt::format("{} more of {} clients", static_cast<size_t>(options_.clients) - members_.size(), options_.clients);
   if (members_.empty()) return "a client that takes part";
   std::string names;

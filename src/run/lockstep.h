@@ -45,7 +45,8 @@ class Lockstep {
   static constexpr int64_t kMostAhead = 128;             // steps from what is published to what may be computed
   static constexpr size_t kMostHeld = 32'768;            // commands for steps to come, of all clients together
   static constexpr size_t kMostHeldBytes = 16u << 20;
-  static constexpr size_t kMostWanted = 1024;            // entries of a RESEND
+  static constexpr size_t kMostWanted = 1024;            // entries of a RESEND that are looked at
+  static constexpr size_t kMostGrants = 4096;            // of a client, for states that are not published yet
 
   // record: writes into the log.
   Lockstep(const LockstepOptions& options, std::function<void(const applied_t&)> record);
@@ -81,6 +82,10 @@ class Lockstep {
   bool drained(const std::vector<Session>& sessions, Time now) const;
   void end() { over_ = true; }
   std::string waits_for() const;    // in words; "": for nobody
+  bool begun() const { return limit_ >= 0; }
+  int64_t limit() const { return limit_; }    // the last state that may be computed; -1 before it has begun
+  // True for a client that takes part and has its lease.
+  bool counts_on(int64_t session) const;
 
  private:
   struct Held {    // a command for a step to come, or for one that is not published yet
@@ -105,6 +110,7 @@ class Lockstep {
   const Member* find(int64_t session) const { return const_cast<Lockstep*>(this)->find(session); }
   engine::Outcome take_part(const Session& session);
   engine::Outcome stands(const Member& member) const;
+  std::string fault_of(const grant_request_t& grant, const Member& member) const;    // "": none; as the next
   std::string take_commands(const grant_request_t& grant, std::vector<Held>& held) const;    // what is wrong; "": nothing
   bool has_room(const Member& member, size_t count, size_t bytes) const;
   void advance();

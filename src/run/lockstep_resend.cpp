@@ -1,5 +1,6 @@
 // The repair of lost messages: RESEND.
 #include <algorithm>
+#include <span>
 
 #include <fmt/format.h>
 
@@ -17,9 +18,6 @@ engine::Outcome Lockstep::resend(const request_t& request, const Session& sessio
   if (decode_checked(request.body.data(), request.body.size(), body) != DecodeFault::none) {
     return engine::Outcome::refuse(reply_t::BAD_REQUEST, "the body is not a resend_request_t");
   }
-  if (body.wanted.size() > kMostWanted) {
-    return engine::Outcome::refuse(reply_t::BAD_REQUEST, fmt::format("{} messages are wanted; {} is allowed", body.wanted.size(), kMostWanted));
-  }
   Member* member = find(session.id);
   if (!member) return engine::Outcome::refuse(reply_t::UNKNOWN_SESSION, "this client does not take part in lockstep (any more)");
   if (body.received > published_) {
@@ -34,7 +32,7 @@ engine::Outcome Lockstep::resend(const request_t& request, const Session& sessio
   reply.step = published_;
   reply.waits_for = waits_for();
   size_t room = engine::kMaxPartSize;
-  for (const resend_wanted_t& wanted : body.wanted) {
+  for (const resend_wanted_t& wanted : std::span(body.wanted).first(std::min(body.wanted.size(), kMostWanted))) {
     const std::span<const uint8_t> bytes = kept_.find(wanted.step, wanted.channel_index, wanted.sequence);
     if (wanted.offset < 0 || static_cast<size_t>(wanted.offset) >= bytes.size()) continue;
     const size_t left = bytes.size() - static_cast<size_t>(wanted.offset);

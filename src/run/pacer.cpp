@@ -141,7 +141,6 @@ void Pacer::stop() {
 
 int64_t Pacer::pause() {
   std::lock_guard lock(mutex_);
-  if (paused_) return until_;
   paused_ = true;
   until_ = std::max<int64_t>(granted_, 0);    // the initial state is always published
   return until_;

@@ -24,7 +24,7 @@ class Pacer : public engine::Pace {
   int borrow(int64_t& step, int limit) override;
   void give_back(int unused) override;
   void stop() override;
-  int64_t pause();                   // returns the last state that will still be computed
+  int64_t pause();                   // ends what allow() allowed, too; returns the last state that will still be computed
   void resume();
   int64_t allow(int64_t steps);      // while paused: that many more; returns the last one of them
   void set_rate(double rate);

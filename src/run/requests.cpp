@@ -23,6 +23,11 @@ engine::Outcome bad_body(const char* type) {
   return engine::Outcome::refuse(reply_t::BAD_REQUEST, std::string("the body is not a ") + type);
 }
 
+// What lockstep answers before there is a state.
+bool is_before_begin(int32_t kind) {
+  return kind == request_t::GRANT || kind == request_t::RESEND || kind == request_t::INFO || kind == request_t::QUIT || kind == request_t::STEP;
+}
+
 void put(const Pose& pose, const Twist& twist, state_reply_t& reply) {
   const Quat& q = pose.rotation;
   const double orientation[4] = {q.w(), q.x(), q.y(), q.z()};
@@ -51,6 +56,9 @@ int64_t Server::features() const {
 // What is repeated must not be disturbed: only who looks is answered meanwhile.
 engine::Outcome Server::ask(const request_t& request, const Session& session) {
   const bool looks = request.kind == request_t::GET_STATE || request.kind == request_t::INFO || request.kind == request_t::QUIT;
+  if (lockstep_ && !replay_ && !lockstep_->begun() && !is_before_begin(request.kind)) {
+    return engine::Outcome::refuse(reply_t::REFUSED, "lockstep has not begun: call step(0), or grant. It waits for " + lockstep_->waits_for());
+  }
   if (replay_ && !looks) return engine::Outcome::refuse(reply_t::REFUSED, "a snapshot is being restored: ask again when that is done");
   if (lockstep_ && request.kind == request_t::GRANT) return lockstep_->grant(request, session);
   if (lockstep_ && request.kind == request_t::RESEND) return lockstep_->resend(request, session);
@@ -59,7 +67,7 @@ engine::Outcome Server::ask(const request_t& request, const Session& session) {
 
 engine::Outcome Server::execute(const request_t& request) {
   switch (request.kind) {
-    case request_t::PAUSE: return engine::Outcome::after(pacer_->pause());
+    case request_t::PAUSE: return pause();
     case request_t::RESUME: pacer_->resume(); return engine::Outcome::with(engine::encoded(state()));
     case request_t::STEP: return step(request);
     case request_t::RATE: return set_rate(request);
@@ -79,10 +87,18 @@ engine::Outcome Server::execute(const request_t& request) {
   return engine::Outcome::refuse(reply_t::NOT_SUPPORTED, "this server does not know requests of kind " + std::to_string(request.kind));
 }
 
+engine::Outcome Server::pause() {
+  const int64_t last = pacer_->pause();
+  control_.cancel_after(last, "a PAUSE ended it at step " + std::to_string(last));
+  return engine::Outcome::after(last);
+}
+
 engine::Outcome Server::step(const request_t& request) {
   step_request_t body;
   if (!read_body(request, body)) return bad_body("step_request_t");
-  if (body.steps < 1) return engine::Outcome::refuse(reply_t::BAD_REQUEST, "steps is " + std::to_string(body.steps) + "; at least 1 is allowed");
+  if (body.steps < 1 || body.steps > kMostSteps) {
+    return engine::Outcome::refuse(reply_t::BAD_REQUEST, "steps is " + std::to_string(body.steps) + "; 1 to " + std::to_string(kMostSteps) + " is allowed");
+  }
   if (lockstep_) return engine::Outcome::refuse(reply_t::REFUSED, "in lockstep it is the clients' grants that step");
   if (!pacer_->paused()) return engine::Outcome::refuse(reply_t::REFUSED, "steps are taken while paused: pause first");
   return engine::Outcome::after(pacer_->allow(body.steps));

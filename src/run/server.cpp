@@ -34,14 +34,16 @@ Server::Server(std::shared_ptr<const model::WorldModel> world, ServerOptions opt
       tick_clock_(engine::kTickRate, world_->step_us),
       info_clock_(engine::kInfoRate, world_->step_us),
       hash_clock_(kHashRate, world_->step_us),
+      worker_(models_, wakeup_, options_.before_model),
       control_(run_id_, {.execute = [this](const request_t& request, const Session& session) { return ask(request, session); },
                          .state = [this] { return engine::encoded(state()); },
                          .publish = [this](const reply_t& reply) { send(own_.reply, reply); },
                          .utime = [this] { return status_.time_us; },
                          .epoch = [this] { return epoch_; },
-                         .has_state = [this] { return latest_ != nullptr; },
+                         .state_comes = [this] { return !latest_ && (!lockstep_ || replay_ || lockstep_->begun()); },
                          .early = [this](const request_t& request, const Session& session) { return lockstep_ && (replay_ || lockstep_->early(request, session)); },
-                         .left = [this](int64_t session) { if (lockstep_) lockstep_->leave(session); }}) {
+                         .left = [this](int64_t session) { if (lockstep_) lockstep_->leave(session); },
+                         .keeps = [this](int64_t session) { return lockstep_ && lockstep_->counts_on(session); }}) {
   if (options_.lockstep.clients > 0) {
     lockstep_ = std::make_unique<Lockstep>(options_.lockstep, [this](applied_t applied) {
       applied.utime = status_.time_us;
@@ -155,11 +157,13 @@ void Server::run() {
       repeat();
       if (!replay_) control_.published(status_.step);
       control_.serve();
+      spawn_ready();
       if (stop_) simulation_->leave_off();
       if (lockstep_ && !lockstep_->full()) simulation_->go();
     }
     if (over) break;
     control_.serve();
+    spawn_ready();
     if (lockstep_) check_leases();
     if (lockstep_ && !lockstep_->full() && simulation_->go()) continue;
     if (!replay_) control_.published(status_.step);    // a PAUSE may wait for a state that was out already

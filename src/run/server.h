@@ -9,6 +9,7 @@
 #include <limits>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,6 +19,7 @@
 #include "run/control.h"
 #include "engine/edits.h"
 #include "run/lockstep.h"
+#include "run/model_worker.h"
 #include "run/recorder.h"
 #include "run/replay.h"
 #include "engine/simulation.h"
@@ -40,6 +42,7 @@ struct ServerOptions {
   std::string repeat;                      // log or snapshot to begin with: what acted on that run acts again
   bool end_with_repeat = false;            // and then end; else go on, and publish from there on
   Recorder::Watcher watcher;               // sees what a log would get
+  std::function<void()> before_model;      // for tests: called in the worker's thread before a SPAWN's model is made ready
   std::vector<std::string> result_options; // for the log's header
   std::vector<std::pair<std::string, std::string>> remaps;
 };
@@ -119,6 +122,7 @@ class Server {
   void note(const request_t& request);           // in the log: it changed the state
   void note_files(const std::vector<std::string>& files);    // that a model was read from which came since the start
   void begin_epoch();                            // the world is made anew
+  engine::Outcome pause();
   engine::Outcome step(const request_t& request);
   engine::Outcome set_rate(const request_t& request);
   engine::Outcome reset(const request_t& request);
@@ -130,7 +134,9 @@ class Server {
   // Applies a change to the world that stands still, and notes it. models: some come or go.
   engine::Outcome change(const request_t& request, bool models, const std::function<engine::Outcome()>& apply);
   engine::Outcome edit(const request_t& request);
-  engine::Outcome spawn(const request_t& request);
+  engine::Outcome spawn(const request_t& request);       // makes the model ready; in a repetition, puts it in at once
+  void spawn_ready();                            // puts in what is ready
+  engine::Outcome put_in(const request_t& request, const spawn_request_t& body, const model::LoadedModel& loaded);
   engine::Outcome reset_poses(const request_t& request);
   engine::Outcome reset_time(const request_t& request);
   void renew_info();
@@ -173,6 +179,9 @@ class Server {
   const Snapshot* latest_ = nullptr;           // newest published state, with the changes since
   Snapshot changed_;
   engine::ModelStore models_{first_world_->file};
+  ModelWorker worker_;                         // of SPAWNs
+  std::optional<ModelWorker::Made> made_;      // the next that is ready,
+  int64_t enters_at_ = -1;                     // and the state that it waits for
   Status status_;
   std::function<void(const Status&)> on_status_;
   std::function<void(const Snapshot&)> on_state_;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <random>
+#include <tuple>
 
 namespace ruedo::run {
 
@@ -17,15 +18,18 @@ Session* Sessions::find(int64_t id) {
   return found == sessions_.end() ? nullptr : &*found;
 }
 
-Session* Sessions::join(const std::string& client, int64_t sequence, Time now) {
+Session* Sessions::join(const std::string& client, int64_t sequence, Time now, const std::function<bool(int64_t)>& keeps) {
   for (Session& session : sessions_) {
     if (session.join_sequence == sequence && session.client == client) return &session;
   }
   if (sessions_.size() == kMostSessions) {
-    const auto oldest = std::min_element(sessions_.begin(), sessions_.end(),
-                                         [](const Session& a, const Session& b) { return a.last_heard < b.last_heard; });
-    if (now - oldest->last_heard < kMaySilence) return nullptr;
-    sessions_.erase(oldest);
+    auto place = sessions_.end();
+    for (auto session = sessions_.begin(); session != sessions_.end(); ++session) {
+      if (now - session->last_heard < kMaySilence || (keeps && keeps(session->id))) continue;
+      if (place == sessions_.end() || std::tie(session->spoke, session->last_heard) < std::tie(place->spoke, place->last_heard)) place = session;
+    }
+    if (place == sessions_.end()) return nullptr;
+    sessions_.erase(place);
   }
   Session& session = sessions_.emplace_back();
   session.id = random_id();
@@ -40,6 +44,7 @@ void Sessions::leave(int64_t id) {
 }
 
 Sessions::Verdict Sessions::judge(const Session& session, int64_t sequence, const reply_t*& reply) const {
+  if (sequence < 1 || sequence - session.last_sequence > kMostJump) return Verdict::too_far;
   if (sequence > session.last_sequence) return Verdict::execute;
   for (const reply_t& kept : session.replies) {
     if (kept.sequence != sequence) continue;

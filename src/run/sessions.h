@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,6 +20,7 @@ struct Session {
   int64_t last_sequence = 0;         // executed, or being executed
   std::deque<reply_t> replies;       // the last ones, oldest first
   std::chrono::steady_clock::time_point last_heard;
+  bool spoke = false;                // asked for something since it joined
 };
 
 // Not thread safe.
@@ -27,14 +29,17 @@ class Sessions {
   using Time = std::chrono::steady_clock::time_point;
   static constexpr size_t kMostSessions = 64;
   static constexpr size_t kKeptReplies = 32;
-  static constexpr auto kMaySilence = std::chrono::minutes(1);    // then its place may go to another
+  static constexpr auto kMaySilence = std::chrono::seconds(3);    // then its place may go to another
+  static constexpr int64_t kMostJump = 1024;                      // of sequences that count up
 
-  // What is to be done with a request of a session.
-  enum class Verdict { execute, answer_again, wait, too_old };
+  // What is to be done with a request of a session. too_far: one forged message must not end a session for good.
+  enum class Verdict { execute, answer_again, wait, too_old, too_far };
 
   Session* find(int64_t id);
-  // The session of a client that joins, the same one for a repeated JOIN; null when there is no place.
-  Session* join(const std::string& client, int64_t sequence, Time now);
+  // The session of a client that joins, the same one for a repeated JOIN. Where all places are taken, the most silent session
+  // gives way, first of those that only ever joined; but none that `keeps`, if there is such a function, holds on to. Null
+  // when there is no place.
+  Session* join(const std::string& client, int64_t sequence, Time now, const std::function<bool(int64_t)>& keeps = {});
   void leave(int64_t id);
 
   // answer_again: `reply` is the one to send.

@@ -140,3 +140,27 @@ def test_the_program_of_the_docs():
     said = [subprocess.run([sys.executable, "-c", source], cwd=SOURCE, capture_output=True, text=True, timeout=PATIENCE) for _ in range(2)]
     assert said[0].stdout.startswith("400 "), said[0].stderr    # 2 s of 5 ms
     assert said[0].stdout == said[1].stdout
+
+
+def test_what_a_newcomer_calls_before_the_first_step_is_answered():
+    import ruedo
+    with ruedo_run("--lockstep", "1", "--disable", "p3at/camera", world=HALL) as server, ruedo.connect(server.url) as sim:
+        for call in (lambda: sim.set_pose("p3at", 0.0, 1.0), lambda: sim.state("p3at"), sim.pause, lambda: sim.spawn("p3at", 2.0, 1.0), sim.reset):
+            with pytest.raises(ruedo.RequestError, match=r"lockstep has not begun: call step\(0\)"):
+                call()
+        sim.step(0)
+        sim.set_pose("p3at", 0.0, 1.0)
+        assert sim.state("p3at").position[1] == pytest.approx(1.0, abs=1e-6)
+        assert sim.step(2).step == 2
+        sim.quit()
+
+
+def test_a_pause_in_lockstep_is_named_by_who_waits():
+    import ruedo
+    with ruedo_run("--lockstep", "1", "--disable", "p3at/camera", world=HALL) as server, ruedo.connect(server.url) as sim:
+        sim.step(1)
+        sim.pause()
+        with pytest.raises(ruedo.Timeout, match="the run waits for a RESUME: it is paused"):
+            sim.step(1, timeout=1.0)
+        sim.resume()
+        assert sim.step(1).step == 3

@@ -43,8 +43,12 @@ class Controlled {
     if (thread_.joinable()) thread_.join();
   }
 
+  void send(const request_t& request) { bus.send("ruedo/request", engine::encoded(request)); }
   reply_t ask(const request_t& request) {
-    bus.send("ruedo/request", engine::encoded(request));
+    send(request);
+    return answer(request);
+  }
+  reply_t answer(const request_t& request) {
     return decoded_as<reply_t>(bus.wait_for("ruedo/reply", from_, [&](const Message& message) {
                                     return decoded_as<reply_t>(message.bytes).sequence == request.sequence;
                                   }).bytes);
@@ -134,12 +138,7 @@ class Controlled {
     return found;
   }
 
-  void rewind() { from_ = 0; }    // after bus.forget()
-  Server& server() { return *server_; }
-  MemoryBus bus;
-
- private:
-  request_t request(int32_t kind, const std::vector<uint8_t>& body) {
+  request_t request(int32_t kind, const std::vector<uint8_t>& body = {}) {
     request_t request;
     request.utime = 0;
     request.run_id = 0;
@@ -151,7 +150,17 @@ class Controlled {
     request.size = static_cast<int32_t>(body.size());
     return request;
   }
+  request_t stepping(int64_t steps) {
+    step_request_t body;
+    body.steps = steps;
+    return request(request_t::STEP, engine::encoded(body));
+  }
 
+  void rewind() { from_ = 0; }    // after bus.forget(), or for an answer that came before another's
+  Server& server() { return *server_; }
+  MemoryBus bus;
+
+ private:
   std::unique_ptr<Server> server_;
   std::thread thread_;
   int64_t session_ = 0, sequence_ = 0;

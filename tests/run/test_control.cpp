@@ -340,7 +340,7 @@ TEST_F(ControlTest, ControlOff) {
 
 // Without a server: the world's first state is late, and who asks for it waits in order.
 TEST(Control, WaitsForTheFirstState) {
-  bool has_state = false;
+  bool state_comes = true;
   std::vector<int32_t> executed;
   std::vector<reply_t> replies;
   Control control(7, {.execute = [&](const request_t& request, const Session&) { executed.push_back(request.kind); return engine::Outcome{}; },
@@ -348,7 +348,7 @@ TEST(Control, WaitsForTheFirstState) {
                       .publish = [&](const reply_t& reply) { replies.push_back(reply); },
                       .utime = [] { return int64_t{0}; },
                       .epoch = [] { return 1; },
-                      .has_state = [&] { return has_state; }});
+                      .state_comes = [&] { return state_comes; }});
   request_t request{};
   request.epoch = -1;
   const auto ask = [&](int32_t kind, const std::vector<uint8_t>& body = {}) {
@@ -372,7 +372,7 @@ TEST(Control, WaitsForTheFirstState) {
   ask(request_t::SPAWN);
   control.serve();
   EXPECT_EQ(executed, std::vector<int32_t>{});
-  has_state = true;
+  state_comes = false;    // it is there
   control.serve();
   EXPECT_EQ(executed, (std::vector<int32_t>{request_t::GET_STATE, request_t::QUIT, request_t::SPAWN}));
   EXPECT_EQ(replies.size(), 4U);
