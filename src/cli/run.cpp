@@ -198,7 +198,8 @@ int run(const RunArguments& arguments) {
     if (!arguments.quiet) print_world(server, *world, place.url);
     view = viewed.open(server, world->name);
   });
-  if (!is_read) server.stop();    // as by SIGTERM: the log gets its end
+  if (!is_read) server.on_state([&server](const Snapshot&) { server.stop(); });    // as by SIGTERM: the log gets its end
+  if (!is_read && arguments.lockstep > 0) server.stop();                           // no state comes by itself
   StatusLine status;
   server.on_status([&](const run::Status& now) { status.draw(now); });
   signals.serve(&server);
