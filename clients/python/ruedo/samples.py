@@ -264,6 +264,8 @@ def _pose(m: Any) -> Pose:
 
 
 def _image(m: Any) -> Image:
+    if m.nmetadata < 0:    # lcm-gen's Python reads none then
+        raise ValueError(f"a length of {m.nmetadata}")
     return Image(m.utime, m.width, m.height, _PIXEL_FORMATS.get(m.pixelformat, f"0x{m.pixelformat:08x}"), m.row_stride,
                  bytes(m.data))
 
@@ -277,6 +279,8 @@ def _imu(m: Any) -> Imu:
 
 
 def _contact(m: Any) -> Contact:
+    if m.n < 0:    # lcm-gen's Python reads none then
+        raise ValueError(f"a length of {m.n}")
     points = [ContactPoint(p.body, _floats(p.position), _floats(p.normal), p.force, p.depth) for p in m.points]
     return Contact(m.utime, bool(m.pressed), points)
 
