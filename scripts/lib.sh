@@ -11,7 +11,7 @@ readonly EXIT_BUILD=1 EXIT_ENVIRONMENT=4
 
 # Packages: "a|b" is the first of them that this distribution has; "?a" is left out where it has none.
 readonly BUILD_PACKAGES=(
-  g++ cmake ninja-build pkg-config ccache python3-venv default-jdk-headless ca-certificates iproute2
+  g++ cmake ninja-build pkg-config ccache python3-venv python3-dev default-jdk-headless ca-certificates iproute2
   libbullet-dev libtinyxml2-dev liburdfdom-dev libassimp-dev libembree-dev libtbb-dev libeigen3-dev
   "?libosmesa6-dev" libegl-dev libegl-mesa0 libgl-dev
   libopencv-core-dev libopencv-imgcodecs-dev libopencv-imgproc-dev
@@ -100,7 +100,7 @@ ensure_packages() {
 # .venv with what requirements.txt asks for.
 ensure_venv() {
   local requirements="$ruedo_root/scripts/requirements.txt" stamp="$ruedo_venv/ruedo-requirements.txt"
-  if cmp -s "$requirements" "$stamp" && "$ruedo_venv/bin/python" -c 'import lcm, numpy, pytest' 2>/dev/null; then
+  if cmp -s "$requirements" "$stamp" && "$ruedo_venv/bin/python" -c 'import lcm, nanobind, numpy, pytest' 2>/dev/null; then
     return
   fi
   if ! "$ruedo_venv/bin/python" -m pip --version >/dev/null 2>&1; then

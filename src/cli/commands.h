@@ -47,9 +47,6 @@ std::shared_ptr<const model::WorldModel> load(const WorldArguments& arguments);
 // Those of them that change a result, as on the command line: for a log's header.
 std::vector<std::string> result_options(const WorldArguments& arguments);
 
-model::Spawn parse_spawn(const std::string& text);                              // MODEL[:NAME]@X,Y[,YAW]
-model::DriveOption parse_drive(const std::string& text);                        // ROBOT=LEFT[+LEFT...],RIGHT[+RIGHT...]
-model::Setting parse_setting(const std::string& text);                          // ROBOT/DEVICE.KEY=VALUE
 std::pair<std::string, std::string> parse_remap(const std::string& text);       // CHANNEL=NAME
 run::WaitForOption parse_wait_for(const std::string& text);                  // CHANNEL@HZ
 double parse_rate(const std::string& text);                                     // a number above 0, or "max": +inf

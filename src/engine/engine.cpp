@@ -61,7 +61,7 @@ struct Engine::Observer {
   std::string device, field;
   FieldReader reader;
   std::vector<int> channels;      // of the robots, in their order
-  FieldArray array;
+  std::shared_ptr<FieldArray> array = std::make_shared<FieldArray>();
   size_t count = 0;               // values of one robot
 };
 
@@ -176,7 +176,7 @@ void Engine::update(Observer& observer, size_t world) {
   const size_t row_size = observer.count * observer.reader.value_size();
   for (size_t robot = 0; robot < observer.channels.size(); ++robot) {
     const std::vector<uint8_t>& message = copies_[world]->newest[static_cast<size_t>(observer.channels[robot])];
-    std::byte* row = observer.array.values.data() + (world * observer.channels.size() + robot) * row_size;
+    std::byte* row = observer.array->values.data() + (world * observer.channels.size() + robot) * row_size;
     if (message.empty() || observer.reader.read(message, row, observer.count)) continue;
     throw std::runtime_error("the number of values in " + observer.device + "." + observer.field +
                              " changes from message to message: an array cannot hold them");
@@ -247,17 +247,17 @@ std::vector<int> Engine::channels_of(const std::string& device) const {
   throw InputError({}, "no robot has a device '" + device + "'; there are " + names);
 }
 
-const FieldArray& Engine::observe(const std::string& device, const std::string& field) {
+std::shared_ptr<const FieldArray> Engine::observe(const std::string& device, const std::string& field) {
   for (const auto& known : observers_) {
     if (known->device == device && known->field == field) return known->array;
   }
   const std::vector<int> channels = channels_of(device);
   const Schema* schema = find_schema(copies_[0]->channels[channels[0]].fingerprint);
   if (!schema) throw InputError({}, "the messages of '" + device + "' are of a type without a description");
-  auto observer = std::make_unique<Observer>(Observer{device, field, FieldReader(*schema, field), channels, {}, 0});
+  auto observer = std::make_unique<Observer>(Observer{device, field, FieldReader(*schema, field), channels});
   const std::vector<uint8_t>& sample = copies_[0]->newest[static_cast<size_t>(channels[0])];
   if (sample.empty()) throw InputError({}, device + "." + field + " has no sample yet: step the engine first");
-  FieldArray& array = observer->array;
+  FieldArray& array = *observer->array;
   array.type = observer->reader.type();
   array.shape = {static_cast<int64_t>(copies_.size()), static_cast<int64_t>(channels.size())};
   observer->count = 1;
@@ -268,7 +268,7 @@ const FieldArray& Engine::observe(const std::string& device, const std::string& 
   array.values.resize(copies_.size() * channels.size() * observer->count * observer->reader.value_size());
   observers_.push_back(std::move(observer));
   for (size_t i = 0; i < copies_.size(); ++i) update(*observers_.back(), i);
-  return array;
+  return observers_.back()->array;
 }
 
 int64_t Engine::current_step(int world) const { return copies_.at(static_cast<size_t>(world))->step; }

@@ -65,9 +65,9 @@ class Engine {
   // Makes a copy as it was at the beginning, with that seed: what follows equals a fresh run.
   void reset(int world, uint64_t seed);
 
-  // The array of a field, kept up to date from now on; valid as long as the engine. device: the name of one ("LRF"), or of its kind
+  // The array of a field, kept up to date as long as the engine lives. device: the name of one ("LRF"), or of its kind
   // ("lrf") where each robot has at most one of them. Throws InputError.
-  const FieldArray& observe(const std::string& device, const std::string& field);
+  std::shared_ptr<const FieldArray> observe(const std::string& device, const std::string& field);
 
   uint64_t state_hash(int world) const;
 

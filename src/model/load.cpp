@@ -9,6 +9,7 @@
 #include "model/sdf_reader.h"
 #include "model/settings.h"
 #include "model/urdf.h"
+#include "model/world_name.h"
 
 namespace fs = std::filesystem;
 
@@ -166,14 +167,14 @@ class Loader {
 
 }  // namespace
 
-std::shared_ptr<const WorldModel> load_world(const std::string& path, const LoadOptions& options) {
+std::shared_ptr<const WorldModel> load_world(const std::string& name, const LoadOptions& options) {
+  const std::string path = world_file(name);
   std::error_code error;
   fs::path full = fs::weakly_canonical(fs::absolute(path), error);
   if (error) full = fs::absolute(path);
   if (full.extension() == ".xacro") {
     throw InputError({path, 0}, "is a xacro file; expand it first: xacro " + full.filename().string() + " > robot.urdf");
   }
-  if (!fs::exists(full, error)) throw InputError({path, 0}, "no such file");
   Loader loader(full.string(), options.allow_absolute);
   const auto root = loader.documents().read(full.string());
   return loader.load(*root, options);

@@ -36,9 +36,16 @@ struct LoadOptions {
   bool allow_absolute = false;           // absolute paths in the files may lead out of the search folders
 };
 
-// Loads an SDF world, an SDF model or a URDF robot (the latter two in an empty world with a ground plane).
+// The options as they are written on the command line and in calls of the engine. Each throws InputError, which shows what it should
+// look like.
+Spawn parse_spawn(const std::string& text);            // MODEL[:NAME]@X,Y[,YAW]
+DriveOption parse_drive(const std::string& text);      // ROBOT=LEFT[+LEFT...],RIGHT[+RIGHT...]
+Setting parse_setting(const std::string& text);        // ROBOT/DEVICE.KEY=VALUE
+
+// Loads an SDF world, an SDF model or a URDF robot (the latter two in an empty world with a ground plane): a file, or the
+// name of a world that comes with Ruedo or lies in a folder of RUEDO_PATH ("arena").
 // Throws InputError for what cannot be loaded; what can be gone on from is in WorldModel::findings.
-std::shared_ptr<const WorldModel> load_world(const std::string& path, const LoadOptions& options = {});
+std::shared_ptr<const WorldModel> load_world(const std::string& name, const LoadOptions& options = {});
 
 // The same from text, with `path` naming it in messages and giving the folder to search from; for tests and
 // models sent along in a request.

@@ -19,6 +19,7 @@
 
 #include <Eigen/Geometry>
 
+#include "core/installation.h"
 #include "model/document.h"
 #include "model/mesh_format.h"
 
@@ -29,11 +30,8 @@ namespace {
 
 std::string default_importer() {
   std::error_code error;
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  if (!error) {
-    const fs::path beside = program.parent_path() / "ruedo-import-mesh";
-    if (fs::exists(beside, error)) return beside.string();
-  }
+  const fs::path beside = fs::path(own_folder()) / "ruedo-import-mesh";
+  if (fs::exists(beside, error)) return beside.string();
   return std::string(RUEDO_BIN_DIR) + "/ruedo-import-mesh";
 }
 

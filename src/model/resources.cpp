@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "core/installation.h"
 #include "model/document.h"
 #include "model/sdf_version.h"
 
@@ -109,12 +110,8 @@ bool may_be_package(const fs::path& folder) {
 }  // namespace
 
 std::string shipped_worlds() {
-  std::error_code error;
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  if (!error) {
-    const fs::path installed = program.parent_path().parent_path() / "share/ruedo/worlds";
-    if (is_folder(installed)) return full_path(installed);
-  }
+  const fs::path installed = fs::path(own_folder()).parent_path() / "share/ruedo/worlds";
+  if (is_folder(installed)) return full_path(installed);
   return is_folder(RUEDO_WORLDS_DIR) ? full_path(RUEDO_WORLDS_DIR) : "";
 }
 

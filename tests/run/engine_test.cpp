@@ -152,7 +152,8 @@ TEST(Engine, ArraysFollowTheRuns) {
   engine::EngineOptions options;
   options.worlds = 2;
   Engine engine(load_text(robot_sdf("a", 0, 0) + robot_sdf("b", 0, 2)), options);
-  const engine::FieldArray& position = engine.observe("pose", "pos");
+  const std::shared_ptr<const engine::FieldArray> observed = engine.observe("pose", "pos");
+  const engine::FieldArray& position = *observed;
   EXPECT_EQ(position.type, Primitive::float64);
   EXPECT_EQ(position.shape, (std::vector<int64_t>{2, 2, 3}));
   const double none = std::nan("");

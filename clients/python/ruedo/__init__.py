@@ -33,6 +33,18 @@ from .world_info import Body
 
 __version__ = "0.1.0"
 
+
+def __getattr__(name: str) -> object:
+    """``ruedo.Engine``, which needs the compiled part of the package: loaded when it is first asked for."""
+    if name != "Engine":
+        raise AttributeError(f"module 'ruedo' has no attribute {name!r}")
+    try:
+        from .engine import Engine
+    except ImportError as error:
+        raise ImportError("ruedo.Engine is not in this installation of the client (it was installed without a build of Ruedo): "
+                          f"use BUILD/python, or an installed Ruedo ({error})") from error
+    return Engine
+
 __all__ = [
     "Body", "Camera", "CameraInfo", "Command", "Contact", "ContactPoint", "Device", "Image", "Imu", "Joints", "LaunchError", "LeaseLost",
     "LidarScan", "Message", "Motion", "MotionError", "MotionStatus", "NoServer", "NotSupported", "Observations", "Odometry", "Pose", "Reader", "RequestError", "Robot",

@@ -1,0 +1,157 @@
+// The module ruedo._engine: the engine in the process of a Python program. ruedo/engine.py is what people call.
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include "core/version.h"
+#include "engine/engine.h"
+#include "model/load.h"
+#include "ruedo/errors.h"
+
+namespace nb = nanobind;
+using ruedo::Primitive;
+using ruedo::engine::Engine;
+using ruedo::engine::FieldArray;
+
+namespace {
+
+nb::dlpack::dtype dtype_of(Primitive type) {
+  switch (type) {
+    case Primitive::boolean: return nb::dtype<bool>();
+    case Primitive::byte: return nb::dtype<uint8_t>();
+    case Primitive::int8: return nb::dtype<int8_t>();
+    case Primitive::int16: return nb::dtype<int16_t>();
+    case Primitive::int32: return nb::dtype<int32_t>();
+    case Primitive::int64: return nb::dtype<int64_t>();
+    case Primitive::float32: return nb::dtype<float>();
+    default: return nb::dtype<double>();
+  }
+}
+
+struct Recorded {
+  int world;
+  int64_t step;
+  std::string channel;
+  std::string bytes;
+};
+
+class PyEngine {
+ public:
+  PyEngine(const std::string& world, const std::optional<std::string>& text, int worlds, uint64_t seed, bool noise, int threads,
+           const std::vector<std::string>& spawns, const std::vector<std::string>& drives, const std::vector<std::string>& settings,
+           const std::vector<std::string>& disabled, bool record) {
+    ruedo::model::LoadOptions options;
+    for (const std::string& one : spawns) options.spawns.push_back(ruedo::model::parse_spawn(one));
+    for (const std::string& one : drives) options.drives.push_back(ruedo::model::parse_drive(one));
+    for (const std::string& one : settings) options.settings.push_back(ruedo::model::parse_setting(one));
+    options.disabled = disabled;
+    ruedo::engine::EngineOptions engine;
+    engine.worlds = worlds;
+    engine.threads = threads;
+    engine.fleet.seed = seed;
+    engine.fleet.noise = noise;
+    engine.fleet.disabled = disabled;
+    const nb::gil_scoped_release release;
+    const auto model = text ? ruedo::model::load_world_text(*text, world, options) : ruedo::model::load_world(world, options);
+    engine_ = std::make_unique<Engine>(model, engine);
+    for (const ruedo::Finding& finding : model->findings) findings_.push_back(finding.source.str() + ": " + finding.element + ": " + finding.text);
+    if (record) {
+      engine_->on_message([this](int copy, int64_t step, const ruedo::engine::Channel& channel, std::span<const uint8_t> bytes) {
+        recorded_.push_back({copy, step, channel.bus_name, {reinterpret_cast<const char*>(bytes.data()), bytes.size()}});
+      });
+    }
+  }
+
+  Engine& engine() const {
+    if (!engine_) throw std::runtime_error("the engine was closed");
+    return *engine_;
+  }
+
+  void close() { engine_.reset(); }
+
+  void step(int64_t steps) {
+    Engine& engine = this->engine();
+    recorded_.clear();
+    const nb::gil_scoped_release release;
+    engine.step(steps);
+  }
+
+  void drive(const nb::ndarray<const double, nb::c_contig, nb::device::cpu>& velocities) {
+    engine().drive({velocities.data(), velocities.size()});
+  }
+
+  void command(int world, const std::string& channel, const nb::bytes& message) {
+    engine().command(world, channel, {static_cast<const uint8_t*>(message.data()), message.size()});
+  }
+
+  void reset(int world, uint64_t seed) {
+    Engine& engine = this->engine();
+    recorded_.clear();
+    const nb::gil_scoped_release release;
+    engine.reset(world, seed);
+  }
+
+  // A view of the engine's own memory, which stays as long as any view of it, and is written by step() and reset().
+  nb::object observe(const std::string& device, const std::string& field) {
+    const auto* array = new std::shared_ptr<const FieldArray>(engine().observe(device, field));
+    const nb::capsule owner(array, [](void* held) noexcept { delete static_cast<std::shared_ptr<const FieldArray>*>(held); });
+    const std::vector<size_t> shape((*array)->shape.begin(), (*array)->shape.end());
+    return nb::cast(nb::ndarray<nb::numpy, nb::ro>((*array)->values.data(), shape.size(), shape.data(), owner, nullptr, dtype_of((*array)->type)));
+  }
+
+  nb::list messages() const {
+    nb::list list;
+    for (const Recorded& one : recorded_) list.append(nb::make_tuple(one.world, one.step, one.channel, nb::bytes(one.bytes.data(), one.bytes.size())));
+    return list;
+  }
+
+  std::vector<std::tuple<std::string, std::string, std::string>> devices() const {
+    std::vector<std::tuple<std::string, std::string, std::string>> list;
+    for (const auto& device : engine().devices()) list.emplace_back(device.robot, device.name, device.kind);
+    return list;
+  }
+
+  const std::vector<std::string>& findings() const { return findings_; }
+
+ private:
+  std::unique_ptr<Engine> engine_;
+  std::vector<std::string> findings_;
+  std::vector<Recorded> recorded_;
+};
+
+}  // namespace
+
+NB_MODULE(_engine, module) {
+  module.attr("version") = ruedo::version();
+  nb::exception<ruedo::InputError>(module, "InputError", PyExc_ValueError);
+  nb::exception<ruedo::EnvironmentError>(module, "EnvironmentError", PyExc_OSError);
+  nb::class_<PyEngine>(module, "Engine")
+      .def(nb::init<const std::string&, const std::optional<std::string>&, int, uint64_t, bool, int, const std::vector<std::string>&,
+                    const std::vector<std::string>&, const std::vector<std::string>&, const std::vector<std::string>&, bool>(),
+           nb::arg("world"), nb::kw_only(), nb::arg("text") = nb::none(), nb::arg("worlds") = 1, nb::arg("seed") = 1, nb::arg("noise") = true,
+           nb::arg("threads") = 0, nb::arg("spawn") = nb::list(), nb::arg("drive") = nb::list(), nb::arg("set") = nb::list(),
+           nb::arg("disable") = nb::list(), nb::arg("record") = false)
+      .def("close", &PyEngine::close)
+      .def("step", &PyEngine::step)
+      .def("drive", &PyEngine::drive)
+      .def("command", &PyEngine::command)
+      .def("reset", &PyEngine::reset)
+      .def("observe", &PyEngine::observe)
+      .def("messages", &PyEngine::messages)
+      .def("devices", &PyEngine::devices)
+      .def("findings", &PyEngine::findings)
+      .def("worlds", [](const PyEngine& self) { return self.engine().worlds(); })
+      .def("step_us", [](const PyEngine& self) { return self.engine().step_us(); })
+      .def("current_step", [](const PyEngine& self, int world) { return self.engine().current_step(world); })
+      .def("driven", [](const PyEngine& self) { return self.engine().driven(); })
+      .def("state_hash", [](const PyEngine& self, int world) { return self.engine().state_hash(world); });
+}

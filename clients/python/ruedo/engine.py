@@ -1,0 +1,192 @@
+"""The simulation in the caller's process: many copies of a world, stepped together over all cores.
+
+    engine = ruedo.Engine("arena", worlds=64, seed=1)
+    ranges = engine.observe("lrf.ranges")          # (worlds, robots, beams), follows the runs
+    commands = np.zeros((64, 1, 2))                # (worlds, driven robots, (m/s, rad/s))
+    engine.step(commands, 20)                      # 20 steps of 5 ms
+
+It is the server's own code and gives the server's own bytes: copy i has the seed ``seed + i``, and its messages are those of
+``ruedo run WORLD --seed seed+i --lockstep 1`` for the same commands at the same steps. There is no network and no clock.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _engine
+
+__all__ = ["Engine"]
+
+
+class Engine:
+    """Copies of one world.
+
+    world: a file, or the name of a world that comes with Ruedo or lies in a folder of RUEDO_PATH; with ``text``, what the text is
+    called. worlds: how many copies. seed: of copy 0; copy i has ``seed + i``. noise: False gives ideal sensors. threads: at most so
+    many cores, 0 for all. spawn ("p3at:guest@1,2,0.5"), drive ("rover=left_joint,right_joint"), set ({"p3at/LRF.update_rate": 10}) and
+    disable ("p3at/camera") are those of ``ruedo run``. record: keep the messages of the last call, for :meth:`messages`.
+
+    Raises ValueError for what is wrong in the file or an argument, with file, line, value and what is allowed; OSError for
+    what the machine lacks. Not for several threads at once; ``step`` lets other Python threads run.
+    """
+
+    def __init__(self, world: str = "world", *, text: str | None = None, worlds: int = 1, seed: int = 1, noise: bool = True,
+                 threads: int = 0, spawn: Iterable[str] = (), drive: Iterable[str] = (), set: Mapping[str, object] | None = None,
+                 disable: Iterable[str] = (), record: bool = False) -> None:
+        for name, value in (("spawn", spawn), ("drive", drive), ("disable", disable)):
+            if isinstance(value, str):
+                raise TypeError(f"{name} is a list of texts, not one: {name}=[{value!r}]")
+        settings = [f"{key}={value}" for key, value in (set or {}).items()]
+        self._core = _engine.Engine(str(world), text=text, worlds=operator.index(worlds), seed=operator.index(seed), noise=bool(noise),
+                                    threads=operator.index(threads), spawn=list(spawn), drive=list(drive), set=settings,
+                                    disable=list(disable), record=bool(record))
+        self._worlds = self._core.worlds()
+        self._seeds = [seed + i for i in range(self._worlds)]
+        self._robots: tuple[str, ...] = tuple(self._core.driven())
+        self._step_us: int = self._core.step_us()
+
+    @property
+    def worlds(self) -> int:
+        """How many copies there are."""
+        return self._worlds
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The robots with a drive, in the order of the world file: the second axis of commands."""
+        return self._robots
+
+    @property
+    def dt(self) -> float:
+        """Seconds of sim time in a step."""
+        return self._step_us * 1e-6
+
+    @property
+    def devices(self) -> list[tuple[str, str, str]]:
+        """(robot, device, kind) of every sensor."""
+        return self._core.devices()
+
+    @property
+    def findings(self) -> list[str]:
+        """What of the world file is not supported, or was repaired: file, line, element, what was done."""
+        return self._core.findings()
+
+    def steps(self, world: int = 0) -> int:
+        """The number of the state that a copy is in; 0 after a reset."""
+        return self._core.current_step(self._checked(world))
+
+    def time(self, world: int = 0) -> float:
+        """Sim time of a copy, s."""
+        return self.steps(world) * self._step_us * 1e-6
+
+    def state_hash(self, world: int = 0) -> int:
+        """A hash of the whole state of a copy, bit for bit: the one of the server's ticks."""
+        return self._core.state_hash(self._checked(world))
+
+    def observe(self, name: str) -> NDArray[Any]:
+        """An array of (worlds, robots, ...) that always shows the newest message of each robot's device.
+
+        name: DEVICE.FIELD; the device by its name ("LRF.ranges") or its kind ("lrf.ranges", "odometry.theta", "pose.pos"), the
+        field as in the message type. It is a view of the engine's memory, cannot be written to, and is written anew by ``step`` and
+        ``reset``: copy what you keep. Robots are those that have the device, in the order of the world file.
+        """
+        device, dot, field = name.rpartition(".")
+        if not dot or not device or not field:
+            raise ValueError(f"{name!r} is no DEVICE.FIELD; for example 'lrf.ranges'")
+        array: NDArray[Any] = self._core.observe(device, field)
+        return array
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self.observe(name)
+
+    def step(self, commands: ArrayLike | None = None, n: int = 1) -> None:
+        """Computes n states of every copy.
+
+        commands: velocities on the states that there are, broadcast to (worlds, robots, 2) as (m/s ahead, rad/s) or
+        (worlds, robots, 3) as (m/s ahead, m/s left, rad/s); a row with NaN is no command. What was commanded before holds, until
+        the robot's watchdog (600 ms of sim time by default).
+        """
+        if commands is not None:
+            self._core.drive(self._velocities(commands))
+        try:
+            count = operator.index(n)
+        except TypeError:
+            raise TypeError(f"n is a whole number of steps, not {n!r}; a step is {self.dt:g} s") from None
+        self._core.step(count)
+
+    def command(self, world: int, channel: str, message: Any) -> None:
+        """A message on one of the channels that take commands ("p3at/move"), on the state that the copy is in.
+
+        message: one of ``ruedo.lcmtypes``, or its bytes.
+        """
+        self._core.command(self._checked(world), channel, message if isinstance(message, bytes) else message.encode())
+
+    def reset(self, worlds: int | Sequence[int] | NDArray[Any] | None = None, seed: int | Sequence[int] | None = None) -> None:
+        """Makes copies as they were at the beginning; what follows equals a fresh run.
+
+        worlds: an index, several, a mask, or None for all. seed: of each of them, or one for the first, counted up; None: the one that
+        the copy has.
+        """
+        indices = self._indices(worlds)
+        if seed is not None:
+            seeds = [seed + i for i in range(len(indices))] if isinstance(seed, (int, np.integer)) else [operator.index(s) for s in seed]
+            if len(seeds) != len(indices):
+                raise ValueError(f"{len(seeds)} seeds for {len(indices)} worlds")
+            for index, one in zip(indices, seeds):
+                self._seeds[index] = one
+        for index in indices:
+            self._core.reset(index, self._seeds[index])
+
+    def messages(self) -> list[tuple[int, int, str, bytes]]:
+        """(world, step, channel, bytes) of every message of the last call of ``step`` or ``reset``; with ``record=True``."""
+        return self._core.messages()
+
+    def close(self) -> None:
+        """Lets go of the copies. Everything but reading what was observed raises afterwards."""
+        self._core.close()
+
+    def __enter__(self) -> Engine:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<ruedo.Engine: {self._worlds} worlds, robots {', '.join(self._robots) or 'none'}, steps of {self.dt * 1e3:g} ms>"
+
+    def _velocities(self, commands: ArrayLike) -> NDArray[np.float64]:
+        given = np.asarray(commands, dtype=np.float64)
+        if given.ndim == 0 or given.shape[-1] not in (2, 3):
+            raise ValueError(f"commands have 2 values for a robot (m/s, rad/s) or 3 (m/s ahead, m/s left, rad/s) in their last axis; "
+                             f"their shape is {given.shape}")
+        shape = (self._worlds, len(self._robots), given.shape[-1])
+        try:
+            rows = np.broadcast_to(given, shape)
+        except ValueError:
+            raise ValueError(f"commands of shape {given.shape} do not fit (worlds, robots, {shape[2]}) = {shape}") from None
+        if shape[2] == 3:
+            return np.ascontiguousarray(rows)
+        full = np.zeros((*shape[:2], 3))
+        full[..., 0] = rows[..., 0]
+        full[..., 2] = rows[..., 1]
+        return full
+
+    def _checked(self, world: int) -> int:
+        index = operator.index(world)
+        if not 0 <= index < self._worlds:
+            raise IndexError(f"world {index} of {self._worlds}")
+        return index
+
+    def _indices(self, worlds: int | Sequence[int] | NDArray[Any] | None) -> list[int]:
+        if worlds is None:
+            return list(range(self._worlds))
+        given = np.asarray(worlds)
+        if given.dtype == bool:
+            if given.shape != (self._worlds,):
+                raise ValueError(f"a mask has one value for each of {self._worlds} worlds; its shape is {given.shape}")
+            return [int(i) for i in np.flatnonzero(given)]
+        return [self._checked(i) for i in np.atleast_1d(given)]

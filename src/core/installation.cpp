@@ -1,0 +1,26 @@
+// The dynamic linker knows which object an address belongs to; the kernel knows the program.
+#include "core/installation.h"
+
+#include <filesystem>
+
+#include <dlfcn.h>
+
+namespace ruedo {
+
+namespace fs = std::filesystem;
+
+std::string own_folder() {
+  static const int here = 0;
+  std::error_code error;
+  Dl_info object{};
+  fs::path file;
+  // Of the program itself the linker has the name as it was typed; of a library, the path.
+  if (dladdr(&here, &object) != 0 && object.dli_fname != nullptr && fs::path(object.dli_fname).filename().string().find(".so") != std::string::npos) {
+    file = fs::canonical(object.dli_fname, error);
+  } else {
+    file = fs::read_symlink("/proc/self/exe", error);
+  }
+  return error ? "" : file.parent_path().string();
+}
+
+}  // namespace ruedo

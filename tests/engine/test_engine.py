@@ -1,0 +1,146 @@
+"""ruedo.Engine: arrays, commands, resets and errors. That its bytes are the server's is tests/run/engine_test.cpp's."""
+import math
+
+import numpy as np
+import pytest
+
+import ruedo
+from ruedo import lcmtypes
+
+# A two-wheeled robot without limits and watchdog, and a lidar of five beams that looks at a wall 2 m ahead of it.
+ROBOT = """<model name='{name}'><pose>0 {y} 0 0 0 0</pose><link name='body'><pose>0 0 0.15 0 0 0</pose><inertial><mass>10</mass></inertial>
+<collision name='c'><geometry><box><size>0.5 0.3 0.2</size></box></geometry></collision>
+<sensor name='scan' type='gpu_lidar'><update_rate>10</update_rate><lidar><scan><horizontal><samples>5</samples><min_angle>-0.4</min_angle>
+<max_angle>0.4</max_angle></horizontal></scan><range><min>0.05</min><max>8</max></range>
+<noise><type>gaussian</type><stddev>0.01</stddev></noise></lidar></sensor></link>
+{wheels}<ruedo:drive><ruedo:left_joint>left_joint</ruedo:left_joint><ruedo:right_joint>right_joint</ruedo:right_joint>
+<ruedo:watchdog>0</ruedo:watchdog></ruedo:drive></model>"""
+WHEEL = """<link name='{side}'><pose>0 {y} 0.1 -1.5707963267948966 0 0</pose><inertial><mass>0.5</mass></inertial>
+<collision name='c'><geometry><cylinder><radius>0.1</radius><length>0.05</length></cylinder></geometry></collision></link>
+<joint name='{side}_joint' type='revolute'><parent>body</parent><child>{side}</child><axis><xyz expressed_in='__model__'>0 1 0</xyz></axis></joint>"""
+WALL = "<static>true</static><link name='l'><collision name='c'><geometry><box><size>0.2 40 2</size></box></geometry></collision></link>"
+
+
+def world(robots=1):
+    wheels = WHEEL.format(side="left", y=0.2) + WHEEL.format(side="right", y=-0.2)
+    models = "".join(ROBOT.format(name=f"r{i}", y=2 * i, wheels=wheels) for i in range(robots))
+    return ("<sdf version='1.9' xmlns:ruedo='ruedo'><world name='w'><physics type='bullet'><max_step_size>0.005</max_step_size></physics>"
+            "<model name='ground'><static>true</static><link name='l'><collision name='c'><geometry><plane><normal>0 0 1</normal></plane>"
+            f"</geometry></collision></link></model><model name='wall'><pose>2.1 0 1 0 0 0</pose>{WALL}</model>{models}</world></sdf>")
+
+
+def engine(robots=1, **options):
+    return ruedo.Engine("w.sdf", text=world(robots), **options)
+
+
+def test_arrays_show_the_runs_without_a_copy():
+    with engine(robots=2, worlds=3, noise=False) as e:
+        assert e.robots == ("r0", "r1") and e.worlds == 3 and e.dt == 0.005
+        ranges, position = e.observe("scan.ranges"), e["pose.pos"]
+        assert ranges.shape == (3, 2, 5) and ranges.dtype == np.float32
+        assert position.shape == (3, 2, 3) and position.dtype == np.float64
+        assert e["scan.ranges"].ctypes.data == ranges.ctypes.data
+        angles = np.linspace(-0.4, 0.4, 5)
+        np.testing.assert_allclose(ranges[2, 1], 2.0 / np.cos(angles), rtol=1e-6)
+        commands = np.zeros((3, 2, 2))
+        commands[1, 0] = 0.4, 0.0       # m/s, rad/s
+        commands[2, 1] = 0.0, math.pi / 2
+        e.step(commands, 200)           # a second
+        np.testing.assert_allclose(position[1, 0], [0.4, 0.0, 0.0], atol=1e-12)
+        np.testing.assert_allclose(position[0], [[0.0, 0.0, 0.0], [0.0, 2.0, 0.0]], atol=1e-12)
+        np.testing.assert_allclose(ranges[1, 0], 1.6 / np.cos(angles), rtol=1e-6)
+        assert ranges[2, 1, 0] == pytest.approx(2.0 / math.sin(0.4), rel=1e-6)      # a quarter turn to the left: along the wall
+        assert np.isinf(ranges[2, 1, 1:]).all()
+        with pytest.raises(ValueError, match="read-only"):
+            ranges[0] = 0
+    assert math.isinf(ranges[2, 1, 4])          # what was observed stays readable
+
+
+def test_commands_are_broadcast_and_nan_is_none():
+    with engine(robots=2, worlds=2) as e:
+        x = e["pose.pos"][..., 0]
+        e.step([0.2, 0.0], 100)
+        np.testing.assert_allclose(x, 0.1, atol=1e-12)
+        e.step([[math.nan, math.nan], [0.0, 0.0]], 100)     # r0 goes on, r1 stops
+        np.testing.assert_allclose(x, [[0.2, 0.1]] * 2, atol=1e-12)
+        e.step(np.zeros((2, 2, 3)), 100)
+        np.testing.assert_allclose(x, [[0.2, 0.1]] * 2, atol=1e-12)
+
+
+def test_seeds_make_the_noise():
+    with engine(worlds=3, seed=5) as several, engine(seed=7) as third:
+        a, b = several["scan.ranges"], third["scan.ranges"]
+        assert (a[2] == b[0]).all() and (a[0] != a[1]).any()
+        several.step(None, 500), third.step(None, 500)
+        assert (a[2] == b[0]).all()
+        assert several.state_hash(2) == third.state_hash()
+
+
+def test_reset_begins_anew():
+    with engine(worlds=4, seed=1) as e:
+        ranges, beginning = e["scan.ranges"], e["scan.ranges"].copy()
+        e.step([0.3, 0.1], 50)
+        assert e.steps(1) == 50 and e.time(1) == 0.25
+        e.reset(np.array([False, True, False, True]))
+        assert [e.steps(i) for i in range(4)] == [50, 0, 50, 0]
+        assert (ranges[[1, 3]] == beginning[[1, 3]]).all()
+        e.reset(2, seed=1)              # another copy's seed
+        assert (ranges[2] == beginning[0]).all()
+        e.reset()
+        assert (ranges[0] == beginning[0]).all() and (ranges[2] == beginning[0]).all()
+
+
+def test_messages_are_those_of_the_channels():
+    with engine(worlds=2, record=True) as e:
+        e.step(None, 40)
+        told = [lcmtypes.planar_lidar_t.decode(data) for world, step, channel, data in e.messages() if world == 1 and channel == "r0/scan"]
+        assert [scan.utime for scan in told] == [100_000, 200_000]      # 10 Hz
+        assert (np.float32(told[-1].ranges) == e["scan.ranges"][1, 0]).all()
+        move = lcmtypes.move_command_t()
+        move.id, move.kind, move.value, move.speed = 1, lcmtypes.move_command_t.ADVANCE, 0.1, 0.2
+        e.command(0, "r0/move", move)
+        e.step(None, 400)
+        np.testing.assert_allclose(e["pose.pos"][:, 0, 0], [0.1, 0.0], atol=1e-9)
+
+
+@pytest.mark.parametrize("call, error, text", [
+    (lambda e: e.step(None, 2.5), TypeError, "n is a whole number of steps, not 2.5; a step is 0.005 s"),
+    (lambda e: e.step(None, 0), ValueError, "1 step or more, not 0"),
+    (lambda e: e.step(3), ValueError, "their shape is ()"),
+    (lambda e: e.step(np.zeros((7, 2))), ValueError, "do not fit (worlds, robots, 2) = (2, 1, 2)"),
+    (lambda e: e.observe("ranges"), ValueError, "no DEVICE.FIELD"),
+    (lambda e: e.observe("lrf.rangs"), ValueError, "'rangs' is no field of numbers in planar_lidar_t; there are utime, nranges, ranges"),
+    (lambda e: e.observe("camera.data"), ValueError, "no robot has a device 'camera'; there are r0/motion"),
+    (lambda e: e.reset(2), IndexError, "world 2 of 2"),
+    (lambda e: e.reset([0, 1], seed=[1]), ValueError, "1 seeds for 2 worlds"),
+    (lambda e: e.command(0, "r0/scan", b""), ValueError, "no robot takes commands on 'r0/scan'"),
+    (lambda e: (e.close(), e.step()), RuntimeError, "closed"),
+])
+def test_errors_say_what_is_wrong(call, error, text):
+    with engine(worlds=2) as e, pytest.raises(error) as caught:
+        call(e)
+    assert text in str(caught.value)
+
+
+@pytest.mark.parametrize("options, error, text", [
+    ({"world": "no_such"}, ValueError, "no world of that name; there are arena, fleet, office"),
+    ({"world": "no/such.sdf"}, ValueError, "no/such.sdf: no such file"),
+    ({"world": "arena", "worlds": 0}, ValueError, "1 world or more, not 0"),
+    ({"world": "arena", "disable": "p3at/camera"}, TypeError, "disable is a list of texts"),
+    ({"world": "arena", "spawn": ["p3at"]}, ValueError, "MODEL[:NAME]@X,Y[,YAW]"),
+    ({"world": "arena", "set": {"p3at/LRF.update_rate": "fast"}}, ValueError, "update_rate"),
+])
+def test_bad_worlds_are_refused(options, error, text):
+    with pytest.raises(error) as caught:
+        ruedo.Engine(**options)
+    assert text in str(caught.value)
+
+
+def test_worlds_are_found_by_name_from_anywhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.sdf").write_text(world())
+    monkeypatch.setenv("RUEDO_PATH", str(tmp_path))
+    assert ruedo.Engine("mine").robots == ("r0",)
+    e = ruedo.Engine("arena", spawn=["p3at:guest@1,1"], set={"p3at/lrf.update_rate": 10}, disable=["p3at/camera", "guest/camera"])
+    assert e.robots == ("p3at", "guest") and "2 " not in repr(e)
+    assert e["lrf.ranges"].shape == (1, 2, 181)
