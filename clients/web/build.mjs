@@ -5,10 +5,12 @@ import { gzipSync } from "node:zlib";
 import { build } from "esbuild";
 
 const [output] = process.argv.slice(2);
+// The licences of what is bundled want their notices with it.
+const notices = ["three", "uplot"].map((name) => `${name}\n\n${readFileSync(`node_modules/${name}/LICENSE`, "utf8").trim().replaceAll("*/", "* /")}`).join("\n\n");
 const bundle = await build({
   entryPoints: { main: "src/main.ts" },
   outdir: "out", write: false, bundle: true, minify: true, format: "esm", target: "es2022",
-  legalComments: "eof", preserveSymlinks: true, logLevel: "warning",
+  legalComments: "none", footer: { js: `/*!\n${notices}\n*/` }, preserveSymlinks: true, logLevel: "warning",
 });
 const kTypes = { js: "text/javascript; charset=utf-8", css: "text/css; charset=utf-8", html: "text/html; charset=utf-8", svg: "image/svg+xml" };
 const files = [["/", "src/index.html"], ["/icon.svg", "src/icon.svg"]].map(([path, name]) => ({ path, name, bytes: readFileSync(name) }));

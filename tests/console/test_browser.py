@@ -55,6 +55,13 @@ def test_the_order_of_loading_is_one(tmp_path):
     assert {f"the odometry is right with {part} last" for part in parts} == set(seen) - {"the order is the same"} and len(seen) == len(parts) + 1
 
 
+def test_everybody_can_use_it(tmp_path):
+    with running() as process:
+        seen = browse(process.url, tmp_path, "access")
+    assert {"axe-core is content", "a phone has all of the bar", "arrows go from tab to tab", "a robot among many is found by its name", "paused, all pixels are drawn",
+            "a new scene takes the place of the old one in the graphics memory", "and driven", "and plotted"} <= set(seen)
+
+
 def test_the_page_loads_fast_fits_and_says_what_is_wrong(tmp_path):
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

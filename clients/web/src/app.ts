@@ -24,6 +24,8 @@ import { Link, type Hello, type Playback } from "./wire/link";
 import { Router } from "./wire/router";
 import { Session } from "./wire/session";
 
+const kTurn_rad = Math.PI / 24, kPan = 0.06, kZoom = 1.15;    // of one press of a key
+
 const byId = (id: string) => document.getElementById(id)!;
 
 export class App {
@@ -55,6 +57,7 @@ export class App {
   readonly channels = new ChannelList(() => this.want());
   readonly panel = new Panel(byId("panel"), this.page, this.stage, { Robot: this.pages.statePage, Plots: this.pages.plotPage, Channels: this.channels.element }, (robot) => this.choose(robot));
   private readonly router = new Router(this.page, this);
+  private shown = "";    // run and name of the robot in the panel
 
   constructor() {
     const { page, control } = this;
@@ -66,12 +69,17 @@ export class App {
     });
     new Timeline(byId("timeline"), page, (on, speed) => this.link.play(on, speed), (time_s) => this.link.seek(time_s));
     makeLegend(byId("legend"), page);
+    this.stage.onDetail = (reduced) => page.set({ reduced });
+    if (!this.stage.renderer) byId("flat").hidden = false;
     this.makePad();
     this.listenToClicks();
     listenToKeys({
       " ": () => control.pauseOrResume(), ".": () => control.step(), r: () => void control.reset(), x: () => control.stop(),
       "1": () => this.setMode("orbit"), "2": () => this.setMode("follow"), "3": () => this.setMode("top"), Home: () => this.stage.home(),
       n: () => this.choose((page.now.robot + 1) % Math.max(1, page.now.world?.robots.length ?? 1)), p: () => this.togglePanel(), t: () => this.toggleTheme(),
+      j: () => this.stage.turn(-kTurn_rad, 0), l: () => this.stage.turn(kTurn_rad, 0), i: () => this.stage.turn(0, kTurn_rad), k: () => this.stage.turn(0, -kTurn_rad),
+      J: () => this.stage.pan(-kPan, 0), L: () => this.stage.pan(kPan, 0), I: () => this.stage.pan(0, kPan), K: () => this.stage.pan(0, -kPan),
+      "+": () => this.stage.zoom(1 / kZoom), "-": () => this.stage.zoom(kZoom),
       b: () => this.panel.startPlacing(), Escape: () => this.panel.stopPlacing(), "?": () => help.showModal(),
     });
     page.watch(["theme"], ({ theme }) => {
@@ -79,6 +87,7 @@ export class App {
       this.stage.setTheme(theme === "dark");
       this.pages.restyle();
     });
+    page.watch(["world", "scene", "robot"], () => this.showRobot());
     page.watch(["hello", "world", "scene", "robot", "layers", "tab", "panel"], () => this.want());
     this.link.connect();
     requestAnimationFrame((at) => this.frame(at));
@@ -110,7 +119,6 @@ export class App {
     this.channels.show(world);
     const at = Math.max(world.robots.findIndex((r) => r.name === name), world.robots.length > 0 ? 0 : -1);
     this.page.set({ world, scene: files?.description ?? null, robot: at });
-    this.showRobot(before?.runId !== world.runId || world.robots[at]?.name !== name);
   }
 
   private onPlayback(playback: Playback): void {
@@ -129,19 +137,19 @@ export class App {
   // ---- what is shown
 
   choose(robot: number): void {
-    if (robot === this.page.now.robot || !this.page.now.world?.robots[robot]) return;
-    this.page.set({ robot });
-    this.showRobot(true);
+    if (this.page.now.world?.robots[robot]) this.page.set({ robot });
   }
 
-  // The chosen robot in panel and view; other: not the one that was shown before.
-  private showRobot(other: boolean): void {
+  // The chosen robot in panel and view.
+  private showRobot(): void {
     const { world, scene, robot: at } = this.page.now, robot = world?.robots[at];
     if (!robot) return;
     const base = scene?.bases.findIndex((b) => b.robot === robot.name) ?? -1;
     this.stage.follow(base);
     this.pages.beginAt(scene ? scene.bases[base]?.start : [0, 0, 0, 1, 0, 0, 0]);
-    if (other) this.pages.show(robot, world!.devices.filter((device) => device.robot === robot.name));
+    const key = `${world!.runId} ${robot.name}`;
+    if (key !== this.shown) this.pages.show(robot, world!.devices.filter((device) => device.robot === robot.name));
+    this.shown = key;
   }
 
   private want(): void {

@@ -3,6 +3,7 @@ import { describe, expect, it } from "vitest";
 import type { world_state_t } from "../generated/messages";
 import { Poses } from "../src/state/poses";
 import { inWorld } from "../src/ui/odometry";
+import { plainKinds } from "../src/scene/plain";
 import { Quality } from "../src/scene/quality";
 
 function stateAt(utime: number, bodies: [index: number, x: number, yaw: number][], more: Partial<world_state_t> = {}): world_state_t {
@@ -71,6 +72,14 @@ describe("poses between two states", () => {
   });
 });
 
+it("kinds of links are drawn plainly when the scene is above its budget, the costliest first, and few links never", () => {
+  expect(plainKinds([1620], [100])).toEqual(new Set([0]));           // 162 000 triangles
+  expect(plainKinds([1620, 100], [30, 50])).toEqual(new Set());      // 53 600
+  expect(plainKinds([1000, 30], [60, 1000])).toEqual(new Set([0]));  // 60 000 and 30 000: the first is enough
+  expect(plainKinds([500_000], [1])).toEqual(new Set());             // one house
+  expect(plainKinds([500_000, 50], [1, 400])).toEqual(new Set([1]));
+});
+
 it("odometry that begins turned and aside is turned and moved", () => {
   const [x, y, heading] = inWorld({ x: 2, y: 1, theta: 0.25 }, [10, 20, Math.PI / 2]);
   expect([x, y, heading].map((v) => Number(v.toFixed(9)))).toEqual([9, 22, Number((Math.PI / 2 + 0.25).toFixed(9))]);
@@ -122,7 +131,24 @@ describe("quality", () => {
     const quality = new Quality(false);
     for (let i = 0; i < 50; ++i) {
       expect(quality.drawn(i * 1000)).toBe(false);
-      quality.idle();
+      quality.idle(i * 1000 + 1);
     }
+  });
+
+  it("draws one frame as finely as can be once nothing moves, and less again when something does", () => {
+    const quality = new Quality(true);
+    expect([quality.moves(0), quality.reduced]).toEqual([false, true]);
+    expect([quality.idle(100), quality.reduced]).toEqual([false, true]);
+    expect([quality.idle(400), quality.reduced, quality.now.shadows]).toEqual([true, false, true]);
+    expect([quality.idle(1000), quality.reduced]).toEqual([false, false]);    // once is enough
+    expect([quality.moves(1100), quality.reduced]).toEqual([true, true]);
+    expect(quality.idle(1200)).toBe(false);
+    expect(quality.idle(1400)).toBe(true);
+  });
+
+  it("has nothing finer to draw where it is the finest already", () => {
+    const quality = new Quality(false);
+    quality.moves(0);
+    expect(quality.idle(10_000)).toBe(false);
   });
 });

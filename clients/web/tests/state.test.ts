@@ -17,7 +17,7 @@ function worldOf(robots: string[]): World {
 function state(more: Partial<PageState> = {}): PageState {
   return {
     link: "open", hello: { mode: "live", title: "", version: "", info: "ruedo/info", fault: "" }, controlled: true, world: worldOf(["a"]), scene: null, robot: 0, paused: false,
-    time_s: 0, factor: null, playback: null, layers: new Set(), mode: "orbit", theme: "dark", tab: "World", panel: true, ...more,
+    time_s: 0, factor: null, playback: null, layers: new Set(), mode: "orbit", reduced: false, theme: "dark", tab: "World", panel: true, ...more,
   };
 }
 

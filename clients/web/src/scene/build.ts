@@ -2,9 +2,9 @@
 // thousand robots are a few draw calls.
 import * as THREE from "three";
 import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
+import { plainKinds } from "./plain";
 import { Flag, type LinkData, type Part, type SceneFiles } from "./description";
 
-const kManyLinks = 150;    // of a kind: round shapes get fewer segments then, and those far away are boxes
 const kSmall = 0.5;        // of a link's largest part: smaller ones are left out far away
 
 // Links of one kind that move, and the meshes that show them.
@@ -47,11 +47,13 @@ export class SceneBuilder {
   build(): Built {
     const still = new THREE.Group(), moving = new THREE.Group();
     const built: Built = { still, moving, movers: [], grounds: [] };
-    this.files.description.kinds.forEach((parts, kind) => {
-      const indices: number[] = [];
-      this.files.links.forEach((link, index) => { if (link.kind === kind) indices.push(index); });
+    const { kinds } = this.files.description, indicesOf: number[][] = kinds.map(() => []);
+    this.files.links.forEach((link, index) => indicesOf[link.kind]?.push(index));
+    const plain = plainKinds(kinds.map((parts) => this.triangles(parts)), indicesOf.map(({ length }) => length));
+    kinds.forEach((parts, kind) => {
+      const indices = indicesOf[kind]!;
       if (indices.length === 0) return;
-      const surfaces = this.surfaces(parts, indices.length > kManyLinks);
+      const surfaces = this.surfaces(parts, plain.has(kind));
       const place = (moves: boolean, into: THREE.Group): Movers | undefined => {
         const chosen = indices.filter((index) => (this.files.links[index]!.body >= 0) === moves);
         if (chosen.length === 0) return undefined;
@@ -67,7 +69,7 @@ export class SceneBuilder {
           if (surface.ground) built.grounds.push(mesh);
           return mesh;
         });
-        return { links, indices: chosen, meshes, far: moves && indices.length > kManyLinks ? this.far(parts, links.length, into) : null };
+        return { links, indices: chosen, meshes, far: moves && plain.has(kind) ? this.far(parts, links.length, into) : null };
       };
       const stillOnes = place(false, still);
       if (stillOnes) {
@@ -86,6 +88,8 @@ export class SceneBuilder {
     });
     return built;
   }
+
+  private triangles(parts: Part[]): number { return parts.reduce((sum, part) => sum + this.batch(part, false)[2] / 3, 0); }
 
   // What a kind of link looks like, in the link's frame: all plain opaque parts are one surface with coloured corners.
   private surfaces(parts: Part[], many: boolean): Surface[] {

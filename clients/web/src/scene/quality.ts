@@ -7,6 +7,7 @@ const kSlow_ms = 50;          // a frame: less than 20 a second
 const kQuick_ms = 25;
 const kFrames = 5;            // frames in a row of which the median counts
 const kFirstWait_ms = 10_000; // until a finer level is tried; each time twice as long
+const kStill_ms = 250;        // without motion, and one frame is drawn as finely as can be
 
 // Whether WebGL is done by the processor here.
 export function drawnBySoftware(): boolean {
@@ -24,13 +25,30 @@ export class Quality {
   private intervals: number[] = [];
   private finer_ms = 0;       // when a finer level is tried
   private wait_ms = kFirstWait_ms;
+  private moved_ms = -1;      // when something was drawn last
+  private still = false;      // one frame is, or was, drawn as finely as can be: nothing moves
 
   constructor(software: boolean) { this.level = software ? 2 : 0; }
 
-  get now(): Level { return kLevels[this.automatic ? this.level : 0]!; }
+  get now(): Level { return kLevels[this.automatic && !this.still ? this.level : 0]!; }
+  get reduced(): boolean { return this.now.ratio < 1; }
 
-  // Nothing was drawn: the next frame's interval says nothing.
-  idle(): void { this.last_ms = -1; }
+  // Nothing is to be drawn: the next frame's interval says nothing. True when it has been so for a while, and what is seen is to be
+  // drawn once more, as finely as can be.
+  idle(at_ms: number): boolean {
+    this.last_ms = -1;
+    if (this.still || !this.automatic || this.level === 0 || this.moved_ms < 0 || at_ms - this.moved_ms < kStill_ms) return false;
+    this.still = true;
+    return true;
+  }
+
+  // Something is to be drawn that moves. True when that is at another level than what was drawn before.
+  moves(at_ms: number): boolean {
+    this.moved_ms = at_ms;
+    const was = this.still;
+    this.still = false;
+    return was;
+  }
 
   // A frame was drawn. True when what comes next is drawn at another level.
   drawn(at_ms: number): boolean {

@@ -16,7 +16,7 @@ const kNoWheels_m = 50;
 export class Stage {
   readonly scene = new THREE.Scene();
   readonly camera = new THREE.PerspectiveCamera(50, 1, 0.05, 400);
-  readonly renderer: THREE.WebGLRenderer;
+  readonly renderer: THREE.WebGLRenderer | null;    // null: no WebGL here, and nothing is drawn
   readonly controls: OrbitControls;
   readonly quality: Quality;
   description: Description | null = null;
@@ -36,20 +36,19 @@ export class Stage {
   private following = -1;            // index into the description's bases
   private lastBase: THREE.Vector3 | null = null;
   wheelAngles = new Map<number, Float64Array>();    // of robots whose odometry is known
+  onDetail: (reduced: boolean) => void = () => undefined;    // with each frame: whether it has fewer pixels than the page
 
   // full: in full detail even where the processor draws.
   constructor(private readonly canvas: HTMLCanvasElement, readonly poses: Poses, full: boolean) {
     const software = !full && drawnBySoftware();
     this.quality = new Quality(software);
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !software, powerPreference: "high-performance" });
-    this.renderer.shadowMap.enabled = true;
-    this.renderer.shadowMap.type = THREE.PCFShadowMap;
-    this.renderer.shadowMap.autoUpdate = false;
-    this.renderer.toneMapping = THREE.NeutralToneMapping;
+    this.renderer = makeRenderer(canvas, !software);
     this.camera.up.set(0, 0, 1);
     this.camera.position.set(-4, -5, 4);
     this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.enableDamping = true;
+    const calm = matchMedia("(prefers-reduced-motion: reduce)");
+    this.controls.enableDamping = !calm.matches;
+    calm.addEventListener("change", () => { this.controls.enableDamping = !calm.matches; });
     this.controls.dampingFactor = 0.15;
     this.controls.maxPolarAngle = Math.PI / 2 - 0.02;
     this.controls.addEventListener("change", () => {
@@ -106,6 +105,7 @@ export class Stage {
     const first = this.description === null;
     this.built = null;
     this.description = files?.description ?? null;
+    for (const light of this.lights.children) if (light instanceof THREE.Light || light instanceof THREE.GridHelper) light.dispose();    // a light has its shadows' picture
     this.lights.clear();
     this.linkWheel.clear();
     if (files) {
@@ -199,6 +199,35 @@ export class Stage {
     this.touch();
   }
 
+  // Turns the view by radians to the right and upwards.
+  turn(right: number, up: number): void {
+    const offset = this.camera.position.clone().sub(this.controls.target), at = new THREE.Spherical().setFromVector3(new THREE.Vector3(offset.x, offset.z, -offset.y));
+    at.theta -= right;
+    at.phi = Math.max(0.02, Math.min(this.controls.maxPolarAngle, at.phi - up));
+    const turned = new THREE.Vector3().setFromSpherical(at);
+    this.look(new THREE.Vector3(turned.x, -turned.z, turned.y));
+  }
+
+  // As many times as far from what is looked at.
+  zoom(times: number): void { this.look(this.camera.position.clone().sub(this.controls.target).multiplyScalar(times)); }
+
+  // Shares of the distance, to the right and ahead over the ground.
+  pan(right: number, ahead: number): void {
+    const offset = this.camera.position.clone().sub(this.controls.target), reach = offset.length();
+    const forward = this.camera.getWorldDirection(new THREE.Vector3()).setZ(0);
+    if (forward.lengthSq() < 1e-6) forward.set(0, 1, 0);
+    forward.normalize();
+    this.controls.target.addScaledVector(forward, ahead * reach).addScaledVector(new THREE.Vector3(forward.y, -forward.x, 0), right * reach);
+    this.look(offset);
+  }
+
+  private look(offset: THREE.Vector3): void {
+    this.camera.position.copy(this.controls.target).add(offset);
+    this.controls.update();
+    this.regroup = true;
+    this.touch();
+  }
+
   follow(robot: number): void {
     if (robot === this.following) return;
     this.following = robot;
@@ -245,8 +274,8 @@ export class Stage {
   private resize(): void {
     const box = this.canvas.parentElement!.getBoundingClientRect();
     if (box.width === 0 || box.height === 0) return;
-    this.renderer.setPixelRatio(Math.min(this.quality.now.ratio, devicePixelRatio));
-    this.renderer.setSize(box.width, box.height, false);
+    this.renderer?.setPixelRatio(Math.min(this.quality.now.ratio, devicePixelRatio));
+    this.renderer?.setSize(box.width, box.height, false);
     this.camera.aspect = box.width / box.height;
     this.camera.updateProjectionMatrix();
     this.touch();
@@ -261,14 +290,17 @@ export class Stage {
     if (overlays()) this.touch();
     this.track();
     this.controls.update();
-    if (!this.dirty) return this.quality.idle();
+    if (!this.renderer) return;
+    if (this.dirty ? this.quality.moves(at_ms) : this.quality.idle(at_ms)) this.refine();
+    else if (!this.dirty) return;
+    else if (this.quality.drawn(at_ms)) this.refine();
     this.dirty = false;
-    if (this.quality.drawn(at_ms)) this.refine();
     const begun = performance.now();
     if (this.regroup) for (const movers of this.built?.movers ?? []) this.group(movers);
     this.regroup = false;
     this.aimSun();
     this.renderer.render(this.scene, this.camera);
+    this.onDetail(this.quality.reduced);
     ++this.frames;
     if (this.built && this.firstDrawn_ms === 0) this.firstDrawn_ms = performance.now();
     this.frameCost_ms += 0.1 * (performance.now() - begun - this.frameCost_ms);
@@ -341,8 +373,21 @@ export class Stage {
     if (!this.moved && this.sun.target.position.distanceToSquared(target) < 0.25) return;
     this.sun.target.position.copy(target);
     this.sun.position.copy(target).addScaledVector(this.sun.userData.direction as THREE.Vector3, -30);
-    this.renderer.shadowMap.needsUpdate = true;
+    this.renderer!.shadowMap.needsUpdate = true;
     this.moved = false;
+  }
+}
+
+function makeRenderer(canvas: HTMLCanvasElement, antialias: boolean): THREE.WebGLRenderer | null {
+  try {
+    const renderer = new THREE.WebGLRenderer({ canvas, antialias, powerPreference: "high-performance" });
+    renderer.shadowMap.enabled = true;
+    renderer.shadowMap.type = THREE.PCFShadowMap;
+    renderer.shadowMap.autoUpdate = false;
+    renderer.toneMapping = THREE.NeutralToneMapping;
+    return renderer;
+  } catch {
+    return null;
   }
 }
 

@@ -23,6 +23,7 @@ export interface PageState {
   playback: Playback | null;        // of a log
   layers: ReadonlySet<Layer>;
   mode: ViewMode;
+  reduced: boolean;                 // drawn with fewer pixels than the page has
   theme: string;
   tab: Tab;
   panel: boolean;                   // is open
@@ -35,7 +36,7 @@ export function makePage(): Page {
   const tab = recall("page");
   return new Store<PageState>({
     link: "connecting", hello: null, controlled: false, world: null, scene: null, robot: -1, paused: false, time_s: 0, factor: null, playback: null,
-    layers: new Set(kLayers.filter((layer) => layers.includes(layer))), mode: "orbit",
+    layers: new Set(kLayers.filter((layer) => layers.includes(layer))), mode: "orbit", reduced: false,
     theme: recall("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"),
     tab: kTabs.find((name) => name === tab) ?? "Robot", panel: innerWidth >= 860 && recall("panel") !== "closed",
   });

@@ -10,7 +10,7 @@ const kKeys: Record<string, [number, number]> = {
 const kDeadZone = 0.15;
 
 export class Drive {
-  readonly stick = h("div", { class: "stick", title: "drag to drive (W A S D)", "aria-label": "driving stick" }, h("div", { class: "knob" }));
+  readonly stick = h("div", { class: "stick", role: "group", title: "drag to drive (W A S D)", "aria-label": "driving stick" }, h("div", { class: "knob" }));
   private readonly held = new Set<string>();
   private fromStick: [number, number] = [0, 0];
   private active = false;

@@ -3,7 +3,7 @@ import { h } from "./dom";
 
 const kKeys: [string[], string][] = [
   [["W", "A", "S", "D"], "drive the chosen robot (arrow keys, a gamepad and the stick, too)"], [["X"], "stop it"], [["Space"], "pause and go on"], [["."], "one step, while paused; in a log, 0.1 s ahead"],
-  [["R"], "reset the world"], [["1", "2", "3"], "orbit, follow and top view"], [["Home"], "the whole world in view"], [["N"], "next robot"], [["P"], "panel"], [["T"], "dark or light"],
+  [["R"], "reset the world"], [["1", "2", "3"], "orbit, follow and top view"], [["I", "J", "K", "L"], "turn the view; with Shift, move it"], [["+", "-"], "nearer, farther"], [["Home"], "the whole world in view"], [["N"], "next robot"], [["P"], "panel"], [["T"], "dark or light"],
   [["B"], "place something with the next click"], [["Esc"], "do not"], [["?"], "these keys"],
 ];
 

@@ -2,12 +2,14 @@
 import { dialogIsOpen } from "./confirm";
 import { isTyping } from "./drive";
 
-// Names as KeyboardEvent.key has them, letters small.
+// Names as KeyboardEvent.key has them; a capital is with Shift. Those that turn the view repeat.
+const kRepeat = new Set([..."ijklIJKL+-"]);
+
 export function listenToKeys(actions: Record<string, () => void>): void {
   addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.repeat || isTyping(event.target) || dialogIsOpen()) return;
-    const action = actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];
-    if (!action || ((event.key === " " || event.key === "Enter") && event.target instanceof HTMLButtonElement)) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target) || dialogIsOpen()) return;
+    const action = actions[event.key] ?? (event.key.length === 1 ? actions[event.key.toLowerCase()] : undefined);
+    if (!action || (event.repeat && !kRepeat.has(event.key)) || ((event.key === " " || event.key === "Enter") && event.target instanceof HTMLButtonElement)) return;
     event.preventDefault();
     action();
   });

@@ -4,10 +4,14 @@ import type { Stage } from "../scene/stage";
 import { h, recall, remember } from "./dom";
 import { kThings, type Thing } from "./things";
 
+const kSearched = 12;    // more robots than these can be searched
+
 export class Panel {
   private readonly tabs = new Map<Tab, HTMLButtonElement>();
   private readonly content = h("div", { class: "page", role: "tabpanel", id: "page", tabindex: 0 });
   private readonly robots = h("select", { class: "full", id: "robots", "aria-label": "robot" });
+  private readonly search = h("input", { type: "search", id: "find", placeholder: "find a robot", "aria-label": "find a robot" });
+  private names: string[] = [];
   private readonly thing = h("select", { class: "wide", "aria-label": "what to place" }, ...kThings.map(({ name }, i) => h("option", { value: i }, name)));
   private readonly place = h("button", { id: "place", click: () => this.arm(!this.armed) }, "Place by click (B)");
   private armed = false;
@@ -20,17 +24,32 @@ export class Panel {
       tabs.append(button);
     }
     tabs.addEventListener("keydown", (event) => this.byArrows(event));
-    this.robots.addEventListener("change", () => choose(this.robots.selectedIndex));
+    this.robots.addEventListener("change", () => choose(this.names.indexOf(this.robots.value)));
+    this.search.addEventListener("input", () => this.fill());
+    this.search.addEventListener("keydown", (event) => {    // the first that is found
+      if (event.key === "Enter" && this.robots.options.length > 0) choose(this.names.indexOf(this.robots.options[0]!.value));
+    });
     element.append(tabs, this.content);
     const contents: Record<Tab, HTMLElement> = { ...pages, World: this.worldPage() };
     page.watch(["tab"], ({ tab }) => this.show(tab, contents[tab]));
     page.watch(["panel"], ({ panel }) => document.getElementById("app")!.classList.toggle("closed", !panel));
     page.watch(["world", "robot"], ({ world, robot }) => {
       const names = world?.robots.map(({ name }) => name) ?? [];
-      if (names.join("\n") !== [...this.robots.options].map(({ text }) => text).join("\n")) this.robots.replaceChildren(...names.map((name) => h("option", {}, name)));
-      this.robots.hidden = names.length === 0;
-      this.robots.selectedIndex = robot;
+      if (names.join("\n") !== this.names.join("\n")) {
+        this.names = names;
+        this.search.hidden = names.length <= kSearched;
+        this.search.value = "";
+        this.robots.hidden = names.length === 0;
+        this.fill();
+      }
+      this.robots.value = names[robot] ?? "";
     });
+  }
+
+  private fill(): void {
+    const words = this.search.value.toLowerCase();
+    this.robots.replaceChildren(...this.names.filter((name) => name.toLowerCase().includes(words)).map((name) => h("option", {}, name)));
+    this.robots.value = this.names[this.page.now.robot] ?? "";
   }
 
   private open(tab: Tab): void {
@@ -45,7 +64,7 @@ export class Panel {
     }
     this.content.setAttribute("aria-labelledby", `tab-${tab}`);
     const withRobot = tab === "Robot" || tab === "Plots";
-    this.content.replaceChildren(...(withRobot ? [this.robots, h("div", { style: "height: 10px" })] : []), content);
+    this.content.replaceChildren(...(withRobot ? [this.search, this.robots, h("div", { style: "height: 10px" })] : []), content);
   }
 
   // As in any list of tabs: arrows, Home and End go from one to the next.
