@@ -5,6 +5,7 @@
 #include <cctype>
 #include <cfenv>
 #include <cmath>
+#include <cstring>
 #include <stdexcept>
 
 #include <tbb/task_arena.h>
@@ -19,6 +20,7 @@ namespace ruedo::engine {
 namespace {
 
 constexpr int64_t kBatchSteps = 32;
+constexpr double kUpright = 0.70710678118654752;    // cosine of 45 degrees
 const std::atomic<bool> kNeverLeftOff{false};
 
 // Rounding and denormals as in every thread that computes, whatever the caller's program has set; put back at the end.
@@ -45,6 +47,7 @@ struct Engine::Arena {
 };
 
 struct Engine::Copy {
+  std::shared_ptr<const model::WorldModel> model;
   Channels channels;
   std::unique_ptr<World> world;
   Batch batch;
@@ -71,9 +74,9 @@ Engine::Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions opt
   arena_->tasks.initialize(options_.threads > 0 ? options_.threads : tbb::task_arena::automatic);
   const DefaultFloatingPoint floating_point;
   copies_.resize(static_cast<size_t>(options_.worlds));
-  copies_[0] = make_copy(options_.fleet.seed);    // the first says what is wrong, and builds what all share
+  copies_[0] = make_copy(world_, options_.fleet.seed);    // the first says what is wrong, and builds what all share
   for_each_copy([this](size_t i) {
-    if (i > 0) copies_[i] = make_copy(options_.fleet.seed + i);
+    if (i > 0) copies_[i] = make_copy(world_, options_.fleet.seed + i);
   });
   const std::vector<Input>& inputs = copies_[0]->world->inbox().inputs();
   for (size_t i = 0; i < inputs.size(); ++i) {
@@ -81,18 +84,23 @@ Engine::Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions opt
     const int instance = copies_[0]->world->layout().robots[static_cast<size_t>(inputs[i].robot)].instance;
     driven_.push_back(world_->models[static_cast<size_t>(instance)].name);
     velocity_inputs_.push_back(static_cast<int>(i));
+    driven_robots_.push_back(inputs[i].robot);
   }
+  touching_->type = Primitive::int32;
+  touching_->shape = {options_.worlds, static_cast<int64_t>(driven_.size())};
+  touching_->values.resize(copies_.size() * driven_.size() * sizeof(int32_t));
   for_each_copy([this](size_t i) { compute(i, 1); });
 }
 
 Engine::~Engine() = default;
 
-std::unique_ptr<Engine::Copy> Engine::make_copy(uint64_t seed) {
+std::unique_ptr<Engine::Copy> Engine::make_copy(std::shared_ptr<const model::WorldModel> model, uint64_t seed) {
   auto copy = std::make_unique<Copy>();
   FleetOptions fleet = options_.fleet;
   fleet.seed = seed;
   Findings findings;
-  copy->world = std::make_unique<World>(world_, fleet, copy->channels, copies_[0] ? findings : findings_, statics_);
+  copy->world = std::make_unique<World>(model, fleet, copy->channels, copies_[0] ? findings : findings_, model == world_ ? statics_ : nullptr);
+  copy->model = std::move(model);
   copy->batch.snapshots.resize(kBatchSteps);
   for (const auto& module : copy->world->modules()) {
     copy->batch.outputs.push_back({false, false, std::vector<Outbox>(static_cast<size_t>(module->pieces()))});
@@ -122,6 +130,8 @@ void Engine::compute(size_t index, int64_t steps) {
     for (auto& module : world.modules()) module->make_scenes(makers);
     copy.scenes_made = true;
   }
+  const size_t robots = driven_.size();
+  std::vector<int32_t> touching(robots, 0);
   for (int64_t left = steps; left > 0; left -= batch.count) {
     batch.first_step = copy.step + 1;
     batch.count = static_cast<int>(std::min(left, kBatchSteps));
@@ -136,8 +146,10 @@ void Engine::compute(size_t index, int64_t steps) {
       module.process(batch, batch.outputs[m], kNeverLeftOff);
     }
     copy.keep_newest();
+    count_touching(index, touching.data());
     if (handler_) tell(index);
   }
+  std::memcpy(touching_->values.data() + index * robots * sizeof(int32_t), touching.data(), robots * sizeof(int32_t));
   for (auto& observer : observers_) update(*observer, index);
 }
 
@@ -168,6 +180,21 @@ void Engine::tell(size_t index) {
           if (entry.step == step) handler_(static_cast<int>(index), step, copy.channels[entry.channel], {outbox.data(entry), entry.size});
         }
       }
+    }
+  }
+}
+
+void Engine::count_touching(size_t index, int32_t* counts) const {
+  const Copy& copy = *copies_[index];
+  const model::BodyLayout& layout = copy.world->layout();
+  for (int i = 0; i < copy.batch.count; ++i) {
+    const std::vector<Contact>& contacts = copy.batch.snapshots[static_cast<size_t>(i)].contacts;
+    for (size_t robot = 0; robot < driven_robots_.size(); ++robot) {
+      const int instance = layout.robots[static_cast<size_t>(driven_robots_[robot])].instance;
+      const auto is_its = [&](int link) { return link >= 0 && layout.links[static_cast<size_t>(link)].instance == instance; };
+      counts[robot] += std::any_of(contacts.begin(), contacts.end(), [&](const Contact& contact) {
+        return std::abs(contact.normal.z()) < kUpright && is_its(contact.link_a) != is_its(contact.link_b);
+      });
     }
   }
 }
@@ -220,10 +247,21 @@ void Engine::command(int world, const std::string& channel, std::span<const uint
   }
 }
 
-void Engine::reset(int world, uint64_t seed) {
+void Engine::reset(int world, uint64_t seed) { reset(world, seed, copies_.at(static_cast<size_t>(world))->model); }
+
+void Engine::reset(int world, uint64_t seed, std::shared_ptr<const model::WorldModel> model) {
   const DefaultFloatingPoint floating_point;
   const auto index = static_cast<size_t>(world);
-  copies_.at(index) = make_copy(seed);
+  const bool other = copies_.at(index)->model != model;
+  auto copy = make_copy(std::move(model), seed);
+  if (other) {
+    const auto same = [](const Channel& a, const Channel& b) { return a.name == b.name && a.fingerprint == b.fingerprint; };
+    const std::vector<Channel>&here = copies_[0]->channels.list(), &there = copy->channels.list();
+    if (!std::equal(here.begin(), here.end(), there.begin(), there.end(), same)) {
+      throw InputError({copy->model->file}, "its robots and devices are not those of " + world_->file + ": an engine's worlds have the same, in the same order");
+    }
+  }
+  copies_[index] = std::move(copy);
   compute(index, 1);
 }
 

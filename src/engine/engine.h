@@ -64,10 +64,17 @@ class Engine {
 
   // Makes a copy as it was at the beginning, with that seed: what follows equals a fresh run.
   void reset(int world, uint64_t seed);
+  // The same with another world, which from then on is that copy's. Throws InputError where its channels are not the
+  // first one's: the same robots with the same devices, in the same order.
+  void reset(int world, uint64_t seed, std::shared_ptr<const model::WorldModel> model);
 
   // The array of a field, kept up to date as long as the engine lives. device: the name of one ("LRF"), or of its kind
   // ("lrf") where each robot has at most one of them. Throws InputError.
   std::shared_ptr<const FieldArray> observe(const std::string& device, const std::string& field);
+
+  // Of each copy and driven robot (int32): how many of the states of the last step() it touched something in, that does not
+  // carry it and that it does not carry: the contact's normal is nearer to level than to upright.
+  std::shared_ptr<const FieldArray> touching() const { return touching_; }
 
   uint64_t state_hash(int world) const;
 
@@ -78,7 +85,8 @@ class Engine {
   struct Copy;
   struct Observer;
 
-  std::unique_ptr<Copy> make_copy(uint64_t seed);
+  std::unique_ptr<Copy> make_copy(std::shared_ptr<const model::WorldModel> model, uint64_t seed);
+  void count_touching(size_t world, int32_t* counts) const;
   void compute(size_t world, int64_t steps);
   void tell(size_t world);
   void update(Observer& observer, size_t world);
@@ -92,6 +100,8 @@ class Engine {
   std::vector<std::unique_ptr<Copy>> copies_;
   std::vector<std::string> driven_;
   std::vector<int> velocity_inputs_;                     // of the driven robots
+  std::vector<int> driven_robots_;                       // indices into BodyLayout::robots
+  std::shared_ptr<FieldArray> touching_ = std::make_shared<FieldArray>();
   std::vector<std::unique_ptr<Observer>> observers_;
   MessageHandler handler_;
   struct Arena;

@@ -90,6 +90,25 @@ def test_reset_begins_anew():
         assert (ranges[0] == beginning[0]).all() and (ranges[2] == beginning[0]).all()
 
 
+def test_a_copy_may_get_another_world():
+    with engine(worlds=2, noise=False) as e:
+        x, ranges, touching = e["pose.pos"][..., 0], e["scan.ranges"], e.touching()
+        e.reset(1, text=world().replace("<pose>2.1 0 1", "<pose>1.1 0 1"))      # the wall is a metre nearer
+        assert ranges[0, 0, 2] == pytest.approx(2.0) and ranges[1, 0, 2] == pytest.approx(1.0)
+        e.step([0.5, 0.0], 20)
+        assert touching.tolist() == [[0], [0]]
+        e.step([0.5, 0.0], 280)         # 1.5 s; the robot's front is 0.25 m ahead of its centre
+        assert x[0, 0] == pytest.approx(0.75, abs=1e-9) and x[1, 0] == pytest.approx(0.75, abs=2e-3)
+        e.step([0.5, 0.0], 100)
+        assert x[0, 0] == pytest.approx(1.0, abs=1e-9) and x[1, 0] == pytest.approx(0.75, abs=2e-3)
+        assert touching[0, 0] == 0 and touching[1, 0] >= 99      # the first of them may still be on its way
+        e.reset(1)                      # keeps its world
+        assert ranges[1, 0, 2] == pytest.approx(1.0) and touching[1, 0] == 0
+        with pytest.raises(ValueError, match="its robots and devices are not those of"):
+            e.reset(0, text=world(robots=2))
+        assert ranges[0, 0, 2] == pytest.approx(1.0, abs=1e-6)      # as it was
+
+
 def test_messages_are_those_of_the_channels():
     with engine(worlds=2, record=True) as e:
         e.step(None, 40)

@@ -37,6 +37,14 @@ nb::dlpack::dtype dtype_of(Primitive type) {
   }
 }
 
+// A view of the engine's own memory, which stays as long as any view of it, and is written by step() and reset().
+nb::object view_of(std::shared_ptr<const FieldArray> array) {
+  const auto* held = new std::shared_ptr<const FieldArray>(std::move(array));
+  const nb::capsule owner(held, [](void* pointer) noexcept { delete static_cast<std::shared_ptr<const FieldArray>*>(pointer); });
+  const std::vector<size_t> shape((*held)->shape.begin(), (*held)->shape.end());
+  return nb::cast(nb::ndarray<nb::numpy, nb::ro>((*held)->values.data(), shape.size(), shape.data(), owner, nullptr, dtype_of((*held)->type)));
+}
+
 struct Recorded {
   int world;
   int64_t step;
@@ -49,7 +57,7 @@ class PyEngine {
   PyEngine(const std::string& world, const std::optional<std::string>& text, int worlds, uint64_t seed, bool noise, int threads,
            const std::vector<std::string>& spawns, const std::vector<std::string>& drives, const std::vector<std::string>& settings,
            const std::vector<std::string>& disabled, bool record) {
-    ruedo::model::LoadOptions options;
+    ruedo::model::LoadOptions& options = options_;
     for (const std::string& one : spawns) options.spawns.push_back(ruedo::model::parse_spawn(one));
     for (const std::string& one : drives) options.drives.push_back(ruedo::model::parse_drive(one));
     for (const std::string& one : settings) options.settings.push_back(ruedo::model::parse_setting(one));
@@ -93,20 +101,17 @@ class PyEngine {
     engine().command(world, channel, {static_cast<const uint8_t*>(message.data()), message.size()});
   }
 
-  void reset(int world, uint64_t seed) {
+  void reset(const std::vector<int>& worlds, const std::vector<uint64_t>& seeds, const std::optional<std::string>& text, const std::string& name) {
     Engine& engine = this->engine();
     recorded_.clear();
     const nb::gil_scoped_release release;
-    engine.reset(world, seed);
+    const auto model = text ? ruedo::model::load_world_text(*text, name, options_) : nullptr;
+    for (size_t i = 0; i < worlds.size(); ++i) model ? engine.reset(worlds[i], seeds[i], model) : engine.reset(worlds[i], seeds[i]);
   }
 
-  // A view of the engine's own memory, which stays as long as any view of it, and is written by step() and reset().
-  nb::object observe(const std::string& device, const std::string& field) {
-    const auto* array = new std::shared_ptr<const FieldArray>(engine().observe(device, field));
-    const nb::capsule owner(array, [](void* held) noexcept { delete static_cast<std::shared_ptr<const FieldArray>*>(held); });
-    const std::vector<size_t> shape((*array)->shape.begin(), (*array)->shape.end());
-    return nb::cast(nb::ndarray<nb::numpy, nb::ro>((*array)->values.data(), shape.size(), shape.data(), owner, nullptr, dtype_of((*array)->type)));
-  }
+  nb::object touching() const { return view_of(engine().touching()); }
+
+  nb::object observe(const std::string& device, const std::string& field) { return view_of(engine().observe(device, field)); }
 
   nb::list messages() const {
     nb::list list;
@@ -123,6 +128,7 @@ class PyEngine {
   const std::vector<std::string>& findings() const { return findings_; }
 
  private:
+  ruedo::model::LoadOptions options_;
   std::unique_ptr<Engine> engine_;
   std::vector<std::string> findings_;
   std::vector<Recorded> recorded_;
@@ -144,8 +150,9 @@ NB_MODULE(_engine, module) {
       .def("step", &PyEngine::step)
       .def("drive", &PyEngine::drive)
       .def("command", &PyEngine::command)
-      .def("reset", &PyEngine::reset)
+      .def("reset", &PyEngine::reset, nb::arg("worlds"), nb::arg("seeds"), nb::arg("text") = nb::none(), nb::arg("name") = "world")
       .def("observe", &PyEngine::observe)
+      .def("touching", &PyEngine::touching)
       .def("messages", &PyEngine::messages)
       .def("devices", &PyEngine::devices)
       .def("findings", &PyEngine::findings)

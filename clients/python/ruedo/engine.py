@@ -45,6 +45,7 @@ class Engine:
         self._core = _engine.Engine(str(world), text=text, worlds=operator.index(worlds), seed=operator.index(seed), noise=bool(noise),
                                     threads=operator.index(threads), spawn=list(spawn), drive=list(drive), set=settings,
                                     disable=list(disable), record=bool(record))
+        self._name = str(world)
         self._worlds = self._core.worlds()
         self._seeds = [seed + i for i in range(self._worlds)]
         self._robots: tuple[str, ...] = tuple(self._core.driven())
@@ -125,11 +126,20 @@ class Engine:
         """
         self._core.command(self._checked(world), channel, message if isinstance(message, bytes) else message.encode())
 
-    def reset(self, worlds: int | Sequence[int] | NDArray[Any] | None = None, seed: int | Sequence[int] | None = None) -> None:
+    def touching(self) -> NDArray[np.int32]:
+        """(worlds, driven robots): in how many of the states of the last ``step`` a robot touched something that does not carry it.
+
+        A contact counts whose normal is nearer to level than to upright. Like what ``observe`` gives, it is a view.
+        """
+        array: NDArray[np.int32] = self._core.touching()
+        return array
+
+    def reset(self, worlds: int | Sequence[int] | NDArray[Any] | None = None, seed: int | Sequence[int] | None = None,
+              text: str | None = None) -> None:
         """Makes copies as they were at the beginning; what follows equals a fresh run.
 
         worlds: an index, several, a mask, or None for all. seed: of each of them, or one for the first, counted up; None: the one that
-        the copy has.
+        the copy has. text: another world for these copies from now on, as SDF, with the same robots and devices.
         """
         indices = self._indices(worlds)
         if seed is not None:
@@ -138,8 +148,7 @@ class Engine:
                 raise ValueError(f"{len(seeds)} seeds for {len(indices)} worlds")
             for index, one in zip(indices, seeds):
                 self._seeds[index] = one
-        for index in indices:
-            self._core.reset(index, self._seeds[index])
+        self._core.reset(indices, [self._seeds[index] for index in indices], text=text, name=self._name)
 
     def messages(self) -> list[tuple[int, int, str, bytes]]:
         """(world, step, channel, bytes) of every message of the last call of ``step`` or ``reset``; with ``record=True``."""
