@@ -9,7 +9,12 @@ namespace ruedo {
 
 namespace fs = std::filesystem;
 
-std::string own_folder() {
+namespace {
+
+constexpr int kMostAbove = 4;    // PREFIX/share/ruedo/python/ruedo, of the Python module
+
+// The folder of the program or library: absolute, without links.
+fs::path own_folder() {
   static const int here = 0;
   std::error_code error;
   Dl_info object{};
@@ -20,7 +25,19 @@ std::string own_folder() {
   } else {
     file = fs::read_symlink("/proc/self/exe", error);
   }
-  return error ? "" : file.parent_path().string();
+  return error ? fs::path() : file.parent_path();
+}
+
+}  // namespace
+
+std::string find_installed(const std::string& path) {
+  fs::path folder = own_folder();
+  if (folder.empty()) return "";
+  std::error_code error;
+  for (int above = 0; above <= kMostAbove; ++above, folder = folder.parent_path()) {
+    if (fs::exists(folder / path, error)) return (folder / path).string();
+  }
+  return "";
 }
 
 }  // namespace ruedo

@@ -29,9 +29,7 @@ namespace ruedo::model {
 namespace {
 
 std::string default_importer() {
-  std::error_code error;
-  const fs::path beside = fs::path(own_folder()) / "ruedo-import-mesh";
-  if (fs::exists(beside, error)) return beside.string();
+  if (const std::string installed = find_installed("bin/ruedo-import-mesh"); !installed.empty()) return installed;
   return std::string(RUEDO_BIN_DIR) + "/ruedo-import-mesh";
 }
 

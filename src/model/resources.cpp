@@ -110,7 +110,7 @@ bool may_be_package(const fs::path& folder) {
 }  // namespace
 
 std::string shipped_worlds() {
-  const fs::path installed = fs::path(own_folder()).parent_path() / "share/ruedo/worlds";
+  const std::string installed = find_installed("share/ruedo/worlds");
   if (is_folder(installed)) return full_path(installed);
   return is_folder(RUEDO_WORLDS_DIR) ? full_path(RUEDO_WORLDS_DIR) : "";
 }

@@ -66,6 +66,17 @@ def test_the_moved_program_finds_its_own(prefix):
         assert str(SOURCE / "worlds") not in said
 
 
+def test_the_moved_engine_finds_its_own(prefix):
+    program = ("import ruedo\n"
+               "try: ruedo.Engine('nowhere')\n"
+               "except ValueError as error: print(error)\n"
+               "with ruedo.Engine('arena', disable=['p3at/camera']) as engine:\n"
+               "    engine.step([0.1, 0.0], 20)\n"
+               "    print(engine['lrf.ranges'].shape)\n")
+    said = run(sys.executable, "-c", program, cwd="/", more={"PYTHONPATH": f"{prefix}/share/ruedo/python"}).stdout
+    assert f"(searched in {prefix}/share/ruedo/worlds)" in said and said.endswith("(1, 1, 181)\n")
+
+
 def test_the_example_from_nothing_to_green(project):
     """Without goldens it says what to do; renewed, all is green, in parallel; twice gives the same."""
     said = ctest(project, "-R", "^gate$", good=False)
