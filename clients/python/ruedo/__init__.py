@@ -23,12 +23,14 @@ from .errors import (LaunchError, LeaseLost, MotionError, NoServer, NotSupported
                      UnknownName)
 from .launch import find_ruedo, launch
 from .lockstep import Command, Message, Observations
+from .logs import read_log
 from .motion import Motion
 from .robot import Camera, Device, Robot
 from .samples import (CameraInfo, Contact, ContactPoint, Image, Imu, Joints, LidarScan, MotionStatus, Odometry, Pose, Sample,
                       Scan, SonarReading)
 from .simulation import Simulation, connect
 from .stream import Reader, Stream
+from .world import World
 from .world_info import Body
 
 __version__ = "0.1.0"
@@ -49,5 +51,5 @@ __all__ = [
     "Body", "Camera", "CameraInfo", "Command", "Contact", "ContactPoint", "Device", "Image", "Imu", "Joints", "LaunchError", "LeaseLost",
     "LidarScan", "Message", "Motion", "MotionError", "MotionStatus", "NoServer", "NotSupported", "Observations", "Odometry", "Pose", "Reader", "RequestError", "Robot",
     "RuedoError", "Sample", "Scan", "Simulation", "SonarReading", "State", "Stream", "Subscription", "Timeout", "TypeMismatch",
-    "UnknownName", "connect", "find_ruedo", "launch", "lcmtypes",
+    "UnknownName", "World", "connect", "find_ruedo", "launch", "lcmtypes", "read_log",
 ]

@@ -9,11 +9,9 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from . import lcmtypes
 from .errors import NotSupported, RequestError, Timeout, TypeMismatch
-from .samples import Floats
+from .samples import Floats, _floats, _Value
 
 if TYPE_CHECKING:
     from .simulation import Simulation
@@ -31,8 +29,8 @@ _KINDS = _names(lcmtypes.request_t)
 _CODES = _names(lcmtypes.reply_t)
 
 
-@dataclass(frozen=True)
-class State:
+@dataclass(frozen=True, eq=False, repr=False)
+class State(_Value):
     """The state of the simulation, and of the model or MODEL/LINK that was asked for (else name is "")."""
 
     utime: int           # us, sim time
@@ -162,5 +160,5 @@ def state_of(reply: Any) -> State:
         m = lcmtypes.state_reply_t.decode(reply.body)
     except Exception:
         raise TypeMismatch("the reply's body is no state_reply_t of this client's version") from None
-    return State(m.utime, m.step, m.state_hash, m.paused, m.rate, m.name, np.array(m.position), np.array(m.orientation),
-                 np.array(m.linear), np.array(m.angular))
+    return State(m.utime, m.step, m.state_hash, m.paused, m.rate, m.name, _floats(m.position), _floats(m.orientation),
+                 _floats(m.linear), _floats(m.angular))

@@ -17,11 +17,12 @@ import tempfile
 import time
 from pathlib import Path
 from urllib.parse import urlsplit
-from typing import IO, Sequence
+from typing import IO, Any, Literal, Mapping, Sequence
 
 from .address import has_multicast_route
 from .errors import LaunchError, NoServer
 from .simulation import Simulation
+from .world import World, find_world
 
 
 def find_ruedo() -> str:
@@ -42,36 +43,73 @@ def find_ruedo() -> str:
                       "(`scripts/run` builds it)")
 
 
-def launch(world: str | os.PathLike[str], *, seed: int | None = None, rate: float | str | None = None,
-           args: Sequence[str] = (), url: str | None = None, name: str = "client", timeout: float = 30.0,
-           verbose: bool = False) -> Simulation:
+def launch(world: str | os.PathLike[str] | World | None = None, *, seed: int | None = None, rate: float | Literal["max"] | None = None,
+           args: Sequence[str] = (), url: str | None = None, name: str = "client", timeout: float = 30.0, verbose: bool = False,
+           text: str | None = None, lockstep: int | bool = 0, spawn: Sequence[str] = (), disable: Sequence[str] = (),
+           set: Mapping[str, object] | None = None, noise: bool = True) -> Simulation:
     """Starts `ruedo run WORLD` and joins it.
 
-    rate: sim time per real time, "max" or math.inf: as fast as it goes; None: real time. args: further options
-    of `ruedo run`, such as ["--spawn", "p3at@0,0"]. url: None takes a free port of this machine. name: of this
-    client. timeout: s of real time until the world is loaded. verbose: show what the server prints (else it
-    is shown in the errors alone). Raises LaunchError with what the server said.
+    world: a file, the name of one of Ruedo's own ("arena"), or a World; text: the world's SDF or URDF itself instead.
+    rate: sim time per real time, "max" or math.inf: as fast as it goes; None: real time. lockstep: how many clients
+    the run waits for (True: for this one). spawn: models as "p3at@0,0" or "p3at:NAME@X,Y,YAW". disable: devices that are left out,
+    "p3at/camera". set: {"p3at/lrf.rate": 20}. noise: False gives ideal values. args: further options of `ruedo run`. url: None takes a free port of this
+    machine. name: of this client. timeout: s of real time until the world is loaded. verbose: show what the server prints (else
+    it is shown in the errors alone). Raises LaunchError with what the server said.
     """
+    options = _options(seed, rate, args, lockstep, spawn, disable, set, noise)
     program = find_ruedo()
+    folder = None
+    if (world is None) == (text is None):
+        raise TypeError("launch() needs either a world or its text")
+    if isinstance(world, World):
+        text = str(world)
+    if text is not None:
+        folder = tempfile.TemporaryDirectory(prefix="ruedo-")
+        file = os.path.join(folder.name, "world.urdf" if "<robot" in text and "<sdf" not in text else "world.sdf")
+        Path(file).write_text(text, encoding="utf-8")
+    else:
+        assert world is not None and not isinstance(world, World)
+        file = find_world(world, program)
     token = None
     if url is None:
         token, url = _free_url()
-    command = [program, "run", os.fspath(world), "--lcm", url, "--watch-stdin"]
-    if seed is not None:
-        command += ["--seed", str(seed)]
-    if rate is not None:
-        command += ["--rate", "max" if rate == "max" or rate == math.inf else str(rate)]
-    server = _Server(command + list(args), token, verbose)
+    server = _Server([program, "run", file, "--lcm", url, "--watch-stdin", *options], token, verbose, folder)
     try:
         until = time.monotonic() + timeout
         server.await_port(url, until)
-        return Simulation(url, name, max(until - time.monotonic(), 1.0), server.ended, server.end)
+        return Simulation(url, name, max(until - time.monotonic(), 1.0), server.ended, server.end, forked=server.forked)
     except NoServer as error:    # with what the server said, when it ended
         server.end()
         raise LaunchError(str(error)) from None
     except BaseException:
         server.end()
         raise
+
+
+def _options(seed: int | None, rate: float | str | None, args: Sequence[str], lockstep: int | bool, spawn: Sequence[str],
+             disable: Sequence[str], set: Mapping[str, object] | None, noise: bool) -> list[str]:
+    """Of `ruedo run`."""
+    for name, several in (("args", args), ("spawn", spawn), ("disable", disable)):
+        if isinstance(several, (str, bytes)):
+            raise TypeError(f"{name} is {several!r}: it must be a list, {name}={str(several).split()!r}")
+    if set is not None and not isinstance(set, Mapping):
+        raise TypeError(f"set is {set!r}: it must be a dict, such as {{'p3at/lrf.rate': 20}}")
+    options = []
+    if seed is not None:
+        options += ["--seed", str(seed)]
+    if rate is not None:
+        options += ["--rate", "max" if rate == "max" or rate == math.inf else str(rate)]
+    if lockstep:
+        options += ["--lockstep", str(int(lockstep))]
+    for model in spawn:
+        options += ["--spawn", model]
+    for device in disable:
+        options += ["--disable", device]
+    for key, value in (set or {}).items():
+        options += ["--set", f"{key}={str(value).lower() if isinstance(value, bool) else value}"]
+    if not noise:
+        options.append("--no-noise")
+    return options + list(args)
 
 
 def _free_url() -> tuple[socket.socket, str]:
@@ -108,8 +146,9 @@ def _say_once(line: str) -> None:
 class _Server:
     """The server process."""
 
-    def __init__(self, command: list[str], token: socket.socket | None, verbose: bool):
+    def __init__(self, command: list[str], token: socket.socket | None, verbose: bool, folder: Any = None):
         self._command = command
+        self._folder = folder    # of the world's file, when it is ours
         self._token = token
         self._output: IO[bytes] | None = None if verbose else tempfile.TemporaryFile()
         try:
@@ -153,6 +192,13 @@ class _Server:
             self._process.wait()
         if self._token:
             self._token.close()
+        if self._folder:
+            self._folder.cleanup()
+
+    def forked(self) -> None:
+        """In a fork's child: the pipe is not to keep the server alive."""
+        if self._process.stdin:
+            self._process.stdin.close()
 
     def _last_lines(self) -> str:
         if self._output is None:

@@ -69,6 +69,12 @@ class Observations(State):
 
     messages: list[Message]
 
+    def _key(self) -> tuple[Any, ...]:
+        return (*super()._key(), tuple(self.messages))
+
+    def __repr__(self) -> str:
+        return f"Observations(step={self.step}, time={self.time:g}, {len(self.messages)} messages)"
+
     def all(self, stream: Stream[T]) -> list[T]:
         """The samples of a device or stream, decoded, in order; none when none was due. Raises TypeMismatch."""
         return [_sample(m.data, stream) for m in self.messages if m.channel == stream.channel]
@@ -155,6 +161,10 @@ class Stepper:
         self._ask_now = False                     # without waiting for a silence
 
     def step(self, n: int, commands: Sequence[Command], timeout: float) -> Observations:
+        if isinstance(n, bool) or not isinstance(n, (int, np.integer)):
+            raise TypeError(f"n is {n!r}: it must be a whole number of steps; {self._sim.step_size:g} s is one")
+        if isinstance(commands, Command):
+            raise TypeError("commands is one Command: put it into a list, [command]")
         if n < 0:
             raise ValueError(f"n is {n}: it must be at least 0")
         for command in commands:

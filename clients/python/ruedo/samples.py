@@ -7,7 +7,7 @@ shown, in integer microseconds; `time` is the same in seconds.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Callable
 
@@ -33,9 +33,47 @@ _MOTION_REASONS = {
 }
 
 
-@dataclass(frozen=True)
-class Sample:
-    """utime: us of sim time."""
+class _Value:
+    """Equal when all is equal, NaN to NaN too; hashed alike; and shown in a line."""
+
+    def _key(self) -> tuple[Any, ...]:
+        return tuple(_comparable(getattr(self, field.name)) for field in fields(self))    # type: ignore[arg-type]
+
+    def __eq__(self, other: object) -> bool:
+        return self is other or (type(self) is type(other) and self._key() == other._key())    # type: ignore[attr-defined]
+
+    def __hash__(self) -> int:
+        return hash((type(self), self._key()))
+
+    def __repr__(self) -> str:
+        shown = ", ".join(f"{field.name}={_short(getattr(self, field.name))}" for field in fields(self))    # type: ignore[arg-type]
+        return f"{type(self).__name__}({shown})"
+
+
+def _comparable(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.shape, value.dtype.str, (value + 0).tobytes()    # -0 as 0
+    if isinstance(value, list):
+        return tuple(_comparable(one) for one in value)
+    return "nan" if isinstance(value, float) and math.isnan(value) else value
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        if value.size <= 4:
+            return "[" + ", ".join(f"{one:g}" for one in value.ravel()) + "]"
+        finite = value[np.isfinite(value)] if value.dtype.kind == "f" else value
+        return f"<{' x '.join(map(str, value.shape))}{f', {finite.min():g} to {finite.max():g}' if finite.size and value.dtype.kind != 'b' else ''}>"
+    if isinstance(value, bytes):
+        return f"<{len(value)} bytes>"
+    if isinstance(value, list) and len(value) > 4:
+        return f"<{len(value)}>"
+    return f"{value:g}" if isinstance(value, float) else repr(value)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Sample(_Value):
+    """utime: us of sim time. Nothing in a sample can be written into: others may have the same one."""
 
     utime: int
 
@@ -45,7 +83,7 @@ class Sample:
         return self.utime * 1e-6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Scan(Sample):
     """A scan of a planar laser range finder with n rays, in the device's frame."""
 
@@ -60,7 +98,7 @@ class Scan(Sample):
         return float(part.min()) if part.size else math.inf
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class LidarScan(Sample):
     """A scan of a laser scanner with m layers of n rays, in the device's frame."""
 
@@ -70,7 +108,7 @@ class LidarScan(Sample):
     intensities: Floats    # (m, n) 0 to 1, or (0, 0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class SonarReading(Sample):
     """The last reading of each of an array's n transducers; their poses are the device's `elements`."""
 
@@ -79,7 +117,7 @@ class SonarReading(Sample):
     fresh: NDArray[np.bool_]     # (n,) true where the reading is of this very message
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Odometry(Sample):
     """What the robot believes of its motion from its wheels; pose of base_link in the frame odom."""
 
@@ -94,7 +132,7 @@ class Odometry(Sample):
     resets: int                  # how often the pose was reset
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Pose(Sample):
     """The true pose of base_link in the world; velocities are expressed in base_link."""
 
@@ -119,7 +157,7 @@ class Pose(Sample):
         return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Image(Sample):
     """A picture. format: "jpeg", "rgb", "bgr", "gray", "gray16" (labels: body index + 1) or "float32"
     (depth, m along the optical axis, +inf: nothing)."""
@@ -171,7 +209,7 @@ class Image(Sample):
 _RAW = {"gray": ("u1", 1), "rgb": ("u1", 3), "bgr": ("u1", 3), "gray16": ("<u2", 1), "float32": ("<f4", 1)}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class CameraInfo(Sample):
     """Intrinsics: a pinhole with OpenCV's distortion."""
 
@@ -184,7 +222,7 @@ class CameraInfo(Sample):
     distortion: Floats     # (5,) k1, k2, p1, p2, k3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Imu(Sample):
     """An inertial measurement unit, in the device's frame."""
 
@@ -193,8 +231,8 @@ class Imu(Sample):
     linear_acceleration: Floats    # (3,) m/s^2, specific force: at rest gravity upwards
 
 
-@dataclass(frozen=True)
-class ContactPoint:
+@dataclass(frozen=True, eq=False, repr=False)
+class ContactPoint(_Value):
     body: str            # the other body
     position: Floats     # (3,) m, world
     normal: Floats       # (3,) unit vector, world, towards the sensor's body
@@ -202,7 +240,7 @@ class ContactPoint:
     depth: float         # m
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Contact(Sample):
     """A bumper."""
 
@@ -210,7 +248,7 @@ class Contact(Sample):
     points: list[ContactPoint]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Joints(Sample):
     names: list[str]
     positions: Floats     # (n,) rad or m
@@ -218,7 +256,7 @@ class Joints(Sample):
     efforts: Floats       # (n,) N m or N
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class MotionStatus(Sample):
     """What a robot is executing."""
 
@@ -232,12 +270,17 @@ class MotionStatus(Sample):
     omega: float        # rad/s
 
 
+def _fixed(values: NDArray[Any]) -> NDArray[Any]:
+    values.setflags(write=False)
+    return values
+
+
 def _floats(values: Any) -> Floats:
-    return np.asarray(values, np.float64)
+    return _fixed(np.array(values, np.float64))
 
 
 def _scan(m: Any) -> Scan:
-    return Scan(m.utime, _floats(m.ranges), m.rad0 + m.radstep * np.arange(m.nranges), _floats(m.intensities))
+    return Scan(m.utime, _floats(m.ranges), _fixed(m.rad0 + m.radstep * np.arange(m.nranges)), _floats(m.intensities))
 
 
 def _lidar(m: Any) -> LidarScan:
@@ -245,18 +288,18 @@ def _lidar(m: Any) -> LidarScan:
         raise ValueError("sizes that do not fit each other")
     shape = (m.nlayers, m.ncolumns)
     return LidarScan(
-        m.utime, _floats(m.ranges).reshape(shape), m.azimuth0 + m.azimuth_step * np.arange(m.ncolumns),
-        m.elevation0 + m.elevation_step * np.arange(m.nlayers),
+        m.utime, _floats(m.ranges).reshape(shape), _fixed(m.azimuth0 + m.azimuth_step * np.arange(m.ncolumns)),
+        _fixed(m.elevation0 + m.elevation_step * np.arange(m.nlayers)),
         _floats(m.intensities).reshape(shape if m.nintensities else (0, 0)))
 
 
 def _sonar(m: Any) -> SonarReading:
-    return SonarReading(m.utime, _floats(m.range), np.asarray(m.fired_utime, np.int64), np.asarray(m.fresh, np.bool_))
+    return SonarReading(m.utime, _floats(m.range), _fixed(np.array(m.fired_utime, np.int64)), _fixed(np.array(m.fresh, np.bool_)))
 
 
 def _odometry(m: Any) -> Odometry:
     return Odometry(m.utime, m.x, m.y, m.theta, m.v, m.omega, _floats(m.angle), _floats(m.rate),
-                    np.asarray(m.ticks, np.int64), m.resets)
+                    _fixed(np.array(m.ticks, np.int64)), m.resets)
 
 
 def _pose(m: Any) -> Pose:

@@ -9,8 +9,11 @@ import os
 import struct
 import threading
 import time
+import weakref
 from types import TracebackType
 from typing import Any, Callable, Sequence
+
+import numpy as np
 
 from . import control, lcmtypes
 from .address import is_claimed, resolve_url
@@ -41,6 +44,20 @@ def connect(url: str | None = None, *, name: str | None = None, timeout: float =
     return Simulation(resolve_url(url), name or f"client-{os.getpid()}", timeout)
 
 
+_all: weakref.WeakSet[Simulation] = weakref.WeakSet()
+
+
+def _after_fork() -> None:
+    """Connections are the parent's: its threads do not run here, and its server is not this process's to end."""
+    for sim in list(_all):
+        sim._closed = "this simulation is the parent process's: connect() again after a fork"
+        sim._forked()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)
+
+
 class Simulation:
     """A running simulation. Made by connect() or launch(); safe to use from any thread.
 
@@ -48,10 +65,11 @@ class Simulation:
     """
 
     def __init__(self, url: str, name: str, timeout: float, server_ended: Callable[[], str | None] = lambda: None,
-                 end_server: Callable[[], None] = lambda: None, transport: Transport | None = None):
+                 end_server: Callable[[], None] = lambda: None, transport: Transport | None = None, forked: Callable[[], None] = lambda: None):
         self.url = url
         self._server_ended = server_ended    # why a private server is gone, None while it runs
         self._end_server = end_server
+        self._forked = forked
         self._news = threading.Condition()
         self._assembler = WorldInfoAssembler()
         self._known: WorldInfo | None = None
@@ -73,6 +91,7 @@ class Simulation:
         self._closed = ""    # why: what every call says
         self._bus = Bus(transport or open_transport(url))
         atexit.register(self.close)
+        _all.add(self)
         try:
             self._bus.subscribe("ruedo/info", self._on_info)
             self._bus.subscribe("ruedo/tick", self._on_tick)
@@ -173,8 +192,10 @@ class Simulation:
             return observations
         if commands:
             raise NotSupported("commands go with steps where the server runs in lockstep: start it with `ruedo run --lockstep N`")
+        if isinstance(n, bool) or not isinstance(n, (int, np.integer)):
+            raise TypeError(f"n is {n!r}: it must be a whole number of steps; {self.step_size:g} s is one")
         body = lcmtypes.step_request_t()
-        body.steps = n
+        body.steps = int(n)
         return observed(control.state_of(self._session.request(lcmtypes.request_t.STEP, body, timeout)), [])
 
     @property
@@ -262,6 +283,8 @@ class Simulation:
 
     def close(self) -> None:
         """Leaves the simulation: repeated commands end, and so does a server that launch() started."""
+        if self._closed:    # in a fork's child the lock may be held for ever
+            return
         with self._wake:
             if self._closed:
                 return

@@ -122,6 +122,9 @@ class Stream(Reader[T]):
             callback._call(sample)
 
     def _read(self, reader: Reader[T], a_new_one: bool, timeout: float) -> T:
+        if isinstance(timeout, bool) or not isinstance(timeout, (int, float)):
+            raise TypeError(f"timeout is {timeout!r}: it must be a number of seconds of real time; of lockstep's observations "
+                            "latest(device) and all(device) are the samples")
         self._subscribe()
         deadline = time.monotonic() + timeout
         with self._news:

@@ -1,0 +1,180 @@
+"""Python as people expect it: arguments, worlds by name and by building, samples as values, errors for wrong types, forks, logs."""
+
+import math
+import os
+import sys
+
+import lcm
+import numpy as np
+import pytest
+import ruedo
+from conftest import HALL, HERE, PATIENCE, SOURCE
+from ruedo import samples
+from ruedo.launch import _options
+from ruedo.world import find_world
+
+QUICK = {"disable": ["p3at/camera"], "timeout": PATIENCE}
+
+
+def scan(*ranges, utime=1):
+    message = ruedo.lcmtypes.planar_lidar_t()
+    message.utime, message.nranges, message.ranges, message.rad0, message.radstep = utime, len(ranges), list(ranges), -0.5, 0.25
+    return samples.CONVERSIONS["planar_lidar_t"][1](message)
+
+
+def test_samples_are_values():
+    one, same, other, later = scan(1.0, math.inf), scan(1.0, math.inf), scan(1.0, 2.0), scan(1.0, math.inf, utime=2)
+    assert one == same and hash(one) == hash(same) and one in {same}
+    assert one != other and one != later and one != "a scan" and len({one, same, other, later}) == 3
+    assert scan(math.nan) == scan(math.nan) and scan(0.0) == scan(-0.0) and hash(scan(0.0)) == hash(scan(-0.0))
+    assert samples.Imu(1, np.zeros(4), np.zeros(3), np.ones(3)) != samples.Imu(1, np.zeros(4), np.zeros(3), np.zeros(3))
+
+
+def test_samples_cannot_be_written_into():
+    for array in (scan(1.0).ranges, scan(1.0).angles, scan(1.0).intensities):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 8.0
+    with pytest.raises(AttributeError):
+        scan(1.0).utime = 3
+
+
+def test_they_are_shown_in_a_line():
+    assert repr(scan(*[1.5] * 180, math.inf)) == "Scan(utime=1, ranges=<181, 1.5 to 1.5>, angles=<181, -0.5 to 44.5>, intensities=[])"
+    picture = samples.Image(5, 200, 200, "jpeg", 0, bytes(40000))
+    assert repr(picture) == "Image(utime=5, width=200, height=200, format='jpeg', row_stride=0, data=<40000 bytes>)"
+
+
+def test_arguments_instead_of_options():
+    said = _options(3, "max", ["--record", "x"], True, ["p3at@0,0"], ["p3at/camera"], {"p3at/lrf.rate": 20, "p3at/lrf.on": True}, False)
+    assert said == ["--seed", "3", "--rate", "max", "--lockstep", "1", "--spawn", "p3at@0,0", "--disable", "p3at/camera",
+                    "--set", "p3at/lrf.rate=20", "--set", "p3at/lrf.on=true", "--no-noise", "--record", "x"]
+
+
+@pytest.mark.parametrize("wrong, says", [
+    ({"args": "--lockstep 1"}, r"args is '--lockstep 1': it must be a list, args=\['--lockstep', '1'\]"),
+    ({"disable": "p3at/camera"}, "disable is 'p3at/camera': it must be a list"),
+    ({"set": ["p3at/lrf.rate=20"]}, "set is .*: it must be a dict"),
+    ({"text": "<sdf/>"}, "either a world or its text"),
+])
+def test_wrong_arguments_say_what_is_right(wrong, says):
+    with pytest.raises(TypeError, match=says):
+        ruedo.launch(HALL, **wrong)
+
+
+def test_worlds_are_found_by_name(tmp_path, monkeypatch):
+    assert find_world("arena", ruedo.find_ruedo()) == str(SOURCE / "worlds/arena.sdf")
+    (tmp_path / "mine.sdf").write_text("<sdf/>")
+    monkeypatch.setenv("RUEDO_PATH", str(tmp_path))
+    assert find_world("mine", ruedo.find_ruedo()) == str(tmp_path / "mine.sdf")
+    with pytest.raises(ruedo.LaunchError, match="there is no world 'arenna'.*mine"):
+        find_world("arenna", ruedo.find_ruedo())
+
+
+def test_a_world_is_built_and_run():
+    """A wall whose face is 3 m ahead of the robot, which carries its LRF 0.16 m ahead of its middle; a ball's worth of a box."""
+    world = ruedo.World("mine").wall(3.05, -2, 3.05, 2).box(0.0, 2.0, mass=3.0, name="crate").cylinder(0.0, -2.0).robot("p3at")
+    with ruedo.launch(world, lockstep=1, noise=False, **QUICK) as sim:
+        assert sim.world == "mine" and [robot.name for robot in sim.robots] == ["p3at"]
+        assert {body.name: body.mass for body in sim.bodies if body.name.startswith("crate")} == {"crate/link": 3.0}
+        seen = sim.step(0)
+        assert seen.latest(sim.robot("p3at").lrf).nearest(-0.05, 0.05) == pytest.approx(3.0 - 0.16, abs=1e-3)
+        assert repr(seen) == f"Observations(step=0, time=0, {len(seen.messages)} messages)"
+        with pytest.raises(TypeError, match="n is 2.5: it must be a whole number of steps; 0.005 s is one"):
+            sim.step(2.5)
+        with pytest.raises(TypeError, match=r"put it into a list, \[command\]"):
+            sim.step(2, sim.robot("p3at").velocity_command(0.1, 0.0))
+        with pytest.raises(TypeError, match="timeout is 'lrf'"):
+            sim.robot("p3at").lrf.latest("lrf")
+        assert sim.step(np.int64(2)).step == 2
+
+
+@pytest.mark.parametrize("call", [lambda: ruedo.World().box(math.nan, 0.0), lambda: ruedo.World().box(0, 0, size=(1, 0, 1)),
+                                  lambda: ruedo.World().wall(1, 1, 1, 1), lambda: ruedo.World().cylinder(0, 0, mass=-1), lambda: ruedo.World(step=0.0)])
+def test_a_world_of_nonsense_is_refused(call):
+    with pytest.raises(ValueError, match="it must be"):
+        call()
+
+
+def test_the_text_of_a_world():
+    with ruedo.launch(text=open(HALL).read(), rate="max", **QUICK) as sim:
+        assert sim.world == "hall"
+
+
+def test_callbacks_are_taken_back_and_readers_do_not_meet(caplog):
+    with ruedo.launch(HALL, **QUICK) as sim:
+        odometry = sim.robot("p3at").odometry
+        heard, failing = [], []
+
+        def fail(sample):
+            failing.append(sample)
+            sys.exit("a callback's own affair")
+
+        with odometry.on_sample(heard.append), odometry.on_sample(fail) as failed:
+            while len(heard) < 3:
+                odometry.next(PATIENCE)
+        count = len(heard)
+        assert failed.closed and "closed" in repr(failed)
+        first, second = odometry.reader(), odometry.reader()
+        for reader in (first, second):
+            now = reader.next(PATIENCE)
+            assert reader.next(PATIENCE).utime > now.utime
+        assert len(heard) == count and len(failing) >= 2
+        sim.close()
+        for call in (odometry.latest, odometry.next, first.next, sim.pause, sim.state, lambda: sim.sleep(1.0), lambda: sim.step(1),
+                     lambda: sim.robot("p3at").set_velocity(0.1, 0.0), lambda: sim.robot("p3at").rotate(1.0), lambda: odometry.on_sample(print),
+                     lambda: sim.on_new_run(print), sim.quit):
+            with pytest.raises(ruedo.NoServer, match="^this simulation was closed$"):
+                call()
+        assert "this simulation was closed" in repr(sim)
+    assert [record.getMessage() for record in caplog.records] == ["a callback on p3at/odometry failed; it is called on, and this is said once"]
+
+
+def test_a_server_that_was_started_anew_is_noticed():
+    from conftest import free_url, ruedo_run
+
+    url = free_url()
+    events = []
+    with ruedo_run("--disable", "p3at/camera", world=HALL, url=url) as first:
+        sim = ruedo.connect(url, timeout=PATIENCE)
+        sim.on_new_run(events.append)
+        robot = sim.robot("p3at")
+        motion = robot.advance(0.1, speed=0.001)
+        first.end()
+    with ruedo_run("--disable", "p3at/camera", world=HALL, url=url), sim:
+        robot.pose.next(PATIENCE)
+        while not events:
+            robot.pose.next(PATIENCE)
+        assert events == [sim] and (motion.state, motion.reason) == ("ended", "new run")
+        assert robot.rotate(0.1).wait(PATIENCE).done
+
+
+def test_the_child_of_a_fork_is_told():
+    with ruedo.launch(HALL, **QUICK) as sim:
+        reader, writer = os.pipe()
+        child = os.fork()
+        if child == 0:
+            try:
+                sim.state()
+            except ruedo.NoServer as error:
+                os.write(writer, str(error).encode())
+            sim.close()
+            os._exit(0)
+        os.waitpid(child, 0)
+        assert os.read(reader, 1000).decode() == "this simulation is the parent process's: connect() again after a fork"
+        assert sim.state().step >= 0    # and the parent's goes on
+
+
+def test_a_log_as_pandas_has_it(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    log = lcm.EventLog(str(tmp_path / "run.lcm"), "w", overwrite=True)
+    for k in range(3):
+        odometry = ruedo.lcmtypes.odometry_t()
+        odometry.utime, odometry.x, odometry.n, odometry.angle, odometry.rate, odometry.ticks = 20000 * k, 0.5 * k, 1, [float(k)], [1.0], [k]
+        log.write_event(k, "p3at/odometry", odometry.encode())
+    log.write_event(9, "other", b"something else")
+    log.close()
+    frames = ruedo.read_log(tmp_path / "run.lcm")
+    assert list(frames) == ["p3at/odometry"] and isinstance(frames["p3at/odometry"], pandas.DataFrame)
+    frame = frames["p3at/odometry"]
+    assert list(frame["x"]) == [0.0, 0.5, 1.0] and list(frame.index) == pytest.approx([0.0, 0.02, 0.04]) and frame["angle"].iloc[2] == [2.0]
+    assert ruedo.read_log(tmp_path / "run.lcm", ["nothing"]) == {}
