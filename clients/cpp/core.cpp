@@ -269,6 +269,14 @@ void Core::on_info(const uint8_t* bytes, size_t size) {
   }
   news_.notify_all();
   if (!info) return;
+  if (before && info->epoch != before->epoch) {
+    std::vector<std::shared_ptr<Driver>> drivers;
+    {
+      const std::lock_guard lock(mutex_);
+      for (const auto& [name, driver] : drivers_) drivers.push_back(driver);
+    }
+    for (const auto& driver : drivers) driver->begin_epoch();
+  }
   forget_removed(*info);
   if (before && info->run_id != before->run_id) begin_run();
 }

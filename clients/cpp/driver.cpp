@@ -20,7 +20,8 @@ constexpr auto kUnseenTime = std::chrono::seconds(1);
 
 void MotionCore::update(const MotionStatus& status) {
   const std::lock_guard lock(mutex);
-  if (done()) return;
+  if (done() || status.utime < utime) return;
+  utime = status.utime;
   if (status.id == id) {
     progress = status.progress;
     remaining = status.remaining;
@@ -92,6 +93,14 @@ std::shared_ptr<MotionCore> Driver::move(Bus& bus, const std::string& channel, c
   if (ended_ != MotionReason::none) motion->end(ended_);
   bus.publish(channel, command);
   return motion;
+}
+
+void Driver::begin_epoch() {
+  const std::lock_guard lock(mutex_);
+  for (const auto& motion : motions_) {
+    const std::lock_guard motion_lock(motion->mutex);
+    motion->utime = -1;
+  }
 }
 
 void Driver::end(MotionReason reason) {

@@ -32,6 +32,7 @@ struct MotionCore {
   MotionReason reason = MotionReason::none;
   double progress = 0.0, remaining = 0.0;
   int unseen = 0;    // statuses that did not show it
+  int64_t utime = -1;    // of the newest status; before it is another run's, or of a reset that info will tell of
 
   // With the mutex held.
   bool done() const { return state == MotionState::done || state == MotionState::ended || state == MotionState::refused; }
@@ -51,6 +52,7 @@ class Driver : public std::enable_shared_from_this<Driver> {
 
   std::shared_ptr<MotionCore> move(Bus& bus, const std::string& channel, const move_command_t& command, const std::string& kind);
   void listen(const std::shared_ptr<StreamCore>& motion);    // throws UnknownName when the robot is gone
+  void begin_epoch();               // sim time was set back
   void end(MotionReason reason);    // its robot, or its run, is gone: nothing is repeated to the next one of that name
 
  private:

@@ -8,10 +8,9 @@ import lcm
 import numpy as np
 import pytest
 import ruedo
-from conftest import HALL, HERE, PATIENCE, SOURCE
+from conftest import HALL, PATIENCE
 from ruedo import samples
 from ruedo.launch import _options
-from ruedo.world import find_world
 
 QUICK = {"disable": ["p3at/camera"], "timeout": PATIENCE}
 
@@ -61,13 +60,11 @@ def test_wrong_arguments_say_what_is_right(wrong, says):
         ruedo.launch(HALL, **wrong)
 
 
-def test_worlds_are_found_by_name(tmp_path, monkeypatch):
-    assert find_world("arena", ruedo.find_ruedo()) == str(SOURCE / "worlds/arena.sdf")
-    (tmp_path / "mine.sdf").write_text("<sdf/>")
-    monkeypatch.setenv("RUEDO_PATH", str(tmp_path))
-    assert find_world("mine", ruedo.find_ruedo()) == str(tmp_path / "mine.sdf")
-    with pytest.raises(ruedo.LaunchError, match="there is no world 'arenna'.*mine"):
-        find_world("arenna", ruedo.find_ruedo())
+def test_worlds_are_found_by_name():
+    with ruedo.launch("arena", rate="max", **QUICK) as sim:
+        assert sim.world == "arena"
+    with pytest.raises(ruedo.LaunchError, match="exit code 3.*arenna"):
+        ruedo.launch("arenna")
 
 
 def test_a_world_is_built_and_run():

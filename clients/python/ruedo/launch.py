@@ -22,7 +22,7 @@ from typing import IO, Any, Literal, Mapping, Sequence
 from .address import has_multicast_route
 from .errors import LaunchError, NoServer
 from .simulation import Simulation
-from .world import World, find_world
+from .world import World
 
 
 def find_ruedo() -> str:
@@ -49,7 +49,7 @@ def launch(world: str | os.PathLike[str] | World | None = None, *, seed: int | N
            set: Mapping[str, object] | None = None, noise: bool = True) -> Simulation:
     """Starts `ruedo run WORLD` and joins it.
 
-    world: a file, the name of one of Ruedo's own ("arena"), or a World; text: the world's SDF or URDF itself instead.
+    world: a file, the name of one that comes with Ruedo or lies in a folder of RUEDO_PATH ("arena"), or a World; text: the world's SDF or URDF itself instead.
     rate: sim time per real time, "max" or math.inf: as fast as it goes; None: real time. lockstep: how many clients
     the run waits for (True: for this one). spawn: models as "p3at@0,0" or "p3at:NAME@X,Y,YAW". disable: devices that are left out,
     "p3at/camera". set: {"p3at/lrf.rate": 20}. noise: False gives ideal values. args: further options of `ruedo run`. url: None takes a free port of this
@@ -69,7 +69,7 @@ def launch(world: str | os.PathLike[str] | World | None = None, *, seed: int | N
         Path(file).write_text(text, encoding="utf-8")
     else:
         assert world is not None and not isinstance(world, World)
-        file = find_world(world, program)
+        file = os.fspath(world)
     token = None
     if url is None:
         token, url = _free_url()

@@ -33,6 +33,7 @@ class Motion:
         self.reason = ""                  # why it ended early or was refused: MotionStatus's, "removed", "new run"
         self._sim, self._robot = sim, robot
         self._unseen = 0
+        self._utime = -1                  # of the newest status; before it is another run's, or of a reset that info will tell of
         self._sent = time.monotonic()
         self._news = threading.Condition()
 
@@ -60,6 +61,9 @@ class Motion:
 
     def _update(self, status: MotionStatus) -> None:
         with self._news:
+            if status.utime < self._utime:
+                return
+            self._utime = status.utime
             if status.id == self.id:
                 self.progress, self.remaining = status.progress, status.remaining
                 self.state, self.reason = status.state, status.reason
@@ -135,6 +139,12 @@ class Driver:
             statuses.close()
         for motion in motions:
             motion._end(reason)
+
+    def begin_epoch(self) -> None:
+        """Sim time was set back."""
+        with self._lock:
+            for motion in self._motions:
+                motion._utime = -1
 
     def _watchdog(self) -> float:
         robot = self._sim._info.robots.get(self._robot)    # None: removed meanwhile

@@ -438,6 +438,9 @@ class Simulation:
                     self._utime = 0
             self._news.notify_all()
         if info:
+            if before and info.epoch != before.epoch:
+                for driver in list(self._drivers.values()):
+                    driver.begin_epoch()
             self._forget_removed(info)
             if before and info.run_id != before.run_id:
                 self._begin_run()

@@ -1,4 +1,4 @@
-"""Worlds: those that are found by their name, and those that a program builds."""
+"""A world that a program builds."""
 
 from __future__ import annotations
 
@@ -6,23 +6,6 @@ import math
 import os
 from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
-
-from .errors import LaunchError
-
-
-def find_world(world: str | os.PathLike[str], program: str) -> str:
-    """world, where it is a file; else the .sdf of that name in RUEDO_PATH or among the program's own worlds ("arena")."""
-    name = os.fspath(world)
-    if os.path.exists(name) or os.sep in name or Path(name).suffix:
-        return name    # the server says what is wrong with it
-    here = Path(program).resolve().parent
-    folders = [Path(folder) for folder in os.environ.get("RUEDO_PATH", "").split(os.pathsep) if folder]
-    folders += [here.parent / "share/ruedo/worlds", *(folder / "worlds" for folder in here.parents)]
-    for folder in folders:
-        if (folder / f"{name}.sdf").is_file():
-            return str(folder / f"{name}.sdf")
-    own = next((sorted(file.stem for file in folder.glob("*.sdf")) for folder in folders if any(folder.glob("*.sdf"))), [])
-    raise LaunchError(f"there is no world {name!r}: it is no file, and not among Ruedo's own ({', '.join(own) or 'none was found'})")
 
 
 class World:

@@ -230,6 +230,10 @@ TEST_F(Lifetimes, ANewRunIsNoticedAndNotDriven) {
   server->await_delivery();
   const Motion motion = robot.advance(1.0);
   robot.set_velocity(0.2, 0.0);
+  server->send_motion("p3at", 5'000'000, motion.id(), ruedo::motion_status_t::STATE_RUNNING);
+  server->send_motion("p3at", 1000, 0, ruedo::motion_status_t::STATE_IDLE);    // of the next run, whose first word it is
+  server->await_delivery();
+  EXPECT_EQ(motion.state(), MotionState::running);
   testing::internal::CaptureStderr();
   server->run_id = 8;
   server->await([&] {

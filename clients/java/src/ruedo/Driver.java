@@ -68,6 +68,11 @@ final class Driver {
         return motion;
     }
 
+    /** Sim time was set back. */
+    synchronized void beginEpoch() {
+        for (Motion motion : motions) motion.beginEpoch();
+    }
+
     /** Its robot, or its run, is gone: nothing is repeated to the next one of that name. */
     void end(String reason) {
         List<Motion> underWay;

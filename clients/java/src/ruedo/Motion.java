@@ -17,6 +17,7 @@ public final class Motion {
     private double progress;
     private double remaining;
     private int unseen;
+    private long utime = -1;    // of the newest status; before it is another run's, or of a reset that info will tell of
 
     Motion(Simulation sim, String robot, long id, String kind, double amount) {
         this.sim = sim;
@@ -79,6 +80,11 @@ public final class Motion {
         return this;
     }
 
+    /** Sim time was set back. */
+    synchronized void beginEpoch() {
+        utime = -1;
+    }
+
     synchronized void end(String why) {
         if (done()) return;
         state = "ended";
@@ -87,7 +93,8 @@ public final class Motion {
     }
 
     synchronized void update(MotionStatus status) {
-        if (done()) return;
+        if (done() || status.utime < utime) return;
+        utime = status.utime;
         if (status.id == id) {
             progress = status.progress;
             remaining = status.remaining;

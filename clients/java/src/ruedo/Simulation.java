@@ -512,6 +512,13 @@ public final class Simulation implements AutoCloseable {
             notifyAll();
         }
         if (info == null) return;
+        if (before != null && before.head.epoch != info.head.epoch) {
+            List<Driver> all;
+            synchronized (robots) {
+                all = new ArrayList<>(drivers.values());
+            }
+            for (Driver driver : all) driver.beginEpoch();
+        }
         forgetRemoved(info);
         if (before != null && before.head.run_id != info.head.run_id) beginRun();
     }

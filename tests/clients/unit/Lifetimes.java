@@ -1,0 +1,81 @@
+import java.util.ArrayList;
+import java.util.List;
+import java.util.concurrent.CountDownLatch;
+import java.util.concurrent.atomic.AtomicInteger;
+import ruedo.Motion;
+import ruedo.Odometry;
+import ruedo.Reader;
+import ruedo.Robot;
+import ruedo.Ruedo;
+import ruedo.RuedoException;
+import ruedo.Simulation;
+import ruedo.Stream;
+import ruedo.Subscription;
+
+/** Callbacks that are taken back or throw, readers, closing, and a server that is started anew; lifetimes_test.py says what is right. */
+public final class Lifetimes {
+    private static final double PATIENCE = 300.0;    // s
+
+    private Lifetimes() {}
+
+    private static void callbacks(Simulation sim) {
+        Stream<Odometry> odometry = sim.robot("p3at").odometry();
+        AtomicInteger heard = new AtomicInteger();
+        AtomicInteger failed = new AtomicInteger();
+        try (Subscription first = odometry.onSample(sample -> {
+            failed.incrementAndGet();
+            throw new AssertionError("a fault of the user's");
+        }); Subscription second = odometry.onSample(sample -> heard.incrementAndGet())) {
+            while (heard.get() < 3) odometry.next(PATIENCE);
+            System.out.println("open " + !first.closed() + " " + !second.closed());
+        }
+        int count = heard.get();
+        Reader<Odometry> one = odometry.reader();
+        Reader<Odometry> other = odometry.reader();
+        long before = one.next(PATIENCE).utime;
+        System.out.println("newer " + (one.next(PATIENCE).utime > before));
+        System.out.println("stolen " + (other.next(0.001).utime == 0));
+        System.out.println("heard " + (heard.get() == count) + " " + (failed.get() >= 3));
+    }
+
+    private static void closed(Simulation sim) {
+        Robot robot = sim.robot("p3at");
+        Stream<Odometry> odometry = robot.odometry();
+        odometry.latest(PATIENCE);
+        sim.close();
+        sim.close();
+        List<Runnable> calls = new ArrayList<>(List.of(sim::pause, sim::resume, () -> sim.step(1), () -> sim.setRate(1.0), sim::reset, sim::state,
+                () -> sim.remove("p3at"), sim::quit, () -> sim.sleep(1.0), () -> sim.onNewRun(() -> {}), odometry::latest, odometry::next,
+                () -> odometry.onSample(sample -> {}), () -> robot.setVelocity(0.1, 0.0), () -> robot.advance(1.0), () -> robot.stop()));
+        int right = 0;
+        for (Runnable call : calls) {
+            try {
+                call.run();
+            } catch (RuedoException.NoServer error) {
+                if (error.getMessage().equals("this simulation was closed")) right++;
+            }
+        }
+        System.out.println("closed " + right + " of " + calls.size() + " " + sim.world());
+    }
+
+    private static void newRun(Simulation sim) throws InterruptedException {
+        CountDownLatch event = new CountDownLatch(1);
+        sim.onNewRun(event::countDown);
+        Motion motion = sim.robot("p3at").advance(0.1, new ruedo.Limits(0.001, 0.0, 0.0));
+        System.out.println("ready");
+        event.await();
+        System.out.println("ended " + motion.state() + " " + motion.reason());
+        System.out.println("turned " + sim.robot("p3at").rotate(0.1).await(PATIENCE).done());
+    }
+
+    public static void main(String[] args) throws InterruptedException {
+        try (Simulation sim = Ruedo.connect(args[0], "lifetimes", PATIENCE)) {
+            if (args[1].equals("new_run")) {
+                newRun(sim);
+            } else {
+                callbacks(sim);
+                closed(sim);
+            }
+        }
+    }
+}
