@@ -26,5 +26,20 @@ const entries = files.map(({ path, name, bytes }, index) => {
   code += `const uint8_t kFile${index}[] = {\n${rows.join(",\n")}};\n`;
   return `    {"${path}", "${kTypes[name.replace(/^.*\./, "")]}", kFile${index}, sizeof kFile${index}},\n`;
 });
-code += `}  // namespace\n\nconst Asset kAssets[] = {\n${entries.join("")}};\nconst size_t kAssetCount = ${entries.length};\n\n}  // namespace ruedo::console\n`;
+// The page as a file that needs no server: all in one, the program compressed. A log follows it, and then the end of the body.
+const text = (name) => files.find((file) => file.name === name).bytes.toString("utf8");
+const boot = `const bytes = Uint8Array.from(atob(document.getElementById("code").textContent), (c) => c.charCodeAt(0));
+const script = document.createElement("script");
+script.type = "module";
+script.textContent = await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+document.body.append(script);`;
+const shell = Buffer.from(text(files[0].name)
+  .replace("/icon.svg", `data:image/svg+xml;base64,${Buffer.from(text("src/icon.svg")).toString("base64")}`)
+  .replace('<link rel="stylesheet" href="/main.css">', () => `<style>${text("main.css")}</style>`)
+  .replace('<script type="module" src="/main.js"></script>', () => `<script type="text/plain" id="code">${gzipSync(Buffer.from(text("main.js")), { level: 9 }).toString("base64")}</script>\n<script type="module">${boot}</script>`)
+  .replace(/<\/body>[^]*$/, ""));
+code += "const uint8_t kShellBytes[] = {";
+for (let at = 0; at < shell.length; at += 32) code += `${[...shell.subarray(at, at + 32)].join(",")},\n`;
+code += "};\n";
+code += `}  // namespace\n\nconst uint8_t* const kShell = kShellBytes;\nconst size_t kShellSize = sizeof kShellBytes;\n\nconst Asset kAssets[] = {\n${entries.join("")}};\nconst size_t kAssetCount = ${entries.length};\n\n}  // namespace ruedo::console\n`;
 writeFileSync(output, code);

@@ -24,7 +24,8 @@ constexpr auto kLongestSleep = std::chrono::milliseconds(100);    // Ctrl-C is s
 volatile std::sig_atomic_t interrupted = 0;
 
 struct PlayArguments {
-  std::string log, speed = "1", lcm, view;
+  std::string log, speed = "1", lcm, view, html;
+  double html_size = 20.0;
   bool viewed = false;
 };
 
@@ -54,6 +55,7 @@ int play(const PlayArguments& arguments) {
   const double speed = parse_rate(arguments.speed);
   std::signal(SIGINT, [](int) { interrupted = 1; });
   std::signal(SIGTERM, [](int) { interrupted = 1; });
+  if (!arguments.html.empty()) return write_page(arguments.log, arguments.html, arguments.html_size), kGood;
   if (arguments.viewed) return view(arguments, speed);
   log::Reader log(arguments.log);
   bus::LcmBus bus(arguments.lcm);
@@ -84,6 +86,9 @@ void add_play(CLI::App& app, Action& chosen) {
   command->add_option("--speed", arguments->speed, "log time per real time, or max")->type_name("S|max")->capture_default_str();
   CLI::Option* view = command->add_option("--view", arguments->view, "show it in the web console instead (default: 127.0.0.1:8080)");
   view->type_name("[ADDRESS:PORT]")->expected(0, 1);
+  command->add_option("--html", arguments->html, "write it as a page that needs no server instead")->type_name("FILE")->excludes(view);
+  command->add_option("--html-size", arguments->html_size, "at most so large: messages are thinned to fit")->type_name("MB")->capture_default_str()
+      ->check(CLI::Range(1.0, 1000.0))->needs("--html");
   command->add_option("--lcm", arguments->lcm, "LCM address (default: $LCM_DEFAULT_URL, or LCM's group)")->type_name("URL");
   command->callback([arguments, view, &chosen] {
     arguments->viewed = view->count() > 0;

@@ -14,6 +14,7 @@
 #include "cli/commands.h"
 #include "cli/isolation.h"
 #include "cli/judge.h"
+#include "cli/view.h"
 #include "ruedo/errors.h"
 #include "log/diff.h"
 #include "log/reader.h"
@@ -24,6 +25,8 @@ namespace ruedo::cli {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kPageSize_MB = 20.0;    // of the page that shows a failed run
 
 struct RegressArguments {
   WorldArguments world;
@@ -117,6 +120,19 @@ std::string run_script(const RegressArguments& arguments) {
   return script.fault().empty() ? "" : "the script ended with " + script.fault() + ": " + arguments.script;
 }
 
+// The failed run as a page beside its log, to be looked at where no ruedo is.
+void attach_page(const std::string& log) {
+#ifdef RUEDO_CONSOLE
+  try {
+    write_page(log, log + ".html", kPageSize_MB);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "ruedo: no page of this run: {}\n", error.what());
+  }
+#else
+  static_cast<void>(log);
+#endif
+}
+
 int regress(RegressArguments arguments) {
   const bool isolated = !arguments.shared_network && isolate();
   Expectations& expected = arguments.expected;
@@ -149,6 +165,7 @@ int regress(RegressArguments arguments) {
     if (std::string fault = run_script(arguments); !fault.empty()) failures.push_back(fault);
   }
   for (const std::string& line : failures) fmt::print(stderr, "FAILED: {}\n", line);
+  if (!failures.empty()) attach_page(arguments.record);
   if (failures.empty()) fmt::print("passed; the run is in {}\n", arguments.record);
   return failures.empty() ? kGood : kCheckFailed;
 }

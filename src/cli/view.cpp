@@ -12,6 +12,7 @@
 #include "cli/logged_run.h"
 #include "console/console.h"
 #include "console/live_source.h"
+#include "console/log_page.h"
 #include "console/log_source.h"
 #include "console/tee_bus.h"
 #include "ruedo/world_info_t.hpp"
@@ -63,6 +64,16 @@ std::shared_ptr<void> view_log(const std::string& log, const std::string& addres
   return serving;
 }
 
+void write_page(const std::string& log, const std::string& path, double most_megabytes) {
+  const console::LogPage page = console::write_log_page(log, [&](const log_header_t& header) { return load_run(header, log); }, path,
+                                                        static_cast<size_t>(most_megabytes * 1e6));
+  std::string thinned;
+  if (page.interval_s > 0) thinned += fmt::format(", messages of a channel at least {:g} s apart", page.interval_s);
+  if (page.pictures_s != 0) thinned += page.pictures_s < 0 ? ", without pictures" : fmt::format(", pictures {:g} s apart", page.pictures_s);
+  if (!page.fault.empty()) fmt::print(stderr, "ruedo: {}: {}\n", log, page.fault);
+  fmt::print("{}: {:.1f} MB{}\n", path, static_cast<double>(page.bytes) * 1e-6, thinned);
+}
+
 }  // namespace ruedo::cli
 
 #else
@@ -72,7 +83,7 @@ namespace ruedo::cli {
 namespace {
 
 [[noreturn]] void no_console() {
-  throw EnvironmentError("--view: this ruedo was built without the web console. Install nodejs, npm and libwebsockets-dev, then "
+  throw EnvironmentError("this ruedo was built without the web console. Install nodejs, npm and libwebsockets-dev, then "
                          "configure with -DRUEDO_CONSOLE=ON and build again");
 }
 
@@ -91,6 +102,8 @@ Bus& ViewedBus::bus() { return inner_; }
 std::shared_ptr<void> ViewedBus::open(run::Server&, const std::string&) { return nullptr; }
 
 std::shared_ptr<void> view_log(const std::string&, const std::string&, double) { no_console(); }
+
+void write_page(const std::string&, const std::string&, double) { no_console(); }
 
 }  // namespace ruedo::cli
 

@@ -35,4 +35,8 @@ class ViewedBus {
 // real time. Throws InputError for what is no log, and as ViewedBus does.
 std::shared_ptr<void> view_log(const std::string& log, const std::string& address, double speed);
 
+// Writes a recorded run as one HTML file that needs no server, of that size at most, and says what is in it. Throws InputError for what is
+// no log or does not fit, and EnvironmentError when the file cannot be written or this build has no console.
+void write_page(const std::string& log, const std::string& path, double most_megabytes);
+
 }  // namespace ruedo::cli

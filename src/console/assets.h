@@ -16,4 +16,8 @@ struct Asset {
 extern const Asset kAssets[];
 extern const size_t kAssetCount;
 
+// The page as HTML for a file, up to where a log and the end of the body follow.
+extern const uint8_t* const kShell;
+extern const size_t kShellSize;
+
 }  // namespace ruedo::console

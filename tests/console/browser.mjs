@@ -28,7 +28,7 @@ page.on("console", (message) => { if (message.type() === "error") wrong(message.
 page.on("pageerror", (error) => wrong(String(error)));
 // A picture that the next one replaces while it is read is no error.
 page.on("requestfailed", (request) => { if (!request.url().startsWith("blob:")) wrong(`${request.url()}: ${request.failure()?.errorText}`); });
-page.on("request", (request) => { if (!request.url().startsWith(new URL(url).origin) && !request.url().startsWith("blob:")) errors.push(`asked ${request.url()}`); });
+page.on("request", (request) => { if (!/^(blob|data):/.test(request.url()) && request.url() !== url && (url.startsWith("file:") || !request.url().startsWith(new URL(url).origin))) errors.push(`asked ${request.url()}`); });
 page.setDefaultTimeout(kPatience_ms);
 // All notes that the page has shown: they go away by themselves, maybe before a busy machine looks.
 await page.addInitScript(() => {

@@ -20,7 +20,8 @@ import { Notice } from "./ui/notice";
 import { Panel } from "./ui/panel";
 import { RobotPages } from "./ui/robot";
 import { Timeline } from "./ui/timeline";
-import { Link, type Hello, type Playback } from "./wire/link";
+import { Link, type Hello, type Playback, type RunLink } from "./wire/link";
+import { LogFile } from "./wire/log_file";
 import { Router } from "./wire/router";
 import { Session } from "./wire/session";
 
@@ -36,21 +37,14 @@ export class App {
   readonly clock = new Clock(this.page, () => this.forgetPast());
   readonly notice = new Notice(byId("notice"), this.page);
   readonly loading = new Loading<SceneFiles>({
-    fetchScene: loadScene,
+    fetchScene: () => loadScene(this.file),
     greeted: (hello) => this.onHello(hello),
     running: (world) => this.onWorld(world),
     complete: (world, scene) => this.onComplete(world, scene),
     failed: (words) => toast(`The scene cannot be loaded: ${words}`, "error"),
   });
-  readonly link: Link = new Link({
-    state: (link, words) => this.notice.onLink(link, words),
-    hello: (hello) => this.loading.onHello(hello),
-    scene: () => void this.loading.onScene(),
-    playback: (playback) => this.onPlayback(playback),
-    message: (channel, bytes) => this.router.onMessage(channel, bytes),
-    traffic: (channels, messages, sizes) => this.channels.traffic(channels, messages, sizes),
-    refused: (channel) => toast(this.page.now.hello?.mode === "log" ? "A recorded run cannot be steered." : `Nobody listens on ${channel}.`, "error"),
-  });
+  private readonly file = LogFile.inPage();
+  readonly link: RunLink = this.file ?? new Link();
   readonly session = new Session((channel, message) => this.link.command(channel, message));
   readonly control = new Control(this.page, this.link, this.session, this.clock);
   readonly pages = new RobotPages((command) => this.control.move(command), () => this.control.stop());
@@ -89,7 +83,15 @@ export class App {
     });
     page.watch(["world", "scene", "robot"], () => this.showRobot());
     page.watch(["hello", "world", "scene", "robot", "layers", "tab", "panel"], () => this.want());
-    this.link.connect();
+    this.link.connect({
+      state: (link, words) => this.notice.onLink(link, words),
+      hello: (hello) => this.loading.onHello(hello),
+      scene: () => void this.loading.onScene(),
+      playback: (playback) => this.onPlayback(playback),
+      message: (channel, bytes) => this.router.onMessage(channel, bytes),
+      traffic: (channels, messages, sizes) => this.channels.traffic(channels, messages, sizes),
+      refused: (channel) => toast(page.now.hello?.mode === "log" ? "A recorded run cannot be steered." : `Nobody listens on ${channel}.`, "error"),
+    });
     requestAnimationFrame((at) => this.frame(at));
   }
 

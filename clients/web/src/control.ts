@@ -7,7 +7,7 @@ import { confirmed } from "./ui/confirm";
 import { toast } from "./ui/dom";
 import type { Thing } from "./ui/things";
 import { encode } from "./wire/lcm";
-import type { Link } from "./wire/link";
+import type { RunLink } from "./wire/link";
 import type { Session } from "./wire/session";
 
 const kFastest_m_s = 1.0, kQuickestTurn_rad_s = 1.5;    // that the page drives at
@@ -20,7 +20,7 @@ export interface Speeds { robot: string; vx: number; omega: number }
 export class Control {
   private motionId = BigInt(Date.now());
 
-  constructor(private readonly page: Page, private readonly link: Link, private readonly session: Session, private readonly clock: Clock) {}
+  constructor(private readonly page: Page, private readonly link: RunLink, private readonly session: Session, private readonly clock: Clock) {}
 
   private get isLog(): boolean { return this.page.now.hello?.mode === "log"; }
 

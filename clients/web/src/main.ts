@@ -14,4 +14,4 @@ try {
   throw error;
 }
 // The token of the address is kept by a cookie.
-if (location.search) history.replaceState(null, "", "/");
+if (location.search && location.protocol !== "file:") history.replaceState(null, "", "/");

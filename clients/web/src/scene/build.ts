@@ -179,7 +179,7 @@ export class SceneBuilder {
     if (index < 0 || !this.files.description.textures[index]) return null;
     let texture = this.textures.get(index);
     if (!texture) {
-      texture = new THREE.TextureLoader().load(`/scene/textures/${index}`);
+      texture = new THREE.TextureLoader().load(this.files.textureUrl(index));
       texture.colorSpace = THREE.SRGBColorSpace;
       texture.wrapS = texture.wrapT = THREE.RepeatWrapping;
       texture.anisotropy = 8;

@@ -26,17 +26,25 @@ export const enum Flag { textured = 1, specular = 2, ground = 4, doubleSided = 8
 export interface MeshData { vertices: Float32Array; indices: Uint32Array }    // a vertex: position, normal, u, v
 export interface LinkData { kind: number; body: number; pose: Float32Array }
 
-export interface SceneFiles { description: Description; meshes: MeshData[]; links: LinkData[] }
+// textureUrl: where the picture of that number is.
+export interface SceneFiles { description: Description; meshes: MeshData[]; links: LinkData[]; textureUrl(index: number): string }
 
-async function get(path: string): Promise<Response> {
-  const response = await fetch(path);
-  if (!response.ok) throw new Error(`${path}: ${response.status}`);
-  return response;
-}
+// A page that has its run in itself has the scene's files, too.
+export interface FileStore { file(path: string): Uint8Array<ArrayBuffer> | null }
 
-// Null when there is no world to show.
-export async function loadScene(): Promise<SceneFiles | null> {
-  const answer = await fetch("/scene.json");
+// Null when there is no world to show. store: null for the program that serves this page.
+export async function loadScene(store: FileStore | null): Promise<SceneFiles | null> {
+  const ask = async (path: string): Promise<Response> => {
+    if (!store) return fetch(path);
+    const bytes = store.file(path);
+    return new Response(bytes, { status: bytes ? 200 : 404 });
+  };
+  const get = async (path: string): Promise<Response> => {
+    const response = await ask(path);
+    if (!response.ok) throw new Error(`${path}: ${response.status}`);
+    return response;
+  };
+  const answer = await ask("/scene.json");
   if (answer.status === 404) return null;
   if (!answer.ok) throw new Error(await answer.text());
   const [description, meshBytes, linkBytes] = await Promise.all([
@@ -55,5 +63,9 @@ export async function loadScene(): Promise<SceneFiles | null> {
   for (let offset = 0; offset + 36 <= linkBytes.byteLength; offset += 36) {
     links.push({ kind: view.getInt32(offset, true), body: view.getInt32(offset + 4, true), pose: new Float32Array(linkBytes, offset + 8, 7) });
   }
-  return { description, meshes, links };
+  const textureUrl = (index: number) => {
+    const path = `/scene/textures/${index}`;
+    return store ? URL.createObjectURL(new Blob([store.file(path) ?? new Uint8Array()])) : path;
+  };
+  return { description, meshes, links, textureUrl };
 }

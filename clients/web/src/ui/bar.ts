@@ -52,7 +52,7 @@ export class Bar {
       this.modes.set(mode, button);
       view.append(button);
     }
-    place.append(h("h1", { class: "name" }, h("img", { src: "/icon.svg", alt: "Ruedo" }), this.name), this.state, h("span", { class: "grow" }),
+    place.append(h("h1", { class: "name" }, h("img", { src: document.querySelector<HTMLLinkElement>("link[rel=icon]")!.href, alt: "Ruedo" }), this.name), this.state, h("span", { class: "grow" }),
       this.clock, this.factor, this.pause, this.stepButton, this.rate, this.resetButton, view,
       iconButton("theme", "dark or light (T)", () => actions.theme(), "roomy"), iconButton("help", "keys (?)", () => actions.help()), iconButton("panel", "panel (P)", () => actions.panel()));
     this.show();

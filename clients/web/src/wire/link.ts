@@ -14,10 +14,21 @@ export interface LinkHandler {
   refused(channel: string): void;
 }
 
+// What a page has of a run: the socket's end, or a log in the page itself.
+export interface RunLink {
+  connect(handler: LinkHandler): void;
+  want(channels: Iterable<string>): void;
+  watchTraffic(on: boolean): void;
+  command(channel: string, message: Uint8Array): boolean;
+  play(on: boolean, speed: number): void;
+  seek(time_s: number): void;
+}
+
 const enum Operation { seen = 1, want = 2, command = 3, traffic = 4, play = 5, seek = 6 }
 const enum Frame { messages = 1, traffic = 2 }
 
-export class Link {
+export class Link implements RunLink {
+  private handler!: LinkHandler;
   private socket: WebSocket | undefined;
   private channels: string[] = [];
   private wanted = new Set<string>();
@@ -25,9 +36,8 @@ export class Link {
   private retry_ms = 300;
   private over = false;
 
-  constructor(private readonly handler: LinkHandler) {}
-
-  connect(): void {
+  connect(handler: LinkHandler): void {
+    this.handler = handler;
     const address = new URL("/socket", location.href);
     address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
     const socket = new WebSocket(address);
@@ -48,7 +58,7 @@ export class Link {
     socket.onclose = () => {
       if (this.socket !== socket) return;
       if (!this.over) this.handler.state("lost", "The connection to the server is lost. Trying again …");
-      setTimeout(() => this.connect(), this.retry_ms);
+      setTimeout(() => this.connect(handler), this.retry_ms);
       this.retry_ms = Math.min(3000, this.retry_ms * 1.5);
     };
   }

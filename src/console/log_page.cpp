@@ -1,0 +1,239 @@
+// The file is the page (kShell, made by build.mjs), a JSON text that says what is where, and all bytes as one base64 text.
+#include "console/log_page.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "console/assets.h"
+#include "console/board.h"
+#include "console/scene_data.h"
+#include "core/json.h"
+#include "core/utf8.h"
+#include "log/index.h"
+#include "log/reader.h"
+#include "ruedo/errors.h"
+#include "ruedo/image_t.hpp"
+#include "ruedo/world_info_t.hpp"
+
+namespace ruedo::console {
+namespace {
+
+constexpr uint32_t kMostMessage = 16u << 20;    // bytes; a larger one is left out
+constexpr SimTime kFirstInterval_us = 20'000;
+constexpr size_t kHead = 16;                    // bytes before an entry's messages: channel, their number, time
+
+template <class Value>
+void append(std::vector<uint8_t>& bytes, Value value) {    // little endian, as browsers are
+  const auto* from = reinterpret_cast<const uint8_t*>(&value);
+  bytes.insert(bytes.end(), from, from + sizeof value);
+}
+
+bool are_pictures(const log::Index::Channel& channel) { return channel.fingerprint == image_t::getHash(); }
+
+// Which entries of a channel remain when no two are closer than that; the first and the last always do.
+std::vector<size_t> thinned(const log::Index::Channel& channel, SimTime interval_us) {
+  std::vector<size_t> kept;
+  for (size_t i = 0; i < channel.entries.size(); ++i) {
+    const log::Index::Entry& entry = channel.entries[i];
+    const bool last = i + 1 == channel.entries.size();
+    if (entry.size > kMostMessage) continue;
+    if (kept.empty() || last || entry.time_us - channel.entries[kept.back()].time_us >= interval_us) kept.push_back(i);
+  }
+  return kept;
+}
+
+size_t size_of(const log::Index& index, bool pictures, SimTime interval_us) {
+  size_t sum = 0;
+  for (const log::Index::Channel& channel : index.channels()) {
+    if (are_pictures(channel) != pictures) continue;
+    for (const size_t i : thinned(channel, interval_us)) sum += channel.entries[i].size + kHead;
+  }
+  return sum;
+}
+
+// The least interval with which they fit; -1 where none does.
+SimTime interval_that_fits(const log::Index& index, bool pictures, size_t room) {
+  for (SimTime interval_us = 0; interval_us <= 2 * (index.end_us() - index.begin_us() + kFirstInterval_us);
+       interval_us = interval_us == 0 ? kFirstInterval_us : interval_us * 2) {
+    if (size_of(index, pictures, interval_us) <= room) return interval_us;
+  }
+  return -1;
+}
+
+class Writer {
+ public:
+  Writer(const std::string& log, const run::LoadRun& load) : index_(log), worlds_(index_, load), reader_(log) {}
+
+  LogPage write(const std::string& log, const std::string& path, size_t most_bytes) {
+    LogPage page;
+    page.fault = fault();
+    add_scenes();
+    // Base64 takes four bytes for three.
+    const size_t fixed = kShellSize + json_scenes_.size() + 64 * index_.channels().size() + 4096;
+    const size_t room = most_bytes > fixed ? (most_bytes - fixed) / 4 * 3 : 0;
+    if (room <= bytes_.size()) {
+      throw InputError({log}, fmt::format("its scene alone needs a page of {:.1f} MB", static_cast<double>(fixed + bytes_.size() / 3 * 4 + 100'000) * 1e-6));
+    }
+    const size_t left = room - bytes_.size();
+    const SimTime pictures = interval_that_fits(index_, true, left / 2);
+    const SimTime interval = interval_that_fits(index_, false, left - (pictures < 0 ? 0 : size_of(index_, true, pictures)));
+    if (interval < 0) throw InputError({log}, fmt::format("does not fit into a page of {:.1f} MB, however few of its messages are in it", static_cast<double>(most_bytes) * 1e-6));
+    const size_t messages_at = bytes_.size();
+    add_messages(interval, pictures);
+    page.interval_s = static_cast<double>(interval) * 1e-6;
+    page.pictures_s = static_cast<double>(pictures) * 1e-6;
+    page.bytes = save(path, head(log, page, messages_at));
+    return page;
+  }
+
+ private:
+  std::string fault() const {
+    const std::string damage = index_.fault().empty() ? "" : "The log is not whole: " + index_.fault() + ".";
+    return damage + (damage.empty() || worlds_.fault().empty() ? "" : " ") + worlds_.fault();
+  }
+
+  void add_file(JsonWriter& json, const std::string& name, const std::vector<uint8_t>& bytes) {
+    json.name(name).open('[').value(static_cast<int64_t>(bytes_.size())).value(static_cast<int64_t>(bytes.size())).close(']');
+    bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
+  }
+
+  // Each scene that the run had, from when on.
+  void add_scenes() {
+    std::vector<SimTime> times{index_.begin_us()};
+    for (const log::Index::Edit& edit : index_.edits()) times.push_back(edit.time_us);
+    JsonWriter json;
+    json.open('[');
+    for (const SimTime time_us : times) {
+      const run::LogWorlds::Scene& scene = worlds_.at(time_us);
+      if (!scenes_.empty() && scenes_.back() == &scene) continue;
+      scenes_.push_back(&scene);
+      json.open('{').member("from", static_cast<double>(scene.from_us) * 1e-6).name("files").open('{');
+      if (scene.world) {
+        const SceneData data(*scene.world, static_cast<int>(scenes_.size()));
+        add_file(json, "/scene.json", {data.json.begin(), data.json.end()});
+        add_file(json, "/scene/meshes", *data.meshes);
+        add_file(json, "/scene/links", *data.links);
+        for (size_t i = 0; i < data.pictures.size(); ++i) {
+          if (data.pictures[i].bytes) add_file(json, "/scene/textures/" + std::to_string(i), *data.pictures[i].bytes);
+        }
+      }
+      json.close('}').close('}');
+    }
+    json_scenes_ = json.close(']').text();
+    bytes_.resize((bytes_.size() + 7) / 8 * 8);
+  }
+
+  // Channel, number of messages (a message may come in parts), time in s; then of each message its size and bytes.
+  void add_entry(uint32_t channel, SimTime time_us, const std::vector<std::vector<uint8_t>>& messages) {
+    append(bytes_, channel);
+    append(bytes_, static_cast<uint32_t>(messages.size()));
+    append(bytes_, static_cast<double>(time_us) * 1e-6);
+    for (const std::vector<uint8_t>& message : messages) {
+      append(bytes_, static_cast<uint32_t>(message.size()));
+      bytes_.insert(bytes_.end(), message.begin(), message.end());
+    }
+  }
+
+  void add_messages(SimTime interval_us, SimTime pictures_us) {
+    for (size_t c = 0; c < index_.channels().size(); ++c) {
+      const log::Index::Channel& channel = index_.channels()[c];
+      names_.push_back(printable(channel.name));
+      if (channel.fingerprint == world_info_t::getHash()) info_ = names_.back();
+      const SimTime interval = are_pictures(channel) ? pictures_us : interval_us;
+      if (interval < 0) continue;
+      for (const size_t i : thinned(channel, interval)) add_entry(static_cast<uint32_t>(c), channel.entries[i].time_us, whole(channel, i));
+    }
+    if (!info_.empty()) return;
+    info_ = "ruedo/info";
+    names_.push_back(info_);
+    for (const run::LogWorlds::Scene* scene : scenes_) add_entry(static_cast<uint32_t>(names_.size() - 1), scene->from_us, scene->info);
+  }
+
+  // A message with the parts that came before it, as far as it is one of several.
+  std::vector<std::vector<uint8_t>> whole(const log::Index::Channel& channel, size_t entry) {
+    std::vector<std::vector<uint8_t>> parts;
+    for (size_t i = entry + 1; i-- > 0 && parts.size() < Board::kMostParts;) {
+      reader_.seek(channel.entries[i].offset);
+      if (!reader_.next(event_)) break;
+      parts.insert(parts.begin(), event_.data);
+      if (!Board::is_later_part(parts.front())) break;
+    }
+    return parts;
+  }
+
+  std::string head(const std::string& log, const LogPage& page, size_t messages_at) const {
+    JsonWriter json;
+    json.open('{').member("title", printable(std::filesystem::path(log).filename().string())).member("info", info_).member("fault", printable(page.fault));
+    json.member("begin", static_cast<double>(index_.begin_us()) * 1e-6).member("end", static_cast<double>(index_.end_us()) * 1e-6);
+    json.member("interval", page.interval_s).member("pictures", page.pictures_s).member("messages", static_cast<int64_t>(messages_at)).name("channels").open('[');
+    for (const std::string& name : names_) json.value(name);
+    json.close(']').name("scenes").raw(json_scenes_).close('}');
+    std::string text;
+    for (const char c : json.text()) {    // nothing in it ends the element that it stands in
+      if (c == '<') {
+        text += "\\u003c";
+      } else {
+        text += c;
+      }
+    }
+    return text;
+  }
+
+  size_t save(const std::string& path, const std::string& head) const {
+    const auto close = [](std::FILE* file) { std::fclose(file); };
+    std::unique_ptr<std::FILE, decltype(close)> file(std::fopen(path.c_str(), "wb"), close);
+    size_t written = 0;
+    bool good = file != nullptr;
+    const auto put = [&](const void* data, size_t size) {
+      good = good && std::fwrite(data, 1, size, file.get()) == size;
+      written += size;
+    };
+    const auto text = [&](std::string_view words) { put(words.data(), words.size()); };
+    put(kShell, kShellSize);
+    text("<script type=\"application/json\" id=\"log\">");
+    text(head);
+    text("</script>\n<script type=\"text/plain\" id=\"bytes\">");
+    text(base64());
+    text("</script>\n</body>\n</html>\n");
+    if (!good || std::fflush(file.get()) != 0) throw EnvironmentError(path + " cannot be written: " + std::strerror(errno));
+    return written;
+  }
+
+  std::string base64() const {
+    constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    std::string text;
+    text.reserve(bytes_.size() / 3 * 4 + 4);
+    for (size_t i = 0; i < bytes_.size(); i += 3) {
+      const size_t count = std::min<size_t>(3, bytes_.size() - i);
+      uint32_t three = 0;
+      for (size_t k = 0; k < 3; ++k) three = three << 8 | (k < count ? bytes_[i + k] : 0u);
+      for (size_t k = 0; k < 4; ++k) text += k <= count ? kDigits[three >> (18 - 6 * k) & 63] : '=';
+    }
+    return text;
+  }
+
+  log::Index index_;
+  run::LogWorlds worlds_;
+  log::Reader reader_;
+  log::Event event_;
+  std::vector<const run::LogWorlds::Scene*> scenes_;
+  std::string json_scenes_, info_;
+  std::vector<std::string> names_;
+  std::vector<uint8_t> bytes_;
+};
+
+}  // namespace
+
+LogPage write_log_page(const std::string& log, const run::LoadRun& load, const std::string& path, size_t most_bytes) {
+  return Writer(log, load).write(log, path, most_bytes);
+}
+
+}  // namespace ruedo::console
