@@ -10,7 +10,9 @@
 #include <cstring>
 #include <fstream>
 
+#include "bus/unix_socket.h"
 #include "ruedo/client.h"
+#include "ruedo/errors.h"
 
 namespace ruedo::client {
 namespace {
@@ -31,6 +33,14 @@ bool can_connect(const std::string& host, const std::string& port, int type, std
   return connected;
 }
 
+bool is_unix_served(const std::string& path) {
+  try {
+    return bus::is_unix_served(path);
+  } catch (const EnvironmentError&) {    // no path of a socket
+    return false;
+  }
+}
+
 }  // namespace
 
 Address split(const std::string& url) {
@@ -38,6 +48,10 @@ Address split(const std::string& url) {
   const size_t scheme_end = url.find("://");
   if (scheme_end == std::string::npos) return address;
   address.scheme = url.substr(0, scheme_end);
+  if (address.scheme == "unix") {
+    address.host = url.substr(scheme_end + 3);
+    return address;
+  }
   const size_t options = url.find('?');
   if (options != std::string::npos) address.options = url.substr(options);
   const std::string network = url.substr(scheme_end + 3, options == std::string::npos ? options : options - scheme_end - 3);
@@ -65,12 +79,14 @@ bool has_multicast_route(const std::string& group) {
 
 bool is_served(const std::string& url) {
   const Address address = split(url);
+  if (address.scheme == "unix") return is_unix_served(address.host);
   std::string why;
   return address.scheme != "tcpq" || can_connect(address.host, address.port, SOCK_STREAM, why);
 }
 
 bool is_claimed(const std::string& url) {
   const Address address = split(url);
+  if (address.scheme == "unix") return is_unix_served(address.host);
   const std::string claim = " @ruedo/" + address.scheme + "/" + address.host + ":" + address.port;
   std::ifstream sockets("/proc/net/unix");
   for (std::string line; std::getline(sockets, line);) {
@@ -92,8 +108,12 @@ void check_reachable(const std::string& url) {
     throw NoServer("no Ruedo server at " + url + " (" + why + "). Is `ruedo run` started with this --lcm? `ruedo doctor` "
                    "looks for what is wrong");
   }
+  if (address.scheme == "unix") {
+    if (is_unix_served(address.host)) return;
+    throw NoServer("no Ruedo server at " + url + ". Is `ruedo run` started with this --lcm, by the same user?");
+  }
   if (address.scheme == "memq" || address.scheme == "file") return;
-  throw NoServer(url + ": not an LCM URL; udpm://GROUP:PORT?ttl=0 or tcpq://HOST:PORT is");
+  throw NoServer(url + ": not an LCM URL; udpm://GROUP:PORT?ttl=0, tcpq://HOST:PORT or unix:///PATH is");
 }
 
 }  // namespace ruedo::client

@@ -11,6 +11,7 @@
 
 #include "address.h"
 #include "ruedo/client.h"
+#include "unix_transport.h"
 
 namespace ruedo::client {
 namespace {
@@ -31,6 +32,7 @@ std::string escaped(const std::string& channel) {
 
 std::unique_ptr<Transport> open_transport(const std::string& url) {
   check_reachable(url);
+  if (const Address address = split(url); address.scheme == "unix") return std::make_unique<UnixTransport>(address.host);
   return std::make_unique<LcmTransport>(url);
 }
 

@@ -16,6 +16,10 @@ class Bus {
   // Safe from any thread. Never throws: a message that cannot be sent is counted.
   virtual void publish(const std::string& channel, const uint8_t* data, size_t size) = 0;
 
+  // What was published is on its way when this returns, at the latest. For whoever publishes much at once: a bus may send it
+  // as one piece. Any thread.
+  virtual void flush() {}
+
   // Called from the bus's own thread for every message on one of the channels given to listen(). The bytes are
   // as they came: nothing about them is checked.
   using Handler = std::function<void(const std::string& channel, const uint8_t* data, size_t size)>;

@@ -58,6 +58,11 @@ LcmBus::LcmBus(const std::string& url) : url_(parse_url(url)) {
   if (url_.scheme == "tcpq" && !is_served(url_, kConnectMs)) {
     throw EnvironmentError("nothing listens at " + url_.str() + ": start `ruedo run` with that --lcm first");
   }
+  if (url_.scheme == "unix") {
+    unix_ = std::make_unique<UnixConnection>(url_.host);
+    receive_buffer_ = SIZE_MAX;
+    return;
+  }
   receive_buffer_ = static_cast<size_t>(receive_buffer(url_));    // -1 becomes the largest
   out_ = std::make_unique<lcm::LCM>(url_.str());
   if (!out_->good()) throw EnvironmentError("LCM cannot open '" + url_.str() + "': run `ruedo doctor`");
@@ -80,7 +85,8 @@ void LcmBus::publish(const std::string& channel, const uint8_t* data, size_t siz
                  "--lcm tcpq://127.0.0.1:7700, or run: sudo sysctl -w net.core.rmem_max=2097152, with recv_buf_size=2097152 in the URL",
                  size, channel, receive_buffer_);
   }
-  if (out_->publish(channel, data, static_cast<unsigned>(size)) != 0) ++failed_;
+  const bool sent = unix_ ? unix_->publish(channel, data, size) : out_->publish(channel, data, static_cast<unsigned>(size)) == 0;
+  if (!sent) ++failed_;
 }
 
 void LcmBus::listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>&) {
@@ -106,7 +112,7 @@ void LcmBus::take_up() {
   std::lock_guard lock(mutex_);
   if (!waits_) return;
   know(wanted_);
-  if (in_) subscribe_missing();
+  if (in_ || unix_) subscribe_missing();
   waits_ = false;
   taken_up_.notify_all();
 }
@@ -114,6 +120,7 @@ void LcmBus::take_up() {
 void LcmBus::know(const std::vector<std::string>& channels) { channels_ = {channels.begin(), channels.end()}; }
 
 void LcmBus::open() {
+  if (unix_) return subscribe_missing();
   if (url_.scheme == "udpm") {
     try {
       multicast_ = std::make_unique<MulticastReceiver>(url_.host, url_.port, std::atoi(url_.option("recv_buf_size", "0").c_str()));
@@ -153,6 +160,12 @@ void LcmBus::ignore_own() {
 }
 
 void LcmBus::subscribe_missing() {
+  if (unix_) {
+    for (const std::string& channel : channels_) {
+      if (subscribed_.insert(channel).second) unix_->subscribe(channel);
+    }
+    return;
+  }
   // A slow reader is none of ours: the handler only checks and stores. Room for a burst from every robot.
   const int queue_size = static_cast<int>(std::clamp<size_t>(4 * channels_.size(), 64, 65536));
   for (const std::string& pattern : channel_patterns({channels_.begin(), channels_.end()})) {
@@ -167,7 +180,7 @@ void LcmBus::read() {
   bool lost = false;    // tcpq: the server
   auto pause = kFirstPause;
   for (;;) {
-    const int file = multicast_ ? multicast_->file() : in_->getFileno();    // another one for each connection
+    const int file = unix_ ? unix_->file() : multicast_ ? multicast_->file() : in_->getFileno();    // another one for each connection
     pollfd waiting[2] = {{lost ? -1 : file, POLLIN, 0}, {stop_event_, POLLIN, 0}};
     if (::poll(waiting, 2, lost ? static_cast<int>(pause.count()) : -1) < 0) continue;    // a signal
     if (waiting[1].revents != 0) {
@@ -181,12 +194,17 @@ void LcmBus::read() {
     lost = !handle();
     if (!lost) pause = kFirstPause;
     else if (was_lost) pause = std::min(2 * pause, kLongestPause);
-    else spdlog::warn("{}: the server has closed the connection; it is looked for again", url_.str());
+    else spdlog::warn("{}: the server has closed the connection{}", url_.str(), unix_ ? "" : "; it is looked for again");
   }
 }
 
-// False when the connection was lost: LCM connects again when it is next asked for a message.
+// False when the connection was lost: LCM connects again when it is next asked for a message. A unix one is not made anew: what
+// was lost meanwhile would not be known.
 bool LcmBus::handle() {
+  if (unix_) {
+    unix_->take(0, [this](std::string_view channel, const uint8_t* data, size_t size) { deliver(channel, data, size); });
+    return !unix_->is_over();
+  }
   if (!multicast_) {
     const bool at_end = is_at_end(in_->getFileno());
     if (in_->handle() == 0) return !at_end;

@@ -2,7 +2,7 @@
 //
 // An LCM instance that only sends (it never subscribes, so LCM gives it no thread), and for multicast a receiver of our own:
 // a message takes one thread from the network to the handler, not two, and what we send ourselves wakes nobody. With tcpq
-// another LCM instance listens, with memq the same one.
+// another LCM instance listens, with memq the same one. A unix address is a connection of our own.
 #pragma once
 
 #include <atomic>
@@ -19,6 +19,7 @@
 
 #include "bus/lcm_url.h"
 #include "bus/multicast_receiver.h"
+#include "bus/unix_connection.h"
 #include "ruedo/bus.h"
 
 namespace ruedo::bus {
@@ -54,6 +55,7 @@ class LcmBus : public Bus {
   std::unique_ptr<lcm::LCM> out_;
   std::shared_ptr<lcm::LCM> in_;             // with memq and tcpq
   std::unique_ptr<MulticastReceiver> multicast_;
+  std::unique_ptr<UnixConnection> unix_;
   size_t receive_buffer_;                    // of clients with this address
   std::atomic<bool> told_large_{false};      // that a message is larger
   Handler handler_;

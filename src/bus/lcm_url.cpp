@@ -15,6 +15,7 @@
 #include <sys/socket.h>
 
 #include "bus/file_handle.h"
+#include "bus/unix_socket.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::bus {
@@ -43,7 +44,7 @@ std::string resolved(const std::string& host) {
 }
 
 [[noreturn]] void refuse(const std::string& text, const std::string& why) {
-  throw InputError({}, "--lcm '" + text + "': " + why + "; an address looks like " + kDefaultUrl + " or tcpq://127.0.0.1:7700");
+  throw InputError({}, "--lcm '" + text + "': " + why + "; an address looks like " + kDefaultUrl + ", tcpq://127.0.0.1:7700 or unix:///tmp/ruedo.sock");
 }
 
 }  // namespace
@@ -74,8 +75,15 @@ LcmUrl parse_url(const std::string& text) {
   const size_t scheme_end = text.find("://");
   if (scheme_end == std::string::npos) refuse(text, "it has no scheme");
   url.scheme = text.substr(0, scheme_end);
-  if (url.scheme != "udpm" && url.scheme != "tcpq" && url.scheme != "memq") refuse(text, "the schemes udpm, tcpq and memq are supported");
+  if (url.scheme != "udpm" && url.scheme != "tcpq" && url.scheme != "memq" && url.scheme != "unix") {
+    refuse(text, "the schemes udpm, tcpq, unix and memq are supported");
+  }
   std::string rest = text.substr(scheme_end + 3);
+  if (url.scheme == "unix") {
+    if (rest.empty() || rest[0] != '/') refuse(text, "'" + rest + "' is no absolute path");
+    url.host = rest;
+    return url;
+  }
   if (const size_t question = rest.find('?'); question != std::string::npos) {
     url.options = rest.substr(question + 1);
     rest.resize(question);
@@ -117,6 +125,7 @@ void check_route(const LcmUrl& url) {
 }
 
 bool is_served(const LcmUrl& url, int timeout_ms) {
+  if (url.scheme == "unix") return is_unix_served(url.host);
   const FileHandle socket(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const sockaddr_in address = address_of(url);
   if (::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) return true;

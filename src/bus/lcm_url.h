@@ -10,8 +10,8 @@ inline constexpr const char* kDefaultUrl = "udpm://239.255.76.67:7667?ttl=0";
 inline constexpr uint16_t kDefaultTcpPort = 7700;    // LCM's
 
 struct LcmUrl {
-  std::string scheme;              // "udpm", "memq", "tcpq", ...
-  std::string host;                // udpm: the multicast group; tcpq: an IPv4 address
+  std::string scheme;              // "udpm", "memq", "tcpq"; "unix", which is no address of LCM's
+  std::string host;                // udpm: the multicast group; tcpq: an IPv4 address; unix: the socket's path
   uint16_t port = 0;
   std::string options;             // "ttl=0&recv_buf_size=2097152"
 

@@ -22,6 +22,7 @@ class RivalWatch : public Bus {
   void publish(const std::string& channel, const uint8_t* data, size_t size) override;
   void listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own = {}) override;
   void listen_to(const std::vector<std::string>& channels, const std::vector<std::string>& own = {}) override;
+  void flush() override { bus_->flush(); }
   void stop() override { bus_->stop(); }
   uint64_t failed() const override { return bus_->failed(); }
 

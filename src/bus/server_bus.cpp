@@ -8,6 +8,7 @@
 
 #include "bus/lcm_bus.h"
 #include "bus/tcpq_server.h"
+#include "bus/unix_server.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::bus {
@@ -83,6 +84,8 @@ ServerBus open_server_bus(const std::string& text, const std::string& world) {
   made.claim = std::make_unique<UrlClaim>(made.url, line_about(world));
   if (made.url.scheme == "tcpq") {
     made.bus = std::make_unique<TcpqServer>(made.url);
+  } else if (made.url.scheme == "unix") {
+    made.bus = std::make_unique<UnixServer>(made.url);
   } else {
     made.bus = std::make_unique<LcmBus>(made.url.str());
   }

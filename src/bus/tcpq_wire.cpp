@@ -23,6 +23,32 @@ std::vector<uint8_t> server_hello() {
   return bytes;
 }
 
+std::vector<uint8_t> client_hello() {
+  std::vector<uint8_t> bytes;
+  append_number(bytes, kClientMagic);
+  append_number(bytes, kVersion);
+  return bytes;
+}
+
+namespace {
+
+// The name is quoted as a pattern.
+void append_pattern(std::vector<uint8_t>& out, uint32_t kind, std::string_view name) {
+  std::string pattern;
+  for (const char c : name) {
+    if (std::string_view(".^$*+?{}[]\\|()").find(c) != std::string_view::npos) pattern += '\\';
+    pattern += c;
+  }
+  append_number(out, kind);
+  append_number(out, static_cast<uint32_t>(pattern.size()));
+  for (const char c : pattern) out.push_back(static_cast<uint8_t>(c));
+}
+
+}  // namespace
+
+void append_subscribe(std::vector<uint8_t>& out, std::string_view name) { append_pattern(out, kSubscribe, name); }
+void append_unsubscribe(std::vector<uint8_t>& out, std::string_view name) { append_pattern(out, kUnsubscribe, name); }
+
 void append_publish(std::vector<uint8_t>& out, std::string_view channel, std::span<const uint8_t> data) {
   append_number(out, kPublish);
   append_number(out, static_cast<uint32_t>(channel.size()));

@@ -20,9 +20,12 @@ inline constexpr size_t kLongestChannel = 63;              // LCM's
 inline constexpr size_t kLongestPattern = 64 * 1024;
 inline constexpr size_t kLargestMessage = 4 * 1024 * 1024; // from a client
 
-// What the server says first.
+// What each side says first.
 std::vector<uint8_t> server_hello();
-// Appends a PUBLISH frame.
+std::vector<uint8_t> client_hello();
+// Append a PUBLISH, or a SUBSCRIBE or UNSUBSCRIBE with a channel's name.
+void append_subscribe(std::vector<uint8_t>& out, std::string_view name);
+void append_unsubscribe(std::vector<uint8_t>& out, std::string_view name);
 void append_publish(std::vector<uint8_t>& out, std::string_view channel, std::span<const uint8_t> data);
 
 struct Frame {

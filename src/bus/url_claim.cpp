@@ -10,6 +10,7 @@
 #include <sys/socket.h>
 #include <sys/un.h>
 
+#include "bus/unix_socket.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::bus {
@@ -38,7 +39,7 @@ FileHandle local_socket(int more) { return FileHandle(::socket(AF_UNIX, SOCK_STR
 }  // namespace
 
 UrlClaim::UrlClaim(const LcmUrl& url, std::string owner) : owner_(std::move(owner)) {
-  if (url.scheme == "memq") return;
+  if (url.scheme == "memq" || url.scheme == "unix") return;    // a socket is its own claim
   const Name name = name_of(url);
   socket_ = local_socket(SOCK_NONBLOCK);
   if (::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&name.address), name.size) != 0 || ::listen(socket_.get(), 16) != 0) {
@@ -80,6 +81,7 @@ void UrlClaim::answer() {
 
 std::string claimed_by(const LcmUrl& url) {
   if (url.scheme == "memq") return "";
+  if (url.scheme == "unix") return is_unix_served(url.host) ? "one that does not say who it is" : "";
   const Name name = name_of(url);
   const FileHandle socket = local_socket(SOCK_NONBLOCK);
   if (::connect(socket.get(), reinterpret_cast<const sockaddr*>(&name.address), name.size) != 0) {

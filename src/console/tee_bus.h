@@ -37,6 +37,7 @@ class TeeBus : public Bus {
   void publish(const std::string& channel, const uint8_t* data, size_t size) override;
   void listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own = {}) override;
   void listen_to(const std::vector<std::string>& channels, const std::vector<std::string>& own = {}) override;
+  void flush() override { inner_.flush(); }
   void stop() override;
   uint64_t failed() const override { return inner_.failed(); }
 

@@ -158,6 +158,7 @@ void Server::run() {
       if (!replay_) control_.published(status_.step);
       control_.serve();
       spawn_ready();
+      bus_.flush();
       if (stop_) simulation_->leave_off();
       if (lockstep_ && !lockstep_->full()) simulation_->go();
     }
@@ -174,6 +175,7 @@ void Server::run() {
     deadline = std::min(deadline, std::max(last_info_, last_tick_) + kPausedInfoPeriod);
     if (lockstep_) deadline = std::min(deadline, lockstep_->next_check());
     if (wait_for_ && !replay_) tell_wait();
+    bus_.flush();
     const bool woken = wakeup_.wait_until(deadline);
     if (!woken && Clock::now() >= next_status) {
       status_.paused = pacer_->paused();
@@ -195,6 +197,7 @@ void Server::check_leases() {
 void Server::drain() {
   lockstep_->end();
   while (!stop_ && !lockstep_->drained(control_.sessions().list(), Clock::now())) {
+    bus_.flush();
     wakeup_.wait_until(Clock::now() + kDrainPeriod);
     control_.serve();
   }

@@ -9,6 +9,7 @@ import os
 import socket
 from urllib.parse import urlsplit
 
+from . import unix_transport
 from .errors import NoServer
 
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0"
@@ -46,13 +47,21 @@ def check_reachable(url: str) -> None:
         except OSError as error:
             raise NoServer(f"no Ruedo server at {url} ({error.strerror or error}). Is `ruedo run` started with this "
                            "--lcm? `ruedo doctor` looks for what is wrong") from None
+    elif parts.scheme == "unix":
+        try:
+            unix_transport.connect(parts.path).close()
+        except OSError as error:
+            raise NoServer(f"no Ruedo server at {url} ({error.strerror or error}). Is `ruedo run` started with this --lcm, "
+                           "by the same user?") from None
     elif parts.scheme not in ("memq", "file"):
-        raise NoServer(f"{url}: not an LCM URL; udpm://GROUP:PORT?ttl=0 or tcpq://HOST:PORT is")
+        raise NoServer(f"{url}: not an LCM URL; udpm://GROUP:PORT?ttl=0, tcpq://HOST:PORT or unix:///PATH is")
 
 
 def is_claimed(url: str) -> bool:
     """Whether a server on this machine has the address: its claim goes with its process."""
     parts = urlsplit(url)
+    if parts.scheme == "unix":
+        return unix_transport.is_served(parts.path)
     host, port = (parts.hostname, parts.port) if parts.hostname else ("239.255.76.67", 7667) if parts.scheme == "udpm" else ("127.0.0.1", 7700)
     try:
         with open("/proc/net/unix", encoding="ascii", errors="replace") as sockets:

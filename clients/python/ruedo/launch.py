@@ -22,6 +22,7 @@ from typing import IO, Any, Literal, Mapping, Sequence
 from .address import has_multicast_route
 from .errors import LaunchError, NoServer
 from .simulation import Simulation
+from .unix_transport import is_served
 from .world import World
 
 
@@ -52,8 +53,8 @@ def launch(world: str | os.PathLike[str] | World | None = None, *, seed: int | N
     world: a file, the name of one that comes with Ruedo or lies in a folder of RUEDO_PATH ("arena"), or a World; text: the world's SDF or URDF itself instead.
     rate: sim time per real time, "max" or math.inf: as fast as it goes; None: real time. lockstep: how many clients
     the run waits for (True: for this one). spawn: models as "p3at@0,0" or "p3at:NAME@X,Y,YAW". disable: devices that are left out,
-    "p3at/camera". set: {"p3at/lrf.rate": 20}. noise: False gives ideal values. args: further options of `ruedo run`. url: None takes a free port of this
-    machine. name: of this client. timeout: s of real time until the world is loaded. verbose: show what the server prints (else
+    "p3at/camera". set: {"p3at/lrf.rate": 20}. noise: False gives ideal values. args: further options of `ruedo run`. url: None takes a local
+    socket, which no other user of the machine reads, and plain LCM programs do not know; "auto" a free port for LCM. name: of this client. timeout: s of real time until the world is loaded. verbose: show what the server prints (else
     it is shown in the errors alone). Raises LaunchError with what the server said.
     """
     options = _options(seed, rate, args, lockstep, spawn, disable, set, noise)
@@ -70,9 +71,12 @@ def launch(world: str | os.PathLike[str] | World | None = None, *, seed: int | N
     else:
         assert world is not None and not isinstance(world, World)
         file = os.fspath(world)
-    token = None
-    if url is None:
+    token: socket.socket | _Folder | None = None
+    if url == "auto":
         token, url = _free_url()
+    elif url is None:
+        token = _Folder()
+        url = f"unix://{token.path}/bus"
     server = _Server([program, "run", file, "--lcm", url, "--watch-stdin", *options], token, verbose, folder)
     try:
         until = time.monotonic() + timeout
@@ -112,6 +116,18 @@ def _options(seed: int | None, rate: float | str | None, args: Sequence[str], lo
     return options + list(args)
 
 
+class _Folder:
+    """Of this user's alone, for the socket."""
+
+    def __init__(self) -> None:
+        runtime = os.environ.get("XDG_RUNTIME_DIR", "")
+        usable = 0 < len(runtime) < 60 and os.access(runtime, os.W_OK | os.X_OK)    # a socket's path has 107 bytes at most
+        self.path = tempfile.mkdtemp(prefix="ruedo-", dir=runtime if usable else "/tmp")
+
+    def close(self) -> None:
+        shutil.rmtree(self.path, ignore_errors=True)
+
+
 def _free_url() -> tuple[socket.socket, str]:
     """A URL that nothing else uses. The TCP socket on the same port, kept open, is the token by which launches of
     any process, in any language, stay apart from each other."""
@@ -146,7 +162,7 @@ def _say_once(line: str) -> None:
 class _Server:
     """The server process."""
 
-    def __init__(self, command: list[str], token: socket.socket | None, verbose: bool, folder: Any = None):
+    def __init__(self, command: list[str], token: socket.socket | _Folder | None, verbose: bool, folder: Any = None):
         self._command = command
         self._folder = folder    # of the world's file, when it is ours
         self._token = token
@@ -167,11 +183,16 @@ class _Server:
         return f"the server ended ({how}): {self._last_lines() or 'it said nothing'}\n(`{' '.join(self._command)}`)"
 
     def await_port(self, url: str, until: float) -> None:
-        """Waits for a tcpq server to listen; one that does not until then is the connection's affair."""
+        """Waits for a tcpq or unix server to listen; one that does not until then is the connection's affair."""
         parts = urlsplit(url)
-        if parts.scheme != "tcpq":
+        if parts.scheme not in ("tcpq", "unix"):
             return
         while time.monotonic() < until and self._process.poll() is None:
+            if parts.scheme == "unix":
+                if is_served(parts.path):
+                    return
+                time.sleep(0.005)
+                continue
             try:
                 socket.create_connection((parts.hostname or "127.0.0.1", parts.port or 7700), 1.0).close()
                 return

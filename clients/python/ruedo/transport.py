@@ -7,13 +7,13 @@ import select
 import threading
 import time
 from contextlib import nullcontext
-from typing import Any, Callable, ContextManager, Protocol
+from typing import Any, ContextManager, Protocol
+from urllib.parse import urlsplit
 
 import lcm
 
 from .address import check_reachable
-
-Receiver = Callable[[str, bytes], None]    # channel, message
+from .unix_transport import Receiver, UnixTransport
 
 
 class Transport(Protocol):
@@ -36,7 +36,8 @@ class Transport(Protocol):
 def open_transport(url: str) -> Transport:
     """Raises NoServer, with the cure, when nothing can come from that URL."""
     check_reachable(url)
-    return LcmTransport(url)
+    parts = urlsplit(url)
+    return UnixTransport(parts.path) if parts.scheme == "unix" else LcmTransport(url)
 
 
 class LcmTransport:

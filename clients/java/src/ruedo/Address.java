@@ -3,7 +3,6 @@ package ruedo;
 import java.io.IOException;
 import java.net.InetAddress;
 import java.net.InetSocketAddress;
-import java.net.Socket;
 import java.net.StandardProtocolFamily;
 import java.net.URI;
 import java.net.URISyntaxException;
@@ -12,7 +11,7 @@ import java.nio.charset.StandardCharsets;
 import java.nio.file.Files;
 import java.nio.file.Path;
 
-/** An LCM URL: udpm://GROUP:PORT?ttl=0 or tcpq://HOST:PORT. */
+/** An LCM URL: udpm://GROUP:PORT?ttl=0 or tcpq://HOST:PORT; or unix:///PATH, a local socket, which is none of LCM's. */
 final class Address {
     static final String DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0";
 
@@ -23,6 +22,7 @@ final class Address {
     final boolean multicast;
     final String host;
     final int port;
+    final String path;    // of a local socket; else null
     private final String options;
 
     /** Throws NoServer for what is no such URL. */
@@ -37,6 +37,14 @@ final class Address {
             throw notOne();
         }
         multicast = "udpm".equals(uri.getScheme());
+        if ("unix".equals(uri.getScheme())) {
+            path = url.substring("unix://".length());
+            if (!path.startsWith("/")) throw notOne();
+            host = options = "";
+            port = 0;
+            return;
+        }
+        path = null;
         boolean bare = uri.getAuthority() == null || uri.getAuthority().isEmpty();
         if ((!multicast && !"tcpq".equals(uri.getScheme())) || (!bare && uri.getHost() == null)) throw notOne();
         host = bare ? multicast ? "239.255.76.67" : "127.0.0.1" : uri.getHost();
@@ -46,7 +54,7 @@ final class Address {
     }
 
     private RuedoException.NoServer notOne() {
-        return new RuedoException.NoServer(url + ": not an LCM URL; udpm://GROUP:PORT?ttl=0 or tcpq://HOST:PORT is");
+        return new RuedoException.NoServer(url + ": not an LCM URL; udpm://GROUP:PORT?ttl=0, tcpq://HOST:PORT or unix:///PATH is");
     }
 
     /** The number that the URL gives as an option. */
@@ -81,6 +89,7 @@ final class Address {
 
     /** Whether a server on this machine has the address: its claim goes with its process. */
     boolean isClaimed() {
+        if (path != null) return isServed();
         String claim = " @ruedo/" + (multicast ? "udpm" : "tcpq") + "/" + host + ":" + port;
         try (java.util.stream.Stream<String> sockets = Files.lines(Path.of("/proc/net/unix"), StandardCharsets.ISO_8859_1)) {
             return sockets.anyMatch(line -> line.endsWith(claim));
@@ -105,12 +114,10 @@ final class Address {
     }
 
     private void probe() throws IOException {
-        try (Socket probe = new Socket()) {
-            probe.connect(new InetSocketAddress(host, port), 2000);
-        }
+        Link.to(this).close();
     }
 
-    /** False for a tcpq address where nobody listens. */
+    /** False for a tcpq or unix address where nobody listens. */
     boolean isServed() {
         if (multicast) return true;
         try {

@@ -3,15 +3,13 @@ package ruedo;
 import java.io.BufferedInputStream;
 import java.io.DataInputStream;
 import java.io.IOException;
-import java.net.InetSocketAddress;
-import java.net.Socket;
 import java.nio.ByteBuffer;
 import java.nio.charset.StandardCharsets;
 import java.util.LinkedHashSet;
 import java.util.Set;
 
 /**
- * LCM over TCP, connected again when the server comes back. LCM's own class for it is not used: it walks through its
+ * LCM over TCP, or a Unix-domain socket with the same frames, connected again when the server comes back. LCM's own class for it is not used: it walks through its
  * subscriptions while others add to them, and its thread ends by that, or by an Error in a callback.
  */
 final class TcpqTransport implements Transport {
@@ -27,7 +25,7 @@ final class TcpqTransport implements Transport {
 
     private final Address address;
     private final Set<String> subscriptions = new LinkedHashSet<>();    // these under this object's monitor
-    private Socket socket;    // null: not connected
+    private Link link;    // null: not connected
     private volatile boolean closed;
 
     TcpqTransport(Address address) {
@@ -80,9 +78,9 @@ final class TcpqTransport implements Transport {
     }
 
     private synchronized void send(ByteBuffer bytes) {
-        if (socket == null) return;
+        if (link == null) return;
         try {
-            socket.getOutputStream().write(bytes.array(), 0, bytes.position());
+            link.write(bytes.array(), bytes.position());
         } catch (IOException error) {
             drop();
         }
@@ -90,34 +88,32 @@ final class TcpqTransport implements Transport {
 
     private synchronized void drop() {
         try {
-            if (socket != null) socket.close();    // a read under way ends
+            if (link != null) link.close();    // a read under way ends
         } catch (IOException error) {
             // it is gone
         }
-        socket = null;
+        link = null;
     }
 
     private synchronized void connect() throws IOException {
-        Socket made = new Socket();
+        Link made = Link.to(address);
         try {
-            made.connect(new InetSocketAddress(address.host, address.port), 2000);
-            made.setTcpNoDelay(true);
-            made.setSoTimeout(2000);
-            made.getOutputStream().write(ByteBuffer.allocate(8).putInt(CLIENT).putInt(VERSION).array());
-            ByteBuffer hello = ByteBuffer.wrap(made.getInputStream().readNBytes(8));
+            made.setTimeout(2000);
+            made.write(ByteBuffer.allocate(8).putInt(CLIENT).putInt(VERSION).array(), 8);
+            ByteBuffer hello = ByteBuffer.wrap(made.input().readNBytes(8));
             if (hello.remaining() < 8 || hello.getInt() != SERVER) throw new IOException("no LCM server answers there");
-            made.setSoTimeout(0);
+            made.setTimeout(0);
         } catch (IOException error) {
             made.close();
             throw error;
         }
-        socket = made;
+        link = made;
         for (String channel : subscriptions) send(named(SUBSCRIBE, pattern(channel), 0));
     }
 
     /** The connection that there is, made again if need be; null: none can be had now, or this is closed. */
     private synchronized DataInputStream input() throws IOException {
-        if (socket == null && !closed) {
+        if (link == null && !closed) {
             try {
                 connect();
             } catch (IOException error) {
@@ -128,7 +124,7 @@ final class TcpqTransport implements Transport {
                 }
             }
         }
-        return socket == null ? null : new DataInputStream(new BufferedInputStream(socket.getInputStream(), 1 << 16));
+        return link == null ? null : new DataInputStream(new BufferedInputStream(link.input(), 1 << 16));
     }
 
     private void run(Receiver receiver) {

@@ -1,0 +1,90 @@
+#include "bus/unix_connection.h"
+
+#include <cerrno>
+#include <cstring>
+
+#include <poll.h>
+#include <sys/socket.h>
+
+#include "bus/tcpq_wire.h"
+#include "bus/unix_socket.h"
+
+namespace ruedo::bus {
+namespace {
+
+constexpr size_t kRoom = size_t{256} << 10;        // bytes received at a time
+constexpr size_t kLargest = size_t{64} << 20;      // a frame: the server is trusted no further
+
+uint32_t number(const uint8_t* b) { return uint32_t{b[0]} << 24 | uint32_t{b[1]} << 16 | uint32_t{b[2]} << 8 | b[3]; }
+
+}  // namespace
+
+UnixConnection::UnixConnection(const std::string& path) : socket_(connect_unix(path)) {
+  send(tcpq::client_hello());
+  buffer_.resize(kRoom);
+}
+
+bool UnixConnection::send(const std::vector<uint8_t>& bytes) {
+  for (size_t sent = 0; sent < bytes.size();) {
+    const ssize_t count = ::send(socket_.get(), &bytes[sent], bytes.size() - sent, MSG_NOSIGNAL);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return false;
+    sent += static_cast<size_t>(count);
+  }
+  return true;
+}
+
+bool UnixConnection::publish(std::string_view channel, const uint8_t* data, size_t size) {
+  const std::lock_guard lock(sending_);
+  frame_.clear();
+  tcpq::append_publish(frame_, channel, {data, size});
+  return send(frame_);
+}
+
+bool UnixConnection::subscribe(std::string_view name) {
+  const std::lock_guard lock(sending_);
+  frame_.clear();
+  tcpq::append_subscribe(frame_, name);
+  return send(frame_);
+}
+
+bool UnixConnection::unsubscribe(std::string_view name) {
+  const std::lock_guard lock(sending_);
+  frame_.clear();
+  tcpq::append_unsubscribe(frame_, name);
+  return send(frame_);
+}
+
+bool UnixConnection::take(int timeout_ms, const Handler& handler) {
+  if (over_) return false;
+  pollfd waiting{socket_.get(), POLLIN, 0};
+  if (timeout_ms != 0 && ::poll(&waiting, 1, timeout_ms) <= 0) return false;
+  if (begin_ > 0) {
+    std::memmove(buffer_.data(), &buffer_[begin_], end_ - begin_);
+    end_ -= begin_;
+    begin_ = 0;
+  }
+  if (buffer_.size() - end_ < kRoom / 2) buffer_.resize(2 * buffer_.size());
+  const ssize_t count = ::recv(socket_.get(), &buffer_[end_], buffer_.size() - end_, MSG_DONTWAIT);
+  if (count < 0 && (errno == EAGAIN || errno == EINTR)) return false;
+  over_ = count <= 0;
+  if (over_) return false;
+  end_ += static_cast<size_t>(count);
+  bool any = false;
+  if (!greeted_ && end_ >= 8) greeted_ = true, begin_ = 8;
+  while (greeted_ && end_ - begin_ >= 12) {
+    const uint8_t* frame = &buffer_[begin_];
+    const size_t name = number(frame + 4);
+    if (name > tcpq::kLongestChannel) return over_ = true, false;
+    if (end_ - begin_ < 12 + name) break;
+    const size_t size = number(frame + 8 + name);
+    if (size > kLargest) return over_ = true, false;
+    if (end_ - begin_ < 12 + name + size) break;
+    begin_ += 12 + name + size;
+    handler({reinterpret_cast<const char*>(frame + 8), name}, frame + 12 + name, size);
+    any = true;
+  }
+  return any;
+}
+
+}  // namespace ruedo::bus

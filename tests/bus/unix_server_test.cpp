@@ -1,0 +1,215 @@
+// The Unix-domain socket: whose it is, that nothing is lost, and clients that mean harm.
+#include "bus/unix_server.h"
+
+#include <condition_variable>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "bus/unix_connection.h"
+#include "bus/unix_socket.h"
+#include "ruedo/errors.h"
+
+namespace fs = std::filesystem;
+
+namespace ruedo::bus {
+namespace {
+
+struct Folder {
+  fs::path path;
+  Folder() {
+    std::string name = (fs::temp_directory_path() / "ruedo-unix-XXXXXX").string();
+    path = ::mkdtemp(name.data());
+  }
+  ~Folder() { fs::remove_all(path); }
+  LcmUrl url(const std::string& name = "bus.sock") const { return {"unix", (path / name).string(), 0, ""}; }
+};
+
+// A server that keeps what it hears on "in".
+struct Served {
+  Folder folder;
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<std::string> heard;
+  UnixServer server{folder.url()};
+  Served() {
+    server.listen({"in"}, [this](const std::string&, const uint8_t* data, size_t size) {
+      const std::lock_guard lock(mutex);
+      heard.emplace_back(data, data + size);
+      changed.notify_all();
+    });
+  }
+  void publish(const std::string& channel, const std::string& text) {
+    server.publish(channel, reinterpret_cast<const uint8_t*>(text.data()), text.size());
+  }
+  void wait_until_heard(size_t count) {
+    std::unique_lock lock(mutex);
+    changed.wait(lock, [&] { return heard.size() >= count; });
+  }
+};
+
+struct Client {
+  UnixConnection connection;
+  std::vector<std::pair<std::string, std::string>> came;
+  // Subscribed when the server has taken what follows the subscription.
+  Client(Served& served, const std::vector<std::string>& channels) : connection(served.folder.url().host) {
+    size_t before = 0;
+    {
+      const std::lock_guard lock(served.mutex);
+      before = served.heard.size();
+    }
+    for (const std::string& channel : channels) connection.subscribe(channel);
+    say("in", "subscribed");
+    served.wait_until_heard(before + 1);
+  }
+  void say(const std::string& channel, const std::string& text) {
+    EXPECT_TRUE(connection.publish(channel, reinterpret_cast<const uint8_t*>(text.data()), text.size()));
+  }
+  bool take(int timeout_ms = -1) {
+    return connection.take(timeout_ms, [this](std::string_view channel, const uint8_t* data, size_t size) {
+      came.emplace_back(channel, std::string(data, data + size));
+    });
+  }
+  void take_until(size_t count) {
+    while (came.size() < count && !connection.is_over()) take();
+  }
+};
+
+using Messages = std::vector<std::pair<std::string, std::string>>;
+
+TEST(UnixServer, BothWaysInOrder) {
+  Served served;
+  Client one(served, {"a", "b"}), other(served, {"b"});
+  served.publish("a", "1");
+  served.publish("c", "nobody's");
+  served.publish("b", "2");
+  served.publish("a", "3");
+  served.server.flush();
+  one.take_until(3);
+  EXPECT_EQ(one.came, (Messages{{"a", "1"}, {"b", "2"}, {"a", "3"}}));
+  other.take_until(1);
+  EXPECT_EQ(other.came, (Messages{{"b", "2"}}));
+  one.say("in", "x");
+  one.say("b", "to the other");    // as on any LCM bus
+  served.wait_until_heard(3);
+  EXPECT_EQ(served.heard.back(), "x");
+  other.take_until(2);
+  EXPECT_EQ(other.came.back(), (std::pair<std::string, std::string>{"b", "to the other"}));
+}
+
+TEST(UnixServer, IsTheUsersOwn) {
+  Served served;
+  struct stat status{};
+  ASSERT_EQ(::stat(served.folder.url().host.c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 07777, 0600u);
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can be somebody else";
+  fs::permissions(served.folder.path, fs::perms::all);                // and even who could open it
+  ASSERT_EQ(::chmod(served.folder.url().host.c_str(), 0666), 0);
+  const pid_t stranger = ::fork();
+  if (stranger == 0) {
+    if (::setgid(65534) != 0 || ::setuid(65534) != 0) ::_exit(9);
+    const int socket = ::socket(AF_UNIX, SOCK_STREAM, 0);
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    const std::string path = served.folder.url().host;
+    path.copy(address.sun_path, sizeof address.sun_path - 1);
+    if (::connect(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) ::_exit(8);
+    char byte;
+    ::_exit(::recv(socket, &byte, 1, 0) == 0 ? 1 : 2);                // it is closed at once
+  }
+  int ended = 0;
+  ::waitpid(stranger, &ended, 0);
+  EXPECT_EQ(WEXITSTATUS(ended), 1);
+  EXPECT_EQ(served.server.refused(), 1u);
+}
+
+TEST(UnixServer, NothingIsLostThatASlowClientTakesLater) {
+  Served served;
+  Client slow(served, {"bulk"});
+  const std::string block(60'000, 'x');
+  for (int i = 0; i < 500; ++i) {    // 30 MB: more than any socket's buffer
+    served.publish("bulk", std::to_string(i) + block);
+    if (i % 10 == 0) served.server.flush();
+  }
+  served.server.flush();
+  EXPECT_EQ(served.server.failed(), 0u);
+  slow.take_until(500);
+  ASSERT_EQ(slow.came.size(), 500u);
+  for (int i = 0; i < 500; ++i) ASSERT_EQ(slow.came[static_cast<size_t>(i)].second, std::to_string(i) + block) << i;
+}
+
+TEST(UnixServer, WhoTakesNothingHasABound) {
+  Served served;
+  Client never(served, {"bulk"}), quick(served, {"out"});
+  const std::string block(1 << 20, 'x');
+  for (size_t i = 0; i < UnixServer::kMostBehind / block.size() + 5; ++i) {
+    served.publish("bulk", block);
+    served.server.flush();
+  }
+  EXPECT_GT(served.server.failed(), 0u);
+  served.publish("out", "1");
+  served.server.flush();
+  quick.take_until(1);
+  EXPECT_EQ(quick.came.size(), 1u);
+}
+
+TEST(UnixServer, WhatWasPublishedLastComes) {
+  auto served = std::make_unique<Served>();
+  Client client(*served, {"out"});
+  for (int i = 0; i < 1000; ++i) served->publish("out", "12");
+  served->server.stop();
+  client.take_until(1000);
+  EXPECT_EQ(client.came.size(), 1000u);
+  while (client.take()) {
+  }
+  EXPECT_TRUE(client.connection.is_over());
+}
+
+TEST(UnixServer, PathsAreClaimedAndCleared) {
+  const Folder folder;
+  {
+    UnixServer first(folder.url());
+    EXPECT_THROW(UnixServer{folder.url()}, EnvironmentError);
+  }
+  EXPECT_FALSE(fs::exists(folder.url().host));
+  { const FileHandle left = listen_unix(folder.url().host); }    // a server that was killed
+  EXPECT_TRUE(fs::exists(folder.url().host));
+  EXPECT_NO_THROW(UnixServer{folder.url()});
+  std::ofstream(folder.url("file").host) << "not a socket";
+  EXPECT_THROW(UnixServer{folder.url("file")}, EnvironmentError);
+  EXPECT_TRUE(fs::exists(folder.url("file").host));
+  EXPECT_THROW(UnixServer{folder.url("no/folder")}, EnvironmentError);
+  EXPECT_THROW(UnixServer(folder.url(std::string(200, 'x'))), EnvironmentError);
+  EXPECT_THROW(UnixConnection{folder.url("nobody").host}, EnvironmentError);
+}
+
+TEST(UnixServer, GarbageEndsItsConnectionAlone) {
+  Served served;
+  Client client(served, {"out"});
+  uint32_t state = 1;
+  for (int i = 0; i < 500; ++i) {
+    const FileHandle raw = connect_unix(served.folder.url().host);
+    std::vector<uint8_t> noise(1 + static_cast<size_t>(i) % 500);
+    for (uint8_t& byte : noise) byte = static_cast<uint8_t>((state = state * 1664525 + 1013904223) >> 24);
+    if (i % 2 == 0) noise.insert(noise.begin(), {0x28, 0x76, 0x17, 0xfb, 0, 0, 1, 0});
+    ::send(raw.get(), noise.data(), noise.size(), MSG_NOSIGNAL);
+  }
+  client.say("in", "still here");
+  served.wait_until_heard(2);
+  served.publish("out", "1");
+  served.server.flush();
+  client.take_until(1);
+  EXPECT_EQ(client.came.size(), 1u);
+}
+
+}  // namespace
+}  // namespace ruedo::bus

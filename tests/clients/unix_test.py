@@ -1,0 +1,64 @@
+"""The local socket: whose it is, and that the three libraries see over it what they see over multicast."""
+
+import os
+import stat
+import subprocess
+import time
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from conftest import HERE, PATIENCE, RUEDO, probe, ruedo_run
+
+HALL = str(HERE / "hall.sdf")
+STEPS = 300
+
+
+def lockstep(language, url=None):
+    with ruedo_run("--lockstep", "1", "--lease", str(PATIENCE), "--disable", "p3at/camera", world=HALL, url=url) as server:
+        return probe(language, server.url, "lockstep", "client0", "p3at", str(STEPS), "1", "0.2").words("end")
+
+
+def test_lockstep_is_the_same_as_over_multicast(language, tmp_path):
+    end = lockstep(language, f"unix://{tmp_path}/bus")
+    assert end[0] == str(STEPS) and end == lockstep(language)
+
+
+def test_nobody_at_the_path_is_said(language, tmp_path):
+    said = probe(language, f"unix://{tmp_path}/nobody", "connect").one("failed")
+    assert said.startswith(f"NoServer: no Ruedo server at unix://{tmp_path}/nobody")
+
+
+def test_launch_takes_a_socket_of_its_own():
+    import ruedo
+
+    with ruedo.launch(HALL, args=["--disable", "p3at/camera"], rate="max") as sim:
+        address = urlsplit(sim.url)
+        assert address.scheme == "unix"
+        path = Path(address.path)
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600 and stat.S_IMODE(path.parent.stat().st_mode) == 0o700
+        sim.robot("p3at").pose.next()
+        heard = subprocess.run([RUEDO, "hz", "p3at/pose", "--lcm", sim.url, "-n", "1"], capture_output=True, text=True, timeout=PATIENCE)
+        assert "Hz" in heard.stdout, heard.stderr
+        told = subprocess.run([RUEDO, "run", HALL, "--lcm", sim.url], capture_output=True, text=True, timeout=PATIENCE)
+        assert told.returncode == 4 and "is taken by another server" in told.stderr
+    assert not path.parent.exists()
+
+
+def test_a_server_that_comes_back_is_heard_again(tmp_path):
+    """At the same path, where the one before, killed, has left its socket; by the same client."""
+    import ruedo
+
+    url = f"unix://{tmp_path}/bus"
+    with ruedo_run("--disable", "p3at/camera", world=HALL, url=url) as server, ruedo.connect(url) as sim:
+        sim.robot("p3at").pose.next()
+        server.process.kill()
+        server.process.wait()
+        assert os.path.exists(f"{tmp_path}/bus")
+        with ruedo_run("--disable", "p3at/camera", world=HALL, url=url):
+            until = time.monotonic() + PATIENCE
+            while True:
+                try:
+                    sim.robot("p3at").pose.next(1.0)
+                    break
+                except ruedo.RuedoError:
+                    assert time.monotonic() < until
