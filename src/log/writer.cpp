@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "ruedo/errors.h"
@@ -35,6 +36,8 @@ Writer::Writer(int file, std::string name) : path_(std::move(name)), file_(file)
 
 Writer::~Writer() {
   flush();
+  struct stat status {};
+  if (::fstat(file_, &status) == 0 && status.st_nlink > 0) ::fdatasync(file_);    // a power cut must not take back what was closed
   ::close(file_);
 }
 

@@ -30,6 +30,37 @@ int open_nameless(const std::string& folder) {
   return named;
 }
 
+// A file that is removed again unless it is kept: what was written of a snapshot would go on taking a full disk's room.
+class PartOfFile {
+ public:
+  explicit PartOfFile(std::string path) : path_(std::move(path)) {}
+  ~PartOfFile() {
+    if (!path_.empty()) ::unlink(path_.c_str());
+  }
+  PartOfFile(const PartOfFile&) = delete;
+  PartOfFile& operator=(const PartOfFile&) = delete;
+  const std::string& path() const { return path_; }
+  // Under its own name, on the disk before this returns; what went wrong, or "".
+  std::string keep_as(const std::string& path) {
+    std::string fault = synced(path_, O_RDONLY);
+    if (fault.empty() && ::rename(path_.c_str(), path.c_str()) != 0) fault = std::strerror(errno);
+    if (!fault.empty()) return fault;
+    path_.clear();
+    return synced(fs::path(path).parent_path().string(), O_RDONLY | O_DIRECTORY);
+  }
+
+ private:
+  static std::string synced(const std::string& path, int flags) {
+    const int file = ::open(path.c_str(), flags | O_CLOEXEC);
+    const bool good = file >= 0 && ::fsync(file) == 0;
+    const std::string fault = good ? "" : std::strerror(errno);
+    if (file >= 0) ::close(file);
+    return fault;
+  }
+
+  std::string path_;
+};
+
 }  // namespace
 
 Recorder::Recorder(const std::string& log, const std::string& snapshots, Watcher watcher) : folder_(snapshots), watcher_(std::move(watcher)) {
@@ -103,7 +134,8 @@ std::string Recorder::snapshot_path(const std::string& name) const {
 }
 
 std::string Recorder::save_snapshot(const std::string& name, const state_hash_t& state) {
-  const std::string path = snapshot_path(name), part = folder_ + "/." + name + ".part";
+  const std::string path = snapshot_path(name);
+  PartOfFile part(folder_ + "/." + name + ".part");
   std::error_code error;
   size_t files = 0;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) files += entry.path().extension() == kSuffix;
@@ -111,23 +143,17 @@ std::string Recorder::save_snapshot(const std::string& name, const state_hash_t&
   journal_->flush();
   if (!journal_->error().empty()) return "the journal is incomplete: " + journal_->error();
   try {
-    log::Writer writer(part);
+    log::Writer writer(part.path());
     const std::string fault = writer.append(*journal_);
     if (!fault.empty()) return fault;
     buffer_.resize(static_cast<size_t>(state.getEncodedSize()));
     state.encode(buffer_.data(), 0, static_cast<int>(buffer_.size()));
     writer.write(base_us_ - journal_base_us_ + state.utime, kStateHash, buffer_.data(), buffer_.size());
     writer.flush();
-    if (writer.error().empty()) fs::rename(part, path, error);
-    if (!writer.error().empty() || error) {
-      const std::string why = writer.error().empty() ? error.message() : writer.error();
-      fs::remove(part, error);
-      return why;
-    }
+    return writer.error().empty() ? part.keep_as(path) : writer.error();
   } catch (const EnvironmentError& fault) {
     return fault.what();
   }
-  return "";
 }
 
 }  // namespace ruedo::run
