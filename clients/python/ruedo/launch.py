@@ -54,8 +54,8 @@ def launch(world: str | os.PathLike[str] | World | None = None, *, seed: int | N
     rate: sim time per real time, "max" or math.inf: as fast as it goes; None: real time. lockstep: how many clients
     the run waits for (True: for this one). spawn: models as "p3at@0,0" or "p3at:NAME@X,Y,YAW". disable: devices that are left out,
     "p3at/camera". set: {"p3at/lrf.rate": 20}. noise: False gives ideal values. args: further options of `ruedo run`. url: None takes a local
-    socket, which no other user of the machine reads, and plain LCM programs do not know; "auto" a free port for LCM. name: of this client. timeout: s of real time until the world is loaded. verbose: show what the server prints (else
-    it is shown in the errors alone). Raises LaunchError with what the server said.
+    socket, which no other user of the machine reads, and plain LCM programs do not know; "auto" a free port for LCM. name: of this
+    client. timeout: s of real time until the world is loaded. verbose: show what the server prints (else it is shown in the errors alone). Raises LaunchError with what the server said.
     """
     options = _options(seed, rate, args, lockstep, spawn, disable, set, noise)
     program = find_ruedo()
@@ -172,6 +172,8 @@ class _Server:
             self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=self._output,
                                              stderr=subprocess.STDOUT if self._output else None, start_new_session=True)
         except OSError as error:
+            if token:
+                token.close()
             raise LaunchError(f"{command[0]} cannot be started: {error.strerror}") from None
 
     def ended(self) -> str | None:
