@@ -12,7 +12,7 @@ readonly EXIT_BUILD=1 EXIT_ENVIRONMENT=4
 # Packages: "a|b" is the first of them that this distribution has; "?a" is left out where it has none.
 readonly BUILD_PACKAGES=(
   g++ cmake ninja-build pkg-config ccache python3-venv python3-dev default-jdk-headless ca-certificates iproute2
-  libbullet-dev libtinyxml2-dev liburdfdom-dev libassimp-dev libembree-dev libtbb-dev libeigen3-dev
+  libbullet-dev libtinyxml2-dev liburdfdom-dev libyaml-cpp-dev libassimp-dev libembree-dev libtbb-dev libeigen3-dev
   "?libosmesa6-dev" libegl-dev libegl-mesa0 libgl-dev
   libopencv-core-dev libopencv-imgcodecs-dev libopencv-imgproc-dev
   libcli11-dev libspdlog-dev libfmt-dev libssl-dev "libglib2.0-0t64|libglib2.0-0" libwebsockets-dev

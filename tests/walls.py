@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[1]
 LIBRARIES = {
     ("btBullet", "bullet/", "LinearMath/", "BulletCollision/", "BulletDynamics/"): {"physics"},
     ("embree3/", "embree4/", "GL/", "EGL/"): {"scene"},
-    ("tinyxml2", "urdf_", "urdf/", "assimp/", "sdf/"): {"model"},
+    ("tinyxml2", "urdf_", "urdf/", "yaml-cpp/", "assimp/", "sdf/"): {"model"},
     ("lcm/lcm.h", "lcm/lcm-cpp", "lcm/eventlog"): {"bus"},
     ("CLI/",): {"cli"},
     ("libwebsockets",): {"console"},

@@ -71,7 +71,7 @@ Stream<SampleType> camera_part(Core& core, const DeviceInfo& camera, const std::
 }
 
 std::string input_channel(Core& core, const std::string& robot, const std::string& type) {
-  if (core.robot_info(robot).drive.empty()) throw NotSupported(robot + " cannot be driven: its model has no drive");
+  if (core.robot_info(robot).drive.empty()) throw NotSupported(robot + " cannot be driven: its model has no drive; --drive " + robot + "=LEFT+...,RIGHT+... gives it one, by its wheel joints");
   const auto info = core.info();
   for (const ChannelInfo& channel : channels_of(*info, robot)) {
     if (channel.input && channel.type == type) return channel.name;
@@ -130,11 +130,12 @@ Motion move(Core& core, const std::string& robot, const char* name, int8_t kind,
   return Motion(driver->move(core.bus(), channel, command, name));
 }
 
-velocity_command_t velocity_message(Core& core, double v, double omega) {
+velocity_command_t velocity_message(Core& core, double v, double omega, double vy) {
   velocity_command_t command{};
   command.utime = core.utime();
   command.vx = finite("v", v);
   command.omega = finite("omega", omega);
+  command.vy = finite("vy", vy);
   return command;
 }
 
@@ -200,16 +201,16 @@ Camera Robot::camera() const {
   return Camera(core_, stream_of(*core_, name_, camera.channel), camera);
 }
 
-void Robot::set_velocity(double v, double omega) const {
-  hold(*core_, name_, input_channel(*core_, name_, "velocity_command_t"), encoded(velocity_message(*core_, v, omega)));
+void Robot::set_velocity(double v, double omega, double vy) const {
+  hold(*core_, name_, input_channel(*core_, name_, "velocity_command_t"), encoded(velocity_message(*core_, v, omega, vy)));
 }
 
 void Robot::set_wheels(double left, double right) const {
   hold(*core_, name_, input_channel(*core_, name_, "wheel_command_t"), encoded(wheel_message(*core_, left, right)));
 }
 
-Command Robot::velocity_command(double v, double omega) const {
-  return {input_channel(*core_, name_, "velocity_command_t"), encoded(velocity_message(*core_, v, omega))};
+Command Robot::velocity_command(double v, double omega, double vy) const {
+  return {input_channel(*core_, name_, "velocity_command_t"), encoded(velocity_message(*core_, v, omega, vy))};
 }
 
 Command Robot::wheel_command(double left, double right) const {

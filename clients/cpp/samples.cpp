@@ -72,7 +72,7 @@ constexpr Word<MotionState> kStates[] = {
 constexpr Word<MotionReason> kReasons[] = {
     {MotionReason::none, ""}, {MotionReason::replaced, "replaced"}, {MotionReason::blocked, "blocked"},
     {MotionReason::watchdog, "watchdog"}, {MotionReason::not_finite, "not finite"}, {MotionReason::bad_kind, "bad kind"},
-    {MotionReason::bad_value, "bad value"}, {MotionReason::no_drive, "no drive"}, {MotionReason::removed, "removed"},
+    {MotionReason::bad_value, "bad value"}, {MotionReason::no_drive, "no drive"}, {MotionReason::not_possible, "not possible"}, {MotionReason::removed, "removed"},
     {MotionReason::new_run, "new run"}};
 
 const Word<MotionKind>* words(MotionKind) { return std::begin(kKinds); }

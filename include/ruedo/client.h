@@ -229,7 +229,7 @@ class Robot {
 
   // Drives with v (m/s ahead) and omega (rad/s), within the robot's limits, until the next command of any kind: the
   // command is repeated in the background, so that the watchdog does not stop the robot.
-  void set_velocity(double v, double omega) const;
+  void set_velocity(double v, double omega, double vy = 0.0) const;    // vy: m/s to the left, of a robot that moves sideways
   // The same with the rates of the left and the right wheels, rad/s, positive ahead.
   void set_wheels(double left, double right) const;
 
@@ -242,7 +242,7 @@ class Robot {
 
   // The same as commands for Simulation::step(), which sends them; nothing repeats these. kind: a primitive; value in m or rad,
   // of a stop 0.
-  [[nodiscard]] Command velocity_command(double v, double omega) const;
+  [[nodiscard]] Command velocity_command(double v, double omega, double vy = 0.0) const;
   [[nodiscard]] Command wheel_command(double left, double right) const;
   [[nodiscard]] Command move_command(MotionKind kind, double value, Limits limits = {}, double radius = 0.0) const;
 

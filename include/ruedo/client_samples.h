@@ -37,7 +37,7 @@ enum class MotionKind : int8_t { none = 0, advance = 1, rotate = 2, heading = 3,
 enum class MotionState : int8_t { idle = 0, running = 1, done = 2, ended = 3, refused = 4, sent = 64, unknown = 127 };
 /// removed: the robot is gone; new_run: the server was started anew.
 enum class MotionReason : int8_t {
-  none = 0, replaced = 1, blocked = 2, watchdog = 3, not_finite = 4, bad_kind = 5, bad_value = 6, no_drive = 7,
+  none = 0, replaced = 1, blocked = 2, watchdog = 3, not_finite = 4, bad_kind = 5, bad_value = 6, no_drive = 7, not_possible = 8,
   removed = 64, new_run = 65, unknown = 127
 };
 /// How the server answers a request, as in reply_t.

@@ -45,13 +45,14 @@ std::vector<RegisterCommand::Add> registered_commands() {
 }
 
 void add_world_arguments(CLI::App& command, WorldArguments& arguments) {
-  command.add_option("WORLD", arguments.world, "SDF world or model, or URDF robot")->required();
+  command.add_option("WORLD", arguments.world, "SDF world or model, or URDF robot (xacro, too)")->required();
   command.add_option("--spawn", arguments.spawns, "place a model on the ground: MODEL[:NAME]@X,Y[,YAW] (m, rad); a file, or one of ours (p3at)")
       ->type_name("SPAWN")->allow_extra_args(false);
   command.add_option("--drive", arguments.drives, "give a model a drive by its wheel joints: ROBOT=LEFT[+LEFT...],RIGHT[+RIGHT...]")
       ->type_name("DRIVE")->allow_extra_args(false);
   command.add_option("--set", arguments.settings, "change a device: ROBOT/DEVICE.KEY=VALUE")->type_name("SETTING")->allow_extra_args(false);
   command.add_option("--disable", arguments.disabled, "leave a device out: ROBOT/DEVICE")->type_name("DEVICE")->allow_extra_args(false);
+  command.add_option("--xacro-arg", arguments.xacro_arguments, "an argument of a xacro file: NAME:=VALUE")->type_name("ARGUMENT")->allow_extra_args(false);
   command.add_flag("--no-noise", arguments.no_noise, "sensors give their ideal values");
   command.add_flag("--allow-absolute", arguments.allow_absolute, "absolute paths in the files may lead out of the folders that are searched");
 }
@@ -95,6 +96,11 @@ model::LoadOptions load_options(const WorldArguments& arguments) {
   model::LoadOptions options;
   for (const std::string& text : arguments.spawns) options.spawns.push_back(model::parse_spawn(text));
   for (const std::string& text : arguments.drives) options.drives.push_back(model::parse_drive(text));
+  for (const std::string& text : arguments.xacro_arguments) {
+    const size_t sign = text.find(":=");
+    if (sign == std::string::npos || sign == 0) wrong("--xacro-arg", text, "it looks like NAME:=VALUE, for example laser_enabled:=true");
+  }
+  options.xacro_arguments = arguments.xacro_arguments;
   options.allow_absolute = arguments.allow_absolute;
   for (const std::string& text : arguments.settings) options.settings.push_back(model::parse_setting(text));
   for (const std::string& text : arguments.disabled) {
@@ -112,6 +118,7 @@ std::vector<std::string> result_options(const WorldArguments& arguments) {
   std::vector<std::string> options;
   for (const std::string& text : arguments.spawns) options.push_back("--spawn=" + text);
   for (const std::string& text : arguments.drives) options.push_back("--drive=" + text);
+  for (const std::string& text : arguments.xacro_arguments) options.push_back("--xacro-arg=" + text);
   if (arguments.allow_absolute) options.push_back("--allow-absolute");
   for (const std::string& text : arguments.settings) options.push_back("--set=" + text);
   for (const std::string& text : arguments.disabled) options.push_back("--disable=" + text);

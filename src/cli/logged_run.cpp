@@ -16,6 +16,7 @@ LoggedOptions read_options(const log_header_t& header, const std::string& log) {
     const std::string name = option.substr(0, equals), value = equals == std::string::npos ? "" : option.substr(equals + 1);
     if (name == "--spawn") world.spawns.push_back(value);
     else if (name == "--drive") world.drives.push_back(value);
+    else if (name == "--xacro-arg") world.xacro_arguments.push_back(value);
     else if (name == "--allow-absolute") world.allow_absolute = true;
     else if (name == "--set") world.settings.push_back(value);
     else if (name == "--disable") world.disabled.push_back(value);

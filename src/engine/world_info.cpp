@@ -4,6 +4,7 @@
 #include <string>
 
 #include "engine/world_state.h"
+#include "model/drive.h"
 
 namespace ruedo::engine {
 namespace {
@@ -56,6 +57,7 @@ robot_info_t robot_info(const model::WorldModel& world, const model::BodyLayout&
   if (model.drive) {
     const model::DriveDescription& drive = *model.drive;
     info.drive = drive.kind == model::DriveDescription::Kind::kinematic ? "kinematic" : "wheels";
+    if (drive.steering != model::DriveDescription::Steering::differential) info.drive += " " + model::name_of(drive.steering);
     info.wheel_radius = drive.wheel_radius;
     info.track = drive.track;
     info.max_speed = drive.max_speed;

@@ -66,7 +66,14 @@ double lowest_point(const Model& model, const std::vector<int>& links, const Pos
 bool is_drive_wheel(const Model& model, int joint) {
   if (!model.drive) return false;
   const auto in = [&](const std::vector<int>& list) { return std::find(list.begin(), list.end(), joint) != list.end(); };
-  return in(model.drive->left_joints) || in(model.drive->right_joints);
+  return in(model.drive->left_joints) || in(model.drive->right_joints) || in(model.drive->steer_joints);
+}
+
+// The link that a drive moves: what its wheels hang on, be it by way of what steers them.
+int carrier_of(const Model& model) {
+  const DriveDescription& drive = *model.drive;
+  const std::vector<int>& first = !drive.steer_joints.empty() ? drive.steer_joints : !drive.left_joints.empty() ? drive.left_joints : drive.right_joints;
+  return first.empty() ? 0 : std::max(model.joints[static_cast<size_t>(first[0])].parent, 0);
 }
 
 // What of a model moves as one, and which links turn with which of its joints: the same for all its instances.
@@ -108,15 +115,44 @@ Grouping group(const Model& model) {
 
 }  // namespace
 
+namespace {
+
+// What turning by an angle does to the link, in its own frame.
+Pose turned(const WheelPlacement& wheel, double angle) {
+  const Quat turn(Eigen::AngleAxisd(angle, wheel.axis_in_L));
+  return {turn, wheel.center_in_L - turn * wheel.center_in_L};
+}
+
+// The rim's speed for a speed of base_link of 1 ahead, 1 to the left, and 1 rad/s. p: the wheel in base_link; axis: about
+// which it turns, there.
+Vec3 rim_of(const DriveDescription& drive, bool left, const Vec3& p, const Vec3& axis) {
+  using Steering = DriveDescription::Steering;
+  const double side = left ? -1.0 : 1.0;
+  if (drive.steering == Steering::omni) {    // rollers across: only what is along its rim turns it
+    const Vec3 along = axis.cross(Vec3::UnitZ()).normalized();
+    return {along.x(), along.y(), p.x() * along.y() - p.y() * along.x()};
+  }
+  if (drive.steering == Steering::mecanum) {    // rollers at 45 degrees, whose axes meet in the middle of the robot, seen from above
+    return {1.0, p.x() * p.y() > 0 ? -1.0 : 1.0, side * 0.5 * (drive.track + drive.wheelbase)};
+  }
+  constexpr double kInTheMiddle_m = 1e-6;
+  if (!(drive.track > 0) || std::abs(p.y()) < kInTheMiddle_m) return {1.0, 0.0, -p.y()};
+  return {1.0, 0.0, side * 0.5 * drive.track};
+}
+
+}  // namespace
+
 Pose BodyLayout::link_in_body(int link, const std::vector<double>& wheel_angles) const {
   const LinkPlacement& placement = links[static_cast<size_t>(link)];
   if (placement.wheel < 0) return placement.X_BL;
   const WheelPlacement& wheel = wheels[static_cast<size_t>(placement.wheel)];
   const Pose& X_BWheel = links[static_cast<size_t>(wheel.link)].X_BL;
-  const Quat turn(Eigen::AngleAxisd(wheel_angles[static_cast<size_t>(placement.wheel)], wheel.axis_in_L));
-  const Pose X_turn{turn, wheel.center_in_L - turn * wheel.center_in_L};
-  if (wheel.link == link) return X_BWheel * X_turn;
-  return X_BWheel * X_turn * X_BWheel.inverse() * placement.X_BL;
+  const Pose X_turn = turned(wheel, wheel_angles[static_cast<size_t>(placement.wheel)]);
+  const Pose X_BL = wheel.link == link ? X_BWheel * X_turn : X_BWheel * X_turn * X_BWheel.inverse() * placement.X_BL;
+  if (wheel.on < 0) return X_BL;
+  const WheelPlacement& steer = wheels[static_cast<size_t>(wheel.on)];
+  const Pose& X_BSteer = links[static_cast<size_t>(steer.link)].X_BL;
+  return X_BSteer * turned(steer, wheel_angles[static_cast<size_t>(wheel.on)]) * X_BSteer.inverse() * X_BL;
 }
 
 // Of the last models seen: fleets follow one another.
@@ -210,7 +246,7 @@ void BodyLayout::add(const WorldModel& world, int i, Known& known) {
     int carrier = 0;
     Pose X_MBase;
     if (model.drive) {
-      carrier = std::max(model.joints[static_cast<size_t>(model.drive->left_joints[0])].parent, 0);
+      carrier = carrier_of(model);
       X_MBase = model.drive->X_MBase;
     }
     const LinkPlacement& link = links[static_cast<size_t>(first + carrier)];
@@ -219,27 +255,34 @@ void BodyLayout::add(const WorldModel& world, int i, Known& known) {
   }
   if (model.drive) {
     const bool kinematic = model.drive->kind == DriveDescription::Kind::kinematic;
-    for (const bool left : {true, false}) {
-      for (const int j : left ? model.drive->left_joints : model.drive->right_joints) {
-        const Joint& joint = model.joints[static_cast<size_t>(j)];
-        const Pose X_LM = model.links[static_cast<size_t>(joint.child)].X_ML.inverse();
-        WheelPlacement wheel;
-        wheel.robot = robot;
-        wheel.joint = j;
-        wheel.link = first + joint.child;
-        wheel.left = left;
-        const Vec3 axis_M = joint.X_MJ.rotation * joint.axis.axis_in_J;
-        const Vec3 left_M = model.drive->X_MBase.rotation * Vec3::UnitY();
-        wheel.axis_in_L = (X_LM.rotation * (axis_M.dot(left_M) < 0 ? Vec3(-axis_M) : axis_M)).normalized();
-        wheel.center_in_L = X_LM * joint.X_MJ.translation;
-        const int index = static_cast<int>(wheels.size());
-        if (kinematic) {
-          for (const int below : subtree(model, joint.child)) links[static_cast<size_t>(first + below)].wheel = index;
-        }
-        placement.wheels.push_back(index);
-        wheels.push_back(wheel);
+    const Pose X_BaseM = model.drive->X_MBase.inverse();
+    const Vec3 left_M = model.drive->X_MBase.rotation * Vec3::UnitY();
+    const auto add_wheel = [&](int j, bool left, bool steers) {
+      const Joint& joint = model.joints[static_cast<size_t>(j)];
+      const Pose X_LM = model.links[static_cast<size_t>(joint.child)].X_ML.inverse();
+      WheelPlacement wheel;
+      wheel.robot = robot;
+      wheel.joint = j;
+      wheel.link = first + joint.child;
+      wheel.left = left;
+      wheel.steers = steers;
+      Vec3 axis_M = joint.X_MJ.rotation * joint.axis.axis_in_J;
+      if (steers ? axis_M.z() < 0 : model.drive->steering != DriveDescription::Steering::omni && axis_M.dot(left_M) < 0) axis_M = -axis_M;
+      wheel.rim = rim_of(*model.drive, left, X_BaseM * joint.X_MJ.translation, X_BaseM.rotation * axis_M);
+      wheel.axis_in_L = (X_LM.rotation * axis_M).normalized();
+      wheel.center_in_L = X_LM * joint.X_MJ.translation;
+      const int index = static_cast<int>(wheels.size());
+      for (const int below : subtree(model, joint.child)) {
+        int& turned_by = links[static_cast<size_t>(first + below)].wheel;
+        if (turned_by >= 0) wheels[static_cast<size_t>(turned_by)].on = index;
+        else if (kinematic) turned_by = index;
       }
-    }
+      placement.wheels.push_back(index);
+      wheels.push_back(wheel);
+    };
+    for (const int j : model.drive->left_joints) add_wheel(j, true, false);
+    for (const int j : model.drive->right_joints) add_wheel(j, false, false);
+    for (const int j : model.drive->steer_joints) add_wheel(j, false, true);
   }
   if (!model.is_static) {
     for (size_t j = 0; j < model.joints.size(); ++j) {

@@ -25,6 +25,9 @@ struct WheelPlacement {
   int joint = -1;           // index into Model::joints
   int link = -1;            // index into BodyLayout::links
   bool left = false;
+  bool steers = false;      // its angle is that of steering, about the vertical
+  int on = -1;              // index into BodyLayout::wheels: the steering joint that it hangs on
+  Vec3 rim = Vec3::UnitX(); // its rim's speed is rim . (vx, vy, omega) of base_link; not for wheels that are steered
   Vec3 axis_in_L = Vec3::UnitY();    // unit; a positive angle about it rolls the robot ahead
   Vec3 center_in_L = Vec3::Zero();   // a point on the axis: the joint, which need not be the link's origin
 };
@@ -48,7 +51,7 @@ struct RobotPlacement {
   int instance = -1;
   int body = -1;            // that carries base_link; -1 for a robot that does not move
   Pose X_BBase;             // base_link in that body (X_WBase when body is -1)
-  std::vector<int> wheels;  // indices into BodyLayout::wheels: left ones first, then right, front first
+  std::vector<int> wheels;  // indices into BodyLayout::wheels: left ones first, then right, front first, then those that steer
   std::vector<int> joints;  // indices into BodyLayout::joints
 };
 

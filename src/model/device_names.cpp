@@ -34,6 +34,13 @@ void make_sensor_names_unique(Model& model, const std::string& where, Findings& 
     findings.repaired(sensor.element->source, where, "the sensor name '" + sensor.name + "' is not fit for a channel; it is called '" + fit + "'");
     sensor.name = fit;
   }
+  const auto is_kept = [](const std::string& name) { return std::find(std::begin(kFixedDevices), std::end(kFixedDevices), name) != std::end(kFixedDevices); };
+  for (SensorDescription& sensor : model.sensors) {
+    if (!is_kept(sensor.name)) continue;
+    const std::string other = sensor.name + "_sensor";
+    findings.repaired(sensor.element->source, where, "the sensor name '" + sensor.name + "' is kept for the robot's own channel; it is called '" + other + "'");
+    sensor.name = other;
+  }
   std::map<std::string, int> uses;
   for (const SensorDescription& sensor : model.sensors) ++uses[sensor.name];
   for (SensorDescription& sensor : model.sensors) {
@@ -44,10 +51,11 @@ void make_sensor_names_unique(Model& model, const std::string& where, Findings& 
     sensor.name = model.links[static_cast<size_t>(sensor.link)].name + "-" + own;
   }
   std::map<std::string, const SensorDescription*> seen;
-  for (const SensorDescription& sensor : model.sensors) {
-    if (const auto [at, is_new] = seen.try_emplace(sensor.name, &sensor); !is_new) {
-      sensor.element->fail("a second sensor of the name '" + sensor.name + "'; the first is in " + at->second->element->source.str());
-    }
+  for (SensorDescription& sensor : model.sensors) {
+    const std::string own = sensor.name;
+    for (int number = 2; !seen.try_emplace(sensor.name, &sensor).second; ++number) sensor.name = own + "_" + std::to_string(number);
+    if (sensor.name == own) continue;
+    findings.repaired(sensor.element->source, where, "a second sensor of the name '" + own + "'; it is called '" + sensor.name + "'");
   }
 }
 

@@ -3,8 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
+#include "model/drive_guess.h"
 #include "model/geometry.h"
+#include "model/plugins.h"
+#include "model/ros_control.h"
 #include "model/sdf_link.h"
 
 namespace ruedo::model {
@@ -90,11 +94,196 @@ void sort_by_front(const Model& model, const Pose& X_MBase, std::vector<int>& jo
   });
 }
 
+using Steering = DriveDescription::Steering;
+
+constexpr double kMostSteering_rad = 1.56;    // a wheel across the robot would not roll
+constexpr double kUsualSteering_rad = 0.6;
+
+const std::vector<std::pair<std::string, Steering>>& steerings() {
+  static const std::vector<std::pair<std::string, Steering>> list = {
+      {"differential", Steering::differential}, {"tracked", Steering::tracked}, {"ackermann", Steering::ackermann}, {"tricycle", Steering::tricycle},
+      {"mecanum", Steering::mecanum},           {"omni", Steering::omni},       {"holonomic", Steering::holonomic}};
+  return list;
+}
+
+Steering read_steering(const Element& e) {
+  const std::string* written = e.attribute("steering");
+  if (!written) return Steering::differential;
+  std::string allowed;
+  for (const auto& [name, steering] : steerings()) {
+    if (name == *written) return steering;
+    allowed += (allowed.empty() ? "" : ", ") + name;
+  }
+  e.fail("steering '" + *written + "' is not allowed; allowed are " + allowed);
+}
+
+bool is_steered(const Model& model, const DriveDescription& drive, int joint) {
+  int link = model.joints[static_cast<size_t>(joint)].parent;
+  for (size_t steps = 0; link >= 0 && steps <= model.joints.size(); ++steps) {
+    for (const int steer : drive.steer_joints) {
+      if (model.joints[static_cast<size_t>(steer)].child == link) return true;
+    }
+    const auto above = std::find_if(model.joints.begin(), model.joints.end(), [&](const Joint& each) { return each.child == link; });
+    link = above == model.joints.end() ? -1 : above->parent;
+  }
+  return false;
+}
+
+void read_joints(const Element& e, const Model& model, DriveDescription& drive) {
+  const auto read = [&](const char* name, std::vector<int>& into) {
+    for (const Element* joint : e.all(name)) into.push_back(joint_of(*joint, model));
+  };
+  read("ruedo:left_joint", drive.left_joints);
+  read("ruedo:right_joint", drive.right_joints);
+  read("ruedo:wheel_joint", drive.left_joints);
+  read("ruedo:steer_joint", drive.steer_joints);
+  std::vector<int> all = drive.left_joints;
+  all.insert(all.end(), drive.right_joints.begin(), drive.right_joints.end());
+  all.insert(all.end(), drive.steer_joints.begin(), drive.steer_joints.end());
+  for (size_t i = 0; i < all.size(); ++i) {
+    if (std::find(all.begin(), all.begin() + static_cast<ptrdiff_t>(i), all[i]) == all.begin() + static_cast<ptrdiff_t>(i)) continue;
+    const bool sides = drive.steer_joints.empty() && !drive.right_joints.empty();
+    e.fail("the joint '" + model.joints[static_cast<size_t>(all[i])].name + (sides ? "' is left and right" : "' is named twice"));
+  }
+  const auto need = [&](bool there, const char* name) {
+    if (!there) e.fail(std::string("has no <") + name + ">");
+  };
+  switch (drive.steering) {
+    case Steering::differential:
+    case Steering::mecanum:
+      need(!drive.left_joints.empty(), "ruedo:left_joint");
+      need(!drive.right_joints.empty(), "ruedo:right_joint");
+      if (drive.steering == Steering::mecanum && (drive.left_joints.size() != 2 || drive.right_joints.size() != 2)) e.fail("a mecanum drive has two left and two right wheels");
+      break;
+    case Steering::omni:
+      if (all.size() < 3) e.fail("an omni drive has three wheels or more");
+      break;
+    case Steering::ackermann:
+    case Steering::tricycle:
+      need(!drive.left_joints.empty() || !drive.right_joints.empty(), drive.steering == Steering::tricycle ? "ruedo:wheel_joint" : "ruedo:left_joint");
+      need(!drive.steer_joints.empty(), "ruedo:steer_joint");
+      break;
+    case Steering::tracked:
+    case Steering::holonomic:
+      if (drive.left_joints.empty() != drive.right_joints.empty() && drive.steering == Steering::tracked) e.fail("has wheels on one side only");
+      break;
+  }
+}
+
+// The lowest point of what collides, below the model's first link.
+Vec3 below_model(const Model& model) {
+  Vec3 at = model.links[0].X_ML.translation;
+  double lowest = std::numeric_limits<double>::infinity();
+  for (const Link& link : model.links) {
+    for (const Collision& each : link.collisions) {
+      const Eigen::AlignedBox3d box = bounds(each.geometry);
+      if (box.isEmpty()) continue;
+      for (int corner = 0; corner < 8; ++corner) {
+        lowest = std::min(lowest, (link.X_ML * each.X_LC * box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner))).z());
+      }
+    }
+  }
+  if (std::isfinite(lowest)) at.z() = lowest;
+  return at;
+}
+
+// base_link: on the ground, in the middle of the wheels that are not steered; and what follows from it.
+void place_base(const Element& e, const Model& model, DriveDescription& drive) {
+  std::vector<int> wheels = drive.left_joints;
+  wheels.insert(wheels.end(), drive.right_joints.begin(), drive.right_joints.end());
+  Quat heading = Quat::Identity();
+  Vec3 at = wheels.empty() ? below_model(model) : Vec3(middle(model, wheels) - Vec3(0, 0, drive.wheel_radius));
+  double track = 0;
+  const auto fixed_of = [&](const std::vector<int>& side) {
+    std::vector<int> fixed;
+    std::copy_if(side.begin(), side.end(), std::back_inserter(fixed), [&](int joint) { return !is_steered(model, drive, joint); });
+    return fixed;
+  };
+  const bool steers = drive.steering == Steering::ackermann || drive.steering == Steering::tricycle;
+  const std::vector<int> lefts = steers ? fixed_of(drive.left_joints) : drive.left_joints, rights = steers ? fixed_of(drive.right_joints) : drive.right_joints;
+  if (!lefts.empty() && !rights.empty() && drive.steering != Steering::omni) {
+    const Vec3 left = middle(model, lefts), right = middle(model, rights);
+    heading = heading_of(left, right, drive, e);
+    at = (left + right) / 2 - Vec3(0, 0, drive.wheel_radius);
+    track = std::hypot((left - right).x(), (left - right).y());
+  }
+  const Allowed positive = Allowed::positive();
+  if (steers) {
+    const std::vector<int> fixed = fixed_of(wheels);
+    const Vec3 steered = middle(model, drive.steer_joints);
+    if (fixed.empty()) {
+      const double wheelbase = e.number("ruedo:wheelbase", 0, positive);
+      if (wheelbase == 0) e.fail("has no <ruedo:wheelbase>, and no wheel that is not steered to take it from");
+      const Vec3 ahead = heading * Vec3::UnitX();
+      at = Vec3(steered.x(), steered.y(), at.z()) - wheelbase * ahead;
+    } else {
+      const Vec3 axle = middle(model, fixed);
+      at = {axle.x(), axle.y(), axle.z() - drive.wheel_radius};
+    }
+    const double ahead = (heading.conjugate() * Vec3(steered - at)).x();
+    if (std::abs(ahead) < 1e-3) e.fail("the steered wheels are beside the fixed ones; they have to be ahead of them or behind");
+    drive.wheelbase = std::copysign(e.number("ruedo:wheelbase", std::abs(ahead), positive), ahead);
+    double limit = std::numeric_limits<double>::infinity();
+    for (const int joint : drive.steer_joints) {
+      const JointAxis& axis = model.joints[static_cast<size_t>(joint)].axis;
+      limit = std::min({limit, std::abs(axis.lower), std::abs(axis.upper)});
+    }
+    if (!(limit > 0)) limit = kUsualSteering_rad;
+    drive.max_steering_angle = std::min(e.number("ruedo:max_steering_angle", std::isinf(limit) ? (drive.steering == Steering::tricycle ? kMostSteering_rad : kUsualSteering_rad) : limit, positive), kMostSteering_rad);
+    drive.max_steering_rate = e.number("ruedo:max_steering_rate", drive.max_steering_rate, positive.or_infinite());
+  }
+  drive.track = track > 0 ? e.number("ruedo:track", track, positive) : e.number("ruedo:track", 0, Allowed::not_negative());
+  if (drive.steering == Steering::tracked && drive.track == 0) e.fail("has no <ruedo:track>, and no wheels to take it from");
+  drive.X_MBase = {heading, at};
+  drive.X_MBase = e.pose("ruedo:base", drive.X_MBase);
+  if (drive.steering == Steering::omni) {    // left and right only say on which side they are
+    const Pose X_BaseM = drive.X_MBase.inverse();
+    drive.left_joints.clear();
+    drive.right_joints.clear();
+    for (const int joint : wheels) {
+      const bool left = (X_BaseM * model.joints[static_cast<size_t>(joint)].X_MJ.translation).y() > 0;
+      (left ? drive.left_joints : drive.right_joints).push_back(joint);
+    }
+  }
+  sort_by_front(model, drive.X_MBase, drive.left_joints);
+  sort_by_front(model, drive.X_MBase, drive.right_joints);
+  if (drive.steering == Steering::mecanum) {
+    const Pose X_BaseM = drive.X_MBase.inverse();
+    const auto x = [&](const std::vector<int>& side, size_t i) { return (X_BaseM * model.joints[static_cast<size_t>(side[i])].X_MJ.translation).x(); };
+    const double apart = (x(drive.left_joints, 0) - x(drive.left_joints, 1) + x(drive.right_joints, 0) - x(drive.right_joints, 1)) / 2;
+    if (!(apart > 1e-6)) e.fail("the front and the rear wheels are in one place");
+    drive.wheelbase = e.number("ruedo:wheelbase", apart, positive);
+  }
+}
+
+void read_limits(const Element& e, const Model& model, DriveDescription& drive) {
+  const Allowed limit = Allowed::positive().or_infinite();
+  drive.max_speed = e.number("ruedo:max_speed", drive.max_speed, limit);
+  drive.max_side_speed = e.number("ruedo:max_side_speed", drive.max_speed, limit);
+  drive.max_turn_rate = e.number("ruedo:max_turn_rate", drive.max_turn_rate, limit);
+  drive.acceleration = e.number("ruedo:acceleration", drive.acceleration, limit);
+  drive.deceleration = e.number("ruedo:deceleration", drive.acceleration, limit);
+  drive.turn_acceleration = e.number("ruedo:turn_acceleration", drive.turn_acceleration, limit);
+  double mass = 0;
+  for (const Link& link : model.links) mass += link.inertial.mass;
+  drive.max_force = e.number("ruedo:max_force", mass * kStandardGravity, limit);
+  drive.max_wheel_torque = e.number("ruedo:max_wheel_torque", drive.max_wheel_torque, limit);
+  drive.max_wheel_rate = e.number("ruedo:max_wheel_rate", drive.max_wheel_rate, limit);
+}
+
 }  // namespace
+
+std::string name_of(Steering steering) {
+  for (const auto& [name, each] : steerings()) {
+    if (each == steering) return name;
+  }
+  return "";
+}
 
 const std::vector<std::string>& drive_elements() {
   static const std::vector<std::string> names = {
-      "ruedo:left_joint", "ruedo:right_joint", "ruedo:wheel_radius", "ruedo:track", "ruedo:base", "ruedo:max_speed",
+      "ruedo:left_joint", "ruedo:right_joint", "ruedo:wheel_joint", "ruedo:steer_joint", "ruedo:wheel_radius", "ruedo:track", "ruedo:wheelbase",
+      "ruedo:max_steering_angle", "ruedo:max_steering_rate", "ruedo:base", "ruedo:max_speed", "ruedo:max_side_speed",
       "ruedo:max_turn_rate", "ruedo:acceleration", "ruedo:deceleration", "ruedo:turn_acceleration", "ruedo:max_force",
       "ruedo:max_wheel_torque", "ruedo:max_wheel_rate", "ruedo:watchdog", "ruedo:pose_rate", "ruedo:status_rate"};
   return names;
@@ -103,7 +292,7 @@ const std::vector<std::string>& drive_elements() {
 const std::vector<std::string>& odometry_elements() {
   static const std::vector<std::string> names = {
       "ruedo:rate", "ruedo:integrator", "ruedo:ticks_per_turn", "ruedo:counter_bits", "ruedo:radius_error",
-      "ruedo:track_error", "ruedo:slip_noise", "ruedo:phase"};
+      "ruedo:track_error", "ruedo:slip_noise", "ruedo:steering_error", "ruedo:phase"};
   return names;
 }
 
@@ -114,40 +303,21 @@ DriveDescription read_drive(std::shared_ptr<const Element> element, std::shared_
   const std::string* type = e.attribute("type");
   if (type && *type != "kinematic" && *type != "wheels") e.fail("type '" + *type + "' is not allowed; allowed are kinematic and wheels");
   if (type && *type == "wheels") drive.kind = DriveDescription::Kind::wheels;
-  for (const Element* joint : e.all("ruedo:left_joint")) drive.left_joints.push_back(joint_of(*joint, model));
-  for (const Element* joint : e.all("ruedo:right_joint")) drive.right_joints.push_back(joint_of(*joint, model));
-  if (drive.left_joints.empty()) e.fail("has no <ruedo:left_joint>");
-  if (drive.right_joints.empty()) e.fail("has no <ruedo:right_joint>");
-  for (const int joint : drive.left_joints) {
-    if (std::find(drive.right_joints.begin(), drive.right_joints.end(), joint) != drive.right_joints.end()) {
-      e.fail("the joint '" + model.joints[static_cast<size_t>(joint)].name + "' is left and right");
-    }
+  drive.steering = read_steering(e);
+  if (drive.kind == DriveDescription::Kind::wheels && drive.steering != Steering::differential) {
+    e.fail("type 'wheels' is not allowed with steering '" + name_of(drive.steering) + "'; allowed is kinematic");
   }
-
-  const Allowed positive = Allowed::positive(), limit = Allowed::positive().or_infinite();
-  const double found_radius = radius_of(model, model.joints[static_cast<size_t>(drive.left_joints[0])]);
-  if (!e.has("ruedo:wheel_radius") && found_radius <= 0) e.fail("has no <ruedo:wheel_radius>, and the wheel has no collision shape to take it from");
-  drive.wheel_radius = e.number("ruedo:wheel_radius", found_radius, positive);
-
-  const Vec3 left = middle(model, drive.left_joints), right = middle(model, drive.right_joints);
-  const Quat ahead = heading_of(left, right, drive, e);
-  const Vec3 across = left - right;
-  drive.track = e.number("ruedo:track", std::hypot(across.x(), across.y()), positive);
-  drive.X_MBase = {ahead, (left + right) / 2 - Vec3(0, 0, drive.wheel_radius)};
-  drive.X_MBase = e.pose("ruedo:base", drive.X_MBase);
-  sort_by_front(model, drive.X_MBase, drive.left_joints);
-  sort_by_front(model, drive.X_MBase, drive.right_joints);
-
-  drive.max_speed = e.number("ruedo:max_speed", drive.max_speed, limit);
-  drive.max_turn_rate = e.number("ruedo:max_turn_rate", drive.max_turn_rate, limit);
-  drive.acceleration = e.number("ruedo:acceleration", drive.acceleration, limit);
-  drive.deceleration = e.number("ruedo:deceleration", drive.acceleration, limit);
-  drive.turn_acceleration = e.number("ruedo:turn_acceleration", drive.turn_acceleration, limit);
-  double mass = 0;
-  for (const Link& link : model.links) mass += link.inertial.mass;
-  drive.max_force = e.number("ruedo:max_force", mass * kStandardGravity, limit);
-  drive.max_wheel_torque = e.number("ruedo:max_wheel_torque", drive.max_wheel_torque, limit);
-  drive.max_wheel_rate = e.number("ruedo:max_wheel_rate", drive.max_wheel_rate, limit);
+  read_joints(e, model, drive);
+  if (drive.left_joints.empty() && drive.right_joints.empty()) {
+    drive.wheel_radius = e.number("ruedo:wheel_radius", 0, Allowed::not_negative());
+  } else {
+    const int first = drive.left_joints.empty() ? drive.right_joints[0] : drive.left_joints[0];
+    const double found_radius = radius_of(model, model.joints[static_cast<size_t>(first)]);
+    if (!e.has("ruedo:wheel_radius") && found_radius <= 0) e.fail("has no <ruedo:wheel_radius>, and the wheel has no collision shape to take it from");
+    drive.wheel_radius = e.number("ruedo:wheel_radius", found_radius, Allowed::positive());
+  }
+  place_base(e, model, drive);
+  read_limits(e, model, drive);
   drive.watchdog_us = std::llround(e.number("ruedo:watchdog", 0.6, Allowed::between(0, 1e6)) * 1e6);
   drive.pose_rate = e.rate("ruedo:pose_rate", drive.pose_rate);
   drive.status_rate = e.rate("ruedo:status_rate", drive.status_rate);
@@ -160,6 +330,77 @@ DriveDescription read_drive(std::shared_ptr<const Element> element, std::shared_
   return drive;
 }
 
+namespace {
+
+// What nothing stands in for, each once.
+void name_plugin(const Element& plugin, const PluginKind& kind, const std::string& where, Findings& findings, std::set<std::string>& named) {
+  std::string text;
+  if (kind.does == PluginKind::Does::dead) text = "the plugin " + kind.name + " does nothing here: " + kind.would;
+  if (kind.does == PluginKind::Does::unknown) text = "plugins are not loaded: " + kind.name;
+  if (!text.empty() && named.insert(text).second) findings.unsupported(plugin.source, where, text);
+}
+
+bool looks_like_robot(const Element& model_element, const std::vector<const Element*>& plugins, const Model& model) {
+  if (model.is_static) return false;
+  if (model_element.has("ruedo:joints") || model_element.has("transmission") || model_element.has("ros2_control") || !model.sensors.empty()) return true;
+  return std::any_of(plugins.begin(), plugins.end(), [](const Element* each) {
+    const auto does = kind_of(*each).does;
+    return does == PluginKind::Does::control || does == PluginKind::Does::drive;
+  });
+}
+
+// Joints that a plugin of their own turns are no drive's.
+bool is_turned_by_plugin(const std::vector<const Element*>& plugins, const std::string& joint) {
+  return std::any_of(plugins.begin(), plugins.end(), [&](const Element* each) {
+    if (kind_of(*each).does != PluginKind::Does::joints || kind_of(*each).name.find("StatePublisher") != std::string::npos) return false;
+    const auto names = each->all("joint_name");
+    return std::any_of(names.begin(), names.end(), [&](const Element* name) { return name->text == joint; });
+  });
+}
+
+std::string joined(const std::vector<std::string>& names, const char* between) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : between) + name;
+  return text;
+}
+
+// The drive of a robot for which no element and no plugin of a drive speaks.
+void find_drive(const Element& model_element, const std::vector<const Element*>& plugins, std::shared_ptr<const Element> odometry,
+                const std::string& where, ReadContext& context, Model& model) {
+  if (!looks_like_robot(model_element, plugins, model)) return;
+  ControllersDrive controllers = drive_from_controllers(model_element, plugins, model, where, context);
+  if (controllers.drive) {
+    const Source source = controllers.drive->source;
+    if (!odometry) odometry = std::move(controllers.odometry);
+    try {
+      model.drive = read_drive(std::move(controllers.drive), odometry, model);
+      if (!controllers.named) {
+        context.findings.repaired(source, where, "it drives as the controller " + controllers.controller + " says, which has its joints; no plugin names the file");
+      }
+      return;
+    } catch (const InputError& error) {
+      context.findings.error(error.source(), where, "the controller " + controllers.controller + " cannot be used: " + error.message());
+    }
+  }
+  GuessedDrive guess = guess_drive(model, controlled_joints(model_element));
+  if (std::any_of(guess.wheels.begin(), guess.wheels.end(), [&](const std::string& wheel) { return is_turned_by_plugin(plugins, wheel); })) return;
+  const std::string flag = "--drive " + model.name + "=LEFT+...,RIGHT+...";
+  if (guess.drive) {
+    try {
+      model.drive = read_drive(std::move(guess.drive), odometry, model);
+      model.drive->guessed = true;
+      context.findings.repaired(model_element.source, where, std::string(kNoDriveIsWritten) + "; guessed from its wheels: " + guess.in_words + " (" + flag + " says it otherwise)");
+      return;
+    } catch (const InputError&) {    // what looked like wheels is none
+    }
+  }
+  if (!guess.wheels.empty()) {
+    context.findings.unsupported(model_element.source, where, std::string(kNoDriveIsWritten) + ", and it stands still; " + flag + " makes it drive, with wheels of " + joined(guess.wheels, ", "));
+  }
+}
+
+}  // namespace
+
 void read_drive_of(const Element& model_element, const std::string& where, ReadContext& context, Model& model) {
   std::shared_ptr<const Element> odometry;
   if (const Element* written = model_element.child("ruedo:odometry")) odometry = written->clone();
@@ -169,34 +410,24 @@ void read_drive_of(const Element& model_element, const std::string& where, ReadC
   }
   std::vector<const Element*> plugins;
   collect_plugins(model_element, plugins);
-  std::string others;
-  const Element* first_other = nullptr;
+  std::set<std::string> named;
   for (const Element* plugin : plugins) {
-    if (auto translated = drive_from_plugin(*plugin)) {
-      if (model.drive) {
-        if (model_element.has("ruedo:drive")) continue;    // Ruedo's own element is there instead of it
-        context.findings.unsupported(plugin->source, where, "a second drive; the first one is used");
-        continue;
-      }
-      try {
-        model.drive = read_drive(std::move(translated), odometry, model);
-      } catch (const InputError& error) {
-        context.findings.error(error.source(), where, "the drive plugin cannot be used: " + error.message());
-      }
+    const PluginKind kind = kind_of(*plugin);
+    model.commanded |= kind.does == PluginKind::Does::joints || kind.does == PluginKind::Does::control;
+    name_plugin(*plugin, kind, where, context.findings, named);
+    auto translated = drive_from_plugin(*plugin);
+    if (!translated || model_element.has("ruedo:drive")) continue;    // Ruedo's own element is there instead of it
+    if (model.drive) {
+      context.findings.unsupported(plugin->source, where, "a second drive; the first one is used");
       continue;
     }
-    model.commanded |= commands_joints(*plugin);
-    if (const char* why = unsupported_drive(*plugin); why && !model_element.has("ruedo:drive")) {
-      context.findings.unsupported(plugin->source, where, why);
-      continue;
+    try {
+      model.drive = read_drive(std::move(translated), odometry, model);
+    } catch (const InputError& error) {
+      context.findings.error(error.source(), where, "the drive plugin cannot be used: " + error.message());
     }
-    const std::string* file = plugin->attribute("filename");
-    const std::string name = file ? *file : "(without a filename)";
-    if (others.find(name) != std::string::npos) continue;
-    others += (others.empty() ? "" : ", ") + name;
-    if (!first_other) first_other = plugin;
   }
-  if (first_other) context.findings.unsupported(first_other->source, where, "plugins are not loaded: " + others);
+  if (!model.drive) find_drive(model_element, plugins, odometry, where, context, model);
   if (odometry && !model.drive) model_element.child("ruedo:odometry")->fail("needs a drive: the model has no <ruedo:drive>");
   if (odometry && model.drive && !model.drive->odometry) {    // a nested model's drive, odometry given here
     odometry->refuse_unknown(odometry_elements(), false);

@@ -20,11 +20,11 @@ DriveDescription read_drive(std::shared_ptr<const Element> drive, std::shared_pt
 // A Gazebo drive plugin as <ruedo:drive>; null when the plugin is another one.
 std::unique_ptr<Element> drive_from_plugin(const Element& plugin);
 
-// Whether a plugin moves a model's joints, or publishes them: what ROBOT/joints and ROBOT/joint_command do here.
-bool commands_joints(const Element& plugin);
+// As <ruedo:drive steering=""> has it: "differential", "mecanum", ...
+std::string name_of(DriveDescription::Steering steering);
 
-// What is to be said of a drive plugin of another kind; null for other plugins.
-const char* unsupported_drive(const Element& plugin);
+// What findings about a drive that no file has begin with.
+inline constexpr const char* kNoDriveIsWritten = "no file says how it drives";
 
 // What may stand in <ruedo:drive> and <ruedo:odometry>.
 const std::vector<std::string>& drive_elements();

@@ -2,10 +2,10 @@
 //
 // Names of parameters are those of the plugins' own documentation; each plugin has had several spellings.
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 
 #include "model/drive.h"
+#include "model/plugins.h"
 
 namespace ruedo::model {
 namespace {
@@ -25,8 +25,14 @@ constexpr Parameter kParameters[] = {
     {"wheelDiameter", "ruedo:wheel_radius", Unit::half},
     {"wheel_separation", "ruedo:track"},
     {"wheelSeparation", "ruedo:track"},
+    {"tracks_separation", "ruedo:track"},
+    {"wheel_base", "ruedo:wheelbase"},
+    {"wheelbase", "ruedo:wheelbase"},
+    {"steering_limit", "ruedo:max_steering_angle"},
+    {"max_steer", "ruedo:max_steering_angle"},
     {"max_linear_velocity", "ruedo:max_speed"},
     {"max_velocity", "ruedo:max_speed"},
+    {"max_speed", "ruedo:max_speed"},
     {"max_angular_velocity", "ruedo:max_turn_rate"},
     {"max_linear_acceleration", "ruedo:acceleration"},
     {"max_acceleration", "ruedo:acceleration"},
@@ -41,22 +47,37 @@ constexpr Parameter kParameters[] = {
     {"MaxForce", "ruedo:max_wheel_torque"},
 };
 
-constexpr const char* kLeft[] = {"left_joint", "leftJoint", "left_front", "leftFrontJoint", "left_rear", "leftRearJoint"};
-constexpr const char* kRight[] = {"right_joint", "rightJoint", "right_front", "rightFrontJoint", "right_rear", "rightRearJoint"};
+struct Joints {
+  const char* ours;
+  std::initializer_list<const char*> theirs;
+};
 
-bool is_one_of(const Element& plugin, std::initializer_list<const char*> known) {
-  std::string name;
-  for (const char* key : {"filename", "name"}) {
-    if (const std::string* value = plugin.attribute(key)) name += *value + " ";
-  }
-  for (char& c : name) c = c == '-' || c == '_' ? ' ' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return std::any_of(known.begin(), known.end(), [&](const char* each) { return name.find(each) != std::string::npos; });
-}
+const Joints kJoints[] = {
+    {"ruedo:left_joint", {"left_joint", "leftJoint", "left_front", "leftFrontJoint", "left_rear", "leftRearJoint", "front_left_joint", "back_left_joint",
+                          "rear_left_joint", "rearLeftJoint", "frontLeftJoint", "leftMiddleJoint", "frontLeftWheelJoint", "rearLeftWheelJoint"}},
+    {"ruedo:right_joint", {"right_joint", "rightJoint", "right_front", "rightFrontJoint", "right_rear", "rightRearJoint", "front_right_joint",
+                           "back_right_joint", "rear_right_joint", "rearRightJoint", "frontRightJoint", "rightMiddleJoint", "frontRightWheelJoint", "rearRightWheelJoint"}},
+    {"ruedo:steer_joint", {"left_steering_joint", "right_steering_joint", "steeringJoint", "steering_joint"}},
+};
 
-bool is_drive(const Element& plugin) {
-  return is_one_of(plugin, {"gazebo ros diff drive", "diffdriveplugin", "diff drive system", "systems::diffdrive", "skidsteerdriveplugin",
-                            "skid steer drive"});
-}
+struct Steered {
+  const char* plugin;
+  const char* steering;
+};
+
+constexpr Steered kSteering[] = {
+    {"MecanumDrive", "mecanum"},
+    {"gazebo_ros_mecanum", "mecanum"},
+    {"AckermannSteering", "ackermann"},
+    {"gazebo_ros_ackermann_drive", "ackermann"},
+    {"gazebo_ros_tricycle_drive", "tricycle"},
+    {"TrackedVehicle", "tracked"},
+    {"SimpleTrackedVehiclePlugin", "tracked"},
+    {"VelocityControl", "holonomic"},
+    {"gazebo_ros_planar_move", "holonomic"},
+    {"gazebo_ros_force_based_move", "holonomic"},
+    {"hector_gazebo_ros_force_based_move", "holonomic"},
+};
 
 void add(Element& drive, const char* name, const std::string& text, const Source& source) {
   auto child = std::make_unique<Element>();
@@ -68,29 +89,20 @@ void add(Element& drive, const char* name, const std::string& text, const Source
 
 }  // namespace
 
-bool commands_joints(const Element& plugin) {
-  return is_one_of(plugin, {"joint controller", "joint position controller", "joint trajectory controller", "joint state publisher",
-                            "joint pose trajectory", "ros control", "ros2 control"});
-}
-
-const char* unsupported_drive(const Element& plugin) {
-  if (is_one_of(plugin, {"ackermann"})) return "an Ackermann drive is not supported, only differential ones are: the robot stands still";
-  if (is_one_of(plugin, {"mecanum", "omni", "planar move", "tricycle"})) {
-    return "an omnidirectional or tricycle drive is not supported, only differential ones are: the robot stands still";
-  }
-  return nullptr;
-}
-
 std::unique_ptr<Element> drive_from_plugin(const Element& plugin) {
-  if (!is_drive(plugin)) return nullptr;
+  const PluginKind kind = kind_of(plugin);
+  if (kind.does != PluginKind::Does::drive) return nullptr;
+  // One that only starts something moving, as obstacles are, takes no commands on the ground.
+  if (kind.name == "VelocityControl" && (plugin.has("initial_linear") || plugin.has("initial_angular"))) return nullptr;
   auto drive = std::make_unique<Element>();
   drive->name = "ruedo:drive";
   drive->source = plugin.source;
-  for (const char* name : kLeft) {
-    for (const Element* joint : plugin.all(name)) add(*drive, "ruedo:left_joint", joint->text, joint->source);
-  }
-  for (const char* name : kRight) {
-    for (const Element* joint : plugin.all(name)) add(*drive, "ruedo:right_joint", joint->text, joint->source);
+  const auto steered = std::find_if(std::begin(kSteering), std::end(kSteering), [&](const Steered& each) { return each.plugin == kind.name; });
+  if (steered != std::end(kSteering)) drive->attributes.emplace_back("steering", steered->steering);
+  for (const Joints& each : kJoints) {
+    for (const char* name : each.theirs) {
+      for (const Element* joint : plugin.all(name)) add(*drive, each.ours, joint->text, joint->source);
+    }
   }
   for (const Parameter& each : kParameters) {
     const Element* given = plugin.child(each.theirs);

@@ -135,17 +135,22 @@ std::optional<Geometry> read_geometry(const Element& element, const std::string&
     if (!shape->has(name)) shape->fail(std::string("has no <") + name + ">");
     return shape->number(name, 0, not_negative);
   };
+  // Where SDF has a default, a file may rely on it.
+  const auto or_default = [&](const char* name, const auto& value) {
+    if (!shape->has(name)) context.findings.repaired(shape->source, where, "a <" + shape->name + "> without <" + name + ">; it is " + value + " as in SDF's description");
+  };
   const std::string& kind = shape->name;
   Geometry g;
   if (kind == "box") {
     g.shape = Shape::box;
-    if (!shape->has("size")) shape->fail("has no <size>");
+    or_default("size", "1 1 1");
     g.size = shape->vector3("size", Vec3::Ones());
     if (g.size.minCoeff() < 0) shape->child("size")->fail("'" + shape->child("size")->text + "' is not allowed; sizes are above 0");
     if (g.size.minCoeff() == 0) return nothing("size");
   } else if (kind == "sphere") {
     g.shape = Shape::sphere;
-    g.size = Vec3::Constant(required("radius"));
+    or_default("radius", "1");
+    g.size = Vec3::Constant(shape->number("radius", 1, not_negative));
     if (g.size.x() == 0) return nothing("radius");
   } else if (kind == "cylinder" || kind == "capsule" || kind == "cone") {
     g.shape = kind == "cylinder" ? Shape::cylinder : kind == "cone" ? Shape::cone : Shape::capsule;
@@ -154,7 +159,7 @@ std::optional<Geometry> read_geometry(const Element& element, const std::string&
     if (g.size.y() == 0 && kind != "capsule") return nothing("length");
   } else if (kind == "ellipsoid") {
     g.shape = Shape::ellipsoid;
-    if (!shape->has("radii")) shape->fail("has no <radii>");
+    or_default("radii", "1 1 1");
     g.size = shape->vector3("radii", Vec3::Ones());
     if (g.size.minCoeff() < 0) shape->child("radii")->fail("'" + shape->child("radii")->text + "' is not allowed; radii are above 0");
     if (g.size.minCoeff() == 0) return nothing("radii");
@@ -164,7 +169,11 @@ std::optional<Geometry> read_geometry(const Element& element, const std::string&
     if (!(normal.norm() > 1e-9)) shape->child("normal")->fail("'" + shape->child("normal")->text + "' is not allowed; a normal is not zero");
     g.normal = normal.normalized();
     if (const Element* size = shape->child("size")) {
-      const std::vector<double> v = size->as_numbers();
+      std::vector<double> v = size->as_numbers();
+      if (v.size() == 3) {    // of a box, which some files have here
+        context.findings.repaired(size->source, where, "<size> of a plane has two numbers; the third is left out");
+        v.pop_back();
+      }
       if (v.size() != 2 || v[0] <= 0 || v[1] <= 0) size->fail("'" + size->text + "' is not allowed; allowed are two numbers above 0");
       g.extent = {v[0], v[1]};
     }

@@ -13,6 +13,7 @@
 #include <assimp/BaseImporter.h>
 #include <assimp/DefaultIOSystem.h>
 #include <assimp/Importer.hpp>
+#include <assimp/MemoryIOWrapper.h>
 #include <assimp/config.h>
 #include <assimp/material.h>
 #include <assimp/postprocess.h>
@@ -43,6 +44,7 @@ class NotingFiles : public Assimp::DefaultIOSystem {
     const auto inside = relative(path);
     if (!inside || std::strchr(mode, 'w') || std::strchr(mode, 'a')) return nullptr;
     note(*inside, Assimp::DefaultIOSystem::Exists(path));
+    if (folder_ / *inside == mesh_ && (mesh_.extension() == ".dae" || mesh_.extension() == ".DAE")) return without_leading_blanks();
     return Assimp::DefaultIOSystem::Open(path, mode);
   }
   std::vector<MeshDependency> dependencies() const {
@@ -52,6 +54,19 @@ class NotingFiles : public Assimp::DefaultIOSystem {
   }
 
  private:
+  // assimp takes a colour with a blank before its first number (" 0.3 0.3 0.3 1") for none, and refuses the file.
+  Assimp::IOStream* without_leading_blanks() const {
+    const std::string text = read_text_file(mesh_.string(), MeshLimits::kFileBytes);
+    auto* kept = new uint8_t[text.size() + 1];    // the stream owns it
+    size_t size = 0;
+    for (size_t i = 0; i < text.size();) {
+      kept[size++] = static_cast<uint8_t>(text[i++]);
+      if (kept[size - 1] != '>') continue;
+      const size_t number = text.find_first_not_of(" \t\r\n", i);
+      if (number != std::string::npos && std::strchr("+-.0123456789", text[number])) i = number;
+    }
+    return new Assimp::MemoryIOStream(kept, size, true);
+  }
   std::optional<std::string> relative(const char* path) const {
     const fs::path full = fs::weakly_canonical(fs::path(path).is_absolute() ? fs::path(path) : folder_ / path);
     const fs::path inside = full.lexically_relative(folder_);

@@ -2,14 +2,17 @@
 #include "model/load.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
+#include "model/drive.h"
 #include "model/placement.h"
 #include "model/sdf_link.h"
 #include "model/sdf_reader.h"
 #include "model/settings.h"
 #include "model/urdf.h"
 #include "model/world_name.h"
+#include "model/xacro.h"
 
 namespace fs = std::filesystem;
 
@@ -28,11 +31,17 @@ constexpr const char* kEmptyWorld = R"(<sdf version="1.9"><world name="empty">
 
 class Loader {
  public:
-  Loader(const std::string& path, bool allow_absolute)
-      : resources_(path, allow_absolute), meshes_(resources_), context_{findings_, resources_, documents_, meshes_}, reader_(context_), path_(path) {}
+  Loader(const std::string& path, const LoadOptions& options)
+      : resources_(path, options.allow_absolute),
+        meshes_(resources_),
+        context_{findings_, resources_, documents_, meshes_, options.xacro_arguments},
+        reader_(context_),
+        path_(path) {}
 
-  std::shared_ptr<const WorldModel> load(const Element& root, const LoadOptions& options) {
+  std::shared_ptr<const WorldModel> load(const Element& written, const LoadOptions& options) {
     world_.file = path_;
+    const std::shared_ptr<const Element> expanded = is_xacro(path_, &written) ? expand_xacro(path_, context_) : nullptr;
+    const Element& root = expanded ? *expanded : written;
     reader_.enter(path_, root);
     if (root.name == "robot") read_robot(root);
     else read_sdf(root);
@@ -45,6 +54,7 @@ class Loader {
     apply_settings(options.settings, world_);
     apply_disabled(options.disabled, world_);
     world_.findings = findings_.list();
+    std::erase_if(world_.findings, [&](const Finding& finding) { return is_settled(finding); });
     for (const std::string& file : meshes_.files_read()) documents_.note(file);
     world_.files_read = documents_.files_read();
     return std::make_shared<const WorldModel>(std::move(world_));
@@ -149,10 +159,34 @@ class Loader {
     }
     const Pose X_WM = room.standing_on(*model, spawn.x, spawn.y, spawn.yaw);
     if (const std::string other = room.overlapped(*model, X_WM); !other.empty()) {
-      throw InputError({}, what + "@" + shown(spawn.x) + "," + shown(spawn.y) + (spawn.yaw != 0 ? "," + shown(spawn.yaw) : "") + ": there is no room, it would stand in '" + other + "'");
+      throw InputError({}, what + "@" + shown(spawn.x) + "," + shown(spawn.y) + (spawn.yaw != 0 ? "," + shown(spawn.yaw) : "") + ": there is no room, it would stand in '" + other + "'" + nearest_place(*model, spawn, room));
     }
     add(name, X_WM, std::move(model), {});
     room.add(world_.models.back());
+  }
+
+  // A guess at a drive, for a model that an <include> or --drive gave one.
+  bool is_settled(const Finding& finding) const {
+    if (finding.text.rfind(kNoDriveIsWritten, 0) != 0) return false;
+    return std::none_of(world_.models.begin(), world_.models.end(), [&](const ModelInstance& each) {
+      const Model& model = *each.model;
+      return model.source.str() == finding.source.str() && (!model.drive || model.drive->guessed);
+    });
+  }
+
+  // In rings about the place that was wanted: "; the nearest free place is 1.5,2".
+  static std::string nearest_place(const Model& model, const Spawn& spawn, const Room& room) {
+    constexpr double kApart_m = 0.25;
+    constexpr int kRings = 40, kAround = 16;
+    for (int ring = 1; ring <= kRings; ++ring) {
+      for (int i = 0; i < kAround; ++i) {
+        const double angle = 2 * M_PI * i / kAround;
+        const auto rounded = [](double value) { return std::round(value * 100) / 100; };
+        const double x = rounded(spawn.x + ring * kApart_m * std::cos(angle)), y = rounded(spawn.y + ring * kApart_m * std::sin(angle));
+        if (room.overlapped(model, room.standing_on(model, x, y, spawn.yaw)).empty()) return "; the nearest free place is " + shown(x) + "," + shown(y);
+      }
+    }
+    return "";
   }
 
   Findings findings_;
@@ -172,10 +206,7 @@ std::shared_ptr<const WorldModel> load_world(const std::string& name, const Load
   std::error_code error;
   fs::path full = fs::weakly_canonical(fs::absolute(path), error);
   if (error) full = fs::absolute(path);
-  if (full.extension() == ".xacro") {
-    throw InputError({path, 0}, "is a xacro file; expand it first: xacro " + full.filename().string() + " > robot.urdf");
-  }
-  Loader loader(full.string(), options.allow_absolute);
+  Loader loader(full.string(), options);
   const auto root = loader.documents().read(full.string());
   return loader.load(*root, options);
 }
@@ -183,7 +214,7 @@ std::shared_ptr<const WorldModel> load_world(const std::string& name, const Load
 std::shared_ptr<const WorldModel> load_world_text(const std::string& text, const std::string& path, const LoadOptions& options) {
   std::error_code error;
   const std::string full = fs::weakly_canonical(fs::absolute(path), error).string();
-  Loader loader(full, options.allow_absolute);
+  Loader loader(full, options);
   std::shared_ptr<const Element> root = parse_document(text, full);
   loader.documents().add(full, root);
   return loader.load(*root, options);

@@ -33,6 +33,7 @@ struct LoadOptions {
   std::vector<Setting> settings;
   std::vector<std::string> disabled;     // "ROBOT/DEVICE"
   std::vector<DriveOption> drives;
+  std::vector<std::string> xacro_arguments;    // "NAME:=VALUE", for xacro files
   bool allow_absolute = false;           // absolute paths in the files may lead out of the search folders
 };
 
@@ -42,7 +43,7 @@ Spawn parse_spawn(const std::string& text);            // MODEL[:NAME]@X,Y[,YAW]
 DriveOption parse_drive(const std::string& text);      // ROBOT=LEFT[+LEFT...],RIGHT[+RIGHT...]
 Setting parse_setting(const std::string& text);        // ROBOT/DEVICE.KEY=VALUE
 
-// Loads an SDF world, an SDF model or a URDF robot (the latter two in an empty world with a ground plane): a file, or the
+// Loads an SDF world, an SDF model or a URDF robot, as it is or as xacro (the latter in an empty world with a ground plane): a file, or the
 // name of a world that comes with Ruedo or lies in a folder of RUEDO_PATH ("arena").
 // Throws InputError for what cannot be loaded; what can be gone on from is in WorldModel::findings.
 std::shared_ptr<const WorldModel> load_world(const std::string& name, const LoadOptions& options = {});

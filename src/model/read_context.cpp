@@ -23,7 +23,8 @@ void report_other_children(const Element& element, const std::vector<std::string
   element.refuse_unknown(known, true);
   for (const auto& child : element.children) {
     if (in(known, child->name) || in(silent, child->name) || child->name.find(':') != std::string::npos) continue;
-    const std::string near = nearest_word(child->name, known);
+    const std::string with_prefix = "ruedo:" + child->name;
+    const std::string near = in(known, with_prefix) ? with_prefix : nearest_word(child->name, known);
     findings.unsupported(child->source, where,
                          "<" + child->name + "> is not supported and left out" + (near.empty() ? "" : "; did you mean <" + near + ">?"));
   }

@@ -16,6 +16,7 @@ struct ReadContext {
   const ResourceFinder& resources;
   DocumentStore& documents;
   MeshLoader& meshes;
+  std::vector<std::string> xacro_arguments = {};    // "NAME:=VALUE"
 };
 
 // The name attribute. Throws InputError when it is absent, empty or reserved by SDF ("world", "__model__").
@@ -25,6 +26,29 @@ std::string required_name(const Element& element);
 // but unsupported or unknown elements are findings, those in `silent` and of other namespaces are passed over.
 void report_other_children(const Element& element, const std::vector<std::string>& known,
                            const std::vector<std::string>& silent, const std::string& where, Findings& findings);
+
+// A file that grows without end: it is refused as a whole, not part by part.
+class TooLarge : public InputError {
+ public:
+  using InputError::InputError;
+};
+
+// Runs read(). What is wrong with an element of the format is named, `what` is left out ("the shape"), and false comes back;
+// what is wrong with one of Ruedo's own is the author's, and throws on.
+template <class Read>
+bool read_or_leave_out(const std::string& where, const std::string& what, Findings& findings, Read read) {
+  try {
+    read();
+    return true;
+  } catch (const TooLarge&) {
+    throw;
+  } catch (const InputError& error) {
+    const std::string element = error.message().substr(0, error.message().find('>'));
+    if (element.find("ruedo:") != std::string::npos) throw;
+    findings.error(error.source(), where, error.message() + "; " + what);
+    return false;
+  }
+}
 
 // "arm::wrist", as SDF scopes names, to "arm.wrist", as channels have it.
 std::string dotted(const std::string& scoped);

@@ -90,6 +90,18 @@ std::string tidy(const std::string& path) {
   return text;
 }
 
+// Fuel's own folders hold a model's versions, each in a folder of its number.
+fs::path newest_version(const fs::path& model) {
+  if (is_there(model / "model.config") || is_there(model / "model.sdf")) return model;
+  int newest = 0;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(model, error)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.empty() && name.size() < 7 && name.find_first_not_of("0123456789") == std::string::npos) newest = std::max(newest, std::stoi(name));
+  }
+  return newest > 0 ? model / std::to_string(newest) : model;
+}
+
 // The name that a ROS package's manifest gives; "" when there is none that can be read.
 std::string package_name(const fs::path& folder) {
   const fs::path manifest = folder / "package.xml";
@@ -123,7 +135,7 @@ ResourceFinder::ResourceFinder(const std::string& top_file, bool allow_absolute)
     add_folder(far_, fs::path(worlds) / "models");
   }
   for (const char* name : {"RUEDO_PATH", "GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "IGN_GAZEBO_RESOURCE_PATH",
-                           "SDF_PATH", "ROS_PACKAGE_PATH"}) {
+                           "GAZEBO_RESOURCE_PATH", "SDF_PATH", "ROS_PACKAGE_PATH"}) {
     add_variable(far_, name);
   }
   if (const char* prefixes = std::getenv("AMENT_PREFIX_PATH")) {
@@ -134,7 +146,22 @@ ResourceFinder::ResourceFinder(const std::string& top_file, bool allow_absolute)
       rest = colon == std::string::npos ? "" : rest.substr(colon + 1);
     }
   }
-  if (const char* home = std::getenv("HOME")) add_folder(far_, fs::path(home) / ".gazebo/models");
+  if (const char* home = std::getenv("HOME")) {
+    add_folder(far_, fs::path(home) / ".gazebo/models");
+    for (const char* cache : {".gz/fuel/fuel.gazebosim.org", ".ignition/fuel/fuel.gazebosim.org", ".ignition/fuel/fuel.ignitionrobotics.org"}) {
+      std::vector<fs::path> owners;
+      std::error_code error;
+      for (const auto& entry : fs::directory_iterator(fs::path(home) / cache, error)) owners.push_back(entry.path());
+      std::sort(owners.begin(), owners.end());
+      for (const fs::path& owner : owners) add_folder(far_, owner / "models");
+    }
+  }
+}
+
+std::vector<std::string> ResourceFinder::folders() const {
+  std::vector<std::string> all = near_;
+  all.insert(all.end(), far_.begin(), far_.end());
+  return all;
 }
 
 std::vector<std::string> ResourceFinder::roots_for(const std::string& from) const {
@@ -194,7 +221,7 @@ std::optional<std::string> ResourceFinder::find(const std::string& written, cons
       std::vector<std::string> matches;
       std::error_code error;
       for (const auto& entry : fs::directory_iterator(root, error)) {
-        if (plain_name(entry.path().filename().string()) == name) matches.push_back((entry.path() / rest).string());
+        if (plain_name(entry.path().filename().string()) == name) matches.push_back((newest_version(entry.path()) / rest).string());
       }
       std::sort(matches.begin(), matches.end());
       for (const auto& match : matches) {
@@ -221,6 +248,12 @@ std::optional<std::string> ResourceFinder::find(const std::string& written, cons
   else if (path.find("://") != std::string::npos) return std::nullopt;
 
   const bool absolute = fs::path(path).is_absolute();
+  if (starts_with(uri, "file://") && !absolute) {    // "file://models/x/mesh.dae", from a file below that models
+    const fs::path top = *fs::path(tidy(path)).begin();
+    for (fs::path folder = fs::path(from).parent_path(); folder.has_relative_path() && top != ".."; folder = folder.parent_path()) {
+      if (folder.filename() == top && is_there(folder.parent_path() / tidy(path))) return full_path(folder.parent_path() / tidy(path));
+    }
+  }
   const std::string beside = (absolute ? fs::path(path) : fs::path(from).parent_path() / path).lexically_normal().string();
   if (is_there(beside) && ((absolute && allow_absolute_) || allowed(beside, from))) return full_path(beside);
   if (absolute) return std::nullopt;

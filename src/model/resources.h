@@ -31,6 +31,9 @@ class ResourceFinder {
   // Why find() gave nothing, for messages: "is not found", or that it leads out of the folders that are searched.
   std::string why_not(const std::string& uri, const std::string& from) const;
 
+  // The folders that are searched wherever a file lies.
+  std::vector<std::string> folders() const;
+
   // A texture, named in `from`: as find(), then by its file name in the usual folders beside.
   std::optional<std::string> find_texture(const std::string& name, const std::string& from) const;
 

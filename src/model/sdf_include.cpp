@@ -4,6 +4,7 @@
 
 #include "model/sdf_reader.h"
 #include "model/urdf.h"
+#include "model/xacro.h"
 
 namespace ruedo::model {
 
@@ -49,6 +50,7 @@ SdfReader::Included SdfReader::read_file(const std::string& path, const Element&
   }
   Included result;
   result.document = context_.documents.read(path);
+  if (is_xacro(path, result.document.get())) result.document = expand_xacro(path, context_);
   std::error_code none;    // it says which file of its folder is the model's
   const auto config = std::filesystem::path(path).parent_path() / "model.config";
   if (std::filesystem::is_regular_file(config, none)) context_.documents.note(config.string());
@@ -112,6 +114,10 @@ std::optional<SdfReader::Included> SdfReader::include(const Element& element, co
   if (!uri || uri->text.empty()) element.fail("has no <uri>");
   const auto path = context_.resources.find_model(uri->text, element.source.file);
   if (!path) {
+    if (uri->text.rfind("https://fuel.", 0) == 0 || uri->text.rfind("http://fuel.", 0) == 0) {    // one text, so that they are one list
+      context_.findings.error(element.source, where + " " + uri->text, "models of Fuel that are not here; the world goes on without them. `gz fuel download -u URI` fetches each");
+      return std::nullopt;
+    }
     context_.findings.error(element.source, where, "'" + uri->text + "' " + context_.resources.why_not(uri->text, element.source.file) + "; the world goes on without it");
     return std::nullopt;
   }

@@ -1,4 +1,5 @@
 // <joint>: type, frames, axes and limits.
+#include <algorithm>
 #include <cmath>
 
 #include "model/sdf_reader.h"
@@ -55,6 +56,17 @@ JointAxis read_axis(const Element& element, SdfVersion version, const Pose& X_MJ
   return axis;
 }
 
+// Whether a joint's settings of the solver say anything but what Gazebo writes out for all of them.
+bool sets_anything(const Element& element) {
+  if (element.children.empty() && !element.text.empty()) {
+    for (const char* usual : {"0", "0.0", "1", "0.2", "true", "false"}) {
+      if (element.text == usual) return false;
+    }
+    return element.text.find_first_of("123456789") != std::string::npos;
+  }
+  return std::any_of(element.children.begin(), element.children.end(), [](const auto& child) { return sets_anything(*child); });
+}
+
 }  // namespace
 
 std::string joint_end(const Element& joint, const char* which) {
@@ -65,6 +77,9 @@ Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
                  const std::string& where, ReadContext& context) {
   report_other_children(element, {"parent", "child", "pose", "axis", "axis2", "sensor"},
                         {"physics", "thread_pitch", "screw_thread_pitch", "gearbox_ratio", "gearbox_reference_body"}, where, context.findings);
+  if (const Element* solver = element.child("physics"); solver && sets_anything(*solver)) {
+    context.findings.unsupported(solver->source, where, "<physics> of a joint is not supported: the solver's own settings hold");
+  }
   Joint joint;
   joint.name = dotted(required_name(element));
   joint.source = element.source;

@@ -72,7 +72,9 @@ Visual read_visual(const Element& element, const Pose& X_LV, Geometry geometry, 
   v.name = required_name(element);
   v.X_LV = X_LV;
   v.geometry = std::move(geometry);
-  if (const Element* material = element.child("material")) v.material = read_material(*material, where, context);
+  if (const Element* material = element.child("material")) {
+    read_or_leave_out(where, "the material is left out", context.findings, [&] { v.material = read_material(*material, where, context); });
+  }
   v.transparency = element.number("transparency", 0, Allowed::between(0, 1));
   v.cast_shadows = element.boolean("cast_shadows", true);
   return v;
@@ -161,7 +163,7 @@ bool computed_inertial(const Element& element, const Element& link_element, cons
 }
 
 Inertial read_inertial(const Element& element, const Element& link_element, const Link& link, const Pose& X_LI, const std::string& where, ReadContext& context) {
-  report_other_children(element, {"pose", "mass", "inertia", "density"}, {"fluid_added_mass", "auto_inertia_params"}, where, context.findings);
+  report_other_children(element, {"pose", "mass", "inertia", "density"}, {"auto_inertia_params"}, where, context.findings);
   Inertial inertial;
   inertial.X_LI = X_LI;
   inertial.mass = element.number("mass", 1.0);
@@ -246,7 +248,7 @@ void collect_plugins(const Element& element, std::vector<const Element*>& plugin
 Link read_link(const Element& element, const PoseInLink& pose_in_link, const std::string& where, ReadContext& context,
                int index, std::vector<SensorDescription>& sensors) {
   report_other_children(element, {"pose", "inertial", "collision", "visual", "sensor", "light", "gravity", "kinematic"},
-                        {"self_collide", "enable_wind", "velocity_decay", "must_be_base_link", "plugin", "battery"}, where,
+                        {"self_collide", "enable_wind", "velocity_decay", "must_be_base_link", "plugin"}, where,
                         context.findings);
   Link link;
   link.name = required_name(element);
@@ -264,26 +266,32 @@ Link read_link(const Element& element, const PoseInLink& pose_in_link, const std
     if (names.insert(child.name + " " + required_name(child)).second) return;
     child.fail("a second <" + child.name + "> named '" + required_name(child) + "' in this link");
   };
+  const auto read_shape = [&](const Element& child) {
+    unique(child);
+    const std::string here = where + "/" + child.name + " " + required_name(child);
+    const Element* shape = child.child("geometry");
+    if (!shape) child.fail("has no <geometry>");
+    auto geometry = read_geometry(*shape, here, context);
+    if (!geometry) return;
+    const Pose pose = pose_in_link(child);
+    if (child.name == "collision") link.collisions.push_back(read_collision(child, pose, std::move(*geometry), here, context));
+    else link.visuals.push_back(read_visual(child, pose, std::move(*geometry), here, context));
+  };
   for (const auto& child : element.children) {
     if (child->name == "collision" || child->name == "visual") {
-      unique(*child);
-      const std::string here = where + "/" + child->name + " " + required_name(*child);
-      const Element* shape = child->child("geometry");
-      if (!shape) child->fail("has no <geometry>");
-      auto geometry = read_geometry(*shape, here, context);
-      if (!geometry) continue;
-      Pose pose = pose_in_link(*child);
-      if (child->name == "collision") link.collisions.push_back(read_collision(*child, pose, std::move(*geometry), here, context));
-      else link.visuals.push_back(read_visual(*child, pose, std::move(*geometry), here, context));
+      read_or_leave_out(where, "the shape is left out", context.findings, [&] { read_shape(*child); });
     } else if (child->name == "light") {
-      link.lights.push_back(read_light(*child, pose_in_link(*child), where + "/light", context));
+      read_or_leave_out(where, "the light is left out", context.findings, [&] { link.lights.push_back(read_light(*child, pose_in_link(*child), where + "/light", context)); });
     } else if (child->name == "sensor") {
-      unique(*child);
-      sensors.push_back(read_sensor(*child, index, pose_in_link(*child)));
+      read_or_leave_out(where, "the sensor is left out", context.findings, [&] {
+        unique(*child);
+        sensors.push_back(read_sensor(*child, index, pose_in_link(*child)));
+      });
     }
   }
   if (const Element* inertial = element.child("inertial")) {
-    link.inertial = read_inertial(*inertial, element, link, pose_in_link(*inertial), where + "/inertial", context);
+    read_or_leave_out(where, "a mass of 1 kg is taken", context.findings,
+                      [&] { link.inertial = read_inertial(*inertial, element, link, pose_in_link(*inertial), where + "/inertial", context); });
   }
   return link;
 }

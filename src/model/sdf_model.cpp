@@ -1,9 +1,11 @@
 // <model>: its frames, links and joints; nested models flattened into it.
 #include <algorithm>
+#include <set>
 
 #include "model/drive.h"
 #include "model/sdf_link.h"
 #include "model/sdf_reader.h"
+#include "model/sensor_plugins.h"
 
 namespace ruedo::model {
 namespace {
@@ -54,7 +56,7 @@ void append_nested(const Nested& nested, const Pose& X_MN, Model& into, Findings
   into.commanded |= from.commanded;
   if (from.drive && !into.drive) {
     into.drive = from.drive;
-    for (auto* joints : {&into.drive->left_joints, &into.drive->right_joints}) {
+    for (auto* joints : {&into.drive->left_joints, &into.drive->right_joints, &into.drive->steer_joints}) {
       for (int& joint : *joints) joint += first_joint;
     }
     into.drive->X_MBase = X_MN * into.drive->X_MBase;
@@ -86,7 +88,7 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
   const std::string where = "model " + model->name;
   report_other_children(element,
                         {"link", "joint", "frame", "model", "include", "pose", "static", "self_collide", "plugin", "ruedo:drive",
-                         "ruedo:joints", "ruedo:odometry", "ruedo:path"},
+                         "ruedo:joints", "ruedo:odometry", "ruedo:path", "transmission", "ros2_control"},
                         {"allow_auto_disable", "enable_wind"}, where, context_.findings);
   model->source = element.source;
   model->is_static = element.boolean("static", false);
@@ -102,11 +104,15 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
   size_t link_count = 0;
   int first_own_link = -1;
   bool parts_missing = false;
-  for (const auto& child : element.children) {
+  std::set<const Element*> left_out;
+  const auto read_part = [&](const Element* child) {
     FrameGraph::Node node;
-    node.element = child.get();
+    node.element = child;
+    // A frame may be named like something else; everything else may not.
+    const auto is_taken = [&] { return child->name == "frame" && frames.has(node.name); };
     if (child->name == "link") {
       node.name = required_name(*child);
+      if (frames.has(node.name)) frames.add(std::move(node));    // throws
       node.pose = child->pose("pose");
       node.relative_to = relative_to(*child);
       node.link = static_cast<int>(link_count++);
@@ -138,7 +144,7 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
       }
       if (!part.scope) {
         parts_missing = true;
-        continue;
+        return;
       }
       part.first_link = link_count;
       node.name = part.merged ? "__merged " + std::to_string(nested.size()) + "__" : part.name;
@@ -152,10 +158,27 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
       link_count += part.scope->model->links.size();
       nested.push_back(std::move(part));
     } else {
-      continue;
+      return;
     }
+    if (is_taken()) child->fail("the name '" + node.name + "' is taken in " + where);
     frames.add(std::move(node));
-    if (link_count > kMaxLinks) child->fail("the model has more than " + std::to_string(kMaxLinks) + " links");
+    if (link_count > kMaxLinks) throw TooLarge(child->source, "<" + child->name + ">: the model has more than " + std::to_string(kMaxLinks) + " links");
+  };
+  std::vector<const Element*> in_order;    // frames last: of two of one name the frame goes
+  for (const bool is_frame : {false, true}) {
+    for (const auto& child : element.children) {
+      if ((child->name == "frame") == is_frame) in_order.push_back(child.get());
+    }
+  }
+  for (const Element* child : in_order) {
+    const size_t open_files = files_.size(), links_before = link_count, nested_before = nested.size();
+    const std::string what = child->name == "include" || child->name == "model" ? "part" : child->name;
+    if (read_or_leave_out(where, "the " + what + " is left out", context_.findings, [&] { read_part(child); })) continue;
+    files_.resize(open_files);
+    link_count = links_before;
+    nested.resize(nested_before);
+    left_out.insert(child);
+    parts_missing |= what != "frame";
   }
   if (link_count == 0) {
     context_.findings.error(element.source, where, "it has no link; the model is left out");
@@ -167,6 +190,7 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
   size_t next_nested = 0;
   bool all_static = true;
   for (const auto& child : element.children) {
+    if (left_out.count(child.get())) continue;
     if (child->name == "link") {
       all_static = false;
       const Pose X_ML = frames.pose(required_name(*child), *child);
@@ -198,19 +222,32 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
       }
     }
   }
+  for (const Element* plugin : element.all("plugin")) {
+    read_or_leave_out(where, "the sensor is left out", context_.findings, [&] {
+      const PluginSensor made = sensor_from_plugin(*plugin);
+      if (!made.sensor) return;
+      const int link = made.link.empty() ? 0 : frames.link(made.link, *plugin);
+      if (link < 0) plugin->fail("'" + made.link + "' is no link");
+      model->sensors.push_back(read_sensor(*made.sensor, link, {}));
+    });
+  }
   if (all_static) model->is_static = true;
 
-  read_joints(element, version, frames, parts_missing, where, *model);
+  read_joints(element, version, frames, left_out, parts_missing, where, *model);
   if (!model->is_static) model->joints.insert(model->joints.end(), anchors.begin(), anchors.end());
 
   // Every name's pose and link, for whoever nests or places this model.
   for (const std::string& name : frames.names()) {
-    scope->frames[name] = {frames.pose(name, element), frames.link(name, element)};
+    read_or_leave_out(where, "the frame '" + name + "' is left out", context_.findings,
+                      [&] { scope->frames[name] = {frames.pose(name, element), frames.link(name, element)}; });
   }
   int canonical = first_own_link >= 0 ? first_own_link : 0;
   if (const std::string* name = element.attribute("canonical_link"); name && !name->empty()) {
-    canonical = frames.link(*name, element);
-    if (canonical < 0) element.fail("canonical_link '" + *name + "' is no link");
+    read_or_leave_out(where, "its first link is taken", context_.findings, [&] {
+      const int link = frames.link(*name, element);
+      if (link < 0) element.fail("canonical_link '" + *name + "' is no link");
+      canonical = link;
+    });
   }
   bring_to_front(canonical, *scope, *model);
   make_sensor_names_unique(*model, where, context_.findings);
@@ -229,21 +266,23 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
   return scope;
 }
 
-void SdfReader::read_joints(const Element& element, SdfVersion version, FrameGraph& frames, bool parts_missing,
-                            const std::string& where, Model& model) {
+void SdfReader::read_joints(const Element& element, SdfVersion version, FrameGraph& frames, const std::set<const Element*>& left_out,
+                            bool parts_missing, const std::string& where, Model& model) {
   for (const auto& child : element.children) {
-    if (child->name != "joint") continue;
-    const std::string here = where + "/joint " + required_name(*child);
+    if (child->name != "joint" || left_out.count(child.get())) continue;
+    const std::string name = required_name(*child), here = where + "/joint " + name;
     if (parts_missing) {
       // What was not found may have held its links.
       const std::string parent = joint_end(*child, "parent"), end = joint_end(*child, "child");
       if ((parent != "world" && !frames.has(parent)) || !frames.has(end)) {
         context_.findings.error(child->source, here, "it joins a link of a part that was not found; the joint is left out");
-        frames.drop(required_name(*child));
+        frames.drop(name);
         continue;
       }
     }
-    model.joints.push_back(read_joint(*child, version, frames, model.links, here, context_));
+    const bool read = read_or_leave_out(here, "the joint is left out", context_.findings,
+                                        [&] { model.joints.push_back(read_joint(*child, version, frames, model.links, here, context_)); });
+    if (!read) frames.drop(name);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -52,7 +53,8 @@ class SdfReader {
   std::shared_ptr<const ScopedModel> read_overridden(const Element& model, const Element& include, SdfVersion version);
   // The instances of a <ruedo:fleet>, after what the world has already.
   void read_fleet(const Element& element, WorldModel& world, size_t most_models);
-  void read_joints(const Element& model, SdfVersion version, FrameGraph& frames, bool parts_missing, const std::string& where, Model& result);
+  void read_joints(const Element& model, SdfVersion version, FrameGraph& frames, const std::set<const Element*>& left_out, bool parts_missing,
+                   const std::string& where, Model& result);
 
   ReadContext& context_;
   std::vector<std::string> files_;

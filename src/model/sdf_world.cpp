@@ -2,8 +2,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "model/material.h"
+#include "model/plugins.h"
 #include "model/sdf_link.h"
 #include "model/sdf_reader.h"
 
@@ -41,6 +43,23 @@ void read_physics(const Element& world_element, WorldModel& world, Findings& fin
   }
   world.gravity = world_element.vector3("gravity", world.gravity);
   if (world.gravity.norm() > 1000) world_element.child("gravity")->fail("'" + world_element.child("gravity")->text + "' is not allowed; allowed are up to 1000 m/s^2");
+}
+
+// Of a world, what changes things in Gazebo and does not here, where it says more than the format's own default.
+void name_what_has_no_effect(const Element& world, const std::string& where, Findings& findings) {
+  const auto name = [&](const char* path, const std::string& text) {
+    if (const Element* element = world.child(path)) findings.unsupported(element->source, where, "<" + element->name + "> is not supported: " + text);
+  };
+  try {
+    if (world.vector3("wind/linear_velocity", Vec3::Zero()) != Vec3::Zero()) name("wind", "no wind blows");
+  } catch (const InputError&) {
+    name("wind", "no wind blows");
+  }
+  if (world.string("atmosphere/temperature", "288.15") != "288.15" || world.has("atmosphere/pressure")) name("atmosphere", "the air has no temperature and no pressure");
+  const auto degrees = [&](const char* path) { return world.string(path, "0").find_first_of("123456789") != std::string::npos; };
+  if (degrees("spherical_coordinates/latitude_deg") || degrees("spherical_coordinates/longitude_deg")) name("spherical_coordinates", "the world lies nowhere on Earth, and no sensor asks");
+  name("population", "what it would place is left out");
+  name("audio", "nothing sounds");
 }
 
 void read_scene(const Element& scene, Sky& sky, Findings& findings) {
@@ -185,21 +204,28 @@ std::map<std::string, SavedModel> saved_models(const Element& world, Findings& f
 
 void SdfReader::read_world(const Element& element, SdfVersion version, WorldModel& world) {
   Findings& findings = context_.findings;
-  world.name = required_name(element);
-  report_other_children(element, {"model", "include", "light", "frame", "physics", "gravity", "scene", "actor", "joint", "ruedo:fleet"},
-                        {"gui", "atmosphere", "magnetic_field", "spherical_coordinates", "wind", "audio", "plugin", "state"},
-                        "world " + world.name, findings);
-  read_physics(element, world, findings);
-  if (const Element* scene = element.child("scene")) read_scene(*scene, world.sky, findings);
-
-  std::string plugins;
-  const Element* first_plugin = nullptr;
-  for (const Element* plugin : element.all("plugin")) {
-    const std::string* file = plugin->attribute("filename");
-    plugins += (plugins.empty() ? "" : ", ") + (file ? *file : std::string("(without a filename)"));
-    if (!first_plugin) first_plugin = plugin;
+  const std::string* name = element.attribute("name");    // no name is reserved for it
+  world.name = name ? *name : "";
+  if (world.name.empty()) {
+    world.name = "world";
+    findings.repaired(element.source, "world", "the world has no name; it is called 'world'");
   }
-  if (first_plugin) findings.unsupported(first_plugin->source, "world " + world.name, "plugins of Gazebo's server are not loaded: " + plugins);
+  report_other_children(element, {"model", "include", "light", "frame", "physics", "gravity", "scene", "actor", "joint", "ruedo:fleet"},
+                        {"gui", "atmosphere", "magnetic_field", "spherical_coordinates", "wind", "audio", "plugin", "state", "population"},
+                        "world " + world.name, findings);
+  const std::string in_world = "world " + world.name;
+  read_or_leave_out(in_world, "what is usual is taken", findings, [&] { read_physics(element, world, findings); });
+  if (const Element* scene = element.child("scene")) read_or_leave_out(in_world, "what is usual is taken", findings, [&] { read_scene(*scene, world.sky, findings); });
+  name_what_has_no_effect(element, in_world, findings);
+
+  std::set<std::string> named;
+  for (const Element* plugin : element.all("plugin")) {
+    const PluginKind kind = kind_of(*plugin);
+    const bool dead = kind.does == PluginKind::Does::dead;
+    if (!dead && kind.does != PluginKind::Does::unknown) continue;
+    if (!named.insert(kind.name).second) continue;
+    findings.unsupported(plugin->source, in_world, dead ? "the plugin " + kind.name + " does nothing here: " + kind.would : "plugins of Gazebo's server are not loaded: " + kind.name);
+  }
   if (const Element* joint = element.child("joint")) {
     findings.unsupported(joint->source, "world " + world.name, "joints between models are not supported and left out; put both models, and the joint, into one <model>");
   }
@@ -223,7 +249,7 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     placed.push_back({name, &by, scope});
   };
   std::map<std::string, int> numbers;    // of the next thing of a name
-  for (const auto& child : element.children) {
+  const auto read_child = [&](const std::unique_ptr<Element>& child) {
     FrameGraph::Node node;
     node.element = child.get();
     if (child->name == "model" || child->name == "include") {
@@ -232,51 +258,63 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
         node.name = required_name(*child);
       } else {
         const auto included = include(*child, "world/include");
-        if (!included) continue;
+        if (!included) return;
         if (included->light) {
           world.lights.push_back(read_light(*included->light, child->pose("pose", included->light->pose("pose")), "world/light", context_));
           world.lights.back().name = included->name;
-          continue;
+          return;
         }
         if (included->actor) {
           place_actor(*included->actor, included->name, *child);
-          continue;
+          return;
         }
         node.scope = included->model;
         node.name = included->name;
       }
-      if (!node.scope) continue;
-      if (frames.has(node.name) && !is_robot(node.scope->model)) {
+      if (!node.scope) return;
+      if (frames.has(node.name)) {
         std::string name;
         int& number = numbers.try_emplace(node.name, 2).first->second;
         while (frames.has(name = node.name + "_" + std::to_string(number))) ++number;
         findings.error(child->source, "model " + node.name, "a second thing of the name '" + node.name + "'; this one is called '" + name + "'");
         node.name = name;
       }
-      if (placed.size() >= kMaxModels) child->fail("the world has more than " + std::to_string(kMaxModels) + " models");
+      if (placed.size() >= kMaxModels) throw TooLarge(child->source, "<" + child->name + ">: the world has more than " + std::to_string(kMaxModels) + " models");
       node.pose = node.scope->pose;
       node.relative_to = node.scope->relative_to;
       node.placement_frame = node.scope->placement_frame;
       placed.push_back({node.name, child.get(), node.scope});
     } else if (child->name == "frame") {
       node.name = required_name(*child);
+      if (frames.has(node.name)) child->fail("the name '" + node.name + "' is taken in the world");
       node.pose = child->pose("pose");
       node.relative_to = relative_to(*child);
       if (const std::string* frame = child->attribute("attached_to")) node.attached_to = *frame;
       if (node.relative_to.empty()) node.relative_to = node.attached_to;
     } else if (child->name == "actor") {
       place_actor(*child, required_name(*child), *child);
-      continue;
+      return;
     } else {
-      continue;
+      return;
     }
     frames.add(std::move(node));
+  };
+  std::vector<const std::unique_ptr<Element>*> in_order;    // frames last: of two of one name the frame goes
+  for (const bool is_frame : {false, true}) {
+    for (const auto& child : element.children) {
+      if ((child->name == "frame") == is_frame) in_order.push_back(&child);
+    }
+  }
+  for (const auto* each : in_order) {
+    const std::unique_ptr<Element>& child = *each;
+    const size_t open_files = files_.size();
+    if (!read_or_leave_out(in_world, "the " + (child->name == "include" ? "model" : child->name) + " is left out", findings, [&] { read_child(child); })) files_.resize(open_files);
   }
   const std::map<std::string, SavedModel> saved = saved_models(element, findings);
   for (const Placed& each : placed) {
     ModelInstance instance;
     instance.name = dotted(each.name);
-    instance.X_WM = frames.pose(each.name, *each.element);
+    if (!read_or_leave_out(in_world, "the model is left out", findings, [&] { instance.X_WM = frames.pose(each.name, *each.element); })) continue;
     instance.model = each.scope->model;
     if (const auto state = saved.find(each.name); state != saved.end() && !instance.model->path) {
       instance.X_WM = state->second.X_WM;
@@ -304,8 +342,10 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
   }
   for (const Element* fleet : element.all("ruedo:fleet")) read_fleet(*fleet, world, kMaxModels);
   for (const Element* light : element.all("light")) {
-    const Pose pose = frames.pose(relative_to(*light), *light) * light->pose("pose");
-    world.lights.push_back(read_light(*light, pose, "world/light", context_));
+    read_or_leave_out(in_world, "the light is left out", findings, [&] {
+      const Pose pose = frames.pose(relative_to(*light), *light) * light->pose("pose");
+      world.lights.push_back(read_light(*light, pose, "world/light", context_));
+    });
   }
 }
 

@@ -43,7 +43,7 @@ std::string escaped(const std::string& text) {
 
 // Back to text for urdfdom, without what it does not read.
 void write_xml(const Element& element, std::string& out) {
-  if (element.name == "gazebo" || element.name == "transmission") return;
+  if (element.name == "gazebo" || element.name == "transmission" || element.name == "ros2_control") return;
   out += "<" + element.name;
   for (const auto& [name, value] : element.attributes) out += " " + name + "=\"" + escaped(value) + "\"";
   out += ">" + escaped(element.text);
@@ -393,6 +393,9 @@ std::unique_ptr<Element> urdf_as_sdf(const Element& written, Findings& findings)
   converter.read_gazebo();
   for (const Element* link : robot.all("link")) converter.add_link(*link);
   for (const Element* joint : robot.all("joint")) converter.add_joint(*joint);
+  for (const char* kind : {"transmission", "ros2_control"}) {    // for the drive's reader
+    for (const Element* each : robot.all(kind)) model.children.push_back(each->clone());
+  }
   if (!model.has("ruedo:joints")) add(model, "ruedo:joints", robot.source);    // a <robot> is one, be it an arm without sensors
   return std::move(converter.model);
 }

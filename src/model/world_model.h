@@ -124,12 +124,21 @@ struct SensorDescription {
 // How a robot drives: read from <ruedo:drive>, or mapped from a Gazebo plugin. See docs/world-files.md.
 struct DriveDescription {
   enum class Kind { kinematic, wheels };
+  // How its wheels let it move. holonomic: in every direction, whatever its wheels are (Gazebo's planar move).
+  enum class Steering { differential, tracked, ackermann, tricycle, mecanum, omni, holonomic };
   Kind kind = Kind::kinematic;
-  std::vector<int> left_joints, right_joints;    // wheel joints, front first
+  Steering steering = Steering::differential;
+  bool guessed = false;                  // no file says how the robot drives; its joints look like wheels
+  std::vector<int> left_joints, right_joints;    // wheel joints, front first; holonomic and tracked may have none
+  std::vector<int> steer_joints;         // Ackermann, tricycle: turn about the vertical, with the wheels that hang on them
   double wheel_radius = 0.0;             // m
   double track = 0.0;                    // m, between the left and right wheels
+  double wheelbase = 0.0;                // m: Ackermann, tricycle: from the fixed axle to the steered one; mecanum: between the axles
+  double max_steering_angle = 0.0;       // rad, of a wheel in the middle of the steered axle
+  double max_steering_rate = std::numeric_limits<double>::infinity();    // rad/s, of that wheel
   Pose X_MBase;                          // base_link: on the ground below the centre of rotation, x ahead
   double max_speed = std::numeric_limits<double>::infinity();            // m/s
+  double max_side_speed = std::numeric_limits<double>::infinity();       // m/s to the left or right: mecanum, omni, holonomic
   double max_turn_rate = std::numeric_limits<double>::infinity();        // rad/s
   double acceleration = std::numeric_limits<double>::infinity();         // m/s^2
   double deceleration = std::numeric_limits<double>::infinity();         // m/s^2

@@ -10,6 +10,15 @@ const model::DriveDescription& description_of(const model::WorldModel& world, co
   return *world.models[static_cast<size_t>(instance)].model->drive;
 }
 
+std::vector<Vec3> rims_of(const model::BodyLayout& layout, int robot) {
+  std::vector<Vec3> rims;
+  for (const int wheel : layout.robots[static_cast<size_t>(robot)].wheels) {
+    const model::WheelPlacement& placement = layout.wheels[static_cast<size_t>(wheel)];
+    if (!placement.steers) rims.push_back(placement.rim);
+  }
+  return rims;
+}
+
 }  // namespace
 
 Drive::Drive(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics, int robot)
@@ -22,7 +31,7 @@ Drive::Drive(const model::WorldModel& world, const model::BodyLayout& layout, ph
       X_BaseB_(X_BBase_.inverse()),
       wheels_(layout.robots[static_cast<size_t>(robot)].wheels),
       description_(description_of(world, layout, robot)),
-      motion_(description_),
+      motion_(description_, rims_of(layout, robot)),
       X_WBase_(base_pose().normalized()) {
   odom_heading_ = heading(X_WBase_.rotation);
 }

@@ -75,6 +75,7 @@ double lowest_of_wheels(const model::WorldModel& world, const model::BodyLayout&
   const Pose X_BaseW = X_BaseB * layout.bodies[static_cast<size_t>(placement.body)].X_WB.inverse();
   double lowest = std::numeric_limits<double>::infinity();
   for (const int wheel : placement.wheels) {
+    if (layout.wheels[static_cast<size_t>(wheel)].steers) continue;
     const auto& link = layout.links[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].link)];
     const Pose X_BaseL = X_BaseW * layout.bodies[static_cast<size_t>(link.body)].X_WB * link.X_BL;
     const auto& collisions = model.links[static_cast<size_t>(link.link)].collisions;

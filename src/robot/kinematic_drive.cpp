@@ -16,6 +16,7 @@ constexpr double kSeesBump_m = 1e-2;         // a bump so near makes the robot l
 // A robot so level, near and calm goes over to the plane's support; at the start its height may be further off,
 // as wheels of many models are a little in the ground.
 constexpr double kLevel_rad = 5e-3, kNear_m = 2e-3, kCalm_m_s = 0.05, kNearAtStart_m = 5e-3;
+constexpr double kLeverWithoutWheels_m = 0.25;    // of the force that turns a robot without wheels
 constexpr SimTime kFallAsleep_us = 500'000;
 constexpr double kStill_m_s = 2e-3, kStill_rad_s = 1e-2;    // of what Bullet moves
 
@@ -26,10 +27,12 @@ Quat about_z(double angle) { return {std::cos(0.5 * angle), 0.0, 0.0, std::sin(0
 KinematicDrive::KinematicDrive(const model::WorldModel& world, const model::BodyLayout& layout,
                                physics::PhysicsWorld& physics, int robot, const std::vector<double>& planes)
     : Drive(world, layout, physics, robot),
+      wheel_angles_(layout, robot, description_),
       planes_(planes),
       lowest_(lowest_of_wheels(world, layout, robot)),
       mass_(physics.mass(body_)),
       yaw_inertia_((X_WBase_.rotation * Vec3::UnitZ()).dot(physics.inertia(body_) * (X_WBase_.rotation * Vec3::UnitZ()))),
+      lever_(description_.track > 0.0 ? 0.5 * description_.track : kLeverWithoutWheels_m),
       max_force_(std::min(description_.max_force, mass_ * world.gravity.norm())),
       gravity_(world.gravity) {
   stand_on_near_plane();
@@ -115,8 +118,7 @@ void KinematicDrive::before_step(SimTime now) {
     wake();
   }
   way_ = motion_.step(now, step_us_);
-  way_sum_ += way_.way;
-  angle_sum_ += way_.angle;
+  wheel_angles_.advance(way_);
   if (!physics_.alone(body_)) choose_support();
   if (on_plane_) {
     before_on_plane();
@@ -141,7 +143,7 @@ bool KinematicDrive::servo(Twist& twist, bool bounded) {
       dy *= allowed / change;
       reached = false;
     }
-    const double allowed_turn = max_force_ * 0.5 * description_.track * step_s_ / yaw_inertia_;
+    const double allowed_turn = max_force_ * lever_ * step_s_ / yaw_inertia_;
     if (std::abs(turn) > allowed_turn) {
       turn = std::copysign(allowed_turn, turn);
       reached = false;
@@ -212,7 +214,7 @@ void KinematicDrive::after_on_plane(SimTime now) {
     heading_ += way_.angle;
     if (std::abs(heading_) > M_PI) heading_ = wrap_angle(heading_);
     motion_.finish(now, way_.way, way_.angle, false);
-    const Twist twist{{motion_.v(), 0.0, 0.0}, {0.0, 0.0, motion_.omega()}};
+    const Twist twist{{motion_.v(), motion_.side(), 0.0}, {0.0, 0.0, motion_.omega()}};
     set_state(next_, twist);
     physics_.set_twist(body_, body_twist(X_WBase_, twist));
     fall_asleep_when_still(true);
@@ -254,7 +256,7 @@ void KinematicDrive::after_on_contacts(SimTime now) {
   Twist twist = base_twist(X_WBase);
   motion_.finish(now, way_.way, way_.angle, false);
   twist.linear.x() = motion_.v();
-  twist.linear.y() = 0.0;
+  twist.linear.y() = motion_.side();
   twist.angular.z() = motion_.omega();
   physics_.set_pose(body_, X_WBase * X_BaseB_);
   physics_.set_twist(body_, body_twist(X_WBase, twist));
@@ -276,15 +278,7 @@ void KinematicDrive::fall_asleep_when_still(bool still) {
 }
 
 void KinematicDrive::read_wheels(Snapshot& snapshot) const {
-  const double r = description_.wheel_radius, half_track = 0.5 * description_.track;
-  if (!(r > 0.0)) return;
-  const double left = (way_sum_ - half_track * angle_sum_) / r, right = (way_sum_ + half_track * angle_sum_) / r;
-  const double left_rate = (wheel_v_ - half_track * wheel_omega_) / r, right_rate = (wheel_v_ + half_track * wheel_omega_) / r;
-  for (size_t i = 0; i < wheels_.size(); ++i) {
-    const bool is_left = i < description_.left_joints.size();
-    snapshot.wheel_angles[static_cast<size_t>(wheels_[i])] = is_left ? left : right;
-    snapshot.wheel_rates[static_cast<size_t>(wheels_[i])] = is_left ? left_rate : right_rate;
-  }
+  wheel_angles_.read(snapshot, {wheel_v_, motion_.side(), wheel_omega_}, motion_.curvature());
 }
 
 }  // namespace ruedo::robot

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "robot/drive.h"
+#include "robot/wheel_angles.h"
 
 namespace ruedo::robot {
 
@@ -50,12 +51,12 @@ class KinematicDrive final : public Drive {
   bool supported_ = false;       // on contacts: wheels stand on something
   Displacement way_;             // that the plan makes in this step
   double heading_ = 0.0;         // of base_link on a plane, rad
-  double way_sum_ = 0.0, angle_sum_ = 0.0;    // of the wheels since the start: integrals of v and omega
+  WheelAngles wheel_angles_;
   SimTime still_us_ = 0;
   Pose next_;                    // of base_link after this step, on a plane
   const std::vector<double>& planes_;
   const double lowest_;          // of the wheels below base_link
-  const double mass_, yaw_inertia_, max_force_;
+  const double mass_, yaw_inertia_, lever_, max_force_;
   const Vec3 gravity_;
 };
 

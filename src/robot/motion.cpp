@@ -40,14 +40,24 @@ bool all_finite(std::initializer_list<double> values) {
 
 }  // namespace
 
-Motion::Motion(const model::DriveDescription& drive)
+Motion::Motion(const model::DriveDescription& drive, const std::vector<Vec3>& rims)
     : deadline_(kNever),
       drive_(drive),
       way_limits_(sane(drive.max_speed, drive.acceleration, drive.deceleration, kFastest_m_s)),
-      angle_limits_(sane(drive.max_turn_rate, drive.turn_acceleration, drive.turn_acceleration, kFastest_rad_s)) {
+      angle_limits_(sane(drive.max_turn_rate, drive.turn_acceleration, drive.turn_acceleration, kFastest_rad_s)),
+      side_limits_(sane(drive.max_side_speed, drive.acceleration, drive.deceleration, kFastest_m_s)) {
+  if (moves_sideways() && rims.size() >= 3) rims_ = rims;
   if (drive.max_wheel_rate * drive.wheel_radius < way_limits_.speed) way_limits_.speed = drive.max_wheel_rate * drive.wheel_radius;
   const double turning = 2.0 * drive.max_wheel_rate * drive.wheel_radius / drive.track;
   if (turning < angle_limits_.speed) angle_limits_.speed = turning;
+}
+
+using Steering = model::DriveDescription::Steering;
+
+bool Motion::is_steered() const { return drive_.steering == Steering::ackermann || drive_.steering == Steering::tricycle; }
+
+bool Motion::moves_sideways() const {
+  return drive_.steering == Steering::mecanum || drive_.steering == Steering::omni || drive_.steering == Steering::holonomic;
 }
 
 void Motion::show(int64_t id, int8_t kind, int8_t state, int8_t reason) {
@@ -80,13 +90,15 @@ void Motion::replace_running() {
 
 void Motion::command(const VelocityCommand& command, SimTime now) {
   if (!all_finite({command.vx, command.vy, command.omega})) return refuse(0, Status::KIND_VELOCITY, Status::REASON_NOT_FINITE);
-  if (command.vy != 0.0) return refuse(0, Status::KIND_VELOCITY, Status::REASON_BAD_VALUE);
-  hold(command.vx, command.omega, now, Status::KIND_VELOCITY);
+  if (command.vy != 0.0 && !moves_sideways()) return refuse(0, Status::KIND_VELOCITY, Status::REASON_BAD_VALUE);
+  hold(command.vx, command.vy, command.omega, now, Status::KIND_VELOCITY);
 }
 
 void Motion::command(const WheelCommand& command, SimTime now) {
   const size_t left = drive_.left_joints.size(), right = drive_.right_joints.size(), n = command.rates.size();
-  if ((n != 2 && n != left + right) || !(drive_.wheel_radius > 0.0) || !(drive_.track > 0.0)) {
+  if (!rims_.empty() && n == rims_.size()) return hold_wheels(command, now);
+  const bool sides = drive_.steering == Steering::differential || drive_.steering == Steering::tracked;
+  if (!sides || (n != 2 && n != left + right) || !(drive_.wheel_radius > 0.0) || !(drive_.track > 0.0)) {
     return refuse(0, Status::KIND_WHEELS, Status::REASON_BAD_VALUE);
   }
   for (const double rate : command.rates) {
@@ -98,30 +110,62 @@ void Motion::command(const WheelCommand& command, SimTime now) {
   for (size_t i = 0; i < n; ++i) (i < of_left ? left_rate : right_rate) += command.rates[i];
   left_rate /= static_cast<double>(of_left);
   right_rate /= static_cast<double>(n - of_left);
-  hold(0.5 * drive_.wheel_radius * (right_rate + left_rate), drive_.wheel_radius * (right_rate - left_rate) / drive_.track,
+  hold(0.5 * drive_.wheel_radius * (right_rate + left_rate), 0.0, drive_.wheel_radius * (right_rate - left_rate) / drive_.track,
        now, Status::KIND_WHEELS);
 }
 
-void Motion::hold(double v, double omega, SimTime now, int8_t kind) {
-  v = std::clamp(v, -way_limits_.speed, way_limits_.speed);
-  omega = std::clamp(omega, -angle_limits_.speed, angle_limits_.speed);
-  if (std::isfinite(drive_.max_wheel_rate)) {    // both together may still be too fast for a wheel: keep the curvature
-    const double fastest = std::abs(v) + 0.5 * drive_.track * std::abs(omega);
-    const double allowed = drive_.max_wheel_rate * drive_.wheel_radius;
-    if (fastest > allowed) {
-      v *= allowed / fastest;
-      omega *= allowed / fastest;
-    }
+// Of mecanum and omni wheels: the twist that fits the rates best, in the sense of least squares.
+void Motion::hold_wheels(const WheelCommand& command, SimTime now) {
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Vec3 sum = Vec3::Zero();
+  for (size_t i = 0; i < rims_.size(); ++i) {
+    if (!std::isfinite(command.rates[i])) return refuse(0, Status::KIND_WHEELS, Status::REASON_NOT_FINITE);
+    normal += rims_[i] * rims_[i].transpose();
+    sum += rims_[i] * (drive_.wheel_radius * command.rates[i]);
   }
+  const Vec3 twist = normal.ldlt().solve(sum);
+  if (!twist.allFinite()) return refuse(0, Status::KIND_WHEELS, Status::REASON_BAD_VALUE);
+  hold(twist.x(), twist.y(), twist.z(), now, Status::KIND_WHEELS);
+}
+
+// All together may be too fast for a wheel: the direction is kept.
+void Motion::keep_wheel_rates(double& v, double& side, double& omega) const {
+  if (!std::isfinite(drive_.max_wheel_rate) || is_steered()) return;
+  double fastest = std::abs(v) + 0.5 * drive_.track * std::abs(omega);
+  if (!rims_.empty()) {
+    fastest = 0.0;
+    for (const Vec3& rim : rims_) fastest = std::max(fastest, std::abs(rim.dot(Vec3(v, side, omega))));
+  }
+  const double allowed = drive_.max_wheel_rate * drive_.wheel_radius;
+  if (fastest <= allowed) return;
+  v *= allowed / fastest;
+  side *= allowed / fastest;
+  omega *= allowed / fastest;
+}
+
+// Standing still it can only turn its wheels.
+void Motion::steer_for(double v, double omega) {
+  const double most = drive_.max_steering_angle;
+  if (v != 0.0) target_steering_ = std::clamp(std::atan(drive_.wheelbase * omega / v), -most, most);
+  else if (omega != 0.0) target_steering_ = std::copysign(most, omega * drive_.wheelbase);
+}
+
+void Motion::hold(double v, double side, double omega, SimTime now, int8_t kind) {
+  v = std::clamp(v, -way_limits_.speed, way_limits_.speed);
+  side = std::clamp(side, -side_limits_.speed, side_limits_.speed);
+  omega = std::clamp(omega, -angle_limits_.speed, angle_limits_.speed);
+  keep_wheel_rates(v, side, omega);
   replace_running();
-  const bool same = holding_ && v == target_v_ && omega == target_omega_;
+  const bool same = holding_ && v == target_v_ && omega == target_omega_ && side == target_side_;
   holding_ = true;
   deadline_ = drive_.watchdog_us > 0 ? now + drive_.watchdog_us : kNever;
   show(0, kind, Status::STATE_RUNNING);
   if (same) return;    // a repeated command only feeds the watchdog
   target_v_ = v;
   target_omega_ = omega;
-  set_plan(Profile::to_velocity(v_, v, way_limits_), Profile::to_velocity(omega_, omega, angle_limits_), now);
+  target_side_ = side;
+  if (is_steered()) steer_for(v, omega);
+  set_plan(Profile::to_velocity(v_, v, way_limits_), Profile::to_velocity(omega_, omega, angle_limits_), now, side);
 }
 
 Limits Motion::stricter(const Limits& own, const MoveCommand& command, double fallback_speed) {
@@ -140,6 +184,7 @@ void Motion::command(const MoveCommand& command, SimTime now, double heading) {
   if (!all_finite({command.value, command.radius, command.speed, command.acceleration, command.deceleration})) {
     return refused(Status::REASON_NOT_FINITE);
   }
+  if (is_steered() && (command.kind == Move::ROTATE || command.kind == Move::HEADING)) return refused(Status::REASON_NOT_POSSIBLE);
   if (command.speed < 0.0 || command.acceleration < 0.0 || command.deceleration < 0.0) return refused(Status::REASON_BAD_VALUE);
   Primitive next;
   switch (command.kind) {
@@ -160,6 +205,7 @@ void Motion::command(const MoveCommand& command, SimTime now, double heading) {
       next.target = std::abs(command.value) * command.radius;
       next.unit = command.value < 0.0 ? -1.0 / command.radius : 1.0 / command.radius;
       next.curvature = next.unit;
+      if (is_steered() && std::abs(drive_.wheelbase) > std::tan(drive_.max_steering_angle) * command.radius) return refused(Status::REASON_NOT_POSSIBLE);
       next.limits = stricter(way_limits_, command, kUsualSpeed_m_s);
       next.limits.speed = std::min(next.limits.speed, angle_limits_.speed * command.radius);
       next.limits.acceleration = std::min(next.limits.acceleration, angle_limits_.acceleration * command.radius);
@@ -195,10 +241,12 @@ void Motion::command(const MoveCommand& command, SimTime now, double heading) {
   window_touched_ = false;
 }
 
-void Motion::set_plan(const Profile& v, const Profile& omega, SimTime now) {
+void Motion::set_plan(const Profile& v, const Profile& omega, SimTime now, double side) {
   start_ = now;
   plan_v_ = v;
   plan_omega_ = omega;
+  if (moves_sideways()) plan_side_ = Profile::to_velocity(side_, side, side_limits_);
+  if (is_steered()) plan_steering_ = SteeringPlan::between(steering_, target_steering_, drive_.max_steering_rate);
   move_on(now);
 }
 
@@ -208,8 +256,16 @@ void Motion::move_on(SimTime to) {
   v_ = plan_v_.velocity(t);
   omega_ = plan_omega_.velocity(t);
   steady_ = t >= plan_v_.end() && t >= plan_omega_.end();
+  if (moves_sideways()) {
+    side_ = plan_side_.velocity(t);
+    steady_ = steady_ && t >= plan_side_.end();
+  } else if (is_steered()) {
+    steering_ = plan_steering_.angle(t);
+    omega_ = v_ * std::tan(steering_) / drive_.wheelbase;
+    steady_ = t >= plan_v_.end() && t >= plan_steering_.end;
+  }
   const bool stopping = log_.current().kind == Move::STOP && log_.current().state == Status::STATE_RUNNING;
-  resting_ = steady_ && v_ == 0.0 && omega_ == 0.0 && deadline_ == kNever && primitive_.axis == Axis::none && !stopping;
+  resting_ = steady_ && v_ == 0.0 && omega_ == 0.0 && side_ == 0.0 && deadline_ == kNever && primitive_.axis == Axis::none && !stopping;
 }
 
 void Motion::plan_primitive(SimTime now) {
@@ -218,7 +274,17 @@ void Motion::plan_primitive(SimTime now) {
   p.done_before_plan = p.done;
   p.begins = p.begins_at = 0.0;
   Profile v, omega;
-  if (p.axis == Axis::way) {
+  if (is_steered()) {
+    target_steering_ = p.axis == Axis::arc ? std::atan(drive_.wheelbase * p.curvature) : 0.0;
+    if (p.axis == Axis::way || steering_ == target_steering_) {
+      v = Profile::to_distance(v_, rest, p.limits);
+    } else {    // an arc begins at rest, when its wheels are steered
+      v = Profile::to_velocity(v_, 0.0, way_limits_);
+      p.begins = std::max(v.end(), SteeringPlan::between(steering_, target_steering_, drive_.max_steering_rate).end);
+      p.begins_at = v.position(p.begins);
+      v.append(Profile::to_distance(0.0, rest, p.limits), p.begins);
+    }
+  } else if (p.axis == Axis::way) {
     v = Profile::to_distance(v_, rest, p.limits);
     omega = Profile::to_velocity(omega_, 0.0, angle_limits_);
   } else if (p.axis == Axis::angle) {
@@ -248,7 +314,8 @@ void Motion::brake(SimTime now) {
 
 void Motion::stand_still(SimTime now) {
   const MotionState state = log_.current();
-  v_ = omega_ = target_v_ = target_omega_ = 0.0;
+  v_ = omega_ = side_ = target_v_ = target_omega_ = target_side_ = 0.0;
+  target_steering_ = steering_;
   brake(now);
   if (state.state != Status::STATE_RUNNING) return;
   show(state.id, state.kind, Status::STATE_ENDED, Status::REASON_REPLACED);
@@ -262,29 +329,35 @@ void Motion::shift_time(SimTime us) {
   if (deadline_ != kNever) deadline_ -= us;
 }
 
+Displacement Motion::way_of(double begin, double end) const {
+  if (is_steered()) return integrate_steered(plan_v_, plan_steering_, drive_.wheelbase, begin, end);
+  if (moves_sideways()) return integrate(plan_v_, plan_side_, plan_omega_, begin, end);
+  return integrate(plan_v_, plan_omega_, begin, end);
+}
+
 Displacement Motion::step(SimTime now, int64_t step_us) {
   if (resting_) return {};
   const SimTime end = now + step_us;
   if (steady_ && end < deadline_) {
     const double step_s = static_cast<double>(step_us) * 1e-6;
-    return along_arc(v_ * step_s, omega_ * step_s);
+    return side_ == 0.0 ? along_arc(v_ * step_s, omega_ * step_s) : along_twist(v_ * step_s, side_ * step_s, omega_ * step_s);
   }
   Displacement way;
   if (deadline_ < end) {    // the watchdog ends the command within this step
     const SimTime deadline = std::max(deadline_, now);
-    way = integrate(plan_v_, plan_omega_, seconds(now), seconds(deadline));
+    way = way_of(seconds(now), seconds(deadline));
     move_on(deadline);
     const int8_t kind = log_.current().kind;
-    const bool moving = target_v_ != 0.0 || target_omega_ != 0.0 || v_ != 0.0 || omega_ != 0.0;
+    const bool moving = target_v_ != 0.0 || target_omega_ != 0.0 || target_side_ != 0.0 || v_ != 0.0 || omega_ != 0.0 || side_ != 0.0;
     if (moving) {
       show(0, kind, Status::STATE_ENDED, Status::REASON_WATCHDOG);
     } else {
       show(0, kind, Status::STATE_DONE);
     }
     brake(deadline);
-    way = chained(way, integrate(plan_v_, plan_omega_, seconds(deadline), seconds(end)));
+    way = chained(way, way_of(seconds(deadline), seconds(end)));
   } else {
-    way = integrate(plan_v_, plan_omega_, seconds(now), seconds(end));
+    way = way_of(seconds(now), seconds(end));
   }
   move_on(end);
   return way;
@@ -292,7 +365,7 @@ Displacement Motion::step(SimTime now, int64_t step_us) {
 
 bool Motion::settled(SimTime now, const Lag& lag) const {
   const bool near = std::abs(lag.way) < kSettled_m && std::abs(lag.angle) < kSettled_rad;
-  return (near && !lag.moving) || seconds(now) > std::max(plan_v_.end(), plan_omega_.end()) + kSettling_s;
+  return (near && !lag.moving) || seconds(now) > std::max({plan_v_.end(), plan_omega_.end(), plan_side_.end()}) + kSettling_s;
 }
 
 void Motion::finish(SimTime now, double way, double angle, bool touched, const Lag& lag) {

@@ -6,11 +6,12 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "model/world_model.h"
 #include "robot/motion_log.h"
 #include "robot/robots.h"
-#include "robot/unicycle.h"
+#include "robot/base_motion.h"
 
 namespace ruedo::robot {
 
@@ -22,7 +23,8 @@ struct Lag {
 
 class Motion {
  public:
-  explicit Motion(const model::DriveDescription& drive);
+  // rims: of its rolling wheels, in their order (model::WheelPlacement::rim); needed where they can roll sideways.
+  explicit Motion(const model::DriveDescription& drive, const std::vector<Vec3>& rims = {});
 
   // Commands, at sim time now. Bad values are refused, and nothing changes but the log.
   void command(const VelocityCommand& command, SimTime now);
@@ -43,6 +45,8 @@ class Motion {
 
   double v() const { return v_; }            // m/s and rad/s at the end of the last step, as planned
   double omega() const { return omega_; }
+  double side() const { return side_; }      // m/s to the left
+  double curvature() const { return is_steered() ? std::tan(steering_) / drive_.wheelbase : 0.0; }    // 1/m
   bool has_primitive() const { return primitive_.axis != Axis::none; }
   bool resting() const { return resting_; }  // stands still, and nothing happens until a command comes
   const MotionLog& log() const { return log_; }
@@ -63,10 +67,16 @@ class Motion {
   };
 
   double seconds(SimTime now) const { return static_cast<double>(now - start_) * 1e-6; }
-  void hold(double v, double omega, SimTime now, int8_t kind);
+  bool is_steered() const;       // turns by steering alone: not on the spot
+  bool moves_sideways() const;
+  void hold(double v, double side, double omega, SimTime now, int8_t kind);
+  void hold_wheels(const WheelCommand& command, SimTime now);
+  void steer_for(double v, double omega);
+  void keep_wheel_rates(double& v, double& side, double& omega) const;
+  Displacement way_of(double begin, double end) const;
   void brake(SimTime now);
   void move_on(SimTime to);
-  void set_plan(const Profile& v, const Profile& omega, SimTime now);
+  void set_plan(const Profile& v, const Profile& omega, SimTime now, double side = 0.0);
   void plan_primitive(SimTime now);
   void replace_running();
   void show(int64_t id, int8_t kind, int8_t state, int8_t reason = 0);
@@ -76,15 +86,17 @@ class Motion {
   static Limits stricter(const Limits& own, const MoveCommand& command, double fallback_speed);
 
   // Hot: what a step of steady motion needs.
-  double v_ = 0.0, omega_ = 0.0;
+  double v_ = 0.0, omega_ = 0.0, side_ = 0.0, steering_ = 0.0;
   bool steady_ = true, resting_ = true;
   SimTime deadline_;             // of the watchdog; far away when it does not run
   const model::DriveDescription& drive_;
-  Limits way_limits_, angle_limits_;
+  Limits way_limits_, angle_limits_, side_limits_;
+  std::vector<Vec3> rims_;       // of mecanum and omni wheels
   // The plan.
   SimTime start_ = 0;
-  Profile plan_v_, plan_omega_;
-  double target_v_ = 0.0, target_omega_ = 0.0;
+  Profile plan_v_, plan_omega_, plan_side_;
+  SteeringPlan plan_steering_;
+  double target_v_ = 0.0, target_omega_ = 0.0, target_side_ = 0.0, target_steering_ = 0.0;
   bool holding_ = false;         // a velocity or wheel command is in force
   Primitive primitive_;
   // Watching for a block: since when, what was done then, the fastest that the plan was since, whether anything touched.

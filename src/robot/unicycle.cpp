@@ -63,7 +63,7 @@ Displacement along_arc(double way, double angle) {
 Displacement chained(const Displacement& first, const Displacement& second) {
   const double c = std::cos(first.angle), s = std::sin(first.angle);
   return {first.x + c * second.x - s * second.y, first.y + s * second.x + c * second.y, first.angle + second.angle,
-          first.way + second.way};
+          first.way + second.way, first.side + second.side};
 }
 
 Displacement integrate(const Profile& v, const Profile& omega, double begin, double end) {

@@ -13,6 +13,7 @@ struct Displacement {
   double x = 0.0, y = 0.0;        // m
   double angle = 0.0;             // rad, not wrapped
   double way = 0.0;               // m, integral of v
+  double side = 0.0;              // m, integral of the speed to the left, of bases that move sideways
 };
 
 // With constant curvature (a line, an arc, or speed and turn rate in proportion): closed form.

@@ -11,11 +11,14 @@
 // - trapezoid: eqs. 4 to 8 of Hernandez-Belmonte et al., ROSSUM 2011, with omega from the difference of the wheel
 //   rates (the printed eq. 4 has their sum): speeds at both ends of the step, averaged. It leaves
 //   v omega^2 dt^3 / 12 a step, 5e-10 m at 0.2 m/s, 0.5 rad/s and 5 ms.
+// Other drives take the arc, with what base_odometry.h makes of their wheels.
 #include <cmath>
+#include <optional>
 
 #include "model/body_layout.h"
 #include "ruedo/odometry_t.hpp"
 #include "ruedo/sensor.h"
+#include "sensors/base_odometry.h"
 
 namespace ruedo {
 namespace {
@@ -27,10 +30,11 @@ struct Configuration {
   double radius_error[2] = {0.0, 0.0};  // left, right; relative
   double track_error = 0.0;             // relative
   double slip_noise = 0.0;              // sqrt(m)
+  double steering_error = 0.0;          // rad, added to what the steering's encoder shows
 
   explicit Configuration(const Element& element) {
     element.refuse_unknown({"ruedo:rate", "ruedo:integrator", "ruedo:ticks_per_turn", "ruedo:counter_bits",
-                            "ruedo:radius_error", "ruedo:track_error", "ruedo:slip_noise"});
+                            "ruedo:radius_error", "ruedo:track_error", "ruedo:slip_noise", "ruedo:steering_error"});
     trapezoid = element.choice("ruedo:integrator", "arc", {"arc", "trapezoid"}) == "trapezoid";
     ticks_per_turn = element.integer("ruedo:ticks_per_turn", 0, Allowed::between(0, 1e9));
     counter_bits = static_cast<int>(element.integer("ruedo:counter_bits", 0, Allowed::between(0, 62)));
@@ -47,6 +51,7 @@ struct Configuration {
     }
     track_error = element.number("ruedo:track_error", 0.0, {-1.0, std::numeric_limits<double>::infinity(), true});
     slip_noise = element.number("ruedo:slip_noise", 0.0, Allowed::not_negative());
+    steering_error = element.number("ruedo:steering_error", 0.0, Allowed::between(-1.5, 1.5));
   }
 };
 
@@ -66,10 +71,12 @@ class Odometry : public Sensor {
     radius_ = drive.wheel_radius;
     track_ = drive.track * (1.0 + configuration_.track_error);
     for (const int wheel : robot.wheels) {
-      const int side = setup.layout.wheels[static_cast<size_t>(wheel)].left ? 0 : 1;
-      wheels_.push_back({wheel, side});
-      ++wheels_of_side_[side];
+      const model::WheelPlacement& placement = setup.layout.wheels[static_cast<size_t>(wheel)];
+      const int side = placement.left ? 0 : 1;
+      wheels_.push_back({wheel, side, placement.steers});
+      if (!placement.steers) ++wheels_of_side_[side];
     }
+    if (BaseOdometry::is_for(drive)) base_.emplace(setup.layout, robot_, drive, configuration_.track_error, configuration_.steering_error);
     message_.n = static_cast<int32_t>(wheels_.size());
     message_.angle.resize(wheels_.size());
     message_.rate.resize(wheels_.size());
@@ -82,11 +89,13 @@ class Odometry : public Sensor {
     const RobotState& robot = now.robots[static_cast<size_t>(robot_)];
     if (time_ < 0) {
       for (Wheel& wheel : wheels_) start(wheel, now);
+      X_WBase_ = robot.X_WBase;
       side_rates(speed_before_);
     } else if (now.time > time_) {
       const double dt_s = 1e-6 * static_cast<double>(now.time - time_);
       turn_wheels(now, dt_s);
-      configuration_.trapezoid ? integrate_trapezoid(dt_s) : integrate_arc();
+      if (base_) integrate_base(now, dt_s);
+      else configuration_.trapezoid ? integrate_trapezoid(dt_s) : integrate_arc();
     }
     time_ = now.time;
     if (robot.odometry_resets != resets_) {
@@ -112,7 +121,7 @@ class Odometry : public Sensor {
       message_.angle[i] = wheel.measured;
       message_.rate[i] = rate;
       message_.ticks[i] = wheel.counter;
-      speed[wheel.side] += rate * believed_radius(wheel.side);
+      if (!wheel.steers) speed[wheel.side] += rate * believed_radius(wheel.side);
     }
     for (int side : {0, 1}) speed[side] /= std::max(1, wheels_of_side_[side]);
     sample_time_ = input.snapshot.time;
@@ -120,8 +129,8 @@ class Odometry : public Sensor {
     message_.x = x_;
     message_.y = y_;
     message_.theta = theta_;
-    message_.v = 0.5 * (speed[0] + speed[1]);
-    message_.omega = (speed[1] - speed[0]) / track_;
+    message_.v = base_ ? rate_.x() : 0.5 * (speed[0] + speed[1]);
+    message_.omega = base_ ? rate_.z() : (speed[1] - speed[0]) / track_;
     message_.resets = resets_;
     out.publish(channel_, message_);
   }
@@ -130,6 +139,7 @@ class Odometry : public Sensor {
   struct Wheel {
     int index;                  // into Snapshot::wheel_angles
     int side;                   // 0 left, 1 right
+    bool steers;                // its angle is that of steering
     double true_angle = 0.0;    // rad
     double slipped = 0.0;       // rad, what slip has added to the encoder's angle so far
     int64_t counter = 0;        // as the encoder shows it, wrapped
@@ -179,13 +189,14 @@ class Odometry : public Sensor {
       wheel.turned = angle - wheel.true_angle;
       wheel.true_angle = angle;
       wheel.rate = now.wheel_rates[static_cast<size_t>(wheel.index)];
-      way[wheel.side] += radius_ * wheel.turned / wheels_of_side_[wheel.side];
+      if (!wheel.steers) way[wheel.side] += radius_ * wheel.turned / wheels_of_side_[wheel.side];
     }
     if (configuration_.slip_noise > 0.0 && (way[0] != 0.0 || way[1] != 0.0)) {
       RandomStream stream = random_.stream(static_cast<uint64_t>(now.step));
       double slip[2];
       for (const int side : {0, 1}) slip[side] = configuration_.slip_noise * std::sqrt(std::abs(way[side])) * stream.gaussian() / radius_;
       for (Wheel& wheel : wheels_) {
+        if (wheel.steers) continue;
         wheel.slipped += slip[wheel.side];
         wheel.turned += slip[wheel.side];
         wheel.rate += slip[wheel.side] / dt_s;
@@ -218,9 +229,37 @@ class Odometry : public Sensor {
     theta_ += turn;
   }
 
+  void integrate_base(const Snapshot& now, double dt_s) {
+    const Pose& X_WBase = now.robots[static_cast<size_t>(robot_)].X_WBase;
+    Vec3 moved;
+    if (base_->has_wheels()) {
+      angles_.clear();
+      ways_.clear();
+      for (const Wheel& wheel : wheels_) {
+        angles_.push_back(wheel.measured);
+        ways_.push_back(believed_radius(wheel.side) * wheel.turned);
+      }
+      moved = base_->moved(ways_, angles_);
+    } else {
+      moved = base_->moved(X_WBase_, X_WBase);
+      if (configuration_.slip_noise > 0.0 && moved != Vec3::Zero()) {
+        RandomStream stream = random_.stream(static_cast<uint64_t>(now.step));
+        for (int i = 0; i < 3; ++i) moved[i] += configuration_.slip_noise * std::sqrt(std::abs(moved[i])) * stream.gaussian();
+      }
+    }
+    X_WBase_ = X_WBase;
+    rate_ = moved / dt_s;
+    const double along = theta_ + 0.5 * moved.z(), chord = sinc(0.5 * moved.z());
+    x_ += chord * (moved.x() * std::cos(along) - moved.y() * std::sin(along));
+    y_ += chord * (moved.x() * std::sin(along) + moved.y() * std::cos(along));
+    theta_ += moved.z();
+  }
+
   void side_rates(double (&speed)[2]) const {
     speed[0] = speed[1] = 0.0;
-    for (const Wheel& wheel : wheels_) speed[wheel.side] += believed_radius(wheel.side) * wheel.rate / wheels_of_side_[wheel.side];
+    for (const Wheel& wheel : wheels_) {
+      if (!wheel.steers) speed[wheel.side] += believed_radius(wheel.side) * wheel.rate / wheels_of_side_[wheel.side];
+    }
   }
 
   void integrate_trapezoid(double dt_s) {
@@ -245,6 +284,10 @@ class Odometry : public Sensor {
   double radius_ = 0.0, track_ = 0.0;    // m; the track is the one that the robot believes in
   std::vector<Wheel> wheels_;
   int wheels_of_side_[2] = {0, 0};
+  std::optional<BaseOdometry> base_;     // of what is no differential drive
+  Pose X_WBase_;                         // at the step before
+  Vec3 rate_ = Vec3::Zero();             // m/s ahead and to the left, rad/s: of the last step, with base_
+  std::vector<double> ways_, angles_;
 
   SimTime time_ = -1, sample_time_ = 0;
   double x_ = 0.0, y_ = 0.0, theta_ = 0.0;    // m, m, rad: base_link in odom

@@ -13,10 +13,11 @@ import sys
 import time
 from pathlib import Path
 
-KINDS = {".world", ".sdf", ".urdf", ".xacro"}
-HEAD = """# Real files, and what Ruedo makes of them
+from sections import put
 
-Made by `tests/corpus/corpus_table.py RUEDO FOLDER -o docs/corpus.md` from public files: TurtleBot3's simulations, AWS RoboMaker's small warehouse,
+KINDS = {".world", ".sdf", ".urdf", ".xacro"}
+TITLE = "Every file"
+HEAD = """Made by `tests/corpus/corpus_table.py RUEDO FOLDER -o docs/corpus.md` from public files: TurtleBot3's simulations, AWS RoboMaker's small warehouse,
 Gazebo's models, and MobileRobots' descriptions of their robots. They are not part of Ruedo. Every file is run for a simulated minute (`ruedo run FILE --rate
 max --duration 60`). "Took" is the wall time of that minute, loading included, on a server's two cores (the camera of TurtleBot3's
 waffles has 1920 x 1080 pixels at 30 Hz, drawn without a GPU); or "not within" the seconds after which it was given up;
@@ -94,7 +95,7 @@ def main():
             call(arguments.ruedo, "render", path, "-o", arguments.pictures / (str(name).replace("/", "_") + ".png"), "--size", "640x480")
     text = "\n".join(lines) + "\n"
     if arguments.out:
-        arguments.out.write_text(text)
+        put(arguments.out, TITLE, text)
     else:
         print(text)
 

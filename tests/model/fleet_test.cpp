@@ -131,10 +131,13 @@ TEST(DriveOption, GivesARobotItsWheels) {
   options.spawns = {{"bot.urdf", "bot", 1, 0, 0}, {"bot.urdf", "other", 3, 0, 0}};
   const auto spawned = load_world(empty, options);
   expect_drive(spawned->models[1]);
-  EXPECT_FALSE(spawned->models[2].model->drive);
+  ASSERT_TRUE(spawned->models[2].model->drive);    // which nobody gave one: its wheels are found
+  EXPECT_TRUE(spawned->models[2].model->drive->guessed);
+  EXPECT_EQ(spawned->findings.size(), 1u);
   const auto included = load_world(folder.write("w.sdf", std::string("<sdf version='1.9'><world name='w'>") + kGround +
       "<include><uri>bot.urdf</uri><ruedo:drive><ruedo:left_joint>jl</ruedo:left_joint><ruedo:right_joint>jr</ruedo:right_joint></ruedo:drive></include></world></sdf>"));
   expect_drive(included->models[1]);
+  EXPECT_TRUE(included->findings.empty());    // nothing of a guess that did not count
 }
 
 TEST(DriveOption, SaysWhatThereIs) {

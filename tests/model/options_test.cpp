@@ -59,6 +59,9 @@ class Options : public testing::Test {
   std::string world;
 };
 
+// Without the free place that it names.
+std::string without_place(const std::string& error) { return error.substr(0, error.find("; the nearest")); }
+
 TEST_F(Options, SpawnStandsOnTheGround) {
   const auto plain = spawned(1, 2, 0.5);
   EXPECT_EQ(plain->models.back().name, "bot");
@@ -84,19 +87,26 @@ TEST_F(Options, SpawnIsTiltedAsTheGround) {
   in_world("<collision name='s'><pose>0.3 0 0.6 0 0 0</pose><geometry><box><size>0.4 4 1</size></box></geometry></collision>");
   LoadOptions options;
   options.spawns.push_back({"bot.sdf", "", 20, 0, 0});
-  EXPECT_EQ(error_of(options), "--spawn bot.sdf@20,0: there is no room, it would stand in 'ramp'");
+  EXPECT_EQ(without_place(error_of(options)), "--spawn bot.sdf@20,0: there is no room, it would stand in 'ramp'");
 }
 
 TEST_F(Options, SpawnRefusesToStandInSomething) {
   LoadOptions options;
   options.spawns.push_back({"bot.sdf", "", 9.9, 0, 0});
-  EXPECT_EQ(error_of(options), "--spawn bot.sdf@9.9,0: there is no room, it would stand in 'wall'");
+  EXPECT_EQ(without_place(error_of(options)), "--spawn bot.sdf@9.9,0: there is no room, it would stand in 'wall'");
   options.spawns[0] = {"bot.sdf", "", 0.3, 5.3, 0};
-  EXPECT_EQ(error_of(options), "--spawn bot.sdf@0.3,5.3: there is no room, it would stand in 'crate'");
+  EXPECT_EQ(without_place(error_of(options)), "--spawn bot.sdf@0.3,5.3: there is no room, it would stand in 'crate'");
   options.spawns[0] = {"bot.sdf", "", 0.56, 5.56, 0};    // past the corner: their boxes are apart by a little
   EXPECT_EQ(error_of(options), "");
   options.spawns = {{"bot.sdf", "", 0, 0, 0}, {"bot.sdf", "", 0.3, 0, 0}};
-  EXPECT_EQ(error_of(options), "--spawn bot.sdf@0.3,0: there is no room, it would stand in 'bot'");
+  EXPECT_EQ(without_place(error_of(options)), "--spawn bot.sdf@0.3,0: there is no room, it would stand in 'bot'");
+  const std::string error = error_of(options), named = "; the nearest free place is ";
+  const size_t at = error.find(named);
+  ASSERT_NE(at, std::string::npos);
+  const std::string place = error.substr(at + named.size());
+  options.spawns[1].x = std::stod(place);
+  options.spawns[1].y = std::stod(place.substr(place.find(',') + 1));
+  EXPECT_EQ(error_of(options), "");    // there it has room
   options.spawns = {{"nobot", "", 0, 0, 0}};
   EXPECT_EQ(error_of(options), "--spawn nobot: there is no such file, and no model of that name in the search path");
   options.spawns = {{"bot.sdf", "wall", 0, 0, 0}};

@@ -35,7 +35,11 @@ void expect_same_bits(const std::string& type, int steps) {
   for (size_t i = 0; i < other_memory.size(); i += 3) other_memory[i].reset();
   const std::vector<Pose> second = ram(type, steps);
   ASSERT_EQ(first.size(), second.size());
-  EXPECT_EQ(std::memcmp(first.data(), second.data(), first.size() * sizeof(Pose)), 0);
+  const auto same = [](const Pose& a, const Pose& b) {    // a Pose has bytes between its parts that are nobody's
+    return std::memcmp(a.rotation.coeffs().data(), b.rotation.coeffs().data(), 4 * sizeof(double)) == 0 &&
+           std::memcmp(a.translation.data(), b.translation.data(), 3 * sizeof(double)) == 0;
+  };
+  for (size_t i = 0; i < first.size(); ++i) ASSERT_TRUE(same(first[i], second[i])) << i;
   double way = 0.0;    // something happened at all
   for (size_t i = 0; i < 60; ++i) way += (first[first.size() - 60 + i].translation - first[i].translation).norm();
   EXPECT_GT(way, 5.0);

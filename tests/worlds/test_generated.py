@@ -32,6 +32,14 @@ def png_pixels(path):
     return pixels
 
 
+def test_bases_are_what_the_script_makes(tmp_path):
+    subprocess.run([sys.executable, WORLDS / "robots/make_bases.py", tmp_path], check=True)
+    made = sorted(path for path in tmp_path.rglob("*") if path.is_file())
+    assert len(made) == 12
+    for path in made:
+        assert path.read_text() == (WORLDS / "robots" / path.relative_to(tmp_path)).read_text(), path
+
+
 @pytest.mark.parametrize("script, outputs", [
     ("robots/p3at/make_meshes.py", "robots/p3at/meshes"),
     ("robots/p3dx/make_meshes.py", "robots/p3dx/meshes"),

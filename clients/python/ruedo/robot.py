@@ -68,7 +68,7 @@ class Camera(Device[Image]):
 class Robot:
     """A robot of the simulation. Lengths in m, angles in rad, counter-clockwise is positive.
 
-    drive: "kinematic", "wheels", or "" for a robot that only senses. watchdog: s of sim time without a
+    drive: "kinematic", "wheels", or "" for a robot that only senses; "kinematic mecanum" and its like name another steering. watchdog: s of sim time without a
     command after which it stops, 0: never. wheels: names of the wheel joints.
     """
 
@@ -193,10 +193,11 @@ class Robot:
 
     # Driving.
 
-    def set_velocity(self, v: float, omega: float) -> None:
+    def set_velocity(self, v: float, omega: float, vy: float = 0.0) -> None:
         """Drives with v (m/s ahead) and omega (rad/s), within the robot's limits, until the next command of any
-        kind: the command is repeated in the background, so that the watchdog does not stop the robot."""
-        command = self.velocity_command(v, omega)
+        kind: the command is repeated in the background, so that the watchdog does not stop the robot. vy: m/s to the
+        left, of a robot that moves sideways; others refuse it."""
+        command = self.velocity_command(v, omega, vy)
         self._sim._driver(self.name).hold(command.channel, command.data)
 
     def set_wheels(self, left: float, right: float) -> None:
@@ -204,10 +205,10 @@ class Robot:
         command = self.wheel_command(left, right)
         self._sim._driver(self.name).hold(command.channel, command.data)
 
-    def velocity_command(self, v: float, omega: float) -> Command:
+    def velocity_command(self, v: float, omega: float, vy: float = 0.0) -> Command:
         """What set_velocity() sends, once, for Simulation.step()."""
         command = lcmtypes.velocity_command_t()
-        command.utime, command.vx, command.omega = self._sim._utime, _finite("v", v), _finite("omega", omega)
+        command.utime, command.vx, command.vy, command.omega = self._sim._utime, _finite("v", v), _finite("vy", vy), _finite("omega", omega)
         return Command(self._input("velocity_command_t"), command.encode())
 
     def wheel_command(self, left: float, right: float) -> Command:
@@ -273,7 +274,7 @@ class Robot:
 
     def _input(self, type: str) -> str:
         if not self.drive:
-            raise NotSupported(f"{self.name} cannot be driven: its model has no drive")
+            raise NotSupported(f"{self.name} cannot be driven: its model has no drive; --drive {self.name}=LEFT+...,RIGHT+... gives it one, by its wheel joints")
         for channel in self._channels:
             if channel.input and channel.type == type:
                 return str(channel.name)

@@ -29,7 +29,7 @@ _PIXEL_FORMATS = {
 _MOTION_KINDS = {0: "none", 1: "advance", 2: "rotate", 3: "heading", 4: "arc", 5: "stop", 16: "velocity", 17: "wheels"}
 _MOTION_STATES = {0: "idle", 1: "running", 2: "done", 3: "ended", 4: "refused"}
 _MOTION_REASONS = {
-    0: "", 1: "replaced", 2: "blocked", 3: "watchdog", 4: "not finite", 5: "bad kind", 6: "bad value", 7: "no drive",
+    0: "", 1: "replaced", 2: "blocked", 3: "watchdog", 4: "not finite", 5: "bad kind", 6: "bad value", 7: "no drive", 8: "not possible",
 }
 
 
@@ -263,7 +263,7 @@ class MotionStatus(Sample):
     id: int             # of the primitive; 0 for velocity and wheel commands
     kind: str           # "none", "advance", "rotate", "heading", "arc", "stop", "velocity", "wheels"
     state: str          # "idle", "running", "done", "ended", "refused"
-    reason: str         # "", "replaced", "blocked", "watchdog", "not finite", "bad kind", "bad value", "no drive"
+    reason: str         # "", "replaced", "blocked", "watchdog", "not finite", "bad kind", "bad value", "no drive", "not possible"
     progress: float     # m or rad done
     remaining: float    # m or rad
     v: float            # m/s

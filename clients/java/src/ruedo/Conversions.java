@@ -49,7 +49,7 @@ final class Conversions {
     private static final String[] KINDS = {"none", "advance", "rotate", "heading", "arc", "stop"};
     private static final String[] STATES = {"idle", "running", "done", "ended", "refused"};
     private static final String[] REASONS =
-            {"", "replaced", "blocked", "watchdog", "not finite", "bad kind", "bad value", "no drive"};
+            {"", "replaced", "blocked", "watchdog", "not finite", "bad kind", "bad value", "no drive", "not possible"};
 
     private Conversions() {}
 

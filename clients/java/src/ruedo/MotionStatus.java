@@ -8,7 +8,7 @@ public final class MotionStatus extends Sample {
     public final String kind;
     /** "idle", "running", "done", "ended", "refused". */
     public final String state;
-    /** "", "replaced", "blocked", "watchdog", "not finite", "bad kind", "bad value", "no drive". */
+    /** "", "replaced", "blocked", "watchdog", "not finite", "bad kind", "bad value", "no drive", "not possible". */
     public final String reason;
     /** m or rad done. */
     public final double progress;

@@ -158,7 +158,12 @@ public final class Robot {
      * command is repeated in the background, so that the watchdog does not stop the robot.
      */
     public void setVelocity(double v, double omega) {
-        Command command = velocityCommand(v, omega);
+        setVelocity(v, omega, 0.0);
+    }
+
+    /** The same with vy, m/s to the left, of a robot that moves sideways; others refuse it. */
+    public void setVelocity(double v, double omega, double vy) {
+        Command command = velocityCommand(v, omega, vy);
         sim.driver(name).hold(command.channel, command.data);
     }
 
@@ -170,9 +175,15 @@ public final class Robot {
 
     /** What {@link #setVelocity} sends, once, for {@link Simulation#step(long, List)}. */
     public Command velocityCommand(double v, double omega) {
+        return velocityCommand(v, omega, 0.0);
+    }
+
+    /** The same with vy, m/s to the left. */
+    public Command velocityCommand(double v, double omega, double vy) {
         velocity_command_t command = new velocity_command_t();
         command.utime = sim.utime();
         command.vx = finite("v", v);
+        command.vy = finite("vy", vy);
         command.omega = finite("omega", omega);
         return new Command(input("velocity_command_t"), Bus.encode(command));
     }
@@ -267,7 +278,8 @@ public final class Robot {
 
     private String input(String type) {
         if (drive().isEmpty()) {
-            throw new RuedoException.NotSupported(name + " cannot be driven: its model has no drive");
+            throw new RuedoException.NotSupported(name + " cannot be driven: its model has no drive; --drive " + name
+                    + "=LEFT+...,RIGHT+... gives it one, by its wheel joints");
         }
         for (channel_info_t channel : sim.info().channels(name)) {
             if (channel.input && channel.type.equals(type)) return channel.name;

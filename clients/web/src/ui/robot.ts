@@ -5,7 +5,8 @@ import { inWorld, type Heading } from "./odometry";
 import { PolarPlot, TimePlot } from "./plots";
 
 const kStates = ["idle", "running", "done", "ended", "refused"];
-const kReasons = ["", "replaced by a newer command", "blocked by contact", "stopped by the watchdog: no command came", "refused: not a finite number", "refused: unknown kind", "refused: value out of range", "refused: the robot cannot move"];
+const kReasons = ["", "replaced by a newer command", "blocked by contact", "stopped by the watchdog: no command came", "refused: not a finite number", "refused: unknown kind", "refused: value out of range", "refused: the robot cannot move",
+  "refused: its drive cannot do that"];
 const kKinds: Record<number, string> = { 1: "advance", 2: "rotate", 3: "heading", 4: "arc", 5: "stop", [motion_status_t.KIND_VELOCITY]: "velocity", [motion_status_t.KIND_WHEELS]: "wheels" };
 const degrees = (rad: number) => `${(rad * 180 / Math.PI).toFixed(1)}°`;
 const heading = (rad: number) => degrees(wrap(rad));    // all headings alike, from -180 to 180

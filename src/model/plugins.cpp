@@ -1,0 +1,256 @@
+// The table of plugins that are known.
+#include "model/plugins.h"
+
+#include <algorithm>
+#include <cctype>
+#include <map>
+
+namespace ruedo::model {
+namespace {
+
+using Does = PluginKind::Does;
+
+struct Known {
+  Does does;
+  const char* would = "";
+};
+
+const std::map<std::string, Known>& of_gz() {
+  static const std::map<std::string, Known> table = {
+      {"DiffDrive", {Does::drive}},
+      {"MecanumDrive", {Does::drive}},
+      {"AckermannSteering", {Does::drive}},
+      {"VelocityControl", {Does::drive}},
+      {"TrackedVehicle", {Does::drive}},
+      {"JointController", {Does::joints}},
+      {"JointPositionController", {Does::joints}},
+      {"JointTrajectoryController", {Does::joints}},
+      {"ApplyJointForce", {Does::joints}},
+      {"Ros2Control", {Does::control}},
+      {"JointStatePublisher", {Does::joints}},
+      {"Physics", {Does::served}},
+      {"Sensors", {Does::served}},
+      {"SceneBroadcaster", {Does::served}},
+      {"UserCommands", {Does::served}},
+      {"Imu", {Does::served}},
+      {"Contact", {Does::served}},
+      {"PosePublisher", {Does::served}},
+      {"OdometryPublisher", {Does::served}},
+      {"LogRecord", {Does::served}},
+      {"TrackController", {Does::served}},    // of a TrackedVehicle's tracks
+      {"LogPlayback", {Does::irrelevant}},
+      {"LogVideoRecorder", {Does::irrelevant}},
+      {"CameraVideoRecorder", {Does::irrelevant}},
+      {"KineticEnergyMonitor", {Does::irrelevant}},
+      {"SystemMonitor", {Does::irrelevant}},
+      {"EntitySystem", {Does::irrelevant}},
+      {"DynamicDetachableJoint", {Does::dead, "joints would come and go"}},
+      {"Label", {Does::dead, "pictures would be labelled with its classes"}},
+      {"ForceTorque", {Does::dead, "force-torque sensors would publish"}},
+      {"AirPressure", {Does::dead, "air pressure sensors would publish"}},
+      {"AirSpeed", {Does::dead, "air speed sensors would publish"}},
+      {"Altimeter", {Does::dead, "altimeters would publish"}},
+      {"Magnetometer", {Does::dead, "magnetometers would publish"}},
+      {"NavSat", {Does::dead, "satellite navigation would publish"}},
+      {"LogicalCamera", {Does::dead, "logical cameras would publish"}},
+      {"OpticalTactilePlugin", {Does::dead, "its tactile sensor would publish"}},
+      {"DopplerVelocityLogSystem", {Does::dead, "its velocity log would publish"}},
+      {"Thermal", {Does::dead, "thermal cameras would see its temperature"}},
+      {"ThermalSensor", {Does::dead, "thermal cameras would publish"}},
+      {"WheelSlip", {Does::dead, "wheels would slip as it says"}},
+      {"WindEffects", {Does::dead, "the wind would push what is loose"}},
+      {"Buoyancy", {Does::dead, "things would float"}},
+      {"BuoyancyEngine", {Does::dead, "it would dive and rise"}},
+      {"Hydrodynamics", {Does::dead, "water would slow it"}},
+      {"LiftDrag", {Does::dead, "wings would lift"}},
+      {"AdvancedLiftDrag", {Does::dead, "wings would lift"}},
+      {"Thruster", {Does::dead, "its thrusters would push"}},
+      {"SpacecraftThrusterModel", {Does::dead, "its thrusters would push"}},
+      {"MulticopterMotorModel", {Does::dead, "its rotors would lift it"}},
+      {"MulticopterVelocityControl", {Does::dead, "it would fly as it is told"}},
+      {"LinearBatteryPlugin", {Does::dead, "its battery would run down"}},
+      {"LinearBattery", {Does::dead, "its battery would run down"}},
+      {"Breadcrumbs", {Does::dead, "it would drop models"}},
+      {"TriggeredPublisher", {Does::dead, "messages would be answered by messages"}},
+      {"PerformerDetector", {Does::dead, "it would tell who is in its region"}},
+      {"TouchPlugin", {Does::dead, "it would tell what touches"}},
+      {"DetachableJoint", {Does::dead, "a joint would hold another model until it is told to let go"}},
+      {"Elevator", {Does::dead, "a lift would go where it is called"}},
+      {"ApplyLinkWrench", {Does::dead, "forces would be taken from messages"}},
+      {"FollowActor", {Does::dead, "it would follow an actor"}},
+      {"TrajectoryFollower", {Does::dead, "it would follow its waypoints"}},
+      {"ParticleEmitter", {Does::dead, "particles would be seen"}},
+      {"ParticleEmitter2", {Does::dead, "particles would be seen"}},
+      {"RFComms", {Does::dead, "radio would be modelled"}},
+      {"PerfectComms", {Does::dead, "messages would pass between its models"}},
+      {"AcousticComms", {Does::dead, "sound would carry messages"}},
+      {"CommsEndpoint", {Does::dead, "it would take part in modelled radio"}},
+      {"EnvironmentPreload", {Does::dead, "the environment's data would be read"}},
+      {"EnvironmentalSensor", {Does::dead, "it would measure the environment's data"}},
+      {"GravityCompensation", {Does::dead, "gravity would be compensated"}},
+      {"HydrodynamicsPlugin", {Does::dead, "water would slow it"}},
+  };
+  return table;
+}
+
+const std::map<std::string, Known>& of_classic() {
+  static const std::map<std::string, Known> table = {
+      {"gazebo_ros_diff_drive", {Does::drive}},
+      {"gazebo_ros_skid_steer_drive", {Does::drive}},
+      {"gazebo_ros_planar_move", {Does::drive}},
+      {"gazebo_ros_mecanum", {Does::drive}},
+      {"gazebo_ros_ackermann_drive", {Does::drive}},
+      {"gazebo_ros_tricycle_drive", {Does::drive}},
+      {"gazebo_ros_force_based_move", {Does::drive}},
+      {"hector_gazebo_ros_force_based_move", {Does::drive}},
+      {"DiffDrivePlugin", {Does::drive}},
+      {"SkidSteerDrivePlugin", {Does::drive}},
+      {"SimpleTrackedVehiclePlugin", {Does::drive}},
+      {"WheelTrackedVehiclePlugin", {Does::drive}},
+      {"diffdrive_plugin_6w", {Does::drive}},
+      {"hector_gazebo_ros_diffdrive_6w", {Does::drive}},
+      {"diffdrive_plugin_multi_wheel", {Does::drive}},
+      {"gazebo_ros_control", {Does::control}},
+      {"gazebo_ros2_control", {Does::control}},
+      {"gz_ros2_control-system", {Does::control}},
+      {"ign_ros2_control-system", {Does::control}},
+      {"gz_ros2_control", {Does::control}},
+      {"ign_ros2_control", {Does::control}},
+      {"hwsim", {Does::control}},
+      {"gazebo_ros_joint_state_publisher", {Does::joints}},
+      {"gazebo_ros_joint_pose_trajectory", {Does::joints}},
+      {"gazebo_ros_joint_trajectory", {Does::joints}},
+      {"JointTrajectoryPlugin", {Does::joints}},
+      {"gazebo_ros_ray_sensor", {Does::served}},
+      {"gazebo_ros_laser", {Does::served}},
+      {"gazebo_ros_gpu_laser", {Does::served}},
+      {"gazebo_ros_block_laser", {Does::served}},
+      {"gazebo_ros_velodyne_laser", {Does::served}},
+      {"gazebo_ros_velodyne_gpu_laser", {Does::served}},
+      {"gazebo_ros_range", {Does::served}},
+      {"hector_gazebo_ros_sonar", {Does::served}},
+      {"gazebo_ros_imu_sensor", {Does::served}},
+      {"gazebo_ros_camera", {Does::served}},
+      {"gazebo_ros_triggered_camera", {Does::served}},
+      {"gazebo_ros_multicamera", {Does::served}},
+      {"gazebo_ros_depth_camera", {Does::served}},
+      {"gazebo_ros_openni_kinect", {Does::served}},
+      {"gazebo_ros_realsense", {Does::served}},
+      {"realsense_gazebo_plugin", {Does::served}},
+      {"gazebo_ros_bumper", {Does::served}},
+      {"gazebo_ros_p3d", {Does::served}},    // ROBOT/pose
+      {"gazebo_ros_init", {Does::served}},
+      {"gazebo_ros_factory", {Does::served}},
+      {"gazebo_ros_state", {Does::served}},
+      {"gazebo_ros_api_plugin", {Does::served}},
+      {"RayPlugin", {Does::served}},
+      {"GpuRayPlugin", {Does::served}},
+      {"CameraPlugin", {Does::served}},
+      {"DepthCameraPlugin", {Does::served}},
+      {"ImuSensorPlugin", {Does::served}},
+      {"ContactPlugin", {Does::served}},
+      {"SonarPlugin", {Does::served}},
+      {"gazebo_ros_video", {Does::irrelevant}},
+      {"gazebo_ros_paths_plugin", {Does::irrelevant}},
+      {"HeightmapLODPlugin", {Does::irrelevant}},
+      {"StaticMapPlugin", {Does::irrelevant}},
+      {"SystemGUI", {Does::irrelevant}},
+      {"gazebo_ros_imu", {Does::served}},    // sensor_from_plugin()
+      {"hector_gazebo_ros_imu", {Does::served}},
+      {"gazebo_ros_gps_sensor", {Does::dead, "satellite navigation would publish"}},
+      {"hector_gazebo_ros_gps", {Does::dead, "it would make satellite navigation without a <sensor>"}},
+      {"hector_gazebo_ros_magnetic", {Does::dead, "it would make a magnetometer without a <sensor>"}},
+      {"hector_gazebo_ros_baro", {Does::dead, "it would make a barometer without a <sensor>"}},
+      {"gazebo_ros_ft_sensor", {Does::dead, "force-torque sensors would publish"}},
+      {"gazebo_ros_f3d", {Does::dead, "it would tell the forces on a link"}},
+      {"gazebo_ros_force", {Does::dead, "forces would be taken from messages"}},
+      {"gazebo_ros_wheel_slip", {Does::dead, "wheels would slip as it says"}},
+      {"WheelSlipPlugin", {Does::dead, "wheels would slip as it says"}},
+      {"WindPlugin", {Does::dead, "the wind would push what is loose"}},
+      {"BuoyancyPlugin", {Does::dead, "things would float"}},
+      {"LiftDragPlugin", {Does::dead, "wings would lift"}},
+      {"ActorPlugin", {Does::dead, "actors would walk by forces instead of their trajectory"}},
+      {"ActorCollisionsPlugin", {Does::served}},
+      {"RandomVelocityPlugin", {Does::dead, "it would move at random"}},
+      {"ElevatorPlugin", {Does::dead, "a lift would go where it is called"}},
+      {"VacuumGripperPlugin", {Does::dead, "a gripper would suck"}},
+      {"gazebo_ros_vacuum_gripper", {Does::dead, "a gripper would suck"}},
+      {"gazebo_grasp_fix", {Does::dead, "what is grasped would stick to the gripper"}},
+      {"gazebo_mimic_joint_plugin", {Does::dead, "one joint would follow another"}},
+      {"roboticsgroup_upatras_gazebo_mimic_joint_plugin", {Does::dead, "one joint would follow another"}},
+      {"roboticsgroup_gazebo_mimic_joint_plugin", {Does::dead, "one joint would follow another"}},
+      {"gazebo_ros_elevator", {Does::dead, "a lift would go where it is called"}},
+      {"gazebo_ros_projector", {Does::dead, "a pattern would be projected"}},
+      {"gazebo_ros_harness", {Does::dead, "a harness would hold it"}},
+      {"gazebo_ros_light", {Does::dead, "lights would go on and off"}},
+      {"slotcar", {Does::dead, "it would drive the lanes of a fleet manager"}},
+      {"door", {Does::dead, "doors would open on request"}},
+      {"lift", {Does::dead, "a lift would go where it is called"}},
+      {"TeleportDispenserPlugin", {Does::dead, "things would be handed to robots"}},
+      {"TeleportIngestorPlugin", {Does::dead, "things would be taken from robots"}},
+      {"readonly", {Does::irrelevant}},
+      {"toggle_floors", {Does::irrelevant}},
+      {"toggle_charging", {Does::irrelevant}},
+      {"thumbnail_generator", {Does::irrelevant}},
+      {"crowd_simulator", {Does::dead, "a crowd would walk"}},
+  };
+  return table;
+}
+
+bool begins_with(const std::string& text, const std::string& start) { return text.rfind(start, 0) == 0; }
+bool ends_with(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+// Without folder, "lib" and ".so".
+std::string library_of(const std::string& filename) {
+  std::string name = filename.substr(filename.rfind('/') + 1);
+  if (const size_t dot = name.find(".so"); dot != std::string::npos) name.erase(dot);
+  for (const char* end : {".dylib", ".dll"}) {
+    if (ends_with(name, end)) name.erase(name.size() - std::string(end).size());
+  }
+  return begins_with(name, "lib") ? name.substr(3) : name;
+}
+
+// "gz-sim7-diff-drive-system" and "ignition-gazebo-diff-drive-system" to "DiffDrive"; "" for other libraries.
+std::string system_of(const std::string& library) {
+  size_t start = std::string::npos;
+  for (const char* prefix : {"gz-sim", "ignition-gazebo", "ign-gazebo"}) {
+    if (begins_with(library, prefix)) start = std::string(prefix).size();
+  }
+  if (start == std::string::npos || !ends_with(library, "-system")) return "";
+  while (start < library.size() && std::isdigit(static_cast<unsigned char>(library[start]))) ++start;
+  std::string name;
+  bool upper = false;
+  for (const char c : library.substr(start, library.size() - start - std::string("-system").size())) {
+    if (c == '-') upper = true;
+    else name += upper ? static_cast<char>(std::toupper(static_cast<unsigned char>(c))) : c, upper = false;
+  }
+  return name;
+}
+
+}  // namespace
+
+PluginKind kind_of(const Element& plugin) {
+  const std::string* name = plugin.attribute("name");
+  const std::string* filename = plugin.attribute("filename");
+  const std::string library = filename ? library_of(*filename) : "";
+  std::string system = system_of(library);
+  for (const char* space : {"::systems::", "gz_ros2_control::", "ign_ros2_control::"}) {
+    const size_t at = name ? name->rfind(space) : std::string::npos;
+    if (at == std::string::npos) continue;
+    system = std::string(space).find("ros2") != std::string::npos ? "Ros2Control" : name->substr(at + std::string(space).size());
+  }
+  // Libraries have names of their own spelling ("imu" for Imu, "rf-comms" for RFComms): case does not count.
+  const auto same = [](const std::string& a, const std::string& b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+  };
+  for (const auto& [known, what] : of_gz()) {
+    if (same(known, system)) return {known, what.does, what.would};
+  }
+  const auto found = of_classic().find(library);
+  if (found != of_classic().end()) return {library, found->second.does, found->second.would};
+  return {filename && !filename->empty() ? *filename : "(without a filename)", Does::unknown, ""};
+}
+
+}  // namespace ruedo::model

@@ -1,0 +1,158 @@
+// The child process, and what it leaves behind.
+#include "model/xacro.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <sstream>
+#include <thread>
+#include <vector>
+
+namespace fs = std::filesystem;
+
+namespace ruedo::model {
+namespace {
+
+constexpr rlim_t kCpu_s = 20, kMemory_bytes = rlim_t{2} << 30, kFile_bytes = rlim_t{64} << 20;
+constexpr int kWall_s = 60;
+constexpr size_t kLargest_bytes = size_t{64} << 20;
+
+// Where the child writes.
+class Folder {
+ public:
+  Folder() {
+    std::string pattern = (fs::temp_directory_path() / "ruedo-xacro-XXXXXX").string();
+    if (!::mkdtemp(pattern.data())) throw InputError({}, std::string("no folder for xacro's output can be made: ") + std::strerror(errno));
+    path_ = pattern;
+  }
+  ~Folder() {
+    std::error_code error;
+    fs::remove_all(path_, error);
+  }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  std::string operator/(const char* name) const { return path_ + "/" + name; }
+
+ private:
+  std::string path_;
+};
+
+std::string script() {
+  std::error_code error;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  const fs::path installed = program.parent_path().parent_path() / "share/ruedo/xacro/expand.py";
+  return !error && fs::exists(installed, error) ? installed.string() : RUEDO_XACRO_DIR "/expand.py";
+}
+
+// Ruedo's own Python where there is one, for it has the package.
+std::string python() {
+  if (const char* chosen = std::getenv("RUEDO_PYTHON")) return chosen;
+  std::error_code error;
+  return fs::exists(RUEDO_PYTHON, error) ? RUEDO_PYTHON : "python3";
+}
+
+void set_limit(decltype(RLIMIT_AS) which, rlim_t value) {
+  const rlimit limit{value, value};
+  ::setrlimit(which, &limit);
+}
+
+// Exit code, or -1 for a child that was ended. Between fork and exec only system calls are made.
+int run(std::vector<std::string> words, const std::string& log) {
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  const pid_t child = ::fork();
+  if (child < 0) return -1;
+  if (child == 0) {
+    ::setpgid(0, 0);
+    set_limit(RLIMIT_CORE, 0);
+    set_limit(RLIMIT_CPU, kCpu_s);
+    set_limit(RLIMIT_FSIZE, kFile_bytes);
+    set_limit(RLIMIT_AS, kMemory_bytes);
+    const int nothing = ::open("/dev/null", O_RDWR);
+    const int messages = ::open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    ::dup2(nothing, 0);
+    ::dup2(nothing, 1);
+    ::dup2(messages, 2);
+    ::execvp(arguments[0], arguments.data());
+    ::_exit(127);
+  }
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(kWall_s);
+  int status = 0;
+  while (true) {
+    const pid_t ended = ::waitpid(child, &status, WNOHANG);
+    if (ended == child) return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    if ((ended < 0 && errno != EINTR) || std::chrono::steady_clock::now() > deadline) {
+      ::kill(-child, SIGKILL);
+      ::waitpid(child, &status, 0);
+      return -1;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+}
+
+std::string text_or_nothing(const std::string& path) {
+  try {
+    return read_text_file(path, kLargest_bytes);
+  } catch (const InputError&) {
+    return "";
+  }
+}
+
+// "FILE:LINE", which expand.py gave each element.
+void take_lines(Element& element, const Source& above) {
+  element.source = above;
+  const auto at = std::find_if(element.attributes.begin(), element.attributes.end(), [](const auto& each) { return each.first == "ruedo_at"; });
+  if (at != element.attributes.end()) {
+    const size_t colon = at->second.rfind(':');
+    element.source = {at->second.substr(0, colon), std::atoi(at->second.c_str() + colon + 1)};
+    element.attributes.erase(at);
+  }
+  const Source own = element.source;
+  for (const auto& child : element.children) take_lines(*child, own);
+}
+
+}  // namespace
+
+bool is_xacro(const std::string& path, const Element* root) {
+  std::error_code error;    // a text that came with a request is none: only what is on the disk is run
+  if (!fs::is_regular_file(path, error)) return false;
+  if (fs::path(path).extension() == ".xacro") return true;
+  if (!root || root->name != "robot") return false;
+  return std::any_of(root->children.begin(), root->children.end(), [](const auto& child) { return child->name.rfind("xacro:", 0) == 0; });
+}
+
+std::shared_ptr<const Element> expand_xacro(const std::string& path, ReadContext& context) {
+  const Folder folder;
+  const std::string out = folder / "robot.urdf", log = folder / "messages";
+  std::vector<std::string> words{python(), script(), path, out};
+  for (const std::string& root : context.resources.folders()) words.insert(words.end(), {"--folder", root});
+  for (const std::string& argument : context.xacro_arguments) words.insert(words.end(), {"--argument", argument});
+  const int code = run(words, log);
+  if (code != 0) {
+    std::string why = text_or_nothing(log);
+    why.erase(std::find(why.begin(), why.end(), '\n'), why.end());
+    if (code == 127) why = "Python is missing (" + words[0] + "); xacro needs it";
+    if (code == -1) why = "it needs more than " + std::to_string(kCpu_s) + " s, or more than 2 GB";
+    throw InputError({path, 0}, "the xacro file cannot be expanded: " + (why.empty() ? "it does not say why" : why));
+  }
+  std::string line;
+  for (std::istringstream files(text_or_nothing(out + ".files")); std::getline(files, line);) context.documents.note(line);
+  for (std::istringstream lines(text_or_nothing(out + ".missing")); std::getline(lines, line);) {
+    const size_t tab = line.find('\t');
+    context.findings.error({line.substr(0, tab), 0}, "xacro", "the include '" + line.substr(std::min(tab, line.size() - 1) + 1) + "' is not found; it is passed over");
+  }
+  std::unique_ptr<Element> root = parse_document(read_text_file(out, kLargest_bytes), path);
+  take_lines(*root, {path, 1});
+  return root;
+}
+
+}  // namespace ruedo::model

@@ -1,0 +1,46 @@
+// Rolling without slip: each wheel's rim has the speed of the ground below it, along the wheel.
+#include "robot/wheel_angles.h"
+
+#include <cmath>
+
+namespace ruedo::robot {
+
+WheelAngles::WheelAngles(const model::BodyLayout& layout, int robot, const model::DriveDescription& drive) : radius_(drive.wheel_radius) {
+  const model::RobotPlacement& placement = layout.robots[static_cast<size_t>(robot)];
+  const Pose X_BaseB = placement.X_BBase.inverse();
+  for (const int index : placement.wheels) {
+    const model::WheelPlacement& wheel = layout.wheels[static_cast<size_t>(index)];
+    const model::WheelPlacement& place = wheel.on < 0 ? wheel : layout.wheels[static_cast<size_t>(wheel.on)];
+    const Vec3 p_Base = X_BaseB * (layout.links[static_cast<size_t>(place.link)].X_BL * place.center_in_L);
+    wheels_.push_back({index, wheel.steers, wheel.on >= 0, wheel.rim, p_Base.x(), p_Base.y()});
+  }
+}
+
+void WheelAngles::advance(const Displacement& way) {
+  way_ += way.way;
+  side_ += way.side;
+  angle_ += way.angle;
+  for (Wheel& wheel : wheels_) {
+    if (wheel.steered) wheel.rolled += std::copysign(std::hypot(way.way - way.angle * wheel.y, way.angle * wheel.x), way.way);
+  }
+}
+
+void WheelAngles::read(Snapshot& snapshot, const Vec3& twist, double curvature) const {
+  const Vec3 sums(way_, side_, angle_);
+  for (const Wheel& wheel : wheels_) {
+    double angle = 0.0, rate = 0.0;
+    if (wheel.steers) {    // across the line to the middle of the circle
+      angle = std::atan2(curvature * wheel.x, 1.0 - curvature * wheel.y);
+    } else if (radius_ > 0.0 && wheel.steered) {
+      angle = wheel.rolled / radius_;
+      rate = std::copysign(std::hypot(twist.x() - twist.z() * wheel.y, twist.z() * wheel.x), twist.x()) / radius_;
+    } else if (radius_ > 0.0) {
+      angle = wheel.rim.dot(sums) / radius_;
+      rate = wheel.rim.dot(twist) / radius_;
+    }
+    snapshot.wheel_angles[static_cast<size_t>(wheel.index)] = angle;
+    snapshot.wheel_rates[static_cast<size_t>(wheel.index)] = rate;
+  }
+}
+
+}  // namespace ruedo::robot

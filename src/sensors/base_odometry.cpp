@@ -1,0 +1,85 @@
+// Forward kinematics of wheels.
+#include "sensors/base_odometry.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ruedo {
+
+using Steering = model::DriveDescription::Steering;
+
+bool BaseOdometry::is_for(const model::DriveDescription& drive) {
+  if (drive.steering == Steering::differential) return false;
+  return drive.steering != Steering::tracked || drive.left_joints.empty();
+}
+
+BaseOdometry::BaseOdometry(const model::BodyLayout& layout, int robot, const model::DriveDescription& drive, double track_error, double steering_error)
+    : lever_(1.0 + track_error), steering_error_(steering_error) {
+  const model::RobotPlacement& placement = layout.robots[static_cast<size_t>(robot)];
+  if (drive.steering == Steering::mecanum || drive.steering == Steering::omni) {
+    normal_.setZero();
+    for (const int wheel : placement.wheels) {
+      Vec3 rim = layout.wheels[static_cast<size_t>(wheel)].rim;
+      rim.z() *= lever_;
+      rims_.push_back(rim);
+      normal_ += rim * rim.transpose();
+    }
+  } else if (drive.steering == Steering::ackermann || drive.steering == Steering::tricycle) {
+    const Pose X_BaseB = placement.X_BBase.inverse();
+    for (const int index : placement.wheels) {
+      const model::WheelPlacement& wheel = layout.wheels[static_cast<size_t>(index)];
+      const model::WheelPlacement& place = wheel.on < 0 ? wheel : layout.wheels[static_cast<size_t>(wheel.on)];
+      const Vec3 p = X_BaseB * (layout.links[static_cast<size_t>(place.link)].X_BL * place.center_in_L);
+      const auto on = std::find(placement.wheels.begin(), placement.wheels.end(), wheel.on);
+      wheels_.push_back({wheel.steers, wheel.on >= 0, static_cast<int>(on - placement.wheels.begin()), p.x(), p.y()});
+    }
+  }
+}
+
+// 1/m, as the wheels that steer show it, each for itself, in the mean.
+double BaseOdometry::curvature(const std::vector<double>& angles) const {
+  double sum = 0.0;
+  int count = 0;
+  for (size_t i = 0; i < wheels_.size(); ++i) {
+    if (!wheels_[i].steers) continue;
+    const double slope = std::tan(angles[i] + steering_error_);
+    sum += slope / (lever_ * wheels_[i].x + slope * wheels_[i].y);
+    ++count;
+  }
+  return count > 0 ? sum / count : 0.0;
+}
+
+Vec3 BaseOdometry::moved(const std::vector<double>& ways, const std::vector<double>& angles) {
+  if (!rims_.empty()) {
+    Vec3 sum = Vec3::Zero();
+    for (size_t i = 0; i < rims_.size(); ++i) sum += rims_[i] * ways[i];
+    return normal_.ldlt().solve(sum);
+  }
+  const double now = curvature(angles);
+  const double middle = started_ ? 0.5 * (curvature_before_ + now) : now;
+  curvature_before_ = now;
+  started_ = true;
+  const bool any_fixed = std::any_of(wheels_.begin(), wheels_.end(), [](const Wheel& wheel) { return !wheel.steers && !wheel.steered; });
+  double way = 0.0;
+  int count = 0;
+  for (size_t i = 0; i < wheels_.size(); ++i) {
+    const Wheel& wheel = wheels_[i];
+    if (wheel.steers || (any_fixed && wheel.steered)) continue;
+    // A wheel on a circle about the same middle; base_link's way is in proportion.
+    const double part = wheel.steered ? std::hypot(1.0 - middle * wheel.y, middle * wheel.x) : 1.0 - middle * wheel.y;
+    way += ways[i] / part;
+    ++count;
+  }
+  if (count > 0) way /= count;
+  return {way, 0.0, way * middle};
+}
+
+Vec3 BaseOdometry::moved(const Pose& before, const Pose& after) const {
+  const double angle = wrap_angle(heading(after.rotation) - heading(before.rotation)), half = 0.5 * angle;
+  const Vec3 chord = after.translation - before.translation;
+  const double c = std::cos(heading(before.rotation) + half), s = std::sin(heading(before.rotation) + half);
+  const double part = half == 0.0 ? 1.0 : half / std::sin(half);    // of an arc to its chord
+  return {part * (c * chord.x() + s * chord.y()), part * (c * chord.y() - s * chord.x()), angle / lever_};
+}
+
+}  // namespace ruedo

@@ -1,0 +1,143 @@
+"""Drives every robot of a folder of public files, and writes what came of it as a table.
+
+    tests/corpus/robots_table.py build/release/bin/ruedo ../shared/corpus [-o docs/corpus.md]
+
+Each is told to drive 0.3 m/s for 2 s and to turn 0.5 rad/s for 2 s, in lockstep and without noise. A sensor publishes when at
+least one message of it came. What `ruedo check` names is grouped by what it says.
+"""
+import argparse
+import collections
+import json
+import math
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import ruedo
+from sections import put
+
+TITLE = "Robots, driven"
+HEAD = """Made by `tests/corpus/robots_table.py RUEDO FOLDER -o docs/corpus.md`, and held by a test: each robot is commanded 0.3 m/s for 2 s, comes to rest, and
+is commanded 0.5 rad/s for 2 s, without noise. "Way" and "turn" are what it did; limits of acceleration that its files give are in them. "Sensors" counts those
+that published. Files that this folder lacks (meshes, included xacro) are named with the rest.
+"""
+
+# Files with a robot that Gazebo drives; what is expanded from a xacro file stands beside it.
+ROBOTS = {
+    "TurtleBot3 burger": "turtlebot3/models/turtlebot3_burger/model.sdf",
+    "TurtleBot3 burger (Classic)": "turtlebot3/models/turtlebot3_burger/model-1_4.sdf",
+    "TurtleBot3 burger with camera": "turtlebot3/models/turtlebot3_burger_cam/model.sdf",
+    "TurtleBot3 waffle": "turtlebot3/models/turtlebot3_waffle/model.sdf",
+    "TurtleBot3 waffle pi": "turtlebot3/models/turtlebot3_waffle_pi/model.sdf",
+    "Pioneer 2-DX": "gazebo_models/pioneer2dx/model.sdf",
+    "Pioneer 3-AT (OSRF)": "gazebo_models/pioneer3at/model.sdf",
+    "Pioneer 3-AT (MobileRobots, URDF)": "amr_robots/urdf/pioneer3at.urdf",
+    "Pioneer 3-AT (MobileRobots, xacro)": "amr_robots/urdf/pioneer3at.urdf.xacro",
+    "Pioneer 3-DX (MobileRobots, URDF)": "amr_robots/urdf/pioneer3dx.urdf",
+    "Pioneer 3-DX (MobileRobots, xacro)": "amr_robots/urdf/pioneer3dx.urdf.xacro",
+    "Pioneer LX (MobileRobots)": "amr_robots/urdf/pioneer-lx.urdf",
+    "SeekurJr (MobileRobots)": "amr_robots/urdf/seekurjr.urdf",
+    "PowerBot (MobileRobots)": "amr_robots/urdf/powerbot.urdf",
+    "Husky (xacro)": "husky/husky_description/urdf/husky.urdf.xacro",
+    "linorobot2 2wd (xacro)": "linorobot2/linorobot2_description/urdf/robots/2wd.urdf.xacro",
+    "linorobot2 4wd (xacro)": "linorobot2/linorobot2_description/urdf/robots/4wd.urdf.xacro",
+    "linorobot2 mecanum (xacro)": "linorobot2/linorobot2_description/urdf/robots/mecanum.urdf.xacro",
+    "neobotix MP-400": "neobotix/robots/mp_400/mp_400.urdf",
+    "neobotix MP-500": "neobotix/robots/mp_500/mp_500.urdf",
+    "neobotix MPO-500": "neobotix/robots/mpo_500/mpo_500.urdf",
+    "neobotix MPO-700": "neobotix/robots/mpo_700/mpo_700.urdf",
+}
+
+# Their wheels' joints are fixed, or there is no plugin that drives them: in Gazebo they stand still, too.
+STAND_THERE_TOO = {"Pioneer 3-DX (MobileRobots, URDF)", "Pioneer 3-DX (MobileRobots, xacro)", "PowerBot (MobileRobots)"}
+
+
+def check(program, path):
+    """What is named, in words, each once."""
+    done = subprocess.run([program, "check", path, "--json"], capture_output=True, text=True, timeout=120)
+    if not done.stdout.startswith("["):
+        return [done.stderr.strip().splitlines()[-1]]
+    texts = collections.Counter()
+    for each in json.loads(done.stdout):
+        text = re.sub(r"\S*/corpus/", "", each["text"])
+        text = re.sub(r"the mesh '[^']*'", "a mesh", text)
+        text = re.sub(r"the include '[^']*'", "an include", text)
+        texts[text.replace("|", "\\|").replace("<", "&lt;")] += 1
+    return [text + (f" ({count} places)" if count > 1 else "") for text, count in texts.items()]
+
+
+def drive(path):
+    """Steering, way, turn, sensors that publish, all sensors. Raises what the server says."""
+    with ruedo.launch(path, args=["--lockstep", "1", "--no-noise"], timeout=120) as sim:
+        if not sim.robots:
+            return "stands still", math.nan, math.nan, 0, 0
+        robot = sim.robots[0]
+        seen = sim.step(0)
+        published = collections.Counter(message.channel for message in seen.messages)
+        if not robot.drive:
+            return "stands still", math.nan, math.nan, 0, 0
+        steered = robot.drive.endswith(("ackermann", "tricycle"))
+        poses = [seen.latest(robot.pose)]
+        second = round(1.0 / sim.step_size)
+
+        def go(seconds, v, omega):
+            for _ in range(round(seconds * 4)):
+                part = sim.step(second // 4, [robot.velocity_command(v, omega)])
+                published.update(message.channel for message in part.messages)
+                pose = part.latest(robot.pose)
+            return pose
+
+        go(0.5, 0.0, 0.0)
+        before = go(0.25, 0.0, 0.0)
+        go(2.0, 0.3, 0.0)
+        straight = go(2.0, 0.0, 0.0)
+        way = math.hypot(straight.x - before.x, straight.y - before.y)
+        go(2.0, 0.5 if steered else 0.0, 0.5)
+        turned = go(2.0, 0.0, 0.0)
+        turn = math.remainder(turned.heading - straight.heading, 2 * math.pi)
+        sensors = [device for device in robot.devices if device.kind not in ("odometry", "pose", "motion", "joints")]
+        alive = sum(any(channel == f"{robot.name}/{each.name}" or channel.startswith(f"{robot.name}/{each.name}/") for channel in published) for each in sensors)
+        return robot.drive.partition(" ")[2] or "differential", way, turn, alive, len(sensors)
+
+
+def row(program, name, path):
+    named = check(program, path)
+    try:
+        steering, way, turn, alive, sensors = drive(path)
+    except ruedo.RuedoError as error:
+        return f"| {name} | does not load | | | | {str(error).splitlines()[0]} |"
+    driven = f"{way:.3f} m | {turn:.3f} rad" if not math.isnan(way) else "- | -"
+    return f"| {name} | {steering} | {driven} | {alive} of {sensors} | {'<br>'.join(named) or 'nothing'} |"
+
+
+def table(program, folder, names=None):
+    os.environ["RUEDO"] = str(program)
+    # ROS packages and models that the files name by their package.
+    os.environ["GAZEBO_MODEL_PATH"] = f"{folder}/gazebo_models:{folder}/turtlebot3/models"
+    rows = []
+    for name, path in ROBOTS.items():
+        if names is None or name in names:
+            rows.append(row(program, name, folder / path))
+            print(rows[-1], file=sys.stderr, flush=True)
+    return "\n".join(["| Robot | Steering | Way for 0.6 m | Turn for 1 rad | Sensors | Named |", "|---|---|---|---|---|---|", *rows]) + "\n"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("ruedo", type=Path)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("-o", "--out", type=Path)
+    parser.add_argument("--only", action="append", help="a robot's name")
+    arguments = parser.parse_args()
+    text = HEAD + "\n" + table(arguments.ruedo.resolve(), arguments.folder.resolve(), arguments.only)
+    if arguments.out:
+        put(arguments.out, TITLE, text)
+    else:
+        sys.stdout.write(text)
+
+
+if __name__ == "__main__":
+    main()

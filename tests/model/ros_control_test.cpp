@@ -1,0 +1,230 @@
+// Drives that stand in the YAML of ros_control and ros2_control, and drives that stand nowhere.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "model/load.h"
+#include "model/yaml.h"
+#include "temporary_folder.h"
+#include "text_world.h"
+
+namespace ruedo::model {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using Steering = DriveDescription::Steering;
+
+// A box on four wheels of radius 0.1 m, 0.6 m apart to the side and 0.5 m along. Wheels' names begin with `prefix`.
+std::string four_wheels(const std::string& more, const std::string& prefix = "") {
+  std::string text = "<robot name='bot'><link name='base'><inertial><mass value='9'/><inertia ixx='0.3' iyy='0.3' izz='0.3' ixy='0' ixz='0' iyz='0'/></inertial></link>";
+  const std::pair<const char*, const char*> places[] = {{"front_left", "0.25 0.3 0.1"}, {"rear_left", "-0.25 0.3 0.1"}, {"front_right", "0.25 -0.3 0.1"}, {"rear_right", "-0.25 -0.3 0.1"}};
+  for (const auto& [place, xyz] : places) {
+    const std::string name = prefix + place;
+    text += "<link name='" + name + "_link'><inertial><mass value='1'/><inertia ixx='0.01' iyy='0.01' izz='0.01' ixy='0' ixz='0' iyz='0'/></inertial>"
+            "<collision><origin rpy='1.5707963 0 0'/><geometry><cylinder radius='0.1' length='0.05'/></geometry></collision></link>"
+            "<joint name='" + name + "' type='continuous'><parent link='base'/><child link='" + name + "_link'/><origin xyz='" + xyz + "'/><axis xyz='0 1 0'/></joint>";
+  }
+  return text + more + "</robot>";
+}
+
+std::string transmission(const std::string& joint) {
+  return "<transmission name='t_" + joint + "'><type>transmission_interface/SimpleTransmission</type><joint name='" + joint +
+         "'><hardwareInterface>hardware_interface/VelocityJointInterface</hardwareInterface></joint></transmission>";
+}
+
+const char* const kPackage = "<package><name>%</name></package>";
+std::string package(const std::string& name) { return std::string(kPackage).replace(std::string(kPackage).find('%'), 1, name); }
+
+const DriveDescription& drive_of(const WorldModel& world) {
+  const auto& drive = world.models.back().model->drive;
+  if (!drive) throw std::runtime_error("no drive");
+  return *drive;
+}
+
+std::vector<std::string> names(const WorldModel& world, const std::vector<int>& joints) {
+  std::vector<std::string> list;
+  for (const int joint : joints) list.push_back(world.models.back().model->joints[static_cast<size_t>(joint)].name);
+  return list;
+}
+
+// ROS 1: the package beside has the file, nobody names it; radius and separation are the robot's own, multiplied.
+TEST(RosControl, DiffDriveOfRos1) {
+  TemporaryFolder folder;
+  folder.write("bot_description/package.xml", package("bot_description"));
+  folder.write("bot_control/package.xml", package("bot_control"));
+  folder.write("bot_control/config/other.yaml", "not: [what, is, looked, for]\n");
+  folder.write("bot_control/config/control.yaml", R"(bot_joints:
+  type: "joint_state_controller/JointStateController"
+bot_velocity_controller:
+  type: "diff_drive_controller/DiffDriveController"
+  left_wheel: ['front_left', 'rear_left']
+  right_wheel: ['front_right', 'rear_right']
+  publish_rate: 40
+  cmd_vel_timeout: 0.25
+  wheel_separation_multiplier: 1.5
+  wheel_radius_multiplier: 0.9
+  linear:
+    x:
+      has_velocity_limits: true
+      max_velocity: 1.0
+      has_acceleration_limits: true
+      max_acceleration: 3.0
+  angular:
+    z:
+      has_velocity_limits: true
+      max_velocity: 2.0
+      has_acceleration_limits: false
+      max_acceleration: 6.0
+)");
+  const auto world = load_world(folder.write("bot_description/urdf/bot.urdf", four_wheels(transmission("front_left") + "<gazebo><plugin name='c' filename='libgazebo_ros_control.so'/></gazebo>")));
+  EXPECT_THAT(texts(*world), ElementsAre("it drives as the controller 'bot_velocity_controller' of control.yaml says, which has its joints; no plugin names the file"));
+  EXPECT_EQ(world->findings[0].source.line, 4);    // yaml-cpp marks a map by its first entry
+  const DriveDescription& drive = drive_of(*world);
+  EXPECT_THAT(names(*world, drive.left_joints), ElementsAre("front_left", "rear_left"));
+  EXPECT_THAT(names(*world, drive.right_joints), ElementsAre("front_right", "rear_right"));
+  EXPECT_FALSE(drive.guessed);
+  EXPECT_NEAR(drive.track, 0.6 * 1.5, 1e-12);
+  EXPECT_EQ(drive.max_speed, 1.0);
+  EXPECT_EQ(drive.acceleration, 3.0);
+  EXPECT_EQ(drive.max_turn_rate, 2.0);
+  EXPECT_TRUE(std::isinf(drive.turn_acceleration));    // its switch is off
+  EXPECT_EQ(drive.watchdog_us, 250'000);
+  EXPECT_DOUBLE_EQ(drive.odometry_rate.hz(), 40.0);
+}
+
+// ROS 2: the plugin names the file as the author's machine had it; names and types are apart; keys with dots.
+TEST(RosControl, DiffDriveOfRos2) {
+  TemporaryFolder folder;
+  folder.write("bot/package.xml", package("bot"));
+  folder.write("bot/config/controllers.yaml", R"(controller_manager:
+  ros__parameters:
+    update_rate: 100
+    joint_state_broadcaster:
+      type: joint_state_broadcaster/JointStateBroadcaster
+    strange:
+      type: maker/StrangeController
+    base:
+      type: diff_drive_controller/DiffDriveController
+base:
+  ros__parameters:
+    left_wheel_names: ["front_left", "rear_left"]
+    right_wheel_names: ["front_right", "rear_right"]
+    wheel_separation: 0.61
+    wheel_radius: 0.11
+    linear.x.max_velocity: 0.8
+    linear.x.min_velocity: -0.4
+    linear.x.max_acceleration: .NaN
+    angular.z.max_velocity: 1.5
+)");
+  const std::string control = "<ros2_control name='s' type='system'><joint name='front_left'><command_interface name='velocity'/></joint></ros2_control>";
+  const auto world = load_world(folder.write(
+      "bot/urdf/bot.urdf", four_wheels(control + "<gazebo><plugin name='gz_ros2_control::GazeboSimROS2ControlPlugin' filename='libgz_ros2_control-system.so'>"
+                                                 "<parameters>/opt/ros/jazzy/share/bot/config/controllers.yaml</parameters></plugin></gazebo>")));
+  EXPECT_THAT(texts(*world), ElementsAre("controllers of type 'maker/StrangeController' are not known; 'strange' does nothing",
+                                         "controller 'base': min_velocity is not kept: it is as fast both ways as max_velocity says"));
+  const DriveDescription& drive = drive_of(*world);
+  EXPECT_EQ(drive.wheel_radius, 0.11);
+  EXPECT_EQ(drive.track, 0.61);
+  EXPECT_EQ(drive.max_speed, 0.8);
+  EXPECT_TRUE(std::isinf(drive.acceleration));
+  EXPECT_EQ(drive.max_turn_rate, 1.5);
+  EXPECT_EQ(drive.watchdog_us, 500'000);    // diff_drive_controller's own
+}
+
+TEST(RosControl, MecanumAndSteeringControllers) {
+  TemporaryFolder folder;
+  folder.write("package.xml", package("bot"));
+  folder.write("config/c.yaml", R"(/**:
+  mecanum:
+    ros__parameters:
+      type: mecanum_drive_controller/MecanumDriveController
+      front_left_wheel_command_joint_name: front_left
+      front_right_wheel_command_joint_name: front_right
+      rear_left_wheel_command_joint_name: rear_left
+      rear_right_wheel_command_joint_name: rear_right
+      kinematics:
+        wheels_radius: 0.1
+        sum_of_robot_center_projection_on_X_Y_axis: 0.55
+)");
+  const auto world = load_world(folder.write("bot.urdf", four_wheels(transmission("front_left"))));
+  EXPECT_EQ(drive_of(*world).steering, Steering::mecanum);
+  EXPECT_NEAR(drive_of(*world).track, 0.6, 1e-12);
+  EXPECT_NEAR(drive_of(*world).wheelbase, 0.5, 1e-12);
+}
+
+// A controller of other joints is another robot's.
+TEST(RosControl, JointsThatAreNotThereAreAnotherRobots) {
+  TemporaryFolder folder;
+  folder.write("package.xml", package("bot"));
+  folder.write("config/c.yaml", "c:\n  type: diff_drive_controller/DiffDriveController\n  left_wheel: port\n  right_wheel: starboard\n");
+  const auto world = load_world(folder.write("bot.urdf", four_wheels(transmission("front_left"))));
+  EXPECT_TRUE(drive_of(*world).guessed);
+}
+
+TEST(RosControl, AFileThatIsNotThereIsNamed) {
+  TemporaryFolder folder;
+  const auto world = load_world(folder.write("bot.urdf", four_wheels("<gazebo><plugin name='c' filename='libgazebo_ros2_control.so'><parameters>$(find x)/y.yaml</parameters></plugin></gazebo>")));
+  EXPECT_THAT(texts(*world), testing::Contains("the controllers' file '$(find x)/y.yaml' is not found"));
+}
+
+TEST(Yaml, IsBounded) {
+  EXPECT_THROW(parse_yaml("a: [", "f"), InputError);
+  EXPECT_THROW(parse_yaml(std::string(2000, '['), "f"), InputError);
+  std::string bomb = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n";
+  for (int i = 1; i < 9; ++i) {
+    const std::string last = "*a" + std::to_string(i - 1) + ", ";
+    bomb += "a" + std::to_string(i) + ": &a" + std::to_string(i) + " [";
+    for (int k = 0; k < 9; ++k) bomb += last;
+    bomb += "x]\n";
+  }
+  EXPECT_THROW(parse_yaml(bomb, "f"), InputError);
+  EXPECT_EQ(parse_yaml("a:\n  b: [1, 2]\n", "f")->child("a/b/item")->source.line, 2);
+}
+
+// ---- Guesses.
+
+TEST(Guess, FourWheelsByNameAndPlace) {
+  TemporaryFolder folder;
+  const auto world = load_world(folder.write("bot.urdf", four_wheels("", "wheel_")));
+  EXPECT_THAT(texts(*world), ElementsAre("no file says how it drives; guessed from its wheels: differential, left wheel_front_left+wheel_rear_left, right "
+                                         "wheel_front_right+wheel_rear_right (--drive bot=LEFT+...,RIGHT+... says it otherwise)"));
+  EXPECT_TRUE(drive_of(*world).guessed);
+  EXPECT_EQ(drive_of(*world).steering, Steering::differential);
+  EXPECT_NEAR(drive_of(*world).track, 0.6, 1e-12);
+  EXPECT_NEAR(drive_of(*world).wheel_radius, 0.1, 1e-12);
+}
+
+TEST(Guess, MecanumByName) {
+  TemporaryFolder folder;
+  const auto world = load_world(folder.write("bot.urdf", four_wheels("", "mecanum_wheel_")));
+  EXPECT_EQ(drive_of(*world).steering, Steering::mecanum);
+}
+
+TEST(Guess, TheFlagSaysItOtherwise) {
+  TemporaryFolder folder;
+  LoadOptions options;
+  options.drives.push_back({"bot", {"wheel_front_left"}, {"wheel_front_right"}});
+  const auto world = load_world(folder.write("bot.urdf", four_wheels("", "wheel_")), options);
+  EXPECT_FALSE(drive_of(*world).guessed);
+  EXPECT_EQ(drive_of(*world).left_joints.size(), 1u);
+}
+
+// An arm has no wheels, a cart of furniture no driver.
+TEST(Guess, WhatIsNoRobotIsNoneAfterwards) {
+  TemporaryFolder folder;
+  const auto arm = load_world(folder.write("arm.urdf", "<robot name='arm'><link name='a'/><link name='b'/><joint name='shoulder' type='continuous'><parent link='a'/><child link='b'/><axis xyz='0 0 1'/></joint></robot>"));
+  EXPECT_FALSE(arm->models.back().model->drive);
+  EXPECT_THAT(texts(*arm), IsEmpty());
+  std::string cart = "<model name='cart'><link name='base'/>";
+  for (const char* side : {"left", "right"}) {
+    const std::string name = std::string(side) + "_wheel";
+    cart += "<link name='" + name + "'><pose>0 " + (side[0] == 'l' ? "0.2" : "-0.2") + " 0.1 0 0 0</pose><collision name='c'><geometry><sphere><radius>0.1</radius></sphere></geometry></collision></link>"
+            "<joint name='" + name + "_joint' type='revolute'><parent>base</parent><child>" + name + "</child><axis><xyz>0 1 0</xyz></axis></joint>";
+  }
+  EXPECT_FALSE(world_of(cart + "</model>")->models[0].model->drive);
+  EXPECT_TRUE(world_of(cart + "<plugin name='c' filename='libgazebo_ros_control.so'/></model>")->models[0].model->drive);
+}
+
+}  // namespace
+}  // namespace ruedo::model

@@ -1,0 +1,90 @@
+// xacro files: expanded without ROS, with the lines where things were written.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "model/load.h"
+#include "model/load_model.h"
+#include "temporary_folder.h"
+#include "text_world.h"
+
+namespace ruedo::model {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+const char* const kBase = R"xml(<robot name="bot" xmlns:xacro="http://www.ros.org/wiki/xacro">
+<xacro:arg name="mass" default="2"/>
+<xacro:property name="half" value="${0.5 * pi / pi}"/>
+<xacro:include filename="$(find parts)/urdf/box.xacro"/>
+<link name="base"><inertial><mass value="$(arg mass)"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<xacro:if value="${half == 0.5}"><xacro:box name="left" size="${2 * half}"/></xacro:if>
+</robot>)xml";
+const char* const kPart = R"xml(<robot xmlns:xacro="http://www.ros.org/wiki/xacro">
+<xacro:macro name="box" params="name size">
+<link name="${name}_box"><collision><geometry><box size="${size} 1 1"/></geometry></collision></link>
+<joint name="${name}_joint" type="fixed"><parent link="base"/><child link="${name}_box"/></joint>
+</xacro:macro></robot>)xml";
+
+struct Packages {
+  TemporaryFolder folder;
+  Packages() {
+    folder.write("somewhere/package.xml", "<package format='3'><name>parts</name></package>");    // the folder's name is another
+    folder.write("somewhere/urdf/box.xacro", kPart);
+    folder.write("bot/package.xml", "<package><name>bot</name></package>");
+  }
+};
+
+TEST(Xacro, IsExpandedWithArgumentsAndPackages) {
+  const Packages packages;
+  LoadOptions options;
+  options.xacro_arguments = {"mass:=3.5"};
+  const auto world = load_world(packages.folder.write("bot/urdf/bot.urdf.xacro", kBase), options);
+  const Model& model = *world->models.back().model;
+  EXPECT_EQ(model.name, "bot");
+  EXPECT_EQ(link_of(model, "base").inertial.mass, 3.5);
+  EXPECT_EQ(link_of(model, "left_box").collisions.at(0).geometry.size.x(), 1.0);
+  EXPECT_EQ(link_of(model, "left_box").source.str(), packages.folder / "somewhere/urdf/box.xacro:3");
+  EXPECT_EQ(link_of(model, "base").source.line, 5);
+  // A log's header has to know all of them.
+  EXPECT_THAT(world->files_read, testing::IsSupersetOf({packages.folder / "bot/urdf/bot.urdf.xacro", packages.folder / "somewhere/urdf/box.xacro"}));
+  EXPECT_EQ(texts(*world), std::vector<std::string>{});
+}
+
+TEST(Xacro, IsKnownByItsElementsToo) {
+  const Packages packages;
+  packages.folder.write("bot/bot.urdf", kBase);
+  const auto world = load_world(packages.folder.write("bot/w.sdf", "<sdf version='1.9'><world name='w'><include><uri>bot.urdf</uri></include></world></sdf>"));
+  EXPECT_EQ(world->models.at(0).model->links.size(), 2u);
+}
+
+TEST(Xacro, AnIncludeThatIsNotThereIsPassedOver) {
+  const Packages packages;
+  const auto world = load_world(packages.folder.write("bot/bot.xacro", "<robot name='b' xmlns:xacro='x'><xacro:include filename='$(find nowhere)/x.xacro'/><link name='l'/></robot>"));
+  EXPECT_THAT(texts(*world), ElementsAre("the include '$(find) nowhere/x.xacro' is not found; it is passed over"));
+}
+
+TEST(Xacro, WhatIsWrongIsSaidInOneLine) {
+  const Packages packages;
+  const auto error_of = [&](const std::string& text) {
+    try {
+      load_world(packages.folder.write("bot/bad.xacro", text));
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const std::string head = "<robot name='b' xmlns:xacro='x'>";
+  EXPECT_THAT(error_of(head + "<link name='${nothing}'/></robot>"), testing::AllOf(HasSubstr("bad.xacro: the xacro file cannot be expanded: "), HasSubstr("'nothing' is not defined")));
+  EXPECT_THAT(error_of(head + "<xacro:unknown/></robot>"), HasSubstr("unknown macro name: xacro:unknown"));
+  EXPECT_THAT(error_of(head + "<link"), HasSubstr("not XML"));
+}
+
+// What comes with a request is not run: only what is on the disk.
+TEST(Xacro, OfATextIsRefused) {
+  const Packages packages;
+  EXPECT_THROW(load_model_text(kBase, packages.folder.write("bot/w.sdf", "")), InputError);
+}
+
+}  // namespace
+}  // namespace ruedo::model
