@@ -162,7 +162,7 @@ def test_the_child_of_a_fork_is_told():
 
 
 def test_a_log_as_pandas_has_it(tmp_path):
-    pandas = pytest.importorskip("pandas")
+    import pandas
     log = lcm.EventLog(str(tmp_path / "run.lcm"), "w", overwrite=True)
     for k in range(3):
         odometry = ruedo.lcmtypes.odometry_t()
