@@ -253,8 +253,8 @@ class Robot {
 
 struct SpawnOptions {
   double heading = 0.0;         // rad
-  std::string name;             // "": the model's own
-  std::string text;             // SDF or URDF sent along, instead of a model's name
+  std::string name = {};        // "": the model's own
+  std::string text = {};        // SDF or URDF sent along, instead of a model's name
   bool on_ground = true;        // stands on the ground below; false: at z
   double z = 0.0;               // m
 };

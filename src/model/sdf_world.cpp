@@ -73,8 +73,6 @@ void read_scene(const Element& scene, Sky& sky, Findings& findings) {
   }
 }
 
-bool is_robot(const std::shared_ptr<const Model>& model) { return ModelInstance{"", {}, model}.is_robot(); }
-
 void add_child(Element& parent, const char* name, const std::string& text) {
   auto child = std::make_unique<Element>();
   child->name = name;
