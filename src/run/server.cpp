@@ -185,7 +185,7 @@ void Server::run() {
   }
   if (lockstep_) drain();
   control_.cancel("the run has ended");
-  if (latest_) recorder_.state_hash(hash_of_state(true));
+  recorder_.state_hash(hash_of_state(true));
   recorder_.flush();
   recorder_.check(status_.time_us);
 }
@@ -303,7 +303,7 @@ state_hash_t Server::hash_of_state(bool last) const {
   hash.utime = status_.time_us;
   hash.step = status_.step;
   hash.epoch = epoch_;
-  hash.state_hash = engine::state_hash(*latest_);
+  hash.state_hash = latest_ ? engine::state_hash(*latest_) : 0;    // a run may end before its first state
   hash.last = last;
   return hash;
 }

@@ -60,31 +60,37 @@ FILES = {
     "joint between models": (world("<joint name='j' type='fixed'><parent>a::l</parent><child>b::l</child></joint>\n" +
                                    "".join(f"<model name='{name}'><link name='l'/></model>" for name in "ab")), {}, 0,
                              ("unsupported", 3, "world w", "put both models, and the joint, into one <model>")),
-    "circle": (world("<include><uri>a.sdf</uri></include>"), {"a.sdf": b"<sdf version='1.9'><model name='a'><include><uri>a.sdf</uri></include></model></sdf>"}, 3,
-               ("error", 1, "", "an include that never ends: a.sdf includes a.sdf")),
-    "number": (in_link("<pose>1e999 0 0 0 0 0</pose>"), {}, 3, ("error", 4, "", "'1e999' is too large for a number")),
-    "not a number": (in_link("<pose>nan 0 0 0 0 0</pose>"), {}, 3, ("error", 4, "", "'nan' is not finite; allowed is a number")),
+    "circle": (world("<include><uri>a.sdf</uri></include>"), {"a.sdf": b"<sdf version='1.9'><model name='a'><include><uri>a.sdf</uri></include></model></sdf>"}, 1,
+               [("error", 1, "model a", "an include that never ends: a.sdf includes a.sdf; the part is left out"),
+                ("error", 1, "model a", "it has no link; the model is left out")]),
+    "number": (in_link("<pose>1e999 0 0 0 0 0</pose>"), {}, 1,
+               [("error", 4, "model m", "'1e999' is too large for a number; the link is left out"),
+                ("error", 3, "model m", "it has no link; the model is left out")]),
+    "not a number": (in_link("<pose>nan 0 0 0 0 0</pose>"), {}, 1,
+                     [("error", 4, "model m", "'nan' is not finite; allowed is a number; the link is left out"),
+                      ("error", 3, "model m", "it has no link; the model is left out")]),
     "only a mark": ("\ufeff", {}, 3, ("error", 0, "", "the file is empty")),
 }
 
 
 @pytest.mark.parametrize("name", FILES)
 def test_files_that_are_wrong(name, tmp_path):
-    text, others, code, (kind, line, element, part) = FILES[name]
+    text, others, code, expected = FILES[name]
     for other, content in others.items():
         (tmp_path / other).parent.mkdir(exist_ok=True)
         (tmp_path / other).write_bytes(content)
     (tmp_path / "w.sdf").write_text(text, encoding="utf-8")
     done = check(tmp_path / "w.sdf", "--json")
     findings = json.loads(done.stdout.decode("utf-8"))
-    assert done.returncode == code and len(findings) == 1, findings
-    found = findings[0]
-    assert set(found) == {"kind", "file", "line", "element", "text"}
-    assert found["file"].startswith(str(tmp_path)) and part in found["text"]
-    assert (found["kind"], found["line"], found["element"]) == (kind, line, element)
+    expected = expected if isinstance(expected, list) else [expected]
+    assert done.returncode == code and len(findings) == len(expected), findings
     text = check(tmp_path / "w.sdf").stdout.decode()
-    place = found["file"] + (f":{line}" if line else "")
-    assert part in text and place in text and "\x1b" not in text
+    for found, (kind, line, element, part) in zip(findings, expected):
+        assert set(found) == {"kind", "file", "line", "element", "text"}
+        assert found["file"].startswith(str(tmp_path)) and part in found["text"]
+        assert (found["kind"], found["line"], found["element"]) == (kind, line, element)
+        place = found["file"] + (f":{line}" if line else "")
+        assert part in text and place in text and "\x1b" not in text
     assert check(tmp_path / "w.sdf", "--strict").returncode == (code or 1)
 
 

@@ -192,7 +192,7 @@ TEST_F(EditsResetTest, HostileRequestsAreAnsweredInWords) {
       {spawn("", 0, 0), reply_t::BAD_REQUEST, "either a model's name or file, or a text"},
       {with([](auto& body) { body.model = "p3at"; }), reply_t::BAD_REQUEST, "either"},
       {spawn("garbage", 5, 5), reply_t::BAD_REQUEST, "the text"},
-      {spawn("<sdf version='1.9'>\n<model name='m'>\n<link></link></model></sdf>", 5, 5), reply_t::BAD_REQUEST, "the text:3"},
+      {spawn("<sdf version='1.9'>\n<model name='m'>\n<link></link></model></sdf>", 5, 5), reply_t::BAD_REQUEST, "one without a link"},
       {spawn("<sdf version='1.9'></sdf>", 5, 5), reply_t::BAD_REQUEST, "holds no <model>"},
       {spawn("<sdf version='1.9'><world name='w'/></sdf>", 5, 5), reply_t::BAD_REQUEST, "is a world"},
       {spawn(as_file("<light name='lamp' type='point'/>"), 5, 5), reply_t::BAD_REQUEST, "holds a <light> and no <model>"},
