@@ -25,6 +25,14 @@ void read_step(const Element& physics, WorldModel& world, Findings& findings) {
   }
 }
 
+void read_gravity(const Element& parent, WorldModel& world) {
+  constexpr double kMost = 1000.0;    // m/s^2
+  const Element* element = parent.child("gravity");
+  const Vec3 gravity = parent.vector3("gravity", world.gravity);
+  if (element && !(gravity.norm() <= kMost)) element->fail("'" + element->text + "' is not allowed; allowed are up to 1000 m/s^2");
+  world.gravity = gravity;
+}
+
 void read_physics(const Element& world_element, WorldModel& world, Findings& findings) {
   const auto all = world_element.all("physics");
   const Element* chosen = all.empty() ? nullptr : all[0];
@@ -39,10 +47,9 @@ void read_physics(const Element& world_element, WorldModel& world, Findings& fin
     report_other_children(*chosen, {"max_step_size", "real_time_factor", "real_time_update_rate", "gravity"},
                           {"ode", "bullet", "simbody", "dart", "max_contacts", "magnetic_field", "update_rate"}, "world/physics", findings);
     read_step(*chosen, world, findings);
-    world.gravity = chosen->vector3("gravity", world.gravity);    // SDF before 1.6
+    read_gravity(*chosen, world);    // SDF before 1.6
   }
-  world.gravity = world_element.vector3("gravity", world.gravity);
-  if (world.gravity.norm() > 1000) world_element.child("gravity")->fail("'" + world_element.child("gravity")->text + "' is not allowed; allowed are up to 1000 m/s^2");
+  read_gravity(world_element, world);
 }
 
 // Of a world, what changes things in Gazebo and does not here, where it says more than the format's own default.

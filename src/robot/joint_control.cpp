@@ -11,6 +11,8 @@
 namespace ruedo::robot {
 
 namespace {
+
+constexpr double kMostCommanded = 1e6;    // rad, m, rad/s, m/s, N or Nm: far beyond any robot, and harmless to the solver
 constexpr double kGain_per_s = 20.0;
 constexpr double kGainPerStep = 0.2;    // no more than this part of the error in a step
 }  // namespace
@@ -38,6 +40,7 @@ int8_t JointControl::apply(int robot, const JointCommand& command) {
   };
   for (size_t i = 0; i < n; ++i) {
     if (!std::isfinite(command.values[i])) return motion_status_t::REASON_NOT_FINITE;
+    if (std::abs(command.values[i]) > kMostCommanded) return motion_status_t::REASON_BAD_VALUE;
     if (command.modes[i] < joint_command_t::POSITION || command.modes[i] > joint_command_t::EFFORT) {
       return motion_status_t::REASON_BAD_KIND;
     }

@@ -82,6 +82,8 @@ const std::vector<BadWorld>& table() {
        ":4: <model/static>: 'maybe' is neither true nor false; allowed are true, false, 1, 0", "the model is left out"},
       {"StepZero", in_world("<physics type='ode'><max_step_size>0</max_step_size></physics>"),
        ":3: <max_step_size>: '0' is not allowed; allowed is a number from 1e-06 to 1", "what is usual is taken"},
+      {"GravityTooLarge", in_world("<gravity>1e101 0.1 -9.7</gravity>"), ":3: <gravity>: '1e101 0.1 -9.7' is not allowed; allowed are up to 1000 m/s^2", "what is usual is taken"},
+      {"GravityOfPhysicsTooLarge", in_world("<physics type='ode'><gravity>0 0 -1e9</gravity></physics>"), ":3: <gravity>: '0 0 -1e9' is not allowed; allowed are up to 1000 m/s^2", "what is usual is taken"},
       {"GravityOfTwo", in_world("<gravity>0 -9.8</gravity>"), ":3: <world/gravity>: '0 -9.8' has 2 numbers; allowed are three", "what is usual is taken"},
       {"ColourOfTwo", in_link("<visual name='v'><geometry><sphere><radius>1</radius></sphere></geometry>\n<material><diffuse>1 0</diffuse></material></visual>"),
        ":6: <diffuse>: '1 0' has 2 numbers; allowed are r g b and r g b a, from 0 to 1", "the material is left out"},
