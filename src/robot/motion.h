@@ -11,6 +11,7 @@
 #include "robot/motion_log.h"
 #include "robot/robots.h"
 #include "robot/unicycle.h"
+#include "robot/wheel_kinematics.h"
 
 namespace ruedo::robot {
 
@@ -44,6 +45,7 @@ class Motion {
   double v() const { return v_; }            // m/s and rad/s at the end of the last step, as planned
   double omega() const { return omega_; }
   bool has_primitive() const { return primitive_.axis != Axis::none; }
+  bool by_wheels() const { return by_wheels_; }    // the last command was one of wheel rates
   bool resting() const { return resting_; }  // stands still, and nothing happens until a command comes
   const MotionLog& log() const { return log_; }
   void show_step() { log_.advance(); }
@@ -80,11 +82,13 @@ class Motion {
   bool steady_ = true, resting_ = true;
   SimTime deadline_;             // of the watchdog; far away when it does not run
   const model::DriveDescription& drive_;
+  WheelKinematics kinematics_;   // as the drive turns speeds into wheel rates
   Limits way_limits_, angle_limits_;
   // The plan.
   SimTime start_ = 0;
   Profile plan_v_, plan_omega_;
   double target_v_ = 0.0, target_omega_ = 0.0;
+  bool by_wheels_ = false;
   bool holding_ = false;         // a velocity or wheel command is in force
   Primitive primitive_;
   // Watching for a block: since when, what was done then, the fastest that the plan was since, whether anything touched.
