@@ -8,6 +8,8 @@
 #include <ruedo/joint_command_t.hpp>
 #include <ruedo/motion_status_t.hpp>
 
+#include "ruedo/quantity.h"
+
 namespace ruedo::robot {
 
 namespace {
@@ -38,6 +40,10 @@ int8_t JointControl::apply(int robot, const JointCommand& command) {
   };
   for (size_t i = 0; i < n; ++i) {
     if (!std::isfinite(command.values[i])) return motion_status_t::REASON_NOT_FINITE;
+    const double most = command.modes[i] == joint_command_t::EFFORT     ? quantity::kEffort.most
+                        : command.modes[i] == joint_command_t::VELOCITY ? quantity::kSpeed.most
+                                                                        : quantity::kLength.most;
+    if (std::abs(command.values[i]) > most) return motion_status_t::REASON_BAD_VALUE;
     if (command.modes[i] < joint_command_t::POSITION || command.modes[i] > joint_command_t::EFFORT) {
       return motion_status_t::REASON_BAD_KIND;
     }
