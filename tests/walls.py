@@ -60,8 +60,48 @@ def broken_walls(root):
     return problems
 
 
-def test_tree_keeps_its_walls():
-    problems = broken_walls(ROOT)
+WHOLE = "src/core/whole.h"    # the one way from a floating-point number to a whole one
+INTEGER = r"(?:std::)?(?:u?int(?:8|16|32|64)?(?:_t)?|size_t|ptrdiff_t|unsigned(?: int| char)?|(?:unsigned )?long(?: long)?|SimTime|char)"
+FLOATING = re.compile(r"\b(?:floor|ceil|round|trunc|sqrt|hypot|a?sin|a?cos|a?tan2?|exp2?|log2?|pow|fmod|norm|M_PI|double|float)\b(?!>)|"
+                      r"\bas_number\(|[.>]number\(|(?<![\w.])\d+\.\d*|(?<![\w.])\d+e\d|\b\w+_(?:s|m|hz|rad|kg)\b(?!\()")
+
+
+def argument(text, begin):
+    """What stands between the parenthesis that opens at `begin` and the one that closes it."""
+    depth = 0
+    for at in range(begin, len(text)):
+        depth += {"(": 1, ")": -1}.get(text[at], 0)
+        if depth == 0:
+            return text[begin + 1:at]
+    return text[begin + 1:]
+
+
+def without_calls(text):
+    """The expression, without what goes into functions that give something else: the size of a list, an element of it."""
+    call = re.compile(r"[\w.:>-]*(?:<\w+>)?\((?:[^()]|\([^()]*\))*\)")
+    return call.sub(lambda match: match.group(0) if FLOATING.search(match.group(0).split("(")[0]) else "f", text)
+
+
+def bare_conversions(root):
+    """Casts of floating-point numbers to whole ones: undefined for what does not fit, which core/whole.h refuses."""
+    problems = []
+    for path in sorted(p for top in ("src", "include") for p in (root / top).rglob("*") if p.suffix in (".cpp", ".h")):
+        relative = path.relative_to(root)
+        if str(relative) == WHOLE:
+            continue
+        text = re.sub(r"//[^\n]*", "", path.read_text(encoding="utf-8"))
+        found = [(m.start(), m.group(0)) for m in re.finditer(r"\bl?l(?:round|rint)[fl]?\(", text)]
+        for match in re.finditer(rf"\bstatic_cast<{INTEGER}>\(|\b{INTEGER}\(", text):
+            inside = argument(text, match.end() - 1)
+            if FLOATING.search(without_calls(re.sub(r"static_cast<(?:double|float)>", "double", inside))):
+                found.append((match.start(), match.group(0) + inside[:40]))
+        problems += [f"{relative}:{text.count(chr(10), 0, at) + 1}: {what.splitlines()[0]}: use {WHOLE}" for at, what in found]
+    return problems
+
+
+@pytest.mark.parametrize("rule", [broken_walls, bare_conversions])
+def test_tree_keeps(rule):
+    problems = rule(ROOT)
     assert not problems, "\n" + "\n".join(problems)
 
 
@@ -103,3 +143,14 @@ def tree(folder, files):
 ])
 def test_walls_are_seen(tmp_path, name, include, good):
     assert (broken_walls(tree(tmp_path, {name: f"#pragma once\n#include {include}\n"})) == []) == good
+
+
+@pytest.mark.parametrize("text, good", [
+    ("int64_t n = std::llround(x);", False), ("auto n = static_cast<int64_t>(std::floor(x / cell));", False), ("auto n = static_cast<int>(phase_s);", False),
+    ("auto n = static_cast<size_t>(2 * static_cast<double>(i));", False), ("auto n = int64_t(e.number(path, 0) * 1e6);", False),
+    ("auto n = static_cast<int>(i);", True), ("auto n = static_cast<size_t>(list[static_cast<size_t>(i)].size());", True), ("auto n = whole<int>(phase_s);", True),
+    ("auto n = static_cast<int64_t>(sizeof(double));", True)])
+def test_bare_conversions_are_seen(tmp_path, text, good):
+    assert (bare_conversions(tree(tmp_path, {"src/core/a.cpp": text + "\n", WHOLE: "static_cast<int>(std::floor(x))\n"})) == []) == good
+
+

@@ -15,22 +15,26 @@
 
 #include "ruedo/errors.h"
 #include "ruedo/pose.h"
+#include "ruedo/quantity.h"
 #include "ruedo/sim_time.h"
 
 namespace ruedo {
 
-// An interval of allowed numbers, for reads and their error messages. Infinity is refused unless or_infinite()
-// lets it in ("inf" and "-inf", as SDF writes the limits of a joint); NaN always is.
+// An interval of allowed numbers of a quantity, for reads and their error messages. However the interval lies, more than the
+// quantity's maximum is refused. Infinity is refused unless or_infinite() lets it in ("inf" and "-inf", as SDF writes the
+// limits of a joint); NaN always is.
 struct Allowed {
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
   bool min_excluded = false;    // true: the value must be above min
   bool infinite = false;        // true: infinity is a value, where min and max admit it
-  Allowed or_infinite() const { return {min, max, min_excluded, true}; }
-  static Allowed any() { return {}; }
-  static Allowed positive() { return {0.0, std::numeric_limits<double>::infinity(), true}; }
-  static Allowed not_negative() { return {0.0, std::numeric_limits<double>::infinity(), false}; }
-  static Allowed between(double low, double high) { return {low, high, false}; }
+  const Quantity* quantity = nullptr;    // null: min and max say it all
+
+  Allowed or_infinite() const { return {min, max, min_excluded, true, quantity}; }
+  static Allowed any(const Quantity& of) { return {.quantity = &of}; }
+  static Allowed positive(const Quantity& of) { return {.min = 0.0, .min_excluded = true, .quantity = &of}; }
+  static Allowed not_negative(const Quantity& of) { return {.min = 0.0, .quantity = &of}; }
+  static Allowed between(double low, double high) { return {.min = low, .max = high}; }
 };
 
 class Element {
@@ -54,22 +58,22 @@ class Element {
   // Typed reads of the child at `path`; `fallback` when it is absent. They throw InputError for what is not
   // of the type (trailing characters, NaN and infinity included) or not allowed. Numbers are read the same in
   // every locale: "1,5" is refused.
-  double number(std::string_view path, double fallback, Allowed allowed = Allowed::any()) const;
-  int64_t integer(std::string_view path, int64_t fallback, Allowed allowed = Allowed::any()) const;
+  double number(std::string_view path, double fallback, Allowed allowed) const;
+  int64_t integer(std::string_view path, int64_t fallback, Allowed allowed) const;
   bool boolean(std::string_view path, bool fallback) const;             // true, false, 1, 0
   std::string string(std::string_view path, std::string_view fallback) const;
   Rate rate(std::string_view path, Rate fallback) const;                // Hz
-  Vec3 vector3(std::string_view path, const Vec3& fallback) const;
+  Vec3 vector3(std::string_view path, const Vec3& fallback, Allowed allowed) const;
   Pose pose(std::string_view path, const Pose& fallback = {}) const;    // "x y z roll pitch yaw", degrees="true"
   // One of `choices`; the error lists them.
   std::string choice(std::string_view path, std::string_view fallback, const std::vector<std::string>& choices) const;
 
   // The same reads of this element's own text.
-  double as_number(Allowed allowed = Allowed::any()) const;
-  int64_t as_integer(Allowed allowed = Allowed::any()) const;
+  double as_number(Allowed allowed) const;
+  int64_t as_integer(Allowed allowed) const;
   bool as_boolean() const;
-  Vec3 as_vector3() const;
-  std::vector<double> as_numbers() const;
+  Vec3 as_vector3(Allowed allowed) const;
+  std::vector<double> as_numbers(Allowed allowed) const;    // each of them
   Pose as_pose() const;
 
   // Refuses children (of the ruedo: namespace only, or of any) that are not in `known`, with a suggestion.

@@ -14,6 +14,7 @@
 
 #include "bus/lcm_bus.h"
 #include "cli/bench_rows.h"
+#include "core/whole.h"
 #include "model/load.h"
 #include "ruedo/errors.h"
 #include "ruedo/motion_status_t.hpp"
@@ -36,7 +37,7 @@ double ms_between(Clock::time_point a, Clock::time_point b) { return std::chrono
 double quantile(std::vector<double> values, double part) {
   if (values.empty()) return std::nan("");
   std::sort(values.begin(), values.end());
-  return values[static_cast<size_t>(part * static_cast<double>(values.size() - 1))];
+  return values[whole<size_t>(part * static_cast<double>(values.size() - 1))];
 }
 
 std::string row_of(const char* table, const char* what, const std::vector<double>& values_ms, int lost) {
@@ -153,7 +154,7 @@ std::shared_ptr<const model::WorldModel> world_with_reports_at_every_step(const 
 }  // namespace
 
 std::vector<std::string> measure_latency(const BenchTask& task) {
-  const int commands = std::max(10, static_cast<int>((task.duration_s > 0.0 ? task.duration_s : 15.0) / 0.05));
+  const int commands = std::max(10, whole<int>((task.duration_s > 0.0 ? task.duration_s : 15.0) / 0.05));
   int ends[2];
   if (pipe(ends) != 0) throw EnvironmentError("no pipe could be made");
   const pid_t client = fork();

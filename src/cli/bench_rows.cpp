@@ -12,6 +12,7 @@
 
 #include "bus/lcm_bus.h"
 #include "cli/bench_world.h"
+#include "core/whole.h"
 #include "model/load.h"
 #include "ruedo/move_command_t.hpp"
 #include "run/server.h"
@@ -99,7 +100,7 @@ std::vector<std::string> measure(const BenchTask& task) {
   }
   options.simulation.fleet.disabled = load_options.disabled;
   options.rate = std::numeric_limits<double>::infinity();
-  options.duration_us = static_cast<int64_t>(sim_s * 1e6);
+  options.duration_us = microseconds(sim_s);
   options.control = false;
   const auto world = model::load_world_text(bench_world(task.robots), "rooms.sdf", load_options);
   std::unique_ptr<bus::LcmBus> lcm;

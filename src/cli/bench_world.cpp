@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "core/whole.h"
+
 namespace ruedo::cli {
 namespace {
 
@@ -37,7 +39,7 @@ class Walls {
 
 int rooms_on_a_side(int robots) {
   if (robots <= 16) return 4;
-  int side = static_cast<int>(std::sqrt(static_cast<double>(robots)));
+  int side = whole<int>(std::sqrt(static_cast<double>(robots)));
   while (side * side < robots) ++side;
   return side;
 }

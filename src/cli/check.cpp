@@ -7,11 +7,9 @@
 #include "cli/listing.h"
 #include "core/json.h"
 #include "core/utf8.h"
-#include "model/body_layout.h"
-#include "physics/physics_world.h"
+#include "engine/world.h"
 #include "ruedo/errors.h"
 #include "scene/render_texture.h"
-#include "engine/fleet.h"
 
 namespace ruedo::cli {
 namespace {
@@ -43,30 +41,29 @@ void check_textures(const model::WorldModel& world, std::vector<Finding>& findin
   }
 }
 
-// What the readers and the devices found. A file that cannot be read at all is one finding.
+// What the readers, the devices and the physics found. loaded: `ruedo run` would start.
 std::vector<Finding> find_all(const CheckArguments& arguments, bool& loaded) {
   loaded = false;
+  std::vector<Finding> findings;
   try {
     const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
-    loaded = true;
-    std::vector<Finding> findings = world->findings;
-    const model::BodyLayout layout(*world);
+    findings = world->findings;
+    check_textures(*world, findings);
+    // All that `ruedo run` makes before it starts; but it stops at the first device that cannot be made.
     engine::Channels channels;
-    Findings of_devices;
+    Findings of_run;
     engine::FleetOptions options;
     options.disabled = arguments.world.disabled;
     options.keep_going = true;
-    engine::make_fleet(*world, layout, options, channels, of_devices);
+    const engine::World made(world, options, channels, of_run);
     const auto is_error = [](const Finding& finding) { return finding.kind == Finding::Kind::error; };
-    loaded = std::none_of(of_devices.list().begin(), of_devices.list().end(), is_error);    // ruedo run stops at the first
-    const physics::PhysicsWorld physics(*world, layout);
-    check_textures(*world, findings);
-    for (const std::vector<Finding>* more : {&of_devices.list(), &physics.findings()}) findings.insert(findings.end(), more->begin(), more->end());
-    return findings;
+    loaded = std::none_of(of_run.list().begin(), of_run.list().end(), is_error);
+    findings.insert(findings.end(), of_run.list().begin(), of_run.list().end());
   } catch (const InputError& error) {
-    if (error.source().file.empty() && !loaded) throw;    // wrong usage
-    return {{Finding::Kind::error, error.source(), "", error.message()}};
+    if (error.source().file.empty()) throw;    // wrong usage
+    findings.push_back({Finding::Kind::error, error.source(), "", error.message()});
   }
+  return findings;
 }
 
 void print_json(const std::vector<Finding>& findings) {

@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "core/utf8.h"
+#include "core/whole.h"
 #include "ruedo/errors.h"
 #include "ruedo/sim_time.h"
 
@@ -89,7 +90,7 @@ double parse_rate(const std::string& text) {
 int64_t parse_duration_us(const std::string& text) {
   double seconds = 0.0;
   if (!read_number(text, seconds) || seconds < 0.0 || seconds > 1e9) wrong("--duration", text, "seconds of sim time, 0 to 1e9");
-  return std::llround(seconds * 1e6);
+  return microseconds(seconds);
 }
 
 model::LoadOptions load_options(const WorldArguments& arguments) {

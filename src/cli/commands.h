@@ -17,7 +17,7 @@
 
 namespace ruedo::cli {
 
-enum ExitCode { kGood = 0, kCheckFailed = 1, kWrongUsage = 2, kBadInput = 3, kEnvironment = 4 };
+enum ExitCode { kGood = 0, kCheckFailed = 1, kWrongUsage = 2, kBadInput = 3, kEnvironment = 4, kBrokenState = 5 };
 
 // Runs after the whole command line was read; returns the exit code. InputError and EnvironmentError may come out.
 using Action = std::function<int()>;

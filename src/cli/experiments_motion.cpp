@@ -11,6 +11,7 @@
 #include "cli/experiment_rig.h"
 #include "cli/experiments.h"
 #include "cli/svg_plot.h"
+#include "core/whole.h"
 #include "ruedo/move_command_t.hpp"
 
 namespace ruedo::cli {
@@ -79,7 +80,7 @@ struct Square {
 
   void look(const ExperimentRig& rig) {
     const Pose& X = rig.robot().X_WBase;
-    if (steps % std::max(1, static_cast<int>(std::lround(packet_s / rig.step_s()))) == 0) packet = rig.odometry();
+    if (steps % std::max(1, rounded<int>(packet_s / rig.step_s())) == 0) packet = rig.odometry();
     const odometry_t& o = packet;
     const double dx = std::abs(X.translation.x() - o.x), dy = std::abs(X.translation.y() - o.y);
     const double dtheta = std::abs(wrap_angle(heading(X.rotation) - o.theta));

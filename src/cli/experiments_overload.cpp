@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "cli/experiments.h"
+#include "core/whole.h"
 #include "model/load.h"
 #include "ruedo/move_command_t.hpp"
 #include "engine/simulation.h"
@@ -49,8 +50,7 @@ Run run_world(std::function<void(const std::string&)> before_batch) {
   engine::SimulationOptions options;
   options.fleet.disabled = {"p3at/camera"};
   options.before_batch = std::move(before_batch);
-  run::Pacer pacer(world->step_us, std::numeric_limits<double>::infinity(),
-                      static_cast<int64_t>(kDuration_s * 1e6) / world->step_us);
+  run::Pacer pacer(world->step_us, std::numeric_limits<double>::infinity(), microseconds(kDuration_s) / world->step_us);
   engine::Simulation simulation(world, options, channels, findings, finished);
 
   move_command_t command{};

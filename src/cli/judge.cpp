@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "cli/judge_hull.h"
+#include "core/whole.h"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
 #include "ruedo/odometry_t.hpp"
@@ -135,7 +136,7 @@ std::vector<std::string> Judge::failures(const std::string& record) {
   for (size_t i = 0; i < expected_.goals.size(); ++i) {
     const Goal& goal = expected_.goals[i];
     if (reached_[i]) continue;
-    fail(fmt::format("goal {}", i), std::llround(goal.by_s * 1e6),
+    fail(fmt::format("goal {}", i), microseconds(goal.by_s),
          fmt::format("{} was not within {:g} m of ({:g}, {:g}) by {:g} s{}", expected_.robot, goal.radius, goal.x, goal.y, goal.by_s,
                      seconds(seen_) < goal.by_s ? fmt::format("; the run ended at {:g} s", seconds(seen_)) : ""));
   }

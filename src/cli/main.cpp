@@ -8,6 +8,7 @@
 
 #include "cli/commands.h"
 #include "core/utf8.h"
+#include "physics/state_check.h"
 #include "ruedo/element.h"
 #include "ruedo/errors.h"
 #include "core/version.h"
@@ -54,7 +55,7 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", std::string("ruedo ") + ruedo::version());
   app.require_subcommand(1);
   app.failure_message(CLI::FailureMessage::simple);
-  app.footer("Exit codes: 0 good, 1 the check failed, 2 wrong usage, 3 bad input file, 4 environment.");
+  app.footer("Exit codes: 0 good, 1 the check failed, 2 wrong usage, 3 bad input file, 4 environment, 5 a state that is not finite.");
   Action action;
   for (const RegisterCommand::Add add : registered_commands()) add(app, action);
   try {
@@ -78,6 +79,9 @@ int main(int argc, char** argv) {
   } catch (const ruedo::InputError& error) {
     say(error.what());
     return error.source().file.empty() ? kWrongUsage : kBadInput;
+  } catch (const ruedo::physics::StateError& error) {
+    say(error.what());
+    return kBrokenState;
   } catch (const ruedo::EnvironmentError& error) {
     say(error.what());
     return kEnvironment;

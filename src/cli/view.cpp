@@ -10,6 +10,7 @@
 #include <filesystem>
 
 #include "cli/logged_run.h"
+#include "core/whole.h"
 #include "console/console.h"
 #include "console/live_source.h"
 #include "console/log_page.h"
@@ -66,7 +67,7 @@ std::shared_ptr<void> view_log(const std::string& log, const std::string& addres
 
 void write_page(const std::string& log, const std::string& path, double most_megabytes) {
   const console::LogPage page = console::write_log_page(log, [&](const log_header_t& header) { return load_run(header, log); }, path,
-                                                        static_cast<size_t>(most_megabytes * 1e6));
+                                                        whole<size_t>(most_megabytes * 1e6));
   std::string thinned;
   if (page.interval_s > 0) thinned += fmt::format(", messages of a channel at least {:g} s apart", page.interval_s);
   if (page.pictures_s != 0) thinned += page.pictures_s < 0 ? ", without pictures" : fmt::format(", pictures {:g} s apart", page.pictures_s);

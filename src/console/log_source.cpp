@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/utf8.h"
+#include "core/whole.h"
 #include "ruedo/world_info_t.hpp"
 
 namespace ruedo::console {
@@ -36,7 +37,7 @@ std::string LogSource::fault() const {
 
 SimTime LogSource::now_us() const {
   if (playback_.now_s >= playback_.end_s) return index_.end_us();
-  return std::max(index_.begin_us(), static_cast<SimTime>(std::llround(playback_.now_s * 1e6)));
+  return std::max(index_.begin_us(), microseconds(playback_.now_s));
 }
 
 void LogSource::pump(Board& board, bool viewers) {

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "core/whole.h"
+
 namespace ruedo {
 namespace {
 
@@ -28,7 +30,7 @@ std::string in_lower_case(std::string_view text) {
 
 // A number in words: 0.5, not 0.500000; 1000000000, not 1e+09.
 std::string shown(double value) {
-  if (value == std::floor(value) && std::abs(value) < 1e15) return std::to_string(static_cast<int64_t>(value));
+  if (value == std::floor(value) && std::abs(value) < 1e15) return std::to_string(whole(value));
   char buffer[32];
   const auto result = std::to_chars(buffer, buffer + sizeof buffer, value);
   return {buffer, result.ptr};
@@ -97,6 +99,12 @@ double number_of(const Value& where, std::string_view text, const Allowed& allow
   if (value < allowed.min || value > allowed.max || (allowed.min_excluded && value <= allowed.min)) {
     where.refuse("is not allowed; allowed is " + described(allowed, "a number"), text);
   }
+  if (allowed.quantity && std::isfinite(value) && std::abs(value) > allowed.quantity->most) {
+    const Quantity& of = *allowed.quantity;
+    const bool vowel = std::string_view("aei").find(of.name.front()) != std::string_view::npos;
+    where.refuse("is too large for a" + std::string(vowel ? "n " : " ") + std::string(of.name) + "; allowed is up to " + shown(of.most) +
+                     (of.unit.empty() ? "" : " " + std::string(of.unit)) + (allowed.infinite ? ", or inf" : ""), text);
+  }
   return value;
 }
 
@@ -113,7 +121,7 @@ int64_t integer_of(const Value& where, const Allowed& allowed) {
     if (read_number(text, number) != Reading::good || number != std::floor(number) || std::abs(number) > 0x1p53) {
       where.refuse("is not a whole number" + wanted);
     }
-    value = static_cast<int64_t>(number);
+    value = whole(number);
   }
   const double compared = static_cast<double>(value);
   if (compared < allowed.min || compared > allowed.max || (allowed.min_excluded && compared <= allowed.min)) {
@@ -129,19 +137,20 @@ bool boolean_of(const Value& where) {
   where.refuse("is neither true nor false; allowed are true, false, 1, 0");
 }
 
-std::vector<double> numbers_of(const Value& where) {
+// The numbers from the fourth on are of another kind in a pose.
+std::vector<double> numbers_of(const Value& where, const Allowed& first_three, const Allowed& others) {
   std::vector<double> values;
   std::string_view rest = where.text();
   while (!rest.empty()) {
     const size_t length = std::min(rest.find_first_of(kSpace), rest.size());
-    values.push_back(number_of(where, rest.substr(0, length), Allowed::any()));
+    values.push_back(number_of(where, rest.substr(0, length), values.size() < 3 ? first_three : others));
     rest = trimmed(rest.substr(length));
   }
   return values;
 }
 
-Vec3 vector3_of(const Value& where) {
-  const std::vector<double> values = numbers_of(where);
+Vec3 vector3_of(const Value& where, const Allowed& allowed) {
+  const std::vector<double> values = numbers_of(where, allowed, allowed);
   if (values.size() != 3) where.refuse("has " + std::to_string(values.size()) + " numbers; allowed are three");
   return {values[0], values[1], values[2]};
 }
@@ -161,7 +170,7 @@ Pose pose_of(const Value& where) {
     }
     quaternion = *written == "quat_xyzw";
   }
-  const std::vector<double> v = numbers_of(where);
+  const std::vector<double> v = numbers_of(where, Allowed::any(quantity::kLength), Allowed::any(quaternion ? quantity::kFactor : quantity::kAngle));
   if (v.empty()) return {};
   if (quaternion) {
     if (degrees) where.refuse("is a quaternion, which has no degrees");
@@ -248,9 +257,9 @@ Rate Element::rate(std::string_view path, Rate fallback) const {
   }
 }
 
-Vec3 Element::vector3(std::string_view path, const Vec3& fallback) const {
+Vec3 Element::vector3(std::string_view path, const Vec3& fallback, Allowed allowed) const {
   const Element* found = child(path);
-  return found ? vector3_of({*found, name + "/" + std::string(path)}) : fallback;
+  return found ? vector3_of({*found, name + "/" + std::string(path)}, allowed) : fallback;
 }
 
 Pose Element::pose(std::string_view path, const Pose& fallback) const {
@@ -276,8 +285,8 @@ double Element::as_number(Allowed allowed) const {
 
 int64_t Element::as_integer(Allowed allowed) const { return integer_of({*this, name}, allowed); }
 bool Element::as_boolean() const { return boolean_of({*this, name}); }
-Vec3 Element::as_vector3() const { return vector3_of({*this, name}); }
-std::vector<double> Element::as_numbers() const { return numbers_of({*this, name}); }
+Vec3 Element::as_vector3(Allowed allowed) const { return vector3_of({*this, name}, allowed); }
+std::vector<double> Element::as_numbers(Allowed allowed) const { return numbers_of({*this, name}, allowed, allowed); }
 Pose Element::as_pose() const { return pose_of({*this, name}); }
 
 void Element::refuse_unknown(const std::vector<std::string>& known, bool only_ruedo) const {

@@ -44,6 +44,7 @@ struct Batch {
   std::atomic<int> pending{kFree};
   std::atomic<bool> failed{false};
   std::string failure;                     // of the module that set `failed`
+  std::string end;                         // why it is the last, where the state could not be gone on from
 };
 
 }  // namespace ruedo::engine

@@ -2,10 +2,12 @@
 #include "engine/fleet.h"
 
 #include <algorithm>
+#include <optional>
 #include <set>
 #include <span>
 #include <thread>
 
+#include "core/whole.h"
 #include "ruedo/joint_command_t.hpp"
 #include "ruedo/move_command_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
@@ -28,7 +30,7 @@ struct Wanted {
   const Element* element;
   int link;          // index into layout.links
   Pose X_LS;
-  Rate rate;
+  std::optional<Rate> rate;    // empty: as its element says
 };
 
 class FleetMaker {
@@ -78,8 +80,7 @@ class FleetMaker {
       for (const model::SensorDescription& sensor : model.sensors) {
         if (std::find(kind.types.begin(), kind.types.end(), sensor.type) == kind.types.end() || disabled(robot, sensor.name)) continue;
         const Element& element = sensor.element ? *sensor.element : no_element();
-        wanted.push_back({&kind, robot, sensor.name, &element, first_link(robot) + sensor.link, sensor.X_LS,
-                          element.rate("update_rate", kind.default_rate)});
+        wanted.push_back({&kind, robot, sensor.name, &element, first_link(robot) + sensor.link, sensor.X_LS, {}});
       }
       return;
     }
@@ -144,8 +145,9 @@ class FleetMaker {
 
   Device make_device(const Wanted& wanted) {
     const std::string& robot = instance(wanted.robot).name;
-    const double phase_s = wanted.element->number("ruedo:phase", 0.0, Allowed::not_negative());
-    if (!wanted.rate.every_step() && wanted.rate.hz() * static_cast<double>(world_.step_us) > 1e6) {
+    const Rate rate = wanted.rate ? *wanted.rate : wanted.element->rate("update_rate", wanted.kind->default_rate);
+    const double phase_s = wanted.element->number("ruedo:phase", 0.0, Allowed::not_negative(quantity::kTime));
+    if (!rate.every_step() && rate.hz() * static_cast<double>(world_.step_us) > 1e6) {
       findings_.repaired(wanted.element->source, robot + "/" + wanted.name,
                          "its rate is above the step rate: it samples at every step");
     }
@@ -159,26 +161,26 @@ class FleetMaker {
                       .X_LS = wanted.X_LS,
                       .random = RandomSource(options_.seed, robot, wanted.name),
                       .noise = options_.noise,
-                      .rate = wanted.rate,
+                      .rate = rate,
                       .findings = &findings_,
                       .add_channel = {}};
     setup.add_channel = [&](const std::string& suffix, const std::string& type, int64_t fingerprint) {
       const std::string device = suffix.empty() ? wanted.name : wanted.name + "/" + suffix;
-      return channels_.add({robot + "/" + device, "", robot, wanted.name, type, fingerprint, wanted.rate, false});
+      return channels_.add({robot + "/" + device, "", robot, wanted.name, type, fingerprint, rate, false});
     };
-    Device device{wanted.kind->make(setup), wanted.rate, static_cast<int64_t>(phase_s * 1e6 + 0.5), wanted.kind->needs_visual_rays,
+    Device device{wanted.kind->make(setup), rate, microseconds(phase_s), wanted.kind->needs_visual_rays,
                   wanted.robot, options_.first_step};
     device.visual_rays |= device.sensor->wants_visual_rays();
-    describe(wanted, *device.sensor);
+    describe(wanted, rate, *device.sensor);
     return device;
   }
 
-  void describe(const Wanted& wanted, const Sensor& sensor) {
+  void describe(const Wanted& wanted, Rate rate, const Sensor& sensor) {
     device_info_t info;
     info.robot = instance(wanted.robot).name;
     info.name = wanted.name;
     info.kind = wanted.kind->name();
-    info.rate = wanted.rate.hz();
+    info.rate = rate.hz();
     const Pose X_BaseS = X_WBase(wanted.robot).inverse() * initial_pose(layout_, wanted.link) * wanted.X_LS;
     for (int i = 0; i < 3; ++i) info.position[i] = X_BaseS.translation[i];
     info.orientation[0] = X_BaseS.rotation.w();

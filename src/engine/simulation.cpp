@@ -9,6 +9,8 @@
 #include <pthread.h>
 #include <sys/prctl.h>
 
+#include "physics/state_check.h"
+
 namespace ruedo::engine {
 namespace {
 
@@ -139,12 +141,19 @@ void Simulation::compute(Batch& batch, int64_t first_step, int count) {
   batch.count = count;
   batch.last = count == 0;
   batch.applied_count = 0;
+  batch.end.clear();
   const auto begin = std::chrono::steady_clock::now();
   try {
-    for (int i = 0; i < count; ++i) {
+    for (int i = 0; i < count && !batch.last; ++i) {
       if (left_off_) batch.count = 0;    // the publisher still holds the last state, in a batch that is free already
       if (batch.count == 0) break;
-      world_.advance(first_step + i, batch.snapshots[static_cast<size_t>(i)], batch);
+      try {
+        world_.advance(first_step + i, batch.snapshots[static_cast<size_t>(i)], batch);
+      } catch (const physics::StateError& error) {    // the steps before it are good
+        batch.end = error.what();
+        batch.count = i;
+        batch.last = true;
+      }
     }
   } catch (const std::exception& error) {
     if (!batch.failed.exchange(true)) batch.failure = std::string("module kinematics: ") + error.what();
@@ -198,6 +207,7 @@ const Batch* Simulation::advance() {
   ++next_batch_;
   taken_ = &batch;
   last_taken_ = batch.last;
+  if (!batch.end.empty()) end_ = batch.end;
   for (auto& cursors : cursors_) std::fill(cursors.begin(), cursors.end(), 0);
   return taken_;
 }

@@ -47,6 +47,9 @@ class Simulation {
   // The publisher's: the next finished batch in order, or null when there is none yet. The batch stays valid until
   // the next call that returns one. Throws std::runtime_error when a module failed.
   const Batch* take();
+  // Whether the last batch was taken, and why it was before its time; "": it was not.
+  bool over() const { return last_taken_; }
+  const std::string& end() const { return end_; }
 
   // Ends the run here: what was not taken yet is left unfinished, so that the last batch comes soon, and no steps with it.
   void leave_off();
@@ -96,6 +99,7 @@ class Simulation {
   size_t next_batch_ = 0;
   Batch* taken_ = nullptr;
   bool last_taken_ = false;
+  std::string end_;
   std::vector<std::vector<size_t>> cursors_;     // of each module's pieces in taken_
 };
 

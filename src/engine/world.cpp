@@ -1,6 +1,8 @@
 // The making of a world, and its step.
 #include "engine/world.h"
 
+#include "physics/state_check.h"
+
 namespace ruedo::engine {
 
 std::shared_ptr<const scene::StaticRayScene> StaticScenes::get(const model::WorldModel& world, const model::BodyLayout& layout, bool visuals) {
@@ -42,6 +44,7 @@ void World::advance(int64_t step, Snapshot& snapshot, Batch& batch) {
   robots_->read(snapshot);
   snapshot.step = step;
   snapshot.time = step * model_.step_us;
+  physics::check_finite(snapshot, model_, layout_);
 }
 
 SceneMakers World::scene_makers() const {

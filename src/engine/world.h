@@ -39,7 +39,8 @@ class World {
         std::shared_ptr<StaticScenes> statics = nullptr);
 
   // Computes the next state into the snapshot: what acts on the state before it is applied (and noted in the batch), then
-  // the physics step. States follow on one another from 0, the initial one.
+  // the physics step. States follow on one another from 0, the initial one. Throws physics::StateError for a state that is
+  // not finite.
   void advance(int64_t step, Snapshot& snapshot, Batch& batch);
 
   const model::WorldModel& model() const { return model_; }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 
+#include "core/whole.h"
 #include "model/drive_guess.h"
 #include "model/geometry.h"
 #include "model/plugins.h"
@@ -207,7 +208,7 @@ void place_base(const Element& e, const Model& model, DriveDescription& drive) {
     at = (left + right) / 2 - Vec3(0, 0, drive.wheel_radius);
     track = std::hypot((left - right).x(), (left - right).y());
   }
-  const Allowed positive = Allowed::positive();
+  const Allowed positive = Allowed::positive(quantity::kLength);
   if (steers) {
     const std::vector<int> fixed = fixed_of(wheels);
     const Vec3 steered = middle(model, drive.steer_joints);
@@ -230,9 +231,9 @@ void place_base(const Element& e, const Model& model, DriveDescription& drive) {
     }
     if (!(limit > 0)) limit = kUsualSteering_rad;
     drive.max_steering_angle = std::min(e.number("ruedo:max_steering_angle", std::isinf(limit) ? (drive.steering == Steering::tricycle ? kMostSteering_rad : kUsualSteering_rad) : limit, positive), kMostSteering_rad);
-    drive.max_steering_rate = e.number("ruedo:max_steering_rate", drive.max_steering_rate, positive.or_infinite());
+    drive.max_steering_rate = e.number("ruedo:max_steering_rate", drive.max_steering_rate, Allowed::positive(quantity::kSpeed).or_infinite());
   }
-  drive.track = track > 0 ? e.number("ruedo:track", track, positive) : e.number("ruedo:track", 0, Allowed::not_negative());
+  drive.track = track > 0 ? e.number("ruedo:track", track, positive) : e.number("ruedo:track", 0, Allowed::not_negative(quantity::kLength));
   if (drive.steering == Steering::tracked && drive.track == 0) e.fail("has no <ruedo:track>, and no wheels to take it from");
   drive.X_MBase = {heading, at};
   drive.X_MBase = e.pose("ruedo:base", drive.X_MBase);
@@ -257,18 +258,19 @@ void place_base(const Element& e, const Model& model, DriveDescription& drive) {
 }
 
 void read_limits(const Element& e, const Model& model, DriveDescription& drive) {
-  const Allowed limit = Allowed::positive().or_infinite();
-  drive.max_speed = e.number("ruedo:max_speed", drive.max_speed, limit);
-  drive.max_side_speed = e.number("ruedo:max_side_speed", drive.max_speed, limit);
-  drive.max_turn_rate = e.number("ruedo:max_turn_rate", drive.max_turn_rate, limit);
-  drive.acceleration = e.number("ruedo:acceleration", drive.acceleration, limit);
-  drive.deceleration = e.number("ruedo:deceleration", drive.acceleration, limit);
-  drive.turn_acceleration = e.number("ruedo:turn_acceleration", drive.turn_acceleration, limit);
+  const Allowed speed = Allowed::positive(quantity::kSpeed).or_infinite(), acceleration = Allowed::positive(quantity::kAcceleration).or_infinite(),
+                effort = Allowed::positive(quantity::kEffort).or_infinite();
+  drive.max_speed = e.number("ruedo:max_speed", drive.max_speed, speed);
+  drive.max_side_speed = e.number("ruedo:max_side_speed", drive.max_speed, speed);
+  drive.max_turn_rate = e.number("ruedo:max_turn_rate", drive.max_turn_rate, speed);
+  drive.acceleration = e.number("ruedo:acceleration", drive.acceleration, acceleration);
+  drive.deceleration = e.number("ruedo:deceleration", drive.acceleration, acceleration);
+  drive.turn_acceleration = e.number("ruedo:turn_acceleration", drive.turn_acceleration, acceleration);
   double mass = 0;
   for (const Link& link : model.links) mass += link.inertial.mass;
-  drive.max_force = e.number("ruedo:max_force", mass * kStandardGravity, limit);
-  drive.max_wheel_torque = e.number("ruedo:max_wheel_torque", drive.max_wheel_torque, limit);
-  drive.max_wheel_rate = e.number("ruedo:max_wheel_rate", drive.max_wheel_rate, limit);
+  drive.max_force = e.number("ruedo:max_force", mass * kStandardGravity, effort);
+  drive.max_wheel_torque = e.number("ruedo:max_wheel_torque", drive.max_wheel_torque, effort);
+  drive.max_wheel_rate = e.number("ruedo:max_wheel_rate", drive.max_wheel_rate, speed);
 }
 
 }  // namespace
@@ -309,16 +311,16 @@ DriveDescription read_drive(std::shared_ptr<const Element> element, std::shared_
   }
   read_joints(e, model, drive);
   if (drive.left_joints.empty() && drive.right_joints.empty()) {
-    drive.wheel_radius = e.number("ruedo:wheel_radius", 0, Allowed::not_negative());
+    drive.wheel_radius = e.number("ruedo:wheel_radius", 0, Allowed::not_negative(quantity::kLength));
   } else {
     const int first = drive.left_joints.empty() ? drive.right_joints[0] : drive.left_joints[0];
     const double found_radius = radius_of(model, model.joints[static_cast<size_t>(first)]);
     if (!e.has("ruedo:wheel_radius") && found_radius <= 0) e.fail("has no <ruedo:wheel_radius>, and the wheel has no collision shape to take it from");
-    drive.wheel_radius = e.number("ruedo:wheel_radius", found_radius, Allowed::positive());
+    drive.wheel_radius = e.number("ruedo:wheel_radius", found_radius, Allowed::positive(quantity::kLength));
   }
   place_base(e, model, drive);
   read_limits(e, model, drive);
-  drive.watchdog_us = std::llround(e.number("ruedo:watchdog", 0.6, Allowed::between(0, 1e6)) * 1e6);
+  drive.watchdog_us = microseconds(e.number("ruedo:watchdog", 0.6, Allowed::between(0, 1e6)));
   drive.pose_rate = e.rate("ruedo:pose_rate", drive.pose_rate);
   drive.status_rate = e.rate("ruedo:status_rate", drive.status_rate);
   if (odometry) {

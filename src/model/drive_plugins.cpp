@@ -107,7 +107,7 @@ std::unique_ptr<Element> drive_from_plugin(const Element& plugin) {
   for (const Parameter& each : kParameters) {
     const Element* given = plugin.child(each.theirs);
     if (!given || drive->has(each.ours)) continue;
-    double value = given->as_number();
+    double value = given->as_number(Allowed::any(quantity::kEffort));
     if (each.unit == Unit::half) value /= 2;
     if (each.unit == Unit::magnitude) value = std::abs(value);
     if (value > 0) add(*drive, each.ours, shown(value), given->source);    // 0: the plugins' "no limit"

@@ -10,7 +10,7 @@ std::optional<Geometry> read_mesh(const Element& mesh, const std::string& where,
   report_other_children(mesh, {"uri", "scale", "submesh"}, {"convex_decomposition"}, where, context.findings);
   Geometry geometry;
   geometry.shape = Shape::mesh;
-  geometry.scale = mesh.vector3("scale", Vec3::Ones());
+  geometry.scale = mesh.vector3("scale", Vec3::Ones(), Allowed::any(quantity::kFactor));
   for (int i = 0; i < 3; ++i) {
     if (geometry.scale[i] == 0) mesh.child("scale")->fail("'" + mesh.child("scale")->text + "' has a zero; a mesh cannot be flat");
   }
@@ -40,13 +40,13 @@ std::optional<Geometry> read_polyline(const Element& geometry_element, const Ele
   for (const Element* polyline : geometry_element.all("polyline")) {
     std::vector<Eigen::Vector2d> polygon;
     for (const Element* point : polyline->all("point")) {
-      const std::vector<double> v = point->as_numbers();
+      const std::vector<double> v = point->as_numbers(Allowed::any(quantity::kLength));
       if (v.size() != 2) point->fail("'" + point->text + "' has " + std::to_string(v.size()) + " numbers; allowed are x y");
       polygon.emplace_back(v[0], v[1]);
     }
     polygons.push_back(std::move(polygon));
   }
-  const double height = first.number("height", 1.0, Allowed::positive());
+  const double height = first.number("height", 1.0, Allowed::positive(quantity::kLength));
   try {
     auto mesh = std::make_shared<Mesh>(extruded(polygons, height));
     mesh->name = first.source.str();
@@ -69,7 +69,7 @@ void cover_with_texture(const Element& element, const Vec3& size, Mesh& mesh, co
     if (child->name != "texture" || child.get() == texture) continue;
     context.findings.unsupported(child->source, where, "a heightmap has one <texture>; this one is not blended in");
   }
-  const double tile_m = texture->number("size", 10.0, Allowed::positive());
+  const double tile_m = texture->number("size", 10.0, Allowed::positive(quantity::kLength));
   const auto path = context.resources.find_texture(picture->text, picture->source.file);
   if (!path) {
     context.findings.unsupported(picture->source, where, "the texture '" + picture->text + "' is not found; the ground is plain");
@@ -89,7 +89,7 @@ std::optional<Geometry> read_heightmap(const Element& element, const std::string
   report_other_children(element, {"uri", "size", "pos", "texture"}, {"use_terrain_paging", "sampling", "blend"}, where, context.findings);
   const std::string uri = element.string("uri", "");
   if (uri.empty()) element.fail("has no <uri>");
-  const Vec3 size = element.vector3("size", Vec3::Ones());
+  const Vec3 size = element.vector3("size", Vec3::Ones(), Allowed::any(quantity::kLength));
   if (size.minCoeff() <= 0) element.child("size")->fail("'" + element.child("size")->text + "' is not allowed; sizes are above 0");
   const auto path = context.resources.find(uri, element.source.file);
   if (!path) {
@@ -105,13 +105,23 @@ std::optional<Geometry> read_heightmap(const Element& element, const std::string
     return std::nullopt;
   }
   cover_with_texture(element, size, *mesh, where, context);
-  const Vec3 at = element.vector3("pos", Vec3::Zero());
+  const Vec3 at = element.vector3("pos", Vec3::Zero(), Allowed::any(quantity::kLength));
   for (auto& p : mesh->positions) p += at.cast<float>();
   mesh->name = *path;
   Geometry geometry;
   geometry.shape = Shape::mesh;
   geometry.mesh = std::move(mesh);
   return geometry;
+}
+
+// The corners of a mesh, times its scale, are lengths that no reader of numbers has seen.
+bool is_too_large(const Geometry& g, const Element& element, const std::string& where, ReadContext& context) {
+  const Eigen::AlignedBox3d box = bounds(g);
+  const double reach = box.isEmpty() ? 0.0 : std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
+  if (reach <= quantity::kLength.most) return false;
+  context.findings.error(element.source, where, "the mesh reaches to " + shown(reach) + " m; allowed is up to " + shown(quantity::kLength.most) +
+                                                    " m; the shape is left out");
+  return true;
 }
 
 }  // namespace
@@ -126,7 +136,7 @@ std::optional<Geometry> read_geometry(const Element& element, const std::string&
   }
   if (!shape) return std::nullopt;
   // Converters write shapes of size zero for what has none: they are nothing. Negative sizes are errors.
-  const Allowed not_negative = Allowed::not_negative();
+  const Allowed not_negative = Allowed::not_negative(quantity::kLength), length = Allowed::any(quantity::kLength);
   const auto nothing = [&](const char* name) {
     context.findings.repaired(shape->source, where, "a <" + shape->name + "> whose <" + name + "> is 0; the shape is left out");
     return std::nullopt;
@@ -144,7 +154,7 @@ std::optional<Geometry> read_geometry(const Element& element, const std::string&
   if (kind == "box") {
     g.shape = Shape::box;
     or_default("size", "1 1 1");
-    g.size = shape->vector3("size", Vec3::Ones());
+    g.size = shape->vector3("size", Vec3::Ones(), length);
     if (g.size.minCoeff() < 0) shape->child("size")->fail("'" + shape->child("size")->text + "' is not allowed; sizes are above 0");
     if (g.size.minCoeff() == 0) return nothing("size");
   } else if (kind == "sphere") {
@@ -160,16 +170,16 @@ std::optional<Geometry> read_geometry(const Element& element, const std::string&
   } else if (kind == "ellipsoid") {
     g.shape = Shape::ellipsoid;
     or_default("radii", "1 1 1");
-    g.size = shape->vector3("radii", Vec3::Ones());
+    g.size = shape->vector3("radii", Vec3::Ones(), length);
     if (g.size.minCoeff() < 0) shape->child("radii")->fail("'" + shape->child("radii")->text + "' is not allowed; radii are above 0");
     if (g.size.minCoeff() == 0) return nothing("radii");
   } else if (kind == "plane") {
     g.shape = Shape::plane;
-    const Vec3 normal = shape->vector3("normal", Vec3::UnitZ());
+    const Vec3 normal = shape->vector3("normal", Vec3::UnitZ(), Allowed::any(quantity::kFactor));
     if (!(normal.norm() > 1e-9)) shape->child("normal")->fail("'" + shape->child("normal")->text + "' is not allowed; a normal is not zero");
     g.normal = normal.normalized();
     if (const Element* size = shape->child("size")) {
-      std::vector<double> v = size->as_numbers();
+      std::vector<double> v = size->as_numbers(length);
       if (v.size() == 3) {    // of a box, which some files have here
         context.findings.repaired(size->source, where, "<size> of a plane has two numbers; the third is left out");
         v.pop_back();
@@ -178,11 +188,13 @@ std::optional<Geometry> read_geometry(const Element& element, const std::string&
       g.extent = {v[0], v[1]};
     }
   } else if (kind == "mesh") {
-    return read_mesh(*shape, where, context);
+    std::optional<Geometry> mesh = read_mesh(*shape, where, context);
+    return mesh && is_too_large(*mesh, *shape, where, context) ? std::nullopt : mesh;
   } else if (kind == "polyline") {
     return read_polyline(element, *shape, where, context);
   } else if (kind == "heightmap") {
-    return read_heightmap(*shape, where, context);
+    std::optional<Geometry> ground = read_heightmap(*shape, where, context);
+    return ground && is_too_large(*ground, *shape, where, context) ? std::nullopt : ground;
   } else {
     const std::string near = nearest_word(kind, {"box", "sphere", "cylinder", "capsule", "cone", "ellipsoid", "plane", "mesh", "polyline", "heightmap"});
     context.findings.unsupported(shape->source, where, "the shape <" + kind + "> is not supported and left out" +

@@ -53,6 +53,7 @@ class Loader {
     apply_drives(options.drives, world_);
     apply_settings(options.settings, world_);
     apply_disabled(options.disabled, world_);
+    name_stuck_robots(world_, findings_);
     world_.findings = findings_.list();
     std::erase_if(world_.findings, [&](const Finding& finding) { return is_settled(finding); });
     for (const std::string& file : meshes_.files_read()) documents_.note(file);

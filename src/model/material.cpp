@@ -170,7 +170,7 @@ std::optional<Material> gazebo_material(const std::string& full_name) {
 }
 
 Rgba read_colour(const Element& element) {
-  const std::vector<double> v = element.as_numbers();
+  const std::vector<double> v = element.as_numbers(Allowed::any(quantity::kBrightness));
   if (v.size() != 3 && v.size() != 4) {
     element.fail("'" + element.text + "' has " + std::to_string(v.size()) + " numbers; allowed are r g b and r g b a, from 0 to 1");
   }
@@ -208,7 +208,7 @@ std::optional<Material> read_material(const Element& element, const std::string&
   }
   if (const Element* e = element.child("specular")) material.specular = read_colour(*e), said = true;
   if (const Element* e = element.child("emissive")) material.emissive = read_colour(*e), said = true;
-  if (const Element* e = element.child("shininess")) material.shininess = static_cast<float>(e->as_number(Allowed::not_negative()));
+  if (const Element* e = element.child("shininess")) material.shininess = static_cast<float>(e->as_number(Allowed::not_negative(quantity::kBrightness)));
   material.double_sided = element.boolean("double_sided", material.double_sided);
   for (const char* workflow : {"pbr/metal", "pbr/specular"}) {
     const Element* map = element.child(std::string(workflow) + "/albedo_map");

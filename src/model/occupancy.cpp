@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/whole.h"
 #include "model/convex.h"
 #include "model/geometry.h"
 #include "model/read_context.h"
@@ -86,7 +87,7 @@ class Cut {
   template <class Visit>
   void for_each_cell(const Box& box, OccupancyGrid& grid, Visit visit) const {
     const auto index = [&](double at, double from, int most) {
-      return static_cast<int>(std::clamp(std::floor((at - from) / grid.resolution), 0.0, most - 1.0));
+      return rounded_down<int>(std::clamp((at - from) / grid.resolution, 0.0, most - 1.0));
     };
     const double gap = kShrunk * grid.resolution, side = grid.resolution - gap;
     const int column1 = index(box.max().x(), grid.x, grid.width), row1 = index(box.max().y(), grid.y, grid.height);

@@ -9,8 +9,10 @@
 #include <unordered_map>
 #include <vector>
 
+#include "core/whole.h"
 #include "model/convex.h"
 #include "model/geometry.h"
+#include "model/read_context.h"
 
 namespace ruedo::model {
 namespace {
@@ -70,7 +72,7 @@ class TriangleGrid {
       points.push_back(X_WG * g.scale.cwiseProduct(p.cast<double>()));
       box_.extend(points.back());
     }
-    side_ = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(g.mesh->triangles.size()) / 2)));
+    side_ = std::max(1, whole<int>(std::sqrt(static_cast<double>(g.mesh->triangles.size()) / 2)));
     side_ = std::min(side_, 512);
     cells_.resize(static_cast<size_t>(side_) * static_cast<size_t>(side_));
     for (const auto& t : g.mesh->triangles) {
@@ -99,7 +101,7 @@ class TriangleGrid {
   void for_each_cell(const Box& box, Visit visit) {
     const auto cell = [&](double at, int axis) {
       const double size = std::max(box_.sizes()[axis], 1e-9);
-      return static_cast<int>(std::clamp((at - box_.min()[axis]) / size * side_, 0.0, side_ - 1.0));
+      return whole<int>(std::clamp((at - box_.min()[axis]) / size * side_, 0.0, side_ - 1.0));
     };
     const int y1 = cell(box.max().y(), 1), x1 = cell(box.max().x(), 0);
     for (int y = cell(box.min().y(), 1); y <= y1; ++y) {
@@ -131,7 +133,7 @@ struct Room::Index {
   std::unordered_map<const Geometry*, Box> boxes;          // likewise
   std::map<int, TriangleGrid> triangles;                   // of the solids that were asked for
 
-  static int64_t cell_of(double at) { return static_cast<int64_t>(std::floor(std::clamp(at, -1e7, 1e7) / kCell_m)); }
+  static int64_t cell_of(double at) { return rounded_down(std::clamp(at, -1e7, 1e7) / kCell_m); }
   static uint64_t key(int64_t x, int64_t y) { return static_cast<uint64_t>(x) << 32 ^ (static_cast<uint64_t>(y) & 0xffffffffu); }
 
   const Box& box_of(const Geometry& g) {
@@ -341,6 +343,24 @@ Pose standing_on(const WorldModel& world, const Model& model, double x, double y
 
 std::string overlapped(const WorldModel& world, const Model& model, const Pose& X_WM, const LinkPose& now) {
   return Room(world, now).overlapped(model, X_WM);
+}
+
+void name_stuck_robots(const WorldModel& world, Findings& findings) {
+  const auto may_be_stuck = [](const ModelInstance& instance) { return instance.is_robot() && !instance.model->is_static; };
+  if (std::none_of(world.models.begin(), world.models.end(), may_be_stuck)) return;
+  Room room;
+  for (const ModelInstance& instance : world.models) {
+    if (!may_be_stuck(instance)) room.add(instance);
+  }
+  for (const ModelInstance& instance : world.models) {
+    if (!may_be_stuck(instance)) continue;
+    if (const std::string other = room.overlapped(*instance.model, instance.X_WM); !other.empty()) {
+      const Vec3& at = instance.X_WM.translation;
+      findings.error(instance.model->source, "model " + instance.name, "at the start, at " + shown(at.x()) + " " + shown(at.y()) + " " + shown(at.z()) +
+                                                                           " m, it stands in '" + other + "', which will push it out; give it a <pose> with room");
+    }
+    room.add(instance);
+  }
 }
 
 double footprint_radius(const Model& model) {

@@ -47,6 +47,10 @@ double ground_height(const WorldModel& world, double x, double y);
 Pose standing_on(const WorldModel& world, const Model& model, double x, double y, double yaw);
 std::string overlapped(const WorldModel& world, const Model& model, const Pose& X_WM, const LinkPose& now = {});
 
+// Robots that share space with something at the start: the solver pushes them out of it, at any speed. As overlapped(), and so
+// what --spawn refuses.
+void name_stuck_robots(const WorldModel& world, Findings& findings);
+
 // The radius of the smallest upright cylinder about the model's base (its origin, without a drive) that holds its
 // collisions, metres.
 double footprint_radius(const Model& model);

@@ -5,6 +5,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "core/whole.h"
 #include "model/placement.h"
 #include "model/sdf_reader.h"
 #include "ruedo/random.h"
@@ -20,7 +21,7 @@ struct Place {
 };
 
 Eigen::Vector2d two_numbers(const Element& element, double least) {
-  const std::vector<double> v = element.as_numbers();
+  const std::vector<double> v = element.as_numbers(Allowed::any(quantity::kLength));
   if (v.size() != 2 || !(v[0] > least && v[1] > least)) {
     element.fail("'" + element.text + "' is not allowed; allowed are two numbers" + (std::isfinite(least) ? " above 0" : ""));
   }
@@ -44,8 +45,8 @@ struct Fleet {
     if (!e.has("ruedo:count")) e.fail("has no <ruedo:count>");
     count = e.integer("ruedo:count", 1, Allowed::between(1, 100'000));
     if (const Element* c = e.child("ruedo:center")) center = two_numbers(*c, -std::numeric_limits<double>::infinity());
-    heading = e.number("ruedo:heading", 0);
-    spacing = e.number("ruedo:spacing", 2 * footprint_radius(model) + kGap_m, Allowed::positive());
+    heading = e.number("ruedo:heading", 0, Allowed::any(quantity::kAngle));
+    spacing = e.number("ruedo:spacing", 2 * footprint_radius(model) + kGap_m, Allowed::positive(quantity::kLength));
     const auto only_for = [&](const char* child, const char* kind) {
       if (e.has(child) && arrangement != kind) e.child(child)->fail(std::string("is for arrangement=\"") + kind + "\"");
     };
@@ -56,7 +57,7 @@ struct Fleet {
   }
 
   Place in_grid(int64_t i) const {
-    const int64_t columns = element.integer("ruedo:columns", static_cast<int64_t>(std::ceil(std::sqrt(static_cast<double>(count)))), Allowed::between(1, 100'000));
+    const int64_t columns = element.integer("ruedo:columns", rounded_up(std::sqrt(static_cast<double>(count))), Allowed::between(1, 100'000));
     const int64_t rows = (count + columns - 1) / columns;
     const auto offset = [&](int64_t at, int64_t of) { return (static_cast<double>(at) - static_cast<double>(of - 1) / 2) * spacing; };
     return {center.x() + offset(i % columns, std::min(columns, count)), center.y() + offset(i / columns, rows), heading};
@@ -66,7 +67,7 @@ struct Fleet {
   Place on_ring(int64_t i) const {
     const double turn = 2 * std::numbers::pi / static_cast<double>(count);
     const double smallest = count > 1 ? spacing / (2 * std::sin(turn / 2)) : 0;
-    const double radius = element.number("ruedo:radius", smallest, Allowed::not_negative()), angle = turn * static_cast<double>(i);
+    const double radius = element.number("ruedo:radius", smallest, Allowed::not_negative(quantity::kLength)), angle = turn * static_cast<double>(i);
     return {center.x() + radius * std::cos(angle), center.y() + radius * std::sin(angle), heading + angle};
   }
 };
@@ -75,7 +76,7 @@ struct Fleet {
 class RandomPlaces {
  public:
   explicit RandomPlaces(const Fleet& fleet)
-      : fleet_(fleet), source_(static_cast<uint64_t>(fleet.element.integer("ruedo:seed", 1, Allowed::not_negative())), fleet.name, "fleet") {
+      : fleet_(fleet), source_(static_cast<uint64_t>(fleet.element.integer("ruedo:seed", 1, Allowed::between(0, 0x1p63))), fleet.name, "fleet") {
     size_ = Eigen::Vector2d::Constant(2 * fleet.spacing * std::sqrt(static_cast<double>(fleet.count)));
     if (const Element* s = fleet.element.child("ruedo:size")) size_ = two_numbers(*s, 0);
   }
@@ -100,7 +101,7 @@ class RandomPlaces {
   std::string size() const { return shown(size_.x()) + " x " + shown(size_.y()) + " m"; }
 
  private:
-  int64_t cell(double at) const { return static_cast<int64_t>(std::floor(std::clamp(at / fleet_.spacing, -1e9, 1e9))); }
+  int64_t cell(double at) const { return rounded_down(std::clamp(at / fleet_.spacing, -1e9, 1e9)); }
   static uint64_t key(int64_t x, int64_t y) { return static_cast<uint64_t>(x) << 32 ^ (static_cast<uint64_t>(y) & 0xffffffffu); }
 
   const Fleet& fleet_;

@@ -12,11 +12,11 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 JointAxis read_axis(const Element& element, SdfVersion version, const Pose& X_MJ, FrameGraph& frames, const Joint& joint,
                     const std::string& where, ReadContext& context) {
   report_other_children(element, {"xyz", "limit", "dynamics", "use_parent_model_frame", "mimic"}, {"initial_position"}, where, context.findings);
-  if (const Element* start = element.child("initial_position"); start && start->as_number() != 0.0) {
+  if (const Element* start = element.child("initial_position"); start && start->as_number(Allowed::any(quantity::kLength)) != 0.0) {
     context.findings.unsupported(start->source, where, "<initial_position> is not supported: the joint begins at 0");
   }
   JointAxis axis;
-  Vec3 xyz = element.vector3("xyz", Vec3::UnitZ());
+  Vec3 xyz = element.vector3("xyz", Vec3::UnitZ(), Allowed::any(quantity::kFactor));
   if (!(xyz.norm() > 1e-9)) element.child("xyz")->fail("'" + element.child("xyz")->text + "' is not allowed; an axis is not zero");
   xyz.normalize();
   const Element* written = element.child("xyz");
@@ -30,7 +30,7 @@ JointAxis read_axis(const Element& element, SdfVersion version, const Pose& X_MJ
   }
   axis.axis_in_J = xyz;
   const auto limit = [&](const char* path, double fallback) {
-    const double value = element.number(path, fallback, {-kInfinity, kInfinity, false, true});
+    const double value = element.number(path, fallback, {.infinite = true});
     return std::abs(value) >= 1e16 ? std::copysign(kInfinity, value) : value;
   };
   axis.lower = limit("limit/lower", -kInfinity);
@@ -45,9 +45,9 @@ JointAxis read_axis(const Element& element, SdfVersion version, const Pose& X_MJ
   const double effort = limit("limit/effort", kInfinity), velocity = limit("limit/velocity", kInfinity);
   axis.effort = effort < 0 ? kInfinity : effort;
   axis.velocity = velocity < 0 ? kInfinity : velocity;
-  axis.damping = element.number("dynamics/damping", 0, Allowed::not_negative());
-  axis.friction = element.number("dynamics/friction", 0, Allowed::not_negative());
-  if (element.number("dynamics/spring_stiffness", 0, Allowed::any()) != 0) {
+  axis.damping = element.number("dynamics/damping", 0, Allowed::not_negative(quantity::kDamping));
+  axis.friction = element.number("dynamics/friction", 0, Allowed::not_negative(quantity::kDamping));
+  if (element.number("dynamics/spring_stiffness", 0, Allowed::any(quantity::kDamping)) != 0) {
     context.findings.unsupported(element.child("dynamics")->child("spring_stiffness")->source, where, "springs of joints are not supported; the joint has none");
   }
   if (const Element* mimic = element.child("mimic")) {

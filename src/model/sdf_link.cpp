@@ -26,22 +26,22 @@ void name_what_has_no_effect(const Element& surface, const std::string& where, F
   }
   if (surface.boolean("contact/collide_without_contact", false)) name("contact/collide_without_contact", "the shape collides as others do");
   for (const char* path : {"friction/ode/slip1", "friction/ode/slip2"}) {
-    if (surface.number(path, 0.0) != 0.0) name(path, "friction does not yield");
+    if (surface.number(path, 0.0, Allowed::any(quantity::kFriction)) != 0.0) name(path, "friction does not yield");
   }
-  if (surface.vector3("friction/ode/fdir1", Vec3::Zero()) != Vec3::Zero()) name("friction/ode/fdir1", "friction is the same in all directions");
+  if (surface.vector3("friction/ode/fdir1", Vec3::Zero(), Allowed::any(quantity::kFactor)) != Vec3::Zero()) name("friction/ode/fdir1", "friction is the same in all directions");
 }
 
 Surface read_surface(const Element& surface, const std::string& where, ReadContext& context) {
   report_other_children(surface, {"friction", "bounce", "ruedo:laser_reflectance", "ruedo:laser_mirror", "ruedo:acoustic_reflectance"},
                         {"contact", "soft_contact"}, where, context.findings);
   Surface s;
-  const Allowed part = Allowed::between(0, 1), not_negative = Allowed::not_negative();
+  const Allowed part = Allowed::between(0, 1), friction = Allowed::not_negative(quantity::kFriction);
   // gz-sim reads friction/ode; friction/bullet is what an author gave for Bullet alone.
   const char* engine = !surface.has("friction/ode") && surface.has("friction/bullet") ? "friction/bullet/" : "friction/ode/";
   const std::string first = engine + std::string(engine[9] == 'b' ? "friction" : "mu");
   const std::string second = engine + std::string(engine[9] == 'b' ? "friction2" : "mu2");
-  s.friction = surface.number(first, s.friction, not_negative);
-  s.friction2 = surface.number(second, surface.has(second) ? s.friction2 : s.friction, not_negative);
+  s.friction = surface.number(first, s.friction, friction);
+  s.friction2 = surface.number(second, surface.has(second) ? s.friction2 : s.friction, friction);
   s.restitution = surface.number("bounce/restitution_coefficient", 0, part);
   s.laser_reflectance = surface.number("ruedo:laser_reflectance", 1, part);
   s.laser_mirror = surface.number("ruedo:laser_mirror", 0, part);
@@ -57,7 +57,7 @@ Collision read_collision(const Element& element, const Pose& X_LC, Geometry geom
   c.name = required_name(element);
   c.X_LC = X_LC;
   c.geometry = std::move(geometry);
-  if (element.number("laser_retro", 0.0) != 0.0) {
+  if (element.number("laser_retro", 0.0, Allowed::any(quantity::kBrightness)) != 0.0) {
     context.findings.unsupported(element.child("laser_retro")->source, where, "<laser_retro> is not supported: <ruedo:laser_reflectance> gives intensities");
   }
   if (const Element* surface = element.child("surface")) c.surface = read_surface(*surface, where, context);
@@ -80,11 +80,13 @@ Visual read_visual(const Element& element, const Pose& X_LV, Geometry geometry, 
   return v;
 }
 
+constexpr double kLightest_kg = 1e-9;    // of less, an impulse would make any speed
+
 // A moment of inertia; NaN where exporters wrote nan.
 double moment(const Element& inertia, const char* name, double fallback) {
   const std::string text = inertia.string(name, "");
   if (text == "nan" || text == "-nan" || text == "NaN") return std::numeric_limits<double>::quiet_NaN();
-  return inertia.number(name, fallback);
+  return inertia.number(name, fallback, Allowed::any(quantity::kInertia));
 }
 
 // What is wrong with an inertia, "" when a body can have it. A thousandth is left for rounded figures.
@@ -134,7 +136,7 @@ std::optional<std::pair<double, Vec3>> solid(const Geometry& geometry) {
 // written), scaled to <mass> if there is one. False when a shape is none of those that are known.
 bool computed_inertial(const Element& element, const Element& link_element, const Link& link, Inertial& inertial) {
   const std::vector<const Element*> written = link_element.all("collision");
-  const double usual = element.number("density", 1000.0, Allowed::positive());
+  const double usual = element.number("density", 1000.0, Allowed::positive(quantity::kDensity));
   double mass = 0;
   Vec3 moment = Vec3::Zero();
   Eigen::Matrix3d about_link = Eigen::Matrix3d::Zero();
@@ -143,7 +145,7 @@ bool computed_inertial(const Element& element, const Element& link_element, cons
     if (!shape) return false;
     double density = usual;
     for (const Element* each : written) {
-      if (required_name(*each) == c.name) density = each->number("density", usual, Allowed::positive());
+      if (required_name(*each) == c.name) density = each->number("density", usual, Allowed::positive(quantity::kDensity));
     }
     const double m = density * shape->first;
     const Vec3 at = c.X_LC.translation;
@@ -152,7 +154,7 @@ bool computed_inertial(const Element& element, const Element& link_element, cons
     moment += m * at;
     about_link += R * Vec3(density * shape->second).asDiagonal() * R.transpose() + m * (at.squaredNorm() * Eigen::Matrix3d::Identity() - at * at.transpose());
   }
-  if (!(mass > 0)) return false;
+  if (!(mass >= kLightest_kg && mass <= quantity::kMass.most)) return false;
   const Vec3 centre = moment / mass;
   const double scale = element.has("mass") ? inertial.mass / mass : 1.0;
   inertial.mass = mass * scale;
@@ -166,9 +168,10 @@ Inertial read_inertial(const Element& element, const Element& link_element, cons
   report_other_children(element, {"pose", "mass", "inertia", "density"}, {"auto_inertia_params"}, where, context.findings);
   Inertial inertial;
   inertial.X_LI = X_LI;
-  inertial.mass = element.number("mass", 1.0);
-  if (!(inertial.mass > 0)) {
-    context.findings.repaired(element.child("mass")->source, where, "the mass " + shown(inertial.mass) + " kg is not above 0; it is taken as 1 kg");
+  inertial.mass = element.number("mass", 1.0, Allowed::any(quantity::kMass));
+  if (!(inertial.mass >= kLightest_kg)) {
+    context.findings.repaired(element.child("mass")->source, where, "the mass " + shown(inertial.mass) + " kg is " +
+                                                                        (inertial.mass > 0 ? "below " + shown(kLightest_kg) + " kg" : "not above 0") + "; it is taken as 1 kg");
     inertial.mass = 1.0;
   }
   const std::string* automatic = element.attribute("auto");
@@ -206,20 +209,20 @@ Light read_light(const Element& element, const Pose& pose, const std::string& wh
   else if (kind == "spot") light.type = Light::Type::spot;
   else if (kind != "point") element.fail("type '" + kind + "' is not allowed; allowed are directional, point, spot");
   light.pose = pose;
-  light.direction = element.vector3("direction", -Vec3::UnitZ());
+  light.direction = element.vector3("direction", -Vec3::UnitZ(), Allowed::any(quantity::kFactor));
   if (!(light.direction.norm() > 1e-9)) element.child("direction")->fail("'" + element.child("direction")->text + "' is not allowed; a direction is not zero");
   light.direction.normalize();
   if (const Element* colour = element.child("diffuse")) light.diffuse = read_colour(*colour);
   if (const Element* colour = element.child("specular")) light.specular = read_colour(*colour);
-  const Allowed not_negative = Allowed::not_negative();
-  light.range = element.number("attenuation/range", light.range, not_negative);
-  light.constant = element.number("attenuation/constant", light.constant, not_negative);
-  light.linear = element.number("attenuation/linear", light.linear, not_negative);
-  light.quadratic = element.number("attenuation/quadratic", light.quadratic, not_negative);
-  light.inner_angle = element.number("spot/inner_angle", 0, not_negative);
-  light.outer_angle = element.number("spot/outer_angle", 0, not_negative);
-  light.falloff = element.number("spot/falloff", 0, not_negative);
-  light.intensity = element.boolean("light_on", true) ? element.number("intensity", 1, not_negative) : 0.0;
+  const Allowed brightness = Allowed::not_negative(quantity::kBrightness), angle = Allowed::not_negative(quantity::kAngle);
+  light.range = element.number("attenuation/range", light.range, Allowed::not_negative(quantity::kRange));
+  light.constant = element.number("attenuation/constant", light.constant, brightness);
+  light.linear = element.number("attenuation/linear", light.linear, brightness);
+  light.quadratic = element.number("attenuation/quadratic", light.quadratic, brightness);
+  light.inner_angle = element.number("spot/inner_angle", 0, angle);
+  light.outer_angle = element.number("spot/outer_angle", 0, angle);
+  light.falloff = element.number("spot/falloff", 0, brightness);
+  light.intensity = element.boolean("light_on", true) ? element.number("intensity", 1, brightness) : 0.0;
   light.cast_shadows = element.boolean("cast_shadows", false);
   return light;
 }
@@ -255,7 +258,7 @@ Link read_link(const Element& element, const PoseInLink& pose_in_link, const std
   link.source = element.source;
   link.gravity = element.boolean("gravity", true);
   link.kinematic = element.boolean("kinematic", false);
-  if (const Element* decay = element.child("velocity_decay"); decay && (decay->number("linear", 0.0) != 0.0 || decay->number("angular", 0.0) != 0.0)) {
+  if (const Element* decay = element.child("velocity_decay"); decay && (decay->number("linear", 0.0, Allowed::any(quantity::kDamping)) != 0.0 || decay->number("angular", 0.0, Allowed::any(quantity::kDamping)) != 0.0)) {
     context.findings.unsupported(decay->source, where, "<velocity_decay> is not supported: nothing slows the link in the air");
   }
   if (element.boolean("self_collide", false)) {

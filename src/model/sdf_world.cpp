@@ -4,6 +4,7 @@
 #include <map>
 #include <set>
 
+#include "core/whole.h"
 #include "model/material.h"
 #include "model/plugins.h"
 #include "model/sdf_link.h"
@@ -18,22 +19,15 @@ void read_step(const Element& physics, WorldModel& world, Findings& findings) {
   const Element* step = physics.child("max_step_size");
   if (!step) return;
   const double seconds = step->as_number(Allowed{1e-6, 1.0, false});
-  world.step_us = std::llround(seconds * 1e6);
+  world.step_us = microseconds(seconds);
   if (std::abs(static_cast<double>(world.step_us) - seconds * 1e6) > 1e-6) {
     findings.repaired(step->source, "world/physics", "the step " + step->text + " s is not a whole number of microseconds; it is " +
                                                          std::to_string(world.step_us) + " us instead");
   }
 }
 
-void read_gravity(const Element& parent, WorldModel& world) {
-  constexpr double kMost = 1000.0;    // m/s^2
-  const Element* element = parent.child("gravity");
-  const Vec3 gravity = parent.vector3("gravity", world.gravity);
-  if (element && !(gravity.norm() <= kMost)) element->fail("'" + element->text + "' is not allowed; allowed are up to 1000 m/s^2");
-  world.gravity = gravity;
-}
-
 void read_physics(const Element& world_element, WorldModel& world, Findings& findings) {
+  const Allowed gravity = Allowed::any(quantity::kGravity);
   const auto all = world_element.all("physics");
   const Element* chosen = all.empty() ? nullptr : all[0];
   for (const Element* each : all) {
@@ -47,9 +41,9 @@ void read_physics(const Element& world_element, WorldModel& world, Findings& fin
     report_other_children(*chosen, {"max_step_size", "real_time_factor", "real_time_update_rate", "gravity"},
                           {"ode", "bullet", "simbody", "dart", "max_contacts", "magnetic_field", "update_rate"}, "world/physics", findings);
     read_step(*chosen, world, findings);
-    read_gravity(*chosen, world);    // SDF before 1.6
+    world.gravity = chosen->vector3("gravity", world.gravity, gravity);    // SDF before 1.6
   }
-  read_gravity(world_element, world);
+  world.gravity = world_element.vector3("gravity", world.gravity, gravity);
 }
 
 // Of a world, what changes things in Gazebo and does not here, where it says more than the format's own default.
@@ -58,7 +52,7 @@ void name_what_has_no_effect(const Element& world, const std::string& where, Fin
     if (const Element* element = world.child(path)) findings.unsupported(element->source, where, "<" + element->name + "> is not supported: " + text);
   };
   try {
-    if (world.vector3("wind/linear_velocity", Vec3::Zero()) != Vec3::Zero()) name("wind", "no wind blows");
+    if (world.vector3("wind/linear_velocity", Vec3::Zero(), Allowed::any(quantity::kSpeed)) != Vec3::Zero()) name("wind", "no wind blows");
   } catch (const InputError&) {
     name("wind", "no wind blows");
   }
@@ -105,7 +99,7 @@ std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& 
   double height = X_WM.translation.z();
   if (const Element* script = actor.child("script")) {
     loop = script->boolean("loop", true);
-    const double delay = script->number("delay_start", 0, Allowed::not_negative());
+    const double delay = script->number("delay_start", 0, Allowed::not_negative(quantity::kTime));
     const std::string where = "actor " + model->name;
     const auto trajectories = script->all("trajectory");
     if (trajectories.size() > 1) {
@@ -115,12 +109,12 @@ std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& 
       const Element* trajectory = trajectories[0];
       double last = -1;
       for (const Element* waypoint : trajectory->all("waypoint")) {
-        const double time = delay + waypoint->number("time", 0, Allowed::not_negative());
+        const double time = delay + waypoint->number("time", 0, Allowed::not_negative(quantity::kTime));
         if (time <= last) {
           context.findings.error(waypoint->source, where, "the time " + shown(time) + " s is not after that of the waypoint before; this one is left out");
           continue;
         }
-        const std::vector<double> numbers = waypoint->has("pose") ? waypoint->child("pose")->as_numbers() : std::vector<double>(6, 0.0);
+        const std::vector<double> numbers = waypoint->has("pose") ? waypoint->child("pose")->as_numbers(Allowed::any(quantity::kLength)) : std::vector<double>(6, 0.0);
         if (numbers.size() != 6) waypoint->child("pose")->fail("'" + waypoint->child("pose")->text + "' is not allowed; allowed are x y z roll pitch yaw");
         constexpr double kUpstairs_m = 2;    // above any skin's own origin
         if (numbers[2] > kUpstairs_m) context.findings.unsupported(waypoint->source, where, "actors walk on z = 0, not above it");
@@ -191,7 +185,7 @@ std::map<std::string, SavedModel> saved_models(const Element& world, Findings& f
           if (own && link->has("pose")) saved.links.push_back({dotted(*own), link->pose("pose").translation});
         }
         models.insert_or_assign(*name, std::move(saved));
-        if ((model->vector3("scale", Vec3::Ones()) - Vec3::Ones()).norm() > 1e-9) {
+        if ((model->vector3("scale", Vec3::Ones(), Allowed::any(quantity::kFactor)) - Vec3::Ones()).norm() > 1e-9) {
           findings.unsupported(model->child("scale")->source, "state/model " + *name, "models are not scaled; it has its own size");
         }
       } catch (const InputError& error) {    // a simulation that went wrong saves such numbers; the models have poses of their own

@@ -19,7 +19,7 @@ Element& add(Element& parent, const char* name, const std::string& text = "") {
 // One number for all axes, or one each.
 void add_noise(Element& imu, const char* quantity, const Element* written) {
   if (!written) return;
-  const std::vector<double> values = written->as_numbers();
+  const std::vector<double> values = written->as_numbers(Allowed::any(quantity::kNoise));
   if (values.size() != 1 && values.size() != 3) written->fail("'" + written->text + "' is not allowed; allowed are one number or three");
   Element& axes = add(imu, quantity);
   for (size_t i = 0; i < 3; ++i) {
@@ -41,7 +41,7 @@ PluginSensor sensor_from_plugin(const Element& plugin) {
   const std::string* name = plugin.attribute("name");
   sensor->attributes.emplace_back("name", name && !name->empty() ? *name : "imu");
   sensor->attributes.emplace_back("type", "imu");
-  if (const double rate = plugin.number("updateRate", 0.0, Allowed::not_negative()); rate > 0) add(*sensor, "update_rate", shown(rate));
+  if (const double rate = plugin.number("updateRate", 0.0, Allowed::not_negative(quantity::kRange)); rate > 0) add(*sensor, "update_rate", shown(rate));
   Element& imu = add(*sensor, "imu");
   const Element* same_for_all = plugin.child("gaussianNoise");
   add_noise(imu, "angular_velocity", plugin.has("rateGaussianNoise") ? plugin.child("rateGaussianNoise") : same_for_all);

@@ -8,6 +8,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "physics/state_check.h"
+#include "ruedo/quantity.h"
+
 namespace ruedo::physics {
 
 namespace {
@@ -251,6 +254,7 @@ void PhysicsWorld::Impl::step() {
     for (JointConstraint& joint : joints_) joint.before_substep(substep_s);
     for (JointConstraint& joint : wheels_) joint.before_substep(substep_s);
     dynamics_.substep(substep_s);
+    bound_speeds();
     for (JointConstraint& joint : joints_) joint.after_substep();
     for (JointConstraint& joint : wheels_) joint.after_substep();
     contacts_.add(dispatcher_);
@@ -276,6 +280,22 @@ void PhysicsWorld::Impl::step() {
       motion.dirty = true;
     }
     motion.kind = Motion::Kind::free;
+  }
+}
+
+// Forces that are allowed, each on its own, can throw a light body at any speed, and what is thrown so drags others along:
+// without a bound the numbers grow from substep to substep, to infinity. Bullet is never given what is not finite.
+void PhysicsWorld::Impl::bound_speeds() {
+  constexpr double kFastest2 = quantity::kSpeed.most * quantity::kSpeed.most;
+  const auto bounded = [](const btVector3& v) { return v.length2() <= kFastest2 ? v : v * (quantity::kSpeed.most / v.length()); };
+  for (btRigidBody* body : simulated_) {
+    const btVector3 &linear = body->getLinearVelocity(), &angular = body->getAngularVelocity(), &at = body->getWorldTransform().getOrigin();
+    if (!std::isfinite(linear.length2() + angular.length2() + at.length2())) {
+      throw StateError("the state of the body '" + layout_.bodies[index(info_of(*body).body)].name +
+                       "' is not finite: the run ends with the step before. Masses, inertias and efforts that do not fit each other do this");
+    }
+    if (linear.length2() > kFastest2) body->setLinearVelocity(bounded(linear));
+    if (angular.length2() > kFastest2) body->setAngularVelocity(bounded(angular));
   }
 }
 

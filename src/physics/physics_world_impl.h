@@ -85,6 +85,7 @@ class PhysicsWorld::Impl {
   void start(int body);               // the velocity it begins the step with
   void update_box(int body);
   void choose_simulated();
+  void bound_speeds();                // after a substep; throws StateError for what is not finite
 
   const model::WorldModel& world_;
   const model::BodyLayout& layout_;

@@ -8,11 +8,12 @@
 #include <ruedo/joint_command_t.hpp>
 #include <ruedo/motion_status_t.hpp>
 
+#include "ruedo/quantity.h"
+
 namespace ruedo::robot {
 
 namespace {
 
-constexpr double kMostCommanded = 1e6;    // rad, m, rad/s, m/s, N or Nm: far beyond any robot, and harmless to the solver
 constexpr double kGain_per_s = 20.0;
 constexpr double kGainPerStep = 0.2;    // no more than this part of the error in a step
 }  // namespace
@@ -40,7 +41,10 @@ int8_t JointControl::apply(int robot, const JointCommand& command) {
   };
   for (size_t i = 0; i < n; ++i) {
     if (!std::isfinite(command.values[i])) return motion_status_t::REASON_NOT_FINITE;
-    if (std::abs(command.values[i]) > kMostCommanded) return motion_status_t::REASON_BAD_VALUE;
+    const double most = command.modes[i] == joint_command_t::EFFORT     ? quantity::kEffort.most
+                        : command.modes[i] == joint_command_t::VELOCITY ? quantity::kSpeed.most
+                                                                        : quantity::kLength.most;
+    if (std::abs(command.values[i]) > most) return motion_status_t::REASON_BAD_VALUE;
     if (command.modes[i] < joint_command_t::POSITION || command.modes[i] > joint_command_t::EFFORT) {
       return motion_status_t::REASON_BAD_KIND;
     }

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/whole.h"
+
 namespace ruedo::robot {
 
 Mover::Mover(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics, int instance)
@@ -31,21 +33,24 @@ Mover::Path Mover::read(const Element& path) {
   const bool ours = path.name.starts_with("ruedo:");
   result.loop = path.boolean(ours ? "ruedo:loop" : "loop", true);
   const auto add = [&waypoints](const Element& element, double time_s, const Pose& pose) {
-    if (time_s < 0.0 || time_s > 1e9) element.fail("the time " + std::to_string(time_s) + " is not within 0 and 1e9 s");
-    const auto time = static_cast<SimTime>(std::llround(time_s * 1e6));
+    if (time_s < 0.0 || time_s > quantity::kTime.most) element.fail("the time " + std::to_string(time_s) + " is not within 0 and 1e9 s");
+    const auto time = microseconds(time_s);
     if (!waypoints.empty() && time <= waypoints.back().time) element.fail("its time is not after the one before");
     waypoints.push_back({time, pose});
   };
   if (ours) {
     for (const Element* waypoint : path.all("ruedo:waypoint")) {
-      const std::vector<double> v = waypoint->as_numbers();
+      const std::vector<double> v = waypoint->as_numbers(Allowed::any(quantity::kTime));
       if (v.size() != 7) waypoint->fail("has " + std::to_string(v.size()) + " numbers, needs time x y z roll pitch yaw");
+      for (size_t i = 1; i < v.size(); ++i) {
+        if (std::abs(v[i]) > quantity::kLength.most) waypoint->fail("'" + waypoint->text + "' leads too far; allowed is up to 1000000 m or rad");
+      }
       add(*waypoint, v[0], Pose::from_xyz_rpy({v[1], v[2], v[3]}, {v[4], v[5], v[6]}));
     }
   } else {
     const Element* trajectory = path.name == "trajectory" ? &path : path.child("trajectory");
     for (const Element* waypoint : trajectory ? trajectory->all("waypoint") : std::vector<const Element*>{}) {
-      add(*waypoint, waypoint->number("time", 0.0), waypoint->pose("pose"));
+      add(*waypoint, waypoint->number("time", 0.0, Allowed::not_negative(quantity::kTime)), waypoint->pose("pose"));
     }
   }
   if (waypoints.empty()) path.fail("has no waypoint");

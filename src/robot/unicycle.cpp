@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "core/whole.h"
+
 namespace ruedo::robot {
 
 namespace {
@@ -26,7 +28,7 @@ Displacement over_piece(double v0, double a, double w0, double b, double duratio
   result.way = way;
   result.angle = angle;
   const double largest_angle = (std::abs(w0) + std::abs(b) * duration) * duration;
-  const int panels = 1 + static_cast<int>(std::min(largest_angle / kLargestPanel_rad, 1e6));
+  const int panels = 1 + whole<int>(std::min(largest_angle / kLargestPanel_rad, 1e6));
   const double half = 0.5 * duration / panels;
   const auto add = [&](double t, double weight) {
     const double heading = (w0 + 0.5 * b * t) * t, speed = (v0 + a * t) * weight;

@@ -26,6 +26,7 @@ engine::Outcome bad_body(const char* type) { return engine::Outcome::refuse(repl
 bool Server::stand_still() {
   const int64_t last = pacer_->hold();
   while (status_.step < last) {
+    if (simulation_->over()) return false;    // a state that cannot be ends a run before its time
     if (const engine::Batch* batch = simulation_->take()) publish(*batch);
     else wakeup_.wait();
   }

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/whole.h"
+
 namespace ruedo::run {
 
 Pacer::Pacer(int64_t step_us, double rate, int64_t last_step)
@@ -12,7 +14,7 @@ Pacer::Pacer(int64_t step_us, double rate, int64_t last_step)
 
 Pacer::Clock::time_point Pacer::due(int64_t step) const {
   const double real_us = static_cast<double>(step - origin_step_) * static_cast<double>(step_us_) / rate_;
-  return origin_time_ + std::chrono::nanoseconds(static_cast<int64_t>(std::min(real_us * 1e3, 9e18)));
+  return origin_time_ + std::chrono::nanoseconds(whole(std::min(real_us * 1e3, 9e18)));
 }
 
 void Pacer::start_anew() {

@@ -5,6 +5,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "physics/state_check.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/motion_status_t.hpp"
 #include "ruedo/request_t.hpp"
@@ -149,7 +150,7 @@ void Server::run() {
     if (stop_) simulation_->leave_off();
     while (const engine::Batch* batch = lockstep_ && lockstep_->full() && !stop_ ? nullptr : simulation_->take()) {
       publish(*batch);
-      over = batch->last;
+      over |= simulation_->over();
       const Clock::time_point now = Clock::now();
       if (on_status_ && now >= next_status) on_status_(status_), next_status = now + kStatusPeriod;
       if (now >= next_flush) recorder_.flush(), next_flush = now + kPausedInfoPeriod;
@@ -162,6 +163,7 @@ void Server::run() {
       if (stop_) simulation_->leave_off();
       if (lockstep_ && !lockstep_->full()) simulation_->go();
     }
+    over |= simulation_->over();    // its last may have been taken before an edit, too
     if (over) break;
     control_.serve();
     spawn_ready();
@@ -188,6 +190,7 @@ void Server::run() {
   recorder_.state_hash(hash_of_state(true));
   recorder_.flush();
   recorder_.check(status_.time_us);
+  if (!simulation_->end().empty()) throw physics::StateError(simulation_->end());
 }
 
 void Server::check_leases() {

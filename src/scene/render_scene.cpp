@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/whole.h"
 #include "scene/render_device.h"
 #include "scene/render_lights.h"
 
@@ -147,7 +148,7 @@ class GlRenderer : public Renderer {
     }
     const auto texel = [&](double metres, double rounding) {
       const double t = (metres / shadow.half + 1.0) * 0.5 * kSize;
-      return static_cast<int>(std::clamp(std::floor(t) + rounding, 0.0, static_cast<double>(kSize)));
+      return whole<int>(std::clamp(std::floor(t) + rounding, 0.0, static_cast<double>(kSize)));
     };
     stale_ = {texel(box.min().x(), -1.0), texel(box.min().y(), -1.0), texel(box.max().x(), 2.0), texel(box.max().y(), 2.0)};
   }

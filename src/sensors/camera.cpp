@@ -71,7 +71,7 @@ class Camera : public Sensor {
       view_ = scene::View{{}, lens_.width, lens_.height, lens_.fx, lens_.fy, lens_.cx, lens_.cy, lens_.near_m, lens_.far_m};
     }
     view_.exposure = std::exp2(element.number("ruedo:exposure", 0.0, Allowed::between(-10.0, 10.0)));
-    view_.samples = camera.integer("image/anti_aliasing", 1, Allowed::not_negative()) > 1 ? 4 : 1;
+    view_.samples = camera.integer("image/anti_aliasing", 1, Allowed::between(0, 1e9)) > 1 ? 4 : 1;
     fill_info();
   }
 
@@ -126,7 +126,7 @@ class Camera : public Sensor {
     const std::string* attribute = noise->attribute("type");
     const std::string type = attribute ? *attribute : noise->string("type", "none");
     if (type != "none" && type != "gaussian") noise->fail("type '" + type + "' is not allowed; allowed: none, gaussian");
-    const double mean = noise->number("mean", 0.0), stddev = noise->number("stddev", 0.0, Allowed::not_negative());
+    const double mean = noise->number("mean", 0.0, Allowed::any(quantity::kNoise)), stddev = noise->number("stddev", 0.0, Allowed::not_negative(quantity::kNoise));
     if (setup.noise && type == "gaussian") noise_ = PixelNoise(mean, stddev);
   }
 

@@ -5,6 +5,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "core/whole.h"
+
 namespace ruedo {
 namespace {
 
@@ -19,18 +21,19 @@ constexpr double kMaxGrowth = 2.5;
 Lens::Lens(const Element& camera) {
   width = static_cast<int>(camera.integer("image/width", width, Allowed::between(1, kMaxPixels)));
   height = static_cast<int>(camera.integer("image/height", height, Allowed::between(1, kMaxPixels)));
-  hfov = camera.number("horizontal_fov", hfov, Allowed{0.0, kMaxHfov, true});
-  near_m = camera.number("clip/near", near_m, Allowed::positive());
-  far_m = camera.number("clip/far", far_m, Allowed::positive());
+  hfov = camera.number("horizontal_fov", hfov, Allowed{.min = 0.0, .max = kMaxHfov, .min_excluded = true});
+  near_m = camera.number("clip/near", near_m, Allowed::positive(quantity::kRange));
+  far_m = camera.number("clip/far", far_m, Allowed::positive(quantity::kRange));
   if (far_m <= near_m) {
     const Element* clip = camera.child("clip");
     (clip ? clip : &camera)->fail("far (" + std::to_string(far_m) + " m) has to be beyond near (" + std::to_string(near_m) + " m)");
   }
   const scene::View pinhole = scene::View::pinhole({}, width, height, hfov);
-  fx = camera.number("lens/intrinsics/fx", pinhole.fx, Allowed::positive());
-  fy = camera.number("lens/intrinsics/fy", camera.has("lens/intrinsics/fx") ? fx : pinhole.fy, Allowed::positive());
-  cx = camera.number("lens/intrinsics/cx", pinhole.cx);
-  cy = camera.number("lens/intrinsics/cy", pinhole.cy);
+  const Allowed focal = Allowed::positive(quantity::kPixels);
+  fx = camera.number("lens/intrinsics/fx", pinhole.fx, focal);
+  fy = camera.number("lens/intrinsics/fy", camera.has("lens/intrinsics/fx") ? fx : pinhole.fy, focal);
+  cx = camera.number("lens/intrinsics/cx", pinhole.cx, Allowed::any(quantity::kPixels));
+  cy = camera.number("lens/intrinsics/cy", pinhole.cy, Allowed::any(quantity::kPixels));
   if (fx != pinhole.fx || cx != pinhole.cx) hfov = std::atan((cx + 0.5) / fx) + std::atan((width - 0.5 - cx) / fx);
   if (const Element* d = camera.child("distortion")) {
     const Allowed range = Allowed::between(-10.0, 10.0);
@@ -97,8 +100,8 @@ LensMap::LensMap(const Lens& lens) {
   ideal_.fy = lens.fy;
   ideal_.cx = std::ceil(-x_min * lens.fx) + 2.0;
   ideal_.cy = std::ceil(-y_min * lens.fy) + 2.0;
-  ideal_.width = static_cast<int>(ideal_.cx + std::ceil(x_max * lens.fx)) + 3;
-  ideal_.height = static_cast<int>(ideal_.cy + std::ceil(y_max * lens.fy)) + 3;
+  ideal_.width = rounded_up<int>(ideal_.cx + x_max * lens.fx) + 3;
+  ideal_.height = rounded_up<int>(ideal_.cy + y_max * lens.fy) + 3;
   ideal_.near_m = lens.near_m;
   ideal_.far_m = lens.far_m;
   x = x * lens.fx + ideal_.cx;

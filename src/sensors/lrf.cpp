@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "core/whole.h"
 #include "ruedo/device_info_t.hpp"
 #include "ruedo/lidar_t.hpp"
 #include "ruedo/planar_lidar_t.hpp"
@@ -34,13 +35,13 @@ struct Sweep {
   // limit_rad: of the angles; whole_rad: of their span.
   Sweep(const Element& e, int64_t samples_if_absent, double limit_rad, double whole_rad) {
     const int64_t samples = e.integer("samples", samples_if_absent, Allowed::between(0, static_cast<double>(kMaxRays)));
-    const double resolution = e.number("resolution", 1.0, Allowed::not_negative());
+    const double resolution = e.number("resolution", 1.0, Allowed::not_negative(quantity::kFactor));
     // A widespread lidar has one layer, and a resolution of 0.01 for it: one ray at least, as in Gazebo.
     const double rays = std::max(1.0, std::round(static_cast<double>(samples) * resolution));
     if (rays > static_cast<double>(kMaxRays)) {
       e.fail("<samples> times <resolution> is " + std::to_string(rays) + " rays; allowed: 1 to " + std::to_string(kMaxRays));
     }
-    count = static_cast<int64_t>(rays);
+    count = whole(rays);
     const double low = e.number("min_angle", 0.0, Allowed::between(-limit_rad, limit_rad));
     const double high = e.number("max_angle", 0.0, Allowed::between(-limit_rad, limit_rad));
     if (high < low) e.fail("<max_angle> " + std::to_string(high) + " is below <min_angle> " + std::to_string(low));
@@ -75,8 +76,8 @@ class Lrf : public Sensor {
     ignored_link_ = e.boolean("ruedo:own_link", false) ? -1 : setup.link;
     visuals_ = e.choice("ruedo:hits", "collisions", {"collisions", "visuals"}) == "visuals";
     intensities_ = e.boolean("ruedo:intensities", true);
-    sweep_us_ = std::llround(1e6 * e.number("ruedo:sweep_time", 0.0, Allowed::between(0.0, 60.0)));
-    bearing_noise_ = e.number("ruedo:bearing_noise", 0.0, Allowed::not_negative());
+    sweep_us_ = microseconds(e.number("ruedo:sweep_time", 0.0, Allowed::between(0.0, 60.0)));
+    bearing_noise_ = e.number("ruedo:bearing_noise", 0.0, Allowed::not_negative(quantity::kAngle));
     noise_ = Noise(laser->child("noise"));
     RandomStream constants = random_.stream(kConstantDraws);
     noise_.draw_bias(constants);
@@ -151,10 +152,10 @@ class Lrf : public Sensor {
   void read_range(const Element& laser) {
     const Element* range = laser.child("range");
     if (!range || !range->has("max")) laser.fail("needs <range> with <max>, the largest range in m");
-    min_ = range->number("min", 0.0, Allowed::not_negative());
-    max_ = range->number("max", 0.0, Allowed::positive());
+    min_ = range->number("min", 0.0, Allowed::not_negative(quantity::kRange));
+    max_ = range->number("max", 0.0, Allowed::positive(quantity::kRange));
     if (max_ <= min_) range->fail("<max> " + std::to_string(max_) + " must be above <min> " + std::to_string(min_));
-    resolution_ = range->number("resolution", 0.0, Allowed::not_negative());
+    resolution_ = range->number("resolution", 0.0, Allowed::not_negative(quantity::kRange));
   }
 
   // Directions in the device's frame, and messages of their final size: nothing grows later.

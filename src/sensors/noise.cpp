@@ -24,13 +24,13 @@ Noise::Noise(const Element* noise) {
 
 Noise Noise::from_parameters(const Element& parameters, bool quantized) {
   Noise noise;
-  noise.mean_ = parameters.number("mean", 0.0);
-  noise.stddev_ = parameters.number("stddev", 0.0, Allowed::not_negative());
-  noise.bias_mean_ = parameters.number("bias_mean", 0.0);
-  noise.bias_stddev_ = parameters.number("bias_stddev", 0.0, Allowed::not_negative());
-  noise.walk_stddev_ = parameters.number("dynamic_bias_stddev", 0.0, Allowed::not_negative());
-  noise.walk_time_s_ = parameters.number("dynamic_bias_correlation_time", 0.0, Allowed::not_negative());
-  noise.precision_ = parameters.number("precision", 0.0, Allowed::not_negative());
+  noise.mean_ = parameters.number("mean", 0.0, Allowed::any(quantity::kNoise));
+  noise.stddev_ = parameters.number("stddev", 0.0, Allowed::not_negative(quantity::kNoise));
+  noise.bias_mean_ = parameters.number("bias_mean", 0.0, Allowed::any(quantity::kNoise));
+  noise.bias_stddev_ = parameters.number("bias_stddev", 0.0, Allowed::not_negative(quantity::kNoise));
+  noise.walk_stddev_ = parameters.number("dynamic_bias_stddev", 0.0, Allowed::not_negative(quantity::kNoise));
+  noise.walk_time_s_ = parameters.number("dynamic_bias_correlation_time", 0.0, Allowed::not_negative(quantity::kTime));
+  noise.precision_ = parameters.number("precision", 0.0, Allowed::not_negative(quantity::kNoise));
   noise.quantized_ = quantized && noise.precision_ > 0.0;
   noise.bias_ = noise.bias_mean_;
   noise.none_ = noise.mean_ == 0.0 && noise.stddev_ == 0.0 && noise.bias_mean_ == 0.0 && noise.bias_stddev_ == 0.0 &&

@@ -16,6 +16,7 @@
 #include <optional>
 
 #include "model/body_layout.h"
+#include "core/whole.h"
 #include "ruedo/odometry_t.hpp"
 #include "ruedo/sensor.h"
 #include "sensors/base_odometry.h"
@@ -42,15 +43,15 @@ struct Configuration {
       element.child("ruedo:counter_bits")->fail("needs <ruedo:ticks_per_turn>: ideal encoders do not wrap");
     }
     if (const Element* errors = element.child("ruedo:radius_error")) {
-      const std::vector<double> values = errors->as_numbers();
+      const std::vector<double> values = errors->as_numbers(Allowed::any(quantity::kFactor));
       if (values.size() != 2 || values[0] <= -1.0 || values[1] <= -1.0) {
         errors->fail("'" + errors->text + "' is not allowed; allowed are two numbers above -1, for left and right");
       }
       radius_error[0] = values[0];
       radius_error[1] = values[1];
     }
-    track_error = element.number("ruedo:track_error", 0.0, {-1.0, std::numeric_limits<double>::infinity(), true});
-    slip_noise = element.number("ruedo:slip_noise", 0.0, Allowed::not_negative());
+    track_error = element.number("ruedo:track_error", 0.0, {.min = -1.0, .min_excluded = true, .quantity = &quantity::kFactor});
+    slip_noise = element.number("ruedo:slip_noise", 0.0, Allowed::not_negative(quantity::kNoise));
     steering_error = element.number("ruedo:steering_error", 0.0, Allowed::between(-1.5, 1.5));
   }
 };
@@ -165,7 +166,7 @@ class Odometry : public Sensor {
   }
 
   int64_t count(double angle) const {
-    return static_cast<int64_t>(std::floor(angle * static_cast<double>(configuration_.ticks_per_turn) / (2.0 * M_PI)));
+    return rounded_down(angle * static_cast<double>(configuration_.ticks_per_turn) / (2.0 * M_PI));
   }
   double angle_of(int64_t ticks) const {
     return static_cast<double>(ticks) * (2.0 * M_PI) / static_cast<double>(configuration_.ticks_per_turn);

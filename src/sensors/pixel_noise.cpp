@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/whole.h"
+
 namespace ruedo {
 namespace {
 
@@ -53,7 +55,7 @@ Vignette::Vignette(double lost, int width, int height) {
   for (int v = 0; v < height; ++v) {
     for (int u = 0; u < width; ++u) {
       const double r2 = ((u - cx) * (u - cx) + (v - cy) * (v - cy)) / corner2;
-      factor_.push_back(static_cast<uint16_t>(std::lround(32768.0 * std::sqrt(1.0 - lost * r2))));
+      factor_.push_back(rounded<uint16_t>(32768.0 * std::sqrt(1.0 - lost * r2)));
     }
   }
 }

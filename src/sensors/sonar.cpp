@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "core/whole.h"
 #include "ruedo/device_info_t.hpp"
 #include "ruedo/sonar_t.hpp"
 #include "sensors/noise.h"
@@ -30,7 +31,7 @@ constexpr double kQuietest = 0.05;    // acoustic reflectance; less is not heard
 std::vector<Vec3> cone(int64_t n, double horizontal_rad, double vertical_rad) {
   std::vector<Vec3> directions{Vec3::UnitX()};
   const int64_t rest = n - 1;
-  const int64_t rings = std::max<int64_t>(1, std::llround((std::sqrt(1.0 + 4.0 * static_cast<double>(rest) / 3.0) - 1.0) / 2.0));
+  const int64_t rings = std::max<int64_t>(1, rounded((std::sqrt(1.0 + 4.0 * static_cast<double>(rest) / 3.0) - 1.0) / 2.0));
   int64_t placed = 0;
   for (int64_t ring = 1; ring <= rings && rest > 0; ++ring) {
     const int64_t until = rest * ring * (ring + 1) / (rings * (rings + 1));
@@ -61,13 +62,13 @@ class Sonar : public Sensor {
     const Element* sonar = e.child("sonar");
     if (!sonar) e.fail("needs a <sonar> with <max>, the largest range in m");
     if (!sonar->has("max")) sonar->fail("needs <max>, the largest range in m");
-    min_ = sonar->number("min", 0.0, Allowed::not_negative());
-    max_ = sonar->number("max", 1.0, Allowed::positive());
+    min_ = sonar->number("min", 0.0, Allowed::not_negative(quantity::kRange));
+    max_ = sonar->number("max", 1.0, Allowed::positive(quantity::kRange));
     if (max_ <= min_) sonar->fail("<max> " + std::to_string(max_) + " must be above <min> " + std::to_string(min_));
     if (sonar->choice("geometry", "cone", {"cone", "sphere"}) == "sphere" && setup.findings) {
       setup.findings->unsupported(sonar->source, "sensor " + setup.device + "/sonar/geometry", "a sphere is not supported; a cone instead");
     }
-    const double aperture = 2.0 * std::atan(sonar->number("radius", 0.5, Allowed::not_negative()) / max_);
+    const double aperture = 2.0 * std::atan(sonar->number("radius", 0.5, Allowed::not_negative(quantity::kRange)) / max_);
     const Element* ours = e.child("ruedo:sonar");
     configure(ours ? *ours : kNothing, aperture, setup);
   }
@@ -156,12 +157,12 @@ class Sonar : public Sensor {
       return;
     }
     std::vector<bool> named(static_cast<size_t>(n), false);
-    for (const double index : order->as_numbers()) {
+    for (const double index : order->as_numbers(Allowed::any(quantity::kFactor))) {
       if (index != std::floor(index) || index < 0 || index >= n) {
         order->fail("'" + order->text + "': allowed are the transducers' numbers, 0 to " + std::to_string(n - 1));
       }
-      order_.push_back(static_cast<int>(index));
-      named[static_cast<size_t>(index)] = true;
+      order_.push_back(whole<int>(index));
+      named[whole<size_t>(index)] = true;
     }
     for (int i = 0; i < n; ++i)
       if (!named[static_cast<size_t>(i)]) order->fail("transducer " + std::to_string(i) + " never fires; name every one of 0 to " + std::to_string(n - 1));

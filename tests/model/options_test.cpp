@@ -131,12 +131,12 @@ TEST_F(Options, SetChangesOneRobotOnly) {
   const auto loaded = load_world(world, options);
   const Model& bot = *loaded->models[5].model;
   const Model& other = *loaded->models[6].model;
-  EXPECT_EQ(bot.sensors[0].element->number("update_rate", 0), 25);
-  EXPECT_EQ(bot.sensors[0].element->number("lidar/range/max", 0), 4);
-  EXPECT_EQ(bot.sensors[0].element->number("ruedo:sweep_time", 0), 0.01);
+  EXPECT_EQ(bot.sensors[0].element->number("update_rate", 0, Allowed::any(quantity::kRange)), 25);
+  EXPECT_EQ(bot.sensors[0].element->number("lidar/range/max", 0, Allowed::any(quantity::kRange)), 4);
+  EXPECT_EQ(bot.sensors[0].element->number("ruedo:sweep_time", 0, Allowed::any(quantity::kRange)), 0.01);
   EXPECT_EQ(bot.drive->max_speed, 0.5);
-  EXPECT_EQ(bot.drive->odometry->integer("ruedo:ticks_per_turn", 0), 1000);
-  EXPECT_EQ(other.sensors[0].element->number("update_rate", 0), 10);
+  EXPECT_EQ(bot.drive->odometry->integer("ruedo:ticks_per_turn", 0, Allowed::any(quantity::kRange)), 1000);
+  EXPECT_EQ(other.sensors[0].element->number("update_rate", 0, Allowed::any(quantity::kRange)), 10);
   EXPECT_EQ(other.drive->max_speed, std::numeric_limits<double>::infinity());
 }
 

@@ -1,0 +1,46 @@
+// A state that is not finite: the run ends with the one before, and says of which body.
+#include <algorithm>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "engine/simulation.h"
+#include "running.h"
+
+namespace ruedo::run {
+namespace {
+
+TEST(BrokenState, EndsTheRunAndIsNotPublished) {
+  engine::Channels channels;
+  Findings findings;
+  engine::Wakeup wakeup;
+  const auto world = load_text(robot_sdf("r", 0, 0) + "<model name='thing'><pose>3 0 50 0 0 0</pose><link name='l'/></model>");
+  engine::Simulation simulation(world, {}, channels, findings, wakeup);
+  Pacer pacer(world->step_us, std::numeric_limits<double>::infinity(), 1000);
+  pacer.set_limit(99);
+  simulation.start(pacer);
+  int64_t last = -1;
+  const auto take = [&] {
+    while (const engine::Batch* batch = simulation.take()) {
+      for (int i = 0; i < batch->count; ++i) {
+        const Snapshot& snapshot = batch->snapshots[static_cast<size_t>(i)];
+        EXPECT_EQ(snapshot.step, ++last);
+        for (const Pose& pose : snapshot.bodies) EXPECT_TRUE(pose.translation.allFinite());
+      }
+    }
+  };
+  for (take(); last < 99; take()) wakeup.wait();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto& bodies = simulation.layout().bodies;
+  const auto thing = std::find_if(bodies.begin(), bodies.end(), [](const auto& body) { return body.name == "thing/l"; });
+  ASSERT_NE(thing, bodies.end());
+  // No input does this, so the test reaches into the physics, which stands still.
+  const_cast<physics::PhysicsWorld&>(simulation.physics()).set_twist(static_cast<int>(thing - bodies.begin()), {Vec3(nan, 0, 0), Vec3::Zero()});
+  pacer.set_limit(1000);
+  for (take(); !simulation.over(); take()) wakeup.wait();
+  EXPECT_EQ(last, 99);
+  EXPECT_THAT(simulation.end(), testing::HasSubstr("'thing/l'"));
+}
+
+}  // namespace
+}  // namespace ruedo::run
