@@ -8,6 +8,7 @@
 #include "cli/commands.h"
 #include "cli/foxglove.h"
 #include "cli/logged_run.h"
+#include "core/utf8.h"
 #include "ruedo/errors.h"
 #include "log/reader.h"
 #include "run/log_worlds.h"
@@ -47,7 +48,7 @@ int export_log(const ExportArguments& arguments) {
   }
   out.finish();
   for (const std::string& fault : {worlds.fault(), log.fault()}) {
-    if (!fault.empty()) fmt::print(stderr, "ruedo: {}: {}\n", arguments.log, fault);
+    if (!fault.empty()) fmt::print(stderr, "ruedo: {}: {}\n", for_terminal(arguments.log), for_terminal(fault));
   }
   fmt::print("{}: {} messages of {}, as {} of Foxglove's and Ruedo's types", arguments.out, read, arguments.log, out.messages());
   if (foxglove.left_out() > 0) fmt::print("; {} of types that are not known, or damaged, are left out", foxglove.left_out());

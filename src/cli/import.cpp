@@ -3,6 +3,7 @@
 #include <cctype>
 #include <filesystem>
 #include <fstream>
+#include <stdexcept>
 
 #include <fmt/format.h>
 
@@ -24,8 +25,15 @@ int import_map(const ImportArguments& arguments) {
   std::transform(kind.begin(), kind.end(), kind.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   std::vector<model::WallPiece> walls;
   std::string left_out;
+  const auto walls_of = [&](const model::OccupancyGrid& grid) {
+    try {
+      return model::walls_of(grid);
+    } catch (const std::runtime_error& error) {
+      throw InputError({arguments.map, 0}, error.what());
+    }
+  };
   if (kind == ".yaml" || kind == ".yml") {
-    walls = model::walls_of(model::read_map(arguments.map));
+    walls = walls_of(model::read_map(arguments.map));
   } else if (kind == ".map") {
     walls = model::read_armap(arguments.map, arguments.thickness, left_out);
   } else if (kind == ".world" || kind == ".inc") {
@@ -38,7 +46,7 @@ int import_map(const ImportArguments& arguments) {
       grid.x *= grid.resolution;
       grid.y *= grid.resolution;
     }
-    walls = model::walls_of(grid);
+    walls = walls_of(grid);
   }
   const std::string sdf = model::world_of_walls(path.stem().string(), walls, arguments.height);
   if (arguments.out.empty()) {

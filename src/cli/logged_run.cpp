@@ -17,7 +17,7 @@ LoggedOptions read_options(const log_header_t& header, const std::string& log) {
     if (name == "--spawn") world.spawns.push_back(value);
     else if (name == "--drive") world.drives.push_back(value);
     else if (name == "--xacro-arg") world.xacro_arguments.push_back(value);
-    else if (name == "--allow-absolute") world.allow_absolute = true;
+    else if (name == "--allow-absolute") continue;    // not a log's to allow: what lies outside is not found
     else if (name == "--set") world.settings.push_back(value);
     else if (name == "--disable") world.disabled.push_back(value);
     else if (name == "--no-noise") world.no_noise = true;

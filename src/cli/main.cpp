@@ -1,6 +1,9 @@
 // ruedo: reads the command line, runs one command, and turns what went wrong into one line and an exit code.
+#include <sys/resource.h>
+
 #include <cstdio>
 #include <exception>
+#include <new>
 
 #include <fmt/format.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
@@ -49,6 +52,18 @@ std::string suggestion(const CLI::App& app, int argc, char** argv) {
   return "";
 }
 
+// What neither threads nor libraries can do without, and what they hang or crash for: said here, where it can be said.
+void check_limits() {
+  constexpr rlim_t kFiles = 64, kMemory = rlim_t{1024} << 20;
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) == 0 && limit.rlim_cur < kFiles) {
+    throw ruedo::EnvironmentError(fmt::format("{} open files are allowed here, and {} are needed: ulimit -n {}", limit.rlim_cur, kFiles, kFiles));
+  }
+  if (getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur < kMemory) {
+    throw ruedo::EnvironmentError(fmt::format("{} MB of address space are allowed here, and {} are needed: ulimit -v {}", limit.rlim_cur >> 20, kMemory >> 20, kMemory >> 10));
+  }
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"Ruedo: a simulation server for mobile robots. Robots are data servers; LCM carries commands in and sensor streams out.",
                "ruedo"};
@@ -66,6 +81,7 @@ int run(int argc, char** argv) {
     fmt::print(stderr, "Run `ruedo --help`, or `ruedo COMMAND --help`.\n");
     return kWrongUsage;
   }
+  check_limits();
   return action();
 }
 
@@ -84,6 +100,9 @@ int main(int argc, char** argv) {
     return kBrokenState;
   } catch (const ruedo::EnvironmentError& error) {
     say(error.what());
+    return kEnvironment;
+  } catch (const std::bad_alloc&) {
+    say("there is not enough memory");
     return kEnvironment;
   } catch (const std::exception& error) {
     say(error.what());

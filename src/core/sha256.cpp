@@ -1,6 +1,9 @@
 // OpenSSL's EVP digests.
 #include "core/sha256.h"
 
+#include <fcntl.h>
+#include <sys/stat.h>
+
 #include <array>
 #include <cstdio>
 #include <memory>
@@ -10,6 +13,8 @@
 
 namespace ruedo {
 namespace {
+
+constexpr int64_t kMostBytes = int64_t{4} << 30;    // of a file that a world was made from
 
 class Digest {
  public:
@@ -44,8 +49,12 @@ std::string sha256(const uint8_t* data, size_t size) {
 
 std::string sha256_of_file(const std::string& path) {
   struct Close { void operator()(std::FILE* file) const { std::fclose(file); } };
-  const std::unique_ptr<std::FILE, Close> file(std::fopen(path.c_str(), "rb"));
-  if (!file) return "";
+  // Not blocking: to open a FIFO would wait for its writer. What is looked at is what was opened.
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  if (descriptor < 0) return "";
+  const std::unique_ptr<std::FILE, Close> file(::fdopen(descriptor, "rb"));
+  struct stat info {};
+  if (!file || ::fstat(descriptor, &info) != 0 || !S_ISREG(info.st_mode) || info.st_size > kMostBytes) return "";
   Digest digest;
   std::vector<uint8_t> piece(1 << 16);
   while (const size_t got = std::fread(piece.data(), 1, piece.size(), file.get())) digest.add(piece.data(), got);

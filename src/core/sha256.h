@@ -10,7 +10,7 @@ namespace ruedo {
 // 64 hexadecimal digits.
 std::string sha256(const uint8_t* data, size_t size);
 
-// Of a file's bytes; "" when it cannot be read.
+// Of a file's bytes; "" when it cannot be read, is no regular file, or is larger than 4 GB.
 std::string sha256_of_file(const std::string& path);
 
 }  // namespace ruedo

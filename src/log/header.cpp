@@ -12,6 +12,7 @@
 #include <gnu/libc-version.h>
 #include <link.h>
 
+#include "model/resources.h"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
 #include "log/reader.h"
@@ -140,12 +141,17 @@ void check_files_of_spawned(const std::string& log) {
   }
 }
 
+// A log may be a stranger's: it is not told what is on this machine, not even by a hash.
 void check_files(const log_header_t& header, const std::string& log) {
+  const model::ResourceFinder finder(header.world_file, false);
   for (const log_file_t& file : header.files) {
-    const std::string now = sha256_of_file(file.path);
-    if (now == file.sha256) continue;
-    throw InputError({file.path}, now.empty() ? "cannot be read; " + log + " was made from it"
-                                              : "was changed since " + log + " was made from it (sha256 then " + file.sha256 + ", now " + now + ")");
+    if (!finder.reaches(file.path)) {
+      throw InputError({log}, "was made from " + file.path + ", which is neither near its world nor in a model folder (RUEDO_PATH); such files are not looked at");
+    }
+    if (sha256_of_file(file.path) == file.sha256) continue;
+    std::error_code error;
+    throw InputError({file.path}, std::filesystem::is_regular_file(file.path, error) ? "was changed since " + log + " was made from it (its sha256 was " + file.sha256 + ")"
+                                                                                     : "cannot be read; " + log + " was made from it");
   }
 }
 

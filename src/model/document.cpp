@@ -1,11 +1,13 @@
 // Files to element trees, by tinyxml2.
 #include "model/document.h"
 
+#include <fcntl.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <set>
 #include <string_view>
 
@@ -15,7 +17,8 @@ namespace ruedo::model {
 namespace {
 
 constexpr size_t kMaxFileBytes = 64u << 20;
-constexpr size_t kMaxElements = 2'000'000;
+// What a document may hold. The parser's own costs grow with the square of some of these, so they are counted before it runs.
+constexpr size_t kMaxElements = 2'000'000, kMaxAttributes = 64, kMaxDepth = 200, kMaxAttributeBytes = 64 << 10, kMaxTextBytes = 1 << 20;
 
 std::string trimmed(const std::string& text) {
   const char* space = " \t\r\n\f\v";
@@ -37,9 +40,70 @@ bool is_utf8(const std::string& text) {
   return true;
 }
 
+// Goes over a text as a parser would, counts, and refuses what holds too much. What is not XML is left to the parser to name.
+class Counter {
+ public:
+  Counter(std::string_view text, const std::string& file) : text_(text), file_(file) {}
+
+  void count() {
+    for (size_t at = 0; at < text_.size();) {
+      if (text_[at] != '<') {
+        const size_t end = std::min(text_.find('<', at), text_.size());
+        if (end - at > kMaxTextBytes) refuse(at, "a text of " + std::to_string(end - at) + " bytes", kMaxTextBytes);
+        at = end;
+      } else if (starts(at, "<!--")) {
+        at = after(at, "-->");
+      } else if (starts(at, "<![CDATA[")) {
+        const size_t end = after(at, "]]>");
+        if (end - at > kMaxTextBytes) refuse(at, "a text of " + std::to_string(end - at) + " bytes", kMaxTextBytes);
+        at = end;
+      } else if (starts(at, "<?") || starts(at, "<!")) {
+        at = after(at, ">");
+      } else if (starts(at, "</")) {
+        if (depth_ > 0) --depth_;
+        at = after(at, ">");
+      } else {
+        at = element(at);
+      }
+    }
+  }
+
+ private:
+  bool starts(size_t at, std::string_view with) const { return text_.substr(at, with.size()) == with; }
+  size_t after(size_t at, std::string_view what) const {
+    const size_t found = text_.find(what, at);
+    return found == std::string_view::npos ? text_.size() : found + what.size();
+  }
+
+  size_t element(size_t begin) {
+    if (++elements_ > kMaxElements) refuse(begin, "more than " + std::to_string(kMaxElements) + " elements", kMaxElements);
+    if (++depth_ > kMaxDepth) refuse(begin, "elements are nested too deep: " + std::to_string(depth_) + " levels", kMaxDepth);
+    size_t attributes = 0, at = begin + 1;
+    for (; at < text_.size() && text_[at] != '>' && text_[at] != '<'; ++at) {
+      if (text_[at] == '=' && ++attributes > kMaxAttributes) {
+        refuse(begin, "an element of more than " + std::to_string(kMaxAttributes) + " attributes", kMaxAttributes);
+      }
+      if (text_[at] != '"' && text_[at] != '\'') continue;
+      const size_t end = std::min(text_.find(text_[at], at + 1), text_.size());
+      if (end - at > kMaxAttributeBytes) refuse(begin, "an attribute of " + std::to_string(end - at) + " bytes", kMaxAttributeBytes);
+      at = end;
+    }
+    if (at < text_.size() && text_[at] == '>' && text_[at - 1] == '/') --depth_;
+    return std::min(at + 1, text_.size());
+  }
+
+  [[noreturn]] void refuse(size_t at, const std::string& what, size_t allowed) const {
+    const auto line = 1 + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at), '\n');
+    throw InputError({file_, static_cast<int>(line)}, what + "; allowed are " + std::to_string(allowed));
+  }
+
+  std::string_view text_;
+  const std::string& file_;
+  size_t elements_ = 0, depth_ = 0;
+};
+
 struct Converter {
   const std::string& file;
-  size_t elements = 0;
 
   std::string checked(const char* text, int line) const {
     std::string result = text ? text : "";
@@ -50,9 +114,6 @@ struct Converter {
   }
 
   std::unique_ptr<Element> convert(const tinyxml2::XMLElement& xml) {
-    if (++elements > kMaxElements) {
-      throw InputError({file, xml.GetLineNum()}, "more than " + std::to_string(kMaxElements) + " elements");
-    }
     auto element = std::make_unique<Element>();
     element->name = checked(xml.Name(), xml.GetLineNum());
     element->source = {file, xml.GetLineNum()};
@@ -102,6 +163,7 @@ std::unique_ptr<Element> parse_document(const std::string& text, const std::stri
   const size_t begin = start.find_first_not_of(" \t\r\n\f\v");
   if (begin == std::string_view::npos) throw InputError({file, 0}, "the file is empty");
   if (start[begin] != '<') throw InputError({file, 1}, "not XML: the text does not begin with '<'");
+  Counter(start, file).count();
   tinyxml2::XMLDocument xml;
   xml.Parse(text.data(), text.size());
   if (xml.Error()) throw InputError({file, xml.ErrorLineNum()}, what_is_wrong(xml));
@@ -114,21 +176,21 @@ std::unique_ptr<Element> parse_document(const std::string& text, const std::stri
 }
 
 std::string read_text_file(const std::string& path, size_t max_bytes) {
+  // Opened once, without waiting for a FIFO's writer: what is looked at is what is read.
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  if (descriptor < 0) throw InputError({path, 0}, errno == ENOENT ? "no such file" : std::string("cannot be read: ") + std::strerror(errno));
+  struct Close { void operator()(std::FILE* file) const { std::fclose(file); } };
+  const std::unique_ptr<std::FILE, Close> file(::fdopen(descriptor, "rb"));
   struct stat info {};
-  if (::stat(path.c_str(), &info) != 0) {
-    throw InputError({path, 0}, errno == ENOENT ? "no such file" : std::string("cannot be read: ") + std::strerror(errno));
-  }
+  if (!file || ::fstat(descriptor, &info) != 0) throw InputError({path, 0}, std::string("cannot be read: ") + std::strerror(errno));
   if (S_ISDIR(info.st_mode)) throw InputError({path, 0}, "is a folder; a file is needed");
   if (!S_ISREG(info.st_mode)) throw InputError({path, 0}, "is not a regular file");
   if (static_cast<size_t>(info.st_size) > max_bytes) {
     throw InputError({path, 0}, "has " + std::to_string(info.st_size) + " bytes; allowed are " + std::to_string(max_bytes));
   }
-  errno = 0;
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw InputError({path, 0}, std::string("cannot be read: ") + std::strerror(errno));
   std::string text(static_cast<size_t>(info.st_size), '\0');
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<size_t>(in.gcount()));
+  text.resize(std::fread(text.data(), 1, text.size(), file.get()));
+  if (std::ferror(file.get())) throw InputError({path, 0}, std::string("cannot be read: ") + std::strerror(errno));
   return text;
 }
 

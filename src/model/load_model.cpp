@@ -1,4 +1,4 @@
-// The readers of a world file, for one model of it. Absolute paths lead nowhere: who asks may be anybody.
+// The readers of a world file, for one model of it. Who asks may be anybody: see ResourceFinder::for_strangers.
 #include "model/load_model.h"
 
 #include <filesystem>
@@ -15,7 +15,7 @@ std::string path_of_text(const std::string& world_file) { return (fs::path(world
 
 LoadedModel read(const std::string& path, const std::string& world_file, std::shared_ptr<const Element> document, LoadBudget* budget) {
   Findings findings;
-  const ResourceFinder resources(world_file, false);
+  const ResourceFinder resources = ResourceFinder::for_strangers(world_file);
   DocumentStore documents;
   MeshImport import;
   import.budget = budget;
@@ -45,7 +45,7 @@ LoadedModel read(const std::string& path, const std::string& world_file, std::sh
 }  // namespace
 
 std::string model_file(const std::string& name, const std::string& world_file) {
-  const ResourceFinder resources(world_file, false);
+  const ResourceFinder resources = ResourceFinder::for_strangers(world_file);
   const auto path = resources.find_model(name, world_file);
   if (!path) throw InputError({}, "'" + name + "' is no model of Ruedo's and no file in the folders that are searched");
   return *path;

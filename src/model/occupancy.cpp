@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "core/whole.h"
 #include "model/convex.h"
@@ -14,6 +15,7 @@ namespace {
 
 constexpr double kMargin_m = 1;
 constexpr double kMostCells = 1e8;
+constexpr size_t kMostWalls = 100'000;    // rectangles of a map; a checkerboard's every other cell is one
 constexpr double kShrunk = 1e-3;    // of a cell, at each side: what only touches a cell is not in it
 
 using Box = Eigen::AlignedBox3d;
@@ -159,6 +161,9 @@ std::vector<WallPiece> walls_of(const OccupancyGrid& grid) {
       while (top + 1 < grid.height && row_is_open(top + 1)) ++top;
       for (int r = row; r <= top; ++r) {
         for (int c = column; c <= right; ++c) done[static_cast<size_t>(r) * static_cast<size_t>(grid.width) + static_cast<size_t>(c)] = true;
+      }
+      if (walls.size() == kMostWalls) {
+        throw std::runtime_error("the map has more than " + std::to_string(kMostWalls) + " walls; a coarser picture, or one without speckles, has fewer");
       }
       const double x = (column + right + 1) * grid.resolution / 2, y = (row + top + 1) * grid.resolution / 2;
       walls.push_back({grid.x + cosine * x - sine * y, grid.y + sine * x + cosine * y, grid.yaw, (right - column + 1) * grid.resolution,

@@ -8,8 +8,8 @@
 
 namespace ruedo::model {
 
-// What is wrong with the size, in words; "" for a picture of at most `most` pixels each way, and for kinds whose head is
-// not known (OpenCV's own limit holds for them: 2^30 pixels). Known are PNG, JPEG, BMP and PBM, PGM, PPM.
+// What is wrong with the size, in words; "" for a picture of at most `most` pixels each way and kMostPixelsInAll. Known are
+// PNG, JPEG, BMP, TIFF and PBM, PGM, PPM; what is of another kind is no picture.
 std::string picture_fault(std::span<const uint8_t> bytes, int64_t most);
 
 inline std::string picture_fault(const std::string& bytes, int64_t most) {

@@ -164,8 +164,36 @@ std::vector<std::string> ResourceFinder::folders() const {
   return all;
 }
 
+ResourceFinder ResourceFinder::for_strangers(const std::string& world_file) {
+  ResourceFinder finder(world_file, false);
+  finder.for_strangers_ = true;
+  finder.near_.clear();
+  const fs::path folder = fs::path(full_path(world_file)).parent_path();
+  for (const fs::path& each : {folder, folder / "models", folder / ".." / "models"}) add_folder(finder.near_, each);
+  return finder;
+}
+
+bool ResourceFinder::reaches(const std::string& path) const {
+  const std::string full = full_path(path);    // where links lead
+  for (const auto* roots : {&near_, &far_}) {
+    for (const std::string& root : *roots) {
+      const std::string begin = root == "/" ? root : root + "/";
+      if (full != root && !starts_with(full, begin.c_str())) continue;
+      if (full == root || full.find("/.", begin.size() - 1) == std::string::npos) return true;
+    }
+  }
+  return false;
+}
+
 std::vector<std::string> ResourceFinder::roots_for(const std::string& from) const {
   std::vector<std::string> roots;
+  if (for_strangers_) {
+    if (reaches(from)) add_folder(roots, fs::path(from).parent_path());
+    for (const auto* folders : {&near_, &far_}) {
+      for (const auto& each : *folders) add_folder(roots, each);
+    }
+    return roots;
+  }
   add_surroundings(roots, fs::path(from).parent_path());
   for (const auto& each : near_) add_folder(roots, each);
   for (const auto& each : far_) add_folder(roots, each);
@@ -184,7 +212,7 @@ bool ResourceFinder::allowed(const std::string& path, const std::string& from) c
 // naming file, a folder that is searched, or in one. Above it the folder's own name will do.
 std::optional<std::string> ResourceFinder::in_package(const std::string& package, const std::string& rest,
                                                       const std::string& from) const {
-  for (fs::path folder = fs::path(from).parent_path(); folder.has_relative_path(); folder = folder.parent_path()) {
+  for (fs::path folder = fs::path(from).parent_path(); !for_strangers_ && folder.has_relative_path(); folder = folder.parent_path()) {
     if (!is_there(folder / rest)) continue;
     if ((folder.filename() == package && may_be_package(folder)) || package_name(folder) == package) return full_path(folder / rest);
   }
@@ -205,7 +233,13 @@ std::optional<std::string> ResourceFinder::in_package(const std::string& package
   return std::nullopt;
 }
 
-std::optional<std::string> ResourceFinder::find(const std::string& written, const std::string& from) const {
+std::optional<std::string> ResourceFinder::find(const std::string& uri, const std::string& from) const {
+  std::optional<std::string> found = find_anything(uri, from);
+  if (found && for_strangers_ && !reaches(*found)) return std::nullopt;
+  return found;
+}
+
+std::optional<std::string> ResourceFinder::find_anything(const std::string& written, const std::string& from) const {
   const std::string uri = decoded(written);
   if (uri.empty() || uri.find('\0') != std::string::npos) return std::nullopt;
 
@@ -268,7 +302,7 @@ std::optional<std::string> ResourceFinder::find(const std::string& written, cons
 
 std::string ResourceFinder::why_not(const std::string& uri, const std::string& from) const {
   const std::string path = decoded(starts_with(uri, "file://") ? uri.substr(7) : uri);
-  if (path.empty() || path.find('\0') != std::string::npos || path.find("://") != std::string::npos) return "is not found";
+  if (for_strangers_ || path.empty() || path.find('\0') != std::string::npos || path.find("://") != std::string::npos) return "is not found";
   const bool absolute = fs::path(path).is_absolute();
   const fs::path full = (absolute ? fs::path(path) : fs::path(from).parent_path() / path).lexically_normal();
   if (is_folder(full.string()) && allowed(full.string(), from)) return "is a folder without model.config or model.sdf";
@@ -281,6 +315,7 @@ std::optional<std::string> ResourceFinder::find_model(const std::string& uri, co
   if (is_new) {
     const auto found = find(uri, from);
     at->second = found ? model_file(*found) : std::nullopt;
+    if (at->second && for_strangers_ && !reaches(*at->second)) at->second = std::nullopt;    // a link in the model's folder
   }
   return at->second;
 }
@@ -321,6 +356,7 @@ std::optional<std::string> ResourceFinder::find_texture(const std::string& name,
   const fs::path folder = fs::path(from).parent_path();
   for (const char* place : {".", "textures", "materials/textures", "../textures", "../materials/textures", "../../materials/textures"}) {
     const fs::path candidate = folder / place / file;
+    if (for_strangers_ && !reaches(candidate)) continue;
     if (is_there(candidate) && !is_folder(candidate)) return full_path(candidate);
   }
   return std::nullopt;

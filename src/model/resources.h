@@ -18,6 +18,13 @@ class ResourceFinder {
   // first. allow_absolute: absolute paths and file:// may lead anywhere; else only into the folders that are searched.
   ResourceFinder(const std::string& top_file, bool allow_absolute);
 
+  // For what comes over a network, or stands in a log: it reaches the folder of the world's file, the `models` folders in and
+  // beside it, and those that the user's variables name; nothing in folders or files whose names begin with a dot, and nothing
+  // that a link leads out of them. What lies elsewhere is not found, and no message says that it is there.
+  static ResourceFinder for_strangers(const std::string& world_file);
+  // Whether a file lies in the folders that are searched, wherever links lead, and below none whose name begins with a dot.
+  bool reaches(const std::string& path) const;
+
   // The absolute path of what `uri`, written in the file `from`, names: a file or a folder.
   std::optional<std::string> find(const std::string& uri, const std::string& from) const;
 
@@ -41,9 +48,11 @@ class ResourceFinder {
   std::vector<std::string> roots_for(const std::string& from) const;
   std::optional<std::string> in_package(const std::string& package, const std::string& rest, const std::string& from) const;
   bool allowed(const std::string& path, const std::string& from) const;
+  std::optional<std::string> find_anything(const std::string& uri, const std::string& from) const;
 
   std::vector<std::string> near_, far_;    // folders searched before and after those of the naming file
   bool allow_absolute_;
+  bool for_strangers_ = false;
   mutable std::map<std::string, std::optional<std::string>> models_;              // by uri and naming file
   mutable std::map<std::string, std::map<std::string, std::string>> packages_;    // in each folder: by name, once looked for
 };

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "physics/state_check.h"
+#include "ruedo/errors.h"
 #include "ruedo/quantity.h"
 
 namespace ruedo::physics {
@@ -20,6 +21,9 @@ constexpr int64_t kLongestSubstep_us = 5000, kLongestSubstepOfWheels_us = 1000;
 constexpr int kSolverIterations = 30;
 // Distance at which Bullet begins to see a contact: a body may come so near in one substep without touching.
 constexpr double kContactReach_m = 0.02;
+
+// Of bodies near each other at the start: their number grows with the square of what stands in one place.
+constexpr int kMostPairs = 200'000;
 
 // Coulomb friction between two surfaces: the lower of both, as in ODE and Gazebo (Bullet multiplies).
 btScalar lower_friction(const btCollisionObject* a, const btCollisionObject* b) {
@@ -73,6 +77,10 @@ PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout
   for (size_t i = 0; i < n; ++i) {
     dynamics_.addRigidBody(rigid_.bodies[i].bullet.get(), btBroadphaseProxy::DefaultFilter, btBroadphaseProxy::AllFilter);
     update_box(static_cast<int>(i));
+    if (broadphase_.getOverlappingPairCache()->getNumOverlappingPairs() > kMostPairs) {
+      throw InputError({world.file, 0}, "more than " + std::to_string(kMostPairs) + " pairs of things touch each other at the start: '" + layout.bodies[i].name +
+                                            "' stands among too many; move them apart");
+    }
   }
   for (JointConstraint& joint : joints_) if (joint.constraint()) dynamics_.addConstraint(joint.constraint(), true);
   for (JointConstraint& joint : wheels_) if (joint.constraint()) dynamics_.addConstraint(joint.constraint(), true);

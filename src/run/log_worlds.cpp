@@ -22,6 +22,8 @@
 namespace ruedo::run {
 namespace {
 
+constexpr size_t kMostPlaced = 50'000;    // models of all scenes together: each scene lists its own
+
 using model::ModelInstance;
 using model::WorldModel;
 
@@ -141,9 +143,14 @@ LogWorlds::LogWorlds(const log::Index& index, const LoadRun& load) {
   }
   scenes_.push_back({index.begin_us(), run.world, make_info(index, run, run.world.get())});
   if (!run.world) return;
+  size_t placed = 0;    // models of all scenes together
   engine::ModelStore models(index.header()->world_file);
   for (const log::Index::Edit& edit : index.edits()) {
     try {
+      if (placed += scenes_.back().world->models.size(); placed > kMostPlaced) {
+        fault_ += (fault_.empty() ? "" : " ") + std::string("Only the first changes of the world are shown.");
+        return;
+      }
       auto world = edited(edit.applied, scenes_.back().world, run.world, models);
       if (!world) continue;
       auto info = make_info(index, run, world.get());

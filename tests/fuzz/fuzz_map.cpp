@@ -1,6 +1,7 @@
 // Pictures and maps: heightmaps, bitmaps, map_server's YAML and ArMap. The first byte says which.
 #include <stdexcept>
 
+#include "budget.h"
 #include "model/geometry.h"
 #include "model/occupancy.h"
 #include "scratch_file.h"
@@ -13,6 +14,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     return folder.write("map.pgm", pgm, sizeof pgm - 1);
   }();
   if (size < 1) return 0;
+  const Budget budget;
   const std::string path = folder.write(data[0] % 4 == 2 ? "map.yaml" : "map.map", data + 1, size - 1);
   try {
     std::string left_out;

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <vector>
 
+#include "budget.h"
 #include "ruedo/decode.h"
 #include "ruedo/grant_request_t.hpp"
 #include "ruedo/join_t.hpp"
@@ -48,6 +49,7 @@ void try_one(size_t which, const std::vector<uint8_t>& bytes) {
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (size < 9) return 0;
+  const Budget budget;
   using namespace ruedo;
   try_one<velocity_command_t, wheel_command_t, move_command_t, joint_command_t, request_t, join_t, name_request_t, rate_request_t, reset_request_t,
           set_pose_request_t, set_twist_request_t, spawn_request_t, step_request_t, grant_request_t, resend_request_t, log_header_t, world_info_t>(

@@ -1,10 +1,12 @@
 // Any text as a robot: the same, with <robot> around what does not begin so, that the mutations stay in the URDF reader.
 #include <string>
 
+#include "budget.h"
 #include "model/body_layout.h"
 #include "model/load.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  const Budget budget;
   std::string text(reinterpret_cast<const char*>(data), size);
   if (text.find("<robot") == std::string::npos) text = "<robot name='r'><link name='base'/>" + text + "</robot>";
   try {

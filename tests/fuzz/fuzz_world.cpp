@@ -1,10 +1,12 @@
 // Any text as a world: it loads, or gives one InputError. Nothing else may come out.
 #include <string>
 
+#include "budget.h"
 #include "model/body_layout.h"
 #include "model/load.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  const Budget budget;
   try {
     const auto world = ruedo::model::load_world_text({reinterpret_cast<const char*>(data), size}, "/nowhere/in/a/world.sdf");
     const ruedo::model::BodyLayout layout(*world);

@@ -1,0 +1,22 @@
+// Any text as the YAML of a map, beside a small picture: it is read and made into walls, or gives one InputError.
+#include <stdexcept>
+
+#include "budget.h"
+#include "model/occupancy.h"
+#include "scratch_file.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace ruedo::model;
+  static const ScratchFolder folder;
+  static const std::string picture = [] {
+    const uint8_t pgm[] = "P5\n2 2\n255\nabcd";
+    return folder.write("map.pgm", pgm, sizeof pgm - 1);
+  }();
+  const Budget budget;
+  const std::string path = folder.write("map.yaml", data, size);
+  try {
+    world_of_walls("w", walls_of(read_map(path)), 1);
+  } catch (const std::runtime_error&) {    // InputError is one
+  }
+  return 0;
+}
