@@ -32,6 +32,7 @@ inline constexpr Quantity kAcceleration{"acceleration", "m/s^2 or rad/s^2", 1e9,
 inline constexpr Quantity kEffort{"effort", "N or N m", 1e9, "forces and torques of drives, commands to joints"};
 inline constexpr Quantity kDamping{"damping", "N s/m or N m s/rad", 1e9, "damping, friction and stiffness of joints"};
 inline constexpr Quantity kFriction{"friction", "", 1e16, "coefficients of friction"};
+inline constexpr Quantity kContact{"contact", "N/m or N s/m", 1e16, "stiffness and damping of contacts"};
 inline constexpr Quantity kTime{"time", "s", 1e9, "phases, waypoints, watchdogs, durations"};
 inline constexpr Quantity kNoise{"noise", "of what it is added to", 1e9, "means, deviations and steps of noise"};
 inline constexpr Quantity kBrightness{"brightness", "", 1e9, "intensity, attenuation and falloff of lights, shininess"};

@@ -6,7 +6,7 @@ namespace ruedo {
 std::span<const Quantity> quantities() {
   using namespace quantity;
   static constexpr Quantity kAll[] = {kLength, kRange, kAngle, kFactor, kMass, kInertia, kDensity, kGravity, kSpeed,
-                                      kAcceleration, kEffort, kDamping, kFriction, kTime, kNoise, kBrightness, kPixels};
+                                      kAcceleration, kEffort, kDamping, kFriction, kContact, kTime, kNoise, kBrightness, kPixels};
   return kAll;
 }
 

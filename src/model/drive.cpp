@@ -273,6 +273,30 @@ void read_limits(const Element& e, const Model& model, DriveDescription& drive) 
   drive.max_wheel_rate = e.number("ruedo:max_wheel_rate", drive.max_wheel_rate, speed);
 }
 
+void read_servo(const Element& e, DriveDescription& drive) {
+  const Allowed gain = Allowed::not_negative(quantity::kDamping);
+  drive.servo_rate_gain = e.number("ruedo:servo_rate_gain", 0.0, gain);
+  drive.servo_angle_gain = e.number("ruedo:servo_angle_gain", 0.0, gain);
+  drive.gear = e.number("ruedo:gear", drive.gear, Allowed::positive(quantity::kFactor));
+  drive.stall_torque = e.number("ruedo:stall_torque", drive.stall_torque, Allowed::positive(quantity::kEffort).or_infinite());
+  drive.no_load_rate = e.number("ruedo:no_load_rate", drive.no_load_rate, Allowed::positive(quantity::kSpeed).or_infinite());
+  drive.yaw_gain = e.number("ruedo:yaw_gain", 0.0, gain);
+  drive.gyro_bias = e.number("ruedo:gyro_bias", 0.0, Allowed::any(quantity::kSpeed));
+  drive.gyro_scale_error = e.number("ruedo:gyro_scale_error", 0.0, {.min = -1.0, .max = 1.0, .min_excluded = true});
+}
+
+// The sensor reads the rest, and says what is wrong with these.
+void read_odometry(const Element& odometry, DriveDescription& drive) {
+  drive.odometry_rate = odometry.rate("ruedo:rate", drive.odometry_rate);
+  if (const Element* errors = odometry.child("ruedo:radius_error")) {
+    const std::vector<double> values = errors->as_numbers();
+    for (size_t side : {0u, 1u}) {
+      if (values.size() == 2 && values[side] > -1.0) drive.radius_error[side] = values[side];
+    }
+  }
+  drive.track_error = odometry.number("ruedo:track_error", 0.0, {.min = -1.0, .min_excluded = true, .quantity = &quantity::kFactor});
+}
+
 }  // namespace
 
 std::string name_of(Steering steering) {
@@ -287,7 +311,9 @@ const std::vector<std::string>& drive_elements() {
       "ruedo:left_joint", "ruedo:right_joint", "ruedo:wheel_joint", "ruedo:steer_joint", "ruedo:wheel_radius", "ruedo:track", "ruedo:wheelbase",
       "ruedo:max_steering_angle", "ruedo:max_steering_rate", "ruedo:base", "ruedo:max_speed", "ruedo:max_side_speed",
       "ruedo:max_turn_rate", "ruedo:acceleration", "ruedo:deceleration", "ruedo:turn_acceleration", "ruedo:max_force",
-      "ruedo:max_wheel_torque", "ruedo:max_wheel_rate", "ruedo:watchdog", "ruedo:pose_rate", "ruedo:status_rate"};
+      "ruedo:max_wheel_torque", "ruedo:max_wheel_rate", "ruedo:watchdog", "ruedo:pose_rate", "ruedo:status_rate",
+      "ruedo:traction", "ruedo:primitives", "ruedo:servo_rate_gain", "ruedo:servo_angle_gain", "ruedo:gear", "ruedo:stall_torque",
+      "ruedo:no_load_rate", "ruedo:yaw_gain", "ruedo:gyro_bias", "ruedo:gyro_scale_error"};
   return names;
 }
 
@@ -321,11 +347,16 @@ DriveDescription read_drive(std::shared_ptr<const Element> element, std::shared_
   place_base(e, model, drive);
   read_limits(e, model, drive);
   drive.watchdog_us = microseconds(e.number("ruedo:watchdog", 0.6, Allowed::between(0, 1e6)));
+  read_servo(e, drive);
+  drive.traction = e.boolean("ruedo:traction", true);
+  const bool wheels = drive.kind == DriveDescription::Kind::wheels;
+  drive.on_odometry = e.choice("ruedo:primitives", wheels ? "odometry" : "truth", {"truth", "odometry"}) == "odometry";
+  if (wheels && !drive.on_odometry) e.child("ruedo:primitives")->fail("'truth' is not allowed with wheels: a robot knows its wheels only; allowed is odometry");
   drive.pose_rate = e.rate("ruedo:pose_rate", drive.pose_rate);
   drive.status_rate = e.rate("ruedo:status_rate", drive.status_rate);
   if (odometry) {
     odometry->refuse_unknown(odometry_elements(), false);
-    drive.odometry_rate = odometry->rate("ruedo:rate", drive.odometry_rate);
+    read_odometry(*odometry, drive);
   }
   drive.element = std::move(element);
   drive.odometry = std::move(odometry);
@@ -433,7 +464,7 @@ void read_drive_of(const Element& model_element, const std::string& where, ReadC
   if (odometry && !model.drive) model_element.child("ruedo:odometry")->fail("needs a drive: the model has no <ruedo:drive>");
   if (odometry && model.drive && !model.drive->odometry) {    // a nested model's drive, odometry given here
     odometry->refuse_unknown(odometry_elements(), false);
-    model.drive->odometry_rate = odometry->rate("ruedo:rate", model.drive->odometry_rate);
+    read_odometry(*odometry, *model.drive);
     model.drive->odometry = odometry;
   }
 }

@@ -47,9 +47,8 @@ JointAxis read_axis(const Element& element, SdfVersion version, const Pose& X_MJ
   axis.velocity = velocity < 0 ? kInfinity : velocity;
   axis.damping = element.number("dynamics/damping", 0, Allowed::not_negative(quantity::kDamping));
   axis.friction = element.number("dynamics/friction", 0, Allowed::not_negative(quantity::kDamping));
-  if (element.number("dynamics/spring_stiffness", 0, Allowed::any(quantity::kDamping)) != 0) {
-    context.findings.unsupported(element.child("dynamics")->child("spring_stiffness")->source, where, "springs of joints are not supported; the joint has none");
-  }
+  axis.spring_stiffness = std::max(0.0, element.number("dynamics/spring_stiffness", 0, Allowed::any(quantity::kDamping)));
+  axis.spring_reference = element.number("dynamics/spring_reference", 0, Allowed::any(quantity::kAngle));
   if (const Element* mimic = element.child("mimic")) {
     context.findings.unsupported(mimic->source, where, "<mimic> is not supported; the joint moves freely");
   }

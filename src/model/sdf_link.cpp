@@ -25,10 +25,23 @@ void name_what_has_no_effect(const Element& surface, const std::string& where, F
     if (!all && mask != "65535") name(kMask, "the shape collides with everything");
   }
   if (surface.boolean("contact/collide_without_contact", false)) name("contact/collide_without_contact", "the shape collides as others do");
-  for (const char* path : {"friction/ode/slip1", "friction/ode/slip2"}) {
-    if (surface.number(path, 0.0, Allowed::any(quantity::kFriction)) != 0.0) name(path, "friction does not yield");
+}
+
+// Friction beside mu and mu2, and what the contact yields.
+void read_contact(const Element& surface, Surface& s) {
+  const Allowed friction = Allowed::not_negative(quantity::kFriction), direction = Allowed::any(quantity::kFactor),
+                length = Allowed::not_negative(quantity::kLength), contact = Allowed::not_negative(quantity::kContact);
+  s.friction_direction = surface.vector3("friction/ode/fdir1", surface.vector3("friction/bullet/fdir1", Vec3::Zero(), direction), direction);
+  s.slip = surface.number("friction/ode/slip1", 0.0, friction);
+  s.slip2 = surface.number("friction/ode/slip2", 0.0, friction);
+  s.rolling = surface.number("friction/bullet/rolling_friction", 0.0, friction);
+  if (const Element* torsional = surface.child("friction/torsional")) {
+    s.torsional = torsional->number("coefficient", 0.0, friction);
+    s.patch_radius = torsional->boolean("use_patch_radius", true) ? torsional->number("patch_radius", 0.0, length) : 0.0;
+    s.surface_radius = torsional->number("surface_radius", 0.0, length);
   }
-  if (surface.vector3("friction/ode/fdir1", Vec3::Zero(), Allowed::any(quantity::kFactor)) != Vec3::Zero()) name("friction/ode/fdir1", "friction is the same in all directions");
+  s.stiffness = surface.number("contact/ode/kp", 0.0, contact);
+  s.damping = surface.number("contact/ode/kd", 1.0, contact);
 }
 
 Surface read_surface(const Element& surface, const std::string& where, ReadContext& context) {
@@ -42,6 +55,7 @@ Surface read_surface(const Element& surface, const std::string& where, ReadConte
   const std::string second = engine + std::string(engine[9] == 'b' ? "friction2" : "mu2");
   s.friction = surface.number(first, s.friction, friction);
   s.friction2 = surface.number(second, surface.has(second) ? s.friction2 : s.friction, friction);
+  read_contact(surface, s);
   s.restitution = surface.number("bounce/restitution_coefficient", 0, part);
   s.laser_reflectance = surface.number("ruedo:laser_reflectance", 1, part);
   s.laser_mirror = surface.number("ruedo:laser_mirror", 0, part);

@@ -26,6 +26,21 @@ void read_step(const Element& physics, WorldModel& world, Findings& findings) {
   }
 }
 
+void read_solver(const Element& bullet, SolverDescription& solver, Findings& findings) {
+  bullet.refuse_unknown({"ruedo:substeps", "ruedo:tolerance"});
+  constexpr const char* kType = "solver/type";
+  if (const std::string type = bullet.string(kType, "sequential_impulse"); type != "sequential_impulse") {
+    findings.unsupported(bullet.child(kType)->source, "world/physics/bullet", "the solver '" + type + "' is not supported; sequential_impulse is used instead");
+  }
+  const auto whole = [&](const char* path, int fallback, int lowest, int highest) {
+    return static_cast<int>(bullet.integer(path, fallback, Allowed::between(lowest, highest)));
+  };
+  solver.iterations = whole("solver/iters", solver.iterations, 1, 100'000);
+  solver.error_reduction = bullet.number("constraints/erp", solver.error_reduction, Allowed::between(0, 1));
+  solver.tolerance = bullet.number("ruedo:tolerance", solver.tolerance, Allowed::between(0, 1));
+  solver.substeps = whole("ruedo:substeps", solver.substeps, 0, 1000);
+}
+
 void read_physics(const Element& world_element, WorldModel& world, Findings& findings) {
   const Allowed gravity = Allowed::any(quantity::kGravity);
   const auto all = world_element.all("physics");
@@ -40,6 +55,7 @@ void read_physics(const Element& world_element, WorldModel& world, Findings& fin
   if (chosen) {
     report_other_children(*chosen, {"max_step_size", "real_time_factor", "real_time_update_rate", "gravity"},
                           {"ode", "bullet", "simbody", "dart", "max_contacts", "magnetic_field", "update_rate"}, "world/physics", findings);
+    if (const Element* bullet = chosen->child("bullet")) read_solver(*bullet, world.solver, findings);
     read_step(*chosen, world, findings);
     world.gravity = chosen->vector3("gravity", world.gravity, gravity);    // SDF before 1.6
   }

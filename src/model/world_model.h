@@ -36,6 +36,13 @@ struct Geometry {
 struct Surface {
   double friction = 1.0;                 // Coulomb, SDF's mu
   double friction2 = 1.0;                // across, SDF's mu2
+  Vec3 friction_direction = Vec3::Zero();    // of `friction`, in the collision's frame, SDF's fdir1; zero: none
+  double slip = 0.0, slip2 = 0.0;        // m/s per N, along and across, SDF's slip1 and slip2
+  double torsional = 0.0;                // coefficient of the friction that turning on the spot meets
+  double patch_radius = 0.0;             // m, of that; 0: from the depth of the contact and the surface's radius
+  double surface_radius = 0.0;           // m
+  double rolling = 0.0;                  // m: moment that rolling meets for a newton of load, friction/bullet/rolling_friction
+  double stiffness = 0.0, damping = 0.0; // N/m, N s/m, SDF's kp and kd; 0: rigid
   double restitution = 0.0;
   double laser_reflectance = 1.0;        // ruedo:laser_reflectance, 0 to 1
   double laser_mirror = 0.0;             // part of the light that leaves like from a mirror
@@ -100,6 +107,7 @@ struct JointAxis {
   double effort = std::numeric_limits<double>::infinity();
   double velocity = std::numeric_limits<double>::infinity();
   double damping = 0.0, friction = 0.0;
+  double spring_stiffness = 0.0, spring_reference = 0.0;    // N m/rad or N/m, towards that position
 };
 
 struct Joint {
@@ -147,6 +155,18 @@ struct DriveDescription {
   double max_wheel_torque = std::numeric_limits<double>::infinity();     // N m, wheels drive
   double max_wheel_rate = std::numeric_limits<double>::infinity();       // rad/s
   int64_t watchdog_us = 600'000;         // 0: off
+  bool traction = true;                  // kinematic: no more force than friction under its wheels gives, where it drives on contacts
+  bool on_odometry = false;              // primitives measure their way by the odometry; wheels: always
+  // What the robot believes of itself is off by these parts: <ruedo:odometry>'s errors.
+  double radius_error[2] = {0.0, 0.0}, track_error = 0.0;    // left, right
+  // wheels: the servo of each wheel's encoder, and its motor, at the motor's shaft.
+  double servo_rate_gain = 0.0;          // N m s/rad at the wheel; 0: from the robot's mass
+  double servo_angle_gain = 0.0;         // N m/rad at the wheel; 0: from the gain of the rate
+  double gear = 1.0;                     // turns of the motor for one of the wheel
+  double stall_torque = std::numeric_limits<double>::infinity();      // N m
+  double no_load_rate = std::numeric_limits<double>::infinity();      // rad/s
+  double yaw_gain = 0.0;                 // 1/s: turns the robot back to the heading of its gyro; 0: off
+  double gyro_bias = 0.0, gyro_scale_error = 0.0;    // rad/s; relative
   Rate odometry_rate{50, 1}, pose_rate{50, 1}, status_rate{10, 1};
   std::shared_ptr<const Element> element;    // <ruedo:drive> or <plugin>; null when synthesised
   std::shared_ptr<const Element> odometry;   // <ruedo:odometry>; null: ideal encoders, arc integrator
@@ -180,11 +200,20 @@ struct Sky {
   bool shadows = true;
 };
 
+// <physics><bullet>: how contacts and joints are solved.
+struct SolverDescription {
+  int iterations = 500;                  // sweeps at most
+  double tolerance = 1e-5;               // m/s: a sweep that changes no velocity by more is the last one
+  double error_reduction = 0.2;          // part of a penetration or of a joint's error that a substep undoes
+  int substeps = 0;                      // of a step, for everything; 0: as many as steps of 5 ms take, of 1 ms where joints are
+};
+
 struct WorldModel {
   std::string name;
   std::string file;
   int64_t step_us = 5000;
   Vec3 gravity{0, 0, -9.8};
+  SolverDescription solver;
   Sky sky;
   std::vector<Light> lights;
   std::vector<ModelInstance> models;     // in file order; --spawn's after them

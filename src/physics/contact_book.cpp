@@ -65,19 +65,17 @@ void ContactBook::make_room(size_t bodies) {
 
 void ContactBook::clear(double step_s) {
   step_s_ = step_s;
-  substeps_ = 0;
+  several_ = false;
   contacts_.clear();
   near_only_.clear();
   touching_.clear();
   near_.clear();
 }
 
-void ContactBook::add(btDispatcher& dispatcher, int substeps) {
-  ++substeps_;
-  near_only_.clear();
-  for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
-    const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(m);
-    if (manifold.getNumContacts() == 0) continue;
+void ContactBook::add(const std::vector<btPersistentManifold*>& manifolds, int substeps, bool last) {
+  several_ |= !last;
+  for (const btPersistentManifold* each : manifolds) {
+    const btPersistentManifold& manifold = *each;
     const ObjectInfo& a = info_of(*manifold.getBody0());
     const ObjectInfo& b = info_of(*manifold.getBody1());
     for (int p = 0; p < manifold.getNumContacts(); ++p) {
@@ -96,7 +94,11 @@ void ContactBook::add(btDispatcher& dispatcher, int substeps) {
       if (touches) contact.force = point.getAppliedImpulse() * substeps / step_s_;
       // Static things come second; of two bodies the lower number comes first.
       if (contact.body_a < 0 || (contact.body_b >= 0 && contact.body_b < contact.body_a)) contact = swapped(contact);
-      (touches ? contacts_ : near_only_).push_back(contact);
+      if (touches) {
+        contacts_.push_back(contact);
+      } else if (last) {
+        near_only_.push_back(contact);
+      }
     }
   }
 }
@@ -125,7 +127,7 @@ void ContactBook::merge() {
 void ContactBook::finish() {
   if (contacts_.empty() && near_only_.empty()) return;
   std::sort(contacts_.begin(), contacts_.end(), earlier);
-  if (substeps_ > 1) merge();
+  if (several_) merge();
   touching_.fill(contacts_);
   near_only_.insert(near_only_.end(), contacts_.begin(), contacts_.end());
   near_.fill(near_only_);

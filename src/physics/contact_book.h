@@ -21,8 +21,9 @@ class ContactBook {
 
   // Starts a step of that length (s).
   void clear(double step_s);
-  // Adds what the dispatcher's manifolds hold after a substep. Where everything sleeps, one call stands for `substeps`.
-  void add(btDispatcher& dispatcher, int substeps = 1);
+  // Adds what manifolds hold after a substep; the last one of a step says what is near. Where everything sleeps, one
+  // call stands for `substeps`.
+  void add(const std::vector<btPersistentManifold*>& manifolds, int substeps, bool last);
   // Ends the step.
   void finish();
 
@@ -53,7 +54,7 @@ class ContactBook {
   void merge();
 
   double step_s_ = 0.0;
-  int substeps_ = 0;
+  bool several_ = false;              // substeps of the same manifolds
   std::vector<Contact> contacts_;
   std::vector<Contact> near_only_;    // of the last substep
   std::vector<Contact> merged_;       // scratch

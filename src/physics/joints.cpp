@@ -1,5 +1,5 @@
-// Hinges, sliders, balls and universal joints. Damping and friction act through the motor row of the constraint
-// with the rate 0 and a bounded impulse: however large they are, they never reverse a motion.
+// Hinges, sliders, balls and universal joints. Damping and friction act as a motor does, with the rate 0 and a bounded
+// impulse: however large they are, they never reverse a motion.
 #include "physics/joints.h"
 
 #include <algorithm>
@@ -31,19 +31,13 @@ Pose along(const Pose& X, const Vec3& axis_in_J, const Vec3& unit) {
 constexpr double kNewRate = 1e-3;
 
 // Bullet's universal joint counts its angles the other way round; the first is about its frame's z, the second about y.
-constexpr int kFirst = 2, kSecond = 1;
+constexpr int kFirst = 2, kSecond = 1, kLocked = 0;
+constexpr double kAside = 1e-9;
 constexpr double kSquare = M_PI / 2 - 1e-3;    // further it cannot turn about the second: there the first axis lies in line
-constexpr double kForced = 0.01;
 
 void set_turns(btRotationalLimitMotor& turns, double lower, double upper) {
   turns.m_loLimit = -upper;
   turns.m_hiLimit = -lower;
-}
-
-void set_motor_of(btRotationalLimitMotor& turns, double rate, double effort) {
-  turns.m_enableMotor = effort > 0.0;
-  turns.m_targetVelocity = -rate;
-  turns.m_maxMotorForce = effort;
 }
 
 double bounded(double value, double limit) { return std::clamp(value, -limit, limit); }
@@ -89,6 +83,10 @@ JointConstraint::JointConstraint(const model::Joint& joint, btRigidBody& parent,
       btVector3 anchor = to_bt(X_WJ.translation), axis1 = to_bt(first), axis2 = to_bt(Vec3(second.normalized()));
       axis2_in_C_ = (from_bt(child_.getWorldTransform()).rotation.conjugate() * second).normalized();
       auto universal = std::make_unique<btUniversalConstraint>(parent_, child_, anchor, axis1, axis2);
+      // Where nothing is amiss to the last bit, Bullet leaves a locked row out. So it is locked a nanometre aside.
+      universal->setLinearLowerLimit({kAside, kAside, kAside});
+      universal->setLinearUpperLimit({kAside, kAside, kAside});
+      set_turns(*universal->getRotationalLimitMotor(kLocked), -kAside, -kAside);
       set_turns(*universal->getRotationalLimitMotor(kFirst), 1.0, -1.0);    // none, or a window at each substep
       set_turns(*universal->getRotationalLimitMotor(kSecond), std::max(limits2_.lower, -kSquare), std::min(limits2_.upper, kSquare));
       constraint_ = std::move(universal);
@@ -98,7 +96,7 @@ JointConstraint::JointConstraint(const model::Joint& joint, btRigidBody& parent,
       constraint_ = std::make_unique<btFixedConstraint>(parent_, child_, to_bt(X_PJ), to_bt(X_CJ));
       break;
   }
-  if (constraint_) constraint_->setJointFeedback(feedback_.get());
+  if (constraint_) constraint_->setUserConstraintPtr(motors_.get());
 }
 
 Vec3 JointConstraint::axis_in_world() const {
@@ -123,13 +121,16 @@ double JointConstraint::velocity() const {
   }
 }
 
-void JointConstraint::set_motor(double rate, double max_effort) {
+void JointConstraint::set_motor(double rate, double lowest_effort, double highest_effort, double gain) {
   rate = bounded(rate, limits_.velocity);
-  max_effort = std::min(max_effort, limits_.effort);
-  const bool news = mode_ != Mode::motor || std::abs(rate - command_) > kNewRate || max_effort != max_effort_;
+  lowest_effort = std::max(lowest_effort, -limits_.effort);
+  highest_effort = std::min(highest_effort, limits_.effort);
+  const bool news = mode_ != Mode::motor || std::abs(rate - command_) > kNewRate;
   mode_ = Mode::motor;
   command_ = rate;
-  max_effort_ = max_effort;
+  lowest_effort_ = lowest_effort;
+  highest_effort_ = highest_effort;
+  gain_ = gain;
   if (news) wake();
 }
 
@@ -146,18 +147,16 @@ void JointConstraint::wake() {
   if (!child_.isStaticObject()) child_.activate(true);
 }
 
-void JointConstraint::move_by_motor(double rate, double max_effort, double substep_s) {
-  const double effort = std::min(max_effort, 1e9);    // Bullet wants it finite
-  if (type_ == model::JointType::prismatic) {
-    auto& slider = static_cast<btSliderConstraint&>(*constraint_);
-    slider.setPoweredLinMotor(effort > 0.0);
-    slider.setTargetLinMotorVelocity(rate);
-    slider.setMaxLinMotorForce(effort);
-  } else if (type_ == model::JointType::revolute || type_ == model::JointType::continuous) {
-    static_cast<btHingeConstraint&>(*constraint_).enableAngularMotor(effort > 0.0, rate, effort * substep_s);
-  } else if (type_ == model::JointType::universal) {
-    set_motor_of(*static_cast<btUniversalConstraint&>(*constraint_).getRotationalLimitMotor(kFirst), rate, effort);
-  }
+void JointConstraint::turn_on(JointMotor& motor, const Vec3& axis, double rate, double lowest, double highest, double substep_s) const {
+  constexpr double kMost = 1e9;    // an infinite impulse is none
+  motor.on = highest > 0.0 || lowest < 0.0;
+  motor.linear = type_ == model::JointType::prismatic;
+  motor.axis = axis;
+  motor.anchor = from_bt(child_.getWorldTransform() * to_bt(X_CJ_.translation));
+  motor.rate = rate;
+  motor.lower = std::max(lowest, -kMost) * substep_s;
+  motor.upper = std::min(highest, kMost) * substep_s;
+  motor.softness = 0.0;
 }
 
 void JointConstraint::push(double effort) {
@@ -172,21 +171,18 @@ void JointConstraint::push(double effort) {
   }
 }
 
-// At a limit this constraint of Bullet's has no motor: the one that the motor leads away from is not there, unless the
-// joint was forced beyond it.
+// Bullet counts no whole turns: a window about where the joint is.
 void JointConstraint::limit_first_axis() {
-  double lower = std::max(limits_.lower, position_ - kWindow), upper = std::min(limits_.upper, position_ + kWindow);
-  if (mode_ == Mode::motor && command_ > 0.0 && position_ > lower - kForced) lower = position_ - kWindow;
-  if (mode_ == Mode::motor && command_ < 0.0 && position_ < upper + kForced) upper = position_ + kWindow;
-  const double turned = position_ - wrap_angle(position_);    // whole turns, which Bullet does not count
+  const double lower = std::max(limits_.lower, position_ - kWindow), upper = std::min(limits_.upper, position_ + kWindow);
+  const double turned = position_ - wrap_angle(position_);
   set_turns(*static_cast<btUniversalConstraint&>(*constraint_).getRotationalLimitMotor(kFirst), lower - turned, upper - turned);
 }
 
-void JointConstraint::brake_second_axis() {
+void JointConstraint::brake_second_axis(double substep_s) {
   const Vec3 axis = from_bt(child_.getWorldTransform().getRotation()) * axis2_in_C_;
   const double rate = axis.dot(from_bt(child_.getAngularVelocity() - parent_.getAngularVelocity()));
-  set_motor_of(*static_cast<btUniversalConstraint&>(*constraint_).getRotationalLimitMotor(kSecond), 0.0,
-               std::min(limits2_.friction + limits2_.damping * std::abs(rate), 1e9));
+  const double brake = limits2_.friction + limits2_.damping * std::abs(rate);
+  turn_on(motors_->second, axis, 0.0, -brake, brake, substep_s);
 }
 
 void JointConstraint::before_substep(double substep_s) {
@@ -196,28 +192,25 @@ void JointConstraint::before_substep(double substep_s) {
         .setLimit(std::max(limits_.lower, position_ - kWindow), std::min(limits_.upper, position_ + kWindow), 1.0, 0.3, 0.0);
   }
   if (type_ == model::JointType::universal) {
-    brake_second_axis();
+    brake_second_axis(substep_s);
     if (limited(limits_)) limit_first_axis();
   }
+  if (type_ == model::JointType::ball || type_ == model::JointType::fixed) return;
+  if (limits_.spring_stiffness > 0.0) push(limits_.spring_stiffness * (limits_.spring_reference - position_));
+  const Vec3 axis = axis_in_world();
   if (mode_ == Mode::motor) {
-    move_by_motor(command_, max_effort_, substep_s);
+    turn_on(motors_->first, axis, command_, lowest_effort_, highest_effort_, substep_s);
+    if (std::isfinite(gain_)) motors_->first.softness = 1.0 / (gain_ * substep_s);
     return;
   }
   if (mode_ == Mode::effort) push(command_);
-  move_by_motor(0.0, limits_.friction + limits_.damping * std::abs(velocity()), substep_s);
+  const double brake = limits_.friction + limits_.damping * std::abs(velocity());
+  turn_on(motors_->first, axis, 0.0, -brake, brake, substep_s);
 }
 
-double JointConstraint::measured_effort() const {
-  const Vec3 force = from_bt(feedback_->m_appliedForceBodyB);
-  if (type_ == model::JointType::prismatic) return axis_in_world().dot(force);
-  // Bullet's torque is about the child's centre of mass, and holds the moment of the force at the joint.
-  const Vec3 arm = from_bt(child_.getWorldTransform() * to_bt(X_CJ_.translation) - child_.getCenterOfMassPosition());
-  return axis_in_world().dot(from_bt(feedback_->m_appliedTorqueBodyB) - arm.cross(force));
-}
-
-void JointConstraint::after_substep() {
+void JointConstraint::after_substep(double substep_s) {
   if (!constraint_ || !constraint_->isEnabled()) return;
-  effort_ = mode_ == Mode::motor ? measured_effort() : mode_ == Mode::effort ? command_ : 0.0;
+  effort_ = mode_ == Mode::motor ? motors_->first.impulse / substep_s : mode_ == Mode::effort ? command_ : 0.0;
   switch (type_) {
     case model::JointType::revolute:
     case model::JointType::continuous: {

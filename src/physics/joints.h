@@ -8,6 +8,7 @@
 
 #include "model/body_layout.h"
 #include "physics/rigid_bodies.h"
+#include "physics/rows.h"
 
 namespace ruedo::physics {
 
@@ -23,8 +24,9 @@ class JointConstraint {
   double velocity() const;
   double effort() const { return effort_; }
 
-  // Holds that rate with at most that effort until another command (rad/s or m/s; N m or N).
-  void set_motor(double rate, double max_effort);
+  // Holds that rate within these efforts until another command (rad/s or m/s; N m or N). With a gain (N m s/rad or N s/m)
+  // the effort is in proportion to what is missing of the rate; infinite: the rate is held at once.
+  void set_motor(double rate, double lowest_effort, double highest_effort, double gain);
   void set_effort(double effort);                  // gives that effort until another command
   bool commanded() const { return mode_ != Mode::passive; }
 
@@ -40,17 +42,16 @@ class JointConstraint {
   }
 
   void before_substep(double substep_s);
-  void after_substep();
+  void after_substep(double substep_s);
 
  private:
   enum class Mode { passive, motor, effort };
   Vec3 axis_in_world() const;
   void wake();
-  void move_by_motor(double rate, double max_effort, double substep_s);
+  void turn_on(JointMotor& motor, const Vec3& axis, double rate, double lowest, double highest, double substep_s) const;
   void push(double effort);                        // for one substep
   void limit_first_axis();                         // of a universal joint, for one substep
-  void brake_second_axis();
-  double measured_effort() const;
+  void brake_second_axis(double substep_s);
 
   model::JointType type_;
   model::JointAxis limits_, limits2_;              // of the second axis: universal only
@@ -59,9 +60,9 @@ class JointConstraint {
   Pose X_PJ_, X_CJ_;
   Vec3 axis2_in_C_ = Vec3::UnitY();                // universal only
   std::unique_ptr<btTypedConstraint> constraint_;
-  std::unique_ptr<btJointFeedback> feedback_ = std::make_unique<btJointFeedback>();
+  std::unique_ptr<JointMotors> motors_ = std::make_unique<JointMotors>();    // the constraint points to it
   Mode mode_ = Mode::passive;
-  double command_ = 0.0, max_effort_ = 0.0;
+  double command_ = 0.0, lowest_effort_ = 0.0, highest_effort_ = 0.0, gain_ = 0.0;
   double position_ = 0.0, effort_ = 0.0;
 };
 

@@ -1,6 +1,8 @@
 // The interface of the physics world, over physics_world_impl.h.
 #include "physics/physics_world.h"
 
+#include <limits>
+
 #include "physics/physics_world_impl.h"
 
 namespace ruedo::physics {
@@ -58,7 +60,7 @@ double PhysicsWorld::joint_position(int joint) const { return impl_->joints_[Imp
 double PhysicsWorld::joint_velocity(int joint) const { return impl_->joints_[Impl::index(joint)].velocity(); }
 double PhysicsWorld::joint_effort(int joint) const { return impl_->joints_[Impl::index(joint)].effort(); }
 void PhysicsWorld::drive_joint_velocity(int joint, double rate, double max_effort) {
-  impl_->joints_[Impl::index(joint)].set_motor(rate, max_effort);
+  impl_->joints_[Impl::index(joint)].set_motor(rate, -max_effort, max_effort, std::numeric_limits<double>::infinity());
 }
 void PhysicsWorld::apply_joint_effort(int joint, double effort) { impl_->joints_[Impl::index(joint)].set_effort(effort); }
 
@@ -70,9 +72,12 @@ double PhysicsWorld::wheel_rate(int wheel) const {
   const int joint = impl_->wheel_joint_[Impl::index(wheel)];
   return joint < 0 ? 0.0 : impl_->wheel_sign_[Impl::index(wheel)] * impl_->wheels_[Impl::index(joint)].velocity();
 }
-void PhysicsWorld::drive_wheel(int wheel, double rate, double max_torque) {
+void PhysicsWorld::drive_wheel(int wheel, const WheelServo& servo) {
   const int joint = impl_->wheel_joint_[Impl::index(wheel)];
-  if (joint >= 0) impl_->wheels_[Impl::index(joint)].set_motor(impl_->wheel_sign_[Impl::index(wheel)] * rate, max_torque);
+  if (joint < 0) return;
+  const bool ahead = impl_->wheel_sign_[Impl::index(wheel)] > 0.0;
+  impl_->wheels_[Impl::index(joint)].set_motor(ahead ? servo.rate : -servo.rate, ahead ? servo.lowest_torque : -servo.highest_torque,
+                                               ahead ? servo.highest_torque : -servo.lowest_torque, servo.gain);
 }
 
 void PhysicsWorld::add(int instance) { impl_->add(instance); }

@@ -20,8 +20,16 @@ enum class Support {
   plane        // moves in its plane only (x, y, yaw of the world); no pair with the static planes
 };
 
-// Deterministic: the same calls give the same bits. A step is divided into equal substeps of 5 ms at most, 1 ms where
-// robots have wheels in friction contact.
+// The torque that a wheel's servo gives until another one is told: gain * (rate - the wheel's own), within the limits. It is
+// implicit in the step, and so stable whatever the gain.
+struct WheelServo {
+  double rate = 0.0;                                   // rad/s, positive rolls ahead
+  double gain = 0.0;                                   // N m s/rad
+  double lowest_torque = 0.0, highest_torque = 0.0;    // N m
+};
+
+// Deterministic: the same calls give the same bits, and what does not touch changes nothing of each other. A step is divided
+// into equal substeps of 5 ms at most; of 1 ms for what joints tie together, wheels among them, and for all that may touch it.
 class PhysicsWorld {
  public:
   // world and layout must outlive it.
@@ -72,7 +80,7 @@ class PhysicsWorld {
   // Wheels that are bodies of their own (the wheels drive); wheel as in BodyLayout::wheels. Positive rolls ahead.
   double wheel_angle(int wheel) const;          // rad, not wrapped
   double wheel_rate(int wheel) const;           // rad/s
-  void drive_wheel(int wheel, double rate, double max_torque);
+  void drive_wheel(int wheel, const WheelServo& servo);
 
   // Between two steps. `instance` is new at the end of the world and the layout, or was removed and placed again:
   // its bodies are where the layout has them, at rest.

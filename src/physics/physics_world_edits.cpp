@@ -58,7 +58,6 @@ void PhysicsWorld::Impl::add(int instance) {
     broadphase_.refilter(bullet(i).getBroadphaseHandle(), &dispatcher_);
   }
   if (has_statics) refilter_all();
-  choose_substeps();
 }
 
 // As a new body where the layout has it.

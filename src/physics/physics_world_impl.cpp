@@ -1,12 +1,12 @@
 // A step of the physics world.
 //
-// Settings for repeatable runs (measured): pairs in the order of their numbers, no random order in the solver,
-// objects added in world order, and a broadphase that knows no addresses. A world that is made again gives the
-// same bits.
+// For repeatable runs: pairs and contacts in the order of their numbers, objects added in world order, and a broadphase
+// that knows no addresses. A world that is made again gives the same bits.
 #include "physics/physics_world_impl.h"
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "physics/state_check.h"
 #include "ruedo/errors.h"
@@ -16,19 +16,15 @@ namespace ruedo::physics {
 
 namespace {
 
-// Motorised wheels in friction contact want shorter substeps: at 1 ms a wheel on the ground does not jitter.
-constexpr int64_t kLongestSubstep_us = 5000, kLongestSubstepOfWheels_us = 1000;
-constexpr int kSolverIterations = 30;
+// What joints tie together wants shorter substeps; so does what touches it. Nothing else: what somebody else's robot does
+// shall change no bit of a stack.
+constexpr int64_t kLongestSubstep_us = 5000, kLongestSubstepOfJoints_us = 1000;
+enum Pace { kCoarse, kFine };
 // Distance at which Bullet begins to see a contact: a body may come so near in one substep without touching.
 constexpr double kContactReach_m = 0.02;
 
 // Of bodies near each other at the start: their number grows with the square of what stands in one place.
 constexpr int kMostPairs = 200'000;
-
-// Coulomb friction between two surfaces: the lower of both, as in ODE and Gazebo (Bullet multiplies).
-btScalar lower_friction(const btCollisionObject* a, const btCollisionObject* b) {
-  return std::min(a->getFriction(), b->getFriction());
-}
 
 }  // namespace
 
@@ -53,24 +49,19 @@ PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout
       ground_(btRigidBody::btRigidBodyConstructionInfo(0.0, nullptr, nullptr)),
       dispatcher_(&configuration_),
       broadphase_(filter_),
-      dynamics_(&dispatcher_, &broadphase_, &solver_, &configuration_) {
-  gCalculateCombinedFrictionCallback = lower_friction;    // Bullet's globals: the same in every world
-  gContactBreakingThreshold = kContactReach_m;
+      dynamics_(dispatcher_, broadphase_, configuration_, surfaces_, SolverSettings{world.solver.iterations, world.solver.tolerance, world.solver.error_reduction}) {
+  gContactBreakingThreshold = kContactReach_m;    // Bullet's globals: the same in every world
   gDisableDeactivation = false;
   dispatcher_.setDispatcherFlags(dispatcher_.getDispatcherFlags() &
                                  ~btCollisionDispatcher::CD_USE_RELATIVE_CONTACT_BREAKING_THRESHOLD);
-  dynamics_.getDispatchInfo().m_deterministicOverlappingPairs = true;
   dynamics_.setForceUpdateAllAabbs(false);
-  btContactSolverInfo& solver = dynamics_.getSolverInfo();
-  solver.m_numIterations = kSolverIterations;
-  solver.m_solverMode = SOLVER_USE_WARMSTARTING | SOLVER_SIMD | SOLVER_USE_2_FRICTION_DIRECTIONS;
-  solver.m_splitImpulsePenetrationThreshold = 0.0;        // penetration is undone without adding velocity
-  solver.m_jointFeedbackInWorldSpace = true;
+  substeps_[kCoarse] = substeps_for(kLongestSubstep_us);
+  substeps_[kFine] = substeps_for(kLongestSubstepOfJoints_us);
 
   for (const auto& object : rigid_.statics) add_static(*object);
   const size_t n = layout.bodies.size();
   motions_.resize(n);
-  simulated_.reserve(n);
+  for (auto& bodies : simulated_) bodies.reserve(n);
   twists_.resize(n);
   for (const auto& body : layout.bodies) poses_.push_back(body.X_WB.normalized());
   add_joints();
@@ -85,12 +76,11 @@ PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout
   for (JointConstraint& joint : joints_) if (joint.constraint()) dynamics_.addConstraint(joint.constraint(), true);
   for (JointConstraint& joint : wheels_) if (joint.constraint()) dynamics_.addConstraint(joint.constraint(), true);
   last_twists_ = twists_;
-  choose_substeps();
 }
 
-void PhysicsWorld::Impl::choose_substeps() {
-  const int64_t longest = wheels_.empty() ? kLongestSubstep_us : kLongestSubstepOfWheels_us;
-  substeps_ = static_cast<int>((step_us_ + longest - 1) / longest);
+int PhysicsWorld::Impl::substeps_for(int64_t longest_us) const {
+  if (world_.solver.substeps > 0) return world_.solver.substeps;
+  return static_cast<int>((step_us_ + longest_us - 1) / longest_us);
 }
 
 PhysicsWorld::Impl::~Impl() {
@@ -235,7 +225,6 @@ void PhysicsWorld::Impl::choose_simulated() {
       update_box(i);
     }
   }
-  simulated_.clear();
   for (int i = 0; i < n; ++i) {
     Motion& motion = motions_[index(i)];
     motion.simulated = false;
@@ -243,45 +232,98 @@ void PhysicsWorld::Impl::choose_simulated() {
     const bool alone_now = alone(i);
     motion.simulated = motion.tied || !alone_now ||
                        (motion.kind != Motion::Kind::guided && !sleeping(i) && !rigid_.bodies[index(i)].info.moved);
-    if (!motion.simulated) continue;
-    start(i);
-    simulated_.push_back(&bullet(i));
+    if (motion.simulated) start(i);
   }
+  choose_pace();
+}
+
+size_t PhysicsWorld::Impl::root(size_t body) {
+  while (parents_[body] != body) body = parents_[body] = parents_[parents_[body]];
+  return body;
+}
+
+// Bodies that joints tie together, and all that may touch them in this step, go at the shorter substeps.
+void PhysicsWorld::Impl::choose_pace() {
+  for (auto& bodies : simulated_) bodies.clear();
+  parents_.resize(motions_.size());
+  std::iota(parents_.begin(), parents_.end(), size_t{0});
+  const auto movable = [&](int body) { return body >= 0 && motions_[index(body)].simulated && !rigid_.bodies[index(body)].info.moved; };
+  const btBroadphasePairArray& pairs = broadphase_.getOverlappingPairCache()->getOverlappingPairArray();
+  for (int i = 0; i < pairs.size(); ++i) {
+    const int a = info_of(*static_cast<btCollisionObject*>(pairs[i].m_pProxy0->m_clientObject)).body;
+    const int b = info_of(*static_cast<btCollisionObject*>(pairs[i].m_pProxy1->m_clientObject)).body;
+    if (!movable(a) || !movable(b)) continue;
+    const size_t of_a = root(index(a)), of_b = root(index(b));
+    parents_[std::max(of_a, of_b)] = std::min(of_a, of_b);
+  }
+  for (Motion& motion : motions_) motion.fine = false;
+  for (size_t i = 0; i < motions_.size(); ++i) {
+    if (motions_[i].simulated && motions_[i].tied) motions_[root(i)].fine = true;
+  }
+  for (size_t i = 0; i < motions_.size(); ++i) {
+    if (!motions_[i].simulated) continue;
+    if (rigid_.bodies[i].info.moved) continue;
+    motions_[i].fine = motions_[root(i)].fine;
+    motions_[i].awake = rigid_.bodies[i].bullet->isActive();
+    simulated_[motions_[i].fine ? kFine : kCoarse].push_back(rigid_.bodies[i].bullet.get());
+  }
+}
+
+// A mover goes on along its way; Bullet leaves it where it is.
+void PhysicsWorld::Impl::move_on(btRigidBody& mover, double substep_s) {
+  btTransform next;
+  btTransformUtil::integrateTransform(mover.getWorldTransform(), mover.getLinearVelocity(), mover.getAngularVelocity(), substep_s, next);
+  mover.setWorldTransform(next);
+}
+
+void PhysicsWorld::Impl::step_at(int pace) {
+  std::vector<btRigidBody*>& bodies = simulated_[pace];
+  if (bodies.empty()) return;
+  std::vector<std::pair<btRigidBody*, btTransform>>& movers = movers_;
+  movers.clear();
+  bool moving = false;
+  for (size_t i = 0; i < motions_.size(); ++i) {
+    if (!motions_[i].simulated || !rigid_.bodies[i].info.moved) continue;
+    btRigidBody& mover = *rigid_.bodies[i].bullet;
+    bodies.push_back(&mover);
+    movers.emplace_back(&mover, mover.getWorldTransform());
+    moving |= motions_[i].kind != Motion::Kind::free;
+  }
+  dynamics_.take(bodies);
+  const double substep_s = static_cast<double>(step_us_) * 1e-6 / substeps_[pace];
+  if (!moving && !dynamics_.awake()) {    // what rests still touches
+    dynamics_.find_manifolds();
+    contacts_.add(dynamics_.manifolds(), substeps_[pace], true);
+    return;
+  }
+  for (int s = 0; s < substeps_[pace]; ++s) {
+    if (pace == kFine) {
+      for (JointConstraint& joint : joints_) joint.before_substep(substep_s);
+      for (JointConstraint& joint : wheels_) joint.before_substep(substep_s);
+    }
+    dynamics_.substep(substep_s);
+    bound_speeds(bodies);
+    if (pace == kFine) {
+      for (JointConstraint& joint : joints_) joint.after_substep(substep_s);
+      for (JointConstraint& joint : wheels_) joint.after_substep(substep_s);
+    }
+    contacts_.add(dynamics_.manifolds(), 1, s + 1 == substeps_[pace]);
+    for (auto& [mover, start] : movers) move_on(*mover, substep_s);
+  }
+  for (auto& [mover, start] : movers) mover->setWorldTransform(start);    // the other pace begins there, too
 }
 
 void PhysicsWorld::Impl::step() {
   last_twists_ = twists_;
   choose_simulated();
-  dynamics_.take(simulated_);
-  const double step_s = static_cast<double>(step_us_) * 1e-6;
-  contacts_.clear(step_s);
-  const bool awake = std::any_of(simulated_.begin(), simulated_.end(), [](const btRigidBody* body) { return body->isActive(); });
-  const int substeps = awake ? substeps_ : 0;
-  const double substep_s = step_s / substeps_;
-  for (int s = 0; s < substeps; ++s) {
-    for (JointConstraint& joint : joints_) joint.before_substep(substep_s);
-    for (JointConstraint& joint : wheels_) joint.before_substep(substep_s);
-    dynamics_.substep(substep_s);
-    bound_speeds();
-    for (JointConstraint& joint : joints_) joint.after_substep();
-    for (JointConstraint& joint : wheels_) joint.after_substep();
-    contacts_.add(dispatcher_);
-    // A mover goes on along its way; Bullet leaves it where it is.
-    for (size_t i = 0; i < motions_.size(); ++i) {
-      if (!motions_[i].simulated || !rigid_.bodies[i].info.moved || motions_[i].kind == Motion::Kind::free) continue;
-      btTransform next;
-      btRigidBody& mover = *rigid_.bodies[i].bullet;
-      btTransformUtil::integrateTransform(mover.getWorldTransform(), mover.getLinearVelocity(), mover.getAngularVelocity(),
-                                          substep_s, next);
-      mover.setWorldTransform(next);
-    }
-  }
-  if (!awake && dispatcher_.getNumManifolds() > 0) contacts_.add(dispatcher_, substeps_);    // what rests still touches
+  contacts_.clear(static_cast<double>(step_us_) * 1e-6);
+  step_at(kCoarse);
+  step_at(kFine);
   contacts_.finish();
   for (int i = 0; i < static_cast<int>(motions_.size()); ++i) {
     Motion& motion = motions_[index(i)];
     const bool moved = rigid_.bodies[index(i)].info.moved;
-    if (awake && motion.simulated && !moved) pull_from_bullet(i);
+    if (motion.simulated && !moved && (motion.awake || !sleeping(i))) pull_from_bullet(i);
     if (motion.kind == Motion::Kind::guided && (moved || contacts_.touching(i).empty())) {
       poses_[index(i)] = motion.end;
       twists_[index(i)] = motion.mean;
@@ -293,10 +335,10 @@ void PhysicsWorld::Impl::step() {
 
 // Forces that are allowed, each on its own, can throw a light body at any speed, and what is thrown so drags others along:
 // without a bound the numbers grow from substep to substep, to infinity. Bullet is never given what is not finite.
-void PhysicsWorld::Impl::bound_speeds() {
+void PhysicsWorld::Impl::bound_speeds(const std::vector<btRigidBody*>& bodies) {
   constexpr double kFastest2 = quantity::kSpeed.most * quantity::kSpeed.most;
   const auto bounded = [](const btVector3& v) { return v.length2() <= kFastest2 ? v : v * (quantity::kSpeed.most / v.length()); };
-  for (btRigidBody* body : simulated_) {
+  for (btRigidBody* body : bodies) {
     const btVector3 &linear = body->getLinearVelocity(), &angular = body->getAngularVelocity(), &at = body->getWorldTransform().getOrigin();
     if (!std::isfinite(linear.length2() + angular.length2() + at.length2())) {
       throw StateError("the state of the body '" + layout_.bodies[index(info_of(*body).body)].name +

@@ -11,6 +11,7 @@
 #include "physics/joints.h"
 #include "physics/physics_world.h"
 #include "physics/rigid_bodies.h"
+#include "physics/surfaces.h"
 
 namespace ruedo::physics {
 
@@ -27,6 +28,8 @@ struct Motion {
   bool dirty = false;         // our pose and twist are newer than Bullet's
   bool tied = false;          // by a joint: always simulated while awake
   bool simulated = false;     // in this step
+  bool fine = false;          // ... in the shorter substeps
+  bool awake = false;         // when the step began
   Twist mean;
   Pose end;
 };
@@ -78,27 +81,33 @@ class PhysicsWorld::Impl {
   void add_static(StaticObject& object);
   void begin_again(int body);
   void refilter_all();
-  void choose_substeps();
+  int substeps_for(int64_t longest_us) const;
+  void choose_pace();
+  void step_at(int pace);
+  void move_on(btRigidBody& mover, double substep_s);
   void tie(int body, int other);
   void push_to_bullet(int body);      // our pose and twist
   void pull_from_bullet(int body);
   void start(int body);               // the velocity it begins the step with
   void update_box(int body);
   void choose_simulated();
-  void bound_speeds();                // after a substep; throws StateError for what is not finite
+  size_t root(size_t body);
+  void bound_speeds(const std::vector<btRigidBody*>& bodies);    // after a substep; throws StateError for what is not finite
 
   const model::WorldModel& world_;
   const model::BodyLayout& layout_;
   int64_t step_us_;
-  int substeps_ = 1;
+  int substeps_[2] = {1, 1};          // of each pace
   MayTouch filter_;
   btRigidBody ground_;                // what joints to the world hold on to
   btDefaultCollisionConfiguration configuration_;
   btCollisionDispatcher dispatcher_;
   Broadphase broadphase_;
-  btSequentialImpulseConstraintSolver solver_;
+  Surfaces surfaces_;
   Dynamics dynamics_;
-  std::vector<btRigidBody*> simulated_;
+  std::vector<btRigidBody*> simulated_[2];    // of each pace
+  std::vector<size_t> parents_;               // union-find over bodies
+  std::vector<std::pair<btRigidBody*, btTransform>> movers_;    // and where they began the step
 };
 
 }  // namespace ruedo::physics

@@ -14,9 +14,8 @@ namespace {
 
 constexpr double kSmallestMass_kg = 1e-6;
 // Driven wheels: the tyre gives way by about so much under the robot's weight, which spreads the weight over all wheels (four
-// rigid ones on a rigid floor stand on any two), and slips more easily sideways than ahead where the file does
-// not say otherwise (a file that gives both directions the same says nothing).
-constexpr double kTyreGives_m = 5e-4, kTyreDamping = 1.0, kLateralFriction = 0.3;
+// rigid ones on a rigid floor stand on any two).
+constexpr double kTyreGives_m = 5e-4, kTyreDamping = 1.0;
 // Velocities below which a body may fall asleep (after 2 s).
 constexpr double kSleepSpeed_m_s = 0.005, kSleepRate_rad_s = 0.01;
 
@@ -122,8 +121,7 @@ void RigidBodies::make_statics(const model::WorldModel& world, const model::Body
     bullet.setCollisionShape(shape);
     bullet.setWorldTransform(to_bt((placement.X_BL * collision.X_LC).normalized()));
     bullet.setCollisionFlags(btCollisionObject::CF_STATIC_OBJECT);
-    bullet.setFriction(collision.surface.friction);
-    bullet.setRestitution(collision.surface.restitution);
+    object->info.surfaces.push_back(surface_of(collision.surface, Quat::Identity()));    // Bullet's frame is the collision's
     object->info.instance = placement.instance;
     object->info.plane = collision.geometry.shape == model::Shape::plane;
     object->info.links.push_back(static_cast<int>(index));
@@ -131,6 +129,18 @@ void RigidBodies::make_statics(const model::WorldModel& world, const model::Body
     bullet.setUserPointer(&object->info);
     statics.push_back(std::move(object));
   }
+}
+
+// A wheel of a wheels drive: y of its frame is its axle.
+ShapeSurface RigidBodies::tyre_of(const model::WorldModel& world, const model::BodyLayout& layout, int wheel, const ShapeSurface& surface) const {
+  const auto& robot = layout.robots[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].robot)];
+  ShapeSurface tyre = surface;
+  if (tyre.along_I == Vec3::Zero()) tyre.axle_I = Vec3::UnitY();
+  if (tyre.stiffness > 0.0) return tyre;    // the file says how it gives
+  const double share = mass_on_each_wheel(*world.models[static_cast<size_t>(robot.instance)].model, robot);
+  tyre.stiffness = share * world.gravity.norm() / kTyreGives_m;
+  tyre.damping = kTyreDamping * 2.0 * std::sqrt(tyre.stiffness * share);
+  return tyre;
 }
 
 void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLayout& layout, int index) {
@@ -155,7 +165,7 @@ void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLay
   const Pose X_IB = body.X_BI.inverse();
 
   bool gravity = false, kinematic = model.path != nullptr;
-  const model::Surface* surface = nullptr;
+  const bool imposed = carries_kinematic_drive(world, layout, index);    // its drive stands for its wheels' friction
   body.compound = std::make_unique<btCompoundShape>();
   std::vector<btCollisionShape*> shapes;
   for (const int link_index : placement.links) {
@@ -179,8 +189,11 @@ void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLay
         body.compound->addChildShape(to_bt(X_IC), shape);
         body.info.links.push_back(link_index);
         body.info.collisions.push_back(static_cast<int>(c));
+        body.info.surfaces.push_back(surface_of(collision.surface, X_IC.rotation));
+        ShapeSurface& surface = body.info.surfaces.back();
+        if (wheel >= 0) surface = tyre_of(world, layout, wheel, surface);
+        if (imposed && link_placement.wheel >= 0) surface.friction = surface.friction2 = 0.0;
       }
-      if (!shapes.empty() && !surface) surface = &collision.surface;
     }
   }
 
@@ -190,23 +203,8 @@ void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLay
   settings.m_startWorldTransform = to_bt((placement.X_WB * body.X_BI).normalized());
   settings.m_linearSleepingThreshold = kSleepSpeed_m_s;
   settings.m_angularSleepingThreshold = kSleepRate_rad_s;
-  if (surface) {
-    settings.m_friction = surface->friction;
-    settings.m_restitution = surface->restitution;
-  }
-  // The drive's force stands for the friction of the wheels.
-  if (carries_kinematic_drive(world, layout, index)) settings.m_friction = 0.0;
   body.bullet = std::make_unique<btRigidBody>(settings);
   btRigidBody& bullet = *body.bullet;
-  if (wheel >= 0) {
-    const bool given = surface && surface->friction > 0.0 && surface->friction2 != surface->friction;
-    const double lateral = given ? surface->friction2 / surface->friction : kLateralFriction;
-    bullet.setAnisotropicFriction({1, lateral, 1}, btCollisionObject::CF_ANISOTROPIC_FRICTION);
-    const int robot = layout.wheels[static_cast<size_t>(wheel)].robot;
-    const double share = mass_on_each_wheel(model, layout.robots[static_cast<size_t>(robot)]);
-    const double stiffness = share * world.gravity.norm() / kTyreGives_m;
-    bullet.setContactStiffnessAndDamping(stiffness, kTyreDamping * 2.0 * std::sqrt(stiffness * share));
-  }
   if (kinematic) bullet.setCollisionFlags(bullet.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
   bullet.setFlags(bullet.getFlags() | BT_DISABLE_WORLD_GRAVITY);    // gravity is set for each body
   body.gravity = gravity && !kinematic ? world.gravity : Vec3(0, 0, 0);

@@ -8,6 +8,7 @@
 #include "model/body_layout.h"
 #include "physics/bullet.h"
 #include "physics/shapes.h"
+#include "physics/surfaces.h"
 
 namespace ruedo::physics {
 
@@ -22,6 +23,7 @@ struct ObjectInfo {
   bool gone = false;               // its model was removed: it is nowhere
   std::vector<int> links;          // of each child shape; one entry for a single shape
   std::vector<int> collisions;     // of each child shape, in its link
+  std::vector<ShapeSurface> surfaces;    // of each child shape
   std::vector<int> joined;         // bodies that a joint ties to this one
 };
 
@@ -57,6 +59,7 @@ class RigidBodies {
 
  private:
   void make_statics(const model::WorldModel& world, const model::BodyLayout& layout, size_t link);
+  ShapeSurface tyre_of(const model::WorldModel& world, const model::BodyLayout& layout, int wheel, const ShapeSurface& surface) const;
   void make_body(const model::WorldModel& world, const model::BodyLayout& layout, int index);
   ShapeFactory shapes_;
 };

@@ -23,28 +23,23 @@ void look_at_joints(const model::WorldModel& world, const model::BodyLayout& lay
   }
 }
 
-// A kinematic drive has no friction at all; of other bodies the first shape's counts.
+// Without a direction two coefficients are one; a torsional one without a patch has no lever.
 void look_at_friction(const model::WorldModel& world, const model::BodyLayout& layout, std::vector<Finding>& findings) {
-  std::vector<bool> drives(layout.bodies.size());
-  for (const auto& robot : layout.robots) {
-    const auto& drive = model_of(world, robot.instance).drive;
-    if (robot.body >= 0 && drive && drive->kind == model::DriveDescription::Kind::kinematic) drives[static_cast<size_t>(robot.body)] = true;
-  }
-  for (size_t i = 0; i < layout.bodies.size(); ++i) {
-    if (drives[i]) continue;
-    const auto& body = layout.bodies[i];
-    const model::Collision* first = nullptr;
-    const model::Collision* other = nullptr;
-    for (const int link : body.links) {
-      const auto& placement = layout.links[static_cast<size_t>(link)];
-      for (const auto& collision : model_of(world, body.instance).links[static_cast<size_t>(placement.link)].collisions) {
-        if (!first) first = &collision;
-        if (!other && collision.surface.friction != first->surface.friction) other = &collision;
+  for (const auto& placement : layout.links) {
+    const model::ModelInstance& instance = world.models[static_cast<size_t>(placement.instance)];
+    const model::Link& link = instance.model->links[static_cast<size_t>(placement.link)];
+    const bool rolls = placement.wheel >= 0;    // its axle is the direction
+    for (const auto& collision : link.collisions) {
+      const model::Surface& surface = collision.surface;
+      const std::string where = "model " + instance.name + "/link " + link.name + "/collision " + collision.name;
+      if (!rolls && surface.friction2 != surface.friction && surface.friction_direction == Vec3::Zero()) {
+        findings.push_back({Finding::Kind::unsupported, collision.source, where, "mu2 differs from mu, and there is no fdir1: mu counts in all directions"});
+      }
+      if (surface.torsional > 0.0 && surface.patch_radius <= 0.0 && surface.surface_radius <= 0.0) {
+        findings.push_back({Finding::Kind::unsupported, collision.source, where,
+                            "a torsional coefficient without patch_radius or surface_radius has no lever: it brakes nothing"});
       }
     }
-    if (!other) continue;
-    findings.push_back({Finding::Kind::unsupported, other->source, "body " + body.name + "/collision " + other->name,
-                        "its friction is not that of " + first->name + ", the body's first shape, which counts for the whole body"});
   }
 }
 

@@ -168,13 +168,44 @@ TEST(Names, ManyThingsOfOneNameLoadAtOnce) {
   EXPECT_EQ(world->models.back().name, "box_20000");
 }
 
-TEST(Findings, SpringsOfJointsAreNamed) {
-  const auto with = [](const std::string& dynamics) {
-    return texts(*world_of("<model name='m'><link name='a'/><link name='b'/><joint name='j' type='prismatic'><parent>a</parent><child>b</child><axis><xyz>0 0 1</xyz><dynamics>" +
-                           dynamics + "</dynamics></axis></joint></model>"));
-  };
-  EXPECT_EQ(with("<spring_stiffness>100</spring_stiffness>"), (std::vector<std::string>{"springs of joints are not supported; the joint has none"}));
-  EXPECT_EQ(with("<spring_reference>0</spring_reference><spring_stiffness>0</spring_stiffness>"), std::vector<std::string>{});
+TEST(Model, SpringsOfJointsAreRead) {
+  const auto world = world_of("<model name='m'><link name='a'/><link name='b'/><joint name='j' type='prismatic'><parent>a</parent><child>b</child><axis><xyz>0 0 1</xyz>"
+                              "<dynamics><spring_reference>0.2</spring_reference><spring_stiffness>100</spring_stiffness></dynamics></axis></joint></model>");
+  EXPECT_EQ(texts(*world), std::vector<std::string>{});
+  const JointAxis& axis = world->models.at(0).model->joints.at(0).axis;
+  EXPECT_EQ(axis.spring_stiffness, 100.0);
+  EXPECT_EQ(axis.spring_reference, 0.2);
+}
+
+// A surface with all that it can say.
+TEST(Model, SurfacesAreRead) {
+  const auto world = world_of("<model name='m'><link name='a'><collision name='c'><geometry><sphere><radius>1</radius></sphere></geometry><surface><friction><ode><mu>0.7</mu>"
+                              "<mu2>0.2</mu2><fdir1>0 1 0</fdir1><slip1>0.01</slip1><slip2>0.02</slip2></ode><torsional><coefficient>0.3</coefficient>"
+                              "<patch_radius>0.04</patch_radius></torsional></friction><contact><ode><kp>5e4</kp><kd>30</kd></ode></contact></surface></collision></link></model>");
+  EXPECT_EQ(texts(*world), std::vector<std::string>{});
+  const Surface& surface = world->models.at(0).model->links.at(0).collisions.at(0).surface;
+  EXPECT_EQ(surface.friction, 0.7);
+  EXPECT_EQ(surface.friction2, 0.2);
+  EXPECT_EQ(surface.friction_direction, Vec3(0, 1, 0));
+  EXPECT_EQ(surface.slip, 0.01);
+  EXPECT_EQ(surface.slip2, 0.02);
+  EXPECT_EQ(surface.torsional, 0.3);
+  EXPECT_EQ(surface.patch_radius, 0.04);
+  EXPECT_EQ(surface.stiffness, 5e4);
+  EXPECT_EQ(surface.damping, 30.0);
+}
+
+TEST(Model, TheSolverOfTheWorldIsRead) {
+  const auto solver_of = [](const std::string& bullet) { return world_of("<physics type='x'><bullet>" + bullet + "</bullet></physics>")->solver; };
+  const SolverDescription given = solver_of("<solver><iters>70</iters></solver><constraints><erp>0.3</erp></constraints><ruedo:substeps>4</ruedo:substeps><ruedo:tolerance>1e-7</ruedo:tolerance>");
+  EXPECT_EQ(given.iterations, 70);
+  EXPECT_EQ(given.error_reduction, 0.3);
+  EXPECT_EQ(given.substeps, 4);
+  EXPECT_EQ(given.tolerance, 1e-7);
+  EXPECT_EQ(solver_of("").iterations, SolverDescription().iterations);
+  EXPECT_THROW(solver_of("<solver><iters>0</iters></solver>"), InputError);
+  EXPECT_THROW(solver_of("<ruedo:substep>4</ruedo:substep>"), InputError);
+  EXPECT_EQ(texts(*world_of("<physics type='x'><bullet><solver><type>dantzig</type></solver></bullet></physics>")).size(), 1u);
 }
 
 TEST(Findings, WhatIsNotSupportedIsNamedOnce) {

@@ -56,8 +56,6 @@ INSTANTIATE_TEST_SUITE_P(Table, Unsupported, testing::Values(
     Part{"CollideBitmask", surface("<contact><collide_bitmask>0x00</collide_bitmask></contact>"), "<collide_bitmask> is not supported: the shape collides with everything"},
     Part{"CollideWithoutContact", surface("<contact><collide_bitmask>0xffff</collide_bitmask><collide_without_contact>1</collide_without_contact></contact>"),
          "<collide_without_contact> is not supported: the shape collides as others do"},
-    Part{"Slip", surface("<friction><ode><mu>1</mu><slip1>0.1</slip1><slip2>0</slip2><fdir1>0 0 0</fdir1></ode></friction>"), "<slip1> is not supported: friction does not yield"},
-    Part{"FrictionDirection", surface("<friction><ode><fdir1>1 0 0</fdir1></ode></friction>"), "<fdir1> is not supported: friction is the same in all directions"},
     Part{"SecondDrive", "<model name='n'>" + driven() + "</model><model name='k'>" + driven() + "</model>",
          "a second drive, of the nested model 'k', is not supported: its wheels turn freely"},
     Part{"SensorOnAJoint", "<joint name='j' type='fixed'><parent>a</parent><child>b</child><sensor name='s' type='force_torque'/></joint>",

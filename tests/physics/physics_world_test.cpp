@@ -6,50 +6,12 @@
 
 #include <gtest/gtest.h>
 
-#include "model/load.h"
+#include "world.h"
 
 namespace ruedo::physics {
 namespace {
 
-class World {
- public:
-  explicit World(const std::string& models, int64_t step_us = 2000)
-      : world(model::load_world_text("<sdf version='1.9' xmlns:ruedo='https://ruedo.org'><world name='w'><gravity>0 0 -10</gravity>"
-                                     "<physics type='x'><max_step_size>" + std::to_string(static_cast<double>(step_us) * 1e-6) +
-                                     "</max_step_size></physics>" + models + "</world></sdf>", "test.sdf")),
-        layout(*world),
-        physics(*world, layout) {}
-  void run(double seconds) {
-    const auto steps = static_cast<int64_t>(std::llround(seconds * 1e6)) / world->step_us;
-    for (int64_t i = 0; i < steps; ++i) physics.step();
-  }
-  int body(const std::string& name) const {
-    for (size_t i = 0; i < layout.bodies.size(); ++i) {
-      if (layout.bodies[i].name == name) return static_cast<int>(i);
-    }
-    return -1;
-  }
-  std::shared_ptr<const model::WorldModel> world;
-  model::BodyLayout layout;
-  PhysicsWorld physics;
-};
-
-const std::string kPlane = "<model name='ground'><static>true</static><link name='l'><collision name='c'><geometry><plane><normal>0 0 1"
-                           "</normal></plane></geometry></collision></link></model>";
-
-std::string thing(const std::string& name, const std::string& pose, const std::string& geometry, double mass, double mu = 0.5,
-                  double inertia = 0.01) {
-  const std::string i = std::to_string(inertia);
-  return "<model name='" + name + "'><pose>" + pose + "</pose>" + (mass > 0 ? "" : "<static>true</static>") + "<link name='l'>" +
-         (mass > 0 ? "<inertial><mass>" + std::to_string(mass) + "</mass><inertia><ixx>" + i + "</ixx><iyy>" + i + "</iyy><izz>" + i +
-                         "</izz></inertia></inertial>"
-                   : "") +
-         "<collision name='c'><geometry>" + geometry + "</geometry><surface><friction><ode><mu>" + std::to_string(mu) + "</mu><mu2>" +
-         std::to_string(mu) + "</mu2></ode></friction></surface></collision></link></model>";
-}
-
-const std::string kBall = "<sphere><radius>0.1</radius></sphere>";
-const std::string kBox = "<box><size>0.2 0.2 0.2</size></box>";
+using namespace testing;
 
 struct ShapeCase {
   const char* geometry;
@@ -206,15 +168,18 @@ TEST(Joints, LimitsHoldOnOneSideAndBeyondATurn) {
 
 // What is held more simply than the file says is told, once and with its name.
 TEST(Physics, SimplerJointsAndFrictionAreNamed) {
-  const auto shape = [](const std::string& name, const std::string& mu) {
-    return "<collision name='" + name + "'><geometry>" + kBall + "</geometry><surface><friction><ode><mu>" + mu + "</mu><mu2>" + mu +
-           "</mu2></ode></friction></surface></collision>";
+  const auto shape = [](const std::string& name, const std::string& friction) {
+    return "<collision name='" + name + "'><geometry>" + kBall + "</geometry><surface><friction>" + friction + "</friction></surface></collision>";
   };
-  World w("<model name='m'><link name='a'>" + shape("one", "0.5") + shape("two", "0.9") + "</link><link name='b'>" + shape("c", "1") +
-          shape("d", "1") + "</link><joint name='j' type='ball'><parent>a</parent><child>b</child></joint></model>");
-  ASSERT_EQ(w.physics.findings().size(), 2u);
+  World w("<model name='m'><link name='a'>" + shape("one", "<ode><mu>0.5</mu><mu2>0.5</mu2></ode>") + shape("two", "<ode><mu>0.9</mu><mu2>0.5</mu2></ode>") +
+          shape("three", "<ode><mu>0.9</mu><mu2>0.5</mu2><fdir1>1 0 0</fdir1></ode>") + "</link><link name='b'>" +
+          shape("c", "<torsional><coefficient>1</coefficient></torsional>") +
+          shape("d", "<torsional><coefficient>1</coefficient><patch_radius>0.01</patch_radius></torsional>") +
+          "</link><joint name='j' type='ball'><parent>a</parent><child>b</child></joint></model>");
+  ASSERT_EQ(w.physics.findings().size(), 3u);
   EXPECT_EQ(w.physics.findings()[0].element, "model m/joint j");
-  EXPECT_EQ(w.physics.findings()[1].element, "body m/a/collision two");
+  EXPECT_EQ(w.physics.findings()[1].element, "model m/link a/collision two");
+  EXPECT_EQ(w.physics.findings()[2].element, "model m/link b/collision c");
 }
 
 TEST(Joints, EffortAccelerates) {
@@ -375,12 +340,12 @@ TEST(Physics, AGuidedBodyEndsExactlyThereUnlessItTouches) {
   const int box = w.body("box/l");
   for (int i = 1; i <= 60; ++i) {
     const Pose end{Quat::Identity(), {0.01 * i, 0, 0.5}};
-    w.physics.guide(box, {{1, 0, 0}, {}}, end);
+    w.physics.guide(box, {{1, 0, 0}, Vec3::Zero()}, end);
     w.physics.step();
     EXPECT_EQ(w.physics.pose(box).translation, end.translation);
   }
   for (int i = 61; i <= 120; ++i) {
-    w.physics.guide(box, {{1, 0, 0}, {}}, {Quat::Identity(), {w.physics.pose(box).translation.x() + 0.01, 0, 0.5}});
+    w.physics.guide(box, {{1, 0, 0}, Vec3::Zero()}, {Quat::Identity(), {w.physics.pose(box).translation.x() + 0.01, 0, 0.5}});
     w.physics.step();
     EXPECT_LT(w.physics.pose(box).translation.x(), 0.801);    // the wall's face at 0.9, half a box before it
   }

@@ -1,0 +1,277 @@
+// Bullet's constraints to rows, and their direct solution.
+//
+// Of a row with bounds (a motor's largest torque, a stop) nobody knows beforehand whether it is at one. All motors begin
+// among the rows that are solved directly; one that comes out beyond its bounds goes to those that are relaxed one
+// by one, for the rest of the substep.
+#include "physics/joint_block.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+namespace ruedo::physics {
+
+namespace {
+
+constexpr double kUnbounded = 1e17;        // Bullet's "infinity" is 1e18 or more
+constexpr double kRegular = 1e-10;         // part of the diagonal: loops of joints say the same twice
+constexpr size_t kMostRows = 8;            // of one of Bullet's constraints
+constexpr size_t kSkip = 12;               // numbers of a row's Jacobian
+constexpr size_t kMostInBlock = 256;       // rows that are solved directly; a longer mechanism's others are relaxed
+
+Vec3 vector_at(const btScalar* v) { return {v[0], v[1], v[2]}; }
+
+bool is_stop(const Row& row) { return row.lower == 0.0 || row.upper == 0.0; }
+
+}  // namespace
+
+// What Bullet says of a constraint's rows.
+struct JointBlocks::Values {
+  std::array<btScalar, kSkip * kMostRows> jacobian{}, error{}, softness{}, lower{}, upper{};
+};
+
+void JointBlocks::clear() {
+  rows_.clear();
+  joints_.clear();
+  block_count_ = 0;
+}
+
+// Returns how many rows there are. `reduction` is the part of the joint's error that the rows' velocities undo in a substep.
+int JointBlocks::ask(btTypedConstraint& constraint, double reduction, double substep_s, Values& values) {
+  btTypedConstraint::btConstraintInfo1 size;
+  constraint.buildJacobian();
+  constraint.getInfo1(&size);
+  if (size.m_numConstraintRows <= 0) return 0;
+  values = {};
+  values.lower.fill(-BT_LARGE_FLOAT);
+  values.upper.fill(BT_LARGE_FLOAT);
+  btTypedConstraint::btConstraintInfo2 info;
+  info.fps = 1.0 / substep_s;
+  info.erp = reduction;
+  info.m_J1linearAxis = values.jacobian.data();
+  info.m_J1angularAxis = values.jacobian.data() + 3;
+  info.m_J2linearAxis = values.jacobian.data() + 6;
+  info.m_J2angularAxis = values.jacobian.data() + 9;
+  info.rowskip = kSkip;
+  info.m_constraintError = values.error.data();
+  info.cfm = values.softness.data();
+  info.m_lowerLimit = values.lower.data();
+  info.m_upperLimit = values.upper.data();
+  info.m_numIterations = 1;
+  info.m_damping = 1.0;
+  constraint.getInfo2(&info);
+  return size.m_numConstraintRows;
+}
+
+void JointBlocks::add(btTypedConstraint& constraint, int a, int b, const SolverBodies& bodies, double substep_s) {
+  Values values;
+  const int n = ask(constraint, 0.0, substep_s, values);
+  auto* motors = static_cast<JointMotors*>(constraint.getUserConstraintPtr());
+  Joint& joint = joints_.emplace_back();
+  joint.constraint = &constraint;
+  joint.first = rows_.size();
+  joint.a = a;
+  joint.b = b;
+  for (int i = 0; i < n; ++i) {
+    const size_t at = static_cast<size_t>(i) * kSkip;
+    Row row;
+    row.a = a;
+    row.b = b;
+    row.linear_a = vector_at(&values.jacobian[at]);
+    row.angular_a = vector_at(&values.jacobian[at + 3]);
+    row.linear_b = vector_at(&values.jacobian[at + 6]);
+    row.angular_b = vector_at(&values.jacobian[at + 9]);
+    row.softness = values.softness[at];
+    row.target = values.error[at];
+    row.lower = values.lower[at];
+    row.upper = values.upper[at];
+    row.prepare(bodies);
+    rows_.push_back(row);
+  }
+  if (motors && motors->first.on) add_motor(motors->first, joint, bodies);
+  if (motors && motors->second.on) add_motor(motors->second, joint, bodies);
+  joint.count = rows_.size() - joint.first;
+}
+
+// Positive as the child, body b, moves against the parent.
+void JointBlocks::add_motor(JointMotor& motor, Joint& joint, const SolverBodies& bodies) {
+  Row row;
+  row.a = joint.a;
+  row.b = joint.b;
+  const auto arm = [&](int body) {
+    const btRigidBody* bullet = bodies[static_cast<size_t>(body)].bullet;
+    return bullet ? Vec3(motor.anchor - from_bt(bullet->getCenterOfMassPosition())) : Vec3(Vec3::Zero());
+  };
+  if (motor.linear) {
+    row.linear_a = -motor.axis;
+    row.angular_a = -arm(joint.a).cross(motor.axis);
+    row.linear_b = motor.axis;
+    row.angular_b = arm(joint.b).cross(motor.axis);
+  } else {
+    row.angular_a = -motor.axis;
+    row.angular_b = motor.axis;
+  }
+  row.softness = motor.softness;
+  row.target = motor.rate;
+  row.lower = motor.lower;
+  row.upper = motor.upper;
+  row.prepare(bodies);
+  (joint.motors[0] ? joint.motors[1] : joint.motors[0]) = &motor;
+  rows_.push_back(row);
+}
+
+size_t JointBlocks::root(size_t body) {
+  while (parents_[body] != body) body = parents_[body] = parents_[parents_[body]];
+  return body;
+}
+
+void JointBlocks::prepare(const SolverBodies& bodies) {
+  if (rows_.empty()) return;
+  parents_.resize(bodies.size());
+  std::iota(parents_.begin(), parents_.end(), size_t{0});
+  const auto moves = [&](int body) { return bodies[static_cast<size_t>(body)].inverse_mass != Vec3::Zero(); };
+  for (const Joint& joint : joints_) {
+    if (!moves(joint.a) || !moves(joint.b)) continue;
+    const size_t a = root(static_cast<size_t>(joint.a)), b = root(static_cast<size_t>(joint.b));
+    parents_[std::max(a, b)] = std::min(a, b);
+  }
+  constexpr size_t kNone = static_cast<size_t>(-1);
+  block_of_root_.assign(bodies.size(), kNone);
+  for (Joint& joint : joints_) {
+    size_t& block = block_of_root_[root(static_cast<size_t>(moves(joint.a) ? joint.a : joint.b))];
+    if (block == kNone) {
+      block = block_count_++;
+      if (blocks_.size() < block_count_) blocks_.emplace_back();
+      blocks_[block].free.clear();
+      blocks_[block].bounded.clear();
+      blocks_[block].factored = false;
+    }
+    joint.block = block;
+    for (size_t i = joint.first; i < joint.first + joint.count; ++i) {
+      const Row& row = rows_[i];
+      if (row.inverse == 0.0) continue;
+      const bool direct = !is_stop(row) && row.upper > 0.0 && row.lower < 0.0 && blocks_[block].free.size() < kMostInBlock;
+      (direct ? blocks_[block].free : blocks_[block].bounded).push_back(i);
+    }
+  }
+}
+
+void JointBlocks::factor(Block& block) {
+  const size_t n = block.free.size();
+  block.factor.assign(n * n, 0.0);
+  for (size_t i = 0; i < n; ++i) {
+    const Row& row = rows_[block.free[i]];
+    double* of_i = &block.factor[i * n];
+    for (size_t j = 0; j < i; ++j) of_i[j] = row.coupling(rows_[block.free[j]]);
+    of_i[i] = row.response * (1.0 + kRegular) + row.softness;
+  }
+  for (size_t i = 0; i < n; ++i) {
+    double* of_i = &block.factor[i * n];
+    for (size_t j = 0; j <= i; ++j) {
+      const double* of_j = &block.factor[j * n];
+      double sum = of_i[j];
+      for (size_t k = 0; k < j; ++k) sum -= of_i[k] * of_j[k];
+      of_i[j] = j < i ? sum / of_j[j] : std::sqrt(std::max(sum, 1e-300 + kRegular * rows_[block.free[i]].response));
+    }
+  }
+  block.factored = true;
+}
+
+void JointBlocks::solve(const Block& block, std::vector<double>& x) const {
+  const size_t n = block.free.size();
+  for (size_t i = 0; i < n; ++i) {
+    const double* of_i = &block.factor[i * n];
+    double sum = x[i];
+    for (size_t k = 0; k < i; ++k) sum -= of_i[k] * x[k];
+    x[i] = sum / of_i[i];
+  }
+  for (size_t i = n; i-- > 0;) {
+    double sum = x[i];
+    for (size_t k = i + 1; k < n; ++k) sum -= block.factor[k * n + i] * x[k];
+    x[i] = sum / block.factor[i * n + i];
+  }
+}
+
+double JointBlocks::sweep(SolverBodies& bodies) {
+  double worst = 0.0;
+  for (size_t b = 0; b < block_count_; ++b) {
+    Block& block = blocks_[b];
+    for (size_t attempt = 0;; ++attempt) {
+      if (!block.factored) factor(block);
+      x_.resize(block.free.size());
+      for (size_t i = 0; i < x_.size(); ++i) {
+        const Row& row = rows_[block.free[i]];
+        x_[i] = row.target - row.velocity(bodies) - row.softness * row.impulse;
+        worst = std::max(worst, std::abs(x_[i]));
+      }
+      solve(block, x_);
+      size_t kept = 0;
+      for (size_t i = 0; i < x_.size(); ++i) {
+        const Row& row = rows_[block.free[i]];
+        const double wanted = row.impulse + x_[i];
+        if (wanted >= row.lower && wanted <= row.upper) {
+          block.free[kept++] = block.free[i];
+        } else {
+          block.bounded.push_back(block.free[i]);
+        }
+      }
+      if (kept == x_.size()) break;
+      block.free.resize(kept);
+      block.factored = false;
+      for (const size_t i : block.bounded) worst = std::max(worst, rows_[i].relax(bodies));
+    }
+    for (size_t i = 0; i < x_.size(); ++i) rows_[block.free[i]].give(bodies, x_[i]);
+    for (const size_t i : block.bounded) worst = std::max(worst, rows_[i].relax(bodies));
+  }
+  return worst;
+}
+
+double JointBlocks::look_again(double substep_s) {
+  double largest = 0.0;
+  Values whole, none;
+  for (Joint& joint : joints_) {
+    const int n = ask(*joint.constraint, 1.0, substep_s, whole);
+    ask(*joint.constraint, 0.0, substep_s, none);
+    const size_t motors = joint.motors[1] ? 2 : joint.motors[0] ? 1 : 0;
+    for (size_t i = 0; i < joint.count - motors && i < static_cast<size_t>(n); ++i) {
+      Row& row = rows_[joint.first + i];
+      row.push_target = whole.error[i * kSkip] - none.error[i * kSkip];
+      largest = std::max(largest, std::abs(row.push_target));
+    }
+  }
+  return largest;
+}
+
+double JointBlocks::sweep_push(SolverBodies& bodies) {
+  double worst = 0.0;
+  for (size_t b = 0; b < block_count_; ++b) {
+    Block& block = blocks_[b];
+    if (!block.factored) factor(block);
+    x_.resize(block.free.size());
+    for (size_t i = 0; i < x_.size(); ++i) {
+      const Row& row = rows_[block.free[i]];
+      x_[i] = row.push_target - row.push_velocity(bodies);
+      worst = std::max(worst, std::abs(x_[i]));
+    }
+    solve(block, x_);
+    for (size_t i = 0; i < x_.size(); ++i) rows_[block.free[i]].give_push(bodies, x_[i]);
+    for (const size_t i : block.bounded) {
+      Row& row = rows_[i];
+      if (!is_stop(row)) continue;    // a motor at its limit holds nothing
+      const double wanted = std::clamp(row.push + (row.push_target - row.push_velocity(bodies)) * row.inverse, row.lower, row.upper);
+      worst = std::max(worst, std::abs(wanted - row.push) * row.response);
+      row.give_push(bodies, wanted - row.push);
+    }
+  }
+  return worst;
+}
+
+void JointBlocks::write_back() const {
+  for (const Joint& joint : joints_) {
+    const size_t motors = joint.motors[1] ? 2 : joint.motors[0] ? 1 : 0;
+    for (size_t i = 0; i < motors; ++i) joint.motors[i]->impulse = rows_[joint.first + joint.count - motors + i].impulse;
+  }
+}
+
+}  // namespace ruedo::physics

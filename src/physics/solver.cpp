@@ -1,0 +1,413 @@
+// A substep of an island.
+#include "physics/solver.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ruedo::physics {
+
+namespace {
+
+constexpr double kSlowestBounce_m_s = 1e-3;
+// So deep a contact is left in peace. Were it undone, too, what rests would be lifted a little, fall a little, and rock.
+constexpr double kRestingDepth_m = 5e-5;
+constexpr int kPushSweeps = 30;
+constexpr double kPushTolerance_m_s = 1e-5;
+// A joint that comes apart faster did so by no motion of its own: it was pushed, or put.
+constexpr double kFastestClosing_m_s = 0.5;
+
+Eigen::Matrix3d matrix(const btMatrix3x3& m) {
+  Eigen::Matrix3d result;
+  for (int i = 0; i < 3; ++i) result.row(i) = from_bt(m.getRow(i));
+  return result;
+}
+
+// Two directions across n, the same ones while n stays the same.
+void across(const Vec3& n, Vec3& first, Vec3& second) {
+  const Vec3 off = std::abs(n.z()) < 0.7 ? Vec3::UnitZ() : Vec3::UnitX();
+  first = (off - n * n.dot(off)).normalized();
+  second = n.cross(first);
+}
+
+Row linear_row(int a, int b, const Vec3& direction, const Vec3& arm_a, const Vec3& arm_b) {
+  Row row;
+  row.a = a;
+  row.b = b;
+  row.linear_a = direction;
+  row.angular_a = arm_a.cross(direction);
+  row.linear_b = -direction;
+  row.angular_b = -arm_b.cross(direction);
+  return row;
+}
+
+Row angular_row(int a, int b, const Vec3& direction) {
+  Row row;
+  row.a = a;
+  row.b = b;
+  row.angular_a = direction;
+  row.angular_b = -direction;
+  return row;
+}
+
+Quat turned_by(const Quat& rotation, const Vec3& turn) {
+  const double angle = turn.norm();
+  return angle > 0.0 ? (Quat(Eigen::AngleAxisd(angle, turn / angle)) * rotation).normalized() : rotation;
+}
+
+// Free rotation over h: the angular momentum stays, the axes turn. Runge and Kutta's fourth order.
+void turn_freely(const btRigidBody& body, Quat& rotation, Vec3& w, double h) {
+  const Vec3 inverse = from_bt(body.getInvInertiaDiagLocal());
+  const Vec3 momentum = rotation * (rotation.conjugate() * w).cwiseQuotient(inverse);
+  const auto rate = [&](const Quat& q) { return Vec3(q * inverse.cwiseProduct(q.conjugate() * momentum)); };
+  const auto turned = [&](const Vec3& k, double t) {
+    const Quat dq(0.0, k.x(), k.y(), k.z());
+    Quat q = rotation;
+    q.coeffs() += 0.5 * t * (dq * rotation).coeffs();
+    return q.normalized();
+  };
+  const Vec3 k1 = rate(rotation), k2 = rate(turned(k1, 0.5 * h)), k3 = rate(turned(k2, 0.5 * h)), k4 = rate(turned(k3, h));
+  const Vec3 mean = (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0;
+  rotation = turned_by(rotation, h * mean);
+  w = rate(rotation);
+}
+
+}  // namespace
+
+int Solver::body_of(const btCollisionObject& object) {
+  const int index = object.getCompanionId();
+  return index > 0 && static_cast<size_t>(index) < bodies_.size() && bodies_[static_cast<size_t>(index)].bullet == &object ? index : 0;
+}
+
+void Solver::add_body(btRigidBody& body, double substep_s) {
+  body.setCompanionId(static_cast<int>(bodies_.size()));
+  SolverBody& s = bodies_.emplace_back();
+  s.bullet = &body;
+  s.v = s.v0 = from_bt(body.getLinearVelocity());
+  s.w = s.w0 = from_bt(body.getAngularVelocity());
+  if (body.isStaticOrKinematicObject()) return;
+  s.inverse_mass = body.getInvMass() * from_bt(body.getLinearFactor());
+  const Eigen::DiagonalMatrix<double, 3> factor(from_bt(body.getAngularFactor()));
+  s.inverse_inertia = factor * matrix(body.getInvInertiaTensorWorld()) * factor;
+  s.v += substep_s * s.inverse_mass.cwiseProduct(from_bt(body.getTotalForce()));
+  s.w += substep_s * (s.inverse_inertia * from_bt(body.getTotalTorque()));
+}
+
+void Solver::set_normal(ContactRows& contact, const ContactSurface& surface, double substep_s) {
+  Row& row = contact.normal;
+  const double gap = contact.gap;
+  double reduction = settings_.error_reduction;
+  contact.soft = surface.stiffness > 0.0;
+  if (contact.soft) {    // an implicit spring and damper
+    const double hard = substep_s * surface.stiffness + surface.damping;
+    row.softness = 1.0 / (substep_s * hard);
+    reduction = substep_s * surface.stiffness / hard;
+  }
+  row.prepare(bodies_);
+  row.lower = 0.0;
+  row.upper = BT_LARGE_FLOAT;
+  row.target = gap > 0.0 ? -gap / substep_s : contact.soft ? -reduction * gap / substep_s : 0.0;
+  row.push_target = gap < -kRestingDepth_m && !contact.soft ? -reduction * (gap + kRestingDepth_m) / substep_s : 0.0;
+  if (surface.restitution <= 0.0) return;
+  // The speed at the moment of touching, somewhere within the substep: forces act up to there only.
+  const SolverBody& A = bodies_[static_cast<size_t>(row.a)];
+  const SolverBody& B = bodies_[static_cast<size_t>(row.b)];
+  const double before = -(row.linear_a.dot(A.v0) + row.angular_a.dot(A.w0) + row.linear_b.dot(B.v0) + row.angular_b.dot(B.w0));
+  const double acceleration = (-row.velocity(bodies_) - before) / substep_s;
+  const double square = before * std::abs(before) + 2.0 * acceleration * std::max(gap, 0.0);
+  const double rebound = square > 0.0 ? surface.restitution * std::sqrt(square) : 0.0;
+  contact.rebound = rebound > kSlowestBounce_m_s ? rebound : 0.0;
+}
+
+void Solver::set_friction(ContactRows& contact, const ContactSurface& surface) {
+  contact.along.softness = surface.slip;
+  contact.across.softness = surface.slip2;
+  contact.along.prepare(bodies_);
+  contact.across.prepare(bodies_);
+  contact.friction = surface.friction;
+  contact.friction2 = surface.friction2;
+  const double m1 = surface.friction, m2 = surface.friction2;
+  const double k11 = m1 * m1 * (contact.along.response + surface.slip), k22 = m2 * m2 * (contact.across.response + surface.slip2);
+  const double k12 = m1 * m2 * contact.along.coupling(contact.across);
+  const double largest = 0.5 * (k11 + k22) + std::hypot(0.5 * (k11 - k22), k12);
+  contact.step = largest > 1e-12 ? 1.0 / largest : 0.0;
+}
+
+void Solver::add_contact(btManifoldPoint& point, const ContactSurface& surface, int a, int b, double substep_s) {
+  if (contacts_.size() == contact_count_) contacts_.emplace_back();
+  ContactRows& contact = contacts_[contact_count_++];
+  contact = {};
+  contact.point = &point;
+  contact.gap = point.getDistance();
+  const Vec3 normal = from_bt(point.m_normalWorldOnB);
+  const auto arm = [&](int body, const btVector3& at) {
+    const btRigidBody* bullet = bodies_[static_cast<size_t>(body)].bullet;
+    return bullet ? from_bt(at - bullet->getCenterOfMassPosition()) : Vec3(Vec3::Zero());
+  };
+  const Vec3 arm_a = arm(a, point.getPositionWorldOnA()), arm_b = arm(b, point.getPositionWorldOnB());
+  contact.normal = linear_row(a, b, normal, arm_a, arm_b);
+  set_normal(contact, surface, substep_s);
+
+  Vec3 first, second;
+  across(normal, first, second);
+  if (surface.along != Vec3::Zero()) {
+    const Vec3 along = surface.along - normal * normal.dot(surface.along);
+    if (along.norm() > 1e-6 * surface.along.norm()) {
+      first = along.normalized();
+      second = normal.cross(first);
+    }
+  }
+  contact.along = linear_row(a, b, first, arm_a, arm_b);
+  contact.across = linear_row(a, b, second, arm_a, arm_b);
+  ContactSurface of_rows = surface;
+  of_rows.slip /= substep_s;
+  of_rows.slip2 /= substep_s;
+  set_friction(contact, of_rows);
+
+  contact.spinning = surface.spinning;
+  contact.rolling = surface.rolling;
+  if (surface.spinning > 0.0) {
+    contact.spin = angular_row(a, b, normal);
+    contact.spin.prepare(bodies_);
+  }
+  if (surface.rolling > 0.0) {
+    contact.roll[0] = angular_row(a, b, first);
+    contact.roll[1] = angular_row(a, b, second);
+    for (Row& row : contact.roll) row.prepare(bodies_);
+  }
+  start_from_last(contact, substep_s);
+}
+
+// The impulses of the substep before. m_prevRHS, which Bullet does not use, holds how long that was.
+void Solver::start_from_last(ContactRows& contact, double substep_s) {
+  const btManifoldPoint& point = *contact.point;
+  if (!(point.m_prevRHS > 0.0) || !(point.m_appliedImpulse > 0.0)) return;
+  const double scale = substep_s / point.m_prevRHS;
+  contact.normal.give(bodies_, scale * point.m_appliedImpulse);
+  const Vec3 rubbed = scale * from_bt(point.m_appliedImpulseLateral1 * point.m_lateralFrictionDir1 + point.m_appliedImpulseLateral2 * point.m_lateralFrictionDir2);
+  contact.along.give(bodies_, rubbed.dot(contact.along.linear_a));
+  contact.across.give(bodies_, rubbed.dot(contact.across.linear_a));
+}
+
+void Solver::add_contacts(btPersistentManifold& manifold, double substep_s) {
+  const btCollisionObject& a = *manifold.getBody0();
+  const btCollisionObject& b = *manifold.getBody1();
+  const int of_a = body_of(a), of_b = body_of(b);
+  for (int i = 0; i < manifold.getNumContacts(); ++i) {
+    btManifoldPoint& point = manifold.getContactPoint(i);
+    add_contact(point, surfaces_.at(a, b, point), of_a, of_b, substep_s);
+  }
+}
+
+// Both directions of friction at once: what holds, where that is within the ellipse of Coulomb's law; else the
+// projection of a step against the slip onto it, in coordinates in which the ellipse is a circle.
+double Solver::rub(ContactRows& contact) {
+  Row& first = contact.along;
+  Row& second = contact.across;
+  const double load = std::max(contact.normal.impulse, 0.0);    // a conjugate step may have gone too far
+  if (load == 0.0 && first.impulse == 0.0 && second.impulse == 0.0) return 0.0;
+  const double v1 = first.velocity(bodies_) + first.softness * first.impulse, v2 = second.velocity(bodies_) + second.softness * second.impulse;
+  const double m1 = contact.friction, m2 = contact.friction2;
+  double p1 = first.impulse - v1 * first.inverse, p2 = second.impulse - v2 * second.inverse;
+  const double u1 = m1 > 0.0 ? p1 / m1 : 0.0, u2 = m2 > 0.0 ? p2 / m2 : 0.0;
+  const bool inside = (m1 > 0.0 || p1 == 0.0) && (m2 > 0.0 || p2 == 0.0) && u1 * u1 + u2 * u2 <= load * load;
+  if (!inside) {
+    double s1 = (m1 > 0.0 ? first.impulse / m1 : 0.0) - contact.step * m1 * v1, s2 = (m2 > 0.0 ? second.impulse / m2 : 0.0) - contact.step * m2 * v2;
+    const double size = std::hypot(s1, s2);
+    if (size > load) {
+      s1 *= load / size;
+      s2 *= load / size;
+    }
+    p1 = m1 * s1;
+    p2 = m2 * s2;
+  }
+  const double more1 = p1 - first.impulse, more2 = p2 - second.impulse;
+  first.give(bodies_, more1);
+  second.give(bodies_, more2);
+  return std::max(std::abs(more1) * first.response, std::abs(more2) * second.response);
+}
+
+double Solver::sweep(int number) {
+  double worst = blocks_.sweep(bodies_);
+  // To and fro: a load goes all the way through a stack in one sweep, whichever way it is numbered.
+  const auto nth = [&](size_t c) -> ContactRows& { return contacts_[number % 2 == 0 ? c : contact_count_ - 1 - c]; };
+  for (size_t c = 0; c < contact_count_; ++c) {
+    ContactRows& contact = nth(c);
+    worst = std::max(worst, rub(contact));
+    if (contact.spinning > 0.0) {
+      contact.spin.upper = contact.spinning * std::max(contact.normal.impulse, 0.0);
+      contact.spin.lower = -contact.spin.upper;
+      worst = std::max(worst, contact.spin.relax(bodies_));
+    }
+    for (int k = 0; contact.rolling > 0.0 && k < 2; ++k) {
+      contact.roll[k].upper = contact.rolling * std::max(contact.normal.impulse, 0.0);
+      contact.roll[k].lower = -contact.roll[k].upper;
+      worst = std::max(worst, contact.roll[k].relax(bodies_));
+    }
+  }
+  for (size_t c = 0; c < contact_count_; ++c) worst = std::max(worst, nth(c).normal.relax(bodies_));
+  return worst;
+}
+
+// Between the sweeps the impulses go on along conjugate directions (M. Silcowitz-Hansen, S. Niebel, K. Erleben, "A
+// nonsmooth nonlinear conjugate gradient method for interactive contact force problems", 2010): stacks and large ratios of
+// masses take a part of the sweeps. The next sweep brings them back within their bounds; the last one goes nowhere.
+void Solver::sweep_until_still() {
+  double last_square = 0.0;
+  for (size_t c = 0; c < contact_count_; ++c) {
+    for (Row* row : contacts_[c].main_rows()) row->before = row->impulse, row->heading = 0.0;
+  }
+  for (int i = 0; i < settings_.iterations; ++i) {
+    const double worst = sweep(i);
+    ++sweeps_;
+    if (worst <= settings_.tolerance_m_s || i + 1 == settings_.iterations) break;
+    double square = 0.0;
+    for (size_t c = 0; c < contact_count_; ++c) {
+      for (const Row* row : contacts_[c].main_rows()) square += (row->impulse - row->before) * (row->impulse - row->before) * row->response;
+    }
+    const double further = i > 0 && last_square > 0.0 ? square / last_square : 0.0;
+    const bool on = further < 1.0 && i + 2 < settings_.iterations;
+    for (size_t c = 0; c < contact_count_; ++c) {
+      for (Row* row : contacts_[c].main_rows()) {
+        const double step = row->impulse - row->before;
+        if (on && row->heading != 0.0) row->give(bodies_, further * row->heading);
+        row->heading = (on ? further * row->heading : 0.0) + step;
+        row->before = row->impulse;
+      }
+    }
+    last_square = square;
+  }
+}
+
+// Of contacts: by velocities that move the bodies in this substep and are not kept.
+void Solver::undo_penetration() {
+  bool any = false;
+  for (size_t c = 0; c < contact_count_; ++c) any |= contacts_[c].normal.push_target > 0.0;
+  if (!any) return;
+  for (int i = 0; i < kPushSweeps; ++i) {
+    double worst = blocks_.sweep_push(bodies_);
+    for (size_t c = 0; c < contact_count_; ++c) {
+      Row& row = contacts_[c].normal;
+      if (contacts_[c].gap > 0.0 || contacts_[c].soft) continue;
+      const double wanted = std::max(0.0, row.push + (row.push_target - row.push_velocity(bodies_)) * row.inverse);
+      if (wanted == row.push) continue;
+      worst = std::max(worst, std::abs(wanted - row.push) * row.response);
+      row.give_push(bodies_, wanted - row.push);
+    }
+    if (worst <= kPushTolerance_m_s) return;
+  }
+}
+
+// The bodies of a mechanism went straight on where its joints lead along arcs. What brings them back together is part of
+// their motion, and so is its velocity (J.-P. Ryckaert et al., "Numerical integration of the cartesian equations of motion of a
+// system with constraints", 1977: SHAKE): a pendulum keeps its energy. An error that no motion makes is undone without.
+void Solver::close_joints(double substep_s) {
+  if (blocks_.empty()) return;
+  for (SolverBody& s : bodies_) s.push_v = s.push_w = Vec3::Zero();
+  const double largest = blocks_.look_again(substep_s);
+  if (largest <= 0.0) return;
+  blocks_.sweep_push(bodies_);
+  const bool kept = largest < kFastestClosing_m_s;
+  for (size_t i = 1; i < bodies_.size(); ++i) {
+    SolverBody& s = bodies_[i];
+    if (s.push_v == Vec3::Zero() && s.push_w == Vec3::Zero()) continue;
+    btTransform X = s.bullet->getWorldTransform();
+    X.setOrigin(X.getOrigin() + to_bt(Vec3(substep_s * s.push_v)));
+    X.setRotation(to_bt(turned_by(from_bt(X.getRotation()), substep_s * s.push_w)));
+    s.bullet->setWorldTransform(X);
+    s.bullet->updateInertiaTensor();
+    if (!kept) continue;
+    s.v += s.push_v;
+    s.w += s.push_w;
+  }
+}
+
+void Solver::advance(double substep_s) {
+  for (size_t i = 1; i < bodies_.size(); ++i) {
+    SolverBody& s = bodies_[i];
+    if (s.inverse_mass == Vec3::Zero() && s.bullet->isStaticOrKinematicObject()) continue;
+    const btTransform& X = s.bullet->getWorldTransform();
+    Vec3 position = from_bt(X.getOrigin()) + substep_s * (s.v + s.push_v);
+    // In free flight the mean velocity of the substep is exact.
+    if (!s.held) position -= 0.5 * substep_s * (s.v - s.v0);
+    Quat rotation = from_bt(X.getRotation());
+    const Vec3 turn = s.w + s.push_w;
+    const bool free_axes = s.bullet->getAngularFactor() == btVector3(1, 1, 1);
+    if (free_axes && s.push_w == Vec3::Zero()) {
+      turn_freely(*s.bullet, rotation, s.w, substep_s);
+    } else {
+      rotation = turned_by(rotation, substep_s * turn);
+    }
+    s.bullet->setWorldTransform(btTransform(to_bt(rotation), to_bt(position)));
+    s.bullet->updateInertiaTensor();
+  }
+}
+
+// Bodies have reached what they hit; now they leave it.
+void Solver::bounce() {
+  bool any = false;
+  for (size_t c = 0; c < contact_count_; ++c) {
+    ContactRows& contact = contacts_[c];
+    if (contact.rebound <= 0.0 || contact.normal.impulse <= 0.0) continue;
+    contact.normal.target = contact.rebound;
+    any = true;
+  }
+  if (any) sweep_until_still();
+}
+
+void Solver::write_back(double substep_s) {
+  for (size_t c = 0; c < contact_count_; ++c) {
+    const ContactRows& contact = contacts_[c];
+    btManifoldPoint& point = *contact.point;
+    point.m_appliedImpulse = contact.normal.impulse;
+    point.m_appliedImpulseLateral1 = contact.along.impulse;
+    point.m_appliedImpulseLateral2 = contact.across.impulse;
+    point.m_lateralFrictionDir1 = to_bt(contact.along.linear_a);
+    point.m_lateralFrictionDir2 = to_bt(contact.across.linear_a);
+    point.m_prevRHS = substep_s;
+  }
+  blocks_.write_back();
+  for (size_t i = 1; i < bodies_.size(); ++i) {
+    SolverBody& s = bodies_[i];
+    if (!s.bullet->isStaticOrKinematicObject()) {
+      s.bullet->setLinearVelocity(to_bt(s.v));
+      s.bullet->setAngularVelocity(to_bt(s.w));
+    }
+    s.bullet->setCompanionId(-1);
+  }
+}
+
+void Solver::solve(const std::vector<btRigidBody*>& bodies, const std::vector<btPersistentManifold*>& manifolds,
+                   const std::vector<btTypedConstraint*>& joints, double substep_s) {
+  sweeps_ = 0;
+  contact_count_ = 0;
+  bodies_.clear();
+  bodies_.emplace_back();
+  blocks_.clear();
+  for (btRigidBody* body : bodies) add_body(*body, substep_s);
+  const auto tie = [this](btRigidBody& body) {
+    const int index = body_of(body);
+    if (index > 0) bodies_[static_cast<size_t>(index)].held = true;
+    return index;
+  };
+  for (btTypedConstraint* joint : joints) {
+    const int a = tie(joint->getRigidBodyA()), b = tie(joint->getRigidBodyB());
+    blocks_.add(*joint, a, b, bodies_, substep_s);
+  }
+  blocks_.prepare(bodies_);
+  for (btPersistentManifold* manifold : manifolds) add_contacts(*manifold, substep_s);
+  if (contact_count_ > 0 || !blocks_.empty()) {
+    sweep_until_still();
+    undo_penetration();
+  }
+  for (size_t c = 0; c < contact_count_; ++c) {
+    const ContactRows& contact = contacts_[c];
+    if (contact.normal.impulse == 0.0 && contact.normal.push == 0.0) continue;
+    bodies_[static_cast<size_t>(contact.normal.a)].held = bodies_[static_cast<size_t>(contact.normal.b)].held = true;
+  }
+  advance(substep_s);
+  close_joints(substep_s);
+  bounce();
+  write_back(substep_s);
+}
+
+}  // namespace ruedo::physics

@@ -1,0 +1,40 @@
+// Flight and rotation of bodies that nothing touches, against closed forms.
+#include <gtest/gtest.h>
+
+#include "world.h"
+
+namespace ruedo::physics::testing {
+namespace {
+
+TEST(FreeMotion, FlightIsTheParabolaAtAnyStep) {
+  for (const int64_t step_us : {1000, 5000, 20'000}) {
+    World w(thing("ball", "0 0 5 0 0 0", kBall, 1), step_us);
+    w.physics.set_twist(0, {{2, 0, 3}, Vec3::Zero()});
+    w.run(1.0);
+    EXPECT_NEAR(w.position("ball/l").x(), 2.0, 1e-9);
+    EXPECT_NEAR(w.position("ball/l").z(), 5.0 + 3.0 - 5.0, 1e-9);
+    EXPECT_NEAR(w.physics.twist(0).linear.z(), 3.0 - 10.0, 1e-9);
+  }
+}
+
+// A body with three moments, spun near its middle axis, tumbles; energy and angular momentum stay.
+TEST(FreeMotion, RotationKeepsEnergyAndAngularMomentum) {
+  World w("<model name='m'><link name='l'><gravity>0</gravity><inertial><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.02</iyy><izz>0.025</izz></inertia></inertial></link></model>", 5000);
+  const auto momentum = [&] { return Vec3(w.physics.inertia(0) * w.physics.twist(0).angular); };
+  const auto energy = [&] { return 0.5 * w.physics.twist(0).angular.dot(momentum()); };
+  w.physics.set_twist(0, {Vec3::Zero(), {0.1, 5.0, 0.1}});
+  w.physics.step();
+  const Vec3 L = momentum();
+  const double E = energy();
+  double most_turned = 0.0;
+  for (int i = 0; i < 1200; ++i) {
+    w.physics.step();
+    most_turned = std::max(most_turned, (w.physics.twist(0).angular - Vec3(0.1, 5.0, 0.1)).norm());
+  }
+  EXPECT_GT(most_turned, 1.5);    // it did tumble
+  EXPECT_LT((momentum() - L).norm(), 1e-6 * L.norm());
+  EXPECT_NEAR(energy() / E, 1.0, 1e-4);
+}
+
+}  // namespace
+}  // namespace ruedo::physics::testing
