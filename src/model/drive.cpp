@@ -351,6 +351,9 @@ DriveDescription read_drive(std::shared_ptr<const Element> element, std::shared_
   drive.traction = e.boolean("ruedo:traction", true);
   const bool wheels = drive.kind == DriveDescription::Kind::wheels;
   drive.on_odometry = e.choice("ruedo:primitives", wheels ? "odometry" : "truth", {"truth", "odometry"}) == "odometry";
+  if (drive.on_odometry && drive.steering != Steering::differential) {
+    e.child("ruedo:primitives")->fail("'odometry' is not allowed with steering '" + name_of(drive.steering) + "'; allowed is truth");
+  }
   if (wheels && !drive.on_odometry) e.child("ruedo:primitives")->fail("'truth' is not allowed with wheels: a robot knows its wheels only; allowed is odometry");
   drive.pose_rate = e.rate("ruedo:pose_rate", drive.pose_rate);
   drive.status_rate = e.rate("ruedo:status_rate", drive.status_rate);

@@ -60,6 +60,7 @@ void Drive::set_state(const Pose& X_WBase, const Twist& twist) {
 void Drive::reset_odometry() {
   ++resets_;
   odom_heading_ = heading(X_WBase_.rotation);
+  believed_heading_ = 0.0;
 }
 
 void Drive::placed(SimTime now) {

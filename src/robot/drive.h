@@ -6,6 +6,7 @@
 #include "model/body_layout.h"
 #include "physics/physics_world.h"
 #include "robot/motion.h"
+#include "robot/wheel_kinematics.h"
 #include "ruedo/snapshot.h"
 
 namespace ruedo::robot {
@@ -31,7 +32,10 @@ class Drive {
   Motion& motion() { return motion_; }
   // The robot's state in the snapshot, and what of its motion came to an end.
   void read(Snapshot& snapshot) const;
-  double heading_in_odom() const { return wrap_angle(heading(X_WBase_.rotation) - odom_heading_); }
+  // As the robot's primitives measure it: the true one, or what its odometry makes of its wheels.
+  double heading_in_odom() const {
+    return description_.on_odometry ? believed_heading_ : wrap_angle(heading(X_WBase_.rotation) - odom_heading_);
+  }
   void reset_odometry();
 
   // The robot was put somewhere else, at rest: the physics has it there already. Its odometry knows nothing of that.
@@ -62,6 +66,7 @@ class Drive {
   Vec3 velocity_ = Vec3::Zero();         // of base_link in the world
   Vec3 acceleration_ = Vec3::Zero();     // of base_link in base_link
   double odom_heading_ = 0.0;            // of odom in the world
+  double believed_heading_ = 0.0;        // of base_link in odom, by the wheels
   int32_t resets_ = 0;
   double wheel_v_ = 0.0, wheel_omega_ = 0.0;
 };

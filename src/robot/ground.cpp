@@ -7,8 +7,8 @@
 
 namespace ruedo::robot {
 
-std::vector<double> level_planes(const model::WorldModel& world, const model::BodyLayout& layout) {
-  std::vector<double> heights;
+std::vector<LevelPlane> level_planes(const model::WorldModel& world, const model::BodyLayout& layout) {
+  std::vector<LevelPlane> planes;
   for (const auto& placement : layout.links) {
     const auto& instance = world.models[static_cast<size_t>(placement.instance)];
     if (placement.body >= 0 || instance.removed) continue;
@@ -17,16 +17,16 @@ std::vector<double> level_planes(const model::WorldModel& world, const model::Bo
       if (collision.geometry.shape != model::Shape::plane) continue;
       const Pose X_WC = placement.X_BL * collision.X_LC;
       const Vec3 normal = X_WC.rotation * collision.geometry.normal;
-      if (normal.z() > 1.0 - 1e-12) heights.push_back(X_WC.translation.z());
+      if (normal.z() > 1.0 - 1e-12) planes.push_back({X_WC.translation.z(), collision.surface.friction});
     }
   }
-  return heights;
+  return planes;
 }
 
-std::optional<double> nearest_plane(const std::vector<double>& planes, double height) {
-  std::optional<double> nearest;
-  for (const double plane : planes) {
-    if (!nearest || std::abs(plane - height) < std::abs(*nearest - height)) nearest = plane;
+std::optional<LevelPlane> nearest_plane(const std::vector<LevelPlane>& planes, double height) {
+  std::optional<LevelPlane> nearest;
+  for (const LevelPlane& plane : planes) {
+    if (!nearest || std::abs(plane.height - height) < std::abs(nearest->height - height)) nearest = plane;
   }
   return nearest;
 }
@@ -66,6 +66,17 @@ double lowest_point(const model::Geometry& geometry, const Pose& X_FC) {
       break;
   }
   return X_FC.translation.z() - reach;
+}
+
+double friction_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout, int robot) {
+  const auto& placement = layout.robots[static_cast<size_t>(robot)];
+  const auto& model = *world.models[static_cast<size_t>(placement.instance)].model;
+  double least = std::numeric_limits<double>::infinity();
+  for (const int wheel : placement.wheels) {
+    const auto& link = layout.links[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].link)];
+    for (const auto& collision : model.links[static_cast<size_t>(link.link)].collisions) least = std::min(least, collision.surface.friction);
+  }
+  return std::isfinite(least) ? least : 1.0;
 }
 
 double lowest_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout, int robot) {

@@ -8,11 +8,18 @@
 
 namespace ruedo::robot {
 
-// Heights (m, world) of the static planes whose normal points straight up.
-std::vector<double> level_planes(const model::WorldModel& world, const model::BodyLayout& layout);
+// A static plane whose normal points straight up.
+struct LevelPlane {
+  double height;      // m, world
+  double friction;
+};
+std::vector<LevelPlane> level_planes(const model::WorldModel& world, const model::BodyLayout& layout);
 
 // The plane nearest to that height.
-std::optional<double> nearest_plane(const std::vector<double>& planes, double height);
+std::optional<LevelPlane> nearest_plane(const std::vector<LevelPlane>& planes, double height);
+
+// The least friction of the shapes of a robot's wheels; 1 where they have none.
+double friction_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout, int robot);
 
 // Height of the lowest point of a shape at X_FC, along z of F.
 double lowest_point(const model::Geometry& geometry, const Pose& X_FC);

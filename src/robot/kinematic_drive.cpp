@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "robot/ground.h"
 
@@ -20,16 +21,30 @@ constexpr double kLeverWithoutWheels_m = 0.25;    // of the force that turns a r
 constexpr SimTime kFallAsleep_us = 500'000;
 constexpr double kStill_m_s = 2e-3, kStill_rad_s = 1e-2;    // of what Bullet moves
 
+// A lighter load than this part of its weight is a first touch, not what it stands with.
+constexpr double kFirstTouch = 0.05;
+
+bool have_shapes(const model::WorldModel& world, const model::BodyLayout& layout, const std::vector<int>& wheels) {
+  return std::any_of(wheels.begin(), wheels.end(), [&](int wheel) {
+    const auto& link = layout.links[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].link)];
+    return !world.models[static_cast<size_t>(link.instance)].model->links[static_cast<size_t>(link.link)].collisions.empty();
+  });
+}
+
 Quat about_z(double angle) { return {std::cos(0.5 * angle), 0.0, 0.0, std::sin(0.5 * angle)}; }
 
 }  // namespace
 
 KinematicDrive::KinematicDrive(const model::WorldModel& world, const model::BodyLayout& layout,
-                               physics::PhysicsWorld& physics, int robot, const std::vector<double>& planes)
+                               physics::PhysicsWorld& physics, int robot, const std::vector<LevelPlane>& planes)
     : Drive(world, layout, physics, robot),
       wheel_angles_(layout, robot, description_),
       planes_(planes),
+      world_(world),
+      layout_(layout),
       lowest_(lowest_of_wheels(world, layout, robot)),
+      wheel_friction_(friction_of_wheels(world, layout, robot)),
+      wheels_touch_(have_shapes(world, layout, wheels_)),
       mass_(physics.mass(body_)),
       yaw_inertia_((X_WBase_.rotation * Vec3::UnitZ()).dot(physics.inertia(body_) * (X_WBase_.rotation * Vec3::UnitZ()))),
       lever_(description_.track > 0.0 ? 0.5 * description_.track : kLeverWithoutWheels_m),
@@ -41,14 +56,16 @@ KinematicDrive::KinematicDrive(const model::WorldModel& world, const model::Body
 void KinematicDrive::stand_on_near_plane() {
   const auto plane = nearest_plane(planes_, X_WBase_.translation.z() + lowest_);
   const Vec3 up = X_WBase_.rotation * Vec3::UnitZ();
-  if (plane && std::abs(plane_gap(*plane)) < kNearAtStart_m && up.z() > std::cos(kLevel_rad)) stand_on_plane(*plane);
+  if (plane && std::abs(plane_gap(plane->height)) < kNearAtStart_m && up.z() > std::cos(kLevel_rad)) stand_on_plane(*plane);
 }
 
-void KinematicDrive::stand_on_plane(double height) {
+void KinematicDrive::stand_on_plane(const LevelPlane& plane) {
   on_plane_ = true;
+  plane_friction_ = plane.friction;
+  carrier_ = Twist{Vec3::Zero(), Vec3::Zero()};
   heading_ = heading(X_WBase_.rotation);
   X_WBase_.rotation = about_z(heading_);
-  X_WBase_.translation.z() = height - lowest_;
+  X_WBase_.translation.z() = plane.height - lowest_;
   physics_.set_support(body_, physics::Support::plane);
   physics_.set_gravity(body_, Vec3::Zero());
   physics_.set_pose(body_, X_WBase_ * X_BaseB_);
@@ -67,13 +84,14 @@ void KinematicDrive::begin_at_rest() {
 void KinematicDrive::ground_changed() {
   if (!on_plane_) return;
   const auto plane = nearest_plane(planes_, X_WBase_.translation.z() + lowest_);
-  if (plane && std::abs(plane_gap(*plane)) < kNear_m) return;
+  if (plane && std::abs(plane_gap(plane->height)) < kNear_m) return;
   leave_plane();
   supported_ = false;
   wake();
 }
 
 void KinematicDrive::leave_plane() {
+  grip_ = grip_on_plane();
   on_plane_ = false;
   supported_ = true;
   physics_.set_support(body_, physics::Support::contacts);
@@ -81,6 +99,27 @@ void KinematicDrive::leave_plane() {
 
 bool KinematicDrive::is_support(const Contact& contact, const Vec3& up) const {
   return contact.normal.dot(up) > kSupportNormal;
+}
+
+bool KinematicDrive::on_wheel(const Contact& contact) const {
+  return !wheels_touch_ || (contact.link_a >= 0 && layout_.links[static_cast<size_t>(contact.link_a)].wheel >= 0);
+}
+
+double KinematicDrive::friction(const Contact& contact) const {
+  const auto of = [this](int link, int shape) {
+    if (link < 0 || shape < 0) return 1.0;
+    const auto& placed = layout_.links[static_cast<size_t>(link)];
+    const auto& collisions = world_.models[static_cast<size_t>(placed.instance)].model->links[static_cast<size_t>(placed.link)].collisions;
+    return static_cast<size_t>(shape) < collisions.size() ? collisions[static_cast<size_t>(shape)].surface.friction : 1.0;
+  };
+  return std::min(of(contact.link_a, contact.shape_a), of(contact.link_b, contact.shape_b));
+}
+
+// With what it carries; what it leans on lightens it.
+double KinematicDrive::grip_on_plane() const {
+  double load = mass_ * gravity_.norm();
+  for (const Contact& contact : physics_.contacts(body_)) load -= contact.normal.z() * contact.force;
+  return std::min(wheel_friction_, plane_friction_) * std::max(load, 0.0);
 }
 
 void KinematicDrive::choose_support() {
@@ -96,13 +135,51 @@ void KinematicDrive::choose_support() {
   const auto plane = nearest_plane(planes_, X_WBase_.translation.z() + lowest_);
   for (const Contact& contact : physics_.nearby(body_)) {
     if (!is_support(contact, up)) continue;
-    supported_ |= contact.depth > -kStanding_m;
+    supported_ |= contact.depth > -kStanding_m && on_wheel(contact);
     bump |= contact.body_b >= 0 || contact.normal.z() < 1.0 - 1e-9 || !plane ||
-            std::abs(contact.position.z() - *plane) > kNear_m;
+            std::abs(contact.position.z() - plane->height) > kNear_m;
   }
-  if (plane && supported_ && !bump && up.z() > std::cos(kLevel_rad) && std::abs(plane_gap(*plane)) < kNear_m &&
+  if (plane && supported_ && !bump && up.z() > std::cos(kLevel_rad) && std::abs(plane_gap(plane->height)) < kNear_m &&
       std::abs(twist_.linear.z()) < kCalm_m_s) {
-    stand_on_plane(*plane);
+    return stand_on_plane(*plane);
+  }
+  look_at_support();
+}
+
+// How firmly the wheels stand, on what, and how that moves.
+void KinematicDrive::look_at_support() {
+  const Vec3 up = X_WBase_.rotation * Vec3::UnitZ();
+  double load = 0.0, least = std::numeric_limits<double>::infinity();
+  grip_ = 0.0;
+  carriers_.clear();
+  for (const Contact& contact : physics_.nearby(body_)) {
+    if (!is_support(contact, up) || !on_wheel(contact) || contact.depth < -kStanding_m) continue;
+    const double mu = friction(contact);
+    load += contact.force;
+    grip_ += mu * contact.force;
+    least = std::min(least, mu);
+    if (contact.body_b >= 0) carriers_.push_back(contact);
+  }
+  const double weight = mass_ * std::max(0.0, -up.dot(gravity_));
+  if (load < kFirstTouch * weight && std::isfinite(least)) grip_ = least * weight;
+  carrier_ = Twist{Vec3::Zero(), Vec3::Zero()};
+  const Quat to_base = X_WBase_.rotation.conjugate();
+  for (const Contact& contact : carriers_) {
+    const Twist& twist = physics_.twist(contact.body_b);
+    const Vec3 arm = X_WBase_.translation - physics_.pose(contact.body_b).translation;
+    const double part = 1.0 / static_cast<double>(carriers_.size());
+    carrier_.linear += part * (to_base * (twist.linear + twist.angular.cross(arm)));
+    carrier_.angular += part * (to_base * twist.angular);
+  }
+}
+
+// What the wheels do to the robot they do to what carries it, the other way round.
+void KinematicDrive::push_back(const Vec3& impulse) {
+  const double part = 1.0 / static_cast<double>(carriers_.size());
+  for (const Contact& contact : carriers_) {
+    if (physics_.mass(contact.body_b) <= 0.0) continue;
+    const Vec3 share = -part * impulse;
+    physics_.apply_impulse(contact.body_b, share, (contact.position - physics_.center_of_mass(contact.body_b)).cross(share));
   }
 }
 
@@ -117,9 +194,19 @@ void KinematicDrive::before_step(SimTime now) {
     if (physics_.sleeping(body_)) return;
     wake();
   }
-  way_ = motion_.step(now, step_us_);
+  way_ = planned_ = motion_.step(now, step_us_);
+  if (description_.on_odometry) {    // the wheels turn as the robot believes it must; what comes of it depends on what they are
+    believed_heading_ = wrap_angle(believed_heading_ + planned_.angle);
+    const SideRates turned = WheelKinematics::believed(description_).wheels({planned_.way, planned_.angle});
+    const PlaneMotion made = WheelKinematics::real(description_).motion(turned);
+    way_ = along_arc(made.v, made.omega);
+  }
   wheel_angles_.advance(way_);
-  if (!physics_.alone(body_)) choose_support();
+  if (!physics_.alone(body_)) {
+    choose_support();
+  } else if (!on_plane_) {
+    supported_ = false;
+  }
   if (on_plane_) {
     before_on_plane();
   } else {
@@ -127,32 +214,32 @@ void KinematicDrive::before_step(SimTime now) {
   }
 }
 
-bool KinematicDrive::servo(Twist& twist, bool bounded) {
-  double dx = way_.x / step_s_ - twist.linear.x(), dy = way_.y / step_s_ - twist.linear.y();
-  double turn = way_.angle / step_s_ - twist.angular.z();
+bool KinematicDrive::servo(Twist& twist, double force, const Vec3& gravity) {
+  double dx = way_.x / step_s_ + carrier_.linear.x() - twist.linear.x(), dy = way_.y / step_s_ + carrier_.linear.y() - twist.linear.y();
+  double turn = way_.angle / step_s_ + carrier_.angular.z() - twist.angular.z();
   if (touched_ && held_) {    // what contacts took in the last step they will take again: the servo gives it in advance
     dx += sent_.x() - twist.linear.x();
     dy += sent_.y() - twist.linear.y();
     turn += sent_.z() - twist.angular.z();
   }
   bool reached = true;
-  if (bounded) {
-    const double change = std::hypot(dx, dy), allowed = max_force_ * step_s_ / mass_;
-    if (change > allowed) {
-      dx *= allowed / change;
-      dy *= allowed / change;
-      reached = false;
-    }
-    const double allowed_turn = max_force_ * lever_ * step_s_ / yaw_inertia_;
-    if (std::abs(turn) > allowed_turn) {
-      turn = std::copysign(allowed_turn, turn);
-      reached = false;
-    }
+  const double fall_x = gravity.x() * step_s_, fall_y = gravity.y() * step_s_;
+  const double change = std::hypot(dx - fall_x, dy - fall_y), allowed = force * step_s_ / mass_;
+  if (change > allowed) {
+    dx = fall_x + (dx - fall_x) * allowed / change;
+    dy = fall_y + (dy - fall_y) * allowed / change;
+    reached = false;
+  }
+  const double allowed_turn = force * lever_ * step_s_ / yaw_inertia_;
+  if (std::abs(turn) > allowed_turn) {
+    turn = std::copysign(allowed_turn, turn);
+    reached = false;
   }
   twist.linear.x() += dx;
   twist.linear.y() += dy;
   twist.angular.z() += turn;
   sent_ = {twist.linear.x(), twist.linear.y(), twist.angular.z()};
+  if (!carriers_.empty()) push_back(mass_ * (X_WBase_.rotation * Vec3(dx - fall_x, dy - fall_y, 0.0)));
   return reached;
 }
 
@@ -167,7 +254,8 @@ void KinematicDrive::before_on_plane() {
 
   if (touched_ || behind_) {
     Twist twist = twist_;
-    behind_ = !servo(twist, true);
+    carriers_.clear();
+    behind_ = !servo(twist, description_.traction ? std::min(max_force_, grip_on_plane()) : max_force_, Vec3::Zero());
     if (behind_) {
       physics_.drive(body_, body_twist(X_WBase_, twist));
       return;
@@ -186,7 +274,9 @@ void KinematicDrive::before_on_contacts() {
   const Vec3 up = X_WBase_.rotation * Vec3::UnitZ();
   physics_.set_gravity(body_, up * up.dot(gravity_));
   Twist twist = twist_;
-  behind_ = !servo(twist, touched_ || behind_);
+  const double force = touched_ || behind_ ? max_force_ : std::numeric_limits<double>::infinity();
+  const Vec3 along_plane = X_WBase_.rotation.conjugate() * Vec3(gravity_ - up * up.dot(gravity_));
+  behind_ = !servo(twist, description_.traction ? std::min(force, grip_) : force, along_plane);
   physics_.drive(body_, body_twist(X_WBase_, twist));
 }
 
@@ -202,9 +292,22 @@ void KinematicDrive::after_step(SimTime now) {
   } else {
     after_on_contacts(now);
   }
-  wheel_v_ = motion_.v();
-  wheel_omega_ = motion_.omega();
+  const PlaneMotion wheels = of_wheels();
+  wheel_v_ = wheels.v;
+  wheel_omega_ = wheels.omega;
   motion_.show_step();
+}
+
+// What the wheels, at the rates of the plan, make of speed and turn rate.
+PlaneMotion KinematicDrive::of_wheels() const {
+  if (!description_.on_odometry) return {motion_.v(), motion_.omega()};
+  return WheelKinematics::real(description_).motion(WheelKinematics::believed(description_).wheels({motion_.v(), motion_.omega()}));
+}
+
+// On odometry the wheels do as planned, and the robot believes them.
+void KinematicDrive::finish(SimTime now, double way, double angle, bool touched) {
+  if (description_.on_odometry) return motion_.finish(now, planned_.way, planned_.angle, false);
+  motion_.finish(now, way, angle, touched);
 }
 
 void KinematicDrive::after_on_plane(SimTime now) {
@@ -213,8 +316,9 @@ void KinematicDrive::after_on_plane(SimTime now) {
   if (!touched_ && !behind_) {
     heading_ += way_.angle;
     if (std::abs(heading_) > M_PI) heading_ = wrap_angle(heading_);
-    motion_.finish(now, way_.way, way_.angle, false);
-    const Twist twist{{motion_.v(), motion_.side(), 0.0}, {0.0, 0.0, motion_.omega()}};
+    finish(now, way_.way, way_.angle, false);
+    const PlaneMotion wheels = of_wheels();
+    const Twist twist{{wheels.v, motion_.side(), 0.0}, {0.0, 0.0, wheels.omega}};
     set_state(next_, twist);
     physics_.set_twist(body_, body_twist(X_WBase_, twist));
     fall_asleep_when_still(true);
@@ -231,7 +335,7 @@ void KinematicDrive::after_on_plane(SimTime now) {
   Twist twist = base_twist(X_WBase);
   twist.linear.z() = twist.angular.x() = twist.angular.y() = 0.0;
   set_state(X_WBase, twist);
-  motion_.finish(now, moved.x() * std::cos(middle) + moved.y() * std::sin(middle), angle, true);
+  finish(now, moved.x() * std::cos(middle) + moved.y() * std::sin(middle), angle, true);
   fall_asleep_when_still(false);
 }
 
@@ -246,22 +350,25 @@ void KinematicDrive::after_on_contacts(SimTime now) {
   const Vec3 moved = X_WBase_.rotation.conjugate() * (X_WBase.translation - X_WBase_.translation);
   if (!supported_ || touched_ || behind_) {
     set_state(X_WBase, base_twist(X_WBase));
-    motion_.finish(now, moved.x(), wrap_angle(bullet_angle), touched_);
+    finish(now, moved.x(), wrap_angle(bullet_angle), touched_);
     fall_asleep_when_still(false);
     return;
   }
   // Only the support: along the robot's own plane the plan holds, across it Bullet.
-  X_WBase.translation = X_WBase_ * Vec3(way_.x, way_.y, moved.z());
-  X_WBase.rotation = (X_WBase_.rotation * (turn * about_z(-bullet_angle)) * about_z(way_.angle)).normalized();
+  const Vec3 carried = step_s_ * carrier_.linear;
+  X_WBase.translation = X_WBase_ * Vec3(way_.x + carried.x(), way_.y + carried.y(), moved.z());
+  X_WBase.rotation = (X_WBase_.rotation * (turn * about_z(-bullet_angle)) * about_z(way_.angle + step_s_ * carrier_.angular.z())).normalized();
   Twist twist = base_twist(X_WBase);
-  motion_.finish(now, way_.way, way_.angle, false);
-  twist.linear.x() = motion_.v();
-  twist.linear.y() = motion_.side();
-  twist.angular.z() = motion_.omega();
+  finish(now, way_.way, way_.angle, false);
+  const PlaneMotion wheels = of_wheels();
+  twist.linear.x() = wheels.v + carrier_.linear.x();
+  twist.linear.y() = motion_.side() + carrier_.linear.y();
+  twist.angular.z() = wheels.omega + carrier_.angular.z();
   physics_.set_pose(body_, X_WBase * X_BaseB_);
   physics_.set_twist(body_, body_twist(X_WBase, twist));
   set_state(X_WBase, twist);
-  fall_asleep_when_still(std::abs(twist.linear.z()) < kStill_m_s && twist.angular.head<2>().norm() < kStill_rad_s);
+  const bool carried_along = carrier_.linear.norm() > kStill_m_s || carrier_.angular.norm() > kStill_rad_s;
+  fall_asleep_when_still(!carried_along && std::abs(twist.linear.z()) < kStill_m_s && twist.angular.head<2>().norm() < kStill_rad_s);
 }
 
 void KinematicDrive::fall_asleep_when_still(bool still) {

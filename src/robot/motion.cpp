@@ -43,6 +43,7 @@ bool all_finite(std::initializer_list<double> values) {
 Motion::Motion(const model::DriveDescription& drive, const std::vector<Vec3>& rims)
     : deadline_(kNever),
       drive_(drive),
+      kinematics_(drive.on_odometry ? WheelKinematics::believed(drive) : WheelKinematics::real(drive)),
       way_limits_(sane(drive.max_speed, drive.acceleration, drive.deceleration, kFastest_m_s)),
       angle_limits_(sane(drive.max_turn_rate, drive.turn_acceleration, drive.turn_acceleration, kFastest_rad_s)),
       side_limits_(sane(drive.max_side_speed, drive.acceleration, drive.deceleration, kFastest_m_s)) {
@@ -110,8 +111,8 @@ void Motion::command(const WheelCommand& command, SimTime now) {
   for (size_t i = 0; i < n; ++i) (i < of_left ? left_rate : right_rate) += command.rates[i];
   left_rate /= static_cast<double>(of_left);
   right_rate /= static_cast<double>(n - of_left);
-  hold(0.5 * drive_.wheel_radius * (right_rate + left_rate), 0.0, drive_.wheel_radius * (right_rate - left_rate) / drive_.track,
-       now, Status::KIND_WHEELS);
+  const PlaneMotion motion = kinematics_.motion({left_rate, right_rate});
+  hold(motion.v, 0.0, motion.omega, now, Status::KIND_WHEELS);
 }
 
 // Of mecanum and omni wheels: the twist that fits the rates best, in the sense of least squares.
@@ -156,6 +157,7 @@ void Motion::hold(double v, double side, double omega, SimTime now, int8_t kind)
   omega = std::clamp(omega, -angle_limits_.speed, angle_limits_.speed);
   keep_wheel_rates(v, side, omega);
   replace_running();
+  by_wheels_ = kind == Status::KIND_WHEELS;
   const bool same = holding_ && v == target_v_ && omega == target_omega_ && side == target_side_;
   holding_ = true;
   deadline_ = drive_.watchdog_us > 0 ? now + drive_.watchdog_us : kNever;
@@ -225,7 +227,7 @@ void Motion::command(const MoveCommand& command, SimTime now, double heading) {
     return refused(Status::REASON_BAD_VALUE);
   }
   replace_running();
-  holding_ = false;
+  holding_ = by_wheels_ = false;
   deadline_ = kNever;
   primitive_ = next;
   show(command.id, command.kind, Status::STATE_RUNNING);

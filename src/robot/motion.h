@@ -12,6 +12,7 @@
 #include "robot/motion_log.h"
 #include "robot/robots.h"
 #include "robot/base_motion.h"
+#include "robot/wheel_kinematics.h"
 
 namespace ruedo::robot {
 
@@ -48,6 +49,7 @@ class Motion {
   double side() const { return side_; }      // m/s to the left
   double curvature() const { return is_steered() ? std::tan(steering_) / drive_.wheelbase : 0.0; }    // 1/m
   bool has_primitive() const { return primitive_.axis != Axis::none; }
+  bool by_wheels() const { return by_wheels_; }    // the last command was one of wheel rates
   bool resting() const { return resting_; }  // stands still, and nothing happens until a command comes
   const MotionLog& log() const { return log_; }
   void show_step() { log_.advance(); }
@@ -90,6 +92,7 @@ class Motion {
   bool steady_ = true, resting_ = true;
   SimTime deadline_;             // of the watchdog; far away when it does not run
   const model::DriveDescription& drive_;
+  WheelKinematics kinematics_;   // as the drive turns speeds into wheel rates
   Limits way_limits_, angle_limits_, side_limits_;
   std::vector<Vec3> rims_;       // of mecanum and omni wheels
   // The plan.
@@ -97,6 +100,7 @@ class Motion {
   Profile plan_v_, plan_omega_, plan_side_;
   SteeringPlan plan_steering_;
   double target_v_ = 0.0, target_omega_ = 0.0, target_side_ = 0.0, target_steering_ = 0.0;
+  bool by_wheels_ = false;
   bool holding_ = false;         // a velocity or wheel command is in force
   Primitive primitive_;
   // Watching for a block: since when, what was done then, the fastest that the plan was since, whether anything touched.

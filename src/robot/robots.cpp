@@ -48,7 +48,7 @@ class Robots::Impl {
   const model::WorldModel& world_;
   const model::BodyLayout& layout_;
   physics::PhysicsWorld& physics_;
-  std::vector<double> planes_;
+  std::vector<LevelPlane> planes_;
   std::vector<std::unique_ptr<Drive>> drives_;    // of each robot; null: it has none, or cannot move
   std::vector<MotionLog> driveless_;              // refusals of those
   std::vector<std::unique_ptr<Mover>> movers_;

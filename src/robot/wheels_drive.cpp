@@ -1,4 +1,4 @@
-// Controllers of the wheels drive.
+// Servos and odometry of the wheels drive.
 #include "robot/wheels_drive.h"
 
 #include <algorithm>
@@ -8,11 +8,13 @@ namespace ruedo::robot {
 
 namespace {
 
-// Gains, by trial on P3-AT and P3-DX: quick, and without overshoot at steps of 1 to 10 ms.
-constexpr double kWayGain_per_s = 10.0;
-constexpr double kYawGain_per_s = 8.0, kYawIntegral_per_s2 = 16.0;
-// What the controllers may be behind; a robot that is held does not wind them up further.
-constexpr double kLargestWayError_m = 0.02, kLargestYawError_rad = 0.15;
+// Where the file gives no gains: a wheel with its share of the robot comes to its rate within so long, and loses what it
+// lags behind in so long.
+constexpr double kRateTime_s = 0.01, kAngleTime_s = 0.02;
+// What a servo may lag behind; a robot that is held does not wind it up further.
+constexpr double kLargestLag_m = 0.05;
+constexpr double kMostOfLag = 0.5;           // of it, that one step may make good: more would overshoot
+constexpr double kLargestYawError_rad = 0.3;
 constexpr double kSupportNormal = 0.5;       // cosine between a support's normal and the robot's up
 constexpr SimTime kFallAsleep_us = 500'000;
 constexpr double kSettled_m_s = 2e-3, kSettled_rad_s = 1e-2;    // a primitive ends below these
@@ -21,28 +23,41 @@ constexpr double kStill_m_s = 5e-3, kStill_rad_s = 2e-2;
 }  // namespace
 
 WheelsDrive::WheelsDrive(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics, int robot)
-    : Drive(world, layout, physics, robot), max_torque_(description_.max_wheel_torque) {
+    : Drive(world, layout, physics, robot),
+      servos_(wheels_.size()),
+      max_torque_(description_.max_wheel_torque),
+      believed_(WheelKinematics::believed(description_)) {
   bodies_.push_back(body_);
-  for (const int wheel : wheels_) {
-    const int body = layout.links[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].link)].body;
-    if (std::find(bodies_.begin(), bodies_.end(), body) == bodies_.end()) bodies_.push_back(body);
+  double mass = physics.mass(body_);
+  for (size_t i = 0; i < wheels_.size(); ++i) {
+    const auto& wheel = layout.wheels[static_cast<size_t>(wheels_[i])];
+    const int body = layout.links[static_cast<size_t>(wheel.link)].body;
+    if (std::find(bodies_.begin(), bodies_.end(), body) != bodies_.end()) continue;
+    bodies_.push_back(body);
+    mass += physics.mass(body);
   }
-  if (!wheels_.empty()) {
-    max_torque_ = std::min(max_torque_, description_.max_force * description_.wheel_radius / static_cast<double>(wheels_.size()));
+  const double r = description_.wheel_radius;
+  if (!wheels_.empty()) max_torque_ = std::min(max_torque_, description_.max_force * r / static_cast<double>(wheels_.size()));
+  max_torque_ = std::min(max_torque_, description_.stall_torque * description_.gear);
+  for (Servo& servo : servos_) {
+    const double inertia = mass * r * r / static_cast<double>(wheels_.size());
+    servo.rate_gain = description_.servo_rate_gain > 0.0 ? description_.servo_rate_gain : inertia / kRateTime_s;
+    servo.angle_gain = description_.servo_angle_gain > 0.0 ? description_.servo_angle_gain : servo.rate_gain / kAngleTime_s;
   }
+  begin_at_rest();
 }
 
-double WheelsDrive::way_of_wheels() const {
-  double left = 0.0, right = 0.0;
-  const size_t of_left = description_.left_joints.size();
-  for (size_t i = 0; i < wheels_.size(); ++i) (i < of_left ? left : right) += physics_.wheel_angle(wheels_[i]);
-  return 0.5 * description_.wheel_radius *
-         (left / static_cast<double>(of_left) + right / static_cast<double>(wheels_.size() - of_left));
+SideRates WheelsDrive::mean_of_sides(double (physics::PhysicsWorld::*of_wheel)(int) const) const {
+  SideRates sum{};
+  for (size_t i = 0; i < wheels_.size(); ++i) (is_left(i) ? sum.left : sum.right) += (physics_.*of_wheel)(wheels_[i]);
+  const size_t left = description_.left_joints.size();
+  return {sum.left / static_cast<double>(left), sum.right / static_cast<double>(wheels_.size() - left)};
 }
 
 void WheelsDrive::begin_at_rest() {
-  planned_way_ = way_of_wheels();
-  heading_error_ = slip_correction_ = turned_ = 0.0;
+  for (size_t i = 0; i < wheels_.size(); ++i) servos_[i].angle = physics_.wheel_angle(wheels_[i]);
+  last_angles_ = mean_of_sides(&physics::PhysicsWorld::wheel_angle);
+  way_missing_ = angle_missing_ = yaw_integral_ = 0.0;
 }
 
 void WheelsDrive::wake() {
@@ -57,22 +72,53 @@ void WheelsDrive::before_step(SimTime now) {
     wake();
   }
   way_ = motion_.step(now, step_us_);
-  planned_way_ += way_.way;
-  const double way_error = std::clamp(planned_way_ - way_of_wheels(), -kLargestWayError_m, kLargestWayError_m);
-  planned_way_ = way_of_wheels() + way_error;
-  heading_error_ = std::clamp(heading_error_ + way_.angle, -kLargestYawError_rad, kLargestYawError_rad);
-  slip_correction_ += kYawIntegral_per_s2 * heading_error_ * step_s_;
-  const double fastest = 2.0 * std::abs(motion_.omega()) + 0.1;    // slip takes half of the turn rate at most
-  slip_correction_ = std::clamp(slip_correction_, -fastest, fastest);
+  way_missing_ += way_.way;
+  angle_missing_ += way_.angle;
+  drive_wheels(believed_.wheels({way_.way / step_s_, way_.angle / step_s_ + yaw_correction()}));
+}
 
-  const double v = way_.way / step_s_ + kWayGain_per_s * way_error;
-  const double omega = way_.angle / step_s_ + kYawGain_per_s * heading_error_ + slip_correction_;
-  const double half_track = 0.5 * description_.track, r = description_.wheel_radius;
+// rad/s, from what the gyro says; wheel commands go past it.
+double WheelsDrive::yaw_correction() {
+  const double gain = description_.yaw_gain;
+  if (gain <= 0.0 || motion_.by_wheels()) return 0.0;
+  const double error = std::clamp(angle_missing_, -kLargestYawError_rad, kLargestYawError_rad);
+  yaw_integral_ += 0.25 * gain * gain * error * step_s_;    // critically damped
+  const double most = 3.0 * std::abs(motion_.omega()) + 0.1;
+  yaw_integral_ = std::clamp(yaw_integral_, -most, most);
+  return gain * error + yaw_integral_;
+}
+
+void WheelsDrive::drive_wheels(const SideRates& rates) {
   for (size_t i = 0; i < wheels_.size(); ++i) {
-    const bool left = i < description_.left_joints.size();
-    const double rate = (v + (left ? -half_track : half_track) * omega) / r;
-    physics_.drive_wheel(wheels_[i], std::clamp(rate, -description_.max_wheel_rate, description_.max_wheel_rate), max_torque_);
+    const double rate = is_left(i) ? rates.left : rates.right;
+    drive_wheel(i, std::clamp(rate, -description_.max_wheel_rate, description_.max_wheel_rate));
   }
+}
+
+void WheelsDrive::drive_wheel(size_t wheel, double rate) {
+  Servo& servo = servos_[wheel];
+  const double angle = physics_.wheel_angle(wheels_[wheel]), most = kLargestLag_m / description_.wheel_radius;
+  const double lag = std::clamp(servo.angle + rate * step_s_ - angle, -most, most);
+  servo.angle = angle + lag;
+  physics::WheelServo command;
+  command.rate = rate + std::min(servo.angle_gain / servo.rate_gain, kMostOfLag / step_s_) * lag;
+  command.gain = servo.rate_gain;
+  // The motor's line: less torque the faster it turns, and more against its turning, up to that at stall.
+  const double part = physics_.wheel_rate(wheels_[wheel]) * description_.gear / description_.no_load_rate;
+  const double stall = std::isfinite(description_.stall_torque) ? description_.stall_torque * description_.gear : max_torque_;
+  command.highest_torque = std::isfinite(stall) ? std::min(max_torque_, stall * std::clamp(1.0 - part, 0.0, 1.0)) : max_torque_;
+  command.lowest_torque = std::isfinite(stall) ? -std::min(max_torque_, stall * std::clamp(1.0 + part, 0.0, 1.0)) : -max_torque_;
+  physics_.drive_wheel(wheels_[wheel], command);
+}
+
+bool WheelsDrive::touches_something() const {
+  const Vec3 up = X_WBase_.rotation * Vec3::UnitZ();
+  for (const int body : bodies_) {
+    for (const Contact& contact : physics_.contacts(body)) {
+      if (contact.normal.dot(up) < kSupportNormal && contact.normal.dot(up) > -kSupportNormal) return true;
+    }
+  }
+  return false;
 }
 
 void WheelsDrive::after_step(SimTime now) {
@@ -84,39 +130,38 @@ void WheelsDrive::after_step(SimTime now) {
   }
   const Pose X_WBase = base_pose().normalized();
   const Quat turn = X_WBase_.rotation.conjugate() * X_WBase.rotation;
-  const double angle = wrap_angle(2.0 * std::atan2(turn.z(), turn.w()));
-  const Vec3 moved = X_WBase_.rotation.conjugate() * (X_WBase.translation - X_WBase_.translation);
-  const Vec3 up = X_WBase_.rotation * Vec3::UnitZ();
-  bool touched = false;
-  for (const int body : bodies_) {
-    for (const Contact& contact : physics_.contacts(body)) touched |= contact.normal.dot(up) < kSupportNormal;
-  }
-  heading_error_ -= angle;
+  const double turned = wrap_angle(2.0 * std::atan2(turn.z(), turn.w()));
   set_state(X_WBase, base_twist(X_WBase));
   read_wheel_rates();
-  motion_.finish(now, moved.x(), angle, touched, lag());
-  if (touched && motion_.has_primitive()) {    // it was planned anew, from where the robot really is
-    planned_way_ = way_of_wheels();
-    heading_error_ = 0.0;
+
+  const SideRates angles = mean_of_sides(&physics::PhysicsWorld::wheel_angle);
+  PlaneMotion made = believed_.motion({angles.left - last_angles_.left, angles.right - last_angles_.right});
+  last_angles_ = angles;
+  if (description_.yaw_gain > 0.0) made.omega = turned * (1.0 + description_.gyro_scale_error) + description_.gyro_bias * step_s_;
+  believed_heading_ = wrap_angle(believed_heading_ + made.omega);
+  way_missing_ -= made.v;
+  angle_missing_ -= made.omega;
+  const bool touched = touches_something();
+  motion_.finish(now, made.v, made.omega, touched, lag());
+  if (touched && motion_.has_primitive()) way_missing_ = angle_missing_ = 0.0;    // it was planned anew, from where the robot believes to be
+  if (!motion_.has_primitive()) {    // a velocity is not made up for later
+    way_missing_ = 0.0;
+    angle_missing_ = std::clamp(angle_missing_, -kLargestYawError_rad, kLargestYawError_rad);
   }
   fall_asleep_when_still();
   motion_.show_step();
 }
 
 Lag WheelsDrive::lag() const {
-  const bool moving = std::abs(twist_.linear.x()) > kSettled_m_s || std::abs(wheel_v_) > kSettled_m_s ||
-                      std::abs(twist_.angular.z()) > kSettled_rad_s;
-  return {planned_way_ - way_of_wheels(), heading_error_, moving};
+  const bool moving = std::abs(wheel_v_) > kSettled_m_s || std::abs(wheel_omega_) > kSettled_rad_s ||
+                      (description_.yaw_gain > 0.0 && std::abs(twist_.angular.z()) > kSettled_rad_s);
+  return {way_missing_, angle_missing_, moving};
 }
 
 void WheelsDrive::read_wheel_rates() {
-  double left = 0.0, right = 0.0;
-  const size_t of_left = description_.left_joints.size();
-  for (size_t i = 0; i < wheels_.size(); ++i) (i < of_left ? left : right) += physics_.wheel_rate(wheels_[i]);
-  left *= description_.wheel_radius / static_cast<double>(of_left);
-  right *= description_.wheel_radius / static_cast<double>(wheels_.size() - of_left);
-  wheel_v_ = 0.5 * (left + right);
-  wheel_omega_ = (right - left) / description_.track;
+  const PlaneMotion motion = WheelKinematics::real(description_).motion(mean_of_sides(&physics::PhysicsWorld::wheel_rate));
+  wheel_v_ = motion.v;
+  wheel_omega_ = motion.omega;
 }
 
 void WheelsDrive::fall_asleep_when_still() {
@@ -127,9 +172,7 @@ void WheelsDrive::fall_asleep_when_still() {
   asleep_ = true;
   twist_ = {};
   wheel_v_ = wheel_omega_ = 0.0;
-  heading_error_ = slip_correction_ = 0.0;
-  planned_way_ = way_of_wheels();
-  for (const int wheel : wheels_) physics_.drive_wheel(wheel, 0.0, max_torque_);
+  begin_at_rest();
   for (const int body : bodies_) physics_.sleep(body);
 }
 

