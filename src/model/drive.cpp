@@ -289,7 +289,7 @@ void read_servo(const Element& e, DriveDescription& drive) {
 void read_odometry(const Element& odometry, DriveDescription& drive) {
   drive.odometry_rate = odometry.rate("ruedo:rate", drive.odometry_rate);
   if (const Element* errors = odometry.child("ruedo:radius_error")) {
-    const std::vector<double> values = errors->as_numbers();
+    const std::vector<double> values = errors->as_numbers(Allowed::any(quantity::kFactor));
     for (size_t side : {0u, 1u}) {
       if (values.size() == 2 && values[side] > -1.0) drive.radius_error[side] = values[side];
     }

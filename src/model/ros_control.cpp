@@ -58,7 +58,7 @@ bool is_true(const Element* flag) { return flag && (flag->text == "true" || flag
 // A number above 0; the controllers' "no limit" is 0, NaN or nothing.
 std::optional<double> positive(const Element* written) {
   if (!written || written->text == ".nan" || written->text == ".NaN" || written->text == "NaN") return std::nullopt;
-  const double value = std::abs(written->as_number());
+  const double value = std::abs(written->as_number(Allowed::between(-1e9, 1e9)));
   return value > 0 ? std::optional(value) : std::nullopt;
 }
 

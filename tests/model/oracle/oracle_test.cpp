@@ -118,28 +118,28 @@ void compare_geometry(const model::Geometry& ours, const sdf::Geometry& theirs, 
 void compare_noise(const Element* ours, const sdf::Noise& theirs, const std::string& what) {
   if (theirs.Type() == sdf::NoiseType::NONE) return;
   ASSERT_NE(ours, nullptr) << what;
-  EXPECT_NEAR(ours->number("mean", 0, Allowed::any(quantity::kRange)), theirs.Mean(), kTolerance) << what;
-  EXPECT_NEAR(ours->number("stddev", 0, Allowed::any(quantity::kRange)), theirs.StdDev(), kTolerance) << what;
+  EXPECT_NEAR(ours->number("mean", 0, ruedo::Allowed::any(ruedo::quantity::kRange)), theirs.Mean(), kTolerance) << what;
+  EXPECT_NEAR(ours->number("stddev", 0, ruedo::Allowed::any(ruedo::quantity::kRange)), theirs.StdDev(), kTolerance) << what;
 }
 
 void compare_sensor(const model::SensorDescription& ours, const sdf::Sensor& theirs, const std::string& what) {
   expect_near(ours.X_LS, resolved(theirs.SemanticPose()), what);
   const Element& e = *ours.element;
-  EXPECT_NEAR(e.number("update_rate", 0, Allowed::any(quantity::kRange)), theirs.UpdateRate(), kTolerance) << what;
+  EXPECT_NEAR(e.number("update_rate", 0, ruedo::Allowed::any(ruedo::quantity::kRange)), theirs.UpdateRate(), kTolerance) << what;
   if (const sdf::Lidar* lidar = theirs.LidarSensor()) {
     const Element* l = e.child("lidar") ? e.child("lidar") : e.child("ray");
     ASSERT_NE(l, nullptr) << what;
-    EXPECT_EQ(l->integer("scan/horizontal/samples", 640, Allowed::any(quantity::kRange)), lidar->HorizontalScanSamples()) << what;
-    EXPECT_NEAR(l->number("scan/horizontal/min_angle", 0, Allowed::any(quantity::kRange)), lidar->HorizontalScanMinAngle().Radian(), kTolerance) << what;
-    EXPECT_NEAR(l->number("scan/horizontal/max_angle", 0, Allowed::any(quantity::kRange)), lidar->HorizontalScanMaxAngle().Radian(), kTolerance) << what;
-    EXPECT_NEAR(l->number("range/min", 0, Allowed::any(quantity::kRange)), lidar->RangeMin(), kTolerance) << what;
-    EXPECT_NEAR(l->number("range/max", 0, Allowed::any(quantity::kRange)), lidar->RangeMax(), kTolerance) << what;
+    EXPECT_EQ(l->integer("scan/horizontal/samples", 640, ruedo::Allowed::any(ruedo::quantity::kRange)), lidar->HorizontalScanSamples()) << what;
+    EXPECT_NEAR(l->number("scan/horizontal/min_angle", 0, ruedo::Allowed::any(ruedo::quantity::kRange)), lidar->HorizontalScanMinAngle().Radian(), kTolerance) << what;
+    EXPECT_NEAR(l->number("scan/horizontal/max_angle", 0, ruedo::Allowed::any(ruedo::quantity::kRange)), lidar->HorizontalScanMaxAngle().Radian(), kTolerance) << what;
+    EXPECT_NEAR(l->number("range/min", 0, ruedo::Allowed::any(ruedo::quantity::kRange)), lidar->RangeMin(), kTolerance) << what;
+    EXPECT_NEAR(l->number("range/max", 0, ruedo::Allowed::any(ruedo::quantity::kRange)), lidar->RangeMax(), kTolerance) << what;
     compare_noise(l->child("noise"), lidar->LidarNoise(), what);
   }
   if (const sdf::Camera* camera = theirs.CameraSensor()) {
-    EXPECT_NEAR(e.number("camera/horizontal_fov", 1.047, Allowed::any(quantity::kRange)), camera->HorizontalFov().Radian(), kTolerance) << what;
-    EXPECT_EQ(e.integer("camera/image/width", 320, Allowed::any(quantity::kRange)), camera->ImageWidth()) << what;
-    EXPECT_NEAR(e.number("camera/clip/far", 100, Allowed::any(quantity::kRange)), camera->FarClip(), kTolerance) << what;
+    EXPECT_NEAR(e.number("camera/horizontal_fov", 1.047, ruedo::Allowed::any(ruedo::quantity::kRange)), camera->HorizontalFov().Radian(), kTolerance) << what;
+    EXPECT_EQ(e.integer("camera/image/width", 320, ruedo::Allowed::any(ruedo::quantity::kRange)), camera->ImageWidth()) << what;
+    EXPECT_NEAR(e.number("camera/clip/far", 100, ruedo::Allowed::any(ruedo::quantity::kRange)), camera->FarClip(), kTolerance) << what;
     compare_noise(e.child("camera/noise"), camera->ImageNoise(), what);
   }
   if (const sdf::Imu* imu = theirs.ImuSensor()) {
