@@ -166,7 +166,7 @@ Mesh heightmap(const std::string& picture, const Vec3& size) {
   } catch (const cv::Exception&) {
     throw std::runtime_error("the picture is broken");
   }
-  if (grey.empty()) throw std::runtime_error("it is no picture that can be read (png, jpeg, bmp, tiff)");
+  if (grey.empty()) throw std::runtime_error("it is no picture that can be read (pgm, png, jpeg, bmp, tiff)");
   if (grey.depth() != CV_8U && grey.depth() != CV_16U) throw std::runtime_error("its pixels are neither of 8 nor of 16 bits");
   if (grey.cols < 2 || grey.rows < 2 || grey.cols > kMost || grey.rows > kMost) {
     throw std::runtime_error("it has " + std::to_string(grey.cols) + " x " + std::to_string(grey.rows) +

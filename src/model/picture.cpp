@@ -94,7 +94,7 @@ Size size_of(const Bytes& bytes) {
 std::string picture_fault(std::span<const uint8_t> span, int64_t most) {
   const Size size = size_of(Bytes(span));
   // Of another kind, a decoder would have to be asked how much it is going to need.
-  if (size.width <= 0 || size.height <= 0) return "it is no picture that can be read (png, jpeg, bmp, tiff)";
+  if (size.width <= 0 || size.height <= 0) return "it is no picture that can be read (pgm, png, jpeg, bmp, tiff)";
   if (size.width <= most && size.height <= most && size.width * size.height <= kMostPixelsInAll) return "";
   if (size.width <= most && size.height <= most) {
     return "it has " + std::to_string(size.width) + " x " + std::to_string(size.height) + " pixels; allowed are " + std::to_string(kMostPixelsInAll) + " in all";

@@ -9,6 +9,9 @@ namespace ruedo::physics {
 
 namespace {
 
+constexpr size_t kTouchingABody = 8;    // usually, and at most
+
+
 // Bullet's island tag is a body's number in bodies_; of what takes no part it is negative.
 bool takes_part(const btCollisionObject& object) { return object.getIslandTag() >= 0; }
 size_t number(const btCollisionObject& object) { return static_cast<size_t>(object.getIslandTag()); }
@@ -69,6 +72,23 @@ void Dynamics::keep_below_the_axle(btPersistentManifold& manifold) {
                         point.m_positionWorldOnA, point.m_localPointA, point.m_positionWorldOnB, point.m_localPointB);
     keep_below_its_axle(*manifold.getBody1(), *manifold.getBody0(), point, point.m_index1, point.m_normalWorldOnB,
                         point.m_positionWorldOnB, point.m_localPointB, point.m_positionWorldOnA, point.m_localPointA);
+  }
+}
+
+Dynamics::Dynamics(btDispatcher& dispatcher, btBroadphaseInterface& broadphase, btCollisionConfiguration& configuration,
+                   const ContactSurfaces& surfaces, const SolverSettings& settings)
+    : btDiscreteDynamicsWorld(&dispatcher, &broadphase, nullptr, &configuration), solver_(surfaces, settings) {}
+
+void Dynamics::reserve(size_t bodies) {
+  bodies_.reserve(bodies);
+  parents_.reserve(bodies);
+  island_of_root_.reserve(bodies);
+  pairs_.reserve(kTouchingABody * bodies);
+  manifolds_.reserve(kTouchingABody * bodies);
+  islands_.resize(std::max(islands_.size(), bodies));
+  for (Island& island : islands_) {
+    island.bodies.reserve(kTouchingABody);
+    island.manifolds.reserve(kTouchingABody);
   }
 }
 

@@ -15,8 +15,10 @@ namespace ruedo::physics {
 class Dynamics final : public btDiscreteDynamicsWorld {
  public:
   Dynamics(btDispatcher& dispatcher, btBroadphaseInterface& broadphase, btCollisionConfiguration& configuration,
-           const ContactSurfaces& surfaces, const SolverSettings& settings)
-      : btDiscreteDynamicsWorld(&dispatcher, &broadphase, nullptr, &configuration), solver_(surfaces, settings) {}
+           const ContactSurfaces& surfaces, const SolverSettings& settings);
+
+  // Room for so many bodies and what they usually touch: until there is more, substeps allocate nothing.
+  void reserve(size_t bodies);
 
   // From now on only these bodies are simulated. All bodies of all pairs and joints must be among them.
   void take(const std::vector<btRigidBody*>& bodies);

@@ -62,6 +62,7 @@ PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout
   const size_t n = layout.bodies.size();
   motions_.resize(n);
   for (auto& bodies : simulated_) bodies.reserve(n);
+  dynamics_.reserve(n);
   twists_.resize(n);
   for (const auto& body : layout.bodies) poses_.push_back(body.X_WB.normalized());
   add_joints();

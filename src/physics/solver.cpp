@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ruedo/quantity.h"
+
 namespace ruedo::physics {
 
 namespace {
@@ -69,6 +71,12 @@ void turn_freely(const btRigidBody& body, Quat& rotation, Vec3& w, double h) {
   const Vec3 mean = (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0;
   rotation = turned_by(rotation, h * mean);
   w = rate(rotation);
+}
+
+// Of bodies that differ in all by many orders of magnitude, the error of a joint can grow with each attempt to undo it.
+Vec3 bounded(const Vec3& velocity) {
+  const double norm = velocity.norm();
+  return norm > quantity::kSpeed.most ? Vec3(velocity * (quantity::kSpeed.most / norm)) : velocity;
 }
 
 }  // namespace
@@ -310,6 +318,8 @@ void Solver::close_joints(double substep_s) {
   for (size_t i = 1; i < bodies_.size(); ++i) {
     SolverBody& s = bodies_[i];
     if (s.push_v == Vec3::Zero() && s.push_w == Vec3::Zero()) continue;
+    s.push_v = bounded(s.push_v);
+    s.push_w = bounded(s.push_w);
     btTransform X = s.bullet->getWorldTransform();
     X.setOrigin(X.getOrigin() + to_bt(Vec3(substep_s * s.push_v)));
     X.setRotation(to_bt(turned_by(from_bt(X.getRotation()), substep_s * s.push_w)));

@@ -44,7 +44,10 @@ struct SolverSettings {
 
 class Solver {
  public:
-  Solver(const ContactSurfaces& surfaces, const SolverSettings& settings) : surfaces_(surfaces), settings_(settings) {}
+  Solver(const ContactSurfaces& surfaces, const SolverSettings& settings) : surfaces_(surfaces), settings_(settings) {
+    bodies_.reserve(kUsually);
+    contacts_.reserve(kUsually);
+  }
 
   // Solves one island for a substep: forces and gravity, which the bodies hold, are added; velocities and poses
   // are advanced. The order of the arguments decides the last bits.
@@ -64,6 +67,8 @@ class Solver {
     bool soft = false;
     std::array<Row*, 3> main_rows() { return {&normal, &along, &across}; }
   };
+
+  static constexpr size_t kUsually = 64;    // bodies, and contacts, of an island
 
   int body_of(const btCollisionObject& object);
   void add_body(btRigidBody& body, double substep_s);

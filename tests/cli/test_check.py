@@ -51,7 +51,7 @@ FILES = {
     "folder as mesh": (mesh("sub"), {"sub/x": b""}, 1, ("error", 4, COLLISION, "the mesh 'sub' cannot be used: it is a folder; a file is needed")),
     "missing mesh": (mesh("none.dae"), {}, 1, ("error", 4, COLLISION, "the mesh 'none.dae' is not found; the shape is left out")),
     "missing picture": (heightmap("none.png"), {}, 1, ("error", 4, COLLISION, "the heightmap 'none.png' is not found")),
-    "broken picture": (heightmap("a.png"), {"a.png": PNG + bytes(40)}, 1, ("error", 4, COLLISION, "it is no picture that can be read (png, jpeg, bmp, tiff)")),
+    "broken picture": (heightmap("a.png"), {"a.png": PNG + bytes(40)}, 1, ("error", 4, COLLISION, "it is no picture that can be read (pgm, png, jpeg, bmp, tiff)")),
     "huge picture": (heightmap("a.png"), {"a.png": png(200000, 200000)}, 1, ("error", 4, COLLISION, "200000 x 200000 pixels; allowed are 1025 each way")),
     "missing texture": (texture("none.png"), {}, 0, ("unsupported", 4, "model m/link l/visual v", "the texture 'none.png' is not found")),
     "broken texture": (texture("a.png"), {"a.png": PNG + bytes(40)}, 0, ("unsupported", 0, "", "the texture is no picture that can be read")),

@@ -143,7 +143,7 @@ TEST(Map, WrongFilesSayWhatIsWrong) {
   EXPECT_EQ(error("a.yaml", "image: ok.pgm\nresolution: -1\norigin: [0,0,0]\n"), "a.yaml:2: resolution: '-1' is not allowed; allowed are numbers above 0, in m");
   EXPECT_EQ(error("a.yaml", "image: ok.pgm\nresolution: 1\norigin: [0]\n"), "a.yaml:3: origin: '[0]' is not allowed; allowed is [x, y, yaw]");
   EXPECT_EQ(error("a.yaml", "image: none.pgm\nresolution: 1\norigin: [0, 0, 0]\n"), "none.pgm: no such file");
-  EXPECT_EQ(error("a.yaml", "image: no.png\nresolution: 1\norigin: [0, 0, 0]\n"), "no.png: is no picture that can be read (pgm, png, jpeg, bmp, tiff)");
+  EXPECT_EQ(error("a.yaml", "image: no.png\nresolution: 1\norigin: [0, 0, 0]\n"), "no.png: it is no picture that can be read (pgm, png, jpeg, bmp, tiff)");
   EXPECT_EQ(error("a.yaml", "hello\n"), "a.yaml:1: 'hello' is no 'key: value'");
   EXPECT_EQ(error("a.map", "hello\n"), "a.map:1: is no map of MobileSim and ARIA: it does not begin with '2D-Map'");
   EXPECT_EQ(error("a.map", "2D-Map\nLINES\n1 2 3\n"), "a.map:3: '1 2 3' is not allowed; allowed are x1 y1 x2 y2, in mm");

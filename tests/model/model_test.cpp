@@ -203,7 +203,9 @@ TEST(Model, TheSolverOfTheWorldIsRead) {
   EXPECT_EQ(given.substeps, 4);
   EXPECT_EQ(given.tolerance, 1e-7);
   EXPECT_EQ(solver_of("").iterations, SolverDescription().iterations);
-  EXPECT_THROW(solver_of("<solver><iters>0</iters></solver>"), InputError);
+  const auto wrong = world_of("<physics type='x'><bullet><solver><iters>0</iters></solver></bullet></physics>");
+  EXPECT_EQ(texts(*wrong).size(), 1u);
+  EXPECT_EQ(wrong->solver.iterations, SolverDescription().iterations);
   EXPECT_THROW(solver_of("<ruedo:substep>4</ruedo:substep>"), InputError);
   EXPECT_EQ(texts(*world_of("<physics type='x'><bullet><solver><type>dantzig</type></solver></bullet></physics>")).size(), 1u);
 }
