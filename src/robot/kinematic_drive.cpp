@@ -350,7 +350,7 @@ void KinematicDrive::after_on_contacts(SimTime now) {
   const Vec3 moved = X_WBase_.rotation.conjugate() * (X_WBase.translation - X_WBase_.translation);
   if (!supported_ || touched_ || behind_) {
     set_state(X_WBase, base_twist(X_WBase));
-    finish(now, moved.x(), wrap_angle(bullet_angle), touched_);
+    finish(now, moved.x(), wrap_angle(bullet_angle), true);
     fall_asleep_when_still(false);
     return;
   }
