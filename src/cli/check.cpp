@@ -5,9 +5,11 @@
 
 #include "cli/commands.h"
 #include "cli/listing.h"
+#include "cli/sandboxed.h"
 #include "core/json.h"
 #include "core/utf8.h"
 #include "engine/world.h"
+#include "model/world_name.h"
 #include "ruedo/errors.h"
 #include "scene/render_texture.h"
 
@@ -15,6 +17,7 @@ namespace ruedo::cli {
 namespace {
 
 struct CheckArguments {
+  bool sandboxed = false;
   WorldArguments world;
   bool json = false, strict = false;
 };
@@ -91,6 +94,7 @@ void print_text(const std::vector<Finding>& findings) {
 }
 
 int check(const CheckArguments& arguments) {
+  if (arguments.sandboxed) enter_sandbox(model::world_file(arguments.world.world), {});
   bool loaded = false;
   const std::vector<Finding> findings = find_all(arguments, loaded);
   int counts[3] = {0, 0, 0};
@@ -117,6 +121,7 @@ void add_check(CLI::App& app, Action& chosen) {
   add_world_arguments(*command, arguments->world);
   command->add_flag("--json", arguments->json, "print a JSON list");
   command->add_flag("--strict", arguments->strict, "what is repaired or not supported fails the check too");
+  add_sandbox_argument(*command, arguments->sandboxed);
   command->callback([arguments, &chosen] { chosen = [arguments] { return check(*arguments); }; });
 }
 

@@ -12,6 +12,7 @@
 #include "ruedo/errors.h"
 #include "scene/render_scene.h"
 #include "log/header.h"
+#include "core/sandbox.h"
 #include "core/version.h"
 
 namespace ruedo::cli {
@@ -87,6 +88,12 @@ void check_renderer(Report& report) {
   }
 }
 
+void check_sandbox(Report& report) {
+  const std::string missing = missing_for_sandbox();
+  if (missing.empty()) return report.good("sandbox", "Landlock and seccomp: --sandbox works, and meshes are imported in one");
+  report.hint("sandbox", missing + ": no --sandbox, and meshes are imported with limits of time and memory only");
+}
+
 int doctor(const std::string& url) {
   Report report;
   report.good("version", fmt::format("ruedo {}, LCM {}.{}.{}, {}, CPU with {}", version(), LCM_VERSION_MAJOR, LCM_VERSION_MINOR,
@@ -94,6 +101,7 @@ int doctor(const std::string& url) {
   check_bus(report, url);
   check_buffers(report);
   check_renderer(report);
+  check_sandbox(report);
   return report.faulty() ? kEnvironment : kGood;
 }
 

@@ -8,6 +8,7 @@
 #include "cli/commands.h"
 #include "cli/foxglove.h"
 #include "cli/logged_run.h"
+#include "cli/sandboxed.h"
 #include "core/utf8.h"
 #include "ruedo/errors.h"
 #include "log/reader.h"
@@ -17,6 +18,7 @@ namespace ruedo::cli {
 namespace {
 
 struct ExportArguments {
+  bool sandboxed = false;
   std::string log, out;
 };
 
@@ -26,6 +28,7 @@ uint64_t nanoseconds(SimTime time_us) {
 }
 
 int export_log(const ExportArguments& arguments) {
+  if (arguments.sandboxed) enter_sandbox(arguments.log, {arguments.out});
   std::error_code error;
   if (std::filesystem::equivalent(arguments.log, arguments.out, error)) throw InputError({}, "OUT is the log itself: " + arguments.out);
   const log::Index index(arguments.log);
@@ -61,6 +64,7 @@ void add_export(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<ExportArguments>();
   command->add_option("LOG", arguments->log, "a standard LCM log")->required();
   command->add_option("OUT", arguments->out, "the file to write, such as run.mcap")->required();
+  add_sandbox_argument(*command, arguments->sandboxed);
   command->callback([arguments, &chosen] { chosen = [arguments] { return export_log(*arguments); }; });
 }
 

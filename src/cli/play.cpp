@@ -10,6 +10,7 @@
 
 #include "bus/lcm_bus.h"
 #include "cli/commands.h"
+#include "cli/sandboxed.h"
 #include "cli/view.h"
 #include "ruedo/errors.h"
 #include "log/reader.h"
@@ -26,7 +27,7 @@ volatile std::sig_atomic_t interrupted = 0;
 struct PlayArguments {
   std::string log, speed = "1", lcm, view, html;
   double html_size = 20.0;
-  bool viewed = false;
+  bool viewed = false, sandboxed = false;
 };
 
 // Channels that a log has for those who read it, and that nobody published.
@@ -52,6 +53,7 @@ int view(const PlayArguments& arguments, double speed) {
 }
 
 int play(const PlayArguments& arguments) {
+  if (arguments.sandboxed) enter_sandbox(arguments.log, {arguments.html});
   const double speed = parse_rate(arguments.speed);
   std::signal(SIGINT, [](int) { interrupted = 1; });
   std::signal(SIGTERM, [](int) { interrupted = 1; });
@@ -90,6 +92,7 @@ void add_play(CLI::App& app, Action& chosen) {
   command->add_option("--html-size", arguments->html_size, "at most so large: messages are thinned to fit")->type_name("MB")->capture_default_str()
       ->check(CLI::Range(1.0, 1000.0))->needs("--html");
   command->add_option("--lcm", arguments->lcm, "LCM address (default: $LCM_DEFAULT_URL, or LCM's group)")->type_name("URL");
+  add_sandbox_argument(*command, arguments->sandboxed);
   command->callback([arguments, view, &chosen] {
     arguments->viewed = view->count() > 0;
     chosen = [arguments] { return play(*arguments); };

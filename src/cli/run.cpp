@@ -19,9 +19,11 @@
 #include "bus/server_bus.h"
 #include "cli/commands.h"
 #include "cli/listing.h"
+#include "cli/sandboxed.h"
 #include "cli/view.h"
 #include "core/utf8.h"
 #include "ruedo/errors.h"
+#include "model/world_name.h"
 #include "run/server.h"
 #include "engine/thread_limit.h"
 
@@ -38,7 +40,7 @@ struct RunArguments {
   std::vector<std::string> remaps, wait_for;
   std::string view;
   bool viewed = false;
-  bool paused = false, quiet = false, watch_stdin = false;
+  bool paused = false, quiet = false, watch_stdin = false, sandboxed = false;
   int threads = 0;
 };
 
@@ -178,8 +180,15 @@ void print_world(const run::Server& server, const model::WorldModel& world, cons
   std::fflush(stdout);
 }
 
+// The file that unix:// makes.
+std::string socket_of(const std::string& lcm) {
+  const bus::LcmUrl url = lcm == "auto" ? bus::LcmUrl{} : bus::parse_url(lcm);
+  return url.scheme == "unix" ? url.host : "";
+}
+
 int run(const RunArguments& arguments) {
   run::ServerOptions options = server_options(arguments);
+  if (arguments.sandboxed) enter_sandbox(model::world_file(arguments.world.world), {arguments.record, arguments.snapshots, socket_of(arguments.lcm)});
   SignalThread signals;
   if (arguments.watch_stdin) watch_stdin();
   const engine::ThreadLimit limit(arguments.threads);
@@ -244,6 +253,7 @@ void add_run(CLI::App& app, Action& chosen) {
   command->add_option("--control", arguments->control, "serve requests: on or off")->capture_default_str()->check(CLI::IsMember({"on", "off"}));
   command->add_flag("--watch-stdin", arguments->watch_stdin, "end when standard input does: for programs that start a server");
   command->add_flag("--quiet", arguments->quiet, "do not list the channels");
+  add_sandbox_argument(*command, arguments->sandboxed);
   command->callback([arguments, view, &chosen] {
     arguments->viewed = view->count() > 0;
     chosen = [arguments] { return run(*arguments); };

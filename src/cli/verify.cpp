@@ -6,6 +6,7 @@
 
 #include "cli/commands.h"
 #include "cli/logged_run.h"
+#include "cli/sandboxed.h"
 #include "core/utf8.h"
 #include "log/header.h"
 #include "engine/thread_limit.h"
@@ -15,6 +16,7 @@ namespace ruedo::cli {
 namespace {
 
 struct VerifyArguments {
+  bool sandboxed = false;
   std::string log;
   int threads = 0;
 };
@@ -56,6 +58,7 @@ int repeat(const VerifyArguments& arguments, const log_header_t& header) {
 }
 
 int verify(const VerifyArguments& arguments) {
+  if (arguments.sandboxed) enter_sandbox(arguments.log, {});
   const log_header_t header = run::read_header(arguments.log);
   log::check_files(header, arguments.log);
   return with_options_of(arguments.log, [&] { return repeat(arguments, header); });
@@ -66,6 +69,7 @@ void add_verify(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<VerifyArguments>();
   command->add_option("LOG", arguments->log, "recorded by ruedo run --record")->required();
   command->add_option("--threads", arguments->threads, "most threads inside a module (default: one a core)")->type_name("N")->check(CLI::Range(1, 1024));
+  add_sandbox_argument(*command, arguments->sandboxed);
   command->callback([arguments, &chosen] { chosen = [arguments] { return verify(*arguments); }; });
 }
 

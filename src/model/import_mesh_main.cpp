@@ -1,7 +1,7 @@
 // ruedo-import-mesh INPUT OUTPUT: turns a mesh file into Ruedo's binary form, by assimp.
 //
-// It runs as a child of the server, with limits on memory and time that the server sets: assimp aborts or
-// hangs on some malformed files. Exit code 0: OUTPUT is complete; else the first line on stderr says why.
+// It runs as a child of the server, with limits on memory and time that the server sets, and in a sandbox of its own: assimp aborts or
+// hangs on some malformed files, and may do worse on others. Exit code 0: OUTPUT is complete; else the first line on stderr says why.
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -19,6 +19,7 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include "core/sandbox.h"
 #include "model/document.h"
 #include "model/mesh_format.h"
 
@@ -258,7 +259,13 @@ int main(int argc, char** argv) {
     return 2;
   }
   try {
-    import(fs::weakly_canonical(argv[1]), argv[2]);
+    const fs::path mesh = fs::weakly_canonical(argv[1]), output = fs::absolute(argv[2]);
+    ruedo::Sandbox sandbox;
+    sandbox.readable = {mesh.parent_path().string()};
+    sandbox.writable = {output.parent_path().string()};
+    sandbox.alone = true;
+    ruedo::enter(sandbox);
+    import(mesh, output);
     return 0;
   } catch (const std::bad_alloc&) {
     std::fprintf(stderr, "it needs more memory than is allowed\n");

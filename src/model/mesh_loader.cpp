@@ -33,12 +33,6 @@ std::string default_importer() {
   return std::string(RUEDO_BIN_DIR) + "/ruedo-import-mesh";
 }
 
-std::string default_cache_folder() {
-  if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache && *cache == '/') return std::string(cache) + "/ruedo";
-  if (const char* home = std::getenv("HOME"); home && *home == '/') return std::string(home) + "/.cache/ruedo";
-  return "";
-}
-
 // A folder for one import's result; removed with all that is in it.
 class TemporaryFolder {
  public:
@@ -184,9 +178,15 @@ void store(const std::string& folder, const std::string& name, const std::string
 
 }  // namespace
 
+std::string mesh_cache_folder() {
+  if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache && *cache == '/') return std::string(cache) + "/ruedo";
+  if (const char* home = std::getenv("HOME"); home && *home == '/') return std::string(home) + "/.cache/ruedo";
+  return "";
+}
+
 MeshLoader::MeshLoader(const ResourceFinder& resources, MeshImport import) : resources_(resources), import_(std::move(import)) {
   if (import_.importer.empty()) import_.importer = default_importer();
-  if (import_.cache_folder.empty()) import_.cache_folder = default_cache_folder();
+  if (import_.cache_folder.empty()) import_.cache_folder = mesh_cache_folder();
   if (import_.cache_folder.empty()) import_.cache = false;
 }
 

@@ -28,6 +28,9 @@ struct MeshImport {
   LoadBudget* budget = nullptr;           // of all meshes together; null: none
 };
 
+// Where imported meshes are kept unless an import says otherwise; "" when there is no such place.
+std::string mesh_cache_folder();
+
 class MeshLoader {
  public:
   explicit MeshLoader(const ResourceFinder& resources, MeshImport import = {});

@@ -52,13 +52,6 @@ std::string script() {
   return !error && fs::exists(installed, error) ? installed.string() : RUEDO_XACRO_DIR "/expand.py";
 }
 
-// Ruedo's own Python where there is one, for it has the package.
-std::string python() {
-  if (const char* chosen = std::getenv("RUEDO_PYTHON")) return chosen;
-  std::error_code error;
-  return fs::exists(RUEDO_PYTHON, error) ? RUEDO_PYTHON : "python3";
-}
-
 void set_limit(decltype(RLIMIT_AS) which, rlim_t value) {
   const rlimit limit{value, value};
   ::setrlimit(which, &limit);
@@ -122,6 +115,13 @@ void take_lines(Element& element, const Source& above) {
 
 }  // namespace
 
+// Ruedo's own where there is one, for it has the package.
+std::string xacro_python() {
+  if (const char* chosen = std::getenv("RUEDO_PYTHON")) return chosen;
+  std::error_code error;
+  return fs::exists(RUEDO_PYTHON, error) ? RUEDO_PYTHON : "python3";
+}
+
 bool is_xacro(const std::string& path, const Element* root) {
   std::error_code error;    // a text that came with a request is none: only what is on the disk is run
   if (!fs::is_regular_file(path, error)) return false;
@@ -133,7 +133,7 @@ bool is_xacro(const std::string& path, const Element* root) {
 std::shared_ptr<const Element> expand_xacro(const std::string& path, ReadContext& context) {
   const Folder folder;
   const std::string out = folder / "robot.urdf", log = folder / "messages";
-  std::vector<std::string> words{python(), script(), path, out};
+  std::vector<std::string> words{xacro_python(), script(), path, out};
   for (const std::string& root : context.resources.folders()) words.insert(words.end(), {"--folder", root});
   for (const std::string& argument : context.xacro_arguments) words.insert(words.end(), {"--argument", argument});
   const int code = run(words, log);

@@ -1,0 +1,101 @@
+// Each test enters a sandbox in a child process, for nothing takes it back.
+#include "core/sandbox.h"
+
+#include <cerrno>
+#include <cstdlib>
+#include <fstream>
+#include <functional>
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "../model/temporary_folder.h"
+
+namespace ruedo {
+namespace {
+
+// What `action` returns in a child within the sandbox: 0, or an errno.
+int within(const Sandbox& sandbox, const std::function<int()>& action) {
+  const pid_t child = fork();
+  if (child == 0) {
+    enter(sandbox);
+    _exit(action());
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+int opened(const std::string& path, int flags) {
+  const int file = open(path.c_str(), flags, 0600);
+  return file < 0 ? errno : (close(file), 0);
+}
+
+int connected() {
+  const int made = socket(AF_INET, SOCK_DGRAM, 0);
+  return made < 0 ? errno : (close(made), 0);
+}
+
+int ran(const char* program) {
+  const pid_t child = fork();
+  if (child < 0) return errno;
+  if (child == 0) {
+    execl(program, program, static_cast<char*>(nullptr));
+    _exit(errno);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  return WEXITSTATUS(status);
+}
+
+class SandboxTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_EQ(missing_for_sandbox(), "");
+    read_ = folder_.write("read/a.txt", "a");
+    written_ = folder_.write("written/a.txt", "a");
+    outside_ = folder_.write("outside/a.txt", "a");
+    sandbox_.readable = {folder_.path() + "/read", folder_.path() + "/nowhere"};
+    sandbox_.writable = {folder_.path() + "/written"};
+  }
+
+  TemporaryFolder folder_;
+  std::string read_, written_, outside_;
+  Sandbox sandbox_;
+};
+
+TEST_F(SandboxTest, ReachesTheListedFilesAndNoOthers) {
+  for (const bool alone : {false, true}) {
+    sandbox_.alone = alone;
+    EXPECT_EQ(within(sandbox_, [&] { return opened(read_, O_RDONLY); }), 0);
+    EXPECT_EQ(within(sandbox_, [&] { return opened(read_, O_WRONLY); }), EACCES);
+    EXPECT_EQ(within(sandbox_, [&] { return opened(written_, O_RDWR | O_TRUNC); }), 0);
+    EXPECT_EQ(within(sandbox_, [&] { return opened(folder_.path() + "/written/new.txt", O_WRONLY | O_CREAT); }), 0);
+    EXPECT_EQ(within(sandbox_, [&] { return opened(outside_, O_RDONLY); }), EACCES);
+    EXPECT_EQ(within(sandbox_, [&] { return opened(folder_.path() + "/outside/new.txt", O_WRONLY | O_CREAT); }), EACCES);
+    EXPECT_EQ(within(sandbox_, [&] { return opened("/etc/shadow", O_RDONLY); }), EACCES);
+    EXPECT_EQ(within(sandbox_, [&] { return unlink(outside_.c_str()) == 0 ? 0 : errno; }), EACCES);
+    EXPECT_EQ(within(sandbox_, [&] { return opened("/proc/1/environ", O_RDONLY); }), EACCES);
+  }
+}
+
+// A link is followed to where it leads.
+TEST_F(SandboxTest, LinksLeadNowhere) {
+  ASSERT_EQ(symlink(outside_.c_str(), (folder_.path() + "/read/link").c_str()), 0);
+  EXPECT_EQ(within(sandbox_, [&] { return opened(folder_.path() + "/read/link", O_RDONLY); }), EACCES);
+}
+
+TEST_F(SandboxTest, AloneItReachesNobody) {
+  EXPECT_EQ(within(sandbox_, connected), 0);
+  EXPECT_EQ(within(sandbox_, [] { return ran("/bin/true"); }), 0);
+  sandbox_.alone = true;
+  EXPECT_EQ(within(sandbox_, connected), EPERM);
+  EXPECT_EQ(within(sandbox_, [] { return execl("/bin/true", "true", static_cast<char*>(nullptr)), errno; }), EPERM);
+  EXPECT_EQ(within(sandbox_, [] { return kill(getppid(), 0) == 0 ? 0 : errno; }), EPERM);
+}
+
+}  // namespace
+}  // namespace ruedo
