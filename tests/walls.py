@@ -107,12 +107,13 @@ def test_tree_keeps(rule):
 
 def test_layers_are_those_of_the_design():
     known = layers(ROOT)
-    assert set(known) == {"core", "model", "scene", "physics", "robot", "sensors", "engine", "log", "run", "bus", "console", "cli"}
+    assert set(known) == {"core", "model", "scene", "physics", "robot", "sensors", "engine", "log", "judge", "run", "bus", "console", "cli"}
     for outsider in ("physics", "engine", "run", "bus", "robot"):
         assert outsider not in known["sensors"]
     for outsider in ("log", "run", "bus", "console"):    # one world knows no file, no network and no clock
         assert outsider not in known["engine"]
     assert not known["log"] & {"engine", "run", "bus"}
+    assert not known["judge"] & {"engine", "run", "bus", "log"}
     assert "run" not in known["bus"] and "scene" not in known["physics"] and known["core"] == {"core"}
 
 

@@ -13,8 +13,9 @@
 #include "cli/client_process.h"
 #include "cli/commands.h"
 #include "cli/isolation.h"
-#include "cli/judge.h"
 #include "cli/view.h"
+#include "judge/judge.h"
+#include "core/json.h"
 #include "ruedo/errors.h"
 #include "log/diff.h"
 #include "log/reader.h"
@@ -31,12 +32,13 @@ constexpr double kPageSize_MB = 20.0;    // of the page that shows a failed run
 struct RegressArguments {
   WorldArguments world;
   uint64_t seed = 1;
-  std::string duration, rate = "max", client, golden, record, script, junit, html;
+  std::string duration, rate = "max", client, golden, record, script, junit, html, json;
+  double clearance_reach = 0.0;
   std::vector<std::string> remaps, wait_for, goals, tolerances, ignored, keep;
-  Expectations expected;
+  judge::Expectations expected;
   double clearance = -1.0, odometry_error = -1.0;
   int lockstep = 0;
-  bool renew = false, shared_network = false;
+  bool renew = false, shared_network = false, no_page = false;
 };
 
 run::ServerOptions server_options(const RegressArguments& arguments) {
@@ -58,7 +60,7 @@ run::ServerOptions server_options(const RegressArguments& arguments) {
 }
 
 // The run. What went wrong besides expectations, or "".
-std::string run(const RegressArguments& arguments, const std::shared_ptr<const model::WorldModel>& world, bool isolated, Judge& judge) {
+std::string run(const RegressArguments& arguments, const std::shared_ptr<const model::WorldModel>& world, bool isolated, judge::Judge& judge) {
   bus::ServerBus place = bus::open_server_bus(isolated ? "auto" : "auto-tcp", world->name);
   bus::RivalWatch bus(std::move(place.bus), [](const std::string& line) { spdlog::warn(line); });
   run::Server server(world, server_options(arguments), bus);
@@ -133,21 +135,51 @@ void attach_page(const std::string& log) {
 #endif
 }
 
+// What did not hold, the log's messages seen to.
+std::vector<judge::Failure> judged(judge::Judge& judge, const std::string& record) {
+  log::Reader log(record);
+  log::Event event;
+  const auto wanted = [](const std::string& channel) { return channel.ends_with("/pose") || channel.ends_with("/odometry"); };
+  while (log.next(event, wanted)) judge.see(event.channel, event.data);
+  return judge.failures();
+}
+
+// For programs that run many: {"faults": [...], "failures": [{"what", "time_s", "text"}], "metrics": {...},
+// "track": [[s, m, m]]}.
+void write_verdict(const std::string& path, const std::vector<std::string>& faults, judge::Judge& judge) {
+  JsonWriter json;
+  json.open('{').name("faults").open('[');
+  for (const std::string& fault : faults) json.value(fault);
+  json.close(']').name("failures").open('[');
+  for (const judge::Failure& failure : judge.failures()) {
+    json.open('{').member("what", failure.what).member("time_s", static_cast<double>(failure.time) * 1e-6).member("text", failure.text).close('}');
+  }
+  json.close(']').name("metrics").open('{');
+  for (const judge::Metric& metric : judge.metrics()) json.member(metric.name, metric.value);
+  json.close('}').name("track").open('[');
+  for (const judge::Judge::Place& place : judge.track()) json.open('[').value(place.time_s).value(place.x).value(place.y).close(']');
+  json.close(']').close('}');
+  write_file(path, json.text() + "\n");
+}
+
 int regress(RegressArguments arguments) {
   const bool isolated = !arguments.shared_network && isolate();
-  Expectations& expected = arguments.expected;
-  for (const std::string& text : arguments.goals) expected.goals.push_back(parse_goal(text));
+  judge::Expectations& expected = arguments.expected;
+  for (const std::string& text : arguments.goals) expected.goals.push_back(judge::parse_goal(text));
   if (arguments.clearance >= 0.0) expected.clearance = arguments.clearance;
   if (arguments.odometry_error >= 0.0) expected.odometry_error = arguments.odometry_error;
+  expected.clearance_reach = arguments.clearance_reach;
   if (arguments.keep.empty()) arguments.keep = {"*/pose"};
   const char* environment = std::getenv("RUEDO_RENEW");
   const bool renew = arguments.renew || (environment && *environment && std::string(environment) != "0");
   const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
   print_findings(world->findings);
-  Judge judge(*world, expected);
+  judge::Judge judge(*world, expected);
   std::vector<std::string> failures;
   if (std::string fault = run(arguments, world, isolated, judge); !fault.empty()) failures.push_back(fault);
-  for (std::string& line : judge.failures(arguments.record)) failures.push_back(std::move(line));
+  const size_t begin_of_judged = failures.size();
+  for (const judge::Failure& failure : judged(judge, arguments.record)) failures.push_back(judge::to_line(failure));
+  const size_t end_of_judged = failures.size();
   if (!arguments.golden.empty()) {
     const std::string kept = arguments.record + ".kept";
     if (const fs::path folder = fs::path(arguments.golden).parent_path(); renew && !folder.empty()) {
@@ -164,8 +196,13 @@ int regress(RegressArguments arguments) {
   if (!arguments.script.empty()) {
     if (std::string fault = run_script(arguments); !fault.empty()) failures.push_back(fault);
   }
+  if (!arguments.json.empty()) {
+    std::vector<std::string> faults = failures;
+    faults.erase(faults.begin() + static_cast<std::ptrdiff_t>(begin_of_judged), faults.begin() + static_cast<std::ptrdiff_t>(end_of_judged));
+    write_verdict(arguments.json, faults, judge);
+  }
   for (const std::string& line : failures) fmt::print(stderr, "FAILED: {}\n", line);
-  if (!failures.empty()) attach_page(arguments.record);
+  if (!failures.empty() && !arguments.no_page) attach_page(arguments.record);
   if (failures.empty()) fmt::print("passed; the run is in {}\n", arguments.record);
   return failures.empty() ? kGood : kCheckFailed;
 }
@@ -190,6 +227,9 @@ void add_regress(CLI::App& app, Action& chosen) {
   command->add_flag("--no-contact", a->expected.no_contact, "the robot touches nothing but the ground");
   command->add_option("--clearance", a->clearance, "at least so far from everything (m)")->type_name("M")->check(CLI::Range(0.0, 100.0));
   command->add_option("--odometry-error", a->odometry_error, "odometry at most so far from the truth (m)")->type_name("M")->check(CLI::Range(0.0, 1e6));
+  command->add_option("--clearance-reach", a->clearance_reach, "measure the smallest clearance below this (m), for --json")->type_name("M")->check(CLI::Range(0.0, 100.0));
+  command->add_option("--json", a->json, "write what failed, and how well the run went in numbers, as JSON")->type_name("FILE");
+  command->add_flag("--no-page", a->no_page, "no page beside the log of a failed run");
   command->add_option("--golden", a->golden, "log to compare with")->type_name("FILE");
   list("--keep", a->keep, "channels that golden logs hold; shell patterns (default: */pose)", "PATTERN");
   list("--tolerance", a->tolerances, "as of ruedo diff", "RULE");

@@ -109,7 +109,7 @@ std::unique_ptr<Engine::Copy> Engine::make_copy(std::shared_ptr<const model::Wor
 }
 
 void Engine::for_each_copy(const std::function<void(size_t)>& body) {
-  if (handler_ || copies_.size() == 1) {
+  if (handler_ || state_handler_ || copies_.size() == 1) {
     for (size_t i = 0; i < copies_.size(); ++i) body(i);
     return;
   }
@@ -147,7 +147,7 @@ void Engine::compute(size_t index, int64_t steps) {
     }
     copy.keep_newest();
     count_touching(index, touching.data());
-    if (handler_) tell(index);
+    if (handler_ || state_handler_) tell(index);
   }
   std::memcpy(touching_->values.data() + index * robots * sizeof(int32_t), touching.data(), robots * sizeof(int32_t));
   for (auto& observer : observers_) update(*observer, index);
@@ -173,6 +173,8 @@ void Engine::Copy::keep_newest() {
 void Engine::tell(size_t index) {
   const Copy& copy = *copies_[index];
   for (int64_t step = copy.batch.first_step; step < copy.batch.first_step + copy.batch.count; ++step) {
+    if (state_handler_) state_handler_(static_cast<int>(index), copy.batch.snapshots[static_cast<size_t>(step - copy.batch.first_step)], copy.batch);
+    if (!handler_) continue;
     for (const Batch::Output& output : copy.batch.outputs) {
       if (!output.woken) continue;
       for (const Outbox& outbox : output.pieces) {
@@ -311,6 +313,7 @@ std::shared_ptr<const FieldArray> Engine::observe(const std::string& device, con
 
 int64_t Engine::current_step(int world) const { return copies_.at(static_cast<size_t>(world))->step; }
 const std::vector<device_info_t>& Engine::devices() const { return copies_[0]->world->devices(); }
+const std::vector<Input>& Engine::inputs(int world) const { return copies_.at(static_cast<size_t>(world))->world->inbox().inputs(); }
 const std::vector<Channel>& Engine::channels() const { return copies_[0]->channels.list(); }
 
 uint64_t Engine::state_hash(int world) const {

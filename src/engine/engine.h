@@ -36,6 +36,8 @@ class Engine {
  public:
   // A message of a copy: step, channel, bytes.
   using MessageHandler = std::function<void(int world, int64_t step, const Channel& channel, std::span<const uint8_t> bytes)>;
+  // A state of a copy: its snapshot, and the batch that tells what acted on the state before it.
+  using StateHandler = std::function<void(int world, const Snapshot& snapshot, const Batch& batch)>;
 
   // Computes state 0 of each copy. Throws InputError and EnvironmentError.
   Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions options);
@@ -80,6 +82,10 @@ class Engine {
 
   // Called in step() and reset() with each message, copies and messages in order; nothing is computed in parallel then.
   void on_message(MessageHandler handler) { handler_ = std::move(handler); }
+  // The same for each state, before its messages.
+  void on_state(StateHandler handler) { state_handler_ = std::move(handler); }
+
+  const std::vector<Input>& inputs(int world) const;
 
  private:
   struct Copy;
@@ -104,6 +110,7 @@ class Engine {
   std::shared_ptr<FieldArray> touching_ = std::make_shared<FieldArray>();
   std::vector<std::unique_ptr<Observer>> observers_;
   MessageHandler handler_;
+  StateHandler state_handler_;
   struct Arena;
   std::unique_ptr<Arena> arena_;
 };

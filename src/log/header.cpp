@@ -38,11 +38,20 @@ std::string joined(const std::vector<std::string>& texts) {
   return all.empty() ? "none" : all;
 }
 
-// Of the program itself: what the linker made of its bytes. "" where it makes nothing.
+bool holds_this_code(const dl_phdr_info& object) {
+  static const int here = 0;
+  const auto address = reinterpret_cast<ElfW(Addr)>(&here);
+  return std::any_of(object.dlpi_phdr, object.dlpi_phdr + object.dlpi_phnum, [&](const ElfW(Phdr)& header) {
+    return header.p_type == PT_LOAD && address - (object.dlpi_addr + header.p_vaddr) < header.p_memsz;
+  });
+}
+
+// Of the program or shared library that this is linked into: what the linker made of its bytes. "" where it makes nothing.
 std::string build_id() {
   std::string id;
   dl_iterate_phdr(
       [](dl_phdr_info* info, size_t, void* data) {
+        if (!holds_this_code(*info)) return 0;
         constexpr size_t kAlign = 4;
         for (int i = 0; i < info->dlpi_phnum; ++i) {
           const ElfW(Phdr)& header = info->dlpi_phdr[i];
@@ -62,7 +71,7 @@ std::string build_id() {
             at = reinterpret_cast<const char*>(bytes) + (note->n_descsz + kAlign - 1) / kAlign * kAlign;
           }
         }
-        return 1;    // the first is the program
+        return 1;
       },
       &id);
   return id;
@@ -88,6 +97,11 @@ std::string cpu_features() {
 #endif
 }
 
+std::string own_version() {
+  const std::string id = build_id();
+  return version() + (id.empty() ? "" : " (build " + id + ")");
+}
+
 std::string libc_version() { return std::string("glibc ") + gnu_get_libc_version(); }
 
 std::vector<std::string> libraries_that_matter() {
@@ -107,8 +121,8 @@ std::vector<std::string> libraries_that_matter() {
 log_header_t make_log_header(const model::WorldModel& world, uint64_t seed, const std::vector<std::string>& options) {
   log_header_t header;
   header.utime = 0;
-  header.version = version();
-  if (const std::string id = build_id(); !id.empty()) header.version += " (build " + id + ")";
+  header.epoch = 0;
+  header.version = own_version();
   header.world = world.name;
   header.world_file = world.file;
   header.seed = static_cast<int64_t>(seed);

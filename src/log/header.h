@@ -11,6 +11,8 @@ namespace ruedo::log {
 
 // The vector extensions of this CPU that glibc or the renderer choose code by.
 std::string cpu_features();
+// Ruedo's version, and the build of this program where the linker noted one: as a header has it.
+std::string own_version();
 std::string libc_version();
 // Those shared libraries of this process that compute what goes into messages, by file name with version, sorted.
 std::vector<std::string> libraries_that_matter();

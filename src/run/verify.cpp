@@ -2,6 +2,7 @@
 #include "run/verify.h"
 
 #include <algorithm>
+#include <set>
 
 #include "ruedo/decode.h"
 #include "log/header.h"
@@ -54,6 +55,7 @@ class Verifier::Impl {
  public:
   Impl(const std::string& log, std::shared_ptr<const model::WorldModel> world, ServerOptions options) : log_(log) {
     step_us_ = world->step_us;
+    find_kept_channels(log);
     options.repeat = log;
     options.end_with_repeat = true;
     options.control = false;
@@ -76,7 +78,23 @@ class Verifier::Impl {
 
  private:
   // What acted is what the repetition was given; the header is the machine's.
-  static bool is_compared(const std::string& channel) { return channel != "ruedo/applied" && channel != "ruedo/header"; }
+  bool is_compared(const std::string& channel) const {
+    return channel != "ruedo/applied" && channel != "ruedo/header" && (kept_.empty() || kept_.contains(channel));
+  }
+
+  // Every run's log has ruedo/world. One without was thinned out, as campaigns keep them: the channels that it has are
+  // compared, the hashes of the state among them.
+  void find_kept_channels(const std::string& path) {
+    log::Reader reader(path);
+    log::Event event;
+    bool hashed = false;
+    while (reader.next(event, [](const std::string&) { return false; })) {
+      if (event.channel == "ruedo/world") return kept_.clear();
+      kept_.insert(event.channel);
+      hashed |= event.channel == "ruedo/state_hash";
+    }
+    if (!hashed) kept_.clear();
+  }
 
   bool next_logged() {
     while (more_) {
@@ -141,6 +159,7 @@ class Verifier::Impl {
   log::Reader log_;
   log::Event logged_;
   bool more_ = true, ended_ = false;
+  std::set<std::string> kept_;    // channels of a log that was thinned out; empty: all
   int64_t step_us_ = 1;
   SimTime last_stamp_ = 0, epoch_begin_us_ = 0;
   int32_t epoch_ = 0;

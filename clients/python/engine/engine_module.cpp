@@ -14,6 +14,8 @@
 
 #include "core/version.h"
 #include "engine/engine.h"
+#include "log/header.h"
+#include "watched_run.h"
 #include "model/load.h"
 #include "ruedo/errors.h"
 
@@ -72,6 +74,12 @@ class PyEngine {
     const auto model = text ? ruedo::model::load_world_text(*text, world, options) : ruedo::model::load_world(world, options);
     engine_ = std::make_unique<Engine>(model, engine);
     for (const ruedo::Finding& finding : model->findings) findings_.push_back(finding.source.str() + ": " + finding.element + ": " + finding.text);
+    world_ = model;
+    for (const std::string& one : spawns) result_options_.push_back("--spawn=" + one);
+    for (const std::string& one : drives) result_options_.push_back("--drive=" + one);
+    for (const std::string& one : settings) result_options_.push_back("--set=" + one);
+    for (const std::string& one : disabled) result_options_.push_back("--disable=" + one);
+    if (!noise) result_options_.push_back("--no-noise");
     if (record) {
       engine_->on_message([this](int copy, int64_t step, const ruedo::engine::Channel& channel, std::span<const uint8_t> bytes) {
         recorded_.push_back({copy, step, channel.bus_name, {reinterpret_cast<const char*>(bytes.data()), bytes.size()}});
@@ -109,6 +117,59 @@ class PyEngine {
     for (size_t i = 0; i < worlds.size(); ++i) model ? engine.reset(worlds[i], seeds[i], model) : engine.reset(worlds[i], seeds[i]);
   }
 
+  // Copy 0 begins anew with that seed and is watched from its first state on. log: "" or the file of what acts on it.
+  void begin_run(uint64_t seed, const std::vector<std::string>& goals, bool no_contact, std::optional<double> clearance,
+                 std::optional<double> odometry_error, double clearance_reach, const std::string& robot, const std::string& log, bool everything) {
+    Engine& engine = this->engine();
+    ruedo::judge::Expectations expected;
+    expected.robot = robot;
+    for (const std::string& goal : goals) expected.goals.push_back(ruedo::judge::parse_goal(goal));
+    expected.no_contact = no_contact;
+    expected.clearance = clearance;
+    expected.odometry_error = odometry_error;
+    expected.clearance_reach = clearance_reach;
+    const nb::gil_scoped_release release;
+    run_.reset();
+    if (!header_) header_ = ruedo::log::make_log_header(*world_, seed, result_options_);    // it hashes the world's files: once
+    header_->seed = static_cast<int64_t>(seed);
+    run_ = std::make_unique<WatchedRun>(*world_, std::move(expected), *header_, log);
+    engine.on_state([this](int copy, const ruedo::Snapshot& snapshot, const ruedo::engine::Batch& batch) {
+      if (copy == 0 && run_) run_->see(snapshot, batch, engine_->inputs(0));
+    });
+    engine.on_message([this, everything](int copy, int64_t, const ruedo::engine::Channel& channel, std::span<const uint8_t> bytes) {
+      if (copy != 0 || !run_) return;
+      run_->judge().see(channel.name, bytes);
+      if (everything) run_->record_message(channel.bus_name, bytes);
+    });
+    engine.reset(0, seed);
+  }
+
+  // What came of it; the log is whole then.
+  nb::dict end_run() {
+    if (!run_) throw std::runtime_error("no run was begun");
+    run_->end();
+    nb::dict verdict, metrics;
+    nb::list failures, track;
+    for (const ruedo::judge::Failure& failure : run_->judge().failures()) {
+      nb::dict one;
+      one["what"] = failure.what;
+      one["time_s"] = static_cast<double>(failure.time) * 1e-6;
+      one["text"] = failure.text;
+      failures.append(one);
+    }
+    for (const ruedo::judge::Metric& metric : run_->judge().metrics()) metrics[metric.name.c_str()] = metric.value;
+    for (const ruedo::judge::Judge::Place& place : run_->judge().track()) track.append(nb::make_tuple(place.time_s, place.x, place.y));
+    verdict["failures"] = failures;
+    verdict["metrics"] = metrics;
+    verdict["track"] = track;
+    run_.reset();
+    engine().on_state({});
+    engine().on_message({});
+    return verdict;
+  }
+
+  std::vector<std::string> files_read() const { return world_->files_read; }
+
   nb::object touching() const { return view_of(engine().touching()); }
 
   nb::object observe(const std::string& device, const std::string& field) { return view_of(engine().observe(device, field)); }
@@ -130,7 +191,10 @@ class PyEngine {
  private:
   ruedo::model::LoadOptions options_;
   std::unique_ptr<Engine> engine_;
-  std::vector<std::string> findings_;
+  std::shared_ptr<const ruedo::model::WorldModel> world_;
+  std::vector<std::string> findings_, result_options_;
+  std::optional<ruedo::log_header_t> header_;
+  std::unique_ptr<WatchedRun> run_;
   std::vector<Recorded> recorded_;
 };
 
@@ -138,6 +202,7 @@ class PyEngine {
 
 NB_MODULE(_engine, module) {
   module.attr("version") = ruedo::version();
+  module.attr("build") = ruedo::log::own_version();
   nb::exception<ruedo::InputError>(module, "InputError", PyExc_ValueError);
   nb::exception<ruedo::EnvironmentError>(module, "EnvironmentError", PyExc_OSError);
   nb::class_<PyEngine>(module, "Engine")
@@ -152,6 +217,11 @@ NB_MODULE(_engine, module) {
       .def("command", &PyEngine::command)
       .def("reset", &PyEngine::reset, nb::arg("worlds"), nb::arg("seeds"), nb::arg("text") = nb::none(), nb::arg("name") = "world")
       .def("observe", &PyEngine::observe)
+      .def("begin_run", &PyEngine::begin_run, nb::arg("seed"), nb::kw_only(), nb::arg("goals"), nb::arg("no_contact"),
+           nb::arg("clearance") = nb::none(), nb::arg("odometry_error") = nb::none(), nb::arg("clearance_reach"), nb::arg("robot"), nb::arg("log"),
+           nb::arg("everything"))
+      .def("end_run", &PyEngine::end_run)
+      .def("files_read", &PyEngine::files_read)
       .def("touching", &PyEngine::touching)
       .def("messages", &PyEngine::messages)
       .def("devices", &PyEngine::devices)

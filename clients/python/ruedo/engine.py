@@ -76,6 +76,29 @@ class Engine:
         """What of the world file is not supported, or was repaired: file, line, element, what was done."""
         return self._core.findings()
 
+    @property
+    def files_read(self) -> list[str]:
+        """The files that the world was read from, in the order of reading."""
+        return list(self._core.files_read())
+
+    def begin_run(self, seed: int, *, goals: Iterable[str] = (), no_contact: bool = False, clearance: float | None = None,
+                  odometry_error: float | None = None, clearance_reach: float = 0.0, robot: str = "", log: str = "",
+                  everything: bool = False) -> None:
+        """Begins copy 0 anew with that seed, and judges it as ``ruedo regress`` does.
+
+        goals: "X,Y,RADIUS,BY". clearance_reach: m, smaller clearances are measured. log: a file that ``ruedo verify`` repeats; with
+        everything: all messages, else only what acted on the run and hashes of its state.
+        """
+        self._core.begin_run(operator.index(seed), goals=list(goals), no_contact=no_contact, clearance=clearance,
+                             odometry_error=odometry_error, clearance_reach=float(clearance_reach), robot=robot, log=log,
+                             everything=everything)
+        self._seeds[0] = operator.index(seed)
+
+    def end_run(self) -> dict[str, Any]:
+        """What came of it: {"failures": [{"what", "time_s", "text"}], "metrics": {name: number}, "track": [(s, m, m)]}."""
+        verdict: dict[str, Any] = self._core.end_run()
+        return verdict
+
     def steps(self, world: int = 0) -> int:
         """The number of the state that a copy is in; 0 after a reset."""
         return self._core.current_step(self._checked(world))

@@ -1,10 +1,10 @@
 // The hull of a robot that stands alone, and rays out from it.
-#include "cli/judge_hull.h"
+#include "judge/judge_hull.h"
 
 #include <cmath>
 #include <numbers>
 
-namespace ruedo::cli {
+namespace ruedo::judge {
 namespace {
 
 constexpr int kDirections = 180, kHeights = 5;
@@ -73,4 +73,4 @@ JudgeHull::Nearest JudgeHull::nearest(const Snapshot& snapshot, double reach) {
   return nearest;
 }
 
-}  // namespace ruedo::cli
+}  // namespace ruedo::judge

@@ -10,7 +10,7 @@
 #include "model/body_layout.h"
 #include "scene/ray_scene.h"
 
-namespace ruedo::cli {
+namespace ruedo::judge {
 
 class JudgeHull {
  public:
@@ -34,4 +34,4 @@ class JudgeHull {
   std::vector<scene::Hit> hits_;
 };
 
-}  // namespace ruedo::cli
+}  // namespace ruedo::judge

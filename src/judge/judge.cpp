@@ -1,22 +1,22 @@
 // Goals, contacts and odometry; clearance is in judge_hull.cpp.
-#include "cli/judge.h"
+#include "judge/judge.h"
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstring>
 
 #include <fmt/format.h>
 
-#include "cli/judge_hull.h"
 #include "core/whole.h"
+#include "judge/judge_hull.h"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
-#include "ruedo/odometry_t.hpp"
-#include "ruedo/pose_t.hpp"
-#include "log/reader.h"
 
-namespace ruedo::cli {
+namespace ruedo::judge {
 namespace {
+
+constexpr SimTime kTrackPeriod = 250'000;    // us
 
 double seconds(SimTime time) { return static_cast<double>(time) * 1e-6; }
 
@@ -54,7 +54,8 @@ Judge::Judge(const model::WorldModel& world, Expectations expected) : world_(wor
   for (size_t i = 0; i < layout_.links.size(); ++i) own_[i] = layout_.links[i].instance == instance;
   for (const model::WheelPlacement& wheel : layout_.wheels) wheel_[static_cast<size_t>(wheel.link)] = wheel.robot == robot_;
   reached_.resize(expected_.goals.size());
-  if (expected_.clearance) hull_ = std::make_unique<JudgeHull>(world_, layout_, robot_);
+  expected_.clearance_reach = std::max(expected_.clearance_reach, expected_.clearance.value_or(0.0));
+  if (expected_.clearance_reach > 0.0) hull_ = std::make_unique<JudgeHull>(world_, layout_, robot_);
 }
 
 Judge::~Judge() = default;
@@ -71,21 +72,30 @@ std::string Judge::name_of(int link) const {
 }
 
 void Judge::see(const Snapshot& snapshot) {
-  seen_ = snapshot.time;
   if (static_cast<size_t>(robot_) >= snapshot.robots.size()) return;
   const Vec3 position = snapshot.robots[static_cast<size_t>(robot_)].X_WBase.translation;
+  if (seen_ >= 0) path_m_ += (position - position_).head<2>().norm();
+  seen_ = snapshot.time;
+  position_ = position;
+  if (snapshot.time >= static_cast<SimTime>(track_.size()) * kTrackPeriod) track_.push_back({seconds(snapshot.time), position.x(), position.y()});
   for (size_t i = 0; i < expected_.goals.size(); ++i) {
     const Goal& goal = expected_.goals[i];
-    if (seconds(snapshot.time) <= goal.by_s && std::hypot(position.x() - goal.x, position.y() - goal.y) <= goal.radius) reached_[i] = true;
+    const double distance = std::hypot(position.x() - goal.x, position.y() - goal.y);
+    if (i + 1 == expected_.goals.size()) last_goal_distance_m_ = std::min(last_goal_distance_m_, distance);
+    if (reached_[i] || seconds(snapshot.time) > goal.by_s || distance > goal.radius) continue;
+    reached_[i] = true;
+    last_goal_ = std::max(last_goal_, snapshot.time);
   }
-  if (expected_.no_contact) see_contacts(snapshot);
-  if (hull_) {
-    const JudgeHull::Nearest nearest = hull_->nearest(snapshot, *expected_.clearance);
-    if (nearest.range < *expected_.clearance) {
-      fail("clearance", snapshot.time, fmt::format("{} was {:.3f} m from {}, at least {:g} m are asked for", expected_.robot, nearest.range,
-                                                   name_of(nearest.link), *expected_.clearance));
-    }
-  }
+  see_contacts(snapshot);
+  if (hull_) see_clearance(snapshot);
+}
+
+void Judge::see_clearance(const Snapshot& snapshot) {
+  const JudgeHull::Nearest nearest = hull_->nearest(snapshot, expected_.clearance_reach);
+  smallest_clearance_m_ = std::min(smallest_clearance_m_, nearest.range);
+  if (!expected_.clearance || nearest.range >= *expected_.clearance) return;
+  fail("clearance", snapshot.time, fmt::format("{} was {:.3f} m from {}, at least {:g} m are asked for", expected_.robot, nearest.range,
+                                               name_of(nearest.link), *expected_.clearance));
 }
 
 void Judge::see_contacts(const Snapshot& snapshot) {
@@ -95,44 +105,42 @@ void Judge::see_contacts(const Snapshot& snapshot) {
     if (a == b) continue;
     // What carries it presses upwards on a wheel, or from below anywhere (castors).
     if (std::abs(contact.normal.z()) > 0.7 && contact.position.z() < snapshot.robots[static_cast<size_t>(robot_)].X_WBase.translation.z() + 0.02) continue;
+    if (first_contact_ < 0) first_contact_ = snapshot.time;
+    if (!expected_.no_contact) return;
     fail("contact", snapshot.time, fmt::format("{} touched {} at ({:.3f}, {:.3f}, {:.3f})", name_of(a ? contact.link_a : contact.link_b),
                                                name_of(a ? contact.link_b : contact.link_a), contact.position.x(), contact.position.y(),
                                                contact.position.z()));
   }
 }
 
-// Odometry starts at zero where the robot starts: the truth is looked at from its first pose.
-void Judge::check_odometry(const std::string& record) {
-  log::Reader log(record);
-  log::Event event;
-  std::optional<pose_t> start, pose;
-  bool compared = false;
-  const std::string pose_channel = expected_.robot + "/pose", odometry_channel = expected_.robot + "/odometry";
-  std::optional<odometry_t> odometry;
-  while (log.next(event)) {
-    pose_t new_pose;
-    odometry_t new_odometry;
-    if (event.channel == pose_channel && decode_checked(event.data.data(), event.data.size(), new_pose) == DecodeFault::none) {
-      if (!start) start = new_pose;
-      pose = new_pose;
-    } else if (event.channel == odometry_channel && decode_checked(event.data.data(), event.data.size(), new_odometry) == DecodeFault::none) {
-      odometry = new_odometry;
-    } else {
-      continue;
-    }
-    if (!pose || !odometry || pose->utime != odometry->utime) continue;
-    compared = true;
-    const double dx = pose->pos[0] - start->pos[0], dy = pose->pos[1] - start->pos[1], turn = heading_of(start->orientation);
-    const double x = std::cos(turn) * dx + std::sin(turn) * dy, y = -std::sin(turn) * dx + std::cos(turn) * dy;
-    const double error = std::hypot(odometry->x - x, odometry->y - y);
-    if (error > *expected_.odometry_error) {
-      return fail("odometry", pose->utime, fmt::format("{}'s odometry was {:.3f} m off, at most {:g} m are asked for", expected_.robot, error, *expected_.odometry_error));
-    }
+void Judge::see(const std::string& channel, std::span<const uint8_t> message) {
+  const auto is = [&](const char* device) { return channel.size() == expected_.robot.size() + std::strlen(device) && channel.starts_with(expected_.robot) && channel.ends_with(device); };
+  if (is("/pose")) {
+    pose_t pose;
+    if (decode_checked(message.data(), message.size(), pose) != DecodeFault::none) return;
+    if (!first_pose_) first_pose_ = pose;
+    pose_ = pose;
+  } else if (is("/odometry")) {
+    odometry_t odometry;
+    if (decode_checked(message.data(), message.size(), odometry) != DecodeFault::none) return;
+    odometry_ = odometry;
+  } else {
+    return;
   }
-  if (!compared) fail("odometry", 0, "there is no " + odometry_channel + " beside " + pose_channel + " to judge by");
+  if (pose_ && odometry_ && pose_->utime == odometry_->utime) compare_odometry();
 }
 
-std::vector<std::string> Judge::failures(const std::string& record) {
+// Odometry starts at zero where the robot starts: the truth is looked at from its first pose.
+void Judge::compare_odometry() {
+  const double dx = pose_->pos[0] - first_pose_->pos[0], dy = pose_->pos[1] - first_pose_->pos[1], turn = heading_of(first_pose_->orientation);
+  const double x = std::cos(turn) * dx + std::sin(turn) * dy, y = -std::sin(turn) * dx + std::cos(turn) * dy;
+  const double error = std::hypot(odometry_->x - x, odometry_->y - y);
+  odometry_error_m_ = std::max(odometry_error_m_, error);
+  if (!expected_.odometry_error || error <= *expected_.odometry_error) return;
+  fail("odometry", pose_->utime, fmt::format("{}'s odometry was {:.3f} m off, at most {:g} m are asked for", expected_.robot, error, *expected_.odometry_error));
+}
+
+std::vector<Failure> Judge::failures() {
   for (size_t i = 0; i < expected_.goals.size(); ++i) {
     const Goal& goal = expected_.goals[i];
     if (reached_[i]) continue;
@@ -140,11 +148,23 @@ std::vector<std::string> Judge::failures(const std::string& record) {
          fmt::format("{} was not within {:g} m of ({:g}, {:g}) by {:g} s{}", expected_.robot, goal.radius, goal.x, goal.y, goal.by_s,
                      seconds(seen_) < goal.by_s ? fmt::format("; the run ended at {:g} s", seconds(seen_)) : ""));
   }
-  if (expected_.odometry_error) check_odometry(record);
+  if (expected_.odometry_error && odometry_error_m_ < 0.0) {
+    fail("odometry", 0, fmt::format("there is no {0}/odometry beside {0}/pose to judge by", expected_.robot));
+  }
   std::stable_sort(failures_.begin(), failures_.end(), [](const Failure& a, const Failure& b) { return a.time < b.time; });
-  std::vector<std::string> lines;
-  for (const Failure& failure : failures_) lines.push_back(fmt::format("{:.3f} s: {}", seconds(failure.time), failure.text));
-  return lines;
+  return failures_;
 }
 
-}  // namespace ruedo::cli
+std::vector<Metric> Judge::metrics() const {
+  std::vector<Metric> metrics{{"time_s", seconds(seen_)}, {"x_m", position_.x()}, {"y_m", position_.y()}, {"path_m", path_m_}};
+  if (!expected_.goals.empty()) metrics.push_back({"goal_distance_m", last_goal_distance_m_});
+  if (!reached_.empty() && std::find(reached_.begin(), reached_.end(), false) == reached_.end()) metrics.push_back({"goal_time_s", seconds(last_goal_)});
+  if (first_contact_ >= 0) metrics.push_back({"contact_time_s", seconds(first_contact_)});
+  if (hull_) metrics.push_back({"clearance_m", std::min(smallest_clearance_m_, expected_.clearance_reach)});
+  if (odometry_error_m_ >= 0.0) metrics.push_back({"odometry_error_m", odometry_error_m_});
+  return metrics;
+}
+
+std::string to_line(const Failure& failure) { return fmt::format("{:.3f} s: {}", seconds(failure.time), failure.text); }
+
+}  // namespace ruedo::judge

@@ -1,0 +1,138 @@
+"""Campaign: the file, its cases, and their runs on whatever engine."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+from pathlib import Path
+from typing import Any, Callable, Iterable, Iterator
+
+from .. import _engine
+from .cluster import run_on_ray
+from .errors import CampaignError, SpecError
+from .local import Done, cores, run_local
+from .plan import Case, Planner, check_values, shard_of
+from .schema import Source, check, read_yaml
+from .store import Results, Store
+
+_REMEMBERED = ("number", "id", "world", "robot", "controller", "seed", "parameters")
+
+Progress = Callable[[Case, dict[str, Any]], None]
+
+
+class Campaign:
+    """Many runs of one experiment.
+
+    spec: a YAML file, or the same members as a dict; a dict's paths begin in `folder`. out: where the
+    results go, default NAME.campaign beside the file. Raises SpecError for what is wrong in the file.
+    """
+
+    def __init__(self, spec: str | os.PathLike[str] | dict[str, Any], *, folder: str | os.PathLike[str] = ".",
+                 out: str | os.PathLike[str] | None = None) -> None:
+        if isinstance(spec, dict):
+            self._content, self._source = json.loads(json.dumps(spec)), Source("campaign")
+            self.folder = Path(folder).resolve()
+            stem = str(spec.get("name", "campaign"))
+        else:
+            file = Path(spec)
+            try:
+                text = file.read_text(encoding="utf-8")
+            except (OSError, UnicodeDecodeError) as error:
+                raise SpecError(f"{file}: cannot be read: {error}") from None
+            self._content, self._source = read_yaml(str(file), text)
+            self.folder, stem = file.resolve().parent, file.stem
+        check(self._content, self._source)
+        check_values(self._content, self._source)
+        self.name = str(self._content.get("name", stem))
+        self.out = Path(out) if out else self.folder / f"{stem}.campaign"
+        self.version = str(getattr(_engine, "build", _engine.version))
+        self._cases: list[Case] | None = None
+        self._files: set[str] = set()    # that the cases are made from
+
+    @property
+    def cases(self) -> list[Case]:
+        """All cases, in the order of the file. Worlds are made and read when this is first asked for."""
+        if self._cases is None:
+            planner = Planner(self._content, self._source, self.folder, self.out / "worlds", self.version)
+            self._cases = planner.cases()
+            self._files = planner.files
+        return self._cases
+
+    def run(self, *, workers: int | None = None, ray: str | None = None, shard: str | None = None,
+            progress: Progress | None = None, stop: Callable[[], bool] = lambda: False) -> Results:
+        """Runs what has no result yet, and returns all results.
+
+        workers: processes on this machine, default one a core. ray: "auto" or an address, the same on a
+        Ray cluster. shard: "I/N", every N-th case from the I-th on. stop: True ends the campaign early.
+        """
+        cases = shard_of(self.cases, shard) if shard else self.cases
+        store = Store(self.out)
+        with _lock(self.out):
+            store.set_about("campaign", json.dumps({"name": self.name, "content": self._content,
+                                                    "folder": str(self.folder), "version": self.version}))
+            store.set_about("cases", json.dumps([{key: getattr(case, key) for key in _REMEMBERED} for case in cases]))
+            known = store.known()
+            missing = [case for case in cases if case.id not in known]
+            sample = self._sampled()
+            for case, outcome, wall_s in self._outcomes(missing, workers, ray):
+                keep = outcome["status"] != "passed" if self._content.get("keep", {}).get("failures", True) else False
+                store.add(case.id, outcome, wall_s, keep or case.id in sample)
+                if progress:
+                    progress(case, outcome)
+                if stop():
+                    break
+        return Results(cases, store.rows(case.id for case in cases), store)
+
+    def results(self, shard: str | None = None) -> Results:
+        """What there is."""
+        cases = shard_of(self.cases, shard) if shard else self.cases
+        store = Store(self.out)
+        return Results(cases, store.rows(case.id for case in cases), store)
+
+    def join(self, folders: Iterable[str | os.PathLike[str]]) -> int:
+        """Takes over the results of shards; how many."""
+        store = Store(self.out)
+        with _lock(self.out):
+            store.set_about("cases", json.dumps([{key: getattr(case, key) for key in _REMEMBERED} for case in self.cases]))
+            return sum(store.take(Store(Path(one), write=False)) for one in folders)
+
+    def case(self, text: str) -> Case:
+        """By its number, or by the beginning of its id."""
+        found = [case for case in self.cases if str(case.number) == text] or [
+            case for case in self.cases if len(text) >= 4 and case.id.startswith(text)]
+        if len(found) != 1:
+            raise SpecError(f"{text} is {'no case' if not found else 'several cases'} of {self.name}: a number from 0 "
+                            f"to {len(self.cases) - 1}, or the first 4 digits or more of an id")
+        return found[0]
+
+    def _sampled(self) -> set[str]:
+        """Cases whose log is kept however they end: those with the lowest ids, which are as good as drawn."""
+        count = self._content.get("keep", {}).get("sample", 0)
+        return set(sorted(case.id for case in self.cases)[:count])
+
+    def _outcomes(self, cases: list[Case], workers: int | None, ray: str | None) -> Iterator[Done]:
+        if ray is not None:
+            return run_on_ray(cases, str(self.folder), self._files, ray, self.version)
+        count = cores() if workers is None else workers
+        if count < 1:
+            raise CampaignError(f"{count} workers: 1 or more are needed")
+        return run_local(cases, str(self.folder), count)
+
+
+class _lock:
+    """One driver at a time; the kernel lets go of it when its holder ends, however that ends."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def __enter__(self) -> None:
+        self._file = open(self._folder / "lock", "w")
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            self._file.close()
+            raise CampaignError(f"{self._folder} is in use by another `ruedo campaign run`") from None
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()

@@ -1,0 +1,341 @@
+"""One case: its run, in the engine or with a server and a program, and what came of it.
+
+The same on every machine and in every order: nothing here reads a clock but to end what hangs.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import tempfile
+import traceback
+from collections import OrderedDict
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Iterator
+
+from ..engine import Engine
+from ..launch import find_ruedo
+from .controller import DONE, View, make_controller
+from .functions import Function
+from .processes import die_with_parent, end_descendants, limit_memory
+
+_TAIL = 4000        # characters of a controller's output that are kept
+_ENGINES = 4        # that a worker keeps
+
+
+@dataclass
+class Outcome:
+    """What came of a case.
+
+    status: passed, failed (an expectation), crashed, timeout or memory (the controller), or invalid (the
+    case cannot be run). what: which expectation, or what went wrong. reason: in a line. log: its content.
+    """
+
+    status: str = "passed"
+    what: str = ""
+    reason: str = ""
+    time_s: float = 0.0
+    metrics: dict[str, float] = field(default_factory=dict)
+    track: list[list[float]] = field(default_factory=list)
+    state_hash: str = ""
+    output: str = ""
+    log: bytes = b""
+
+    def fail(self, status: str, what: str, reason: str) -> None:
+        """The first thing that went wrong is what stays."""
+        if self.status == "passed":
+            self.status, self.what, self.reason = status, what, reason
+
+    def as_dict(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+class TimeIsUp(BaseException):
+    """Of the wall-clock limit, inside a controller: no `except Exception` of its own stops it."""
+
+
+class BrokenRun(BaseException):
+    """The simulation itself ended: a state that is not finite, say."""
+
+
+class Runner:
+    """Runs cases, one after the other. folder: of the campaign's file."""
+
+    def __init__(self, folder: str) -> None:
+        self._folder = Path(folder)
+        self._engines: OrderedDict[str, Engine] = OrderedDict()
+
+    def run(self, what: dict[str, Any], full_log: str = "") -> Outcome:
+        """full_log: a file for all messages of the run; "": what acted on it is in the outcome."""
+        outcome = Outcome()
+        with tempfile.TemporaryDirectory(prefix="ruedo-case-") as scratch:
+            log = full_log or os.path.join(scratch, "run.lcm")
+            everything = bool(full_log or what["metrics"] or "golden" in what["expect"])
+            try:
+                if "python" in what["controller"]:
+                    with _captured(os.path.join(scratch, "output"), outcome):
+                        self._run_in_engine(what, log, everything, outcome)
+                else:
+                    self._run_command(what, log, scratch, outcome)
+                self._measure(what, log, outcome)
+            except (ValueError, OSError) as error:
+                outcome.fail("invalid", "case", _line(error))
+            if os.path.exists(log):
+                outcome.log, outcome.state_hash = thinned(log)
+        outcome.time_s = outcome.metrics.get("time_s", 0.0)
+        return outcome
+
+    # ---- In the engine.
+
+    def _run_in_engine(self, what: dict[str, Any], log: str, everything: bool, outcome: Outcome) -> None:
+        engine = self._engine(what)
+        expect, limits = what["expect"], what["limits"]
+        robot = expect.get("robot") or (engine.robots[0] if engine.robots else "")
+        engine.begin_run(what["seed"], goals=_goals(what), no_contact=expect.get("no_contact", False),
+                         clearance=expect.get("clearance"), odometry_error=expect.get("odometry_error"),
+                         clearance_reach=expect.get("clearance_reach", 0.0), robot=expect.get("robot", ""),
+                         log=log, everything=everything)
+        try:
+            with _time_limit(limits["wall"]), limit_memory(limits["memory_mb"]):
+                self._drive(engine, robot, what)
+        except TimeIsUp:
+            outcome.fail("timeout", "controller", too_slow(limits["wall"]))
+        except BrokenRun as error:
+            outcome.fail("invalid", "state", str(error))
+        except MemoryError:
+            outcome.fail("memory", "controller", too_large(limits["memory_mb"]))
+        except SystemExit as error:
+            if error.code not in (None, 0):
+                outcome.fail("crashed", "controller", f"the controller ended with SystemExit: {error.code}")
+        except Exception as error:
+            outcome.fail("crashed", "controller", f"the controller raised {type(error).__name__}: {error}"[:300])
+            traceback.print_exc()
+        finally:
+            verdict = engine.end_run()
+        self._take(verdict, outcome)
+
+    def _drive(self, engine: Engine, robot: str, what: dict[str, Any]) -> None:
+        made = what["controller"]
+        steps = max(1, round(1.0 / (made.get("hz", 10.0) * engine.dt)))
+        last = round(what["limits"]["duration"] / engine.dt)
+        controller = make_controller(Function(made["python"], self._folder).load(), what["parameters"])
+        view = View(engine, robot, what["parameters"], what["seed"])
+        index = engine.robots.index(robot) if robot in engine.robots else -1
+        commands = _no_commands(len(engine.robots))
+        while engine.steps() < last:
+            answer = controller(view)
+            if isinstance(answer, str) and answer == DONE:
+                return
+            commands[:] = float("nan")
+            if answer is not None:
+                v, *sideways, omega = answer
+                commands[0, index] = v, sideways[0] if sideways else 0.0, omega
+            try:
+                engine.step(commands if index >= 0 else None, min(steps, last - engine.steps()))
+            except RuntimeError as error:
+                raise BrokenRun(_line(error)) from None
+
+    def _engine(self, what: dict[str, Any]) -> Engine:
+        world = what["world"]
+        options: dict[str, Any] = {"spawn": [world["spawn"]] if world["spawn"] else [], "set": what["settings"],
+                                   "disable": what["disable"], "noise": what["noise"]}
+        if what["faults"]:
+            options["fault"] = [fault_text(one) for one in what["faults"]]
+        key = json.dumps([world["file"], world["sha256"], options], sort_keys=True)
+        engine = self._engines.pop(key, None) or Engine(world["file"], threads=1, seed=what["seed"], **options)
+        self._engines[key] = engine
+        while len(self._engines) > _ENGINES:
+            self._engines.popitem(last=False)[1].close()
+        return engine
+
+    # ---- With a server and a program.
+
+    def _run_command(self, what: dict[str, Any], log: str, scratch: str, outcome: Outcome) -> None:
+        limits, made = what["limits"], what["controller"]
+        verdict_file, output_file = os.path.join(scratch, "verdict.json"), os.path.join(scratch, "output")
+        environment = {**os.environ, "RUEDO_PARAMETERS": json.dumps(what["parameters"], sort_keys=True),
+                       "RUEDO_SEED": str(what["seed"]), **{k: str(v) for k, v in made.get("environment", {}).items()}}
+        with open(output_file, "wb") as output:
+            process = subprocess.Popen(regress_command(what, log, verdict_file), cwd=self._folder, stdin=subprocess.DEVNULL,
+                                       stdout=output, stderr=subprocess.STDOUT, env=environment,
+                                       start_new_session=True, preexec_fn=die_with_parent)
+            try:
+                code: int | None = process.wait(limits["wall"])
+            except subprocess.TimeoutExpired:
+                code = None
+            finally:
+                if process.poll() is None:
+                    os.killpg(process.pid, signal.SIGKILL)
+                    process.wait()
+                end_descendants()
+        outcome.output = _tail(output_file)
+        if os.path.exists(verdict_file):
+            verdict = json.loads(Path(verdict_file).read_text())
+            for fault in verdict["faults"]:
+                self._take_fault(fault, limits["memory_mb"], outcome)
+            self._take(verdict, outcome)
+        elif code is None:
+            outcome.fail("timeout", "controller", too_slow(limits["wall"]))
+        else:
+            said = [line for line in outcome.output.splitlines() if line.startswith("ruedo: ")]
+            outcome.fail("invalid", "case", said[-1][7:] if said else f"ruedo regress ended with exit code {code}")
+
+    def _take_fault(self, fault: str, memory_mb: int, outcome: Outcome) -> None:
+        starved = ("MemoryError", "bad_alloc", "OutOfMemoryError", "Cannot allocate memory")
+        if fault.startswith("the client ended with"):
+            if any(word in outcome.output for word in starved):
+                return outcome.fail("memory", "controller", too_large(memory_mb))
+            return outcome.fail("crashed", "controller", fault.replace("the client", "the controller"))
+        if fault.startswith("the run differs from"):
+            return outcome.fail("failed", "golden", fault.splitlines()[0])
+        outcome.fail("crashed", "controller", fault.splitlines()[0])
+
+    # ---- Of both.
+
+    def _take(self, verdict: dict[str, Any], outcome: Outcome) -> None:
+        for failure in verdict["failures"]:
+            outcome.fail("failed", failure["what"].split(" ")[0], f"{failure['time_s']:.3f} s: {failure['text']}")
+        outcome.metrics.update({name: value for name, value in verdict["metrics"].items() if value is not None})
+        outcome.track = [[round(value, 4) for value in place] for place in verdict["track"]]
+
+    def _measure(self, what: dict[str, Any], log: str, outcome: Outcome) -> None:
+        if "golden" in what["expect"] and "python" in what["controller"]:
+            self._compare_with_golden(what["expect"], log, outcome)
+        for metric in what["metrics"]:
+            try:
+                outcome.metrics[metric["name"]] = float(Function(metric["python"], self._folder).load()(log))
+            except Exception as error:
+                outcome.fail("invalid", "metric", f"{metric['python']} raised {type(error).__name__}: {error}"[:300])
+
+    def _compare_with_golden(self, expect: dict[str, Any], log: str, outcome: Outcome) -> None:
+        kept = log + ".kept"
+        _copy_channels(log, kept, lambda channel: channel.endswith("/pose"))
+        command = [find_ruedo(), "diff", str(self._folder / expect["golden"]), kept]
+        for option in ("tolerance", "ignore"):
+            for rule in expect.get("tolerances" if option == "tolerance" else option, []):
+                command += [f"--{option}", rule]
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode != 0:
+            first = (done.stdout or done.stderr).strip().splitlines()
+            outcome.fail("failed", "golden", f"the run differs from {expect['golden']}: {first[0] if first else ''}")
+
+
+def regress_command(what: dict[str, Any], log: str, verdict: str = "") -> list[str]:
+    """The `ruedo regress` that is a case with a program; to be run in the campaign's folder."""
+    world, made, expect, limits = what["world"], what["controller"], what["expect"], what["limits"]
+    client = f"ulimit -d {limits['memory_mb'] * 1024}; {made['command']}"
+    command = [find_ruedo(), "regress", world["file"], "--client", client, "--seed", str(what["seed"]),
+               "--duration", str(limits["duration"]), "--record", log, "--no-page"]
+    if verdict:
+        command += ["--json", verdict]
+    if world["spawn"]:
+        command += ["--spawn", world["spawn"]]
+    for key, value in what["settings"].items():
+        command += ["--set", f"{key}={str(value).lower() if isinstance(value, bool) else value}"]
+    for option, values in (("disable", what["disable"]), ("wait-for", made.get("wait_for", ())),
+                           ("remap", made.get("remap", ())), ("goal", _goals(what)),
+                           ("tolerance", expect.get("tolerances", ())), ("ignore", expect.get("ignore", ())),
+                           ("fault", [fault_text(one) for one in what["faults"]])):
+        command += [f"--{option}={value}" for value in values]
+    for option, value in (("lockstep", made.get("lockstep")), ("robot", expect.get("robot")), ("golden", expect.get("golden")),
+                          ("clearance", expect.get("clearance")), ("odometry-error", expect.get("odometry_error")),
+                          ("clearance-reach", expect.get("clearance_reach"))):
+        if value is not None:
+            command += [f"--{option}", str(value)]
+    return command + (["--no-contact"] if expect.get("no_contact") else []) + ([] if what["noise"] else ["--no-noise"])
+
+
+def fault_text(fault: dict[str, Any]) -> str:
+    """As `--fault` has it: ROBOT/TARGET:KIND@AT,for=S,value=V."""
+    target = "/".join(one for one in (fault.get("robot", ""), fault.get("target", "")) if one)
+    numbers = "".join(f",{name}={fault[key]}" for key, name in (
+        ("duration", "for"), ("value", "value"), ("from", "from"), ("to", "to"), ("x", "x"), ("y", "y"), ("heading", "heading"))
+        if key in fault)
+    return f"{target}:{fault['kind']}@{fault.get('at', 0)}{numbers}"
+
+
+def thinned(log: str) -> tuple[bytes, str]:
+    """What acted on the run and the hashes of its state, as a log; and the last of the hashes."""
+    from ..lcmtypes import state_hash_t
+    kept = log + ".thin"
+    last = _copy_channels(log, kept, {"ruedo/header", "ruedo/applied", "ruedo/state_hash"}.__contains__, "ruedo/state_hash")
+    content = Path(kept).read_bytes()
+    os.unlink(kept)
+    return content, f"{state_hash_t.decode(last).state_hash & (2**64 - 1):016x}" if last else ""
+
+
+def _copy_channels(log: str, to: str, kept: Any, last_of: str = "") -> bytes:
+    import lcm
+    written = lcm.EventLog(to, "w", overwrite=True)
+    last = b""
+    for event in lcm.EventLog(log, "r"):
+        if kept(event.channel):
+            written.write_event(event.timestamp, event.channel, event.data)
+            last = event.data if event.channel == last_of else last
+    written.close()
+    return last
+
+
+def _goals(what: dict[str, Any]) -> list[str]:
+    by = what["limits"]["duration"]
+    return [f"{float(one['x'])!r},{float(one['y'])!r},{float(one['radius'])!r},{float(one.get('by', by))!r}"
+            for one in what["expect"].get("goal", [])]
+
+
+def too_slow(wall: float) -> str:
+    return f"the run took more than {wall:g} s of real time"
+
+
+def too_large(memory_mb: int) -> str:
+    return f"the controller wanted more than {memory_mb} MB of memory"
+
+
+def _no_commands(robots: int) -> Any:
+    import numpy as np
+    return np.full((1, robots, 3), np.nan)
+
+
+def _line(error: BaseException) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0][:300]
+
+
+def _tail(file: str) -> str:
+    with open(file, "rb") as stream:
+        stream.seek(max(0, os.path.getsize(file) - _TAIL))
+        return stream.read().decode(errors="replace")
+
+
+@contextmanager
+def _time_limit(seconds: float) -> Iterator[None]:
+    def ring(*_: object) -> None:
+        raise TimeIsUp
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+@contextmanager
+def _captured(file: str, outcome: Outcome) -> Iterator[None]:
+    """What is printed, by Python or by a library, goes into the outcome."""
+    import sys
+    with open(file, "wb") as output:
+        sys.stdout.flush(), sys.stderr.flush()
+        kept = os.dup(1), os.dup(2)
+        os.dup2(output.fileno(), 1), os.dup2(output.fileno(), 2)
+        try:
+            yield
+        finally:
+            sys.stdout.flush(), sys.stderr.flush()
+            for number, copy in enumerate(kept, 1):
+                os.dup2(copy, number)
+                os.close(copy)
+    outcome.output = _tail(file)

@@ -1,0 +1,70 @@
+"""Controllers that run in the engine, in the process: what they see, and what they answer."""
+
+from __future__ import annotations
+
+import inspect
+from typing import Any, Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..engine import Engine
+
+DONE = "done"
+"""What a controller answers to end its run."""
+
+
+class View:
+    """What a controller in the engine sees of its robot at a decision.
+
+    view["lrf.ranges"]: the newest message's field, DEVICE.FIELD as in Engine.observe(). view.time: s of
+    sim time. view.parameters and view.seed: of the case. view.send(channel, message): a command other
+    than a velocity.
+    """
+
+    def __init__(self, engine: Engine, robot: str, parameters: dict[str, Any], seed: int) -> None:
+        self._engine = engine
+        self._row = {device: i for device, i in _rows(engine, robot).items()}
+        self.robot = robot
+        self.parameters = parameters
+        self.seed = seed
+
+    @property
+    def time(self) -> float:
+        """s of sim time."""
+        return self._engine.time()
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        device = name.rpartition(".")[0].lower()
+        return np.asarray(self._engine.observe(name)[0, self._row.get(device, 0)])
+
+    def send(self, channel: str, message: Any) -> None:
+        """A message on one of the robot's channels: "move" or "p3at/move"."""
+        full = channel if "/" in channel else f"{self.robot}/{channel}"
+        self._engine.command(0, full, message)
+
+
+def _rows(engine: Engine, robot: str) -> dict[str, int]:
+    """Of each device or kind: which row of its arrays is the robot's."""
+    seen: dict[str, int] = {}
+    rows: dict[str, int] = {}
+    for owner, device, kind in engine.devices:
+        for name in {device.lower(), kind.lower()}:
+            if owner == robot:
+                rows.setdefault(name, seen.get(name, 0))
+            seen[name] = seen.get(name, 0) + 1
+    return rows
+
+
+def make_controller(thing: Any, parameters: dict[str, Any]) -> Callable[[View], Any]:
+    """A class is made anew for each run, with the parameters that it takes; a function is as it is."""
+    if not inspect.isclass(thing):
+        if not callable(thing):
+            raise TypeError(f"{thing!r} is no controller: a function of a View, or a class of such objects")
+        return thing    # type: ignore[no-any-return]
+    accepted = inspect.signature(thing).parameters.values()
+    if any(one.kind is one.VAR_KEYWORD for one in accepted):
+        return thing(**parameters)    # type: ignore[no-any-return]
+    names = {one.name for one in accepted}
+    made = thing(**{name: value for name, value in parameters.items() if name in names})
+    return made    # type: ignore[no-any-return]

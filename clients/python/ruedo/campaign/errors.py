@@ -1,0 +1,22 @@
+"""What goes wrong with a campaign, each with the exit code of the command line."""
+
+from __future__ import annotations
+
+from ..errors import RuedoError
+
+
+class CampaignError(RuedoError):
+    """The campaign cannot be run here: the machine, the disk, a cluster."""
+
+    exit_code = 4
+
+
+class SpecError(CampaignError, ValueError):
+    """The campaign's file is wrong: file, line, member, value and what is allowed."""
+
+    exit_code = 3
+
+
+def missing(package: str, extra: str) -> CampaignError:
+    """A package that an extra of pip's brings is not there."""
+    return CampaignError(f"this needs {package}: pip install 'ruedo[{extra}]'")

@@ -1,0 +1,136 @@
+"""Cases on this machine's cores: a process each, that may be killed without harm to the others."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections import deque
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+from typing import Any, Iterable, Iterator
+
+from .case import Outcome, too_slow
+from .errors import CampaignError
+from .plan import Case
+
+_GRACE = 5.0        # s beyond a case's own limit, before its worker is killed
+_TRIES = 2          # of a case whose worker was killed
+
+Done = tuple[Case, dict[str, Any], float]    # the case, its outcome, and how long it took (s)
+
+
+class Worker:
+    """A process that runs one case at a time."""
+
+    def __init__(self, folder: str) -> None:
+        ours, theirs = socket.socketpair()
+        package = str(Path(__file__).resolve().parents[2])
+        path = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "ruedo.campaign.worker", str(theirs.fileno()), folder], pass_fds=[theirs.fileno()],
+                stdin=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": path})
+        except OSError as error:
+            raise CampaignError(f"a worker cannot be started: {error.strerror}") from None
+        theirs.close()
+        self.pipe = Connection(ours.detach())
+        self.case: Case | None = None
+        self.tries = 0
+        self._until = 0.0
+
+    def give(self, case: Case, tries: int = 1) -> None:
+        self.case, self.tries = case, tries
+        self._until = time.monotonic() + case.what["limits"]["wall"] + _GRACE
+        try:
+            self.pipe.send(case.what)
+        except OSError:
+            pass    # it was killed while idle: its pipe is at its end
+
+    def left_s(self) -> float:
+        """Until it must have answered."""
+        return max(0.0, self._until - time.monotonic())
+
+    def take(self) -> tuple[dict[str, Any], float] | None:
+        """The outcome, and how long it took; None: it is gone."""
+        try:
+            answer: tuple[dict[str, Any], float] = self.pipe.recv()
+        except (EOFError, OSError):
+            return None
+        return answer
+
+    def end(self) -> int:
+        """Its exit code."""
+        self._process.kill() if self._process.poll() is None else None
+        code = self._process.wait()
+        self.pipe.close()
+        return code
+
+
+def run_local(cases: Iterable[Case], folder: str, workers: int, kept: list[Worker] | None = None) -> Iterator[Done]:
+    """Outcomes as they come. A case whose worker is killed is run once more, then it has failed.
+
+    kept: workers that are there already, and stay; new ones that take their place stand in it afterwards.
+    """
+    waiting = deque((case, 1) for case in cases)
+    crew: list[Worker] = [] if kept is None else kept
+    try:
+        while len(crew) < min(workers, len(waiting)):
+            crew.append(Worker(folder))
+        while waiting or any(one.case for one in crew):
+            for one in crew:
+                if one.case is None and waiting:
+                    one.give(*waiting.popleft())
+            yield from _collect(crew, waiting, folder)
+    finally:
+        for one in crew if kept is None else ():
+            one.end()
+
+
+def _collect(crew: list[Worker], waiting: deque[tuple[Case, int]], folder: str) -> Iterator[Done]:
+    busy = [one for one in crew if one.case]
+    ready = wait([one.pipe for one in busy], min(one.left_s() for one in busy))
+    for one in busy:
+        assert one.case is not None
+        case, tries = one.case, one.tries
+        answer = one.take() if one.pipe in ready else None
+        if answer:
+            one.case = None
+            if waiting:
+                one.give(*waiting.popleft())    # before the result is dealt with: no core waits
+            yield case, *answer
+            continue
+        late = one.left_s() == 0.0
+        if one.pipe not in ready and not late:
+            continue
+        code = one.end()
+        crew[crew.index(one)] = Worker(folder)
+        if one.pipe not in ready:
+            yield case, failed("timeout", too_slow(case.what["limits"]["wall"])), case.what["limits"]["wall"]
+        elif tries < _TRIES:
+            waiting.appendleft((case, tries + 1))
+        else:
+            yield case, failed("crashed", f"the controller took its process with it ({how(code)}), {_TRIES} times"), 0.0
+
+
+def failed(status: str, reason: str) -> dict[str, Any]:
+    """The outcome of a case that took its worker with it."""
+    outcome = Outcome()
+    outcome.fail(status, "controller", reason)
+    return outcome.as_dict()
+
+
+def how(code: int) -> str:
+    if code >= 0:
+        return f"exit code {code}"
+    try:
+        return signal.Signals(-code).name
+    except ValueError:
+        return f"signal {-code}"
+
+
+def cores() -> int:
+    return len(os.sched_getaffinity(0))

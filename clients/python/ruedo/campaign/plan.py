@@ -1,0 +1,312 @@
+"""The cases of a campaign: every combination of its members, each with the hash of all that acts on it."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+import math
+import random
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from statistics import NormalDist
+from typing import Any, Callable, Iterator
+
+from .errors import SpecError
+from .functions import Function
+from .schema import Source
+from .worlds import WorldFiles
+
+DEFAULT_MEMORY_MB = 4096
+_HOLE = re.compile(r"(?<![${])\{([A-Za-z_]\w*)\}")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One run of a campaign.
+
+    id: the first 16 digits of a SHA-256 of everything that acts on it: equal ids, equal results.
+    what: all that a worker needs to run it. The rest says where in the campaign it stands.
+    """
+
+    number: int
+    id: str
+    world: str
+    robot: str
+    controller: str
+    seed: int
+    parameters: dict[str, Any]
+    what: dict[str, Any] = field(repr=False)
+
+    @property
+    def place(self) -> str:
+        """What it is compared by with another campaign's: all but the controller."""
+        return json.dumps([self.world, self.robot, self.seed, self.parameters], sort_keys=True)
+
+
+def substitute(value: Any, names: dict[str, Any], wrong: Callable[[str], Exception]) -> Any:
+    """`{name}` becomes its value; a text that is nothing else becomes the value itself."""
+    if isinstance(value, dict):
+        return {key: substitute(one, names, wrong) for key, one in value.items()}
+    if isinstance(value, list):
+        return [substitute(one, names, wrong) for one in value]
+    if not isinstance(value, str):
+        return value
+
+    def named(match: re.Match[str]) -> Any:
+        if match.group(1) not in names:
+            raise wrong(f"{{{match.group(1)}}} is no parameter; there are {', '.join(sorted(names))} "
+                        "(a brace of your own is written twice, {{ and }})")
+        return names[match.group(1)]
+
+    whole = _HOLE.fullmatch(value)
+    if whole:
+        return named(whole)
+    text = _HOLE.sub(lambda match: _text(named(match)), value)
+    return text.replace("{{", "{").replace("}}", "}")
+
+
+def _text(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def points(parameters: dict[str, Any], sampling: dict[str, Any]) -> list[dict[str, Any]]:
+    """Lists and grids are crossed; distributions are drawn together, as a Latin hypercube by default."""
+    crossed, drawn = {}, {}
+    for name, given in parameters.items():
+        kind, values = ("list", given) if isinstance(given, list) else next(iter(given.items()))
+        if kind == "list":
+            crossed[name] = values
+        elif kind == "grid":
+            crossed[name] = _grid(values["from"], values["to"], values["steps"])
+        else:
+            drawn[name] = (kind, values)
+    samples = _draw(drawn, sampling) if drawn else [{}]
+    grid = [dict(zip(crossed, one)) for one in itertools.product(*crossed.values())]
+    return [{name: {**at, **sample}[name] for name in parameters} for at in grid for sample in samples]
+
+
+def _grid(low: float, high: float, steps: int) -> list[float]:
+    if steps == 1:
+        return [low]
+    return [_round(low + (high - low) * i / (steps - 1)) for i in range(steps)]
+
+
+def _draw(drawn: dict[str, tuple[str, list[float]]], sampling: dict[str, Any]) -> list[dict[str, Any]]:
+    count = sampling.get("samples", 10)
+    latin = sampling.get("method", "latin") == "latin"
+    columns = {}
+    for name, (kind, bounds) in drawn.items():
+        # A column has draws of its own, so that another parameter leaves it as it is. Python promises
+        # the numbers of random() for a seed, and of nothing else.
+        draw = random.Random(f"{sampling.get('seed', 1)}/{name}")
+        strata = sorted(range(count), key=lambda _: draw.random()) if latin else None
+        column = [(strata[i] + draw.random()) / count if strata else draw.random() for i in range(count)]
+        columns[name] = [_at(kind, bounds, p) for p in column]
+    return [{name: column[i] for name, column in columns.items()} for i in range(count)]
+
+
+def _at(kind: str, bounds: list[float], p: float) -> float:
+    low, high = bounds
+    if kind == "uniform":
+        return _round(low + (high - low) * p)
+    if kind == "log_uniform":
+        return _round(low * (high / low) ** p)
+    if kind == "integers":
+        return min(int(low + (high - low + 1) * p), int(high))
+    return _round(low + high * NormalDist().inv_cdf(min(max(p, 1e-12), 1 - 1e-12)))
+
+
+def _round(value: float) -> float:
+    """9 digits: what is left of another machine's last bits of pow() and the like."""
+    return float(f"{value:.9g}")
+
+
+def check_values(content: dict[str, Any], source: Source) -> None:
+    """What a schema cannot say. Raises SpecError."""
+    for path, value in _leaves(content, ()):
+        if isinstance(value, float) and not math.isfinite(value):
+            raise source.error(path, f"is {value}; allowed is a finite number")
+    for name, given in content.get("parameters", {}).items():
+        if not name.isidentifier() or name in ("seed", "case", "world", "robot", "controller", "folder"):
+            raise source.error(("parameters", name), "is no name of a parameter: letters, digits and '_', and "
+                               "not seed, case, world, robot, controller or folder")
+        kind = None if isinstance(given, list) else next(iter(given))
+        if kind in ("uniform", "log_uniform", "integers"):
+            low, high = given[kind]
+            if low > high or (kind == "log_uniform" and low <= 0):
+                raise source.error(("parameters", name, kind), f"is {given[kind]}; allowed is [low, high]"
+                                   + (", both above 0" if kind == "log_uniform" else ""))
+        if kind == "normal" and given[kind][1] < 0:
+            raise source.error(("parameters", name, kind), f"is {given[kind]}; allowed is [mean, sigma], sigma 0 or more")
+    for member, ways in (("worlds", ("file", "generator")), ("controllers", ("command", "python"))):
+        names: set[str] = set()
+        for i, one in enumerate(content[member]):
+            if isinstance(one, str):
+                continue
+            if sum(way in one for way in ways) != 1:
+                raise source.error((member, i), f"needs either {ways[0]} or {ways[1]}")
+            if one.get("name") in names:
+                raise source.error((member, i, "name"), f"is {one['name']!r}, which another one is called")
+            names |= {one["name"]} if "name" in one else set()
+    seeds = content.get("seeds", 1)
+    low = min(seeds) if isinstance(seeds, list) else seeds.get("first", 1) if isinstance(seeds, dict) else 1
+    if low < 0:
+        raise source.error(("seeds",), f"has {low}; allowed are whole numbers from 0 on")
+
+
+def _leaves(value: Any, path: tuple[Any, ...]) -> Iterator[tuple[tuple[Any, ...], Any]]:
+    if isinstance(value, dict):
+        for key, one in value.items():
+            yield from _leaves(one, (*path, key))
+    elif isinstance(value, list):
+        for i, one in enumerate(value):
+            yield from _leaves(one, (*path, i))
+    else:
+        yield path, value
+
+
+def seeds_of(given: Any) -> list[int]:
+    """A number is a count from 1 on."""
+    if isinstance(given, int):
+        return list(range(1, given + 1))
+    if isinstance(given, dict):
+        return [given.get("first", 1) + i for i in range(given.get("count", 1))]
+    return list(dict.fromkeys(given))
+
+
+class Planner:
+    """Makes the cases of a checked campaign. folder: where its paths begin; store: where made worlds go."""
+
+    def __init__(self, content: dict[str, Any], source: Source, folder: Path, store: Path, version: str) -> None:
+        self._content, self._source, self._folder, self._version = content, source, folder, version
+        self._worlds = WorldFiles(folder, store)
+        self._hashes: dict[str, str] = {}
+        self._functions: dict[str, Function] = {}
+
+    def cases(self) -> list[Case]:
+        """All of them, in the order of the file."""
+        content = self._content
+        grid = points(content.get("parameters", {}), content.get("sampling", {}))
+        robots = content.get("robots", [""])
+        made: list[Case] = []
+        for (w, world), robot, controller, at, seed in itertools.product(
+                enumerate(content["worlds"]), robots, enumerate(content["controllers"]), grid,
+                seeds_of(content.get("seeds", 1))):
+            made.append(self._case(len(made), w, world, robot, controller, at, seed))
+        twice = {one.id: one for one in made}
+        if len(twice) != len(made):
+            seen: set[str] = set()
+            first = next(one for one in made if one.id in seen or seen.add(one.id))    # type: ignore[func-returns-value]
+            raise SpecError(f"{self._source.name}: case {first.number} is the same as another one: two of its "
+                            "worlds, robots, controllers or parameters do not differ in what they do")
+        return made
+
+    @property
+    def files(self) -> set[str]:
+        """All that the cases are made from."""
+        return self._worlds.files | {str(self._folder / name) for name in self._hashes} | {
+            str(function.file) for function in self._functions.values()}
+
+    def _case(self, number: int, w: int, world: Any, robot: str, controller: tuple[int, dict[str, Any]],
+              at: dict[str, Any], seed: int) -> Case:
+        c, asked = controller
+        names = {**at, "seed": seed, "folder": str(self._folder)}
+
+        def fill(path: tuple[Any, ...], value: Any) -> Any:
+            return substitute(value, names, lambda text: self._source.error(path, text))
+
+        content = self._content
+        expect = fill(("expect",), content.get("expect", {}))
+        if isinstance(expect.get("goal"), dict):
+            expect["goal"] = [expect["goal"]]
+        limits = content["limits"]
+        what: dict[str, Any] = {
+            "world": self._world(w, world, robot, fill, at, seed),
+            "settings": fill(("set",), content.get("set", {})), "disable": content.get("disable", []),
+            "noise": content.get("noise", True), "seed": seed, "parameters": at,
+            "controller": self._controller(c, asked, fill), "expect": expect,
+            "faults": fill(("faults",), content.get("faults", [])),
+            "metrics": [{**one, "sha256": self._function(("metrics", i, "python"), one["python"]).sha256}
+                        for i, one in enumerate(content.get("metrics", []))],
+            "limits": {"duration": limits["duration"], "wall": limits.get("wall", 300),
+                       "memory_mb": limits.get("memory_mb", DEFAULT_MEMORY_MB)}}
+        if "golden" in expect:
+            expect["golden_sha256"] = self._sha256(("expect", "golden"), expect["golden"])
+        digest = hashlib.sha256(canonical([self._version, _acting(what)])).hexdigest()[:16]
+        return Case(number, digest, what["world"]["name"], what["world"]["spawn"] or "", asked["name"], seed,
+                    at, what)
+
+    def _world(self, w: int, world: Any, robot: str, fill: Callable[..., Any], at: dict[str, Any],
+               seed: int) -> dict[str, Any]:
+        asked = {"file": world} if isinstance(world, str) else world
+        path = ("worlds", w)
+        spawn = fill(("robots",), robot)
+        try:
+            if "file" in asked:
+                file = self._worlds.find(fill(path, asked["file"]))
+                name = asked.get("name", Path(file).stem)
+            else:
+                generator = self._function((*path, "generator"), asked["generator"])
+                given = fill((*path, "parameters"), asked.get("parameters", {}))
+                file = self._worlds.generate(generator, given)
+                name = asked.get("name", asked["generator"].rpartition(":")[2])
+            hashed = self._worlds.sha256(file, spawn)
+        except (ValueError, OSError) as error:
+            raise self._source.error(path, str(error)) from None
+        return {"name": name, "file": file, "spawn": spawn, "sha256": hashed}
+
+    def _controller(self, c: int, asked: dict[str, Any], fill: Callable[..., Any]) -> dict[str, Any]:
+        path = ("controllers", c)
+        made = {key: fill((*path, key), value) for key, value in asked.items() if key not in ("name", "files")}
+        files: dict[str, str] = {}
+        for i, pattern in enumerate(asked.get("files", [])):
+            found = sorted(one for one in self._folder.glob(pattern) if one.is_file())
+            if not found:
+                raise self._source.error((*path, "files", i), f"is {pattern!r}, and no file is called so in {self._folder}")
+            files |= {str(one.relative_to(self._folder)): self._sha256((*path, "files", i), str(one)) for one in found}
+        if "command" in made:
+            for word in re.split(r"[\s'\"=]+", made["command"]):
+                if word and (self._folder / word).is_file():
+                    files[word] = self._sha256((*path, "command"), word)
+        else:
+            function = self._function((*path, "python"), made["python"])
+            files["python"] = function.sha256
+        return {**made, "files": files}
+
+    def _function(self, path: tuple[Any, ...], name: str) -> Function:
+        if name not in self._functions:
+            try:
+                self._functions[name] = Function(name, self._folder)
+            except ValueError as error:
+                raise self._source.error(path, str(error)) from None
+        return self._functions[name]
+
+    def _sha256(self, path: tuple[Any, ...], name: str) -> str:
+        if name not in self._hashes:
+            try:
+                self._hashes[name] = hashlib.sha256((self._folder / name).read_bytes()).hexdigest()
+            except OSError as error:
+                raise self._source.error(path, f"{name} cannot be read: {error.strerror}") from None
+        return self._hashes[name]
+
+
+def canonical(value: Any) -> bytes:
+    """One text for one value."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True).encode()
+
+
+def _acting(what: dict[str, Any]) -> dict[str, Any]:
+    """What acts, without the names of folders: the same on every machine."""
+    world = {key: what["world"][key] for key in ("spawn", "sha256")}
+    expect = {key: value for key, value in what["expect"].items() if key != "golden"}
+    return {**what, "world": world, "expect": expect}
+
+
+def shard_of(cases: list[Case], shard: str) -> list[Case]:
+    """I/N: every N-th case, from the I-th on (1 is the first)."""
+    match = re.fullmatch(r"(\d+)/(\d+)", shard)
+    if not match or not 1 <= int(match.group(1)) <= int(match.group(2)):
+        raise SpecError(f"--shard {shard}: it looks like I/N with I from 1 to N, for example 2/4")
+    return cases[int(match.group(1)) - 1::int(match.group(2))]

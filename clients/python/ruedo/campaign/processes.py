@@ -1,0 +1,75 @@
+"""Limits on what runs beside a campaign, and the ends of what it leaves behind. Linux."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import resource
+import signal
+from contextlib import contextmanager
+from typing import Iterator
+
+_libc = ctypes.CDLL(None, use_errno=True)
+_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
+
+
+def die_with_parent() -> None:
+    """This process is killed when the thread that started it ends, however that ends."""
+    _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+
+
+def adopt_orphans() -> None:
+    """What a child of this process leaves behind becomes its own child, so that it can be ended."""
+    _libc.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+
+
+def end_descendants() -> None:
+    """Kills all children of this process that are left, and theirs."""
+    while True:
+        children = _children()
+        if not children:
+            return
+        for child in children:
+            try:
+                os.kill(child, signal.SIGKILL)
+            except ProcessLookupError:
+                pass
+        for child in children:
+            try:
+                os.waitpid(child, 0)
+            except ChildProcessError:
+                pass
+
+
+def _children() -> list[int]:
+    found: list[int] = []
+    for task in os.listdir("/proc/self/task"):
+        try:
+            with open(f"/proc/self/task/{task}/children") as stream:
+                found += [int(one) for one in stream.read().split()]
+        except OSError:
+            pass
+    return found
+
+
+def private_mb() -> int:
+    """What this process has of data that is its own, MB: what RLIMIT_DATA counts."""
+    with open("/proc/self/status") as stream:
+        for line in stream:
+            if line.startswith("VmData:"):
+                return int(line.split()[1]) // 1024
+    return 0
+
+
+@contextmanager
+def limit_memory(more_mb: int) -> Iterator[None]:
+    """So much more than there is already; beyond it, MemoryError."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    wanted = (private_mb() + more_mb) << 20
+    if hard != resource.RLIM_INFINITY:
+        wanted = min(wanted, hard)
+    resource.setrlimit(resource.RLIMIT_DATA, (wanted, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))

@@ -1,0 +1,247 @@
+"""A campaign as one HTML page that needs nothing but a browser: tables, plots as SVG, paths of the worst runs."""
+
+from __future__ import annotations
+
+import html
+import io
+from pathlib import Path
+from typing import Any, Iterable
+
+from .compare import compare_with
+from .errors import missing
+from .plan import Case
+from .stats import wilson
+from .store import Results
+
+_BINS = 8           # of a parameter with more values than that
+_WORST = 12         # runs that are drawn
+_STYLE = """
+body { font: 15px/1.45 system-ui, sans-serif; color: #1d2330; background: #fff; max-width: 1080px; margin: 2em auto; padding: 0 1em }
+h1 { font-size: 1.5em } h2 { font-size: 1.15em; margin-top: 2.2em; border-bottom: 1px solid #d6dae3; padding-bottom: .2em }
+table { border-collapse: collapse; margin: .8em 0 } th, td { text-align: left; padding: .25em .8em .25em 0; vertical-align: top }
+th { font-weight: 600; border-bottom: 1px solid #9aa3b5 } td.n { text-align: right; font-variant-numeric: tabular-nums }
+.bar { background: #e6e9f0; width: 160px; height: .8em; position: relative; display: inline-block }
+.bar b { position: absolute; top: 0; bottom: 0; background: #8fb7e8 } .bar i { position: absolute; top: -2px; bottom: -2px; width: 2px; background: #173f73 }
+.plots { display: flex; flex-wrap: wrap; gap: 12px } .plots figure { margin: 0 } figcaption { font-size: .85em; color: #4a5266; max-width: 330px }
+code { background: #f2f4f8; padding: .1em .3em; user-select: all } svg { max-width: 100%; height: auto }
+"""
+
+
+def write_report(campaign: Any, file: Path, baseline: str | None = None) -> None:
+    """Of what there is so far. baseline: as of compare_with()."""
+    results: Results = campaign.results()
+    parts = [_head(campaign, results), *_by_parameter(results), *_reasons(results), *_distributions(results),
+             *_heat_map(results), *_worst(campaign, results)]
+    if baseline:
+        parts += _comparison(campaign, baseline)
+    title = html.escape(campaign.name)
+    page = (f"<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'><title>{title}</title><style>{_STYLE}</style></head><body>"
+            f"{''.join(parts)}</body></html>\n")
+    file.write_text(page, encoding="utf-8")
+
+
+def _head(campaign: Any, results: Results) -> str:
+    done, failed = len(results.done), len(results.failed)
+    low, high = wilson(done - failed, done)
+    rate = f"{(done - failed) / done:.1%} passed (95 % interval {low:.1%} to {high:.1%})" if done else "nothing was run yet"
+    return (f"<h1>{html.escape(campaign.name)}</h1><p>{done} of {len(results.cases)} cases, {failed} failed: {rate}. "
+            f"Ruedo {html.escape(campaign.version)}.</p>")
+
+
+# ---- Success by parameter.
+
+def _by_parameter(results: Results) -> Iterable[str]:
+    yield "<h2>Success</h2><p>With Wilson's 95 % interval.</p>"
+    keys = {"world": lambda case: case.world, "robot": lambda case: case.robot, "controller": lambda case: case.controller}
+    names = list(dict.fromkeys(name for case in results.cases for name in case.parameters))
+    for name in names:
+        keys[name] = _binned(name, [case.parameters.get(name) for case in results.cases])
+    for name, key in keys.items():
+        groups: dict[Any, list[bool]] = {}
+        for case, row in results.done:
+            groups.setdefault(key(case), []).append(row["status"] == "passed")
+        if len(groups) > 1:
+            yield _success_table(name, sorted(groups.items(), key=lambda one: _order(one[0])))
+
+
+def _binned(name: str, values: list[Any]) -> Any:
+    numbers = [one for one in values if isinstance(one, (int, float)) and not isinstance(one, bool)]
+    if len(set(numbers)) <= _BINS or len(numbers) < len(values):
+        return lambda case: case.parameters.get(name)
+    low, high = min(numbers), max(numbers)
+    width = (high - low) / _BINS
+
+    def key(case: Case) -> Any:
+        i = min(int((case.parameters[name] - low) / width), _BINS - 1)
+        return _Bin(low + i * width, low + (i + 1) * width)
+
+    return key
+
+
+class _Bin(tuple):    # type: ignore[type-arg]
+    """From and to, of a parameter's values."""
+
+    def __new__(cls, low: float, high: float) -> _Bin:
+        return super().__new__(cls, (low, high))
+
+    def __str__(self) -> str:
+        return f"{self[0]:.4g} to {self[1]:.4g}"
+
+
+def _order(value: Any) -> tuple[int, Any]:
+    if isinstance(value, (int, float)):
+        return 0, (value,)
+    return (0, tuple(value)) if isinstance(value, _Bin) else (1, (str(value),))
+
+
+def _success_table(name: str, groups: list[tuple[Any, list[bool]]]) -> str:
+    rows = []
+    for value, good in groups:
+        low, high = wilson(sum(good), len(good))
+        share = sum(good) / len(good)
+        bar = (f"<span class='bar'><b style='left:{low:.1%};right:{1 - high:.1%}'></b><i style='left:{share:.1%}'></i></span>")
+        rows.append(f"<tr><td>{html.escape(str(value))}</td><td class='n'>{sum(good)} of {len(good)}</td><td class='n'>{share:.1%}</td>"
+                    f"<td>{bar}</td><td class='n'>{low:.1%} to {high:.1%}</td></tr>")
+    return (f"<table><tr><th>{html.escape(name)}</th><th>passed</th><th></th><th></th><th>interval</th></tr>{''.join(rows)}</table>")
+
+
+def _reasons(results: Results) -> Iterable[str]:
+    counts: dict[tuple[str, str], list[Case]] = {}
+    for case, row in results.failed:
+        counts.setdefault((row["status"], row["what"]), []).append(case)
+    if not counts:
+        return
+    yield "<h2>Why they failed</h2><table><tr><th>status</th><th>what</th><th>cases</th><th>first</th></tr>"
+    for (status, what), cases in sorted(counts.items(), key=lambda one: -len(one[1])):
+        row = results.row(cases[0])
+        assert row is not None
+        yield (f"<tr><td>{status}</td><td>{html.escape(what)}</td><td class='n'>{len(cases)}</td><td>{cases[0].number}: "
+               f"{html.escape(row['reason'])}</td></tr>")
+    yield "</table>"
+
+
+# ---- Plots.
+
+def _figure(width: float = 3.4, height: float = 2.5) -> Any:
+    try:
+        import matplotlib
+    except ImportError:
+        raise missing("matplotlib", "campaign") from None
+    matplotlib.use("svg")
+    matplotlib.rcParams.update({"svg.hashsalt": "ruedo", "font.size": 8, "axes.spines.top": False, "axes.spines.right": False})
+    from matplotlib.figure import Figure
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def _svg(figure: Any) -> str:
+    text = io.StringIO()
+    figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
+    whole = text.getvalue()
+    return whole[whole.index("<svg"):]
+
+
+def _distributions(results: Results) -> Iterable[str]:
+    names = sorted({name for _, row in results.done for name in row["metrics"]})
+    plots = []
+    for name in names:
+        good = [row["metrics"][name] for _, row in results.done if name in row["metrics"] and row["status"] == "passed"]
+        bad = [row["metrics"][name] for _, row in results.done if name in row["metrics"] and row["status"] != "passed"]
+        if len(set(good + bad)) < 2:
+            continue
+        figure = _figure()
+        axes = figure.add_subplot()
+        axes.hist([good, bad], bins=20, stacked=True, color=["#8fb7e8", "#d96b5b"], label=["passed", "failed"])
+        axes.set_xlabel(name)
+        axes.legend(frameon=False)
+        plots.append(f"<figure>{_svg(figure)}</figure>")
+    if plots:
+        yield f"<h2>Distributions</h2><div class='plots'>{''.join(plots)}</div>"
+
+
+def _heat_map(results: Results) -> Iterable[str]:
+    plots = []
+    for world in dict.fromkeys(case.world for case in results.cases):
+        places = [_place_of_failure(row) for case, row in results.failed if case.world == world]
+        known = [one for one in places if one]
+        if not known:
+            continue
+        figure = _figure(5.2, 3.6)
+        axes = figure.add_subplot()
+        drawn = axes.hexbin(*zip(*known), gridsize=24, mincnt=1, cmap="OrRd", linewidths=0.2)
+        figure.colorbar(drawn, label="failures")
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.set_xlabel("x (m)")
+        axes.set_ylabel("y (m)")
+        plots.append(f"<figure>{_svg(figure)}<figcaption>{html.escape(world)}: {len(known)} failures, where the robot was then</figcaption></figure>")
+    if plots:
+        yield f"<h2>Where they failed</h2><div class='plots'>{''.join(plots)}</div>"
+
+
+def _place_of_failure(row: dict[str, Any]) -> tuple[float, float] | None:
+    """Where the robot was when the first expectation did not hold; at the end, if that has no time."""
+    if not row["track"]:
+        return None
+    try:
+        time_s = float(row["reason"].split(" s:")[0])
+    except ValueError:
+        time_s = row["track"][-1][0]
+    place = min(row["track"], key=lambda one: abs(one[0] - time_s))
+    return place[1], place[2]
+
+
+def badness(row: dict[str, Any]) -> tuple[float, ...]:
+    """The worst first: crashes, then contacts, then what missed its goal by most."""
+    metrics = row["metrics"]
+    order = {"crashed": 0, "memory": 0, "timeout": 0, "invalid": 1}.get(row["status"], 2)
+    return order, 0 if "contact_time_s" in metrics else 1, -metrics.get("goal_distance_m", 0.0), metrics.get("clearance_m", 0.0)
+
+
+def _worst(campaign: Any, results: Results) -> Iterable[str]:
+    worst = sorted(results.failed, key=lambda one: (badness(one[1]), one[0].number))[:_WORST]
+    if not worst:
+        return
+    yield "<h2>The worst runs</h2><div class='plots'>"
+    for case, row in worst:
+        yield f"<figure>{_path(case, row)}<figcaption>{_caption(results, case, row)}</figcaption></figure>"
+    yield "</div>"
+
+
+def _path(case: Case, row: dict[str, Any]) -> str:
+    figure = _figure()
+    axes = figure.add_subplot()
+    if row["track"]:
+        _, x, y = zip(*row["track"])
+        axes.plot(x, y, color="#2c5f9e", linewidth=1.2)
+        axes.plot(x[0], y[0], "o", color="#2c5f9e", markersize=4)
+        place = _place_of_failure(row)
+        if place:
+            axes.plot(*place, "x", color="#c23b22", markersize=7)
+    for goal in case.what.get("expect", {}).get("goal", []):
+        from matplotlib.patches import Circle
+        axes.add_patch(Circle((goal["x"], goal["y"]), goal["radius"], fill=False, color="#3b8f4a"))
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.1)
+    return _svg(figure)
+
+
+def _caption(results: Results, case: Case, row: dict[str, Any]) -> str:
+    settings = ", ".join(f"{name}={value}" for name, value in case.parameters.items())
+    log = results.log(case)
+    text = f"<b>{case.number}</b> {html.escape(case.controller)}, seed {case.seed}{', ' + html.escape(settings) if settings else ''}: {html.escape(row['reason'])}"
+    if not log:
+        return text
+    path = html.escape(str(log.resolve()))
+    return f"{text}<br><a href='file://{path}'>log</a>; in the console: <code>ruedo play {path} --console</code>"
+
+
+def _comparison(campaign: Any, baseline: str) -> Iterable[str]:
+    found = compare_with(campaign, baseline)
+    change, low, high = found.change
+    yield (f"<h2>Compared with {html.escape(found.before)}</h2><p>{found.count} cases in both: {len(found.worse)} became worse, "
+           f"{len(found.better)} better. The success rate changed by {change:+.1%} (95 % interval {low:+.1%} to {high:+.1%}); "
+           f"exact p = {found.p:.3g} (McNemar).</p><table><tr><th></th><th>case</th><th>before</th><th>now</th></tr>")
+    for kind, pairs in (("worse", found.worse), ("better", found.better)):
+        for case, before, now in pairs[:50]:
+            yield (f"<tr><td>{kind}</td><td>{case.number}</td><td>{html.escape(before['reason'] or 'passed')}</td>"
+                   f"<td>{html.escape(now['reason'] or 'passed')}</td></tr>")
+    yield "</table>"

@@ -1,0 +1,193 @@
+"""Results in SQLite, as they come: one row a case, by the hash of all that acts on it."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import sqlite3
+from pathlib import Path
+from typing import Any, Iterable
+
+from .errors import CampaignError, missing
+from .plan import Case
+
+_SCHEMA = """
+CREATE TABLE IF NOT EXISTS about (key TEXT PRIMARY KEY, value TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS results (
+  id TEXT PRIMARY KEY, status TEXT NOT NULL, what TEXT NOT NULL, reason TEXT NOT NULL, time_s REAL NOT NULL,
+  state_hash TEXT NOT NULL, metrics TEXT NOT NULL, track TEXT NOT NULL, output TEXT NOT NULL, wall_s REAL NOT NULL);
+"""
+_COLUMNS = ("id", "status", "what", "reason", "time_s", "state_hash", "metrics", "track", "output", "wall_s")
+_FORMAT = "1"
+
+
+class Store:
+    """The folder of a campaign's results: results.sqlite, logs/, worlds/. One writer at a time."""
+
+    def __init__(self, folder: Path, write: bool = True) -> None:
+        self.folder = folder
+        file = folder / "results.sqlite"
+        if not write and not file.is_file():
+            raise CampaignError(f"{folder} holds no results of a campaign (no results.sqlite)")
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._db = sqlite3.connect(file, timeout=10, isolation_level=None)
+            self._db.executescript("PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL;" + _SCHEMA)
+        except (sqlite3.Error, OSError) as error:
+            raise CampaignError(f"{file}: {error}") from None
+        found = self.about("format")
+        if found is None:
+            self.set_about("format", _FORMAT)
+        elif found != _FORMAT:
+            raise CampaignError(f"{file} is of format {found}; this Ruedo reads {_FORMAT}")
+
+    def close(self) -> None:
+        self._db.close()
+
+    def about(self, key: str) -> str | None:
+        row = self._db.execute("SELECT value FROM about WHERE key = ?", (key,)).fetchone()
+        return None if row is None else str(row[0])
+
+    def set_about(self, key: str, value: str) -> None:
+        self._write("INSERT OR REPLACE INTO about VALUES (?, ?)", (key, value))
+
+    def known(self) -> set[str]:
+        """The ids of all cases that have a result."""
+        return {row[0] for row in self._db.execute("SELECT id FROM results")}
+
+    def add(self, id: str, outcome: dict[str, Any], wall_s: float, keep_log: bool) -> None:
+        """On the disk when this returns. Raises CampaignError for a full one; nothing that was there is lost."""
+        if keep_log and outcome["log"]:
+            self._keep_log(id, outcome["log"])
+        self._write(f"INSERT OR REPLACE INTO results VALUES ({', '.join('?' * len(_COLUMNS))})",
+                    (id, outcome["status"], outcome["what"], outcome["reason"], outcome["time_s"], outcome["state_hash"],
+                     json.dumps(outcome["metrics"], sort_keys=True), json.dumps(outcome["track"]),
+                     outcome["output"] if outcome["status"] != "passed" else "", wall_s))
+
+    def rows(self, ids: Iterable[str]) -> dict[str, dict[str, Any]]:
+        """Of those cases, those that have a result."""
+        wanted = set(ids)
+        found = {}
+        for row in self._db.execute(f"SELECT {', '.join(_COLUMNS)} FROM results"):
+            if row[0] not in wanted:
+                continue
+            one = dict(zip(_COLUMNS, row))
+            one["metrics"], one["track"] = json.loads(one["metrics"]), json.loads(one["track"])
+            found[one["id"]] = one
+        return found
+
+    def take(self, other: Store) -> int:
+        """The results and logs of another folder that are not here yet; how many."""
+        known = self.known()
+        taken = 0
+        for row in other._db.execute(f"SELECT {', '.join(_COLUMNS)} FROM results"):
+            if row[0] in known:
+                continue
+            self._write(f"INSERT INTO results VALUES ({', '.join('?' * len(_COLUMNS))})", row)
+            log = other.log(row[0])
+            if log.exists():
+                self._keep_log(row[0], log.read_bytes())
+            taken += 1
+        return taken
+
+    def log(self, id: str) -> Path:
+        """Where the log of a case is, if it was kept."""
+        return self.folder / "logs" / f"{id}.lcm"
+
+    def _keep_log(self, id: str, content: bytes) -> None:
+        try:
+            self.log(id).parent.mkdir(exist_ok=True)
+            part = self.log(id).with_suffix(".part")
+            part.write_bytes(content)
+            part.rename(self.log(id))
+        except OSError as error:
+            raise CampaignError(f"{self.log(id)}: {error.strerror}; what was run so far is kept: make room, and resume") from None
+
+    def _write(self, statement: str, values: tuple[Any, ...]) -> None:
+        try:
+            self._db.execute(statement, values)
+        except sqlite3.Error as error:
+            raise CampaignError(f"{self.folder / 'results.sqlite'}: {error}; what was run so far is kept: make room, and resume") from None
+
+
+class Results:
+    """The results of a campaign's cases, in the order of its file."""
+
+    def __init__(self, cases: list[Case], rows: dict[str, dict[str, Any]], store: Store) -> None:
+        self.cases, self._rows, self.store = cases, rows, store
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def row(self, case: Case) -> dict[str, Any] | None:
+        """The result of a case; None: it was not run yet."""
+        return self._rows.get(case.id)
+
+    @property
+    def done(self) -> list[tuple[Case, dict[str, Any]]]:
+        """All cases that have a result, with it."""
+        return [(case, self._rows[case.id]) for case in self.cases if case.id in self._rows]
+
+    @property
+    def failed(self) -> list[tuple[Case, dict[str, Any]]]:
+        return [(case, row) for case, row in self.done if row["status"] != "passed"]
+
+    def log(self, case: Case) -> Path | None:
+        """The log of a case that was kept: what acted on it, for `ruedo verify`."""
+        return self.store.log(case.id) if self.store.log(case.id).exists() else None
+
+    def table(self) -> list[dict[str, Any]]:
+        """A row a case. Wall-clock times are not in it: the table is the same from every machine."""
+        parameters = list(dict.fromkeys(name for case in self.cases for name in case.parameters))
+        metrics = sorted({name for _, row in self.done for name in row["metrics"]})
+        table = []
+        for case, row in self.done:
+            one: dict[str, Any] = {"number": case.number, "id": case.id, "world": case.world, "robot": case.robot,
+                                   "controller": case.controller, "seed": case.seed}
+            one |= {name: case.parameters.get(name) for name in parameters}
+            one |= {"status": row["status"], "passed": row["status"] == "passed", "what": row["what"], "reason": row["reason"],
+                    "state_hash": row["state_hash"]}
+            table.append(one | {name: row["metrics"].get(name) for name in metrics})
+        return table
+
+    def csv(self) -> str:
+        table = self.table()
+        text = io.StringIO()
+        writer = csv.DictWriter(text, list(table[0]) if table else ["number"], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(table)
+        return text.getvalue()
+
+    def frame(self) -> Any:
+        """The table as a pandas DataFrame."""
+        try:
+            import pandas
+        except ImportError:
+            raise missing("pandas", "campaign") from None
+        return pandas.DataFrame(self.table())
+
+    def parquet(self, file: str) -> None:
+        try:
+            import pyarrow  # noqa: F401
+        except ImportError:
+            raise missing("pyarrow", "campaign") from None
+        self.frame().to_parquet(file, index=False)
+
+    def junit(self, name: str) -> str:
+        """For CI: a test case for each."""
+        from xml.etree import ElementTree
+        suite = ElementTree.Element("testsuite", name=name, tests=str(len(self.done)), failures=str(len(self.failed)))
+        for case, row in self.done:
+            title = ", ".join(f"{key}={value}" for key, value in case.parameters.items())
+            test = ElementTree.SubElement(suite, "testcase", classname=f"{case.world}.{case.controller}",
+                                          name=f"{case.number} seed={case.seed} {title}".strip(), time=f"{row['wall_s']:.3f}")
+            if row["status"] != "passed":
+                failure = ElementTree.SubElement(test, "failure", type=f"{row['status']}: {row['what']}", message=_printable(row["reason"]))
+                failure.text = _printable(row["output"])
+        return "<?xml version='1.0' encoding='UTF-8'?>\n" + ElementTree.tostring(suite, encoding="unicode") + "\n"
+
+
+def _printable(text: str) -> str:
+    """What XML may hold."""
+    return "".join(c for c in text if c in "\t\n" or (ord(c) >= 32 and not 0xD800 <= ord(c) < 0xE000 and ord(c) not in (0xFFFE, 0xFFFF)))

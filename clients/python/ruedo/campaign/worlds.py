@@ -1,0 +1,93 @@
+"""The worlds of a campaign: files and what they refer to, by content; and worlds that functions make."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+from ..engine import Engine
+from .functions import Function
+
+_URI = re.compile(r"<uri>\s*([^<]+?)\s*</uri>|filename=[\"']([^\"']+)[\"']")
+
+
+class WorldFiles:
+    """folder: of the campaign's file. store: generated worlds go there, named by their content."""
+
+    def __init__(self, folder: Path, store: Path) -> None:
+        self._folder, self._store = folder, store
+        self._made: dict[str, str] = {}
+        self._hashed: dict[tuple[str, str], str] = {}
+        self._read: dict[tuple[Any, ...], str] = {}
+        self.files: set[str] = set()    # all that were read
+
+    def find(self, name: str) -> str:
+        """A file beside the campaign's, or the name of a world that comes with Ruedo."""
+        beside = self._folder / name
+        return str(beside) if beside.is_file() else name
+
+    def generate(self, generator: Function, parameters: dict[str, Any]) -> str:
+        """The file of the world that generator(**parameters) makes: SDF as text, or a ruedo.World."""
+        key = f"{generator.sha256}{generator.name}{sorted(parameters.items())!r}"
+        if key not in self._made:
+            try:
+                text = str(generator.load()(**parameters))
+            except Exception as error:
+                raise ValueError(f"{generator.name}({_arguments(parameters)}) raised {type(error).__name__}: {error}") from None
+            if "<sdf" not in text and "<robot" not in text:
+                raise ValueError(f"{generator.name}({_arguments(parameters)}) made no world, but {text[:60]!r}")
+            self._made[key] = str(keep_text(text, self._store))
+        return self._made[key]
+
+    def sha256(self, world: str, spawn: str) -> str:
+        """Of the world's file and all files that it and the spawned model are read from.
+
+        Worlds that refer to the same files are read once: what is not in the text does not change.
+        """
+        model = spawn.rpartition("@")[0].partition(":")[0]
+        known = self._hashed.get((world, model))
+        if known:
+            return known
+        own = ""
+        if os.path.isfile(world):
+            text = Path(world).read_bytes()
+            own = hashlib.sha256(text).hexdigest()
+            uris = tuple(sorted({a or b for a, b in _URI.findall(text.decode(errors="replace"))}))
+            key: tuple[Any, ...] = (os.path.dirname(os.path.abspath(world)), uris, model)
+        else:
+            key = (world, model)
+        if key not in self._read:
+            with Engine(world, spawn=[spawn] if spawn else [], disable=()) as engine:
+                rest = [file for file in engine.files_read if not _same(file, world)]
+            digest = hashlib.sha256()
+            for file in rest:
+                digest.update(hashlib.sha256(Path(file).read_bytes()).digest())
+            self._read[key] = digest.hexdigest()
+            self.files.update(rest)
+        if own:
+            self.files.add(os.path.abspath(world))
+        self._hashed[(world, model)] = hashlib.sha256((own + self._read[key]).encode()).hexdigest()
+        return self._hashed[(world, model)]
+
+
+def keep_text(text: str, store: Path) -> Path:
+    """A file of that text in the folder, named by its content; whole or not there."""
+    name = hashlib.sha256(text.encode()).hexdigest()[:16] + (".sdf" if "<sdf" in text else ".urdf")
+    file = store / name
+    if not file.exists():
+        store.mkdir(parents=True, exist_ok=True)
+        part = store / f".{name}.{os.getpid()}"
+        part.write_text(text, encoding="utf-8")
+        part.rename(file)
+    return file.resolve()
+
+
+def _same(a: str, b: str) -> bool:
+    return os.path.realpath(a) == os.path.realpath(b)
+
+
+def _arguments(parameters: dict[str, Any]) -> str:
+    return ", ".join(f"{name}={value!r}" for name, value in parameters.items())
