@@ -25,7 +25,7 @@ engine::Outcome bad_body(const char* type) { return engine::Outcome::refuse(repl
 
 bool Server::stand_still() {
   const int64_t last = pacer_->hold();
-  while (status_.step < last) {
+  while (publisher_.step() < last) {
     if (simulation_->over()) return false;    // a state that cannot be ends a run before its time
     if (const engine::Batch* batch = simulation_->take()) publish(*batch);
     else wakeup_.wait();
@@ -49,26 +49,16 @@ engine::Outcome Server::change(const request_t& request, bool models, const std:
   }
   if (outcome.code == reply_t::OK) {
     note(request);
-    changed_ = latest_ ? *latest_ : Snapshot{};
+    changed_ = publisher_.latest() ? *publisher_.latest() : Snapshot{};
     simulation_->robots().read(changed_);
-    changed_.step = status_.step;
-    changed_.time = status_.time_us;
-    if (latest_) latest_ = &changed_;
-    if (models) renew_info();
+    changed_.step = publisher_.step();
+    changed_.time = publisher_.time_us();
+    publisher_.change_latest(changed_);
+    if (models) announce();
+    if (models && !replay_) info_beat_.say();
   }
   move_on();
   return outcome;
-}
-
-void Server::renew_info() {
-  make_info();
-  sequences_.resize(channels_.list().size(), 0);
-  std::vector<std::string> inputs, outputs;
-  for (const engine::Channel& channel : channels_.list()) {
-    if (!channel.gone) (channel.input ? inputs : outputs).push_back(channel.bus_name);
-  }
-  bus_.listen_to(inputs, outputs);
-  if (!replay_) publish_info();
 }
 
 engine::Outcome Server::edit(const request_t& request) {
@@ -114,7 +104,7 @@ void Server::spawn_ready() {
     }
     const request_t& request = made_->request;
     if (!control_.is_pending(request.session, request.sequence)) continue;    // the world was reset meanwhile
-    if (status_.step < enters_at_ && !pacer_->paused()) return;
+    if (publisher_.step() < enters_at_ && !pacer_->paused()) return;
     control_.finish(request.session, request.sequence,
                     made_->fault.empty() ? put_in(request, made_->body, made_->loaded) : engine::Outcome::refuse(reply_t::BAD_REQUEST, made_->fault));
   }
@@ -123,11 +113,11 @@ void Server::spawn_ready() {
 engine::Outcome Server::put_in(const request_t& request, const spawn_request_t& body, const model::LoadedModel& loaded) {
   std::string name;
   const engine::Outcome outcome = change(request, true, [&] {
-    return engine::spawn(body, loaded, status_.step + 1, *simulation_, channels_, name);
+    return engine::spawn(body, loaded, publisher_.step() + 1, *simulation_, channels_, name);
   });
   if (outcome.code == reply_t::OK) note_files(loaded.files_read);
   if (outcome.code != reply_t::OK || replay_) return outcome;
-  spdlog::info("{} was spawned at step {}", name, status_.step);
+  spdlog::info("{} was spawned at step {}", name, publisher_.step());
   for (size_t i = 0; i < std::min(loaded.findings.size(), kFindingsTold); ++i) {
     const Finding& finding = loaded.findings[i];
     spdlog::warn("{}: {}: {}", finding.source.str(), finding.element, finding.text);
@@ -136,7 +126,7 @@ engine::Outcome Server::put_in(const request_t& request, const spawn_request_t& 
   which.name = name;
   request_t look = request;
   look.body = engine::encoded(which);
-  return latest_ ? get_state(look) : outcome;
+  return publisher_.latest() ? get_state(look) : outcome;
 }
 
 engine::Outcome Server::reset_poses(const request_t& request) {
@@ -148,7 +138,6 @@ engine::Outcome Server::reset_time(const request_t& request) {
   if (!stand_still()) return engine::Outcome::refuse(reply_t::REFUSED, "the run is over");
   if (!replay_) control_.cancel("sim time was reset");
   note(request);
-  recorder_.set_back(status_.time_us);
   header_.epoch = ++epoch_;
   pacer_->begin_time_anew();
   {
@@ -164,12 +153,8 @@ engine::Outcome Server::reset_time(const request_t& request) {
     lockstep_->restart();
     lockstep_->attach(simulation_->inbox(), *pacer_);
   }
-  status_.step = -1;
-  status_.time_us = 0;
-  latest_ = nullptr;
-  sequences_.assign(sequences_.size(), 0);
-  next_tick_ = next_info_ = next_hash_ = ticks_ = infos_ = hashes_ = 0;
-  make_info();
+  publisher_.begin_epoch(epoch_);
+  announce();
   move_on();
   return engine::Outcome::after(0);
 }

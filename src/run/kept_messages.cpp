@@ -16,7 +16,7 @@ void KeptMessages::begin_step(int64_t step) {
 }
 
 void KeptMessages::keep(int channel, int64_t sequence, const uint8_t* data, size_t size) {
-  Step& step = steps_.back();
+  KeptStep& step = steps_.back();
   step.entries.push_back({channel, sequence, step.bytes.size(), size});
   step.bytes.insert(step.bytes.end(), data, data + size);
   bytes_ += size;
@@ -24,7 +24,7 @@ void KeptMessages::keep(int channel, int64_t sequence, const uint8_t* data, size
 
 void KeptMessages::forget(int64_t step) {
   while (!steps_.empty() && steps_.front().step <= step) {
-    Step old = std::move(steps_.front());
+    KeptStep old = std::move(steps_.front());
     steps_.pop_front();
     bytes_ -= old.bytes.size();
     old.entries.clear();
@@ -36,7 +36,7 @@ void KeptMessages::forget(int64_t step) {
 
 std::span<const uint8_t> KeptMessages::find(int64_t step, int channel, int64_t sequence) const {
   if (steps_.empty() || step < steps_.front().step || step > steps_.back().step) return {};
-  const Step& kept = steps_[static_cast<size_t>(step - steps_.front().step)];
+  const KeptStep& kept = steps_[static_cast<size_t>(step - steps_.front().step)];
   for (const Entry& entry : kept.entries) {
     if (entry.channel == channel && entry.sequence == sequence) return {kept.bytes.data() + entry.offset, entry.size};
   }

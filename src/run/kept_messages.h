@@ -6,12 +6,22 @@
 #include <span>
 #include <vector>
 
+#include "run/sink.h"
+
 namespace ruedo::run {
 
-class KeptMessages {
+class KeptMessages : public Sink {
  public:
   static constexpr size_t kMostSteps = 128;
   static constexpr size_t kMostBytes = 32u << 20;
+
+  // Samples, and the ticks.
+  Hears hears() const override { return {.samples = true, .services = true}; }
+  void announce(const std::shared_ptr<const Announcement>& announcement) override { tick_ = announcement->own.tick; }
+  void begin_step(const Step& step) override { begin_step(step.step); }
+  void message(const Published& message) override {
+    if (message.kind == Kind::sample || message.index == tick_) keep(message.index, message.sequence, message.data, message.size);
+  }
 
   // Steps follow on one another. keep() belongs to the last one.
   void begin_step(int64_t step);
@@ -30,15 +40,16 @@ class KeptMessages {
 
  private:
   struct Entry { int channel; int64_t sequence; size_t offset, size; };
-  struct Step {
+  struct KeptStep {
     int64_t step = 0;
     std::vector<Entry> entries;
     std::vector<uint8_t> bytes;
   };
   static constexpr size_t kSpareBytes = 64u << 10;    // a buffer larger than this goes back to the system
 
-  std::deque<Step> steps_;
-  std::vector<Step> spare_;    // their memory is used again
+  int tick_ = -1;    // channel
+  std::deque<KeptStep> steps_;
+  std::vector<KeptStep> spare_;    // their memory is used again
   size_t bytes_ = 0;
 };
 

@@ -64,11 +64,10 @@ class Lockstep {
   // True for a grant that has to wait for one before it, or for room: it is ignored until it is repeated.
   bool early(const request_t& request, const Session& session) const;
 
-  // The publisher's hooks: before the messages of a state, for each, and when its tick is out.
-  void begin_step(int64_t step) { kept_.begin_step(step); }
-  void keep(int channel, int64_t sequence, const uint8_t* data, size_t size) { kept_.keep(channel, sequence, data, size); }
+  // A sink: what clients may have lost.
+  KeptMessages& kept() { return kept_; }
   void add_applied(TickWriter& tick, int64_t step, const std::vector<Session>& sessions);
-  void published(int64_t step);
+  void published(int64_t step);    // its tick is out, too
   // True when the messages that not everybody has received are as many as are kept: publish no more.
   bool full() const { return kept_.full(); }
 

@@ -24,17 +24,18 @@ void Server::begin_repeat(const std::string& path) {
   if (!pacer_) epoch_ = replay->header().epoch;
   replay_ = std::move(replay);
   repeating_ = true;
+  publisher_.mute(true);
 }
 
 void Server::repeat() {
   try {
     while (replay_) {
       const Replay::Target target{simulation_->inbox(), *pacer_, [this](const applied_t& applied) { return input_of(applied); },
-                                  recorder_.base_us() - repeat_begin_us_};
-      if (const applied_t* applied = replay_->advance(status_.step, target)) {
+                                  publisher_.base_us() - repeat_begin_us_};
+      if (const applied_t* applied = replay_->advance(publisher_.step(), target)) {
         repeat_request(*applied);
         replay_->executed();
-      } else if (replay_->at_end(status_.step)) {
+      } else if (replay_->at_end(publisher_.step())) {
         end_repeat();
       } else {
         return;
@@ -68,7 +69,7 @@ void Server::end_repeat() {
   }
   const std::string path = replay_->path();
   if (!replay_->complete()) throw InputError({path}, "is no snapshot: " + replay_->fault());
-  if (!latest_ || engine::state_hash(*latest_) != replay_->end().state_hash) {
+  if (!publisher_.latest() || engine::state_hash(*publisher_.latest()) != replay_->end().state_hash) {
     throw InputError({path}, "leads to another state here than where it was saved: its program, libraries or CPU are others");
   }
   options_.repeat.clear();
@@ -78,15 +79,16 @@ void Server::end_repeat() {
 void Server::go_on(bool paused) {
   replay_.reset();
   repeating_ = false;
+  publisher_.mute(false);
   pacer_->set_rate(after_repeat_.rate);
   if (paused) pacer_->pause();
-  if (lockstep_) lockstep_->begin_at(status_.step);
+  if (lockstep_) lockstep_->begin_at(publisher_.step());
   else pacer_->set_limit(std::numeric_limits<int64_t>::max());
   if (wait_for_) {
     const std::lock_guard lock(simulation_mutex_);
-    wait_for_->attach(channels_, simulation_->inbox(), *pacer_, status_.step);
+    wait_for_->attach(channels_, simulation_->inbox(), *pacer_, publisher_.step());
   }
-  publish_info();
+  info_beat_.say();
 }
 
 int Server::input_of(const applied_t& applied) const {
@@ -109,28 +111,28 @@ int Server::input_of(const applied_t& applied) const {
 }
 
 engine::Outcome Server::snapshot(const request_t& request) {
-  if (!recorder_.has_journal()) return engine::Outcome::refuse(reply_t::NOT_SUPPORTED, "start the server with --snapshots FOLDER");
+  if (!journal_) return engine::Outcome::refuse(reply_t::NOT_SUPPORTED, "start the server with --snapshots FOLDER");
   name_request_t body;
   if (decode_checked(request.body.data(), request.body.size(), body) != DecodeFault::none) {
     return engine::Outcome::refuse(reply_t::BAD_REQUEST, "the body is not a name_request_t");
   }
-  if (recorder_.snapshot_path(body.name).empty()) {
+  if (journal_->snapshot_path(body.name).empty()) {
     return engine::Outcome::refuse(reply_t::BAD_REQUEST, "'" + body.name + "' is no name of a snapshot: 1 to 63 letters, digits, '_', '-' and '.', not first a '.'");
   }
-  const std::string fault = recorder_.save_snapshot(body.name, hash_of_state(true));
+  const std::string fault = journal_->save_snapshot(body.name, hashes_.now(true), publisher_.base_us() + publisher_.time_us());
   if (!fault.empty()) return engine::Outcome::refuse(reply_t::REFUSED, "the snapshot was not saved: " + fault);
   return engine::Outcome::with(engine::encoded(state()));
 }
 
 // In the log it is a reset, and the run up to the snapshot's step: so the log needs no other file to be repeated.
 engine::Outcome Server::restore(const request_t& request) {
-  if (!recorder_.has_journal()) return engine::Outcome::refuse(reply_t::NOT_SUPPORTED, "start the server with --snapshots FOLDER");
+  if (!journal_) return engine::Outcome::refuse(reply_t::NOT_SUPPORTED, "start the server with --snapshots FOLDER");
   name_request_t body;
   if (decode_checked(request.body.data(), request.body.size(), body) != DecodeFault::none) {
     return engine::Outcome::refuse(reply_t::BAD_REQUEST, "the body is not a name_request_t");
   }
   if (lockstep_) return engine::Outcome::refuse(reply_t::REFUSED, "a run in lockstep cannot be set to a snapshot: start one with --restore");
-  const std::string path = recorder_.snapshot_path(body.name);
+  const std::string path = journal_->snapshot_path(body.name);
   if (path.empty() || !std::filesystem::exists(path)) {
     return engine::Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no snapshot '" + body.name + "'");
   }
@@ -151,7 +153,7 @@ engine::Outcome Server::restore(const request_t& request) {
     return engine::Outcome::refuse(reply_t::REFUSED, error.what());
   }
   begin_epoch();
-  repeat_begin_us_ = recorder_.base_us();
+  repeat_begin_us_ = publisher_.base_us();
   repeat();
   return engine::Outcome::after(0);
 }

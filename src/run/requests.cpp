@@ -49,7 +49,7 @@ int64_t Server::features() const {
                                request_t::REMOVE, request_t::SET_POSE, request_t::SET_TWIST};
   for (int32_t kind : kinds) bits |= int64_t{1} << kind;
   if (lockstep_) bits |= int64_t{1} << request_t::GRANT | int64_t{1} << request_t::RESEND;
-  if (recorder_.has_journal()) bits |= int64_t{1} << request_t::SNAPSHOT | int64_t{1} << request_t::RESTORE;
+  if (journal_) bits |= int64_t{1} << request_t::SNAPSHOT | int64_t{1} << request_t::RESTORE;
   return bits;
 }
 
@@ -73,7 +73,7 @@ engine::Outcome Server::execute(const request_t& request) {
     case request_t::RATE: return set_rate(request);
     case request_t::RESET: return reset(request);
     case request_t::GET_STATE: return get_state(request);
-    case request_t::INFO: publish_info(); return {};
+    case request_t::INFO: info_beat_.say(); return {};
     case request_t::QUIT: stop(); return {};
     case request_t::RESET_ODOMETRY: return reset_odometry(request);
     case request_t::SPAWN:
@@ -132,42 +132,40 @@ engine::Outcome Server::reset(const request_t& request) {
 
 void Server::note(const request_t& request) {
   applied_t applied;
-  applied.utime = status_.time_us;
-  applied.step = status_.step;
+  applied.utime = publisher_.time_us();
+  applied.step = publisher_.step();
   applied.epoch = epoch_;
   applied.sequence = request.sequence;
   applied.channel = "ruedo/request";
   applied.kind = request.kind;
   applied.size = request.size;
   applied.data = request.body;
-  recorder_.applied(applied);
+  publisher_.record(kAppliedChannel, applied);
 }
 
 void Server::note_files(const std::vector<std::string>& files) {
-  if (files.empty() || !(recorder_.wants_messages() || recorder_.has_journal())) return;
+  if (files.empty() || !publisher_.has_recorders()) return;
   log_header_t header = header_;
-  header.utime = status_.time_us;
+  header.utime = publisher_.time_us();
   header.files = log::hashed_files(files);
   header.nfiles = static_cast<int32_t>(header.files.size());
-  recorder_.files(header);
+  publisher_.record(kHeaderChannel, header);
 }
 
 void Server::begin_epoch() {
   header_.epoch = ++epoch_;
   header_.seed = static_cast<int64_t>(options_.simulation.fleet.seed);
-  recorder_.begin_anew(status_.time_us, header_);
-  status_.step = -1;
-  status_.time_us = 0;
   if (lockstep_) lockstep_->restart();
   make_simulation();
+  if (journal_) journal_->begin(header_, publisher_.base_us());
   simulation_->start(*pacer_);
 }
 
 state_reply_t Server::state() const {
   state_reply_t reply;
-  reply.utime = status_.time_us;
-  reply.step = status_.step;
-  reply.state_hash = latest_ ? engine::state_hash(*latest_) : 0;
+  reply.utime = publisher_.time_us();
+  reply.step = publisher_.step();
+  reply.state_hash = publisher_.latest() ? engine::state_hash(*publisher_.latest()) : 0;
   reply.paused = pacer_->paused();
   reply.rate = pacer_->rate();
   put(Pose{}, Twist{}, reply);
@@ -191,8 +189,8 @@ engine::Outcome Server::get_state(const request_t& request) {
     Pose X_WL = placement.X_BL;
     Twist twist;
     if (placement.body >= 0) {
-      const Pose& X_WB = latest_->bodies[static_cast<size_t>(placement.body)];
-      const Twist& body_twist = latest_->body_twists[static_cast<size_t>(placement.body)];
+      const Pose& X_WB = publisher_.latest()->bodies[static_cast<size_t>(placement.body)];
+      const Twist& body_twist = publisher_.latest()->body_twists[static_cast<size_t>(placement.body)];
       X_WL = X_WB * placement.X_BL;
       const Pose X_WF = whole_model ? X_WL * link.X_ML.inverse() : X_WL;
       twist.angular = body_twist.angular;

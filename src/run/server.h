@@ -16,14 +16,16 @@
 
 #include "ruedo/bus.h"
 #include "ruedo/state_reply_t.hpp"
+#include "run/beats.h"
 #include "run/control.h"
 #include "engine/edits.h"
 #include "run/lockstep.h"
 #include "run/model_worker.h"
-#include "run/recorder.h"
+#include "run/journal.h"
+#include "run/publisher.h"
 #include "run/replay.h"
 #include "engine/simulation.h"
-#include "run/tick.h"
+#include "run/sinks.h"
 #include "run/wait_for.h"
 #include "engine/world_info.h"
 
@@ -41,7 +43,7 @@ struct ServerOptions {
   std::vector<WaitForOption> wait_for;
   std::string repeat;                      // log or snapshot to begin with: what acted on that run acts again
   bool end_with_repeat = false;            // and then end; else go on, and publish from there on
-  Recorder::Watcher watcher;               // sees what a log would get
+  Watcher watcher;               // sees what a log would get
   std::function<void()> before_model;      // for tests: called in the worker's thread before a SPAWN's model is made ready
   std::vector<std::string> result_options; // for the log's header
   std::vector<std::pair<std::string, std::string>> remaps;
@@ -67,11 +69,17 @@ class Server {
 
   void stop();    // any thread
 
-  // As if it had come over the bus: a command on one of the input channels. Any thread.
-  void command(const std::string& channel, const std::vector<uint8_t>& bytes);
+  // Another sink for the run's messages, beside the bus and the log. Before run(); it must outlive the run.
+  void add(Sink& sink) { publisher_.add(sink); }
+
+  // A command on one of the input channels, or a request, as it would come over the bus: bytes that nobody has checked. For the
+  // bus and for whatever else clients speak. Any thread.
+  void receive(const std::string& channel, const uint8_t* data, size_t size);
+  void receive(const std::string& channel, const std::vector<uint8_t>& bytes) { receive(channel, bytes.data(), bytes.size()); }
 
   const engine::Channels& channels() const { return channels_; }
-  const std::vector<world_info_t>& info() const { return info_; }
+  // What clients are told of the world; until models come or go.
+  const std::vector<world_info_t>& info() const { return publisher_.announcement().info; }
   const Findings& findings() const { return findings_; }
   // The world as it is now: another object when models have come or gone. Any thread.
   std::shared_ptr<const model::WorldModel> world() {
@@ -90,21 +98,18 @@ class Server {
  private:
   using Clock = std::chrono::steady_clock;
 
+  void add_sinks();
   void make_simulation();
-  void make_info();
-  void listen();
+  void announce();
   void publish(const engine::Batch& batch);
   void publish_step(const engine::Batch& batch, const Snapshot& snapshot);
-  void finish_tick(int64_t step);
   void check_leases();    // of lockstep
   void drain();           // lets clients in lockstep fetch what they have lost
-  void tell_watchdogs(const Snapshot& snapshot);    // on the terminal, once a robot
+  void tell_watchdog(size_t robot);                 // on the terminal
   void record_applied(const engine::Batch& batch, int64_t step);
-  void publish_info();
+  Status status() const;
   void tell_wait();                                 // for whom the run waits, once a second has passed
-  template <class Message>
-  void send(int channel, const Message& message);
-  state_hash_t hash_of_state(bool last) const;
+  void add_applied(TickWriter& tick, int64_t step);
 
   // Repeating what is in a log; in repeat.cpp.
   void begin_repeat(const std::string& path);    // throws InputError
@@ -139,7 +144,6 @@ class Server {
   engine::Outcome put_in(const request_t& request, const spawn_request_t& body, const model::LoadedModel& loaded);
   engine::Outcome reset_poses(const request_t& request);
   engine::Outcome reset_time(const request_t& request);
-  void renew_info();
   state_reply_t state() const;
   int64_t features() const;
 
@@ -151,10 +155,15 @@ class Server {
   int32_t epoch_ = 0;
   engine::Channels channels_;
   engine::SimulationChannels own_;
+  std::string request_channel_;                        // as it is called on the bus; "": none
   Findings findings_;
   engine::Wakeup wakeup_;                              // a batch is finished, a request has come, or the end
   std::atomic<bool> stop_{false};
-  Recorder recorder_;
+  Publisher publisher_;
+  BusSink bus_sink_;
+  std::unique_ptr<LogSink> log_;               // null: none, as the next two
+  std::unique_ptr<WatcherSink> watcher_;
+  std::unique_ptr<Journal> journal_;
   log_header_t header_;                        // of this epoch
   std::unique_ptr<Replay> replay_;             // while something is repeated: commands and requests wait outside
   std::atomic<bool> repeating_{false};         // the same for the bus's thread
@@ -167,22 +176,15 @@ class Server {
   int64_t wait_step_ = -1;                     // the run has been at this step
   Clock::time_point wait_begin_;               // since then
   bool wait_told_ = false;
-  std::vector<world_info_t> info_;
-  SampleClock tick_clock_, info_clock_, hash_clock_;
-  int64_t next_tick_ = 0, next_info_ = 0, next_hash_ = 0;    // steps
-  int64_t ticks_ = 0, infos_ = 0, hashes_ = 0;
-  Clock::time_point last_info_, last_tick_;
-  std::vector<int64_t> sequences_;             // messages on each channel in this epoch
-  TickWriter tick_;
-  std::vector<uint8_t> buffer_;
-  std::vector<bool> watchdog_told_;            // of each robot
-  const Snapshot* latest_ = nullptr;           // newest published state, with the changes since
+  Ticks ticks_;
+  InfoBeat info_beat_;
+  HashBeat hashes_;
+  WatchdogWarnings watchdogs_;
   Snapshot changed_;
   engine::ModelStore models_{first_world_->file};
   ModelWorker worker_;                         // of SPAWNs
   std::optional<ModelWorker::Made> made_;      // the next that is ready,
   int64_t enters_at_ = -1;                     // and the state that it waits for
-  Status status_;
   std::function<void(const Status&)> on_status_;
   std::function<void(const Snapshot&)> on_state_;
   std::unique_ptr<Lockstep> lockstep_;         // null: the run goes by itself

@@ -38,12 +38,11 @@ uint32_t crc32(const uint8_t* data, size_t size, uint32_t before) {
   return ~crc;
 }
 
-void TickWriter::begin(int64_t utime, int64_t run_id, int32_t epoch, int64_t step, int64_t state_hash) {
+void TickWriter::begin(int64_t utime, int64_t run_id, int32_t epoch, int64_t step) {
   head_.utime = utime;
   head_.run_id = run_id;
   head_.epoch = epoch;
   head_.step = step;
-  head_.state_hash = state_hash;
   applied_.clear();
   manifest_.clear();
 }
@@ -62,7 +61,7 @@ void TickWriter::add_message(int channel, int64_t sequence, const uint8_t* data,
   entry.crc = static_cast<int32_t>(crc32(data, size));
 }
 
-void TickWriter::finish(const std::function<void(const tick_t&)>& publish) {
+void TickWriter::finish(int64_t state_hash, const std::function<void(const tick_t&)>& publish) {
   constexpr size_t kMessageSize = 4 + 8 + 4 + 4;
   constexpr size_t kInPart = (engine::kMaxPartSize - 16'384) / kMessageSize;    // the rest: the head, and 64 clients' names
   const size_t nparts = std::max<size_t>(1, (manifest_.size() + kInPart - 1) / kInPart);
@@ -71,7 +70,7 @@ void TickWriter::finish(const std::function<void(const tick_t&)>& publish) {
     part_.run_id = head_.run_id;
     part_.epoch = head_.epoch;
     part_.step = head_.step;
-    part_.state_hash = head_.state_hash;
+    part_.state_hash = state_hash;
     part_.part = static_cast<int16_t>(part);
     part_.nparts = static_cast<int16_t>(nparts);
     part_.applied.clear();

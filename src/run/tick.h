@@ -15,12 +15,12 @@ uint32_t crc32(const uint8_t* data, size_t size, uint32_t before = 0);
 // Collects a step's messages and cuts the tick into parts.
 class TickWriter {
  public:
-  void begin(int64_t utime, int64_t run_id, int32_t epoch, int64_t step, int64_t state_hash);
+  void begin(int64_t utime, int64_t run_id, int32_t epoch, int64_t step);
   void add_applied(const std::string& client, int64_t sequence);
   void add_message(int channel, int64_t sequence, const uint8_t* data, size_t size);
 
   // Calls publish for each part.
-  void finish(const std::function<void(const tick_t&)>& publish);
+  void finish(int64_t state_hash, const std::function<void(const tick_t&)>& publish);
 
  private:
   tick_t head_, part_;

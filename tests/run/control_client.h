@@ -24,9 +24,10 @@ T decoded_as(const std::vector<uint8_t>& bytes) {
   return message;
 }
 
-class Controlled {
+template <class SomeBus>
+class ControlledOn {
  public:
-  ~Controlled() { end(); }
+  ~ControlledOn() { end(); }
 
   void begin(ServerOptions options, const std::string& models) {
     server_ = std::make_unique<Server>(load_text(models), std::move(options), bus);
@@ -158,7 +159,7 @@ class Controlled {
 
   void rewind() { from_ = 0; }    // after bus.forget(), or for an answer that came before another's
   Server& server() { return *server_; }
-  MemoryBus bus;
+  SomeBus bus;
 
  private:
   std::unique_ptr<Server> server_;
@@ -166,6 +167,8 @@ class Controlled {
   int64_t session_ = 0, sequence_ = 0;
   size_t from_ = 0;
 };
+
+using Controlled = ControlledOn<MemoryBus>;
 
 inline ServerOptions paused_server() {
   ServerOptions options;

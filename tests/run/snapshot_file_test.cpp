@@ -7,7 +7,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "run/recorder.h"
+#include "run/journal.h"
 
 namespace fs = std::filesystem;
 
@@ -33,16 +33,16 @@ TEST(SnapshotFile, OneThatFailsLeavesNothing) {
   std::string folder = (fs::temp_directory_path() / "ruedo-snapshots-XXXXXX").string();
   ASSERT_NE(::mkdtemp(folder.data()), nullptr);
   {
-    Recorder recorder("", folder, {});
-    recorder.begin(log_header_t{});
+    Journal journal(folder);
+    journal.begin(log_header_t{}, 0);
     const state_hash_t state{};
-    ASSERT_EQ(recorder.save_snapshot("good", state), "");
+    ASSERT_EQ(journal.save_snapshot("good", state, 0), "");
     const uint64_t whole = fs::file_size(folder + "/good.snapshot");
     for (const uint64_t room : {whole - 1, whole / 4}) {    // for all but its end; not even for its beginning
       const FileLimit limit(room);
-      EXPECT_NE(recorder.save_snapshot("bad", state), "") << room;
+      EXPECT_NE(journal.save_snapshot("bad", state, 0), "") << room;
     }
-    ASSERT_EQ(recorder.save_snapshot("again", state), "");
+    ASSERT_EQ(journal.save_snapshot("again", state, 0), "");
   }
   std::vector<std::string> left;
   for (const auto& entry : fs::directory_iterator(folder)) left.push_back(entry.path().filename().string());

@@ -102,7 +102,7 @@ std::string log_of(const std::shared_ptr<const model::WorldModel>& world, const 
   velocity_command_t command{};
   command.vx = 0.4;
   command.omega = 0.3;
-  server.command(world->models[1].name + "/velocity", engine::encoded(command));
+  server.receive(world->models[1].name + "/velocity", engine::encoded(command));
   server.run();
   return file.bytes();
 }

@@ -41,7 +41,7 @@ void drive_circles(Server& server, int robots) {
   command.value = 1e6;
   command.radius = 1.0;
   command.speed = 0.4;
-  for (int i = 0; i < robots; ++i) server.command("r" + std::to_string(i) + "/move", engine::encoded(command));
+  for (int i = 0; i < robots; ++i) server.receive("r" + std::to_string(i) + "/move", engine::encoded(command));
 }
 
 ServerOptions options_for(const Fleet& fleet, double seconds) {
@@ -78,7 +78,7 @@ void drive_into_walls(Server& server, int robots) {
   command.kind = move_command_t::ADVANCE;
   command.value = 1e6;
   command.speed = 0.4;
-  for (int i = 0; i < robots; ++i) server.command("r" + std::to_string(i) + "/move", engine::encoded(command));
+  for (int i = 0; i < robots; ++i) server.receive("r" + std::to_string(i) + "/move", engine::encoded(command));
 }
 
 // operator new in 1 000 steps, from 5 s to 10 s of sim time, counted between two messages that only the publisher sends.

@@ -83,7 +83,7 @@ TEST(Recording, HoldsWhatARepetitionNeeds) {
   command.vx = 0.3;
   {
     Server server(load_text(robot_sdf("r", 0, 0)), options, bus);
-    server.command("r/velocity", engine::encoded(command));
+    server.receive("r/velocity", engine::encoded(command));
     server.run();
   }
   lcm::LogFile log(file.path(), "r");

@@ -1,0 +1,69 @@
+// All of it comes from the state that was published last.
+#include "run/beats.h"
+
+#include "ruedo/motion_status_t.hpp"
+#include "engine/world_state.h"
+#include "run/journal.h"
+
+namespace ruedo::run {
+
+bool Beat::due(int64_t step) {
+  if (step != last_ + 1 || step > next_) next_ = clock_.step_of(clock_.samples_before(step));
+  last_ = step;
+  return step == next_;
+}
+
+void Ticks::begin_step(const Step& step) {
+  due_ = beat_.due(step.step);
+  if (due_) tick_.begin(step.time_us, run_id_, step.epoch, step.step);
+}
+
+void Ticks::message(const Published& message) {
+  if (due_) tick_.add_message(message.index, message.sequence, message.data, message.size);
+}
+
+void Ticks::end_step(const Step& step) {
+  if (!due_) return;
+  add_applied_(tick_, step.step);
+  tick_.finish(engine::state_hash(*publisher_.latest()), [this](const tick_t& part) {
+    publisher_.service(publisher_.announcement().own.tick, part, part.part);
+  });
+  last_ = std::chrono::steady_clock::now();
+}
+
+void InfoBeat::say() {
+  const bool paused = paused_();
+  for (world_info_t& part : info_) {
+    part.utime = publisher_.time_us();
+    part.paused = paused;
+    publisher_.service(publisher_.announcement().own.info, part);
+  }
+  last_ = std::chrono::steady_clock::now();
+}
+
+state_hash_t HashBeat::now(bool last) const {
+  state_hash_t hash;
+  hash.utime = publisher_.time_us();
+  hash.step = publisher_.step();
+  hash.epoch = publisher_.epoch();
+  hash.state_hash = publisher_.latest() ? engine::state_hash(*publisher_.latest()) : 0;    // a run may end before its first state
+  hash.last = last;
+  return hash;
+}
+
+void HashBeat::end_step(const Step& step) {
+  if (beat_.due(step.step) && publisher_.has_recorders()) publisher_.record(kStateHashChannel, now(false));
+}
+
+void WatchdogWarnings::end_step(const Step& step) {
+  if (!beat_.due(step.step)) return;
+  const std::vector<RobotState>& robots = publisher_.latest()->robots;
+  told_.resize(robots.size(), false);
+  for (size_t i = 0; i < robots.size(); ++i) {
+    if (robots[i].motion.reason != motion_status_t::REASON_WATCHDOG || told_[i]) continue;
+    told_[i] = true;
+    tell_(i);
+  }
+}
+
+}  // namespace ruedo::run

@@ -1,0 +1,114 @@
+// Records in, snapshots out.
+#include "run/journal.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "ruedo/errors.h"
+
+namespace ruedo::run {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kSuffix = ".snapshot";
+
+// A file without a name, which goes when it is closed, however the process ends.
+int open_nameless(const std::string& folder) {
+  const int file = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+  if (file >= 0) return file;
+  std::string path = folder + "/.journal-XXXXXX";    // a file system without O_TMPFILE
+  const int named = ::mkstemp(path.data());
+  if (named < 0) throw EnvironmentError("--snapshots: cannot write in '" + folder + "': " + std::strerror(errno));
+  ::unlink(path.c_str());
+  return named;
+}
+
+// A file that is removed again unless it is kept: what was written of a snapshot would go on taking a full disk's room.
+class PartOfFile {
+ public:
+  explicit PartOfFile(std::string path) : path_(std::move(path)) {}
+  ~PartOfFile() {
+    if (!path_.empty()) ::unlink(path_.c_str());
+  }
+  PartOfFile(const PartOfFile&) = delete;
+  PartOfFile& operator=(const PartOfFile&) = delete;
+  const std::string& path() const { return path_; }
+  // Under its own name, on the disk before this returns; what went wrong, or "".
+  std::string keep_as(const std::string& path) {
+    std::string fault = synced(path_, O_RDONLY);
+    if (fault.empty() && ::rename(path_.c_str(), path.c_str()) != 0) fault = std::strerror(errno);
+    if (!fault.empty()) return fault;
+    path_.clear();
+    return synced(fs::path(path).parent_path().string(), O_RDONLY | O_DIRECTORY);
+  }
+
+ private:
+  static std::string synced(const std::string& path, int flags) {
+    const int file = ::open(path.c_str(), flags | O_CLOEXEC);
+    const bool good = file >= 0 && ::fsync(file) == 0;
+    const std::string fault = good ? "" : std::strerror(errno);
+    if (file >= 0) ::close(file);
+    return fault;
+  }
+
+  std::string path_;
+};
+
+template <class Message>
+void write(log::Writer& writer, SimTime stamp_us, const std::string& channel, const Message& message) {
+  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
+  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  writer.write(stamp_us, channel, bytes.data(), bytes.size());
+}
+
+}  // namespace
+
+Journal::Journal(const std::string& folder) : folder_(folder), writer_(open_nameless(folder), "the journal in " + folder) {}
+
+void Journal::begin(const log_header_t& header, SimTime stamp_us) {
+  writer_.truncate();
+  base_us_ = stamp_us;
+  write(writer_, 0, kHeaderChannel, header);
+}
+
+void Journal::message(const Published& message) {
+  if (message.channel == kStateHashChannel) return;
+  writer_.write(message.stamp_us - base_us_, message.channel, message.data, message.size);
+}
+
+std::string Journal::snapshot_path(const std::string& name) const {
+  const auto allowed = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' || c == '.';
+  };
+  if (name.empty() || name.size() > 63 || name[0] == '.' || !std::all_of(name.begin(), name.end(), allowed)) return "";
+  return folder_ + "/" + name + kSuffix;
+}
+
+std::string Journal::save_snapshot(const std::string& name, const state_hash_t& state, SimTime stamp_us) {
+  const std::string path = snapshot_path(name);
+  PartOfFile part(folder_ + "/." + name + ".part");
+  std::error_code error;
+  size_t files = 0;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) files += entry.path().extension() == kSuffix;
+  if (files >= kMostSnapshots && !fs::exists(path, error)) return "the folder holds " + std::to_string(files) + " snapshots already";
+  writer_.flush();
+  if (!writer_.error().empty()) return "the journal is incomplete: " + writer_.error();
+  try {
+    log::Writer snapshot(part.path());
+    const std::string fault = snapshot.append(writer_);
+    if (!fault.empty()) return fault;
+    write(snapshot, stamp_us - base_us_, kStateHashChannel, state);
+    snapshot.flush();
+    return snapshot.error().empty() ? part.keep_as(path) : snapshot.error();
+  } catch (const EnvironmentError& fault) {
+    return fault.what();
+  }
+}
+
+}  // namespace ruedo::run

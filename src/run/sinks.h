@@ -1,0 +1,86 @@
+// The sinks of a server: the bus, the log, and whoever watches in the same process.
+#pragma once
+
+#include <functional>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "log/writer.h"
+#include "ruedo/bus.h"
+#include "run/queued_sink.h"
+#include "run/sink.h"
+
+namespace ruedo::run {
+
+// What clients hear, and the channels on which they are heard.
+class BusSink : public Sink {
+ public:
+  explicit BusSink(Bus& bus) : bus_(bus) {}
+
+  // From now on commands and requests come to the handler, in the bus's thread. Once, after the first announcement.
+  void listen(Bus::Handler handler);
+
+  Hears hears() const override { return {.samples = true, .services = true}; }
+  void announce(const std::shared_ptr<const Announcement>& announcement) override;
+  void message(const Published& message) override { bus_.publish(message.channel, message.data, message.size); }
+  void flush() override { bus_.flush(); }
+
+ private:
+  Bus& bus_;
+  bool listening_ = false;
+  std::vector<std::string> inputs_, outputs_;
+};
+
+// A standard LCM log, written in a thread of its own. The run waits when the disk is slower than it: a log is whole.
+class LogSink : public Sink {
+ public:
+  // Throws EnvironmentError when the file cannot be created.
+  explicit LogSink(const std::string& path);
+
+  Hears hears() const override { return queue_.hears(); }
+  void begin_step(const Step& step) override { queue_.begin_step(step); }
+  void message(const Published& message) override { queue_.message(message); }
+  void end_step(const Step& step) override { queue_.end_step(step); }
+  void flush() override { queue_.flush(); }
+
+  // Returns when all that came so far was handed to the operating system.
+  void drain() { queue_.drain(); }
+  // Throws EnvironmentError when the log cannot be written any more. now: sim time.
+  void check(SimTime now) const;
+
+ private:
+  class File : public Sink {
+   public:
+    explicit File(const std::string& path) : writer_(path), path_(path) {}
+    Hears hears() const override { return {.samples = true, .records = true, .repeated = true}; }
+    void message(const Published& message) override { writer_.write(message.stamp_us, message.channel, message.data, message.size); }
+    void flush() override;
+    std::string error() const;
+    const std::string& path() const { return path_; }
+
+   private:
+    log::Writer writer_;
+    const std::string path_;
+    mutable std::mutex mutex_;
+    std::string error_;
+  };
+
+  File file_;
+  QueuedSink queue_;
+};
+
+// Sees each message as a log would get it.
+using Watcher = std::function<void(SimTime stamp, const std::string& channel, const uint8_t* data, size_t size)>;
+
+class WatcherSink : public Sink {
+ public:
+  explicit WatcherSink(Watcher watcher) : watcher_(std::move(watcher)) {}
+  Hears hears() const override { return {.samples = true, .records = true, .repeated = true}; }
+  void message(const Published& message) override { watcher_(message.stamp_us, message.channel, message.data, message.size); }
+
+ private:
+  const Watcher watcher_;
+};
+
+}  // namespace ruedo::run
