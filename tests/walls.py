@@ -18,6 +18,7 @@ LIBRARIES = {
     ("lcm/lcm.h", "lcm/lcm-cpp", "lcm/eventlog"): {"bus"},
     ("CLI/",): {"cli"},
     ("libwebsockets",): {"console"},
+    ("dds/dds.h", "dds/ddsi"): {"dds"},
     ("tbb/", "oneapi/tbb"): {"scene", "sensors", "engine"},
 }
 
@@ -107,7 +108,7 @@ def test_tree_keeps(rule):
 
 def test_layers_are_those_of_the_design():
     known = layers(ROOT)
-    assert set(known) == {"core", "model", "scene", "physics", "robot", "sensors", "engine", "log", "judge", "run", "bus", "console", "cli"}
+    assert set(known) == {"core", "model", "scene", "physics", "robot", "sensors", "engine", "log", "judge", "run", "bus", "ros2", "dds", "console", "cli"}
     for outsider in ("physics", "engine", "run", "bus", "robot"):
         assert outsider not in known["sensors"]
     for outsider in ("log", "run", "bus", "console"):    # one world knows no file, no network and no clock

@@ -48,11 +48,11 @@ uint32_t crc_of(std::string_view bytes, uint32_t before = 0) {
 
 }  // namespace
 
-McapWriter::McapWriter(const std::string& path) : path_(path), file_(std::fopen(path.c_str(), "wb")) {
+McapWriter::McapWriter(const std::string& path, const std::string& profile) : path_(path), file_(std::fopen(path.c_str(), "wb")) {
   if (!file_) throw EnvironmentError(path + " cannot be written: " + std::strerror(errno));
   write(kMagic);
   std::string fields;
-  put_text(fields, "");    // no profile
+  put_text(fields, profile);
   put_text(fields, std::string("Ruedo ") + version());
   write(record(Op::header, fields));
 }
@@ -83,7 +83,7 @@ uint16_t McapWriter::add_schema(const std::string& name, const std::string& enco
   return id;
 }
 
-uint16_t McapWriter::add_channel(uint16_t schema, const std::string& topic, const std::string& encoding) {
+uint16_t McapWriter::add_channel(uint16_t schema, const std::string& topic, const std::string& encoding, const Metadata& metadata) {
   if (channels_.size() >= kMostIds) throw InputError({path_}, "has no room for more than 65535 channels");
   const auto id = static_cast<uint16_t>(channels_.size() + 1);
   std::string fields;
@@ -91,7 +91,9 @@ uint16_t McapWriter::add_channel(uint16_t schema, const std::string& topic, cons
   put(fields, schema);
   put_text(fields, topic);
   put_text(fields, encoding);
-  put(fields, uint32_t{0});    // no metadata
+  std::string map;
+  for (const auto& [key, value] : metadata) put_text(map, key), put_text(map, value);
+  put_text(fields, map);
   channels_.push_back(record(Op::channel, fields));
   chunk_ += channels_.back();
   return id;

@@ -16,15 +16,18 @@ class McapWriter {
   static constexpr size_t kChunkSize = size_t{1} << 20;    // bytes; a chunk ends with the message that passes it
   static constexpr size_t kMostIds = 65535;                // schemas, and channels
 
-  // Throws EnvironmentError when the file cannot be written, as all that follows does.
-  explicit McapWriter(const std::string& path);
+  using Metadata = std::map<std::string, std::string>;
+
+  // profile: MCAP's word for whose conventions hold, "ros2". Throws EnvironmentError when the file cannot be written, as all that
+  // follows does.
+  explicit McapWriter(const std::string& path, const std::string& profile = "");
   ~McapWriter();    // a file that was not finished is removed
   McapWriter(const McapWriter&) = delete;
   McapWriter& operator=(const McapWriter&) = delete;
 
   // Both return an id. Throw InputError when there are too many.
   uint16_t add_schema(const std::string& name, const std::string& encoding, std::string_view data);
-  uint16_t add_channel(uint16_t schema, const std::string& topic, const std::string& encoding);
+  uint16_t add_channel(uint16_t schema, const std::string& topic, const std::string& encoding, const Metadata& metadata = {});
   void add_message(uint16_t channel, uint64_t time_ns, std::string_view data);
   void finish();
 

@@ -19,6 +19,7 @@
 #include "bus/server_bus.h"
 #include "cli/commands.h"
 #include "cli/listing.h"
+#include "cli/ros2.h"
 #include "cli/sandboxed.h"
 #include "cli/view.h"
 #include "core/utf8.h"
@@ -42,6 +43,7 @@ struct RunArguments {
   bool viewed = false;
   bool paused = false, quiet = false, watch_stdin = false, sandboxed = false;
   int threads = 0;
+  Ros2Arguments ros2;
 };
 
 // Takes SIGINT, SIGTERM, and SIGHUP where it is not ignored (nohup), in a thread of its own: a handler could do next to nothing.
@@ -152,6 +154,7 @@ run::ServerOptions server_options(const RunArguments& arguments) {
   options.record = arguments.record;
   options.result_options = result_options(arguments.world);
   for (const std::string& text : arguments.remaps) {
+    if (text.starts_with('/')) continue;    // ROS's names, which change nothing of the run
     options.remaps.push_back(parse_remap(text));
     options.result_options.push_back("--remap=" + text);
   }
@@ -163,6 +166,16 @@ run::ServerOptions server_options(const RunArguments& arguments) {
   options.simulation.fleet.noise = !arguments.world.no_noise;
   options.simulation.fleet.disabled = arguments.world.disabled;
   return options;
+}
+
+std::vector<std::pair<std::string, std::string>> topic_remaps(const RunArguments& arguments) {
+  std::vector<std::pair<std::string, std::string>> remaps;
+  for (const std::string& text : arguments.remaps) {
+    if (!text.starts_with('/')) continue;
+    if (!arguments.ros2.on) throw InputError({}, "--remap " + text + ": names of ROS topics go with --ros2");
+    remaps.push_back(parse_remap(text));
+  }
+  return remaps;
 }
 
 // What clients need to find this server, where they would not find it by themselves.
@@ -196,9 +209,11 @@ int run(const RunArguments& arguments) {
   bus::ServerBus place = bus::open_server_bus(arguments.lcm, world->name);
   bus::RivalWatch bus(std::move(place.bus), [](const std::string& line) { spdlog::warn(line); });
   ViewedBus viewed(bus, arguments.viewed, arguments.view);
-  run::Server server(world, std::move(options), viewed.bus());
+  Ros2Bus ros2(viewed.bus(), arguments.ros2);
+  const auto channel_remaps = options.remaps;
+  run::Server server(world, std::move(options), ros2.bus());
   place.claim->describe(fmt::format("pid {}, world {}, run {}", getpid(), world->name, server.run_id()));
-  std::shared_ptr<void> view;
+  std::shared_ptr<void> view, node;
   const bool is_read = is_printed([&] {
     announce(place);
     std::vector<Finding> findings = world->findings;
@@ -206,6 +221,7 @@ int run(const RunArguments& arguments) {
     print_findings(findings);
     if (!arguments.quiet) print_world(server, *world, place.url);
     view = viewed.open(server, world->name);
+    node = ros2.open(server, topic_remaps(arguments), channel_remaps);
   });
   if (!is_read) server.on_state([&server](const Snapshot&) { server.stop(); });    // as by SIGTERM: the log gets its end
   if (!is_read && arguments.lockstep > 0) server.stop();                           // no state comes by itself
@@ -239,6 +255,10 @@ void add_run(CLI::App& app, Action& chosen) {
   command->add_option("--remap", arguments->remaps, "give a channel another name: CHANNEL=NAME")->type_name("REMAP")->allow_extra_args(false);
   CLI::Option* view = command->add_option("--view", arguments->view, "serve the web console (default: 127.0.0.1:8080)");
   view->type_name("[ADDRESS:PORT]")->expected(0, 1);
+  CLI::Option* ros2 = command->add_option("--ros2", arguments->ros2.distro, "be a ROS 2 node, of that release (default: $ROS_DISTRO, or jazzy)");
+  ros2->type_name("[DISTRO]")->expected(0, 1);
+  command->add_option("--ros2-clock", arguments->ros2.clock_hz, "/clock at most so often in a second of sim time")
+      ->type_name("HZ")->capture_default_str()->check(CLI::Range(0.1, 10000.0));
   command->add_option("--wait-for", arguments->wait_for, "wait at each step where a command is due: CHANNEL@HZ")
       ->type_name("INPUT")->allow_extra_args(false);
   command->add_option("--snapshots", arguments->snapshots, "the folder where clients may save the state, and restore it")->type_name("FOLDER");
@@ -254,8 +274,9 @@ void add_run(CLI::App& app, Action& chosen) {
   command->add_flag("--watch-stdin", arguments->watch_stdin, "end when standard input does: for programs that start a server");
   command->add_flag("--quiet", arguments->quiet, "do not list the channels");
   add_sandbox_argument(*command, arguments->sandboxed);
-  command->callback([arguments, view, &chosen] {
+  command->callback([arguments, view, ros2, &chosen] {
     arguments->viewed = view->count() > 0;
+    arguments->ros2.on = ros2->count() > 0;
     chosen = [arguments] { return run(*arguments); };
   });
 }

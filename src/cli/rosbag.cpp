@@ -1,0 +1,127 @@
+// metadata.yaml as rosbag2 writes it: version 9 from Jazzy on, version 5 for Humble.
+#include "cli/rosbag.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include <fmt/format.h>
+
+#include "ruedo/decode.h"
+#include "ruedo/errors.h"
+#include "ruedo/world_info_t.hpp"
+
+namespace ruedo::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string qos_profile(const ros2::Qos& qos, ros2::Distro distro, const std::string& indent) {
+  const bool numbers = distro == ros2::Distro::humble || distro == ros2::Distro::iron;
+  const auto infinite = [&](const char* name) {
+    return fmt::format("{}  {}:\n{}    sec: 9223372036\n{}    nsec: 854775807\n", indent, name, indent, indent);
+  };
+  const char* reliability = numbers ? (qos.reliable ? "1" : "2") : (qos.reliable ? "reliable" : "best_effort");
+  const char* durability = numbers ? (qos.transient_local ? "1" : "2") : (qos.transient_local ? "transient_local" : "volatile");
+  return fmt::format("{}- history: {}\n{}  depth: {}\n{}  reliability: {}\n{}  durability: {}\n", indent, numbers ? "1" : "keep_last", indent, qos.depth,
+                     indent, reliability, indent, durability) +
+         infinite("deadline") + infinite("lifespan") + fmt::format("{}  liveliness: {}\n", indent, numbers ? "1" : "automatic") +
+         infinite("liveliness_lease_duration") + indent + "  avoid_ros_namespace_conventions: false";
+}
+
+// A text within double quotes.
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    if (c == '\n') out += "\\n";
+    else out += c;
+  }
+  return out + "\"";
+}
+
+}  // namespace
+
+Rosbag::Rosbag(const std::string& folder, ros2::ConversionOptions options) : folder_(folder), options_(std::move(options)) {
+  std::error_code error;
+  while (folder_.size() > 1 && folder_.ends_with('/')) folder_.pop_back();
+  if (fs::exists(folder_, error)) throw InputError({}, "--ros2: " + folder_ + " is there already; a bag gets a folder of its own");
+  fs::create_directories(folder_, error);
+  if (error) throw EnvironmentError(folder_ + " cannot be made: " + error.message());
+  file_ = fs::path(folder_).filename().string() + "_0.mcap";
+  out_ = std::make_unique<McapWriter>((fs::path(folder_) / file_).string(), "ros2");
+}
+
+void Rosbag::begin_scene(const run::LogWorlds::Scene& scene, uint64_t time_ns) {
+  std::vector<world_info_t> info;
+  size_t robots = 0;
+  for (const std::vector<uint8_t>& bytes : scene.info) {
+    world_info_t part;
+    if (decode_checked(bytes.data(), bytes.size(), part) != DecodeFault::none) continue;
+    robots += part.robots.size();
+    info.push_back(std::move(part));
+  }
+  if (!names_) {
+    options_.many = robots > 1;
+    names_.emplace(options_.many, options_.topics);
+  }
+  conversions_ = std::make_unique<ros2::Conversions>(info, options_, *names_);
+  write({names_->topic("", "tf_static"), "tf2_msgs/msg/TFMessage", ros2::kLatchedQos}, time_ns, conversions_->static_frames());
+}
+
+void Rosbag::add(const std::string& channel, uint64_t time_ns, std::span<const uint8_t> message) {
+  const bool known = conversions_ && conversions_->convert(channel, message, [](size_t) { return true; },
+                                                           [&](size_t topic, std::span<const uint8_t> cdr) { write(conversions_->topics()[topic], time_ns, cdr); });
+  if (!known) ++left_out_;
+}
+
+void Rosbag::write(const ros2::Topic& topic, uint64_t time_ns, std::span<const uint8_t> cdr) {
+  const auto [schema, first] = schemas_.try_emplace(topic.type);
+  if (first) schema->second = out_->add_schema(topic.type, "ros2msg", ros2::full_text(topic.type, options_.distro));
+  const auto [at, fresh] = topics_.try_emplace(topic.name + " " + topic.type, Recorded{topic, 0});
+  if (fresh) {
+    at->second.channel = out_->add_channel(schema->second, topic.name, "cdr",
+                                           {{"offered_qos_profiles", qos_profile(topic.qos, options_.distro, "") + "\n"},
+                                            {"topic_type_hash", ros2::type_hash(topic.type, options_.distro)}});
+  }
+  begin_ns_ = out_->messages() == 0 ? time_ns : std::min(begin_ns_, time_ns);
+  end_ns_ = std::max(end_ns_, time_ns);
+  out_->add_message(at->second.channel, time_ns, {reinterpret_cast<const char*>(cdr.data()), cdr.size()});
+  ++at->second.messages;
+}
+
+std::string Rosbag::metadata() const {
+  const bool old = options_.distro == ros2::Distro::humble || options_.distro == ros2::Distro::iron;
+  std::string topics;
+  for (const auto& [name, recorded] : topics_) {
+    const ros2::Topic& topic = recorded.topic;
+    topics += fmt::format("    - topic_metadata:\n        name: {}\n        type: {}\n        serialization_format: cdr\n", topic.name, topic.type);
+    topics += old ? "        offered_qos_profiles: " + quoted(qos_profile(topic.qos, options_.distro, "")) + "\n"
+                  : "        offered_qos_profiles:\n" + qos_profile(topic.qos, options_.distro, "          ") + "\n";
+    if (!old) topics += fmt::format("        type_description_hash: {}\n", ros2::type_hash(topic.type, options_.distro));
+    topics += fmt::format("      message_count: {}\n", recorded.messages);
+  }
+  const uint64_t duration = end_ns_ - begin_ns_, count = out_->messages();
+  std::string text = fmt::format(
+      "rosbag2_bagfile_information:\n  version: {}\n  storage_identifier: mcap\n  duration:\n    nanoseconds: {}\n"
+      "  starting_time:\n    nanoseconds_since_epoch: {}\n  message_count: {}\n  topics_with_message_count:{}\n{}"
+      "  compression_format: \"\"\n  compression_mode: \"\"\n  relative_file_paths:\n    - {}\n"
+      "  files:\n    - path: {}\n      starting_time:\n        nanoseconds_since_epoch: {}\n      duration:\n        nanoseconds: {}\n"
+      "      message_count: {}\n",
+      old ? 5 : 9, duration, begin_ns_, count, topics.empty() ? " []" : "", topics, quoted(file_), quoted(file_), begin_ns_, duration, count);
+  if (!old) text += fmt::format("  custom_data: ~\n  ros_distro: {}\n", ros2::name_of(options_.distro));
+  return text;
+}
+
+void Rosbag::finish() {
+  out_->finish();
+  const fs::path path = fs::path(folder_) / "metadata.yaml";
+  std::ofstream file(path);
+  file << metadata();
+  file.close();
+  if (!file) throw EnvironmentError(path.string() + " cannot be written: " + std::strerror(errno));
+}
+
+}  // namespace ruedo::cli

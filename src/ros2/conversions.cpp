@@ -1,0 +1,513 @@
+// REP-103 (units, optical frames), 105 (frames), 117 (ranges without return), 145 (IMU). Covariances that nobody knows are 0, as
+// sensor_msgs says; what is not measured at all has -1 in its first element.
+#include "ros2/conversions.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "ros2/pictures.h"
+#include "ruedo/camera_info_t.hpp"
+#include "ruedo/contact_t.hpp"
+#include "ruedo/decode.h"
+#include "ruedo/image_t.hpp"
+#include "ruedo/imu_t.hpp"
+#include "ruedo/joint_state_t.hpp"
+#include "ruedo/lidar_t.hpp"
+#include "ruedo/odometry_t.hpp"
+#include "ruedo/planar_lidar_t.hpp"
+#include "ruedo/pose.h"
+#include "ruedo/pose_t.hpp"
+#include "ruedo/sonar_t.hpp"
+
+namespace ruedo::ros2 {
+namespace {
+
+// Where a message comes from, for those who write it down.
+struct Source {
+  std::vector<std::string> wheels;        // names of their joints
+  device_info_t device{};
+  std::string part;                       // of the channel's name behind the device: "depth", "info", ...
+  double rate = 0.0;                      // Hz
+  std::string base, odom, frame, optical, world;
+  int element = -1;                       // of a sonar
+  Distro distro = Distro::jazzy;
+};
+
+void put_vector(CdrWriter& out, double x, double y, double z) { out.put(x).put(y).put(z); }
+void put_vector(CdrWriter& out, const double* v) { put_vector(out, v[0], v[1], v[2]); }
+void put_quaternion(CdrWriter& out, const double* wxyz) { out.put(wxyz[1]).put(wxyz[2]).put(wxyz[3]).put(wxyz[0]); }
+
+template <size_t size>
+void put_zeros(CdrWriter& out, double first = 0.0) {
+  double zeros[size] = {first};
+  out.put_array(std::span<const double>(zeros));
+}
+
+void put_transform(CdrWriter& out, int64_t utime, const std::string& parent, const std::string& child, const double* position, const double* wxyz) {
+  put_header(out, utime, parent);
+  out.put(child);
+  put_vector(out, position);
+  put_quaternion(out, wxyz);
+}
+
+void write_scan(const planar_lidar_t& scan, const Source& from, CdrWriter& out) {
+  put_header(out, scan.utime, from.frame);
+  const float last = scan.rad0 + static_cast<float>(std::max(0, scan.nranges - 1)) * scan.radstep;
+  out.put(scan.rad0).put(last).put(scan.radstep);
+  out.put(0.0f).put(from.rate > 0 ? static_cast<float>(1.0 / from.rate) : 0.0f);    // time between rays, and between scans
+  out.put(static_cast<float>(from.device.range_min)).put(static_cast<float>(from.device.range_max));
+  out.put_sequence(std::span<const float>(scan.ranges)).put_sequence(std::span<const float>(scan.intensities));
+}
+
+void put_point_fields(CdrWriter& out) {
+  constexpr uint8_t kFloat32 = 7;
+  constexpr const char* kNames[] = {"x", "y", "z", "intensity"};
+  out.put_length(4);
+  for (uint32_t i = 0; i < 4; ++i) out.put(kNames[i]).put(4 * i).put(kFloat32).put(uint32_t{1});
+}
+
+// A row a layer; rays without a return are NaN, so that neighbours stay neighbours.
+void write_points(const lidar_t& lidar, const Source& from, CdrWriter& out) {
+  put_header(out, lidar.utime, from.frame);
+  const auto columns = static_cast<uint32_t>(std::max(0, lidar.ncolumns));
+  const auto layers = columns == 0 ? 0u : static_cast<uint32_t>(lidar.ranges.size() / columns);
+  out.put(layers).put(columns);
+  put_point_fields(out);
+  out.put(false).put(uint32_t{16}).put(16 * columns);
+  out.put_length(size_t{16} * layers * columns);
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  bool dense = true;
+  std::vector<float> values;
+  values.reserve(size_t{4} * layers * columns);
+  for (uint32_t layer = 0; layer < layers; ++layer) {
+    const double elevation = lidar.elevation0 + layer * static_cast<double>(lidar.elevation_step);
+    for (uint32_t column = 0; column < columns; ++column) {
+      const size_t i = size_t{layer} * columns + column;
+      const double range = lidar.ranges[i], azimuth = lidar.azimuth0 + column * static_cast<double>(lidar.azimuth_step);
+      const bool hit = std::isfinite(range);
+      dense &= hit;
+      values.push_back(hit ? static_cast<float>(range * std::cos(elevation) * std::cos(azimuth)) : kNone);
+      values.push_back(hit ? static_cast<float>(range * std::cos(elevation) * std::sin(azimuth)) : kNone);
+      values.push_back(hit ? static_cast<float>(range * std::sin(elevation)) : kNone);
+      values.push_back(i < lidar.intensities.size() ? lidar.intensities[i] : 0.0f);
+    }
+  }
+  out.put_array(std::span(reinterpret_cast<const uint8_t*>(values.data()), values.size() * sizeof(float)));
+  out.put(dense);
+}
+
+bool is_fresh(const sonar_t& sonar, const Source& from) {
+  const auto i = static_cast<size_t>(from.element);
+  return i < sonar.fresh.size() && i < sonar.range.size() && sonar.fresh[i] != 0;
+}
+
+void write_range(const sonar_t& sonar, const Source& from, CdrWriter& out) {
+  const auto i = static_cast<size_t>(from.element);
+  const int64_t fired = i < sonar.fired_utime.size() ? sonar.fired_utime[i] : -1;
+  put_header(out, fired < 0 ? sonar.utime : fired, from.frame);
+  constexpr uint8_t kUltrasound = 0;
+  out.put(kUltrasound).put(static_cast<float>(from.device.fov_horizontal));
+  out.put(static_cast<float>(from.device.range_min)).put(static_cast<float>(from.device.range_max)).put(sonar.range[i]);
+  if (from.distro != Distro::humble) out.put(0.0f);    // variance: not known
+}
+
+// Echoes alone, each on the axis of its transducer.
+void write_sonar_points(const sonar_t& sonar, const Source& from, CdrWriter& out) {
+  put_header(out, sonar.utime, from.frame);
+  std::vector<float> points;
+  const size_t count = std::min(sonar.range.size(), from.device.element_pose.size());
+  for (size_t i = 0; i < count; ++i) {
+    if (!(sonar.range[i] < static_cast<float>(from.device.range_max)) || sonar.fired_utime[i] < 0) continue;
+    const std::vector<double>& e = from.device.element_pose[i];
+    const Pose X = Pose::from_xyz_rpy(Vec3(e[0], e[1], e[2]), Vec3(e[3], e[4], e[5]));
+    const Vec3 p = X * Vec3(sonar.range[i], 0, 0);
+    for (int k = 0; k < 3; ++k) points.push_back(static_cast<float>(p[k]));
+  }
+  out.put_length(points.size() / 3).put_array(std::span<const float>(points));
+  out.put_length(0);    // channels
+}
+
+void put_yaw(CdrWriter& out, double yaw) { out.put(0.0).put(0.0).put(std::sin(yaw / 2)).put(std::cos(yaw / 2)); }
+
+void write_odometry(const odometry_t& odometry, const Source& from, CdrWriter& out) {
+  put_header(out, odometry.utime, from.odom);
+  out.put(from.base);
+  put_vector(out, odometry.x, odometry.y, 0.0);
+  put_yaw(out, odometry.theta);
+  put_zeros<36>(out);
+  put_vector(out, odometry.v, 0.0, 0.0);
+  put_vector(out, 0.0, 0.0, odometry.omega);
+  put_zeros<36>(out);
+}
+
+void write_odometry_frame(const odometry_t& odometry, const Source& from, CdrWriter& out) {
+  const double position[3] = {odometry.x, odometry.y, 0.0};
+  const double wxyz[4] = {std::cos(odometry.theta / 2), 0.0, 0.0, std::sin(odometry.theta / 2)};
+  out.put_length(1);
+  put_transform(out, odometry.utime, from.odom, from.base, position, wxyz);
+}
+
+void write_wheels(const odometry_t& odometry, const Source& from, CdrWriter& out) {
+  put_header(out, odometry.utime, "");
+  const size_t count = std::min({from.wheels.size(), odometry.angle.size(), odometry.rate.size()});
+  out.put_length(count);
+  for (size_t i = 0; i < count; ++i) out.put(from.wheels[i]);
+  out.put_sequence(std::span(odometry.angle.data(), count)).put_sequence(std::span(odometry.rate.data(), count)).put_length(0);
+}
+
+bool has_wheels(const Source& from) { return !from.wheels.empty(); }
+
+void write_joints(const joint_state_t& joints, const Source&, CdrWriter& out) {
+  put_header(out, joints.utime, "");
+  out.put_length(joints.joint_name.size());
+  for (const std::string& name : joints.joint_name) out.put(name);
+  for (const auto* values : {&joints.joint_position, &joints.joint_velocity, &joints.joint_effort}) {
+    out.put_length(values->size());
+    for (const float value : *values) out.put(static_cast<double>(value));
+  }
+}
+
+void write_imu(const imu_t& imu, const Source& from, CdrWriter& out) {
+  const bool oriented = imu.orientation[0] != 0 || imu.orientation[1] != 0 || imu.orientation[2] != 0 || imu.orientation[3] != 0;
+  put_header(out, imu.utime, from.frame);
+  put_quaternion(out, imu.orientation);
+  put_zeros<9>(out, oriented ? 0.0 : -1.0);
+  put_vector(out, imu.angular_velocity);
+  put_zeros<9>(out);
+  put_vector(out, imu.linear_acceleration);
+  put_zeros<9>(out);
+}
+
+void write_ground_truth(const pose_t& pose, const Source& from, CdrWriter& out) {
+  put_header(out, pose.utime, from.world);
+  out.put(from.base);
+  put_vector(out, pose.pos);
+  put_quaternion(out, pose.orientation);
+  put_zeros<36>(out);
+  put_vector(out, pose.vel);
+  put_vector(out, pose.rotation_rate);
+  put_zeros<36>(out);
+}
+
+void write_image(const image_t& image, const Source& from, CdrWriter& out) {
+  const RawPicture raw = raw_picture(image);
+  put_header(out, image.utime, from.optical);
+  out.put(raw.height).put(raw.width).put(raw.encoding).put(uint8_t{0}).put(raw.step);
+  out.put_sequence(std::span<const uint8_t>(raw.data));
+}
+
+void write_compressed(const image_t& image, const Source& from, CdrWriter& out) {
+  put_header(out, image.utime, from.optical);
+  out.put("jpeg");
+  if (image.pixelformat == image_t::PIXEL_FORMAT_MJPEG) {
+    out.put_sequence(std::span<const uint8_t>(image.data));
+  } else {
+    out.put_sequence(std::span<const uint8_t>(jpeg_of(image)));
+  }
+}
+
+void write_camera_info(const camera_info_t& camera, const Source& from, CdrWriter& out) {
+  put_header(out, camera.utime, from.optical);
+  out.put(static_cast<uint32_t>(camera.height)).put(static_cast<uint32_t>(camera.width)).put("plumb_bob");
+  out.put_sequence(std::span<const double>(camera.distortion));
+  const double k[9] = {camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1};
+  const double r[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const double p[12] = {camera.fx, 0, camera.cx, 0, 0, camera.fy, camera.cy, 0, 0, 0, 1, 0};
+  out.put_array(std::span<const double>(k)).put_array(std::span<const double>(r)).put_array(std::span<const double>(p));
+  out.put(uint32_t{0}).put(uint32_t{0});                                               // binning
+  out.put(uint32_t{0}).put(uint32_t{0}).put(uint32_t{0}).put(uint32_t{0}).put(false);    // region of interest: all
+}
+
+void put_entity(CdrWriter& out, const std::string& name) {
+  constexpr uint8_t kLink = 3;
+  out.put(uint64_t{0}).put(name).put(kLink);
+}
+
+// A point of contact each; the force acts on the robot's body along the normal.
+void write_contacts(const contact_t& contact, const Source& from, CdrWriter& out) {
+  const std::string own = from.device.robot + "/" + from.device.name;
+  put_header(out, contact.utime, from.world);
+  out.put_length(contact.points.size());
+  for (const contact_point_t& point : contact.points) {
+    put_entity(out, own);
+    put_entity(out, point.body);
+    out.put_length(1);
+    put_vector(out, point.position);
+    out.put_length(1);
+    put_vector(out, point.normal);
+    out.put_length(1).put(point.depth);
+    out.put_length(1);
+    put_header(out, contact.utime, from.world);
+    out.put(own).put(uint32_t{0}).put(point.body).put(uint32_t{0});
+    for (const double sign : {1.0, -1.0}) {
+      put_vector(out, sign * point.force * point.normal[0], sign * point.force * point.normal[1], sign * point.force * point.normal[2]);
+      put_vector(out, 0, 0, 0);
+    }
+  }
+}
+
+void write_bumper(const contact_t& contact, const Source&, CdrWriter& out) { out.put(static_cast<bool>(contact.pressed)); }
+
+// Whose topic it is: a device's, each transducer's, the robot's, or one for all.
+enum class Scope { device, element, robot, world };
+
+template <class Message>
+struct Row {
+  const char* topic;
+  const char* type;
+  Qos qos;
+  void (*write)(const Message&, const Source&, CdrWriter&);
+  bool (*applies)(const Source&) = nullptr;                    // null: always
+  bool (*is_due)(const Message&, const Source&) = nullptr;     // null: in every message
+  Scope scope = Scope::device;
+};
+
+bool is_colour(const Source& from) { return from.part.empty(); }
+bool is_depth(const Source& from) { return from.part == "depth"; }
+bool is_labels(const Source& from) { return from.part == "labels"; }
+
+// What each type becomes.
+template <class Message>
+std::span<const Row<Message>> rows();
+
+#define RUEDO_ROWS(Message, ...)                              \
+  template <>                                                 \
+  std::span<const Row<Message>> rows<Message>() {             \
+    static constexpr Row<Message> kRows[] = {__VA_ARGS__};    \
+    return kRows;                                             \
+  }
+
+RUEDO_ROWS(planar_lidar_t, {"scan", "sensor_msgs/msg/LaserScan", kSensorQos, write_scan})
+RUEDO_ROWS(lidar_t, {"points", "sensor_msgs/msg/PointCloud2", kSensorQos, write_points})
+RUEDO_ROWS(sonar_t,
+           {"range", "sensor_msgs/msg/Range", kSensorQos, write_range, nullptr, is_fresh, Scope::element},
+           {"sonar", "sensor_msgs/msg/PointCloud", kSensorQos, write_sonar_points})
+RUEDO_ROWS(odometry_t,
+           {"odom", "nav_msgs/msg/Odometry", kStateQos, write_odometry, nullptr, nullptr, Scope::robot},
+           {"tf", "tf2_msgs/msg/TFMessage", kTfQos, write_odometry_frame, nullptr, nullptr, Scope::world},
+           {"joint_states", "sensor_msgs/msg/JointState", kStateQos, write_wheels, has_wheels, nullptr, Scope::robot})
+RUEDO_ROWS(joint_state_t, {"joint_states", "sensor_msgs/msg/JointState", kStateQos, write_joints, nullptr, nullptr, Scope::robot})
+RUEDO_ROWS(imu_t, {"imu", "sensor_msgs/msg/Imu", kSensorQos, write_imu})
+RUEDO_ROWS(pose_t, {"ground_truth", "nav_msgs/msg/Odometry", kStateQos, write_ground_truth, nullptr, nullptr, Scope::robot})
+RUEDO_ROWS(image_t,
+           {"image_raw", "sensor_msgs/msg/Image", kSensorQos, write_image, is_colour},
+           {"image_raw/compressed", "sensor_msgs/msg/CompressedImage", kSensorQos, write_compressed, is_colour},
+           {"depth", "sensor_msgs/msg/Image", kSensorQos, write_image, is_depth},
+           {"labels", "sensor_msgs/msg/Image", kSensorQos, write_image, is_labels})
+RUEDO_ROWS(camera_info_t, {"camera_info", "sensor_msgs/msg/CameraInfo", kSensorQos, write_camera_info})
+RUEDO_ROWS(contact_t,
+           {"contacts", "ros_gz_interfaces/msg/Contacts", kSensorQos, write_contacts},
+           {"bumper", "std_msgs/msg/Bool", kSensorQos, write_bumper})
+
+#undef RUEDO_ROWS
+
+}  // namespace
+
+struct Conversions::Route {
+  virtual ~Route() = default;
+  virtual bool run(std::span<const uint8_t> message, const Wanted& wanted, const Emit& emit) = 0;
+  std::vector<size_t> topics;
+};
+
+// All that is known of a run, looked up by robot and device.
+struct Conversions::Plan {
+  const ConversionOptions& options;
+  Names& names;
+  std::map<std::string, const robot_info_t*> robots;
+  std::map<std::string, const device_info_t*> devices;         // by "ROBOT/DEVICE"
+  std::map<std::pair<std::string, std::string>, int> uses;     // of a robot's topic, by its devices
+
+  Source source(const channel_info_t& channel) const {
+    Source from;
+    const std::string name = channel.robot + "/" + channel.device;
+    if (const auto robot = robots.find(channel.robot); robot != robots.end()) from.wheels = robot->second->wheels;
+    if (const auto device = devices.find(name); device != devices.end()) from.device = *device->second;
+    const std::string original = original_name(channel.name);
+    if (original.starts_with(name + "/")) from.part = original.substr(name.size() + 1);
+    from.rate = channel.rate;
+    from.distro = options.distro;
+    from.world = "world";
+    from.base = names.frame(channel.robot, "base_link");
+    from.odom = names.frame(channel.robot, "odom");
+    from.frame = names.frame(channel.robot, ros_name(channel.device));
+    from.optical = from.frame + "_optical";
+    return from;
+  }
+
+  std::string original_name(const std::string& bus_name) const {
+    for (const auto& [from, to] : options.channels) {
+      if (to == bus_name) return from;
+    }
+    return bus_name;
+  }
+
+  template <class Message>
+  void count(const channel_info_t& channel) {
+    for (const Row<Message>& row : rows<Message>()) {
+      if (!row.applies || row.applies(source(channel))) ++uses[{channel.robot, row.topic}];
+    }
+  }
+
+  // "scan" where the robot has one; else "DEVICE/scan".
+  template <class Message>
+  std::string topic(const Row<Message>& row, const channel_info_t& channel) {
+    const bool alone = row.scope == Scope::robot || row.scope == Scope::world || uses[{channel.robot, row.topic}] == 1;
+    return names.topic(row.scope == Scope::world ? "" : channel.robot, (alone ? "" : ros_name(channel.device) + "/") + row.topic);
+  }
+};
+
+namespace {
+
+template <class Message>
+class TypedRoute : public Conversions::Route {
+ public:
+  void add(const Row<Message>& row, Source source, size_t topic) {
+    entries_.push_back({&row, std::move(source), topic});
+    topics.push_back(topic);
+  }
+
+  bool run(std::span<const uint8_t> message, const Conversions::Wanted& wanted, const Conversions::Emit& emit) override {
+    bool decoded = false;
+    for (const Entry& entry : entries_) {
+      if (!wanted(entry.topic)) continue;
+      if (!decoded && decode_checked(message.data(), message.size(), message_) != DecodeFault::none) return false;
+      decoded = true;
+      if (entry.row->is_due && !entry.row->is_due(message_, entry.source)) continue;
+      out_.clear();
+      entry.row->write(message_, entry.source, out_);
+      emit(entry.topic, out_.bytes());
+    }
+    return true;
+  }
+
+ private:
+  struct Entry {
+    const Row<Message>* row;
+    Source source;
+    size_t topic;
+  };
+  std::vector<Entry> entries_;
+  Message message_;
+  CdrWriter out_;
+};
+
+// Calls visit.operator()<Message>() with the type that has that name; the list of all types that become anything.
+template <class Visit>
+void with_type(const std::string& type, const Visit& visit) {
+  const auto match = [&]<class... Messages>() {
+    (static_cast<void>(type == Messages::getTypeName() && (visit.template operator()<Messages>(), true)), ...);
+  };
+  match.template operator()<planar_lidar_t, lidar_t, sonar_t, odometry_t, joint_state_t, imu_t, pose_t, image_t, camera_info_t, contact_t>();
+}
+
+}  // namespace
+
+Conversions::Conversions(const std::vector<world_info_t>& info, const ConversionOptions& options, Names& names) {
+  Plan plan{options, names, {}, {}, {}};
+  const auto each_channel = [&](const auto& visit) {
+    for (const world_info_t& part : info) {
+      for (const channel_info_t& channel : part.channels) {
+        if (!channel.input && !channel.robot.empty()) visit(channel);
+      }
+    }
+  };
+  for (const world_info_t& part : info) {
+    for (const robot_info_t& robot : part.robots) plan.robots[robot.name] = &robot;
+    for (const device_info_t& device : part.devices) plan.devices[device.robot + "/" + device.name] = &device;
+  }
+  each_channel([&](const channel_info_t& channel) { with_type(channel.type, [&]<class Message>() { plan.count<Message>(channel); }); });
+  each_channel([&](const channel_info_t& channel) { with_type(channel.type, [&]<class Message>() { add_route<Message>(channel, plan); }); });
+  for (const auto& [name, device] : plan.devices) add_frames(*device, names);
+}
+
+Conversions::~Conversions() = default;
+
+template <class Message>
+void Conversions::add_route(const channel_info_t& channel, Plan& plan) {
+  auto route = std::make_unique<TypedRoute<Message>>();
+  for (const Row<Message>& row : rows<Message>()) {
+    Source from = plan.source(channel);
+    if (row.applies && !row.applies(from)) continue;
+    const std::string name = plan.topic(row, channel);
+    if (row.scope != Scope::element) {
+      route->add(row, from, add_topic({name, row.type, row.qos}));
+      continue;
+    }
+    const std::string array = from.frame;
+    for (int i = 0; i < from.device.nelements; ++i) {
+      from.element = i;
+      from.frame = array + "_" + std::to_string(i);
+      route->add(row, from, add_topic({name + "_" + std::to_string(i), row.type, row.qos}));
+    }
+  }
+  routes_[channel.name] = std::move(route);
+}
+
+size_t Conversions::add_topic(Topic topic) {
+  const auto [at, fresh] = by_name_.try_emplace(topic.name + " " + topic.type, topics_.size());
+  if (fresh) topics_.push_back(std::move(topic));
+  return at->second;
+}
+
+void Conversions::add_frames(const device_info_t& device, const Names& names) {
+  constexpr double kOptical[4] = {0.5, -0.5, 0.5, -0.5};    // z ahead, x right, y down
+  constexpr double kNowhere[3] = {0, 0, 0};
+  if (device.kind == "odometry" || device.kind == "pose" || device.kind == "motion" || device.kind == "joints") return;
+  const std::string frame = names.frame(device.robot, ros_name(device.name));
+  const auto add = [this](const std::string& parent, const std::string& child, const double* position, const double* wxyz) {
+    Frame& added = frames_.emplace_back(Frame{parent, child, {}, {}});
+    std::copy(position, position + 3, added.position);
+    std::copy(wxyz, wxyz + 4, added.orientation);
+  };
+  add(names.frame(device.robot, "base_link"), frame, device.position, device.orientation);
+  if (device.kind == "camera") add(frame, frame + "_optical", kNowhere, kOptical);
+  for (size_t i = 0; i < device.element_pose.size(); ++i) {
+    const std::vector<double>& e = device.element_pose[i];
+    const Pose X = Pose::from_xyz_rpy(Vec3(e[0], e[1], e[2]), Vec3(e[3], e[4], e[5]));
+    const double wxyz[4] = {X.rotation.w(), X.rotation.x(), X.rotation.y(), X.rotation.z()};
+    add(frame, frame + "_" + std::to_string(i), X.translation.data(), wxyz);
+  }
+}
+
+std::vector<std::string> Conversions::channels() const {
+  std::vector<std::string> names;
+  for (const auto& [name, route] : routes_) names.push_back(name);
+  return names;
+}
+
+bool Conversions::is_wanted(const std::string& channel, const Wanted& wanted) const {
+  const auto route = routes_.find(channel);
+  return route != routes_.end() && std::any_of(route->second->topics.begin(), route->second->topics.end(), wanted);
+}
+
+bool Conversions::convert(const std::string& channel, std::span<const uint8_t> message, const Wanted& wanted, const Emit& emit) {
+  const auto route = routes_.find(channel);
+  return route != routes_.end() && route->second->run(message, wanted, emit);
+}
+
+std::vector<uint8_t> Conversions::static_frames() const {
+  CdrWriter out;
+  out.put_length(frames_.size());
+  for (const Frame& frame : frames_) put_transform(out, 0, frame.parent, frame.child, frame.position, frame.orientation);
+  return out.bytes();
+}
+
+void put_time(CdrWriter& out, int64_t utime) {
+  const int64_t us = ((utime % 1'000'000) + 1'000'000) % 1'000'000;
+  out.put(static_cast<int32_t>((utime - us) / 1'000'000)).put(static_cast<uint32_t>(us * 1000));
+}
+
+void put_header(CdrWriter& out, int64_t utime, const std::string& frame) {
+  put_time(out, utime);
+  out.put(frame);
+}
+
+std::vector<uint8_t> clock_message(int64_t utime) {
+  CdrWriter out;
+  put_time(out, utime);
+  return out.bytes();
+}
+
+}  // namespace ruedo::ros2

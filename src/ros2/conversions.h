@@ -1,0 +1,74 @@
+// The one table of what Ruedo publishes and how it is said in ROS: a bus message in, one or more ROS messages out.
+//
+// It knows no network: `ruedo run --ros2` sends what comes out, `ruedo export --ros2` writes it into a bag.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "ros2/cdr.h"
+#include "ros2/interfaces.h"
+#include "ros2/names.h"
+#include "ros2/topic.h"
+#include "ruedo/world_info_t.hpp"
+
+namespace ruedo::ros2 {
+
+struct ConversionOptions {
+  Distro distro = Distro::jazzy;
+  bool many = false;                                            // robots have namespaces
+  Remaps topics;                                                // of ROS names
+  std::vector<std::pair<std::string, std::string>> channels;    // the bus's --remap
+};
+
+class Conversions {
+ public:
+  using Wanted = std::function<bool(size_t topic)>;
+  using Emit = std::function<void(size_t topic, std::span<const uint8_t> cdr)>;
+
+  // info: all parts of ruedo/info.
+  Conversions(const std::vector<world_info_t>& info, const ConversionOptions& options, Names& names);
+  ~Conversions();
+
+  const std::vector<Topic>& topics() const { return topics_; }
+
+  // Those that become anything, and whether anything is wanted of one.
+  std::vector<std::string> channels() const;
+  bool is_wanted(const std::string& channel, const Wanted& wanted) const;
+  // Converts what is wanted of a message. False: it is not of its channel's type, or damaged.
+  bool convert(const std::string& channel, std::span<const uint8_t> message, const Wanted& wanted, const Emit& emit);
+
+  // /tf_static: where the devices sit on their robots.
+  std::vector<uint8_t> static_frames() const;
+
+  struct Route;
+
+ private:
+  struct Plan;
+  template <class Message>
+  void add_route(const channel_info_t& channel, Plan& plan);
+  size_t add_topic(Topic topic);
+  void add_frames(const device_info_t& device, const Names& names);
+
+  std::vector<Topic> topics_;
+  std::unordered_map<std::string, size_t> by_name_;                            // of topics
+  std::unordered_map<std::string, std::unique_ptr<Route>> routes_;             // by channel; looked up only
+  struct Frame {
+    std::string parent, child;
+    double position[3], orientation[4];    // w, x, y, z
+  };
+  std::vector<Frame> frames_;
+};
+
+// rosgraph_msgs/msg/Clock, and the others that no bus message stands for.
+std::vector<uint8_t> clock_message(int64_t utime);
+
+void put_time(CdrWriter& out, int64_t utime);
+void put_header(CdrWriter& out, int64_t utime, const std::string& frame);
+
+}  // namespace ruedo::ros2

@@ -1,0 +1,60 @@
+// What carries ROS messages: writers and readers of CDR bytes under ROS names. src/dds implements it over Cyclone DDS.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "ros2/topic.h"
+
+namespace ruedo::ros2 {
+
+using Gid = std::array<uint8_t, 16>;
+
+// Where a sample goes by, and what the transport's middleware calls it.
+enum class Role { topic, request, reply, graph };
+
+struct Endpoint {
+  Role role = Role::topic;
+  Topic topic;              // of a service: its name, and "pkg/srv/Name_Request" or "..._Response"
+  std::string hash;         // RIHS01_..., "": none
+};
+
+class Writer {
+ public:
+  virtual ~Writer() = default;
+  // Never waits; false: it could not be sent.
+  virtual bool write(std::span<const uint8_t> cdr) = 0;
+  virtual bool is_read() const = 0;    // somebody listens
+  virtual Gid gid() const = 0;
+};
+
+class Reader {
+ public:
+  virtual ~Reader() = default;
+  virtual Gid gid() const = 0;
+};
+
+class Transport {
+ public:
+  virtual ~Transport() = default;
+
+  using Handler = std::function<void(std::span<const uint8_t> cdr)>;
+
+  // Both throw EnvironmentError. The handler is called from the transport's thread.
+  virtual std::unique_ptr<Writer> add_writer(const Endpoint& endpoint) = 0;
+  virtual std::unique_ptr<Reader> add_reader(const Endpoint& endpoint, Handler handler) = 0;
+
+  // Handlers are called from now on, and no more once stop() has returned.
+  virtual void start() = 0;
+  virtual void stop() = 0;
+
+  virtual Gid gid() const = 0;              // of this participant
+  virtual std::string where() const = 0;    // "domain 0, this machine only"
+  virtual uint64_t refused() const = 0;     // samples too large to be looked at
+};
+
+}  // namespace ruedo::ros2

@@ -1,0 +1,96 @@
+"""`ruedo run --ros2` and an independent peer: the PyPI package cyclonedds, with types written from the ROS interfaces."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from cyclonedds.core import Policy, Qos
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
+
+PATIENCE = float(os.environ.get("RUEDO_PATIENCE", "300"))    # s, for what comes sooner or later
+SOURCE = Path(os.environ.get("RUEDO_SOURCE_DIR", Path(__file__).resolve().parents[2]))
+RUEDO = os.environ.get("RUEDO", str(SOURCE / "build/release/bin/ruedo"))
+ARENA = str(SOURCE / "worlds/arena.sdf")
+
+_domains = iter(range(1, 200))
+
+
+class Peer:
+    """A participant; `topic` is ROS's name."""
+
+    def __init__(self, domain: int):
+        self.participant = DomainParticipant(domain)
+        self.entities: list[object] = []
+
+    def reader(self, topic: str, kind: type, latched: bool = False, reliable: bool = True, depth: int = 1000, prefix: str = "rt") -> DataReader:
+        qos = [Policy.History.KeepLast(depth)]
+        qos.append(Policy.Reliability.Reliable(duration(seconds=1)) if reliable else Policy.Reliability.BestEffort)
+        if latched:
+            qos.append(Policy.Durability.TransientLocal)
+        reader = DataReader(self.participant, Topic(self.participant, prefix + topic, kind), qos=Qos(*qos))
+        self.entities.append(reader)
+        return reader
+
+    def writer(self, topic: str, kind: type, prefix: str = "rt") -> DataWriter:
+        qos = Qos(Policy.History.KeepLast(100), Policy.Reliability.Reliable(duration(seconds=1)))
+        writer = DataWriter(self.participant, Topic(self.participant, prefix + topic, kind), qos=qos)
+        self.entities.append(writer)
+        return writer
+
+
+class Run:
+    """`ruedo run WORLD --ros2` in a domain of its own; ends with the with-block."""
+
+    def __init__(self, *arguments: str, world: str = ARENA, environment: dict[str, str] | None = None):
+        self.domain = next(_domains)
+        environment = {**os.environ, "ROS_DOMAIN_ID": str(self.domain), **(environment or {})}
+        self.process = subprocess.Popen([RUEDO, "run", world, "--ros2", "--lcm", "auto", *arguments], env=environment,
+                                        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+    def __enter__(self) -> Run:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
+
+    def end(self) -> str:
+        """Its output."""
+        if self.process.poll() is None:
+            self.process.terminate()
+        try:
+            return self.process.communicate(timeout=PATIENCE)[0]
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            return self.process.communicate()[0]
+        except ValueError:    # read already
+            return ""
+
+
+def wait_for(condition, what: str = "the condition"):
+    """What `condition` returns, once that is true."""
+    deadline = time.monotonic() + PATIENCE
+    while time.monotonic() < deadline:
+        if result := condition():
+            return result
+        time.sleep(0.01)
+    pytest.fail(f"{what} did not come")
+
+
+def take(reader: DataReader, count: int = 1) -> list:
+    """The next samples of a reader, at least so many."""
+    samples: list = []
+
+    def enough():
+        samples.extend(s for s in reader.take(N=1000) if hasattr(s, "__idl__"))
+        return len(samples) >= count
+
+    wait_for(enough, f"{count} samples on {reader.topic.name}")
+    return samples
