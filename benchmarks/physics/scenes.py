@@ -1,0 +1,112 @@
+"""What a test is made of, said once for all simulators: free bodies, things that never move, and mechanisms as URDF.
+
+Lengths in m, angles in rad, kg, s. Every mechanism is one URDF text, which all three simulators read themselves.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+
+GRAVITY = 9.81
+
+
+@dataclass(frozen=True)
+class Shape:
+    """kind and size: box (x, y, z), sphere (radius), cylinder (radius, length along z), plane (), mesh ()."""
+
+    kind: str
+    size: tuple[float, ...] = ()
+    file: Path | None = None    # of a mesh
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    friction: float = 1.0
+    restitution: float = 0.0
+    torsion_m: float = 0.0      # moment about the normal for a newton of load
+
+
+@dataclass(frozen=True)
+class Body:
+    """mass 0: it never moves. inertia: of the axes; by default that of its first shape, solid."""
+
+    name: str
+    shapes: tuple[Shape, ...]
+    mass: float = 1.0
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rpy: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    inertia: tuple[float, float, float] | None = None
+
+    def moments(self) -> tuple[float, float, float]:
+        if self.inertia:
+            return self.inertia
+        m, shape = self.mass, self.shapes[0]
+        if shape.kind == "box":
+            a, b, c = (s * s for s in shape.size)
+            return m * (b + c) / 12, m * (a + c) / 12, m * (a + b) / 12
+        if shape.kind == "sphere":
+            return (0.4 * m * shape.size[0] ** 2,) * 3
+        r, h = shape.size
+        side = m * (3 * r * r + h * h) / 12
+        return side, side, m * r * r / 2
+
+
+@dataclass(frozen=True)
+class Scene:
+    bodies: tuple[Body, ...] = ()
+    urdf: str = ""              # a mechanism "robot" whose first link is called "world" and never moves
+    gravity: float = GRAVITY
+    commands: bool = False      # joints are told something
+
+    @property
+    def free(self) -> list[Body]:
+        return [body for body in self.bodies if body.mass > 0.0]
+
+
+PLANE = Body("ground", (Shape("plane"),), mass=0.0)
+BOUNCING_PLANE = Body("ground", (Shape("plane", restitution=1.0),), mass=0.0)
+
+
+@dataclass
+class Chain:
+    """Links one after another, each turning about an axis of its own at its origin, as URDF."""
+
+    links: list[str] = field(default_factory=list)
+    last: str = "world"
+
+    def add(self, name: str, at: tuple[float, float, float], mass: float, center: tuple[float, float, float],
+            inertia: tuple[float, float, float], axis: str = "0 1 0", rpy: tuple[float, float, float] = (0, 0, 0)) -> Chain:
+        i = inertia
+        self.links.append(
+            f'<link name="{name}"><inertial><origin xyz="{_list(center)}"/><mass value="{mass!r}"/>'
+            f'<inertia ixx="{i[0]!r}" iyy="{i[1]!r}" izz="{i[2]!r}" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+            f'<joint name="to_{name}" type="continuous"><parent link="{self.last}"/><child link="{name}"/>'
+            f'<origin xyz="{_list(at)}" rpy="{_list(rpy)}"/><axis xyz="{axis}"/><limit effort="1000" velocity="1000"/></joint>')
+        self.last = name
+        return self
+
+    def urdf(self) -> str:
+        return f'<robot name="robot"><link name="world"/>{"".join(self.links)}</robot>'
+
+
+def flat_mesh(folder: Path, half: float = 8.0, triangle: float = 0.08, along: float | None = None) -> Path:
+    """A flat floor of right triangles with legs of that length, z = 0."""
+    along = half if along is None else along
+    path = folder / f"flat_{half:g}_{triangle:g}.obj"
+    nx, ny = round(2 * along / triangle), round(2 * half / triangle)
+    lines = [f"v {-1.0 + i * triangle:.4f} {-half + j * triangle:.4f} 0" for j in range(ny + 1) for i in range(nx + 1)]
+    for j in range(ny):
+        for i in range(nx):
+            a = j * (nx + 1) + i + 1
+            lines += [f"f {a} {a + 1} {a + nx + 2}", f"f {a} {a + nx + 2} {a + nx + 1}"]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def quaternion(rpy: tuple[float, float, float]) -> tuple[float, float, float, float]:
+    """w, x, y, z."""
+    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a / 2), math.sin(a / 2)) for a in rpy)
+    return (cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy)
+
+
+def _list(values: tuple[float, ...]) -> str:
+    return " ".join(repr(float(v)) for v in values)
