@@ -96,8 +96,12 @@ void Simulation::remove_model(int instance, Channels& channels) {
   fit_threads();
   if (!started_) return;
   const SceneMakers makers = world_.scene_makers();
-  for (auto& thread : threads_) {
-    if (thread->running()) thread->renew_scenes(makers);
+  try {
+    for (auto& thread : threads_) {
+      if (thread->running()) thread->renew_scenes(makers);
+    }
+  } catch (const std::exception& error) {    // a module without its scene or renderer would sample nothing, or crash
+    throw SceneLost(std::string("what sensors see cannot be made again after a change of the world: ") + error.what());
   }
 }
 

@@ -8,6 +8,7 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
@@ -18,6 +19,11 @@
 #include "engine/world.h"
 
 namespace ruedo::engine {
+
+// After a change of the world, or the attempt, a module has no scene or renderer any more: the simulation cannot go on.
+struct SceneLost : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
 
 struct SimulationOptions {
   FleetOptions fleet;
@@ -69,7 +75,7 @@ class Simulation {
   // ---- Changes of the world, while it stands still: its pace holds, all batches are taken, every thread waits. What is
   // written then is handed to the threads by the locks of the pace and of the modules' queues.
 
-  // As World's. Throws EnvironmentError, too, when a module cannot be served here; the world is then as it was.
+  // As World's. Throws EnvironmentError, too, when a module cannot be served here; the world is then as it was. Both throw SceneLost.
   int add_model(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model, int64_t step,
                 Channels& channels, Findings& findings);
   void remove_model(int instance, Channels& channels);

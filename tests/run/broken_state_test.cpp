@@ -42,5 +42,30 @@ TEST(BrokenState, EndsTheRunAndIsNotPublished) {
   EXPECT_THAT(simulation.end(), testing::HasSubstr("'thing/l'"));
 }
 
+// The renderer is made again when a model comes or goes, and may not be had a second time; nor for the way back.
+TEST(BrokenState, NobodyGoesOnWithoutARenderer) {
+  engine::Channels channels;
+  Findings findings;
+  engine::Wakeup wakeup;
+  const std::string camera = "<sensor name='camera' type='camera'><update_rate>10</update_rate><camera><image><width>8</width><height>8</height></image></camera></sensor>";
+  const auto world = load_text(robot_sdf("r", 0, 0, camera));
+  Pacer pacer(world->step_us, std::numeric_limits<double>::infinity(), 1000);
+  engine::Simulation simulation(world, {}, channels, findings, wakeup);
+  pacer.set_limit(9);
+  simulation.start(pacer);
+  int64_t last = -1;
+  while (last < 9) {
+    if (const engine::Batch* batch = simulation.take()) last += batch->count;
+    else wakeup.wait();
+  }
+  const auto guest = load_text(robot_sdf("guest", 0, 0))->models.at(0).model;
+  const Pose place{Quat::Identity(), {3, 0, 0}};
+  const int instance = simulation.add_model("guest", place, guest, 10, channels, findings);
+  setenv("RUEDO_RENDERER", "none", 1);
+  EXPECT_THROW(simulation.add_model("second", {Quat::Identity(), {6, 0, 0}}, guest, 10, channels, findings), engine::SceneLost);
+  EXPECT_THROW(simulation.remove_model(instance, channels), engine::SceneLost);
+  unsetenv("RUEDO_RENDERER");
+}
+
 }  // namespace
 }  // namespace ruedo::run
