@@ -9,9 +9,11 @@ install(DIRECTORY ${CMAKE_SOURCE_DIR}/worlds DESTINATION ${CMAKE_INSTALL_DATADIR
 install(FILES ${CMAKE_SOURCE_DIR}/src/model/xacro/expand.py DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo/xacro)
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/proto DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo FILES_MATCHING PATTERN "*.lcm")
 
-# LCM, which came from a wheel and may not be there where this is moved to.
+# LCM, which came from a wheel and may not be there where this is moved to; libraries that call our elementary functions.
 get_target_property(lcm_library lcm LOCATION)
 install(FILES ${lcm_library} DESTINATION ${CMAKE_INSTALL_LIBDIR}/ruedo RENAME liblcm.so.1)
+get_property(copies GLOBAL PROPERTY RUEDO_OWN_MATH_COPIES)
+install(FILES ${copies} DESTINATION ${CMAKE_INSTALL_LIBDIR}/ruedo)
 
 # find_package(ruedo)
 install(EXPORT ruedo FILE ruedoTargets.cmake NAMESPACE ruedo:: DESTINATION ${package})
@@ -22,7 +24,11 @@ install(FILES ${CMAKE_BINARY_DIR}/cmake/ruedoConfig.cmake ${CMAKE_BINARY_DIR}/cm
 
 # The Python client with its pytest fixture, to put on PYTHONPATH; the metadata let pytest find the fixture there.
 set(python ${CMAKE_INSTALL_DATADIR}/ruedo/python)
-install(DIRECTORY ${CMAKE_BINARY_DIR}/python/ruedo DESTINATION ${python} PATTERN __pycache__ EXCLUDE)
+install(DIRECTORY ${CMAKE_BINARY_DIR}/python/ruedo DESTINATION ${python} PATTERN __pycache__ EXCLUDE PATTERN "_engine*" EXCLUDE)
+if(TARGET ruedo_python_engine)
+  set_target_properties(ruedo_python_engine PROPERTIES INSTALL_RPATH "\$ORIGIN/../../../../${CMAKE_INSTALL_LIBDIR}/ruedo")
+  install(TARGETS ruedo_python_engine LIBRARY DESTINATION ${python}/ruedo)
+endif()
 set(metadata ${CMAKE_BINARY_DIR}/cmake/ruedo-${PROJECT_VERSION}.dist-info)
 file(WRITE ${metadata}/METADATA "Metadata-Version: 2.1\nName: ruedo\nVersion: ${PROJECT_VERSION}\nRequires-Dist: lcm==1.5.3\nRequires-Dist: numpy\n")
 file(WRITE ${metadata}/entry_points.txt "[pytest11]\nruedo = ruedo.regression\n")

@@ -16,12 +16,13 @@ readonly BUILD_PACKAGES=(
   "?libosmesa6-dev" libegl-dev libegl-mesa0 libgl-dev
   libopencv-core-dev libopencv-imgcodecs-dev libopencv-imgproc-dev
   libcli11-dev libspdlog-dev libfmt-dev libssl-dev libseccomp-dev "libglib2.0-0t64|libglib2.0-0" libwebsockets-dev cyclonedds-dev
+  musl-dev
 )
 # libsdformat is the oracle of the world reader's tests; Debian has it up to 12. clang builds the fuzzers; nftables
-# is the firewall that a test runs into.
+# is the firewall that a test runs into; MPFR is the oracle of the elementary functions, and qemu has other processors.
 readonly TEST_PACKAGES=(
   libgtest-dev libgmock-dev libbenchmark-dev libopencv-contrib-dev "?libsdformat-dev" "?chromium" clang "?libclang-rt-dev"
-  nftables
+  nftables libmpfr-dev qemu-user
 )
 
 # The web console's page is built by node and npm; a machine that has an npm of another origin keeps it.

@@ -3,7 +3,9 @@
 The layers and what each may use are read from the ruedo_layer() lines of the top CMakeLists.txt, so that there is one list.
 Libraries that live in one layer alone are listed below. The rule is also run on small trees that break it.
 """
+import os
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -116,6 +118,49 @@ def test_layers_are_those_of_the_design():
     assert not known["log"] & {"engine", "run", "bus"}
     assert not known["judge"] & {"engine", "run", "bus", "log"}
     assert "run" not in known["bus"] and "scene" not in known["physics"] and known["core"] == {"core"}
+
+
+# Elementary functions: ours alone, since the C library's depend on the CPU (include/ruedo/math.h).
+MATH = set(re.search(r"set\(RUEDO_MATH_FUNCTIONS ([^)]*)\)", (ROOT / "cmake/RuedoMath.cmake").read_text(encoding="utf-8")).group(1).split())
+NOT_OURS = MATH | {"log2", "log1p", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "cbrt", "erf", "erfc", "lgamma", "tgamma", "polar", "arg"}
+
+
+def foreign_math(root):
+    call = re.compile(r"(?:std::|(?<![\w:.>\"]))(" + "|".join(sorted(NOT_OURS)) + r")[fl]?\(")
+    problems = []
+    for path in sorted(p for top in ("src", "include") for p in (root / top).rglob("*") if p.suffix in (".cpp", ".h")):
+        if path.relative_to(root).as_posix() in ("include/ruedo/math.h", "src/core/math/c_names.cpp"):
+            continue
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+            code = re.sub(r'"(?:[^"\\]|\\.)*"|//.*', "", line)
+            declared = re.search(r"\b(?:void|Log|Logger|MotionLog&?|Reader)\s+(?:log)\(", code)
+            problems += [f"{path.relative_to(root)}:{number}: {name}() is the C library's; use math::{name} of ruedo/math.h"
+                         for name in call.findall(code) if not declared]
+    return problems
+
+
+def test_elementary_functions_are_ours():
+    problems = foreign_math(ROOT)
+    assert not problems, "\n" + "\n".join(problems)
+
+
+def test_a_foreign_function_is_named(tmp_path):
+    (tmp_path / "src/robot").mkdir(parents=True)
+    (tmp_path / "include").mkdir()
+    (tmp_path / "src/robot/a.cpp").write_text("// sin(x)\ndouble a = std::sin(1.0), b = math::cos(2.0);\nfloat c = atan2f(1, 2) + std::log2(3);\n")
+    assert [p.split(": ")[0] + p.split(": ")[1][:5] for p in foreign_math(tmp_path)] == [
+        "src/robot/a.cpp:2sin()", "src/robot/a.cpp:3atan2", "src/robot/a.cpp:3log2("]
+
+
+@pytest.mark.skipif("RUEDO_BINARY_DIR" not in os.environ, reason="started without a build")
+def test_what_is_built_takes_no_elementary_function_from_outside():
+    build = Path(os.environ["RUEDO_BINARY_DIR"])
+    built = [build / "bin/ruedo", build / "bin/ruedo-import-mesh", *build.glob("python/ruedo/_engine*.so"), *build.glob("math/lib*.so*")]
+    assert len(built) >= 7
+    for path in built:
+        names = subprocess.run(["nm", "-D", "--undefined-only", path], capture_output=True, text=True, check=True).stdout.split()
+        foreign = {name.split("@")[0] for name in names} & NOT_OURS
+        assert not foreign, f"{path.name} takes {', '.join(sorted(foreign))} from the C library"
 
 
 # The rule itself, on trees that break it.

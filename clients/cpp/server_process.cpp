@@ -33,12 +33,13 @@ bool is_program(const fs::path& path) {
   return fs::is_regular_file(path, error) && access(path.c_str(), X_OK) == 0;
 }
 
-// RUEDO, else the PATH, else the bin/ or build/*/bin/ of a folder above this program.
-std::string find_ruedo() {
+// RUEDO, else the one of the installation, else the PATH, else the bin/ or build/*/bin/ of a folder above this program.
+std::string find_ruedo(const std::string& installed) {
   if (const char* named = std::getenv("RUEDO"); named && *named) {
     if (!is_program(named)) throw LaunchError("the environment's RUEDO is '" + std::string(named) + "', which is no program");
     return named;
   }
+  if (!installed.empty() && is_program(installed)) return installed;
   std::istringstream path(std::getenv("PATH") ? std::getenv("PATH") : "");
   for (std::string folder; std::getline(path, folder, ':');) {
     if (is_program(fs::path(folder) / "ruedo")) return fs::path(folder) / "ruedo";
@@ -52,7 +53,7 @@ std::string find_ruedo() {
     }
     if (folder == folder.root_path()) break;
   }
-  throw LaunchError("the program `ruedo` was not found: not in RUEDO, not on the PATH, not built beside this program "
+  throw LaunchError("the program `ruedo` was not found: not in RUEDO, not in its installation, not on the PATH, not built beside this program "
                     "(`scripts/run` builds it)");
 }
 
@@ -102,7 +103,7 @@ std::string free_url(int& token) {
 }  // namespace
 
 ServerProcess::ServerProcess(const std::string& world, const LaunchOptions& options) {
-  const std::string program = find_ruedo();
+  const std::string program = find_ruedo(options.program);
   url_ = options.url.empty() ? free_url(token_) : options.url;
   std::vector<std::string> command{program, "run", world, "--lcm", url_, "--watch-stdin"};
   if (options.seed >= 0) command.insert(command.end(), {"--seed", std::to_string(options.seed)});

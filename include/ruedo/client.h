@@ -328,6 +328,11 @@ struct ConnectOptions {
 Simulation connect(const std::string& url = "", const ConnectOptions& options = {});
 
 struct LaunchOptions {
+#ifdef RUEDO_PROGRAM                  // find_package(ruedo) and ruedo.pc define it
+  std::string program = RUEDO_PROGRAM;
+#else
+  std::string program;                // the server, unless the environment's RUEDO names one; "": by the PATH, or above this program
+#endif
   int64_t seed = -1;                  // -1: the server's default
   double rate = 1.0;                  // sim time per real time; kFast: as fast as it goes
   std::vector<std::string> args;      // further options of `ruedo run`
@@ -337,7 +342,7 @@ struct LaunchOptions {
   bool verbose = false;               // show what the server prints; else it is shown in errors alone
 };
 
-// Starts `ruedo run WORLD` (found by RUEDO, the PATH, or above this program) and joins it. The server ends with the
+// Starts `ruedo run WORLD` and joins it. The server ends with the
 // Simulation, and with this process however that ends. Throws LaunchError with what the server said.
 Simulation launch(const std::string& world, const LaunchOptions& options = {});
 

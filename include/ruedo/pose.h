@@ -9,6 +9,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "ruedo/math.h"
+
 namespace ruedo {
 
 using Vec3 = Eigen::Vector3d;
@@ -46,7 +48,7 @@ struct Twist {
 
 // Heading of a pose in the plane: the angle of its x axis about the world's z, in (-pi, pi].
 inline double heading(const Quat& q) {
-  return std::atan2(2.0 * (q.w() * q.z() + q.x() * q.y()), 1.0 - 2.0 * (q.y() * q.y() + q.z() * q.z()));
+  return math::atan2(2.0 * (q.w() * q.z() + q.x() * q.y()), 1.0 - 2.0 * (q.y() * q.y() + q.z() * q.z()));
 }
 
 // Wraps an angle into (-pi, pi].

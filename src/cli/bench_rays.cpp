@@ -10,6 +10,7 @@
 #include "cli/bench_rows.h"
 #include "cli/bench_world.h"
 #include "model/load.h"
+#include "ruedo/math.h"
 #include "ruedo/random.h"
 
 namespace ruedo::cli {
@@ -52,10 +53,10 @@ std::vector<scene::Ray> scans(int robots) {
   for (int scan = 0; scan < std::max(kFewestScans, robots); ++scan) {
     const int room = scan % rooms;
     const double place = 2.0 * M_PI * random.uniform(), heading = 2.0 * M_PI * random.uniform();
-    const Vec3 at((room % side + 0.5) * kRoomSize_m + std::cos(place), (room / side + 0.5) * kRoomSize_m + std::sin(place), kHeight_m);
+    const Vec3 at((room % side + 0.5) * kRoomSize_m + math::cos(place), (room / side + 0.5) * kRoomSize_m + math::sin(place), kHeight_m);
     for (int i = 0; i < kRays; ++i) {
       const double angle = heading + (i - kRays / 2) * M_PI / 180.0;
-      rays.push_back({at, Vec3(std::cos(angle), std::sin(angle), 0.0), kMaxRange_m});
+      rays.push_back({at, Vec3(math::cos(angle), math::sin(angle), 0.0), kMaxRange_m});
     }
   }
   return rays;

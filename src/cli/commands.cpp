@@ -15,6 +15,7 @@
 #include "core/whole.h"
 #include "ruedo/errors.h"
 #include "ruedo/sim_time.h"
+#include "scene/gl_context.h"
 
 namespace ruedo::cli {
 namespace {
@@ -55,6 +56,7 @@ void add_world_arguments(CLI::App& command, WorldArguments& arguments) {
   command.add_option("--disable", arguments.disabled, "leave a device out: ROBOT/DEVICE")->type_name("DEVICE")->allow_extra_args(false);
   command.add_option("--xacro-arg", arguments.xacro_arguments, "an argument of a xacro file: NAME:=VALUE")->type_name("ARGUMENT")->allow_extra_args(false);
   command.add_flag("--no-noise", arguments.no_noise, "sensors give their ideal values");
+  command.add_flag("--fast-pixels", arguments.fast_pixels, "draw with all that this CPU has: faster, and other last bits on other CPUs");
   command.add_flag("--allow-absolute", arguments.allow_absolute, "absolute paths in the files may lead out of the folders that are searched");
 }
 
@@ -112,6 +114,7 @@ model::LoadOptions load_options(const WorldArguments& arguments) {
 }
 
 std::shared_ptr<const model::WorldModel> load(const WorldArguments& arguments) {
+  if (arguments.fast_pixels) scene::draw_as_fast_as_it_goes();
   return model::load_world(arguments.world, load_options(arguments));
 }
 
@@ -124,6 +127,7 @@ std::vector<std::string> result_options(const WorldArguments& arguments) {
   for (const std::string& text : arguments.settings) options.push_back("--set=" + text);
   for (const std::string& text : arguments.disabled) options.push_back("--disable=" + text);
   if (arguments.no_noise) options.push_back("--no-noise");
+  if (arguments.fast_pixels) options.push_back("--fast-pixels");
   return options;
 }
 

@@ -37,9 +37,9 @@ int run_experiments(const std::string& out);    // ruedo experiments
 struct WorldArguments {
   std::string world;
   std::vector<std::string> spawns, drives, settings, disabled, xacro_arguments;
-  bool no_noise = false, allow_absolute = false;
+  bool no_noise = false, allow_absolute = false, fast_pixels = false;
 };
-// WORLD, --spawn, --drive, --set, --disable, --xacro-arg, --no-noise, --allow-absolute.
+// WORLD, --spawn, --drive, --set, --disable, --xacro-arg, --no-noise, --allow-absolute, --fast-pixels.
 void add_world_arguments(CLI::App& command, WorldArguments& arguments);
 // Throws InputError; without a file in it for wrong usage.
 model::LoadOptions load_options(const WorldArguments& arguments);

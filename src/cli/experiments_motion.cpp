@@ -12,6 +12,7 @@
 #include "cli/experiments.h"
 #include "cli/svg_plot.h"
 #include "core/whole.h"
+#include "ruedo/math.h"
 #include "ruedo/move_command_t.hpp"
 
 namespace ruedo::cli {
@@ -97,7 +98,7 @@ struct Square {
  private:
   // A point of the plot each centimetre is enough.
   static void add(Points& path, double x, double y) {
-    if (path.empty() || std::hypot(x - path.back().first, y - path.back().second) > 0.01) path.push_back({x, y});
+    if (path.empty() || math::hypot(x - path.back().first, y - path.back().second) > 0.01) path.push_back({x, y});
   }
   int steps = 0;
 };
@@ -109,7 +110,7 @@ Square square_late(double packet_s) {
   square.packet_s = packet_s;
   for (int side = 0; side < 4 * kLaps; ++side) {
     const odometry_t from = rig.odometry();
-    brake_late(1.0, 0.6, 0.3, 0.6, rig.step_s(), [&] { return std::hypot(rig.odometry().x - from.x, rig.odometry().y - from.y); },
+    brake_late(1.0, 0.6, 0.3, 0.6, rig.step_s(), [&] { return math::hypot(rig.odometry().x - from.x, rig.odometry().y - from.y); },
                [&](double v) {
                  rig.velocity(v, 0);
                  rig.step();

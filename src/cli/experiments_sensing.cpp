@@ -12,6 +12,7 @@
 #include "cli/svg_plot.h"
 #include "model/load.h"
 #include "robot/robots.h"
+#include "ruedo/math.h"
 #include "ruedo/planar_lidar_t.hpp"
 #include "scene/ray_scene.h"
 #include "scene/render_scene.h"
@@ -41,9 +42,9 @@ const Obstacle kObstacles[] = {
 
 // Distance from (x, y) along (cos, sin) of `angle` to an obstacle's outline, +inf when it is missed.
 double distance_to(const Obstacle& o, double x, double y, double angle) {
-  const double c = std::cos(o.yaw), s = std::sin(o.yaw);
+  const double c = math::cos(o.yaw), s = math::sin(o.yaw);
   const double px = c * (x - o.x) + s * (y - o.y), py = -s * (x - o.x) + c * (y - o.y);    // in its own axes
-  const double dx = std::cos(angle - o.yaw), dy = std::sin(angle - o.yaw);
+  const double dx = math::cos(angle - o.yaw), dy = math::sin(angle - o.yaw);
   if (o.round) {
     const double along = -(px * dx + py * dy), off2 = px * px + py * py - along * along;
     if (off2 > o.a * o.a) return kInfinity;
@@ -135,7 +136,7 @@ struct LaserBench {
 
 // Where the LRF is and how far it should see, ray by ray.
 struct Expected {
-  double x = kRobotX + kLaserAhead * std::cos(kRobotYaw), y = kRobotY + kLaserAhead * std::sin(kRobotYaw);
+  double x = kRobotX + kLaserAhead * math::cos(kRobotYaw), y = kRobotY + kLaserAhead * math::sin(kRobotYaw);
   double range(double angle) const {
     double nearest = kInfinity;
     for (const Obstacle& o : kObstacles) nearest = std::min(nearest, distance_to(o, x, y, angle));
@@ -148,9 +149,9 @@ Points outline(const Obstacle& o) {
   const int corners = o.round ? 48 : 4;
   for (int i = 0; i < corners; ++i) {
     const double t = 2 * M_PI * (i + 0.5) / corners;
-    const double lx = o.round ? o.a * std::cos(t) : std::copysign(0.5 * o.a, std::cos(t));
-    const double ly = o.round ? o.a * std::sin(t) : std::copysign(0.5 * o.b, std::sin(t));
-    points.push_back({o.x + lx * std::cos(o.yaw) - ly * std::sin(o.yaw), o.y + lx * std::sin(o.yaw) + ly * std::cos(o.yaw)});
+    const double lx = o.round ? o.a * math::cos(t) : std::copysign(0.5 * o.a, math::cos(t));
+    const double ly = o.round ? o.a * math::sin(t) : std::copysign(0.5 * o.b, math::sin(t));
+    points.push_back({o.x + lx * math::cos(o.yaw) - ly * math::sin(o.yaw), o.y + lx * math::sin(o.yaw) + ly * math::cos(o.yaw)});
   }
   return points;
 }
@@ -189,7 +190,7 @@ void laser_experiment(Experiments& all) {
     const double angle = kRobotYaw - M_PI / 2 + M_PI * i / 180.0;
     const double range = expected.range(angle), seen = scan.ranges[static_cast<size_t>(i)];
     worst = std::max(worst, std::isinf(range) && std::isinf(seen) ? 0.0 : std::abs(range - seen));
-    const double x = expected.x + seen * std::cos(angle), y = expected.y + seen * std::sin(angle);
+    const double x = expected.x + seen * math::cos(angle), y = expected.y + seen * math::sin(angle);
     plot.line({{expected.x, expected.y}, {x, y}}, "#d62728", "", false, 0.7);
     lines.push_back({{expected.x, expected.y, 0.39}, {x, y, 0.39}, {1.0f, 0.1f, 0.1f, 0.35f}});
   }

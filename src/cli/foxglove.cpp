@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 #include <fmt/format.h>
 
@@ -15,6 +14,7 @@
 #include "ruedo/camera_info_t.hpp"
 #include "ruedo/decode.h"
 #include "ruedo/image_t.hpp"
+#include "ruedo/math.h"
 #include "ruedo/odometry_t.hpp"
 #include "ruedo/planar_lidar_t.hpp"
 #include "ruedo/pose_t.hpp"
@@ -302,7 +302,7 @@ bool FoxgloveExport::convert(const std::string& channel, uint64_t time_ns, std::
     odometry_t odometry;
     if (!read(odometry)) return false;
     const std::string robot = channel.substr(0, channel.find('/'));
-    const Pose X{Quat(std::cos(odometry.theta / 2), 0, 0, std::sin(odometry.theta / 2)), Vec3(odometry.x, odometry.y, 0)};
+    const Pose X{Quat(math::cos(odometry.theta / 2), 0, 0, math::sin(odometry.theta / 2)), Vec3(odometry.x, odometry.y, 0)};
     send(channel, foxglove::pose_in_frame(), time_ns, pose_json(X, robot + "/odom", time_ns));
     return true;
   }

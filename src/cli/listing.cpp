@@ -10,6 +10,7 @@
 
 #include "cli/commands.h"
 #include "core/utf8.h"
+#include "ruedo/math.h"
 
 namespace ruedo::cli {
 namespace {
@@ -144,7 +145,7 @@ void print_devices(FILE* out, const std::vector<world_info_t>& info) {
     for (const device_info_t& device : whole.devices) {
       if (device.robot != robot.name) continue;
       const double* q = device.orientation;
-      const double yaw = std::atan2(2.0 * (q[0] * q[3] + q[1] * q[2]), 1.0 - 2.0 * (q[2] * q[2] + q[3] * q[3]));
+      const double yaw = math::atan2(2.0 * (q[0] * q[3] + q[1] * q[2]), 1.0 - 2.0 * (q[2] * q[2] + q[3] * q[3]));
       fmt::print(out, "  {}{:<16}{} {:<10} at {:.3f}, {:.3f}, {:.3f} m, {:.1f} deg  {}\n", style.cyan, device.name, style.off, device.kind,
                  device.position[0], device.position[1], device.position[2], yaw * 180.0 / M_PI, what_text(device));
     }

@@ -3,6 +3,7 @@
 
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <new>
 
 #include <fmt/format.h>
@@ -10,10 +11,12 @@
 #include <spdlog/spdlog.h>
 
 #include "cli/commands.h"
+#include "core/installation.h"
 #include "core/utf8.h"
 #include "physics/state_check.h"
 #include "ruedo/element.h"
 #include "ruedo/errors.h"
+#include "scene/gl_context.h"
 #include "core/version.h"
 
 namespace {
@@ -64,10 +67,24 @@ void check_limits() {
   }
 }
 
+// A folder or file that comes with the program, for what is built on it: printed in place of running a command.
+void add_place(CLI::App& app, const std::string& option, const std::string& path, int above, const std::string& description) {
+  const auto show = [=] {
+    const std::string found = ruedo::find_installed(path);
+    if (found.empty()) throw ruedo::EnvironmentError("there is no " + path + " beside this program: it was not installed, or without that");
+    std::filesystem::path place = found;
+    for (int i = 0; i < above; ++i) place = place.parent_path();
+    throw CLI::CallForVersion(place.string(), 0);
+  };
+  app.add_flag_callback(option, show, description);
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"Ruedo: a simulation server for mobile robots. Robots are data servers; LCM carries commands in and sensor streams out.",
                "ruedo"};
   app.set_version_flag("--version", std::string("ruedo ") + ruedo::version());
+  add_place(app, "--prefix", "share/ruedo/worlds", 3, "print where Ruedo is installed, for CMAKE_PREFIX_PATH, and exit");
+  add_place(app, "--jar", "share/java/ruedo.jar", 0, "print where the Java client is, for the class path, and exit");
   app.require_subcommand(1);
   app.failure_message(CLI::FailureMessage::simple);
   app.footer("Exit codes: 0 good, 1 the check failed, 2 wrong usage, 3 bad input file, 4 environment, 5 a state that is not finite.");
@@ -88,6 +105,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  ruedo::scene::draw_the_same_everywhere();
   spdlog::set_default_logger(spdlog::stderr_color_mt("ruedo"));
   spdlog::set_pattern("%^ruedo: %l:%$ %v");
   try {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "ruedo/lidar_t.hpp"
+#include "ruedo/math.h"
 #include "ruedo/planar_lidar_t.hpp"
 #include "ruedo/sonar_t.hpp"
 #include "scene/ray_scene.h"
@@ -18,7 +19,7 @@ constexpr size_t kMaxRaysDrawn = 2000;    // of one device
 constexpr int kArcSegments = 8;
 
 Vec3 direction(double azimuth, double elevation) {
-  return {std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth), std::sin(elevation)};
+  return {math::cos(elevation) * math::cos(azimuth), math::cos(elevation) * math::sin(azimuth), math::sin(elevation)};
 }
 
 void add_ray(const Pose& X_WS, const Vec3& d_S, double range, double range_max, std::vector<scene::Line>& lines) {

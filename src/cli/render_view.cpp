@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "ruedo/errors.h"
+#include "ruedo/math.h"
 
 namespace ruedo::cli {
 namespace {
@@ -54,7 +55,7 @@ scene::View at_an_angle(Size size, const scene::Bounds& bounds, const Vec3& sunl
   double yaw = kIsoYaw, best = -2.0;
   for (int quarter = 0; quarter < 4; ++quarter) {
     const double candidate = kIsoYaw + quarter * M_PI / 2;
-    const double along = std::cos(candidate - std::atan2(sunlight.y(), sunlight.x()));
+    const double along = math::cos(candidate - math::atan2(sunlight.y(), sunlight.x()));
     if (along > best + 1e-9) {
       best = along;
       yaw = candidate;

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "ruedo/math.h"
+
 namespace ruedo::cli {
 namespace {
 
@@ -19,7 +21,7 @@ struct Axis {
   // A round distance of ticks: 1, 2 or 5 times a power of ten, some six of them.
   double tick() const {
     const double rough = (high - low) / 6;
-    const double power = std::pow(10.0, std::floor(std::log10(rough)));
+    const double power = math::pow(10.0, std::floor(math::log10(rough)));
     for (const double factor : {1.0, 2.0, 5.0}) {
       if (factor * power >= rough) return factor * power;
     }

@@ -49,7 +49,7 @@ int repeat(const VerifyArguments& arguments, const log_header_t& header) {
   if (result.difference) {
     fmt::print("{}: {}\nBefore it, {} were repeated byte for byte.\n", arguments.log, for_terminal(describe(*result.difference)), for_terminal(so_far));
     if (same_machine) return kCheckFailed;
-    fmt::print("What is not as in the log may be why: bytes hold for one build on one kind of CPU. Repeat it there.\n");
+    fmt::print("What is not as in the log may be why: bytes hold for one version with its libraries. Repeat it there.\n");
     return kEnvironment;
   }
   fmt::print("{}: repeated byte for byte: {}\n", arguments.log, for_terminal(so_far));

@@ -9,6 +9,7 @@
 #include "model/placement.h"
 #include "model/read_context.h"
 #include "core/sha256.h"
+#include "ruedo/math.h"
 
 namespace ruedo::engine {
 namespace {
@@ -143,7 +144,7 @@ Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, 
   Pose X_WM = pose_of(request.position, request.orientation);
   const Vec3 ahead = X_WM.rotation * Vec3::UnitX();
   if (request.on_ground) {
-    X_WM = model::standing_on(world, *loaded.model, request.position[0], request.position[1], std::atan2(ahead.y(), ahead.x()));
+    X_WM = model::standing_on(world, *loaded.model, request.position[0], request.position[1], math::atan2(ahead.y(), ahead.x()));
   }
   const auto now = [&](size_t instance, size_t link) { return link_now(simulation, instance, link); };
   if (const std::string other = model::overlapped(world, *loaded.model, X_WM, now); !other.empty()) {

@@ -12,6 +12,7 @@
 #include "judge/judge_hull.h"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
+#include "ruedo/math.h"
 
 namespace ruedo::judge {
 namespace {
@@ -21,7 +22,7 @@ constexpr SimTime kTrackPeriod = 250'000;    // us
 double seconds(SimTime time) { return static_cast<double>(time) * 1e-6; }
 
 // Of a quaternion w, x, y, z.
-double heading_of(const double* q) { return std::atan2(2.0 * (q[0] * q[3] + q[1] * q[2]), 1.0 - 2.0 * (q[2] * q[2] + q[3] * q[3])); }
+double heading_of(const double* q) { return math::atan2(2.0 * (q[0] * q[3] + q[1] * q[2]), 1.0 - 2.0 * (q[2] * q[2] + q[3] * q[3])); }
 
 }  // namespace
 
@@ -80,7 +81,7 @@ void Judge::see(const Snapshot& snapshot) {
   if (snapshot.time >= static_cast<SimTime>(track_.size()) * kTrackPeriod) track_.push_back({seconds(snapshot.time), position.x(), position.y()});
   for (size_t i = 0; i < expected_.goals.size(); ++i) {
     const Goal& goal = expected_.goals[i];
-    const double distance = std::hypot(position.x() - goal.x, position.y() - goal.y);
+    const double distance = math::hypot(position.x() - goal.x, position.y() - goal.y);
     if (i + 1 == expected_.goals.size()) last_goal_distance_m_ = std::min(last_goal_distance_m_, distance);
     if (reached_[i] || seconds(snapshot.time) > goal.by_s || distance > goal.radius) continue;
     reached_[i] = true;
@@ -133,8 +134,8 @@ void Judge::see(const std::string& channel, std::span<const uint8_t> message) {
 // Odometry starts at zero where the robot starts: the truth is looked at from its first pose.
 void Judge::compare_odometry() {
   const double dx = pose_->pos[0] - first_pose_->pos[0], dy = pose_->pos[1] - first_pose_->pos[1], turn = heading_of(first_pose_->orientation);
-  const double x = std::cos(turn) * dx + std::sin(turn) * dy, y = -std::sin(turn) * dx + std::cos(turn) * dy;
-  const double error = std::hypot(odometry_->x - x, odometry_->y - y);
+  const double x = math::cos(turn) * dx + math::sin(turn) * dy, y = -math::sin(turn) * dx + math::cos(turn) * dy;
+  const double error = math::hypot(odometry_->x - x, odometry_->y - y);
   odometry_error_m_ = std::max(odometry_error_m_, error);
   if (!expected_.odometry_error || error <= *expected_.odometry_error) return;
   fail("odometry", pose_->utime, fmt::format("{}'s odometry was {:.3f} m off, at most {:g} m are asked for", expected_.robot, error, *expected_.odometry_error));

@@ -1,8 +1,9 @@
 // The hull of a robot that stands alone, and rays out from it.
 #include "judge/judge_hull.h"
 
-#include <cmath>
 #include <numbers>
+
+#include "ruedo/math.h"
 
 namespace ruedo::judge {
 namespace {
@@ -19,7 +20,7 @@ scene::Hit inward(const scene::RayScene& scene, const Vec3& direction, double he
 
 Vec3 direction_of(int i) {
   const double angle = 2.0 * std::numbers::pi * i / kDirections;
-  return {std::cos(angle), std::sin(angle), 0.0};
+  return {math::cos(angle), math::sin(angle), 0.0};
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ namespace {
 
 // Libraries that compute what goes into messages: arithmetic, physics, rays, pictures, readers of files. Others are
 // loaded as the machine and the options have it, and change nothing.
-constexpr std::string_view kThatMatter[] = {"libc.so",      "libm.so",   "libstdc++", "libBullet", "libLinearMath",
+constexpr std::string_view kThatMatter[] = {"libstdc++", "libBullet", "libLinearMath",
                                             "libembree",    "libOSMesa", "libEGL",    "libLLVM",   "libgallium",
                                             "libopencv_im", "libjpeg",   "libassimp", "libtinyxml2", "liburdfdom"};
 
@@ -85,6 +85,7 @@ std::string cpu_features() {
   const auto add = [&](bool present, const char* name) {
     if (present) text += (text.empty() ? "" : " ") + std::string(name);
   };
+  text = "x86-64";
   __builtin_cpu_init();
   add(__builtin_cpu_supports("sse4.2"), "sse4.2");
   add(__builtin_cpu_supports("avx"), "avx");
@@ -92,6 +93,8 @@ std::string cpu_features() {
   add(__builtin_cpu_supports("avx2"), "avx2");
   add(__builtin_cpu_supports("avx512f"), "avx512f");
   return text;
+#elif defined(__aarch64__)
+  return "aarch64";
 #else
   return "unknown";
 #endif
@@ -175,8 +178,10 @@ std::vector<std::string> machine_differences(const log_header_t& log, const log_
     if (then != now) lines.push_back(std::string(what) + ": the log has " + then + ", here it is " + now);
   };
   compare("Ruedo", log.version, here.version);
-  compare("CPU features", log.cpu, here.cpu);
-  compare("C library", log.libc, here.libc);
+  const auto architecture = [](const std::string& cpu) { return cpu.substr(0, cpu.find(' ')); };
+  compare("processor", architecture(log.cpu), architecture(here.cpu));
+  // What is computed is the same on all of them, and with every C library; pictures are, unless they were to be fast.
+  if (std::find(log.options.begin(), log.options.end(), "--fast-pixels") != log.options.end()) compare("CPU features", log.cpu, here.cpu);
   std::vector<std::string> only_log, only_here;
   std::set_difference(log.libraries.begin(), log.libraries.end(), here.libraries.begin(), here.libraries.end(), std::back_inserter(only_log));
   std::set_difference(here.libraries.begin(), here.libraries.end(), log.libraries.begin(), log.libraries.end(), std::back_inserter(only_here));

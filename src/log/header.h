@@ -9,7 +9,7 @@
 
 namespace ruedo::log {
 
-// The vector extensions of this CPU that glibc or the renderer choose code by.
+// The processor's family, then the vector extensions of this CPU that libraries choose code by: "x86-64 sse4.2 avx".
 std::string cpu_features();
 // Ruedo's version, and the build of this program where the linker noted one: as a header has it.
 std::string own_version();

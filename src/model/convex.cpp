@@ -3,12 +3,14 @@
 
 #include <array>
 
+#include "ruedo/math.h"
+
 namespace ruedo::model {
 namespace {
 
 Vec3 support_in_shape(const Geometry& g, const Vec3& d) {
   const auto sign = [](double v) { return v < 0 ? -1.0 : 1.0; };
-  const double across = std::hypot(d.x(), d.y());
+  const double across = math::hypot(d.x(), d.y());
   const auto rim = [&](double radius) { return across > 0 ? Vec3(d.x() / across * radius, d.y() / across * radius, 0) : Vec3(Vec3::Zero()); };
   switch (g.shape) {
     case Shape::box: return Vec3(sign(d.x()), sign(d.y()), sign(d.z())).cwiseProduct(g.size) / 2;

@@ -11,6 +11,7 @@
 #include "model/plugins.h"
 #include "model/ros_control.h"
 #include "model/sdf_link.h"
+#include "ruedo/math.h"
 
 namespace ruedo::model {
 namespace {
@@ -83,7 +84,7 @@ Quat heading_of(const Vec3& left, const Vec3& right, DriveDescription& drive, co
     std::swap(drive.left_joints, drive.right_joints);
     ahead = -ahead;
   }
-  return Quat(Eigen::AngleAxisd(std::atan2(ahead.y(), ahead.x()), Vec3::UnitZ()));
+  return Quat(Eigen::AngleAxisd(math::atan2(ahead.y(), ahead.x()), Vec3::UnitZ()));
 }
 
 // Front first, whatever the order in the file.
@@ -206,7 +207,7 @@ void place_base(const Element& e, const Model& model, DriveDescription& drive) {
     const Vec3 left = middle(model, lefts), right = middle(model, rights);
     heading = heading_of(left, right, drive, e);
     at = (left + right) / 2 - Vec3(0, 0, drive.wheel_radius);
-    track = std::hypot((left - right).x(), (left - right).y());
+    track = math::hypot((left - right).x(), (left - right).y());
   }
   const Allowed positive = Allowed::positive(quantity::kLength);
   if (steers) {

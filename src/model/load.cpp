@@ -13,6 +13,7 @@
 #include "model/urdf.h"
 #include "model/world_name.h"
 #include "model/xacro.h"
+#include "ruedo/math.h"
 
 namespace fs = std::filesystem;
 
@@ -183,7 +184,7 @@ class Loader {
       for (int i = 0; i < kAround; ++i) {
         const double angle = 2 * M_PI * i / kAround;
         const auto rounded = [](double value) { return std::round(value * 100) / 100; };
-        const double x = rounded(spawn.x + ring * kApart_m * std::cos(angle)), y = rounded(spawn.y + ring * kApart_m * std::sin(angle));
+        const double x = rounded(spawn.x + ring * kApart_m * math::cos(angle)), y = rounded(spawn.y + ring * kApart_m * math::sin(angle));
         if (room.overlapped(model, room.standing_on(model, x, y, spawn.yaw)).empty()) return "; the nearest free place is " + shown(x) + "," + shown(y);
       }
     }

@@ -13,6 +13,7 @@
 #include "model/occupancy.h"
 #include "model/picture.h"
 #include "model/read_context.h"
+#include "ruedo/math.h"
 
 namespace fs = std::filesystem;
 
@@ -213,7 +214,7 @@ std::vector<WallPiece> read_armap(const std::string& path, double thickness, std
       } else {
         const double dx = v[2] - v[0], dy = v[3] - v[1];
         // As thick at its ends as at its sides: corners close.
-        lines.push_back({(v[0] + v[2]) / 2, (v[1] + v[3]) / 2, std::atan2(dy, dx), std::hypot(dx, dy) + thickness, thickness});
+        lines.push_back({(v[0] + v[2]) / 2, (v[1] + v[3]) / 2, math::atan2(dy, dx), math::hypot(dx, dy) + thickness, thickness});
       }
     }
   }

@@ -9,6 +9,7 @@
 #include "model/convex.h"
 #include "model/geometry.h"
 #include "model/read_context.h"
+#include "ruedo/math.h"
 
 namespace ruedo::model {
 namespace {
@@ -146,7 +147,7 @@ std::vector<WallPiece> walls_of(const OccupancyGrid& grid) {
   const auto open = [&](int column, int row) {
     return grid.at(column, row) == Cell::occupied && !done[static_cast<size_t>(row) * static_cast<size_t>(grid.width) + static_cast<size_t>(column)];
   };
-  const double cosine = std::cos(grid.yaw), sine = std::sin(grid.yaw);
+  const double cosine = math::cos(grid.yaw), sine = math::sin(grid.yaw);
   for (int row = 0; row < grid.height; ++row) {
     for (int column = 0; column < grid.width; ++column) {
       if (!open(column, row)) continue;

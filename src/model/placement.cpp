@@ -13,6 +13,7 @@
 #include "model/convex.h"
 #include "model/geometry.h"
 #include "model/read_context.h"
+#include "ruedo/math.h"
 
 namespace ruedo::model {
 namespace {
@@ -307,7 +308,7 @@ std::optional<Pose> Room::on_slope(const Model& model, const Pose& X_WM, double 
   }
   const Vec3 c = A.colPivHouseholderQr().solve(heights);
   const Eigen::Matrix<double, kSamples * kSamples, 1> bumps = heights - A * c;
-  const double slope = std::hypot(c[1], c[2]);
+  const double slope = math::hypot(c[1], c[2]);
   if (slope < 1e-6 || slope > kSteepest || bumps.cwiseAbs().maxCoeff() > kBump_m) return std::nullopt;
   const Vec3 up = Vec3(-c[1], -c[2], 1).normalized(), level_ahead = X_WM.rotation * Vec3::UnitX();
   const Vec3 ahead = (level_ahead + Vec3(0, 0, c[1] * level_ahead.x() + c[2] * level_ahead.y())).normalized();    // of the same heading
@@ -370,7 +371,7 @@ double footprint_radius(const Model& model) {
     for (const Collision& c : link.collisions) {
       const Box box = placed(bounds(c.geometry), X_BaseM * link.X_ML * c.X_LC);
       if (box.isEmpty()) continue;
-      radius = std::max(radius, std::hypot(std::max(std::abs(box.min().x()), std::abs(box.max().x())),
+      radius = std::max(radius, math::hypot(std::max(std::abs(box.min().x()), std::abs(box.max().x())),
                                            std::max(std::abs(box.min().y()), std::abs(box.max().y()))));
     }
   }

@@ -11,6 +11,7 @@
 #include <set>
 
 #include "model/yaml.h"
+#include "ruedo/math.h"
 
 namespace fs = std::filesystem;
 
@@ -153,7 +154,7 @@ struct Translation {
       return sum;
     };
     const Vec3 across = middle("ruedo:left_joint") - middle("ruedo:right_joint");
-    return std::hypot(across.x(), across.y());
+    return math::hypot(across.x(), across.y());
   }
 
   void limits() {

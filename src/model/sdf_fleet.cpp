@@ -8,6 +8,7 @@
 #include "core/whole.h"
 #include "model/placement.h"
 #include "model/sdf_reader.h"
+#include "ruedo/math.h"
 #include "ruedo/random.h"
 
 namespace ruedo::model {
@@ -66,9 +67,9 @@ struct Fleet {
   // Neighbours are `spacing` apart, as the crow flies; they look outwards.
   Place on_ring(int64_t i) const {
     const double turn = 2 * std::numbers::pi / static_cast<double>(count);
-    const double smallest = count > 1 ? spacing / (2 * std::sin(turn / 2)) : 0;
+    const double smallest = count > 1 ? spacing / (2 * math::sin(turn / 2)) : 0;
     const double radius = element.number("ruedo:radius", smallest, Allowed::not_negative(quantity::kLength)), angle = turn * static_cast<double>(i);
-    return {center.x() + radius * std::cos(angle), center.y() + radius * std::sin(angle), heading + angle};
+    return {center.x() + radius * math::cos(angle), center.y() + radius * math::sin(angle), heading + angle};
   }
 };
 

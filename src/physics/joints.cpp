@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ruedo/math.h"
+
 namespace ruedo::physics {
 
 namespace {
@@ -230,7 +232,7 @@ void JointConstraint::after_substep(double substep_s) {
       const Quat R_PC = from_bt(parent_.getWorldTransform().getRotation()).conjugate() * from_bt(child_.getWorldTransform().getRotation());
       const Vec3 first = X_PJ_.rotation * limits_.axis_in_J;
       const Vec3 then = X_PJ_.rotation * (X_CJ_.rotation.conjugate() * axis2_in_C_), now = R_PC * axis2_in_C_;
-      position_ += wrap_angle(std::atan2(first.dot(then.cross(now)), then.dot(now)) - position_);
+      position_ += wrap_angle(math::atan2(first.dot(then.cross(now)), then.dot(now)) - position_);
       break;
     }
     default: break;

@@ -10,6 +10,7 @@
 #include <LinearMath/btConvexHullComputer.h>
 
 #include "physics/convex_shapes.h"
+#include "ruedo/math.h"
 
 namespace ruedo::physics {
 
@@ -89,7 +90,7 @@ std::unique_ptr<btConvexHullShape> hull_of(const std::vector<btVector3>& points,
     for (size_t i = 0; i < kMaxHullVertices; ++i) {    // a Fibonacci sphere
       const double z = 1.0 - (2.0 * static_cast<double>(i) + 1.0) / kMaxHullVertices;
       const double angle = 2.399963229728653 * static_cast<double>(i), r = std::sqrt(1.0 - z * z);
-      const btVector3 direction(r * std::cos(angle), r * std::sin(angle), z);
+      const btVector3 direction(r * math::cos(angle), r * math::sin(angle), z);
       int best = 0;
       for (int v = 1; v < corners; ++v) {
         if (direction.dot(computer.vertices[v]) > direction.dot(computer.vertices[best])) best = v;

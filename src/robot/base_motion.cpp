@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "ruedo/math.h"
+
 namespace ruedo::robot {
 
 namespace {
@@ -38,7 +40,7 @@ Displacement over_piece(const Profile::Segment& v, const Profile::Segment& u, co
   const int panels = 1 + static_cast<int>(std::min(largest_angle / kLargestPanel_rad, 1e6));
   for (int panel = 0; panel < panels; ++panel) {
     quadrature(duration * panel / panels, duration * (panel + 1) / panels, [&](double s, double weight) {
-      const double heading = (w0 + 0.5 * w.acceleration * s) * s, cosine = std::cos(heading), sine = std::sin(heading);
+      const double heading = (w0 + 0.5 * w.acceleration * s) * s, cosine = math::cos(heading), sine = math::sin(heading);
       const double ahead = v0 + v.acceleration * s, left = u0 + u.acceleration * s;
       result.x += weight * (ahead * cosine - left * sine);
       result.y += weight * (ahead * sine + left * cosine);
@@ -50,8 +52,8 @@ Displacement over_piece(const Profile::Segment& v, const Profile::Segment& u, co
 }  // namespace
 
 Displacement along_twist(double way, double side, double angle) {
-  const double half = 0.5 * angle, part = angle == 0.0 ? 1.0 : std::sin(half) / half;
-  const double c = part * std::cos(half), s = part * std::sin(half);
+  const double half = 0.5 * angle, part = angle == 0.0 ? 1.0 : math::sin(half) / half;
+  const double c = part * math::cos(half), s = part * math::sin(half);
   return {way * c - side * s, way * s + side * c, angle, way, side};
 }
 
@@ -79,19 +81,19 @@ Displacement integrate_steered(const Profile& v, const SteeringPlan& steering, d
     const auto speed = [&](double time) { return segment.velocity + segment.acceleration * (time - segment.time); };
     if (t >= steering.end) {
       const double way = 0.5 * (speed(t) + speed(next)) * (next - t);
-      sum = chained(sum, along_arc(way, way * std::tan(steering.to) / wheelbase));
+      sum = chained(sum, along_arc(way, way * math::tan(steering.to) / wheelbase));
     } else {
       next = std::min({next, steering.end, t + kLongestSteering_s});
       const auto heading = [&](double to) {
         double angle = 0.0;
-        quadrature(t, to, [&](double s, double weight) { angle += weight * speed(s) * std::tan(steering.angle(s)) / wheelbase; });
+        quadrature(t, to, [&](double s, double weight) { angle += weight * speed(s) * math::tan(steering.angle(s)) / wheelbase; });
         return angle;
       };
       Displacement piece;
       quadrature(t, next, [&](double s, double weight) {
         const double at = heading(s);
-        piece.x += weight * speed(s) * std::cos(at);
-        piece.y += weight * speed(s) * std::sin(at);
+        piece.x += weight * speed(s) * math::cos(at);
+        piece.y += weight * speed(s) * math::sin(at);
       });
       piece.way = 0.5 * (speed(t) + speed(next)) * (next - t);
       piece.angle = heading(next);

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "ruedo/math.h"
+
 namespace ruedo::robot {
 
 std::vector<LevelPlane> level_planes(const model::WorldModel& world, const model::BodyLayout& layout) {
@@ -34,7 +36,7 @@ std::optional<LevelPlane> nearest_plane(const std::vector<LevelPlane>& planes, d
 double lowest_point(const model::Geometry& geometry, const Pose& X_FC) {
   const Vec3 down = X_FC.rotation.conjugate() * -Vec3::UnitZ();    // in C
   const Vec3& size = geometry.size;
-  const double across = std::hypot(down.x(), down.y());
+  const double across = math::hypot(down.x(), down.y());
   double reach = 0.0;
   switch (geometry.shape) {
     case model::Shape::box:

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "robot/ground.h"
+#include "ruedo/math.h"
 
 namespace ruedo::robot {
 
@@ -31,7 +32,7 @@ bool have_shapes(const model::WorldModel& world, const model::BodyLayout& layout
   });
 }
 
-Quat about_z(double angle) { return {std::cos(0.5 * angle), 0.0, 0.0, std::sin(0.5 * angle)}; }
+Quat about_z(double angle) { return {math::cos(0.5 * angle), 0.0, 0.0, math::sin(0.5 * angle)}; }
 
 }  // namespace
 
@@ -56,7 +57,7 @@ KinematicDrive::KinematicDrive(const model::WorldModel& world, const model::Body
 void KinematicDrive::stand_on_near_plane() {
   const auto plane = nearest_plane(planes_, X_WBase_.translation.z() + lowest_);
   const Vec3 up = X_WBase_.rotation * Vec3::UnitZ();
-  if (plane && std::abs(plane_gap(plane->height)) < kNearAtStart_m && up.z() > std::cos(kLevel_rad)) stand_on_plane(*plane);
+  if (plane && std::abs(plane_gap(plane->height)) < kNearAtStart_m && up.z() > math::cos(kLevel_rad)) stand_on_plane(*plane);
 }
 
 void KinematicDrive::stand_on_plane(const LevelPlane& plane) {
@@ -139,7 +140,7 @@ void KinematicDrive::choose_support() {
     bump |= contact.body_b >= 0 || contact.normal.z() < 1.0 - 1e-9 || !plane ||
             std::abs(contact.position.z() - plane->height) > kNear_m;
   }
-  if (plane && supported_ && !bump && up.z() > std::cos(kLevel_rad) && std::abs(plane_gap(plane->height)) < kNear_m &&
+  if (plane && supported_ && !bump && up.z() > math::cos(kLevel_rad) && std::abs(plane_gap(plane->height)) < kNear_m &&
       std::abs(twist_.linear.z()) < kCalm_m_s) {
     return stand_on_plane(*plane);
   }
@@ -224,7 +225,7 @@ bool KinematicDrive::servo(Twist& twist, double force, const Vec3& gravity) {
   }
   bool reached = true;
   const double fall_x = gravity.x() * step_s_, fall_y = gravity.y() * step_s_;
-  const double change = std::hypot(dx - fall_x, dy - fall_y), allowed = force * step_s_ / mass_;
+  const double change = math::hypot(dx - fall_x, dy - fall_y), allowed = force * step_s_ / mass_;
   if (change > allowed) {
     dx = fall_x + (dx - fall_x) * allowed / change;
     dy = fall_y + (dy - fall_y) * allowed / change;
@@ -335,7 +336,7 @@ void KinematicDrive::after_on_plane(SimTime now) {
   Twist twist = base_twist(X_WBase);
   twist.linear.z() = twist.angular.x() = twist.angular.y() = 0.0;
   set_state(X_WBase, twist);
-  finish(now, moved.x() * std::cos(middle) + moved.y() * std::sin(middle), angle, true);
+  finish(now, moved.x() * math::cos(middle) + moved.y() * math::sin(middle), angle, true);
   fall_asleep_when_still(false);
 }
 
@@ -346,7 +347,7 @@ void KinematicDrive::after_on_contacts(SimTime now) {
   for (const Contact& contact : physics_.contacts(body_)) touched_ |= !is_support(contact, up);
   Pose X_WBase = base_pose().normalized();
   const Quat turn = X_WBase_.rotation.conjugate() * X_WBase.rotation;
-  const double bullet_angle = 2.0 * std::atan2(turn.z(), turn.w());
+  const double bullet_angle = 2.0 * math::atan2(turn.z(), turn.w());
   const Vec3 moved = X_WBase_.rotation.conjugate() * (X_WBase.translation - X_WBase_.translation);
   if (!supported_ || touched_ || behind_) {
     set_state(X_WBase, base_twist(X_WBase));

@@ -8,6 +8,8 @@
 #include <ruedo/motion_status_t.hpp>
 #include <ruedo/move_command_t.hpp>
 
+#include "ruedo/math.h"
+
 namespace ruedo::robot {
 
 namespace {
@@ -147,7 +149,7 @@ void Motion::keep_wheel_rates(double& v, double& side, double& omega) const {
 // Standing still it can only turn its wheels.
 void Motion::steer_for(double v, double omega) {
   const double most = drive_.max_steering_angle;
-  if (v != 0.0) target_steering_ = std::clamp(std::atan(drive_.wheelbase * omega / v), -most, most);
+  if (v != 0.0) target_steering_ = std::clamp(math::atan(drive_.wheelbase * omega / v), -most, most);
   else if (omega != 0.0) target_steering_ = std::copysign(most, omega * drive_.wheelbase);
 }
 
@@ -207,7 +209,7 @@ void Motion::command(const MoveCommand& command, SimTime now, double heading) {
       next.target = std::abs(command.value) * command.radius;
       next.unit = command.value < 0.0 ? -1.0 / command.radius : 1.0 / command.radius;
       next.curvature = next.unit;
-      if (is_steered() && std::abs(drive_.wheelbase) > std::tan(drive_.max_steering_angle) * command.radius) return refused(Status::REASON_NOT_POSSIBLE);
+      if (is_steered() && std::abs(drive_.wheelbase) > math::tan(drive_.max_steering_angle) * command.radius) return refused(Status::REASON_NOT_POSSIBLE);
       next.limits = stricter(way_limits_, command, kUsualSpeed_m_s);
       next.limits.speed = std::min(next.limits.speed, angle_limits_.speed * command.radius);
       next.limits.acceleration = std::min(next.limits.acceleration, angle_limits_.acceleration * command.radius);
@@ -263,7 +265,7 @@ void Motion::move_on(SimTime to) {
     steady_ = steady_ && t >= plan_side_.end();
   } else if (is_steered()) {
     steering_ = plan_steering_.angle(t);
-    omega_ = v_ * std::tan(steering_) / drive_.wheelbase;
+    omega_ = v_ * math::tan(steering_) / drive_.wheelbase;
     steady_ = t >= plan_v_.end() && t >= plan_steering_.end;
   }
   const bool stopping = log_.current().kind == Move::STOP && log_.current().state == Status::STATE_RUNNING;
@@ -277,7 +279,7 @@ void Motion::plan_primitive(SimTime now) {
   p.begins = p.begins_at = 0.0;
   Profile v, omega;
   if (is_steered()) {
-    target_steering_ = p.axis == Axis::arc ? std::atan(drive_.wheelbase * p.curvature) : 0.0;
+    target_steering_ = p.axis == Axis::arc ? math::atan(drive_.wheelbase * p.curvature) : 0.0;
     if (p.axis == Axis::way || steering_ == target_steering_) {
       v = Profile::to_distance(v_, rest, p.limits);
     } else {    // an arc begins at rest, when its wheels are steered

@@ -13,6 +13,7 @@
 #include "robot/robots.h"
 #include "robot/base_motion.h"
 #include "robot/wheel_kinematics.h"
+#include "ruedo/math.h"
 
 namespace ruedo::robot {
 
@@ -47,7 +48,7 @@ class Motion {
   double v() const { return v_; }            // m/s and rad/s at the end of the last step, as planned
   double omega() const { return omega_; }
   double side() const { return side_; }      // m/s to the left
-  double curvature() const { return is_steered() ? std::tan(steering_) / drive_.wheelbase : 0.0; }    // 1/m
+  double curvature() const { return is_steered() ? math::tan(steering_) / drive_.wheelbase : 0.0; }    // 1/m
   bool has_primitive() const { return primitive_.axis != Axis::none; }
   bool by_wheels() const { return by_wheels_; }    // the last command was one of wheel rates
   bool resting() const { return resting_; }  // stands still, and nothing happens until a command comes

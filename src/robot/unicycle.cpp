@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/whole.h"
+#include "ruedo/math.h"
 
 namespace ruedo::robot {
 
@@ -32,8 +33,8 @@ Displacement over_piece(double v0, double a, double w0, double b, double duratio
   const double half = 0.5 * duration / panels;
   const auto add = [&](double t, double weight) {
     const double heading = (w0 + 0.5 * b * t) * t, speed = (v0 + a * t) * weight;
-    result.x += speed * std::cos(heading);
-    result.y += speed * std::sin(heading);
+    result.x += speed * math::cos(heading);
+    result.y += speed * math::sin(heading);
   };
   for (int panel = 0; panel < panels; ++panel) {
     const double middle = (2 * panel + 1) * half;
@@ -55,15 +56,15 @@ Displacement along_arc(double way, double angle) {
     result.x = way;
     return result;
   }
-  const double half = 0.5 * angle, sine = std::sin(half);
+  const double half = 0.5 * angle, sine = math::sin(half);
   const double chord = way * (sine / half);    // sin(h) / h is well conditioned down to the smallest angles
-  result.x = chord * std::cos(half);
+  result.x = chord * math::cos(half);
   result.y = chord * sine;
   return result;
 }
 
 Displacement chained(const Displacement& first, const Displacement& second) {
-  const double c = std::cos(first.angle), s = std::sin(first.angle);
+  const double c = math::cos(first.angle), s = math::sin(first.angle);
   return {first.x + c * second.x - s * second.y, first.y + s * second.x + c * second.y, first.angle + second.angle,
           first.way + second.way, first.side + second.side};
 }

@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "ruedo/math.h"
+
 namespace ruedo::robot {
 
 WheelAngles::WheelAngles(const model::BodyLayout& layout, int robot, const model::DriveDescription& drive) : radius_(drive.wheel_radius) {
@@ -21,7 +23,7 @@ void WheelAngles::advance(const Displacement& way) {
   side_ += way.side;
   angle_ += way.angle;
   for (Wheel& wheel : wheels_) {
-    if (wheel.steered) wheel.rolled += std::copysign(std::hypot(way.way - way.angle * wheel.y, way.angle * wheel.x), way.way);
+    if (wheel.steered) wheel.rolled += std::copysign(math::hypot(way.way - way.angle * wheel.y, way.angle * wheel.x), way.way);
   }
 }
 
@@ -30,10 +32,10 @@ void WheelAngles::read(Snapshot& snapshot, const Vec3& twist, double curvature) 
   for (const Wheel& wheel : wheels_) {
     double angle = 0.0, rate = 0.0;
     if (wheel.steers) {    // across the line to the middle of the circle
-      angle = std::atan2(curvature * wheel.x, 1.0 - curvature * wheel.y);
+      angle = math::atan2(curvature * wheel.x, 1.0 - curvature * wheel.y);
     } else if (radius_ > 0.0 && wheel.steered) {
       angle = wheel.rolled / radius_;
-      rate = std::copysign(std::hypot(twist.x() - twist.z() * wheel.y, twist.z() * wheel.x), twist.x()) / radius_;
+      rate = std::copysign(math::hypot(twist.x() - twist.z() * wheel.y, twist.z() * wheel.x), twist.x()) / radius_;
     } else if (radius_ > 0.0) {
       angle = wheel.rim.dot(sums) / radius_;
       rate = wheel.rim.dot(twist) / radius_;

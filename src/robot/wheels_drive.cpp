@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ruedo/math.h"
+
 namespace ruedo::robot {
 
 namespace {
@@ -130,7 +132,7 @@ void WheelsDrive::after_step(SimTime now) {
   }
   const Pose X_WBase = base_pose().normalized();
   const Quat turn = X_WBase_.rotation.conjugate() * X_WBase.rotation;
-  const double turned = wrap_angle(2.0 * std::atan2(turn.z(), turn.w()));
+  const double turned = wrap_angle(2.0 * math::atan2(turn.z(), turn.w()));
   set_state(X_WBase, base_twist(X_WBase));
   read_wheel_rates();
 

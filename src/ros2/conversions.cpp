@@ -15,6 +15,7 @@
 #include "ruedo/imu_t.hpp"
 #include "ruedo/joint_state_t.hpp"
 #include "ruedo/lidar_t.hpp"
+#include "ruedo/math.h"
 #include "ruedo/odometry_t.hpp"
 #include "ruedo/planar_lidar_t.hpp"
 #include "ruedo/pose.h"
@@ -88,9 +89,9 @@ void write_points(const lidar_t& lidar, const Source& from, CdrWriter& out) {
       const double range = lidar.ranges[i], azimuth = lidar.azimuth0 + column * static_cast<double>(lidar.azimuth_step);
       const bool hit = std::isfinite(range);
       dense &= hit;
-      values.push_back(hit ? static_cast<float>(range * std::cos(elevation) * std::cos(azimuth)) : kNone);
-      values.push_back(hit ? static_cast<float>(range * std::cos(elevation) * std::sin(azimuth)) : kNone);
-      values.push_back(hit ? static_cast<float>(range * std::sin(elevation)) : kNone);
+      values.push_back(hit ? static_cast<float>(range * math::cos(elevation) * math::cos(azimuth)) : kNone);
+      values.push_back(hit ? static_cast<float>(range * math::cos(elevation) * math::sin(azimuth)) : kNone);
+      values.push_back(hit ? static_cast<float>(range * math::sin(elevation)) : kNone);
       values.push_back(i < lidar.intensities.size() ? lidar.intensities[i] : 0.0f);
     }
   }
@@ -129,7 +130,7 @@ void write_sonar_points(const sonar_t& sonar, const Source& from, CdrWriter& out
   out.put_length(0);    // channels
 }
 
-void put_yaw(CdrWriter& out, double yaw) { out.put(0.0).put(0.0).put(std::sin(yaw / 2)).put(std::cos(yaw / 2)); }
+void put_yaw(CdrWriter& out, double yaw) { out.put(0.0).put(0.0).put(math::sin(yaw / 2)).put(math::cos(yaw / 2)); }
 
 void write_odometry(const odometry_t& odometry, const Source& from, CdrWriter& out) {
   put_header(out, odometry.utime, from.odom);
@@ -144,7 +145,7 @@ void write_odometry(const odometry_t& odometry, const Source& from, CdrWriter& o
 
 void write_odometry_frame(const odometry_t& odometry, const Source& from, CdrWriter& out) {
   const double position[3] = {odometry.x, odometry.y, 0.0};
-  const double wxyz[4] = {std::cos(odometry.theta / 2), 0.0, 0.0, std::sin(odometry.theta / 2)};
+  const double wxyz[4] = {math::cos(odometry.theta / 2), 0.0, 0.0, math::sin(odometry.theta / 2)};
   out.put_length(1);
   put_transform(out, odometry.utime, from.odom, from.base, position, wxyz);
 }

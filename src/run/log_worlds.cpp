@@ -3,7 +3,6 @@
 #include "run/log_worlds.h"
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 
 #include "core/utf8.h"
@@ -11,6 +10,7 @@
 #include "model/placement.h"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
+#include "ruedo/math.h"
 #include "ruedo/name_request_t.hpp"
 #include "ruedo/request_t.hpp"
 #include "ruedo/reset_request_t.hpp"
@@ -36,7 +36,7 @@ void spawn(const spawn_request_t& request, const model::LoadedModel& loaded, Wor
   const double* q = request.orientation;
   Pose X_WM{Quat(q[0], q[1], q[2], q[3]).normalized(), Vec3(request.position[0], request.position[1], request.position[2])};
   const Vec3 ahead = X_WM.rotation * Vec3::UnitX();
-  if (request.on_ground) X_WM = model::standing_on(world, *loaded.model, request.position[0], request.position[1], std::atan2(ahead.y(), ahead.x()));
+  if (request.on_ground) X_WM = model::standing_on(world, *loaded.model, request.position[0], request.position[1], math::atan2(ahead.y(), ahead.x()));
   const std::string name = request.name.empty() ? engine::unused_name(world, loaded.name) : request.name;
   const auto free = std::find_if(world.models.begin(), world.models.end(), [&](const ModelInstance& instance) {
     return instance.removed && instance.model == loaded.model;

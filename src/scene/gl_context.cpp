@@ -5,6 +5,24 @@
 #include "ruedo/errors.h"
 
 namespace ruedo::scene {
+namespace {
+
+constexpr const char* kMesasCpu = "GALLIUM_OVERRIDE_CPU_CAPS";
+bool set_by_us = false;
+
+}  // namespace
+
+void draw_the_same_everywhere() {
+#ifdef __x86_64__
+  if (std::getenv(kMesasCpu) != nullptr || !__builtin_cpu_supports("sse4.1")) return;
+  set_by_us = ::setenv(kMesasCpu, "sse4.1", 0) == 0;
+#endif
+}
+
+void draw_as_fast_as_it_goes() {
+  if (set_by_us) ::unsetenv(kMesasCpu);
+  set_by_us = false;
+}
 
 std::unique_ptr<GlContext> make_gl_context() {
   const char* wanted = std::getenv("RUEDO_RENDERER");

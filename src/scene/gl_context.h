@@ -22,6 +22,13 @@ class GlContext {
 // Throws EnvironmentError with the cure when there is no backend, or RUEDO_RENDERER names an unknown one.
 std::unique_ptr<GlContext> make_gl_context();
 
+// Mesa draws with the widest vectors that a CPU has, and other widths give other last bits. After the first of these it takes
+// every x86-64 CPU for one with SSE 4.1, and draws the same everywhere for a sixth more time; the second undoes it. Mesa reads
+// the environment before its first picture, once: call them while there is one thread. Without effect on other processors, on CPUs
+// without SSE 4.1, and where the environment says something of its own (GALLIUM_OVERRIDE_CPU_CAPS).
+void draw_the_same_everywhere();
+void draw_as_fast_as_it_goes();
+
 // The backends; null when it was not built in or does not work here, with the reason in `why`.
 std::unique_ptr<GlContext> make_osmesa_context(std::string& why);
 std::unique_ptr<GlContext> make_egl_context(std::string& why);

@@ -1,5 +1,7 @@
 #include "scene/ray_table.h"
 
+#include "ruedo/math.h"
+
 namespace ruedo::scene {
 
 using model::Shape;
@@ -210,7 +212,7 @@ Vec3 shape_normal(const RayShape& shape, int feature, const Vec3& p) {
     case Shape::capsule: return feature == kSide ? Vec3(p.x(), p.y(), 0.0).normalized() : (p - s.y() * end(feature)).normalized();
     case Shape::cone: {
       if (feature != kSide) return end(feature);
-      const double around = std::hypot(p.x(), p.y());
+      const double around = math::hypot(p.x(), p.y());
       if (around == 0.0) return Vec3::UnitZ();    // the apex
       return Vec3(p.x() / around * 2.0 * s.y(), p.y() / around * 2.0 * s.y(), s.x()).normalized();
     }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ruedo/math.h"
+
 namespace ruedo::scene {
 namespace {
 
@@ -86,7 +88,7 @@ void RenderLights::fill(const Culler& culler, const View& view, FrameBlock& fram
     frame.lamp_colour[i] = light_colour(light);
     frame.lamp_attenuation[i] = vec4({light.constant, light.linear, light.quadratic}, light.falloff);
     frame.lamp_axis[i] = vec4((M.leftCols<3>() * light.direction).normalized(), 0.0);
-    frame.lamp_cone[i] = vec4({std::cos(0.5 * light.outer_angle), std::cos(0.5 * light.inner_angle), 0.0}, 0.0);
+    frame.lamp_cone[i] = vec4({math::cos(0.5 * light.outer_angle), math::cos(0.5 * light.inner_angle), 0.0}, 0.0);
   }
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ruedo/math.h"
+
 namespace ruedo::scene {
 namespace {
 
@@ -50,7 +52,7 @@ void revolve(RenderMesh& mesh, const std::vector<Ring>& rings, int segments) {
   for (const Ring& ring : rings) {
     for (int i = 0; i <= segments; ++i) {
       const double angle = 2.0 * M_PI * (i % segments) / segments;
-      const auto c = static_cast<float>(std::cos(angle)), s = static_cast<float>(std::sin(angle));
+      const auto c = static_cast<float>(math::cos(angle)), s = static_cast<float>(math::sin(angle));
       mesh.vertices.push_back({{ring.radius * c, ring.radius * s, ring.z},
                                {ring.normal_radial * c, ring.normal_radial * s, ring.normal_z},
                                {static_cast<float>(i) / static_cast<float>(segments), ring.v}});
@@ -71,7 +73,7 @@ void disc(RenderMesh& mesh, float z, float radius, bool up, int segments) {
   const Vector3f normal(0.0f, 0.0f, up ? 1.0f : -1.0f);
   for (int i = 0; i < segments; ++i) {
     const double angle = 2.0 * M_PI * i / segments;
-    const auto c = static_cast<float>(std::cos(angle)), s = static_cast<float>(std::sin(angle));
+    const auto c = static_cast<float>(math::cos(angle)), s = static_cast<float>(math::sin(angle));
     mesh.vertices.push_back({{radius * c, radius * s, z}, normal, {0.5f + 0.5f * c, 0.5f + (up ? 0.5f : -0.5f) * s}});
   }
   for (uint32_t i = 1; i + 1 < static_cast<uint32_t>(segments); ++i) {
@@ -84,9 +86,9 @@ std::vector<Ring> half_circle(int segments, double from, double to, double radiu
   for (int i = 0; i <= segments; ++i) {
     const double part = static_cast<double>(i) / segments, angle = from + (to - from) * part;
     const bool pole = std::abs(std::abs(angle) - M_PI / 2) < 1e-9;
-    rings.push_back({static_cast<float>(shift + radius * std::sin(angle)),
-                     pole ? 0.0f : static_cast<float>(radius * std::cos(angle)),
-                     pole ? 0.0f : static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)),
+    rings.push_back({static_cast<float>(shift + radius * math::sin(angle)),
+                     pole ? 0.0f : static_cast<float>(radius * math::cos(angle)),
+                     pole ? 0.0f : static_cast<float>(math::cos(angle)), static_cast<float>(math::sin(angle)),
                      static_cast<float>(v0 + (v1 - v0) * part)});
   }
   return rings;

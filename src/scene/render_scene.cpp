@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/whole.h"
+#include "ruedo/math.h"
 #include "scene/render_device.h"
 #include "scene/render_lights.h"
 
@@ -234,7 +235,7 @@ View View::pinhole(const Pose& X_WCamera, int width, int height, double hfov_rad
   view.X_WCamera = X_WCamera;
   view.width = width;
   view.height = height;
-  view.fx = view.fy = width / (2.0 * std::tan(0.5 * hfov_rad));
+  view.fx = view.fy = width / (2.0 * math::tan(0.5 * hfov_rad));
   view.cx = 0.5 * width;
   view.cy = 0.5 * height;
   return view;

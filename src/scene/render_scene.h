@@ -2,7 +2,7 @@
 //
 // A Renderer owns one context. It may move from thread to thread between draws, but serves one at a time: several
 // cameras use several cores with one renderer each (a pool of them). Pixels depend on nothing but the world, the
-// snapshot and the view; they are the same from every renderer, in every run on one CPU type, with both backends.
+// snapshot and the view; they are the same from every renderer, in every run (see draw_the_same_everywhere()), with both backends.
 #pragma once
 
 #include <array>

@@ -2,7 +2,8 @@
 #include "sensors/base_odometry.h"
 
 #include <algorithm>
-#include <cmath>
+
+#include "ruedo/math.h"
 
 namespace ruedo {
 
@@ -42,7 +43,7 @@ double BaseOdometry::curvature(const std::vector<double>& angles) const {
   int count = 0;
   for (size_t i = 0; i < wheels_.size(); ++i) {
     if (!wheels_[i].steers) continue;
-    const double slope = std::tan(angles[i] + steering_error_);
+    const double slope = math::tan(angles[i] + steering_error_);
     sum += slope / (lever_ * wheels_[i].x + slope * wheels_[i].y);
     ++count;
   }
@@ -66,7 +67,7 @@ Vec3 BaseOdometry::moved(const std::vector<double>& ways, const std::vector<doub
     const Wheel& wheel = wheels_[i];
     if (wheel.steers || (any_fixed && wheel.steered)) continue;
     // A wheel on a circle about the same middle; base_link's way is in proportion.
-    const double part = wheel.steered ? std::hypot(1.0 - middle * wheel.y, middle * wheel.x) : 1.0 - middle * wheel.y;
+    const double part = wheel.steered ? math::hypot(1.0 - middle * wheel.y, middle * wheel.x) : 1.0 - middle * wheel.y;
     way += ways[i] / part;
     ++count;
   }
@@ -77,8 +78,8 @@ Vec3 BaseOdometry::moved(const std::vector<double>& ways, const std::vector<doub
 Vec3 BaseOdometry::moved(const Pose& before, const Pose& after) const {
   const double angle = wrap_angle(heading(after.rotation) - heading(before.rotation)), half = 0.5 * angle;
   const Vec3 chord = after.translation - before.translation;
-  const double c = std::cos(heading(before.rotation) + half), s = std::sin(heading(before.rotation) + half);
-  const double part = half == 0.0 ? 1.0 : half / std::sin(half);    // of an arc to its chord
+  const double c = math::cos(heading(before.rotation) + half), s = math::sin(heading(before.rotation) + half);
+  const double part = half == 0.0 ? 1.0 : half / math::sin(half);    // of an arc to its chord
   return {part * (c * chord.x() + s * chord.y()), part * (c * chord.y() - s * chord.x()), angle / lever_};
 }
 

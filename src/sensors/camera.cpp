@@ -6,9 +6,9 @@
 #include "ruedo/camera_info_t.hpp"
 #include "ruedo/device_info_t.hpp"
 #include "ruedo/image_t.hpp"
+#include "ruedo/math.h"
 #include "ruedo/sensor.h"
 
-#include <cmath>
 #include <optional>
 
 #include <opencv2/imgcodecs.hpp>
@@ -70,7 +70,7 @@ class Camera : public Sensor {
     } else {
       view_ = scene::View{{}, lens_.width, lens_.height, lens_.fx, lens_.fy, lens_.cx, lens_.cy, lens_.near_m, lens_.far_m};
     }
-    view_.exposure = std::exp2(element.number("ruedo:exposure", 0.0, Allowed::between(-10.0, 10.0)));
+    view_.exposure = math::exp2(element.number("ruedo:exposure", 0.0, Allowed::between(-10.0, 10.0)));
     view_.samples = camera.integer("image/anti_aliasing", 1, Allowed::between(0, 1e9)) > 1 ? 4 : 1;
     fill_info();
   }
@@ -89,7 +89,7 @@ class Camera : public Sensor {
     info.width = lens_.width;
     info.height = lens_.height;
     info.fov_horizontal = lens_.hfov;
-    info.fov_vertical = std::atan((lens_.cy + 0.5) / lens_.fy) + std::atan((lens_.height - 0.5 - lens_.cy) / lens_.fy);
+    info.fov_vertical = math::atan((lens_.cy + 0.5) / lens_.fy) + math::atan((lens_.height - 0.5 - lens_.cy) / lens_.fy);
     info.range_min = lens_.near_m;
     info.range_max = lens_.far_m;
   }

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/whole.h"
+#include "ruedo/math.h"
 
 namespace ruedo {
 namespace {
@@ -34,7 +35,7 @@ Lens::Lens(const Element& camera) {
   fy = camera.number("lens/intrinsics/fy", camera.has("lens/intrinsics/fx") ? fx : pinhole.fy, focal);
   cx = camera.number("lens/intrinsics/cx", pinhole.cx, Allowed::any(quantity::kPixels));
   cy = camera.number("lens/intrinsics/cy", pinhole.cy, Allowed::any(quantity::kPixels));
-  if (fx != pinhole.fx || cx != pinhole.cx) hfov = std::atan((cx + 0.5) / fx) + std::atan((width - 0.5 - cx) / fx);
+  if (fx != pinhole.fx || cx != pinhole.cx) hfov = math::atan((cx + 0.5) / fx) + math::atan((width - 0.5 - cx) / fx);
   if (const Element* d = camera.child("distortion")) {
     const Allowed range = Allowed::between(-10.0, 10.0);
     distortion = {d->number("k1", 0, range), d->number("k2", 0, range), d->number("p1", 0, range),

@@ -12,6 +12,7 @@
 #include "core/whole.h"
 #include "ruedo/device_info_t.hpp"
 #include "ruedo/lidar_t.hpp"
+#include "ruedo/math.h"
 #include "ruedo/planar_lidar_t.hpp"
 #include "sensors/noise.h"
 #include "sensors/ray_device.h"
@@ -191,7 +192,7 @@ class Lrf : public Sensor {
 
   Vec3 direction(int64_t layer, double azimuth) const {
     const double elevation = layers_.angle(layer);
-    return {std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth), std::sin(elevation)};
+    return {math::cos(elevation) * math::cos(azimuth), math::cos(elevation) * math::sin(azimuth), math::sin(elevation)};
   }
 
   // Puts the rays into the world. All layers of a column are taken at once.

@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "ruedo/math.h"
+
 namespace ruedo {
 namespace {
 
@@ -49,8 +51,8 @@ double Noise::apply(double ideal, double dt_s, RandomStream& stream) {
     if (dt_s != known_dt_s_) {
       known_dt_s_ = dt_s;
       if (walk_time_s_ > 0.0) {
-        decay_ = std::exp(-dt_s / walk_time_s_);
-        drive_ = walk_stddev_ * std::sqrt(-0.5 * walk_time_s_ * std::expm1(-2.0 * dt_s / walk_time_s_));
+        decay_ = math::exp(-dt_s / walk_time_s_);
+        drive_ = walk_stddev_ * std::sqrt(-0.5 * walk_time_s_ * math::expm1(-2.0 * dt_s / walk_time_s_));
       } else {
         decay_ = 1.0;
         drive_ = walk_stddev_ * std::sqrt(dt_s);

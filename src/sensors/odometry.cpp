@@ -17,6 +17,7 @@
 
 #include "model/body_layout.h"
 #include "core/whole.h"
+#include "ruedo/math.h"
 #include "ruedo/odometry_t.hpp"
 #include "ruedo/sensor.h"
 #include "sensors/base_odometry.h"
@@ -59,7 +60,7 @@ struct Configuration {
 // sin(x) / x
 double sinc(double x) {
   const double x2 = x * x;
-  return x2 < 1e-4 ? 1.0 - x2 / 6.0 * (1.0 - x2 / 20.0) : std::sin(x) / x;
+  return x2 < 1e-4 ? 1.0 - x2 / 6.0 * (1.0 - x2 / 20.0) : math::sin(x) / x;
 }
 
 class Odometry : public Sensor {
@@ -225,8 +226,8 @@ class Odometry : public Sensor {
     const double turn = (way[1] - way[0]) / track_;
     const double chord = 0.5 * (way[0] + way[1]) * sinc(0.5 * turn);
     const double along = theta_ + 0.5 * turn;
-    x_ += chord * std::cos(along);
-    y_ += chord * std::sin(along);
+    x_ += chord * math::cos(along);
+    y_ += chord * math::sin(along);
     theta_ += turn;
   }
 
@@ -251,8 +252,8 @@ class Odometry : public Sensor {
     X_WBase_ = X_WBase;
     rate_ = moved / dt_s;
     const double along = theta_ + 0.5 * moved.z(), chord = sinc(0.5 * moved.z());
-    x_ += chord * (moved.x() * std::cos(along) - moved.y() * std::sin(along));
-    y_ += chord * (moved.x() * std::sin(along) + moved.y() * std::cos(along));
+    x_ += chord * (moved.x() * math::cos(along) - moved.y() * math::sin(along));
+    y_ += chord * (moved.x() * math::sin(along) + moved.y() * math::cos(along));
     theta_ += moved.z();
   }
 
@@ -272,8 +273,8 @@ class Odometry : public Sensor {
     const double omega = (speed[1] - speed[0]) / track_;
     const double theta_before = theta_;
     theta_ += dt_s * 0.5 * (omega + omega_before);                                                  // eq. 8
-    x_ += dt_s * 0.5 * (v * std::cos(theta_) + v_before * std::cos(theta_before));                  // eq. 6
-    y_ += dt_s * 0.5 * (v * std::sin(theta_) + v_before * std::sin(theta_before));                  // eq. 7
+    x_ += dt_s * 0.5 * (v * math::cos(theta_) + v_before * math::cos(theta_before));                  // eq. 6
+    y_ += dt_s * 0.5 * (v * math::sin(theta_) + v_before * math::sin(theta_before));                  // eq. 7
     speed_before_[0] = speed[0];
     speed_before_[1] = speed[1];
   }

@@ -12,6 +12,7 @@
 
 #include "core/whole.h"
 #include "ruedo/device_info_t.hpp"
+#include "ruedo/math.h"
 #include "ruedo/sonar_t.hpp"
 #include "sensors/noise.h"
 #include "sensors/ray_device.h"
@@ -39,13 +40,13 @@ std::vector<Vec3> cone(int64_t n, double horizontal_rad, double vertical_rad) {
     const double part = (1.0 + 0.5 * static_cast<double>(placed + until)) / static_cast<double>(n);    // inside the ring
     for (int64_t i = 0; i < on_ring; ++i) {
       const double turn = 2.0 * M_PI * (static_cast<double>(i) + (ring % 2 ? 0.0 : 0.5)) / static_cast<double>(on_ring);
-      const double left = -0.5 * horizontal_rad * std::sin(turn), up = 0.5 * vertical_rad * std::cos(turn);
-      const double edge = std::hypot(left, up);    // rad from the axis to the cone's edge
+      const double left = -0.5 * horizontal_rad * math::sin(turn), up = 0.5 * vertical_rad * math::cos(turn);
+      const double edge = math::hypot(left, up);    // rad from the axis to the cone's edge
       if (edge == 0.0) {
         directions.push_back(Vec3::UnitX());
         continue;
       }
-      const double cosine = 1.0 - part * (1.0 - std::cos(edge)), sine = std::sqrt(1.0 - cosine * cosine);
+      const double cosine = 1.0 - part * (1.0 - math::cos(edge)), sine = std::sqrt(1.0 - cosine * cosine);
       directions.push_back({cosine, sine * left / edge, sine * up / edge});
     }
     placed = until;
@@ -68,7 +69,7 @@ class Sonar : public Sensor {
     if (sonar->choice("geometry", "cone", {"cone", "sphere"}) == "sphere" && setup.findings) {
       setup.findings->unsupported(sonar->source, "sensor " + setup.device + "/sonar/geometry", "a sphere is not supported; a cone instead");
     }
-    const double aperture = 2.0 * std::atan(sonar->number("radius", 0.5, Allowed::not_negative(quantity::kRange)) / max_);
+    const double aperture = 2.0 * math::atan(sonar->number("radius", 0.5, Allowed::not_negative(quantity::kRange)) / max_);
     const Element* ours = e.child("ruedo:sonar");
     configure(ours ? *ours : kNothing, aperture, setup);
   }
@@ -102,8 +103,8 @@ class Sonar : public Sensor {
     for (const Transducer& transducer : transducers_) {
       const Vec3& p = transducer.X_ST.translation;
       const Eigen::Matrix3d R = transducer.X_ST.rotation.toRotationMatrix();
-      const double pitch = std::atan2(-R(2, 0), std::hypot(R(0, 0), R(1, 0)));
-      info.element_pose.push_back({p.x(), p.y(), p.z(), std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0))});
+      const double pitch = math::atan2(-R(2, 0), math::hypot(R(0, 0), R(1, 0)));
+      info.element_pose.push_back({p.x(), p.y(), p.z(), math::atan2(R(2, 1), R(2, 2)), pitch, math::atan2(R(1, 0), R(0, 0))});
     }
   }
 
@@ -135,7 +136,7 @@ class Sonar : public Sensor {
     all_ = ours.choice("ruedo:firing", "sequence", {"sequence", "all"}) == "all";
     read_order(ours, n);
     const double specular = ours.number("ruedo:specular_angle", M_PI / 2, Allowed::between(0.0, M_PI / 2 + 1e-6));
-    least_cosine_ = specular >= M_PI / 2 - 1e-9 ? 0.0 : std::cos(specular);
+    least_cosine_ = specular >= M_PI / 2 - 1e-9 ? 0.0 : math::cos(specular);
     cross_talk_ = setup.noise ? ours.number("ruedo:cross_talk", 0.0, Allowed::between(0.0, 1.0)) : 0.0;
     RandomStream constants = random_.stream(kConstantDraws);
     for (Transducer& transducer : transducers_) {

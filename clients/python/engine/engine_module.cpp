@@ -18,6 +18,7 @@
 #include "watched_run.h"
 #include "model/load.h"
 #include "ruedo/errors.h"
+#include "scene/gl_context.h"
 
 namespace nb = nanobind;
 using ruedo::Primitive;
@@ -201,6 +202,7 @@ class PyEngine {
 }  // namespace
 
 NB_MODULE(_engine, module) {
+  ruedo::scene::draw_the_same_everywhere();    // an import has the interpreter to itself
   module.attr("version") = ruedo::version();
   module.attr("build") = ruedo::log::own_version();
   nb::exception<ruedo::InputError>(module, "InputError", PyExc_ValueError);

@@ -27,21 +27,30 @@ from .world import World
 
 
 def find_ruedo() -> str:
-    """The ruedo program: RUEDO, else PATH, else the bin/ or build/*/bin/ of a folder above this package."""
+    """The ruedo program: RUEDO, else that of the installation which this package belongs to, else PATH, else one built in a
+    folder above this package."""
     named = os.environ.get("RUEDO")
     if named:
         if not os.access(named, os.X_OK) or os.path.isdir(named):
             raise LaunchError(f"the environment's RUEDO is {named!r}, which is no program")
         return named
+    above = Path(__file__).resolve().parents
+    for candidate in (folder / "bin/ruedo" for folder in above):
+        if _is_program(candidate):
+            return str(candidate)
     found = shutil.which("ruedo")
     if found:
         return found
-    for folder in Path(__file__).resolve().parents:
-        for candidate in [folder / "bin/ruedo", *sorted(folder.glob("build/*/bin/ruedo")), folder / "build/bin/ruedo"]:
-            if candidate.is_file() and os.access(candidate, os.X_OK):
+    for folder in above:
+        for candidate in [*sorted(folder.glob("build/*/bin/ruedo")), folder / "build/bin/ruedo"]:
+            if _is_program(candidate):
                 return str(candidate)
-    raise LaunchError("the program `ruedo` was not found: not in RUEDO, not on the PATH, not built beside this package "
-                      "(`scripts/run` builds it)")
+    raise LaunchError("the program `ruedo` was not found: not in RUEDO, not beside this package, not on the PATH "
+                      "(`pip install` of Ruedo's wheel brings it, `scripts/run` builds it)")
+
+
+def _is_program(path: Path) -> bool:
+    return path.is_file() and os.access(path, os.X_OK)
 
 
 def launch(world: str | os.PathLike[str] | World | None = None, *, seed: int | None = None, rate: float | Literal["max"] | None = None,

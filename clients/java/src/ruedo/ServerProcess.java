@@ -105,36 +105,42 @@ final class ServerProcess {
         }
     }
 
-    /** RUEDO, else the PATH, else the bin/ or build/{any}/bin/ of a folder above this jar. */
+    /** RUEDO, else that of the installation which this jar belongs to, else the PATH, else one built in a folder above this jar. */
     private static String findRuedo() {
         String named = System.getenv("RUEDO");
         if (named != null && !named.isEmpty()) {
             if (isProgram(new File(named))) return named;
             throw new RuedoException.LaunchError("the environment's RUEDO is '" + named + "', which is no program");
         }
+        List<File> above = foldersAbove();
+        List<File> candidates = new ArrayList<>();
+        for (File folder : above) candidates.add(new File(folder, "bin/ruedo"));
         String path = System.getenv("PATH");
-        for (String folder : (path == null ? "" : path).split(File.pathSeparator)) {
-            File candidate = new File(folder, "ruedo");
+        for (String folder : (path == null ? "" : path).split(File.pathSeparator)) candidates.add(new File(folder, "ruedo"));
+        for (File folder : above) {
+            candidates.add(new File(folder, "build/bin/ruedo"));
+            File[] builds = new File(folder, "build").listFiles(File::isDirectory);
+            if (builds == null) continue;
+            Arrays.sort(builds);
+            for (File build : builds) candidates.add(new File(build, "bin/ruedo"));
+        }
+        for (File candidate : candidates) {
             if (isProgram(candidate)) return candidate.getPath();
         }
+        throw new RuedoException.LaunchError("the program `ruedo` was not found: not in RUEDO, not beside this jar, not on the PATH "
+                + "(a Maven project names it by RUEDO; `scripts/run` builds it)");
+    }
+
+    /** Those that this jar lies in, from the nearest on; none for a jar in a strange place. */
+    private static List<File> foldersAbove() {
+        List<File> folders = new ArrayList<>();
         try {
             File here = new File(Ruedo.class.getProtectionDomain().getCodeSource().getLocation().toURI());
-            for (File folder = here.getParentFile(); folder != null; folder = folder.getParentFile()) {
-                List<File> candidates = new ArrayList<>(List.of(new File(folder, "bin/ruedo"), new File(folder, "build/bin/ruedo")));
-                File[] builds = new File(folder, "build").listFiles(File::isDirectory);
-                if (builds != null) {
-                    Arrays.sort(builds);
-                    for (File build : builds) candidates.add(new File(build, "bin/ruedo"));
-                }
-                for (File candidate : candidates) {
-                    if (isProgram(candidate)) return candidate.getPath();
-                }
-            }
+            for (File folder = here.getParentFile(); folder != null; folder = folder.getParentFile()) folders.add(folder);
         } catch (URISyntaxException error) {
-            // a jar in a strange place: say that nothing was found
+            // not a file
         }
-        throw new RuedoException.LaunchError("the program `ruedo` was not found: not in RUEDO, not on the PATH, not built "
-                + "beside this jar (`scripts/run` builds it)");
+        return folders;
     }
 
     private static boolean isProgram(File file) {

@@ -1,0 +1,21 @@
+"""The runs of golden_runs.cpp make the bytes that are kept in hashes.txt: on this processor, or on the emulated one that
+RUEDO_PROCESSOR names (of `qemu-x86_64 -cpu help`), with one thread and with two."""
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).resolve().parent
+EXPECTED = dict(line.split() for line in (HERE / "hashes.txt").read_text(encoding="ascii").splitlines())
+PROCESSOR = os.environ["RUEDO_PROCESSOR"]
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("name", EXPECTED)
+def test_same_bytes(name, threads):
+    emulator = [] if PROCESSOR == "native" else ["qemu-x86_64", "-cpu", PROCESSOR]
+    program = Path(os.environ["RUEDO_BINARY_DIR"]) / "tests/golden/golden_runs"
+    result = subprocess.run([*emulator, program, "--threads", str(threads), name], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.split() == [name, EXPECTED[name]], f"{name} on {PROCESSOR}; if results changed on purpose: target renew-golden-hashes"
