@@ -1,4 +1,4 @@
-# Makes ruedo.jar: PROTO, SOURCES, OUTPUT, LCM_GEN, LCM_JAR, JAVAC and JAR say from what and with what.
+# Makes ruedo.jar: PROTO, SOURCES, OUTPUT, VERSION, LCM_GEN, LCM_JAR, JAVAC and JAR say from what and with what.
 #
 # The message types come out as the package ruedo.lcmtypes: renamed on the way, so that they do not meet the
 # library's own classes; LCM's fingerprints do not depend on it.
@@ -30,7 +30,14 @@ file(GLOB generated ${work}/java/ruedo/lcmtypes/*.java)
 file(GLOB library ${SOURCES}/src/ruedo/*.java)
 run(${JAVAC} --release 11 -nowarn -encoding UTF-8 -cp ${work}/classes -d ${work}/classes ${generated})
 run(${JAVAC} --release 11 -Xlint:all -encoding UTF-8 -cp ${work}/classes -d ${work}/classes ${library})
-run(${JAR} cf ${OUTPUT}/ruedo.jar -C ${work}/classes .)
+file(WRITE ${work}/manifest "Automatic-Module-Name: ruedo\nImplementation-Title: ruedo\nImplementation-Version: ${VERSION}\n")
+# The same bytes from the same classes, where jar can (from 17 on).
+execute_process(COMMAND ${JAR} --help OUTPUT_VARIABLE help)
+set(date "")
+if(help MATCHES "--date=")
+  set(date --date=2020-01-01T00:00:00Z)
+endif()
+run(${JAR} --create --file ${OUTPUT}/ruedo.jar ${date} --manifest ${work}/manifest -C ${work}/classes .)
 
 file(GLOB examples ${SOURCES}/examples/*.java)
 run(${JAVAC} --release 11 -Xlint:all -encoding UTF-8 -cp ${work}/classes -d ${work}/examples ${examples})

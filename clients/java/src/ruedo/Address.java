@@ -27,8 +27,6 @@ final class Address {
 
     /** Throws NoServer for what is no such URL. */
     Address(String url) {
-        // Multicast over IPv6 sockets does not reach IPv4 groups everywhere; this must be said before the first socket.
-        System.setProperty("java.net.preferIPv4Stack", "true");
         this.url = url;
         URI uri;
         try {
@@ -74,7 +72,6 @@ final class Address {
         String named = System.getenv("LCM_DEFAULT_URL");
         if (url != null && !url.isEmpty()) return url;
         if (named != null && !named.isEmpty()) return named;
-        System.setProperty("java.net.preferIPv4Stack", "true");    // before the first socket; see the constructor
         return hasMulticastRoute("239.255.76.67") ? DEFAULT_URL : FALLBACK_URL;
     }
 

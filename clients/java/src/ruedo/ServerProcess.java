@@ -2,11 +2,12 @@ package ruedo;
 
 import java.io.File;
 import java.io.IOException;
-import java.net.DatagramSocket;
 import java.net.InetAddress;
 import java.net.InetSocketAddress;
 import java.net.ServerSocket;
+import java.net.StandardProtocolFamily;
 import java.net.URISyntaxException;
+import java.nio.channels.DatagramChannel;
 import java.nio.charset.StandardCharsets;
 import java.nio.file.Files;
 import java.nio.file.Path;
@@ -29,7 +30,6 @@ final class ServerProcess {
 
     ServerProcess(String world, LaunchOptions options) {
         String program = findRuedo();
-        System.setProperty("java.net.preferIPv4Stack", "true");
         url = options.url.isEmpty() ? freeUrl() : options.url;
         command = new ArrayList<>(List.of(program, "run", world, "--lcm", url, "--watch-stdin"));
         if (options.seed != null) command.addAll(List.of("--seed", Long.toString(options.seed)));
@@ -161,8 +161,7 @@ final class ServerProcess {
                     sayOnce("ruedo: no multicast route here: launch() speaks LCM over TCP, LCM_DEFAULT_URL=tcpq://127.0.0.1:" + port);
                     return "tcpq://127.0.0.1:" + port;
                 }
-                try (DatagramSocket probe = new DatagramSocket(null)) {
-                    probe.setReuseAddress(false);
+                try (DatagramChannel probe = DatagramChannel.open(StandardProtocolFamily.INET)) {
                     probe.bind(new InetSocketAddress("0.0.0.0", port));    // fails when any LCM program uses the port
                     return "udpm://239.255.76.67:" + port + "?ttl=0";
                 } catch (IOException error) {

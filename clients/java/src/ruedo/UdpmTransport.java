@@ -1,13 +1,14 @@
 package ruedo;
 
 import java.io.IOException;
-import java.net.DatagramPacket;
 import java.net.InetAddress;
 import java.net.InetSocketAddress;
-import java.net.MulticastSocket;
+import java.net.NetworkInterface;
 import java.net.SocketAddress;
+import java.net.StandardProtocolFamily;
 import java.net.StandardSocketOptions;
 import java.nio.ByteBuffer;
+import java.nio.channels.DatagramChannel;
 import java.nio.charset.StandardCharsets;
 import java.util.Arrays;
 import java.util.BitSet;
@@ -42,7 +43,7 @@ final class UdpmTransport implements Transport {
     }
 
     private final InetSocketAddress group;
-    private final MulticastSocket socket;
+    private final DatagramChannel socket;
     private int sequence;    // under this object's monitor
     private volatile boolean closed;
     private final Map<SocketAddress, Partial> partials = new LinkedHashMap<>() {    // the receiving thread's
@@ -57,15 +58,30 @@ final class UdpmTransport implements Transport {
     UdpmTransport(Address address) {
         try {
             group = new InetSocketAddress(InetAddress.getByName(address.host), address.port);
-            socket = new MulticastSocket(address.port);
+            // Of IPv4: multicast over IPv6 sockets does not reach IPv4 groups everywhere, and java.net.preferIPv4Stack is read
+            // before this could set it when Java starts from a module path.
+            socket = DatagramChannel.open(StandardProtocolFamily.INET);
+            socket.setOption(StandardSocketOptions.SO_REUSEADDR, true);
+            socket.bind(new InetSocketAddress(address.port));
             int buffer = address.option("recv_buf_size", 0);
-            if (buffer > 0) socket.setReceiveBufferSize(buffer);
+            if (buffer > 0) socket.setOption(StandardSocketOptions.SO_RCVBUF, buffer);
             socket.setOption(StandardSocketOptions.IP_MULTICAST_LOOP, true);
-            socket.setTimeToLive(Math.max(0, Math.min(255, address.option("ttl", 0))));
-            socket.joinGroup(group, null);
+            socket.setOption(StandardSocketOptions.IP_MULTICAST_TTL, Math.max(0, Math.min(255, address.option("ttl", 0))));
+            socket.join(group.getAddress(), routeTo(group));
         } catch (IOException | RuntimeException error) {
             throw new RuedoException.NoServer(address.url + ": it cannot be used (" + error.getMessage()
                     + "); `ruedo doctor` looks for what is wrong");
+        }
+    }
+
+    /** The interface that the kernel sends by. */
+    private static NetworkInterface routeTo(InetSocketAddress group) throws IOException {
+        try (DatagramChannel probe = DatagramChannel.open(StandardProtocolFamily.INET)) {
+            probe.connect(group);
+            InetAddress own = ((InetSocketAddress) probe.getLocalAddress()).getAddress();
+            NetworkInterface found = NetworkInterface.getByInetAddress(own);
+            if (found == null) throw new IOException("no interface has the address " + own.getHostAddress());
+            return found;
         }
     }
 
@@ -85,12 +101,17 @@ final class UdpmTransport implements Transport {
     @Override
     public void close() {
         closed = true;
-        socket.close();
+        try {
+            socket.close();
+        } catch (IOException error) {
+            // it is of no use any more
+        }
     }
 
     @Override
     public void publish(String channel, byte[] message) {
         byte[] name = (channel + "\0").getBytes(StandardCharsets.US_ASCII);
+        boolean interrupted = Thread.interrupted();    // sending with that set would close the channel
         try {
             synchronized (this) {
                 sequence++;
@@ -102,6 +123,8 @@ final class UdpmTransport implements Transport {
             }
         } catch (IOException error) {
             // lost
+        } finally {
+            if (interrupted) Thread.currentThread().interrupt();
         }
     }
 
@@ -119,15 +142,18 @@ final class UdpmTransport implements Transport {
     }
 
     private void send(ByteBuffer bytes) throws IOException {
-        socket.send(new DatagramPacket(bytes.array(), bytes.position(), group));
+        bytes.flip();
+        socket.send(bytes, group);
     }
 
     private void run(Receiver receiver) {
-        DatagramPacket packet = new DatagramPacket(new byte[65536], 65536);
+        ByteBuffer packet = ByteBuffer.allocate(65536);
         while (!closed) {
             try {
-                socket.receive(packet);
-                take(packet, receiver);
+                packet.clear();
+                SocketAddress sender = socket.receive(packet);
+                packet.flip();
+                take(packet, sender, receiver);
             } catch (IOException error) {
                 if (!closed) pause();
             } catch (Throwable error) {    // whatever came, the receiving thread lives
@@ -144,13 +170,12 @@ final class UdpmTransport implements Transport {
         }
     }
 
-    private void take(DatagramPacket packet, Receiver receiver) {
-        ByteBuffer in = ByteBuffer.wrap(packet.getData(), packet.getOffset(), packet.getLength());
+    private void take(ByteBuffer in, SocketAddress sender, Receiver receiver) {
         if (in.remaining() < 8) return;
         int magic = in.getInt();
         int number = in.getInt();
         if (magic == LONG) {
-            takeFragment(packet.getSocketAddress(), number, in, receiver);
+            takeFragment(sender, number, in, receiver);
         } else if (magic == SHORT) {
             String channel = channel(in);
             if (channel == null || !receiver.wants(channel)) return;
