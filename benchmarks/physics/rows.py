@@ -246,7 +246,7 @@ def stack(boxes: int, top: float = 1.0) -> Callable[[Make, float, Series], float
 @cache
 def floor() -> Body:
     folder = Path(tempfile.mkdtemp(prefix="ruedo-floor-"))
-    return Body("floor", (Shape("mesh", file=flat_mesh(folder, half=1.0, along=5.0)),), mass=0.0)
+    return Body("floor", (Shape("mesh", file=flat_mesh(folder, half=2.0, along=5.0)),), mass=0.0)
 
 
 def rolling(body: Body, ground: Callable[[], Body], what: str, heading: float = 0.3) -> Callable[[Make, float, Series], float]:

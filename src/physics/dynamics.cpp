@@ -5,6 +5,8 @@
 #include <numeric>
 #include <tuple>
 
+#include "physics/mesh_edges.h"
+
 namespace ruedo::physics {
 
 namespace {
@@ -17,6 +19,8 @@ bool takes_part(const btCollisionObject& object) { return object.getIslandTag() 
 size_t number(const btCollisionObject& object) { return static_cast<size_t>(object.getIslandTag()); }
 // What the solver may move: a mover and a wall tie nothing together.
 bool can_be_moved(const btCollisionObject& object) { return takes_part(object) && !object.isStaticOrKinematicObject(); }
+
+const btCollisionObject& object_of(const btBroadphaseProxy& proxy) { return *static_cast<const btCollisionObject*>(proxy.m_clientObject); }
 
 bool asleep(const btRigidBody& body) { return body.getActivationState() == ISLAND_SLEEPING; }
 
@@ -102,12 +106,9 @@ void Dynamics::take(const std::vector<btRigidBody*>& bodies) {
   manifolds_.clear();
   joints_.clear();
   if (bodies_.empty()) return;
-  const auto object_of = [](const btBroadphaseProxy* proxy) -> const btCollisionObject& {
-    return *static_cast<const btCollisionObject*>(proxy->m_clientObject);
-  };
   btBroadphasePairArray& pairs = getPairCache()->getOverlappingPairArray();
   for (int i = 0; i < pairs.size(); ++i) {
-    if (takes_part(object_of(pairs[i].m_pProxy0)) || takes_part(object_of(pairs[i].m_pProxy1))) pairs_.push_back(&pairs[i]);
+    if (takes_part(object_of(*pairs[i].m_pProxy0)) || takes_part(object_of(*pairs[i].m_pProxy1))) pairs_.push_back(&pairs[i]);
   }
   std::sort(pairs_.begin(), pairs_.end(), [](const btBroadphasePair* a, const btBroadphasePair* b) {
     return std::pair(a->m_pProxy0->m_uniqueId, a->m_pProxy1->m_uniqueId) < std::pair(b->m_pProxy0->m_uniqueId, b->m_pProxy1->m_uniqueId);
@@ -136,7 +137,10 @@ void Dynamics::substep(double substep_s) {
   for (btRigidBody* body : bodies_) if (body->isActive()) body->applyGravity();
   auto& dispatcher = static_cast<btCollisionDispatcher&>(*getDispatcher());
   getDispatchInfo().m_timeStep = substep_s;
-  for (btBroadphasePair* pair : pairs_) btCollisionDispatcher::defaultNearCallback(*pair, dispatcher, getDispatchInfo());
+  for (btBroadphasePair* pair : pairs_) {
+    const bool mesh = is_mesh(object_of(*pair->m_pProxy0)) || is_mesh(object_of(*pair->m_pProxy1));
+    mesh ? collide_with_mesh(*pair, dispatcher, getDispatchInfo()) : btCollisionDispatcher::defaultNearCallback(*pair, dispatcher, getDispatchInfo());
+  }
   find_manifolds();
   for (btPersistentManifold* manifold : manifolds_) keep_below_the_axle(*manifold);
   find_islands();

@@ -10,6 +10,7 @@
 #include <LinearMath/btConvexHullComputer.h>
 
 #include "physics/convex_shapes.h"
+#include "physics/mesh_edges.h"
 #include "ruedo/math.h"
 
 namespace ruedo::physics {
@@ -113,8 +114,9 @@ struct ShapeFactory::Triangles {
   std::vector<double> positions;
   std::vector<int> indices;
   btTriangleIndexVertexArray array;
+  MeshEdges edges;
 
-  Triangles(const model::Mesh& mesh, const Vec3& scale) {
+  Triangles(const model::Mesh& mesh, const Vec3& scale) : edges(mesh, scale) {
     for (const auto& p : mesh.positions) {
       for (int i = 0; i < 3; ++i) positions.push_back(p[i] * scale[i]);
     }
@@ -175,6 +177,7 @@ btCollisionShape* ShapeFactory::fixed(const model::Geometry& geometry) {
     triangles_.push_back(std::make_unique<Triangles>(*geometry.mesh, scale));
     auto mesh = std::make_unique<btBvhTriangleMeshShape>(&triangles_.back()->array, /*quantised*/ false);
     mesh->setMargin(0.0);
+    mesh->setUserPointer(&triangles_.back()->edges);
     shape = own(std::move(mesh));
   }
   return shape;

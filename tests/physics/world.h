@@ -16,7 +16,7 @@ class World {
   explicit World(const std::string& models, int64_t step_us = 2000, const std::string& solver = "")
       : world(model::load_world_text("<sdf version='1.9' xmlns:ruedo='https://ruedo.org'><world name='w'><gravity>0 0 -10</gravity>"
                                      "<physics type='x'><max_step_size>" + std::to_string(static_cast<double>(step_us) * 1e-6) +
-                                     "</max_step_size><bullet>" + solver + "</bullet></physics>" + models + "</world></sdf>", "test.sdf")),
+                                     "</max_step_size><bullet>" + solver + "</bullet></physics>" + models + "</world></sdf>", "test.sdf", anywhere())),
         layout(*world),
         physics(*world, layout) {}
   void run(double seconds) {
@@ -33,6 +33,13 @@ class World {
   std::shared_ptr<const model::WorldModel> world;
   model::BodyLayout layout;
   PhysicsWorld physics;
+
+ private:
+  static model::LoadOptions anywhere() {
+    model::LoadOptions options;
+    options.allow_absolute = true;    // meshes that a test wrote
+    return options;
+  }
 };
 
 inline const std::string kPlane = "<model name='ground'><static>true</static><link name='l'><collision name='c'><geometry><plane><normal>0 0 1"
