@@ -40,6 +40,18 @@ def test_bases_are_what_the_script_makes(tmp_path):
         assert path.read_text() == (WORLDS / "robots" / path.relative_to(tmp_path)).read_text(), path
 
 
+def test_worlds_are_what_the_script_makes(tmp_path):
+    subprocess.run([sys.executable, WORLDS / "make_worlds.py", tmp_path], check=True)
+    made = sorted(path for path in tmp_path.rglob("*") if path.is_file())
+    assert len(made) == 7
+    for path in made:
+        kept = WORLDS / path.relative_to(tmp_path)
+        if path.suffix == ".png":
+            assert png_pixels(path) == png_pixels(kept), kept
+        else:
+            assert path.read_text() == kept.read_text(), kept
+
+
 @pytest.mark.parametrize("script, outputs", [
     ("robots/p3at/make_meshes.py", "robots/p3at/meshes"),
     ("robots/p3dx/make_meshes.py", "robots/p3dx/meshes"),
