@@ -1,23 +1,57 @@
 // The one place where commands meet ROS 2.
 #include "cli/ros2.h"
 
+#include <algorithm>
+#include <chrono>
 #include <cstdlib>
+#include <thread>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "ros2/commands.h"
+#include "ruedo/element.h"
 #include "ruedo/errors.h"
+#include "run/server.h"
 
 #ifdef RUEDO_ROS2
-
 #include "dds/cyclone_transport.h"
 #include "model/body_layout.h"
 #include "ros2/node.h"
-#include "ros2/tap_bus.h"
-#include "run/server.h"
+#include "run/queued_sink.h"
+#endif
 
 namespace ruedo::cli {
+
+std::vector<run::WaitForOption> with_channels(std::vector<run::WaitForOption> options, const model::WorldModel& world, const Ros2Arguments& arguments) {
+  const auto robots = std::count_if(world.models.begin(), world.models.end(), [](const model::ModelInstance& m) { return m.is_robot() && !m.removed; });
+  ros2::Names names(robots > 1, arguments.topics);
+  std::vector<std::string> topics;
+  for (const model::ModelInstance& robot : world.models) {
+    if (!robot.is_robot() || robot.removed) continue;
+    for (const auto& [topic, channel] : ros2::command_topics(robot.name, names)) {
+      topics.push_back(topic);
+      for (run::WaitForOption& option : options) {
+        if (option.channel == topic) option.channel = channel;
+      }
+    }
+  }
+  for (const run::WaitForOption& option : options) {
+    if (!option.channel.starts_with('/')) continue;
+    const std::string near = nearest_word(option.channel, topics);
+    throw InputError({}, "--wait-for: there is no ROS topic '" + option.channel + "' that takes commands" + (near.empty() ? "" : "; did you mean '" + near + "'?"));
+  }
+  return options;
+}
+
+#ifdef RUEDO_ROS2
+
 namespace {
+
+constexpr size_t kMostQueued = size_t{64} << 20;                // bytes
+constexpr auto kLook = std::chrono::milliseconds(10);           // at who is there
+constexpr auto kSettled = std::chrono::milliseconds(300);       // since the last one came
+constexpr auto kPatience = std::chrono::seconds(1);
 
 ros2::Distro distro_of(const Ros2Arguments& arguments) {
   if (!arguments.distro.empty()) return ros2::parse_distro(arguments.distro);
@@ -36,80 +70,82 @@ std::vector<std::string> joints_of(const model::WorldModel& world, const std::st
   return names;
 }
 
-void print_topics(const ros2::Node& node, const std::string& where) {
-  fmt::print("ROS 2 ({})\n", where);
-  for (const ros2::Topic& topic : node.outputs()) fmt::print("  -> {:<32} {}\n", topic.name, topic.type);
-  for (const ros2::Topic& topic : node.inputs()) fmt::print("  <- {:<32} {}\n", topic.name, topic.type);
-  std::fflush(stdout);
+ros2::NodeOptions node_options(run::Server& server, const Ros2Arguments& arguments) {
+  ros2::NodeOptions options;
+  size_t robots = 0;
+  for (const world_info_t& part : server.info()) robots += part.robots.size();
+  options.conversion = {distro_of(arguments), robots > 1, arguments.topics, arguments.channels};
+  options.clock_hz = arguments.clock_hz;
+  options.joints = [&server](const std::string& robot) { return joints_of(*server.world(), robot); };
+  return options;
 }
+
+class CycloneNode : public Ros2Node {
+ public:
+  CycloneNode(run::Server& server, const Ros2Arguments& arguments, std::unique_ptr<ros2::Transport> transport)
+      : server_(server),
+        wait_for_(arguments.wait_for),
+        where_(fmt::format("{}, {}", ros2::name_of(distro_of(arguments)), transport->where())),
+        node_(node_options(server, arguments), std::move(transport), server.info(),
+              [&server](const std::string& channel, std::span<const uint8_t> message) { server.receive(channel, message.data(), message.size()); }),
+        queue_(node_, {.thread = "ros2", .most_bytes = kMostQueued}) {
+    server.add(queue_);
+    node_.start();
+  }
+  ~CycloneNode() override {
+    node_.stop();
+    const ros2::Node::Counts counts = node_.counts();
+    if (counts.faulty > 0) spdlog::warn("ROS 2: {} messages that came were faulty, and ignored", counts.faulty);
+    if (const uint64_t lost = counts.dropped + queue_.missed(); lost > 0) spdlog::warn("ROS 2: {} messages were dropped: it did not follow the run", lost);
+  }
+
+  void print() const override {
+    fmt::print("ROS 2 ({})\n", where_);
+    for (const ros2::Topic& topic : node_.outputs()) fmt::print("  -> {:<32} {}\n", topic.name, topic.type);
+    for (const ros2::Topic& topic : node_.inputs()) fmt::print("  <- {:<32} {}\n", topic.name, topic.type);
+    std::fflush(stdout);
+  }
+
+  // Nothing is published before: a controller that came late would miss the first state, and answer with the second.
+  void wait_for_peers() override {
+    using Clock = std::chrono::steady_clock;
+    const Clock::time_point begin = Clock::now();
+    Clock::time_point changed = begin;
+    bool told = false;
+    for (size_t peers = 0; !wait_for_.empty() && !server_.stopping(); std::this_thread::sleep_for(kLook)) {
+      const Clock::time_point now = Clock::now();
+      if (const size_t found = node_.peers(); found != peers) peers = found, changed = now;
+      const bool ready = node_.is_read() && std::all_of(wait_for_.begin(), wait_for_.end(), [&](const std::string& topic) { return node_.is_written(topic); });
+      if (ready && now >= changed + kSettled) return;
+      if (told || now < begin + kPatience) continue;
+      told = true;
+      spdlog::info("ROS 2: the run begins when somebody publishes on {}, and reads a topic of it", fmt::join(wait_for_, ", "));
+    }
+  }
+
+ private:
+  run::Server& server_;
+  std::vector<std::string> wait_for_;
+  std::string where_;
+  ros2::Node node_;
+  run::QueuedSink queue_;
+};
 
 }  // namespace
 
-struct Ros2Bus::Impl {
-  ros2::NodeOptions options;
-  dds::CycloneOptions network;
-  ros2::TapBus tap;
-};
-
-Ros2Bus::Ros2Bus(Bus& bus, const Ros2Arguments& arguments) : inner_(bus) {
-  if (!arguments.on) return;
-  impl_.reset(new Impl{{}, dds::options_from_environment(), ros2::TapBus(bus)});
-  impl_->options.conversion.distro = distro_of(arguments);
-  impl_->options.clock_hz = arguments.clock_hz;
+std::unique_ptr<Ros2Node> Ros2Node::open(run::Server& server, const Ros2Arguments& arguments) {
+  if (!arguments.on) return nullptr;
+  distro_of(arguments);    // before a network is asked
+  return std::make_unique<CycloneNode>(server, arguments, dds::open_cyclone(dds::options_from_environment()));
 }
-
-Ros2Bus::~Ros2Bus() = default;
-
-Bus& Ros2Bus::bus() { return impl_ ? impl_->tap : inner_; }
-
-std::shared_ptr<void> Ros2Bus::open(run::Server& server, std::vector<std::pair<std::string, std::string>> topics,
-                                    std::vector<std::pair<std::string, std::string>> channels) {
-  if (!impl_) return nullptr;
-  ros2::NodeOptions options = impl_->options;
-  size_t robots = 0;
-  for (const world_info_t& part : server.info()) robots += part.robots.size();
-  options.conversion.many = robots > 1;
-  options.conversion.topics = std::move(topics);
-  options.conversion.channels = std::move(channels);
-  options.joints = [&server](const std::string& robot) { return joints_of(*server.world(), robot); };
-  auto transport = dds::open_cyclone(impl_->network);
-  const std::string where = fmt::format("{}, {}", ros2::name_of(options.conversion.distro), transport->where());
-  auto node = std::make_shared<ros2::Node>(std::move(options), std::move(transport), server.info(),
-                                           [tap = &impl_->tap](const std::string& channel, std::span<const uint8_t> message) { tap->inject(channel, message); });
-  print_topics(*node, where);
-  node->start();
-  impl_->tap.attach(node.get());
-  server.on_state([node = node.get()](const Snapshot& snapshot) { node->state(snapshot.time); });
-  return {node.get(), [node, tap = &impl_->tap](void*) {
-            tap->attach(nullptr);
-            node->stop();
-            const ros2::Node::Counts counts = node->counts();
-            if (counts.dropped > 0) spdlog::warn("ROS 2: {} messages were dropped: readers, or the node itself, did not follow", counts.dropped);
-          }};
-}
-
-}  // namespace ruedo::cli
 
 #else
 
-namespace ruedo::cli {
-
-struct Ros2Bus::Impl {};
-
-Ros2Bus::Ros2Bus(Bus& bus, const Ros2Arguments& arguments) : inner_(bus) {
-  if (arguments.on) {
-    throw EnvironmentError("this ruedo was built without ROS 2. Install cyclonedds-dev, then configure with -DRUEDO_ROS2=ON and build again");
-  }
+std::unique_ptr<Ros2Node> Ros2Node::open(run::Server&, const Ros2Arguments& arguments) {
+  if (!arguments.on) return nullptr;
+  throw EnvironmentError("this ruedo was built without ROS 2. Install cyclonedds-dev, then configure with -DRUEDO_ROS2=ON and build again");
 }
-
-Ros2Bus::~Ros2Bus() = default;
-
-Bus& Ros2Bus::bus() { return inner_; }
-
-std::shared_ptr<void> Ros2Bus::open(run::Server&, std::vector<std::pair<std::string, std::string>>, std::vector<std::pair<std::string, std::string>>) {
-  return nullptr;
-}
-
-}  // namespace ruedo::cli
 
 #endif
+
+}  // namespace ruedo::cli

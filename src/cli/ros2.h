@@ -6,7 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "ruedo/bus.h"
+#include "model/world_model.h"
+#include "run/wait_for.h"
 
 namespace ruedo::run {
 class Server;
@@ -18,26 +19,25 @@ struct Ros2Arguments {
   bool on = false;
   std::string distro;        // "": $ROS_DISTRO, or jazzy
   double clock_hz = 100.0;
+  std::vector<std::pair<std::string, std::string>> topics;      // --remap of ROS names
+  std::vector<std::pair<std::string, std::string>> channels;    // of the bus's
+  std::vector<std::string> wait_for;                            // ROS topics on which the run waits
 };
 
-// The bus of a server that is a ROS 2 node. Made before the server; without --ros2 it is the bus itself.
-class Ros2Bus {
+// A node, from its making on; the run's messages come to it once it is attached.
+class Ros2Node {
  public:
-  // Throws InputError, and EnvironmentError when this build has no Cyclone DDS.
-  Ros2Bus(Bus& bus, const Ros2Arguments& arguments);
-  ~Ros2Bus();
+  // Null without --ros2. Throws InputError, and EnvironmentError when this build has no Cyclone DDS or there is no network for it.
+  static std::unique_ptr<Ros2Node> open(run::Server& server, const Ros2Arguments& arguments);
 
-  Bus& bus();
+  virtual ~Ros2Node() = default;    // after the run, before the server
+  virtual void print() const = 0;   // the topics
 
-  // Runs the node for as long as the returned object lives, which is before the server ends. topics: --remap of ROS names; channels: of
-  // the bus's. Null without --ros2. Throws InputError and EnvironmentError.
-  std::shared_ptr<void> open(run::Server& server, std::vector<std::pair<std::string, std::string>> topics,
-                             std::vector<std::pair<std::string, std::string>> channels);
-
- private:
-  struct Impl;
-  Bus& inner_;
-  std::unique_ptr<Impl> impl_;
+  // Returns when somebody publishes each topic that the run waits for, and reads something of this run; or the run is to end.
+  virtual void wait_for_peers() = 0;
 };
+
+// The input channel of each ROS topic among --wait-for. Throws InputError for what is no topic that takes commands.
+std::vector<run::WaitForOption> with_channels(std::vector<run::WaitForOption> options, const model::WorldModel& world, const Ros2Arguments& arguments);
 
 }  // namespace ruedo::cli

@@ -168,14 +168,18 @@ run::ServerOptions server_options(const RunArguments& arguments) {
   return options;
 }
 
-std::vector<std::pair<std::string, std::string>> topic_remaps(const RunArguments& arguments) {
-  std::vector<std::pair<std::string, std::string>> remaps;
+// What of the options is ROS's: names that begin with a slash.
+Ros2Arguments ros2_arguments(const RunArguments& arguments, const run::ServerOptions& options) {
+  Ros2Arguments ros2 = arguments.ros2;
   for (const std::string& text : arguments.remaps) {
-    if (!text.starts_with('/')) continue;
-    if (!arguments.ros2.on) throw InputError({}, "--remap " + text + ": names of ROS topics go with --ros2");
-    remaps.push_back(parse_remap(text));
+    if (text.starts_with('/')) ros2.topics.push_back(parse_remap(text));
   }
-  return remaps;
+  for (const run::WaitForOption& option : options.wait_for) {
+    if (option.channel.starts_with('/')) ros2.wait_for.push_back(option.channel);
+  }
+  if (!ros2.on && !(ros2.topics.empty() && ros2.wait_for.empty())) throw InputError({}, "names of ROS topics (/...) in --remap and --wait-for go with --ros2");
+  ros2.channels = options.remaps;
+  return ros2;
 }
 
 // What clients need to find this server, where they would not find it by themselves.
@@ -209,11 +213,12 @@ int run(const RunArguments& arguments) {
   bus::ServerBus place = bus::open_server_bus(arguments.lcm, world->name);
   bus::RivalWatch bus(std::move(place.bus), [](const std::string& line) { spdlog::warn(line); });
   ViewedBus viewed(bus, arguments.viewed, arguments.view);
-  Ros2Bus ros2(viewed.bus(), arguments.ros2);
-  const auto channel_remaps = options.remaps;
-  run::Server server(world, std::move(options), ros2.bus());
+  const Ros2Arguments ros2 = ros2_arguments(arguments, options);
+  options.wait_for = with_channels(std::move(options.wait_for), *world, ros2);
+  run::Server server(world, std::move(options), viewed.bus());
+  const std::unique_ptr<Ros2Node> node = Ros2Node::open(server, ros2);
   place.claim->describe(fmt::format("pid {}, world {}, run {}", getpid(), world->name, server.run_id()));
-  std::shared_ptr<void> view, node;
+  std::shared_ptr<void> view;
   const bool is_read = is_printed([&] {
     announce(place);
     std::vector<Finding> findings = world->findings;
@@ -221,13 +226,14 @@ int run(const RunArguments& arguments) {
     print_findings(findings);
     if (!arguments.quiet) print_world(server, *world, place.url);
     view = viewed.open(server, world->name);
-    node = ros2.open(server, topic_remaps(arguments), channel_remaps);
+    if (node && !arguments.quiet) node->print();
   });
   if (!is_read) server.on_state([&server](const Snapshot&) { server.stop(); });    // as by SIGTERM: the log gets its end
   if (!is_read && arguments.lockstep > 0) server.stop();                           // no state comes by itself
   StatusLine status;
   server.on_status([&](const run::Status& now) { status.draw(now); });
   signals.serve(&server);
+  if (node) node->wait_for_peers();
   try {
     server.run();
   } catch (const run::LeaseEnded& ended) {

@@ -151,9 +151,9 @@ class CycloneWriter : public ros2::Writer {
     ddsi_serdata* sample = make_sample(type_, cdr);
     return dds_writecdr(writer_, sample) == DDS_RETCODE_OK;
   }
-  bool is_read() const override {
+  size_t readers() const override {
     dds_publication_matched_status_t status{};
-    return dds_get_publication_matched_status(writer_, &status) == DDS_RETCODE_OK && status.current_count > 0;
+    return dds_get_publication_matched_status(writer_, &status) == DDS_RETCODE_OK ? status.current_count : 0;
   }
   Gid gid() const override { return gid_of(writer_); }
 
@@ -180,6 +180,10 @@ class CycloneReader : public ros2::Reader {
   }
 
   Gid gid() const override { return gid_of(reader_); }
+  size_t writers() const override {
+    dds_subscription_matched_status_t status{};
+    return dds_get_subscription_matched_status(reader_, &status) == DDS_RETCODE_OK ? status.current_count : 0;
+  }
 
   // The transport's thread.
   void take() {

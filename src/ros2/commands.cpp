@@ -93,18 +93,19 @@ Bytes from_array(std::span<const uint8_t> cdr, const std::vector<std::string>& j
 
 struct Row {
   const char* channel_type;
+  const char* channel;
   const char* topic;
   const char* type;
   Bytes (*convert)(std::span<const uint8_t>, const std::vector<std::string>& joints);
 };
 
 constexpr Row kRows[] = {
-    {"velocity_command_t", "cmd_vel", "geometry_msgs/msg/Twist", from_twist},
-    {"velocity_command_t", "cmd_vel", "geometry_msgs/msg/TwistStamped", from_twist_stamped},
-    {"joint_command_t", "joint_trajectory_controller/joint_trajectory", "trajectory_msgs/msg/JointTrajectory", from_trajectory},
-    {"joint_command_t", "forward_position_controller/commands", "std_msgs/msg/Float64MultiArray", from_array<joint_command_t::POSITION>},
-    {"joint_command_t", "forward_velocity_controller/commands", "std_msgs/msg/Float64MultiArray", from_array<joint_command_t::VELOCITY>},
-    {"joint_command_t", "forward_effort_controller/commands", "std_msgs/msg/Float64MultiArray", from_array<joint_command_t::EFFORT>},
+    {"velocity_command_t", "velocity", "cmd_vel", "geometry_msgs/msg/Twist", from_twist},
+    {"velocity_command_t", "velocity", "cmd_vel", "geometry_msgs/msg/TwistStamped", from_twist_stamped},
+    {"joint_command_t", "joint_command", "joint_trajectory_controller/joint_trajectory", "trajectory_msgs/msg/JointTrajectory", from_trajectory},
+    {"joint_command_t", "joint_command", "forward_position_controller/commands", "std_msgs/msg/Float64MultiArray", from_array<joint_command_t::POSITION>},
+    {"joint_command_t", "joint_command", "forward_velocity_controller/commands", "std_msgs/msg/Float64MultiArray", from_array<joint_command_t::VELOCITY>},
+    {"joint_command_t", "joint_command", "forward_effort_controller/commands", "std_msgs/msg/Float64MultiArray", from_array<joint_command_t::EFFORT>},
 };
 
 }  // namespace
@@ -121,6 +122,12 @@ std::vector<Command> commands_of(const std::vector<world_info_t>& info, const Jo
     }
   }
   return commands;
+}
+
+std::vector<std::pair<std::string, std::string>> command_topics(const std::string& robot, Names& names) {
+  std::vector<std::pair<std::string, std::string>> topics;
+  for (const Row& row : kRows) topics.emplace_back(names.topic(robot, row.topic), robot + "/" + row.channel);
+  return topics;
 }
 
 }  // namespace ruedo::ros2

@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "ros2/names.h"
@@ -25,5 +26,8 @@ struct Command {
 // Of every robot that takes commands. joints: names of the joints of a robot, in the order of joint_states.
 using JointNames = std::function<std::vector<std::string>(const std::string& robot)>;
 std::vector<Command> commands_of(const std::vector<world_info_t>& info, const JointNames& joints, Names& names);
+
+// The same as pairs of a topic and the name of the channel, of a robot of which nothing more is known.
+std::vector<std::pair<std::string, std::string>> command_topics(const std::string& robot, Names& names);
 
 }  // namespace ruedo::ros2

@@ -309,7 +309,6 @@ RUEDO_ROWS(contact_t,
 struct Conversions::Route {
   virtual ~Route() = default;
   virtual bool run(std::span<const uint8_t> message, const Wanted& wanted, const Emit& emit) = 0;
-  std::vector<size_t> topics;
 };
 
 // All that is known of a run, looked up by robot and device.
@@ -364,10 +363,7 @@ namespace {
 template <class Message>
 class TypedRoute : public Conversions::Route {
  public:
-  void add(const Row<Message>& row, Source source, size_t topic) {
-    entries_.push_back({&row, std::move(source), topic});
-    topics.push_back(topic);
-  }
+  void add(const Row<Message>& row, Source source, size_t topic) { entries_.push_back({&row, std::move(source), topic}); }
 
   bool run(std::span<const uint8_t> message, const Conversions::Wanted& wanted, const Conversions::Emit& emit) override {
     bool decoded = false;
@@ -470,17 +466,6 @@ void Conversions::add_frames(const device_info_t& device, const Names& names) {
     const double wxyz[4] = {X.rotation.w(), X.rotation.x(), X.rotation.y(), X.rotation.z()};
     add(frame, frame + "_" + std::to_string(i), X.translation.data(), wxyz);
   }
-}
-
-std::vector<std::string> Conversions::channels() const {
-  std::vector<std::string> names;
-  for (const auto& [name, route] : routes_) names.push_back(name);
-  return names;
-}
-
-bool Conversions::is_wanted(const std::string& channel, const Wanted& wanted) const {
-  const auto route = routes_.find(channel);
-  return route != routes_.end() && std::any_of(route->second->topics.begin(), route->second->topics.end(), wanted);
 }
 
 bool Conversions::convert(const std::string& channel, std::span<const uint8_t> message, const Wanted& wanted, const Emit& emit) {

@@ -37,9 +37,6 @@ class Conversions {
 
   const std::vector<Topic>& topics() const { return topics_; }
 
-  // Those that become anything, and whether anything is wanted of one.
-  std::vector<std::string> channels() const;
-  bool is_wanted(const std::string& channel, const Wanted& wanted) const;
   // Converts what is wanted of a message. False: it is not of its channel's type, or damaged.
   bool convert(const std::string& channel, std::span<const uint8_t> message, const Wanted& wanted, const Emit& emit);
 

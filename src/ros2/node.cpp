@@ -7,12 +7,9 @@
 #include <spdlog/spdlog.h>
 
 #include "core/whole.h"
-#include "ruedo/decode.h"
 
 namespace ruedo::ros2 {
 namespace {
-
-constexpr auto kLook = std::chrono::milliseconds(50);    // how often it is looked who reads
 
 std::string key(const Topic& topic) { return topic.name + " " + topic.type; }
 
@@ -27,15 +24,6 @@ bool is_same(const std::vector<world_info_t>& a, const std::vector<world_info_t>
     return all;
   };
   return names(a) == names(b);
-}
-
-std::string channel_of(const std::vector<world_info_t>& info, const std::string& type) {
-  for (const world_info_t& part : info) {
-    for (const channel_info_t& channel : part.channels) {
-      if (channel.type == type && channel.robot.empty()) return channel.name;
-    }
-  }
-  return {};
 }
 
 }  // namespace
@@ -60,68 +48,30 @@ Node::~Node() { stop(); }
 void Node::start() {
   injecting_ = true;
   transport_->start();
-  thread_ = std::thread([this] { work(); });
 }
 
 void Node::stop() {
   injecting_ = false;
   transport_->stop();
-  {
-    const std::lock_guard lock(mutex_);
-    stopping_ = true;
-  }
-  wake_.notify_one();
-  if (thread_.joinable()) thread_.join();
 }
 
 Endpoint Node::endpoint(const Topic& topic, Role role) const { return {role, topic, type_hash(topic.type, options_.conversion.distro)}; }
 
-void Node::offer(const std::string& channel, const uint8_t* data, size_t size) {
-  const std::lock_guard lock(mutex_);
-  const auto wanted = wanted_.find(channel);
-  if (wanted == wanted_.end() || !wanted->second) return;
-  queue_.push_back({-1, channel, {data, data + size}});
-  queued_ += size;
-  while (queued_ > kMostQueued && queue_.size() > 1) {
-    queued_ -= queue_.front().bytes.size();
-    queue_.pop_front();
-    ++dropped_;
-  }
-  wake_.notify_one();
+void Node::announce(const std::shared_ptr<const run::Announcement>& announcement) {
+  next_clock_us_ = 0;    // sim time may begin again
+  if (!is_same(announcement->info, info_)) take_over(announcement->info);
 }
 
-void Node::state(int64_t utime) {
-  const std::lock_guard lock(mutex_);
-  // Time goes back with a reset.
-  if (utime < next_clock_us_ && utime + clock_period_us_ >= next_clock_us_) return;
-  next_clock_us_ = utime / clock_period_us_ * clock_period_us_ + clock_period_us_;
-  queue_.push_back({utime, {}, {}});
-  wake_.notify_one();
+// Before what is measured at that time.
+void Node::begin_step(const run::Step& step) {
+  if (step.time_us < next_clock_us_) return;
+  next_clock_us_ = step.time_us / clock_period_us_ * clock_period_us_ + clock_period_us_;
+  send(*clock_, clock_message(step.time_us));
 }
 
-void Node::work() {
-  std::deque<Item> items;
-  auto next_look = std::chrono::steady_clock::now();
-  for (;;) {
-    {
-      std::unique_lock lock(mutex_);
-      wake_.wait_until(lock, next_look, [this] { return stopping_ || !queue_.empty(); });
-      if (stopping_) return;
-      items.swap(queue_);
-      queued_ = 0;
-    }
-    for (const Item& item : items) handle(item);
-    items.clear();
-    if (std::chrono::steady_clock::now() < next_look) continue;
-    update_wanted();
-    next_look = std::chrono::steady_clock::now() + kLook;
-  }
-}
-
-void Node::handle(const Item& item) {
-  if (item.clock >= 0) return send(*clock_, clock_message(item.clock));
-  if (item.channel == info_channel_) return handle_info(item);
-  conversions_->convert(item.channel, item.bytes, [this](size_t topic) { return writer_of_topic_[topic]->is_read(); },
+void Node::message(const run::Published& message) {
+  if (message.kind != run::Kind::sample) return;
+  conversions_->convert(message.channel, {message.data, message.size}, [this](size_t topic) { return writer_of_topic_[topic]->is_read(); },
                         [this](size_t topic, std::span<const uint8_t> cdr) { send(*writer_of_topic_[topic], cdr); });
 }
 
@@ -130,23 +80,8 @@ void Node::send(Writer& writer, std::span<const uint8_t> cdr) {
   else ++dropped_;
 }
 
-// Comes in parts; all of them make a whole.
-void Node::handle_info(const Item& item) {
-  world_info_t part;
-  if (decode_checked(item.bytes.data(), item.bytes.size(), part) != DecodeFault::none) return;
-  if (part.part == 0) parts_.clear();
-  const bool next = part.part == static_cast<int16_t>(parts_.size());
-  const int16_t count = part.nparts;
-  if (!next) return parts_.clear();
-  parts_.push_back(std::move(part));
-  if (static_cast<int16_t>(parts_.size()) != count) return;
-  if (!is_same(parts_, info_)) take_over(parts_);
-  parts_.clear();
-}
-
 void Node::take_over(const std::vector<world_info_t>& info) {
   info_ = info;
-  info_channel_ = channel_of(info, world_info_t::getTypeName());
   auto conversions = std::make_unique<Conversions>(info, options_.conversion, names_);
   std::map<std::string, std::unique_ptr<Writer>> writers;
   std::vector<Writer*> of_topic;
@@ -161,8 +96,7 @@ void Node::take_over(const std::vector<world_info_t>& info) {
   writer_of_topic_ = std::move(of_topic);
   add_commands(info);
   static_frames_->write(conversions_->static_frames());
-  announce();
-  update_wanted();
+  tell_graph();
 }
 
 // Of a robot that is gone, the run itself refuses what comes.
@@ -175,16 +109,7 @@ void Node::add_commands(const std::vector<world_info_t>& info) {
   }
 }
 
-void Node::update_wanted() {
-  std::unordered_map<std::string, bool> wanted{{info_channel_, true}};
-  for (const std::string& channel : conversions_->channels()) {
-    wanted[channel] = conversions_->is_wanted(channel, [this](size_t topic) { return writer_of_topic_[topic]->is_read(); });
-  }
-  const std::lock_guard lock(mutex_);
-  wanted_ = std::move(wanted);
-}
-
-void Node::announce() {
+void Node::tell_graph() {
   const size_t size = options_.conversion.distro == Distro::humble ? 24 : 16;
   CdrWriter out;
   const auto put_gid = [&](const Gid& gid) {
@@ -213,6 +138,22 @@ void Node::receive(const Command& command, std::span<const uint8_t> cdr) {
   last_warning_ns_ = now;
   spdlog::warn("ROS 2: {} got {} bytes that are no {} for this robot: ignored ({} such messages so far)", command.topic.name, cdr.size(),
                command.topic.type, faulty);
+}
+
+bool Node::is_read() const {
+  return std::any_of(writers_.begin(), writers_.end(), [](const auto& each) { return each.second->is_read(); });
+}
+
+bool Node::is_written(const std::string& topic) const {
+  return std::any_of(commands_.begin(), commands_.end(),
+                     [&](const auto& each) { return each.second.topic.name == topic && readers_.at(each.first)->writers() > 0; });
+}
+
+size_t Node::peers() const {
+  size_t count = 0;
+  for (const auto& [name, writer] : writers_) count += writer->readers();
+  for (const auto& [name, reader] : readers_) count += reader->writers();
+  return count;
 }
 
 std::vector<Topic> Node::outputs() const {

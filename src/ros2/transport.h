@@ -28,13 +28,15 @@ class Writer {
   virtual ~Writer() = default;
   // Never waits; false: it could not be sent.
   virtual bool write(std::span<const uint8_t> cdr) = 0;
-  virtual bool is_read() const = 0;    // somebody listens
+  virtual size_t readers() const = 0;    // of others
+  bool is_read() const { return readers() > 0; }
   virtual Gid gid() const = 0;
 };
 
 class Reader {
  public:
   virtual ~Reader() = default;
+  virtual size_t writers() const = 0;    // of others
   virtual Gid gid() const = 0;
 };
 

@@ -68,6 +68,7 @@ class Server {
   void run();
 
   void stop();    // any thread
+  bool stopping() const { return stop_; }
 
   // Another sink for the run's messages, beside the bus and the log. Before run(); it must outlive the run.
   void add(Sink& sink) { publisher_.add(sink); }

@@ -1,0 +1,80 @@
+"""What strangers send: counted, harmless, and said once a second at most."""
+
+import math
+import random
+from dataclasses import dataclass
+
+import pytest
+from conftest import Peer, Run, take, wait_for
+from cyclonedds.idl.types import float64, sequence, uint8
+from cyclonedds.idl import IdlStruct
+from ros_types import LaserScan, Odometry, Twist, Vector3
+
+
+@dataclass
+class NotATwist(IdlStruct, typename="geometry_msgs::msg::dds_::Twist_"):
+    """Says it is a Twist."""
+    data: sequence[uint8]
+
+
+@dataclass
+class ShortTwist(IdlStruct, typename="geometry_msgs::msg::dds_::Twist_"):
+    x: float64
+
+
+def drives(peer, cmd_vel, odometry):
+    def moves():
+        cmd_vel.write(Twist(Vector3(x=0.3), Vector3()))
+        return any(o.twist.twist.linear.x == pytest.approx(0.3) for o in odometry.take(N=100))
+
+    wait_for(moves, "0.3 m/s")
+
+
+@pytest.mark.parametrize("kind, samples", [
+    (NotATwist, [NotATwist(bytes(random.Random(i).randrange(256) for _ in range(n))) for i, n in enumerate((0, 1, 3, 7, 20, 31))]),
+    (ShortTwist, [ShortTwist(math.nan), ShortTwist(1e308)]),
+], ids=["bytes", "short"])
+def test_bytes_that_are_no_message_are_counted(kind, samples):
+    with Run("--no-noise") as run:
+        peer = Peer(run.domain)
+        liar = peer.writer("/cmd_vel", kind)
+        wait_for(lambda: len(liar.get_matched_subscriptions()) > 0, "a reader")
+        for sample in samples:
+            liar.write(sample)
+        honest = Peer(run.domain)
+        drives(honest, honest.writer("/cmd_vel", Twist), honest.reader("/odom", Odometry))
+        output = run.end()
+    assert run.process.returncode == 0
+    assert f"{len(samples)} messages that came were faulty" in output
+    assert "that are no geometry_msgs/msg/Twist" in output
+
+
+def test_a_message_of_64_mb_is_not_looked_at():
+    with Run("--no-noise") as run:
+        peer = Peer(run.domain)
+        liar = peer.writer("/cmd_vel", NotATwist)
+        wait_for(lambda: len(liar.get_matched_subscriptions()) > 0, "a reader")
+        liar.write(NotATwist(bytes(64 << 20)))
+        honest = Peer(run.domain)
+        drives(honest, honest.writer("/cmd_vel", Twist), honest.reader("/odom", Odometry))
+        run.end()
+    assert run.process.returncode == 0
+
+
+@pytest.mark.parametrize("speed", [math.nan, math.inf, -math.inf])
+def test_no_number_moves_nothing(speed):
+    with Run("--no-noise", "--duration", "3", "--rate", "2") as run:
+        peer = Peer(run.domain)
+        cmd_vel, odometry = peer.writer("/cmd_vel", Twist), peer.reader("/odom", Odometry)
+        take(odometry)
+        cmd_vel.write(Twist(Vector3(x=speed), Vector3()))
+        assert all(o.pose.pose.position.x == 0.0 for o in take(odometry, 50))
+    assert run.process.returncode == 0
+
+
+def test_a_reader_that_never_takes_costs_nobody_anything():
+    with Run("--rate", "max", "--duration", "20") as run:
+        sleeper, peer = Peer(run.domain), Peer(run.domain)
+        sleeper.reader("/scan", LaserScan, depth=1)
+        take(peer.reader("/scan", LaserScan), 5)
+        assert run.process.wait(timeout=300) == 0
