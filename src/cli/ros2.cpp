@@ -103,6 +103,7 @@ class CycloneNode : public Ros2Node {
     fmt::print("ROS 2 ({})\n", where_);
     for (const ros2::Topic& topic : node_.outputs()) fmt::print("  -> {:<32} {}\n", topic.name, topic.type);
     for (const ros2::Topic& topic : node_.inputs()) fmt::print("  <- {:<32} {}\n", topic.name, topic.type);
+    for (const ros2::Topic& service : node_.services()) fmt::print("  <> {:<32} {}\n", service.name, service.type);
     std::fflush(stdout);
   }
 

@@ -72,7 +72,8 @@ QosPointer qos_of(const Endpoint& endpoint) {
   }
   dds_qset_writer_data_lifecycle(qos.get(), false);
   dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
-  const std::string user_data = endpoint.hash.empty() ? "" : "typehash=" + endpoint.hash + ";";
+  const std::string user_data = (endpoint.service.empty() ? "" : "serviceid=" + endpoint.service + ";") +
+                                (endpoint.hash.empty() ? "" : "typehash=" + endpoint.hash + ";");
   if (!user_data.empty()) dds_qset_userdata(qos.get(), user_data.data(), user_data.size());
   return qos;
 }

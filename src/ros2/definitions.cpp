@@ -1,5 +1,5 @@
 // Names, types and order of the fields as the packages common_interfaces, rcl_interfaces, rmw_dds_common, geometry2 and ros_gz
-// have them from Humble to Lyrical.
+// have them from Humble to Lyrical, and simulation_interfaces in its versions 1.x.
 #include "ros2/definitions.h"
 
 namespace ruedo::ros2 {
@@ -70,6 +70,28 @@ constexpr Definition kDefinitions[] = {
      "Entity collision1\nEntity collision2\ngeometry_msgs/Vector3[] positions\ngeometry_msgs/Vector3[] normals\nfloat64[] depths\n"
      "JointWrench[] wrenches\n"},
     {"ros_gz_interfaces/msg/Contacts", "std_msgs/Header header\nContact[] contacts\n"},
+    {"service_msgs/msg/ServiceEventInfo", "uint8 event_type\nbuiltin_interfaces/Time stamp\nchar[16] client_gid\nint64 sequence_number\n"},
+    {"simulation_interfaces/msg/Result", "uint8 result\nstring error_message\n"},
+    {"simulation_interfaces/msg/EntityState",
+     "std_msgs/Header header\ngeometry_msgs/Pose pose\ngeometry_msgs/Twist twist\ngeometry_msgs/Accel acceleration\n"},
+    {"simulation_interfaces/msg/EntityCategory", "uint8 category\n"},
+    {"simulation_interfaces/msg/TagsFilter", "string[] tags\nuint8 filter_mode\n"},
+    {"simulation_interfaces/msg/Bounds", "uint8 type\ngeometry_msgs/Vector3[] points\n"},
+    {"simulation_interfaces/msg/EntityFilters", "string filter\nEntityCategory[] categories\nTagsFilter tags\nBounds bounds\n"},
+    {"simulation_interfaces/msg/SimulationState", "uint8 state\n"},
+    {"simulation_interfaces/msg/SimulatorFeatures", "uint16[] features\nstring[] spawn_formats\nstring custom_info\n"},
+    {"simulation_interfaces/srv/GetSimulatorFeatures", "---\nSimulatorFeatures features\n"},
+    {"simulation_interfaces/srv/ResetSimulation", "uint8 scope\n---\nResult result\n"},
+    {"simulation_interfaces/srv/StepSimulation", "uint64 steps\n---\nResult result\n"},
+    {"simulation_interfaces/srv/GetSimulationState", "---\nSimulationState state\nResult result\n"},
+    {"simulation_interfaces/srv/SetSimulationState", "SimulationState state\n---\nResult result\n"},
+    {"simulation_interfaces/srv/SpawnEntity",
+     "string name\nbool allow_renaming\nstring uri\nstring resource_string\nstring entity_namespace\n"
+     "geometry_msgs/PoseStamped initial_pose\n---\nResult result\nstring entity_name\n"},
+    {"simulation_interfaces/srv/DeleteEntity", "string entity\n---\nResult result\n"},
+    {"simulation_interfaces/srv/GetEntities", "EntityFilters filters\n---\nResult result\nstring[] entities\n"},
+    {"simulation_interfaces/srv/GetEntityState", "string entity\n---\nResult result\nEntityState state\n"},
+    {"simulation_interfaces/srv/SetEntityState", "string entity\nEntityState state\n---\nResult result\n"},
     {"rmw_dds_common/msg/Gid", "char[16] data\n", "char[24] data\n"},
     {"rmw_dds_common/msg/NodeEntitiesInfo",
      "string<=256 node_namespace\nstring<=256 node_name\nGid[] reader_gid_seq\nGid[] writer_gid_seq\n"},

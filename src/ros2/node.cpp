@@ -7,6 +7,9 @@
 #include <spdlog/spdlog.h>
 
 #include "core/whole.h"
+#include "ruedo/reply_t.hpp"
+#include "ruedo/request_t.hpp"
+#include "ruedo/set_pose_request_t.hpp"
 
 namespace ruedo::ros2 {
 namespace {
@@ -26,6 +29,15 @@ bool is_same(const std::vector<world_info_t>& a, const std::vector<world_info_t>
   return names(a) == names(b);
 }
 
+std::string channel_of(const std::vector<world_info_t>& info, const std::string& type) {
+  for (const world_info_t& part : info) {
+    for (const channel_info_t& channel : part.channels) {
+      if (channel.type == type && channel.robot.empty()) return channel.name;
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 Node::Node(NodeOptions options, std::unique_ptr<Transport> transport, const std::vector<world_info_t>& info, Inject inject)
@@ -33,11 +45,13 @@ Node::Node(NodeOptions options, std::unique_ptr<Transport> transport, const std:
       transport_(std::move(transport)),
       inject_(std::move(inject)),
       names_(options_.conversion.many, options_.conversion.topics),
+      requests_([this](const std::string& channel, std::span<const uint8_t> message) { inject_(channel, message); }),
       clock_period_us_(std::max<int64_t>(1, rounded(1e6 / options_.clock_hz))) {
   clock_topic_ = {names_.topic("", "clock"), "rosgraph_msgs/msg/Clock", kStateQos};
   static_frames_topic_ = {names_.topic("", "tf_static"), "tf2_msgs/msg/TFMessage", kLatchedQos};
   clock_ = transport_->add_writer(endpoint(clock_topic_));
   static_frames_ = transport_->add_writer(endpoint(static_frames_topic_));
+  services_ = std::make_unique<Services>(*transport_, options_.conversion.distro, names_, requests_);
   graph_ = transport_->add_writer(endpoint({"ros_discovery_info", "rmw_dds_common/msg/ParticipantEntitiesInfo", kLatchedQos}, Role::graph));
   take_over(info);
   names_.check_remaps();
@@ -70,6 +84,7 @@ void Node::begin_step(const run::Step& step) {
 }
 
 void Node::message(const run::Published& message) {
+  if (message.kind == run::Kind::service && message.channel == reply_channel_) requests_.reply({message.data, message.size});
   if (message.kind != run::Kind::sample) return;
   conversions_->convert(message.channel, {message.data, message.size}, [this](size_t topic) { return writer_of_topic_[topic]->is_read(); },
                         [this](size_t topic, std::span<const uint8_t> cdr) { send(*writer_of_topic_[topic], cdr); });
@@ -82,6 +97,9 @@ void Node::send(Writer& writer, std::span<const uint8_t> cdr) {
 
 void Node::take_over(const std::vector<world_info_t>& info) {
   info_ = info;
+  requests_.listen(channel_of(info, request_t::getTypeName()));
+  reply_channel_ = channel_of(info, reply_t::getTypeName());
+  services_->update(info);
   auto conversions = std::make_unique<Conversions>(info, options_.conversion, names_);
   std::map<std::string, std::unique_ptr<Writer>> writers;
   std::vector<Writer*> of_topic;
@@ -107,6 +125,13 @@ void Node::add_commands(const std::vector<world_info_t>& info) {
     if (!fresh) continue;
     readers_[name] = transport_->add_reader(endpoint(at->second.topic), [this, added = &at->second](std::span<const uint8_t> cdr) { receive(*added, cdr); });
   }
+  for (const world_info_t& part : info) {
+    for (const robot_info_t& robot : part.robots) {
+      const Topic topic{names_.topic(robot.name, "initialpose"), "geometry_msgs/msg/PoseWithCovarianceStamped", kCommandQos};
+      if (!poses_.try_emplace(key(topic), topic).second) continue;
+      readers_[key(topic)] = transport_->add_reader(endpoint(topic), [this, name = robot.name, topic](std::span<const uint8_t> cdr) { receive_pose(name, topic.name, cdr); });
+    }
+  }
 }
 
 void Node::tell_graph() {
@@ -119,10 +144,12 @@ void Node::tell_graph() {
   };
   put_gid(transport_->gid());
   out.put_length(1).put("/").put("ruedo");
-  out.put_length(readers_.size());
+  out.put_length(readers_.size() + services_->readers().size());
   for (const auto& [name, reader] : readers_) put_gid(reader->gid());
-  out.put_length(writers_.size() + 2);
+  for (const Reader* reader : services_->readers()) put_gid(reader->gid());
+  out.put_length(writers_.size() + services_->writers().size() + 2);
   for (const auto& [name, writer] : writers_) put_gid(writer->gid());
+  for (const Writer* writer : services_->writers()) put_gid(writer->gid());
   put_gid(clock_->gid());
   put_gid(static_frames_->gid());
   graph_->write(out.bytes());
@@ -132,12 +159,34 @@ void Node::receive(const Command& command, std::span<const uint8_t> cdr) {
   ++received_;
   if (!injecting_) return;
   if (const auto bytes = command.convert(cdr)) return inject_(command.channel, *bytes);
+  count_faulty(command.topic.name, command.topic.type, cdr.size());
+}
+
+// Where somebody says that the robot is, there it is put: the map's frame is the world's.
+void Node::receive_pose(const std::string& robot, const std::string& topic, std::span<const uint8_t> cdr) {
+  ++received_;
+  if (!injecting_) return;
+  CdrReader in(cdr);
+  in.skip<uint32_t>(2);
+  const std::string frame = in.get_text();
+  set_pose_request_t pose;
+  pose.name = robot;
+  for (double& x : pose.position) x = in.get<double>();
+  for (const size_t i : {1, 2, 3, 0}) pose.orientation[i] = in.get<double>();
+  if (!in.good() || !(frame.empty() || frame == "map" || frame == "world")) return count_faulty(topic, "pose in the frame map", cdr.size());
+  std::vector<uint8_t> body(static_cast<size_t>(pose.getEncodedSize()));
+  pose.encode(body.data(), 0, static_cast<int>(body.size()));
+  requests_.ask(request_t::SET_POSE, std::move(body), [topic](const reply_t& reply) {
+    if (reply.code != reply_t::OK) spdlog::warn("ROS 2: {}: {}", topic, reply.text);
+  });
+}
+
+void Node::count_faulty(const std::string& topic, const std::string& type, size_t size) {
   const uint64_t faulty = ++faulty_;
   const int64_t now = std::chrono::steady_clock::now().time_since_epoch().count();
   if (now < last_warning_ns_ + 1'000'000'000 && last_warning_ns_ != 0) return;
   last_warning_ns_ = now;
-  spdlog::warn("ROS 2: {} got {} bytes that are no {} for this robot: ignored ({} such messages so far)", command.topic.name, cdr.size(),
-               command.topic.type, faulty);
+  spdlog::warn("ROS 2: {} got {} bytes that are no {} for this robot: ignored ({} such messages so far)", topic, size, type, faulty);
 }
 
 bool Node::is_read() const {
@@ -165,6 +214,7 @@ std::vector<Topic> Node::outputs() const {
 std::vector<Topic> Node::inputs() const {
   std::vector<Topic> topics;
   for (const auto& [name, command] : commands_) topics.push_back(command.topic);
+  for (const auto& [name, topic] : poses_) topics.push_back(topic);
   return topics;
 }
 

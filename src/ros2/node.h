@@ -15,6 +15,8 @@
 
 #include "ros2/commands.h"
 #include "ros2/conversions.h"
+#include "ros2/requests.h"
+#include "ros2/services.h"
 #include "ros2/transport.h"
 #include "run/sink.h"
 
@@ -46,7 +48,7 @@ class Node : public run::Sink {
   struct Counts {
     uint64_t sent = 0, received = 0, dropped = 0, faulty = 0;
   };
-  Counts counts() const { return {sent_, received_, dropped_, faulty_}; }
+  Counts counts() const { return {sent_, received_, dropped_, faulty_ + services_->faulty()}; }
   // Before the run begins: whether anybody reads a sensor's topic, publishes on that one, and how many of both there are.
   bool is_read() const;
   bool is_written(const std::string& topic) const;
@@ -54,18 +56,21 @@ class Node : public run::Sink {
 
   std::vector<Topic> outputs() const;
   std::vector<Topic> inputs() const;
+  std::vector<Topic> services() const { return services_->list(); }
 
  private:
   void take_over(const std::vector<world_info_t>& info);    // of robots that have come or gone
   void add_commands(const std::vector<world_info_t>& info);
   void tell_graph();                                        // ros_discovery_info
   void receive(const Command& command, std::span<const uint8_t> cdr);
+  void receive_pose(const std::string& robot, const std::string& topic, std::span<const uint8_t> cdr);    // initialpose
+  void count_faulty(const std::string& topic, const std::string& type, size_t size);
   void send(Writer& writer, std::span<const uint8_t> cdr);
   Endpoint endpoint(const Topic& topic, Role role = Role::topic) const;
 
   NodeOptions options_;
   std::unique_ptr<Transport> transport_;
-  Inject inject_;
+  Inject inject_;    // before what uses it
   Names names_;
 
   // Of the thread that the sink is called in.
@@ -76,6 +81,10 @@ class Node : public run::Sink {
   std::unique_ptr<Writer> clock_, static_frames_, graph_;
   std::map<std::string, std::unique_ptr<Reader>> readers_;
   std::map<std::string, Command> commands_;                   // by name and type
+  std::map<std::string, Topic> poses_;                        // initialpose of each robot, by name and type
+  Requests requests_;
+  std::unique_ptr<Services> services_;
+  std::string reply_channel_;
   std::vector<world_info_t> info_;
   int64_t clock_period_us_, next_clock_us_ = 0;
 

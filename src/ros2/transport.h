@@ -21,6 +21,7 @@ struct Endpoint {
   Role role = Role::topic;
   Topic topic;              // of a service: its name, and "pkg/srv/Name_Request" or "..._Response"
   std::string hash;         // RIHS01_..., "": none
+  std::string service = {}; // what both ends of a service have in common; "": a topic
 };
 
 class Writer {

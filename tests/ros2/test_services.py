@@ -1,0 +1,155 @@
+"""simulation_interfaces over DDS, as rmw_cyclonedds maps services, called by a peer that no one here wrote."""
+
+from __future__ import annotations
+
+import itertools
+import random
+
+import pytest
+from conftest import Peer, Run, take, wait_for
+from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsSubscription
+from cyclonedds.core import Policy
+from ros_types import (Clock, Header, Odometry, Point, Pose, PoseWithCovariance, PoseWithCovarianceStamped, Quaternion, Time, Twist, Vector3)
+from simulation_types import SERVICES, Accel, Bounds, EntityCategory, EntityFilters, EntityState, PoseStamped, TagsFilter
+
+OK, NOT_FOUND, INCORRECT_STATE, FAILED, UNSUPPORTED = 1, 2, 3, 4, 0
+STOPPED, PLAYING, PAUSED = 0, 1, 2
+
+
+class Client:
+    """A client of the run's services; calls wait for their answer."""
+
+    def __init__(self, domain: int):
+        self.peer = Peer(domain)
+        self.mark = random.Random(domain).getrandbits(64)
+        self.sequence = itertools.count(1)
+        self.ends = {}
+
+    def call(self, service: str, *arguments):
+        question, answer = SERVICES[service]
+        if service not in self.ends:
+            writer = self.peer.writer(f"/{service}Request", question, prefix="rq")
+            reader = self.peer.reader(f"/{service}Reply", answer, prefix="rr")
+            wait_for(lambda: writer.get_matched_subscriptions() and reader.get_matched_publications(), service)
+            self.ends[service] = writer, reader
+        writer, reader = self.ends[service]
+        sequence = next(self.sequence)
+        writer.write(question(self.mark, sequence, *arguments))
+        (reply,) = take(reader)
+        assert (reply.client, reply.sequence_number) == (self.mark, sequence)
+        return reply
+
+    def state(self) -> int:
+        return self.call("get_simulation_state").state
+
+
+def at(x=0.0, y=0.0, z=0.0, frame="") -> PoseStamped:
+    return PoseStamped(Header(Time(), frame), Pose(Point(x, y, z), Quaternion()))
+
+
+def filters(pattern="", categories=(), tags=(), points=()) -> EntityFilters:
+    return EntityFilters(pattern, [EntityCategory(c) for c in categories], TagsFilter(list(tags), 0), Bounds(0, list(points)))
+
+
+@pytest.fixture
+def client():
+    with Run("--no-noise") as run:
+        yield Client(run.domain)
+
+
+def test_features_are_told(client):
+    told = client.call("get_simulator_features")
+    assert {0, 1, 10, 11, 20, 26, 31, 32} <= set(told.features)
+    assert told.spawn_formats == ["sdf", "urdf"]
+
+
+def test_states_follow_each_other(client):
+    assert client.state() == PLAYING
+    assert client.call("step_simulation", 1).result.result == INCORRECT_STATE
+    assert client.call("set_simulation_state", PLAYING).result.result == 101
+    assert client.call("set_simulation_state", PAUSED).result.result == OK
+    assert client.state() == PAUSED
+    clocks = client.peer.reader("/clock", Clock)
+    before = client.call("get_entity_state", "p3at").state.header.stamp.us
+    assert client.call("step_simulation", 40).result.result == OK
+    assert client.call("get_entity_state", "p3at").state.header.stamp.us == before + 40 * 5000
+    assert take(clocks)
+    assert client.call("set_simulation_state", STOPPED).result.result == OK
+    assert client.state() == STOPPED
+    assert client.call("set_simulation_state", PLAYING).result.result == OK
+    assert client.state() == PLAYING
+    assert client.call("set_simulation_state", 9).result.result == FAILED
+
+
+def test_entities_are_listed_and_filtered(client):
+    names = client.call("get_entities", filters()).entities
+    assert "p3at" in names and "parcel" in names
+    assert client.call("get_entities", filters("^p3at$")).entities == ["p3at"]
+    assert client.call("get_entities", filters(categories=[2])).entities == ["p3at"]
+    assert "p3at" not in client.call("get_entities", filters(categories=[5])).entities
+    assert client.call("get_entities", filters(tags=["x"])).entities == []
+    for bad in ("(", "(a{9}){9}", "a" * 1000):
+        assert client.call("get_entities", filters(bad)).result.result == UNSUPPORTED
+    assert client.call("get_entities", filters(points=[Vector3(), Vector3()])).result.result == UNSUPPORTED
+
+
+def test_states_of_entities_are_got_and_set(client):
+    got = client.call("get_entity_state", "p3at")
+    assert got.result.result == OK and got.state.header.frame_id == "world"
+    assert client.call("get_entity_state", "nobody").result.result == NOT_FOUND
+    assert client.call("get_entity_state", "").result.result == NOT_FOUND
+    rest, none = Twist(Vector3(), Vector3()), Accel(Vector3(), Vector3())
+    there = EntityState(Header(Time(), "world"), Pose(Point(0.0, 1.5, 0.0), Quaternion()), rest, none)
+    assert client.call("set_entity_state", "p3at", there).result.result == OK
+    position = client.call("get_entity_state", "p3at").state.pose.position
+    assert (position.x, position.y) == (pytest.approx(0.0), pytest.approx(1.5))
+    elsewhere = EntityState(Header(Time(), "mars"), there.pose, rest, none)
+    assert client.call("set_entity_state", "p3at", elsewhere).result.result == FAILED
+
+
+def test_robots_come_and_go_with_their_topics(client):
+    assert client.call("spawn_entity", "", False, "p3at", "", "", at(0.0, 1.5)).result.result == 102
+    assert client.call("spawn_entity", "p3at", False, "p3at", "", "", at(0.0, 1.5)).result.result == 101
+    assert client.call("spawn_entity", "bob", False, "", "", "", at(0.0, 1.5)).result.result == 104
+    assert client.call("spawn_entity", "bob", False, "no_such_model", "", "", at(0.0, 1.5)).result.result == FAILED
+    assert client.call("spawn_entity", "bob", False, "p3at", "", "", at(0.0, 1.5, frame="mars")).result.result == FAILED
+    spawned = client.call("spawn_entity", "p3at", True, "p3at", "", "", at(0.0, 1.5))
+    assert (spawned.result.result, spawned.entity_name) == (OK, "p3at_2"), spawned.result.error_message
+    wait_for(lambda: "p3at_2" in client.call("get_entities", filters()).entities, "p3at_2")
+    assert client.call("delete_entity", "p3at_2").result.result == OK
+    assert client.call("delete_entity", "p3at_2").result.result == NOT_FOUND
+
+
+@pytest.mark.parametrize("scope, code", [(0, OK), (255, OK), (1, OK), (2, OK), (3, OK), (7, OK), (4, UNSUPPORTED), (5, UNSUPPORTED)])
+def test_resets_have_scopes(client, scope, code):
+    assert client.call("reset_simulation", scope).result.result == code
+
+
+def test_where_somebody_says_the_robot_is_there_it_is_put(client):
+    initial = client.peer.writer("/initialpose", PoseWithCovarianceStamped)
+    wait_for(lambda: initial.get_matched_subscriptions(), "a reader")
+    truth = client.peer.reader("/ground_truth", Odometry)
+    pose = PoseWithCovariance(Pose(Point(0.0, 1.5, 0.0), Quaternion()), [0.0] * 36)
+    initial.write(PoseWithCovarianceStamped(Header(Time(), "map"), pose))
+    wait_for(lambda: any(abs(o.pose.pose.position.y - 1.5) < 1e-6 for o in truth.take(N=100)), "the robot at its new place")
+
+
+def test_without_control_services_say_so():
+    with Run("--control", "off") as run:
+        assert Client(run.domain).call("step_simulation", 1).result.result == UNSUPPORTED
+
+
+def test_both_ends_of_a_service_have_its_hash_and_one_id(client):
+    reader = BuiltinDataReader(client.peer.participant, BuiltinTopicDcpsSubscription)
+    found = {}
+
+    def all_there():
+        for s in reader.take(N=1000):
+            if s.topic_name.startswith("rq/") and Policy.Userdata in s.qos:
+                found[s.topic_name] = s.qos[Policy.Userdata].data.decode()
+        return len(found) >= 10
+
+    wait_for(all_there, "ten services")
+    # As rosidl generated it for simulation_interfaces 1.x.
+    assert "typehash=RIHS01_4ce285d7ff9b8ac70dcc95161f32bf54c05a6f4b13427990e41ab40c36c39646;" in found["rq/reset_simulationRequest"]
+    assert all(data.startswith("serviceid=") for data in found.values())
