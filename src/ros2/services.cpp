@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <map>
+#include <thread>
 
 #include <regex.h>
 
@@ -144,6 +146,20 @@ class Filter {
   regex_t expression_{};
 };
 
+// A client's first request may be here before it is known who reads the replies, which would then go to nobody: rmw_cyclonedds waits
+// for that, too. Each client has a writer and a reader; one that has no reader costs the wait once.
+void await_reader(const Reader& requests, const Writer& replies, size_t& deaf) {
+  constexpr auto kLongest = std::chrono::milliseconds(500), kLook = std::chrono::milliseconds(1);
+  const auto missing = [&] {
+    const size_t clients = requests.writers(), readers = replies.readers();
+    return clients > readers ? clients - readers : 0;
+  };
+  deaf = std::min(deaf, missing());
+  const auto deadline = std::chrono::steady_clock::now() + kLongest;
+  while (missing() > deaf && std::chrono::steady_clock::now() < deadline) std::this_thread::sleep_for(kLook);
+  deaf = missing();
+}
+
 // Both ends of a service say that they belong together.
 std::string service_id(const Gid& gid, const std::string& name) {
   uint64_t hash = 14695981039346656037u;    // FNV-1a
@@ -190,12 +206,13 @@ void Services::add(Transport& transport, Distro distro, Names& names, const Row&
   services_.push_back(std::move(service));
 }
 
-void Services::receive(const Service& service, Handler handler, std::span<const uint8_t> cdr) {
+void Services::receive(Service& service, Handler handler, std::span<const uint8_t> cdr) {
   const auto call = std::make_shared<Call>(*service.replies, cdr);
   if (!call->in.good()) {
     ++faulty_;
     return;
   }
+  await_reader(*service.requests, *service.replies, service.deaf);
   (this->*handler)(call);
 }
 

@@ -41,6 +41,7 @@ class Services {
     Topic topic;
     std::unique_ptr<Writer> replies;
     std::unique_ptr<Reader> requests;
+    size_t deaf = 0;    // clients that write requests, and read no replies
   };
   using CallPointer = std::shared_ptr<Call>;
   using Handler = void (Services::*)(const CallPointer& call);
@@ -51,7 +52,7 @@ class Services {
   };
 
   void add(Transport& transport, Distro distro, Names& names, const Row& row);
-  void receive(const Service& service, Handler handler, std::span<const uint8_t> cdr);
+  void receive(Service& service, Handler handler, std::span<const uint8_t> cdr);
 
   // Asks the run, and answers with its Result alone.
   void pass_on(const CallPointer& call, int32_t kind, std::vector<uint8_t> body);
