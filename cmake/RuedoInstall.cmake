@@ -22,12 +22,21 @@ write_basic_package_version_file(${CMAKE_BINARY_DIR}/cmake/ruedoConfigVersion.cm
 install(FILES ${CMAKE_BINARY_DIR}/cmake/ruedoConfig.cmake ${CMAKE_BINARY_DIR}/cmake/ruedoConfigVersion.cmake
   cmake/RuedoRegression.cmake DESTINATION ${package})
 
+# For those who do not use CMake: pkg-config --cflags --libs ruedo
+string(REGEX REPLACE "[^/]+" ".." up ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+configure_file(cmake/ruedo.pc.in ${CMAKE_BINARY_DIR}/cmake/ruedo.pc @ONLY)
+install(FILES ${CMAKE_BINARY_DIR}/cmake/ruedo.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+
 # The Python client with its pytest fixture, to put on PYTHONPATH; the metadata let pytest find the fixture there.
 set(python ${CMAKE_INSTALL_DATADIR}/ruedo/python)
 install(DIRECTORY ${CMAKE_BINARY_DIR}/python/ruedo DESTINATION ${python} PATTERN __pycache__ EXCLUDE PATTERN "_engine*" EXCLUDE)
 if(TARGET ruedo_python_engine)
   set_target_properties(ruedo_python_engine PROPERTIES INSTALL_RPATH "\$ORIGIN/../../../../${CMAKE_INSTALL_LIBDIR}/ruedo")
   install(TARGETS ruedo_python_engine LIBRARY DESTINATION ${python}/ruedo)
+endif()
+if(TARGET ruedo_python_engine_stable)
+  set_target_properties(ruedo_python_engine_stable PROPERTIES INSTALL_RPATH "\$ORIGIN/../../../../${CMAKE_INSTALL_LIBDIR}/ruedo")
+  install(TARGETS ruedo_python_engine_stable LIBRARY DESTINATION ${python}/ruedo)
 endif()
 set(metadata ${CMAKE_BINARY_DIR}/cmake/ruedo-${PROJECT_VERSION}.dist-info)
 file(WRITE ${metadata}/METADATA "Metadata-Version: 2.1\nName: ruedo\nVersion: ${PROJECT_VERSION}\nRequires-Dist: lcm==1.5.3\nRequires-Dist: numpy\n")

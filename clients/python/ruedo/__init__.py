@@ -12,6 +12,10 @@
 Units are SI, angles radians; x ahead, y left, z up. `ruedo.lcmtypes` has the message types themselves.
 """
 
+from ._installation import load_glib
+
+load_glib()    # before anything imports lcm
+
 try:
     from . import lcmtypes
 except ImportError as _error:

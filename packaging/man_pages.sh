@@ -1,0 +1,15 @@
+#!/usr/bin/env bash
+# man_pages.sh RUEDO FOLDER: ruedo.1 and a page for each command in FOLDER, compressed, from what the program's --help says.
+set -euo pipefail
+ruedo=$1 folder=$2
+mkdir -p "$folder"
+page() {    # NAME WHAT COMMAND...
+  local name=$1 what=$2
+  shift 2
+  SOURCE_DATE_EPOCH=0 LC_ALL=C help2man --no-info --section=1 --name="$what" --version-string="$("$ruedo" --version)" "$*" |
+    sed "s/^\.TH .*/.TH ${name^^} 1 \"\" \"$("$ruedo" --version)\" \"User Commands\"/" | gzip -9n >"$folder/$name.1.gz"
+}
+page ruedo "a simulation server for mobile robots" "$ruedo"
+"$ruedo" --help | sed -n '/^Subcommands:/,/^[A-Z][a-z]* codes/s/^  \([a-z0-9-]\+\) \+\(.*\)/\1 \2/p' | while read -r command what; do
+  page "ruedo-$command" "$what" "$ruedo" "$command" </dev/null
+done
