@@ -24,12 +24,14 @@
 namespace ruedo::cli {
 
 std::vector<run::WaitForOption> with_channels(std::vector<run::WaitForOption> options, const model::WorldModel& world, const Ros2Arguments& arguments) {
-  const auto robots = std::count_if(world.models.begin(), world.models.end(), [](const model::ModelInstance& m) { return m.is_robot() && !m.removed; });
-  ros2::Names names(robots > 1, arguments.topics);
+  std::vector<std::string> robots;
+  for (const model::ModelInstance& model : world.models) {
+    if (model.is_robot() && !model.removed) robots.push_back(model.name);
+  }
+  ros2::Names names(robots.size() == 1 ? robots.front() : "", arguments.topics);
   std::vector<std::string> topics;
-  for (const model::ModelInstance& robot : world.models) {
-    if (!robot.is_robot() || robot.removed) continue;
-    for (const auto& [topic, channel] : ros2::command_topics(robot.name, names)) {
+  for (const std::string& robot : robots) {
+    for (const auto& [topic, channel] : ros2::command_topics(robot, names)) {
       topics.push_back(topic);
       for (run::WaitForOption& option : options) {
         if (option.channel == topic) option.channel = channel;
@@ -72,9 +74,11 @@ std::vector<std::string> joints_of(const model::WorldModel& world, const std::st
 
 ros2::NodeOptions node_options(run::Server& server, const Ros2Arguments& arguments) {
   ros2::NodeOptions options;
-  size_t robots = 0;
-  for (const world_info_t& part : server.info()) robots += part.robots.size();
-  options.conversion = {distro_of(arguments), robots > 1, arguments.topics, arguments.channels};
+  std::vector<std::string> robots;
+  for (const world_info_t& part : server.info()) {
+    for (const robot_info_t& robot : part.robots) robots.push_back(robot.name);
+  }
+  options.conversion = {distro_of(arguments), robots.size() == 1 ? robots.front() : "", arguments.topics, arguments.channels};
   options.clock_hz = arguments.clock_hz;
   options.joints = [&server](const std::string& robot) { return joints_of(*server.world(), robot); };
   return options;

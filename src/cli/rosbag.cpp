@@ -56,16 +56,16 @@ Rosbag::Rosbag(const std::string& folder, ros2::ConversionOptions options) : fol
 
 void Rosbag::begin_scene(const run::LogWorlds::Scene& scene, uint64_t time_ns) {
   std::vector<world_info_t> info;
-  size_t robots = 0;
+  std::vector<std::string> robots;
   for (const std::vector<uint8_t>& bytes : scene.info) {
     world_info_t part;
     if (decode_checked(bytes.data(), bytes.size(), part) != DecodeFault::none) continue;
-    robots += part.robots.size();
+    for (const robot_info_t& robot : part.robots) robots.push_back(robot.name);
     info.push_back(std::move(part));
   }
   if (!names_) {
-    options_.many = robots > 1;
-    names_.emplace(options_.many, options_.topics);
+    options_.root = robots.size() == 1 ? robots.front() : "";
+    names_.emplace(options_.root, options_.topics);
   }
   conversions_ = std::make_unique<ros2::Conversions>(info, options_, *names_);
   write({names_->topic("", "tf_static"), "tf2_msgs/msg/TFMessage", ros2::kLatchedQos}, time_ns, conversions_->static_frames());

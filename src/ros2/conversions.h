@@ -21,7 +21,7 @@ namespace ruedo::ros2 {
 
 struct ConversionOptions {
   Distro distro = Distro::jazzy;
-  bool many = false;                                            // robots have namespaces
+  std::string root;                                             // the robot without a namespace; "": none
   Remaps topics;                                                // of ROS names
   std::vector<std::pair<std::string, std::string>> channels;    // the bus's --remap
 };

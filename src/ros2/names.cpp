@@ -20,14 +20,14 @@ std::string ros_name(const std::string& name) {
 }
 
 std::string Names::topic(const std::string& robot, const std::string& name) {
-  const std::string own = (many_ && !robot.empty() ? "/" + ros_name(robot) : "") + "/" + name;
+  const std::string own = (is_plain(robot) ? "" : "/" + ros_name(robot)) + "/" + name;
   asked_.insert(own);
   const auto remap = std::find_if(remaps_.begin(), remaps_.end(), [&](const auto& each) { return each.first == own; });
   return remap == remaps_.end() ? own : remap->second;
 }
 
 std::string Names::frame(const std::string& robot, const std::string& name) const {
-  return (many_ && !robot.empty() ? ros_name(robot) + "/" : "") + name;
+  return (is_plain(robot) ? "" : ros_name(robot) + "/") + name;
 }
 
 void Names::check_remaps() const {

@@ -1,7 +1,7 @@
 // What robots, devices and frames are called in ROS.
 //
-// One robot has the root namespace and plain frames ("/scan", "base_link"); of many each has its own ("/alice/scan",
-// "alice/base_link"). Names that ROS does not allow are made so that it does, and each is given once.
+// A robot that is alone when a run begins has the root namespace and plain frames ("/scan", "base_link"); every other has its own
+// ("/alice/scan", "alice/base_link"), those that come later, too. Names that ROS does not allow are made so that it does, and each is given once.
 #pragma once
 
 #include <map>
@@ -16,8 +16,8 @@ using Remaps = std::vector<std::pair<std::string, std::string>>;    // "/scan", 
 
 class Names {
  public:
-  // many: every robot gets a namespace. remaps: of topics and services, whole names.
-  Names(bool many, Remaps remaps) : many_(many), remaps_(std::move(remaps)) {}
+  // root: the robot without a namespace; "": none. remaps: of topics and services, whole names.
+  Names(std::string root, Remaps remaps) : root_(std::move(root)), remaps_(std::move(remaps)) {}
 
   // "/alice/scan" for ("alice", "scan"); the world's own have robot "". Throws InputError when two remaps make one name of two.
   std::string topic(const std::string& robot, const std::string& name);
@@ -27,7 +27,9 @@ class Names {
   void check_remaps() const;
 
  private:
-  bool many_;
+  bool is_plain(const std::string& robot) const { return robot.empty() || robot == root_; }
+
+  std::string root_;
   Remaps remaps_;
   std::set<std::string> asked_;
 };

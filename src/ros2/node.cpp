@@ -44,7 +44,7 @@ Node::Node(NodeOptions options, std::unique_ptr<Transport> transport, const std:
     : options_(std::move(options)),
       transport_(std::move(transport)),
       inject_(std::move(inject)),
-      names_(options_.conversion.many, options_.conversion.topics),
+      names_(options_.conversion.root, options_.conversion.topics),
       requests_([this](const std::string& channel, std::span<const uint8_t> message) { inject_(channel, message); }),
       clock_period_us_(std::max<int64_t>(1, rounded(1e6 / options_.clock_hz))) {
   clock_topic_ = {names_.topic("", "clock"), "rosgraph_msgs/msg/Clock", kStateQos};

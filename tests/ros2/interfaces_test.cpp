@@ -48,10 +48,12 @@ TEST(Names, AreMadeFitForRos) {
 }
 
 TEST(Names, OneRobotHasTheRootAndManyHaveNamespaces) {
-  Names one(false, {{"/scan", "/front/scan"}}), many(true, {});
+  Names one("p3at", {{"/scan", "/front/scan"}}), many("", {});
   EXPECT_EQ(one.topic("p3at", "odom"), "/odom");
   EXPECT_EQ(one.topic("p3at", "scan"), "/front/scan");
   EXPECT_EQ(one.frame("p3at", "base_link"), "base_link");
+  EXPECT_EQ(one.topic("bob", "odom"), "/bob/odom");    // who comes later
+  EXPECT_EQ(one.frame("bob", "base_link"), "bob/base_link");
   EXPECT_EQ(many.topic("alice", "scan"), "/alice/scan");
   EXPECT_EQ(many.topic("", "clock"), "/clock");
   EXPECT_EQ(many.frame("alice", "base_link"), "alice/base_link");
@@ -59,7 +61,7 @@ TEST(Names, OneRobotHasTheRootAndManyHaveNamespaces) {
 }
 
 TEST(Names, ARemapOfNothingIsRefused) {
-  Names names(false, {{"/scam", "/x"}});
+  Names names("p3at", {{"/scam", "/x"}});
   names.topic("p3at", "scan");
   EXPECT_THROW(names.check_remaps(), InputError);
 }

@@ -111,6 +111,17 @@ def test_the_humble_of_a_bag_is_humbles(logged):
     assert len(bag_messages(logged / "humble", store)["/sonar_front/range_0"]) > 0
 
 
+@pytest.mark.parametrize("distro", ["humble", "iron", "jazzy", "kilted", "lyrical"])
+def test_hashes_are_those_of_each_release(logged, distro, tmp_path):
+    ruedo("export", logged / "run.lcm", "--ros2", tmp_path / "bag", "--distro", distro)
+    store = get_typestore(getattr(Stores, f"ROS2_{distro.upper()}"))
+    with open(tmp_path / "bag/bag_0.mcap", "rb") as file:
+        summary = make_reader(file).get_summary()
+    told = {summary.schemas[c.schema_id].name: c.metadata["topic_type_hash"] for c in summary.channels.values()}
+    assert told == {name: store.hash_rihs01(name) for name in told} and len(told) >= 9
+    assert len(bag_messages(tmp_path / "bag", store)) == len(summary.channels)
+
+
 def test_a_folder_that_is_there_is_left_alone(logged):
     (logged / "mine").mkdir()
     result = subprocess.run([RUEDO, "export", logged / "run.lcm", "--ros2", logged / "mine"], capture_output=True, text=True)

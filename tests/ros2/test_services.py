@@ -116,6 +116,9 @@ def test_robots_come_and_go_with_their_topics(client):
     spawned = client.call("spawn_entity", "p3at", True, "p3at", "", "", at(0.0, 1.5))
     assert (spawned.result.result, spawned.entity_name) == (OK, "p3at_2"), spawned.result.error_message
     wait_for(lambda: "p3at_2" in client.call("get_entities", filters()).entities, "p3at_2")
+    own, first = client.peer.reader("/p3at_2/ground_truth", Odometry), client.peer.reader("/ground_truth", Odometry)
+    assert all(o.child_frame_id == "p3at_2/base_link" and o.pose.pose.position.y == pytest.approx(1.5) for o in take(own, 5))
+    assert all(o.child_frame_id == "base_link" and o.pose.pose.position.y == pytest.approx(0.0) for o in take(first, 5))
     assert client.call("delete_entity", "p3at_2").result.result == OK
     assert client.call("delete_entity", "p3at_2").result.result == NOT_FOUND
 
