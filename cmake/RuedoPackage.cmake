@@ -14,8 +14,9 @@ set(CPACK_PACKAGE_NAME ruedo)
 set(CPACK_PACKAGE_VENDOR "The Ruedo authors")
 set(CPACK_PACKAGE_CONTACT "The Ruedo authors <ruedo@localhost>")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "simulation server for mobile robots")
-set(CPACK_PACKAGE_DESCRIPTION "Loads worlds and robots in SDF and URDF, steps them, and serves their sensors over LCM, with clients for C++, Python and Java.
-The same seed and commands give the same bytes.")
+set(CPACK_PACKAGE_DESCRIPTION "Loads worlds and robots in SDF and URDF, steps them, and serves their
+sensors over LCM, with clients for C++, Python and Java. The same seed and
+commands give the same bytes.")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)

@@ -11,5 +11,6 @@ page() {    # NAME WHAT COMMAND...
 }
 page ruedo "a simulation server for mobile robots" "$ruedo"
 "$ruedo" --help | sed -n '/^Subcommands:/,/^[A-Z][a-z]* codes/s/^  \([a-z0-9-]\+\) \+\(.*\)/\1 \2/p' | while read -r command what; do
+  "$ruedo" "$command" --help >/dev/null 2>&1 </dev/null || continue    # a command of the Python client, which is not there
   page "ruedo-$command" "$what" "$ruedo" "$command" </dev/null
 done

@@ -79,6 +79,7 @@ final class UdpmTransport implements Transport {
         try (DatagramChannel probe = DatagramChannel.open(StandardProtocolFamily.INET)) {
             probe.connect(group);
             InetAddress own = ((InetSocketAddress) probe.getLocalAddress()).getAddress();
+            if (own.isAnyLocalAddress()) own = InetAddress.getByName("127.0.0.1");    // loopback's own is given to no way out
             NetworkInterface found = NetworkInterface.getByInetAddress(own);
             if (found == null) throw new IOException("no interface has the address " + own.getHostAddress());
             return found;
