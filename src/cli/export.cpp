@@ -52,12 +52,17 @@ uint64_t read_log(const std::string& path, const log::Index& index, const run::L
   return read;
 }
 
+std::string without_slash(std::string folder) {
+  while (folder.size() > 1 && folder.ends_with('/')) folder.pop_back();
+  return folder;
+}
+
 void export_bag(const ExportArguments& arguments, const log::Index& index, const run::LogWorlds& worlds, const run::LoggedRun& logged) {
   ros2::ConversionOptions options;
   options.distro = ros2::parse_distro(arguments.distro);
   options.channels = logged.remaps;
   for (const std::string& text : arguments.remaps) options.topics.push_back(parse_remap(text));
-  Rosbag bag(arguments.bag, options);
+  Rosbag bag(without_slash(arguments.bag), options);
   const uint64_t read = read_log(arguments.log, index, worlds, bag);
   bag.finish();
   fmt::print("{}: {} messages of {}, as {} of ROS 2's types; {} are of types that ROS 2 has no message for\n", arguments.bag, read, arguments.log,
@@ -78,7 +83,7 @@ void export_foxglove(const ExportArguments& arguments, const log::Index& index, 
 
 int export_log(const ExportArguments& arguments) {
   if (arguments.out.empty() == arguments.bag.empty()) throw InputError({}, "give OUT, or --ros2 FOLDER");
-  if (arguments.sandboxed) enter_sandbox(arguments.log, {arguments.out, arguments.bag});
+  if (arguments.sandboxed) enter_sandbox(arguments.log, {arguments.out, without_slash(arguments.bag)});
   const log::Index index(arguments.log);
   run::LoggedRun logged;
   const run::LogWorlds worlds(index, [&](const log_header_t& header) { return logged = load_run(header, arguments.log); });

@@ -46,12 +46,18 @@ std::string quoted(const std::string& text) {
 
 Rosbag::Rosbag(const std::string& folder, ros2::ConversionOptions options) : folder_(folder), options_(std::move(options)) {
   std::error_code error;
-  while (folder_.size() > 1 && folder_.ends_with('/')) folder_.pop_back();
   if (fs::exists(folder_, error)) throw InputError({}, "--ros2: " + folder_ + " is there already; a bag gets a folder of its own");
   fs::create_directories(folder_, error);
   if (error) throw EnvironmentError(folder_ + " cannot be made: " + error.message());
   file_ = fs::path(folder_).filename().string() + "_0.mcap";
   out_ = std::make_unique<McapWriter>((fs::path(folder_) / file_).string(), "ros2");
+}
+
+Rosbag::~Rosbag() {
+  if (finished_) return;
+  out_.reset();    // which removes its file
+  std::error_code error;
+  fs::remove(folder_, error);
 }
 
 void Rosbag::begin_scene(const run::LogWorlds::Scene& scene, uint64_t time_ns) {
@@ -67,8 +73,10 @@ void Rosbag::begin_scene(const run::LogWorlds::Scene& scene, uint64_t time_ns) {
     options_.root = robots.size() == 1 ? robots.front() : "";
     names_.emplace(options_.root, options_.topics);
   }
+  const bool first = !conversions_;
   conversions_ = std::make_unique<ros2::Conversions>(info, options_, *names_);
   write({names_->topic("", "tf_static"), "tf2_msgs/msg/TFMessage", ros2::kLatchedQos}, time_ns, conversions_->static_frames());
+  if (first) names_->check_remaps();
 }
 
 void Rosbag::add(const std::string& channel, uint64_t time_ns, std::span<const uint8_t> message) {
@@ -122,6 +130,7 @@ void Rosbag::finish() {
   file << metadata();
   file.close();
   if (!file) throw EnvironmentError(path.string() + " cannot be written: " + std::strerror(errno));
+  finished_ = true;
 }
 
 }  // namespace ruedo::cli

@@ -18,8 +18,9 @@ namespace ruedo::cli {
 
 class Rosbag {
  public:
-  // Makes the folder. Throws InputError when it is there already, and EnvironmentError when it cannot be made.
+  // Makes the folder (no slash at its end). Throws InputError when it is there already, and EnvironmentError when it cannot be made.
   Rosbag(const std::string& folder, ros2::ConversionOptions options);
+  ~Rosbag();    // a bag that was not finished is removed
 
   // What runs from now on.
   void begin_scene(const run::LogWorlds::Scene& scene, uint64_t time_ns);
@@ -48,6 +49,7 @@ class Rosbag {
   std::map<std::string, uint16_t> schemas_;
   std::map<std::string, Recorded> topics_;    // by name and type
   uint64_t begin_ns_ = 0, end_ns_ = 0, left_out_ = 0;
+  bool finished_ = false;
 };
 
 }  // namespace ruedo::cli

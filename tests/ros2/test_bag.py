@@ -122,6 +122,14 @@ def test_hashes_are_those_of_each_release(logged, distro, tmp_path):
     assert len(bag_messages(tmp_path / "bag", store)) == len(summary.channels)
 
 
+def test_topics_of_a_bag_are_remapped(logged):
+    ruedo("export", logged / "run.lcm", "--ros2", f"{logged / 'remapped'}/", "--remap", "/scan=/front/scan")
+    assert "/front/scan" in bag_messages(logged / "remapped", get_typestore(Stores.ROS2_JAZZY))
+    wrong = subprocess.run([RUEDO, "export", logged / "run.lcm", "--ros2", logged / "none", "--remap", "/scam=/x"], capture_output=True, text=True)
+    assert wrong.returncode in (2, 3) and "did you mean '/scan'?" in wrong.stderr
+    assert not (logged / "none").exists()
+
+
 def test_a_folder_that_is_there_is_left_alone(logged):
     (logged / "mine").mkdir()
     result = subprocess.run([RUEDO, "export", logged / "run.lcm", "--ros2", logged / "mine"], capture_output=True, text=True)
