@@ -35,7 +35,7 @@ def png_pixels(path):
 def test_bases_are_what_the_script_makes(tmp_path):
     subprocess.run([sys.executable, WORLDS / "robots/make_bases.py", tmp_path], check=True)
     made = sorted(path for path in tmp_path.rglob("*") if path.is_file())
-    assert len(made) == 12
+    assert len(made) == 16
     for path in made:
         assert path.read_text() == (WORLDS / "robots" / path.relative_to(tmp_path)).read_text(), path
 

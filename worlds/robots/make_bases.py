@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Makes the robots that show each way to steer: a car, a tricycle, a mecanum, an omni, a holonomic and a tracked base.
+"""Makes the robots that show each way to steer: a car, a tricycle, a mecanum, an omni, a holonomic and a tracked base; a small one for
+lessons, and one with an arm.
 
     worlds/robots/make_bases.py [FOLDER]
 
@@ -159,7 +160,59 @@ def puck():
     return "A disc that moves in every direction.", text
 
 
+def round_base(mass, shell, ground, high, radius, track, more=""):
+    """Two wheels in the middle, a ball before and one behind, on which it slides."""
+    middle = ground + high / 2
+    text = (f'    <link name="base_link">\n      <inertial><pose>0 0 {number(middle)} 0 0 0</pose><mass>{number(mass)}</mass>'
+            f"<inertia>{inertia(mass, 1.7 * shell, 1.7 * shell, high)}</inertia></inertial>\n")
+    text += shape("", (0, 0, middle, 0, 0, 0), f"<cylinder><radius>{number(shell)}</radius><length>{number(high)}</length></cylinder>", DARK)
+    ball = ground / 2 + 0.004
+    for name, x in (("caster_front", 0.75 * shell), ("caster_rear", -0.75 * shell)):
+        text += shape(SLIDES, (x, 0, ball, 0, 0, 0), f"<sphere><radius>{number(ball)}</radius></sphere>", GREY, name)
+    text += more + "    </link>\n"
+    for side, y in (("left", track / 2), ("right", -track / 2)):
+        text += wheel(f"{side}_wheel", 0, y, radius, 0.02, mass=0.1) + joint(f"{side}_joint", "base_link", f"{side}_wheel")
+    return text
+
+
+def turtle():
+    """A small round robot for lessons, with a range finder, a camera and an IMU."""
+    plates = "".join(shape("", (0, 0, z, 0, 0, 0), "<cylinder><radius>0.14</radius><length>0.012</length></cylinder>", GREY, f"plate_{i}") for i, z in enumerate((0.19, 0.27)))
+    posts = "".join(shape("", (0.1 * math.cos(a), 0.1 * math.sin(a), 0.185, 0, 0, 0), "<cylinder><radius>0.008</radius><length>0.17</length></cylinder>", DARK, f"post_{i}")
+                    for i, a in enumerate((0.8, 2.35, 3.93, 5.5)))
+    camera = ('      <sensor name="camera" type="camera">\n        <pose>0.13 0 0.22 0 0 0</pose><update_rate>15</update_rate>\n        <camera><horizontal_fov>1.05</horizontal_fov>'
+              "<image><width>320</width><height>240</height></image><clip><near>0.05</near><far>30</far></clip></camera>\n      </sensor>\n")
+    text = round_base(3.4, 0.17, 0.02, 0.08, 0.036, 0.235, plates + posts + sensors(0.35) + camera)
+    text += drive("differential", [("left_joint", "left_joint"), ("right_joint", "right_joint")] + limits(0.5, 2, 0.8, 4))
+    return "A small round robot for lessons: two wheels, a range finder all around, a camera and an IMU.", text
+
+
+def segment(name, parent, at, length, mass, axis, most, effort):
+    """A link of the arm, upright above its joint, and the joint."""
+    x, y, z = at
+    link = (f'    <link name="{name}"><pose>{numbers((x, y, z, 0, 0, 0))}</pose>\n      <inertial><pose>0 0 {number(length / 2)} 0 0 0</pose><mass>{number(mass)}</mass>'
+            f"<inertia>{inertia(mass, 0.05, 0.05, length)}</inertia></inertial>\n")
+    link += shape("", (0, 0, length / 2, 0, 0, 0), f"<box><size>0.045 0.045 {number(length - 0.01)}</size></box>", RED, "tube") + "    </link>\n"
+    return link + (f'    <joint name="{name}_joint" type="revolute"><parent>{parent}</parent><child>{name}</child><axis><xyz>{axis}</xyz>'
+                   f"<limit><lower>{number(-most)}</lower><upper>{number(most)}</upper><effort>{number(effort)}</effort><velocity>2</velocity></limit>"
+                   f"<dynamics><damping>0.1</damping></dynamics></axis></joint>\n")
+
+
+def carrier():
+    """An arm of four joints on a base of two wheels; joint_command moves it."""
+    text = round_base(25, 0.26, 0.03, 0.24, 0.08, 0.4, sensors(0.34, 0.18))
+    parent, z = "base_link", 0.27
+    for name, length, mass, axis, most, effort in (("turret", 0.08, 1.0, "0 0 1", 3.0, 20), ("upper_arm", 0.3, 1.2, "0 1 0", 1.9, 40),
+                                                   ("forearm", 0.26, 0.8, "0 1 0", 2.4, 25), ("hand", 0.1, 0.3, "0 1 0", 1.9, 8)):
+        text += segment(name, parent, (-0.06, 0, z), length, mass, axis, most, effort)
+        parent, z = name, z + length
+    text += drive("differential", [("left_joint", "left_joint"), ("right_joint", "right_joint")] + limits(0.8, 1.5, 0.6, 3))
+    return "An arm of four joints on a base of two wheels.", text
+
+
 ROBOTS = {
+    "turtle": turtle,
+    "carrier": carrier,
     "car": car,
     "tricycle": tricycle,
     "mecanum": lambda: four("mecanum", "mecanum", RED, "Four mecanum wheels, whose rollers' axes meet in the middle."),
