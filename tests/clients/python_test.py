@@ -3,6 +3,8 @@
 import math
 import os
 import sys
+import warnings
+import zlib
 
 import lcm
 import numpy as np
@@ -175,3 +177,68 @@ def test_a_log_as_pandas_has_it(tmp_path):
     frame = frames["p3at/odometry"]
     assert list(frame["x"]) == [0.0, 0.5, 1.0] and list(frame.index) == pytest.approx([0.0, 0.02, 0.04]) and frame["angle"].iloc[2] == [2.0]
     assert ruedo.read_log(tmp_path / "run.lcm", ["nothing"]) == {}
+
+
+class At:
+    """Something placed: 1 m ahead and 0.5 m up, a quarter turn to the left."""
+    position = np.array([1.0, 0.0, 0.5])
+    orientation = np.array([math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)])
+
+
+def test_points_of_a_scan():
+    found = scan(2.0, math.inf, 1.0, -math.inf).points()    # at -0.5, 0 and 0.5 rad from the third on
+    assert np.allclose(found, [[2 * math.cos(-0.5), 2 * math.sin(-0.5)], [1.0, 0.0]])
+    ahead = scan(math.inf, math.inf, 2.0)                   # along the device's x axis
+    assert np.allclose(ahead.points(At()), [[1.0, 2.0, 0.5]])
+    assert np.allclose(ahead.points(At(), At()), [[1.0 - 2.0, 1.0, 1.0]])
+    with pytest.raises(TypeError, match="needs the device"):
+        ahead.points(pose=At())
+
+
+def test_notebooks_show_pictures_and_scans():
+    pixels = np.arange(2 * 3 * 3, dtype=np.uint8).reshape(2, 3, 3)
+    picture = samples.Image(5, 3, 2, "rgb", 9, pixels.tobytes())
+    png = picture._repr_png_()
+    assert png.startswith(b"\x89PNG\r\n\x1a\n") and picture._repr_jpeg_() is None
+    body = png[png.index(b"IDAT") + 4:]
+    rows = np.frombuffer(zlib.decompressobj().decompress(body), np.uint8).reshape(2, 10)
+    assert (rows[:, 1:].reshape(2, 3, 3) == pixels).all() and (rows[:, 0] == 0).all()
+    assert samples.Image(5, 3, 2, "jpeg", 0, b"\xff\xd8")._repr_jpeg_() == b"\xff\xd8"
+    depth = samples.Image(5, 2, 1, "float32", 8, np.array([1.0, math.inf], np.float32).tobytes())
+    assert depth._repr_png_().startswith(b"\x89PNG")
+    svg = scan(math.inf, math.inf, 2.0)._repr_svg_()
+    assert svg.startswith("<svg") and svg.count("<circle") == 1
+
+
+def test_a_map_is_an_array(tmp_path):
+    (tmp_path / "m.pgm").write_bytes(b"P5\n# a comment\n3 2\n255\n" + bytes([0, 254, 205, 254, 254, 0]))
+    (tmp_path / "m.yaml").write_text("image: m.pgm\nresolution: 0.5\norigin: [-1, -2, 0]\noccupied_thresh: 0.65\nfree_thresh: 0.196\n")
+    grid = ruedo.load_map(tmp_path / "m.yaml")
+    assert grid.cells.tolist() == [[0, 0, 100], [100, 0, -1]]    # the picture's last row is the southernmost
+    assert grid.resolution == 0.5 and grid.origin == (-1.0, -2.0, 0.0)
+    assert grid.at(0.4, -1.9) == 100 and grid.at(-0.9, -1.4) == 100 and grid.at(-0.9, -1.9) == 0 and grid.at(5, 5) == -1
+
+
+@pytest.mark.parametrize("text, says", [
+    ("image: m.pgm\n", "resolution, origin is missing"),
+    ("[1, 2]", "a map of image, resolution and origin is wanted"),
+    ("image: m.pgm\nresolution: -1\norigin: [0, 0, 0]\n", "resolution is -1: a number above 0 is wanted"),
+    ("image: m.pgm\nresolution: 1\norigin: [0, 0]\n", "origin is .*: three numbers are wanted"),
+    ("image: m.pgm\nresolution: 1\norigin: [0, 0, 0]\n", "with 9 x 9 pixels is wanted, and 1 bytes are there"),
+])
+def test_a_wrong_map_says_what_is_wrong(text, says, tmp_path):
+    (tmp_path / "m.pgm").write_bytes(b"P5 9 9 255\n1")
+    (tmp_path / "m.yaml").write_text(text)
+    with pytest.raises(ValueError, match=f"m.(yaml|pgm): {says}"):
+        ruedo.load_map(tmp_path / "m.yaml")
+
+
+def test_degrees_are_warned_of():
+    from ruedo.robot import _radians
+    for call, angle, usual in (("rotate", 90, 4 * math.pi), ("turn_to", -45, 2 * math.pi)):
+        with pytest.warns(UserWarning, match=rf"{call}\({angle}\) is .* turns: angles are in radians"):
+            _radians(call, angle, usual)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for angle in (math.pi, 3 * math.pi, 2, -6, 13.37):
+            _radians("rotate", angle, 4 * math.pi)

@@ -28,6 +28,7 @@ from .errors import (LaunchError, LeaseLost, MotionError, NoServer, NotSupported
 from .launch import find_ruedo, launch
 from .lockstep import Command, Message, Observations
 from .logs import read_log
+from .maps import OccupancyMap, load_map
 from .motion import Motion
 from .robot import Camera, Device, Robot
 from .samples import (CameraInfo, Contact, ContactPoint, Image, Imu, Joints, LidarScan, MotionStatus, Odometry, Pose, Sample,
@@ -53,7 +54,7 @@ def __getattr__(name: str) -> object:
 
 __all__ = [
     "Body", "Camera", "CameraInfo", "Command", "Contact", "ContactPoint", "Device", "Image", "Imu", "Joints", "LaunchError", "LeaseLost",
-    "LidarScan", "Message", "Motion", "MotionError", "MotionStatus", "NoServer", "NotSupported", "Observations", "Odometry", "Pose", "Reader", "RequestError", "Robot",
+    "LidarScan", "Message", "Motion", "MotionError", "MotionStatus", "NoServer", "NotSupported", "Observations", "OccupancyMap", "Odometry", "Pose", "Reader", "RequestError", "Robot",
     "RuedoError", "Sample", "Scan", "Simulation", "SonarReading", "State", "Stream", "Subscription", "Timeout", "TypeMismatch",
-    "UnknownName", "World", "connect", "find_ruedo", "launch", "lcmtypes", "read_log",
+    "UnknownName", "World", "connect", "find_ruedo", "launch", "lcmtypes", "load_map", "read_log",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -239,10 +240,12 @@ class Robot:
 
     def rotate(self, angle: float, speed: float = 0.0, acceleration: float = 0.0, deceleration: float = 0.0) -> Motion:
         """Turns on the spot by an angle (rad, more than a turn is allowed). Limits in rad/s and rad/s^2."""
+        _radians("rotate", angle, 4.0 * math.pi)
         return self._move("rotate", lcmtypes.move_command_t.ROTATE, angle, 0.0, speed, acceleration, deceleration)
 
     def turn_to(self, heading: float, speed: float = 0.0, acceleration: float = 0.0, deceleration: float = 0.0) -> Motion:
         """Turns on the spot, the shorter way, to a heading (rad, in the frame odom). Limits in rad/s and rad/s^2."""
+        _radians("turn_to", heading, 2.0 * math.pi)
         return self._move("turn_to", lcmtypes.move_command_t.HEADING, heading, 0.0, speed, acceleration, deceleration)
 
     def arc(self, angle: float, radius: float, speed: float = 0.0, acceleration: float = 0.0, deceleration: float = 0.0) -> Motion:
@@ -250,6 +253,7 @@ class Robot:
         left). Limits in m/s and m/s^2."""
         if not radius > 0.0:
             raise ValueError(f"radius is {radius}: it must be > 0 m; the sign of the angle says left or right")
+        _radians("arc", angle, 4.0 * math.pi)
         return self._move("arc", lcmtypes.move_command_t.ARC, angle, radius, speed, acceleration, deceleration)
 
     def _move(self, name: str, kind: int, value: float, radius: float = 0.0, speed: float = 0.0, acceleration: float = 0.0,
@@ -313,6 +317,12 @@ class Robot:
 
     def _plain(self, channel: Any) -> Stream[Any]:
         return self._sim._stream(channel, lambda: Stream(self._sim, channel.name, channel.type, channel.fingerprint, channel.rate))
+
+
+def _radians(call: str, angle: float, usual: float) -> None:
+    """Whole degrees that are many turns as radians are taken for a mistake, and named; they are obeyed all the same."""
+    if abs(angle) > usual and float(angle).is_integer():
+        warnings.warn(f"{call}({angle:g}) is {abs(angle) / (2.0 * math.pi):.1f} turns: angles are in radians, {call}(math.radians({angle:g}))", stacklevel=3)
 
 
 def _finite(name: str, value: float) -> float:

@@ -14,9 +14,9 @@ from typing import Any, Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from . import lcmtypes
-
-Floats = NDArray[np.float64]
+from . import lcmtypes, notebook
+from .errors import NotSupported
+from .geometry import Floats, Placed, transformed
 
 _PIXEL_FORMATS = {
     lcmtypes.image_t.PIXEL_FORMAT_GRAY: "gray",
@@ -96,6 +96,36 @@ class Scan(Sample):
         is nearer than the device can measure."""
         part = self.ranges[(self.angles >= from_angle) & (self.angles <= to_angle)]
         return float(part.min()) if part.size else math.inf
+
+    def points(self, device: Placed | None = None, pose: Placed | None = None) -> Floats:
+        """Where the rays ended, of those that returned: (k, 2) m in the device's frame; with the device (``robot.lrf``) (k, 3)
+        in base_link, and with the robot's pose, too, in the world."""
+        good = np.isfinite(self.ranges)
+        ranges, angles = self.ranges[good], self.angles[good]
+        points = np.stack([ranges * np.cos(angles), ranges * np.sin(angles)], axis=1)
+        if device is None:
+            if pose is not None:
+                raise TypeError("points(pose=...) needs the device, too: points(robot.lrf, pose)")
+            return points
+        above = transformed(np.column_stack([points, np.zeros(len(points))]), device)
+        return above if pose is None else transformed(above, pose)
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draws the scan, x upwards as the robot looks, y to the left. axes: matplotlib's; None: new ones. Returns them. Needs matplotlib."""
+        if axes is None:
+            try:
+                from matplotlib import pyplot
+            except ImportError:
+                raise NotSupported("plot() needs matplotlib: pip install matplotlib") from None
+            axes = pyplot.subplots()[1]
+        points = self.points()
+        axes.plot(-points[:, 1], points[:, 0], ".", markersize=3)
+        axes.plot(0.0, 0.0, "^", color="tab:red")
+        axes.set(aspect="equal", xlabel="to the right, m", ylabel="ahead, m")
+        return axes
+
+    def _repr_svg_(self) -> str:
+        return notebook.scan_svg(self.points())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -194,6 +224,12 @@ class Image(Sample):
             return pixels
         colour = pixels.reshape(self.height, self.width, channels)
         return colour[:, :, ::-1] if self.format == "bgr" else colour
+
+    def _repr_jpeg_(self) -> bytes | None:
+        return self.data if self.format == "jpeg" else None
+
+    def _repr_png_(self) -> bytes | None:
+        return None if self.format == "jpeg" else notebook.png(notebook.visible(self.array()))
 
     def save(self, path: str | Path) -> None:
         """Writes a JPEG's bytes as they are. Raw 8-bit pictures are written as PPM or PGM."""
