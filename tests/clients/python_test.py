@@ -224,7 +224,7 @@ def test_a_map_is_an_array(tmp_path):
     ("[1, 2]", "a map of image, resolution and origin is wanted"),
     ("image: m.pgm\nresolution: -1\norigin: [0, 0, 0]\n", "resolution is -1: a number above 0 is wanted"),
     ("image: m.pgm\nresolution: 1\norigin: [0, 0]\n", "origin is .*: three numbers are wanted"),
-    ("image: m.pgm\nresolution: 1\norigin: [0, 0, 0]\n", "with 9 x 9 pixels is wanted, and 1 bytes are there"),
+    ("image: m.pgm\nresolution: 1\norigin: [0, 0, 0]\n", "a PGM of 8 bits with 9 x 9 pixels is wanted, and 1 bytes are there"),
 ])
 def test_a_wrong_map_says_what_is_wrong(text, says, tmp_path):
     (tmp_path / "m.pgm").write_bytes(b"P5 9 9 255\n1")
