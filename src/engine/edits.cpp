@@ -9,7 +9,7 @@
 #include "model/placement.h"
 #include "model/read_context.h"
 #include "core/sha256.h"
-#include "ruedo/math.h"
+#include "engine/world_editor.h"
 
 namespace ruedo::engine {
 namespace {
@@ -57,13 +57,6 @@ std::string fault_of_name(const std::string& name) {
   return "";
 }
 
-int find_model(const model::WorldModel& world, const std::string& name) {
-  const auto found = std::find_if(world.models.begin(), world.models.end(), [&](const model::ModelInstance& instance) {
-    return !instance.removed && instance.name == name;
-  });
-  return found == world.models.end() ? -1 : static_cast<int>(found - world.models.begin());
-}
-
 Outcome unknown(const std::string& name) { return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no model called '" + name + "'"); }
 
 // Why a model cannot be put elsewhere or pushed; "": it can.
@@ -86,13 +79,6 @@ Pose link_now(const Simulation& simulation, size_t instance, size_t link) {
 }
 
 }  // namespace
-
-std::string unused_name(const model::WorldModel& world, const std::string& name) {
-  if (find_model(world, name) < 0) return name;
-  int number = 2;
-  while (find_model(world, name + "_" + std::to_string(number)) >= 0) ++number;
-  return name + "_" + std::to_string(number);
-}
 
 model::LoadedModel ModelStore::load(const spawn_request_t& request, model::LoadBudget* budget) {
   std::string key;
@@ -141,11 +127,7 @@ Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, 
   if (!request.name.empty() && find_model(world, request.name) >= 0) return refused("the name '" + request.name + "' is taken");
   name = request.name.empty() ? unused_name(world, loaded.name) : request.name;
   if (const std::string fault = fault_of_name(name); !fault.empty()) return bad("the model's name '" + name + "' " + fault);
-  Pose X_WM = pose_of(request.position, request.orientation);
-  const Vec3 ahead = X_WM.rotation * Vec3::UnitX();
-  if (request.on_ground) {
-    X_WM = model::standing_on(world, *loaded.model, request.position[0], request.position[1], math::atan2(ahead.y(), ahead.x()));
-  }
+  const Pose X_WM = spawn_pose(world, *loaded.model, request);
   const auto now = [&](size_t instance, size_t link) { return link_now(simulation, instance, link); };
   if (const std::string other = model::overlapped(world, *loaded.model, X_WM, now); !other.empty()) {
     return refused("there is no room for '" + name + "' at " + list_of({{X_WM.translation.x(), X_WM.translation.y(), X_WM.translation.z()}}) +

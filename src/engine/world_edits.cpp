@@ -3,6 +3,7 @@
 #include <thread>
 
 #include "engine/world.h"
+#include "engine/world_editor.h"
 #include "engine/world_state.h"
 
 namespace ruedo::engine {
@@ -19,23 +20,10 @@ constexpr unsigned kMostDrawers = 8;    // threads that draw
 
 }  // namespace
 
-// At the end of all lists, or in the place of a removed instance of the model: whoever lets models come and go for days
-// has lists that do not grow.
 int World::place(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model) {
-  const auto free = std::find_if(model_.models.begin(), model_.models.end(), [&](const model::ModelInstance& instance) {
-    return instance.removed && instance.model == model;
-  });
-  if (free == model_.models.end()) {
-    model_.models.push_back({name, X_WM, std::move(model)});
-    layout_.append(model_);
-    return static_cast<int>(model_.models.size()) - 1;
-  }
-  const int instance = static_cast<int>(free - model_.models.begin());
-  free->name = name;
-  free->X_WM = X_WM;
-  free->removed = false;
-  layout_.place_again(model_, instance);
-  return instance;
+  const WorldEditor::Placed placed = WorldEditor(model_).place(name, X_WM, std::move(model));
+  placed.reused ? layout_.place_again(model_, placed.instance) : layout_.append(model_);
+  return placed.instance;
 }
 
 int World::add_model(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model, int64_t step,
@@ -85,15 +73,14 @@ void World::show_beginning(Fleet& fleet, int64_t step) const {
 }
 
 void World::remove_model(int instance, Channels& channels) {
-  model::ModelInstance& removed = model_.models[static_cast<size_t>(instance)];
+  const std::string name = model_.models[static_cast<size_t>(instance)].name;
   if (const int robot = robot_of(layout_, instance); robot >= 0) {
     for (auto& module : modules_) module->remove(robot);
-    std::erase_if(devices_, [&](const device_info_t& device) { return device.robot == removed.name; });
+    std::erase_if(devices_, [&](const device_info_t& device) { return device.robot == name; });
     inbox_.remove(robot);
-    channels.remove(removed.name);
+    channels.remove(name);
   }
-  removed.removed = true;
-  removed.name.clear();
+  WorldEditor(model_).remove(instance);
   physics_->remove(instance);
   robots_->remove(instance);
   statics_ = std::make_shared<StaticScenes>();

@@ -7,16 +7,15 @@
 
 #include "core/utf8.h"
 #include "model/body_layout.h"
-#include "model/placement.h"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
-#include "ruedo/math.h"
 #include "ruedo/name_request_t.hpp"
 #include "ruedo/request_t.hpp"
 #include "ruedo/reset_request_t.hpp"
 #include "ruedo/world_info_t.hpp"
 #include "engine/edits.h"
 #include "engine/fleet.h"
+#include "engine/world_editor.h"
 #include "engine/world_info.h"
 
 namespace ruedo::run {
@@ -24,28 +23,11 @@ namespace {
 
 constexpr size_t kMostPlaced = 50'000;    // models of all scenes together: each scene lists its own
 
-using model::ModelInstance;
 using model::WorldModel;
 
 template <class Body>
 bool read_body(const applied_t& applied, Body& body) {
   return decode_checked(applied.data.data(), applied.data.size(), body) == DecodeFault::none;
-}
-
-void spawn(const spawn_request_t& request, const model::LoadedModel& loaded, WorldModel& world) {
-  const double* q = request.orientation;
-  Pose X_WM{Quat(q[0], q[1], q[2], q[3]).normalized(), Vec3(request.position[0], request.position[1], request.position[2])};
-  const Vec3 ahead = X_WM.rotation * Vec3::UnitX();
-  if (request.on_ground) X_WM = model::standing_on(world, *loaded.model, request.position[0], request.position[1], math::atan2(ahead.y(), ahead.x()));
-  const std::string name = request.name.empty() ? engine::unused_name(world, loaded.name) : request.name;
-  const auto free = std::find_if(world.models.begin(), world.models.end(), [&](const ModelInstance& instance) {
-    return instance.removed && instance.model == loaded.model;
-  });
-  if (free == world.models.end()) {
-    world.models.push_back({name, X_WM, loaded.model});
-  } else {
-    *free = {name, X_WM, loaded.model};
-  }
 }
 
 // The world after a request; null when it changed no model.
@@ -60,20 +42,20 @@ std::shared_ptr<const WorldModel> edited(const applied_t& applied, const std::sh
     case request_t::REMOVE: {
       name_request_t body;
       if (!read_body(applied, body)) return nullptr;
+      const int instance = engine::find_model(*before, body.name);
+      if (instance < 0) return nullptr;
       auto world = std::make_shared<WorldModel>(*before);
-      for (ModelInstance& instance : world->models) {
-        if (instance.removed || instance.name != body.name) continue;
-        instance.removed = true;
-        instance.name.clear();
-        return world;
-      }
-      return nullptr;
+      engine::WorldEditor(*world).remove(instance);
+      return world;
     }
     default: {
       spawn_request_t body;
       if (!read_body(applied, body) || engine::check_spawn(body).code != reply_t::OK) return nullptr;
       auto world = std::make_shared<WorldModel>(*before);
-      spawn(body, models.load(body), *world);
+      const model::LoadedModel loaded = models.load(body);
+      const std::string name = body.name.empty() ? engine::unused_name(*world, loaded.name) : body.name;
+      const Pose X_WM = engine::spawn_pose(*world, *loaded.model, body);
+      engine::WorldEditor(*world).place(name, X_WM, loaded.model);
       return world;
     }
   }

@@ -1,0 +1,66 @@
+// Names and places of models that come and go.
+#include "engine/world_editor.h"
+
+#include <gtest/gtest.h>
+
+#include "engine/edits.h"
+
+namespace ruedo::engine {
+namespace {
+
+std::shared_ptr<const model::Model> made() { return std::make_shared<model::Model>(); }
+
+model::WorldModel with(const std::vector<std::string>& names) {
+  model::WorldModel world;
+  for (const std::string& name : names) world.models.push_back({name, Pose{}, made()});
+  return world;
+}
+
+TEST(WorldEditor, FindsTheFirstUnusedName) {
+  EXPECT_EQ(unused_name(with({}), "cart"), "cart");
+  EXPECT_EQ(unused_name(with({"cart"}), "cart"), "cart_2");
+  EXPECT_EQ(unused_name(with({"cart", "cart_2", "cart_4"}), "cart"), "cart_3");
+  EXPECT_EQ(unused_name(with({"cart", "cart_3"}), "cart"), "cart_2");
+  // Not of that row: 0 and 1, what is no number, and numbers written otherwise.
+  EXPECT_EQ(unused_name(with({"cart", "cart_0", "cart_1", "cart_x", "cart_", "cart_02", "cart_2x", "cart_-2", "carts_2"}), "cart"), "cart_2");
+  EXPECT_EQ(unused_name(with({"cart", "cart_99999999999999999999"}), "cart"), "cart_2");
+}
+
+TEST(WorldEditor, NamesOfTheRemovedAreFree) {
+  model::WorldModel world = with({"cart", "cart_2"});
+  WorldEditor(world).remove(0);
+  EXPECT_EQ(find_model(world, "cart"), -1);
+  EXPECT_EQ(find_model(world, "cart_2"), 1);
+  EXPECT_EQ(unused_name(world, "cart"), "cart");
+}
+
+TEST(WorldEditor, PlacesAModelWhereOneOfItsKindWas) {
+  model::WorldModel world = with({"a", "b", "c"});
+  WorldEditor editor(world);
+  const auto model = world.models[1].model;
+  editor.remove(1);
+  const WorldEditor::Placed other = editor.place("d", Pose{}, made());
+  EXPECT_EQ(other.instance, 3);
+  EXPECT_FALSE(other.reused);
+  const Pose X_WM{Quat::Identity(), Vec3(1, 2, 3)};
+  const WorldEditor::Placed same = editor.place("e", X_WM, model);
+  EXPECT_EQ(same.instance, 1);
+  EXPECT_TRUE(same.reused);
+  EXPECT_EQ(world.models[1].name, "e");
+  EXPECT_FALSE(world.models[1].removed);
+  EXPECT_EQ(world.models[1].X_WM.translation, Vec3(1, 2, 3));
+  EXPECT_EQ(editor.place("f", Pose{}, model).instance, 4);    // its place is taken
+}
+
+TEST(WorldEditor, SpawnsWhereTheRequestSays) {
+  spawn_request_t request{};
+  request.position[0] = 1.0;
+  request.position[2] = 0.5;
+  request.orientation[0] = 1.0005;    // as good as a unit quaternion
+  const Pose X_WM = spawn_pose(model::WorldModel{}, model::Model{}, request);
+  EXPECT_EQ(X_WM.translation, Vec3(1.0, 0.0, 0.5));
+  EXPECT_EQ(X_WM.rotation.w(), 1.0);
+}
+
+}  // namespace
+}  // namespace ruedo::engine
