@@ -6,7 +6,7 @@
 
 #include "bus/lcm_bus.h"
 #include "model/load.h"
-#include "run/server.h"
+#include "run/run.h"
 
 namespace {
 
@@ -33,13 +33,13 @@ std::shared_ptr<const model::WorldModel> arena() {
 
 void run(benchmark::State& state, Bus& bus, int batch_steps) {
   constexpr int64_t kSeconds = 60;
-  run::ServerOptions options;
+  run::RunOptions options;
   options.rate = std::numeric_limits<double>::infinity();
   options.duration_us = kSeconds * 1'000'000;
   options.simulation.batch_steps = batch_steps;
   for (auto _ : state) {
     state.PauseTiming();
-    auto server = std::make_unique<run::Server>(arena(), options, bus);
+    auto server = std::make_unique<run::Run>(arena(), options, bus);
     state.ResumeTiming();
     server->run();
     state.PauseTiming();

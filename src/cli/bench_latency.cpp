@@ -19,7 +19,7 @@
 #include "ruedo/errors.h"
 #include "ruedo/motion_status_t.hpp"
 #include "ruedo/move_command_t.hpp"
-#include "run/server.h"
+#include "run/run.h"
 
 namespace ruedo::cli {
 namespace {
@@ -164,12 +164,12 @@ std::vector<std::string> measure_latency(const BenchTask& task) {
 
   model::LoadOptions load;
   load.disabled = {"r/camera"};
-  run::ServerOptions options;
+  run::RunOptions options;
   options.control = false;
   options.simulation.fleet.disabled = load.disabled;
   bus::LcmBus lcm(task.lcm);
   TimedBus bus(lcm, 1'000'000);
-  run::Server server(world_with_reports_at_every_step(load), std::move(options), bus);
+  run::Run server(world_with_reports_at_every_step(load), std::move(options), bus);
   std::string text;
   int status = 0;
   std::thread ender([&] {

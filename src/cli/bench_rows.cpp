@@ -15,7 +15,7 @@
 #include "core/whole.h"
 #include "model/load.h"
 #include "ruedo/move_command_t.hpp"
-#include "run/server.h"
+#include "run/run.h"
 #include "engine/thread_limit.h"
 
 namespace ruedo::cli {
@@ -94,7 +94,7 @@ std::vector<std::string> measure(const BenchTask& task) {
 
   const auto load_begin = std::chrono::steady_clock::now();
   model::LoadOptions load_options;
-  run::ServerOptions options;
+  run::RunOptions options;
   if (task.table != Table::camera) {
     for (int robot = 0; robot < task.robots; ++robot) load_options.disabled.push_back(fmt::format("r{}/camera", robot));
   }
@@ -106,7 +106,7 @@ std::vector<std::string> measure(const BenchTask& task) {
   std::unique_ptr<bus::LcmBus> lcm;
   if (task.table == Table::lcm) lcm = std::make_unique<bus::LcmBus>(task.lcm);
   CountingBus sink(lcm.get());
-  run::Server server(world, std::move(options), sink);
+  run::Run server(world, std::move(options), sink);
   const std::vector<uint8_t> circle = circle_command();
   for (int robot = 0; robot < task.robots; ++robot) server.receive(fmt::format("r{}/move", robot), circle);
   const double load_s = seconds_since(load_begin);

@@ -20,7 +20,7 @@
 #include "log/diff.h"
 #include "log/reader.h"
 #include "log/writer.h"
-#include "run/server.h"
+#include "run/run.h"
 
 namespace ruedo::cli {
 namespace {
@@ -41,8 +41,8 @@ struct RegressArguments {
   bool renew = false, shared_network = false, no_page = false;
 };
 
-run::ServerOptions server_options(const RegressArguments& arguments) {
-  run::ServerOptions options;
+run::RunOptions server_options(const RegressArguments& arguments) {
+  run::RunOptions options;
   options.rate = parse_rate(arguments.rate);
   options.duration_us = parse_duration_us(arguments.duration);
   options.lockstep = {arguments.lockstep, 30.0, run::LockstepOptions::Policy::fail};
@@ -63,7 +63,7 @@ run::ServerOptions server_options(const RegressArguments& arguments) {
 std::string run(const RegressArguments& arguments, const std::shared_ptr<const model::WorldModel>& world, bool isolated, judge::Judge& judge) {
   bus::ServerBus place = bus::open_server_bus(isolated ? "auto" : "auto-tcp", world->name);
   bus::RivalWatch bus(std::move(place.bus), [](const std::string& line) { spdlog::warn(line); });
-  run::Server server(world, server_options(arguments), bus);
+  run::Run server(world, server_options(arguments), bus);
   server.on_state([&](const Snapshot& snapshot) { judge.see(snapshot); });
   std::unique_ptr<ClientProcess> client;
   if (!arguments.client.empty()) {

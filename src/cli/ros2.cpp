@@ -12,7 +12,7 @@
 #include "ros2/commands.h"
 #include "ruedo/element.h"
 #include "ruedo/errors.h"
-#include "run/server.h"
+#include "run/run.h"
 
 #ifdef RUEDO_ROS2
 #include "dds/cyclone_transport.h"
@@ -72,7 +72,7 @@ std::vector<std::string> joints_of(const model::WorldModel& world, const std::st
   return names;
 }
 
-ros2::NodeOptions node_options(run::Server& server, const Ros2Arguments& arguments) {
+ros2::NodeOptions node_options(run::Run& server, const Ros2Arguments& arguments) {
   ros2::NodeOptions options;
   std::vector<std::string> robots;
   for (const world_info_t& part : server.info()) {
@@ -86,7 +86,7 @@ ros2::NodeOptions node_options(run::Server& server, const Ros2Arguments& argumen
 
 class CycloneNode : public Ros2Node {
  public:
-  CycloneNode(run::Server& server, const Ros2Arguments& arguments, std::unique_ptr<ros2::Transport> transport)
+  CycloneNode(run::Run& server, const Ros2Arguments& arguments, std::unique_ptr<ros2::Transport> transport)
       : server_(server),
         wait_for_(arguments.wait_for),
         where_(fmt::format("{}, {}", ros2::name_of(distro_of(arguments)), transport->where())),
@@ -129,7 +129,7 @@ class CycloneNode : public Ros2Node {
   }
 
  private:
-  run::Server& server_;
+  run::Run& server_;
   std::vector<std::string> wait_for_;
   std::string where_;
   ros2::Node node_;
@@ -138,7 +138,7 @@ class CycloneNode : public Ros2Node {
 
 }  // namespace
 
-std::unique_ptr<Ros2Node> Ros2Node::open(run::Server& server, const Ros2Arguments& arguments) {
+std::unique_ptr<Ros2Node> Ros2Node::open(run::Run& server, const Ros2Arguments& arguments) {
   if (!arguments.on) return nullptr;
   distro_of(arguments);    // before a network is asked
   return std::make_unique<CycloneNode>(server, arguments, dds::open_cyclone(dds::options_from_environment()));
@@ -146,7 +146,7 @@ std::unique_ptr<Ros2Node> Ros2Node::open(run::Server& server, const Ros2Argument
 
 #else
 
-std::unique_ptr<Ros2Node> Ros2Node::open(run::Server&, const Ros2Arguments& arguments) {
+std::unique_ptr<Ros2Node> Ros2Node::open(run::Run&, const Ros2Arguments& arguments) {
   if (!arguments.on) return nullptr;
   throw EnvironmentError("this ruedo was built without ROS 2. Install cyclonedds-dev, then configure with -DRUEDO_ROS2=ON and build again");
 }

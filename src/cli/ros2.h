@@ -10,7 +10,7 @@
 #include "run/wait_for.h"
 
 namespace ruedo::run {
-class Server;
+class Run;
 }
 
 namespace ruedo::cli {
@@ -28,7 +28,7 @@ struct Ros2Arguments {
 class Ros2Node {
  public:
   // Null without --ros2. Throws InputError, and EnvironmentError when this build has no Cyclone DDS or there is no network for it.
-  static std::unique_ptr<Ros2Node> open(run::Server& server, const Ros2Arguments& arguments);
+  static std::unique_ptr<Ros2Node> open(run::Run& server, const Ros2Arguments& arguments);
 
   virtual ~Ros2Node() = default;    // after the run, before the server
   virtual void print() const = 0;   // the topics

@@ -25,7 +25,7 @@
 #include "core/utf8.h"
 #include "ruedo/errors.h"
 #include "model/world_name.h"
-#include "run/server.h"
+#include "run/run.h"
 #include "engine/thread_limit.h"
 
 namespace ruedo::cli {
@@ -66,13 +66,13 @@ class SignalThread {
     pthread_kill(thread_.native_handle(), SIGTERM);
     thread_.join();
   }
-  void serve(run::Server* server) { server_ = server; }
+  void serve(run::Run* server) { server_ = server; }
 
  private:
   void wait() {
     for (int signal = 0; sigwait(&signals_, &signal) == 0;) {
       if (done_) return;
-      run::Server* server = server_;
+      run::Run* server = server_;
       if (!server || asked_) std::_Exit(128 + signal);    // nothing to end cleanly, or it does not end
       asked_ = true;
       server->stop();
@@ -81,7 +81,7 @@ class SignalThread {
 
   sigset_t signals_;
   std::atomic<bool> done_{false};
-  std::atomic<run::Server*> server_{nullptr};
+  std::atomic<run::Run*> server_{nullptr};
   bool asked_ = false;
   std::thread thread_;
 };
@@ -144,8 +144,8 @@ run::LockstepOptions lockstep_options(const RunArguments& arguments) {
   return {arguments.lockstep, arguments.lease, policy};
 }
 
-run::ServerOptions server_options(const RunArguments& arguments) {
-  run::ServerOptions options;
+run::RunOptions server_options(const RunArguments& arguments) {
+  run::RunOptions options;
   options.rate = parse_rate(arguments.lockstep > 0 ? "max" : arguments.rate.empty() ? "1" : arguments.rate);
   if (!arguments.duration.empty()) options.duration_us = parse_duration_us(arguments.duration);
   options.paused = arguments.paused;
@@ -169,7 +169,7 @@ run::ServerOptions server_options(const RunArguments& arguments) {
 }
 
 // What of the options is ROS's: names that begin with a slash.
-Ros2Arguments ros2_arguments(const RunArguments& arguments, const run::ServerOptions& options) {
+Ros2Arguments ros2_arguments(const RunArguments& arguments, const run::RunOptions& options) {
   Ros2Arguments ros2 = arguments.ros2;
   for (const std::string& text : arguments.remaps) {
     if (text.starts_with('/')) ros2.topics.push_back(parse_remap(text));
@@ -189,7 +189,7 @@ void announce(const bus::ServerBus& place) {
   std::fflush(stdout);
 }
 
-void print_world(const run::Server& server, const model::WorldModel& world, const bus::LcmUrl& url) {
+void print_world(const run::Run& server, const model::WorldModel& world, const bus::LcmUrl& url) {
   const Style style = style_of(stdout);
   fmt::print("{}{}{}: steps of {:g} ms, seed {}, on {}\n", style.bold, for_terminal(world.name), style.off, static_cast<double>(world.step_us) * 1e-3,
              static_cast<uint64_t>(server.info().front().seed), url.str());
@@ -204,7 +204,7 @@ std::string socket_of(const std::string& lcm) {
 }
 
 int run(const RunArguments& arguments) {
-  run::ServerOptions options = server_options(arguments);
+  run::RunOptions options = server_options(arguments);
   if (arguments.sandboxed) enter_sandbox(model::world_file(arguments.world.world), {arguments.record, arguments.snapshots, socket_of(arguments.lcm)});
   SignalThread signals;
   if (arguments.watch_stdin) watch_stdin();
@@ -215,7 +215,7 @@ int run(const RunArguments& arguments) {
   ViewedBus viewed(bus, arguments.viewed, arguments.view);
   const Ros2Arguments ros2 = ros2_arguments(arguments, options);
   options.wait_for = with_channels(std::move(options.wait_for), *world, ros2);
-  run::Server server(world, std::move(options), viewed.bus());
+  run::Run server(world, std::move(options), viewed.bus());
   const std::unique_ptr<Ros2Node> node = Ros2Node::open(server, ros2);
   place.claim->describe(fmt::format("pid {}, world {}, run {}", getpid(), world->name, server.run_id()));
   std::shared_ptr<void> view;

@@ -31,7 +31,7 @@ std::string describe(const run::FirstDifference& difference) {
 
 int repeat(const VerifyArguments& arguments, const log_header_t& header) {
   LoggedOptions logged = read_options(header, arguments.log);
-  run::ServerOptions options;
+  run::RunOptions options;
   options.remaps = std::move(logged.remaps);
   options.simulation.fleet.seed = static_cast<uint64_t>(header.seed);
   options.simulation.fleet.noise = !logged.world.no_noise;

@@ -17,7 +17,7 @@
 #include "console/log_source.h"
 #include "console/tee_bus.h"
 #include "ruedo/world_info_t.hpp"
-#include "run/server.h"
+#include "run/run.h"
 
 namespace ruedo::cli {
 namespace {
@@ -42,7 +42,7 @@ ViewedBus::~ViewedBus() = default;
 
 Bus& ViewedBus::bus() { return impl_ ? impl_->tee : inner_; }
 
-std::shared_ptr<void> ViewedBus::open(run::Server& server, const std::string& title) {
+std::shared_ptr<void> ViewedBus::open(run::Run& server, const std::string& title) {
   if (!impl_) return nullptr;
   std::string info;
   for (const engine::Channel& channel : server.channels().list()) {
@@ -100,7 +100,7 @@ ViewedBus::~ViewedBus() = default;
 
 Bus& ViewedBus::bus() { return inner_; }
 
-std::shared_ptr<void> ViewedBus::open(run::Server&, const std::string&) { return nullptr; }
+std::shared_ptr<void> ViewedBus::open(run::Run&, const std::string&) { return nullptr; }
 
 std::shared_ptr<void> view_log(const std::string&, const std::string&, double) { no_console(); }
 

@@ -7,7 +7,7 @@
 #include "ruedo/bus.h"
 
 namespace ruedo::run {
-class Server;
+class Run;
 }
 
 namespace ruedo::cli {
@@ -23,7 +23,7 @@ class ViewedBus {
 
   // Serves the console for as long as the returned object lives, and prints where. Null without --view. Throws
   // EnvironmentError when the address cannot be had. The server must outlive it.
-  std::shared_ptr<void> open(run::Server& server, const std::string& title);
+  std::shared_ptr<void> open(run::Run& server, const std::string& title);
 
  private:
   struct Impl;

@@ -7,6 +7,7 @@
 #include "core/utf8.h"
 #include "ruedo/decode.h"
 #include "ruedo/join_t.hpp"
+#include "run/request_table.h"
 
 namespace ruedo::run {
 
@@ -25,12 +26,6 @@ bool Control::receive(const uint8_t* data, size_t size) {
 
 namespace {
 
-// Who reads or changes the world does so in a state. Grants are what lockstep's own order is about.
-bool needs_state(int32_t kind) {
-  return kind != request_t::JOIN && kind != request_t::LEAVE && kind != request_t::INFO && kind != request_t::QUIT &&
-         kind != request_t::GRANT && kind != request_t::RESEND;
-}
-
 // Names in it may be anybody's: clients show it, and replies are kept.
 std::string fit_text(const std::string& text) {
   if (text.size() <= Control::kLongestText) return for_terminal(text);
@@ -40,7 +35,7 @@ std::string fit_text(const std::string& text) {
 }  // namespace
 
 void Control::serve() {
-  if (!held_.empty() && !server_.state_comes()) {
+  if (!held_.empty() && !host_.state_comes()) {
     for (const request_t& request : std::exchange(held_, {})) serve(request);
   }
   {
@@ -55,42 +50,42 @@ void Control::serve() {
 void Control::serve(const request_t& request) {
   reply_t reply;
   reply.run_id = run_id_;
-  reply.epoch = server_.epoch();
+  reply.epoch = host_.epoch();
   reply.session = request.session;
   reply.sequence = request.sequence;
   reply.kind = request.kind;
   reply.code = reply_t::OK;
   reply.size = 0;
-  const auto refuse = [&](int32_t code, std::string text) {
+  const auto answer_with = [&](int32_t code, std::string text) {    // at once; it is not kept for repeats
     reply.code = code;
     reply.text = std::move(text);
     publish(reply);
   };
-  if (request.run_id != 0 && request.run_id != run_id_) return refuse(reply_t::WRONG_RUN, "this is another run of the server");
+  if (request.run_id != 0 && request.run_id != run_id_) return answer_with(reply_t::WRONG_RUN, "this is another run of the server");
   if (request.kind == request_t::JOIN) return join(request, reply);
   if (request.kind == request_t::LEAVE) {    // as often as one likes
-    if (server_.left) server_.left(request.session);
+    if (host_.left) host_.left(request.session);
     sessions_.leave(request.session);
     return publish(reply);
   }
   if (request.kind == request_t::INFO && request.session == 0) {    // who has not joined yet may ask what there is to join
-    server_.execute(request, Session{});
+    host_.execute(request, Session{});
     return;
   }
   Session* session = sessions_.find(request.session);
-  if (!session) return refuse(reply_t::UNKNOWN_SESSION, "no such session: join first");
+  if (!session) return answer_with(reply_t::UNKNOWN_SESSION, "no such session: join first");
   session->last_heard = std::chrono::steady_clock::now();
   session->spoke = true;
   if (request.kind == request_t::RESEND) {    // changes nothing: it may come as often as one likes, in any order
-    engine::Outcome outcome = server_.execute(request, *session);
+    engine::Outcome outcome = host_.execute(request, *session);
     reply.body = std::move(outcome.body);
     reply.size = static_cast<int32_t>(reply.body.size());
-    return refuse(outcome.code, std::move(outcome.text));
+    return answer_with(outcome.code, std::move(outcome.text));
   }
   if (judge(request, *session, reply) != Sessions::Verdict::execute) return;
-  if (server_.early && request.kind == request_t::GRANT && server_.early(request, *session)) return;
+  if (host_.early && request.kind == request_t::GRANT && host_.early(request, *session)) return;
   // After the sequence: a repeated RESET, of the epoch that it ended, gets its answer again.
-  if (request.epoch != -1 && request.epoch != reply.epoch) return refuse(reply_t::WRONG_EPOCH, "the world was reset since");
+  if (request.epoch != -1 && request.epoch != reply.epoch) return answer_with(reply_t::WRONG_EPOCH, "the world was reset since");
   if (must_wait(request)) return hold(request);
   execute(request, *session, reply);
 }
@@ -102,7 +97,7 @@ Sessions::Verdict Control::judge(const request_t& request, const Session& sessio
   const Sessions::Verdict verdict = sessions_.judge(session, request.sequence, kept);
   const std::string last = std::to_string(session.last_sequence);
   switch (verdict) {
-    case Sessions::Verdict::answer_again: server_.publish(*kept); return verdict;
+    case Sessions::Verdict::answer_again: host_.publish(*kept); return verdict;
     case Sessions::Verdict::wait:
     case Sessions::Verdict::execute: return verdict;
     case Sessions::Verdict::too_old:
@@ -123,7 +118,7 @@ void Control::execute(const request_t& request, Session& session, reply_t& reply
   sessions_.begin(session, request.sequence);
   engine::Outcome outcome = has_too_many(request)
                         ? engine::Outcome::refuse(reply_t::REFUSED, "too many requests of this client wait for their steps: wait for the answers")
-                        : server_.execute(request, session);
+                        : host_.execute(request, session);
   reply.code = outcome.code;
   reply.text = std::move(outcome.text);
   reply.body = std::move(outcome.body);
@@ -136,7 +131,8 @@ void Control::execute(const request_t& request, Session& session, reply_t& reply
 
 // Behind one that waits, all of its session do: they are executed in their order.
 bool Control::must_wait(const request_t& request) const {
-  if (needs_state(request.kind) && server_.state_comes()) return true;
+  const RequestKind* kind = find_request_kind(request.kind);
+  if ((!kind || kind->waits == RequestKind::for_state) && host_.state_comes()) return true;
   return std::any_of(held_.begin(), held_.end(), [&](const request_t& held) { return held.session == request.session; });
 }
 
@@ -162,7 +158,7 @@ void Control::join(const request_t& request, reply_t& reply) {
       body.client.size() > 63 || for_terminal(body.client) != body.client || request.sequence <= 0) {
     reply.code = reply_t::BAD_REQUEST;
     reply.text = "JOIN wants a join_t with a name of 1 to 63 bytes of UTF-8 without control characters, and a sequence above 0";
-  } else if (const Session* session = sessions_.join(body.client, request.sequence, std::chrono::steady_clock::now(), server_.keeps)) {
+  } else if (const Session* session = sessions_.join(body.client, request.sequence, std::chrono::steady_clock::now(), host_.keeps)) {
     reply.session = session->id;
   } else {
     reply.code = reply_t::REFUSED;
@@ -173,18 +169,18 @@ void Control::join(const request_t& request, reply_t& reply) {
 }
 
 void Control::publish(reply_t& reply) {
-  reply.utime = server_.utime();
+  reply.utime = host_.utime();
   reply.text = fit_text(reply.text);
-  server_.publish(reply);
+  host_.publish(reply);
 }
 
 void Control::answer(reply_t& reply, bool quiet) {
-  reply.utime = server_.utime();
-  reply.epoch = server_.epoch();
+  reply.utime = host_.utime();
+  reply.epoch = host_.epoch();
   reply.text = fit_text(reply.text);
   reply.size = static_cast<int32_t>(reply.body.size());
   sessions_.keep(reply);
-  if (!quiet) server_.publish(reply);
+  if (!quiet) host_.publish(reply);
 }
 
 void Control::published(int64_t step) {
@@ -192,7 +188,7 @@ void Control::published(int64_t step) {
   const auto ready = std::stable_partition(waiting_.begin(), waiting_.end(),
                                            [&](const Waiting& waiting) { return waiting.after_step > step || waiting.after_step == kPending; });
   for (auto it = ready; it != waiting_.end(); ++it) {
-    it->reply.body = server_.state();
+    it->reply.body = host_.state();
     answer(it->reply);
   }
   waiting_.erase(ready, waiting_.end());

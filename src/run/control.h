@@ -31,7 +31,8 @@ class Control {
   static constexpr size_t kMostUnanswered = 32;           // requests of one session that are not answered yet
   static constexpr size_t kLongestText = 1000;            // bytes of a reply's text
 
-  struct Server {
+  // The run that it serves.
+  struct Host {
     std::function<engine::Outcome(const request_t& request, const Session& session)> execute;
     // The body of an answer that waited for its step.
     std::function<std::vector<uint8_t>()> state;
@@ -47,7 +48,7 @@ class Control {
     std::function<bool(int64_t session)> keeps = {};
   };
 
-  Control(int64_t run_id, Server server) : run_id_(run_id), server_(std::move(server)) {}
+  Control(int64_t run_id, Host host) : run_id_(run_id), host_(std::move(host)) {}
 
   // Any thread. False for what is not a request.
   bool receive(const uint8_t* data, size_t size);
@@ -89,7 +90,7 @@ class Control {
   void publish(reply_t& reply);
 
   int64_t run_id_;
-  Server server_;
+  Host host_;
   Sessions sessions_;
   std::vector<Waiting> waiting_;
   std::vector<request_t> held_;        // judged, and waiting for the first state

@@ -4,26 +4,19 @@
 // modules at their queues. So the change needs no lock against any of them.
 #include <spdlog/spdlog.h>
 
-#include "ruedo/decode.h"
-#include "ruedo/name_request_t.hpp"
+#include "ruedo/applied_t.hpp"
 #include "engine/edits.h"
-#include "run/server.h"
+#include "log/header.h"
+#include "run/run.h"
 
 namespace ruedo::run {
 namespace {
 
 constexpr size_t kFindingsTold = 5;
 
-template <class Body>
-bool read_body(const request_t& request, Body& body) {
-  return decode_checked(request.body.data(), request.body.size(), body) == DecodeFault::none;
-}
-
-engine::Outcome bad_body(const char* type) { return engine::Outcome::refuse(reply_t::BAD_REQUEST, std::string("the body is not a ") + type); }
-
 }  // namespace
 
-bool Server::stand_still() {
+bool Run::stand_still() {
   const int64_t last = pacer_->hold();
   while (publisher_.step() < last) {
     if (simulation_->over()) return false;    // a state that cannot be ends a run before its time
@@ -33,15 +26,15 @@ bool Server::stand_still() {
   return pacer_->wait_until_held();
 }
 
-void Server::move_on() {
+void Run::let_go() {
   pacer_->release();
   wakeup_.set();    // what came meanwhile
 }
 
-engine::Outcome Server::change(const request_t& request, bool models, const std::function<engine::Outcome()>& apply) {
-  if (lockstep_ && lockstep_->full()) return engine::Outcome::refuse(reply_t::REFUSED, "not all clients have the messages of the last steps: ask again");
-  if (!stand_still()) return engine::Outcome::refuse(reply_t::REFUSED, "the run is over");
-  engine::Outcome outcome;
+Run::Outcome Run::change(const request_t& request, bool models, const std::function<Outcome()>& apply) {
+  if (!mode().has_room()) return Outcome::refuse(reply_t::REFUSED, "not all clients have the messages of the last steps: ask again");
+  if (!stand_still()) return Outcome::refuse(reply_t::REFUSED, "the run is over");
+  Outcome outcome;
   {
     const std::lock_guard lock(simulation_mutex_);
     outcome = apply();
@@ -55,68 +48,110 @@ engine::Outcome Server::change(const request_t& request, bool models, const std:
     changed_.time = publisher_.time_us();
     publisher_.change_latest(changed_);
     if (models) announce();
-    if (models && !replay_) info_beat_.say();
+    if (models && !repeating_) info_beat_.say();
   }
-  move_on();
+  let_go();
   return outcome;
 }
 
-engine::Outcome Server::edit(const request_t& request) {
-  switch (request.kind) {
-    case request_t::SPAWN: return spawn(request);
-    case request_t::REMOVE: {
-      name_request_t body;
-      if (!read_body(request, body)) return bad_body("name_request_t");
-      return change(request, true, [&] { return engine::remove(body.name, *simulation_, channels_); });
-    }
-    case request_t::SET_POSE: {
-      set_pose_request_t body;
-      if (!read_body(request, body)) return bad_body("set_pose_request_t");
-      return change(request, false, [&] { return engine::set_pose(body, *simulation_); });
-    }
-    default: {
-      set_twist_request_t body;
-      if (!read_body(request, body)) return bad_body("set_twist_request_t");
-      return change(request, false, [&] { return engine::set_twist(body, *simulation_); });
-    }
+void Run::note(const request_t& request) {
+  applied_t applied;
+  applied.utime = publisher_.time_us();
+  applied.step = publisher_.step();
+  applied.epoch = epoch_;
+  applied.sequence = request.sequence;
+  applied.channel = "ruedo/request";
+  applied.kind = request.kind;
+  applied.size = request.size;
+  applied.data = request.body;
+  publisher_.record(kAppliedChannel, applied);
+}
+
+void Run::note_files(const std::vector<std::string>& files) {
+  if (files.empty() || !publisher_.has_recorders()) return;
+  log_header_t header = header_;
+  header.utime = publisher_.time_us();
+  header.files = log::hashed_files(files);
+  header.nfiles = static_cast<int32_t>(header.files.size());
+  publisher_.record(kHeaderChannel, header);
+}
+
+Run::Outcome Run::reset(const request_t& request, const reset_request_t& body) {
+  const auto bad = [](std::string text) { return Outcome::refuse(reply_t::BAD_REQUEST, std::move(text)); };
+  switch (body.what) {
+    case reset_request_t::ALL:
+      return body.seed < -1 ? bad("a seed is 0 or more, -1 for the one there is") : reset_all(request, body.seed);
+    case reset_request_t::TIME:
+    case reset_request_t::POSES:
+      if (body.seed != -1) return bad("another seed goes with a reset of everything; -1 is allowed here");
+      return body.what == reset_request_t::TIME ? reset_time(request) : reset_poses(request);
+    default: return bad("a reset of kind " + std::to_string(body.what) + "; there are 0 (all), 1 (time) and 2 (poses)");
   }
 }
 
-engine::Outcome Server::spawn(const request_t& request) {
-  spawn_request_t body;
-  if (!read_body(request, body)) return bad_body("spawn_request_t");
-  if (engine::Outcome outcome = engine::check_spawn(body); outcome.code != reply_t::OK) return outcome;
-  if (!replay_) return worker_.add({request, std::move(body)});
+Run::Outcome Run::reset_all(const request_t& request, int64_t seed) {
+  if (!repeating_) control_.cancel("the world was reset");
+  note(request);
+  if (seed >= 0) options_.simulation.fleet.seed = static_cast<uint64_t>(seed);
+  begin_epoch();
+  return Outcome::after(0);
+}
+
+Run::Outcome Run::reset_poses(const request_t& request) {
+  const Outcome outcome = change(request, false, [&] { return engine::reset_poses(*simulation_), Outcome{}; });
+  return outcome.code == reply_t::OK ? Outcome::with(engine::encoded(state())) : outcome;
+}
+
+Run::Outcome Run::reset_time(const request_t& request) {
+  if (!stand_still()) return Outcome::refuse(reply_t::REFUSED, "the run is over");
+  if (!repeating_) control_.cancel("sim time was reset");
+  note(request);
+  header_.epoch = ++epoch_;
+  pacer_->begin_time_anew();
+  publisher_.begin_epoch(epoch_);
+  {
+    const std::lock_guard lock(simulation_mutex_);
+    simulation_->begin_time_anew(epoch_);
+    mode().begin(stage(), -1);
+  }
+  announce();
+  let_go();
+  return Outcome::after(0);
+}
+
+Run::Outcome Run::spawn(const request_t& request, const spawn_request_t& body) {
+  if (Outcome outcome = engine::check_spawn(body); outcome.code != reply_t::OK) return outcome;
+  if (!repeating_) return worker_.add({request, body});
   try {
     return put_in(request, body, models_.load(body));
   } catch (const InputError& error) {
-    return engine::Outcome::refuse(reply_t::BAD_REQUEST, error.what());
+    return Outcome::refuse(reply_t::BAD_REQUEST, error.what());
   }
 }
 
-// In lockstep what is granted is computed first: so who waits for the answer knows the step.
-void Server::spawn_ready() {
+// What was granted is computed first: so who waits for the answer knows the step.
+void Run::spawn_ready() {
   for (;; made_.reset()) {
     if (!made_) {
       made_ = worker_.take();
       if (!made_) return;
-      enters_at_ = lockstep_ ? lockstep_->limit() : -1;
+      enters_at_ = mode().granted();
     }
     const request_t& request = made_->request;
     if (!control_.is_pending(request.session, request.sequence)) continue;    // the world was reset meanwhile
     if (publisher_.step() < enters_at_ && !pacer_->paused()) return;
     control_.finish(request.session, request.sequence,
-                    made_->fault.empty() ? put_in(request, made_->body, made_->loaded) : engine::Outcome::refuse(reply_t::BAD_REQUEST, made_->fault));
+                    made_->fault.empty() ? put_in(request, made_->body, made_->loaded) : Outcome::refuse(reply_t::BAD_REQUEST, made_->fault));
   }
 }
 
-engine::Outcome Server::put_in(const request_t& request, const spawn_request_t& body, const model::LoadedModel& loaded) {
+Run::Outcome Run::put_in(const request_t& request, const spawn_request_t& body, const model::LoadedModel& loaded) {
   std::string name;
-  const engine::Outcome outcome = change(request, true, [&] {
+  const Outcome outcome = change(request, true, [&] {
     return engine::spawn(body, loaded, publisher_.step() + 1, *simulation_, channels_, name);
   });
   if (outcome.code == reply_t::OK) note_files(loaded.files_read);
-  if (outcome.code != reply_t::OK || replay_) return outcome;
+  if (outcome.code != reply_t::OK || repeating_) return outcome;
   spdlog::info("{} was spawned at step {}", name, publisher_.step());
   for (size_t i = 0; i < std::min(loaded.findings.size(), kFindingsTold); ++i) {
     const Finding& finding = loaded.findings[i];
@@ -124,39 +159,19 @@ engine::Outcome Server::put_in(const request_t& request, const spawn_request_t& 
   }
   name_request_t which;    // the answer says what its name is, and where it stands
   which.name = name;
-  request_t look = request;
-  look.body = engine::encoded(which);
-  return publisher_.latest() ? get_state(look) : outcome;
+  return publisher_.latest() ? get_state(request, which) : outcome;
 }
 
-engine::Outcome Server::reset_poses(const request_t& request) {
-  const engine::Outcome outcome = change(request, false, [&] { return engine::reset_poses(*simulation_), engine::Outcome{}; });
-  return outcome.code == reply_t::OK ? engine::Outcome::with(engine::encoded(state())) : outcome;
+Run::Outcome Run::remove(const request_t& request, const name_request_t& body) {
+  return change(request, true, [&] { return engine::remove(body.name, *simulation_, channels_); });
 }
 
-engine::Outcome Server::reset_time(const request_t& request) {
-  if (!stand_still()) return engine::Outcome::refuse(reply_t::REFUSED, "the run is over");
-  if (!replay_) control_.cancel("sim time was reset");
-  note(request);
-  header_.epoch = ++epoch_;
-  pacer_->begin_time_anew();
-  {
-    const std::lock_guard lock(simulation_mutex_);
-    simulation_->begin_time_anew(epoch_);
-    if (wait_for_ && !replay_) {
-      wait_for_->detach();
-      wait_for_->attach(channels_, simulation_->inbox(), *pacer_, 0);
-    }
-  }
-  if (replay_) pacer_->set_limit(-1);
-  if (lockstep_) {
-    lockstep_->restart();
-    lockstep_->attach(simulation_->inbox(), *pacer_);
-  }
-  publisher_.begin_epoch(epoch_);
-  announce();
-  move_on();
-  return engine::Outcome::after(0);
+Run::Outcome Run::set_pose(const request_t& request, const set_pose_request_t& body) {
+  return change(request, false, [&] { return engine::set_pose(body, *simulation_); });
+}
+
+Run::Outcome Run::set_twist(const request_t& request, const set_twist_request_t& body) {
+  return change(request, false, [&] { return engine::set_twist(body, *simulation_); });
 }
 
 }  // namespace ruedo::run

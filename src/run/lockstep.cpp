@@ -29,28 +29,20 @@ const Session* session_of(const std::vector<Session>& sessions, int64_t id) {
 Lockstep::Lockstep(const LockstepOptions& options, std::function<void(const applied_t&)> record)
     : options_(options), record_(std::move(record)) {}
 
-void Lockstep::attach(engine::CommandInbox& inbox, Pacer& pacer) {
-  inbox_ = &inbox;
-  pacer_ = &pacer;
-  pacer_->set_limit(limit_);
-}
-
-void Lockstep::restart() {
+void Lockstep::begin(const Stage& stage, int64_t step) {
+  inbox_ = stage.inbox;
+  gate_ = stage.gate;
   kept_.clear();
-  limit_ = started_ ? 0 : -1;
-  published_ = -1;
+  limit_ = step < 0 && started_ ? 0 : step;
+  published_ = step;
   for (Member& member : members_) {
-    member.granted = 0;
-    member.received = -1;
+    member.granted = std::max<int64_t>(step, 0);
+    member.received = step;
     member.held.clear();
     member.scheduled = member.held_bytes = 0;
     member.grants.clear();
   }
-}
-
-void Lockstep::begin_at(int64_t step) {
-  limit_ = published_ = step;
-  pacer_->set_limit(limit_);
+  gate_->set_limit(limit_);
 }
 
 Lockstep::Member* Lockstep::find(int64_t session) {
@@ -138,7 +130,20 @@ std::string Lockstep::take_commands(const grant_request_t& grant, std::vector<He
   return "";
 }
 
+std::string Lockstep::refusal(int32_t kind, bool) const {
+  switch (kind) {
+    case request_t::RESTORE: return "a run in lockstep cannot be set to a snapshot: start one with --restore";
+    case request_t::GRANT:
+    case request_t::RESEND:
+    case request_t::INFO:
+    case request_t::QUIT:
+    case request_t::STEP: return "";    // a STEP says that grants step
+    default: return begun() ? "" : "lockstep has not begun: call step(0), or grant. It waits for " + waits_for();
+  }
+}
+
 engine::Outcome Lockstep::grant(const request_t& request, const Session& session) {
+  if (request.kind == request_t::RESEND) return resend(request, session);
   grant_request_t grant;
   if (!read_grant(request, grant)) return engine::Outcome::refuse(reply_t::BAD_REQUEST, "the body is not a grant_request_t");
   if (grant.granted == -1) return take_part(session);
@@ -178,7 +183,7 @@ void Lockstep::advance() {
   if (until <= limit_) return;
   schedule(until);
   limit_ = until;
-  pacer_->set_limit_quietly(limit_);    // the publisher goes on from here
+  gate_->set_limit_quietly(limit_);    // the publisher goes on from here
 }
 
 // Commands of one step go in the order of the clients' names, each client's in the order of its grants.
@@ -231,13 +236,13 @@ void Lockstep::add_applied(TickWriter& tick, int64_t step, const std::vector<Ses
   }
 }
 
-bool Lockstep::counts_on(int64_t session) const {
+bool Lockstep::keeps(int64_t session) const {
   const Member* member = find(session);
   return member && !member->silent;
 }
 
 std::string Lockstep::waits_for() const {
-  if (begun() && pacer_->paused()) return "a RESUME: it is paused";
+  if (begun() && gate_->paused()) return "a RESUME: it is paused";
   if (!started_) return fmt::format("{} more of {} clients", static_cast<size_t>(options_.clients) - members_.size(), options_.clients);
   if (members_.empty()) return "a client that takes part";
   std::string names;
@@ -246,6 +251,11 @@ std::string Lockstep::waits_for() const {
     names += (names.empty() ? "'" : ", '") + member.name + (member.silent ? "' (silent)" : "'");
   }
   return names;
+}
+
+Mode::Attended Lockstep::attend(const std::vector<Session>& sessions, int64_t, Time now) {
+  std::vector<int64_t> dropped = check_leases(sessions, now);
+  return {next_check_, std::move(dropped)};
 }
 
 std::vector<int64_t> Lockstep::check_leases(const std::vector<Session>& sessions, Time now) {
@@ -281,7 +291,7 @@ std::vector<int64_t> Lockstep::check_leases(const std::vector<Session>& sessions
   return dropped;
 }
 
-void Lockstep::leave(int64_t session) {
+void Lockstep::left(int64_t session) {
   const auto found = std::find_if(members_.begin(), members_.end(), [&](const Member& member) { return member.session == session; });
   if (found == members_.end()) return;
   if (started_) note(request_t::LEAVE, *found);
@@ -290,7 +300,7 @@ void Lockstep::leave(int64_t session) {
   advance();
 }
 
-bool Lockstep::drained(const std::vector<Session>& sessions, Time now) const {
+bool Lockstep::finished(const std::vector<Session>& sessions, Time now) const {
   return std::all_of(members_.begin(), members_.end(), [&](const Member& member) {
     const Session* session = session_of(sessions, member.session);
     return member.received >= published_ || !session || now - session->last_heard > kLastWords;

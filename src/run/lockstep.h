@@ -1,7 +1,7 @@
 // Lockstep: the run goes as far as its clients have granted, with the commands that came with their grants.
 //
 // Here is who takes part and how far each has granted, the commands for steps to come, the messages that not all
-// have received yet, and the leases. The publisher's, all of it; what it decides goes to the pacer and the inbox.
+// have received yet, and the leases. What it decides goes to the gate and the inbox.
 #pragma once
 
 #include <chrono>
@@ -17,8 +17,7 @@
 #include "engine/command_inbox.h"
 #include "run/control.h"
 #include "run/kept_messages.h"
-#include "run/pacer.h"
-#include "run/tick.h"
+#include "run/mode.h"
 
 namespace ruedo::run {
 
@@ -39,52 +38,39 @@ struct LockstepOptions {
   Policy policy = Policy::pause;
 };
 
-class Lockstep {
+class Lockstep : public Mode {
  public:
-  using Time = std::chrono::steady_clock::time_point;
   static constexpr int64_t kMostAhead = 128;             // steps from what is published to what may be computed
   static constexpr size_t kMostHeld = 32'768;            // commands for steps to come, of all clients together
   static constexpr size_t kMostHeldBytes = 16u << 20;
   static constexpr size_t kMostWanted = 1024;            // entries of a RESEND that are looked at
   static constexpr size_t kMostGrants = 4096;            // of a client, for states that are not published yet
 
-  // record: writes into the log.
+  // record: writes joins and ended leases into the log.
   Lockstep(const LockstepOptions& options, std::function<void(const applied_t&)> record);
 
-  // Where commands go and what is paced, for a simulation that was made anew.
-  void attach(engine::CommandInbox& inbox, Pacer& pacer);
-  // The world was reset: everyone's grants stand at 0 again.
-  void restart();
-  // The run goes on from a snapshot: everyone's grants stand at its step. Before anyone takes part.
-  void begin_at(int64_t step);
+  // Everyone's grants stand at `step`, or at 0.
+  void begin(const Stage& stage, int64_t step) override;
+  // False when the messages that not everybody has received are as many as are kept.
+  bool has_room() const override { return !kept_.full(); }
+  bool takes_grants() const override { return true; }
+  int64_t granted() const override { return limit_; }
+  bool state_comes() const override { return begun(); }
 
-  // GRANT and RESEND.
-  engine::Outcome grant(const request_t& request, const Session& session);
-  engine::Outcome resend(const request_t& request, const Session& session);
-  // True for a grant that has to wait for one before it, or for room: it is ignored until it is repeated.
-  bool early(const request_t& request, const Session& session) const;
+  void published(int64_t step) override;
+  void add_applied(TickWriter& tick, int64_t step, const std::vector<Session>& sessions) override;
+  Sink* sink() override { return &kept_; }
 
-  // A sink: what clients may have lost.
-  KeptMessages& kept() { return kept_; }
-  void add_applied(TickWriter& tick, int64_t step, const std::vector<Session>& sessions);
-  void published(int64_t step);    // its tick is out, too
-  // True when the messages that not everybody has received are as many as are kept: publish no more.
-  bool full() const { return kept_.full(); }
+  // Ends leases by the policy. Throws LeaseEnded.
+  Attended attend(const std::vector<Session>& sessions, int64_t step, Time now) override;
+  void end() override { over_ = true; }
+  bool finished(const std::vector<Session>& sessions, Time now) const override;    // all have everything, or say nothing more
 
-  // Ends leases by the policy; returns the clients that were dropped. Throws LeaseEnded.
-  std::vector<int64_t> check_leases(const std::vector<Session>& sessions, Time now);
-  void leave(int64_t session);
-  // When check_leases() wants to be called next.
-  Time next_check() const { return next_check_; }
-
-  // The run has ended: true when all have everything, or say nothing more.
-  bool drained(const std::vector<Session>& sessions, Time now) const;
-  void end() { over_ = true; }
-  std::string waits_for() const;    // in words; "": for nobody
-  bool begun() const { return limit_ >= 0; }
-  int64_t limit() const { return limit_; }    // the last state that may be computed; -1 before it has begun
-  // True for a client that takes part and has its lease.
-  bool counts_on(int64_t session) const;
+  std::string refusal(int32_t kind, bool looks) const override;
+  engine::Outcome grant(const request_t& request, const Session& session) override;
+  bool early(const request_t& request, const Session& session) const override;
+  void left(int64_t session) override;
+  bool keeps(int64_t session) const override;    // it takes part and has its lease
 
  private:
   struct Held {    // a command for a step to come, or for one that is not published yet
@@ -105,6 +91,10 @@ class Lockstep {
     bool silent = false;       // its lease has ended, and the run waits
   };
 
+  bool begun() const { return limit_ >= 0; }
+  std::string waits_for() const;    // in words; "": for nobody
+  engine::Outcome resend(const request_t& request, const Session& session);
+  std::vector<int64_t> check_leases(const std::vector<Session>& sessions, Time now);
   Member* find(int64_t session);
   const Member* find(int64_t session) const { return const_cast<Lockstep*>(this)->find(session); }
   engine::Outcome take_part(const Session& session);
@@ -120,7 +110,7 @@ class Lockstep {
   const LockstepOptions options_;
   const std::function<void(const applied_t&)> record_;
   engine::CommandInbox* inbox_ = nullptr;
-  Pacer* pacer_ = nullptr;
+  Gate* gate_ = nullptr;
   std::vector<Member> members_;    // by name
   bool started_ = false;           // all were there once
   bool over_ = false;

@@ -10,10 +10,11 @@
 #include <mutex>
 
 #include "engine/pace.h"
+#include "run/gate.h"
 
 namespace ruedo::run {
 
-class Pacer : public engine::Pace {
+class Pacer : public engine::Pace, public Gate {
  public:
   using Clock = std::chrono::steady_clock;
 
@@ -28,10 +29,8 @@ class Pacer : public engine::Pace {
   void resume();
   int64_t allow(int64_t steps);      // while paused: that many more; returns the last one of them
   void set_rate(double rate);
-  // No state after `step` is computed until a higher limit is set; the step that waits for it is due at once then.
-  void set_limit(int64_t step);
-  // The same, for who calls borrow() next.
-  void set_limit_quietly(int64_t step);
+  void set_limit(int64_t step) override;
+  void set_limit_quietly(int64_t step) override;    // for who calls borrow() next
 
   // Standing still for a change of the world. hold(): wait() lets nothing more go; returns the last state that it let go.
   // wait_until_held(), when that state is done: until the simulation thread waits; false when the run is over.
@@ -40,7 +39,7 @@ class Pacer : public engine::Pace {
   void release();
   void begin_time_anew();            // while held: the next state is 0
 
-  bool paused() const;
+  bool paused() const override;
   double rate() const;
   int64_t last_step() const { return last_step_; }
 

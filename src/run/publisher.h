@@ -1,6 +1,6 @@
 // Hands each state's messages, what acted on the run, and what the run itself says to all sinks, in one order.
 //
-// It numbers the messages of each channel and stamps them for logs. Not thread safe: the thread of Server::run() publishes.
+// It numbers the messages of each channel and stamps them for logs. Not thread safe: the thread of Run::run() publishes.
 #pragma once
 
 #include <cstdint>

@@ -5,7 +5,7 @@
 
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
-#include "ruedo/request_t.hpp"
+#include "run/request_table.h"
 
 namespace ruedo::run {
 namespace {
@@ -22,15 +22,10 @@ log_header_t first_event(log::Reader& reader, log::Event& event) {
   return header;
 }
 
+// Who joined and left says nothing to the world.
 bool acts(int32_t kind) {
-  switch (kind) {
-    case request_t::RESET:
-    case request_t::SPAWN:
-    case request_t::REMOVE:
-    case request_t::SET_POSE:
-    case request_t::SET_TWIST: return true;
-    default: return false;    // who joined and left says nothing to the world
-  }
+  const RequestKind* known = find_request_kind(kind);
+  return known && known->effect == RequestKind::acts;
 }
 
 }  // namespace
@@ -47,7 +42,7 @@ void Replay::damaged(const std::string& what) const { throw InputError({reader_.
 
 const applied_t* Replay::advance(int64_t step, const Target& target) {
   const auto go_on_to = [&](int64_t last) {
-    target.pacer.set_limit(last);
+    target.gate.set_limit(last);
     return nullptr;
   };
   for (;;) {

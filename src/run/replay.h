@@ -13,7 +13,7 @@
 #include "ruedo/state_hash_t.hpp"
 #include "engine/command_inbox.h"
 #include "log/reader.h"
-#include "run/pacer.h"
+#include "run/gate.h"
 
 namespace ruedo::run {
 
@@ -22,7 +22,7 @@ class Replay {
   // What the epoch that runs now is driven by.
   struct Target {
     engine::CommandInbox& inbox;
-    Pacer& pacer;
+    Gate& gate;
     // The input that takes it; -1: it is a request. Throws InputError for a channel that there is not.
     std::function<int(const applied_t&)> input_of;
     SimTime begin_us;    // of the epoch, in stamps of the log: what went on before sim time was last set to 0
@@ -39,6 +39,7 @@ class Replay {
   // does not fit what runs.
   const applied_t* advance(int64_t step, const Target& target);
   void executed();
+  const applied_t& applied() const { return applied_; }    // that advance() returned
 
   // After advance() returned null: whether that was all.
   bool at_end(int64_t step) const { return ended_ && !waits_ && step >= end_step_; }

@@ -1,32 +1,136 @@
-// What each request of the simulation control does.
-#include <cmath>
+// The table of requests, and those that steer the run or look at it. Those that change the world are in edit_requests.cpp.
+#include <algorithm>
+#include <filesystem>
+#include <iterator>
 
-#include "ruedo/decode.h"
-#include "ruedo/name_request_t.hpp"
-#include "ruedo/rate_request_t.hpp"
-#include "ruedo/reset_request_t.hpp"
-#include "ruedo/state_reply_t.hpp"
-#include "ruedo/step_request_t.hpp"
+#include "ruedo/errors.h"
 #include "log/header.h"
-#include "run/server.h"
 #include "engine/world_state.h"
+#include "run/request_table.h"
+#include "run/run.h"
 
 namespace ruedo::run {
+
+using engine::Outcome;
+
+// The functions of Run, as the table has them.
+class RequestTable {
+ public:
+  template <Outcome (Run::*function)(const request_t&)>
+  static Outcome plain(Run& run, const request_t& request, const Session&) {
+    return (run.*function)(request);
+  }
+
+  template <class Body, Outcome (Run::*function)(const request_t&, const Body&)>
+  static Outcome with(Run& run, const request_t& request, const Session&) {
+    Body body;
+    return read_body(request, body) ? (run.*function)(request, body) : bad_body<Body>();
+  }
+
+  static Outcome grant(Run& run, const request_t& request, const Session& session) { return run.mode().grant(request, session); }
+
+  static const RequestKind kKinds[];
+  static const RequestKind* find(int32_t kind);
+};
+
+const RequestKind RequestTable::kKinds[] = {
+    // kind, needs, effect, waits, function
+    {request_t::JOIN, RequestKind::nothing, RequestKind::steers, RequestKind::for_nothing, nullptr},
+    {request_t::LEAVE, RequestKind::nothing, RequestKind::steers, RequestKind::for_nothing, nullptr},
+    {request_t::PAUSE, RequestKind::nothing, RequestKind::steers, RequestKind::for_state, plain<&Run::pause>},
+    {request_t::RESUME, RequestKind::nothing, RequestKind::steers, RequestKind::for_state, plain<&Run::resume>},
+    {request_t::STEP, RequestKind::nothing, RequestKind::steers, RequestKind::for_state, with<step_request_t, &Run::step>},
+    {request_t::RATE, RequestKind::nothing, RequestKind::steers, RequestKind::for_state, with<rate_request_t, &Run::set_rate>},
+    {request_t::GET_STATE, RequestKind::nothing, RequestKind::looks, RequestKind::for_state, with<name_request_t, &Run::get_state>},
+    {request_t::INFO, RequestKind::nothing, RequestKind::looks, RequestKind::for_nothing, plain<&Run::say_info>},
+    {request_t::QUIT, RequestKind::nothing, RequestKind::looks, RequestKind::for_nothing, plain<&Run::quit>},
+    {request_t::RESET_ODOMETRY, RequestKind::nothing, RequestKind::steers, RequestKind::for_state, with<name_request_t, &Run::reset_odometry>},
+    {request_t::RESET, RequestKind::nothing, RequestKind::acts, RequestKind::for_state, with<reset_request_t, &Run::reset>},
+    {request_t::SPAWN, RequestKind::nothing, RequestKind::acts, RequestKind::for_state, with<spawn_request_t, &Run::spawn>},
+    {request_t::REMOVE, RequestKind::nothing, RequestKind::acts, RequestKind::for_state, with<name_request_t, &Run::remove>},
+    {request_t::SET_POSE, RequestKind::nothing, RequestKind::acts, RequestKind::for_state, with<set_pose_request_t, &Run::set_pose>},
+    {request_t::SET_TWIST, RequestKind::nothing, RequestKind::acts, RequestKind::for_state, with<set_twist_request_t, &Run::set_twist>},
+    {request_t::GRANT, RequestKind::grants, RequestKind::steers, RequestKind::for_nothing, grant},
+    {request_t::RESEND, RequestKind::grants, RequestKind::steers, RequestKind::for_nothing, grant},
+    {request_t::SNAPSHOT, RequestKind::snapshots, RequestKind::steers, RequestKind::for_state, with<name_request_t, &Run::snapshot>},
+    {request_t::RESTORE, RequestKind::snapshots, RequestKind::steers, RequestKind::for_state, with<name_request_t, &Run::restore>},
+};
+
+const RequestKind* RequestTable::find(int32_t kind) {
+  const auto found = std::find_if(std::begin(kKinds), std::end(kKinds), [kind](const RequestKind& each) { return each.kind == kind; });
+  return found == std::end(kKinds) ? nullptr : &*found;
+}
+
+const RequestKind* find_request_kind(int32_t kind) { return RequestTable::find(kind); }
+
+bool Run::serves(const RequestKind& kind) const {
+  return kind.needs == RequestKind::nothing || (kind.needs == RequestKind::grants ? mode_->takes_grants() : journal_ != nullptr);
+}
+
+int64_t Run::features() const {
+  int64_t bits = 0;
+  for (const RequestKind& kind : RequestTable::kKinds) {
+    if (serves(kind)) bits |= int64_t{1} << kind.kind;
+  }
+  return bits;
+}
+
+Outcome Run::ask(const request_t& request, const Session& session) {
+  const RequestKind* kind = find_request_kind(request.kind);
+  if (kind && serves(*kind)) {
+    std::string refusal = mode().refusal(request.kind, kind->effect == RequestKind::looks);
+    if (!refusal.empty()) return Outcome::refuse(reply_t::REFUSED, std::move(refusal));
+  }
+  return execute(request, session);
+}
+
+Outcome Run::execute(const request_t& request, const Session& session) {
+  const RequestKind* kind = find_request_kind(request.kind);
+  if (!kind || !kind->execute) {
+    return Outcome::refuse(reply_t::NOT_SUPPORTED, "this server does not know requests of kind " + std::to_string(request.kind));
+  }
+  if (serves(*kind)) return kind->execute(*this, request, session);
+  return Outcome::refuse(reply_t::NOT_SUPPORTED, kind->needs == RequestKind::grants ? "this run is not in lockstep: start the server with --lockstep N"
+                                                                                    : "start the server with --snapshots FOLDER");
+}
+
+Outcome Run::pause(const request_t&) {
+  const int64_t last = pacer_->pause();
+  control_.cancel_after(last, "a PAUSE ended it at step " + std::to_string(last));
+  return Outcome::after(last);
+}
+
+Outcome Run::resume(const request_t&) {
+  pacer_->resume();
+  return Outcome::with(engine::encoded(state()));
+}
+
+Outcome Run::step(const request_t&, const step_request_t& body) {
+  if (body.steps < 1 || body.steps > kMostSteps) {
+    return Outcome::refuse(reply_t::BAD_REQUEST, "steps is " + std::to_string(body.steps) + "; 1 to " + std::to_string(kMostSteps) + " is allowed");
+  }
+  if (mode().takes_grants()) return Outcome::refuse(reply_t::REFUSED, "in lockstep it is the clients' grants that step");
+  if (!pacer_->paused()) return Outcome::refuse(reply_t::REFUSED, "steps are taken while paused: pause first");
+  return Outcome::after(pacer_->allow(body.steps));
+}
+
+Outcome Run::set_rate(const request_t&, const rate_request_t& body) {
+  if (!(body.rate > 0.0)) return Outcome::refuse(reply_t::BAD_REQUEST, "a rate is above 0, +inf for as fast as it goes");
+  pacer_->set_rate(body.rate);
+  return Outcome::with(engine::encoded(state()));
+}
+
+Outcome Run::say_info(const request_t&) {
+  info_beat_.say();
+  return {};
+}
+
+Outcome Run::quit(const request_t&) {
+  stop();
+  return {};
+}
+
 namespace {
-
-template <class Body>
-bool read_body(const request_t& request, Body& body) {
-  return decode_checked(request.body.data(), request.body.size(), body) == DecodeFault::none;
-}
-
-engine::Outcome bad_body(const char* type) {
-  return engine::Outcome::refuse(reply_t::BAD_REQUEST, std::string("the body is not a ") + type);
-}
-
-// What lockstep answers before there is a state.
-bool is_before_begin(int32_t kind) {
-  return kind == request_t::GRANT || kind == request_t::RESEND || kind == request_t::INFO || kind == request_t::QUIT || kind == request_t::STEP;
-}
 
 void put(const Pose& pose, const Twist& twist, state_reply_t& reply) {
   const Quat& q = pose.rotation;
@@ -41,127 +145,7 @@ void put(const Pose& pose, const Twist& twist, state_reply_t& reply) {
 
 }  // namespace
 
-int64_t Server::features() const {
-  int64_t bits = 0;
-  constexpr int32_t kinds[] = {request_t::JOIN,  request_t::LEAVE,     request_t::PAUSE, request_t::RESUME,
-                               request_t::STEP,  request_t::RATE,      request_t::RESET, request_t::GET_STATE,
-                               request_t::INFO,  request_t::QUIT,      request_t::RESET_ODOMETRY, request_t::SPAWN,
-                               request_t::REMOVE, request_t::SET_POSE, request_t::SET_TWIST};
-  for (int32_t kind : kinds) bits |= int64_t{1} << kind;
-  if (lockstep_) bits |= int64_t{1} << request_t::GRANT | int64_t{1} << request_t::RESEND;
-  if (journal_) bits |= int64_t{1} << request_t::SNAPSHOT | int64_t{1} << request_t::RESTORE;
-  return bits;
-}
-
-// What is repeated must not be disturbed: only who looks is answered meanwhile.
-engine::Outcome Server::ask(const request_t& request, const Session& session) {
-  const bool looks = request.kind == request_t::GET_STATE || request.kind == request_t::INFO || request.kind == request_t::QUIT;
-  if (lockstep_ && !replay_ && !lockstep_->begun() && !is_before_begin(request.kind)) {
-    return engine::Outcome::refuse(reply_t::REFUSED, "lockstep has not begun: call step(0), or grant. It waits for " + lockstep_->waits_for());
-  }
-  if (replay_ && !looks) return engine::Outcome::refuse(reply_t::REFUSED, "a snapshot is being restored: ask again when that is done");
-  if (lockstep_ && request.kind == request_t::GRANT) return lockstep_->grant(request, session);
-  if (lockstep_ && request.kind == request_t::RESEND) return lockstep_->resend(request, session);
-  return execute(request);
-}
-
-engine::Outcome Server::execute(const request_t& request) {
-  switch (request.kind) {
-    case request_t::PAUSE: return pause();
-    case request_t::RESUME: pacer_->resume(); return engine::Outcome::with(engine::encoded(state()));
-    case request_t::STEP: return step(request);
-    case request_t::RATE: return set_rate(request);
-    case request_t::RESET: return reset(request);
-    case request_t::GET_STATE: return get_state(request);
-    case request_t::INFO: info_beat_.say(); return {};
-    case request_t::QUIT: stop(); return {};
-    case request_t::RESET_ODOMETRY: return reset_odometry(request);
-    case request_t::SPAWN:
-    case request_t::REMOVE:
-    case request_t::SET_POSE:
-    case request_t::SET_TWIST: return edit(request);
-    case request_t::SNAPSHOT: return snapshot(request);
-    case request_t::RESTORE: return restore(request);
-    default: break;
-  }
-  return engine::Outcome::refuse(reply_t::NOT_SUPPORTED, "this server does not know requests of kind " + std::to_string(request.kind));
-}
-
-engine::Outcome Server::pause() {
-  const int64_t last = pacer_->pause();
-  control_.cancel_after(last, "a PAUSE ended it at step " + std::to_string(last));
-  return engine::Outcome::after(last);
-}
-
-engine::Outcome Server::step(const request_t& request) {
-  step_request_t body;
-  if (!read_body(request, body)) return bad_body("step_request_t");
-  if (body.steps < 1 || body.steps > kMostSteps) {
-    return engine::Outcome::refuse(reply_t::BAD_REQUEST, "steps is " + std::to_string(body.steps) + "; 1 to " + std::to_string(kMostSteps) + " is allowed");
-  }
-  if (lockstep_) return engine::Outcome::refuse(reply_t::REFUSED, "in lockstep it is the clients' grants that step");
-  if (!pacer_->paused()) return engine::Outcome::refuse(reply_t::REFUSED, "steps are taken while paused: pause first");
-  return engine::Outcome::after(pacer_->allow(body.steps));
-}
-
-engine::Outcome Server::set_rate(const request_t& request) {
-  rate_request_t body;
-  if (!read_body(request, body)) return bad_body("rate_request_t");
-  if (!(body.rate > 0.0)) return engine::Outcome::refuse(reply_t::BAD_REQUEST, "a rate is above 0, +inf for as fast as it goes");
-  pacer_->set_rate(body.rate);
-  return engine::Outcome::with(engine::encoded(state()));
-}
-
-engine::Outcome Server::reset(const request_t& request) {
-  reset_request_t body;
-  if (!read_body(request, body)) return bad_body("reset_request_t");
-  if (body.what != reset_request_t::ALL && body.what != reset_request_t::TIME && body.what != reset_request_t::POSES) {
-    return engine::Outcome::refuse(reply_t::BAD_REQUEST, "a reset of kind " + std::to_string(body.what) + "; there are 0 (all), 1 (time) and 2 (poses)");
-  }
-  if (body.what != reset_request_t::ALL) {
-    if (body.seed != -1) return engine::Outcome::refuse(reply_t::BAD_REQUEST, "another seed goes with a reset of everything; -1 is allowed here");
-    return body.what == reset_request_t::TIME ? reset_time(request) : reset_poses(request);
-  }
-  if (body.seed < -1) return engine::Outcome::refuse(reply_t::BAD_REQUEST, "a seed is 0 or more, -1 for the one there is");
-  if (!replay_) control_.cancel("the world was reset");
-  note(request);
-  if (body.seed >= 0) options_.simulation.fleet.seed = static_cast<uint64_t>(body.seed);
-  begin_epoch();
-  return engine::Outcome::after(0);
-}
-
-void Server::note(const request_t& request) {
-  applied_t applied;
-  applied.utime = publisher_.time_us();
-  applied.step = publisher_.step();
-  applied.epoch = epoch_;
-  applied.sequence = request.sequence;
-  applied.channel = "ruedo/request";
-  applied.kind = request.kind;
-  applied.size = request.size;
-  applied.data = request.body;
-  publisher_.record(kAppliedChannel, applied);
-}
-
-void Server::note_files(const std::vector<std::string>& files) {
-  if (files.empty() || !publisher_.has_recorders()) return;
-  log_header_t header = header_;
-  header.utime = publisher_.time_us();
-  header.files = log::hashed_files(files);
-  header.nfiles = static_cast<int32_t>(header.files.size());
-  publisher_.record(kHeaderChannel, header);
-}
-
-void Server::begin_epoch() {
-  header_.epoch = ++epoch_;
-  header_.seed = static_cast<int64_t>(options_.simulation.fleet.seed);
-  if (lockstep_) lockstep_->restart();
-  make_simulation();
-  if (journal_) journal_->begin(header_, publisher_.base_us());
-  simulation_->start(*pacer_);
-}
-
-state_reply_t Server::state() const {
+state_reply_t Run::state() const {
   state_reply_t reply;
   reply.utime = publisher_.time_us();
   reply.step = publisher_.step();
@@ -172,12 +156,10 @@ state_reply_t Server::state() const {
   return reply;
 }
 
-engine::Outcome Server::get_state(const request_t& request) {
-  name_request_t body;
-  if (!read_body(request, body)) return bad_body("name_request_t");
+Outcome Run::get_state(const request_t&, const name_request_t& body) {
   state_reply_t reply = state();
   reply.name = body.name;
-  if (body.name.empty()) return engine::Outcome::with(engine::encoded(reply));
+  if (body.name.empty()) return Outcome::with(engine::encoded(reply));
   const model::BodyLayout& layout = simulation_->layout();
   for (size_t i = 0; i < layout.links.size(); ++i) {
     const model::LinkPlacement& placement = layout.links[i];
@@ -197,21 +179,55 @@ engine::Outcome Server::get_state(const request_t& request) {
       twist.linear = body_twist.linear + body_twist.angular.cross(X_WF.translation - X_WB.translation);
     }
     put(whole_model ? X_WL * link.X_ML.inverse() : X_WL, twist, reply);
-    return engine::Outcome::with(engine::encoded(reply));
+    return Outcome::with(engine::encoded(reply));
   }
-  return engine::Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no model or MODEL/LINK called '" + body.name + "'");
+  return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no model or MODEL/LINK called '" + body.name + "'");
 }
 
-engine::Outcome Server::reset_odometry(const request_t& request) {
-  name_request_t body;
-  if (!read_body(request, body)) return bad_body("name_request_t");
+Outcome Run::reset_odometry(const request_t& request, const name_request_t& body) {
   const model::BodyLayout& layout = simulation_->layout();
   for (size_t i = 0; i < layout.robots.size(); ++i) {
     if (world_->models[static_cast<size_t>(layout.robots[i].instance)].name != body.name) continue;
     simulation_->inbox().reset_odometry(static_cast<int>(i), request.body);
     return {};
   }
-  return engine::Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no robot called '" + body.name + "'");
+  return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no robot called '" + body.name + "'");
+}
+
+Outcome Run::snapshot(const request_t&, const name_request_t& body) {
+  if (journal_->snapshot_path(body.name).empty()) {
+    return Outcome::refuse(reply_t::BAD_REQUEST, "'" + body.name + "' is no name of a snapshot: 1 to 63 letters, digits, '_', '-' and '.', not first a '.'");
+  }
+  const std::string fault = journal_->save_snapshot(body.name, hashes_.now(true), publisher_.base_us() + publisher_.time_us());
+  if (!fault.empty()) return Outcome::refuse(reply_t::REFUSED, "the snapshot was not saved: " + fault);
+  return Outcome::with(engine::encoded(state()));
+}
+
+// In the log it is a reset, and the run up to the snapshot's step: so the log needs no other file to be repeated.
+Outcome Run::restore(const request_t& request, const name_request_t& body) {
+  const std::string path = journal_->snapshot_path(body.name);
+  if (path.empty() || !std::filesystem::exists(path)) {
+    return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no snapshot '" + body.name + "'");
+  }
+  try {
+    reset_request_t reset;
+    reset.what = reset_request_t::ALL;
+    const log_header_t header = read_header(path);
+    log::check_same_run(header, header_, path);
+    reset.seed = header.seed == header_.seed ? -1 : header.seed;
+    control_.cancel("a snapshot is restored");
+    request_t noted = request;
+    noted.kind = request_t::RESET;
+    noted.body = engine::encoded(reset);
+    noted.size = static_cast<int32_t>(noted.body.size());
+    note(noted);
+    begin_repeat(path);
+  } catch (const InputError& error) {
+    return Outcome::refuse(reply_t::REFUSED, error.what());
+  }
+  begin_epoch();
+  take_turns();
+  return Outcome::after(0);
 }
 
 }  // namespace ruedo::run

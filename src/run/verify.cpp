@@ -53,14 +53,14 @@ void name_field(const std::vector<uint8_t>& logged, const std::vector<uint8_t>& 
 
 class Verifier::Impl {
  public:
-  Impl(const std::string& log, std::shared_ptr<const model::WorldModel> world, ServerOptions options) : log_(log) {
+  Impl(const std::string& log, std::shared_ptr<const model::WorldModel> world, RunOptions options) : log_(log) {
     step_us_ = world->step_us;
     find_kept_channels(log);
     options.repeat = log;
     options.end_with_repeat = true;
     options.control = false;
     options.watcher = [this](SimTime stamp, const std::string& channel, const uint8_t* data, size_t size) { see(stamp, channel, data, size); };
-    server_ = std::make_unique<Server>(std::move(world), std::move(options), bus_);
+    server_ = std::make_unique<Run>(std::move(world), std::move(options), bus_);
   }
 
   Verification run() {
@@ -165,10 +165,10 @@ class Verifier::Impl {
   int32_t epoch_ = 0;
   Verification verdict_;
   Nowhere bus_;
-  std::unique_ptr<Server> server_;
+  std::unique_ptr<Run> server_;
 };
 
-Verifier::Verifier(const std::string& log, std::shared_ptr<const model::WorldModel> world, ServerOptions options)
+Verifier::Verifier(const std::string& log, std::shared_ptr<const model::WorldModel> world, RunOptions options)
     : impl_(std::make_unique<Impl>(log, std::move(world), std::move(options))), log_(log) {
   impl_->log_header = read_header(log);
   impl_->differences = log::machine_differences(impl_->log_header, impl_->header);

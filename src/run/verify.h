@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "run/server.h"
+#include "run/run.h"
 
 namespace ruedo::run {
 
@@ -32,7 +32,7 @@ struct Verification {
 class Verifier {
  public:
   // world and options as the log's header has them. Throws InputError and EnvironmentError.
-  Verifier(const std::string& log, std::shared_ptr<const model::WorldModel> world, ServerOptions options);
+  Verifier(const std::string& log, std::shared_ptr<const model::WorldModel> world, RunOptions options);
   ~Verifier();
 
   // In what this machine and program differ from the log's, a line each: then a difference says nothing about determinism.

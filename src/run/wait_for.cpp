@@ -19,9 +19,9 @@ WaitFor::WaitFor(std::vector<WaitForOption> options, int64_t step_us) {
   }
 }
 
-void WaitFor::attach(const engine::Channels& channels, engine::CommandInbox& inbox, Pacer& pacer, int64_t step) {
+void WaitFor::attach(const engine::Channels& channels, engine::CommandInbox& inbox, Gate& gate, int64_t step) {
   inbox_ = &inbox;
-  pacer_ = &pacer;
+  gate_ = &gate;
   for (Waited& waited : waited_) {
     std::vector<std::string> names;
     waited.channel.clear();
@@ -68,7 +68,7 @@ bool WaitFor::receive(const std::string& channel, const uint8_t* data, size_t si
 void WaitFor::limit() {
   int64_t last = std::numeric_limits<int64_t>::max();
   for (const Waited& waited : waited_) last = std::min(last, waited.clock.step_of(waited.next));
-  pacer_->set_limit(last);
+  gate_->set_limit(last);
 }
 
 std::string WaitFor::waits_for(int64_t step) const {

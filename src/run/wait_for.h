@@ -11,7 +11,7 @@
 #include "ruedo/sim_time.h"
 #include "engine/channels.h"
 #include "engine/command_inbox.h"
-#include "run/pacer.h"
+#include "run/gate.h"
 
 namespace ruedo::run {
 
@@ -28,8 +28,7 @@ class WaitFor {
   WaitFor(std::vector<WaitForOption> options, int64_t step_us);
 
   // For a simulation that was made anew, or is at `step` for another reason. Throws InputError for what is no input.
-  void attach(const engine::Channels& channels, engine::CommandInbox& inbox, Pacer& pacer, int64_t step);
-  void detach() { inbox_ = nullptr; }
+  void attach(const engine::Channels& channels, engine::CommandInbox& inbox, Gate& gate, int64_t step);
 
   // False: the channel is none of these.
   bool receive(const std::string& channel, const uint8_t* data, size_t size);
@@ -51,7 +50,7 @@ class WaitFor {
 
   std::vector<Waited> waited_;
   engine::CommandInbox* inbox_ = nullptr;
-  Pacer* pacer_ = nullptr;
+  Gate* gate_ = nullptr;
 };
 
 }  // namespace ruedo::run

@@ -103,8 +103,8 @@ TEST(Places, GoToNewcomersWithinSeconds) {
   EXPECT_NE(sessions.find(kept), nullptr);
 }
 
-ServerOptions in_lockstep() {
-  ServerOptions options = fast(1e6);
+RunOptions in_lockstep() {
+  RunOptions options = fast(1e6);
   options.lockstep.clients = 1;
   options.lockstep.lease_s = 1e6;
   return options;

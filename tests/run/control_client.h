@@ -29,18 +29,29 @@ class ControlledOn {
  public:
   ~ControlledOn() { end(); }
 
-  void begin(ServerOptions options, const std::string& models) {
-    server_ = std::make_unique<Server>(load_text(models), std::move(options), bus);
+  void begin(RunOptions options, const std::string& models) {
+    start(std::move(options), models);
+    join();
+  }
+  void start(RunOptions options, const std::string& models) {
+    server_ = std::make_unique<run::Run>(load_text(models), std::move(options), bus);
     thread_ = std::thread([this] { server_->run(); });
+  }
+  reply_t join() {
     join_t body;
     body.client = "test";
     request_t joining = request(request_t::JOIN, engine::encoded(body));
     joining.session = 0;
     joining.sequence = 4711;
-    session_ = ask(joining).session;
+    const reply_t reply = ask(joining);
+    session_ = reply.session;
+    return reply;
   }
   void end() {
     if (server_) server_->stop();
+    wait();
+  }
+  void wait() {    // for the end of the run
     if (thread_.joinable()) thread_.join();
   }
 
@@ -158,11 +169,11 @@ class ControlledOn {
   }
 
   void rewind() { from_ = 0; }    // after bus.forget(), or for an answer that came before another's
-  Server& server() { return *server_; }
+  run::Run& server() { return *server_; }
   SomeBus bus;
 
  private:
-  std::unique_ptr<Server> server_;
+  std::unique_ptr<run::Run> server_;
   std::thread thread_;
   int64_t session_ = 0, sequence_ = 0;
   size_t from_ = 0;
@@ -170,8 +181,8 @@ class ControlledOn {
 
 using Controlled = ControlledOn<MemoryBus>;
 
-inline ServerOptions paused_server() {
-  ServerOptions options;
+inline RunOptions paused_server() {
+  RunOptions options;
   options.paused = true;
   return options;
 }

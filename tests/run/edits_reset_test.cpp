@@ -101,7 +101,7 @@ TEST_F(EditsResetTest, AResetOfAllTakesGuestsAwayAndEqualsAFreshRun) {
 
 TEST_F(EditsResetTest, TheLogHasWhatWasChangedAndWhen) {
   const TemporaryFile log("edits.lcm");
-  ServerOptions options = paused_server();
+  RunOptions options = paused_server();
   options.record = log.path();
   begin(options, robot_sdf("r", 0, 0));
   step(10);
@@ -133,7 +133,7 @@ TEST_F(EditsResetTest, TheLogHasWhatWasChangedAndWhen) {
 TEST_F(EditsResetTest, ARunWithChangesIsRepeatedFromItsLog) {
   const std::string models = robot_sdf("r", 0, 0, imu()) + box_sdf("box", "0.2 0.2 0.2", false, 2, 0, 0.1);
   const TemporaryFile log("repeat.lcm");
-  ServerOptions options = paused_server();
+  RunOptions options = paused_server();
   options.record = log.path();
   begin(options, models);
   for (int epoch = 0; epoch < 2; ++epoch) {
@@ -158,7 +158,7 @@ TEST_F(EditsResetTest, ARunWithChangesIsRepeatedFromItsLog) {
     if (epoch == 0) reset(reset_request_t::ALL, 7);
   }
   end();
-  ServerOptions again;
+  RunOptions again;
   again.simulation.fleet.seed = 1;
   const Verification verification = Verifier(log.path(), load_text(models), again).run();
   EXPECT_EQ(verification.fault, "");

@@ -221,7 +221,7 @@ TEST(Edits, ARunWithAGuestRepeatsWithAnyNumberOfThreads) {
   const auto run = [](int threads, bool sleepy) {
     const engine::ThreadLimit limit(threads);
     Controlled run;
-    ServerOptions options = paused_server();
+    RunOptions options = paused_server();
     if (sleepy) options.simulation.before_batch = [](const std::string& module) {
       std::this_thread::sleep_for(std::chrono::microseconds(module.size() * 40));
     };

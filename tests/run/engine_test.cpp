@@ -64,10 +64,10 @@ std::vector<Command> random_commands(std::mt19937& random, int robots, int64_t s
 
 std::map<int64_t, Told> by_server(const std::shared_ptr<const model::WorldModel>& world, uint64_t seed, const std::vector<Command>& commands, int64_t steps) {
   LossyBus bus({}, 1);
-  ServerOptions options = fast(1e6, seed);
+  RunOptions options = fast(1e6, seed);
   options.lockstep.clients = 1;
   options.lockstep.lease_s = 60.0;
-  Server server(world, options, bus);
+  run::Run server(world, options, bus);
   std::thread running([&] { server.run(); });
   LockstepClient client(bus, server.channels(), "test");
   client.take_part();

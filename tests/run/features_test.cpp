@@ -10,7 +10,7 @@ namespace {
 class Features : public testing::Test, protected Controlled {
  protected:
   // Requests with an empty body: what is served finds something wrong with it, or does it.
-  void expect_truth(const ServerOptions& options) {
+  void expect_truth(const RunOptions& options) {
     begin(options, robot_sdf("r", 0, 0));
     if (options.lockstep.clients > 0) {    // step 0 waits for its client
       grant_request_t taking_part;
@@ -41,7 +41,7 @@ TEST_F(Features, OfAPlainServer) {
 }
 
 TEST_F(Features, OfLockstep) {
-  ServerOptions options;
+  RunOptions options;
   options.lockstep.clients = 1;
   expect_truth(options);
   EXPECT_TRUE(served_ >> request_t::GRANT & 1);
@@ -49,7 +49,7 @@ TEST_F(Features, OfLockstep) {
 }
 
 TEST_F(Features, OfOneThatSavesSnapshots) {
-  ServerOptions options = paused_server();
+  RunOptions options = paused_server();
   options.snapshots = std::filesystem::temp_directory_path().string();    // nothing is saved: the name is missing
   expect_truth(options);
   EXPECT_TRUE(served_ >> request_t::SNAPSHOT & 1);

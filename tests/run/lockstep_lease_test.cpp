@@ -37,10 +37,10 @@ class LockstepTest : public testing::Test {
   ~LockstepTest() override { end(); }
 
   void begin(int clients, Policy policy, double lease_s, const std::string& record = "") {
-    ServerOptions options = fast(1e6);
+    RunOptions options = fast(1e6);
     options.lockstep = {clients, lease_s, policy};
     options.record = record;
-    server_ = std::make_unique<Server>(load_text(robot_sdf("r", 0, 0)), options, bus_);
+    server_ = std::make_unique<run::Run>(load_text(robot_sdf("r", 0, 0)), options, bus_);
     thread_ = std::thread([this] {
       try {
         server_->run();
@@ -69,7 +69,7 @@ class LockstepTest : public testing::Test {
   }
 
   LossyBus bus_{{}, 1};
-  std::unique_ptr<Server> server_;
+  std::unique_ptr<run::Run> server_;
   std::thread thread_;
   std::string why_;
   std::atomic<bool> over_{false};

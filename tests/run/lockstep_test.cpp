@@ -42,10 +42,10 @@ struct Result {
 // its number, and all of them say something different to r0 at every 50th step.
 Result run(int clients, Faults faults, unsigned seed) {
   LossyBus bus(faults, seed);
-  ServerOptions options = fast(1e6);
+  RunOptions options = fast(1e6);
   options.lockstep.clients = clients;
   options.lockstep.lease_s = 60.0;
-  Server server(load_text(robots(clients)), options, bus);
+  run::Run server(load_text(robots(clients)), options, bus);
   std::thread running([&] { server.run(); });
   std::vector<std::map<int64_t, LockstepClient::Seen>> seen(static_cast<size_t>(clients));
   std::vector<std::thread> threads;

@@ -17,7 +17,7 @@
 
 #include "model/load.h"
 #include "ruedo/bus.h"
-#include "run/server.h"
+#include "run/run.h"
 #include "engine/thread_limit.h"
 
 namespace ruedo::run {
@@ -139,8 +139,8 @@ inline std::shared_ptr<const model::WorldModel> load_text(const std::string& mod
 }
 
 // As fast as it goes, for `seconds` of sim time.
-inline ServerOptions fast(double seconds, uint64_t seed = 1) {
-  ServerOptions options;
+inline RunOptions fast(double seconds, uint64_t seed = 1) {
+  RunOptions options;
   options.rate = std::numeric_limits<double>::infinity();
   options.duration_us = static_cast<int64_t>(seconds * 1e6);
   options.simulation.fleet.seed = seed;

@@ -111,9 +111,9 @@ TEST(QueuedSink, MissesWholeStepsRatherThanWaiting) {
   EXPECT_EQ(lines.back(), "end 1000");
 }
 
-TEST(Server, HandsTheSameMessagesToEverySink) {
+TEST(Run, HandsTheSameMessagesToEverySink) {
   MemoryBus bus;
-  Server server(load_text(robot_sdf("r", 0, 0)), fast(0.1), bus);
+  run::Run server(load_text(robot_sdf("r", 0, 0)), fast(0.1), bus);
   Notes samples, all({.samples = true, .records = true, .services = true});
   server.add(samples);
   server.add(all);
@@ -135,7 +135,7 @@ TEST(Server, HandsTheSameMessagesToEverySink) {
 }
 
 // A middleware of its own: it hears in a thread, and commands from there.
-TEST(Server, TakesCommandsFromASink) {
+TEST(Run, TakesCommandsFromASink) {
   class Driver : public Sink {
    public:
     explicit Driver(std::function<void()> command) : command_(std::move(command)) {}
@@ -148,7 +148,7 @@ TEST(Server, TakesCommandsFromASink) {
     bool sent_ = false;
   };
   MemoryBus bus;
-  Server server(load_text(robot_sdf("r", 0, 0)), fast(1e6), bus);
+  run::Run server(load_text(robot_sdf("r", 0, 0)), fast(1e6), bus);
   Driver driver([&] {
     velocity_command_t command{};
     command.vx = 0.5;
@@ -163,7 +163,7 @@ TEST(Server, TakesCommandsFromASink) {
 }
 
 // The robot is there again, and its commands are heard again.
-TEST(Server, ListensToARobotThatAResetBringsBack) {
+TEST(Run, ListensToARobotThatAResetBringsBack) {
   class ListeningBus : public MemoryBus {
    public:
     void listen_to(const std::vector<std::string>& channels, const std::vector<std::string>&) override {

@@ -33,7 +33,7 @@ TEST(SpawnWorker, TheRunAndOthersGoOnMeanwhile) {
   Gate gate;
   TemporaryFile log("spawned.lcm");
   Controlled client;
-  ServerOptions options = paused_server();
+  RunOptions options = paused_server();
   options.record = log.path();
   options.before_model = gate.wait();
   client.begin(options, kRobot);
@@ -59,7 +59,7 @@ TEST(SpawnWorker, TheRunAndOthersGoOnMeanwhile) {
     applied.emplace_back(one.step, one.kind);
   }
   EXPECT_EQ(applied, (std::vector<std::pair<int64_t, int32_t>>{{7, request_t::SET_POSE}, {7, request_t::SPAWN}}));
-  Verifier verifier(log.path(), load_text(kRobot), ServerOptions{});
+  Verifier verifier(log.path(), load_text(kRobot), RunOptions{});
   const Verification verdict = verifier.run();
   EXPECT_FALSE(verdict.difference);
   EXPECT_EQ(verdict.fault, "");
@@ -68,7 +68,7 @@ TEST(SpawnWorker, TheRunAndOthersGoOnMeanwhile) {
 TEST(SpawnWorker, AResetEndsWhatIsNotReady) {
   Gate gate;
   Controlled client;
-  ServerOptions options = paused_server();
+  RunOptions options = paused_server();
   options.before_model = gate.wait();
   client.begin(options, kRobot);
   const request_t spawn = client.request(request_t::SPAWN, engine::encoded(Controlled::spawning(kBox, 2, 0)));
@@ -87,7 +87,7 @@ TEST(SpawnWorker, AResetEndsWhatIsNotReady) {
 TEST(SpawnWorker, FewWait) {
   Gate gate;
   Controlled client;
-  ServerOptions options = paused_server();
+  RunOptions options = paused_server();
   options.before_model = gate.wait();
   client.begin(options, kRobot);
   const auto spawning = [&](int i) { return client.request(request_t::SPAWN, engine::encoded(Controlled::spawning(kBox, 2, i))); };
@@ -102,7 +102,7 @@ TEST(SpawnWorker, FewWait) {
 TEST(SpawnWorker, TheEndWaitsForNoModel) {
   Gate gate;
   Controlled client;
-  ServerOptions options = paused_server();
+  RunOptions options = paused_server();
   options.before_model = gate.wait();
   client.begin(options, kRobot);
   const request_t spawn = client.request(request_t::SPAWN, engine::encoded(Controlled::spawning(kBox, 2, 0)));
@@ -117,7 +117,7 @@ TEST(SpawnWorker, TheEndWaitsForNoModel) {
 // The client grants 100 steps, asks for a model while they are computed, and waits for the answer: the model enters at step 100.
 TEST(SpawnWorker, InLockstepTheStepIsThatOfTheGrants) {
   Controlled client;
-  ServerOptions options = fast(1e6);
+  RunOptions options = fast(1e6);
   options.lockstep.clients = 1;
   options.lockstep.lease_s = 1e6;
   client.begin(options, kRobot);

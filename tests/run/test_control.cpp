@@ -18,83 +18,30 @@
 #include "ruedo/velocity_command_t.hpp"
 #include "ruedo/wheel_command_t.hpp"
 #include "ruedo/world_info_t.hpp"
-#include "running.h"
+#include "control_client.h"
 
 namespace ruedo::run {
 namespace {
 
 template <class T>
 T decoded(const std::vector<uint8_t>& bytes) {
-  T message;
-  EXPECT_EQ(decode_checked(bytes.data(), bytes.size(), message), DecodeFault::none) << T::getTypeName();
-  return message;
+  return decoded_as<T>(bytes);
 }
 
-// A server that runs in a thread, and a client of its control.
-class ControlTest : public testing::Test {
+class ControlTest : public testing::Test, protected Controlled {
  protected:
-  ~ControlTest() override { end(); }
-
-  void begin(ServerOptions options, const std::string& models = robot_sdf("r", 0, 0)) {
-    server_ = std::make_unique<Server>(load_text(models), std::move(options), bus_);
-    thread_ = std::thread([this] { server_->run(); });
-  }
-  void end() {
-    if (server_) server_->stop();
-    if (thread_.joinable()) thread_.join();
-  }
-
-  request_t request(int32_t kind, const std::vector<uint8_t>& body = {}) {
-    request_t request;
-    request.utime = 0;
-    request.run_id = 0;
-    request.epoch = -1;
-    request.session = session_;
-    request.sequence = ++sequence_;
-    request.kind = kind;
-    request.body = body;
-    request.size = static_cast<int32_t>(body.size());
-    return request;
-  }
-
-  reply_t ask(const request_t& request) {
-    bus_.send("ruedo/request", engine::encoded(request));
-    return decoded<reply_t>(bus_.wait_for("ruedo/reply", from_, [&](const Message& message) {
-                                  return decoded<reply_t>(message.bytes).sequence == request.sequence;
-                                }).bytes);
-  }
-  reply_t ask(int32_t kind, const std::vector<uint8_t>& body = {}) { return ask(request(kind, body)); }
-
+  void begin(RunOptions options, const std::string& models = robot_sdf("r", 0, 0)) { start(std::move(options), models); }
   void join() {
-    join_t body;
-    body.client = "test";
-    request_t joining = request(request_t::JOIN, engine::encoded(body));
-    joining.session = 0;
-    joining.sequence = 4711;
-    const reply_t reply = ask(joining);
+    const reply_t reply = Controlled::join();
     ASSERT_EQ(reply.code, reply_t::OK) << reply.text;
-    session_ = reply.session;
-    EXPECT_EQ(ask(joining).session, session_);    // a repeated JOIN: the same session
+    EXPECT_EQ(Controlled::join().session, reply.session);    // a repeated JOIN: the same session
   }
+  reply_t step(int64_t steps) { return ask(stepping(steps)); }
 
-  reply_t step(int64_t steps) {
-    step_request_t body;
-    body.steps = steps;
-    return ask(request_t::STEP, engine::encoded(body));
-  }
-
-  MemoryBus bus_;
-  std::unique_ptr<Server> server_;
-  std::thread thread_;
-  int64_t session_ = 0, sequence_ = 0;
-  size_t from_ = 0;
+  MemoryBus& bus_ = bus;
 };
 
-ServerOptions paused() {
-  ServerOptions options;
-  options.paused = true;
-  return options;
-}
+RunOptions paused() { return paused_server(); }
 
 TEST_F(ControlTest, StartsPausedAndSteps) {
   begin(paused());
@@ -114,7 +61,7 @@ TEST_F(ControlTest, StartsPausedAndSteps) {
 }
 
 TEST_F(ControlTest, PausesAndResumes) {
-  ServerOptions options;
+  RunOptions options;
   options.rate = std::numeric_limits<double>::infinity();
   begin(options);
   join();
@@ -153,7 +100,7 @@ TEST_F(ControlTest, RefusesOtherRunsEpochsAndSessions) {
   begin(paused());
   join();
   request_t other = request(request_t::PAUSE);
-  other.run_id = server_->run_id() ^ 1;
+  other.run_id = server().run_id() ^ 1;
   EXPECT_EQ(ask(other).code, reply_t::WRONG_RUN);
   other = request(request_t::PAUSE);
   other.epoch = 7;
@@ -277,9 +224,9 @@ TEST_F(ControlTest, SurvivesHostileMessages) {
       {"r/move", std::vector<uint8_t>(8, 0)},
   };
   for (const auto& [channel, bytes] : table) {
-    const uint64_t before = server_->inbox().refused();
+    const uint64_t before = server().inbox().refused();
     bus_.send(channel, bytes);
-    EXPECT_EQ(server_->inbox().refused(), before + 1) << channel << " with " << bytes.size() << " bytes";
+    EXPECT_EQ(server().inbox().refused(), before + 1) << channel << " with " << bytes.size() << " bytes";
   }
   // Of other channels, or of robots that there are not: nothing at all.
   bus_.send("nobody/velocity", velocity);
@@ -314,27 +261,27 @@ TEST_F(ControlTest, KeepsTheNewestCommands) {
     bus_.send("r/velocity", engine::encoded(command));
   }
   step(200);
-  EXPECT_EQ(server_->inbox().displaced(), 100'000u - engine::CommandInbox::kKeptPerRobot);
+  EXPECT_EQ(server().inbox().displaced(), 100'000u - engine::CommandInbox::kKeptPerRobot);
   name_request_t name;
   name.name = "r";
   EXPECT_NEAR(decoded<state_reply_t>(ask(request_t::GET_STATE, engine::encoded(name)).body).position[0], 0.1, 1e-9);
 }
 
 TEST_F(ControlTest, QuitEndsTheRun) {
-  ServerOptions options;
+  RunOptions options;
   options.rate = std::numeric_limits<double>::infinity();
   begin(options);
   join();
   EXPECT_EQ(ask(request_t::QUIT).code, reply_t::OK);
-  thread_.join();
+  wait();
 }
 
 TEST_F(ControlTest, ControlOff) {
-  ServerOptions options = fast(0.1);
+  RunOptions options = fast(0.1);
   options.control = false;
   begin(options);
   bus_.send("ruedo/request", engine::encoded(request(request_t::PAUSE)));
-  thread_.join();
+  wait();
   for (const Message& message : bus_.messages()) EXPECT_NE(message.channel, "ruedo/reply");
 }
 

@@ -86,7 +86,7 @@ struct Variation {
 std::string log_of(const std::shared_ptr<const model::WorldModel>& world, const Variation& variation) {
   const TemporaryFile file("determinism.lcmlog");
   const engine::ThreadLimit limit(variation.threads);
-  ServerOptions options = fast(1.0, variation.seed);
+  RunOptions options = fast(1.0, variation.seed);
   options.rate = variation.rate;
   options.record = file.path();
   options.simulation.batch_steps = variation.batch_steps;
@@ -97,7 +97,7 @@ std::string log_of(const std::shared_ptr<const model::WorldModel>& world, const 
     };
   }
   MemoryBus bus;
-  Server server(world, options, bus);
+  run::Run server(world, options, bus);
   bus.on_publish = nullptr;
   velocity_command_t command{};
   command.vx = 0.4;

@@ -35,7 +35,7 @@ Fleet fleet(int robots) {
   return fleet;
 }
 
-void drive_circles(Server& server, int robots) {
+void drive_circles(run::Run& server, int robots) {
   move_command_t command{};
   command.kind = move_command_t::ARC;
   command.value = 1e6;
@@ -44,8 +44,8 @@ void drive_circles(Server& server, int robots) {
   for (int i = 0; i < robots; ++i) server.receive("r" + std::to_string(i) + "/move", engine::encoded(command));
 }
 
-ServerOptions options_for(const Fleet& fleet, double seconds) {
-  ServerOptions options = fast(seconds);
+RunOptions options_for(const Fleet& fleet, double seconds) {
+  RunOptions options = fast(seconds);
   options.control = false;
   options.simulation.fleet.disabled = fleet.load.disabled;
   return options;
@@ -54,11 +54,11 @@ ServerOptions options_for(const Fleet& fleet, double seconds) {
 std::string log_of(const Fleet& fleet, int threads) {
   const TemporaryFile file("hundred.lcmlog");
   const engine::ThreadLimit limit(threads);
-  ServerOptions options = options_for(fleet, 1.0);
+  RunOptions options = options_for(fleet, 1.0);
   options.record = file.path();
   MemoryBus bus;
   bus.keep = false;
-  Server server(fleet.world, options, bus);
+  run::Run server(fleet.world, options, bus);
   drive_circles(server, 100);
   server.run();
   return file.bytes();
@@ -73,7 +73,7 @@ TEST(Hundred, SameBytesForOneTwoAndEightThreads) {
 }
 
 // Straight on, into the walls and into those who stand there already.
-void drive_into_walls(Server& server, int robots) {
+void drive_into_walls(run::Run& server, int robots) {
   move_command_t command{};
   command.kind = move_command_t::ADVANCE;
   command.value = 1e6;
@@ -82,7 +82,7 @@ void drive_into_walls(Server& server, int robots) {
 }
 
 // operator new in 1 000 steps, from 5 s to 10 s of sim time, counted between two messages that only the publisher sends.
-uint64_t allocations_in_thousand_steps(int robots, void (*drive)(Server&, int)) {
+uint64_t allocations_in_thousand_steps(int robots, void (*drive)(run::Run&, int)) {
   const Fleet all = fleet(robots);
   MemoryBus bus;
   bus.keep = false;
@@ -94,7 +94,7 @@ uint64_t allocations_in_thousand_steps(int robots, void (*drive)(Server&, int)) 
     if (poses == 251) at_start = allocations();
     if (poses == 501) at_end = allocations();
   };
-  Server server(all.world, options_for(all, 11.0), bus);
+  run::Run server(all.world, options_for(all, 11.0), bus);
   drive(server, robots);
   server.run();
   EXPECT_GE(poses, 501);

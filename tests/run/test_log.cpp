@@ -60,11 +60,11 @@ TEST(Writer, AFullDiskIsSaid) {
 }
 
 TEST(Recording, AFullDiskEndsTheRun) {
-  ServerOptions options = fast(600.0);
+  RunOptions options = fast(600.0);
   options.record = "/dev/full";
   MemoryBus bus;
   bus.keep = false;
-  Server server(load_text(robot_sdf("r", 0, 0)), options, bus);
+  run::Run server(load_text(robot_sdf("r", 0, 0)), options, bus);
   try {
     server.run();
     FAIL() << "it ran on";
@@ -75,14 +75,14 @@ TEST(Recording, AFullDiskEndsTheRun) {
 
 TEST(Recording, HoldsWhatARepetitionNeeds) {
   const TemporaryFile file("run.lcmlog");
-  ServerOptions options = fast(1.0, 42);
+  RunOptions options = fast(1.0, 42);
   options.record = file.path();
   options.result_options = {"--no-noise"};
   MemoryBus bus;
   velocity_command_t command{};
   command.vx = 0.3;
   {
-    Server server(load_text(robot_sdf("r", 0, 0)), options, bus);
+    run::Run server(load_text(robot_sdf("r", 0, 0)), options, bus);
     server.receive("r/velocity", engine::encoded(command));
     server.run();
   }

@@ -23,7 +23,7 @@ int64_t utime_of(const Message& message) {
 
 TEST(Schedule, StepThenModuleThenRobot) {
   MemoryBus bus;
-  Server server(load_text(robot_sdf("b", 0, 0) + robot_sdf("a", 2, 0)), fast(0.1), bus);
+  run::Run server(load_text(robot_sdf("b", 0, 0) + robot_sdf("a", 2, 0)), fast(0.1), bus);
   server.run();
   // At 0 and at every 20 ms: odometry and pose of b (first in the world), then of a; and the world at 30 Hz, last.
   std::map<int64_t, std::vector<std::string>> at;
@@ -52,9 +52,9 @@ TEST(Schedule, AnHourWithoutDrift) {
   MemoryBus bus;
   bus.keep = false;
   std::map<std::string, int64_t> counts;
-  ServerOptions options = fast(3600.0);
+  RunOptions options = fast(3600.0);
   bus.on_publish = [&](const std::string& channel) { ++counts[channel]; };
-  Server server(load_text(robot_sdf("r", 0, 0)), options, bus);
+  run::Run server(load_text(robot_sdf("r", 0, 0)), options, bus);
   server.run();
   EXPECT_EQ(counts["r/odometry"], 50 * 3600 + 1);
   EXPECT_EQ(counts["r/pose"], 50 * 3600 + 1);
@@ -67,7 +67,7 @@ TEST(Schedule, AnHourWithoutDrift) {
 TEST(Schedule, StampsOfAnOddRate) {
   const auto world = load_text(robot_sdf("r", 0, 0));
   MemoryBus bus;
-  Server server(world, fast(60.0), bus);
+  run::Run server(world, fast(60.0), bus);
   server.run();
   int64_t k = 0;
   for (const Message& message : bus.messages()) {
@@ -91,12 +91,12 @@ TEST(Schedule, SlowSinkBoundsTheRun) {
     std::unique_lock lock(mutex);
     changed.wait(lock, [&] { return open.load(); });
   };
-  ServerOptions options = fast(10.0);
+  RunOptions options = fast(10.0);
   options.simulation.batch_steps = 8;
   options.simulation.before_batch = [&](const std::string& module) {
     if (module == "kinematics") ++rounds;
   };
-  Server server(load_text(robot_sdf("r", 0, 0)), options, bus);
+  run::Run server(load_text(robot_sdf("r", 0, 0)), options, bus);
   std::thread thread([&] { server.run(); });
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
   const int64_t while_blocked = rounds;
@@ -122,9 +122,9 @@ TEST(Schedule, SteadyStateAllocatesNothing) {
     if (worlds == 301) at_start = allocations();
     if (worlds == 451) at_end = allocations();    // 5 s, 1000 steps later
   };
-  ServerOptions options = fast(20.0);
+  RunOptions options = fast(20.0);
   options.control = false;
-  Server server(load_text(robot_sdf("r", 0, 0)), options, bus);
+  run::Run server(load_text(robot_sdf("r", 0, 0)), options, bus);
   server.run();
   ASSERT_GE(worlds, 451);
   EXPECT_EQ(at_end - at_start, 0u);
@@ -132,7 +132,7 @@ TEST(Schedule, SteadyStateAllocatesNothing) {
 
 TEST(Schedule, TickListsTheMessagesOfItsStep) {
   MemoryBus bus;
-  Server server(load_text(robot_sdf("r", 0, 0)), fast(0.1), bus);
+  run::Run server(load_text(robot_sdf("r", 0, 0)), fast(0.1), bus);
   server.run();
   const auto messages = bus.messages();
   size_t checked = 0;

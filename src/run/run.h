@@ -1,7 +1,8 @@
-// A run: the simulation, the bus, the log and the control of all of it.
+// A run: one world, its mode, its sinks, and the requests of its clients.
 //
-// run() is the publisher: it takes finished batches in order, sends their messages, records them, executes
-// requests between batches, and ends when the run does. Everything goes out from its thread, in one order.
+// run() is the publisher: it takes finished batches in order, hands their messages to the sinks, executes requests between
+// batches, and ends when the run does. Everything goes out from its thread, in one order. How it goes on is its mode's (mode.h), what
+// goes where its sinks' (sink.h), what a request does is in the table of requests.cpp.
 #pragma once
 
 #include <atomic>
@@ -15,23 +16,29 @@
 #include <vector>
 
 #include "ruedo/bus.h"
+#include "ruedo/name_request_t.hpp"
+#include "ruedo/rate_request_t.hpp"
+#include "ruedo/reset_request_t.hpp"
 #include "ruedo/state_reply_t.hpp"
+#include "ruedo/step_request_t.hpp"
+#include "engine/edits.h"
+#include "engine/simulation.h"
+#include "engine/world_info.h"
 #include "run/beats.h"
 #include "run/control.h"
-#include "engine/edits.h"
+#include "run/journal.h"
 #include "run/lockstep.h"
 #include "run/model_worker.h"
-#include "run/journal.h"
+#include "run/pacer.h"
 #include "run/publisher.h"
-#include "run/replay.h"
-#include "engine/simulation.h"
+#include "run/repeating.h"
+#include "run/request_table.h"
 #include "run/sinks.h"
 #include "run/wait_for.h"
-#include "engine/world_info.h"
 
 namespace ruedo::run {
 
-struct ServerOptions {
+struct RunOptions {
   engine::SimulationOptions simulation;
   double rate = 1.0;                       // simulated per real time; +inf: as fast as it goes
   int64_t duration_us = -1;                // sim time; -1: without end
@@ -43,7 +50,7 @@ struct ServerOptions {
   std::vector<WaitForOption> wait_for;
   std::string repeat;                      // log or snapshot to begin with: what acted on that run acts again
   bool end_with_repeat = false;            // and then end; else go on, and publish from there on
-  Watcher watcher;               // sees what a log would get
+  Watcher watcher;                         // sees what a log would get
   std::function<void()> before_model;      // for tests: called in the worker's thread before a SPAWN's model is made ready
   std::vector<std::string> result_options; // for the log's header
   std::vector<std::pair<std::string, std::string>> remaps;
@@ -57,17 +64,17 @@ struct Status {
   bool paused = false;
 };
 
-class Server {
+class Run {
  public:
   // The bus must outlive it. Throws InputError and EnvironmentError.
-  Server(std::shared_ptr<const model::WorldModel> world, ServerOptions options, Bus& bus);
-  ~Server();
+  Run(std::shared_ptr<const model::WorldModel> world, RunOptions options, Bus& bus);
+  ~Run();
 
   // Runs until the duration is over, stop(), or QUIT. Throws EnvironmentError when the log cannot be written any
   // more, and LeaseEnded; the log is then whole up to there.
   void run();
 
-  void stop();    // any thread
+  void stop();    // any thread, as the next
   bool stopping() const { return stop_; }
 
   // Another sink for the run's messages, beside the bus and the log. Before run(); it must outlive the run.
@@ -98,97 +105,111 @@ class Server {
 
  private:
   using Clock = std::chrono::steady_clock;
+  using Outcome = engine::Outcome;
+  friend class RequestTable;
 
+  // The loop; in run.cpp.
   void add_sinks();
-  void make_simulation();
-  void announce();
+  Control::Host control_host();
+  void publish_what_is_ready();
   void publish(const engine::Batch& batch);
-  void publish_step(const engine::Batch& batch, const Snapshot& snapshot);
-  void check_leases();    // of lockstep
-  void drain();           // lets clients in lockstep fetch what they have lost
-  void tell_watchdog(size_t robot);                 // on the terminal
   void record_applied(const engine::Batch& batch, int64_t step);
+  bool compute_here();                           // a few steps that were granted; false: there are none
+  void serve();                                  // requests, and models that are ready
+  Clock::time_point attend();                    // to what real time brings; returns when next
+  void tell_status();
+  void finish();                                 // the run is over
   Status status() const;
-  void tell_wait();                                 // for whom the run waits, once a second has passed
-  void add_applied(TickWriter& tick, int64_t step);
+  void tell_watchdog(size_t robot);              // on the terminal
 
-  // Repeating what is in a log; in repeat.cpp.
+  // The world and the mode in which it runs; in run_world.cpp.
+  void make_world();                             // anew: what follows equals a fresh run
+  struct Pace { double rate; bool paused; };
+  void make_simulation(const Pace& pace);
+  void begin_epoch();                            // with a world made anew
+  void announce();
+  Mode::Stage stage();
+  Mode& mode() { return repeating_ ? static_cast<Mode&>(*repeating_) : *mode_; }
+  const Mode& mode() const { return repeating_ ? static_cast<const Mode&>(*repeating_) : *mode_; }
   void begin_repeat(const std::string& path);    // throws InputError
-  void repeat();                                 // after each state: what acts on it, and the end
-  void repeat_request(const applied_t& applied);
-  void end_repeat();
-  void go_on(bool paused);
-  int input_of(const applied_t& applied) const;
-  engine::Outcome snapshot(const request_t& request);
-  engine::Outcome restore(const request_t& request);
+  void take_turn();                              // what the mode wants done at this state
+  void take_turns();
+  void end_repeat(bool paused);
 
-  // Requests; in requests.cpp.
-  engine::Outcome ask(const request_t& request, const Session& session);
-  engine::Outcome execute(const request_t& request);
+  // Requests; in requests.cpp. Those of clients go through ask(), those of a log are executed.
+  Outcome ask(const request_t& request, const Session& session);
+  Outcome execute(const request_t& request, const Session& session);
+  bool serves(const RequestKind& kind) const;
+  int64_t features() const;
   void note(const request_t& request);           // in the log: it changed the state
   void note_files(const std::vector<std::string>& files);    // that a model was read from which came since the start
-  void begin_epoch();                            // the world is made anew
-  engine::Outcome pause();
-  engine::Outcome step(const request_t& request);
-  engine::Outcome set_rate(const request_t& request);
-  engine::Outcome reset(const request_t& request);
-  engine::Outcome get_state(const request_t& request);
-  engine::Outcome reset_odometry(const request_t& request);
-  // Changes between two steps; in edit_requests.cpp.
-  bool stand_still();                            // false: the run is over
-  void move_on();
-  // Applies a change to the world that stands still, and notes it. models: some come or go.
-  engine::Outcome change(const request_t& request, bool models, const std::function<engine::Outcome()>& apply);
-  engine::Outcome edit(const request_t& request);
-  engine::Outcome spawn(const request_t& request);       // makes the model ready; in a repetition, puts it in at once
-  void spawn_ready();                            // puts in what is ready
-  engine::Outcome put_in(const request_t& request, const spawn_request_t& body, const model::LoadedModel& loaded);
-  engine::Outcome reset_poses(const request_t& request);
-  engine::Outcome reset_time(const request_t& request);
   state_reply_t state() const;
-  int64_t features() const;
+  Outcome pause(const request_t&);
+  Outcome resume(const request_t&);
+  Outcome step(const request_t&, const step_request_t& body);
+  Outcome set_rate(const request_t&, const rate_request_t& body);
+  Outcome get_state(const request_t&, const name_request_t& body);
+  Outcome say_info(const request_t&);
+  Outcome quit(const request_t&);
+  Outcome reset_odometry(const request_t& request, const name_request_t& body);
+  Outcome snapshot(const request_t&, const name_request_t& body);
+  Outcome restore(const request_t& request, const name_request_t& body);
+
+  // Requests that change the world between two steps; in edit_requests.cpp.
+  bool stand_still();                            // false: the run is over
+  void let_go();
+  // Applies a change to the world that stands still, and notes it. models: some come or go.
+  Outcome change(const request_t& request, bool models, const std::function<Outcome()>& apply);
+  Outcome reset(const request_t& request, const reset_request_t& body);
+  Outcome reset_all(const request_t& request, int64_t seed);
+  Outcome reset_poses(const request_t& request);
+  Outcome reset_time(const request_t& request);
+  Outcome spawn(const request_t& request, const spawn_request_t& body);    // makes the model ready; of a log, puts it in at once
+  void spawn_ready();                            // puts in what is ready
+  Outcome put_in(const request_t& request, const spawn_request_t& body, const model::LoadedModel& loaded);
+  Outcome remove(const request_t& request, const name_request_t& body);
+  Outcome set_pose(const request_t& request, const set_pose_request_t& body);
+  Outcome set_twist(const request_t& request, const set_twist_request_t& body);
 
   const std::shared_ptr<const model::WorldModel> first_world_;    // as it was loaded
   std::shared_ptr<const model::WorldModel> world_;
-  ServerOptions options_;
+  RunOptions options_;
   Bus& bus_;
   const int64_t run_id_;
   int32_t epoch_ = 0;
   engine::Channels channels_;
   engine::SimulationChannels own_;
-  std::string request_channel_;                        // as it is called on the bus; "": none
+  std::string request_channel_;                // as it is called on the bus; "": none
   Findings findings_;
-  engine::Wakeup wakeup_;                              // a batch is finished, a request has come, or the end
+  engine::Wakeup wakeup_;                      // a batch is finished, a request has come, or the end
   std::atomic<bool> stop_{false};
+
+  std::mutex simulation_mutex_;                // of the world and the mode: commands reach them from other threads
+  std::unique_ptr<Pacer> pacer_;
+  std::unique_ptr<engine::Simulation> simulation_;
+  const std::unique_ptr<Mode> mode_;
+  std::unique_ptr<Repeating> repeating_;       // before that mode goes on; null: nothing is repeated
+  Pace wanted_;                                // by the clients, once nothing is repeated
+
   Publisher publisher_;
   BusSink bus_sink_;
   std::unique_ptr<LogSink> log_;               // null: none, as the next two
   std::unique_ptr<WatcherSink> watcher_;
   std::unique_ptr<Journal> journal_;
-  log_header_t header_;                        // of this epoch
-  std::unique_ptr<Replay> replay_;             // while something is repeated: commands and requests wait outside
-  std::atomic<bool> repeating_{false};         // the same for the bus's thread
-  SimTime repeat_begin_us_ = 0;                // stamp at which it began
-  struct { double rate; bool paused; } after_repeat_{};
-  std::unique_ptr<Pacer> pacer_;
-  std::mutex simulation_mutex_;                // the bus's thread reaches the inbox through it
-  std::unique_ptr<engine::Simulation> simulation_;
-  std::unique_ptr<WaitFor> wait_for_;          // null: for nobody
-  int64_t wait_step_ = -1;                     // the run has been at this step
-  Clock::time_point wait_begin_;               // since then
-  bool wait_told_ = false;
-  Ticks ticks_;
-  InfoBeat info_beat_;
   HashBeat hashes_;
   WatchdogWarnings watchdogs_;
-  Snapshot changed_;
+  Ticks ticks_;
+  InfoBeat info_beat_;
+  log_header_t header_;                        // of this epoch
+  Snapshot changed_;                           // the last state, after requests
+  std::function<void(const Status&)> on_status_;
+  std::function<void(const Snapshot&)> on_state_;
+  Clock::time_point next_status_;
+
   engine::ModelStore models_{first_world_->file};
   ModelWorker worker_;                         // of SPAWNs
   std::optional<ModelWorker::Made> made_;      // the next that is ready,
   int64_t enters_at_ = -1;                     // and the state that it waits for
-  std::function<void(const Status&)> on_status_;
-  std::function<void(const Snapshot&)> on_state_;
-  std::unique_ptr<Lockstep> lockstep_;         // null: the run goes by itself
   Control control_;
 };
 

@@ -1,0 +1,126 @@
+// How a run goes on: by itself (Live), by what its clients grant (Lockstep), or by what is in a log (Repeating).
+//
+// The run asks its mode whether it may go on, tells it what was published, and asks when it wants to be called again. What is said
+// of states, requests and messages is the same in all modes. The publisher's thread calls everything here; receive() comes from any
+// thread, never beside begin() or attend().
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "ruedo/request_t.hpp"
+#include "engine/channels.h"
+#include "engine/command_inbox.h"
+#include "engine/outcome.h"
+#include "run/gate.h"
+#include "run/sessions.h"
+#include "run/sink.h"
+#include "run/tick.h"
+
+namespace ruedo::run {
+
+class Mode {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+
+  // The world that runs; valid until begin() names another.
+  struct Stage {
+    engine::CommandInbox* inbox = nullptr;
+    Gate* gate = nullptr;
+    const engine::Channels* channels = nullptr;
+    SimTime base_us = 0;                              // the stamp of sim time 0
+    std::function<std::string(int robot)> robot_name;
+  };
+  // What the run has to do before it goes on.
+  struct Turn {
+    enum class What { nothing, execute, change_mode, end };
+    What what = What::nothing;
+    request_t request{};    // to execute
+  };
+  struct Attended {
+    Time next = Time::max();        // when attend() wants to be called again, at the latest
+    std::vector<int64_t> dropped;   // sessions that have ended
+  };
+
+  virtual ~Mode() = default;
+
+  // ---- May it go on?
+
+  // The run goes on from the state `step` of that world; -1: from its beginning. Throws InputError.
+  virtual void begin(const Stage& stage, int64_t step) = 0;
+  // False while somebody has to catch up with what was published: no batch is taken.
+  virtual bool has_room() const { return true; }
+  // Clients say how far it goes: every step has its tick, and the publisher computes a few steps itself.
+  virtual bool takes_grants() const { return false; }
+  // The last state that was granted; -1: none was.
+  virtual int64_t granted() const { return -1; }
+  // Whether the first state comes by itself.
+  virtual bool state_comes() const { return true; }
+
+  // ---- What was published
+
+  // All states up to this one, with their ticks.
+  virtual void published(int64_t step) { static_cast<void>(step); }
+  // To be asked until there is nothing to do. Throws InputError.
+  virtual Turn turn(int64_t step) {
+    static_cast<void>(step);
+    return {};
+  }
+  // What came of the request of the last turn. Throws InputError.
+  virtual void executed(const engine::Outcome& outcome) { static_cast<void>(outcome); }
+  // Who asked what last, for the tick of that step.
+  virtual void add_applied(TickWriter& tick, int64_t step, const std::vector<Session>& sessions) {
+    static_cast<void>(step);
+    for (const Session& session : sessions) tick.add_applied(session.client, session.last_sequence);
+  }
+  // Hears what is published; null: it need not.
+  virtual Sink* sink() { return nullptr; }
+
+  // ---- When next?
+
+  // Looks after what depends on real time.
+  virtual Attended attend(const std::vector<Session>& sessions, int64_t step, Time now) {
+    static_cast<void>(sessions), static_cast<void>(step), static_cast<void>(now);
+    return {};
+  }
+  // No state comes any more. finished(): no client wants anything.
+  virtual void end() {}
+  virtual bool finished(const std::vector<Session>& sessions, Time now) const {
+    static_cast<void>(sessions), static_cast<void>(now);
+    return true;
+  }
+
+  // ---- Clients
+
+  // A command, as it came; true: the mode has seen to it.
+  virtual bool receive(const std::string& channel, const uint8_t* data, size_t size) {
+    static_cast<void>(channel), static_cast<void>(data), static_cast<void>(size);
+    return false;
+  }
+  // Why a request of that kind is refused now; "": it is not. looks: it changes nothing.
+  virtual std::string refusal(int32_t kind, bool looks) const {
+    static_cast<void>(kind), static_cast<void>(looks);
+    return "";
+  }
+  // GRANT and RESEND, where it takes grants.
+  virtual engine::Outcome grant(const request_t& request, const Session& session) {
+    static_cast<void>(session);
+    return engine::Outcome::refuse(reply_t::NOT_SUPPORTED, "kind " + std::to_string(request.kind) + " is for runs in lockstep");
+  }
+  // A grant that has to wait for one before it, or for room: it is ignored until it is repeated.
+  virtual bool early(const request_t& request, const Session& session) const {
+    static_cast<void>(request), static_cast<void>(session);
+    return false;
+  }
+  virtual void left(int64_t session) { static_cast<void>(session); }
+  // The place of this session may not be given away.
+  virtual bool keeps(int64_t session) const {
+    static_cast<void>(session);
+    return false;
+  }
+};
+
+}  // namespace ruedo::run

@@ -1,0 +1,40 @@
+// A run that repeats a log, or the log that a snapshot is: for `ruedo verify`, and to restore a snapshot.
+//
+// A snapshot is what acted on the world up to its step. Physics keeps contacts, their impulses and the order of its pairs from
+// step to step; running up to the step gives them back exactly. Meanwhile commands are ignored, and requests that change something refused.
+#pragma once
+
+#include <string>
+
+#include "run/mode.h"
+#include "run/replay.h"
+
+namespace ruedo::run {
+
+class Repeating : public Mode {
+ public:
+  // after: the mode in which the run goes on; null: the run ends with the log. Throws InputError for what is no log.
+  Repeating(const std::string& path, const Mode* after);
+
+  const log_header_t& header() const { return replay_.header(); }
+  const std::string& path() const { return replay_.path(); }
+  // Throws InputError when the log does not say that it ends in that state.
+  void check_end(int64_t state_hash) const;
+
+  void begin(const Stage& stage, int64_t step) override;
+  Turn turn(int64_t step) override;
+  void executed(const engine::Outcome& outcome) override;
+  bool receive(const std::string&, const uint8_t*, size_t) override { return true; }
+  std::string refusal(int32_t kind, bool looks) const override;
+  bool early(const request_t& request, const Session& session) const override;
+
+ private:
+  int input_of(const applied_t& applied) const;    // -1: a request that the run executes
+
+  Replay replay_;
+  const Mode* after_;
+  Stage stage_;
+  SimTime begin_us_ = -1;    // the stamp at which the first epoch began; -1: it has not
+};
+
+}  // namespace ruedo::run

@@ -1,0 +1,231 @@
+// The publisher's loop.
+#include "run/run.h"
+
+#include <cfenv>
+
+#include <spdlog/spdlog.h>
+
+#include "physics/state_check.h"
+#include "ruedo/applied_t.hpp"
+#include "ruedo/request_t.hpp"
+#include "log/header.h"
+#include "run/live.h"
+#include "run/request_table.h"
+
+namespace ruedo::run {
+namespace {
+
+constexpr auto kStatusPeriod = std::chrono::milliseconds(500);
+constexpr auto kPausedInfoPeriod = std::chrono::seconds(1);
+constexpr auto kDrainPeriod = std::chrono::milliseconds(50);
+
+// record: writes joins and ended leases into the log.
+std::unique_ptr<Mode> make_mode(const RunOptions& options, int64_t step_us, std::function<void(applied_t)> record) {
+  if (options.lockstep.clients > 0) return std::make_unique<Lockstep>(options.lockstep, std::move(record));
+  return std::make_unique<Live>(options.wait_for, step_us);
+}
+
+}  // namespace
+
+Run::Run(std::shared_ptr<const model::WorldModel> world, RunOptions options, Bus& bus)
+    : first_world_(std::move(world)),
+      world_(first_world_),
+      options_(std::move(options)),
+      bus_(bus),
+      run_id_(random_id()),
+      channels_(options_.remaps),
+      mode_(make_mode(options_, world_->step_us, [this](applied_t applied) {
+        applied.utime = publisher_.time_us();
+        applied.epoch = epoch_;
+        publisher_.record(kAppliedChannel, applied);
+      })),
+      wanted_{options_.rate, options_.paused},
+      bus_sink_(bus),
+      hashes_(publisher_, world_->step_us),
+      watchdogs_(publisher_, world_->step_us, [this](size_t robot) { tell_watchdog(robot); }),
+      ticks_(publisher_, run_id_, mode_->takes_grants() ? Rate{} : engine::kTickRate, world_->step_us,
+             [this](TickWriter& tick, int64_t step) { mode().add_applied(tick, step, control_.sessions().list()); }),
+      info_beat_(publisher_, world_->step_us, [this] { return pacer_->paused(); }),
+      worker_(models_, wakeup_, options_.before_model),
+      control_(run_id_, control_host()) {
+  if (!options_.record.empty()) log_ = std::make_unique<LogSink>(options_.record);
+  if (!options_.snapshots.empty()) journal_ = std::make_unique<Journal>(options_.snapshots);
+  if (options_.watcher) watcher_ = std::make_unique<WatcherSink>(options_.watcher);
+  if (!options_.repeat.empty()) {
+    begin_repeat(options_.repeat);
+    epoch_ = repeating_->header().epoch;
+  }
+  make_world();
+  channels_.check_remaps();
+  add_sinks();
+  if (publisher_.has_recorders() || repeating_) {
+    header_ = log::make_log_header(*world_, options_.simulation.fleet.seed, options_.result_options);
+    header_.epoch = epoch_;
+    publisher_.record(kHeaderChannel, header_);
+    if (journal_) journal_->begin(header_, 0);
+  }
+  if (repeating_ && !options_.end_with_repeat) log::check_same_run(repeating_->header(), header_, options_.repeat);
+}
+
+Run::~Run() { bus_.stop(); }
+
+// What the mode keeps for clients is kept before the tick says that it was sent.
+void Run::add_sinks() {
+  publisher_.add(bus_sink_);
+  if (log_) publisher_.add(*log_);
+  if (journal_) publisher_.add(*journal_);
+  if (watcher_) publisher_.add(*watcher_);
+  if (Sink* sink = mode_->sink()) publisher_.add(*sink);
+  publisher_.add(hashes_);
+  publisher_.add(watchdogs_);
+  publisher_.add(ticks_);
+  publisher_.add(info_beat_);
+}
+
+Control::Host Run::control_host() {
+  return {.execute = [this](const request_t& request, const Session& session) { return ask(request, session); },
+          .state = [this] { return engine::encoded(state()); },
+          .publish = [this](const reply_t& reply) { publisher_.service(own_.reply, reply); },
+          .utime = [this] { return publisher_.time_us(); },
+          .epoch = [this] { return epoch_; },
+          .state_comes = [this] { return !publisher_.latest() && mode().state_comes(); },
+          .early = [this](const request_t& request, const Session& session) { return mode().early(request, session); },
+          .left = [this](int64_t session) { mode_->left(session); },
+          .keeps = [this](int64_t session) { return mode_->keeps(session); }};
+}
+
+void Run::receive(const std::string& channel, const uint8_t* data, size_t size) {
+  if (!request_channel_.empty() && channel == request_channel_) {
+    if (control_.receive(data, size)) wakeup_.set();
+    return;
+  }
+  const std::lock_guard lock(simulation_mutex_);
+  if (!mode().receive(channel, data, size)) simulation_->inbox().receive(channel, data, size);
+}
+
+void Run::stop() {
+  stop_ = true;
+  wakeup_.set();
+}
+
+void Run::run() {
+  std::fesetenv(FE_DFL_ENV);    // as in the threads that compute: in lockstep this is one of them
+  bus_sink_.listen([this](const std::string& channel, const uint8_t* data, size_t size) { receive(channel, data, size); });
+  simulation_->start(*pacer_);
+  take_turns();
+  next_status_ = Clock::now() + kStatusPeriod;
+  for (;;) {
+    publish_what_is_ready();
+    if (simulation_->over()) break;
+    serve();
+    const Clock::time_point next = attend();
+    if (compute_here()) continue;
+    if (!repeating_) control_.published(publisher_.step());    // a PAUSE may wait for a state that was out already
+    publisher_.flush();
+    if (!wakeup_.wait_until(next)) tell_status();
+  }
+  finish();
+}
+
+void Run::publish_what_is_ready() {
+  for (;;) {
+    if (stop_) simulation_->leave_off();
+    const engine::Batch* batch = mode().has_room() || stop_ ? simulation_->take() : nullptr;
+    if (!batch) return;
+    publish(*batch);
+    tell_status();
+    if (log_) log_->check(publisher_.time_us());
+    take_turns();
+    if (!repeating_) control_.published(publisher_.step());
+    serve();
+    publisher_.flush();
+    if (stop_) simulation_->leave_off();
+    compute_here();
+  }
+}
+
+void Run::publish(const engine::Batch& batch) {
+  for (int i = 0; i < batch.count; ++i) {
+    const Snapshot& state = batch.snapshots[static_cast<size_t>(i)];
+    record_applied(batch, state.step - 1);    // on the state before this one, whose messages are out
+    publisher_.publish(*simulation_, batch, state);
+    if (on_state_) on_state_(state);
+  }
+  if (batch.count > 0) mode().published(publisher_.step());
+}
+
+void Run::record_applied(const engine::Batch& batch, int64_t step) {
+  if (!publisher_.has_recorders()) return;
+  for (int i = 0; i < batch.applied_count; ++i) {
+    const engine::AppliedCommand& command = batch.applied[static_cast<size_t>(i)];
+    if (command.step != step) continue;
+    const engine::Input& input = simulation_->inbox().inputs()[static_cast<size_t>(command.input)];
+    applied_t applied;
+    applied.step = step;
+    applied.utime = step * world_->step_us;
+    applied.epoch = epoch_;
+    applied.sequence = 0;
+    const bool request = input.kind == engine::Input::Kind::reset_odometry;
+    applied.channel = request ? "ruedo/request" : input.channel;
+    applied.kind = request ? request_t::RESET_ODOMETRY : 0;
+    applied.size = static_cast<int32_t>(command.bytes.size());
+    applied.data = command.bytes;
+    publisher_.record(kAppliedChannel, applied);
+  }
+}
+
+bool Run::compute_here() { return mode().takes_grants() && mode().has_room() && simulation_->go(); }
+
+void Run::serve() {
+  control_.serve();
+  spawn_ready();
+}
+
+Run::Clock::time_point Run::attend() {
+  const Clock::time_point now = Clock::now();
+  // A sign of life each second, also while the run stands still, a step takes long, or a snapshot is restored.
+  const auto last_sign = [this] { return std::max(info_beat_.last(), ticks_.last()); };
+  if (now >= last_sign() + kPausedInfoPeriod) info_beat_.say();
+  Mode::Attended attended;
+  {
+    const std::lock_guard lock(simulation_mutex_);
+    attended = mode().attend(control_.sessions().list(), publisher_.step(), now);
+  }
+  for (const int64_t session : attended.dropped) control_.drop(session);
+  return std::min({next_status_, last_sign() + kPausedInfoPeriod, attended.next});
+}
+
+Status Run::status() const { return {publisher_.step(), publisher_.time_us(), publisher_.messages(), pacer_->paused()}; }
+
+void Run::tell_status() {
+  const Clock::time_point now = Clock::now();
+  if (now < next_status_) return;
+  if (on_status_) on_status_(status());
+  next_status_ = now + kStatusPeriod;
+}
+
+void Run::tell_watchdog(size_t index) {
+  const model::ModelInstance& robot = world_->models[static_cast<size_t>(simulation_->layout().robots[index].instance)];
+  spdlog::warn("{} was stopped by its watchdog: no command came for {:g} s of sim time. A velocity or wheel command "
+               "wants repeating (this is said once)", robot.name, static_cast<double>(robot.model->drive->watchdog_us) * 1e-6);
+}
+
+// Clients may still fetch what they have lost.
+void Run::finish() {
+  mode().end();
+  while (!stop_ && !mode().finished(control_.sessions().list(), Clock::now())) {
+    publisher_.flush();
+    wakeup_.wait_until(Clock::now() + kDrainPeriod);
+    control_.serve();
+  }
+  control_.cancel("the run has ended");
+  publisher_.record(kStateHashChannel, hashes_.now(true));
+  publisher_.flush();
+  if (log_) {
+    log_->drain();
+    log_->check(publisher_.time_us());
+  }
+  if (!simulation_->end().empty()) throw physics::StateError(simulation_->end());
+}
+
+}  // namespace ruedo::run

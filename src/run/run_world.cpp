@@ -1,0 +1,117 @@
+// The world of each epoch, and the change from repeating a log to going on.
+#include <limits>
+
+#include <spdlog/spdlog.h>
+
+#include "ruedo/errors.h"
+#include "core/version.h"
+#include "engine/world_state.h"
+#include "run/run.h"
+
+namespace ruedo::run {
+
+// Everything that has a state is made here. What is repeated goes as fast as it can, whatever the clients want.
+void Run::make_world() {
+  if (!repeating_ && pacer_) wanted_ = {pacer_->rate(), pacer_->paused()};
+  const Pace pace = repeating_ ? Pace{std::numeric_limits<double>::infinity(), false} : wanted_;
+  {
+    const std::lock_guard lock(simulation_mutex_);
+    make_simulation(pace);
+  }
+  announce();    // the bus may have to wait for a thread that waits for the lock
+}
+
+void Run::make_simulation(const Pace& pace) {
+  simulation_.reset();
+  world_ = first_world_;
+  channels_.clear();
+  own_ = engine::add_simulation_channels(channels_, options_.control);
+  if (own_.request >= 0 && request_channel_.empty()) request_channel_ = channels_[own_.request].bus_name;    // once: other threads read it
+  options_.simulation.fleet.epoch = epoch_;
+  findings_ = Findings();
+  simulation_ = std::make_unique<engine::Simulation>(world_, options_.simulation, channels_, findings_, wakeup_);
+  const int64_t last_step = options_.duration_us < 0 ? std::numeric_limits<int64_t>::max() : options_.duration_us / world_->step_us;
+  pacer_ = std::make_unique<Pacer>(world_->step_us, pace.rate, last_step);
+  if (pace.paused) pacer_->pause();
+  publisher_.begin_epoch(epoch_);
+  mode().begin(stage(), -1);
+}
+
+void Run::begin_epoch() {
+  header_.epoch = ++epoch_;
+  header_.seed = static_cast<int64_t>(options_.simulation.fleet.seed);
+  make_world();
+  if (journal_) journal_->begin(header_, publisher_.base_us());
+  simulation_->start(*pacer_);
+}
+
+void Run::announce() {
+  world_info_t head;
+  head.utime = 0;
+  head.run_id = run_id_;
+  head.epoch = epoch_;
+  head.version = version();
+  head.world = world_->name;
+  head.seed = static_cast<int64_t>(options_.simulation.fleet.seed);
+  head.step_us = world_->step_us;
+  head.features = options_.control ? features() : 0;
+  head.paused = pacer_->paused();
+  publisher_.announce({channels_, own_, engine::make_world_info(head, *world_, simulation_->layout(), simulation_->devices(), channels_)});
+}
+
+Mode::Stage Run::stage() {
+  return {&simulation_->inbox(), pacer_.get(), &channels_, publisher_.base_us(), [this](int robot) {
+            return world_->models[static_cast<size_t>(simulation_->layout().robots[static_cast<size_t>(robot)].instance)].name;
+          }};
+}
+
+void Run::begin_repeat(const std::string& path) {
+  auto repeating = std::make_unique<Repeating>(path, options_.end_with_repeat ? nullptr : mode_.get());
+  if (pacer_) wanted_ = {pacer_->rate(), pacer_->paused()};
+  options_.simulation.fleet.seed = static_cast<uint64_t>(repeating->header().seed);
+  const std::lock_guard lock(simulation_mutex_);
+  repeating_ = std::move(repeating);
+  publisher_.mute(true);
+}
+
+void Run::take_turns() {
+  try {
+    take_turn();
+  } catch (const InputError& error) {
+    if (!options_.repeat.empty()) throw;
+    // Who asked for it is told, and the world stays where it got to.
+    control_.cancel(error.what());
+    spdlog::error("{}. The run is paused", error.what());
+    end_repeat(true);
+  }
+}
+
+void Run::take_turn() {
+  for (;;) {
+    const Mode::Turn turn = mode().turn(publisher_.step());
+    switch (turn.what) {
+      case Mode::Turn::What::nothing: return;
+      case Mode::Turn::What::execute: mode().executed(execute(turn.request, Session{})); break;
+      case Mode::Turn::What::end: return stop();
+      case Mode::Turn::What::change_mode:
+        repeating_->check_end(publisher_.latest() ? engine::state_hash(*publisher_.latest()) : 0);
+        options_.repeat.clear();
+        end_repeat(wanted_.paused);
+        break;
+    }
+  }
+}
+
+void Run::end_repeat(bool paused) {
+  pacer_->set_rate(wanted_.rate);
+  if (paused) pacer_->pause();
+  {
+    const std::lock_guard lock(simulation_mutex_);
+    repeating_.reset();
+    publisher_.mute(false);
+    mode_->begin(stage(), publisher_.step());
+  }
+  info_beat_.say();
+}
+
+}  // namespace ruedo::run

@@ -1,0 +1,288 @@
+// The three modes without a run: what each lets go, on a gate that only writes down its limit.
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "log/writer.h"
+#include "running.h"
+#include "ruedo/errors.h"
+#include "ruedo/grant_reply_t.hpp"
+#include "ruedo/resend_request_t.hpp"
+#include "ruedo/reset_request_t.hpp"
+#include "ruedo/velocity_command_t.hpp"
+#include "run/journal.h"
+#include "run/live.h"
+#include "run/lockstep.h"
+#include "run/repeating.h"
+
+namespace ruedo::run {
+namespace {
+
+using std::chrono::seconds;
+
+constexpr int64_t kStep_us = 5000;
+const Mode::Time kStart{};
+
+class FakeGate : public Gate {
+ public:
+  void set_limit(int64_t step) override { limit = step; }
+  void set_limit_quietly(int64_t step) override { limit = step; }
+  bool paused() const override { return is_paused; }
+  int64_t limit = -100;
+  bool is_paused = false;
+};
+
+// A world with a robot that takes velocities.
+struct FakeWorld {
+  FakeWorld() {
+    engine::Channel velocity{"r/velocity", "r/velocity", "r", "", "velocity_command_t", velocity_command_t::getHash(), Rate{}, true};
+    channels.add(velocity);
+  }
+  Mode::Stage stage(SimTime base_us = 0) {
+    return {&inbox, &gate, &channels, base_us, [](int) { return std::string("r"); }};
+  }
+  FakeGate gate;
+  engine::Channels channels;
+  engine::CommandInbox inbox{{{"r/velocity", 0, engine::Input::Kind::velocity}}, 1};
+};
+
+std::vector<uint8_t> forward() {
+  velocity_command_t command{};
+  command.vx = 0.5;
+  return engine::encoded(command);
+}
+
+TEST(Live, GoesOnByItself) {
+  FakeWorld world;
+  Live live({}, kStep_us);
+  live.begin(world.stage(), -1);
+  EXPECT_EQ(world.gate.limit, std::numeric_limits<int64_t>::max());
+  EXPECT_TRUE(live.has_room() && live.state_comes() && !live.takes_grants());
+  EXPECT_FALSE(live.receive("r/velocity", nullptr, 0));    // it acts when it comes
+  EXPECT_EQ(live.attend({}, 0, kStart).next, Mode::Time::max());
+  EXPECT_EQ(live.turn(0).what, Mode::Turn::What::nothing);
+  EXPECT_EQ(live.refusal(request_t::RESET, false), "");
+}
+
+TEST(Live, WaitsForTheMessagesOfAChannel) {
+  FakeWorld world;
+  Live live({{"r/velocity", {10, 1}}}, kStep_us);
+  live.begin(world.stage(), -1);
+  EXPECT_EQ(world.gate.limit, 0);    // message 0 acts on state 0, message k on state 20 k
+  const std::vector<uint8_t> command = forward();
+  EXPECT_TRUE(live.receive("r/velocity", command.data(), command.size()));
+  EXPECT_EQ(world.gate.limit, 20);
+  EXPECT_TRUE(live.receive("r/velocity", command.data(), command.size()));
+  EXPECT_EQ(world.gate.limit, 40);
+  EXPECT_EQ(live.attend({}, 40, kStart).next, kStart + seconds(1));    // then it says for whom it waits
+  live.begin(world.stage(), 50);
+  EXPECT_EQ(world.gate.limit, 60);
+}
+
+TEST(Live, RefusesToWaitForWhatIsNoInput) {
+  FakeWorld world;
+  Live live({{"r/velocty", {10, 1}}}, kStep_us);
+  EXPECT_THROW(live.begin(world.stage(), -1), InputError);
+}
+
+class LockstepModeTest : public testing::Test {
+ protected:
+  void begin(int clients, LockstepOptions::Policy policy = LockstepOptions::Policy::pause) {
+    lockstep_ = std::make_unique<Lockstep>(LockstepOptions{clients, 10.0, policy}, [this](const applied_t& applied) { noted_.push_back(applied); });
+    lockstep_->begin(world_.stage(), -1);
+    for (int i = 0; i < clients; ++i) {
+      Session session;
+      session.id = i + 1;
+      session.client = std::string(1, static_cast<char>('a' + i));
+      session.last_heard = kStart;
+      sessions_.push_back(session);
+    }
+  }
+  engine::Outcome grant(int client, int64_t from, int64_t until, int64_t received = -1) {
+    grant_request_t body{};
+    body.granted = from;
+    body.step_until = until;
+    body.received = received;
+    request_t request{};
+    request.kind = request_t::GRANT;
+    request.body = engine::encoded(body);
+    return lockstep_->grant(request, sessions_[static_cast<size_t>(client)]);
+  }
+  void join_all() {
+    for (size_t i = 0; i < sessions_.size(); ++i) EXPECT_EQ(grant(static_cast<int>(i), -1, -1).code, reply_t::OK);
+  }
+  void publish(int64_t step) {
+    lockstep_->sink()->begin_step({step, step * kStep_us, 0});
+    lockstep_->published(step);
+  }
+
+  FakeWorld world_;
+  std::unique_ptr<Lockstep> lockstep_;
+  std::vector<Session> sessions_;
+  std::vector<applied_t> noted_;
+};
+
+TEST_F(LockstepModeTest, GoesToTheSmallestGrant) {
+  begin(2);
+  EXPECT_EQ(world_.gate.limit, -1);
+  EXPECT_FALSE(lockstep_->state_comes());
+  EXPECT_NE(lockstep_->refusal(request_t::GET_STATE, true), "");
+  grant(0, -1, -1);
+  EXPECT_EQ(world_.gate.limit, -1);
+  grant(1, -1, -1);
+  EXPECT_EQ(world_.gate.limit, 0);    // both are there
+  EXPECT_EQ(noted_.size(), 2u);
+  EXPECT_EQ(lockstep_->refusal(request_t::GET_STATE, true), "");
+  EXPECT_NE(lockstep_->refusal(request_t::RESTORE, false), "");
+  publish(0);
+  grant(0, 0, 10);
+  EXPECT_EQ(world_.gate.limit, 0);
+  grant(1, 0, 4);
+  EXPECT_EQ(world_.gate.limit, 4);
+  EXPECT_EQ(lockstep_->granted(), 4);
+  grant(1, 4, 20);
+  EXPECT_EQ(world_.gate.limit, 10);
+}
+
+TEST_F(LockstepModeTest, BeginsAgainWithAWorldMadeAnew) {
+  begin(1);
+  join_all();
+  publish(0);
+  grant(0, 0, 50);
+  lockstep_->begin(world_.stage(), -1);
+  EXPECT_EQ(world_.gate.limit, 0);
+  EXPECT_EQ(grant(0, 0, 3).code, reply_t::OK);    // grants stand at 0 again
+}
+
+TEST_F(LockstepModeTest, HasNoRoomBeforeTheMessagesAreReceived) {
+  begin(1);
+  join_all();
+  grant(0, 0, 1000);
+  const auto most = static_cast<int64_t>(KeptMessages::kMostSteps);
+  for (int64_t step = 0; step < most; ++step) {
+    EXPECT_TRUE(lockstep_->has_room()) << step;
+    publish(step);
+  }
+  EXPECT_FALSE(lockstep_->has_room());
+  resend_request_t body{};
+  body.received = 9;
+  request_t request{};
+  request.kind = request_t::RESEND;
+  request.body = engine::encoded(body);
+  EXPECT_EQ(lockstep_->grant(request, sessions_[0]).code, reply_t::OK);
+  EXPECT_TRUE(lockstep_->has_room());
+  EXPECT_EQ(world_.gate.limit, most - 1 + Lockstep::kMostAhead);
+}
+
+TEST_F(LockstepModeTest, WaitsForTheSilentOrGoesOnOrFails) {
+  using Policy = LockstepOptions::Policy;
+  for (const Policy policy : {Policy::pause, Policy::drop, Policy::fail}) {
+    sessions_.clear();
+    begin(2, policy);
+    join_all();
+    publish(0);
+    grant(0, 0, 10);
+    EXPECT_TRUE(lockstep_->attend(sessions_, 0, kStart + seconds(9)).dropped.empty());
+    sessions_[0].last_heard = kStart + seconds(9);
+    if (policy == Policy::fail) {
+      EXPECT_THROW(lockstep_->attend(sessions_, 0, kStart + seconds(11)), LeaseEnded);
+      continue;
+    }
+    const auto dropped = lockstep_->attend(sessions_, 0, kStart + seconds(11)).dropped;
+    EXPECT_EQ(dropped, policy == Policy::drop ? std::vector<int64_t>{2} : std::vector<int64_t>{});
+    EXPECT_EQ(world_.gate.limit, policy == Policy::drop ? 10 : 0);
+    EXPECT_EQ(lockstep_->keeps(2), false);
+  }
+}
+
+// A log of two epochs: a command on state 7, a reset at 20, the end at 30.
+class RepeatingTest : public testing::Test {
+ protected:
+  RepeatingTest() {
+    log::Writer writer(file_.path());
+    log_header_t header{};
+    header.step_us = kStep_us;
+    write(writer, 0, kHeaderChannel, header);
+    applied_t applied{};
+    applied.channel = "r/velocity";
+    applied.step = 7;
+    applied.data = forward();
+    applied.size = static_cast<int32_t>(applied.data.size());
+    write(writer, 7 * kStep_us, kAppliedChannel, applied);
+    reset_request_t reset{};
+    reset.seed = -1;
+    applied.channel = "ruedo/request";
+    applied.kind = request_t::RESET;
+    applied.step = 20;
+    applied.data = engine::encoded(reset);
+    applied.size = static_cast<int32_t>(applied.data.size());
+    write(writer, 20 * kStep_us, kAppliedChannel, applied);
+    state_hash_t hash{};
+    hash.step = 30;
+    hash.epoch = 1;
+    hash.state_hash = 4711;
+    hash.last = true;
+    write(writer, 50 * kStep_us, kStateHashChannel, hash);
+    writer.flush();
+  }
+
+  template <class T>
+  static void write(log::Writer& writer, int64_t stamp, const std::string& channel, const T& message) {
+    const std::vector<uint8_t> bytes = engine::encoded(message);
+    writer.write(stamp, channel, bytes.data(), bytes.size());
+  }
+
+  TemporaryFile file_{"repeating.log"};
+  FakeWorld world_;
+};
+
+TEST_F(RepeatingTest, GoesFromRequestToRequestAndEnds) {
+  Repeating repeating(file_.path(), nullptr);
+  repeating.begin(world_.stage(), -1);
+  EXPECT_EQ(world_.gate.limit, -1);
+  EXPECT_EQ(repeating.turn(-1).what, Mode::Turn::What::nothing);
+  EXPECT_EQ(world_.gate.limit, 20);
+  const Mode::Turn reset = repeating.turn(20);
+  ASSERT_EQ(reset.what, Mode::Turn::What::execute);
+  EXPECT_EQ(reset.request.kind, request_t::RESET);
+  repeating.begin(world_.stage(20 * kStep_us), -1);    // as that request does
+  repeating.executed({});
+  EXPECT_EQ(repeating.turn(-1).what, Mode::Turn::What::nothing);
+  EXPECT_EQ(world_.gate.limit, 30);
+  EXPECT_EQ(repeating.turn(29).what, Mode::Turn::What::nothing);
+  EXPECT_EQ(repeating.turn(30).what, Mode::Turn::What::end);
+  repeating.check_end(4711);
+  EXPECT_THROW(repeating.check_end(4712), InputError);
+}
+
+TEST_F(RepeatingTest, IsNotDisturbed) {
+  const Live after({}, kStep_us);
+  Repeating repeating(file_.path(), &after);
+  repeating.begin(world_.stage(), -1);
+  const std::vector<uint8_t> command = forward();
+  EXPECT_TRUE(repeating.receive("r/velocity", command.data(), command.size()));    // and ignored
+  EXPECT_NE(repeating.refusal(request_t::SPAWN, false), "");
+  EXPECT_EQ(repeating.refusal(request_t::GET_STATE, true), "");
+  repeating.turn(-1);
+  ASSERT_EQ(repeating.turn(20).what, Mode::Turn::What::execute);
+  try {
+    repeating.executed(engine::Outcome::refuse(reply_t::REFUSED, "no room"));
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr(file_.path()), testing::HasSubstr("step 20"), testing::HasSubstr("no room")));
+  }
+}
+
+TEST_F(RepeatingTest, HandsOverToTheModeAfterIt) {
+  const Live after({}, kStep_us);
+  Repeating repeating(file_.path(), &after);
+  repeating.begin(world_.stage(), -1);
+  repeating.turn(20);
+  repeating.executed({});
+  repeating.begin(world_.stage(20 * kStep_us), -1);
+  EXPECT_EQ(repeating.turn(30).what, Mode::Turn::What::change_mode);
+}
+
+}  // namespace
+}  // namespace ruedo::run
