@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "core/option_text.h"
 #include "core/utf8.h"
 #include "core/whole.h"
 #include "ruedo/errors.h"
@@ -23,15 +24,6 @@ namespace {
 std::vector<std::pair<int, RegisterCommand::Add>>& commands() {
   static std::vector<std::pair<int, RegisterCommand::Add>> list;
   return list;
-}
-
-[[noreturn]] void wrong(const std::string& option, const std::string& text, const std::string& allowed) {
-  throw InputError({}, option + " '" + text + "': " + allowed);
-}
-
-bool read_number(std::string_view text, double& value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
 }
 
 }  // namespace
@@ -63,7 +55,7 @@ void add_world_arguments(CLI::App& command, WorldArguments& arguments) {
 std::pair<std::string, std::string> parse_remap(const std::string& text) {
   const size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0 || equals + 1 == text.size()) {
-    wrong("--remap", text, "it looks like CHANNEL=NAME, for example p3at/LRF=LASER");
+    refuse_option("--remap", text, "it looks like CHANNEL=NAME, for example p3at/LRF=LASER");
   }
   return {text.substr(0, equals), text.substr(equals + 1)};
 }
@@ -71,27 +63,27 @@ std::pair<std::string, std::string> parse_remap(const std::string& text) {
 run::WaitForOption parse_wait_for(const std::string& text) {
   const char* allowed = "it looks like CHANNEL@HZ, for example p3at/velocity@10, with a rate above 0";
   const size_t at = text.rfind('@');
-  if (at == std::string::npos || at == 0) wrong("--wait-for", text, allowed);
+  if (at == std::string::npos || at == 0) refuse_option("--wait-for", text, allowed);
   run::WaitForOption option{text.substr(0, at), {}};
   try {
     option.rate = Rate::parse(text.substr(at + 1));
   } catch (const std::invalid_argument&) {
-    wrong("--wait-for", text, allowed);
+    refuse_option("--wait-for", text, allowed);
   }
-  if (option.rate.every_step()) wrong("--wait-for", text, allowed);
+  if (option.rate.every_step()) refuse_option("--wait-for", text, allowed);
   return option;
 }
 
 double parse_rate(const std::string& text) {
   double rate = 0.0;
   if (text == "max") return std::numeric_limits<double>::infinity();
-  if (!read_number(text, rate) || rate <= 0.0) wrong("--rate", text, "a number above 0 (1 is real time), or max");
+  if (!read_number(text, rate) || rate <= 0.0) refuse_option("--rate", text, "a number above 0 (1 is real time), or max");
   return rate;
 }
 
 int64_t parse_duration_us(const std::string& text) {
   double seconds = 0.0;
-  if (!read_number(text, seconds) || seconds < 0.0 || seconds > 1e9) wrong("--duration", text, "seconds of sim time, 0 to 1e9");
+  if (!read_number(text, seconds) || seconds < 0.0 || seconds > 1e9) refuse_option("--duration", text, "seconds of sim time, 0 to 1e9");
   return microseconds(seconds);
 }
 
@@ -101,13 +93,13 @@ model::LoadOptions load_options(const WorldArguments& arguments) {
   for (const std::string& text : arguments.drives) options.drives.push_back(model::parse_drive(text));
   for (const std::string& text : arguments.xacro_arguments) {
     const size_t sign = text.find(":=");
-    if (sign == std::string::npos || sign == 0) wrong("--xacro-arg", text, "it looks like NAME:=VALUE, for example laser_enabled:=true");
+    if (sign == std::string::npos || sign == 0) refuse_option("--xacro-arg", text, "it looks like NAME:=VALUE, for example laser_enabled:=true");
   }
   options.xacro_arguments = arguments.xacro_arguments;
   options.allow_absolute = arguments.allow_absolute;
   for (const std::string& text : arguments.settings) options.settings.push_back(model::parse_setting(text));
   for (const std::string& text : arguments.disabled) {
-    if (text.find('/') == std::string::npos) wrong("--disable", text, "it looks like ROBOT/DEVICE, for example p3at/CAMERA");
+    if (text.find('/') == std::string::npos) refuse_option("--disable", text, "it looks like ROBOT/DEVICE, for example p3at/CAMERA");
   }
   options.disabled = arguments.disabled;
   return options;

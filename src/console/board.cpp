@@ -2,31 +2,18 @@
 #include "console/board.h"
 
 #include "core/utf8.h"
+#include "core/wire_size.h"
 #include "ruedo/schema.h"
 
 namespace ruedo::console {
 namespace {
-
-int bytes_of(Primitive primitive) {
-  switch (primitive) {
-    case Primitive::boolean:
-    case Primitive::byte:
-    case Primitive::int8: return 1;
-    case Primitive::int16: return 2;
-    case Primitive::int32:
-    case Primitive::float32: return 4;
-    case Primitive::int64:
-    case Primitive::float64: return 8;
-    default: return 0;
-  }
-}
 
 // Where the field `part`, an int16, stands in a message; -1 where there is none, or not always at one place.
 int part_offset(const Schema& schema) {
   int at = 8;    // after the fingerprint
   for (const Field& field : schema.fields) {
     if (field.name == "part" && field.primitive == Primitive::int16) return at;
-    const int size = bytes_of(field.primitive);
+    const auto size = static_cast<int>(wire_size(field.primitive));
     if (size == 0 || !field.dimensions.empty()) return -1;
     at += size;
   }

@@ -3,6 +3,7 @@
 #include <bit>
 #include <charconv>
 
+#include "core/wire_size.h"
 #include "ruedo/schema.h"
 
 namespace ruedo {
@@ -11,21 +12,8 @@ namespace {
 // Structs in structs; ours go three deep.
 constexpr int kMaxDepth = 16;
 
-size_t wire_size(Primitive primitive) {
-  switch (primitive) {
-    case Primitive::boolean:
-    case Primitive::byte:
-    case Primitive::int8: return 1;
-    case Primitive::int16: return 2;
-    case Primitive::int32:
-    case Primitive::float32:
-    case Primitive::string: return 4;    // a string: its length, which the text follows
-    case Primitive::int64:
-    case Primitive::float64: return 8;
-    case Primitive::none: break;
-  }
-  return 0;
-}
+// What is always there of a value: of a string its length, which the text follows.
+size_t fixed_size(Primitive primitive) { return primitive == Primitive::string ? 4 : wire_size(primitive); }
 
 uint64_t big_endian(const uint8_t* bytes, size_t size) {
   uint64_t value = 0;
@@ -36,7 +24,7 @@ uint64_t big_endian(const uint8_t* bytes, size_t size) {
 // The fewest bytes that a value of this type takes on the wire; bounds the count of elements of hostile arrays.
 size_t least_size(const Field& field, int depth) {
   if (field.primitive == Primitive::string) return 5;
-  if (field.primitive != Primitive::none) return wire_size(field.primitive);
+  if (field.primitive != Primitive::none) return fixed_size(field.primitive);
   if (field.type == nullptr || depth > kMaxDepth) return 0;
   size_t sum = 0;
   for (const Field& member : field.type->fields) {
@@ -84,7 +72,7 @@ class Walk {
     // Without a visitor, numbers need no look at each.
     if (visitor_ == nullptr && dimension + 1 == field.dimensions.size() && field.primitive != Primitive::none &&
         field.primitive != Primitive::string) {
-      return skip(static_cast<size_t>(count) * wire_size(field.primitive));
+      return skip(static_cast<size_t>(count) * fixed_size(field.primitive));
     }
     for (int64_t i = 0; i < count && !ended_; ++i) {
       if (visitor_ != nullptr) path_.parts.back().indices[dimension] = i;
@@ -96,7 +84,7 @@ class Walk {
   bool value(const Field& field, int depth) {
     if (ended_) return true;
     if (field.primitive == Primitive::none) return field.type != nullptr && fields(*field.type, depth + 1);
-    const size_t size = wire_size(field.primitive);
+    const size_t size = fixed_size(field.primitive);
     if (bytes_.size() - at_ < size) return false;
     const uint64_t raw = big_endian(bytes_.data() + at_, size);
     at_ += size;

@@ -4,26 +4,11 @@
 #include <algorithm>
 #include <cstring>
 
+#include "core/wire_size.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::engine {
 namespace {
-
-size_t size_of(Primitive type) {
-  switch (type) {
-    case Primitive::boolean:
-    case Primitive::byte:
-    case Primitive::int8: return 1;
-    case Primitive::int16: return 2;
-    case Primitive::int32:
-    case Primitive::float32: return 4;
-    case Primitive::int64:
-    case Primitive::float64: return 8;
-    case Primitive::none:
-    case Primitive::string: break;
-  }
-  return 0;
-}
 
 bool is_integer(Primitive type) {
   return type == Primitive::int8 || type == Primitive::int16 || type == Primitive::int32 || type == Primitive::int64;
@@ -48,7 +33,7 @@ void copy_swapped(const uint8_t* from, std::byte* to, size_t count) {
 
 int64_t read_integer(const uint8_t* at, Primitive type) {
   int64_t value = static_cast<int8_t>(at[0]);    // keeps the sign
-  for (size_t i = 1; i < size_of(type); ++i) value = value * 256 + at[i];
+  for (size_t i = 1; i < wire_size(type); ++i) value = value * 256 + at[i];
   return value;
 }
 
@@ -71,7 +56,7 @@ FieldReader::FieldReader(const Schema& schema, const std::string& field) : schem
   if (type_ == Primitive::none) throw InputError({}, "'" + field + "' is no field of numbers in " + schema.name + "; there are " + readable);
 }
 
-size_t FieldReader::value_size() const { return size_of(type_); }
+size_t FieldReader::value_size() const { return wire_size(type_); }
 
 int64_t FieldReader::length(const Field& field) const {
   int64_t length = 1;
@@ -90,7 +75,7 @@ FieldReader::Place FieldReader::find(std::span<const uint8_t> message) const {
       continue;
     }
     if (field.dimensions.empty() && is_integer(field.primitive)) counts_[i] = read_integer(message.data() + offset, field.primitive);
-    offset += static_cast<size_t>(length(field)) * size_of(field.primitive);
+    offset += static_cast<size_t>(length(field)) * wire_size(field.primitive);
   }
   return {offset, static_cast<size_t>(length(schema_->fields[target_]))};
 }

@@ -1,0 +1,24 @@
+// Options as users write them, read strictly: a wrong one says what it should look like.
+#pragma once
+
+#include <charconv>
+#include <cmath>
+#include <string>
+#include <string_view>
+
+#include "ruedo/errors.h"
+
+namespace ruedo {
+
+// option: its name; allowed: what it should look like.
+[[noreturn]] inline void refuse_option(const std::string& option, const std::string& text, const std::string& allowed) {
+  throw InputError({}, option + " '" + text + "': " + allowed);
+}
+
+// False for what is no finite number, or has anything after it.
+inline bool read_number(std::string_view text, double& value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
+}
+
+}  // namespace ruedo

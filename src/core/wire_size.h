@@ -1,0 +1,27 @@
+// How many bytes a value of a primitive type takes in an encoded message.
+#pragma once
+
+#include <cstddef>
+
+#include "ruedo/schema.h"
+
+namespace ruedo {
+
+// 0: not always the same number (a string), or no primitive.
+constexpr size_t wire_size(Primitive primitive) {
+  switch (primitive) {
+    case Primitive::boolean:
+    case Primitive::byte:
+    case Primitive::int8: return 1;
+    case Primitive::int16: return 2;
+    case Primitive::int32:
+    case Primitive::float32: return 4;
+    case Primitive::int64:
+    case Primitive::float64: return 8;
+    case Primitive::none:
+    case Primitive::string: break;
+  }
+  return 0;
+}
+
+}  // namespace ruedo
