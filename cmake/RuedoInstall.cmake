@@ -3,8 +3,8 @@
 include(CMakePackageConfigHelpers)
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/ruedo)
 
-set_target_properties(ruedo ruedo-import-mesh PROPERTIES INSTALL_RPATH "\$ORIGIN/../${CMAKE_INSTALL_LIBDIR}/ruedo")
-install(TARGETS ruedo ruedo-import-mesh RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+set_target_properties(ruedo ruedo-measure ruedo-import-mesh PROPERTIES INSTALL_RPATH "\$ORIGIN/../${CMAKE_INSTALL_LIBDIR}/ruedo")
+install(TARGETS ruedo ruedo-measure ruedo-import-mesh RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/worlds DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo)
 install(FILES ${CMAKE_SOURCE_DIR}/src/model/xacro/expand.py DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo/xacro)
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/proto DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo FILES_MATCHING PATTERN "*.lcm")

@@ -155,8 +155,8 @@ def test_a_foreign_function_is_named(tmp_path):
 @pytest.mark.skipif("RUEDO_BINARY_DIR" not in os.environ, reason="started without a build")
 def test_what_is_built_takes_no_elementary_function_from_outside():
     build = Path(os.environ["RUEDO_BINARY_DIR"])
-    built = [build / "bin/ruedo", build / "bin/ruedo-import-mesh", *build.glob("python/ruedo/_engine*.so"), *build.glob("math/lib*.so*")]
-    assert len(built) >= 7
+    built = [build / "bin/ruedo", build / "bin/ruedo-measure", build / "bin/ruedo-import-mesh", *build.glob("python/ruedo/_engine*.so"), *build.glob("math/lib*.so*")]
+    assert len(built) >= 8
     for path in built:
         names = subprocess.run(["nm", "-D", "--undefined-only", path], capture_output=True, text=True, check=True).stdout.split()
         foreign = {name.split("@")[0] for name in names} & NOT_OURS

@@ -1,6 +1,7 @@
 """ruedo bench: every table has its rows, and the workload is the one that is described. No figure of speed is judged."""
 import json
 import os
+import shutil
 import subprocess
 
 import pytest
@@ -78,3 +79,21 @@ def test_the_world_can_be_written(tmp_path):
     assert text.count("model://p3at") == 20
     # 5 rooms a side: 4 outer walls, and 2 pieces beside the door of each of 2 x 4 x 5 inner walls.
     assert text.count("<collision") == 4 + 2 * 2 * 4 * 5
+
+
+@pytest.mark.parametrize("command", ["bench", "experiments"])
+def test_help_is_that_of_the_program_that_measures(command):
+    result = subprocess.run([RUEDO, command, "--help"], capture_output=True, text=True, timeout=200)
+    assert result.returncode == 0 and ("--robots" if command == "bench" else "--out") in result.stdout
+
+
+def test_wrong_options_are_named():
+    result = bench("--robts", "3")
+    assert result.returncode == 2 and "did you mean '--robots'" in result.stderr
+
+
+def test_without_the_program_that_measures(tmp_path):
+    alone = tmp_path / "ruedo"
+    shutil.copy(RUEDO, alone)
+    result = subprocess.run([alone, "bench"], capture_output=True, text=True, timeout=200)
+    assert result.returncode == 4 and "ruedo-measure" in result.stderr
