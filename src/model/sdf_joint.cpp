@@ -11,7 +11,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 JointAxis read_axis(const Element& element, SdfVersion version, const Pose& X_MJ, FrameGraph& frames, const Joint& joint,
                     const std::string& where, ReadContext& context) {
-  report_other_children(element, {"xyz", "limit", "dynamics", "use_parent_model_frame", "mimic"}, {"initial_position"}, where, context.findings);
+  report_other_children(element, {"xyz", "limit", "dynamics", "use_parent_model_frame", "mimic", "ruedo:position_gain", "ruedo:rate_gain"}, {"initial_position"}, where, context.findings);
   if (const Element* start = element.child("initial_position"); start && start->as_number(Allowed::any(quantity::kLength)) != 0.0) {
     context.findings.unsupported(start->source, where, "<initial_position> is not supported: the joint begins at 0");
   }
@@ -49,9 +49,8 @@ JointAxis read_axis(const Element& element, SdfVersion version, const Pose& X_MJ
   axis.friction = element.number("dynamics/friction", 0, Allowed::not_negative(quantity::kDamping));
   axis.spring_stiffness = std::max(0.0, element.number("dynamics/spring_stiffness", 0, Allowed::any(quantity::kDamping)));
   axis.spring_reference = element.number("dynamics/spring_reference", 0, Allowed::any(quantity::kAngle));
-  if (const Element* mimic = element.child("mimic")) {
-    context.findings.unsupported(mimic->source, where, "<mimic> is not supported; the joint moves freely");
-  }
+  axis.position_gain = element.number("ruedo:position_gain", axis.position_gain, Allowed::positive(quantity::kFactor));
+  axis.rate_gain = element.number("ruedo:rate_gain", axis.rate_gain, Allowed::positive(quantity::kDamping).or_infinite());
   return axis;
 }
 
@@ -66,7 +65,35 @@ bool sets_anything(const Element& element) {
   return std::any_of(element.children.begin(), element.children.end(), [](const auto& child) { return sets_anything(*child); });
 }
 
+// m/rad; right-handed threads are positive. <thread_pitch>, which SDF had before, is in rad/m and counts left-handed ones.
+double read_advance(const Element& joint) {
+  if (joint.has("screw_thread_pitch")) return joint.number("screw_thread_pitch", 1.0, Allowed::any(quantity::kLength)) / (2.0 * M_PI);
+  const double turns = joint.number("thread_pitch", 1.0, Allowed::any(quantity::kFactor));
+  if (turns == 0.0) joint.child("thread_pitch")->fail("'0' is not allowed; a thread that never advances is a continuous joint");
+  return -1.0 / turns;
+}
+
 }  // namespace
+
+void read_mimic(const Element& element, const std::vector<Joint>& joints, Joint& joint) {
+  const Element* mimic = element.child("axis/mimic");
+  if (!mimic || joint.type == JointType::fixed || joint.type == JointType::ball) return;
+  const std::string* written = mimic->attribute("joint");
+  if (!written || written->empty()) mimic->fail("needs the attribute joint, the name of the joint that it follows");
+  if (const std::string* axis = mimic->attribute("axis"); axis && *axis != "axis") mimic->fail("axis '" + *axis + "' is not allowed; a joint follows the first axis of another");
+  const std::string name = dotted(*written);
+  const auto leader = std::find_if(joints.begin(), joints.end(), [&](const Joint& each) { return each.name == name; });
+  if (leader == joints.end()) mimic->fail("joint '" + name + "' is none of the model's joints");
+  if (leader->type == JointType::fixed || leader->type == JointType::ball) mimic->fail("joint '" + name + "' has no position to follow");
+  for (const Joint* each = &*leader;; each = &joints[static_cast<size_t>(each->leader)]) {
+    if (each == &joint) mimic->fail("joint '" + name + "' follows this one: a joint cannot follow itself");
+    if (each->leader < 0) break;
+  }
+  joint.mimic_multiplier = mimic->number("multiplier", 1.0, Allowed::any(quantity::kFactor));
+  joint.mimic_offset = mimic->number("offset", 0.0, Allowed::any(quantity::kAngle));
+  joint.mimic_reference = mimic->number("reference", 0.0, Allowed::any(quantity::kAngle));
+  joint.leader = static_cast<int>(leader - joints.begin());
+}
 
 std::string joint_end(const Element& joint, const char* which) {
   return joint.string(which, "").empty() ? joint.string(std::string(which) + "/link_name", "") : joint.string(which, "");
@@ -74,8 +101,8 @@ std::string joint_end(const Element& joint, const char* which) {
 
 Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames, const std::vector<Link>& links,
                  const std::string& where, ReadContext& context) {
-  report_other_children(element, {"parent", "child", "pose", "axis", "axis2", "sensor"},
-                        {"physics", "thread_pitch", "screw_thread_pitch", "gearbox_ratio", "gearbox_reference_body"}, where, context.findings);
+  report_other_children(element, {"parent", "child", "pose", "axis", "axis2", "sensor", "thread_pitch", "screw_thread_pitch"},
+                        {"physics", "gearbox_ratio", "gearbox_reference_body"}, where, context.findings);
   if (const Element* solver = element.child("physics"); solver && sets_anything(*solver)) {
     context.findings.unsupported(solver->source, where, "<physics> of a joint is not supported: the solver's own settings hold");
   }
@@ -87,17 +114,17 @@ Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
   static const std::vector<std::pair<std::string, JointType>> kTypes = {
       {"fixed", JointType::fixed},           {"revolute", JointType::revolute}, {"continuous", JointType::continuous},
       {"prismatic", JointType::prismatic},   {"ball", JointType::ball},         {"universal", JointType::universal},
-      {"revolute2", JointType::universal}};
+      {"revolute2", JointType::universal},   {"screw", JointType::screw}};
   bool known = false;
   for (const auto& [name, value] : kTypes) {
     if (*type == name) joint.type = value, known = true;
   }
   if (!known) {
-    if (*type != "screw" && *type != "gearbox" && *type != "planar" && *type != "floating") {
+    if (*type != "gearbox" && *type != "planar" && *type != "floating") {
       std::vector<std::string> names;
       for (const auto& each : kTypes) names.push_back(each.first);
       const std::string near = nearest_word(*type, names);
-      element.fail("type '" + *type + "' is not allowed; allowed are fixed, revolute, continuous, prismatic, ball, universal" +
+      element.fail("type '" + *type + "' is not allowed; allowed are fixed, revolute, continuous, prismatic, ball, universal, screw" +
                    (near.empty() ? "" : "; did you mean '" + near + "'?"));
     }
     context.findings.unsupported(element.source, where, "joints of type '" + *type + "' are not supported; this one is held fixed");
@@ -124,7 +151,8 @@ Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
   if (const Element* sensor = element.child("sensor")) {
     context.findings.unsupported(sensor->source, where, "sensors on joints are not supported");
   }
-  const bool needs_axis = joint.type == JointType::revolute || joint.type == JointType::continuous || joint.type == JointType::prismatic;
+  const bool needs_axis = joint.type == JointType::revolute || joint.type == JointType::continuous || joint.type == JointType::prismatic ||
+                          joint.type == JointType::screw;
   if (const Element* axis = element.child("axis")) {
     if (joint.type != JointType::fixed && joint.type != JointType::ball) {
       joint.axis = read_axis(*axis, version, joint.X_MJ, frames, joint, where + "/axis", context);
@@ -132,6 +160,7 @@ Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
   } else if (needs_axis) {
     element.fail("has no <axis>; joints of type '" + *type + "' need one");
   }
+  if (joint.type == JointType::screw) joint.advance = read_advance(element);
   if (joint.type == JointType::universal) {
     if (const Element* axis2 = element.child("axis2")) {
       joint.axis2 = read_axis(*axis2, version, joint.X_MJ, frames, joint, where + "/axis2", context);

@@ -46,6 +46,7 @@ void append_nested(const Nested& nested, const Pose& X_MN, Model& into, Findings
     joint.X_MJ = X_MN * joint.X_MJ;
     if (joint.parent >= 0) joint.parent += first_link;
     joint.child += first_link;
+    if (joint.leader >= 0) joint.leader += first_joint;
     into.joints.push_back(std::move(joint));
   }
   for (SensorDescription sensor : from.sensors) {
@@ -283,6 +284,13 @@ void SdfReader::read_joints(const Element& element, SdfVersion version, FrameGra
     const bool read = read_or_leave_out(here, "the joint is left out", context_.findings,
                                         [&] { model.joints.push_back(read_joint(*child, version, frames, model.links, here, context_)); });
     if (!read) frames.drop(name);
+  }
+  for (const auto& child : element.children) {
+    if (child->name != "joint") continue;
+    const std::string name = dotted(required_name(*child));
+    const auto joint = std::find_if(model.joints.begin(), model.joints.end(), [&](const Joint& each) { return each.name == name; });
+    if (joint == model.joints.end()) continue;
+    read_or_leave_out(where + "/joint " + name, "the joint moves on its own", context_.findings, [&] { read_mimic(*child, model.joints, *joint); });
   }
 }
 

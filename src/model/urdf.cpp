@@ -288,7 +288,12 @@ struct Converter {
       add(dynamics, "damping", source, shown(std::max(from->dynamics->damping, 0.0)));
       add(dynamics, "friction", source, shown(std::max(from->dynamics->friction, 0.0)));
     }
-    if (const Element* mimic = written.child("mimic")) add(axis, "mimic", mimic->source);
+    if (const Element* mimic = written.child("mimic"); mimic && from->mimic) {
+      Element& follows = add(axis, "mimic", mimic->source);
+      follows.attributes.emplace_back("joint", from->mimic->joint_name);
+      add(follows, "multiplier", mimic->source, shown(from->mimic->multiplier));
+      add(follows, "offset", mimic->source, shown(from->mimic->offset));
+    }
   }
 };
 

@@ -98,7 +98,7 @@ struct Link {
   Source source;
 };
 
-enum class JointType { fixed, revolute, continuous, prismatic, ball, universal };
+enum class JointType { fixed, revolute, continuous, prismatic, ball, universal, screw };
 
 struct JointAxis {
   Vec3 axis_in_J = Vec3::UnitZ();        // unit vector, in the joint's frame (expressed_in is resolved)
@@ -108,6 +108,8 @@ struct JointAxis {
   double velocity = std::numeric_limits<double>::infinity();
   double damping = 0.0, friction = 0.0;
   double spring_stiffness = 0.0, spring_reference = 0.0;    // N m/rad or N/m, towards that position
+  double position_gain = 20.0;           // 1/s: rate for what is missing of a position that it was told
+  double rate_gain = std::numeric_limits<double>::infinity();    // N m s/rad or N s/m: effort for what is missing of a rate
 };
 
 struct Joint {
@@ -117,6 +119,9 @@ struct Joint {
   int child = 0;
   Pose X_MJ;                             // at the start
   JointAxis axis, axis2;                 // axis2: universal only
+  double advance = 0.0;                  // m/rad along the axis: screw only
+  int leader = -1;                       // index into joints: the one that this one mimics
+  double mimic_multiplier = 1.0, mimic_offset = 0.0, mimic_reference = 0.0;    // multiplier (leader - reference) + offset
   Source source;
 };
 

@@ -105,9 +105,9 @@ void JointBlocks::add_motor(JointMotor& motor, Joint& joint, const SolverBodies&
   };
   if (motor.linear) {
     row.linear_a = -motor.axis;
-    row.angular_a = -arm(joint.a).cross(motor.axis);
+    row.angular_a = motor.advance * motor.axis - arm(joint.a).cross(motor.axis);
     row.linear_b = motor.axis;
-    row.angular_b = arm(joint.b).cross(motor.axis);
+    row.angular_b = arm(joint.b).cross(motor.axis) - motor.advance * motor.axis;
   } else {
     row.angular_a = -motor.axis;
     row.angular_b = motor.axis;

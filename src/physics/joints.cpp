@@ -48,7 +48,8 @@ double bounded(double value, double limit) { return std::clamp(value, -limit, li
 
 JointConstraint::JointConstraint(const model::Joint& joint, btRigidBody& parent, btRigidBody& child, const Pose& X_PJ,
                                  const Pose& X_CJ)
-    : type_(joint.type), limits_(joint.axis), limits2_(joint.axis2), parent_(parent), child_(child), X_PJ_(X_PJ), X_CJ_(X_CJ) {
+    : type_(joint.type), advance_(joint.advance), multiplier_(joint.mimic_multiplier),
+      offset_(joint.mimic_offset - joint.mimic_multiplier * joint.mimic_reference), limits_(joint.axis), limits2_(joint.axis2), parent_(parent), child_(child), X_PJ_(X_PJ), X_CJ_(X_CJ) {
   switch (type_) {
     case model::JointType::revolute:
     case model::JointType::continuous: {
@@ -69,6 +70,17 @@ JointConstraint::JointConstraint(const model::Joint& joint, btRigidBody& parent,
       slider->setUpperLinLimit(limited(limits_) ? std::min(limits_.upper, kNoLimit) : -1.0);
       slider->setLowerAngLimit(0.0);
       slider->setUpperAngLimit(0.0);
+      constraint_ = std::move(slider);
+      break;
+    }
+    case model::JointType::screw: {    // a slider that may turn; the thread is a row of its own
+      auto slider = std::make_unique<btSliderConstraint>(parent_, child_, to_bt(along(X_PJ, limits_.axis_in_J, Vec3::UnitX())),
+                                                         to_bt(along(X_CJ, limits_.axis_in_J, Vec3::UnitX())), true);
+      const double one = bounded(limits_.lower * advance_, kNoLimit), other = bounded(limits_.upper * advance_, kNoLimit);
+      slider->setLowerLinLimit(limited(limits_) && advance_ != 0.0 ? std::min(one, other) : 1.0);
+      slider->setUpperLinLimit(limited(limits_) && advance_ != 0.0 ? std::max(one, other) : -1.0);
+      slider->setLowerAngLimit(1.0);
+      slider->setUpperAngLimit(-1.0);
       constraint_ = std::move(slider);
       break;
     }
@@ -112,6 +124,7 @@ double JointConstraint::velocity() const {
     case model::JointType::revolute:
     case model::JointType::continuous:
     case model::JointType::universal:
+    case model::JointType::screw:
       return axis.dot(turn);
     case model::JointType::prismatic: {
       const btVector3 arm = child_.getWorldTransform() * to_bt(X_CJ_.translation);
@@ -132,7 +145,7 @@ void JointConstraint::set_motor(double rate, double lowest_effort, double highes
   command_ = rate;
   lowest_effort_ = lowest_effort;
   highest_effort_ = highest_effort;
-  gain_ = gain;
+  gain_ = std::min(gain, limits_.rate_gain);
   if (news) wake();
 }
 
@@ -187,8 +200,30 @@ void JointConstraint::brake_second_axis(double substep_s) {
   turn_on(motors_->second, axis, 0.0, -brake, brake, substep_s);
 }
 
+double JointConstraint::advanced() const {
+  const btVector3 from = parent_.getWorldTransform() * to_bt(X_PJ_.translation);
+  const btVector3 to = child_.getWorldTransform() * to_bt(X_CJ_.translation);
+  return axis_in_world().dot(from_bt(to - from));
+}
+
+void JointConstraint::hold_thread(double substep_s) {
+  constexpr double kEachSubstep = 0.2;    // of an error that is undone
+  constexpr double kAnything = 1e9;       // N
+  const double error = advanced() - advance_ * position_;
+  turn_on(motors_->second, axis_in_world(), -kEachSubstep * error / substep_s, -kAnything, kAnything, substep_s);
+  motors_->second.linear = true;
+  motors_->second.advance = advance_;
+}
+
+void JointConstraint::follow(double leader_position, double leader_rate, double substep_s) {
+  constexpr double kEachSubstep = 0.3;    // of what it lags
+  follows_ = true;
+  follow_rate_ = bounded(multiplier_ * leader_rate + kEachSubstep * (multiplier_ * leader_position + offset_ - position_) / substep_s, limits_.velocity);
+}
+
 void JointConstraint::before_substep(double substep_s) {
   if (!constraint_ || !constraint_->isEnabled()) return;
+  if (type_ == model::JointType::screw) hold_thread(substep_s);
   if (type_ == model::JointType::revolute && limited(limits_) && !within_a_turn(limits_)) {
     static_cast<btHingeConstraint&>(*constraint_)
         .setLimit(std::max(limits_.lower, position_ - kWindow), std::min(limits_.upper, position_ + kWindow), 1.0, 0.3, 0.0);
@@ -200,6 +235,7 @@ void JointConstraint::before_substep(double substep_s) {
   if (type_ == model::JointType::ball || type_ == model::JointType::fixed) return;
   if (limits_.spring_stiffness > 0.0) push(limits_.spring_stiffness * (limits_.spring_reference - position_));
   const Vec3 axis = axis_in_world();
+  if (follows_) return turn_on(motors_->first, axis, follow_rate_, -limits_.effort, limits_.effort, substep_s);
   if (mode_ == Mode::motor) {
     turn_on(motors_->first, axis, command_, lowest_effort_, highest_effort_, substep_s);
     if (std::isfinite(gain_)) motors_->first.softness = 1.0 / (gain_ * substep_s);
@@ -212,7 +248,7 @@ void JointConstraint::before_substep(double substep_s) {
 
 void JointConstraint::after_substep(double substep_s) {
   if (!constraint_ || !constraint_->isEnabled()) return;
-  effort_ = mode_ == Mode::motor ? motors_->first.impulse / substep_s : mode_ == Mode::effort ? command_ : 0.0;
+  effort_ = follows_ || mode_ == Mode::motor ? motors_->first.impulse / substep_s : mode_ == Mode::effort ? command_ : 0.0;
   switch (type_) {
     case model::JointType::revolute:
     case model::JointType::continuous: {
@@ -221,10 +257,15 @@ void JointConstraint::after_substep(double substep_s) {
       position_ += wrap_angle(angle - position_);
       break;
     }
-    case model::JointType::prismatic: {
-      const btVector3 from = parent_.getWorldTransform() * to_bt(X_PJ_.translation);
-      const btVector3 to = child_.getWorldTransform() * to_bt(X_CJ_.translation);
-      position_ = axis_in_world().dot(from_bt(to - from));
+    case model::JointType::prismatic:
+      position_ = advanced();
+      break;
+    case model::JointType::screw: {
+      const Vec3 first = X_PJ_.rotation * limits_.axis_in_J, square = first.unitOrthogonal();
+      const Quat turned = from_bt(parent_.getWorldTransform().getRotation()).conjugate() * from_bt(child_.getWorldTransform().getRotation()) *
+                          X_CJ_.rotation * X_PJ_.rotation.conjugate();
+      const Vec3 now = turned * square;
+      position_ += wrap_angle(math::atan2(first.dot(square.cross(now)), square.dot(now)) - position_);
       break;
     }
     case model::JointType::universal: {

@@ -41,6 +41,8 @@ class JointConstraint {
     start_again();
   }
 
+  // For the coming substep: another joint leads, and this one goes along, with its largest effort at most. The leader does not feel it.
+  void follow(double leader_position, double leader_rate, double substep_s);
   void before_substep(double substep_s);
   void after_substep(double substep_s);
 
@@ -52,8 +54,14 @@ class JointConstraint {
   void push(double effort);                        // for one substep
   void limit_first_axis();                         // of a universal joint, for one substep
   void brake_second_axis(double substep_s);
+  double advanced() const;                         // m along the axis since the start
+  void hold_thread(double substep_s);
 
   model::JointType type_;
+  double advance_;                                 // m/rad: screw only
+  double multiplier_, offset_;                     // of the leader's position
+  bool follows_ = false;                           // in the coming substep, at follow_rate_
+  double follow_rate_ = 0.0;
   model::JointAxis limits_, limits2_;              // of the second axis: universal only
   btRigidBody& parent_;
   btRigidBody& child_;

@@ -123,6 +123,13 @@ void PhysicsWorld::Impl::add_joints() {
   for (size_t i = joints_.size(); i < layout_.joints.size(); ++i) {
     joints_.push_back(make_joint(layout_.joints[i].instance, layout_.joints[i].joint));
   }
+  const auto leader_of = [&](const auto& placed) {
+    const int leader = world_.models[index(placed.instance)].model->joints[index(placed.joint)].leader;
+    const auto same = [&](const auto& each) { return each.instance == placed.instance && each.joint == leader; };
+    const auto found = std::find_if(layout_.joints.begin(), layout_.joints.end(), same);
+    return leader < 0 || found == layout_.joints.end() ? -1 : static_cast<int>(found - layout_.joints.begin());
+  };
+  for (size_t i = leaders_.size(); i < layout_.joints.size(); ++i) leaders_.push_back(leader_of(layout_.joints[i]));
   for (size_t i = wheel_joint_.size(); i < layout_.wheels.size(); ++i) add_wheel(i);
 }
 
@@ -277,6 +284,16 @@ void PhysicsWorld::Impl::move_on(btRigidBody& mover, double substep_s) {
   mover.setWorldTransform(next);
 }
 
+void PhysicsWorld::Impl::before_substep(double substep_s) {
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    if (leaders_[i] < 0) continue;
+    const JointConstraint& leader = joints_[index(leaders_[i])];
+    joints_[i].follow(leader.position(), leader.velocity(), substep_s);
+  }
+  for (JointConstraint& joint : joints_) joint.before_substep(substep_s);
+  for (JointConstraint& joint : wheels_) joint.before_substep(substep_s);
+}
+
 void PhysicsWorld::Impl::step_at(int pace) {
   std::vector<btRigidBody*>& bodies = simulated_[pace];
   if (bodies.empty()) return;
@@ -298,10 +315,7 @@ void PhysicsWorld::Impl::step_at(int pace) {
     return;
   }
   for (int s = 0; s < substeps_[pace]; ++s) {
-    if (pace == kFine) {
-      for (JointConstraint& joint : joints_) joint.before_substep(substep_s);
-      for (JointConstraint& joint : wheels_) joint.before_substep(substep_s);
-    }
+    if (pace == kFine) before_substep(substep_s);
     dynamics_.substep(substep_s);
     bound_speeds(bodies);
     if (pace == kFine) {
@@ -331,7 +345,13 @@ void PhysicsWorld::Impl::step() {
       motion.dirty = true;
     }
     motion.kind = Motion::Kind::free;
+    motion.fresh = false;
   }
+}
+
+bool PhysicsWorld::Impl::falling(int body) const {
+  const ObjectInfo& info = rigid_.bodies[index(body)].info;
+  return !motions_[index(body)].tied && !info.moved && !info.gone && !info.on_plane && alone(body);
 }
 
 // Forces that are allowed, each on its own, can throw a light body at any speed, and what is thrown so drags others along:
@@ -383,6 +403,7 @@ void PhysicsWorld::Impl::read(Snapshot& snapshot) const {
   snapshot.body_accelerations.resize(twists_.size());
   for (size_t i = 0; i < twists_.size(); ++i) {
     snapshot.body_accelerations[i] = (twists_[i].linear - last_twists_[i].linear) / step_s;
+    if (motions_[i].fresh && falling(static_cast<int>(i))) snapshot.body_accelerations[i] = from_bt(rigid_.bodies[i].bullet->getGravity());
   }
   snapshot.joint_positions.resize(joints_.size());
   snapshot.joint_velocities.resize(joints_.size());

@@ -30,6 +30,7 @@ struct Motion {
   bool simulated = false;     // in this step
   bool fine = false;          // ... in the shorter substeps
   bool awake = false;         // when the step began
+  bool fresh = true;          // put there since the last step: nothing says how it accelerates but gravity
   Twist mean;
   Pose end;
 };
@@ -58,6 +59,7 @@ class PhysicsWorld::Impl {
   void disturb(int body);
   btRigidBody& bullet(int body) { return *rigid_.bodies[index(body)].bullet; }
   bool alone(int body) const { return broadphase_.alone(rigid_.bodies[index(body)].bullet->getBroadphaseHandle()); }
+  bool falling(int body) const;
   bool sleeping(int body) const { return rigid_.bodies[index(body)].bullet->getActivationState() == ISLAND_SLEEPING; }
   void sleep(int body);
 
@@ -69,12 +71,14 @@ class PhysicsWorld::Impl {
   std::vector<Motion> motions_;
   ContactBook contacts_;
   std::vector<JointConstraint> joints_;       // as in the layout
+  std::vector<int> leaders_;                  // of each joint, into joints_: the one that it mimics; -1: none
   std::vector<JointConstraint> wheels_;       // those that are bodies of their own
   std::vector<int> wheel_joint_;              // of each wheel, into wheels_; -1: none
   std::vector<double> wheel_sign_;            // axis of the joint against that of the wheel
 
  private:
   void add_joints();                  // those that are new
+  void before_substep(double substep_s);
   void add_wheel(size_t wheel);
   JointConstraint make_joint(int instance, int joint);
   void add_joints(int instance);      // in the simulation, too

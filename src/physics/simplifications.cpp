@@ -1,6 +1,7 @@
 // Joints and surfaces that are simplified. Said once, while a world loads, so that nobody has to find out.
 #include "physics/simplifications.h"
 
+#include <algorithm>
 #include <string>
 
 namespace ruedo::physics {
@@ -14,6 +15,11 @@ const model::Model& model_of(const model::WorldModel& world, int instance) {
 void look_at_joints(const model::WorldModel& world, const model::BodyLayout& layout, std::vector<Finding>& findings) {
   for (const auto& placement : layout.joints) {
     const model::Joint& joint = model_of(world, placement.instance).joints[static_cast<size_t>(placement.joint)];
+    const bool led = std::any_of(layout.joints.begin(), layout.joints.end(), [&](const auto& other) { return other.instance == placement.instance && other.joint == joint.leader; });
+    if (joint.leader >= 0 && !led) {
+      findings.push_back({Finding::Kind::unsupported, joint.source, "model " + world.models[static_cast<size_t>(placement.instance)].name + "/joint " + joint.name,
+                          "<mimic> of a driven wheel is not supported; the joint moves freely"});
+    }
     const bool ball = joint.type == model::JointType::ball;
     if (!ball && joint.type != model::JointType::universal) continue;
     findings.push_back({Finding::Kind::unsupported, joint.source,

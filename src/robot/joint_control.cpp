@@ -14,7 +14,6 @@ namespace ruedo::robot {
 
 namespace {
 
-constexpr double kGain_per_s = 20.0;
 constexpr double kGainPerStep = 0.2;    // no more than this part of the error in a step
 }  // namespace
 
@@ -22,7 +21,7 @@ JointControl::JointControl(const model::WorldModel& world, const model::BodyLayo
     : world_(world),
       layout_(layout),
       physics_(physics),
-      gain_(std::min(kGain_per_s, kGainPerStep / (static_cast<double>(world.step_us) * 1e-6))) {
+      largest_gain_(kGainPerStep / (static_cast<double>(world.step_us) * 1e-6)) {
   targets_.reserve(layout.joints.size());
 }
 
@@ -48,7 +47,8 @@ int8_t JointControl::apply(int robot, const JointCommand& command) {
     if (command.modes[i] < joint_command_t::POSITION || command.modes[i] > joint_command_t::EFFORT) {
       return motion_status_t::REASON_BAD_KIND;
     }
-    if (find(command.names[i]) < 0) return motion_status_t::REASON_BAD_VALUE;
+    const int joint = find(command.names[i]);
+    if (joint < 0 || description(joint).leader >= 0) return motion_status_t::REASON_BAD_VALUE;    // one that mimics another takes no commands
   }
   for (size_t i = 0; i < n; ++i) {
     const int joint = find(command.names[i]);
@@ -60,7 +60,7 @@ int8_t JointControl::apply(int robot, const JointCommand& command) {
       physics_.apply_joint_effort(joint, command.values[i]);
     } else {
       const bool limited = axis.lower <= axis.upper;
-      targets_.push_back({joint, limited ? std::clamp(command.values[i], axis.lower, axis.upper) : command.values[i]});
+      targets_.push_back({joint, limited ? std::clamp(command.values[i], axis.lower, axis.upper) : command.values[i], std::min(axis.position_gain, largest_gain_)});
     }
     const auto& placed = layout_.joints[static_cast<size_t>(joint)];
     if (placed.parent_body >= 0) physics_.wake(placed.parent_body);
@@ -78,7 +78,7 @@ void JointControl::before_step() {
     const double error = target.position - physics_.joint_position(target.joint);
     const auto& placed = layout_.joints[static_cast<size_t>(target.joint)];
     const auto& model = *world_.models[static_cast<size_t>(placed.instance)].model;
-    physics_.drive_joint_velocity(target.joint, gain_ * error, model.joints[static_cast<size_t>(placed.joint)].axis.effort);
+    physics_.drive_joint_velocity(target.joint, target.gain * error, model.joints[static_cast<size_t>(placed.joint)].axis.effort);
   }
 }
 

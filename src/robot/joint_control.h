@@ -24,12 +24,13 @@ class JointControl {
   struct Target {
     int joint;              // index into BodyLayout::joints
     double position;
+    double gain;            // 1/s
   };
 
   const model::WorldModel& world_;
   const model::BodyLayout& layout_;
   physics::PhysicsWorld& physics_;
-  double gain_;                     // 1/s, of the position controller
+  double largest_gain_;             // 1/s, of the position controller
   std::vector<Target> targets_;     // joints under position control
 };
 

@@ -27,6 +27,7 @@ constexpr double kDone = 1e-6;                  // m or rad: a touched primitive
 // A primitive is blocked when in so long a time something touched and less than this part of the plan was done.
 constexpr SimTime kBlockWindow_us = 500'000;
 constexpr double kBlockedPart = 0.1;
+constexpr double kJitter = 5e-3;                // m or rad in that time: no way and no turn
 // Behind its plan by less, a robot has settled. One that does not within this time after the plan's end (a slope that it
 // slides on) is done as far as it came.
 constexpr double kSettled_m = 5e-4, kSettled_rad = 1e-3;
@@ -163,8 +164,10 @@ void Motion::hold(double v, double side, double omega, SimTime now, int8_t kind)
   const bool same = holding_ && v == target_v_ && omega == target_omega_ && side == target_side_;
   holding_ = true;
   deadline_ = drive_.watchdog_us > 0 ? now + drive_.watchdog_us : kNever;
-  show(0, kind, Status::STATE_RUNNING);
+  const bool blocked = same && log_.current().kind == kind && log_.current().reason == Status::REASON_BLOCKED;
+  show(0, kind, Status::STATE_RUNNING, blocked ? Status::REASON_BLOCKED : Status::REASON_NONE);
   if (same) return;    // a repeated command only feeds the watchdog
+  begin_window(now);
   target_v_ = v;
   target_omega_ = omega;
   target_side_ = side;
@@ -240,9 +243,7 @@ void Motion::command(const MoveCommand& command, SimTime now, double heading) {
     if (command.deceleration > 0.0) stopping.deceleration = std::min(stopping.deceleration, command.deceleration);
     set_plan(Profile::to_velocity(v_, 0.0, stopping), Profile::to_velocity(omega_, 0.0, angle_limits_), now);
   }
-  window_start_ = now;
-  window_done_ = window_fastest_ = 0.0;
-  window_touched_ = false;
+  begin_window(now);
 }
 
 void Motion::set_plan(const Profile& v, const Profile& omega, SimTime now, double side) {
@@ -381,6 +382,7 @@ void Motion::finish(SimTime now, double way, double angle, bool touched, const L
       show(log_.current().id, Move::STOP, Status::STATE_DONE);
       move_on(now);
     }
+    if (holding_) watch_held(now, way, angle, touched);
     return;
   }
   const double t = seconds(now);
@@ -405,6 +407,29 @@ void Motion::finish(SimTime now, double way, double angle, bool touched, const L
   watch_for_block(now, touched);
   publish_progress();
   if (touched && p.axis != Axis::none && t >= p.begins) plan_primitive(now);    // what is left, from where it really is
+}
+
+void Motion::begin_window(SimTime now) {
+  window_start_ = now;
+  window_done_ = window_turned_ = window_fastest_ = window_fastest_turn_ = 0.0;
+  window_touched_ = false;
+}
+
+// A velocity holds on; its status says while it leads nowhere.
+void Motion::watch_held(SimTime now, double way, double angle, bool touched) {
+  window_touched_ |= touched;
+  window_done_ += way;
+  window_turned_ += angle;
+  window_fastest_ = std::max(window_fastest_, std::abs(v_));
+  window_fastest_turn_ = std::max(window_fastest_turn_, std::abs(omega_));
+  if (now - window_start_ < kBlockWindow_us) return;
+  const double seconds = static_cast<double>(now - window_start_) * 1e-6;
+  const bool wanted = window_fastest_ > 0.0 || window_fastest_turn_ > 0.0;
+  const auto short_of = [&](double done, double fastest) { return std::abs(done) <= kJitter + kBlockedPart * fastest * seconds; };
+  const bool stuck = short_of(window_done_, window_fastest_) && short_of(window_turned_, window_fastest_turn_);
+  const int8_t reason = wanted && window_touched_ && stuck ? Status::REASON_BLOCKED : Status::REASON_NONE;
+  if (log_.current().state == Status::STATE_RUNNING && log_.current().reason != reason) show(0, log_.current().kind, Status::STATE_RUNNING, reason);
+  begin_window(now);
 }
 
 void Motion::watch_for_block(SimTime now, bool touched) {

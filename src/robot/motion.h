@@ -84,7 +84,9 @@ class Motion {
   void replace_running();
   void show(int64_t id, int8_t kind, int8_t state, int8_t reason = 0);
   void publish_progress();
+  void begin_window(SimTime now);
   void watch_for_block(SimTime now, bool touched);
+  void watch_held(SimTime now, double way, double angle, bool touched);
   bool settled(SimTime now, const Lag& lag) const;
   static Limits stricter(const Limits& own, const MoveCommand& command, double fallback_speed);
 
@@ -107,6 +109,7 @@ class Motion {
   // Watching for a block: since when, what was done then, the fastest that the plan was since, whether anything touched.
   SimTime window_start_ = 0;
   double window_done_ = 0.0, window_fastest_ = 0.0;
+  double window_turned_ = 0.0, window_fastest_turn_ = 0.0;    // beside the way, of a velocity command
   bool window_touched_ = false;
   MotionLog log_;
 };

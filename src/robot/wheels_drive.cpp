@@ -133,6 +133,7 @@ void WheelsDrive::after_step(SimTime now) {
   const Pose X_WBase = base_pose().normalized();
   const Quat turn = X_WBase_.rotation.conjugate() * X_WBase.rotation;
   const double turned = wrap_angle(2.0 * math::atan2(turn.z(), turn.w()));
+  const double ahead = (X_WBase_.rotation.conjugate() * (X_WBase.translation - X_WBase_.translation)).x();
   set_state(X_WBase, base_twist(X_WBase));
   read_wheel_rates();
 
@@ -144,7 +145,9 @@ void WheelsDrive::after_step(SimTime now) {
   way_missing_ -= made.v;
   angle_missing_ -= made.omega;
   const bool touched = touches_something();
-  motion_.finish(now, made.v, made.omega, touched, lag());
+  // A primitive ends by what the robot believes; whether a velocity leads anywhere, the room says.
+  const bool believes = motion_.has_primitive();
+  motion_.finish(now, believes ? made.v : ahead, believes ? made.omega : turned, touched, lag());
   if (touched && motion_.has_primitive()) way_missing_ = angle_missing_ = 0.0;    // it was planned anew, from where the robot believes to be
   if (!motion_.has_primitive()) {    // a velocity is not made up for later
     way_missing_ = 0.0;

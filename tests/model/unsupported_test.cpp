@@ -44,12 +44,10 @@ TEST_P(Unsupported, IsNamedOnceWithItsLine) {
 
 INSTANTIATE_TEST_SUITE_P(Table, Unsupported, testing::Values(
     Part{"OtherPlugin", plugin("libx.so", "x") + plugin("libx.so", "y"), "plugins are not loaded: libx.so"},
-    Part{"Screw", joint("screw"), "joints of type 'screw' are not supported; this one is held fixed"},
     Part{"Gearbox", joint("gearbox"), "joints of type 'gearbox' are not supported; this one is held fixed"},
-    Part{"Mimic", joint("revolute", "<mimic joint='k'><multiplier>1</multiplier></mimic>"), "<mimic> is not supported; the joint moves freely"},
     Part{"InitialPosition", joint("revolute", "<initial_position>0.5</initial_position>"), "<initial_position> is not supported: the joint begins at 0"},
-    Part{"NoInitialPosition", joint("revolute", "<initial_position>0</initial_position>") + joint("screw").replace(13, 1, "k"),
-         "joints of type 'screw' are not supported; this one is held fixed"},
+    Part{"NoInitialPosition", joint("revolute", "<initial_position>0</initial_position>") + joint("gearbox").replace(13, 1, "k"),
+         "joints of type 'gearbox' are not supported; this one is held fixed"},
     Part{"VelocityDecay", "<link name='c'><velocity_decay/></link><link name='d'><velocity_decay><linear>0.1</linear></velocity_decay></link>",
          "<velocity_decay> is not supported: nothing slows the link in the air"},
     Part{"SelfCollideOfALink", "<link name='c'><self_collide>1</self_collide></link>", "<self_collide> of a link is not supported; a model may have it"},
@@ -62,14 +60,37 @@ INSTANTIATE_TEST_SUITE_P(Table, Unsupported, testing::Values(
          "sensors on joints are not supported"}),
     [](const auto& info) { return std::string(info.param.name); });
 
-TEST(UnsupportedOfUrdf, MimicJoints) {
+TEST(Mimic, UrdfAndSdfSayWhoLeads) {
   const auto world = load_world_text(
       "<robot name='r'><link name='a'/><link name='b'/><link name='c'/>\n"
       "<joint name='j' type='continuous'><parent link='a'/><child link='b'/></joint>\n"
-      "<joint name='k' type='continuous'><parent link='a'/><child link='c'/><mimic joint='j'/></joint></robot>", "/nowhere/r.urdf");
-  ASSERT_EQ(world->findings.size(), 1u);
-  EXPECT_EQ(world->findings[0].text, "<mimic> is not supported; the joint moves freely");
-  EXPECT_EQ(world->findings[0].source.line, 3);
+      "<joint name='k' type='continuous'><parent link='a'/><child link='c'/><mimic joint='j' multiplier='-2' offset='0.5'/></joint></robot>", "/nowhere/r.urdf");
+  EXPECT_TRUE(world->findings.empty());
+  const Joint& k = world->models.at(world->models.size() - 1).model->joints.at(1);
+  EXPECT_EQ(k.leader, 0);
+  EXPECT_EQ(k.mimic_multiplier, -2.0);
+  EXPECT_EQ(k.mimic_offset, 0.5);
+  const auto sdf = load_world_text("<sdf version='1.11'><world name='w'><model name='m'><link name='a'/><link name='b'/><link name='c'/>" + joint("revolute") +
+                                   "<joint name='k' type='revolute'><parent>a</parent><child>c</child><axis><xyz>0 0 1</xyz><mimic joint='j'><multiplier>3</multiplier>"
+                                   "<offset>1</offset><reference>0.25</reference></mimic></axis></joint></model></world></sdf>", "/nowhere/w.sdf");
+  EXPECT_TRUE(sdf->findings.empty());
+  EXPECT_EQ(sdf->models.at(0).model->joints.at(1).leader, 0);
+  EXPECT_EQ(sdf->models[0].model->joints[1].mimic_reference, 0.25);
+}
+
+// A leader that is not there, or follows its own follower, is an error; the joint moves on its own.
+TEST(Mimic, NobodyFollowsNobodyOrItself) {
+  const auto finding = [](const std::string& leader) {
+    const auto world = load_world_text("<sdf version='1.9'><world name='w'>\n<model name='m'><link name='a'/><link name='b'/>\n" +
+                                           joint("revolute", "<mimic joint='" + leader + "'/>") + "</model></world></sdf>", "/nowhere/w.sdf");
+    EXPECT_EQ(world->findings.size(), 1u);
+    EXPECT_EQ(world->findings.at(0).kind, Finding::Kind::error);
+    EXPECT_EQ(world->findings[0].source.line, 3);
+    EXPECT_EQ(world->models.at(0).model->joints.at(0).leader, -1);
+    return world->findings[0].text;
+  };
+  EXPECT_THAT(finding("k"), testing::HasSubstr("joint 'k' is none of the model's joints"));
+  EXPECT_THAT(finding("j"), testing::HasSubstr("cannot follow itself"));
 }
 
 // An axis by another frame's directions, in the model's (before SDF 1.5), and by the switch of 1.5 and 1.6.

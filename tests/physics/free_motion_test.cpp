@@ -17,6 +17,19 @@ TEST(FreeMotion, FlightIsTheParabolaAtAnyStep) {
   }
 }
 
+// What falls at the start accelerates by gravity in the first state, what stands does not; as soon as they are simulated they say so themselves.
+TEST(FreeMotion, TheFirstStateKnowsWhatFalls) {
+  World w(kPlane + thing("falling", "0 0 5 0 0 0", kBall, 1) + thing("standing", "2 0 0.1 0 0 0", kBall, 1) + thing("post", "4 0 1 0 0 0", kBox, 0), 5000);
+  Snapshot first, second;
+  w.physics.read(first);
+  w.physics.step();
+  w.physics.read(second);
+  for (const Snapshot* state : {&first, &second}) {
+    EXPECT_NEAR(state->body_accelerations[0].z(), -10.0, 1e-9);
+    EXPECT_NEAR(state->body_accelerations[1].z(), 0.0, 1e-9);
+  }
+}
+
 // A body with three moments, spun near its middle axis, tumbles; energy and angular momentum stay.
 TEST(FreeMotion, RotationKeepsEnergyAndAngularMomentum) {
   World w("<model name='m'><link name='l'><gravity>0</gravity><inertial><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.02</iyy><izz>0.025</izz></inertia></inertial></link></model>", 5000);

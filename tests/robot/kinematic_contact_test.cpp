@@ -96,6 +96,24 @@ TEST(KinematicContact, APrimitiveBlockedByAWallEnds) {
   EXPECT_EQ(sim.robot().wheel_v, 0.0);
 }
 
+// A velocity holds, and its status says that it leads nowhere, until it does again.
+TEST(KinematicContact, AVelocityBlockedByAWallSaysSo) {
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) + box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"));
+  sim.velocity(0.5, 0.0);
+  sim.run(1.0);
+  EXPECT_EQ(sim.robot().motion.reason, Status::REASON_NONE);    // on its way
+  sim.run(3.0);
+  EXPECT_EQ(sim.robot().motion.kind, Status::KIND_VELOCITY);
+  EXPECT_EQ(sim.robot().motion.state, Status::STATE_RUNNING);
+  EXPECT_EQ(sim.robot().motion.reason, Status::REASON_BLOCKED);
+  sim.velocity(0.5, 0.0);    // said again, it is still blocked
+  sim.run(0.1);
+  EXPECT_EQ(sim.robot().motion.reason, Status::REASON_BLOCKED);
+  sim.velocity(-0.3, 0.0);
+  sim.run(1.0);
+  EXPECT_EQ(sim.robot().motion.reason, Status::REASON_NONE);
+}
+
 TEST(KinematicContact, APrimitiveThatPushesABoxStillEndsAtItsDistance) {
   Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", limits(0.5, 1.0, 0.5, 0.5, 1.0)) + box_sdf("box", "0.6 0 0.15 0 0 0", "0.3 0.3 0.3", 5.0));
   sim.move(Move::ADVANCE, 1.0);
