@@ -11,7 +11,7 @@ from typing import Callable
 
 import numpy as np
 
-from scenes import BOUNCING_PLANE, GRAVITY, PLANE, Body, Chain, Scene, Shape, flat_mesh
+from scenes import BOUNCING_PLANE, GRAVITY, PLANE, Body, Chain, Scene, Shape, flat_mesh, skid_steered
 from simulators import Simulator
 
 Make = Callable[[Scene, float], Simulator]    # a simulator's class
@@ -267,10 +267,34 @@ def rolling(body: Body, ground: Callable[[], Body], what: str, heading: float = 
     return measure
 
 
+def skidding(left: float, right: float) -> Callable[[Make, float, Series], float]:
+    """How much wider its wheels' rates would have the track than it is, for the turn that the robot makes."""
+    def measure(make: Make, step_s: float, series: Series) -> float:
+        half_base, half_track, radius = 0.1345, 0.197, 0.111
+        urdf = skid_steered(half_base, half_track, radius, 0.075, 14.0, 1.5)
+        scene = Scene((PLANE,), urdf=urdf, wheels=(("to_fl", "to_rl"), ("to_fr", "to_rr")), friction=0.8)
+        with make(scene, step_s) as sim:
+            sim.drive(left, right)
+            sim.step(steps(2.0, step_s))
+            def heading() -> float:
+                rotation = sim.rotation("base")
+                return math.atan2(rotation[1, 0], rotation[0, 0])
+            turned, last = 0.0, heading()
+            for i in range(16):
+                sim.step(steps(0.5, step_s))
+                turned += math.remainder(heading() - last, 2 * math.pi)
+                last = heading()
+                series.append((0.5 * (i + 1), turned))
+            return radius * (right - left) * 8.0 / (2 * half_track * turned)
+    return measure
+
+
 BALL = Body("ball", (Shape("sphere", (0.1,)),), at=(0, 0, 0.1))
 ROLLER = Body("roller", (Shape("cylinder", (0.1, 0.3)),), at=(0, 0, 0.1), rpy=(math.pi / 2, 0, 0))
 
 FREE, JOINTED, CONTACT, STACKS, MESHES = "Flight and rotation", "Mechanisms", "Contacts", "Stacks", "Floors of triangles"
+SKIDDING = "Skid steering"
+WANG = "[Wang et al. 2015](https://doi.org/10.3390/s150509681)"
 CLOSED = "closed form"
 
 ROWS = [
@@ -294,5 +318,7 @@ ROWS = [
     Row("ball_aside", MESHES, "ball rolling at 1 m/s over triangles of 8 cm, 5 s: aside", "mm", 0.0, CLOSED, rolling(BALL, floor, "aside"), 3),
     Row("ball_speed", MESHES, "the same: speed after 5 s", "m/s", 1.0, CLOSED, rolling(BALL, floor, "speed")),
     Row("roller_plane", MESHES, "lying cylinder rolling on a plane: speed after 5 s", "m/s", 1.0, CLOSED, rolling(ROLLER, lambda: PLANE, "speed", 0.0)),
+    Row("skid_spot", SKIDDING, "P3-AT, wheels at -1 and 1 rad/s, mu 0.8: track that its wheels would say, of the real one", "", 1.466, WANG, skidding(-1.0, 1.0), 3),
+    Row("skid_curve", SKIDDING, "the same on a curve, wheels at 1 and 3 rad/s", "", 1.41, WANG, skidding(1.0, 3.0), 3),
     Row("roller_mesh", MESHES, "lying cylinder rolling over triangles of 8 cm: speed after 5 s", "m/s", 1.0, CLOSED, rolling(ROLLER, floor, "speed", 0.0)),
 ]

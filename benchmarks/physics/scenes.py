@@ -56,6 +56,8 @@ class Scene:
     urdf: str = ""              # a mechanism "robot" whose first link is called "world" and never moves
     gravity: float = GRAVITY
     commands: bool = False      # joints are told something
+    wheels: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())    # joints of a robot "robot" that moves: left and right, in `urdf`
+    friction: float = 1.0       # of its wheels
 
     @property
     def free(self) -> list[Body]:
@@ -86,6 +88,19 @@ class Chain:
 
     def urdf(self) -> str:
         return f'<robot name="robot"><link name="world"/>{"".join(self.links)}</robot>'
+
+
+def skid_steered(half_base: float, half_track: float, radius: float, width: float, body_kg: float, wheel_kg: float) -> str:
+    """A robot of four wheels as URDF; its first link, "base", has its origin on the ground, in the middle."""
+    side, axle = wheel_kg * (3 * radius**2 + width**2) / 12, wheel_kg * radius**2 / 2
+    wheels = ""
+    for name, x, y in (("fl", 1, 1), ("rl", -1, 1), ("fr", 1, -1), ("rr", -1, -1)):
+        wheels += (f'<link name="{name}"><inertial><mass value="{wheel_kg}"/><inertia ixx="{side!r}" iyy="{axle!r}" izz="{side!r}" ixy="0" ixz="0" iyz="0"/></inertial>'
+                   f'<collision><origin rpy="{math.pi / 2!r} 0 0"/><geometry><cylinder radius="{radius}" length="{width}"/></geometry></collision></link>'
+                   f'<joint name="to_{name}" type="continuous"><parent link="base"/><child link="{name}"/>'
+                   f'<origin xyz="{x * half_base} {y * half_track} {radius}"/><axis xyz="0 1 0"/><limit effort="100" velocity="100"/></joint>')
+    return (f'<robot name="robot"><link name="base"><inertial><origin xyz="0 0 0.18"/><mass value="{body_kg}"/>'
+            f'<inertia ixx="0.1381" iyy="0.2829" izz="0.3277" ixy="0" ixz="0" iyz="0"/></inertial></link>{wheels}</robot>')
 
 
 def flat_mesh(folder: Path, half: float = 8.0, triangle: float = 0.08, along: float | None = None) -> Path:

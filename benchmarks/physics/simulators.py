@@ -32,6 +32,8 @@ class Simulator:
     def set_velocity(self, body: str, linear: Sequence[float], angular: Sequence[float] = (0, 0, 0)) -> None: ...
     def hold(self, joints: Sequence[str], mode: str, value: float) -> None:
         """mode: "velocity" (rad/s) or "position" (rad)."""
+    def drive(self, left: float, right: float) -> None:
+        """Turns the wheels of each side at these rates (rad/s)."""
     def close(self) -> None: ...
     def __enter__(self):
         return self
@@ -56,15 +58,15 @@ class Ruedo(Simulator):
         self._folder = tempfile.TemporaryDirectory(prefix="ruedo-physics-")
         world = Path(self._folder.name) / "world.sdf"
         if scene.urdf:
-            (Path(self._folder.name) / "robot.urdf").write_text(scene.urdf, encoding="utf-8")
+            (Path(self._folder.name) / "robot.urdf").write_text(with_friction(scene), encoding="utf-8")
         world.write_text(sdf(scene, step_s), encoding="utf-8")
-        mode = {"lockstep": 1} if scene.commands else {"args": ["--paused"]}
+        mode = {"lockstep": 1} if scene.commands or scene.wheels[0] else {"args": ["--paused"]}
         self._sim = ruedo.launch(world, rate="max", timeout=120, **mode)
         self._commands: list[ruedo.Command] = []
         self.step(0)
 
     def step(self, n: int = 1) -> None:
-        if self._scene.commands:
+        if self._scene.commands or self._scene.wheels[0]:
             self._sim.step(n, self._commands if n else (), timeout=600)
             self._commands = self._commands if not n else []
         elif n:
@@ -94,6 +96,9 @@ class Ruedo(Simulator):
         command.mode, command.value = bytes([kind] * command.n), [value] * command.n
         self._commands.append(ruedo.Command("robot/joint_command", command.encode()))
 
+    def drive(self, left, right) -> None:
+        self._commands.append(self._sim.robot("robot").wheel_command(left, right))
+
     def close(self) -> None:
         self._sim.close()
         self._folder.cleanup()
@@ -118,9 +123,26 @@ class MuJoCo(Simulator):
         if scene.commands:
             for joint in list(spec.joints):
                 self._servos(spec, joint.name)
+        if scene.wheels[0]:
+            self._on_wheels(spec)
         self._model = spec.compile()
         self._data = mujoco.MjData(self._model)
         mujoco.mj_forward(self._model, self._data)
+
+    def _on_wheels(self, spec) -> None:
+        spec.body("base").add_freejoint()
+        for geom in spec.geoms:
+            if geom.parent.name != "world" and geom.parent.name not in [b.name for b in self._scene.bodies]:
+                geom.friction, geom.priority = [self._scene.friction, 1e-9, 1e-9], 1
+        for joint in (*self._scene.wheels[0], *self._scene.wheels[1]):
+            servo = spec.add_actuator(name=f"{joint}_velocity", trntype=self._mj.mjtTrn.mjTRN_JOINT, target=joint)
+            servo.gaintype, servo.biastype = self._mj.mjtGain.mjGAIN_FIXED, self._mj.mjtBias.mjBIAS_AFFINE
+            servo.gainprm[0], servo.biasprm[:3] = 100.0, [0, 0, -100.0]
+
+    def drive(self, left, right) -> None:
+        for joints, rate in zip(self._scene.wheels, (left, right)):
+            for joint in joints:
+                self._data.actuator(f"{joint}_velocity").ctrl[0] = rate
 
     def _servos(self, spec, joint: str) -> None:
         """Proportional, as stiff as they stay stable at all three steps."""
@@ -207,13 +229,21 @@ class PyBullet(Simulator):
         p = self._p
         path = Path(self._folder.name) / "robot.urdf"
         path.write_text(urdf, encoding="utf-8")
-        self._robot = p.loadURDF(str(path), useFixedBase=True, flags=p.URDF_USE_INERTIA_FROM_FILE, physicsClientId=self._id)
+        self._robot = p.loadURDF(str(path), useFixedBase=not self._scene.wheels[0], flags=p.URDF_USE_INERTIA_FROM_FILE, physicsClientId=self._id)
         for i in range(p.getNumJoints(self._robot, physicsClientId=self._id)):
             info = p.getJointInfo(self._robot, i, physicsClientId=self._id)
             self._joints[info[1].decode()] = self._links[info[12].decode()] = i
             p.setJointMotorControl2(self._robot, i, p.VELOCITY_CONTROL, force=0, physicsClientId=self._id)
             p.changeDynamics(self._robot, i, linearDamping=0, angularDamping=0, jointDamping=0, physicsClientId=self._id)
         p.changeDynamics(self._robot, -1, linearDamping=0, angularDamping=0, physicsClientId=self._id)
+        for joint in (*self._scene.wheels[0], *self._scene.wheels[1]):
+            p.changeDynamics(self._robot, self._joints[joint], lateralFriction=self._scene.friction, physicsClientId=self._id)
+        self._links["base"] = -1
+
+    def drive(self, left, right) -> None:
+        for joints, rate in zip(self._scene.wheels, (left, right)):
+            for joint in joints:
+                self._p.setJointMotorControl2(self._robot, self._joints[joint], self._p.VELOCITY_CONTROL, targetVelocity=rate, force=100, physicsClientId=self._id)
 
     def _add(self, body: Body) -> int:
         p, c = self._p, {"physicsClientId": self._id}
@@ -256,7 +286,7 @@ class PyBullet(Simulator):
         if body in self._bodies:
             x, y, z, w = self._p.getBasePositionAndOrientation(self._bodies[body], physicsClientId=self._id)[1]
         else:
-            x, y, z, w = self._link(body)[5]
+            x, y, z, w = self._p.getBasePositionAndOrientation(self._robot, physicsClientId=self._id)[1] if self._links[body] < 0 else self._link(body)[5]
         return matrix((w, x, y, z))
 
     def velocity(self, body: str) -> tuple[Vec, Vec]:
@@ -288,10 +318,21 @@ def available(peers: bool) -> list[type[Simulator]]:
     return [Ruedo] + [s for s, package in ((MuJoCo, "mujoco"), (PyBullet, "pybullet")) if peers and importlib.util.find_spec(package)]
 
 
+def with_friction(scene: Scene) -> str:
+    """The URDF with what Gazebo's users write for the friction of wheels."""
+    wheels = [joint.removeprefix("to_") for side in scene.wheels for joint in side]
+    blocks = "".join(f'<gazebo reference="{wheel}"><mu1>{scene.friction}</mu1><mu2>{scene.friction}</mu2></gazebo>' for wheel in wheels)
+    return scene.urdf.replace("</robot>", blocks + "</robot>")
+
+
 def sdf(scene: Scene, step_s: float) -> str:
     models = "".join(_model(body) for body in scene.bodies)
     if scene.urdf:
-        models += "<include><uri>robot.urdf</uri><name>robot</name></include>"
+        drive = ""
+        if scene.wheels[0]:
+            sides = "".join(f"<ruedo:{side}_joint>{joint}</ruedo:{side}_joint>" for side, joints in zip(("left", "right"), scene.wheels) for joint in joints)
+            drive = f'<ruedo:drive type="wheels">{sides}<ruedo:watchdog>0</ruedo:watchdog></ruedo:drive>'
+        models += f"<include><uri>robot.urdf</uri><name>robot</name>{drive}</include>"
     return (f'<sdf version="1.9" xmlns:ruedo="urn:ruedo"><world name="test"><gravity>0 0 {-scene.gravity!r}</gravity>'
             f'<physics name="step" type="bullet"><max_step_size>{step_s!r}</max_step_size></physics>{models}</world></sdf>')
 

@@ -60,8 +60,9 @@ std::string page(const std::vector<Outcome>& outcomes) {
           "deceleration 0.6 m/s^2, 1.74 rad/s^2 (AMRISim's parameters; those that the model in worlds/robots/p3at has). They were not fitted, and these rows have\n"
           "no target. Once the odometry is that of the same step: the trapezoid then runs half a frame behind the robot. Once it is that of\n"
           "the last status packet, which the real robot sends each 0.1 s. Which of both the paper did is not known.\n\n"
-          "In Ruedo's setting the kinematic drive runs the primitives. With the wheels drive the wheels slip: a robot that steers by\n"
-          "skidding turns less than its wheels say, so that its odometry needs a wider track than the real one.\n\n";
+          "In Ruedo's setting the kinematic drive runs the primitives, by the robot's true way. With the wheels drive the wheels slip, and the\n"
+          "primitives end where the robot's odometry has them, as on a real robot: one that steers by skidding turns less than its wheels say,\n"
+          "so that its square does not close until its odometry believes in a wider track than the real one.\n\n";
   text += table(outcomes, "E2");
   text += "![Square, late braking](experiments/e2_late_braking.svg)\n\n"
           "![Square, kinematic drive](experiments/e2_kinematic.svg)\n\n"

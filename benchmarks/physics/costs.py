@@ -1,0 +1,75 @@
+"""CPU time of a stack, an arm and a floor of triangles, in the process, at a step of 5 ms."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+
+import ruedo
+import rows
+from scenes import PLANE, Body, Scene, Shape
+from simulators import Simulator, sdf, with_friction
+
+STEP_S, SECONDS, REPEATS = 0.005, 1.5, 5    # shorter than the 2 s after which Ruedo lets what rests sleep
+
+
+class InProcess(Simulator):
+    """Ruedo as ruedo.Engine, on one core."""
+
+    name = "Ruedo"
+
+    def __init__(self, scene: Scene, step_s: float) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="ruedo-physics-")
+        world = Path(self._folder.name) / "world.sdf"
+        if scene.urdf:
+            (Path(self._folder.name) / "robot.urdf").write_text(with_friction(scene), encoding="utf-8")
+        world.write_text(sdf(scene, step_s), encoding="utf-8")
+        self._engine = ruedo.Engine(str(world), threads=1)
+
+    def step(self, n: int = 1) -> None:
+        if n:
+            self._engine.step(None, n)
+
+    def hold(self, joints, mode, value) -> None:
+        command = ruedo.lcmtypes.joint_command_t()
+        command.n, command.name = len(joints), list(joints)
+        command.mode, command.value = bytes([command.VELOCITY] * command.n), [value] * command.n
+        self._engine.command(0, "robot/joint_command", command)
+
+    def close(self) -> None:
+        self._engine.close()
+        self._folder.cleanup()
+
+
+def falling() -> Scene:
+    """20 boxes, balls and cylinders onto triangles of 8 cm."""
+    shapes = (Shape("box", (0.2, 0.2, 0.2), friction=0.8), Shape("sphere", (0.1,), friction=0.8), Shape("cylinder", (0.1, 0.2), friction=0.8))
+    return Scene((rows.floor(), *(Body(f"b{i}", (shapes[i % 3],), at=(0.03 + 0.4 * (i % 5), -0.61 + 0.4 * (i // 5), 0.15)) for i in range(20))))
+
+
+def cost(make, scene: Scene, joints: bool) -> float:
+    """ms of CPU time for a second of sim time: the least of several runs, from the same beginning."""
+    best = float("inf")
+    for _ in range(REPEATS):
+        with make(scene, STEP_S) as sim:
+            if joints:
+                sim.hold(rows.JOINTS, "velocity", 0.0)
+            began = time.process_time()
+            sim.step(round(SECONDS / STEP_S))
+            best = min(best, time.process_time() - began)
+    return 1e3 * best / SECONDS
+
+
+def table(peers: list[type[Simulator]]) -> str:
+    scenes = (("stack of 15 boxes, 1.5 s", Scene((PLANE, *(rows.box(f"b{i}", mass=1.0, at=(0, 0, 0.1 + 0.2 * i)) for i in range(15)))), False),
+              ("arm of six joints that holds 5 kg", Scene(urdf=rows.arm(), commands=True), True),
+              ("20 things that fall on triangles of 8 cm", falling(), False))
+    makers = [InProcess, *peers]
+    lines = ["| ms of one core for a simulated second | " + " | ".join(m.name for m in makers) + (" | Ruedo, of the faster one |" if peers else " |"),
+             "|---|" + "---|" * (len(makers) + bool(peers))]
+    for title, scene, joints in scenes:
+        costs = [cost(make, scene, joints) for make in makers]
+        ratio = f" {costs[0] / min(costs[1:]):.2f} |" if peers else ""
+        lines.append(f"| {title} | " + " | ".join(f"{c:.1f}" for c in costs) + " |" + ratio)
+    return "\n".join(lines) + "\n"
