@@ -77,6 +77,15 @@ def test_the_moved_engine_finds_its_own(prefix):
     assert f"(searched in {prefix}/share/ruedo/worlds)" in said and said.endswith("(1, 1, 181)\n")
 
 
+def test_pkg_config_leads_to_library_and_server(prefix, tmp_path):
+    """Of the same installation."""
+    (tmp_path / "a.cpp").write_text('#include <ruedo/client.h>\n#include <cstdio>\n'
+                                    'int main() { std::puts(ruedo::client::LaunchOptions{}.program.c_str()); return &ruedo::client::launch == nullptr; }\n')
+    flags = run("pkg-config", "--cflags", "--libs", "ruedo", more={"PKG_CONFIG_PATH": str(next(prefix.glob("lib/**/pkgconfig")))}).stdout
+    run("sh", "-c", f"g++ -std=c++17 a.cpp -o a {flags.strip()}", cwd=tmp_path)
+    assert Path(run(tmp_path / "a").stdout.strip()).resolve() == prefix / "bin/ruedo"
+
+
 def test_the_example_from_nothing_to_green(project):
     """Without goldens it says what to do; renewed, all is green, in parallel; twice gives the same."""
     said = ctest(project, "-R", "^gate$", good=False)
