@@ -4,8 +4,10 @@
 // a surface of acoustic reflectance of at least kQuietest, at an incidence of at most the specular angle. The
 // reading is the average of all rays, those without echo counting as the maximum range (Hernandez-Belmonte,
 // Ayala-Ramirez, Sanchez-Yanez, ROSSUM 2011), or the nearest echo, as real sonars give it. It is not below the minimum
-// range, in which a transducer still rings. Noise is added to readings with an echo.
+// range, in which a transducer still rings. The nearest echo is looked for with rays a degree apart or closer, and then about the
+// nearest of them, ever closer, until it is nearest. Noise is added to readings with an echo.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -52,6 +54,17 @@ std::vector<Vec3> cone(int64_t n, double horizontal_rad, double vertical_rad) {
     placed = until;
   }
   return directions;
+}
+
+constexpr double kApart_rad = M_PI / 180.0;     // rays that look for the nearest echo
+constexpr double kClosest_rad = 1e-5;           // how finely it is found
+constexpr int kMostRounds = 60;
+constexpr size_t kAround = 6;                   // rays of a round
+
+// As many rays as a cone needs for that distance from one to the next.
+int64_t rays_for(double horizontal_rad, double vertical_rad) {
+  constexpr int64_t kMost = 2000;    // of a cone that is wider than sonars' are
+  return std::min(kMost, rounded(0.25 * M_PI * std::max(horizontal_rad, kApart_rad) * std::max(vertical_rad, kApart_rad) / (kApart_rad * kApart_rad)));
 }
 
 class Sonar : public Sensor {
@@ -124,7 +137,9 @@ class Sonar : public Sensor {
     const Allowed angle = Allowed::between(0.0, M_PI);
     horizontal_ = ours.number("ruedo:horizontal_aperture", aperture, angle);
     vertical_ = ours.number("ruedo:vertical_aperture", aperture, angle);
-    const int64_t rays = ours.integer("ruedo:rays", 9, Allowed::between(1, 10000));
+    nearest_ = ours.choice("ruedo:reading", "average", {"average", "nearest"}) == "nearest";
+    int64_t rays = ours.integer("ruedo:rays", 9, Allowed::between(1, 10000));
+    if (nearest_) rays = std::max(rays, rays_for(horizontal_, vertical_));
     const std::vector<Vec3> directions = cone(rays, horizontal_, vertical_);
     for (const Transducer& transducer : transducers_)
       for (const Vec3& direction : directions) directions_.push_back(transducer.X_ST.rotation * direction);
@@ -132,7 +147,6 @@ class Sonar : public Sensor {
     hits_.resize(directions.size());
     for (Ray& ray : rays_) ray.max_range = max_;
 
-    nearest_ = ours.choice("ruedo:reading", "average", {"average", "nearest"}) == "nearest";
     all_ = ours.choice("ruedo:firing", "sequence", {"sequence", "all"}) == "all";
     read_order(ours, n);
     const double specular = ours.number("ruedo:specular_angle", M_PI / 2, Allowed::between(0.0, M_PI / 2 + 1e-6));
@@ -182,7 +196,7 @@ class Sonar : public Sensor {
 
     const bool fired = message_.fired_utime[i] >= 0;
     const double dt_s = fired ? 1e-6 * static_cast<double>(input.snapshot.time - message_.fired_utime[i]) : 0.0;
-    double range = reading();
+    double range = nearest_ ? std::max(search(R_WS * transducer.X_ST.rotation, input), min_) : reading();
     const double measured = transducer.noise.apply(range, dt_s, stream);    // drawn with an echo or without
     if (range < max_) range = std::clamp(measured, min_, max_);
     if (cross_talk_ > 0.0) {
@@ -206,6 +220,48 @@ class Sonar : public Sensor {
     }
     const double range = nearest_ || nearest == max_ ? nearest : sum / static_cast<double>(rays_.size());
     return std::max(range, min_);
+  }
+
+  // The nearest echo of the cone: from the nearest of its rays on, downhill. R_WT: of the transducer, x along the axis.
+  double search(const Eigen::Matrix3d& R_WT, const SampleInput& input) {
+    double best = max_;
+    Vec3 at = Vec3::UnitX();    // in T
+    for (size_t k = 0; k < rays_.size(); ++k) {
+      if (!hears(rays_[k], hits_[k]) || hits_[k].range >= best) continue;
+      best = hits_[k].range;
+      at = R_WT.transpose() * rays_[k].direction;
+    }
+    if (best == max_) return best;
+    std::array<Ray, kAround> rays;
+    std::array<Hit, kAround> hits;
+    double apart = 0.5 * kApart_rad;
+    for (int round = 0; round < kMostRounds && apart > kClosest_rad; ++round) {
+      for (size_t i = 0; i < kAround; ++i) {
+        const double turn = 2.0 * M_PI * static_cast<double>(i) / kAround;
+        rays[i].origin = rays_[0].origin;
+        rays[i].max_range = max_;
+        rays[i].direction = R_WT * within_cone(at + apart * Vec3(0.0, math::cos(turn), math::sin(turn)));
+      }
+      input.rays->cast(rays, hits, mount_.link());
+      const double before = best;
+      for (size_t i = 0; i < kAround; ++i) {
+        if (!hears(rays[i], hits[i]) || hits[i].range >= best) continue;
+        best = hits[i].range;
+        at = R_WT.transpose() * rays[i].direction;
+      }
+      if (best == before) apart *= 0.5;
+    }
+    return best;
+  }
+
+  // The direction (T) itself, or the one on the cone's edge on its side.
+  Vec3 within_cone(const Vec3& direction) const {
+    const double a = std::max(0.5 * horizontal_, kClosest_rad), b = std::max(0.5 * vertical_, kClosest_rad);
+    const double side = std::sqrt(direction.y() * direction.y() + direction.z() * direction.z());
+    if (side == 0.0) return Vec3::UnitX();
+    const double y = direction.y() / side, z = direction.z() / side;
+    const double angle = std::min(math::atan2(side, direction.x()), 1.0 / std::sqrt(y * y / (a * a) + z * z / (b * b)));
+    return {math::cos(angle), math::sin(angle) * y, math::sin(angle) * z};
   }
 
   bool hears(const Ray& ray, const Hit& hit) const {

@@ -61,9 +61,29 @@ TEST(Sonar, RaysWithoutEchoCountAsTheMaximum) {
   RayBench average(robot_world(plate, array(cone(M_PI / 3, M_PI / 3, 9, "average"))), "SONAR");
   EXPECT_NEAR(average.sample<sonar_t>().range[0], (8 * 5 + 2 / std::cos(angle)) / 9, 1e-6);
   RayBench nearest(robot_world(plate, array(cone(M_PI / 3, M_PI / 3, 9, "nearest"))), "SONAR");
-  EXPECT_NEAR(nearest.sample<sonar_t>().range[0], 2 / std::cos(angle), 1e-6);
+  EXPECT_NEAR(nearest.sample<sonar_t>().range[0], std::hypot(2, 2 * std::tan(angle) - 0.05), 1e-5);    // its lower edge
   RayBench nothing(robot_world("", array(cone(M_PI / 3, M_PI / 3, 9, "average"))), "SONAR");
   EXPECT_EQ(nothing.sample<sonar_t>().range[0], 5.0f);
+}
+
+// A wall turned by 23 degrees, 2 m away along its normal: nearest on the cone's edge, 15 degrees off, on the side of the normal.
+TEST(Sonar, TheNearestEchoOfAWallAcross) {
+  for (const double turned : {23.0, -23.0, 10.0, 40.0}) {
+    const double a = turned * M_PI / 180, p = 2.0;
+    const std::string pose = std::to_string((p + 0.5) * std::cos(a)) + " " + std::to_string((p + 0.5) * std::sin(a)) + " 0 0 0 " + std::to_string(a);
+    RayBench bench(robot_world(solid("wall", pose, box(1, 100, 100)), array(cone(M_PI / 6, M_PI / 6, 9, "nearest"))), "SONAR");
+    EXPECT_NEAR(bench.sample<sonar_t>().range[0], p / std::cos(std::max(0.0, std::abs(a) - M_PI / 12)), 1e-5) << turned;
+  }
+}
+
+// A pole of 4 cm at 2 m, anywhere in the cone.
+TEST(Sonar, TheNearestEchoMissesNoPole) {
+  for (const double bearing : {-14.0, -9.3, -4.7, 0.0, 3.1, 8.8, 14.0}) {
+    const double a = bearing * M_PI / 180;
+    const std::string pose = std::to_string(2 * std::cos(a)) + " " + std::to_string(2 * std::sin(a)) + " 0 0 0 0";
+    RayBench bench(robot_world(solid("pole", pose, "<cylinder><radius>0.02</radius><length>1</length></cylinder>"), array(cone(M_PI / 6, M_PI / 36, 9, "nearest"))), "SONAR");
+    EXPECT_NEAR(bench.sample<sonar_t>().range[0], 1.98, 1e-4) << bearing;
+  }
 }
 
 // Many rays approach the mean over the cone of d / cos: d log(1 / cos) / (1 - cos), and stay within the cone.
@@ -151,9 +171,9 @@ TEST(Sonar, LostEchoes) {
   EXPECT_EQ(look("<ruedo:acoustic_reflectance>0.05</ruedo:acoustic_reflectance>", "", 0), 2.0);
   EXPECT_EQ(look("<ruedo:acoustic_reflectance>0.049</ruedo:acoustic_reflectance>", "", 0), 5.0);
   const std::string specular = "<ruedo:specular_angle>0.4</ruedo:specular_angle>";
-  EXPECT_NEAR(look("", specular, 0.39), 2 / std::cos(0.39), 1e-6);
-  EXPECT_EQ(look("", specular, 0.41), 5.0);
-  EXPECT_NEAR(look("", "", 1.1), 2 / std::cos(1.1), 1e-6);    // off by default
+  EXPECT_NEAR(look("", specular, 0.39), 2 / std::cos(0.39 - 0.05), 1e-6);
+  EXPECT_EQ(look("", specular, 0.46), 5.0);
+  EXPECT_NEAR(look("", "", 1.1), 2 / std::cos(1.1 - 0.05), 1e-6);    // off by default
 }
 
 TEST(Sonar, CrossTalkGivesTheNearerEchoOfTheOneBefore) {
