@@ -28,5 +28,5 @@ class SdistWithTypes(sdist):
 
 
 # With proto/ at hand the build makes the types; from an sdist they are a package like any other.
-packages = ["ruedo", "ruedo.campaign"] + ([] if PROTO.is_dir() else ["ruedo.lcmtypes"])
+packages = ["ruedo", "ruedo.campaign", "ruedo.hunt"] + ([] if PROTO.is_dir() else ["ruedo.lcmtypes"])
 setup(packages=packages, cmdclass={"build_py": BuildWithTypes, "sdist": SdistWithTypes})

@@ -16,6 +16,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// One line for what is not installed, instead of a traceback.
+constexpr const char* kStart = R"py(import sys
+try:
+    from ruedo.campaign.cli import main
+except ImportError as error:
+    print(f"ruedo: {error}: this Python ({sys.executable}) needs pip install 'ruedo[campaign]' (for hunts 'ruedo[hunt]', for clusters 'ruedo[ray]')", file=sys.stderr)
+    sys.exit(4)
+sys.exit(main(sys.argv[1:]))
+)py";
+
 // The folder that holds the package: of an installation, of a build, or "" where Python has to know it by itself.
 std::string package_folder() {
   for (const char* path : {"share/ruedo/python/ruedo", "python/ruedo"}) {
@@ -38,7 +48,7 @@ int hand_over(const char* command, const std::vector<std::string>& arguments) {
   if (!package.empty()) ::setenv("PYTHONPATH", (package + (before && *before ? ":" + std::string(before) : "")).c_str(), 1);
   std::error_code error;
   if (const fs::path self = fs::read_symlink("/proc/self/exe", error); !error) ::setenv("RUEDO", self.c_str(), 0);
-  std::vector<std::string> words{interpreter, "-m", "ruedo.campaign", command};
+  std::vector<std::string> words{interpreter, "-c", kStart, command};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> pointers;
   for (std::string& word : words) pointers.push_back(word.data());

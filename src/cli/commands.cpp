@@ -47,6 +47,8 @@ void add_world_arguments(CLI::App& command, WorldArguments& arguments) {
   command.add_option("--set", arguments.settings, "change a device: ROBOT/DEVICE.KEY=VALUE")->type_name("SETTING")->allow_extra_args(false);
   command.add_option("--disable", arguments.disabled, "leave a device out: ROBOT/DEVICE")->type_name("DEVICE")->allow_extra_args(false);
   command.add_option("--xacro-arg", arguments.xacro_arguments, "an argument of a xacro file: NAME:=VALUE")->type_name("ARGUMENT")->allow_extra_args(false);
+  command.add_option("--fault", arguments.faults, "what goes wrong: [ROBOT][/TARGET]:KIND@SECONDS[,for=S][,value=V]... (docs/campaigns.md)")
+      ->type_name("FAULT")->allow_extra_args(false);
   command.add_flag("--no-noise", arguments.no_noise, "sensors give their ideal values");
   command.add_flag("--fast-pixels", arguments.fast_pixels, "draw with all that this CPU has: faster, and other last bits on other CPUs");
   command.add_flag("--allow-absolute", arguments.allow_absolute, "absolute paths in the files may lead out of the folders that are searched");
@@ -102,6 +104,7 @@ model::LoadOptions load_options(const WorldArguments& arguments) {
     if (text.find('/') == std::string::npos) refuse_option("--disable", text, "it looks like ROBOT/DEVICE, for example p3at/CAMERA");
   }
   options.disabled = arguments.disabled;
+  for (const std::string& text : arguments.faults) options.faults.push_back(model::parse_fault(text));
   return options;
 }
 
@@ -118,6 +121,7 @@ std::vector<std::string> result_options(const WorldArguments& arguments) {
   if (arguments.allow_absolute) options.push_back("--allow-absolute");
   for (const std::string& text : arguments.settings) options.push_back("--set=" + text);
   for (const std::string& text : arguments.disabled) options.push_back("--disable=" + text);
+  for (const std::string& text : arguments.faults) options.push_back("--fault=" + text);
   if (arguments.no_noise) options.push_back("--no-noise");
   if (arguments.fast_pixels) options.push_back("--fast-pixels");
   return options;

@@ -36,10 +36,10 @@ int run_experiments(const std::string& out);    // ruedo experiments
 // The world and what is changed in it, for every command that loads one.
 struct WorldArguments {
   std::string world;
-  std::vector<std::string> spawns, drives, settings, disabled, xacro_arguments;
+  std::vector<std::string> spawns, drives, settings, disabled, xacro_arguments, faults;
   bool no_noise = false, allow_absolute = false, fast_pixels = false;
 };
-// WORLD, --spawn, --drive, --set, --disable, --xacro-arg, --no-noise, --allow-absolute, --fast-pixels.
+// WORLD, --spawn, --drive, --set, --disable, --fault, --xacro-arg, --no-noise, --allow-absolute, --fast-pixels.
 void add_world_arguments(CLI::App& command, WorldArguments& arguments);
 // Throws InputError; without a file in it for wrong usage.
 model::LoadOptions load_options(const WorldArguments& arguments);

@@ -20,6 +20,7 @@ LoggedOptions read_options(const log_header_t& header, const std::string& log) {
     else if (name == "--allow-absolute") continue;    // not a log's to allow: what lies outside is not found
     else if (name == "--set") world.settings.push_back(value);
     else if (name == "--disable") world.disabled.push_back(value);
+    else if (name == "--fault") world.faults.push_back(value);
     else if (name == "--no-noise") world.no_noise = true;
     else if (name == "--fast-pixels") world.fast_pixels = true;
     else if (name == "--remap") options.remaps.push_back(with_options_of(log, [&] { return parse_remap(value); }));

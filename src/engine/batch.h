@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -23,6 +24,8 @@ struct AppliedCommand {
   std::vector<uint8_t> bytes;      // the message, as it came
 };
 
+struct SensorFault;
+
 // Written by the simulation thread, then by each module into its own output, then read by the publisher.
 struct Batch {
   int64_t first_step = 0;
@@ -31,6 +34,9 @@ struct Batch {
   std::vector<Snapshot> snapshots;         // the first `count` are valid
   std::vector<AppliedCommand> applied;     // the first `applied_count` are valid
   int applied_count = 0;
+
+  // Of all devices, while any is faulty or was; null: none. Those of the batch's steps are in it.
+  std::shared_ptr<const std::vector<SensorFault>> sensor_faults;
 
   struct Output {
     bool woken = false;                    // false: the rest is of an earlier round

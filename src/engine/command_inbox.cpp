@@ -10,7 +10,9 @@
 
 #include <spdlog/spdlog.h>
 
+#include "engine/faults.h"
 #include "ruedo/decode.h"
+#include "ruedo/fault_t.hpp"
 #include "ruedo/joint_command_t.hpp"
 #include "ruedo/move_command_t.hpp"
 #include "ruedo/name_request_t.hpp"
@@ -19,6 +21,18 @@
 #include "ruedo/wheel_command_t.hpp"
 
 namespace ruedo::engine {
+
+namespace {
+
+// A fault's values, checked when it came; whether its robot has that device is seen when it acts.
+std::string check_fault_message(const uint8_t* data, size_t size, model::Fault& fault) {
+  fault_t message;
+  if (decode_checked(data, size, message) != DecodeFault::none) return "it is none";
+  fault = fault_of(message);
+  return model::check_fault(fault);
+}
+
+}  // namespace
 
 DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size, robot::Command& command) {
   DecodeFault fault = DecodeFault::none;
@@ -58,6 +72,11 @@ DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size, r
         command.what = robot::JointCommand{std::move(message.name), {message.mode.begin(), message.mode.end()},
                                            std::move(message.value)};
       }
+      break;
+    }
+    case Input::Kind::fault: {    // it is no command of a robot's: apply() takes the bytes
+      fault_t message;
+      fault = decode_checked(data, size, message);
       break;
     }
     case Input::Kind::reset_odometry: {
@@ -145,6 +164,10 @@ void CommandInbox::receive(const std::string& channel, const uint8_t* data, size
   command.robot = input.robot;
   const DecodeFault fault = decode_command(input.kind, data, size, command);
   if (fault != DecodeFault::none) return refuse(channel, describe(fault));
+  if (input.kind == Input::Kind::fault) {
+    model::Fault asked;
+    if (const std::string why = check_fault_message(data, size, asked); !why.empty()) return refuse(channel, why.c_str());
+  }
   keep(found->second, command, data, size);
 }
 
@@ -180,6 +203,8 @@ CommandInbox::Scheduled CommandInbox::schedule(int64_t step, int input, const ui
   robot::Command command;
   command.robot = inputs_[static_cast<size_t>(input)].robot;
   if (decode_command(inputs_[static_cast<size_t>(input)].kind, data, size, command) != DecodeFault::none) return Scheduled::faulty;
+  model::Fault asked;
+  if (inputs_[static_cast<size_t>(input)].kind == Input::Kind::fault && !check_fault_message(data, size, asked).empty()) return Scheduled::faulty;
   std::lock_guard lock(mutex_);
   if (step < next_step_) return Scheduled::late;
   if (scheduled_count_ == kMostScheduled || scheduled_bytes_ + size > kMostScheduledBytes) return Scheduled::full;
@@ -208,7 +233,7 @@ CommandInbox::Entry& CommandInbox::next_taken(size_t& count) {
   return taken_[count++];
 }
 
-void CommandInbox::apply(robot::Robots& robots, int64_t step, Batch& batch) {
+void CommandInbox::apply(robot::Robots& robots, Faults& faults, int64_t step, Batch& batch) {
   size_t scheduled = 0, count = 0;
   {
     std::lock_guard lock(mutex_);
@@ -230,7 +255,12 @@ void CommandInbox::apply(robot::Robots& robots, int64_t step, Batch& batch) {
   std::sort(taken_.begin() + static_cast<std::ptrdiff_t>(scheduled), taken_.begin() + static_cast<std::ptrdiff_t>(count),
             [](const Entry& a, const Entry& b) { return a.arrival < b.arrival; });
   for (size_t i = 0; i < count; ++i) {
-    robots.apply(taken_[i].command);
+    if (inputs_[static_cast<size_t>(taken_[i].input)].kind == Input::Kind::fault) {
+      model::Fault fault;
+      if (check_fault_message(taken_[i].bytes.data(), taken_[i].bytes.size(), fault).empty()) faults.begin(fault, taken_[i].command.robot, step);
+    } else {
+      faults.command(taken_[i].command, step, robots);
+    }
     if (static_cast<size_t>(batch.applied_count) == batch.applied.size()) batch.applied.emplace_back();
     AppliedCommand& applied = batch.applied[static_cast<size_t>(batch.applied_count++)];
     applied.step = step;

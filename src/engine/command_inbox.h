@@ -19,9 +19,11 @@
 
 namespace ruedo::engine {
 
+class Faults;
+
 // A channel on which a robot takes commands.
 struct Input {
-  enum class Kind { velocity, wheels, move, joints, reset_odometry };
+  enum class Kind { velocity, wheels, move, joints, fault, reset_odometry };
   std::string channel;    // on the bus
   int robot = -1;         // index into BodyLayout::robots
   Kind kind = Kind::velocity;
@@ -52,7 +54,7 @@ class CommandInbox {
 
   // Applies what acts on the state `step` and notes it in the batch: what was scheduled for it, then what waits, in the
   // order of arrival. The simulation thread's, for one step after the other.
-  void apply(robot::Robots& robots, int64_t step, Batch& batch);
+  void apply(robot::Robots& robots, Faults& faults, int64_t step, Batch& batch);
 
   const std::vector<Input>& inputs() const { return inputs_; }
   // The first state that commands may still act on. Any thread.

@@ -244,8 +244,13 @@ void Engine::command(int world, const std::string& channel, std::span<const uint
   switch (inbox.schedule(copy.step, static_cast<int>(input - inbox.inputs().begin()), message.data(), message.size())) {
     case CommandInbox::Scheduled::kept: return;
     case CommandInbox::Scheduled::full: throw InputError({}, "more commands wait than a world keeps: step it first");
+    case CommandInbox::Scheduled::faulty:
+      if (fault_t fault; input->kind == Input::Kind::fault && decode_checked(message.data(), message.size(), fault) == DecodeFault::none) {
+        throw InputError({}, channel + ": " + model::check_fault(fault_of(fault)));
+      }
+      throw InputError({}, "that is no message for " + channel);
     case CommandInbox::Scheduled::late:
-    case CommandInbox::Scheduled::faulty: throw InputError({}, "that is no message for " + channel);
+      throw InputError({}, "that is no message for " + channel);
   }
 }
 

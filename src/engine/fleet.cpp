@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "core/whole.h"
+#include "ruedo/fault_t.hpp"
 #include "ruedo/joint_command_t.hpp"
 #include "ruedo/move_command_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
@@ -169,7 +170,7 @@ class FleetMaker {
       return channels_.add({robot + "/" + device, "", robot, wanted.name, type, fingerprint, rate, false});
     };
     Device device{wanted.kind->make(setup), rate, microseconds(phase_s), wanted.kind->needs_visual_rays,
-                  wanted.robot, options_.first_step};
+                  wanted.robot, options_.first_step, wanted.name};
     device.visual_rays |= device.sensor->wants_visual_rays();
     describe(wanted, rate, *device.sensor);
     return device;
@@ -227,6 +228,7 @@ class FleetMaker {
       if (!layout_.robots[static_cast<size_t>(robot)].joints.empty()) {
         add_input<joint_command_t>(robot, "joint_command", Input::Kind::joints);
       }
+      add_input<fault_t>(robot, "fault", Input::Kind::fault);
       fleet_.inputs.push_back({"", robot, Input::Kind::reset_odometry});
     }
   }

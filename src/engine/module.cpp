@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "engine/parallel.h"
+#include "engine/sensor_faults.h"
 
 namespace ruedo::engine {
 
@@ -121,6 +122,30 @@ void Module::process_pieces(const Batch& batch, Batch::Output& output, int begin
   parallel_pieces(pieces(), process_one);
 }
 
+SampleInput Module::input_of(const Slot& slot, const Snapshot& snapshot) const {
+  return {snapshot, slot.sample, slot.visual_rays ? visual_rays_.get() : rays_.get(), renderer_.get()};
+}
+
+// The device itself notices nothing: what it publishes is changed on its way out.
+void Module::sample_with_faults(const Batch& batch, const Snapshot& snapshot, size_t k, Outbox& outbox) {
+  Slot& slot = slots_[k];
+  const Device& device = setup_.devices[k];
+  const bool faulty = std::any_of(batch.sensor_faults->begin(), batch.sensor_faults->end(), [&](const SensorFault& fault) {
+    return fault.acts_on(device.robot, device.name, snapshot.step);
+  });
+  Outbox own;
+  own.begin_step(snapshot.step);
+  Outbox& out = faulty ? own : outbox;
+  if (slot.observes) device.sensor->observe(snapshot, out);
+  if (slot.step == snapshot.step) {
+    device.sensor->sample(input_of(slot, snapshot), out);
+    slot.step = device.first_step + slot.clock.step_of(++slot.sample);
+  }
+  if (!faulty) return;
+  if (!slot.faults) slot.faults = std::make_shared<FaultFilter>(setup_.step_us);
+  slot.faults->pass(own, *batch.sensor_faults, device.robot, device.name, snapshot.step, outbox);
+}
+
 void Module::process_piece(const Batch& batch, Outbox& outbox, int piece, int begin, int end, const std::atomic<bool>& left_off) {
   const size_t first = static_cast<size_t>(piece) * setup_.piece_size;
   const size_t last = std::min(first + setup_.piece_size, slots_.size());
@@ -130,11 +155,14 @@ void Module::process_piece(const Batch& batch, Outbox& outbox, int piece, int be
     for (size_t k = first; k < last; ++k) {
       Slot& slot = slots_[k];
       Sensor& sensor = *setup_.devices[k].sensor;
+      if (batch.sensor_faults) {
+        sample_with_faults(batch, snapshot, k, outbox);
+        continue;
+      }
       if (slot.observes) sensor.observe(snapshot, outbox);
       if (slot.step != snapshot.step) continue;
       if (left_off.load(std::memory_order_relaxed)) return;    // a thousand pictures may be in the batch
-      const scene::RayScene* rays = slot.visual_rays ? visual_rays_.get() : rays_.get();
-      sensor.sample({snapshot, slot.sample, rays, renderer_.get()}, outbox);
+      sensor.sample(input_of(slot, snapshot), outbox);
       slot.step = setup_.devices[k].first_step + slot.clock.step_of(++slot.sample);
     }
   }

@@ -18,6 +18,8 @@
 
 namespace ruedo::engine {
 
+class FaultFilter;
+
 // The steps at which any of some devices takes a sample.
 class DueSteps {
  public:
@@ -42,6 +44,7 @@ struct Device {
   bool visual_rays = false;                // its rays hit visuals, not collisions
   int robot = -1;                          // index into BodyLayout::robots; -1: the simulation's
   int64_t first_step = 0;                  // its samples count from the time of this one
+  std::string name = {};                   // as its robot's faults name it
 };
 
 struct ModuleSetup {
@@ -98,11 +101,18 @@ class Module {
   int pieces() const { return static_cast<int>((setup_.devices.size() + setup_.piece_size - 1) / setup_.piece_size); }
 
  private:
-  struct Slot { SampleClock clock; int64_t sample, step; bool observes, visual_rays; };
+  struct Slot {
+    SampleClock clock;
+    int64_t sample, step;
+    bool observes, visual_rays;
+    std::shared_ptr<FaultFilter> faults = {};    // made when the device is first faulty
+  };
 
   Slot slot_of(const Device& device) const;
   void count_due();
   void process_pieces(const Batch& batch, Batch::Output& output, int begin, int end, const std::atomic<bool>& left_off);
+  void sample_with_faults(const Batch& batch, const Snapshot& snapshot, size_t k, Outbox& outbox);
+  SampleInput input_of(const Slot& slot, const Snapshot& snapshot) const;
   void process_piece(const Batch& batch, Outbox& outbox, int piece, int begin, int end, const std::atomic<bool>& left_off);
 
   ModuleSetup setup_;

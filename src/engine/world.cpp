@@ -20,6 +20,7 @@ World::World(std::shared_ptr<const model::WorldModel> world, const FleetOptions&
       fleet_(make_fleet(model_, layout_, options, channels, findings)),
       devices_(std::move(fleet_.devices)),
       inbox_(std::move(fleet_.inputs), static_cast<int>(layout_.robots.size())),
+      faults_(model_, layout_, devices_, options.seed),
       physics_(std::make_unique<physics::PhysicsWorld>(model_, layout_)),
       robots_(std::make_unique<robot::Robots>(model_, layout_, *physics_)),
       statics_(statics ? std::move(statics) : std::make_shared<StaticScenes>()) {
@@ -38,12 +39,15 @@ World::World(std::shared_ptr<const model::WorldModel> world, const FleetOptions&
 
 void World::advance(int64_t step, Snapshot& snapshot, Batch& batch) {
   if (step > 0) {
-    inbox_.apply(*robots_, step - 1, batch);    // on the state before
+    faults_.before_commands(step - 1, *robots_);
+    inbox_.apply(*robots_, faults_, step - 1, batch);    // on the state before
     robots_->step();
   }
   robots_->read(snapshot);
   snapshot.step = step;
   snapshot.time = step * model_.step_us;
+  faults_.show_wheels(snapshot);
+  batch.sensor_faults = faults_.of_sensors();
   physics::check_finite(snapshot, model_, layout_);
 }
 

@@ -13,6 +13,7 @@
 #include "engine/batch.h"
 #include "engine/channels.h"
 #include "engine/command_inbox.h"
+#include "engine/faults.h"
 #include "engine/fleet.h"
 #include "engine/module.h"
 #include "model/body_layout.h"
@@ -47,6 +48,7 @@ class World {
   const model::BodyLayout& layout() const { return layout_; }
   const std::vector<device_info_t>& devices() const { return devices_; }
   CommandInbox& inbox() { return inbox_; }
+  const Faults& faults() const { return faults_; }
   const physics::PhysicsWorld& physics() const { return *physics_; }
   robot::Robots& robots() { return *robots_; }
   std::vector<std::unique_ptr<Module>>& modules() { return modules_; }    // in the order of the schedule
@@ -77,6 +79,7 @@ class World {
   Fleet fleet_;                                  // its parts move into what follows
   std::vector<device_info_t> devices_;
   CommandInbox inbox_;
+  Faults faults_;
   std::unique_ptr<physics::PhysicsWorld> physics_;
   std::unique_ptr<robot::Robots> robots_;
   int world_channel_ = -1;                       // of ruedo/world

@@ -78,6 +78,7 @@ void World::remove_model(int instance, Channels& channels) {
     for (auto& module : modules_) module->remove(robot);
     std::erase_if(devices_, [&](const device_info_t& device) { return device.robot == name; });
     inbox_.remove(robot);
+    faults_.remove(robot);
     channels.remove(name);
   }
   WorldEditor(model_).remove(instance);
@@ -120,6 +121,7 @@ SimTime World::begin_time_anew(int epoch) {
   options_.epoch = epoch;
   const SimTime was = robots_->set_time_to_zero();
   inbox_.begin_time_anew();
+  faults_.begin_time_anew();
   for (auto& module : modules_) module->begin_time_anew(was);
   renew_world_state();
   return was;

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <filesystem>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include "model/drive.h"
 #include "model/placement.h"
 #include "model/sdf_link.h"
@@ -54,6 +57,8 @@ class Loader {
     apply_drives(options.drives, world_);
     apply_settings(options.settings, world_);
     apply_disabled(options.disabled, world_);
+    world_.faults.insert(world_.faults.end(), options.faults.begin(), options.faults.end());
+    for (Fault& fault : world_.faults) name_robot(fault);
     name_stuck_robots(world_, findings_);
     world_.findings = findings_.list();
     std::erase_if(world_.findings, [&](const Finding& finding) { return is_settled(finding); });
@@ -65,6 +70,17 @@ class Loader {
   DocumentStore& documents() { return documents_; }
 
  private:
+  void name_robot(Fault& fault) const {
+    std::vector<std::string> robots;
+    for (const ModelInstance& instance : world_.models) {
+      if (instance.is_robot()) robots.push_back(instance.name);
+    }
+    if (fault.robot.empty() && !robots.empty()) fault.robot = robots.front();
+    if (std::find(robots.begin(), robots.end(), fault.robot) != robots.end()) return;
+    throw InputError(fault.source, fmt::format("a fault of robot '{}'; the world has {}", fault.robot,
+                                               robots.empty() ? "no robot" : fmt::format("{}", fmt::join(robots, ", "))));
+  }
+
   void read_empty_world() {
     const auto root = parse_document(kEmptyWorld, path_);
     reader_.read_world(*root->child("world"), {1, 9}, world_);

@@ -34,6 +34,7 @@ struct LoadOptions {
   std::vector<std::string> disabled;     // "ROBOT/DEVICE"
   std::vector<DriveOption> drives;
   std::vector<std::string> xacro_arguments;    // "NAME:=VALUE", for xacro files
+  std::vector<Fault> faults;
   bool allow_absolute = false;           // absolute paths in the files may lead out of the search folders
 };
 

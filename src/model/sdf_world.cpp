@@ -98,6 +98,27 @@ void add_child(Element& parent, const char* name, const std::string& text) {
   parent.children.push_back(std::move(child));
 }
 
+Fault read_fault(const Element& e) {
+  e.refuse_unknown({"ruedo:robot", "ruedo:target", "ruedo:kind", "ruedo:at", "ruedo:for", "ruedo:value", "ruedo:from", "ruedo:to", "ruedo:x",
+                    "ruedo:y", "ruedo:heading"}, false);
+  if (!e.has("ruedo:kind")) e.fail("has no <ruedo:kind>");
+  Fault fault;
+  fault.robot = e.string("ruedo:robot", "");
+  fault.target = e.string("ruedo:target", "");
+  fault.kind = e.string("ruedo:kind", "");
+  fault.at_s = e.number("ruedo:at", 0.0, Allowed::between(0, 1e6));
+  fault.duration_s = e.number("ruedo:for", 0.0, Allowed::between(0, 1e6));
+  fault.value = e.number("ruedo:value", 0.0, Allowed::between(-1e6, 1e6));
+  fault.from = e.number("ruedo:from", 0.0, Allowed::between(0, 1));
+  fault.to = e.number("ruedo:to", 1.0, Allowed::between(0, 1));
+  fault.x = e.number("ruedo:x", 0.0, Allowed::between(-1e6, 1e6));
+  fault.y = e.number("ruedo:y", 0.0, Allowed::between(-1e6, 1e6));
+  fault.heading = e.number("ruedo:heading", 0.0, Allowed::between(-1e6, 1e6));
+  fault.source = e.source;
+  if (const std::string why = check_fault(fault); !why.empty()) e.fail(why);
+  return fault;
+}
+
 }  // namespace
 
 // An actor is a person: a cylinder that stands on the ground and moves along the trajectory, without a skin.
@@ -225,7 +246,7 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     world.name = "world";
     findings.repaired(element.source, "world", "the world has no name; it is called 'world'");
   }
-  report_other_children(element, {"model", "include", "light", "frame", "physics", "gravity", "scene", "actor", "joint", "ruedo:fleet"},
+  report_other_children(element, {"model", "include", "light", "frame", "physics", "gravity", "scene", "actor", "joint", "ruedo:fleet", "ruedo:fault"},
                         {"gui", "atmosphere", "magnetic_field", "spherical_coordinates", "wind", "audio", "plugin", "state", "population"},
                         "world " + world.name, findings);
   const std::string in_world = "world " + world.name;
@@ -356,6 +377,7 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     world.models.push_back(std::move(instance));
   }
   for (const Element* fleet : element.all("ruedo:fleet")) read_fleet(*fleet, world, kMaxModels);
+  for (const Element* fault : element.all("ruedo:fault")) world.faults.push_back(read_fault(*fault));
   for (const Element* light : element.all("light")) {
     read_or_leave_out(in_world, "the light is left out", findings, [&] {
       const Pose pose = frames.pose(relative_to(*light), *light) * light->pose("pose");

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "model/fault.h"
 #include "model/mesh.h"
 #include "ruedo/element.h"
 #include "ruedo/pose.h"
@@ -225,6 +226,7 @@ struct WorldModel {
   std::vector<Finding> findings;         // what was unsupported or repaired
   std::vector<std::string> files_read;   // absolute paths, in the order of first reading
   std::vector<std::string> disabled;     // "ROBOT/odometry", ...: channels of a robot itself that are switched off
+  std::vector<Fault> faults;             // each names a robot of the world
 };
 
 }  // namespace ruedo::model

@@ -60,7 +60,7 @@ class StaticRayScene {
  public:
   StaticRayScene(const model::WorldModel& world, const model::BodyLayout& layout, bool visuals, Backend backend);
 
-  const model::BodyLayout& layout;
+  const model::BodyLayout layout;    // its own: worlds that share it come and go
   const Backend backend;
 
  private:

@@ -176,6 +176,24 @@ def test_two_campaigns_compared(whole):
     assert found.p == 0.5 and found.change[0] == pytest.approx(0.25)
 
 
+def test_thirty_students_are_marked_in_one_command(tmp_path):
+    (tmp_path / "students").mkdir()
+    for i in range(30):    # every third drives into the wall 1.2 m ahead
+        (tmp_path / f"students/student{i:02d}.py").write_text(CONTROLLER.replace('not view.parameters["bold"]', str(i % 3 != 0)))
+    (tmp_path / "labs.yaml").write_text("""
+worlds: [{name: wall, file: wall.sdf}]
+controllers: [{name: student, each: "students/*.py", python: "{file}:ahead"}]
+disable: [p3at/camera, p3at/sonar_front, p3at/sonar_rear]
+expect: {no_contact: true}
+limits: {duration: 3}
+""")
+    from ruedo import World
+    (tmp_path / "wall.sdf").write_text(str(World("wall").wall(1.2, -2, 1.2, 2).robot("p3at")))
+    ruedo("campaign", "run", "labs.yaml", "--quiet", folder=tmp_path, code=1)
+    marks = Campaign(tmp_path / "labs.yaml").results().frame().groupby("controller").passed.mean()
+    assert len(marks) == 30 and [bool(marks[f"student{i:02d}"]) for i in range(30)] == [i % 3 != 0 for i in range(30)]
+
+
 def test_slurm(whole):
     folder, _ = whole
     script = ruedo("campaign", "slurm", "c.yaml", "--tasks", "4", folder=folder).stdout

@@ -48,6 +48,16 @@ def test_the_command_line_says_it_in_one_line_with_exit_code_3(folder):
     assert "cannot be read" in ruedo("campaign", "run", "none.yaml", folder=folder, code=3).stderr
 
 
+def test_a_python_without_what_it_takes_is_told_in_one_line(folder):
+    import os
+    (folder / "python").write_text("#!/bin/sh\nexec python3 -S \"$@\"\n")    # no site-packages
+    (folder / "python").chmod(0o755)
+    done = ruedo("campaign", "run", "c.yaml", folder=folder, code=4, env={**os.environ, "RUEDO_PYTHON": str(folder / "python")})
+    assert done.stderr.count("\n") == 1 and "pip install 'ruedo[campaign]'" in done.stderr
+    done = ruedo("campaign", "run", "c.yaml", folder=folder, code=4, env={**os.environ, "RUEDO_PYTHON": "/nowhere"})
+    assert "'/nowhere' cannot be started (No such file or directory)" in done.stderr
+
+
 def test_the_same_is_checked_of_a_dict():
     with pytest.raises(SpecError, match="^campaign: limits.duration: is 'x'; allowed is a number$"):
         Campaign({"worlds": ["arena"], "controllers": [{"name": "a", "command": "true"}], "limits": {"duration": "x"}})

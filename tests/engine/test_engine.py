@@ -163,3 +163,12 @@ def test_worlds_are_found_by_name_from_anywhere(tmp_path, monkeypatch):
     e = ruedo.Engine("arena", spawn=["p3at:guest@1,1"], set={"p3at/lrf.update_rate": 10}, disable=["p3at/camera", "guest/camera"])
     assert e.robots == ("p3at", "guest") and "2 " not in repr(e)
     assert e["lrf.ranges"].shape == (1, 2, 181)
+
+
+def test_copies_that_share_a_world_outlive_the_first():
+    engine = ruedo.Engine("arena", worlds=4, disable=["p3at/camera"])
+    engine.reset()
+    before = engine.observe("lrf.ranges").copy()
+    for _ in range(3):
+        engine.reset()
+    assert (engine.observe("lrf.ranges") == before).all()

@@ -35,7 +35,7 @@ class InboxTest : public testing::Test {
   // The speeds of the commands that act on that state, in their order.
   std::vector<double> apply(int64_t step) {
     batch_.applied_count = 0;
-    inbox_.apply(robots_, step, batch_);
+    inbox_.apply(robots_, faults_, step, batch_);
     std::vector<double> speeds;
     for (int i = 0; i < batch_.applied_count; ++i) {
       const engine::AppliedCommand& applied = batch_.applied[static_cast<size_t>(i)];
@@ -51,6 +51,8 @@ class InboxTest : public testing::Test {
   model::BodyLayout layout_{*world_};
   physics::PhysicsWorld physics_{*world_, layout_};
   robot::Robots robots_{*world_, layout_, physics_};
+  std::vector<device_info_t> devices_;
+  engine::Faults faults_{*world_, layout_, devices_, 1};
   engine::CommandInbox inbox_{{{"r/velocity", 0, engine::Input::Kind::velocity}}, 1};
   engine::Batch batch_;
 };

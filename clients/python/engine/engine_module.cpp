@@ -59,12 +59,13 @@ class PyEngine {
  public:
   PyEngine(const std::string& world, const std::optional<std::string>& text, int worlds, uint64_t seed, bool noise, int threads,
            const std::vector<std::string>& spawns, const std::vector<std::string>& drives, const std::vector<std::string>& settings,
-           const std::vector<std::string>& disabled, bool record) {
+           const std::vector<std::string>& disabled, const std::vector<std::string>& faults, bool record) {
     ruedo::model::LoadOptions& options = options_;
     for (const std::string& one : spawns) options.spawns.push_back(ruedo::model::parse_spawn(one));
     for (const std::string& one : drives) options.drives.push_back(ruedo::model::parse_drive(one));
     for (const std::string& one : settings) options.settings.push_back(ruedo::model::parse_setting(one));
     options.disabled = disabled;
+    for (const std::string& one : faults) options.faults.push_back(ruedo::model::parse_fault(one));
     ruedo::engine::EngineOptions engine;
     engine.worlds = worlds;
     engine.threads = threads;
@@ -80,6 +81,7 @@ class PyEngine {
     for (const std::string& one : drives) result_options_.push_back("--drive=" + one);
     for (const std::string& one : settings) result_options_.push_back("--set=" + one);
     for (const std::string& one : disabled) result_options_.push_back("--disable=" + one);
+    for (const std::string& one : faults) result_options_.push_back("--fault=" + one);
     if (!noise) result_options_.push_back("--no-noise");
     if (record) {
       engine_->on_message([this](int copy, int64_t step, const ruedo::engine::Channel& channel, std::span<const uint8_t> bytes) {
@@ -209,10 +211,10 @@ NB_MODULE(_engine, module) {
   nb::exception<ruedo::EnvironmentError>(module, "EnvironmentError", PyExc_OSError);
   nb::class_<PyEngine>(module, "Engine")
       .def(nb::init<const std::string&, const std::optional<std::string>&, int, uint64_t, bool, int, const std::vector<std::string>&,
-                    const std::vector<std::string>&, const std::vector<std::string>&, const std::vector<std::string>&, bool>(),
+                    const std::vector<std::string>&, const std::vector<std::string>&, const std::vector<std::string>&, const std::vector<std::string>&, bool>(),
            nb::arg("world"), nb::kw_only(), nb::arg("text") = nb::none(), nb::arg("worlds") = 1, nb::arg("seed") = 1, nb::arg("noise") = true,
            nb::arg("threads") = 0, nb::arg("spawn") = nb::list(), nb::arg("drive") = nb::list(), nb::arg("set") = nb::list(),
-           nb::arg("disable") = nb::list(), nb::arg("record") = false)
+           nb::arg("disable") = nb::list(), nb::arg("fault") = nb::list(), nb::arg("record") = false)
       .def("close", &PyEngine::close)
       .def("step", &PyEngine::step)
       .def("drive", &PyEngine::drive)

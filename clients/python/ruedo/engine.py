@@ -29,7 +29,7 @@ class Engine:
     world: a file, or the name of a world that comes with Ruedo or lies in a folder of RUEDO_PATH; with ``text``, what the text is
     called. worlds: how many copies. seed: of copy 0; copy i has ``seed + i``. noise: False gives ideal sensors. threads: at most so
     many cores, 0 for all. spawn ("p3at:guest@1,2,0.5"), drive ("rover=left_joint,right_joint"), set ({"p3at/LRF.update_rate": 10}) and
-    disable ("p3at/camera") are those of ``ruedo run``. record: keep the messages of the last call, for :meth:`messages`.
+    disable ("p3at/camera") and fault ("p3at/lrf:freeze@3") are those of ``ruedo run``. record: keep the messages of the last call, for :meth:`messages`.
 
     Raises ValueError for what is wrong in the file or an argument, with file, line, value and what is allowed; OSError for
     what the machine lacks. Not for several threads at once; ``step`` lets other Python threads run.
@@ -37,14 +37,14 @@ class Engine:
 
     def __init__(self, world: str = "world", *, text: str | None = None, worlds: int = 1, seed: int = 1, noise: bool = True,
                  threads: int = 0, spawn: Iterable[str] = (), drive: Iterable[str] = (), set: Mapping[str, object] | None = None,
-                 disable: Iterable[str] = (), record: bool = False) -> None:
-        for name, value in (("spawn", spawn), ("drive", drive), ("disable", disable)):
+                 disable: Iterable[str] = (), fault: Iterable[str] = (), record: bool = False) -> None:
+        for name, value in (("spawn", spawn), ("drive", drive), ("disable", disable), ("fault", fault)):
             if isinstance(value, str):
                 raise TypeError(f"{name} is a list of texts, not one: {name}=[{value!r}]")
         settings = [f"{key}={value}" for key, value in (set or {}).items()]
         self._core = _engine.Engine(str(world), text=text, worlds=operator.index(worlds), seed=operator.index(seed), noise=bool(noise),
                                     threads=operator.index(threads), spawn=list(spawn), drive=list(drive), set=settings,
-                                    disable=list(disable), record=bool(record))
+                                    disable=list(disable), fault=list(fault), record=bool(record))
         self._name = str(world)
         self._worlds = self._core.worlds()
         self._seeds = [seed + i for i in range(self._worlds)]

@@ -229,6 +229,24 @@ class Robot:
         command = self._move_message(kinds[kind], value, radius, speed, acceleration, deceleration)
         return Command(self._input("move_command_t"), command.encode())
 
+    def fault_command(self, kind: str, target: str = "", *, duration: float = 0.0, value: float = 0.0, view: tuple[float, float] = (0.0, 1.0),
+                      place: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Command:
+        """A fault for Simulation.step(), or for inject(). kind and target as in proto/fault_t.lcm: "freeze" of "lrf", "kidnapped".
+
+        duration: s of sim time, 0: to the end. view: of "blocked", parts of the field of view. place: of "kidnapped", m, m, rad.
+        """
+        fault = lcmtypes.fault_t()
+        fault.utime, fault.kind, fault.target = self._sim._utime, kind, target
+        fault.duration, fault.value = _finite("duration", duration), _finite("value", value)
+        fault.view_begin, fault.view_end = (_finite("view", one) for one in view)
+        fault.x, fault.y, fault.heading = (_finite("place", one) for one in place)
+        return Command(self._input("fault_t"), fault.encode())
+
+    def inject(self, kind: str, target: str = "", **how: Any) -> None:
+        """Something goes wrong from now on; what it takes is fault_command()'s. The server's log says what acted; a wrong one is ignored."""
+        command = self.fault_command(kind, target, **how)
+        self._sim._bus.publish(command.channel, command.data)
+
     def stop(self, deceleration: float = 0.0) -> Motion:
         """Comes to rest. deceleration: limit in m/s^2, 0: the robot's own."""
         return self._move("stop", lcmtypes.move_command_t.STOP, 0.0, deceleration=deceleration)

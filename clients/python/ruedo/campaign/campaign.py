@@ -15,6 +15,7 @@ from .local import Done, cores, run_local
 from .plan import Case, Planner, check_values, shard_of
 from .schema import Source, check, read_yaml
 from .store import Results, Store
+from .worlds import WorldFiles
 
 _REMEMBERED = ("number", "id", "world", "robot", "controller", "seed", "parameters")
 
@@ -43,18 +44,25 @@ class Campaign:
             self._content, self._source = read_yaml(str(file), text)
             self.folder, stem = file.resolve().parent, file.stem
         check(self._content, self._source)
+        self._content["controllers"] = list(self._each_controller())
         check_values(self._content, self._source)
         self.name = str(self._content.get("name", stem))
         self.out = Path(out) if out else self.folder / f"{stem}.campaign"
         self.version = str(getattr(_engine, "build", _engine.version))
         self._cases: list[Case] | None = None
+        self.worlds = WorldFiles(self.folder, self.out / "worlds")
         self._files: set[str] = set()    # that the cases are made from
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """The file's members."""
+        return self._content
 
     @property
     def cases(self) -> list[Case]:
         """All cases, in the order of the file. Worlds are made and read when this is first asked for."""
         if self._cases is None:
-            planner = Planner(self._content, self._source, self.folder, self.out / "worlds", self.version)
+            planner = Planner(self._content, self._source, self.folder, self.out / "worlds", self.version, self.worlds)
             self._cases = planner.cases()
             self._files = planner.files
         return self._cases
@@ -105,6 +113,20 @@ class Campaign:
             raise SpecError(f"{text} is {'no case' if not found else 'several cases'} of {self.name}: a number from 0 "
                             f"to {len(self.cases) - 1}, or the first 4 digits or more of an id")
         return found[0]
+
+    def _each_controller(self) -> Iterator[dict[str, Any]]:
+        """A controller with `each` is one for each file: {file} is its path, and its name, without ending, the controller's."""
+        for i, one in enumerate(self._content["controllers"]):
+            if "each" not in one:
+                yield one
+                continue
+            files = sorted(file for file in self.folder.glob(one["each"]) if file.is_file())
+            if not files:
+                raise self._source.error(("controllers", i, "each"), f"is {one['each']!r}, and no file is called so in {self.folder}")
+            for file in files:
+                path = str(file.relative_to(self.folder))
+                made = {key: value.replace("{file}", path) if isinstance(value, str) else value for key, value in one.items() if key != "each"}
+                yield {**made, "name": file.stem}
 
     def _sampled(self) -> set[str]:
         """Cases whose log is kept however they end: those with the lowest ids, which are as good as drawn."""

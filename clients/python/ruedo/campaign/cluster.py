@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import socket
 from pathlib import Path
 from typing import Any, Iterable, Iterator
 
@@ -24,6 +25,7 @@ def run_on_ray(cases: list[Case], folder: str, files: Iterable[str], address: st
         raise missing("Ray", "ray") from None
     joined = not ray.is_initialized()
     if joined:
+        _knock(address)
         try:
             ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
         except Exception as error:
@@ -36,6 +38,17 @@ def run_on_ray(cases: list[Case], folder: str, files: Iterable[str], address: st
     finally:
         if joined:
             ray.shutdown()
+
+
+def _knock(address: str) -> None:
+    """Ray itself takes minutes to say that nobody is there."""
+    host, colon, port = address.removeprefix("ray://").rpartition(":")
+    if not colon or not port.isdigit():
+        return    # "auto", "local", a name that Ray knows
+    try:
+        socket.create_connection((host, int(port)), 10.0).close()
+    except OSError as error:
+        raise CampaignError(f"--ray {address}: no cluster answers: {error.strerror or error}") from None
 
 
 def _run(ray: Any, cases: list[Case], folder: str, bundle: Bundle, version: str) -> Iterator[Done]:

@@ -177,11 +177,15 @@ def seeds_of(given: Any) -> list[int]:
 
 
 class Planner:
-    """Makes the cases of a checked campaign. folder: where its paths begin; store: where made worlds go."""
+    """Makes the cases of a checked campaign. folder: where its paths begin; store: where made worlds go.
 
-    def __init__(self, content: dict[str, Any], source: Source, folder: Path, store: Path, version: str) -> None:
+    worlds: of an earlier plan of the same folder, which has read them already.
+    """
+
+    def __init__(self, content: dict[str, Any], source: Source, folder: Path, store: Path, version: str,
+                 worlds: WorldFiles | None = None) -> None:
         self._content, self._source, self._folder, self._version = content, source, folder, version
-        self._worlds = WorldFiles(folder, store)
+        self._worlds = worlds or WorldFiles(folder, store)
         self._hashes: dict[str, str] = {}
         self._functions: dict[str, Function] = {}
 

@@ -122,7 +122,7 @@ def _reasons(results: Results) -> Iterable[str]:
 
 # ---- Plots.
 
-def _figure(width: float = 3.4, height: float = 2.5) -> Any:
+def new_figure(width: float = 3.4, height: float = 2.5) -> Any:
     try:
         import matplotlib
     except ImportError:
@@ -148,7 +148,7 @@ def _distributions(results: Results) -> Iterable[str]:
         bad = [row["metrics"][name] for _, row in results.done if name in row["metrics"] and row["status"] != "passed"]
         if len(set(good + bad)) < 2:
             continue
-        figure = _figure()
+        figure = new_figure()
         axes = figure.add_subplot()
         axes.hist([good, bad], bins=20, stacked=True, color=["#8fb7e8", "#d96b5b"], label=["passed", "failed"])
         axes.set_xlabel(name)
@@ -165,7 +165,7 @@ def _heat_map(results: Results) -> Iterable[str]:
         known = [one for one in places if one]
         if not known:
             continue
-        figure = _figure(5.2, 3.6)
+        figure = new_figure(5.2, 3.6)
         axes = figure.add_subplot()
         drawn = axes.hexbin(*zip(*known), gridsize=24, mincnt=1, cmap="OrRd", linewidths=0.2)
         figure.colorbar(drawn, label="failures")
@@ -207,7 +207,7 @@ def _worst(campaign: Any, results: Results) -> Iterable[str]:
 
 
 def _path(case: Case, row: dict[str, Any]) -> str:
-    figure = _figure()
+    figure = new_figure()
     axes = figure.add_subplot()
     if row["track"]:
         _, x, y = zip(*row["track"])

@@ -38,16 +38,24 @@ _WORLD = {
                    "parameters": {"type": "object"}},
     "additionalProperties": False}
 _CONTROLLER = _object(
-    {"name": _NAME, "command": {"type": "string"}, "python": {"type": "string"}, "files": _TEXTS,
+    {"name": _NAME, "each": {"type": "string"}, "command": {"type": "string"}, "python": {"type": "string"}, "files": _TEXTS,
      "lockstep": {"type": "integer", "minimum": 1, "maximum": 64}, "wait_for": _TEXTS, "remap": _TEXTS,
      "hz": _POSITIVE, "environment": {"type": "object", "additionalProperties": _VALUE}}, ("name",))
 _FAULT = _object(
     {"robot": {"type": "string"}, "kind": {"type": "string"}, "target": {"type": "string"},
      "at": _NUMBER_OR_NAME, "duration": _NUMBER_OR_NAME, "value": _NUMBER_OR_NAME,
-     "from": _NUMBER_OR_NAME, "to": _NUMBER_OR_NAME}, ("kind",))
+     "from": _NUMBER_OR_NAME, "to": _NUMBER_OR_NAME, "x": _NUMBER_OR_NAME, "y": _NUMBER_OR_NAME,
+     "heading": _NUMBER_OR_NAME}, ("kind",))
+_HUNT = _object(
+    {"obstacles": _object({"most": {"type": "integer", "minimum": 1, "maximum": 20},
+                           "area": {"type": "array", "items": _NUMBER, "minItems": 4, "maxItems": 4},
+                           "size": _PAIR}, ("most", "area")),
+     "faults": {"type": "array", "items": _FAULT, "minItems": 1},
+     "seeds": {"type": "integer", "minimum": 1}})
 _EXPECT = _object(
     {"robot": {"type": "string"}, "goal": {**_GOAL, "type": ["object", "array"], "items": _GOAL},
      "no_contact": {"type": "boolean"}, "clearance": _NUMBER_OR_NAME, "odometry_error": _NUMBER_OR_NAME,
+     "clearance_reach": {"type": "number", "minimum": 0, "maximum": 100},
      "golden": {"type": "string"}, "tolerances": _TEXTS, "ignore": _TEXTS})
 
 SCHEMA: dict[str, Any] = _object(
@@ -71,6 +79,7 @@ SCHEMA: dict[str, Any] = _object(
      "limits": _object({"duration": {"type": "number", "exclusiveMinimum": 0, "maximum": 1e6},
                         "wall": _POSITIVE, "memory_mb": {"type": "integer", "minimum": 16}},
                        ("duration",)),
+     "hunt": _HUNT,
      "keep": _object({"failures": {"type": "boolean"}, "sample": {"type": "integer", "minimum": 0}})},
     ("worlds", "controllers", "limits"))
 

@@ -1,0 +1,179 @@
+"""The hunt: choices become cases, cases are run, and what fails is shrunk."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Callable
+
+from ..campaign import Campaign
+from ..campaign.case import Outcome as OutcomeOfCase
+from ..campaign.errors import CampaignError, SpecError
+from ..campaign.local import Worker, cores, run_local
+from ..campaign.plan import Case
+from ..campaign.worlds import keep_text
+from .regression import keep
+from .search import SEARCHES
+from .shrink import shrink
+from .space import Choices, Space
+
+Outcome = dict[str, Any]
+Progress = Callable[[int, Outcome, float], None]    # how many cases, the outcome, its score
+_REACH_M = 3.0      # clearances below it steer
+
+
+@dataclass
+class Found:
+    """A case that breaks the controller, as small as it became.
+
+    cases: that were run until it was found; shrinking took `shrink_cases` more.
+    """
+
+    choices: Choices
+    outcome: Outcome
+    case: Case
+    cases: int
+    shrink_cases: int
+    content: dict[str, Any]
+    folder: Path
+
+    @property
+    def status(self) -> str:
+        return str(self.outcome["status"])
+
+    @property
+    def reason(self) -> str:
+        return str(self.outcome["reason"])
+
+    def keep(self, folder: str | Path) -> Path:
+        """Writes it as a regression test: what `ctest` and `pytest` run from then on."""
+        return keep(self, Path(folder))
+
+
+class Hunt:
+    """spec: a campaign's file, or dict, with one controller and one world; `hunt` in it says what else may be chosen."""
+
+    def __init__(self, spec: Any, *, folder: str | Path = ".", out: str | Path | None = None) -> None:
+        self._campaign = Campaign(spec, folder=folder, out=out)
+        self.name = self._campaign.name
+        self.content: dict[str, Any] = self._campaign.content
+        self.folder = self._campaign.folder
+        self.space = Space(self.content)
+        self._store = self._campaign.out / "worlds"
+
+    def run(self, *, cases: int = 200, seed: int = 1, by: str = "optuna", workers: int | None = None, shrink_cases: int = 100,
+            progress: Progress | None = None) -> Found | None:
+        """The first case that fails, shrunk; None: none was found. The same seed finds the same, with any number of workers.
+
+        by: "optuna" (TPE, after the corners) or "hypothesis" (its own draws, steered by target()).
+        """
+        count = invalid = 0
+        first_invalid = ""
+        with _Crew(str(self.folder), workers or cores()) as crew:
+
+            def evaluate(several: list[Choices]) -> list[tuple[Outcome, float]]:
+                nonlocal count, invalid, first_invalid
+                outcomes = crew.run([self._case_or_why_not(one) for one in several])
+                for outcome in outcomes:
+                    count += 1
+                    if outcome["status"] == "invalid":
+                        invalid += 1
+                        first_invalid = first_invalid or outcome["reason"]
+                    if progress:
+                        progress(count, outcome, self.score(outcome))
+                return [(outcome, self.score(outcome)) for outcome in outcomes]
+
+            hit = SEARCHES[by](self.space, evaluate, cases, seed)
+            if hit is None:
+                if 2 * invalid > count:
+                    raise CampaignError(f"{self.name}: {invalid} of {count} cases could not be run: {first_invalid}")
+                return None
+            choices, outcome = hit
+            found_after = count
+            choices, outcome = shrink(self.space, choices, outcome, evaluate, shrink_cases)
+            return Found(self.space.used(choices), outcome, self.case(choices), found_after, count - found_after, self.content_of(choices),
+                         self.folder)
+
+    def score(self, outcome: Outcome) -> float:
+        """How well it went: below 0 it failed; else the smaller of the clearance (of 3 m) and what was left of the time."""
+        if outcome["status"] != "passed":
+            return -1.0
+        metrics = outcome["metrics"]
+        parts = [metrics.get("clearance_m", _REACH_M) / _REACH_M]
+        goals = self.content.get("expect", {}).get("goal")
+        if goals and "goal_time_s" in metrics:
+            by = self.content["limits"]["duration"]
+            parts.append(1.0 - metrics["goal_time_s"] / by)
+        return float(min(parts))
+
+    def content_of(self, choices: Choices) -> dict[str, Any]:
+        """A campaign's file of this one case."""
+        space = self.space
+        content = json.loads(json.dumps({key: value for key, value in self.content.items() if key != "hunt"}))
+        content["parameters"] = {name: [choices[name]] for name in space.parameters}
+        content["seeds"] = [choices["seed"]]
+        content["faults"] = content.get("faults", []) + space.fault(choices)
+        expect = content.setdefault("expect", {})
+        expect.setdefault("clearance_reach", _REACH_M)
+        if "duration" in choices:
+            content["limits"]["duration"] = choices["duration"]
+        return content    # type: ignore[no-any-return]
+
+    def case(self, choices: Choices) -> Case:
+        """What is to be run."""
+        content = self.content_of(choices)
+        made = self._campaign_of(content)
+        boxes = self.space.boxes(choices)
+        if boxes:
+            content["worlds"] = [{"name": made.cases[0].world, "file": str(self._with_boxes(made.cases[0].what["world"]["file"], boxes))}]
+            made = self._campaign_of(content)
+        case, = made.cases
+        return case
+
+    def _case_or_why_not(self, choices: Choices) -> Case | Outcome:
+        """A world that cannot be made breaks nobody: the hunt goes on."""
+        try:
+            return self.case(choices)
+        except SpecError as error:
+            outcome = OutcomeOfCase()
+            outcome.fail("invalid", "case", str(error))
+            return outcome.as_dict()
+
+    def _campaign_of(self, content: dict[str, Any]) -> Campaign:
+        made = Campaign(content, folder=self.folder, out=self._campaign.out)
+        made.worlds = self._campaign.worlds    # what was read once is known
+        return made
+
+    def _with_boxes(self, world: str, boxes: list[tuple[float, float, float]]) -> Path:
+        text = Path(world).read_text(encoding="utf-8")
+        models = "".join(
+            f"<model name='hunted_{i}'><static>true</static><pose>{x!r} {y!r} 0.5 0 0 0</pose><link name='link'>"
+            f"<collision name='c'><geometry><box><size>{side!r} {side!r} 1</size></box></geometry></collision>"
+            f"<visual name='v'><geometry><box><size>{side!r} {side!r} 1</size></box></geometry></visual></link></model>"
+            for i, (x, y, side) in enumerate(boxes))
+        before, end, after = text.rpartition("</world>")
+        return keep_text(before + models + end + after, self._store)
+
+
+class _Crew:
+    """Workers that stay from one batch to the next."""
+
+    def __init__(self, folder: str, workers: int) -> None:
+        self._folder, self._workers = folder, workers
+        self._crew: list[Worker] = []
+
+    def __enter__(self) -> _Crew:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for one in self._crew:
+            one.end()
+
+    def run(self, cases: list[Case | Outcome]) -> list[Outcome]:
+        """In the order of the cases; what has its outcome already keeps it."""
+        found: dict[str, Outcome] = {}
+        wanted = list({case.id: case for case in cases if isinstance(case, Case)}.values())
+        for case, outcome, _ in run_local(wanted, self._folder, self._workers, self._crew):
+            found[case.id] = outcome
+        return [found[case.id] if isinstance(case, Case) else case for case in cases]

@@ -1,0 +1,86 @@
+// What goes wrong with the robots of a world, and when: from its file, and from commands on ROBOT/fault.
+//
+// The simulation thread's. Sensors' faults go with the batches to the modules (sensor_faults.h); those of wheels and commands
+// act here, on what the drives are told and on the wheel angles that encoders see.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "engine/sensor_faults.h"
+#include "model/body_layout.h"
+#include "model/fault.h"
+#include "robot/robots.h"
+#include "ruedo/device_info_t.hpp"
+#include "ruedo/fault_t.hpp"
+#include "ruedo/random.h"
+#include "ruedo/snapshot.h"
+
+namespace ruedo::engine {
+
+// A message's fault, as if a file had it; the robot is the channel's.
+model::Fault fault_of(const fault_t& message);
+
+class Faults {
+ public:
+  // Takes the world's own. All must outlive it. Throws InputError for one that names no device of its robot.
+  Faults(const model::WorldModel& world, const model::BodyLayout& layout, const std::vector<device_info_t>& devices, uint64_t seed);
+
+  // What is wrong with a fault of that robot, or "".
+  std::string check(const model::Fault& fault, int robot) const;
+  // It acts on the state `step`: samples of later ones show it. One that is wrong changes nothing.
+  void begin(const model::Fault& fault, int robot, int64_t step);
+
+  // Before the commands on the state `step`: what was late acts, who is kidnapped is put elsewhere.
+  void before_commands(int64_t step, robot::Robots& robots);
+  // A command on the state `step`, or what becomes of it.
+  void command(const robot::Command& command, int64_t step, robot::Robots& robots);
+  // The wheels of a new state as encoders see them.
+  void show_wheels(Snapshot& snapshot);
+  // For the modules; null while there was none.
+  const std::shared_ptr<const std::vector<SensorFault>>& of_sensors() const { return of_sensors_; }
+
+  void remove(int robot);
+  void begin_time_anew();    // steps count from 0: what went on is over
+
+ private:
+  enum class Kind { encoder_stuck, wheel_slip, weak_motor, commands_lost, commands_late, commands_doubled, kidnapped };
+  struct RobotFault {
+    Kind kind;
+    int robot;
+    bool left, right;          // which wheels
+    int64_t begin, end;        // of steps
+    int64_t delay_steps;
+    double value;
+    model::Fault asked;
+    bool done = false;         // of who was kidnapped
+    bool acts(int of_robot, int64_t step) const { return robot == of_robot && step >= begin && step < end; }
+  };
+
+  int64_t steps(double seconds) const;
+  void begin_at(const model::Fault& fault, int robot, int64_t begin, bool message);
+  void begin_of_device(const model::Fault& fault, int robot, int64_t begin, int64_t end);
+  const device_info_t* find_device(int robot, const std::string& name) const;
+  const std::string& name_of(int robot) const;
+  double left_of(int robot, bool left, int64_t step) const;    // of the commanded speed of a side
+  robot::Command weakened(robot::Command command, int64_t step) const;
+  bool is_lost(int robot, int64_t step);
+
+  const model::WorldModel& world_;
+  const model::BodyLayout& layout_;
+  const std::vector<device_info_t>& devices_;
+  uint64_t seed_;
+  std::shared_ptr<const std::vector<SensorFault>> of_sensors_;
+  int64_t sensor_faults_ = 0;
+  std::vector<RobotFault> of_robots_;
+  std::deque<std::pair<int64_t, robot::Command>> late_;    // by the step on which they act, in order
+  std::vector<uint64_t> draws_;                            // of each robot
+  bool wheels_ever_ = false;
+  std::vector<double> true_angles_, shown_angles_;         // of each wheel, while encoders may be wrong
+};
+
+}  // namespace ruedo::engine
