@@ -5,9 +5,6 @@
 #include <cmath>
 #include <filesystem>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
 #include "model/drive.h"
 #include "model/placement.h"
 #include "model/sdf_link.h"
@@ -77,8 +74,9 @@ class Loader {
     }
     if (fault.robot.empty() && !robots.empty()) fault.robot = robots.front();
     if (std::find(robots.begin(), robots.end(), fault.robot) != robots.end()) return;
-    throw InputError(fault.source, fmt::format("a fault of robot '{}'; the world has {}", fault.robot,
-                                               robots.empty() ? "no robot" : fmt::format("{}", fmt::join(robots, ", "))));
+    std::string names;
+    for (const std::string& robot : robots) names += (names.empty() ? "" : ", ") + robot;
+    throw InputError(fault.source, "a fault of robot '" + fault.robot + "'; the world has " + (names.empty() ? "no robot" : names));
   }
 
   void read_empty_world() {
