@@ -47,7 +47,7 @@ uint64_t read_log(const std::string& path, const log::Index& index, const run::L
     ++read;
   }
   for (const std::string& fault : {worlds.fault(), log.fault()}) {
-    if (!fault.empty()) fmt::print(stderr, "ruedo: {}: {}\n", path, fault);
+    if (!fault.empty()) fmt::print(stderr, "ruedo: {}: {}\n", for_terminal(path), for_terminal(fault));
   }
   return read;
 }

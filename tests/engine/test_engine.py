@@ -142,7 +142,7 @@ def test_errors_say_what_is_wrong(call, error, text):
 
 
 @pytest.mark.parametrize("options, error, text", [
-    ({"world": "no_such"}, ValueError, "no world of that name; there are arena, fleet, office"),
+    ({"world": "no_such"}, ValueError, "no world of that name; there are arena, crossing, field, fleet, maze, office"),
     ({"world": "no/such.sdf"}, ValueError, "no/such.sdf: no such file"),
     ({"world": "arena", "worlds": 0}, ValueError, "1 world or more, not 0"),
     ({"world": "arena", "disable": "p3at/camera"}, TypeError, "disable is a list of texts"),

@@ -110,7 +110,7 @@ const std::vector<BadWorld>& table() {
       // Joints.
       {"JointWithoutType", joint("<joint name='j'><parent>a</parent><child>b</child></joint>"), ":5: <joint>: has no type", "the joint is left out"},
       {"MistypedJoint", joint("<joint name='j' type='revolut'><parent>a</parent><child>b</child></joint>"),
-       ":5: <joint>: type 'revolut' is not allowed; allowed are fixed, revolute, continuous, prismatic, ball, universal; did you mean 'revolute'?", "the joint is left out"},
+       ":5: <joint>: type 'revolut' is not allowed; allowed are fixed, revolute, continuous, prismatic, ball, universal, screw; did you mean 'revolute'?", "the joint is left out"},
       {"JointWithoutChild", joint("<joint name='j' type='fixed'><parent>a</parent></joint>"), ":5: <joint>: has no <child>", "the joint is left out"},
       {"JointToNoLink", joint("<joint name='j' type='fixed'><parent>a</parent>\n<child>c</child></joint>"),
        ":6: <child>: there is no frame 'c' in model m; did you mean 'a'?", "the joint is left out"},

@@ -48,7 +48,7 @@ TEST_F(EditsTest, ASpawnedRobotIsThereAndDrives) {
   int inputs = 0, devices = 0;
   for (const channel_info_t& channel : info.channels) inputs += channel.robot == "guest" && channel.input;
   for (const device_info_t& device : info.devices) devices += device.robot == "guest";
-  EXPECT_EQ(inputs, 3);     // velocity, wheels, move
+  EXPECT_EQ(inputs, 4);     // velocity, wheels, move, fault
   EXPECT_EQ(devices, 4);    // odometry, pose, motion, lrf
 
   const size_t from = bus.count();
