@@ -2,6 +2,7 @@
 // when a node wrote it.
 #include "ros2/commands.h"
 
+#include "engine/outcome.h"
 #include "ros2/cdr.h"
 #include "ruedo/joint_command_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
@@ -9,14 +10,9 @@
 namespace ruedo::ros2 {
 namespace {
 
-using Bytes = std::optional<std::vector<uint8_t>>;
+using engine::encoded;
 
-template <class Message>
-std::vector<uint8_t> encoded(const Message& message) {
-  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
-}
+using Bytes = std::optional<std::vector<uint8_t>>;
 
 void skip_header(CdrReader& in) {
   in.skip<uint32_t>(2);

@@ -3,6 +3,7 @@
 #include <random>
 #include <utility>
 
+#include "engine/outcome.h"
 #include "ruedo/decode.h"
 #include "ruedo/join_t.hpp"
 #include "ruedo/request_t.hpp"
@@ -10,12 +11,7 @@
 namespace ruedo::ros2 {
 namespace {
 
-template <class Message>
-std::vector<uint8_t> encoded(const Message& message) {
-  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
-}
+using engine::encoded;
 
 std::vector<uint8_t> request(int64_t session, int64_t sequence, int32_t kind, const std::vector<uint8_t>& body) {
   request_t message;

@@ -10,6 +10,7 @@
 #include <regex.h>
 
 #include "core/version.h"
+#include "engine/outcome.h"
 #include "ros2/cdr.h"
 #include "ros2/conversions.h"
 #include "ruedo/decode.h"
@@ -53,6 +54,8 @@ class Services::Call {
 
 namespace {
 
+using engine::encoded;
+
 // simulation_interfaces/msg/Result, and what some services add.
 constexpr uint8_t kUnsupported = 0, kOk = 1, kNotFound = 2, kIncorrectState = 3, kFailed = 4;
 constexpr uint8_t kNameNotUnique = 101, kNameInvalid = 102, kNoResource = 104;
@@ -60,13 +63,6 @@ constexpr uint8_t kAlreadyThere = 101;
 // EntityCategory
 constexpr uint8_t kRobot = 2, kDynamic = 4, kStatic = 5;
 constexpr size_t kLongestFilter = 200;
-
-template <class Message>
-std::vector<uint8_t> encoded(const Message& message) {
-  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
-}
 
 std::vector<uint8_t> name_body(const std::string& name) {
   name_request_t body;

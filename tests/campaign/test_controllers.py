@@ -92,7 +92,7 @@ def test_each_bad_controller_is_one_failed_case(tmp_path):
 
 
 PROGRAM = '''
-import json, os, sys, time
+import json, os, subprocess, sys, time
 import ruedo
 
 how = sys.argv[1]
@@ -106,8 +106,7 @@ with ruedo.connect(timeout=60.0) as sim:
         print("it is broken")
         sys.exit(3)
     if how == "leave_behind":
-        os.system("sleep 1000 &")
-        open("child", "w").write(os.popen("pgrep -n -x sleep").read())
+        open("child", "w").write(str(subprocess.Popen(["sleep", "1000"]).pid))
     while how == "hang":
         time.sleep(1)
 '''
