@@ -1,7 +1,8 @@
-// Time of a camera picture: drawing, read-back, and what the camera does with it. CPU time is that of all threads,
-// Mesa's included; frames per second follow from the wall time.
+// Time of a camera picture: drawing, read-back, and what the camera does with it. CPU time is that
+// of all threads, Mesa's included; frames per second follow from the wall time.
 //
-// Scenes: worlds/arena.sdf from the robot's camera, and a room with spheres of 20 000 and of 500 000 triangles.
+// Scenes: worlds/arena.sdf from the robot's camera, and a room with spheres of 20 000 and of 500
+// 000 triangles.
 #include <cmath>
 
 #include <benchmark/benchmark.h>
@@ -21,7 +22,8 @@ std::shared_ptr<const model::Mesh> sphere(int n) {
   for (int i = 0; i <= n; ++i) {
     for (int k = 0; k <= n; ++k) {
       const double polar = M_PI * i / n, around = 2.0 * M_PI * k / n;
-      const Eigen::Vector3f p(static_cast<float>(std::sin(polar) * std::cos(around)), static_cast<float>(std::sin(polar) * std::sin(around)),
+      const Eigen::Vector3f p(static_cast<float>(std::sin(polar) * std::cos(around)),
+                              static_cast<float>(std::sin(polar) * std::sin(around)),
                               static_cast<float>(std::cos(polar)));
       mesh->positions.push_back(p);
       mesh->normals.push_back(p);
@@ -54,13 +56,15 @@ std::shared_ptr<const model::WorldModel> room(int triangles) {
     model::Geometry wall;
     wall.size = Vec3::Constant(10.0);
     wall.size[i / 2] = 0.2;
-    add(Vec3(0, 0, 5) + (i % 2 == 0 ? 5.0 : -5.0) * Vec3::Unit(i / 2), wall, {0.7f, 0.65f, 0.6f, 1});
+    add(Vec3(0, 0, 5) + (i % 2 == 0 ? 5.0 : -5.0) * Vec3::Unit(i / 2), wall,
+        {0.7f, 0.65f, 0.6f, 1});
   }
   model::Geometry ball;
   ball.shape = model::Shape::mesh;
   ball.mesh = sphere(static_cast<int>(std::sqrt(triangles / (2.0 * kSpheres))));
   ball.scale = Vec3::Constant(0.4);
-  for (int i = 0; i < kSpheres; ++i) add({(i % 5) - 1.0, (i / 5) * 1.5 - 2.2, 1.2 + 0.1 * i}, ball, {0.3f, 0.5f, 0.7f, 1});
+  for (int i = 0; i < kSpheres; ++i)
+    add({(i % 5) - 1.0, (i / 5) * 1.5 - 2.2, 1.2 + 0.1 * i}, ball, {0.3f, 0.5f, 0.7f, 1});
   world->models.push_back({"room", {}, model});
   model::Light sun;
   sun.type = model::Light::Type::directional;
@@ -71,7 +75,8 @@ std::shared_ptr<const model::WorldModel> room(int triangles) {
   return world;
 }
 
-void draw(benchmark::State& state, const model::WorldModel& world, const Pose& X_WCamera, bool depth, int samples) {
+void draw(benchmark::State& state, const model::WorldModel& world, const Pose& X_WCamera,
+          bool depth, int samples) {
   const model::BodyLayout layout(world);
   const auto renderer = scene::make_renderer(world, layout);
   Snapshot snapshot;
@@ -81,7 +86,7 @@ void draw(benchmark::State& state, const model::WorldModel& world, const Pose& X
   view.samples = samples;
   scene::Picture picture;
   picture.want_depth = depth;
-  renderer->draw(snapshot, view, picture);    // compiles programs and decodes textures
+  renderer->draw(snapshot, view, picture);  // compiles programs and decodes textures
   for (auto _ : state) renderer->draw(snapshot, view, picture);
   state.SetItemsProcessed(state.iterations());
   state.SetLabel(renderer->description());
@@ -89,7 +94,8 @@ void draw(benchmark::State& state, const model::WorldModel& world, const Pose& X
 
 void BM_Arena(benchmark::State& state) {
   static const auto world = model::load_world(RUEDO_SOURCE_DIR "/worlds/arena.sdf");
-  draw(state, *world, Pose::from_xyz_rpy({0.2, 0, 0.4}, Vec3::Zero()), state.range(0) != 0, static_cast<int>(state.range(1)));
+  draw(state, *world, Pose::from_xyz_rpy({0.2, 0, 0.4}, Vec3::Zero()), state.range(0) != 0,
+       static_cast<int>(state.range(1)));
 }
 void BM_Room(benchmark::State& state) {
   auto world = std::make_shared<model::WorldModel>(*room(static_cast<int>(state.range(0))));
@@ -107,15 +113,35 @@ void BM_Jpeg(benchmark::State& state) {
   const auto world = room(20000);
   const model::BodyLayout layout(*world);
   scene::Picture picture;
-  scene::make_renderer(*world, layout)->draw({}, scene::View::pinhole(Pose::from_xyz_rpy({-4.5, 0, 2.5}, Vec3::Zero()), 640, 480, 1.047), picture);
+  scene::make_renderer(*world, layout)
+      ->draw(
+          {},
+          scene::View::pinhole(Pose::from_xyz_rpy({-4.5, 0, 2.5}, Vec3::Zero()), 640, 480, 1.047),
+          picture);
   const cv::Mat pixels(480, 640, CV_8UC3, picture.rgb.data());
   std::vector<uint8_t> bytes;
   for (auto _ : state) cv::imencode(".jpg", pixels, bytes, {cv::IMWRITE_JPEG_QUALITY, 85});
   state.SetLabel(std::to_string(bytes.size()) + " bytes");
 }
 
-BENCHMARK(BM_Arena)->ArgNames({"depth", "samples"})->Args({0, 1})->Args({1, 1})->Args({0, 4})->MeasureProcessCPUTime()->UseRealTime()->Unit(benchmark::kMillisecond);
-BENCHMARK(BM_Room)->ArgNames({"triangles", "shadows", "depth"})->Args({20000, 0, 1})->Args({20000, 1, 1})->Args({500000, 0, 1})->Args({500000, 1, 1})->Args({20000, 0, 0})->MeasureProcessCPUTime()->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_Arena)
+    ->ArgNames({"depth", "samples"})
+    ->Args({0, 1})
+    ->Args({1, 1})
+    ->Args({0, 4})
+    ->MeasureProcessCPUTime()
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_Room)
+    ->ArgNames({"triangles", "shadows", "depth"})
+    ->Args({20000, 0, 1})
+    ->Args({20000, 1, 1})
+    ->Args({500000, 0, 1})
+    ->Args({500000, 1, 1})
+    ->Args({20000, 0, 0})
+    ->MeasureProcessCPUTime()
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_Noise)->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_Jpeg)->Unit(benchmark::kMillisecond);
 

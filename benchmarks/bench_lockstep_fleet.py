@@ -1,6 +1,6 @@
 """Lockstep from Python with many robots of 24 beams: robot-decisions a second at 10 Hz, over each transport in turn.
 
-    bench_lockstep_fleet.py [DECISIONS] [ROUNDS] [ROBOTS,...]      starts servers of its own; prints the median of each
+bench_lockstep_fleet.py [DECISIONS] [ROUNDS] [ROBOTS,...]      starts servers of its own; prints the median of each
 """
 
 import statistics
@@ -49,7 +49,9 @@ def rate(file: Path, url: str | None, count: int, decisions: int) -> float:
 def main() -> None:
     decisions = int(sys.argv[1]) if len(sys.argv) > 1 else 200
     rounds = int(sys.argv[2]) if len(sys.argv) > 2 else 5
-    counts = [int(count) for count in (sys.argv[3] if len(sys.argv) > 3 else "1,16,64,256").split(",")]
+    counts = [
+        int(count) for count in (sys.argv[3] if len(sys.argv) > 3 else "1,16,64,256").split(",")
+    ]
     with tempfile.TemporaryDirectory() as folder:
         for count in counts:
             file = Path(folder) / f"{count}.sdf"
@@ -61,7 +63,9 @@ def main() -> None:
                         rates[name].append(rate(file, url, count, max(10, decisions // count)))
                     except ruedo.RuedoError as error:
                         print(f"{count} robots, {name}: {error}", flush=True)
-            said = ", ".join(f"{name} {statistics.median(each):.0f}" for name, each in rates.items() if each)
+            said = ", ".join(
+                f"{name} {statistics.median(each):.0f}" for name, each in rates.items() if each
+            )
             print(f"{count} robots: {said} robot-decisions/s", flush=True)
 
 

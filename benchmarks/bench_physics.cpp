@@ -1,7 +1,9 @@
-// Cost of a step of physics and robots: kinematic robots circling on a plane among 300 static boxes, at 5 ms.
+// Cost of a step of physics and robots: kinematic robots circling on a plane among 300 static
+// boxes, at 5 ms.
 //
-// Args: the number of robots. "Rooms": each in a square of its own, never near anything. "Resting": asleep.
-// "Crowd": close together, so that they touch. The snapshot is read in each step, as the server does.
+// Args: the number of robots. "Rooms": each in a square of its own, never near anything. "Resting":
+// asleep. "Crowd": close together, so that they touch. The snapshot is read in each step, as the
+// server does.
 #include <cmath>
 #include <memory>
 
@@ -27,7 +29,11 @@ std::shared_ptr<model::Model> robot_model() {
   model::Link base;
   base.name = "base";
   base.inertial = {14.0, Pose{Quat::Identity(), {0, 0, 0.15}}, Vec3(0.3, 0.4, 0.5).asDiagonal()};
-  base.collisions.push_back({"c", Pose{Quat::Identity(), {0, 0, 0.18}}, shape(model::Shape::box, {0.5, 0.3, 0.15}), {}, {}});
+  base.collisions.push_back({"c",
+                             Pose{Quat::Identity(), {0, 0, 0.18}},
+                             shape(model::Shape::box, {0.5, 0.3, 0.15}),
+                             {},
+                             {}});
   robot->links.push_back(base);
   model::DriveDescription drive;
   drive.wheel_radius = 0.111;
@@ -41,14 +47,16 @@ std::shared_ptr<model::Model> robot_model() {
       wheel.name = "wheel" + std::to_string(robot->links.size());
       wheel.X_ML = {Quat(Eigen::AngleAxisd(-M_PI / 2, Vec3::UnitX())), {x, y, 0.111}};
       wheel.inertial = {1.5, Pose(), Vec3(0.005, 0.005, 0.009).asDiagonal()};
-      wheel.collisions.push_back({"c", {}, shape(model::Shape::cylinder, {0.111, 0.075, 0}), {}, {}});
+      wheel.collisions.push_back(
+          {"c", {}, shape(model::Shape::cylinder, {0.111, 0.075, 0}), {}, {}});
       model::Joint joint;
       joint.name = wheel.name + "_joint";
       joint.type = model::JointType::continuous;
       joint.parent = 0;
       joint.child = static_cast<int>(robot->links.size());
       joint.X_MJ = wheel.X_ML;
-      (y > 0 ? drive.left_joints : drive.right_joints).push_back(static_cast<int>(robot->joints.size()));
+      (y > 0 ? drive.left_joints : drive.right_joints)
+          .push_back(static_cast<int>(robot->joints.size()));
       robot->links.push_back(wheel);
       robot->joints.push_back(joint);
     }
@@ -57,7 +65,8 @@ std::shared_ptr<model::Model> robot_model() {
   return robot;
 }
 
-model::ModelInstance fixed(const std::string& name, const Pose& pose, const model::Geometry& geometry) {
+model::ModelInstance fixed(const std::string& name, const Pose& pose,
+                           const model::Geometry& geometry) {
   auto thing = std::make_shared<model::Model>();
   thing->is_static = true;
   model::Link link;
@@ -73,12 +82,14 @@ model::WorldModel world_of(int robots, double spacing_m) {
   const int side = static_cast<int>(std::ceil(std::sqrt(robots)));
   for (int i = 0; i < 300; ++i) {
     const double x = (i % 20 - 0.5) * spacing_m, y = (i / 20 - 0.5) * spacing_m;
-    world.models.push_back(fixed("box" + std::to_string(i), {Quat::Identity(), {x, y, 0.25}}, shape(model::Shape::box, {0.3, 0.3, 0.5})));
+    world.models.push_back(fixed("box" + std::to_string(i), {Quat::Identity(), {x, y, 0.25}},
+                                 shape(model::Shape::box, {0.3, 0.3, 0.5})));
   }
   const auto robot = robot_model();
   for (int i = 0; i < robots; ++i) {
-    world.models.push_back({"robot" + std::to_string(i),
-                            Pose{Quat::Identity(), {i % side * spacing_m, i / side * spacing_m, 0.0}}, robot});
+    world.models.push_back(
+        {"robot" + std::to_string(i),
+         Pose{Quat::Identity(), {i % side * spacing_m, i / side * spacing_m, 0.0}}, robot});
   }
   return world;
 }
@@ -90,8 +101,9 @@ void run(benchmark::State& state, double spacing_m, double v, double omega) {
   physics::PhysicsWorld physics(world, layout);
   robot::Robots robots(world, layout, physics);
   Snapshot snapshot;
-  for (int i = 0; i < n && (v != 0.0 || omega != 0.0); ++i) robots.apply({i, robot::VelocityCommand{v, 0.0, omega}});
-  for (int i = 0; i < 400; ++i) robots.step();    // up to speed
+  for (int i = 0; i < n && (v != 0.0 || omega != 0.0); ++i)
+    robots.apply({i, robot::VelocityCommand{v, 0.0, omega}});
+  for (int i = 0; i < 400; ++i) robots.step();  // up to speed
   for (auto _ : state) {
     robots.step();
     robots.read(snapshot);

@@ -1,5 +1,6 @@
-// How fast the server runs one P3-AT without a camera: as a whole, and by the number of steps that are handed over at
-// once. "x" is sim time per real time; messages go to a sink that counts, or over LCM.
+// How fast the server runs one P3-AT without a camera: as a whole, and by the number of steps that
+// are handed over at once. "x" is sim time per real time; messages go to a sink that counts, or
+// over LCM.
 #include <limits>
 
 #include <benchmark/benchmark.h>
@@ -48,15 +49,23 @@ void run(benchmark::State& state, Bus& bus, int batch_steps) {
   }
   const double simulated_s = static_cast<double>(kSeconds * state.iterations());
   state.counters["x"] = benchmark::Counter(simulated_s, benchmark::Counter::kIsRate);
-  state.counters["us_per_step"] =
-      benchmark::Counter(simulated_s * 200.0 * 1e-6, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  state.counters["us_per_step"] = benchmark::Counter(
+      simulated_s * 200.0 * 1e-6, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
 void BM_BatchSteps(benchmark::State& state) {
   CountingBus bus;
   run(state, bus, static_cast<int>(state.range(0)));
 }
-BENCHMARK(BM_BatchSteps)->Arg(1)->Arg(4)->Arg(8)->Arg(16)->Arg(32)->Arg(64)->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_BatchSteps)
+    ->Arg(1)
+    ->Arg(4)
+    ->Arg(8)
+    ->Arg(16)
+    ->Arg(32)
+    ->Arg(64)
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
 
 void BM_OverMemq(benchmark::State& state) {
   bus::LcmBus bus("memq://");

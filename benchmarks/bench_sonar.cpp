@@ -1,5 +1,5 @@
-// What a firing of a sonar's transducer costs, by the rays of its cone: the P3-AT's front array, by the sensor's own code,
-// in the office and in the arena that come with Ruedo.
+// What a firing of a sonar's transducer costs, by the rays of its cone: the P3-AT's front array, by
+// the sensor's own code, in the office and in the arena that come with Ruedo.
 //
 //   bench_sonar [repeats]      one core; medians of the thread's own time; run it from anywhere
 #include <algorithm>
@@ -10,11 +10,11 @@
 #include <string>
 #include <vector>
 
+#include "engine/fleet.h"
 #include "model/body_layout.h"
 #include "model/load.h"
 #include "ruedo/sensor.h"
 #include "scene/ray_scene.h"
-#include "engine/fleet.h"
 
 namespace {
 
@@ -29,7 +29,8 @@ double cpu_time_us() {
 // us a firing: the median of some runs of 400 samples, one transducer each.
 double measure(const std::string& file, int rays, int repeats) {
   model::LoadOptions options;
-  options.settings.push_back({"p3at", "sonar_front", "ruedo:sonar.ruedo:rays", std::to_string(rays)});
+  options.settings.push_back(
+      {"p3at", "sonar_front", "ruedo:sonar.ruedo:rays", std::to_string(rays)});
   const auto world = model::load_world(file, options);
   const model::BodyLayout layout(*world);
   engine::Channels channels;
@@ -55,7 +56,8 @@ double measure(const std::string& file, int rays, int repeats) {
       out.clear();
       sonar->sample({now, sample++, scene.get(), nullptr}, out);
     }
-    if (i > 0) times.push_back((cpu_time_us() - start) / kSamples);    // the first run warms the caches
+    if (i > 0)
+      times.push_back((cpu_time_us() - start) / kSamples);  // the first run warms the caches
   }
   std::nth_element(times.begin(), times.begin() + repeats / 2, times.end());
   return times[static_cast<size_t>(repeats / 2)];
@@ -68,7 +70,8 @@ int main(int argc, char** argv) {
   const std::string worlds = std::string(RUEDO_SOURCE_DIR) + "/worlds/";
   for (const char* world : {"arena.sdf", "office.sdf"}) {
     for (const int rays : {1, 9, 19, 37}) {
-      std::printf("%-10s %3d rays a cone  %6.2f us a firing\n", world, rays, measure(worlds + world, rays, repeats));
+      std::printf("%-10s %3d rays a cone  %6.2f us a firing\n", world, rays,
+                  measure(worlds + world, rays, repeats));
     }
   }
   return 0;

@@ -1,8 +1,9 @@
 """failed_tests.py REPORT: the failed tests of a JUnit report by ctest, each with the end of its output."""
+
 import sys
 from xml.etree import ElementTree
 
-LINES = 60    # of each test's output
+LINES = 60  # of each test's output
 
 
 def main(report):

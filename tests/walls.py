@@ -3,6 +3,7 @@
 The layers and what each may use are read from the ruedo_layer() lines of the top CMakeLists.txt, so that there is one list.
 Libraries that live in one layer alone are listed below. The rule is also run on small trees that break it.
 """
+
 import os
 import re
 import subprocess
@@ -23,6 +24,7 @@ LIBRARIES = {
     ("dds/dds.h", "dds/ddsi"): {"dds"},
     ("tbb/", "oneapi/tbb"): {"scene", "sensors", "engine"},
 }
+
 
 def layers(root):
     """{layer: the layers it may include, itself among them}, from CMakeLists.txt; the command line may include all."""
@@ -46,12 +48,19 @@ def includes(path):
 def broken_walls(root):
     known = layers(root)
     problems = []
-    for path in sorted(p for top in ("src", "include") for p in (root / top).rglob("*") if p.suffix in (".cpp", ".h")):
+    for path in sorted(
+        p
+        for top in ("src", "include")
+        for p in (root / top).rglob("*")
+        if p.suffix in (".cpp", ".h")
+    ):
         relative = path.relative_to(root)
         layer = relative.parts[1] if relative.parts[0] == "src" else "include/ruedo"
         allowed = known.get(layer, set())
         if layer != "include/ruedo" and not allowed:
-            problems.append(f"{relative}: layer {layer} has no ruedo_layer() line in CMakeLists.txt")
+            problems.append(
+                f"{relative}: layer {layer} has no ruedo_layer() line in CMakeLists.txt"
+            )
             continue
         for number, name in includes(path):
             target = name.split("/")[0]
@@ -59,14 +68,18 @@ def broken_walls(root):
                 problems.append(f"{relative}:{number}: {layer} may not include {name}")
             for prefixes, homes in LIBRARIES.items():
                 if name.startswith(prefixes) and layer not in homes:
-                    problems.append(f"{relative}:{number}: {name} belongs to {', '.join(sorted(homes))}, not to {layer}")
+                    problems.append(
+                        f"{relative}:{number}: {name} belongs to {', '.join(sorted(homes))}, not to {layer}"
+                    )
     return problems
 
 
-WHOLE = "src/core/whole.h"    # the one way from a floating-point number to a whole one
+WHOLE = "src/core/whole.h"  # the one way from a floating-point number to a whole one
 INTEGER = r"(?:std::)?(?:u?int(?:8|16|32|64)?(?:_t)?|size_t|ptrdiff_t|unsigned(?: int| char)?|(?:unsigned )?long(?: long)?|SimTime|char)"
-FLOATING = re.compile(r"\b(?:floor|ceil|round|trunc|sqrt|hypot|a?sin|a?cos|a?tan2?|exp2?|log2?|pow|fmod|norm|M_PI|double|float)\b(?!>)|"
-                      r"\bas_number\(|[.>]number\(|(?<![\w.])\d+\.\d*|(?<![\w.])\d+e\d|\b\w+_(?:s|m|hz|rad|kg)\b(?!\()")
+FLOATING = re.compile(
+    r"\b(?:floor|ceil|round|trunc|sqrt|hypot|a?sin|a?cos|a?tan2?|exp2?|log2?|pow|fmod|norm|M_PI|double|float)\b(?!>)|"
+    r"\bas_number\(|[.>]number\(|(?<![\w.])\d+\.\d*|(?<![\w.])\d+e\d|\b\w+_(?:s|m|hz|rad|kg)\b(?!\()"
+)
 
 
 def argument(text, begin):
@@ -75,20 +88,27 @@ def argument(text, begin):
     for at in range(begin, len(text)):
         depth += {"(": 1, ")": -1}.get(text[at], 0)
         if depth == 0:
-            return text[begin + 1:at]
-    return text[begin + 1:]
+            return text[begin + 1 : at]
+    return text[begin + 1 :]
 
 
 def without_calls(text):
     """The expression, without what goes into functions that give something else: the size of a list, an element of it."""
     call = re.compile(r"[\w.:>-]*(?:<\w+>)?\((?:[^()]|\([^()]*\))*\)")
-    return call.sub(lambda match: match.group(0) if FLOATING.search(match.group(0).split("(")[0]) else "f", text)
+    return call.sub(
+        lambda match: match.group(0) if FLOATING.search(match.group(0).split("(")[0]) else "f", text
+    )
 
 
 def bare_conversions(root):
     """Casts of floating-point numbers to whole ones: undefined for what does not fit, which core/whole.h refuses."""
     problems = []
-    for path in sorted(p for top in ("src", "include") for p in (root / top).rglob("*") if p.suffix in (".cpp", ".h")):
+    for path in sorted(
+        p
+        for top in ("src", "include")
+        for p in (root / top).rglob("*")
+        if p.suffix in (".cpp", ".h")
+    ):
         relative = path.relative_to(root)
         if str(relative) == WHOLE:
             continue
@@ -96,9 +116,14 @@ def bare_conversions(root):
         found = [(m.start(), m.group(0)) for m in re.finditer(r"\bl?l(?:round|rint)[fl]?\(", text)]
         for match in re.finditer(rf"\bstatic_cast<{INTEGER}>\(|\b{INTEGER}\(", text):
             inside = argument(text, match.end() - 1)
-            if FLOATING.search(without_calls(re.sub(r"static_cast<(?:double|float)>", "double", inside))):
+            if FLOATING.search(
+                without_calls(re.sub(r"static_cast<(?:double|float)>", "double", inside))
+            ):
                 found.append((match.start(), match.group(0) + inside[:40]))
-        problems += [f"{relative}:{text.count(chr(10), 0, at) + 1}: {what.splitlines()[0]}: use {WHOLE}" for at, what in found]
+        problems += [
+            f"{relative}:{text.count(chr(10), 0, at) + 1}: {what.splitlines()[0]}: use {WHOLE}"
+            for at, what in found
+        ]
     return problems
 
 
@@ -110,32 +135,89 @@ def test_tree_keeps(rule):
 
 def test_layers_are_those_of_the_design():
     known = layers(ROOT)
-    assert set(known) == {"core", "model", "scene", "physics", "robot", "sensors", "engine", "log", "judge", "run", "bus", "ros2", "dds", "console", "cli"}
+    assert set(known) == {
+        "core",
+        "model",
+        "scene",
+        "physics",
+        "robot",
+        "sensors",
+        "engine",
+        "log",
+        "judge",
+        "run",
+        "bus",
+        "ros2",
+        "dds",
+        "console",
+        "cli",
+    }
     for outsider in ("physics", "engine", "run", "bus", "robot"):
         assert outsider not in known["sensors"]
-    for outsider in ("log", "run", "bus", "console"):    # one world knows no file, no network and no clock
+    for outsider in (
+        "log",
+        "run",
+        "bus",
+        "console",
+    ):  # one world knows no file, no network and no clock
         assert outsider not in known["engine"]
     assert not known["log"] & {"engine", "run", "bus"}
     assert not known["judge"] & {"engine", "run", "bus", "log"}
-    assert "run" not in known["bus"] and "scene" not in known["physics"] and known["core"] == {"core"}
+    assert (
+        "run" not in known["bus"] and "scene" not in known["physics"] and known["core"] == {"core"}
+    )
 
 
 # Elementary functions: ours alone, since the C library's depend on the CPU (include/ruedo/math.h).
-MATH = set(re.search(r"set\(RUEDO_MATH_FUNCTIONS ([^)]*)\)", (ROOT / "cmake/RuedoMath.cmake").read_text(encoding="utf-8")).group(1).split())
-NOT_OURS = MATH | {"log2", "log1p", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "cbrt", "erf", "erfc", "lgamma", "tgamma", "polar", "arg"}
+MATH = set(
+    re.search(
+        r"set\(RUEDO_MATH_FUNCTIONS ([^)]*)\)",
+        (ROOT / "cmake/RuedoMath.cmake").read_text(encoding="utf-8"),
+    )
+    .group(1)
+    .split()
+)
+NOT_OURS = MATH | {
+    "log2",
+    "log1p",
+    "sinh",
+    "cosh",
+    "tanh",
+    "asinh",
+    "acosh",
+    "atanh",
+    "cbrt",
+    "erf",
+    "erfc",
+    "lgamma",
+    "tgamma",
+    "polar",
+    "arg",
+}
 
 
 def foreign_math(root):
     call = re.compile(r"(?:std::|(?<![\w:.>\"]))(" + "|".join(sorted(NOT_OURS)) + r")[fl]?\(")
     problems = []
-    for path in sorted(p for top in ("src", "include") for p in (root / top).rglob("*") if p.suffix in (".cpp", ".h")):
-        if path.relative_to(root).as_posix() in ("include/ruedo/math.h", "src/core/math/c_names.cpp"):
+    for path in sorted(
+        p
+        for top in ("src", "include")
+        for p in (root / top).rglob("*")
+        if p.suffix in (".cpp", ".h")
+    ):
+        if path.relative_to(root).as_posix() in (
+            "include/ruedo/math.h",
+            "src/core/math/c_names.cpp",
+        ):
             continue
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
             code = re.sub(r'"(?:[^"\\]|\\.)*"|//.*', "", line)
             declared = re.search(r"\b(?:void|Log|Logger|MotionLog&?|Reader)\s+(?:log)\(", code)
-            problems += [f"{path.relative_to(root)}:{number}: {name}() is the C library's; use math::{name} of ruedo/math.h"
-                         for name in call.findall(code) if not declared]
+            problems += [
+                f"{path.relative_to(root)}:{number}: {name}() is the C library's; use math::{name} of ruedo/math.h"
+                for name in call.findall(code)
+                if not declared
+            ]
     return problems
 
 
@@ -147,57 +229,93 @@ def test_elementary_functions_are_ours():
 def test_a_foreign_function_is_named(tmp_path):
     (tmp_path / "src/robot").mkdir(parents=True)
     (tmp_path / "include").mkdir()
-    (tmp_path / "src/robot/a.cpp").write_text("// sin(x)\ndouble a = std::sin(1.0), b = math::cos(2.0);\nfloat c = atan2f(1, 2) + std::log2(3);\n")
+    (tmp_path / "src/robot/a.cpp").write_text(
+        "// sin(x)\ndouble a = std::sin(1.0), b = math::cos(2.0);\nfloat c = atan2f(1, 2) + std::log2(3);\n"
+    )
     assert [p.split(": ")[0] + p.split(": ")[1][:5] for p in foreign_math(tmp_path)] == [
-        "src/robot/a.cpp:2sin()", "src/robot/a.cpp:3atan2", "src/robot/a.cpp:3log2("]
+        "src/robot/a.cpp:2sin()",
+        "src/robot/a.cpp:3atan2",
+        "src/robot/a.cpp:3log2(",
+    ]
 
 
 @pytest.mark.skipif("RUEDO_BINARY_DIR" not in os.environ, reason="started without a build")
 def test_what_is_built_takes_no_elementary_function_from_outside():
     build = Path(os.environ["RUEDO_BINARY_DIR"])
-    built = [build / "bin/ruedo", build / "bin/ruedo-measure", build / "bin/ruedo-import-mesh", *build.glob("python/ruedo/_engine*.so"), *build.glob("math/lib*.so*")]
+    built = [
+        build / "bin/ruedo",
+        build / "bin/ruedo-measure",
+        build / "bin/ruedo-import-mesh",
+        *build.glob("python/ruedo/_engine*.so"),
+        *build.glob("math/lib*.so*"),
+    ]
     assert len(built) >= 8
     for path in built:
-        names = subprocess.run(["nm", "-D", "--undefined-only", path], capture_output=True, text=True, check=True).stdout.split()
+        names = subprocess.run(
+            ["nm", "-D", "--undefined-only", path], capture_output=True, text=True, check=True
+        ).stdout.split()
         foreign = {name.split("@")[0] for name in names} & NOT_OURS
         assert not foreign, f"{path.name} takes {', '.join(sorted(foreign))} from the C library"
 
 
 # The rule itself, on trees that break it.
 
+
 def tree(folder, files):
-    (folder / "CMakeLists.txt").write_text("ruedo_layer(core LINK Eigen3::Eigen)\nruedo_layer(scene LINK ruedo_core)\n"
-                                           "ruedo_layer(physics LINK ruedo_core)\nruedo_layer(sensors OBJECT LINK ruedo_scene)\n")
+    (folder / "CMakeLists.txt").write_text(
+        "ruedo_layer(core LINK Eigen3::Eigen)\nruedo_layer(scene LINK ruedo_core)\n"
+        "ruedo_layer(physics LINK ruedo_core)\nruedo_layer(sensors OBJECT LINK ruedo_scene)\n"
+    )
     for name, text in files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text)
     return folder
 
 
-@pytest.mark.parametrize("name, include, good", [
-    ("src/sensors/lrf.cpp", '"scene/ray_scene.h"', True),
-    ("src/sensors/lrf.cpp", '"core/x.h"', True),
-    ("src/sensors/lrf.cpp", '"physics/physics_world.h"', False),
-    ("src/scene/ray.cpp", '"sensors/lrf.h"', False),
-    ("src/scene/ray.cpp", "<embree4/rtcore.h>", True),
-    ("src/sensors/lrf.cpp", "<embree4/rtcore.h>", False),
-    ("src/physics/world.cpp", "<btBulletDynamicsCommon.h>", True),
-    ("src/scene/ray.cpp", "<btBulletDynamicsCommon.h>", False),
-    ("src/cli/main.cpp", '"sensors/lrf.h"', True),
-    ("include/ruedo/pose.h", "<Eigen/Geometry>", True),
-    ("include/ruedo/pose.h", '"core/x.h"', False),
-    ("src/newlayer/x.cpp", '"core/x.h"', False),
-])
+@pytest.mark.parametrize(
+    "name, include, good",
+    [
+        ("src/sensors/lrf.cpp", '"scene/ray_scene.h"', True),
+        ("src/sensors/lrf.cpp", '"core/x.h"', True),
+        ("src/sensors/lrf.cpp", '"physics/physics_world.h"', False),
+        ("src/scene/ray.cpp", '"sensors/lrf.h"', False),
+        ("src/scene/ray.cpp", "<embree4/rtcore.h>", True),
+        ("src/sensors/lrf.cpp", "<embree4/rtcore.h>", False),
+        ("src/physics/world.cpp", "<btBulletDynamicsCommon.h>", True),
+        ("src/scene/ray.cpp", "<btBulletDynamicsCommon.h>", False),
+        ("src/cli/main.cpp", '"sensors/lrf.h"', True),
+        ("include/ruedo/pose.h", "<Eigen/Geometry>", True),
+        ("include/ruedo/pose.h", '"core/x.h"', False),
+        ("src/newlayer/x.cpp", '"core/x.h"', False),
+    ],
+)
 def test_walls_are_seen(tmp_path, name, include, good):
-    assert (broken_walls(tree(tmp_path, {name: f"#pragma once\n#include {include}\n"})) == []) == good
+    assert (
+        broken_walls(tree(tmp_path, {name: f"#pragma once\n#include {include}\n"})) == []
+    ) == good
 
 
-@pytest.mark.parametrize("text, good", [
-    ("int64_t n = std::llround(x);", False), ("auto n = static_cast<int64_t>(std::floor(x / cell));", False), ("auto n = static_cast<int>(phase_s);", False),
-    ("auto n = static_cast<size_t>(2 * static_cast<double>(i));", False), ("auto n = int64_t(e.number(path, 0) * 1e6);", False),
-    ("auto n = static_cast<int>(i);", True), ("auto n = static_cast<size_t>(list[static_cast<size_t>(i)].size());", True), ("auto n = whole<int>(phase_s);", True),
-    ("auto n = static_cast<int64_t>(sizeof(double));", True)])
+@pytest.mark.parametrize(
+    "text, good",
+    [
+        ("int64_t n = std::llround(x);", False),
+        ("auto n = static_cast<int64_t>(std::floor(x / cell));", False),
+        ("auto n = static_cast<int>(phase_s);", False),
+        ("auto n = static_cast<size_t>(2 * static_cast<double>(i));", False),
+        ("auto n = int64_t(e.number(path, 0) * 1e6);", False),
+        ("auto n = static_cast<int>(i);", True),
+        ("auto n = static_cast<size_t>(list[static_cast<size_t>(i)].size());", True),
+        ("auto n = whole<int>(phase_s);", True),
+        ("auto n = static_cast<int64_t>(sizeof(double));", True),
+    ],
+)
 def test_bare_conversions_are_seen(tmp_path, text, good):
-    assert (bare_conversions(tree(tmp_path, {"src/core/a.cpp": text + "\n", WHOLE: "static_cast<int>(std::floor(x))\n"})) == []) == good
-
-
+    assert (
+        bare_conversions(
+            tree(
+                tmp_path,
+                {"src/core/a.cpp": text + "\n", WHOLE: "static_cast<int>(std::floor(x))\n"},
+            )
+        )
+        == []
+    ) == good

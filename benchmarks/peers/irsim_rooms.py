@@ -16,17 +16,50 @@ STEP_S = 0.1
 
 
 def make_world(rooms: bench.Rooms) -> dict:
-    size = max(max(b.center[0] + b.size[0] / 2, b.center[1] + b.size[1] / 2) for b in rooms.walls) + 1.0
-    lidar = {"name": "lidar2d", "range_min": 0, "range_max": bench.LRF_RANGE_M, "angle_range": math.pi,
-             "number": bench.LRF_RAYS, "noise": False, "alpha": 0.4}
-    robots = [{"kinematics": {"name": "diff"}, "shape": {"name": "circle", "radius": 0.3},
-               "state": [s.x, s.y, s.yaw], "goal": [s.x, s.y, 0], "vel_max": [1, 2], "sensors": [lidar]}
-              for s in rooms.starts]
-    walls = [{"shape": {"name": "rectangle", "length": b.size[0], "width": b.size[1]},
-              "state": [b.center[0], b.center[1], 0]} for b in rooms.walls]
-    return {"world": {"width": size + 1.0, "height": size + 1.0, "offset": [-1, -1], "step_time": STEP_S, "sample_time": STEP_S,
-                      "control_mode": "auto", "collision_mode": "unobstructed"},
-            "robot": robots, "obstacle": walls}
+    size = (
+        max(max(b.center[0] + b.size[0] / 2, b.center[1] + b.size[1] / 2) for b in rooms.walls)
+        + 1.0
+    )
+    lidar = {
+        "name": "lidar2d",
+        "range_min": 0,
+        "range_max": bench.LRF_RANGE_M,
+        "angle_range": math.pi,
+        "number": bench.LRF_RAYS,
+        "noise": False,
+        "alpha": 0.4,
+    }
+    robots = [
+        {
+            "kinematics": {"name": "diff"},
+            "shape": {"name": "circle", "radius": 0.3},
+            "state": [s.x, s.y, s.yaw],
+            "goal": [s.x, s.y, 0],
+            "vel_max": [1, 2],
+            "sensors": [lidar],
+        }
+        for s in rooms.starts
+    ]
+    walls = [
+        {
+            "shape": {"name": "rectangle", "length": b.size[0], "width": b.size[1]},
+            "state": [b.center[0], b.center[1], 0],
+        }
+        for b in rooms.walls
+    ]
+    return {
+        "world": {
+            "width": size + 1.0,
+            "height": size + 1.0,
+            "offset": [-1, -1],
+            "step_time": STEP_S,
+            "sample_time": STEP_S,
+            "control_mode": "auto",
+            "collision_mode": "unobstructed",
+        },
+        "robot": robots,
+        "obstacle": walls,
+    }
 
 
 def run(rooms: bench.Rooms):

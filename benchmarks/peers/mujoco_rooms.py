@@ -14,14 +14,18 @@ def make_xml(rooms: bench.Rooms) -> str:
     walls = "".join(
         f'<geom type="box" pos="{b.center[0]} {b.center[1]} {b.center[2]}" '
         f'size="{b.size[0] / 2} {b.size[1] / 2} {b.size[2] / 2}" contype="1" conaffinity="2"/>'
-        for b in rooms.walls)
+        for b in rooms.walls
+    )
     robots = "".join(
         f'<body name="r{i}" pos="{s.x} {s.y} 0.14" euler="0 0 {s.yaw}"><freejoint/>'
         '<geom type="box" size="0.25 0.25 0.14" mass="20" friction="0 0 0" contype="2" conaffinity="3"/></body>'
-        for i, s in enumerate(rooms.starts))
-    return (f'<mujoco><compiler angle="radian"/><option timestep="{STEP_S}"/><size memory="2G"/><worldbody>'
-            f'<geom type="plane" size="0 0 1" friction="0 0 0" contype="1" conaffinity="2"/>{walls}{robots}'
-            '</worldbody></mujoco>')
+        for i, s in enumerate(rooms.starts)
+    )
+    return (
+        f'<mujoco><compiler angle="radian"/><option timestep="{STEP_S}"/><size memory="2G"/><worldbody>'
+        f'<geom type="plane" size="0 0 1" friction="0 0 0" contype="1" conaffinity="2"/>{walls}{robots}'
+        '</worldbody></mujoco>'
+    )
 
 
 def run(rooms: bench.Rooms):
@@ -49,10 +53,24 @@ def run(rooms: bench.Rooms):
             if step % scan_every == 0:
                 for i in range(count):
                     heading = yaw[i] + angles
-                    rays = np.stack([np.cos(heading), np.sin(heading), np.zeros_like(heading)], axis=1)
+                    rays = np.stack(
+                        [np.cos(heading), np.sin(heading), np.zeros_like(heading)], axis=1
+                    )
                     origin = np.array([data.qpos[7 * i], data.qpos[7 * i + 1], bench.LRF_HEIGHT_M])
-                    mujoco.mj_multiRay(model, data, origin, rays.ravel(), None, 1, body_ids[i], geom_ids, distances, None,
-                                       bench.LRF_RAYS, bench.LRF_RANGE_M)
+                    mujoco.mj_multiRay(
+                        model,
+                        data,
+                        origin,
+                        rays.ravel(),
+                        None,
+                        1,
+                        body_ids[i],
+                        geom_ids,
+                        distances,
+                        None,
+                        bench.LRF_RAYS,
+                        bench.LRF_RANGE_M,
+                    )
             step += 1
 
     return advance

@@ -15,12 +15,16 @@ def prepare(walls: list[bench.Box], eye: tuple[float, float, float]):
         shape = p.createVisualShape(p.GEOM_BOX, halfExtents=[length / 2 for length in wall.size])
         p.createMultiBody(0, baseVisualShapeIndex=shape, basePosition=wall.center)
     width, height = bench.PICTURE
-    projection = p.computeProjectionMatrixFOV(math.degrees(bench.vertical_view_rad()), width / height, 0.05, 50)
+    projection = p.computeProjectionMatrixFOV(
+        math.degrees(bench.vertical_view_rad()), width / height, 0.05, 50
+    )
 
     def draw(yaw: float):
         target = [eye[0] + math.cos(yaw), eye[1] + math.sin(yaw), eye[2]]
         view = p.computeViewMatrix(eye, target, [0, 0, 1])
-        return p.getCameraImage(width, height, view, projection, shadow=0, renderer=p.ER_TINY_RENDERER)[2]
+        return p.getCameraImage(
+            width, height, view, projection, shadow=0, renderer=p.ER_TINY_RENDERER
+        )[2]
 
     return draw
 

@@ -20,8 +20,12 @@ def run(rooms: bench.Rooms):
     chassis = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.25, 0.25, 0.14])
     robots = []
     for start in rooms.starts:
-        robot = p.createMultiBody(20, chassis, basePosition=[start.x, start.y, 0.141],
-                                  baseOrientation=p.getQuaternionFromEuler([0, 0, start.yaw]))
+        robot = p.createMultiBody(
+            20,
+            chassis,
+            basePosition=[start.x, start.y, 0.141],
+            baseOrientation=p.getQuaternionFromEuler([0, 0, start.yaw]),
+        )
         p.changeDynamics(robot, -1, lateralFriction=0, spinningFriction=0)
         robots.append(robot)
     angles = bench.ray_angles()
@@ -36,15 +40,24 @@ def run(rooms: bench.Rooms):
                 position, orientation = p.getBasePositionAndOrientation(robot)
                 yaw = p.getEulerFromQuaternion(orientation)[2]
                 fall = p.getBaseVelocity(robot)[0][2]
-                p.resetBaseVelocity(robot, [bench.SPEED_M_S * math.cos(yaw), bench.SPEED_M_S * math.sin(yaw), fall],
-                                    [0, 0, bench.TURN_RATE_RAD_S])
+                p.resetBaseVelocity(
+                    robot,
+                    [bench.SPEED_M_S * math.cos(yaw), bench.SPEED_M_S * math.sin(yaw), fall],
+                    [0, 0, bench.TURN_RATE_RAD_S],
+                )
                 poses.append((position, yaw))
             p.stepSimulation()
             if step % scan_every == 0:
                 for position, yaw in poses:
                     origin = [position[0], position[1], bench.LRF_HEIGHT_M]
-                    ends = [[origin[0] + bench.LRF_RANGE_M * math.cos(yaw + a),
-                             origin[1] + bench.LRF_RANGE_M * math.sin(yaw + a), origin[2]] for a in angles]
+                    ends = [
+                        [
+                            origin[0] + bench.LRF_RANGE_M * math.cos(yaw + a),
+                            origin[1] + bench.LRF_RANGE_M * math.sin(yaw + a),
+                            origin[2],
+                        ]
+                        for a in angles
+                    ]
                     p.rayTestBatch([origin] * len(ends), ends, numThreads=0)
             step += 1
 

@@ -70,7 +70,9 @@ def main(simulator: str, step_s: float, run) -> None:
     """Times `run(rooms, sim_seconds)`, which returns a function that advances by that long, and prints a JSON row."""
     parser = argparse.ArgumentParser(description=f"{simulator} on Ruedo's benchmark map")
     parser.add_argument("world", help="file written by ruedo bench --write-world")
-    parser.add_argument("--duration", type=float, default=5.0, help="simulated seconds to time (default 5)")
+    parser.add_argument(
+        "--duration", type=float, default=5.0, help="simulated seconds to time (default 5)"
+    )
     arguments = parser.parse_args()
     rooms = load(arguments.world)
     advance = run(rooms)
@@ -78,14 +80,18 @@ def main(simulator: str, step_s: float, run) -> None:
     began, cpu_began = time.perf_counter(), time.process_time()
     advance(arguments.duration)
     wall_s, cpu_s = time.perf_counter() - began, time.process_time() - cpu_began
-    print(json.dumps({
-        "simulator": simulator,
-        "robots": len(rooms.starts),
-        "step_ms": step_s * 1e3,
-        "real_time_factor": arguments.duration / wall_s,
-        "cpu_s_per_sim_s": cpu_s / arguments.duration,
-        "memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
-    }))
+    print(
+        json.dumps(
+            {
+                "simulator": simulator,
+                "robots": len(rooms.starts),
+                "step_ms": step_s * 1e3,
+                "real_time_factor": arguments.duration / wall_s,
+                "cpu_s_per_sim_s": cpu_s / arguments.duration,
+                "memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+            }
+        )
+    )
 
 
 def vertical_view_rad() -> float:
@@ -109,5 +115,12 @@ def camera_main(simulator: str, prepare) -> None:
     for frame in range(arguments.frames):
         draw(math.radians(10 * frame))
     wall_s, cpu_s = time.perf_counter() - began, time.process_time() - cpu_began
-    print(json.dumps({"simulator": simulator, "frames_per_s": arguments.frames / wall_s,
-                      "frames_per_cpu_s": arguments.frames / cpu_s}))
+    print(
+        json.dumps(
+            {
+                "simulator": simulator,
+                "frames_per_s": arguments.frames / wall_s,
+                "frames_per_cpu_s": arguments.frames / cpu_s,
+            }
+        )
+    )

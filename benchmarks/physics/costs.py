@@ -11,7 +11,11 @@ import rows
 from scenes import PLANE, Body, Scene, Shape
 from simulators import Simulator, sdf, with_friction
 
-STEP_S, SECONDS, REPEATS = 0.005, 1.5, 5    # shorter than the 2 s after which Ruedo lets what rests sleep
+STEP_S, SECONDS, REPEATS = (
+    0.005,
+    1.5,
+    5,
+)  # shorter than the 2 s after which Ruedo lets what rests sleep
 
 
 class InProcess(Simulator):
@@ -23,7 +27,9 @@ class InProcess(Simulator):
         self._folder = tempfile.TemporaryDirectory(prefix="ruedo-physics-")
         world = Path(self._folder.name) / "world.sdf"
         if scene.urdf:
-            (Path(self._folder.name) / "robot.urdf").write_text(with_friction(scene), encoding="utf-8")
+            (Path(self._folder.name) / "robot.urdf").write_text(
+                with_friction(scene), encoding="utf-8"
+            )
         world.write_text(sdf(scene, step_s), encoding="utf-8")
         self._engine = ruedo.Engine(str(world), threads=1)
 
@@ -44,8 +50,24 @@ class InProcess(Simulator):
 
 def falling() -> Scene:
     """20 boxes, balls and cylinders onto triangles of 8 cm."""
-    shapes = (Shape("box", (0.2, 0.2, 0.2), friction=0.8), Shape("sphere", (0.1,), friction=0.8), Shape("cylinder", (0.1, 0.2), friction=0.8))
-    return Scene((rows.floor(), *(Body(f"b{i}", (shapes[i % 3],), at=(0.03 + 0.4 * (i % 5), -0.61 + 0.4 * (i // 5), 0.15)) for i in range(20))))
+    shapes = (
+        Shape("box", (0.2, 0.2, 0.2), friction=0.8),
+        Shape("sphere", (0.1,), friction=0.8),
+        Shape("cylinder", (0.1, 0.2), friction=0.8),
+    )
+    return Scene(
+        (
+            rows.floor(),
+            *(
+                Body(
+                    f"b{i}",
+                    (shapes[i % 3],),
+                    at=(0.03 + 0.4 * (i % 5), -0.61 + 0.4 * (i // 5), 0.15),
+                )
+                for i in range(20)
+            ),
+        )
+    )
 
 
 def cost(make, scene: Scene, joints: bool) -> float:
@@ -62,12 +84,24 @@ def cost(make, scene: Scene, joints: bool) -> float:
 
 
 def table(peers: list[type[Simulator]]) -> str:
-    scenes = (("stack of 15 boxes, 1.5 s", Scene((PLANE, *(rows.box(f"b{i}", mass=1.0, at=(0, 0, 0.1 + 0.2 * i)) for i in range(15)))), False),
-              ("arm of six joints that holds 5 kg", Scene(urdf=rows.arm(), commands=True), True),
-              ("20 things that fall on triangles of 8 cm", falling(), False))
+    scenes = (
+        (
+            "stack of 15 boxes, 1.5 s",
+            Scene(
+                (PLANE, *(rows.box(f"b{i}", mass=1.0, at=(0, 0, 0.1 + 0.2 * i)) for i in range(15)))
+            ),
+            False,
+        ),
+        ("arm of six joints that holds 5 kg", Scene(urdf=rows.arm(), commands=True), True),
+        ("20 things that fall on triangles of 8 cm", falling(), False),
+    )
     makers = [InProcess, *peers]
-    lines = ["| ms of one core for a simulated second | " + " | ".join(m.name for m in makers) + (" | Ruedo, of the faster one |" if peers else " |"),
-             "|---|" + "---|" * (len(makers) + bool(peers))]
+    lines = [
+        "| ms of one core for a simulated second | "
+        + " | ".join(m.name for m in makers)
+        + (" | Ruedo, of the faster one |" if peers else " |"),
+        "|---|" + "---|" * (len(makers) + bool(peers)),
+    ]
     for title, scene, joints in scenes:
         costs = [cost(make, scene, joints) for make in makers]
         ratio = f" {costs[0] / min(costs[1:]):.2f} |" if peers else ""

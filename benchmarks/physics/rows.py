@@ -11,11 +11,21 @@ from typing import Callable
 
 import numpy as np
 
-from scenes import BOUNCING_PLANE, GRAVITY, PLANE, Body, Chain, Scene, Shape, flat_mesh, skid_steered
+from scenes import (
+    BOUNCING_PLANE,
+    GRAVITY,
+    PLANE,
+    Body,
+    Chain,
+    Scene,
+    Shape,
+    flat_mesh,
+    skid_steered,
+)
 from simulators import Simulator
 
-Make = Callable[[Scene, float], Simulator]    # a simulator's class
-Series = list[tuple[float, float]]            # s, value
+Make = Callable[[Scene, float], Simulator]  # a simulator's class
+Series = list[tuple[float, float]]  # s, value
 
 
 @dataclass(frozen=True)
@@ -25,10 +35,12 @@ class Row:
     title: str
     unit: str
     reference: float
-    source: str                                        # of the reference
-    measure: Callable[[Make, float, Series], float]    # the series may be filled with what is worth a plot
+    source: str  # of the reference
+    measure: Callable[
+        [Make, float, Series], float
+    ]  # the series may be filled with what is worth a plot
     digits: int = 4
-    long: bool = False                                 # takes more than some seconds
+    long: bool = False  # takes more than some seconds
 
 
 def steps(seconds: float, step_s: float) -> int:
@@ -36,6 +48,7 @@ def steps(seconds: float, step_s: float) -> int:
 
 
 # Flight and rotation
+
 
 def flight(make: Make, step_s: float, series: Series) -> float:
     with make(Scene((Body("ball", (Shape("sphere", (0.1,)),), at=(0, 0, 5)),)), step_s) as sim:
@@ -46,10 +59,15 @@ def flight(make: Make, step_s: float, series: Series) -> float:
 
 def tumbling(make: Make, step_s: float, series: Series) -> float:
     moments = (0.01, 0.02, 0.025)
-    with make(Scene((Body("brick", (Shape("box", (0.1, 0.1, 0.1)),), inertia=moments),), gravity=0.0), step_s) as sim:
+    with make(
+        Scene((Body("brick", (Shape("box", (0.1, 0.1, 0.1)),), inertia=moments),), gravity=0.0),
+        step_s,
+    ) as sim:
+
         def energy() -> float:
             own = sim.rotation("brick").T @ sim.velocity("brick")[1]
             return 0.5 * float(np.dot(moments, own * own))
+
         sim.set_velocity("brick", (0, 0, 0), (0.1, 5.0, 0.1))
         before = 0.5 * (0.01 * 0.01 + 0.02 * 25 + 0.025 * 0.01)
         for i in range(60):
@@ -78,31 +96,55 @@ def angle_about_y(rotation: np.ndarray) -> float:
 def pendulum(amplitude: float) -> Callable[[Make, float, Series], float]:
     def measure(make: Make, step_s: float, series: Series) -> float:
         # At rest along x; hanging is pi / 2 about y.
-        urdf = Chain().add("arm", (0, 0, 1), 2.0, (0.5, 0, 0), (0.01, 0.1, 0.1), rpy=(0, math.pi / 2 - amplitude, 0)).urdf()
+        urdf = (
+            Chain()
+            .add(
+                "arm",
+                (0, 0, 1),
+                2.0,
+                (0.5, 0, 0),
+                (0.01, 0.1, 0.1),
+                rpy=(0, math.pi / 2 - amplitude, 0),
+            )
+            .urdf()
+        )
         with make(Scene(urdf=urdf), step_s) as sim:
             crossings, last, i = [], -amplitude, 0
             while len(crossings) < 3 and i * step_s < 12.0:
                 sim.step(1)
                 i += 1
-                angle = math.remainder(angle_about_y(sim.rotation("arm")) - math.pi / 2, 2 * math.pi)
+                angle = math.remainder(
+                    angle_about_y(sim.rotation("arm")) - math.pi / 2, 2 * math.pi
+                )
                 if abs(angle) < 1.0 and last * angle < 0.0 and abs(last) < 1.0:
                     crossings.append((i - angle / (angle - last)) * step_s)
                 last = angle
             return crossings[2] - crossings[0] if len(crossings) == 3 else math.nan
+
     return measure
 
 
 def double_pendulum(make: Make, step_s: float, series: Series) -> float:
-    chain = Chain().add("a", (0, 0, 2), 1.0, (0.25, 0, 0), LINK, rpy=(0, -1, 0)).add("b", (0.5, 0, 0), 1.0, (0.25, 0, 0), LINK, rpy=(0, 0.5, 0))
+    chain = (
+        Chain()
+        .add("a", (0, 0, 2), 1.0, (0.25, 0, 0), LINK, rpy=(0, -1, 0))
+        .add("b", (0.5, 0, 0), 1.0, (0.25, 0, 0), LINK, rpy=(0, 0.5, 0))
+    )
     with make(Scene(urdf=chain.urdf()), step_s) as sim:
+
         def energy() -> float:
             total = 0.0
             for link in ("a", "b"):
                 rotation, (linear, angular) = sim.rotation(link), sim.velocity(link)
                 center = rotation @ np.array([0.25, 0, 0])
                 v, own = linear + np.cross(angular, center), rotation.T @ angular
-                total += 0.5 * float(v @ v) + 0.5 * float(np.dot(LINK, own * own)) + GRAVITY * (sim.position(link)[2] + center[2] - 2.0)
+                total += (
+                    0.5 * float(v @ v)
+                    + 0.5 * float(np.dot(LINK, own * own))
+                    + GRAVITY * (sim.position(link)[2] + center[2] - 2.0)
+                )
             return total
+
         before, scale = energy(), GRAVITY * (0.25 + 0.75)
         for i in range(40):
             sim.step(steps(0.5, step_s))
@@ -114,7 +156,14 @@ def arm() -> str:
     """Six links of 0.2 m and 1 kg, stretched out, 5 kg at the tip; every second joint turns about z."""
     chain = Chain()
     for i in range(6):
-        chain.add(f"l{i}", (0, 0, 1) if i == 0 else (0.2, 0, 0), 6.0 if i == 5 else 1.0, (0.1, 0, 0), (0.001, 0.004, 0.004), "0 1 0" if i % 2 == 0 else "0 0 1")
+        chain.add(
+            f"l{i}",
+            (0, 0, 1) if i == 0 else (0.2, 0, 0),
+            6.0 if i == 5 else 1.0,
+            (0.1, 0, 0),
+            (0.001, 0.004, 0.004),
+            "0 1 0" if i % 2 == 0 else "0 0 1",
+        )
     return chain.urdf()
 
 
@@ -127,14 +176,17 @@ def arm_creep(make: Make, step_s: float, series: Series) -> float:
         sim.step(steps(1.0, step_s))
         start = sim.position("l5")
         sim.step(steps(9.0, step_s))
-        return float(np.linalg.norm(sim.position("l5") - start)) / 9.0    # over 1 m: rad/s
+        return float(np.linalg.norm(sim.position("l5") - start)) / 9.0  # over 1 m: rad/s
 
 
 def arm_error(make: Make, step_s: float, series: Series) -> float:
     """Told 0.2 rad everywhere, from stretched out: where its last joint is 4 s later, against the product of its rotations."""
     at, turned = np.array([0.0, 0.0, 1.0]), np.eye(3)
     c, s = math.cos(0.2), math.sin(0.2)
-    about_y, about_z = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]), np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    about_y, about_z = (
+        np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]),
+        np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]),
+    )
     for i in range(5):
         turned = turned @ (about_y if i % 2 == 0 else about_z)
         at = at + turned @ np.array([0.2, 0, 0])
@@ -145,6 +197,7 @@ def arm_error(make: Make, step_s: float, series: Series) -> float:
 
 
 # Contacts
+
 
 def box(name: str = "box", **more) -> Body:
     friction = more.pop("friction", 0.8)
@@ -159,6 +212,7 @@ def sliding(angle: float) -> Callable[[Make, float, Series], float]:
             sim.set_velocity("box", (math.cos(angle), math.sin(angle), 0))
             sim.step(steps(1.0, step_s))
             return float(np.linalg.norm((sim.position("box") - start)[:2]))
+
     return measure
 
 
@@ -166,7 +220,13 @@ def slope(angle: float, body: Body) -> Scene:
     """A body that touches a slope down along x."""
     height = body.shapes[0].size[0] / (2 if body.shapes[0].kind == "box" else 1)
     at = (height * math.sin(angle), 0.0, height * math.cos(angle))
-    hill = Body("hill", (Shape("box", (40.0, 4.0, 1.0)),), mass=0.0, at=(-0.5 * math.sin(angle), 0, -0.5 * math.cos(angle)), rpy=(0, angle, 0))
+    hill = Body(
+        "hill",
+        (Shape("box", (40.0, 4.0, 1.0)),),
+        mass=0.0,
+        at=(-0.5 * math.sin(angle), 0, -0.5 * math.cos(angle)),
+        rpy=(0, angle, 0),
+    )
     return Scene((hill, Body(body.name, body.shapes, at=at, rpy=(0, angle, 0))))
 
 
@@ -208,6 +268,7 @@ def bounce(restitution: float) -> Callable[[Make, float, Series], float]:
                 up = up or sim.velocity("ball")[0][2] > 0.05
                 highest = max(highest, z) if up else 0.0
             return highest
+
     return measure
 
 
@@ -222,7 +283,10 @@ def spinning(make: Make, step_s: float, series: Series) -> float:
 
 def tunnelling(make: Make, step_s: float, series: Series) -> float:
     wall = Body("wall", (Shape("box", (0.002, 2, 2)),), mass=0.0)
-    with make(Scene((wall, Body("ball", (Shape("sphere", (0.05,)),), at=(-0.503, 0, 0))), gravity=0.0), step_s) as sim:
+    with make(
+        Scene((wall, Body("ball", (Shape("sphere", (0.05,)),), at=(-0.503, 0, 0))), gravity=0.0),
+        step_s,
+    ) as sim:
         sim.set_velocity("ball", (10, 0, 0))
         sim.step(steps(0.5, step_s))
         return float(max(sim.position("ball")[0], 0.0))
@@ -230,18 +294,33 @@ def tunnelling(make: Make, step_s: float, series: Series) -> float:
 
 # Stacks
 
+
 def stack(boxes: int, top: float = 1.0) -> Callable[[Make, float, Series], float]:
     def measure(make: Make, step_s: float, series: Series) -> float:
-        bodies = tuple(box(f"b{i}", mass=top if i + 1 == boxes else 1.0, at=(0, 0, 0.1 + 0.2 * i)) for i in range(boxes))
+        bodies = tuple(
+            box(f"b{i}", mass=top if i + 1 == boxes else 1.0, at=(0, 0, 0.1 + 0.2 * i))
+            for i in range(boxes)
+        )
         with make(Scene((PLANE, *bodies)), step_s) as sim:
             for i in range(60):
                 sim.step(steps(1.0, step_s))
-                series.append((i + 1.0, 1e3 * max(float(np.linalg.norm(sim.position(b.name) - np.array(b.at))) for b in bodies)))
+                series.append(
+                    (
+                        i + 1.0,
+                        1e3
+                        * max(
+                            float(np.linalg.norm(sim.position(b.name) - np.array(b.at)))
+                            for b in bodies
+                        ),
+                    )
+                )
             return max(value for _, value in series)
+
     return measure
 
 
 # A floor of triangles
+
 
 @cache
 def floor() -> Body:
@@ -249,7 +328,9 @@ def floor() -> Body:
     return Body("floor", (Shape("mesh", file=flat_mesh(folder, half=2.0, along=5.0)),), mass=0.0)
 
 
-def rolling(body: Body, ground: Callable[[], Body], what: str, heading: float = 0.3) -> Callable[[Make, float, Series], float]:
+def rolling(
+    body: Body, ground: Callable[[], Body], what: str, heading: float = 0.3
+) -> Callable[[Make, float, Series], float]:
     def measure(make: Make, step_s: float, series: Series) -> float:
         radius = body.shapes[0].size[0]
         with make(Scene((ground(), body)), step_s) as sim:
@@ -264,21 +345,27 @@ def rolling(body: Body, ground: Callable[[], Body], what: str, heading: float = 
                 series.append((0.1 * (i + 1), 1e3 * aside))
                 worst = max(worst, abs(aside))
             return 1e3 * worst if what == "aside" else float(sim.velocity(body.name)[0] @ ahead)
+
     return measure
 
 
 def skidding(left: float, right: float) -> Callable[[Make, float, Series], float]:
     """How much wider its wheels' rates would have the track than it is, for the turn that the robot makes."""
+
     def measure(make: Make, step_s: float, series: Series) -> float:
         half_base, half_track, radius = 0.1345, 0.197, 0.111
         urdf = skid_steered(half_base, half_track, radius, 0.075, 14.0, 1.5)
-        scene = Scene((PLANE,), urdf=urdf, wheels=(("to_fl", "to_rl"), ("to_fr", "to_rr")), friction=0.8)
+        scene = Scene(
+            (PLANE,), urdf=urdf, wheels=(("to_fl", "to_rl"), ("to_fr", "to_rr")), friction=0.8
+        )
         with make(scene, step_s) as sim:
             sim.drive(left, right)
             sim.step(steps(2.0, step_s))
+
             def heading() -> float:
                 rotation = sim.rotation("base")
                 return math.atan2(rotation[1, 0], rotation[0, 0])
+
             turned, last = 0.0, heading()
             for i in range(16):
                 sim.step(steps(0.5, step_s))
@@ -286,39 +373,257 @@ def skidding(left: float, right: float) -> Callable[[Make, float, Series], float
                 last = heading()
                 series.append((0.5 * (i + 1), turned))
             return radius * (right - left) * 8.0 / (2 * half_track * turned)
+
     return measure
 
 
 BALL = Body("ball", (Shape("sphere", (0.1,)),), at=(0, 0, 0.1))
 ROLLER = Body("roller", (Shape("cylinder", (0.1, 0.3)),), at=(0, 0, 0.1), rpy=(math.pi / 2, 0, 0))
 
-FREE, JOINTED, CONTACT, STACKS, MESHES = "Flight and rotation", "Mechanisms", "Contacts", "Stacks", "Floors of triangles"
+FREE, JOINTED, CONTACT, STACKS, MESHES = (
+    "Flight and rotation",
+    "Mechanisms",
+    "Contacts",
+    "Stacks",
+    "Floors of triangles",
+)
 SKIDDING = "Skid steering"
 WANG = "[Wang et al. 2015](https://doi.org/10.3390/s150509681)"
 CLOSED = "closed form"
 
 ROWS = [
-    Row("flight", FREE, "thrown with 2, 3 m/s: height after 1 s", "m", 5 + 3 - GRAVITY / 2, CLOSED, flight, 6),
-    Row("tumbling", FREE, "spun at 5 rad/s about its middle axis: energy after 6 s, of 1", "", 1.0, CLOSED, tumbling, 5),
-    Row("pendulum_small", JOINTED, "pendulum, 0.1 rad: period", "s", pendulum_period(0.1), CLOSED, pendulum(0.1), 5),
-    Row("pendulum_large", JOINTED, "pendulum, 3.0 rad: period", "s", pendulum_period(3.0), CLOSED, pendulum(3.0), 4),
-    Row("double_pendulum", JOINTED, "double pendulum: change of its energy in 20 s, of what it has above the lowest", "%", 0.0, CLOSED, double_pendulum, 3),
-    Row("arm_velocity", JOINTED, "arm of six joints, 5 kg at its tip, told to hold still: creep", "rad/s", 0.0, CLOSED, arm_creep, 2),
-    Row("arm_position", JOINTED, "the same arm told 0.2 rad in each joint: error of the last one's place after 4 s", "mm", 0.0, CLOSED, arm_error, 3),
-    Row("sliding", CONTACT, "box pushed to 1 m/s, mu 0.4: way", "m", 1 / (2 * 0.4 * GRAVITY), CLOSED, sliding(0.0), 5),
-    Row("sliding_45", CONTACT, "the same, at 45 degrees to its sides", "m", 1 / (2 * 0.4 * GRAVITY), CLOSED, sliding(math.pi / 4), 5),
-    Row("creep", CONTACT, "box on a slope, 0.01 rad less than mu 0.8 holds: way in 10 s", "mm", 0.0, CLOSED, creep, 3),
-    Row("slide_down", CONTACT, "box on a slope of 0.8 rad, mu 0.8: acceleration", "m/s^2", GRAVITY * (math.sin(0.8) - 0.8 * math.cos(0.8)), CLOSED, slide_down),
-    Row("roll_down", CONTACT, "ball on a slope of 0.3 rad: acceleration", "m/s^2", 5 / 7 * GRAVITY * math.sin(0.3), CLOSED, roll_down),
-    *(Row(f"bounce_{e:g}", CONTACT, f"ball from 1 m, restitution {e:g}: height", "m", e * e, CLOSED, bounce(e)) for e in (0.2, 0.5, 1.0)),
-    Row("spinning", CONTACT, "ball that spins at 10 rad/s, moment 5 mm of its load: rate after 0.4 s", "rad/s", 10 - 0.4 * 0.005 * GRAVITY / 0.004, CLOSED, spinning),
-    Row("tunnelling", CONTACT, "ball of 5 cm at 10 m/s against a wall of 2 mm: how far behind it", "m", 0.0, CLOSED, tunnelling, 3),
-    *(Row(f"stack_{n}", STACKS, f"{n} boxes: furthest from its place in 60 s", "mm", 0.0, CLOSED, stack(n), 3, long=True) for n in (8, 10, 15)),
-    *(Row(f"heavy_{n}", STACKS, f"100 kg on {n} of 1 kg: furthest in 60 s", "mm", 0.0, CLOSED, stack(n + 1, 100.0), 3, long=True) for n in (1, 2)),
-    Row("ball_aside", MESHES, "ball rolling at 1 m/s over triangles of 8 cm, 5 s: aside", "mm", 0.0, CLOSED, rolling(BALL, floor, "aside"), 3),
-    Row("ball_speed", MESHES, "the same: speed after 5 s", "m/s", 1.0, CLOSED, rolling(BALL, floor, "speed")),
-    Row("roller_plane", MESHES, "lying cylinder rolling on a plane: speed after 5 s", "m/s", 1.0, CLOSED, rolling(ROLLER, lambda: PLANE, "speed", 0.0)),
-    Row("skid_spot", SKIDDING, "P3-AT, wheels at -1 and 1 rad/s, mu 0.8: track that its wheels would say, of the real one", "", 1.466, WANG, skidding(-1.0, 1.0), 3),
-    Row("skid_curve", SKIDDING, "the same on a curve, wheels at 1 and 3 rad/s", "", 1.41, WANG, skidding(1.0, 3.0), 3),
-    Row("roller_mesh", MESHES, "lying cylinder rolling over triangles of 8 cm: speed after 5 s", "m/s", 1.0, CLOSED, rolling(ROLLER, floor, "speed", 0.0)),
+    Row(
+        "flight",
+        FREE,
+        "thrown with 2, 3 m/s: height after 1 s",
+        "m",
+        5 + 3 - GRAVITY / 2,
+        CLOSED,
+        flight,
+        6,
+    ),
+    Row(
+        "tumbling",
+        FREE,
+        "spun at 5 rad/s about its middle axis: energy after 6 s, of 1",
+        "",
+        1.0,
+        CLOSED,
+        tumbling,
+        5,
+    ),
+    Row(
+        "pendulum_small",
+        JOINTED,
+        "pendulum, 0.1 rad: period",
+        "s",
+        pendulum_period(0.1),
+        CLOSED,
+        pendulum(0.1),
+        5,
+    ),
+    Row(
+        "pendulum_large",
+        JOINTED,
+        "pendulum, 3.0 rad: period",
+        "s",
+        pendulum_period(3.0),
+        CLOSED,
+        pendulum(3.0),
+        4,
+    ),
+    Row(
+        "double_pendulum",
+        JOINTED,
+        "double pendulum: change of its energy in 20 s, of what it has above the lowest",
+        "%",
+        0.0,
+        CLOSED,
+        double_pendulum,
+        3,
+    ),
+    Row(
+        "arm_velocity",
+        JOINTED,
+        "arm of six joints, 5 kg at its tip, told to hold still: creep",
+        "rad/s",
+        0.0,
+        CLOSED,
+        arm_creep,
+        2,
+    ),
+    Row(
+        "arm_position",
+        JOINTED,
+        "the same arm told 0.2 rad in each joint: error of the last one's place after 4 s",
+        "mm",
+        0.0,
+        CLOSED,
+        arm_error,
+        3,
+    ),
+    Row(
+        "sliding",
+        CONTACT,
+        "box pushed to 1 m/s, mu 0.4: way",
+        "m",
+        1 / (2 * 0.4 * GRAVITY),
+        CLOSED,
+        sliding(0.0),
+        5,
+    ),
+    Row(
+        "sliding_45",
+        CONTACT,
+        "the same, at 45 degrees to its sides",
+        "m",
+        1 / (2 * 0.4 * GRAVITY),
+        CLOSED,
+        sliding(math.pi / 4),
+        5,
+    ),
+    Row(
+        "creep",
+        CONTACT,
+        "box on a slope, 0.01 rad less than mu 0.8 holds: way in 10 s",
+        "mm",
+        0.0,
+        CLOSED,
+        creep,
+        3,
+    ),
+    Row(
+        "slide_down",
+        CONTACT,
+        "box on a slope of 0.8 rad, mu 0.8: acceleration",
+        "m/s^2",
+        GRAVITY * (math.sin(0.8) - 0.8 * math.cos(0.8)),
+        CLOSED,
+        slide_down,
+    ),
+    Row(
+        "roll_down",
+        CONTACT,
+        "ball on a slope of 0.3 rad: acceleration",
+        "m/s^2",
+        5 / 7 * GRAVITY * math.sin(0.3),
+        CLOSED,
+        roll_down,
+    ),
+    *(
+        Row(
+            f"bounce_{e:g}",
+            CONTACT,
+            f"ball from 1 m, restitution {e:g}: height",
+            "m",
+            e * e,
+            CLOSED,
+            bounce(e),
+        )
+        for e in (0.2, 0.5, 1.0)
+    ),
+    Row(
+        "spinning",
+        CONTACT,
+        "ball that spins at 10 rad/s, moment 5 mm of its load: rate after 0.4 s",
+        "rad/s",
+        10 - 0.4 * 0.005 * GRAVITY / 0.004,
+        CLOSED,
+        spinning,
+    ),
+    Row(
+        "tunnelling",
+        CONTACT,
+        "ball of 5 cm at 10 m/s against a wall of 2 mm: how far behind it",
+        "m",
+        0.0,
+        CLOSED,
+        tunnelling,
+        3,
+    ),
+    *(
+        Row(
+            f"stack_{n}",
+            STACKS,
+            f"{n} boxes: furthest from its place in 60 s",
+            "mm",
+            0.0,
+            CLOSED,
+            stack(n),
+            3,
+            long=True,
+        )
+        for n in (8, 10, 15)
+    ),
+    *(
+        Row(
+            f"heavy_{n}",
+            STACKS,
+            f"100 kg on {n} of 1 kg: furthest in 60 s",
+            "mm",
+            0.0,
+            CLOSED,
+            stack(n + 1, 100.0),
+            3,
+            long=True,
+        )
+        for n in (1, 2)
+    ),
+    Row(
+        "ball_aside",
+        MESHES,
+        "ball rolling at 1 m/s over triangles of 8 cm, 5 s: aside",
+        "mm",
+        0.0,
+        CLOSED,
+        rolling(BALL, floor, "aside"),
+        3,
+    ),
+    Row(
+        "ball_speed",
+        MESHES,
+        "the same: speed after 5 s",
+        "m/s",
+        1.0,
+        CLOSED,
+        rolling(BALL, floor, "speed"),
+    ),
+    Row(
+        "roller_plane",
+        MESHES,
+        "lying cylinder rolling on a plane: speed after 5 s",
+        "m/s",
+        1.0,
+        CLOSED,
+        rolling(ROLLER, lambda: PLANE, "speed", 0.0),
+    ),
+    Row(
+        "skid_spot",
+        SKIDDING,
+        "P3-AT, wheels at -1 and 1 rad/s, mu 0.8: track that its wheels would say, of the real one",
+        "",
+        1.466,
+        WANG,
+        skidding(-1.0, 1.0),
+        3,
+    ),
+    Row(
+        "skid_curve",
+        SKIDDING,
+        "the same on a curve, wheels at 1 and 3 rad/s",
+        "",
+        1.41,
+        WANG,
+        skidding(1.0, 3.0),
+        3,
+    ),
+    Row(
+        "roller_mesh",
+        MESHES,
+        "lying cylinder rolling over triangles of 8 cm: speed after 5 s",
+        "m/s",
+        1.0,
+        CLOSED,
+        rolling(ROLLER, floor, "speed", 0.0),
+    ),
 ]

@@ -18,11 +18,11 @@ class Shape:
 
     kind: str
     size: tuple[float, ...] = ()
-    file: Path | None = None    # of a mesh
+    file: Path | None = None  # of a mesh
     at: tuple[float, float, float] = (0.0, 0.0, 0.0)
     friction: float = 1.0
     restitution: float = 0.0
-    torsion_m: float = 0.0      # moment about the normal for a newton of load
+    torsion_m: float = 0.0  # moment about the normal for a newton of load
 
 
 @dataclass(frozen=True)
@@ -53,11 +53,14 @@ class Body:
 @dataclass(frozen=True)
 class Scene:
     bodies: tuple[Body, ...] = ()
-    urdf: str = ""              # a mechanism "robot" whose first link is called "world" and never moves
+    urdf: str = ""  # a mechanism "robot" whose first link is called "world" and never moves
     gravity: float = GRAVITY
-    commands: bool = False      # joints are told something
-    wheels: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())    # joints of a robot "robot" that moves: left and right, in `urdf`
-    friction: float = 1.0       # of its wheels
+    commands: bool = False  # joints are told something
+    wheels: tuple[tuple[str, ...], tuple[str, ...]] = (
+        (),
+        (),
+    )  # joints of a robot "robot" that moves: left and right, in `urdf`
+    friction: float = 1.0  # of its wheels
 
     @property
     def free(self) -> list[Body]:
@@ -75,14 +78,23 @@ class Chain:
     links: list[str] = field(default_factory=list)
     last: str = "world"
 
-    def add(self, name: str, at: tuple[float, float, float], mass: float, center: tuple[float, float, float],
-            inertia: tuple[float, float, float], axis: str = "0 1 0", rpy: tuple[float, float, float] = (0, 0, 0)) -> Chain:
+    def add(
+        self,
+        name: str,
+        at: tuple[float, float, float],
+        mass: float,
+        center: tuple[float, float, float],
+        inertia: tuple[float, float, float],
+        axis: str = "0 1 0",
+        rpy: tuple[float, float, float] = (0, 0, 0),
+    ) -> Chain:
         i = inertia
         self.links.append(
             f'<link name="{name}"><inertial><origin xyz="{_list(center)}"/><mass value="{mass!r}"/>'
             f'<inertia ixx="{i[0]!r}" iyy="{i[1]!r}" izz="{i[2]!r}" ixy="0" ixz="0" iyz="0"/></inertial></link>'
             f'<joint name="to_{name}" type="continuous"><parent link="{self.last}"/><child link="{name}"/>'
-            f'<origin xyz="{_list(at)}" rpy="{_list(rpy)}"/><axis xyz="{axis}"/><limit effort="1000" velocity="1000"/></joint>')
+            f'<origin xyz="{_list(at)}" rpy="{_list(rpy)}"/><axis xyz="{axis}"/><limit effort="1000" velocity="1000"/></joint>'
+        )
         self.last = name
         return self
 
@@ -90,25 +102,42 @@ class Chain:
         return f'<robot name="robot"><link name="world"/>{"".join(self.links)}</robot>'
 
 
-def skid_steered(half_base: float, half_track: float, radius: float, width: float, body_kg: float, wheel_kg: float) -> str:
+def skid_steered(
+    half_base: float,
+    half_track: float,
+    radius: float,
+    width: float,
+    body_kg: float,
+    wheel_kg: float,
+) -> str:
     """A robot of four wheels as URDF; its first link, "base", has its origin on the ground, in the middle."""
     side, axle = wheel_kg * (3 * radius**2 + width**2) / 12, wheel_kg * radius**2 / 2
     wheels = ""
     for name, x, y in (("fl", 1, 1), ("rl", -1, 1), ("fr", 1, -1), ("rr", -1, -1)):
-        wheels += (f'<link name="{name}"><inertial><mass value="{wheel_kg}"/><inertia ixx="{side!r}" iyy="{axle!r}" izz="{side!r}" ixy="0" ixz="0" iyz="0"/></inertial>'
-                   f'<collision><origin rpy="{math.pi / 2!r} 0 0"/><geometry><cylinder radius="{radius}" length="{width}"/></geometry></collision></link>'
-                   f'<joint name="to_{name}" type="continuous"><parent link="base"/><child link="{name}"/>'
-                   f'<origin xyz="{x * half_base} {y * half_track} {radius}"/><axis xyz="0 1 0"/><limit effort="100" velocity="100"/></joint>')
-    return (f'<robot name="robot"><link name="base"><inertial><origin xyz="0 0 0.18"/><mass value="{body_kg}"/>'
-            f'<inertia ixx="0.1381" iyy="0.2829" izz="0.3277" ixy="0" ixz="0" iyz="0"/></inertial></link>{wheels}</robot>')
+        wheels += (
+            f'<link name="{name}"><inertial><mass value="{wheel_kg}"/><inertia ixx="{side!r}" iyy="{axle!r}" izz="{side!r}" ixy="0" ixz="0" iyz="0"/></inertial>'
+            f'<collision><origin rpy="{math.pi / 2!r} 0 0"/><geometry><cylinder radius="{radius}" length="{width}"/></geometry></collision></link>'
+            f'<joint name="to_{name}" type="continuous"><parent link="base"/><child link="{name}"/>'
+            f'<origin xyz="{x * half_base} {y * half_track} {radius}"/><axis xyz="0 1 0"/><limit effort="100" velocity="100"/></joint>'
+        )
+    return (
+        f'<robot name="robot"><link name="base"><inertial><origin xyz="0 0 0.18"/><mass value="{body_kg}"/>'
+        f'<inertia ixx="0.1381" iyy="0.2829" izz="0.3277" ixy="0" ixz="0" iyz="0"/></inertial></link>{wheels}</robot>'
+    )
 
 
-def flat_mesh(folder: Path, half: float = 8.0, triangle: float = 0.08, along: float | None = None) -> Path:
+def flat_mesh(
+    folder: Path, half: float = 8.0, triangle: float = 0.08, along: float | None = None
+) -> Path:
     """A flat floor of right triangles with legs of that length, z = 0."""
     along = half if along is None else along
     path = folder / f"flat_{half:g}_{triangle:g}.obj"
     nx, ny = round(2 * along / triangle), round(2 * half / triangle)
-    lines = [f"v {-1.0 + i * triangle:.4f} {-half + j * triangle:.4f} 0" for j in range(ny + 1) for i in range(nx + 1)]
+    lines = [
+        f"v {-1.0 + i * triangle:.4f} {-half + j * triangle:.4f} 0"
+        for j in range(ny + 1)
+        for i in range(nx + 1)
+    ]
     for j in range(ny):
         for i in range(nx):
             a = j * (nx + 1) + i + 1
@@ -120,7 +149,12 @@ def flat_mesh(folder: Path, half: float = 8.0, triangle: float = 0.08, along: fl
 def quaternion(rpy: tuple[float, float, float]) -> tuple[float, float, float, float]:
     """w, x, y, z."""
     (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a / 2), math.sin(a / 2)) for a in rpy)
-    return (cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
 
 
 def _list(values: tuple[float, ...]) -> str:

@@ -36,7 +36,7 @@ bool can_connect(const std::string& host, const std::string& port, int type, std
 bool is_unix_served(const std::string& path) {
   try {
     return bus::is_unix_served(path);
-  } catch (const EnvironmentError&) {    // no path of a socket
+  } catch (const EnvironmentError&) {  // no path of a socket
     return false;
   }
 }
@@ -54,7 +54,8 @@ Address split(const std::string& url) {
   }
   const size_t options = url.find('?');
   if (options != std::string::npos) address.options = url.substr(options);
-  const std::string network = url.substr(scheme_end + 3, options == std::string::npos ? options : options - scheme_end - 3);
+  const std::string network =
+      url.substr(scheme_end + 3, options == std::string::npos ? options : options - scheme_end - 3);
   const size_t colon = network.rfind(':');
   address.host = network.substr(0, colon);
   if (colon != std::string::npos) address.port = network.substr(colon + 1);
@@ -90,7 +91,9 @@ bool is_claimed(const std::string& url) {
   const std::string claim = " @ruedo/" + address.scheme + "/" + address.host + ":" + address.port;
   std::ifstream sockets("/proc/net/unix");
   for (std::string line; std::getline(sockets, line);) {
-    if (line.size() >= claim.size() && line.compare(line.size() - claim.size(), claim.size(), claim) == 0) return true;
+    if (line.size() >= claim.size() &&
+        line.compare(line.size() - claim.size(), claim.size(), claim) == 0)
+      return true;
   }
   return false;
 }
@@ -100,20 +103,25 @@ void check_reachable(const std::string& url) {
   std::string why;
   if (address.scheme == "udpm") {
     if (has_multicast_route(address.host)) return;
-    throw NoServer(url + ": this machine has no route for multicast. On Linux: sudo ip route add 224.0.0.0/4 dev lo; "
-                         "`ruedo doctor` tells more");
+    throw NoServer(url +
+                   ": this machine has no route for multicast. On Linux: sudo ip route add "
+                   "224.0.0.0/4 dev lo; "
+                   "`ruedo doctor` tells more");
   }
   if (address.scheme == "tcpq") {
     if (can_connect(address.host, address.port, SOCK_STREAM, why)) return;
-    throw NoServer("no Ruedo server at " + url + " (" + why + "). Is `ruedo run` started with this --lcm? `ruedo doctor` "
+    throw NoServer("no Ruedo server at " + url + " (" + why +
+                   "). Is `ruedo run` started with this --lcm? `ruedo doctor` "
                    "looks for what is wrong");
   }
   if (address.scheme == "unix") {
     if (is_unix_served(address.host)) return;
-    throw NoServer("no Ruedo server at " + url + ". Is `ruedo run` started with this --lcm, by the same user?");
+    throw NoServer("no Ruedo server at " + url +
+                   ". Is `ruedo run` started with this --lcm, by the same user?");
   }
   if (address.scheme == "memq" || address.scheme == "file") return;
-  throw NoServer(url + ": not an LCM URL; udpm://GROUP:PORT?ttl=0, tcpq://HOST:PORT or unix:///PATH is");
+  throw NoServer(url +
+                 ": not an LCM URL; udpm://GROUP:PORT?ttl=0, tcpq://HOST:PORT or unix:///PATH is");
 }
 
 }  // namespace ruedo::client

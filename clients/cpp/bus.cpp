@@ -31,7 +31,8 @@ struct Bus::State : std::enable_shared_from_this<Bus::State> {
   std::atomic<std::chrono::steady_clock::rep> lent_until{0};
 };
 
-Bus::Bus(std::unique_ptr<Transport> transport) : state_(std::make_shared<State>(std::move(transport))) {}
+Bus::Bus(std::unique_ptr<Transport> transport)
+    : state_(std::make_shared<State>(std::move(transport))) {}
 
 Bus::~Bus() { close(); }
 
@@ -47,7 +48,8 @@ Subscription Bus::subscribe(const std::string& channel, Handler handler) {
     state_->transport->subscribe(channel);
   }
   auto callback = handlers->add(channel, std::move(handler));
-  callback->at_close([state = state_->weak_from_this(), list = std::weak_ptr(handlers), channel, raw = callback.get()] {
+  callback->at_close([state = state_->weak_from_this(), list = std::weak_ptr(handlers), channel,
+                      raw = callback.get()] {
     if (const auto here = list.lock()) here->remove(raw);
     if (const auto bus = state.lock()) bus->leave(channel);
   });
@@ -86,7 +88,8 @@ void Bus::State::handle(std::chrono::milliseconds timeout) {
     std::shared_ptr<Handlers> called;
     {
       const std::lock_guard lock(mutex);
-      if (const auto found = handlers.find(channel); found != handlers.end()) called = found->second;
+      if (const auto found = handlers.find(channel); found != handlers.end())
+        called = found->second;
     }
     if (called && !closed) called->call(bytes, size);
   });
@@ -97,7 +100,8 @@ void Bus::State::receive() {
     const auto now = std::chrono::steady_clock::now().time_since_epoch();
     const std::chrono::steady_clock::duration lent(lent_until);
     if (now < lent) {
-      std::this_thread::sleep_for(std::min<std::chrono::steady_clock::duration>(lent - now, kLendTime));
+      std::this_thread::sleep_for(
+          std::min<std::chrono::steady_clock::duration>(lent - now, kLendTime));
     } else {
       const std::lock_guard turn(receiving);
       handle(std::chrono::milliseconds(100));

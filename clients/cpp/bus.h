@@ -26,19 +26,22 @@ class Bus {
   explicit Bus(std::unique_ptr<Transport> transport);
   ~Bus();
 
-  void start();    // begins to receive; at least one subscription comes first: LCM's socket is made by it
+  void
+  start();  // begins to receive; at least one subscription comes first: LCM's socket is made by it
   [[nodiscard]] Subscription subscribe(const std::string& channel, Handler handler);
   void publish(const std::string& channel, const uint8_t* bytes, size_t size);
-  void receive_directly();    // as Transport's
-  void close();               // in a handler, too: the thread ends when that returns
+  void receive_directly();  // as Transport's
+  void close();             // in a handler, too: the thread ends when that returns
 
-  // Who waits for much may receive for himself: handing each message from thread to thread takes as long as getting it.
-  // While one of these lives, and a moment longer, the receiving thread sleeps, and handle() runs the handlers.
+  // Who waits for much may receive for himself: handing each message from thread to thread takes as
+  // long as getting it. While one of these lives, and a moment longer, the receiving thread sleeps,
+  // and handle() runs the handlers.
   class Turn {
    public:
     explicit Turn(Bus& bus);
     ~Turn();
-    void handle(std::chrono::steady_clock::duration timeout);    // what has come, or until the time is over
+    void handle(
+        std::chrono::steady_clock::duration timeout);  // what has come, or until the time is over
 
    private:
     const std::shared_ptr<State> state_;
@@ -52,7 +55,7 @@ class Bus {
   }
 
  private:
-  const std::shared_ptr<State> state_;    // the thread has one, too: a handler may destroy the bus
+  const std::shared_ptr<State> state_;  // the thread has one, too: a handler may destroy the bus
   std::thread thread_;
 };
 

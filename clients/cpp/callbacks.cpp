@@ -17,7 +17,9 @@ void CallbackCore::close() {
 
 void CallbackCore::say_failed(const char* why) {
   if (std::exchange(failed_, true)) return;
-  std::fprintf(stderr, "ruedo: a callback on %s failed: %s; it is called on, and this is said once\n", what_.c_str(), why);
+  std::fprintf(stderr,
+               "ruedo: a callback on %s failed: %s; it is called on, and this is said once\n",
+               what_.c_str(), why);
 }
 
 Subscription::~Subscription() { close(); }

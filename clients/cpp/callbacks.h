@@ -21,7 +21,8 @@ class CallbackCore {
   explicit CallbackCore(std::string what) : what_(std::move(what)) {}
   virtual ~CallbackCore() = default;
 
-  // From the return on it is not called any more: waits for a call in another thread. May be called from the callback itself.
+  // From the return on it is not called any more: waits for a call in another thread. May be called
+  // from the callback itself.
   void close();
   bool closed() const { return closed_; }
   // What is to be done when it was taken back.
@@ -30,7 +31,7 @@ class CallbackCore {
  protected:
   void say_failed(const char* why);
 
-  const std::string what_;    // is called on what
+  const std::string what_;  // is called on what
   std::recursive_mutex running_;
   std::atomic<bool> closed_{false};
 
@@ -43,7 +44,8 @@ template <class... Arguments>
 class Callback : public CallbackCore {
  public:
   using Function = std::function<void(Arguments...)>;
-  Callback(std::string what, Function function) : CallbackCore(std::move(what)), function_(std::move(function)) {}
+  Callback(std::string what, Function function)
+      : CallbackCore(std::move(what)), function_(std::move(function)) {}
 
   // What the callback throws is said once, and hurts nobody else.
   void call(Arguments... arguments) {
@@ -62,7 +64,8 @@ class Callback : public CallbackCore {
   const Function function_;
 };
 
-// Those who are called together. Thread safe; who comes or goes meanwhile is not called or called once more.
+// Those who are called together. Thread safe; who comes or goes meanwhile is not called or called
+// once more.
 template <class... Arguments>
 class CallbackList : public std::enable_shared_from_this<CallbackList<Arguments...>> {
  public:
@@ -82,12 +85,14 @@ class CallbackList : public std::enable_shared_from_this<CallbackList<Arguments.
   void remove(const One* gone) {
     const std::lock_guard lock(mutex_);
     auto next = std::make_shared<std::vector<std::shared_ptr<One>>>(*all_);
-    next->erase(std::remove_if(next->begin(), next->end(), [&](const auto& one) { return one.get() == gone; }), next->end());
+    next->erase(std::remove_if(next->begin(), next->end(),
+                               [&](const auto& one) { return one.get() == gone; }),
+                next->end());
     all_ = std::move(next);
   }
   bool empty() const { return snapshot()->empty(); }
   void call(Arguments... arguments) const {
-    const All all = snapshot();    // one that leaves meanwhile lives on until the loop's end
+    const All all = snapshot();  // one that leaves meanwhile lives on until the loop's end
     for (const auto& one : *all) one->call(arguments...);
   }
 

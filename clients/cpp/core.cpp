@@ -14,7 +14,8 @@ namespace ruedo::client {
 namespace {
 
 constexpr auto kAskAgain = std::chrono::milliseconds(100);
-constexpr double kSilence = 5.0;    // s of real time without any message: a server gives a sign of life each second
+constexpr double kSilence =
+    5.0;  // s of real time without any message: a server gives a sign of life each second
 
 }  // namespace
 
@@ -29,10 +30,15 @@ std::string text_of(Duration time) {
   return text;
 }
 
-Core::Core(const std::string& url, const std::string& name, std::unique_ptr<ServerProcess> server, std::unique_ptr<Transport> transport)
-    : url_(url), server_(std::move(server)), last_sign_(Clock::now().time_since_epoch().count()), session_(*this, name),
-      stepper_(*this), bus_(transport ? std::move(transport) : open_transport(url)) {
-  uint32_t hash = 2166136261u;    // FNV-1a of the name: two clients number their primitives apart
+Core::Core(const std::string& url, const std::string& name, std::unique_ptr<ServerProcess> server,
+           std::unique_ptr<Transport> transport)
+    : url_(url),
+      server_(std::move(server)),
+      last_sign_(Clock::now().time_since_epoch().count()),
+      session_(*this, name),
+      stepper_(*this),
+      bus_(transport ? std::move(transport) : open_transport(url)) {
+  uint32_t hash = 2166136261u;  // FNV-1a of the name: two clients number their primitives apart
   for (unsigned char c : name) hash = (hash ^ c) * 16777619u;
   ids_ = static_cast<int64_t>(hash & 0x7fffffffu) << 20;
 }
@@ -45,9 +51,16 @@ void Core::join(Duration timeout) {
       if (const auto core = self.lock()) method(*core, bytes, size);
     };
   };
-  info_source_ = bus_.subscribe("ruedo/info", handler([](Core& core, const uint8_t* bytes, size_t size) { core.on_info(bytes, size); }));
-  tick_source_ = bus_.subscribe("ruedo/tick", handler([](Core& core, const uint8_t* bytes, size_t size) { core.on_tick(bytes, size); }));
-  reply_source_ = bus_.subscribe("ruedo/reply", handler([](Core& core, const uint8_t* bytes, size_t size) { core.session_.receive(bytes, size); }));
+  info_source_ = bus_.subscribe(
+      "ruedo/info",
+      handler([](Core& core, const uint8_t* bytes, size_t size) { core.on_info(bytes, size); }));
+  tick_source_ = bus_.subscribe(
+      "ruedo/tick",
+      handler([](Core& core, const uint8_t* bytes, size_t size) { core.on_tick(bytes, size); }));
+  reply_source_ =
+      bus_.subscribe("ruedo/reply", handler([](Core& core, const uint8_t* bytes, size_t size) {
+                       core.session_.receive(bytes, size);
+                     }));
   bus_.start();
   const Clock::time_point deadline = deadline_after(timeout);
   std::unique_lock lock(mutex_);
@@ -57,7 +70,8 @@ void Core::join(Duration timeout) {
       if (const auto ended = server_->ended()) throw NoServer(*ended);
     }
     if (Clock::now() >= deadline) {
-      throw NoServer("no Ruedo server answered at " + url_ + " within " + text_of(timeout) + " s. Is `ruedo run` started, with the same "
+      throw NoServer("no Ruedo server answered at " + url_ + " within " + text_of(timeout) +
+                     " s. Is `ruedo run` started, with the same "
                      "--lcm or LCM_DEFAULT_URL? `ruedo doctor` looks for what is wrong");
     }
     ask_info();
@@ -92,13 +106,16 @@ RobotInfo Core::robot_info(const std::string& name) const {
   if (const RobotInfo* robot = known->robot(name)) return *robot;
   std::string names;
   for (const RobotInfo& robot : known->robots) names += (names.empty() ? "" : ", ") + robot.name;
-  throw UnknownName("there is no robot '" + name + "'; there is " + (names.empty() ? "none" : names));
+  throw UnknownName("there is no robot '" + name + "'; there is " +
+                    (names.empty() ? "none" : names));
 }
 
 std::shared_ptr<StreamCore> Core::stream(const ChannelInfo& channel) {
   const std::lock_guard lock(mutex_);
   auto& stream = streams_[channel.name];
-  if (!stream || stream->type() != channel.type) stream = std::make_shared<StreamCore>(weak_from_this(), channel);    // the next run's may be another
+  if (!stream || stream->type() != channel.type)
+    stream =
+        std::make_shared<StreamCore>(weak_from_this(), channel);  // the next run's may be another
   return stream;
 }
 
@@ -114,11 +131,12 @@ std::shared_ptr<Driver> Core::driver(const std::string& robot) {
 void Core::keep_repeating(const std::shared_ptr<Driver>& driver) {
   const std::lock_guard lock(mutex_);
   repeating_.insert(driver);
-  if (!repeater_.joinable() && !closed_) repeater_ = std::thread([this] { repeat(); });    // close() awaits its end
+  if (!repeater_.joinable() && !closed_)
+    repeater_ = std::thread([this] { repeat(); });  // close() awaits its end
   wake_.notify_all();
 }
 
-void Core::repeat() {    // feeds the watchdogs in real time
+void Core::repeat() {  // feeds the watchdogs in real time
   double period = 0.1;
   std::unique_lock lock(mutex_);
   while (!closed_) {
@@ -183,7 +201,8 @@ void Core::begin_run() {
   }
   end_drivers(drivers, MotionReason::new_run);
   for (const auto& stream : streams) stream->forget();
-  std::fprintf(stderr, "ruedo: another run has begun at %s: commands are not repeated into it\n", url_.c_str());
+  std::fprintf(stderr, "ruedo: another run has begun at %s: commands are not repeated into it\n",
+               url_.c_str());
   new_run_->call();
 }
 
@@ -225,17 +244,20 @@ void Core::check_server() {
     if (const auto ended = server_->ended()) throw NoServer(*ended);
   }
   // One of this machine that is stopped, or in a debugger, is waited for.
-  if (silence() > kSilence && !is_claimed(url_)) throw NoServer("nothing was heard from the server at " + url_ + " for 5 s");
+  if (silence() > kSilence && !is_claimed(url_))
+    throw NoServer("nothing was heard from the server at " + url_ + " for 5 s");
 }
 
 std::string Core::what_is_known(double rate) const {
   char text[96];
   if (silence() > 3.0) {
-    std::snprintf(text, sizeof text, "nothing at all was heard from the server for %.1f s", silence());
+    std::snprintf(text, sizeof text, "nothing at all was heard from the server for %.1f s",
+                  silence());
   } else if (info()->paused) {
     return "the simulation is paused";
   } else if (rate > 0.0) {
-    std::snprintf(text, sizeof text, "its rate is %g Hz of sim time, which is now %.2f s", rate, static_cast<double>(utime_) * 1e-6);
+    std::snprintf(text, sizeof text, "its rate is %g Hz of sim time, which is now %.2f s", rate,
+                  static_cast<double>(utime_) * 1e-6);
   } else {
     return "it sends when something happens";
   }
@@ -243,7 +265,8 @@ std::string Core::what_is_known(double rate) const {
 }
 
 double Core::silence() const {
-  const Clock::duration since = Clock::now().time_since_epoch() - Clock::duration(last_sign_.load());
+  const Clock::duration since =
+      Clock::now().time_since_epoch() - Clock::duration(last_sign_.load());
   return std::chrono::duration<double>(since).count();
 }
 
@@ -289,7 +312,7 @@ void Core::on_tick(const uint8_t* bytes, size_t size) {
   const auto known = info();
   if (!known) return;
   another_run_ = in.int64() != known->run_id;
-  if (another_run_) {    // it may be the server's next one
+  if (another_run_) {  // it may be the server's next one
     if (Clock::now().time_since_epoch() - Clock::duration(asked_.load()) > kAskAgain) ask_info();
     return;
   }

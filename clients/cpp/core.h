@@ -1,4 +1,5 @@
-// A connection: what is known of the simulation, its streams, its robots' commands, and its session.
+// A connection: what is known of the simulation, its streams, its robots' commands, and its
+// session.
 #pragma once
 
 #include <atomic>
@@ -27,26 +28,27 @@ namespace ruedo::client {
 class ServerProcess;
 
 using Clock = std::chrono::steady_clock;
-Clock::time_point deadline_after(Duration time);    // kForever: never
-std::string text_of(Duration time);                 // seconds as a user wrote them: 5, not 5.000000
+Clock::time_point deadline_after(Duration time);  // kForever: never
+std::string text_of(Duration time);               // seconds as a user wrote them: 5, not 5.000000
 inline constexpr const char* kClosed = "this simulation was closed";
 
 class Core : public std::enable_shared_from_this<Core> {
  public:
   // server: a private one, or nullptr. transport: nullptr opens the URL's, which throws NoServer.
-  Core(const std::string& url, const std::string& name, std::unique_ptr<ServerProcess> server, std::unique_ptr<Transport> transport = nullptr);
+  Core(const std::string& url, const std::string& name, std::unique_ptr<ServerProcess> server,
+       std::unique_ptr<Transport> transport = nullptr);
   ~Core();
 
-  void join(Duration timeout);    // begins to receive, and waits for ruedo/info; throws NoServer
-  void close();                   // in a callback, too
-  void check_open() const;        // throws NoServer
+  void join(Duration timeout);  // begins to receive, and waits for ruedo/info; throws NoServer
+  void close();                 // in a callback, too
+  void check_open() const;      // throws NoServer
 
   Bus& bus() { return bus_; }
   Session& session() { return session_; }
   Stepper& stepper() { return stepper_; }
   const std::string& url() const { return url_; }
   std::shared_ptr<const WorldInfo> info() const;
-  RobotInfo robot_info(const std::string& name) const;    // throws UnknownName
+  RobotInfo robot_info(const std::string& name) const;  // throws UnknownName
   int64_t utime() const { return utime_; }
   int64_t next_id() { return ++ids_; }
 
@@ -58,11 +60,12 @@ class Core : public std::enable_shared_from_this<Core> {
   void note_time(int64_t utime);
   void reset_time() { utime_ = 0; }
   void sleep_until(int64_t utime);
-  // After the set of models changed; before: the info from before that, null: the one that is known now.
+  // After the set of models changed; before: the info from before that, null: the one that is known
+  // now.
   void refresh_info(std::shared_ptr<const WorldInfo> before = nullptr);
-  void check_server();                              // throws NoServer when it is gone, or this was closed
+  void check_server();  // throws NoServer when it is gone, or this was closed
   Subscription on_new_run(std::function<void()> callback);
-  std::string what_is_known(double rate) const;     // for timeouts
+  std::string what_is_known(double rate) const;  // for timeouts
 
  private:
   void on_info(const uint8_t* bytes, size_t size);
@@ -72,13 +75,13 @@ class Core : public std::enable_shared_from_this<Core> {
   void end_drivers(const std::vector<std::shared_ptr<Driver>>& drivers, MotionReason reason);
   void ask_info();
   void repeat();
-  double silence() const;    // s
+  double silence() const;  // s
 
   const std::string url_;
   std::unique_ptr<ServerProcess> server_;
   mutable std::mutex mutex_;
   std::condition_variable news_;
-  WorldInfoAssembler assembler_;                    // the receiving thread's
+  WorldInfoAssembler assembler_;  // the receiving thread's
   std::shared_ptr<const WorldInfo> known_;
   std::exception_ptr fault_;
   std::map<std::string, std::shared_ptr<StreamCore>> streams_;
@@ -86,8 +89,8 @@ class Core : public std::enable_shared_from_this<Core> {
   std::set<std::shared_ptr<Driver>> repeating_;
   std::atomic<int64_t> utime_{0}, ids_{0};
   std::atomic<Clock::time_point::rep> last_sign_;
-  std::atomic<Clock::time_point::rep> asked_{0};    // for info
-  std::atomic<bool> another_run_{false};            // is what the last tick was of
+  std::atomic<Clock::time_point::rep> asked_{0};  // for info
+  std::atomic<bool> another_run_{false};          // is what the last tick was of
   std::atomic<bool> closed_{false};
   const std::shared_ptr<CallbackList<>> new_run_ = std::make_shared<CallbackList<>>();
   std::thread repeater_;

@@ -12,7 +12,8 @@
 namespace ruedo::client {
 namespace {
 
-// A primitive that no status has shown after this many statuses and this time was lost or replaced at once.
+// A primitive that no status has shown after this many statuses and this time was lost or replaced
+// at once.
 constexpr int kUnseenStatuses = 20;
 constexpr auto kUnseenTime = std::chrono::seconds(1);
 
@@ -29,8 +30,9 @@ void MotionCore::update(const MotionStatus& status) {
     reason = status.reason;
   } else if (status.state == MotionState::refused) {
     // another command, which changed nothing
-  } else if (state != MotionState::sent || (++unseen >= kUnseenStatuses && Clock::now() - sent >= kUnseenTime)) {
-    state = MotionState::ended;    // its own end fell between two statuses
+  } else if (state != MotionState::sent ||
+             (++unseen >= kUnseenStatuses && Clock::now() - sent >= kUnseenTime)) {
+    state = MotionState::ended;  // its own end fell between two statuses
     reason = MotionReason::replaced;
   }
   news.notify_all();
@@ -50,12 +52,15 @@ Driver::Driver(std::weak_ptr<Core> core, std::string robot, double watchdog)
 void Driver::listen(const std::shared_ptr<StreamCore>& motion) {
   {
     const std::lock_guard lock(mutex_);
-    if (ended_ != MotionReason::none) throw UnknownName(robot_ + " is gone: " + to_string(ended_));    // while the command was being made
+    if (ended_ != MotionReason::none)
+      throw UnknownName(robot_ +
+                        " is gone: " + to_string(ended_));  // while the command was being made
   }
   const std::lock_guard lock(listening_);
   if (statuses_.open()) return;
   statuses_ = motion->on_sample([self = weak_from_this()](const Sample& sample) {
-    if (const auto driver = self.lock()) driver->on_status(static_cast<const MotionStatus&>(sample));
+    if (const auto driver = self.lock())
+      driver->on_status(static_cast<const MotionStatus&>(sample));
   });
 }
 
@@ -73,9 +78,12 @@ void Driver::repeat(Bus& bus) {
   if (!held_.empty()) bus.publish(held_channel_, held_.data(), held_.size());
 }
 
-double Driver::period() const { return watchdog_ > 0.0 ? std::clamp(watchdog_ / 4.0, 0.01, 0.1) : 0.1; }
+double Driver::period() const {
+  return watchdog_ > 0.0 ? std::clamp(watchdog_ / 4.0, 0.01, 0.1) : 0.1;
+}
 
-std::shared_ptr<MotionCore> Driver::move(Bus& bus, const std::string& channel, const move_command_t& command, const std::string& kind) {
+std::shared_ptr<MotionCore> Driver::move(Bus& bus, const std::string& channel,
+                                         const move_command_t& command, const std::string& kind) {
   auto motion = std::make_shared<MotionCore>();
   motion->connection = core_;
   motion->robot = robot_;
@@ -84,11 +92,13 @@ std::shared_ptr<MotionCore> Driver::move(Bus& bus, const std::string& channel, c
   motion->remaining = std::abs(command.value);
   motion->sent = Clock::now();
   const std::lock_guard lock(mutex_);
-  held_.clear();    // a repetition after this would replace the primitive
-  motions_.erase(std::remove_if(motions_.begin(), motions_.end(), [](const auto& other) {
-    const std::lock_guard other_lock(other->mutex);
-    return other->done();
-  }), motions_.end());
+  held_.clear();  // a repetition after this would replace the primitive
+  motions_.erase(std::remove_if(motions_.begin(), motions_.end(),
+                                [](const auto& other) {
+                                  const std::lock_guard other_lock(other->mutex);
+                                  return other->done();
+                                }),
+                 motions_.end());
   motions_.push_back(motion);
   if (ended_ != MotionReason::none) motion->end(ended_);
   bus.publish(channel, command);
@@ -126,12 +136,16 @@ void Driver::on_status(const MotionStatus& status) {
   {
     const std::lock_guard lock(mutex_);
     motions = motions_;
-    running_ = running_ || (!held_.empty() && status.id == 0 && status.state == MotionState::running);
-    stopped = running_ && !held_.empty() && status.reason == MotionReason::watchdog && !watchdog_told_;
+    running_ =
+        running_ || (!held_.empty() && status.id == 0 && status.state == MotionState::running);
+    stopped =
+        running_ && !held_.empty() && status.reason == MotionReason::watchdog && !watchdog_told_;
     watchdog_told_ = watchdog_told_ || stopped;
   }
   if (stopped) {
-    std::fprintf(stderr, "ruedo: %s: stopped by its watchdog: no command came for %g s of sim time\n", robot_.c_str(), watchdog_);
+    std::fprintf(stderr,
+                 "ruedo: %s: stopped by its watchdog: no command came for %g s of sim time\n",
+                 robot_.c_str(), watchdog_);
   }
   for (const auto& motion : motions) motion->update(status);
 }
@@ -169,7 +183,8 @@ const Motion& Motion::wait(Duration timeout) const {
   std::unique_lock lock(motion.mutex);
   while (!motion.done()) {
     if (Clock::now() >= deadline) {
-      throw Timeout(motion.robot + ": " + motion.kind + " was not done within " + text_of(timeout) + " s (" + remaining_text() + ")");
+      throw Timeout(motion.robot + ": " + motion.kind + " was not done within " + text_of(timeout) +
+                    " s (" + remaining_text() + ")");
     }
     motion.news.wait_until(lock, std::min(deadline, Clock::now() + std::chrono::milliseconds(500)));
     const auto connection = motion.connection.lock();
@@ -177,8 +192,10 @@ const Motion& Motion::wait(Duration timeout) const {
     connection->check_server();
   }
   if (motion.state != MotionState::done) {
-    throw MotionError(motion.robot + ": " + motion.kind + (motion.state == MotionState::refused ? " was refused: " : " ended: ") +
-                          to_string(motion.reason) + ", " + remaining_text(), motion.reason);
+    throw MotionError(motion.robot + ": " + motion.kind +
+                          (motion.state == MotionState::refused ? " was refused: " : " ended: ") +
+                          to_string(motion.reason) + ", " + remaining_text(),
+                      motion.reason);
   }
   return *this;
 }

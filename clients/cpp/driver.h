@@ -31,11 +31,15 @@ struct MotionCore {
   MotionState state = MotionState::sent;
   MotionReason reason = MotionReason::none;
   double progress = 0.0, remaining = 0.0;
-  int unseen = 0;    // statuses that did not show it
-  int64_t utime = -1;    // of the newest status; before it is another run's, or of a reset that info will tell of
+  int unseen = 0;  // statuses that did not show it
+  int64_t utime =
+      -1;  // of the newest status; before it is another run's, or of a reset that info will tell of
 
   // With the mutex held.
-  bool done() const { return state == MotionState::done || state == MotionState::ended || state == MotionState::refused; }
+  bool done() const {
+    return state == MotionState::done || state == MotionState::ended ||
+           state == MotionState::refused;
+  }
   void update(const MotionStatus& status);
   void end(MotionReason why);
 };
@@ -48,24 +52,27 @@ class Driver : public std::enable_shared_from_this<Driver> {
   // Publishes the command now, and again until the next one.
   void hold(Bus& bus, const std::string& channel, std::vector<uint8_t> bytes);
   void repeat(Bus& bus);
-  double period() const;    // s of real time between repetitions
+  double period() const;  // s of real time between repetitions
 
-  std::shared_ptr<MotionCore> move(Bus& bus, const std::string& channel, const move_command_t& command, const std::string& kind);
-  void listen(const std::shared_ptr<StreamCore>& motion);    // throws UnknownName when the robot is gone
-  void begin_epoch();               // sim time was set back
-  void end(MotionReason reason);    // its robot, or its run, is gone: nothing is repeated to the next one of that name
+  std::shared_ptr<MotionCore> move(Bus& bus, const std::string& channel,
+                                   const move_command_t& command, const std::string& kind);
+  void listen(
+      const std::shared_ptr<StreamCore>& motion);  // throws UnknownName when the robot is gone
+  void begin_epoch();                              // sim time was set back
+  void end(MotionReason reason);  // its robot, or its run, is gone: nothing is repeated to the next
+                                  // one of that name
 
  private:
   void on_status(const MotionStatus& status);
 
   const std::weak_ptr<Core> core_;
   const std::string robot_;
-  const double watchdog_;    // s
-  std::mutex listening_;     // statuses_
+  const double watchdog_;  // s
+  std::mutex listening_;   // statuses_
   Subscription statuses_;
   std::mutex mutex_;
   std::string held_channel_;
-  std::vector<uint8_t> held_;    // empty: nothing
+  std::vector<uint8_t> held_;  // empty: nothing
   std::vector<std::shared_ptr<MotionCore>> motions_;
   MotionReason ended_ = MotionReason::none;
   bool running_ = false, watchdog_told_ = false;

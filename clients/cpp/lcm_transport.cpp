@@ -32,11 +32,13 @@ std::string escaped(const std::string& channel) {
 
 std::unique_ptr<Transport> open_transport(const std::string& url) {
   check_reachable(url);
-  if (const Address address = split(url); address.scheme == "unix") return std::make_unique<UnixTransport>(address.host);
+  if (const Address address = split(url); address.scheme == "unix")
+    return std::make_unique<UnixTransport>(address.host);
   return std::make_unique<LcmTransport>(url);
 }
 
-LcmTransport::LcmTransport(const std::string& url) : url_(url), multicast_(split(url).scheme == "udpm") {
+LcmTransport::LcmTransport(const std::string& url)
+    : url_(url), multicast_(split(url).scheme == "udpm") {
   lcm_ = lcm_create(url.c_str());
   receiver_ = lcm_ && multicast_ ? lcm_create(url.c_str()) : lcm_;
   if (receiver_) return;
@@ -58,20 +60,21 @@ void LcmTransport::subscribe(const std::string& channel) {
     self.bytes_.assign(bytes, bytes + buffer->data_size);
   };
   const std::lock_guard lock(mutex_);
-  if (receiver_) subscriptions_[channel] = lcm_subscribe(receiver_, escaped(channel).c_str(), arrive, this);
+  if (receiver_)
+    subscriptions_[channel] = lcm_subscribe(receiver_, escaped(channel).c_str(), arrive, this);
 }
 
 void LcmTransport::unsubscribe(const std::string& channel) {
   const std::lock_guard lock(mutex_);
   const auto found = subscriptions_.find(channel);
-  if (found == subscriptions_.end()) return;    // received directly
+  if (found == subscriptions_.end()) return;  // received directly
   lcm_unsubscribe(receiver_, found->second);
   subscriptions_.erase(found);
 }
 
 void LcmTransport::publish(const std::string& channel, const uint8_t* bytes, size_t size) {
   std::unique_lock lock(mutex_, std::defer_lock);
-  if (!multicast_) lock.lock();    // multicast has a lock of its own
+  if (!multicast_) lock.lock();  // multicast has a lock of its own
   lcm_publish(lcm_, channel.c_str(), bytes, static_cast<unsigned int>(size));
 }
 
@@ -81,10 +84,11 @@ void LcmTransport::receive_directly() {
   const size_t buffer = address.options.find("recv_buf_size=");
   const std::lock_guard lock(mutex_);
   try {
-    direct_ = std::make_unique<bus::MulticastReceiver>(address.host, static_cast<uint16_t>(std::atoi(address.port.c_str())),
-                                                       buffer == std::string::npos ? 0 : std::atoi(address.options.c_str() + buffer + 14));
+    direct_ = std::make_unique<bus::MulticastReceiver>(
+        address.host, static_cast<uint16_t>(std::atoi(address.port.c_str())),
+        buffer == std::string::npos ? 0 : std::atoi(address.options.c_str() + buffer + 14));
   } catch (const std::system_error&) {
-    return;    // as it was
+    return;  // as it was
   }
   subscriptions_.clear();
   lcm_destroy(receiver_);
@@ -111,7 +115,8 @@ bool LcmTransport::wait(std::chrono::milliseconds timeout) {
     waiting.fd = lcm_get_fileno(receiver_);
   }
   if (waiting.fd >= 0) return ::poll(&waiting, 1, static_cast<int>(timeout.count())) > 0;
-  // TCP without a server: publish() tries to connect, and those who wait find out by their timeouts.
+  // TCP without a server: publish() tries to connect, and those who wait find out by their
+  // timeouts.
   std::this_thread::sleep_for(std::min(timeout, std::chrono::milliseconds(100)));
   return false;
 }

@@ -1,8 +1,9 @@
 // LCM as a transport.
 //
-// Where LCM's calls may not meet, one lock is around them: over TCP publish, subscribe and handle use one socket without a lock
-// of their own, and lcm_unsubscribe() changes the list that a dispatch in another thread walks through. What comes is
-// handed over after the lock was released, and waiting is done outside of it.
+// Where LCM's calls may not meet, one lock is around them: over TCP publish, subscribe and handle
+// use one socket without a lock of their own, and lcm_unsubscribe() changes the list that a
+// dispatch in another thread walks through. What comes is handed over after the lock was released,
+// and waiting is done outside of it.
 #pragma once
 
 #include <lcm/lcm.h>
@@ -18,15 +19,15 @@ namespace ruedo::client {
 
 class LcmTransport : public Transport {
  public:
-  explicit LcmTransport(const std::string& url);    // throws NoServer
+  explicit LcmTransport(const std::string& url);  // throws NoServer
   ~LcmTransport() override;
 
   void subscribe(const std::string& channel) override;
   void unsubscribe(const std::string& channel) override;
   void publish(const std::string& channel, const uint8_t* bytes, size_t size) override;
   bool receive(std::chrono::milliseconds timeout, const Receiver& receiver) override;
-  // Without LCM's own thread, where the network is multicast: a message comes in half the time. What waits is then in the
-  // socket's buffer alone, for all channels together.
+  // Without LCM's own thread, where the network is multicast: a message comes in half the time.
+  // What waits is then in the socket's buffer alone, for all channels together.
   void receive_directly() override;
 
  private:
@@ -35,13 +36,13 @@ class LcmTransport : public Transport {
 
   const std::string url_;
   const bool multicast_;
-  lcm_t* lcm_ = nullptr;         // sends; receives, too, where the network is not multicast
-  lcm_t* receiver_ = nullptr;    // null once there is a direct one
+  lcm_t* lcm_ = nullptr;       // sends; receives, too, where the network is not multicast
+  lcm_t* receiver_ = nullptr;  // null once there is a direct one
   std::unique_ptr<bus::MulticastReceiver> direct_;
-  std::mutex mutex_;             // receiver_ and what follows
+  std::mutex mutex_;  // receiver_ and what follows
   std::map<std::string, lcm_subscription_t*> subscriptions_;
   bool arrived_ = false;
-  std::string channel_;          // of what arrived
+  std::string channel_;  // of what arrived
   std::vector<uint8_t> bytes_;
 };
 

@@ -10,11 +10,14 @@ SampleType decoded(const Observations::Message& message) {
   const SampleDecoder& decoder = *find_decoder(message_type<SampleType>());
   try {
     WireReader in(message.bytes.data(), message.bytes.size());
-    if (in.int64() == decoder.fingerprint) return static_cast<const SampleType&>(*decoder.decode(in));
+    if (in.int64() == decoder.fingerprint)
+      return static_cast<const SampleType&>(*decoder.decode(in));
   } catch (const WireError& error) {
-    throw TypeMismatch(message.channel + ": a message is no valid " + decoder.type + ": " + error.what());
+    throw TypeMismatch(message.channel + ": a message is no valid " + decoder.type + ": " +
+                       error.what());
   }
-  throw TypeMismatch(message.channel + " carries another type than " + decoder.type + ", or another version of it");
+  throw TypeMismatch(message.channel + " carries another type than " + decoder.type +
+                     ", or another version of it");
 }
 
 }  // namespace
@@ -36,8 +39,8 @@ std::optional<SampleType> Observations::latest(const Stream<SampleType>& stream)
   return std::nullopt;
 }
 
-#define RUEDO_OBSERVATIONS(SampleType)                                                      \
-  template std::vector<SampleType> Observations::all(const Stream<SampleType>&) const;      \
+#define RUEDO_OBSERVATIONS(SampleType)                                                 \
+  template std::vector<SampleType> Observations::all(const Stream<SampleType>&) const; \
   template std::optional<SampleType> Observations::latest(const Stream<SampleType>&) const;
 RUEDO_OBSERVATIONS(Scan)
 RUEDO_OBSERVATIONS(LidarScan)

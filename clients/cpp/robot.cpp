@@ -28,7 +28,8 @@ std::string names_of(const std::vector<DeviceInfo>& devices) {
   return names.empty() ? "none" : names;
 }
 
-std::shared_ptr<StreamCore> stream_of(Core& core, const std::string& robot, const std::string& channel) {
+std::shared_ptr<StreamCore> stream_of(Core& core, const std::string& robot,
+                                      const std::string& channel) {
   const auto info = core.info();
   for (const ChannelInfo& found : channels_of(*info, robot)) {
     if (found.name == channel) return core.stream(found);
@@ -41,7 +42,8 @@ Device<SampleType> first_device(Core& core, const std::string& robot, const char
   core.robot_info(robot);
   const auto info = core.info();
   for (const DeviceInfo& device : devices_of(*info, robot)) {
-    if (device.type == message_type<SampleType>()) return {stream_of(core, robot, device.channel), device};
+    if (device.type == message_type<SampleType>())
+      return {stream_of(core, robot, device.channel), device};
   }
   throw UnknownName(robot + " has no " + what + "; it has " + names_of(devices_of(*info, robot)));
 }
@@ -51,7 +53,8 @@ Stream<SampleType> first_stream(Core& core, const std::string& robot, const char
   core.robot_info(robot);
   const auto info = core.info();
   for (const ChannelInfo& channel : channels_of(*info, robot)) {
-    if (channel.type == message_type<SampleType>() && !channel.input) return Stream<SampleType>(core.stream(channel));
+    if (channel.type == message_type<SampleType>() && !channel.input)
+      return Stream<SampleType>(core.stream(channel));
   }
   throw UnknownName(robot + " publishes no " + what);
 }
@@ -66,12 +69,14 @@ Stream<SampleType> camera_part(Core& core, const DeviceInfo& camera, const std::
       return Stream<SampleType>(core.stream(channel));
     }
   }
-  throw UnknownName(camera.robot + "/" + camera.name + " publishes no " + part + "; <ruedo:" + part +
-                    "> in the world file switches it on");
+  throw UnknownName(camera.robot + "/" + camera.name + " publishes no " + part +
+                    "; <ruedo:" + part + "> in the world file switches it on");
 }
 
 std::string input_channel(Core& core, const std::string& robot, const std::string& type) {
-  if (core.robot_info(robot).drive.empty()) throw NotSupported(robot + " cannot be driven: its model has no drive; --drive " + robot + "=LEFT+...,RIGHT+... gives it one, by its wheel joints");
+  if (core.robot_info(robot).drive.empty())
+    throw NotSupported(robot + " cannot be driven: its model has no drive; --drive " + robot +
+                       "=LEFT+...,RIGHT+... gives it one, by its wheel joints");
   const auto info = core.info();
   for (const ChannelInfo& channel : channels_of(*info, robot)) {
     if (channel.input && channel.type == type) return channel.name;
@@ -81,7 +86,8 @@ std::string input_channel(Core& core, const std::string& robot, const std::strin
 
 double finite(const char* name, double value) {
   if (!std::isfinite(value)) {
-    throw std::invalid_argument(std::string(name) + " is " + std::to_string(value) + ": it must be a finite number");
+    throw std::invalid_argument(std::string(name) + " is " + std::to_string(value) +
+                                ": it must be a finite number");
   }
   return value;
 }
@@ -97,19 +103,22 @@ double limit(const char* name, double value) {
 void listen(Core& core, const std::string& robot, Driver& driver) {
   const auto info = core.info();
   for (const ChannelInfo& channel : channels_of(*info, robot)) {
-    if (channel.type == message_type<MotionStatus>() && !channel.input) return driver.listen(core.stream(channel));
+    if (channel.type == message_type<MotionStatus>() && !channel.input)
+      return driver.listen(core.stream(channel));
   }
   throw NotSupported(robot + " publishes no motion status");
 }
 
-void hold(Core& core, const std::string& robot, const std::string& channel, std::vector<uint8_t> bytes) {
+void hold(Core& core, const std::string& robot, const std::string& channel,
+          std::vector<uint8_t> bytes) {
   const auto driver = core.driver(robot);
   listen(core, robot, *driver);
   driver->hold(core.bus(), channel, std::move(bytes));
   core.keep_repeating(driver);
 }
 
-move_command_t move_message(Core& core, int8_t kind, double value, double radius, const Limits& limits) {
+move_command_t move_message(Core& core, int8_t kind, double value, double radius,
+                            const Limits& limits) {
   move_command_t command{};
   command.utime = core.utime();
   command.kind = kind;
@@ -121,7 +130,8 @@ move_command_t move_message(Core& core, int8_t kind, double value, double radius
   return command;
 }
 
-Motion move(Core& core, const std::string& robot, const char* name, int8_t kind, double value, double radius, const Limits& limits) {
+Motion move(Core& core, const std::string& robot, const char* name, int8_t kind, double value,
+            double radius, const Limits& limits) {
   move_command_t command = move_message(core, kind, value, radius, limits);
   const std::string channel = input_channel(core, robot, "move_command_t");
   const auto driver = core.driver(robot);
@@ -153,7 +163,9 @@ Camera::Camera(std::shared_ptr<Core> core, std::shared_ptr<StreamCore> stream, D
     : Device<Image>(std::move(stream), std::move(info)), connection_(std::move(core)) {}
 Stream<Image> Camera::depth() const { return camera_part<Image>(*connection_, info(), "depth"); }
 Stream<Image> Camera::labels() const { return camera_part<Image>(*connection_, info(), "labels"); }
-Stream<CameraInfo> Camera::intrinsics() const { return camera_part<CameraInfo>(*connection_, info(), "info"); }
+Stream<CameraInfo> Camera::intrinsics() const {
+  return camera_part<CameraInfo>(*connection_, info(), "info");
+}
 
 RobotInfo Robot::info() const { return core_->robot_info(name_); }
 
@@ -168,7 +180,8 @@ Device<SampleType> Robot::device(const std::string& name) const {
   for (const DeviceInfo& device : all) {
     if (device.name != name) continue;
     if (device.type != message_type<SampleType>()) {
-      throw TypeMismatch(name_ + "/" + name + " sends " + device.type + ", not " + message_type<SampleType>());
+      throw TypeMismatch(name_ + "/" + name + " sends " + device.type + ", not " +
+                         message_type<SampleType>());
     }
     return {stream_of(*core_, name_, device.channel), device};
   }
@@ -187,13 +200,23 @@ template Device<Joints> Robot::device(const std::string&) const;
 template Device<MotionStatus> Robot::device(const std::string&) const;
 
 Device<Scan> Robot::lrf() const { return first_device<Scan>(*core_, name_, "laser range finder"); }
-Device<LidarScan> Robot::lidar() const { return first_device<LidarScan>(*core_, name_, "laser scanner with several layers"); }
-Device<SonarReading> Robot::sonar() const { return first_device<SonarReading>(*core_, name_, "sonar"); }
-Device<Odometry> Robot::odometry() const { return first_device<Odometry>(*core_, name_, "odometry"); }
+Device<LidarScan> Robot::lidar() const {
+  return first_device<LidarScan>(*core_, name_, "laser scanner with several layers");
+}
+Device<SonarReading> Robot::sonar() const {
+  return first_device<SonarReading>(*core_, name_, "sonar");
+}
+Device<Odometry> Robot::odometry() const {
+  return first_device<Odometry>(*core_, name_, "odometry");
+}
 Device<Imu> Robot::imu() const { return first_device<Imu>(*core_, name_, "IMU"); }
-Device<Contact> Robot::contact() const { return first_device<Contact>(*core_, name_, "contact sensor"); }
+Device<Contact> Robot::contact() const {
+  return first_device<Contact>(*core_, name_, "contact sensor");
+}
 Stream<Pose> Robot::pose() const { return first_stream<Pose>(*core_, name_, "true pose"); }
-Stream<MotionStatus> Robot::motion() const { return first_stream<MotionStatus>(*core_, name_, "motion status"); }
+Stream<MotionStatus> Robot::motion() const {
+  return first_stream<MotionStatus>(*core_, name_, "motion status");
+}
 Stream<Joints> Robot::joints() const { return first_stream<Joints>(*core_, name_, "joints"); }
 
 Camera Robot::camera() const {
@@ -202,24 +225,29 @@ Camera Robot::camera() const {
 }
 
 void Robot::set_velocity(double v, double omega, double vy) const {
-  hold(*core_, name_, input_channel(*core_, name_, "velocity_command_t"), encoded(velocity_message(*core_, v, omega, vy)));
+  hold(*core_, name_, input_channel(*core_, name_, "velocity_command_t"),
+       encoded(velocity_message(*core_, v, omega, vy)));
 }
 
 void Robot::set_wheels(double left, double right) const {
-  hold(*core_, name_, input_channel(*core_, name_, "wheel_command_t"), encoded(wheel_message(*core_, left, right)));
+  hold(*core_, name_, input_channel(*core_, name_, "wheel_command_t"),
+       encoded(wheel_message(*core_, left, right)));
 }
 
 Command Robot::velocity_command(double v, double omega, double vy) const {
-  return {input_channel(*core_, name_, "velocity_command_t"), encoded(velocity_message(*core_, v, omega, vy))};
+  return {input_channel(*core_, name_, "velocity_command_t"),
+          encoded(velocity_message(*core_, v, omega, vy))};
 }
 
 Command Robot::wheel_command(double left, double right) const {
-  return {input_channel(*core_, name_, "wheel_command_t"), encoded(wheel_message(*core_, left, right))};
+  return {input_channel(*core_, name_, "wheel_command_t"),
+          encoded(wheel_message(*core_, left, right))};
 }
 
 Command Robot::move_command(MotionKind kind, double value, Limits limits, double radius) const {
   if (kind < MotionKind::advance || kind > MotionKind::stop) {
-    throw std::invalid_argument(std::string("kind is ") + to_string(kind) + ": it must be advance, rotate, heading, arc or stop");
+    throw std::invalid_argument(std::string("kind is ") + to_string(kind) +
+                                ": it must be advance, rotate, heading, arc or stop");
   }
   move_command_t command = move_message(*core_, static_cast<int8_t>(kind), value, radius, limits);
   command.id = core_->next_id();
@@ -240,7 +268,8 @@ Motion Robot::turn_to(double heading, Limits limits) const {
 }
 Motion Robot::arc(double angle, double radius, Limits limits) const {
   if (!(radius > 0.0)) {
-    throw std::invalid_argument("radius is " + std::to_string(radius) + ": it must be > 0 m; the sign of the angle says left or right");
+    throw std::invalid_argument("radius is " + std::to_string(radius) +
+                                ": it must be > 0 m; the sign of the angle says left or right");
   }
   return move(*core_, name_, "arc", move_command_t::ARC, angle, radius, limits);
 }

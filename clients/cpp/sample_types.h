@@ -14,7 +14,7 @@ namespace ruedo::client {
 struct SampleDecoder {
   const char* type;
   int64_t fingerprint;
-  std::shared_ptr<const Sample> (*decode)(WireReader&);    // throws WireError
+  std::shared_ptr<const Sample> (*decode)(WireReader&);  // throws WireError
 };
 
 // nullptr when this client does not know the type.

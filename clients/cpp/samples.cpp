@@ -21,7 +21,8 @@ namespace ruedo::client {
 double Scan::nearest(double from_angle, double to_angle) const {
   double nearest = std::numeric_limits<double>::infinity();
   for (size_t i = 0; i < ranges.size(); ++i) {
-    if (angle(i) >= from_angle && angle(i) <= to_angle) nearest = std::min(nearest, static_cast<double>(ranges[i]));
+    if (angle(i) >= from_angle && angle(i) <= to_angle)
+      nearest = std::min(nearest, static_cast<double>(ranges[i]));
   }
   return nearest;
 }
@@ -34,13 +35,17 @@ double Pose::heading() const {
 void Image::save(const std::string& path) const {
   std::ofstream file(path, std::ios::binary);
   if (format == Format::jpeg) {
-    file.write(reinterpret_cast<const char*>(data.data()), static_cast<std::streamsize>(data.size()));
+    file.write(reinterpret_cast<const char*>(data.data()),
+               static_cast<std::streamsize>(data.size()));
   } else if (format == Format::rgb || format == Format::bgr || format == Format::gray) {
     const int channels = format == Format::gray ? 1 : 3;
-    const size_t row_bytes = static_cast<size_t>(std::max(width, 0)) * static_cast<size_t>(channels);
+    const size_t row_bytes =
+        static_cast<size_t>(std::max(width, 0)) * static_cast<size_t>(channels);
     const size_t stride = row_stride > 0 ? static_cast<size_t>(row_stride) : row_bytes;
-    if (width <= 0 || height <= 0 || stride < row_bytes || data.size() / stride < static_cast<size_t>(height)) {
-      throw Error(path + ": the picture's size does not fit its " + std::to_string(data.size()) + " bytes");
+    if (width <= 0 || height <= 0 || stride < row_bytes ||
+        data.size() / stride < static_cast<size_t>(height)) {
+      throw Error(path + ": the picture's size does not fit its " + std::to_string(data.size()) +
+                  " bytes");
     }
     file << (channels == 1 ? "P5 " : "P6 ") << width << ' ' << height << " 255\n";
     std::string row(row_bytes, '\0');
@@ -61,19 +66,30 @@ void Image::save(const std::string& path) const {
 namespace {
 
 template <class Enum>
-struct Word { Enum value; const char* text; };
+struct Word {
+  Enum value;
+  const char* text;
+};
 
 constexpr Word<MotionKind> kKinds[] = {
-    {MotionKind::none, "none"}, {MotionKind::advance, "advance"}, {MotionKind::rotate, "rotate"}, {MotionKind::heading, "heading"},
-    {MotionKind::arc, "arc"}, {MotionKind::stop, "stop"}, {MotionKind::velocity, "velocity"}, {MotionKind::wheels, "wheels"}};
+    {MotionKind::none, "none"},         {MotionKind::advance, "advance"},
+    {MotionKind::rotate, "rotate"},     {MotionKind::heading, "heading"},
+    {MotionKind::arc, "arc"},           {MotionKind::stop, "stop"},
+    {MotionKind::velocity, "velocity"}, {MotionKind::wheels, "wheels"}};
 constexpr Word<MotionState> kStates[] = {
-    {MotionState::idle, "idle"}, {MotionState::running, "running"}, {MotionState::done, "done"}, {MotionState::ended, "ended"},
-    {MotionState::refused, "refused"}, {MotionState::sent, "sent"}};
-constexpr Word<MotionReason> kReasons[] = {
-    {MotionReason::none, ""}, {MotionReason::replaced, "replaced"}, {MotionReason::blocked, "blocked"},
-    {MotionReason::watchdog, "watchdog"}, {MotionReason::not_finite, "not finite"}, {MotionReason::bad_kind, "bad kind"},
-    {MotionReason::bad_value, "bad value"}, {MotionReason::no_drive, "no drive"}, {MotionReason::not_possible, "not possible"}, {MotionReason::removed, "removed"},
-    {MotionReason::new_run, "new run"}};
+    {MotionState::idle, "idle"},   {MotionState::running, "running"}, {MotionState::done, "done"},
+    {MotionState::ended, "ended"}, {MotionState::refused, "refused"}, {MotionState::sent, "sent"}};
+constexpr Word<MotionReason> kReasons[] = {{MotionReason::none, ""},
+                                           {MotionReason::replaced, "replaced"},
+                                           {MotionReason::blocked, "blocked"},
+                                           {MotionReason::watchdog, "watchdog"},
+                                           {MotionReason::not_finite, "not finite"},
+                                           {MotionReason::bad_kind, "bad kind"},
+                                           {MotionReason::bad_value, "bad value"},
+                                           {MotionReason::no_drive, "no drive"},
+                                           {MotionReason::not_possible, "not possible"},
+                                           {MotionReason::removed, "removed"},
+                                           {MotionReason::new_run, "new run"}};
 
 const Word<MotionKind>* words(MotionKind) { return std::begin(kKinds); }
 const Word<MotionState>* words(MotionState) { return std::begin(kStates); }
@@ -85,7 +101,8 @@ size_t count(MotionReason) { return std::size(kReasons); }
 template <class Enum>
 const Word<Enum>* word_of(Enum value) {
   const Word<Enum>* const end = words(value) + count(value);
-  const Word<Enum>* const found = std::find_if(words(value), end, [&](const Word<Enum>& word) { return word.value == value; });
+  const Word<Enum>* const found =
+      std::find_if(words(value), end, [&](const Word<Enum>& word) { return word.value == value; });
   return found == end ? nullptr : found;
 }
 
@@ -116,9 +133,10 @@ std::shared_ptr<const Sample> decode_lidar(WireReader& in) {
   s->azimuth_step = in.float32();
   s->elevation_min = in.float32();
   s->elevation_step = in.float32();
-  const bool fits = s->layers >= 0 && s->columns >= 0 &&
-                    static_cast<size_t>(s->layers) * static_cast<size_t>(s->columns) == s->ranges.size() &&
-                    (s->intensities.empty() || s->intensities.size() == s->ranges.size());
+  const bool fits =
+      s->layers >= 0 && s->columns >= 0 &&
+      static_cast<size_t>(s->layers) * static_cast<size_t>(s->columns) == s->ranges.size() &&
+      (s->intensities.empty() || s->intensities.size() == s->ranges.size());
   if (!fits) throw WireError("sizes that do not fit each other");
   return s;
 }
@@ -176,7 +194,7 @@ std::shared_ptr<const Sample> decode_image(WireReader& in) {
   s->row_stride = in.int32();
   s->format = image_format(in.int32());
   s->data = in.bytes(in.count(1));
-  return s;    // the metadata behind is not used
+  return s;  // the metadata behind is not used
 }
 
 std::shared_ptr<const Sample> decode_camera_info(WireReader& in) {
@@ -270,16 +288,49 @@ const SampleDecoder* find_decoder(const std::string& type) {
   return nullptr;
 }
 
-template <> const char* message_type<Scan>() { return "planar_lidar_t"; }
-template <> const char* message_type<LidarScan>() { return "lidar_t"; }
-template <> const char* message_type<SonarReading>() { return "sonar_t"; }
-template <> const char* message_type<Odometry>() { return "odometry_t"; }
-template <> const char* message_type<Pose>() { return "pose_t"; }
-template <> const char* message_type<Image>() { return "image_t"; }
-template <> const char* message_type<CameraInfo>() { return "camera_info_t"; }
-template <> const char* message_type<Imu>() { return "imu_t"; }
-template <> const char* message_type<Contact>() { return "contact_t"; }
-template <> const char* message_type<Joints>() { return "joint_state_t"; }
-template <> const char* message_type<MotionStatus>() { return "motion_status_t"; }
+template <>
+const char* message_type<Scan>() {
+  return "planar_lidar_t";
+}
+template <>
+const char* message_type<LidarScan>() {
+  return "lidar_t";
+}
+template <>
+const char* message_type<SonarReading>() {
+  return "sonar_t";
+}
+template <>
+const char* message_type<Odometry>() {
+  return "odometry_t";
+}
+template <>
+const char* message_type<Pose>() {
+  return "pose_t";
+}
+template <>
+const char* message_type<Image>() {
+  return "image_t";
+}
+template <>
+const char* message_type<CameraInfo>() {
+  return "camera_info_t";
+}
+template <>
+const char* message_type<Imu>() {
+  return "imu_t";
+}
+template <>
+const char* message_type<Contact>() {
+  return "contact_t";
+}
+template <>
+const char* message_type<Joints>() {
+  return "joint_state_t";
+}
+template <>
+const char* message_type<MotionStatus>() {
+  return "motion_status_t";
+}
 
 }  // namespace ruedo::client

@@ -33,10 +33,13 @@ bool is_program(const fs::path& path) {
   return fs::is_regular_file(path, error) && access(path.c_str(), X_OK) == 0;
 }
 
-// RUEDO, else the one of the installation, else the PATH, else the bin/ or build/*/bin/ of a folder above this program.
+// RUEDO, else the one of the installation, else the PATH, else the bin/ or build/*/bin/ of a folder
+// above this program.
 std::string find_ruedo(const std::string& installed) {
   if (const char* named = std::getenv("RUEDO"); named && *named) {
-    if (!is_program(named)) throw LaunchError("the environment's RUEDO is '" + std::string(named) + "', which is no program");
+    if (!is_program(named))
+      throw LaunchError("the environment's RUEDO is '" + std::string(named) +
+                        "', which is no program");
     return named;
   }
   if (!installed.empty() && is_program(installed)) return installed;
@@ -45,16 +48,20 @@ std::string find_ruedo(const std::string& installed) {
     if (is_program(fs::path(folder) / "ruedo")) return fs::path(folder) / "ruedo";
   }
   std::error_code error;
-  for (fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path(); !folder.empty(); folder = folder.parent_path()) {
+  for (fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path(); !folder.empty();
+       folder = folder.parent_path()) {
     std::vector<fs::path> candidates{folder / "bin/ruedo", folder / "build/bin/ruedo"};
-    for (const auto& build : fs::directory_iterator(folder / "build", error)) candidates.push_back(build.path() / "bin/ruedo");
+    for (const auto& build : fs::directory_iterator(folder / "build", error))
+      candidates.push_back(build.path() / "bin/ruedo");
     for (const fs::path& candidate : candidates) {
       if (is_program(candidate)) return candidate;
     }
     if (folder == folder.root_path()) break;
   }
-  throw LaunchError("the program `ruedo` was not found: not in RUEDO, not in its installation, not on the PATH, not built beside this program "
-                    "(`scripts/run` builds it)");
+  throw LaunchError(
+      "the program `ruedo` was not found: not in RUEDO, not in its installation, not on the PATH, "
+      "not built beside this program "
+      "(`scripts/run` builds it)");
 }
 
 int bound_socket(int type, const char* host, uint16_t port) {
@@ -63,7 +70,8 @@ int bound_socket(int type, const char* host, uint16_t port) {
   address.sin_family = AF_INET;
   address.sin_port = htons(port);
   inet_pton(AF_INET, host, &address.sin_addr);
-  if (fd >= 0 && bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) return fd;
+  if (fd >= 0 && bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0)
+    return fd;
   if (fd >= 0) close(fd);
   return -1;
 }
@@ -75,22 +83,26 @@ uint16_t port_of(int fd) {
   return ntohs(address.sin_port);
 }
 
-// A URL that nothing else uses. The TCP socket on the same port, kept open as `token`, keeps launches of any
-// process, in any language, apart from each other.
+// A URL that nothing else uses. The TCP socket on the same port, kept open as `token`, keeps
+// launches of any process, in any language, apart from each other.
 std::string free_url(int& token) {
   for (int i = 0; i < 100; ++i) {
     token = bound_socket(SOCK_STREAM, "127.0.0.1", 0);
     if (token < 0) break;
     const uint16_t port = port_of(token);
     if (!has_multicast_route()) {
-      close(std::exchange(token, -1));    // the server itself will listen on it
+      close(std::exchange(token, -1));  // the server itself will listen on it
       static std::once_flag said;
       std::call_once(said, [&] {
-        std::fprintf(stderr, "ruedo: no multicast route here: launch() speaks LCM over TCP, LCM_DEFAULT_URL=tcpq://127.0.0.1:%d\n", port);
+        std::fprintf(stderr,
+                     "ruedo: no multicast route here: launch() speaks LCM over TCP, "
+                     "LCM_DEFAULT_URL=tcpq://127.0.0.1:%d\n",
+                     port);
       });
       return "tcpq://127.0.0.1:" + std::to_string(port);
     }
-    const int probe = bound_socket(SOCK_DGRAM, "0.0.0.0", port);    // fails when any LCM program uses the port
+    const int probe =
+        bound_socket(SOCK_DGRAM, "0.0.0.0", port);  // fails when any LCM program uses the port
     if (probe >= 0) {
       close(probe);
       return "udpm://239.255.76.67:" + std::to_string(port) + "?ttl=0";
@@ -125,7 +137,8 @@ ServerProcess::~ServerProcess() { end(); }
 
 void ServerProcess::start(const std::vector<std::string>& command, bool verbose) {
   int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0) throw LaunchError(std::string("no pipe for the server: ") + std::strerror(errno));
+  if (pipe2(ends, O_CLOEXEC) != 0)
+    throw LaunchError(std::string("no pipe for the server: ") + std::strerror(errno));
   stdin_ = ends[1];
   if (!verbose) {
     const char* folder = std::getenv("TMPDIR");
@@ -140,14 +153,16 @@ void ServerProcess::start(const std::vector<std::string>& command, bool verbose)
     posix_spawn_file_actions_adddup2(&actions, output_, 1);
     posix_spawn_file_actions_adddup2(&actions, output_, 2);
   }
-  // A session of its own: Ctrl-C in a terminal reaches this process alone, which may still use the server.
+  // A session of its own: Ctrl-C in a terminal reaches this process alone, which may still use the
+  // server.
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID);
   std::vector<char*> arguments;
   for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
-  const int error = posix_spawn(&pid_, command[0].c_str(), &actions, &attributes, arguments.data(), environ);
+  const int error =
+      posix_spawn(&pid_, command[0].c_str(), &actions, &attributes, arguments.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
   posix_spawnattr_destroy(&attributes);
   close(ends[0]);
@@ -157,7 +172,8 @@ void ServerProcess::start(const std::vector<std::string>& command, bool verbose)
   }
 }
 
-// A tcpq server listens once its world is loaded; who ends before that is found out by the connection.
+// A tcpq server listens once its world is loaded; who ends before that is found out by the
+// connection.
 void ServerProcess::await_port(Duration timeout) {
   const auto deadline = deadline_after(timeout);
   while (!is_served(url_) && !ended() && std::chrono::steady_clock::now() < deadline) {
@@ -177,7 +193,8 @@ std::optional<std::string> ServerProcess::ended() {
   const std::string how = WIFEXITED(status_) ? "exit code " + std::to_string(WEXITSTATUS(status_))
                                              : "signal " + std::to_string(WTERMSIG(status_));
   const std::string said = last_lines();
-  return "the server ended (" + how + "): " + (said.empty() ? "it said nothing" : said) + "\n(`" + command_ + "`)";
+  return "the server ended (" + how + "): " + (said.empty() ? "it said nothing" : said) + "\n(`" +
+         command_ + "`)";
 }
 
 void ServerProcess::end() {
@@ -205,8 +222,10 @@ std::string ServerProcess::last_lines() const {
   text.resize(read > 0 ? static_cast<size_t>(read) : 0);
   while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back()))) text.pop_back();
   size_t from = text.size();
-  for (int lines = 0; lines < 12 && from != std::string::npos && from > 0; ++lines) from = text.rfind('\n', from - 1);
-  return from == std::string::npos ? text : text.substr(from + (from < text.size() && text[from] == '\n'));
+  for (int lines = 0; lines < 12 && from != std::string::npos && from > 0; ++lines)
+    from = text.rfind('\n', from - 1);
+  return from == std::string::npos ? text
+                                   : text.substr(from + (from < text.size() && text[from] == '\n'));
 }
 
 }  // namespace ruedo::client

@@ -1,7 +1,8 @@
 // A private server: on a free port, and ended when this process does, however that ends.
 //
-// The server watches its standard input (--watch-stdin) and ends when the pipe closes: the kernel closes it for a
-// process that was killed, too, and it does not depend on which thread started it, as PR_SET_PDEATHSIG does.
+// The server watches its standard input (--watch-stdin) and ends when the pipe closes: the kernel
+// closes it for a process that was killed, too, and it does not depend on which thread started it,
+// as PR_SET_PDEATHSIG does.
 #pragma once
 
 #include <sys/types.h>
@@ -17,11 +18,12 @@ namespace ruedo::client {
 
 class ServerProcess {
  public:
-  ServerProcess(const std::string& world, const LaunchOptions& options);    // throws LaunchError
+  ServerProcess(const std::string& world, const LaunchOptions& options);  // throws LaunchError
   ~ServerProcess();
 
   const std::string& url() const { return url_; }
-  // How the server ended, with the last lines it printed; nothing while it runs. Thread safe, as is end().
+  // How the server ended, with the last lines it printed; nothing while it runs. Thread safe, as is
+  // end().
   std::optional<std::string> ended();
   // Closes the pipe, which ends the server; kills it when it has not ended after 5 s.
   void end();
@@ -29,7 +31,7 @@ class ServerProcess {
  private:
   void start(const std::vector<std::string>& command, bool verbose);
   void await_port(Duration timeout);
-  bool poll();    // true when it has ended; with the mutex held
+  bool poll();  // true when it has ended; with the mutex held
   std::string last_lines() const;
 
   std::string url_, command_;
@@ -37,7 +39,7 @@ class ServerProcess {
   pid_t pid_ = -1;
   int status_ = 0;
   bool ended_ = false;
-  int stdin_ = -1, output_ = -1, token_ = -1;    // file descriptors
+  int stdin_ = -1, output_ = -1, token_ = -1;  // file descriptors
 };
 
 }  // namespace ruedo::client

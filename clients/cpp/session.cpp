@@ -15,16 +15,19 @@ namespace {
 constexpr auto kRepeatTime = std::chrono::milliseconds(100);
 
 std::string kind_name(int32_t kind) {
-  static const char* const names[] = {"", "JOIN", "LEAVE", "PAUSE", "RESUME", "STEP", "RATE", "RESET", "SPAWN", "REMOVE",
-                                      "SET_POSE", "SET_TWIST", "GET_STATE", "INFO", "QUIT", "GRANT", "RESEND", "SNAPSHOT",
-                                      "RESTORE", "RESET_ODOMETRY"};
-  return kind > 0 && kind < static_cast<int32_t>(std::size(names)) ? names[kind] : std::to_string(kind);
+  static const char* const names[] = {
+      "",      "JOIN",  "LEAVE",  "PAUSE",    "RESUME",    "STEP",          "RATE",
+      "RESET", "SPAWN", "REMOVE", "SET_POSE", "SET_TWIST", "GET_STATE",     "INFO",
+      "QUIT",  "GRANT", "RESEND", "SNAPSHOT", "RESTORE",   "RESET_ODOMETRY"};
+  return kind > 0 && kind < static_cast<int32_t>(std::size(names)) ? names[kind]
+                                                                   : std::to_string(kind);
 }
 
 Reply checked(Reply reply) {
   if (reply.code == reply_t::OK) return reply;
-  const std::string text = kind_name(reply.kind) + ": " +
-                           (reply.text.empty() ? "refused with code " + std::to_string(reply.code) : reply.text);
+  const std::string text =
+      kind_name(reply.kind) + ": " +
+      (reply.text.empty() ? "refused with code " + std::to_string(reply.code) : reply.text);
   if (reply.code == reply_t::NOT_SUPPORTED) throw NotSupported(text);
   throw RequestError(text, static_cast<ReplyCode>(reply.code));
 }
@@ -40,19 +43,21 @@ Reply Session::request_in_turn(int32_t kind, const std::vector<uint8_t>& body, D
   core_.check_open();
   const auto info = core_.info();
   if (!(static_cast<uint64_t>(info->features) >> kind & 1)) {
-    throw NotSupported("this server (Ruedo " + info->version + ") has no " + kind_name(kind) + " request");
+    throw NotSupported("this server (Ruedo " + info->version + ") has no " + kind_name(kind) +
+                       " request");
   }
   for (int attempt = 1;; ++attempt) {
     if (session_ == 0 || run_id_ != info->run_id) join(info->run_id, timeout);
     Reply reply = exchange(kind, session_, ++sequence_, body, timeout);
     if (reply.code != reply_t::UNKNOWN_SESSION || attempt == 2) return checked(std::move(reply));
-    session_ = 0;    // its place went to another: join again
+    session_ = 0;  // its place went to another: join again
   }
 }
 
 void Session::leave() {
   std::lock_guard lock(one_at_a_time_);
-  if (session_ == 0 || !(static_cast<uint64_t>(core_.info()->features) >> request_t::LEAVE & 1)) return;
+  if (session_ == 0 || !(static_cast<uint64_t>(core_.info()->features) >> request_t::LEAVE & 1))
+    return;
   publish(request_t::LEAVE, session_, ++sequence_, {});
   session_ = 0;
 }
@@ -61,14 +66,16 @@ void Session::join(int64_t run_id, Duration timeout) {
   join_t body;
   body.client = name_;
   std::random_device random;
-  const int64_t number = static_cast<int64_t>((static_cast<uint64_t>(random()) << 32 | random()) >> 2) + 1;
+  const int64_t number =
+      static_cast<int64_t>((static_cast<uint64_t>(random()) << 32 | random()) >> 2) + 1;
   const Reply reply = checked(exchange(request_t::JOIN, 0, number, encoded(body), timeout));
   session_ = reply.session;
   run_id_ = run_id;
   sequence_ = 0;
 }
 
-Reply Session::exchange(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body, Duration timeout) {
+Reply Session::exchange(int32_t kind, int64_t session, int64_t sequence,
+                        const std::vector<uint8_t>& body, Duration timeout) {
   const Clock::time_point deadline = deadline_after(timeout);
   std::unique_lock lock(mutex_);
   awaited_kind_ = kind;
@@ -77,7 +84,8 @@ Reply Session::exchange(int32_t kind, int64_t session, int64_t sequence, const s
   while (!reply_) {
     if (Clock::now() >= deadline) {
       awaited_kind_ = 0;
-      throw Timeout("no reply to " + kind_name(kind) + " on ruedo/reply within " + text_of(timeout) + " s");
+      throw Timeout("no reply to " + kind_name(kind) + " on ruedo/reply within " +
+                    text_of(timeout) + " s");
     }
     publish(kind, session, sequence, body);
     news_.wait_for(lock, kRepeatTime, [this] { return reply_.has_value(); });
@@ -87,7 +95,8 @@ Reply Session::exchange(int32_t kind, int64_t session, int64_t sequence, const s
   return std::move(*reply_);
 }
 
-void Session::publish(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body, int32_t epoch) {
+void Session::publish(int32_t kind, int64_t session, int64_t sequence,
+                      const std::vector<uint8_t>& body, int32_t epoch) {
   request_t request;
   request.utime = core_.utime();
   request.run_id = core_.info()->run_id;
@@ -105,8 +114,8 @@ void Session::receive(const uint8_t* bytes, size_t size) {
   try {
     WireReader in(bytes, size);
     if (in.int64() != reply_t::getHash()) return;
-    in.int64();    // utime
-    in.int64();    // run
+    in.int64();  // utime
+    in.int64();  // run
     reply.epoch = in.int32();
     reply.session = in.int64();
     reply.sequence = in.int64();

@@ -1,4 +1,5 @@
-// A client's session with the server: requests are repeated until they are answered, and executed once.
+// A client's session with the server: requests are repeated until they are answered, and executed
+// once.
 #pragma once
 
 #include <atomic>
@@ -31,32 +32,36 @@ class Session {
  public:
   Session(Core& core, std::string name) : core_(core), name_(std::move(name)) {}
 
-  // Joins on the first request. Throws NotSupported, RequestError, Timeout (after `timeout` of real time).
+  // Joins on the first request. Throws NotSupported, RequestError, Timeout (after `timeout` of real
+  // time).
   Reply request(int32_t kind, const std::vector<uint8_t>& body, Duration timeout);
-  // For grants, which are not answered by replies: keeps other requests waiting while the lock lives.
+  // For grants, which are not answered by replies: keeps other requests waiting while the lock
+  // lives.
   std::unique_lock<std::mutex> turn() { return std::unique_lock(one_at_a_time_); }
   Reply request_in_turn(int32_t kind, const std::vector<uint8_t>& body, Duration timeout);
   int64_t next_sequence() { return ++sequence_; }
   int64_t id() const { return session_; }
   const std::string& name() const { return name_; }
-  void publish(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body, int32_t epoch = -1);
+  void publish(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body,
+               int32_t epoch = -1);
 
-  void leave();    // without waiting for an answer
-  void receive(const uint8_t* bytes, size_t size);    // a message of ruedo/reply
+  void leave();                                     // without waiting for an answer
+  void receive(const uint8_t* bytes, size_t size);  // a message of ruedo/reply
 
  private:
   void join(int64_t run_id, Duration timeout);
-  Reply exchange(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body, Duration timeout);
+  Reply exchange(int32_t kind, int64_t session, int64_t sequence, const std::vector<uint8_t>& body,
+                 Duration timeout);
 
   Core& core_;
   const std::string name_;
   std::mutex one_at_a_time_;
-  int64_t run_id_ = 0, sequence_ = 0;    // under one_at_a_time_
+  int64_t run_id_ = 0, sequence_ = 0;  // under one_at_a_time_
 
   std::mutex mutex_;
   std::condition_variable news_;
   std::atomic<int64_t> session_ = 0;
-  int32_t awaited_kind_ = 0;             // 0: none
+  int32_t awaited_kind_ = 0;  // 0: none
   int64_t awaited_sequence_ = 0;
   std::optional<Reply> reply_;
 };

@@ -22,7 +22,9 @@ namespace {
 
 constexpr Duration kReplyTime = 5.0, kSlowReplyTime = 60.0, kRestoreTime = 3600.0;
 
-Quaternion about_z(double heading) { return {std::cos(heading / 2.0), 0.0, 0.0, std::sin(heading / 2.0)}; }
+Quaternion about_z(double heading) {
+  return {std::cos(heading / 2.0), 0.0, 0.0, std::sin(heading / 2.0)};
+}
 
 std::vector<uint8_t> name_body(const std::string& name) {
   name_request_t body;
@@ -47,14 +49,17 @@ State state_of(const Reply& reply) {
     state.angular = in.array<3>();
     return state;
   } catch (const WireError& error) {
-    throw TypeMismatch(std::string("the reply's body is no state_reply_t of this client's version: ") + error.what());
+    throw TypeMismatch(
+        std::string("the reply's body is no state_reply_t of this client's version: ") +
+        error.what());
   }
 }
 
 }  // namespace
 
 Simulation connect(const std::string& url, const ConnectOptions& options) {
-  const std::string name = options.name.empty() ? "client-" + std::to_string(getpid()) : options.name;
+  const std::string name =
+      options.name.empty() ? "client-" + std::to_string(getpid()) : options.name;
   auto core = std::make_shared<Core>(resolve_url(url), name, nullptr);
   core->join(options.timeout);
   return Simulation(std::move(core));
@@ -121,22 +126,29 @@ void Simulation::sleep(Duration time) const {
   core->sleep_until(core->utime() + std::llround(time.count() * 1e6));
 }
 
-Subscription Simulation::on_new_run(std::function<void()> callback) const { return core()->on_new_run(std::move(callback)); }
+Subscription Simulation::on_new_run(std::function<void()> callback) const {
+  return core()->on_new_run(std::move(callback));
+}
 
 void Simulation::pause() const { core()->session().request(request_t::PAUSE, {}, kReplyTime); }
 void Simulation::resume() const { core()->session().request(request_t::RESUME, {}, kReplyTime); }
 
-Observations Simulation::step(int64_t n, const std::vector<Command>& commands, Duration timeout) const {
+Observations Simulation::step(int64_t n, const std::vector<Command>& commands,
+                              Duration timeout) const {
   if (lockstep()) return core()->stepper().step(n, commands, timeout);
   if (!commands.empty()) {
-    throw NotSupported("commands go with steps where the server runs in lockstep: start it with `ruedo run --lockstep N`");
+    throw NotSupported(
+        "commands go with steps where the server runs in lockstep: start it with `ruedo run "
+        "--lockstep N`");
   }
   step_request_t body;
   body.steps = n;
   return {state_of(core()->session().request(request_t::STEP, encoded(body), timeout)), {}};
 }
 
-bool Simulation::lockstep() const { return static_cast<uint64_t>(core()->info()->features) >> request_t::GRANT & 1; }
+bool Simulation::lockstep() const {
+  return static_cast<uint64_t>(core()->info()->features) >> request_t::GRANT & 1;
+}
 
 void Simulation::set_rate(double rate) const {
   rate_request_t body;
@@ -146,7 +158,9 @@ void Simulation::set_rate(double rate) const {
 
 void Simulation::reset(Reset what, int64_t seed) const {
   reset_request_t body;
-  body.what = what == Reset::all ? reset_request_t::ALL : what == Reset::time ? reset_request_t::TIME : reset_request_t::POSES;
+  body.what = what == Reset::all    ? reset_request_t::ALL
+              : what == Reset::time ? reset_request_t::TIME
+                                    : reset_request_t::POSES;
   body.seed = seed;
   core()->session().request(request_t::RESET, encoded(body), kSlowReplyTime);
   if (what == Reset::poses) return;
@@ -154,7 +168,8 @@ void Simulation::reset(Reset what, int64_t seed) const {
   core()->stepper().forget();
 }
 
-std::string Simulation::spawn(const std::string& model, double x, double y, const SpawnOptions& options) const {
+std::string Simulation::spawn(const std::string& model, double x, double y,
+                              const SpawnOptions& options) const {
   spawn_request_t body{};
   body.name = options.name;
   body.model = model;
@@ -177,7 +192,8 @@ void Simulation::remove(const std::string& name) const {
   core()->refresh_info(before);
 }
 
-void Simulation::set_pose(const std::string& name, const Vector3& position, const Quaternion& orientation) const {
+void Simulation::set_pose(const std::string& name, const Vector3& position,
+                          const Quaternion& orientation) const {
   set_pose_request_t body;
   body.name = name;
   std::copy(position.begin(), position.end(), body.position);
@@ -185,11 +201,13 @@ void Simulation::set_pose(const std::string& name, const Vector3& position, cons
   core()->session().request(request_t::SET_POSE, encoded(body), kReplyTime);
 }
 
-void Simulation::set_pose(const std::string& name, double x, double y, double heading, double z) const {
+void Simulation::set_pose(const std::string& name, double x, double y, double heading,
+                          double z) const {
   set_pose(name, {x, y, z}, about_z(heading));
 }
 
-void Simulation::set_twist(const std::string& name, const Vector3& linear, const Vector3& angular) const {
+void Simulation::set_twist(const std::string& name, const Vector3& linear,
+                           const Vector3& angular) const {
   set_twist_request_t body;
   body.name = name;
   std::copy(linear.begin(), linear.end(), body.linear);
@@ -210,7 +228,8 @@ State Simulation::snapshot(const std::string& name) const {
 }
 
 State Simulation::restore(const std::string& name) const {
-  const State state = state_of(core()->session().request(request_t::RESTORE, name_body(name), kRestoreTime));
+  const State state =
+      state_of(core()->session().request(request_t::RESTORE, name_body(name), kRestoreTime));
   core()->reset_time();
   core()->stepper().forget();
   return state;

@@ -14,8 +14,9 @@
 namespace ruedo::client {
 namespace {
 
-constexpr auto kFirstRepeat = std::chrono::milliseconds(5), kLastRepeat = std::chrono::milliseconds(100);
-constexpr size_t kMostWanted = 256;              // messages asked for at once
+constexpr auto kFirstRepeat = std::chrono::milliseconds(5),
+               kLastRepeat = std::chrono::milliseconds(100);
+constexpr size_t kMostWanted = 256;  // messages asked for at once
 
 }  // namespace
 
@@ -23,8 +24,9 @@ Observations Stepper::step(int64_t n, const std::vector<Command>& commands, Dura
   if (n < 0) throw std::invalid_argument("n is " + std::to_string(n) + ": it must be at least 0");
   for (const Command& command : commands) {
     if (command.after >= 0 && command.after < n) continue;
-    throw std::invalid_argument("a command is for " + std::to_string(command.after) + " steps on; of " + std::to_string(n) +
-                                " steps 0 to " + std::to_string(n - 1) + " is allowed");
+    throw std::invalid_argument("a command is for " + std::to_string(command.after) +
+                                " steps on; of " + std::to_string(n) + " steps 0 to " +
+                                std::to_string(n - 1) + " is allowed");
   }
   std::lock_guard one_at_a_time(one_at_a_time_);
   const auto turn = core_.session().turn();
@@ -32,23 +34,25 @@ Observations Stepper::step(int64_t n, const std::vector<Command>& commands, Dura
   std::unique_lock lock(mutex_);
   if (part_ && core_.info()->run_id != run_id_) {
     part_ = false;
-    throw NoServer("the run that this client took part in has ended; another is at " + core_.url() + " now");
+    throw NoServer("the run that this client took part in has ended; another is at " + core_.url() +
+                   " now");
   }
   if (!part_) {
     lock.unlock();
     take_part(timeout);
     lock.lock();
   }
-  wait(lock, have_, timeout);    // for nothing, unless the call before gave up
+  wait(lock, have_, timeout);  // for nothing, unless the call before gave up
   const int64_t until = n > INT64_MAX - granted_ ? INT64_MAX : granted_ + n;
   if (n > 0) {
     grant_ = {core_.session().next_sequence(), granted_, grant_body(until, commands), false};
     granted_ = until;
-    acknowledged_ = have_;    // the grant says it
+    acknowledged_ = have_;  // the grant says it
     grant_again();
   }
   wait(lock, until, timeout);
-  if (early_.size() > info_->channel_list.size() || core_.info() != info_) {    // a model came on the way
+  if (early_.size() > info_->channel_list.size() ||
+      core_.info() != info_) {  // a model came on the way
     lock.unlock();
     if (early_.size() > core_.info()->channel_list.size()) core_.refresh_info();
     subscribe();
@@ -76,12 +80,14 @@ void Stepper::take_part(Duration timeout) {
   std::lock_guard lock(mutex_);
   try {
     WireReader in(reply.body.data(), reply.body.size());
-    in.int64();    // fingerprint
+    in.int64();  // fingerprint
     granted_ = in.int64();
     have_ = in.int64();
     newest_ = in.int64();
   } catch (const WireError& error) {
-    throw TypeMismatch(std::string("the reply to GRANT is no grant_reply_t of this client's version: ") + error.what());
+    throw TypeMismatch(
+        std::string("the reply to GRANT is no grant_reply_t of this client's version: ") +
+        error.what());
   }
   run_id_ = core_.info()->run_id;
   epoch_ = reply.epoch;
@@ -104,20 +110,27 @@ void Stepper::subscribe() {
   const auto wanted = [&](size_t i) {
     if (i >= info->channel_list.size()) return std::string();
     const ChannelInfo& channel = info->channel_list[i];
-    return channel.input || (channel.robot.empty() && channel.type != "world_state_t") ? std::string() : channel.name;
+    return channel.input || (channel.robot.empty() && channel.type != "world_state_t")
+               ? std::string()
+               : channel.name;
   };
-  for (auto it = sources_.begin(); it != sources_.end();) it = it->second.first == wanted(it->first) ? std::next(it) : sources_.erase(it);
+  for (auto it = sources_.begin(); it != sources_.end();)
+    it = it->second.first == wanted(it->first) ? std::next(it) : sources_.erase(it);
   for (size_t i = 0; i < info->channel_list.size(); ++i) {
     const std::string channel = wanted(i);
     if (channel.empty() || sources_.count(i)) continue;
     const auto index = static_cast<int32_t>(i);
-    sources_[i] = {channel, core_.bus().subscribe(channel, [this, index](const uint8_t* bytes, size_t size) { on_message(index, bytes, size); })};
+    sources_[i] = {channel,
+                   core_.bus().subscribe(channel, [this, index](const uint8_t* bytes, size_t size) {
+                     on_message(index, bytes, size);
+                   })};
   }
   std::lock_guard lock(mutex_);
   info_ = info;
 }
 
-std::vector<uint8_t> Stepper::grant_body(int64_t until, const std::vector<Command>& commands) const {
+std::vector<uint8_t> Stepper::grant_body(int64_t until,
+                                         const std::vector<Command>& commands) const {
   grant_request_t body;
   body.granted = granted_;
   body.step_until = until;
@@ -133,8 +146,8 @@ std::vector<uint8_t> Stepper::grant_body(int64_t until, const std::vector<Comman
   return encoded(body);
 }
 
-// Until the states up to `until` are here with all their messages. After a silence the grant, or the request for what is
-// missing, goes out again, sooner at first.
+// Until the states up to `until` are here with all their messages. After a silence the grant, or
+// the request for what is missing, goes out again, sooner at first.
 void Stepper::wait(std::unique_lock<std::mutex>& lock, int64_t until, Duration timeout) {
   Clock::duration repeat = kFirstRepeat;
   Clock::time_point deadline = deadline_after(timeout);
@@ -145,9 +158,12 @@ void Stepper::wait(std::unique_lock<std::mutex>& lock, int64_t until, Duration t
   lock.lock();
   while (!done()) {
     const int64_t had = have_;
-    const auto news_here = [&] { return done() || fault_ || ask_now_ || have_ - acknowledged_ >= kAcknowledgedTogether; };
+    const auto news_here = [&] {
+      return done() || fault_ || ask_now_ || have_ - acknowledged_ >= kAcknowledgedTogether;
+    };
     const Clock::time_point quiet_at = Clock::now() + repeat;
-    for (Clock::time_point now = quiet_at - repeat; !news_here() && now < quiet_at; now = Clock::now()) {
+    for (Clock::time_point now = quiet_at - repeat; !news_here() && now < quiet_at;
+         now = Clock::now()) {
       lock.unlock();
       core_.check_open();
       turn.handle(quiet_at - now);
@@ -165,23 +181,25 @@ void Stepper::wait(std::unique_lock<std::mutex>& lock, int64_t until, Duration t
     } else if (silence || ask_now_) {
       ask_for_lost(until);
     } else if (have_ - acknowledged_ >= kAcknowledgedTogether) {
-      ask_for_lost(have_);    // for nothing: it says what is here
+      ask_for_lost(have_);  // for nothing: it says what is here
     }
     ask_now_ = false;
-    repeat = silence ? std::min<Clock::duration>(2 * repeat, kLastRepeat) : Clock::duration(kFirstRepeat);
+    repeat = silence ? std::min<Clock::duration>(2 * repeat, kLastRepeat)
+                     : Clock::duration(kFirstRepeat);
     if (have_ > had) deadline = deadline_after(timeout);
     if (!silence) continue;
     lock.unlock();
     core_.check_server();
     lock.lock();
     if (Clock::now() < deadline) continue;
-    throw Timeout("step " + std::to_string(have_ + 1) + " did not come within " + text_of(timeout) + " s" +
-                  (waits_for_.empty() ? "" : ": the run waits for " + waits_for_));
+    throw Timeout("step " + std::to_string(have_ + 1) + " did not come within " + text_of(timeout) +
+                  " s" + (waits_for_.empty() ? "" : ": the run waits for " + waits_for_));
   }
 }
 
 void Stepper::grant_again() {
-  core_.session().publish(request_t::GRANT, core_.session().id(), grant_.sequence, grant_.body, epoch_);
+  core_.session().publish(request_t::GRANT, core_.session().id(), grant_.sequence, grant_.body,
+                          epoch_);
 }
 
 void Stepper::ask_for_lost(int64_t until) {
@@ -195,7 +213,8 @@ void Stepper::ask_for_lost(int64_t until) {
     wanted.sequence = sequence;
     wanted.offset = static_cast<int32_t>(offset);
   };
-  const int64_t last = std::min(until, std::max({newest_, have_ + 1, steps_.empty() ? have_ : steps_.rbegin()->first}));
+  const int64_t last = std::min(
+      until, std::max({newest_, have_ + 1, steps_.empty() ? have_ : steps_.rbegin()->first}));
   for (int64_t step = have_ + 1; step <= last && body.wanted.size() < kMostWanted; ++step) {
     const auto found = steps_.find(step);
     if (found == steps_.end()) {
@@ -203,18 +222,21 @@ void Stepper::ask_for_lost(int64_t until) {
       continue;
     }
     for (size_t part = 0; part < found->second.nparts; ++part) {
-      if (!found->second.part_here[part]) want(step, info_->tick_channel, static_cast<int64_t>(part), 0);
+      if (!found->second.part_here[part])
+        want(step, info_->tick_channel, static_cast<int64_t>(part), 0);
       for (const Entry& entry : found->second.parts[part]) {
         if (!entry.here()) want(step, entry.channel, entry.sequence, entry.bytes.size());
       }
     }
   }
   body.nwanted = static_cast<int32_t>(body.wanted.size());
-  core_.session().publish(request_t::RESEND, core_.session().id(), ++resend_sequence_, encoded(body), epoch_);
+  core_.session().publish(request_t::RESEND, core_.session().id(), ++resend_sequence_,
+                          encoded(body), epoch_);
 }
 
 void Stepper::collect(Observations& observations) {
-  for (auto step = steps_.begin(); step != steps_.end() && step->first <= have_; step = steps_.erase(step)) {
+  for (auto step = steps_.begin(); step != steps_.end() && step->first <= have_;
+       step = steps_.erase(step)) {
     observations.step = collected_ = step->first;
     observations.utime = step->second.utime;
     observations.state_hash = step->second.state_hash;
@@ -222,13 +244,14 @@ void Stepper::collect(Observations& observations) {
       for (Entry& entry : part) {
         const auto channel = static_cast<size_t>(entry.channel);
         const bool known = channel < info_->channel_list.size();
-        observations.messages.push_back({step->first, known ? info_->channel_list[channel].name : "", std::move(entry.bytes)});
+        observations.messages.push_back(
+            {step->first, known ? info_->channel_list[channel].name : "", std::move(entry.bytes)});
       }
     }
     last_utime_ = observations.utime;
     last_hash_ = observations.state_hash;
   }
-  observations.step = collected_;    // n = 0: the state of the call before
+  observations.step = collected_;  // n = 0: the state of the call before
   observations.utime = last_utime_;
   observations.state_hash = last_hash_;
   observations.rate = kFast;

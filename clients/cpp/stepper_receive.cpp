@@ -1,4 +1,5 @@
-// Putting ticks and messages of lockstep together, as they come: in any order, twice, or not at all.
+// Putting ticks and messages of lockstep together, as they come: in any order, twice, or not at
+// all.
 #include <algorithm>
 #include <array>
 #include <utility>
@@ -14,9 +15,9 @@
 namespace ruedo::client {
 namespace {
 
-constexpr size_t kMostEarly = 512;       // messages of one channel that wait for their ticks
+constexpr size_t kMostEarly = 512;  // messages of one channel that wait for their ticks
 constexpr int32_t kMostChannels = 1 << 20;
-constexpr int64_t kMostAhead = 1024;     // steps beyond what is here: no server is that far
+constexpr int64_t kMostAhead = 1024;  // steps beyond what is here: no server is that far
 
 }  // namespace
 
@@ -29,13 +30,16 @@ uint32_t crc32(const uint8_t* bytes, size_t size) {
       made[0][i] = value;
     }
     for (size_t k = 1; k < 4; ++k)
-      for (size_t i = 0; i < 256; ++i) made[k][i] = made[0][made[k - 1][i] & 255] ^ made[k - 1][i] >> 8;
+      for (size_t i = 0; i < 256; ++i)
+        made[k][i] = made[0][made[k - 1][i] & 255] ^ made[k - 1][i] >> 8;
     return made;
   }();
   uint32_t crc = ~0u;
   for (; size >= 4; bytes += 4, size -= 4) {
-    const uint32_t word = crc ^ (bytes[0] | uint32_t{bytes[1]} << 8 | uint32_t{bytes[2]} << 16 | uint32_t{bytes[3]} << 24);
-    crc = table[3][word & 255] ^ table[2][word >> 8 & 255] ^ table[1][word >> 16 & 255] ^ table[0][word >> 24];
+    const uint32_t word = crc ^ (bytes[0] | uint32_t{bytes[1]} << 8 | uint32_t{bytes[2]} << 16 |
+                                 uint32_t{bytes[3]} << 24);
+    crc = table[3][word & 255] ^ table[2][word >> 8 & 255] ^ table[1][word >> 16 & 255] ^
+          table[0][word >> 24];
   }
   for (; size > 0; ++bytes, --size) crc = table[0][(crc ^ *bytes) & 255] ^ crc >> 8;
   return ~crc;
@@ -44,24 +48,27 @@ uint32_t crc32(const uint8_t* bytes, size_t size) {
 void Stepper::on_message(int32_t channel, const uint8_t* bytes, size_t size) {
   if (size < 16) return;
   WireReader in(bytes, size);
-  in.int64();    // fingerprint
+  in.int64();  // fingerprint
   const int64_t utime = in.int64();
   const uint32_t crc = crc32(bytes, size);
   std::vector<uint8_t> copy(bytes, bytes + size);
   std::lock_guard lock(mutex_);
   if (!part_) return;
-  for (auto& [number, step] : steps_) {    // a tick may come before its messages
-    if (number > have_ && step.missing > 0 && fill(step, channel, size, crc, copy)) return progress();
+  for (auto& [number, step] : steps_) {  // a tick may come before its messages
+    if (number > have_ && step.missing > 0 && fill(step, channel, size, crc, copy))
+      return progress();
   }
   std::deque<Early>& early = early_[static_cast<size_t>(channel)];
   if (early.size() == kMostEarly) early.pop_front();
   early.push_back({size, crc, utime, std::move(copy)});
 }
 
-bool Stepper::fill(Step& step, int32_t channel, size_t size, uint32_t crc, std::vector<uint8_t>& bytes) {
+bool Stepper::fill(Step& step, int32_t channel, size_t size, uint32_t crc,
+                   std::vector<uint8_t>& bytes) {
   for (std::vector<Entry>& part : step.parts) {
     for (Entry& entry : part) {
-      if (entry.channel != channel || entry.size != size || entry.crc != crc || entry.here()) continue;
+      if (entry.channel != channel || entry.size != size || entry.crc != crc || entry.here())
+        continue;
       entry.bytes = std::move(bytes);
       --step.missing;
       return true;
@@ -84,13 +91,17 @@ void Stepper::take_tick(const uint8_t* bytes, size_t size) {
   const int part = in.int16(), nparts = in.int16();
   if (run_id != run_id_ || part < 0 || part >= nparts) return;
   if (epoch != epoch_) {
-    if (epoch > epoch_ && !fault_) fault_ = std::make_exception_ptr(Error("the world was reset by another client: the next step begins anew"));
+    if (epoch > epoch_ && !fault_)
+      fault_ = std::make_exception_ptr(
+          Error("the world was reset by another client: the next step begins anew"));
     return;
   }
   newest_ = std::max(newest_, number);
-  for (size_t n = in.count(13); n > 0; --n) {    // applied: only this says that the grant was executed
+  for (size_t n = in.count(13); n > 0;
+       --n) {  // applied: only this says that the grant was executed
     const std::string client = in.string();
-    if (in.int64() >= grant_.sequence && number > grant_.from && client == core_.session().name()) grant_.taken = true;
+    if (in.int64() >= grant_.sequence && number > grant_.from && client == core_.session().name())
+      grant_.taken = true;
   }
   if (number <= have_ || number - have_ > kMostAhead) return;
   Step& step = steps_[number];
@@ -101,7 +112,8 @@ void Stepper::take_tick(const uint8_t* bytes, size_t size) {
     step.utime = utime;
     step.state_hash = state_hash;
   }
-  if (step.nparts != static_cast<size_t>(nparts) || step.part_here[static_cast<size_t>(part)]) return;
+  if (step.nparts != static_cast<size_t>(nparts) || step.part_here[static_cast<size_t>(part)])
+    return;
   std::vector<Entry> entries;
   size_t missing = 0;
   for (size_t n = in.count(20); n > 0; --n) {
@@ -111,9 +123,12 @@ void Stepper::take_tick(const uint8_t* bytes, size_t size) {
     entry.size = static_cast<size_t>(in.int32());
     entry.crc = static_cast<uint32_t>(in.int32());
     if (entry.channel < 0 || entry.channel >= kMostChannels) throw WireError("a channel's index");
-    if (static_cast<size_t>(entry.channel) >= early_.size()) early_.resize(static_cast<size_t>(entry.channel) + 1);    // of a model that came
+    if (static_cast<size_t>(entry.channel) >= early_.size())
+      early_.resize(static_cast<size_t>(entry.channel) + 1);  // of a model that came
     std::deque<Early>& early = early_[static_cast<size_t>(entry.channel)];
-    const auto found = std::find_if(early.begin(), early.end(), [&](const Early& one) { return one.size == entry.size && one.crc == entry.crc; });
+    const auto found = std::find_if(early.begin(), early.end(), [&](const Early& one) {
+      return one.size == entry.size && one.crc == entry.crc;
+    });
     if (found == early.end()) {
       ++missing;
     } else {
@@ -130,10 +145,11 @@ void Stepper::take_tick(const uint8_t* bytes, size_t size) {
 
 // With the mutex held, after something came.
 void Stepper::progress() {
-  for (auto step = steps_.find(have_ + 1); step != steps_.end() && step->first == have_ + 1 && step->second.complete(); ++step) {
+  for (auto step = steps_.find(have_ + 1);
+       step != steps_.end() && step->first == have_ + 1 && step->second.complete(); ++step) {
     ++have_;
     for (const std::vector<Entry>& part : step->second.parts) {
-      for (const Entry& entry : part) {    // what is left of the time before came twice
+      for (const Entry& entry : part) {  // what is left of the time before came twice
         std::deque<Early>& early = early_[static_cast<size_t>(entry.channel)];
         while (!early.empty() && early.front().utime <= step->second.utime) early.pop_front();
       }
@@ -145,28 +161,32 @@ void Stepper::on_reply(const Reply& reply) {
   std::lock_guard lock(mutex_);
   if (!part_) return;
   if (reply.code != reply_t::OK) {
-    if (reply.kind == request_t::GRANT ? (grant_.taken || reply.sequence != grant_.sequence) : reply.sequence != resend_sequence_) return;
+    if (reply.kind == request_t::GRANT ? (grant_.taken || reply.sequence != grant_.sequence)
+                                       : reply.sequence != resend_sequence_)
+      return;
     if (!fault_) fault_ = fault_of(reply);
     return;
   }
   try {
     if (reply.kind == request_t::RESEND) return take_pieces(reply.body);
     if (reply.sequence != grant_.sequence || grant_.taken) return;
-    grant_.taken = ask_now_ = true;    // it was repeated: its ticks may be lost
+    grant_.taken = ask_now_ = true;  // it was repeated: its ticks may be lost
   } catch (const WireError&) {
   }
 }
 
 std::exception_ptr Stepper::fault_of(const Reply& reply) const {
   const std::string text = (reply.kind == request_t::GRANT ? "GRANT: " : "RESEND: ") + reply.text;
-  if (reply.code == reply_t::UNKNOWN_SESSION) return std::make_exception_ptr(LeaseLost(text, ReplyCode::unknown_session));
-  if (reply.code == reply_t::WRONG_RUN || reply.code == reply_t::REFUSED) return std::make_exception_ptr(NoServer(text));
+  if (reply.code == reply_t::UNKNOWN_SESSION)
+    return std::make_exception_ptr(LeaseLost(text, ReplyCode::unknown_session));
+  if (reply.code == reply_t::WRONG_RUN || reply.code == reply_t::REFUSED)
+    return std::make_exception_ptr(NoServer(text));
   return std::make_exception_ptr(RequestError(text, static_cast<ReplyCode>(reply.code)));
 }
 
 void Stepper::take_pieces(const std::vector<uint8_t>& body) {
   WireReader in(body.data(), body.size());
-  in.int64();    // fingerprint
+  in.int64();  // fingerprint
   newest_ = std::max(newest_, in.int64());
   waits_for_ = in.string();
   std::vector<std::vector<uint8_t>> ticks;
@@ -176,7 +196,7 @@ void Stepper::take_pieces(const std::vector<uint8_t>& body) {
     const int64_t number = in.int64();
     const int32_t channel = in.int32();
     const int64_t sequence = in.int64();
-    in.int32();    // total
+    in.int32();  // total
     const auto offset = static_cast<size_t>(in.int32());
     std::vector<uint8_t> piece = in.bytes(in.count(1));
     if (channel == info_->tick_channel) {
@@ -187,21 +207,23 @@ void Stepper::take_pieces(const std::vector<uint8_t>& body) {
     if (step == steps_.end()) continue;
     for (std::vector<Entry>& part : step->second.parts) {
       for (Entry& entry : part) {
-        if (entry.channel != channel || entry.sequence != sequence || entry.here() || entry.bytes.size() != offset) continue;
+        if (entry.channel != channel || entry.sequence != sequence || entry.here() ||
+            entry.bytes.size() != offset)
+          continue;
         if (piece.size() > entry.size - offset) continue;
         entry.bytes.insert(entry.bytes.end(), piece.begin(), piece.end());
         if (!entry.here()) continue;
         if (crc32(entry.bytes.data(), entry.size) == entry.crc) {
           --step->second.missing;
         } else {
-          entry.bytes.clear();    // from the start again
+          entry.bytes.clear();  // from the start again
         }
       }
     }
   }
   for (const std::vector<uint8_t>& tick : ticks) take_tick(tick.data(), tick.size());
   progress();
-  ask_now_ = any;    // more may be missing than goes into one reply
+  ask_now_ = any;  // more may be missing than goes into one reply
 }
 
 }  // namespace ruedo::client

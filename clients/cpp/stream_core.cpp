@@ -18,7 +18,11 @@ std::string hex(int64_t fingerprint) {
 }  // namespace
 
 StreamCore::StreamCore(std::weak_ptr<Core> core, const ChannelInfo& channel)
-    : core_(std::move(core)), channel_(channel.name), type_(channel.type), fingerprint_(channel.fingerprint), rate_(channel.rate),
+    : core_(std::move(core)),
+      channel_(channel.name),
+      type_(channel.type),
+      fingerprint_(channel.fingerprint),
+      rate_(channel.rate),
       decoder_(find_decoder(channel.type)) {}
 
 std::shared_ptr<Core> StreamCore::connection() const {
@@ -35,9 +39,12 @@ Subscription StreamCore::on_sample(std::function<void(const Sample&)> callback) 
 
 TypeMismatch StreamCore::mismatch(int64_t fingerprint) const {
   const auto core = core_.lock();
-  return TypeMismatch(channel_ + " carries another version of " + type_ + " (fingerprint " + hex(fingerprint) +
-                      ") than this client reads (" + hex(decoder_->fingerprint) + ")" +
-                      (core ? ": the server is Ruedo " + core->info()->version + "; use the client of the same version" : ""));
+  return TypeMismatch(channel_ + " carries another version of " + type_ + " (fingerprint " +
+                      hex(fingerprint) + ") than this client reads (" + hex(decoder_->fingerprint) +
+                      ")" +
+                      (core ? ": the server is Ruedo " + core->info()->version +
+                                  "; use the client of the same version"
+                            : ""));
 }
 
 void StreamCore::subscribe(Core& core) {
@@ -45,9 +52,10 @@ void StreamCore::subscribe(Core& core) {
   if (source_.open()) return;
   if (!decoder_) throw TypeMismatch(channel_ + ": this client does not know the type " + type_);
   if (fingerprint_ != decoder_->fingerprint) throw mismatch(fingerprint_);
-  source_ = core.bus().subscribe(channel_, [self = weak_from_this()](const uint8_t* bytes, size_t size) {
-    if (const auto stream = self.lock()) stream->receive(bytes, size);
-  });
+  source_ =
+      core.bus().subscribe(channel_, [self = weak_from_this()](const uint8_t* bytes, size_t size) {
+        if (const auto stream = self.lock()) stream->receive(bytes, size);
+      });
 }
 
 void StreamCore::forget() {
@@ -73,8 +81,9 @@ void StreamCore::receive(const uint8_t* bytes, size_t size) {
     if (fingerprint != decoder_->fingerprint) throw mismatch(fingerprint);
     sample = decoder_->decode(in);
   } catch (const WireError& error) {
-    fault = std::make_exception_ptr(TypeMismatch(channel_ + ": a message of " + std::to_string(size) + " bytes is no valid " +
-                                                 type_ + ": " + error.what()));
+    fault =
+        std::make_exception_ptr(TypeMismatch(channel_ + ": a message of " + std::to_string(size) +
+                                             " bytes is no valid " + type_ + ": " + error.what()));
   } catch (const TypeMismatch&) {
     fault = std::current_exception();
   }
@@ -92,7 +101,8 @@ void StreamCore::receive(const uint8_t* bytes, size_t size) {
   callbacks_->call(*sample);
 }
 
-std::shared_ptr<const Sample> StreamCore::read(std::atomic<int64_t>& seen, bool new_one, Duration timeout) {
+std::shared_ptr<const Sample> StreamCore::read(std::atomic<int64_t>& seen, bool new_one,
+                                               Duration timeout) {
   const auto core = connection();
   subscribe(*core);
   const Clock::time_point deadline = deadline_after(timeout);
@@ -100,7 +110,8 @@ std::shared_ptr<const Sample> StreamCore::read(std::atomic<int64_t>& seen, bool 
   while (!sample_ || (new_one && count_ == seen)) {
     if (fault_) std::rethrow_exception(std::exchange(fault_, nullptr));
     if (Clock::now() >= deadline) {
-      throw Timeout("no sample on " + channel_ + " within " + text_of(timeout) + " s (" + core->what_is_known(rate_) + ")");
+      throw Timeout("no sample on " + channel_ + " within " + text_of(timeout) + " s (" +
+                    core->what_is_known(rate_) + ")");
     }
     news_.wait_until(lock, std::min(deadline, Clock::now() + std::chrono::milliseconds(500)));
     core->check_server();
@@ -110,10 +121,13 @@ std::shared_ptr<const Sample> StreamCore::read(std::atomic<int64_t>& seen, bool 
 }
 
 template <class SampleType>
-Stream<SampleType>::Stream(std::shared_ptr<StreamCore> core) : core_(std::move(core)), seen_(core_->last_read()) {}
+Stream<SampleType>::Stream(std::shared_ptr<StreamCore> core)
+    : core_(std::move(core)), seen_(core_->last_read()) {}
 
 template <class SampleType>
-const std::string& Stream<SampleType>::channel() const { return core_->channel(); }
+const std::string& Stream<SampleType>::channel() const {
+  return core_->channel();
+}
 
 template <class SampleType>
 SampleType Stream<SampleType>::latest(Duration timeout) const {
@@ -127,7 +141,9 @@ SampleType Stream<SampleType>::next(Duration timeout) const {
 
 template <class SampleType>
 Subscription Stream<SampleType>::on_sample(std::function<void(const SampleType&)> callback) const {
-  return core_->on_sample([callback = std::move(callback)](const Sample& sample) { callback(static_cast<const SampleType&>(sample)); });
+  return core_->on_sample([callback = std::move(callback)](const Sample& sample) {
+    callback(static_cast<const SampleType&>(sample));
+  });
 }
 
 template class Stream<Scan>;

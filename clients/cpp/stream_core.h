@@ -25,34 +25,35 @@ class StreamCore : public std::enable_shared_from_this<StreamCore> {
 
   const std::string& channel() const { return channel_; }
   const std::string& type() const { return type_; }
-  int64_t last_read() const { return last_read_; }    // where a new reader begins
-  // seen: the reader's. new_one: waits for a sample that it has not seen. Throws Timeout, TypeMismatch, NoServer.
+  int64_t last_read() const { return last_read_; }  // where a new reader begins
+  // seen: the reader's. new_one: waits for a sample that it has not seen. Throws Timeout,
+  // TypeMismatch, NoServer.
   std::shared_ptr<const Sample> read(std::atomic<int64_t>& seen, bool new_one, Duration timeout);
   Subscription on_sample(std::function<void(const Sample&)> callback);
-  void forget();    // what came is of a run that has ended
-  void end();       // its robot is gone
+  void forget();  // what came is of a run that has ended
+  void end();     // its robot is gone
 
  private:
   using Callbacks = CallbackList<const Sample&>;
 
-  std::shared_ptr<Core> connection() const;    // throws NoServer once it was closed
+  std::shared_ptr<Core> connection() const;  // throws NoServer once it was closed
   void subscribe(Core& core);
   void receive(const uint8_t* bytes, size_t size);
   TypeMismatch mismatch(int64_t fingerprint) const;
 
   const std::weak_ptr<Core> core_;
   const std::string channel_, type_;
-  const int64_t fingerprint_;    // as ruedo/info says
+  const int64_t fingerprint_;  // as ruedo/info says
   const double rate_;
   const SampleDecoder* decoder_;
   const std::shared_ptr<Callbacks> callbacks_ = std::make_shared<Callbacks>();
 
-  std::mutex opening_;           // source_
+  std::mutex opening_;  // source_
   Subscription source_;
-  std::mutex mutex_;             // what follows
+  std::mutex mutex_;  // what follows
   std::condition_variable news_;
   std::shared_ptr<const Sample> sample_;
-  int64_t count_ = 0;            // samples received
+  int64_t count_ = 0;  // samples received
   std::atomic<int64_t> last_read_{0};
   std::exception_ptr fault_;
 };

@@ -11,19 +11,21 @@
 
 namespace ruedo::client {
 
-// receive() is called by one thread at a time, the rest by any, also while receive() waits or its receiver runs.
+// receive() is called by one thread at a time, the rest by any, also while receive() waits or its
+// receiver runs.
 class Transport {
  public:
   using Receiver = std::function<void(std::string_view channel, const uint8_t* bytes, size_t size)>;
 
   virtual ~Transport() = default;
-  virtual void subscribe(const std::string& channel) = 0;    // from the return on, every message of that channel is received
+  virtual void subscribe(const std::string& channel) = 0;  // from the return on, every message of
+                                                           // that channel is received
   virtual void unsubscribe(const std::string& channel) = 0;
   virtual void publish(const std::string& channel, const uint8_t* bytes, size_t size) = 0;
   // Hands over what has come, or waits for it at most so long and returns false.
   virtual bool receive(std::chrono::milliseconds timeout, const Receiver& receiver) = 0;
-  // From now on as fast as it goes, at the price of loss where many messages come at once: for lockstep, which fetches again
-  // what was lost. Not while another thread receives.
+  // From now on as fast as it goes, at the price of loss where many messages come at once: for
+  // lockstep, which fetches again what was lost. Not while another thread receives.
   virtual void receive_directly() {}
 };
 

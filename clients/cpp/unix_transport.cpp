@@ -51,7 +51,7 @@ void UnixTransport::publish(const std::string& channel, const uint8_t* bytes, si
 
 bool UnixTransport::receive(std::chrono::milliseconds timeout, const Receiver& receiver) {
   const auto open = connection();
-  if (!open) {    // those who wait find out by their timeouts
+  if (!open) {  // those who wait find out by their timeouts
     std::this_thread::sleep_for(std::min(timeout, kAgain));
     const std::lock_guard lock(mutex_);
     try {
@@ -66,7 +66,8 @@ bool UnixTransport::receive(std::chrono::milliseconds timeout, const Receiver& r
   const auto sleep_at = std::chrono::steady_clock::now() + kLookTime;
   do {
     if (open->take(0, receiver)) return true;
-  } while (may_look_again && timeout.count() > 0 && !open->is_over() && std::chrono::steady_clock::now() < sleep_at);
+  } while (may_look_again && timeout.count() > 0 && !open->is_over() &&
+           std::chrono::steady_clock::now() < sleep_at);
   if (open->take(static_cast<int>(timeout.count()), receiver)) return true;
   if (open->is_over()) {
     const std::lock_guard lock(mutex_);

@@ -1,4 +1,5 @@
-// A Unix-domain socket to a server on this machine: no other user reads it, nothing is lost, and it is faster.
+// A Unix-domain socket to a server on this machine: no other user reads it, nothing is lost, and it
+// is faster.
 #pragma once
 
 #include <memory>
@@ -14,7 +15,7 @@ namespace ruedo::client {
 // Connects again when the server comes back.
 class UnixTransport : public Transport {
  public:
-  explicit UnixTransport(const std::string& path);    // throws NoServer
+  explicit UnixTransport(const std::string& path);  // throws NoServer
 
   void subscribe(const std::string& channel) override;
   void unsubscribe(const std::string& channel) override;
@@ -23,11 +24,11 @@ class UnixTransport : public Transport {
 
  private:
   std::shared_ptr<bus::UnixConnection> connection();
-  void connect();    // with the mutex held
+  void connect();  // with the mutex held
 
   const std::string path_;
   std::mutex mutex_;
-  std::shared_ptr<bus::UnixConnection> connection_;    // null: there is no server
+  std::shared_ptr<bus::UnixConnection> connection_;  // null: there is no server
   std::set<std::string> channels_;
 };
 

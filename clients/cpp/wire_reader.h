@@ -1,4 +1,5 @@
-// Reads an LCM message field by field, and never beyond its end: what a length promises must be there.
+// Reads an LCM message field by field, and never beyond its end: what a length promises must be
+// there.
 #pragma once
 
 #include <array>
@@ -12,7 +13,9 @@
 namespace ruedo::client {
 
 // The bytes are not what their type says.
-struct WireError : std::runtime_error { using std::runtime_error::runtime_error; };
+struct WireError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
 
 class WireReader {
  public:
@@ -27,7 +30,7 @@ class WireReader {
   double float64() { return std::bit_cast<double>(big_endian(take(8), 8)); }
 
   std::string string() {
-    const size_t length = count(1);    // with its closing zero
+    const size_t length = count(1);  // with its closing zero
     if (length == 0) throw WireError("a string without an end");
     const uint8_t* bytes = take(length);
     return {reinterpret_cast<const char*>(bytes), length - 1};
@@ -37,16 +40,27 @@ class WireReader {
   size_t count(size_t element_size) { return fits(int32(), element_size); }
   size_t fits(int64_t n, size_t element_size) const {
     if (n < 0 || static_cast<uint64_t>(n) > static_cast<size_t>(end_ - at_) / element_size) {
-      throw WireError("a length of " + std::to_string(n) + " with " + std::to_string(end_ - at_) + " bytes left");
+      throw WireError("a length of " + std::to_string(n) + " with " + std::to_string(end_ - at_) +
+                      " bytes left");
     }
     return static_cast<size_t>(n);
   }
 
-  std::vector<float> floats(size_t n) { return many<float>(n, 4, [this] { return float32(); }); }
-  std::vector<double> doubles(size_t n) { return many<double>(n, 8, [this] { return float64(); }); }
-  std::vector<int64_t> int64s(size_t n) { return many<int64_t>(n, 8, [this] { return int64(); }); }
-  std::vector<std::string> strings(size_t n) { return many<std::string>(n, 5, [this] { return string(); }); }
-  std::vector<bool> booleans(size_t n) { return many<bool>(n, 1, [this] { return boolean(); }); }
+  std::vector<float> floats(size_t n) {
+    return many<float>(n, 4, [this] { return float32(); });
+  }
+  std::vector<double> doubles(size_t n) {
+    return many<double>(n, 8, [this] { return float64(); });
+  }
+  std::vector<int64_t> int64s(size_t n) {
+    return many<int64_t>(n, 8, [this] { return int64(); });
+  }
+  std::vector<std::string> strings(size_t n) {
+    return many<std::string>(n, 5, [this] { return string(); });
+  }
+  std::vector<bool> booleans(size_t n) {
+    return many<bool>(n, 1, [this] { return boolean(); });
+  }
   std::vector<uint8_t> bytes(size_t n) {
     const uint8_t* from = take(n);
     return {from, from + n};

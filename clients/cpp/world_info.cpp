@@ -14,15 +14,15 @@ RobotInfo read_robot(WireReader& in) {
   robot.name = in.string();
   robot.model = in.string();
   robot.drive = in.string();
-  in.int32();    // body
-  for (double* value : {&robot.wheel_radius, &robot.track, &robot.max_speed, &robot.max_turn_rate, &robot.acceleration,
-                        &robot.deceleration, &robot.turn_acceleration}) {
+  in.int32();  // body
+  for (double* value : {&robot.wheel_radius, &robot.track, &robot.max_speed, &robot.max_turn_rate,
+                        &robot.acceleration, &robot.deceleration, &robot.turn_acceleration}) {
     *value = in.float64();
   }
   robot.watchdog = static_cast<double>(in.int64()) * 1e-6;
   const size_t n = in.count(5 + 1);
   robot.wheels = in.strings(n);
-  in.booleans(n);    // which are on the left
+  in.booleans(n);  // which are on the left
   return robot;
 }
 
@@ -34,7 +34,8 @@ DeviceInfo read_device(WireReader& in) {
   device.rate = in.float64();
   device.position = in.array<3>();
   device.orientation = in.array<4>();
-  for (double* value : {&device.range_min, &device.range_max, &device.fov_horizontal, &device.fov_vertical}) {
+  for (double* value :
+       {&device.range_min, &device.range_max, &device.fov_horizontal, &device.fov_vertical}) {
     *value = in.float64();
   }
   device.width = in.int32();
@@ -58,7 +59,7 @@ ChannelInfo read_channel(WireReader& in) {
 
 BodyInfo read_body(WireReader& in) {
   BodyInfo body;
-  in.int32();    // its place in ruedo/world
+  in.int32();  // its place in ruedo/world
   body.name = in.string();
   body.is_static = in.boolean();
   body.mass = in.float64();
@@ -67,11 +68,11 @@ BodyInfo read_body(WireReader& in) {
 
 // The head of every part is the same.
 void read_part(WireReader& in, WorldInfo& info) {
-  in.int64();    // utime
+  in.int64();  // utime
   info.run_id = in.int64();
   info.epoch = in.int32();
-  in.int16();    // part
-  in.int16();    // nparts
+  in.int16();  // part
+  in.int16();  // nparts
   info.version = in.string();
   info.world = in.string();
   info.seed = in.int64();
@@ -85,13 +86,14 @@ void read_part(WireReader& in, WorldInfo& info) {
   }
   for (size_t n = in.count(30); n > 0; --n) {
     ChannelInfo channel = read_channel(in);
-    if (channel.type == "tick_t") info.tick_channel = static_cast<int32_t>(info.channel_list.size());
+    if (channel.type == "tick_t")
+      info.tick_channel = static_cast<int32_t>(info.channel_list.size());
     info.channel_list.push_back(channel);
     info.channels[channel.robot].push_back(std::move(channel));
   }
   for (size_t n = in.count(4 + 4 + 1 + 1 + 8); n > 0; --n) {
     BodyInfo body = read_body(in);
-    if (!body.name.empty()) info.bodies.push_back(std::move(body));    // else it was removed
+    if (!body.name.empty()) info.bodies.push_back(std::move(body));  // else it was removed
   }
 }
 
@@ -114,8 +116,11 @@ std::shared_ptr<const WorldInfo> WorldInfoAssembler::add(const uint8_t* bytes, s
   WireReader head(bytes, size);
   const int64_t fingerprint = head.int64();
   if (fingerprint != world_info_t::getHash()) {
-    throw TypeMismatch("ruedo/info carries another version of world_info_t (fingerprint " + hex(fingerprint) + ") than this "
-                       "client reads (" + hex(world_info_t::getHash()) + "): use the client of the server's version");
+    throw TypeMismatch("ruedo/info carries another version of world_info_t (fingerprint " +
+                       hex(fingerprint) +
+                       ") than this "
+                       "client reads (" +
+                       hex(world_info_t::getHash()) + "): use the client of the server's version");
   }
   const int64_t utime = head.int64(), run_id = head.int64();
   const int32_t epoch = head.int32();
@@ -133,16 +138,18 @@ std::shared_ptr<const WorldInfo> WorldInfoAssembler::add(const uint8_t* bytes, s
   auto info = std::make_shared<WorldInfo>();
   try {
     for (const auto& [index, content] : parts_) {
-      std::vector<uint8_t> whole(8, 0);    // utime has no meaning here
+      std::vector<uint8_t> whole(8, 0);  // utime has no meaning here
       whole.insert(whole.end(), content.begin(), content.end());
       WireReader in(whole.data(), whole.size());
       read_part(in, *info);
     }
   } catch (const WireError& error) {
     parts_.clear();
-    throw TypeMismatch(std::string("a message on ruedo/info is no valid world_info_t: ") + error.what());
+    throw TypeMismatch(std::string("a message on ruedo/info is no valid world_info_t: ") +
+                       error.what());
   }
-  for (size_t i = 0; i < info->robots.size(); ++i) info->robot_index.emplace(info->robots[i].name, i);
+  for (size_t i = 0; i < info->robots.size(); ++i)
+    info->robot_index.emplace(info->robots[i].name, i);
   // A device's channel is the one that carries its samples.
   for (auto& [robot, devices] : info->devices) {
     for (DeviceInfo& device : devices) {

@@ -28,27 +28,29 @@ struct WorldInfo {
   bool paused = false;
   std::vector<RobotInfo> robots;
   std::map<std::string, size_t> robot_index;
-  std::map<std::string, std::vector<DeviceInfo>> devices;      // by robot
-  std::map<std::string, std::vector<ChannelInfo>> channels;    // by robot
-  std::vector<ChannelInfo> channel_list;                       // as ruedo/tick counts them
-  std::vector<BodyInfo> bodies;                                // that are there now
-  int32_t tick_channel = -1;                                   // in that list
+  std::map<std::string, std::vector<DeviceInfo>> devices;    // by robot
+  std::map<std::string, std::vector<ChannelInfo>> channels;  // by robot
+  std::vector<ChannelInfo> channel_list;                     // as ruedo/tick counts them
+  std::vector<BodyInfo> bodies;                              // that are there now
+  int32_t tick_channel = -1;                                 // in that list
 
   const RobotInfo* robot(const std::string& name) const;
 };
 
-// Takes messages of ruedo/info as they come. The parts of one info share run, epoch and utime. An info that says
-// again what the last one said, which is the rule, is known by its bytes and not decoded.
+// Takes messages of ruedo/info as they come. The parts of one info share run, epoch and utime. An
+// info that says again what the last one said, which is the rule, is known by its bytes and not
+// decoded.
 class WorldInfoAssembler {
  public:
-  // The info, when this message completed a new one. Throws TypeMismatch for another version of the type.
+  // The info, when this message completed a new one. Throws TypeMismatch for another version of the
+  // type.
   std::shared_ptr<const WorldInfo> add(const uint8_t* bytes, size_t size);
 
  private:
-  using Key = std::tuple<int64_t, int64_t, int32_t, int>;    // utime, run, epoch, nparts
+  using Key = std::tuple<int64_t, int64_t, int32_t, int>;  // utime, run, epoch, nparts
   Key key_{};
   std::map<int, std::vector<uint8_t>> parts_;
-  std::map<int, std::vector<uint8_t>> last_;                 // without fingerprint and utime
+  std::map<int, std::vector<uint8_t>> last_;  // without fingerprint and utime
 };
 
 }  // namespace ruedo::client

@@ -32,11 +32,21 @@ def generate(proto: Path, output: Path, lcm_gen: str | None = None) -> None:
         raise SystemExit(f"{proto} has no .lcm files")
     with tempfile.TemporaryDirectory() as scratch:
         for file in files:
-            renamed = re.sub(r"^package ruedo;", "package ruedo.lcmtypes;", file.read_text(), flags=re.MULTILINE)
+            renamed = re.sub(
+                r"^package ruedo;", "package ruedo.lcmtypes;", file.read_text(), flags=re.MULTILINE
+            )
             (Path(scratch) / file.name).write_text(renamed)
         made = Path(scratch) / "python"
-        subprocess.run([lcm_gen or find_lcm_gen(), "-p", "--ppath", str(made),
-                        *(str(Path(scratch) / f.name) for f in files)], check=True)
+        subprocess.run(
+            [
+                lcm_gen or find_lcm_gen(),
+                "-p",
+                "--ppath",
+                str(made),
+                *(str(Path(scratch) / f.name) for f in files),
+            ],
+            check=True,
+        )
         target = output / "ruedo" / "lcmtypes"
         shutil.rmtree(target, ignore_errors=True)
         shutil.copytree(made / "ruedo" / "lcmtypes", target)

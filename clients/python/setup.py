@@ -17,7 +17,7 @@ from generate_types import generate  # noqa: E402
 class BuildWithTypes(build_py):
     def run(self):
         super().run()
-        if PROTO.is_dir():    # else: built from an sdist, which brings the types along
+        if PROTO.is_dir():  # else: built from an sdist, which brings the types along
             generate(PROTO, HERE if getattr(self, "editable_mode", False) else Path(self.build_lib))
 
 
@@ -28,5 +28,7 @@ class SdistWithTypes(sdist):
 
 
 # With proto/ at hand the build makes the types; from an sdist they are a package like any other.
-packages = ["ruedo", "ruedo.campaign", "ruedo.hunt"] + ([] if PROTO.is_dir() else ["ruedo.lcmtypes"])
+packages = ["ruedo", "ruedo.campaign", "ruedo.hunt"] + (
+    [] if PROTO.is_dir() else ["ruedo.lcmtypes"]
+)
 setup(packages=packages, cmdclass={"build_py": BuildWithTypes, "sdist": SdistWithTypes})

@@ -19,20 +19,42 @@ def generate_launch_description() -> LaunchDescription:
     bringup = FindPackageShare("nav2_bringup")
     defaults = PathJoinSubstitution([bringup, "params", "nav2_params.yaml"])
     # A P3-AT is larger than the TurtleBot that Nav2's parameters are for; 0.22 is right for a TurtleBot.
-    parameters = RewrittenYaml(source_file=defaults, param_rewrites={"robot_radius": LaunchConfiguration("robot_radius")}, convert_types=True)
+    parameters = RewrittenYaml(
+        source_file=defaults,
+        param_rewrites={"robot_radius": LaunchConfiguration("robot_radius")},
+        convert_types=True,
+    )
 
     def include(name: str, arguments: dict) -> IncludeLaunchDescription:
         source = PythonLaunchDescriptionSource(PathJoinSubstitution([bringup, "launch", name]))
         return IncludeLaunchDescription(source, launch_arguments=arguments.items())
 
-    return LaunchDescription([
-        DeclareLaunchArgument("map", default_value="", description="made by `ruedo map WORLD -o map.yaml`"),
-        DeclareLaunchArgument("slam", default_value="False", description="make the map by slam_toolbox instead"),
-        DeclareLaunchArgument("robot_radius", default_value="0.38", description="m"),
-        # Ruedo's base_link is on the ground, where Nav2's parameters have base_footprint.
-        Node(package="tf2_ros", executable="static_transform_publisher", parameters=[{"use_sim_time": True}],
-             arguments=["--frame-id", "base_link", "--child-frame-id", "base_footprint"]),
-        include("bringup_launch.py", {"map": LaunchConfiguration("map"), "slam": LaunchConfiguration("slam"), "use_sim_time": "True",
-                                      "params_file": parameters, "autostart": "True"}),
-        include("rviz_launch.py", {"use_sim_time": "True"}),
-    ])
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument(
+                "map", default_value="", description="made by `ruedo map WORLD -o map.yaml`"
+            ),
+            DeclareLaunchArgument(
+                "slam", default_value="False", description="make the map by slam_toolbox instead"
+            ),
+            DeclareLaunchArgument("robot_radius", default_value="0.38", description="m"),
+            # Ruedo's base_link is on the ground, where Nav2's parameters have base_footprint.
+            Node(
+                package="tf2_ros",
+                executable="static_transform_publisher",
+                parameters=[{"use_sim_time": True}],
+                arguments=["--frame-id", "base_link", "--child-frame-id", "base_footprint"],
+            ),
+            include(
+                "bringup_launch.py",
+                {
+                    "map": LaunchConfiguration("map"),
+                    "slam": LaunchConfiguration("slam"),
+                    "use_sim_time": "True",
+                    "params_file": parameters,
+                    "autostart": "True",
+                },
+            ),
+            include("rviz_launch.py", {"use_sim_time": "True"}),
+        ]
+    )

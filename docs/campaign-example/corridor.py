@@ -23,7 +23,7 @@ class Corridor:
     """Turns towards the goal and drives there, slower near things, round what is in the way."""
 
     def __init__(self, planted=""):
-        self.planted = planted          # "far", "pi" or "frozen": which fault it has
+        self.planted = planted  # "far", "pi" or "frozen": which fault it has
         self.lost = False
         self.last, self.same = None, 0
 
@@ -34,7 +34,7 @@ class Corridor:
         if math.hypot(GOAL[0] - x, GOAL[1] - y) < 0.3:
             return "done"
         if self.planted == "far" and ranges[0] > 8.0:
-            self.lost = True            # takes the reading for a fault of the sensor, and never forgets it
+            self.lost = True  # takes the reading for a fault of the sensor, and never forgets it
         if self.lost:
             return 0.0, 0.0
         heading = math.atan2(2 * w * z, 1 - 2 * z * z)
@@ -42,7 +42,7 @@ class Corridor:
         if not (self.planted == "pi" and abs(error) == math.pi):
             error = math.atan2(math.sin(error), math.cos(error))
         else:
-            error = 0.0                 # the way of one who wraps with a < where <= belongs
+            error = 0.0  # the way of one who wraps with a < where <= belongs
         if self.blind(ranges):
             return 0.0, 0.0
         return self.drive(error, np.minimum(ranges, 8.0))
@@ -51,7 +51,9 @@ class Corridor:
         """A scan that is the same to the last bit is no scan: there is always noise."""
         if self.planted == "frozen":
             return False
-        self.same = self.same + 1 if self.last is not None and np.array_equal(ranges, self.last) else 0
+        self.same = (
+            self.same + 1 if self.last is not None and np.array_equal(ranges, self.last) else 0
+        )
         self.last = ranges.copy()
         return self.same >= 5
 

@@ -1,5 +1,5 @@
-// Drives a P3-AT through a gate, towards the middle of what its laser range finder sees to both sides, and stops 4 m ahead.
-// In lockstep: 20 steps of 5 ms, then the next command.
+// Drives a P3-AT through a gate, towards the middle of what its laser range finder sees to both
+// sides, and stops 4 m ahead. In lockstep: 20 steps of 5 ms, then the next command.
 #include <ruedo/client.h>
 
 #include <algorithm>
@@ -15,7 +15,8 @@ int main() {
     const auto odometry = seen.latest(robot.odometry());
     if (!scan || !odometry) continue;
     if (odometry->x > 4.0) break;
-    const double left = std::min(scan->nearest(0.2, 1.5), 3.0), right = std::min(scan->nearest(-1.5, -0.2), 3.0);
+    const double left = std::min(scan->nearest(0.2, 1.5), 3.0),
+                 right = std::min(scan->nearest(-1.5, -0.2), 3.0);
     v = 0.4;
     omega = std::clamp(0.5 * (left - right) - 0.8 * odometry->theta, -0.5, 0.5);
   }

@@ -16,21 +16,24 @@ class Bus {
   // Safe from any thread. Never throws: a message that cannot be sent is counted.
   virtual void publish(const std::string& channel, const uint8_t* data, size_t size) = 0;
 
-  // What was published is on its way when this returns, at the latest. For whoever publishes much at once: a bus may send it
-  // as one piece. Any thread.
+  // What was published is on its way when this returns, at the latest. For whoever publishes much
+  // at once: a bus may send it as one piece. Any thread.
   virtual void flush() {}
 
-  // Called from the bus's own thread for every message on one of the channels given to listen(). The bytes are
-  // as they came: nothing about them is checked.
+  // Called from the bus's own thread for every message on one of the channels given to listen().
+  // The bytes are as they came: nothing about them is checked.
   using Handler = std::function<void(const std::string& channel, const uint8_t* data, size_t size)>;
 
-  // Starts to listen; once in a bus's life. `own` are the channels that this process publishes: a bus that hears
-  // itself can tell them from a stranger's.
-  virtual void listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own = {}) = 0;
+  // Starts to listen; once in a bus's life. `own` are the channels that this process publishes: a
+  // bus that hears itself can tell them from a stranger's.
+  virtual void listen(const std::vector<std::string>& channels, Handler handler,
+                      const std::vector<std::string>& own = {}) = 0;
 
-  // After listen(): from now on these are the channels, and `own` those that this process publishes. Messages on channels
-  // that stay are not lost. Returns when the bus has taken them up. Any thread but the bus's own.
-  virtual void listen_to(const std::vector<std::string>& channels, const std::vector<std::string>& own = {}) {
+  // After listen(): from now on these are the channels, and `own` those that this process
+  // publishes. Messages on channels that stay are not lost. Returns when the bus has taken them up.
+  // Any thread but the bus's own.
+  virtual void listen_to(const std::vector<std::string>& channels,
+                         const std::vector<std::string>& own = {}) {
     static_cast<void>(channels), static_cast<void>(own);
   }
 

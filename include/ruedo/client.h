@@ -1,11 +1,12 @@
 /// @file
 /// Ruedo's client for C++17: connect to a robot simulation, read its sensors, drive its robots.
 ///
-/// SI units, radians; x ahead, y left, z up; quaternions w, x, y, z. utime is sim time in microseconds. Everything
-/// here is safe to use from any thread. Link with ruedo::client.
+/// SI units, radians; x ahead, y left, z up; quaternions w, x, y, z. utime is sim time in
+/// microseconds. Everything here is safe to use from any thread. Link with ruedo::client.
 ///
-/// Handles (Robot, Stream, Device, Motion) may outlive their Simulation. Once it was closed, destroyed or moved from, whatever
-/// needs the server throws NoServer ("this simulation was closed").
+/// Handles (Robot, Stream, Device, Motion) may outlive their Simulation. Once it was closed,
+/// destroyed or moved from, whatever needs the server throws NoServer ("this simulation was
+/// closed").
 //
 //     auto sim = ruedo::client::connect();
 //     auto robot = sim.robot("p3at");
@@ -32,40 +33,41 @@ namespace ruedo::client {
 
 struct RobotInfo {
   std::string name, model;
-  std::string drive;                                   // "kinematic", "wheels", "": it only senses
-  double wheel_radius = 0.0, track = 0.0;              // m
-  double max_speed = 0.0, max_turn_rate = 0.0;         // m/s, rad/s
-  double acceleration = 0.0, deceleration = 0.0;       // m/s^2
-  double turn_acceleration = 0.0;                      // rad/s^2
-  double watchdog = 0.0;                               // s of sim time, 0: off
-  std::vector<std::string> wheels;                     // joint names
+  std::string drive;                              // "kinematic", "wheels", "": it only senses
+  double wheel_radius = 0.0, track = 0.0;         // m
+  double max_speed = 0.0, max_turn_rate = 0.0;    // m/s, rad/s
+  double acceleration = 0.0, deceleration = 0.0;  // m/s^2
+  double turn_acceleration = 0.0;                 // rad/s^2
+  double watchdog = 0.0;                          // s of sim time, 0: off
+  std::vector<std::string> wheels;                // joint names
 };
 
 // A set of links that do not move against each other.
 struct BodyInfo {
-  std::string name;                                    // MODEL/LINK: what Simulation::state() takes
-  bool is_static = false;                              // it never moves
-  double mass = 0.0;                                   // kg; 0 of what never moves
+  std::string name;        // MODEL/LINK: what Simulation::state() takes
+  bool is_static = false;  // it never moves
+  double mass = 0.0;       // kg; 0 of what never moves
 };
 
 struct DeviceInfo {
   std::string robot, name;
-  std::string kind;                                    // "lrf", "sonar", "odometry", "camera", "pose", ...
-  std::string channel, type;                           // on the bus
-  double rate = 0.0;                                   // Hz of sim time; 0: every step
-  Vector3 position{};                                  // m, in base_link at the start
-  Quaternion orientation{};                            // device to base_link
-  double range_min = 0.0, range_max = 0.0;             // m
-  double fov_horizontal = 0.0, fov_vertical = 0.0;     // rad
-  int width = 0, height = 0;                           // rays and layers, transducers, or pixels
-  std::vector<std::array<double, 6>> elements;         // a sonar's transducers: x, y, z, roll, pitch, yaw in its frame
+  std::string kind;                         // "lrf", "sonar", "odometry", "camera", "pose", ...
+  std::string channel, type;                // on the bus
+  double rate = 0.0;                        // Hz of sim time; 0: every step
+  Vector3 position{};                       // m, in base_link at the start
+  Quaternion orientation{};                 // device to base_link
+  double range_min = 0.0, range_max = 0.0;  // m
+  double fov_horizontal = 0.0, fov_vertical = 0.0;  // rad
+  int width = 0, height = 0;                        // rays and layers, transducers, or pixels
+  std::vector<std::array<double, 6>>
+      elements;  // a sonar's transducers: x, y, z, roll, pitch, yaw in its frame
 };
 
 // The state of the simulation, and of the model or MODEL/LINK that was asked for (else name is "").
 struct State : Sample {
   int64_t step = 0, state_hash = 0;
   bool paused = false;
-  double rate = 0.0;            // sim time per real time that is asked for; kFast: as fast as it goes
+  double rate = 0.0;  // sim time per real time that is asked for; kFast: as fast as it goes
   std::string name;
   Vector3 position{};           // m, world
   Quaternion orientation{};     // to world
@@ -74,9 +76,9 @@ struct State : Sample {
 
 // A command for Simulation::step(), as Robot::velocity_command() and its like make it.
 struct Command {
-  std::string channel;           // one of the command channels of ruedo/info
-  std::vector<uint8_t> bytes;    // the encoded message
-  int64_t after = 0;             // steps from where the call begins to the state that it acts on
+  std::string channel;         // one of the command channels of ruedo/info
+  std::vector<uint8_t> bytes;  // the encoded message
+  int64_t after = 0;           // steps from where the call begins to the state that it acts on
   Command at(int64_t steps) const { return {channel, bytes, steps}; }
 };
 
@@ -85,11 +87,12 @@ class Core;          // a connection; clients/cpp/core.h
 class StreamCore;    // a subscription; clients/cpp/stream_core.h
 struct MotionCore;
 
-/// A callback that is called until this is closed or destroyed, or the Simulation is closed. Move-only.
+/// A callback that is called until this is closed or destroyed, or the Simulation is closed.
+/// Move-only.
 ///
-/// Once close() has returned, or the destructor, the callback is not called any more, and no call of it is under way (but for
-/// the one that closes it itself): what it refers to may go. What a callback throws is said on the terminal once, and hurts
-/// nobody else.
+/// Once close() has returned, or the destructor, the callback is not called any more, and no call
+/// of it is under way (but for the one that closes it itself): what it refers to may go. What a
+/// callback throws is said on the terminal once, and hurts nobody else.
 class [[nodiscard]] Subscription {
  public:
   Subscription() = default;
@@ -98,7 +101,7 @@ class [[nodiscard]] Subscription {
   Subscription& operator=(Subscription&& other) noexcept;
   ~Subscription();
   void close();
-  void keep();                         ///< The callback stays for as long as the Simulation, without this.
+  void keep();  ///< The callback stays for as long as the Simulation, without this.
   [[nodiscard]] bool open() const;
 
  private:
@@ -107,8 +110,9 @@ class [[nodiscard]] Subscription {
 
 /// A stream of samples from one channel. The first use subscribes.
 ///
-/// Each Stream is a reader of its own: next() goes by what this object has returned, not by what others have. A new one begins
-/// where the channel was last read, so that `robot.lrf().next()` in a loop returns each sample once.
+/// Each Stream is a reader of its own: next() goes by what this object has returned, not by what
+/// others have. A new one begins where the channel was last read, so that `robot.lrf().next()` in a
+/// loop returns each sample once.
 template <class SampleType>
 class Stream {
  public:
@@ -125,19 +129,20 @@ class Stream {
   /// @param timeout of real time
   /// @throws Timeout, TypeMismatch, NoServer
   [[nodiscard]] SampleType latest(Duration timeout = 5.0) const;
-  /// The newest sample that neither latest() nor next() of this object has returned yet; waits for one. A reader slower than
-  /// the rate skips samples; on_sample() skips none.
+  /// The newest sample that neither latest() nor next() of this object has returned yet; waits for
+  /// one. A reader slower than the rate skips samples; on_sample() skips none.
   /// @param timeout of real time
   /// @throws Timeout, TypeMismatch, NoServer
   SampleType next(Duration timeout = 5.0) const;
-  /// Calls back in the receiving thread for every sample from now on. The callback must be quick, and must not wait for other
-  /// samples or replies.
+  /// Calls back in the receiving thread for every sample from now on. The callback must be quick,
+  /// and must not wait for other samples or replies.
   /// @throws TypeMismatch, NoServer
   Subscription on_sample(std::function<void(const SampleType&)> callback) const;
 
  private:
   std::shared_ptr<StreamCore> core_;
-  mutable std::atomic<int64_t> seen_;    // of the samples received, the newest that a call has returned
+  mutable std::atomic<int64_t>
+      seen_;  // of the samples received, the newest that a call has returned
 };
 
 // What step() saw: the state after its last step, and the sensor messages of all its steps.
@@ -147,9 +152,10 @@ struct Observations : State {
     std::string channel;
     std::vector<uint8_t> bytes;
   };
-  std::vector<Message> messages;    // in the order in which the simulation made them
+  std::vector<Message> messages;  // in the order in which the simulation made them
 
-  // The samples of a device or stream, decoded, in order; none when none was due. Throw TypeMismatch.
+  // The samples of a device or stream, decoded, in order; none when none was due. Throw
+  // TypeMismatch.
   template <class SampleType>
   std::vector<SampleType> all(const Stream<SampleType>& stream) const;
   template <class SampleType>
@@ -160,7 +166,8 @@ struct Observations : State {
 template <class SampleType>
 class Device : public Stream<SampleType> {
  public:
-  Device(std::shared_ptr<StreamCore> core, DeviceInfo info) : Stream<SampleType>(std::move(core)), info_(std::move(info)) {}
+  Device(std::shared_ptr<StreamCore> core, DeviceInfo info)
+      : Stream<SampleType>(std::move(core)), info_(std::move(info)) {}
   const DeviceInfo& info() const { return info_; }
   const std::string& name() const { return info_.name; }
 
@@ -168,7 +175,8 @@ class Device : public Stream<SampleType> {
   DeviceInfo info_;
 };
 
-// A camera; its further channels, where the world file asks for them. They throw UnknownName where it does not.
+// A camera; its further channels, where the world file asks for them. They throw UnknownName where
+// it does not.
 class Camera : public Device<Image> {
  public:
   Camera(std::shared_ptr<Core> core, std::shared_ptr<StreamCore> stream, DeviceInfo info);
@@ -185,34 +193,37 @@ class Motion {
  public:
   explicit Motion(std::shared_ptr<MotionCore> core) : core_(std::move(core)) {}
   int64_t id() const;
-  bool done() const;            // true when the robot is not executing it any more, for whatever reason
+  bool done() const;  // true when the robot is not executing it any more, for whatever reason
   MotionState state() const;
   MotionReason reason() const;  // why it ended early or was refused
   double progress() const;      // m or rad
   double remaining() const;     // m or rad
   /// Waits until it is done.
   /// @param timeout of real time
-  /// @throws MotionError when it ended early or was refused; Timeout when it still runs: the robot goes on then; NoServer
+  /// @throws MotionError when it ended early or was refused; Timeout when it still runs: the robot
+  /// goes on then; NoServer
   const Motion& wait(Duration timeout = kForever) const;
 
  private:
   std::shared_ptr<MotionCore> core_;
 };
 
-// Limits of a primitive: m/s and m/s^2, for turns on the spot rad/s and rad/s^2. 0: the robot's own.
+// Limits of a primitive: m/s and m/s^2, for turns on the spot rad/s and rad/s^2. 0: the robot's
+// own.
 struct Limits {
   double speed = 0.0, acceleration = 0.0, deceleration = 0.0;
 };
 
 class Robot {
  public:
-  Robot(std::shared_ptr<Core> core, std::string name) : core_(std::move(core)), name_(std::move(name)) {}
+  Robot(std::shared_ptr<Core> core, std::string name)
+      : core_(std::move(core)), name_(std::move(name)) {}
   const std::string& name() const { return name_; }
   RobotInfo info() const;
 
-  std::vector<DeviceInfo> devices() const;    // in the order of the world file
-  // The device of that name. Throws UnknownName, which lists those that exist, and TypeMismatch when its samples
-  // are of another kind.
+  std::vector<DeviceInfo> devices() const;  // in the order of the world file
+  // The device of that name. Throws UnknownName, which lists those that exist, and TypeMismatch
+  // when its samples are of another kind.
   template <class SampleType>
   Device<SampleType> device(const std::string& name) const;
   // The first device of a kind; UnknownName when there is none.
@@ -223,28 +234,32 @@ class Robot {
   Camera camera() const;
   Device<Imu> imu() const;
   Device<Contact> contact() const;
-  Stream<Pose> pose() const;              // the true pose
-  Stream<MotionStatus> motion() const;    // what it is executing
+  Stream<Pose> pose() const;            // the true pose
+  Stream<MotionStatus> motion() const;  // what it is executing
   Stream<Joints> joints() const;
 
-  // Drives with v (m/s ahead) and omega (rad/s), within the robot's limits, until the next command of any kind: the
-  // command is repeated in the background, so that the watchdog does not stop the robot.
-  void set_velocity(double v, double omega, double vy = 0.0) const;    // vy: m/s to the left, of a robot that moves sideways
+  // Drives with v (m/s ahead) and omega (rad/s), within the robot's limits, until the next command
+  // of any kind: the command is repeated in the background, so that the watchdog does not stop the
+  // robot.
+  void set_velocity(double v, double omega,
+                    double vy = 0.0) const;  // vy: m/s to the left, of a robot that moves sideways
   // The same with the rates of the left and the right wheels, rad/s, positive ahead.
   void set_wheels(double left, double right) const;
 
   // Each returns at once; wait() on what it returns waits for the end.
   Motion stop(double deceleration = 0.0) const;
-  Motion advance(double distance, Limits limits = {}) const;              // m, negative: back
-  Motion rotate(double angle, Limits limits = {}) const;                  // rad, on the spot
-  Motion turn_to(double heading, Limits limits = {}) const;               // rad in odom, the shorter way
-  Motion arc(double angle, double radius, Limits limits = {}) const;      // rad turned (positive: left), m > 0
+  Motion advance(double distance, Limits limits = {}) const;  // m, negative: back
+  Motion rotate(double angle, Limits limits = {}) const;      // rad, on the spot
+  Motion turn_to(double heading, Limits limits = {}) const;   // rad in odom, the shorter way
+  Motion arc(double angle, double radius,
+             Limits limits = {}) const;  // rad turned (positive: left), m > 0
 
-  // The same as commands for Simulation::step(), which sends them; nothing repeats these. kind: a primitive; value in m or rad,
-  // of a stop 0.
+  // The same as commands for Simulation::step(), which sends them; nothing repeats these. kind: a
+  // primitive; value in m or rad, of a stop 0.
   [[nodiscard]] Command velocity_command(double v, double omega, double vy = 0.0) const;
   [[nodiscard]] Command wheel_command(double left, double right) const;
-  [[nodiscard]] Command move_command(MotionKind kind, double value, Limits limits = {}, double radius = 0.0) const;
+  [[nodiscard]] Command move_command(MotionKind kind, double value, Limits limits = {},
+                                     double radius = 0.0) const;
 
  private:
   std::shared_ptr<Core> core_;
@@ -252,16 +267,17 @@ class Robot {
 };
 
 struct SpawnOptions {
-  double heading = 0.0;         // rad
-  std::string name = {};        // "": the model's own
-  std::string text = {};        // SDF or URDF sent along, instead of a model's name
-  bool on_ground = true;        // stands on the ground below; false: at z
-  double z = 0.0;               // m
+  double heading = 0.0;   // rad
+  std::string name = {};  // "": the model's own
+  std::string text = {};  // SDF or URDF sent along, instead of a model's name
+  bool on_ground = true;  // stands on the ground below; false: at z
+  double z = 0.0;         // m
 };
 
 enum class Reset { all, time, poses };
 
-/// A running simulation. Move-only; its destructor closes it. In lockstep, or while paused, step() drives time.
+/// A running simulation. Move-only; its destructor closes it. In lockstep, or while paused, step()
+/// drives time.
 class [[nodiscard]] Simulation {
  public:
   explicit Simulation(std::shared_ptr<Core> core);
@@ -270,80 +286,90 @@ class [[nodiscard]] Simulation {
   ~Simulation();
 
   [[nodiscard]] std::string url() const;
-  [[nodiscard]] std::string version() const;      // of the server
+  [[nodiscard]] std::string version() const;  // of the server
   [[nodiscard]] std::string world() const;
   int64_t seed() const;
-  double step_size() const;         // s
-  double time() const;              // s, sim time of the newest message that came
-  bool paused() const;              // as ruedo/info last said it
+  double step_size() const;  // s
+  double time() const;       // s, sim time of the newest message that came
+  bool paused() const;       // as ruedo/info last said it
   [[nodiscard]] std::vector<Robot> robots() const;
-  [[nodiscard]] std::vector<BodyInfo> bodies() const;          // all that there are
-  [[nodiscard]] Robot robot(const std::string& name) const;    // UnknownName lists those that exist
-  void sleep(Duration time) const;               // of sim time
-  /// Calls back in the receiving thread when another server, or the same one started anew, answers at this address. Commands
-  /// are not repeated into the new run, and primitives under way have ended.
+  [[nodiscard]] std::vector<BodyInfo> bodies() const;        // all that there are
+  [[nodiscard]] Robot robot(const std::string& name) const;  // UnknownName lists those that exist
+  void sleep(Duration time) const;                           // of sim time
+  /// Calls back in the receiving thread when another server, or the same one started anew, answers
+  /// at this address. Commands are not repeated into the new run, and primitives under way have
+  /// ended.
   Subscription on_new_run(std::function<void()> callback) const;
 
   // Each throws NotSupported where the server has no such request, RequestError when it refuses.
   void pause() const;
   void resume() const;
-  // Takes n steps, at most `timeout` of real time each time that nothing goes on, and returns what was seen.
-  // In lockstep (`ruedo run --lockstep N`): takes part from the first call on, grants n steps with their commands, and
-  // has every message of every step; the first call's observations begin with those of the state it found. n = 0 takes
-  // no step. Throws LeaseLost. Else: steps a paused simulation; there are no commands, and the messages are in the
-  // streams.
-  Observations step(int64_t n = 1, const std::vector<Command>& commands = {}, Duration timeout = 60.0) const;
-  bool lockstep() const;                                     // whether the server runs in lockstep
+  // Takes n steps, at most `timeout` of real time each time that nothing goes on, and returns what
+  // was seen. In lockstep (`ruedo run --lockstep N`): takes part from the first call on, grants n
+  // steps with their commands, and has every message of every step; the first call's observations
+  // begin with those of the state it found. n = 0 takes no step. Throws LeaseLost. Else: steps a
+  // paused simulation; there are no commands, and the messages are in the streams.
+  Observations step(int64_t n = 1, const std::vector<Command>& commands = {},
+                    Duration timeout = 60.0) const;
+  bool lockstep() const;  // whether the server runs in lockstep
   void set_rate(double rate) const;
-  void reset(Reset what = Reset::all, int64_t seed = -1) const;    // seed -1: the same again
+  void reset(Reset what = Reset::all, int64_t seed = -1) const;  // seed -1: the same again
   // Returns the model's name: the server numbers one that is taken, unless it was asked for.
-  std::string spawn(const std::string& model, double x, double y, const SpawnOptions& options = {}) const;
+  std::string spawn(const std::string& model, double x, double y,
+                    const SpawnOptions& options = {}) const;
   void remove(const std::string& name) const;
-  void set_pose(const std::string& name, const Vector3& position, const Quaternion& orientation) const;
-  void set_pose(const std::string& name, double x, double y, double heading = 0.0, double z = 0.0) const;
+  void set_pose(const std::string& name, const Vector3& position,
+                const Quaternion& orientation) const;
+  void set_pose(const std::string& name, double x, double y, double heading = 0.0,
+                double z = 0.0) const;
   void set_twist(const std::string& name, const Vector3& linear, const Vector3& angular = {}) const;
   [[nodiscard]] State state(const std::string& name = "") const;
   void reset_odometry(const std::string& robot) const;
-  // Saves the state under a name, in the folder that the server was started with (--snapshots FOLDER), and returns it.
+  // Saves the state under a name, in the folder that the server was started with (--snapshots
+  // FOLDER), and returns it.
   State snapshot(const std::string& name) const;
-  // Puts the world back to a snapshot; what follows equals what followed it. The server runs there from the beginning of
-  // the snapshot's run, in silence: this takes as long as that part takes at rate max. A new epoch.
+  // Puts the world back to a snapshot; what follows equals what followed it. The server runs there
+  // from the beginning of the snapshot's run, in silence: this takes as long as that part takes at
+  // rate max. A new epoch.
   State restore(const std::string& name) const;
-  void quit() const;                // ends the server
+  void quit() const;  // ends the server
 
-  void close();                     // ends repeated commands, and a server that launch() started; a second time nothing
+  void
+  close();  // ends repeated commands, and a server that launch() started; a second time nothing
 
  private:
-  std::shared_ptr<Core> core() const;    // throws NoServer once it was moved from
+  std::shared_ptr<Core> core() const;  // throws NoServer once it was moved from
   std::shared_ptr<Core> core_;
 };
 
 struct ConnectOptions {
-  std::string name;         // of this client; "": "client-PID"
-  Duration timeout = 2.0;   // of real time to wait for a server
+  std::string name;        // of this client; "": "client-PID"
+  Duration timeout = 2.0;  // of real time to wait for a server
 };
 
-// Joins the simulation at an LCM URL; "": LCM_DEFAULT_URL, else LCM's default group and port with ttl 0.
-// Throws NoServer.
+// Joins the simulation at an LCM URL; "": LCM_DEFAULT_URL, else LCM's default group and port with
+// ttl 0. Throws NoServer.
 Simulation connect(const std::string& url = "", const ConnectOptions& options = {});
 
 struct LaunchOptions {
-#ifdef RUEDO_PROGRAM                  // find_package(ruedo) and ruedo.pc define it
+#ifdef RUEDO_PROGRAM  // find_package(ruedo) and ruedo.pc define it
   std::string program = RUEDO_PROGRAM;
 #else
-  std::string program;                // the server, unless the environment's RUEDO names one; "": by the PATH, or above this program
+  std::string program;  // the server, unless the environment's RUEDO names one; "": by the PATH, or
+                        // above this program
 #endif
-  int64_t seed = -1;                  // -1: the server's default
-  double rate = 1.0;                  // sim time per real time; kFast: as fast as it goes
-  std::vector<std::string> args;      // further options of `ruedo run`
-  std::string url;                    // "": a free port of this machine
+  int64_t seed = -1;              // -1: the server's default
+  double rate = 1.0;              // sim time per real time; kFast: as fast as it goes
+  std::vector<std::string> args;  // further options of `ruedo run`
+  std::string url;                // "": a free port of this machine
   std::string name = "client";
-  Duration timeout = 30.0;            // of real time until the world is loaded
-  bool verbose = false;               // show what the server prints; else it is shown in errors alone
+  Duration timeout = 30.0;  // of real time until the world is loaded
+  bool verbose = false;     // show what the server prints; else it is shown in errors alone
 };
 
 // Starts `ruedo run WORLD` and joins it. The server ends with the
-// Simulation, and with this process however that ends. Throws LaunchError with what the server said.
+// Simulation, and with this process however that ends. Throws LaunchError with what the server
+// said.
 Simulation launch(const std::string& world, const LaunchOptions& options = {});
 
 }  // namespace ruedo::client

@@ -1,6 +1,7 @@
 // What Ruedo's client for C++ delivers and throws: samples and errors. ruedo/client.h includes it.
 //
-// SI units, radians; x ahead, y left, z up; quaternions w, x, y, z. utime is sim time in microseconds.
+// SI units, radians; x ahead, y left, z up; quaternions w, x, y, z. utime is sim time in
+// microseconds.
 #pragma once
 
 #include <array>
@@ -18,31 +19,70 @@ namespace ruedo::client {
 /// A span of time: any of std::chrono's, or a number of seconds. kForever has no end.
 class Duration : public std::chrono::duration<double> {
  public:
-  constexpr Duration(double seconds) : std::chrono::duration<double>(seconds) {}    // NOLINT: both are meant to convert
+  constexpr Duration(double seconds)
+      : std::chrono::duration<double>(seconds) {}  // NOLINT: both are meant to convert
   template <class Rep, class Period>
-  constexpr Duration(std::chrono::duration<Rep, Period> time) : std::chrono::duration<double>(time) {}    // NOLINT
+  constexpr Duration(std::chrono::duration<Rep, Period> time)
+      : std::chrono::duration<double>(time) {}  // NOLINT
 };
 
 inline constexpr double kForever = std::numeric_limits<double>::infinity();
-inline constexpr double kFast = std::numeric_limits<double>::infinity();    // a rate: as fast as it goes
+inline constexpr double kFast =
+    std::numeric_limits<double>::infinity();  // a rate: as fast as it goes
 
 using Vector3 = std::array<double, 3>;
-using Quaternion = std::array<double, 4>;    // w, x, y, z
+using Quaternion = std::array<double, 4>;  // w, x, y, z
 
 // ---- What a robot executes.
 
-/// What a command asks for. heading: turn to a heading in odom; velocity and wheels are no primitives.
-enum class MotionKind : int8_t { none = 0, advance = 1, rotate = 2, heading = 3, arc = 4, stop = 5, velocity = 16, wheels = 17, unknown = 127 };
+/// What a command asks for. heading: turn to a heading in odom; velocity and wheels are no
+/// primitives.
+enum class MotionKind : int8_t {
+  none = 0,
+  advance = 1,
+  rotate = 2,
+  heading = 3,
+  arc = 4,
+  stop = 5,
+  velocity = 16,
+  wheels = 17,
+  unknown = 127
+};
 /// sent: no status has shown it yet; ended: before it was done, its reason says why.
-enum class MotionState : int8_t { idle = 0, running = 1, done = 2, ended = 3, refused = 4, sent = 64, unknown = 127 };
+enum class MotionState : int8_t {
+  idle = 0,
+  running = 1,
+  done = 2,
+  ended = 3,
+  refused = 4,
+  sent = 64,
+  unknown = 127
+};
 /// removed: the robot is gone; new_run: the server was started anew.
 enum class MotionReason : int8_t {
-  none = 0, replaced = 1, blocked = 2, watchdog = 3, not_finite = 4, bad_kind = 5, bad_value = 6, no_drive = 7, not_possible = 8,
-  removed = 64, new_run = 65, unknown = 127
+  none = 0,
+  replaced = 1,
+  blocked = 2,
+  watchdog = 3,
+  not_finite = 4,
+  bad_kind = 5,
+  bad_value = 6,
+  no_drive = 7,
+  not_possible = 8,
+  removed = 64,
+  new_run = 65,
+  unknown = 127
 };
 /// How the server answers a request, as in reply_t.
 enum class ReplyCode : int32_t {
-  ok = 0, bad_request = 1, unknown_name = 2, refused = 3, wrong_run = 4, wrong_epoch = 5, old_sequence = 6, unknown_session = 7,
+  ok = 0,
+  bad_request = 1,
+  unknown_name = 2,
+  refused = 3,
+  wrong_run = 4,
+  wrong_epoch = 5,
+  old_sequence = 6,
+  unknown_session = 7,
   not_supported = 8
 };
 
@@ -50,44 +90,65 @@ enum class ReplyCode : int32_t {
 [[nodiscard]] const char* to_string(MotionKind kind);
 [[nodiscard]] const char* to_string(MotionState state);
 [[nodiscard]] const char* to_string(MotionReason reason);
-inline std::ostream& operator<<(std::ostream& out, MotionKind kind) { return out << to_string(kind); }
-inline std::ostream& operator<<(std::ostream& out, MotionState state) { return out << to_string(state); }
-inline std::ostream& operator<<(std::ostream& out, MotionReason reason) { return out << to_string(reason); }
+inline std::ostream& operator<<(std::ostream& out, MotionKind kind) {
+  return out << to_string(kind);
+}
+inline std::ostream& operator<<(std::ostream& out, MotionState state) {
+  return out << to_string(state);
+}
+inline std::ostream& operator<<(std::ostream& out, MotionReason reason) {
+  return out << to_string(reason);
+}
 
 // ---- What can go wrong. Bad arguments (NaN, a radius of 0) are std::invalid_argument.
 
-struct Error : std::runtime_error { using std::runtime_error::runtime_error; };
-struct NoServer : Error { using Error::Error; };         // none answered, it fell silent or ended, or the Simulation was closed
-struct LaunchError : Error { using Error::Error; };      // a private server could not be started
-struct UnknownName : Error { using Error::Error; };      // the text lists the names that exist
-struct Timeout : Error { using Error::Error; };
-struct TypeMismatch : Error { using Error::Error; };     // a channel carries another version of a type
-struct NotSupported : Error { using Error::Error; };     // the server or the robot cannot do that
-struct MotionError : Error {                             // a primitive ended early or was refused
+struct Error : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+struct NoServer : Error {
+  using Error::Error;
+};  // none answered, it fell silent or ended, or the Simulation was closed
+struct LaunchError : Error {
+  using Error::Error;
+};  // a private server could not be started
+struct UnknownName : Error {
+  using Error::Error;
+};  // the text lists the names that exist
+struct Timeout : Error {
+  using Error::Error;
+};
+struct TypeMismatch : Error {
+  using Error::Error;
+};  // a channel carries another version of a type
+struct NotSupported : Error {
+  using Error::Error;
+};                            // the server or the robot cannot do that
+struct MotionError : Error {  // a primitive ended early or was refused
   MotionError(const std::string& text, MotionReason why) : Error(text), reason(why) {}
   MotionReason reason;
 };
-struct RequestError : Error {                            // the server refused a request
+struct RequestError : Error {  // the server refused a request
   RequestError(const std::string& text, ReplyCode reply_code) : Error(text), code(reply_code) {}
   ReplyCode code;
 };
-struct LeaseLost : RequestError {                        // lockstep goes on without this client, which was silent too long;
-  using RequestError::RequestError;                      // the next step() takes part again
+struct LeaseLost
+    : RequestError {  // lockstep goes on without this client, which was silent too long;
+  using RequestError::RequestError;  // the next step() takes part again
 };
 
 // ---- Samples.
 
 struct Sample {
-  int64_t utime = 0;                                     // us, sim time of the state shown
-  double time() const { return static_cast<double>(utime) * 1e-6; }    // s
+  int64_t utime = 0;  // us, sim time of the state shown
+  double time() const { return static_cast<double>(utime) * 1e-6; }  // s
 };
 
 // A scan of a planar laser range finder, in the device's frame.
 struct Scan : Sample {
-  std::vector<float> ranges;         // m; +inf: no return, -inf: nearer than the minimum range
-  std::vector<float> intensities;    // 0 to 1; empty when the device has none
-  double angle_min = 0.0;            // rad, of ray 0, from the device's x axis towards y (left)
-  double angle_step = 0.0;           // rad
+  std::vector<float> ranges;       // m; +inf: no return, -inf: nearer than the minimum range
+  std::vector<float> intensities;  // 0 to 1; empty when the device has none
+  double angle_min = 0.0;          // rad, of ray 0, from the device's x axis towards y (left)
+  double angle_step = 0.0;         // rad
   double angle(size_t ray) const { return angle_min + angle_step * static_cast<double>(ray); }
   // The smallest range between two angles (rad); +inf when nothing is there.
   [[nodiscard]] double nearest(double from_angle, double to_angle) const;
@@ -96,71 +157,73 @@ struct Scan : Sample {
 // A scan of a laser scanner with several layers: element layer * columns + column.
 struct LidarScan : Sample {
   int layers = 0, columns = 0;
-  std::vector<float> ranges;         // m, lowest layer first; as in Scan
-  std::vector<float> intensities;    // 0 to 1, or empty
-  double azimuth_min = 0.0, azimuth_step = 0.0;        // rad, left is positive
-  double elevation_min = 0.0, elevation_step = 0.0;    // rad, up is positive
+  std::vector<float> ranges;                         // m, lowest layer first; as in Scan
+  std::vector<float> intensities;                    // 0 to 1, or empty
+  double azimuth_min = 0.0, azimuth_step = 0.0;      // rad, left is positive
+  double elevation_min = 0.0, elevation_step = 0.0;  // rad, up is positive
 };
 
 // The last reading of each of an array's transducers; their poses are DeviceInfo::elements.
 struct SonarReading : Sample {
-  std::vector<float> ranges;           // m from the transducer's face; without an echo: the maximum range
-  std::vector<int64_t> fired_utime;    // us, when each fired last; -1: not yet
-  std::vector<bool> fresh;             // true where the reading is of this very message
+  std::vector<float> ranges;  // m from the transducer's face; without an echo: the maximum range
+  std::vector<int64_t> fired_utime;  // us, when each fired last; -1: not yet
+  std::vector<bool> fresh;           // true where the reading is of this very message
 };
 
 // What the robot believes of its motion from its wheels; pose of base_link in the frame odom.
 struct Odometry : Sample {
-  double x = 0.0, y = 0.0;             // m
-  double theta = 0.0;                  // rad, not wrapped
-  double v = 0.0, omega = 0.0;         // m/s, rad/s
-  std::vector<double> wheel_angles;    // rad since the start, positive ahead; order of RobotInfo::wheels
-  std::vector<double> wheel_rates;     // rad/s
-  std::vector<int64_t> ticks;          // encoder counts
-  int32_t resets = 0;                  // how often the pose was reset
+  double x = 0.0, y = 0.0;      // m
+  double theta = 0.0;           // rad, not wrapped
+  double v = 0.0, omega = 0.0;  // m/s, rad/s
+  std::vector<double>
+      wheel_angles;  // rad since the start, positive ahead; order of RobotInfo::wheels
+  std::vector<double> wheel_rates;  // rad/s
+  std::vector<int64_t> ticks;       // encoder counts
+  int32_t resets = 0;               // how often the pose was reset
 };
 
 // The true pose of base_link in the world; velocities are expressed in base_link.
 struct Pose : Sample {
-  Vector3 position{};         // m
+  Vector3 position{};  // m
   Quaternion orientation{};
-  Vector3 velocity{};         // m/s
-  Vector3 rotation_rate{};    // rad/s
-  Vector3 acceleration{};     // m/s^2, without gravity
+  Vector3 velocity{};       // m/s
+  Vector3 rotation_rate{};  // rad/s
+  Vector3 acceleration{};   // m/s^2, without gravity
   double x() const { return position[0]; }
   double y() const { return position[1]; }
-  double heading() const;     // rad, counter-clockwise from the world's x axis, in (-pi, pi]
+  double heading() const;  // rad, counter-clockwise from the world's x axis, in (-pi, pi]
 };
 
 struct Image : Sample {
   enum class Format { unknown, jpeg, rgb, bgr, gray, gray16, float32 };
-  int width = 0, height = 0;    // pixels
-  Format format = Format::unknown;    // gray16: labels (body index + 1); float32: depth, m, +inf: nothing
-  int row_stride = 0;           // bytes in a row, 0 for jpeg
-  std::vector<uint8_t> data;    // as they came: rows from the top, or a JPEG file
+  int width = 0, height = 0;  // pixels
+  Format format =
+      Format::unknown;        // gray16: labels (body index + 1); float32: depth, m, +inf: nothing
+  int row_stride = 0;         // bytes in a row, 0 for jpeg
+  std::vector<uint8_t> data;  // as they came: rows from the top, or a JPEG file
   // Writes a JPEG's bytes as they are, rgb, bgr and gray as PPM or PGM. Throws Error.
   void save(const std::string& path) const;
 };
 
 // A pinhole with OpenCV's distortion.
 struct CameraInfo : Sample {
-  int width = 0, height = 0;                          // pixels
-  double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;      // pixels
-  std::array<double, 5> distortion{};                 // k1, k2, p1, p2, k3
+  int width = 0, height = 0;                      // pixels
+  double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;  // pixels
+  std::array<double, 5> distortion{};             // k1, k2, p1, p2, k3
 };
 
-struct Imu : Sample {               // in the device's frame
-  Quaternion orientation{};         // device to world
-  Vector3 angular_velocity{};       // rad/s
-  Vector3 linear_acceleration{};    // m/s^2, specific force: at rest gravity upwards
+struct Imu : Sample {             // in the device's frame
+  Quaternion orientation{};       // device to world
+  Vector3 angular_velocity{};     // rad/s
+  Vector3 linear_acceleration{};  // m/s^2, specific force: at rest gravity upwards
 };
 
 struct ContactPoint {
-  std::string body;       // the other body
-  Vector3 position{};     // m, world
-  Vector3 normal{};       // unit vector, world, towards the sensor's body
-  double force = 0.0;     // N
-  double depth = 0.0;     // m
+  std::string body;    // the other body
+  Vector3 position{};  // m, world
+  Vector3 normal{};    // unit vector, world, towards the sensor's body
+  double force = 0.0;  // N
+  double depth = 0.0;  // m
 };
 struct Contact : Sample {
   bool pressed = false;
@@ -169,12 +232,12 @@ struct Contact : Sample {
 
 struct Joints : Sample {
   std::vector<std::string> names;
-  std::vector<float> positions, velocities, efforts;    // rad or m, rad/s or m/s, N m or N
+  std::vector<float> positions, velocities, efforts;  // rad or m, rad/s or m/s, N m or N
 };
 
 // What a robot is executing.
 struct MotionStatus : Sample {
-  int64_t id = 0;                            // of the primitive; 0 for velocity and wheel commands
+  int64_t id = 0;  // of the primitive; 0 for velocity and wheel commands
   MotionKind kind = MotionKind::none;
   MotionState state = MotionState::idle;
   MotionReason reason = MotionReason::none;  // why it ended or was refused

@@ -19,16 +19,19 @@ struct Source {
 class InputError : public std::runtime_error {
  public:
   InputError(Source source, const std::string& what)
-      : std::runtime_error(source.file.empty() ? what : source.str() + ": " + what), source_(std::move(source)), message_(what) {}
+      : std::runtime_error(source.file.empty() ? what : source.str() + ": " + what),
+        source_(std::move(source)),
+        message_(what) {}
   const Source& source() const { return source_; }
-  const std::string& message() const { return message_; }    // without the place
+  const std::string& message() const { return message_; }  // without the place
 
  private:
   Source source_;
   std::string message_;
 };
 
-// The machine lacks something (a route, a renderer, room on a disk). The text holds the cure. Exit code 4.
+// The machine lacks something (a route, a renderer, room on a disk). The text holds the cure. Exit
+// code 4.
 class EnvironmentError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -39,8 +42,8 @@ struct Finding {
   enum class Kind { unsupported, repaired, error };
   Kind kind;
   Source source;
-  std::string element;    // path of the element: "model p3at/link chassis/inertial"
-  std::string text;       // what was found, and what Ruedo does instead
+  std::string element;  // path of the element: "model p3at/link chassis/inertial"
+  std::string text;     // what was found, and what Ruedo does instead
 };
 
 // Collects findings; the same text about the same kind of thing is kept once per place.
@@ -60,7 +63,7 @@ class Findings {
  private:
   void add(Finding finding);
   std::vector<Finding> list_;
-  std::unordered_set<std::string> seen_;    // looked up only, never walked through
+  std::unordered_set<std::string> seen_;  // looked up only, never walked through
 };
 
 }  // namespace ruedo

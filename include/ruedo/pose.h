@@ -1,7 +1,7 @@
 // Poses and twists, in double precision, and the frames they relate.
 //
-// A pose X_AB maps coordinates in frame B to coordinates in frame A: p_A = X_AB * p_B. Names say the frames:
-// X_WB is the pose of body B in the world W. SI units, radians; x ahead, y left, z up.
+// A pose X_AB maps coordinates in frame B to coordinates in frame A: p_A = X_AB * p_B. Names say
+// the frames: X_WB is the pose of body B in the world W. SI units, radians; x ahead, y left, z up.
 #pragma once
 
 #include <cmath>
@@ -21,11 +21,13 @@ struct Pose {
   Quat rotation = Quat::Identity();
   Vec3 translation = Vec3::Zero();
 
-  // SDF's and URDF's convention: fixed-axis roll about x, then pitch about y, then yaw about z, in radians.
+  // SDF's and URDF's convention: fixed-axis roll about x, then pitch about y, then yaw about z, in
+  // radians.
   static Pose from_xyz_rpy(const Vec3& xyz, const Vec3& rpy) {
-    return {Quat(Eigen::AngleAxisd(rpy.z(), Vec3::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Vec3::UnitY()) *
-                 Eigen::AngleAxisd(rpy.x(), Vec3::UnitX())),
-            xyz};
+    return {
+        Quat(Eigen::AngleAxisd(rpy.z(), Vec3::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Vec3::UnitY()) *
+             Eigen::AngleAxisd(rpy.x(), Vec3::UnitX())),
+        xyz};
   }
 
   Pose operator*(const Pose& other) const {
@@ -39,8 +41,8 @@ struct Pose {
   Pose normalized() const { return {rotation.normalized(), translation}; }
 };
 
-// Velocity of a frame's origin in m/s and angular velocity in rad/s; where it is used says the frame in
-// which the two are expressed.
+// Velocity of a frame's origin in m/s and angular velocity in rad/s; where it is used says the
+// frame in which the two are expressed.
 struct Twist {
   Vec3 linear = Vec3::Zero();
   Vec3 angular = Vec3::Zero();
@@ -48,7 +50,8 @@ struct Twist {
 
 // Heading of a pose in the plane: the angle of its x axis about the world's z, in (-pi, pi].
 inline double heading(const Quat& q) {
-  return math::atan2(2.0 * (q.w() * q.z() + q.x() * q.y()), 1.0 - 2.0 * (q.y() * q.y() + q.z() * q.z()));
+  return math::atan2(2.0 * (q.w() * q.z() + q.x() * q.y()),
+                     1.0 - 2.0 * (q.y() * q.y() + q.z() * q.z()));
 }
 
 // Wraps an angle into (-pi, pi].

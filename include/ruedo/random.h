@@ -1,7 +1,8 @@
-// Counter-based random numbers: a draw depends on (seed, robot, device, sample, draw) and on nothing else,
-// so that no thread, no other device and no added robot can change it.
+// Counter-based random numbers: a draw depends on (seed, robot, device, sample, draw) and on
+// nothing else, so that no thread, no other device and no added robot can change it.
 //
-// The generator is Philox4x32-10 (Salmon et al., "Parallel Random Numbers: As Easy as 1, 2, 3", SC 2011).
+// The generator is Philox4x32-10 (Salmon et al., "Parallel Random Numbers: As Easy as 1, 2, 3", SC
+// 2011).
 #pragma once
 
 #include <array>
@@ -14,9 +15,9 @@ namespace ruedo {
 // The bijection itself: ten rounds of Philox4x32 on a counter under a key.
 std::array<uint32_t, 4> philox4x32(std::array<uint32_t, 4> counter, std::array<uint32_t, 2> key);
 
-// The x for which a normal variable of mean 0 and sigma 1 is below x with probability p, 0 < p < 1: Wichura's
-// AS 241 (PPND16), relative error below 1e-15. Uses no function of libm but the square root, which is exact
-// everywhere, so that its bits depend on no CPU.
+// The x for which a normal variable of mean 0 and sigma 1 is below x with probability p, 0 < p < 1:
+// Wichura's AS 241 (PPND16), relative error below 1e-15. Uses no function of libm but the square
+// root, which is exact everywhere, so that its bits depend on no CPU.
 double normal_quantile(double p);
 
 // The draws of one sample. Cheap to make; holds 64 bytes and no reference.
@@ -24,10 +25,10 @@ class RandomStream {
  public:
   RandomStream(uint64_t key, uint64_t sample) : key_(key), sample_(sample) {}
 
-  uint32_t bits();     // 32 random bits
-  double uniform();    // in [0, 1), 53 bits
-  // Normal with mean 0 and sigma 1, by the inverse of the normal distribution (Wichura's AS 241): one
-  // uniform gives one value, with no state between draws.
+  uint32_t bits();   // 32 random bits
+  double uniform();  // in [0, 1), 53 bits
+  // Normal with mean 0 and sigma 1, by the inverse of the normal distribution (Wichura's AS 241):
+  // one uniform gives one value, with no state between draws.
   double gaussian();
   // The same values as a call of gaussian() for each; many at once cost less.
   void gaussians(std::span<double> values);

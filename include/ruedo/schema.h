@@ -1,5 +1,5 @@
-// The message types as data: what proto/*.lcm says, embedded in the program. It lets any message be checked, compared
-// and printed by its fields' names without a line of code for its type.
+// The message types as data: what proto/*.lcm says, embedded in the program. It lets any message be
+// checked, compared and printed by its fields' names without a line of code for its type.
 //
 // Everything here is const after the first use and safe from many threads.
 #pragma once
@@ -15,26 +15,37 @@
 
 namespace ruedo {
 
-enum class Primitive : uint8_t { none, boolean, byte, int8, int16, int32, int64, float32, float64, string };
+enum class Primitive : uint8_t {
+  none,
+  boolean,
+  byte,
+  int8,
+  int16,
+  int32,
+  int64,
+  float32,
+  float64,
+  string
+};
 
 struct Schema;
 
 // A dimension of an array: a fixed size, or the integer field before it that counts the elements.
 struct Dimension {
   int64_t size = 0;
-  int counted_by = -1;    // index into Schema::fields; -1: fixed
+  int counted_by = -1;  // index into Schema::fields; -1: fixed
 };
 
 struct Field {
   std::string name;
-  Primitive primitive = Primitive::none;    // none: another type
-  const Schema* type = nullptr;             // of a field that is a struct
-  std::vector<Dimension> dimensions;        // empty: one value
+  Primitive primitive = Primitive::none;  // none: another type
+  const Schema* type = nullptr;           // of a field that is a struct
+  std::vector<Dimension> dimensions;      // empty: one value
 };
 
 struct Schema {
-  std::string name;                         // "planar_lidar_t"
-  int64_t fingerprint = 0;                  // LCM's hash of the type, the first eight bytes of a message
+  std::string name;         // "planar_lidar_t"
+  int64_t fingerprint = 0;  // LCM's hash of the type, the first eight bytes of a message
   std::vector<Field> fields;
 };
 
@@ -58,13 +69,14 @@ struct FieldPath {
   };
   std::vector<Part> parts;
 
-  std::string str() const;        // "points[2].position[0]"
-  std::string pattern() const;    // without the indices: "points.position"
+  std::string str() const;      // "points[2].position[0]"
+  std::string pattern() const;  // without the indices: "points.position"
 };
 
-// Visits every value of a message in its order; the visitor returns false to end early. Returns false when the message's
-// bytes are not one whole message of that type: a wrong fingerprint, a length that is negative or reaches beyond the
-// end, an unterminated string, bytes left over. Never reads outside of the bytes, whatever they are.
+// Visits every value of a message in its order; the visitor returns false to end early. Returns
+// false when the message's bytes are not one whole message of that type: a wrong fingerprint, a
+// length that is negative or reaches beyond the end, an unterminated string, bytes left over. Never
+// reads outside of the bytes, whatever they are.
 bool visit_message(const Schema& schema, std::span<const uint8_t> message,
                    const std::function<bool(const FieldPath&, const FieldValue&)>& visitor);
 

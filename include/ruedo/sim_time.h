@@ -1,5 +1,5 @@
-// Simulated time: whole microseconds and step counts, and the schedule of a device's samples in them.
-// No double ever holds a time, so a rate never drifts.
+// Simulated time: whole microseconds and step counts, and the schedule of a device's samples in
+// them. No double ever holds a time, so a rate never drifts.
 #pragma once
 
 #include <cstdint>
@@ -26,8 +26,8 @@ struct Rate {
   friend bool operator==(const Rate&, const Rate&) = default;
 };
 
-// Says at which steps a device takes its samples. Sample k (from 0, the initial state) is taken at the first
-// step whose time is at least phase + k / rate.
+// Says at which steps a device takes its samples. Sample k (from 0, the initial state) is taken at
+// the first step whose time is at least phase + k / rate.
 class SampleClock {
  public:
   // step_us > 0; phase_us >= 0. A rate of zero, or above the step rate, means every step.
@@ -35,7 +35,8 @@ class SampleClock {
 
   // The step of sample k.
   int64_t step_of(int64_t sample) const;
-  // The number of samples taken before step `step`; it is also the index of the sample taken at or after it.
+  // The number of samples taken before step `step`; it is also the index of the sample taken at or
+  // after it.
   int64_t samples_before(int64_t step) const;
   bool every_step() const { return every_step_; }
 

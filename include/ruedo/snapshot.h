@@ -1,7 +1,9 @@
-// The state of the world at one step: written once by the kinematics module, then read by all others.
+// The state of the world at one step: written once by the kinematics module, then read by all
+// others.
 //
-// Index spaces are those of model::BodyLayout. Everything is in the world frame and in SI units unless a
-// comment says otherwise. Plain arrays: copying one allocates nothing once its vectors have their size.
+// Index spaces are those of model::BodyLayout. Everything is in the world frame and in SI units
+// unless a comment says otherwise. Plain arrays: copying one allocates nothing once its vectors
+// have their size.
 #pragma once
 
 #include <cstdint>
@@ -28,22 +30,24 @@ struct MotionState {
   int64_t id = 0;
   int8_t kind = 0, state = 0, reason = 0;
   double done = 0.0, remaining = 0.0;
-  int64_t changes = 0;             // counts the changes of id, kind, state and reason, and the MotionEnds
+  int64_t changes = 0;  // counts the changes of id, kind, state and reason, and the MotionEnds
 };
 
-// What came to its end by a command in this step: a primitive that it replaced, or the command itself, refused.
+// What came to its end by a command in this step: a primitive that it replaced, or the command
+// itself, refused.
 struct MotionEnd {
-  int robot = -1;                  // index into BodyLayout::robots
+  int robot = -1;  // index into BodyLayout::robots
   MotionState state;
 };
 
 struct RobotState {
-  Pose X_WBase;                    // base_link
-  Twist twist;                     // of base_link, expressed in base_link
-  Vec3 acceleration = Vec3::Zero();    // m/s^2 of base_link's origin, expressed in base_link, without gravity
-  double wheel_v = 0.0, wheel_omega = 0.0;    // m/s, rad/s: what the wheels do, before slip
+  Pose X_WBase;  // base_link
+  Twist twist;   // of base_link, expressed in base_link
+  Vec3 acceleration =
+      Vec3::Zero();  // m/s^2 of base_link's origin, expressed in base_link, without gravity
+  double wheel_v = 0.0, wheel_omega = 0.0;  // m/s, rad/s: what the wheels do, before slip
   MotionState motion;
-  int32_t odometry_resets = 0;     // counts the commands that reset the odometry
+  int32_t odometry_resets = 0;  // counts the commands that reset the odometry
 };
 
 struct Snapshot {
@@ -58,8 +62,8 @@ struct Snapshot {
   std::vector<double> joint_velocities;
   std::vector<double> joint_efforts;
   std::vector<RobotState> robots;
-  std::vector<MotionEnd> motion_ends;    // by robot, then in the order of the commands
-  std::vector<Contact> contacts;         // in a fixed order
+  std::vector<MotionEnd> motion_ends;  // by robot, then in the order of the commands
+  std::vector<Contact> contacts;       // in a fixed order
 };
 
 }  // namespace ruedo

@@ -23,10 +23,11 @@ namespace ruedo::bus {
 namespace {
 
 constexpr int kConnectMs = 2000;
-constexpr int kTakenTogether = 64;    // messages, before it is looked whether the bus ends
+constexpr int kTakenTogether = 64;  // messages, before it is looked whether the bus ends
 constexpr const char* kSelfTest = "LCM_SELF_TEST";
 constexpr auto kSelfTestTime = std::chrono::milliseconds(50);
-constexpr std::chrono::milliseconds kFirstPause{50}, kLongestPause{1000};    // between connections to a server that is gone
+constexpr std::chrono::milliseconds kFirstPause{50},
+    kLongestPause{1000};  // between connections to a server that is gone
 
 bool is_at_end(int file) {
   char byte;
@@ -44,7 +45,8 @@ std::vector<std::string> channel_patterns(const std::vector<std::string>& names)
         if (i > 0 && std::isdigit(static_cast<unsigned char>(name[i - 1]))) continue;
         pattern += "[0-9]{1,9}";
       } else {
-        if (!std::isalnum(static_cast<unsigned char>(name[i])) && name[i] != '_' && name[i] != '/') pattern += '\\';
+        if (!std::isalnum(static_cast<unsigned char>(name[i])) && name[i] != '_' && name[i] != '/')
+          pattern += '\\';
         pattern += name[i];
       }
     }
@@ -56,16 +58,18 @@ std::vector<std::string> channel_patterns(const std::vector<std::string>& names)
 LcmBus::LcmBus(const std::string& url) : url_(parse_url(url)) {
   check_route(url_);
   if (url_.scheme == "tcpq" && !is_served(url_, kConnectMs)) {
-    throw EnvironmentError("nothing listens at " + url_.str() + ": start `ruedo run` with that --lcm first");
+    throw EnvironmentError("nothing listens at " + url_.str() +
+                           ": start `ruedo run` with that --lcm first");
   }
   if (url_.scheme == "unix") {
     unix_ = std::make_unique<UnixConnection>(url_.host);
     receive_buffer_ = SIZE_MAX;
     return;
   }
-  receive_buffer_ = static_cast<size_t>(receive_buffer(url_));    // -1 becomes the largest
+  receive_buffer_ = static_cast<size_t>(receive_buffer(url_));  // -1 becomes the largest
   out_ = std::make_unique<lcm::LCM>(url_.str());
-  if (!out_->good()) throw EnvironmentError("LCM cannot open '" + url_.str() + "': run `ruedo doctor`");
+  if (!out_->good())
+    throw EnvironmentError("LCM cannot open '" + url_.str() + "': run `ruedo doctor`");
 }
 
 LcmBus::~LcmBus() { stop(); }
@@ -81,15 +85,20 @@ void LcmBus::stop() {
 
 void LcmBus::publish(const std::string& channel, const uint8_t* data, size_t size) {
   if (size > receive_buffer_ && !told_large_.exchange(true)) {
-    spdlog::warn("a message of {} bytes on {} does not fit into a receive buffer of {} bytes: LCM clients on this host may miss it. Use JPEG, or "
-                 "--lcm tcpq://127.0.0.1:7700, or run: sudo sysctl -w net.core.rmem_max=2097152, with recv_buf_size=2097152 in the URL",
-                 size, channel, receive_buffer_);
+    spdlog::warn(
+        "a message of {} bytes on {} does not fit into a receive buffer of {} bytes: LCM clients "
+        "on this host may miss it. Use JPEG, or "
+        "--lcm tcpq://127.0.0.1:7700, or run: sudo sysctl -w net.core.rmem_max=2097152, with "
+        "recv_buf_size=2097152 in the URL",
+        size, channel, receive_buffer_);
   }
-  const bool sent = unix_ ? unix_->publish(channel, data, size) : out_->publish(channel, data, static_cast<unsigned>(size)) == 0;
+  const bool sent = unix_ ? unix_->publish(channel, data, size)
+                          : out_->publish(channel, data, static_cast<unsigned>(size)) == 0;
   if (!sent) ++failed_;
 }
 
-void LcmBus::listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>&) {
+void LcmBus::listen(const std::vector<std::string>& channels, Handler handler,
+                    const std::vector<std::string>&) {
   handler_ = std::move(handler);
   know(channels);
   open();
@@ -107,7 +116,8 @@ void LcmBus::listen_to(const std::vector<std::string>& channels, const std::vect
   taken_up_.wait(lock, [this] { return !waits_; });
 }
 
-// LCM is subscribed to in the thread that handles its messages, and the instance stays: nothing that is on its way is lost.
+// LCM is subscribed to in the thread that handles its messages, and the instance stays: nothing
+// that is on its way is lost.
 void LcmBus::take_up() {
   std::lock_guard lock(mutex_);
   if (!waits_) return;
@@ -117,30 +127,38 @@ void LcmBus::take_up() {
   taken_up_.notify_all();
 }
 
-void LcmBus::know(const std::vector<std::string>& channels) { channels_ = {channels.begin(), channels.end()}; }
+void LcmBus::know(const std::vector<std::string>& channels) {
+  channels_ = {channels.begin(), channels.end()};
+}
 
 void LcmBus::open() {
   if (unix_) return subscribe_missing();
   if (url_.scheme == "udpm") {
     try {
-      multicast_ = std::make_unique<MulticastReceiver>(url_.host, url_.port, std::atoi(url_.option("recv_buf_size", "0").c_str()));
+      multicast_ = std::make_unique<MulticastReceiver>(
+          url_.host, url_.port, std::atoi(url_.option("recv_buf_size", "0").c_str()));
     } catch (const std::system_error& error) {
-      throw EnvironmentError("cannot listen on '" + url_.str() + "' (" + error.what() + "): run `ruedo doctor`");
+      throw EnvironmentError("cannot listen on '" + url_.str() + "' (" + error.what() +
+                             "): run `ruedo doctor`");
     }
     return ignore_own();
   }
   if (url_.scheme == "memq") {
-    in_ = std::shared_ptr<lcm::LCM>(out_.get(), [](lcm::LCM*) {});    // messages stay inside of one instance
+    in_ = std::shared_ptr<lcm::LCM>(out_.get(),
+                                    [](lcm::LCM*) {});  // messages stay inside of one instance
   } else {
     in_ = std::make_shared<lcm::LCM>(url_.str());
-    if (!in_->good()) throw EnvironmentError("LCM cannot open '" + url_.str() + "': run `ruedo doctor`");
+    if (!in_->good())
+      throw EnvironmentError("LCM cannot open '" + url_.str() + "': run `ruedo doctor`");
   }
   subscribe_missing();
   // LCM's subscribe succeeds even where nothing can be received.
-  if (in_->getFileno() < 0) throw EnvironmentError("LCM cannot listen on '" + url_.str() + "': run `ruedo doctor`");
+  if (in_->getFileno() < 0)
+    throw EnvironmentError("LCM cannot listen on '" + url_.str() + "': run `ruedo doctor`");
 }
 
-// Our first message comes back and tells from where LCM sends. Where it does not, all of them come back, and are passed over.
+// Our first message comes back and tells from where LCM sends. Where it does not, all of them come
+// back, and are passed over.
 void LcmBus::ignore_own() {
   uint8_t mark[16];
   std::random_device random;
@@ -166,7 +184,8 @@ void LcmBus::subscribe_missing() {
     }
     return;
   }
-  // A slow reader is none of ours: the handler only checks and stores. Room for a burst from every robot.
+  // A slow reader is none of ours: the handler only checks and stores. Room for a burst from every
+  // robot.
   const int queue_size = static_cast<int>(std::clamp<size_t>(4 * channels_.size(), 64, 65536));
   for (const std::string& pattern : channel_patterns({channels_.begin(), channels_.end()})) {
     if (!subscribed_.insert(pattern).second) continue;
@@ -177,12 +196,14 @@ void LcmBus::subscribe_missing() {
 
 void LcmBus::read() {
   pthread_setname_np(pthread_self(), "bus");
-  bool lost = false;    // tcpq: the server
+  bool lost = false;  // tcpq: the server
   auto pause = kFirstPause;
   for (;;) {
-    const int file = unix_ ? unix_->file() : multicast_ ? multicast_->file() : in_->getFileno();    // another one for each connection
+    const int file = unix_        ? unix_->file()
+                     : multicast_ ? multicast_->file()
+                                  : in_->getFileno();  // another one for each connection
     pollfd waiting[2] = {{lost ? -1 : file, POLLIN, 0}, {stop_event_, POLLIN, 0}};
-    if (::poll(waiting, 2, lost ? static_cast<int>(pause.count()) : -1) < 0) continue;    // a signal
+    if (::poll(waiting, 2, lost ? static_cast<int>(pause.count()) : -1) < 0) continue;  // a signal
     if (waiting[1].revents != 0) {
       if (stopping_) return;
       uint64_t count;
@@ -192,17 +213,23 @@ void LcmBus::read() {
     if (!lost && waiting[0].revents == 0) continue;
     const bool was_lost = lost;
     lost = !handle();
-    if (!lost) pause = kFirstPause;
-    else if (was_lost) pause = std::min(2 * pause, kLongestPause);
-    else spdlog::warn("{}: the server has closed the connection{}", url_.str(), unix_ ? "" : "; it is looked for again");
+    if (!lost)
+      pause = kFirstPause;
+    else if (was_lost)
+      pause = std::min(2 * pause, kLongestPause);
+    else
+      spdlog::warn("{}: the server has closed the connection{}", url_.str(),
+                   unix_ ? "" : "; it is looked for again");
   }
 }
 
-// False when the connection was lost: LCM connects again when it is next asked for a message. A unix one is not made anew: what
-// was lost meanwhile would not be known.
+// False when the connection was lost: LCM connects again when it is next asked for a message. A
+// unix one is not made anew: what was lost meanwhile would not be known.
 bool LcmBus::handle() {
   if (unix_) {
-    unix_->take(0, [this](std::string_view channel, const uint8_t* data, size_t size) { deliver(channel, data, size); });
+    unix_->take(0, [this](std::string_view channel, const uint8_t* data, size_t size) {
+      deliver(channel, data, size);
+    });
     return !unix_->is_over();
   }
   if (!multicast_) {
@@ -211,7 +238,9 @@ bool LcmBus::handle() {
     ++failed_;
     return false;
   }
-  const auto take = [this](std::string_view channel, const uint8_t* data, size_t size) { deliver(channel, data, size); };
+  const auto take = [this](std::string_view channel, const uint8_t* data, size_t size) {
+    deliver(channel, data, size);
+  };
   for (int i = 0; i < kTakenTogether && multicast_->take(take); ++i) {
   }
   return true;
@@ -222,7 +251,7 @@ void LcmBus::on_message(const lcm::ReceiveBuffer* buffer, const std::string& cha
 }
 
 void LcmBus::deliver(std::string_view channel, const uint8_t* data, size_t size) {
-  const auto known = channels_.find(channel);    // LCM's patterns are wider than the list
+  const auto known = channels_.find(channel);  // LCM's patterns are wider than the list
   if (known != channels_.end()) handler_(*known, data, size);
 }
 

@@ -1,8 +1,9 @@
 // The bus over LCM.
 //
-// An LCM instance that only sends (it never subscribes, so LCM gives it no thread), and for multicast a receiver of our own:
-// a message takes one thread from the network to the handler, not two, and what we send ourselves wakes nobody. With tcpq
-// another LCM instance listens, with memq the same one. A unix address is a connection of our own.
+// An LCM instance that only sends (it never subscribes, so LCM gives it no thread), and for
+// multicast a receiver of our own: a message takes one thread from the network to the handler, not
+// two, and what we send ourselves wakes nobody. With tcpq another LCM instance listens, with memq
+// the same one. A unix address is a connection of our own.
 #pragma once
 
 #include <atomic>
@@ -27,14 +28,17 @@ namespace ruedo::bus {
 class LcmBus : public Bus {
  public:
   // Opens the bus; "": $LCM_DEFAULT_URL, or LCM's default group with ttl 0. A tcpq address is that
-  // of a server which is there already (tcpq_server.h makes one). Throws InputError for a bad address and EnvironmentError,
-  // with the cure, when this machine has no multicast route or the server is not there.
+  // of a server which is there already (tcpq_server.h makes one). Throws InputError for a bad
+  // address and EnvironmentError, with the cure, when this machine has no multicast route or the
+  // server is not there.
   explicit LcmBus(const std::string& url);
   ~LcmBus() override;
 
   void publish(const std::string& channel, const uint8_t* data, size_t size) override;
-  void listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own = {}) override;
-  void listen_to(const std::vector<std::string>& channels, const std::vector<std::string>& own = {}) override;
+  void listen(const std::vector<std::string>& channels, Handler handler,
+              const std::vector<std::string>& own = {}) override;
+  void listen_to(const std::vector<std::string>& channels,
+                 const std::vector<std::string>& own = {}) override;
   void stop() override;
   uint64_t failed() const override { return failed_; }
 
@@ -45,34 +49,34 @@ class LcmBus : public Bus {
   void open();
   void ignore_own();
   void subscribe_missing();
-  void take_up();    // what listen_to() left
+  void take_up();  // what listen_to() left
   void read();
-  bool handle();     // what is there
+  bool handle();  // what is there
   void on_message(const lcm::ReceiveBuffer* buffer, const std::string& channel);
   void deliver(std::string_view channel, const uint8_t* data, size_t size);
 
   LcmUrl url_;
   std::unique_ptr<lcm::LCM> out_;
-  std::shared_ptr<lcm::LCM> in_;             // with memq and tcpq
+  std::shared_ptr<lcm::LCM> in_;  // with memq and tcpq
   std::unique_ptr<MulticastReceiver> multicast_;
   std::unique_ptr<UnixConnection> unix_;
-  size_t receive_buffer_;                    // of clients with this address
-  std::atomic<bool> told_large_{false};      // that a message is larger
+  size_t receive_buffer_;                // of clients with this address
+  std::atomic<bool> told_large_{false};  // that a message is larger
   Handler handler_;
   std::set<std::string, std::less<>> channels_;
-  std::set<std::string> subscribed_;         // patterns, by in_
-  int stop_event_ = -1;                      // to end, or to take up
+  std::set<std::string> subscribed_;  // patterns, by in_
+  int stop_event_ = -1;               // to end, or to take up
   std::atomic<bool> stopping_{false};
   std::mutex mutex_;
   std::condition_variable taken_up_;
-  bool waits_ = false;                       // wanted_ is to be taken up
-  std::vector<std::string> wanted_;          // channels
+  bool waits_ = false;               // wanted_ is to be taken up
+  std::vector<std::string> wanted_;  // channels
   std::thread thread_;
   std::atomic<uint64_t> failed_{0};
 };
 
-// Regular expressions that match the names: digits become runs of digits, so that a thousand robots with names that
-// count up are one expression. Names that are not in the list may match too.
+// Regular expressions that match the names: digits become runs of digits, so that a thousand robots
+// with names that count up are one expression. Names that are not in the list may match too.
 std::vector<std::string> channel_patterns(const std::vector<std::string>& names);
 
 }  // namespace ruedo::bus

@@ -38,13 +38,15 @@ std::string resolved(const std::string& host) {
   hints.ai_socktype = SOCK_STREAM;
   if (::getaddrinfo(host.c_str(), nullptr, &hints, &found) != 0) return "";
   char text[INET_ADDRSTRLEN] = "";
-  ::inet_ntop(AF_INET, &reinterpret_cast<const sockaddr_in*>(found->ai_addr)->sin_addr, text, sizeof text);
+  ::inet_ntop(AF_INET, &reinterpret_cast<const sockaddr_in*>(found->ai_addr)->sin_addr, text,
+              sizeof text);
   ::freeaddrinfo(found);
   return text;
 }
 
 [[noreturn]] void refuse(const std::string& text, const std::string& why) {
-  throw InputError({}, "--lcm '" + text + "': " + why + "; an address looks like " + kDefaultUrl + ", tcpq://127.0.0.1:7700 or unix:///tmp/ruedo.sock");
+  throw InputError({}, "--lcm '" + text + "': " + why + "; an address looks like " + kDefaultUrl +
+                           ", tcpq://127.0.0.1:7700 or unix:///tmp/ruedo.sock");
 }
 
 }  // namespace
@@ -75,7 +77,8 @@ LcmUrl parse_url(const std::string& text) {
   const size_t scheme_end = text.find("://");
   if (scheme_end == std::string::npos) refuse(text, "it has no scheme");
   url.scheme = text.substr(0, scheme_end);
-  if (url.scheme != "udpm" && url.scheme != "tcpq" && url.scheme != "memq" && url.scheme != "unix") {
+  if (url.scheme != "udpm" && url.scheme != "tcpq" && url.scheme != "memq" &&
+      url.scheme != "unix") {
     refuse(text, "the schemes udpm, tcpq, unix and memq are supported");
   }
   std::string rest = text.substr(scheme_end + 3);
@@ -91,8 +94,10 @@ LcmUrl parse_url(const std::string& text) {
   if (url.scheme == "memq") return url;
   if (const size_t colon = rest.find(':'); colon != std::string::npos) {
     const std::string digits = rest.substr(colon + 1);
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), url.port);
-    if (error != std::errc() || end != digits.data() + digits.size() || url.port == 0) refuse(text, "'" + digits + "' is no port");
+    const auto [end, error] =
+        std::from_chars(digits.data(), digits.data() + digits.size(), url.port);
+    if (error != std::errc() || end != digits.data() + digits.size() || url.port == 0)
+      refuse(text, "'" + digits + "' is no port");
     rest.resize(colon);
   }
   if (url.scheme == "tcpq") {
@@ -114,26 +119,30 @@ LcmUrl parse_url(const std::string& text) {
 bool has_route(const LcmUrl& url) {
   const FileHandle socket = datagram_socket();
   const sockaddr_in address = address_of(url);
-  return socket && ::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+  return socket &&
+         ::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
 }
 
 void check_route(const LcmUrl& url) {
   if (url.scheme != "udpm" || has_route(url)) return;
-  throw EnvironmentError("no route to the multicast group " + url.host + " (" + std::strerror(errno) +
-                         "): connect to a network, or run: sudo ip link set lo up multicast on; sudo ip route add " + url.host +
-                         "/32 dev lo");
+  throw EnvironmentError(
+      "no route to the multicast group " + url.host + " (" + std::strerror(errno) +
+      "): connect to a network, or run: sudo ip link set lo up multicast on; sudo ip route add " +
+      url.host + "/32 dev lo");
 }
 
 bool is_served(const LcmUrl& url, int timeout_ms) {
   if (url.scheme == "unix") return is_unix_served(url.host);
   const FileHandle socket(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const sockaddr_in address = address_of(url);
-  if (::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) return true;
+  if (::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0)
+    return true;
   if (errno != EINPROGRESS) return false;
   pollfd waiting{socket.get(), POLLOUT, 0};
   int error = 0;
   socklen_t size = sizeof error;
-  return ::poll(&waiting, 1, timeout_ms) == 1 && ::getsockopt(socket.get(), SOL_SOCKET, SO_ERROR, &error, &size) == 0 && error == 0;
+  return ::poll(&waiting, 1, timeout_ms) == 1 &&
+         ::getsockopt(socket.get(), SOL_SOCKET, SO_ERROR, &error, &size) == 0 && error == 0;
 }
 
 bool hears_itself(const LcmUrl& url, int timeout_ms) {
@@ -147,20 +156,25 @@ bool hears_itself(const LcmUrl& url, int timeout_ms) {
   any.sin_addr.s_addr = htonl(INADDR_ANY);
   ip_mreq membership{address.sin_addr, any.sin_addr};
   if (::bind(receiver.get(), reinterpret_cast<const sockaddr*>(&any), sizeof any) != 0 ||
-      ::setsockopt(receiver.get(), IPPROTO_IP, IP_ADD_MEMBERSHIP, &membership, sizeof membership) != 0) {
+      ::setsockopt(receiver.get(), IPPROTO_IP, IP_ADD_MEMBERSHIP, &membership, sizeof membership) !=
+          0) {
     return false;
   }
   const unsigned char ttl = 0;
   ::setsockopt(sender.get(), IPPROTO_IP, IP_MULTICAST_TTL, &ttl, sizeof ttl);
-  // A whole LCM message (magic "LC02", sequence 0, channel, no data), so that others on the group can make sense of it.
+  // A whole LCM message (magic "LC02", sequence 0, channel, no data), so that others on the group
+  // can make sense of it.
   const char probe[] = "LC02\0\0\0\0RUEDO_SELF_TEST";
-  if (::sendto(sender.get(), probe, sizeof probe, 0, reinterpret_cast<const sockaddr*>(&address), sizeof address) < 0) return false;
+  if (::sendto(sender.get(), probe, sizeof probe, 0, reinterpret_cast<const sockaddr*>(&address),
+               sizeof address) < 0)
+    return false;
   for (;;) {
     pollfd waiting{receiver.get(), POLLIN, 0};
     if (::poll(&waiting, 1, timeout_ms) <= 0) return false;
     char buffer[64];
     const ssize_t size = ::recv(receiver.get(), buffer, sizeof buffer, 0);
-    if (size == static_cast<ssize_t>(sizeof probe) && std::memcmp(buffer, probe, sizeof probe) == 0) return true;
+    if (size == static_cast<ssize_t>(sizeof probe) && std::memcmp(buffer, probe, sizeof probe) == 0)
+      return true;
   }
 }
 
@@ -179,7 +193,8 @@ int64_t receive_buffer_limit() { return kernel_setting("/proc/sys/net/core/rmem_
 int64_t receive_buffer(const LcmUrl& url) {
   if (url.scheme != "udpm") return -1;
   const int64_t asked = std::atoll(url.option("recv_buf_size", "0").c_str());
-  return asked > 0 ? std::min(asked, receive_buffer_limit()) : kernel_setting("/proc/sys/net/core/rmem_default");
+  return asked > 0 ? std::min(asked, receive_buffer_limit())
+                   : kernel_setting("/proc/sys/net/core/rmem_default");
 }
 
 }  // namespace ruedo::bus

@@ -10,7 +10,8 @@ constexpr uint64_t rounded(uint64_t size) { return (size + 7) & ~uint64_t{7}; }
 
 }  // namespace
 
-MessageRing::MessageRing(size_t capacity) : capacity_(rounded(capacity)), block_(new uint8_t[capacity_]) {}
+MessageRing::MessageRing(size_t capacity)
+    : capacity_(rounded(capacity)), block_(new uint8_t[capacity_]) {}
 
 bool MessageRing::append(uint32_t channel, std::span<const uint8_t> bytes) {
   if (bytes.size() > largest()) return false;

@@ -1,5 +1,5 @@
-// The newest messages, in one block of memory: each reader has a place of its own in it, and who falls a whole ring
-// behind has lost what was overwritten. So a slow reader costs no memory.
+// The newest messages, in one block of memory: each reader has a place of its own in it, and who
+// falls a whole ring behind has lost what was overwritten. So a slow reader costs no memory.
 //
 // Not thread safe.
 #pragma once
@@ -14,9 +14,9 @@ namespace ruedo::bus {
 class MessageRing {
  public:
   struct Message {
-    uint32_t channel;                  // a number of the writer's own
-    std::span<const uint8_t> bytes;    // valid until the next append
-    uint64_t next;                     // the place of the message after it
+    uint32_t channel;                // a number of the writer's own
+    std::span<const uint8_t> bytes;  // valid until the next append
+    uint64_t next;                   // the place of the message after it
   };
 
   // The memory is touched, and so taken, as it is first written.
@@ -34,7 +34,7 @@ class MessageRing {
 
  private:
   struct Head {
-    uint32_t size;       // of the message; kPadding: nothing up to the end of the block
+    uint32_t size;  // of the message; kPadding: nothing up to the end of the block
     uint32_t channel;
   };
   static constexpr uint32_t kPadding = UINT32_MAX;

@@ -1,7 +1,8 @@
 // LCM's multicast on the wire. All numbers are big endian.
 //
 //   short:    magic, sequence, channel and a 0, data
-//   fragment: magic, sequence, size of the message, offset, number of the fragment (16 bits), of how many; the first has
+//   fragment: magic, sequence, size of the message, offset, number of the fragment (16 bits), of
+//   how many; the first has
 //             channel and a 0 before its data
 #include "bus/multicast_receiver.h"
 
@@ -22,13 +23,18 @@ namespace {
 constexpr uint32_t kShort = 0x4c433032, kFragment = 0x4c433033;
 constexpr size_t kShortHead = 8, kFragmentHead = 20, kLargestDatagram = 65536;
 
-uint32_t number32(const uint8_t* at) { return uint32_t{at[0]} << 24 | uint32_t{at[1]} << 16 | uint32_t{at[2]} << 8 | at[3]; }
+uint32_t number32(const uint8_t* at) {
+  return uint32_t{at[0]} << 24 | uint32_t{at[1]} << 16 | uint32_t{at[2]} << 8 | at[3];
+}
 uint32_t number16(const uint8_t* at) { return uint32_t{at[0]} << 8 | at[1]; }
 
 // The channel's name at the beginning of `bytes`; size() + 1 of them are its. Empty: there is none.
 std::string_view channel_at(const uint8_t* bytes, size_t size) {
-  const auto* end = static_cast<const uint8_t*>(std::memchr(bytes, 0, std::min(size, MulticastReceiver::kLongestChannel + 1)));
-  return end ? std::string_view(reinterpret_cast<const char*>(bytes), static_cast<size_t>(end - bytes)) : std::string_view();
+  const auto* end = static_cast<const uint8_t*>(
+      std::memchr(bytes, 0, std::min(size, MulticastReceiver::kLongestChannel + 1)));
+  return end ? std::string_view(reinterpret_cast<const char*>(bytes),
+                                static_cast<size_t>(end - bytes))
+             : std::string_view();
 }
 
 }  // namespace
@@ -49,12 +55,14 @@ MulticastReceiver::MulticastReceiver(const std::string& group, uint16_t port, in
   const int on = 1;
   check(::setsockopt(socket_, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) == 0, "SO_REUSEADDR");
   check(::setsockopt(socket_, SOL_SOCKET, SO_REUSEPORT, &on, sizeof on) == 0, "SO_REUSEPORT");
-  if (buffer > 0) ::setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &buffer, sizeof buffer);    // as much as may be
+  if (buffer > 0)
+    ::setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &buffer, sizeof buffer);  // as much as may be
   check(::bind(socket_, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0, "bind");
   ip_mreq membership{};
   membership.imr_multiaddr = address.sin_addr;
   membership.imr_interface.s_addr = htonl(INADDR_ANY);
-  check(::setsockopt(socket_, IPPROTO_IP, IP_ADD_MEMBERSHIP, &membership, sizeof membership) == 0, "IP_ADD_MEMBERSHIP");
+  check(::setsockopt(socket_, IPPROTO_IP, IP_ADD_MEMBERSHIP, &membership, sizeof membership) == 0,
+        "IP_ADD_MEMBERSHIP");
 }
 
 MulticastReceiver::~MulticastReceiver() { ::close(socket_); }
@@ -62,13 +70,16 @@ MulticastReceiver::~MulticastReceiver() { ::close(socket_); }
 bool MulticastReceiver::take(const Handler& handler) {
   sockaddr_in from{};
   socklen_t from_size = sizeof from;
-  const ssize_t got = ::recvfrom(socket_, datagram_.data(), datagram_.size(), MSG_DONTWAIT, reinterpret_cast<sockaddr*>(&from), &from_size);
+  const ssize_t got = ::recvfrom(socket_, datagram_.data(), datagram_.size(), MSG_DONTWAIT,
+                                 reinterpret_cast<sockaddr*>(&from), &from_size);
   if (got < 0) return false;
-  read(datagram_.data(), static_cast<size_t>(got), {ntohl(from.sin_addr.s_addr), ntohs(from.sin_port)}, handler);
+  read(datagram_.data(), static_cast<size_t>(got),
+       {ntohl(from.sin_addr.s_addr), ntohs(from.sin_port)}, handler);
   return true;
 }
 
-void MulticastReceiver::read(const uint8_t* bytes, size_t size, Sender sender, const Handler& handler) {
+void MulticastReceiver::read(const uint8_t* bytes, size_t size, Sender sender,
+                             const Handler& handler) {
   sender_ = sender;
   if (size <= kShortHead) return;
   const uint32_t magic = number32(bytes);
@@ -81,7 +92,8 @@ void MulticastReceiver::read(const uint8_t* bytes, size_t size, Sender sender, c
 
 void MulticastReceiver::take_fragment(const uint8_t* bytes, size_t size, const Handler& handler) {
   if (size <= kFragmentHead) return;
-  const size_t total = number32(bytes + 8), offset = number32(bytes + 12), number = number16(bytes + 16), of = number16(bytes + 18);
+  const size_t total = number32(bytes + 8), offset = number32(bytes + 12),
+               number = number16(bytes + 16), of = number16(bytes + 18);
   const uint8_t* data = bytes + kFragmentHead;
   size_t length = size - kFragmentHead;
   std::string_view channel;
@@ -105,14 +117,18 @@ void MulticastReceiver::take_fragment(const uint8_t* bytes, size_t size, const H
 }
 
 // Null when a fragment contradicts those before it.
-MulticastReceiver::Partial* MulticastReceiver::partial_of(uint32_t sequence, size_t size, size_t fragments) {
-  const auto known = std::find_if(partials_.begin(), partials_.end(), [&](const Partial& one) { return one.sender == sender_; });
+MulticastReceiver::Partial* MulticastReceiver::partial_of(uint32_t sequence, size_t size,
+                                                          size_t fragments) {
+  const auto known = std::find_if(partials_.begin(), partials_.end(),
+                                  [&](const Partial& one) { return one.sender == sender_; });
   if (known != partials_.end()) {
-    if (known->sequence == sequence) return known->data.size() == size && known->here.size() == fragments ? &*known : nullptr;
+    if (known->sequence == sequence)
+      return known->data.size() == size && known->here.size() == fragments ? &*known : nullptr;
     partial_bytes_ -= known->data.size();
     partials_.erase(known);
   }
-  while (!partials_.empty() && (partials_.size() >= kMostSenders || partial_bytes_ + size > kMostPartial)) {
+  while (!partials_.empty() &&
+         (partials_.size() >= kMostSenders || partial_bytes_ + size > kMostPartial)) {
     partial_bytes_ -= partials_.front().data.size();
     partials_.pop_front();
   }

@@ -1,7 +1,8 @@
 // Receives what LCM programs send by multicast, in the thread that asks.
 //
-// LCM itself puts a thread and a pipe in between, which takes longer than a message does. The wire format is LCM's ("udpm"):
-// short messages in one datagram, long ones in fragments. Needs nothing but the system: the C++ client is built with it, too.
+// LCM itself puts a thread and a pipe in between, which takes longer than a message does. The wire
+// format is LCM's ("udpm"): short messages in one datagram, long ones in fragments. Needs nothing
+// but the system: the C++ client is built with it, too.
 #pragma once
 
 #include <cstdint>
@@ -18,36 +19,37 @@ class MulticastReceiver {
  public:
   using Handler = std::function<void(std::string_view channel, const uint8_t* data, size_t size)>;
 
-  static constexpr size_t kLongestChannel = 63;             // LCM's
-  static constexpr size_t kMostPartial = 32u << 20;         // bytes of messages that are not whole yet
-  static constexpr size_t kMostSenders = 32;                // of such messages
+  static constexpr size_t kLongestChannel = 63;      // LCM's
+  static constexpr size_t kMostPartial = 32u << 20;  // bytes of messages that are not whole yet
+  static constexpr size_t kMostSenders = 32;         // of such messages
 
-  // Joins the group. buffer: bytes of the socket's buffer, 0: the system's. Throws std::system_error.
+  // Joins the group. buffer: bytes of the socket's buffer, 0: the system's. Throws
+  // std::system_error.
   MulticastReceiver(const std::string& group, uint16_t port, int buffer);
   ~MulticastReceiver();
   MulticastReceiver(const MulticastReceiver&) = delete;
   MulticastReceiver& operator=(const MulticastReceiver&) = delete;
 
-  int file() const { return socket_; }    // readable when take() has something
+  int file() const { return socket_; }  // readable when take() has something
 
   struct Sender {
-    uint32_t address = 0;    // IPv4 and port, in the host's byte order
+    uint32_t address = 0;  // IPv4 and port, in the host's byte order
     uint16_t port = 0;
     bool operator==(const Sender&) const = default;
   };
 
-  // Takes one datagram and calls the handler when a message is whole with it. False: none is there. What is not LCM's is
-  // passed over.
+  // Takes one datagram and calls the handler when a message is whole with it. False: none is there.
+  // What is not LCM's is passed over.
   bool take(const Handler& handler);
   // The same for a datagram that came in another way.
   void read(const uint8_t* bytes, size_t size, Sender sender, const Handler& handler);
 
-  Sender sender() const { return sender_; }    // of the datagram that was taken last
+  Sender sender() const { return sender_; }  // of the datagram that was taken last
   // Not to be woken for the datagrams of that one any more: false where the system cannot.
   bool ignore(Sender sender);
 
  private:
-  struct Partial {    // of each sender the newest message
+  struct Partial {  // of each sender the newest message
     Sender sender;
     uint32_t sequence = 0;
     std::string channel;
@@ -62,7 +64,7 @@ class MulticastReceiver {
   int socket_;
   Sender sender_;
   std::vector<uint8_t> datagram_;
-  std::list<Partial> partials_;    // the newest last
+  std::list<Partial> partials_;  // the newest last
   size_t partial_bytes_ = 0;
 };
 

@@ -1,4 +1,5 @@
-// From /proc: /proc/net/tcp has each connection's inode and user, /proc/PID/fd the inodes that a process holds.
+// From /proc: /proc/net/tcp has each connection's inode and user, /proc/PID/fd the inodes that a
+// process holds.
 #include "bus/peer_owners.h"
 
 #include <cctype>
@@ -26,15 +27,18 @@ bool read_port(const std::string& text, uint16_t& port) {
 }  // namespace
 
 PeerOwners::PeerOwners(uint16_t server_port) {
-  std::unordered_map<std::string, uint16_t> port_of;    // "socket:[INODE]" to the peer's port
+  std::unordered_map<std::string, uint16_t> port_of;  // "socket:[INODE]" to the peer's port
   std::ifstream connections("/proc/net/tcp");
   std::string line;
   for (std::getline(connections, line); std::getline(connections, line);) {
     std::istringstream words(line);
     std::string number, local, remote, state, queues, timer, retries, user, timeout, inode;
-    words >> number >> local >> remote >> state >> queues >> timer >> retries >> user >> timeout >> inode;
+    words >> number >> local >> remote >> state >> queues >> timer >> retries >> user >> timeout >>
+        inode;
     uint16_t local_port = 0, remote_port = 0;
-    if (!read_port(local, local_port) || !read_port(remote, remote_port) || remote_port != server_port) continue;
+    if (!read_port(local, local_port) || !read_port(remote, remote_port) ||
+        remote_port != server_port)
+      continue;
     by_port_[local_port] = "user " + user;
     port_of["socket:[" + inode + "]"] = local_port;
   }
@@ -43,7 +47,8 @@ PeerOwners::PeerOwners(uint16_t server_port) {
     const std::string number = process.path().filename().string();
     if (number.empty() || std::isdigit(static_cast<unsigned char>(number[0])) == 0) continue;
     std::error_code gone;
-    for (auto file = fs::directory_iterator(process.path() / "fd", gone); !gone && file != fs::directory_iterator(); file.increment(gone)) {
+    for (auto file = fs::directory_iterator(process.path() / "fd", gone);
+         !gone && file != fs::directory_iterator(); file.increment(gone)) {
       std::error_code unreadable;
       const auto found = port_of.find(fs::read_symlink(file->path(), unreadable).string());
       if (!unreadable && found != port_of.end()) by_port_[found->second] = "process " + number;

@@ -1,4 +1,5 @@
-// Whose the other ends of TCP connections are: of this machine's processes by their number, of other machines by address.
+// Whose the other ends of TCP connections are: of this machine's processes by their number, of
+// other machines by address.
 #pragma once
 
 #include <cstdint>
@@ -9,14 +10,16 @@ namespace ruedo::bus {
 
 class PeerOwners {
  public:
-  // Looks through the system's list of connections to this port, and its processes' files: takes milliseconds.
+  // Looks through the system's list of connections to this port, and its processes' files: takes
+  // milliseconds.
   explicit PeerOwners(uint16_t server_port);
 
-  // Of the peer of a connected socket. Processes of other users cannot be looked into: all of a user's are one.
+  // Of the peer of a connected socket. Processes of other users cannot be looked into: all of a
+  // user's are one.
   std::string owner_of(int socket) const;
 
  private:
-  std::unordered_map<uint16_t, std::string> by_port_;    // of the peer
+  std::unordered_map<uint16_t, std::string> by_port_;  // of the peer
 };
 
 }  // namespace ruedo::bus

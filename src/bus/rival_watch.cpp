@@ -11,7 +11,7 @@ namespace ruedo::bus {
 namespace {
 
 constexpr const char* kInfo = "ruedo/info";
-constexpr size_t kMostRivals = 8;    // are named
+constexpr size_t kMostRivals = 8;  // are named
 
 std::vector<std::string> with_info(std::vector<std::string> channels) {
   channels.push_back(kInfo);
@@ -28,17 +28,20 @@ int64_t run_id_of(const uint8_t* data, size_t size) {
 
 }  // namespace
 
-RivalWatch::RivalWatch(std::unique_ptr<Bus> bus, std::function<void(const std::string&)> say) : bus_(std::move(bus)), say_(std::move(say)) {}
+RivalWatch::RivalWatch(std::unique_ptr<Bus> bus, std::function<void(const std::string&)> say)
+    : bus_(std::move(bus)), say_(std::move(say)) {}
 
 void RivalWatch::publish(const std::string& channel, const uint8_t* data, size_t size) {
   if (run_id_ == 0 && channel == kInfo) run_id_ = run_id_of(data, size);
   bus_->publish(channel, data, size);
 }
 
-void RivalWatch::listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own) {
+void RivalWatch::listen(const std::vector<std::string>& channels, Handler handler,
+                        const std::vector<std::string>& own) {
   bus_->listen(
       with_info(channels),
-      [this, handler = std::move(handler)](const std::string& channel, const uint8_t* data, size_t size) {
+      [this, handler = std::move(handler)](const std::string& channel, const uint8_t* data,
+                                           size_t size) {
         if (channel == kInfo) {
           heard(data, size);
         } else {
@@ -48,21 +51,25 @@ void RivalWatch::listen(const std::vector<std::string>& channels, Handler handle
       own);
 }
 
-void RivalWatch::listen_to(const std::vector<std::string>& channels, const std::vector<std::string>& own) {
+void RivalWatch::listen_to(const std::vector<std::string>& channels,
+                           const std::vector<std::string>& own) {
   bus_->listen_to(with_info(channels), own);
 }
 
 void RivalWatch::heard(const uint8_t* data, size_t size) {
-  if (run_id_ == 0) return;    // the rival says it again when there is our own to tell
+  if (run_id_ == 0) return;  // the rival says it again when there is our own to tell
   const int64_t id = run_id_of(data, size);
-  if (id == run_id_ || rivals_.size() >= kMostRivals || std::find(rivals_.begin(), rivals_.end(), id) != rivals_.end()) return;
+  if (id == run_id_ || rivals_.size() >= kMostRivals ||
+      std::find(rivals_.begin(), rivals_.end(), id) != rivals_.end())
+    return;
   world_info_t info;
   if (decode_checked(data, size, info) != DecodeFault::none) return;
   rivals_.push_back(id);
   std::string world = info.world.substr(0, 100);
   std::replace_if(world.begin(), world.end(), [](unsigned char c) { return c < ' '; }, '?');
-  say_("another server is on this channel: run " + std::to_string(id) + ", world " + world + "; this one is run " +
-       std::to_string(run_id_) + ". Their messages mix: give one of them another --lcm port (this is said once)");
+  say_("another server is on this channel: run " + std::to_string(id) + ", world " + world +
+       "; this one is run " + std::to_string(run_id_) +
+       ". Their messages mix: give one of them another --lcm port (this is said once)");
 }
 
 }  // namespace ruedo::bus

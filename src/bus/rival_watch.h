@@ -1,7 +1,8 @@
-// A bus that notices another server on its channels: two servers that publish the same channels confuse every client.
+// A bus that notices another server on its channels: two servers that publish the same channels
+// confuse every client.
 //
-// Servers of one host are kept apart by their claims (url_claim.h); this is for those of other hosts, and for what
-// else sends ruedo/info. Each rival is named once.
+// Servers of one host are kept apart by their claims (url_claim.h); this is for those of other
+// hosts, and for what else sends ruedo/info. Each rival is named once.
 #pragma once
 
 #include <atomic>
@@ -20,8 +21,10 @@ class RivalWatch : public Bus {
   RivalWatch(std::unique_ptr<Bus> bus, std::function<void(const std::string&)> say);
 
   void publish(const std::string& channel, const uint8_t* data, size_t size) override;
-  void listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own = {}) override;
-  void listen_to(const std::vector<std::string>& channels, const std::vector<std::string>& own = {}) override;
+  void listen(const std::vector<std::string>& channels, Handler handler,
+              const std::vector<std::string>& own = {}) override;
+  void listen_to(const std::vector<std::string>& channels,
+                 const std::vector<std::string>& own = {}) override;
   void flush() override { bus_->flush(); }
   void stop() override { bus_->stop(); }
   uint64_t failed() const override { return bus_->failed(); }
@@ -31,7 +34,7 @@ class RivalWatch : public Bus {
 
   std::unique_ptr<Bus> bus_;
   std::function<void(const std::string&)> say_;
-  std::atomic<int64_t> run_id_{0};     // ours, as we published it
+  std::atomic<int64_t> run_id_{0};  // ours, as we published it
   std::vector<int64_t> rivals_;
 };
 

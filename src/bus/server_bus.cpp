@@ -22,7 +22,9 @@ FileHandle bound(int type, in_addr_t host, uint16_t port) {
   address.sin_family = AF_INET;
   address.sin_port = htons(port);
   address.sin_addr.s_addr = htonl(host);
-  return ::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ? std::move(socket) : FileHandle();
+  return ::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0
+             ? std::move(socket)
+             : FileHandle();
 }
 
 uint16_t port_of(const FileHandle& socket) {
@@ -32,9 +34,12 @@ uint16_t port_of(const FileHandle& socket) {
   return ntohs(address.sin_port);
 }
 
-std::string line_about(const std::string& world) { return "pid " + std::to_string(::getpid()) + ", world " + world; }
+std::string line_about(const std::string& world) {
+  return "pid " + std::to_string(::getpid()) + ", world " + world;
+}
 
-// A multicast port that nothing on this machine uses, with a TCP socket on the same port as the token of it.
+// A multicast port that nothing on this machine uses, with a TCP socket on the same port as the
+// token of it.
 ServerBus on_free_multicast_port(const std::string& world) {
   for (int i = 0; i < kTries; ++i) {
     ServerBus made;
@@ -42,7 +47,7 @@ ServerBus on_free_multicast_port(const std::string& world) {
     if (!made.token) break;
     made.url = parse_url(kDefaultUrl);
     made.url.port = port_of(made.token);
-    if (!bound(SOCK_DGRAM, INADDR_ANY, made.url.port)) continue;    // some LCM program uses it
+    if (!bound(SOCK_DGRAM, INADDR_ANY, made.url.port)) continue;  // some LCM program uses it
     if (!claimed_by(made.url).empty()) continue;
     made.claim = std::make_unique<UrlClaim>(made.url, line_about(world));
     made.bus = std::make_unique<LcmBus>(made.url.str());
@@ -68,7 +73,8 @@ ServerBus open_server_bus(const std::string& text, const std::string& world) {
   const bool asked = !text.empty() || (environment && *environment);
   const bool routed = has_route(parse_url(kDefaultUrl));
   if (text == "auto" || text == "auto-tcp") {
-    ServerBus made = routed && text == "auto" ? on_free_multicast_port(world) : on_free_tcp_port(world);
+    ServerBus made =
+        routed && text == "auto" ? on_free_multicast_port(world) : on_free_tcp_port(world);
     made.announce = true;
     return made;
   }
@@ -76,7 +82,8 @@ ServerBus open_server_bus(const std::string& text, const std::string& world) {
   if (!asked && !routed) {
     made.url = parse_url("tcpq://");
     made.announce = true;
-    made.note = "no multicast route here, so this server speaks LCM over TCP (`ruedo doctor` tells more)";
+    made.note =
+        "no multicast route here, so this server speaks LCM over TCP (`ruedo doctor` tells more)";
   } else {
     made.url = parse_url(text);
   }

@@ -1,4 +1,5 @@
-// The bus that a server serves on: finds the address, claims it, and opens it as multicast or as a tcpq server.
+// The bus that a server serves on: finds the address, claims it, and opens it as multicast or as a
+// tcpq server.
 #pragma once
 
 #include <memory>
@@ -17,17 +18,19 @@ struct ServerBus {
   bool announce = false;
   // Why it is another than was asked for; "" mostly.
   std::string note;
-  FileHandle token;                     // keeps `auto` and the client libraries' launch() from the same port
+  FileHandle token;  // keeps `auto` and the client libraries' launch() from the same port
   std::unique_ptr<UrlClaim> claim;
-  std::unique_ptr<Bus> bus;             // last: it is closed first
+  std::unique_ptr<Bus> bus;  // last: it is closed first
 };
 
-// `text` is an LCM URL; "auto": a free port of this machine; "auto-tcp": the same, and tcpq in any case; "": $LCM_DEFAULT_URL, else LCM's default group, else, where
-// that has no route, tcpq://127.0.0.1:7700. `world` is what others are told of this server. Throws InputError for a bad
-// address and EnvironmentError, with the cure, when it cannot be served or another server has it.
+// `text` is an LCM URL; "auto": a free port of this machine; "auto-tcp": the same, and tcpq in any
+// case; "": $LCM_DEFAULT_URL, else LCM's default group, else, where that has no route,
+// tcpq://127.0.0.1:7700. `world` is what others are told of this server. Throws InputError for a
+// bad address and EnvironmentError, with the cure, when it cannot be served or another server has
+// it.
 ServerBus open_server_bus(const std::string& text, const std::string& world);
 
 // What a shell needs to send clients there.
-std::string export_line(const LcmUrl& url);    // export LCM_DEFAULT_URL='...'
+std::string export_line(const LcmUrl& url);  // export LCM_DEFAULT_URL='...'
 
 }  // namespace ruedo::bus

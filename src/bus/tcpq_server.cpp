@@ -23,37 +23,46 @@
 namespace ruedo::bus {
 namespace {
 
-constexpr auto kGreetingTime = std::chrono::seconds(3);     // until a client must have said that it is one
+constexpr auto kGreetingTime =
+    std::chrono::seconds(3);  // until a client must have said that it is one
 constexpr auto kAcceptPause = std::chrono::milliseconds(200);
 constexpr auto kFarewellTime = std::chrono::seconds(2);
-constexpr auto kStuckTime = std::chrono::seconds(30);       // that a client may take nothing of what waits for it
-constexpr int kKeepAlive_s = 30, kKeepAliveAgain_s = 10, kKeepAlives = 3;    // until a machine that is gone is noticed
-constexpr size_t kChunk = 64 * 1024;                        // bytes received from one client at a time
-constexpr int kMostChunks = 4;                              // and then the others have their turn
+constexpr auto kStuckTime =
+    std::chrono::seconds(30);  // that a client may take nothing of what waits for it
+constexpr int kKeepAlive_s = 30, kKeepAliveAgain_s = 10,
+              kKeepAlives = 3;        // until a machine that is gone is noticed
+constexpr size_t kChunk = 64 * 1024;  // bytes received from one client at a time
+constexpr int kMostChunks = 4;        // and then the others have their turn
 constexpr size_t kMostNumbers = 32768;
-constexpr int kMostPieces = 64;                             // messages in one call of the system
+constexpr int kMostPieces = 64;  // messages in one call of the system
 
-void set(int socket, int level, int option, int value = 1) { ::setsockopt(socket, level, option, &value, sizeof value); }
+void set(int socket, int level, int option, int value = 1) {
+  ::setsockopt(socket, level, option, &value, sizeof value);
+}
 
 }  // namespace
 
 TcpqServer::TcpqServer(const LcmUrl& url) : url_(url) {
   listener_ = FileHandle(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  set(listener_.get(), SOL_SOCKET, SO_REUSEADDR);    // connections of a server that has ended do not hold the port
+  set(listener_.get(), SOL_SOCKET,
+      SO_REUSEADDR);  // connections of a server that has ended do not hold the port
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(url.port);
   ::inet_pton(AF_INET, url.host.c_str(), &address.sin_addr);
-  if (::bind(listener_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 || ::listen(listener_.get(), 128) != 0) {
+  if (::bind(listener_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+      ::listen(listener_.get(), 128) != 0) {
     throw EnvironmentError("cannot serve " + url.str() + " (" + std::strerror(errno) +
-                           "): another program has that port, or this machine has no such address; `--lcm auto` takes a free port");
+                           "): another program has that port, or this machine has no such address; "
+                           "`--lcm auto` takes a free port");
   }
   poll_ = FileHandle(::epoll_create1(EPOLL_CLOEXEC));
   wake_ = FileHandle(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
   for (const int file : {listener_.get(), wake_.get()}) {
     epoll_event event{};
     event.events = EPOLLIN;
-    event.data.ptr = file == wake_.get() ? static_cast<void*>(&wake_) : static_cast<void*>(&listener_);
+    event.data.ptr =
+        file == wake_.get() ? static_cast<void*>(&wake_) : static_cast<void*>(&listener_);
     ::epoll_ctl(poll_.get(), EPOLL_CTL_ADD, file, &event);
   }
 }
@@ -67,13 +76,15 @@ uint16_t TcpqServer::port() const {
   return ntohs(address.sin_port);
 }
 
-void TcpqServer::listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>&) {
+void TcpqServer::listen(const std::vector<std::string>& channels, Handler handler,
+                        const std::vector<std::string>&) {
   handler_ = std::move(handler);
   listen_to(channels);
   thread_ = std::thread([this] { serve(); });
 }
 
-void TcpqServer::listen_to(const std::vector<std::string>& channels, const std::vector<std::string>&) {
+void TcpqServer::listen_to(const std::vector<std::string>& channels,
+                           const std::vector<std::string>&) {
   std::lock_guard lock(mutex_);
   channels_ = {channels.begin(), channels.end()};
 }
@@ -107,7 +118,8 @@ void TcpqServer::publish(const std::string& channel, const uint8_t* data, size_t
     wake = !std::exchange(woken_, true);
   }
   const uint64_t one = 1;
-  if (wake) [[maybe_unused]] const ssize_t written = ::write(wake_.get(), &one, sizeof one);
+  if (wake) [[maybe_unused]]
+    const ssize_t written = ::write(wake_.get(), &one, sizeof one);
 }
 
 void TcpqServer::serve() {
@@ -115,9 +127,10 @@ void TcpqServer::serve() {
   Clock::time_point end{};
   epoll_event events[64];
   for (;;) {
-    const bool stopping = stop_;    // read before collect(): all that was published before stop() is taken over
+    const bool stopping =
+        stop_;  // read before collect(): all that was published before stop() is taken over
     const int count = ::epoll_wait(poll_.get(), events, 64, stopping ? 10 : 500);
-    bool newcomers = false;    // after the others: making place for them ends old ones
+    bool newcomers = false;  // after the others: making place for them ends old ones
     for (int i = 0; i < count; ++i) {
       if (events[i].data.ptr == &wake_) {
         uint64_t times = 0;
@@ -142,7 +155,8 @@ void TcpqServer::serve() {
   for (Client& client : clients_) {
     ::shutdown(client.socket.get(), SHUT_WR);
     uint8_t bytes[4096];
-    for (int i = 0; i < 64 && ::recv(client.socket.get(), bytes, sizeof bytes, MSG_DONTWAIT) > 0; ++i) {
+    for (int i = 0; i < 64 && ::recv(client.socket.get(), bytes, sizeof bytes, MSG_DONTWAIT) > 0;
+         ++i) {
     }
   }
   clients_.clear();
@@ -150,7 +164,9 @@ void TcpqServer::serve() {
 }
 
 bool TcpqServer::drained() const {
-  return std::all_of(clients_.begin(), clients_.end(), [this](const Client& c) { return c.filter.empty() || (c.rest.empty() && c.place == ring_.end()); });
+  return std::all_of(clients_.begin(), clients_.end(), [this](const Client& c) {
+    return c.filter.empty() || (c.rest.empty() && c.place == ring_.end());
+  });
 }
 
 void TcpqServer::accept_all() {
@@ -158,13 +174,13 @@ void TcpqServer::accept_all() {
     FileHandle socket(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
     if (!socket) {
       if (errno == EINTR || errno == ECONNABORTED) continue;
-      if (errno != EAGAIN) look_again_soon();    // no file descriptors, no memory
+      if (errno != EAGAIN) look_again_soon();  // no file descriptors, no memory
       return;
     }
     ++connections_;
     if (clients_.size() >= kMostClients && !make_place(socket)) {
       ++dropped_clients_;
-      continue;    // closes it
+      continue;  // closes it
     }
     set(socket.get(), IPPROTO_TCP, TCP_NODELAY);
     set(socket.get(), IPPROTO_TCP, TCP_QUICKACK);
@@ -188,8 +204,8 @@ void TcpqServer::look_again_soon() {
   ::epoll_ctl(poll_.get(), EPOLL_CTL_DEL, listener_.get(), nullptr);
 }
 
-// All places are taken: the oldest that has not greeted goes, else the oldest that greeted and said nothing more, else one
-// of who has most. False when the newcomer is one of too many itself.
+// All places are taken: the oldest that has not greeted goes, else the oldest that greeted and said
+// nothing more, else one of who has most. False when the newcomer is one of too many itself.
 bool TcpqServer::make_place(const FileHandle& newcomer) {
   for (const bool greeted : {false, true}) {
     for (Client& client : clients_) {
@@ -200,7 +216,8 @@ bool TcpqServer::make_place(const FileHandle& newcomer) {
     }
   }
   Client* client = of_largest_share(newcomer);
-  look_again_soon();    // finding out who has how many takes a while: a flood of newcomers must not stop the bus
+  look_again_soon();  // finding out who has how many takes a while: a flood of newcomers must not
+                      // stop the bus
   if (!client) return false;
   drop(*client, "there are too many, and its process has most of them");
   sweep();
@@ -209,14 +226,16 @@ bool TcpqServer::make_place(const FileHandle& newcomer) {
 
 TcpqServer::Client* TcpqServer::of_largest_share(const FileHandle& newcomer) {
   const PeerOwners owners(port());
-  std::map<std::string, std::pair<size_t, Client*>> shares;    // how many, and the newest
+  std::map<std::string, std::pair<size_t, Client*>> shares;  // how many, and the newest
   for (Client& client : clients_) {
     auto& [count, newest] = shares[owners.owner_of(client.socket.get())];
     ++count;
     newest = &client;
   }
   const size_t own = shares[owners.owner_of(newcomer.get())].first + 1;
-  const auto largest = std::max_element(shares.begin(), shares.end(), [](const auto& a, const auto& b) { return a.second.first < b.second.first; });
+  const auto largest = std::max_element(
+      shares.begin(), shares.end(),
+      [](const auto& a, const auto& b) { return a.second.first < b.second.first; });
   return largest->second.first > own ? largest->second.second : nullptr;
 }
 
@@ -237,7 +256,8 @@ void TcpqServer::receive(Client& client) {
     while ((result = client.reader.next(frame)) == tcpq::Reader::Result::frame) take(client, frame);
     client.reader.tidy();
     received_ += client.reader.held() - held;
-    if (result == tcpq::Reader::Result::broken) return drop(client, "what it sends is not LCM's tcpq, or too large");
+    if (result == tcpq::Reader::Result::broken)
+      return drop(client, "what it sends is not LCM's tcpq, or too large");
     if (received_ > kMostReceived) return drop(client, "unfinished messages take too much memory");
     if (!greeted && client.reader.greeted()) {
       client.rest = tcpq::server_hello();
@@ -245,7 +265,7 @@ void TcpqServer::receive(Client& client) {
     }
     if (static_cast<size_t>(size) < sizeof chunk) break;
   }
-  set(client.socket.get(), IPPROTO_TCP, TCP_QUICKACK);    // the kernel falls back to delayed ones
+  set(client.socket.get(), IPPROTO_TCP, TCP_QUICKACK);  // the kernel falls back to delayed ones
 }
 
 void TcpqServer::take(Client& client, const tcpq::Frame& frame) {
@@ -298,7 +318,7 @@ void TcpqServer::collect() {
     std::memcpy(&size, &collected_[at], sizeof size);
     at += sizeof size;
     const std::span<const uint8_t> frame(&collected_[at], size);
-    const uint32_t name_size = frame[7];    // at most 63
+    const uint32_t name_size = frame[7];  // at most 63
     ring_.append(number_of({reinterpret_cast<const char*>(&frame[8]), name_size}), frame);
     at += size;
   }
@@ -315,7 +335,10 @@ uint32_t TcpqServer::number_of(std::string_view channel) {
 }
 
 bool TcpqServer::wants(Client& client, const MessageRing::Message& message) {
-  const auto passes = [&] { return client.filter.passes({reinterpret_cast<const char*>(&message.bytes[8]), message.bytes[7]}); };
+  const auto passes = [&] {
+    return client.filter.passes(
+        {reinterpret_cast<const char*>(&message.bytes[8]), message.bytes[7]});
+  };
   if (message.channel == 0) return passes();
   if (client.wants.size() <= message.channel) client.wants.resize(message.channel + 64);
   int8_t& known = client.wants[message.channel];
@@ -331,7 +354,8 @@ void TcpqServer::send_all() {
 
 bool TcpqServer::send_rest(Client& client) {
   while (client.rest_sent < client.rest.size()) {
-    const ssize_t sent = ::send(client.socket.get(), &client.rest[client.rest_sent], client.rest.size() - client.rest_sent, MSG_NOSIGNAL);
+    const ssize_t sent = ::send(client.socket.get(), &client.rest[client.rest_sent],
+                                client.rest.size() - client.rest_sent, MSG_NOSIGNAL);
     if (sent >= 0) {
       client.rest_sent += static_cast<size_t>(sent);
       client.moved = Clock::now();
@@ -351,7 +375,7 @@ bool TcpqServer::send_rest(Client& client) {
 void TcpqServer::send(Client& client) {
   if (!client.rest.empty() && !send_rest(client)) return;
   while (!client.filter.empty() && client.place < ring_.end()) {
-    if (client.place < ring_.begin()) {    // overtaken
+    if (client.place < ring_.begin()) {  // overtaken
       ++skipped_;
       client.place = ring_.end();
       break;
@@ -410,8 +434,10 @@ void TcpqServer::watch(Client& client, bool for_room) {
 void TcpqServer::sweep() {
   const Clock::time_point now = Clock::now();
   for (auto client = clients_.begin(); client != clients_.end();) {
-    if (!client->gone && !client->reader.greeted() && now - client->since > kGreetingTime) drop(*client, "it did not greet");
-    if (!client->gone && client->blocked && now - client->moved > kStuckTime) drop(*client, "it took nothing for half a minute");
+    if (!client->gone && !client->reader.greeted() && now - client->since > kGreetingTime)
+      drop(*client, "it did not greet");
+    if (!client->gone && client->blocked && now - client->moved > kStuckTime)
+      drop(*client, "it took nothing for half a minute");
     if (!client->gone) {
       ++client;
       continue;

@@ -1,11 +1,13 @@
 // The bus as a tcpq server: LCM programs connect to it over TCP, and need no multicast.
 //
-// One thread does all the network. publish() copies a message into a bounded queue and returns; the thread moves it to a
-// ring from which each client is served at its own pace. A client that falls a ring behind loses messages. What
-// clients publish goes to the simulation and to all clients that subscribed to it, as on any LCM bus.
+// One thread does all the network. publish() copies a message into a bounded queue and returns; the
+// thread moves it to a ring from which each client is served at its own pace. A client that falls a
+// ring behind loses messages. What clients publish goes to the simulation and to all clients that
+// subscribed to it, as on any LCM bus.
 //
-// Where all places are taken, who connects gets that of a connection that said nothing, else of the process (of another
-// machine: the address) that has most of them, if that has more than the newcomer's own would have.
+// Where all places are taken, who connects gets that of a connection that said nothing, else of the
+// process (of another machine: the address) that has most of them, if that has more than the
+// newcomer's own would have.
 #pragma once
 
 #include <atomic>
@@ -29,11 +31,13 @@ namespace ruedo::bus {
 class TcpqServer : public Bus {
  public:
   static constexpr size_t kMostClients = 512;
-  static constexpr size_t kMostWaiting = 16 << 20;       // bytes between publish() and the thread
-  static constexpr size_t kRing = 16 << 20;              // bytes
-  static constexpr size_t kMostReceived = 64 << 20;      // bytes of frames that are not whole yet, all clients together
+  static constexpr size_t kMostWaiting = 16 << 20;  // bytes between publish() and the thread
+  static constexpr size_t kRing = 16 << 20;         // bytes
+  static constexpr size_t kMostReceived =
+      64 << 20;  // bytes of frames that are not whole yet, all clients together
 
-  // Listens at the address of a tcpq URL, and nowhere else. Throws EnvironmentError when it is taken.
+  // Listens at the address of a tcpq URL, and nowhere else. Throws EnvironmentError when it is
+  // taken.
   explicit TcpqServer(const LcmUrl& url);
   ~TcpqServer() override;
 
@@ -41,16 +45,19 @@ class TcpqServer : public Bus {
   uint16_t port() const;
 
   void publish(const std::string& channel, const uint8_t* data, size_t size) override;
-  void listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own = {}) override;
-  void listen_to(const std::vector<std::string>& channels, const std::vector<std::string>& own = {}) override;
-  // Sends what was published so far to clients that take it, waits half a second at most, and closes all connections.
+  void listen(const std::vector<std::string>& channels, Handler handler,
+              const std::vector<std::string>& own = {}) override;
+  void listen_to(const std::vector<std::string>& channels,
+                 const std::vector<std::string>& own = {}) override;
+  // Sends what was published so far to clients that take it, waits half a second at most, and
+  // closes all connections.
   void stop() override;
   uint64_t failed() const override { return failed_; }
 
   // Counts since the start.
   uint64_t connections() const { return connections_; }
   uint64_t dropped_clients() const { return dropped_clients_; }
-  uint64_t skipped() const { return skipped_; }          // times that a slow client lost messages
+  uint64_t skipped() const { return skipped_; }  // times that a slow client lost messages
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -60,13 +67,13 @@ class TcpqServer : public Bus {
     Clock::time_point since;
     tcpq::Reader reader;
     tcpq::Filter filter;
-    std::vector<int8_t> wants;       // by channel number: 0 not known yet, 1 yes, -1 no
-    uint64_t place = 0;              // in the ring
-    std::vector<uint8_t> rest;       // of a message that was sent in part
+    std::vector<int8_t> wants;  // by channel number: 0 not known yet, 1 yes, -1 no
+    uint64_t place = 0;         // in the ring
+    std::vector<uint8_t> rest;  // of a message that was sent in part
     size_t rest_sent = 0;
-    bool blocked = false;            // waits for room in the socket
-    Clock::time_point moved;         // when the socket last took something, or nothing was left
-    bool spoke = false;              // published or subscribed
+    bool blocked = false;     // waits for room in the socket
+    Clock::time_point moved;  // when the socket last took something, or nothing was left
+    bool spoke = false;       // published or subscribed
     bool gone = false;
   };
 
@@ -93,23 +100,24 @@ class TcpqServer : public Bus {
   FileHandle listener_, poll_, wake_;
   Handler handler_;
 
-  std::mutex mutex_;                                     // of the next three
-  std::unordered_set<std::string> channels_;             // listened to
-  std::vector<uint8_t> waiting_;                         // frames, each behind its size
+  std::mutex mutex_;                          // of the next three
+  std::unordered_set<std::string> channels_;  // listened to
+  std::vector<uint8_t> waiting_;              // frames, each behind its size
   bool woken_ = false;
-  std::atomic<int> listeners_{0};                        // clients with a subscription
+  std::atomic<int> listeners_{0};  // clients with a subscription
   std::atomic<bool> stop_{false};
   std::atomic<uint64_t> failed_{0}, connections_{0}, dropped_clients_{0}, skipped_{0};
 
   // The thread's own.
   std::vector<uint8_t> collected_;
   MessageRing ring_{kRing};
-  std::unordered_map<std::string, uint32_t> numbers_;    // of channels; beyond a bound all others share number 0
+  std::unordered_map<std::string, uint32_t>
+      numbers_;  // of channels; beyond a bound all others share number 0
   std::list<Client> clients_;
-  size_t received_ = 0;                                  // bytes that the readers hold
-  Clock::time_point accept_again_{};                     // when there was no room for one more
+  size_t received_ = 0;               // bytes that the readers hold
+  Clock::time_point accept_again_{};  // when there was no room for one more
   Clock::time_point complained_{};
-  uint64_t silent_drops_ = 0;                            // since it last complained
+  uint64_t silent_drops_ = 0;  // since it last complained
   std::vector<uint8_t> frame_;
   std::thread thread_;
 };

@@ -8,7 +8,7 @@ namespace ruedo::bus::tcpq {
 namespace {
 
 constexpr uint32_t kPublish = 1, kSubscribe = 2, kUnsubscribe = 3;
-constexpr size_t kKept = 256 * 1024;    // bytes of memory that an idle client's buffer may keep
+constexpr size_t kKept = 256 * 1024;  // bytes of memory that an idle client's buffer may keep
 
 void append_number(std::vector<uint8_t>& out, uint32_t number) {
   for (int shift = 24; shift >= 0; shift -= 8) out.push_back(static_cast<uint8_t>(number >> shift));
@@ -46,10 +46,15 @@ void append_pattern(std::vector<uint8_t>& out, uint32_t kind, std::string_view n
 
 }  // namespace
 
-void append_subscribe(std::vector<uint8_t>& out, std::string_view name) { append_pattern(out, kSubscribe, name); }
-void append_unsubscribe(std::vector<uint8_t>& out, std::string_view name) { append_pattern(out, kUnsubscribe, name); }
+void append_subscribe(std::vector<uint8_t>& out, std::string_view name) {
+  append_pattern(out, kSubscribe, name);
+}
+void append_unsubscribe(std::vector<uint8_t>& out, std::string_view name) {
+  append_pattern(out, kUnsubscribe, name);
+}
 
-void append_publish(std::vector<uint8_t>& out, std::string_view channel, std::span<const uint8_t> data) {
+void append_publish(std::vector<uint8_t>& out, std::string_view channel,
+                    std::span<const uint8_t> data) {
   append_number(out, kPublish);
   append_number(out, static_cast<uint32_t>(channel.size()));
   out.insert(out.end(), channel.begin(), channel.end());
@@ -84,9 +89,12 @@ Reader::Result Reader::next(Frame& frame) {
   }
   if (left < end) return Result::more;
   const uint8_t* begin = buffer_.data() + read_;
-  frame.kind = kind == kPublish ? Frame::Kind::publish : kind == kSubscribe ? Frame::Kind::subscribe : Frame::Kind::unsubscribe;
+  frame.kind = kind == kPublish     ? Frame::Kind::publish
+               : kind == kSubscribe ? Frame::Kind::subscribe
+                                    : Frame::Kind::unsubscribe;
   frame.channel = {reinterpret_cast<const char*>(begin + 8), length};
-  frame.data = kind == kPublish ? std::span(begin + text_end + 4, begin + end) : std::span<const uint8_t>();
+  frame.data =
+      kind == kPublish ? std::span(begin + text_end + 4, begin + end) : std::span<const uint8_t>();
   read_ += end;
   return Result::frame;
 }
@@ -101,11 +109,12 @@ Pattern read_pattern(std::string_view pattern) {
   Pattern read{"", true};
   for (size_t i = 0; i < pattern.size(); ++i) {
     const char c = pattern[i];
-    if (c == '\\' && i + 1 < pattern.size() && pattern[i + 1] == 'Q') {    // Java quotes so
+    if (c == '\\' && i + 1 < pattern.size() && pattern[i + 1] == 'Q') {  // Java quotes so
       const size_t end = std::min(pattern.find("\\E", i + 2), pattern.size());
       read.text += pattern.substr(i + 2, end - i - 2);
       i = end + 1;
-    } else if (c == '\\' && i + 1 < pattern.size() && !std::isalnum(static_cast<unsigned char>(pattern[i + 1]))) {
+    } else if (c == '\\' && i + 1 < pattern.size() &&
+               !std::isalnum(static_cast<unsigned char>(pattern[i + 1]))) {
       read.text += pattern[++i];
     } else if (std::string_view(".^$*+?{}[]\\|()").find(c) == std::string_view::npos) {
       read.text += c;
@@ -124,7 +133,8 @@ void Filter::subscribe(std::string_view pattern) {
   Pattern read = read_pattern(pattern);
   auto& kept = read.whole ? names_ : beginnings_;
   const size_t most = read.whole ? kMostNames : kMostBeginnings;
-  if (kept.size() >= most && !kept.contains(read.text)) {    // who wants so much gets everything, for good
+  if (kept.size() >= most &&
+      !kept.contains(read.text)) {  // who wants so much gets everything, for good
     ++beginnings_[""];
     return;
   }
@@ -140,7 +150,8 @@ void Filter::unsubscribe(std::string_view pattern) {
 
 bool Filter::passes(std::string_view channel) const {
   if (names_.contains(std::string(channel))) return true;
-  return std::any_of(beginnings_.begin(), beginnings_.end(), [&](const auto& one) { return channel.starts_with(one.first); });
+  return std::any_of(beginnings_.begin(), beginnings_.end(),
+                     [&](const auto& one) { return channel.starts_with(one.first); });
 }
 
 }  // namespace ruedo::bus::tcpq

@@ -1,7 +1,9 @@
-// LCM's tcpq on the wire, the server's side: the client's stream taken apart, and which channels a client asked for.
+// LCM's tcpq on the wire, the server's side: the client's stream taken apart, and which channels a
+// client asked for.
 //
-// A client sends its magic and the version, hears the server's, and then sends frames: PUBLISH (channel, data),
-// SUBSCRIBE and UNSUBSCRIBE (a regular expression). The server sends PUBLISH frames alone. Numbers are big endian.
+// A client sends its magic and the version, hears the server's, and then sends frames: PUBLISH
+// (channel, data), SUBSCRIBE and UNSUBSCRIBE (a regular expression). The server sends PUBLISH
+// frames alone. Numbers are big endian.
 #pragma once
 
 #include <cstddef>
@@ -16,9 +18,9 @@ namespace ruedo::bus::tcpq {
 
 inline constexpr uint32_t kServerMagic = 0x287617fa, kClientMagic = 0x287617fb, kVersion = 0x0100;
 inline constexpr uint16_t kDefaultPort = 7700;
-inline constexpr size_t kLongestChannel = 63;              // LCM's
+inline constexpr size_t kLongestChannel = 63;  // LCM's
 inline constexpr size_t kLongestPattern = 64 * 1024;
-inline constexpr size_t kLargestMessage = 4 * 1024 * 1024; // from a client
+inline constexpr size_t kLargestMessage = 4 * 1024 * 1024;  // from a client
 
 // What each side says first.
 std::vector<uint8_t> server_hello();
@@ -26,23 +28,27 @@ std::vector<uint8_t> client_hello();
 // Append a PUBLISH, or a SUBSCRIBE or UNSUBSCRIBE with a channel's name.
 void append_subscribe(std::vector<uint8_t>& out, std::string_view name);
 void append_unsubscribe(std::vector<uint8_t>& out, std::string_view name);
-void append_publish(std::vector<uint8_t>& out, std::string_view channel, std::span<const uint8_t> data);
+void append_publish(std::vector<uint8_t>& out, std::string_view channel,
+                    std::span<const uint8_t> data);
 
 struct Frame {
   enum class Kind { publish, subscribe, unsubscribe };
   Kind kind;
-  std::string_view channel;          // or the pattern
-  std::span<const uint8_t> data;     // of a publish
+  std::string_view channel;       // or the pattern
+  std::span<const uint8_t> data;  // of a publish
 };
 
-// Takes one client's stream apart. Holds the bytes of the frame that is not whole yet, never more than came.
+// Takes one client's stream apart. Holds the bytes of the frame that is not whole yet, never more
+// than came.
 class Reader {
  public:
-  void add(std::span<const uint8_t> bytes) { buffer_.insert(buffer_.end(), bytes.begin(), bytes.end()); }
+  void add(std::span<const uint8_t> bytes) {
+    buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+  }
 
   enum class Result { frame, more, broken };
-  // The next frame, valid until add() or tidy(); `more` when it has not all come; `broken` when this is no tcpq client or a
-  // length is beyond what is allowed.
+  // The next frame, valid until add() or tidy(); `more` when it has not all come; `broken` when
+  // this is no tcpq client or a length is beyond what is allowed.
   Result next(Frame& frame);
   // Forgets what was read.
   void tidy();
@@ -58,8 +64,9 @@ class Reader {
   bool greeted_ = false;
 };
 
-// The channels that one client subscribed to, or more: a pattern that is neither a name nor a name's beginning passes
-// everything that begins as it does, for LCM filters again in the client. So no client's expression is ever run here.
+// The channels that one client subscribed to, or more: a pattern that is neither a name nor a
+// name's beginning passes everything that begins as it does, for LCM filters again in the client.
+// So no client's expression is ever run here.
 class Filter {
  public:
   static constexpr size_t kMostNames = 65536, kMostBeginnings = 64;
@@ -70,7 +77,7 @@ class Filter {
   bool empty() const { return names_.empty() && beginnings_.empty(); }
 
  private:
-  std::unordered_map<std::string, int> names_, beginnings_;    // with how often each was asked for
+  std::unordered_map<std::string, int> names_, beginnings_;  // with how often each was asked for
 };
 
 // A pattern as a name, or as the beginning that all names which match it have.

@@ -12,10 +12,12 @@
 namespace ruedo::bus {
 namespace {
 
-constexpr size_t kRoom = size_t{256} << 10;        // bytes received at a time
-constexpr size_t kLargest = size_t{64} << 20;      // a frame: the server is trusted no further
+constexpr size_t kRoom = size_t{256} << 10;    // bytes received at a time
+constexpr size_t kLargest = size_t{64} << 20;  // a frame: the server is trusted no further
 
-uint32_t number(const uint8_t* b) { return uint32_t{b[0]} << 24 | uint32_t{b[1]} << 16 | uint32_t{b[2]} << 8 | b[3]; }
+uint32_t number(const uint8_t* b) {
+  return uint32_t{b[0]} << 24 | uint32_t{b[1]} << 16 | uint32_t{b[2]} << 8 | b[3];
+}
 
 }  // namespace
 

@@ -1,4 +1,5 @@
-// A client's end of a Unix-domain socket: connects, sends, and takes what came apart (see unix_server.h).
+// A client's end of a Unix-domain socket: connects, sends, and takes what came apart (see
+// unix_server.h).
 //
 // Safe to publish and subscribe from any thread; take() from one at a time.
 #pragma once
@@ -23,11 +24,11 @@ class UnixConnection {
 
   // False when the server is gone, for good.
   bool publish(std::string_view channel, const uint8_t* data, size_t size);
-  bool subscribe(std::string_view name);    // a channel's, no pattern
+  bool subscribe(std::string_view name);  // a channel's, no pattern
   bool unsubscribe(std::string_view name);
 
-  // Waits at most so long (ms) for something, and calls the handler for each whole message that came. False when there was
-  // nothing.
+  // Waits at most so long (ms) for something, and calls the handler for each whole message that
+  // came. False when there was nothing.
   bool take(int timeout_ms, const Handler& handler);
   bool is_over() const { return over_; }
   int file() const { return socket_.get(); }
@@ -38,7 +39,7 @@ class UnixConnection {
   FileHandle socket_;
   std::mutex sending_;
   std::vector<uint8_t> frame_;
-  std::vector<uint8_t> buffer_;    // received; [begin_, end_) is not taken yet
+  std::vector<uint8_t> buffer_;  // received; [begin_, end_) is not taken yet
   size_t begin_ = 0, end_ = 0;
   bool greeted_ = false, over_ = false;
 };

@@ -1,4 +1,5 @@
-// One thread accepts, receives, and sends what clients did not take at once; flush() sends from its caller's.
+// One thread accepts, receives, and sends what clients did not take at once; flush() sends from its
+// caller's.
 #include "bus/unix_server.h"
 
 #include <algorithm>
@@ -20,11 +21,12 @@
 namespace ruedo::bus {
 namespace {
 
-constexpr auto kGreetingTime = std::chrono::seconds(3);    // until a client must have said that it is one
+constexpr auto kGreetingTime =
+    std::chrono::seconds(3);  // until a client must have said that it is one
 constexpr auto kFarewellTime = std::chrono::seconds(2);
-constexpr size_t kChunk = 64 * 1024;                       // bytes received from one client at a time
-constexpr int kMostPieces = 256;                           // of memory, in one call of the system
-constexpr size_t kMostUnsent = size_t{1} << 20;            // bytes that wait for flush()
+constexpr size_t kChunk = 64 * 1024;             // bytes received from one client at a time
+constexpr int kMostPieces = 256;                 // of memory, in one call of the system
+constexpr size_t kMostUnsent = size_t{1} << 20;  // bytes that wait for flush()
 
 void add_to(int poll, int file, void* what) {
   epoll_event event{};
@@ -41,10 +43,11 @@ uint64_t inode_of(const std::string& path) {
 }  // namespace
 
 std::string_view UnixServer::Frame::channel(const std::vector<uint8_t>& frames) const {
-  return {reinterpret_cast<const char*>(&frames[begin + 8]), frames[begin + 7]};    // at most 63
+  return {reinterpret_cast<const char*>(&frames[begin + 8]), frames[begin + 7]};  // at most 63
 }
 
-UnixServer::UnixServer(const LcmUrl& url) : url_(url), listener_(listen_unix(url.host)), inode_(inode_of(url.host)) {
+UnixServer::UnixServer(const LcmUrl& url)
+    : url_(url), listener_(listen_unix(url.host)), inode_(inode_of(url.host)) {
   poll_ = FileHandle(::epoll_create1(EPOLL_CLOEXEC));
   wake_ = FileHandle(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
   add_to(poll_.get(), listener_.get(), &listener_);
@@ -56,13 +59,15 @@ UnixServer::~UnixServer() {
   if (inode_ != 0 && inode_of(url_.host) == inode_) ::unlink(url_.host.c_str());
 }
 
-void UnixServer::listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>&) {
+void UnixServer::listen(const std::vector<std::string>& channels, Handler handler,
+                        const std::vector<std::string>&) {
   handler_ = std::move(handler);
   listen_to(channels);
   thread_ = std::thread([this] { serve(); });
 }
 
-void UnixServer::listen_to(const std::vector<std::string>& channels, const std::vector<std::string>&) {
+void UnixServer::listen_to(const std::vector<std::string>& channels,
+                           const std::vector<std::string>&) {
   const std::lock_guard lock(mutex_);
   channels_ = {channels.begin(), channels.end()};
 }
@@ -115,29 +120,38 @@ void UnixServer::send(Client& client) {
     msghdr header{};
     header.msg_iov = pieces;
     header.msg_iovlen = static_cast<size_t>(count);
-    const ssize_t result = client.behind() > 0 ? 0 : ::sendmsg(client.socket.get(), &header, MSG_NOSIGNAL | MSG_DONTWAIT);
+    const ssize_t result =
+        client.behind() > 0 ? 0
+                            : ::sendmsg(client.socket.get(), &header, MSG_NOSIGNAL | MSG_DONTWAIT);
     if (result < 0 && errno != EAGAIN && errno != EINTR) client.gone = true;
     size_t sent = result < 0 ? 0 : static_cast<size_t>(result);
     for (int i = 0; i < count && !client.gone; ++i) {
       const size_t done = std::min(sent, pieces[i].iov_len);
       sent -= done;
-      if (done < pieces[i].iov_len) keep(client, {static_cast<const uint8_t*>(pieces[i].iov_base) + done, pieces[i].iov_len - done});
+      if (done < pieces[i].iov_len)
+        keep(client,
+             {static_cast<const uint8_t*>(pieces[i].iov_base) + done, pieces[i].iov_len - done});
     }
     count = 0;
   };
   size_t waiting = client.behind();
   for (const Frame& frame : index_) {
     if (!client.filter.passes(frame.channel(frames_))) continue;
-    if (waiting + frame.size > kMostBehind || held_ + waiting + frame.size > kMostHeld + client.behind()) {
+    if (waiting + frame.size > kMostBehind ||
+        held_ + waiting + frame.size > kMostHeld + client.behind()) {
       ++failed_;
       if (!std::exchange(client.told, true)) {
-        spdlog::warn("{}: a client takes nothing, and loses messages: {} MiB wait for it (this is said once)", url_.str(), waiting >> 20);
+        spdlog::warn(
+            "{}: a client takes nothing, and loses messages: {} MiB wait for it (this is said "
+            "once)",
+            url_.str(), waiting >> 20);
       }
       continue;
     }
     waiting += frame.size;
     uint8_t* begin = &frames_[frame.begin];
-    if (count > 0 && static_cast<uint8_t*>(pieces[count - 1].iov_base) + pieces[count - 1].iov_len == begin) {
+    if (count > 0 &&
+        static_cast<uint8_t*>(pieces[count - 1].iov_base) + pieces[count - 1].iov_len == begin) {
       pieces[count - 1].iov_len += frame.size;
       continue;
     }
@@ -149,7 +163,8 @@ void UnixServer::send(Client& client) {
 
 void UnixServer::keep(Client& client, std::span<const uint8_t> bytes) {
   if (client.rest_sent > 0 && client.rest_sent >= client.rest.size() / 2) {
-    client.rest.erase(client.rest.begin(), client.rest.begin() + static_cast<std::ptrdiff_t>(client.rest_sent));
+    client.rest.erase(client.rest.begin(),
+                      client.rest.begin() + static_cast<std::ptrdiff_t>(client.rest_sent));
     client.rest_sent = 0;
   }
   client.rest.insert(client.rest.end(), bytes.begin(), bytes.end());
@@ -159,7 +174,8 @@ void UnixServer::keep(Client& client, std::span<const uint8_t> bytes) {
 
 void UnixServer::send_rest(Client& client) {
   while (client.behind() > 0 && !client.gone) {
-    const ssize_t sent = ::send(client.socket.get(), &client.rest[client.rest_sent], client.behind(), MSG_NOSIGNAL | MSG_DONTWAIT);
+    const ssize_t sent = ::send(client.socket.get(), &client.rest[client.rest_sent],
+                                client.behind(), MSG_NOSIGNAL | MSG_DONTWAIT);
     if (sent < 0 && errno == EAGAIN) break;
     if (sent < 0 && errno != EINTR) client.gone = true;
     if (sent > 0) client.rest_sent += static_cast<size_t>(sent), held_ -= static_cast<size_t>(sent);
@@ -199,7 +215,7 @@ void UnixServer::serve() {
       }
       sweep();
       accept_all();
-      send_frames();    // from client to client
+      send_frames();  // from client to client
     }
     if (!stopping) {
       for (const auto& [channel, data] : heard_) handler_(channel, data.data(), data.size());
@@ -216,7 +232,8 @@ void UnixServer::serve() {
 
 bool UnixServer::drained() {
   const std::lock_guard lock(mutex_);
-  return std::all_of(clients_.begin(), clients_.end(), [](const Client& client) { return client.gone || client.behind() == 0; });
+  return std::all_of(clients_.begin(), clients_.end(),
+                     [](const Client& client) { return client.gone || client.behind() == 0; });
 }
 
 void UnixServer::accept_all() {
@@ -224,12 +241,12 @@ void UnixServer::accept_all() {
     FileHandle socket(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
     if (!socket) {
       if (errno == EINTR || errno == ECONNABORTED) continue;
-      return;    // the next round looks again, if it was for want of file descriptors
+      return;  // the next round looks again, if it was for want of file descriptors
     }
     ++connections_;
     if (!is_own_peer(socket.get()) || clients_.size() >= kMostClients) {
       ++refused_;
-      continue;    // closes it
+      continue;  // closes it
     }
     Client& client = clients_.emplace_back();
     client.socket = std::move(socket);
@@ -264,14 +281,15 @@ void UnixServer::receive(Client& client) {
 void UnixServer::take(Client& client, const tcpq::Frame& frame) {
   switch (frame.kind) {
     case tcpq::Frame::Kind::subscribe:
-      send_frames();    // what was published before is not for it
+      send_frames();  // what was published before is not for it
       client.filter.subscribe(frame.channel);
       return;
     case tcpq::Frame::Kind::unsubscribe: client.filter.unsubscribe(frame.channel); return;
     case tcpq::Frame::Kind::publish: break;
   }
   const std::string channel(frame.channel);
-  if (channels_.contains(channel)) heard_.emplace_back(channel, std::vector<uint8_t>(frame.data.begin(), frame.data.end()));
+  if (channels_.contains(channel))
+    heard_.emplace_back(channel, std::vector<uint8_t>(frame.data.begin(), frame.data.end()));
   const auto wants = [&](const Client& other) { return other.filter.passes(channel); };
   if (std::any_of(clients_.begin(), clients_.end(), wants)) add(channel, frame.data);
 }
@@ -279,7 +297,8 @@ void UnixServer::take(Client& client, const tcpq::Frame& frame) {
 void UnixServer::sweep() {
   const Clock::time_point now = Clock::now();
   for (auto client = clients_.begin(); client != clients_.end();) {
-    if (!client->reader.greeted() && now - client->since > kGreetingTime) ++refused_, client->gone = true;
+    if (!client->reader.greeted() && now - client->since > kGreetingTime)
+      ++refused_, client->gone = true;
     if (!client->gone) {
       ++client;
       continue;

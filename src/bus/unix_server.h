@@ -1,9 +1,10 @@
 // The bus as a Unix-domain socket: for programs of one user on one machine.
 //
-// The socket has mode 0600, and the kernel says whose the other end is: nobody else reads or sends. The frames are tcpq's
-// (tcpq_wire.h). What is published waits for flush(), and then goes to each client in one call of the system; what a
-// client does not take at once is kept for it, in order. So nothing is lost on the way, but for a client that falls
-// kMostBehind behind: it loses whole messages, and that is said.
+// The socket has mode 0600, and the kernel says whose the other end is: nobody else reads or sends.
+// The frames are tcpq's (tcpq_wire.h). What is published waits for flush(), and then goes to each
+// client in one call of the system; what a client does not take at once is kept for it, in order.
+// So nothing is lost on the way, but for a client that falls kMostBehind behind: it loses whole
+// messages, and that is said.
 #pragma once
 
 #include <atomic>
@@ -26,25 +27,30 @@ namespace ruedo::bus {
 class UnixServer : public Bus {
  public:
   static constexpr size_t kMostClients = 256;
-  static constexpr size_t kMostBehind = size_t{64} << 20;     // bytes that one client has not taken
-  static constexpr size_t kMostHeld = size_t{256} << 20;      // bytes that wait for clients, or are messages of theirs which are not whole yet
+  static constexpr size_t kMostBehind = size_t{64} << 20;  // bytes that one client has not taken
+  static constexpr size_t kMostHeld =
+      size_t{256}
+      << 20;  // bytes that wait for clients, or are messages of theirs which are not whole yet
 
-  // Makes the socket; a file that a server left behind is replaced. Throws EnvironmentError when the path is served, or
-  // cannot be.
+  // Makes the socket; a file that a server left behind is replaced. Throws EnvironmentError when
+  // the path is served, or cannot be.
   explicit UnixServer(const LcmUrl& url);
-  ~UnixServer() override;    // removes the socket
+  ~UnixServer() override;  // removes the socket
 
   void publish(const std::string& channel, const uint8_t* data, size_t size) override;
   void flush() override;
-  void listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own = {}) override;
-  void listen_to(const std::vector<std::string>& channels, const std::vector<std::string>& own = {}) override;
-  // Sends what was published to clients that take it, waits two seconds at most, and closes all connections.
+  void listen(const std::vector<std::string>& channels, Handler handler,
+              const std::vector<std::string>& own = {}) override;
+  void listen_to(const std::vector<std::string>& channels,
+                 const std::vector<std::string>& own = {}) override;
+  // Sends what was published to clients that take it, waits two seconds at most, and closes all
+  // connections.
   void stop() override;
   uint64_t failed() const override { return failed_; }
 
   // Counts since the start.
   uint64_t connections() const { return connections_; }
-  uint64_t refused() const { return refused_; }    // of other users, too many, or no clients of ours
+  uint64_t refused() const { return refused_; }  // of other users, too many, or no clients of ours
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -54,14 +60,14 @@ class UnixServer : public Bus {
     Clock::time_point since;
     tcpq::Reader reader;
     tcpq::Filter filter;
-    std::vector<uint8_t> rest;    // what it has not taken yet
+    std::vector<uint8_t> rest;  // what it has not taken yet
     size_t rest_sent = 0;
-    bool watched = false;         // for room
-    bool told = false;            // that it lost messages
+    bool watched = false;  // for room
+    bool told = false;     // that it lost messages
     bool gone = false;
     size_t behind() const { return rest.size() - rest_sent; }
   };
-  struct Frame {                  // in frames_
+  struct Frame {  // in frames_
     size_t begin, size;
     std::string_view channel(const std::vector<uint8_t>& frames) const;
   };
@@ -86,13 +92,14 @@ class UnixServer : public Bus {
   std::atomic<bool> stop_{false};
   std::atomic<uint64_t> failed_{0}, connections_{0}, refused_{0};
 
-  std::mutex mutex_;    // of all that follows; not held while the handler runs
-  std::unordered_set<std::string> channels_;    // listened to
-  std::vector<uint8_t> frames_;                 // published since flush()
+  std::mutex mutex_;  // of all that follows; not held while the handler runs
+  std::unordered_set<std::string> channels_;  // listened to
+  std::vector<uint8_t> frames_;               // published since flush()
   std::vector<Frame> index_;
   std::list<Client> clients_;
-  size_t held_ = 0;                             // bytes in rest of all clients
-  std::vector<std::pair<std::string, std::vector<uint8_t>>> heard_;    // for the handler; the thread's
+  size_t held_ = 0;  // bytes in rest of all clients
+  std::vector<std::pair<std::string, std::vector<uint8_t>>>
+      heard_;  // for the handler; the thread's
   std::thread thread_;
 };
 

@@ -17,7 +17,8 @@ sockaddr_un address_of(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (path.empty() || path[0] != '/' || path.size() >= sizeof address.sun_path) {
-    throw EnvironmentError("unix://" + path + ": a socket has an absolute path of at most " + std::to_string(sizeof address.sun_path - 1) +
+    throw EnvironmentError("unix://" + path + ": a socket has an absolute path of at most " +
+                           std::to_string(sizeof address.sun_path - 1) +
                            " bytes, such as unix:///tmp/ruedo.sock");
   }
   std::memcpy(address.sun_path, path.data(), path.size());
@@ -26,7 +27,9 @@ sockaddr_un address_of(const std::string& path) {
 
 FileHandle connected(const sockaddr_un& address) {
   FileHandle socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  return ::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ? std::move(socket) : FileHandle();
+  return ::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0
+             ? std::move(socket)
+             : FileHandle();
 }
 
 }  // namespace
@@ -34,27 +37,35 @@ FileHandle connected(const sockaddr_un& address) {
 FileHandle connect_unix(const std::string& path) {
   FileHandle socket = connected(address_of(path));
   if (!socket) {
-    throw EnvironmentError("nothing listens at unix://" + path + " (" + std::strerror(errno) + "): start `ruedo run` with that --lcm first");
+    throw EnvironmentError("nothing listens at unix://" + path + " (" + std::strerror(errno) +
+                           "): start `ruedo run` with that --lcm first");
   }
-  if (!is_own_peer(socket.get())) throw EnvironmentError("unix://" + path + " is served by another user");
+  if (!is_own_peer(socket.get()))
+    throw EnvironmentError("unix://" + path + " is served by another user");
   return socket;
 }
 
-bool is_unix_served(const std::string& path) { return static_cast<bool>(connected(address_of(path))); }
+bool is_unix_served(const std::string& path) {
+  return static_cast<bool>(connected(address_of(path)));
+}
 
 FileHandle listen_unix(const std::string& path) {
   const sockaddr_un address = address_of(path);
-  if (is_unix_served(path)) throw EnvironmentError("unix://" + path + " is taken by another server: end that one, or take another path");
+  if (is_unix_served(path))
+    throw EnvironmentError("unix://" + path +
+                           " is taken by another server: end that one, or take another path");
   struct stat status{};
   if (::lstat(path.c_str(), &status) == 0) {
-    if (!S_ISSOCK(status.st_mode)) throw EnvironmentError("unix://" + path + " is a file that is no socket: take another path");
+    if (!S_ISSOCK(status.st_mode))
+      throw EnvironmentError("unix://" + path + " is a file that is no socket: take another path");
     ::unlink(path.c_str());
   }
   FileHandle socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  ::fchmod(socket.get(), 0600);    // before it has a name
-  if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 || ::chmod(path.c_str(), 0600) != 0 ||
-      ::listen(socket.get(), 128) != 0) {
-    throw EnvironmentError("cannot serve unix://" + path + " (" + std::strerror(errno) + "): the folder must be there, and this user's to write");
+  ::fchmod(socket.get(), 0600);  // before it has a name
+  if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+      ::chmod(path.c_str(), 0600) != 0 || ::listen(socket.get(), 128) != 0) {
+    throw EnvironmentError("cannot serve unix://" + path + " (" + std::strerror(errno) +
+                           "): the folder must be there, and this user's to write");
   }
   return socket;
 }
@@ -62,7 +73,8 @@ FileHandle listen_unix(const std::string& path) {
 bool is_own_peer(int socket) {
   ucred peer{};
   socklen_t size = sizeof peer;
-  return ::getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 && (peer.uid == ::geteuid() || peer.uid == 0);
+  return ::getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 &&
+         (peer.uid == ::geteuid() || peer.uid == 0);
 }
 
 }  // namespace ruedo::bus

@@ -7,13 +7,15 @@
 
 namespace ruedo::bus {
 
-// Connects to the socket of a server that runs as the same user. Throws EnvironmentError, with the cure.
+// Connects to the socket of a server that runs as the same user. Throws EnvironmentError, with the
+// cure.
 FileHandle connect_unix(const std::string& path);
 
 // True when somebody listens there.
 bool is_unix_served(const std::string& path);
 
-// Binds a socket of mode 0600 and listens; what a server left behind is replaced. Throws EnvironmentError.
+// Binds a socket of mode 0600 and listens; what a server left behind is replaced. Throws
+// EnvironmentError.
 FileHandle listen_unix(const std::string& path);
 
 // Whether the other end is a process of this user, or of root.

@@ -1,4 +1,5 @@
-// Embree's own triangles in single precision and nothing of ours: what the ray caster is measured against.
+// Embree's own triangles in single precision and nothing of ours: what the ray caster is measured
+// against.
 #pragma once
 
 #include <algorithm>
@@ -15,8 +16,10 @@ class BareEmbree {
  public:
   explicit BareEmbree(const model::Mesh& mesh) {
     RTCGeometry geometry = rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* p = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, mesh.positions.size()));
-    auto* t = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, mesh.triangles.size()));
+    auto* p = static_cast<float*>(rtcSetNewGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, mesh.positions.size()));
+    auto* t = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, mesh.triangles.size()));
     for (const auto& v : mesh.positions) p = std::copy(v.data(), v.data() + 3, p);
     for (const auto& v : mesh.triangles) t = std::copy(v.begin(), v.end(), t);
     rtcCommitGeometry(geometry);
@@ -33,15 +36,18 @@ class BareEmbree {
       scene::Packet packet;
       const size_t last = packets ? std::min(rays.size(), first + scene::kLanes) : first + 1;
       for (size_t i = first; i < last; ++i) {
-        packet.add(static_cast<int>(i - first), rays[i].origin, rays[i].direction, 0.0, rays[i].max_range);
+        packet.add(static_cast<int>(i - first), rays[i].origin, rays[i].direction, 0.0,
+                   rays[i].max_range);
       }
       if (packets) {
         scene::intersect(scene_.get(), context, packet.valid, packet.rays);
-        for (size_t i = first; i < last; ++i) ranges[i] = static_cast<double>(packet.rays.ray.tfar[i - first]);
+        for (size_t i = first; i < last; ++i)
+          ranges[i] = static_cast<double>(packet.rays.ray.tfar[i - first]);
       } else {
         const RTCRay8& r = packet.rays.ray;
         RTCRayHit one;
-        one.ray = {r.org_x[0], r.org_y[0], r.org_z[0], 0, r.dir_x[0], r.dir_y[0], r.dir_z[0], 0, r.tfar[0], ~0u, 0, 0};
+        one.ray = {r.org_x[0], r.org_y[0], r.org_z[0], 0,   r.dir_x[0], r.dir_y[0],
+                   r.dir_z[0], 0,          r.tfar[0],  ~0u, 0,          0};
         one.hit.geomID = RTC_INVALID_GEOMETRY_ID;
         scene::intersect(scene_.get(), context, one);
         ranges[first] = static_cast<double>(one.ray.tfar);

@@ -1,6 +1,6 @@
-// ruedo bench: what this machine does. Robots against real time, each with an LRF, sixteen sonars and odometry in rooms
-// with contacts; the same with the messages on LCM; cameras; the latency of commands and the pacing of the loop; rays.
-// docs/performance.md says what the figures mean.
+// ruedo bench: what this machine does. Robots against real time, each with an LRF, sixteen sonars
+// and odometry in rooms with contacts; the same with the messages on LCM; cameras; the latency of
+// commands and the pacing of the loop; rays. docs/performance.md says what the figures mean.
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -37,7 +37,9 @@ struct BenchArguments {
 };
 
 bool is_run(const BenchArguments& arguments, Table table) {
-  if (!arguments.only.empty()) return std::find(arguments.only.begin(), arguments.only.end(), name_of(table)) != arguments.only.end();
+  if (!arguments.only.empty())
+    return std::find(arguments.only.begin(), arguments.only.end(), name_of(table)) !=
+           arguments.only.end();
   if (table == Table::robots) return arguments.lcm.empty() || arguments.robots.empty();
   if (table == Table::lcm) return !arguments.lcm.empty() || arguments.robots.empty();
   return arguments.robots.empty();
@@ -48,7 +50,8 @@ std::vector<BenchTask> tasks_of(const BenchArguments& arguments) {
   std::vector<BenchTask> tasks;
   const auto add = [&](Table table, std::vector<int> by_default) {
     if (!is_run(arguments, table)) return;
-    for (const int robots : table != Table::latency && !arguments.robots.empty() ? arguments.robots : by_default) {
+    for (const int robots :
+         table != Table::latency && !arguments.robots.empty() ? arguments.robots : by_default) {
       tasks.push_back({table, robots, arguments.duration_s, arguments.threads, url});
     }
   };
@@ -66,7 +69,9 @@ std::string heading_of(Table table) {
     case Table::lcm: return "Robots, messages on LCM";
     case Table::camera: return "Robots with a camera each, 640 x 480 at 15 Hz";
     case Table::latency: return "One robot at --rate 1, step 5 ms, over LCM";
-    case Table::rays: return "Rays on one core: scans of 181, 8 m, in the rooms of so many robots; bare Embree in the same run";
+    case Table::rays:
+      return "Rays on one core: scans of 181, 8 m, in the rooms of so many robots; bare Embree in "
+             "the same run";
   }
   return "";
 }
@@ -74,12 +79,15 @@ std::string heading_of(Table table) {
 void print_head(Table table) {
   fmt::print("{}\n", heading_of(table));
   if (table == Table::latency) {
-    fmt::print("  {:<42} {:>7} {:>10} {:>10} {:>10}\n", "", "count", "median ms", "99 % ms", "largest");
+    fmt::print("  {:<42} {:>7} {:>10} {:>10} {:>10}\n", "", "count", "median ms", "99 % ms",
+               "largest");
   } else if (table == Table::rays) {
-    fmt::print("  {:>7} {:>14} {:>14} {:>9} {:>14}\n", "robots", "million rays/s", "bare Embree", "ratio", "difference m");
+    fmt::print("  {:>7} {:>14} {:>14} {:>9} {:>14}\n", "robots", "million rays/s", "bare Embree",
+               "ratio", "difference m");
   } else {
-    fmt::print("  {:>7} {:>12} {:>9} {:>9} {:>9} {:>11} {:>10} {:>9}\n", "robots", "x real time", "sim s", "wall s", "CPU s",
-               table == Table::camera ? "pictures/s" : "messages/s", "loading s", "memory");
+    fmt::print("  {:>7} {:>12} {:>9} {:>9} {:>9} {:>11} {:>10} {:>9}\n", "robots", "x real time",
+               "sim s", "wall s", "CPU s", table == Table::camera ? "pictures/s" : "messages/s",
+               "loading s", "memory");
   }
 }
 
@@ -87,17 +95,21 @@ void print_row(Table table, const std::string& row) {
   const auto value = [&](const char* key) { return value_of(row, key); };
   if (table == Table::latency) {
     const size_t from = row.find("\"what\": \"") + 9;
-    fmt::print("  {:<42} {:>7.0f} {:>10.3g} {:>10.3g} {:>10.3g}\n", row.substr(from, row.find('"', from) - from), value("count"), value("median_ms"),
+    fmt::print("  {:<42} {:>7.0f} {:>10.3g} {:>10.3g} {:>10.3g}\n",
+               row.substr(from, row.find('"', from) - from), value("count"), value("median_ms"),
                value("p99_ms"), value("max_ms"));
     if (value("lost") > 0) fmt::print("  {:.0f} of them were lost\n", value("lost"));
   } else if (table == Table::rays) {
-    fmt::print("  {:>7.0f} {:>14.3g} {:>14.3g} {:>9.3g} {:>14.2g}\n", value("robots"), 1e-6 * value("rays_per_s"), 1e-6 * value("embree_rays_per_s"),
+    fmt::print("  {:>7.0f} {:>14.3g} {:>14.3g} {:>9.3g} {:>14.2g}\n", value("robots"),
+               1e-6 * value("rays_per_s"), 1e-6 * value("embree_rays_per_s"),
                value("ratio_to_embree"), value("largest_difference_m"));
   } else {
-    fmt::print("  {:>7.0f} {:>12.4g} {:>9.4g} {:>9.3g} {:>9.3g} {:>11.4g} {:>10.3g} {:>6.0f} MB\n", value("robots"), value("real_time_factor"),
-               value("sim_s"), value("wall_s"), value("cpu_s"),
-               table == Table::camera ? value("pictures_per_s") : value("messages_per_sim_s") * value("real_time_factor"), value("load_s"),
-               value("memory_mb"));
+    fmt::print("  {:>7.0f} {:>12.4g} {:>9.4g} {:>9.3g} {:>9.3g} {:>11.4g} {:>10.3g} {:>6.0f} MB\n",
+               value("robots"), value("real_time_factor"), value("sim_s"), value("wall_s"),
+               value("cpu_s"),
+               table == Table::camera ? value("pictures_per_s")
+                                      : value("messages_per_sim_s") * value("real_time_factor"),
+               value("load_s"), value("memory_mb"));
   }
   std::fflush(stdout);
 }
@@ -110,8 +122,9 @@ void show_progress(size_t done, const std::vector<BenchTask>& tasks) {
     const BenchTask& task = tasks[done];
     constexpr size_t kWidth = 24;
     const size_t filled = kWidth * done / tasks.size();
-    fmt::print(stderr, "[{}{}] {} of {}: {}, {} robot{} ...", std::string(filled, '#'), std::string(kWidth - filled, '.'), done + 1, tasks.size(),
-               name_of(task.table), task.robots, task.robots == 1 ? "" : "s");
+    fmt::print(stderr, "[{}{}] {} of {}: {}, {} robot{} ...", std::string(filled, '#'),
+               std::string(kWidth - filled, '.'), done + 1, tasks.size(), name_of(task.table),
+               task.robots, task.robots == 1 ? "" : "s");
   }
   std::fflush(stderr);
 }
@@ -126,7 +139,8 @@ int run_all(const BenchArguments& arguments) {
     std::string fault;
     try {
       rows = measure_apart(tasks[i]);
-    } catch (const EnvironmentError& error) {    // no multicast, say, or no renderer: the other tables are still good
+    } catch (const EnvironmentError&
+                 error) {  // no multicast, say, or no renderer: the other tables are still good
       fault = error.what();
       code = kEnvironment;
     }
@@ -137,8 +151,10 @@ int run_all(const BenchArguments& arguments) {
     }
     if (!fault.empty()) fmt::print(stderr, "{}\n", fault);
     for (const std::string& row : rows) {
-      if (arguments.json) fmt::print("{}\n", row);
-      else print_row(table, row);
+      if (arguments.json)
+        fmt::print("{}\n", row);
+      else
+        print_row(table, row);
     }
     std::fflush(stdout);
   }
@@ -163,20 +179,41 @@ int run_bench(const BenchArguments& arguments) {
 }
 
 void add_bench(CLI::App& app, Action& chosen) {
-  CLI::App* command = app.add_subcommand("bench", "measure this machine: robots against real time, LCM, cameras, latency, rays");
+  CLI::App* command = app.add_subcommand(
+      "bench", "measure this machine: robots against real time, LCM, cameras, latency, rays");
   const auto arguments = std::make_shared<BenchArguments>();
-  command->add_option("--robots", arguments->robots, "how many; several give several rows, of the first table alone (default: all tables, 1 10 100 1000)")
-      ->type_name("N")->check(CLI::Range(1, 100'000));
-  command->add_option("--only", arguments->only, "tables to measure: robots, lcm, camera, latency, rays")
-      ->type_name("TABLE")->check(CLI::IsMember({"robots", "lcm", "camera", "latency", "rays"}));
-  command->add_option("--duration", arguments->duration_s, "simulated seconds (default: by the number of robots)")
-      ->type_name("S")->check(CLI::Range(0.1, 1e6));
-  command->add_option("--threads", arguments->threads, "most threads inside a module (default: one a core)")->type_name("N")->check(CLI::Range(1, 1024));
-  command->add_option("--lcm", arguments->lcm, std::string("LCM address of the tables with LCM (default: ") + kBenchUrl + ")")->type_name("URL");
+  command
+      ->add_option("--robots", arguments->robots,
+                   "how many; several give several rows, of the first table alone (default: all "
+                   "tables, 1 10 100 1000)")
+      ->type_name("N")
+      ->check(CLI::Range(1, 100'000));
+  command
+      ->add_option("--only", arguments->only,
+                   "tables to measure: robots, lcm, camera, latency, rays")
+      ->type_name("TABLE")
+      ->check(CLI::IsMember({"robots", "lcm", "camera", "latency", "rays"}));
+  command
+      ->add_option("--duration", arguments->duration_s,
+                   "simulated seconds (default: by the number of robots)")
+      ->type_name("S")
+      ->check(CLI::Range(0.1, 1e6));
+  command
+      ->add_option("--threads", arguments->threads,
+                   "most threads inside a module (default: one a core)")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1024));
+  command
+      ->add_option("--lcm", arguments->lcm,
+                   std::string("LCM address of the tables with LCM (default: ") + kBenchUrl + ")")
+      ->type_name("URL");
   command->add_flag("--json", arguments->json, "a JSON object a line");
-  command->add_option("--write-world", arguments->write_world, "write the world instead of running it")->type_name("FILE");
+  command
+      ->add_option("--write-world", arguments->write_world, "write the world instead of running it")
+      ->type_name("FILE");
   command->add_flag("--one", arguments->one, "one row, in this process")->group("");
-  command->callback([arguments, &chosen] { chosen = [arguments] { return run_bench(*arguments); }; });
+  command->callback(
+      [arguments, &chosen] { chosen = [arguments] { return run_bench(*arguments); }; });
 }
 
 const RegisterCommand kRegister{80, add_bench};
@@ -185,9 +222,11 @@ const RegisterCommand kRegister{80, add_bench};
 
 // The row's lines come back through a pipe; what goes wrong is said on stderr by the child.
 std::vector<std::string> measure_apart(const BenchTask& task) {
-  std::vector<std::string> words{"/proc/self/exe", "bench", "--one", "--only", name_of(task.table), "--lcm", task.lcm};
+  std::vector<std::string> words{"/proc/self/exe",    "bench", "--one", "--only",
+                                 name_of(task.table), "--lcm", task.lcm};
   words.insert(words.end(), {"--robots", std::to_string(task.robots)});
-  if (task.duration_s > 0.0) words.insert(words.end(), {"--duration", fmt::format("{}", task.duration_s)});
+  if (task.duration_s > 0.0)
+    words.insert(words.end(), {"--duration", fmt::format("{}", task.duration_s)});
   if (task.threads > 0) words.insert(words.end(), {"--threads", std::to_string(task.threads)});
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
@@ -210,12 +249,14 @@ std::vector<std::string> measure_apart(const BenchTask& task) {
   }
   std::string text;
   char buffer[512];
-  for (ssize_t count = 0; (count = read(ends[0], buffer, sizeof buffer)) > 0;) text.append(buffer, static_cast<size_t>(count));
+  for (ssize_t count = 0; (count = read(ends[0], buffer, sizeof buffer)) > 0;)
+    text.append(buffer, static_cast<size_t>(count));
   close(ends[0]);
   int status = 0;
   waitpid(child, &status, 0);
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0 || text.empty()) {
-    throw EnvironmentError(fmt::format("the measurement '{}' with {} robots did not finish", name_of(task.table), task.robots));
+    throw EnvironmentError(fmt::format("the measurement '{}' with {} robots did not finish",
+                                       name_of(task.table), task.robots));
   }
   std::vector<std::string> rows;
   for (size_t at = 0; at < text.size();) {

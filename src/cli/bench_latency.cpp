@@ -1,5 +1,5 @@
-// How soon a command shows, and how evenly the loop runs: one P3-AT at --rate 1 that reports its motion at every step,
-// and a client in another process, over LCM, as a user's would be.
+// How soon a command shows, and how evenly the loop runs: one P3-AT at --rate 1 that reports its
+// motion at every step, and a client in another process, over LCM, as a user's would be.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -32,7 +32,9 @@ constexpr const char* kWorld = R"(<sdf version="1.9"><world name="latency">
   <include><uri>model://p3at</uri><name>r</name></include></world></sdf>)";
 constexpr auto kLost = std::chrono::seconds(1);
 
-double ms_between(Clock::time_point a, Clock::time_point b) { return std::chrono::duration<double, std::milli>(b - a).count(); }
+double ms_between(Clock::time_point a, Clock::time_point b) {
+  return std::chrono::duration<double, std::milli>(b - a).count();
+}
 
 double quantile(std::vector<double> values, double part) {
   if (values.empty()) return std::nan("");
@@ -40,9 +42,13 @@ double quantile(std::vector<double> values, double part) {
   return values[whole<size_t>(part * static_cast<double>(values.size() - 1))];
 }
 
-std::string row_of(const char* table, const char* what, const std::vector<double>& values_ms, int lost) {
-  return fmt::format("{{\"table\": \"{}\", \"what\": \"{}\", \"count\": {}, \"lost\": {}, \"median_ms\": {:.4g}, \"p99_ms\": {:.4g}, \"max_ms\": {:.4g}}}",
-                     table, what, values_ms.size(), lost, quantile(values_ms, 0.5), quantile(values_ms, 0.99), quantile(values_ms, 1.0));
+std::string row_of(const char* table, const char* what, const std::vector<double>& values_ms,
+                   int lost) {
+  return fmt::format(
+      "{{\"table\": \"{}\", \"what\": \"{}\", \"count\": {}, \"lost\": {}, \"median_ms\": {:.4g}, "
+      "\"p99_ms\": {:.4g}, \"max_ms\": {:.4g}}}",
+      table, what, values_ms.size(), lost, quantile(values_ms, 0.5), quantile(values_ms, 0.99),
+      quantile(values_ms, 1.0));
 }
 
 // Notes when the motion of each step goes out.
@@ -56,15 +62,18 @@ class TimedBus : public Bus {
     motion.decode(data, 0, static_cast<int>(size));
     times_.push_back({motion.utime, Clock::now()});
   }
-  void listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own) override {
+  void listen(const std::vector<std::string>& channels, Handler handler,
+              const std::vector<std::string>& own) override {
     bus_.listen(channels, std::move(handler), own);
   }
   void stop() override { bus_.stop(); }
 
-  // How late each step is against the earliest one: the pacing is k steps after k steps' time, so this does not add up.
+  // How late each step is against the earliest one: the pacing is k steps after k steps' time, so
+  // this does not add up.
   std::vector<double> lateness_ms() const {
     std::vector<double> late;
-    for (const Sent& sent : times_) late.push_back(ms_between(times_[0].at, sent.at) - 1e-3 * static_cast<double>(sent.utime));
+    for (const Sent& sent : times_)
+      late.push_back(ms_between(times_[0].at, sent.at) - 1e-3 * static_cast<double>(sent.utime));
     const double first = late.empty() ? 0.0 : *std::min_element(late.begin(), late.end());
     for (double& each : late) each -= first;
     return late;
@@ -79,7 +88,8 @@ class TimedBus : public Bus {
   std::vector<Sent> times_;
 };
 
-// Sends primitives at times that fall anywhere within a step; the first r/motion with a command's id is its effect.
+// Sends primitives at times that fall anywhere within a step; the first r/motion with a command's
+// id is its effect.
 class Client {
  public:
   explicit Client(const std::string& url) : bus_(url) {
@@ -94,9 +104,10 @@ class Client {
     });
   }
 
-  // angle_rad: of the turns; small ones are over when the next command comes, large ones are replaced by it.
+  // angle_rad: of the turns; small ones are over when the next command comes, large ones are
+  // replaced by it.
   std::string run(const char* what, double angle_rad, int commands) {
-    wait_for(-1, kLost);    // until anything was heard
+    wait_for(-1, kLost);  // until anything was heard
     std::vector<double> latency_ms;
     int lost = 0;
     for (int i = 1; i <= commands; ++i) {
@@ -109,8 +120,10 @@ class Client {
       command.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
       const Clock::time_point sent = Clock::now();
       bus_.publish("r/move", bytes.data(), bytes.size());
-      if (wait_for(command.id, kLost)) latency_ms.push_back(ms_between(sent, seen_at_));
-      else ++lost;
+      if (wait_for(command.id, kLost))
+        latency_ms.push_back(ms_between(sent, seen_at_));
+      else
+        ++lost;
     }
     return row_of("latency", what, latency_ms, lost);
   }
@@ -136,12 +149,14 @@ int run_client(const std::string& url, int commands, int pipe) {
     rows += client.run("command that replaces a running one", 3.0, commands) + "\n";
     return write(pipe, rows.data(), rows.size()) == static_cast<ssize_t>(rows.size()) ? 0 : 1;
   } catch (const std::exception&) {
-    return 1;    // the server's own LcmBus says what is wrong
+    return 1;  // the server's own LcmBus says what is wrong
   }
 }
 
-std::shared_ptr<const model::WorldModel> world_with_reports_at_every_step(const model::LoadOptions& options) {
-  const auto world = std::make_shared<model::WorldModel>(*model::load_world_text(kWorld, "latency.sdf", options));
+std::shared_ptr<const model::WorldModel> world_with_reports_at_every_step(
+    const model::LoadOptions& options) {
+  const auto world =
+      std::make_shared<model::WorldModel>(*model::load_world_text(kWorld, "latency.sdf", options));
   for (model::ModelInstance& instance : world->models) {
     if (!instance.model->drive) continue;
     auto changed = std::make_shared<model::Model>(*instance.model);
@@ -154,7 +169,8 @@ std::shared_ptr<const model::WorldModel> world_with_reports_at_every_step(const 
 }  // namespace
 
 std::vector<std::string> measure_latency(const BenchTask& task) {
-  const int commands = std::max(10, whole<int>((task.duration_s > 0.0 ? task.duration_s : 15.0) / 0.05));
+  const int commands =
+      std::max(10, whole<int>((task.duration_s > 0.0 ? task.duration_s : 15.0) / 0.05));
   int ends[2];
   if (pipe(ends) != 0) throw EnvironmentError("no pipe could be made");
   const pid_t client = fork();
@@ -174,14 +190,16 @@ std::vector<std::string> measure_latency(const BenchTask& task) {
   int status = 0;
   std::thread ender([&] {
     char buffer[512];
-    for (ssize_t count = 0; (count = read(ends[0], buffer, sizeof buffer)) > 0;) text.append(buffer, static_cast<size_t>(count));
+    for (ssize_t count = 0; (count = read(ends[0], buffer, sizeof buffer)) > 0;)
+      text.append(buffer, static_cast<size_t>(count));
     waitpid(client, &status, 0);
     server.stop();
   });
   server.run();
   ender.join();
   close(ends[0]);
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) throw EnvironmentError("the benchmark's client did not finish");
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
+    throw EnvironmentError("the benchmark's client did not finish");
   std::vector<std::string> rows;
   for (size_t at = 0; at < text.size();) {
     const size_t end = text.find('\n', at);

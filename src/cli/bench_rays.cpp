@@ -1,4 +1,5 @@
-// Rays alone: scans in the benchmark's rooms by Ruedo's caster and by bare Embree, in turn, on one core.
+// Rays alone: scans in the benchmark's rooms by Ruedo's caster and by bare Embree, in turn, on one
+// core.
 #include <algorithm>
 #include <cmath>
 #include <ctime>
@@ -16,7 +17,7 @@
 namespace ruedo::cli {
 namespace {
 
-constexpr int kRays = 181;           // of a scan of 180 degrees
+constexpr int kRays = 181;  // of a scan of 180 degrees
 constexpr double kMaxRange_m = 8.0, kHeight_m = 0.3;
 constexpr int kFewestScans = 200, kRounds = 15;
 
@@ -25,14 +26,19 @@ model::Mesh triangles_of(const model::WorldModel& world, const model::BodyLayout
   model::Mesh mesh;
   for (const model::LinkPlacement& placement : layout.links) {
     const model::ModelInstance& instance = world.models[static_cast<size_t>(placement.instance)];
-    for (const model::Collision& collision : instance.model->links[static_cast<size_t>(placement.link)].collisions) {
+    for (const model::Collision& collision :
+         instance.model->links[static_cast<size_t>(placement.link)].collisions) {
       if (collision.geometry.shape != model::Shape::box) continue;
       const auto first = static_cast<uint32_t>(mesh.positions.size());
       for (int corner = 0; corner < 8; ++corner) {
-        const Vec3 sign((corner & 1) != 0 ? 0.5 : -0.5, (corner & 2) != 0 ? 0.5 : -0.5, (corner & 4) != 0 ? 0.5 : -0.5);
-        mesh.positions.push_back((placement.X_BL * (collision.X_LC * collision.geometry.size.cwiseProduct(sign))).cast<float>());
+        const Vec3 sign((corner & 1) != 0 ? 0.5 : -0.5, (corner & 2) != 0 ? 0.5 : -0.5,
+                        (corner & 4) != 0 ? 0.5 : -0.5);
+        mesh.positions.push_back(
+            (placement.X_BL * (collision.X_LC * collision.geometry.size.cwiseProduct(sign)))
+                .cast<float>());
       }
-      for (const uint32_t bit : {1U, 2U, 4U}) {    // the axis of a pair of faces; the other two span them
+      for (const uint32_t bit :
+           {1U, 2U, 4U}) {  // the axis of a pair of faces; the other two span them
         const uint32_t u = bit == 1U ? 2U : 1U, v = 7U - bit - u;
         for (const uint32_t side : {0U, bit}) {
           const uint32_t a = first + side;
@@ -53,7 +59,8 @@ std::vector<scene::Ray> scans(int robots) {
   for (int scan = 0; scan < std::max(kFewestScans, robots); ++scan) {
     const int room = scan % rooms;
     const double place = 2.0 * M_PI * random.uniform(), heading = 2.0 * M_PI * random.uniform();
-    const Vec3 at((room % side + 0.5) * kRoomSize_m + math::cos(place), (room / side + 0.5) * kRoomSize_m + math::sin(place), kHeight_m);
+    const Vec3 at((room % side + 0.5) * kRoomSize_m + math::cos(place),
+                  (room / side + 0.5) * kRoomSize_m + math::sin(place), kHeight_m);
     for (int i = 0; i < kRays; ++i) {
       const double angle = heading + (i - kRays / 2) * M_PI / 180.0;
       rays.push_back({at, Vec3(math::cos(angle), math::sin(angle), 0.0), kMaxRange_m});
@@ -70,7 +77,8 @@ double cpu_time_s() {
 }
 
 double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
+                   values.end());
   return values[values.size() / 2];
 }
 
@@ -78,7 +86,8 @@ double median(std::vector<double> values) {
 
 std::vector<std::string> measure_rays(const BenchTask& task) {
   model::WorldModel rooms = *model::load_world_text(bench_world(task.robots), "rooms.sdf", {});
-  std::erase_if(rooms.models, [](const model::ModelInstance& instance) { return !instance.model->is_static; });
+  std::erase_if(rooms.models,
+                [](const model::ModelInstance& instance) { return !instance.model->is_static; });
   const model::BodyLayout layout(rooms);
   const auto ours = scene::make_ray_scene(scene::make_static_ray_scene(rooms, layout));
   const BareEmbree bare(triangles_of(rooms, layout));
@@ -87,18 +96,23 @@ std::vector<std::string> measure_rays(const BenchTask& task) {
   std::vector<double> ranges(rays.size()), our_s, bare_s;
   for (int round = 0; round < kRounds; ++round) {
     const double begin = cpu_time_s();
-    for (size_t i = 0; i < rays.size(); i += kRays) ours->cast(std::span(&rays[i], kRays), std::span(&hits[i], kRays));
+    for (size_t i = 0; i < rays.size(); i += kRays)
+      ours->cast(std::span(&rays[i], kRays), std::span(&hits[i], kRays));
     const double middle = cpu_time_s();
     bare.cast(rays, ranges, true);
     our_s.push_back(middle - begin);
     bare_s.push_back(cpu_time_s() - middle);
   }
   double largest = 0.0;
-  for (size_t i = 0; i < rays.size(); ++i) largest = std::max(largest, std::abs(ranges[i] - std::min(hits[i].range, kMaxRange_m)));
+  for (size_t i = 0; i < rays.size(); ++i)
+    largest = std::max(largest, std::abs(ranges[i] - std::min(hits[i].range, kMaxRange_m)));
   const auto count = static_cast<double>(rays.size());
-  return {fmt::format("{{\"table\": \"rays\", \"robots\": {}, \"rays\": {}, \"rays_per_s\": {:.6g}, \"embree_rays_per_s\": {:.6g}, "
-                      "\"ratio_to_embree\": {:.4g}, \"largest_difference_m\": {:.3g}}}",
-                      task.robots, rays.size(), count / median(our_s), count / median(bare_s), median(our_s) / median(bare_s), largest)};
+  return {
+      fmt::format("{{\"table\": \"rays\", \"robots\": {}, \"rays\": {}, \"rays_per_s\": {:.6g}, "
+                  "\"embree_rays_per_s\": {:.6g}, "
+                  "\"ratio_to_embree\": {:.4g}, \"largest_difference_m\": {:.3g}}}",
+                  task.robots, rays.size(), count / median(our_s), count / median(bare_s),
+                  median(our_s) / median(bare_s), largest)};
 }
 
 }  // namespace ruedo::cli

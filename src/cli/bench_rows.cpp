@@ -13,10 +13,10 @@
 #include "bus/lcm_bus.h"
 #include "cli/bench_world.h"
 #include "core/whole.h"
+#include "engine/thread_limit.h"
 #include "model/load.h"
 #include "ruedo/move_command_t.hpp"
 #include "run/run.h"
-#include "engine/thread_limit.h"
 
 namespace ruedo::cli {
 namespace {
@@ -33,7 +33,8 @@ class CountingBus : public Bus {
     pictures += channel.ends_with("/camera");
     if (bus_) bus_->publish(channel, data, size);
   }
-  void listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own) override {
+  void listen(const std::vector<std::string>& channels, Handler handler,
+              const std::vector<std::string>& own) override {
     if (bus_) bus_->listen(channels, std::move(handler), own);
   }
   void stop() override {
@@ -58,7 +59,9 @@ rusage usage() {
 
 double cpu_seconds() {
   const rusage now = usage();
-  const auto seconds = [](const timeval& time) { return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec); };
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
   return seconds(now.ru_utime) + seconds(now.ru_stime);
 }
 
@@ -76,7 +79,8 @@ std::vector<uint8_t> circle_command() {
 
 // A few seconds of a modern machine.
 double default_duration_s(const BenchTask& task) {
-  return task.table == Table::camera ? 20.0 / task.robots : std::clamp(8000.0 / task.robots, 1.0, 1500.0);
+  return task.table == Table::camera ? 20.0 / task.robots
+                                     : std::clamp(8000.0 / task.robots, 1.0, 1500.0);
 }
 
 }  // namespace
@@ -96,7 +100,8 @@ std::vector<std::string> measure(const BenchTask& task) {
   model::LoadOptions load_options;
   run::RunOptions options;
   if (task.table != Table::camera) {
-    for (int robot = 0; robot < task.robots; ++robot) load_options.disabled.push_back(fmt::format("r{}/camera", robot));
+    for (int robot = 0; robot < task.robots; ++robot)
+      load_options.disabled.push_back(fmt::format("r{}/camera", robot));
   }
   options.simulation.fleet.disabled = load_options.disabled;
   options.rate = std::numeric_limits<double>::infinity();
@@ -108,19 +113,23 @@ std::vector<std::string> measure(const BenchTask& task) {
   CountingBus sink(lcm.get());
   run::Run server(world, std::move(options), sink);
   const std::vector<uint8_t> circle = circle_command();
-  for (int robot = 0; robot < task.robots; ++robot) server.receive(fmt::format("r{}/move", robot), circle);
+  for (int robot = 0; robot < task.robots; ++robot)
+    server.receive(fmt::format("r{}/move", robot), circle);
   const double load_s = seconds_since(load_begin);
 
   const double cpu_begin = cpu_seconds();
   const auto begin = std::chrono::steady_clock::now();
   server.run();
   const double wall_s = seconds_since(begin), cpu_s = cpu_seconds() - cpu_begin;
-  return {fmt::format("{{\"table\": \"{}\", \"simulator\": \"Ruedo\", \"robots\": {}, \"real_time_factor\": {:.6g}, \"sim_s\": {:.6g}, "
-                      "\"wall_s\": {:.6g}, \"cpu_s\": {:.6g}, \"load_s\": {:.6g}, \"memory_mb\": {:.6g}, \"step_ms\": 5, "
-                      "\"messages_per_sim_s\": {:.6g}, \"bytes_per_sim_s\": {:.6g}, \"pictures_per_s\": {:.6g}}}",
-                      name_of(task.table), task.robots, sim_s / wall_s, sim_s, wall_s, cpu_s, load_s,
-                      static_cast<double>(usage().ru_maxrss) / 1024.0, static_cast<double>(sink.messages) / sim_s,
-                      static_cast<double>(sink.bytes) / sim_s, static_cast<double>(sink.pictures) / wall_s)};
+  return {fmt::format(
+      "{{\"table\": \"{}\", \"simulator\": \"Ruedo\", \"robots\": {}, \"real_time_factor\": "
+      "{:.6g}, \"sim_s\": {:.6g}, "
+      "\"wall_s\": {:.6g}, \"cpu_s\": {:.6g}, \"load_s\": {:.6g}, \"memory_mb\": {:.6g}, "
+      "\"step_ms\": 5, "
+      "\"messages_per_sim_s\": {:.6g}, \"bytes_per_sim_s\": {:.6g}, \"pictures_per_s\": {:.6g}}}",
+      name_of(task.table), task.robots, sim_s / wall_s, sim_s, wall_s, cpu_s, load_s,
+      static_cast<double>(usage().ru_maxrss) / 1024.0, static_cast<double>(sink.messages) / sim_s,
+      static_cast<double>(sink.bytes) / sim_s, static_cast<double>(sink.pictures) / wall_s)};
 }
 
 double value_of(const std::string& row, const std::string& key) {

@@ -1,4 +1,5 @@
-// Writes the benchmark's world as SDF, so that every simulator of the comparison gets the same walls and robots.
+// Writes the benchmark's world as SDF, so that every simulator of the comparison gets the same
+// walls and robots.
 #include "cli/bench_world.h"
 
 #include <cmath>
@@ -22,11 +23,14 @@ class Walls {
     const double length_x = std::abs(x1 - x0) + (y0 == y1 ? 0.0 : kWallThickness_m);
     const double length_y = std::abs(y1 - y0) + (x0 == x1 ? 0.0 : kWallThickness_m);
     const std::string geometry =
-        fmt::format("<geometry><box><size>{:.3f} {:.3f} {:.3f}</size></box></geometry>", length_x, length_y, kWallHeight_m);
-    const std::string pose =
-        fmt::format("<pose>{:.3f} {:.3f} {:.3f} 0 0 0</pose>", (x0 + x1) / 2, (y0 + y1) / 2, kWallHeight_m / 2);
-    sdf_ += fmt::format("        <collision name=\"c{0}\">{1}{2}</collision>\n        <visual name=\"v{0}\">{1}{2}</visual>\n", count_++,
-                        pose, geometry);
+        fmt::format("<geometry><box><size>{:.3f} {:.3f} {:.3f}</size></box></geometry>", length_x,
+                    length_y, kWallHeight_m);
+    const std::string pose = fmt::format("<pose>{:.3f} {:.3f} {:.3f} 0 0 0</pose>", (x0 + x1) / 2,
+                                         (y0 + y1) / 2, kWallHeight_m / 2);
+    sdf_ += fmt::format(
+        "        <collision name=\"c{0}\">{1}{2}</collision>\n        <visual "
+        "name=\"v{0}\">{1}{2}</visual>\n",
+        count_++, pose, geometry);
   }
   const std::string& sdf() const { return sdf_; }
 
@@ -81,8 +85,10 @@ std::string bench_world(int robots) {
   for (int robot = 0; robot < robots; ++robot) {
     const double x = (robot % side + 0.5) * kRoomSize_m + kCircleRadius_m;
     const double y = (robot / side + 0.5) * kRoomSize_m;
-    sdf += fmt::format("    <include><uri>model://p3at</uri><name>r{}</name><pose>{:.3f} {:.3f} 0 0 0 1.5707963267948966</pose></include>\n",
-                       robot, x, y);
+    sdf += fmt::format(
+        "    <include><uri>model://p3at</uri><name>r{}</name><pose>{:.3f} {:.3f} 0 0 0 "
+        "1.5707963267948966</pose></include>\n",
+        robot, x, y);
   }
   return sdf + "  </world>\n</sdf>\n";
 }

@@ -29,8 +29,11 @@ void check_textures(const model::WorldModel& world, std::vector<Finding>& findin
     const model::Texture* texture = material.texture.get();
     if (!texture || !seen.insert(texture->path.empty() ? owner : texture->path).second) return;
     if (scene::decode_texture(*texture).width > 0) return;
-    findings.push_back({Finding::Kind::unsupported, {texture->path.empty() ? owner : texture->path, 0}, "",
-                        "the texture is no picture that can be read; the plain colour is shown instead"});
+    findings.push_back(
+        {Finding::Kind::unsupported,
+         {texture->path.empty() ? owner : texture->path, 0},
+         "",
+         "the texture is no picture that can be read; the plain colour is shown instead"});
   };
   for (const model::ModelInstance& instance : world.models) {
     for (const model::Link& link : instance.model->links) {
@@ -52,18 +55,21 @@ std::vector<Finding> find_all(const CheckArguments& arguments, bool& loaded) {
     const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
     findings = world->findings;
     check_textures(*world, findings);
-    // All that `ruedo run` makes before it starts; but it stops at the first device that cannot be made.
+    // All that `ruedo run` makes before it starts; but it stops at the first device that cannot be
+    // made.
     engine::Channels channels;
     Findings of_run;
     engine::FleetOptions options;
     options.disabled = arguments.world.disabled;
     options.keep_going = true;
     const engine::World made(world, options, channels, of_run);
-    const auto is_error = [](const Finding& finding) { return finding.kind == Finding::Kind::error; };
+    const auto is_error = [](const Finding& finding) {
+      return finding.kind == Finding::Kind::error;
+    };
     loaded = std::none_of(of_run.list().begin(), of_run.list().end(), is_error);
     findings.insert(findings.end(), of_run.list().begin(), of_run.list().end());
   } catch (const InputError& error) {
-    if (error.source().file.empty()) throw;    // wrong usage
+    if (error.source().file.empty()) throw;  // wrong usage
     findings.push_back({Finding::Kind::error, error.source(), "", error.message()});
   }
   return findings;
@@ -73,7 +79,10 @@ void print_json(const std::vector<Finding>& findings) {
   JsonWriter json;
   json.open('[');
   for (const Finding& finding : findings) {
-    json.open('{').member("kind", kind_name(finding.kind)).member("file", finding.source.file).member("line", finding.source.line);
+    json.open('{')
+        .member("kind", kind_name(finding.kind))
+        .member("file", finding.source.file)
+        .member("line", finding.source.line);
     json.member("element", finding.element).member("text", finding.text).close('}');
   }
   fmt::print("{}\n", json.close(']').text());
@@ -81,13 +90,18 @@ void print_json(const std::vector<Finding>& findings) {
 
 void print_text(const std::vector<Finding>& findings) {
   const Style style = style_of(stdout);
-  for (const Finding::Kind kind : {Finding::Kind::error, Finding::Kind::unsupported, Finding::Kind::repaired}) {
+  for (const Finding::Kind kind :
+       {Finding::Kind::error, Finding::Kind::unsupported, Finding::Kind::repaired}) {
     for (const FindingGroup& group : group(findings)) {
       if (group.kind != kind) continue;
-      const char* colour = kind == Finding::Kind::error ? style.red : kind == Finding::Kind::unsupported ? style.yellow : style.cyan;
-      fmt::print("{}{}{}{}: {}\n", style.bold, colour, kind_name(kind), style.off, for_terminal(group.text));
+      const char* colour = kind == Finding::Kind::error         ? style.red
+                           : kind == Finding::Kind::unsupported ? style.yellow
+                                                                : style.cyan;
+      fmt::print("{}{}{}{}: {}\n", style.bold, colour, kind_name(kind), style.off,
+                 for_terminal(group.text));
       for (const Finding* place : group.places) {
-        fmt::print("    {}{}{}{}\n", for_terminal(place->source.str()), style.dim, place->element.empty() ? "" : "  " + for_terminal(place->element), style.off);
+        fmt::print("    {}{}{}{}\n", for_terminal(place->source.str()), style.dim,
+                   place->element.empty() ? "" : "  " + for_terminal(place->element), style.off);
       }
     }
   }
@@ -107,7 +121,9 @@ int check(const CheckArguments& arguments) {
     const Style style = style_of(stdout);
     fmt::print("{}{}: {}{}\n", findings.empty() ? style.green : style.bold, arguments.world.world,
                findings.empty() ? "good"
-                                : fmt::format("{}, {} not supported, {} repaired", counted(static_cast<size_t>(errors), "error"), counts[static_cast<int>(Finding::Kind::unsupported)],
+                                : fmt::format("{}, {} not supported, {} repaired",
+                                              counted(static_cast<size_t>(errors), "error"),
+                                              counts[static_cast<int>(Finding::Kind::unsupported)],
                                               counts[static_cast<int>(Finding::Kind::repaired)]),
                style.off);
   }
@@ -116,11 +132,13 @@ int check(const CheckArguments& arguments) {
 }
 
 void add_check(CLI::App& app, Action& chosen) {
-  CLI::App* command = app.add_subcommand("check", "name everything wrong or unsupported in a world file, with file and line");
+  CLI::App* command = app.add_subcommand(
+      "check", "name everything wrong or unsupported in a world file, with file and line");
   const auto arguments = std::make_shared<CheckArguments>();
   add_world_arguments(*command, arguments->world);
   command->add_flag("--json", arguments->json, "print a JSON list");
-  command->add_flag("--strict", arguments->strict, "what is repaired or not supported fails the check too");
+  command->add_flag("--strict", arguments->strict,
+                    "what is repaired or not supported fails the check too");
   add_sandbox_argument(*command, arguments->sandboxed);
   command->callback([arguments, &chosen] { chosen = [arguments] { return check(*arguments); }; });
 }

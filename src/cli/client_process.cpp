@@ -21,7 +21,8 @@ constexpr auto kLook = std::chrono::milliseconds(5);
 
 }  // namespace
 
-ClientProcess::ClientProcess(const std::string& command, const std::vector<std::string>& variables, std::function<void()> ended) {
+ClientProcess::ClientProcess(const std::string& command, const std::vector<std::string>& variables,
+                             std::function<void()> ended) {
   std::vector<std::string> environment = variables;
   for (char** variable = environ; *variable; ++variable) {
     const std::string name = std::string(*variable).substr(0, std::strcspn(*variable, "=") + 1);
@@ -34,8 +35,9 @@ ClientProcess::ClientProcess(const std::string& command, const std::vector<std::
   pointers.push_back(nullptr);
   const pid_t parent = ::getpid();
   pid_ = ::fork();
-  if (pid_ < 0) throw EnvironmentError("'" + command + "' cannot be started: " + std::strerror(errno));
-  if (pid_ == 0) {    // only what is safe after fork in a program with threads
+  if (pid_ < 0)
+    throw EnvironmentError("'" + command + "' cannot be started: " + std::strerror(errno));
+  if (pid_ == 0) {  // only what is safe after fork in a program with threads
     sigset_t none;
     sigemptyset(&none);
     ::sigprocmask(SIG_SETMASK, &none, nullptr);
@@ -47,7 +49,8 @@ ClientProcess::ClientProcess(const std::string& command, const std::vector<std::
   }
   waiter_ = std::thread([this, ended = std::move(ended)] {
     siginfo_t info;
-    while (::waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOWAIT) != 0 && errno == EINTR) {
+    while (::waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOWAIT) != 0 &&
+           errno == EINTR) {
     }
     over_ = true;
     ended();
@@ -61,8 +64,10 @@ bool ClientProcess::end() {
   const bool by_itself = over_;
   const auto begin = std::chrono::steady_clock::now();
   if (!over_) ::kill(-pid_, SIGTERM);
-  while (!over_ && std::chrono::steady_clock::now() < begin + kPatience) std::this_thread::sleep_for(kLook);
-  ::kill(-pid_, SIGKILL);    // and what it left behind; its own number is not free before it is waited for
+  while (!over_ && std::chrono::steady_clock::now() < begin + kPatience)
+    std::this_thread::sleep_for(kLook);
+  ::kill(-pid_,
+         SIGKILL);  // and what it left behind; its own number is not free before it is waited for
   waiter_.join();
   ::waitpid(pid_, &status_, 0);
   pid_ = -1;

@@ -1,5 +1,5 @@
-// A command line of the user's, run beside a simulation: with LCM_DEFAULT_URL in its environment, in a process group of
-// its own, and ended with this program, however that ends.
+// A command line of the user's, run beside a simulation: with LCM_DEFAULT_URL in its environment,
+// in a process group of its own, and ended with this program, however that ends.
 #pragma once
 
 #include <atomic>
@@ -15,18 +15,22 @@ namespace ruedo::cli {
 
 class ClientProcess {
  public:
-  // Runs `command` by the shell, with the variables ("NAME=VALUE") added to the environment. `ended` is called, from a
-  // thread of its own, when it ends. Throws EnvironmentError when there are no processes.
-  ClientProcess(const std::string& command, const std::vector<std::string>& variables, std::function<void()> ended);
+  // Runs `command` by the shell, with the variables ("NAME=VALUE") added to the environment.
+  // `ended` is called, from a thread of its own, when it ends. Throws EnvironmentError when there
+  // are no processes.
+  ClientProcess(const std::string& command, const std::vector<std::string>& variables,
+                std::function<void()> ended);
   ~ClientProcess();
 
-  // Asks it to end, and ends it when it has not after some seconds. True when it had ended by itself before.
+  // Asks it to end, and ends it when it has not after some seconds. True when it had ended by
+  // itself before.
   bool end();
 
   // Waits until it has ended by itself.
   void wait();
 
-  // What is wrong with how it ended: "exit code 3", "signal 11"; "" for exit code 0. After end() or wait().
+  // What is wrong with how it ended: "exit code 3", "signal 11"; "" for exit code 0. After end() or
+  // wait().
   std::string fault() const;
 
  private:

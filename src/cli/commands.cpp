@@ -32,26 +32,49 @@ RegisterCommand::RegisterCommand(int order, Add add) { commands().emplace_back(o
 
 std::vector<RegisterCommand::Add> registered_commands() {
   auto sorted = commands();
-  std::sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::sort(sorted.begin(), sorted.end(),
+            [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<RegisterCommand::Add> list;
   for (const auto& [order, add] : sorted) list.push_back(add);
   return list;
 }
 
 void add_world_arguments(CLI::App& command, WorldArguments& arguments) {
-  command.add_option("WORLD", arguments.world, "SDF world or model, or URDF robot (xacro, too)")->required();
-  command.add_option("--spawn", arguments.spawns, "place a model on the ground: MODEL[:NAME]@X,Y[,YAW] (m, rad); a file, or one of ours (p3at)")
-      ->type_name("SPAWN")->allow_extra_args(false);
-  command.add_option("--drive", arguments.drives, "give a model a drive by its wheel joints: ROBOT=LEFT[+LEFT...],RIGHT[+RIGHT...]")
-      ->type_name("DRIVE")->allow_extra_args(false);
-  command.add_option("--set", arguments.settings, "change a device: ROBOT/DEVICE.KEY=VALUE")->type_name("SETTING")->allow_extra_args(false);
-  command.add_option("--disable", arguments.disabled, "leave a device out: ROBOT/DEVICE")->type_name("DEVICE")->allow_extra_args(false);
-  command.add_option("--xacro-arg", arguments.xacro_arguments, "an argument of a xacro file: NAME:=VALUE")->type_name("ARGUMENT")->allow_extra_args(false);
-  command.add_option("--fault", arguments.faults, "what goes wrong: [ROBOT][/TARGET]:KIND@SECONDS[,for=S][,value=V]... (docs/campaigns.md)")
-      ->type_name("FAULT")->allow_extra_args(false);
+  command.add_option("WORLD", arguments.world, "SDF world or model, or URDF robot (xacro, too)")
+      ->required();
+  command
+      .add_option("--spawn", arguments.spawns,
+                  "place a model on the ground: MODEL[:NAME]@X,Y[,YAW] (m, rad); a file, or one of "
+                  "ours (p3at)")
+      ->type_name("SPAWN")
+      ->allow_extra_args(false);
+  command
+      .add_option("--drive", arguments.drives,
+                  "give a model a drive by its wheel joints: ROBOT=LEFT[+LEFT...],RIGHT[+RIGHT...]")
+      ->type_name("DRIVE")
+      ->allow_extra_args(false);
+  command.add_option("--set", arguments.settings, "change a device: ROBOT/DEVICE.KEY=VALUE")
+      ->type_name("SETTING")
+      ->allow_extra_args(false);
+  command.add_option("--disable", arguments.disabled, "leave a device out: ROBOT/DEVICE")
+      ->type_name("DEVICE")
+      ->allow_extra_args(false);
+  command
+      .add_option("--xacro-arg", arguments.xacro_arguments,
+                  "an argument of a xacro file: NAME:=VALUE")
+      ->type_name("ARGUMENT")
+      ->allow_extra_args(false);
+  command
+      .add_option(
+          "--fault", arguments.faults,
+          "what goes wrong: [ROBOT][/TARGET]:KIND@SECONDS[,for=S][,value=V]... (docs/campaigns.md)")
+      ->type_name("FAULT")
+      ->allow_extra_args(false);
   command.add_flag("--no-noise", arguments.no_noise, "sensors give their ideal values");
-  command.add_flag("--fast-pixels", arguments.fast_pixels, "draw with all that this CPU has: faster, and other last bits on other CPUs");
-  command.add_flag("--allow-absolute", arguments.allow_absolute, "absolute paths in the files may lead out of the folders that are searched");
+  command.add_flag("--fast-pixels", arguments.fast_pixels,
+                   "draw with all that this CPU has: faster, and other last bits on other CPUs");
+  command.add_flag("--allow-absolute", arguments.allow_absolute,
+                   "absolute paths in the files may lead out of the folders that are searched");
 }
 
 std::pair<std::string, std::string> parse_remap(const std::string& text) {
@@ -63,7 +86,8 @@ std::pair<std::string, std::string> parse_remap(const std::string& text) {
 }
 
 run::WaitForOption parse_wait_for(const std::string& text) {
-  const char* allowed = "it looks like CHANNEL@HZ, for example p3at/velocity@10, with a rate above 0";
+  const char* allowed =
+      "it looks like CHANNEL@HZ, for example p3at/velocity@10, with a rate above 0";
   const size_t at = text.rfind('@');
   if (at == std::string::npos || at == 0) refuse_option("--wait-for", text, allowed);
   run::WaitForOption option{text.substr(0, at), {}};
@@ -79,32 +103,41 @@ run::WaitForOption parse_wait_for(const std::string& text) {
 double parse_rate(const std::string& text) {
   double rate = 0.0;
   if (text == "max") return std::numeric_limits<double>::infinity();
-  if (!read_number(text, rate) || rate <= 0.0) refuse_option("--rate", text, "a number above 0 (1 is real time), or max");
+  if (!read_number(text, rate) || rate <= 0.0)
+    refuse_option("--rate", text, "a number above 0 (1 is real time), or max");
   return rate;
 }
 
 int64_t parse_duration_us(const std::string& text) {
   double seconds = 0.0;
-  if (!read_number(text, seconds) || seconds < 0.0 || seconds > 1e9) refuse_option("--duration", text, "seconds of sim time, 0 to 1e9");
+  if (!read_number(text, seconds) || seconds < 0.0 || seconds > 1e9)
+    refuse_option("--duration", text, "seconds of sim time, 0 to 1e9");
   return microseconds(seconds);
 }
 
 model::LoadOptions load_options(const WorldArguments& arguments) {
   model::LoadOptions options;
-  for (const std::string& text : arguments.spawns) options.spawns.push_back(model::parse_spawn(text));
-  for (const std::string& text : arguments.drives) options.drives.push_back(model::parse_drive(text));
+  for (const std::string& text : arguments.spawns)
+    options.spawns.push_back(model::parse_spawn(text));
+  for (const std::string& text : arguments.drives)
+    options.drives.push_back(model::parse_drive(text));
   for (const std::string& text : arguments.xacro_arguments) {
     const size_t sign = text.find(":=");
-    if (sign == std::string::npos || sign == 0) refuse_option("--xacro-arg", text, "it looks like NAME:=VALUE, for example laser_enabled:=true");
+    if (sign == std::string::npos || sign == 0)
+      refuse_option("--xacro-arg", text,
+                    "it looks like NAME:=VALUE, for example laser_enabled:=true");
   }
   options.xacro_arguments = arguments.xacro_arguments;
   options.allow_absolute = arguments.allow_absolute;
-  for (const std::string& text : arguments.settings) options.settings.push_back(model::parse_setting(text));
+  for (const std::string& text : arguments.settings)
+    options.settings.push_back(model::parse_setting(text));
   for (const std::string& text : arguments.disabled) {
-    if (text.find('/') == std::string::npos) refuse_option("--disable", text, "it looks like ROBOT/DEVICE, for example p3at/CAMERA");
+    if (text.find('/') == std::string::npos)
+      refuse_option("--disable", text, "it looks like ROBOT/DEVICE, for example p3at/CAMERA");
   }
   options.disabled = arguments.disabled;
-  for (const std::string& text : arguments.faults) options.faults.push_back(model::parse_fault(text));
+  for (const std::string& text : arguments.faults)
+    options.faults.push_back(model::parse_fault(text));
   return options;
 }
 
@@ -117,7 +150,8 @@ std::vector<std::string> result_options(const WorldArguments& arguments) {
   std::vector<std::string> options;
   for (const std::string& text : arguments.spawns) options.push_back("--spawn=" + text);
   for (const std::string& text : arguments.drives) options.push_back("--drive=" + text);
-  for (const std::string& text : arguments.xacro_arguments) options.push_back("--xacro-arg=" + text);
+  for (const std::string& text : arguments.xacro_arguments)
+    options.push_back("--xacro-arg=" + text);
   if (arguments.allow_absolute) options.push_back("--allow-absolute");
   for (const std::string& text : arguments.settings) options.push_back("--set=" + text);
   for (const std::string& text : arguments.disabled) options.push_back("--disable=" + text);
@@ -140,7 +174,8 @@ std::vector<FindingGroup> group(const std::vector<Finding>& findings) {
   std::vector<FindingGroup> groups;
   std::map<std::pair<int, std::string>, size_t> index;
   for (const Finding& finding : findings) {
-    const auto [found, added] = index.try_emplace({static_cast<int>(finding.kind), finding.text}, groups.size());
+    const auto [found, added] =
+        index.try_emplace({static_cast<int>(finding.kind), finding.text}, groups.size());
     if (added) groups.push_back({finding.kind, finding.text, {}});
     groups[found->second].places.push_back(&finding);
   }
@@ -151,10 +186,14 @@ void print_findings(const std::vector<Finding>& findings) {
   const Style style = style_of(stderr);
   for (const FindingGroup& group : group(findings)) {
     const Finding& first = *group.places.front();
-    const std::string more = group.places.size() > 1 ? fmt::format(" (and {} more places; see ruedo check)", group.places.size() - 1) : "";
+    const std::string more =
+        group.places.size() > 1
+            ? fmt::format(" (and {} more places; see ruedo check)", group.places.size() - 1)
+            : "";
     const char* colour = group.kind == Finding::Kind::error ? style.red : style.yellow;
-    fmt::print(stderr, "{}{}{}: {}: {}: {}{}{}{}\n", colour, kind_name(group.kind), style.off, for_terminal(first.source.str()),
-               for_terminal(first.element), for_terminal(group.text), style.dim, more, style.off);
+    fmt::print(stderr, "{}{}{}: {}: {}: {}{}{}{}\n", colour, kind_name(group.kind), style.off,
+               for_terminal(first.source.str()), for_terminal(first.element),
+               for_terminal(group.text), style.dim, more, style.off);
   }
 }
 

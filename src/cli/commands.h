@@ -1,5 +1,5 @@
-// What the commands of the program share: how a command is added, the options that say which world to load, exit
-// codes, and printing.
+// What the commands of the program share: how a command is added, the options that say which world
+// to load, exit codes, and printing.
 //
 // A command is one file: a function that adds a subcommand, and one registration at its end.
 #pragma once
@@ -17,13 +17,21 @@
 
 namespace ruedo::cli {
 
-enum ExitCode { kGood = 0, kCheckFailed = 1, kWrongUsage = 2, kBadInput = 3, kEnvironment = 4, kBrokenState = 5 };
+enum ExitCode {
+  kGood = 0,
+  kCheckFailed = 1,
+  kWrongUsage = 2,
+  kBadInput = 3,
+  kEnvironment = 4,
+  kBrokenState = 5
+};
 
-// Runs after the whole command line was read; returns the exit code. InputError and EnvironmentError may come out.
+// Runs after the whole command line was read; returns the exit code. InputError and
+// EnvironmentError may come out.
 using Action = std::function<int()>;
 
-// Put one at namespace scope: static const RegisterCommand kRegister{10, add_run}; commands are listed by `order`.
-// `add` adds a subcommand whose callback sets `chosen`.
+// Put one at namespace scope: static const RegisterCommand kRegister{10, add_run}; commands are
+// listed by `order`. `add` adds a subcommand whose callback sets `chosen`.
 struct RegisterCommand {
   using Add = void (*)(CLI::App& app, Action& chosen);
   RegisterCommand(int order, Add add);
@@ -31,7 +39,7 @@ struct RegisterCommand {
 std::vector<RegisterCommand::Add> registered_commands();
 
 // Commands that live in files of their own beside their subcommand; they return the exit code.
-int run_experiments(const std::string& out);    // ruedo experiments
+int run_experiments(const std::string& out);  // ruedo experiments
 
 // The world and what is changed in it, for every command that loads one.
 struct WorldArguments {
@@ -39,7 +47,8 @@ struct WorldArguments {
   std::vector<std::string> spawns, drives, settings, disabled, xacro_arguments, faults;
   bool no_noise = false, allow_absolute = false, fast_pixels = false;
 };
-// WORLD, --spawn, --drive, --set, --disable, --fault, --xacro-arg, --no-noise, --allow-absolute, --fast-pixels.
+// WORLD, --spawn, --drive, --set, --disable, --fault, --xacro-arg, --no-noise, --allow-absolute,
+// --fast-pixels.
 void add_world_arguments(CLI::App& command, WorldArguments& arguments);
 // Throws InputError; without a file in it for wrong usage.
 model::LoadOptions load_options(const WorldArguments& arguments);
@@ -47,19 +56,19 @@ std::shared_ptr<const model::WorldModel> load(const WorldArguments& arguments);
 // Those of them that change a result, as on the command line: for a log's header.
 std::vector<std::string> result_options(const WorldArguments& arguments);
 
-std::pair<std::string, std::string> parse_remap(const std::string& text);       // CHANNEL=NAME
-run::WaitForOption parse_wait_for(const std::string& text);                  // CHANNEL@HZ
-double parse_rate(const std::string& text);                                     // a number above 0, or "max": +inf
-int64_t parse_duration_us(const std::string& text);                             // seconds
+std::pair<std::string, std::string> parse_remap(const std::string& text);  // CHANNEL=NAME
+run::WaitForOption parse_wait_for(const std::string& text);                // CHANNEL@HZ
+double parse_rate(const std::string& text);          // a number above 0, or "max": +inf
+int64_t parse_duration_us(const std::string& text);  // seconds
 
 // Findings that say the same of several places, together.
 struct FindingGroup {
   Finding::Kind kind;
   std::string text;
-  std::vector<const Finding*> places;    // in the order of the files
+  std::vector<const Finding*> places;  // in the order of the files
 };
 std::vector<FindingGroup> group(const std::vector<Finding>& findings);
-const char* kind_name(Finding::Kind kind);    // "unsupported", "repaired", "error"
+const char* kind_name(Finding::Kind kind);  // "unsupported", "repaired", "error"
 // One line a group on stderr.
 void print_findings(const std::vector<Finding>& findings);
 

@@ -6,8 +6,8 @@
 
 #include "cli/commands.h"
 #include "core/utf8.h"
-#include "ruedo/errors.h"
 #include "log/diff.h"
+#include "ruedo/errors.h"
 
 namespace ruedo::cli {
 namespace {
@@ -25,12 +25,15 @@ void write_file(const std::string& path, const std::string& text) {
 
 int diff(const DiffArguments& arguments) {
   std::vector<log::DiffRule> rules;
-  for (const std::string& text : arguments.tolerances) rules.push_back(log::DiffRule::parse(text, false));
-  for (const std::string& text : arguments.ignored) rules.push_back(log::DiffRule::parse(text, true));
+  for (const std::string& text : arguments.tolerances)
+    rules.push_back(log::DiffRule::parse(text, false));
+  for (const std::string& text : arguments.ignored)
+    rules.push_back(log::DiffRule::parse(text, true));
   const log::Diff result = log::diff_logs(arguments.golden, arguments.other, rules);
   fmt::print("{}", for_terminal(log::diff_text(result)));
   if (!arguments.junit.empty()) write_file(arguments.junit, log::diff_junit(result));
-  if (!arguments.html.empty()) write_file(arguments.html, log::diff_html(result, arguments.golden, arguments.other));
+  if (!arguments.html.empty())
+    write_file(arguments.html, log::diff_html(result, arguments.golden, arguments.other));
   return result.same() ? kGood : kCheckFailed;
 }
 
@@ -39,12 +42,18 @@ void add_diff(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<DiffArguments>();
   command->add_option("GOLDEN", arguments->golden, "the log to compare with")->required();
   command->add_option("NEW", arguments->other, "the log to judge")->required();
-  command->add_option("--tolerance", arguments->tolerances,
-                      "CHANNEL:FIELD=abs:1e-3,rel:0.01,angle:0.02; shell patterns; the last that fits counts")
-      ->type_name("RULE")->allow_extra_args(false);
-  command->add_option("--ignore", arguments->ignored, "CHANNEL or CHANNEL:FIELD")->type_name("PATTERN")->allow_extra_args(false);
+  command
+      ->add_option(
+          "--tolerance", arguments->tolerances,
+          "CHANNEL:FIELD=abs:1e-3,rel:0.01,angle:0.02; shell patterns; the last that fits counts")
+      ->type_name("RULE")
+      ->allow_extra_args(false);
+  command->add_option("--ignore", arguments->ignored, "CHANNEL or CHANNEL:FIELD")
+      ->type_name("PATTERN")
+      ->allow_extra_args(false);
   command->add_option("--junit", arguments->junit, "write JUnit XML")->type_name("FILE");
-  command->add_option("--html", arguments->html, "write a page with plots of what differs")->type_name("FILE");
+  command->add_option("--html", arguments->html, "write a page with plots of what differs")
+      ->type_name("FILE");
   command->callback([arguments, &chosen] { chosen = [arguments] { return diff(*arguments); }; });
 }
 

@@ -1,4 +1,5 @@
-// ruedo doctor: what this machine lacks, each fault in one line with its cure, in less than a second.
+// ruedo doctor: what this machine lacks, each fault in one line with its cure, in less than a
+// second.
 #include <cstdlib>
 
 #include <fmt/format.h>
@@ -8,23 +9,27 @@
 #include "bus/lcm_url.h"
 #include "bus/url_claim.h"
 #include "cli/commands.h"
+#include "core/sandbox.h"
+#include "core/version.h"
+#include "log/header.h"
 #include "model/body_layout.h"
 #include "ruedo/errors.h"
 #include "scene/render_scene.h"
-#include "log/header.h"
-#include "core/sandbox.h"
-#include "core/version.h"
 
 namespace ruedo::cli {
 namespace {
 
-constexpr int64_t kGoodBuffer = 2'097'152;    // bytes: a raw VGA picture passes
+constexpr int64_t kGoodBuffer = 2'097'152;  // bytes: a raw VGA picture passes
 constexpr int kSelfTestMs = 300;
 
 class Report {
  public:
-  void good(const std::string& what, const std::string& text) { line(style_.green, "ok", what, text); }
-  void hint(const std::string& what, const std::string& text) { line(style_.yellow, "hint", what, text); }
+  void good(const std::string& what, const std::string& text) {
+    line(style_.green, "ok", what, text);
+  }
+  void hint(const std::string& what, const std::string& text) {
+    line(style_.yellow, "hint", what, text);
+  }
   void fault(const std::string& what, const std::string& text) {
     line(style_.red, "FAULT", what, text);
     faulty_ = true;
@@ -32,7 +37,8 @@ class Report {
   bool faulty() const { return faulty_; }
 
  private:
-  void line(const char* colour, const char* verdict, const std::string& what, const std::string& text) {
+  void line(const char* colour, const char* verdict, const std::string& what,
+            const std::string& text) {
     fmt::print("{}{:<5}{}  {:<16} {}\n", colour, verdict, style_.off, what, text);
   }
   Style style_ = style_of(stdout);
@@ -43,23 +49,34 @@ void check_multicast(Report& report, const bus::LcmUrl& url) {
   try {
     bus::check_route(url);
   } catch (const EnvironmentError& error) {
-    return report.fault("multicast", std::string(error.what()) + "; or do without: ruedo run WORLD --lcm tcpq://127.0.0.1:7700");
+    return report.fault(
+        "multicast",
+        std::string(error.what()) + "; or do without: ruedo run WORLD --lcm tcpq://127.0.0.1:7700");
   }
   if (bus::hears_itself(url, kSelfTestMs)) {
     report.good("multicast", url.str() + ": a datagram to the group comes back");
   } else {
-    report.fault("multicast", url.str() + ": a datagram to the group does not come back: run: sudo ip link set lo multicast on; sudo ip route add " +
-                                  url.host + "/32 dev lo; or let the firewall pass UDP port " + std::to_string(url.port));
+    report.fault("multicast", url.str() +
+                                  ": a datagram to the group does not come back: run: sudo ip link "
+                                  "set lo multicast on; sudo ip route add " +
+                                  url.host + "/32 dev lo; or let the firewall pass UDP port " +
+                                  std::to_string(url.port));
   }
 }
 
-// Who serves the address, or would. Where the environment names none and there is no multicast, that is TCP.
+// Who serves the address, or would. Where the environment names none and there is no multicast,
+// that is TCP.
 void check_server(Report& report, const bus::LcmUrl& url) {
-  if (url.scheme == "memq") return report.good("server", url.str() + " stays inside of one process");
+  if (url.scheme == "memq")
+    return report.good("server", url.str() + " stays inside of one process");
   const std::string owner = bus::claimed_by(url);
   if (!owner.empty()) return report.good("server", url.str() + ": " + owner);
-  if (url.scheme == "tcpq" && bus::is_served(url, kSelfTestMs)) return report.good("server", url.str() + ": something listens there, not a server of this machine's Ruedo");
-  report.hint("server", "none on " + url.str() + " from this machine: `ruedo run WORLD` starts one; where it is on another address, its LCM_DEFAULT_URL is wanted here");
+  if (url.scheme == "tcpq" && bus::is_served(url, kSelfTestMs))
+    return report.good(
+        "server", url.str() + ": something listens there, not a server of this machine's Ruedo");
+  report.hint("server", "none on " + url.str() +
+                            " from this machine: `ruedo run WORLD` starts one; where it is on "
+                            "another address, its LCM_DEFAULT_URL is wanted here");
 }
 
 void check_bus(Report& report, const std::string& text) {
@@ -73,9 +90,12 @@ void check_bus(Report& report, const std::string& text) {
 void check_buffers(Report& report) {
   const int64_t limit = bus::receive_buffer_limit();
   if (limit < 0) return report.hint("receive buffers", "not known on this system");
-  if (limit >= kGoodBuffer) return report.good("receive buffers", fmt::format("up to {} bytes", limit));
-  report.hint("receive buffers", fmt::format("at most {} bytes: raw pictures get lost (JPEG passes). For raw ones run: sudo sysctl -w net.core.rmem_max={}",
-                                             limit, kGoodBuffer));
+  if (limit >= kGoodBuffer)
+    return report.good("receive buffers", fmt::format("up to {} bytes", limit));
+  report.hint("receive buffers",
+              fmt::format("at most {} bytes: raw pictures get lost (JPEG passes). For raw ones "
+                          "run: sudo sysctl -w net.core.rmem_max={}",
+                          limit, kGoodBuffer));
 }
 
 void check_renderer(Report& report) {
@@ -90,14 +110,19 @@ void check_renderer(Report& report) {
 
 void check_sandbox(Report& report) {
   const std::string missing = missing_for_sandbox();
-  if (missing.empty()) return report.good("sandbox", "Landlock and seccomp: --sandbox works, and meshes are imported in one");
-  report.hint("sandbox", missing + ": no --sandbox, and meshes are imported with limits of time and memory only");
+  if (missing.empty())
+    return report.good("sandbox",
+                       "Landlock and seccomp: --sandbox works, and meshes are imported in one");
+  report.hint(
+      "sandbox",
+      missing + ": no --sandbox, and meshes are imported with limits of time and memory only");
 }
 
 int doctor(const std::string& url) {
   Report report;
-  report.good("version", fmt::format("ruedo {}, LCM {}.{}.{}, {}, CPU with {}", version(), LCM_VERSION_MAJOR, LCM_VERSION_MINOR,
-                                     LCM_VERSION_PATCH, log::libc_version(), log::cpu_features()));
+  report.good("version", fmt::format("ruedo {}, LCM {}.{}.{}, {}, CPU with {}", version(),
+                                     LCM_VERSION_MAJOR, LCM_VERSION_MINOR, LCM_VERSION_PATCH,
+                                     log::libc_version(), log::cpu_features()));
   check_bus(report, url);
   check_buffers(report);
   check_renderer(report);
@@ -106,7 +131,9 @@ int doctor(const std::string& url) {
 }
 
 void add_doctor(CLI::App& app, Action& chosen) {
-  CLI::App* command = app.add_subcommand("doctor", "check this machine: multicast route, buffers, renderer, versions; each fault with its cure");
+  CLI::App* command = app.add_subcommand(
+      "doctor",
+      "check this machine: multicast route, buffers, renderer, versions; each fault with its cure");
   const auto url = std::make_shared<std::string>();
   command->add_option("--lcm", *url, "LCM address to check")->type_name("URL");
   command->callback([url, &chosen] { chosen = [url] { return doctor(*url); }; });

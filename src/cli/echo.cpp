@@ -1,4 +1,5 @@
-// ruedo echo and ruedo hz: what is on a channel, and how often, in a terminal. They see what any client sees.
+// ruedo echo and ruedo hz: what is on a channel, and how often, in a terminal. They see what any
+// client sees.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -20,8 +21,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kShownElements = 8;         // of an array
-constexpr size_t kMostWaiting = 1000;     // messages; more are dropped and counted
+constexpr int kShownElements = 8;      // of an array
+constexpr size_t kMostWaiting = 1000;  // messages; more are dropped and counted
 
 struct Message {
   std::string channel;
@@ -71,7 +72,8 @@ class Printer {
     if (pattern != pattern_) end_field();
     pattern_ = pattern;
     if (std::any_of(path.parts.begin(), path.parts.end(), [](const auto& part) {
-          return std::any_of(part.indices.begin(), part.indices.end(), [](int64_t i) { return i >= kShownElements; });
+          return std::any_of(part.indices.begin(), part.indices.end(),
+                             [](int64_t i) { return i >= kShownElements; });
         })) {
       ++hidden_;
       return true;
@@ -98,7 +100,9 @@ void print(const Message& message) {
   }
   fmt::print("{} ({}, {} bytes)\n", channel, schema->name, message.bytes.size());
   Printer printer;
-  const bool whole = visit_message(*schema, message.bytes, [&](const FieldPath& path, const FieldValue& value) { return printer(path, value); });
+  const bool whole = visit_message(
+      *schema, message.bytes,
+      [&](const FieldPath& path, const FieldValue& value) { return printer(path, value); });
   printer.end_field();
   if (!whole) fmt::print("  ... and then bytes that are not a {}\n", schema->name);
 }
@@ -113,12 +117,18 @@ struct EchoArguments {
 int echo(const EchoArguments& arguments) {
   Mailbox mailbox;
   bus::LcmBus bus(arguments.lcm);
-  bus.listen(arguments.channels, [&](const std::string& channel, const uint8_t* data, size_t size) { mailbox.put(channel, data, size); });
-  const auto patience = arguments.timeout_s > 0.0 ? std::chrono::duration<double>(arguments.timeout_s) : std::chrono::hours(24 * 365);
+  bus.listen(arguments.channels, [&](const std::string& channel, const uint8_t* data, size_t size) {
+    mailbox.put(channel, data, size);
+  });
+  const auto patience = arguments.timeout_s > 0.0
+                            ? std::chrono::duration<double>(arguments.timeout_s)
+                            : std::chrono::hours(24 * 365);
   Message message;
   for (int seen = 0; arguments.count == 0 || seen < arguments.count; ++seen) {
-    if (!mailbox.take(message, Clock::now() + std::chrono::duration_cast<Clock::duration>(patience))) {
-      fmt::print(stderr, "ruedo: nothing on {} for {:g} s, on {}\n", fmt::join(arguments.channels, ", "), arguments.timeout_s, bus.url().str());
+    if (!mailbox.take(message,
+                      Clock::now() + std::chrono::duration_cast<Clock::duration>(patience))) {
+      fmt::print(stderr, "ruedo: nothing on {} for {:g} s, on {}\n",
+                 fmt::join(arguments.channels, ", "), arguments.timeout_s, bus.url().str());
       return kCheckFailed;
     }
     print(message);
@@ -137,7 +147,9 @@ struct Traffic {
 int hz(const EchoArguments& arguments) {
   Mailbox mailbox;
   bus::LcmBus bus(arguments.lcm);
-  bus.listen(arguments.channels, [&](const std::string& channel, const uint8_t* data, size_t size) { mailbox.put(channel, data, size); });
+  bus.listen(arguments.channels, [&](const std::string& channel, const uint8_t* data, size_t size) {
+    mailbox.put(channel, data, size);
+  });
   std::map<std::string, Traffic> traffic;
   bool anything = false;
   for (int report = 0; arguments.count == 0 || report < arguments.count; ++report) {
@@ -158,37 +170,54 @@ int hz(const EchoArguments& arguments) {
     for (const std::string& channel : arguments.channels) {
       Traffic& t = traffic[channel];
       anything |= t.messages > 0;
-      if (t.messages == 0) fmt::print("{}: nothing\n", channel);
-      else if (t.most_s == 0.0) fmt::print("{}: {:.1f} Hz\n", channel, static_cast<double>(t.messages) / seconds);
+      if (t.messages == 0)
+        fmt::print("{}: nothing\n", channel);
+      else if (t.most_s == 0.0)
+        fmt::print("{}: {:.1f} Hz\n", channel, static_cast<double>(t.messages) / seconds);
       else {
-        fmt::print("{}: {:.1f} Hz, {:.1f} to {:.1f} ms apart, {:.1f} kB/s\n", channel, static_cast<double>(t.messages) / seconds,
-                   t.least_s * 1e3, t.most_s * 1e3, static_cast<double>(t.bytes) / seconds * 1e-3);
+        fmt::print("{}: {:.1f} Hz, {:.1f} to {:.1f} ms apart, {:.1f} kB/s\n", channel,
+                   static_cast<double>(t.messages) / seconds, t.least_s * 1e3, t.most_s * 1e3,
+                   static_cast<double>(t.bytes) / seconds * 1e-3);
       }
       t = {0, 0, t.last, INFINITY, 0.0};
     }
-    if (const uint64_t dropped = mailbox.dropped(); dropped > 0) fmt::print("{} messages came faster than they could be counted\n", dropped);
+    if (const uint64_t dropped = mailbox.dropped(); dropped > 0)
+      fmt::print("{} messages came faster than they could be counted\n", dropped);
     std::fflush(stdout);
   }
   return anything ? kGood : kCheckFailed;
 }
 
-void add(CLI::App& app, Action& chosen, const char* name, const char* help, const char* count_help, int (*action)(const EchoArguments&)) {
+void add(CLI::App& app, Action& chosen, const char* name, const char* help, const char* count_help,
+         int (*action)(const EchoArguments&)) {
   CLI::App* command = app.add_subcommand(name, help);
   const auto arguments = std::make_shared<EchoArguments>();
   command->add_option("CHANNEL", arguments->channels, "such as p3at/odometry")->required();
-  command->add_option("--lcm", arguments->lcm, "LCM address (default: $LCM_DEFAULT_URL, or LCM's group)")->type_name("URL");
-  command->add_option("-n,--count", arguments->count, count_help)->type_name("N")->check(CLI::Range(1, 1'000'000'000));
+  command
+      ->add_option("--lcm", arguments->lcm,
+                   "LCM address (default: $LCM_DEFAULT_URL, or LCM's group)")
+      ->type_name("URL");
+  command->add_option("-n,--count", arguments->count, count_help)
+      ->type_name("N")
+      ->check(CLI::Range(1, 1'000'000'000));
   if (action == echo) {
-    command->add_option("--timeout", arguments->timeout_s, "end with 1 when nothing came for so long")->type_name("S")->check(CLI::PositiveNumber);
+    command
+        ->add_option("--timeout", arguments->timeout_s, "end with 1 when nothing came for so long")
+        ->type_name("S")
+        ->check(CLI::PositiveNumber);
   }
-  command->callback([arguments, action, &chosen] { chosen = [arguments, action] { return action(*arguments); }; });
+  command->callback([arguments, action, &chosen] {
+    chosen = [arguments, action] { return action(*arguments); };
+  });
 }
 
 void add_echo(CLI::App& app, Action& chosen) {
-  add(app, chosen, "echo", "print the messages on a channel, field by field", "end after so many messages", echo);
+  add(app, chosen, "echo", "print the messages on a channel, field by field",
+      "end after so many messages", echo);
 }
 void add_hz(CLI::App& app, Action& chosen) {
-  add(app, chosen, "hz", "measure how often a channel's messages come", "end after so many seconds", hz);
+  add(app, chosen, "hz", "measure how often a channel's messages come", "end after so many seconds",
+      hz);
 }
 
 const RegisterCommand kRegisterEcho{60, add_echo};

@@ -13,7 +13,7 @@
 namespace ruedo::cli {
 namespace {
 
-constexpr SimTime kMostTime = 300'000'000;    // us, of one primitive
+constexpr SimTime kMostTime = 300'000'000;  // us, of one primitive
 
 // The P3-AT's world with the drive and odometry that the options ask for.
 std::shared_ptr<const model::WorldModel> make_world(const RigOptions& options) {
@@ -25,14 +25,15 @@ std::shared_ptr<const model::WorldModel> make_world(const RigOptions& options) {
   for (model::ModelInstance& instance : world->models) {
     if (instance.name != "p3at") continue;
     auto robot = std::make_shared<model::Model>(*instance.model);
-    robot->sensors.clear();    // odometry alone is looked at
+    robot->sensors.clear();  // odometry alone is looked at
     model::DriveDescription& drive = *robot->drive;
     drive.kind = options.drive;
     drive.watchdog_us = 0;
     drive.odometry_rate = {0, 1};
     if (!options.limits) {
       constexpr double kNone = std::numeric_limits<double>::infinity();
-      drive.max_speed = drive.max_turn_rate = drive.acceleration = drive.deceleration = drive.turn_acceleration = kNone;
+      drive.max_speed = drive.max_turn_rate = drive.acceleration = drive.deceleration =
+          drive.turn_acceleration = kNone;
     }
     auto odometry = std::make_shared<Element>();
     odometry->name = "ruedo:odometry";
@@ -80,7 +81,8 @@ void ExperimentRig::look() {
   }
   ++samples_;
   for (const Outbox::Entry& entry : out_.entries()) {
-    if (entry.channel == channel_) odometry_.decode(out_.data(entry), 0, static_cast<int>(entry.size));
+    if (entry.channel == channel_)
+      odometry_.decode(out_.data(entry), 0, static_cast<int>(entry.size));
   }
 }
 
@@ -95,10 +97,13 @@ bool ExperimentRig::moved(int64_t id) const {
   if (motion.id == id && motion.state == motion_status_t::STATE_DONE) return true;
   const bool ended = motion.id == id && motion.state > motion_status_t::STATE_DONE;
   for (const MotionEnd& end : now_.motion_ends) {
-    if (end.state.id == id) throw std::runtime_error(fmt::format("the primitive {} was refused, reason {}", id, end.state.reason));
+    if (end.state.id == id)
+      throw std::runtime_error(
+          fmt::format("the primitive {} was refused, reason {}", id, end.state.reason));
   }
   if (ended || now_.time > give_up_) {
-    throw std::runtime_error(fmt::format("the primitive {} ended with state {}, reason {}", id, motion.state, motion.reason));
+    throw std::runtime_error(fmt::format("the primitive {} ended with state {}, reason {}", id,
+                                         motion.state, motion.reason));
   }
   return false;
 }

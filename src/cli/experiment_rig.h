@@ -1,5 +1,5 @@
-// A P3-AT on an empty plane, driven step by step with its odometry, without threads: for experiments that act on
-// every step's state.
+// A P3-AT on an empty plane, driven step by step with its odometry, without threads: for
+// experiments that act on every step's state.
 #pragma once
 
 #include <memory>
@@ -7,18 +7,18 @@
 #include <utility>
 #include <vector>
 
+#include "engine/fleet.h"
 #include "model/body_layout.h"
 #include "physics/physics_world.h"
 #include "robot/robots.h"
 #include "ruedo/odometry_t.hpp"
-#include "engine/fleet.h"
 
 namespace ruedo::cli {
 
 struct RigOptions {
   int64_t step_us = 5000;
   model::DriveDescription::Kind drive = model::DriveDescription::Kind::kinematic;
-  bool limits = true;     // the P3-AT's own on speed and acceleration; false: none
+  bool limits = true;  // the P3-AT's own on speed and acceleration; false: none
   // Children of <ruedo:odometry>: ("ruedo:integrator", "arc"). It is read out at every step.
   std::vector<std::pair<std::string, std::string>> odometry;
 };
@@ -27,10 +27,12 @@ class ExperimentRig {
  public:
   explicit ExperimentRig(const RigOptions& options);
 
-  void velocity(double v, double omega) { robots_->apply({0, robot::VelocityCommand{v, 0.0, omega}}); }
+  void velocity(double v, double omega) {
+    robots_->apply({0, robot::VelocityCommand{v, 0.0, omega}});
+  }
   void step();
-  // Commands a primitive and steps until it has ended; calls each() after every step. Throws std::runtime_error
-  // when it ends otherwise than done, or not within five simulated minutes.
+  // Commands a primitive and steps until it has ended; calls each() after every step. Throws
+  // std::runtime_error when it ends otherwise than done, or not within five simulated minutes.
   template <class Each>
   void move(const robot::MoveCommand& command, Each&& each) {
     start(command);
@@ -56,8 +58,8 @@ class ExperimentRig {
   std::unique_ptr<robot::Robots> robots_;
   engine::Channels channels_;
   Findings findings_;
-  engine::ModuleSetup module_;    // odometry's
-  int channel_ = -1;              // of odometry_t
+  engine::ModuleSetup module_;  // odometry's
+  int channel_ = -1;            // of odometry_t
   Snapshot now_;
   Outbox out_;
   odometry_t odometry_;

@@ -1,4 +1,5 @@
-// `ruedo experiments`: runs E1 to E5, prints the table, and writes a page with plots, and the numbers as JSON.
+// `ruedo experiments`: runs E1 to E5, prints the table, and writes a page with plots, and the
+// numbers as JSON.
 #include "cli/experiments.h"
 
 #include <cmath>
@@ -16,7 +17,10 @@ namespace {
 
 std::string shown(const Outcome& outcome) {
   const double v = outcome.value;
-  const std::string number = v == 0 ? "0" : std::abs(v) < 1e-3 ? fmt::format("{:.1e}", v) : std::abs(v) < 1 ? fmt::format("{:.4f}", v) : fmt::format("{:.2f}", v);
+  const std::string number = v == 0               ? "0"
+                             : std::abs(v) < 1e-3 ? fmt::format("{:.1e}", v)
+                             : std::abs(v) < 1    ? fmt::format("{:.4f}", v)
+                                                  : fmt::format("{:.2f}", v);
   return outcome.unit.empty() ? number : number + " " + outcome.unit;
 }
 
@@ -24,15 +28,20 @@ void write_file(const std::filesystem::path& path, const std::string& text) {
   std::ofstream file(path, std::ios::binary);
   file << text;
   file.close();
-  if (!file) throw EnvironmentError("cannot write " + path.string() + ": choose another folder with --out, or make room");
+  if (!file)
+    throw EnvironmentError("cannot write " + path.string() +
+                           ": choose another folder with --out, or make room");
 }
 
 std::string table(const std::vector<Outcome>& outcomes, const std::string& experiment) {
   std::string text = "| Measured | Paper | Ruedo | Target | |\n|---|---|---|---|---|\n";
   for (const Outcome& o : outcomes) {
     if (o.experiment != experiment) continue;
-    text += fmt::format("| {} | {} | {} | {} | {} |\n", o.quantity, o.paper, shown(o), o.target.empty() ? "as measured" : o.target,
-                        o.target.empty() ? "" : o.met ? "met" : "**missed**");
+    text += fmt::format("| {} | {} | {} | {} | {} |\n", o.quantity, o.paper, shown(o),
+                        o.target.empty() ? "as measured" : o.target,
+                        o.target.empty() ? ""
+                        : o.met          ? "met"
+                                         : "**missed**");
   }
   return text + "\n";
 }
@@ -40,59 +49,86 @@ std::string table(const std::vector<Outcome>& outcomes, const std::string& exper
 std::string page(const std::vector<Outcome>& outcomes) {
   std::string text =
       "# The paper's experiments\n\n"
-      "Ruedo began with Hernandez-Belmonte, Ayala-Ramirez and Sanchez-Yanez, \"A Mobile Robot Simulator Using a Game\n"
-      "Development Engine\", ROSSUM 2011. This page is written by `ruedo experiments --out docs`, which runs the paper's\n"
+      "Ruedo began with Hernandez-Belmonte, Ayala-Ramirez and Sanchez-Yanez, \"A Mobile Robot "
+      "Simulator Using a Game\n"
+      "Development Engine\", ROSSUM 2011. This page is written by `ruedo experiments --out docs`, "
+      "which runs the paper's\n"
       "experiments again on a P3-AT: in the paper's setting, and in Ruedo's.\n\n"
-      "The paper's setting is taken to be a loop at 50 Hz that starts to brake when v^2 / (2 d) has reached the rest of the way.\n"
-      "It notices that up to a frame late, and a frame late is up to v dt too far. The paper prints neither the loop nor its limits:\n"
-      "4.2 and 0.27 m/s^2 are chosen so that a loop of this kind nearly gives the paper's two numbers, so its agreement in E1 shows that late braking\n"
-      "can explain them, not that it did. Ruedo plans a primitive in closed form and evaluates it exactly at every step, so that the way\n"
-      "does not depend on the step. The way is that at the step at which the primitive says that it is done.\n\n"
+      "The paper's setting is taken to be a loop at 50 Hz that starts to brake when v^2 / (2 d) "
+      "has reached the rest of the way.\n"
+      "It notices that up to a frame late, and a frame late is up to v dt too far. The paper "
+      "prints neither the loop nor its limits:\n"
+      "4.2 and 0.27 m/s^2 are chosen so that a loop of this kind nearly gives the paper's two "
+      "numbers, so its agreement in E1 shows that late braking\n"
+      "can explain them, not that it did. Ruedo plans a primitive in closed form and evaluates it "
+      "exactly at every step, so that the way\n"
+      "does not depend on the step. The way is that at the step at which the primitive says that "
+      "it is done.\n\n"
       "## E1: advance by one metre (the paper's Fig. 8)\n\n";
   text += table(outcomes, "E1");
-  text += "![Speed over time, high acceleration](experiments/e1_high_acceleration.svg)\n\n"
-          "![Speed over time, high deceleration](experiments/e1_high_deceleration.svg)\n\n"
-          "## E2: a square of one metre, five times (Fig. 9)\n\n"
-          "The paper's measure: the mean, over the run, of the difference between the true pose and the odometry; here of its absolute\n"
-          "value, at every step. The paper says: a square of 1000 mm, \"several times\", odometry by the trapezoidal rule. It does not say how\n"
-          "many times, at which speeds and limits, at which rate, how old the odometry was when it was compared, and whether signs\n"
-          "cancelled. Assumed are five times, 50 Hz, the loop of E1, and the P3-AT's usual limits: 0.6 m/s, 0.75 rad/s, acceleration 0.3 and\n"
-          "deceleration 0.6 m/s^2, 1.74 rad/s^2 (AMRISim's parameters; those that the model in worlds/robots/p3at has). They were not fitted, and these rows have\n"
-          "no target. Once the odometry is that of the same step: the trapezoid then runs half a frame behind the robot. Once it is that of\n"
-          "the last status packet, which the real robot sends each 0.1 s. Which of both the paper did is not known.\n\n"
-          "In Ruedo's setting the kinematic drive runs the primitives, by the robot's true way. With the wheels drive the wheels slip, and the\n"
-          "primitives end where the robot's odometry has them, as on a real robot: one that steers by skidding turns less than its wheels say,\n"
-          "so that its square does not close until its odometry believes in a wider track than the real one.\n\n";
+  text +=
+      "![Speed over time, high acceleration](experiments/e1_high_acceleration.svg)\n\n"
+      "![Speed over time, high deceleration](experiments/e1_high_deceleration.svg)\n\n"
+      "## E2: a square of one metre, five times (Fig. 9)\n\n"
+      "The paper's measure: the mean, over the run, of the difference between the true pose and "
+      "the odometry; here of its absolute\n"
+      "value, at every step. The paper says: a square of 1000 mm, \"several times\", odometry by "
+      "the trapezoidal rule. It does not say how\n"
+      "many times, at which speeds and limits, at which rate, how old the odometry was when it was "
+      "compared, and whether signs\n"
+      "cancelled. Assumed are five times, 50 Hz, the loop of E1, and the P3-AT's usual limits: 0.6 "
+      "m/s, 0.75 rad/s, acceleration 0.3 and\n"
+      "deceleration 0.6 m/s^2, 1.74 rad/s^2 (AMRISim's parameters; those that the model in "
+      "worlds/robots/p3at has). They were not fitted, and these rows have\n"
+      "no target. Once the odometry is that of the same step: the trapezoid then runs half a frame "
+      "behind the robot. Once it is that of\n"
+      "the last status packet, which the real robot sends each 0.1 s. Which of both the paper did "
+      "is not known.\n\n"
+      "In Ruedo's setting the kinematic drive runs the primitives, by the robot's true way. With "
+      "the wheels drive the wheels slip, and the\n"
+      "primitives end where the robot's odometry has them, as on a real robot: one that steers by "
+      "skidding turns less than its wheels say,\n"
+      "so that its square does not close until its odometry believes in a wider track than the "
+      "real one.\n\n";
   text += table(outcomes, "E2");
-  text += "![Square, late braking](experiments/e2_late_braking.svg)\n\n"
-          "![Square, kinematic drive](experiments/e2_kinematic.svg)\n\n"
-          "![Square, wheels in contact](experiments/e2_wheels.svg)\n\n"
-          "## E3: the laser range finder among obstacles (Fig. 7)\n\n"
-          "181 rays over 180 degrees, against distances computed from the obstacles' outlines.\n\n";
+  text +=
+      "![Square, late braking](experiments/e2_late_braking.svg)\n\n"
+      "![Square, kinematic drive](experiments/e2_kinematic.svg)\n\n"
+      "![Square, wheels in contact](experiments/e2_wheels.svg)\n\n"
+      "## E3: the laser range finder among obstacles (Fig. 7)\n\n"
+      "181 rays over 180 degrees, against distances computed from the obstacles' outlines.\n\n";
   text += table(outcomes, "E3");
-  text += "![The scene with the rays](experiments/e3_picture.png)\n\n"
-          "![The rays from above](experiments/e3_rays.svg)\n\n"
-          "## E4: an overloaded host\n\n"
-          "The paper blames errors on the load of the host. Ruedo runs once on the host as it is, and once beside four threads a core that\n"
-          "do nothing but burn time, with every module held up at random.\n\n";
+  text +=
+      "![The scene with the rays](experiments/e3_picture.png)\n\n"
+      "![The rays from above](experiments/e3_rays.svg)\n\n"
+      "## E4: an overloaded host\n\n"
+      "The paper blames errors on the load of the host. Ruedo runs once on the host as it is, and "
+      "once beside four threads a core that\n"
+      "do nothing but burn time, with every module held up at random.\n\n";
   text += table(outcomes, "E4");
-  text += "## E5: noise on and off\n\n"
-          "The LRF of E3 with a sigma of 10 mm, under 1000 seeds.\n\n";
+  text +=
+      "## E5: noise on and off\n\n"
+      "The LRF of E3 with a sigma of 10 mm, under 1000 seeds.\n\n";
   return text + table(outcomes, "E5");
 }
 
 std::string json(const std::vector<Outcome>& outcomes) {
   std::string text = "[\n";
   for (const Outcome& o : outcomes) {
-    text += fmt::format("  {{\"experiment\": \"{}\", \"quantity\": \"{}\", \"paper\": \"{}\", \"value\": {:.17g}, \"unit\": \"{}\", \"target\": \"{}\", \"met\": {}}}{}\n",
-                        o.experiment, o.quantity, o.paper, o.value, o.unit, o.target, o.met, &o == &outcomes.back() ? "" : ",");
+    text += fmt::format(
+        "  {{\"experiment\": \"{}\", \"quantity\": \"{}\", \"paper\": \"{}\", \"value\": {:.17g}, "
+        "\"unit\": \"{}\", \"target\": \"{}\", \"met\": {}}}{}\n",
+        o.experiment, o.quantity, o.paper, o.value, o.unit, o.target, o.met,
+        &o == &outcomes.back() ? "" : ",");
   }
   return text + "]\n";
 }
 
 }  // namespace
 
-void Experiments::write(const std::string& file, const std::string& text) const { write_file(pictures / file, text); }
+void Experiments::write(const std::string& file, const std::string& text) const {
+  write_file(pictures / file, text);
+}
 
 int run_experiments(const std::string& out) {
   const std::filesystem::path folder(out);
@@ -100,7 +136,9 @@ int run_experiments(const std::string& out) {
   all.pictures = folder / "experiments";
   std::error_code error;
   std::filesystem::create_directories(all.pictures, error);
-  if (error) throw EnvironmentError("cannot make the folder " + all.pictures.string() + " (" + error.message() + "): choose another with --out");
+  if (error)
+    throw EnvironmentError("cannot make the folder " + all.pictures.string() + " (" +
+                           error.message() + "): choose another with --out");
   const bool terminal = isatty(STDERR_FILENO) != 0;
   all.progress = [terminal](const std::string& text) {
     std::fprintf(stderr, terminal ? "\r\033[K%s ..." : "%s ...\n", text.c_str());
@@ -115,13 +153,15 @@ int run_experiments(const std::string& out) {
 
   bool met = true;
   for (const Outcome& o : all.outcomes) {
-    std::printf("%-3s %-100s %14s  %s\n", o.experiment.c_str(), o.quantity.c_str(), shown(o).c_str(),
+    std::printf("%-3s %-100s %14s  %s\n", o.experiment.c_str(), o.quantity.c_str(),
+                shown(o).c_str(),
                 o.target.empty() ? "" : ((o.met ? "met: " : "MISSED: ") + o.target).c_str());
     met = met && o.met;
   }
   write_file(folder / "experiments.md", page(all.outcomes));
   write_file(all.pictures / "numbers.json", json(all.outcomes));
-  std::printf("Written: %s, with its pictures in %s\n", (folder / "experiments.md").c_str(), all.pictures.c_str());
+  std::printf("Written: %s, with its pictures in %s\n", (folder / "experiments.md").c_str(),
+              all.pictures.c_str());
   return met ? 0 : 1;
 }
 

@@ -1,5 +1,6 @@
-// The experiments of the paper that Ruedo began with: Hernandez-Belmonte, Ayala-Ramirez, Sanchez-Yanez, "A Mobile
-// Robot Simulator Using a Game Development Engine", ROSSUM 2011; run again in its setting and in ours.
+// The experiments of the paper that Ruedo began with: Hernandez-Belmonte, Ayala-Ramirez,
+// Sanchez-Yanez, "A Mobile Robot Simulator Using a Game Development Engine", ROSSUM 2011; run again
+// in its setting and in ours.
 #pragma once
 
 #include <filesystem>
@@ -11,29 +12,29 @@ namespace ruedo::cli {
 
 // One number of an experiment.
 struct Outcome {
-  std::string experiment;    // "E1"
-  std::string quantity;      // what was measured, and how
-  std::string paper;         // the paper's number, as printed there; "" where it has none
-  double value = 0.0;        // ours
+  std::string experiment;  // "E1"
+  std::string quantity;    // what was measured, and how
+  std::string paper;       // the paper's number, as printed there; "" where it has none
+  double value = 0.0;      // ours
   std::string unit;
-  std::string target;        // in words; "" where it is only reported
+  std::string target;  // in words; "" where it is only reported
   bool met = true;
 };
 
 // What an experiment is given, and where it leaves what it found.
 struct Experiments {
-  std::filesystem::path pictures;              // folder for plots
+  std::filesystem::path pictures;  // folder for plots
   std::vector<Outcome> outcomes;
   std::function<void(const std::string&)> progress = [](const std::string&) {};
 
   void report(Outcome outcome) { outcomes.push_back(std::move(outcome)); }
-  void write(const std::string& file, const std::string& text) const;    // into `pictures`
+  void write(const std::string& file, const std::string& text) const;  // into `pictures`
 };
 
-void advance_experiment(Experiments& all);       // E1
-void square_experiment(Experiments& all);        // E2
-void laser_experiment(Experiments& all);         // E3
-void overload_experiment(Experiments& all);      // E4
-void noise_experiment(Experiments& all);         // E5
+void advance_experiment(Experiments& all);   // E1
+void square_experiment(Experiments& all);    // E2
+void laser_experiment(Experiments& all);     // E3
+void overload_experiment(Experiments& all);  // E4
+void noise_experiment(Experiments& all);     // E5
 
 }  // namespace ruedo::cli

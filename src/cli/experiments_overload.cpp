@@ -1,5 +1,6 @@
-// E4: the paper blames errors on an overloaded host. Here the whole server runs once on an idle host and once beside
-// threads that burn every core, with modules held up at random: the bytes must be the same.
+// E4: the paper blames errors on an overloaded host. Here the whole server runs once on an idle
+// host and once beside threads that burn every core, with modules held up at random: the bytes must
+// be the same.
 #include <atomic>
 #include <limits>
 #include <random>
@@ -9,9 +10,9 @@
 
 #include "cli/experiments.h"
 #include "core/whole.h"
+#include "engine/simulation.h"
 #include "model/load.h"
 #include "ruedo/move_command_t.hpp"
-#include "engine/simulation.h"
 #include "run/pacer.h"
 
 namespace ruedo::cli {
@@ -26,19 +27,23 @@ std::shared_ptr<const model::WorldModel> make_world() {
   return model::load_world_text(
       "<sdf version='1.9'><world name='walls'><include><uri>model://ground_plane</uri></include>"
       "<include><uri>model://p3at</uri><name>p3at</name></include>"
-      "<model name='wall'><static>true</static><pose>4 0 0.5 0 0 0.3</pose><link name='link'><collision name='c'><geometry>"
+      "<model name='wall'><static>true</static><pose>4 0 0.5 0 0 0.3</pose><link "
+      "name='link'><collision name='c'><geometry>"
       "<box><size>0.2 9 1</size></box></geometry></collision></link></model>"
-      "<model name='parcel'><pose>1.5 0.2 0.2 0 0 0</pose><link name='link'><collision name='c'><geometry><box><size>0.3 0.3 0.3</size></box>"
+      "<model name='parcel'><pose>1.5 0.2 0.2 0 0 0</pose><link name='link'><collision "
+      "name='c'><geometry><box><size>0.3 0.3 0.3</size></box>"
       "</geometry></collision></link></model></world></sdf>",
       "experiments", options);
 }
 
 struct Run {
-  uint64_t hash = 0xcbf29ce484222325u;    // FNV-1a of all messages, with their steps and channels, in order
+  uint64_t hash =
+      0xcbf29ce484222325u;  // FNV-1a of all messages, with their steps and channels, in order
   int64_t messages = 0;
 
   void add(const void* data, size_t size) {
-    for (size_t i = 0; i < size; ++i) hash = (hash ^ static_cast<const uint8_t*>(data)[i]) * 0x100000001b3u;
+    for (size_t i = 0; i < size; ++i)
+      hash = (hash ^ static_cast<const uint8_t*>(data)[i]) * 0x100000001b3u;
   }
 };
 
@@ -50,7 +55,8 @@ Run run_world(std::function<void(const std::string&)> before_batch) {
   engine::SimulationOptions options;
   options.fleet.disabled = {"p3at/camera"};
   options.before_batch = std::move(before_batch);
-  run::Pacer pacer(world->step_us, std::numeric_limits<double>::infinity(), microseconds(kDuration_s) / world->step_us);
+  run::Pacer pacer(world->step_us, std::numeric_limits<double>::infinity(),
+                   microseconds(kDuration_s) / world->step_us);
   engine::Simulation simulation(world, options, channels, findings, finished);
 
   move_command_t command{};
@@ -71,12 +77,13 @@ Run run_world(std::function<void(const std::string&)> before_batch) {
       continue;
     }
     for (int i = 0; i < batch->count; ++i) {
-      simulation.messages(*batch, batch->first_step + i, [&](int64_t step, int channel, const uint8_t* data, size_t size) {
-        run.add(&step, sizeof step);
-        run.add(&channel, sizeof channel);
-        run.add(data, size);
-        ++run.messages;
-      });
+      simulation.messages(*batch, batch->first_step + i,
+                          [&](int64_t step, int channel, const uint8_t* data, size_t size) {
+                            run.add(&step, sizeof step);
+                            run.add(&channel, sizeof channel);
+                            run.add(data, size);
+                            ++run.messages;
+                          });
     }
     last = batch->last;
   }
@@ -106,10 +113,14 @@ void overload_experiment(Experiments& all) {
   burn = false;
   for (std::thread& burner : burners) burner.join();
 
-  const bool same = idle.hash == loaded.hash && idle.messages == loaded.messages && idle.messages > 0;
-  all.report({"E4", fmt::format("{:.0f} s of a P3-AT with all modules but the camera: messages that an overloaded host changes, of {}", kDuration_s,
-                                idle.messages),
-              "errors blamed on it", same ? 0.0 : static_cast<double>(idle.messages), "", "none: the same bytes", same});
+  const bool same =
+      idle.hash == loaded.hash && idle.messages == loaded.messages && idle.messages > 0;
+  all.report({"E4",
+              fmt::format("{:.0f} s of a P3-AT with all modules but the camera: messages that an "
+                          "overloaded host changes, of {}",
+                          kDuration_s, idle.messages),
+              "errors blamed on it", same ? 0.0 : static_cast<double>(idle.messages), "",
+              "none: the same bytes", same});
 }
 
 }  // namespace ruedo::cli

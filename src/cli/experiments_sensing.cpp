@@ -1,5 +1,5 @@
-// E3, the laser range finder among obstacles, and E5, noise on and off: against distances computed here, from the
-// obstacles' outlines and not from the scene that the rays see.
+// E3, the laser range finder among obstacles, and E5, noise on and off: against distances computed
+// here, from the obstacles' outlines and not from the scene that the rays see.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -10,22 +10,22 @@
 
 #include "cli/experiments.h"
 #include "cli/svg_plot.h"
+#include "engine/fleet.h"
 #include "model/load.h"
 #include "robot/robots.h"
 #include "ruedo/math.h"
 #include "ruedo/planar_lidar_t.hpp"
 #include "scene/ray_scene.h"
 #include "scene/render_scene.h"
-#include "engine/fleet.h"
 
 namespace ruedo::cli {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kHeight = 0.8;                           // m, of all obstacles; the LRF sits lower
+constexpr double kHeight = 0.8;  // m, of all obstacles; the LRF sits lower
 constexpr double kRobotX = 0.3, kRobotY = -0.2, kRobotYaw = 0.4;
-constexpr double kLaserAhead = 0.16;                      // m, of base_link
-constexpr double kNoise_m = 0.01;                         // E5's sigma
+constexpr double kLaserAhead = 0.16;  // m, of base_link
+constexpr double kNoise_m = 0.01;     // E5's sigma
 
 // Standing upright: a box of two lengths, or a cylinder of radius a.
 struct Obstacle {
@@ -34,16 +34,20 @@ struct Obstacle {
 };
 
 const Obstacle kObstacles[] = {
-    {false, 0, 4.1, 0, 8.4, 0.2},     {false, 0, -4.1, 0, 8.4, 0.2},    {false, 4.1, 0, 0, 0.2, 8},
-    {false, -4.1, 0, 0, 0.2, 8},      {false, 2.2, 1.5, 0.5, 0.6, 0.6}, {false, -1.2, 2.2, -0.35, 1.0, 0.5},
-    {false, 2.4, -1.8, 0.3, 0.8, 0.8}, {true, 3.2, 0.3, 0, 0.25, 0},     {true, 0.9, 2.6, 0, 0.3, 0},
-    {true, 1.2, -2.9, 0, 0.35, 0},    {true, 1.9, 0.1, 0, 0.08, 0},
+    {false, 0, 4.1, 0, 8.4, 0.2},      {false, 0, -4.1, 0, 8.4, 0.2},
+    {false, 4.1, 0, 0, 0.2, 8},        {false, -4.1, 0, 0, 0.2, 8},
+    {false, 2.2, 1.5, 0.5, 0.6, 0.6},  {false, -1.2, 2.2, -0.35, 1.0, 0.5},
+    {false, 2.4, -1.8, 0.3, 0.8, 0.8}, {true, 3.2, 0.3, 0, 0.25, 0},
+    {true, 0.9, 2.6, 0, 0.3, 0},       {true, 1.2, -2.9, 0, 0.35, 0},
+    {true, 1.9, 0.1, 0, 0.08, 0},
 };
 
-// Distance from (x, y) along (cos, sin) of `angle` to an obstacle's outline, +inf when it is missed.
+// Distance from (x, y) along (cos, sin) of `angle` to an obstacle's outline, +inf when it is
+// missed.
 double distance_to(const Obstacle& o, double x, double y, double angle) {
   const double c = math::cos(o.yaw), s = math::sin(o.yaw);
-  const double px = c * (x - o.x) + s * (y - o.y), py = -s * (x - o.x) + c * (y - o.y);    // in its own axes
+  const double px = c * (x - o.x) + s * (y - o.y),
+               py = -s * (x - o.x) + c * (y - o.y);  // in its own axes
   const double dx = math::cos(angle - o.yaw), dy = math::sin(angle - o.yaw);
   if (o.round) {
     const double along = -(px * dx + py * dy), off2 = px * px + py * py - along * along;
@@ -66,17 +70,25 @@ double distance_to(const Obstacle& o, double x, double y, double angle) {
 
 std::string world_text() {
   std::string text = fmt::format(
-      "<sdf version='1.9'><world name='obstacles'><include><uri>model://sun</uri></include><include><uri>model://ground_plane</uri></include>"
+      "<sdf version='1.9'><world "
+      "name='obstacles'><include><uri>model://sun</uri></include><include><uri>model://"
+      "ground_plane</uri></include>"
       "<include><uri>model://p3at</uri><name>p3at</name><pose>{} {} 0 0 0 {}</pose></include>",
       kRobotX, kRobotY, kRobotYaw);
   int number = 0;
   for (const Obstacle& o : kObstacles) {
-    const std::string shape = o.round ? fmt::format("<cylinder><radius>{}</radius><length>{}</length></cylinder>", o.a, kHeight)
-                                      : fmt::format("<box><size>{} {} {}</size></box>", o.a, o.b, kHeight);
-    text += fmt::format("<model name='obstacle_{}'><static>true</static><pose>{} {} {} 0 0 {}</pose><link name='link'>"
-                        "<collision name='c'><geometry>{}</geometry></collision><visual name='v'><geometry>{}</geometry>"
-                        "<material><diffuse>{}</diffuse></material></visual></link></model>",
-                        ++number, o.x, o.y, 0.5 * kHeight, o.yaw, shape, shape, o.round ? "0.85 0.55 0.2 1" : "0.25 0.4 0.65 1");
+    const std::string shape =
+        o.round ? fmt::format("<cylinder><radius>{}</radius><length>{}</length></cylinder>", o.a,
+                              kHeight)
+                : fmt::format("<box><size>{} {} {}</size></box>", o.a, o.b, kHeight);
+    text += fmt::format(
+        "<model name='obstacle_{}'><static>true</static><pose>{} {} {} 0 0 {}</pose><link "
+        "name='link'>"
+        "<collision name='c'><geometry>{}</geometry></collision><visual "
+        "name='v'><geometry>{}</geometry>"
+        "<material><diffuse>{}</diffuse></material></visual></link></model>",
+        ++number, o.x, o.y, 0.5 * kHeight, o.yaw, shape, shape,
+        o.round ? "0.85 0.55 0.2 1" : "0.25 0.4 0.65 1");
   }
   return text + "</world></sdf>";
 }
@@ -88,11 +100,13 @@ void set(Element& element, std::string_view path, const std::string& text) {
 // The world with the P3-AT's LRF as its only sensor, and the state at the start.
 struct LaserBench {
   LaserBench() {
-    auto changed = std::make_shared<model::WorldModel>(*model::load_world_text(world_text(), "experiments"));
+    auto changed =
+        std::make_shared<model::WorldModel>(*model::load_world_text(world_text(), "experiments"));
     for (model::ModelInstance& instance : changed->models) {
       if (instance.name != "p3at") continue;
       auto robot = std::make_shared<model::Model>(*instance.model);
-      std::erase_if(robot->sensors, [](const model::SensorDescription& sensor) { return sensor.name != "lrf"; });
+      std::erase_if(robot->sensors,
+                    [](const model::SensorDescription& sensor) { return sensor.name != "lrf"; });
       for (model::SensorDescription& sensor : robot->sensors) {
         const std::shared_ptr<Element> element = sensor.element->clone();
         set(*element, "lidar/range/max", "32");
@@ -114,7 +128,8 @@ struct LaserBench {
   planar_lidar_t scan(uint64_t seed, bool noise) {
     engine::Channels channels;
     Findings findings;
-    engine::Fleet fleet = engine::make_fleet(*world, *layout, {.seed = seed, .noise = noise, .disabled = {}}, channels, findings);
+    engine::Fleet fleet = engine::make_fleet(
+        *world, *layout, {.seed = seed, .noise = noise, .disabled = {}}, channels, findings);
     Outbox out;
     planar_lidar_t message;
     for (engine::ModuleSetup& module : fleet.modules) {
@@ -136,7 +151,8 @@ struct LaserBench {
 
 // Where the LRF is and how far it should see, ray by ray.
 struct Expected {
-  double x = kRobotX + kLaserAhead * math::cos(kRobotYaw), y = kRobotY + kLaserAhead * math::sin(kRobotYaw);
+  double x = kRobotX + kLaserAhead * math::cos(kRobotYaw),
+         y = kRobotY + kLaserAhead * math::sin(kRobotYaw);
   double range(double angle) const {
     double nearest = kInfinity;
     for (const Obstacle& o : kObstacles) nearest = std::min(nearest, distance_to(o, x, y, angle));
@@ -151,14 +167,17 @@ Points outline(const Obstacle& o) {
     const double t = 2 * M_PI * (i + 0.5) / corners;
     const double lx = o.round ? o.a * math::cos(t) : std::copysign(0.5 * o.a, math::cos(t));
     const double ly = o.round ? o.a * math::sin(t) : std::copysign(0.5 * o.b, math::sin(t));
-    points.push_back({o.x + lx * math::cos(o.yaw) - ly * math::sin(o.yaw), o.y + lx * math::sin(o.yaw) + ly * math::cos(o.yaw)});
+    points.push_back({o.x + lx * math::cos(o.yaw) - ly * math::sin(o.yaw),
+                      o.y + lx * math::sin(o.yaw) + ly * math::cos(o.yaw)});
   }
   return points;
 }
 
 // The scene from behind the robot, with the rays drawn in, like the paper's Fig. 7.
-void draw_picture(const Experiments& all, const LaserBench& bench, const std::vector<scene::Line>& lines) {
-  const std::unique_ptr<scene::Renderer> renderer = scene::make_renderer(*bench.world, *bench.layout);
+void draw_picture(const Experiments& all, const LaserBench& bench,
+                  const std::vector<scene::Line>& lines) {
+  const std::unique_ptr<scene::Renderer> renderer =
+      scene::make_renderer(*bench.world, *bench.layout);
   scene::View view;
   view.X_WCamera = Pose::from_xyz_rpy({-2.9, -2.6, 3.4}, {0, 0.68, 0.62});
   view.width = 960;
@@ -168,7 +187,8 @@ void draw_picture(const Experiments& all, const LaserBench& bench, const std::ve
   view.cy = 320;
   scene::Picture picture;
   renderer->draw(bench.start, view, picture, lines);
-  for (size_t i = 0; i + 2 < picture.rgb.size(); i += 3) std::swap(picture.rgb[i], picture.rgb[i + 2]);    // OpenCV's order
+  for (size_t i = 0; i + 2 < picture.rgb.size(); i += 3)
+    std::swap(picture.rgb[i], picture.rgb[i + 2]);  // OpenCV's order
   const cv::Mat image(view.height, view.width, CV_8UC3, picture.rgb.data());
   std::vector<uint8_t> png;
   cv::imencode(".png", image, png);
@@ -198,25 +218,29 @@ void laser_experiment(Experiments& all) {
   plot.area(outline({false, kRobotX, kRobotY, kRobotYaw, 0.5, 0.38}), "#333333");
   all.write("e3_rays.svg", plot.svg());
   draw_picture(all, bench, lines);
-  all.report({"E3", "LRF among obstacles: worst error of 181 rays", "", worst, "m", "within 1e-6 m", worst < 1e-6});
+  all.report({"E3", "LRF among obstacles: worst error of 181 rays", "", worst, "m", "within 1e-6 m",
+              worst < 1e-6});
 }
 
 void noise_experiment(Experiments& all) {
   constexpr int kSeeds = 1000;
-  constexpr double k99 = 2.5758;    // two-sided
+  constexpr double k99 = 2.5758;  // two-sided
   LaserBench bench;
   const planar_lidar_t ideal = bench.scan(1, false);
   double differs = 0, sum = 0, squares = 0, count = 0, one_ray = 0;
   for (int seed = 1; seed <= kSeeds; ++seed) {
-    if (seed % 100 == 0) all.progress(fmt::format("E5: noise on and off, seed {} of {}", seed, kSeeds));
+    if (seed % 100 == 0)
+      all.progress(fmt::format("E5: noise on and off, seed {} of {}", seed, kSeeds));
     if (seed <= 20) {
       const planar_lidar_t off = bench.scan(static_cast<uint64_t>(seed), false);
-      differs += std::memcmp(off.ranges.data(), ideal.ranges.data(), ideal.ranges.size() * sizeof(float)) != 0;
+      differs += std::memcmp(off.ranges.data(), ideal.ranges.data(),
+                             ideal.ranges.size() * sizeof(float)) != 0;
     }
     const planar_lidar_t noisy = bench.scan(static_cast<uint64_t>(seed), true);
     for (size_t i = 0; i < ideal.ranges.size(); ++i) {
       if (!std::isfinite(ideal.ranges[i]) || !std::isfinite(noisy.ranges[i])) continue;
-      const double error = static_cast<double>(noisy.ranges[i]) - static_cast<double>(ideal.ranges[i]);
+      const double error =
+          static_cast<double>(noisy.ranges[i]) - static_cast<double>(ideal.ranges[i]);
       sum += error;
       squares += error * error;
       ++count;
@@ -227,13 +251,17 @@ void noise_experiment(Experiments& all) {
   // The interval of a sigma from n values: +- k sigma / sqrt(2 n).
   const auto interval = [](double n) { return k99 * kNoise_m / std::sqrt(2 * n); };
   const auto inside = [](double value, double half) { return std::abs(value - kNoise_m) < half; };
-  all.report({"E5", "noise off: scans of 20 seeds that differ from the ideal one in any bit", "off", differs, "", "none", differs == 0});
-  all.report({"E5", "noise on: sigma of one ray, 1000 seeds (10 mm asked for)", "on", 1000 * sigma_one, "mm",
-              fmt::format("99 %: 10 +- {:.2f} mm", 1000 * interval(kSeeds)), inside(sigma_one, interval(kSeeds))});
+  all.report({"E5", "noise off: scans of 20 seeds that differ from the ideal one in any bit", "off",
+              differs, "", "none", differs == 0});
+  all.report({"E5", "noise on: sigma of one ray, 1000 seeds (10 mm asked for)", "on",
+              1000 * sigma_one, "mm", fmt::format("99 %: 10 +- {:.2f} mm", 1000 * interval(kSeeds)),
+              inside(sigma_one, interval(kSeeds))});
   all.report({"E5", "noise on: sigma of all rays, 1000 seeds", "on", 1000 * sigma, "mm",
-              fmt::format("99 %: 10 +- {:.3f} mm", 1000 * interval(count)), inside(sigma, interval(count))});
+              fmt::format("99 %: 10 +- {:.3f} mm", 1000 * interval(count)),
+              inside(sigma, interval(count))});
   const double mean_bound = k99 * kNoise_m / std::sqrt(count);
-  all.report({"E5", "noise on: mean of all rays, 1000 seeds", "on", 1000 * sum / count, "mm", fmt::format("99 %: 0 +- {:.3f} mm", 1000 * mean_bound),
+  all.report({"E5", "noise on: mean of all rays, 1000 seeds", "on", 1000 * sum / count, "mm",
+              fmt::format("99 %: 0 +- {:.3f} mm", 1000 * mean_bound),
               std::abs(sum / count) < mean_bound});
 }
 

@@ -11,8 +11,8 @@
 #include "cli/rosbag.h"
 #include "cli/sandboxed.h"
 #include "core/utf8.h"
-#include "ruedo/errors.h"
 #include "log/reader.h"
+#include "ruedo/errors.h"
 #include "run/log_worlds.h"
 
 namespace ruedo::cli {
@@ -31,14 +31,15 @@ uint64_t nanoseconds(SimTime time_us) {
 
 // Gives every message to `out`, which is told what runs from when on. Returns how many there were.
 template <class Export>
-uint64_t read_log(const std::string& path, const log::Index& index, const run::LogWorlds& worlds, Export& out) {
+uint64_t read_log(const std::string& path, const log::Index& index, const run::LogWorlds& worlds,
+                  Export& out) {
   log::Reader log(path);
   const run::LogWorlds::Scene* scene = nullptr;
   log::Event event;
   SimTime now_us = index.begin_us();
   uint64_t read = 0;
   while (log.next(event)) {
-    now_us = std::max(now_us, event.timestamp_us);    // as in the index: times never go back
+    now_us = std::max(now_us, event.timestamp_us);  // as in the index: times never go back
     if (const auto* next = &worlds.at(now_us); next != scene) {
       scene = next;
       out.begin_scene(*scene, nanoseconds(now_us));
@@ -47,7 +48,8 @@ uint64_t read_log(const std::string& path, const log::Index& index, const run::L
     ++read;
   }
   for (const std::string& fault : {worlds.fault(), log.fault()}) {
-    if (!fault.empty()) fmt::print(stderr, "ruedo: {}: {}\n", for_terminal(path), for_terminal(fault));
+    if (!fault.empty())
+      fmt::print(stderr, "ruedo: {}: {}\n", for_terminal(path), for_terminal(fault));
   }
   return read;
 }
@@ -57,7 +59,8 @@ std::string without_slash(std::string folder) {
   return folder;
 }
 
-void export_bag(const ExportArguments& arguments, const log::Index& index, const run::LogWorlds& worlds, const run::LoggedRun& logged) {
+void export_bag(const ExportArguments& arguments, const log::Index& index,
+                const run::LogWorlds& worlds, const run::LoggedRun& logged) {
   ros2::ConversionOptions options;
   options.distro = ros2::parse_distro(arguments.distro);
   options.channels = logged.remaps;
@@ -65,43 +68,60 @@ void export_bag(const ExportArguments& arguments, const log::Index& index, const
   Rosbag bag(without_slash(arguments.bag), options);
   const uint64_t read = read_log(arguments.log, index, worlds, bag);
   bag.finish();
-  fmt::print("{}: {} messages of {}, as {} of ROS 2's types; {} are of types that ROS 2 has no message for\n", arguments.bag, read, arguments.log,
-             bag.messages(), bag.left_out());
+  fmt::print(
+      "{}: {} messages of {}, as {} of ROS 2's types; {} are of types that ROS 2 has no message "
+      "for\n",
+      arguments.bag, read, arguments.log, bag.messages(), bag.left_out());
 }
 
-void export_foxglove(const ExportArguments& arguments, const log::Index& index, const run::LogWorlds& worlds) {
+void export_foxglove(const ExportArguments& arguments, const log::Index& index,
+                     const run::LogWorlds& worlds) {
   std::error_code error;
-  if (std::filesystem::equivalent(arguments.log, arguments.out, error)) throw InputError({}, "OUT is the log itself: " + arguments.out);
+  if (std::filesystem::equivalent(arguments.log, arguments.out, error))
+    throw InputError({}, "OUT is the log itself: " + arguments.out);
   McapWriter out(arguments.out);
   FoxgloveExport foxglove(out);
   const uint64_t read = read_log(arguments.log, index, worlds, foxglove);
   out.finish();
-  fmt::print("{}: {} messages of {}, as {} of Foxglove's and Ruedo's types", arguments.out, read, arguments.log, out.messages());
-  if (foxglove.left_out() > 0) fmt::print("; {} of types that are not known, or damaged, are left out", foxglove.left_out());
+  fmt::print("{}: {} messages of {}, as {} of Foxglove's and Ruedo's types", arguments.out, read,
+             arguments.log, out.messages());
+  if (foxglove.left_out() > 0)
+    fmt::print("; {} of types that are not known, or damaged, are left out", foxglove.left_out());
   fmt::print("\n");
 }
 
 int export_log(const ExportArguments& arguments) {
-  if (arguments.out.empty() == arguments.bag.empty()) throw InputError({}, "give OUT, or --ros2 FOLDER");
-  if (arguments.sandboxed) enter_sandbox(arguments.log, {arguments.out, without_slash(arguments.bag)});
+  if (arguments.out.empty() == arguments.bag.empty())
+    throw InputError({}, "give OUT, or --ros2 FOLDER");
+  if (arguments.sandboxed)
+    enter_sandbox(arguments.log, {arguments.out, without_slash(arguments.bag)});
   const log::Index index(arguments.log);
   run::LoggedRun logged;
-  const run::LogWorlds worlds(index, [&](const log_header_t& header) { return logged = load_run(header, arguments.log); });
-  if (arguments.bag.empty()) export_foxglove(arguments, index, worlds);
-  else export_bag(arguments, index, worlds, logged);
+  const run::LogWorlds worlds(
+      index, [&](const log_header_t& header) { return logged = load_run(header, arguments.log); });
+  if (arguments.bag.empty())
+    export_foxglove(arguments, index, worlds);
+  else
+    export_bag(arguments, index, worlds, logged);
   return kGood;
 }
 
 void add_export(CLI::App& app, Action& chosen) {
-  CLI::App* command = app.add_subcommand("export", "write a log as an MCAP file with Foxglove's message types, or as a ROS 2 bag");
+  CLI::App* command = app.add_subcommand(
+      "export", "write a log as an MCAP file with Foxglove's message types, or as a ROS 2 bag");
   const auto arguments = std::make_shared<ExportArguments>();
   command->add_option("LOG", arguments->log, "a standard LCM log")->required();
   command->add_option("OUT", arguments->out, "the file to write, such as run.mcap");
-  command->add_option("--ros2", arguments->bag, "write a ROS 2 bag into this new folder instead")->type_name("FOLDER");
-  command->add_option("--distro", arguments->distro, "the ROS 2 release that the bag is for")->capture_default_str();
-  command->add_option("--remap", arguments->remaps, "give a ROS topic another name: /TOPIC=/NAME")->type_name("REMAP")->allow_extra_args(false);
+  command->add_option("--ros2", arguments->bag, "write a ROS 2 bag into this new folder instead")
+      ->type_name("FOLDER");
+  command->add_option("--distro", arguments->distro, "the ROS 2 release that the bag is for")
+      ->capture_default_str();
+  command->add_option("--remap", arguments->remaps, "give a ROS topic another name: /TOPIC=/NAME")
+      ->type_name("REMAP")
+      ->allow_extra_args(false);
   add_sandbox_argument(*command, arguments->sandboxed);
-  command->callback([arguments, &chosen] { chosen = [arguments] { return export_log(*arguments); }; });
+  command->callback(
+      [arguments, &chosen] { chosen = [arguments] { return export_log(*arguments); }; });
 }
 
 const RegisterCommand kRegister{53, add_export};

@@ -1,5 +1,6 @@
-// Frames: world, a frame for each body that moves (MODEL/LINK), for each robot (its base_link), its odometry's origin
-// (ROBOT/odom), and its devices (ROBOT/DEVICE, and ROBOT/DEVICE/optical: z ahead, x right, y down).
+// Frames: world, a frame for each body that moves (MODEL/LINK), for each robot (its base_link), its
+// odometry's origin (ROBOT/odom), and its devices (ROBOT/DEVICE, and ROBOT/DEVICE/optical: z ahead,
+// x right, y down).
 #include "cli/foxglove.h"
 
 #include <algorithm>
@@ -24,20 +25,43 @@
 namespace ruedo::cli {
 namespace {
 
-constexpr int kManyLinks = 150;    // of a kind: round shapes get fewer triangles then, as on the console's page
+constexpr int kManyLinks =
+    150;  // of a kind: round shapes get fewer triangles then, as on the console's page
 constexpr const char* kFrames = "ruedo/frames";
 constexpr const char* kScene = "ruedo/scene";
 
 void write_time(JsonWriter& json, const char* name, uint64_t time_ns) {
-  json.name(name).open('{').member("sec", static_cast<int64_t>(time_ns / 1'000'000'000)).member("nsec", static_cast<int64_t>(time_ns % 1'000'000'000)).close('}');
+  json.name(name)
+      .open('{')
+      .member("sec", static_cast<int64_t>(time_ns / 1'000'000'000))
+      .member("nsec", static_cast<int64_t>(time_ns % 1'000'000'000))
+      .close('}');
 }
 
 void write_xyz(JsonWriter& json, const char* name, double x, double y, double z) {
-  json.name(name).open('{').name("x").raw(json_number(x)).name("y").raw(json_number(y)).name("z").raw(json_number(z)).close('}');
+  json.name(name)
+      .open('{')
+      .name("x")
+      .raw(json_number(x))
+      .name("y")
+      .raw(json_number(y))
+      .name("z")
+      .raw(json_number(z))
+      .close('}');
 }
 
 void write_rotation(JsonWriter& json, const char* name, double w, double x, double y, double z) {
-  json.name(name).open('{').name("x").raw(json_number(x)).name("y").raw(json_number(y)).name("z").raw(json_number(z)).name("w").raw(json_number(w)).close('}');
+  json.name(name)
+      .open('{')
+      .name("x")
+      .raw(json_number(x))
+      .name("y")
+      .raw(json_number(y))
+      .name("z")
+      .raw(json_number(z))
+      .name("w")
+      .raw(json_number(w))
+      .close('}');
 }
 
 void write_pose(JsonWriter& json, const Pose& X) {
@@ -48,7 +72,8 @@ void write_pose(JsonWriter& json, const Pose& X) {
   json.close('}');
 }
 
-void write_frame(JsonWriter& json, uint64_t time_ns, const std::string& parent, const std::string& child, const Pose& X) {
+void write_frame(JsonWriter& json, uint64_t time_ns, const std::string& parent,
+                 const std::string& child, const Pose& X) {
   const Quat& q = X.rotation;
   json.open('{');
   write_time(json, "timestamp", time_ns);
@@ -66,7 +91,8 @@ void write_numbers(JsonWriter& json, const char* name, const Numbers& numbers) {
 }
 
 Pose pose_of(const double* position, const double* orientation) {
-  return Pose{Quat(orientation[0], orientation[1], orientation[2], orientation[3]), Vec3(position[0], position[1], position[2])};
+  return Pose{Quat(orientation[0], orientation[1], orientation[2], orientation[3]),
+              Vec3(position[0], position[1], position[2])};
 }
 
 // What Foxglove calls a format of raw pixels; null: it has none for it.
@@ -87,7 +113,8 @@ std::string scan_json(const planar_lidar_t& scan, const std::string& frame, uint
   write_time(json, "timestamp", time_ns);
   json.member("frame_id", frame);
   write_pose(json, Pose{});
-  const double first = scan.rad0, last = first + std::max(0, scan.nranges - 1) * static_cast<double>(scan.radstep);
+  const double first = scan.rad0,
+               last = first + std::max(0, scan.nranges - 1) * static_cast<double>(scan.radstep);
   json.name("start_angle").raw(json_number(first)).name("end_angle").raw(json_number(last));
   write_numbers(json, "ranges", scan.ranges);
   write_numbers(json, "intensities", scan.intensities);
@@ -95,14 +122,16 @@ std::string scan_json(const planar_lidar_t& scan, const std::string& frame, uint
   return json.text();
 }
 
-std::string image_json(const image_t& image, const char* encoding, const std::string& frame, uint64_t time_ns) {
+std::string image_json(const image_t& image, const char* encoding, const std::string& frame,
+                       uint64_t time_ns) {
   JsonWriter json;
   json.open('{');
   write_time(json, "timestamp", time_ns);
   json.member("frame_id", frame);
   if (encoding) {
     json.member("width", image.width).member("height", image.height).member("encoding", encoding);
-    json.member("step", image.row_stride > 0 || image.height < 1 ? image.row_stride : image.size / image.height);
+    json.member("step", image.row_stride > 0 || image.height < 1 ? image.row_stride
+                                                                 : image.size / image.height);
   } else {
     json.member("format", "jpeg");
   }
@@ -114,7 +143,10 @@ std::string camera_json(const camera_info_t& camera, const std::string& frame, u
   JsonWriter json;
   json.open('{');
   write_time(json, "timestamp", time_ns);
-  json.member("frame_id", frame).member("width", camera.width).member("height", camera.height).member("distortion_model", "plumb_bob");
+  json.member("frame_id", frame)
+      .member("width", camera.width)
+      .member("height", camera.height)
+      .member("distortion_model", "plumb_bob");
   const auto [fx, fy, cx, cy] = std::array{camera.fx, camera.fy, camera.cx, camera.cy};
   write_numbers(json, "D", camera.distortion);
   write_numbers(json, "K", std::array{fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0});
@@ -135,11 +167,13 @@ std::string pose_json(const Pose& X, const std::string& frame, uint64_t time_ns)
 }
 
 // A part of a link as a list of triangles in the body's frame, or the world's.
-void write_part(JsonWriter& json, const scene::RenderContent& content, const scene::RenderPart& part, bool many, const Pose& X_BL) {
-  const scene::Batch& batch = content.batches[static_cast<size_t>(many ? part.small_batch : part.batch)];
+void write_part(JsonWriter& json, const scene::RenderContent& content,
+                const scene::RenderPart& part, bool many, const Pose& X_BL) {
+  const scene::Batch& batch =
+      content.batches[static_cast<size_t>(many ? part.small_batch : part.batch)];
   const scene::RenderMesh& mesh = content.meshes[static_cast<size_t>(batch.mesh)];
   const scene::Affine M = scene::compose(scene::to_affine(X_BL), part.M_LP);
-  std::map<uint32_t, size_t> places;    // of vertices among the points
+  std::map<uint32_t, size_t> places;  // of vertices among the points
   std::vector<uint32_t> vertices;
   std::vector<size_t> corners;
   for (uint32_t i = batch.first_index; i < batch.first_index + batch.index_count; ++i) {
@@ -157,7 +191,13 @@ void write_part(JsonWriter& json, const scene::RenderContent& content, const sce
   }
   json.close(']');
   const model::Rgba& c = part.diffuse;
-  json.name("color").open('{').member("r", double{c[0]}).member("g", double{c[1]}).member("b", double{c[2]}).member("a", double{c[3]}).close('}');
+  json.name("color")
+      .open('{')
+      .member("r", double{c[0]})
+      .member("g", double{c[1]})
+      .member("b", double{c[2]})
+      .member("a", double{c[3]})
+      .close('}');
   json.name("colors").open('[').close(']').name("indices").open('[');
   for (const size_t corner : corners) json.value(static_cast<int64_t>(corner));
   json.close(']').close('}');
@@ -165,7 +205,8 @@ void write_part(JsonWriter& json, const scene::RenderContent& content, const sce
 
 }  // namespace
 
-uint16_t FoxgloveExport::channel(const std::string& topic, const std::string& name, const std::string& schema) {
+uint16_t FoxgloveExport::channel(const std::string& topic, const std::string& name,
+                                 const std::string& schema) {
   const auto [known, fresh] = schemas_.try_emplace(name);
   if (fresh) known->second = out_.add_schema(name, "jsonschema", schema);
   const auto [at, first] = channels_.try_emplace(topic + '\n' + name);
@@ -173,7 +214,8 @@ uint16_t FoxgloveExport::channel(const std::string& topic, const std::string& na
   return at->second;
 }
 
-void FoxgloveExport::send(const std::string& topic, const foxglove::Type& type, uint64_t time_ns, const std::string& json) {
+void FoxgloveExport::send(const std::string& topic, const foxglove::Type& type, uint64_t time_ns,
+                          const std::string& json) {
   out_.add_message(channel(topic, type.name, type.schema), time_ns, json);
 }
 
@@ -190,7 +232,8 @@ void FoxgloveExport::begin_scene(const run::LogWorlds::Scene& scene, uint64_t ti
       body_names_.insert(body.name);
     }
     for (const channel_info_t& channel : part.channels) {
-      if (!channel.device.empty()) device_of_channel_[channel.name] = channel.robot + "/" + channel.device;
+      if (!channel.device.empty())
+        device_of_channel_[channel.name] = channel.robot + "/" + channel.device;
     }
   }
   if (!scene.world) return;
@@ -211,9 +254,11 @@ void FoxgloveExport::send_frames(const run::LogWorlds::Scene& scene, uint64_t ti
   for (const model::RobotPlacement& robot : layout.robots) {
     const model::ModelInstance& instance = scene.world->models[static_cast<size_t>(robot.instance)];
     if (instance.removed) continue;
-    const model::BodyPlacement* body = robot.body < 0 ? nullptr : &layout.bodies[static_cast<size_t>(robot.body)];
+    const model::BodyPlacement* body =
+        robot.body < 0 ? nullptr : &layout.bodies[static_cast<size_t>(robot.body)];
     write_frame(json, time_ns, body ? body->name : "world", instance.name, robot.X_BBase);
-    write_frame(json, time_ns, "world", instance.name + "/odom", body ? body->X_WB * robot.X_BBase : robot.X_BBase);
+    write_frame(json, time_ns, "world", instance.name + "/odom",
+                body ? body->X_WB * robot.X_BBase : robot.X_BBase);
   }
   for (const std::vector<uint8_t>& bytes : scene.info) {
     world_info_t part;
@@ -221,7 +266,9 @@ void FoxgloveExport::send_frames(const run::LogWorlds::Scene& scene, uint64_t ti
     for (const device_info_t& device : part.devices) {
       const std::string frame = device_frame(device.robot + "/" + device.name);
       write_frame(json, time_ns, device.robot, frame, pose_of(device.position, device.orientation));
-      if (device.kind == "camera") write_frame(json, time_ns, frame, frame + "/optical", Pose{Quat(0.5, -0.5, 0.5, -0.5), Vec3::Zero()});
+      if (device.kind == "camera")
+        write_frame(json, time_ns, frame, frame + "/optical",
+                    Pose{Quat(0.5, -0.5, 0.5, -0.5), Vec3::Zero()});
     }
   }
   json.close(']').close('}');
@@ -240,7 +287,14 @@ void FoxgloveExport::send_scene(const model::WorldModel& world, uint64_t time_ns
     JsonWriter all;
     all.open('{').name("deletions").open('[').open('{');
     write_time(all, "timestamp", time_ns);
-    all.member("type", 1).member("id", "").close('}').close(']').name("entities").open('[').close(']').close('}');
+    all.member("type", 1)
+        .member("id", "")
+        .close('}')
+        .close(']')
+        .name("entities")
+        .open('[')
+        .close(']')
+        .close('}');
     send(kScene, foxglove::scene_update(), time_ns, all.text());
   }
   scene_sent_ = true;
@@ -256,11 +310,14 @@ void FoxgloveExport::send_scene(const model::WorldModel& world, uint64_t time_ns
       const auto kind = static_cast<size_t>(content.kind_of_link[link]);
       json.open('{');
       write_time(json, "timestamp", time_ns);
-      json.member("frame_id", placement.body < 0 ? std::string("world") : layout.bodies[static_cast<size_t>(placement.body)].name);
+      json.member("frame_id", placement.body < 0
+                                  ? std::string("world")
+                                  : layout.bodies[static_cast<size_t>(placement.body)].name);
       json.member("id", instance.name + "/" + instance.model->links[k].name);
       write_time(json, "lifetime", 0);
       json.member("frame_locked", true).name("triangles").open('[');
-      for (const scene::RenderPart& part : content.link_kinds[kind].parts) write_part(json, content, part, links_of_kind[kind] > kManyLinks, placement.X_BL);
+      for (const scene::RenderPart& part : content.link_kinds[kind].parts)
+        write_part(json, content, part, links_of_kind[kind] > kManyLinks, placement.X_BL);
       json.close(']').close('}');
     }
     json.close(']').close('}');
@@ -268,8 +325,11 @@ void FoxgloveExport::send_scene(const model::WorldModel& world, uint64_t time_ns
   }
 }
 
-bool FoxgloveExport::convert(const std::string& channel, uint64_t time_ns, std::span<const uint8_t> message, bool& all) {
-  const auto read = [&](auto& into) { return decode_checked(message.data(), message.size(), into) == DecodeFault::none; };
+bool FoxgloveExport::convert(const std::string& channel, uint64_t time_ns,
+                             std::span<const uint8_t> message, bool& all) {
+  const auto read = [&](auto& into) {
+    return decode_checked(message.data(), message.size(), into) == DecodeFault::none;
+  };
   const int64_t fingerprint = fingerprint_of(message);
   if (fingerprint == planar_lidar_t::getHash()) {
     planar_lidar_t scan;
@@ -283,26 +343,30 @@ bool FoxgloveExport::convert(const std::string& channel, uint64_t time_ns, std::
     const char* encoding = encoding_of(image.pixelformat);
     if (!encoding && image.pixelformat != image_t::PIXEL_FORMAT_MJPEG) return false;
     const std::string frame = device_frame(channel) + "/optical";
-    send(channel, encoding ? foxglove::raw_image() : foxglove::compressed_image(), time_ns, image_json(image, encoding, frame, time_ns));
+    send(channel, encoding ? foxglove::raw_image() : foxglove::compressed_image(), time_ns,
+         image_json(image, encoding, frame, time_ns));
     return all = true;
   }
   if (fingerprint == camera_info_t::getHash()) {
     camera_info_t camera;
     if (!read(camera)) return false;
-    send(channel, foxglove::camera_calibration(), time_ns, camera_json(camera, device_frame(channel) + "/optical", time_ns));
+    send(channel, foxglove::camera_calibration(), time_ns,
+         camera_json(camera, device_frame(channel) + "/optical", time_ns));
     return all = true;
   }
   if (fingerprint == pose_t::getHash()) {
     pose_t pose;
     if (!read(pose)) return false;
-    send(channel, foxglove::pose_in_frame(), time_ns, pose_json(pose_of(pose.pos, pose.orientation), "world", time_ns));
+    send(channel, foxglove::pose_in_frame(), time_ns,
+         pose_json(pose_of(pose.pos, pose.orientation), "world", time_ns));
     return true;
   }
   if (fingerprint == odometry_t::getHash()) {
     odometry_t odometry;
     if (!read(odometry)) return false;
     const std::string robot = channel.substr(0, channel.find('/'));
-    const Pose X{Quat(math::cos(odometry.theta / 2), 0, 0, math::sin(odometry.theta / 2)), Vec3(odometry.x, odometry.y, 0)};
+    const Pose X{Quat(math::cos(odometry.theta / 2), 0, 0, math::sin(odometry.theta / 2)),
+                 Vec3(odometry.x, odometry.y, 0)};
     send(channel, foxglove::pose_in_frame(), time_ns, pose_json(X, robot + "/odom", time_ns));
     return true;
   }
@@ -313,8 +377,10 @@ bool FoxgloveExport::convert(const std::string& channel, uint64_t time_ns, std::
     json.open('{').name("transforms").open('[');
     for (size_t i = 0; i < state.index.size(); ++i) {
       const auto known = bodies_.find(state.index[i]);
-      const std::string name = known == bodies_.end() ? fmt::format("body_{}", state.index[i]) : known->second;
-      write_frame(json, time_ns, "world", name, pose_of(state.position[i].data(), state.orientation[i].data()));
+      const std::string name =
+          known == bodies_.end() ? fmt::format("body_{}", state.index[i]) : known->second;
+      write_frame(json, time_ns, "world", name,
+                  pose_of(state.position[i].data(), state.orientation[i].data()));
     }
     json.close(']').close('}');
     send(channel, foxglove::frame_transforms(), time_ns, json.text());
@@ -323,7 +389,8 @@ bool FoxgloveExport::convert(const std::string& channel, uint64_t time_ns, std::
   return false;
 }
 
-void FoxgloveExport::add(const std::string& name, uint64_t time_ns, std::span<const uint8_t> message) {
+void FoxgloveExport::add(const std::string& name, uint64_t time_ns,
+                         std::span<const uint8_t> message) {
   const std::string topic = printable(name);
   bool all = false;
   const bool converted = convert(topic, time_ns, message, all);
@@ -334,7 +401,8 @@ void FoxgloveExport::add(const std::string& name, uint64_t time_ns, std::span<co
     ++left_out_;
     return;
   }
-  const std::string own = converted ? topic + "/values" : topic;    // what Foxglove's type leaves out is there
+  const std::string own =
+      converted ? topic + "/values" : topic;  // what Foxglove's type leaves out is there
   out_.add_message(channel(own, "ruedo." + schema->name, json_schema(*schema)), time_ns, json);
 }
 

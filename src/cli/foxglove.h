@@ -1,5 +1,5 @@
-// A log's messages as Foxglove shows them: frames, scans, pictures, poses, the scene. What it has no type for, and what its
-// type leaves out, goes along as JSON of Ruedo's own types.
+// A log's messages as Foxglove shows them: frames, scans, pictures, poses, the scene. What it has
+// no type for, and what its type leaves out, goes along as JSON of Ruedo's own types.
 #pragma once
 
 #include <cstdint>
@@ -30,17 +30,19 @@ class FoxgloveExport {
 
  private:
   uint16_t channel(const std::string& topic, const std::string& name, const std::string& schema);
-  void send(const std::string& topic, const foxglove::Type& type, uint64_t time_ns, const std::string& json);
+  void send(const std::string& topic, const foxglove::Type& type, uint64_t time_ns,
+            const std::string& json);
   void send_frames(const run::LogWorlds::Scene& scene, uint64_t time_ns);
   void send_scene(const model::WorldModel& world, uint64_t time_ns);
   std::string device_frame(const std::string& channel) const;
   // Whether Foxglove has a type for it; all: that type says all that the message does.
-  bool convert(const std::string& channel, uint64_t time_ns, std::span<const uint8_t> message, bool& all);
+  bool convert(const std::string& channel, uint64_t time_ns, std::span<const uint8_t> message,
+               bool& all);
 
   McapWriter& out_;
   std::map<std::string, uint16_t> schemas_, channels_;
-  std::map<std::string, std::string> device_of_channel_;    // "p3at/camera/info": "p3at/camera"
-  std::map<int, std::string> bodies_;                       // names, by index
+  std::map<std::string, std::string> device_of_channel_;  // "p3at/camera/info": "p3at/camera"
+  std::map<int, std::string> bodies_;                     // names, by index
   std::set<std::string> body_names_;
   bool scene_sent_ = false;
   uint64_t left_out_ = 0;

@@ -19,7 +19,9 @@ std::string object(const std::string& title, const Fields& fields) {
   return json.text();
 }
 
-std::string list(const std::string& items) { return R"({"type": "array", "items": )" + items + "}"; }
+std::string list(const std::string& items) {
+  return R"({"type": "array", "items": )" + items + "}";
+}
 
 const std::string kNumber = R"({"type": "number"})";
 const std::string kCount = R"({"type": "integer", "minimum": 0})";
@@ -28,68 +30,112 @@ const std::string kFlag = R"({"type": "boolean"})";
 const std::string kBytes = R"({"type": "string", "contentEncoding": "base64"})";
 
 std::string time(const char* title) {
-  return object(title, {{"sec", R"({"type": "integer"})"}, {"nsec", R"({"type": "integer", "minimum": 0, "maximum": 999999999})"}});
+  return object(title, {{"sec", R"({"type": "integer"})"},
+                        {"nsec", R"({"type": "integer", "minimum": 0, "maximum": 999999999})"}});
 }
-std::string vector3() { return object("foxglove.Vector3", {{"x", kNumber}, {"y", kNumber}, {"z", kNumber}}); }
-std::string point3() { return object("foxglove.Point3", {{"x", kNumber}, {"y", kNumber}, {"z", kNumber}}); }
-std::string quaternion() { return object("foxglove.Quaternion", {{"x", kNumber}, {"y", kNumber}, {"z", kNumber}, {"w", kNumber}}); }
-std::string colour() { return object("foxglove.Color", {{"r", kNumber}, {"g", kNumber}, {"b", kNumber}, {"a", kNumber}}); }
-std::string pose() { return object("foxglove.Pose", {{"position", vector3()}, {"orientation", quaternion()}}); }
+std::string vector3() {
+  return object("foxglove.Vector3", {{"x", kNumber}, {"y", kNumber}, {"z", kNumber}});
+}
+std::string point3() {
+  return object("foxglove.Point3", {{"x", kNumber}, {"y", kNumber}, {"z", kNumber}});
+}
+std::string quaternion() {
+  return object("foxglove.Quaternion",
+                {{"x", kNumber}, {"y", kNumber}, {"z", kNumber}, {"w", kNumber}});
+}
+std::string colour() {
+  return object("foxglove.Color", {{"r", kNumber}, {"g", kNumber}, {"b", kNumber}, {"a", kNumber}});
+}
+std::string pose() {
+  return object("foxglove.Pose", {{"position", vector3()}, {"orientation", quaternion()}});
+}
 
 Type type(const std::string& name, const Fields& fields) { return {name, object(name, fields)}; }
 
 std::string deletion() {
-  return object("foxglove.SceneEntityDeletion", {{"timestamp", time("time")}, {"type", kCount}, {"id", kText}});
+  return object("foxglove.SceneEntityDeletion",
+                {{"timestamp", time("time")}, {"type", kCount}, {"id", kText}});
 }
 std::string triangles() {
-  return object("foxglove.TriangleListPrimitive",
-                {{"pose", pose()}, {"points", list(point3())}, {"color", colour()}, {"colors", list(colour())}, {"indices", list(kCount)}});
+  return object("foxglove.TriangleListPrimitive", {{"pose", pose()},
+                                                   {"points", list(point3())},
+                                                   {"color", colour()},
+                                                   {"colors", list(colour())},
+                                                   {"indices", list(kCount)}});
 }
 std::string entity() {
-  return object("foxglove.SceneEntity", {{"timestamp", time("time")}, {"frame_id", kText}, {"id", kText}, {"lifetime", time("duration")},
-                                         {"frame_locked", kFlag}, {"triangles", list(triangles())}});
+  return object("foxglove.SceneEntity", {{"timestamp", time("time")},
+                                         {"frame_id", kText},
+                                         {"id", kText},
+                                         {"lifetime", time("duration")},
+                                         {"frame_locked", kFlag},
+                                         {"triangles", list(triangles())}});
 }
 
 }  // namespace
 
 const Type& laser_scan() {
-  static const Type made = type("foxglove.LaserScan", {{"timestamp", time("time")}, {"frame_id", kText}, {"pose", pose()}, {"start_angle", kNumber},
-                                                       {"end_angle", kNumber}, {"ranges", list(kNumber)}, {"intensities", list(kNumber)}});
+  static const Type made = type("foxglove.LaserScan", {{"timestamp", time("time")},
+                                                       {"frame_id", kText},
+                                                       {"pose", pose()},
+                                                       {"start_angle", kNumber},
+                                                       {"end_angle", kNumber},
+                                                       {"ranges", list(kNumber)},
+                                                       {"intensities", list(kNumber)}});
   return made;
 }
 
 const Type& compressed_image() {
-  static const Type made = type("foxglove.CompressedImage", {{"timestamp", time("time")}, {"frame_id", kText}, {"data", kBytes}, {"format", kText}});
+  static const Type made =
+      type("foxglove.CompressedImage",
+           {{"timestamp", time("time")}, {"frame_id", kText}, {"data", kBytes}, {"format", kText}});
   return made;
 }
 
 const Type& raw_image() {
-  static const Type made = type("foxglove.RawImage", {{"timestamp", time("time")}, {"frame_id", kText}, {"width", kCount}, {"height", kCount},
-                                                      {"encoding", kText}, {"step", kCount}, {"data", kBytes}});
+  static const Type made = type("foxglove.RawImage", {{"timestamp", time("time")},
+                                                      {"frame_id", kText},
+                                                      {"width", kCount},
+                                                      {"height", kCount},
+                                                      {"encoding", kText},
+                                                      {"step", kCount},
+                                                      {"data", kBytes}});
   return made;
 }
 
 const Type& camera_calibration() {
-  static const Type made = type("foxglove.CameraCalibration",
-                                {{"timestamp", time("time")}, {"frame_id", kText}, {"width", kCount}, {"height", kCount}, {"distortion_model", kText},
-                                 {"D", list(kNumber)}, {"K", list(kNumber)}, {"R", list(kNumber)}, {"P", list(kNumber)}});
+  static const Type made = type("foxglove.CameraCalibration", {{"timestamp", time("time")},
+                                                               {"frame_id", kText},
+                                                               {"width", kCount},
+                                                               {"height", kCount},
+                                                               {"distortion_model", kText},
+                                                               {"D", list(kNumber)},
+                                                               {"K", list(kNumber)},
+                                                               {"R", list(kNumber)},
+                                                               {"P", list(kNumber)}});
   return made;
 }
 
 const Type& pose_in_frame() {
-  static const Type made = type("foxglove.PoseInFrame", {{"timestamp", time("time")}, {"frame_id", kText}, {"pose", pose()}});
+  static const Type made = type(
+      "foxglove.PoseInFrame", {{"timestamp", time("time")}, {"frame_id", kText}, {"pose", pose()}});
   return made;
 }
 
 const Type& frame_transforms() {
-  static const Type made = type("foxglove.FrameTransforms",
-                                {{"transforms", list(object("foxglove.FrameTransform", {{"timestamp", time("time")}, {"parent_frame_id", kText}, {"child_frame_id", kText},
-                                                                                        {"translation", vector3()}, {"rotation", quaternion()}}))}});
+  static const Type made =
+      type("foxglove.FrameTransforms",
+           {{"transforms", list(object("foxglove.FrameTransform", {{"timestamp", time("time")},
+                                                                   {"parent_frame_id", kText},
+                                                                   {"child_frame_id", kText},
+                                                                   {"translation", vector3()},
+                                                                   {"rotation", quaternion()}}))}});
   return made;
 }
 
 const Type& scene_update() {
-  static const Type made = type("foxglove.SceneUpdate", {{"deletions", list(deletion())}, {"entities", list(entity())}});
+  static const Type made =
+      type("foxglove.SceneUpdate", {{"deletions", list(deletion())}, {"entities", list(entity())}});
   return made;
 }
 

@@ -1,4 +1,5 @@
-// Foxglove's message types that a log is exported to, as JSON Schemas with the names by which Foxglove knows them.
+// Foxglove's message types that a log is exported to, as JSON Schemas with the names by which
+// Foxglove knows them.
 #pragma once
 
 #include <string>
@@ -6,8 +7,8 @@
 namespace ruedo::cli::foxglove {
 
 struct Type {
-  std::string name;      // "foxglove.LaserScan"
-  std::string schema;    // JSON Schema
+  std::string name;    // "foxglove.LaserScan"
+  std::string schema;  // JSON Schema
 };
 
 const Type& laser_scan();

@@ -22,7 +22,8 @@ struct ImportArguments {
 int import_map(const ImportArguments& arguments) {
   const std::filesystem::path path = arguments.map;
   std::string kind = path.extension().string();
-  std::transform(kind.begin(), kind.end(), kind.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::transform(kind.begin(), kind.end(), kind.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   std::vector<model::WallPiece> walls;
   std::string left_out;
   const auto walls_of = [&](const model::OccupancyGrid& grid) {
@@ -37,10 +38,14 @@ int import_map(const ImportArguments& arguments) {
   } else if (kind == ".map") {
     walls = model::read_armap(arguments.map, arguments.thickness, left_out);
   } else if (kind == ".world" || kind == ".inc") {
-    throw InputError({arguments.map, 0}, "is a world of Stage; import the bitmap that it names, with --width and Stage's size");
+    throw InputError(
+        {arguments.map, 0},
+        "is a world of Stage; import the bitmap that it names, with --width and Stage's size");
   } else {
-    if ((arguments.resolution > 0) == (arguments.width > 0)) throw InputError({}, "a bitmap needs --resolution or --width, to know how large it is");
-    model::OccupancyGrid grid = model::read_bitmap(arguments.map, arguments.resolution > 0 ? arguments.resolution : 1);
+    if ((arguments.resolution > 0) == (arguments.width > 0))
+      throw InputError({}, "a bitmap needs --resolution or --width, to know how large it is");
+    model::OccupancyGrid grid =
+        model::read_bitmap(arguments.map, arguments.resolution > 0 ? arguments.resolution : 1);
     if (arguments.width > 0) {
       grid.resolution = arguments.width / grid.width;
       grid.x *= grid.resolution;
@@ -57,20 +62,30 @@ int import_map(const ImportArguments& arguments) {
   out << sdf;
   out.close();
   if (!out) throw EnvironmentError(arguments.out + " cannot be written");
-  fmt::print("{}: {} walls{}\n", arguments.out, walls.size(), left_out.empty() ? "" : "; left out: " + left_out);
+  fmt::print("{}: {} walls{}\n", arguments.out, walls.size(),
+             left_out.empty() ? "" : "; left out: " + left_out);
   return kGood;
 }
 
 void add_import(CLI::App& app, Action& chosen) {
-  CLI::App* command = app.add_subcommand("import", "turn a map of ROS, Stage or MobileSim into a world with walls");
+  CLI::App* command =
+      app.add_subcommand("import", "turn a map of ROS, Stage or MobileSim into a world with walls");
   const auto arguments = std::make_shared<ImportArguments>();
-  command->add_option("MAP", arguments->map, "map_server's .yaml, ARIA's .map, or a picture")->required();
+  command->add_option("MAP", arguments->map, "map_server's .yaml, ARIA's .map, or a picture")
+      ->required();
   command->add_option("-o,--out", arguments->out, "the world (default: standard output)");
-  command->add_option("--resolution", arguments->resolution, "of a picture: side of a pixel, m")->check(CLI::Range(1e-4, 1000.0));
-  command->add_option("--width", arguments->width, "of a picture: how wide it is, m (Stage's size)")->check(CLI::Range(1e-3, 1e5));
-  command->add_option("--height", arguments->height, "of the walls, m")->capture_default_str()->check(CLI::Range(0.01, 100.0));
-  command->add_option("--thickness", arguments->thickness, "of a .map's lines, m")->capture_default_str()->check(CLI::Range(0.001, 10.0));
-  command->callback([arguments, &chosen] { chosen = [arguments] { return import_map(*arguments); }; });
+  command->add_option("--resolution", arguments->resolution, "of a picture: side of a pixel, m")
+      ->check(CLI::Range(1e-4, 1000.0));
+  command->add_option("--width", arguments->width, "of a picture: how wide it is, m (Stage's size)")
+      ->check(CLI::Range(1e-3, 1e5));
+  command->add_option("--height", arguments->height, "of the walls, m")
+      ->capture_default_str()
+      ->check(CLI::Range(0.01, 100.0));
+  command->add_option("--thickness", arguments->thickness, "of a .map's lines, m")
+      ->capture_default_str()
+      ->check(CLI::Range(0.001, 10.0));
+  command->callback(
+      [arguments, &chosen] { chosen = [arguments] { return import_map(*arguments); }; });
 }
 
 const RegisterCommand kRegister{45, add_import};

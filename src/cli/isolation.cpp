@@ -15,7 +15,8 @@ namespace ruedo::cli {
 namespace {
 
 constexpr const char* kMark = "RUEDO_ISOLATED";
-constexpr const char* kPrepare = "ip link set lo up && ip route add 224.0.0.0/4 dev lo && exec \"$@\"";
+constexpr const char* kPrepare =
+    "ip link set lo up && ip route add 224.0.0.0/4 dev lo && exec \"$@\"";
 
 std::vector<std::string> own_command() {
   std::ifstream file("/proc/self/cmdline", std::ios::binary);
@@ -59,7 +60,8 @@ bool isolate() {
   char program[4096];
   const ssize_t size = ::readlink("/proc/self/exe", program, sizeof program);
   if (size <= 0 || size == sizeof program) return false;
-  command[0] = std::string(program, static_cast<size_t>(size));    // the shell's own /proc/self is another
+  command[0] =
+      std::string(program, static_cast<size_t>(size));  // the shell's own /proc/self is another
   for (const char* flags : {"-n", "-rn"}) {
     if (!works(flags)) continue;
     ::setenv(kMark, "1", 1);

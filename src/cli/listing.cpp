@@ -1,4 +1,5 @@
-// Prints what ruedo/info tells clients, for people: one column each for channel, type, rate and what it is.
+// Prints what ruedo/info tells clients, for people: one column each for channel, type, rate and
+// what it is.
 #include "cli/listing.h"
 
 #include <algorithm>
@@ -44,8 +45,11 @@ std::string what_text(const device_info_t& device) {
   } else if (device.width > 0) {
     text = fmt::format("{} {}", device.width, device.nelements > 0 ? "transducers" : "rays");
   }
-  if (device.fov_horizontal > 0.0) text += fmt::format("{}{:.4g} deg", text.empty() ? "" : ", ", device.fov_horizontal * degrees);
-  if (device.range_max > 0.0) text += fmt::format("{}{:g} to {:g} m", text.empty() ? "" : ", ", device.range_min, device.range_max);
+  if (device.fov_horizontal > 0.0)
+    text += fmt::format("{}{:.4g} deg", text.empty() ? "" : ", ", device.fov_horizontal * degrees);
+  if (device.range_max > 0.0)
+    text += fmt::format("{}{:g} to {:g} m", text.empty() ? "" : ", ", device.range_min,
+                        device.range_max);
   return text;
 }
 
@@ -62,8 +66,9 @@ void print_rows(FILE* out, const std::vector<Row>& rows) {
     type = std::max(type, row.type.size());
   }
   for (const Row& row : rows) {
-    fmt::print(out, "  {} {}{:<{}}{}  {:<{}}  {}{:>10}{}  {}{}{}\n", row.input ? "<-" : "->", style.cyan, row.channel, name, style.off, row.type,
-               type, style.bold, row.rate, style.off, style.dim, row.what, style.off);
+    fmt::print(out, "  {} {}{:<{}}{}  {:<{}}  {}{:>10}{}  {}{}{}\n", row.input ? "<-" : "->",
+               style.cyan, row.channel, name, style.off, row.type, type, style.bold, row.rate,
+               style.off, style.dim, row.what, style.off);
   }
 }
 
@@ -71,7 +76,8 @@ std::string drive_text(const robot_info_t& robot) {
   if (robot.drive.empty()) return "does not drive";
   std::string text = robot.drive + " drive";
   if (std::isfinite(robot.max_speed)) text += fmt::format(", {:g} m/s", robot.max_speed);
-  if (std::isfinite(robot.max_turn_rate)) text += fmt::format(", {:.4g} rad/s", robot.max_turn_rate);
+  if (std::isfinite(robot.max_turn_rate))
+    text += fmt::format(", {:.4g} rad/s", robot.max_turn_rate);
   return text;
 }
 
@@ -84,11 +90,16 @@ std::map<std::string, std::vector<Row>> rows_by_robot(const Whole& whole) {
     const auto found = devices.find({channel.robot, channel.device});
     const device_info_t* device = found == devices.end() ? nullptr : found->second;
     const bool main_channel = device && channel.name == channel.robot + "/" + channel.device;
-    rows[channel.robot].push_back({channel.name, channel.type, rate_text(channel, device ? device->kind : ""),
-                                   channel.input ? "commands" : main_channel ? what_text(*device) : "", channel.input != 0});
+    rows[channel.robot].push_back({channel.name, channel.type,
+                                   rate_text(channel, device ? device->kind : ""),
+                                   channel.input  ? "commands"
+                                   : main_channel ? what_text(*device)
+                                                  : "",
+                                   channel.input != 0});
   }
   for (auto& [robot, list] : rows) {
-    std::stable_sort(list.begin(), list.end(), [](const Row& a, const Row& b) { return a.input < b.input; });
+    std::stable_sort(list.begin(), list.end(),
+                     [](const Row& a, const Row& b) { return a.input < b.input; });
   }
   return rows;
 }
@@ -97,7 +108,8 @@ std::string signature(const robot_info_t& robot, const std::vector<Row>& rows) {
   std::string text = robot.model + "|" + drive_text(robot);
   for (const Row& row : rows) {
     const bool own = row.channel.rfind(robot.name + "/", 0) == 0;
-    text += "|" + (own ? row.channel.substr(robot.name.size()) : row.channel) + row.type + row.rate + row.what;
+    text += "|" + (own ? row.channel.substr(robot.name.size()) : row.channel) + row.type +
+            row.rate + row.what;
   }
   return text;
 }
@@ -108,19 +120,26 @@ void print_channels(FILE* out, const std::vector<world_info_t>& info) {
   const Style style = style_of(out);
   const Whole whole(info);
   auto rows = rows_by_robot(whole);
-  std::vector<std::pair<const robot_info_t*, std::vector<std::string>>> kinds;    // the first of each, and the others' names
+  std::vector<std::pair<const robot_info_t*, std::vector<std::string>>>
+      kinds;  // the first of each, and the others' names
   std::map<std::string, size_t> kind_of;
   for (const robot_info_t& robot : whole.robots) {
-    const auto [found, added] = kind_of.try_emplace(signature(robot, rows[robot.name]), kinds.size());
-    if (added) kinds.push_back({&robot, {}});
-    else kinds[found->second].second.push_back(robot.name);
+    const auto [found, added] =
+        kind_of.try_emplace(signature(robot, rows[robot.name]), kinds.size());
+    if (added)
+      kinds.push_back({&robot, {}});
+    else
+      kinds[found->second].second.push_back(robot.name);
   }
   for (const auto& [robot, others] : kinds) {
-    fmt::print(out, "{}{}{} ({}; {})", style.bold, robot->name, style.off, for_terminal(robot->model), drive_text(*robot));
+    fmt::print(out, "{}{}{} ({}; {})", style.bold, robot->name, style.off,
+               for_terminal(robot->model), drive_text(*robot));
     if (!others.empty()) {
       fmt::print(out, ", and alike: ");
-      for (size_t i = 0; i < others.size() && i < 3; ++i) fmt::print(out, "{}{}", i > 0 ? ", " : "", others[i]);
-      if (others.size() > 3) fmt::print(out, ", ... {} ({} in all)", others.back(), others.size() + 1);
+      for (size_t i = 0; i < others.size() && i < 3; ++i)
+        fmt::print(out, "{}{}", i > 0 ? ", " : "", others[i]);
+      if (others.size() > 3)
+        fmt::print(out, ", ... {} ({} in all)", others.back(), others.size() + 1);
     }
     fmt::print(out, "\n");
     print_rows(out, rows[robot->name]);
@@ -133,21 +152,31 @@ void print_devices(FILE* out, const std::vector<world_info_t>& info) {
   const Style style = style_of(out);
   const Whole whole(info);
   for (const robot_info_t& robot : whole.robots) {
-    fmt::print(out, "{}{}{} ({}; {})\n", style.bold, robot.name, style.off, for_terminal(robot.model), drive_text(robot));
+    fmt::print(out, "{}{}{} ({}; {})\n", style.bold, robot.name, style.off,
+               for_terminal(robot.model), drive_text(robot));
     if (!robot.drive.empty()) {
       std::string wheels;
-      for (size_t i = 0; i < robot.wheels.size(); ++i) wheels += fmt::format("{}{} ({})", i > 0 ? ", " : "", robot.wheels[i], robot.left[i] ? "left" : "right");
-      fmt::print(out, "  wheels: {}; radius {:g} m, track {:g} m\n", wheels, robot.wheel_radius, robot.track);
-      fmt::print(out, "  accelerates with {:g}, brakes with {:g} m/s^2, turns with {:g} rad/s^2; watchdog {}\n", robot.acceleration,
-                 robot.deceleration, robot.turn_acceleration,
-                 robot.watchdog_us > 0 ? fmt::format("{:g} s", static_cast<double>(robot.watchdog_us) * 1e-6) : "off");
+      for (size_t i = 0; i < robot.wheels.size(); ++i)
+        wheels += fmt::format("{}{} ({})", i > 0 ? ", " : "", robot.wheels[i],
+                              robot.left[i] ? "left" : "right");
+      fmt::print(out, "  wheels: {}; radius {:g} m, track {:g} m\n", wheels, robot.wheel_radius,
+                 robot.track);
+      fmt::print(
+          out,
+          "  accelerates with {:g}, brakes with {:g} m/s^2, turns with {:g} rad/s^2; watchdog {}\n",
+          robot.acceleration, robot.deceleration, robot.turn_acceleration,
+          robot.watchdog_us > 0
+              ? fmt::format("{:g} s", static_cast<double>(robot.watchdog_us) * 1e-6)
+              : "off");
     }
     for (const device_info_t& device : whole.devices) {
       if (device.robot != robot.name) continue;
       const double* q = device.orientation;
-      const double yaw = math::atan2(2.0 * (q[0] * q[3] + q[1] * q[2]), 1.0 - 2.0 * (q[2] * q[2] + q[3] * q[3]));
-      fmt::print(out, "  {}{:<16}{} {:<10} at {:.3f}, {:.3f}, {:.3f} m, {:.1f} deg  {}\n", style.cyan, device.name, style.off, device.kind,
-                 device.position[0], device.position[1], device.position[2], yaw * 180.0 / M_PI, what_text(device));
+      const double yaw =
+          math::atan2(2.0 * (q[0] * q[3] + q[1] * q[2]), 1.0 - 2.0 * (q[2] * q[2] + q[3] * q[3]));
+      fmt::print(out, "  {}{:<16}{} {:<10} at {:.3f}, {:.3f}, {:.3f} m, {:.1f} deg  {}\n",
+                 style.cyan, device.name, style.off, device.kind, device.position[0],
+                 device.position[1], device.position[2], yaw * 180.0 / M_PI, what_text(device));
     }
   }
 }

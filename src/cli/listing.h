@@ -16,6 +16,8 @@ void print_channels(FILE* out, const std::vector<world_info_t>& info);
 void print_devices(FILE* out, const std::vector<world_info_t>& info);
 
 // "1 robot", "2 robots".
-inline std::string counted(size_t n, const char* what) { return std::to_string(n) + " " + what + (n == 1 ? "" : "s"); }
+inline std::string counted(size_t n, const char* what) {
+  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
+}
 
 }  // namespace ruedo::cli

@@ -17,11 +17,12 @@ struct LoggedOptions {
   std::vector<std::pair<std::string, std::string>> remaps;
 };
 
-// log: names it in messages. Throws InputError for a header without a world, or with an option that is not known.
+// log: names it in messages. Throws InputError for a header without a world, or with an option that
+// is not known.
 LoggedOptions read_options(const log_header_t& header, const std::string& log);
 
-// What `repeat` returns. An option that is wrong there was not typed by the user, it stands in the log: the InputError that
-// it makes names the log.
+// What `repeat` returns. An option that is wrong there was not typed by the user, it stands in the
+// log: the InputError that it makes names the log.
 template <typename Repeat>
 auto with_options_of(const std::string& log, Repeat repeat) {
   try {
@@ -32,8 +33,8 @@ auto with_options_of(const std::string& log, Repeat repeat) {
   }
 }
 
-// The run to show. A world whose files were changed is shown as it is now, with a warning. Throws InputError, too, when the
-// world cannot be read.
+// The run to show. A world whose files were changed is shown as it is now, with a warning. Throws
+// InputError, too, when the world cannot be read.
 run::LoggedRun load_run(const log_header_t& header, const std::string& log);
 
 }  // namespace ruedo::cli

@@ -1,4 +1,5 @@
-// ruedo: reads the command line, runs one command, and turns what went wrong into one line and an exit code.
+// ruedo: reads the command line, runs one command, and turns what went wrong into one line and an
+// exit code.
 #include <sys/resource.h>
 
 #include <cstdio>
@@ -13,11 +14,11 @@
 #include "cli/commands.h"
 #include "core/installation.h"
 #include "core/utf8.h"
+#include "core/version.h"
 #include "physics/state_check.h"
 #include "ruedo/element.h"
 #include "ruedo/errors.h"
 #include "scene/gl_context.h"
-#include "core/version.h"
 
 namespace {
 
@@ -25,7 +26,8 @@ using namespace ruedo::cli;
 
 void say(const std::string& text) {
   const Style style = style_of(stderr);
-  fmt::print(stderr, "{}{}ruedo: {}{}{}\n", style.bold, style.red, style.off, ruedo::for_terminal(text), style.off);
+  fmt::print(stderr, "{}{}ruedo: {}{}{}\n", style.bold, style.red, style.off,
+             ruedo::for_terminal(text), style.off);
 }
 
 // A hint for what CLI11 did not know: the nearest command or option.
@@ -50,28 +52,38 @@ std::string suggestion(const CLI::App& app, int argc, char** argv) {
     if (std::find(known.begin(), known.end(), name) != known.end()) continue;
     const std::string near = ruedo::nearest_word(name, known);
     if (!near.empty()) return "; did you mean '" + near + "'?";
-    if (command == &app && word[0] != '-') return fmt::format("; there is no '{}', there are {}", word, fmt::join(known, ", "));
+    if (command == &app && word[0] != '-')
+      return fmt::format("; there is no '{}', there are {}", word, fmt::join(known, ", "));
   }
   return "";
 }
 
-// What neither threads nor libraries can do without, and what they hang or crash for: said here, where it can be said.
+// What neither threads nor libraries can do without, and what they hang or crash for: said here,
+// where it can be said.
 void check_limits() {
   constexpr rlim_t kFiles = 64, kMemory = rlim_t{1024} << 20;
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) == 0 && limit.rlim_cur < kFiles) {
-    throw ruedo::EnvironmentError(fmt::format("{} open files are allowed here, and {} are needed: ulimit -n {}", limit.rlim_cur, kFiles, kFiles));
+    throw ruedo::EnvironmentError(
+        fmt::format("{} open files are allowed here, and {} are needed: ulimit -n {}",
+                    limit.rlim_cur, kFiles, kFiles));
   }
   if (getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur < kMemory) {
-    throw ruedo::EnvironmentError(fmt::format("{} MB of address space are allowed here, and {} are needed: ulimit -v {}", limit.rlim_cur >> 20, kMemory >> 20, kMemory >> 10));
+    throw ruedo::EnvironmentError(
+        fmt::format("{} MB of address space are allowed here, and {} are needed: ulimit -v {}",
+                    limit.rlim_cur >> 20, kMemory >> 20, kMemory >> 10));
   }
 }
 
-// A folder or file that comes with the program, for what is built on it: printed in place of running a command.
-void add_place(CLI::App& app, const std::string& option, const std::string& path, int above, const std::string& description) {
+// A folder or file that comes with the program, for what is built on it: printed in place of
+// running a command.
+void add_place(CLI::App& app, const std::string& option, const std::string& path, int above,
+               const std::string& description) {
   const auto show = [=] {
     const std::string found = ruedo::find_installed(path);
-    if (found.empty()) throw ruedo::EnvironmentError("there is no " + path + " beside this program: it was not installed, or without that");
+    if (found.empty())
+      throw ruedo::EnvironmentError("there is no " + path +
+                                    " beside this program: it was not installed, or without that");
     std::filesystem::path place = found;
     for (int i = 0; i < above; ++i) place = place.parent_path();
     throw CLI::CallForVersion(place.string(), 0);
@@ -80,20 +92,26 @@ void add_place(CLI::App& app, const std::string& option, const std::string& path
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{"Ruedo: a simulation server for mobile robots. Robots are data servers; LCM carries commands in and sensor streams out.",
-               "ruedo"};
+  CLI::App app{
+      "Ruedo: a simulation server for mobile robots. Robots are data servers; LCM carries commands "
+      "in and sensor streams out.",
+      "ruedo"};
   app.set_version_flag("--version", std::string("ruedo ") + ruedo::version());
-  add_place(app, "--prefix", "share/ruedo/worlds", 3, "print where Ruedo is installed, for CMAKE_PREFIX_PATH, and exit");
-  add_place(app, "--jar", "share/java/ruedo.jar", 0, "print where the Java client is, for the class path, and exit");
+  add_place(app, "--prefix", "share/ruedo/worlds", 3,
+            "print where Ruedo is installed, for CMAKE_PREFIX_PATH, and exit");
+  add_place(app, "--jar", "share/java/ruedo.jar", 0,
+            "print where the Java client is, for the class path, and exit");
   app.require_subcommand(1);
   app.failure_message(CLI::FailureMessage::simple);
-  app.footer("Exit codes: 0 good, 1 the check failed, 2 wrong usage, 3 bad input file, 4 environment, 5 a state that is not finite.");
+  app.footer(
+      "Exit codes: 0 good, 1 the check failed, 2 wrong usage, 3 bad input file, 4 environment, 5 a "
+      "state that is not finite.");
   Action action;
   for (const RegisterCommand::Add add : registered_commands()) add(app, action);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);    // --help, --version
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
     say(std::string(error.what()) + suggestion(app, argc, argv));
     fmt::print(stderr, "Run `ruedo --help`, or `ruedo COMMAND --help`.\n");
     return kWrongUsage;

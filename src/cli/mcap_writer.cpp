@@ -1,5 +1,5 @@
-// Records are an operation (1 byte), a length (8 bytes) and their fields, all little endian; texts and lists have their
-// length in bytes before them (4 bytes).
+// Records are an operation (1 byte), a length (8 bytes) and their fields, all little endian; texts
+// and lists have their length in bytes before them (4 bytes).
 #include "cli/mcap_writer.h"
 
 #include <algorithm>
@@ -7,21 +7,32 @@
 #include <cstring>
 #include <filesystem>
 
+#include "core/version.h"
 #include "ruedo/errors.h"
 #include "run/tick.h"
-#include "core/version.h"
 
 namespace ruedo::cli {
 namespace {
 
 enum class Op : uint8_t {
-  header = 1, footer = 2, schema = 3, channel = 4, message = 5, chunk = 6, message_index = 7, chunk_index = 8, statistics = 11, summary_offset = 14, data_end = 15,
+  header = 1,
+  footer = 2,
+  schema = 3,
+  channel = 4,
+  message = 5,
+  chunk = 6,
+  message_index = 7,
+  chunk_index = 8,
+  statistics = 11,
+  summary_offset = 14,
+  data_end = 15,
 };
 constexpr std::string_view kMagic = "\x89MCAP0\r\n";
 
 template <class Number>
 void put(std::string& bytes, Number value) {
-  for (size_t i = 0; i < sizeof value; ++i) bytes += static_cast<char>(static_cast<uint64_t>(value) >> (8 * i));
+  for (size_t i = 0; i < sizeof value; ++i)
+    bytes += static_cast<char>(static_cast<uint64_t>(value) >> (8 * i));
 }
 void put_text(std::string& bytes, std::string_view text) {
   put(bytes, static_cast<uint32_t>(text.size()));
@@ -48,7 +59,8 @@ uint32_t crc_of(std::string_view bytes, uint32_t before = 0) {
 
 }  // namespace
 
-McapWriter::McapWriter(const std::string& path, const std::string& profile) : path_(path), file_(std::fopen(path.c_str(), "wb")) {
+McapWriter::McapWriter(const std::string& path, const std::string& profile)
+    : path_(path), file_(std::fopen(path.c_str(), "wb")) {
   if (!file_) throw EnvironmentError(path + " cannot be written: " + std::strerror(errno));
   write(kMagic);
   std::string fields;
@@ -60,18 +72,21 @@ McapWriter::McapWriter(const std::string& path, const std::string& profile) : pa
 McapWriter::~McapWriter() {
   if (finished_) return;
   file_.reset();
-  std::error_code error;    // a device is none of ours to remove
+  std::error_code error;  // a device is none of ours to remove
   if (std::filesystem::is_regular_file(path_, error)) std::filesystem::remove(path_, error);
 }
 
 void McapWriter::write(std::string_view bytes) {
-  if (std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size()) throw EnvironmentError(path_ + " cannot be written: " + std::strerror(errno));
+  if (std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size())
+    throw EnvironmentError(path_ + " cannot be written: " + std::strerror(errno));
   offset_ += bytes.size();
   crc_ = crc_of(bytes, crc_);
 }
 
-uint16_t McapWriter::add_schema(const std::string& name, const std::string& encoding, std::string_view data) {
-  if (schemas_.size() >= kMostIds) throw InputError({path_}, "has no room for more than 65535 schemas");
+uint16_t McapWriter::add_schema(const std::string& name, const std::string& encoding,
+                                std::string_view data) {
+  if (schemas_.size() >= kMostIds)
+    throw InputError({path_}, "has no room for more than 65535 schemas");
   const auto id = static_cast<uint16_t>(schemas_.size() + 1);
   std::string fields;
   put(fields, id);
@@ -83,8 +98,10 @@ uint16_t McapWriter::add_schema(const std::string& name, const std::string& enco
   return id;
 }
 
-uint16_t McapWriter::add_channel(uint16_t schema, const std::string& topic, const std::string& encoding, const Metadata& metadata) {
-  if (channels_.size() >= kMostIds) throw InputError({path_}, "has no room for more than 65535 channels");
+uint16_t McapWriter::add_channel(uint16_t schema, const std::string& topic,
+                                 const std::string& encoding, const Metadata& metadata) {
+  if (channels_.size() >= kMostIds)
+    throw InputError({path_}, "has no room for more than 65535 channels");
   const auto id = static_cast<uint16_t>(channels_.size() + 1);
   std::string fields;
   put(fields, id);
@@ -109,8 +126,8 @@ void McapWriter::add_message(uint16_t channel, uint64_t time_ns, std::string_vie
   std::string fields;
   put(fields, channel);
   put(fields, sequences_[channel]++);
-  put(fields, time_ns);    // logged
-  put(fields, time_ns);    // published
+  put(fields, time_ns);  // logged
+  put(fields, time_ns);  // published
   chunk_ += static_cast<char>(Op::message);
   put(chunk_, static_cast<uint64_t>(fields.size() + data.size()));
   chunk_ += fields;
@@ -128,7 +145,7 @@ void McapWriter::end_chunk() {
   put(fields, chunk_end_ns_);
   put(fields, static_cast<uint64_t>(chunk_.size()));
   put(fields, crc_of(chunk_));
-  put_text(fields, "");    // not compressed
+  put_text(fields, "");  // not compressed
   put(fields, static_cast<uint64_t>(chunk_.size()));
   fields += chunk_;
   write(record(Op::chunk, fields));
@@ -151,7 +168,7 @@ void McapWriter::end_chunk() {
 void McapWriter::write_summary() {
   const uint64_t begin = offset_;
   std::string offsets;
-  crc_ = 0;    // of the summary from here on
+  crc_ = 0;  // of the summary from here on
   const auto group = [&](Op op, const std::vector<std::string>& records) {
     const uint64_t from = offset_;
     for (const std::string& each : records) write(each);
@@ -168,8 +185,8 @@ void McapWriter::write_summary() {
   put(statistics, messages_);
   put(statistics, static_cast<uint16_t>(schemas_.size()));
   put(statistics, static_cast<uint32_t>(channels_.size()));
-  put(statistics, uint32_t{0});    // attachments
-  put(statistics, uint32_t{0});    // metadata
+  put(statistics, uint32_t{0});  // attachments
+  put(statistics, uint32_t{0});  // metadata
   put(statistics, static_cast<uint32_t>(chunks_.size()));
   put(statistics, begin_ns_);
   put(statistics, end_ns_);
@@ -178,7 +195,8 @@ void McapWriter::write_summary() {
   std::vector<std::string> indexes;
   for (const ChunkIndex& chunk : chunks_) {
     std::string fields;
-    for (const uint64_t value : {chunk.begin_ns, chunk.end_ns, chunk.offset, chunk.size}) put(fields, value);
+    for (const uint64_t value : {chunk.begin_ns, chunk.end_ns, chunk.offset, chunk.size})
+      put(fields, value);
     put_map(fields, chunk.index_offsets);
     put(fields, chunk.index_size);
     put_text(fields, "");
@@ -193,7 +211,8 @@ void McapWriter::write_summary() {
   put(footer, begin);
   put(footer, offsets_begin);
   std::string head = record(Op::footer, footer);
-  head[1] = static_cast<char>(footer.size() + sizeof(uint32_t));    // its length counts the checksum, too
+  head[1] =
+      static_cast<char>(footer.size() + sizeof(uint32_t));  // its length counts the checksum, too
   put(footer, crc_of(head, crc_));
   write(record(Op::footer, footer));
 }
@@ -205,7 +224,8 @@ void McapWriter::finish() {
   write(record(Op::data_end, data_end));
   write_summary();
   write(kMagic);
-  if (std::fflush(file_.get()) != 0) throw EnvironmentError(path_ + " cannot be written: " + std::strerror(errno));
+  if (std::fflush(file_.get()) != 0)
+    throw EnvironmentError(path_ + " cannot be written: " + std::strerror(errno));
   finished_ = true;
 }
 

@@ -1,4 +1,5 @@
-// Writes MCAP files (mcap.dev/spec): messages in chunks with their indexes, a summary, and checksums. Not compressed.
+// Writes MCAP files (mcap.dev/spec): messages in chunks with their indexes, a summary, and
+// checksums. Not compressed.
 #pragma once
 
 #include <cstdint>
@@ -13,21 +14,23 @@ namespace ruedo::cli {
 
 class McapWriter {
  public:
-  static constexpr size_t kChunkSize = size_t{1} << 20;    // bytes; a chunk ends with the message that passes it
-  static constexpr size_t kMostIds = 65535;                // schemas, and channels
+  static constexpr size_t kChunkSize =
+      size_t{1} << 20;                       // bytes; a chunk ends with the message that passes it
+  static constexpr size_t kMostIds = 65535;  // schemas, and channels
 
   using Metadata = std::map<std::string, std::string>;
 
-  // profile: MCAP's word for whose conventions hold, "ros2". Throws EnvironmentError when the file cannot be written, as all that
-  // follows does.
+  // profile: MCAP's word for whose conventions hold, "ros2". Throws EnvironmentError when the file
+  // cannot be written, as all that follows does.
   explicit McapWriter(const std::string& path, const std::string& profile = "");
-  ~McapWriter();    // a file that was not finished is removed
+  ~McapWriter();  // a file that was not finished is removed
   McapWriter(const McapWriter&) = delete;
   McapWriter& operator=(const McapWriter&) = delete;
 
   // Both return an id. Throw InputError when there are too many.
   uint16_t add_schema(const std::string& name, const std::string& encoding, std::string_view data);
-  uint16_t add_channel(uint16_t schema, const std::string& topic, const std::string& encoding, const Metadata& metadata = {});
+  uint16_t add_channel(uint16_t schema, const std::string& topic, const std::string& encoding,
+                       const Metadata& metadata = {});
   void add_message(uint16_t channel, uint64_t time_ns, std::string_view data);
   void finish();
 
@@ -47,14 +50,16 @@ class McapWriter {
   void write_summary();
 
   std::string path_;
-  struct Close { void operator()(std::FILE* file) const { std::fclose(file); } };
+  struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
   std::unique_ptr<std::FILE, Close> file_;
   uint64_t offset_ = 0;
-  uint32_t crc_ = 0;                    // of all that was written
-  std::vector<std::string> schemas_, channels_;    // records
-  std::map<uint16_t, uint64_t> counts_;            // messages of each channel
+  uint32_t crc_ = 0;                             // of all that was written
+  std::vector<std::string> schemas_, channels_;  // records
+  std::map<uint16_t, uint64_t> counts_;          // messages of each channel
   std::map<uint16_t, uint32_t> sequences_;
-  std::string chunk_;                              // records of the chunk that is open
+  std::string chunk_;  // records of the chunk that is open
   std::map<uint16_t, std::vector<IndexEntry>> index_;
   uint64_t chunk_begin_ns_ = 0, chunk_end_ns_ = 0, begin_ns_ = 0, end_ns_ = 0, messages_ = 0;
   std::vector<ChunkIndex> chunks_;

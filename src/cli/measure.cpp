@@ -1,4 +1,5 @@
-// ruedo bench and ruedo experiments: a program of its own, ruedo-measure, so that what serves does not carry what measures.
+// ruedo bench and ruedo experiments: a program of its own, ruedo-measure, so that what serves does
+// not carry what measures.
 #include <cerrno>
 #include <cstring>
 
@@ -13,8 +14,12 @@ namespace {
 
 int pass_on(const std::string& command, const std::vector<std::string>& words) {
   const std::string program = find_installed("ruedo-measure");
-  if (program.empty()) throw EnvironmentError("ruedo " + command + " is done by ruedo-measure, which is not beside this program: it was not installed");
-  std::vector<char*> arguments{const_cast<char*>(program.c_str()), const_cast<char*>(command.c_str())};
+  if (program.empty())
+    throw EnvironmentError(
+        "ruedo " + command +
+        " is done by ruedo-measure, which is not beside this program: it was not installed");
+  std::vector<char*> arguments{const_cast<char*>(program.c_str()),
+                               const_cast<char*>(command.c_str())};
   for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
   ::execv(program.c_str(), arguments.data());
@@ -32,8 +37,10 @@ void add(CLI::App& app, Action& chosen, const std::string& name, const std::stri
 }
 
 void add_all(CLI::App& app, Action& chosen) {
-  add(app, chosen, "bench", "measure this machine: robots against real time, LCM, cameras, latency, rays");
-  add(app, chosen, "experiments", "run the experiments of the paper that Ruedo began with, and write a page about them");
+  add(app, chosen, "bench",
+      "measure this machine: robots against real time, LCM, cameras, latency, rays");
+  add(app, chosen, "experiments",
+      "run the experiments of the paper that Ruedo began with, and write a page about them");
 }
 
 const RegisterCommand kRegister{80, add_all};

@@ -1,4 +1,5 @@
-// A message is checked as a whole first; then it is walked by its type without a further look at lengths.
+// A message is checked as a whole first; then it is walked by its type without a further look at
+// lengths.
 #include "cli/message_json.h"
 
 #include <cmath>
@@ -63,7 +64,8 @@ class Walk {
   explicit Walk(std::span<const uint8_t> bytes) : bytes_(bytes) {}
 
   void object(const Schema& schema, JsonWriter& json) {
-    std::vector<int64_t> counts(schema.fields.size());    // of fields that are numbers: those of array lengths are
+    std::vector<int64_t> counts(
+        schema.fields.size());  // of fields that are numbers: those of array lengths are
     json.open('{');
     for (size_t i = 0; i < schema.fields.size(); ++i) {
       const Field& field = schema.fields[i];
@@ -82,10 +84,12 @@ class Walk {
     return value;
   }
 
-  void array(const Field& field, size_t dimension, const std::vector<int64_t>& counts, JsonWriter& json, int64_t& integer) {
+  void array(const Field& field, size_t dimension, const std::vector<int64_t>& counts,
+             JsonWriter& json, int64_t& integer) {
     if (dimension == field.dimensions.size()) return one(field, json, integer);
     const Dimension& of = field.dimensions[dimension];
-    const auto count = static_cast<size_t>(of.counted_by < 0 ? of.size : counts[static_cast<size_t>(of.counted_by)]);
+    const auto count = static_cast<size_t>(
+        of.counted_by < 0 ? of.size : counts[static_cast<size_t>(of.counted_by)]);
     if (field.primitive == Primitive::byte && dimension + 1 == field.dimensions.size()) {
       json.value(base64(bytes_.subspan(at_, count)));
       at_ += count;
@@ -120,7 +124,7 @@ class Walk {
         return;
       }
       case Primitive::string: {
-        const size_t size = static_cast<size_t>(take(4));    // with the 0 at its end
+        const size_t size = static_cast<size_t>(take(4));  // with the 0 at its end
         json.value(printable({reinterpret_cast<const char*>(bytes_.data()) + at_, size - 1}));
         at_ += size;
         return;
@@ -135,12 +139,15 @@ class Walk {
 }  // namespace
 
 std::string base64(std::span<const uint8_t> bytes) {
-  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  constexpr std::string_view kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text;
   text.reserve((bytes.size() + 2) / 3 * 4);
   for (size_t i = 0; i < bytes.size(); i += 3) {
     const size_t left = bytes.size() - i;
-    const uint32_t three = uint32_t{bytes[i]} << 16 | (left > 1 ? uint32_t{bytes[i + 1]} << 8 : 0u) | (left > 2 ? uint32_t{bytes[i + 2]} : 0u);
+    const uint32_t three = uint32_t{bytes[i]} << 16 |
+                           (left > 1 ? uint32_t{bytes[i + 1]} << 8 : 0u) |
+                           (left > 2 ? uint32_t{bytes[i + 2]} : 0u);
     text += kDigits[three >> 18];
     text += kDigits[three >> 12 & 63];
     text += left > 1 ? kDigits[three >> 6 & 63] : '=';
@@ -162,7 +169,7 @@ std::string json_message(const Schema& schema, std::span<const uint8_t> message)
   if (!well_formed(schema, message)) return "";
   JsonWriter json;
   Walk walk(message);
-  walk.skip(sizeof(int64_t));    // the fingerprint
+  walk.skip(sizeof(int64_t));  // the fingerprint
   walk.object(schema, json);
   return json.text();
 }

@@ -13,8 +13,8 @@ namespace ruedo::cli {
 // Bytes as base64, as JSON Schema's contentEncoding names it.
 std::string base64(std::span<const uint8_t> bytes);
 
-// A number as JSON that reads back to the same; of those that JSON has not, infinity as 1e999 (what reads beyond the
-// largest number is infinite) and NaN as null.
+// A number as JSON that reads back to the same; of those that JSON has not, infinity as 1e999 (what
+// reads beyond the largest number is infinite) and NaN as null.
 std::string json_number(double value);
 std::string json_number(float value);
 

@@ -1,4 +1,5 @@
-// ruedo play: publishes a log's messages again, with the times between them; or shows them in the web console.
+// ruedo play: publishes a log's messages again, with the times between them; or shows them in the
+// web console.
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -12,15 +13,15 @@
 #include "cli/commands.h"
 #include "cli/sandboxed.h"
 #include "cli/view.h"
-#include "ruedo/errors.h"
 #include "log/reader.h"
+#include "ruedo/errors.h"
 
 namespace ruedo::cli {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kLongestSleep = std::chrono::milliseconds(100);    // Ctrl-C is seen after that
+constexpr auto kLongestSleep = std::chrono::milliseconds(100);  // Ctrl-C is seen after that
 
 volatile std::sig_atomic_t interrupted = 0;
 
@@ -46,7 +47,9 @@ bool sleep_until(Clock::time_point time) {
 
 int view(const PlayArguments& arguments, double speed) {
   if (!std::isfinite(speed)) throw InputError({}, "--speed max: with --view a number is wanted");
-  if (!arguments.lcm.empty()) throw InputError({}, "--lcm goes not with --view: the page shows the log, and nothing is published");
+  if (!arguments.lcm.empty())
+    throw InputError(
+        {}, "--lcm goes not with --view: the page shows the log, and nothing is published");
   const auto serving = view_log(arguments.log, arguments.view, speed);
   while (!interrupted) std::this_thread::sleep_for(kLongestSleep);
   return kGood;
@@ -57,7 +60,8 @@ int play(const PlayArguments& arguments) {
   const double speed = parse_rate(arguments.speed);
   std::signal(SIGINT, [](int) { interrupted = 1; });
   std::signal(SIGTERM, [](int) { interrupted = 1; });
-  if (!arguments.html.empty()) return write_page(arguments.log, arguments.html, arguments.html_size), kGood;
+  if (!arguments.html.empty())
+    return write_page(arguments.log, arguments.html, arguments.html_size), kGood;
   if (arguments.viewed) return view(arguments, speed);
   log::Reader log(arguments.log);
   bus::LcmBus bus(arguments.lcm);
@@ -70,28 +74,46 @@ int play(const PlayArguments& arguments) {
     if (messages == 0) first_us = event.timestamp_us, begin = Clock::now();
     if (std::isfinite(speed)) {
       const double after_s = static_cast<double>(event.timestamp_us - first_us) * 1e-6 / speed;
-      if (!sleep_until(begin + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(after_s)))) break;
+      if (!sleep_until(begin + std::chrono::duration_cast<Clock::duration>(
+                                   std::chrono::duration<double>(after_s))))
+        break;
     }
     bus.publish(event.channel, event.data.data(), event.data.size());
     ++messages;
   }
   if (!log.fault().empty()) fmt::print(stderr, "ruedo: {}: {}\n", arguments.log, log.fault());
-  const double seconds = messages == 0 ? 0.0 : static_cast<double>(event.timestamp_us - first_us) * 1e-6;
-  fmt::print("{}: {} messages, {:g} s, on {}{}\n", arguments.log, messages, seconds, bus.url().str(), interrupted ? "; interrupted" : "");
+  const double seconds =
+      messages == 0 ? 0.0 : static_cast<double>(event.timestamp_us - first_us) * 1e-6;
+  fmt::print("{}: {} messages, {:g} s, on {}{}\n", arguments.log, messages, seconds,
+             bus.url().str(), interrupted ? "; interrupted" : "");
   return kGood;
 }
 
 void add_play(CLI::App& app, Action& chosen) {
-  CLI::App* command = app.add_subcommand("play", "publish a log's messages again, or show them in the web console");
+  CLI::App* command =
+      app.add_subcommand("play", "publish a log's messages again, or show them in the web console");
   const auto arguments = std::make_shared<PlayArguments>();
   command->add_option("LOG", arguments->log, "a standard LCM log")->required();
-  command->add_option("--speed", arguments->speed, "log time per real time, or max")->type_name("S|max")->capture_default_str();
-  CLI::Option* view = command->add_option("--view", arguments->view, "show it in the web console instead (default: 127.0.0.1:8080)");
+  command->add_option("--speed", arguments->speed, "log time per real time, or max")
+      ->type_name("S|max")
+      ->capture_default_str();
+  CLI::Option* view = command->add_option(
+      "--view", arguments->view, "show it in the web console instead (default: 127.0.0.1:8080)");
   view->type_name("[ADDRESS:PORT]")->expected(0, 1);
-  command->add_option("--html", arguments->html, "write it as a page that needs no server instead")->type_name("FILE")->excludes(view);
-  command->add_option("--html-size", arguments->html_size, "at most so large: messages are thinned to fit")->type_name("MB")->capture_default_str()
-      ->check(CLI::Range(1.0, 1000.0))->needs("--html");
-  command->add_option("--lcm", arguments->lcm, "LCM address (default: $LCM_DEFAULT_URL, or LCM's group)")->type_name("URL");
+  command->add_option("--html", arguments->html, "write it as a page that needs no server instead")
+      ->type_name("FILE")
+      ->excludes(view);
+  command
+      ->add_option("--html-size", arguments->html_size,
+                   "at most so large: messages are thinned to fit")
+      ->type_name("MB")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 1000.0))
+      ->needs("--html");
+  command
+      ->add_option("--lcm", arguments->lcm,
+                   "LCM address (default: $LCM_DEFAULT_URL, or LCM's group)")
+      ->type_name("URL");
   add_sandbox_argument(*command, arguments->sandboxed);
   command->callback([arguments, view, &chosen] {
     arguments->viewed = view->count() > 0;

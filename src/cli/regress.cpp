@@ -1,4 +1,5 @@
-// ruedo regress: one regression of a user's: a world, a client, and what must come of it. ctest and pytest run it.
+// ruedo regress: one regression of a user's: a world, a client, and what must come of it. ctest and
+// pytest run it.
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
@@ -14,12 +15,12 @@
 #include "cli/commands.h"
 #include "cli/isolation.h"
 #include "cli/view.h"
-#include "judge/judge.h"
 #include "core/json.h"
-#include "ruedo/errors.h"
+#include "judge/judge.h"
 #include "log/diff.h"
 #include "log/reader.h"
 #include "log/writer.h"
+#include "ruedo/errors.h"
 #include "run/run.h"
 
 namespace ruedo::cli {
@@ -27,7 +28,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kPageSize_MB = 20.0;    // of the page that shows a failed run
+constexpr double kPageSize_MB = 20.0;  // of the page that shows a failed run
 
 struct RegressArguments {
   WorldArguments world;
@@ -52,7 +53,8 @@ run::RunOptions server_options(const RegressArguments& arguments) {
     options.remaps.push_back(parse_remap(text));
     options.result_options.push_back("--remap=" + text);
   }
-  for (const std::string& text : arguments.wait_for) options.wait_for.push_back(parse_wait_for(text));
+  for (const std::string& text : arguments.wait_for)
+    options.wait_for.push_back(parse_wait_for(text));
   options.simulation.fleet.seed = arguments.seed;
   options.simulation.fleet.noise = !arguments.world.no_noise;
   options.simulation.fleet.disabled = arguments.world.disabled;
@@ -60,15 +62,18 @@ run::RunOptions server_options(const RegressArguments& arguments) {
 }
 
 // The run. What went wrong besides expectations, or "".
-std::string run(const RegressArguments& arguments, const std::shared_ptr<const model::WorldModel>& world, bool isolated, judge::Judge& judge) {
+std::string run(const RegressArguments& arguments,
+                const std::shared_ptr<const model::WorldModel>& world, bool isolated,
+                judge::Judge& judge) {
   bus::ServerBus place = bus::open_server_bus(isolated ? "auto" : "auto-tcp", world->name);
   bus::RivalWatch bus(std::move(place.bus), [](const std::string& line) { spdlog::warn(line); });
   run::Run server(world, server_options(arguments), bus);
   server.on_state([&](const Snapshot& snapshot) { judge.see(snapshot); });
   std::unique_ptr<ClientProcess> client;
   if (!arguments.client.empty()) {
-    client = std::make_unique<ClientProcess>(arguments.client, std::vector<std::string>{"LCM_DEFAULT_URL=" + place.url.str()},
-                                             [&server] { server.stop(); });
+    client = std::make_unique<ClientProcess>(
+        arguments.client, std::vector<std::string>{"LCM_DEFAULT_URL=" + place.url.str()},
+        [&server] { server.stop(); });
   }
   std::string fault;
   try {
@@ -76,14 +81,18 @@ std::string run(const RegressArguments& arguments, const std::shared_ptr<const m
   } catch (const run::LeaseEnded& ended) {
     fault = ended.what();
   }
-  if (client && client->end() && !client->fault().empty()) return "the client ended with " + client->fault();
+  if (client && client->end() && !client->fault().empty())
+    return "the client ended with " + client->fault();
   return fault;
 }
 
 // A log's events on the channels that are kept.
-void keep_channels(const std::string& from, const std::string& to, const std::vector<std::string>& patterns) {
+void keep_channels(const std::string& from, const std::string& to,
+                   const std::vector<std::string>& patterns) {
   const auto kept = [&](const std::string& channel) {
-    return std::any_of(patterns.begin(), patterns.end(), [&](const std::string& pattern) { return fnmatch(pattern.c_str(), channel.c_str(), 0) == 0; });
+    return std::any_of(patterns.begin(), patterns.end(), [&](const std::string& pattern) {
+      return fnmatch(pattern.c_str(), channel.c_str(), 0) == 0;
+    });
   };
   log::Reader log(from);
   log::Writer writer(to);
@@ -96,30 +105,45 @@ void keep_channels(const std::string& from, const std::string& to, const std::ve
   }
   writer.flush();
   if (!writer.error().empty()) throw EnvironmentError(to + ": " + writer.error());
-  if (count == 0) throw InputError({}, fmt::format("--keep {}: no message is on such a channel", fmt::join(patterns, " ")));
+  if (count == 0)
+    throw InputError(
+        {}, fmt::format("--keep {}: no message is on such a channel", fmt::join(patterns, " ")));
 }
 
 void write_file(const std::string& path, const std::string& text) {
   std::FILE* file = std::fopen(path.c_str(), "w");
-  if (!file || std::fwrite(text.data(), 1, text.size(), file) != text.size() || std::fclose(file) != 0) throw EnvironmentError(path + " cannot be written");
+  if (!file || std::fwrite(text.data(), 1, text.size(), file) != text.size() ||
+      std::fclose(file) != 0)
+    throw EnvironmentError(path + " cannot be written");
 }
 
 // What differs from the golden log, or "".
 std::string compare(const RegressArguments& arguments, const std::string& kept) {
-  if (!fs::exists(arguments.golden)) return "there is no golden log " + arguments.golden + " yet: run this once with RUEDO_RENEW=1";
+  if (!fs::exists(arguments.golden))
+    return "there is no golden log " + arguments.golden + " yet: run this once with RUEDO_RENEW=1";
   std::vector<log::DiffRule> rules;
-  for (const std::string& text : arguments.tolerances) rules.push_back(log::DiffRule::parse(text, false));
-  for (const std::string& text : arguments.ignored) rules.push_back(log::DiffRule::parse(text, true));
+  for (const std::string& text : arguments.tolerances)
+    rules.push_back(log::DiffRule::parse(text, false));
+  for (const std::string& text : arguments.ignored)
+    rules.push_back(log::DiffRule::parse(text, true));
   const log::Diff result = log::diff_logs(arguments.golden, kept, rules);
   if (!arguments.junit.empty()) write_file(arguments.junit, log::diff_junit(result));
-  if (!arguments.html.empty()) write_file(arguments.html, log::diff_html(result, arguments.golden, kept));
-  return result.same() ? "" : "the run differs from " + arguments.golden + ":\n" + log::diff_text(result);
+  if (!arguments.html.empty())
+    write_file(arguments.html, log::diff_html(result, arguments.golden, kept));
+  return result.same()
+             ? ""
+             : "the run differs from " + arguments.golden + ":\n" + log::diff_text(result);
 }
 
 std::string run_script(const RegressArguments& arguments) {
-  ClientProcess script(arguments.script, {"RUEDO_LOG=" + fs::absolute(arguments.record).string(), "RUEDO_WORLD=" + fs::absolute(arguments.world.world).string()}, [] {});
+  ClientProcess script(arguments.script,
+                       {"RUEDO_LOG=" + fs::absolute(arguments.record).string(),
+                        "RUEDO_WORLD=" + fs::absolute(arguments.world.world).string()},
+                       [] {});
   script.wait();
-  return script.fault().empty() ? "" : "the script ended with " + script.fault() + ": " + arguments.script;
+  return script.fault().empty()
+             ? ""
+             : "the script ended with " + script.fault() + ": " + arguments.script;
 }
 
 // The failed run as a page beside its log, to be looked at where no ruedo is.
@@ -139,25 +163,33 @@ void attach_page(const std::string& log) {
 std::vector<judge::Failure> judged(judge::Judge& judge, const std::string& record) {
   log::Reader log(record);
   log::Event event;
-  const auto wanted = [](const std::string& channel) { return channel.ends_with("/pose") || channel.ends_with("/odometry"); };
+  const auto wanted = [](const std::string& channel) {
+    return channel.ends_with("/pose") || channel.ends_with("/odometry");
+  };
   while (log.next(event, wanted)) judge.see(event.channel, event.data);
   return judge.failures();
 }
 
-// For programs that run many: {"faults": [...], "failures": [{"what", "time_s", "text"}], "metrics": {...},
-// "track": [[s, m, m]]}.
-void write_verdict(const std::string& path, const std::vector<std::string>& faults, judge::Judge& judge) {
+// For programs that run many: {"faults": [...], "failures": [{"what", "time_s", "text"}],
+// "metrics": {...}, "track": [[s, m, m]]}.
+void write_verdict(const std::string& path, const std::vector<std::string>& faults,
+                   judge::Judge& judge) {
   JsonWriter json;
   json.open('{').name("faults").open('[');
   for (const std::string& fault : faults) json.value(fault);
   json.close(']').name("failures").open('[');
   for (const judge::Failure& failure : judge.failures()) {
-    json.open('{').member("what", failure.what).member("time_s", static_cast<double>(failure.time) * 1e-6).member("text", failure.text).close('}');
+    json.open('{')
+        .member("what", failure.what)
+        .member("time_s", static_cast<double>(failure.time) * 1e-6)
+        .member("text", failure.text)
+        .close('}');
   }
   json.close(']').name("metrics").open('{');
   for (const judge::Metric& metric : judge.metrics()) json.member(metric.name, metric.value);
   json.close('}').name("track").open('[');
-  for (const judge::Judge::Place& place : judge.track()) json.open('[').value(place.time_s).value(place.x).value(place.y).close(']');
+  for (const judge::Judge::Place& place : judge.track())
+    json.open('[').value(place.time_s).value(place.x).value(place.y).close(']');
   json.close(']').close('}');
   write_file(path, json.text() + "\n");
 }
@@ -171,22 +203,27 @@ int regress(RegressArguments arguments) {
   expected.clearance_reach = arguments.clearance_reach;
   if (arguments.keep.empty()) arguments.keep = {"*/pose"};
   const char* environment = std::getenv("RUEDO_RENEW");
-  const bool renew = arguments.renew || (environment && *environment && std::string(environment) != "0");
+  const bool renew =
+      arguments.renew || (environment && *environment && std::string(environment) != "0");
   const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
   print_findings(world->findings);
   judge::Judge judge(*world, expected);
   std::vector<std::string> failures;
-  if (std::string fault = run(arguments, world, isolated, judge); !fault.empty()) failures.push_back(fault);
+  if (std::string fault = run(arguments, world, isolated, judge); !fault.empty())
+    failures.push_back(fault);
   const size_t begin_of_judged = failures.size();
-  for (const judge::Failure& failure : judged(judge, arguments.record)) failures.push_back(judge::to_line(failure));
+  for (const judge::Failure& failure : judged(judge, arguments.record))
+    failures.push_back(judge::to_line(failure));
   const size_t end_of_judged = failures.size();
   if (!arguments.golden.empty()) {
     const std::string kept = arguments.record + ".kept";
-    if (const fs::path folder = fs::path(arguments.golden).parent_path(); renew && !folder.empty()) {
-      std::error_code error;    // the log's own opening says what is wrong
+    if (const fs::path folder = fs::path(arguments.golden).parent_path();
+        renew && !folder.empty()) {
+      std::error_code error;  // the log's own opening says what is wrong
       fs::create_directories(folder, error);
     }
-    keep_channels(arguments.record, renew && failures.empty() ? arguments.golden : kept, arguments.keep);
+    keep_channels(arguments.record, renew && failures.empty() ? arguments.golden : kept,
+                  arguments.keep);
     if (renew && failures.empty()) {
       fmt::print("renewed {}\n", arguments.golden);
     } else if (std::string difference = compare(arguments, kept); !difference.empty()) {
@@ -198,7 +235,8 @@ int regress(RegressArguments arguments) {
   }
   if (!arguments.json.empty()) {
     std::vector<std::string> faults = failures;
-    faults.erase(faults.begin() + static_cast<std::ptrdiff_t>(begin_of_judged), faults.begin() + static_cast<std::ptrdiff_t>(end_of_judged));
+    faults.erase(faults.begin() + static_cast<std::ptrdiff_t>(begin_of_judged),
+                 faults.begin() + static_cast<std::ptrdiff_t>(end_of_judged));
     write_verdict(arguments.json, faults, judge);
   }
   for (const std::string& line : failures) fmt::print(stderr, "FAILED: {}\n", line);
@@ -208,37 +246,79 @@ int regress(RegressArguments arguments) {
 }
 
 void add_regress(CLI::App& app, Action& chosen) {
-  CLI::App* command = app.add_subcommand("regress", "run a world with a client on a port of its own, and hold the run against what is expected of it");
+  CLI::App* command = app.add_subcommand("regress",
+                                         "run a world with a client on a port of its own, and hold "
+                                         "the run against what is expected of it");
   const auto a = std::make_shared<RegressArguments>();
-  const auto list = [&](const char* name, std::vector<std::string>& to, const char* text, const char* type) {
+  const auto list = [&](const char* name, std::vector<std::string>& to, const char* text,
+                        const char* type) {
     command->add_option(name, to, text)->type_name(type)->allow_extra_args(false);
   };
   add_world_arguments(*command, a->world);
-  command->add_option("--client", a->client, "command line of the client, for a shell; LCM_DEFAULT_URL says where the run is")->type_name("COMMAND");
+  command
+      ->add_option("--client", a->client,
+                   "command line of the client, for a shell; LCM_DEFAULT_URL says where the run is")
+      ->type_name("COMMAND");
   command->add_option("--seed", a->seed, "of all noise")->type_name("N")->capture_default_str();
-  command->add_option("--duration", a->duration, "end after so many seconds of sim time, or when the client ends")->type_name("S")->required();
-  command->add_option("--rate", a->rate, "sim time per real time, or max")->type_name("R|max")->capture_default_str();
+  command
+      ->add_option("--duration", a->duration,
+                   "end after so many seconds of sim time, or when the client ends")
+      ->type_name("S")
+      ->required();
+  command->add_option("--rate", a->rate, "sim time per real time, or max")
+      ->type_name("R|max")
+      ->capture_default_str();
   command->add_option("--record", a->record, "the log of the run")->type_name("FILE")->required();
-  command->add_option("--lockstep", a->lockstep, "wait for so many clients, then go as far as all of them grant")->type_name("N")->check(CLI::Range(1, 64));
-  list("--wait-for", a->wait_for, "do not pass a step at which a message on that channel is due: CHANNEL@HZ", "WAIT");
+  command
+      ->add_option("--lockstep", a->lockstep,
+                   "wait for so many clients, then go as far as all of them grant")
+      ->type_name("N")
+      ->check(CLI::Range(1, 64));
+  list("--wait-for", a->wait_for,
+       "do not pass a step at which a message on that channel is due: CHANNEL@HZ", "WAIT");
   list("--remap", a->remaps, "give a channel another name: CHANNEL=NAME", "REMAP");
-  command->add_option("--robot", a->expected.robot, "whom the expectations are about (default: the first of the world)")->type_name("NAME");
-  list("--goal", a->goals, "base_link gets within RADIUS of X, Y by a time: X,Y,RADIUS,BY (m, s)", "GOAL");
-  command->add_flag("--no-contact", a->expected.no_contact, "the robot touches nothing but the ground");
-  command->add_option("--clearance", a->clearance, "at least so far from everything (m)")->type_name("M")->check(CLI::Range(0.0, 100.0));
-  command->add_option("--odometry-error", a->odometry_error, "odometry at most so far from the truth (m)")->type_name("M")->check(CLI::Range(0.0, 1e6));
-  command->add_option("--clearance-reach", a->clearance_reach, "measure the smallest clearance below this (m), for --json")->type_name("M")->check(CLI::Range(0.0, 100.0));
-  command->add_option("--json", a->json, "write what failed, and how well the run went in numbers, as JSON")->type_name("FILE");
+  command
+      ->add_option("--robot", a->expected.robot,
+                   "whom the expectations are about (default: the first of the world)")
+      ->type_name("NAME");
+  list("--goal", a->goals, "base_link gets within RADIUS of X, Y by a time: X,Y,RADIUS,BY (m, s)",
+       "GOAL");
+  command->add_flag("--no-contact", a->expected.no_contact,
+                    "the robot touches nothing but the ground");
+  command->add_option("--clearance", a->clearance, "at least so far from everything (m)")
+      ->type_name("M")
+      ->check(CLI::Range(0.0, 100.0));
+  command
+      ->add_option("--odometry-error", a->odometry_error,
+                   "odometry at most so far from the truth (m)")
+      ->type_name("M")
+      ->check(CLI::Range(0.0, 1e6));
+  command
+      ->add_option("--clearance-reach", a->clearance_reach,
+                   "measure the smallest clearance below this (m), for --json")
+      ->type_name("M")
+      ->check(CLI::Range(0.0, 100.0));
+  command
+      ->add_option("--json", a->json,
+                   "write what failed, and how well the run went in numbers, as JSON")
+      ->type_name("FILE");
   command->add_flag("--no-page", a->no_page, "no page beside the log of a failed run");
   command->add_option("--golden", a->golden, "log to compare with")->type_name("FILE");
-  list("--keep", a->keep, "channels that golden logs hold; shell patterns (default: */pose)", "PATTERN");
+  list("--keep", a->keep, "channels that golden logs hold; shell patterns (default: */pose)",
+       "PATTERN");
   list("--tolerance", a->tolerances, "as of ruedo diff", "RULE");
   list("--ignore", a->ignored, "as of ruedo diff", "PATTERN");
-  command->add_option("--junit", a->junit, "write how the golden log compares as JUnit XML")->type_name("FILE");
+  command->add_option("--junit", a->junit, "write how the golden log compares as JUnit XML")
+      ->type_name("FILE");
   command->add_option("--html", a->html, "write it as a page with plots")->type_name("FILE");
-  command->add_option("--script", a->script, "command line that judges too, by its exit code; RUEDO_LOG is the run's log")->type_name("COMMAND");
-  command->add_flag("--shared-network", a->shared_network, "no network of its own: for a client that needs other machines");
-  command->add_flag("--renew", a->renew, "write the golden log anew, when all else holds; or set RUEDO_RENEW=1");
+  command
+      ->add_option("--script", a->script,
+                   "command line that judges too, by its exit code; RUEDO_LOG is the run's log")
+      ->type_name("COMMAND");
+  command->add_flag("--shared-network", a->shared_network,
+                    "no network of its own: for a client that needs other machines");
+  command->add_flag("--renew", a->renew,
+                    "write the golden log anew, when all else holds; or set RUEDO_RENEW=1");
   command->callback([a, &chosen] { chosen = [a] { return regress(*a); }; });
 }
 

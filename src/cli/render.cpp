@@ -1,4 +1,5 @@
-// ruedo render: one picture of a world at its start, from anywhere or as one of its cameras sees it.
+// ruedo render: one picture of a world at its start, from anywhere or as one of its cameras sees
+// it.
 #include <algorithm>
 #include <filesystem>
 
@@ -25,7 +26,8 @@ struct RenderArguments {
 // Drawn at twice the size with smooth edges, then reduced, where memory allows.
 constexpr int kMaxSupersampledSide = 4096;
 
-cv::Mat picture_of_world(const RenderArguments& arguments, const model::WorldModel& world, const model::BodyLayout& layout) {
+cv::Mat picture_of_world(const RenderArguments& arguments, const model::WorldModel& world,
+                         const model::BodyLayout& layout) {
   const auto renderer = scene::make_renderer(world, layout);
   const Size size = arguments.size.empty() ? Size{} : parse_size(arguments.size);
   Vec3 sunlight(1, 1, -1);
@@ -45,7 +47,8 @@ cv::Mat picture_of_world(const RenderArguments& arguments, const model::WorldMod
   view.cy *= factor;
   view.samples = 4;
   scene::Picture picture;
-  const std::vector<scene::Line> lines = arguments.rays ? device_rays(world, layout) : std::vector<scene::Line>();
+  const std::vector<scene::Line> lines =
+      arguments.rays ? device_rays(world, layout) : std::vector<scene::Line>();
   renderer->draw(initial_snapshot(layout), view, picture, lines);
   cv::Mat rgb(view.height, view.width, CV_8UC3, picture.rgb.data()), reduced, bgr;
   cv::resize(rgb, reduced, wanted, 0, 0, cv::INTER_AREA);
@@ -62,13 +65,16 @@ void require_camera(const std::string& camera, const model::WorldModel& world) {
   }
   if (std::find(cameras.begin(), cameras.end(), camera) != cameras.end()) return;
   const std::string near = nearest_word(camera, cameras);
-  throw InputError({}, fmt::format("--camera {}: there is no such camera; {}", camera,
-                                   cameras.empty() ? "the world has none" : fmt::format("there are: {}", fmt::join(cameras, ", "))) +
-                           (near.empty() ? "" : "; did you mean " + near + "?"));
+  throw InputError(
+      {}, fmt::format("--camera {}: there is no such camera; {}", camera,
+                      cameras.empty() ? "the world has none"
+                                      : fmt::format("there are: {}", fmt::join(cameras, ", "))) +
+              (near.empty() ? "" : "; did you mean " + near + "?"));
 }
 
 // What the camera itself gives: with its lens, noise and exposure, but not compressed.
-cv::Mat picture_of_camera(const RenderArguments& arguments, const model::WorldModel& world, const model::BodyLayout& layout) {
+cv::Mat picture_of_camera(const RenderArguments& arguments, const model::WorldModel& world,
+                          const model::BodyLayout& layout) {
   const auto device = make_lone_device(world, layout, arguments.camera, !arguments.world.no_noise);
   const auto renderer = scene::make_renderer(world, layout);
   Outbox out;
@@ -77,9 +83,11 @@ cv::Mat picture_of_camera(const RenderArguments& arguments, const model::WorldMo
     if (device->channels[static_cast<size_t>(entry.channel)] != arguments.camera) continue;
     image_t image;
     if (image.decode(out.data(entry), 0, static_cast<int>(entry.size)) < 0) break;
-    if (image.pixelformat == image_t::PIXEL_FORMAT_MJPEG) return cv::imdecode(image.data, cv::IMREAD_COLOR);
+    if (image.pixelformat == image_t::PIXEL_FORMAT_MJPEG)
+      return cv::imdecode(image.data, cv::IMREAD_COLOR);
     const bool grey = image.pixelformat == image_t::PIXEL_FORMAT_GRAY;
-    cv::Mat bgr, pixels(image.height, image.width, grey ? CV_8UC1 : CV_8UC3, image.data.data(), static_cast<size_t>(image.row_stride));
+    cv::Mat bgr, pixels(image.height, image.width, grey ? CV_8UC1 : CV_8UC3, image.data.data(),
+                        static_cast<size_t>(image.row_stride));
     if (grey) return pixels.clone();
     cv::cvtColor(pixels, bgr, cv::COLOR_RGB2BGR);
     return bgr;
@@ -92,17 +100,21 @@ std::shared_ptr<const model::WorldModel> load(const RenderArguments& arguments) 
   model::LoadOptions options = load_options(arguments.world);
   if (arguments.camera.empty()) return model::load_world(arguments.world.world, options);
   const size_t slash = arguments.camera.find('/');
-  if (slash == std::string::npos) throw InputError({}, "--camera " + arguments.camera + ": allowed is ROBOT/DEVICE");
-  const std::string robot = arguments.camera.substr(0, slash), device = arguments.camera.substr(slash + 1);
+  if (slash == std::string::npos)
+    throw InputError({}, "--camera " + arguments.camera + ": allowed is ROBOT/DEVICE");
+  const std::string robot = arguments.camera.substr(0, slash),
+                    device = arguments.camera.substr(slash + 1);
   const Size size = arguments.size.empty() ? Size{} : parse_size(arguments.size);
   std::vector<model::Setting> settings{{robot, device, "ruedo:encoding", "rgb"}};
-  settings.insert(settings.end(), options.settings.begin(), options.settings.end());    // what the user sets comes later and holds
+  settings.insert(settings.end(), options.settings.begin(),
+                  options.settings.end());  // what the user sets comes later and holds
   if (size.width != 0) {
     settings.push_back({robot, device, "camera.image.width", std::to_string(size.width)});
     settings.push_back({robot, device, "camera.image.height", std::to_string(size.height)});
   }
   options.settings.clear();
-  const auto world = std::make_shared<model::WorldModel>(*model::load_world(arguments.world.world, options));
+  const auto world =
+      std::make_shared<model::WorldModel>(*model::load_world(arguments.world.world, options));
   require_camera(arguments.camera, *world);
   model::apply_settings(settings, *world);
   return world;
@@ -110,17 +122,21 @@ std::shared_ptr<const model::WorldModel> load(const RenderArguments& arguments) 
 
 int render(const RenderArguments& arguments) {
   if (!arguments.camera.empty() && arguments.rays) {
-    throw InputError({}, "--rays goes with --view, not with --camera: a camera does not see the rays");
+    throw InputError({},
+                     "--rays goes with --view, not with --camera: a camera does not see the rays");
   }
   std::string extension = std::filesystem::path(arguments.output).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (extension != ".png" && extension != ".jpg" && extension != ".jpeg") {
-    throw InputError({}, "-o " + arguments.output + ": allowed are names that end in .png, .jpg or .jpeg");
+    throw InputError(
+        {}, "-o " + arguments.output + ": allowed are names that end in .png, .jpg or .jpeg");
   }
   const auto world = load(arguments);
   print_findings(world->findings);
   const model::BodyLayout layout(*world);
-  const cv::Mat bgr = arguments.camera.empty() ? picture_of_world(arguments, *world, layout) : picture_of_camera(arguments, *world, layout);
+  const cv::Mat bgr = arguments.camera.empty() ? picture_of_world(arguments, *world, layout)
+                                               : picture_of_camera(arguments, *world, layout);
   bool written = false;
   try {
     written = cv::imwrite(arguments.output, bgr);
@@ -135,12 +151,20 @@ void add_render(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand("render", "draw a picture of a world at its start");
   const auto arguments = std::make_shared<RenderArguments>();
   add_world_arguments(*command, arguments->world);
-  command->add_option("-o,--output", arguments->output, "the picture: .png or .jpg")->type_name("FILE")->required();
-  auto* camera = command->add_option("--camera", arguments->camera, "as this camera sees it")->type_name("ROBOT/DEVICE");
-  command->add_option("--view", arguments->view, "top, iso, or x,y,z,roll,pitch,yaw (m, rad; x looks ahead, 1.2 rad wide)")
-      ->type_name("VIEW")->capture_default_str()->excludes(camera);
+  command->add_option("-o,--output", arguments->output, "the picture: .png or .jpg")
+      ->type_name("FILE")
+      ->required();
+  auto* camera = command->add_option("--camera", arguments->camera, "as this camera sees it")
+                     ->type_name("ROBOT/DEVICE");
+  command
+      ->add_option("--view", arguments->view,
+                   "top, iso, or x,y,z,roll,pitch,yaw (m, rad; x looks ahead, 1.2 rad wide)")
+      ->type_name("VIEW")
+      ->capture_default_str()
+      ->excludes(camera);
   command->add_option("--size", arguments->size, "of the picture, in pixels")->type_name("WxH");
-  command->add_flag("--rays", arguments->rays, "draw the rays of laser scanners and the cones of sonars");
+  command->add_flag("--rays", arguments->rays,
+                    "draw the rays of laser scanners and the cones of sonars");
   command->callback([arguments, &chosen] { chosen = [arguments] { return render(*arguments); }; });
 }
 

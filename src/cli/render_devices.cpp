@@ -15,23 +15,28 @@ namespace {
 using Colour = std::array<float, 4>;
 constexpr Colour kLaser{0.90f, 0.16f, 0.10f, 0.55f}, kLaserOpen{0.90f, 0.16f, 0.10f, 0.16f};
 constexpr Colour kSonar{0.06f, 0.36f, 0.85f, 0.85f}, kSonarOpen{0.06f, 0.36f, 0.85f, 0.35f};
-constexpr size_t kMaxRaysDrawn = 2000;    // of one device
+constexpr size_t kMaxRaysDrawn = 2000;  // of one device
 constexpr int kArcSegments = 8;
 
 Vec3 direction(double azimuth, double elevation) {
-  return {math::cos(elevation) * math::cos(azimuth), math::cos(elevation) * math::sin(azimuth), math::sin(elevation)};
+  return {math::cos(elevation) * math::cos(azimuth), math::cos(elevation) * math::sin(azimuth),
+          math::sin(elevation)};
 }
 
-void add_ray(const Pose& X_WS, const Vec3& d_S, double range, double range_max, std::vector<scene::Line>& lines) {
+void add_ray(const Pose& X_WS, const Vec3& d_S, double range, double range_max,
+             std::vector<scene::Line>& lines) {
   const bool hit = std::isfinite(range);
   const double length = hit ? range : range < 0 ? 0.0 : range_max;
   lines.push_back({X_WS.translation, X_WS * (length * d_S), hit ? kLaser : kLaserOpen});
 }
 
-void add_scan(const LoneDevice& device, const planar_lidar_t& scan, std::vector<scene::Line>& lines) {
+void add_scan(const LoneDevice& device, const planar_lidar_t& scan,
+              std::vector<scene::Line>& lines) {
   for (size_t i = 0; i < scan.ranges.size(); ++i) {
-    const double angle = static_cast<double>(scan.rad0) + static_cast<double>(i) * static_cast<double>(scan.radstep);
-    add_ray(device.X_WS, direction(angle, 0.0), static_cast<double>(scan.ranges[i]), device.info.range_max, lines);
+    const double angle =
+        static_cast<double>(scan.rad0) + static_cast<double>(i) * static_cast<double>(scan.radstep);
+    add_ray(device.X_WS, direction(angle, 0.0), static_cast<double>(scan.ranges[i]),
+            device.info.range_max, lines);
   }
 }
 
@@ -39,9 +44,14 @@ void add_scan(const LoneDevice& device, const lidar_t& scan, std::vector<scene::
   const size_t columns = static_cast<size_t>(std::max(scan.ncolumns, 1));
   const size_t stride = 1 + scan.ranges.size() / kMaxRaysDrawn;
   for (size_t i = 0; i < scan.ranges.size(); i += stride) {
-    const double azimuth = static_cast<double>(scan.azimuth0) + static_cast<double>(i % columns) * static_cast<double>(scan.azimuth_step);
-    const double elevation = static_cast<double>(scan.elevation0) + static_cast<double>(i / columns) * static_cast<double>(scan.elevation_step);
-    add_ray(device.X_WS, direction(azimuth, elevation), static_cast<double>(scan.ranges[i]), device.info.range_max, lines);
+    const double azimuth =
+        static_cast<double>(scan.azimuth0) +
+        static_cast<double>(i % columns) * static_cast<double>(scan.azimuth_step);
+    const double elevation =
+        static_cast<double>(scan.elevation0) +
+        static_cast<double>(i / columns) * static_cast<double>(scan.elevation_step);
+    add_ray(device.X_WS, direction(azimuth, elevation), static_cast<double>(scan.ranges[i]),
+            device.info.range_max, lines);
   }
 }
 
@@ -93,12 +103,14 @@ Snapshot initial_snapshot(const model::BodyLayout& layout) {
   s.robots.resize(layout.robots.size());
   for (size_t i = 0; i < layout.robots.size(); ++i) {
     const model::RobotPlacement& robot = layout.robots[i];
-    s.robots[i].X_WBase = robot.body < 0 ? robot.X_BBase : s.bodies[static_cast<size_t>(robot.body)] * robot.X_BBase;
+    s.robots[i].X_WBase =
+        robot.body < 0 ? robot.X_BBase : s.bodies[static_cast<size_t>(robot.body)] * robot.X_BBase;
   }
   return s;
 }
 
-std::vector<std::string> device_names(const model::WorldModel& world, const model::BodyLayout& layout) {
+std::vector<std::string> device_names(const model::WorldModel& world,
+                                      const model::BodyLayout& layout) {
   std::vector<std::string> names;
   for (const model::RobotPlacement& robot : layout.robots) {
     const model::ModelInstance& instance = world.models[static_cast<size_t>(robot.instance)];
@@ -109,7 +121,8 @@ std::vector<std::string> device_names(const model::WorldModel& world, const mode
   return names;
 }
 
-std::unique_ptr<LoneDevice> make_lone_device(const model::WorldModel& world, const model::BodyLayout& layout,
+std::unique_ptr<LoneDevice> make_lone_device(const model::WorldModel& world,
+                                             const model::BodyLayout& layout,
                                              const std::string& name, bool noise) {
   static const Element kNothing;
   for (size_t robot = 0; robot < layout.robots.size(); ++robot) {
@@ -122,12 +135,27 @@ std::unique_ptr<LoneDevice> make_lone_device(const model::WorldModel& world, con
       device->kind = kind;
       const int link = layout.first_link[instance_index] + sensor.link;
       const model::LinkPlacement& placement = layout.links[static_cast<size_t>(link)];
-      const Pose X_WL = placement.body < 0 ? placement.X_BL : layout.bodies[static_cast<size_t>(placement.body)].X_WB * placement.X_BL;
+      const Pose X_WL =
+          placement.body < 0
+              ? placement.X_BL
+              : layout.bodies[static_cast<size_t>(placement.body)].X_WB * placement.X_BL;
       device->X_WS = X_WL * sensor.X_LS;
       const Element& element = sensor.element ? *sensor.element : kNothing;
-      SensorSetup setup{world, layout, element, instance.name, sensor.name, static_cast<int>(robot), link, sensor.X_LS,
-                        RandomSource(1, instance.name, sensor.name), noise, element.rate("update_rate", kind->default_rate), nullptr, {}};
-      setup.add_channel = [&device, &name](const std::string& suffix, const std::string& type, int64_t) {
+      SensorSetup setup{world,
+                        layout,
+                        element,
+                        instance.name,
+                        sensor.name,
+                        static_cast<int>(robot),
+                        link,
+                        sensor.X_LS,
+                        RandomSource(1, instance.name, sensor.name),
+                        noise,
+                        element.rate("update_rate", kind->default_rate),
+                        nullptr,
+                        {}};
+      setup.add_channel = [&device, &name](const std::string& suffix, const std::string& type,
+                                           int64_t) {
         device->channels.push_back(suffix.empty() ? name : name + "/" + suffix);
         device->types.push_back(type);
         return static_cast<int>(device->channels.size()) - 1;
@@ -140,9 +168,10 @@ std::unique_ptr<LoneDevice> make_lone_device(const model::WorldModel& world, con
   return nullptr;
 }
 
-std::vector<scene::Line> device_rays(const model::WorldModel& world, const model::BodyLayout& layout) {
+std::vector<scene::Line> device_rays(const model::WorldModel& world,
+                                     const model::BodyLayout& layout) {
   const Snapshot snapshot = initial_snapshot(layout);
-  std::unique_ptr<scene::RayScene> scenes[2];    // collisions, visuals
+  std::unique_ptr<scene::RayScene> scenes[2];  // collisions, visuals
   const auto scene = [&](bool visuals) {
     auto& rays = scenes[visuals ? 1 : 0];
     if (!rays) {
@@ -161,16 +190,22 @@ std::vector<scene::Line> device_rays(const model::WorldModel& world, const model
     for (int64_t k = 0; k < samples; ++k) {
       out.clear();
       if (device->sensor->observes()) device->sensor->observe(snapshot, out);
-      device->sensor->sample({snapshot, k, scene(device->kind->needs_visual_rays || device->sensor->wants_visual_rays()), nullptr}, out);
+      device->sensor->sample(
+          {snapshot, k,
+           scene(device->kind->needs_visual_rays || device->sensor->wants_visual_rays()), nullptr},
+          out);
     }
     for (const Outbox::Entry& entry : out.entries()) {
       const std::string& type = device->types[static_cast<size_t>(entry.channel)];
       planar_lidar_t scan;
       lidar_t layers;
       sonar_t sonar;
-      if (type == planar_lidar_t::getTypeName() && decode(out, entry, scan)) add_scan(*device, scan, lines);
-      if (type == lidar_t::getTypeName() && decode(out, entry, layers)) add_scan(*device, layers, lines);
-      if (type == sonar_t::getTypeName() && decode(out, entry, sonar)) add_cones(*device, sonar, lines);
+      if (type == planar_lidar_t::getTypeName() && decode(out, entry, scan))
+        add_scan(*device, scan, lines);
+      if (type == lidar_t::getTypeName() && decode(out, entry, layers))
+        add_scan(*device, layers, lines);
+      if (type == sonar_t::getTypeName() && decode(out, entry, sonar))
+        add_cones(*device, sonar, lines);
     }
   }
   return lines;

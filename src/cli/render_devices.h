@@ -1,5 +1,5 @@
-// Sensors made outside of a server, for a picture of what they see at the start: a camera's own picture, the rays of
-// laser scanners and the cones of sonars.
+// Sensors made outside of a server, for a picture of what they see at the start: a camera's own
+// picture, the rays of laser scanners and the cones of sonars.
 #pragma once
 
 #include <memory>
@@ -17,21 +17,24 @@ struct LoneDevice {
   const SensorKind* kind = nullptr;
   std::unique_ptr<Sensor> sensor;
   device_info_t info{};
-  std::vector<std::string> channels, types;    // by the index that it publishes with
-  Pose X_WS;                                   // at the start
+  std::vector<std::string> channels, types;  // by the index that it publishes with
+  Pose X_WS;                                 // at the start
 };
 
 // The state of the world before the first step.
 Snapshot initial_snapshot(const model::BodyLayout& layout);
 
 // Robots' names and their devices of <sensor> elements that some kind serves: "ROBOT/DEVICE".
-std::vector<std::string> device_names(const model::WorldModel& world, const model::BodyLayout& layout);
+std::vector<std::string> device_names(const model::WorldModel& world,
+                                      const model::BodyLayout& layout);
 
 // Makes ROBOT/DEVICE; null when there is none.
-std::unique_ptr<LoneDevice> make_lone_device(const model::WorldModel& world, const model::BodyLayout& layout,
+std::unique_ptr<LoneDevice> make_lone_device(const model::WorldModel& world,
+                                             const model::BodyLayout& layout,
                                              const std::string& name, bool noise);
 
 // The rays and cones of all devices, up to what they hit.
-std::vector<scene::Line> device_rays(const model::WorldModel& world, const model::BodyLayout& layout);
+std::vector<scene::Line> device_rays(const model::WorldModel& world,
+                                     const model::BodyLayout& layout);
 
 }  // namespace ruedo::cli

@@ -9,15 +9,16 @@
 namespace ruedo::cli {
 
 struct Size {
-  int width = 0, height = 0;    // pixels; 0: not given
+  int width = 0, height = 0;  // pixels; 0: not given
 };
 
 // "WxH". Throws InputError.
 Size parse_size(const std::string& text);
 
-// text: "top" (parallel, from above, x to the right), "iso" (from above at an angle), or "x,y,z,roll,pitch,yaw"
-// (m, rad; x ahead). bounds: of what there is to see; sunlight: which way it goes, so that iso looks at the lit sides.
-// A size that is not given is chosen. Throws InputError.
-scene::View parse_view(const std::string& text, Size size, const scene::Bounds& bounds, const Vec3& sunlight);
+// text: "top" (parallel, from above, x to the right), "iso" (from above at an angle), or
+// "x,y,z,roll,pitch,yaw" (m, rad; x ahead). bounds: of what there is to see; sunlight: which way it
+// goes, so that iso looks at the lit sides. A size that is not given is chosen. Throws InputError.
+scene::View parse_view(const std::string& text, Size size, const scene::Bounds& bounds,
+                       const Vec3& sunlight);
 
 }  // namespace ruedo::cli

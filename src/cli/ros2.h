@@ -17,27 +17,32 @@ namespace ruedo::cli {
 
 struct Ros2Arguments {
   bool on = false;
-  std::string distro;        // "": $ROS_DISTRO, or jazzy
+  std::string distro;  // "": $ROS_DISTRO, or jazzy
   double clock_hz = 100.0;
-  std::vector<std::pair<std::string, std::string>> topics;      // --remap of ROS names
-  std::vector<std::pair<std::string, std::string>> channels;    // of the bus's
-  std::vector<std::string> wait_for;                            // ROS topics on which the run waits
+  std::vector<std::pair<std::string, std::string>> topics;    // --remap of ROS names
+  std::vector<std::pair<std::string, std::string>> channels;  // of the bus's
+  std::vector<std::string> wait_for;                          // ROS topics on which the run waits
 };
 
 // A node, from its making on; the run's messages come to it once it is attached.
 class Ros2Node {
  public:
-  // Null without --ros2. Throws InputError, and EnvironmentError when this build has no Cyclone DDS or there is no network for it.
+  // Null without --ros2. Throws InputError, and EnvironmentError when this build has no Cyclone DDS
+  // or there is no network for it.
   static std::unique_ptr<Ros2Node> open(run::Run& server, const Ros2Arguments& arguments);
 
-  virtual ~Ros2Node() = default;    // after the run, before the server
-  virtual void print() const = 0;   // the topics
+  virtual ~Ros2Node() = default;   // after the run, before the server
+  virtual void print() const = 0;  // the topics
 
-  // Returns when somebody publishes each topic that the run waits for, and reads something of this run; or the run is to end.
+  // Returns when somebody publishes each topic that the run waits for, and reads something of this
+  // run; or the run is to end.
   virtual void wait_for_peers() = 0;
 };
 
-// The input channel of each ROS topic among --wait-for. Throws InputError for what is no topic that takes commands.
-std::vector<run::WaitForOption> with_channels(std::vector<run::WaitForOption> options, const model::WorldModel& world, const Ros2Arguments& arguments);
+// The input channel of each ROS topic among --wait-for. Throws InputError for what is no topic that
+// takes commands.
+std::vector<run::WaitForOption> with_channels(std::vector<run::WaitForOption> options,
+                                              const model::WorldModel& world,
+                                              const Ros2Arguments& arguments);
 
 }  // namespace ruedo::cli

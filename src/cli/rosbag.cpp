@@ -21,14 +21,20 @@ namespace fs = std::filesystem;
 std::string qos_profile(const ros2::Qos& qos, ros2::Distro distro, const std::string& indent) {
   const bool numbers = distro == ros2::Distro::humble || distro == ros2::Distro::iron;
   const auto infinite = [&](const char* name) {
-    return fmt::format("{}  {}:\n{}    sec: 9223372036\n{}    nsec: 854775807\n", indent, name, indent, indent);
+    return fmt::format("{}  {}:\n{}    sec: 9223372036\n{}    nsec: 854775807\n", indent, name,
+                       indent, indent);
   };
-  const char* reliability = numbers ? (qos.reliable ? "1" : "2") : (qos.reliable ? "reliable" : "best_effort");
-  const char* durability = numbers ? (qos.transient_local ? "1" : "2") : (qos.transient_local ? "transient_local" : "volatile");
-  return fmt::format("{}- history: {}\n{}  depth: {}\n{}  reliability: {}\n{}  durability: {}\n", indent, numbers ? "1" : "keep_last", indent, qos.depth,
-                     indent, reliability, indent, durability) +
-         infinite("deadline") + infinite("lifespan") + fmt::format("{}  liveliness: {}\n", indent, numbers ? "1" : "automatic") +
-         infinite("liveliness_lease_duration") + indent + "  avoid_ros_namespace_conventions: false";
+  const char* reliability =
+      numbers ? (qos.reliable ? "1" : "2") : (qos.reliable ? "reliable" : "best_effort");
+  const char* durability = numbers ? (qos.transient_local ? "1" : "2")
+                                   : (qos.transient_local ? "transient_local" : "volatile");
+  return fmt::format("{}- history: {}\n{}  depth: {}\n{}  reliability: {}\n{}  durability: {}\n",
+                     indent, numbers ? "1" : "keep_last", indent, qos.depth, indent, reliability,
+                     indent, durability) +
+         infinite("deadline") + infinite("lifespan") +
+         fmt::format("{}  liveliness: {}\n", indent, numbers ? "1" : "automatic") +
+         infinite("liveliness_lease_duration") + indent +
+         "  avoid_ros_namespace_conventions: false";
 }
 
 // A text within double quotes.
@@ -36,17 +42,22 @@ std::string quoted(const std::string& text) {
   std::string out = "\"";
   for (const char c : text) {
     if (c == '"' || c == '\\') out += '\\';
-    if (c == '\n') out += "\\n";
-    else out += c;
+    if (c == '\n')
+      out += "\\n";
+    else
+      out += c;
   }
   return out + "\"";
 }
 
 }  // namespace
 
-Rosbag::Rosbag(const std::string& folder, ros2::ConversionOptions options) : folder_(folder), options_(std::move(options)) {
+Rosbag::Rosbag(const std::string& folder, ros2::ConversionOptions options)
+    : folder_(folder), options_(std::move(options)) {
   std::error_code error;
-  if (fs::exists(folder_, error)) throw InputError({}, "--ros2: " + folder_ + " is there already; a bag gets a folder of its own");
+  if (fs::exists(folder_, error))
+    throw InputError({},
+                     "--ros2: " + folder_ + " is there already; a bag gets a folder of its own");
   fs::create_directories(folder_, error);
   if (error) throw EnvironmentError(folder_ + " cannot be made: " + error.message());
   file_ = fs::path(folder_).filename().string() + "_0.mcap";
@@ -55,7 +66,7 @@ Rosbag::Rosbag(const std::string& folder, ros2::ConversionOptions options) : fol
 
 Rosbag::~Rosbag() {
   if (finished_) return;
-  out_.reset();    // which removes its file
+  out_.reset();  // which removes its file
   std::error_code error;
   fs::remove(folder_, error);
 }
@@ -75,28 +86,36 @@ void Rosbag::begin_scene(const run::LogWorlds::Scene& scene, uint64_t time_ns) {
   }
   const bool first = !conversions_;
   conversions_ = std::make_unique<ros2::Conversions>(info, options_, *names_);
-  write({names_->topic("", "tf_static"), "tf2_msgs/msg/TFMessage", ros2::kLatchedQos}, time_ns, conversions_->static_frames());
+  write({names_->topic("", "tf_static"), "tf2_msgs/msg/TFMessage", ros2::kLatchedQos}, time_ns,
+        conversions_->static_frames());
   if (first) names_->check_remaps();
 }
 
 void Rosbag::add(const std::string& channel, uint64_t time_ns, std::span<const uint8_t> message) {
-  const bool known = conversions_ && conversions_->convert(channel, message, [](size_t) { return true; },
-                                                           [&](size_t topic, std::span<const uint8_t> cdr) { write(conversions_->topics()[topic], time_ns, cdr); });
+  const bool known = conversions_ && conversions_->convert(
+                                         channel, message, [](size_t) { return true; },
+                                         [&](size_t topic, std::span<const uint8_t> cdr) {
+                                           write(conversions_->topics()[topic], time_ns, cdr);
+                                         });
   if (!known) ++left_out_;
 }
 
 void Rosbag::write(const ros2::Topic& topic, uint64_t time_ns, std::span<const uint8_t> cdr) {
   const auto [schema, first] = schemas_.try_emplace(topic.type);
-  if (first) schema->second = out_->add_schema(topic.type, "ros2msg", ros2::full_text(topic.type, options_.distro));
+  if (first)
+    schema->second =
+        out_->add_schema(topic.type, "ros2msg", ros2::full_text(topic.type, options_.distro));
   const auto [at, fresh] = topics_.try_emplace(topic.name + " " + topic.type, Recorded{topic, 0});
   if (fresh) {
-    at->second.channel = out_->add_channel(schema->second, topic.name, "cdr",
-                                           {{"offered_qos_profiles", qos_profile(topic.qos, options_.distro, "") + "\n"},
-                                            {"topic_type_hash", ros2::type_hash(topic.type, options_.distro)}});
+    at->second.channel = out_->add_channel(
+        schema->second, topic.name, "cdr",
+        {{"offered_qos_profiles", qos_profile(topic.qos, options_.distro, "") + "\n"},
+         {"topic_type_hash", ros2::type_hash(topic.type, options_.distro)}});
   }
   begin_ns_ = out_->messages() == 0 ? time_ns : std::min(begin_ns_, time_ns);
   end_ns_ = std::max(end_ns_, time_ns);
-  out_->add_message(at->second.channel, time_ns, {reinterpret_cast<const char*>(cdr.data()), cdr.size()});
+  out_->add_message(at->second.channel, time_ns,
+                    {reinterpret_cast<const char*>(cdr.data()), cdr.size()});
   ++at->second.messages;
 }
 
@@ -105,21 +124,33 @@ std::string Rosbag::metadata() const {
   std::string topics;
   for (const auto& [name, recorded] : topics_) {
     const ros2::Topic& topic = recorded.topic;
-    topics += fmt::format("    - topic_metadata:\n        name: {}\n        type: {}\n        serialization_format: cdr\n", topic.name, topic.type);
-    topics += old ? "        offered_qos_profiles: " + quoted(qos_profile(topic.qos, options_.distro, "")) + "\n"
-                  : "        offered_qos_profiles:\n" + qos_profile(topic.qos, options_.distro, "          ") + "\n";
-    if (!old) topics += fmt::format("        type_description_hash: {}\n", ros2::type_hash(topic.type, options_.distro));
+    topics += fmt::format(
+        "    - topic_metadata:\n        name: {}\n        type: {}\n        serialization_format: "
+        "cdr\n",
+        topic.name, topic.type);
+    topics += old ? "        offered_qos_profiles: " +
+                        quoted(qos_profile(topic.qos, options_.distro, "")) + "\n"
+                  : "        offered_qos_profiles:\n" +
+                        qos_profile(topic.qos, options_.distro, "          ") + "\n";
+    if (!old)
+      topics += fmt::format("        type_description_hash: {}\n",
+                            ros2::type_hash(topic.type, options_.distro));
     topics += fmt::format("      message_count: {}\n", recorded.messages);
   }
   const uint64_t duration = end_ns_ - begin_ns_, count = out_->messages();
   std::string text = fmt::format(
-      "rosbag2_bagfile_information:\n  version: {}\n  storage_identifier: mcap\n  duration:\n    nanoseconds: {}\n"
-      "  starting_time:\n    nanoseconds_since_epoch: {}\n  message_count: {}\n  topics_with_message_count:{}\n{}"
+      "rosbag2_bagfile_information:\n  version: {}\n  storage_identifier: mcap\n  duration:\n    "
+      "nanoseconds: {}\n"
+      "  starting_time:\n    nanoseconds_since_epoch: {}\n  message_count: {}\n  "
+      "topics_with_message_count:{}\n{}"
       "  compression_format: \"\"\n  compression_mode: \"\"\n  relative_file_paths:\n    - {}\n"
-      "  files:\n    - path: {}\n      starting_time:\n        nanoseconds_since_epoch: {}\n      duration:\n        nanoseconds: {}\n"
+      "  files:\n    - path: {}\n      starting_time:\n        nanoseconds_since_epoch: {}\n      "
+      "duration:\n        nanoseconds: {}\n"
       "      message_count: {}\n",
-      old ? 5 : 9, duration, begin_ns_, count, topics.empty() ? " []" : "", topics, quoted(file_), quoted(file_), begin_ns_, duration, count);
-  if (!old) text += fmt::format("  custom_data: ~\n  ros_distro: {}\n", ros2::name_of(options_.distro));
+      old ? 5 : 9, duration, begin_ns_, count, topics.empty() ? " []" : "", topics, quoted(file_),
+      quoted(file_), begin_ns_, duration, count);
+  if (!old)
+    text += fmt::format("  custom_data: ~\n  ros_distro: {}\n", ros2::name_of(options_.distro));
   return text;
 }
 

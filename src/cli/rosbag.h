@@ -1,4 +1,5 @@
-// A log as a ROS 2 bag: a folder with an MCAP file of CDR messages and the metadata.yaml by which rosbag2 finds it.
+// A log as a ROS 2 bag: a folder with an MCAP file of CDR messages and the metadata.yaml by which
+// rosbag2 finds it.
 #pragma once
 
 #include <cstdint>
@@ -18,13 +19,15 @@ namespace ruedo::cli {
 
 class Rosbag {
  public:
-  // Makes the folder (no slash at its end). Throws InputError when it is there already, and EnvironmentError when it cannot be made.
+  // Makes the folder (no slash at its end). Throws InputError when it is there already, and
+  // EnvironmentError when it cannot be made.
   Rosbag(const std::string& folder, ros2::ConversionOptions options);
-  ~Rosbag();    // a bag that was not finished is removed
+  ~Rosbag();  // a bag that was not finished is removed
 
   // What runs from now on.
   void begin_scene(const run::LogWorlds::Scene& scene, uint64_t time_ns);
-  // A message as it came; one that ROS has no type for, or that is damaged, is left out and counted.
+  // A message as it came; one that ROS has no type for, or that is damaged, is left out and
+  // counted.
   void add(const std::string& channel, uint64_t time_ns, std::span<const uint8_t> message);
   void finish();
 
@@ -47,7 +50,7 @@ class Rosbag {
   std::unique_ptr<McapWriter> out_;
   std::unique_ptr<ros2::Conversions> conversions_;
   std::map<std::string, uint16_t> schemas_;
-  std::map<std::string, Recorded> topics_;    // by name and type
+  std::map<std::string, Recorded> topics_;  // by name and type
   uint64_t begin_ns_ = 0, end_ns_ = 0, left_out_ = 0;
   bool finished_ = false;
 };

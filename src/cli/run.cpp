@@ -1,6 +1,6 @@
 // ruedo run: loads a world and serves it until the end, Ctrl-C, or a client's QUIT.
-#include <cerrno>
 #include <atomic>
+#include <cerrno>
 #include <charconv>
 #include <chrono>
 #include <csignal>
@@ -23,10 +23,10 @@
 #include "cli/sandboxed.h"
 #include "cli/view.h"
 #include "core/utf8.h"
-#include "ruedo/errors.h"
-#include "model/world_name.h"
-#include "run/run.h"
 #include "engine/thread_limit.h"
+#include "model/world_name.h"
+#include "ruedo/errors.h"
+#include "run/run.h"
 
 namespace ruedo::cli {
 namespace {
@@ -46,17 +46,18 @@ struct RunArguments {
   Ros2Arguments ros2;
 };
 
-// Takes SIGINT, SIGTERM, and SIGHUP where it is not ignored (nohup), in a thread of its own: a handler could do next to nothing.
-// Make it before any other thread, which then inherits that the signals are blocked. A pipe that nobody reads is no
-// signal here, but an error of who writes.
+// Takes SIGINT, SIGTERM, and SIGHUP where it is not ignored (nohup), in a thread of its own: a
+// handler could do next to nothing. Make it before any other thread, which then inherits that the
+// signals are blocked. A pipe that nobody reads is no signal here, but an error of who writes.
 class SignalThread {
  public:
   SignalThread() {
     sigemptyset(&signals_);
     sigaddset(&signals_, SIGINT);
     sigaddset(&signals_, SIGTERM);
-    struct sigaction hang_up {};
-    if (sigaction(SIGHUP, nullptr, &hang_up) == 0 && hang_up.sa_handler != SIG_IGN) sigaddset(&signals_, SIGHUP);
+    struct sigaction hang_up{};
+    if (sigaction(SIGHUP, nullptr, &hang_up) == 0 && hang_up.sa_handler != SIG_IGN)
+      sigaddset(&signals_, SIGHUP);
     std::signal(SIGPIPE, SIG_IGN);
     pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
     thread_ = std::thread([this] { wait(); });
@@ -73,7 +74,8 @@ class SignalThread {
     for (int signal = 0; sigwait(&signals_, &signal) == 0;) {
       if (done_) return;
       run::Run* server = server_;
-      if (!server || asked_) std::_Exit(128 + signal);    // nothing to end cleanly, or it does not end
+      if (!server || asked_)
+        std::_Exit(128 + signal);  // nothing to end cleanly, or it does not end
       asked_ = true;
       server->stop();
     }
@@ -86,8 +88,9 @@ class SignalThread {
   std::thread thread_;
 };
 
-// Ends the run, as SIGTERM would, when standard input ends: the client that started this server holds the other end of
-// the pipe, and the kernel closes it however that client ends. The thread waits in read() for as long as the process lives.
+// Ends the run, as SIGTERM would, when standard input ends: the client that started this server
+// holds the other end of the pipe, and the kernel closes it however that client ends. The thread
+// waits in read() for as long as the process lives.
 void watch_stdin() {
   std::thread([] {
     char bytes[256];
@@ -125,8 +128,10 @@ class StatusLine {
     last_time_ = now;
     if (!shown_) return;
     shown_ = drawn_ = is_printed([&] {
-      fmt::print(stderr, "\r\033[K{:.2f} s   {}   {:.0f} messages/s", static_cast<double>(status.time_us) * 1e-6,
-                 status.paused ? std::string("paused") : fmt::format("x {:.3g} real time", factor), messages);
+      fmt::print(stderr, "\r\033[K{:.2f} s   {}   {:.0f} messages/s",
+                 static_cast<double>(status.time_us) * 1e-6,
+                 status.paused ? std::string("paused") : fmt::format("x {:.3g} real time", factor),
+                 messages);
       std::fflush(stderr);
     });
   }
@@ -139,14 +144,19 @@ class StatusLine {
 
 run::LockstepOptions lockstep_options(const RunArguments& arguments) {
   using Policy = run::LockstepOptions::Policy;
-  if (arguments.lockstep > 0 && arguments.control == "off") throw InputError({}, "--lockstep needs requests: not with --control off");
-  const Policy policy = arguments.lease_policy == "drop" ? Policy::drop : arguments.lease_policy == "fail" ? Policy::fail : Policy::pause;
+  if (arguments.lockstep > 0 && arguments.control == "off")
+    throw InputError({}, "--lockstep needs requests: not with --control off");
+  const Policy policy = arguments.lease_policy == "drop"   ? Policy::drop
+                        : arguments.lease_policy == "fail" ? Policy::fail
+                                                           : Policy::pause;
   return {arguments.lockstep, arguments.lease, policy};
 }
 
 run::RunOptions server_options(const RunArguments& arguments) {
   run::RunOptions options;
-  options.rate = parse_rate(arguments.lockstep > 0 ? "max" : arguments.rate.empty() ? "1" : arguments.rate);
+  options.rate = parse_rate(arguments.lockstep > 0   ? "max"
+                            : arguments.rate.empty() ? "1"
+                                                     : arguments.rate);
   if (!arguments.duration.empty()) options.duration_us = parse_duration_us(arguments.duration);
   options.paused = arguments.paused;
   options.lockstep = lockstep_options(arguments);
@@ -154,12 +164,14 @@ run::RunOptions server_options(const RunArguments& arguments) {
   options.record = arguments.record;
   options.result_options = result_options(arguments.world);
   for (const std::string& text : arguments.remaps) {
-    if (text.starts_with('/')) continue;    // ROS's names, which change nothing of the run
+    if (text.starts_with('/')) continue;  // ROS's names, which change nothing of the run
     options.remaps.push_back(parse_remap(text));
     options.result_options.push_back("--remap=" + text);
   }
-  for (const std::string& text : arguments.wait_for) options.wait_for.push_back(parse_wait_for(text));
-  if (arguments.lockstep > 0 && !arguments.wait_for.empty()) throw InputError({}, "--lockstep does not go with --wait-for");
+  for (const std::string& text : arguments.wait_for)
+    options.wait_for.push_back(parse_wait_for(text));
+  if (arguments.lockstep > 0 && !arguments.wait_for.empty())
+    throw InputError({}, "--lockstep does not go with --wait-for");
   options.snapshots = arguments.snapshots;
   options.repeat = arguments.restore;
   options.simulation.fleet.seed = arguments.seed;
@@ -177,7 +189,8 @@ Ros2Arguments ros2_arguments(const RunArguments& arguments, const run::RunOption
   for (const run::WaitForOption& option : options.wait_for) {
     if (option.channel.starts_with('/')) ros2.wait_for.push_back(option.channel);
   }
-  if (!ros2.on && !(ros2.topics.empty() && ros2.wait_for.empty())) throw InputError({}, "names of ROS topics (/...) in --remap and --wait-for go with --ros2");
+  if (!ros2.on && !(ros2.topics.empty() && ros2.wait_for.empty()))
+    throw InputError({}, "names of ROS topics (/...) in --remap and --wait-for go with --ros2");
   ros2.channels = options.remaps;
   return ros2;
 }
@@ -191,7 +204,8 @@ void announce(const bus::ServerBus& place) {
 
 void print_world(const run::Run& server, const model::WorldModel& world, const bus::LcmUrl& url) {
   const Style style = style_of(stdout);
-  fmt::print("{}{}{}: steps of {:g} ms, seed {}, on {}\n", style.bold, for_terminal(world.name), style.off, static_cast<double>(world.step_us) * 1e-3,
+  fmt::print("{}{}{}: steps of {:g} ms, seed {}, on {}\n", style.bold, for_terminal(world.name),
+             style.off, static_cast<double>(world.step_us) * 1e-3,
              static_cast<uint64_t>(server.info().front().seed), url.str());
   print_channels(stdout, server.info());
   std::fflush(stdout);
@@ -205,7 +219,9 @@ std::string socket_of(const std::string& lcm) {
 
 int run(const RunArguments& arguments) {
   run::RunOptions options = server_options(arguments);
-  if (arguments.sandboxed) enter_sandbox(model::world_file(arguments.world.world), {arguments.record, arguments.snapshots, socket_of(arguments.lcm)});
+  if (arguments.sandboxed)
+    enter_sandbox(model::world_file(arguments.world.world),
+                  {arguments.record, arguments.snapshots, socket_of(arguments.lcm)});
   SignalThread signals;
   if (arguments.watch_stdin) watch_stdin();
   const engine::ThreadLimit limit(arguments.threads);
@@ -217,19 +233,23 @@ int run(const RunArguments& arguments) {
   options.wait_for = with_channels(std::move(options.wait_for), *world, ros2);
   run::Run server(world, std::move(options), viewed.bus());
   const std::unique_ptr<Ros2Node> node = Ros2Node::open(server, ros2);
-  place.claim->describe(fmt::format("pid {}, world {}, run {}", getpid(), world->name, server.run_id()));
+  place.claim->describe(
+      fmt::format("pid {}, world {}, run {}", getpid(), world->name, server.run_id()));
   std::shared_ptr<void> view;
   const bool is_read = is_printed([&] {
     announce(place);
     std::vector<Finding> findings = world->findings;
-    findings.insert(findings.end(), server.findings().list().begin(), server.findings().list().end());
+    findings.insert(findings.end(), server.findings().list().begin(),
+                    server.findings().list().end());
     print_findings(findings);
     if (!arguments.quiet) print_world(server, *world, place.url);
     view = viewed.open(server, world->name);
     if (node && !arguments.quiet) node->print();
   });
-  if (!is_read) server.on_state([&server](const Snapshot&) { server.stop(); });    // as by SIGTERM: the log gets its end
-  if (!is_read && arguments.lockstep > 0) server.stop();                           // no state comes by itself
+  if (!is_read)
+    server.on_state(
+        [&server](const Snapshot&) { server.stop(); });   // as by SIGTERM: the log gets its end
+  if (!is_read && arguments.lockstep > 0) server.stop();  // no state comes by itself
   StatusLine status;
   server.on_status([&](const run::Status& now) { status.draw(now); });
   signals.serve(&server);
@@ -246,38 +266,92 @@ int run(const RunArguments& arguments) {
 }
 
 void add_run(CLI::App& app, Action& chosen) {
-  CLI::App* command = app.add_subcommand("run", "serve a world: step it, publish its sensors, take commands");
+  CLI::App* command =
+      app.add_subcommand("run", "serve a world: step it, publish its sensors, take commands");
   const auto arguments = std::make_shared<RunArguments>();
   add_world_arguments(*command, arguments->world);
-  command->add_option("--seed", arguments->seed, "of all noise")->type_name("N")->capture_default_str()->check([](const std::string& text) {
-    uint64_t seed = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
-    return error == std::errc() && end == text.data() + text.size() ? "" : "'" + text + "' is not allowed; a seed is a whole number from 0 to 18446744073709551615";
-  });
-  command->add_option("--rate", arguments->rate, "sim time per real time, or max (default: 1); in lockstep the grants alone pace it")->type_name("R|max");
-  command->add_option("--duration", arguments->duration, "end after so many seconds of sim time")->type_name("S");
-  command->add_option("--lcm", arguments->lcm, "LCM address, or auto for a free port (default: $LCM_DEFAULT_URL, or LCM's group with ttl 0)")->type_name("URL|auto");
+  command->add_option("--seed", arguments->seed, "of all noise")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check([](const std::string& text) {
+        uint64_t seed = 0;
+        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
+        return error == std::errc() && end == text.data() + text.size()
+                   ? ""
+                   : "'" + text +
+                         "' is not allowed; a seed is a whole number from 0 to "
+                         "18446744073709551615";
+      });
+  command
+      ->add_option(
+          "--rate", arguments->rate,
+          "sim time per real time, or max (default: 1); in lockstep the grants alone pace it")
+      ->type_name("R|max");
+  command->add_option("--duration", arguments->duration, "end after so many seconds of sim time")
+      ->type_name("S");
+  command
+      ->add_option("--lcm", arguments->lcm,
+                   "LCM address, or auto for a free port (default: $LCM_DEFAULT_URL, or LCM's "
+                   "group with ttl 0)")
+      ->type_name("URL|auto");
   command->add_option("--record", arguments->record, "write a standard LCM log")->type_name("FILE");
-  command->add_option("--remap", arguments->remaps, "give a channel another name: CHANNEL=NAME")->type_name("REMAP")->allow_extra_args(false);
-  CLI::Option* view = command->add_option("--view", arguments->view, "serve the web console (default: 127.0.0.1:8080)");
+  command->add_option("--remap", arguments->remaps, "give a channel another name: CHANNEL=NAME")
+      ->type_name("REMAP")
+      ->allow_extra_args(false);
+  CLI::Option* view = command->add_option("--view", arguments->view,
+                                          "serve the web console (default: 127.0.0.1:8080)");
   view->type_name("[ADDRESS:PORT]")->expected(0, 1);
-  CLI::Option* ros2 = command->add_option("--ros2", arguments->ros2.distro, "be a ROS 2 node, of that release (default: $ROS_DISTRO, or jazzy)");
+  CLI::Option* ros2 =
+      command->add_option("--ros2", arguments->ros2.distro,
+                          "be a ROS 2 node, of that release (default: $ROS_DISTRO, or jazzy)");
   ros2->type_name("[DISTRO]")->expected(0, 1);
-  command->add_option("--ros2-clock", arguments->ros2.clock_hz, "/clock at most so often in a second of sim time")
-      ->type_name("HZ")->capture_default_str()->check(CLI::Range(0.1, 10000.0));
-  command->add_option("--wait-for", arguments->wait_for, "wait at each step where a command is due: CHANNEL@HZ")
-      ->type_name("INPUT")->allow_extra_args(false);
-  command->add_option("--snapshots", arguments->snapshots, "the folder where clients may save the state, and restore it")->type_name("FOLDER");
-  command->add_option("--restore", arguments->restore, "begin with the state of a snapshot of the same world and options")->type_name("FILE");
+  command
+      ->add_option("--ros2-clock", arguments->ros2.clock_hz,
+                   "/clock at most so often in a second of sim time")
+      ->type_name("HZ")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 10000.0));
+  command
+      ->add_option("--wait-for", arguments->wait_for,
+                   "wait at each step where a command is due: CHANNEL@HZ")
+      ->type_name("INPUT")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--snapshots", arguments->snapshots,
+                   "the folder where clients may save the state, and restore it")
+      ->type_name("FOLDER");
+  command
+      ->add_option("--restore", arguments->restore,
+                   "begin with the state of a snapshot of the same world and options")
+      ->type_name("FILE");
   command->add_flag("--paused", arguments->paused, "start paused, at step 0");
-  command->add_option("--lockstep", arguments->lockstep, "wait for so many clients, then go as far as all of them grant")->type_name("N")->check(CLI::Range(1, 64));
-  command->add_option("--lease", arguments->lease, "seconds of real time after which a silent client of lockstep has lost its lease")
-      ->type_name("S")->capture_default_str()->check(CLI::Range(0.01, 1e6));
-  command->add_option("--lease-policy", arguments->lease_policy, "then: pause the run, drop the client, or fail the run with exit code 1")
-      ->capture_default_str()->check(CLI::IsMember({"pause", "drop", "fail"}));
-  command->add_option("--threads", arguments->threads, "most threads inside a module (default: one a core)")->type_name("N")->check(CLI::Range(1, 1024));
-  command->add_option("--control", arguments->control, "serve requests: on or off")->capture_default_str()->check(CLI::IsMember({"on", "off"}));
-  command->add_flag("--watch-stdin", arguments->watch_stdin, "end when standard input does: for programs that start a server");
+  command
+      ->add_option("--lockstep", arguments->lockstep,
+                   "wait for so many clients, then go as far as all of them grant")
+      ->type_name("N")
+      ->check(CLI::Range(1, 64));
+  command
+      ->add_option(
+          "--lease", arguments->lease,
+          "seconds of real time after which a silent client of lockstep has lost its lease")
+      ->type_name("S")
+      ->capture_default_str()
+      ->check(CLI::Range(0.01, 1e6));
+  command
+      ->add_option("--lease-policy", arguments->lease_policy,
+                   "then: pause the run, drop the client, or fail the run with exit code 1")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"pause", "drop", "fail"}));
+  command
+      ->add_option("--threads", arguments->threads,
+                   "most threads inside a module (default: one a core)")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1024));
+  command->add_option("--control", arguments->control, "serve requests: on or off")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"on", "off"}));
+  command->add_flag("--watch-stdin", arguments->watch_stdin,
+                    "end when standard input does: for programs that start a server");
   command->add_flag("--quiet", arguments->quiet, "do not list the channels");
   add_sandbox_argument(*command, arguments->sandboxed);
   command->callback([arguments, view, ros2, &chosen] {

@@ -16,17 +16,21 @@ namespace fs = std::filesystem;
 namespace ruedo::cli {
 
 void add_sandbox_argument(CLI::App& command, bool& sandboxed) {
-  command.add_flag("--sandbox", sandboxed, "for files of strangers: reach no file but theirs, and the model folders (see ruedo doctor)");
+  command.add_flag(
+      "--sandbox", sandboxed,
+      "for files of strangers: reach no file but theirs, and the model folders (see ruedo doctor)");
 }
 
 namespace {
 
-// The cache of meshes, and in it what would go to /tmp, where files of others are. Without a cache, /tmp.
+// The cache of meshes, and in it what would go to /tmp, where files of others are. Without a cache,
+// /tmp.
 std::string own_folder() {
   const std::string cache = model::mesh_cache_folder();
   const fs::path temporary = fs::path(cache) / "tmp";
   std::error_code error;
-  if (cache.empty() || (fs::create_directories(temporary, error), error)) return fs::temp_directory_path().string();
+  if (cache.empty() || (fs::create_directories(temporary, error), error))
+    return fs::temp_directory_path().string();
   setenv("TMPDIR", temporary.c_str(), 1);
   return cache;
 }
@@ -34,17 +38,20 @@ std::string own_folder() {
 }  // namespace
 
 void enter_sandbox(const std::string& file, const std::vector<std::string>& written) {
-  if (const std::string missing = missing_for_sandbox(); !missing.empty()) throw EnvironmentError("--sandbox: " + missing);
+  if (const std::string missing = missing_for_sandbox(); !missing.empty())
+    throw EnvironmentError("--sandbox: " + missing);
   Sandbox sandbox;
   sandbox.readable = model::ResourceFinder::for_strangers(file).folders();
   sandbox.readable.push_back(fs::absolute(file).parent_path().string());
   const fs::path python = model::xacro_python();
-  if (python.has_parent_path()) sandbox.runnable.push_back(python.parent_path().parent_path().string());
+  if (python.has_parent_path())
+    sandbox.runnable.push_back(python.parent_path().parent_path().string());
   sandbox.writable.push_back(own_folder());
   std::error_code error;
   for (const std::string& path : written) {
     if (path.empty()) continue;
-    const bool itself = fs::exists(path, error) && !fs::is_regular_file(path, error);    // a folder, a device
+    const bool itself =
+        fs::exists(path, error) && !fs::is_regular_file(path, error);  // a folder, a device
     sandbox.writable.push_back(itself ? path : fs::absolute(path).parent_path().string());
   }
   enter(sandbox);

@@ -12,8 +12,9 @@ namespace ruedo::cli {
 
 void add_sandbox_argument(CLI::App& command, bool& sandboxed);
 
-// Before any thread is started. file: the world or log; its folder, the models in and beside it, and the folders of RUEDO_PATH and its kin stay
-// readable. written: files and folders that the command writes; "" are passed over. Throws EnvironmentError where the kernel has no sandbox.
+// Before any thread is started. file: the world or log; its folder, the models in and beside it,
+// and the folders of RUEDO_PATH and its kin stay readable. written: files and folders that the
+// command writes; "" are passed over. Throws EnvironmentError where the kernel has no sandbox.
 void enter_sandbox(const std::string& file, const std::vector<std::string>& written);
 
 }  // namespace ruedo::cli

@@ -13,10 +13,14 @@ class SvgPlot {
  public:
   // equal_axes: one unit is as long on both axes (maps).
   SvgPlot(std::string title, std::string x_label, std::string y_label, bool equal_axes = false)
-      : title_(std::move(title)), x_label_(std::move(x_label)), y_label_(std::move(y_label)), equal_axes_(equal_axes) {}
+      : title_(std::move(title)),
+        x_label_(std::move(x_label)),
+        y_label_(std::move(y_label)),
+        equal_axes_(equal_axes) {}
 
   // Joined by straight lines; an empty label stays out of the legend. colour: any that SVG knows.
-  void line(Points points, std::string colour, std::string label = "", bool dashed = false, double width = 1.6);
+  void line(Points points, std::string colour, std::string label = "", bool dashed = false,
+            double width = 1.6);
   // A closed outline, filled.
   void area(Points points, std::string colour);
 

@@ -17,7 +17,7 @@
 namespace ruedo::cli {
 namespace {
 
-constexpr int kRepeat_ms = 100;    // well within a robot's watchdog
+constexpr int kRepeat_ms = 100;  // well within a robot's watchdog
 constexpr int kCtrlC = 3;
 constexpr double kStep_m_s = 0.1, kStep_rad_s = 0.2;
 
@@ -25,10 +25,12 @@ constexpr double kStep_m_s = 0.1, kStep_rad_s = 0.2;
 class RawTerminal {
  public:
   RawTerminal() {
-    if (isatty(STDIN_FILENO) == 0) throw EnvironmentError("teleop needs a terminal to read keys from");
+    if (isatty(STDIN_FILENO) == 0)
+      throw EnvironmentError("teleop needs a terminal to read keys from");
     tcgetattr(STDIN_FILENO, &before_);
     termios raw = before_;
-    raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO | ISIG);    // Ctrl-C is a key too: the robot is stopped first
+    raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO |
+                                          ISIG);  // Ctrl-C is a key too: the robot is stopped first
     tcsetattr(STDIN_FILENO, TCSANOW, &raw);
   }
   ~RawTerminal() { tcsetattr(STDIN_FILENO, TCSANOW, &before_); }
@@ -37,7 +39,8 @@ class RawTerminal {
   termios before_{};
 };
 
-// The next key, or 0 when none came in that time; -1 at the end of the input. An arrow key is its letter's.
+// The next key, or 0 when none came in that time; -1 at the end of the input. An arrow key is its
+// letter's.
 int next_key(int timeout_ms) {
   pollfd input{STDIN_FILENO, POLLIN, 0};
   if (poll(&input, 1, timeout_ms) <= 0) return 0;
@@ -84,7 +87,8 @@ int teleop(const TeleopArguments& arguments) {
     command.vx = std::round(command.vx / kStep_m_s) * kStep_m_s;
     command.omega = std::round(command.omega / kStep_rad_s) * kStep_rad_s;
     send();
-    fmt::print("\r\033[K{}: {:+.1f} m/s, {:+.1f} rad/s", arguments.robot, command.vx, command.omega);
+    fmt::print("\r\033[K{}: {:+.1f} m/s, {:+.1f} rad/s", arguments.robot, command.vx,
+               command.omega);
     std::fflush(stdout);
   }
   command.vx = command.omega = 0.0;
@@ -97,7 +101,10 @@ void add_teleop(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand("teleop", "drive a robot with the keyboard");
   const auto arguments = std::make_shared<TeleopArguments>();
   command->add_option("ROBOT", arguments->robot, "its name, such as p3at")->required();
-  command->add_option("--lcm", arguments->lcm, "LCM address (default: $LCM_DEFAULT_URL, or LCM's group)")->type_name("URL");
+  command
+      ->add_option("--lcm", arguments->lcm,
+                   "LCM address (default: $LCM_DEFAULT_URL, or LCM's group)")
+      ->type_name("URL");
   command->callback([arguments, &chosen] { chosen = [arguments] { return teleop(*arguments); }; });
 }
 

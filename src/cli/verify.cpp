@@ -8,8 +8,8 @@
 #include "cli/logged_run.h"
 #include "cli/sandboxed.h"
 #include "core/utf8.h"
-#include "log/header.h"
 #include "engine/thread_limit.h"
+#include "log/header.h"
 #include "run/verify.h"
 
 namespace ruedo::cli {
@@ -22,11 +22,15 @@ struct VerifyArguments {
 };
 
 std::string describe(const run::FirstDifference& difference) {
-  const std::string where = fmt::format("{} at step {} ({:g} s{})", difference.channel, difference.step,
-                                        static_cast<double>(difference.time_us) * 1e-6,
-                                        difference.epoch > 0 ? fmt::format(", epoch {}", difference.epoch) : "");
-  if (difference.field.empty()) return fmt::format("{}: the log has {}, the repetition {}", where, difference.logged, difference.repeated);
-  return fmt::format("{}: {} is {} in the log, {} in the repetition", where, difference.field, difference.logged, difference.repeated);
+  const std::string where =
+      fmt::format("{} at step {} ({:g} s{})", difference.channel, difference.step,
+                  static_cast<double>(difference.time_us) * 1e-6,
+                  difference.epoch > 0 ? fmt::format(", epoch {}", difference.epoch) : "");
+  if (difference.field.empty())
+    return fmt::format("{}: the log has {}, the repetition {}", where, difference.logged,
+                       difference.repeated);
+  return fmt::format("{}: {} is {} in the log, {} in the repetition", where, difference.field,
+                     difference.logged, difference.repeated);
 }
 
 int repeat(const VerifyArguments& arguments, const log_header_t& header) {
@@ -40,20 +44,26 @@ int repeat(const VerifyArguments& arguments, const log_header_t& header) {
   const engine::ThreadLimit limit(arguments.threads);
   run::Verifier verifier(arguments.log, load(logged.world), std::move(options));
   const bool same_machine = verifier.machine_differences().empty();
-  for (const std::string& line : verifier.machine_differences()) fmt::print("not as in the log: {}\n", for_terminal(line));
+  for (const std::string& line : verifier.machine_differences())
+    fmt::print("not as in the log: {}\n", for_terminal(line));
   std::fflush(stdout);
   verifier.check_same_run();
   const run::Verification result = verifier.run();
-  const std::string so_far = fmt::format("{} messages, {} bytes, {:g} s of {}, seed {}", result.messages, result.bytes,
-                                         static_cast<double>(result.time_us) * 1e-6, header.world, static_cast<uint64_t>(header.seed));
+  const std::string so_far = fmt::format(
+      "{} messages, {} bytes, {:g} s of {}, seed {}", result.messages, result.bytes,
+      static_cast<double>(result.time_us) * 1e-6, header.world, static_cast<uint64_t>(header.seed));
   if (result.difference) {
-    fmt::print("{}: {}\nBefore it, {} were repeated byte for byte.\n", arguments.log, for_terminal(describe(*result.difference)), for_terminal(so_far));
+    fmt::print("{}: {}\nBefore it, {} were repeated byte for byte.\n", arguments.log,
+               for_terminal(describe(*result.difference)), for_terminal(so_far));
     if (same_machine) return kCheckFailed;
-    fmt::print("What is not as in the log may be why: bytes hold for one version with its libraries. Repeat it there.\n");
+    fmt::print(
+        "What is not as in the log may be why: bytes hold for one version with its libraries. "
+        "Repeat it there.\n");
     return kEnvironment;
   }
   fmt::print("{}: repeated byte for byte: {}\n", arguments.log, for_terminal(so_far));
-  if (!result.fault.empty()) fmt::print("{}: {}; verified up to there\n", arguments.log, for_terminal(result.fault));
+  if (!result.fault.empty())
+    fmt::print("{}: {}; verified up to there\n", arguments.log, for_terminal(result.fault));
   return kGood;
 }
 
@@ -65,10 +75,15 @@ int verify(const VerifyArguments& arguments) {
 }
 
 void add_verify(CLI::App& app, Action& chosen) {
-  CLI::App* command = app.add_subcommand("verify", "repeat a recorded run, and compare it byte by byte");
+  CLI::App* command =
+      app.add_subcommand("verify", "repeat a recorded run, and compare it byte by byte");
   const auto arguments = std::make_shared<VerifyArguments>();
   command->add_option("LOG", arguments->log, "recorded by ruedo run --record")->required();
-  command->add_option("--threads", arguments->threads, "most threads inside a module (default: one a core)")->type_name("N")->check(CLI::Range(1, 1024));
+  command
+      ->add_option("--threads", arguments->threads,
+                   "most threads inside a module (default: one a core)")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1024));
   add_sandbox_argument(*command, arguments->sandboxed);
   command->callback([arguments, &chosen] { chosen = [arguments] { return verify(*arguments); }; });
 }

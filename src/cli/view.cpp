@@ -10,12 +10,12 @@
 #include <filesystem>
 
 #include "cli/logged_run.h"
-#include "core/whole.h"
 #include "console/console.h"
 #include "console/live_source.h"
 #include "console/log_page.h"
 #include "console/log_source.h"
 #include "console/tee_bus.h"
+#include "core/whole.h"
 #include "ruedo/world_info_t.hpp"
 #include "run/run.h"
 
@@ -48,17 +48,21 @@ std::shared_ptr<void> ViewedBus::open(run::Run& server, const std::string& title
   for (const engine::Channel& channel : server.channels().list()) {
     if (channel.name == "ruedo/info") info = channel.bus_name;
   }
-  auto source = std::make_unique<console::LiveSource>(impl_->tee, [&server] { return server.world(); }, info);
-  auto serving = std::make_shared<console::Console>(impl_->address, std::move(source), "live", title);
+  auto source =
+      std::make_unique<console::LiveSource>(impl_->tee, [&server] { return server.world(); }, info);
+  auto serving =
+      std::make_shared<console::Console>(impl_->address, std::move(source), "live", title);
   print_urls(*serving);
   return serving;
 }
 
 std::shared_ptr<void> view_log(const std::string& log, const std::string& address, double speed) {
   const console::Address where = console::parse_address(address);
-  auto source = std::make_unique<console::LogSource>(log, [&](const log_header_t& header) { return load_run(header, log); }, speed);
+  auto source = std::make_unique<console::LogSource>(
+      log, [&](const log_header_t& header) { return load_run(header, log); }, speed);
   const std::string fault = source->fault();
-  auto serving = std::make_shared<console::Console>(where, std::move(source), "log", std::filesystem::path(log).filename().string());
+  auto serving = std::make_shared<console::Console>(where, std::move(source), "log",
+                                                    std::filesystem::path(log).filename().string());
   serving->end("ruedo play has ended.");
   if (!fault.empty()) fmt::print(stderr, "ruedo: {}: {}\n", log, fault);
   print_urls(*serving);
@@ -66,11 +70,15 @@ std::shared_ptr<void> view_log(const std::string& log, const std::string& addres
 }
 
 void write_page(const std::string& log, const std::string& path, double most_megabytes) {
-  const console::LogPage page = console::write_log_page(log, [&](const log_header_t& header) { return load_run(header, log); }, path,
-                                                        whole<size_t>(most_megabytes * 1e6));
+  const console::LogPage page = console::write_log_page(
+      log, [&](const log_header_t& header) { return load_run(header, log); }, path,
+      whole<size_t>(most_megabytes * 1e6));
   std::string thinned;
-  if (page.interval_s > 0) thinned += fmt::format(", messages of a channel at least {:g} s apart", page.interval_s);
-  if (page.pictures_s != 0) thinned += page.pictures_s < 0 ? ", without pictures" : fmt::format(", pictures {:g} s apart", page.pictures_s);
+  if (page.interval_s > 0)
+    thinned += fmt::format(", messages of a channel at least {:g} s apart", page.interval_s);
+  if (page.pictures_s != 0)
+    thinned += page.pictures_s < 0 ? ", without pictures"
+                                   : fmt::format(", pictures {:g} s apart", page.pictures_s);
   if (!page.fault.empty()) fmt::print(stderr, "ruedo: {}: {}\n", log, page.fault);
   fmt::print("{}: {:.1f} MB{}\n", path, static_cast<double>(page.bytes) * 1e-6, thinned);
 }
@@ -84,8 +92,10 @@ namespace ruedo::cli {
 namespace {
 
 [[noreturn]] void no_console() {
-  throw EnvironmentError("this ruedo was built without the web console. Install nodejs, npm and libwebsockets-dev, then "
-                         "configure with -DRUEDO_CONSOLE=ON and build again");
+  throw EnvironmentError(
+      "this ruedo was built without the web console. Install nodejs, npm and libwebsockets-dev, "
+      "then "
+      "configure with -DRUEDO_CONSOLE=ON and build again");
 }
 
 }  // namespace

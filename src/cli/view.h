@@ -1,4 +1,5 @@
-// --view: the web console beside a run or a log. Without the console in this build it says what is missing.
+// --view: the web console beside a run or a log. Without the console in this build it says what is
+// missing.
 #pragma once
 
 #include <memory>
@@ -21,8 +22,8 @@ class ViewedBus {
 
   Bus& bus();
 
-  // Serves the console for as long as the returned object lives, and prints where. Null without --view. Throws
-  // EnvironmentError when the address cannot be had. The server must outlive it.
+  // Serves the console for as long as the returned object lives, and prints where. Null without
+  // --view. Throws EnvironmentError when the address cannot be had. The server must outlive it.
   std::shared_ptr<void> open(run::Run& server, const std::string& title);
 
  private:
@@ -31,12 +32,14 @@ class ViewedBus {
   std::unique_ptr<Impl> impl_;
 };
 
-// Serves the console with a recorded run for as long as the returned object lives, and prints where. speed: log time per
-// real time. Throws InputError for what is no log, and as ViewedBus does.
+// Serves the console with a recorded run for as long as the returned object lives, and prints
+// where. speed: log time per real time. Throws InputError for what is no log, and as ViewedBus
+// does.
 std::shared_ptr<void> view_log(const std::string& log, const std::string& address, double speed);
 
-// Writes a recorded run as one HTML file that needs no server, of that size at most, and says what is in it. Throws InputError for what is
-// no log or does not fit, and EnvironmentError when the file cannot be written or this build has no console.
+// Writes a recorded run as one HTML file that needs no server, of that size at most, and says what
+// is in it. Throws InputError for what is no log or does not fit, and EnvironmentError when the
+// file cannot be written or this build has no console.
 void write_page(const std::string& log, const std::string& path, double most_megabytes);
 
 }  // namespace ruedo::cli

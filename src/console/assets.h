@@ -7,9 +7,9 @@
 namespace ruedo::console {
 
 struct Asset {
-  const char* path;       // "/", "/main.js", ...
+  const char* path;  // "/", "/main.js", ...
   const char* type;
-  const uint8_t* data;    // compressed by gzip
+  const uint8_t* data;  // compressed by gzip
   size_t size;
 };
 

@@ -1,4 +1,5 @@
-// What belongs together is told from the message types' description: a type with a field `part` comes in parts.
+// What belongs together is told from the message types' description: a type with a field `part`
+// comes in parts.
 #include "console/board.h"
 
 #include "core/utf8.h"
@@ -8,9 +9,10 @@
 namespace ruedo::console {
 namespace {
 
-// Where the field `part`, an int16, stands in a message; -1 where there is none, or not always at one place.
+// Where the field `part`, an int16, stands in a message; -1 where there is none, or not always at
+// one place.
 int part_offset(const Schema& schema) {
-  int at = 8;    // after the fingerprint
+  int at = 8;  // after the fingerprint
   for (const Field& field : schema.fields) {
     if (field.name == "part" && field.primitive == Primitive::int16) return at;
     const auto size = static_cast<int>(wire_size(field.primitive));
@@ -38,14 +40,16 @@ void Board::put(size_t index, std::vector<uint8_t> message) {
     channel.newest.clear();
   }
   const auto at = static_cast<size_t>(channel.part_at);
-  const bool later_part = channel.part_at >= 0 && message.size() >= at + 2 && (message[at] != 0 || message[at + 1] != 0);
+  const bool later_part = channel.part_at >= 0 && message.size() >= at + 2 &&
+                          (message[at] != 0 || message[at + 1] != 0);
   if (channel.replies) {
     if (channel.newest.size() >= kKeptReplies) channel.newest.erase(channel.newest.begin());
   } else if (!later_part || channel.newest.size() >= kMostParts) {
     channel.newest.clear();
   }
   channel.last_number = ++number_;
-  channel.newest.push_back({number_, std::make_shared<const std::vector<uint8_t>>(std::move(message))});
+  channel.newest.push_back(
+      {number_, std::make_shared<const std::vector<uint8_t>>(std::move(message))});
 }
 
 bool Board::is_later_part(std::span<const uint8_t> message) {

@@ -1,7 +1,8 @@
-// The newest messages of each channel, as the console's viewers are to see them. The console thread's alone.
+// The newest messages of each channel, as the console's viewers are to see them. The console
+// thread's alone.
 //
-// Of most channels one message is kept. Messages in parts are kept together, and so are the last few replies, so that
-// nobody misses his own.
+// Of most channels one message is kept. Messages in parts are kept together, and so are the last
+// few replies, so that nobody misses his own.
 #pragma once
 
 #include <cstdint>
@@ -20,17 +21,17 @@ class Board {
   static constexpr size_t kMostParts = 256;
 
   struct Message {
-    uint64_t number;    // counts all messages that came to this board
+    uint64_t number;  // counts all messages that came to this board
     Bytes bytes;
   };
   struct Channel {
     std::string name;
     std::vector<Message> newest;
-    uint64_t last_number = 0;     // of the newest message; 0: none yet
+    uint64_t last_number = 0;  // of the newest message; 0: none yet
     int64_t fingerprint = 0;
-    int part_at = -1;             // byte at which the number of the part stands; -1: it has none
+    int part_at = -1;  // byte at which the number of the part stands; -1: it has none
     bool replies = false;
-    int watchers = 0;             // viewers that want it
+    int watchers = 0;  // viewers that want it
   };
 
   // Makes room up to that channel. Names that are not UTF-8 are shown with '?'.

@@ -23,7 +23,9 @@ namespace {
 
 constexpr auto kPlaybackPeriod = std::chrono::milliseconds(100);
 
-Bytes bytes_of(std::string_view text) { return std::make_shared<const std::vector<uint8_t>>(text.begin(), text.end()); }
+Bytes bytes_of(std::string_view text) {
+  return std::make_shared<const std::vector<uint8_t>>(text.begin(), text.end());
+}
 
 HttpResponse not_found() {
   HttpResponse response;
@@ -37,8 +39,8 @@ HttpResponse not_found() {
 struct Console::Impl {
   Stage stage;
   std::shared_ptr<const model::WorldModel> world;
-  std::unique_ptr<SceneData> scene;      // of that world; null: not made yet
-  Playback told;                         // to the viewers
+  std::unique_ptr<SceneData> scene;  // of that world; null: not made yet
+  Playback told;                     // to the viewers
   std::chrono::steady_clock::time_point told_at;
   std::unique_ptr<WebServer> web;
   std::thread thread;
@@ -69,7 +71,9 @@ HttpResponse Console::Impl::get(std::string_view path) {
   for (size_t i = 0; i < kAssetCount; ++i) {
     const Asset& asset = kAssets[i];
     if (path != asset.path) continue;
-    HttpResponse response = blob(std::make_shared<const std::vector<uint8_t>>(asset.data, asset.data + asset.size), asset.type);
+    HttpResponse response =
+        blob(std::make_shared<const std::vector<uint8_t>>(asset.data, asset.data + asset.size),
+             asset.type);
     response.gzip = true;
     return response;
   }
@@ -84,7 +88,9 @@ HttpResponse Console::Impl::get(std::string_view path) {
   const std::string_view number = path.substr(kTextures.size());
   size_t index = 0;
   const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), index);
-  if (error != std::errc() || end != number.data() + number.size() || index >= data->pictures.size()) return not_found();
+  if (error != std::errc() || end != number.data() + number.size() ||
+      index >= data->pictures.size())
+    return not_found();
   return blob(data->pictures[index].bytes, data->pictures[index].type);
 }
 
@@ -110,14 +116,23 @@ bool Console::Impl::tick() {
   return stage.viewers > 0 || before != stage.board.newest();
 }
 
-Console::Console(const Address& address, std::unique_ptr<Source> source, const std::string& mode, const std::string& title)
+Console::Console(const Address& address, std::unique_ptr<Source> source, const std::string& mode,
+                 const std::string& title)
     : impl_(std::make_unique<Impl>()) {
   Impl& impl = *impl_;
   impl.stage.source = std::move(source);
   impl.world = impl.stage.source->world();
   JsonWriter json;
-  json.open('{').name("hello").open('{').member("mode", mode).member("title", printable(title)).member("version", version());
-  json.member("info", impl.stage.source->info_channel()).member("fault", printable(impl.stage.source->fault())).close('}').close('}');
+  json.open('{')
+      .name("hello")
+      .open('{')
+      .member("mode", mode)
+      .member("title", printable(title))
+      .member("version", version());
+  json.member("info", impl.stage.source->info_channel())
+      .member("fault", printable(impl.stage.source->fault()))
+      .close('}')
+      .close('}');
   impl.stage.greeting = json.text();
   const std::string token = address.loopback() ? "" : make_token();
   WebHandler handler;
@@ -135,7 +150,8 @@ Console::Console(const Address& address, std::unique_ptr<Source> source, const s
   };
   impl.web = std::make_unique<WebServer>(address, token, std::move(handler));
   for (const std::string& host : reachable_hosts(address)) {
-    urls_.push_back("http://" + host + ":" + std::to_string(impl.web->port()) + "/" + (token.empty() ? "" : "?token=" + token));
+    urls_.push_back("http://" + host + ":" + std::to_string(impl.web->port()) + "/" +
+                    (token.empty() ? "" : "?token=" + token));
   }
   impl.thread = std::thread([&impl] {
     pthread_setname_np(pthread_self(), "console");
@@ -155,7 +171,7 @@ void Console::end(const std::string& words) {
 Console::~Console() {
   impl_->web->stop();
   impl_->thread.join();
-  impl_->web.reset();    // its viewers, before the stage
+  impl_->web.reset();  // its viewers, before the stage
 }
 
 }  // namespace ruedo::console

@@ -1,4 +1,5 @@
-// The web console: serves the page, and lets browsers see and steer what its source shows. In a thread of its own.
+// The web console: serves the page, and lets browsers see and steer what its source shows. In a
+// thread of its own.
 #pragma once
 
 #include <memory>
@@ -14,8 +15,10 @@ class Console {
  public:
   static constexpr int kMostViewers = 128;
 
-  // Starts to serve. mode: "live" or "log"; title: what is shown. Throws EnvironmentError when the address cannot be had.
-  Console(const Address& address, std::unique_ptr<Source> source, const std::string& mode, const std::string& title);
+  // Starts to serve. mode: "live" or "log"; title: what is shown. Throws EnvironmentError when the
+  // address cannot be had.
+  Console(const Address& address, std::unique_ptr<Source> source, const std::string& mode,
+          const std::string& title);
   // Tells the viewers that it is over, and ends.
   ~Console();
 

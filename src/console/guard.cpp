@@ -1,5 +1,6 @@
-// Loopback: only who calls this machine by a loopback name comes in, so that a page elsewhere whose name was made to
-// point here does not. Elsewhere: only who has the token. A page of another origin never gets a socket.
+// Loopback: only who calls this machine by a loopback name comes in, so that a page elsewhere whose
+// name was made to point here does not. Elsewhere: only who has the token. A page of another origin
+// never gets a socket.
 #include "console/guard.h"
 
 #include <arpa/inet.h>
@@ -18,7 +19,10 @@ namespace ruedo::console {
 namespace {
 
 [[noreturn]] void bad_address(const std::string& text) {
-  throw InputError({}, "--view: '" + text + "' is not allowed; an address is ADDRESS:PORT, such as 127.0.0.1:8080 or 0.0.0.0:8080");
+  throw InputError(
+      {},
+      "--view: '" + text +
+          "' is not allowed; an address is ADDRESS:PORT, such as 127.0.0.1:8080 or 0.0.0.0:8080");
 }
 
 std::string_view host_name(std::string_view host) {
@@ -26,9 +30,11 @@ std::string_view host_name(std::string_view host) {
   return host.ends_with(']') ? host : host.substr(0, colon);
 }
 
-bool equal(std::string_view a, std::string_view b) {    // in a time that tells nothing of where they differ
+bool equal(std::string_view a,
+           std::string_view b) {  // in a time that tells nothing of where they differ
   unsigned difference = a.size() == b.size() ? 0 : 1;
-  for (size_t i = 0; i < std::min(a.size(), b.size()); ++i) difference |= static_cast<unsigned char>(a[i]) ^ static_cast<unsigned char>(b[i]);
+  for (size_t i = 0; i < std::min(a.size(), b.size()); ++i)
+    difference |= static_cast<unsigned char>(a[i]) ^ static_cast<unsigned char>(b[i]);
   return difference == 0;
 }
 
@@ -38,7 +44,8 @@ Address parse_address(const std::string& text) {
   Address address;
   if (text.empty()) return address;
   const size_t colon = text.rfind(':');
-  std::string host = text.substr(0, colon), port = colon == std::string::npos ? "" : text.substr(colon + 1);
+  std::string host = text.substr(0, colon),
+              port = colon == std::string::npos ? "" : text.substr(colon + 1);
   if (colon == std::string::npos && text.find_first_not_of("0123456789") == std::string::npos) {
     host.clear();
     port = text;
@@ -47,7 +54,9 @@ Address parse_address(const std::string& text) {
   }
   if (!port.empty()) {
     const auto [end, error] = std::from_chars(port.data(), port.data() + port.size(), address.port);
-    if (error != std::errc() || end != port.data() + port.size() || address.port < 0 || address.port > 65535) bad_address(text);
+    if (error != std::errc() || end != port.data() + port.size() || address.port < 0 ||
+        address.port > 65535)
+      bad_address(text);
   }
   if (host == "localhost") host = "127.0.0.1";
   if (!host.empty()) {
@@ -69,7 +78,8 @@ std::string cookie_value(std::string_view cookies, std::string_view name) {
     std::string_view cookie = cookies.substr(0, end);
     cookies.remove_prefix(std::min(end + 1, cookies.size()));
     while (cookie.starts_with(' ')) cookie.remove_prefix(1);
-    if (cookie.starts_with(name) && cookie.substr(name.size()).starts_with('=')) return std::string(cookie.substr(name.size() + 1));
+    if (cookie.starts_with(name) && cookie.substr(name.size()).starts_with('='))
+      return std::string(cookie.substr(name.size() + 1));
   }
   return {};
 }
@@ -78,15 +88,19 @@ std::string refuse(const Visit& visit, const Address& address, const std::string
   if (address.loopback()) {
     const std::string_view name = host_name(visit.host);
     in_addr parsed{};
-    const bool is_loopback = name.starts_with("127.") && inet_pton(AF_INET, std::string(name).c_str(), &parsed) == 1;
+    const bool is_loopback =
+        name.starts_with("127.") && inet_pton(AF_INET, std::string(name).c_str(), &parsed) == 1;
     if (name != "localhost" && !is_loopback && name != "[::1]") {
-      return "This console answers to localhost only. To reach it from elsewhere, start it with --view ADDRESS:PORT.";
+      return "This console answers to localhost only. To reach it from elsewhere, start it with "
+             "--view ADDRESS:PORT.";
     }
   }
-  if (!token.empty() && !equal(visit.token, token) && !equal(cookie_value(visit.cookie, "ruedo_token"), token)) {
+  if (!token.empty() && !equal(visit.token, token) &&
+      !equal(cookie_value(visit.cookie, "ruedo_token"), token)) {
     return "A token is needed: open the address that the server printed when it started.";
   }
-  if (visit.socket && !visit.origin.empty() && visit.origin != "http://" + visit.host && visit.origin != "https://" + visit.host) {
+  if (visit.socket && !visit.origin.empty() && visit.origin != "http://" + visit.host &&
+      visit.origin != "https://" + visit.host) {
     return "A page of another origin may not steer this simulation.";
   }
   return {};
@@ -98,7 +112,8 @@ std::vector<std::string> reachable_hosts(const Address& address) {
   ifaddrs* interfaces = nullptr;
   if (getifaddrs(&interfaces) == 0) {
     for (const ifaddrs* i = interfaces; i; i = i->ifa_next) {
-      if (!i->ifa_addr || i->ifa_addr->sa_family != AF_INET || (i->ifa_flags & IFF_UP) == 0) continue;
+      if (!i->ifa_addr || i->ifa_addr->sa_family != AF_INET || (i->ifa_flags & IFF_UP) == 0)
+        continue;
       char text[INET_ADDRSTRLEN];
       const auto* ipv4 = reinterpret_cast<const sockaddr_in*>(i->ifa_addr);
       if (inet_ntop(AF_INET, &ipv4->sin_addr, text, sizeof text)) hosts.emplace_back(text);

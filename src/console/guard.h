@@ -9,8 +9,8 @@
 namespace ruedo::console {
 
 struct Address {
-  std::string host = "127.0.0.1";    // dotted IPv4
-  int port = 8080;                   // 0: any that is free
+  std::string host = "127.0.0.1";  // dotted IPv4
+  int port = 8080;                 // 0: any that is free
   bool loopback() const { return host.starts_with("127."); }
 };
 
@@ -22,8 +22,9 @@ std::string make_token();
 
 // What a request says of itself.
 struct Visit {
-  std::string host{}, origin{}, cookie{}, token{};    // headers Host, Origin and Cookie; the address's ?token=
-  bool socket = false;                        // asks for a WebSocket
+  std::string host{}, origin{}, cookie{},
+      token{};          // headers Host, Origin and Cookie; the address's ?token=
+  bool socket = false;  // asks for a WebSocket
 };
 
 // "" when the visit may go on; else why not. token: "" where none is asked for.

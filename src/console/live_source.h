@@ -8,7 +8,7 @@
 
 namespace ruedo::console {
 
-using WorldOf = std::function<std::shared_ptr<const model::WorldModel>()>;    // safe from any thread
+using WorldOf = std::function<std::shared_ptr<const model::WorldModel>()>;  // safe from any thread
 
 class LiveSource : public Source {
  public:
@@ -31,7 +31,8 @@ class LiveSource : public Source {
 
   Count traffic(size_t channel) const override {
     const Traffic& traffic = bus_.channel(channel);
-    return {traffic.messages.load(std::memory_order_relaxed), traffic.size.load(std::memory_order_relaxed)};
+    return {traffic.messages.load(std::memory_order_relaxed),
+            traffic.size.load(std::memory_order_relaxed)};
   }
   bool command(const std::string& channel, std::span<const uint8_t> message) override {
     return bus_.command(channel, message.data(), message.size());

@@ -1,4 +1,5 @@
-// The file is the page (kShell, made by build.mjs), a JSON text that says what is where, and all bytes as one base64 text.
+// The file is the page (kShell, made by build.mjs), a JSON text that says what is where, and all
+// bytes as one base64 text.
 #include "console/log_page.h"
 
 #include <algorithm>
@@ -26,26 +27,30 @@
 namespace ruedo::console {
 namespace {
 
-constexpr uint32_t kMostMessage = 16u << 20;    // bytes; a larger one is left out
+constexpr uint32_t kMostMessage = 16u << 20;  // bytes; a larger one is left out
 constexpr SimTime kFirstInterval_us = 20'000;
-constexpr size_t kHead = 16;                    // bytes before an entry's messages: channel, their number, time
+constexpr size_t kHead = 16;  // bytes before an entry's messages: channel, their number, time
 
 template <class Value>
-void append(std::vector<uint8_t>& bytes, Value value) {    // little endian, as browsers are
+void append(std::vector<uint8_t>& bytes, Value value) {  // little endian, as browsers are
   const auto* from = reinterpret_cast<const uint8_t*>(&value);
   bytes.insert(bytes.end(), from, from + sizeof value);
 }
 
-bool are_pictures(const log::Index::Channel& channel) { return channel.fingerprint == image_t::getHash(); }
+bool are_pictures(const log::Index::Channel& channel) {
+  return channel.fingerprint == image_t::getHash();
+}
 
-// Which entries of a channel remain when no two are closer than that; the first and the last always do.
+// Which entries of a channel remain when no two are closer than that; the first and the last always
+// do.
 std::vector<size_t> thinned(const log::Index::Channel& channel, SimTime interval_us) {
   std::vector<size_t> kept;
   for (size_t i = 0; i < channel.entries.size(); ++i) {
     const log::Index::Entry& entry = channel.entries[i];
     const bool last = i + 1 == channel.entries.size();
     if (entry.size > kMostMessage) continue;
-    if (kept.empty() || last || entry.time_us - channel.entries[kept.back()].time_us >= interval_us) kept.push_back(i);
+    if (kept.empty() || last || entry.time_us - channel.entries[kept.back()].time_us >= interval_us)
+      kept.push_back(i);
   }
   return kept;
 }
@@ -61,7 +66,8 @@ size_t size_of(const log::Index& index, bool pictures, SimTime interval_us) {
 
 // The least interval with which they fit; -1 where none does.
 SimTime interval_that_fits(const log::Index& index, bool pictures, size_t room) {
-  for (SimTime interval_us = 0; interval_us <= 2 * (index.end_us() - index.begin_us() + kFirstInterval_us);
+  for (SimTime interval_us = 0;
+       interval_us <= 2 * (index.end_us() - index.begin_us() + kFirstInterval_us);
        interval_us = interval_us == 0 ? kFirstInterval_us : interval_us * 2) {
     if (size_of(index, pictures, interval_us) <= room) return interval_us;
   }
@@ -70,7 +76,8 @@ SimTime interval_that_fits(const log::Index& index, bool pictures, size_t room) 
 
 class Writer {
  public:
-  Writer(const std::string& log, const run::LoadRun& load) : index_(log), worlds_(index_, load), reader_(log) {}
+  Writer(const std::string& log, const run::LoadRun& load)
+      : index_(log), worlds_(index_, load), reader_(log) {}
 
   LogPage write(const std::string& log, const std::string& path, size_t most_bytes) {
     LogPage page;
@@ -80,12 +87,19 @@ class Writer {
     const size_t fixed = kShellSize + json_scenes_.size() + 64 * index_.channels().size() + 4096;
     const size_t room = most_bytes > fixed ? (most_bytes - fixed) / 4 * 3 : 0;
     if (room <= bytes_.size()) {
-      throw InputError({log}, fmt::format("its scene alone needs a page of {:.1f} MB", static_cast<double>(fixed + bytes_.size() / 3 * 4 + 100'000) * 1e-6));
+      throw InputError(
+          {log}, fmt::format("its scene alone needs a page of {:.1f} MB",
+                             static_cast<double>(fixed + bytes_.size() / 3 * 4 + 100'000) * 1e-6));
     }
     const size_t left = room - bytes_.size();
     const SimTime pictures = interval_that_fits(index_, true, left / 2);
-    const SimTime interval = interval_that_fits(index_, false, left - (pictures < 0 ? 0 : size_of(index_, true, pictures)));
-    if (interval < 0) throw InputError({log}, fmt::format("does not fit into a page of {:.1f} MB, however few of its messages are in it", static_cast<double>(most_bytes) * 1e-6));
+    const SimTime interval = interval_that_fits(
+        index_, false, left - (pictures < 0 ? 0 : size_of(index_, true, pictures)));
+    if (interval < 0)
+      throw InputError(
+          {log}, fmt::format(
+                     "does not fit into a page of {:.1f} MB, however few of its messages are in it",
+                     static_cast<double>(most_bytes) * 1e-6));
     const size_t messages_at = bytes_.size();
     add_messages(interval, pictures);
     page.interval_s = static_cast<double>(interval) * 1e-6;
@@ -96,12 +110,17 @@ class Writer {
 
  private:
   std::string fault() const {
-    const std::string damage = index_.fault().empty() ? "" : "The log is not whole: " + index_.fault() + ".";
+    const std::string damage =
+        index_.fault().empty() ? "" : "The log is not whole: " + index_.fault() + ".";
     return damage + (damage.empty() || worlds_.fault().empty() ? "" : " ") + worlds_.fault();
   }
 
   void add_file(JsonWriter& json, const std::string& name, const std::vector<uint8_t>& bytes) {
-    json.name(name).open('[').value(static_cast<int64_t>(bytes_.size())).value(static_cast<int64_t>(bytes.size())).close(']');
+    json.name(name)
+        .open('[')
+        .value(static_cast<int64_t>(bytes_.size()))
+        .value(static_cast<int64_t>(bytes.size()))
+        .close(']');
     bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
   }
 
@@ -115,14 +134,18 @@ class Writer {
       const run::LogWorlds::Scene& scene = worlds_.at(time_us);
       if (!scenes_.empty() && scenes_.back() == &scene) continue;
       scenes_.push_back(&scene);
-      json.open('{').member("from", static_cast<double>(scene.from_us) * 1e-6).name("files").open('{');
+      json.open('{')
+          .member("from", static_cast<double>(scene.from_us) * 1e-6)
+          .name("files")
+          .open('{');
       if (scene.world) {
         const SceneData data(*scene.world, static_cast<int>(scenes_.size()));
         add_file(json, "/scene.json", {data.json.begin(), data.json.end()});
         add_file(json, "/scene/meshes", *data.meshes);
         add_file(json, "/scene/links", *data.links);
         for (size_t i = 0; i < data.pictures.size(); ++i) {
-          if (data.pictures[i].bytes) add_file(json, "/scene/textures/" + std::to_string(i), *data.pictures[i].bytes);
+          if (data.pictures[i].bytes)
+            add_file(json, "/scene/textures/" + std::to_string(i), *data.pictures[i].bytes);
         }
       }
       json.close('}').close('}');
@@ -131,8 +154,10 @@ class Writer {
     bytes_.resize((bytes_.size() + 7) / 8 * 8);
   }
 
-  // Channel, number of messages (a message may come in parts), time in s; then of each message its size and bytes.
-  void add_entry(uint32_t channel, SimTime time_us, const std::vector<std::vector<uint8_t>>& messages) {
+  // Channel, number of messages (a message may come in parts), time in s; then of each message its
+  // size and bytes.
+  void add_entry(uint32_t channel, SimTime time_us,
+                 const std::vector<std::vector<uint8_t>>& messages) {
     append(bytes_, channel);
     append(bytes_, static_cast<uint32_t>(messages.size()));
     append(bytes_, static_cast<double>(time_us) * 1e-6);
@@ -149,12 +174,14 @@ class Writer {
       if (channel.fingerprint == world_info_t::getHash()) info_ = names_.back();
       const SimTime interval = are_pictures(channel) ? pictures_us : interval_us;
       if (interval < 0) continue;
-      for (const size_t i : thinned(channel, interval)) add_entry(static_cast<uint32_t>(c), channel.entries[i].time_us, whole(channel, i));
+      for (const size_t i : thinned(channel, interval))
+        add_entry(static_cast<uint32_t>(c), channel.entries[i].time_us, whole(channel, i));
     }
     if (!info_.empty()) return;
     info_ = "ruedo/info";
     names_.push_back(info_);
-    for (const run::LogWorlds::Scene* scene : scenes_) add_entry(static_cast<uint32_t>(names_.size() - 1), scene->from_us, scene->info);
+    for (const run::LogWorlds::Scene* scene : scenes_)
+      add_entry(static_cast<uint32_t>(names_.size() - 1), scene->from_us, scene->info);
   }
 
   // A message with the parts that came before it, as far as it is one of several.
@@ -171,13 +198,21 @@ class Writer {
 
   std::string head(const std::string& log, const LogPage& page, size_t messages_at) const {
     JsonWriter json;
-    json.open('{').member("title", printable(std::filesystem::path(log).filename().string())).member("info", info_).member("fault", printable(page.fault));
-    json.member("begin", static_cast<double>(index_.begin_us()) * 1e-6).member("end", static_cast<double>(index_.end_us()) * 1e-6);
-    json.member("interval", page.interval_s).member("pictures", page.pictures_s).member("messages", static_cast<int64_t>(messages_at)).name("channels").open('[');
+    json.open('{')
+        .member("title", printable(std::filesystem::path(log).filename().string()))
+        .member("info", info_)
+        .member("fault", printable(page.fault));
+    json.member("begin", static_cast<double>(index_.begin_us()) * 1e-6)
+        .member("end", static_cast<double>(index_.end_us()) * 1e-6);
+    json.member("interval", page.interval_s)
+        .member("pictures", page.pictures_s)
+        .member("messages", static_cast<int64_t>(messages_at))
+        .name("channels")
+        .open('[');
     for (const std::string& name : names_) json.value(name);
     json.close(']').name("scenes").raw(json_scenes_).close('}');
     std::string text;
-    for (const char c : json.text()) {    // nothing in it ends the element that it stands in
+    for (const char c : json.text()) {  // nothing in it ends the element that it stands in
       if (c == '<') {
         text += "\\u003c";
       } else {
@@ -203,7 +238,8 @@ class Writer {
     text("</script>\n<script type=\"text/plain\" id=\"bytes\">");
     text(base64());
     text("</script>\n</body>\n</html>\n");
-    if (!good || std::fflush(file.get()) != 0) throw EnvironmentError(path + " cannot be written: " + std::strerror(errno));
+    if (!good || std::fflush(file.get()) != 0)
+      throw EnvironmentError(path + " cannot be written: " + std::strerror(errno));
     return written;
   }
 
@@ -232,7 +268,8 @@ class Writer {
 
 }  // namespace
 
-LogPage write_log_page(const std::string& log, const run::LoadRun& load, const std::string& path, size_t most_bytes) {
+LogPage write_log_page(const std::string& log, const run::LoadRun& load, const std::string& path,
+                       size_t most_bytes) {
   return Writer(log, load).write(log, path, most_bytes);
 }
 

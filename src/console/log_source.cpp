@@ -1,4 +1,5 @@
-// Playing and seeking are one thing: the time is another one, and channels whose newest message has changed are read.
+// Playing and seeking are one thing: the time is another one, and channels whose newest message has
+// changed are read.
 #include "console/log_source.h"
 
 #include <algorithm>
@@ -11,13 +12,18 @@
 namespace ruedo::console {
 namespace {
 
-constexpr double kLongestPause_s = 0.5;    // between two looks at the clock; after a longer one the log does not jump
+constexpr double kLongestPause_s =
+    0.5;  // between two looks at the clock; after a longer one the log does not jump
 constexpr double kSlowest = 0.01, kFastest = 1000.0;
 
 }  // namespace
 
 LogSource::LogSource(const std::string& path, const run::LoadRun& load, double speed)
-    : index_(path), worlds_(index_, load), reader_(path), scene_(&worlds_.at(index_.begin_us())), shown_(index_.channels().size(), kNothing) {
+    : index_(path),
+      worlds_(index_, load),
+      reader_(path),
+      scene_(&worlds_.at(index_.begin_us())),
+      shown_(index_.channels().size(), kNothing) {
   playback_.begin_s = static_cast<double>(index_.begin_us()) * 1e-6;
   playback_.end_s = static_cast<double>(index_.end_us()) * 1e-6;
   playback_.now_s = playback_.begin_s;
@@ -31,7 +37,8 @@ LogSource::LogSource(const std::string& path, const run::LoadRun& load, double s
 }
 
 std::string LogSource::fault() const {
-  const std::string log = index_.fault().empty() ? "" : "The log is not whole: " + index_.fault() + ".";
+  const std::string log =
+      index_.fault().empty() ? "" : "The log is not whole: " + index_.fault() + ".";
   return log + (log.empty() || worlds_.fault().empty() ? "" : " ") + worlds_.fault();
 }
 
@@ -46,7 +53,8 @@ void LogSource::pump(Board& board, bool viewers) {
     if (makes_info_) board.name(index_.channels().size(), info_channel_);
   }
   const auto now = std::chrono::steady_clock::now();
-  const double passed_s = std::min(kLongestPause_s, std::chrono::duration<double>(now - last_).count());
+  const double passed_s =
+      std::min(kLongestPause_s, std::chrono::duration<double>(now - last_).count());
   last_ = now;
   if (viewers && playback_.playing) {
     playback_.now_s = std::min(playback_.end_s, playback_.now_s + passed_s * playback_.speed);
@@ -61,7 +69,7 @@ void LogSource::show(Board& board) {
   const auto& channels = index_.channels();
   for (size_t i = 0; i < channels.size(); ++i) {
     if (board.channels()[i].watchers == 0) {
-      shown_[i] = kNothing;    // it is read again when somebody wants it
+      shown_[i] = kNothing;  // it is read again when somebody wants it
       continue;
     }
     size_t count = channels[i].count_until(time_us);
@@ -84,14 +92,15 @@ void LogSource::load(Board& board, size_t channel, size_t count) {
     parts.push_back(event_.data);
     if (!board.is_later_part(parts.back())) break;
   }
-  for (auto part = parts.rbegin(); part != parts.rend(); ++part) board.put(channel, std::move(*part));
+  for (auto part = parts.rbegin(); part != parts.rend(); ++part)
+    board.put(channel, std::move(*part));
 }
 
 bool LogSource::read(size_t channel, size_t entry) {
   const log::Index::Entry& wanted = index_.channels()[channel].entries[entry];
   if (wanted.size > kMostMessage) return false;
   reader_.seek(wanted.offset);
-  return reader_.next(event_);    // false when the file is no longer what it was
+  return reader_.next(event_);  // false when the file is no longer what it was
 }
 
 Source::Count LogSource::traffic(size_t channel) const {
@@ -99,7 +108,7 @@ Source::Count LogSource::traffic(size_t channel) const {
   const log::Index::Channel& of = index_.channels()[channel];
   const size_t count = of.count_until(now_us());
   if (count == 0) return {};
-  constexpr uint32_t kEventHead = 28;    // bytes before channel and data
+  constexpr uint32_t kEventHead = 28;  // bytes before channel and data
   return {count, of.entries[count - 1].size - kEventHead - static_cast<uint32_t>(of.name.size())};
 }
 

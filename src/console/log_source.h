@@ -1,4 +1,5 @@
-// A recorded run, as the console sees it: at each moment the newest message of every channel that somebody watches.
+// A recorded run, as the console sees it: at each moment the newest message of every channel that
+// somebody watches.
 //
 // All viewers see the same moment. Time stands still while nobody watches.
 #pragma once
@@ -15,7 +16,7 @@ namespace ruedo::console {
 
 class LogSource : public Source {
  public:
-  static constexpr uint32_t kMostMessage = 64u << 20;    // bytes; a larger one is not shown
+  static constexpr uint32_t kMostMessage = 64u << 20;  // bytes; a larger one is not shown
 
   // Throws InputError for what is no log. speed: log time per real time.
   LogSource(const std::string& path, const run::LoadRun& load, double speed);
@@ -44,9 +45,10 @@ class LogSource : public Source {
   log::Event event_;
   const run::LogWorlds::Scene* scene_;
   std::string info_channel_;
-  bool makes_info_ = false;             // the log has none: it is the channel after all of the log's
-  const run::LogWorlds::Scene* told_ = nullptr;    // whose info is on the board
-  std::vector<size_t> shown_;           // of each channel, how many messages there were when one was put on the board
+  bool makes_info_ = false;  // the log has none: it is the channel after all of the log's
+  const run::LogWorlds::Scene* told_ = nullptr;  // whose info is on the board
+  std::vector<size_t>
+      shown_;  // of each channel, how many messages there were when one was put on the board
   Playback playback_;
   std::chrono::steady_clock::time_point last_;
 };

@@ -1,4 +1,5 @@
-// Messages on their way from the publisher to the console: a ring of bytes that never makes its writer wait.
+// Messages on their way from the publisher to the console: a ring of bytes that never makes its
+// writer wait.
 //
 // One writer and one reader at a time. What has no room is dropped and counted.
 #pragma once

@@ -1,4 +1,5 @@
-// What a camera of the simulation draws is what a viewer gets: the same tessellation, surfaces and lights.
+// What a camera of the simulation draws is what a viewer gets: the same tessellation, surfaces and
+// lights.
 #include "console/scene_data.h"
 
 #include <array>
@@ -18,12 +19,13 @@
 namespace ruedo::console {
 namespace {
 
-constexpr size_t kMostPictureBytes = size_t{32} << 20;    // of a file that is served as it is
+constexpr size_t kMostPictureBytes = size_t{32} << 20;  // of a file that is served as it is
 
 template <class Number>
 void list(JsonWriter& json, const Number* numbers, size_t count) {
   json.open('[');
-  for (size_t i = 0; i < count; ++i) json.value(static_cast<double>(static_cast<float>(numbers[i])));
+  for (size_t i = 0; i < count; ++i)
+    json.value(static_cast<double>(static_cast<float>(numbers[i])));
   json.close(']');
 }
 
@@ -50,7 +52,8 @@ class Blob {
   std::vector<uint8_t> bytes_;
 };
 
-// PNG and JPEG go out as they are; what browsers do not know, and what is larger than any screen, is made a PNG.
+// PNG and JPEG go out as they are; what browsers do not know, and what is larger than any screen,
+// is made a PNG.
 Picture picture(const model::Texture& texture) {
   std::vector<uint8_t> bytes = texture.embedded;
   std::error_code error;
@@ -59,14 +62,19 @@ Picture picture(const model::Texture& texture) {
     std::ifstream file(texture.path, std::ios::binary);
     bytes.assign(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
   }
-  const auto begins = [&](const char* magic, size_t size) { return bytes.size() > size && std::memcmp(bytes.data(), magic, size) == 0; };
+  const auto begins = [&](const char* magic, size_t size) {
+    return bytes.size() > size && std::memcmp(bytes.data(), magic, size) == 0;
+  };
   if (bytes.size() < (size_t{4} << 20)) {
-    if (begins("\x89PNG", 4)) return {"image/png", std::make_shared<const std::vector<uint8_t>>(std::move(bytes))};
-    if (begins("\xff\xd8\xff", 3)) return {"image/jpeg", std::make_shared<const std::vector<uint8_t>>(std::move(bytes))};
+    if (begins("\x89PNG", 4))
+      return {"image/png", std::make_shared<const std::vector<uint8_t>>(std::move(bytes))};
+    if (begins("\xff\xd8\xff", 3))
+      return {"image/jpeg", std::make_shared<const std::vector<uint8_t>>(std::move(bytes))};
   }
   const scene::TexturePixels pixels = scene::decode_texture(texture);
   if (pixels.width == 0) return {};
-  cv::Mat rgba(pixels.height, pixels.width, CV_8UC4, const_cast<uint8_t*>(pixels.rgba.data())), bgra;
+  cv::Mat rgba(pixels.height, pixels.width, CV_8UC4, const_cast<uint8_t*>(pixels.rgba.data())),
+      bgra;
   cv::cvtColor(rgba, bgra, cv::COLOR_RGBA2BGRA);
   cv::flip(bgra, bgra, 0);
   std::vector<uint8_t> png;
@@ -77,13 +85,18 @@ Picture picture(const model::Texture& texture) {
 void write_light(JsonWriter& json, const scene::RenderLight& light) {
   constexpr const char* kTypes[] = {"directional", "point", "spot"};
   const model::Light& l = light.light;
-  const Vec3 direction = l.pose.rotation * l.direction;    // in the world, or in the link
+  const Vec3 direction = l.pose.rotation * l.direction;  // in the world, or in the link
   json.open('{').member("type", kTypes[static_cast<int>(l.type)]).member("link", light.link);
   list(json.name("position"), l.pose.translation.data(), 3);
   list(json.name("direction"), direction.data(), 3);
   list(json.name("colour"), l.diffuse.data(), 3);
-  json.member("range", l.range).member("outer_angle", l.outer_angle).member("inner_angle", l.inner_angle);
-  json.member("intensity", l.intensity).member("constant", l.constant).member("linear", l.linear).member("quadratic", l.quadratic);
+  json.member("range", l.range)
+      .member("outer_angle", l.outer_angle)
+      .member("inner_angle", l.inner_angle);
+  json.member("intensity", l.intensity)
+      .member("constant", l.constant)
+      .member("linear", l.linear)
+      .member("quadratic", l.quadratic);
   json.member("shadows", l.cast_shadows).close('}');
 }
 
@@ -93,7 +106,11 @@ SceneData::SceneData(const model::WorldModel& world, int version) {
   const model::BodyLayout layout(world);
   const scene::RenderContent content(world, layout);
   JsonWriter out;
-  out.open('{').member("version", version).member("world", world.name).member("sky", world.sky.sky).member("shadows", world.sky.shadows);
+  out.open('{')
+      .member("version", version)
+      .member("world", world.name)
+      .member("sky", world.sky.sky)
+      .member("shadows", world.sky.shadows);
   list(out.name("ambient"), world.sky.ambient.data(), 3);
   list(out.name("background"), world.sky.background.data(), 3);
   list(out.name("low"), content.bounds.low.data(), 3);
@@ -103,7 +120,10 @@ SceneData::SceneData(const model::WorldModel& world, int version) {
   out.name("meshes").open('[');
   for (const scene::RenderMesh& mesh : content.meshes) {
     static_assert(sizeof(scene::RenderVertex) == 32);
-    out.open('[').value(static_cast<int64_t>(mesh.vertices.size())).value(static_cast<int64_t>(mesh.indices.size())).close(']');
+    out.open('[')
+        .value(static_cast<int64_t>(mesh.vertices.size()))
+        .value(static_cast<int64_t>(mesh.indices.size()))
+        .close(']');
     blob.add(mesh.vertices);
     blob.add(mesh.indices);
   }
@@ -115,14 +135,23 @@ SceneData::SceneData(const model::WorldModel& world, int version) {
   }
   out.close(']').name("batches").open('[');
   for (const scene::Batch& batch : content.batches) {
-    out.open('[').value(batch.mesh).value(int64_t{batch.first_index}).value(int64_t{batch.index_count}).value(batch.texture).value(int64_t{batch.flags}).close(']');
+    out.open('[')
+        .value(batch.mesh)
+        .value(int64_t{batch.first_index})
+        .value(int64_t{batch.index_count})
+        .value(batch.texture)
+        .value(int64_t{batch.flags})
+        .close(']');
   }
   out.close(']').name("kinds").open('[');
   for (const scene::RenderLinkKind& kind : content.link_kinds) {
     out.open('[');
     for (const scene::RenderPart& part : kind.parts) {
-      out.open('{').member("batch", part.batch).member("small", part.small_batch).member("shadow", part.casts_shadow);
-      std::array<double, 12> rows{};    // of [M | t]
+      out.open('{')
+          .member("batch", part.batch)
+          .member("small", part.small_batch)
+          .member("shadow", part.casts_shadow);
+      std::array<double, 12> rows{};  // of [M | t]
       for (int i = 0; i < 12; ++i) rows[static_cast<size_t>(i)] = part.M_LP(i / 4, i % 4);
       list(out.name("matrix"), rows.data(), 12);
       list(out.name("diffuse"), part.diffuse.data(), 4);
@@ -136,9 +165,13 @@ SceneData::SceneData(const model::WorldModel& world, int version) {
   for (const scene::RenderLight& light : content.lights) write_light(out, light);
   out.close(']').name("models").open('[');
   for (size_t i = 0; i < world.models.size(); ++i) {
-    out.open('{').member("name", world.models[i].name).member("first_link", layout.first_link[i]).close('}');
+    out.open('{')
+        .member("name", world.models[i].name)
+        .member("first_link", layout.first_link[i])
+        .close('}');
   }
-  // The wheels of robots whose wheels are no bodies: link, robot, place among its wheels, a point on the axis, the axis.
+  // The wheels of robots whose wheels are no bodies: link, robot, place among its wheels, a point
+  // on the axis, the axis.
   out.close(']').name("wheels").open('[');
   for (size_t r = 0; r < layout.robots.size(); ++r) {
     const model::RobotPlacement& robot = layout.robots[r];
@@ -151,11 +184,16 @@ SceneData::SceneData(const model::WorldModel& world, int version) {
       out.close(']');
     }
   }
-  // base_link in the body that carries it, or in the world, and where it starts in the world: x, y, z, qw, qx, qy, qz.
+  // base_link in the body that carries it, or in the world, and where it starts in the world: x, y,
+  // z, qw, qx, qy, qz.
   out.close(']').name("bases").open('[');
   for (const model::RobotPlacement& robot : layout.robots) {
-    out.open('{').member("robot", world.models[static_cast<size_t>(robot.instance)].name).member("body", robot.body);
-    const Pose start = robot.body < 0 ? robot.X_BBase : layout.bodies[static_cast<size_t>(robot.body)].X_WB * robot.X_BBase;
+    out.open('{')
+        .member("robot", world.models[static_cast<size_t>(robot.instance)].name)
+        .member("body", robot.body);
+    const Pose start = robot.body < 0
+                           ? robot.X_BBase
+                           : layout.bodies[static_cast<size_t>(robot.body)].X_WB * robot.X_BBase;
     list(out.name("pose"), numbers(robot.X_BBase).data(), 7);
     list(out.name("start"), numbers(start).data(), 7);
     out.close('}');

@@ -13,10 +13,10 @@ namespace ruedo::console {
 
 // Where the player of a log is.
 struct Playback {
-  double begin_s = 0, end_s = 0, now_s = 0;    // log time
-  double speed = 1;                            // log time per real time
+  double begin_s = 0, end_s = 0, now_s = 0;  // log time
+  double speed = 1;                          // log time per real time
   bool playing = false;
-  int64_t jumps = 0;                           // counts what is no playing on: what was drawn along the way does not hold
+  int64_t jumps = 0;  // counts what is no playing on: what was drawn along the way does not hold
   friend bool operator==(const Playback&, const Playback&) = default;
 };
 
@@ -29,7 +29,7 @@ class Source {
 
   struct Count {
     uint64_t messages = 0;
-    uint32_t size = 0;    // bytes of the newest message
+    uint32_t size = 0;  // bytes of the newest message
   };
   virtual Count traffic(size_t channel) const = 0;
 
@@ -46,7 +46,9 @@ class Source {
   // Of logs.
   virtual const Playback* playback() const { return nullptr; }
   virtual void play(bool on, double speed) { static_cast<void>(on), static_cast<void>(speed); }
-  virtual void seek(Board& board, double time_s) { static_cast<void>(board), static_cast<void>(time_s); }
+  virtual void seek(Board& board, double time_s) {
+    static_cast<void>(board), static_cast<void>(time_s);
+  }
 };
 
 }  // namespace ruedo::console

@@ -8,16 +8,23 @@ void TeeBus::publish(const std::string& channel, const uint8_t* data, size_t siz
   offer(channel, data, size);
 }
 
-void TeeBus::listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>& own) {
+void TeeBus::listen(const std::vector<std::string>& channels, Handler handler,
+                    const std::vector<std::string>& own) {
   allow(channels);
   {
     const std::lock_guard lock(handler_mutex_);
     handler_ = std::move(handler);
   }
-  inner_.listen(channels, [this](const std::string& channel, const uint8_t* data, size_t size) { receive(channel, data, size); }, own);
+  inner_.listen(
+      channels,
+      [this](const std::string& channel, const uint8_t* data, size_t size) {
+        receive(channel, data, size);
+      },
+      own);
 }
 
-void TeeBus::listen_to(const std::vector<std::string>& channels, const std::vector<std::string>& own) {
+void TeeBus::listen_to(const std::vector<std::string>& channels,
+                       const std::vector<std::string>& own) {
   allow(channels);
   inner_.listen_to(channels, own);
 }
@@ -51,7 +58,8 @@ bool TeeBus::command(const std::string& channel, const uint8_t* data, size_t siz
 }
 
 Traffic* TeeBus::find(const std::string& channel) {
-  if (const auto at = by_name_.find(channel); at != by_name_.end()) return channels_[at->second].get();
+  if (const auto at = by_name_.find(channel); at != by_name_.end())
+    return channels_[at->second].get();
   if (channels_.size() >= kMostChannels) return nullptr;
   const size_t index = channels_.size();
   Traffic& added = *channels_.emplace_back(std::make_unique<Traffic>());
@@ -66,9 +74,11 @@ Traffic* TeeBus::find(const std::string& channel) {
 void TeeBus::offer(const std::string& channel, const uint8_t* data, size_t size) {
   if (offering_.test_and_set(std::memory_order_acquire)) return;
   if (Traffic* traffic = find(channel)) {
-    traffic->messages.store(traffic->messages.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    traffic->messages.store(traffic->messages.load(std::memory_order_relaxed) + 1,
+                            std::memory_order_relaxed);
     traffic->size.store(static_cast<uint32_t>(size), std::memory_order_relaxed);
-    if (watched_.load(std::memory_order_relaxed) && traffic->wanted.load(std::memory_order_relaxed)) {
+    if (watched_.load(std::memory_order_relaxed) &&
+        traffic->wanted.load(std::memory_order_relaxed)) {
       ring_.offer(traffic->index, data, size);
     }
   }

@@ -11,10 +11,10 @@ namespace ruedo::console {
 namespace {
 
 constexpr auto kTrafficPeriod = std::chrono::milliseconds(500);
-constexpr size_t kMostNames = 2000;    // of channels in one message
+constexpr size_t kMostNames = 2000;  // of channels in one message
 
 template <class Value>
-void append(std::vector<uint8_t>& bytes, Value value) {    // little endian, as browsers are
+void append(std::vector<uint8_t>& bytes, Value value) {  // little endian, as browsers are
   const auto* from = reinterpret_cast<const uint8_t*>(&value);
   bytes.insert(bytes.end(), from, from + sizeof value);
 }
@@ -38,9 +38,7 @@ bool Viewer::receive(std::span<const uint8_t> message) {
   if (message.empty()) return false;
   const std::span<const uint8_t> rest = message.subspan(1);
   switch (static_cast<Operation>(message[0])) {
-    case Operation::seen:
-      unseen_ = std::max(0, unseen_ - 1);
-      return true;
+    case Operation::seen: unseen_ = std::max(0, unseen_ - 1); return true;
     case Operation::want:
       want({reinterpret_cast<const char*>(rest.data()), rest.size()});
       return true;
@@ -59,11 +57,13 @@ bool Viewer::receive(std::span<const uint8_t> message) {
       return true;
     case Operation::play:
       if (rest.size() != 9) return false;
-      if (const double speed = read_double(rest.subspan(1)); std::isfinite(speed) && speed > 0.0) stage_.source->play(rest[0] != 0, speed);
+      if (const double speed = read_double(rest.subspan(1)); std::isfinite(speed) && speed > 0.0)
+        stage_.source->play(rest[0] != 0, speed);
       return true;
     case Operation::seek:
       if (rest.size() != 8) return false;
-      if (const double time_s = read_double(rest); std::isfinite(time_s)) stage_.source->seek(stage_.board, time_s);
+      if (const double time_s = read_double(rest); std::isfinite(time_s))
+        stage_.source->seek(stage_.board, time_s);
       return true;
   }
   return false;
@@ -84,7 +84,8 @@ void Viewer::want(std::string_view names) {
   sights_.clear();
   if (wanted_names_.empty()) return;
   match_names();
-  for (size_t i = 0; i < std::min(before.size(), sights_.size()); ++i) sights_[i].sent = before[i].wanted ? before[i].sent : 0;
+  for (size_t i = 0; i < std::min(before.size(), sights_.size()); ++i)
+    sights_[i].sent = before[i].wanted ? before[i].sent : 0;
 }
 
 void Viewer::match_names() {
@@ -132,11 +133,21 @@ bool Viewer::next_text(std::string& text) {
     text = "{\"scene\": " + std::to_string(told_world_) + "}";
     return true;
   }
-  if (const Playback* playback = stage_.source->playback(); playback && told_playback_ != stage_.playback_version) {
+  if (const Playback* playback = stage_.source->playback();
+      playback && told_playback_ != stage_.playback_version) {
     told_playback_ = stage_.playback_version;
     JsonWriter json;
-    json.open('{').name("playback").open('{').member("begin", playback->begin_s).member("end", playback->end_s).member("now", playback->now_s);
-    json.member("speed", playback->speed).member("playing", playback->playing).member("jumps", playback->jumps).close('}').close('}');
+    json.open('{')
+        .name("playback")
+        .open('{')
+        .member("begin", playback->begin_s)
+        .member("end", playback->end_s)
+        .member("now", playback->now_s);
+    json.member("speed", playback->speed)
+        .member("playing", playback->playing)
+        .member("jumps", playback->jumps)
+        .close('}')
+        .close('}');
     text = json.text();
     return true;
   }
@@ -176,7 +187,8 @@ bool Viewer::next_messages(std::vector<uint8_t>& frame) {
   return true;
 }
 
-// Its kind (4 bytes), then of each channel the count of messages (4 bytes, wraps) and the newest one's size (4 bytes).
+// Its kind (4 bytes), then of each channel the count of messages (4 bytes, wraps) and the newest
+// one's size (4 bytes).
 void Viewer::add_traffic(std::vector<uint8_t>& frame) {
   append(frame, uint32_t{static_cast<uint8_t>(Frame::traffic)});
   for (size_t i = 0; i < stage_.board.channels().size(); ++i) {

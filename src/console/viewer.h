@@ -1,6 +1,7 @@
 // One browser: what it wants to see, what it has seen, and what it asks for.
 //
-// A viewer gets the next messages only when it has taken the last ones, so one that is slow sees fewer of them.
+// A viewer gets the next messages only when it has taken the last ones, so one that is slow sees
+// fewer of them.
 #pragma once
 
 #include <chrono>
@@ -18,9 +19,9 @@ namespace ruedo::console {
 struct Stage {
   Board board;
   std::unique_ptr<Source> source;
-  std::string greeting;          // JSON, the first message to a viewer
-  std::string farewell;          // JSON, the last one; "" while it goes on
-  uint64_t world_version = 0;    // another one when the scene has changed
+  std::string greeting;        // JSON, the first message to a viewer
+  std::string farewell;        // JSON, the last one; "" while it goes on
+  uint64_t world_version = 0;  // another one when the scene has changed
   uint64_t playback_version = 0;
   int viewers = 0;
   int traffic_viewers = 0;
@@ -28,21 +29,21 @@ struct Stage {
 
 // What a browser sends: an operation, then what it is about.
 enum class Operation : uint8_t {
-  seen = 1,         // the oldest frame that is on its way has been taken
-  want = 2,         // names of channels, one a line: these and no others
-  command = 3,      // length of the name (1 byte), name, message: onto that channel
-  traffic = 4,      // 1 or 0: how much goes over each channel, once a second
-  play = 5,         // of a log: 1 or 0 (1 byte), speed (float64, little endian)
-  seek = 6,         // of a log: time in s (float64, little endian)
+  seen = 1,     // the oldest frame that is on its way has been taken
+  want = 2,     // names of channels, one a line: these and no others
+  command = 3,  // length of the name (1 byte), name, message: onto that channel
+  traffic = 4,  // 1 or 0: how much goes over each channel, once a second
+  play = 5,     // of a log: 1 or 0 (1 byte), speed (float64, little endian)
+  seek = 6,     // of a log: time in s (float64, little endian)
 };
 // What it gets as binary messages; what is text is JSON.
 enum class Frame : uint8_t { messages = 1, traffic = 2 };
 
 class Viewer : public Connection {
  public:
-  static constexpr int kMostUnseen = 2;                          // frames
-  static constexpr size_t kMostFrame = size_t{8} << 20;          // bytes; one message more may pass it
-  static constexpr size_t kMostWanted = 4096;                    // channels
+  static constexpr int kMostUnseen = 2;                  // frames
+  static constexpr size_t kMostFrame = size_t{8} << 20;  // bytes; one message more may pass it
+  static constexpr size_t kMostWanted = 4096;            // channels
 
   explicit Viewer(Stage& stage);
   ~Viewer() override;
@@ -61,13 +62,13 @@ class Viewer : public Connection {
   std::vector<std::string> wanted_names_;
   struct Sight {
     bool wanted = false;
-    uint64_t sent = 0;    // number of the newest message sent
+    uint64_t sent = 0;  // number of the newest message sent
   };
-  std::vector<Sight> sights_;        // of each of the board's channels
-  size_t told_channels_ = 0;         // whose names the browser has
+  std::vector<Sight> sights_;  // of each of the board's channels
+  size_t told_channels_ = 0;   // whose names the browser has
   uint64_t told_world_ = 0, told_playback_ = 0;
   bool greeted_ = false, parted_ = false, traffic_ = false;
-  std::string note_;                 // to say next
+  std::string note_;  // to say next
   int unseen_ = 0;
   std::chrono::steady_clock::time_point next_traffic_;
 };

@@ -1,4 +1,5 @@
-// The event loop: who comes in is judged (guard.h), pages are sent in chunks, sockets when they can take more.
+// The event loop: who comes in is judged (guard.h), pages are sent in chunks, sockets when they can
+// take more.
 #include "console/web_server.h"
 
 #include <arpa/inet.h>
@@ -23,11 +24,13 @@ namespace {
 
 constexpr lws_usec_t kTick_us = 16'000;
 constexpr lws_usec_t kIdleTick_us = 250'000;
-constexpr lws_usec_t kFarewell_us = 300'000;    // for the last words to viewers
+constexpr lws_usec_t kFarewell_us = 300'000;  // for the last words to viewers
 constexpr size_t kChunk = 64 * 1024;
-constexpr lws_retry_bo_t kIdlePolicy = {nullptr, 0, 0, 20, 60, 0};    // seconds: ping after 20, gone after 60
+constexpr lws_retry_bo_t kIdlePolicy = {nullptr, 0,  0,
+                                        20,      60, 0};  // seconds: ping after 20, gone after 60
 
-// The port that the address gives, or a free one for 0. libwebsockets itself says only that it failed.
+// The port that the address gives, or a free one for 0. libwebsockets itself says only that it
+// failed.
 int checked_port(const Address& address) {
   const int probe = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   const int one = 1;
@@ -36,14 +39,17 @@ int checked_port(const Address& address) {
   wanted.sin_family = AF_INET;
   wanted.sin_port = htons(static_cast<uint16_t>(address.port));
   inet_pton(AF_INET, address.host.c_str(), &wanted.sin_addr);
-  const bool bound = ::bind(probe, reinterpret_cast<sockaddr*>(&wanted), sizeof wanted) == 0 && ::listen(probe, 1) == 0;
+  const bool bound = ::bind(probe, reinterpret_cast<sockaddr*>(&wanted), sizeof wanted) == 0 &&
+                     ::listen(probe, 1) == 0;
   const int error = errno;
   socklen_t size = sizeof wanted;
   if (bound) ::getsockname(probe, reinterpret_cast<sockaddr*>(&wanted), &size);
   ::close(probe);
   if (!bound) {
-    throw EnvironmentError("--view: " + address.host + ":" + std::to_string(address.port) + " cannot be served: " + std::strerror(error) +
-                           ". Another port is chosen by --view " + address.host + ":PORT, a free one by PORT 0");
+    throw EnvironmentError("--view: " + address.host + ":" + std::to_string(address.port) +
+                           " cannot be served: " + std::strerror(error) +
+                           ". Another port is chosen by --view " + address.host +
+                           ":PORT, a free one by PORT 0");
   }
   return ntohs(wanted.sin_port);
 }
@@ -51,7 +57,7 @@ int checked_port(const Address& address) {
 }  // namespace
 
 struct WebServer::Impl {
-  struct Transfer {    // of a response's body
+  struct Transfer {  // of a response's body
     Bytes body;
     size_t sent = 0;
   };
@@ -60,7 +66,7 @@ struct WebServer::Impl {
     std::vector<uint8_t> incoming;
   };
   struct Timer {
-    lws_sorted_usec_list_t entry{};    // the first member: libwebsockets hands its address back
+    lws_sorted_usec_list_t entry{};  // the first member: libwebsockets hands its address back
     Impl* owner = nullptr;
   };
 
@@ -70,10 +76,10 @@ struct WebServer::Impl {
   lws_context* context = nullptr;
   lws_vhost* vhost = nullptr;
   Timer timer;
-  std::map<lws*, Transfer> transfers;    // looked up only
+  std::map<lws*, Transfer> transfers;  // looked up only
   std::map<lws*, Socket> sockets;
-  size_t open = 0;                       // connections of any kind
-  std::deque<lws*> silent;               // of them, those that have asked for nothing yet: oldest first
+  size_t open = 0;          // connections of any kind
+  std::deque<lws*> silent;  // of them, those that have asked for nothing yet: oldest first
   std::vector<uint8_t> message;
   std::atomic<bool> stopping{false};
   bool over = false;
@@ -91,7 +97,8 @@ struct WebServer::Impl {
   std::string refusal(lws* wsi, bool socket) const {
     char value[128];
     const char* given = lws_get_urlarg_by_name(wsi, "token=", value, sizeof value);
-    Visit visit{header(wsi, WSI_TOKEN_HOST), header(wsi, WSI_TOKEN_ORIGIN), header(wsi, WSI_TOKEN_HTTP_COOKIE), given ? given : "", socket};
+    Visit visit{header(wsi, WSI_TOKEN_HOST), header(wsi, WSI_TOKEN_ORIGIN),
+                header(wsi, WSI_TOKEN_HTTP_COOKIE), given ? given : "", socket};
     return refuse(visit, address, token);
   }
   int respond(lws* wsi, HttpResponse response);
@@ -101,7 +108,8 @@ struct WebServer::Impl {
   int write(lws* wsi);
 };
 
-int WebServer::Impl::callback(lws* wsi, lws_callback_reasons reason, void*, void* in, size_t length) {
+int WebServer::Impl::callback(lws* wsi, lws_callback_reasons reason, void*, void* in,
+                              size_t length) {
   const lws_context* of = wsi ? lws_get_context(wsi) : nullptr;
   auto* impl = of ? static_cast<Impl*>(lws_context_user(const_cast<lws_context*>(of))) : nullptr;
   return impl ? impl->dispatch(wsi, reason, in, length) : 0;
@@ -109,11 +117,8 @@ int WebServer::Impl::callback(lws* wsi, lws_callback_reasons reason, void*, void
 
 int WebServer::Impl::dispatch(lws* wsi, lws_callback_reasons reason, void* in, size_t length) {
   switch (reason) {
-    case LWS_CALLBACK_FILTER_NETWORK_CONNECTION:
-      return open >= kMostConnections ? 1 : 0;
-    case LWS_CALLBACK_WSI_CREATE:
-      ++open;
-      return 0;
+    case LWS_CALLBACK_FILTER_NETWORK_CONNECTION: return open >= kMostConnections ? 1 : 0;
+    case LWS_CALLBACK_WSI_CREATE: ++open; return 0;
     case LWS_CALLBACK_SERVER_NEW_CLIENT_INSTANTIATED:
       silent.push_back(wsi);
       if (silent.size() > kMostSilent) {
@@ -130,8 +135,7 @@ int WebServer::Impl::dispatch(lws* wsi, lws_callback_reasons reason, void* in, s
     case LWS_CALLBACK_HTTP:
       std::erase(silent, wsi);
       return request(wsi, {static_cast<const char*>(in), length});
-    case LWS_CALLBACK_HTTP_WRITEABLE:
-      return send_chunk(wsi);
+    case LWS_CALLBACK_HTTP_WRITEABLE: return send_chunk(wsi);
     case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
       std::erase(silent, wsi);
       if (header(wsi, WSI_TOKEN_GET_URI) != "/socket" || !refusal(wsi, true).empty()) {
@@ -147,15 +151,10 @@ int WebServer::Impl::dispatch(lws* wsi, lws_callback_reasons reason, void* in, s
       lws_sul_schedule(context, 0, &timer.entry, &on_timer, kTick_us);
       return 0;
     }
-    case LWS_CALLBACK_RECEIVE:
-      return receive(wsi, static_cast<const uint8_t*>(in), length);
-    case LWS_CALLBACK_SERVER_WRITEABLE:
-      return write(wsi);
-    case LWS_CALLBACK_CLOSED:
-      sockets.erase(wsi);
-      return 0;
-    default:
-      return 0;
+    case LWS_CALLBACK_RECEIVE: return receive(wsi, static_cast<const uint8_t*>(in), length);
+    case LWS_CALLBACK_SERVER_WRITEABLE: return write(wsi);
+    case LWS_CALLBACK_CLOSED: sockets.erase(wsi); return 0;
+    default: return 0;
   }
 }
 
@@ -163,13 +162,15 @@ void WebServer::Impl::on_timer(lws_sorted_usec_list_t* entry) {
   Impl& impl = *reinterpret_cast<Timer*>(entry)->owner;
   if (impl.stopping) {
     impl.over = true;
-    lws_cancel_service(impl.context);    // or this very call of lws_service goes on to wait for something else
+    lws_cancel_service(
+        impl.context);  // or this very call of lws_service goes on to wait for something else
     return;
   }
   if (impl.handler.tick()) {
     for (auto& [wsi, socket] : impl.sockets) lws_callback_on_writable(wsi);
   }
-  lws_sul_schedule(impl.context, 0, entry, &on_timer, impl.sockets.empty() ? kIdleTick_us : kTick_us);
+  lws_sul_schedule(impl.context, 0, entry, &on_timer,
+                   impl.sockets.empty() ? kIdleTick_us : kTick_us);
 }
 
 int WebServer::Impl::request(lws* wsi, std::string_view path) {
@@ -179,28 +180,35 @@ int WebServer::Impl::request(lws* wsi, std::string_view path) {
     response.body = std::make_shared<const std::vector<uint8_t>>(words.begin(), words.end());
     return response;
   };
-  if (lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) <= 0) return respond(wsi, text(405, "Only GET is served here.\n"));
-  if (const std::string why = refusal(wsi, false); !why.empty()) return respond(wsi, text(403, why + "\n"));
+  if (lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) <= 0)
+    return respond(wsi, text(405, "Only GET is served here.\n"));
+  if (const std::string why = refusal(wsi, false); !why.empty())
+    return respond(wsi, text(403, why + "\n"));
   return respond(wsi, handler.get(path));
 }
 
 int WebServer::Impl::respond(lws* wsi, HttpResponse response) {
   std::array<uint8_t, LWS_PRE + 2048> buffer{};
-  uint8_t *at = buffer.data() + LWS_PRE, *const start = at, *const end = buffer.data() + buffer.size() - 1;
+  uint8_t *at = buffer.data() + LWS_PRE, *const start = at,
+          *const end = buffer.data() + buffer.size() - 1;
   bool fits = true;
   const auto add = [&](const char* name, const std::string& value) {
     fits = fits && lws_add_http_header_by_name(wsi, reinterpret_cast<const unsigned char*>(name),
-                                               reinterpret_cast<const unsigned char*>(value.data()), static_cast<int>(value.size()), &at, end) == 0;
+                                               reinterpret_cast<const unsigned char*>(value.data()),
+                                               static_cast<int>(value.size()), &at, end) == 0;
   };
   const size_t size = response.body ? response.body->size() : 0;
-  fits = lws_add_http_common_headers(wsi, static_cast<unsigned>(response.status), response.type.c_str(), size, &at, end) == 0;
+  fits = lws_add_http_common_headers(wsi, static_cast<unsigned>(response.status),
+                                     response.type.c_str(), size, &at, end) == 0;
   add("content-security-policy:",
-      "default-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'");
+      "default-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; "
+      "frame-ancestors 'none'; base-uri 'none'; form-action 'none'");
   add("x-content-type-options:", "nosniff");
   add("referrer-policy:", "no-referrer");
   add("cache-control:", response.lasting ? "private, max-age=86400" : "no-store");
   if (response.gzip) add("content-encoding:", "gzip");
-  if (!token.empty() && response.status == 200) add("set-cookie:", "ruedo_token=" + token + "; HttpOnly; SameSite=Strict; Path=/");
+  if (!token.empty() && response.status == 200)
+    add("set-cookie:", "ruedo_token=" + token + "; HttpOnly; SameSite=Strict; Path=/");
   if (!fits || lws_finalize_write_http_header(wsi, start, &at, end) != 0) return 1;
   if (size == 0) return lws_http_transaction_completed(wsi) != 0 ? -1 : 0;
   transfers[wsi] = {std::move(response.body), 0};
@@ -216,7 +224,9 @@ int WebServer::Impl::send_chunk(lws* wsi) {
   const bool last = transfer.sent + size == transfer.body->size();
   message.resize(LWS_PRE + size);
   std::memcpy(message.data() + LWS_PRE, transfer.body->data() + transfer.sent, size);
-  if (lws_write(wsi, message.data() + LWS_PRE, size, last ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP) < 0) return -1;
+  if (lws_write(wsi, message.data() + LWS_PRE, size, last ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP) <
+      0)
+    return -1;
   transfer.sent += size;
   if (!last) {
     lws_callback_on_writable(wsi);
@@ -246,14 +256,18 @@ int WebServer::Impl::write(lws* wsi) {
   message.assign(LWS_PRE, 0);
   bool text = false;
   if (!at->second.connection->next(message, text)) return 0;
-  if (lws_write(wsi, message.data() + LWS_PRE, message.size() - LWS_PRE, text ? LWS_WRITE_TEXT : LWS_WRITE_BINARY) < 0) return -1;
-  lws_callback_on_writable(wsi);    // until there is nothing left to say
+  if (lws_write(wsi, message.data() + LWS_PRE, message.size() - LWS_PRE,
+                text ? LWS_WRITE_TEXT : LWS_WRITE_BINARY) < 0)
+    return -1;
+  lws_callback_on_writable(wsi);  // until there is nothing left to say
   return 0;
 }
 
-WebServer::WebServer(const Address& address, const std::string& token, WebHandler handler) : impl_(std::make_unique<Impl>()) {
+WebServer::WebServer(const Address& address, const std::string& token, WebHandler handler)
+    : impl_(std::make_unique<Impl>()) {
   static const std::array<lws_protocols, 2> kProtocols = {
-      lws_protocols{"ruedo", &Impl::callback, 0, 16384, 0, nullptr, 0}, lws_protocols{nullptr, nullptr, 0, 0, 0, nullptr, 0}};
+      lws_protocols{"ruedo", &Impl::callback, 0, 16384, 0, nullptr, 0},
+      lws_protocols{nullptr, nullptr, 0, 0, 0, nullptr, 0}};
   impl_->address = address;
   impl_->address.port = checked_port(address);
   impl_->token = token;
@@ -279,7 +293,8 @@ WebServer::WebServer(const Address& address, const std::string& token, WebHandle
   impl_->vhost = impl_->context ? lws_create_vhost(impl_->context, &info) : nullptr;
   if (!impl_->vhost) {
     if (impl_->context) lws_context_destroy(impl_->context);
-    throw EnvironmentError("--view: libwebsockets cannot serve " + impl_->address.host + ":" + std::to_string(impl_->address.port));
+    throw EnvironmentError("--view: libwebsockets cannot serve " + impl_->address.host + ":" +
+                           std::to_string(impl_->address.port));
   }
 }
 
@@ -295,7 +310,8 @@ void WebServer::run() {
     farewell = true;
     impl_->handler.end();
     for (auto& [wsi, socket] : impl_->sockets) lws_callback_on_writable(wsi);
-    lws_sul_schedule(impl_->context, 0, &impl_->timer.entry, &Impl::on_timer, impl_->sockets.empty() ? 1 : kFarewell_us);
+    lws_sul_schedule(impl_->context, 0, &impl_->timer.entry, &Impl::on_timer,
+                     impl_->sockets.empty() ? 1 : kFarewell_us);
   }
   lws_sul_cancel(&impl_->timer.entry);
 }

@@ -1,6 +1,7 @@
 // HTTP and WebSocket for the console, over libwebsockets: one thread, one port, everything bounded.
 //
-// Why libwebsockets: a small C library that every distribution has, with one event loop for HTTP and WebSocket.
+// Why libwebsockets: a small C library that every distribution has, with one event loop for HTTP
+// and WebSocket.
 #pragma once
 
 #include <functional>
@@ -19,8 +20,8 @@ struct HttpResponse {
   int status = 200;
   std::string type = "text/plain; charset=utf-8";
   Bytes body;
-  bool gzip = false;         // the body is compressed
-  bool lasting = false;      // may be kept by the browser
+  bool gzip = false;     // the body is compressed
+  bool lasting = false;  // may be kept by the browser
 };
 
 // One browser's WebSocket.
@@ -35,17 +36,20 @@ class Connection {
 
 struct WebHandler {
   std::function<HttpResponse(std::string_view path)> get;
-  std::function<std::unique_ptr<Connection>()> open;    // null: there are too many
-  std::function<void()> end;                            // before the last messages are sent
-  std::function<bool()> tick;                           // every few milliseconds while there are connections; true: they may have something to send
+  std::function<std::unique_ptr<Connection>()> open;  // null: there are too many
+  std::function<void()> end;                          // before the last messages are sent
+  std::function<bool()> tick;  // every few milliseconds while there are connections; true: they may
+                               // have something to send
 };
 
 class WebServer {
  public:
-  static constexpr size_t kMostConnections = 320;             // HTTP and WebSocket together
-  static constexpr size_t kMostSilent = 64;                   // of them that have asked for nothing yet; beyond, the oldest goes
-  static constexpr size_t kMostMessage = size_t{1} << 20;     // bytes that a browser may send as one message
-  static constexpr size_t kMostHeaders = 4096;                // bytes of a request's headers
+  static constexpr size_t kMostConnections = 320;  // HTTP and WebSocket together
+  static constexpr size_t kMostSilent =
+      64;  // of them that have asked for nothing yet; beyond, the oldest goes
+  static constexpr size_t kMostMessage = size_t{1}
+                                         << 20;  // bytes that a browser may send as one message
+  static constexpr size_t kMostHeaders = 4096;   // bytes of a request's headers
 
   // Binds the port. Throws EnvironmentError, with the cure, when that cannot be had.
   WebServer(const Address& address, const std::string& token, WebHandler handler);
@@ -56,7 +60,7 @@ class WebServer {
   int port() const;
   // Serves until stop(); then gives what waits a moment to be sent.
   void run();
-  void stop();    // any thread
+  void stop();  // any thread
 
   struct Impl;
 

@@ -1,5 +1,5 @@
-// Typed reads of the document tree. Numbers are read by std::from_chars, which knows no locale; every error
-// says file, line, element, value and what is allowed.
+// Typed reads of the document tree. Numbers are read by std::from_chars, which knows no locale;
+// every error says file, line, element, value and what is allowed.
 #include "ruedo/element.h"
 
 #include <algorithm>
@@ -40,7 +40,8 @@ std::string shown(double value) {
 std::string quoted(std::string_view text) {
   constexpr size_t kLongest = 60;
   std::string result = "'";
-  for (const char c : text.substr(0, kLongest)) result += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+  for (const char c : text.substr(0, kLongest))
+    result += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
   return result + (text.size() > kLongest ? "...'" : "'");
 }
 
@@ -76,10 +77,12 @@ enum class Reading { good, not_a_number, too_large };
 Reading read_number(std::string_view text, double& value) {
   if (text.size() > 1 && text[0] == '+' && text[1] != '-' && text[1] != '+') text.remove_prefix(1);
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error == std::errc::invalid_argument || end != text.data() + text.size()) return Reading::not_a_number;
+  if (error == std::errc::invalid_argument || end != text.data() + text.size())
+    return Reading::not_a_number;
   if (error == std::errc::result_out_of_range) {
     const size_t e = text.find_first_of("eE");
-    const bool tiny = e != std::string_view::npos ? text.substr(e + 1, 1) == "-" : trimmed(text).find('.') <= 2;
+    const bool tiny =
+        e != std::string_view::npos ? text.substr(e + 1, 1) == "-" : trimmed(text).find('.') <= 2;
     if (!tiny) return Reading::too_large;
     value = 0.0;
   }
@@ -91,19 +94,24 @@ double number_of(const Value& where, std::string_view text, const Allowed& allow
   switch (read_number(text, value)) {
     case Reading::good: break;
     case Reading::too_large: where.refuse("is too large for a number", text);
-    case Reading::not_a_number: where.refuse("is not a number; allowed is " + described(allowed, "a number"), text);
+    case Reading::not_a_number:
+      where.refuse("is not a number; allowed is " + described(allowed, "a number"), text);
   }
   if (std::isnan(value) || (std::isinf(value) && !allowed.infinite)) {
     where.refuse("is not finite; allowed is " + described(allowed, "a number"), text);
   }
-  if (value < allowed.min || value > allowed.max || (allowed.min_excluded && value <= allowed.min)) {
+  if (value < allowed.min || value > allowed.max ||
+      (allowed.min_excluded && value <= allowed.min)) {
     where.refuse("is not allowed; allowed is " + described(allowed, "a number"), text);
   }
   if (allowed.quantity && std::isfinite(value) && std::abs(value) > allowed.quantity->most) {
     const Quantity& of = *allowed.quantity;
     const bool vowel = std::string_view("aei").find(of.name.front()) != std::string_view::npos;
-    where.refuse("is too large for a" + std::string(vowel ? "n " : " ") + std::string(of.name) + "; allowed is up to " + shown(of.most) +
-                     (of.unit.empty() ? "" : " " + std::string(of.unit)) + (allowed.infinite ? ", or inf" : ""), text);
+    where.refuse("is too large for a" + std::string(vowel ? "n " : " ") + std::string(of.name) +
+                     "; allowed is up to " + shown(of.most) +
+                     (of.unit.empty() ? "" : " " + std::string(of.unit)) +
+                     (allowed.infinite ? ", or inf" : ""),
+                 text);
   }
   return value;
 }
@@ -118,13 +126,15 @@ int64_t integer_of(const Value& where, const Allowed& allowed) {
   if (error != std::errc() || end != digits.data() + digits.size()) {
     // Files also write "640.0" and "1e3".
     double number = 0.0;
-    if (read_number(text, number) != Reading::good || number != std::floor(number) || std::abs(number) > 0x1p53) {
+    if (read_number(text, number) != Reading::good || number != std::floor(number) ||
+        std::abs(number) > 0x1p53) {
       where.refuse("is not a whole number" + wanted);
     }
     value = whole(number);
   }
   const double compared = static_cast<double>(value);
-  if (compared < allowed.min || compared > allowed.max || (allowed.min_excluded && compared <= allowed.min)) {
+  if (compared < allowed.min || compared > allowed.max ||
+      (allowed.min_excluded && compared <= allowed.min)) {
     where.refuse("is not allowed" + wanted);
   }
   return value;
@@ -138,12 +148,14 @@ bool boolean_of(const Value& where) {
 }
 
 // The numbers from the fourth on are of another kind in a pose.
-std::vector<double> numbers_of(const Value& where, const Allowed& first_three, const Allowed& others) {
+std::vector<double> numbers_of(const Value& where, const Allowed& first_three,
+                               const Allowed& others) {
   std::vector<double> values;
   std::string_view rest = where.text();
   while (!rest.empty()) {
     const size_t length = std::min(rest.find_first_of(kSpace), rest.size());
-    values.push_back(number_of(where, rest.substr(0, length), values.size() < 3 ? first_three : others));
+    values.push_back(
+        number_of(where, rest.substr(0, length), values.size() < 3 ? first_three : others));
     rest = trimmed(rest.substr(length));
   }
   return values;
@@ -151,7 +163,8 @@ std::vector<double> numbers_of(const Value& where, const Allowed& first_three, c
 
 Vec3 vector3_of(const Value& where, const Allowed& allowed) {
   const std::vector<double> values = numbers_of(where, allowed, allowed);
-  if (values.size() != 3) where.refuse("has " + std::to_string(values.size()) + " numbers; allowed are three");
+  if (values.size() != 3)
+    where.refuse("has " + std::to_string(values.size()) + " numbers; allowed are three");
   return {values[0], values[1], values[2]};
 }
 
@@ -166,20 +179,25 @@ Pose pose_of(const Value& where) {
   }
   if (const std::string* written = where.element.attribute("rotation_format")) {
     if (*written != "euler_rpy" && *written != "quat_xyzw") {
-      where.refuse("is not allowed for rotation_format; allowed are euler_rpy and quat_xyzw", *written);
+      where.refuse("is not allowed for rotation_format; allowed are euler_rpy and quat_xyzw",
+                   *written);
     }
     quaternion = *written == "quat_xyzw";
   }
-  const std::vector<double> v = numbers_of(where, Allowed::any(quantity::kLength), Allowed::any(quaternion ? quantity::kFactor : quantity::kAngle));
+  const std::vector<double> v =
+      numbers_of(where, Allowed::any(quantity::kLength),
+                 Allowed::any(quaternion ? quantity::kFactor : quantity::kAngle));
   if (v.empty()) return {};
   if (quaternion) {
     if (degrees) where.refuse("is a quaternion, which has no degrees");
-    if (v.size() != 7) where.refuse("has " + std::to_string(v.size()) + " numbers; allowed are x y z qx qy qz qw");
+    if (v.size() != 7)
+      where.refuse("has " + std::to_string(v.size()) + " numbers; allowed are x y z qx qy qz qw");
     const Quat q(v[6], v[3], v[4], v[5]);
     if (!(q.norm() > 1e-9)) where.refuse("has no rotation: its quaternion is zero");
     return {q.normalized(), {v[0], v[1], v[2]}};
   }
-  if (v.size() != 6) where.refuse("has " + std::to_string(v.size()) + " numbers; allowed are x y z roll pitch yaw");
+  if (v.size() != 6)
+    where.refuse("has " + std::to_string(v.size()) + " numbers; allowed are x y z roll pitch yaw");
   const double unit = degrees ? M_PI / 180.0 : 1.0;
   return Pose::from_xyz_rpy({v[0], v[1], v[2]}, Vec3(v[3], v[4], v[5]) * unit);
 }
@@ -208,7 +226,8 @@ const Element* Element::child(std::string_view path) const {
   const size_t slash = path.find('/');
   const std::string_view first = path.substr(0, slash);
   for (const auto& each : children) {
-    if (each->name == first) return slash == std::string_view::npos ? each.get() : each->child(path.substr(slash + 1));
+    if (each->name == first)
+      return slash == std::string_view::npos ? each.get() : each->child(path.substr(slash + 1));
   }
   return nullptr;
 }
@@ -267,7 +286,8 @@ Pose Element::pose(std::string_view path, const Pose& fallback) const {
   return found ? pose_of({*found, name + "/" + std::string(path)}) : fallback;
 }
 
-std::string Element::choice(std::string_view path, std::string_view fallback, const std::vector<std::string>& choices) const {
+std::string Element::choice(std::string_view path, std::string_view fallback,
+                            const std::vector<std::string>& choices) const {
   const Element* found = child(path);
   if (!found) return std::string(fallback);
   const Value value{*found, name + "/" + std::string(path)};
@@ -286,7 +306,9 @@ double Element::as_number(Allowed allowed) const {
 int64_t Element::as_integer(Allowed allowed) const { return integer_of({*this, name}, allowed); }
 bool Element::as_boolean() const { return boolean_of({*this, name}); }
 Vec3 Element::as_vector3(Allowed allowed) const { return vector3_of({*this, name}, allowed); }
-std::vector<double> Element::as_numbers(Allowed allowed) const { return numbers_of({*this, name}, allowed, allowed); }
+std::vector<double> Element::as_numbers(Allowed allowed) const {
+  return numbers_of({*this, name}, allowed, allowed);
+}
 Pose Element::as_pose() const { return pose_of({*this, name}); }
 
 void Element::refuse_unknown(const std::vector<std::string>& known, bool only_ruedo) const {

@@ -11,7 +11,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int kMostAbove = 4;    // PREFIX/share/ruedo/python/ruedo, of the Python module
+constexpr int kMostAbove = 4;  // PREFIX/share/ruedo/python/ruedo, of the Python module
 
 // The folder of the program or library: absolute, without links.
 fs::path own_folder() {
@@ -20,7 +20,8 @@ fs::path own_folder() {
   Dl_info object{};
   fs::path file;
   // Of the program itself the linker has the name as it was typed; of a library, the path.
-  if (dladdr(&here, &object) != 0 && object.dli_fname != nullptr && fs::path(object.dli_fname).filename().string().find(".so") != std::string::npos) {
+  if (dladdr(&here, &object) != 0 && object.dli_fname != nullptr &&
+      fs::path(object.dli_fname).filename().string().find(".so") != std::string::npos) {
     file = fs::canonical(object.dli_fname, error);
   } else {
     file = fs::read_symlink("/proc/self/exe", error);

@@ -12,7 +12,7 @@ namespace ruedo {
 // Values and names in the order of the calls; commas and quotes are seen to here.
 class JsonWriter {
  public:
-  JsonWriter& open(char bracket) {    // '{' or '['
+  JsonWriter& open(char bracket) {  // '{' or '['
     separate();
     text_ += bracket;
     first_ = true;
@@ -27,17 +27,21 @@ class JsonWriter {
     separate();
     quote(name);
     text_ += ": ";
-    first_ = true;    // its value needs no comma
+    first_ = true;  // its value needs no comma
     return *this;
   }
   JsonWriter& value(std::string_view text) { return separate(), quote(text), *this; }
   JsonWriter& value(const char* text) { return value(std::string_view(text)); }
   JsonWriter& value(bool flag) { return raw(flag ? "true" : "false"); }
-  JsonWriter& value(double number) { return raw(std::isfinite(number) ? fmt::format("{}", number) : "null"); }
+  JsonWriter& value(double number) {
+    return raw(std::isfinite(number) ? fmt::format("{}", number) : "null");
+  }
   JsonWriter& value(int64_t number) { return raw(fmt::format("{}", number)); }
   JsonWriter& value(int number) { return value(int64_t{number}); }
   template <class Value>
-  JsonWriter& member(std::string_view key, const Value& of_it) { return name(key).value(of_it); }
+  JsonWriter& member(std::string_view key, const Value& of_it) {
+    return name(key).value(of_it);
+  }
   // A value that is JSON already.
   JsonWriter& raw(std::string_view text) {
     separate();

@@ -11,7 +11,8 @@
 namespace ruedo {
 
 // option: its name; allowed: what it should look like.
-[[noreturn]] inline void refuse_option(const std::string& option, const std::string& text, const std::string& allowed) {
+[[noreturn]] inline void refuse_option(const std::string& option, const std::string& text,
+                                       const std::string& allowed) {
   throw InputError({}, option + " '" + text + "': " + allowed);
 }
 

@@ -5,8 +5,10 @@ namespace ruedo {
 
 std::span<const Quantity> quantities() {
   using namespace quantity;
-  static constexpr Quantity kAll[] = {kLength, kRange, kAngle, kFactor, kMass, kInertia, kDensity, kGravity, kSpeed,
-                                      kAcceleration, kEffort, kDamping, kFriction, kContact, kTime, kNoise, kBrightness, kPixels};
+  static constexpr Quantity kAll[] = {kLength,  kRange,      kAngle,    kFactor,  kMass,
+                                      kInertia, kDensity,    kGravity,  kSpeed,   kAcceleration,
+                                      kEffort,  kDamping,    kFriction, kContact, kTime,
+                                      kNoise,   kBrightness, kPixels};
   return kAll;
 }
 

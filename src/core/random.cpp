@@ -1,6 +1,7 @@
-// Counter-based random numbers: Philox4x32-10 (Salmon et al., SC 2011) and the inverse normal distribution by
-// Wichura, "Algorithm AS 241: The Percentage Points of the Normal Distribution", Applied Statistics 37 (1988).
-// Integer arithmetic, + - * / and square roots only: the same bits on every CPU.
+// Counter-based random numbers: Philox4x32-10 (Salmon et al., SC 2011) and the inverse normal
+// distribution by Wichura, "Algorithm AS 241: The Percentage Points of the Normal Distribution",
+// Applied Statistics 37 (1988). Integer arithmetic, + - * / and square roots only: the same bits on
+// every CPU.
 #include "ruedo/random.h"
 
 #include <bit>
@@ -22,51 +23,72 @@ uint64_t absorb(uint64_t hash, std::string_view text) {
   return mix(hash ^ (text.size() * 0x9e3779b97f4a7c15u));
 }
 
-// Natural logarithm of a positive normal number, within 1e-16 of the larger of 1 and |log x|. With x = 2^e m,
-// m in [sqrt 1/2, sqrt 2), log m = 2 artanh(s), s = (m - 1) / (m + 1), |s| < 0.172: eleven odd powers.
+// Natural logarithm of a positive normal number, within 1e-16 of the larger of 1 and |log x|. With
+// x = 2^e m, m in [sqrt 1/2, sqrt 2), log m = 2 artanh(s), s = (m - 1) / (m + 1), |s| < 0.172:
+// eleven odd powers.
 double natural_log(double x) {
   const uint64_t bits = std::bit_cast<uint64_t>(x);
   int exponent = static_cast<int>(bits >> 52) - 1023;
-  double m = std::bit_cast<double>((bits & 0xfffffffffffffu) | 0x3ff0000000000000u);    // [1, 2)
+  double m = std::bit_cast<double>((bits & 0xfffffffffffffu) | 0x3ff0000000000000u);  // [1, 2)
   if (m > 1.4142135623730951) {
     m *= 0.5;
     ++exponent;
   }
   const double s = (m - 1.0) / (m + 1.0);
   const double s2 = s * s;
-  constexpr double kOdd[10] = {1.0 / 21, 1.0 / 19, 1.0 / 17, 1.0 / 15, 1.0 / 13, 1.0 / 11, 1.0 / 9, 1.0 / 7, 1.0 / 5, 1.0 / 3};
+  constexpr double kOdd[10] = {1.0 / 21, 1.0 / 19, 1.0 / 17, 1.0 / 15, 1.0 / 13,
+                               1.0 / 11, 1.0 / 9,  1.0 / 7,  1.0 / 5,  1.0 / 3};
   double tail = 0.0;
   for (const double c : kOdd) tail = tail * s2 + c;
   const double e = exponent;
   // ln 2 in two parts, the first with few bits, so that e times it is exact.
-  return e * 6.93147180369123816490e-01 + (2.0 * s + (2.0 * s * s2 * tail + e * 1.90821492927058770002e-10));
+  return e * 6.93147180369123816490e-01 +
+         (2.0 * s + (2.0 * s * s2 * tail + e * 1.90821492927058770002e-10));
 }
 
-// Polynomials of degree 7, the coefficients from the lowest power up. By halves (Estrin): the products do not wait
-// for each other as in Horner's scheme.
+// Polynomials of degree 7, the coefficients from the lowest power up. By halves (Estrin): the
+// products do not wait for each other as in Horner's scheme.
 inline double polynomial(const double (&c)[8], double r) {
   const double r2 = r * r;
-  return ((c[0] + c[1] * r) + (c[2] + c[3] * r) * r2) + ((c[4] + c[5] * r) + (c[6] + c[7] * r) * r2) * (r2 * r2);
+  return ((c[0] + c[1] * r) + (c[2] + c[3] * r) * r2) +
+         ((c[4] + c[5] * r) + (c[6] + c[7] * r) * r2) * (r2 * r2);
 }
 
 // AS 241's PPND16: centre, near tails, far tails.
 constexpr double kA[8] = {3.3871328727963666080e0, 1.3314166789178437745e2, 1.9715909503065514427e3,
                           1.3731693765509461125e4, 4.5921953931549871457e4, 6.7265770927008700853e4,
                           3.3430575583588128105e4, 2.5090809287301226727e3};
-constexpr double kB[8] = {1.0, 4.2313330701600911252e1, 6.8718700749205790830e2, 5.3941960214247511077e3,
-                          2.1213794301586595867e4, 3.9307895800092710610e4, 2.8729085735721942674e4,
+constexpr double kB[8] = {1.0,
+                          4.2313330701600911252e1,
+                          6.8718700749205790830e2,
+                          5.3941960214247511077e3,
+                          2.1213794301586595867e4,
+                          3.9307895800092710610e4,
+                          2.8729085735721942674e4,
                           5.2264952788528545610e3};
-constexpr double kC[8] = {1.42343711074968357734e0, 4.63033784615654529590e0, 5.76949722146069140550e0,
-                          3.64784832476320460504e0, 1.27045825245236838258e0, 2.41780725177450611770e-1,
+constexpr double kC[8] = {1.42343711074968357734e0,  4.63033784615654529590e0,
+                          5.76949722146069140550e0,  3.64784832476320460504e0,
+                          1.27045825245236838258e0,  2.41780725177450611770e-1,
                           2.27238449892691845833e-2, 7.74545014278341407640e-4};
-constexpr double kD[8] = {1.0, 2.05319162663775882187e0, 1.67638483018380384940e0, 6.89767334985100004550e-1,
-                          1.48103976427480074590e-1, 1.51986665636164571966e-2, 5.47593808499534494600e-4,
+constexpr double kD[8] = {1.0,
+                          2.05319162663775882187e0,
+                          1.67638483018380384940e0,
+                          6.89767334985100004550e-1,
+                          1.48103976427480074590e-1,
+                          1.51986665636164571966e-2,
+                          5.47593808499534494600e-4,
                           1.05075007164441684324e-9};
-constexpr double kE[8] = {6.65790464350110377720e0, 5.46378491116411436990e0, 1.78482653991729133580e0,
-                          2.96560571828504891230e-1, 2.65321895265761230930e-2, 1.24266094738807843860e-3,
+constexpr double kE[8] = {6.65790464350110377720e0,  5.46378491116411436990e0,
+                          1.78482653991729133580e0,  2.96560571828504891230e-1,
+                          2.65321895265761230930e-2, 1.24266094738807843860e-3,
                           2.71155556874348757815e-5, 2.01033439929228813265e-7};
-constexpr double kF[8] = {1.0, 5.99832206555887937690e-1, 1.36929880922735805310e-1, 1.48753612908506148525e-2,
-                          7.86869131145613259100e-4, 1.84631831751005468180e-5, 1.42151175831644588870e-7,
+constexpr double kF[8] = {1.0,
+                          5.99832206555887937690e-1,
+                          1.36929880922735805310e-1,
+                          1.48753612908506148525e-2,
+                          7.86869131145613259100e-4,
+                          1.84631831751005468180e-5,
+                          1.42151175831644588870e-7,
                           2.04426310338993978564e-15};
 
 // PPND16 where |q| <= kCentre, q = p - 1/2.
@@ -87,8 +109,10 @@ std::array<uint32_t, 4> philox4x32(std::array<uint32_t, 4> counter, std::array<u
   for (int round = 0; round < 10; ++round) {
     const uint64_t product0 = uint64_t{0xD2511F53u} * counter[0];
     const uint64_t product1 = uint64_t{0xCD9E8D57u} * counter[2];
-    counter = {static_cast<uint32_t>(product1 >> 32) ^ counter[1] ^ key[0], static_cast<uint32_t>(product1),
-               static_cast<uint32_t>(product0 >> 32) ^ counter[3] ^ key[1], static_cast<uint32_t>(product0)};
+    counter = {static_cast<uint32_t>(product1 >> 32) ^ counter[1] ^ key[0],
+               static_cast<uint32_t>(product1),
+               static_cast<uint32_t>(product0 >> 32) ^ counter[3] ^ key[1],
+               static_cast<uint32_t>(product0)};
     key[0] += 0x9E3779B9u;
     key[1] += 0xBB67AE85u;
   }
@@ -129,7 +153,8 @@ double RandomStream::gaussian() {
 void RandomStream::gaussians(std::span<double> values) {
   size_t done = 0;
   while (next_ != 4 && done < values.size()) values[done++] = gaussian();
-  // Two values a block. The centre's formula runs for all, in a loop without branches; the tails, 15 %, follow singly.
+  // Two values a block. The centre's formula runs for all, in a loop without branches; the tails,
+  // 15 %, follow singly.
   constexpr size_t kBlocks = 16;
   uint32_t word[4][kBlocks];
   for (; values.size() - done >= 2 * kBlocks; done += 2 * kBlocks) {
@@ -142,7 +167,8 @@ void RandomStream::gaussians(std::span<double> values) {
     uint32_t key0 = static_cast<uint32_t>(key_), key1 = static_cast<uint32_t>(key_ >> 32);
     for (int round = 0; round < 10; ++round) {
       for (size_t i = 0; i < kBlocks; ++i) {
-        const uint64_t product0 = uint64_t{0xD2511F53u} * word[0][i], product1 = uint64_t{0xCD9E8D57u} * word[2][i];
+        const uint64_t product0 = uint64_t{0xD2511F53u} * word[0][i],
+                       product1 = uint64_t{0xCD9E8D57u} * word[2][i];
         word[0][i] = static_cast<uint32_t>(product1 >> 32) ^ word[1][i] ^ key0;
         word[1][i] = static_cast<uint32_t>(product1);
         word[2][i] = static_cast<uint32_t>(product0 >> 32) ^ word[3][i] ^ key1;

@@ -18,27 +18,35 @@
 namespace ruedo {
 namespace {
 
-// linux/landlock.h of Debian 12 knows the first two versions of the interface; kernels say which one they have.
-constexpr uint64_t kExecute = 1u << 0, kWriteFile = 1u << 1, kReadFile = 1u << 2, kReadDir = 1u << 3, kFirstVersion = (1u << 13) - 1;
-constexpr uint64_t kRefer = 1u << 13, kTruncate = 1u << 14, kIoctlDevice = 1u << 15;    // versions 2, 3, 5
+// linux/landlock.h of Debian 12 knows the first two versions of the interface; kernels say which
+// one they have.
+constexpr uint64_t kExecute = 1u << 0, kWriteFile = 1u << 1, kReadFile = 1u << 2,
+                   kReadDir = 1u << 3, kFirstVersion = (1u << 13) - 1;
+constexpr uint64_t kRefer = 1u << 13, kTruncate = 1u << 14,
+                   kIoctlDevice = 1u << 15;  // versions 2, 3, 5
 constexpr uint64_t kOfFiles = kExecute | kWriteFile | kReadFile | kTruncate | kIoctlDevice;
-constexpr uint64_t kTcp = 3;           // bind and connect, version 4
-constexpr uint64_t kScopes = 3;        // abstract sockets and signals, version 6
+constexpr uint64_t kTcp = 3;     // bind and connect, version 4
+constexpr uint64_t kScopes = 3;  // abstract sockets and signals, version 6
 
-struct RulesetAttributes {    // landlock_ruleset_attr of version 6
+struct RulesetAttributes {  // landlock_ruleset_attr of version 6
   uint64_t files, network, scopes;
 };
 
 int landlock_version() {
-  const long version = syscall(SYS_landlock_create_ruleset, nullptr, 0, LANDLOCK_CREATE_RULESET_VERSION);
+  const long version =
+      syscall(SYS_landlock_create_ruleset, nullptr, 0, LANDLOCK_CREATE_RULESET_VERSION);
   return version < 0 ? 0 : static_cast<int>(version);
 }
 
 uint64_t rights_over_files(int version) {
-  return kFirstVersion | (version >= 2 ? kRefer : 0) | (version >= 3 ? kTruncate : 0) | (version >= 5 ? kIoctlDevice : 0);
+  return kFirstVersion | (version >= 2 ? kRefer : 0) | (version >= 3 ? kTruncate : 0) |
+         (version >= 5 ? kIoctlDevice : 0);
 }
 
-[[noreturn]] void fail(const char* what) { throw EnvironmentError(std::string("the sandbox cannot be entered: ") + what + ": " + std::strerror(errno)); }
+[[noreturn]] void fail(const char* what) {
+  throw EnvironmentError(std::string("the sandbox cannot be entered: ") + what + ": " +
+                         std::strerror(errno));
+}
 
 class File {
  public:
@@ -56,33 +64,68 @@ class File {
 
 void allow(const File& ruleset, const std::string& path, uint64_t rights) {
   const File file(::open(path.c_str(), O_PATH | O_CLOEXEC));
-  struct stat status {};
-  if (file.get() < 0 || ::fstat(file.get(), &status) != 0) return;    // not there
+  struct stat status{};
+  if (file.get() < 0 || ::fstat(file.get(), &status) != 0) return;  // not there
   landlock_path_beneath_attr beneath{};
   beneath.allowed_access = S_ISDIR(status.st_mode) ? rights : rights & kOfFiles;
   beneath.parent_fd = file.get();
-  const bool added = syscall(SYS_landlock_add_rule, ruleset.get(), LANDLOCK_RULE_PATH_BENEATH, &beneath, 0) == 0;
-  if (!added && errno != EBADFD) fail(path.c_str());    // a pipe: no file
+  const bool added =
+      syscall(SYS_landlock_add_rule, ruleset.get(), LANDLOCK_RULE_PATH_BENEATH, &beneath, 0) == 0;
+  if (!added && errno != EBADFD) fail(path.c_str());  // a pipe: no file
 }
 
-// What programs need that do nothing: libraries, the processors, time zones, devices without a content. Not /etc as a whole, not /proc of others.
-constexpr const char* kSystem[] = {"/usr", "/lib", "/lib32", "/lib64", "/bin", "/sbin", "/opt", "/etc/ld.so.cache", "/etc/ld.so.preload", "/etc/localtime",
-                                   "/etc/hosts", "/etc/resolv.conf", "/etc/nsswitch.conf", "/etc/host.conf", "/etc/gai.conf", "/etc/protocols", "/etc/services",
-                                   "/etc/ssl/openssl.cnf", "/etc/alternatives", "/etc/glvnd", "/etc/drirc", "/proc/self", "/proc/cpuinfo", "/proc/meminfo",
-                                   "/proc/filesystems", "/proc/mounts", "/proc/net", "/proc/sys", "/sys/devices", "/sys/fs/cgroup", "/sys/class", "/sys/dev"};
-constexpr const char* kDevices[] = {"/dev/null", "/dev/zero", "/dev/random", "/dev/urandom", "/dev/tty", "/dev/dri"};
+// What programs need that do nothing: libraries, the processors, time zones, devices without a
+// content. Not /etc as a whole, not /proc of others.
+constexpr const char* kSystem[] = {"/usr",
+                                   "/lib",
+                                   "/lib32",
+                                   "/lib64",
+                                   "/bin",
+                                   "/sbin",
+                                   "/opt",
+                                   "/etc/ld.so.cache",
+                                   "/etc/ld.so.preload",
+                                   "/etc/localtime",
+                                   "/etc/hosts",
+                                   "/etc/resolv.conf",
+                                   "/etc/nsswitch.conf",
+                                   "/etc/host.conf",
+                                   "/etc/gai.conf",
+                                   "/etc/protocols",
+                                   "/etc/services",
+                                   "/etc/ssl/openssl.cnf",
+                                   "/etc/alternatives",
+                                   "/etc/glvnd",
+                                   "/etc/drirc",
+                                   "/proc/self",
+                                   "/proc/cpuinfo",
+                                   "/proc/meminfo",
+                                   "/proc/filesystems",
+                                   "/proc/mounts",
+                                   "/proc/net",
+                                   "/proc/sys",
+                                   "/sys/devices",
+                                   "/sys/fs/cgroup",
+                                   "/sys/class",
+                                   "/sys/dev"};
+constexpr const char* kDevices[] = {"/dev/null",    "/dev/zero", "/dev/random",
+                                    "/dev/urandom", "/dev/tty",  "/dev/dri"};
 
 void bound_files(const Sandbox& sandbox, int version) {
   const uint64_t all = rights_over_files(version), reading = kReadFile | kReadDir | kExecute;
-  RulesetAttributes attributes{all, sandbox.alone && version >= 4 ? kTcp : 0, sandbox.alone && version >= 6 ? kScopes : 0};
-  const size_t size = version >= 6 ? sizeof attributes : version >= 4 ? 2 * sizeof(uint64_t) : sizeof(uint64_t);
+  RulesetAttributes attributes{all, sandbox.alone && version >= 4 ? kTcp : 0,
+                               sandbox.alone && version >= 6 ? kScopes : 0};
+  const size_t size = version >= 6   ? sizeof attributes
+                      : version >= 4 ? 2 * sizeof(uint64_t)
+                                     : sizeof(uint64_t);
   const File ruleset(static_cast<int>(syscall(SYS_landlock_create_ruleset, &attributes, size, 0)));
   if (ruleset.get() < 0) fail("Landlock");
   if (!sandbox.alone) {
     for (const char* path : kSystem) allow(ruleset, path, reading);
     for (const char* path : kDevices) allow(ruleset, path, all);
     for (const char* part : {"bin", "lib", "math", "share", "python"}) {
-      if (const std::string installed = find_installed(part); !installed.empty()) allow(ruleset, installed, reading);
+      if (const std::string installed = find_installed(part); !installed.empty())
+        allow(ruleset, installed, reading);
     }
   }
   for (const std::string& path : sandbox.readable) allow(ruleset, path, kReadFile | kReadDir);
@@ -92,16 +135,74 @@ void bound_files(const Sandbox& sandbox, int version) {
 }
 
 // What no program here has a reason to ask of the kernel.
-constexpr const char* kNever[] = {"ptrace", "process_vm_readv", "process_vm_writev", "mount", "umount2", "pivot_root", "chroot", "setns", "unshare", "bpf",
-                                  "perf_event_open", "keyctl", "add_key", "request_key", "init_module", "finit_module", "delete_module", "kexec_load",
-                                  "kexec_file_load", "reboot", "swapon", "swapoff", "open_by_handle_at", "name_to_handle_at", "userfaultfd", "io_uring_setup",
-                                  "io_uring_enter", "io_uring_register", "acct", "quotactl", "settimeofday", "clock_settime", "adjtimex", "iopl", "ioperm",
-                                  "syslog", "sethostname", "setdomainname", "mknod", "mknodat", "move_mount", "open_tree", "fsopen", "fsconfig", "fsmount", "fspick"};
-constexpr const char* kNeverAlone[] = {"execve", "execveat", "fork", "vfork", "socket", "socketpair", "connect", "bind", "listen", "accept", "accept4", "sendto",
-                                       "sendmsg", "kill", "tkill", "pidfd_open", "pidfd_send_signal", "pidfd_getfd"};
+constexpr const char* kNever[] = {"ptrace",
+                                  "process_vm_readv",
+                                  "process_vm_writev",
+                                  "mount",
+                                  "umount2",
+                                  "pivot_root",
+                                  "chroot",
+                                  "setns",
+                                  "unshare",
+                                  "bpf",
+                                  "perf_event_open",
+                                  "keyctl",
+                                  "add_key",
+                                  "request_key",
+                                  "init_module",
+                                  "finit_module",
+                                  "delete_module",
+                                  "kexec_load",
+                                  "kexec_file_load",
+                                  "reboot",
+                                  "swapon",
+                                  "swapoff",
+                                  "open_by_handle_at",
+                                  "name_to_handle_at",
+                                  "userfaultfd",
+                                  "io_uring_setup",
+                                  "io_uring_enter",
+                                  "io_uring_register",
+                                  "acct",
+                                  "quotactl",
+                                  "settimeofday",
+                                  "clock_settime",
+                                  "adjtimex",
+                                  "iopl",
+                                  "ioperm",
+                                  "syslog",
+                                  "sethostname",
+                                  "setdomainname",
+                                  "mknod",
+                                  "mknodat",
+                                  "move_mount",
+                                  "open_tree",
+                                  "fsopen",
+                                  "fsconfig",
+                                  "fsmount",
+                                  "fspick"};
+constexpr const char* kNeverAlone[] = {"execve",
+                                       "execveat",
+                                       "fork",
+                                       "vfork",
+                                       "socket",
+                                       "socketpair",
+                                       "connect",
+                                       "bind",
+                                       "listen",
+                                       "accept",
+                                       "accept4",
+                                       "sendto",
+                                       "sendmsg",
+                                       "kill",
+                                       "tkill",
+                                       "pidfd_open",
+                                       "pidfd_send_signal",
+                                       "pidfd_getfd"};
 
 void bound_calls(const Sandbox& sandbox) {
-  const std::unique_ptr<void, void (*)(scmp_filter_ctx)> filter(seccomp_init(SCMP_ACT_ALLOW), seccomp_release);
+  const std::unique_ptr<void, void (*)(scmp_filter_ctx)> filter(seccomp_init(SCMP_ACT_ALLOW),
+                                                                seccomp_release);
   if (!filter) fail("seccomp");
   const auto refuse = [&](const char* name) {
     const int number = seccomp_syscall_resolve_name(name);
@@ -122,7 +223,9 @@ bool has_seccomp() { return seccomp_api_get() >= 2 && prctl(PR_GET_SECCOMP, 0, 0
 }  // namespace
 
 std::string missing_for_sandbox() {
-  if (landlock_version() == 0) return "the kernel has no Landlock (Linux 5.13 and later have it, unless it is left out of lsm= at boot)";
+  if (landlock_version() == 0)
+    return "the kernel has no Landlock (Linux 5.13 and later have it, unless it is left out of "
+           "lsm= at boot)";
   if (!has_seccomp()) return "the kernel has no seccomp filters";
   return "";
 }

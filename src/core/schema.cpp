@@ -1,7 +1,8 @@
 // Reads the embedded .lcm texts into schemas and computes LCM's fingerprints.
 //
-// The fingerprint's rules are those of lcm-gen 1.5: a hash over the members' names, primitive types and dimensions; a
-// struct adds the hashes of the types it holds and is then rotated left by one bit.
+// The fingerprint's rules are those of lcm-gen 1.5: a hash over the members' names, primitive types
+// and dimensions; a struct adds the hashes of the types it holds and is then rotated left by one
+// bit.
 #include "ruedo/schema.h"
 
 #include <algorithm>
@@ -20,15 +21,16 @@ extern const size_t kLcmSourceCount;
 
 namespace {
 
-constexpr std::array<std::pair<std::string_view, Primitive>, 9> kPrimitives{{{"boolean", Primitive::boolean},
-                                                                            {"byte", Primitive::byte},
-                                                                            {"int8_t", Primitive::int8},
-                                                                            {"int16_t", Primitive::int16},
-                                                                            {"int32_t", Primitive::int32},
-                                                                            {"int64_t", Primitive::int64},
-                                                                            {"float", Primitive::float32},
-                                                                            {"double", Primitive::float64},
-                                                                            {"string", Primitive::string}}};
+constexpr std::array<std::pair<std::string_view, Primitive>, 9> kPrimitives{
+    {{"boolean", Primitive::boolean},
+     {"byte", Primitive::byte},
+     {"int8_t", Primitive::int8},
+     {"int16_t", Primitive::int16},
+     {"int32_t", Primitive::int32},
+     {"int64_t", Primitive::int64},
+     {"float", Primitive::float32},
+     {"double", Primitive::float64},
+     {"string", Primitive::string}}};
 
 // Words and single punctuation characters, without comments.
 class Tokens {
@@ -47,7 +49,10 @@ class Tokens {
   }
 
  private:
-  static bool is_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '.' || c == '-' || c == '+'; }
+  static bool is_word(char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '.' || c == '-' ||
+           c == '+';
+  }
   void skip() {
     while (at_ < text_.size()) {
       if (std::isspace(static_cast<unsigned char>(text_[at_]))) {
@@ -69,7 +74,7 @@ class Tokens {
 // A schema before the types of its members are looked up.
 struct Parsed {
   Schema schema;
-  std::vector<std::string> type_names;    // of each field
+  std::vector<std::string> type_names;  // of each field
   uint64_t hash = 0x12345678;
 };
 
@@ -111,7 +116,8 @@ bool parse_member(Tokens& tokens, std::string_view type, Parsed& parsed) {
       std::from_chars(size.data(), size.data() + size.size(), dimension.size);
     } else {
       const auto& fields = parsed.schema.fields;
-      const auto counter = std::find_if(fields.begin(), fields.end(), [&](const Field& f) { return f.name == size; });
+      const auto counter = std::find_if(fields.begin(), fields.end(),
+                                        [&](const Field& f) { return f.name == size; });
       if (counter == fields.end()) throw std::logic_error("unknown length " + std::string(size));
       dimension.counted_by = static_cast<int>(counter - fields.begin());
     }
@@ -133,28 +139,32 @@ void parse_file(std::string_view text, std::deque<Parsed>& all) {
     for (token = tokens.next(); token != "}"; token = tokens.next()) {
       if (token.empty()) throw std::logic_error("no end of " + parsed.schema.name);
       if (token == "const") {
-        while (tokens.next() != ";") {}
+        while (tokens.next() != ";") {
+        }
         continue;
       }
-      while (parse_member(tokens, token, parsed)) {}
+      while (parse_member(tokens, token, parsed)) {
+      }
     }
     all.push_back(std::move(parsed));
   }
 }
 
 struct Registry {
-  std::vector<Schema> schemas;    // by name
+  std::vector<Schema> schemas;  // by name
   std::map<int64_t, const Schema*> by_fingerprint;
 
   Registry() {
     std::deque<Parsed> parsed;
     for (size_t i = 0; i < kLcmSourceCount; ++i) parse_file(kLcmSources[i], parsed);
-    std::sort(parsed.begin(), parsed.end(), [](const Parsed& a, const Parsed& b) { return a.schema.name < b.schema.name; });
+    std::sort(parsed.begin(), parsed.end(),
+              [](const Parsed& a, const Parsed& b) { return a.schema.name < b.schema.name; });
     for (const Parsed& p : parsed) schemas.push_back(p.schema);
     for (size_t i = 0; i < schemas.size(); ++i) {
       for (size_t f = 0; f < schemas[i].fields.size(); ++f) {
         Field& field = schemas[i].fields[f];
-        if (field.primitive == Primitive::none) field.type = find(without_package(parsed[i].type_names[f]));
+        if (field.primitive == Primitive::none)
+          field.type = find(without_package(parsed[i].type_names[f]));
       }
     }
     for (size_t i = 0; i < schemas.size(); ++i) {
@@ -164,18 +174,23 @@ struct Registry {
   }
 
   const Schema* find(std::string_view name) const {
-    const auto at = std::lower_bound(schemas.begin(), schemas.end(), name, [](const Schema& s, std::string_view n) { return s.name < n; });
+    const auto at =
+        std::lower_bound(schemas.begin(), schemas.end(), name,
+                         [](const Schema& s, std::string_view n) { return s.name < n; });
     return at != schemas.end() && at->name == name ? &*at : nullptr;
   }
 
  private:
-  static std::string_view without_package(std::string_view type) { return type.substr(type.rfind('.') + 1); }
+  static std::string_view without_package(std::string_view type) {
+    return type.substr(type.rfind('.') + 1);
+  }
 
   // No type of ours holds itself, so the recursion ends.
   uint64_t fingerprint(size_t index, const std::deque<Parsed>& parsed) const {
     uint64_t hash = parsed[index].hash;
     for (const Field& field : schemas[index].fields) {
-      if (field.type != nullptr) hash += fingerprint(static_cast<size_t>(field.type - schemas.data()), parsed);
+      if (field.type != nullptr)
+        hash += fingerprint(static_cast<size_t>(field.type - schemas.data()), parsed);
     }
     return (hash << 1) + (hash >> 63);
   }

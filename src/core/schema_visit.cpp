@@ -1,5 +1,5 @@
-// Walks through the bytes of a message by its schema. The bytes are hostile: every length is checked against what is
-// there before it is believed.
+// Walks through the bytes of a message by its schema. The bytes are hostile: every length is
+// checked against what is there before it is believed.
 #include <bit>
 #include <charconv>
 
@@ -13,7 +13,9 @@ namespace {
 constexpr int kMaxDepth = 16;
 
 // What is always there of a value: of a string its length, which the text follows.
-size_t fixed_size(Primitive primitive) { return primitive == Primitive::string ? 4 : wire_size(primitive); }
+size_t fixed_size(Primitive primitive) {
+  return primitive == Primitive::string ? 4 : wire_size(primitive);
+}
 
 uint64_t big_endian(const uint8_t* bytes, size_t size) {
   uint64_t value = 0;
@@ -21,7 +23,8 @@ uint64_t big_endian(const uint8_t* bytes, size_t size) {
   return value;
 }
 
-// The fewest bytes that a value of this type takes on the wire; bounds the count of elements of hostile arrays.
+// The fewest bytes that a value of this type takes on the wire; bounds the count of elements of
+// hostile arrays.
 size_t least_size(const Field& field, int depth) {
   if (field.primitive == Primitive::string) return 5;
   if (field.primitive != Primitive::none) return fixed_size(field.primitive);
@@ -29,7 +32,8 @@ size_t least_size(const Field& field, int depth) {
   size_t sum = 0;
   for (const Field& member : field.type->fields) {
     size_t count = 1;
-    for (const Dimension& d : member.dimensions) count *= d.counted_by < 0 ? static_cast<size_t>(d.size) : 0;
+    for (const Dimension& d : member.dimensions)
+      count *= d.counted_by < 0 ? static_cast<size_t>(d.size) : 0;
     sum += count * least_size(member, depth + 1);
   }
   return sum;
@@ -46,7 +50,8 @@ class Walk {
     std::vector<int64_t> counts(schema.fields.size(), 0);
     for (size_t i = 0; i < schema.fields.size(); ++i) {
       const Field& field = schema.fields[i];
-      if (visitor_ != nullptr) path_.parts.push_back({&field, std::vector<int64_t>(field.dimensions.size(), 0)});
+      if (visitor_ != nullptr)
+        path_.parts.push_back({&field, std::vector<int64_t>(field.dimensions.size(), 0)});
       if (!elements(field, counts, 0, depth)) return false;
       if (visitor_ != nullptr) path_.parts.pop_back();
       counts[i] = last_integer_;
@@ -62,7 +67,8 @@ class Walk {
   }
 
  private:
-  bool elements(const Field& field, const std::vector<int64_t>& counts, size_t dimension, int depth) {
+  bool elements(const Field& field, const std::vector<int64_t>& counts, size_t dimension,
+                int depth) {
     if (dimension == field.dimensions.size()) return value(field, depth);
     const Dimension& d = field.dimensions[dimension];
     const int64_t count = d.counted_by < 0 ? d.size : counts[static_cast<size_t>(d.counted_by)];
@@ -70,8 +76,8 @@ class Walk {
     const size_t least = least_size(field, depth);
     if (least > 0 && static_cast<uint64_t>(count) > (bytes_.size() - at_) / least) return false;
     // Without a visitor, numbers need no look at each.
-    if (visitor_ == nullptr && dimension + 1 == field.dimensions.size() && field.primitive != Primitive::none &&
-        field.primitive != Primitive::string) {
+    if (visitor_ == nullptr && dimension + 1 == field.dimensions.size() &&
+        field.primitive != Primitive::none && field.primitive != Primitive::string) {
       return skip(static_cast<size_t>(count) * fixed_size(field.primitive));
     }
     for (int64_t i = 0; i < count && !ended_; ++i) {
@@ -83,7 +89,8 @@ class Walk {
 
   bool value(const Field& field, int depth) {
     if (ended_) return true;
-    if (field.primitive == Primitive::none) return field.type != nullptr && fields(*field.type, depth + 1);
+    if (field.primitive == Primitive::none)
+      return field.type != nullptr && fields(*field.type, depth + 1);
     const size_t size = fixed_size(field.primitive);
     if (bytes_.size() - at_ < size) return false;
     const uint64_t raw = big_endian(bytes_.data() + at_, size);
@@ -95,7 +102,8 @@ class Walk {
       case Primitive::int16: return give(int64_t{static_cast<int16_t>(raw)});
       case Primitive::int32: return give(int64_t{static_cast<int32_t>(raw)});
       case Primitive::int64: return give(static_cast<int64_t>(raw));
-      case Primitive::float32: return give(double{std::bit_cast<float>(static_cast<uint32_t>(raw))});
+      case Primitive::float32:
+        return give(double{std::bit_cast<float>(static_cast<uint32_t>(raw))});
       case Primitive::float64: return give(std::bit_cast<double>(raw));
       case Primitive::string: return text(static_cast<int32_t>(raw));
       case Primitive::none: break;
@@ -108,7 +116,7 @@ class Walk {
     const auto length = static_cast<size_t>(length_with_zero);
     if (bytes_.size() - at_ < length || bytes_[at_ + length - 1] != 0) return false;
     const std::string_view text(reinterpret_cast<const char*>(bytes_.data()) + at_, length - 1);
-    if (text.find('\0') != text.npos) return false;    // whoever encodes it again would end there
+    if (text.find('\0') != text.npos) return false;  // whoever encodes it again would end there
     at_ += length;
     return give(text);
   }
@@ -151,7 +159,9 @@ bool visit_message(const Schema& schema, std::span<const uint8_t> message, const
   return walk(schema, message, &visitor);
 }
 
-bool well_formed(const Schema& schema, std::span<const uint8_t> message) { return walk(schema, message, nullptr); }
+bool well_formed(const Schema& schema, std::span<const uint8_t> message) {
+  return walk(schema, message, nullptr);
+}
 
 std::string FieldPath::str() const {
   std::string text;
@@ -176,9 +186,12 @@ std::string to_string(const FieldValue& value) {
   return std::visit(
       [](const auto& v) -> std::string {
         using T = std::decay_t<decltype(v)>;
-        if constexpr (std::is_same_v<T, bool>) return v ? "true" : "false";
-        else if constexpr (std::is_same_v<T, std::string_view>) return '"' + std::string(v) + '"';
-        else return number_text(v);
+        if constexpr (std::is_same_v<T, bool>)
+          return v ? "true" : "false";
+        else if constexpr (std::is_same_v<T, std::string_view>)
+          return '"' + std::string(v) + '"';
+        else
+          return number_text(v);
       },
       value);
 }

@@ -14,7 +14,7 @@
 namespace ruedo {
 namespace {
 
-constexpr int64_t kMostBytes = int64_t{4} << 30;    // of a file that a world was made from
+constexpr int64_t kMostBytes = int64_t{4} << 30;  // of a file that a world was made from
 
 class Digest {
  public:
@@ -35,7 +35,9 @@ class Digest {
   }
 
  private:
-  struct Free { void operator()(EVP_MD_CTX* context) const { EVP_MD_CTX_free(context); } };
+  struct Free {
+    void operator()(EVP_MD_CTX* context) const { EVP_MD_CTX_free(context); }
+  };
   std::unique_ptr<EVP_MD_CTX, Free> context_{EVP_MD_CTX_new()};
 };
 
@@ -48,16 +50,21 @@ std::string sha256(const uint8_t* data, size_t size) {
 }
 
 std::string sha256_of_file(const std::string& path) {
-  struct Close { void operator()(std::FILE* file) const { std::fclose(file); } };
+  struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
   // Not blocking: to open a FIFO would wait for its writer. What is looked at is what was opened.
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   if (descriptor < 0) return "";
   const std::unique_ptr<std::FILE, Close> file(::fdopen(descriptor, "rb"));
-  struct stat info {};
-  if (!file || ::fstat(descriptor, &info) != 0 || !S_ISREG(info.st_mode) || info.st_size > kMostBytes) return "";
+  struct stat info{};
+  if (!file || ::fstat(descriptor, &info) != 0 || !S_ISREG(info.st_mode) ||
+      info.st_size > kMostBytes)
+    return "";
   Digest digest;
   std::vector<uint8_t> piece(1 << 16);
-  while (const size_t got = std::fread(piece.data(), 1, piece.size(), file.get())) digest.add(piece.data(), got);
+  while (const size_t got = std::fread(piece.data(), 1, piece.size(), file.get()))
+    digest.add(piece.data(), got);
   return std::ferror(file.get()) ? "" : digest.hex();
 }
 

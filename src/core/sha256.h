@@ -1,4 +1,5 @@
-// SHA-256 (FIPS 180-4), for the hashes of a run's files in its log; `sha256sum FILE` prints the same digits.
+// SHA-256 (FIPS 180-4), for the hashes of a run's files in its log; `sha256sum FILE` prints the
+// same digits.
 #pragma once
 
 #include <cstddef>

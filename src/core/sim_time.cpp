@@ -1,5 +1,5 @@
-// Exact rates and the steps at which a device takes its samples. All in integers: 128 bits hold the products
-// of a million hours at a megahertz.
+// Exact rates and the steps at which a device takes its samples. All in integers: 128 bits hold the
+// products of a million hours at a megahertz.
 #include "ruedo/sim_time.h"
 
 #include <cassert>
@@ -29,7 +29,8 @@ bool is_digit(char c) { return c >= '0' && c <= '9'; }
 }  // namespace
 
 Rate Rate::parse(std::string_view text) {
-  constexpr const char* kForm = "allowed is a decimal number from 0 to 1000000 Hz with at most nine decimals";
+  constexpr const char* kForm =
+      "allowed is a decimal number from 0 to 1000000 Hz with at most nine decimals";
   size_t at = !text.empty() && text[0] == '+' ? 1 : 0;
   // digits * 10^exponent
   int64_t digits = 0;
@@ -41,7 +42,8 @@ Rate Rate::parse(std::string_view text) {
       continue;
     }
     any = true;
-    if (digits >= 100'000'000'000'000'000) {    // 18 digits: no more fit; zeros at the end mean nothing
+    if (digits >=
+        100'000'000'000'000'000) {  // 18 digits: no more fit; zeros at the end mean nothing
       if (text[at] != '0') refuse(text, kForm);
       if (!point) ++exponent;
       continue;
@@ -73,7 +75,8 @@ Rate Rate::parse(std::string_view text) {
     if (digits > kMaxRateHz) refuse(text, "above 1000000 Hz");
     digits *= 10;
   }
-  if (static_cast<Wide>(digits) > static_cast<Wide>(kMaxRateHz) * denominator) refuse(text, "above 1000000 Hz");
+  if (static_cast<Wide>(digits) > static_cast<Wide>(kMaxRateHz) * denominator)
+    refuse(text, "above 1000000 Hz");
   const int64_t common = std::gcd(digits, denominator);
   return {digits / common, denominator / common};
 }
@@ -90,7 +93,8 @@ int64_t SampleClock::step_of(int64_t sample) const {
   // The first s with s * step >= phase + sample * 1e6 * denominator / numerator.
   const Wide time_times_rate = static_cast<Wide>(phase_us_) * rate_.numerator +
                                static_cast<Wide>(sample) * rate_.denominator * kMicrosPerSecond;
-  return static_cast<int64_t>(ceil_div(time_times_rate, static_cast<Wide>(rate_.numerator) * step_us_));
+  return static_cast<int64_t>(
+      ceil_div(time_times_rate, static_cast<Wide>(rate_.numerator) * step_us_));
 }
 
 int64_t SampleClock::samples_before(int64_t step) const {
@@ -102,8 +106,9 @@ int64_t SampleClock::samples_before(int64_t step) const {
   // Samples whose time is at most that of the step before.
   const Wide time = static_cast<Wide>(step - 1) * step_us_ - phase_us_;
   if (time < 0) return 0;
-  return static_cast<int64_t>(
-             floor_div(time * rate_.numerator, static_cast<Wide>(rate_.denominator) * kMicrosPerSecond)) + 1;
+  return static_cast<int64_t>(floor_div(time * rate_.numerator,
+                                        static_cast<Wide>(rate_.denominator) * kMicrosPerSecond)) +
+         1;
 }
 
 }  // namespace ruedo

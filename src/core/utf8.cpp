@@ -9,25 +9,31 @@ namespace {
 
 // Bytes of the UTF-8 character that begins there; 0 where none does.
 size_t character_size(std::string_view text) {
-  const auto byte = [&](size_t i) { return i < text.size() ? static_cast<uint8_t>(text[i]) : uint8_t{0}; };
+  const auto byte = [&](size_t i) {
+    return i < text.size() ? static_cast<uint8_t>(text[i]) : uint8_t{0};
+  };
   const auto follows = [&](size_t i) { return (byte(i) & 0xc0) == 0x80; };
   const uint8_t first = byte(0), second = byte(1);
   if (first < 0x80) return 1;
   if (first >= 0xc2 && first < 0xe0) return follows(1) ? 2 : 0;
-  if (first >= 0xe0 && first < 0xf0) {    // neither longer than needed nor a half of a UTF-16 pair
-    const bool fits = follows(1) && (first != 0xe0 || second >= 0xa0) && (first != 0xed || second < 0xa0);
+  if (first >= 0xe0 && first < 0xf0) {  // neither longer than needed nor a half of a UTF-16 pair
+    const bool fits =
+        follows(1) && (first != 0xe0 || second >= 0xa0) && (first != 0xed || second < 0xa0);
     return fits && follows(2) ? 3 : 0;
   }
   if (first < 0xf0 || first > 0xf4) return 0;
-  const bool fits = follows(1) && (first != 0xf0 || second >= 0x90) && (first != 0xf4 || second < 0x90);
+  const bool fits =
+      follows(1) && (first != 0xf0 || second >= 0x90) && (first != 0xf4 || second < 0x90);
   return fits && follows(2) && follows(3) ? 4 : 0;
 }
 
-// Whether the character is one of the codes U+0000 to U+001F or U+007F to U+009F, but no line end or tab.
+// Whether the character is one of the codes U+0000 to U+001F or U+007F to U+009F, but no line end
+// or tab.
 bool is_control(std::string_view character) {
   const auto byte = [&](size_t i) { return static_cast<uint8_t>(character[i]); };
   if (character.size() == 2) return byte(0) == 0xc2 && byte(1) < 0xa0;
-  return character.size() == 1 && (byte(0) < 0x20 || byte(0) == 0x7f) && byte(0) != '\n' && byte(0) != '\t';
+  return character.size() == 1 && (byte(0) < 0x20 || byte(0) == 0x7f) && byte(0) != '\n' &&
+         byte(0) != '\t';
 }
 
 std::string cleaned(std::string_view text, bool of_controls) {
@@ -36,8 +42,10 @@ std::string cleaned(std::string_view text, bool of_controls) {
   while (!text.empty()) {
     const size_t size = character_size(text);
     const std::string_view character = text.substr(0, size);
-    if (size == 0 || (of_controls && is_control(character))) result += '?';
-    else result += character;
+    if (size == 0 || (of_controls && is_control(character)))
+      result += '?';
+    else
+      result += character;
     text.remove_prefix(std::max<size_t>(1, size));
   }
   return result;

@@ -1,5 +1,6 @@
-// The one way from a floating-point number to a whole one. A bare cast of what does not fit is undefined: it gives the most
-// negative number, and a loop that counts up from there never ends. tests/walls.py finds casts that go round this file.
+// The one way from a floating-point number to a whole one. A bare cast of what does not fit is
+// undefined: it gives the most negative number, and a loop that counts up from there never ends.
+// tests/walls.py finds casts that go round this file.
 #pragma once
 
 #include <cmath>
@@ -25,11 +26,17 @@ Whole whole(double value) {
 
 // The nearest whole number, the one below, the one above.
 template <std::integral Whole = int64_t>
-Whole rounded(double value) { return whole<Whole>(std::round(value)); }
+Whole rounded(double value) {
+  return whole<Whole>(std::round(value));
+}
 template <std::integral Whole = int64_t>
-Whole rounded_down(double value) { return whole<Whole>(std::floor(value)); }
+Whole rounded_down(double value) {
+  return whole<Whole>(std::floor(value));
+}
 template <std::integral Whole = int64_t>
-Whole rounded_up(double value) { return whole<Whole>(std::ceil(value)); }
+Whole rounded_up(double value) {
+  return whole<Whole>(std::ceil(value));
+}
 
 // Seconds as whole microseconds, the nearest.
 inline int64_t microseconds(double seconds) { return rounded(seconds * 1e6); }

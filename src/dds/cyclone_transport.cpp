@@ -30,8 +30,8 @@ using ros2::Endpoint;
 using ros2::Gid;
 using ros2::Role;
 
-constexpr uint32_t kLastDomain = 232;    // ports of higher ones do not exist
-constexpr int kMostTaken = 64;           // samples at once
+constexpr uint32_t kLastDomain = 232;  // ports of higher ones do not exist
+constexpr int kMostTaken = 64;         // samples at once
 
 struct QosDeleter {
   void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
@@ -39,14 +39,16 @@ struct QosDeleter {
 using QosPointer = std::unique_ptr<dds_qos_t, QosDeleter>;
 
 dds_entity_t checked(dds_entity_t result, const std::string& what) {
-  if (result < 0) throw EnvironmentError(fmt::format("ROS 2: {}: {}", what, dds_strretcode(-result)));
+  if (result < 0)
+    throw EnvironmentError(fmt::format("ROS 2: {}: {}", what, dds_strretcode(-result)));
   return result;
 }
 
 Gid gid_of(dds_entity_t entity) {
   dds_guid_t guid{};
   Gid gid{};
-  if (dds_get_guid(entity, &guid) == DDS_RETCODE_OK) std::copy(std::begin(guid.v), std::end(guid.v), gid.begin());
+  if (dds_get_guid(entity, &guid) == DDS_RETCODE_OK)
+    std::copy(std::begin(guid.v), std::end(guid.v), gid.begin());
   return gid;
 }
 
@@ -65,15 +67,19 @@ QosPointer qos_of(const Endpoint& endpoint) {
   QosPointer qos(dds_create_qos());
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, wanted.depth);
   // Nobody waits for a slow reader: what it has no room for is dropped.
-  dds_qset_reliability(qos.get(), wanted.reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, 0);
-  dds_qset_durability(qos.get(), wanted.transient_local ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
+  dds_qset_reliability(qos.get(),
+                       wanted.reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, 0);
+  dds_qset_durability(
+      qos.get(), wanted.transient_local ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   if (wanted.transient_local) {
-    dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, wanted.depth, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
+    dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, wanted.depth,
+                                DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
   }
   dds_qset_writer_data_lifecycle(qos.get(), false);
   dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
-  const std::string user_data = (endpoint.service.empty() ? "" : "serviceid=" + endpoint.service + ";") +
-                                (endpoint.hash.empty() ? "" : "typehash=" + endpoint.hash + ";");
+  const std::string user_data =
+      (endpoint.service.empty() ? "" : "serviceid=" + endpoint.service + ";") +
+      (endpoint.hash.empty() ? "" : "typehash=" + endpoint.hash + ";");
   if (!user_data.empty()) dds_qset_userdata(qos.get(), user_data.data(), user_data.size());
   return qos;
 }
@@ -82,26 +88,32 @@ QosPointer qos_of(const Endpoint& endpoint) {
 std::string peer_element(std::string_view address) {
   std::string text;
   for (const char c : address) {
-    if (c == '&') text += "&amp;";
-    else if (c == '<') text += "&lt;";
-    else if (c == '"') text += "&quot;";
-    else text += c;
+    if (c == '&')
+      text += "&amp;";
+    else if (c == '<')
+      text += "&lt;";
+    else if (c == '"')
+      text += "&quot;";
+    else
+      text += c;
   }
   return "<Peer Address=\"" + text + "\"/>";
 }
 
-// All nodes of this machine, and no other: multicast goes over the loopback interface alone, which finds those that listen to
-// multicast on whatever interface; those that do without it, as ROS's LOCALHOST has it, are asked one by one. The other interfaces
-// are named because Cyclone takes a node for unreachable whose address is on none of its own.
+// All nodes of this machine, and no other: multicast goes over the loopback interface alone, which
+// finds those that listen to multicast on whatever interface; those that do without it, as ROS's
+// LOCALHOST has it, are asked one by one. The other interfaces are named because Cyclone takes a
+// node for unreachable whose address is on none of its own.
 std::string local_interfaces() {
-  constexpr size_t kMost = 3;    // Cyclone has room for four
+  constexpr size_t kMost = 3;  // Cyclone has room for four
   std::string text = "<NetworkInterface address=\"127.0.0.1\" multicast=\"true\"/>";
   ifaddrs* list = nullptr;
   if (getifaddrs(&list) != 0) return text;
   size_t count = 0;
   std::set<std::string> names;
   for (const ifaddrs* each = list; each && count < kMost; each = each->ifa_next) {
-    const bool usable = each->ifa_addr && each->ifa_addr->sa_family == AF_INET && (each->ifa_flags & IFF_UP) && !(each->ifa_flags & IFF_LOOPBACK);
+    const bool usable = each->ifa_addr && each->ifa_addr->sa_family == AF_INET &&
+                        (each->ifa_flags & IFF_UP) && !(each->ifa_flags & IFF_LOOPBACK);
     if (!usable || !names.insert(each->ifa_name).second) continue;
     text += fmt::format("<NetworkInterface name=\"{}\" multicast=\"false\"/>", each->ifa_name);
     ++count;
@@ -114,10 +126,14 @@ std::string configuration(const CycloneOptions& options) {
   std::string general, peers;
   switch (options.range) {
     case Range::off:
-      general = "<Interfaces><NetworkInterface address=\"127.0.0.1\" multicast=\"false\"/></Interfaces><AllowMulticast>false</AllowMulticast>";
+      general =
+          "<Interfaces><NetworkInterface address=\"127.0.0.1\" "
+          "multicast=\"false\"/></Interfaces><AllowMulticast>false</AllowMulticast>";
       break;
     case Range::localhost:
-      general = "<Interfaces>" + local_interfaces() + "</Interfaces><AllowMulticast>spdp</AllowMulticast><MulticastTimeToLive>0</MulticastTimeToLive>";
+      general = "<Interfaces>" + local_interfaces() +
+                "</Interfaces><AllowMulticast>spdp</AllowMulticast><MulticastTimeToLive>0</"
+                "MulticastTimeToLive>";
       peers = peer_element("127.0.0.1");
       break;
     case Range::subnet:
@@ -125,13 +141,18 @@ std::string configuration(const CycloneOptions& options) {
   }
   for (size_t begin = 0; begin < options.static_peers.size();) {
     const size_t end = std::min(options.static_peers.find(';', begin), options.static_peers.size());
-    if (end > begin) peers += peer_element(std::string_view(options.static_peers).substr(begin, end - begin));
+    if (end > begin)
+      peers += peer_element(std::string_view(options.static_peers).substr(begin, end - begin));
     begin = end + 1;
   }
   // Pictures go in few datagrams; the cache of a writer is bounded by its depth alone.
   return "<CycloneDDS><Domain Id=\"any\"><General>" + general +
          "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>60000B</FragmentSize></General>"
-         "<Discovery>" + (peers.empty() ? "" : "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>119</MaxAutoParticipantIndex><Peers>" + peers + "</Peers>") +
+         "<Discovery>" +
+         (peers.empty() ? ""
+                        : "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>119</"
+                          "MaxAutoParticipantIndex><Peers>" +
+                              peers + "</Peers>") +
          "</Discovery><Internal><Watermarks><WhcHigh>1GB</WhcHigh></Watermarks></Internal>"
          "<Tracing><Verbosity>none</Verbosity></Tracing></Domain></CycloneDDS>";
 }
@@ -140,8 +161,11 @@ class CycloneWriter : public ros2::Writer {
  public:
   CycloneWriter(dds_entity_t participant, const Endpoint& endpoint) {
     const std::string name = dds_topic(endpoint);
-    topic_ = checked(create_raw_topic(participant, name.c_str(), ros2::dds_type(endpoint.topic.type).c_str(), &type_), "topic " + name);
-    writer_ = checked(dds_create_writer(participant, topic_, qos_of(endpoint).get(), nullptr), "writer of " + name);
+    topic_ = checked(create_raw_topic(participant, name.c_str(),
+                                      ros2::dds_type(endpoint.topic.type).c_str(), &type_),
+                     "topic " + name);
+    writer_ = checked(dds_create_writer(participant, topic_, qos_of(endpoint).get(), nullptr),
+                      "writer of " + name);
   }
   ~CycloneWriter() override {
     dds_delete(writer_);
@@ -154,7 +178,9 @@ class CycloneWriter : public ros2::Writer {
   }
   size_t readers() const override {
     dds_publication_matched_status_t status{};
-    return dds_get_publication_matched_status(writer_, &status) == DDS_RETCODE_OK ? status.current_count : 0;
+    return dds_get_publication_matched_status(writer_, &status) == DDS_RETCODE_OK
+               ? status.current_count
+               : 0;
   }
   Gid gid() const override { return gid_of(writer_); }
 
@@ -165,14 +191,21 @@ class CycloneWriter : public ros2::Writer {
 
 class CycloneReader : public ros2::Reader {
  public:
-  CycloneReader(dds_entity_t participant, dds_entity_t waitset, const Endpoint& endpoint, ros2::Transport::Handler handler)
+  CycloneReader(dds_entity_t participant, dds_entity_t waitset, const Endpoint& endpoint,
+                ros2::Transport::Handler handler)
       : waitset_(waitset), name_(endpoint.topic.name), handler_(std::move(handler)) {
     const std::string name = dds_topic(endpoint);
     const ddsi_sertype* type = nullptr;
-    topic_ = checked(create_raw_topic(participant, name.c_str(), ros2::dds_type(endpoint.topic.type).c_str(), &type), "topic " + name);
-    reader_ = checked(dds_create_reader(participant, topic_, qos_of(endpoint).get(), nullptr), "reader of " + name);
-    checked(dds_set_status_mask(reader_, DDS_DATA_AVAILABLE_STATUS | DDS_REQUESTED_INCOMPATIBLE_QOS_STATUS), "reader of " + name);
-    checked(dds_waitset_attach(waitset_, reader_, reinterpret_cast<dds_attach_t>(this)), "reader of " + name);
+    topic_ = checked(create_raw_topic(participant, name.c_str(),
+                                      ros2::dds_type(endpoint.topic.type).c_str(), &type),
+                     "topic " + name);
+    reader_ = checked(dds_create_reader(participant, topic_, qos_of(endpoint).get(), nullptr),
+                      "reader of " + name);
+    checked(dds_set_status_mask(reader_,
+                                DDS_DATA_AVAILABLE_STATUS | DDS_REQUESTED_INCOMPATIBLE_QOS_STATUS),
+            "reader of " + name);
+    checked(dds_waitset_attach(waitset_, reader_, reinterpret_cast<dds_attach_t>(this)),
+            "reader of " + name);
   }
   ~CycloneReader() override {
     dds_waitset_detach(waitset_, reader_);
@@ -183,13 +216,16 @@ class CycloneReader : public ros2::Reader {
   Gid gid() const override { return gid_of(reader_); }
   size_t writers() const override {
     dds_subscription_matched_status_t status{};
-    return dds_get_subscription_matched_status(reader_, &status) == DDS_RETCODE_OK ? status.current_count : 0;
+    return dds_get_subscription_matched_status(reader_, &status) == DDS_RETCODE_OK
+               ? status.current_count
+               : 0;
   }
 
   // The transport's thread.
   void take() {
     uint32_t status = 0;
-    dds_take_status(reader_, &status, DDS_DATA_AVAILABLE_STATUS | DDS_REQUESTED_INCOMPATIBLE_QOS_STATUS);
+    dds_take_status(reader_, &status,
+                    DDS_DATA_AVAILABLE_STATUS | DDS_REQUESTED_INCOMPATIBLE_QOS_STATUS);
     if (status & DDS_REQUESTED_INCOMPATIBLE_QOS_STATUS) tell_incompatible();
     ddsi_serdata* samples[kMostTaken];
     dds_sample_info_t infos[kMostTaken];
@@ -205,7 +241,10 @@ class CycloneReader : public ros2::Reader {
  private:
   void tell_incompatible() {
     if (std::exchange(told_, true)) return;
-    spdlog::warn("ROS 2: somebody publishes on {} with a QoS that a reliable reader does not get (best effort): it is not heard", name_);
+    spdlog::warn(
+        "ROS 2: somebody publishes on {} with a QoS that a reliable reader does not get (best "
+        "effort): it is not heard",
+        name_);
   }
 
   dds_entity_t waitset_, topic_ = 0, reader_ = 0;
@@ -217,14 +256,17 @@ class CycloneReader : public ros2::Reader {
 class CycloneTransport : public ros2::Transport {
  public:
   explicit CycloneTransport(const CycloneOptions& options) : options_(options) {
-    domain_ = checked(dds_create_domain(options.domain, (configuration(options) + options.more).c_str()), fmt::format("domain {}", options.domain));
+    domain_ =
+        checked(dds_create_domain(options.domain, (configuration(options) + options.more).c_str()),
+                fmt::format("domain {}", options.domain));
     QosPointer qos(dds_create_qos());
     constexpr char kEnclave[] = "enclave=/;";
     dds_qset_userdata(qos.get(), kEnclave, sizeof kEnclave - 1);
     participant_ = dds_create_participant(options.domain, qos.get(), nullptr);
     if (participant_ < 0) {
       dds_delete(domain_);
-      throw EnvironmentError(fmt::format("ROS 2: no participant in domain {}: {}", options.domain, dds_strretcode(-participant_)));
+      throw EnvironmentError(fmt::format("ROS 2: no participant in domain {}: {}", options.domain,
+                                         dds_strretcode(-participant_)));
     }
     waitset_ = dds_create_waitset(participant_);
     wake_ = dds_create_guardcondition(participant_);
@@ -235,7 +277,9 @@ class CycloneTransport : public ros2::Transport {
     dds_delete(domain_);
   }
 
-  std::unique_ptr<ros2::Writer> add_writer(const Endpoint& endpoint) override { return std::make_unique<CycloneWriter>(participant_, endpoint); }
+  std::unique_ptr<ros2::Writer> add_writer(const Endpoint& endpoint) override {
+    return std::make_unique<CycloneWriter>(participant_, endpoint);
+  }
   std::unique_ptr<ros2::Reader> add_reader(const Endpoint& endpoint, Handler handler) override {
     return std::make_unique<CycloneReader>(participant_, waitset_, endpoint, std::move(handler));
   }
@@ -252,8 +296,10 @@ class CycloneTransport : public ros2::Transport {
 
   Gid gid() const override { return gid_of(participant_); }
   std::string where() const override {
-    constexpr const char* kRanges[] = {"discovery off", "this machine only", "the subnet", "as Cyclone DDS is configured"};
-    return fmt::format("domain {}, {}", options_.domain, kRanges[static_cast<size_t>(options_.range)]);
+    constexpr const char* kRanges[] = {"discovery off", "this machine only", "the subnet",
+                                       "as Cyclone DDS is configured"};
+    return fmt::format("domain {}, {}", options_.domain,
+                       kRanges[static_cast<size_t>(options_.range)]);
   }
   uint64_t refused() const override { return refused_samples(); }
 
@@ -284,25 +330,35 @@ std::string environment(const char* name) {
 CycloneOptions options_from_environment() {
   CycloneOptions options;
   if (const std::string text = environment("ROS_DOMAIN_ID"); !text.empty()) {
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), options.domain);
+    const auto [end, error] =
+        std::from_chars(text.data(), text.data() + text.size(), options.domain);
     if (error != std::errc() || end != text.data() + text.size() || options.domain > kLastDomain) {
-      throw InputError({}, fmt::format("ROS_DOMAIN_ID is '{}'; 0 to {} is allowed", text, kLastDomain));
+      throw InputError({},
+                       fmt::format("ROS_DOMAIN_ID is '{}'; 0 to {} is allowed", text, kLastDomain));
     }
   }
   const std::string range = environment("ROS_AUTOMATIC_DISCOVERY_RANGE");
-  const std::map<std::string, Range> ranges{{"", Range::localhost}, {"OFF", Range::off}, {"LOCALHOST", Range::localhost},
-                                            {"SUBNET", Range::subnet}, {"SYSTEM_DEFAULT", Range::system_default}};
+  const std::map<std::string, Range> ranges{{"", Range::localhost},
+                                            {"OFF", Range::off},
+                                            {"LOCALHOST", Range::localhost},
+                                            {"SUBNET", Range::subnet},
+                                            {"SYSTEM_DEFAULT", Range::system_default}};
   const auto known = ranges.find(range);
   if (known == ranges.end()) {
-    throw InputError({}, "ROS_AUTOMATIC_DISCOVERY_RANGE is '" + range + "'; OFF, LOCALHOST, SUBNET and SYSTEM_DEFAULT are allowed");
+    throw InputError({}, "ROS_AUTOMATIC_DISCOVERY_RANGE is '" + range +
+                             "'; OFF, LOCALHOST, SUBNET and SYSTEM_DEFAULT are allowed");
   }
   options.range = known->second;
   // As with any program over Cyclone DDS: what it says goes before what Ruedo says.
-  if (const std::string more = environment("CYCLONEDDS_URI"); !more.empty()) options.more = "," + more;
-  if (options.range != Range::system_default && options.range != Range::off) options.static_peers = environment("ROS_STATIC_PEERS");
+  if (const std::string more = environment("CYCLONEDDS_URI"); !more.empty())
+    options.more = "," + more;
+  if (options.range != Range::system_default && options.range != Range::off)
+    options.static_peers = environment("ROS_STATIC_PEERS");
   return options;
 }
 
-std::unique_ptr<ros2::Transport> open_cyclone(const CycloneOptions& options) { return std::make_unique<CycloneTransport>(options); }
+std::unique_ptr<ros2::Transport> open_cyclone(const CycloneOptions& options) {
+  return std::make_unique<CycloneTransport>(options);
+}
 
 }  // namespace ruedo::dds

@@ -1,4 +1,5 @@
-// The operations that Cyclone DDS asks of a type, for one that has no keys and whose samples are bytes.
+// The operations that Cyclone DDS asks of a type, for one that has no keys and whose samples are
+// bytes.
 #include "dds/raw_type.h"
 
 #include <algorithm>
@@ -18,8 +19,8 @@ std::atomic<uint64_t> refused{0};
 struct RawType : ddsi_sertype {};
 
 struct RawSample : ddsi_serdata {
-  std::vector<uint8_t> bytes;    // with CDR's header, filled up to a multiple of four
-  size_t size = 0;               // without what fills up
+  std::vector<uint8_t> bytes;  // with CDR's header, filled up to a multiple of four
+  size_t size = 0;             // without what fills up
 };
 
 RawSample* new_sample(const ddsi_sertype* type, ddsi_serdata_kind kind, size_t size) {
@@ -30,10 +31,14 @@ RawSample* new_sample(const ddsi_sertype* type, ddsi_serdata_kind kind, size_t s
   return sample;
 }
 
-const RawSample& as_raw(const ddsi_serdata* sample) { return *static_cast<const RawSample*>(sample); }
+const RawSample& as_raw(const ddsi_serdata* sample) {
+  return *static_cast<const RawSample*>(sample);
+}
 
 bool equal_keys(const ddsi_serdata*, const ddsi_serdata*) { return true; }
-uint32_t size_of(const ddsi_serdata* sample) { return static_cast<uint32_t>(as_raw(sample).bytes.size()); }
+uint32_t size_of(const ddsi_serdata* sample) {
+  return static_cast<uint32_t>(as_raw(sample).bytes.size());
+}
 void free_sample(ddsi_serdata* sample) { delete static_cast<RawSample*>(sample); }
 
 bool is_too_large(ddsi_serdata_kind kind, size_t size) {
@@ -43,20 +48,24 @@ bool is_too_large(ddsi_serdata_kind kind, size_t size) {
 }
 
 // Fragments come in the order of their offsets and may overlap.
-ddsi_serdata* from_fragments(const ddsi_sertype* type, ddsi_serdata_kind kind, const nn_rdata* fragment, size_t size) {
+ddsi_serdata* from_fragments(const ddsi_sertype* type, ddsi_serdata_kind kind,
+                             const nn_rdata* fragment, size_t size) {
   if (is_too_large(kind, size)) return nullptr;
   RawSample* sample = new_sample(type, kind, size);
   uint32_t done = 0;
   for (; fragment; fragment = fragment->nextfrag) {
     if (fragment->maxp1 <= done || fragment->min > done || fragment->maxp1 > size) continue;
-    const unsigned char* payload = NN_RMSG_PAYLOADOFF(fragment->rmsg, NN_RDATA_PAYLOAD_OFF(fragment));
-    std::memcpy(sample->bytes.data() + done, payload + (done - fragment->min), fragment->maxp1 - done);
+    const unsigned char* payload =
+        NN_RMSG_PAYLOADOFF(fragment->rmsg, NN_RDATA_PAYLOAD_OFF(fragment));
+    std::memcpy(sample->bytes.data() + done, payload + (done - fragment->min),
+                fragment->maxp1 - done);
     done = fragment->maxp1;
   }
   return sample;
 }
 
-ddsi_serdata* from_pieces(const ddsi_sertype* type, ddsi_serdata_kind kind, ddsrt_msg_iovlen_t count, const ddsrt_iovec_t* pieces, size_t size) {
+ddsi_serdata* from_pieces(const ddsi_sertype* type, ddsi_serdata_kind kind,
+                          ddsrt_msg_iovlen_t count, const ddsrt_iovec_t* pieces, size_t size) {
   if (is_too_large(kind, size)) return nullptr;
   RawSample* sample = new_sample(type, kind, size);
   size_t done = 0;
@@ -68,17 +77,22 @@ ddsi_serdata* from_pieces(const ddsi_sertype* type, ddsi_serdata_kind kind, ddsr
   return sample;
 }
 
-ddsi_serdata* from_keyhash(const ddsi_sertype* type, const ddsi_keyhash*) { return new_sample(type, SDK_KEY, 0); }
+ddsi_serdata* from_keyhash(const ddsi_sertype* type, const ddsi_keyhash*) {
+  return new_sample(type, SDK_KEY, 0);
+}
 
 // Only Cyclone itself calls these two with samples of this type: to make an instance of no key.
-ddsi_serdata* from_sample(const ddsi_sertype* type, ddsi_serdata_kind kind, const void*) { return new_sample(type, kind, 0); }
+ddsi_serdata* from_sample(const ddsi_sertype* type, ddsi_serdata_kind kind, const void*) {
+  return new_sample(type, kind, 0);
+}
 bool to_sample(const ddsi_serdata*, void*, void**, void*) { return true; }
 
 void to_bytes(const ddsi_serdata* sample, size_t offset, size_t size, void* out) {
   std::memcpy(out, as_raw(sample).bytes.data() + offset, size);
 }
 
-ddsi_serdata* lend_bytes(const ddsi_serdata* sample, size_t offset, size_t size, ddsrt_iovec_t* out) {
+ddsi_serdata* lend_bytes(const ddsi_serdata* sample, size_t offset, size_t size,
+                         ddsrt_iovec_t* out) {
   out->iov_base = const_cast<uint8_t*>(as_raw(sample).bytes.data() + offset);
   out->iov_len = size;
   return ddsi_serdata_ref(sample);
@@ -90,7 +104,9 @@ ddsi_serdata* without_type(const ddsi_serdata* sample) {
   copy->type = nullptr;
   return copy;
 }
-bool untyped_to_sample(const ddsi_sertype*, const ddsi_serdata*, void*, void**, void*) { return true; }
+bool untyped_to_sample(const ddsi_sertype*, const ddsi_serdata*, void*, void**, void*) {
+  return true;
+}
 
 size_t print(const ddsi_sertype*, const ddsi_serdata*, char* out, size_t size) {
   return size == 0 ? 0 : (out[0] = 0, 0);
@@ -123,7 +139,9 @@ void free_type(ddsi_sertype* type) {
 }
 // Called for types of one name and these operations alone.
 bool equal_types(const ddsi_sertype*, const ddsi_sertype*) { return true; }
-uint32_t hash_type(const ddsi_sertype* type) { return static_cast<uint32_t>(std::hash<std::string_view>{}(type->type_name)); }
+uint32_t hash_type(const ddsi_sertype* type) {
+  return static_cast<uint32_t>(std::hash<std::string_view>{}(type->type_name));
+}
 
 ddsi_sertype_ops type_operations() {
   ddsi_sertype_ops ops{};
@@ -139,12 +157,15 @@ const ddsi_sertype_ops kTypeOperations = type_operations();
 
 }  // namespace
 
-dds_entity_t create_raw_topic(dds_entity_t participant, const char* topic, const char* type, const ddsi_sertype** sample_type) {
+dds_entity_t create_raw_topic(dds_entity_t participant, const char* topic, const char* type,
+                              const ddsi_sertype** sample_type) {
   auto* raw = new RawType{};
-  ddsi_sertype_init_flags(raw, type, &kTypeOperations, &kSampleOperations, DDSI_SERTYPE_FLAG_TOPICKIND_NO_KEY);
+  ddsi_sertype_init_flags(raw, type, &kTypeOperations, &kSampleOperations,
+                          DDSI_SERTYPE_FLAG_TOPICKIND_NO_KEY);
   raw->allowed_data_representation = DDS_DATA_REPRESENTATION_FLAG_XCDR1;
   ddsi_sertype* used = raw;
-  const dds_entity_t entity = dds_create_topic_sertype(participant, topic, &used, nullptr, nullptr, nullptr);
+  const dds_entity_t entity =
+      dds_create_topic_sertype(participant, topic, &used, nullptr, nullptr, nullptr);
   if (entity < 0) ddsi_sertype_unref(raw);
   *sample_type = used;
   return entity;
@@ -153,7 +174,8 @@ dds_entity_t create_raw_topic(dds_entity_t participant, const char* topic, const
 ddsi_serdata* make_sample(const ddsi_sertype* type, std::span<const uint8_t> bytes) {
   RawSample* sample = new_sample(type, SDK_DATA, bytes.size());
   std::memcpy(sample->bytes.data(), bytes.data(), bytes.size());
-  sample->bytes[3] = static_cast<uint8_t>(sample->bytes.size() - bytes.size());    // how many bytes fill up
+  sample->bytes[3] =
+      static_cast<uint8_t>(sample->bytes.size() - bytes.size());  // how many bytes fill up
   return sample;
 }
 

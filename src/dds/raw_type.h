@@ -1,4 +1,5 @@
-// A type of Cyclone DDS whose samples are CDR bytes as they go over the wire: no generated code, no copy through a struct.
+// A type of Cyclone DDS whose samples are CDR bytes as they go over the wire: no generated code, no
+// copy through a struct.
 #pragma once
 
 #include <cstddef>
@@ -15,8 +16,10 @@ namespace ruedo::dds {
 // Samples that come in and are larger are dropped, and counted.
 inline constexpr size_t kMostReceived = size_t{1} << 20;
 
-// A topic with that name and that type's name, and the type for its samples, which lives as long. Negative: Cyclone's error.
-dds_entity_t create_raw_topic(dds_entity_t participant, const char* topic, const char* type, const ddsi_sertype** sample_type);
+// A topic with that name and that type's name, and the type for its samples, which lives as long.
+// Negative: Cyclone's error.
+dds_entity_t create_raw_topic(dds_entity_t participant, const char* topic, const char* type,
+                              const ddsi_sertype** sample_type);
 
 // A sample of that topic's type to be written by dds_writecdr(), which takes it over.
 ddsi_serdata* make_sample(const ddsi_sertype* type, std::span<const uint8_t> bytes);

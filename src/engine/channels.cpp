@@ -18,20 +18,26 @@ int Channels::add(Channel channel) {
     if (name == channel.name) channel.bus_name = bus_name;
   }
   if (channel.bus_name.empty() || channel.bus_name.size() > kMaxChannelName) {
-    throw InputError({}, "channel '" + channel.bus_name + "' has " + std::to_string(channel.bus_name.size()) +
-                             " characters; 1 to " + std::to_string(kMaxChannelName) +
-                             " are allowed: give the robot or the device a shorter name, or use --remap");
+    throw InputError(
+        {}, "channel '" + channel.bus_name + "' has " + std::to_string(channel.bus_name.size()) +
+                " characters; 1 to " + std::to_string(kMaxChannelName) +
+                " are allowed: give the robot or the device a shorter name, or use --remap");
   }
-  const auto free = [&](const Channel& old) { return old.gone && old.type == channel.type && old.input == channel.input; };
+  const auto free = [&](const Channel& old) {
+    return old.gone && old.type == channel.type && old.input == channel.input;
+  };
   auto place = channels_.end();
-  if (by_bus_name_.size() < channels_.size()) {    // some are gone; nobody looks for them while a world is loaded
-    place = std::find_if(channels_.begin(), channels_.end(), [&](const Channel& old) { return free(old) && old.name == channel.name; });
+  if (by_bus_name_.size() <
+      channels_.size()) {  // some are gone; nobody looks for them while a world is loaded
+    place = std::find_if(channels_.begin(), channels_.end(),
+                         [&](const Channel& old) { return free(old) && old.name == channel.name; });
     if (place == channels_.end()) place = std::find_if(channels_.begin(), channels_.end(), free);
   }
   const int index = static_cast<int>(place - channels_.begin());
   if (const auto [other, added] = by_bus_name_.try_emplace(channel.bus_name, index); !added) {
-    throw InputError({}, "two channels are called '" + channel.bus_name + "': '" + channels_[static_cast<size_t>(other->second)].name +
-                             "' and '" + channel.name + "'");
+    throw InputError({}, "two channels are called '" + channel.bus_name + "': '" +
+                             channels_[static_cast<size_t>(other->second)].name + "' and '" +
+                             channel.name + "'");
   }
   if (place == channels_.end()) {
     channels_.push_back(std::move(channel));
@@ -55,7 +61,8 @@ void Channels::check_remaps() const {
   for (const auto& [name, bus_name] : remaps_) {
     if (std::find(names.begin(), names.end(), name) != names.end()) continue;
     const std::string near = nearest_word(name, names);
-    throw InputError({}, "--remap: there is no channel '" + name + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?"));
+    throw InputError({}, "--remap: there is no channel '" + name + "'" +
+                             (near.empty() ? "" : "; did you mean '" + near + "'?"));
   }
 }
 

@@ -1,4 +1,5 @@
-// The channels of a run: which there are, what they carry, and under which names they go over the bus.
+// The channels of a run: which there are, what they carry, and under which names they go over the
+// bus.
 #pragma once
 
 #include <cstdint>
@@ -11,31 +12,34 @@
 
 namespace ruedo::engine {
 
-inline constexpr size_t kMaxChannelName = 63;    // LCM's limit
+inline constexpr size_t kMaxChannelName = 63;  // LCM's limit
 
 struct Channel {
-  std::string name;          // "p3at/LRF"
-  std::string bus_name;      // after --remap
-  std::string robot;         // "" for the simulation's
-  std::string device;        // "" for commands
-  std::string type;          // "planar_lidar_t"
+  std::string name;      // "p3at/LRF"
+  std::string bus_name;  // after --remap
+  std::string robot;     // "" for the simulation's
+  std::string device;    // "" for commands
+  std::string type;      // "planar_lidar_t"
   int64_t fingerprint = 0;
-  Rate rate;                 // 0: every step, or when something happens
-  bool input = false;        // clients publish on it
-  bool gone = false;         // its robot was removed; the next channel of the type takes its place
+  Rate rate;           // 0: every step, or when something happens
+  bool input = false;  // clients publish on it
+  bool gone = false;   // its robot was removed; the next channel of the type takes its place
 };
 
 class Channels {
  public:
   // remaps: pairs of a channel's name and its name on the bus.
-  explicit Channels(std::vector<std::pair<std::string, std::string>> remaps = {}) : remaps_(std::move(remaps)) {}
+  explicit Channels(std::vector<std::pair<std::string, std::string>> remaps = {})
+      : remaps_(std::move(remaps)) {}
 
   // Returns the channel's index. Throws InputError for a name that is too long or taken.
   int add(Channel channel);
 
   template <class Message>
-  int add(const std::string& name, const std::string& robot, const std::string& device, Rate rate, bool input = false) {
-    return add({name, name, robot, device, Message::getTypeName(), Message::getHash(), rate, input});
+  int add(const std::string& name, const std::string& robot, const std::string& device, Rate rate,
+          bool input = false) {
+    return add(
+        {name, name, robot, device, Message::getTypeName(), Message::getHash(), rate, input});
   }
 
   const std::vector<Channel>& list() const { return channels_; }
@@ -54,12 +58,12 @@ class Channels {
  private:
   std::vector<std::pair<std::string, std::string>> remaps_;
   std::vector<Channel> channels_;
-  std::unordered_map<std::string, int> by_bus_name_;    // looked up only, never walked through
+  std::unordered_map<std::string, int> by_bus_name_;  // looked up only, never walked through
 };
 
 // The channels of the simulation itself, but for ruedo/world, which its module announces.
 struct SimulationChannels {
-  int tick = -1, info = -1, request = -1, reply = -1;    // request and reply: -1 without control
+  int tick = -1, info = -1, request = -1, reply = -1;  // request and reply: -1 without control
 };
 inline constexpr Rate kTickRate{10, 1}, kInfoRate{1, 1};
 SimulationChannels add_simulation_channels(Channels& channels, bool control);

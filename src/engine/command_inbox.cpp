@@ -34,7 +34,8 @@ std::string check_fault_message(const uint8_t* data, size_t size, model::Fault& 
 
 }  // namespace
 
-DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size, robot::Command& command) {
+DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size,
+                           robot::Command& command) {
   DecodeFault fault = DecodeFault::none;
   switch (kind) {
     case Input::Kind::velocity: {
@@ -42,12 +43,14 @@ DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size, r
       if (fingerprint_of({data, size}) == pose_t::getHash()) {
         pose_t pose;
         fault = decode_checked(data, size, pose);
-        if (fault == DecodeFault::none) command.what = robot::VelocityCommand{pose.vel[0], pose.vel[1], pose.rotation_rate[2]};
+        if (fault == DecodeFault::none)
+          command.what = robot::VelocityCommand{pose.vel[0], pose.vel[1], pose.rotation_rate[2]};
         break;
       }
       velocity_command_t message;
       fault = decode_checked(data, size, message);
-      if (fault == DecodeFault::none) command.what = robot::VelocityCommand{message.vx, message.vy, message.omega};
+      if (fault == DecodeFault::none)
+        command.what = robot::VelocityCommand{message.vx, message.vy, message.omega};
       break;
     }
     case Input::Kind::wheels: {
@@ -60,8 +63,9 @@ DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size, r
       move_command_t message;
       fault = decode_checked(data, size, message);
       if (fault == DecodeFault::none) {
-        command.what = robot::MoveCommand{message.id,    message.kind,         message.value,       message.radius,
-                                          message.speed, message.acceleration, message.deceleration};
+        command.what = robot::MoveCommand{message.id,          message.kind,  message.value,
+                                          message.radius,      message.speed, message.acceleration,
+                                          message.deceleration};
       }
       break;
     }
@@ -69,12 +73,13 @@ DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size, r
       joint_command_t message;
       fault = decode_checked(data, size, message);
       if (fault == DecodeFault::none) {
-        command.what = robot::JointCommand{std::move(message.name), {message.mode.begin(), message.mode.end()},
+        command.what = robot::JointCommand{std::move(message.name),
+                                           {message.mode.begin(), message.mode.end()},
                                            std::move(message.value)};
       }
       break;
     }
-    case Input::Kind::fault: {    // it is no command of a robot's: apply() takes the bytes
+    case Input::Kind::fault: {  // it is no command of a robot's: apply() takes the bytes
       fault_t message;
       fault = decode_checked(data, size, message);
       break;
@@ -91,13 +96,18 @@ DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size, r
 
 bool is_finite(const robot::Command& command) {
   const auto all = [](std::span<const double> values) {
-    return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+    return std::all_of(values.begin(), values.end(),
+                       [](double value) { return std::isfinite(value); });
   };
   struct Values {
     decltype(all)& finite;
-    bool operator()(const robot::VelocityCommand& c) const { return finite({{c.vx, c.vy, c.omega}}); }
+    bool operator()(const robot::VelocityCommand& c) const {
+      return finite({{c.vx, c.vy, c.omega}});
+    }
     bool operator()(const robot::WheelCommand& c) const { return finite(c.rates); }
-    bool operator()(const robot::MoveCommand& c) const { return finite({{c.value, c.radius, c.speed, c.acceleration, c.deceleration}}); }
+    bool operator()(const robot::MoveCommand& c) const {
+      return finite({{c.value, c.radius, c.speed, c.acceleration, c.deceleration}});
+    }
     bool operator()(const robot::JointCommand& c) const { return finite(c.values); }
     bool operator()(const robot::ResetOdometry&) const { return true; }
   };
@@ -105,7 +115,9 @@ bool is_finite(const robot::Command& command) {
 }
 
 CommandInbox::CommandInbox(std::vector<Input> inputs, int robots)
-    : inputs_(std::move(inputs)), reset_input_(static_cast<size_t>(robots), -1), slots_(static_cast<size_t>(robots)) {
+    : inputs_(std::move(inputs)),
+      reset_input_(static_cast<size_t>(robots), -1),
+      slots_(static_cast<size_t>(robots)) {
   for (size_t i = 0; i < inputs_.size(); ++i) listen(static_cast<int>(i));
   waiting_.reserve(slots_.size());
 }
@@ -125,7 +137,9 @@ void CommandInbox::add(const std::vector<Input>& inputs, int robots) {
   slots_.resize(static_cast<size_t>(robots));
   for (const Input& input : inputs) {
     // A robot in the place of one that was removed has the same inputs.
-    auto at = std::find_if(inputs_.begin(), inputs_.end(), [&](const Input& old) { return old.robot == input.robot && old.kind == input.kind; });
+    auto at = std::find_if(inputs_.begin(), inputs_.end(), [&](const Input& old) {
+      return old.robot == input.robot && old.kind == input.kind;
+    });
     if (at == inputs_.end()) at = inputs_.insert(at, input);
     at->channel = input.channel;
     listen(static_cast<int>(at - inputs_.begin()));
@@ -143,7 +157,8 @@ void CommandInbox::remove(int robot) {
   std::erase(waiting_, robot);
   const auto is_of = [robot](const Entry& entry) { return entry.command.robot == robot; };
   const auto end = scheduled_.begin() + static_cast<std::ptrdiff_t>(scheduled_count_);
-  const auto kept = std::stable_partition(scheduled_.begin(), end, [&](const Entry& entry) { return !is_of(entry); });
+  const auto kept = std::stable_partition(scheduled_.begin(), end,
+                                          [&](const Entry& entry) { return !is_of(entry); });
   for (auto entry = kept; entry != end; ++entry) scheduled_bytes_ -= entry->bytes.size();
   scheduled_count_ = static_cast<size_t>(kept - scheduled_.begin());
   std::make_heap(scheduled_.begin(), kept, later);
@@ -166,7 +181,8 @@ void CommandInbox::receive(const std::string& channel, const uint8_t* data, size
   if (fault != DecodeFault::none) return refuse(channel, describe(fault));
   if (input.kind == Input::Kind::fault) {
     model::Fault asked;
-    if (const std::string why = check_fault_message(data, size, asked); !why.empty()) return refuse(channel, why.c_str());
+    if (const std::string why = check_fault_message(data, size, asked); !why.empty())
+      return refuse(channel, why.c_str());
   }
   keep(found->second, command, data, size);
 }
@@ -196,18 +212,27 @@ void CommandInbox::keep(int input, robot::Command& command, const uint8_t* data,
   entry.bytes.assign(data, data + size);
 }
 
-bool CommandInbox::later(const Entry& a, const Entry& b) { return std::tie(a.step, a.arrival) > std::tie(b.step, b.arrival); }
+bool CommandInbox::later(const Entry& a, const Entry& b) {
+  return std::tie(a.step, a.arrival) > std::tie(b.step, b.arrival);
+}
 
-CommandInbox::Scheduled CommandInbox::schedule(int64_t step, int input, const uint8_t* data, size_t size) {
-  if (input < 0 || static_cast<size_t>(input) >= inputs_.size() || size > kMaxMessageSize) return Scheduled::faulty;
+CommandInbox::Scheduled CommandInbox::schedule(int64_t step, int input, const uint8_t* data,
+                                               size_t size) {
+  if (input < 0 || static_cast<size_t>(input) >= inputs_.size() || size > kMaxMessageSize)
+    return Scheduled::faulty;
   robot::Command command;
   command.robot = inputs_[static_cast<size_t>(input)].robot;
-  if (decode_command(inputs_[static_cast<size_t>(input)].kind, data, size, command) != DecodeFault::none) return Scheduled::faulty;
+  if (decode_command(inputs_[static_cast<size_t>(input)].kind, data, size, command) !=
+      DecodeFault::none)
+    return Scheduled::faulty;
   model::Fault asked;
-  if (inputs_[static_cast<size_t>(input)].kind == Input::Kind::fault && !check_fault_message(data, size, asked).empty()) return Scheduled::faulty;
+  if (inputs_[static_cast<size_t>(input)].kind == Input::Kind::fault &&
+      !check_fault_message(data, size, asked).empty())
+    return Scheduled::faulty;
   std::lock_guard lock(mutex_);
   if (step < next_step_) return Scheduled::late;
-  if (scheduled_count_ == kMostScheduled || scheduled_bytes_ + size > kMostScheduledBytes) return Scheduled::full;
+  if (scheduled_count_ == kMostScheduled || scheduled_bytes_ + size > kMostScheduledBytes)
+    return Scheduled::full;
   if (scheduled_count_ == scheduled_.size()) scheduled_.emplace_back();
   Entry& entry = scheduled_[scheduled_count_++];
   entry.step = step;
@@ -216,7 +241,8 @@ CommandInbox::Scheduled CommandInbox::schedule(int64_t step, int input, const ui
   std::swap(entry.command, command);
   entry.bytes.assign(data, data + size);
   scheduled_bytes_ += size;
-  std::push_heap(scheduled_.begin(), scheduled_.begin() + static_cast<std::ptrdiff_t>(scheduled_count_), later);
+  std::push_heap(scheduled_.begin(),
+                 scheduled_.begin() + static_cast<std::ptrdiff_t>(scheduled_count_), later);
   return Scheduled::kept;
 }
 
@@ -238,30 +264,36 @@ void CommandInbox::apply(robot::Robots& robots, Faults& faults, int64_t step, Ba
   {
     std::lock_guard lock(mutex_);
     next_step_ = step + 1;
-    // Buffers are swapped, never copied, and what is taken leaves its buffers behind for what comes.
+    // Buffers are swapped, never copied, and what is taken leaves its buffers behind for what
+    // comes.
     for (; scheduled_count_ > 0 && scheduled_.front().step <= step; ++scheduled) {
-      std::pop_heap(scheduled_.begin(), scheduled_.begin() + static_cast<std::ptrdiff_t>(scheduled_count_), later);
+      std::pop_heap(scheduled_.begin(),
+                    scheduled_.begin() + static_cast<std::ptrdiff_t>(scheduled_count_), later);
       Entry& entry = scheduled_[--scheduled_count_];
       scheduled_bytes_ -= entry.bytes.size();
       std::swap(next_taken(count), entry);
     }
     for (int robot : waiting_) {
       Slots& slots = slots_[static_cast<size_t>(robot)];
-      for (size_t i = 0; i < slots.size; ++i) std::swap(next_taken(count), slots.entries[(slots.first + i) % kKeptPerRobot]);
+      for (size_t i = 0; i < slots.size; ++i)
+        std::swap(next_taken(count), slots.entries[(slots.first + i) % kKeptPerRobot]);
       slots.size = 0;
     }
     waiting_.clear();
   }
-  std::sort(taken_.begin() + static_cast<std::ptrdiff_t>(scheduled), taken_.begin() + static_cast<std::ptrdiff_t>(count),
+  std::sort(taken_.begin() + static_cast<std::ptrdiff_t>(scheduled),
+            taken_.begin() + static_cast<std::ptrdiff_t>(count),
             [](const Entry& a, const Entry& b) { return a.arrival < b.arrival; });
   for (size_t i = 0; i < count; ++i) {
     if (inputs_[static_cast<size_t>(taken_[i].input)].kind == Input::Kind::fault) {
       model::Fault fault;
-      if (check_fault_message(taken_[i].bytes.data(), taken_[i].bytes.size(), fault).empty()) faults.begin(fault, taken_[i].command.robot, step);
+      if (check_fault_message(taken_[i].bytes.data(), taken_[i].bytes.size(), fault).empty())
+        faults.begin(fault, taken_[i].command.robot, step);
     } else {
       faults.command(taken_[i].command, step, robots);
     }
-    if (static_cast<size_t>(batch.applied_count) == batch.applied.size()) batch.applied.emplace_back();
+    if (static_cast<size_t>(batch.applied_count) == batch.applied.size())
+      batch.applied.emplace_back();
     AppliedCommand& applied = batch.applied[static_cast<size_t>(batch.applied_count++)];
     applied.step = step;
     applied.input = taken_[i].input;

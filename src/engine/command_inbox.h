@@ -1,8 +1,9 @@
-// Where commands wait for the next step: received by the bus's thread, checked, and taken by the simulation
-// thread at a step boundary.
+// Where commands wait for the next step: received by the bus's thread, checked, and taken by the
+// simulation thread at a step boundary.
 //
-// Bounded: of each robot the newest few are kept, so that a flood costs nothing but the flooder's own commands. Commands
-// for steps to come wait apart from those, and are refused when there is no room.
+// Bounded: of each robot the newest few are kept, so that a flood costs nothing but the flooder's
+// own commands. Commands for steps to come wait apart from those, and are refused when there is no
+// room.
 #pragma once
 
 #include <array>
@@ -13,9 +14,9 @@
 #include <unordered_map>
 #include <vector>
 
+#include "engine/batch.h"
 #include "robot/robots.h"
 #include "ruedo/decode.h"
-#include "engine/batch.h"
 
 namespace ruedo::engine {
 
@@ -24,16 +25,16 @@ class Faults;
 // A channel on which a robot takes commands.
 struct Input {
   enum class Kind { velocity, wheels, move, joints, fault, reset_odometry };
-  std::string channel;    // on the bus
-  int robot = -1;         // index into BodyLayout::robots
+  std::string channel;  // on the bus
+  int robot = -1;       // index into BodyLayout::robots
   Kind kind = Kind::velocity;
 };
 
 class CommandInbox {
  public:
   static constexpr size_t kKeptPerRobot = 4;
-  static constexpr size_t kMaxMessageSize = 65536;    // bytes
-  static constexpr size_t kMostScheduled = 65536;     // commands
+  static constexpr size_t kMaxMessageSize = 65536;  // bytes
+  static constexpr size_t kMostScheduled = 65536;   // commands
   static constexpr size_t kMostScheduledBytes = 32u << 20;
 
   enum class Scheduled { kept, faulty, late, full };
@@ -41,19 +42,22 @@ class CommandInbox {
   // inputs: at most one of each channel but for reset_odometry, which has none of its own.
   CommandInbox(std::vector<Input> inputs, int robots);
 
-  // Checks a message and keeps it; a faulty one is counted, and logged once a second at most. Any thread.
+  // Checks a message and keeps it; a faulty one is counted, and logged once a second at most. Any
+  // thread.
   void receive(const std::string& channel, const uint8_t* data, size_t size);
 
   // Asks for a reset of a robot's odometry, with the request's body for the log. Any thread.
   void reset_odometry(int robot, const std::vector<uint8_t>& body);
 
-  // Keeps a command, as it would come over the bus, that acts on the state of exactly that step: before the live ones
-  // of that step, in the order of scheduling. input: index into inputs(). late: the state was left already; full: no
-  // room before others were applied. A command that is refused changes nothing. Any thread.
+  // Keeps a command, as it would come over the bus, that acts on the state of exactly that step:
+  // before the live ones of that step, in the order of scheduling. input: index into inputs().
+  // late: the state was left already; full: no room before others were applied. A command that is
+  // refused changes nothing. Any thread.
   Scheduled schedule(int64_t step, int input, const uint8_t* data, size_t size);
 
-  // Applies what acts on the state `step` and notes it in the batch: what was scheduled for it, then what waits, in the
-  // order of arrival. The simulation thread's, for one step after the other.
+  // Applies what acts on the state `step` and notes it in the batch: what was scheduled for it,
+  // then what waits, in the order of arrival. The simulation thread's, for one step after the
+  // other.
   void apply(robot::Robots& robots, Faults& faults, int64_t step, Batch& batch);
 
   const std::vector<Input>& inputs() const { return inputs_; }
@@ -67,50 +71,51 @@ class CommandInbox {
   // Robots that come and go; while nothing is received or applied. `inputs` are all of one robot.
   void add(const std::vector<Input>& inputs, int robots);
   void remove(int robot);
-  void begin_time_anew();    // steps count from 0: what was scheduled is dropped
+  void begin_time_anew();  // steps count from 0: what was scheduled is dropped
 
-  uint64_t refused() const { return refused_; }       // faulty messages
-  uint64_t displaced() const { return displaced_; }   // commands that newer ones pushed out
+  uint64_t refused() const { return refused_; }      // faulty messages
+  uint64_t displaced() const { return displaced_; }  // commands that newer ones pushed out
 
  private:
   struct Entry {
-    int64_t step = -1;    // of a scheduled command
+    int64_t step = -1;  // of a scheduled command
     uint64_t arrival = 0;
     int input = -1;
     robot::Command command;
     std::vector<uint8_t> bytes;
   };
-  struct Slots {    // a ring of the newest
+  struct Slots {  // a ring of the newest
     std::array<Entry, kKeptPerRobot> entries;
     size_t first = 0, size = 0;
   };
 
   void listen(int input);
-  Entry& next_entry(int robot);    // with the mutex held
+  Entry& next_entry(int robot);  // with the mutex held
   void keep(int input, robot::Command& command, const uint8_t* data, size_t size);
   void refuse(const std::string& channel, const char* why);
   Entry& next_taken(size_t& count);
-  static bool later(const Entry& a, const Entry& b);    // order of the heap
+  static bool later(const Entry& a, const Entry& b);  // order of the heap
 
   std::vector<Input> inputs_;
-  std::unordered_map<std::string, int> by_channel_;    // looked up only, never walked
-  std::vector<int> reset_input_;                       // of each robot
+  std::unordered_map<std::string, int> by_channel_;  // looked up only, never walked
+  std::vector<int> reset_input_;                     // of each robot
   mutable std::mutex mutex_;
   std::vector<Slots> slots_;
-  std::vector<int> waiting_;                           // robots with entries
+  std::vector<int> waiting_;  // robots with entries
   uint64_t arrivals_ = 0;
-  std::vector<Entry> scheduled_;                       // the first scheduled_count_ are a heap, the next step on top
+  std::vector<Entry> scheduled_;  // the first scheduled_count_ are a heap, the next step on top
   size_t scheduled_count_ = 0, scheduled_bytes_ = 0;
-  int64_t next_step_ = 0;                              // what was applied is all before it
-  std::vector<Entry> taken_;                           // the simulation thread's
+  int64_t next_step_ = 0;     // what was applied is all before it
+  std::vector<Entry> taken_;  // the simulation thread's
   std::atomic<uint64_t> refused_{0}, displaced_{0};
-  int64_t last_warning_ns_ = 0;                        // the bus thread's
+  int64_t last_warning_ns_ = 0;  // the bus thread's
 };
 
 // Whether all of its values are numbers.
 bool is_finite(const robot::Command& command);
 
 // Decodes a command of that kind, or says why not.
-DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size, robot::Command& command);
+DecodeFault decode_command(Input::Kind kind, const uint8_t* data, size_t size,
+                           robot::Command& command);
 
 }  // namespace ruedo::engine

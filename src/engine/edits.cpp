@@ -6,10 +6,10 @@
 #include <filesystem>
 #include <span>
 
-#include "model/placement.h"
-#include "model/read_context.h"
 #include "core/sha256.h"
 #include "engine/world_editor.h"
+#include "model/placement.h"
+#include "model/read_context.h"
 
 namespace ruedo::engine {
 namespace {
@@ -24,40 +24,49 @@ std::string list_of(std::span<const double> values) {
 }
 
 // "": they are all numbers, none beyond `most`.
-std::string fault_of(const char* what, std::span<const double> values, double most, const char* unit) {
+std::string fault_of(const char* what, std::span<const double> values, double most,
+                     const char* unit) {
   for (const double value : values) {
-    if (!std::isfinite(value)) return std::string(what) + " is " + list_of(values) + ": only finite numbers are allowed";
+    if (!std::isfinite(value))
+      return std::string(what) + " is " + list_of(values) + ": only finite numbers are allowed";
     if (std::abs(value) > most) {
-      return std::string(what) + " is " + list_of(values) + ": allowed is up to " + model::shown(most) + " " + unit;
+      return std::string(what) + " is " + list_of(values) + ": allowed is up to " +
+             model::shown(most) + " " + unit;
     }
   }
   return "";
 }
 
 std::string fault_of_pose(const double (&position)[3], const double (&orientation)[4]) {
-  if (std::string fault = fault_of("position", position, kFarthest_m, "m"); !fault.empty()) return fault;
+  if (std::string fault = fault_of("position", position, kFarthest_m, "m"); !fault.empty())
+    return fault;
   double squared = 0.0;
   for (const double part : orientation) squared += part * part;
-  if (!(std::abs(squared - 1.0) <= 2e-3)) {    // not for NaN either
+  if (!(std::abs(squared - 1.0) <= 2e-3)) {  // not for NaN either
     return "orientation is " + list_of(orientation) + ": a unit quaternion w, x, y, z is wanted";
   }
   return "";
 }
 
 Pose pose_of(const double (&position)[3], const double (&orientation)[4]) {
-  return Pose{Quat(orientation[0], orientation[1], orientation[2], orientation[3]).normalized(), Vec3(position[0], position[1], position[2])};
+  return Pose{Quat(orientation[0], orientation[1], orientation[2], orientation[3]).normalized(),
+              Vec3(position[0], position[1], position[2])};
 }
 
 // "": it may be a model's. Names go into channels, logs and terminals.
 std::string fault_of_name(const std::string& name) {
-  if (name.empty() || name.size() > 63) return "has " + std::to_string(name.size()) + " characters; allowed are 1 to 63";
-  const bool fit = std::all_of(name.begin(), name.end(), [](char c) { return c > 0x20 && c < 0x7f && c != '/'; });
+  if (name.empty() || name.size() > 63)
+    return "has " + std::to_string(name.size()) + " characters; allowed are 1 to 63";
+  const bool fit = std::all_of(name.begin(), name.end(),
+                               [](char c) { return c > 0x20 && c < 0x7f && c != '/'; });
   if (!fit) return "is not fit for a channel: letters, digits and signs but '/' are allowed";
   if (name == "ruedo" || name == "world") return "is kept for Ruedo itself; choose another";
   return "";
 }
 
-Outcome unknown(const std::string& name) { return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no model called '" + name + "'"); }
+Outcome unknown(const std::string& name) {
+  return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no model called '" + name + "'");
+}
 
 // Why a model cannot be put elsewhere or pushed; "": it can.
 std::string why_immovable(const Simulation& simulation, int instance) {
@@ -66,7 +75,8 @@ std::string why_immovable(const Simulation& simulation, int instance) {
   const model::BodyLayout& layout = simulation.layout();
   const size_t first = static_cast<size_t>(layout.first_link[static_cast<size_t>(instance)]);
   bool moves = false, stands = false;
-  for (size_t link = first; link < first + model.links.size(); ++link) (layout.links[link].body >= 0 ? moves : stands) = true;
+  for (size_t link = first; link < first + model.links.size(); ++link)
+    (layout.links[link].body >= 0 ? moves : stands) = true;
   for (const model::Joint& joint : model.joints) stands |= joint.parent < 0;
   if (!moves) return "is static: remove it, and spawn it where it should stand";
   return stands ? "is fixed to the world by a joint" : "";
@@ -74,8 +84,10 @@ std::string why_immovable(const Simulation& simulation, int instance) {
 
 Pose link_now(const Simulation& simulation, size_t instance, size_t link) {
   const model::BodyLayout& layout = simulation.layout();
-  const model::LinkPlacement& placement = layout.links[static_cast<size_t>(layout.first_link[instance]) + link];
-  return placement.body < 0 ? placement.X_BL : simulation.physics().pose(placement.body) * placement.X_BL;
+  const model::LinkPlacement& placement =
+      layout.links[static_cast<size_t>(layout.first_link[instance]) + link];
+  return placement.body < 0 ? placement.X_BL
+                            : simulation.physics().pose(placement.body) * placement.X_BL;
 }
 
 }  // namespace
@@ -83,7 +95,8 @@ Pose link_now(const Simulation& simulation, size_t instance, size_t link) {
 model::LoadedModel ModelStore::load(const spawn_request_t& request, model::LoadBudget* budget) {
   std::string key;
   if (request.model.empty()) {
-    key = "text " + sha256(reinterpret_cast<const uint8_t*>(request.text.data()), request.text.size());
+    key = "text " +
+          sha256(reinterpret_cast<const uint8_t*>(request.text.data()), request.text.size());
   } else {
     const std::string path = model::model_file(request.model, world_file_);
     std::error_code error;
@@ -99,38 +112,48 @@ model::LoadedModel ModelStore::load(const spawn_request_t& request, model::LoadB
       if (loaded.model) return loaded;
     }
   }
-  model::LoadedModel loaded = request.model.empty() ? model::load_model_text(request.text, world_file_, budget)
-                                                    : model::load_model(request.model, world_file_, budget);
+  model::LoadedModel loaded = request.model.empty()
+                                  ? model::load_model_text(request.text, world_file_, budget)
+                                  : model::load_model(request.model, world_file_, budget);
   const std::lock_guard lock(mutex_);
   Known& known = known_[key];
   known.model = loaded.model;
   known.rest = loaded;
   known.rest.model.reset();
-  known.rest.files_read.clear();    // the log has them once
+  known.rest.files_read.clear();  // the log has them once
   return loaded;
 }
 
 Outcome check_spawn(const spawn_request_t& request) {
-  if (request.model.empty() == request.text.empty()) return bad("a SPAWN has either a model's name or file, or a text");
-  if (std::string fault = fault_of_pose(request.position, request.orientation); !fault.empty()) return bad(fault);
+  if (request.model.empty() == request.text.empty())
+    return bad("a SPAWN has either a model's name or file, or a text");
+  if (std::string fault = fault_of_pose(request.position, request.orientation); !fault.empty())
+    return bad(fault);
   if (request.name.empty()) return {};
   const std::string fault = fault_of_name(request.name);
   return fault.empty() ? Outcome{} : bad("the name '" + request.name.substr(0, 80) + "' " + fault);
 }
 
-Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, int64_t step, Simulation& simulation,
-              Channels& channels, std::string& name) {
+Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, int64_t step,
+              Simulation& simulation, Channels& channels, std::string& name) {
   const model::WorldModel& world = simulation.world();
   if (world.models.size() >= kMostModels) {
-    return refused("the world has " + std::to_string(kMostModels) + " models, those that were removed included; a reset makes room");
+    return refused("the world has " + std::to_string(kMostModels) +
+                   " models, those that were removed included; a reset makes room");
   }
-  if (!request.name.empty() && find_model(world, request.name) >= 0) return refused("the name '" + request.name + "' is taken");
+  if (!request.name.empty() && find_model(world, request.name) >= 0)
+    return refused("the name '" + request.name + "' is taken");
   name = request.name.empty() ? unused_name(world, loaded.name) : request.name;
-  if (const std::string fault = fault_of_name(name); !fault.empty()) return bad("the model's name '" + name + "' " + fault);
+  if (const std::string fault = fault_of_name(name); !fault.empty())
+    return bad("the model's name '" + name + "' " + fault);
   const Pose X_WM = spawn_pose(world, *loaded.model, request);
-  const auto now = [&](size_t instance, size_t link) { return link_now(simulation, instance, link); };
-  if (const std::string other = model::overlapped(world, *loaded.model, X_WM, now); !other.empty()) {
-    return refused("there is no room for '" + name + "' at " + list_of({{X_WM.translation.x(), X_WM.translation.y(), X_WM.translation.z()}}) +
+  const auto now = [&](size_t instance, size_t link) {
+    return link_now(simulation, instance, link);
+  };
+  if (const std::string other = model::overlapped(world, *loaded.model, X_WM, now);
+      !other.empty()) {
+    return refused("there is no room for '" + name + "' at " +
+                   list_of({{X_WM.translation.x(), X_WM.translation.y(), X_WM.translation.z()}}) +
                    ": it would stand in '" + other + "'");
   }
   try {
@@ -153,26 +176,34 @@ Outcome remove(const std::string& name, Simulation& simulation, Channels& channe
 }
 
 Outcome set_pose(const set_pose_request_t& request, Simulation& simulation) {
-  if (const std::string fault = fault_of_pose(request.position, request.orientation); !fault.empty()) return bad(fault);
+  if (const std::string fault = fault_of_pose(request.position, request.orientation);
+      !fault.empty())
+    return bad(fault);
   const int instance = find_model(simulation.world(), request.name);
   if (instance < 0) return unknown(request.name);
-  if (const std::string why = why_immovable(simulation, instance); !why.empty()) return refused("'" + request.name + "' " + why);
+  if (const std::string why = why_immovable(simulation, instance); !why.empty())
+    return refused("'" + request.name + "' " + why);
   simulation.robots().set_pose(instance, pose_of(request.position, request.orientation));
   return {};
 }
 
 Outcome set_twist(const set_twist_request_t& request, Simulation& simulation) {
-  if (const std::string fault = fault_of("linear", request.linear, kFastest_m_s, "m/s"); !fault.empty()) return bad(fault);
-  if (const std::string fault = fault_of("angular", request.angular, kFastest_rad_s, "rad/s"); !fault.empty()) return bad(fault);
+  if (const std::string fault = fault_of("linear", request.linear, kFastest_m_s, "m/s");
+      !fault.empty())
+    return bad(fault);
+  if (const std::string fault = fault_of("angular", request.angular, kFastest_rad_s, "rad/s");
+      !fault.empty())
+    return bad(fault);
   const int instance = find_model(simulation.world(), request.name);
   if (instance < 0) return unknown(request.name);
   std::string why = why_immovable(simulation, instance);
   const model::Model& model = *simulation.world().models[static_cast<size_t>(instance)].model;
-  const bool kinematic = std::any_of(model.links.begin(), model.links.end(), [](const model::Link& link) { return link.kinematic; });
+  const bool kinematic = std::any_of(model.links.begin(), model.links.end(),
+                                     [](const model::Link& link) { return link.kinematic; });
   if (why.empty() && model.drive) why = "has a drive: send it a velocity command";
   if (why.empty() && kinematic) why = "is kinematic: it stays where it is put";
   if (!why.empty()) return refused("'" + request.name + "' " + why);
-  const auto vec = [](const double (&v)[3]) { return Vec3(v[0], v[1], v[2]); };
+  const auto vec = [](const double(&v)[3]) { return Vec3(v[0], v[1], v[2]); };
   simulation.robots().set_twist(instance, {vec(request.linear), vec(request.angular)});
   return {};
 }
@@ -180,7 +211,8 @@ Outcome set_twist(const set_twist_request_t& request, Simulation& simulation) {
 void reset_poses(Simulation& simulation) {
   const std::vector<model::ModelInstance>& models = simulation.world().models;
   for (size_t i = 0; i < models.size(); ++i) {
-    if (!models[i].removed && !models[i].model->is_static) simulation.robots().start_again(static_cast<int>(i));
+    if (!models[i].removed && !models[i].model->is_static)
+      simulation.robots().start_again(static_cast<int>(i));
   }
 }
 

@@ -1,8 +1,9 @@
 // Changes of the world that requests ask for: models come and go, are put elsewhere, are pushed.
 //
-// Each function checks a request's body and carries it out on a simulation that stands still; the effect is on the state
-// that was computed last. The same body on the same state does the same, so a log needs no more than the bodies: a name
-// that is left to the server, and the height of the ground, follow from the state.
+// Each function checks a request's body and carries it out on a simulation that stands still; the
+// effect is on the state that was computed last. The same body on the same state does the same, so
+// a log needs no more than the bodies: a name that is left to the server, and the height of the
+// ground, follow from the state.
 #pragma once
 
 #include <functional>
@@ -12,20 +13,21 @@
 #include <string>
 #include <vector>
 
+#include "engine/outcome.h"
+#include "engine/simulation.h"
 #include "model/load_model.h"
 #include "ruedo/set_pose_request_t.hpp"
 #include "ruedo/set_twist_request_t.hpp"
 #include "ruedo/spawn_request_t.hpp"
-#include "engine/outcome.h"
-#include "engine/simulation.h"
 
 namespace ruedo::engine {
 
-inline constexpr double kFarthest_m = 1e6, kFastest_m_s = 1e3, kFastest_rad_s = 1e4;    // that a request may ask for
-inline constexpr size_t kMostModels = 10'000;    // of a world, the places of removed ones included
+inline constexpr double kFarthest_m = 1e6, kFastest_m_s = 1e3,
+                        kFastest_rad_s = 1e4;  // that a request may ask for
+inline constexpr size_t kMostModels = 10'000;  // of a world, the places of removed ones included
 
-// Models that came with requests. A file that was not touched since, or the same text, is read once as long as any model
-// of a world is of it. Thread safe.
+// Models that came with requests. A file that was not touched since, or the same text, is read once
+// as long as any model of a world is of it. Thread safe.
 class ModelStore {
  public:
   explicit ModelStore(std::string world_file) : world_file_(std::move(world_file)) {}
@@ -35,7 +37,7 @@ class ModelStore {
  private:
   struct Known {
     std::weak_ptr<const model::Model> model;
-    model::LoadedModel rest;    // without the model
+    model::LoadedModel rest;  // without the model
   };
   std::string world_file_;
   std::mutex mutex_;
@@ -48,8 +50,8 @@ std::string unused_name(const model::WorldModel& world, const std::string& name)
 // What can be said before the model is read; OK: nothing is wrong.
 Outcome check_spawn(const spawn_request_t& request);
 // step: of the first state that shows it. name: becomes the model's.
-Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, int64_t step, Simulation& simulation,
-              Channels& channels, std::string& name);
+Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, int64_t step,
+              Simulation& simulation, Channels& channels, std::string& name);
 Outcome remove(const std::string& name, Simulation& simulation, Channels& channels);
 Outcome set_pose(const set_pose_request_t& request, Simulation& simulation);
 Outcome set_twist(const set_twist_request_t& request, Simulation& simulation);

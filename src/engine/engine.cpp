@@ -1,4 +1,5 @@
-// Each copy is computed by one task, modules and all; arrays are written by the task of the copy that they show.
+// Each copy is computed by one task, modules and all; arrays are written by the task of the copy
+// that they show.
 #include "engine/engine.h"
 
 #include <algorithm>
@@ -20,10 +21,11 @@ namespace ruedo::engine {
 namespace {
 
 constexpr int64_t kBatchSteps = 32;
-constexpr double kUpright = 0.70710678118654752;    // cosine of 45 degrees
+constexpr double kUpright = 0.70710678118654752;  // cosine of 45 degrees
 const std::atomic<bool> kNeverLeftOff{false};
 
-// Rounding and denormals as in every thread that computes, whatever the caller's program has set; put back at the end.
+// Rounding and denormals as in every thread that computes, whatever the caller's program has set;
+// put back at the end.
 class DefaultFloatingPoint {
  public:
   DefaultFloatingPoint() {
@@ -37,7 +39,9 @@ class DefaultFloatingPoint {
 };
 
 bool same_name(const std::string& a, const std::string& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) {
+    return std::tolower(x) == std::tolower(y);
+  });
 }
 
 }  // namespace
@@ -51,11 +55,14 @@ struct Engine::Copy {
   Channels channels;
   std::unique_ptr<World> world;
   Batch batch;
-  int64_t step = -1;    // of the state that there is
+  int64_t step = -1;  // of the state that there is
   bool scenes_made = false;
-  std::vector<std::vector<uint8_t>> newest;    // message of each channel; empty: none yet
-  struct Place { const Outbox* outbox; const Outbox::Entry* entry; };
-  std::vector<Place> places;                   // of the newest messages of a batch
+  std::vector<std::vector<uint8_t>> newest;  // message of each channel; empty: none yet
+  struct Place {
+    const Outbox* outbox;
+    const Outbox::Entry* entry;
+  };
+  std::vector<Place> places;  // of the newest messages of a batch
 
   void keep_newest();
 };
@@ -63,25 +70,28 @@ struct Engine::Copy {
 struct Engine::Observer {
   std::string device, field;
   FieldReader reader;
-  std::vector<int> channels;      // of the robots, in their order
+  std::vector<int> channels;  // of the robots, in their order
   std::shared_ptr<FieldArray> array = std::make_shared<FieldArray>();
-  size_t count = 0;               // values of one robot
+  size_t count = 0;  // values of one robot
 };
 
 Engine::Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions options)
     : world_(std::move(world)), options_(std::move(options)), arena_(std::make_unique<Arena>()) {
-  if (options_.worlds < 1) throw InputError({}, "an engine has 1 world or more, not " + std::to_string(options_.worlds));
+  if (options_.worlds < 1)
+    throw InputError({}, "an engine has 1 world or more, not " + std::to_string(options_.worlds));
   arena_->tasks.initialize(options_.threads > 0 ? options_.threads : tbb::task_arena::automatic);
   const DefaultFloatingPoint floating_point;
   copies_.resize(static_cast<size_t>(options_.worlds));
-  copies_[0] = make_copy(world_, options_.fleet.seed);    // the first says what is wrong, and builds what all share
+  copies_[0] = make_copy(
+      world_, options_.fleet.seed);  // the first says what is wrong, and builds what all share
   for_each_copy([this](size_t i) {
     if (i > 0) copies_[i] = make_copy(world_, options_.fleet.seed + i);
   });
   const std::vector<Input>& inputs = copies_[0]->world->inbox().inputs();
   for (size_t i = 0; i < inputs.size(); ++i) {
     if (inputs[i].kind != Input::Kind::velocity) continue;
-    const int instance = copies_[0]->world->layout().robots[static_cast<size_t>(inputs[i].robot)].instance;
+    const int instance =
+        copies_[0]->world->layout().robots[static_cast<size_t>(inputs[i].robot)].instance;
     driven_.push_back(world_->models[static_cast<size_t>(instance)].name);
     velocity_inputs_.push_back(static_cast<int>(i));
     driven_robots_.push_back(inputs[i].robot);
@@ -94,16 +104,20 @@ Engine::Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions opt
 
 Engine::~Engine() = default;
 
-std::unique_ptr<Engine::Copy> Engine::make_copy(std::shared_ptr<const model::WorldModel> model, uint64_t seed) {
+std::unique_ptr<Engine::Copy> Engine::make_copy(std::shared_ptr<const model::WorldModel> model,
+                                                uint64_t seed) {
   auto copy = std::make_unique<Copy>();
   FleetOptions fleet = options_.fleet;
   fleet.seed = seed;
   Findings findings;
-  copy->world = std::make_unique<World>(model, fleet, copy->channels, copies_[0] ? findings : findings_, model == world_ ? statics_ : nullptr);
+  copy->world =
+      std::make_unique<World>(model, fleet, copy->channels, copies_[0] ? findings : findings_,
+                              model == world_ ? statics_ : nullptr);
   copy->model = std::move(model);
   copy->batch.snapshots.resize(kBatchSteps);
   for (const auto& module : copy->world->modules()) {
-    copy->batch.outputs.push_back({false, false, std::vector<Outbox>(static_cast<size_t>(module->pieces()))});
+    copy->batch.outputs.push_back(
+        {false, false, std::vector<Outbox>(static_cast<size_t>(module->pieces()))});
   }
   return copy;
 }
@@ -136,7 +150,8 @@ void Engine::compute(size_t index, int64_t steps) {
     batch.first_step = copy.step + 1;
     batch.count = static_cast<int>(std::min(left, kBatchSteps));
     batch.applied_count = 0;
-    for (int i = 0; i < batch.count; ++i) world.advance(batch.first_step + i, batch.snapshots[static_cast<size_t>(i)], batch);
+    for (int i = 0; i < batch.count; ++i)
+      world.advance(batch.first_step + i, batch.snapshots[static_cast<size_t>(i)], batch);
     copy.step += batch.count;
     for (size_t m = 0; m < world.modules().size(); ++m) {
       Module& module = *world.modules()[m];
@@ -149,7 +164,8 @@ void Engine::compute(size_t index, int64_t steps) {
     count_touching(index, touching.data());
     if (handler_ || state_handler_) tell(index);
   }
-  std::memcpy(touching_->values.data() + index * robots * sizeof(int32_t), touching.data(), robots * sizeof(int32_t));
+  std::memcpy(touching_->values.data() + index * robots * sizeof(int32_t), touching.data(),
+              robots * sizeof(int32_t));
   for (auto& observer : observers_) update(*observer, index);
 }
 
@@ -159,7 +175,8 @@ void Engine::Copy::keep_newest() {
   for (const Batch::Output& output : batch.outputs) {
     if (!output.woken) continue;
     for (const Outbox& outbox : output.pieces) {
-      for (const Outbox::Entry& entry : outbox.entries()) places[static_cast<size_t>(entry.channel)] = {&outbox, &entry};
+      for (const Outbox::Entry& entry : outbox.entries())
+        places[static_cast<size_t>(entry.channel)] = {&outbox, &entry};
     }
   }
   for (size_t channel = 0; channel < places.size(); ++channel) {
@@ -172,14 +189,20 @@ void Engine::Copy::keep_newest() {
 // In the order in which a server publishes them: step by step, then by the schedule.
 void Engine::tell(size_t index) {
   const Copy& copy = *copies_[index];
-  for (int64_t step = copy.batch.first_step; step < copy.batch.first_step + copy.batch.count; ++step) {
-    if (state_handler_) state_handler_(static_cast<int>(index), copy.batch.snapshots[static_cast<size_t>(step - copy.batch.first_step)], copy.batch);
+  for (int64_t step = copy.batch.first_step; step < copy.batch.first_step + copy.batch.count;
+       ++step) {
+    if (state_handler_)
+      state_handler_(static_cast<int>(index),
+                     copy.batch.snapshots[static_cast<size_t>(step - copy.batch.first_step)],
+                     copy.batch);
     if (!handler_) continue;
     for (const Batch::Output& output : copy.batch.outputs) {
       if (!output.woken) continue;
       for (const Outbox& outbox : output.pieces) {
         for (const Outbox::Entry& entry : outbox.entries()) {
-          if (entry.step == step) handler_(static_cast<int>(index), step, copy.channels[entry.channel], {outbox.data(entry), entry.size});
+          if (entry.step == step)
+            handler_(static_cast<int>(index), step, copy.channels[entry.channel],
+                     {outbox.data(entry), entry.size});
         }
       }
     }
@@ -193,9 +216,12 @@ void Engine::count_touching(size_t index, int32_t* counts) const {
     const std::vector<Contact>& contacts = copy.batch.snapshots[static_cast<size_t>(i)].contacts;
     for (size_t robot = 0; robot < driven_robots_.size(); ++robot) {
       const int instance = layout.robots[static_cast<size_t>(driven_robots_[robot])].instance;
-      const auto is_its = [&](int link) { return link >= 0 && layout.links[static_cast<size_t>(link)].instance == instance; };
+      const auto is_its = [&](int link) {
+        return link >= 0 && layout.links[static_cast<size_t>(link)].instance == instance;
+      };
       counts[robot] += std::any_of(contacts.begin(), contacts.end(), [&](const Contact& contact) {
-        return std::abs(contact.normal.z()) < kUpright && is_its(contact.link_a) != is_its(contact.link_b);
+        return std::abs(contact.normal.z()) < kUpright &&
+               is_its(contact.link_a) != is_its(contact.link_b);
       });
     }
   }
@@ -204,8 +230,10 @@ void Engine::count_touching(size_t index, int32_t* counts) const {
 void Engine::update(Observer& observer, size_t world) {
   const size_t row_size = observer.count * observer.reader.value_size();
   for (size_t robot = 0; robot < observer.channels.size(); ++robot) {
-    const std::vector<uint8_t>& message = copies_[world]->newest[static_cast<size_t>(observer.channels[robot])];
-    std::byte* row = observer.array->values.data() + (world * observer.channels.size() + robot) * row_size;
+    const std::vector<uint8_t>& message =
+        copies_[world]->newest[static_cast<size_t>(observer.channels[robot])];
+    std::byte* row =
+        observer.array->values.data() + (world * observer.channels.size() + robot) * row_size;
     if (message.empty() || observer.reader.read(message, row, observer.count)) continue;
     throw std::runtime_error("the number of values in " + observer.device + "." + observer.field +
                              " changes from message to message: an array cannot hold them");
@@ -220,7 +248,9 @@ void Engine::step(int64_t steps) {
 
 void Engine::drive(std::span<const double> velocities) {
   const size_t rows = copies_.size() * velocity_inputs_.size();
-  if (velocities.size() != 3 * rows) throw InputError({}, "velocities are " + std::to_string(rows) + " rows of 3, one for each driven robot of each world");
+  if (velocities.size() != 3 * rows)
+    throw InputError({}, "velocities are " + std::to_string(rows) +
+                             " rows of 3, one for each driven robot of each world");
   uint8_t bytes[64];
   for (size_t row = 0; row < rows; ++row) {
     const double* v = velocities.data() + 3 * row;
@@ -232,29 +262,37 @@ void Engine::drive(std::span<const double> velocities) {
     command.omega = v[2];
     const int size = command.encode(bytes, 0, sizeof bytes);
     Copy& copy = *copies_[row / velocity_inputs_.size()];
-    copy.world->inbox().schedule(copy.step, velocity_inputs_[row % velocity_inputs_.size()], bytes, static_cast<size_t>(size));
+    copy.world->inbox().schedule(copy.step, velocity_inputs_[row % velocity_inputs_.size()], bytes,
+                                 static_cast<size_t>(size));
   }
 }
 
 void Engine::command(int world, const std::string& channel, std::span<const uint8_t> message) {
   Copy& copy = *copies_.at(static_cast<size_t>(world));
   CommandInbox& inbox = copy.world->inbox();
-  const auto input = std::find_if(inbox.inputs().begin(), inbox.inputs().end(), [&](const Input& one) { return one.channel == channel; });
-  if (channel.empty() || input == inbox.inputs().end()) throw InputError({}, "no robot takes commands on '" + channel + "'");
-  switch (inbox.schedule(copy.step, static_cast<int>(input - inbox.inputs().begin()), message.data(), message.size())) {
+  const auto input = std::find_if(inbox.inputs().begin(), inbox.inputs().end(),
+                                  [&](const Input& one) { return one.channel == channel; });
+  if (channel.empty() || input == inbox.inputs().end())
+    throw InputError({}, "no robot takes commands on '" + channel + "'");
+  switch (inbox.schedule(copy.step, static_cast<int>(input - inbox.inputs().begin()),
+                         message.data(), message.size())) {
     case CommandInbox::Scheduled::kept: return;
-    case CommandInbox::Scheduled::full: throw InputError({}, "more commands wait than a world keeps: step it first");
+    case CommandInbox::Scheduled::full:
+      throw InputError({}, "more commands wait than a world keeps: step it first");
     case CommandInbox::Scheduled::faulty:
-      if (fault_t fault; input->kind == Input::Kind::fault && decode_checked(message.data(), message.size(), fault) == DecodeFault::none) {
+      if (fault_t fault;
+          input->kind == Input::Kind::fault &&
+          decode_checked(message.data(), message.size(), fault) == DecodeFault::none) {
         throw InputError({}, channel + ": " + model::check_fault(fault_of(fault)));
       }
       throw InputError({}, "that is no message for " + channel);
-    case CommandInbox::Scheduled::late:
-      throw InputError({}, "that is no message for " + channel);
+    case CommandInbox::Scheduled::late: throw InputError({}, "that is no message for " + channel);
   }
 }
 
-void Engine::reset(int world, uint64_t seed) { reset(world, seed, copies_.at(static_cast<size_t>(world))->model); }
+void Engine::reset(int world, uint64_t seed) {
+  reset(world, seed, copies_.at(static_cast<size_t>(world))->model);
+}
 
 void Engine::reset(int world, uint64_t seed, std::shared_ptr<const model::WorldModel> model) {
   const DefaultFloatingPoint floating_point;
@@ -262,10 +300,14 @@ void Engine::reset(int world, uint64_t seed, std::shared_ptr<const model::WorldM
   const bool other = copies_.at(index)->model != model;
   auto copy = make_copy(std::move(model), seed);
   if (other) {
-    const auto same = [](const Channel& a, const Channel& b) { return a.name == b.name && a.fingerprint == b.fingerprint; };
+    const auto same = [](const Channel& a, const Channel& b) {
+      return a.name == b.name && a.fingerprint == b.fingerprint;
+    };
     const std::vector<Channel>&here = copies_[0]->channels.list(), &there = copy->channels.list();
     if (!std::equal(here.begin(), here.end(), there.begin(), there.end(), same)) {
-      throw InputError({copy->model->file}, "its robots and devices are not those of " + world_->file + ": an engine's worlds have the same, in the same order");
+      throw InputError({copy->model->file},
+                       "its robots and devices are not those of " + world_->file +
+                           ": an engine's worlds have the same, in the same order");
     }
   }
   copies_[index] = std::move(copy);
@@ -279,29 +321,38 @@ std::vector<int> Engine::channels_of(const std::string& device) const {
     std::string last_robot;
     for (const device_info_t& one : devices) {
       if (!same_name(by_kind ? one.kind : one.name, device)) continue;
-      if (one.robot == last_robot) throw InputError({}, "robot " + one.robot + " has several devices of kind '" + device + "': give one's name");
+      if (one.robot == last_robot)
+        throw InputError({}, "robot " + one.robot + " has several devices of kind '" + device +
+                                 "': give one's name");
       last_robot = one.robot;
       const std::vector<Channel>& list = copies_[0]->channels.list();
-      const auto found = std::find_if(list.begin(), list.end(), [&](const Channel& channel) { return channel.name == one.robot + "/" + one.name; });
+      const auto found = std::find_if(list.begin(), list.end(), [&](const Channel& channel) {
+        return channel.name == one.robot + "/" + one.name;
+      });
       if (found != list.end()) channels.push_back(static_cast<int>(found - list.begin()));
     }
     if (!channels.empty()) return channels;
   }
   std::string names;
-  for (const device_info_t& one : devices) names += (names.empty() ? "" : ", ") + one.robot + "/" + one.name;
+  for (const device_info_t& one : devices)
+    names += (names.empty() ? "" : ", ") + one.robot + "/" + one.name;
   throw InputError({}, "no robot has a device '" + device + "'; there are " + names);
 }
 
-std::shared_ptr<const FieldArray> Engine::observe(const std::string& device, const std::string& field) {
+std::shared_ptr<const FieldArray> Engine::observe(const std::string& device,
+                                                  const std::string& field) {
   for (const auto& known : observers_) {
     if (known->device == device && known->field == field) return known->array;
   }
   const std::vector<int> channels = channels_of(device);
   const Schema* schema = find_schema(copies_[0]->channels[channels[0]].fingerprint);
-  if (!schema) throw InputError({}, "the messages of '" + device + "' are of a type without a description");
-  auto observer = std::make_unique<Observer>(Observer{device, field, FieldReader(*schema, field), channels});
+  if (!schema)
+    throw InputError({}, "the messages of '" + device + "' are of a type without a description");
+  auto observer =
+      std::make_unique<Observer>(Observer{device, field, FieldReader(*schema, field), channels});
   const std::vector<uint8_t>& sample = copies_[0]->newest[static_cast<size_t>(channels[0])];
-  if (sample.empty()) throw InputError({}, device + "." + field + " has no sample yet: step the engine first");
+  if (sample.empty())
+    throw InputError({}, device + "." + field + " has no sample yet: step the engine first");
   FieldArray& array = *observer->array;
   array.type = observer->reader.type();
   array.shape = {static_cast<int64_t>(copies_.size()), static_cast<int64_t>(channels.size())};
@@ -310,20 +361,26 @@ std::shared_ptr<const FieldArray> Engine::observe(const std::string& device, con
     array.shape.push_back(size);
     observer->count *= static_cast<size_t>(size);
   }
-  array.values.resize(copies_.size() * channels.size() * observer->count * observer->reader.value_size());
+  array.values.resize(copies_.size() * channels.size() * observer->count *
+                      observer->reader.value_size());
   observers_.push_back(std::move(observer));
   for (size_t i = 0; i < copies_.size(); ++i) update(*observers_.back(), i);
   return observers_.back()->array;
 }
 
-int64_t Engine::current_step(int world) const { return copies_.at(static_cast<size_t>(world))->step; }
+int64_t Engine::current_step(int world) const {
+  return copies_.at(static_cast<size_t>(world))->step;
+}
 const std::vector<device_info_t>& Engine::devices() const { return copies_[0]->world->devices(); }
-const std::vector<Input>& Engine::inputs(int world) const { return copies_.at(static_cast<size_t>(world))->world->inbox().inputs(); }
+const std::vector<Input>& Engine::inputs(int world) const {
+  return copies_.at(static_cast<size_t>(world))->world->inbox().inputs();
+}
 const std::vector<Channel>& Engine::channels() const { return copies_[0]->channels.list(); }
 
 uint64_t Engine::state_hash(int world) const {
   const Copy& copy = *copies_.at(static_cast<size_t>(world));
-  return static_cast<uint64_t>(engine::state_hash(copy.batch.snapshots[static_cast<size_t>(copy.batch.count - 1)]));
+  return static_cast<uint64_t>(
+      engine::state_hash(copy.batch.snapshots[static_cast<size_t>(copy.batch.count - 1)]));
 }
 
 }  // namespace ruedo::engine

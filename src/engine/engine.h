@@ -1,8 +1,8 @@
 // Many copies of one world in the caller's process, stepped together over all cores.
 //
-// The same code as a server's run, and the same bytes: copy i with the seed s + i, given the same commands at the same
-// steps, makes the messages of `ruedo run --lockstep --seed s+i`. What never moves is shared between the copies.
-// Not thread safe: one thread at a time.
+// The same code as a server's run, and the same bytes: copy i with the seed s + i, given the same
+// commands at the same steps, makes the messages of `ruedo run --lockstep --seed s+i`. What never
+// moves is shared between the copies. Not thread safe: one thread at a time.
 #pragma once
 
 #include <atomic>
@@ -20,22 +20,23 @@ namespace ruedo::engine {
 
 struct EngineOptions {
   int worlds = 1;
-  FleetOptions fleet;    // its seed is that of copy 0
-  int threads = 0;       // 0: one a core
+  FleetOptions fleet;  // its seed is that of copy 0
+  int threads = 0;     // 0: one a core
 };
 
-// A field of one device on all robots that have it, in all copies. It follows the runs: after each step it holds what the
-// newest message of each said.
+// A field of one device on all robots that have it, in all copies. It follows the runs: after each
+// step it holds what the newest message of each said.
 struct FieldArray {
   Primitive type = Primitive::none;
-  std::vector<int64_t> shape;        // copies, robots, then the field's own
-  std::vector<std::byte> values;     // row by row, in the host's byte order
+  std::vector<int64_t> shape;     // copies, robots, then the field's own
+  std::vector<std::byte> values;  // row by row, in the host's byte order
 };
 
 class Engine {
  public:
   // A message of a copy: step, channel, bytes.
-  using MessageHandler = std::function<void(int world, int64_t step, const Channel& channel, std::span<const uint8_t> bytes)>;
+  using MessageHandler = std::function<void(int world, int64_t step, const Channel& channel,
+                                            std::span<const uint8_t> bytes)>;
   // A state of a copy: its snapshot, and the batch that tells what acted on the state before it.
   using StateHandler = std::function<void(int world, const Snapshot& snapshot, const Batch& batch)>;
 
@@ -53,34 +54,39 @@ class Engine {
   const std::vector<std::string>& driven() const { return driven_; }
   const Findings& findings() const { return findings_; }
 
-  // Computes that many states of every copy, 1 or more. Throws std::runtime_error when a module failed.
+  // Computes that many states of every copy, 1 or more. Throws std::runtime_error when a module
+  // failed.
   void step(int64_t steps);
 
-  // A velocity for every driven robot of every copy, on the states that there are: copies x driven robots x (m/s ahead, m/s
-  // left, rad/s), row by row. A row with a NaN gives no command: what was commanded before holds.
+  // A velocity for every driven robot of every copy, on the states that there are: copies x driven
+  // robots x (m/s ahead, m/s left, rad/s), row by row. A row with a NaN gives no command: what was
+  // commanded before holds.
   void drive(std::span<const double> velocities);
 
-  // A message as it would come over the bus, on the state that there is. Throws InputError for a channel that takes no
-  // commands, or bytes that are no such message.
+  // A message as it would come over the bus, on the state that there is. Throws InputError for a
+  // channel that takes no commands, or bytes that are no such message.
   void command(int world, const std::string& channel, std::span<const uint8_t> message);
 
   // Makes a copy as it was at the beginning, with that seed: what follows equals a fresh run.
   void reset(int world, uint64_t seed);
-  // The same with another world, which from then on is that copy's. Throws InputError where its channels are not the
-  // first one's: the same robots with the same devices, in the same order.
+  // The same with another world, which from then on is that copy's. Throws InputError where its
+  // channels are not the first one's: the same robots with the same devices, in the same order.
   void reset(int world, uint64_t seed, std::shared_ptr<const model::WorldModel> model);
 
-  // The array of a field, kept up to date as long as the engine lives. device: the name of one ("LRF"), or of its kind
+  // The array of a field, kept up to date as long as the engine lives. device: the name of one
+  // ("LRF"), or of its kind
   // ("lrf") where each robot has at most one of them. Throws InputError.
   std::shared_ptr<const FieldArray> observe(const std::string& device, const std::string& field);
 
-  // Of each copy and driven robot (int32): how many of the states of the last step() it touched something in, that does not
-  // carry it and that it does not carry: the contact's normal is nearer to level than to upright.
+  // Of each copy and driven robot (int32): how many of the states of the last step() it touched
+  // something in, that does not carry it and that it does not carry: the contact's normal is nearer
+  // to level than to upright.
   std::shared_ptr<const FieldArray> touching() const { return touching_; }
 
   uint64_t state_hash(int world) const;
 
-  // Called in step() and reset() with each message, copies and messages in order; nothing is computed in parallel then.
+  // Called in step() and reset() with each message, copies and messages in order; nothing is
+  // computed in parallel then.
   void on_message(MessageHandler handler) { handler_ = std::move(handler); }
   // The same for each state, before its messages.
   void on_state(StateHandler handler) { state_handler_ = std::move(handler); }
@@ -105,8 +111,8 @@ class Engine {
   Findings findings_;
   std::vector<std::unique_ptr<Copy>> copies_;
   std::vector<std::string> driven_;
-  std::vector<int> velocity_inputs_;                     // of the driven robots
-  std::vector<int> driven_robots_;                       // indices into BodyLayout::robots
+  std::vector<int> velocity_inputs_;  // of the driven robots
+  std::vector<int> driven_robots_;    // indices into BodyLayout::robots
   std::shared_ptr<FieldArray> touching_ = std::make_shared<FieldArray>();
   std::vector<std::unique_ptr<Observer>> observers_;
   MessageHandler handler_;

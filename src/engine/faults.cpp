@@ -15,18 +15,22 @@
 namespace ruedo::engine {
 namespace {
 
-constexpr size_t kMostFaults = 1000;          // of each sort at once; more are refused
-constexpr size_t kMostLate = 65536;           // commands
+constexpr size_t kMostFaults = 1000;  // of each sort at once; more are refused
+constexpr size_t kMostLate = 65536;   // commands
 
 bool same_name(const std::string& a, const std::string& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) {
+    return std::tolower(x) == std::tolower(y);
+  });
 }
 
 SensorFault::Kind sensor_kind(const std::string& name) {
   using Kind = SensorFault::Kind;
-  const std::pair<const char*, Kind> kinds[] = {{"freeze", Kind::freeze}, {"lag", Kind::lag}, {"bias", Kind::bias}, {"scale", Kind::scale},
-                                                {"blocked", Kind::blocked}, {"clock_drift", Kind::clock_drift}};
-  for (const auto& [known, kind] : kinds) if (name == known) return kind;
+  const std::pair<const char*, Kind> kinds[] = {
+      {"freeze", Kind::freeze}, {"lag", Kind::lag},         {"bias", Kind::bias},
+      {"scale", Kind::scale},   {"blocked", Kind::blocked}, {"clock_drift", Kind::clock_drift}};
+  for (const auto& [known, kind] : kinds)
+    if (name == known) return kind;
   return Kind::dropout;
 }
 
@@ -46,28 +50,35 @@ model::Fault fault_of(const fault_t& message) {
   return fault;
 }
 
-Faults::Faults(const model::WorldModel& world, const model::BodyLayout& layout, const std::vector<device_info_t>& devices, uint64_t seed)
+Faults::Faults(const model::WorldModel& world, const model::BodyLayout& layout,
+               const std::vector<device_info_t>& devices, uint64_t seed)
     : world_(world), layout_(layout), devices_(devices), seed_(seed) {
   for (const model::Fault& fault : world.faults) {
     for (size_t i = 0; i < layout.robots.size(); ++i) {
       const int robot = static_cast<int>(i);
       if (name_of(robot) != fault.robot) continue;
-      if (const std::string why = check(fault, robot); !why.empty()) throw InputError(fault.source, "a fault of " + fault.robot + ": " + why);
-      begin_at(fault, robot, rounded_up(fault.at_s * 1e6 / static_cast<double>(world.step_us) - 1e-6), false);
+      if (const std::string why = check(fault, robot); !why.empty())
+        throw InputError(fault.source, "a fault of " + fault.robot + ": " + why);
+      begin_at(fault, robot,
+               rounded_up(fault.at_s * 1e6 / static_cast<double>(world.step_us) - 1e-6), false);
     }
   }
 }
 
 const std::string& Faults::name_of(int robot) const {
-  return world_.models[static_cast<size_t>(layout_.robots[static_cast<size_t>(robot)].instance)].name;
+  return world_.models[static_cast<size_t>(layout_.robots[static_cast<size_t>(robot)].instance)]
+      .name;
 }
 
-int64_t Faults::steps(double seconds) const { return std::max<int64_t>(1, rounded(seconds * 1e6 / static_cast<double>(world_.step_us))); }
+int64_t Faults::steps(double seconds) const {
+  return std::max<int64_t>(1, rounded(seconds * 1e6 / static_cast<double>(world_.step_us)));
+}
 
 const device_info_t* Faults::find_device(int robot, const std::string& name) const {
   for (const bool by_kind : {false, true}) {
     for (const device_info_t& device : devices_) {
-      if (device.robot == name_of(robot) && same_name(by_kind ? device.kind : device.name, name)) return &device;
+      if (device.robot == name_of(robot) && same_name(by_kind ? device.kind : device.name, name))
+        return &device;
     }
   }
   return nullptr;
@@ -75,19 +86,27 @@ const device_info_t* Faults::find_device(int robot, const std::string& name) con
 
 std::string Faults::check(const model::Fault& fault, int robot) const {
   if (std::string why = model::check_fault(fault); !why.empty()) return why;
-  if (of_robots_.size() + (of_sensors_ ? of_sensors_->size() : 0) >= kMostFaults) return fmt::format("there are {} faults already", kMostFaults);
+  if (of_robots_.size() + (of_sensors_ ? of_sensors_->size() : 0) >= kMostFaults)
+    return fmt::format("there are {} faults already", kMostFaults);
   const model::FaultKind& kind = *model::find_fault_kind(fault.kind);
   if (kind.of == model::FaultKind::Of::device) {
     const device_info_t* device = find_device(robot, fault.target);
     const std::vector<std::string>& disabled = world_.disabled;
-    if (!device && std::find(disabled.begin(), disabled.end(), name_of(robot) + "/" + fault.target) != disabled.end()) return "";
+    if (!device && std::find(disabled.begin(), disabled.end(),
+                             name_of(robot) + "/" + fault.target) != disabled.end())
+      return "";
     if (!device) {
       std::vector<std::string> names;
-      for (const device_info_t& one : devices_) if (one.robot == name_of(robot)) names.push_back(one.name);
-      return fmt::format("there is no device '{}' to be faulty; {} has {}", fault.target, name_of(robot), fmt::join(names, ", "));
+      for (const device_info_t& one : devices_)
+        if (one.robot == name_of(robot)) names.push_back(one.name);
+      return fmt::format("there is no device '{}' to be faulty; {} has {}", fault.target,
+                         name_of(robot), fmt::join(names, ", "));
     }
-    if (!applies_to(sensor_kind(fault.kind), device->kind)) return fmt::format("{} is no fault of a {}", fault.kind, device->kind);
-  } else if (!world_.models[static_cast<size_t>(layout_.robots[static_cast<size_t>(robot)].instance)].model->drive) {
+    if (!applies_to(sensor_kind(fault.kind), device->kind))
+      return fmt::format("{} is no fault of a {}", fault.kind, device->kind);
+  } else if (!world_
+                  .models[static_cast<size_t>(layout_.robots[static_cast<size_t>(robot)].instance)]
+                  .model->drive) {
     return fmt::format("{} is a fault of robots that drive", fault.kind);
   }
   return "";
@@ -105,21 +124,25 @@ void Faults::begin_at(const model::Fault& fault, int robot, int64_t begin, bool 
   const int64_t end = fault.duration_s > 0.0 ? begin + steps(fault.duration_s) : INT64_MAX;
   const model::FaultKind& kind = *model::find_fault_kind(fault.kind);
   if (kind.of == model::FaultKind::Of::device) {
-    return begin_of_device(fault, robot, message ? begin + 1 : begin, message && end != INT64_MAX ? end + 1 : end);
+    return begin_of_device(fault, robot, message ? begin + 1 : begin,
+                           message && end != INT64_MAX ? end + 1 : end);
   }
   const std::pair<const char*, Kind> kinds[] = {
-      {"encoder_stuck", Kind::encoder_stuck}, {"wheel_slip", Kind::wheel_slip}, {"weak_motor", Kind::weak_motor}, {"commands_lost", Kind::commands_lost},
-      {"commands_late", Kind::commands_late}, {"commands_doubled", Kind::commands_doubled}, {"kidnapped", Kind::kidnapped}};
+      {"encoder_stuck", Kind::encoder_stuck}, {"wheel_slip", Kind::wheel_slip},
+      {"weak_motor", Kind::weak_motor},       {"commands_lost", Kind::commands_lost},
+      {"commands_late", Kind::commands_late}, {"commands_doubled", Kind::commands_doubled},
+      {"kidnapped", Kind::kidnapped}};
   for (const auto& [name, robot_kind] : kinds) {
     if (fault.kind != name) continue;
-    of_robots_.push_back({robot_kind, robot, fault.target != "right", fault.target != "left", begin, end, steps(fault.value), fault.value, fault});
+    of_robots_.push_back({robot_kind, robot, fault.target != "right", fault.target != "left", begin,
+                          end, steps(fault.value), fault.value, fault});
     wheels_ever_ |= robot_kind == Kind::encoder_stuck || robot_kind == Kind::wheel_slip;
   }
 }
 
 void Faults::begin_of_device(const model::Fault& fault, int robot, int64_t begin, int64_t end) {
   const device_info_t* device = find_device(robot, fault.target);
-  if (!device) return;    // it is switched off
+  if (!device) return;  // it is switched off
   SensorFault made;
   made.id = ++sensor_faults_;
   made.kind = sensor_kind(fault.kind);
@@ -131,7 +154,8 @@ void Faults::begin_of_device(const model::Fault& fault, int robot, int64_t begin
   made.value = fault.value;
   made.from = fault.from;
   made.to = fault.to;
-  auto all = of_sensors_ ? std::make_shared<std::vector<SensorFault>>(*of_sensors_) : std::make_shared<std::vector<SensorFault>>();
+  auto all = of_sensors_ ? std::make_shared<std::vector<SensorFault>>(*of_sensors_)
+                         : std::make_shared<std::vector<SensorFault>>();
   all->push_back(std::move(made));
   of_sensors_ = std::move(all);
 }
@@ -148,7 +172,8 @@ void Faults::before_commands(int64_t step, robot::Robots& robots) {
     Pose X_WM = robots.model_pose(instance);
     X_WM.translation.x() = fault.asked.x;
     X_WM.translation.y() = fault.asked.y;
-    X_WM.rotation = Quat(math::cos(0.5 * fault.asked.heading), 0.0, 0.0, math::sin(0.5 * fault.asked.heading));
+    X_WM.rotation =
+        Quat(math::cos(0.5 * fault.asked.heading), 0.0, 0.0, math::sin(0.5 * fault.asked.heading));
     robots.set_pose(instance, X_WM);
   }
 }
@@ -158,18 +183,22 @@ bool Faults::is_lost(int robot, int64_t step) {
   for (const RobotFault& fault : of_robots_) {
     if (fault.kind != Kind::commands_lost || !fault.acts(robot, step)) continue;
     draws_.resize(layout_.robots.size());
-    lost |= RandomSource(seed_, name_of(robot), "commands_lost").stream(draws_[static_cast<size_t>(robot)]++).uniform() < fault.value;
+    lost |= RandomSource(seed_, name_of(robot), "commands_lost")
+                .stream(draws_[static_cast<size_t>(robot)]++)
+                .uniform() < fault.value;
   }
   return lost;
 }
 
 void Faults::command(const robot::Command& command, int64_t step, robot::Robots& robots) {
-  if (of_robots_.empty() || std::holds_alternative<robot::ResetOdometry>(command.what)) return robots.apply(command);
+  if (of_robots_.empty() || std::holds_alternative<robot::ResetOdometry>(command.what))
+    return robots.apply(command);
   if (is_lost(command.robot, step)) return;
   int64_t delay = 0;
   const auto later = [&](int64_t steps) {
     if (late_.size() >= kMostLate) return;
-    const auto after = std::upper_bound(late_.begin(), late_.end(), step + steps, [](int64_t at, const auto& one) { return at < one.first; });
+    const auto after = std::upper_bound(late_.begin(), late_.end(), step + steps,
+                                        [](int64_t at, const auto& one) { return at < one.first; });
     late_.insert(after, {step + steps, command});
   };
   for (const RobotFault& fault : of_robots_) {
@@ -191,16 +220,22 @@ double Faults::left_of(int robot, bool left, int64_t step) const {
   return rest;
 }
 
-// A weak motor, or a wheel that slips, makes less of what is asked. A primitive's limits are those of its slower side.
+// A weak motor, or a wheel that slips, makes less of what is asked. A primitive's limits are those
+// of its slower side.
 robot::Command Faults::weakened(robot::Command command, int64_t step) const {
-  const double left = left_of(command.robot, true, step), right = left_of(command.robot, false, step), least = std::min(left, right);
+  const double left = left_of(command.robot, true, step),
+               right = left_of(command.robot, false, step), least = std::min(left, right);
   if (left == 1.0 && right == 1.0) return command;
-  const model::DriveDescription& drive = *world_.models[static_cast<size_t>(layout_.robots[static_cast<size_t>(command.robot)].instance)].model->drive;
+  const model::DriveDescription& drive =
+      *world_
+           .models[static_cast<size_t>(layout_.robots[static_cast<size_t>(command.robot)].instance)]
+           .model->drive;
   if (auto* velocity = std::get_if<robot::VelocityCommand>(&command.what)) {
     const double half = 0.5 * drive.track;
     velocity->vy *= least;
     if (half > 0.0) {
-      const double of_left = left * (velocity->vx - half * velocity->omega), of_right = right * (velocity->vx + half * velocity->omega);
+      const double of_left = left * (velocity->vx - half * velocity->omega),
+                   of_right = right * (velocity->vx + half * velocity->omega);
       velocity->vx = 0.5 * (of_left + of_right);
       velocity->omega = 0.5 * (of_right - of_left) / half;
     } else {
@@ -208,7 +243,8 @@ robot::Command Faults::weakened(robot::Command command, int64_t step) const {
       velocity->omega *= least;
     }
   } else if (auto* wheels = std::get_if<robot::WheelCommand>(&command.what)) {
-    for (size_t i = 0; i < wheels->rates.size(); ++i) wheels->rates[i] *= wheels->rates.size() == 2 ? (i == 0 ? left : right) : least;
+    for (size_t i = 0; i < wheels->rates.size(); ++i)
+      wheels->rates[i] *= wheels->rates.size() == 2 ? (i == 0 ? left : right) : least;
   } else if (auto* move = std::get_if<robot::MoveCommand>(&command.what)) {
     move->speed = least * (move->speed > 0.0 ? move->speed : drive.max_speed);
   }
@@ -217,12 +253,15 @@ robot::Command Faults::weakened(robot::Command command, int64_t step) const {
 
 void Faults::show_wheels(Snapshot& snapshot) {
   if (!wheels_ever_) return;
-  if (true_angles_.size() != snapshot.wheel_angles.size()) true_angles_ = shown_angles_ = snapshot.wheel_angles;
+  if (true_angles_.size() != snapshot.wheel_angles.size())
+    true_angles_ = shown_angles_ = snapshot.wheel_angles;
   for (size_t i = 0; i < snapshot.wheel_angles.size(); ++i) {
     const model::WheelPlacement& wheel = layout_.wheels[i];
     double factor = 1.0;
     for (const RobotFault& fault : of_robots_) {
-      if (!fault.acts(wheel.robot, snapshot.step) || !(wheel.left ? fault.left : fault.right) || wheel.steers) continue;
+      if (!fault.acts(wheel.robot, snapshot.step) || !(wheel.left ? fault.left : fault.right) ||
+          wheel.steers)
+        continue;
       if (fault.kind == Kind::encoder_stuck) factor = 0.0;
       if (fault.kind == Kind::wheel_slip) factor /= 1.0 - fault.value;
     }

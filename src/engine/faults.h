@@ -1,7 +1,9 @@
-// What goes wrong with the robots of a world, and when: from its file, and from commands on ROBOT/fault.
+// What goes wrong with the robots of a world, and when: from its file, and from commands on
+// ROBOT/fault.
 //
-// The simulation thread's. Sensors' faults go with the batches to the modules (sensor_faults.h); those of wheels and commands
-// act here, on what the drives are told and on the wheel angles that encoders see.
+// The simulation thread's. Sensors' faults go with the batches to the modules (sensor_faults.h);
+// those of wheels and commands act here, on what the drives are told and on the wheel angles that
+// encoders see.
 #pragma once
 
 #include <cstdint>
@@ -27,8 +29,10 @@ model::Fault fault_of(const fault_t& message);
 
 class Faults {
  public:
-  // Takes the world's own. All must outlive it. Throws InputError for one that names no device of its robot.
-  Faults(const model::WorldModel& world, const model::BodyLayout& layout, const std::vector<device_info_t>& devices, uint64_t seed);
+  // Takes the world's own. All must outlive it. Throws InputError for one that names no device of
+  // its robot.
+  Faults(const model::WorldModel& world, const model::BodyLayout& layout,
+         const std::vector<device_info_t>& devices, uint64_t seed);
 
   // What is wrong with a fault of that robot, or "".
   std::string check(const model::Fault& fault, int robot) const;
@@ -45,20 +49,30 @@ class Faults {
   const std::shared_ptr<const std::vector<SensorFault>>& of_sensors() const { return of_sensors_; }
 
   void remove(int robot);
-  void begin_time_anew();    // steps count from 0: what went on is over
+  void begin_time_anew();  // steps count from 0: what went on is over
 
  private:
-  enum class Kind { encoder_stuck, wheel_slip, weak_motor, commands_lost, commands_late, commands_doubled, kidnapped };
+  enum class Kind {
+    encoder_stuck,
+    wheel_slip,
+    weak_motor,
+    commands_lost,
+    commands_late,
+    commands_doubled,
+    kidnapped
+  };
   struct RobotFault {
     Kind kind;
     int robot;
-    bool left, right;          // which wheels
-    int64_t begin, end;        // of steps
+    bool left, right;    // which wheels
+    int64_t begin, end;  // of steps
     int64_t delay_steps;
     double value;
     model::Fault asked;
-    bool done = false;         // of who was kidnapped
-    bool acts(int of_robot, int64_t step) const { return robot == of_robot && step >= begin && step < end; }
+    bool done = false;  // of who was kidnapped
+    bool acts(int of_robot, int64_t step) const {
+      return robot == of_robot && step >= begin && step < end;
+    }
   };
 
   int64_t steps(double seconds) const;
@@ -66,7 +80,7 @@ class Faults {
   void begin_of_device(const model::Fault& fault, int robot, int64_t begin, int64_t end);
   const device_info_t* find_device(int robot, const std::string& name) const;
   const std::string& name_of(int robot) const;
-  double left_of(int robot, bool left, int64_t step) const;    // of the commanded speed of a side
+  double left_of(int robot, bool left, int64_t step) const;  // of the commanded speed of a side
   robot::Command weakened(robot::Command command, int64_t step) const;
   bool is_lost(int robot, int64_t step);
 
@@ -77,10 +91,10 @@ class Faults {
   std::shared_ptr<const std::vector<SensorFault>> of_sensors_;
   int64_t sensor_faults_ = 0;
   std::vector<RobotFault> of_robots_;
-  std::deque<std::pair<int64_t, robot::Command>> late_;    // by the step on which they act, in order
-  std::vector<uint64_t> draws_;                            // of each robot
+  std::deque<std::pair<int64_t, robot::Command>> late_;  // by the step on which they act, in order
+  std::vector<uint64_t> draws_;                          // of each robot
   bool wheels_ever_ = false;
-  std::vector<double> true_angles_, shown_angles_;         // of each wheel, while encoders may be wrong
+  std::vector<double> true_angles_, shown_angles_;  // of each wheel, while encoders may be wrong
 };
 
 }  // namespace ruedo::engine

@@ -11,7 +11,8 @@ namespace ruedo::engine {
 namespace {
 
 bool is_integer(Primitive type) {
-  return type == Primitive::int8 || type == Primitive::int16 || type == Primitive::int32 || type == Primitive::int64;
+  return type == Primitive::int8 || type == Primitive::int16 || type == Primitive::int32 ||
+         type == Primitive::int64;
 }
 
 template <class Word>
@@ -32,18 +33,20 @@ void copy_swapped(const uint8_t* from, std::byte* to, size_t count) {
 }
 
 int64_t read_integer(const uint8_t* at, Primitive type) {
-  int64_t value = static_cast<int8_t>(at[0]);    // keeps the sign
+  int64_t value = static_cast<int8_t>(at[0]);  // keeps the sign
   for (size_t i = 1; i < wire_size(type); ++i) value = value * 256 + at[i];
   return value;
 }
 
 }  // namespace
 
-FieldReader::FieldReader(const Schema& schema, const std::string& field) : schema_(&schema), counts_(schema.fields.size(), 0) {
+FieldReader::FieldReader(const Schema& schema, const std::string& field)
+    : schema_(&schema), counts_(schema.fields.size(), 0) {
   std::string readable;
   for (size_t i = 0; i < schema.fields.size(); ++i) {
     const Field& one = schema.fields[i];
-    if (one.primitive == Primitive::none) break;    // what lies behind has no place that can be computed
+    if (one.primitive == Primitive::none)
+      break;  // what lies behind has no place that can be computed
     if (one.primitive == Primitive::string) {
       if (!one.dimensions.empty()) break;
       continue;
@@ -53,7 +56,9 @@ FieldReader::FieldReader(const Schema& schema, const std::string& field) : schem
     target_ = i;
     type_ = one.primitive;
   }
-  if (type_ == Primitive::none) throw InputError({}, "'" + field + "' is no field of numbers in " + schema.name + "; there are " + readable);
+  if (type_ == Primitive::none)
+    throw InputError(
+        {}, "'" + field + "' is no field of numbers in " + schema.name + "; there are " + readable);
 }
 
 size_t FieldReader::value_size() const { return wire_size(type_); }
@@ -61,20 +66,23 @@ size_t FieldReader::value_size() const { return wire_size(type_); }
 int64_t FieldReader::length(const Field& field) const {
   int64_t length = 1;
   for (const Dimension& dimension : field.dimensions) {
-    length *= dimension.counted_by < 0 ? dimension.size : counts_[static_cast<size_t>(dimension.counted_by)];
+    length *= dimension.counted_by < 0 ? dimension.size
+                                       : counts_[static_cast<size_t>(dimension.counted_by)];
   }
   return length;
 }
 
 FieldReader::Place FieldReader::find(std::span<const uint8_t> message) const {
-  size_t offset = sizeof(int64_t);    // the fingerprint
+  size_t offset = sizeof(int64_t);  // the fingerprint
   for (size_t i = 0; i < target_; ++i) {
     const Field& field = schema_->fields[i];
     if (field.primitive == Primitive::string) {
-      offset += sizeof(int32_t) + static_cast<size_t>(read_integer(message.data() + offset, Primitive::int32));
+      offset += sizeof(int32_t) +
+                static_cast<size_t>(read_integer(message.data() + offset, Primitive::int32));
       continue;
     }
-    if (field.dimensions.empty() && is_integer(field.primitive)) counts_[i] = read_integer(message.data() + offset, field.primitive);
+    if (field.dimensions.empty() && is_integer(field.primitive))
+      counts_[i] = read_integer(message.data() + offset, field.primitive);
     offset += static_cast<size_t>(length(field)) * wire_size(field.primitive);
   }
   return {offset, static_cast<size_t>(length(schema_->fields[target_]))};
@@ -84,7 +92,8 @@ std::vector<int64_t> FieldReader::shape(std::span<const uint8_t> message) const 
   find(message);
   std::vector<int64_t> shape;
   for (const Dimension& dimension : schema_->fields[target_].dimensions) {
-    shape.push_back(dimension.counted_by < 0 ? dimension.size : counts_[static_cast<size_t>(dimension.counted_by)]);
+    shape.push_back(dimension.counted_by < 0 ? dimension.size
+                                             : counts_[static_cast<size_t>(dimension.counted_by)]);
   }
   return shape;
 }

@@ -8,12 +8,12 @@
 #include <thread>
 
 #include "core/whole.h"
+#include "engine/world_state.h"
 #include "ruedo/fault_t.hpp"
 #include "ruedo/joint_command_t.hpp"
 #include "ruedo/move_command_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
 #include "ruedo/wheel_command_t.hpp"
-#include "engine/world_state.h"
 
 namespace ruedo::engine {
 namespace {
@@ -29,30 +29,37 @@ struct Wanted {
   int robot;
   std::string name;
   const Element* element;
-  int link;          // index into layout.links
+  int link;  // index into layout.links
   Pose X_LS;
-  std::optional<Rate> rate;    // empty: as its element says
+  std::optional<Rate> rate;  // empty: as its element says
 };
 
 class FleetMaker {
  public:
-  FleetMaker(const model::WorldModel& world, const model::BodyLayout& layout, const FleetOptions& options, Channels& channels,
-             Findings& findings)
-      : world_(world), layout_(layout), options_(options), channels_(channels), findings_(findings),
-        disabled_(world.disabled.begin(), world.disabled.end()), devices_of_(layout.robots.size()) {
+  FleetMaker(const model::WorldModel& world, const model::BodyLayout& layout,
+             const FleetOptions& options, Channels& channels, Findings& findings)
+      : world_(world),
+        layout_(layout),
+        options_(options),
+        channels_(channels),
+        findings_(findings),
+        disabled_(world.disabled.begin(), world.disabled.end()),
+        devices_of_(layout.robots.size()) {
     disabled_.insert(options.disabled.begin(), options.disabled.end());
   }
 
   Fleet make() {
-    const std::vector<SensorKind>& kinds = sensor_kinds();    // those of a module are neighbours
+    const std::vector<SensorKind>& kinds = sensor_kinds();  // those of a module are neighbours
     for (auto first = kinds.begin(); first != kinds.end();) {
-      const auto last = std::find_if(first, kinds.end(), [&](const SensorKind& kind) { return kind.module != first->module; });
+      const auto last = std::find_if(
+          first, kinds.end(), [&](const SensorKind& kind) { return kind.module != first->module; });
       add_module({first, last}, static_cast<int>(first - kinds.begin()));
       first = last;
     }
     name_unserved(kinds);
     add_inputs();
-    if (options_.only_robot < 0) fleet_.modules.push_back(world_state_module(world_, layout_, options_.epoch, channels_));
+    if (options_.only_robot < 0)
+      fleet_.modules.push_back(world_state_module(world_, layout_, options_.epoch, channels_));
     for (auto& devices : devices_of_) {
       for (device_info_t& device : devices) fleet_.devices.push_back(std::move(device));
     }
@@ -70,40 +77,59 @@ class FleetMaker {
     return world_.models[static_cast<size_t>(layout_.robots[static_cast<size_t>(robot)].instance)];
   }
 
-  int first_link(int robot) const { return layout_.first_link[static_cast<size_t>(layout_.robots[static_cast<size_t>(robot)].instance)]; }
+  int first_link(int robot) const {
+    return layout_
+        .first_link[static_cast<size_t>(layout_.robots[static_cast<size_t>(robot)].instance)];
+  }
 
-  bool disabled(int robot, const std::string& device) const { return disabled_.contains(instance(robot).name + "/" + device); }
+  bool disabled(int robot, const std::string& device) const {
+    return disabled_.contains(instance(robot).name + "/" + device);
+  }
 
   // The devices of a kind on a robot, in the order of its file.
   void collect(const SensorKind& kind, int robot, std::vector<Wanted>& wanted) const {
     const model::Model& model = *instance(robot).model;
     if (kind.attach_to.empty()) {
       for (const model::SensorDescription& sensor : model.sensors) {
-        if (std::find(kind.types.begin(), kind.types.end(), sensor.type) == kind.types.end() || disabled(robot, sensor.name)) continue;
+        if (std::find(kind.types.begin(), kind.types.end(), sensor.type) == kind.types.end() ||
+            disabled(robot, sensor.name))
+          continue;
         const Element& element = sensor.element ? *sensor.element : no_element();
-        wanted.push_back({&kind, robot, sensor.name, &element, first_link(robot) + sensor.link, sensor.X_LS, {}});
+        wanted.push_back({&kind,
+                          robot,
+                          sensor.name,
+                          &element,
+                          first_link(robot) + sensor.link,
+                          sensor.X_LS,
+                          {}});
       }
       return;
     }
-    const bool attached = kind.attach_to == "robot" || (kind.attach_to == "drive" && model.drive) ||
-                          (kind.attach_to == "joints" && !layout_.robots[static_cast<size_t>(robot)].joints.empty());
+    const bool attached =
+        kind.attach_to == "robot" || (kind.attach_to == "drive" && model.drive) ||
+        (kind.attach_to == "joints" && !layout_.robots[static_cast<size_t>(robot)].joints.empty());
     if (!attached || disabled(robot, kind.device_name)) return;
     const Element* element = &no_element();
     Rate rate = kind.default_rate;
     if (model.drive) {
       const model::DriveDescription& drive = *model.drive;
-      if (drive.odometry && drive.odometry->name == "ruedo:" + kind.device_name) element = drive.odometry.get();
+      if (drive.odometry && drive.odometry->name == "ruedo:" + kind.device_name)
+        element = drive.odometry.get();
       if (kind.drive_rate) rate = kind.drive_rate(drive);
     }
     const model::RobotPlacement& placement = layout_.robots[static_cast<size_t>(robot)];
-    int link = first_link(robot);    // it sits in base_link
-    if (placement.body >= 0) link = layout_.bodies[static_cast<size_t>(placement.body)].links.front();
-    wanted.push_back({&kind, robot, kind.device_name, element, link, initial_pose(layout_, link).inverse() * X_WBase(robot), rate});
+    int link = first_link(robot);  // it sits in base_link
+    if (placement.body >= 0)
+      link = layout_.bodies[static_cast<size_t>(placement.body)].links.front();
+    wanted.push_back({&kind, robot, kind.device_name, element, link,
+                      initial_pose(layout_, link).inverse() * X_WBase(robot), rate});
   }
 
   Pose X_WBase(int robot) const {
     const model::RobotPlacement& placement = layout_.robots[static_cast<size_t>(robot)];
-    return placement.body >= 0 ? layout_.bodies[static_cast<size_t>(placement.body)].X_WB * placement.X_BBase : placement.X_BBase;
+    return placement.body >= 0
+               ? layout_.bodies[static_cast<size_t>(placement.body)].X_WB * placement.X_BBase
+               : placement.X_BBase;
   }
 
   void add_module(std::span<const SensorKind> kinds, int rank) {
@@ -122,10 +148,12 @@ class FleetMaker {
       setup.wants_renderer |= kind.needs_renderer;
     }
     setup.piece_size = setup.wants_rays || setup.wants_visual_rays ? 4 : 16;
-    // Pictures: each renderer has a thread of its own, with a stretch of the cameras. Which renderer draws which
-    // camera changes no pixel.
+    // Pictures: each renderer has a thread of its own, with a stretch of the cameras. Which
+    // renderer draws which camera changes no pixel.
     const size_t cores = std::max(1u, std::thread::hardware_concurrency());
-    const size_t threads = setup.wants_renderer && options_.only_robot < 0 ? std::min({wanted.size(), cores, size_t{8}}) : 1;
+    const size_t threads = setup.wants_renderer && options_.only_robot < 0
+                               ? std::min({wanted.size(), cores, size_t{8}})
+                               : 1;
     for (size_t i = 0; i < threads; ++i) {
       const size_t first = wanted.size() * i / threads, last = wanted.size() * (i + 1) / threads;
       ModuleSetup module = setup.without_devices();
@@ -140,14 +168,17 @@ class FleetMaker {
       module.devices.push_back(make_device(wanted));
     } catch (const InputError& error) {
       if (!options_.keep_going) throw;
-      findings_.error(error.source(), instance(wanted.robot).name + "/" + wanted.name, error.message());
+      findings_.error(error.source(), instance(wanted.robot).name + "/" + wanted.name,
+                      error.message());
     }
   }
 
   Device make_device(const Wanted& wanted) {
     const std::string& robot = instance(wanted.robot).name;
-    const Rate rate = wanted.rate ? *wanted.rate : wanted.element->rate("update_rate", wanted.kind->default_rate);
-    const double phase_s = wanted.element->number("ruedo:phase", 0.0, Allowed::not_negative(quantity::kTime));
+    const Rate rate =
+        wanted.rate ? *wanted.rate : wanted.element->rate("update_rate", wanted.kind->default_rate);
+    const double phase_s =
+        wanted.element->number("ruedo:phase", 0.0, Allowed::not_negative(quantity::kTime));
     if (!rate.every_step() && rate.hz() * static_cast<double>(world_.step_us) > 1e6) {
       findings_.repaired(wanted.element->source, robot + "/" + wanted.name,
                          "its rate is above the step rate: it samples at every step");
@@ -165,12 +196,19 @@ class FleetMaker {
                       .rate = rate,
                       .findings = &findings_,
                       .add_channel = {}};
-    setup.add_channel = [&](const std::string& suffix, const std::string& type, int64_t fingerprint) {
+    setup.add_channel = [&](const std::string& suffix, const std::string& type,
+                            int64_t fingerprint) {
       const std::string device = suffix.empty() ? wanted.name : wanted.name + "/" + suffix;
-      return channels_.add({robot + "/" + device, "", robot, wanted.name, type, fingerprint, rate, false});
+      return channels_.add(
+          {robot + "/" + device, "", robot, wanted.name, type, fingerprint, rate, false});
     };
-    Device device{wanted.kind->make(setup), rate, microseconds(phase_s), wanted.kind->needs_visual_rays,
-                  wanted.robot, options_.first_step, wanted.name};
+    Device device{wanted.kind->make(setup),
+                  rate,
+                  microseconds(phase_s),
+                  wanted.kind->needs_visual_rays,
+                  wanted.robot,
+                  options_.first_step,
+                  wanted.name};
     device.visual_rays |= device.sensor->wants_visual_rays();
     describe(wanted, rate, *device.sensor);
     return device;
@@ -182,7 +220,8 @@ class FleetMaker {
     info.name = wanted.name;
     info.kind = wanted.kind->name();
     info.rate = rate.hz();
-    const Pose X_BaseS = X_WBase(wanted.robot).inverse() * initial_pose(layout_, wanted.link) * wanted.X_LS;
+    const Pose X_BaseS =
+        X_WBase(wanted.robot).inverse() * initial_pose(layout_, wanted.link) * wanted.X_LS;
     for (int i = 0; i < 3; ++i) info.position[i] = X_BaseS.translation[i];
     info.orientation[0] = X_BaseS.rotation.w();
     info.orientation[1] = X_BaseS.rotation.x();
@@ -205,8 +244,10 @@ class FleetMaker {
           return std::find(kind.types.begin(), kind.types.end(), sensor.type) != kind.types.end();
         });
         if (served) continue;
-        findings_.unsupported(sensor.element ? sensor.element->source : model->source, "model " + model->name + "/sensor " + sensor.name,
-                              "sensors of type '" + sensor.type + "' are not supported; the robot runs without it");
+        findings_.unsupported(
+            sensor.element ? sensor.element->source : model->source,
+            "model " + model->name + "/sensor " + sensor.name,
+            "sensors of type '" + sensor.type + "' are not supported; the robot runs without it");
       }
     }
   }
@@ -239,19 +280,21 @@ class FleetMaker {
   Channels& channels_;
   Findings& findings_;
   Fleet fleet_;
-  std::set<std::string> disabled_;    // "ROBOT/DEVICE"
-  std::vector<std::vector<device_info_t>> devices_of_;    // each robot
+  std::set<std::string> disabled_;                      // "ROBOT/DEVICE"
+  std::vector<std::vector<device_info_t>> devices_of_;  // each robot
 };
 
 }  // namespace
 
 Pose initial_pose(const model::BodyLayout& layout, int link) {
   const model::LinkPlacement& placement = layout.links[static_cast<size_t>(link)];
-  return placement.body >= 0 ? layout.bodies[static_cast<size_t>(placement.body)].X_WB * placement.X_BL : placement.X_BL;
+  return placement.body >= 0
+             ? layout.bodies[static_cast<size_t>(placement.body)].X_WB * placement.X_BL
+             : placement.X_BL;
 }
 
-Fleet make_fleet(const model::WorldModel& world, const model::BodyLayout& layout, const FleetOptions& options, Channels& channels,
-                 Findings& findings) {
+Fleet make_fleet(const model::WorldModel& world, const model::BodyLayout& layout,
+                 const FleetOptions& options, Channels& channels, Findings& findings) {
   return FleetMaker(world, layout, options, channels, findings).make();
 }
 

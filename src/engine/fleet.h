@@ -6,34 +6,35 @@
 #include <string>
 #include <vector>
 
-#include "ruedo/device_info_t.hpp"
-#include "ruedo/sensor.h"
 #include "engine/channels.h"
 #include "engine/command_inbox.h"
 #include "engine/module.h"
+#include "ruedo/device_info_t.hpp"
+#include "ruedo/sensor.h"
 
 namespace ruedo::engine {
 
 struct FleetOptions {
   uint64_t seed = 1;
   bool noise = true;
-  std::vector<std::string> disabled;    // "ROBOT/DEVICE"
+  std::vector<std::string> disabled;  // "ROBOT/DEVICE"
   int epoch = 0;
-  bool keep_going = false;              // a device that is configured wrongly is an error finding, and left out
-  int only_robot = -1;                  // index into BodyLayout::robots: one that joins a world that runs
-  int64_t first_step = 0;               // samples count from its time
+  bool keep_going = false;  // a device that is configured wrongly is an error finding, and left out
+  int only_robot = -1;      // index into BodyLayout::robots: one that joins a world that runs
+  int64_t first_step = 0;   // samples count from its time
 };
 
 struct Fleet {
-  std::vector<ModuleSetup> modules;         // in the order of the schedule
-  std::vector<device_info_t> devices;       // robots in world order, their devices in the order of the modules
+  std::vector<ModuleSetup> modules;  // in the order of the schedule
+  std::vector<device_info_t>
+      devices;  // robots in world order, their devices in the order of the modules
   std::vector<Input> inputs;
 };
 
-// Makes all devices and announces all channels. world and layout must outlive the fleet. What is not supported
-// goes to `findings`; a configuration that is wrong throws InputError.
-Fleet make_fleet(const model::WorldModel& world, const model::BodyLayout& layout, const FleetOptions& options,
-                 Channels& channels, Findings& findings);
+// Makes all devices and announces all channels. world and layout must outlive the fleet. What is
+// not supported goes to `findings`; a configuration that is wrong throws InputError.
+Fleet make_fleet(const model::WorldModel& world, const model::BodyLayout& layout,
+                 const FleetOptions& options, Channels& channels, Findings& findings);
 
 // The pose of a link's frame L at the start, in the world.
 Pose initial_pose(const model::BodyLayout& layout, int link);

@@ -9,13 +9,17 @@
 namespace ruedo::engine {
 
 void DueSteps::add(const SampleClock& clock, int64_t first, int64_t sample) {
-  // A thousand devices of one rate are one entry: the first few samples tell clocks apart well enough, since a
-  // surplus entry costs time but changes nothing.
+  // A thousand devices of one rate are one entry: the first few samples tell clocks apart well
+  // enough, since a surplus entry costs time but changes nothing.
   const auto same = [&](const Entry& entry) {
-    return entry.first == first && entry.sample == sample && entry.clock.every_step() == clock.every_step() && entry.clock.step_of(0) == clock.step_of(0) &&
-           entry.clock.step_of(1) == clock.step_of(1) && entry.clock.step_of(1'000'003) == clock.step_of(1'000'003);
+    return entry.first == first && entry.sample == sample &&
+           entry.clock.every_step() == clock.every_step() &&
+           entry.clock.step_of(0) == clock.step_of(0) &&
+           entry.clock.step_of(1) == clock.step_of(1) &&
+           entry.clock.step_of(1'000'003) == clock.step_of(1'000'003);
   };
-  if (std::none_of(entries_.begin(), entries_.end(), same)) entries_.push_back({clock, first, sample, first + clock.step_of(sample)});
+  if (std::none_of(entries_.begin(), entries_.end(), same))
+    entries_.push_back({clock, first, sample, first + clock.step_of(sample)});
   update();
 }
 
@@ -39,7 +43,8 @@ Module::Module(ModuleSetup setup) : setup_(std::move(setup)) {
 
 Module::Slot Module::slot_of(const Device& device) const {
   const SampleClock clock(device.rate, setup_.step_us, device.phase_us);
-  return {clock, 0, device.first_step + clock.step_of(0), device.sensor->observes(), device.visual_rays};
+  return {clock, 0, device.first_step + clock.step_of(0), device.sensor->observes(),
+          device.visual_rays};
 }
 
 // From what is due of each device; of all batches so far each has been handed over and finished.
@@ -55,7 +60,9 @@ void Module::count_due() {
 
 void Module::add(ModuleSetup more) {
   for (Device& device : more.devices) {
-    const auto after = std::find_if(setup_.devices.begin(), setup_.devices.end(), [&](const Device& other) { return other.robot > device.robot; });
+    const auto after =
+        std::find_if(setup_.devices.begin(), setup_.devices.end(),
+                     [&](const Device& other) { return other.robot > device.robot; });
     slots_.insert(slots_.begin() + (after - setup_.devices.begin()), slot_of(device));
     setup_.wants_visual_rays |= device.visual_rays;
     setup_.devices.insert(after, std::move(device));
@@ -72,7 +79,9 @@ void Module::remove(int robot) {
   count_due();
 }
 
-void Module::replace_sensor(std::unique_ptr<Sensor> sensor) { setup_.devices[0].sensor = std::move(sensor); }
+void Module::replace_sensor(std::unique_ptr<Sensor> sensor) {
+  setup_.devices[0].sensor = std::move(sensor);
+}
 
 void Module::begin_time_anew(SimTime us) {
   for (size_t i = 0; i < slots_.size(); ++i) {
@@ -87,7 +96,7 @@ void Module::make_scenes(const SceneMakers& makers) {
   if (setup_.wants_rays) rays_ = makers.rays();
   if (setup_.wants_visual_rays) visual_rays_ = makers.visual_rays();
   if (!setup_.wants_renderer) return;
-  renderer_.reset();    // one context at a time
+  renderer_.reset();  // one context at a time
   renderer_ = makers.renderer();
 }
 
@@ -111,11 +120,12 @@ void Module::process(const Batch& batch, Batch::Output& output, const std::atomi
   if (observes_ && begin < batch.count) process_pieces(batch, output, begin, batch.count, left_off);
 }
 
-void Module::process_pieces(const Batch& batch, Batch::Output& output, int begin, int end, const std::atomic<bool>& left_off) {
+void Module::process_pieces(const Batch& batch, Batch::Output& output, int begin, int end,
+                            const std::atomic<bool>& left_off) {
   const auto process_one = [&](int piece) {
     process_piece(batch, output.pieces[static_cast<size_t>(piece)], piece, begin, end, left_off);
   };
-  if (pieces() == 1 || renderer_) {    // a renderer serves one thread
+  if (pieces() == 1 || renderer_) {  // a renderer serves one thread
     for (int piece = 0; piece < pieces(); ++piece) process_one(piece);
     return;
   }
@@ -123,16 +133,19 @@ void Module::process_pieces(const Batch& batch, Batch::Output& output, int begin
 }
 
 SampleInput Module::input_of(const Slot& slot, const Snapshot& snapshot) const {
-  return {snapshot, slot.sample, slot.visual_rays ? visual_rays_.get() : rays_.get(), renderer_.get()};
+  return {snapshot, slot.sample, slot.visual_rays ? visual_rays_.get() : rays_.get(),
+          renderer_.get()};
 }
 
 // The device itself notices nothing: what it publishes is changed on its way out.
-void Module::sample_with_faults(const Batch& batch, const Snapshot& snapshot, size_t k, Outbox& outbox) {
+void Module::sample_with_faults(const Batch& batch, const Snapshot& snapshot, size_t k,
+                                Outbox& outbox) {
   Slot& slot = slots_[k];
   const Device& device = setup_.devices[k];
-  const bool faulty = std::any_of(batch.sensor_faults->begin(), batch.sensor_faults->end(), [&](const SensorFault& fault) {
-    return fault.acts_on(device.robot, device.name, snapshot.step);
-  });
+  const bool faulty = std::any_of(batch.sensor_faults->begin(), batch.sensor_faults->end(),
+                                  [&](const SensorFault& fault) {
+                                    return fault.acts_on(device.robot, device.name, snapshot.step);
+                                  });
   Outbox own;
   own.begin_step(snapshot.step);
   Outbox& out = faulty ? own : outbox;
@@ -146,7 +159,8 @@ void Module::sample_with_faults(const Batch& batch, const Snapshot& snapshot, si
   slot.faults->pass(own, *batch.sensor_faults, device.robot, device.name, snapshot.step, outbox);
 }
 
-void Module::process_piece(const Batch& batch, Outbox& outbox, int piece, int begin, int end, const std::atomic<bool>& left_off) {
+void Module::process_piece(const Batch& batch, Outbox& outbox, int piece, int begin, int end,
+                           const std::atomic<bool>& left_off) {
   const size_t first = static_cast<size_t>(piece) * setup_.piece_size;
   const size_t last = std::min(first + setup_.piece_size, slots_.size());
   for (int i = begin; i < end; ++i) {
@@ -161,7 +175,8 @@ void Module::process_piece(const Batch& batch, Outbox& outbox, int piece, int be
       }
       if (slot.observes) sensor.observe(snapshot, outbox);
       if (slot.step != snapshot.step) continue;
-      if (left_off.load(std::memory_order_relaxed)) return;    // a thousand pictures may be in the batch
+      if (left_off.load(std::memory_order_relaxed))
+        return;  // a thousand pictures may be in the batch
       sensor.sample(input_of(slot, snapshot), outbox);
       slot.step = setup_.devices[k].first_step + slot.clock.step_of(++slot.sample);
     }

@@ -1,8 +1,8 @@
 // A module: the devices of one kind on all robots of a world, and when each of them takes a sample.
 //
-// Its bytes do not depend on threads: devices are cut into pieces of a fixed size, each piece has an outbox of
-// its own, and they are read in order, whichever was finished first. Who hosts the world gives a module a thread
-// (ModuleThread), or works through it in its own.
+// Its bytes do not depend on threads: devices are cut into pieces of a fixed size, each piece has
+// an outbox of its own, and they are read in order, whichever was finished first. Who hosts the
+// world gives a module a thread (ModuleThread), or works through it in its own.
 #pragma once
 
 #include <atomic>
@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
+#include "engine/batch.h"
 #include "ruedo/sensor.h"
 #include "scene/ray_scene.h"
 #include "scene/render_scene.h"
-#include "engine/batch.h"
 
 namespace ruedo::engine {
 
@@ -26,11 +26,14 @@ class DueSteps {
   // first: the step that the clock counts from; sample: the next one.
   void add(const SampleClock& clock, int64_t first = 0, int64_t sample = 0);
   void clear() { entries_.clear(), update(); }
-  int64_t next() const { return next_; }    // INT64_MAX: never
-  void pass(int64_t step);                  // everything up to and with `step` is done
+  int64_t next() const { return next_; }  // INT64_MAX: never
+  void pass(int64_t step);                // everything up to and with `step` is done
 
  private:
-  struct Entry { SampleClock clock; int64_t first, sample, step; };
+  struct Entry {
+    SampleClock clock;
+    int64_t first, sample, step;
+  };
   void update();
   std::vector<Entry> entries_;
   int64_t next_ = INT64_MAX;
@@ -41,18 +44,18 @@ struct Device {
   std::unique_ptr<Sensor> sensor;
   Rate rate;
   int64_t phase_us = 0;
-  bool visual_rays = false;                // its rays hit visuals, not collisions
-  int robot = -1;                          // index into BodyLayout::robots; -1: the simulation's
-  int64_t first_step = 0;                  // its samples count from the time of this one
-  std::string name = {};                   // as its robot's faults name it
+  bool visual_rays = false;  // its rays hit visuals, not collisions
+  int robot = -1;            // index into BodyLayout::robots; -1: the simulation's
+  int64_t first_step = 0;    // its samples count from the time of this one
+  std::string name = {};     // as its robot's faults name it
 };
 
 struct ModuleSetup {
   std::string name;
-  std::vector<Device> devices;             // in world order: robot, then device
-  int piece_size = 16;                     // devices that are worked through one after the other
+  std::vector<Device> devices;  // in world order: robot, then device
+  int piece_size = 16;          // devices that are worked through one after the other
   int64_t step_us = 5000;
-  int rank = 0;                            // in the schedule; modules of one kind share it
+  int rank = 0;  // in the schedule; modules of one kind share it
   bool wants_rays = false, wants_visual_rays = false, wants_renderer = false;
 
   ModuleSetup without_devices() const {
@@ -60,8 +63,8 @@ struct ModuleSetup {
   }
 };
 
-// What a module needs of the world to make its scenes, in its own thread. An entry may be empty when no module
-// wants it.
+// What a module needs of the world to make its scenes, in its own thread. An entry may be empty
+// when no module wants it.
 struct SceneMakers {
   std::function<std::unique_ptr<scene::RayScene>()> rays, visual_rays;
   std::function<std::unique_ptr<scene::Renderer>()> renderer;
@@ -71,54 +74,64 @@ class Module {
  public:
   explicit Module(ModuleSetup setup);
 
-  // Makes its scenes, in the thread that will process batches: a renderer's context belongs to it. Throws what making them threw.
+  // Makes its scenes, in the thread that will process batches: a renderer's context belongs to it.
+  // Throws what making them threw.
   void make_scenes(const SceneMakers& makers);
-  bool has_scenes() const { return setup_.wants_rays || setup_.wants_visual_rays || setup_.wants_renderer; }
+  bool has_scenes() const {
+    return setup_.wants_rays || setup_.wants_visual_rays || setup_.wants_renderer;
+  }
   void drop_renderer() { renderer_.reset(); }
   bool has_renderer() const { return renderer_ != nullptr; }
 
-  // For whoever makes batches: whether one up to `last_step` has work for it; and that it gets that batch.
+  // For whoever makes batches: whether one up to `last_step` has work for it; and that it gets that
+  // batch.
   bool wants(int64_t last_step) const { return observes_ || to_hand_over_.next() <= last_step; }
   void pass(int64_t last_step) { to_hand_over_.pass(last_step); }
 
-  // Lets its devices observe and sample the states of a batch, and writes their messages into `output`. Batches come in
-  // order; left_off: once it is true nobody wants samples any more.
+  // Lets its devices observe and sample the states of a batch, and writes their messages into
+  // `output`. Batches come in order; left_off: once it is true nobody wants samples any more.
   void process(const Batch& batch, Batch::Output& output, const std::atomic<bool>& left_off);
   // Whether a sample is due before that step.
   bool is_due(int64_t before_step) const { return to_sample_.next() < before_step; }
 
   // Changes between two batches, while it has none.
-  void add(ModuleSetup more);              // its devices, in the order of robots
+  void add(ModuleSetup more);  // its devices, in the order of robots
   void remove(int robot);
-  void replace_sensor(std::unique_ptr<Sensor> sensor);    // of the only device, whose samples go on
-  void begin_time_anew(SimTime us);        // sim time was set back by so much, and steps count from 0
+  void replace_sensor(std::unique_ptr<Sensor> sensor);  // of the only device, whose samples go on
+  void begin_time_anew(SimTime us);  // sim time was set back by so much, and steps count from 0
 
   int rank() const { return setup_.rank; }
   bool wants_visual_rays() const { return setup_.wants_visual_rays; }
   // True when it serves a robot that comes after that one.
-  bool robots_after(int robot) const { return !setup_.devices.empty() && setup_.devices.back().robot > robot; }
+  bool robots_after(int robot) const {
+    return !setup_.devices.empty() && setup_.devices.back().robot > robot;
+  }
   const std::string& name() const { return setup_.name; }
-  int pieces() const { return static_cast<int>((setup_.devices.size() + setup_.piece_size - 1) / setup_.piece_size); }
+  int pieces() const {
+    return static_cast<int>((setup_.devices.size() + setup_.piece_size - 1) / setup_.piece_size);
+  }
 
  private:
   struct Slot {
     SampleClock clock;
     int64_t sample, step;
     bool observes, visual_rays;
-    std::shared_ptr<FaultFilter> faults = {};    // made when the device is first faulty
+    std::shared_ptr<FaultFilter> faults = {};  // made when the device is first faulty
   };
 
   Slot slot_of(const Device& device) const;
   void count_due();
-  void process_pieces(const Batch& batch, Batch::Output& output, int begin, int end, const std::atomic<bool>& left_off);
+  void process_pieces(const Batch& batch, Batch::Output& output, int begin, int end,
+                      const std::atomic<bool>& left_off);
   void sample_with_faults(const Batch& batch, const Snapshot& snapshot, size_t k, Outbox& outbox);
   SampleInput input_of(const Slot& slot, const Snapshot& snapshot) const;
-  void process_piece(const Batch& batch, Outbox& outbox, int piece, int begin, int end, const std::atomic<bool>& left_off);
+  void process_piece(const Batch& batch, Outbox& outbox, int piece, int begin, int end,
+                     const std::atomic<bool>& left_off);
 
   ModuleSetup setup_;
   bool observes_ = false;
-  std::vector<Slot> slots_;                // one per device
-  DueSteps to_hand_over_, to_sample_;      // of who makes batches, of who processes them
+  std::vector<Slot> slots_;            // one per device
+  DueSteps to_hand_over_, to_sample_;  // of who makes batches, of who processes them
   std::unique_ptr<scene::RayScene> rays_, visual_rays_;
   std::unique_ptr<scene::Renderer> renderer_;
 };

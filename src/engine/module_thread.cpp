@@ -15,7 +15,8 @@ constexpr size_t kQueued = 16;
 
 }  // namespace
 
-ModuleThread::ModuleThread(Module& module, Host host) : module_(module), host_(std::move(host)), queue_(kQueued) {}
+ModuleThread::ModuleThread(Module& module, Host host)
+    : module_(module), host_(std::move(host)), queue_(kQueued) {}
 
 ModuleThread::~ModuleThread() {
   if (!thread_.joinable()) return;
@@ -27,7 +28,8 @@ void ModuleThread::start(const SceneMakers& makers) {
   std::promise<void> ready;
   thread_ = std::thread([this, &ready, &makers] {
     pthread_setname_np(pthread_self(), module_.name().substr(0, 15).c_str());
-    std::fesetenv(FE_DFL_ENV);    // rounding and denormals as everywhere, whatever libraries did to the parent
+    std::fesetenv(
+        FE_DFL_ENV);  // rounding and denormals as everywhere, whatever libraries did to the parent
     try {
       module_.make_scenes(makers);
       ready.set_value();
@@ -36,7 +38,7 @@ void ModuleThread::start(const SceneMakers& makers) {
       return;
     }
     work();
-    module_.drop_renderer();    // its context belongs to this thread
+    module_.drop_renderer();  // its context belongs to this thread
   });
   try {
     ready.get_future().get();
@@ -63,7 +65,8 @@ void ModuleThread::hand_over(Batch& batch, int64_t last_step) {
 
 // A renderer's context belongs to the module's thread.
 bool ModuleThread::is_quick() const {
-  return !module_.has_renderer() && in_hand_.load(std::memory_order_acquire) == 0 && cost_ns_.load(std::memory_order_relaxed) < kQuickNs;
+  return !module_.has_renderer() && in_hand_.load(std::memory_order_acquire) == 0 &&
+         cost_ns_.load(std::memory_order_relaxed) < kQuickNs;
 }
 
 void ModuleThread::work_here(Batch& batch, int64_t last_step) {
@@ -95,9 +98,12 @@ void ModuleThread::work_through(Batch& batch) {
   try {
     module_.process(batch, batch.outputs[index_], host_.left_off);
   } catch (const std::exception& error) {
-    if (!batch.failed.exchange(true)) batch.failure = "module " + module_.name() + ": " + error.what();
+    if (!batch.failed.exchange(true))
+      batch.failure = "module " + module_.name() + ": " + error.what();
   }
-  if (due) cost_ns_.store((std::chrono::steady_clock::now() - begin) / std::chrono::nanoseconds(1), std::memory_order_relaxed);
+  if (due)
+    cost_ns_.store((std::chrono::steady_clock::now() - begin) / std::chrono::nanoseconds(1),
+                   std::memory_order_relaxed);
   if (batch.pending.fetch_sub(1, std::memory_order_acq_rel) == 1) host_.finished.set();
 }
 

@@ -1,4 +1,5 @@
-// The thread of a module: takes batches in order, works the module's devices through them, says when it is done.
+// The thread of a module: takes batches in order, works the module's devices through them, says
+// when it is done.
 #pragma once
 
 #include <atomic>
@@ -16,15 +17,15 @@ namespace ruedo::engine {
 class ModuleThread {
  public:
   struct Host {
-    Wakeup& finished;                      // set when a module was the last to finish a batch
-    const std::atomic<bool>& left_off;     // once it is true nobody wants samples any more
+    Wakeup& finished;                   // set when a module was the last to finish a batch
+    const std::atomic<bool>& left_off;  // once it is true nobody wants samples any more
     // For tests: called in the module's thread before each batch.
     std::function<void(const std::string& module)> before_batch;
   };
 
   // The module must outlive it.
   ModuleThread(Module& module, Host host);
-  ~ModuleThread();    // ends the thread; batches that were handed over are finished first
+  ~ModuleThread();  // ends the thread; batches that were handed over are finished first
 
   // Starts the thread and waits until the module's scenes are made. Throws what making them threw.
   void start(const SceneMakers& makers);
@@ -34,12 +35,12 @@ class ModuleThread {
   bool running() const { return thread_.joinable(); }
 
   const Module& module() const { return module_; }
-  void set_index(size_t index) { index_ = index; }    // of its output in each batch
+  void set_index(size_t index) { index_ = index; }  // of its output in each batch
 
   // For the thread that makes batches: hands one over.
   void hand_over(Batch& batch, int64_t last_step);
-  // For whoever dispatches a batch of a few steps: whether working through it takes less than waking the module's thread,
-  // by how long the last took, and doing so in the caller's thread.
+  // For whoever dispatches a batch of a few steps: whether working through it takes less than
+  // waking the module's thread, by how long the last took, and doing so in the caller's thread.
   bool is_quick() const;
   void work_here(Batch& batch, int64_t last_step);
 
@@ -51,11 +52,11 @@ class ModuleThread {
   Host host_;
   size_t index_ = 0;
   Queue<Batch*> queue_;
-  Batch renewal_;                          // in the queue: makers_ wait
+  Batch renewal_;  // in the queue: makers_ wait
   const SceneMakers* makers_ = nullptr;
   std::promise<void>* made_ = nullptr;
-  std::atomic<int> in_hand_{0};            // batches that its thread has
-  std::atomic<int64_t> cost_ns_{INT64_MAX};    // of the last batch in which something was due
+  std::atomic<int> in_hand_{0};              // batches that its thread has
+  std::atomic<int64_t> cost_ns_{INT64_MAX};  // of the last batch in which something was due
   std::thread thread_;
 };
 

@@ -1,7 +1,8 @@
 // A parallel loop over pieces, by TBB.
 //
-// TBB is not instrumented for the thread sanitizer, which would take every body for a race. A build with the sanitizer
-// runs the bodies in plain threads, so that it sees all that they do, and a race between them shows.
+// TBB is not instrumented for the thread sanitizer, which would take every body for a race. A build
+// with the sanitizer runs the bodies in plain threads, so that it sees all that they do, and a race
+// between them shows.
 #pragma once
 
 #if defined(__SANITIZE_THREAD__)
@@ -13,7 +14,8 @@
 
 namespace ruedo::engine {
 
-// Calls body(0), ..., body(count - 1), in any order and from any threads, and returns when all are done.
+// Calls body(0), ..., body(count - 1), in any order and from any threads, and returns when all are
+// done.
 template <class Body>
 void parallel_pieces(int count, const Body& body) {
 #if defined(__SANITIZE_THREAD__)

@@ -1,5 +1,5 @@
-// What the threads of a simulation wait on: a bounded queue from one thread to another, and a flag that wakes a waiter.
-// Mutexes live here, in the pacer and in the inboxes, and nowhere else.
+// What the threads of a simulation wait on: a bounded queue from one thread to another, and a flag
+// that wakes a waiter. Mutexes live here, in the pacer and in the inboxes, and nowhere else.
 #pragma once
 
 #include <chrono>

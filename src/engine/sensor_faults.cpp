@@ -17,7 +17,9 @@
 namespace ruedo::engine {
 namespace {
 
-constexpr size_t kTimeAt = 8, kTimeSize = 8;    // every type begins with its fingerprint and int64_t utime, high byte first
+constexpr size_t
+    kTimeAt = 8,
+    kTimeSize = 8;  // every type begins with its fingerprint and int64_t utime, high byte first
 
 int64_t time_of(const std::vector<uint8_t>& bytes) {
   uint64_t time = 0;
@@ -27,28 +29,33 @@ int64_t time_of(const std::vector<uint8_t>& bytes) {
 
 void set_time(std::vector<uint8_t>& bytes, int64_t time) {
   auto rest = static_cast<uint64_t>(time);
-  for (size_t i = kTimeAt + kTimeSize; i-- > kTimeAt; rest >>= 8) bytes[i] = static_cast<uint8_t>(rest);
+  for (size_t i = kTimeAt + kTimeSize; i-- > kTimeAt; rest >>= 8)
+    bytes[i] = static_cast<uint8_t>(rest);
 }
 
 // As Outbox takes it.
 struct Encoded {
   const std::vector<uint8_t>& bytes;
   int getEncodedSize() const { return static_cast<int>(bytes.size()); }
-  void encode(void* to, int offset, int size) const { std::memcpy(static_cast<uint8_t*>(to) + offset, bytes.data(), static_cast<size_t>(size)); }
+  void encode(void* to, int offset, int size) const {
+    std::memcpy(static_cast<uint8_t*>(to) + offset, bytes.data(), static_cast<size_t>(size));
+  }
 };
 
 // What is no return, or nearer than the minimum, stays so.
 template <class Number>
 Number wrong(const SensorFault& fault, Number value) {
   if (!std::isfinite(value)) return value;
-  return static_cast<Number>(fault.kind == SensorFault::Kind::bias ? value + fault.value : value * fault.value);
+  return static_cast<Number>(fault.kind == SensorFault::Kind::bias ? value + fault.value
+                                                                   : value * fault.value);
 }
 
 template <class Number>
 void change_rays(const SensorFault& fault, std::vector<Number>& ranges, size_t row) {
   if (row == 0) return;
   const auto count = static_cast<double>(row);
-  const size_t first = rounded_up<size_t>(fault.from * count), last = rounded_down<size_t>(fault.to * count);
+  const size_t first = rounded_up<size_t>(fault.from * count),
+               last = rounded_down<size_t>(fault.to * count);
   for (size_t i = 0; i < ranges.size(); ++i) {
     if (fault.kind != SensorFault::Kind::blocked) {
       ranges[i] = std::max(wrong(fault, ranges[i]), Number{0});
@@ -58,15 +65,22 @@ void change_rays(const SensorFault& fault, std::vector<Number>& ranges, size_t r
   }
 }
 
-void change(const SensorFault& fault, planar_lidar_t& message) { change_rays(fault, message.ranges, message.ranges.size()); }
-void change(const SensorFault& fault, sonar_t& message) { change_rays(fault, message.range, message.range.size()); }
-void change(const SensorFault& fault, lidar_t& message) { change_rays(fault, message.ranges, static_cast<size_t>(std::max(message.ncolumns, 0))); }
-void change(const SensorFault& fault, odometry_t& message) {    // a bias is of its heading
+void change(const SensorFault& fault, planar_lidar_t& message) {
+  change_rays(fault, message.ranges, message.ranges.size());
+}
+void change(const SensorFault& fault, sonar_t& message) {
+  change_rays(fault, message.range, message.range.size());
+}
+void change(const SensorFault& fault, lidar_t& message) {
+  change_rays(fault, message.ranges, static_cast<size_t>(std::max(message.ncolumns, 0)));
+}
+void change(const SensorFault& fault, odometry_t& message) {  // a bias is of its heading
   message.theta = wrong(fault, message.theta);
   if (fault.kind == SensorFault::Kind::bias) return;
-  for (double* value : {&message.x, &message.y, &message.v, &message.omega}) *value = wrong(fault, *value);
+  for (double* value : {&message.x, &message.y, &message.v, &message.omega})
+    *value = wrong(fault, *value);
 }
-void change(const SensorFault& fault, imu_t& message) {    // a bias is of the turn rate about its z
+void change(const SensorFault& fault, imu_t& message) {  // a bias is of the turn rate about its z
   if (fault.kind == SensorFault::Kind::bias) {
     message.angular_velocity[2] += fault.value;
     return;
@@ -78,15 +92,18 @@ void change(const SensorFault& fault, imu_t& message) {    // a bias is of the t
 template <class Type>
 bool change_as(const SensorFault& fault, std::vector<uint8_t>& bytes) {
   Type message;
-  if (fingerprint_of(bytes) != Type::getHash() || decode_checked(bytes.data(), bytes.size(), message) != DecodeFault::none) return false;
+  if (fingerprint_of(bytes) != Type::getHash() ||
+      decode_checked(bytes.data(), bytes.size(), message) != DecodeFault::none)
+    return false;
   change(fault, message);
   message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
   return true;
 }
 
 void change_values(const SensorFault& fault, std::vector<uint8_t>& bytes) {
-  static_cast<void>(change_as<planar_lidar_t>(fault, bytes) || change_as<sonar_t>(fault, bytes) || change_as<lidar_t>(fault, bytes) ||
-                    change_as<odometry_t>(fault, bytes) || change_as<imu_t>(fault, bytes));
+  static_cast<void>(change_as<planar_lidar_t>(fault, bytes) || change_as<sonar_t>(fault, bytes) ||
+                    change_as<lidar_t>(fault, bytes) || change_as<odometry_t>(fault, bytes) ||
+                    change_as<imu_t>(fault, bytes));
 }
 
 }  // namespace
@@ -94,11 +111,13 @@ void change_values(const SensorFault& fault, std::vector<uint8_t>& bytes) {
 bool applies_to(SensorFault::Kind fault, const std::string& device_kind) {
   const bool rays = device_kind == "lrf" || device_kind == "lidar" || device_kind == "sonar";
   if (fault == SensorFault::Kind::blocked) return rays;
-  if (fault == SensorFault::Kind::bias || fault == SensorFault::Kind::scale) return rays || device_kind == "odometry" || device_kind == "imu";
+  if (fault == SensorFault::Kind::bias || fault == SensorFault::Kind::scale)
+    return rays || device_kind == "odometry" || device_kind == "imu";
   return true;
 }
 
-void FaultFilter::pass(const Outbox& published, const std::vector<SensorFault>& faults, int robot, const std::string& device, int64_t step, Outbox& out) {
+void FaultFilter::pass(const Outbox& published, const std::vector<SensorFault>& faults, int robot,
+                       const std::string& device, int64_t step, Outbox& out) {
   std::vector<Message> messages;
   for (const Outbox::Entry& entry : published.entries()) {
     const uint8_t* bytes = published.data(entry);
@@ -112,7 +131,9 @@ void FaultFilter::pass(const Outbox& published, const std::vector<SensorFault>& 
       case SensorFault::Kind::lag: lag(fault, step, messages); break;
       case SensorFault::Kind::clock_drift:
         for (Message& message : messages) {
-          set_time(message.bytes, time_of(message.bytes) + rounded(fault.value * static_cast<double>((step - fault.begin) * step_us_)));
+          set_time(message.bytes,
+                   time_of(message.bytes) +
+                       rounded(fault.value * static_cast<double>((step - fault.begin) * step_us_)));
         }
         break;
       default:
@@ -122,7 +143,8 @@ void FaultFilter::pass(const Outbox& published, const std::vector<SensorFault>& 
   for (const Message& message : messages) out.publish(message.channel, Encoded{message.bytes});
 }
 
-// The first message under the fault comes again and again, with the time of its day: a driver that hangs stamps its old data anew.
+// The first message under the fault comes again and again, with the time of its day: a driver that
+// hangs stamps its old data anew.
 void FaultFilter::freeze(const SensorFault& fault, std::vector<Message>& messages) {
   for (Message& message : messages) {
     const auto [kept, first] = frozen_.try_emplace({fault.id, message.channel}, message.bytes);

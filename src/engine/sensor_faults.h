@@ -15,11 +15,11 @@ namespace ruedo::engine {
 // Of one device, from a step on.
 struct SensorFault {
   enum class Kind { dropout, freeze, lag, bias, scale, blocked, clock_drift };
-  int64_t id = 0;                    // counts them: states of faults are kept by it
+  int64_t id = 0;  // counts them: states of faults are kept by it
   Kind kind = Kind::dropout;
-  int robot = -1;                    // index into BodyLayout::robots
+  int robot = -1;  // index into BodyLayout::robots
   std::string device;
-  int64_t begin = 0, end = INT64_MAX;    // samples of begin <= step < end
+  int64_t begin = 0, end = INT64_MAX;  // samples of begin <= step < end
   int64_t lag_steps = 0;
   double value = 0.0, from = 0.0, to = 1.0;
 
@@ -37,7 +37,8 @@ class FaultFilter {
   explicit FaultFilter(int64_t step_us) : step_us_(step_us) {}
 
   // What becomes of what the device published at a step. Faults act in their order.
-  void pass(const Outbox& published, const std::vector<SensorFault>& faults, int robot, const std::string& device, int64_t step, Outbox& out);
+  void pass(const Outbox& published, const std::vector<SensorFault>& faults, int robot,
+            const std::string& device, int64_t step, Outbox& out);
 
  private:
   struct Message {
@@ -48,8 +49,9 @@ class FaultFilter {
   void lag(const SensorFault& fault, int64_t step, std::vector<Message>& messages);
 
   int64_t step_us_;
-  std::map<std::pair<int64_t, int>, std::vector<uint8_t>> frozen_;               // by fault and channel
-  std::map<int64_t, std::deque<std::pair<int64_t, Message>>> under_way_;         // by fault: step and message
+  std::map<std::pair<int64_t, int>, std::vector<uint8_t>> frozen_;  // by fault and channel
+  std::map<int64_t, std::deque<std::pair<int64_t, Message>>>
+      under_way_;  // by fault: step and message
 };
 
 }  // namespace ruedo::engine

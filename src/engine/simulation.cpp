@@ -14,22 +14,27 @@
 namespace ruedo::engine {
 namespace {
 
-constexpr size_t kMaxSnapshotMemory = 64u << 20;    // bytes of all batches together
+constexpr size_t kMaxSnapshotMemory = 64u << 20;  // bytes of all batches together
 constexpr int kMaxBatchSteps = 32;
 constexpr int kFewSteps = 4;
-constexpr int64_t kQuickNs = 1'000'000;    // of a step that the publisher may wait for: it gives the signs of life
+constexpr int64_t kQuickNs =
+    1'000'000;  // of a step that the publisher may wait for: it gives the signs of life
 
 // Large worlds gain nothing from many steps in flight, and their snapshots are large.
 int batch_steps(const model::BodyLayout& layout) {
-  const size_t snapshot = sizeof(Snapshot) + layout.bodies.size() * (sizeof(Pose) + sizeof(Twist) + sizeof(Vec3)) +
-                          layout.wheels.size() * 16 + layout.joints.size() * 24 + layout.robots.size() * sizeof(RobotState);
-  return static_cast<int>(std::clamp<size_t>(kMaxSnapshotMemory / snapshot / Simulation::kBatches, 1, kMaxBatchSteps));
+  const size_t snapshot = sizeof(Snapshot) +
+                          layout.bodies.size() * (sizeof(Pose) + sizeof(Twist) + sizeof(Vec3)) +
+                          layout.wheels.size() * 16 + layout.joints.size() * 24 +
+                          layout.robots.size() * sizeof(RobotState);
+  return static_cast<int>(
+      std::clamp<size_t>(kMaxSnapshotMemory / snapshot / Simulation::kBatches, 1, kMaxBatchSteps));
 }
 
 }  // namespace
 
-Simulation::Simulation(std::shared_ptr<const model::WorldModel> world, const SimulationOptions& options, Channels& channels,
-                       Findings& findings, Wakeup& finished)
+Simulation::Simulation(std::shared_ptr<const model::WorldModel> world,
+                       const SimulationOptions& options, Channels& channels, Findings& findings,
+                       Wakeup& finished)
     : world_(std::move(world), options.fleet, channels, findings),
       before_batch_(options.before_batch),
       finished_(finished),
@@ -42,7 +47,7 @@ Simulation::Simulation(std::shared_ptr<const model::WorldModel> world, const Sim
 Simulation::~Simulation() {
   if (!thread_.joinable()) return;
   leave_off();
-  while (!last_taken_) {    // the simulation thread needs free batches to come to its end
+  while (!last_taken_) {  // the simulation thread needs free batches to come to its end
     if (!advance()) finished_.wait();
   }
   thread_.join();
@@ -59,8 +64,13 @@ void Simulation::start(Pace& pace) {
 void Simulation::fit_threads() {
   std::vector<std::unique_ptr<ModuleThread>> threads;
   for (auto& module : world_.modules()) {
-    const auto known = std::find_if(threads_.begin(), threads_.end(), [&](const auto& thread) { return thread && &thread->module() == module.get(); });
-    threads.push_back(known == threads_.end() ? std::make_unique<ModuleThread>(*module, ModuleThread::Host{finished_, left_off_, before_batch_}) : std::move(*known));
+    const auto known = std::find_if(threads_.begin(), threads_.end(), [&](const auto& thread) {
+      return thread && &thread->module() == module.get();
+    });
+    threads.push_back(known == threads_.end()
+                          ? std::make_unique<ModuleThread>(
+                                *module, ModuleThread::Host{finished_, left_off_, before_batch_})
+                          : std::move(*known));
   }
   threads_ = std::move(threads);
   cursors_.resize(threads_.size());
@@ -76,14 +86,16 @@ void Simulation::fit_threads() {
   }
 }
 
-int Simulation::add_model(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model, int64_t step,
+int Simulation::add_model(const std::string& name, const Pose& X_WM,
+                          std::shared_ptr<const model::Model> model, int64_t step,
                           Channels& channels, Findings& findings) {
   const int instance = world_.add_model(name, X_WM, std::move(model), step, channels, findings);
   fit_threads();
   if (!started_) return instance;
   try {
     const SceneMakers makers = world_.scene_makers();
-    for (auto& thread : threads_) thread->running() ? thread->renew_scenes(makers) : thread->start(makers);
+    for (auto& thread : threads_)
+      thread->running() ? thread->renew_scenes(makers) : thread->start(makers);
   } catch (...) {
     remove_model(instance, channels);
     throw;
@@ -100,15 +112,18 @@ void Simulation::remove_model(int instance, Channels& channels) {
     for (auto& thread : threads_) {
       if (thread->running()) thread->renew_scenes(makers);
     }
-  } catch (const std::exception& error) {    // a module without its scene or renderer would sample nothing, or crash
-    throw SceneLost(std::string("what sensors see cannot be made again after a change of the world: ") + error.what());
+  } catch (const std::exception&
+               error) {  // a module without its scene or renderer would sample nothing, or crash
+    throw SceneLost(
+        std::string("what sensors see cannot be made again after a change of the world: ") +
+        error.what());
   }
 }
 
 void Simulation::simulate() {
   pthread_setname_np(pthread_self(), "kinematics");
   std::fesetenv(FE_DFL_ENV);
-  prctl(PR_SET_TIMERSLACK, 1);    // ns: the kernel may otherwise wake us 50 us late
+  prctl(PR_SET_TIMERSLACK, 1);  // ns: the kernel may otherwise wake us 50 us late
   const int limit = static_cast<int>(batches_[0].snapshots.size());
   for (int64_t first_step = 0;;) {
     const int count = pace_->wait(first_step, limit);
@@ -124,7 +139,8 @@ void Simulation::simulate() {
 
 bool Simulation::go() {
   int64_t first_step = 0;
-  const int limit = step_ns_ > kQuickNs ? 0 : std::min(kFewSteps, static_cast<int>(batches_[0].snapshots.size()));
+  const int limit =
+      step_ns_ > kQuickNs ? 0 : std::min(kFewSteps, static_cast<int>(batches_[0].snapshots.size()));
   const int count = pace_->borrow(first_step, limit);
   if (count == 0) return false;
   Batch& batch = batches_[round_ % batches_.size()];
@@ -149,22 +165,26 @@ void Simulation::compute(Batch& batch, int64_t first_step, int count) {
   const auto begin = std::chrono::steady_clock::now();
   try {
     for (int i = 0; i < count && !batch.last; ++i) {
-      if (left_off_) batch.count = 0;    // the publisher still holds the last state, in a batch that is free already
+      if (left_off_)
+        batch.count =
+            0;  // the publisher still holds the last state, in a batch that is free already
       if (batch.count == 0) break;
       try {
         world_.advance(first_step + i, batch.snapshots[static_cast<size_t>(i)], batch);
-      } catch (const physics::StateError& error) {    // the steps before it are good
+      } catch (const physics::StateError& error) {  // the steps before it are good
         batch.end = error.what();
         batch.count = i;
         batch.last = true;
       }
     }
   } catch (const std::exception& error) {
-    if (!batch.failed.exchange(true)) batch.failure = std::string("module kinematics: ") + error.what();
+    if (!batch.failed.exchange(true))
+      batch.failure = std::string("module kinematics: ") + error.what();
     batch.count = 0;
     batch.last = true;
   }
-  if (count > 0) step_ns_ = (std::chrono::steady_clock::now() - begin) / std::chrono::nanoseconds(count);
+  if (count > 0)
+    step_ns_ = (std::chrono::steady_clock::now() - begin) / std::chrono::nanoseconds(count);
 }
 
 void Simulation::dispatch(Batch& batch, bool here) {
@@ -183,7 +203,7 @@ void Simulation::dispatch(Batch& batch, bool here) {
     any_here |= output.here;
     if (output.woken && !output.here) threads_[m]->hand_over(batch, last_step);
   }
-  for (size_t m = 0; any_here && m < threads_.size(); ++m) {    // beside those that were woken
+  for (size_t m = 0; any_here && m < threads_.size(); ++m) {  // beside those that were woken
     if (batch.outputs[m].here) threads_[m]->work_here(batch, last_step);
   }
   if (batch.pending.fetch_sub(1, std::memory_order_acq_rel) == 1) finished_.set();

@@ -11,7 +11,8 @@ struct ThreadLimit::Impl {
 
 ThreadLimit::ThreadLimit(int threads) {
   if (threads <= 0) return;
-  impl_.reset(new Impl{tbb::global_control(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads))});
+  impl_.reset(new Impl{tbb::global_control(tbb::global_control::max_allowed_parallelism,
+                                           static_cast<size_t>(threads))});
 }
 
 ThreadLimit::~ThreadLimit() = default;

@@ -5,15 +5,17 @@
 
 namespace ruedo::engine {
 
-std::shared_ptr<const scene::StaticRayScene> StaticScenes::get(const model::WorldModel& world, const model::BodyLayout& layout, bool visuals) {
+std::shared_ptr<const scene::StaticRayScene> StaticScenes::get(const model::WorldModel& world,
+                                                               const model::BodyLayout& layout,
+                                                               bool visuals) {
   const std::lock_guard lock(mutex_);
   auto& scene = visuals ? visuals_ : collisions_;
   if (!scene) scene = scene::make_static_ray_scene(world, layout, visuals);
   return scene;
 }
 
-World::World(std::shared_ptr<const model::WorldModel> world, const FleetOptions& options, Channels& channels, Findings& findings,
-             std::shared_ptr<StaticScenes> statics)
+World::World(std::shared_ptr<const model::WorldModel> world, const FleetOptions& options,
+             Channels& channels, Findings& findings, std::shared_ptr<StaticScenes> statics)
     : model_(*world),
       layout_(model_),
       options_(options),
@@ -26,12 +28,19 @@ World::World(std::shared_ptr<const model::WorldModel> world, const FleetOptions&
       statics_(statics ? std::move(statics) : std::make_shared<StaticScenes>()) {
   for (const Finding& finding : physics_->findings()) {
     switch (finding.kind) {
-      case Finding::Kind::unsupported: findings.unsupported(finding.source, finding.element, finding.text); break;
-      case Finding::Kind::repaired: findings.repaired(finding.source, finding.element, finding.text); break;
-      case Finding::Kind::error: findings.error(finding.source, finding.element, finding.text); break;
+      case Finding::Kind::unsupported:
+        findings.unsupported(finding.source, finding.element, finding.text);
+        break;
+      case Finding::Kind::repaired:
+        findings.repaired(finding.source, finding.element, finding.text);
+        break;
+      case Finding::Kind::error:
+        findings.error(finding.source, finding.element, finding.text);
+        break;
     }
   }
-  for (ModuleSetup& setup : fleet_.modules) modules_.push_back(std::make_unique<Module>(std::move(setup)));
+  for (ModuleSetup& setup : fleet_.modules)
+    modules_.push_back(std::make_unique<Module>(std::move(setup)));
   for (size_t i = 0; i < channels.list().size(); ++i) {
     if (channels.list()[i].name == "ruedo/world") world_channel_ = static_cast<int>(i);
   }
@@ -40,7 +49,7 @@ World::World(std::shared_ptr<const model::WorldModel> world, const FleetOptions&
 void World::advance(int64_t step, Snapshot& snapshot, Batch& batch) {
   if (step > 0) {
     faults_.before_commands(step - 1, *robots_);
-    inbox_.apply(*robots_, faults_, step - 1, batch);    // on the state before
+    inbox_.apply(*robots_, faults_, step - 1, batch);  // on the state before
     robots_->step();
   }
   robots_->read(snapshot);
@@ -54,7 +63,9 @@ void World::advance(int64_t step, Snapshot& snapshot, Batch& batch) {
 SceneMakers World::scene_makers() const {
   SceneMakers makers;
   makers.rays = [this] { return scene::make_ray_scene(statics_->get(model_, layout_, false)); };
-  makers.visual_rays = [this] { return scene::make_ray_scene(statics_->get(model_, layout_, true)); };
+  makers.visual_rays = [this] {
+    return scene::make_ray_scene(statics_->get(model_, layout_, true));
+  };
   makers.renderer = [this] { return scene::make_renderer(model_, layout_); };
   return makers;
 }

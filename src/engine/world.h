@@ -1,8 +1,8 @@
 // One world that can be stepped: its model, physics, robots and devices.
 //
-// It knows no threads, no clock and no network; its host does: Simulation runs one over threads, Engine many in the
-// caller's process. Not thread safe, but that its modules may be processed beside each other and beside advance(), each
-// by one thread.
+// It knows no threads, no clock and no network; its host does: Simulation runs one over threads,
+// Engine many in the caller's process. Not thread safe, but that its modules may be processed
+// beside each other and beside advance(), each by one thread.
 #pragma once
 
 #include <memory>
@@ -23,10 +23,12 @@
 
 namespace ruedo::engine {
 
-// The geometry that never moves, built when it is first asked for: shared by all modules, and by copies of one world.
+// The geometry that never moves, built when it is first asked for: shared by all modules, and by
+// copies of one world.
 class StaticScenes {
  public:
-  std::shared_ptr<const scene::StaticRayScene> get(const model::WorldModel& world, const model::BodyLayout& layout, bool visuals);
+  std::shared_ptr<const scene::StaticRayScene> get(const model::WorldModel& world,
+                                                   const model::BodyLayout& layout, bool visuals);
 
  private:
   std::mutex mutex_;
@@ -36,12 +38,12 @@ class StaticScenes {
 class World {
  public:
   // Announces its channels. statics: of another copy of the same world, or null. Throws InputError.
-  World(std::shared_ptr<const model::WorldModel> world, const FleetOptions& options, Channels& channels, Findings& findings,
-        std::shared_ptr<StaticScenes> statics = nullptr);
+  World(std::shared_ptr<const model::WorldModel> world, const FleetOptions& options,
+        Channels& channels, Findings& findings, std::shared_ptr<StaticScenes> statics = nullptr);
 
-  // Computes the next state into the snapshot: what acts on the state before it is applied (and noted in the batch), then
-  // the physics step. States follow on one another from 0, the initial one. Throws physics::StateError for a state that is
-  // not finite.
+  // Computes the next state into the snapshot: what acts on the state before it is applied (and
+  // noted in the batch), then the physics step. States follow on one another from 0, the initial
+  // one. Throws physics::StateError for a state that is not finite.
   void advance(int64_t step, Snapshot& snapshot, Batch& batch);
 
   const model::WorldModel& model() const { return model_; }
@@ -51,16 +53,19 @@ class World {
   const Faults& faults() const { return faults_; }
   const physics::PhysicsWorld& physics() const { return *physics_; }
   robot::Robots& robots() { return *robots_; }
-  std::vector<std::unique_ptr<Module>>& modules() { return modules_; }    // in the order of the schedule
-  SceneMakers scene_makers() const;    // valid until a model comes or goes
+  std::vector<std::unique_ptr<Module>>& modules() {
+    return modules_;
+  }                                  // in the order of the schedule
+  SceneMakers scene_makers() const;  // valid until a model comes or goes
 
-  // ---- Changes between two steps, while no module is at work; in world_edits.cpp. When models have come or gone, modules
-  // may be others, and those that have scenes want them anew.
+  // ---- Changes between two steps, while no module is at work; in world_edits.cpp. When models
+  // have come or gone, modules may be others, and those that have scenes want them anew.
 
-  // Puts a model in, which is seen from the next state on; `step` is that state's number. Returns its index in
-  // model().models. Throws InputError; the world is then as it was.
-  int add_model(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model, int64_t step,
-                Channels& channels, Findings& findings);
+  // Puts a model in, which is seen from the next state on; `step` is that state's number. Returns
+  // its index in model().models. Throws InputError; the world is then as it was.
+  int add_model(const std::string& name, const Pose& X_WM,
+                std::shared_ptr<const model::Model> model, int64_t step, Channels& channels,
+                Findings& findings);
   // Takes one out. Its numbers stay free until the same model comes again.
   void remove_model(int instance, Channels& channels);
   // The state that there is becomes state 0. Returns what the time was.
@@ -76,13 +81,13 @@ class World {
   model::WorldModel model_;
   model::BodyLayout layout_;
   FleetOptions options_;
-  Fleet fleet_;                                  // its parts move into what follows
+  Fleet fleet_;  // its parts move into what follows
   std::vector<device_info_t> devices_;
   CommandInbox inbox_;
   Faults faults_;
   std::unique_ptr<physics::PhysicsWorld> physics_;
   std::unique_ptr<robot::Robots> robots_;
-  int world_channel_ = -1;                       // of ruedo/world
+  int world_channel_ = -1;  // of ruedo/world
   std::vector<std::unique_ptr<Module>> modules_;
   std::shared_ptr<StaticScenes> statics_;
 };

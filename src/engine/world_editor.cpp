@@ -12,11 +12,13 @@
 
 namespace ruedo::engine {
 
-WorldEditor::Placed WorldEditor::place(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model) {
+WorldEditor::Placed WorldEditor::place(const std::string& name, const Pose& X_WM,
+                                       std::shared_ptr<const model::Model> model) {
   std::vector<model::ModelInstance>& models = world_.models;
-  const auto free = std::find_if(models.begin(), models.end(), [&](const model::ModelInstance& instance) {
-    return instance.removed && instance.model == model;
-  });
+  const auto free =
+      std::find_if(models.begin(), models.end(), [&](const model::ModelInstance& instance) {
+        return instance.removed && instance.model == model;
+      });
   if (free == models.end()) {
     models.push_back({name, X_WM, std::move(model)});
     return {static_cast<int>(models.size()) - 1, false};
@@ -34,9 +36,10 @@ void WorldEditor::remove(int instance) {
 }
 
 int find_model(const model::WorldModel& world, const std::string& name) {
-  const auto found = std::find_if(world.models.begin(), world.models.end(), [&](const model::ModelInstance& instance) {
-    return !instance.removed && instance.name == name;
-  });
+  const auto found = std::find_if(world.models.begin(), world.models.end(),
+                                  [&](const model::ModelInstance& instance) {
+                                    return !instance.removed && instance.name == name;
+                                  });
   return found == world.models.end() ? -1 : static_cast<int>(found - world.models.begin());
 }
 
@@ -49,19 +52,24 @@ std::string unused_name(const model::WorldModel& world, const std::string& name)
     const char* const begin = instance.name.data() + stem.size();
     const char* const end = instance.name.data() + instance.name.size();
     int number = 0;
-    if (const auto [last, error] = std::from_chars(begin, end, number); error == std::errc() && last == end && *begin != '0') taken.insert(number);
+    if (const auto [last, error] = std::from_chars(begin, end, number);
+        error == std::errc() && last == end && *begin != '0')
+      taken.insert(number);
   }
   int number = 2;
   for (auto at = taken.lower_bound(2); at != taken.end() && *at == number; ++at) ++number;
   return stem + std::to_string(number);
 }
 
-Pose spawn_pose(const model::WorldModel& world, const model::Model& model, const spawn_request_t& request) {
+Pose spawn_pose(const model::WorldModel& world, const model::Model& model,
+                const spawn_request_t& request) {
   const double* q = request.orientation;
-  const Pose X_WM{Quat(q[0], q[1], q[2], q[3]).normalized(), Vec3(request.position[0], request.position[1], request.position[2])};
+  const Pose X_WM{Quat(q[0], q[1], q[2], q[3]).normalized(),
+                  Vec3(request.position[0], request.position[1], request.position[2])};
   if (!request.on_ground) return X_WM;
   const Vec3 ahead = X_WM.rotation * Vec3::UnitX();
-  return model::standing_on(world, model, request.position[0], request.position[1], math::atan2(ahead.y(), ahead.x()));
+  return model::standing_on(world, model, request.position[0], request.position[1],
+                            math::atan2(ahead.y(), ahead.x()));
 }
 
 }  // namespace ruedo::engine

@@ -1,8 +1,8 @@
-// Models that come to a world and leave it, as the host of a run and a reader of its log both do it: names and places in the lists
-// come out the same.
+// Models that come to a world and leave it, as the host of a run and a reader of its log both do
+// it: names and places in the lists come out the same.
 //
-// What has left keeps its place in the list of models, which the next instance of the same model takes: whoever lets models come and
-// go for days has lists that do not grow.
+// What has left keeps its place in the list of models, which the next instance of the same model
+// takes: whoever lets models come and go for days has lists that do not grow.
 #pragma once
 
 #include <memory>
@@ -19,10 +19,11 @@ class WorldEditor {
   explicit WorldEditor(model::WorldModel& world) : world_(world) {}
 
   struct Placed {
-    int instance;    // index into the world's models
-    bool reused;     // in the place of one that has left
+    int instance;  // index into the world's models
+    bool reused;   // in the place of one that has left
   };
-  Placed place(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model);
+  Placed place(const std::string& name, const Pose& X_WM,
+               std::shared_ptr<const model::Model> model);
   void remove(int instance);
 
  private:
@@ -33,6 +34,7 @@ class WorldEditor {
 int find_model(const model::WorldModel& world, const std::string& name);
 
 // Where a SPAWN puts a model: as it says, or standing on the ground below.
-Pose spawn_pose(const model::WorldModel& world, const model::Model& model, const spawn_request_t& request);
+Pose spawn_pose(const model::WorldModel& world, const model::Model& model,
+                const spawn_request_t& request);
 
 }  // namespace ruedo::engine

@@ -16,18 +16,20 @@ int robot_of(const model::BodyLayout& layout, int instance) {
   return -1;
 }
 
-constexpr unsigned kMostDrawers = 8;    // threads that draw
+constexpr unsigned kMostDrawers = 8;  // threads that draw
 
 }  // namespace
 
-int World::place(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model) {
+int World::place(const std::string& name, const Pose& X_WM,
+                 std::shared_ptr<const model::Model> model) {
   const WorldEditor::Placed placed = WorldEditor(model_).place(name, X_WM, std::move(model));
   placed.reused ? layout_.place_again(model_, placed.instance) : layout_.append(model_);
   return placed.instance;
 }
 
-int World::add_model(const std::string& name, const Pose& X_WM, std::shared_ptr<const model::Model> model, int64_t step,
-                          Channels& channels, Findings& findings) {
+int World::add_model(const std::string& name, const Pose& X_WM,
+                     std::shared_ptr<const model::Model> model, int64_t step, Channels& channels,
+                     Findings& findings) {
   const model::BodyLayout layout_before = layout_;
   const std::vector<model::ModelInstance> models_before = model_.models;
   const Channels channels_before = channels;
@@ -90,16 +92,23 @@ void World::remove_model(int instance, Channels& channels) {
 
 void World::join(Fleet fleet) {
   for (ModuleSetup& setup : fleet.modules) join(std::move(setup));
-  devices_.insert(devices_.end(), std::make_move_iterator(fleet.devices.begin()), std::make_move_iterator(fleet.devices.end()));
+  devices_.insert(devices_.end(), std::make_move_iterator(fleet.devices.begin()),
+                  std::make_move_iterator(fleet.devices.end()));
 }
 
-// To the last module of its kind, so that devices stay in the order of robots; or as a new one, in its place.
+// To the last module of its kind, so that devices stay in the order of robots; or as a new one, in
+// its place.
 void World::join(ModuleSetup setup) {
-  auto after = std::find_if(modules_.begin(), modules_.end(), [&](const auto& module) { return module->rank() > setup.rank; });
+  auto after = std::find_if(modules_.begin(), modules_.end(),
+                            [&](const auto& module) { return module->rank() > setup.rank; });
   const auto same = [&](const auto& module) { return module->rank() == setup.rank; };
   const auto known = static_cast<unsigned>(std::count_if(modules_.begin(), modules_.end(), same));
-  const bool last_place = setup.devices.empty() || known == 0 || !(*(after - 1))->robots_after(setup.devices.front().robot);
-  const unsigned most = setup.wants_renderer ? std::min(kMostDrawers, std::max(1u, std::thread::hardware_concurrency())) : 1;
+  const bool last_place = setup.devices.empty() || known == 0 ||
+                          !(*(after - 1))->robots_after(setup.devices.front().robot);
+  const unsigned most =
+      setup.wants_renderer
+          ? std::min(kMostDrawers, std::max(1u, std::thread::hardware_concurrency()))
+          : 1;
   if (known > 0 && (known >= most || !last_place)) {
     // A robot in the place of a removed one may belong before the last module's first.
     auto into = std::find_if(modules_.begin(), after, [&](const auto& module) {
@@ -113,7 +122,8 @@ void World::join(ModuleSetup setup) {
 
 void World::renew_world_state() {
   for (auto& module : modules_) {
-    if (module->name() == "world") module->replace_sensor(world_state_sensor(model_, layout_, options_.epoch, world_channel_));
+    if (module->name() == "world")
+      module->replace_sensor(world_state_sensor(model_, layout_, options_.epoch, world_channel_));
   }
 }
 

@@ -15,7 +15,7 @@ class Parts {
 
   // Adds an entry to that list of the current part, or of a new one when it has no room.
   template <class Entry>
-  void add(std::vector<Entry> world_info_t::*list, int32_t world_info_t::*count, Entry entry) {
+  void add(std::vector<Entry> world_info_t::* list, int32_t world_info_t::* count, Entry entry) {
     const size_t size = static_cast<size_t>(entry._getEncodedSizeNoHash());
     if (size_ + size > kMaxPartSize) begin();
     size_ += size;
@@ -44,7 +44,8 @@ class Parts {
   size_t size_ = 0;
 };
 
-robot_info_t robot_info(const model::WorldModel& world, const model::BodyLayout& layout, const model::RobotPlacement& placement) {
+robot_info_t robot_info(const model::WorldModel& world, const model::BodyLayout& layout,
+                        const model::RobotPlacement& placement) {
   const model::ModelInstance& instance = world.models[static_cast<size_t>(placement.instance)];
   const model::Model& model = *instance.model;
   robot_info_t info;
@@ -57,7 +58,8 @@ robot_info_t robot_info(const model::WorldModel& world, const model::BodyLayout&
   if (model.drive) {
     const model::DriveDescription& drive = *model.drive;
     info.drive = drive.kind == model::DriveDescription::Kind::kinematic ? "kinematic" : "wheels";
-    if (drive.steering != model::DriveDescription::Steering::differential) info.drive += " " + model::name_of(drive.steering);
+    if (drive.steering != model::DriveDescription::Steering::differential)
+      info.drive += " " + model::name_of(drive.steering);
     info.wheel_radius = drive.wheel_radius;
     info.track = drive.track;
     info.max_speed = drive.max_speed;
@@ -77,23 +79,29 @@ robot_info_t robot_info(const model::WorldModel& world, const model::BodyLayout&
 }
 
 const model::Link& link_of(const model::WorldModel& world, const model::LinkPlacement& placement) {
-  return world.models[static_cast<size_t>(placement.instance)].model->links[static_cast<size_t>(placement.link)];
+  return world.models[static_cast<size_t>(placement.instance)]
+      .model->links[static_cast<size_t>(placement.link)];
 }
 
 }  // namespace
 
-std::vector<world_info_t> make_world_info(const world_info_t& head, const model::WorldModel& world, const model::BodyLayout& layout,
-                                          const std::vector<device_info_t>& devices, const Channels& channels) {
+std::vector<world_info_t> make_world_info(const world_info_t& head, const model::WorldModel& world,
+                                          const model::BodyLayout& layout,
+                                          const std::vector<device_info_t>& devices,
+                                          const Channels& channels) {
   Parts parts(head);
-  const auto removed = [&](int instance) { return world.models[static_cast<size_t>(instance)].removed; };
+  const auto removed = [&](int instance) {
+    return world.models[static_cast<size_t>(instance)].removed;
+  };
   for (const model::RobotPlacement& robot : layout.robots) {
     if (removed(robot.instance)) continue;
     parts.add(&world_info_t::robots, &world_info_t::nrobots, robot_info(world, layout, robot));
   }
-  for (const device_info_t& device : devices) parts.add(&world_info_t::devices, &world_info_t::ndevices, device);
+  for (const device_info_t& device : devices)
+    parts.add(&world_info_t::devices, &world_info_t::ndevices, device);
   for (const Channel& channel : channels.list()) {
     channel_info_t info{};
-    if (channel.gone) {    // its place counts: ticks name channels by it
+    if (channel.gone) {  // its place counts: ticks name channels by it
       parts.add(&world_info_t::channels, &world_info_t::nchannels, info);
       continue;
     }
@@ -106,7 +114,8 @@ std::vector<world_info_t> make_world_info(const world_info_t& head, const model:
     info.input = channel.input;
     parts.add(&world_info_t::channels, &world_info_t::nchannels, info);
   }
-  for (const model::ListedBody& listed : layout.listed) {    // their places count: pictures label by them
+  for (const model::ListedBody& listed :
+       layout.listed) {  // their places count: pictures label by them
     const model::LinkPlacement& link = layout.links[static_cast<size_t>(listed.link)];
     body_info_t info{};
     info.index = -1;
@@ -114,12 +123,14 @@ std::vector<world_info_t> make_world_info(const world_info_t& head, const model:
     if (removed(link.instance)) {
       // no name
     } else if (listed.body < 0) {
-      info.name = world.models[static_cast<size_t>(link.instance)].name + "/" + link_of(world, link).name;
+      info.name =
+          world.models[static_cast<size_t>(link.instance)].name + "/" + link_of(world, link).name;
     } else {
       const model::BodyPlacement& body = layout.bodies[static_cast<size_t>(listed.body)];
       info.index = listed.body;
       info.name = body.name;
-      for (int each : body.links) info.mass += link_of(world, layout.links[static_cast<size_t>(each)]).inertial.mass;
+      for (int each : body.links)
+        info.mass += link_of(world, layout.links[static_cast<size_t>(each)]).inertial.mass;
     }
     parts.add(&world_info_t::bodies, &world_info_t::nbodies, info);
   }

@@ -3,15 +3,17 @@
 
 #include <vector>
 
+#include "engine/channels.h"
 #include "model/body_layout.h"
 #include "ruedo/device_info_t.hpp"
 #include "ruedo/world_info_t.hpp"
-#include "engine/channels.h"
 
 namespace ruedo::engine {
 
 // The head is copied into each part; the lists are cut where a part would exceed kMaxPartSize.
-std::vector<world_info_t> make_world_info(const world_info_t& head, const model::WorldModel& world, const model::BodyLayout& layout,
-                                          const std::vector<device_info_t>& devices, const Channels& channels);
+std::vector<world_info_t> make_world_info(const world_info_t& head, const model::WorldModel& world,
+                                          const model::BodyLayout& layout,
+                                          const std::vector<device_info_t>& devices,
+                                          const Channels& channels);
 
 }  // namespace ruedo::engine

@@ -38,7 +38,8 @@ class WorldState : public Sensor {
       for (size_t i = 0; i < message.index.size(); ++i) {
         const Pose& X_WB = input.snapshot.bodies[static_cast<size_t>(message.index[i])];
         for (int k = 0; k < 3; ++k) message.position[i][k] = X_WB.translation[k];
-        message.orientation[i] = {X_WB.rotation.w(), X_WB.rotation.x(), X_WB.rotation.y(), X_WB.rotation.z()};
+        message.orientation[i] = {X_WB.rotation.w(), X_WB.rotation.x(), X_WB.rotation.y(),
+                                  X_WB.rotation.z()};
       }
       out.publish(channel_, message);
     }
@@ -58,7 +59,10 @@ class Hash {
     hash_ ^= hash_ >> 29;
   }
   void add(const Vec3& v) { add(v.x()), add(v.y()), add(v.z()); }
-  void add(const Pose& X) { add(X.translation), add(X.rotation.w()), add(X.rotation.x()), add(X.rotation.y()), add(X.rotation.z()); }
+  void add(const Pose& X) {
+    add(X.translation), add(X.rotation.w()), add(X.rotation.x()), add(X.rotation.y()),
+        add(X.rotation.z());
+  }
   void add(const Twist& twist) { add(twist.linear), add(twist.angular); }
   void add(const std::vector<double>& values) {
     for (double value : values) add(value);
@@ -71,15 +75,19 @@ class Hash {
 
 }  // namespace
 
-std::unique_ptr<Sensor> world_state_sensor(const model::WorldModel& world, const model::BodyLayout& layout, int epoch, int channel) {
+std::unique_ptr<Sensor> world_state_sensor(const model::WorldModel& world,
+                                           const model::BodyLayout& layout, int epoch,
+                                           int channel) {
   std::vector<int32_t> there;
   for (size_t i = 0; i < layout.bodies.size(); ++i) {
-    if (!world.models[static_cast<size_t>(layout.bodies[i].instance)].removed) there.push_back(static_cast<int32_t>(i));
+    if (!world.models[static_cast<size_t>(layout.bodies[i].instance)].removed)
+      there.push_back(static_cast<int32_t>(i));
   }
   return std::make_unique<WorldState>(there, epoch, channel);
 }
 
-ModuleSetup world_state_module(const model::WorldModel& world, const model::BodyLayout& layout, int epoch, Channels& channels) {
+ModuleSetup world_state_module(const model::WorldModel& world, const model::BodyLayout& layout,
+                               int epoch, Channels& channels) {
   const int channel = channels.add<world_state_t>("ruedo/world", "", "", kWorldRate);
   ModuleSetup module;
   module.name = "world";

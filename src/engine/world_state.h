@@ -1,21 +1,24 @@
 // The module "world": ruedo/world, the poses of all bodies that can move.
 #pragma once
 
-#include "model/body_layout.h"
 #include "engine/channels.h"
 #include "engine/module.h"
+#include "model/body_layout.h"
 
 namespace ruedo::engine {
 
-inline constexpr size_t kMaxPartSize = 60'000;    // bytes of one part of a long message
+inline constexpr size_t kMaxPartSize = 60'000;  // bytes of one part of a long message
 
 // A module like any other, with one device: the simulation.
-ModuleSetup world_state_module(const model::WorldModel& world, const model::BodyLayout& layout, int epoch, Channels& channels);
+ModuleSetup world_state_module(const model::WorldModel& world, const model::BodyLayout& layout,
+                               int epoch, Channels& channels);
 
 // Its device, for bodies or an epoch that are others now. channel: as the module announced it.
-std::unique_ptr<Sensor> world_state_sensor(const model::WorldModel& world, const model::BodyLayout& layout, int epoch, int channel);
+std::unique_ptr<Sensor> world_state_sensor(const model::WorldModel& world,
+                                           const model::BodyLayout& layout, int epoch, int channel);
 
-// A hash of what a step's state is, for ruedo/tick: of every body's and robot's pose and motion, bit for bit.
+// A hash of what a step's state is, for ruedo/tick: of every body's and robot's pose and motion,
+// bit for bit.
 int64_t state_hash(const Snapshot& snapshot);
 
 }  // namespace ruedo::engine

@@ -1,5 +1,5 @@
-// What a regression or a case of a campaign expects of a run, held against the true state of every step; and how well
-// the run went, in numbers.
+// What a regression or a case of a campaign expects of a run, held against the true state of every
+// step; and how well the run went, in numbers.
 #pragma once
 
 #include <cstdint>
@@ -21,27 +21,28 @@ namespace ruedo::judge {
 class JudgeHull;
 
 struct Goal {
-  double x = 0.0, y = 0.0, radius = 0.0;    // m, world: base_link within this circle
-  double by_s = 0.0;                        // sim time
+  double x = 0.0, y = 0.0, radius = 0.0;  // m, world: base_link within this circle
+  double by_s = 0.0;                      // sim time
 };
-Goal parse_goal(const std::string& text);   // X,Y,RADIUS,BY; throws InputError
+Goal parse_goal(const std::string& text);  // X,Y,RADIUS,BY; throws InputError
 
 struct Expectations {
-  std::string robot;                        // its name; "": the first of the world
+  std::string robot;  // its name; "": the first of the world
   std::vector<Goal> goals;
-  bool no_contact = false;                  // with anything but what its wheels stand on
-  std::optional<double> clearance;          // m, at least, from the robot's hull to everything else
-  std::optional<double> odometry_error;     // m, at most, between odometry and truth
-  double clearance_reach = 0.0;             // m: clearances below this are measured, whether or not one is asked for
+  bool no_contact = false;               // with anything but what its wheels stand on
+  std::optional<double> clearance;       // m, at least, from the robot's hull to everything else
+  std::optional<double> odometry_error;  // m, at most, between odometry and truth
+  double clearance_reach =
+      0.0;  // m: clearances below this are measured, whether or not one is asked for
 };
 
 struct Failure {
-  std::string what;                         // "goal 0", "contact", "clearance", "odometry"
+  std::string what;  // "goal 0", "contact", "clearance", "odometry"
   SimTime time = 0;
   std::string text;
 };
 
-std::string to_line(const Failure& failure);    // "12.500 s: p3at touched wall/link at ..."
+std::string to_line(const Failure& failure);  // "12.500 s: p3at touched wall/link at ..."
 
 // A number that says how well a run went: SI units, in the name's end.
 struct Metric {
@@ -61,8 +62,9 @@ class Judge {
 
   // After the run: what did not hold, the first of each kind, the earliest first.
   std::vector<Failure> failures();
-  // After the run: time_s, x_m, y_m and path_m of the end; goal_distance_m, the smallest to the last goal, and goal_time_s, when all were
-  // reached; contact_time_s of the first contact; clearance_m and odometry_error_m where they were measured.
+  // After the run: time_s, x_m, y_m and path_m of the end; goal_distance_m, the smallest to the
+  // last goal, and goal_time_s, when all were reached; contact_time_s of the first contact;
+  // clearance_m and odometry_error_m where they were measured.
   std::vector<Metric> metrics() const;
   // Where base_link was every quarter of a second: s, m, m.
   struct Place {
@@ -80,8 +82,8 @@ class Judge {
   const model::WorldModel& world_;
   Expectations expected_;
   model::BodyLayout layout_;
-  int robot_ = -1;                          // index into BodyLayout::robots
-  std::vector<bool> own_, wheel_;           // of each link
+  int robot_ = -1;                 // index into BodyLayout::robots
+  std::vector<bool> own_, wheel_;  // of each link
   std::unique_ptr<JudgeHull> hull_;
   std::vector<bool> reached_;
   double last_goal_distance_m_ = std::numeric_limits<double>::infinity();
@@ -93,8 +95,8 @@ class Judge {
   std::vector<Place> track_;
   std::optional<pose_t> first_pose_, pose_;
   std::optional<odometry_t> odometry_;
-  double odometry_error_m_ = -1.0;          // the largest so far; below 0: nothing was compared
-  std::vector<Failure> failures_;           // the first of each kind
+  double odometry_error_m_ = -1.0;  // the largest so far; below 0: nothing was compared
+  std::vector<Failure> failures_;   // the first of each kind
 };
 
 }  // namespace ruedo::judge

@@ -1,7 +1,8 @@
 // How far a robot's hull is from everything else, by horizontal rays.
 //
-// The hull is found once, by rays towards a robot that stands alone; then rays go out from it, in every second degree and
-// at five heights. An obstacle that is thinner than the gap between rays may be missed while it is far.
+// The hull is found once, by rays towards a robot that stands alone; then rays go out from it, in
+// every second degree and at five heights. An obstacle that is thinner than the gap between rays
+// may be missed while it is far.
 #pragma once
 
 #include <memory>
@@ -17,8 +18,8 @@ class JudgeHull {
   JudgeHull(const model::WorldModel& world, const model::BodyLayout& layout, int robot);
 
   struct Nearest {
-    double range = std::numeric_limits<double>::infinity();    // m
-    int link = -1;                                             // of what is nearest
+    double range = std::numeric_limits<double>::infinity();  // m
+    int link = -1;                                           // of what is nearest
   };
   // The nearest thing within `reach` (m) of the hull.
   Nearest nearest(const Snapshot& snapshot, double reach);
@@ -28,7 +29,7 @@ class JudgeHull {
 
   const model::BodyLayout& layout_;
   int robot_;
-  std::vector<scene::Ray> hull_;               // in base_link: points on the hull, directions outwards
+  std::vector<scene::Ray> hull_;  // in base_link: points on the hull, directions outwards
   std::unique_ptr<scene::RayScene> scene_;
   std::vector<scene::Ray> rays_;
   std::vector<scene::Hit> hits_;

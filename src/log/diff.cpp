@@ -7,27 +7,31 @@
 #include <charconv>
 #include <cmath>
 
+#include "log/reader.h"
 #include "ruedo/errors.h"
 #include "ruedo/pose.h"
 #include "ruedo/schema.h"
-#include "log/reader.h"
 
 namespace ruedo::log {
 namespace {
 
-constexpr size_t kMaxSamples = 1000;    // for a plot
+constexpr size_t kMaxSamples = 1000;  // for a plot
 constexpr std::string_view kHeaderChannel = "ruedo/header";
 
 double parse_tolerance(std::string_view text, std::string_view whole) {
   double value = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !(value >= 0.0) || !std::isfinite(value)) {
-    throw InputError({}, "tolerance \"" + std::string(whole) + "\": \"" + std::string(text) + "\" is not a number of at least 0");
+  if (error != std::errc() || end != text.data() + text.size() || !(value >= 0.0) ||
+      !std::isfinite(value)) {
+    throw InputError({}, "tolerance \"" + std::string(whole) + "\": \"" + std::string(text) +
+                             "\" is not a number of at least 0");
   }
   return value;
 }
 
-bool fits(const std::string& pattern, const std::string& name) { return fnmatch(pattern.c_str(), name.c_str(), 0) == 0; }
+bool fits(const std::string& pattern, const std::string& name) {
+  return fnmatch(pattern.c_str(), name.c_str(), 0) == 0;
+}
 
 // A scalar of a message, taken out of it.
 struct Value {
@@ -40,9 +44,12 @@ std::vector<Value> values_of(const Schema& schema, const std::vector<uint8_t>& m
   std::vector<Value> values;
   visit_message(schema, message, [&](const FieldPath& path, const FieldValue& value) {
     Value v{path.str(), path.pattern(), to_string(value), 0.0, true};
-    if (const auto* integer = std::get_if<int64_t>(&value)) v.number = static_cast<double>(*integer);
-    else if (const auto* number = std::get_if<double>(&value)) v.number = *number;
-    else v.is_number = false;
+    if (const auto* integer = std::get_if<int64_t>(&value))
+      v.number = static_cast<double>(*integer);
+    else if (const auto* number = std::get_if<double>(&value))
+      v.number = *number;
+    else
+      v.is_number = false;
     values.push_back(std::move(v));
     return true;
   });
@@ -59,8 +66,10 @@ class Comparison {
     if (golden.data == other.data) return;
     const Schema* schema = find_schema(fingerprint_of(golden.data));
     if (schema != nullptr) channel.type = schema->name;
-    if (schema == nullptr || !well_formed(*schema, golden.data) || !well_formed(*schema, other.data)) {
-      differ(channel, golden.timestamp_us, {"(bytes)", "(bytes)", std::to_string(golden.data.size()) + " bytes", 0, false},
+    if (schema == nullptr || !well_formed(*schema, golden.data) ||
+        !well_formed(*schema, other.data)) {
+      differ(channel, golden.timestamp_us,
+             {"(bytes)", "(bytes)", std::to_string(golden.data.size()) + " bytes", 0, false},
              {"", "", std::to_string(other.data.size()) + " bytes", 0, false});
       return;
     }
@@ -71,7 +80,8 @@ class Comparison {
     if (const DiffRule* rule = rule_of(event.channel, ""); rule != nullptr && rule->ignore) return;
     ChannelDifference& channel = diff_.channels[event.channel];
     int64_t& count = in_golden ? channel.missing : channel.extra;
-    if (count++ == 0) (in_golden ? channel.first_missing : channel.first_extra) = event.timestamp_us;
+    if (count++ == 0)
+      (in_golden ? channel.first_missing : channel.first_extra) = event.timestamp_us;
   }
 
   bool ignored(const std::string& channel) const {
@@ -83,7 +93,9 @@ class Comparison {
   // The last rule for that field; field "": for the channel as a whole.
   const DiffRule* rule_of(const std::string& channel, const std::string& field) const {
     for (auto rule = rules_.rbegin(); rule != rules_.rend(); ++rule) {
-      if (fits(rule->channel, channel) && (field.empty() ? rule->field == "*" : fits(rule->field, field))) return &*rule;
+      if (fits(rule->channel, channel) &&
+          (field.empty() ? rule->field == "*" : fits(rule->field, field)))
+        return &*rule;
     }
     return nullptr;
   }
@@ -95,12 +107,17 @@ class Comparison {
     if (rule->ignore) return true;
     if (!golden.is_number || !other.is_number) return false;
     const double difference = other.number - golden.number;
-    if (rule->angle >= 0.0 && std::isfinite(difference) && std::abs(wrap_angle(difference)) <= rule->angle) return true;
-    return std::abs(difference) <= std::max(rule->absolute, rule->relative * std::abs(golden.number));
+    if (rule->angle >= 0.0 && std::isfinite(difference) &&
+        std::abs(wrap_angle(difference)) <= rule->angle)
+      return true;
+    return std::abs(difference) <=
+           std::max(rule->absolute, rule->relative * std::abs(golden.number));
   }
 
-  // Arrays of other lengths shift what follows, so values are matched by their paths, which come in one order.
-  void fields(ChannelDifference& channel, const Event& event, const std::vector<Value>& golden, const std::vector<Value>& other) {
+  // Arrays of other lengths shift what follows, so values are matched by their paths, which come in
+  // one order.
+  void fields(ChannelDifference& channel, const Event& event, const std::vector<Value>& golden,
+              const std::vector<Value>& other) {
     std::map<std::string_view, const Value*> by_path;
     for (const Value& value : other) by_path.emplace(value.path, &value);
     for (const Value& value : golden) {
@@ -108,7 +125,8 @@ class Comparison {
       const Value absent{value.path, value.pattern, "(absent)", 0.0, false};
       const Value& counterpart = match == by_path.end() ? absent : *match->second;
       if (match != by_path.end()) by_path.erase(match);
-      if (!good(event.channel, value, counterpart)) differ(channel, event.timestamp_us, value, counterpart);
+      if (!good(event.channel, value, counterpart))
+        differ(channel, event.timestamp_us, value, counterpart);
     }
     for (const Value& value : other) {
       if (!by_path.contains(value.path)) continue;
@@ -117,7 +135,8 @@ class Comparison {
     }
   }
 
-  static void differ(ChannelDifference& channel, SimTime time, const Value& golden, const Value& other) {
+  static void differ(ChannelDifference& channel, SimTime time, const Value& golden,
+                     const Value& other) {
     FieldDifference& field = channel.fields[golden.pattern];
     if (field.count++ == 0) {
       field.first_time = time;
@@ -148,7 +167,8 @@ class Stamps {
   // The events of time(), by channel, each channel's in their order.
   std::map<std::string, std::vector<Event>> take() {
     std::map<std::string, std::vector<Event>> events;
-    for (const SimTime now = time(); more_ && time() == now; more_ = reader_.next(event_)) events[event_.channel].push_back(event_);
+    for (const SimTime now = time(); more_ && time() == now; more_ = reader_.next(event_))
+      events[event_.channel].push_back(event_);
     return events;
   }
 
@@ -168,31 +188,42 @@ DiffRule DiffRule::parse(std::string_view text, bool ignore) {
   const size_t colon = where.find(':');
   rule.channel = where.substr(0, colon);
   if (colon != std::string_view::npos) rule.field = where.substr(colon + 1);
-  if (rule.channel.empty() || rule.field.empty()) throw InputError({}, "\"" + std::string(text) + "\" does not name CHANNEL or CHANNEL:FIELD");
+  if (rule.channel.empty() || rule.field.empty())
+    throw InputError({}, "\"" + std::string(text) + "\" does not name CHANNEL or CHANNEL:FIELD");
   if (ignore) return rule;
   if (equals == std::string_view::npos) {
-    throw InputError({}, "tolerance \"" + std::string(text) + "\" is not of the form CHANNEL:FIELD=abs:1e-3,rel:0.01,angle:0.02");
+    throw InputError({}, "tolerance \"" + std::string(text) +
+                             "\" is not of the form CHANNEL:FIELD=abs:1e-3,rel:0.01,angle:0.02");
   }
   std::string_view rest = text.substr(equals + 1);
   while (!rest.empty()) {
     const std::string_view part = rest.substr(0, rest.find(','));
     rest.remove_prefix(std::min(rest.size(), part.size() + 1));
     const size_t separator = part.find(':');
-    const std::string_view kind = separator == std::string_view::npos ? "abs" : part.substr(0, separator);
-    const double value = parse_tolerance(separator == std::string_view::npos ? part : part.substr(separator + 1), text);
-    if (kind == "abs") rule.absolute = value;
-    else if (kind == "rel") rule.relative = value;
-    else if (kind == "angle") rule.angle = value;
-    else throw InputError({}, "tolerance \"" + std::string(text) + "\": \"" + std::string(kind) + "\" is none of abs, rel, angle");
+    const std::string_view kind =
+        separator == std::string_view::npos ? "abs" : part.substr(0, separator);
+    const double value = parse_tolerance(
+        separator == std::string_view::npos ? part : part.substr(separator + 1), text);
+    if (kind == "abs")
+      rule.absolute = value;
+    else if (kind == "rel")
+      rule.relative = value;
+    else if (kind == "angle")
+      rule.angle = value;
+    else
+      throw InputError({}, "tolerance \"" + std::string(text) + "\": \"" + std::string(kind) +
+                               "\" is none of abs, rel, angle");
   }
   return rule;
 }
 
 bool Diff::same() const {
-  return std::all_of(channels.begin(), channels.end(), [](const auto& channel) { return channel.second.same(); });
+  return std::all_of(channels.begin(), channels.end(),
+                     [](const auto& channel) { return channel.second.same(); });
 }
 
-Diff diff_logs(const std::string& golden_path, const std::string& other_path, const std::vector<DiffRule>& rules) {
+Diff diff_logs(const std::string& golden_path, const std::string& other_path,
+               const std::vector<DiffRule>& rules) {
   Diff diff;
   Comparison comparison(diff, rules);
   Stamps golden(golden_path), other(other_path);
@@ -203,7 +234,8 @@ Diff diff_logs(const std::string& golden_path, const std::string& other_path, co
     const bool take_other = other.more() && (!golden.more() || other.time() <= golden.time());
     auto golden_events = take_golden ? golden.take() : decltype(golden.take()){};
     auto other_events = take_other ? other.take() : decltype(other.take()){};
-    if (const auto at = golden_events.find(std::string(kHeaderChannel)); at != golden_events.end()) {
+    if (const auto at = golden_events.find(std::string(kHeaderChannel));
+        at != golden_events.end()) {
       golden_header = at->second.front().data;
       golden_events.erase(at);
     }
@@ -215,13 +247,16 @@ Diff diff_logs(const std::string& golden_path, const std::string& other_path, co
       if (comparison.ignored(channel)) continue;
       const std::vector<Event>& counterparts = other_events[channel];
       for (size_t i = 0; i < events.size(); ++i) {
-        if (i < counterparts.size()) comparison.both(events[i], counterparts[i]);
-        else comparison.only(events[i], true);
+        if (i < counterparts.size())
+          comparison.both(events[i], counterparts[i]);
+        else
+          comparison.only(events[i], true);
       }
     }
     for (const auto& [channel, events] : other_events) {
       const auto counterparts = golden_events.find(channel);
-      for (size_t i = counterparts == golden_events.end() ? 0 : counterparts->second.size(); i < events.size(); ++i) {
+      for (size_t i = counterparts == golden_events.end() ? 0 : counterparts->second.size();
+           i < events.size(); ++i) {
         comparison.only(events[i], false);
       }
     }
@@ -229,7 +264,9 @@ Diff diff_logs(const std::string& golden_path, const std::string& other_path, co
   if (!golden.fault().empty()) diff.notes.push_back(golden_path + ": " + golden.fault());
   if (!other.fault().empty()) diff.notes.push_back(other_path + ": " + other.fault());
   if (golden_header != other_header) {
-    diff.notes.push_back("the headers differ: another machine, version, world file or option (ruedo/header is not compared)");
+    diff.notes.push_back(
+        "the headers differ: another machine, version, world file or option (ruedo/header is not "
+        "compared)");
   }
   return diff;
 }

@@ -1,7 +1,8 @@
 // Compares two logs message by message and field by field, with a tolerance for each.
 //
-// Messages are matched by channel, timestamp and, within those, their order. Types that Ruedo does not know are
-// compared by their bytes. The channel ruedo/header, which tells the machine, is not compared.
+// Messages are matched by channel, timestamp and, within those, their order. Types that Ruedo does
+// not know are compared by their bytes. The channel ruedo/header, which tells the machine, is not
+// compared.
 #pragma once
 
 #include <map>
@@ -13,50 +14,57 @@
 
 namespace ruedo::log {
 
-// What may differ. A value is good when any of the three tolerances holds; the last rule that fits a field counts.
+// What may differ. A value is good when any of the three tolerances holds; the last rule that fits
+// a field counts.
 struct DiffRule {
-  std::string channel = "*";    // shell patterns
-  std::string field = "*";      // without indices: "points.position"
+  std::string channel = "*";  // shell patterns
+  std::string field = "*";    // without indices: "points.position"
   bool ignore = false;
   double absolute = 0.0;
-  double relative = 0.0;        // of the golden value
-  double angle = -1.0;          // rad, of the difference wrapped into (-pi, pi]; below 0: not an angle
+  double relative = 0.0;  // of the golden value
+  double angle = -1.0;    // rad, of the difference wrapped into (-pi, pi]; below 0: not an angle
 
-  // Reads "CHANNEL:FIELD=abs:1e-3,rel:0.01,angle:0.02" and, with ignore, "CHANNEL" or "CHANNEL:FIELD".
-  // Throws InputError.
+  // Reads "CHANNEL:FIELD=abs:1e-3,rel:0.01,angle:0.02" and, with ignore, "CHANNEL" or
+  // "CHANNEL:FIELD". Throws InputError.
   static DiffRule parse(std::string_view text, bool ignore);
 };
 
 struct FieldDifference {
-  struct Sample { SimTime time; double golden, other; };
+  struct Sample {
+    SimTime time;
+    double golden, other;
+  };
 
-  int64_t count = 0;            // values beyond the tolerance
-  double worst = 0.0;           // largest difference of numbers
+  int64_t count = 0;   // values beyond the tolerance
+  double worst = 0.0;  // largest difference of numbers
   SimTime first_time = 0;
   std::string first_path, first_golden, first_other;
   std::vector<Sample> samples;  // of the element that differed first, thinned out, for a plot
 };
 
 struct ChannelDifference {
-  std::string type;             // "" when unknown
-  int64_t compared = 0;         // messages in both logs
-  int64_t missing = 0, extra = 0;    // messages in one log only
+  std::string type;                // "" when unknown
+  int64_t compared = 0;            // messages in both logs
+  int64_t missing = 0, extra = 0;  // messages in one log only
   SimTime first_missing = 0, first_extra = 0;
-  std::map<std::string, FieldDifference> fields;    // by FieldPath::pattern(); "(bytes)" for unknown types
+  std::map<std::string, FieldDifference>
+      fields;  // by FieldPath::pattern(); "(bytes)" for unknown types
   bool same() const { return missing == 0 && extra == 0 && fields.empty(); }
 };
 
 struct Diff {
   std::map<std::string, ChannelDifference> channels;
-  std::vector<std::string> notes;    // cut-off logs, other machines
+  std::vector<std::string> notes;  // cut-off logs, other machines
   bool same() const;
 };
 
 // Throws InputError when one of them is not a log.
-Diff diff_logs(const std::string& golden, const std::string& other, const std::vector<DiffRule>& rules);
+Diff diff_logs(const std::string& golden, const std::string& other,
+               const std::vector<DiffRule>& rules);
 
-std::string diff_text(const Diff& diff);      // for a terminal
-std::string diff_junit(const Diff& diff);     // JUnit XML: one test case a channel
-std::string diff_html(const Diff& diff, const std::string& golden, const std::string& other);    // one page, plots inside
+std::string diff_text(const Diff& diff);   // for a terminal
+std::string diff_junit(const Diff& diff);  // JUnit XML: one test case a channel
+std::string diff_html(const Diff& diff, const std::string& golden,
+                      const std::string& other);  // one page, plots inside
 
 }  // namespace ruedo::log

@@ -12,24 +12,26 @@
 #include <gnu/libc-version.h>
 #include <link.h>
 
+#include "core/sha256.h"
+#include "core/version.h"
+#include "log/reader.h"
 #include "model/resources.h"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
-#include "log/reader.h"
-#include "core/sha256.h"
-#include "core/version.h"
 
 namespace ruedo::log {
 namespace {
 
-// Libraries that compute what goes into messages: arithmetic, physics, rays, pictures, readers of files. Others are
-// loaded as the machine and the options have it, and change nothing.
-constexpr std::string_view kThatMatter[] = {"libstdc++", "libBullet", "libLinearMath",
-                                            "libembree",    "libOSMesa", "libEGL",    "libLLVM",   "libgallium",
-                                            "libopencv_im", "libjpeg",   "libassimp", "libtinyxml2", "liburdfdom"};
+// Libraries that compute what goes into messages: arithmetic, physics, rays, pictures, readers of
+// files. Others are loaded as the machine and the options have it, and change nothing.
+constexpr std::string_view kThatMatter[] = {
+    "libstdc++", "libBullet",   "libLinearMath", "libembree",    "libOSMesa",
+    "libEGL",    "libLLVM",     "libgallium",    "libopencv_im", "libjpeg",
+    "libassimp", "libtinyxml2", "liburdfdom"};
 
 bool matters(std::string_view name) {
-  return std::any_of(std::begin(kThatMatter), std::end(kThatMatter), [&](std::string_view start) { return name.starts_with(start); });
+  return std::any_of(std::begin(kThatMatter), std::end(kThatMatter),
+                     [&](std::string_view start) { return name.starts_with(start); });
 }
 
 std::string joined(const std::vector<std::string>& texts) {
@@ -41,12 +43,15 @@ std::string joined(const std::vector<std::string>& texts) {
 bool holds_this_code(const dl_phdr_info& object) {
   static const int here = 0;
   const auto address = reinterpret_cast<ElfW(Addr)>(&here);
-  return std::any_of(object.dlpi_phdr, object.dlpi_phdr + object.dlpi_phnum, [&](const ElfW(Phdr)& header) {
-    return header.p_type == PT_LOAD && address - (object.dlpi_addr + header.p_vaddr) < header.p_memsz;
-  });
+  return std::any_of(object.dlpi_phdr, object.dlpi_phdr + object.dlpi_phnum,
+                     [&](const ElfW(Phdr) & header) {
+                       return header.p_type == PT_LOAD &&
+                              address - (object.dlpi_addr + header.p_vaddr) < header.p_memsz;
+                     });
 }
 
-// Of the program or shared library that this is linked into: what the linker made of its bytes. "" where it makes nothing.
+// Of the program or shared library that this is linked into: what the linker made of its bytes. ""
+// where it makes nothing.
 std::string build_id() {
   std::string id;
   dl_iterate_phdr(
@@ -60,15 +65,18 @@ std::string build_id() {
           for (const char* end = at + header.p_memsz; at + sizeof(ElfW(Nhdr)) <= end;) {
             const auto* note = reinterpret_cast<const ElfW(Nhdr)*>(at);
             const char* name = at + sizeof *note;
-            const auto* bytes = reinterpret_cast<const unsigned char*>(name + (note->n_namesz + kAlign - 1) / kAlign * kAlign);
-            if (note->n_type == NT_GNU_BUILD_ID && std::string_view(name, note->n_namesz) == std::string_view("GNU", 4)) {
+            const auto* bytes = reinterpret_cast<const unsigned char*>(
+                name + (note->n_namesz + kAlign - 1) / kAlign * kAlign);
+            if (note->n_type == NT_GNU_BUILD_ID &&
+                std::string_view(name, note->n_namesz) == std::string_view("GNU", 4)) {
               char digits[3];
               for (size_t k = 0; k < note->n_descsz; ++k) {
                 std::snprintf(digits, sizeof digits, "%02x", bytes[k]);
                 *static_cast<std::string*>(data) += digits;
               }
             }
-            at = reinterpret_cast<const char*>(bytes) + (note->n_descsz + kAlign - 1) / kAlign * kAlign;
+            at = reinterpret_cast<const char*>(bytes) +
+                 (note->n_descsz + kAlign - 1) / kAlign * kAlign;
           }
         }
         return 1;
@@ -121,7 +129,8 @@ std::vector<std::string> libraries_that_matter() {
   return {names.begin(), names.end()};
 }
 
-log_header_t make_log_header(const model::WorldModel& world, uint64_t seed, const std::vector<std::string>& options) {
+log_header_t make_log_header(const model::WorldModel& world, uint64_t seed,
+                             const std::vector<std::string>& options) {
   log_header_t header;
   header.utime = 0;
   header.epoch = 0;
@@ -154,7 +163,8 @@ void check_files_of_spawned(const std::string& log) {
   while (reader.next(event, [](const std::string& channel) { return channel == "ruedo/header"; })) {
     log_header_t header;
     if (event.channel != "ruedo/header" || std::exchange(first, false)) continue;
-    if (decode_checked(event.data.data(), event.data.size(), header) == DecodeFault::none) check_files(header, log);
+    if (decode_checked(event.data.data(), event.data.size(), header) == DecodeFault::none)
+      check_files(header, log);
   }
 }
 
@@ -163,42 +173,57 @@ void check_files(const log_header_t& header, const std::string& log) {
   const model::ResourceFinder finder(header.world_file, false);
   for (const log_file_t& file : header.files) {
     if (!finder.reaches(file.path)) {
-      throw InputError({log}, "was made from " + file.path + ", which is neither near its world nor in a model folder (RUEDO_PATH); such files are not looked at");
+      throw InputError({log}, "was made from " + file.path +
+                                  ", which is neither near its world nor in a model folder "
+                                  "(RUEDO_PATH); such files are not looked at");
     }
     if (sha256_of_file(file.path) == file.sha256) continue;
     std::error_code error;
-    throw InputError({file.path}, std::filesystem::is_regular_file(file.path, error) ? "was changed since " + log + " was made from it (its sha256 was " + file.sha256 + ")"
-                                                                                     : "cannot be read; " + log + " was made from it");
+    throw InputError({file.path}, std::filesystem::is_regular_file(file.path, error)
+                                      ? "was changed since " + log +
+                                            " was made from it (its sha256 was " + file.sha256 + ")"
+                                      : "cannot be read; " + log + " was made from it");
   }
 }
 
 std::vector<std::string> machine_differences(const log_header_t& log, const log_header_t& here) {
   std::vector<std::string> lines;
   const auto compare = [&](const char* what, const std::string& then, const std::string& now) {
-    if (then != now) lines.push_back(std::string(what) + ": the log has " + then + ", here it is " + now);
+    if (then != now)
+      lines.push_back(std::string(what) + ": the log has " + then + ", here it is " + now);
   };
   compare("Ruedo", log.version, here.version);
   const auto architecture = [](const std::string& cpu) { return cpu.substr(0, cpu.find(' ')); };
   compare("processor", architecture(log.cpu), architecture(here.cpu));
-  // What is computed is the same on all of them, and with every C library; pictures are, unless they were to be fast.
-  if (std::find(log.options.begin(), log.options.end(), "--fast-pixels") != log.options.end()) compare("CPU features", log.cpu, here.cpu);
+  // What is computed is the same on all of them, and with every C library; pictures are, unless
+  // they were to be fast.
+  if (std::find(log.options.begin(), log.options.end(), "--fast-pixels") != log.options.end())
+    compare("CPU features", log.cpu, here.cpu);
   std::vector<std::string> only_log, only_here;
-  std::set_difference(log.libraries.begin(), log.libraries.end(), here.libraries.begin(), here.libraries.end(), std::back_inserter(only_log));
-  std::set_difference(here.libraries.begin(), here.libraries.end(), log.libraries.begin(), log.libraries.end(), std::back_inserter(only_here));
+  std::set_difference(log.libraries.begin(), log.libraries.end(), here.libraries.begin(),
+                      here.libraries.end(), std::back_inserter(only_log));
+  std::set_difference(here.libraries.begin(), here.libraries.end(), log.libraries.begin(),
+                      log.libraries.end(), std::back_inserter(only_here));
   compare("libraries", joined(only_log), joined(only_here));
   return lines;
 }
 
 void check_same_run(const log_header_t& log, const log_header_t& here, const std::string& path) {
-  const auto refuse = [&](const std::string& text) { throw InputError({path}, "is of another run: " + text); };
+  const auto refuse = [&](const std::string& text) {
+    throw InputError({path}, "is of another run: " + text);
+  };
   for (size_t i = 0; i < std::max(log.files.size(), here.files.size()); ++i) {
     if (i >= here.files.size()) refuse("it was made from " + log.files[i].path + ", too");
     if (i >= log.files.size()) refuse("it was not made from " + here.files[i].path);
-    if (log.files[i].path != here.files[i].path) refuse("it was made from " + log.files[i].path + ", not from " + here.files[i].path);
-    if (log.files[i].sha256 != here.files[i].sha256) refuse(here.files[i].path + " was changed since");
+    if (log.files[i].path != here.files[i].path)
+      refuse("it was made from " + log.files[i].path + ", not from " + here.files[i].path);
+    if (log.files[i].sha256 != here.files[i].sha256)
+      refuse(here.files[i].path + " was changed since");
   }
-  if (log.options != here.options) refuse("its options are " + joined(log.options) + "; here they are " + joined(here.options));
-  if (log.step_us != here.step_us) refuse("its steps are " + std::to_string(log.step_us) + " us long");
+  if (log.options != here.options)
+    refuse("its options are " + joined(log.options) + "; here they are " + joined(here.options));
+  if (log.step_us != here.step_us)
+    refuse("its steps are " + std::to_string(log.step_us) + " us long");
 }
 
 }  // namespace ruedo::log

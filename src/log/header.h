@@ -9,16 +9,19 @@
 
 namespace ruedo::log {
 
-// The processor's family, then the vector extensions of this CPU that libraries choose code by: "x86-64 sse4.2 avx".
+// The processor's family, then the vector extensions of this CPU that libraries choose code by:
+// "x86-64 sse4.2 avx".
 std::string cpu_features();
 // Ruedo's version, and the build of this program where the linker noted one: as a header has it.
 std::string own_version();
 std::string libc_version();
-// Those shared libraries of this process that compute what goes into messages, by file name with version, sorted.
+// Those shared libraries of this process that compute what goes into messages, by file name with
+// version, sorted.
 std::vector<std::string> libraries_that_matter();
 
 // options: those that change the result, as on the command line.
-log_header_t make_log_header(const model::WorldModel& world, uint64_t seed, const std::vector<std::string>& options);
+log_header_t make_log_header(const model::WorldModel& world, uint64_t seed,
+                             const std::vector<std::string>& options);
 
 // With their SHA-256.
 std::vector<log_file_t> hashed_files(const std::vector<std::string>& paths);
@@ -28,11 +31,12 @@ void check_files(const log_header_t& header, const std::string& log);
 // The same for the models that came later in the log.
 void check_files_of_spawned(const std::string& log);
 
-// What determines a run's bytes beside its log and is not the same here, a line each: Ruedo's version and build, the CPU,
-// the C library, other libraries.
+// What determines a run's bytes beside its log and is not the same here, a line each: Ruedo's
+// version and build, the CPU, the C library, other libraries.
 std::vector<std::string> machine_differences(const log_header_t& log, const log_header_t& here);
 
-// Throws InputError when a run with the header `here` is another one than the log's: other files, options or steps.
+// Throws InputError when a run with the header `here` is another one than the log's: other files,
+// options or steps.
 void check_same_run(const log_header_t& log, const log_header_t& here, const std::string& path);
 
 }  // namespace ruedo::log

@@ -1,4 +1,5 @@
-// The data of a channel's first message is read for its type, and those of the header and of requests for what they say.
+// The data of a channel's first message is read for its type, and those of the header and of
+// requests for what they say.
 #include "log/index.h"
 
 #include <algorithm>
@@ -13,25 +14,32 @@ namespace {
 
 constexpr const char *kHeader = "ruedo/header", *kApplied = "ruedo/applied";
 
-bool changes_world(int32_t kind) { return kind == request_t::SPAWN || kind == request_t::REMOVE || kind == request_t::RESET; }
+bool changes_world(int32_t kind) {
+  return kind == request_t::SPAWN || kind == request_t::REMOVE || kind == request_t::RESET;
+}
 
 }  // namespace
 
 size_t Index::Channel::count_until(SimTime time_us) const {
-  const auto after = std::upper_bound(entries.begin(), entries.end(), time_us, [](SimTime time, const Entry& entry) { return time < entry.time_us; });
+  const auto after =
+      std::upper_bound(entries.begin(), entries.end(), time_us,
+                       [](SimTime time, const Entry& entry) { return time < entry.time_us; });
   return static_cast<size_t>(after - entries.begin());
 }
 
 Index::Index(const std::string& path) {
   Reader reader(path);
   Event event;
-  std::unordered_map<std::string, size_t> known;    // looked up only
-  const auto wanted = [&](const std::string& channel) { return channel == kApplied || !known.contains(channel); };
+  std::unordered_map<std::string, size_t> known;  // looked up only
+  const auto wanted = [&](const std::string& channel) {
+    return channel == kApplied || !known.contains(channel);
+  };
   size_t messages = 0;
   bool crowded = false;
   for (int64_t offset = 0; reader.next(event, wanted); offset = reader.offset()) {
     if (messages == kMostMessages) {
-      fault_ = "has more than " + std::to_string(kMostMessages) + " messages: those after them are not shown";
+      fault_ = "has more than " + std::to_string(kMostMessages) +
+               " messages: those after them are not shown";
       break;
     }
     if (channels_.size() == kMostChannels && !known.contains(event.channel)) {
@@ -44,21 +52,26 @@ Index::Index(const std::string& path) {
     add(event, offset, reader.offset(), at->second);
   }
   if (!reader.fault().empty()) fault_ = reader.fault();
-  if (crowded && fault_.empty()) fault_ = "has more than " + std::to_string(kMostChannels) + " channels: the others are not shown";
-  if (messages == 0) throw InputError({path}, "holds no message" + (fault_.empty() ? "" : ": " + fault_));
+  if (crowded && fault_.empty())
+    fault_ =
+        "has more than " + std::to_string(kMostChannels) + " channels: the others are not shown";
+  if (messages == 0)
+    throw InputError({path}, "holds no message" + (fault_.empty() ? "" : ": " + fault_));
 }
 
 void Index::add(const Event& event, int64_t offset, int64_t end, size_t channel) {
   const bool first = channels_[channel].entries.empty();
   if (first && event.channel == kHeader) {
     log_header_t header;
-    if (decode_checked(event.data.data(), event.data.size(), header) == DecodeFault::none) header_ = std::move(header);
+    if (decode_checked(event.data.data(), event.data.size(), header) == DecodeFault::none)
+      header_ = std::move(header);
   }
   end_us_ = std::max(end_us_, event.timestamp_us);
   channels_[channel].entries.push_back({end_us_, offset, static_cast<uint32_t>(end - offset)});
   if (event.channel != kApplied || edits_.size() >= kMostEdits) return;
   applied_t applied;
-  if (decode_checked(event.data.data(), event.data.size(), applied) == DecodeFault::none && changes_world(applied.kind)) {
+  if (decode_checked(event.data.data(), event.data.size(), applied) == DecodeFault::none &&
+      changes_world(applied.kind)) {
     edits_.push_back({end_us_, std::move(applied)});
   }
 }

@@ -1,7 +1,8 @@
-// Where each message of a log is, by channel and time, so that any moment of it can be shown at once.
+// Where each message of a log is, by channel and time, so that any moment of it can be shown at
+// once.
 //
-// The log is read through once; of most messages only the place is kept. Times never go back: an event that does counts as
-// at the time of the one before it.
+// The log is read through once; of most messages only the place is kept. Times never go back: an
+// event that does counts as at the time of the one before it.
 #pragma once
 
 #include <cstdint>
@@ -9,26 +10,28 @@
 #include <string>
 #include <vector>
 
+#include "log/reader.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/log_header_t.hpp"
-#include "log/reader.h"
 
 namespace ruedo::log {
 
 class Index {
  public:
-  static constexpr size_t kMostMessages = 20'000'000;    // 24 bytes each; what comes after them is not shown
-  static constexpr size_t kMostChannels = 65'536;        // what is on others is not shown
-  static constexpr size_t kMostEdits = 1'000;            // requests that changed the world; later ones are not followed
+  static constexpr size_t kMostMessages =
+      20'000'000;  // 24 bytes each; what comes after them is not shown
+  static constexpr size_t kMostChannels = 65'536;  // what is on others is not shown
+  static constexpr size_t kMostEdits =
+      1'000;  // requests that changed the world; later ones are not followed
 
   struct Entry {
     SimTime time_us;
-    int64_t offset;    // of the event in the file
-    uint32_t size;     // bytes of the file up to the next event
+    int64_t offset;  // of the event in the file
+    uint32_t size;   // bytes of the file up to the next event
   };
   struct Channel {
     std::string name;
-    int64_t fingerprint = 0;    // of its first message
+    int64_t fingerprint = 0;  // of its first message
     std::vector<Entry> entries;
 
     // How many messages there are up to that time, itself included.
@@ -43,7 +46,9 @@ class Index {
   explicit Index(const std::string& path);
 
   const std::vector<Channel>& channels() const { return channels_; }
-  const std::optional<log_header_t>& header() const { return header_; }    // none: not recorded by ruedo run
+  const std::optional<log_header_t>& header() const {
+    return header_;
+  }  // none: not recorded by ruedo run
   const std::vector<Edit>& edits() const { return edits_; }
   SimTime begin_us() const { return begin_us_; }
   SimTime end_us() const { return end_us_; }

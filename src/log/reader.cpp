@@ -1,4 +1,5 @@
-// The format of an event, big endian: sync word, event number, timestamp, lengths of channel and data, channel, data.
+// The format of an event, big endian: sync word, event number, timestamp, lengths of channel and
+// data, channel, data.
 #include "log/reader.h"
 
 #include <sys/stat.h>
@@ -20,13 +21,16 @@ constexpr uint32_t kMaxData = 1u << 30;
 uint32_t read32(const uint8_t* bytes) {
   return uint32_t{bytes[0]} << 24 | uint32_t{bytes[1]} << 16 | uint32_t{bytes[2]} << 8 | bytes[3];
 }
-int64_t read64(const uint8_t* bytes) { return static_cast<int64_t>(uint64_t{read32(bytes)} << 32 | read32(bytes + 4)); }
+int64_t read64(const uint8_t* bytes) {
+  return static_cast<int64_t>(uint64_t{read32(bytes)} << 32 | read32(bytes + 4));
+}
 
 }  // namespace
 
 Reader::Reader(const std::string& path) : path_(path) {
-  struct stat status {};
-  if (stat(path.c_str(), &status) != 0) throw InputError({path}, std::string("cannot be read: ") + std::strerror(errno));
+  struct stat status{};
+  if (stat(path.c_str(), &status) != 0)
+    throw InputError({path}, std::string("cannot be read: ") + std::strerror(errno));
   if (!S_ISREG(status.st_mode)) throw InputError({path}, "is not a file; an LCM log is expected");
   size_ = status.st_size;
   file_.reset(std::fopen(path.c_str(), "rb"));
@@ -53,7 +57,9 @@ bool Reader::skip(size_t size) {
 
 void Reader::seek(int64_t offset) {
   std::clearerr(file_.get());
-  fault_ = std::fseek(file_.get(), static_cast<long>(offset), SEEK_SET) == 0 ? "" : "cannot be read at byte " + std::to_string(offset);
+  fault_ = std::fseek(file_.get(), static_cast<long>(offset), SEEK_SET) == 0
+               ? ""
+               : "cannot be read at byte " + std::to_string(offset);
   offset_ = offset;
 }
 

@@ -24,8 +24,9 @@ class Reader {
   // Throws InputError when the file cannot be opened, or is not an LCM log.
   explicit Reader(const std::string& path);
 
-  // Reads the next whole event; false at the end, or where the log was cut off or is damaged: see fault().
-  // The event's buffers are reused. wanted: of other channels the data is passed over, and left empty.
+  // Reads the next whole event; false at the end, or where the log was cut off or is damaged: see
+  // fault(). The event's buffers are reused. wanted: of other channels the data is passed over, and
+  // left empty.
   bool next(Event& event, const std::function<bool(const std::string& channel)>& wanted = {});
 
   // The next event is that at this byte, where offset() was before one.
@@ -34,14 +35,16 @@ class Reader {
   // After next() returned false: "" at a proper end, else what is wrong and at which byte.
   const std::string& fault() const { return fault_; }
   const std::string& path() const { return path_; }
-  int64_t size() const { return size_; }        // bytes of the file
-  int64_t offset() const { return offset_; }    // bytes read so far
+  int64_t size() const { return size_; }      // bytes of the file
+  int64_t offset() const { return offset_; }  // bytes read so far
 
  private:
   bool read(void* into, size_t size);
   bool skip(size_t size);
 
-  struct Close { void operator()(std::FILE* file) const { std::fclose(file); } };
+  struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
   std::string path_;
   std::unique_ptr<std::FILE, Close> file_;
   int64_t size_ = 0;

@@ -1,4 +1,5 @@
-// The LCM log format: each event is sync word, number, timestamp, two lengths, channel and data, big-endian.
+// The LCM log format: each event is sync word, number, timestamp, two lengths, channel and data,
+// big-endian.
 #include "log/writer.h"
 
 #include <cerrno>
@@ -14,7 +15,7 @@ namespace ruedo::log {
 namespace {
 
 constexpr uint32_t kSync = 0xEDA1DA01;
-constexpr size_t kFlushSize = 1 << 20;    // bytes
+constexpr size_t kFlushSize = 1 << 20;  // bytes
 
 template <class Integer>
 void put(std::vector<uint8_t>& buffer, Integer value) {
@@ -25,8 +26,10 @@ void put(std::vector<uint8_t>& buffer, Integer value) {
 
 }  // namespace
 
-Writer::Writer(const std::string& path) : Writer(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666), path) {
-  if (file_ < 0) throw EnvironmentError("--record: cannot write '" + path + "': " + std::strerror(errno));
+Writer::Writer(const std::string& path)
+    : Writer(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666), path) {
+  if (file_ < 0)
+    throw EnvironmentError("--record: cannot write '" + path + "': " + std::strerror(errno));
 }
 
 Writer::Writer(int file, std::string name) : path_(std::move(name)), file_(file) {
@@ -36,12 +39,14 @@ Writer::Writer(int file, std::string name) : path_(std::move(name)), file_(file)
 
 Writer::~Writer() {
   flush();
-  struct stat status {};
-  if (::fstat(file_, &status) == 0 && status.st_nlink > 0) ::fdatasync(file_);    // a power cut must not take back what was closed
+  struct stat status{};
+  if (::fstat(file_, &status) == 0 && status.st_nlink > 0)
+    ::fdatasync(file_);  // a power cut must not take back what was closed
   ::close(file_);
 }
 
-void Writer::write(int64_t timestamp_us, const std::string& channel, const uint8_t* data, size_t size) {
+void Writer::write(int64_t timestamp_us, const std::string& channel, const uint8_t* data,
+                   size_t size) {
   if (!error_.empty()) return;
   put(buffer_, kSync);
   put(buffer_, static_cast<uint64_t>(events_++));

@@ -1,6 +1,7 @@
 // Writes a standard LCM log: what lcm-logplayer, lcm-spy and lcm::LogFile read.
 //
-// Buffered, and flushed at whole events: a log that was cut off by a full disk or a kill is readable up to there.
+// Buffered, and flushed at whole events: a log that was cut off by a full disk or a kill is
+// readable up to there.
 #pragma once
 
 #include <cstdint>
@@ -28,10 +29,12 @@ class Writer {
   // Begins anew with an empty file, whatever went wrong before.
   void truncate();
 
-  // Adds the events of another log that was written from its beginning and flushed, to an empty one. What went wrong, or "".
+  // Adds the events of another log that was written from its beginning and flushed, to an empty
+  // one. What went wrong, or "".
   std::string append(const Writer& other);
 
-  // What went wrong ("no space left on device"), or "". The file then ends with the last whole event that had room.
+  // What went wrong ("no space left on device"), or "". The file then ends with the last whole
+  // event that had room.
   const std::string& error() const { return error_; }
   const std::string& path() const { return path_; }
 
@@ -41,8 +44,8 @@ class Writer {
   std::string path_;
   int file_ = -1;
   std::vector<uint8_t> buffer_;
-  std::vector<size_t> ends_;    // where the events in the buffer end
-  int64_t written_ = 0;         // bytes of whole events in the file
+  std::vector<size_t> ends_;  // where the events in the buffer end
+  int64_t written_ = 0;       // bytes of whole events in the file
   int64_t events_ = 0;
   std::string error_;
 };

@@ -1,5 +1,6 @@
-// Which links move as one. Links are joined by fixed joints, by the wheels of a kinematic drive, and by its
-// passive wheels (casters): what hangs on a free joint and reaches down to the ground the robot stands on.
+// Which links move as one. Links are joined by fixed joints, by the wheels of a kinematic drive,
+// and by its passive wheels (casters): what hangs on a free joint and reaches down to the ground
+// the robot stands on.
 #include "model/body_layout.h"
 
 #include <algorithm>
@@ -32,8 +33,11 @@ class Groups {
 };
 
 bool unlimited(const Joint& joint) {
-  if (joint.type == JointType::ball || joint.type == JointType::continuous || joint.type == JointType::universal) return true;
-  return joint.type == JointType::revolute && std::isinf(joint.axis.lower) && std::isinf(joint.axis.upper);
+  if (joint.type == JointType::ball || joint.type == JointType::continuous ||
+      joint.type == JointType::universal)
+    return true;
+  return joint.type == JointType::revolute && std::isinf(joint.axis.lower) &&
+         std::isinf(joint.axis.upper);
 }
 
 // The links below a joint, through all further joints.
@@ -41,7 +45,9 @@ std::vector<int> subtree(const Model& model, int link) {
   std::vector<int> links{link};
   for (size_t i = 0; i < links.size(); ++i) {
     for (const Joint& joint : model.joints) {
-      if (joint.parent == links[i] && std::find(links.begin(), links.end(), joint.child) == links.end()) links.push_back(joint.child);
+      if (joint.parent == links[i] &&
+          std::find(links.begin(), links.end(), joint.child) == links.end())
+        links.push_back(joint.child);
     }
   }
   return links;
@@ -56,7 +62,8 @@ double lowest_point(const Model& model, const std::vector<int>& links, const Pos
       if (box.isEmpty()) continue;
       const Pose X = X_BaseM * link.X_ML * c.X_LC;
       for (int corner = 0; corner < 8; ++corner) {
-        lowest = std::min(lowest, (X * box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner))).z());
+        lowest = std::min(
+            lowest, (X * box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner))).z());
       }
     }
   }
@@ -65,22 +72,28 @@ double lowest_point(const Model& model, const std::vector<int>& links, const Pos
 
 bool is_drive_wheel(const Model& model, int joint) {
   if (!model.drive) return false;
-  const auto in = [&](const std::vector<int>& list) { return std::find(list.begin(), list.end(), joint) != list.end(); };
-  return in(model.drive->left_joints) || in(model.drive->right_joints) || in(model.drive->steer_joints);
+  const auto in = [&](const std::vector<int>& list) {
+    return std::find(list.begin(), list.end(), joint) != list.end();
+  };
+  return in(model.drive->left_joints) || in(model.drive->right_joints) ||
+         in(model.drive->steer_joints);
 }
 
 // The link that a drive moves: what its wheels hang on, be it by way of what steers them.
 int carrier_of(const Model& model) {
   const DriveDescription& drive = *model.drive;
-  const std::vector<int>& first = !drive.steer_joints.empty() ? drive.steer_joints : !drive.left_joints.empty() ? drive.left_joints : drive.right_joints;
+  const std::vector<int>& first = !drive.steer_joints.empty()  ? drive.steer_joints
+                                  : !drive.left_joints.empty() ? drive.left_joints
+                                                               : drive.right_joints;
   return first.empty() ? 0 : std::max(model.joints[static_cast<size_t>(first[0])].parent, 0);
 }
 
-// What of a model moves as one, and which links turn with which of its joints: the same for all its instances.
+// What of a model moves as one, and which links turn with which of its joints: the same for all its
+// instances.
 struct Grouping {
   Groups links;
-  std::vector<bool> joined;          // of each joint: its links are one
-  std::vector<bool> is_static;       // of each group's representative
+  std::vector<bool> joined;     // of each joint: its links are one
+  std::vector<bool> is_static;  // of each group's representative
 };
 
 Grouping group(const Model& model) {
@@ -90,11 +103,13 @@ Grouping group(const Model& model) {
   const auto join = [&](size_t j) {
     if (result.joined[j]) return;
     result.joined[j] = true;
-    if (model.joints[j].parent >= 0) result.links.join(model.joints[j].parent, model.joints[j].child);
+    if (model.joints[j].parent >= 0)
+      result.links.join(model.joints[j].parent, model.joints[j].child);
   };
   for (size_t j = 0; j < model.joints.size(); ++j) {
     const Joint& joint = model.joints[j];
-    if (joint.type == JointType::fixed || (kinematic && is_drive_wheel(model, static_cast<int>(j)))) join(j);
+    if (joint.type == JointType::fixed || (kinematic && is_drive_wheel(model, static_cast<int>(j))))
+      join(j);
   }
   if (kinematic) {
     const Pose X_BaseM = model.drive->X_MBase.inverse();
@@ -108,7 +123,8 @@ Grouping group(const Model& model) {
     }
   }
   for (const Joint& joint : model.joints) {
-    if (joint.parent < 0 && joint.type == JointType::fixed) result.is_static[static_cast<size_t>(result.links.find(joint.child))] = true;
+    if (joint.parent < 0 && joint.type == JointType::fixed)
+      result.is_static[static_cast<size_t>(result.links.find(joint.child))] = true;
   }
   return result;
 }
@@ -123,16 +139,17 @@ Pose turned(const WheelPlacement& wheel, double angle) {
   return {turn, wheel.center_in_L - turn * wheel.center_in_L};
 }
 
-// The rim's speed for a speed of base_link of 1 ahead, 1 to the left, and 1 rad/s. p: the wheel in base_link; axis: about
-// which it turns, there.
+// The rim's speed for a speed of base_link of 1 ahead, 1 to the left, and 1 rad/s. p: the wheel in
+// base_link; axis: about which it turns, there.
 Vec3 rim_of(const DriveDescription& drive, bool left, const Vec3& p, const Vec3& axis) {
   using Steering = DriveDescription::Steering;
   const double side = left ? -1.0 : 1.0;
-  if (drive.steering == Steering::omni) {    // rollers across: only what is along its rim turns it
+  if (drive.steering == Steering::omni) {  // rollers across: only what is along its rim turns it
     const Vec3 along = axis.cross(Vec3::UnitZ()).normalized();
     return {along.x(), along.y(), p.x() * along.y() - p.y() * along.x()};
   }
-  if (drive.steering == Steering::mecanum) {    // rollers at 45 degrees, whose axes meet in the middle of the robot, seen from above
+  if (drive.steering == Steering::mecanum) {  // rollers at 45 degrees, whose axes meet in the
+                                              // middle of the robot, seen from above
     return {1.0, p.x() * p.y() > 0 ? -1.0 : 1.0, side * 0.5 * (drive.track + drive.wheelbase)};
   }
   constexpr double kInTheMiddle_m = 1e-6;
@@ -148,11 +165,13 @@ Pose BodyLayout::link_in_body(int link, const std::vector<double>& wheel_angles)
   const WheelPlacement& wheel = wheels[static_cast<size_t>(placement.wheel)];
   const Pose& X_BWheel = links[static_cast<size_t>(wheel.link)].X_BL;
   const Pose X_turn = turned(wheel, wheel_angles[static_cast<size_t>(placement.wheel)]);
-  const Pose X_BL = wheel.link == link ? X_BWheel * X_turn : X_BWheel * X_turn * X_BWheel.inverse() * placement.X_BL;
+  const Pose X_BL = wheel.link == link ? X_BWheel * X_turn
+                                       : X_BWheel * X_turn * X_BWheel.inverse() * placement.X_BL;
   if (wheel.on < 0) return X_BL;
   const WheelPlacement& steer = wheels[static_cast<size_t>(wheel.on)];
   const Pose& X_BSteer = links[static_cast<size_t>(steer.link)].X_BL;
-  return X_BSteer * turned(steer, wheel_angles[static_cast<size_t>(wheel.on)]) * X_BSteer.inverse() * X_BL;
+  return X_BSteer * turned(steer, wheel_angles[static_cast<size_t>(wheel.on)]) *
+         X_BSteer.inverse() * X_BL;
 }
 
 // Of the last models seen: fleets follow one another.
@@ -160,7 +179,8 @@ struct BodyLayout::Known {
   std::vector<std::pair<const Model*, Grouping>> groupings;
 
   const Grouping& of(const Model& model) {
-    auto known = std::find_if(groupings.begin(), groupings.end(), [&](const auto& each) { return each.first == &model; });
+    auto known = std::find_if(groupings.begin(), groupings.end(),
+                              [&](const auto& each) { return each.first == &model; });
     if (known == groupings.end()) {
       if (groupings.size() >= 16) groupings.clear();
       groupings.emplace_back(&model, group(model));
@@ -184,7 +204,8 @@ void BodyLayout::append(const WorldModel& world) {
 }
 
 void BodyLayout::list(size_t first_body, size_t first_link) {
-  for (size_t body = first_body; body < bodies.size(); ++body) listed.push_back({static_cast<int>(body), bodies[body].links.front()});
+  for (size_t body = first_body; body < bodies.size(); ++body)
+    listed.push_back({static_cast<int>(body), bodies[body].links.front()});
   for (size_t link = first_link; link < links.size(); ++link) {
     if (links[link].body < 0) listed.push_back({-1, static_cast<int>(link)});
   }
@@ -194,7 +215,8 @@ void BodyLayout::place_again(const WorldModel& world, int instance) {
   const ModelInstance& placed = world.models[static_cast<size_t>(instance)];
   const Model& model = *placed.model;
   for (LinkPlacement& link : links) {
-    if (link.instance == instance && link.body < 0) link.X_BL = placed.X_WM * model.links[static_cast<size_t>(link.link)].X_ML;
+    if (link.instance == instance && link.body < 0)
+      link.X_BL = placed.X_WM * model.links[static_cast<size_t>(link.link)].X_ML;
   }
   for (BodyPlacement& body : bodies) {
     if (body.instance != instance) continue;
@@ -229,7 +251,10 @@ void BodyLayout::add(const WorldModel& world, int i, Known& known) {
       int& body = body_of_group[static_cast<size_t>(root)];
       if (body < 0) {
         body = static_cast<int>(bodies.size());
-        bodies.push_back({i, root, {}, instance.X_WM * X_MB,
+        bodies.push_back({i,
+                          root,
+                          {},
+                          instance.X_WM * X_MB,
                           instance.name + "/" + model.links[static_cast<size_t>(root)].name});
       }
       link.body = body;
@@ -251,7 +276,8 @@ void BodyLayout::add(const WorldModel& world, int i, Known& known) {
     }
     const LinkPlacement& link = links[static_cast<size_t>(first + carrier)];
     placement.body = link.body;
-    placement.X_BBase = link.X_BL * model.links[static_cast<size_t>(carrier)].X_ML.inverse() * X_MBase;
+    placement.X_BBase =
+        link.X_BL * model.links[static_cast<size_t>(carrier)].X_ML.inverse() * X_MBase;
   }
   if (model.drive) {
     const bool kinematic = model.drive->kind == DriveDescription::Kind::kinematic;
@@ -267,15 +293,21 @@ void BodyLayout::add(const WorldModel& world, int i, Known& known) {
       wheel.left = left;
       wheel.steers = steers;
       Vec3 axis_M = joint.X_MJ.rotation * joint.axis.axis_in_J;
-      if (steers ? axis_M.z() < 0 : model.drive->steering != DriveDescription::Steering::omni && axis_M.dot(left_M) < 0) axis_M = -axis_M;
-      wheel.rim = rim_of(*model.drive, left, X_BaseM * joint.X_MJ.translation, X_BaseM.rotation * axis_M);
+      if (steers
+              ? axis_M.z() < 0
+              : model.drive->steering != DriveDescription::Steering::omni && axis_M.dot(left_M) < 0)
+        axis_M = -axis_M;
+      wheel.rim =
+          rim_of(*model.drive, left, X_BaseM * joint.X_MJ.translation, X_BaseM.rotation * axis_M);
       wheel.axis_in_L = (X_LM.rotation * axis_M).normalized();
       wheel.center_in_L = X_LM * joint.X_MJ.translation;
       const int index = static_cast<int>(wheels.size());
       for (const int below : subtree(model, joint.child)) {
         int& turned_by = links[static_cast<size_t>(first + below)].wheel;
-        if (turned_by >= 0) wheels[static_cast<size_t>(turned_by)].on = index;
-        else if (kinematic) turned_by = index;
+        if (turned_by >= 0)
+          wheels[static_cast<size_t>(turned_by)].on = index;
+        else if (kinematic)
+          turned_by = index;
       }
       placement.wheels.push_back(index);
       wheels.push_back(wheel);
@@ -288,9 +320,11 @@ void BodyLayout::add(const WorldModel& world, int i, Known& known) {
     for (size_t j = 0; j < model.joints.size(); ++j) {
       const Joint& joint = model.joints[j];
       if (grouping.joined[j] || is_drive_wheel(model, static_cast<int>(j))) continue;
-      const auto body = [&](int link) { return link < 0 ? -1 : links[static_cast<size_t>(first + link)].body; };
+      const auto body = [&](int link) {
+        return link < 0 ? -1 : links[static_cast<size_t>(first + link)].body;
+      };
       const int parent = body(joint.parent), child = body(joint.child);
-      if (parent == child) continue;    // both static, or joined another way
+      if (parent == child) continue;  // both static, or joined another way
       placement.joints.push_back(static_cast<int>(joints.size()));
       joints.push_back({i, static_cast<int>(j), parent, child});
     }

@@ -1,4 +1,5 @@
-// GJK in double precision. Touching within a micrometre counts as overlap or not: callers keep a margin.
+// GJK in double precision. Touching within a micrometre counts as overlap or not: callers keep a
+// margin.
 #include "model/convex.h"
 
 #include <array>
@@ -11,7 +12,10 @@ namespace {
 Vec3 support_in_shape(const Geometry& g, const Vec3& d) {
   const auto sign = [](double v) { return v < 0 ? -1.0 : 1.0; };
   const double across = math::hypot(d.x(), d.y());
-  const auto rim = [&](double radius) { return across > 0 ? Vec3(d.x() / across * radius, d.y() / across * radius, 0) : Vec3(Vec3::Zero()); };
+  const auto rim = [&](double radius) {
+    return across > 0 ? Vec3(d.x() / across * radius, d.y() / across * radius, 0)
+                      : Vec3(Vec3::Zero());
+  };
   switch (g.shape) {
     case Shape::box: return Vec3(sign(d.x()), sign(d.y()), sign(d.z())).cwiseProduct(g.size) / 2;
     case Shape::sphere: return d.normalized() * g.size.x();
@@ -20,7 +24,8 @@ Vec3 support_in_shape(const Geometry& g, const Vec3& d) {
       return g.size.cwiseProduct(scaled.normalized());
     }
     case Shape::cylinder: return rim(g.size.x()) + Vec3(0, 0, sign(d.z()) * g.size.y() / 2);
-    case Shape::capsule: return d.normalized() * g.size.x() + Vec3(0, 0, sign(d.z()) * g.size.y() / 2);
+    case Shape::capsule:
+      return d.normalized() * g.size.x() + Vec3(0, 0, sign(d.z()) * g.size.y() / 2);
     case Shape::cone: {
       const Vec3 apex(0, 0, g.size.y() / 2), base = rim(g.size.x()) - Vec3(0, 0, g.size.y() / 2);
       return apex.dot(d) > base.dot(d) ? apex : base;
@@ -49,7 +54,8 @@ struct Simplex {
   }
 };
 
-// Keeps the part of the simplex nearest to the origin and turns `direction` to it; true: the origin is inside.
+// Keeps the part of the simplex nearest to the origin and turns `direction` to it; true: the origin
+// is inside.
 bool reduce(Simplex& s, Vec3& direction) {
   const auto line = [&](const Vec3& a, const Vec3& b) {
     const Vec3 ab = b - a;
@@ -90,10 +96,14 @@ bool reduce(Simplex& s, Vec3& direction) {
   } else if (s.n == 4) {
     const Vec3 b = s.p[2], c = s.p[1], d = s.p[0];
     const Vec3 abc = (b - a).cross(c - a), acd = (c - a).cross(d - a), adb = (d - a).cross(b - a);
-    if (abc.dot(-a) > 0) triangle(a, b, c);
-    else if (acd.dot(-a) > 0) triangle(a, c, d);
-    else if (adb.dot(-a) > 0) triangle(a, d, b);
-    else return true;
+    if (abc.dot(-a) > 0)
+      triangle(a, b, c);
+    else if (acd.dot(-a) > 0)
+      triangle(a, c, d);
+    else if (adb.dot(-a) > 0)
+      triangle(a, d, b);
+    else
+      return true;
   }
   return false;
 }
@@ -116,13 +126,13 @@ bool overlap(const Convex& a, const Convex& b) {
   simplex.set({support(direction)});
   direction = -simplex.p[0];
   for (int i = 0; i < 64; ++i) {
-    if (direction.squaredNorm() < 1e-18) return true;    // the origin is on the simplex
+    if (direction.squaredNorm() < 1e-18) return true;  // the origin is on the simplex
     const Vec3 point = support(direction.normalized());
     if (point.dot(direction) <= 0) return false;
     simplex.p[static_cast<size_t>(simplex.n++)] = point;
     if (reduce(simplex, direction)) return true;
   }
-  return true;    // it hovers at the border
+  return true;  // it hovers at the border
 }
 
 }  // namespace ruedo::model

@@ -9,13 +9,16 @@
 namespace ruedo::model {
 namespace {
 
-constexpr size_t kMaxChannel = 63;    // bytes; LCM's limit
+constexpr size_t kMaxChannel = 63;  // bytes; LCM's limit
 
-constexpr const char* kFixedDevices[] = {"odometry", "pose", "motion", "velocity", "wheels", "move", "joints", "joint_command"};
+constexpr const char* kFixedDevices[] = {"odometry", "pose", "motion", "velocity",
+                                         "wheels",   "move", "joints", "joint_command"};
 
 bool is_fit(char c) { return static_cast<unsigned char>(c) > 0x20 && c != 0x7f && c != '/'; }
 
-bool fit_for_channel(std::string_view name) { return std::all_of(name.begin(), name.end(), is_fit) && for_terminal(name) == name; }
+bool fit_for_channel(std::string_view name) {
+  return std::all_of(name.begin(), name.end(), is_fit) && for_terminal(name) == name;
+}
 
 }  // namespace
 
@@ -31,14 +34,21 @@ void make_sensor_names_unique(Model& model, const std::string& where, Findings& 
   for (SensorDescription& sensor : model.sensors) {
     const std::string fit = made_fit_for_channel(sensor.name);
     if (fit == sensor.name) continue;
-    findings.repaired(sensor.element->source, where, "the sensor name '" + sensor.name + "' is not fit for a channel; it is called '" + fit + "'");
+    findings.repaired(sensor.element->source, where,
+                      "the sensor name '" + sensor.name +
+                          "' is not fit for a channel; it is called '" + fit + "'");
     sensor.name = fit;
   }
-  const auto is_kept = [](const std::string& name) { return std::find(std::begin(kFixedDevices), std::end(kFixedDevices), name) != std::end(kFixedDevices); };
+  const auto is_kept = [](const std::string& name) {
+    return std::find(std::begin(kFixedDevices), std::end(kFixedDevices), name) !=
+           std::end(kFixedDevices);
+  };
   for (SensorDescription& sensor : model.sensors) {
     if (!is_kept(sensor.name)) continue;
     const std::string other = sensor.name + "_sensor";
-    findings.repaired(sensor.element->source, where, "the sensor name '" + sensor.name + "' is kept for the robot's own channel; it is called '" + other + "'");
+    findings.repaired(sensor.element->source, where,
+                      "the sensor name '" + sensor.name +
+                          "' is kept for the robot's own channel; it is called '" + other + "'");
     sensor.name = other;
   }
   std::map<std::string, int> uses;
@@ -53,35 +63,45 @@ void make_sensor_names_unique(Model& model, const std::string& where, Findings& 
   std::map<std::string, const SensorDescription*> seen;
   for (SensorDescription& sensor : model.sensors) {
     const std::string own = sensor.name;
-    for (int number = 2; !seen.try_emplace(sensor.name, &sensor).second; ++number) sensor.name = own + "_" + std::to_string(number);
+    for (int number = 2; !seen.try_emplace(sensor.name, &sensor).second; ++number)
+      sensor.name = own + "_" + std::to_string(number);
     if (sensor.name == own) continue;
-    findings.repaired(sensor.element->source, where, "a second sensor of the name '" + own + "'; it is called '" + sensor.name + "'");
+    findings.repaired(
+        sensor.element->source, where,
+        "a second sensor of the name '" + own + "'; it is called '" + sensor.name + "'");
   }
 }
 
 void check_channel_names(const ModelInstance& instance, const Source& source) {
   if (!instance.is_robot()) return;
   const auto refuse = [](const Source& at, const std::string& what) { throw InputError(at, what); };
-  if (instance.name == "ruedo") refuse(source, "the model name 'ruedo' is kept for Ruedo's own channels; choose another");
+  if (instance.name == "ruedo")
+    refuse(source, "the model name 'ruedo' is kept for Ruedo's own channels; choose another");
   if (!fit_for_channel(instance.name)) {
-    refuse(source, "the model name '" + instance.name + "' is not fit for a channel: it has a '/', a space or a control character");
+    refuse(source, "the model name '" + instance.name +
+                       "' is not fit for a channel: it has a '/', a space or a control character");
   }
   const auto check_length = [&](const std::string& device, const Source& at) {
     const std::string channel = instance.name + "/" + device;
     if (channel.size() > kMaxChannel) {
-      refuse(at, "the channel '" + channel + "' has " + std::to_string(channel.size()) + " characters; allowed are 63");
+      refuse(at, "the channel '" + channel + "' has " + std::to_string(channel.size()) +
+                     " characters; allowed are 63");
     }
   };
   check_length("joint_command", source);
   for (const SensorDescription& sensor : instance.model->sensors) {
     const Source& at = sensor.element->source;
-    if (std::find(std::begin(kFixedDevices), std::end(kFixedDevices), sensor.name) != std::end(kFixedDevices)) {
-      refuse(at, "the sensor name '" + sensor.name + "' is kept for the robot's own channel; choose another");
+    if (std::find(std::begin(kFixedDevices), std::end(kFixedDevices), sensor.name) !=
+        std::end(kFixedDevices)) {
+      refuse(at, "the sensor name '" + sensor.name +
+                     "' is kept for the robot's own channel; choose another");
     }
     if (!fit_for_channel(sensor.name)) {
-      refuse(at, "the sensor name '" + sensor.name + "' is not fit for a channel: it has a '/', a space or a control character");
+      refuse(at, "the sensor name '" + sensor.name +
+                     "' is not fit for a channel: it has a '/', a space or a control character");
     }
-    check_length(sensor.name + (sensor.type.find("camera") != std::string::npos ? "/labels" : ""), at);
+    check_length(sensor.name + (sensor.type.find("camera") != std::string::npos ? "/labels" : ""),
+                 at);
   }
 }
 

@@ -17,30 +17,36 @@ namespace ruedo::model {
 namespace {
 
 constexpr size_t kMaxFileBytes = 64u << 20;
-// What a document may hold. The parser's own costs grow with the square of some of these, so they are counted before it runs.
-constexpr size_t kMaxElements = 2'000'000, kMaxAttributes = 64, kMaxDepth = 200, kMaxAttributeBytes = 64 << 10, kMaxTextBytes = 1 << 20;
+// What a document may hold. The parser's own costs grow with the square of some of these, so they
+// are counted before it runs.
+constexpr size_t kMaxElements = 2'000'000, kMaxAttributes = 64, kMaxDepth = 200,
+                 kMaxAttributeBytes = 64 << 10, kMaxTextBytes = 1 << 20;
 
 std::string trimmed(const std::string& text) {
   const char* space = " \t\r\n\f\v";
   const size_t begin = text.find_first_not_of(space);
-  return begin == std::string::npos ? "" : text.substr(begin, text.find_last_not_of(space) - begin + 1);
+  return begin == std::string::npos ? ""
+                                    : text.substr(begin, text.find_last_not_of(space) - begin + 1);
 }
 
-// Whether the bytes are UTF-8 (overlong forms and surrogates are let through: nothing here interprets them).
+// Whether the bytes are UTF-8 (overlong forms and surrogates are let through: nothing here
+// interprets them).
 bool is_utf8(const std::string& text) {
   for (size_t i = 0; i < text.size();) {
     const unsigned char c = static_cast<unsigned char>(text[i]);
     const int more = c < 0x80 ? 0 : c >> 5 == 6 ? 1 : c >> 4 == 14 ? 2 : c >> 3 == 30 ? 3 : -1;
     if (more < 0) return false;
     for (int k = 1; k <= more; ++k) {
-      if (i + k >= text.size() || (static_cast<unsigned char>(text[i + k]) & 0xC0) != 0x80) return false;
+      if (i + k >= text.size() || (static_cast<unsigned char>(text[i + k]) & 0xC0) != 0x80)
+        return false;
     }
     i += static_cast<size_t>(more) + 1;
   }
   return true;
 }
 
-// Goes over a text as a parser would, counts, and refuses what holds too much. What is not XML is left to the parser to name.
+// Goes over a text as a parser would, counts, and refuses what holds too much. What is not XML is
+// left to the parser to name.
 class Counter {
  public:
   Counter(std::string_view text, const std::string& file) : text_(text), file_(file) {}
@@ -49,13 +55,15 @@ class Counter {
     for (size_t at = 0; at < text_.size();) {
       if (text_[at] != '<') {
         const size_t end = std::min(text_.find('<', at), text_.size());
-        if (end - at > kMaxTextBytes) refuse(at, "a text of " + std::to_string(end - at) + " bytes", kMaxTextBytes);
+        if (end - at > kMaxTextBytes)
+          refuse(at, "a text of " + std::to_string(end - at) + " bytes", kMaxTextBytes);
         at = end;
       } else if (starts(at, "<!--")) {
         at = after(at, "-->");
       } else if (starts(at, "<![CDATA[")) {
         const size_t end = after(at, "]]>");
-        if (end - at > kMaxTextBytes) refuse(at, "a text of " + std::to_string(end - at) + " bytes", kMaxTextBytes);
+        if (end - at > kMaxTextBytes)
+          refuse(at, "a text of " + std::to_string(end - at) + " bytes", kMaxTextBytes);
         at = end;
       } else if (starts(at, "<?") || starts(at, "<!")) {
         at = after(at, ">");
@@ -69,23 +77,30 @@ class Counter {
   }
 
  private:
-  bool starts(size_t at, std::string_view with) const { return text_.substr(at, with.size()) == with; }
+  bool starts(size_t at, std::string_view with) const {
+    return text_.substr(at, with.size()) == with;
+  }
   size_t after(size_t at, std::string_view what) const {
     const size_t found = text_.find(what, at);
     return found == std::string_view::npos ? text_.size() : found + what.size();
   }
 
   size_t element(size_t begin) {
-    if (++elements_ > kMaxElements) refuse(begin, "more than " + std::to_string(kMaxElements) + " elements", kMaxElements);
-    if (++depth_ > kMaxDepth) refuse(begin, "elements are nested too deep: " + std::to_string(depth_) + " levels", kMaxDepth);
+    if (++elements_ > kMaxElements)
+      refuse(begin, "more than " + std::to_string(kMaxElements) + " elements", kMaxElements);
+    if (++depth_ > kMaxDepth)
+      refuse(begin, "elements are nested too deep: " + std::to_string(depth_) + " levels",
+             kMaxDepth);
     size_t attributes = 0, at = begin + 1;
     for (; at < text_.size() && text_[at] != '>' && text_[at] != '<'; ++at) {
       if (text_[at] == '=' && ++attributes > kMaxAttributes) {
-        refuse(begin, "an element of more than " + std::to_string(kMaxAttributes) + " attributes", kMaxAttributes);
+        refuse(begin, "an element of more than " + std::to_string(kMaxAttributes) + " attributes",
+               kMaxAttributes);
       }
       if (text_[at] != '"' && text_[at] != '\'') continue;
       const size_t end = std::min(text_.find(text_[at], at + 1), text_.size());
-      if (end - at > kMaxAttributeBytes) refuse(begin, "an attribute of " + std::to_string(end - at) + " bytes", kMaxAttributeBytes);
+      if (end - at > kMaxAttributeBytes)
+        refuse(begin, "an attribute of " + std::to_string(end - at) + " bytes", kMaxAttributeBytes);
       at = end;
     }
     if (at < text_.size() && text_[at] == '>' && text_[at - 1] == '/') --depth_;
@@ -93,8 +108,10 @@ class Counter {
   }
 
   [[noreturn]] void refuse(size_t at, const std::string& what, size_t allowed) const {
-    const auto line = 1 + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at), '\n');
-    throw InputError({file_, static_cast<int>(line)}, what + "; allowed are " + std::to_string(allowed));
+    const auto line =
+        1 + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at), '\n');
+    throw InputError({file_, static_cast<int>(line)},
+                     what + "; allowed are " + std::to_string(allowed));
   }
 
   std::string_view text_;
@@ -118,7 +135,8 @@ struct Converter {
     element->name = checked(xml.Name(), xml.GetLineNum());
     element->source = {file, xml.GetLineNum()};
     for (auto* a = xml.FirstAttribute(); a; a = a->Next()) {
-      element->attributes.emplace_back(checked(a->Name(), a->GetLineNum()), checked(a->Value(), a->GetLineNum()));
+      element->attributes.emplace_back(checked(a->Name(), a->GetLineNum()),
+                                       checked(a->Value(), a->GetLineNum()));
     }
     std::string text;
     for (auto* node = xml.FirstChild(); node; node = node->NextSibling()) {
@@ -137,13 +155,15 @@ std::string what_is_wrong(const tinyxml2::XMLDocument& xml) {
   using namespace tinyxml2;
   switch (xml.ErrorID()) {
     case XML_ERROR_EMPTY_DOCUMENT: return "the file is empty";
-    case XML_ERROR_MISMATCHED_ELEMENT: return "not XML: this element is closed by another name, or not at all";
+    case XML_ERROR_MISMATCHED_ELEMENT:
+      return "not XML: this element is closed by another name, or not at all";
     case XML_ERROR_PARSING_ELEMENT: return "not XML: an element that is not complete";
     case XML_ERROR_PARSING_ATTRIBUTE: return "not XML: an attribute that is not complete";
     case XML_ERROR_PARSING_TEXT: return "not XML: text that never ends";
     case XML_ERROR_PARSING_COMMENT: return "not XML: a comment that never ends";
     case XML_ERROR_PARSING_CDATA: return "not XML: a CDATA section that never ends";
-    case XML_ERROR_PARSING_DECLARATION: return "not XML: a declaration that is wrong or in the wrong place";
+    case XML_ERROR_PARSING_DECLARATION:
+      return "not XML: a declaration that is wrong or in the wrong place";
     case XML_ERROR_PARSING_UNKNOWN: return "not XML: a '<!' that never ends";
     case XML_ELEMENT_DEPTH_EXCEEDED: return "elements are nested too deep";
     default: return std::string("not XML: ") + xml.ErrorName();
@@ -157,9 +177,10 @@ std::unique_ptr<Element> parse_document(const std::string& text, const std::stri
   if (text.rfind("\xFF\xFE", 0) == 0 || text.rfind("\xFE\xFF", 0) == 0) {
     throw InputError({file, 1}, "the text is UTF-16; save the file as UTF-8");
   }
-  if (text.find('\0') != std::string::npos) throw InputError({file, 1}, "not a text file: it holds zero bytes");
+  if (text.find('\0') != std::string::npos)
+    throw InputError({file, 1}, "not a text file: it holds zero bytes");
   std::string_view start = text;
-  if (start.starts_with("\xEF\xBB\xBF")) start.remove_prefix(3);    // UTF-8's mark
+  if (start.starts_with("\xEF\xBB\xBF")) start.remove_prefix(3);  // UTF-8's mark
   const size_t begin = start.find_first_not_of(" \t\r\n\f\v");
   if (begin == std::string_view::npos) throw InputError({file, 0}, "the file is empty");
   if (start[begin] != '<') throw InputError({file, 1}, "not XML: the text does not begin with '<'");
@@ -170,7 +191,8 @@ std::unique_ptr<Element> parse_document(const std::string& text, const std::stri
   const auto* root = xml.RootElement();
   if (!root) throw InputError({file, 1}, "the file holds no element");
   if (const auto* second = root->NextSiblingElement()) {
-    throw InputError({file, second->GetLineNum()}, "not XML: a second root element <" + std::string(second->Name()) + ">");
+    throw InputError({file, second->GetLineNum()},
+                     "not XML: a second root element <" + std::string(second->Name()) + ">");
   }
   return Converter{file}.convert(*root);
 }
@@ -178,19 +200,27 @@ std::unique_ptr<Element> parse_document(const std::string& text, const std::stri
 std::string read_text_file(const std::string& path, size_t max_bytes) {
   // Opened once, without waiting for a FIFO's writer: what is looked at is what is read.
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
-  if (descriptor < 0) throw InputError({path, 0}, errno == ENOENT ? "no such file" : std::string("cannot be read: ") + std::strerror(errno));
-  struct Close { void operator()(std::FILE* file) const { std::fclose(file); } };
+  if (descriptor < 0)
+    throw InputError({path, 0}, errno == ENOENT
+                                    ? "no such file"
+                                    : std::string("cannot be read: ") + std::strerror(errno));
+  struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
   const std::unique_ptr<std::FILE, Close> file(::fdopen(descriptor, "rb"));
-  struct stat info {};
-  if (!file || ::fstat(descriptor, &info) != 0) throw InputError({path, 0}, std::string("cannot be read: ") + std::strerror(errno));
+  struct stat info{};
+  if (!file || ::fstat(descriptor, &info) != 0)
+    throw InputError({path, 0}, std::string("cannot be read: ") + std::strerror(errno));
   if (S_ISDIR(info.st_mode)) throw InputError({path, 0}, "is a folder; a file is needed");
   if (!S_ISREG(info.st_mode)) throw InputError({path, 0}, "is not a regular file");
   if (static_cast<size_t>(info.st_size) > max_bytes) {
-    throw InputError({path, 0}, "has " + std::to_string(info.st_size) + " bytes; allowed are " + std::to_string(max_bytes));
+    throw InputError({path, 0}, "has " + std::to_string(info.st_size) + " bytes; allowed are " +
+                                    std::to_string(max_bytes));
   }
   std::string text(static_cast<size_t>(info.st_size), '\0');
   text.resize(std::fread(text.data(), 1, text.size(), file.get()));
-  if (std::ferror(file.get())) throw InputError({path, 0}, std::string("cannot be read: ") + std::strerror(errno));
+  if (std::ferror(file.get()))
+    throw InputError({path, 0}, std::string("cannot be read: ") + std::strerror(errno));
   return text;
 }
 

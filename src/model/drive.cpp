@@ -1,4 +1,5 @@
-// <ruedo:drive> and <ruedo:odometry>, with what they leave out taken from the wheels' joints and shapes.
+// <ruedo:drive> and <ruedo:odometry>, with what they leave out taken from the wheels' joints and
+// shapes.
 #include "model/drive.h"
 
 #include <algorithm>
@@ -16,7 +17,7 @@
 namespace ruedo::model {
 namespace {
 
-constexpr double kStandardGravity = 9.80665;    // m/s^2
+constexpr double kStandardGravity = 9.80665;  // m/s^2
 
 int joint_of(const Element& element, const Model& model) {
   const std::string name = dotted(element.text);
@@ -26,7 +27,8 @@ int joint_of(const Element& element, const Model& model) {
     // Gazebo's plugins also take "MODEL::JOINT".
     if (joint.name == name || model.name + "." + joint.name == name) {
       if (joint.type != JointType::revolute && joint.type != JointType::continuous) {
-        element.fail("the joint '" + name + "' does not turn; a wheel's joint is revolute or continuous");
+        element.fail("the joint '" + name +
+                     "' does not turn; a wheel's joint is revolute or continuous");
       }
       return static_cast<int>(i);
     }
@@ -37,8 +39,8 @@ int joint_of(const Element& element, const Model& model) {
                (near.empty() ? "" : "; did you mean '" + near + "'?"));
 }
 
-// The radius of the wheel on a joint: of the round shapes of its link and of the links fixed to it, across the
-// axis; 0 when there is none.
+// The radius of the wheel on a joint: of the round shapes of its link and of the links fixed to it,
+// across the axis; 0 when there is none.
 double radius_of(const Model& model, const Joint& joint) {
   std::vector<int> links{joint.child};
   for (size_t i = 0; i < links.size(); ++i) {
@@ -72,9 +74,10 @@ Vec3 middle(const Model& model, const std::vector<int>& joints) {
   return sum / static_cast<double>(joints.size());
 }
 
-// x ahead, with the left wheels to the left. Wheels named the other way round (some robots have that) keep the
-// model's own x ahead.
-Quat heading_of(const Vec3& left, const Vec3& right, DriveDescription& drive, const Element& element) {
+// x ahead, with the left wheels to the left. Wheels named the other way round (some robots have
+// that) keep the model's own x ahead.
+Quat heading_of(const Vec3& left, const Vec3& right, DriveDescription& drive,
+                const Element& element) {
   Vec3 across = left - right;
   across.z() = 0;
   if (!(across.norm() > 1e-6)) element.fail("the left and the right wheels are in one place");
@@ -98,13 +101,15 @@ void sort_by_front(const Model& model, const Pose& X_MBase, std::vector<int>& jo
 
 using Steering = DriveDescription::Steering;
 
-constexpr double kMostSteering_rad = 1.56;    // a wheel across the robot would not roll
+constexpr double kMostSteering_rad = 1.56;  // a wheel across the robot would not roll
 constexpr double kUsualSteering_rad = 0.6;
 
 const std::vector<std::pair<std::string, Steering>>& steerings() {
   static const std::vector<std::pair<std::string, Steering>> list = {
-      {"differential", Steering::differential}, {"tracked", Steering::tracked}, {"ackermann", Steering::ackermann}, {"tricycle", Steering::tricycle},
-      {"mecanum", Steering::mecanum},           {"omni", Steering::omni},       {"holonomic", Steering::holonomic}};
+      {"differential", Steering::differential}, {"tracked", Steering::tracked},
+      {"ackermann", Steering::ackermann},       {"tricycle", Steering::tricycle},
+      {"mecanum", Steering::mecanum},           {"omni", Steering::omni},
+      {"holonomic", Steering::holonomic}};
   return list;
 }
 
@@ -125,7 +130,8 @@ bool is_steered(const Model& model, const DriveDescription& drive, int joint) {
     for (const int steer : drive.steer_joints) {
       if (model.joints[static_cast<size_t>(steer)].child == link) return true;
     }
-    const auto above = std::find_if(model.joints.begin(), model.joints.end(), [&](const Joint& each) { return each.child == link; });
+    const auto above = std::find_if(model.joints.begin(), model.joints.end(),
+                                    [&](const Joint& each) { return each.child == link; });
     link = above == model.joints.end() ? -1 : above->parent;
   }
   return false;
@@ -143,9 +149,12 @@ void read_joints(const Element& e, const Model& model, DriveDescription& drive) 
   all.insert(all.end(), drive.right_joints.begin(), drive.right_joints.end());
   all.insert(all.end(), drive.steer_joints.begin(), drive.steer_joints.end());
   for (size_t i = 0; i < all.size(); ++i) {
-    if (std::find(all.begin(), all.begin() + static_cast<ptrdiff_t>(i), all[i]) == all.begin() + static_cast<ptrdiff_t>(i)) continue;
+    if (std::find(all.begin(), all.begin() + static_cast<ptrdiff_t>(i), all[i]) ==
+        all.begin() + static_cast<ptrdiff_t>(i))
+      continue;
     const bool sides = drive.steer_joints.empty() && !drive.right_joints.empty();
-    e.fail("the joint '" + model.joints[static_cast<size_t>(all[i])].name + (sides ? "' is left and right" : "' is named twice"));
+    e.fail("the joint '" + model.joints[static_cast<size_t>(all[i])].name +
+           (sides ? "' is left and right" : "' is named twice"));
   }
   const auto need = [&](bool there, const char* name) {
     if (!there) e.fail(std::string("has no <") + name + ">");
@@ -155,19 +164,24 @@ void read_joints(const Element& e, const Model& model, DriveDescription& drive) 
     case Steering::mecanum:
       need(!drive.left_joints.empty(), "ruedo:left_joint");
       need(!drive.right_joints.empty(), "ruedo:right_joint");
-      if (drive.steering == Steering::mecanum && (drive.left_joints.size() != 2 || drive.right_joints.size() != 2)) e.fail("a mecanum drive has two left and two right wheels");
+      if (drive.steering == Steering::mecanum &&
+          (drive.left_joints.size() != 2 || drive.right_joints.size() != 2))
+        e.fail("a mecanum drive has two left and two right wheels");
       break;
     case Steering::omni:
       if (all.size() < 3) e.fail("an omni drive has three wheels or more");
       break;
     case Steering::ackermann:
     case Steering::tricycle:
-      need(!drive.left_joints.empty() || !drive.right_joints.empty(), drive.steering == Steering::tricycle ? "ruedo:wheel_joint" : "ruedo:left_joint");
+      need(!drive.left_joints.empty() || !drive.right_joints.empty(),
+           drive.steering == Steering::tricycle ? "ruedo:wheel_joint" : "ruedo:left_joint");
       need(!drive.steer_joints.empty(), "ruedo:steer_joint");
       break;
     case Steering::tracked:
     case Steering::holonomic:
-      if (drive.left_joints.empty() != drive.right_joints.empty() && drive.steering == Steering::tracked) e.fail("has wheels on one side only");
+      if (drive.left_joints.empty() != drive.right_joints.empty() &&
+          drive.steering == Steering::tracked)
+        e.fail("has wheels on one side only");
       break;
   }
 }
@@ -181,7 +195,9 @@ Vec3 below_model(const Model& model) {
       const Eigen::AlignedBox3d box = bounds(each.geometry);
       if (box.isEmpty()) continue;
       for (int corner = 0; corner < 8; ++corner) {
-        lowest = std::min(lowest, (link.X_ML * each.X_LC * box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner))).z());
+        lowest = std::min(lowest, (link.X_ML * each.X_LC *
+                                   box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner)))
+                                      .z());
       }
     }
   }
@@ -189,20 +205,24 @@ Vec3 below_model(const Model& model) {
   return at;
 }
 
-// base_link: on the ground, in the middle of the wheels that are not steered; and what follows from it.
+// base_link: on the ground, in the middle of the wheels that are not steered; and what follows from
+// it.
 void place_base(const Element& e, const Model& model, DriveDescription& drive) {
   std::vector<int> wheels = drive.left_joints;
   wheels.insert(wheels.end(), drive.right_joints.begin(), drive.right_joints.end());
   Quat heading = Quat::Identity();
-  Vec3 at = wheels.empty() ? below_model(model) : Vec3(middle(model, wheels) - Vec3(0, 0, drive.wheel_radius));
+  Vec3 at = wheels.empty() ? below_model(model)
+                           : Vec3(middle(model, wheels) - Vec3(0, 0, drive.wheel_radius));
   double track = 0;
   const auto fixed_of = [&](const std::vector<int>& side) {
     std::vector<int> fixed;
-    std::copy_if(side.begin(), side.end(), std::back_inserter(fixed), [&](int joint) { return !is_steered(model, drive, joint); });
+    std::copy_if(side.begin(), side.end(), std::back_inserter(fixed),
+                 [&](int joint) { return !is_steered(model, drive, joint); });
     return fixed;
   };
   const bool steers = drive.steering == Steering::ackermann || drive.steering == Steering::tricycle;
-  const std::vector<int> lefts = steers ? fixed_of(drive.left_joints) : drive.left_joints, rights = steers ? fixed_of(drive.right_joints) : drive.right_joints;
+  const std::vector<int> lefts = steers ? fixed_of(drive.left_joints) : drive.left_joints,
+                         rights = steers ? fixed_of(drive.right_joints) : drive.right_joints;
   if (!lefts.empty() && !rights.empty() && drive.steering != Steering::omni) {
     const Vec3 left = middle(model, lefts), right = middle(model, rights);
     heading = heading_of(left, right, drive, e);
@@ -215,7 +235,8 @@ void place_base(const Element& e, const Model& model, DriveDescription& drive) {
     const Vec3 steered = middle(model, drive.steer_joints);
     if (fixed.empty()) {
       const double wheelbase = e.number("ruedo:wheelbase", 0, positive);
-      if (wheelbase == 0) e.fail("has no <ruedo:wheelbase>, and no wheel that is not steered to take it from");
+      if (wheelbase == 0)
+        e.fail("has no <ruedo:wheelbase>, and no wheel that is not steered to take it from");
       const Vec3 ahead = heading * Vec3::UnitX();
       at = Vec3(steered.x(), steered.y(), at.z()) - wheelbase * ahead;
     } else {
@@ -223,7 +244,9 @@ void place_base(const Element& e, const Model& model, DriveDescription& drive) {
       at = {axle.x(), axle.y(), axle.z() - drive.wheel_radius};
     }
     const double ahead = (heading.conjugate() * Vec3(steered - at)).x();
-    if (std::abs(ahead) < 1e-3) e.fail("the steered wheels are beside the fixed ones; they have to be ahead of them or behind");
+    if (std::abs(ahead) < 1e-3)
+      e.fail(
+          "the steered wheels are beside the fixed ones; they have to be ahead of them or behind");
     drive.wheelbase = std::copysign(e.number("ruedo:wheelbase", std::abs(ahead), positive), ahead);
     double limit = std::numeric_limits<double>::infinity();
     for (const int joint : drive.steer_joints) {
@@ -231,19 +254,29 @@ void place_base(const Element& e, const Model& model, DriveDescription& drive) {
       limit = std::min({limit, std::abs(axis.lower), std::abs(axis.upper)});
     }
     if (!(limit > 0)) limit = kUsualSteering_rad;
-    drive.max_steering_angle = std::min(e.number("ruedo:max_steering_angle", std::isinf(limit) ? (drive.steering == Steering::tricycle ? kMostSteering_rad : kUsualSteering_rad) : limit, positive), kMostSteering_rad);
-    drive.max_steering_rate = e.number("ruedo:max_steering_rate", drive.max_steering_rate, Allowed::positive(quantity::kSpeed).or_infinite());
+    drive.max_steering_angle = std::min(
+        e.number("ruedo:max_steering_angle",
+                 std::isinf(limit) ? (drive.steering == Steering::tricycle ? kMostSteering_rad
+                                                                           : kUsualSteering_rad)
+                                   : limit,
+                 positive),
+        kMostSteering_rad);
+    drive.max_steering_rate = e.number("ruedo:max_steering_rate", drive.max_steering_rate,
+                                       Allowed::positive(quantity::kSpeed).or_infinite());
   }
-  drive.track = track > 0 ? e.number("ruedo:track", track, positive) : e.number("ruedo:track", 0, Allowed::not_negative(quantity::kLength));
-  if (drive.steering == Steering::tracked && drive.track == 0) e.fail("has no <ruedo:track>, and no wheels to take it from");
+  drive.track = track > 0 ? e.number("ruedo:track", track, positive)
+                          : e.number("ruedo:track", 0, Allowed::not_negative(quantity::kLength));
+  if (drive.steering == Steering::tracked && drive.track == 0)
+    e.fail("has no <ruedo:track>, and no wheels to take it from");
   drive.X_MBase = {heading, at};
   drive.X_MBase = e.pose("ruedo:base", drive.X_MBase);
-  if (drive.steering == Steering::omni) {    // left and right only say on which side they are
+  if (drive.steering == Steering::omni) {  // left and right only say on which side they are
     const Pose X_BaseM = drive.X_MBase.inverse();
     drive.left_joints.clear();
     drive.right_joints.clear();
     for (const int joint : wheels) {
-      const bool left = (X_BaseM * model.joints[static_cast<size_t>(joint)].X_MJ.translation).y() > 0;
+      const bool left =
+          (X_BaseM * model.joints[static_cast<size_t>(joint)].X_MJ.translation).y() > 0;
       (left ? drive.left_joints : drive.right_joints).push_back(joint);
     }
   }
@@ -251,22 +284,28 @@ void place_base(const Element& e, const Model& model, DriveDescription& drive) {
   sort_by_front(model, drive.X_MBase, drive.right_joints);
   if (drive.steering == Steering::mecanum) {
     const Pose X_BaseM = drive.X_MBase.inverse();
-    const auto x = [&](const std::vector<int>& side, size_t i) { return (X_BaseM * model.joints[static_cast<size_t>(side[i])].X_MJ.translation).x(); };
-    const double apart = (x(drive.left_joints, 0) - x(drive.left_joints, 1) + x(drive.right_joints, 0) - x(drive.right_joints, 1)) / 2;
+    const auto x = [&](const std::vector<int>& side, size_t i) {
+      return (X_BaseM * model.joints[static_cast<size_t>(side[i])].X_MJ.translation).x();
+    };
+    const double apart = (x(drive.left_joints, 0) - x(drive.left_joints, 1) +
+                          x(drive.right_joints, 0) - x(drive.right_joints, 1)) /
+                         2;
     if (!(apart > 1e-6)) e.fail("the front and the rear wheels are in one place");
     drive.wheelbase = e.number("ruedo:wheelbase", apart, positive);
   }
 }
 
 void read_limits(const Element& e, const Model& model, DriveDescription& drive) {
-  const Allowed speed = Allowed::positive(quantity::kSpeed).or_infinite(), acceleration = Allowed::positive(quantity::kAcceleration).or_infinite(),
+  const Allowed speed = Allowed::positive(quantity::kSpeed).or_infinite(),
+                acceleration = Allowed::positive(quantity::kAcceleration).or_infinite(),
                 effort = Allowed::positive(quantity::kEffort).or_infinite();
   drive.max_speed = e.number("ruedo:max_speed", drive.max_speed, speed);
   drive.max_side_speed = e.number("ruedo:max_side_speed", drive.max_speed, speed);
   drive.max_turn_rate = e.number("ruedo:max_turn_rate", drive.max_turn_rate, speed);
   drive.acceleration = e.number("ruedo:acceleration", drive.acceleration, acceleration);
   drive.deceleration = e.number("ruedo:deceleration", drive.acceleration, acceleration);
-  drive.turn_acceleration = e.number("ruedo:turn_acceleration", drive.turn_acceleration, acceleration);
+  drive.turn_acceleration =
+      e.number("ruedo:turn_acceleration", drive.turn_acceleration, acceleration);
   double mass = 0;
   for (const Link& link : model.links) mass += link.inertial.mass;
   drive.max_force = e.number("ruedo:max_force", mass * kStandardGravity, effort);
@@ -279,11 +318,14 @@ void read_servo(const Element& e, DriveDescription& drive) {
   drive.servo_rate_gain = e.number("ruedo:servo_rate_gain", 0.0, gain);
   drive.servo_angle_gain = e.number("ruedo:servo_angle_gain", 0.0, gain);
   drive.gear = e.number("ruedo:gear", drive.gear, Allowed::positive(quantity::kFactor));
-  drive.stall_torque = e.number("ruedo:stall_torque", drive.stall_torque, Allowed::positive(quantity::kEffort).or_infinite());
-  drive.no_load_rate = e.number("ruedo:no_load_rate", drive.no_load_rate, Allowed::positive(quantity::kSpeed).or_infinite());
+  drive.stall_torque = e.number("ruedo:stall_torque", drive.stall_torque,
+                                Allowed::positive(quantity::kEffort).or_infinite());
+  drive.no_load_rate = e.number("ruedo:no_load_rate", drive.no_load_rate,
+                                Allowed::positive(quantity::kSpeed).or_infinite());
   drive.yaw_gain = e.number("ruedo:yaw_gain", 0.0, gain);
   drive.gyro_bias = e.number("ruedo:gyro_bias", 0.0, Allowed::any(quantity::kSpeed));
-  drive.gyro_scale_error = e.number("ruedo:gyro_scale_error", 0.0, {.min = -1.0, .max = 1.0, .min_excluded = true});
+  drive.gyro_scale_error =
+      e.number("ruedo:gyro_scale_error", 0.0, {.min = -1.0, .max = 1.0, .min_excluded = true});
 }
 
 // The sensor reads the rest, and says what is wrong with these.
@@ -295,7 +337,9 @@ void read_odometry(const Element& odometry, DriveDescription& drive) {
       if (values.size() == 2 && values[side] > -1.0) drive.radius_error[side] = values[side];
     }
   }
-  drive.track_error = odometry.number("ruedo:track_error", 0.0, {.min = -1.0, .min_excluded = true, .quantity = &quantity::kFactor});
+  drive.track_error =
+      odometry.number("ruedo:track_error", 0.0,
+                      {.min = -1.0, .min_excluded = true, .quantity = &quantity::kFactor});
 }
 
 }  // namespace
@@ -308,42 +352,74 @@ std::string name_of(Steering steering) {
 }
 
 const std::vector<std::string>& drive_elements() {
-  static const std::vector<std::string> names = {
-      "ruedo:left_joint", "ruedo:right_joint", "ruedo:wheel_joint", "ruedo:steer_joint", "ruedo:wheel_radius", "ruedo:track", "ruedo:wheelbase",
-      "ruedo:max_steering_angle", "ruedo:max_steering_rate", "ruedo:base", "ruedo:max_speed", "ruedo:max_side_speed",
-      "ruedo:max_turn_rate", "ruedo:acceleration", "ruedo:deceleration", "ruedo:turn_acceleration", "ruedo:max_force",
-      "ruedo:max_wheel_torque", "ruedo:max_wheel_rate", "ruedo:watchdog", "ruedo:pose_rate", "ruedo:status_rate",
-      "ruedo:traction", "ruedo:primitives", "ruedo:servo_rate_gain", "ruedo:servo_angle_gain", "ruedo:gear", "ruedo:stall_torque",
-      "ruedo:no_load_rate", "ruedo:yaw_gain", "ruedo:gyro_bias", "ruedo:gyro_scale_error"};
+  static const std::vector<std::string> names = {"ruedo:left_joint",
+                                                 "ruedo:right_joint",
+                                                 "ruedo:wheel_joint",
+                                                 "ruedo:steer_joint",
+                                                 "ruedo:wheel_radius",
+                                                 "ruedo:track",
+                                                 "ruedo:wheelbase",
+                                                 "ruedo:max_steering_angle",
+                                                 "ruedo:max_steering_rate",
+                                                 "ruedo:base",
+                                                 "ruedo:max_speed",
+                                                 "ruedo:max_side_speed",
+                                                 "ruedo:max_turn_rate",
+                                                 "ruedo:acceleration",
+                                                 "ruedo:deceleration",
+                                                 "ruedo:turn_acceleration",
+                                                 "ruedo:max_force",
+                                                 "ruedo:max_wheel_torque",
+                                                 "ruedo:max_wheel_rate",
+                                                 "ruedo:watchdog",
+                                                 "ruedo:pose_rate",
+                                                 "ruedo:status_rate",
+                                                 "ruedo:traction",
+                                                 "ruedo:primitives",
+                                                 "ruedo:servo_rate_gain",
+                                                 "ruedo:servo_angle_gain",
+                                                 "ruedo:gear",
+                                                 "ruedo:stall_torque",
+                                                 "ruedo:no_load_rate",
+                                                 "ruedo:yaw_gain",
+                                                 "ruedo:gyro_bias",
+                                                 "ruedo:gyro_scale_error"};
   return names;
 }
 
 const std::vector<std::string>& odometry_elements() {
   static const std::vector<std::string> names = {
-      "ruedo:rate", "ruedo:integrator", "ruedo:ticks_per_turn", "ruedo:counter_bits", "ruedo:radius_error",
-      "ruedo:track_error", "ruedo:slip_noise", "ruedo:steering_error", "ruedo:phase"};
+      "ruedo:rate",         "ruedo:integrator",     "ruedo:ticks_per_turn",
+      "ruedo:counter_bits", "ruedo:radius_error",   "ruedo:track_error",
+      "ruedo:slip_noise",   "ruedo:steering_error", "ruedo:phase"};
   return names;
 }
 
-DriveDescription read_drive(std::shared_ptr<const Element> element, std::shared_ptr<const Element> odometry, const Model& model) {
+DriveDescription read_drive(std::shared_ptr<const Element> element,
+                            std::shared_ptr<const Element> odometry, const Model& model) {
   const Element& e = *element;
   e.refuse_unknown(drive_elements(), false);
   DriveDescription drive;
   const std::string* type = e.attribute("type");
-  if (type && *type != "kinematic" && *type != "wheels") e.fail("type '" + *type + "' is not allowed; allowed are kinematic and wheels");
+  if (type && *type != "kinematic" && *type != "wheels")
+    e.fail("type '" + *type + "' is not allowed; allowed are kinematic and wheels");
   if (type && *type == "wheels") drive.kind = DriveDescription::Kind::wheels;
   drive.steering = read_steering(e);
   if (drive.kind == DriveDescription::Kind::wheels && drive.steering != Steering::differential) {
-    e.fail("type 'wheels' is not allowed with steering '" + name_of(drive.steering) + "'; allowed is kinematic");
+    e.fail("type 'wheels' is not allowed with steering '" + name_of(drive.steering) +
+           "'; allowed is kinematic");
   }
   read_joints(e, model, drive);
   if (drive.left_joints.empty() && drive.right_joints.empty()) {
-    drive.wheel_radius = e.number("ruedo:wheel_radius", 0, Allowed::not_negative(quantity::kLength));
+    drive.wheel_radius =
+        e.number("ruedo:wheel_radius", 0, Allowed::not_negative(quantity::kLength));
   } else {
     const int first = drive.left_joints.empty() ? drive.right_joints[0] : drive.left_joints[0];
     const double found_radius = radius_of(model, model.joints[static_cast<size_t>(first)]);
-    if (!e.has("ruedo:wheel_radius") && found_radius <= 0) e.fail("has no <ruedo:wheel_radius>, and the wheel has no collision shape to take it from");
-    drive.wheel_radius = e.number("ruedo:wheel_radius", found_radius, Allowed::positive(quantity::kLength));
+    if (!e.has("ruedo:wheel_radius") && found_radius <= 0)
+      e.fail("has no <ruedo:wheel_radius>, and the wheel has no collision shape to take it from");
+    drive.wheel_radius =
+        e.number("ruedo:wheel_radius", found_radius, Allowed::positive(quantity::kLength));
   }
   place_base(e, model, drive);
   read_limits(e, model, drive);
@@ -351,11 +427,18 @@ DriveDescription read_drive(std::shared_ptr<const Element> element, std::shared_
   read_servo(e, drive);
   drive.traction = e.boolean("ruedo:traction", true);
   const bool wheels = drive.kind == DriveDescription::Kind::wheels;
-  drive.on_odometry = e.choice("ruedo:primitives", wheels ? "odometry" : "truth", {"truth", "odometry"}) == "odometry";
+  drive.on_odometry = e.choice("ruedo:primitives", wheels ? "odometry" : "truth",
+                               {"truth", "odometry"}) == "odometry";
   if (drive.on_odometry && drive.steering != Steering::differential) {
-    e.child("ruedo:primitives")->fail("'odometry' is not allowed with steering '" + name_of(drive.steering) + "'; allowed is truth");
+    e.child("ruedo:primitives")
+        ->fail("'odometry' is not allowed with steering '" + name_of(drive.steering) +
+               "'; allowed is truth");
   }
-  if (wheels && !drive.on_odometry) e.child("ruedo:primitives")->fail("'truth' is not allowed with wheels: a robot knows its wheels only; allowed is odometry");
+  if (wheels && !drive.on_odometry)
+    e.child("ruedo:primitives")
+        ->fail(
+            "'truth' is not allowed with wheels: a robot knows its wheels only; allowed is "
+            "odometry");
   drive.pose_rate = e.rate("ruedo:pose_rate", drive.pose_rate);
   drive.status_rate = e.rate("ruedo:status_rate", drive.status_rate);
   if (odometry) {
@@ -370,16 +453,21 @@ DriveDescription read_drive(std::shared_ptr<const Element> element, std::shared_
 namespace {
 
 // What nothing stands in for, each once.
-void name_plugin(const Element& plugin, const PluginKind& kind, const std::string& where, Findings& findings, std::set<std::string>& named) {
+void name_plugin(const Element& plugin, const PluginKind& kind, const std::string& where,
+                 Findings& findings, std::set<std::string>& named) {
   std::string text;
-  if (kind.does == PluginKind::Does::dead) text = "the plugin " + kind.name + " does nothing here: " + kind.would;
+  if (kind.does == PluginKind::Does::dead)
+    text = "the plugin " + kind.name + " does nothing here: " + kind.would;
   if (kind.does == PluginKind::Does::unknown) text = "plugins are not loaded: " + kind.name;
   if (!text.empty() && named.insert(text).second) findings.unsupported(plugin.source, where, text);
 }
 
-bool looks_like_robot(const Element& model_element, const std::vector<const Element*>& plugins, const Model& model) {
+bool looks_like_robot(const Element& model_element, const std::vector<const Element*>& plugins,
+                      const Model& model) {
   if (model.is_static) return false;
-  if (model_element.has("ruedo:joints") || model_element.has("transmission") || model_element.has("ros2_control") || !model.sensors.empty()) return true;
+  if (model_element.has("ruedo:joints") || model_element.has("transmission") ||
+      model_element.has("ros2_control") || !model.sensors.empty())
+    return true;
   return std::any_of(plugins.begin(), plugins.end(), [](const Element* each) {
     const auto does = kind_of(*each).does;
     return does == PluginKind::Does::control || does == PluginKind::Does::drive;
@@ -389,9 +477,12 @@ bool looks_like_robot(const Element& model_element, const std::vector<const Elem
 // Joints that a plugin of their own turns are no drive's.
 bool is_turned_by_plugin(const std::vector<const Element*>& plugins, const std::string& joint) {
   return std::any_of(plugins.begin(), plugins.end(), [&](const Element* each) {
-    if (kind_of(*each).does != PluginKind::Does::joints || kind_of(*each).name.find("StatePublisher") != std::string::npos) return false;
+    if (kind_of(*each).does != PluginKind::Does::joints ||
+        kind_of(*each).name.find("StatePublisher") != std::string::npos)
+      return false;
     const auto names = each->all("joint_name");
-    return std::any_of(names.begin(), names.end(), [&](const Element* name) { return name->text == joint; });
+    return std::any_of(names.begin(), names.end(),
+                       [&](const Element* name) { return name->text == joint; });
   });
 }
 
@@ -402,43 +493,57 @@ std::string joined(const std::vector<std::string>& names, const char* between) {
 }
 
 // The drive of a robot for which no element and no plugin of a drive speaks.
-void find_drive(const Element& model_element, const std::vector<const Element*>& plugins, std::shared_ptr<const Element> odometry,
-                const std::string& where, ReadContext& context, Model& model) {
+void find_drive(const Element& model_element, const std::vector<const Element*>& plugins,
+                std::shared_ptr<const Element> odometry, const std::string& where,
+                ReadContext& context, Model& model) {
   if (!looks_like_robot(model_element, plugins, model)) return;
-  ControllersDrive controllers = drive_from_controllers(model_element, plugins, model, where, context);
+  ControllersDrive controllers =
+      drive_from_controllers(model_element, plugins, model, where, context);
   if (controllers.drive) {
     const Source source = controllers.drive->source;
     if (!odometry) odometry = std::move(controllers.odometry);
     try {
       model.drive = read_drive(std::move(controllers.drive), odometry, model);
       if (!controllers.named) {
-        context.findings.repaired(source, where, "it drives as the controller " + controllers.controller + " says, which has its joints; no plugin names the file");
+        context.findings.repaired(source, where,
+                                  "it drives as the controller " + controllers.controller +
+                                      " says, which has its joints; no plugin names the file");
       }
       return;
     } catch (const InputError& error) {
-      context.findings.error(error.source(), where, "the controller " + controllers.controller + " cannot be used: " + error.message());
+      context.findings.error(
+          error.source(), where,
+          "the controller " + controllers.controller + " cannot be used: " + error.message());
     }
   }
   GuessedDrive guess = guess_drive(model, controlled_joints(model_element));
-  if (std::any_of(guess.wheels.begin(), guess.wheels.end(), [&](const std::string& wheel) { return is_turned_by_plugin(plugins, wheel); })) return;
+  if (std::any_of(guess.wheels.begin(), guess.wheels.end(),
+                  [&](const std::string& wheel) { return is_turned_by_plugin(plugins, wheel); }))
+    return;
   const std::string flag = "--drive " + model.name + "=LEFT+...,RIGHT+...";
   if (guess.drive) {
     try {
       model.drive = read_drive(std::move(guess.drive), odometry, model);
       model.drive->guessed = true;
-      context.findings.repaired(model_element.source, where, std::string(kNoDriveIsWritten) + "; guessed from its wheels: " + guess.in_words + " (" + flag + " says it otherwise)");
+      context.findings.repaired(model_element.source, where,
+                                std::string(kNoDriveIsWritten) + "; guessed from its wheels: " +
+                                    guess.in_words + " (" + flag + " says it otherwise)");
       return;
-    } catch (const InputError&) {    // what looked like wheels is none
+    } catch (const InputError&) {  // what looked like wheels is none
     }
   }
   if (!guess.wheels.empty()) {
-    context.findings.unsupported(model_element.source, where, std::string(kNoDriveIsWritten) + ", and it stands still; " + flag + " makes it drive, with wheels of " + joined(guess.wheels, ", "));
+    context.findings.unsupported(model_element.source, where,
+                                 std::string(kNoDriveIsWritten) + ", and it stands still; " + flag +
+                                     " makes it drive, with wheels of " +
+                                     joined(guess.wheels, ", "));
   }
 }
 
 }  // namespace
 
-void read_drive_of(const Element& model_element, const std::string& where, ReadContext& context, Model& model) {
+void read_drive_of(const Element& model_element, const std::string& where, ReadContext& context,
+                   Model& model) {
   std::shared_ptr<const Element> odometry;
   if (const Element* written = model_element.child("ruedo:odometry")) odometry = written->clone();
   if (const auto drives = model_element.all("ruedo:drive"); !drives.empty()) {
@@ -450,10 +555,12 @@ void read_drive_of(const Element& model_element, const std::string& where, ReadC
   std::set<std::string> named;
   for (const Element* plugin : plugins) {
     const PluginKind kind = kind_of(*plugin);
-    model.commanded |= kind.does == PluginKind::Does::joints || kind.does == PluginKind::Does::control;
+    model.commanded |=
+        kind.does == PluginKind::Does::joints || kind.does == PluginKind::Does::control;
     name_plugin(*plugin, kind, where, context.findings, named);
     auto translated = drive_from_plugin(*plugin);
-    if (!translated || model_element.has("ruedo:drive")) continue;    // Ruedo's own element is there instead of it
+    if (!translated || model_element.has("ruedo:drive"))
+      continue;  // Ruedo's own element is there instead of it
     if (model.drive) {
       context.findings.unsupported(plugin->source, where, "a second drive; the first one is used");
       continue;
@@ -461,12 +568,15 @@ void read_drive_of(const Element& model_element, const std::string& where, ReadC
     try {
       model.drive = read_drive(std::move(translated), odometry, model);
     } catch (const InputError& error) {
-      context.findings.error(error.source(), where, "the drive plugin cannot be used: " + error.message());
+      context.findings.error(error.source(), where,
+                             "the drive plugin cannot be used: " + error.message());
     }
   }
   if (!model.drive) find_drive(model_element, plugins, odometry, where, context, model);
-  if (odometry && !model.drive) model_element.child("ruedo:odometry")->fail("needs a drive: the model has no <ruedo:drive>");
-  if (odometry && model.drive && !model.drive->odometry) {    // a nested model's drive, odometry given here
+  if (odometry && !model.drive)
+    model_element.child("ruedo:odometry")->fail("needs a drive: the model has no <ruedo:drive>");
+  if (odometry && model.drive &&
+      !model.drive->odometry) {  // a nested model's drive, odometry given here
     odometry->refuse_unknown(odometry_elements(), false);
     read_odometry(*odometry, *model.drive);
     model.drive->odometry = odometry;

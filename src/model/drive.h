@@ -10,12 +10,14 @@
 
 namespace ruedo::model {
 
-// Gives the model its drive and odometry, from its <ruedo:drive> or a plugin that is known; other plugins are told
-// once. The model's links and joints are complete.
-void read_drive_of(const Element& model_element, const std::string& where, ReadContext& context, Model& model);
+// Gives the model its drive and odometry, from its <ruedo:drive> or a plugin that is known; other
+// plugins are told once. The model's links and joints are complete.
+void read_drive_of(const Element& model_element, const std::string& where, ReadContext& context,
+                   Model& model);
 
 // The drive that a <ruedo:drive> describes. Throws InputError.
-DriveDescription read_drive(std::shared_ptr<const Element> drive, std::shared_ptr<const Element> odometry, const Model& model);
+DriveDescription read_drive(std::shared_ptr<const Element> drive,
+                            std::shared_ptr<const Element> odometry, const Model& model);
 
 // A Gazebo drive plugin as <ruedo:drive>; null when the plugin is another one.
 std::unique_ptr<Element> drive_from_plugin(const Element& plugin);

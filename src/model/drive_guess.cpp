@@ -1,5 +1,5 @@
-// Wheels are joints that turn without end about a level axis and stand on the ground. Those with "wheel" in their names
-// count first; without any, the round things that stand in pairs.
+// Wheels are joints that turn without end about a level axis and stand on the ground. Those with
+// "wheel" in their names count first; without any, the round things that stand in pairs.
 #include "model/drive_guess.h"
 
 #include <algorithm>
@@ -11,10 +11,10 @@
 namespace ruedo::model {
 namespace {
 
-constexpr double kLevel = 0.35;          // of an axis' unit vector, upwards
-constexpr double kGround_m = 0.03;       // above the lowest wheel
-constexpr double kAside_m = 0.02;        // nearer to the middle is neither left nor right
-constexpr double kParallel = 0.95;       // cosine
+constexpr double kLevel = 0.35;     // of an axis' unit vector, upwards
+constexpr double kGround_m = 0.03;  // above the lowest wheel
+constexpr double kAside_m = 0.02;   // nearer to the middle is neither left nor right
+constexpr double kParallel = 0.95;  // cosine
 
 std::string lower(std::string text) {
   for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -22,31 +22,36 @@ std::string lower(std::string text) {
 }
 
 bool has_any(const std::string& name, std::initializer_list<const char*> words) {
-  return std::any_of(words.begin(), words.end(), [&](const char* word) { return name.find(word) != std::string::npos; });
+  return std::any_of(words.begin(), words.end(),
+                     [&](const char* word) { return name.find(word) != std::string::npos; });
 }
 
 bool unlimited(const Joint& joint) {
-  return joint.type == JointType::continuous || (joint.type == JointType::revolute && std::isinf(joint.axis.lower) && std::isinf(joint.axis.upper));
+  return joint.type == JointType::continuous ||
+         (joint.type == JointType::revolute && std::isinf(joint.axis.lower) &&
+          std::isinf(joint.axis.upper));
 }
 
 Vec3 axis_in_model(const Joint& joint) { return joint.X_MJ.rotation * joint.axis.axis_in_J; }
 
 struct Wheel {
   int joint = -1;
-  int steer = -1;         // the joint about the vertical that it hangs on
-  Vec3 axis, at;          // in the model
+  int steer = -1;  // the joint about the vertical that it hangs on
+  Vec3 axis, at;   // in the model
   double lowest = 0.0;
-  std::string name;       // of joint and link, in small letters
+  std::string name;  // of joint and link, in small letters
 };
 
 // The joint about the vertical between the wheel and the base; -1: none.
 int steering_above(const Model& model, int joint) {
   int link = model.joints[static_cast<size_t>(joint)].parent;
   for (size_t steps = 0; link >= 0 && steps <= model.joints.size(); ++steps) {
-    const auto above = std::find_if(model.joints.begin(), model.joints.end(), [&](const Joint& each) { return each.child == link; });
+    const auto above = std::find_if(model.joints.begin(), model.joints.end(),
+                                    [&](const Joint& each) { return each.child == link; });
     if (above == model.joints.end()) return -1;
     const bool turns = above->type == JointType::revolute || above->type == JointType::continuous;
-    if (turns && std::abs(axis_in_model(*above).z()) > 1.0 - kLevel) return static_cast<int>(above - model.joints.begin());
+    if (turns && std::abs(axis_in_model(*above).z()) > 1.0 - kLevel)
+      return static_cast<int>(above - model.joints.begin());
     link = above->parent;
   }
   return -1;
@@ -54,7 +59,9 @@ int steering_above(const Model& model, int joint) {
 
 bool is_round(const Model& model, int link) {
   for (const Collision& c : model.links[static_cast<size_t>(link)].collisions) {
-    if (c.geometry.shape == Shape::cylinder || c.geometry.shape == Shape::sphere || c.geometry.shape == Shape::mesh) return true;
+    if (c.geometry.shape == Shape::cylinder || c.geometry.shape == Shape::sphere ||
+        c.geometry.shape == Shape::mesh)
+      return true;
   }
   return false;
 }
@@ -69,11 +76,17 @@ std::vector<Wheel> wheels_of(const Model& model, bool by_name) {
     wheel.axis = axis_in_model(joint);
     if (std::abs(wheel.axis.z()) > kLevel) continue;
     wheel.name = lower(joint.name + " " + model.links[static_cast<size_t>(joint.child)].name);
-    if (has_any(wheel.name, {"caster", "castor", "idler", "swivel", "roller", "passive", "laser", "lidar", "scan", "sonar", "camera", "rotor", "prop"})) continue;
-    if (by_name ? !has_any(wheel.name, {"wheel", "whl", "tire", "tyre"}) : !is_round(model, joint.child)) continue;
+    if (has_any(wheel.name, {"caster", "castor", "idler", "swivel", "roller", "passive", "laser",
+                             "lidar", "scan", "sonar", "camera", "rotor", "prop"}))
+      continue;
+    if (by_name ? !has_any(wheel.name, {"wheel", "whl", "tire", "tyre"})
+                : !is_round(model, joint.child))
+      continue;
     wheel.steer = steering_above(model, wheel.joint);
     if (wheel.steer >= 0 && unlimited(model.joints[static_cast<size_t>(wheel.steer)]) &&
-        has_any(lower(model.joints[static_cast<size_t>(wheel.steer)].name), {"caster", "castor", "swivel"})) continue;
+        has_any(lower(model.joints[static_cast<size_t>(wheel.steer)].name),
+                {"caster", "castor", "swivel"}))
+      continue;
     wheel.at = joint.X_MJ.translation;
     wheel.lowest = lowest_point_below(model, wheel.joint);
     wheels.push_back(wheel);
@@ -99,14 +112,18 @@ double lowest_point_below(const Model& model, int joint) {
   std::vector<int> links{top.child};
   for (size_t i = 0; i < links.size(); ++i) {
     for (const Joint& each : model.joints) {
-      if (each.parent == links[i] && std::find(links.begin(), links.end(), each.child) == links.end()) links.push_back(each.child);
+      if (each.parent == links[i] &&
+          std::find(links.begin(), links.end(), each.child) == links.end())
+        links.push_back(each.child);
     }
   }
   double lowest = top.X_MJ.translation.z();
   const auto reach = [&](const Pose& X, const Geometry& geometry) {
     const Eigen::AlignedBox3d box = bounds(geometry);
     if (box.isEmpty()) return;
-    for (int corner = 0; corner < 8; ++corner) lowest = std::min(lowest, (X * box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner))).z());
+    for (int corner = 0; corner < 8; ++corner)
+      lowest = std::min(lowest,
+                        (X * box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner))).z());
   };
   for (const int index : links) {
     const Link& link = model.links[static_cast<size_t>(index)];
@@ -120,16 +137,25 @@ GuessedDrive guess_drive(const Model& model, const std::vector<std::string>& con
   std::vector<Wheel> wheels = wheels_of(model, true);
   if (wheels.size() < 2) wheels = wheels_of(model, false);
   const auto is_controlled = [&](const Wheel& wheel) {
-    return std::any_of(controlled.begin(), controlled.end(), [&](const std::string& name) { return name == model.joints[static_cast<size_t>(wheel.joint)].name; });
+    return std::any_of(controlled.begin(), controlled.end(), [&](const std::string& name) {
+      return name == model.joints[static_cast<size_t>(wheel.joint)].name;
+    });
   };
-  if (std::count_if(wheels.begin(), wheels.end(), is_controlled) >= 2) std::erase_if(wheels, [&](const Wheel& wheel) { return !is_controlled(wheel); });
-  for (const Wheel& wheel : wheels) result.wheels.push_back(model.joints[static_cast<size_t>(wheel.joint)].name);
+  if (std::count_if(wheels.begin(), wheels.end(), is_controlled) >= 2)
+    std::erase_if(wheels, [&](const Wheel& wheel) { return !is_controlled(wheel); });
+  for (const Wheel& wheel : wheels)
+    result.wheels.push_back(model.joints[static_cast<size_t>(wheel.joint)].name);
   if (wheels.size() < 2) return result;
 
-  const auto parallel = [&](const Wheel& wheel) { return std::abs(wheel.axis.dot(wheels[0].axis)) > kParallel; };
+  const auto parallel = [&](const Wheel& wheel) {
+    return std::abs(wheel.axis.dot(wheels[0].axis)) > kParallel;
+  };
   const bool all_parallel = std::all_of(wheels.begin(), wheels.end(), parallel);
-  const auto steered = static_cast<size_t>(std::count_if(wheels.begin(), wheels.end(), [](const Wheel& wheel) { return wheel.steer >= 0; }));
-  const bool rollers = std::any_of(wheels.begin(), wheels.end(), [](const Wheel& wheel) { return has_any(wheel.name, {"mecanum", "meca", "omni"}); });
+  const auto steered = static_cast<size_t>(std::count_if(
+      wheels.begin(), wheels.end(), [](const Wheel& wheel) { return wheel.steer >= 0; }));
+  const bool rollers = std::any_of(wheels.begin(), wheels.end(), [](const Wheel& wheel) {
+    return has_any(wheel.name, {"mecanum", "meca", "omni"});
+  });
 
   auto drive = std::make_unique<Element>();
   drive->name = "ruedo:drive";
@@ -143,8 +169,12 @@ GuessedDrive guess_drive(const Model& model, const std::vector<std::string>& con
   if (ahead.x() < -1e-6 || (std::abs(ahead.x()) <= 1e-6 && ahead.y() < 0)) left = -left;
 
   std::string lefts, rights, steers, steering = "differential";
-  const auto name_of = [&](int joint) -> const std::string& { return model.joints[static_cast<size_t>(joint)].name; };
-  const auto list = [](std::string& names, const std::string& name) { names += (names.empty() ? "" : "+") + name; };
+  const auto name_of = [&](int joint) -> const std::string& {
+    return model.joints[static_cast<size_t>(joint)].name;
+  };
+  const auto list = [](std::string& names, const std::string& name) {
+    names += (names.empty() ? "" : "+") + name;
+  };
   const auto sides = [&](bool with_steered) {
     for (const Wheel& wheel : wheels) {
       if (!with_steered && wheel.steer >= 0) continue;
@@ -157,19 +187,22 @@ GuessedDrive guess_drive(const Model& model, const std::vector<std::string>& con
   if (!all_parallel) {
     if (wheels.size() < 3) return result;
     steering = "omni";
-    for (const Wheel& wheel : wheels) add(*drive, "ruedo:left_joint", name_of(wheel.joint)), list(lefts, name_of(wheel.joint));
+    for (const Wheel& wheel : wheels)
+      add(*drive, "ruedo:left_joint", name_of(wheel.joint)), list(lefts, name_of(wheel.joint));
   } else if (steered == wheels.size()) {
-    steering = "holonomic";    // each wheel turns where it has to go
+    steering = "holonomic";  // each wheel turns where it has to go
     for (const Wheel& wheel : wheels) add(*drive, "ruedo:steer_joint", name_of(wheel.steer));
     sides(true);
   } else if (steered > 0) {
     std::vector<int> joints;
     for (const Wheel& wheel : wheels) {
-      if (wheel.steer < 0 || std::find(joints.begin(), joints.end(), wheel.steer) != joints.end()) continue;
+      if (wheel.steer < 0 || std::find(joints.begin(), joints.end(), wheel.steer) != joints.end())
+        continue;
       joints.push_back(wheel.steer);
       add(*drive, "ruedo:steer_joint", name_of(wheel.steer));
       list(steers, name_of(wheel.steer));
-      if (std::abs(left.dot(wheel.at - middle)) < kAside_m) add(*drive, "ruedo:left_joint", name_of(wheel.joint));
+      if (std::abs(left.dot(wheel.at - middle)) < kAside_m)
+        add(*drive, "ruedo:left_joint", name_of(wheel.joint));
     }
     steering = joints.size() > 1 ? "ackermann" : "tricycle";
     sides(true);
@@ -179,7 +212,10 @@ GuessedDrive guess_drive(const Model& model, const std::vector<std::string>& con
   }
   if (lefts.empty() || (rights.empty() && steering != "omni")) return result;
   drive->attributes.emplace_back("steering", steering);
-  result.in_words = steering + ", " + (steering == "omni" ? "wheels " + lefts : "left " + lefts + ", right " + rights) + (steers.empty() ? "" : ", steered by " + steers);
+  result.in_words =
+      steering + ", " +
+      (steering == "omni" ? "wheels " + lefts : "left " + lefts + ", right " + rights) +
+      (steers.empty() ? "" : ", steered by " + steers);
   result.drive = std::move(drive);
   return result;
 }

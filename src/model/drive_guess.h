@@ -1,4 +1,5 @@
-// What a robot's drive is where no file says it: from the names, the axes and the places of its joints.
+// What a robot's drive is where no file says it: from the names, the axes and the places of its
+// joints.
 #pragma once
 
 #include <memory>
@@ -10,9 +11,10 @@
 namespace ruedo::model {
 
 struct GuessedDrive {
-  std::unique_ptr<Element> drive;     // null: its joints do not look like those of a drive
-  std::string in_words;               // "differential, left a+b, right c+d"
-  std::vector<std::string> wheels;    // joints that look like wheels, whether a drive came of them or not
+  std::unique_ptr<Element> drive;  // null: its joints do not look like those of a drive
+  std::string in_words;            // "differential, left a+b, right c+d"
+  std::vector<std::string>
+      wheels;  // joints that look like wheels, whether a drive came of them or not
 };
 
 // controlled: joints that a controller may turn; empty: nothing is known of that.

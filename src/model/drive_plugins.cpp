@@ -1,6 +1,7 @@
 // The drive plugins of Gazebo Classic and gz-sim, as the <ruedo:drive> that says the same.
 //
-// Names of parameters are those of the plugins' own documentation; each plugin has had several spellings.
+// Names of parameters are those of the plugins' own documentation; each plugin has had several
+// spellings.
 #include <algorithm>
 #include <cmath>
 
@@ -53,11 +54,16 @@ struct Joints {
 };
 
 const Joints kJoints[] = {
-    {"ruedo:left_joint", {"left_joint", "leftJoint", "left_front", "leftFrontJoint", "left_rear", "leftRearJoint", "front_left_joint", "back_left_joint",
-                          "rear_left_joint", "rearLeftJoint", "frontLeftJoint", "leftMiddleJoint", "frontLeftWheelJoint", "rearLeftWheelJoint"}},
-    {"ruedo:right_joint", {"right_joint", "rightJoint", "right_front", "rightFrontJoint", "right_rear", "rightRearJoint", "front_right_joint",
-                           "back_right_joint", "rear_right_joint", "rearRightJoint", "frontRightJoint", "rightMiddleJoint", "frontRightWheelJoint", "rearRightWheelJoint"}},
-    {"ruedo:steer_joint", {"left_steering_joint", "right_steering_joint", "steeringJoint", "steering_joint"}},
+    {"ruedo:left_joint",
+     {"left_joint", "leftJoint", "left_front", "leftFrontJoint", "left_rear", "leftRearJoint",
+      "front_left_joint", "back_left_joint", "rear_left_joint", "rearLeftJoint", "frontLeftJoint",
+      "leftMiddleJoint", "frontLeftWheelJoint", "rearLeftWheelJoint"}},
+    {"ruedo:right_joint",
+     {"right_joint", "rightJoint", "right_front", "rightFrontJoint", "right_rear", "rightRearJoint",
+      "front_right_joint", "back_right_joint", "rear_right_joint", "rearRightJoint",
+      "frontRightJoint", "rightMiddleJoint", "frontRightWheelJoint", "rearRightWheelJoint"}},
+    {"ruedo:steer_joint",
+     {"left_steering_joint", "right_steering_joint", "steeringJoint", "steering_joint"}},
 };
 
 struct Steered {
@@ -93,15 +99,19 @@ std::unique_ptr<Element> drive_from_plugin(const Element& plugin) {
   const PluginKind kind = kind_of(plugin);
   if (kind.does != PluginKind::Does::drive) return nullptr;
   // One that only starts something moving, as obstacles are, takes no commands on the ground.
-  if (kind.name == "VelocityControl" && (plugin.has("initial_linear") || plugin.has("initial_angular"))) return nullptr;
+  if (kind.name == "VelocityControl" &&
+      (plugin.has("initial_linear") || plugin.has("initial_angular")))
+    return nullptr;
   auto drive = std::make_unique<Element>();
   drive->name = "ruedo:drive";
   drive->source = plugin.source;
-  const auto steered = std::find_if(std::begin(kSteering), std::end(kSteering), [&](const Steered& each) { return each.plugin == kind.name; });
+  const auto steered = std::find_if(std::begin(kSteering), std::end(kSteering),
+                                    [&](const Steered& each) { return each.plugin == kind.name; });
   if (steered != std::end(kSteering)) drive->attributes.emplace_back("steering", steered->steering);
   for (const Joints& each : kJoints) {
     for (const char* name : each.theirs) {
-      for (const Element* joint : plugin.all(name)) add(*drive, each.ours, joint->text, joint->source);
+      for (const Element* joint : plugin.all(name))
+        add(*drive, each.ours, joint->text, joint->source);
     }
   }
   for (const Parameter& each : kParameters) {
@@ -110,7 +120,8 @@ std::unique_ptr<Element> drive_from_plugin(const Element& plugin) {
     double value = given->as_number(Allowed::any(quantity::kEffort));
     if (each.unit == Unit::half) value /= 2;
     if (each.unit == Unit::magnitude) value = std::abs(value);
-    if (value > 0) add(*drive, each.ours, shown(value), given->source);    // 0: the plugins' "no limit"
+    if (value > 0)
+      add(*drive, each.ours, shown(value), given->source);  // 0: the plugins' "no limit"
   }
   return drive;
 }

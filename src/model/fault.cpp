@@ -16,14 +16,17 @@ namespace {
 constexpr double kLongest_s = 1e6, kLongestDelay_s = 60.0, kFarthest_m = 1e6;
 
 [[noreturn]] void wrong(const std::string& text, const std::string& why) {
-  throw InputError({}, "--fault '" + text + "': " + why + "it looks like ROBOT/DEVICE:KIND@SECONDS[,for=S][,value=V][,...], for example "
-                       "p3at/lrf:freeze@3,for=2");
+  throw InputError(
+      {}, "--fault '" + text + "': " + why +
+              "it looks like ROBOT/DEVICE:KIND@SECONDS[,for=S][,value=V][,...], for example "
+              "p3at/lrf:freeze@3,for=2");
 }
 
 double read_number(const std::string& text, const std::string& part) {
   double value = 0.0;
   const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
-  if (error != std::errc() || end != part.data() + part.size() || !std::isfinite(value)) wrong(text, "'" + part + "' is no number; ");
+  if (error != std::errc() || end != part.data() + part.size() || !std::isfinite(value))
+    wrong(text, "'" + part + "' is no number; ");
   return value;
 }
 
@@ -52,7 +55,8 @@ const std::vector<FaultKind>& fault_kinds() {
 
 const FaultKind* find_fault_kind(const std::string& name) {
   const auto& kinds = fault_kinds();
-  const auto found = std::find_if(kinds.begin(), kinds.end(), [&](const FaultKind& kind) { return kind.name == name; });
+  const auto found = std::find_if(kinds.begin(), kinds.end(),
+                                  [&](const FaultKind& kind) { return kind.name == name; });
   return found == kinds.end() ? nullptr : &*found;
 }
 
@@ -62,23 +66,40 @@ std::string check_fault(const Fault& fault) {
     std::vector<std::string> names;
     for (const FaultKind& one : fault_kinds()) names.push_back(one.name);
     const std::string near = nearest_word(fault.kind, names);
-    return fmt::format("kind '{}' is not allowed; allowed are {}{}", fault.kind, fmt::join(names, ", "), near.empty() ? "" : "; did you mean '" + near + "'?");
+    return fmt::format("kind '{}' is not allowed; allowed are {}{}", fault.kind,
+                       fmt::join(names, ", "),
+                       near.empty() ? "" : "; did you mean '" + near + "'?");
   }
   const auto is_time = [](double s) { return s >= 0.0 && s <= kLongest_s; };
-  if (!is_time(fault.at_s)) return fmt::format("its time {} is not allowed; allowed are 0 to {:g} s", fault.at_s, kLongest_s);
-  if (!is_time(fault.duration_s)) return fmt::format("its duration {} is not allowed; allowed are 0 (to the end) to {:g} s", fault.duration_s, kLongest_s);
+  if (!is_time(fault.at_s))
+    return fmt::format("its time {} is not allowed; allowed are 0 to {:g} s", fault.at_s,
+                       kLongest_s);
+  if (!is_time(fault.duration_s))
+    return fmt::format("its duration {} is not allowed; allowed are 0 (to the end) to {:g} s",
+                       fault.duration_s, kLongest_s);
   if (kind->least < kind->most && !(fault.value >= kind->least && fault.value <= kind->most)) {
-    return fmt::format("value {} of {} is not allowed; allowed are {:g} to {:g} ({})", fault.value, kind->name, kind->least, kind->most, kind->meaning);
+    return fmt::format("value {} of {} is not allowed; allowed are {:g} to {:g} ({})", fault.value,
+                       kind->name, kind->least, kind->most, kind->meaning);
   }
-  if (kind->of == FaultKind::Of::device && fault.target.empty()) return kind->name + " needs a device";
-  if (kind->of == FaultKind::Of::wheels && fault.target != "" && fault.target != "left" && fault.target != "right") {
-    return fmt::format("target '{}' of {} is not allowed; allowed are left, right, or none for both", fault.target, kind->name);
+  if (kind->of == FaultKind::Of::device && fault.target.empty())
+    return kind->name + " needs a device";
+  if (kind->of == FaultKind::Of::wheels && fault.target != "" && fault.target != "left" &&
+      fault.target != "right") {
+    return fmt::format(
+        "target '{}' of {} is not allowed; allowed are left, right, or none for both", fault.target,
+        kind->name);
   }
-  if (kind->of == FaultKind::Of::robot && !fault.target.empty()) return fmt::format("{} has no target, and '{}' is one", kind->name, fault.target);
+  if (kind->of == FaultKind::Of::robot && !fault.target.empty())
+    return fmt::format("{} has no target, and '{}' is one", kind->name, fault.target);
   if (!(fault.from >= 0.0 && fault.from < fault.to && fault.to <= 1.0)) {
-    return fmt::format("from {} to {} is not allowed; allowed are parts of the field of view, 0 to 1, the smaller first", fault.from, fault.to);
+    return fmt::format(
+        "from {} to {} is not allowed; allowed are parts of the field of view, 0 to 1, the smaller "
+        "first",
+        fault.from, fault.to);
   }
-  if (!(std::abs(fault.x) <= kFarthest_m && std::abs(fault.y) <= kFarthest_m && std::isfinite(fault.heading))) return "its place is no place";
+  if (!(std::abs(fault.x) <= kFarthest_m && std::abs(fault.y) <= kFarthest_m &&
+        std::isfinite(fault.heading)))
+    return "its place is no place";
   return "";
 }
 
@@ -97,19 +118,30 @@ Fault parse_fault(const std::string& text) {
   while (end < text.size()) {
     const size_t begin = end + 1, equals = text.find('=', begin);
     end = std::min(text.find(',', begin), text.size());
-    if (equals == std::string::npos || equals > end) wrong(text, "'" + text.substr(begin, end - begin) + "' is no NAME=VALUE; ");
+    if (equals == std::string::npos || equals > end)
+      wrong(text, "'" + text.substr(begin, end - begin) + "' is no NAME=VALUE; ");
     const std::string name = text.substr(begin, equals - begin);
     const double value = read_number(text, text.substr(equals + 1, end - equals - 1));
-    if (name == "for") fault.duration_s = value;
-    else if (name == "value") fault.value = value;
-    else if (name == "from") fault.from = value;
-    else if (name == "to") fault.to = value;
-    else if (name == "x") fault.x = value;
-    else if (name == "y") fault.y = value;
-    else if (name == "heading") fault.heading = value;
-    else wrong(text, "'" + name + "' is not allowed; allowed are for, value, from, to, x, y and heading; ");
+    if (name == "for")
+      fault.duration_s = value;
+    else if (name == "value")
+      fault.value = value;
+    else if (name == "from")
+      fault.from = value;
+    else if (name == "to")
+      fault.to = value;
+    else if (name == "x")
+      fault.x = value;
+    else if (name == "y")
+      fault.y = value;
+    else if (name == "heading")
+      fault.heading = value;
+    else
+      wrong(text,
+            "'" + name + "' is not allowed; allowed are for, value, from, to, x, y and heading; ");
   }
-  if (const std::string why = check_fault(fault); !why.empty()) throw InputError({}, "--fault '" + text + "': " + why);
+  if (const std::string why = check_fault(fault); !why.empty())
+    throw InputError({}, "--fault '" + text + "': " + why);
   return fault;
 }
 

@@ -7,8 +7,10 @@ namespace ruedo::model {
 
 void FrameGraph::add(Node node) {
   if (const auto taken = by_name_.find(node.name); taken != by_name_.end()) {
-    node.element->fail("the name '" + node.name + "' is taken by <" + nodes_[taken->second].element->name + "> in " +
-                       nodes_[taken->second].element->source.str() + "; names are unique in " + scope_name_);
+    node.element->fail("the name '" + node.name + "' is taken by <" +
+                       nodes_[taken->second].element->name + "> in " +
+                       nodes_[taken->second].element->source.str() + "; names are unique in " +
+                       scope_name_);
   }
   if (node.merged) {
     for (const auto& [name, frame] : node.scope->frames) {
@@ -21,7 +23,8 @@ void FrameGraph::add(Node node) {
   } else {
     for (const size_t m : merged_) {
       if (nodes_[m].scope->frames.count(node.name)) {
-        node.element->fail("the name '" + node.name + "' is taken by what <include> merges in " + nodes_[m].element->source.str());
+        node.element->fail("the name '" + node.name + "' is taken by what <include> merges in " +
+                           nodes_[m].element->source.str());
       }
     }
   }
@@ -67,17 +70,19 @@ FrameGraph::Found FrameGraph::require(const std::string& name, const Element& as
   if (find(name, found)) return found;
   const std::string near = nearest_word(name, names());
   std::string help = near.empty() ? "" : "; did you mean '" + near + "'?";
-  if (near.empty() && name.find("::") != std::string::npos) help = "; it can be of this model or of one that is nested in it";
+  if (near.empty() && name.find("::") != std::string::npos)
+    help = "; it can be of this model or of one that is nested in it";
   asker.fail("there is no frame '" + name + "' in " + scope_name_ + help);
 }
 
 std::vector<std::string> FrameGraph::names() const {
   std::vector<std::string> list;
   for (const Node& node : nodes_) {
-    if (!by_name_.count(node.name)) continue;    // dropped
+    if (!by_name_.count(node.name)) continue;  // dropped
     if (!node.merged) list.push_back(node.name);
     if (node.scope) {
-      for (const auto& [name, frame] : node.scope->frames) list.push_back(node.merged ? name : node.name + "::" + name);
+      for (const auto& [name, frame] : node.scope->frames)
+        list.push_back(node.merged ? name : node.name + "::" + name);
     }
   }
   return list;
@@ -108,7 +113,8 @@ Pose FrameGraph::node_pose(size_t index) {
     if (inner != frames.end()) {
       placed = placed * inner->second.X_MF.inverse();
     } else if (node.placement_frame != "__model__") {
-      node.element->fail("placement_frame '" + node.placement_frame + "' is no frame of the model '" + node.scope->model->name + "'");
+      node.element->fail("placement_frame '" + node.placement_frame +
+                         "' is no frame of the model '" + node.scope->model->name + "'");
     }
   }
   states_[index] = State::known;
@@ -124,18 +130,22 @@ Pose FrameGraph::pose(const std::string& name, const Element& asker) {
 
 int FrameGraph::node_link(size_t index, int depth) {
   const Node& node = nodes_[index];
-  if (depth > static_cast<int>(nodes_.size())) node.element->fail("'" + node.name + "' is attached to itself, through other frames");
-  if (node.scope) return node.first_link;    // a model moves with its canonical link
+  if (depth > static_cast<int>(nodes_.size()))
+    node.element->fail("'" + node.name + "' is attached to itself, through other frames");
+  if (node.scope) return node.first_link;  // a model moves with its canonical link
   if (node.link >= 0) return node.link;
-  if (node.attached_to.empty() || node.attached_to == "__model__" || node.attached_to == "world") return -1;
+  if (node.attached_to.empty() || node.attached_to == "__model__" || node.attached_to == "world")
+    return -1;
   const Found found = require(node.attached_to, *node.element);
-  return found.inner ? nodes_[found.node].first_link + found.inner->link : node_link(found.node, depth + 1);
+  return found.inner ? nodes_[found.node].first_link + found.inner->link
+                     : node_link(found.node, depth + 1);
 }
 
 int FrameGraph::link(const std::string& name, const Element& asker) {
   if (name.empty() || name == "__model__" || name == "world") return -1;
   const Found found = require(name, asker);
-  return found.inner ? nodes_[found.node].first_link + std::max(found.inner->link, 0) : node_link(found.node, 0);
+  return found.inner ? nodes_[found.node].first_link + std::max(found.inner->link, 0)
+                     : node_link(found.node, 0);
 }
 
 }  // namespace ruedo::model

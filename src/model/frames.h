@@ -1,8 +1,8 @@
-// Frames by name: links, joints, <frame>s and nested models of one model, or the models and frames of a world, each
-// placed relative to another.
+// Frames by name: links, joints, <frame>s and nested models of one model, or the models and frames
+// of a world, each placed relative to another.
 //
-// Poses are those of the file, at the start: every frame is then fixed to every other, so one pose in the scope's
-// own frame says it all. Names with "::" reach into nested models.
+// Poses are those of the file, at the start: every frame is then fixed to every other, so one pose
+// in the scope's own frame says it all. Names with "::" reach into nested models.
 #pragma once
 
 #include <map>
@@ -14,7 +14,8 @@
 
 namespace ruedo::model {
 
-// A frame of a model that was read: X_MF, and the link it moves with (-1: a static scope's or the world's).
+// A frame of a model that was read: X_MF, and the link it moves with (-1: a static scope's or the
+// world's).
 struct FrameInModel {
   Pose X_MF;
   int link = -1;
@@ -23,10 +24,10 @@ struct FrameInModel {
 // A model as its own file sees it, before somebody places it.
 struct ScopedModel {
   std::shared_ptr<const Model> model;
-  std::map<std::string, FrameInModel, std::less<>> frames;    // by SDF's scoped names, "arm::wrist"
-  Pose pose;                       // <pose>, relative to
-  std::string relative_to;         // this, in the scope of who places it; "": its frame
-  std::string placement_frame;     // the frame that <pose> places; "": the model's own
+  std::map<std::string, FrameInModel, std::less<>> frames;  // by SDF's scoped names, "arm::wrist"
+  Pose pose;                                                // <pose>, relative to
+  std::string relative_to;      // this, in the scope of who places it; "": its frame
+  std::string placement_frame;  // the frame that <pose> places; "": the model's own
 };
 
 class FrameGraph {
@@ -36,22 +37,22 @@ class FrameGraph {
 
   struct Node {
     std::string name;
-    const Element* element = nullptr;    // for messages
+    const Element* element = nullptr;  // for messages
     Pose pose;
-    std::string relative_to;             // "": the scope's own frame
-    std::string attached_to;             // "": what `link` says, or the scope itself
+    std::string relative_to;  // "": the scope's own frame
+    std::string attached_to;  // "": what `link` says, or the scope itself
     int link = -1;
-    std::shared_ptr<const ScopedModel> scope;    // a nested model: its frames are reached by "name::"
-    std::string placement_frame;         // of that model: the frame that `pose` places
-    int first_link = 0;                  // of that model's links in this scope
-    bool merged = false;                 // its frames are reached by their own names
+    std::shared_ptr<const ScopedModel> scope;  // a nested model: its frames are reached by "name::"
+    std::string placement_frame;               // of that model: the frame that `pose` places
+    int first_link = 0;                        // of that model's links in this scope
+    bool merged = false;                       // its frames are reached by their own names
   };
 
   // Throws InputError when the name is taken.
   void add(Node node);
 
-  // The pose of a frame in the scope, and the link it moves with. `asker` is blamed when there is no such frame, or
-  // when frames go in a circle.
+  // The pose of a frame in the scope, and the link it moves with. `asker` is blamed when there is
+  // no such frame, or when frames go in a circle.
   Pose pose(const std::string& name, const Element& asker);
   int link(const std::string& name, const Element& asker);
   bool has(const std::string& name);
@@ -65,7 +66,7 @@ class FrameGraph {
  private:
   struct Found {
     size_t node;
-    const FrameInModel* inner = nullptr;    // within the node's nested model
+    const FrameInModel* inner = nullptr;  // within the node's nested model
   };
   bool find(const std::string& name, Found& found) const;
   Found require(const std::string& name, const Element& asker) const;

@@ -1,7 +1,8 @@
 // ruedo-import-mesh INPUT OUTPUT: turns a mesh file into Ruedo's binary form, by assimp.
 //
-// It runs as a child of the server, with limits on memory and time that the server sets, and in a sandbox of its own: assimp aborts or
-// hangs on some malformed files, and may do worse on others. Exit code 0: OUTPUT is complete; else the first line on stderr says why.
+// It runs as a child of the server, with limits on memory and time that the server sets, and in a
+// sandbox of its own: assimp aborts or hangs on some malformed files, and may do worse on others.
+// Exit code 0: OUTPUT is complete; else the first line on stderr says why.
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -12,12 +13,12 @@
 
 #include <assimp/BaseImporter.h>
 #include <assimp/DefaultIOSystem.h>
-#include <assimp/Importer.hpp>
 #include <assimp/MemoryIOWrapper.h>
 #include <assimp/config.h>
 #include <assimp/material.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
+#include <assimp/Importer.hpp>
 
 #include "core/sandbox.h"
 #include "model/document.h"
@@ -28,8 +29,8 @@ using namespace ruedo::model;
 
 namespace {
 
-// Opens files in the mesh's own folder and below only, and notes each, so that the cache knows what the result
-// depends on.
+// Opens files in the mesh's own folder and below only, and notes each, so that the cache knows what
+// the result depends on.
 class NotingFiles : public Assimp::DefaultIOSystem {
  public:
   explicit NotingFiles(const fs::path& mesh) : mesh_(mesh), folder_(mesh.parent_path()) {}
@@ -45,7 +46,8 @@ class NotingFiles : public Assimp::DefaultIOSystem {
     const auto inside = relative(path);
     if (!inside || std::strchr(mode, 'w') || std::strchr(mode, 'a')) return nullptr;
     note(*inside, Assimp::DefaultIOSystem::Exists(path));
-    if (folder_ / *inside == mesh_ && (mesh_.extension() == ".dae" || mesh_.extension() == ".DAE")) return without_leading_blanks();
+    if (folder_ / *inside == mesh_ && (mesh_.extension() == ".dae" || mesh_.extension() == ".DAE"))
+      return without_leading_blanks();
     return Assimp::DefaultIOSystem::Open(path, mode);
   }
   std::vector<MeshDependency> dependencies() const {
@@ -55,10 +57,11 @@ class NotingFiles : public Assimp::DefaultIOSystem {
   }
 
  private:
-  // assimp takes a colour with a blank before its first number (" 0.3 0.3 0.3 1") for none, and refuses the file.
+  // assimp takes a colour with a blank before its first number (" 0.3 0.3 0.3 1") for none, and
+  // refuses the file.
   Assimp::IOStream* without_leading_blanks() const {
     const std::string text = read_text_file(mesh_.string(), MeshLimits::kFileBytes);
-    auto* kept = new uint8_t[text.size() + 1];    // the stream owns it
+    auto* kept = new uint8_t[text.size() + 1];  // the stream owns it
     size_t size = 0;
     for (size_t i = 0; i < text.size();) {
       kept[size++] = static_cast<uint8_t>(text[i++]);
@@ -69,7 +72,8 @@ class NotingFiles : public Assimp::DefaultIOSystem {
     return new Assimp::MemoryIOStream(kept, size, true);
   }
   std::optional<std::string> relative(const char* path) const {
-    const fs::path full = fs::weakly_canonical(fs::path(path).is_absolute() ? fs::path(path) : folder_ / path);
+    const fs::path full =
+        fs::weakly_canonical(fs::path(path).is_absolute() ? fs::path(path) : folder_ / path);
     const fs::path inside = full.lexically_relative(folder_);
     if (inside.empty() || *inside.begin() == "..") return std::nullopt;
     return inside.string();
@@ -77,7 +81,8 @@ class NotingFiles : public Assimp::DefaultIOSystem {
   void note(const std::string& inside, bool there) const {
     if (folder_ / inside == mesh_ || seen_.count(inside) || seen_.size() >= 1000) return;
     uint64_t hash = 0;
-    if (there) hash = content_hash(read_text_file((folder_ / inside).string(), MeshLimits::kFileBytes));
+    if (there)
+      hash = content_hash(read_text_file((folder_ / inside).string(), MeshLimits::kFileBytes));
     seen_[inside] = hash;
   }
   fs::path mesh_, folder_;
@@ -99,7 +104,8 @@ Material material_of(const aiScene& scene, const aiMaterial& from) {
   read(AI_MATKEY_COLOR_EMISSIVE, to.emissive);
   float number = 0;
   if (from.Get(AI_MATKEY_SHININESS, number) == AI_SUCCESS && number > 0) to.shininess = number;
-  if (from.Get(AI_MATKEY_OPACITY, number) == AI_SUCCESS && number >= 0 && number < 1) to.diffuse[3] = number;
+  if (from.Get(AI_MATKEY_OPACITY, number) == AI_SUCCESS && number >= 0 && number < 1)
+    to.diffuse[3] = number;
   int two_sided = 0;
   if (from.Get(AI_MATKEY_TWOSIDED, two_sided) == AI_SUCCESS) to.double_sided = two_sided != 0;
   aiString path;
@@ -118,12 +124,14 @@ Material material_of(const aiScene& scene, const aiMaterial& from) {
     if (texture->path.size() > 4000) texture->path.clear();
     if (!texture->path.empty() || !texture->embedded.empty()) to.texture = texture;
     // Exporters leave the colour black where the texture says it all.
-    if (to.texture && to.diffuse[0] + to.diffuse[1] + to.diffuse[2] == 0) to.diffuse = {1, 1, 1, to.diffuse[3]};
+    if (to.texture && to.diffuse[0] + to.diffuse[1] + to.diffuse[2] == 0)
+      to.diffuse = {1, 1, 1, to.diffuse[3]};
   }
   return to;
 }
 
-void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent, Mesh& mesh, int depth) {
+void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent, Mesh& mesh,
+            int depth) {
   if (depth > 200) throw std::runtime_error("its nodes are nested too deep");
   const aiMatrix4x4 X = parent * node.mTransformation;
   aiMatrix3x3 normal_matrix(X);
@@ -133,10 +141,13 @@ void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent,
     const aiMesh& from = *scene.mMeshes[node.mMeshes[m]];
     if (!(from.mPrimitiveTypes & aiPrimitiveType_TRIANGLE)) continue;
     const size_t first = mesh.positions.size();
-    if (first + from.mNumVertices > MeshLimits::kVertices) throw std::runtime_error("it has more than 8000000 vertices");
-    // One array for all parts: a part without normals or texture coordinates gets none for all but the first.
+    if (first + from.mNumVertices > MeshLimits::kVertices)
+      throw std::runtime_error("it has more than 8000000 vertices");
+    // One array for all parts: a part without normals or texture coordinates gets none for all but
+    // the first.
     const bool with_normals = from.HasNormals(), with_uvs = from.HasTextureCoords(0);
-    if (with_normals && mesh.normals.size() < first) mesh.normals.resize(first, Eigen::Vector3f::Zero());
+    if (with_normals && mesh.normals.size() < first)
+      mesh.normals.resize(first, Eigen::Vector3f::Zero());
     if (with_uvs && mesh.uvs.size() < first) mesh.uvs.resize(first, Eigen::Vector2f::Zero());
     for (unsigned v = 0; v < from.mNumVertices; ++v) {
       const aiVector3D p = X * from.mVertices[v];
@@ -166,25 +177,29 @@ void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent,
     part.material = static_cast<int>(from.mMaterialIndex);
     if (part.triangle_count) mesh.parts.push_back(part);
   }
-  for (unsigned c = 0; c < node.mNumChildren; ++c) append(scene, *node.mChildren[c], X, mesh, depth + 1);
+  for (unsigned c = 0; c < node.mNumChildren; ++c)
+    append(scene, *node.mChildren[c], X, mesh, depth + 1);
 }
 
-// Normals of zero length (a part without any beside parts that have them) become those of the triangles.
+// Normals of zero length (a part without any beside parts that have them) become those of the
+// triangles.
 void fill_missing_normals(Mesh& mesh) {
   if (mesh.normals.empty()) return;
   for (const auto& t : mesh.triangles) {
     for (const uint32_t i : t) {
       if (i >= mesh.positions.size() || mesh.normals[i] != Eigen::Vector3f::Zero()) continue;
-      const Eigen::Vector3f a = mesh.positions[t[1]] - mesh.positions[t[0]], b = mesh.positions[t[2]] - mesh.positions[t[0]];
+      const Eigen::Vector3f a = mesh.positions[t[1]] - mesh.positions[t[0]],
+                            b = mesh.positions[t[2]] - mesh.positions[t[0]];
       const Eigen::Vector3f n = a.cross(b);
-      mesh.normals[i] = n.squaredNorm() > 0 ? Eigen::Vector3f(n.normalized()) : Eigen::Vector3f::UnitZ();
+      mesh.normals[i] =
+          n.squaredNorm() > 0 ? Eigen::Vector3f(n.normalized()) : Eigen::Vector3f::UnitZ();
     }
   }
 }
 
-// What brings the scene to metres and z up. COLLADA's unit is in its root node, and its up axis is left alone, as
-// Gazebo leaves it. glTF is y up by its specification; assimp turns 3DS to y up, and FBX from 5.4 on, by its root node. Before,
-// FBX is as its own settings say.
+// What brings the scene to metres and z up. COLLADA's unit is in its root node, and its up axis is
+// left alone, as Gazebo leaves it. glTF is y up by its specification; assimp turns 3DS to y up, and
+// FBX from 5.4 on, by its root node. Before, FBX is as its own settings say.
 aiMatrix4x4 to_z_up(const aiScene& scene, const std::string& extension) {
   aiMatrix4x4 turn, scale;
   aiMatrix4x4::RotationX(static_cast<float>(M_PI / 2), turn);
@@ -194,11 +209,12 @@ aiMatrix4x4 to_z_up(const aiScene& scene, const std::string& extension) {
   turn.c2 = 1;
   if (extension == "gltf" || extension == "glb" || extension == "3ds") return turn;
   if (extension == "fbx") {
-    float centimetres = 1.0f;    // in one of the file's units
+    float centimetres = 1.0f;  // in one of the file's units
     int up = 1;
     if (scene.mMetaData) {
       double wide = 0;
-      if (!scene.mMetaData->Get("UnitScaleFactor", centimetres) && scene.mMetaData->Get("UnitScaleFactor", wide)) {
+      if (!scene.mMetaData->Get("UnitScaleFactor", centimetres) &&
+          scene.mMetaData->Get("UnitScaleFactor", wide)) {
         centimetres = static_cast<float>(wide);
       }
       scene.mMetaData->Get("UpAxis", up);
@@ -223,15 +239,18 @@ void import(const fs::path& input, const fs::path& output) {
     if (!extensions.count(extension)) importer.UnregisterLoader(each);
   }
   auto* files = new NotingFiles(input);
-  importer.SetIOHandler(files);    // the importer owns it
+  importer.SetIOHandler(files);  // the importer owns it
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, true);
-  importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
-  importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, aiComponent_TANGENTS_AND_BITANGENTS | aiComponent_COLORS |
-                                                          aiComponent_BONEWEIGHTS | aiComponent_ANIMATIONS |
-                                                          aiComponent_LIGHTS | aiComponent_CAMERAS);
-  const aiScene* scene = importer.ReadFile(input.string(), aiProcess_Triangulate | aiProcess_SortByPType |
-                                                               aiProcess_RemoveComponent | aiProcess_JoinIdenticalVertices);
+  importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
+                              aiPrimitiveType_POINT | aiPrimitiveType_LINE);
+  importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS,
+                              aiComponent_TANGENTS_AND_BITANGENTS | aiComponent_COLORS |
+                                  aiComponent_BONEWEIGHTS | aiComponent_ANIMATIONS |
+                                  aiComponent_LIGHTS | aiComponent_CAMERAS);
+  const aiScene* scene = importer.ReadFile(
+      input.string(), aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_RemoveComponent |
+                          aiProcess_JoinIdenticalVertices);
   if (!scene || !scene->mRootNode) throw std::runtime_error(importer.GetErrorString());
 
   MeshPackage package;
@@ -239,7 +258,8 @@ void import(const fs::path& input, const fs::path& output) {
   for (unsigned m = 0; m < scene->mNumMaterials; ++m) {
     package.mesh.materials.push_back(material_of(*scene, *scene->mMaterials[m]));
   }
-  if (const std::string fault = mesh_fault(package.mesh); !fault.empty()) throw std::runtime_error(fault);
+  if (const std::string fault = mesh_fault(package.mesh); !fault.empty())
+    throw std::runtime_error(fault);
   fill_missing_normals(package.mesh);
   package.mesh.closed = is_closed(package.mesh);
   package.dependencies = files->dependencies();

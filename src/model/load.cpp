@@ -41,11 +41,14 @@ class Loader {
 
   std::shared_ptr<const WorldModel> load(const Element& written, const LoadOptions& options) {
     world_.file = path_;
-    const std::shared_ptr<const Element> expanded = is_xacro(path_, &written) ? expand_xacro(path_, context_) : nullptr;
+    const std::shared_ptr<const Element> expanded =
+        is_xacro(path_, &written) ? expand_xacro(path_, context_) : nullptr;
     const Element& root = expanded ? *expanded : written;
     reader_.enter(path_, root);
-    if (root.name == "robot") read_robot(root);
-    else read_sdf(root);
+    if (root.name == "robot")
+      read_robot(root);
+    else
+      read_sdf(root);
     reader_.leave();
     if (!options.spawns.empty()) {
       Room room(world_);
@@ -76,7 +79,8 @@ class Loader {
     if (std::find(robots.begin(), robots.end(), fault.robot) != robots.end()) return;
     std::string names;
     for (const std::string& robot : robots) names += (names.empty() ? "" : ", ") + robot;
-    throw InputError(fault.source, "a fault of robot '" + fault.robot + "'; the world has " + (names.empty() ? "no robot" : names));
+    throw InputError(fault.source, "a fault of robot '" + fault.robot + "'; the world has " +
+                                       (names.empty() ? "no robot" : names));
   }
 
   void read_empty_world() {
@@ -85,13 +89,18 @@ class Loader {
   }
 
   // The name of a file's robot, as its channels can have it.
-  std::string name_in_world(const std::string& name, const std::shared_ptr<const Model>& model, const Source& source) {
-    const std::string fit = ModelInstance{name, {}, model}.is_robot() ? made_fit_for_channel(name) : name;
-    if (fit != name) findings_.repaired(source, "model " + name, "the name is not fit for a channel; the robot is called '" + fit + "'");
+  std::string name_in_world(const std::string& name, const std::shared_ptr<const Model>& model,
+                            const Source& source) {
+    const std::string fit =
+        ModelInstance{name, {}, model}.is_robot() ? made_fit_for_channel(name) : name;
+    if (fit != name)
+      findings_.repaired(source, "model " + name,
+                         "the name is not fit for a channel; the robot is called '" + fit + "'");
     return fit;
   }
 
-  void add(const std::string& name, const Pose& X_WM, std::shared_ptr<const Model> model, const Source& source) {
+  void add(const std::string& name, const Pose& X_WM, std::shared_ptr<const Model> model,
+           const Source& source) {
     world_.models.push_back({name, X_WM, std::move(model)});
     check_channel_names(world_.models.back(), source);
   }
@@ -100,7 +109,8 @@ class Loader {
     const SdfVersion version = reader_.version_of(root);
     const auto worlds = root.all("world");
     if (!worlds.empty()) {
-      if (worlds.size() > 1) findings_.unsupported(worlds[1]->source, "sdf", "a second world in one file is left out");
+      if (worlds.size() > 1)
+        findings_.unsupported(worlds[1]->source, "sdf", "a second world in one file is left out");
       reader_.read_world(*worlds[0], version, world_);
       return;
     }
@@ -110,7 +120,8 @@ class Loader {
     for (const auto& child : root.children) {
       if (child->name == "model") {
         if (const auto scope = reader_.read_model(*child, version)) {
-          const std::string name = name_in_world(required_name(*child), scope->model, child->source);
+          const std::string name =
+              name_in_world(required_name(*child), scope->model, child->source);
           for (const ModelInstance& other : world_.models) {
             if (other.name == name && any) child->fail("a second model of the name '" + name + "'");
           }
@@ -120,7 +131,7 @@ class Loader {
         }
         any = true;
       } else if (child->name == "light") {
-        if (!own_light) world_.lights.clear();    // it stands in for our sun
+        if (!own_light) world_.lights.clear();  // it stands in for our sun
         own_light = any = true;
         world_.lights.push_back(read_light(*child, child->pose("pose"), "light", context_));
       } else if (child->name == "actor") {
@@ -154,20 +165,26 @@ class Loader {
     if (!path && spawn.model.find("://") == std::string::npos) {
       const fs::path here = fs::absolute(spawn.model);
       std::error_code error;
-      if (fs::exists(here, error)) path = ResourceFinder::model_file(fs::weakly_canonical(here, error).string());
+      if (fs::exists(here, error))
+        path = ResourceFinder::model_file(fs::weakly_canonical(here, error).string());
     }
-    if (!path) throw InputError({}, what + ": there is no such file, and no model of that name in the search path");
+    if (!path)
+      throw InputError(
+          {}, what + ": there is no such file, and no model of that name in the search path");
     std::shared_ptr<const Model> model;
     std::string name;
     const auto included = reader_.read_file(*path, asker);
     if (included.model) model = included.model->model, name = included.name;
     if (!model) throw InputError({*path, 0}, what + ": the file holds no model");
     const auto taken = [&](const std::string& wanted) {
-      return std::any_of(world_.models.begin(), world_.models.end(), [&](const auto& each) { return each.name == wanted; });
+      return std::any_of(world_.models.begin(), world_.models.end(),
+                         [&](const auto& each) { return each.name == wanted; });
     };
     if (!spawn.name.empty()) {
       name = spawn.name;
-      if (taken(name)) throw InputError({}, what + ": the name '" + name + "' is taken by another model of the world");
+      if (taken(name))
+        throw InputError({},
+                         what + ": the name '" + name + "' is taken by another model of the world");
     } else {
       name = name_in_world(name, model, model->source);
       const std::string own = name;
@@ -175,7 +192,10 @@ class Loader {
     }
     const Pose X_WM = room.standing_on(*model, spawn.x, spawn.y, spawn.yaw);
     if (const std::string other = room.overlapped(*model, X_WM); !other.empty()) {
-      throw InputError({}, what + "@" + shown(spawn.x) + "," + shown(spawn.y) + (spawn.yaw != 0 ? "," + shown(spawn.yaw) : "") + ": there is no room, it would stand in '" + other + "'" + nearest_place(*model, spawn, room));
+      throw InputError({}, what + "@" + shown(spawn.x) + "," + shown(spawn.y) +
+                               (spawn.yaw != 0 ? "," + shown(spawn.yaw) : "") +
+                               ": there is no room, it would stand in '" + other + "'" +
+                               nearest_place(*model, spawn, room));
     }
     add(name, X_WM, std::move(model), {});
     room.add(world_.models.back());
@@ -198,8 +218,10 @@ class Loader {
       for (int i = 0; i < kAround; ++i) {
         const double angle = 2 * M_PI * i / kAround;
         const auto rounded = [](double value) { return std::round(value * 100) / 100; };
-        const double x = rounded(spawn.x + ring * kApart_m * math::cos(angle)), y = rounded(spawn.y + ring * kApart_m * math::sin(angle));
-        if (room.overlapped(model, room.standing_on(model, x, y, spawn.yaw)).empty()) return "; the nearest free place is " + shown(x) + "," + shown(y);
+        const double x = rounded(spawn.x + ring * kApart_m * math::cos(angle)),
+                     y = rounded(spawn.y + ring * kApart_m * math::sin(angle));
+        if (room.overlapped(model, room.standing_on(model, x, y, spawn.yaw)).empty())
+          return "; the nearest free place is " + shown(x) + "," + shown(y);
       }
     }
     return "";
@@ -227,7 +249,8 @@ std::shared_ptr<const WorldModel> load_world(const std::string& name, const Load
   return loader.load(*root, options);
 }
 
-std::shared_ptr<const WorldModel> load_world_text(const std::string& text, const std::string& path, const LoadOptions& options) {
+std::shared_ptr<const WorldModel> load_world_text(const std::string& text, const std::string& path,
+                                                  const LoadOptions& options) {
   std::error_code error;
   const std::string full = fs::weakly_canonical(fs::absolute(path), error).string();
   Loader loader(full, options);

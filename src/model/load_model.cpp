@@ -1,4 +1,5 @@
-// The readers of a world file, for one model of it. Who asks may be anybody: see ResourceFinder::for_strangers.
+// The readers of a world file, for one model of it. Who asks may be anybody: see
+// ResourceFinder::for_strangers.
 #include "model/load_model.h"
 
 #include <filesystem>
@@ -11,9 +12,12 @@ namespace ruedo::model {
 namespace {
 
 // A file of the world's folder that is not there.
-std::string path_of_text(const std::string& world_file) { return (fs::path(world_file).parent_path() / "the text").string(); }
+std::string path_of_text(const std::string& world_file) {
+  return (fs::path(world_file).parent_path() / "the text").string();
+}
 
-LoadedModel read(const std::string& path, const std::string& world_file, std::shared_ptr<const Element> document, LoadBudget* budget) {
+LoadedModel read(const std::string& path, const std::string& world_file,
+                 std::shared_ptr<const Element> document, LoadBudget* budget) {
   Findings findings;
   const ResourceFinder resources = ResourceFinder::for_strangers(world_file);
   DocumentStore documents;
@@ -27,17 +31,23 @@ LoadedModel read(const std::string& path, const std::string& world_file, std::sh
   asker.name = "SPAWN";
   const auto included = reader.read_file(path, asker);
   if (included.light || included.actor) {
-    throw InputError({path, (included.light ? included.light : included.actor)->source.line},
-                     included.light ? "holds a <light> and no <model>: lights stand in the world's file, or in a link"
-                                    : "holds an <actor> and no <model>: actors stand in the world's file");
+    throw InputError(
+        {path, (included.light ? included.light : included.actor)->source.line},
+        included.light
+            ? "holds a <light> and no <model>: lights stand in the world's file, or in a link"
+            : "holds an <actor> and no <model>: actors stand in the world's file");
   }
-  if (!included.model || !included.model->model) throw InputError({path, 0}, "holds no <model>, or one without a link");
+  if (!included.model || !included.model->model)
+    throw InputError({path, 0}, "holds no <model>, or one without a link");
   for (const std::string& file : meshes.files_read()) documents.note(file);
   LoadedModel loaded{included.model->model, included.name, findings.list(), documents.files_read()};
-  if (ModelInstance{loaded.name, {}, loaded.model}.is_robot()) loaded.name = made_fit_for_channel(loaded.name);
+  if (ModelInstance{loaded.name, {}, loaded.model}.is_robot())
+    loaded.name = made_fit_for_channel(loaded.name);
   if (loaded.model->links.size() > kMostLinksOfSpawned) {
-    throw InputError(loaded.model->source, "the model '" + loaded.name + "' has " + std::to_string(loaded.model->links.size()) +
-                                               " links; allowed are " + std::to_string(kMostLinksOfSpawned));
+    throw InputError(loaded.model->source, "the model '" + loaded.name + "' has " +
+                                               std::to_string(loaded.model->links.size()) +
+                                               " links; allowed are " +
+                                               std::to_string(kMostLinksOfSpawned));
   }
   return loaded;
 }
@@ -47,7 +57,9 @@ LoadedModel read(const std::string& path, const std::string& world_file, std::sh
 std::string model_file(const std::string& name, const std::string& world_file) {
   const ResourceFinder resources = ResourceFinder::for_strangers(world_file);
   const auto path = resources.find_model(name, world_file);
-  if (!path) throw InputError({}, "'" + name + "' is no model of Ruedo's and no file in the folders that are searched");
+  if (!path)
+    throw InputError(
+        {}, "'" + name + "' is no model of Ruedo's and no file in the folders that are searched");
   return *path;
 }
 
@@ -55,7 +67,8 @@ LoadedModel load_model(const std::string& name, const std::string& world_file, L
   return read(model_file(name, world_file), world_file, nullptr, budget);
 }
 
-LoadedModel load_model_text(const std::string& text, const std::string& world_file, LoadBudget* budget) {
+LoadedModel load_model_text(const std::string& text, const std::string& world_file,
+                            LoadBudget* budget) {
   const std::string path = path_of_text(world_file);
   try {
     std::shared_ptr<const Element> document = parse_document(text, path);

@@ -1,4 +1,5 @@
-// Meshes that are made here: prisms over polylines (ear clipping, holes joined by bridges) and heightmaps.
+// Meshes that are made here: prisms over polylines (ear clipping, holes joined by bridges) and
+// heightmaps.
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -53,7 +54,8 @@ bool sees(const Point& a, const Point& b, const std::vector<Polygon>& walls) {
   return true;
 }
 
-// Joins a hole (clockwise) to the outline (counter-clockwise) by the shortest bridge that crosses no wall.
+// Joins a hole (clockwise) to the outline (counter-clockwise) by the shortest bridge that crosses
+// no wall.
 void join_hole(Polygon& outline, const Polygon& hole, const std::vector<Polygon>& walls) {
   double best = std::numeric_limits<double>::infinity();
   size_t best_outer = 0, best_inner = 0;
@@ -74,7 +76,8 @@ void join_hole(Polygon& outline, const Polygon& hole, const std::vector<Polygon>
   outline = std::move(joined);
 }
 
-// Triangles of a simple polygon that runs counter-clockwise (bridges run through twice are allowed).
+// Triangles of a simple polygon that runs counter-clockwise (bridges run through twice are
+// allowed).
 std::vector<std::array<Point, 3>> clip_ears(Polygon p) {
   std::vector<std::array<Point, 3>> triangles;
   while (p.size() > 3) {
@@ -84,8 +87,9 @@ std::vector<std::array<Point, 3>> clip_ears(Polygon p) {
       const double turn = cross(a, b, c);
       if (turn < 0) continue;
       const bool blocked = turn > 0 && std::any_of(p.begin(), p.end(), [&](const Point& q) {
-        return q != a && q != b && q != c && cross(a, b, q) >= 0 && cross(b, c, q) >= 0 && cross(c, a, q) >= 0;
-      });
+                             return q != a && q != b && q != c && cross(a, b, q) >= 0 &&
+                                    cross(b, c, q) >= 0 && cross(c, a, q) >= 0;
+                           });
       if (blocked) continue;
       if (turn > 0) triangles.push_back({a, b, c});
       p.erase(p.begin() + static_cast<long>(i));
@@ -104,7 +108,7 @@ Mesh extruded(const std::vector<Polygon>& written, double height) {
   std::vector<Polygon> polygons = written;
   size_t points = 0;
   for (Polygon& p : polygons) {
-    if (p.size() > 1 && p.front() == p.back()) p.pop_back();    // closed explicitly
+    if (p.size() > 1 && p.front() == p.back()) p.pop_back();  // closed explicitly
     p.erase(std::unique(p.begin(), p.end()), p.end());
     if (p.size() < 3) throw std::runtime_error("a polygon has less than three points");
     if (std::abs(area(p)) < 1e-12) throw std::runtime_error("a polygon has no area");
@@ -114,38 +118,45 @@ Mesh extruded(const std::vector<Polygon>& written, double height) {
   for (const Polygon& p : polygons) {
     for (size_t i = 0; i < p.size(); ++i) {
       for (size_t k = i + 2; k < p.size(); ++k) {
-        if (cross_properly(p[i], p[i + 1], p[k], p[(k + 1) % p.size()])) throw std::runtime_error("a polygon crosses itself");
+        if (cross_properly(p[i], p[i + 1], p[k], p[(k + 1) % p.size()]))
+          throw std::runtime_error("a polygon crosses itself");
       }
     }
   }
   // Even depth: an outline; odd: a hole of the outline around it.
   std::vector<int> depth(polygons.size(), 0);
   for (size_t i = 0; i < polygons.size(); ++i) {
-    for (size_t k = 0; k < polygons.size(); ++k) depth[i] += k != i && inside(polygons[i][0], polygons[k]);
+    for (size_t k = 0; k < polygons.size(); ++k)
+      depth[i] += k != i && inside(polygons[i][0], polygons[k]);
     const bool counter_clockwise = area(polygons[i]) > 0;
-    if (counter_clockwise != (depth[i] % 2 == 0)) std::reverse(polygons[i].begin(), polygons[i].end());
+    if (counter_clockwise != (depth[i] % 2 == 0))
+      std::reverse(polygons[i].begin(), polygons[i].end());
   }
 
   Mesh mesh;
   const auto add = [&](const Point& p, double z) {
-    mesh.positions.emplace_back(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(z));
+    mesh.positions.emplace_back(static_cast<float>(p.x()), static_cast<float>(p.y()),
+                                static_cast<float>(z));
     return static_cast<uint32_t>(mesh.positions.size() - 1);
   };
   for (size_t i = 0; i < polygons.size(); ++i) {
     if (depth[i] % 2) continue;
     Polygon outline = polygons[i];
     for (size_t k = 0; k < polygons.size(); ++k) {
-      if (depth[k] == depth[i] + 1 && inside(polygons[k][0], polygons[i])) join_hole(outline, polygons[k], polygons);
+      if (depth[k] == depth[i] + 1 && inside(polygons[k][0], polygons[i]))
+        join_hole(outline, polygons[k], polygons);
     }
     for (const auto& t : clip_ears(outline)) {
       mesh.triangles.push_back({add(t[0], height), add(t[1], height), add(t[2], height)});
       mesh.triangles.push_back({add(t[0], 0), add(t[2], 0), add(t[1], 0)});
     }
   }
-  for (const Polygon& p : polygons) {    // walls: outward for outlines and holes alike, by their directions
+  for (const Polygon& p :
+       polygons) {  // walls: outward for outlines and holes alike, by their directions
     for (size_t i = 0; i < p.size(); ++i) {
       const Point &a = p[i], &b = p[(i + 1) % p.size()];
-      const uint32_t low_a = add(a, 0), low_b = add(b, 0), high_a = add(a, height), high_b = add(b, height);
+      const uint32_t low_a = add(a, 0), low_b = add(b, 0), high_a = add(a, height),
+                     high_b = add(b, height);
       mesh.triangles.push_back({low_a, low_b, high_b});
       mesh.triangles.push_back({low_a, high_b, high_a});
     }
@@ -158,34 +169,42 @@ Mesh extruded(const std::vector<Polygon>& written, double height) {
 Mesh heightmap(const std::string& picture, const Vec3& size) {
   const std::string bytes = read_text_file(picture, 64 << 20);
   constexpr int kMost = 1025;
-  if (const std::string fault = picture_fault(bytes, kMost); !fault.empty()) throw std::runtime_error(fault);
+  if (const std::string fault = picture_fault(bytes, kMost); !fault.empty())
+    throw std::runtime_error(fault);
   cv::Mat grey;
   try {
-    grey = cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data())),
-                        cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
+    grey = cv::imdecode(
+        cv::Mat(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data())),
+        cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
   } catch (const cv::Exception&) {
     throw std::runtime_error("the picture is broken");
   }
-  if (grey.empty()) throw std::runtime_error("it is no picture that can be read (pgm, png, jpeg, bmp, tiff)");
-  if (grey.depth() != CV_8U && grey.depth() != CV_16U) throw std::runtime_error("its pixels are neither of 8 nor of 16 bits");
+  if (grey.empty())
+    throw std::runtime_error("it is no picture that can be read (pgm, png, jpeg, bmp, tiff)");
+  if (grey.depth() != CV_8U && grey.depth() != CV_16U)
+    throw std::runtime_error("its pixels are neither of 8 nor of 16 bits");
   if (grey.cols < 2 || grey.rows < 2 || grey.cols > kMost || grey.rows > kMost) {
-    throw std::runtime_error("it has " + std::to_string(grey.cols) + " x " + std::to_string(grey.rows) +
-                             " pixels; allowed are 2 to 1025 each way");
+    throw std::runtime_error("it has " + std::to_string(grey.cols) + " x " +
+                             std::to_string(grey.rows) + " pixels; allowed are 2 to 1025 each way");
   }
   const double white = grey.depth() == CV_8U ? 255.0 : 65535.0;
   Mesh mesh;
   mesh.positions.reserve(static_cast<size_t>(grey.cols) * grey.rows);
-  for (int row = 0; row < grey.rows; ++row) {    // the picture's first row is the farthest in +y
+  for (int row = 0; row < grey.rows; ++row) {  // the picture's first row is the farthest in +y
     for (int column = 0; column < grey.cols; ++column) {
-      const double value = grey.depth() == CV_8U ? grey.at<uint8_t>(row, column) : grey.at<uint16_t>(row, column);
-      const double u = static_cast<double>(column) / (grey.cols - 1), v = 1.0 - static_cast<double>(row) / (grey.rows - 1);
-      mesh.positions.push_back(Vec3((u - 0.5) * size.x(), (v - 0.5) * size.y(), value / white * size.z()).cast<float>());
+      const double value =
+          grey.depth() == CV_8U ? grey.at<uint8_t>(row, column) : grey.at<uint16_t>(row, column);
+      const double u = static_cast<double>(column) / (grey.cols - 1),
+                   v = 1.0 - static_cast<double>(row) / (grey.rows - 1);
+      mesh.positions.push_back(
+          Vec3((u - 0.5) * size.x(), (v - 0.5) * size.y(), value / white * size.z()).cast<float>());
       mesh.uvs.emplace_back(static_cast<float>(u), static_cast<float>(v));
     }
   }
   for (int row = 0; row + 1 < grey.rows; ++row) {
     for (int column = 0; column + 1 < grey.cols; ++column) {
-      const uint32_t a = static_cast<uint32_t>(row * grey.cols + column), b = a + 1, c = a + static_cast<uint32_t>(grey.cols), d = c + 1;
+      const uint32_t a = static_cast<uint32_t>(row * grey.cols + column), b = a + 1,
+                     c = a + static_cast<uint32_t>(grey.cols), d = c + 1;
       mesh.triangles.push_back({a, c, b});
       mesh.triangles.push_back({b, c, d});
     }

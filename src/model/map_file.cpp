@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 namespace ruedo::model {
 namespace {
 
-constexpr int kMostPixels = 20'000;    // each way
+constexpr int kMostPixels = 20'000;  // each way
 
 struct Line {
   int number;
@@ -40,7 +40,8 @@ std::vector<Line> lines_of(const std::string& path, size_t most_bytes) {
 
 std::string trimmed(const std::string& text) {
   const size_t begin = text.find_first_not_of(" \t");
-  return begin == std::string::npos ? "" : text.substr(begin, text.find_last_not_of(" \t") - begin + 1);
+  return begin == std::string::npos ? ""
+                                    : text.substr(begin, text.find_last_not_of(" \t") - begin + 1);
 }
 
 double number(const std::string& text, const Source& source, const std::string& what) {
@@ -52,14 +53,18 @@ double number(const std::string& text, const Source& source, const std::string& 
   return value;
 }
 
-// The flat YAML that map_server writes: "key: value" lines, lists in brackets or as "- value" lines.
+// The flat YAML that map_server writes: "key: value" lines, lists in brackets or as "- value"
+// lines.
 class FlatYaml {
  public:
   explicit FlatYaml(const std::string& path) : path_(path) {
     std::string key;
     for (const auto& [line, raw] : lines_of(path, 1 << 20)) {
       std::string text = raw;
-      if (const size_t hash = text.find('#'); hash == 0 || (hash != std::string::npos && (text[hash - 1] == ' ' || text[hash - 1] == '\t'))) text.resize(hash);
+      if (const size_t hash = text.find('#');
+          hash == 0 ||
+          (hash != std::string::npos && (text[hash - 1] == ' ' || text[hash - 1] == '\t')))
+        text.resize(hash);
       text = trimmed(text);
       if (text.empty() || text == "---" || text == "...") continue;
       if (text[0] == '-' && !key.empty() && text.size() > 1 && text[1] == ' ') {
@@ -67,18 +72,24 @@ class FlatYaml {
         continue;
       }
       const size_t colon = text.find(':');
-      if (colon == std::string::npos) throw InputError({path, line}, "'" + text + "' is no 'key: value'");
+      if (colon == std::string::npos)
+        throw InputError({path, line}, "'" + text + "' is no 'key: value'");
       key = trimmed(text.substr(0, colon));
       std::string value = trimmed(text.substr(colon + 1));
-      if (value.size() >= 2 && (value.front() == '"' || value.front() == '\'') && value.back() == value.front()) value = value.substr(1, value.size() - 2);
+      if (value.size() >= 2 && (value.front() == '"' || value.front() == '\'') &&
+          value.back() == value.front())
+        value = value.substr(1, value.size() - 2);
       values_[key] = {line, value};
     }
   }
 
   bool has(const std::string& key) const { return values_.count(key) != 0; }
-  Source source(const std::string& key) const { return {path_, has(key) ? values_.at(key).first : 0}; }
+  Source source(const std::string& key) const {
+    return {path_, has(key) ? values_.at(key).first : 0};
+  }
   std::string text(const std::string& key) const {
-    if (!has(key) || values_.at(key).second.empty()) throw InputError({path_, 0}, "has no '" + key + "'");
+    if (!has(key) || values_.at(key).second.empty())
+      throw InputError({path_, 0}, "has no '" + key + "'");
     return values_.at(key).second;
   }
   double real(const std::string& key) const { return number(text(key), source(key), key); }
@@ -102,14 +113,18 @@ class FlatYaml {
 cv::Mat read_picture(const std::string& path) {
   const std::string bytes = read_text_file(path, 256u << 20);
   if (bytes.empty()) throw InputError({path, 0}, "the file is empty");
-  if (const std::string fault = picture_fault(bytes, kMostPixels); !fault.empty()) throw InputError({path, 0}, fault);
+  if (const std::string fault = picture_fault(bytes, kMostPixels); !fault.empty())
+    throw InputError({path, 0}, fault);
   cv::Mat grey;
   try {
-    grey = cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data())), cv::IMREAD_GRAYSCALE);
+    grey = cv::imdecode(
+        cv::Mat(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data())),
+        cv::IMREAD_GRAYSCALE);
   } catch (const cv::Exception&) {
     throw InputError({path, 0}, "the picture is broken");
   }
-  if (grey.empty()) throw InputError({path, 0}, "is no picture that can be read (pgm, png, jpeg, bmp, tiff)");
+  if (grey.empty())
+    throw InputError({path, 0}, "is no picture that can be read (pgm, png, jpeg, bmp, tiff)");
   return grey;
 }
 
@@ -121,28 +136,38 @@ OccupancyGrid grid_of(const cv::Mat& grey, double resolution, CellOf cell_of) {
   grid.resolution = resolution;
   grid.cells.resize(static_cast<size_t>(grey.cols) * static_cast<size_t>(grey.rows));
   for (int row = 0; row < grey.rows; ++row) {
-    for (int column = 0; column < grey.cols; ++column) grid.at(column, grey.rows - 1 - row) = cell_of(grey.at<uint8_t>(row, column));
+    for (int column = 0; column < grey.cols; ++column)
+      grid.at(column, grey.rows - 1 - row) = cell_of(grey.at<uint8_t>(row, column));
   }
   return grid;
 }
 
 }  // namespace
 
-// The rules of map_server's "trinary" mode, by which "scale" maps are cut here, too; a "raw" map has the per cent themselves.
+// The rules of map_server's "trinary" mode, by which "scale" maps are cut here, too; a "raw" map
+// has the per cent themselves.
 OccupancyGrid read_map(const std::string& path) {
   const FlatYaml yaml(path);
   const double resolution = yaml.real("resolution");
-  if (!(resolution > 0 && resolution <= 1000)) throw InputError(yaml.source("resolution"), "resolution: '" + yaml.text("resolution") + "' is not allowed; allowed are numbers above 0, in m");
+  if (!(resolution > 0 && resolution <= 1000))
+    throw InputError(yaml.source("resolution"),
+                     "resolution: '" + yaml.text("resolution") +
+                         "' is not allowed; allowed are numbers above 0, in m");
   const std::vector<double> origin = yaml.list("origin");
-  if (origin.size() != 3 && origin.size() != 2) throw InputError(yaml.source("origin"), "origin: '" + yaml.text("origin") + "' is not allowed; allowed is [x, y, yaw]");
+  if (origin.size() != 3 && origin.size() != 2)
+    throw InputError(yaml.source("origin"), "origin: '" + yaml.text("origin") +
+                                                "' is not allowed; allowed is [x, y, yaw]");
   const double occupied = yaml.has("occupied_thresh") ? yaml.real("occupied_thresh") : 0.65;
   const double free = yaml.has("free_thresh") ? yaml.real("free_thresh") : 0.25;
   const std::string negate = yaml.has("negate") ? yaml.text("negate") : "0";
   const bool negated = negate == "1" || negate == "true";
   const std::string mode = yaml.has("mode") ? yaml.text("mode") : "trinary";
-  if (mode != "trinary" && mode != "scale" && mode != "raw") throw InputError(yaml.source("mode"), "mode: '" + mode + "' is not allowed; allowed are trinary, scale and raw");
+  if (mode != "trinary" && mode != "scale" && mode != "raw")
+    throw InputError(yaml.source("mode"),
+                     "mode: '" + mode + "' is not allowed; allowed are trinary, scale and raw");
   const fs::path named = yaml.text("image");
-  const std::string picture = (named.is_absolute() ? named : fs::path(path).parent_path() / named).string();
+  const std::string picture =
+      (named.is_absolute() ? named : fs::path(path).parent_path() / named).string();
   OccupancyGrid grid = grid_of(read_picture(picture), resolution, [&](uint8_t value) {
     if (mode == "raw" && value > 100) return Cell::unknown;
     const double p = mode == "raw" ? value / 100.0 : (negated ? value : 255 - value) / 255.0;
@@ -155,7 +180,9 @@ OccupancyGrid read_map(const std::string& path) {
 }
 
 OccupancyGrid read_bitmap(const std::string& path, double resolution) {
-  OccupancyGrid grid = grid_of(read_picture(path), resolution, [](uint8_t value) { return value < 128 ? Cell::occupied : Cell::free; });
+  OccupancyGrid grid = grid_of(read_picture(path), resolution, [](uint8_t value) {
+    return value < 128 ? Cell::occupied : Cell::free;
+  });
   grid.x = -grid.width * resolution / 2;
   grid.y = -grid.height * resolution / 2;
   return grid;
@@ -169,7 +196,9 @@ void write_map(const OccupancyGrid& grid, const std::string& path) {
   for (int r = grid.height - 1; r >= 0; --r) {
     for (int c = 0; c < grid.width; ++c) {
       const Cell cell = grid.at(c, r);
-      row[static_cast<size_t>(c)] = static_cast<char>(cell == Cell::occupied ? 0 : cell == Cell::free ? 254 : 205);
+      row[static_cast<size_t>(c)] = static_cast<char>(cell == Cell::occupied ? 0
+                                                      : cell == Cell::free   ? 254
+                                                                             : 205);
     }
     image.write(row.data(), static_cast<std::streamsize>(row.size()));
   }
@@ -177,17 +206,20 @@ void write_map(const OccupancyGrid& grid, const std::string& path) {
   if (!image) throw EnvironmentError(picture.string() + " cannot be written");
   const auto rounded = [](double v) { return shown(std::round(v * 1e9) / 1e9 + 0.0); };
   std::ofstream yaml(path);
-  yaml << "image: " << picture.filename().string() << "\nmode: trinary\nresolution: " << rounded(grid.resolution) << "\norigin: [" << rounded(grid.x) << ", "
-       << rounded(grid.y) << ", " << rounded(grid.yaw) << "]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n";
+  yaml << "image: " << picture.filename().string()
+       << "\nmode: trinary\nresolution: " << rounded(grid.resolution) << "\norigin: ["
+       << rounded(grid.x) << ", " << rounded(grid.y) << ", " << rounded(grid.yaw)
+       << "]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n";
   yaml.close();
   if (!yaml) throw EnvironmentError(path + " cannot be written");
 }
 
-std::vector<WallPiece> read_armap(const std::string& path, double thickness, std::string& left_out) {
+std::vector<WallPiece> read_armap(const std::string& path, double thickness,
+                                  std::string& left_out) {
   enum class Part { head, lines, points };
   Part part = Part::head;
   std::vector<WallPiece> lines, points;
-  std::map<std::string, int> others;    // kinds of the map's objects, and how many
+  std::map<std::string, int> others;  // kinds of the map's objects, and how many
   double point_size = 0.02;
   bool is_map = false;
   for (const auto& [line, raw] : lines_of(path, 256u << 20)) {
@@ -196,32 +228,41 @@ std::vector<WallPiece> read_armap(const std::string& path, double thickness, std
     std::vector<std::string> words;
     for (std::string word; in >> word;) words.push_back(word);
     if (words.empty()) continue;
-    if (words[0] == "2D-Map" || words[0] == "2D-Map-Ex" || words[0] == "2D-Map-Ex2") is_map = true;
-    else if (words[0] == "LINES") part = Part::lines;
-    else if (words[0] == "DATA") part = Part::points;
+    if (words[0] == "2D-Map" || words[0] == "2D-Map-Ex" || words[0] == "2D-Map-Ex2")
+      is_map = true;
+    else if (words[0] == "LINES")
+      part = Part::lines;
+    else if (words[0] == "DATA")
+      part = Part::points;
     else if (part == Part::head) {
-      if (words[0] == "Resolution:" && words.size() > 1) point_size = std::max(number(words[1], source, "Resolution") / 1000, 0.001);
+      if (words[0] == "Resolution:" && words.size() > 1)
+        point_size = std::max(number(words[1], source, "Resolution") / 1000, 0.001);
       if (words[0] == "Cairn:" && words.size() > 1) ++others[words[1]];
     } else {
       const size_t wanted = part == Part::lines ? 4 : 2;
       if (words.size() != wanted) {
-        throw InputError(source, "'" + raw + "' is not allowed; allowed are " + (wanted == 4 ? "x1 y1 x2 y2" : "x y") + ", in mm");
+        throw InputError(source, "'" + raw + "' is not allowed; allowed are " +
+                                     (wanted == 4 ? "x1 y1 x2 y2" : "x y") + ", in mm");
       }
       double v[4] = {};
-      for (size_t i = 0; i < wanted; ++i) v[i] = number(words[i], source, wanted == 4 ? "LINES" : "DATA") / 1000;
+      for (size_t i = 0; i < wanted; ++i)
+        v[i] = number(words[i], source, wanted == 4 ? "LINES" : "DATA") / 1000;
       if (part == Part::points) {
         points.push_back({v[0], v[1], 0, point_size, point_size});
       } else {
         const double dx = v[2] - v[0], dy = v[3] - v[1];
         // As thick at its ends as at its sides: corners close.
-        lines.push_back({(v[0] + v[2]) / 2, (v[1] + v[3]) / 2, math::atan2(dy, dx), math::hypot(dx, dy) + thickness, thickness});
+        lines.push_back({(v[0] + v[2]) / 2, (v[1] + v[3]) / 2, math::atan2(dy, dx),
+                         math::hypot(dx, dy) + thickness, thickness});
       }
     }
   }
-  if (!is_map) throw InputError({path, 1}, "is no map of MobileSim and ARIA: it does not begin with '2D-Map'");
+  if (!is_map)
+    throw InputError({path, 1}, "is no map of MobileSim and ARIA: it does not begin with '2D-Map'");
   if (lines.empty() && points.empty()) throw InputError({path, 0}, "holds no LINES and no DATA");
   if (!lines.empty() && !points.empty()) left_out = std::to_string(points.size()) + " points";
-  for (const auto& [kind, count] : others) left_out += (left_out.empty() ? "" : ", ") + std::to_string(count) + " " + kind;
+  for (const auto& [kind, count] : others)
+    left_out += (left_out.empty() ? "" : ", ") + std::to_string(count) + " " + kind;
   return lines.empty() ? points : lines;
 }
 

@@ -15,39 +15,40 @@ using Rgba = std::array<float, 4>;
 
 // A picture that is not decoded yet: a file, or the bytes of one that was embedded in a mesh file.
 struct Texture {
-  std::string path;                // empty when embedded
-  std::vector<uint8_t> embedded;   // an encoded image (png, jpeg, ...)
+  std::string path;               // empty when embedded
+  std::vector<uint8_t> embedded;  // an encoded image (png, jpeg, ...)
 };
 
-// Colours in [0, 1], linear in the renderer's sense of SDF; a texture multiplies the diffuse colour.
+// Colours in [0, 1], linear in the renderer's sense of SDF; a texture multiplies the diffuse
+// colour.
 struct Material {
   Rgba ambient{0.7f, 0.7f, 0.7f, 1.0f};
   Rgba diffuse{0.7f, 0.7f, 0.7f, 1.0f};
   Rgba specular{0.0f, 0.0f, 0.0f, 1.0f};
   Rgba emissive{0.0f, 0.0f, 0.0f, 1.0f};
   float shininess = 16.0f;
-  std::shared_ptr<const Texture> texture;    // null: none
+  std::shared_ptr<const Texture> texture;  // null: none
   bool double_sided = false;
 };
 
-// Immutable after loading and shared by all that use the file. Metres, z up, x ahead: a mesh file's unit and
-// up axis are already applied; SDF's <scale> is not.
+// Immutable after loading and shared by all that use the file. Metres, z up, x ahead: a mesh file's
+// unit and up axis are already applied; SDF's <scale> is not.
 struct Mesh {
-  struct Part {             // triangles [first, first + count) of one material, of one submesh
+  struct Part {  // triangles [first, first + count) of one material, of one submesh
     std::string name;
     uint32_t first_triangle = 0;
     uint32_t triangle_count = 0;
-    int material = -1;      // index into materials; -1: none
+    int material = -1;  // index into materials; -1: none
   };
 
-  std::string name;         // the file, for messages
+  std::string name;  // the file, for messages
   std::vector<Eigen::Vector3f> positions;
-  std::vector<Eigen::Vector3f> normals;    // one per position, or empty (flat shading)
-  std::vector<Eigen::Vector2f> uvs;        // one per position, or empty; v counts up
-  std::vector<std::array<uint32_t, 3>> triangles;    // counter-clockwise seen from outside
+  std::vector<Eigen::Vector3f> normals;            // one per position, or empty (flat shading)
+  std::vector<Eigen::Vector2f> uvs;                // one per position, or empty; v counts up
+  std::vector<std::array<uint32_t, 3>> triangles;  // counter-clockwise seen from outside
   std::vector<Part> parts;
   std::vector<Material> materials;
-  bool closed = false;      // every edge belongs to two triangles: there is an inside
+  bool closed = false;  // every edge belongs to two triangles: there is an inside
 };
 
 }  // namespace ruedo::model

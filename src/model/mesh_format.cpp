@@ -11,14 +11,17 @@
 namespace ruedo::model {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "the mesh cache is written as memory has it");
+static_assert(std::endian::native == std::endian::little,
+              "the mesh cache is written as memory has it");
 
-constexpr uint32_t kMagic = 0x6d647552;    // "Rudm"
+constexpr uint32_t kMagic = 0x6d647552;  // "Rudm"
 
 class Writer {
  public:
   template <class T>
-  void value(const T& v) { bytes_.append(reinterpret_cast<const char*>(&v), sizeof(T)); }
+  void value(const T& v) {
+    bytes_.append(reinterpret_cast<const char*>(&v), sizeof(T));
+  }
   void string(std::string_view text) {
     value(static_cast<uint32_t>(text.size()));
     bytes_.append(text);
@@ -26,7 +29,8 @@ class Writer {
   template <class T>
   void array(const std::vector<T>& items) {
     value(static_cast<uint32_t>(items.size()));
-    if (!items.empty()) bytes_.append(reinterpret_cast<const char*>(items.data()), items.size() * sizeof(T));
+    if (!items.empty())
+      bytes_.append(reinterpret_cast<const char*>(items.data()), items.size() * sizeof(T));
   }
   std::string take() { return std::move(bytes_); }
 
@@ -51,7 +55,9 @@ class Reader {
   }
   uint32_t count(uint32_t most, const char* what) {
     const uint32_t n = value<uint32_t>();
-    if (n > most) throw std::runtime_error(std::to_string(n) + " " + what + "; allowed are " + std::to_string(most));
+    if (n > most)
+      throw std::runtime_error(std::to_string(n) + " " + what + "; allowed are " +
+                               std::to_string(most));
     return n;
   }
   template <class T>
@@ -101,11 +107,12 @@ uint64_t hashed(std::string_view bytes, uint64_t seed, uint64_t factor) {
 
 uint64_t content_hash(std::string_view bytes) {
   const uint64_t h = hashed(bytes, 0x9e3779b97f4a7c15ull, 0x87c37b91114253d5ull);
-  return h ? h : 1;    // 0 is kept for "not there"
+  return h ? h : 1;  // 0 is kept for "not there"
 }
 
 std::string content_key(std::string_view bytes) {
-  const uint64_t halves[2] = {content_hash(bytes), hashed(bytes, 0xd6e8feb86659fd93ull, 0x4cf5ad432745937full)};
+  const uint64_t halves[2] = {content_hash(bytes),
+                              hashed(bytes, 0xd6e8feb86659fd93ull, 0x4cf5ad432745937full)};
   std::string key;
   for (const uint64_t half : halves) {
     for (int shift = 60; shift >= 0; shift -= 4) key += "0123456789abcdef"[(half >> shift) & 15];
@@ -136,7 +143,8 @@ std::string pack_mesh(const MeshPackage& package) {
   }
   out.value(static_cast<uint32_t>(mesh.materials.size()));
   for (const auto& m : mesh.materials) {
-    for (const Rgba* colour : {&m.ambient, &m.diffuse, &m.specular, &m.emissive}) out.value(*colour);
+    for (const Rgba* colour : {&m.ambient, &m.diffuse, &m.specular, &m.emissive})
+      out.value(*colour);
     out.value(m.shininess);
     out.value(static_cast<uint8_t>(m.double_sided));
     out.string(m.texture ? m.texture->path : "");
@@ -158,7 +166,8 @@ MeshPackage unpack_mesh(std::string_view bytes) {
 
   Reader in(bytes);
   if (in.value<uint32_t>() != kMagic) throw std::runtime_error("it is no mesh");
-  if (in.value<uint32_t>() != kMeshFormatVersion) throw std::runtime_error("it is of another version");
+  if (in.value<uint32_t>() != kMeshFormatVersion)
+    throw std::runtime_error("it is of another version");
   MeshPackage package;
   package.dependencies.resize(in.count(1000, "files"));
   for (auto& each : package.dependencies) {
@@ -179,13 +188,15 @@ MeshPackage unpack_mesh(std::string_view bytes) {
   }
   mesh.materials.resize(in.count(MeshLimits::kParts, "materials"));
   for (auto& m : mesh.materials) {
-    for (Rgba* colour : {&m.ambient, &m.diffuse, &m.specular, &m.emissive}) *colour = in.value<Rgba>();
+    for (Rgba* colour : {&m.ambient, &m.diffuse, &m.specular, &m.emissive})
+      *colour = in.value<Rgba>();
     m.shininess = in.value<float>();
     m.double_sided = in.value<uint8_t>() != 0;
     Texture texture;
     texture.path = in.string();
     texture.embedded = in.array<uint8_t>(MeshLimits::kTextureBytes, "bytes of a texture");
-    if (!texture.path.empty() || !texture.embedded.empty()) m.texture = std::make_shared<Texture>(std::move(texture));
+    if (!texture.path.empty() || !texture.embedded.empty())
+      m.texture = std::make_shared<Texture>(std::move(texture));
   }
   mesh.closed = in.value<uint8_t>() != 0;
   if (!in.done()) throw std::runtime_error("there are bytes after its end");
@@ -196,12 +207,15 @@ MeshPackage unpack_mesh(std::string_view bytes) {
 std::string mesh_fault(const Mesh& mesh) {
   const size_t vertices = mesh.positions.size();
   if (mesh.triangles.empty()) return "it has no triangles";
-  if (vertices > MeshLimits::kVertices) return "it has more than " + std::to_string(MeshLimits::kVertices) + " vertices";
+  if (vertices > MeshLimits::kVertices)
+    return "it has more than " + std::to_string(MeshLimits::kVertices) + " vertices";
   if (mesh.triangles.size() > MeshLimits::kTriangles) {
     return "it has more than " + std::to_string(MeshLimits::kTriangles) + " triangles";
   }
-  if (!mesh.normals.empty() && mesh.normals.size() != vertices) return "it has not one normal per vertex";
-  if (!mesh.uvs.empty() && mesh.uvs.size() != vertices) return "it has not one texture coordinate per vertex";
+  if (!mesh.normals.empty() && mesh.normals.size() != vertices)
+    return "it has not one normal per vertex";
+  if (!mesh.uvs.empty() && mesh.uvs.size() != vertices)
+    return "it has not one texture coordinate per vertex";
   for (const auto& p : mesh.positions) {
     if (!p.allFinite()) return "it has a vertex that is not finite";
     if (p.cwiseAbs().maxCoeff() > MeshLimits::kExtent_m) return "it reaches beyond 1000 km";
@@ -213,10 +227,12 @@ std::string mesh_fault(const Mesh& mesh) {
     if (!uv.allFinite()) return "it has a texture coordinate that is not finite";
   }
   for (const auto& t : mesh.triangles) {
-    if (t[0] >= vertices || t[1] >= vertices || t[2] >= vertices) return "a triangle names a vertex that is not there";
+    if (t[0] >= vertices || t[1] >= vertices || t[2] >= vertices)
+      return "a triangle names a vertex that is not there";
   }
   for (const auto& part : mesh.parts) {
-    if (part.first_triangle > mesh.triangles.size() || part.triangle_count > mesh.triangles.size() - part.first_triangle) {
+    if (part.first_triangle > mesh.triangles.size() ||
+        part.triangle_count > mesh.triangles.size() - part.first_triangle) {
       return "a part names triangles that are not there";
     }
     if (part.material < -1 || part.material >= static_cast<int>(mesh.materials.size())) {
@@ -254,14 +270,15 @@ bool is_closed(const Mesh& mesh) {
   edges.reserve(mesh.triangles.size() * 3);
   for (const auto& t : mesh.triangles) {
     const uint32_t p[3] = {point[t[0]], point[t[1]], point[t[2]]};
-    if (p[0] == p[1] || p[1] == p[2] || p[2] == p[0]) continue;    // no area, no edge
+    if (p[0] == p[1] || p[1] == p[2] || p[2] == p[0]) continue;  // no area, no edge
     for (int k = 0; k < 3; ++k) edges.emplace_back(p[k], p[(k + 1) % 3]);
   }
   if (edges.empty()) return false;
   std::sort(edges.begin(), edges.end());
   for (size_t i = 0; i < edges.size(); ++i) {
     if (i > 0 && edges[i] == edges[i - 1]) return false;
-    if (!std::binary_search(edges.begin(), edges.end(), std::pair(edges[i].second, edges[i].first))) return false;
+    if (!std::binary_search(edges.begin(), edges.end(), std::pair(edges[i].second, edges[i].first)))
+      return false;
   }
   return true;
 }

@@ -1,7 +1,8 @@
-// The binary form in which the importer hands a mesh to the server, and in which the cache keeps it.
+// The binary form in which the importer hands a mesh to the server, and in which the cache keeps
+// it.
 //
-// Whoever reads it trusts nothing: counts against the bytes that are there, indices against counts, numbers
-// against NaN and absurd sizes.
+// Whoever reads it trusts nothing: counts against the bytes that are there, indices against counts,
+// numbers against NaN and absurd sizes.
 #pragma once
 
 #include <string>
@@ -16,22 +17,23 @@ namespace ruedo::model {
 constexpr uint32_t kMeshFormatVersion = 3;
 
 struct MeshLimits {
-  static constexpr size_t kFileBytes = 256u << 20;      // of a mesh file
+  static constexpr size_t kFileBytes = 256u << 20;  // of a mesh file
   static constexpr uint32_t kVertices = 8'000'000;
   static constexpr uint32_t kTriangles = 8'000'000;
   static constexpr uint32_t kParts = 100'000;
-  static constexpr size_t kTextureBytes = 64u << 20;    // of all embedded textures
-  static constexpr float kExtent_m = 1e6f;              // largest coordinate
+  static constexpr size_t kTextureBytes = 64u << 20;  // of all embedded textures
+  static constexpr float kExtent_m = 1e6f;            // largest coordinate
 };
 
-// Another file that the mesh file refers to (a material library, a buffer), by its path from the mesh's folder.
+// Another file that the mesh file refers to (a material library, a buffer), by its path from the
+// mesh's folder.
 struct MeshDependency {
   std::string path;
-  uint64_t hash = 0;    // content_hash of its bytes; 0: it was not there
+  uint64_t hash = 0;  // content_hash of its bytes; 0: it was not there
 };
 
 struct MeshPackage {
-  Mesh mesh;            // texture paths as the file writes them
+  Mesh mesh;  // texture paths as the file writes them
   std::vector<MeshDependency> dependencies;
 };
 
@@ -46,8 +48,8 @@ MeshPackage unpack_mesh(std::string_view bytes);
 // What is wrong with the mesh's numbers and indices, "" when nothing is.
 std::string mesh_fault(const Mesh& mesh);
 
-// Whether every edge belongs to exactly two triangles, run through in opposite directions; equal positions
-// count as one.
+// Whether every edge belongs to exactly two triangles, run through in opposite directions; equal
+// positions count as one.
 bool is_closed(const Mesh& mesh);
 
 }  // namespace ruedo::model

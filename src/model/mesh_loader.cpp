@@ -29,7 +29,8 @@ namespace ruedo::model {
 namespace {
 
 std::string default_importer() {
-  if (const std::string installed = find_installed("bin/ruedo-import-mesh"); !installed.empty()) return installed;
+  if (const std::string installed = find_installed("bin/ruedo-import-mesh"); !installed.empty())
+    return installed;
   return std::string(RUEDO_BIN_DIR) + "/ruedo-import-mesh";
 }
 
@@ -38,7 +39,8 @@ class TemporaryFolder {
  public:
   TemporaryFolder() {
     std::string name = (fs::temp_directory_path() / "ruedo-mesh-XXXXXX").string();
-    if (!::mkdtemp(name.data())) throw std::runtime_error(std::string("no temporary folder: ") + std::strerror(errno));
+    if (!::mkdtemp(name.data()))
+      throw std::runtime_error(std::string("no temporary folder: ") + std::strerror(errno));
     path_ = name;
   }
   ~TemporaryFolder() {
@@ -59,18 +61,19 @@ std::string first_line(const std::string& file) {
   std::getline(in, line);
   if (line.size() > 300) line.resize(300);
   for (char& c : line) {
-    if (static_cast<unsigned char>(c) < 0x20 || static_cast<unsigned char>(c) >= 0x7f) c = '?';    // bytes of the file, perhaps
+    if (static_cast<unsigned char>(c) < 0x20 || static_cast<unsigned char>(c) >= 0x7f)
+      c = '?';  // bytes of the file, perhaps
   }
   return line;
 }
 
-#ifdef __has_feature    // clang
+#ifdef __has_feature  // clang
 #if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
 #define __SANITIZE_ADDRESS__ 1
 #endif
 #endif
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kLimitAddressSpace = false;    // sanitizers reserve terabytes of addresses
+constexpr bool kLimitAddressSpace = false;  // sanitizers reserve terabytes of addresses
 #else
 constexpr bool kLimitAddressSpace = true;
 #endif
@@ -81,10 +84,13 @@ void set_limit(decltype(RLIMIT_AS) which, rlim_t value) {
 }
 
 // Runs the importer; throws what is wrong. Between fork and exec only system calls are made.
-void run_importer(const MeshImport& import, const std::string& input, const std::string& output, const std::string& log) {
+void run_importer(const MeshImport& import, const std::string& input, const std::string& output,
+                  const std::string& log) {
   const char* arguments[] = {import.importer.c_str(), input.c_str(), output.c_str(), nullptr};
   const pid_t child = ::fork();
-  if (child < 0) throw std::runtime_error(std::string("the importer cannot be started: ") + std::strerror(errno));
+  if (child < 0)
+    throw std::runtime_error(std::string("the importer cannot be started: ") +
+                             std::strerror(errno));
   if (child == 0) {
     ::setpgid(0, 0);
     set_limit(RLIMIT_CORE, 0);
@@ -99,19 +105,23 @@ void run_importer(const MeshImport& import, const std::string& input, const std:
     ::execv(arguments[0], const_cast<char**>(arguments));
     ::_exit(127);
   }
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(import.wall_limit_s);
+  const auto deadline =
+      std::chrono::steady_clock::now() + std::chrono::seconds(import.wall_limit_s);
   int status = 0;
-  for (auto pause = std::chrono::microseconds(200);; pause = std::min(pause * 2, std::chrono::microseconds(20'000))) {
+  for (auto pause = std::chrono::microseconds(200);;
+       pause = std::min(pause * 2, std::chrono::microseconds(20'000))) {
     const pid_t ended = ::waitpid(child, &status, WNOHANG);
     if (ended == child) break;
-    if (ended < 0 && errno != EINTR) throw std::runtime_error(std::string("the importer is lost: ") + std::strerror(errno));
+    if (ended < 0 && errno != EINTR)
+      throw std::runtime_error(std::string("the importer is lost: ") + std::strerror(errno));
     const bool too_long = std::chrono::steady_clock::now() > deadline;
     if (too_long || (import.budget && import.budget->is_over())) {
       ::kill(-child, SIGKILL);
       ::kill(child, SIGKILL);
       ::waitpid(child, &status, 0);
       if (!too_long) import.budget->take_time();
-      throw std::runtime_error("the importer took longer than " + std::to_string(import.wall_limit_s) + " s");
+      throw std::runtime_error("the importer took longer than " +
+                               std::to_string(import.wall_limit_s) + " s");
     }
     std::this_thread::sleep_for(pause);
   }
@@ -122,9 +132,11 @@ void run_importer(const MeshImport& import, const std::string& input, const std:
   if (WIFSIGNALED(status)) {
     const int signal = WTERMSIG(status);
     if (signal == SIGXCPU || signal == SIGKILL) {
-      throw std::runtime_error("the importer needed more than " + std::to_string(import.cpu_limit_s) + " s of CPU time");
+      throw std::runtime_error("the importer needed more than " +
+                               std::to_string(import.cpu_limit_s) + " s of CPU time");
     }
-    throw std::runtime_error("the importer died of signal " + std::to_string(signal) + "; the file is malformed");
+    throw std::runtime_error("the importer died of signal " + std::to_string(signal) +
+                             "; the file is malformed");
   }
   const std::string message = first_line(log);
   throw std::runtime_error(message.empty() ? "the importer failed" : message);
@@ -144,20 +156,21 @@ size_t bytes_of(const Mesh& mesh) {
 }
 
 bool dependencies_hold(const MeshPackage& package, const fs::path& folder) {
-  return std::all_of(package.dependencies.begin(), package.dependencies.end(), [&](const MeshDependency& each) {
-    std::error_code error;
-    const fs::path path = folder / each.path;
-    if (!fs::is_regular_file(path, error)) return each.hash == 0;
-    try {
-      return content_hash(read_text_file(path.string(), MeshLimits::kFileBytes)) == each.hash;
-    } catch (const InputError&) {
-      return false;
-    }
-  });
+  return std::all_of(
+      package.dependencies.begin(), package.dependencies.end(), [&](const MeshDependency& each) {
+        std::error_code error;
+        const fs::path path = folder / each.path;
+        if (!fs::is_regular_file(path, error)) return each.hash == 0;
+        try {
+          return content_hash(read_text_file(path.string(), MeshLimits::kFileBytes)) == each.hash;
+        } catch (const InputError&) {
+          return false;
+        }
+      });
 }
 
-// Into the cache by renaming, so that no other process reads half an entry. A cache that cannot be written is
-// no fault.
+// Into the cache by renaming, so that no other process reads half an entry. A cache that cannot be
+// written is no fault.
 void store(const std::string& folder, const std::string& name, const std::string& bytes) {
   std::error_code error;
   fs::create_directories(folder, error);
@@ -171,20 +184,25 @@ void store(const std::string& folder, const std::string& name, const std::string
     written += static_cast<size_t>(n);
   }
   ::close(file);
-  if (written == bytes.size()) fs::rename(temporary, folder + "/" + name, error);
-  else error = std::make_error_code(std::errc::io_error);
+  if (written == bytes.size())
+    fs::rename(temporary, folder + "/" + name, error);
+  else
+    error = std::make_error_code(std::errc::io_error);
   if (error) fs::remove(temporary, error);
 }
 
 }  // namespace
 
 std::string mesh_cache_folder() {
-  if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache && *cache == '/') return std::string(cache) + "/ruedo";
-  if (const char* home = std::getenv("HOME"); home && *home == '/') return std::string(home) + "/.cache/ruedo";
+  if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache && *cache == '/')
+    return std::string(cache) + "/ruedo";
+  if (const char* home = std::getenv("HOME"); home && *home == '/')
+    return std::string(home) + "/.cache/ruedo";
   return "";
 }
 
-MeshLoader::MeshLoader(const ResourceFinder& resources, MeshImport import) : resources_(resources), import_(std::move(import)) {
+MeshLoader::MeshLoader(const ResourceFinder& resources, MeshImport import)
+    : resources_(resources), import_(std::move(import)) {
   if (import_.importer.empty()) import_.importer = default_importer();
   if (import_.cache_folder.empty()) import_.cache_folder = mesh_cache_folder();
   if (import_.cache_folder.empty()) import_.cache = false;
@@ -202,18 +220,21 @@ Mesh MeshLoader::taken(MeshPackage package, const std::string& path) {
 Mesh MeshLoader::import_or_cached(const std::string& path) {
   const fs::path file = path;
   std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
-  constexpr const char* kKnown[] = {".obj", ".dae", ".stl", ".ply", ".gltf", ".glb", ".3ds", ".fbx"};
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  constexpr const char* kKnown[] = {".obj",  ".dae", ".stl", ".ply",
+                                    ".gltf", ".glb", ".3ds", ".fbx"};
   if (std::find(std::begin(kKnown), std::end(kKnown), extension) == std::end(kKnown)) {
     std::error_code error;
     if (fs::is_directory(file, error)) throw std::runtime_error("it is a folder; a file is needed");
-    throw std::runtime_error((extension.empty() ? "a name without an extension" : "'" + extension + "'") +
-                             " is no known kind of mesh; known are obj, dae, stl, ply, gltf, glb, 3ds, fbx");
+    throw std::runtime_error(
+        (extension.empty() ? "a name without an extension" : "'" + extension + "'") +
+        " is no known kind of mesh; known are obj, dae, stl, ply, gltf, glb, 3ds, fbx");
   }
   const std::string content = bytes_of(path, MeshLimits::kFileBytes);
   files_.push_back(path);
-  const std::string name =
-      content_key(content) + extension.substr(1) + "-" + std::to_string(kMeshFormatVersion) + ".mesh";
+  const std::string name = content_key(content) + extension.substr(1) + "-" +
+                           std::to_string(kMeshFormatVersion) + ".mesh";
   constexpr size_t kMostBytes = size_t{1} << 30;
   if (import_.cache) {
     const std::string entry = import_.cache_folder + "/" + name;
@@ -259,9 +280,11 @@ std::shared_ptr<const Mesh> MeshLoader::load(const std::string& path) {
   return entry.mesh;
 }
 
-std::shared_ptr<const Mesh> MeshLoader::load_submesh(const std::string& path, const std::string& submesh, bool center) {
+std::shared_ptr<const Mesh> MeshLoader::load_submesh(const std::string& path,
+                                                     const std::string& submesh, bool center) {
   const std::string key = path + "\n" + submesh + (center ? "\ncenter" : "");
-  if (const auto known = meshes_.find(key); known != meshes_.end() && known->second.mesh) return known->second.mesh;
+  if (const auto known = meshes_.find(key); known != meshes_.end() && known->second.mesh)
+    return known->second.mesh;
   const auto whole = load(path);
   auto mesh = std::make_shared<Mesh>();
   mesh->name = path + ", submesh " + submesh;

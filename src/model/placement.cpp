@@ -1,4 +1,5 @@
-// Heights by vertical lines through the static collisions, room by GJK against the collisions nearby.
+// Heights by vertical lines through the static collisions, room by GJK against the collisions
+// nearby.
 #include "model/placement.h"
 
 #include <algorithm>
@@ -18,13 +19,13 @@
 namespace ruedo::model {
 namespace {
 
-constexpr double kStep_m = 0.5;         // what counts as ground above the lowest surface
-constexpr double kClearance_m = 0.02;   // what a model may sink into bumps of the ground
-constexpr double kSteepest = 0.7;        // slope that something is put on: 35 degrees
-constexpr double kBump_m = 0.05;        // what ground under a model may differ from a plane
+constexpr double kStep_m = 0.5;        // what counts as ground above the lowest surface
+constexpr double kClearance_m = 0.02;  // what a model may sink into bumps of the ground
+constexpr double kSteepest = 0.7;      // slope that something is put on: 35 degrees
+constexpr double kBump_m = 0.05;       // what ground under a model may differ from a plane
 constexpr double kFar_m = 1e5;
-constexpr double kCell_m = 2;           // of the grid over what stands in the world
-constexpr double kMostCells = 64;       // a thing that covers more is kept in a list of its own
+constexpr double kCell_m = 2;      // of the grid over what stands in the world
+constexpr double kMostCells = 64;  // a thing that covers more is kept in a list of its own
 
 using Box = Eigen::AlignedBox3d;
 
@@ -32,7 +33,8 @@ using Box = Eigen::AlignedBox3d;
 Box placed(const Box& box, const Pose& X_WG) {
   Box result;
   if (box.isEmpty()) return result;
-  for (int corner = 0; corner < 8; ++corner) result.extend(X_WG * box.corner(static_cast<Box::CornerType>(corner)));
+  for (int corner = 0; corner < 8; ++corner)
+    result.extend(X_WG * box.corner(static_cast<Box::CornerType>(corner)));
   return result;
 }
 
@@ -40,15 +42,15 @@ Box placed(const Box& box, const Pose& X_WG) {
 std::optional<double> height_of(const std::array<Vec3, 3>& t, double x, double y) {
   const Vec3 ab = t[1] - t[0], ac = t[2] - t[0];
   const double area = ab.x() * ac.y() - ab.y() * ac.x();
-  if (std::abs(area) < 1e-15) return std::nullopt;    // vertical
+  if (std::abs(area) < 1e-15) return std::nullopt;  // vertical
   const double dx = x - t[0].x(), dy = y - t[0].y();
   const double u = (dx * ac.y() - dy * ac.x()) / area, v = (ab.x() * dy - ab.y() * dx) / area;
   if (u < -1e-9 || v < -1e-9 || u + v > 1 + 1e-9) return std::nullopt;
   return t[0].z() + u * ab.z() + v * ac.z();
 }
 
-// The top of a convex shape over (x, y): the highest z at which a thin vertical needle from far above meets it, by
-// halving.
+// The top of a convex shape over (x, y): the highest z at which a thin vertical needle from far
+// above meets it, by halving.
 std::optional<double> top_of(const Convex& shape, const Box& box, double x, double y) {
   const auto meets_above = [&](double z) {
     const Vec3 needle[2] = {{x, y, z}, {x, y, box.max().z() + 1}};
@@ -80,11 +82,14 @@ class TriangleGrid {
       triangles_.push_back({points[t[0]], points[t[1]], points[t[2]]});
       Box around;
       for (const Vec3& corner : triangles_.back()) around.extend(corner);
-      for_each_cell(around, [&](std::vector<uint32_t>& cell) { cell.push_back(static_cast<uint32_t>(triangles_.size() - 1)); });
+      for_each_cell(around, [&](std::vector<uint32_t>& cell) {
+        cell.push_back(static_cast<uint32_t>(triangles_.size() - 1));
+      });
     }
   }
 
-  // Every triangle whose box may meet that one; some more than once. Ends when `visit` returns true.
+  // Every triangle whose box may meet that one; some more than once. Ends when `visit` returns
+  // true.
   template <class Visit>
   bool any(const Box& box, Visit visit) {
     bool found = false;
@@ -106,7 +111,8 @@ class TriangleGrid {
     };
     const int y1 = cell(box.max().y(), 1), x1 = cell(box.max().x(), 0);
     for (int y = cell(box.min().y(), 1); y <= y1; ++y) {
-      for (int x = cell(box.min().x(), 0); x <= x1; ++x) visit(cells_[static_cast<size_t>(y * side_ + x)]);
+      for (int x = cell(box.min().x(), 0); x <= x1; ++x)
+        visit(cells_[static_cast<size_t>(y * side_ + x)]);
     }
   }
 
@@ -129,13 +135,15 @@ struct Room::Index {
 
   std::vector<std::pair<std::string, std::shared_ptr<const Model>>> instances;
   std::vector<Solid> solids;
-  std::vector<int> planes, large;    // indices into solids
-  std::unordered_map<uint64_t, std::vector<int>> cells;    // looked up only, never walked through
-  std::unordered_map<const Geometry*, Box> boxes;          // likewise
-  std::map<int, TriangleGrid> triangles;                   // of the solids that were asked for
+  std::vector<int> planes, large;                        // indices into solids
+  std::unordered_map<uint64_t, std::vector<int>> cells;  // looked up only, never walked through
+  std::unordered_map<const Geometry*, Box> boxes;        // likewise
+  std::map<int, TriangleGrid> triangles;                 // of the solids that were asked for
 
   static int64_t cell_of(double at) { return rounded_down(std::clamp(at, -1e7, 1e7) / kCell_m); }
-  static uint64_t key(int64_t x, int64_t y) { return static_cast<uint64_t>(x) << 32 ^ (static_cast<uint64_t>(y) & 0xffffffffu); }
+  static uint64_t key(int64_t x, int64_t y) {
+    return static_cast<uint64_t>(x) << 32 ^ (static_cast<uint64_t>(y) & 0xffffffffu);
+  }
 
   const Box& box_of(const Geometry& g) {
     const auto [at, is_new] = boxes.try_emplace(&g);
@@ -157,12 +165,14 @@ struct Room::Index {
       for (const Collision& c : model->links[l].collisions) {
         const Pose X_WG = X * c.X_LC;
         const int solid = static_cast<int>(solids.size());
-        solids.push_back({&c.geometry, X_WG, placed(box_of(c.geometry), X_WG), static_cast<int>(instances.size()) - 1, model->is_static});
+        solids.push_back({&c.geometry, X_WG, placed(box_of(c.geometry), X_WG),
+                          static_cast<int>(instances.size()) - 1, model->is_static});
         const Box& box = solids.back().box;
         if (c.geometry.shape == Shape::plane) {
           planes.push_back(solid);
         } else if (!box.isEmpty()) {
-          const int64_t x0 = cell_of(box.min().x()), x1 = cell_of(box.max().x()), y0 = cell_of(box.min().y()), y1 = cell_of(box.max().y());
+          const int64_t x0 = cell_of(box.min().x()), x1 = cell_of(box.max().x()),
+                        y0 = cell_of(box.min().y()), y1 = cell_of(box.max().y());
           if (static_cast<double>(x1 - x0 + 1) * static_cast<double>(y1 - y0 + 1) > kMostCells) {
             large.push_back(solid);
             continue;
@@ -180,10 +190,12 @@ struct Room::Index {
     std::vector<int> found = large;
     for (int64_t x = cell_of(box.min().x()); x <= cell_of(box.max().x()); ++x) {
       for (int64_t y = cell_of(box.min().y()); y <= cell_of(box.max().y()); ++y) {
-        if (const auto cell = cells.find(key(x, y)); cell != cells.end()) found.insert(found.end(), cell->second.begin(), cell->second.end());
+        if (const auto cell = cells.find(key(x, y)); cell != cells.end())
+          found.insert(found.end(), cell->second.begin(), cell->second.end());
       }
     }
-    std::erase_if(found, [&](int solid) { return !solids[static_cast<size_t>(solid)].box.intersects(box); });
+    std::erase_if(
+        found, [&](int solid) { return !solids[static_cast<size_t>(solid)].box.intersects(box); });
     std::sort(found.begin(), found.end());
     found.erase(std::unique(found.begin(), found.end()), found.end());
     return found;
@@ -224,13 +236,18 @@ struct Room::Index {
       }
     }
     if (parts.empty()) return "";
-    const auto counts = [&](int solid) { return !of_static || solids[static_cast<size_t>(solid)].is_static; };
-    const auto name = [&](int solid) { return instances[static_cast<size_t>(solids[static_cast<size_t>(solid)].instance)].first; };
+    const auto counts = [&](int solid) {
+      return !of_static || solids[static_cast<size_t>(solid)].is_static;
+    };
+    const auto name = [&](int solid) {
+      return instances[static_cast<size_t>(solids[static_cast<size_t>(solid)].instance)].first;
+    };
     for (const int plane : planes) {
       const Solid& s = solids[static_cast<size_t>(plane)];
       const Vec3 n = s.X_WG.rotation * s.geometry->normal;
       for (const Part& part : parts) {
-        if (counts(plane) && n.dot(part.shape.support(-n) - s.X_WG.translation) < 0) return name(plane);
+        if (counts(plane) && n.dot(part.shape.support(-n) - s.X_WG.translation) < 0)
+          return name(plane);
       }
     }
     for (const int solid : near(whole)) {
@@ -249,12 +266,15 @@ Room::Room(const WorldModel& world, const LinkPose& now) : Room() {
   for (size_t i = 0; i < world.models.size(); ++i) {
     const ModelInstance& instance = world.models[i];
     if (instance.removed) continue;
-    index_->add(instance.name, instance.model, [&](size_t l) { return now ? now(i, l) : instance.X_WM * instance.model->links[l].X_ML; });
+    index_->add(instance.name, instance.model, [&](size_t l) {
+      return now ? now(i, l) : instance.X_WM * instance.model->links[l].X_ML;
+    });
   }
 }
 
 void Room::add(const ModelInstance& instance) {
-  index_->add(instance.name, instance.model, [&](size_t l) { return instance.X_WM * instance.model->links[l].X_ML; });
+  index_->add(instance.name, instance.model,
+              [&](size_t l) { return instance.X_WM * instance.model->links[l].X_ML; });
 }
 
 double Room::ground_height(double x, double y) const {
@@ -263,7 +283,8 @@ double Room::ground_height(double x, double y) const {
     const Index::Solid& s = index_->solids[static_cast<size_t>(plane)];
     const Vec3 n = s.X_WG.rotation * s.geometry->normal;
     const Vec3& at = s.X_WG.translation;
-    if (s.is_static && n.z() > 1e-6) heights.push_back(at.z() - (n.x() * (x - at.x()) + n.y() * (y - at.y())) / n.z());
+    if (s.is_static && n.z() > 1e-6)
+      heights.push_back(at.z() - (n.x() * (x - at.x()) + n.y() * (y - at.y())) / n.z());
   }
   const Box line(Vec3(x, y, -kFar_m), Vec3(x, y, kFar_m));
   for (const int solid : index_->near(line)) {
@@ -288,16 +309,17 @@ double Room::ground_height(double x, double y) const {
   return ground;
 }
 
-// The ground under a model at its level pose, as a plane: z = c[0] + c[1] (x - x0) + c[2] (y - y0) about the place (x0, y0).
-// nullopt: it is level, too steep, or no plane.
+// The ground under a model at its level pose, as a plane: z = c[0] + c[1] (x - x0) + c[2] (y - y0)
+// about the place (x0, y0). nullopt: it is level, too steep, or no plane.
 std::optional<Pose> Room::on_slope(const Model& model, const Pose& X_WM, double lowest) const {
   Box foot;
   for (const Link& link : model.links) {
-    for (const Collision& c : link.collisions) foot.extend(placed(index_->known_box_of(c.geometry), link.X_ML * c.X_LC));
+    for (const Collision& c : link.collisions)
+      foot.extend(placed(index_->known_box_of(c.geometry), link.X_ML * c.X_LC));
   }
   if (foot.isEmpty()) return std::nullopt;
   const Vec3 place(X_WM.translation.x(), X_WM.translation.y(), 0);
-  constexpr int kSamples = 3;    // each way
+  constexpr int kSamples = 3;  // each way
   Eigen::Matrix<double, kSamples * kSamples, 3> A;
   Eigen::Matrix<double, kSamples * kSamples, 1> heights;
   for (int i = 0; i < kSamples * kSamples; ++i) {
@@ -309,9 +331,11 @@ std::optional<Pose> Room::on_slope(const Model& model, const Pose& X_WM, double 
   const Vec3 c = A.colPivHouseholderQr().solve(heights);
   const Eigen::Matrix<double, kSamples * kSamples, 1> bumps = heights - A * c;
   const double slope = math::hypot(c[1], c[2]);
-  if (slope < 1e-6 || slope > kSteepest || bumps.cwiseAbs().maxCoeff() > kBump_m) return std::nullopt;
+  if (slope < 1e-6 || slope > kSteepest || bumps.cwiseAbs().maxCoeff() > kBump_m)
+    return std::nullopt;
   const Vec3 up = Vec3(-c[1], -c[2], 1).normalized(), level_ahead = X_WM.rotation * Vec3::UnitX();
-  const Vec3 ahead = (level_ahead + Vec3(0, 0, c[1] * level_ahead.x() + c[2] * level_ahead.y())).normalized();    // of the same heading
+  const Vec3 ahead = (level_ahead + Vec3(0, 0, c[1] * level_ahead.x() + c[2] * level_ahead.y()))
+                         .normalized();  // of the same heading
   Eigen::Matrix3d axes;
   axes << ahead, up.cross(ahead), up;
   return Pose{Quat(axes), place + Vec3(0, 0, c[0]) + up * (bumps.maxCoeff() - lowest)};
@@ -323,10 +347,12 @@ Pose Room::standing_on(const Model& model, double x, double y, double yaw) const
   for (const Link& link : model.links) {
     for (const Collision& c : link.collisions) {
       if (c.geometry.shape == Shape::plane) continue;
-      lowest = std::min(lowest, Convex{&c.geometry, X_WM * link.X_ML * c.X_LC, {}}.support(-Vec3::UnitZ()).z());
+      lowest = std::min(
+          lowest, Convex{&c.geometry, X_WM * link.X_ML * c.X_LC, {}}.support(-Vec3::UnitZ()).z());
     }
   }
-  // A drive says better where the ground is than a wheel's shape, which may be a little larger or smaller.
+  // A drive says better where the ground is than a wheel's shape, which may be a little larger or
+  // smaller.
   if (model.drive) lowest = std::min(lowest, model.drive->X_MBase.translation.z());
   if (!std::isfinite(lowest)) lowest = 0;
   X_WM.translation.z() = ground_height(x, y) - lowest;
@@ -334,20 +360,27 @@ Pose Room::standing_on(const Model& model, double x, double y, double yaw) const
   return on_slope(model, X_WM, lowest).value_or(X_WM);
 }
 
-std::string Room::overlapped(const Model& model, const Pose& X_WM) const { return index_->overlapped(model, X_WM, false); }
+std::string Room::overlapped(const Model& model, const Pose& X_WM) const {
+  return index_->overlapped(model, X_WM, false);
+}
 
-double ground_height(const WorldModel& world, double x, double y) { return Room(world).ground_height(x, y); }
+double ground_height(const WorldModel& world, double x, double y) {
+  return Room(world).ground_height(x, y);
+}
 
 Pose standing_on(const WorldModel& world, const Model& model, double x, double y, double yaw) {
   return Room(world).standing_on(model, x, y, yaw);
 }
 
-std::string overlapped(const WorldModel& world, const Model& model, const Pose& X_WM, const LinkPose& now) {
+std::string overlapped(const WorldModel& world, const Model& model, const Pose& X_WM,
+                       const LinkPose& now) {
   return Room(world, now).overlapped(model, X_WM);
 }
 
 void name_stuck_robots(const WorldModel& world, Findings& findings) {
-  const auto may_be_stuck = [](const ModelInstance& instance) { return instance.is_robot() && !instance.model->is_static; };
+  const auto may_be_stuck = [](const ModelInstance& instance) {
+    return instance.is_robot() && !instance.model->is_static;
+  };
   if (std::none_of(world.models.begin(), world.models.end(), may_be_stuck)) return;
   Room room;
   for (const ModelInstance& instance : world.models) {
@@ -357,8 +390,10 @@ void name_stuck_robots(const WorldModel& world, Findings& findings) {
     if (!may_be_stuck(instance)) continue;
     if (const std::string other = room.overlapped(*instance.model, instance.X_WM); !other.empty()) {
       const Vec3& at = instance.X_WM.translation;
-      findings.error(instance.model->source, "model " + instance.name, "at the start, at " + shown(at.x()) + " " + shown(at.y()) + " " + shown(at.z()) +
-                                                                           " m, it stands in '" + other + "', which will push it out; give it a <pose> with room");
+      findings.error(instance.model->source, "model " + instance.name,
+                     "at the start, at " + shown(at.x()) + " " + shown(at.y()) + " " +
+                         shown(at.z()) + " m, it stands in '" + other +
+                         "', which will push it out; give it a <pose> with room");
     }
     room.add(instance);
   }
@@ -371,8 +406,9 @@ double footprint_radius(const Model& model) {
     for (const Collision& c : link.collisions) {
       const Box box = placed(bounds(c.geometry), X_BaseM * link.X_ML * c.X_LC);
       if (box.isEmpty()) continue;
-      radius = std::max(radius, math::hypot(std::max(std::abs(box.min().x()), std::abs(box.max().x())),
-                                           std::max(std::abs(box.min().y()), std::abs(box.max().y()))));
+      radius =
+          std::max(radius, math::hypot(std::max(std::abs(box.min().x()), std::abs(box.max().x())),
+                                       std::max(std::abs(box.min().y()), std::abs(box.max().y()))));
     }
   }
   return radius;

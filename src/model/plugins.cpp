@@ -37,7 +37,7 @@ const std::map<std::string, Known>& of_gz() {
       {"PosePublisher", {Does::served}},
       {"OdometryPublisher", {Does::served}},
       {"LogRecord", {Does::served}},
-      {"TrackController", {Does::served}},    // of a TrackedVehicle's tracks
+      {"TrackController", {Does::served}},  // of a TrackedVehicle's tracks
       {"LogPlayback", {Does::irrelevant}},
       {"LogVideoRecorder", {Does::irrelevant}},
       {"CameraVideoRecorder", {Does::irrelevant}},
@@ -74,7 +74,8 @@ const std::map<std::string, Known>& of_gz() {
       {"TriggeredPublisher", {Does::dead, "messages would be answered by messages"}},
       {"PerformerDetector", {Does::dead, "it would tell who is in its region"}},
       {"TouchPlugin", {Does::dead, "it would tell what touches"}},
-      {"DetachableJoint", {Does::dead, "a joint would hold another model until it is told to let go"}},
+      {"DetachableJoint",
+       {Does::dead, "a joint would hold another model until it is told to let go"}},
       {"Elevator", {Does::dead, "a lift would go where it is called"}},
       {"ApplyLinkWrench", {Does::dead, "forces would be taken from messages"}},
       {"FollowActor", {Does::dead, "it would follow an actor"}},
@@ -138,7 +139,7 @@ const std::map<std::string, Known>& of_classic() {
       {"gazebo_ros_realsense", {Does::served}},
       {"realsense_gazebo_plugin", {Does::served}},
       {"gazebo_ros_bumper", {Does::served}},
-      {"gazebo_ros_p3d", {Does::served}},    // ROBOT/pose
+      {"gazebo_ros_p3d", {Does::served}},  // ROBOT/pose
       {"gazebo_ros_init", {Does::served}},
       {"gazebo_ros_factory", {Does::served}},
       {"gazebo_ros_state", {Does::served}},
@@ -155,11 +156,13 @@ const std::map<std::string, Known>& of_classic() {
       {"HeightmapLODPlugin", {Does::irrelevant}},
       {"StaticMapPlugin", {Does::irrelevant}},
       {"SystemGUI", {Does::irrelevant}},
-      {"gazebo_ros_imu", {Does::served}},    // sensor_from_plugin()
+      {"gazebo_ros_imu", {Does::served}},  // sensor_from_plugin()
       {"hector_gazebo_ros_imu", {Does::served}},
       {"gazebo_ros_gps_sensor", {Does::dead, "satellite navigation would publish"}},
-      {"hector_gazebo_ros_gps", {Does::dead, "it would make satellite navigation without a <sensor>"}},
-      {"hector_gazebo_ros_magnetic", {Does::dead, "it would make a magnetometer without a <sensor>"}},
+      {"hector_gazebo_ros_gps",
+       {Does::dead, "it would make satellite navigation without a <sensor>"}},
+      {"hector_gazebo_ros_magnetic",
+       {Does::dead, "it would make a magnetometer without a <sensor>"}},
       {"hector_gazebo_ros_baro", {Does::dead, "it would make a barometer without a <sensor>"}},
       {"gazebo_ros_ft_sensor", {Does::dead, "force-torque sensors would publish"}},
       {"gazebo_ros_f3d", {Does::dead, "it would tell the forces on a link"}},
@@ -177,7 +180,8 @@ const std::map<std::string, Known>& of_classic() {
       {"gazebo_ros_vacuum_gripper", {Does::dead, "a gripper would suck"}},
       {"gazebo_grasp_fix", {Does::dead, "what is grasped would stick to the gripper"}},
       {"gazebo_mimic_joint_plugin", {Does::dead, "one joint would follow another"}},
-      {"roboticsgroup_upatras_gazebo_mimic_joint_plugin", {Does::dead, "one joint would follow another"}},
+      {"roboticsgroup_upatras_gazebo_mimic_joint_plugin",
+       {Does::dead, "one joint would follow another"}},
       {"roboticsgroup_gazebo_mimic_joint_plugin", {Does::dead, "one joint would follow another"}},
       {"gazebo_ros_elevator", {Does::dead, "a lift would go where it is called"}},
       {"gazebo_ros_projector", {Does::dead, "a pattern would be projected"}},
@@ -197,7 +201,9 @@ const std::map<std::string, Known>& of_classic() {
   return table;
 }
 
-bool begins_with(const std::string& text, const std::string& start) { return text.rfind(start, 0) == 0; }
+bool begins_with(const std::string& text, const std::string& start) {
+  return text.rfind(start, 0) == 0;
+}
 bool ends_with(const std::string& text, const std::string& end) {
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
@@ -212,19 +218,25 @@ std::string library_of(const std::string& filename) {
   return begins_with(name, "lib") ? name.substr(3) : name;
 }
 
-// "gz-sim7-diff-drive-system" and "ignition-gazebo-diff-drive-system" to "DiffDrive"; "" for other libraries.
+// "gz-sim7-diff-drive-system" and "ignition-gazebo-diff-drive-system" to "DiffDrive"; "" for other
+// libraries.
 std::string system_of(const std::string& library) {
   size_t start = std::string::npos;
   for (const char* prefix : {"gz-sim", "ignition-gazebo", "ign-gazebo"}) {
     if (begins_with(library, prefix)) start = std::string(prefix).size();
   }
   if (start == std::string::npos || !ends_with(library, "-system")) return "";
-  while (start < library.size() && std::isdigit(static_cast<unsigned char>(library[start]))) ++start;
+  while (start < library.size() && std::isdigit(static_cast<unsigned char>(library[start])))
+    ++start;
   std::string name;
   bool upper = false;
-  for (const char c : library.substr(start, library.size() - start - std::string("-system").size())) {
-    if (c == '-') upper = true;
-    else name += upper ? static_cast<char>(std::toupper(static_cast<unsigned char>(c))) : c, upper = false;
+  for (const char c :
+       library.substr(start, library.size() - start - std::string("-system").size())) {
+    if (c == '-')
+      upper = true;
+    else
+      name += upper ? static_cast<char>(std::toupper(static_cast<unsigned char>(c))) : c,
+          upper = false;
   }
   return name;
 }
@@ -239,11 +251,16 @@ PluginKind kind_of(const Element& plugin) {
   for (const char* space : {"::systems::", "gz_ros2_control::", "ign_ros2_control::"}) {
     const size_t at = name ? name->rfind(space) : std::string::npos;
     if (at == std::string::npos) continue;
-    system = std::string(space).find("ros2") != std::string::npos ? "Ros2Control" : name->substr(at + std::string(space).size());
+    system = std::string(space).find("ros2") != std::string::npos
+                 ? "Ros2Control"
+                 : name->substr(at + std::string(space).size());
   }
-  // Libraries have names of their own spelling ("imu" for Imu, "rf-comms" for RFComms): case does not count.
+  // Libraries have names of their own spelling ("imu" for Imu, "rf-comms" for RFComms): case does
+  // not count.
   const auto same = [](const std::string& a, const std::string& b) {
-    return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) {
+      return std::tolower(x) == std::tolower(y);
+    });
   };
   for (const auto& [known, what] : of_gz()) {
     if (same(known, system)) return {known, what.does, what.would};

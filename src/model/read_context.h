@@ -16,16 +16,19 @@ struct ReadContext {
   const ResourceFinder& resources;
   DocumentStore& documents;
   MeshLoader& meshes;
-  std::vector<std::string> xacro_arguments = {};    // "NAME:=VALUE"
+  std::vector<std::string> xacro_arguments = {};  // "NAME:=VALUE"
 };
 
-// The name attribute. Throws InputError when it is absent, empty or reserved by SDF ("world", "__model__").
+// The name attribute. Throws InputError when it is absent, empty or reserved by SDF ("world",
+// "__model__").
 std::string required_name(const Element& element);
 
-// Looks at the children that a reader does not read: unknown ruedo: elements are errors with a suggestion, known
-// but unsupported or unknown elements are findings, those in `silent` and of other namespaces are passed over.
+// Looks at the children that a reader does not read: unknown ruedo: elements are errors with a
+// suggestion, known but unsupported or unknown elements are findings, those in `silent` and of
+// other namespaces are passed over.
 void report_other_children(const Element& element, const std::vector<std::string>& known,
-                           const std::vector<std::string>& silent, const std::string& where, Findings& findings);
+                           const std::vector<std::string>& silent, const std::string& where,
+                           Findings& findings);
 
 // A file that grows without end: it is refused as a whole, not part by part.
 class TooLarge : public InputError {
@@ -33,10 +36,12 @@ class TooLarge : public InputError {
   using InputError::InputError;
 };
 
-// Runs read(). What is wrong with an element of the format is named, `what` is left out ("the shape"), and false comes back;
-// what is wrong with one of Ruedo's own is the author's, and throws on.
+// Runs read(). What is wrong with an element of the format is named, `what` is left out ("the
+// shape"), and false comes back; what is wrong with one of Ruedo's own is the author's, and throws
+// on.
 template <class Read>
-bool read_or_leave_out(const std::string& where, const std::string& what, Findings& findings, Read read) {
+bool read_or_leave_out(const std::string& where, const std::string& what, Findings& findings,
+                       Read read) {
   try {
     read();
     return true;

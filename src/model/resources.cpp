@@ -1,5 +1,5 @@
-// The search for files, in a fixed order: the naming file's own surroundings, the top file's, Ruedo's own
-// worlds, then the variables that Ruedo's and Gazebo's users set.
+// The search for files, in a fixed order: the naming file's own surroundings, the top file's,
+// Ruedo's own worlds, then the variables that Ruedo's and Gazebo's users set.
 #include "model/resources.h"
 
 #include <algorithm>
@@ -38,12 +38,14 @@ void add_folder(std::vector<std::string>& folders, const fs::path& folder) {
   if (std::find(folders.begin(), folders.end(), path) == folders.end()) folders.push_back(path);
 }
 
-// A file's folder, `models` in and beside it, and the folder above, in which a model's neighbours are.
+// A file's folder, `models` in and beside it, and the folder above, in which a model's neighbours
+// are.
 void add_surroundings(std::vector<std::string>& folders, const fs::path& folder) {
   add_folder(folders, folder);
   add_folder(folders, folder / "models");
   add_folder(folders, folder / ".." / "models");
-  if (folder.has_relative_path() && folder.parent_path().has_relative_path()) add_folder(folders, folder / "..");
+  if (folder.has_relative_path() && folder.parent_path().has_relative_path())
+    add_folder(folders, folder / "..");
 }
 
 void add_variable(std::vector<std::string>& folders, const char* name) {
@@ -52,7 +54,8 @@ void add_variable(std::vector<std::string>& folders, const char* name) {
   std::string rest = value;
   while (!rest.empty()) {
     const size_t colon = rest.find(':');
-    if (const std::string folder = rest.substr(0, colon); !folder.empty()) add_folder(folders, folder);
+    if (const std::string folder = rest.substr(0, colon); !folder.empty())
+      add_folder(folders, folder);
     rest = colon == std::string::npos ? "" : rest.substr(colon + 1);
   }
 }
@@ -69,7 +72,8 @@ std::string plain_name(const std::string& name) {
 std::string decoded(const std::string& uri) {
   std::string text;
   for (size_t i = 0; i < uri.size(); ++i) {
-    if (uri[i] == '%' && i + 2 < uri.size() && std::isxdigit(static_cast<unsigned char>(uri[i + 1])) &&
+    if (uri[i] == '%' && i + 2 < uri.size() &&
+        std::isxdigit(static_cast<unsigned char>(uri[i + 1])) &&
         std::isxdigit(static_cast<unsigned char>(uri[i + 2]))) {
       text += static_cast<char>(std::stoi(uri.substr(i + 1, 2), nullptr, 16));
       i += 2;
@@ -97,7 +101,9 @@ fs::path newest_version(const fs::path& model) {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(model, error)) {
     const std::string name = entry.path().filename().string();
-    if (!name.empty() && name.size() < 7 && name.find_first_not_of("0123456789") == std::string::npos) newest = std::max(newest, std::stoi(name));
+    if (!name.empty() && name.size() < 7 &&
+        name.find_first_not_of("0123456789") == std::string::npos)
+      newest = std::max(newest, std::stoi(name));
   }
   return newest > 0 ? model / std::to_string(newest) : model;
 }
@@ -107,16 +113,19 @@ std::string package_name(const fs::path& folder) {
   const fs::path manifest = folder / "package.xml";
   if (!is_there(manifest)) return "";
   try {
-    return parse_document(read_text_file(manifest.string(), 1 << 20), manifest.string())->string("name", "");
+    return parse_document(read_text_file(manifest.string(), 1 << 20), manifest.string())
+        ->string("name", "");
   } catch (const InputError&) {
     return "";
   }
 }
 
-// Where a package's own files lie, its folder is above them; that of the user holds more than a package.
+// Where a package's own files lie, its folder is above them; that of the user holds more than a
+// package.
 bool may_be_package(const fs::path& folder) {
   const char* home = std::getenv("HOME");
-  return folder.parent_path().has_relative_path() && (!home || !starts_with(full_path(home) + "/", (folder.string() + "/").c_str()));
+  return folder.parent_path().has_relative_path() &&
+         (!home || !starts_with(full_path(home) + "/", (folder.string() + "/").c_str()));
 }
 
 }  // namespace
@@ -127,15 +136,17 @@ std::string shipped_worlds() {
   return is_folder(RUEDO_WORLDS_DIR) ? full_path(RUEDO_WORLDS_DIR) : "";
 }
 
-ResourceFinder::ResourceFinder(const std::string& top_file, bool allow_absolute) : allow_absolute_(allow_absolute) {
+ResourceFinder::ResourceFinder(const std::string& top_file, bool allow_absolute)
+    : allow_absolute_(allow_absolute) {
   add_surroundings(near_, fs::path(full_path(top_file)).parent_path());
   if (const std::string worlds = shipped_worlds(); !worlds.empty()) {
     add_folder(far_, worlds);
     add_folder(far_, fs::path(worlds) / "robots");
     add_folder(far_, fs::path(worlds) / "models");
   }
-  for (const char* name : {"RUEDO_PATH", "GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "IGN_GAZEBO_RESOURCE_PATH",
-                           "GAZEBO_RESOURCE_PATH", "SDF_PATH", "ROS_PACKAGE_PATH"}) {
+  for (const char* name :
+       {"RUEDO_PATH", "GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "IGN_GAZEBO_RESOURCE_PATH",
+        "GAZEBO_RESOURCE_PATH", "SDF_PATH", "ROS_PACKAGE_PATH"}) {
     add_variable(far_, name);
   }
   if (const char* prefixes = std::getenv("AMENT_PREFIX_PATH")) {
@@ -148,10 +159,12 @@ ResourceFinder::ResourceFinder(const std::string& top_file, bool allow_absolute)
   }
   if (const char* home = std::getenv("HOME")) {
     add_folder(far_, fs::path(home) / ".gazebo/models");
-    for (const char* cache : {".gz/fuel/fuel.gazebosim.org", ".ignition/fuel/fuel.gazebosim.org", ".ignition/fuel/fuel.ignitionrobotics.org"}) {
+    for (const char* cache : {".gz/fuel/fuel.gazebosim.org", ".ignition/fuel/fuel.gazebosim.org",
+                              ".ignition/fuel/fuel.ignitionrobotics.org"}) {
       std::vector<fs::path> owners;
       std::error_code error;
-      for (const auto& entry : fs::directory_iterator(fs::path(home) / cache, error)) owners.push_back(entry.path());
+      for (const auto& entry : fs::directory_iterator(fs::path(home) / cache, error))
+        owners.push_back(entry.path());
       std::sort(owners.begin(), owners.end());
       for (const fs::path& owner : owners) add_folder(far_, owner / "models");
     }
@@ -169,12 +182,13 @@ ResourceFinder ResourceFinder::for_strangers(const std::string& world_file) {
   finder.for_strangers_ = true;
   finder.near_.clear();
   const fs::path folder = fs::path(full_path(world_file)).parent_path();
-  for (const fs::path& each : {folder, folder / "models", folder / ".." / "models"}) add_folder(finder.near_, each);
+  for (const fs::path& each : {folder, folder / "models", folder / ".." / "models"})
+    add_folder(finder.near_, each);
   return finder;
 }
 
 bool ResourceFinder::reaches(const std::string& path) const {
-  const std::string full = full_path(path);    // where links lead
+  const std::string full = full_path(path);  // where links lead
   for (const auto* roots : {&near_, &far_}) {
     for (const std::string& root : *roots) {
       const std::string begin = root == "/" ? root : root + "/";
@@ -208,13 +222,17 @@ bool ResourceFinder::allowed(const std::string& path, const std::string& from) c
   return false;
 }
 
-// ROS packages may live in a folder of another name: one whose package.xml has the name counts too, be it above the
-// naming file, a folder that is searched, or in one. Above it the folder's own name will do.
-std::optional<std::string> ResourceFinder::in_package(const std::string& package, const std::string& rest,
+// ROS packages may live in a folder of another name: one whose package.xml has the name counts too,
+// be it above the naming file, a folder that is searched, or in one. Above it the folder's own name
+// will do.
+std::optional<std::string> ResourceFinder::in_package(const std::string& package,
+                                                      const std::string& rest,
                                                       const std::string& from) const {
-  for (fs::path folder = fs::path(from).parent_path(); !for_strangers_ && folder.has_relative_path(); folder = folder.parent_path()) {
+  for (fs::path folder = fs::path(from).parent_path();
+       !for_strangers_ && folder.has_relative_path(); folder = folder.parent_path()) {
     if (!is_there(folder / rest)) continue;
-    if ((folder.filename() == package && may_be_package(folder)) || package_name(folder) == package) return full_path(folder / rest);
+    if ((folder.filename() == package && may_be_package(folder)) || package_name(folder) == package)
+      return full_path(folder / rest);
   }
   for (const auto& root : roots_for(from)) {
     const auto [at, inserted] = packages_.try_emplace(root);
@@ -224,22 +242,26 @@ std::optional<std::string> ResourceFinder::in_package(const std::string& package
       for (const auto& entry : fs::directory_iterator(root, error)) folders.push_back(entry.path());
       std::sort(folders.begin() + 1, folders.end());
       for (const auto& folder : folders) {
-        if (const std::string name = package_name(folder); !name.empty()) at->second.emplace(name, folder.string());
+        if (const std::string name = package_name(folder); !name.empty())
+          at->second.emplace(name, folder.string());
       }
     }
     const auto folder = at->second.find(package);
-    if (folder != at->second.end() && is_there(fs::path(folder->second) / rest)) return full_path(fs::path(folder->second) / rest);
+    if (folder != at->second.end() && is_there(fs::path(folder->second) / rest))
+      return full_path(fs::path(folder->second) / rest);
   }
   return std::nullopt;
 }
 
-std::optional<std::string> ResourceFinder::find(const std::string& uri, const std::string& from) const {
+std::optional<std::string> ResourceFinder::find(const std::string& uri,
+                                                const std::string& from) const {
   std::optional<std::string> found = find_anything(uri, from);
   if (found && for_strangers_ && !reaches(*found)) return std::nullopt;
   return found;
 }
 
-std::optional<std::string> ResourceFinder::find_anything(const std::string& written, const std::string& from) const {
+std::optional<std::string> ResourceFinder::find_anything(const std::string& written,
+                                                         const std::string& from) const {
   const std::string uri = decoded(written);
   if (uri.empty() || uri.find('\0') != std::string::npos) return std::nullopt;
 
@@ -248,14 +270,16 @@ std::optional<std::string> ResourceFinder::find_anything(const std::string& writ
     const size_t models = uri.find("/models/");
     if (models == std::string::npos) return std::nullopt;
     std::string name = uri.substr(models + 8), rest;
-    if (const size_t files = name.find("/files/"); files != std::string::npos) rest = tidy(name.substr(files + 7));
+    if (const size_t files = name.find("/files/"); files != std::string::npos)
+      rest = tidy(name.substr(files + 7));
     name = plain_name(name.substr(0, name.find('/')));
     if (name.empty() || starts_with(rest, "..")) return std::nullopt;
     for (const auto& root : roots_for(from)) {
       std::vector<std::string> matches;
       std::error_code error;
       for (const auto& entry : fs::directory_iterator(root, error)) {
-        if (plain_name(entry.path().filename().string()) == name) matches.push_back((newest_version(entry.path()) / rest).string());
+        if (plain_name(entry.path().filename().string()) == name)
+          matches.push_back((newest_version(entry.path()) / rest).string());
       }
       std::sort(matches.begin(), matches.end());
       for (const auto& match : matches) {
@@ -274,22 +298,30 @@ std::optional<std::string> ResourceFinder::find_anything(const std::string& writ
       if (is_there(found)) return found;
     }
     const size_t slash = path.find('/');
-    return in_package(path.substr(0, slash), slash == std::string::npos ? "" : path.substr(slash + 1), from);
+    return in_package(path.substr(0, slash),
+                      slash == std::string::npos ? "" : path.substr(slash + 1), from);
   }
 
   std::string path = uri;
-  if (starts_with(path, "file://")) path = path.substr(7);
-  else if (path.find("://") != std::string::npos) return std::nullopt;
+  if (starts_with(path, "file://"))
+    path = path.substr(7);
+  else if (path.find("://") != std::string::npos)
+    return std::nullopt;
 
   const bool absolute = fs::path(path).is_absolute();
-  if (starts_with(uri, "file://") && !absolute) {    // "file://models/x/mesh.dae", from a file below that models
+  if (starts_with(uri, "file://") &&
+      !absolute) {  // "file://models/x/mesh.dae", from a file below that models
     const fs::path top = *fs::path(tidy(path)).begin();
-    for (fs::path folder = fs::path(from).parent_path(); folder.has_relative_path() && top != ".."; folder = folder.parent_path()) {
-      if (folder.filename() == top && is_there(folder.parent_path() / tidy(path))) return full_path(folder.parent_path() / tidy(path));
+    for (fs::path folder = fs::path(from).parent_path(); folder.has_relative_path() && top != "..";
+         folder = folder.parent_path()) {
+      if (folder.filename() == top && is_there(folder.parent_path() / tidy(path)))
+        return full_path(folder.parent_path() / tidy(path));
     }
   }
-  const std::string beside = (absolute ? fs::path(path) : fs::path(from).parent_path() / path).lexically_normal().string();
-  if (is_there(beside) && ((absolute && allow_absolute_) || allowed(beside, from))) return full_path(beside);
+  const std::string beside =
+      (absolute ? fs::path(path) : fs::path(from).parent_path() / path).lexically_normal().string();
+  if (is_there(beside) && ((absolute && allow_absolute_) || allowed(beside, from)))
+    return full_path(beside);
   if (absolute) return std::nullopt;
   const std::string tidied = tidy(path);
   if (tidied.empty() || starts_with(tidied, "..")) return std::nullopt;
@@ -302,20 +334,27 @@ std::optional<std::string> ResourceFinder::find_anything(const std::string& writ
 
 std::string ResourceFinder::why_not(const std::string& uri, const std::string& from) const {
   const std::string path = decoded(starts_with(uri, "file://") ? uri.substr(7) : uri);
-  if (for_strangers_ || path.empty() || path.find('\0') != std::string::npos || path.find("://") != std::string::npos) return "is not found";
+  if (for_strangers_ || path.empty() || path.find('\0') != std::string::npos ||
+      path.find("://") != std::string::npos)
+    return "is not found";
   const bool absolute = fs::path(path).is_absolute();
-  const fs::path full = (absolute ? fs::path(path) : fs::path(from).parent_path() / path).lexically_normal();
-  if (is_folder(full.string()) && allowed(full.string(), from)) return "is a folder without model.config or model.sdf";
+  const fs::path full =
+      (absolute ? fs::path(path) : fs::path(from).parent_path() / path).lexically_normal();
+  if (is_folder(full.string()) && allowed(full.string(), from))
+    return "is a folder without model.config or model.sdf";
   if (!is_there(full) || allowed(full.string(), from)) return "is not found";
-  return absolute ? "lies outside the folders that are searched (--allow-absolute lets it in)" : "leads out of the folders that are searched";
+  return absolute ? "lies outside the folders that are searched (--allow-absolute lets it in)"
+                  : "leads out of the folders that are searched";
 }
 
-std::optional<std::string> ResourceFinder::find_model(const std::string& uri, const std::string& from) const {
+std::optional<std::string> ResourceFinder::find_model(const std::string& uri,
+                                                      const std::string& from) const {
   const auto [at, is_new] = models_.try_emplace(uri + "\n" + fs::path(from).parent_path().string());
   if (is_new) {
     const auto found = find(uri, from);
     at->second = found ? model_file(*found) : std::nullopt;
-    if (at->second && for_strangers_ && !reaches(*at->second)) at->second = std::nullopt;    // a link in the model's folder
+    if (at->second && for_strangers_ && !reaches(*at->second))
+      at->second = std::nullopt;  // a link in the model's folder
   }
   return at->second;
 }
@@ -331,7 +370,8 @@ std::optional<std::string> ResourceFinder::model_file(const std::string& path) {
     SdfVersion best_version{0, 0};
     for (const Element* sdf : root->all("sdf")) {
       const std::string* written = sdf->attribute("version");
-      const SdfVersion version = written ? SdfVersion::parse(*written).value_or(SdfVersion{0, 1}) : SdfVersion{0, 1};
+      const SdfVersion version =
+          written ? SdfVersion::parse(*written).value_or(SdfVersion{0, 1}) : SdfVersion{0, 1};
       const std::string name = tidy(sdf->text);
       if (name.empty() || starts_with(name, "..") || !is_there(folder / name)) continue;
       if (best.empty() || best_version < version) {
@@ -342,19 +382,23 @@ std::optional<std::string> ResourceFinder::model_file(const std::string& path) {
     if (!best.empty()) return best;
   }
   if (is_there(folder / "model.sdf")) return (folder / "model.sdf").string();
-  if (is_there(config)) throw InputError({config.string(), 0}, "<sdf> names no file that is in the folder");
+  if (is_there(config))
+    throw InputError({config.string(), 0}, "<sdf> names no file that is in the folder");
   return std::nullopt;
 }
 
-std::optional<std::string> ResourceFinder::find_texture(const std::string& name, const std::string& from) const {
+std::optional<std::string> ResourceFinder::find_texture(const std::string& name,
+                                                        const std::string& from) const {
   if (auto found = find(name, from); found && !is_folder(*found)) return found;
-  // Exporters write paths of their own machine; the picture is then beside the mesh or in the model's folders.
+  // Exporters write paths of their own machine; the picture is then beside the mesh or in the
+  // model's folders.
   std::string slashes = name;
   std::replace(slashes.begin(), slashes.end(), '\\', '/');
   const fs::path file = fs::path(slashes).filename();
   if (file.empty() || file == "..") return std::nullopt;
   const fs::path folder = fs::path(from).parent_path();
-  for (const char* place : {".", "textures", "materials/textures", "../textures", "../materials/textures", "../../materials/textures"}) {
+  for (const char* place : {".", "textures", "materials/textures", "../textures",
+                            "../materials/textures", "../../materials/textures"}) {
     const fs::path candidate = folder / place / file;
     if (for_strangers_ && !reaches(candidate)) continue;
     if (is_there(candidate) && !is_folder(candidate)) return full_path(candidate);

@@ -1,7 +1,9 @@
-// Controllers of ROS 1 (ros_controllers) and ROS 2 (ros2_controllers): which files they stand in, and their parameters.
+// Controllers of ROS 1 (ros_controllers) and ROS 2 (ros2_controllers): which files they stand in,
+// and their parameters.
 //
-// Names and defaults are those of the controllers' own documentation. A ROS 1 controller is a map with a `type`; in ROS 2
-// the controller manager names the types, and NAME/ros__parameters holds the rest, with dots or nested.
+// Names and defaults are those of the controllers' own documentation. A ROS 1 controller is a map
+// with a `type`; in ROS 2 the controller manager names the types, and NAME/ros__parameters holds
+// the rest, with dots or nested.
 #include "model/ros_control.h"
 
 #include <algorithm>
@@ -18,7 +20,8 @@ namespace fs = std::filesystem;
 namespace ruedo::model {
 namespace {
 
-constexpr size_t kLargestFile = 1 << 18, kMostFiles = 300, kMostFolders = 200;    // of parameters, looked at for one robot
+constexpr size_t kLargestFile = 1 << 18, kMostFiles = 300,
+                 kMostFolders = 200;  // of parameters, looked at for one robot
 
 struct Controller {
   std::string name, type;                  // "diff_drive_controller/DiffDriveController"
@@ -30,7 +33,8 @@ struct Controller {
 const Element* below(const Element& map, const std::string& path) {
   for (const auto& child : map.children) {
     if (child->name == path) return child.get();
-    if (path.size() > child->name.size() && path.compare(0, child->name.size(), child->name) == 0 && path[child->name.size()] == '.') {
+    if (path.size() > child->name.size() && path.compare(0, child->name.size(), child->name) == 0 &&
+        path[child->name.size()] == '.') {
       if (const Element* found = below(*child, path.substr(child->name.size() + 1))) return found;
     }
   }
@@ -54,11 +58,14 @@ std::vector<std::string> names_in(const Element* list) {
   return names;
 }
 
-bool is_true(const Element* flag) { return flag && (flag->text == "true" || flag->text == "True" || flag->text == "1"); }
+bool is_true(const Element* flag) {
+  return flag && (flag->text == "true" || flag->text == "True" || flag->text == "1");
+}
 
 // A number above 0; the controllers' "no limit" is 0, NaN or nothing.
 std::optional<double> positive(const Element* written) {
-  if (!written || written->text == ".nan" || written->text == ".NaN" || written->text == "NaN") return std::nullopt;
+  if (!written || written->text == ".nan" || written->text == ".NaN" || written->text == "NaN")
+    return std::nullopt;
   const double value = std::abs(written->as_number(Allowed::between(-1e9, 1e9)));
   return value > 0 ? std::optional(value) : std::nullopt;
 }
@@ -67,7 +74,8 @@ std::optional<double> positive(const Element* written) {
 
 void collect_types(const Element& map, std::vector<Controller>& into) {
   for (const auto& child : map.children) {
-    if (const Element* type = child->child("type"); type && type->text.find("ontroller") != std::string::npos) {
+    if (const Element* type = child->child("type");
+        type && type->text.find("ontroller") != std::string::npos) {
       into.push_back({child->name, type->text, {child.get()}, child->source});
     }
     collect_types(*child, into);
@@ -101,7 +109,7 @@ struct Translation {
   const Controller& from;
   const Model& model;
   Element& drive;
-  std::string missing;    // a joint that the model does not have
+  std::string missing;  // a joint that the model does not have
 
   void add(const char* name, const std::string& text, const Source& source) {
     drive.children.push_back(std::make_unique<Element>());
@@ -115,7 +123,9 @@ struct Translation {
     for (const char* name : theirs) {
       const Element* list = parameter(from, {name});
       for (const std::string& joint : names_in(list)) {
-        const bool known = std::any_of(model.joints.begin(), model.joints.end(), [&](const Joint& each) { return each.name == dotted(joint); });
+        const bool known =
+            std::any_of(model.joints.begin(), model.joints.end(),
+                        [&](const Joint& each) { return each.name == dotted(joint); });
         if (!known) missing = joint;
         add(ours, joint, list->source);
       }
@@ -125,12 +135,14 @@ struct Translation {
   void number(const char* ours, std::initializer_list<const char*> theirs, double factor = 1.0) {
     for (const char* name : theirs) {
       const Element* written = parameter(from, {name});
-      if (const auto value = positive(written)) return add(ours, shown(*value * factor), written->source);
+      if (const auto value = positive(written))
+        return add(ours, shown(*value * factor), written->source);
     }
   }
 
   // A limit of ROS: with a switch in the first generations, without in the later ones.
-  void limit(const char* ours, const std::string& axis, const char* kind, std::initializer_list<const char*> names) {
+  void limit(const char* ours, const std::string& axis, const char* kind,
+             std::initializer_list<const char*> names) {
     const Element* has = parameter(from, {(axis + ".has_" + kind + "_limits").c_str()});
     if (has && !is_true(has)) return;
     for (const char* name : names) {
@@ -139,16 +151,20 @@ struct Translation {
     }
   }
 
-  double multiplier(std::initializer_list<const char*> names) { return positive(parameter(from, names)).value_or(1.0); }
+  double multiplier(std::initializer_list<const char*> names) {
+    return positive(parameter(from, names)).value_or(1.0);
+  }
 
-  // The middles of the two sides' wheels apart, as the ROS 1 controllers measure it where it is not written.
+  // The middles of the two sides' wheels apart, as the ROS 1 controllers measure it where it is not
+  // written.
   double separation() const {
     const auto middle = [&](const char* side) {
       Vec3 sum = Vec3::Zero();
       const auto all = drive.all(side);
       for (const Element* each : all) {
         for (const Joint& joint : model.joints) {
-          if (joint.name == dotted(each->text)) sum += joint.X_MJ.translation / static_cast<double>(all.size());
+          if (joint.name == dotted(each->text))
+            sum += joint.X_MJ.translation / static_cast<double>(all.size());
         }
       }
       return sum;
@@ -160,13 +176,17 @@ struct Translation {
   void limits() {
     limit("ruedo:max_speed", "linear.x", "velocity", {"max_velocity"});
     limit("ruedo:acceleration", "linear.x", "acceleration", {"max_acceleration"});
-    limit("ruedo:deceleration", "linear.x", "acceleration", {"max_deceleration", "min_acceleration"});
+    limit("ruedo:deceleration", "linear.x", "acceleration",
+          {"max_deceleration", "min_acceleration"});
     limit("ruedo:max_side_speed", "linear.y", "velocity", {"max_velocity"});
     limit("ruedo:max_turn_rate", "angular.z", "velocity", {"max_velocity"});
     limit("ruedo:turn_acceleration", "angular.z", "acceleration", {"max_acceleration"});
-    const Element* timeout = parameter(from, {"cmd_vel_timeout", "reference_timeout", "command_timeout"});
-    if (timeout) add("ruedo:watchdog", shown(positive(timeout).value_or(0.0)), timeout->source);
-    else add("ruedo:watchdog", "0.5", from.source);    // the controllers' own default
+    const Element* timeout =
+        parameter(from, {"cmd_vel_timeout", "reference_timeout", "command_timeout"});
+    if (timeout)
+      add("ruedo:watchdog", shown(positive(timeout).value_or(0.0)), timeout->source);
+    else
+      add("ruedo:watchdog", "0.5", from.source);  // the controllers' own default
   }
 };
 
@@ -175,17 +195,24 @@ using Read = void (*)(Translation&);
 void differential(Translation& t) {
   t.joints("ruedo:left_joint", {"left_wheel", "left_wheel_names"});
   t.joints("ruedo:right_joint", {"right_wheel", "right_wheel_names"});
-  t.number("ruedo:wheel_radius", {"wheel_radius"}, t.multiplier({"wheel_radius_multiplier", "left_wheel_radius_multiplier"}));
+  t.number("ruedo:wheel_radius", {"wheel_radius"},
+           t.multiplier({"wheel_radius_multiplier", "left_wheel_radius_multiplier"}));
   const double wider = t.multiplier({"wheel_separation_multiplier"});
   t.number("ruedo:track", {"wheel_separation"}, wider);
-  if (!t.drive.has("ruedo:track")) t.add("ruedo:track", shown(t.separation() * wider), t.from.source);
+  if (!t.drive.has("ruedo:track"))
+    t.add("ruedo:track", shown(t.separation() * wider), t.from.source);
 }
 
 void mecanum(Translation& t) {
   t.drive.attributes.emplace_back("steering", "mecanum");
-  t.joints("ruedo:left_joint", {"front_left_wheel_command_joint_name", "rear_left_wheel_command_joint_name", "front_left_wheel_joint", "back_left_wheel_joint"});
-  t.joints("ruedo:right_joint", {"front_right_wheel_command_joint_name", "rear_right_wheel_command_joint_name", "front_right_wheel_joint", "back_right_wheel_joint"});
-  t.number("ruedo:wheel_radius", {"kinematics.wheels_radius", "wheel_radius"}, t.multiplier({"wheel_radius_multiplier"}));
+  t.joints("ruedo:left_joint",
+           {"front_left_wheel_command_joint_name", "rear_left_wheel_command_joint_name",
+            "front_left_wheel_joint", "back_left_wheel_joint"});
+  t.joints("ruedo:right_joint",
+           {"front_right_wheel_command_joint_name", "rear_right_wheel_command_joint_name",
+            "front_right_wheel_joint", "back_right_wheel_joint"});
+  t.number("ruedo:wheel_radius", {"kinematics.wheels_radius", "wheel_radius"},
+           t.multiplier({"wheel_radius_multiplier"}));
   t.number("ruedo:track", {"wheel_separation_y"});
   t.number("ruedo:wheelbase", {"wheel_separation_x"});
   // Half the way between the axles and half the track, in one.
@@ -204,18 +231,25 @@ void omni(Translation& t) {
 }
 
 void car(Translation& t) {
-  t.joints("ruedo:left_joint", {"rear_wheel", "rear_wheels_names", "traction_joints_names", "traction_joint_name"});
-  t.joints("ruedo:steer_joint", {"front_steer", "front_wheels_names", "steering_joints_names", "steering_joint_name"});
+  t.joints("ruedo:left_joint",
+           {"rear_wheel", "rear_wheels_names", "traction_joints_names", "traction_joint_name"});
+  t.joints("ruedo:steer_joint",
+           {"front_steer", "front_wheels_names", "steering_joints_names", "steering_joint_name"});
   if (const Element* front = parameter(t.from, {"front_steering"}); front && !is_true(front)) {
-    std::erase_if(t.drive.children, [](const auto& child) { return child->name == "ruedo:left_joint" || child->name == "ruedo:steer_joint"; });
+    std::erase_if(t.drive.children, [](const auto& child) {
+      return child->name == "ruedo:left_joint" || child->name == "ruedo:steer_joint";
+    });
     t.joints("ruedo:left_joint", {"front_wheels_names"});
     t.joints("ruedo:steer_joint", {"rear_wheels_names"});
   }
   const bool two = t.drive.all("ruedo:steer_joint").size() > 1;
   t.drive.attributes.emplace_back("steering", two ? "ackermann" : "tricycle");
-  t.number("ruedo:wheelbase", {"wheelbase", "wheel_separation_h"}, t.multiplier({"wheel_separation_h_multiplier"}));
-  t.number("ruedo:track", {"traction_track_width", "rear_wheel_track", "wheel_track", "wheel_separation"});
-  t.number("ruedo:wheel_radius", {"traction_wheels_radius", "rear_wheels_radius", "wheel_radius"}, t.multiplier({"wheel_radius_multiplier"}));
+  t.number("ruedo:wheelbase", {"wheelbase", "wheel_separation_h"},
+           t.multiplier({"wheel_separation_h_multiplier"}));
+  t.number("ruedo:track",
+           {"traction_track_width", "rear_wheel_track", "wheel_track", "wheel_separation"});
+  t.number("ruedo:wheel_radius", {"traction_wheels_radius", "rear_wheels_radius", "wheel_radius"},
+           t.multiplier({"wheel_radius_multiplier"}));
   t.number("ruedo:max_steering_angle", {"steering.max_position"});
   t.number("ruedo:max_steering_rate", {"steering.max_velocity"});
   t.number("ruedo:max_speed", {"traction.max_velocity"}, 1.0);
@@ -223,26 +257,38 @@ void car(Translation& t) {
 
 struct KnownType {
   const char* in_type;
-  Read read;              // null: it drives nothing; its joints take commands, or Ruedo's own part does its job
+  Read read;  // null: it drives nothing; its joints take commands, or Ruedo's own part does its job
 };
 
 // In this order: "tricycle_steering_controller" has "steering_controller" in it, too.
 constexpr KnownType kTypes[] = {
-    {"diff_drive_controller", differential}, {"DiffDriveController", differential},
-    {"mecanum_drive_controller", mecanum},   {"MecanumDriveController", mecanum},
-    {"omni_wheel_drive", omni},              {"OmniWheelDrive", omni},
-    {"ackermann", car},                      {"bicycle_steering", car},
+    {"diff_drive_controller", differential},
+    {"DiffDriveController", differential},
+    {"mecanum_drive_controller", mecanum},
+    {"MecanumDriveController", mecanum},
+    {"omni_wheel_drive", omni},
+    {"OmniWheelDrive", omni},
+    {"ackermann", car},
+    {"bicycle_steering", car},
     {"tricycle", car},
-    {"joint_state", nullptr},                {"JointState", nullptr},
-    {"JointTrajectory", nullptr},            {"joint_trajectory", nullptr},
-    {"position_controllers", nullptr},       {"velocity_controllers", nullptr},
-    {"effort_controllers", nullptr},         {"forward_command_controller", nullptr},
-    {"gripper", nullptr},                    {"Gripper", nullptr},
-    {"imu_sensor", nullptr},                 {"pid_controller", nullptr},
+    {"joint_state", nullptr},
+    {"JointState", nullptr},
+    {"JointTrajectory", nullptr},
+    {"joint_trajectory", nullptr},
+    {"position_controllers", nullptr},
+    {"velocity_controllers", nullptr},
+    {"effort_controllers", nullptr},
+    {"forward_command_controller", nullptr},
+    {"gripper", nullptr},
+    {"Gripper", nullptr},
+    {"imu_sensor", nullptr},
+    {"pid_controller", nullptr},
 };
 
 const KnownType* known_type(const std::string& type) {
-  const auto found = std::find_if(std::begin(kTypes), std::end(kTypes), [&](const KnownType& each) { return type.find(each.in_type) != std::string::npos; });
+  const auto found = std::find_if(std::begin(kTypes), std::end(kTypes), [&](const KnownType& each) {
+    return type.find(each.in_type) != std::string::npos;
+  });
   return found == std::end(kTypes) ? nullptr : found;
 }
 
@@ -276,20 +322,28 @@ std::unique_ptr<Element> odometry_of(const Controller& controller) {
 }
 
 // What of a drive's parameters changes how it moves in ROS and not here.
-void name_what_has_no_effect(const Controller& controller, const std::string& where, Findings& findings) {
+void name_what_has_no_effect(const Controller& controller, const std::string& where,
+                             Findings& findings) {
   const auto name = [&](const Element* written, const std::string& text) {
-    if (written) findings.unsupported(written->source, where, "controller '" + controller.name + "': " + text);
+    if (written)
+      findings.unsupported(written->source, where, "controller '" + controller.name + "': " + text);
   };
   for (const char* axis : {"linear.x", "angular.z"}) {
     const std::string at = axis;
-    if (const Element* has = parameter(controller, {(at + ".has_jerk_limits").c_str()}); is_true(has)) name(has, "limits of the jerk are not kept");
+    if (const Element* has = parameter(controller, {(at + ".has_jerk_limits").c_str()});
+        is_true(has))
+      name(has, "limits of the jerk are not kept");
     const auto fastest = positive(parameter(controller, {(at + ".max_velocity").c_str()}));
     const Element* slowest = parameter(controller, {(at + ".min_velocity").c_str()});
     const auto backwards = positive(slowest);
-    if (fastest && backwards && std::abs(*fastest - *backwards) > 1e-9) name(slowest, "min_velocity is not kept: it is as fast both ways as max_velocity says");
+    if (fastest && backwards && std::abs(*fastest - *backwards) > 1e-9)
+      name(slowest, "min_velocity is not kept: it is as fast both ways as max_velocity says");
   }
-  const auto left = positive(parameter(controller, {"left_wheel_radius_multiplier"})), right = positive(parameter(controller, {"right_wheel_radius_multiplier"}));
-  if (left.value_or(1.0) != right.value_or(1.0)) name(parameter(controller, {"right_wheel_radius_multiplier"}), "the right wheels have the radius of the left ones");
+  const auto left = positive(parameter(controller, {"left_wheel_radius_multiplier"})),
+             right = positive(parameter(controller, {"right_wheel_radius_multiplier"}));
+  if (left.value_or(1.0) != right.value_or(1.0))
+    name(parameter(controller, {"right_wheel_radius_multiplier"}),
+         "the right wheels have the radius of the left ones");
 }
 
 // ---- Files.
@@ -299,19 +353,25 @@ std::string trimmed_package_path(const std::string& path) {
   return share == std::string::npos ? "" : "package://" + path.substr(share + 7);
 }
 
-bool is_yaml(const fs::path& path) { return path.extension() == ".yaml" || path.extension() == ".yml"; }
+bool is_yaml(const fs::path& path) {
+  return path.extension() == ".yaml" || path.extension() == ".yml";
+}
 
 // The folders of parameters in a package.
 void add_parameter_files(const fs::path& package, std::vector<std::string>& files) {
   std::vector<fs::path> found;
-  for (const char* name : {"config", "configs", "params", "param", "control", "controllers", "yaml"}) {
+  for (const char* name :
+       {"config", "configs", "params", "param", "control", "controllers", "yaml"}) {
     std::error_code error;
     size_t looked = 0;
-    for (auto at = fs::recursive_directory_iterator(package / name, fs::directory_options::skip_permission_denied, error);
-         !error && at != fs::recursive_directory_iterator() && ++looked < kMostFiles; at.increment(error)) {
+    for (auto at = fs::recursive_directory_iterator(
+             package / name, fs::directory_options::skip_permission_denied, error);
+         !error && at != fs::recursive_directory_iterator() && ++looked < kMostFiles;
+         at.increment(error)) {
       if (at.depth() > 2) at.disable_recursion_pending();
       std::error_code none;
-      if (is_yaml(at->path()) && at->is_regular_file(none) && at->file_size(none) <= kLargestFile) found.push_back(at->path());
+      if (is_yaml(at->path()) && at->is_regular_file(none) && at->file_size(none) <= kLargestFile)
+        found.push_back(at->path());
     }
   }
   std::sort(found.begin(), found.end());
@@ -326,7 +386,10 @@ std::vector<std::string> files_beside(const std::string& from) {
   fs::path package = fs::path(from).parent_path();
   std::error_code error;
   constexpr int kHighest = 5;
-  for (int up = 0; up < kHighest && package.has_relative_path() && !fs::exists(package / "package.xml", error); ++up) package = package.parent_path();
+  for (int up = 0;
+       up < kHighest && package.has_relative_path() && !fs::exists(package / "package.xml", error);
+       ++up)
+    package = package.parent_path();
   if (!fs::exists(package / "package.xml", error)) {
     add_parameter_files(fs::path(from).parent_path(), files);
     add_parameter_files(fs::path(from).parent_path().parent_path(), files);
@@ -334,38 +397,50 @@ std::vector<std::string> files_beside(const std::string& from) {
   }
   add_parameter_files(package, files);
   std::vector<fs::path> beside;
-  for (const auto& entry : fs::directory_iterator(package.parent_path(), fs::directory_options::skip_permission_denied, error)) {
+  for (const auto& entry : fs::directory_iterator(
+           package.parent_path(), fs::directory_options::skip_permission_denied, error)) {
     if (beside.size() >= kMostFolders) break;
-    if (entry.path() != package && fs::exists(entry.path() / "package.xml", error)) beside.push_back(entry.path());
+    if (entry.path() != package && fs::exists(entry.path() / "package.xml", error))
+      beside.push_back(entry.path());
   }
   std::sort(beside.begin(), beside.end());
   for (const fs::path& folder : beside) add_parameter_files(folder, files);
   return files;
 }
 
-std::vector<std::string> named_files(const std::vector<const Element*>& plugins, const std::vector<std::string>& beside, const std::string& where, ReadContext& context) {
+std::vector<std::string> named_files(const std::vector<const Element*>& plugins,
+                                     const std::vector<std::string>& beside,
+                                     const std::string& where, ReadContext& context) {
   std::vector<std::string> files;
   for (const Element* plugin : plugins) {
     if (kind_of(*plugin).does != PluginKind::Does::control) continue;
     for (const Element* written : plugin->all("parameters")) {
       auto path = context.resources.find(written->text, written->source.file);
-      if (!path) path = context.resources.find(trimmed_package_path(written->text), written->source.file);
-      const auto same_name = [&](const std::string& file) { return fs::path(file).filename() == fs::path(written->text).filename(); };
+      if (!path)
+        path = context.resources.find(trimmed_package_path(written->text), written->source.file);
+      const auto same_name = [&](const std::string& file) {
+        return fs::path(file).filename() == fs::path(written->text).filename();
+      };
       const auto match = std::find_if(beside.begin(), beside.end(), same_name);
       if (!path && match != beside.end()) path = *match;
-      if (path) files.push_back(*path);
-      else context.findings.error(written->source, where, "the controllers' file '" + written->text + "' " + context.resources.why_not(written->text, written->source.file));
+      if (path)
+        files.push_back(*path);
+      else
+        context.findings.error(written->source, where,
+                               "the controllers' file '" + written->text + "' " +
+                                   context.resources.why_not(written->text, written->source.file));
     }
   }
   return files;
 }
 
-std::unique_ptr<Element> read_yaml(const std::string& path, bool named, const std::string& where, ReadContext& context) {
+std::unique_ptr<Element> read_yaml(const std::string& path, bool named, const std::string& where,
+                                   ReadContext& context) {
   try {
     const std::string text = read_text_file(path, kLargestFile);
     if (text.find("ontroller") == std::string::npos) return nullptr;
     return parse_yaml(text, path);
-  } catch (const InputError& error) {    // a file beside may be anything
+  } catch (const InputError& error) {  // a file beside may be anything
     if (named) context.findings.error(error.source(), where, error.message());
     return nullptr;
   }
@@ -373,10 +448,14 @@ std::unique_ptr<Element> read_yaml(const std::string& path, bool named, const st
 
 }  // namespace
 
-ControllersDrive drive_from_controllers(const Element& model_element, const std::vector<const Element*>& plugins, const Model& model,
-                                        const std::string& where, ReadContext& context) {
+ControllersDrive drive_from_controllers(const Element& model_element,
+                                        const std::vector<const Element*>& plugins,
+                                        const Model& model, const std::string& where,
+                                        ReadContext& context) {
   const bool controlled = model_element.has("transmission") || model_element.has("ros2_control") ||
-                          std::any_of(plugins.begin(), plugins.end(), [](const Element* each) { return kind_of(*each).does == PluginKind::Does::control; });
+                          std::any_of(plugins.begin(), plugins.end(), [](const Element* each) {
+                            return kind_of(*each).does == PluginKind::Does::control;
+                          });
   if (!controlled) return {};
   const std::vector<std::string> beside = files_beside(model_element.source.file);
   const std::vector<std::string> named = named_files(plugins, beside, where, context);
@@ -386,13 +465,17 @@ ControllersDrive drive_from_controllers(const Element& model_element, const std:
     ControllersDrive result;
     for (const Controller& each : controllers_in(*file)) {
       if (is_named && !known_type(each.type)) {
-        context.findings.unsupported(each.source, where, "controllers of type '" + each.type + "' are not known; '" + each.name + "' does nothing");
+        context.findings.unsupported(each.source, where,
+                                     "controllers of type '" + each.type + "' are not known; '" +
+                                         each.name + "' does nothing");
       }
       if (result.drive) continue;
       try {
         result.drive = drive_of(each, model);
       } catch (const InputError& error) {
-        if (is_named) context.findings.error(error.source(), where, "controller '" + each.name + "': " + error.message());
+        if (is_named)
+          context.findings.error(error.source(), where,
+                                 "controller '" + each.name + "': " + error.message());
         result.drive.reset();
       }
       if (!result.drive) continue;
@@ -421,7 +504,8 @@ std::vector<std::string> controlled_joints(const Element& model_element) {
     if (interface.find("elocity") != std::string::npos) by_velocity.push_back(*name);
   };
   for (const Element* transmission : model_element.all("transmission")) {
-    for (const Element* joint : transmission->all("joint")) note(*joint, joint->string("hardwareInterface", ""));
+    for (const Element* joint : transmission->all("joint"))
+      note(*joint, joint->string("hardwareInterface", ""));
   }
   for (const Element* system : model_element.all("ros2_control")) {
     for (const Element* joint : system->all("joint")) {

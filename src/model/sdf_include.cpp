@@ -17,16 +17,24 @@ std::string relative_to(const Element& owner) {
 }
 
 SdfVersion SdfReader::version_of(const Element& root) {
-  if (root.name == "gazebo") root.fail("this is the format of Gazebo before 1.0; Ruedo reads SDF 1.4 to 1.12 (gz sdf -p converts it)");
+  if (root.name == "gazebo")
+    root.fail(
+        "this is the format of Gazebo before 1.0; Ruedo reads SDF 1.4 to 1.12 (gz sdf -p converts "
+        "it)");
   if (root.name != "sdf") root.fail("is no SDF: the root element is not <sdf>");
   const std::string* written = root.attribute("version");
-  if (!written) root.fail("has no version; the attribute version is required, as in version=\"1.9\"");
+  if (!written)
+    root.fail("has no version; the attribute version is required, as in version=\"1.9\"");
   const auto version = SdfVersion::parse(*written);
   if (!version) root.fail("version '" + *written + "' is no version; allowed are 1.4 to 1.12");
-  if (*version < SdfVersion{1, 3}) root.fail("version '" + *written + "' is too old; allowed are 1.4 to 1.12");
-  if (version->major > 1) root.fail("version '" + *written + "' is not known; allowed are 1.4 to 1.12");
+  if (*version < SdfVersion{1, 3})
+    root.fail("version '" + *written + "' is too old; allowed are 1.4 to 1.12");
+  if (version->major > 1)
+    root.fail("version '" + *written + "' is not known; allowed are 1.4 to 1.12");
   if (*version > SdfVersion{1, 12}) {
-    context_.findings.unsupported(root.source, "sdf", "version " + *written + " is newer than 1.12; what it adds is left out");
+    context_.findings.unsupported(
+        root.source, "sdf",
+        "version " + *written + " is newer than 1.12; what it adds is left out");
   }
   return *version;
 }
@@ -37,7 +45,8 @@ void SdfReader::enter(const std::string& path, const Element& asker) {
     for (auto at = std::find(files_.begin(), files_.end(), path); at != files_.end(); ++at) {
       circle += std::filesystem::path(*at).filename().string() + " includes ";
     }
-    asker.fail("an include that never ends: " + circle + std::filesystem::path(path).filename().string());
+    asker.fail("an include that never ends: " + circle +
+               std::filesystem::path(path).filename().string());
   }
   files_.push_back(path);
 }
@@ -51,7 +60,7 @@ SdfReader::Included SdfReader::read_file(const std::string& path, const Element&
   Included result;
   result.document = context_.documents.read(path);
   if (is_xacro(path, result.document.get())) result.document = expand_xacro(path, context_);
-  std::error_code none;    // it says which file of its folder is the model's
+  std::error_code none;  // it says which file of its folder is the model's
   const auto config = std::filesystem::path(path).parent_path() / "model.config";
   if (std::filesystem::is_regular_file(config, none)) context_.documents.note(config.string());
   if (result.document->name == "robot") {
@@ -76,15 +85,19 @@ SdfReader::Included SdfReader::read_file(const std::string& path, const Element&
       result.name = required_name(*child);
       break;
     }
-    if (child->name == "world") child->fail("is a world; only models, lights and actors can be included");
+    if (child->name == "world")
+      child->fail("is a world; only models, lights and actors can be included");
   }
   if (result.name.empty()) result.document->fail("holds no <model>, <light> or <actor>");
   leave();
   return cache_[path] = result;
 }
 
-// Reads the model again with what <include> says beside its own elements: static, plugins, sensors, ruedo:.
-std::shared_ptr<const ScopedModel> SdfReader::read_overridden(const Element& model, const Element& include, SdfVersion version) {
+// Reads the model again with what <include> says beside its own elements: static, plugins, sensors,
+// ruedo:.
+std::shared_ptr<const ScopedModel> SdfReader::read_overridden(const Element& model,
+                                                              const Element& include,
+                                                              SdfVersion version) {
   const auto copy = model.clone();
   const auto remove = [&](const std::string& name) {
     std::erase_if(copy->children, [&](const auto& child) { return child->name == name; });
@@ -104,40 +117,57 @@ std::shared_ptr<const ScopedModel> SdfReader::read_overridden(const Element& mod
   return read_model(*copy, version);
 }
 
-std::optional<SdfReader::Included> SdfReader::include(const Element& element, const std::string& where) {
-  report_other_children(element, {"uri", "name", "pose", "static", "placement_frame", "plugin", "sensor", "ruedo:drive", "ruedo:joints", "ruedo:odometry", "ruedo:path"},
+std::optional<SdfReader::Included> SdfReader::include(const Element& element,
+                                                      const std::string& where) {
+  report_other_children(element,
+                        {"uri", "name", "pose", "static", "placement_frame", "plugin", "sensor",
+                         "ruedo:drive", "ruedo:joints", "ruedo:odometry", "ruedo:path"},
                         {"allow_auto_disable", "enable_wind"}, where, context_.findings);
   if (const Element* changes = element.child("experimental:params")) {
-    context_.findings.unsupported(changes->source, where, "<experimental:params> is not supported: the model is included as it is");
+    context_.findings.unsupported(
+        changes->source, where,
+        "<experimental:params> is not supported: the model is included as it is");
   }
   const Element* uri = element.child("uri");
   if (!uri || uri->text.empty()) element.fail("has no <uri>");
   const auto path = context_.resources.find_model(uri->text, element.source.file);
   if (!path) {
-    if (uri->text.rfind("https://fuel.", 0) == 0 || uri->text.rfind("http://fuel.", 0) == 0) {    // one text, so that they are one list
-      context_.findings.error(element.source, where + " " + uri->text, "models of Fuel that are not here; the world goes on without them. `gz fuel download -u URI` fetches each");
+    if (uri->text.rfind("https://fuel.", 0) == 0 ||
+        uri->text.rfind("http://fuel.", 0) == 0) {  // one text, so that they are one list
+      context_.findings.error(element.source, where + " " + uri->text,
+                              "models of Fuel that are not here; the world goes on without them. "
+                              "`gz fuel download -u URI` fetches each");
       return std::nullopt;
     }
-    context_.findings.error(element.source, where, "'" + uri->text + "' " + context_.resources.why_not(uri->text, element.source.file) + "; the world goes on without it");
+    context_.findings.error(element.source, where,
+                            "'" + uri->text + "' " +
+                                context_.resources.why_not(uri->text, element.source.file) +
+                                "; the world goes on without it");
     return std::nullopt;
   }
   Included result = read_file(*path, element);
-  const bool overridden = std::any_of(element.children.begin(), element.children.end(), [](const auto& child) {
-    return child->name == "static" || child->name == "plugin" || child->name == "sensor" || child->name.rfind("ruedo:", 0) == 0;
-  });
+  const bool overridden =
+      std::any_of(element.children.begin(), element.children.end(), [](const auto& child) {
+        return child->name == "static" || child->name == "plugin" || child->name == "sensor" ||
+               child->name.rfind("ruedo:", 0) == 0;
+      });
   if (overridden && result.model) {
     // <static> alone, with the value that the model has: nothing to read again.
-    const bool only_static = element.has("static") && !element.has("plugin") && !element.has("sensor") &&
-                             element.boolean("static", false) == result.model->model->is_static &&
-                             std::none_of(element.children.begin(), element.children.end(),
-                                          [](const auto& child) { return child->name.rfind("ruedo:", 0) == 0; });
+    const bool only_static =
+        element.has("static") && !element.has("plugin") && !element.has("sensor") &&
+        element.boolean("static", false) == result.model->model->is_static &&
+        std::none_of(element.children.begin(), element.children.end(),
+                     [](const auto& child) { return child->name.rfind("ruedo:", 0) == 0; });
     if (!only_static) {
       enter(*path, element);
       // Equal overrides (a fleet's) share one model, too.
       std::string key = *path;
       for (const auto& child : element.children) {
-        if (child->name == "static") key += "\nstatic " + child->text;
-        else if (child->name == "plugin" || child->name == "sensor" || child->name.rfind("ruedo:", 0) == 0) key += "\n" + child->source.str();
+        if (child->name == "static")
+          key += "\nstatic " + child->text;
+        else if (child->name == "plugin" || child->name == "sensor" ||
+                 child->name.rfind("ruedo:", 0) == 0)
+          key += "\n" + child->source.str();
       }
       if (const auto known = cache_.find(key); known != cache_.end()) {
         result = known->second;
@@ -159,7 +189,8 @@ std::optional<SdfReader::Included> SdfReader::include(const Element& element, co
       placed->relative_to = relative_to(element);
     }
     placed->placement_frame = element.string("placement_frame", result.model->placement_frame);
-    if (element.has("placement_frame") && !element.has("pose")) element.child("placement_frame")->fail("needs a <pose> beside it");
+    if (element.has("placement_frame") && !element.has("pose"))
+      element.child("placement_frame")->fail("needs a <pose> beside it");
     result.model = std::move(placed);
   }
   return result;

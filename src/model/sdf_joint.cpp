@@ -9,20 +9,29 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-JointAxis read_axis(const Element& element, SdfVersion version, const Pose& X_MJ, FrameGraph& frames, const Joint& joint,
-                    const std::string& where, ReadContext& context) {
-  report_other_children(element, {"xyz", "limit", "dynamics", "use_parent_model_frame", "mimic", "ruedo:position_gain", "ruedo:rate_gain"}, {"initial_position"}, where, context.findings);
-  if (const Element* start = element.child("initial_position"); start && start->as_number(Allowed::any(quantity::kLength)) != 0.0) {
-    context.findings.unsupported(start->source, where, "<initial_position> is not supported: the joint begins at 0");
+JointAxis read_axis(const Element& element, SdfVersion version, const Pose& X_MJ,
+                    FrameGraph& frames, const Joint& joint, const std::string& where,
+                    ReadContext& context) {
+  report_other_children(element,
+                        {"xyz", "limit", "dynamics", "use_parent_model_frame", "mimic",
+                         "ruedo:position_gain", "ruedo:rate_gain"},
+                        {"initial_position"}, where, context.findings);
+  if (const Element* start = element.child("initial_position");
+      start && start->as_number(Allowed::any(quantity::kLength)) != 0.0) {
+    context.findings.unsupported(start->source, where,
+                                 "<initial_position> is not supported: the joint begins at 0");
   }
   JointAxis axis;
   Vec3 xyz = element.vector3("xyz", Vec3::UnitZ(), Allowed::any(quantity::kFactor));
-  if (!(xyz.norm() > 1e-9)) element.child("xyz")->fail("'" + element.child("xyz")->text + "' is not allowed; an axis is not zero");
+  if (!(xyz.norm() > 1e-9))
+    element.child("xyz")->fail("'" + element.child("xyz")->text +
+                               "' is not allowed; an axis is not zero");
   xyz.normalize();
   const Element* written = element.child("xyz");
   const std::string* frame = written ? written->attribute("expressed_in") : nullptr;
   // Before SDF 1.5 an axis was written in the model's frame; 1.5 and 1.6 have a switch for that.
-  const bool in_model = version < SdfVersion{1, 5} || element.boolean("use_parent_model_frame", false);
+  const bool in_model =
+      version < SdfVersion{1, 5} || element.boolean("use_parent_model_frame", false);
   if (frame && !frame->empty()) {
     xyz = X_MJ.rotation.conjugate() * (frames.pose(*frame, element).rotation * xyz);
   } else if (in_model) {
@@ -37,20 +46,27 @@ JointAxis read_axis(const Element& element, SdfVersion version, const Pose& X_MJ
   axis.upper = limit("limit/upper", kInfinity);
   if (joint.type == JointType::continuous) axis.lower = -kInfinity, axis.upper = kInfinity;
   if (axis.lower > axis.upper) {
-    context.findings.repaired(element.child("limit")->source, where, "the lower limit " + shown(axis.lower) + " is above the upper limit " +
-                                                                         shown(axis.upper) + "; they are taken the other way round");
+    context.findings.repaired(element.child("limit")->source, where,
+                              "the lower limit " + shown(axis.lower) +
+                                  " is above the upper limit " + shown(axis.upper) +
+                                  "; they are taken the other way round");
     std::swap(axis.lower, axis.upper);
   }
   // Negative: no limit.
-  const double effort = limit("limit/effort", kInfinity), velocity = limit("limit/velocity", kInfinity);
+  const double effort = limit("limit/effort", kInfinity),
+               velocity = limit("limit/velocity", kInfinity);
   axis.effort = effort < 0 ? kInfinity : effort;
   axis.velocity = velocity < 0 ? kInfinity : velocity;
   axis.damping = element.number("dynamics/damping", 0, Allowed::not_negative(quantity::kDamping));
   axis.friction = element.number("dynamics/friction", 0, Allowed::not_negative(quantity::kDamping));
-  axis.spring_stiffness = std::max(0.0, element.number("dynamics/spring_stiffness", 0, Allowed::any(quantity::kDamping)));
-  axis.spring_reference = element.number("dynamics/spring_reference", 0, Allowed::any(quantity::kAngle));
-  axis.position_gain = element.number("ruedo:position_gain", axis.position_gain, Allowed::positive(quantity::kFactor));
-  axis.rate_gain = element.number("ruedo:rate_gain", axis.rate_gain, Allowed::positive(quantity::kDamping).or_infinite());
+  axis.spring_stiffness = std::max(
+      0.0, element.number("dynamics/spring_stiffness", 0, Allowed::any(quantity::kDamping)));
+  axis.spring_reference =
+      element.number("dynamics/spring_reference", 0, Allowed::any(quantity::kAngle));
+  axis.position_gain = element.number("ruedo:position_gain", axis.position_gain,
+                                      Allowed::positive(quantity::kFactor));
+  axis.rate_gain = element.number("ruedo:rate_gain", axis.rate_gain,
+                                  Allowed::positive(quantity::kDamping).or_infinite());
   return axis;
 }
 
@@ -62,14 +78,19 @@ bool sets_anything(const Element& element) {
     }
     return element.text.find_first_of("123456789") != std::string::npos;
   }
-  return std::any_of(element.children.begin(), element.children.end(), [](const auto& child) { return sets_anything(*child); });
+  return std::any_of(element.children.begin(), element.children.end(),
+                     [](const auto& child) { return sets_anything(*child); });
 }
 
-// m/rad; right-handed threads are positive. <thread_pitch>, which SDF had before, is in rad/m and counts left-handed ones.
+// m/rad; right-handed threads are positive. <thread_pitch>, which SDF had before, is in rad/m and
+// counts left-handed ones.
 double read_advance(const Element& joint) {
-  if (joint.has("screw_thread_pitch")) return joint.number("screw_thread_pitch", 1.0, Allowed::any(quantity::kLength)) / (2.0 * M_PI);
+  if (joint.has("screw_thread_pitch"))
+    return joint.number("screw_thread_pitch", 1.0, Allowed::any(quantity::kLength)) / (2.0 * M_PI);
   const double turns = joint.number("thread_pitch", 1.0, Allowed::any(quantity::kFactor));
-  if (turns == 0.0) joint.child("thread_pitch")->fail("'0' is not allowed; a thread that never advances is a continuous joint");
+  if (turns == 0.0)
+    joint.child("thread_pitch")
+        ->fail("'0' is not allowed; a thread that never advances is a continuous joint");
   return -1.0 / turns;
 }
 
@@ -79,14 +100,19 @@ void read_mimic(const Element& element, const std::vector<Joint>& joints, Joint&
   const Element* mimic = element.child("axis/mimic");
   if (!mimic || joint.type == JointType::fixed || joint.type == JointType::ball) return;
   const std::string* written = mimic->attribute("joint");
-  if (!written || written->empty()) mimic->fail("needs the attribute joint, the name of the joint that it follows");
-  if (const std::string* axis = mimic->attribute("axis"); axis && *axis != "axis") mimic->fail("axis '" + *axis + "' is not allowed; a joint follows the first axis of another");
+  if (!written || written->empty())
+    mimic->fail("needs the attribute joint, the name of the joint that it follows");
+  if (const std::string* axis = mimic->attribute("axis"); axis && *axis != "axis")
+    mimic->fail("axis '" + *axis + "' is not allowed; a joint follows the first axis of another");
   const std::string name = dotted(*written);
-  const auto leader = std::find_if(joints.begin(), joints.end(), [&](const Joint& each) { return each.name == name; });
+  const auto leader = std::find_if(joints.begin(), joints.end(),
+                                   [&](const Joint& each) { return each.name == name; });
   if (leader == joints.end()) mimic->fail("joint '" + name + "' is none of the model's joints");
-  if (leader->type == JointType::fixed || leader->type == JointType::ball) mimic->fail("joint '" + name + "' has no position to follow");
+  if (leader->type == JointType::fixed || leader->type == JointType::ball)
+    mimic->fail("joint '" + name + "' has no position to follow");
   for (const Joint* each = &*leader;; each = &joints[static_cast<size_t>(each->leader)]) {
-    if (each == &joint) mimic->fail("joint '" + name + "' follows this one: a joint cannot follow itself");
+    if (each == &joint)
+      mimic->fail("joint '" + name + "' follows this one: a joint cannot follow itself");
     if (each->leader < 0) break;
   }
   joint.mimic_multiplier = mimic->number("multiplier", 1.0, Allowed::any(quantity::kFactor));
@@ -96,15 +122,20 @@ void read_mimic(const Element& element, const std::vector<Joint>& joints, Joint&
 }
 
 std::string joint_end(const Element& joint, const char* which) {
-  return joint.string(which, "").empty() ? joint.string(std::string(which) + "/link_name", "") : joint.string(which, "");
+  return joint.string(which, "").empty() ? joint.string(std::string(which) + "/link_name", "")
+                                         : joint.string(which, "");
 }
 
-Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames, const std::vector<Link>& links,
-                 const std::string& where, ReadContext& context) {
-  report_other_children(element, {"parent", "child", "pose", "axis", "axis2", "sensor", "thread_pitch", "screw_thread_pitch"},
-                        {"physics", "gearbox_ratio", "gearbox_reference_body"}, where, context.findings);
+Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
+                 const std::vector<Link>& links, const std::string& where, ReadContext& context) {
+  report_other_children(
+      element,
+      {"parent", "child", "pose", "axis", "axis2", "sensor", "thread_pitch", "screw_thread_pitch"},
+      {"physics", "gearbox_ratio", "gearbox_reference_body"}, where, context.findings);
   if (const Element* solver = element.child("physics"); solver && sets_anything(*solver)) {
-    context.findings.unsupported(solver->source, where, "<physics> of a joint is not supported: the solver's own settings hold");
+    context.findings.unsupported(
+        solver->source, where,
+        "<physics> of a joint is not supported: the solver's own settings hold");
   }
   Joint joint;
   joint.name = dotted(required_name(element));
@@ -112,9 +143,14 @@ Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
   const std::string* type = element.attribute("type");
   if (!type) element.fail("has no type");
   static const std::vector<std::pair<std::string, JointType>> kTypes = {
-      {"fixed", JointType::fixed},           {"revolute", JointType::revolute}, {"continuous", JointType::continuous},
-      {"prismatic", JointType::prismatic},   {"ball", JointType::ball},         {"universal", JointType::universal},
-      {"revolute2", JointType::universal},   {"screw", JointType::screw}};
+      {"fixed", JointType::fixed},
+      {"revolute", JointType::revolute},
+      {"continuous", JointType::continuous},
+      {"prismatic", JointType::prismatic},
+      {"ball", JointType::ball},
+      {"universal", JointType::universal},
+      {"revolute2", JointType::universal},
+      {"screw", JointType::screw}};
   bool known = false;
   for (const auto& [name, value] : kTypes) {
     if (*type == name) joint.type = value, known = true;
@@ -124,10 +160,14 @@ Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
       std::vector<std::string> names;
       for (const auto& each : kTypes) names.push_back(each.first);
       const std::string near = nearest_word(*type, names);
-      element.fail("type '" + *type + "' is not allowed; allowed are fixed, revolute, continuous, prismatic, ball, universal, screw" +
+      element.fail("type '" + *type +
+                   "' is not allowed; allowed are fixed, revolute, continuous, prismatic, ball, "
+                   "universal, screw" +
                    (near.empty() ? "" : "; did you mean '" + near + "'?"));
     }
-    context.findings.unsupported(element.source, where, "joints of type '" + *type + "' are not supported; this one is held fixed");
+    context.findings.unsupported(
+        element.source, where,
+        "joints of type '" + *type + "' are not supported; this one is held fixed");
   }
 
   const auto end = [&](const char* which) -> const Element& {
@@ -137,12 +177,14 @@ Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
     return *found;
   };
   const Element &parent = end("parent"), &child = end("child");
-  const std::string parent_name = joint_end(element, "parent"), child_name = joint_end(element, "child");
+  const std::string parent_name = joint_end(element, "parent"),
+                    child_name = joint_end(element, "child");
   if (child_name == "world") child.fail("'world' is not allowed as the child of a joint");
   joint.parent = parent_name == "world" ? -1 : frames.link(parent_name, parent);
   joint.child = frames.link(child_name, child);
   if (joint.child < 0) child.fail("'" + child_name + "' is not part of a link");
-  if (joint.parent < 0 && parent_name != "world") parent.fail("'" + parent_name + "' is not part of a link");
+  if (joint.parent < 0 && parent_name != "world")
+    parent.fail("'" + parent_name + "' is not part of a link");
   if (joint.parent == joint.child) {
     element.fail("joins the link '" + links[static_cast<size_t>(joint.child)].name + "' to itself");
   }
@@ -151,8 +193,9 @@ Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
   if (const Element* sensor = element.child("sensor")) {
     context.findings.unsupported(sensor->source, where, "sensors on joints are not supported");
   }
-  const bool needs_axis = joint.type == JointType::revolute || joint.type == JointType::continuous || joint.type == JointType::prismatic ||
-                          joint.type == JointType::screw;
+  const bool needs_axis = joint.type == JointType::revolute ||
+                          joint.type == JointType::continuous ||
+                          joint.type == JointType::prismatic || joint.type == JointType::screw;
   if (const Element* axis = element.child("axis")) {
     if (joint.type != JointType::fixed && joint.type != JointType::ball) {
       joint.axis = read_axis(*axis, version, joint.X_MJ, frames, joint, where + "/axis", context);
@@ -163,7 +206,8 @@ Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
   if (joint.type == JointType::screw) joint.advance = read_advance(element);
   if (joint.type == JointType::universal) {
     if (const Element* axis2 = element.child("axis2")) {
-      joint.axis2 = read_axis(*axis2, version, joint.X_MJ, frames, joint, where + "/axis2", context);
+      joint.axis2 =
+          read_axis(*axis2, version, joint.X_MJ, frames, joint, where + "/axis2", context);
     } else {
       joint.axis2.axis_in_J = Vec3::UnitX();
     }

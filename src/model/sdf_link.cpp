@@ -1,4 +1,5 @@
-// Links. Inertias that no body can have are replaced by those of a box as large as the collisions, and told.
+// Links. Inertias that no body can have are replaced by those of a box as large as the collisions,
+// and told.
 #include "model/sdf_link.h"
 
 #include <cmath>
@@ -16,28 +17,37 @@ namespace {
 // Of a surface, what changes how things move in Gazebo and does not here.
 void name_what_has_no_effect(const Element& surface, const std::string& where, Findings& findings) {
   const auto name = [&](const char* path, const std::string& text) {
-    findings.unsupported(surface.child(path)->source, where, "<" + surface.child(path)->name + "> is not supported: " + text);
+    findings.unsupported(surface.child(path)->source, where,
+                         "<" + surface.child(path)->name + "> is not supported: " + text);
   };
   constexpr const char* kMask = "contact/collide_bitmask";
   if (surface.has(kMask)) {
     const std::string mask = surface.string(kMask, "");
-    const bool all = mask.find_first_not_of("0x1fF") == std::string::npos && mask.find_first_of("1fF") != std::string::npos;
+    const bool all = mask.find_first_not_of("0x1fF") == std::string::npos &&
+                     mask.find_first_of("1fF") != std::string::npos;
     if (!all && mask != "65535") name(kMask, "the shape collides with everything");
   }
-  if (surface.boolean("contact/collide_without_contact", false)) name("contact/collide_without_contact", "the shape collides as others do");
+  if (surface.boolean("contact/collide_without_contact", false))
+    name("contact/collide_without_contact", "the shape collides as others do");
 }
 
 // Friction beside mu and mu2, and what the contact yields.
 void read_contact(const Element& surface, Surface& s) {
-  const Allowed friction = Allowed::not_negative(quantity::kFriction), direction = Allowed::any(quantity::kFactor),
-                length = Allowed::not_negative(quantity::kLength), contact = Allowed::not_negative(quantity::kContact);
-  s.friction_direction = surface.vector3("friction/ode/fdir1", surface.vector3("friction/bullet/fdir1", Vec3::Zero(), direction), direction);
+  const Allowed friction = Allowed::not_negative(quantity::kFriction),
+                direction = Allowed::any(quantity::kFactor),
+                length = Allowed::not_negative(quantity::kLength),
+                contact = Allowed::not_negative(quantity::kContact);
+  s.friction_direction =
+      surface.vector3("friction/ode/fdir1",
+                      surface.vector3("friction/bullet/fdir1", Vec3::Zero(), direction), direction);
   s.slip = surface.number("friction/ode/slip1", 0.0, friction);
   s.slip2 = surface.number("friction/ode/slip2", 0.0, friction);
   s.rolling = surface.number("friction/bullet/rolling_friction", 0.0, friction);
   if (const Element* torsional = surface.child("friction/torsional")) {
     s.torsional = torsional->number("coefficient", 0.0, friction);
-    s.patch_radius = torsional->boolean("use_patch_radius", true) ? torsional->number("patch_radius", 0.0, length) : 0.0;
+    s.patch_radius = torsional->boolean("use_patch_radius", true)
+                         ? torsional->number("patch_radius", 0.0, length)
+                         : 0.0;
     s.surface_radius = torsional->number("surface_radius", 0.0, length);
   }
   s.stiffness = surface.number("contact/ode/kp", 0.0, contact);
@@ -45,12 +55,17 @@ void read_contact(const Element& surface, Surface& s) {
 }
 
 Surface read_surface(const Element& surface, const std::string& where, ReadContext& context) {
-  report_other_children(surface, {"friction", "bounce", "ruedo:laser_reflectance", "ruedo:laser_mirror", "ruedo:acoustic_reflectance"},
+  report_other_children(surface,
+                        {"friction", "bounce", "ruedo:laser_reflectance", "ruedo:laser_mirror",
+                         "ruedo:acoustic_reflectance"},
                         {"contact", "soft_contact"}, where, context.findings);
   Surface s;
-  const Allowed part = Allowed::between(0, 1), friction = Allowed::not_negative(quantity::kFriction);
+  const Allowed part = Allowed::between(0, 1),
+                friction = Allowed::not_negative(quantity::kFriction);
   // gz-sim reads friction/ode; friction/bullet is what an author gave for Bullet alone.
-  const char* engine = !surface.has("friction/ode") && surface.has("friction/bullet") ? "friction/bullet/" : "friction/ode/";
+  const char* engine = !surface.has("friction/ode") && surface.has("friction/bullet")
+                           ? "friction/bullet/"
+                           : "friction/ode/";
   const std::string first = engine + std::string(engine[9] == 'b' ? "friction" : "mu");
   const std::string second = engine + std::string(engine[9] == 'b' ? "friction2" : "mu2");
   s.friction = surface.number(first, s.friction, friction);
@@ -64,52 +79,63 @@ Surface read_surface(const Element& surface, const std::string& where, ReadConte
   return s;
 }
 
-Collision read_collision(const Element& element, const Pose& X_LC, Geometry geometry, const std::string& where, ReadContext& context) {
-  report_other_children(element, {"pose", "geometry", "surface"}, {"laser_retro", "max_contacts", "density", "auto_inertia_params"},
-                        where, context.findings);
+Collision read_collision(const Element& element, const Pose& X_LC, Geometry geometry,
+                         const std::string& where, ReadContext& context) {
+  report_other_children(element, {"pose", "geometry", "surface"},
+                        {"laser_retro", "max_contacts", "density", "auto_inertia_params"}, where,
+                        context.findings);
   Collision c;
   c.name = required_name(element);
   c.X_LC = X_LC;
   c.geometry = std::move(geometry);
   if (element.number("laser_retro", 0.0, Allowed::any(quantity::kBrightness)) != 0.0) {
-    context.findings.unsupported(element.child("laser_retro")->source, where, "<laser_retro> is not supported: <ruedo:laser_reflectance> gives intensities");
+    context.findings.unsupported(
+        element.child("laser_retro")->source, where,
+        "<laser_retro> is not supported: <ruedo:laser_reflectance> gives intensities");
   }
-  if (const Element* surface = element.child("surface")) c.surface = read_surface(*surface, where, context);
+  if (const Element* surface = element.child("surface"))
+    c.surface = read_surface(*surface, where, context);
   c.source = element.source;
   return c;
 }
 
-Visual read_visual(const Element& element, const Pose& X_LV, Geometry geometry, const std::string& where, ReadContext& context) {
+Visual read_visual(const Element& element, const Pose& X_LV, Geometry geometry,
+                   const std::string& where, ReadContext& context) {
   report_other_children(element, {"pose", "geometry", "material", "transparency", "cast_shadows"},
-                        {"laser_retro", "meta", "visibility_flags", "plugin"}, where, context.findings);
+                        {"laser_retro", "meta", "visibility_flags", "plugin"}, where,
+                        context.findings);
   Visual v;
   v.name = required_name(element);
   v.X_LV = X_LV;
   v.geometry = std::move(geometry);
   if (const Element* material = element.child("material")) {
-    read_or_leave_out(where, "the material is left out", context.findings, [&] { v.material = read_material(*material, where, context); });
+    read_or_leave_out(where, "the material is left out", context.findings,
+                      [&] { v.material = read_material(*material, where, context); });
   }
   v.transparency = element.number("transparency", 0, Allowed::between(0, 1));
   v.cast_shadows = element.boolean("cast_shadows", true);
   return v;
 }
 
-constexpr double kLightest_kg = 1e-9;    // of less, an impulse would make any speed
+constexpr double kLightest_kg = 1e-9;  // of less, an impulse would make any speed
 
 // A moment of inertia; NaN where exporters wrote nan.
 double moment(const Element& inertia, const char* name, double fallback) {
   const std::string text = inertia.string(name, "");
-  if (text == "nan" || text == "-nan" || text == "NaN") return std::numeric_limits<double>::quiet_NaN();
+  if (text == "nan" || text == "-nan" || text == "NaN")
+    return std::numeric_limits<double>::quiet_NaN();
   return inertia.number(name, fallback, Allowed::any(quantity::kInertia));
 }
 
-// What is wrong with an inertia, "" when a body can have it. A thousandth is left for rounded figures.
+// What is wrong with an inertia, "" when a body can have it. A thousandth is left for rounded
+// figures.
 std::string inertia_fault(const Inertial& inertial) {
   if (!inertial.inertia.allFinite()) return "a moment of inertia is not a number";
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(inertial.inertia);
-  const Vec3 moments = solver.eigenvalues();    // ascending
+  const Vec3 moments = solver.eigenvalues();  // ascending
   if (!(moments[0] > 0)) return "the moments of inertia are not all positive";
-  if (moments[0] + moments[1] < moments[2] * (1 - 1e-3)) return "one moment of inertia is larger than the sum of the two others";
+  if (moments[0] + moments[1] < moments[2] * (1 - 1e-3))
+    return "one moment of inertia is larger than the sum of the two others";
   return "";
 }
 
@@ -130,25 +156,37 @@ Eigen::Matrix3d box_inertia(double mass, const Link& link, Vec3& size) {
   }
   size = box.isEmpty() ? Vec3(Vec3::Constant(0.1)) : Vec3(box.sizes().cwiseMax(0.01));
   const Vec3 s2 = size.cwiseProduct(size);
-  return Vec3(mass / 12 * (s2.y() + s2.z()), mass / 12 * (s2.x() + s2.z()), mass / 12 * (s2.x() + s2.y())).asDiagonal();
+  return Vec3(mass / 12 * (s2.y() + s2.z()), mass / 12 * (s2.x() + s2.z()),
+              mass / 12 * (s2.x() + s2.y()))
+      .asDiagonal();
 }
 
-// Volume, and the moments about the middle for a density of 1; nullopt: a shape of which they are not known.
+// Volume, and the moments about the middle for a density of 1; nullopt: a shape of which they are
+// not known.
 std::optional<std::pair<double, Vec3>> solid(const Geometry& geometry) {
   const double x = geometry.size.x(), y = geometry.size.y(), z = geometry.size.z();
-  const auto with = [](double volume, double xx, double yy, double zz) { return std::pair(volume, Vec3(volume * Vec3(xx, yy, zz))); };
+  const auto with = [](double volume, double xx, double yy, double zz) {
+    return std::pair(volume, Vec3(volume * Vec3(xx, yy, zz)));
+  };
   switch (geometry.shape) {
-    case Shape::box: return with(x * y * z, (y * y + z * z) / 12, (x * x + z * z) / 12, (x * x + y * y) / 12);
-    case Shape::sphere: return with(4.0 / 3 * M_PI * x * x * x, 0.4 * x * x, 0.4 * x * x, 0.4 * x * x);
-    case Shape::cylinder: return with(M_PI * x * x * y, x * x / 4 + y * y / 12, x * x / 4 + y * y / 12, x * x / 2);
-    case Shape::ellipsoid: return with(4.0 / 3 * M_PI * x * y * z, (y * y + z * z) / 5, (x * x + z * z) / 5, (x * x + y * y) / 5);
+    case Shape::box:
+      return with(x * y * z, (y * y + z * z) / 12, (x * x + z * z) / 12, (x * x + y * y) / 12);
+    case Shape::sphere:
+      return with(4.0 / 3 * M_PI * x * x * x, 0.4 * x * x, 0.4 * x * x, 0.4 * x * x);
+    case Shape::cylinder:
+      return with(M_PI * x * x * y, x * x / 4 + y * y / 12, x * x / 4 + y * y / 12, x * x / 2);
+    case Shape::ellipsoid:
+      return with(4.0 / 3 * M_PI * x * y * z, (y * y + z * z) / 5, (x * x + z * z) / 5,
+                  (x * x + y * y) / 5);
     default: return std::nullopt;
   }
 }
 
-// auto="true": mass, centre and moments of the collisions' solids (of SDF's default density, 1000 kg/m^3, where none is
-// written), scaled to <mass> if there is one. False when a shape is none of those that are known.
-bool computed_inertial(const Element& element, const Element& link_element, const Link& link, Inertial& inertial) {
+// auto="true": mass, centre and moments of the collisions' solids (of SDF's default density, 1000
+// kg/m^3, where none is written), scaled to <mass> if there is one. False when a shape is none of
+// those that are known.
+bool computed_inertial(const Element& element, const Element& link_element, const Link& link,
+                       Inertial& inertial) {
   const std::vector<const Element*> written = link_element.all("collision");
   const double usual = element.number("density", 1000.0, Allowed::positive(quantity::kDensity));
   double mass = 0;
@@ -159,14 +197,16 @@ bool computed_inertial(const Element& element, const Element& link_element, cons
     if (!shape) return false;
     double density = usual;
     for (const Element* each : written) {
-      if (required_name(*each) == c.name) density = each->number("density", usual, Allowed::positive(quantity::kDensity));
+      if (required_name(*each) == c.name)
+        density = each->number("density", usual, Allowed::positive(quantity::kDensity));
     }
     const double m = density * shape->first;
     const Vec3 at = c.X_LC.translation;
     const Eigen::Matrix3d R = c.X_LC.rotation.toRotationMatrix();
     mass += m;
     moment += m * at;
-    about_link += R * Vec3(density * shape->second).asDiagonal() * R.transpose() + m * (at.squaredNorm() * Eigen::Matrix3d::Identity() - at * at.transpose());
+    about_link += R * Vec3(density * shape->second).asDiagonal() * R.transpose() +
+                  m * (at.squaredNorm() * Eigen::Matrix3d::Identity() - at * at.transpose());
   }
   if (!(mass >= kLightest_kg && mass <= quantity::kMass.most)) return false;
   const Vec3 centre = moment / mass;
@@ -174,18 +214,25 @@ bool computed_inertial(const Element& element, const Element& link_element, cons
   inertial.mass = mass * scale;
   inertial.X_LI = Pose{};
   inertial.X_LI.translation = centre;
-  inertial.inertia = scale * (about_link - mass * (centre.squaredNorm() * Eigen::Matrix3d::Identity() - centre * centre.transpose()));
+  inertial.inertia =
+      scale * (about_link - mass * (centre.squaredNorm() * Eigen::Matrix3d::Identity() -
+                                    centre * centre.transpose()));
   return true;
 }
 
-Inertial read_inertial(const Element& element, const Element& link_element, const Link& link, const Pose& X_LI, const std::string& where, ReadContext& context) {
-  report_other_children(element, {"pose", "mass", "inertia", "density"}, {"auto_inertia_params"}, where, context.findings);
+Inertial read_inertial(const Element& element, const Element& link_element, const Link& link,
+                       const Pose& X_LI, const std::string& where, ReadContext& context) {
+  report_other_children(element, {"pose", "mass", "inertia", "density"}, {"auto_inertia_params"},
+                        where, context.findings);
   Inertial inertial;
   inertial.X_LI = X_LI;
   inertial.mass = element.number("mass", 1.0, Allowed::any(quantity::kMass));
   if (!(inertial.mass >= kLightest_kg)) {
-    context.findings.repaired(element.child("mass")->source, where, "the mass " + shown(inertial.mass) + " kg is " +
-                                                                        (inertial.mass > 0 ? "below " + shown(kLightest_kg) + " kg" : "not above 0") + "; it is taken as 1 kg");
+    context.findings.repaired(
+        element.child("mass")->source, where,
+        "the mass " + shown(inertial.mass) + " kg is " +
+            (inertial.mass > 0 ? "below " + shown(kLightest_kg) + " kg" : "not above 0") +
+            "; it is taken as 1 kg");
     inertial.mass = 1.0;
   }
   const std::string* automatic = element.attribute("auto");
@@ -193,18 +240,24 @@ Inertial read_inertial(const Element& element, const Element& link_element, cons
     if (computed_inertial(element, link_element, link, inertial)) return inertial;
     Vec3 size;
     inertial.inertia = box_inertia(inertial.mass, link, size);
-    context.findings.repaired(element.source, where, "auto=\"true\" is not computed from the shapes; the inertia is that of a box of " + in_words(size));
+    context.findings.repaired(
+        element.source, where,
+        "auto=\"true\" is not computed from the shapes; the inertia is that of a box of " +
+            in_words(size));
     return inertial;
   }
   if (const Element* i = element.child("inertia")) {
-    report_other_children(*i, {"ixx", "iyy", "izz", "ixy", "ixz", "iyz"}, {}, where, context.findings);
+    report_other_children(*i, {"ixx", "iyy", "izz", "ixy", "ixz", "iyz"}, {}, where,
+                          context.findings);
     const double ixx = moment(*i, "ixx", 1), iyy = moment(*i, "iyy", 1), izz = moment(*i, "izz", 1);
     const double ixy = moment(*i, "ixy", 0), ixz = moment(*i, "ixz", 0), iyz = moment(*i, "iyz", 0);
     inertial.inertia << ixx, ixy, ixz, ixy, iyy, iyz, ixz, iyz, izz;
     if (const std::string fault = inertia_fault(inertial); !fault.empty()) {
       Vec3 size;
       inertial.inertia = box_inertia(inertial.mass, link, size);
-      context.findings.repaired(i->source, where, fault + "; the inertia of a box of " + in_words(size) + " is taken instead");
+      context.findings.repaired(
+          i->source, where,
+          fault + "; the inertia of a box of " + in_words(size) + " is taken instead");
     }
   }
   return inertial;
@@ -212,31 +265,43 @@ Inertial read_inertial(const Element& element, const Element& link_element, cons
 
 }  // namespace
 
-Light read_light(const Element& element, const Pose& pose, const std::string& where, ReadContext& context) {
-  report_other_children(element, {"pose", "diffuse", "specular", "attenuation", "direction", "spot", "intensity", "cast_shadows", "light_on"},
+Light read_light(const Element& element, const Pose& pose, const std::string& where,
+                 ReadContext& context) {
+  report_other_children(element,
+                        {"pose", "diffuse", "specular", "attenuation", "direction", "spot",
+                         "intensity", "cast_shadows", "light_on"},
                         {"visualize"}, where, context.findings);
   Light light;
   light.name = required_name(element);
   const std::string* type = element.attribute("type");
   const std::string kind = type ? *type : "point";
-  if (kind == "directional") light.type = Light::Type::directional;
-  else if (kind == "spot") light.type = Light::Type::spot;
-  else if (kind != "point") element.fail("type '" + kind + "' is not allowed; allowed are directional, point, spot");
+  if (kind == "directional")
+    light.type = Light::Type::directional;
+  else if (kind == "spot")
+    light.type = Light::Type::spot;
+  else if (kind != "point")
+    element.fail("type '" + kind + "' is not allowed; allowed are directional, point, spot");
   light.pose = pose;
   light.direction = element.vector3("direction", -Vec3::UnitZ(), Allowed::any(quantity::kFactor));
-  if (!(light.direction.norm() > 1e-9)) element.child("direction")->fail("'" + element.child("direction")->text + "' is not allowed; a direction is not zero");
+  if (!(light.direction.norm() > 1e-9))
+    element.child("direction")
+        ->fail("'" + element.child("direction")->text +
+               "' is not allowed; a direction is not zero");
   light.direction.normalize();
   if (const Element* colour = element.child("diffuse")) light.diffuse = read_colour(*colour);
   if (const Element* colour = element.child("specular")) light.specular = read_colour(*colour);
-  const Allowed brightness = Allowed::not_negative(quantity::kBrightness), angle = Allowed::not_negative(quantity::kAngle);
-  light.range = element.number("attenuation/range", light.range, Allowed::not_negative(quantity::kRange));
+  const Allowed brightness = Allowed::not_negative(quantity::kBrightness),
+                angle = Allowed::not_negative(quantity::kAngle);
+  light.range =
+      element.number("attenuation/range", light.range, Allowed::not_negative(quantity::kRange));
   light.constant = element.number("attenuation/constant", light.constant, brightness);
   light.linear = element.number("attenuation/linear", light.linear, brightness);
   light.quadratic = element.number("attenuation/quadratic", light.quadratic, brightness);
   light.inner_angle = element.number("spot/inner_angle", 0, angle);
   light.outer_angle = element.number("spot/outer_angle", 0, angle);
   light.falloff = element.number("spot/falloff", 0, brightness);
-  light.intensity = element.boolean("light_on", true) ? element.number("intensity", 1, brightness) : 0.0;
+  light.intensity =
+      element.boolean("light_on", true) ? element.number("intensity", 1, brightness) : 0.0;
   light.cast_shadows = element.boolean("cast_shadows", false);
   return light;
 }
@@ -255,28 +320,37 @@ SensorDescription read_sensor(const Element& element, int link, const Pose& X_LS
 
 void collect_plugins(const Element& element, std::vector<const Element*>& plugins) {
   for (const auto& child : element.children) {
-    if (child->name == "plugin") plugins.push_back(child.get());
-    else if (child->name == "link" || child->name == "sensor" || child->name == "visual" || child->name == "camera") {
+    if (child->name == "plugin")
+      plugins.push_back(child.get());
+    else if (child->name == "link" || child->name == "sensor" || child->name == "visual" ||
+             child->name == "camera") {
       collect_plugins(*child, plugins);
     }
   }
 }
 
-Link read_link(const Element& element, const PoseInLink& pose_in_link, const std::string& where, ReadContext& context,
-               int index, std::vector<SensorDescription>& sensors) {
-  report_other_children(element, {"pose", "inertial", "collision", "visual", "sensor", "light", "gravity", "kinematic"},
-                        {"self_collide", "enable_wind", "velocity_decay", "must_be_base_link", "plugin"}, where,
-                        context.findings);
+Link read_link(const Element& element, const PoseInLink& pose_in_link, const std::string& where,
+               ReadContext& context, int index, std::vector<SensorDescription>& sensors) {
+  report_other_children(
+      element,
+      {"pose", "inertial", "collision", "visual", "sensor", "light", "gravity", "kinematic"},
+      {"self_collide", "enable_wind", "velocity_decay", "must_be_base_link", "plugin"}, where,
+      context.findings);
   Link link;
   link.name = required_name(element);
   link.source = element.source;
   link.gravity = element.boolean("gravity", true);
   link.kinematic = element.boolean("kinematic", false);
-  if (const Element* decay = element.child("velocity_decay"); decay && (decay->number("linear", 0.0, Allowed::any(quantity::kDamping)) != 0.0 || decay->number("angular", 0.0, Allowed::any(quantity::kDamping)) != 0.0)) {
-    context.findings.unsupported(decay->source, where, "<velocity_decay> is not supported: nothing slows the link in the air");
+  if (const Element* decay = element.child("velocity_decay");
+      decay && (decay->number("linear", 0.0, Allowed::any(quantity::kDamping)) != 0.0 ||
+                decay->number("angular", 0.0, Allowed::any(quantity::kDamping)) != 0.0)) {
+    context.findings.unsupported(
+        decay->source, where,
+        "<velocity_decay> is not supported: nothing slows the link in the air");
   }
   if (element.boolean("self_collide", false)) {
-    context.findings.unsupported(element.child("self_collide")->source, where, "<self_collide> of a link is not supported; a model may have it");
+    context.findings.unsupported(element.child("self_collide")->source, where,
+                                 "<self_collide> of a link is not supported; a model may have it");
   }
   std::set<std::string> names;
   const auto unique = [&](const Element& child) {
@@ -291,14 +365,19 @@ Link read_link(const Element& element, const PoseInLink& pose_in_link, const std
     auto geometry = read_geometry(*shape, here, context);
     if (!geometry) return;
     const Pose pose = pose_in_link(child);
-    if (child.name == "collision") link.collisions.push_back(read_collision(child, pose, std::move(*geometry), here, context));
-    else link.visuals.push_back(read_visual(child, pose, std::move(*geometry), here, context));
+    if (child.name == "collision")
+      link.collisions.push_back(read_collision(child, pose, std::move(*geometry), here, context));
+    else
+      link.visuals.push_back(read_visual(child, pose, std::move(*geometry), here, context));
   };
   for (const auto& child : element.children) {
     if (child->name == "collision" || child->name == "visual") {
-      read_or_leave_out(where, "the shape is left out", context.findings, [&] { read_shape(*child); });
+      read_or_leave_out(where, "the shape is left out", context.findings,
+                        [&] { read_shape(*child); });
     } else if (child->name == "light") {
-      read_or_leave_out(where, "the light is left out", context.findings, [&] { link.lights.push_back(read_light(*child, pose_in_link(*child), where + "/light", context)); });
+      read_or_leave_out(where, "the light is left out", context.findings, [&] {
+        link.lights.push_back(read_light(*child, pose_in_link(*child), where + "/light", context));
+      });
     } else if (child->name == "sensor") {
       read_or_leave_out(where, "the sensor is left out", context.findings, [&] {
         unique(*child);
@@ -307,8 +386,10 @@ Link read_link(const Element& element, const PoseInLink& pose_in_link, const std
     }
   }
   if (const Element* inertial = element.child("inertial")) {
-    read_or_leave_out(where, "a mass of 1 kg is taken", context.findings,
-                      [&] { link.inertial = read_inertial(*inertial, element, link, pose_in_link(*inertial), where + "/inertial", context); });
+    read_or_leave_out(where, "a mass of 1 kg is taken", context.findings, [&] {
+      link.inertial = read_inertial(*inertial, element, link, pose_in_link(*inertial),
+                                    where + "/inertial", context);
+    });
   }
   return link;
 }

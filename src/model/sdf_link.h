@@ -1,4 +1,5 @@
-// <link> and what it holds: inertia, collisions, visuals, lights, sensors. And <light>, wherever it is.
+// <link> and what it holds: inertia, collisions, visuals, lights, sensors. And <light>, wherever it
+// is.
 #pragma once
 
 #include <functional>
@@ -14,11 +15,12 @@ namespace ruedo::model {
 using PoseInLink = std::function<Pose(const Element&)>;
 
 // The link without its X_ML; its sensors are appended to `sensors` with the index `link`.
-Link read_link(const Element& element, const PoseInLink& pose_in_link, const std::string& where, ReadContext& context,
-               int link, std::vector<SensorDescription>& sensors);
+Link read_link(const Element& element, const PoseInLink& pose_in_link, const std::string& where,
+               ReadContext& context, int link, std::vector<SensorDescription>& sensors);
 
 // A light at `pose`.
-Light read_light(const Element& element, const Pose& pose, const std::string& where, ReadContext& context);
+Light read_light(const Element& element, const Pose& pose, const std::string& where,
+                 ReadContext& context);
 
 // A sensor; its name as written, with "::" as ".".
 SensorDescription read_sensor(const Element& element, int link, const Pose& X_LS);

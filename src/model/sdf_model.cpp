@@ -10,7 +10,7 @@
 namespace ruedo::model {
 namespace {
 
-constexpr size_t kMaxLinks = 20'000;    // of one model: includes of includes cannot grow without end
+constexpr size_t kMaxLinks = 20'000;  // of one model: includes of includes cannot grow without end
 
 struct Nested {
   std::shared_ptr<const ScopedModel> scope;
@@ -35,7 +35,8 @@ Joint anchor(const std::string& name, int link, const Pose& X_MJ, const Source& 
 void append_nested(const Nested& nested, const Pose& X_MN, Model& into, Findings& findings) {
   const Model& from = *nested.scope->model;
   const std::string prefix = nested.merged ? "" : dotted(nested.name) + ".";
-  const int first_link = static_cast<int>(nested.first_link), first_joint = static_cast<int>(into.joints.size());
+  const int first_link = static_cast<int>(nested.first_link),
+            first_joint = static_cast<int>(into.joints.size());
   for (Link link : from.links) {
     link.name = prefix + link.name;
     link.X_ML = X_MN * link.X_ML;
@@ -57,12 +58,15 @@ void append_nested(const Nested& nested, const Pose& X_MN, Model& into, Findings
   into.commanded |= from.commanded;
   if (from.drive && !into.drive) {
     into.drive = from.drive;
-    for (auto* joints : {&into.drive->left_joints, &into.drive->right_joints, &into.drive->steer_joints}) {
+    for (auto* joints :
+         {&into.drive->left_joints, &into.drive->right_joints, &into.drive->steer_joints}) {
       for (int& joint : *joints) joint += first_joint;
     }
     into.drive->X_MBase = X_MN * into.drive->X_MBase;
   } else if (from.drive) {
-    findings.unsupported(from.source, "model " + into.name, "a second drive, of the nested model '" + from.name + "', is not supported: its wheels turn freely");
+    findings.unsupported(from.source, "model " + into.name,
+                         "a second drive, of the nested model '" + from.name +
+                             "', is not supported: its wheels turn freely");
   }
   if (from.path && !into.path && into.links.size() == from.links.size()) into.path = from.path;
 }
@@ -70,10 +74,13 @@ void append_nested(const Nested& nested, const Pose& X_MN, Model& into, Findings
 // Makes `canonical` link 0; every index follows.
 void bring_to_front(int canonical, ScopedModel& scope, Model& model) {
   if (canonical <= 0) return;
-  std::rotate(model.links.begin(), model.links.begin() + canonical, model.links.begin() + canonical + 1);
+  std::rotate(model.links.begin(), model.links.begin() + canonical,
+              model.links.begin() + canonical + 1);
   const auto moved = [&](int& link) {
-    if (link == canonical) link = 0;
-    else if (link >= 0 && link < canonical) ++link;
+    if (link == canonical)
+      link = 0;
+    else if (link >= 0 && link < canonical)
+      ++link;
   };
   for (Joint& joint : model.joints) moved(joint.parent), moved(joint.child);
   for (SensorDescription& sensor : model.sensors) moved(sensor.link);
@@ -82,21 +89,24 @@ void bring_to_front(int canonical, ScopedModel& scope, Model& model) {
 
 }  // namespace
 
-std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element, SdfVersion version) {
+std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
+                                                         SdfVersion version) {
   auto scope = std::make_shared<ScopedModel>();
   auto model = std::make_shared<Model>();
   model->name = required_name(element);
   const std::string where = "model " + model->name;
   report_other_children(element,
-                        {"link", "joint", "frame", "model", "include", "pose", "static", "self_collide", "plugin", "ruedo:drive",
-                         "ruedo:joints", "ruedo:odometry", "ruedo:path", "transmission", "ros2_control"},
+                        {"link", "joint", "frame", "model", "include", "pose", "static",
+                         "self_collide", "plugin", "ruedo:drive", "ruedo:joints", "ruedo:odometry",
+                         "ruedo:path", "transmission", "ros2_control"},
                         {"allow_auto_disable", "enable_wind"}, where, context_.findings);
   model->source = element.source;
   model->is_static = element.boolean("static", false);
   model->self_collide = element.boolean("self_collide", false);
   scope->pose = element.pose("pose");
   scope->relative_to = relative_to(element);
-  if (const std::string* frame = element.attribute("placement_frame")) scope->placement_frame = *frame;
+  if (const std::string* frame = element.attribute("placement_frame"))
+    scope->placement_frame = *frame;
 
   // First all names, then poses: frames may be written in any order.
   FrameGraph frames(where);
@@ -113,7 +123,7 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
     const auto is_taken = [&] { return child->name == "frame" && frames.has(node.name); };
     if (child->name == "link") {
       node.name = required_name(*child);
-      if (frames.has(node.name)) frames.add(std::move(node));    // throws
+      if (frames.has(node.name)) frames.add(std::move(node));  // throws
       node.pose = child->pose("pose");
       node.relative_to = relative_to(*child);
       node.link = static_cast<int>(link_count++);
@@ -138,7 +148,8 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
         part.name = required_name(*child);
       } else {
         auto included = include(*child, where + "/include");
-        if (included && !included->model) child->fail("is no model; a model can include models only");
+        if (included && !included->model)
+          child->fail("is no model; a model can include models only");
         if (included) part.scope = included->model, part.name = included->name;
         const std::string* merge = child->attribute("merge");
         part.merged = merge && (*merge == "true" || *merge == "1");
@@ -163,18 +174,24 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
     }
     if (is_taken()) child->fail("the name '" + node.name + "' is taken in " + where);
     frames.add(std::move(node));
-    if (link_count > kMaxLinks) throw TooLarge(child->source, "<" + child->name + ">: the model has more than " + std::to_string(kMaxLinks) + " links");
+    if (link_count > kMaxLinks)
+      throw TooLarge(child->source, "<" + child->name + ">: the model has more than " +
+                                        std::to_string(kMaxLinks) + " links");
   };
-  std::vector<const Element*> in_order;    // frames last: of two of one name the frame goes
+  std::vector<const Element*> in_order;  // frames last: of two of one name the frame goes
   for (const bool is_frame : {false, true}) {
     for (const auto& child : element.children) {
       if ((child->name == "frame") == is_frame) in_order.push_back(child.get());
     }
   }
   for (const Element* child : in_order) {
-    const size_t open_files = files_.size(), links_before = link_count, nested_before = nested.size();
-    const std::string what = child->name == "include" || child->name == "model" ? "part" : child->name;
-    if (read_or_leave_out(where, "the " + what + " is left out", context_.findings, [&] { read_part(child); })) continue;
+    const size_t open_files = files_.size(), links_before = link_count,
+                 nested_before = nested.size();
+    const std::string what =
+        child->name == "include" || child->name == "model" ? "part" : child->name;
+    if (read_or_leave_out(where, "the " + what + " is left out", context_.findings,
+                          [&] { read_part(child); }))
+      continue;
     files_.resize(open_files);
     link_count = links_before;
     nested.resize(nested_before);
@@ -201,11 +218,13 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
         return frame.empty() ? pose : X_ML.inverse() * (frames.pose(frame, owner) * pose);
       };
       const int index = static_cast<int>(model->links.size());
-      Link link = read_link(*child, in_link, where + "/link " + required_name(*child), context_, index, model->sensors);
+      Link link = read_link(*child, in_link, where + "/link " + required_name(*child), context_,
+                            index, model->sensors);
       link.name = dotted(link.name);
       link.X_ML = X_ML;
       model->links.push_back(std::move(link));
-    } else if (next_nested < nested.size() && (child->name == "model" || child->name == "include") &&
+    } else if (next_nested < nested.size() &&
+               (child->name == "model" || child->name == "include") &&
                model->links.size() == nested[next_nested].first_link) {
       const Nested& part = nested[next_nested];
       // A part that is missing left no entry: this one is told by whose element it is.
@@ -216,7 +235,8 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
       if (part.scope->model->is_static) {
         for (size_t i = 0; i < part.scope->model->links.size(); ++i) {
           const int link = static_cast<int>(part.first_link + i);
-          anchors.push_back(anchor(model->links[static_cast<size_t>(link)].name, link, model->links[static_cast<size_t>(link)].X_ML, child->source));
+          anchors.push_back(anchor(model->links[static_cast<size_t>(link)].name, link,
+                                   model->links[static_cast<size_t>(link)].X_ML, child->source));
         }
       } else {
         all_static = false;
@@ -239,8 +259,9 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
 
   // Every name's pose and link, for whoever nests or places this model.
   for (const std::string& name : frames.names()) {
-    read_or_leave_out(where, "the frame '" + name + "' is left out", context_.findings,
-                      [&] { scope->frames[name] = {frames.pose(name, element), frames.link(name, element)}; });
+    read_or_leave_out(where, "the frame '" + name + "' is left out", context_.findings, [&] {
+      scope->frames[name] = {frames.pose(name, element), frames.link(name, element)};
+    });
   }
   int canonical = first_own_link >= 0 ? first_own_link : 0;
   if (const std::string* name = element.attribute("canonical_link"); name && !name->empty()) {
@@ -254,7 +275,10 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
   make_sensor_names_unique(*model, where, context_.findings);
   read_drive_of(element, where, context_, *model);
   model->commanded |= element.has("ruedo:joints");
-  model->commanded &= !model->is_static && std::any_of(model->joints.begin(), model->joints.end(), [](const Joint& joint) { return joint.type != JointType::fixed; });
+  model->commanded &= !model->is_static && std::any_of(model->joints.begin(), model->joints.end(),
+                                                       [](const Joint& joint) {
+                                                         return joint.type != JointType::fixed;
+                                                       });
   if (const Element* path = element.child("ruedo:path")) {
     path->refuse_unknown({"ruedo:waypoint", "ruedo:loop"}, false);
     model->path = path->clone();
@@ -267,8 +291,9 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
   return scope;
 }
 
-void SdfReader::read_joints(const Element& element, SdfVersion version, FrameGraph& frames, const std::set<const Element*>& left_out,
-                            bool parts_missing, const std::string& where, Model& model) {
+void SdfReader::read_joints(const Element& element, SdfVersion version, FrameGraph& frames,
+                            const std::set<const Element*>& left_out, bool parts_missing,
+                            const std::string& where, Model& model) {
   for (const auto& child : element.children) {
     if (child->name != "joint" || left_out.count(child.get())) continue;
     const std::string name = required_name(*child), here = where + "/joint " + name;
@@ -276,21 +301,26 @@ void SdfReader::read_joints(const Element& element, SdfVersion version, FrameGra
       // What was not found may have held its links.
       const std::string parent = joint_end(*child, "parent"), end = joint_end(*child, "child");
       if ((parent != "world" && !frames.has(parent)) || !frames.has(end)) {
-        context_.findings.error(child->source, here, "it joins a link of a part that was not found; the joint is left out");
+        context_.findings.error(
+            child->source, here,
+            "it joins a link of a part that was not found; the joint is left out");
         frames.drop(name);
         continue;
       }
     }
-    const bool read = read_or_leave_out(here, "the joint is left out", context_.findings,
-                                        [&] { model.joints.push_back(read_joint(*child, version, frames, model.links, here, context_)); });
+    const bool read = read_or_leave_out(here, "the joint is left out", context_.findings, [&] {
+      model.joints.push_back(read_joint(*child, version, frames, model.links, here, context_));
+    });
     if (!read) frames.drop(name);
   }
   for (const auto& child : element.children) {
     if (child->name != "joint") continue;
     const std::string name = dotted(required_name(*child));
-    const auto joint = std::find_if(model.joints.begin(), model.joints.end(), [&](const Joint& each) { return each.name == name; });
+    const auto joint = std::find_if(model.joints.begin(), model.joints.end(),
+                                    [&](const Joint& each) { return each.name == name; });
     if (joint == model.joints.end()) continue;
-    read_or_leave_out(where + "/joint " + name, "the joint moves on its own", context_.findings, [&] { read_mimic(*child, model.joints, *joint); });
+    read_or_leave_out(where + "/joint " + name, "the joint moves on its own", context_.findings,
+                      [&] { read_mimic(*child, model.joints, *joint); });
   }
 }
 

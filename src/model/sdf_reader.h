@@ -1,7 +1,8 @@
-// SDF 1.3 to 1.12: worlds and models, includes, nested models, joints. The element tree in, models out.
+// SDF 1.3 to 1.12: worlds and models, includes, nested models, joints. The element tree in, models
+// out.
 //
-// What is wrong throws InputError; what can be gone on from is in the context's findings. One reader serves one
-// load; a file that is included a thousand times is read once.
+// What is wrong throws InputError; what can be gone on from is in the context's findings. One
+// reader serves one load; a file that is included a thousand times is read once.
 #pragma once
 
 #include <map>
@@ -33,12 +34,12 @@ class SdfReader {
 
   // The model of a file, or of the folder that holds one: for --spawn and includes.
   struct Included {
-    std::shared_ptr<const ScopedModel> model;    // null: `light` it is, or an actor
+    std::shared_ptr<const ScopedModel> model;  // null: `light` it is, or an actor
     std::shared_ptr<const Element> document;
     const Element* light = nullptr;
     const Element* actor = nullptr;
     SdfVersion version;
-    std::string name;                            // <include>'s, or the file's
+    std::string name;  // <include>'s, or the file's
   };
   Included read_file(const std::string& path, const Element& asker);
 
@@ -46,14 +47,17 @@ class SdfReader {
   void enter(const std::string& path, const Element& asker);
   void leave() { files_.pop_back(); }
 
-  static std::shared_ptr<const Model> actor_model(const Element& actor, Pose& X_WM, ReadContext& context);
+  static std::shared_ptr<const Model> actor_model(const Element& actor, Pose& X_WM,
+                                                  ReadContext& context);
 
  private:
   std::optional<Included> include(const Element& element, const std::string& where);
-  std::shared_ptr<const ScopedModel> read_overridden(const Element& model, const Element& include, SdfVersion version);
+  std::shared_ptr<const ScopedModel> read_overridden(const Element& model, const Element& include,
+                                                     SdfVersion version);
   // The instances of a <ruedo:fleet>, after what the world has already.
   void read_fleet(const Element& element, WorldModel& world, size_t most_models);
-  void read_joints(const Element& model, SdfVersion version, FrameGraph& frames, const std::set<const Element*>& left_out, bool parts_missing,
+  void read_joints(const Element& model, SdfVersion version, FrameGraph& frames,
+                   const std::set<const Element*>& left_out, bool parts_missing,
                    const std::string& where, Model& result);
 
   ReadContext& context_;
@@ -64,22 +68,25 @@ class SdfReader {
 // The frame in <pose relative_to=""> (SDF 1.7 on) or <pose frame=""> (before); "": none.
 std::string relative_to(const Element& owner);
 
-// A name without '/', spaces and control characters: '_' stands for each, '?' for what is not UTF-8 and for its control characters.
+// A name without '/', spaces and control characters: '_' stands for each, '?' for what is not UTF-8
+// and for its control characters.
 std::string made_fit_for_channel(const std::string& name);
 
-// Makes the devices' names fit for channels and unique: of two sensors with one name, each becomes LINK-SENSOR. Throws
-// InputError for names that Ruedo's own channels have, and for two that stay the same.
+// Makes the devices' names fit for channels and unique: of two sensors with one name, each becomes
+// LINK-SENSOR. Throws InputError for names that Ruedo's own channels have, and for two that stay
+// the same.
 void make_sensor_names_unique(Model& model, const std::string& where, Findings& findings);
 
 // Checks that the names of an instance and of its devices are fit for channels.
 void check_channel_names(const ModelInstance& instance, const Source& source);
 
-// The name in a joint's <parent> or <child>, which old files write in <link_name>; "" when there is none.
+// The name in a joint's <parent> or <child>, which old files write in <link_name>; "" when there is
+// none.
 std::string joint_end(const Element& joint, const char* which);
 
 // <joint> to Joint; the frames are those of its model.
-Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames, const std::vector<Link>& links,
-                 const std::string& where, ReadContext& context);
+Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
+                 const std::vector<Link>& links, const std::string& where, ReadContext& context);
 // Its <mimic>, when all joints of the model are read.
 void read_mimic(const Element& element, const std::vector<Joint>& joints, Joint& joint);
 

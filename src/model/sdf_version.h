@@ -17,7 +17,9 @@ struct SdfVersion {
     const size_t dot = text.find('.');
     if (dot == std::string::npos) return std::nullopt;
     const auto number = [](const std::string& digits) -> int {
-      if (digits.empty() || digits.size() > 4 || digits.find_first_not_of("0123456789") != std::string::npos) return -1;
+      if (digits.empty() || digits.size() > 4 ||
+          digits.find_first_not_of("0123456789") != std::string::npos)
+        return -1;
       return std::stoi(digits);
     };
     const SdfVersion version{number(text.substr(0, dot)), number(text.substr(dot + 1))};

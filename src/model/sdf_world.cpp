@@ -21,22 +21,28 @@ void read_step(const Element& physics, WorldModel& world, Findings& findings) {
   const double seconds = step->as_number(Allowed{1e-6, 1.0, false});
   world.step_us = microseconds(seconds);
   if (std::abs(static_cast<double>(world.step_us) - seconds * 1e6) > 1e-6) {
-    findings.repaired(step->source, "world/physics", "the step " + step->text + " s is not a whole number of microseconds; it is " +
-                                                         std::to_string(world.step_us) + " us instead");
+    findings.repaired(step->source, "world/physics",
+                      "the step " + step->text +
+                          " s is not a whole number of microseconds; it is " +
+                          std::to_string(world.step_us) + " us instead");
   }
 }
 
 void read_solver(const Element& bullet, SolverDescription& solver, Findings& findings) {
   bullet.refuse_unknown({"ruedo:substeps", "ruedo:tolerance"});
   constexpr const char* kType = "solver/type";
-  if (const std::string type = bullet.string(kType, "sequential_impulse"); type != "sequential_impulse") {
-    findings.unsupported(bullet.child(kType)->source, "world/physics/bullet", "the solver '" + type + "' is not supported; sequential_impulse is used instead");
+  if (const std::string type = bullet.string(kType, "sequential_impulse");
+      type != "sequential_impulse") {
+    findings.unsupported(
+        bullet.child(kType)->source, "world/physics/bullet",
+        "the solver '" + type + "' is not supported; sequential_impulse is used instead");
   }
   const auto whole = [&](const char* path, int fallback, int lowest, int highest) {
     return static_cast<int>(bullet.integer(path, fallback, Allowed::between(lowest, highest)));
   };
   solver.iterations = whole("solver/iters", solver.iterations, 1, 100'000);
-  solver.error_reduction = bullet.number("constraints/erp", solver.error_reduction, Allowed::between(0, 1));
+  solver.error_reduction =
+      bullet.number("constraints/erp", solver.error_reduction, Allowed::between(0, 1));
   solver.tolerance = bullet.number("ruedo:tolerance", solver.tolerance, Allowed::between(0, 1));
   solver.substeps = whole("ruedo:substeps", solver.substeps, 0, 1000);
 }
@@ -53,34 +59,49 @@ void read_physics(const Element& world_element, WorldModel& world, Findings& fin
     }
   }
   if (chosen) {
-    report_other_children(*chosen, {"max_step_size", "real_time_factor", "real_time_update_rate", "gravity"},
-                          {"ode", "bullet", "simbody", "dart", "max_contacts", "magnetic_field", "update_rate"}, "world/physics", findings);
-    if (const Element* bullet = chosen->child("bullet")) read_solver(*bullet, world.solver, findings);
+    report_other_children(
+        *chosen, {"max_step_size", "real_time_factor", "real_time_update_rate", "gravity"},
+        {"ode", "bullet", "simbody", "dart", "max_contacts", "magnetic_field", "update_rate"},
+        "world/physics", findings);
+    if (const Element* bullet = chosen->child("bullet"))
+      read_solver(*bullet, world.solver, findings);
     read_step(*chosen, world, findings);
-    world.gravity = chosen->vector3("gravity", world.gravity, gravity);    // SDF before 1.6
+    world.gravity = chosen->vector3("gravity", world.gravity, gravity);  // SDF before 1.6
   }
   world.gravity = world_element.vector3("gravity", world.gravity, gravity);
 }
 
-// Of a world, what changes things in Gazebo and does not here, where it says more than the format's own default.
+// Of a world, what changes things in Gazebo and does not here, where it says more than the format's
+// own default.
 void name_what_has_no_effect(const Element& world, const std::string& where, Findings& findings) {
   const auto name = [&](const char* path, const std::string& text) {
-    if (const Element* element = world.child(path)) findings.unsupported(element->source, where, "<" + element->name + "> is not supported: " + text);
+    if (const Element* element = world.child(path))
+      findings.unsupported(element->source, where,
+                           "<" + element->name + "> is not supported: " + text);
   };
   try {
-    if (world.vector3("wind/linear_velocity", Vec3::Zero(), Allowed::any(quantity::kSpeed)) != Vec3::Zero()) name("wind", "no wind blows");
+    if (world.vector3("wind/linear_velocity", Vec3::Zero(), Allowed::any(quantity::kSpeed)) !=
+        Vec3::Zero())
+      name("wind", "no wind blows");
   } catch (const InputError&) {
     name("wind", "no wind blows");
   }
-  if (world.string("atmosphere/temperature", "288.15") != "288.15" || world.has("atmosphere/pressure")) name("atmosphere", "the air has no temperature and no pressure");
-  const auto degrees = [&](const char* path) { return world.string(path, "0").find_first_of("123456789") != std::string::npos; };
-  if (degrees("spherical_coordinates/latitude_deg") || degrees("spherical_coordinates/longitude_deg")) name("spherical_coordinates", "the world lies nowhere on Earth, and no sensor asks");
+  if (world.string("atmosphere/temperature", "288.15") != "288.15" ||
+      world.has("atmosphere/pressure"))
+    name("atmosphere", "the air has no temperature and no pressure");
+  const auto degrees = [&](const char* path) {
+    return world.string(path, "0").find_first_of("123456789") != std::string::npos;
+  };
+  if (degrees("spherical_coordinates/latitude_deg") ||
+      degrees("spherical_coordinates/longitude_deg"))
+    name("spherical_coordinates", "the world lies nowhere on Earth, and no sensor asks");
   name("population", "what it would place is left out");
   name("audio", "nothing sounds");
 }
 
 void read_scene(const Element& scene, Sky& sky, Findings& findings) {
-  report_other_children(scene, {"ambient", "background", "sky", "shadows"}, {"grid", "origin_visual", "fog"}, "world/scene", findings);
+  report_other_children(scene, {"ambient", "background", "sky", "shadows"},
+                        {"grid", "origin_visual", "fog"}, "world/scene", findings);
   if (const Element* colour = scene.child("ambient")) sky.ambient = read_colour(*colour);
   if (const Element* colour = scene.child("background")) sky.background = read_colour(*colour);
   sky.sky = scene.has("sky");
@@ -99,8 +120,9 @@ void add_child(Element& parent, const char* name, const std::string& text) {
 }
 
 Fault read_fault(const Element& e) {
-  e.refuse_unknown({"ruedo:robot", "ruedo:target", "ruedo:kind", "ruedo:at", "ruedo:for", "ruedo:value", "ruedo:from", "ruedo:to", "ruedo:x",
-                    "ruedo:y", "ruedo:heading"}, false);
+  e.refuse_unknown({"ruedo:robot", "ruedo:target", "ruedo:kind", "ruedo:at", "ruedo:for",
+                    "ruedo:value", "ruedo:from", "ruedo:to", "ruedo:x", "ruedo:y", "ruedo:heading"},
+                   false);
   if (!e.has("ruedo:kind")) e.fail("has no <ruedo:kind>");
   Fault fault;
   fault.robot = e.string("ruedo:robot", "");
@@ -121,13 +143,17 @@ Fault read_fault(const Element& e) {
 
 }  // namespace
 
-// An actor is a person: a cylinder that stands on the ground and moves along the trajectory, without a skin.
-std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& X_WM, ReadContext& context) {
-  constexpr double kHeight = 1.7, kRadius = 0.25;    // m
+// An actor is a person: a cylinder that stands on the ground and moves along the trajectory,
+// without a skin.
+std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& X_WM,
+                                                    ReadContext& context) {
+  constexpr double kHeight = 1.7, kRadius = 0.25;  // m
   auto model = std::make_shared<Model>();
   model->name = required_name(actor);
   model->source = actor.source;
-  context.findings.unsupported(actor.source, "actor " + model->name, "actors move as cylinders of 1.7 m; skins and animations are not shown");
+  context.findings.unsupported(
+      actor.source, "actor " + model->name,
+      "actors move as cylinders of 1.7 m; skins and animations are not shown");
   X_WM = actor.pose("pose");
   auto path = std::make_shared<Element>();
   path->name = "ruedo:path";
@@ -140,21 +166,33 @@ std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& 
     const std::string where = "actor " + model->name;
     const auto trajectories = script->all("trajectory");
     if (trajectories.size() > 1) {
-      context.findings.unsupported(trajectories[1]->source, where, "an actor has one <trajectory>; this one is not walked");
+      context.findings.unsupported(trajectories[1]->source, where,
+                                   "an actor has one <trajectory>; this one is not walked");
     }
     if (!trajectories.empty()) {
       const Element* trajectory = trajectories[0];
       double last = -1;
       for (const Element* waypoint : trajectory->all("waypoint")) {
-        const double time = delay + waypoint->number("time", 0, Allowed::not_negative(quantity::kTime));
+        const double time =
+            delay + waypoint->number("time", 0, Allowed::not_negative(quantity::kTime));
         if (time <= last) {
-          context.findings.error(waypoint->source, where, "the time " + shown(time) + " s is not after that of the waypoint before; this one is left out");
+          context.findings.error(
+              waypoint->source, where,
+              "the time " + shown(time) +
+                  " s is not after that of the waypoint before; this one is left out");
           continue;
         }
-        const std::vector<double> numbers = waypoint->has("pose") ? waypoint->child("pose")->as_numbers(Allowed::any(quantity::kLength)) : std::vector<double>(6, 0.0);
-        if (numbers.size() != 6) waypoint->child("pose")->fail("'" + waypoint->child("pose")->text + "' is not allowed; allowed are x y z roll pitch yaw");
-        constexpr double kUpstairs_m = 2;    // above any skin's own origin
-        if (numbers[2] > kUpstairs_m) context.findings.unsupported(waypoint->source, where, "actors walk on z = 0, not above it");
+        const std::vector<double> numbers =
+            waypoint->has("pose")
+                ? waypoint->child("pose")->as_numbers(Allowed::any(quantity::kLength))
+                : std::vector<double>(6, 0.0);
+        if (numbers.size() != 6)
+          waypoint->child("pose")->fail("'" + waypoint->child("pose")->text +
+                                        "' is not allowed; allowed are x y z roll pitch yaw");
+        constexpr double kUpstairs_m = 2;  // above any skin's own origin
+        if (numbers[2] > kUpstairs_m)
+          context.findings.unsupported(waypoint->source, where,
+                                       "actors walk on z = 0, not above it");
         // Skins lie on their back in their own frame; a person walks upright.
         const double values[] = {time, numbers[0], numbers[1], 0, 0, 0, numbers[5]};
         std::string text;
@@ -196,7 +234,7 @@ std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& 
 
 namespace {
 
-constexpr double kMoved_m = 0.01;    // from where a link is in its model, by a joint
+constexpr double kMoved_m = 0.01;  // from where a link is in its model, by a joint
 
 struct SavedModel {
   struct Link {
@@ -208,7 +246,8 @@ struct SavedModel {
   std::vector<Link> links;
 };
 
-// Where Gazebo Classic's <state> has the models: a world that was saved is as it was then, not as its models' own poses say.
+// Where Gazebo Classic's <state> has the models: a world that was saved is as it was then, not as
+// its models' own poses say.
 std::map<std::string, SavedModel> saved_models(const Element& world, Findings& findings) {
   std::map<std::string, SavedModel> models;
   for (const Element* state : world.all("state")) {
@@ -219,18 +258,24 @@ std::map<std::string, SavedModel> saved_models(const Element& world, Findings& f
         SavedModel saved{model->pose("pose"), model->source, {}};
         for (const Element* link : model->all("link")) {
           const std::string* own = link->attribute("name");
-          if (own && link->has("pose")) saved.links.push_back({dotted(*own), link->pose("pose").translation});
+          if (own && link->has("pose"))
+            saved.links.push_back({dotted(*own), link->pose("pose").translation});
         }
         models.insert_or_assign(*name, std::move(saved));
-        if ((model->vector3("scale", Vec3::Ones(), Allowed::any(quantity::kFactor)) - Vec3::Ones()).norm() > 1e-9) {
-          findings.unsupported(model->child("scale")->source, "state/model " + *name, "models are not scaled; it has its own size");
+        if ((model->vector3("scale", Vec3::Ones(), Allowed::any(quantity::kFactor)) - Vec3::Ones())
+                .norm() > 1e-9) {
+          findings.unsupported(model->child("scale")->source, "state/model " + *name,
+                               "models are not scaled; it has its own size");
         }
-      } catch (const InputError& error) {    // a simulation that went wrong saves such numbers; the models have poses of their own
+      } catch (const InputError& error) {  // a simulation that went wrong saves such numbers; the
+                                           // models have poses of their own
         findings.error(error.source(), "state/model " + *name, error.message());
       }
     }
     for (const char* change : {"insertions", "deletions"}) {
-      if (const Element* it = state->child(change)) findings.unsupported(it->source, "state", "<" + it->name + "> are not supported and left out");
+      if (const Element* it = state->child(change))
+        findings.unsupported(it->source, "state",
+                             "<" + it->name + "> are not supported and left out");
     }
   }
   return models;
@@ -240,18 +285,24 @@ std::map<std::string, SavedModel> saved_models(const Element& world, Findings& f
 
 void SdfReader::read_world(const Element& element, SdfVersion version, WorldModel& world) {
   Findings& findings = context_.findings;
-  const std::string* name = element.attribute("name");    // no name is reserved for it
+  const std::string* name = element.attribute("name");  // no name is reserved for it
   world.name = name ? *name : "";
   if (world.name.empty()) {
     world.name = "world";
     findings.repaired(element.source, "world", "the world has no name; it is called 'world'");
   }
-  report_other_children(element, {"model", "include", "light", "frame", "physics", "gravity", "scene", "actor", "joint", "ruedo:fleet", "ruedo:fault"},
-                        {"gui", "atmosphere", "magnetic_field", "spherical_coordinates", "wind", "audio", "plugin", "state", "population"},
+  report_other_children(element,
+                        {"model", "include", "light", "frame", "physics", "gravity", "scene",
+                         "actor", "joint", "ruedo:fleet", "ruedo:fault"},
+                        {"gui", "atmosphere", "magnetic_field", "spherical_coordinates", "wind",
+                         "audio", "plugin", "state", "population"},
                         "world " + world.name, findings);
   const std::string in_world = "world " + world.name;
-  read_or_leave_out(in_world, "what is usual is taken", findings, [&] { read_physics(element, world, findings); });
-  if (const Element* scene = element.child("scene")) read_or_leave_out(in_world, "what is usual is taken", findings, [&] { read_scene(*scene, world.sky, findings); });
+  read_or_leave_out(in_world, "what is usual is taken", findings,
+                    [&] { read_physics(element, world, findings); });
+  if (const Element* scene = element.child("scene"))
+    read_or_leave_out(in_world, "what is usual is taken", findings,
+                      [&] { read_scene(*scene, world.sky, findings); });
   name_what_has_no_effect(element, in_world, findings);
 
   std::set<std::string> named;
@@ -260,10 +311,14 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     const bool dead = kind.does == PluginKind::Does::dead;
     if (!dead && kind.does != PluginKind::Does::unknown) continue;
     if (!named.insert(kind.name).second) continue;
-    findings.unsupported(plugin->source, in_world, dead ? "the plugin " + kind.name + " does nothing here: " + kind.would : "plugins of Gazebo's server are not loaded: " + kind.name);
+    findings.unsupported(plugin->source, in_world,
+                         dead ? "the plugin " + kind.name + " does nothing here: " + kind.would
+                              : "plugins of Gazebo's server are not loaded: " + kind.name);
   }
   if (const Element* joint = element.child("joint")) {
-    findings.unsupported(joint->source, "world " + world.name, "joints between models are not supported and left out; put both models, and the joint, into one <model>");
+    findings.unsupported(joint->source, "world " + world.name,
+                         "joints between models are not supported and left out; put both models, "
+                         "and the joint, into one <model>");
   }
 
   FrameGraph frames("the world");
@@ -284,7 +339,7 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     frames.add(node);
     placed.push_back({name, &by, scope});
   };
-  std::map<std::string, int> numbers;    // of the next thing of a name
+  std::map<std::string, int> numbers;  // of the next thing of a name
   const auto read_child = [&](const std::unique_ptr<Element>& child) {
     FrameGraph::Node node;
     node.element = child.get();
@@ -296,7 +351,9 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
         const auto included = include(*child, "world/include");
         if (!included) return;
         if (included->light) {
-          world.lights.push_back(read_light(*included->light, child->pose("pose", included->light->pose("pose")), "world/light", context_));
+          world.lights.push_back(read_light(*included->light,
+                                            child->pose("pose", included->light->pose("pose")),
+                                            "world/light", context_));
           world.lights.back().name = included->name;
           return;
         }
@@ -312,10 +369,14 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
         std::string name;
         int& number = numbers.try_emplace(node.name, 2).first->second;
         while (frames.has(name = node.name + "_" + std::to_string(number))) ++number;
-        findings.error(child->source, "model " + node.name, "a second thing of the name '" + node.name + "'; this one is called '" + name + "'");
+        findings.error(
+            child->source, "model " + node.name,
+            "a second thing of the name '" + node.name + "'; this one is called '" + name + "'");
         node.name = name;
       }
-      if (placed.size() >= kMaxModels) throw TooLarge(child->source, "<" + child->name + ">: the world has more than " + std::to_string(kMaxModels) + " models");
+      if (placed.size() >= kMaxModels)
+        throw TooLarge(child->source, "<" + child->name + ">: the world has more than " +
+                                          std::to_string(kMaxModels) + " models");
       node.pose = node.scope->pose;
       node.relative_to = node.scope->relative_to;
       node.placement_frame = node.scope->placement_frame;
@@ -335,7 +396,8 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     }
     frames.add(std::move(node));
   };
-  std::vector<const std::unique_ptr<Element>*> in_order;    // frames last: of two of one name the frame goes
+  std::vector<const std::unique_ptr<Element>*>
+      in_order;  // frames last: of two of one name the frame goes
   for (const bool is_frame : {false, true}) {
     for (const auto& child : element.children) {
       if ((child->name == "frame") == is_frame) in_order.push_back(&child);
@@ -344,20 +406,30 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
   for (const auto* each : in_order) {
     const std::unique_ptr<Element>& child = *each;
     const size_t open_files = files_.size();
-    if (!read_or_leave_out(in_world, "the " + (child->name == "include" ? "model" : child->name) + " is left out", findings, [&] { read_child(child); })) files_.resize(open_files);
+    if (!read_or_leave_out(
+            in_world, "the " + (child->name == "include" ? "model" : child->name) + " is left out",
+            findings, [&] { read_child(child); }))
+      files_.resize(open_files);
   }
   const std::map<std::string, SavedModel> saved = saved_models(element, findings);
   for (const Placed& each : placed) {
     ModelInstance instance;
     instance.name = dotted(each.name);
-    if (!read_or_leave_out(in_world, "the model is left out", findings, [&] { instance.X_WM = frames.pose(each.name, *each.element); })) continue;
+    if (!read_or_leave_out(in_world, "the model is left out", findings,
+                           [&] { instance.X_WM = frames.pose(each.name, *each.element); }))
+      continue;
     instance.model = each.scope->model;
     if (const auto state = saved.find(each.name); state != saved.end() && !instance.model->path) {
       instance.X_WM = state->second.X_WM;
       for (const SavedModel::Link& link : state->second.links) {
-        const auto own = std::find_if(instance.model->links.begin(), instance.model->links.end(), [&](const Link& one) { return one.name == link.name; });
-        if (own == instance.model->links.end() || (link.p_W - (instance.X_WM * own->X_ML).translation).norm() < kMoved_m) continue;
-        findings.unsupported(state->second.source, "state/model " + each.name, "its link '" + link.name + "' was moved by a joint; it stands where the model has it");
+        const auto own = std::find_if(instance.model->links.begin(), instance.model->links.end(),
+                                      [&](const Link& one) { return one.name == link.name; });
+        if (own == instance.model->links.end() ||
+            (link.p_W - (instance.X_WM * own->X_ML).translation).norm() < kMoved_m)
+          continue;
+        findings.unsupported(
+            state->second.source, "state/model " + each.name,
+            "its link '" + link.name + "' was moved by a joint; it stands where the model has it");
         break;
       }
     }
@@ -365,11 +437,15 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
       const std::string fit = made_fit_for_channel(instance.name);
       std::string name = fit;
       const auto taken = [&] {
-        return frames.has(name) || std::any_of(world.models.begin(), world.models.end(), [&](const auto& other) { return other.name == name; });
+        return frames.has(name) ||
+               std::any_of(world.models.begin(), world.models.end(),
+                           [&](const auto& other) { return other.name == name; });
       };
-      for (int number = 2; name != instance.name && taken(); ++number) name = fit + "_" + std::to_string(number);
+      for (int number = 2; name != instance.name && taken(); ++number)
+        name = fit + "_" + std::to_string(number);
       if (name != instance.name) {
-        findings.repaired(each.element->source, "model " + instance.name, "the name is not fit for a channel; the robot is called '" + name + "'");
+        findings.repaired(each.element->source, "model " + instance.name,
+                          "the name is not fit for a channel; the robot is called '" + name + "'");
         instance.name = name;
       }
     }
@@ -377,7 +453,8 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     world.models.push_back(std::move(instance));
   }
   for (const Element* fleet : element.all("ruedo:fleet")) read_fleet(*fleet, world, kMaxModels);
-  for (const Element* fault : element.all("ruedo:fault")) world.faults.push_back(read_fault(*fault));
+  for (const Element* fault : element.all("ruedo:fault"))
+    world.faults.push_back(read_fault(*fault));
   for (const Element* light : element.all("light")) {
     read_or_leave_out(in_world, "the light is left out", findings, [&] {
       const Pose pose = frames.pose(relative_to(*light), *light) * light->pose("pose");

@@ -20,7 +20,8 @@ Element& add(Element& parent, const char* name, const std::string& text = "") {
 void add_noise(Element& imu, const char* quantity, const Element* written) {
   if (!written) return;
   const std::vector<double> values = written->as_numbers(Allowed::any(quantity::kNoise));
-  if (values.size() != 1 && values.size() != 3) written->fail("'" + written->text + "' is not allowed; allowed are one number or three");
+  if (values.size() != 1 && values.size() != 3)
+    written->fail("'" + written->text + "' is not allowed; allowed are one number or three");
   Element& axes = add(imu, quantity);
   for (size_t i = 0; i < 3; ++i) {
     constexpr const char* kAxes[] = {"x", "y", "z"};
@@ -41,11 +42,15 @@ PluginSensor sensor_from_plugin(const Element& plugin) {
   const std::string* name = plugin.attribute("name");
   sensor->attributes.emplace_back("name", name && !name->empty() ? *name : "imu");
   sensor->attributes.emplace_back("type", "imu");
-  if (const double rate = plugin.number("updateRate", 0.0, Allowed::not_negative(quantity::kRange)); rate > 0) add(*sensor, "update_rate", shown(rate));
+  if (const double rate = plugin.number("updateRate", 0.0, Allowed::not_negative(quantity::kRange));
+      rate > 0)
+    add(*sensor, "update_rate", shown(rate));
   Element& imu = add(*sensor, "imu");
   const Element* same_for_all = plugin.child("gaussianNoise");
-  add_noise(imu, "angular_velocity", plugin.has("rateGaussianNoise") ? plugin.child("rateGaussianNoise") : same_for_all);
-  add_noise(imu, "linear_acceleration", plugin.has("accelGaussianNoise") ? plugin.child("accelGaussianNoise") : same_for_all);
+  add_noise(imu, "angular_velocity",
+            plugin.has("rateGaussianNoise") ? plugin.child("rateGaussianNoise") : same_for_all);
+  add_noise(imu, "linear_acceleration",
+            plugin.has("accelGaussianNoise") ? plugin.child("accelGaussianNoise") : same_for_all);
   return {std::move(sensor), plugin.string("bodyName", "")};
 }
 

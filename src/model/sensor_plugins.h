@@ -9,8 +9,8 @@
 namespace ruedo::model {
 
 struct PluginSensor {
-  std::unique_ptr<Element> sensor;    // null: the plugin makes none that there is here
-  std::string link;                   // whose it is; "": the model's first
+  std::unique_ptr<Element> sensor;  // null: the plugin makes none that there is here
+  std::string link;                 // whose it is; "": the model's first
 };
 
 PluginSensor sensor_from_plugin(const Element& plugin);

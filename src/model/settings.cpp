@@ -1,4 +1,5 @@
-// Settings edit a copy of a sensor's or a drive's element, which its own reader then reads as if the file said so.
+// Settings edit a copy of a sensor's or a drive's element, which its own reader then reads as if
+// the file said so.
 #include "model/settings.h"
 
 #include <algorithm>
@@ -10,8 +11,10 @@
 namespace ruedo::model {
 namespace {
 
-constexpr const char* kDriveDevices[] = {"velocity", "wheels", "odometry", "pose", "motion", "move"};
-constexpr const char* kFixedDevices[] = {"velocity", "wheels", "odometry", "pose", "motion", "move", "joints", "joint_command"};
+constexpr const char* kDriveDevices[] = {"velocity", "wheels", "odometry",
+                                         "pose",     "motion", "move"};
+constexpr const char* kFixedDevices[] = {"velocity", "wheels", "odometry", "pose",
+                                         "motion",   "move",   "joints",   "joint_command"};
 
 template <class List>
 bool contains(const List& list, const std::string& what) {
@@ -46,7 +49,8 @@ class RobotsByName {
     std::vector<std::string> names;
     for (const auto& [robot, instance] : robots_) names.push_back(robot);
     const std::string near = nearest_word(name, names);
-    throw InputError({}, option + ": there is no robot '" + name + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") +
+    throw InputError({}, option + ": there is no robot '" + name + "'" +
+                             (near.empty() ? "" : "; did you mean '" + near + "'?") +
                              "; there are " + listed(names));
   }
 
@@ -63,27 +67,37 @@ std::vector<std::string> known_keys(const std::string& type) {
   if (type == "ray" || type == "gpu_ray" || type == "lidar" || type == "gpu_lidar") {
     const std::string top = type.find("ray") != std::string::npos ? "ray" : "lidar";
     for (const char* plane : {"horizontal", "vertical"}) {
-      for (const char* each : {"samples", "resolution", "min_angle", "max_angle"}) keys.push_back(top + ".scan." + plane + "." + each);
+      for (const char* each : {"samples", "resolution", "min_angle", "max_angle"})
+        keys.push_back(top + ".scan." + plane + "." + each);
     }
-    for (const char* each : {"min", "max", "resolution"}) keys.push_back(top + ".range." + std::string(each));
+    for (const char* each : {"min", "max", "resolution"})
+      keys.push_back(top + ".range." + std::string(each));
     noise(top + ".noise");
-    for (const char* each : {"own_link", "hits", "intensities", "sweep_time", "bearing_noise", "phase"}) keys.push_back(std::string("ruedo:") + each);
+    for (const char* each :
+         {"own_link", "hits", "intensities", "sweep_time", "bearing_noise", "phase"})
+      keys.push_back(std::string("ruedo:") + each);
   } else if (type == "sonar") {
-    for (const char* each : {"min", "max", "radius", "geometry"}) keys.push_back(std::string("sonar.") + each);
-    for (const char* each : {"horizontal_aperture", "vertical_aperture", "rays", "reading", "firing", "order", "specular_angle", "cross_talk"}) {
+    for (const char* each : {"min", "max", "radius", "geometry"})
+      keys.push_back(std::string("sonar.") + each);
+    for (const char* each : {"horizontal_aperture", "vertical_aperture", "rays", "reading",
+                             "firing", "order", "specular_angle", "cross_talk"}) {
       keys.push_back(std::string("ruedo:sonar.ruedo:") + each);
     }
     noise("ruedo:sonar.noise");
   } else if (type.find("camera") != std::string::npos) {
-    for (const char* each : {"horizontal_fov", "image.width", "image.height", "image.format", "clip.near", "clip.far"}) keys.push_back(std::string("camera.") + each);
+    for (const char* each :
+         {"horizontal_fov", "image.width", "image.height", "image.format", "clip.near", "clip.far"})
+      keys.push_back(std::string("camera.") + each);
     noise("camera.noise");
-    for (const char* each : {"encoding", "quality", "depth", "labels", "exposure", "vignetting"}) keys.push_back(std::string("ruedo:") + each);
+    for (const char* each : {"encoding", "quality", "depth", "labels", "exposure", "vignetting"})
+      keys.push_back(std::string("ruedo:") + each);
   }
   return keys;
 }
 
 // Every path below the element that ends in a text.
-void collect_keys(const Element& element, const std::string& prefix, std::vector<std::string>& keys) {
+void collect_keys(const Element& element, const std::string& prefix,
+                  std::vector<std::string>& keys) {
   for (const auto& child : element.children) {
     if (child->name == "plugin" || child->name == "ruedo:transducer") continue;
     const std::string key = prefix + child->name;
@@ -96,29 +110,38 @@ void collect_keys(const Element& element, const std::string& prefix, std::vector
 }
 
 std::string without_prefixes(std::string key) {
-  for (size_t at = key.find("ruedo:"); at != std::string::npos; at = key.find("ruedo:")) key.erase(at, 6);
+  for (size_t at = key.find("ruedo:"); at != std::string::npos; at = key.find("ruedo:"))
+    key.erase(at, 6);
   return key;
 }
 
-// The one key that is meant: in full, or by an ending ("range.max"), "ruedo:" left out as one likes.
-std::string resolved(const std::string& wanted, const std::vector<std::string>& keys, const std::string& option) {
+// The one key that is meant: in full, or by an ending ("range.max"), "ruedo:" left out as one
+// likes.
+std::string resolved(const std::string& wanted, const std::vector<std::string>& keys,
+                     const std::string& option) {
   const std::string plain = without_prefixes(wanted);
   std::vector<std::string> matches;
   for (const std::string& key : keys) {
     if (key == wanted) return key;
     const std::string candidate = without_prefixes(key);
-    const bool ends = candidate == plain || (candidate.size() > plain.size() && candidate.compare(candidate.size() - plain.size(), plain.size(), plain) == 0 &&
+    const bool ends = candidate == plain || (candidate.size() > plain.size() &&
+                                             candidate.compare(candidate.size() - plain.size(),
+                                                               plain.size(), plain) == 0 &&
                                              candidate[candidate.size() - plain.size() - 1] == '.');
     if (candidate == plain) return key;
     if (ends) matches.push_back(key);
   }
   if (matches.size() == 1) return matches[0];
-  if (matches.size() > 1) throw InputError({}, option + ": '" + wanted + "' could be " + listed(matches));
+  if (matches.size() > 1)
+    throw InputError({}, option + ": '" + wanted + "' could be " + listed(matches));
   const std::string near = nearest_word(wanted, keys);
-  throw InputError({}, option + ": there is no '" + wanted + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") + "; there are " + listed(keys));
+  throw InputError({}, option + ": there is no '" + wanted + "'" +
+                           (near.empty() ? "" : "; did you mean '" + near + "'?") + "; there are " +
+                           listed(keys));
 }
 
-void set_text(Element& element, const std::string& key, const std::string& value, const Source& source) {
+void set_text(Element& element, const std::string& key, const std::string& value,
+              const Source& source) {
   Element* at = &element;
   std::string rest = key;
   while (!rest.empty()) {
@@ -137,20 +160,26 @@ void set_text(Element& element, const std::string& key, const std::string& value
   at->source = source;
 }
 
-void set_in_drive(Model& model, const Setting& setting, const std::string& option, const Source& source) {
+void set_in_drive(Model& model, const Setting& setting, const std::string& option,
+                  const Source& source) {
   const bool odometry = setting.device == "odometry";
   std::vector<std::string> keys = odometry ? odometry_elements() : drive_elements();
   std::shared_ptr<const Element> original = odometry ? model.drive->odometry : model.drive->element;
   std::unique_ptr<Element> copy;
-  if (original) copy = original->clone();
-  else copy = std::make_unique<Element>();
+  if (original)
+    copy = original->clone();
+  else
+    copy = std::make_unique<Element>();
   copy->name = odometry ? "ruedo:odometry" : "ruedo:drive";
   set_text(*copy, resolved(setting.key, keys, option), setting.value, source);
   std::shared_ptr<const Element> edited = std::move(copy);
   // base_link may have been moved by nesting, which the drive's own element does not know.
   const Pose X_MBase = model.drive->X_MBase;
-  auto drive = read_drive(odometry ? model.drive->element : edited, odometry ? edited : model.drive->odometry, model);
-  if (setting.key.find("base") == std::string::npos && setting.key.find("wheel_radius") == std::string::npos) drive.X_MBase = X_MBase;
+  auto drive = read_drive(odometry ? model.drive->element : edited,
+                          odometry ? edited : model.drive->odometry, model);
+  if (setting.key.find("base") == std::string::npos &&
+      setting.key.find("wheel_radius") == std::string::npos)
+    drive.X_MBase = X_MBase;
   model.drive = std::move(drive);
 }
 
@@ -167,10 +196,12 @@ void apply_drives(const std::vector<DriveOption>& drives, WorldModel& world) {
     }
     if (!instance) {
       const std::string near = nearest_word(each.robot, names);
-      throw InputError({}, option + ": there is no model '" + each.robot + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") +
+      throw InputError({}, option + ": there is no model '" + each.robot + "'" +
+                               (near.empty() ? "" : "; did you mean '" + near + "'?") +
                                "; there are " + listed(names));
     }
-    if (instance->model->is_static) throw InputError({}, option + ": the model is static; what drives is not");
+    if (instance->model->is_static)
+      throw InputError({}, option + ": the model is static; what drives is not");
     auto drive = std::make_shared<Element>();
     drive->name = "ruedo:drive";
     drive->source = {option, 0};
@@ -198,7 +229,8 @@ void apply_settings(const std::vector<Setting>& settings, WorldModel& world) {
     ModelInstance& instance = robots.at(setting.robot, option);
     auto model = std::make_shared<Model>(*instance.model);
     const Source source{option, 0};
-    const auto sensor = std::find_if(model->sensors.begin(), model->sensors.end(), [&](const auto& each) { return each.name == setting.device; });
+    const auto sensor = std::find_if(model->sensors.begin(), model->sensors.end(),
+                                     [&](const auto& each) { return each.name == setting.device; });
     if (sensor != model->sensors.end()) {
       std::unique_ptr<Element> copy = sensor->element->clone();
       std::vector<std::string> keys;
@@ -215,7 +247,8 @@ void apply_settings(const std::vector<Setting>& settings, WorldModel& world) {
     } else {
       const std::vector<std::string> devices = devices_of(*model);
       const std::string near = nearest_word(setting.device, devices);
-      throw InputError({}, option + ": the robot has no device '" + setting.device + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") +
+      throw InputError({}, option + ": the robot has no device '" + setting.device + "'" +
+                               (near.empty() ? "" : "; did you mean '" + near + "'?") +
                                "; there are " + listed(devices));
     }
     instance.model = std::move(model);
@@ -224,7 +257,8 @@ void apply_settings(const std::vector<Setting>& settings, WorldModel& world) {
 
 void apply_disabled(const std::vector<std::string>& disabled, WorldModel& world) {
   const RobotsByName robots(world);
-  std::map<std::pair<std::shared_ptr<const Model>, std::string>, std::shared_ptr<const Model>> without;    // equal robots share a model
+  std::map<std::pair<std::shared_ptr<const Model>, std::string>, std::shared_ptr<const Model>>
+      without;  // equal robots share a model
   for (const std::string& each : disabled) {
     const std::string option = "--disable " + each;
     const size_t slash = each.find('/');
@@ -246,7 +280,8 @@ void apply_disabled(const std::vector<std::string>& disabled, WorldModel& world)
     } else {
       const std::vector<std::string> devices = devices_of(*instance.model);
       const std::string near = nearest_word(device, devices);
-      throw InputError({}, option + ": the robot has no device '" + device + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") +
+      throw InputError({}, option + ": the robot has no device '" + device + "'" +
+                               (near.empty() ? "" : "; did you mean '" + near + "'?") +
                                "; there are " + listed(devices));
     }
   }

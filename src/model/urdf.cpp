@@ -23,7 +23,8 @@ class Listener : public console_bridge::OutputHandler {
   ~Listener() override { console_bridge::restorePreviousOutputHandler(); }
   void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
     constexpr size_t kMost = 1000;
-    if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR && errors.size() < kMost) errors.push_back(text);
+    if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR && errors.size() < kMost)
+      errors.push_back(text);
   }
   std::vector<std::string> errors;
 };
@@ -43,15 +44,18 @@ std::string escaped(const std::string& text) {
 
 // Back to text for urdfdom, without what it does not read.
 void write_xml(const Element& element, std::string& out) {
-  if (element.name == "gazebo" || element.name == "transmission" || element.name == "ros2_control") return;
+  if (element.name == "gazebo" || element.name == "transmission" || element.name == "ros2_control")
+    return;
   out += "<" + element.name;
-  for (const auto& [name, value] : element.attributes) out += " " + name + "=\"" + escaped(value) + "\"";
+  for (const auto& [name, value] : element.attributes)
+    out += " " + name + "=\"" + escaped(value) + "\"";
   out += ">" + escaped(element.text);
   for (const auto& child : element.children) write_xml(*child, out);
   out += "</" + element.name + ">";
 }
 
-Element& add(Element& parent, const char* name, const Source& source, const std::string& text = "") {
+Element& add(Element& parent, const char* name, const Source& source,
+             const std::string& text = "") {
   auto child = std::make_unique<Element>();
   child->name = name;
   child->text = text;
@@ -66,7 +70,8 @@ std::string numbers(std::initializer_list<double> values) {
   return text;
 }
 
-void add_pose(Element& parent, const urdf::Pose& pose, const Source& source, const std::string& relative_to = "") {
+void add_pose(Element& parent, const urdf::Pose& pose, const Source& source,
+              const std::string& relative_to = "") {
   const auto& p = pose.position;
   const auto& q = pose.rotation;
   Element& element = add(parent, "pose", source, numbers({p.x, p.y, p.z, q.x, q.y, q.z, q.w}));
@@ -84,7 +89,8 @@ void add_geometry(Element& parent, const urdf::Geometry* geometry, const Source&
       break;
     }
     case urdf::Geometry::SPHERE:
-      add(add(element, "sphere", source), "radius", source, shown(static_cast<const urdf::Sphere*>(geometry)->radius));
+      add(add(element, "sphere", source), "radius", source,
+          shown(static_cast<const urdf::Sphere*>(geometry)->radius));
       break;
     case urdf::Geometry::CYLINDER: {
       const auto* cylinder = static_cast<const urdf::Cylinder*>(geometry);
@@ -112,12 +118,14 @@ struct GazeboLink {
   const Element* gravity_off = nullptr;
 };
 
-// The root link of this name stands for the world: what hangs on it is fixed to the world by its joint, as Gazebo has it.
+// The root link of this name stands for the world: what hangs on it is fixed to the world by its
+// joint, as Gazebo has it.
 constexpr const char* kWorld = "world";
 
 std::string name_of(const Element& link_or_joint) {
   const std::string* name = link_or_joint.attribute("name");
-  return link_or_joint.name == "link" && name && *name == kWorld ? kWorld : required_name(link_or_joint);
+  return link_or_joint.name == "link" && name && *name == kWorld ? kWorld
+                                                                 : required_name(link_or_joint);
 }
 
 // In <gazebo> a value is an attribute or the text.
@@ -139,36 +147,67 @@ struct Converter {
       for (const auto& child : block->children) {
         const std::string& name = child->name;
         if (!reference || reference->empty()) {
-          if (name == "plugin" || name == "static" || name == "self_collide" || name.rfind("ruedo:", 0) == 0) {
+          if (name == "plugin" || name == "static" || name == "self_collide" ||
+              name.rfind("ruedo:", 0) == 0) {
             model->children.push_back(child->clone());
           } else if (name.find(':') == std::string::npos) {
-            findings.unsupported(child->source, "robot " + urdf.getName(), "<" + name + "> in <gazebo> is not supported and left out");
+            findings.unsupported(child->source, "robot " + urdf.getName(),
+                                 "<" + name + "> in <gazebo> is not supported and left out");
           }
           continue;
         }
         // Settings of Gazebo's contact and joint solvers, for which there is nothing to set here.
-        constexpr std::string_view kOfSolvers[] = {"kp", "kd", "minDepth", "min_depth", "maxVel", "max_vel", "maxContacts", "max_contacts",
-                                                   "implicitSpringDamper", "provideFeedback", "stopCfm", "stopErp", "stopKd", "stopKp",
-                                                   "fudgeFactor", "fudge_factor", "cfmDamping", "preserveFixedJoint", "disableFixedJointLumping"};
-        if (std::find(std::begin(kOfSolvers), std::end(kOfSolvers), name) != std::end(kOfSolvers)) continue;
+        constexpr std::string_view kOfSolvers[] = {"kp",
+                                                   "kd",
+                                                   "minDepth",
+                                                   "min_depth",
+                                                   "maxVel",
+                                                   "max_vel",
+                                                   "maxContacts",
+                                                   "max_contacts",
+                                                   "implicitSpringDamper",
+                                                   "provideFeedback",
+                                                   "stopCfm",
+                                                   "stopErp",
+                                                   "stopKd",
+                                                   "stopKp",
+                                                   "fudgeFactor",
+                                                   "fudge_factor",
+                                                   "cfmDamping",
+                                                   "preserveFixedJoint",
+                                                   "disableFixedJointLumping"};
+        if (std::find(std::begin(kOfSolvers), std::end(kOfSolvers), name) != std::end(kOfSolvers))
+          continue;
         const auto leave_out = [&] {
-          findings.unsupported(child->source, "robot " + urdf.getName(), "<" + name + "> in <gazebo reference=\"" + *reference + "\"> is not supported and left out");
+          findings.unsupported(child->source, "robot " + urdf.getName(),
+                               "<" + name + "> in <gazebo reference=\"" + *reference +
+                                   "\"> is not supported and left out");
         };
         if (!urdf.getLink(*reference)) {
           if (urdf.getJoint(*reference)) leave_out();
           continue;
         }
         GazeboLink& link = gazebo[*reference];
-        if (name == "sensor") link.sensors.push_back(child.get());
-        else if (name == "material") link.material = value_of(*child);
-        else if (name == "mu1") link.mu1 = child.get();
-        else if (name == "mu2") link.mu2 = child.get();
-        else if (name == "turnGravityOff") link.gravity_off = child.get();
-        else if (name == "plugin") model->children.push_back(child->clone());
-        else leave_out();
+        if (name == "sensor")
+          link.sensors.push_back(child.get());
+        else if (name == "material")
+          link.material = value_of(*child);
+        else if (name == "mu1")
+          link.mu1 = child.get();
+        else if (name == "mu2")
+          link.mu2 = child.get();
+        else if (name == "turnGravityOff")
+          link.gravity_off = child.get();
+        else if (name == "plugin")
+          model->children.push_back(child->clone());
+        else
+          leave_out();
       }
-      if (reference && !reference->empty() && !urdf.getLink(*reference) && !urdf.getJoint(*reference)) {
-        findings.error(block->source, "robot " + urdf.getName(), "<gazebo reference=\"" + *reference + "\">: there is no link or joint of that name");
+      if (reference && !reference->empty() && !urdf.getLink(*reference) &&
+          !urdf.getJoint(*reference)) {
+        findings.error(
+            block->source, "robot " + urdf.getName(),
+            "<gazebo reference=\"" + *reference + "\">: there is no link or joint of that name");
       }
     }
   }
@@ -187,11 +226,13 @@ struct Converter {
     }
     add(inertial, "mass", source, shown(mass));
     Element& inertia = add(inertial, "inertia", source);
-    const std::pair<const char*, double> moments[] = {{"ixx", ixx}, {"iyy", iyy}, {"izz", izz}, {"ixy", ixy}, {"ixz", ixz}, {"iyz", iyz}};
+    const std::pair<const char*, double> moments[] = {{"ixx", ixx}, {"iyy", iyy}, {"izz", izz},
+                                                      {"ixy", ixy}, {"ixz", ixz}, {"iyz", iyz}};
     for (const auto& [name, value] : moments) add(inertia, name, source, shown(value));
   }
 
-  void add_material(Element& visual, const urdf::Visual& from, const GazeboLink& block, const Source& source) {
+  void add_material(Element& visual, const urdf::Visual& from, const GazeboLink& block,
+                    const Source& source) {
     if (!block.material.empty()) {
       add(add(add(visual, "material", source), "script", source), "name", source, block.material);
       return;
@@ -203,16 +244,23 @@ struct Converter {
     const std::string colour = texture.empty() ? numbers({c.r, c.g, c.b, c.a}) : "1 1 1 1";
     add(material, "ambient", source, colour);
     add(material, "diffuse", source, colour);
-    if (!texture.empty()) add(add(add(material, "pbr", source), "metal", source), "albedo_map", source, texture);
+    if (!texture.empty())
+      add(add(add(material, "pbr", source), "metal", source), "albedo_map", source, texture);
   }
 
   void add_link(const Element& written) {
     const urdf::LinkConstSharedPtr from = urdf.getLink(name_of(written));
     if (!from) return;
     if (from->name == kWorld) {
-      if (from->parent_joint) written.fail("'world' is a reserved name; only the root of all links may have it, which then is the world");
-      if (!from->collision_array.empty() || !from->visual_array.empty() || !gazebo[kWorld].sensors.empty()) {
-        findings.unsupported(written.source, "robot " + urdf.getName(), "the link 'world' is the world itself; its shapes and sensors are left out");
+      if (from->parent_joint)
+        written.fail(
+            "'world' is a reserved name; only the root of all links may have it, which then is the "
+            "world");
+      if (!from->collision_array.empty() || !from->visual_array.empty() ||
+          !gazebo[kWorld].sensors.empty()) {
+        findings.unsupported(
+            written.source, "robot " + urdf.getName(),
+            "the link 'world' is the world itself; its shapes and sensors are left out");
       }
       return;
     }
@@ -221,14 +269,16 @@ struct Converter {
     link.attributes.emplace_back("name", from->name);
     if (from->parent_joint) {
       const std::string& parent = from->parent_joint->parent_link_name;
-      add_pose(link, from->parent_joint->parent_to_joint_origin_transform, written.source, parent == kWorld ? "" : parent);
+      add_pose(link, from->parent_joint->parent_to_joint_origin_transform, written.source,
+               parent == kWorld ? "" : parent);
     }
     if (block.gravity_off) {
       const auto off = block.gravity_off->clone();
       off->text = value_of(*off);
       add(link, "gravity", off->source, off->as_boolean() ? "false" : "true");
     }
-    add_inertial(link, *from, written.child("inertial") ? written.child("inertial")->source : written.source);
+    add_inertial(link, *from,
+                 written.child("inertial") ? written.child("inertial")->source : written.source);
     const auto lines = [&](const char* name, size_t i) {
       const auto all = written.all(name);
       return i < all.size() ? all[i]->source : written.source;
@@ -236,11 +286,13 @@ struct Converter {
     for (size_t i = 0; i < from->collision_array.size(); ++i) {
       const Source source = lines("collision", i);
       Element& collision = add(link, "collision", source);
-      collision.attributes.emplace_back("name", i == 0 ? "collision" : "collision_" + std::to_string(i));
+      collision.attributes.emplace_back("name",
+                                        i == 0 ? "collision" : "collision_" + std::to_string(i));
       add_pose(collision, from->collision_array[i]->origin, source);
       add_geometry(collision, from->collision_array[i]->geometry.get(), source);
       if (block.mu1 || block.mu2) {
-        Element& ode = add(add(add(collision, "surface", source), "friction", source), "ode", source);
+        Element& ode =
+            add(add(add(collision, "surface", source), "friction", source), "ode", source);
         if (block.mu1) add(ode, "mu", block.mu1->source, value_of(*block.mu1));
         if (block.mu2) add(ode, "mu2", block.mu2->source, value_of(*block.mu2));
       }
@@ -259,11 +311,13 @@ struct Converter {
   void add_joint(const Element& written) {
     const urdf::JointConstSharedPtr from = urdf.getJoint(required_name(written));
     if (!from) return;
-    static const std::map<int, const char*> kTypes = {
-        {urdf::Joint::FIXED, "fixed"},         {urdf::Joint::REVOLUTE, "revolute"}, {urdf::Joint::CONTINUOUS, "continuous"},
-        {urdf::Joint::PRISMATIC, "prismatic"}, {urdf::Joint::PLANAR, "planar"}};
+    static const std::map<int, const char*> kTypes = {{urdf::Joint::FIXED, "fixed"},
+                                                      {urdf::Joint::REVOLUTE, "revolute"},
+                                                      {urdf::Joint::CONTINUOUS, "continuous"},
+                                                      {urdf::Joint::PRISMATIC, "prismatic"},
+                                                      {urdf::Joint::PLANAR, "planar"}};
     const auto type = kTypes.find(from->type);
-    if (type == kTypes.end()) return;    // floating: nothing ties the two
+    if (type == kTypes.end()) return;  // floating: nothing ties the two
     const Source& source = written.source;
     Element& joint = add(*model, "joint", source);
     joint.attributes.emplace_back("name", from->name);
@@ -304,7 +358,8 @@ void refuse_xacro(const Element& element) {
   for (const auto& child : element.children) refuse_xacro(*child);
 }
 
-// urdfdom names what it stumbles over, without the line: the link or joint whose name its message has in brackets or quotes.
+// urdfdom names what it stumbles over, without the line: the link or joint whose name its message
+// has in brackets or quotes.
 const Element& whom_it_names(const std::string& fault, const Element& robot) {
   for (const char* kind : {"joint", "link"}) {
     for (const Element* each : robot.all(kind)) {
@@ -318,8 +373,8 @@ const Element& whom_it_names(const std::string& fault, const Element& robot) {
 }
 
 struct Parsed {
-  urdf::ModelInterfaceSharedPtr model;    // null: urdfdom gave up
-  std::vector<std::string> errors;        // what it said
+  urdf::ModelInterfaceSharedPtr model;  // null: urdfdom gave up
+  std::vector<std::string> errors;      // what it said
 };
 
 Parsed parse(const Element& robot) {
@@ -336,33 +391,40 @@ Parsed parse(const Element& robot) {
   return parsed;
 }
 
-// The part of a link at which urdfdom stopped, for it leaves out what comes after a fault; null: it read all of them. It
-// reads the inertia first, then what is seen, then what collides.
-const Element* faulty_part(const Element& link, const urdf::Link& read, const std::set<std::string>& of_bad_inertia) {
-  if (link.has("inertial") && of_bad_inertia.count(name_of(link)) > 0) return link.child("inertial");
+// The part of a link at which urdfdom stopped, for it leaves out what comes after a fault; null: it
+// read all of them. It reads the inertia first, then what is seen, then what collides.
+const Element* faulty_part(const Element& link, const urdf::Link& read,
+                           const std::set<std::string>& of_bad_inertia) {
+  if (link.has("inertial") && of_bad_inertia.count(name_of(link)) > 0)
+    return link.child("inertial");
   const auto seen = link.all("visual"), solid = link.all("collision");
   if (read.visual_array.size() < seen.size()) return seen[read.visual_array.size()];
   if (read.collision_array.size() < solid.size()) return solid[read.collision_array.size()];
   return nullptr;
 }
 
-// Takes the parts out that urdfdom cannot read, so that it reads the others; true when there were any.
+// Takes the parts out that urdfdom cannot read, so that it reads the others; true when there were
+// any.
 bool leave_out_faults(Element& robot, const Parsed& parsed, Findings& findings) {
   constexpr size_t kMostSaid = 300;
   std::string said;
-  std::set<std::string> of_bad_inertia;    // links: "... inertial element for Link [NAME]"
+  std::set<std::string> of_bad_inertia;  // links: "... inertial element for Link [NAME]"
   for (const std::string& error : parsed.errors) {
     if (said.size() <= kMostSaid) said += (said.empty() ? "" : "; ") + error;
     const size_t open = error.rfind('['), close = error.rfind(']');
-    if (error.find("inertial") != std::string::npos && open < close) of_bad_inertia.insert(error.substr(open + 1, close - open - 1));
+    if (error.find("inertial") != std::string::npos && open < close)
+      of_bad_inertia.insert(error.substr(open + 1, close - open - 1));
   }
   if (said.size() > kMostSaid) said.replace(kMostSaid, std::string::npos, " ...");
   bool any = false;
   for (const auto& link : robot.children) {
-    const urdf::LinkConstSharedPtr read = link->name == "link" ? parsed.model->getLink(name_of(*link)) : nullptr;
+    const urdf::LinkConstSharedPtr read =
+        link->name == "link" ? parsed.model->getLink(name_of(*link)) : nullptr;
     const Element* fault = read ? faulty_part(*link, *read, of_bad_inertia) : nullptr;
     if (!fault) continue;
-    findings.error(fault->source, "link " + name_of(*link), "this <" + fault->name + "> is left out, urdfdom cannot read it: " + (said.empty() ? "it does not say why" : said));
+    findings.error(fault->source, "link " + name_of(*link),
+                   "this <" + fault->name + "> is left out, urdfdom cannot read it: " +
+                       (said.empty() ? "it does not say why" : said));
     std::erase_if(link->children, [&](const auto& child) { return child.get() == fault; });
     any = true;
   }
@@ -379,29 +441,36 @@ std::unique_ptr<Element> urdf_as_sdf(const Element& written, Findings& findings)
   for (const char* kind : {"link", "joint"}) {
     std::map<std::string, const Element*> seen;
     for (const Element* each : robot.all(kind)) {
-      if (!seen.try_emplace(name_of(*each), each).second) each->fail("a second <" + std::string(kind) + "> of the name '" + name_of(*each) + "'");
+      if (!seen.try_emplace(name_of(*each), each).second)
+        each->fail("a second <" + std::string(kind) + "> of the name '" + name_of(*each) + "'");
     }
   }
   Parsed parsed = parse(robot);
-  constexpr int kMostFaults = 20;    // in one link
-  for (int i = 0; i < kMostFaults && parsed.model && parsed.model->getRoot() && leave_out_faults(robot, parsed, findings); ++i) parsed = parse(robot);
+  constexpr int kMostFaults = 20;  // in one link
+  for (int i = 0; i < kMostFaults && parsed.model && parsed.model->getRoot() &&
+                  leave_out_faults(robot, parsed, findings);
+       ++i)
+    parsed = parse(robot);
   const urdf::ModelInterfaceSharedPtr& urdf = parsed.model;
   const std::string fault = parsed.errors.empty() ? "unknown reason" : parsed.errors.front();
-  if (!urdf || !urdf->getRoot()) whom_it_names(fault, robot).fail("urdfdom cannot read it: " + fault);
+  if (!urdf || !urdf->getRoot())
+    whom_it_names(fault, robot).fail("urdfdom cannot read it: " + fault);
 
   Converter converter{robot, findings, *urdf, {}};
   Element& model = *converter.model;
   model.name = "model";
   model.source = robot.source;
   model.attributes.emplace_back("name", name);
-  if (urdf->getRoot()->name != kWorld) model.attributes.emplace_back("canonical_link", urdf->getRoot()->name);
+  if (urdf->getRoot()->name != kWorld)
+    model.attributes.emplace_back("canonical_link", urdf->getRoot()->name);
   converter.read_gazebo();
   for (const Element* link : robot.all("link")) converter.add_link(*link);
   for (const Element* joint : robot.all("joint")) converter.add_joint(*joint);
-  for (const char* kind : {"transmission", "ros2_control"}) {    // for the drive's reader
+  for (const char* kind : {"transmission", "ros2_control"}) {  // for the drive's reader
     for (const Element* each : robot.all(kind)) model.children.push_back(each->clone());
   }
-  if (!model.has("ruedo:joints")) add(model, "ruedo:joints", robot.source);    // a <robot> is one, be it an arm without sensors
+  if (!model.has("ruedo:joints"))
+    add(model, "ruedo:joints", robot.source);  // a <robot> is one, be it an arm without sensors
   return std::move(converter.model);
 }
 

@@ -1,8 +1,9 @@
-// The world as the files describe it: immutable once loaded, shared by every other part of the program.
+// The world as the files describe it: immutable once loaded, shared by every other part of the
+// program.
 //
-// A Model is what one file says; a ModelInstance places it. A thousand robots of one kind share one Model.
-// Nested models are flattened: their links, joints and sensors carry the scoped name ("arm.wrist").
-// Frames: W world, M model, L link, J joint, S sensor, C collision, V visual.
+// A Model is what one file says; a ModelInstance places it. A thousand robots of one kind share one
+// Model. Nested models are flattened: their links, joints and sensors carry the scoped name
+// ("arm.wrist"). Frames: W world, M model, L link, J joint, S sensor, C collision, V visual.
 #pragma once
 
 #include <cstdint>
@@ -21,33 +22,37 @@ namespace ruedo::model {
 
 enum class Shape { box, sphere, cylinder, capsule, ellipsoid, cone, plane, mesh };
 
-// A shape in its own frame, centred at the origin; cylinder, capsule and cone stand along z (the cone's apex up).
+// A shape in its own frame, centred at the origin; cylinder, capsule and cone stand along z (the
+// cone's apex up).
 struct Geometry {
   Shape shape = Shape::box;
-  // box: full lengths; sphere: radius in x; cylinder, cone: radius in x, length in y; capsule: radius in x,
-  // length of the cylindrical part in y; ellipsoid: radii; plane: unused. Metres.
+  // box: full lengths; sphere: radius in x; cylinder, cone: radius in x, length in y; capsule:
+  // radius in x, length of the cylindrical part in y; ellipsoid: radii; plane: unused. Metres.
   Vec3 size = Vec3::Ones();
-  Vec3 normal = Vec3::UnitZ();           // plane only; the plane goes through the origin and is infinite
-  Eigen::Vector2d extent{100, 100};      // plane only: how much of it is drawn
-  std::shared_ptr<const Mesh> mesh;      // mesh only; polylines and heightmaps are meshes too
-  Vec3 scale = Vec3::Ones();             // mesh only
+  Vec3 normal = Vec3::UnitZ();  // plane only; the plane goes through the origin and is infinite
+  Eigen::Vector2d extent{100, 100};  // plane only: how much of it is drawn
+  std::shared_ptr<const Mesh> mesh;  // mesh only; polylines and heightmaps are meshes too
+  Vec3 scale = Vec3::Ones();         // mesh only
 };
 
 // What contact and rays need to know of a surface.
 struct Surface {
-  double friction = 1.0;                 // Coulomb, SDF's mu
-  double friction2 = 1.0;                // across, SDF's mu2
-  Vec3 friction_direction = Vec3::Zero();    // of `friction`, in the collision's frame, SDF's fdir1; zero: none
-  double slip = 0.0, slip2 = 0.0;        // m/s per N, along and across, SDF's slip1 and slip2
-  double torsional = 0.0;                // coefficient of the friction that turning on the spot meets
-  double patch_radius = 0.0;             // m, of that; 0: from the depth of the contact and the surface's radius
-  double surface_radius = 0.0;           // m
-  double rolling = 0.0;                  // m: moment that rolling meets for a newton of load, friction/bullet/rolling_friction
-  double stiffness = 0.0, damping = 0.0; // N/m, N s/m, SDF's kp and kd; 0: rigid
+  double friction = 1.0;   // Coulomb, SDF's mu
+  double friction2 = 1.0;  // across, SDF's mu2
+  Vec3 friction_direction =
+      Vec3::Zero();  // of `friction`, in the collision's frame, SDF's fdir1; zero: none
+  double slip = 0.0, slip2 = 0.0;  // m/s per N, along and across, SDF's slip1 and slip2
+  double torsional = 0.0;          // coefficient of the friction that turning on the spot meets
+  double patch_radius =
+      0.0;  // m, of that; 0: from the depth of the contact and the surface's radius
+  double surface_radius = 0.0;  // m
+  double rolling =
+      0.0;  // m: moment that rolling meets for a newton of load, friction/bullet/rolling_friction
+  double stiffness = 0.0, damping = 0.0;  // N/m, N s/m, SDF's kp and kd; 0: rigid
   double restitution = 0.0;
-  double laser_reflectance = 1.0;        // ruedo:laser_reflectance, 0 to 1
-  double laser_mirror = 0.0;             // part of the light that leaves like from a mirror
-  double acoustic_reflectance = 1.0;     // ruedo:acoustic_reflectance, 0 to 1
+  double laser_reflectance = 1.0;     // ruedo:laser_reflectance, 0 to 1
+  double laser_mirror = 0.0;          // part of the light that leaves like from a mirror
+  double acoustic_reflectance = 1.0;  // ruedo:acoustic_reflectance, 0 to 1
 };
 
 struct Collision {
@@ -62,8 +67,8 @@ struct Visual {
   std::string name;
   Pose X_LV;
   Geometry geometry;
-  std::optional<Material> material;      // absent: the mesh's own, or grey
-  double transparency = 0.0;             // 0 opaque, 1 invisible
+  std::optional<Material> material;  // absent: the mesh's own, or grey
+  double transparency = 0.0;         // 0 opaque, 1 invisible
   bool cast_shadows = true;
 };
 
@@ -71,20 +76,20 @@ struct Light {
   enum class Type { directional, point, spot };
   std::string name;
   Type type = Type::point;
-  Pose pose;                             // in the world, or in the link that carries it
-  Vec3 direction = -Vec3::UnitZ();       // in the light's frame
+  Pose pose;                        // in the world, or in the link that carries it
+  Vec3 direction = -Vec3::UnitZ();  // in the light's frame
   Rgba diffuse{1, 1, 1, 1};
   Rgba specular{0.1f, 0.1f, 0.1f, 1};
   double range = 10.0, constant = 1.0, linear = 0.0, quadratic = 0.0;
-  double inner_angle = 0.0, outer_angle = 0.0, falloff = 0.0;    // spot, rad
+  double inner_angle = 0.0, outer_angle = 0.0, falloff = 0.0;  // spot, rad
   double intensity = 1.0;
   bool cast_shadows = false;
 };
 
 struct Inertial {
-  double mass = 1.0;                     // kg
-  Pose X_LI;                             // centre of mass, axes of the moments
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Identity();    // kg m^2, about the centre of mass, in I
+  double mass = 1.0;                                      // kg
+  Pose X_LI;                                              // centre of mass, axes of the moments
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Identity();  // kg m^2, about the centre of mass, in I
 };
 
 struct Link {
@@ -102,116 +107,131 @@ struct Link {
 enum class JointType { fixed, revolute, continuous, prismatic, ball, universal, screw };
 
 struct JointAxis {
-  Vec3 axis_in_J = Vec3::UnitZ();        // unit vector, in the joint's frame (expressed_in is resolved)
+  Vec3 axis_in_J = Vec3::UnitZ();  // unit vector, in the joint's frame (expressed_in is resolved)
   double lower = -std::numeric_limits<double>::infinity();
   double upper = std::numeric_limits<double>::infinity();
   double effort = std::numeric_limits<double>::infinity();
   double velocity = std::numeric_limits<double>::infinity();
   double damping = 0.0, friction = 0.0;
-  double spring_stiffness = 0.0, spring_reference = 0.0;    // N m/rad or N/m, towards that position
-  double position_gain = 20.0;           // 1/s: rate for what is missing of a position that it was told
-  double rate_gain = std::numeric_limits<double>::infinity();    // N m s/rad or N s/m: effort for what is missing of a rate
+  double spring_stiffness = 0.0, spring_reference = 0.0;  // N m/rad or N/m, towards that position
+  double position_gain = 20.0;  // 1/s: rate for what is missing of a position that it was told
+  double rate_gain = std::numeric_limits<double>::infinity();  // N m s/rad or N s/m: effort for
+                                                               // what is missing of a rate
 };
 
 struct Joint {
   std::string name;
   JointType type = JointType::fixed;
-  int parent = -1;                       // index into links; -1: the world
+  int parent = -1;  // index into links; -1: the world
   int child = 0;
-  Pose X_MJ;                             // at the start
-  JointAxis axis, axis2;                 // axis2: universal only
-  double advance = 0.0;                  // m/rad along the axis: screw only
-  int leader = -1;                       // index into joints: the one that this one mimics
-  double mimic_multiplier = 1.0, mimic_offset = 0.0, mimic_reference = 0.0;    // multiplier (leader - reference) + offset
+  Pose X_MJ;              // at the start
+  JointAxis axis, axis2;  // axis2: universal only
+  double advance = 0.0;   // m/rad along the axis: screw only
+  int leader = -1;        // index into joints: the one that this one mimics
+  double mimic_multiplier = 1.0, mimic_offset = 0.0,
+         mimic_reference = 0.0;  // multiplier (leader - reference) + offset
   Source source;
 };
 
 // A sensor of a file, still as its element: the sensor's own source file reads it.
 struct SensorDescription {
-  std::string name;                      // the device's name: unique in its model, fit for a channel
-  std::string type;                      // SDF's type: "ray", "gpu_lidar", "lidar", "sonar", "camera", "custom", ...
+  std::string name;  // the device's name: unique in its model, fit for a channel
+  std::string type;  // SDF's type: "ray", "gpu_lidar", "lidar", "sonar", "camera", "custom", ...
   int link = 0;
   Pose X_LS;
   std::shared_ptr<const Element> element;
 };
 
-// How a robot drives: read from <ruedo:drive>, or mapped from a Gazebo plugin. See docs/world-files.md.
+// How a robot drives: read from <ruedo:drive>, or mapped from a Gazebo plugin. See
+// docs/world-files.md.
 struct DriveDescription {
   enum class Kind { kinematic, wheels };
-  // How its wheels let it move. holonomic: in every direction, whatever its wheels are (Gazebo's planar move).
+  // How its wheels let it move. holonomic: in every direction, whatever its wheels are (Gazebo's
+  // planar move).
   enum class Steering { differential, tracked, ackermann, tricycle, mecanum, omni, holonomic };
   Kind kind = Kind::kinematic;
   Steering steering = Steering::differential;
-  bool guessed = false;                  // no file says how the robot drives; its joints look like wheels
-  std::vector<int> left_joints, right_joints;    // wheel joints, front first; holonomic and tracked may have none
-  std::vector<int> steer_joints;         // Ackermann, tricycle: turn about the vertical, with the wheels that hang on them
-  double wheel_radius = 0.0;             // m
-  double track = 0.0;                    // m, between the left and right wheels
-  double wheelbase = 0.0;                // m: Ackermann, tricycle: from the fixed axle to the steered one; mecanum: between the axles
-  double max_steering_angle = 0.0;       // rad, of a wheel in the middle of the steered axle
-  double max_steering_rate = std::numeric_limits<double>::infinity();    // rad/s, of that wheel
-  Pose X_MBase;                          // base_link: on the ground below the centre of rotation, x ahead
-  double max_speed = std::numeric_limits<double>::infinity();            // m/s
-  double max_side_speed = std::numeric_limits<double>::infinity();       // m/s to the left or right: mecanum, omni, holonomic
-  double max_turn_rate = std::numeric_limits<double>::infinity();        // rad/s
-  double acceleration = std::numeric_limits<double>::infinity();         // m/s^2
-  double deceleration = std::numeric_limits<double>::infinity();         // m/s^2
-  double turn_acceleration = std::numeric_limits<double>::infinity();    // rad/s^2
-  double max_force = std::numeric_limits<double>::infinity();            // N, of the drive as a whole
-  double max_wheel_torque = std::numeric_limits<double>::infinity();     // N m, wheels drive
-  double max_wheel_rate = std::numeric_limits<double>::infinity();       // rad/s
-  int64_t watchdog_us = 600'000;         // 0: off
-  bool traction = true;                  // kinematic: no more force than friction under its wheels gives, where it drives on contacts
-  bool on_odometry = false;              // primitives measure their way by the odometry; wheels: always
+  bool guessed = false;  // no file says how the robot drives; its joints look like wheels
+  std::vector<int> left_joints,
+      right_joints;               // wheel joints, front first; holonomic and tracked may have none
+  std::vector<int> steer_joints;  // Ackermann, tricycle: turn about the vertical, with the wheels
+                                  // that hang on them
+  double wheel_radius = 0.0;      // m
+  double track = 0.0;             // m, between the left and right wheels
+  double wheelbase = 0.0;         // m: Ackermann, tricycle: from the fixed axle to the steered one;
+                                  // mecanum: between the axles
+  double max_steering_angle = 0.0;  // rad, of a wheel in the middle of the steered axle
+  double max_steering_rate = std::numeric_limits<double>::infinity();  // rad/s, of that wheel
+  Pose X_MBase;  // base_link: on the ground below the centre of rotation, x ahead
+  double max_speed = std::numeric_limits<double>::infinity();          // m/s
+  double max_side_speed = std::numeric_limits<double>::infinity();     // m/s to the left or right:
+                                                                       // mecanum, omni, holonomic
+  double max_turn_rate = std::numeric_limits<double>::infinity();      // rad/s
+  double acceleration = std::numeric_limits<double>::infinity();       // m/s^2
+  double deceleration = std::numeric_limits<double>::infinity();       // m/s^2
+  double turn_acceleration = std::numeric_limits<double>::infinity();  // rad/s^2
+  double max_force = std::numeric_limits<double>::infinity();          // N, of the drive as a whole
+  double max_wheel_torque = std::numeric_limits<double>::infinity();   // N m, wheels drive
+  double max_wheel_rate = std::numeric_limits<double>::infinity();     // rad/s
+  int64_t watchdog_us = 600'000;                                       // 0: off
+  bool traction = true;  // kinematic: no more force than friction under its wheels gives, where it
+                         // drives on contacts
+  bool on_odometry = false;  // primitives measure their way by the odometry; wheels: always
   // What the robot believes of itself is off by these parts: <ruedo:odometry>'s errors.
-  double radius_error[2] = {0.0, 0.0}, track_error = 0.0;    // left, right
+  double radius_error[2] = {0.0, 0.0}, track_error = 0.0;  // left, right
   // wheels: the servo of each wheel's encoder, and its motor, at the motor's shaft.
-  double servo_rate_gain = 0.0;          // N m s/rad at the wheel; 0: from the robot's mass
-  double servo_angle_gain = 0.0;         // N m/rad at the wheel; 0: from the gain of the rate
-  double gear = 1.0;                     // turns of the motor for one of the wheel
-  double stall_torque = std::numeric_limits<double>::infinity();      // N m
-  double no_load_rate = std::numeric_limits<double>::infinity();      // rad/s
-  double yaw_gain = 0.0;                 // 1/s: turns the robot back to the heading of its gyro; 0: off
-  double gyro_bias = 0.0, gyro_scale_error = 0.0;    // rad/s; relative
+  double servo_rate_gain = 0.0;   // N m s/rad at the wheel; 0: from the robot's mass
+  double servo_angle_gain = 0.0;  // N m/rad at the wheel; 0: from the gain of the rate
+  double gear = 1.0;              // turns of the motor for one of the wheel
+  double stall_torque = std::numeric_limits<double>::infinity();  // N m
+  double no_load_rate = std::numeric_limits<double>::infinity();  // rad/s
+  double yaw_gain = 0.0;  // 1/s: turns the robot back to the heading of its gyro; 0: off
+  double gyro_bias = 0.0, gyro_scale_error = 0.0;  // rad/s; relative
   Rate odometry_rate{50, 1}, pose_rate{50, 1}, status_rate{10, 1};
-  std::shared_ptr<const Element> element;    // <ruedo:drive> or <plugin>; null when synthesised
-  std::shared_ptr<const Element> odometry;   // <ruedo:odometry>; null: ideal encoders, arc integrator
+  std::shared_ptr<const Element> element;  // <ruedo:drive> or <plugin>; null when synthesised
+  std::shared_ptr<const Element>
+      odometry;  // <ruedo:odometry>; null: ideal encoders, arc integrator
 };
 
 struct Model {
-  std::string name;                      // as the file says
+  std::string name;  // as the file says
   bool is_static = false;
   bool self_collide = false;
-  std::vector<Link> links;               // links[0] is the canonical link, or the first
+  std::vector<Link> links;  // links[0] is the canonical link, or the first
   std::vector<Joint> joints;
   std::vector<SensorDescription> sensors;
   std::optional<DriveDescription> drive;
-  bool commanded = false;                // its joints take commands, which makes a robot of an arm without sensors
-  std::shared_ptr<const Element> path;   // <ruedo:path> or an actor's trajectory; null: none
+  bool commanded =
+      false;  // its joints take commands, which makes a robot of an arm without sensors
+  std::shared_ptr<const Element> path;  // <ruedo:path> or an actor's trajectory; null: none
   Source source;
 };
 
 struct ModelInstance {
-  std::string name;                      // unique in the world, fit for a channel
+  std::string name;  // unique in the world, fit for a channel
   Pose X_WM;
   std::shared_ptr<const Model> model;
-  bool removed = false;                  // while the world runs: its place in all lists stays, and it is nowhere
-  bool is_robot() const { return model->drive.has_value() || !model->sensors.empty() || model->commanded; }
+  bool removed = false;  // while the world runs: its place in all lists stays, and it is nowhere
+  bool is_robot() const {
+    return model->drive.has_value() || !model->sensors.empty() || model->commanded;
+  }
 };
 
 struct Sky {
   Rgba ambient{0.4f, 0.4f, 0.4f, 1};
   Rgba background{0.7f, 0.7f, 0.7f, 1};
-  bool sky = false;                      // a gradient and a horizon instead of the background colour
+  bool sky = false;  // a gradient and a horizon instead of the background colour
   bool shadows = true;
 };
 
 // <physics><bullet>: how contacts and joints are solved.
 struct SolverDescription {
-  int iterations = 500;                  // sweeps at most
-  double tolerance = 1e-5;               // m/s: a sweep that changes no velocity by more is the last one
-  double error_reduction = 0.2;          // part of a penetration or of a joint's error that a substep undoes
-  int substeps = 0;                      // of a step, for everything; 0: as many as steps of 5 ms take, of 1 ms where joints are
+  int iterations = 500;     // sweeps at most
+  double tolerance = 1e-5;  // m/s: a sweep that changes no velocity by more is the last one
+  double error_reduction =
+      0.2;  // part of a penetration or of a joint's error that a substep undoes
+  int substeps =
+      0;  // of a step, for everything; 0: as many as steps of 5 ms take, of 1 ms where joints are
 };
 
 struct WorldModel {
@@ -222,11 +242,12 @@ struct WorldModel {
   SolverDescription solver;
   Sky sky;
   std::vector<Light> lights;
-  std::vector<ModelInstance> models;     // in file order; --spawn's after them
-  std::vector<Finding> findings;         // what was unsupported or repaired
-  std::vector<std::string> files_read;   // absolute paths, in the order of first reading
-  std::vector<std::string> disabled;     // "ROBOT/odometry", ...: channels of a robot itself that are switched off
-  std::vector<Fault> faults;             // each names a robot of the world
+  std::vector<ModelInstance> models;    // in file order; --spawn's after them
+  std::vector<Finding> findings;        // what was unsupported or repaired
+  std::vector<std::string> files_read;  // absolute paths, in the order of first reading
+  std::vector<std::string>
+      disabled;  // "ROBOT/odometry", ...: channels of a robot itself that are switched off
+  std::vector<Fault> faults;  // each names a robot of the world
 };
 
 }  // namespace ruedo::model

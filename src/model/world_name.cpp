@@ -41,7 +41,8 @@ std::string joined(const std::vector<std::string>& words) {
 std::string world_file(const std::string& name) {
   std::error_code error;
   if (fs::exists(name, error)) return name;
-  if (name.empty() || name.find('/') != std::string::npos || fs::path(name).has_extension()) throw InputError({name, 0}, "no such file");
+  if (name.empty() || name.find('/') != std::string::npos || fs::path(name).has_extension())
+    throw InputError({name, 0}, "no such file");
   std::set<std::string> known;
   std::vector<std::string> searched;
   for (const fs::path& folder : folders()) {
@@ -52,10 +53,13 @@ std::string world_file(const std::string& name) {
     }
     for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
       const std::string extension = entry.path().extension().string();
-      if (std::find(std::begin(kEndings), std::end(kEndings), extension) != std::end(kEndings)) known.insert(entry.path().stem().string());
+      if (std::find(std::begin(kEndings), std::end(kEndings), extension) != std::end(kEndings))
+        known.insert(entry.path().stem().string());
     }
   }
-  throw InputError({name, 0}, "no such file, and no world of that name; there are " + joined({known.begin(), known.end()}) + " (searched in " + joined(searched) + ")");
+  throw InputError({name, 0}, "no such file, and no world of that name; there are " +
+                                  joined({known.begin(), known.end()}) + " (searched in " +
+                                  joined(searched) + ")");
 }
 
 }  // namespace ruedo::model

@@ -30,7 +30,9 @@ class Folder {
  public:
   Folder() {
     std::string pattern = (fs::temp_directory_path() / "ruedo-xacro-XXXXXX").string();
-    if (!::mkdtemp(pattern.data())) throw InputError({}, std::string("no folder for xacro's output can be made: ") + std::strerror(errno));
+    if (!::mkdtemp(pattern.data()))
+      throw InputError(
+          {}, std::string("no folder for xacro's output can be made: ") + std::strerror(errno));
     path_ = pattern;
   }
   ~Folder() {
@@ -103,7 +105,8 @@ std::string text_or_nothing(const std::string& path) {
 // "FILE:LINE", which expand.py gave each element.
 void take_lines(Element& element, const Source& above) {
   element.source = above;
-  const auto at = std::find_if(element.attributes.begin(), element.attributes.end(), [](const auto& each) { return each.first == "ruedo_at"; });
+  const auto at = std::find_if(element.attributes.begin(), element.attributes.end(),
+                               [](const auto& each) { return each.first == "ruedo_at"; });
   if (at != element.attributes.end()) {
     const size_t colon = at->second.rfind(':');
     element.source = {at->second.substr(0, colon), std::atoi(at->second.c_str() + colon + 1)};
@@ -123,32 +126,40 @@ std::string xacro_python() {
 }
 
 bool is_xacro(const std::string& path, const Element* root) {
-  std::error_code error;    // a text that came with a request is none: only what is on the disk is run
+  std::error_code
+      error;  // a text that came with a request is none: only what is on the disk is run
   if (!fs::is_regular_file(path, error)) return false;
   if (fs::path(path).extension() == ".xacro") return true;
   if (!root || root->name != "robot") return false;
-  return std::any_of(root->children.begin(), root->children.end(), [](const auto& child) { return child->name.rfind("xacro:", 0) == 0; });
+  return std::any_of(root->children.begin(), root->children.end(),
+                     [](const auto& child) { return child->name.rfind("xacro:", 0) == 0; });
 }
 
 std::shared_ptr<const Element> expand_xacro(const std::string& path, ReadContext& context) {
   const Folder folder;
   const std::string out = folder / "robot.urdf", log = folder / "messages";
   std::vector<std::string> words{xacro_python(), script(), path, out};
-  for (const std::string& root : context.resources.folders()) words.insert(words.end(), {"--folder", root});
-  for (const std::string& argument : context.xacro_arguments) words.insert(words.end(), {"--argument", argument});
+  for (const std::string& root : context.resources.folders())
+    words.insert(words.end(), {"--folder", root});
+  for (const std::string& argument : context.xacro_arguments)
+    words.insert(words.end(), {"--argument", argument});
   const int code = run(words, log);
   if (code != 0) {
     std::string why = text_or_nothing(log);
     why.erase(std::find(why.begin(), why.end(), '\n'), why.end());
     if (code == 127) why = "Python is missing (" + words[0] + "); xacro needs it";
     if (code == -1) why = "it needs more than " + std::to_string(kCpu_s) + " s, or more than 2 GB";
-    throw InputError({path, 0}, "the xacro file cannot be expanded: " + (why.empty() ? "it does not say why" : why));
+    throw InputError({path, 0}, "the xacro file cannot be expanded: " +
+                                    (why.empty() ? "it does not say why" : why));
   }
   std::string line;
-  for (std::istringstream files(text_or_nothing(out + ".files")); std::getline(files, line);) context.documents.note(line);
+  for (std::istringstream files(text_or_nothing(out + ".files")); std::getline(files, line);)
+    context.documents.note(line);
   for (std::istringstream lines(text_or_nothing(out + ".missing")); std::getline(lines, line);) {
     const size_t tab = line.find('\t');
-    context.findings.error({line.substr(0, tab), 0}, "xacro", "the include '" + line.substr(std::min(tab, line.size() - 1) + 1) + "' is not found; it is passed over");
+    context.findings.error({line.substr(0, tab), 0}, "xacro",
+                           "the include '" + line.substr(std::min(tab, line.size() - 1) + 1) +
+                               "' is not found; it is passed over");
   }
   std::unique_ptr<Element> root = parse_document(read_text_file(out, kLargest_bytes), path);
   take_lines(*root, {path, 1});

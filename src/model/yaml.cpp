@@ -7,7 +7,7 @@ namespace ruedo::model {
 namespace {
 
 constexpr int kDeepest = 32;
-constexpr size_t kMostNodes = 100'000;    // aliases can name the same node again and again
+constexpr size_t kMostNodes = 100'000;  // aliases can name the same node again and again
 
 struct Converter {
   const std::string& file;
@@ -15,14 +15,19 @@ struct Converter {
 
   void convert(const YAML::Node& node, Element& into, int depth) {
     into.source = {file, node.Mark().line + 1};
-    if (depth > kDeepest) throw InputError(into.source, "YAML that is nested more than " + std::to_string(kDeepest) + " deep");
-    if (++nodes > kMostNodes) throw InputError(into.source, "YAML of more than " + std::to_string(kMostNodes) + " entries");
+    if (depth > kDeepest)
+      throw InputError(into.source,
+                       "YAML that is nested more than " + std::to_string(kDeepest) + " deep");
+    if (++nodes > kMostNodes)
+      throw InputError(into.source, "YAML of more than " + std::to_string(kMostNodes) + " entries");
     if (node.IsScalar()) {
       into.text = node.Scalar();
     } else if (node.IsSequence()) {
       for (const YAML::Node& item : node) convert(item, child(into, "item"), depth + 1);
     } else if (node.IsMap()) {
-      for (const auto& entry : node) convert(entry.second, child(into, entry.first.IsScalar() ? entry.first.Scalar() : ""), depth + 1);
+      for (const auto& entry : node)
+        convert(entry.second, child(into, entry.first.IsScalar() ? entry.first.Scalar() : ""),
+                depth + 1);
     }
   }
 
@@ -41,7 +46,8 @@ std::unique_ptr<Element> parse_yaml(const std::string& text, const std::string& 
     const YAML::Node node = YAML::Load(text);
     Converter{file}.convert(node, *root, 0);
   } catch (const YAML::Exception& error) {
-    throw InputError({file, error.mark.is_null() ? 0 : error.mark.line + 1}, "is no YAML: " + error.msg);
+    throw InputError({file, error.mark.is_null() ? 0 : error.mark.line + 1},
+                     "is no YAML: " + error.msg);
   }
   return root;
 }

@@ -8,7 +8,8 @@ namespace ruedo::physics {
 namespace {
 
 constexpr double kSlack_m = 0.05;
-constexpr size_t kPartners = 8, kFound = 64;    // room for so many beforehand: the running loop allocates none
+constexpr size_t kPartners = 8,
+                 kFound = 64;  // room for so many beforehand: the running loop allocates none
 
 btDbvtVolume widened(const btVector3& low, const btVector3& high, double by) {
   btDbvtVolume volume = btDbvtVolume::FromMM(low, high);
@@ -16,11 +17,13 @@ btDbvtVolume widened(const btVector3& low, const btVector3& high, double by) {
   return volume;
 }
 
-// A plane has half a space inside: a box overlaps it when its lowest corner along the normal is below.
+// A plane has half a space inside: a box overlaps it when its lowest corner along the normal is
+// below.
 bool reaches_plane(const btDbvtVolume& box, const btCollisionObject& object) {
   const auto* plane = static_cast<const btStaticPlaneShape*>(object.getCollisionShape());
   const btVector3 normal = object.getWorldTransform().getBasis() * plane->getPlaneNormal();
-  const btVector3 on_plane = object.getWorldTransform() * (plane->getPlaneNormal() * plane->getPlaneConstant());
+  const btVector3 on_plane =
+      object.getWorldTransform() * (plane->getPlaneNormal() * plane->getPlaneConstant());
   const btVector3 half = box.Extents();
   return normal.dot(box.Center() - on_plane) <= normal.absolute().dot(half);
 }
@@ -36,11 +39,12 @@ struct Collect : btDbvt::ICollide {
 
 Broadphase::~Broadphase() = default;
 
-btBroadphaseProxy* Broadphase::createProxy(const btVector3& low, const btVector3& high, int shape_type, void* object,
-                                           int group, int mask, btDispatcher* dispatcher) {
+btBroadphaseProxy* Broadphase::createProxy(const btVector3& low, const btVector3& high,
+                                           int shape_type, void* object, int group, int mask,
+                                           btDispatcher* dispatcher) {
   const int id = ++made_;
   Proxy& proxy = proxies_[id];
-  const bool empty = low.x() > high.x();    // of a compound without shapes
+  const bool empty = low.x() > high.x();  // of a compound without shapes
   proxy.m_aabbMin = empty ? btVector3(0, 0, 0) : low;
   proxy.m_aabbMax = empty ? btVector3(0, 0, 0) : high;
   proxy.m_clientObject = object;
@@ -54,8 +58,9 @@ btBroadphaseProxy* Broadphase::createProxy(const btVector3& low, const btVector3
     planes_.push_back(&proxy);
     return &proxy;
   }
-  proxy.leaf = proxy.moves ? moving_.insert(widened(proxy.m_aabbMin, proxy.m_aabbMax, kSlack_m), &proxy)
-                           : fixed_.insert(btDbvtVolume::FromMM(proxy.m_aabbMin, proxy.m_aabbMax), &proxy);
+  proxy.leaf = proxy.moves
+                   ? moving_.insert(widened(proxy.m_aabbMin, proxy.m_aabbMax, kSlack_m), &proxy)
+                   : fixed_.insert(btDbvtVolume::FromMM(proxy.m_aabbMin, proxy.m_aabbMax), &proxy);
   if (proxy.moves) find_pairs(proxy, dispatcher);
   return &proxy;
 }
@@ -68,7 +73,8 @@ void Broadphase::destroyProxy(btBroadphaseProxy* base, btDispatcher* dispatcher)
   proxies_.erase(proxy->m_uniqueId);
 }
 
-void Broadphase::setAabb(btBroadphaseProxy* base, const btVector3& low, const btVector3& high, btDispatcher* dispatcher) {
+void Broadphase::setAabb(btBroadphaseProxy* base, const btVector3& low, const btVector3& high,
+                         btDispatcher* dispatcher) {
   auto& proxy = *static_cast<Proxy*>(base);
   proxy.m_aabbMin = low;
   proxy.m_aabbMax = high;
@@ -91,7 +97,8 @@ void Broadphase::refilter(btBroadphaseProxy* base, btDispatcher* dispatcher) {
 }
 
 bool Broadphase::overlap(const Proxy& a, const Proxy& b) const {
-  if (!b.leaf) return reaches_plane(a.leaf->volume, *static_cast<btCollisionObject*>(b.m_clientObject));
+  if (!b.leaf)
+    return reaches_plane(a.leaf->volume, *static_cast<btCollisionObject*>(b.m_clientObject));
   return Intersect(a.leaf->volume, b.leaf->volume);
 }
 
@@ -109,8 +116,11 @@ void Broadphase::find_pairs(Proxy& proxy, btDispatcher* dispatcher) {
   }
   const auto& object = *static_cast<btCollisionObject*>(proxy.m_clientObject);
   for (Proxy* other : found_) {
-    if (other == &proxy || std::find(proxy.partners.begin(), proxy.partners.end(), other) != proxy.partners.end()) continue;
-    if (filter_.may_touch(object, *static_cast<btCollisionObject*>(other->m_clientObject))) add_pair(proxy, *other);
+    if (other == &proxy ||
+        std::find(proxy.partners.begin(), proxy.partners.end(), other) != proxy.partners.end())
+      continue;
+    if (filter_.may_touch(object, *static_cast<btCollisionObject*>(other->m_clientObject)))
+      add_pair(proxy, *other);
   }
 }
 
@@ -132,15 +142,16 @@ void Broadphase::getAabb(btBroadphaseProxy* proxy, btVector3& low, btVector3& hi
   high = proxy->m_aabbMax;
 }
 
-void Broadphase::aabbTest(const btVector3& low, const btVector3& high, btBroadphaseAabbCallback& callback) {
+void Broadphase::aabbTest(const btVector3& low, const btVector3& high,
+                          btBroadphaseAabbCallback& callback) {
   for (auto& [id, proxy] : proxies_) {
     if (TestAabbAgainstAabb2(low, high, proxy.m_aabbMin, proxy.m_aabbMax)) callback.process(&proxy);
   }
 }
 
 // Rays are cast by the scene, never here; this only keeps the interface whole.
-void Broadphase::rayTest(const btVector3&, const btVector3&, btBroadphaseRayCallback& callback, const btVector3&,
-                         const btVector3&) {
+void Broadphase::rayTest(const btVector3&, const btVector3&, btBroadphaseRayCallback& callback,
+                         const btVector3&, const btVector3&) {
   for (auto& [id, proxy] : proxies_) callback.process(&proxy);
 }
 

@@ -1,22 +1,27 @@
-// Bullet's headers in double precision, and the conversions between its types and ours. Included by the sources
-// of this folder only.
+// Bullet's headers in double precision, and the conversions between its types and ours. Included by
+// the sources of this folder only.
 #pragma once
 
 #include <btBulletDynamicsCommon.h>
 
 #include "ruedo/pose.h"
 
-// Without BT_USE_DOUBLE_PRECISION, Bullet's headers compile all the same, and everything breaks at run time.
+// Without BT_USE_DOUBLE_PRECISION, Bullet's headers compile all the same, and everything breaks at
+// run time.
 static_assert(sizeof(btScalar) == 8, "Bullet must be used in double precision");
 
 namespace ruedo::physics {
 
 inline btVector3 to_bt(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 inline btQuaternion to_bt(const Quat& q) { return {q.x(), q.y(), q.z(), q.w()}; }
-inline btTransform to_bt(const Pose& X) { return btTransform(to_bt(X.rotation), to_bt(X.translation)); }
+inline btTransform to_bt(const Pose& X) {
+  return btTransform(to_bt(X.rotation), to_bt(X.translation));
+}
 
 inline Vec3 from_bt(const btVector3& v) { return {v.x(), v.y(), v.z()}; }
 inline Quat from_bt(const btQuaternion& q) { return {q.w(), q.x(), q.y(), q.z()}; }
-inline Pose from_bt(const btTransform& X) { return {from_bt(X.getRotation()), from_bt(X.getOrigin())}; }
+inline Pose from_bt(const btTransform& X) {
+  return {from_bt(X.getRotation()), from_bt(X.getOrigin())};
+}
 
 }  // namespace ruedo::physics

@@ -15,15 +15,18 @@ constexpr double kSamePlace_m = 5e-3;
 // Room beforehand: a face has four points, and most bodies touch two others at most.
 constexpr size_t kRoom = 64, kRoomPerBody = 8;
 
-// The entry of a child shape in one of ObjectInfo's lists; Bullet says no child for what is a single shape.
+// The entry of a child shape in one of ObjectInfo's lists; Bullet says no child for what is a
+// single shape.
 int entry_of(const ObjectInfo& info, const std::vector<int>& list, int child) {
-  if (info.body < 0 || child < 0 || static_cast<size_t>(child) >= list.size()) return list.empty() ? -1 : list.front();
+  if (info.body < 0 || child < 0 || static_cast<size_t>(child) >= list.size())
+    return list.empty() ? -1 : list.front();
   return list[static_cast<size_t>(child)];
 }
 
 bool earlier(const Contact& a, const Contact& b) {
   const auto key = [](const Contact& c) {
-    return std::tuple(c.body_a, c.link_a, c.body_b, c.link_b, c.position.x(), c.position.y(), c.position.z(), c.depth);
+    return std::tuple(c.body_a, c.link_a, c.body_b, c.link_b, c.position.x(), c.position.y(),
+                      c.position.z(), c.depth);
   };
   return key(a) < key(b);
 }
@@ -72,7 +75,8 @@ void ContactBook::clear(double step_s) {
   near_.clear();
 }
 
-void ContactBook::add(const std::vector<btPersistentManifold*>& manifolds, int substeps, bool last) {
+void ContactBook::add(const std::vector<btPersistentManifold*>& manifolds, int substeps,
+                      bool last) {
   several_ |= !last;
   for (const btPersistentManifold* each : manifolds) {
     const btPersistentManifold& manifold = *each;
@@ -93,7 +97,8 @@ void ContactBook::add(const std::vector<btPersistentManifold*>& manifolds, int s
       const bool touches = point.getAppliedImpulse() > 0.0 || contact.depth >= 0.0;
       if (touches) contact.force = point.getAppliedImpulse() * substeps / step_s_;
       // Static things come second; of two bodies the lower number comes first.
-      if (contact.body_a < 0 || (contact.body_b >= 0 && contact.body_b < contact.body_a)) contact = swapped(contact);
+      if (contact.body_a < 0 || (contact.body_b >= 0 && contact.body_b < contact.body_a))
+        contact = swapped(contact);
       if (touches) {
         contacts_.push_back(contact);
       } else if (last) {
@@ -106,14 +111,17 @@ void ContactBook::add(const std::vector<btPersistentManifold*>& manifolds, int s
 // The same place in several substeps: their impulses add up.
 void ContactBook::merge() {
   merged_.clear();
-  size_t first = 0;    // of the same two links
+  size_t first = 0;  // of the same two links
   for (const Contact& contact : contacts_) {
-    if (!merged_.empty() && (merged_.back().link_a != contact.link_a || merged_.back().link_b != contact.link_b)) {
+    if (!merged_.empty() &&
+        (merged_.back().link_a != contact.link_a || merged_.back().link_b != contact.link_b)) {
       first = merged_.size();
     }
-    const auto same = std::find_if(merged_.begin() + static_cast<std::ptrdiff_t>(first), merged_.end(), [&](const Contact& other) {
-      return (other.position - contact.position).norm() < kSamePlace_m;
-    });
+    const auto same =
+        std::find_if(merged_.begin() + static_cast<std::ptrdiff_t>(first), merged_.end(),
+                     [&](const Contact& other) {
+                       return (other.position - contact.position).norm() < kSamePlace_m;
+                     });
     if (same == merged_.end()) {
       merged_.push_back(contact);
     } else {

@@ -1,5 +1,5 @@
-// The contacts of a step: read from Bullet's manifolds after each substep, put into a fixed order, and sorted by
-// the bodies that take part.
+// The contacts of a step: read from Bullet's manifolds after each substep, put into a fixed order,
+// and sorted by the bodies that take part.
 #pragma once
 
 #include <span>
@@ -15,19 +15,19 @@ class ContactBook {
   explicit ContactBook(size_t bodies) : touching_(bodies), near_(bodies) { make_room(bodies); }
 
   void resize(size_t bodies) { touching_.resize(bodies), near_.resize(bodies), make_room(bodies); }
-  // For so many contacts memory is taken beforehand, so that new ones do not allocate in the running loop. What is not
-  // used costs addresses only.
+  // For so many contacts memory is taken beforehand, so that new ones do not allocate in the
+  // running loop. What is not used costs addresses only.
   size_t room() const { return contacts_.capacity(); }
 
   // Starts a step of that length (s).
   void clear(double step_s);
-  // Adds what manifolds hold after a substep; the last one of a step says what is near. Where everything sleeps, one
-  // call stands for `substeps`.
+  // Adds what manifolds hold after a substep; the last one of a step says what is near. Where
+  // everything sleeps, one call stands for `substeps`.
   void add(const std::vector<btPersistentManifold*>& manifolds, int substeps, bool last);
   // Ends the step.
   void finish();
 
-  const std::vector<Contact>& all() const { return contacts_; }    // those that touched
+  const std::vector<Contact>& all() const { return contacts_; }  // those that touched
   std::span<const Contact> touching(int body) const { return touching_.of(body); }
   std::span<const Contact> near(int body) const { return near_.of(body); }
 
@@ -47,17 +47,17 @@ class ContactBook {
 
    private:
     std::vector<Contact> entries_;
-    std::vector<std::pair<size_t, size_t>> ranges_;    // first, count
+    std::vector<std::pair<size_t, size_t>> ranges_;  // first, count
   };
 
   void make_room(size_t bodies);
   void merge();
 
   double step_s_ = 0.0;
-  bool several_ = false;              // substeps of the same manifolds
+  bool several_ = false;  // substeps of the same manifolds
   std::vector<Contact> contacts_;
-  std::vector<Contact> near_only_;    // of the last substep
-  std::vector<Contact> merged_;       // scratch
+  std::vector<Contact> near_only_;  // of the last substep
+  std::vector<Contact> merged_;     // scratch
   ByBody touching_, near_;
 };
 

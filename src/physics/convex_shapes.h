@@ -1,5 +1,5 @@
-// Convex shapes that Bullet lacks: an exact ellipsoid, and a tyre, which touches the ground in one point as a
-// sphere does but is no wider than the wheel.
+// Convex shapes that Bullet lacks: an exact ellipsoid, and a tyre, which touches the ground in one
+// point as a sphere does but is no wider than the wheel.
 //
 // Both are given to Bullet's GJK by their support function.
 #pragma once
@@ -12,11 +12,15 @@ class ConvexShape : public btConvexInternalShape {
  public:
   ConvexShape() { m_shapeType = CUSTOM_CONVEX_SHAPE_TYPE; }
 
-  void batchedUnitVectorGetSupportingVertexWithoutMargin(const btVector3* directions, btVector3* supports,
+  void batchedUnitVectorGetSupportingVertexWithoutMargin(const btVector3* directions,
+                                                         btVector3* supports,
                                                          int count) const override {
-    for (int i = 0; i < count; ++i) supports[i] = localGetSupportingVertexWithoutMargin(directions[i]);
+    for (int i = 0; i < count; ++i)
+      supports[i] = localGetSupportingVertexWithoutMargin(directions[i]);
   }
-  void getAabb(const btTransform& X, btVector3& low, btVector3& high) const override { getAabbSlow(X, low, high); }
+  void getAabb(const btTransform& X, btVector3& low, btVector3& high) const override {
+    getAabbSlow(X, low, high);
+  }
   // Moments of inertia come from the world file, never from shapes.
   void calculateLocalInertia(btScalar, btVector3& inertia) const override { inertia.setZero(); }
 };
@@ -36,8 +40,9 @@ class EllipsoidShape final : public ConvexShape {
   btVector3 radii_;
 };
 
-// All points within width / 2 of a disc: the shape of a wheel with a round tyre. The axis is z; radius and width
-// (m) are the outer ones. The tyre's roundness is Bullet's collision margin, the disc its core.
+// All points within width / 2 of a disc: the shape of a wheel with a round tyre. The axis is z;
+// radius and width (m) are the outer ones. The tyre's roundness is Bullet's collision margin, the
+// disc its core.
 class TyreShape final : public ConvexShape {
  public:
   TyreShape(btScalar radius, btScalar width) : core_(radius - btMin(width / 2, radius)) {

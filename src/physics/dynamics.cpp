@@ -11,22 +11,28 @@ namespace ruedo::physics {
 
 namespace {
 
-constexpr size_t kTouchingABody = 8;    // usually, and at most
-
+constexpr size_t kTouchingABody = 8;  // usually, and at most
 
 // Bullet's island tag is a body's number in bodies_; of what takes no part it is negative.
 bool takes_part(const btCollisionObject& object) { return object.getIslandTag() >= 0; }
-size_t number(const btCollisionObject& object) { return static_cast<size_t>(object.getIslandTag()); }
+size_t number(const btCollisionObject& object) {
+  return static_cast<size_t>(object.getIslandTag());
+}
 // What the solver may move: a mover and a wall tie nothing together.
-bool can_be_moved(const btCollisionObject& object) { return takes_part(object) && !object.isStaticOrKinematicObject(); }
+bool can_be_moved(const btCollisionObject& object) {
+  return takes_part(object) && !object.isStaticOrKinematicObject();
+}
 
-const btCollisionObject& object_of(const btBroadphaseProxy& proxy) { return *static_cast<const btCollisionObject*>(proxy.m_clientObject); }
+const btCollisionObject& object_of(const btBroadphaseProxy& proxy) {
+  return *static_cast<const btCollisionObject*>(proxy.m_clientObject);
+}
 
 bool asleep(const btRigidBody& body) { return body.getActivationState() == ISLAND_SLEEPING; }
 
 bool moves(const btCollisionObject& object) {
   const auto* body = btRigidBody::upcast(&object);
-  return body && body->isKinematicObject() && !(body->getLinearVelocity().isZero() && body->getAngularVelocity().isZero());
+  return body && body->isKinematicObject() &&
+         !(body->getLinearVelocity().isZero() && body->getAngularVelocity().isZero());
 }
 
 int id_of(const btCollisionObject& object) { return object.getBroadphaseHandle()->m_uniqueId; }
@@ -36,12 +42,14 @@ std::tuple<int, int, int, int> place_of(const btPersistentManifold& manifold) {
   return {id_of(*manifold.getBody0()), id_of(*manifold.getBody1()), first.m_index0, first.m_index1};
 }
 
-// Bullet finds one contact of a lying cylinder a substep, at one of its ends, and keeps what it found at the other. Those
-// points roll with the cylinder, to behind its axle, and lift it from there: it would roll faster and faster. So they are
-// moved back to below the axle.
-// `outward` is the contact's normal away from `body`; p and q are the contact's points on the body and on the other one.
-void keep_below_its_axle(const btCollisionObject& body, const btCollisionObject& other, btManifoldPoint& point, int child,
-                         const btVector3& outward, btVector3& p_W, btVector3& p_Body, btVector3& q_W, btVector3& q_Other) {
+// Bullet finds one contact of a lying cylinder a substep, at one of its ends, and keeps what it
+// found at the other. Those points roll with the cylinder, to behind its axle, and lift it from
+// there: it would roll faster and faster. So they are moved back to below the axle. `outward` is
+// the contact's normal away from `body`; p and q are the contact's points on the body and on the
+// other one.
+void keep_below_its_axle(const btCollisionObject& body, const btCollisionObject& other,
+                         btManifoldPoint& point, int child, const btVector3& outward,
+                         btVector3& p_W, btVector3& p_Body, btVector3& q_W, btVector3& q_Other) {
   const btCollisionShape* shape = body.getCollisionShape();
   btTransform X_WS = body.getWorldTransform();
   if (shape->isCompound()) {
@@ -53,10 +61,11 @@ void keep_below_its_axle(const btCollisionObject& body, const btCollisionObject&
   if (shape->getShapeType() != CYLINDER_SHAPE_PROXYTYPE) return;
   const btVector3 axis = X_WS.getBasis().getColumn(2);
   const btVector3 down = outward - outward.dot(axis) * axis;
-  constexpr btScalar kLying = 0.7;    // of a unit normal across the axis
+  constexpr btScalar kLying = 0.7;  // of a unit normal across the axis
   if (down.length2() < kLying * kLying) return;
   const btScalar radius = static_cast<const btCylinderShapeZ*>(shape)->getRadius();
-  const btVector3 moved = X_WS.getOrigin() + (p_W - X_WS.getOrigin()).dot(axis) * axis + radius * down.normalized();
+  const btVector3 moved =
+      X_WS.getOrigin() + (p_W - X_WS.getOrigin()).dot(axis) * axis + radius * down.normalized();
   btVector3 along = moved - p_W;
   if (along.length2() > gContactBreakingThreshold * gContactBreakingThreshold) return;
   along -= along.dot(outward) * outward;
@@ -72,16 +81,20 @@ void keep_below_its_axle(const btCollisionObject& body, const btCollisionObject&
 void Dynamics::keep_below_the_axle(btPersistentManifold& manifold) {
   for (int k = 0; k < manifold.getNumContacts(); ++k) {
     btManifoldPoint& point = manifold.getContactPoint(k);
-    keep_below_its_axle(*manifold.getBody0(), *manifold.getBody1(), point, point.m_index0, -point.m_normalWorldOnB,
-                        point.m_positionWorldOnA, point.m_localPointA, point.m_positionWorldOnB, point.m_localPointB);
-    keep_below_its_axle(*manifold.getBody1(), *manifold.getBody0(), point, point.m_index1, point.m_normalWorldOnB,
-                        point.m_positionWorldOnB, point.m_localPointB, point.m_positionWorldOnA, point.m_localPointA);
+    keep_below_its_axle(*manifold.getBody0(), *manifold.getBody1(), point, point.m_index0,
+                        -point.m_normalWorldOnB, point.m_positionWorldOnA, point.m_localPointA,
+                        point.m_positionWorldOnB, point.m_localPointB);
+    keep_below_its_axle(*manifold.getBody1(), *manifold.getBody0(), point, point.m_index1,
+                        point.m_normalWorldOnB, point.m_positionWorldOnB, point.m_localPointB,
+                        point.m_positionWorldOnA, point.m_localPointA);
   }
 }
 
-Dynamics::Dynamics(btDispatcher& dispatcher, btBroadphaseInterface& broadphase, btCollisionConfiguration& configuration,
-                   const ContactSurfaces& surfaces, const SolverSettings& settings)
-    : btDiscreteDynamicsWorld(&dispatcher, &broadphase, nullptr, &configuration), solver_(surfaces, settings) {}
+Dynamics::Dynamics(btDispatcher& dispatcher, btBroadphaseInterface& broadphase,
+                   btCollisionConfiguration& configuration, const ContactSurfaces& surfaces,
+                   const SolverSettings& settings)
+    : btDiscreteDynamicsWorld(&dispatcher, &broadphase, nullptr, &configuration),
+      solver_(surfaces, settings) {}
 
 void Dynamics::reserve(size_t bodies) {
   bodies_.reserve(bodies);
@@ -97,7 +110,7 @@ void Dynamics::reserve(size_t bodies) {
 }
 
 void Dynamics::take(const std::vector<btRigidBody*>& bodies) {
-  m_collisionObjects.resizeNoInitialize(0);    // Bullet's own lists: nobody uses them
+  m_collisionObjects.resizeNoInitialize(0);  // Bullet's own lists: nobody uses them
   m_nonStaticRigidBodies.resizeNoInitialize(0);
   for (btRigidBody* body : bodies_) body->setIslandTag(-1);
   bodies_ = bodies;
@@ -108,19 +121,24 @@ void Dynamics::take(const std::vector<btRigidBody*>& bodies) {
   if (bodies_.empty()) return;
   btBroadphasePairArray& pairs = getPairCache()->getOverlappingPairArray();
   for (int i = 0; i < pairs.size(); ++i) {
-    if (takes_part(object_of(*pairs[i].m_pProxy0)) || takes_part(object_of(*pairs[i].m_pProxy1))) pairs_.push_back(&pairs[i]);
+    if (takes_part(object_of(*pairs[i].m_pProxy0)) || takes_part(object_of(*pairs[i].m_pProxy1)))
+      pairs_.push_back(&pairs[i]);
   }
   std::sort(pairs_.begin(), pairs_.end(), [](const btBroadphasePair* a, const btBroadphasePair* b) {
-    return std::pair(a->m_pProxy0->m_uniqueId, a->m_pProxy1->m_uniqueId) < std::pair(b->m_pProxy0->m_uniqueId, b->m_pProxy1->m_uniqueId);
+    return std::pair(a->m_pProxy0->m_uniqueId, a->m_pProxy1->m_uniqueId) <
+           std::pair(b->m_pProxy0->m_uniqueId, b->m_pProxy1->m_uniqueId);
   });
   for (int i = 0; i < m_constraints.size(); ++i) {
     btTypedConstraint& joint = *m_constraints[i];
-    if (joint.isEnabled() && (takes_part(joint.getRigidBodyA()) || takes_part(joint.getRigidBodyB()))) joints_.push_back(&joint);
+    if (joint.isEnabled() &&
+        (takes_part(joint.getRigidBodyA()) || takes_part(joint.getRigidBodyB())))
+      joints_.push_back(&joint);
   }
 }
 
 bool Dynamics::awake() const {
-  return std::any_of(bodies_.begin(), bodies_.end(), [](const btRigidBody* body) { return body->isActive(); });
+  return std::any_of(bodies_.begin(), bodies_.end(),
+                     [](const btRigidBody* body) { return body->isActive(); });
 }
 
 void Dynamics::find_manifolds() {
@@ -128,18 +146,24 @@ void Dynamics::find_manifolds() {
   for (int i = 0; i < getDispatcher()->getNumManifolds(); ++i) {
     btPersistentManifold* manifold = getDispatcher()->getManifoldByIndexInternal(i);
     if (manifold->getNumContacts() == 0) continue;
-    if (takes_part(*manifold->getBody0()) || takes_part(*manifold->getBody1())) manifolds_.push_back(manifold);
+    if (takes_part(*manifold->getBody0()) || takes_part(*manifold->getBody1()))
+      manifolds_.push_back(manifold);
   }
-  std::sort(manifolds_.begin(), manifolds_.end(), [](const btPersistentManifold* a, const btPersistentManifold* b) { return place_of(*a) < place_of(*b); });
+  std::sort(manifolds_.begin(), manifolds_.end(),
+            [](const btPersistentManifold* a, const btPersistentManifold* b) {
+              return place_of(*a) < place_of(*b);
+            });
 }
 
 void Dynamics::substep(double substep_s) {
-  for (btRigidBody* body : bodies_) if (body->isActive()) body->applyGravity();
+  for (btRigidBody* body : bodies_)
+    if (body->isActive()) body->applyGravity();
   auto& dispatcher = static_cast<btCollisionDispatcher&>(*getDispatcher());
   getDispatchInfo().m_timeStep = substep_s;
   for (btBroadphasePair* pair : pairs_) {
     const bool mesh = is_mesh(object_of(*pair->m_pProxy0)) || is_mesh(object_of(*pair->m_pProxy1));
-    mesh ? collide_with_mesh(*pair, dispatcher, getDispatchInfo()) : btCollisionDispatcher::defaultNearCallback(*pair, dispatcher, getDispatchInfo());
+    mesh ? collide_with_mesh(*pair, dispatcher, getDispatchInfo())
+         : btCollisionDispatcher::defaultNearCallback(*pair, dispatcher, getDispatchInfo());
   }
   find_manifolds();
   for (btPersistentManifold* manifold : manifolds_) keep_below_the_axle(*manifold);
@@ -166,13 +190,15 @@ Dynamics::Island& Dynamics::island_of(const btCollisionObject& a, const btCollis
 void Dynamics::find_islands() {
   parents_.resize(bodies_.size());
   std::iota(parents_.begin(), parents_.end(), size_t{0});
-  for (const btPersistentManifold* manifold : manifolds_) join(*manifold->getBody0(), *manifold->getBody1());
-  for (const btTypedConstraint* joint : joints_) join(joint->getRigidBodyA(), joint->getRigidBodyB());
+  for (const btPersistentManifold* manifold : manifolds_)
+    join(*manifold->getBody0(), *manifold->getBody1());
+  for (const btTypedConstraint* joint : joints_)
+    join(joint->getRigidBodyA(), joint->getRigidBodyB());
   island_count_ = 0;
   island_of_root_.resize(bodies_.size());
   for (size_t i = 0; i < bodies_.size(); ++i) {
     if (!can_be_moved(*bodies_[i])) continue;
-    const size_t of = root(i);    // the smallest number of all
+    const size_t of = root(i);  // the smallest number of all
     if (of == i) {
       island_of_root_[i] = island_count_++;
       if (islands_.size() < island_count_) islands_.emplace_back();
@@ -196,14 +222,17 @@ void Dynamics::find_islands() {
 
 void Dynamics::solve(Island& island, double substep_s) {
   // Movers take part with their velocity, and wake what they touch.
-  bool awake = std::any_of(island.bodies.begin(), island.bodies.end(), [](const btRigidBody* body) { return body->isActive(); });
+  bool awake = std::any_of(island.bodies.begin(), island.bodies.end(),
+                           [](const btRigidBody* body) { return body->isActive(); });
   const size_t own = island.bodies.size();
   for (const btPersistentManifold* manifold : island.manifolds) {
     for (const btCollisionObject* object : {manifold->getBody0(), manifold->getBody1()}) {
       if (!moves(*object)) continue;
       awake = true;
       auto* mover = const_cast<btRigidBody*>(btRigidBody::upcast(object));
-      if (std::find(island.bodies.begin() + static_cast<std::ptrdiff_t>(own), island.bodies.end(), mover) == island.bodies.end()) island.bodies.push_back(mover);
+      if (std::find(island.bodies.begin() + static_cast<std::ptrdiff_t>(own), island.bodies.end(),
+                    mover) == island.bodies.end())
+        island.bodies.push_back(mover);
     }
   }
   if (!awake) return;

@@ -1,8 +1,8 @@
 // Bullet's dynamics world, stepped by us: only the bodies that need it take part, island by island.
 //
-// Bullet's own stepSimulation goes over every object of the world several times; with a thousand robots that touch
-// nothing, that is most of its cost. It also solves islands together, and in an order that others decide; here an
-// island's bits depend on its own bodies alone.
+// Bullet's own stepSimulation goes over every object of the world several times; with a thousand
+// robots that touch nothing, that is most of its cost. It also solves islands together, and in an
+// order that others decide; here an island's bits depend on its own bodies alone.
 #pragma once
 
 #include <vector>
@@ -14,15 +14,18 @@ namespace ruedo::physics {
 
 class Dynamics final : public btDiscreteDynamicsWorld {
  public:
-  Dynamics(btDispatcher& dispatcher, btBroadphaseInterface& broadphase, btCollisionConfiguration& configuration,
-           const ContactSurfaces& surfaces, const SolverSettings& settings);
+  Dynamics(btDispatcher& dispatcher, btBroadphaseInterface& broadphase,
+           btCollisionConfiguration& configuration, const ContactSurfaces& surfaces,
+           const SolverSettings& settings);
 
-  // Room for so many bodies and what they usually touch: until there is more, substeps allocate nothing.
+  // Room for so many bodies and what they usually touch: until there is more, substeps allocate
+  // nothing.
   void reserve(size_t bodies);
 
-  // From now on only these bodies are simulated. All bodies of all pairs and joints must be among them.
+  // From now on only these bodies are simulated. All bodies of all pairs and joints must be among
+  // them.
   void take(const std::vector<btRigidBody*>& bodies);
-  bool awake() const;    // one of them is
+  bool awake() const;  // one of them is
 
   // One substep: forces and gravity to contacts, contacts to velocities, velocities to poses.
   void substep(double substep_s);
@@ -47,10 +50,10 @@ class Dynamics final : public btDiscreteDynamicsWorld {
 
   Solver solver_;
   std::vector<btRigidBody*> bodies_;
-  std::vector<btBroadphasePair*> pairs_;             // of bodies_, in the order of their numbers
+  std::vector<btBroadphasePair*> pairs_;  // of bodies_, in the order of their numbers
   std::vector<btPersistentManifold*> manifolds_;
   std::vector<btTypedConstraint*> joints_;
-  std::vector<size_t> parents_, island_of_root_;     // union-find over bodies_
+  std::vector<size_t> parents_, island_of_root_;  // union-find over bodies_
   std::vector<Island> islands_;
   size_t island_count_ = 0;
 };

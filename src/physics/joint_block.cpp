@@ -1,8 +1,8 @@
 // Bullet's constraints to rows, and their direct solution.
 //
-// Of a row with bounds (a motor's largest torque, a stop) nobody knows beforehand whether it is at one. All motors begin
-// among the rows that are solved directly; one that comes out beyond its bounds goes to those that are relaxed one
-// by one, for the rest of the substep.
+// Of a row with bounds (a motor's largest torque, a stop) nobody knows beforehand whether it is at
+// one. All motors begin among the rows that are solved directly; one that comes out beyond its
+// bounds goes to those that are relaxed one by one, for the rest of the substep.
 #include "physics/joint_block.h"
 
 #include <algorithm>
@@ -14,11 +14,12 @@ namespace ruedo::physics {
 
 namespace {
 
-constexpr double kUnbounded = 1e17;        // Bullet's "infinity" is 1e18 or more
-constexpr double kRegular = 1e-10;         // part of the diagonal: loops of joints say the same twice
-constexpr size_t kMostRows = 8;            // of one of Bullet's constraints
-constexpr size_t kSkip = 12;               // numbers of a row's Jacobian
-constexpr size_t kMostInBlock = 256;       // rows that are solved directly; a longer mechanism's others are relaxed
+constexpr double kUnbounded = 1e17;  // Bullet's "infinity" is 1e18 or more
+constexpr double kRegular = 1e-10;   // part of the diagonal: loops of joints say the same twice
+constexpr size_t kMostRows = 8;      // of one of Bullet's constraints
+constexpr size_t kSkip = 12;         // numbers of a row's Jacobian
+constexpr size_t kMostInBlock =
+    256;  // rows that are solved directly; a longer mechanism's others are relaxed
 
 Vec3 vector_at(const btScalar* v) { return {v[0], v[1], v[2]}; }
 
@@ -37,8 +38,10 @@ void JointBlocks::clear() {
   block_count_ = 0;
 }
 
-// Returns how many rows there are. `reduction` is the part of the joint's error that the rows' velocities undo in a substep.
-int JointBlocks::ask(btTypedConstraint& constraint, double reduction, double substep_s, Values& values) {
+// Returns how many rows there are. `reduction` is the part of the joint's error that the rows'
+// velocities undo in a substep.
+int JointBlocks::ask(btTypedConstraint& constraint, double reduction, double substep_s,
+                     Values& values) {
   btTypedConstraint::btConstraintInfo1 size;
   constraint.buildJacobian();
   constraint.getInfo1(&size);
@@ -64,7 +67,8 @@ int JointBlocks::ask(btTypedConstraint& constraint, double reduction, double sub
   return size.m_numConstraintRows;
 }
 
-void JointBlocks::add(btTypedConstraint& constraint, int a, int b, const SolverBodies& bodies, double substep_s) {
+void JointBlocks::add(btTypedConstraint& constraint, int a, int b, const SolverBodies& bodies,
+                      double substep_s) {
   Values values;
   const int n = ask(constraint, 0.0, substep_s, values);
   auto* motors = static_cast<JointMotors*>(constraint.getUserConstraintPtr());
@@ -101,7 +105,8 @@ void JointBlocks::add_motor(JointMotor& motor, Joint& joint, const SolverBodies&
   row.b = joint.b;
   const auto arm = [&](int body) {
     const btRigidBody* bullet = bodies[static_cast<size_t>(body)].bullet;
-    return bullet ? Vec3(motor.anchor - from_bt(bullet->getCenterOfMassPosition())) : Vec3(Vec3::Zero());
+    return bullet ? Vec3(motor.anchor - from_bt(bullet->getCenterOfMassPosition()))
+                  : Vec3(Vec3::Zero());
   };
   if (motor.linear) {
     row.linear_a = -motor.axis;
@@ -130,7 +135,9 @@ void JointBlocks::prepare(const SolverBodies& bodies) {
   if (rows_.empty()) return;
   parents_.resize(bodies.size());
   std::iota(parents_.begin(), parents_.end(), size_t{0});
-  const auto moves = [&](int body) { return bodies[static_cast<size_t>(body)].inverse_mass != Vec3::Zero(); };
+  const auto moves = [&](int body) {
+    return bodies[static_cast<size_t>(body)].inverse_mass != Vec3::Zero();
+  };
   for (const Joint& joint : joints_) {
     if (!moves(joint.a) || !moves(joint.b)) continue;
     const size_t a = root(static_cast<size_t>(joint.a)), b = root(static_cast<size_t>(joint.b));
@@ -151,7 +158,8 @@ void JointBlocks::prepare(const SolverBodies& bodies) {
     for (size_t i = joint.first; i < joint.first + joint.count; ++i) {
       const Row& row = rows_[i];
       if (row.inverse == 0.0) continue;
-      const bool direct = !is_stop(row) && row.upper > 0.0 && row.lower < 0.0 && blocks_[block].free.size() < kMostInBlock;
+      const bool direct = !is_stop(row) && row.upper > 0.0 && row.lower < 0.0 &&
+                          blocks_[block].free.size() < kMostInBlock;
       (direct ? blocks_[block].free : blocks_[block].bounded).push_back(i);
     }
   }
@@ -172,7 +180,8 @@ void JointBlocks::factor(Block& block) {
       const double* of_j = &block.factor[j * n];
       double sum = of_i[j];
       for (size_t k = 0; k < j; ++k) sum -= of_i[k] * of_j[k];
-      of_i[j] = j < i ? sum / of_j[j] : std::sqrt(std::max(sum, 1e-300 + kRegular * rows_[block.free[i]].response));
+      of_i[j] = j < i ? sum / of_j[j]
+                      : std::sqrt(std::max(sum, 1e-300 + kRegular * rows_[block.free[i]].response));
     }
   }
   block.factored = true;
@@ -258,8 +267,10 @@ double JointBlocks::sweep_push(SolverBodies& bodies) {
     for (size_t i = 0; i < x_.size(); ++i) rows_[block.free[i]].give_push(bodies, x_[i]);
     for (const size_t i : block.bounded) {
       Row& row = rows_[i];
-      if (!is_stop(row)) continue;    // a motor at its limit holds nothing
-      const double wanted = std::clamp(row.push + (row.push_target - row.push_velocity(bodies)) * row.inverse, row.lower, row.upper);
+      if (!is_stop(row)) continue;  // a motor at its limit holds nothing
+      const double wanted =
+          std::clamp(row.push + (row.push_target - row.push_velocity(bodies)) * row.inverse,
+                     row.lower, row.upper);
       worst = std::max(worst, std::abs(wanted - row.push) * row.response);
       row.give_push(bodies, wanted - row.push);
     }
@@ -270,7 +281,8 @@ double JointBlocks::sweep_push(SolverBodies& bodies) {
 void JointBlocks::write_back() const {
   for (const Joint& joint : joints_) {
     const size_t motors = joint.motors[1] ? 2 : joint.motors[0] ? 1 : 0;
-    for (size_t i = 0; i < motors; ++i) joint.motors[i]->impulse = rows_[joint.first + joint.count - motors + i].impulse;
+    for (size_t i = 0; i < motors; ++i)
+      joint.motors[i]->impulse = rows_[joint.first + joint.count - motors + i].impulse;
   }
 }
 

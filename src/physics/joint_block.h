@@ -1,4 +1,5 @@
-// The joints of mechanisms as rows of the solver: those of one mechanism are a block that is solved directly.
+// The joints of mechanisms as rows of the solver: those of one mechanism are a block that is solved
+// directly.
 #pragma once
 
 #include <vector>
@@ -10,32 +11,35 @@ namespace ruedo::physics {
 class JointBlocks {
  public:
   void clear();
-  // Adds the rows of an enabled constraint between two bodies of the solver, with its motors (Bullet's user pointer).
-  void add(btTypedConstraint& constraint, int a, int b, const SolverBodies& bodies, double substep_s);
+  // Adds the rows of an enabled constraint between two bodies of the solver, with its motors
+  // (Bullet's user pointer).
+  void add(btTypedConstraint& constraint, int a, int b, const SolverBodies& bodies,
+           double substep_s);
   // All are added: sorts the rows into blocks.
   void prepare(const SolverBodies& bodies);
   bool empty() const { return rows_.empty(); }
 
-  // Brings all rows to their targets, as far as their bounds allow. Returns how far off the worst was, m/s or rad/s.
+  // Brings all rows to their targets, as far as their bounds allow. Returns how far off the worst
+  // was, m/s or rad/s.
   double sweep(SolverBodies& bodies);
   double sweep_push(SolverBodies& bodies);
-  // The bodies have moved. Sets the rows' push targets to the velocities that bring the joints back together within a
-  // substep; returns the largest.
+  // The bodies have moved. Sets the rows' push targets to the velocities that bring the joints back
+  // together within a substep; returns the largest.
   double look_again(double substep_s);
-  void write_back() const;            // to the motors
+  void write_back() const;  // to the motors
 
  private:
   struct Joint {
-    size_t first = 0, count = 0;      // rows
+    size_t first = 0, count = 0;  // rows
     btTypedConstraint* constraint = nullptr;
-    JointMotor* motors[2] = {};       // of the last rows, in that order
+    JointMotor* motors[2] = {};  // of the last rows, in that order
     int a = 0, b = 0;
     size_t block = 0;
   };
   struct Block {
-    std::vector<size_t> free;         // rows that are solved directly: none of them is at a bound
-    std::vector<size_t> bounded;      // rows at a bound, relaxed one by one
-    std::vector<double> factor;       // Cholesky, lower, by rows, of the free ones
+    std::vector<size_t> free;     // rows that are solved directly: none of them is at a bound
+    std::vector<size_t> bounded;  // rows at a bound, relaxed one by one
+    std::vector<double> factor;   // Cholesky, lower, by rows, of the free ones
     bool factored = false;
   };
 
@@ -48,11 +52,11 @@ class JointBlocks {
 
   std::vector<Row> rows_;
   std::vector<Joint> joints_;
-  std::vector<size_t> parents_;       // union-find over bodies
+  std::vector<size_t> parents_;  // union-find over bodies
   std::vector<Block> blocks_;
   size_t block_count_ = 0;
   std::vector<size_t> block_of_root_;
-  std::vector<double> x_;             // scratch
+  std::vector<double> x_;  // scratch
 };
 
 }  // namespace ruedo::physics

@@ -1,5 +1,5 @@
-// Hinges, sliders, balls and universal joints. Damping and friction act as a motor does, with the rate 0 and a bounded
-// impulse: however large they are, they never reverse a motion.
+// Hinges, sliders, balls and universal joints. Damping and friction act as a motor does, with the
+// rate 0 and a bounded impulse: however large they are, they never reverse a motion.
 #include "physics/joints.h"
 
 #include <algorithm>
@@ -18,8 +18,8 @@ bool limited(const model::JointAxis& axis) {
   return (axis.lower > -kNoLimit || axis.upper < kNoLimit) && axis.lower <= axis.upper;
 }
 
-// Bullet's hinge knows its angle within a turn. Limits beyond that, or on one side only, are held by a window of so
-// much (rad) to both sides of where the joint is, cut off at the limits.
+// Bullet's hinge knows its angle within a turn. Limits beyond that, or on one side only, are held
+// by a window of so much (rad) to both sides of where the joint is, cut off at the limits.
 constexpr double kWindow = 1.5;
 
 bool within_a_turn(const model::JointAxis& axis) { return axis.lower > -M_PI && axis.upper < M_PI; }
@@ -32,10 +32,12 @@ Pose along(const Pose& X, const Vec3& axis_in_J, const Vec3& unit) {
 // A motor's rate that changes by less (m/s or rad/s) wakes nothing that sleeps.
 constexpr double kNewRate = 1e-3;
 
-// Bullet's universal joint counts its angles the other way round; the first is about its frame's z, the second about y.
+// Bullet's universal joint counts its angles the other way round; the first is about its frame's z,
+// the second about y.
 constexpr int kFirst = 2, kSecond = 1, kLocked = 0;
 constexpr double kAside = 1e-9;
-constexpr double kSquare = M_PI / 2 - 1e-3;    // further it cannot turn about the second: there the first axis lies in line
+constexpr double kSquare =
+    M_PI / 2 - 1e-3;  // further it cannot turn about the second: there the first axis lies in line
 
 void set_turns(btRotationalLimitMotor& turns, double lower, double upper) {
   turns.m_loLimit = -upper;
@@ -46,26 +48,36 @@ double bounded(double value, double limit) { return std::clamp(value, -limit, li
 
 }  // namespace
 
-JointConstraint::JointConstraint(const model::Joint& joint, btRigidBody& parent, btRigidBody& child, const Pose& X_PJ,
-                                 const Pose& X_CJ)
-    : type_(joint.type), advance_(joint.advance), multiplier_(joint.mimic_multiplier),
-      offset_(joint.mimic_offset - joint.mimic_multiplier * joint.mimic_reference), limits_(joint.axis), limits2_(joint.axis2), parent_(parent), child_(child), X_PJ_(X_PJ), X_CJ_(X_CJ) {
+JointConstraint::JointConstraint(const model::Joint& joint, btRigidBody& parent, btRigidBody& child,
+                                 const Pose& X_PJ, const Pose& X_CJ)
+    : type_(joint.type),
+      advance_(joint.advance),
+      multiplier_(joint.mimic_multiplier),
+      offset_(joint.mimic_offset - joint.mimic_multiplier * joint.mimic_reference),
+      limits_(joint.axis),
+      limits2_(joint.axis2),
+      parent_(parent),
+      child_(child),
+      X_PJ_(X_PJ),
+      X_CJ_(X_CJ) {
   switch (type_) {
     case model::JointType::revolute:
     case model::JointType::continuous: {
-      auto hinge = std::make_unique<btHingeConstraint>(parent_, child_, to_bt(along(X_PJ, limits_.axis_in_J, Vec3::UnitZ())),
-                                                       to_bt(along(X_CJ, limits_.axis_in_J, Vec3::UnitZ())), true);
+      auto hinge = std::make_unique<btHingeConstraint>(
+          parent_, child_, to_bt(along(X_PJ, limits_.axis_in_J, Vec3::UnitZ())),
+          to_bt(along(X_CJ, limits_.axis_in_J, Vec3::UnitZ())), true);
       if (type_ == model::JointType::revolute && limited(limits_) && within_a_turn(limits_)) {
         hinge->setLimit(limits_.lower, limits_.upper, 1.0, 0.3, 0.0);
       } else {
-        hinge->setLimit(1.0, -1.0);    // none, or a window at each substep
+        hinge->setLimit(1.0, -1.0);  // none, or a window at each substep
       }
       constraint_ = std::move(hinge);
       break;
     }
     case model::JointType::prismatic: {
-      auto slider = std::make_unique<btSliderConstraint>(parent_, child_, to_bt(along(X_PJ, limits_.axis_in_J, Vec3::UnitX())),
-                                                         to_bt(along(X_CJ, limits_.axis_in_J, Vec3::UnitX())), true);
+      auto slider = std::make_unique<btSliderConstraint>(
+          parent_, child_, to_bt(along(X_PJ, limits_.axis_in_J, Vec3::UnitX())),
+          to_bt(along(X_CJ, limits_.axis_in_J, Vec3::UnitX())), true);
       slider->setLowerLinLimit(limited(limits_) ? std::max(limits_.lower, -kNoLimit) : 1.0);
       slider->setUpperLinLimit(limited(limits_) ? std::min(limits_.upper, kNoLimit) : -1.0);
       slider->setLowerAngLimit(0.0);
@@ -73,10 +85,12 @@ JointConstraint::JointConstraint(const model::Joint& joint, btRigidBody& parent,
       constraint_ = std::move(slider);
       break;
     }
-    case model::JointType::screw: {    // a slider that may turn; the thread is a row of its own
-      auto slider = std::make_unique<btSliderConstraint>(parent_, child_, to_bt(along(X_PJ, limits_.axis_in_J, Vec3::UnitX())),
-                                                         to_bt(along(X_CJ, limits_.axis_in_J, Vec3::UnitX())), true);
-      const double one = bounded(limits_.lower * advance_, kNoLimit), other = bounded(limits_.upper * advance_, kNoLimit);
+    case model::JointType::screw: {  // a slider that may turn; the thread is a row of its own
+      auto slider = std::make_unique<btSliderConstraint>(
+          parent_, child_, to_bt(along(X_PJ, limits_.axis_in_J, Vec3::UnitX())),
+          to_bt(along(X_CJ, limits_.axis_in_J, Vec3::UnitX())), true);
+      const double one = bounded(limits_.lower * advance_, kNoLimit),
+                   other = bounded(limits_.upper * advance_, kNoLimit);
       slider->setLowerLinLimit(limited(limits_) && advance_ != 0.0 ? std::min(one, other) : 1.0);
       slider->setUpperLinLimit(limited(limits_) && advance_ != 0.0 ? std::max(one, other) : -1.0);
       slider->setLowerAngLimit(1.0);
@@ -85,7 +99,8 @@ JointConstraint::JointConstraint(const model::Joint& joint, btRigidBody& parent,
       break;
     }
     case model::JointType::ball:
-      constraint_ = std::make_unique<btPoint2PointConstraint>(parent_, child_, to_bt(X_PJ.translation), to_bt(X_CJ.translation));
+      constraint_ = std::make_unique<btPoint2PointConstraint>(
+          parent_, child_, to_bt(X_PJ.translation), to_bt(X_CJ.translation));
       break;
     case model::JointType::universal: {
       // Bullet wants the two axes square to each other; in world coordinates at the start.
@@ -94,15 +109,21 @@ JointConstraint::JointConstraint(const model::Joint& joint, btRigidBody& parent,
       Vec3 second = X_WJ.rotation * joint.axis2.axis_in_J;
       second -= first * first.dot(second);
       if (second.norm() < 1e-6) second = first.unitOrthogonal();
-      btVector3 anchor = to_bt(X_WJ.translation), axis1 = to_bt(first), axis2 = to_bt(Vec3(second.normalized()));
-      axis2_in_C_ = (from_bt(child_.getWorldTransform()).rotation.conjugate() * second).normalized();
-      auto universal = std::make_unique<btUniversalConstraint>(parent_, child_, anchor, axis1, axis2);
-      // Where nothing is amiss to the last bit, Bullet leaves a locked row out. So it is locked a nanometre aside.
+      btVector3 anchor = to_bt(X_WJ.translation), axis1 = to_bt(first),
+                axis2 = to_bt(Vec3(second.normalized()));
+      axis2_in_C_ =
+          (from_bt(child_.getWorldTransform()).rotation.conjugate() * second).normalized();
+      auto universal =
+          std::make_unique<btUniversalConstraint>(parent_, child_, anchor, axis1, axis2);
+      // Where nothing is amiss to the last bit, Bullet leaves a locked row out. So it is locked a
+      // nanometre aside.
       universal->setLinearLowerLimit({kAside, kAside, kAside});
       universal->setLinearUpperLimit({kAside, kAside, kAside});
       set_turns(*universal->getRotationalLimitMotor(kLocked), -kAside, -kAside);
-      set_turns(*universal->getRotationalLimitMotor(kFirst), 1.0, -1.0);    // none, or a window at each substep
-      set_turns(*universal->getRotationalLimitMotor(kSecond), std::max(limits2_.lower, -kSquare), std::min(limits2_.upper, kSquare));
+      set_turns(*universal->getRotationalLimitMotor(kFirst), 1.0,
+                -1.0);  // none, or a window at each substep
+      set_turns(*universal->getRotationalLimitMotor(kSecond), std::max(limits2_.lower, -kSquare),
+                std::min(limits2_.upper, kSquare));
       constraint_ = std::move(universal);
       break;
     }
@@ -124,19 +145,19 @@ double JointConstraint::velocity() const {
     case model::JointType::revolute:
     case model::JointType::continuous:
     case model::JointType::universal:
-    case model::JointType::screw:
-      return axis.dot(turn);
+    case model::JointType::screw: return axis.dot(turn);
     case model::JointType::prismatic: {
       const btVector3 arm = child_.getWorldTransform() * to_bt(X_CJ_.translation);
-      return axis.dot(from_bt(child_.getVelocityInLocalPoint(arm - child_.getCenterOfMassPosition()) -
-                              parent_.getVelocityInLocalPoint(arm - parent_.getCenterOfMassPosition())));
+      return axis.dot(
+          from_bt(child_.getVelocityInLocalPoint(arm - child_.getCenterOfMassPosition()) -
+                  parent_.getVelocityInLocalPoint(arm - parent_.getCenterOfMassPosition())));
     }
-    default:
-      return 0.0;
+    default: return 0.0;
   }
 }
 
-void JointConstraint::set_motor(double rate, double lowest_effort, double highest_effort, double gain) {
+void JointConstraint::set_motor(double rate, double lowest_effort, double highest_effort,
+                                double gain) {
   rate = bounded(rate, limits_.velocity);
   lowest_effort = std::max(lowest_effort, -limits_.effort);
   highest_effort = std::min(highest_effort, limits_.effort);
@@ -162,8 +183,9 @@ void JointConstraint::wake() {
   if (!child_.isStaticObject()) child_.activate(true);
 }
 
-void JointConstraint::turn_on(JointMotor& motor, const Vec3& axis, double rate, double lowest, double highest, double substep_s) const {
-  constexpr double kMost = 1e9;    // an infinite impulse is none
+void JointConstraint::turn_on(JointMotor& motor, const Vec3& axis, double rate, double lowest,
+                              double highest, double substep_s) const {
+  constexpr double kMost = 1e9;  // an infinite impulse is none
   motor.on = highest > 0.0 || lowest < 0.0;
   motor.linear = type_ == model::JointType::prismatic;
   motor.axis = axis;
@@ -188,9 +210,11 @@ void JointConstraint::push(double effort) {
 
 // Bullet counts no whole turns: a window about where the joint is.
 void JointConstraint::limit_first_axis() {
-  const double lower = std::max(limits_.lower, position_ - kWindow), upper = std::min(limits_.upper, position_ + kWindow);
+  const double lower = std::max(limits_.lower, position_ - kWindow),
+               upper = std::min(limits_.upper, position_ + kWindow);
   const double turned = position_ - wrap_angle(position_);
-  set_turns(*static_cast<btUniversalConstraint&>(*constraint_).getRotationalLimitMotor(kFirst), lower - turned, upper - turned);
+  set_turns(*static_cast<btUniversalConstraint&>(*constraint_).getRotationalLimitMotor(kFirst),
+            lower - turned, upper - turned);
 }
 
 void JointConstraint::brake_second_axis(double substep_s) {
@@ -207,18 +231,22 @@ double JointConstraint::advanced() const {
 }
 
 void JointConstraint::hold_thread(double substep_s) {
-  constexpr double kEachSubstep = 0.2;    // of an error that is undone
-  constexpr double kAnything = 1e9;       // N
+  constexpr double kEachSubstep = 0.2;  // of an error that is undone
+  constexpr double kAnything = 1e9;     // N
   const double error = advanced() - advance_ * position_;
-  turn_on(motors_->second, axis_in_world(), -kEachSubstep * error / substep_s, -kAnything, kAnything, substep_s);
+  turn_on(motors_->second, axis_in_world(), -kEachSubstep * error / substep_s, -kAnything,
+          kAnything, substep_s);
   motors_->second.linear = true;
   motors_->second.advance = advance_;
 }
 
 void JointConstraint::follow(double leader_position, double leader_rate, double substep_s) {
-  constexpr double kEachSubstep = 0.3;    // of what it lags
+  constexpr double kEachSubstep = 0.3;  // of what it lags
   follows_ = true;
-  follow_rate_ = bounded(multiplier_ * leader_rate + kEachSubstep * (multiplier_ * leader_position + offset_ - position_) / substep_s, limits_.velocity);
+  follow_rate_ =
+      bounded(multiplier_ * leader_rate +
+                  kEachSubstep * (multiplier_ * leader_position + offset_ - position_) / substep_s,
+              limits_.velocity);
 }
 
 void JointConstraint::before_substep(double substep_s) {
@@ -226,16 +254,19 @@ void JointConstraint::before_substep(double substep_s) {
   if (type_ == model::JointType::screw) hold_thread(substep_s);
   if (type_ == model::JointType::revolute && limited(limits_) && !within_a_turn(limits_)) {
     static_cast<btHingeConstraint&>(*constraint_)
-        .setLimit(std::max(limits_.lower, position_ - kWindow), std::min(limits_.upper, position_ + kWindow), 1.0, 0.3, 0.0);
+        .setLimit(std::max(limits_.lower, position_ - kWindow),
+                  std::min(limits_.upper, position_ + kWindow), 1.0, 0.3, 0.0);
   }
   if (type_ == model::JointType::universal) {
     brake_second_axis(substep_s);
     if (limited(limits_)) limit_first_axis();
   }
   if (type_ == model::JointType::ball || type_ == model::JointType::fixed) return;
-  if (limits_.spring_stiffness > 0.0) push(limits_.spring_stiffness * (limits_.spring_reference - position_));
+  if (limits_.spring_stiffness > 0.0)
+    push(limits_.spring_stiffness * (limits_.spring_reference - position_));
   const Vec3 axis = axis_in_world();
-  if (follows_) return turn_on(motors_->first, axis, follow_rate_, -limits_.effort, limits_.effort, substep_s);
+  if (follows_)
+    return turn_on(motors_->first, axis, follow_rate_, -limits_.effort, limits_.effort, substep_s);
   if (mode_ == Mode::motor) {
     turn_on(motors_->first, axis, command_, lowest_effort_, highest_effort_, substep_s);
     if (std::isfinite(gain_)) motors_->first.softness = 1.0 / (gain_ * substep_s);
@@ -248,31 +279,37 @@ void JointConstraint::before_substep(double substep_s) {
 
 void JointConstraint::after_substep(double substep_s) {
   if (!constraint_ || !constraint_->isEnabled()) return;
-  effort_ = follows_ || mode_ == Mode::motor ? motors_->first.impulse / substep_s : mode_ == Mode::effort ? command_ : 0.0;
+  effort_ = follows_ || mode_ == Mode::motor ? motors_->first.impulse / substep_s
+            : mode_ == Mode::effort          ? command_
+                                             : 0.0;
   switch (type_) {
     case model::JointType::revolute:
     case model::JointType::continuous: {
-      const double angle = static_cast<btHingeConstraint&>(*constraint_)
-                               .getHingeAngle(parent_.getWorldTransform(), child_.getWorldTransform());
+      const double angle =
+          static_cast<btHingeConstraint&>(*constraint_)
+              .getHingeAngle(parent_.getWorldTransform(), child_.getWorldTransform());
       position_ += wrap_angle(angle - position_);
       break;
     }
-    case model::JointType::prismatic:
-      position_ = advanced();
-      break;
+    case model::JointType::prismatic: position_ = advanced(); break;
     case model::JointType::screw: {
       const Vec3 first = X_PJ_.rotation * limits_.axis_in_J, square = first.unitOrthogonal();
-      const Quat turned = from_bt(parent_.getWorldTransform().getRotation()).conjugate() * from_bt(child_.getWorldTransform().getRotation()) *
-                          X_CJ_.rotation * X_PJ_.rotation.conjugate();
+      const Quat turned = from_bt(parent_.getWorldTransform().getRotation()).conjugate() *
+                          from_bt(child_.getWorldTransform().getRotation()) * X_CJ_.rotation *
+                          X_PJ_.rotation.conjugate();
       const Vec3 now = turned * square;
-      position_ += wrap_angle(math::atan2(first.dot(square.cross(now)), square.dot(now)) - position_);
+      position_ +=
+          wrap_angle(math::atan2(first.dot(square.cross(now)), square.dot(now)) - position_);
       break;
     }
     case model::JointType::universal: {
-      // A turn about the parent's axis, then one about the child's: where the child's second axis points, seen along the first.
-      const Quat R_PC = from_bt(parent_.getWorldTransform().getRotation()).conjugate() * from_bt(child_.getWorldTransform().getRotation());
+      // A turn about the parent's axis, then one about the child's: where the child's second axis
+      // points, seen along the first.
+      const Quat R_PC = from_bt(parent_.getWorldTransform().getRotation()).conjugate() *
+                        from_bt(child_.getWorldTransform().getRotation());
       const Vec3 first = X_PJ_.rotation * limits_.axis_in_J;
-      const Vec3 then = X_PJ_.rotation * (X_CJ_.rotation.conjugate() * axis2_in_C_), now = R_PC * axis2_in_C_;
+      const Vec3 then = X_PJ_.rotation * (X_CJ_.rotation.conjugate() * axis2_in_C_),
+                 now = R_PC * axis2_in_C_;
       position_ += wrap_angle(math::atan2(first.dot(then.cross(now)), then.dot(now)) - position_);
       break;
     }

@@ -1,6 +1,7 @@
 // Joints between bodies as Bullet's constraints: limits, damping, friction, motors.
 //
-// A joint's position is 0 at the start and is positive as the child turns or moves about or along the axis.
+// A joint's position is 0 at the start and is positive as the child turns or moves about or along
+// the axis.
 #pragma once
 
 #include <memory>
@@ -15,19 +16,24 @@ namespace ruedo::physics {
 class JointConstraint {
  public:
   // X_PJ, X_CJ: the joint's frame in Bullet's frames I of parent and child.
-  JointConstraint(const model::Joint& joint, btRigidBody& parent, btRigidBody& child, const Pose& X_PJ, const Pose& X_CJ);
+  JointConstraint(const model::Joint& joint, btRigidBody& parent, btRigidBody& child,
+                  const Pose& X_PJ, const Pose& X_CJ);
 
-  btTypedConstraint* constraint() { return constraint_.get(); }    // null: nothing to hold (no such joint)
+  btTypedConstraint* constraint() {
+    return constraint_.get();
+  }  // null: nothing to hold (no such joint)
 
-  // Of a universal joint these, and what it is told, are about its first axis; a ball joint has none: 0.
-  double position() const { return position_; }    // rad or m
+  // Of a universal joint these, and what it is told, are about its first axis; a ball joint has
+  // none: 0.
+  double position() const { return position_; }  // rad or m
   double velocity() const;
   double effort() const { return effort_; }
 
-  // Holds that rate within these efforts until another command (rad/s or m/s; N m or N). With a gain (N m s/rad or N s/m)
-  // the effort is in proportion to what is missing of the rate; infinite: the rate is held at once.
+  // Holds that rate within these efforts until another command (rad/s or m/s; N m or N). With a
+  // gain (N m s/rad or N s/m) the effort is in proportion to what is missing of the rate; infinite:
+  // the rate is held at once.
   void set_motor(double rate, double lowest_effort, double highest_effort, double gain);
-  void set_effort(double effort);                  // gives that effort until another command
+  void set_effort(double effort);  // gives that effort until another command
   bool commanded() const { return mode_ != Mode::passive; }
 
   // The bodies were put back to where they started: the position is 0, and no command holds.
@@ -36,12 +42,13 @@ class JointConstraint {
     mode_ = Mode::passive;
   }
 
-  void disable() {    // it holds nothing any more
+  void disable() {  // it holds nothing any more
     if (constraint_) constraint_->setEnabled(false);
     start_again();
   }
 
-  // For the coming substep: another joint leads, and this one goes along, with its largest effort at most. The leader does not feel it.
+  // For the coming substep: another joint leads, and this one goes along, with its largest effort
+  // at most. The leader does not feel it.
   void follow(double leader_position, double leader_rate, double substep_s);
   void before_substep(double substep_s);
   void after_substep(double substep_s);
@@ -50,25 +57,27 @@ class JointConstraint {
   enum class Mode { passive, motor, effort };
   Vec3 axis_in_world() const;
   void wake();
-  void turn_on(JointMotor& motor, const Vec3& axis, double rate, double lowest, double highest, double substep_s) const;
-  void push(double effort);                        // for one substep
-  void limit_first_axis();                         // of a universal joint, for one substep
+  void turn_on(JointMotor& motor, const Vec3& axis, double rate, double lowest, double highest,
+               double substep_s) const;
+  void push(double effort);  // for one substep
+  void limit_first_axis();   // of a universal joint, for one substep
   void brake_second_axis(double substep_s);
-  double advanced() const;                         // m along the axis since the start
+  double advanced() const;  // m along the axis since the start
   void hold_thread(double substep_s);
 
   model::JointType type_;
-  double advance_;                                 // m/rad: screw only
-  double multiplier_, offset_;                     // of the leader's position
-  bool follows_ = false;                           // in the coming substep, at follow_rate_
+  double advance_;              // m/rad: screw only
+  double multiplier_, offset_;  // of the leader's position
+  bool follows_ = false;        // in the coming substep, at follow_rate_
   double follow_rate_ = 0.0;
-  model::JointAxis limits_, limits2_;              // of the second axis: universal only
+  model::JointAxis limits_, limits2_;  // of the second axis: universal only
   btRigidBody& parent_;
   btRigidBody& child_;
   Pose X_PJ_, X_CJ_;
-  Vec3 axis2_in_C_ = Vec3::UnitY();                // universal only
+  Vec3 axis2_in_C_ = Vec3::UnitY();  // universal only
   std::unique_ptr<btTypedConstraint> constraint_;
-  std::unique_ptr<JointMotors> motors_ = std::make_unique<JointMotors>();    // the constraint points to it
+  std::unique_ptr<JointMotors> motors_ =
+      std::make_unique<JointMotors>();  // the constraint points to it
   Mode mode_ = Mode::passive;
   double command_ = 0.0, lowest_effort_ = 0.0, highest_effort_ = 0.0, gain_ = 0.0;
   double position_ = 0.0, effort_ = 0.0;

@@ -31,7 +31,9 @@ void PhysicsWorld::drive(int body, const Twist& twist) {
   motion.mean = twist;
 }
 
-void PhysicsWorld::set_gravity(int body, const Vec3& gravity) { impl_->bullet(body).setGravity(to_bt(gravity)); }
+void PhysicsWorld::set_gravity(int body, const Vec3& gravity) {
+  impl_->bullet(body).setGravity(to_bt(gravity));
+}
 
 double PhysicsWorld::mass(int body) const {
   const double inverse = impl_->bullet(body).getInvMass();
@@ -49,35 +51,53 @@ Eigen::Matrix3d PhysicsWorld::inertia(int body) const {
 void PhysicsWorld::apply_impulse(int body, const Vec3& linear, const Vec3& angular) {
   impl_->apply_impulse(body, linear, angular);
 }
-std::span<const Contact> PhysicsWorld::contacts(int body) const { return impl_->contacts_.touching(body); }
-std::span<const Contact> PhysicsWorld::nearby(int body) const { return impl_->contacts_.near(body); }
+std::span<const Contact> PhysicsWorld::contacts(int body) const {
+  return impl_->contacts_.touching(body);
+}
+std::span<const Contact> PhysicsWorld::nearby(int body) const {
+  return impl_->contacts_.near(body);
+}
 bool PhysicsWorld::alone(int body) const { return impl_->alone(body); }
 void PhysicsWorld::wake(int body) { impl_->bullet(body).activate(true); }
 void PhysicsWorld::sleep(int body) { impl_->sleep(body); }
 bool PhysicsWorld::sleeping(int body) const { return impl_->sleeping(body); }
 
-double PhysicsWorld::joint_position(int joint) const { return impl_->joints_[Impl::index(joint)].position(); }
-double PhysicsWorld::joint_velocity(int joint) const { return impl_->joints_[Impl::index(joint)].velocity(); }
-double PhysicsWorld::joint_effort(int joint) const { return impl_->joints_[Impl::index(joint)].effort(); }
-void PhysicsWorld::drive_joint_velocity(int joint, double rate, double max_effort) {
-  impl_->joints_[Impl::index(joint)].set_motor(rate, -max_effort, max_effort, std::numeric_limits<double>::infinity());
+double PhysicsWorld::joint_position(int joint) const {
+  return impl_->joints_[Impl::index(joint)].position();
 }
-void PhysicsWorld::apply_joint_effort(int joint, double effort) { impl_->joints_[Impl::index(joint)].set_effort(effort); }
+double PhysicsWorld::joint_velocity(int joint) const {
+  return impl_->joints_[Impl::index(joint)].velocity();
+}
+double PhysicsWorld::joint_effort(int joint) const {
+  return impl_->joints_[Impl::index(joint)].effort();
+}
+void PhysicsWorld::drive_joint_velocity(int joint, double rate, double max_effort) {
+  impl_->joints_[Impl::index(joint)].set_motor(rate, -max_effort, max_effort,
+                                               std::numeric_limits<double>::infinity());
+}
+void PhysicsWorld::apply_joint_effort(int joint, double effort) {
+  impl_->joints_[Impl::index(joint)].set_effort(effort);
+}
 
 double PhysicsWorld::wheel_angle(int wheel) const {
   const int joint = impl_->wheel_joint_[Impl::index(wheel)];
-  return joint < 0 ? 0.0 : impl_->wheel_sign_[Impl::index(wheel)] * impl_->wheels_[Impl::index(joint)].position();
+  return joint < 0 ? 0.0
+                   : impl_->wheel_sign_[Impl::index(wheel)] *
+                         impl_->wheels_[Impl::index(joint)].position();
 }
 double PhysicsWorld::wheel_rate(int wheel) const {
   const int joint = impl_->wheel_joint_[Impl::index(wheel)];
-  return joint < 0 ? 0.0 : impl_->wheel_sign_[Impl::index(wheel)] * impl_->wheels_[Impl::index(joint)].velocity();
+  return joint < 0 ? 0.0
+                   : impl_->wheel_sign_[Impl::index(wheel)] *
+                         impl_->wheels_[Impl::index(joint)].velocity();
 }
 void PhysicsWorld::drive_wheel(int wheel, const WheelServo& servo) {
   const int joint = impl_->wheel_joint_[Impl::index(wheel)];
   if (joint < 0) return;
   const bool ahead = impl_->wheel_sign_[Impl::index(wheel)] > 0.0;
-  impl_->wheels_[Impl::index(joint)].set_motor(ahead ? servo.rate : -servo.rate, ahead ? servo.lowest_torque : -servo.highest_torque,
-                                               ahead ? servo.highest_torque : -servo.lowest_torque, servo.gain);
+  impl_->wheels_[Impl::index(joint)].set_motor(
+      ahead ? servo.rate : -servo.rate, ahead ? servo.lowest_torque : -servo.highest_torque,
+      ahead ? servo.highest_torque : -servo.lowest_torque, servo.gain);
 }
 
 void PhysicsWorld::add(int instance) { impl_->add(instance); }

@@ -1,8 +1,9 @@
-// The rigid-body world: Bullet in double precision behind an interface of our own types. Bullet lives in this
-// folder only. Bodies are numbered as in model::BodyLayout. Not thread safe: the kinematics module owns it.
+// The rigid-body world: Bullet in double precision behind an interface of our own types. Bullet
+// lives in this folder only. Bodies are numbered as in model::BodyLayout. Not thread safe: the
+// kinematics module owns it.
 //
-// A kinematic robot on a horizontal ground plane has no contact pair with it: its support is analytic, see
-// set_support().
+// A kinematic robot on a horizontal ground plane has no contact pair with it: its support is
+// analytic, see set_support().
 #pragma once
 
 #include <memory>
@@ -16,20 +17,21 @@ namespace ruedo::physics {
 
 // How a body is held up.
 enum class Support {
-  contacts,    // six degrees of freedom, contacts with everything
-  plane        // moves in its plane only (x, y, yaw of the world); no pair with the static planes
+  contacts,  // six degrees of freedom, contacts with everything
+  plane      // moves in its plane only (x, y, yaw of the world); no pair with the static planes
 };
 
-// The torque that a wheel's servo gives until another one is told: gain * (rate - the wheel's own), within the limits. It is
-// implicit in the step, and so stable whatever the gain.
+// The torque that a wheel's servo gives until another one is told: gain * (rate - the wheel's own),
+// within the limits. It is implicit in the step, and so stable whatever the gain.
 struct WheelServo {
-  double rate = 0.0;                                   // rad/s, positive rolls ahead
-  double gain = 0.0;                                   // N m s/rad
-  double lowest_torque = 0.0, highest_torque = 0.0;    // N m
+  double rate = 0.0;                                 // rad/s, positive rolls ahead
+  double gain = 0.0;                                 // N m s/rad
+  double lowest_torque = 0.0, highest_torque = 0.0;  // N m
 };
 
-// Deterministic: the same calls give the same bits, and what does not touch changes nothing of each other. A step is divided
-// into equal substeps of 5 ms at most; of 1 ms for what joints tie together, wheels among them, and for all that may touch it.
+// Deterministic: the same calls give the same bits, and what does not touch changes nothing of each
+// other. A step is divided into equal substeps of 5 ms at most; of 1 ms for what joints tie
+// together, wheels among them, and for all that may touch it.
 class PhysicsWorld {
  public:
   // world and layout must outlive it.
@@ -46,56 +48,61 @@ class PhysicsWorld {
   void set_twist(int body, const Twist& twist);
   void set_support(int body, Support support);
 
-  // For the coming step only: the body starts it with `mean`, and where it touches nothing it ends at `X_WB`
-  // exactly. A body with nothing near costs no collision detection and no solver. A kinematic body (a mover) ends
-  // there whatever it touches.
+  // For the coming step only: the body starts it with `mean`, and where it touches nothing it ends
+  // at `X_WB` exactly. A body with nothing near costs no collision detection and no solver. A
+  // kinematic body (a mover) ends there whatever it touches.
   void guide(int body, const Twist& mean, const Pose& X_WB);
   // For the coming step only: the body starts it with `twist`, and Bullet says where it ends.
   void drive(int body, const Twist& twist);
   // Acceleration by gravity of one body from now on, m/s^2, world.
   void set_gravity(int body, const Vec3& gravity);
 
-  double mass(int body) const;                  // kg
-  Vec3 center_of_mass(int body) const;          // m, world
-  Eigen::Matrix3d inertia(int body) const;      // kg m^2, about the centre of mass, world axes
+  double mass(int body) const;              // kg
+  Vec3 center_of_mass(int body) const;      // m, world
+  Eigen::Matrix3d inertia(int body) const;  // kg m^2, about the centre of mass, world axes
   // Changes the velocity at once, by an impulse in N s and N m s about the centre of mass, world.
   void apply_impulse(int body, const Vec3& linear, const Vec3& angular);
   // Contacts of that body in the last step; valid until the next. The body is always `a` here.
   std::span<const Contact> contacts(int body) const;
-  // The same and the places where it is about to touch, within 20 mm: these have no force and a negative depth.
+  // The same and the places where it is about to touch, within 20 mm: these have no force and a
+  // negative depth.
   std::span<const Contact> nearby(int body) const;
   // True when no other thing is near that the body could touch.
   bool alone(int body) const;
   void wake(int body);
-  void sleep(int body);                         // at once, with velocity 0; a contact or wake() ends it
+  void sleep(int body);  // at once, with velocity 0; a contact or wake() ends it
   bool sleeping(int body) const;
 
   // Motors of joints that are not wheels of a drive; joint as in BodyLayout::joints.
-  double joint_position(int joint) const;       // rad or m, not wrapped; 0 at the start
-  double joint_velocity(int joint) const;       // rad/s or m/s
-  double joint_effort(int joint) const;         // N m or N: what its motor gave in the last step
-  void drive_joint_velocity(int joint, double rate, double max_effort);    // rad/s or m/s; N m or N
+  double joint_position(int joint) const;  // rad or m, not wrapped; 0 at the start
+  double joint_velocity(int joint) const;  // rad/s or m/s
+  double joint_effort(int joint) const;    // N m or N: what its motor gave in the last step
+  void drive_joint_velocity(int joint, double rate, double max_effort);  // rad/s or m/s; N m or N
   void apply_joint_effort(int joint, double effort);
 
-  // Wheels that are bodies of their own (the wheels drive); wheel as in BodyLayout::wheels. Positive rolls ahead.
-  double wheel_angle(int wheel) const;          // rad, not wrapped
-  double wheel_rate(int wheel) const;           // rad/s
+  // Wheels that are bodies of their own (the wheels drive); wheel as in BodyLayout::wheels.
+  // Positive rolls ahead.
+  double wheel_angle(int wheel) const;  // rad, not wrapped
+  double wheel_rate(int wheel) const;   // rad/s
   void drive_wheel(int wheel, const WheelServo& servo);
 
-  // Between two steps. `instance` is new at the end of the world and the layout, or was removed and placed again:
-  // its bodies are where the layout has them, at rest.
+  // Between two steps. `instance` is new at the end of the world and the layout, or was removed and
+  // placed again: its bodies are where the layout has them, at rest.
   void add(int instance);
-  // Takes an instance out: its bodies touch nothing and stay where they are. What rested on it wakes.
+  // Takes an instance out: its bodies touch nothing and stay where they are. What rested on it
+  // wakes.
   void remove(int instance);
   // Wakes a body and all that it could touch: before it is put elsewhere, and after.
   void disturb(int body);
-  // Its bodies were put back to where they started: a joint that is no wheel of a drive is at 0, and no command holds.
+  // Its bodies were put back to where they started: a joint that is no wheel of a drive is at 0,
+  // and no command holds.
   void start_again(int joint);
 
   // Shapes that Bullet can only approximate.
   const std::vector<Finding>& findings() const;
 
-  // Writes poses, twists, accelerations, joints and contacts (not robots and wheels) of the current state.
+  // Writes poses, twists, accelerations, joints and contacts (not robots and wheels) of the current
+  // state.
   void read(Snapshot& snapshot) const;
 
  private:

@@ -1,19 +1,21 @@
 // Instances that come and go between two steps.
 //
-// What is removed keeps its place in the lists, so that all numbers stay; the broadphase refuses all its pairs, and no
-// step looks at it. The same model may be put into that place again.
+// What is removed keeps its place in the lists, so that all numbers stay; the broadphase refuses
+// all its pairs, and no step looks at it. The same model may be put into that place again.
 #include "physics/physics_world_impl.h"
 
 namespace ruedo::physics {
 
 void PhysicsWorld::Impl::disturb(int body) {
   btRigidBody& itself = bullet(body);
-  broadphase_.for_each_partner(itself.getBroadphaseHandle(), [](btCollisionObject& partner) { partner.activate(true); });
+  broadphase_.for_each_partner(itself.getBroadphaseHandle(),
+                               [](btCollisionObject& partner) { partner.activate(true); });
   itself.activate(true);
 }
 
 void PhysicsWorld::Impl::refilter_all() {
-  for (RigidBody& rigid : rigid_.bodies) broadphase_.refilter(rigid.bullet->getBroadphaseHandle(), &dispatcher_);
+  for (RigidBody& rigid : rigid_.bodies)
+    broadphase_.refilter(rigid.bullet->getBroadphaseHandle(), &dispatcher_);
 }
 
 void PhysicsWorld::Impl::add_static(StaticObject& object) {
@@ -33,7 +35,9 @@ void PhysicsWorld::Impl::add(int instance) {
     if (!is_of(object->info)) continue;
     object->info.gone = false;
     const auto& link = layout_.links[index(object->info.links.front())];
-    const auto& collision = world_.models[index(instance)].model->links[index(link.link)].collisions[index(object->info.collisions.front())];
+    const auto& collision =
+        world_.models[index(instance)].model->links[index(link.link)].collisions[index(
+            object->info.collisions.front())];
     object->bullet->setWorldTransform(to_bt((link.X_BL * collision.X_LC).normalized()));
     add_static(*object);
     has_statics = true;
@@ -50,7 +54,8 @@ void PhysicsWorld::Impl::add(int instance) {
   }
   add_joints(instance);
   for (size_t i = first; i < rigid_.bodies.size(); ++i) {
-    dynamics_.addRigidBody(rigid_.bodies[i].bullet.get(), btBroadphaseProxy::DefaultFilter, btBroadphaseProxy::AllFilter);
+    dynamics_.addRigidBody(rigid_.bodies[i].bullet.get(), btBroadphaseProxy::DefaultFilter,
+                           btBroadphaseProxy::AllFilter);
   }
   for (int i = 0; i < static_cast<int>(rigid_.bodies.size()); ++i) {
     if (!is_of(rigid_.bodies[index(i)].info)) continue;
@@ -87,12 +92,15 @@ void PhysicsWorld::Impl::add_joints(int instance) {
   }
   for (size_t i = 0; i < wheel_joint_.size(); ++i) {
     const auto& wheel = layout_.wheels[i];
-    if (wheel_joint_[i] >= 0 && layout_.robots[index(wheel.robot)].instance == instance) again(wheels_[index(wheel_joint_[i])], wheel.joint);
+    if (wheel_joint_[i] >= 0 && layout_.robots[index(wheel.robot)].instance == instance)
+      again(wheels_[index(wheel_joint_[i])], wheel.joint);
   }
   const size_t joints = joints_.size(), wheels = wheels_.size();
   add_joints();
-  for (size_t i = joints; i < joints_.size(); ++i) if (joints_[i].constraint()) dynamics_.addConstraint(joints_[i].constraint(), true);
-  for (size_t i = wheels; i < wheels_.size(); ++i) if (wheels_[i].constraint()) dynamics_.addConstraint(wheels_[i].constraint(), true);
+  for (size_t i = joints; i < joints_.size(); ++i)
+    if (joints_[i].constraint()) dynamics_.addConstraint(joints_[i].constraint(), true);
+  for (size_t i = wheels; i < wheels_.size(); ++i)
+    if (wheels_[i].constraint()) dynamics_.addConstraint(wheels_[i].constraint(), true);
 }
 
 void PhysicsWorld::Impl::remove(int instance) {
@@ -100,16 +108,21 @@ void PhysicsWorld::Impl::remove(int instance) {
   for (int i = 0; i < static_cast<int>(rigid_.bodies.size()); ++i) {
     RigidBody& rigid = rigid_.bodies[index(i)];
     bool neighbour = is_of(rigid.info);
-    broadphase_.for_each_partner(rigid.bullet->getBroadphaseHandle(), [&](btCollisionObject& partner) { neighbour |= is_of(info_of(partner)); });
+    broadphase_.for_each_partner(
+        rigid.bullet->getBroadphaseHandle(),
+        [&](btCollisionObject& partner) { neighbour |= is_of(info_of(partner)); });
     if (neighbour && !rigid.info.gone) rigid.bullet->activate(true);
   }
   const auto let_go = [&](JointConstraint& joint) {
-    if (joint.constraint() && joint.constraint()->isEnabled()) dynamics_.removeConstraint(joint.constraint());
+    if (joint.constraint() && joint.constraint()->isEnabled())
+      dynamics_.removeConstraint(joint.constraint());
     joint.disable();
   };
-  for (size_t i = 0; i < joints_.size(); ++i) if (layout_.joints[i].instance == instance) let_go(joints_[i]);
+  for (size_t i = 0; i < joints_.size(); ++i)
+    if (layout_.joints[i].instance == instance) let_go(joints_[i]);
   for (size_t i = 0; i < wheel_joint_.size(); ++i) {
-    if (wheel_joint_[i] >= 0 && layout_.robots[index(layout_.wheels[i].robot)].instance == instance) let_go(wheels_[index(wheel_joint_[i])]);
+    if (wheel_joint_[i] >= 0 && layout_.robots[index(layout_.wheels[i].robot)].instance == instance)
+      let_go(wheels_[index(wheel_joint_[i])]);
   }
   bool has_statics = false;
   for (const auto& object : rigid_.statics) {
@@ -125,7 +138,7 @@ void PhysicsWorld::Impl::remove(int instance) {
     broadphase_.refilter(rigid.bullet->getBroadphaseHandle(), &dispatcher_);
   }
   if (!has_statics) return;
-  refilter_all();    // nobody may know them when their boxes go
+  refilter_all();  // nobody may know them when their boxes go
   for (const auto& object : rigid_.statics) {
     if (!is_of(object->info)) continue;
     broadphase_.destroyProxy(object->bullet->getBroadphaseHandle(), &dispatcher_);

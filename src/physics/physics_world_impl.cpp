@@ -1,7 +1,7 @@
 // A step of the physics world.
 //
-// For repeatable runs: pairs and contacts in the order of their numbers, objects added in world order, and a broadphase
-// that knows no addresses. A world that is made again gives the same bits.
+// For repeatable runs: pairs and contacts in the order of their numbers, objects added in world
+// order, and a broadphase that knows no addresses. A world that is made again gives the same bits.
 #include "physics/physics_world_impl.h"
 
 #include <algorithm>
@@ -16,22 +16,25 @@ namespace ruedo::physics {
 
 namespace {
 
-// What joints tie together wants shorter substeps; so does what touches it. Nothing else: what somebody else's robot does
-// shall change no bit of a stack.
+// What joints tie together wants shorter substeps; so does what touches it. Nothing else: what
+// somebody else's robot does shall change no bit of a stack.
 constexpr int64_t kLongestSubstep_us = 5000, kLongestSubstepOfJoints_us = 1000;
 enum Pace { kCoarse, kFine };
-// Distance at which Bullet begins to see a contact: a body may come so near in one substep without touching.
+// Distance at which Bullet begins to see a contact: a body may come so near in one substep without
+// touching.
 constexpr double kContactReach_m = 0.02;
 
-// Of bodies near each other at the start: their number grows with the square of what stands in one place.
+// Of bodies near each other at the start: their number grows with the square of what stands in one
+// place.
 constexpr int kMostPairs = 200'000;
 
 }  // namespace
 
-bool MayTouch::may_touch(const btCollisionObject& object_a, const btCollisionObject& object_b) const {
+bool MayTouch::may_touch(const btCollisionObject& object_a,
+                         const btCollisionObject& object_b) const {
   const ObjectInfo& a = info_of(object_a);
   const ObjectInfo& b = info_of(object_b);
-  if (a.links.empty() || b.links.empty()) return false;    // no shapes
+  if (a.links.empty() || b.links.empty()) return false;  // no shapes
   if (a.gone || b.gone) return false;
   if ((a.moved || a.body < 0) && (b.moved || b.body < 0)) return false;
   if ((a.on_plane && b.plane) || (b.on_plane && a.plane)) return false;
@@ -49,11 +52,14 @@ PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout
       ground_(btRigidBody::btRigidBodyConstructionInfo(0.0, nullptr, nullptr)),
       dispatcher_(&configuration_),
       broadphase_(filter_),
-      dynamics_(dispatcher_, broadphase_, configuration_, surfaces_, SolverSettings{world.solver.iterations, world.solver.tolerance, world.solver.error_reduction}) {
-  gContactBreakingThreshold = kContactReach_m;    // Bullet's globals: the same in every world
+      dynamics_(dispatcher_, broadphase_, configuration_, surfaces_,
+                SolverSettings{world.solver.iterations, world.solver.tolerance,
+                               world.solver.error_reduction}) {
+  gContactBreakingThreshold = kContactReach_m;  // Bullet's globals: the same in every world
   gDisableDeactivation = false;
-  dispatcher_.setDispatcherFlags(dispatcher_.getDispatcherFlags() &
-                                 ~btCollisionDispatcher::CD_USE_RELATIVE_CONTACT_BREAKING_THRESHOLD);
+  dispatcher_.setDispatcherFlags(
+      dispatcher_.getDispatcherFlags() &
+      ~btCollisionDispatcher::CD_USE_RELATIVE_CONTACT_BREAKING_THRESHOLD);
   dynamics_.setForceUpdateAllAabbs(false);
   substeps_[kCoarse] = substeps_for(kLongestSubstep_us);
   substeps_[kFine] = substeps_for(kLongestSubstepOfJoints_us);
@@ -67,15 +73,20 @@ PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout
   for (const auto& body : layout.bodies) poses_.push_back(body.X_WB.normalized());
   add_joints();
   for (size_t i = 0; i < n; ++i) {
-    dynamics_.addRigidBody(rigid_.bodies[i].bullet.get(), btBroadphaseProxy::DefaultFilter, btBroadphaseProxy::AllFilter);
+    dynamics_.addRigidBody(rigid_.bodies[i].bullet.get(), btBroadphaseProxy::DefaultFilter,
+                           btBroadphaseProxy::AllFilter);
     update_box(static_cast<int>(i));
     if (broadphase_.getOverlappingPairCache()->getNumOverlappingPairs() > kMostPairs) {
-      throw InputError({world.file, 0}, "more than " + std::to_string(kMostPairs) + " pairs of things touch each other at the start: '" + layout.bodies[i].name +
+      throw InputError({world.file, 0}, "more than " + std::to_string(kMostPairs) +
+                                            " pairs of things touch each other at the start: '" +
+                                            layout.bodies[i].name +
                                             "' stands among too many; move them apart");
     }
   }
-  for (JointConstraint& joint : joints_) if (joint.constraint()) dynamics_.addConstraint(joint.constraint(), true);
-  for (JointConstraint& joint : wheels_) if (joint.constraint()) dynamics_.addConstraint(joint.constraint(), true);
+  for (JointConstraint& joint : joints_)
+    if (joint.constraint()) dynamics_.addConstraint(joint.constraint(), true);
+  for (JointConstraint& joint : wheels_)
+    if (joint.constraint()) dynamics_.addConstraint(joint.constraint(), true);
   last_twists_ = twists_;
 }
 
@@ -87,7 +98,8 @@ int PhysicsWorld::Impl::substeps_for(int64_t longest_us) const {
 PhysicsWorld::Impl::~Impl() {
   for (auto* joints : {&joints_, &wheels_}) {
     for (JointConstraint& joint : *joints) {
-      if (joint.constraint() && joint.constraint()->isEnabled()) dynamics_.removeConstraint(joint.constraint());
+      if (joint.constraint() && joint.constraint()->isEnabled())
+        dynamics_.removeConstraint(joint.constraint());
     }
   }
   dynamics_.take({});
@@ -109,14 +121,17 @@ JointConstraint PhysicsWorld::Impl::make_joint(int instance, int joint_index) {
   const int parent = body_of(joint.parent), child = body_of(joint.child);
   const Pose X_WJ = placed.X_WM * joint.X_MJ;
   const auto in_body = [&](int body) {
-    return body < 0 ? X_WJ : rigid_.bodies[index(body)].X_BI.inverse() * poses_[index(body)].inverse() * X_WJ;
+    return body < 0
+               ? X_WJ
+               : rigid_.bodies[index(body)].X_BI.inverse() * poses_[index(body)].inverse() * X_WJ;
   };
   if (child >= 0) {
     tie(child, parent);
   } else {
-    tie(parent, child);    // what the joint carries is fixed to the world
+    tie(parent, child);  // what the joint carries is fixed to the world
   }
-  return {joint, parent < 0 ? ground_ : bullet(parent), child < 0 ? ground_ : bullet(child), in_body(parent), in_body(child)};
+  return {joint, parent < 0 ? ground_ : bullet(parent), child < 0 ? ground_ : bullet(child),
+          in_body(parent), in_body(child)};
 }
 
 void PhysicsWorld::Impl::add_joints() {
@@ -124,12 +139,18 @@ void PhysicsWorld::Impl::add_joints() {
     joints_.push_back(make_joint(layout_.joints[i].instance, layout_.joints[i].joint));
   }
   const auto leader_of = [&](const auto& placed) {
-    const int leader = world_.models[index(placed.instance)].model->joints[index(placed.joint)].leader;
-    const auto same = [&](const auto& each) { return each.instance == placed.instance && each.joint == leader; };
+    const int leader =
+        world_.models[index(placed.instance)].model->joints[index(placed.joint)].leader;
+    const auto same = [&](const auto& each) {
+      return each.instance == placed.instance && each.joint == leader;
+    };
     const auto found = std::find_if(layout_.joints.begin(), layout_.joints.end(), same);
-    return leader < 0 || found == layout_.joints.end() ? -1 : static_cast<int>(found - layout_.joints.begin());
+    return leader < 0 || found == layout_.joints.end()
+               ? -1
+               : static_cast<int>(found - layout_.joints.begin());
   };
-  for (size_t i = leaders_.size(); i < layout_.joints.size(); ++i) leaders_.push_back(leader_of(layout_.joints[i]));
+  for (size_t i = leaders_.size(); i < layout_.joints.size(); ++i)
+    leaders_.push_back(leader_of(layout_.joints[i]));
   for (size_t i = wheel_joint_.size(); i < layout_.wheels.size(); ++i) add_wheel(i);
 }
 
@@ -174,7 +195,8 @@ void PhysicsWorld::Impl::push_to_bullet(int body) {
 
 void PhysicsWorld::Impl::pull_from_bullet(int body) {
   const RigidBody& rigid = rigid_.bodies[index(body)];
-  const Pose X_WB = (from_bt(rigid.bullet->getWorldTransform()) * rigid.X_BI.inverse()).normalized();
+  const Pose X_WB =
+      (from_bt(rigid.bullet->getWorldTransform()) * rigid.X_BI.inverse()).normalized();
   poses_[index(body)] = X_WB;
   const Vec3 arm = X_WB.rotation * rigid.X_BI.translation;
   Twist& twist = twists_[index(body)];
@@ -190,7 +212,8 @@ void PhysicsWorld::Impl::update_box(int body) {
   const Motion& motion = motions_[index(body)];
   const double step_s = static_cast<double>(step_us_) * 1e-6;
   const auto half_of = [&rigid](const Pose& X) {
-    return Vec3(X.rotation.toRotationMatrix().cwiseAbs() * rigid.box_half + Vec3::Constant(kContactReach_m));
+    return Vec3(X.rotation.toRotationMatrix().cwiseAbs() * rigid.box_half +
+                Vec3::Constant(kContactReach_m));
   };
   const Pose& from = poses_[index(body)];
   const Vec3 center = from * rigid.box_center, half = half_of(from);
@@ -239,7 +262,8 @@ void PhysicsWorld::Impl::choose_simulated() {
     if (rigid_.bodies[index(i)].info.gone) continue;
     const bool alone_now = alone(i);
     motion.simulated = motion.tied || !alone_now ||
-                       (motion.kind != Motion::Kind::guided && !sleeping(i) && !rigid_.bodies[index(i)].info.moved);
+                       (motion.kind != Motion::Kind::guided && !sleeping(i) &&
+                        !rigid_.bodies[index(i)].info.moved);
     if (motion.simulated) start(i);
   }
   choose_pace();
@@ -250,16 +274,22 @@ size_t PhysicsWorld::Impl::root(size_t body) {
   return body;
 }
 
-// Bodies that joints tie together, and all that may touch them in this step, go at the shorter substeps.
+// Bodies that joints tie together, and all that may touch them in this step, go at the shorter
+// substeps.
 void PhysicsWorld::Impl::choose_pace() {
   for (auto& bodies : simulated_) bodies.clear();
   parents_.resize(motions_.size());
   std::iota(parents_.begin(), parents_.end(), size_t{0});
-  const auto movable = [&](int body) { return body >= 0 && motions_[index(body)].simulated && !rigid_.bodies[index(body)].info.moved; };
-  const btBroadphasePairArray& pairs = broadphase_.getOverlappingPairCache()->getOverlappingPairArray();
+  const auto movable = [&](int body) {
+    return body >= 0 && motions_[index(body)].simulated && !rigid_.bodies[index(body)].info.moved;
+  };
+  const btBroadphasePairArray& pairs =
+      broadphase_.getOverlappingPairCache()->getOverlappingPairArray();
   for (int i = 0; i < pairs.size(); ++i) {
-    const int a = info_of(*static_cast<btCollisionObject*>(pairs[i].m_pProxy0->m_clientObject)).body;
-    const int b = info_of(*static_cast<btCollisionObject*>(pairs[i].m_pProxy1->m_clientObject)).body;
+    const int a =
+        info_of(*static_cast<btCollisionObject*>(pairs[i].m_pProxy0->m_clientObject)).body;
+    const int b =
+        info_of(*static_cast<btCollisionObject*>(pairs[i].m_pProxy1->m_clientObject)).body;
     if (!movable(a) || !movable(b)) continue;
     const size_t of_a = root(index(a)), of_b = root(index(b));
     parents_[std::max(of_a, of_b)] = std::min(of_a, of_b);
@@ -280,7 +310,8 @@ void PhysicsWorld::Impl::choose_pace() {
 // A mover goes on along its way; Bullet leaves it where it is.
 void PhysicsWorld::Impl::move_on(btRigidBody& mover, double substep_s) {
   btTransform next;
-  btTransformUtil::integrateTransform(mover.getWorldTransform(), mover.getLinearVelocity(), mover.getAngularVelocity(), substep_s, next);
+  btTransformUtil::integrateTransform(mover.getWorldTransform(), mover.getLinearVelocity(),
+                                      mover.getAngularVelocity(), substep_s, next);
   mover.setWorldTransform(next);
 }
 
@@ -309,7 +340,7 @@ void PhysicsWorld::Impl::step_at(int pace) {
   }
   dynamics_.take(bodies);
   const double substep_s = static_cast<double>(step_us_) * 1e-6 / substeps_[pace];
-  if (!moving && !dynamics_.awake()) {    // what rests still touches
+  if (!moving && !dynamics_.awake()) {  // what rests still touches
     dynamics_.find_manifolds();
     contacts_.add(dynamics_.manifolds(), substeps_[pace], true);
     return;
@@ -325,7 +356,8 @@ void PhysicsWorld::Impl::step_at(int pace) {
     contacts_.add(dynamics_.manifolds(), 1, s + 1 == substeps_[pace]);
     for (auto& [mover, start] : movers) move_on(*mover, substep_s);
   }
-  for (auto& [mover, start] : movers) mover->setWorldTransform(start);    // the other pace begins there, too
+  for (auto& [mover, start] : movers)
+    mover->setWorldTransform(start);  // the other pace begins there, too
 }
 
 void PhysicsWorld::Impl::step() {
@@ -354,16 +386,21 @@ bool PhysicsWorld::Impl::falling(int body) const {
   return !motions_[index(body)].tied && !info.moved && !info.gone && !info.on_plane && alone(body);
 }
 
-// Forces that are allowed, each on its own, can throw a light body at any speed, and what is thrown so drags others along:
-// without a bound the numbers grow from substep to substep, to infinity. Bullet is never given what is not finite.
+// Forces that are allowed, each on its own, can throw a light body at any speed, and what is thrown
+// so drags others along: without a bound the numbers grow from substep to substep, to infinity.
+// Bullet is never given what is not finite.
 void PhysicsWorld::Impl::bound_speeds(const std::vector<btRigidBody*>& bodies) {
   constexpr double kFastest2 = quantity::kSpeed.most * quantity::kSpeed.most;
-  const auto bounded = [](const btVector3& v) { return v.length2() <= kFastest2 ? v : v * (quantity::kSpeed.most / v.length()); };
+  const auto bounded = [](const btVector3& v) {
+    return v.length2() <= kFastest2 ? v : v * (quantity::kSpeed.most / v.length());
+  };
   for (btRigidBody* body : bodies) {
-    const btVector3 &linear = body->getLinearVelocity(), &angular = body->getAngularVelocity(), &at = body->getWorldTransform().getOrigin();
+    const btVector3 &linear = body->getLinearVelocity(), &angular = body->getAngularVelocity(),
+                    &at = body->getWorldTransform().getOrigin();
     if (!std::isfinite(linear.length2() + angular.length2() + at.length2())) {
       throw StateError("the state of the body '" + layout_.bodies[index(info_of(*body).body)].name +
-                       "' is not finite: the run ends with the step before. Masses, inertias and efforts that do not fit each other do this");
+                       "' is not finite: the run ends with the step before. Masses, inertias and "
+                       "efforts that do not fit each other do this");
     }
     if (linear.length2() > kFastest2) body->setLinearVelocity(bounded(linear));
     if (angular.length2() > kFastest2) body->setAngularVelocity(bounded(angular));
@@ -403,7 +440,8 @@ void PhysicsWorld::Impl::read(Snapshot& snapshot) const {
   snapshot.body_accelerations.resize(twists_.size());
   for (size_t i = 0; i < twists_.size(); ++i) {
     snapshot.body_accelerations[i] = (twists_[i].linear - last_twists_[i].linear) / step_s;
-    if (motions_[i].fresh && falling(static_cast<int>(i))) snapshot.body_accelerations[i] = from_bt(rigid_.bodies[i].bullet->getGravity());
+    if (motions_[i].fresh && falling(static_cast<int>(i)))
+      snapshot.body_accelerations[i] = from_bt(rigid_.bodies[i].bullet->getGravity());
   }
   snapshot.joint_positions.resize(joints_.size());
   snapshot.joint_velocities.resize(joints_.size());

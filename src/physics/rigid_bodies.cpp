@@ -1,4 +1,5 @@
-// Mass properties and compounds. Inertia is that of the links about the common centre of mass (parallel axes).
+// Mass properties and compounds. Inertia is that of the links about the common centre of mass
+// (parallel axes).
 #include "physics/rigid_bodies.h"
 
 #include <algorithm>
@@ -13,19 +14,20 @@ namespace ruedo::physics {
 namespace {
 
 constexpr double kSmallestMass_kg = 1e-6;
-// Driven wheels: the tyre gives way by about so much under the robot's weight, which spreads the weight over all wheels (four
-// rigid ones on a rigid floor stand on any two).
+// Driven wheels: the tyre gives way by about so much under the robot's weight, which spreads the
+// weight over all wheels (four rigid ones on a rigid floor stand on any two).
 constexpr double kTyreGives_m = 5e-4, kTyreDamping = 1.0;
 // Velocities below which a body may fall asleep (after 2 s).
 constexpr double kSleepSpeed_m_s = 0.005, kSleepRate_rad_s = 0.01;
 
 struct MassProperties {
   double mass = 0.0;
-  Vec3 center = Vec3::Zero();                               // in B
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();        // about the centre, axes of B
+  Vec3 center = Vec3::Zero();                         // in B
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  // about the centre, axes of B
 };
 
-MassProperties mass_of(const model::Model& model, const model::BodyLayout& layout, const model::BodyPlacement& body) {
+MassProperties mass_of(const model::Model& model, const model::BodyLayout& layout,
+                       const model::BodyPlacement& body) {
   MassProperties sum;
   for (const int index : body.links) {
     const auto& placement = layout.links[static_cast<size_t>(index)];
@@ -41,13 +43,15 @@ MassProperties mass_of(const model::Model& model, const model::BodyLayout& layou
     const Pose X_BI = placement.X_BL * inertial.X_LI;
     const Eigen::Matrix3d R = X_BI.rotation.toRotationMatrix();
     const Vec3 d = X_BI.translation - sum.center;
-    sum.inertia += R * inertial.inertia * R.transpose() +
-                   inertial.mass * (d.squaredNorm() * Eigen::Matrix3d::Identity() - d * d.transpose());
+    sum.inertia +=
+        R * inertial.inertia * R.transpose() +
+        inertial.mass * (d.squaredNorm() * Eigen::Matrix3d::Identity() - d * d.transpose());
   }
   return sum;
 }
 
-// Principal axes as a rotation; the axes of B where they are principal already, so that no rounding creeps in.
+// Principal axes as a rotation; the axes of B where they are principal already, so that no rounding
+// creeps in.
 Quat principal_axes(const Eigen::Matrix3d& inertia, Vec3& moments) {
   Eigen::Matrix3d off = inertia;
   off.diagonal().setZero();
@@ -63,11 +67,15 @@ Quat principal_axes(const Eigen::Matrix3d& inertia, Vec3& moments) {
 // The wheel of a wheels drive that this body is, or -1.
 int driven_wheel(const model::BodyLayout& layout, int index) {
   const int instance = layout.bodies[static_cast<size_t>(index)].instance;
-  const auto robot = std::lower_bound(layout.robots.begin(), layout.robots.end(), instance,
-                                      [](const model::RobotPlacement& a, int b) { return a.instance < b; });
-  if (robot == layout.robots.end() || robot->instance != instance || robot->body == index) return -1;
+  const auto robot =
+      std::lower_bound(layout.robots.begin(), layout.robots.end(), instance,
+                       [](const model::RobotPlacement& a, int b) { return a.instance < b; });
+  if (robot == layout.robots.end() || robot->instance != instance || robot->body == index)
+    return -1;
   for (const int wheel : robot->wheels) {
-    if (layout.links[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].link)].body == index) return wheel;
+    if (layout.links[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].link)].body ==
+        index)
+      return wheel;
   }
   return -1;
 }
@@ -78,7 +86,8 @@ double mass_on_each_wheel(const model::Model& model, const model::RobotPlacement
   return mass / static_cast<double>(std::max<size_t>(robot.wheels.size(), 1));
 }
 
-bool carries_kinematic_drive(const model::WorldModel& world, const model::BodyLayout& layout, int index) {
+bool carries_kinematic_drive(const model::WorldModel& world, const model::BodyLayout& layout,
+                             int index) {
   for (const auto& robot : layout.robots) {
     if (robot.body != index) continue;
     const auto& drive = world.models[static_cast<size_t>(robot.instance)].model->drive;
@@ -96,17 +105,20 @@ RigidBodies::RigidBodies(const model::WorldModel& world, const model::BodyLayout
   for (size_t i = 0; i < bodies.size(); ++i) make_body(world, layout, static_cast<int>(i));
 }
 
-void RigidBodies::append(const model::WorldModel& world, const model::BodyLayout& layout, int instance) {
+void RigidBodies::append(const model::WorldModel& world, const model::BodyLayout& layout,
+                         int instance) {
   const size_t first = bodies.size();
   for (size_t link = 0; link < layout.links.size(); ++link) {
     if (layout.links[link].instance == instance) make_statics(world, layout, link);
   }
   bodies.resize(layout.bodies.size());
-  for (size_t i = 0; i < first; ++i) bodies[i].bullet->setUserPointer(&bodies[i].info);    // they may have moved
+  for (size_t i = 0; i < first; ++i)
+    bodies[i].bullet->setUserPointer(&bodies[i].info);  // they may have moved
   for (size_t i = first; i < bodies.size(); ++i) make_body(world, layout, static_cast<int>(i));
 }
 
-void RigidBodies::make_statics(const model::WorldModel& world, const model::BodyLayout& layout, size_t index) {
+void RigidBodies::make_statics(const model::WorldModel& world, const model::BodyLayout& layout,
+                               size_t index) {
   const auto& placement = layout.links[index];
   if (placement.body >= 0) return;
   const auto& model = *world.models[static_cast<size_t>(placement.instance)].model;
@@ -121,7 +133,8 @@ void RigidBodies::make_statics(const model::WorldModel& world, const model::Body
     bullet.setCollisionShape(shape);
     bullet.setWorldTransform(to_bt((placement.X_BL * collision.X_LC).normalized()));
     bullet.setCollisionFlags(btCollisionObject::CF_STATIC_OBJECT);
-    object->info.surfaces.push_back(surface_of(collision.surface, Quat::Identity()));    // Bullet's frame is the collision's
+    object->info.surfaces.push_back(
+        surface_of(collision.surface, Quat::Identity()));  // Bullet's frame is the collision's
     object->info.instance = placement.instance;
     object->info.plane = collision.geometry.shape == model::Shape::plane;
     object->info.links.push_back(static_cast<int>(index));
@@ -132,18 +145,22 @@ void RigidBodies::make_statics(const model::WorldModel& world, const model::Body
 }
 
 // A wheel of a wheels drive: y of its frame is its axle.
-ShapeSurface RigidBodies::tyre_of(const model::WorldModel& world, const model::BodyLayout& layout, int wheel, const ShapeSurface& surface) const {
-  const auto& robot = layout.robots[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].robot)];
+ShapeSurface RigidBodies::tyre_of(const model::WorldModel& world, const model::BodyLayout& layout,
+                                  int wheel, const ShapeSurface& surface) const {
+  const auto& robot =
+      layout.robots[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].robot)];
   ShapeSurface tyre = surface;
   if (tyre.along_I == Vec3::Zero()) tyre.axle_I = Vec3::UnitY();
-  if (tyre.stiffness > 0.0) return tyre;    // the file says how it gives
-  const double share = mass_on_each_wheel(*world.models[static_cast<size_t>(robot.instance)].model, robot);
+  if (tyre.stiffness > 0.0) return tyre;  // the file says how it gives
+  const double share =
+      mass_on_each_wheel(*world.models[static_cast<size_t>(robot.instance)].model, robot);
   tyre.stiffness = share * world.gravity.norm() / kTyreGives_m;
   tyre.damping = kTyreDamping * 2.0 * std::sqrt(tyre.stiffness * share);
   return tyre;
 }
 
-void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLayout& layout, int index) {
+void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLayout& layout,
+                            int index) {
   const auto& placement = layout.bodies[static_cast<size_t>(index)];
   const auto& instance = world.models[static_cast<size_t>(placement.instance)];
   const model::Model& model = *instance.model;
@@ -152,9 +169,10 @@ void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLay
 
   const MassProperties mass = mass_of(model, layout, placement);
   Vec3 moments;
-  if (wheel >= 0) {    // y of I is the wheel's axis, which lateral friction refers to
+  if (wheel >= 0) {  // y of I is the wheel's axis, which lateral friction refers to
     const auto& of_wheel = layout.wheels[static_cast<size_t>(wheel)];
-    const Vec3 axis = layout.links[static_cast<size_t>(of_wheel.link)].X_BL.rotation * of_wheel.axis_in_L;
+    const Vec3 axis =
+        layout.links[static_cast<size_t>(of_wheel.link)].X_BL.rotation * of_wheel.axis_in_L;
     body.X_BI.rotation = Quat::FromTwoVectors(Vec3::UnitY(), axis);
     const Eigen::Matrix3d R = body.X_BI.rotation.toRotationMatrix();
     moments = (R.transpose() * mass.inertia * R).diagonal();
@@ -165,7 +183,8 @@ void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLay
   const Pose X_IB = body.X_BI.inverse();
 
   bool gravity = false, kinematic = model.path != nullptr;
-  const bool imposed = carries_kinematic_drive(world, layout, index);    // its drive stands for its wheels' friction
+  const bool imposed =
+      carries_kinematic_drive(world, layout, index);  // its drive stands for its wheels' friction
   body.compound = std::make_unique<btCompoundShape>();
   std::vector<btCollisionShape*> shapes;
   for (const int link_index : placement.links) {
@@ -179,10 +198,12 @@ void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLay
       if (wheel >= 0 && collision.geometry.shape == model::Shape::cylinder) {
         shapes.push_back(shapes_.tyre(collision.geometry.size.x(), collision.geometry.size.y()));
       } else if (!shapes_.moving(collision.geometry, shapes)) {
-        findings.push_back({Finding::Kind::unsupported, collision.source,
-                            "model " + instance.name + "/link " + link.name + "/collision " + collision.name,
-                            "a concave or open mesh on a body that moves: it collides as " + std::to_string(shapes.size()) +
-                                " convex piece(s), the hulls of its connected parts"});
+        findings.push_back(
+            {Finding::Kind::unsupported, collision.source,
+             "model " + instance.name + "/link " + link.name + "/collision " + collision.name,
+             "a concave or open mesh on a body that moves: it collides as " +
+                 std::to_string(shapes.size()) +
+                 " convex piece(s), the hulls of its connected parts"});
       }
       const Pose X_IC = (X_IB * link_placement.X_BL * collision.X_LC).normalized();
       for (btCollisionShape* shape : shapes) {
@@ -197,16 +218,19 @@ void RigidBodies::make_body(const model::WorldModel& world, const model::BodyLay
     }
   }
 
-  const double smallest = 1e-9 + 1e-6 * mass.mass;    // a moment of 0 would let a torque turn it at any speed
-  btRigidBody::btRigidBodyConstructionInfo settings(kinematic ? 0.0 : mass.mass, nullptr, body.compound.get(),
-                                                    kinematic ? btVector3(0, 0, 0) : to_bt(Vec3(moments.cwiseMax(smallest))));
+  const double smallest =
+      1e-9 + 1e-6 * mass.mass;  // a moment of 0 would let a torque turn it at any speed
+  btRigidBody::btRigidBodyConstructionInfo settings(
+      kinematic ? 0.0 : mass.mass, nullptr, body.compound.get(),
+      kinematic ? btVector3(0, 0, 0) : to_bt(Vec3(moments.cwiseMax(smallest))));
   settings.m_startWorldTransform = to_bt((placement.X_WB * body.X_BI).normalized());
   settings.m_linearSleepingThreshold = kSleepSpeed_m_s;
   settings.m_angularSleepingThreshold = kSleepRate_rad_s;
   body.bullet = std::make_unique<btRigidBody>(settings);
   btRigidBody& bullet = *body.bullet;
-  if (kinematic) bullet.setCollisionFlags(bullet.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
-  bullet.setFlags(bullet.getFlags() | BT_DISABLE_WORLD_GRAVITY);    // gravity is set for each body
+  if (kinematic)
+    bullet.setCollisionFlags(bullet.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+  bullet.setFlags(bullet.getFlags() | BT_DISABLE_WORLD_GRAVITY);  // gravity is set for each body
   body.gravity = gravity && !kinematic ? world.gravity : Vec3(0, 0, 0);
   bullet.setGravity(to_bt(body.gravity));
 

@@ -1,5 +1,5 @@
-// From the world's links to Bullet's collision objects: a static object for each collision that never moves, a
-// compound rigid body for each body of the layout.
+// From the world's links to Bullet's collision objects: a static object for each collision that
+// never moves, a compound rigid body for each body of the layout.
 #pragma once
 
 #include <memory>
@@ -14,31 +14,32 @@ namespace ruedo::physics {
 
 // What a collision object is to the rest of Ruedo; Bullet's user pointer leads to it.
 struct ObjectInfo {
-  int body = -1;                   // -1: static
+  int body = -1;  // -1: static
   int instance = -1;
-  bool self_collide = false;       // of its model
+  bool self_collide = false;  // of its model
   bool plane = false;
-  bool on_plane = false;           // held up by a plane without a contact pair
-  bool moved = false;              // kinematic: moved from outside, never by contacts
-  bool gone = false;               // its model was removed: it is nowhere
-  std::vector<int> links;          // of each child shape; one entry for a single shape
-  std::vector<int> collisions;     // of each child shape, in its link
-  std::vector<ShapeSurface> surfaces;    // of each child shape
-  std::vector<int> joined;         // bodies that a joint ties to this one
+  bool on_plane = false;               // held up by a plane without a contact pair
+  bool moved = false;                  // kinematic: moved from outside, never by contacts
+  bool gone = false;                   // its model was removed: it is nowhere
+  std::vector<int> links;              // of each child shape; one entry for a single shape
+  std::vector<int> collisions;         // of each child shape, in its link
+  std::vector<ShapeSurface> surfaces;  // of each child shape
+  std::vector<int> joined;             // bodies that a joint ties to this one
 };
 
 inline const ObjectInfo& info_of(const btCollisionObject& object) {
   return *static_cast<const ObjectInfo*>(object.getUserPointer());
 }
 
-// A moving body. Bullet's own frame I has its origin in the centre of mass and the principal axes of inertia.
+// A moving body. Bullet's own frame I has its origin in the centre of mass and the principal axes
+// of inertia.
 struct RigidBody {
   std::unique_ptr<btCompoundShape> compound;
   std::unique_ptr<btRigidBody> bullet;
   ObjectInfo info;
   Pose X_BI;
-  Vec3 gravity = Vec3::Zero();     // at the start
-  Vec3 box_center = Vec3::Zero(), box_half = Vec3::Zero();    // bounds of the shapes, in B
+  Vec3 gravity = Vec3::Zero();                              // at the start
+  Vec3 box_center = Vec3::Zero(), box_half = Vec3::Zero();  // bounds of the shapes, in B
 };
 
 struct StaticObject {
@@ -53,13 +54,14 @@ class RigidBodies {
   // Makes what the layout has of a new instance, at the end of the lists.
   void append(const model::WorldModel& world, const model::BodyLayout& layout, int instance);
 
-  std::vector<RigidBody> bodies;                           // as in the layout
-  std::vector<std::unique_ptr<StaticObject>> statics;      // in world order
+  std::vector<RigidBody> bodies;                       // as in the layout
+  std::vector<std::unique_ptr<StaticObject>> statics;  // in world order
   std::vector<Finding> findings;
 
  private:
   void make_statics(const model::WorldModel& world, const model::BodyLayout& layout, size_t link);
-  ShapeSurface tyre_of(const model::WorldModel& world, const model::BodyLayout& layout, int wheel, const ShapeSurface& surface) const;
+  ShapeSurface tyre_of(const model::WorldModel& world, const model::BodyLayout& layout, int wheel,
+                       const ShapeSurface& surface) const;
   void make_body(const model::WorldModel& world, const model::BodyLayout& layout, int index);
   ShapeFactory shapes_;
 };

@@ -1,5 +1,5 @@
-// Bodies and rows of the constraint solver: a row says what one combination of two bodies' velocities shall be, and has an
-// impulse that brings it there.
+// Bodies and rows of the constraint solver: a row says what one combination of two bodies'
+// velocities shall be, and has an impulse that brings it there.
 #pragma once
 
 #include <vector>
@@ -9,40 +9,43 @@
 namespace ruedo::physics {
 
 struct SolverBody {
-  btRigidBody* bullet = nullptr;    // null: what never moves
-  Vec3 v = Vec3::Zero(), w = Vec3::Zero();              // of the centre of mass, m/s and rad/s, world
-  Vec3 push_v = Vec3::Zero(), push_w = Vec3::Zero();    // that undo errors of position, and are then forgotten
-  Vec3 v0 = Vec3::Zero(), w0 = Vec3::Zero();            // before forces acted
-  Vec3 inverse_mass = Vec3::Zero();                     // 1/kg, for each axis of the world
-  Eigen::Matrix3d inverse_inertia = Eigen::Matrix3d::Zero();    // world
-  bool held = false;                                    // a row acted on it, or a joint ties it
+  btRigidBody* bullet = nullptr;            // null: what never moves
+  Vec3 v = Vec3::Zero(), w = Vec3::Zero();  // of the centre of mass, m/s and rad/s, world
+  Vec3 push_v = Vec3::Zero(),
+       push_w = Vec3::Zero();  // that undo errors of position, and are then forgotten
+  Vec3 v0 = Vec3::Zero(), w0 = Vec3::Zero();                  // before forces acted
+  Vec3 inverse_mass = Vec3::Zero();                           // 1/kg, for each axis of the world
+  Eigen::Matrix3d inverse_inertia = Eigen::Matrix3d::Zero();  // world
+  bool held = false;  // a row acted on it, or a joint ties it
 };
 // What drives or brakes a joint about or along one axis, beside what Bullet's constraint holds.
 struct JointMotor {
   bool on = false, linear = false;
-  Vec3 axis = Vec3::UnitZ(), anchor = Vec3::Zero();     // world; the child turns or moves positively
-  double advance = 0.0;                                 // m/rad, linear: of a thread, which the rate does not count
-  double rate = 0.0;                                    // rad/s or m/s
-  double lower = 0.0, upper = 0.0;                      // impulse in a substep, N m s or N s
-  double softness = 0.0;                                // rate lost for an impulse: 1 / (gain * substep)
-  double impulse = 0.0;                                 // that it gave
+  Vec3 axis = Vec3::UnitZ(), anchor = Vec3::Zero();  // world; the child turns or moves positively
+  double advance = 0.0;             // m/rad, linear: of a thread, which the rate does not count
+  double rate = 0.0;                // rad/s or m/s
+  double lower = 0.0, upper = 0.0;  // impulse in a substep, N m s or N s
+  double softness = 0.0;            // rate lost for an impulse: 1 / (gain * substep)
+  double impulse = 0.0;             // that it gave
 };
 struct JointMotors {
-  JointMotor first, second;                             // the second one: universal joints
+  JointMotor first, second;  // the second one: universal joints
 };
 
-using SolverBodies = std::vector<SolverBody>;           // the first one is what never moves
+using SolverBodies = std::vector<SolverBody>;  // the first one is what never moves
 
 struct Row {
   int a = 0, b = 0;
-  Vec3 linear_a = Vec3::Zero(), angular_a = Vec3::Zero(), linear_b = Vec3::Zero(), angular_b = Vec3::Zero();    // J
-  Vec3 moves_a = Vec3::Zero(), turns_a = Vec3::Zero(), moves_b = Vec3::Zero(), turns_b = Vec3::Zero();          // M^-1 J^T
-  double response = 0.0;      // J M^-1 J^T: change of the velocity by a unit impulse
-  double softness = 0.0;      // of the row: J v + softness * impulse = target
-  double inverse = 0.0;       // 1 / (response + softness); 0: nothing can move
+  Vec3 linear_a = Vec3::Zero(), angular_a = Vec3::Zero(), linear_b = Vec3::Zero(),
+       angular_b = Vec3::Zero();  // J
+  Vec3 moves_a = Vec3::Zero(), turns_a = Vec3::Zero(), moves_b = Vec3::Zero(),
+       turns_b = Vec3::Zero();  // M^-1 J^T
+  double response = 0.0;        // J M^-1 J^T: change of the velocity by a unit impulse
+  double softness = 0.0;        // of the row: J v + softness * impulse = target
+  double inverse = 0.0;         // 1 / (response + softness); 0: nothing can move
   double target = 0.0, lower = 0.0, upper = 0.0, impulse = 0.0;
   double push_target = 0.0, push = 0.0;
-  double before = 0.0, heading = 0.0;    // of the impulse, for the conjugate directions
+  double before = 0.0, heading = 0.0;  // of the impulse, for the conjugate directions
 
   // To be called when bodies, Jacobian and softness are set.
   void prepare(const SolverBodies& bodies) {
@@ -52,7 +55,8 @@ struct Row {
     turns_a = A.inverse_inertia * angular_a;
     moves_b = B.inverse_mass.cwiseProduct(linear_b);
     turns_b = B.inverse_inertia * angular_b;
-    response = linear_a.dot(moves_a) + angular_a.dot(turns_a) + linear_b.dot(moves_b) + angular_b.dot(turns_b);
+    response = linear_a.dot(moves_a) + angular_a.dot(turns_a) + linear_b.dot(moves_b) +
+               angular_b.dot(turns_b);
     inverse = response > 1e-12 ? 1.0 / (response + softness) : 0.0;
   }
   // What an impulse of this row changes in the velocity of another one.
@@ -72,7 +76,8 @@ struct Row {
   double push_velocity(const SolverBodies& bodies) const {
     const SolverBody& A = bodies[static_cast<size_t>(a)];
     const SolverBody& B = bodies[static_cast<size_t>(b)];
-    return linear_a.dot(A.push_v) + angular_a.dot(A.push_w) + linear_b.dot(B.push_v) + angular_b.dot(B.push_w);
+    return linear_a.dot(A.push_v) + angular_a.dot(A.push_w) + linear_b.dot(B.push_v) +
+           angular_b.dot(B.push_w);
   }
   // Adds to the impulse.
   void give(SolverBodies& bodies, double more) {

@@ -1,5 +1,6 @@
-// Geometry to Bullet's shapes: margins that keep primitives exact, triangle meshes with an unquantised BVH (a
-// quantised one loses contacts), hulls of the connected parts of meshes that move.
+// Geometry to Bullet's shapes: margins that keep primitives exact, triangle meshes with an
+// unquantised BVH (a quantised one loses contacts), hulls of the connected parts of meshes that
+// move.
 #include "physics/shapes.h"
 
 #include <algorithm>
@@ -17,15 +18,17 @@ namespace ruedo::physics {
 
 namespace {
 
-// Bullet rounds the edges of boxes and cylinders by the margin, without changing their size; its default, 40 mm,
-// is as large as a robot's wheel.
+// Bullet rounds the edges of boxes and cylinders by the margin, without changing their size; its
+// default, 40 mm, is as large as a robot's wheel.
 constexpr double kMargin_m = 1e-3;
 constexpr size_t kMaxPieces = 32;
 constexpr size_t kMaxHullVertices = 128;
 // A mesh whose hulls enclose so much more than it does counts as concave.
 constexpr double kConcavity = 0.02;
 
-double margin_for(double smallest_half_size) { return std::min(kMargin_m, 0.1 * smallest_half_size); }
+double margin_for(double smallest_half_size) {
+  return std::min(kMargin_m, 0.1 * smallest_half_size);
+}
 
 btVector3 scaled(const Eigen::Vector3f& p, const Vec3& scale) {
   return {p.x() * scale.x(), p.y() * scale.y(), p.z() * scale.z()};
@@ -45,7 +48,8 @@ std::vector<int> connected_parts(const model::Mesh& mesh, int& count) {
     const Eigen::Vector3f& p = mesh.positions[i];
     return std::array<float, 3>{p.x(), p.y(), p.z()};
   };
-  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return std::pair(key(a), a) < std::pair(key(b), b); });
+  std::sort(order.begin(), order.end(),
+            [&](uint32_t a, uint32_t b) { return std::pair(key(a), a) < std::pair(key(b), b); });
   for (size_t i = 1; i < n; ++i) {
     if (key(order[i]) == key(order[i - 1])) parent[root(order[i])] = root(order[i - 1]);
   }
@@ -68,8 +72,8 @@ double volume_of(const btConvexHullComputer& hull) {
   for (int f = 0; f < hull.faces.size(); ++f) {
     const btConvexHullComputer::Edge* first = &hull.edges[hull.faces[f]];
     const btVector3& a = hull.vertices[first->getSourceVertex()];
-    for (const auto* edge = first->getNextEdgeOfFace(); edge->getTargetVertex() != first->getSourceVertex();
-         edge = edge->getNextEdgeOfFace()) {
+    for (const auto* edge = first->getNextEdgeOfFace();
+         edge->getTargetVertex() != first->getSourceVertex(); edge = edge->getNextEdgeOfFace()) {
       const btVector3& b = hull.vertices[edge->getSourceVertex()];
       const btVector3& c = hull.vertices[edge->getTargetVertex()];
       six_volumes += a.dot(b.cross(c));
@@ -78,17 +82,19 @@ double volume_of(const btConvexHullComputer& hull) {
   return std::abs(six_volumes) / 6.0;
 }
 
-// The corners of the hull of `points`, thinned out to those that are extreme in evenly spread directions when
-// there are too many.
+// The corners of the hull of `points`, thinned out to those that are extreme in evenly spread
+// directions when there are too many.
 std::unique_ptr<btConvexHullShape> hull_of(const std::vector<btVector3>& points, double& volume) {
   btConvexHullComputer computer;
-  computer.compute(&points[0].m_floats[0], sizeof(btVector3), static_cast<int>(points.size()), 0, 0);
+  computer.compute(&points[0].m_floats[0], sizeof(btVector3), static_cast<int>(points.size()), 0,
+                   0);
   volume += volume_of(computer);
   auto shape = std::make_unique<btConvexHullShape>();
   const int corners = computer.vertices.size();
-  std::vector<bool> keep(static_cast<size_t>(corners), corners <= static_cast<int>(kMaxHullVertices));
+  std::vector<bool> keep(static_cast<size_t>(corners),
+                         corners <= static_cast<int>(kMaxHullVertices));
   if (corners > static_cast<int>(kMaxHullVertices)) {
-    for (size_t i = 0; i < kMaxHullVertices; ++i) {    // a Fibonacci sphere
+    for (size_t i = 0; i < kMaxHullVertices; ++i) {  // a Fibonacci sphere
       const double z = 1.0 - (2.0 * static_cast<double>(i) + 1.0) / kMaxHullVertices;
       const double angle = 2.399963229728653 * static_cast<double>(i), r = std::sqrt(1.0 - z * z);
       const btVector3 direction(r * math::cos(angle), r * math::sin(angle), z);
@@ -120,7 +126,8 @@ struct ShapeFactory::Triangles {
     for (const auto& p : mesh.positions) {
       for (int i = 0; i < 3; ++i) positions.push_back(p[i] * scale[i]);
     }
-    for (const auto& triangle : mesh.triangles) indices.insert(indices.end(), triangle.begin(), triangle.end());
+    for (const auto& triangle : mesh.triangles)
+      indices.insert(indices.end(), triangle.begin(), triangle.end());
     btIndexedMesh part;
     part.m_numTriangles = static_cast<int>(mesh.triangles.size());
     part.m_triangleIndexBase = reinterpret_cast<const unsigned char*>(indices.data());
@@ -144,26 +151,23 @@ btCollisionShape* ShapeFactory::primitive(const model::Geometry& geometry) {
       box->setMargin(margin_for(size.minCoeff() / 2));
       return own(std::move(box));
     }
-    case model::Shape::sphere:
-      return own(std::make_unique<btSphereShape>(size.x()));
+    case model::Shape::sphere: return own(std::make_unique<btSphereShape>(size.x()));
     case model::Shape::cylinder: {
-      auto cylinder = std::make_unique<btCylinderShapeZ>(btVector3(size.x(), size.x(), size.y() / 2));
+      auto cylinder =
+          std::make_unique<btCylinderShapeZ>(btVector3(size.x(), size.x(), size.y() / 2));
       cylinder->setMargin(margin_for(std::min(size.x(), size.y() / 2)));
       return own(std::move(cylinder));
     }
-    case model::Shape::capsule:
-      return own(std::make_unique<btCapsuleShapeZ>(size.x(), size.y()));
-    case model::Shape::ellipsoid:
-      return own(std::make_unique<EllipsoidShape>(to_bt(size)));
+    case model::Shape::capsule: return own(std::make_unique<btCapsuleShapeZ>(size.x(), size.y()));
+    case model::Shape::ellipsoid: return own(std::make_unique<EllipsoidShape>(to_bt(size)));
     case model::Shape::cone: {
       auto cone = std::make_unique<btConeShapeZ>(size.x(), size.y());
-      cone->setMargin(0.0);    // a cone's margin is added outside
+      cone->setMargin(0.0);  // a cone's margin is added outside
       return own(std::move(cone));
     }
     case model::Shape::plane:
       return own(std::make_unique<btStaticPlaneShape>(to_bt(geometry.normal), 0.0));
-    case model::Shape::mesh:
-      break;
+    case model::Shape::mesh: break;
   }
   return nullptr;
 }
@@ -175,7 +179,8 @@ btCollisionShape* ShapeFactory::fixed(const model::Geometry& geometry) {
   btCollisionShape*& shape = fixed_meshes_[{geometry.mesh.get(), scale.x(), scale.y(), scale.z()}];
   if (!shape) {
     triangles_.push_back(std::make_unique<Triangles>(*geometry.mesh, scale));
-    auto mesh = std::make_unique<btBvhTriangleMeshShape>(&triangles_.back()->array, /*quantised*/ false);
+    auto mesh =
+        std::make_unique<btBvhTriangleMeshShape>(&triangles_.back()->array, /*quantised*/ false);
     mesh->setMargin(0.0);
     mesh->setUserPointer(&triangles_.back()->edges);
     shape = own(std::move(mesh));
@@ -204,7 +209,8 @@ bool ShapeFactory::moving(const model::Geometry& geometry, std::vector<btCollisi
     std::vector<std::vector<btVector3>> points(static_cast<size_t>(count));
     double mesh_volume = 0.0, hull_volume = 0.0;
     for (const auto& triangle : mesh.triangles) {
-      const btVector3 a = scaled(mesh.positions[triangle[0]], scale), b = scaled(mesh.positions[triangle[1]], scale),
+      const btVector3 a = scaled(mesh.positions[triangle[0]], scale),
+                      b = scaled(mesh.positions[triangle[1]], scale),
                       c = scaled(mesh.positions[triangle[2]], scale);
       mesh_volume += a.dot(b.cross(c)) / 6.0;
       auto& of_part = points[static_cast<size_t>(part[triangle[0]])];

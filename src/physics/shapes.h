@@ -1,5 +1,5 @@
-// Collision geometry as Bullet's shapes. Primitives are exact; a mesh that never moves is the mesh itself, one
-// that moves becomes convex pieces, and says so where that changes it.
+// Collision geometry as Bullet's shapes. Primitives are exact; a mesh that never moves is the mesh
+// itself, one that moves becomes convex pieces, and says so where that changes it.
 #pragma once
 
 #include <map>
@@ -12,7 +12,8 @@
 
 namespace ruedo::physics {
 
-// Makes and owns shapes; those of one mesh at one scale are shared. Must outlive all that use its shapes.
+// Makes and owns shapes; those of one mesh at one scale are shared. Must outlive all that use its
+// shapes.
 class ShapeFactory {
  public:
   ShapeFactory();
@@ -21,9 +22,9 @@ class ShapeFactory {
   // For a body that never moves. Null for a mesh without triangles. Planes: through the origin.
   btCollisionShape* fixed(const model::Geometry& geometry);
 
-  // For a body that moves: one shape, or for a mesh the convex hull of each connected part. Appends to `shapes`;
-  // nothing is appended for a plane, which cannot move. Returns false when the shape is not quite the geometry:
-  // a concave mesh.
+  // For a body that moves: one shape, or for a mesh the convex hull of each connected part. Appends
+  // to `shapes`; nothing is appended for a plane, which cannot move. Returns false when the shape
+  // is not quite the geometry: a concave mesh.
   bool moving(const model::Geometry& geometry, std::vector<btCollisionShape*>& shapes);
 
   // A wheel of that radius and width about its z axis (m).
@@ -35,7 +36,8 @@ class ShapeFactory {
     std::vector<btCollisionShape*> hulls;
     bool exact = true;
   };
-  using MeshKey = std::tuple<const model::Mesh*, double, double, double>;    // looked up, never iterated
+  using MeshKey =
+      std::tuple<const model::Mesh*, double, double, double>;  // looked up, never iterated
 
   btCollisionShape* primitive(const model::Geometry& geometry);
   template <class Shape>

@@ -1,4 +1,5 @@
-// Joints and surfaces that are simplified. Said once, while a world loads, so that nobody has to find out.
+// Joints and surfaces that are simplified. Said once, while a world loads, so that nobody has to
+// find out.
 #include "physics/simplifications.h"
 
 #include <algorithm>
@@ -12,38 +13,54 @@ const model::Model& model_of(const model::WorldModel& world, int instance) {
   return *world.models[static_cast<size_t>(instance)].model;
 }
 
-void look_at_joints(const model::WorldModel& world, const model::BodyLayout& layout, std::vector<Finding>& findings) {
+void look_at_joints(const model::WorldModel& world, const model::BodyLayout& layout,
+                    std::vector<Finding>& findings) {
   for (const auto& placement : layout.joints) {
-    const model::Joint& joint = model_of(world, placement.instance).joints[static_cast<size_t>(placement.joint)];
-    const bool led = std::any_of(layout.joints.begin(), layout.joints.end(), [&](const auto& other) { return other.instance == placement.instance && other.joint == joint.leader; });
+    const model::Joint& joint =
+        model_of(world, placement.instance).joints[static_cast<size_t>(placement.joint)];
+    const bool led =
+        std::any_of(layout.joints.begin(), layout.joints.end(), [&](const auto& other) {
+          return other.instance == placement.instance && other.joint == joint.leader;
+        });
     if (joint.leader >= 0 && !led) {
-      findings.push_back({Finding::Kind::unsupported, joint.source, "model " + world.models[static_cast<size_t>(placement.instance)].name + "/joint " + joint.name,
+      findings.push_back({Finding::Kind::unsupported, joint.source,
+                          "model " + world.models[static_cast<size_t>(placement.instance)].name +
+                              "/joint " + joint.name,
                           "<mimic> of a driven wheel is not supported; the joint moves freely"});
     }
     const bool ball = joint.type == model::JointType::ball;
     if (!ball && joint.type != model::JointType::universal) continue;
     findings.push_back({Finding::Kind::unsupported, joint.source,
-                        "model " + world.models[static_cast<size_t>(placement.instance)].name + "/joint " + joint.name,
-                        ball ? "a ball joint holds its links together; it takes no commands, and its position is published as 0"
-                             : "a universal joint takes commands for its first axis, and publishes that one's position"});
+                        "model " + world.models[static_cast<size_t>(placement.instance)].name +
+                            "/joint " + joint.name,
+                        ball ? "a ball joint holds its links together; it takes no commands, and "
+                               "its position is published as 0"
+                             : "a universal joint takes commands for its first axis, and publishes "
+                               "that one's position"});
   }
 }
 
 // Without a direction two coefficients are one; a torsional one without a patch has no lever.
-void look_at_friction(const model::WorldModel& world, const model::BodyLayout& layout, std::vector<Finding>& findings) {
+void look_at_friction(const model::WorldModel& world, const model::BodyLayout& layout,
+                      std::vector<Finding>& findings) {
   for (const auto& placement : layout.links) {
     const model::ModelInstance& instance = world.models[static_cast<size_t>(placement.instance)];
     const model::Link& link = instance.model->links[static_cast<size_t>(placement.link)];
-    const bool rolls = placement.wheel >= 0;    // its axle is the direction
+    const bool rolls = placement.wheel >= 0;  // its axle is the direction
     for (const auto& collision : link.collisions) {
       const model::Surface& surface = collision.surface;
-      const std::string where = "model " + instance.name + "/link " + link.name + "/collision " + collision.name;
-      if (!rolls && surface.friction2 != surface.friction && surface.friction_direction == Vec3::Zero()) {
-        findings.push_back({Finding::Kind::unsupported, collision.source, where, "mu2 differs from mu, and there is no fdir1: mu counts in all directions"});
+      const std::string where =
+          "model " + instance.name + "/link " + link.name + "/collision " + collision.name;
+      if (!rolls && surface.friction2 != surface.friction &&
+          surface.friction_direction == Vec3::Zero()) {
+        findings.push_back(
+            {Finding::Kind::unsupported, collision.source, where,
+             "mu2 differs from mu, and there is no fdir1: mu counts in all directions"});
       }
       if (surface.torsional > 0.0 && surface.patch_radius <= 0.0 && surface.surface_radius <= 0.0) {
         findings.push_back({Finding::Kind::unsupported, collision.source, where,
-                            "a torsional coefficient without patch_radius or surface_radius has no lever: it brakes nothing"});
+                            "a torsional coefficient without patch_radius or surface_radius has no "
+                            "lever: it brakes nothing"});
       }
     }
   }
@@ -51,7 +68,8 @@ void look_at_friction(const model::WorldModel& world, const model::BodyLayout& l
 
 }  // namespace
 
-std::vector<Finding> simplifications(const model::WorldModel& world, const model::BodyLayout& layout) {
+std::vector<Finding> simplifications(const model::WorldModel& world,
+                                     const model::BodyLayout& layout) {
   std::vector<Finding> findings;
   look_at_joints(world, layout, findings);
   look_at_friction(world, layout, findings);

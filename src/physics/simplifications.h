@@ -7,7 +7,9 @@
 
 namespace ruedo::physics {
 
-// Ball and universal joints (they hold; their state and motors are partial), and bodies whose shapes have different friction.
-std::vector<Finding> simplifications(const model::WorldModel& world, const model::BodyLayout& layout);
+// Ball and universal joints (they hold; their state and motors are partial), and bodies whose
+// shapes have different friction.
+std::vector<Finding> simplifications(const model::WorldModel& world,
+                                     const model::BodyLayout& layout);
 
 }  // namespace ruedo::physics

@@ -12,7 +12,8 @@ namespace ruedo::physics {
 namespace {
 
 constexpr double kSlowestBounce_m_s = 1e-3;
-// So deep a contact is left in peace. Were it undone, too, what rests would be lifted a little, fall a little, and rock.
+// So deep a contact is left in peace. Were it undone, too, what rests would be lifted a little,
+// fall a little, and rock.
 constexpr double kRestingDepth_m = 5e-5;
 constexpr int kPushSweeps = 30;
 constexpr double kPushTolerance_m_s = 1e-5;
@@ -54,27 +55,32 @@ Row angular_row(int a, int b, const Vec3& direction) {
 
 Quat turned_by(const Quat& rotation, const Vec3& turn) {
   const double angle = turn.norm();
-  return angle > 0.0 ? (Quat(Eigen::AngleAxisd(angle, turn / angle)) * rotation).normalized() : rotation;
+  return angle > 0.0 ? (Quat(Eigen::AngleAxisd(angle, turn / angle)) * rotation).normalized()
+                     : rotation;
 }
 
 // Free rotation over h: the angular momentum stays, the axes turn. Runge and Kutta's fourth order.
 void turn_freely(const btRigidBody& body, Quat& rotation, Vec3& w, double h) {
   const Vec3 inverse = from_bt(body.getInvInertiaDiagLocal());
   const Vec3 momentum = rotation * (rotation.conjugate() * w).cwiseQuotient(inverse);
-  const auto rate = [&](const Quat& q) { return Vec3(q * inverse.cwiseProduct(q.conjugate() * momentum)); };
+  const auto rate = [&](const Quat& q) {
+    return Vec3(q * inverse.cwiseProduct(q.conjugate() * momentum));
+  };
   const auto turned = [&](const Vec3& k, double t) {
     const Quat dq(0.0, k.x(), k.y(), k.z());
     Quat q = rotation;
     q.coeffs() += 0.5 * t * (dq * rotation).coeffs();
     return q.normalized();
   };
-  const Vec3 k1 = rate(rotation), k2 = rate(turned(k1, 0.5 * h)), k3 = rate(turned(k2, 0.5 * h)), k4 = rate(turned(k3, h));
+  const Vec3 k1 = rate(rotation), k2 = rate(turned(k1, 0.5 * h)), k3 = rate(turned(k2, 0.5 * h)),
+             k4 = rate(turned(k3, h));
   const Vec3 mean = (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0;
   rotation = turned_by(rotation, h * mean);
   w = rate(rotation);
 }
 
-// Of bodies that differ in all by many orders of magnitude, the error of a joint can grow with each attempt to undo it.
+// Of bodies that differ in all by many orders of magnitude, the error of a joint can grow with each
+// attempt to undo it.
 Vec3 bounded(const Vec3& velocity) {
   const double norm = velocity.norm();
   return norm > quantity::kSpeed.most ? Vec3(velocity * (quantity::kSpeed.most / norm)) : velocity;
@@ -84,7 +90,10 @@ Vec3 bounded(const Vec3& velocity) {
 
 int Solver::body_of(const btCollisionObject& object) {
   const int index = object.getCompanionId();
-  return index > 0 && static_cast<size_t>(index) < bodies_.size() && bodies_[static_cast<size_t>(index)].bullet == &object ? index : 0;
+  return index > 0 && static_cast<size_t>(index) < bodies_.size() &&
+                 bodies_[static_cast<size_t>(index)].bullet == &object
+             ? index
+             : 0;
 }
 
 void Solver::add_body(btRigidBody& body, double substep_s) {
@@ -106,7 +115,7 @@ void Solver::set_normal(ContactRows& contact, const ContactSurface& surface, dou
   const double gap = contact.gap;
   double reduction = settings_.error_reduction;
   contact.soft = surface.stiffness > 0.0;
-  if (contact.soft) {    // an implicit spring and damper
+  if (contact.soft) {  // an implicit spring and damper
     const double hard = substep_s * surface.stiffness + surface.damping;
     row.softness = 1.0 / (substep_s * hard);
     reduction = substep_s * surface.stiffness / hard;
@@ -115,12 +124,15 @@ void Solver::set_normal(ContactRows& contact, const ContactSurface& surface, dou
   row.lower = 0.0;
   row.upper = BT_LARGE_FLOAT;
   row.target = gap > 0.0 ? -gap / substep_s : contact.soft ? -reduction * gap / substep_s : 0.0;
-  row.push_target = gap < -kRestingDepth_m && !contact.soft ? -reduction * (gap + kRestingDepth_m) / substep_s : 0.0;
+  row.push_target = gap < -kRestingDepth_m && !contact.soft
+                        ? -reduction * (gap + kRestingDepth_m) / substep_s
+                        : 0.0;
   if (surface.restitution <= 0.0) return;
   // The speed at the moment of touching, somewhere within the substep: forces act up to there only.
   const SolverBody& A = bodies_[static_cast<size_t>(row.a)];
   const SolverBody& B = bodies_[static_cast<size_t>(row.b)];
-  const double before = -(row.linear_a.dot(A.v0) + row.angular_a.dot(A.w0) + row.linear_b.dot(B.v0) + row.angular_b.dot(B.w0));
+  const double before = -(row.linear_a.dot(A.v0) + row.angular_a.dot(A.w0) +
+                          row.linear_b.dot(B.v0) + row.angular_b.dot(B.w0));
   const double acceleration = (-row.velocity(bodies_) - before) / substep_s;
   const double square = before * std::abs(before) + 2.0 * acceleration * std::max(gap, 0.0);
   const double rebound = square > 0.0 ? surface.restitution * std::sqrt(square) : 0.0;
@@ -135,13 +147,15 @@ void Solver::set_friction(ContactRows& contact, const ContactSurface& surface) {
   contact.friction = surface.friction;
   contact.friction2 = surface.friction2;
   const double m1 = surface.friction, m2 = surface.friction2;
-  const double k11 = m1 * m1 * (contact.along.response + surface.slip), k22 = m2 * m2 * (contact.across.response + surface.slip2);
+  const double k11 = m1 * m1 * (contact.along.response + surface.slip),
+               k22 = m2 * m2 * (contact.across.response + surface.slip2);
   const double k12 = m1 * m2 * contact.along.coupling(contact.across);
   const double largest = 0.5 * (k11 + k22) + math::hypot(0.5 * (k11 - k22), k12);
   contact.step = largest > 1e-12 ? 1.0 / largest : 0.0;
 }
 
-void Solver::add_contact(btManifoldPoint& point, const ContactSurface& surface, int a, int b, double substep_s) {
+void Solver::add_contact(btManifoldPoint& point, const ContactSurface& surface, int a, int b,
+                         double substep_s) {
   if (contacts_.size() == contact_count_) contacts_.emplace_back();
   ContactRows& contact = contacts_[contact_count_++];
   contact = {};
@@ -152,7 +166,8 @@ void Solver::add_contact(btManifoldPoint& point, const ContactSurface& surface, 
     const btRigidBody* bullet = bodies_[static_cast<size_t>(body)].bullet;
     return bullet ? from_bt(at - bullet->getCenterOfMassPosition()) : Vec3(Vec3::Zero());
   };
-  const Vec3 arm_a = arm(a, point.getPositionWorldOnA()), arm_b = arm(b, point.getPositionWorldOnB());
+  const Vec3 arm_a = arm(a, point.getPositionWorldOnA()),
+             arm_b = arm(b, point.getPositionWorldOnB());
   contact.normal = linear_row(a, b, normal, arm_a, arm_b);
   set_normal(contact, surface, substep_s);
 
@@ -186,13 +201,15 @@ void Solver::add_contact(btManifoldPoint& point, const ContactSurface& surface, 
   start_from_last(contact, substep_s);
 }
 
-// The impulses of the substep before. m_prevRHS, which Bullet does not use, holds how long that was.
+// The impulses of the substep before. m_prevRHS, which Bullet does not use, holds how long that
+// was.
 void Solver::start_from_last(ContactRows& contact, double substep_s) {
   const btManifoldPoint& point = *contact.point;
   if (!(point.m_prevRHS > 0.0) || !(point.m_appliedImpulse > 0.0)) return;
   const double scale = substep_s / point.m_prevRHS;
   contact.normal.give(bodies_, scale * point.m_appliedImpulse);
-  const Vec3 rubbed = scale * from_bt(point.m_appliedImpulseLateral1 * point.m_lateralFrictionDir1 + point.m_appliedImpulseLateral2 * point.m_lateralFrictionDir2);
+  const Vec3 rubbed = scale * from_bt(point.m_appliedImpulseLateral1 * point.m_lateralFrictionDir1 +
+                                      point.m_appliedImpulseLateral2 * point.m_lateralFrictionDir2);
   contact.along.give(bodies_, rubbed.dot(contact.along.linear_a));
   contact.across.give(bodies_, rubbed.dot(contact.across.linear_a));
 }
@@ -207,20 +224,25 @@ void Solver::add_contacts(btPersistentManifold& manifold, double substep_s) {
   }
 }
 
-// Both directions of friction at once: what holds, where that is within the ellipse of Coulomb's law; else the
-// projection of a step against the slip onto it, in coordinates in which the ellipse is a circle.
+// Both directions of friction at once: what holds, where that is within the ellipse of Coulomb's
+// law; else the projection of a step against the slip onto it, in coordinates in which the ellipse
+// is a circle.
 double Solver::rub(ContactRows& contact) {
   Row& first = contact.along;
   Row& second = contact.across;
-  const double load = std::max(contact.normal.impulse, 0.0);    // a conjugate step may have gone too far
+  const double load =
+      std::max(contact.normal.impulse, 0.0);  // a conjugate step may have gone too far
   if (load == 0.0 && first.impulse == 0.0 && second.impulse == 0.0) return 0.0;
-  const double v1 = first.velocity(bodies_) + first.softness * first.impulse, v2 = second.velocity(bodies_) + second.softness * second.impulse;
+  const double v1 = first.velocity(bodies_) + first.softness * first.impulse,
+               v2 = second.velocity(bodies_) + second.softness * second.impulse;
   const double m1 = contact.friction, m2 = contact.friction2;
   double p1 = first.impulse - v1 * first.inverse, p2 = second.impulse - v2 * second.inverse;
   const double u1 = m1 > 0.0 ? p1 / m1 : 0.0, u2 = m2 > 0.0 ? p2 / m2 : 0.0;
-  const bool inside = (m1 > 0.0 || p1 == 0.0) && (m2 > 0.0 || p2 == 0.0) && u1 * u1 + u2 * u2 <= load * load;
+  const bool inside =
+      (m1 > 0.0 || p1 == 0.0) && (m2 > 0.0 || p2 == 0.0) && u1 * u1 + u2 * u2 <= load * load;
   if (!inside) {
-    double s1 = (m1 > 0.0 ? first.impulse / m1 : 0.0) - contact.step * m1 * v1, s2 = (m2 > 0.0 ? second.impulse / m2 : 0.0) - contact.step * m2 * v2;
+    double s1 = (m1 > 0.0 ? first.impulse / m1 : 0.0) - contact.step * m1 * v1,
+           s2 = (m2 > 0.0 ? second.impulse / m2 : 0.0) - contact.step * m2 * v2;
     const double size = math::hypot(s1, s2);
     if (size > load) {
       s1 *= load / size;
@@ -238,7 +260,9 @@ double Solver::rub(ContactRows& contact) {
 double Solver::sweep(int number) {
   double worst = blocks_.sweep(bodies_);
   // To and fro: a load goes all the way through a stack in one sweep, whichever way it is numbered.
-  const auto nth = [&](size_t c) -> ContactRows& { return contacts_[number % 2 == 0 ? c : contact_count_ - 1 - c]; };
+  const auto nth = [&](size_t c) -> ContactRows& {
+    return contacts_[number % 2 == 0 ? c : contact_count_ - 1 - c];
+  };
   for (size_t c = 0; c < contact_count_; ++c) {
     ContactRows& contact = nth(c);
     worst = std::max(worst, rub(contact));
@@ -257,9 +281,10 @@ double Solver::sweep(int number) {
   return worst;
 }
 
-// Between the sweeps the impulses go on along conjugate directions (M. Silcowitz-Hansen, S. Niebel, K. Erleben, "A
-// nonsmooth nonlinear conjugate gradient method for interactive contact force problems", 2010): stacks and large ratios of
-// masses take a part of the sweeps. The next sweep brings them back within their bounds; the last one goes nowhere.
+// Between the sweeps the impulses go on along conjugate directions (M. Silcowitz-Hansen, S. Niebel,
+// K. Erleben, "A nonsmooth nonlinear conjugate gradient method for interactive contact force
+// problems", 2010): stacks and large ratios of masses take a part of the sweeps. The next sweep
+// brings them back within their bounds; the last one goes nowhere.
 void Solver::sweep_until_still() {
   double last_square = 0.0;
   for (size_t c = 0; c < contact_count_; ++c) {
@@ -271,7 +296,8 @@ void Solver::sweep_until_still() {
     if (worst <= settings_.tolerance_m_s || i + 1 == settings_.iterations) break;
     double square = 0.0;
     for (size_t c = 0; c < contact_count_; ++c) {
-      for (const Row* row : contacts_[c].main_rows()) square += (row->impulse - row->before) * (row->impulse - row->before) * row->response;
+      for (const Row* row : contacts_[c].main_rows())
+        square += (row->impulse - row->before) * (row->impulse - row->before) * row->response;
     }
     const double further = i > 0 && last_square > 0.0 ? square / last_square : 0.0;
     const bool on = further < 1.0 && i + 2 < settings_.iterations;
@@ -297,7 +323,8 @@ void Solver::undo_penetration() {
     for (size_t c = 0; c < contact_count_; ++c) {
       Row& row = contacts_[c].normal;
       if (contacts_[c].gap > 0.0 || contacts_[c].soft) continue;
-      const double wanted = std::max(0.0, row.push + (row.push_target - row.push_velocity(bodies_)) * row.inverse);
+      const double wanted =
+          std::max(0.0, row.push + (row.push_target - row.push_velocity(bodies_)) * row.inverse);
       if (wanted == row.push) continue;
       worst = std::max(worst, std::abs(wanted - row.push) * row.response);
       row.give_push(bodies_, wanted - row.push);
@@ -306,9 +333,10 @@ void Solver::undo_penetration() {
   }
 }
 
-// The bodies of a mechanism went straight on where its joints lead along arcs. What brings them back together is part of
-// their motion, and so is its velocity (J.-P. Ryckaert et al., "Numerical integration of the cartesian equations of motion of a
-// system with constraints", 1977: SHAKE): a pendulum keeps its energy. An error that no motion makes is undone without.
+// The bodies of a mechanism went straight on where its joints lead along arcs. What brings them
+// back together is part of their motion, and so is its velocity (J.-P. Ryckaert et al., "Numerical
+// integration of the cartesian equations of motion of a system with constraints", 1977: SHAKE): a
+// pendulum keeps its energy. An error that no motion makes is undone without.
 void Solver::close_joints(double substep_s) {
   if (blocks_.empty()) return;
   for (SolverBody& s : bodies_) s.push_v = s.push_w = Vec3::Zero();
@@ -387,7 +415,8 @@ void Solver::write_back(double substep_s) {
   }
 }
 
-void Solver::solve(const std::vector<btRigidBody*>& bodies, const std::vector<btPersistentManifold*>& manifolds,
+void Solver::solve(const std::vector<btRigidBody*>& bodies,
+                   const std::vector<btPersistentManifold*>& manifolds,
                    const std::vector<btTypedConstraint*>& joints, double substep_s) {
   sweeps_ = 0;
   contact_count_ = 0;
@@ -413,7 +442,8 @@ void Solver::solve(const std::vector<btRigidBody*>& bodies, const std::vector<bt
   for (size_t c = 0; c < contact_count_; ++c) {
     const ContactRows& contact = contacts_[c];
     if (contact.normal.impulse == 0.0 && contact.normal.push == 0.0) continue;
-    bodies_[static_cast<size_t>(contact.normal.a)].held = bodies_[static_cast<size_t>(contact.normal.b)].held = true;
+    bodies_[static_cast<size_t>(contact.normal.a)].held =
+        bodies_[static_cast<size_t>(contact.normal.b)].held = true;
   }
   advance(substep_s);
   close_joints(substep_s);

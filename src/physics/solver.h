@@ -1,13 +1,19 @@
-// Contacts and joints to velocities: the constraint solver of an island, the bodies that touch or are tied to each other.
+// Contacts and joints to velocities: the constraint solver of an island, the bodies that touch or
+// are tied to each other.
 //
-// Projected Gauss-Seidel on impulses, started with those of the last substep, as in Bullet's own sequential impulses
-// (E. Catto, "Iterative dynamics with temporal coherence", 2005), with four differences that were measured to matter:
-// - Sweeps are accelerated by conjugate directions, and go on until no row changes a velocity by more than a tolerance, up to
+// Projected Gauss-Seidel on impulses, started with those of the last substep, as in Bullet's own
+// sequential impulses (E. Catto, "Iterative dynamics with temporal coherence", 2005), with four
+// differences that were measured to matter:
+// - Sweeps are accelerated by conjugate directions, and go on until no row changes a velocity by
+// more than a tolerance, up to
 //   a limit: a lone robot takes a few, a stack or a large ratio of masses takes more.
-// - The joints of a mechanism are one block, solved directly (dense Cholesky) in each sweep: a chain of joints holds.
-// - Friction is Coulomb's cone, not a pyramid: an ellipse where a file gives two coefficients. Its force points against
+// - The joints of a mechanism are one block, solved directly (dense Cholesky) in each sweep: a
+// chain of joints holds.
+// - Friction is Coulomb's cone, not a pyramid: an ellipse where a file gives two coefficients. Its
+// force points against
 //   the slip of greatest dissipation, whatever the heading.
-// - Penetration and joint errors are undone by velocities of their own, which are forgotten: they add no energy.
+// - Penetration and joint errors are undone by velocities of their own, which are forgotten: they
+// add no energy.
 #pragma once
 
 #include <array>
@@ -21,59 +27,64 @@ namespace ruedo::physics {
 
 // What acts between two shapes, of both together.
 struct ContactSurface {
-  double friction = 1.0, friction2 = 1.0;    // along `along` and across it
-  Vec3 along = Vec3::Zero();                 // m/s, world, need not be unit; zero: the same in all directions
-  double slip = 0.0, slip2 = 0.0;            // m/s per N, along and across
-  double spinning = 0.0, rolling = 0.0;      // m: largest moment about the normal, and across it, for a newton of load
+  double friction = 1.0, friction2 = 1.0;  // along `along` and across it
+  Vec3 along = Vec3::Zero();       // m/s, world, need not be unit; zero: the same in all directions
+  double slip = 0.0, slip2 = 0.0;  // m/s per N, along and across
+  double spinning = 0.0,
+         rolling = 0.0;  // m: largest moment about the normal, and across it, for a newton of load
   double restitution = 0.0;
-  double stiffness = 0.0, damping = 0.0;     // N/m, N s/m; 0: rigid
+  double stiffness = 0.0, damping = 0.0;  // N/m, N s/m; 0: rigid
 };
 
 // Says what acts at a contact point.
 class ContactSurfaces {
  public:
   virtual ~ContactSurfaces() = default;
-  virtual ContactSurface at(const btCollisionObject& a, const btCollisionObject& b, const btManifoldPoint& point) const = 0;
+  virtual ContactSurface at(const btCollisionObject& a, const btCollisionObject& b,
+                            const btManifoldPoint& point) const = 0;
 };
 
 struct SolverSettings {
-  int iterations = 500;            // at most
-  double tolerance_m_s = 1e-5;     // a sweep that changes no velocity by more is the last one
-  double error_reduction = 0.2;    // part of a penetration or joint error that a substep undoes
+  int iterations = 500;          // at most
+  double tolerance_m_s = 1e-5;   // a sweep that changes no velocity by more is the last one
+  double error_reduction = 0.2;  // part of a penetration or joint error that a substep undoes
 };
 
 class Solver {
  public:
-  Solver(const ContactSurfaces& surfaces, const SolverSettings& settings) : surfaces_(surfaces), settings_(settings) {
+  Solver(const ContactSurfaces& surfaces, const SolverSettings& settings)
+      : surfaces_(surfaces), settings_(settings) {
     bodies_.reserve(kUsually);
     contacts_.reserve(kUsually);
   }
 
-  // Solves one island for a substep: forces and gravity, which the bodies hold, are added; velocities and poses
-  // are advanced. The order of the arguments decides the last bits.
-  void solve(const std::vector<btRigidBody*>& bodies, const std::vector<btPersistentManifold*>& manifolds,
+  // Solves one island for a substep: forces and gravity, which the bodies hold, are added;
+  // velocities and poses are advanced. The order of the arguments decides the last bits.
+  void solve(const std::vector<btRigidBody*>& bodies,
+             const std::vector<btPersistentManifold*>& manifolds,
              const std::vector<btTypedConstraint*>& joints, double substep_s);
 
-  int sweeps() const { return sweeps_; }    // of the last call
+  int sweeps() const { return sweeps_; }  // of the last call
 
  private:
   struct ContactRows {
     btManifoldPoint* point = nullptr;
     Row normal, along, across, spin, roll[2];
     double friction = 0.0, friction2 = 0.0, spinning = 0.0, rolling = 0.0;
-    double step = 0.0;               // of the projected gradient for both directions of friction
-    double gap = 0.0;                // m, negative: overlap
-    double rebound = 0.0;            // m/s that a bounce leaves with
+    double step = 0.0;     // of the projected gradient for both directions of friction
+    double gap = 0.0;      // m, negative: overlap
+    double rebound = 0.0;  // m/s that a bounce leaves with
     bool soft = false;
     std::array<Row*, 3> main_rows() { return {&normal, &along, &across}; }
   };
 
-  static constexpr size_t kUsually = 64;    // bodies, and contacts, of an island
+  static constexpr size_t kUsually = 64;  // bodies, and contacts, of an island
 
   int body_of(const btCollisionObject& object);
   void add_body(btRigidBody& body, double substep_s);
   void add_contacts(btPersistentManifold& manifold, double substep_s);
-  void add_contact(btManifoldPoint& point, const ContactSurface& surface, int a, int b, double substep_s);
+  void add_contact(btManifoldPoint& point, const ContactSurface& surface, int a, int b,
+                   double substep_s);
   void set_normal(ContactRows& contact, const ContactSurface& surface, double substep_s);
   void set_friction(ContactRows& contact, const ContactSurface& surface);
   void start_from_last(ContactRows& contact, double substep_s);

@@ -1,5 +1,5 @@
-// Sums find what is not finite: one infinity or NaN in a sum makes it infinite or NaN, and what is added here is far from
-// the largest double.
+// Sums find what is not finite: one infinity or NaN in a sum makes it infinite or NaN, and what is
+// added here is far from the largest double.
 #include "physics/state_check.h"
 
 #include <cmath>
@@ -10,45 +10,62 @@ namespace ruedo::physics {
 
 namespace {
 
-bool finite(const Pose& X) { return std::isfinite(X.translation.sum() + X.rotation.coeffs().sum()); }
+bool finite(const Pose& X) {
+  return std::isfinite(X.translation.sum() + X.rotation.coeffs().sum());
+}
 bool finite(const Twist& twist) { return std::isfinite(twist.linear.sum() + twist.angular.sum()); }
 
 [[noreturn]] void fail(const Snapshot& snapshot, const std::string& what) {
-  throw StateError("at " + model::shown(static_cast<double>(snapshot.time) * 1e-6) + " s the state of " + what +
-                   " is not finite: the run ends with the step before. Masses, inertias and efforts that do not fit each other do this");
+  throw StateError("at " + model::shown(static_cast<double>(snapshot.time) * 1e-6) +
+                   " s the state of " + what +
+                   " is not finite: the run ends with the step before. Masses, inertias and "
+                   "efforts that do not fit each other do this");
 }
 
-std::string joint_name(size_t joint, const model::WorldModel& world, const model::BodyLayout& layout) {
+std::string joint_name(size_t joint, const model::WorldModel& world,
+                       const model::BodyLayout& layout) {
   const auto& placed = layout.joints[joint];
   const model::ModelInstance& instance = world.models[static_cast<size_t>(placed.instance)];
-  return "the joint '" + instance.name + "/" + instance.model->joints[static_cast<size_t>(placed.joint)].name + "'";
+  return "the joint '" + instance.name + "/" +
+         instance.model->joints[static_cast<size_t>(placed.joint)].name + "'";
 }
 
 }  // namespace
 
-void check_finite(const Snapshot& snapshot, const model::WorldModel& world, const model::BodyLayout& layout) {
+void check_finite(const Snapshot& snapshot, const model::WorldModel& world,
+                  const model::BodyLayout& layout) {
   for (size_t i = 0; i < snapshot.bodies.size(); ++i) {
     const Vec3& acceleration = snapshot.body_accelerations[i];
-    if (!finite(snapshot.bodies[i]) || !finite(snapshot.body_twists[i]) || !std::isfinite(acceleration.sum())) {
+    if (!finite(snapshot.bodies[i]) || !finite(snapshot.body_twists[i]) ||
+        !std::isfinite(acceleration.sum())) {
       fail(snapshot, "the body '" + layout.bodies[i].name + "'");
     }
   }
   for (size_t i = 0; i < snapshot.joint_positions.size(); ++i) {
-    if (!std::isfinite(snapshot.joint_positions[i] + snapshot.joint_velocities[i] + snapshot.joint_efforts[i])) fail(snapshot, joint_name(i, world, layout));
+    if (!std::isfinite(snapshot.joint_positions[i] + snapshot.joint_velocities[i] +
+                       snapshot.joint_efforts[i]))
+      fail(snapshot, joint_name(i, world, layout));
   }
   for (size_t i = 0; i < snapshot.robots.size(); ++i) {
     const RobotState& robot = snapshot.robots[i];
     const bool good = finite(robot.X_WBase) && finite(robot.twist) &&
-                      std::isfinite(robot.acceleration.sum() + robot.wheel_v + robot.wheel_omega + robot.motion.done + robot.motion.remaining);
-    if (!good) fail(snapshot, "the robot '" + world.models[static_cast<size_t>(layout.robots[i].instance)].name + "'");
+                      std::isfinite(robot.acceleration.sum() + robot.wheel_v + robot.wheel_omega +
+                                    robot.motion.done + robot.motion.remaining);
+    if (!good)
+      fail(snapshot,
+           "the robot '" + world.models[static_cast<size_t>(layout.robots[i].instance)].name + "'");
   }
   for (size_t i = 0; i < snapshot.wheel_angles.size(); ++i) {
-    if (!std::isfinite(snapshot.wheel_angles[i] + snapshot.wheel_rates[i])) fail(snapshot, "wheel " + std::to_string(i));
+    if (!std::isfinite(snapshot.wheel_angles[i] + snapshot.wheel_rates[i]))
+      fail(snapshot, "wheel " + std::to_string(i));
   }
   for (const Contact& contact : snapshot.contacts) {
-    if (!std::isfinite(contact.position.sum() + contact.normal.sum() + contact.force + contact.depth)) {
+    if (!std::isfinite(contact.position.sum() + contact.normal.sum() + contact.force +
+                       contact.depth)) {
       const int body = contact.body_a >= 0 ? contact.body_a : contact.body_b;
-      fail(snapshot, "a contact of the body '" + (body < 0 ? std::string() : layout.bodies[static_cast<size_t>(body)].name) + "'");
+      fail(snapshot,
+           "a contact of the body '" +
+               (body < 0 ? std::string() : layout.bodies[static_cast<size_t>(body)].name) + "'");
     }
   }
 }

@@ -1,4 +1,5 @@
-// Of two coefficients of friction the lower one holds, as in ODE and Gazebo; what yields yields together.
+// Of two coefficients of friction the lower one holds, as in ODE and Gazebo; what yields yields
+// together.
 #include "physics/surfaces.h"
 
 #include <algorithm>
@@ -10,40 +11,52 @@ namespace ruedo::physics {
 
 namespace {
 
-// A contact stiffer than this (N/m) is rigid: at 1 ms it would sink less than a micrometre under a robot.
+// A contact stiffer than this (N/m) is rigid: at 1 ms it would sink less than a micrometre under a
+// robot.
 constexpr double kRigid = 1e8;
-// Moment of friction about the normal of a round patch, of its radius times the load (Hertz's pressure).
+// Moment of friction about the normal of a round patch, of its radius times the load (Hertz's
+// pressure).
 constexpr double kPatch = 3.0 * M_PI / 16.0;
 
 const ShapeSurface& surface_at(const ObjectInfo& info, int child) {
   static const ShapeSurface kPlain;
   if (info.surfaces.empty()) return kPlain;
-  const bool known = info.body >= 0 && child >= 0 && static_cast<size_t>(child) < info.surfaces.size();
+  const bool known =
+      info.body >= 0 && child >= 0 && static_cast<size_t>(child) < info.surfaces.size();
   return known ? info.surfaces[static_cast<size_t>(child)] : info.surfaces.front();
 }
 
 // Where `friction` acts along, in the world; not projected yet.
-Vec3 direction_of(const ShapeSurface& surface, const btCollisionObject& object, const Vec3& normal) {
-  const auto in_world = [&](const Vec3& v) { return from_bt(object.getWorldTransform().getBasis() * to_bt(v)); };
+Vec3 direction_of(const ShapeSurface& surface, const btCollisionObject& object,
+                  const Vec3& normal) {
+  const auto in_world = [&](const Vec3& v) {
+    return from_bt(object.getWorldTransform().getBasis() * to_bt(v));
+  };
   if (surface.along_I != Vec3::Zero()) return in_world(surface.along_I);
   if (surface.axle_I == Vec3::Zero() || surface.friction == surface.friction2) return Vec3::Zero();
   const Vec3 ahead = in_world(surface.axle_I).cross(normal);
-  return ahead.norm() > 1e-3 ? ahead : Vec3(Vec3::Zero());    // a wheel that lies on its side has none
+  return ahead.norm() > 1e-3 ? ahead
+                             : Vec3(Vec3::Zero());  // a wheel that lies on its side has none
 }
 
 double torsional_lever(const ShapeSurface& surface, double depth_m) {
-  const double patch = surface.patch_radius_m > 0.0 ? surface.patch_radius_m : std::sqrt(surface.surface_radius_m * std::max(depth_m, 0.0));
+  const double patch = surface.patch_radius_m > 0.0
+                           ? surface.patch_radius_m
+                           : std::sqrt(surface.surface_radius_m * std::max(depth_m, 0.0));
   return kPatch * surface.torsional * patch;
 }
 
-double in_series(double k1, double k2) { return k1 > 0.0 && k2 > 0.0 ? k1 * k2 / (k1 + k2) : std::max(k1, k2); }
+double in_series(double k1, double k2) {
+  return k1 > 0.0 && k2 > 0.0 ? k1 * k2 / (k1 + k2) : std::max(k1, k2);
+}
 
 }  // namespace
 
 ShapeSurface surface_of(const model::Surface& surface, const Quat& R_IC) {
   ShapeSurface s;
   s.friction = surface.friction;
-  s.along_I = surface.friction_direction == Vec3::Zero() ? Vec3(Vec3::Zero()) : Vec3(R_IC * surface.friction_direction);
+  s.along_I = surface.friction_direction == Vec3::Zero() ? Vec3(Vec3::Zero())
+                                                         : Vec3(R_IC * surface.friction_direction);
   s.friction2 = surface.friction2;
   s.slip = surface.slip;
   s.slip2 = surface.slip2;
@@ -59,7 +72,8 @@ ShapeSurface surface_of(const model::Surface& surface, const Quat& R_IC) {
   return s;
 }
 
-ContactSurface Surfaces::at(const btCollisionObject& a, const btCollisionObject& b, const btManifoldPoint& point) const {
+ContactSurface Surfaces::at(const btCollisionObject& a, const btCollisionObject& b,
+                            const btManifoldPoint& point) const {
   const ShapeSurface& of_a = surface_at(info_of(a), point.m_index0);
   const ShapeSurface& of_b = surface_at(info_of(b), point.m_index1);
   const Vec3 normal = from_bt(point.m_normalWorldOnB);
@@ -67,7 +81,8 @@ ContactSurface Surfaces::at(const btCollisionObject& a, const btCollisionObject&
   const Vec3 along_a = direction_of(of_a, a, normal), along_b = direction_of(of_b, b, normal);
   const bool directed_a = along_a != Vec3::Zero(), directed_b = along_b != Vec3::Zero();
   // Without a direction the two coefficients are one.
-  const double a2 = directed_a ? of_a.friction2 : of_a.friction, b2 = directed_b ? of_b.friction2 : of_b.friction;
+  const double a2 = directed_a ? of_a.friction2 : of_a.friction,
+               b2 = directed_b ? of_b.friction2 : of_b.friction;
   both.friction = std::min(of_a.friction, of_b.friction);
   both.friction2 = std::min(a2, b2);
   both.along = directed_a ? along_a : along_b;

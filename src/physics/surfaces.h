@@ -1,5 +1,5 @@
-// What two shapes' surfaces make of a contact: friction, slip, bounce, stiffness. A surface belongs to a shape, so that a caster
-// without friction keeps that on a chassis with some.
+// What two shapes' surfaces make of a contact: friction, slip, bounce, stiffness. A surface belongs
+// to a shape, so that a caster without friction keeps that on a chassis with some.
 #pragma once
 
 #include <vector>
@@ -12,15 +12,17 @@ namespace ruedo::physics {
 // A shape's surface in the terms of its body.
 struct ShapeSurface {
   double friction = 1.0, friction2 = 1.0;
-  Vec3 along_I = Vec3::Zero();       // direction of `friction` in the body's frame I; zero: none is given
-  Vec3 axle_I = Vec3::Zero();        // of a wheel: `friction` acts across it, `friction2` along it; zero: no wheel
-  double slip = 0.0, slip2 = 0.0;    // m/s per N
-  double torsional = 0.0;            // coefficient
-  double patch_radius_m = 0.0;       // of the torsional friction; 0: from the two below
+  Vec3 along_I =
+      Vec3::Zero();  // direction of `friction` in the body's frame I; zero: none is given
+  Vec3 axle_I =
+      Vec3::Zero();  // of a wheel: `friction` acts across it, `friction2` along it; zero: no wheel
+  double slip = 0.0, slip2 = 0.0;  // m/s per N
+  double torsional = 0.0;          // coefficient
+  double patch_radius_m = 0.0;     // of the torsional friction; 0: from the two below
   double surface_radius_m = 0.0;
   double rolling_m = 0.0;
   double restitution = 0.0;
-  double stiffness = 0.0, damping = 0.0;    // 0: rigid
+  double stiffness = 0.0, damping = 0.0;  // 0: rigid
 };
 
 // R_IC: the collision's axes in the body's frame.
@@ -29,7 +31,8 @@ ShapeSurface surface_of(const model::Surface& surface, const Quat& R_IC);
 // By way of ObjectInfo.
 class Surfaces final : public ContactSurfaces {
  public:
-  ContactSurface at(const btCollisionObject& a, const btCollisionObject& b, const btManifoldPoint& point) const override;
+  ContactSurface at(const btCollisionObject& a, const btCollisionObject& b,
+                    const btManifoldPoint& point) const override;
 };
 
 }  // namespace ruedo::physics

@@ -5,7 +5,8 @@ namespace ruedo::robot {
 
 namespace {
 
-const model::DriveDescription& description_of(const model::WorldModel& world, const model::BodyLayout& layout, int robot) {
+const model::DriveDescription& description_of(const model::WorldModel& world,
+                                              const model::BodyLayout& layout, int robot) {
   const int instance = layout.robots[static_cast<size_t>(robot)].instance;
   return *world.models[static_cast<size_t>(instance)].model->drive;
 }
@@ -21,7 +22,8 @@ std::vector<Vec3> rims_of(const model::BodyLayout& layout, int robot) {
 
 }  // namespace
 
-Drive::Drive(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics, int robot)
+Drive::Drive(const model::WorldModel& world, const model::BodyLayout& layout,
+             physics::PhysicsWorld& physics, int robot)
     : physics_(physics),
       robot_(robot),
       body_(layout.robots[static_cast<size_t>(robot)].body),

@@ -1,4 +1,5 @@
-// What drives have in common: a robot's motion (what it was asked to do), and what it publishes about itself.
+// What drives have in common: a robot's motion (what it was asked to do), and what it publishes
+// about itself.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +17,8 @@ void read_motion(const MotionLog& log, int robot, Snapshot& snapshot);
 
 class Drive {
  public:
-  Drive(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics, int robot);
+  Drive(const model::WorldModel& world, const model::BodyLayout& layout,
+        physics::PhysicsWorld& physics, int robot);
   virtual ~Drive() = default;
   Drive(const Drive&) = delete;
   Drive& operator=(const Drive&) = delete;
@@ -34,11 +36,13 @@ class Drive {
   void read(Snapshot& snapshot) const;
   // As the robot's primitives measure it: the true one, or what its odometry makes of its wheels.
   double heading_in_odom() const {
-    return description_.on_odometry ? believed_heading_ : wrap_angle(heading(X_WBase_.rotation) - odom_heading_);
+    return description_.on_odometry ? believed_heading_
+                                    : wrap_angle(heading(X_WBase_.rotation) - odom_heading_);
   }
   void reset_odometry();
 
-  // The robot was put somewhere else, at rest: the physics has it there already. Its odometry knows nothing of that.
+  // The robot was put somewhere else, at rest: the physics has it there already. Its odometry knows
+  // nothing of that.
   void placed(SimTime now);
   // The level planes are others now.
   virtual void ground_changed() {}
@@ -51,7 +55,7 @@ class Drive {
   Twist base_twist(const Pose& X_WBase) const;
   // The other way round: the twist of the body's frame B in the world.
   Twist body_twist(const Pose& X_WBase, const Twist& of_base) const;
-  void set_state(const Pose& X_WBase, const Twist& twist);    // after a step
+  void set_state(const Pose& X_WBase, const Twist& twist);  // after a step
 
   physics::PhysicsWorld& physics_;
   const int robot_, body_;
@@ -62,11 +66,11 @@ class Drive {
   const model::DriveDescription& description_;
   Motion motion_;
   Pose X_WBase_;
-  Twist twist_;                          // of base_link in base_link
-  Vec3 velocity_ = Vec3::Zero();         // of base_link in the world
-  Vec3 acceleration_ = Vec3::Zero();     // of base_link in base_link
-  double odom_heading_ = 0.0;            // of odom in the world
-  double believed_heading_ = 0.0;        // of base_link in odom, by the wheels
+  Twist twist_;                       // of base_link in base_link
+  Vec3 velocity_ = Vec3::Zero();      // of base_link in the world
+  Vec3 acceleration_ = Vec3::Zero();  // of base_link in base_link
+  double odom_heading_ = 0.0;         // of odom in the world
+  double believed_heading_ = 0.0;     // of base_link in odom, by the wheels
   int32_t resets_ = 0;
   double wheel_v_ = 0.0, wheel_omega_ = 0.0;
 };

@@ -9,7 +9,8 @@
 
 namespace ruedo::robot {
 
-std::vector<LevelPlane> level_planes(const model::WorldModel& world, const model::BodyLayout& layout) {
+std::vector<LevelPlane> level_planes(const model::WorldModel& world,
+                                     const model::BodyLayout& layout) {
   std::vector<LevelPlane> planes;
   for (const auto& placement : layout.links) {
     const auto& instance = world.models[static_cast<size_t>(placement.instance)];
@@ -19,7 +20,8 @@ std::vector<LevelPlane> level_planes(const model::WorldModel& world, const model
       if (collision.geometry.shape != model::Shape::plane) continue;
       const Pose X_WC = placement.X_BL * collision.X_LC;
       const Vec3 normal = X_WC.rotation * collision.geometry.normal;
-      if (normal.z() > 1.0 - 1e-12) planes.push_back({X_WC.translation.z(), collision.surface.friction});
+      if (normal.z() > 1.0 - 1e-12)
+        planes.push_back({X_WC.translation.z(), collision.surface.friction});
     }
   }
   return planes;
@@ -28,37 +30,29 @@ std::vector<LevelPlane> level_planes(const model::WorldModel& world, const model
 std::optional<LevelPlane> nearest_plane(const std::vector<LevelPlane>& planes, double height) {
   std::optional<LevelPlane> nearest;
   for (const LevelPlane& plane : planes) {
-    if (!nearest || std::abs(plane.height - height) < std::abs(nearest->height - height)) nearest = plane;
+    if (!nearest || std::abs(plane.height - height) < std::abs(nearest->height - height))
+      nearest = plane;
   }
   return nearest;
 }
 
 double lowest_point(const model::Geometry& geometry, const Pose& X_FC) {
-  const Vec3 down = X_FC.rotation.conjugate() * -Vec3::UnitZ();    // in C
+  const Vec3 down = X_FC.rotation.conjugate() * -Vec3::UnitZ();  // in C
   const Vec3& size = geometry.size;
   const double across = math::hypot(down.x(), down.y());
   double reach = 0.0;
   switch (geometry.shape) {
-    case model::Shape::box:
-      reach = 0.5 * down.cwiseAbs().dot(size);
-      break;
-    case model::Shape::sphere:
-      reach = size.x();
-      break;
+    case model::Shape::box: reach = 0.5 * down.cwiseAbs().dot(size); break;
+    case model::Shape::sphere: reach = size.x(); break;
     case model::Shape::cylinder:
       reach = size.x() * across + 0.5 * size.y() * std::abs(down.z());
       break;
-    case model::Shape::capsule:
-      reach = size.x() + 0.5 * size.y() * std::abs(down.z());
-      break;
-    case model::Shape::ellipsoid:
-      reach = down.cwiseProduct(size).norm();
-      break;
+    case model::Shape::capsule: reach = size.x() + 0.5 * size.y() * std::abs(down.z()); break;
+    case model::Shape::ellipsoid: reach = down.cwiseProduct(size).norm(); break;
     case model::Shape::cone:
       reach = std::max(0.5 * size.y() * down.z(), size.x() * across - 0.5 * size.y() * down.z());
       break;
-    case model::Shape::plane:
-      break;
+    case model::Shape::plane: break;
     case model::Shape::mesh:
       reach = -std::numeric_limits<double>::infinity();
       if (!geometry.mesh) break;
@@ -70,18 +64,22 @@ double lowest_point(const model::Geometry& geometry, const Pose& X_FC) {
   return X_FC.translation.z() - reach;
 }
 
-double friction_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout, int robot) {
+double friction_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout,
+                          int robot) {
   const auto& placement = layout.robots[static_cast<size_t>(robot)];
   const auto& model = *world.models[static_cast<size_t>(placement.instance)].model;
   double least = std::numeric_limits<double>::infinity();
   for (const int wheel : placement.wheels) {
-    const auto& link = layout.links[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].link)];
-    for (const auto& collision : model.links[static_cast<size_t>(link.link)].collisions) least = std::min(least, collision.surface.friction);
+    const auto& link =
+        layout.links[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].link)];
+    for (const auto& collision : model.links[static_cast<size_t>(link.link)].collisions)
+      least = std::min(least, collision.surface.friction);
   }
   return std::isfinite(least) ? least : 1.0;
 }
 
-double lowest_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout, int robot) {
+double lowest_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout,
+                        int robot) {
   const auto& placement = layout.robots[static_cast<size_t>(robot)];
   const auto& model = *world.models[static_cast<size_t>(placement.instance)].model;
   const Pose X_BaseB = placement.X_BBase.inverse();
@@ -89,13 +87,15 @@ double lowest_of_wheels(const model::WorldModel& world, const model::BodyLayout&
   double lowest = std::numeric_limits<double>::infinity();
   for (const int wheel : placement.wheels) {
     if (layout.wheels[static_cast<size_t>(wheel)].steers) continue;
-    const auto& link = layout.links[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].link)];
+    const auto& link =
+        layout.links[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].link)];
     const Pose X_BaseL = X_BaseW * layout.bodies[static_cast<size_t>(link.body)].X_WB * link.X_BL;
     const auto& collisions = model.links[static_cast<size_t>(link.link)].collisions;
     for (const auto& collision : collisions) {
       lowest = std::min(lowest, lowest_point(collision.geometry, X_BaseL * collision.X_LC));
     }
-    if (collisions.empty()) lowest = std::min(lowest, X_BaseL.translation.z() - model.drive->wheel_radius);
+    if (collisions.empty())
+      lowest = std::min(lowest, X_BaseL.translation.z() - model.drive->wheel_radius);
   }
   return std::isfinite(lowest) ? lowest : 0.0;
 }

@@ -10,22 +10,24 @@ namespace ruedo::robot {
 
 // A static plane whose normal points straight up.
 struct LevelPlane {
-  double height;      // m, world
+  double height;  // m, world
   double friction;
 };
-std::vector<LevelPlane> level_planes(const model::WorldModel& world, const model::BodyLayout& layout);
+std::vector<LevelPlane> level_planes(const model::WorldModel& world,
+                                     const model::BodyLayout& layout);
 
 // The plane nearest to that height.
 std::optional<LevelPlane> nearest_plane(const std::vector<LevelPlane>& planes, double height);
 
 // The least friction of the shapes of a robot's wheels; 1 where they have none.
-double friction_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout, int robot);
+double friction_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout,
+                          int robot);
 
 // Height of the lowest point of a shape at X_FC, along z of F.
 double lowest_point(const model::Geometry& geometry, const Pose& X_FC);
 
-// Height of the lowest point of a robot's wheels, along z of base_link and from its origin. Of wheels without
-// collision shapes, the drive's wheel radius below the wheel's centre.
+// Height of the lowest point of a robot's wheels, along z of base_link and from its origin. Of
+// wheels without collision shapes, the drive's wheel radius below the wheel's centre.
 double lowest_of_wheels(const model::WorldModel& world, const model::BodyLayout& layout, int robot);
 
 }  // namespace ruedo::robot

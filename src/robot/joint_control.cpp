@@ -1,4 +1,5 @@
-// Position control is a velocity in proportion to the error, within the joint's own limits of rate and effort.
+// Position control is a velocity in proportion to the error, within the joint's own limits of rate
+// and effort.
 #include "robot/joint_control.h"
 
 #include <algorithm>
@@ -14,10 +15,11 @@ namespace ruedo::robot {
 
 namespace {
 
-constexpr double kGainPerStep = 0.2;    // no more than this part of the error in a step
+constexpr double kGainPerStep = 0.2;  // no more than this part of the error in a step
 }  // namespace
 
-JointControl::JointControl(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics)
+JointControl::JointControl(const model::WorldModel& world, const model::BodyLayout& layout,
+                           physics::PhysicsWorld& physics)
     : world_(world),
       layout_(layout),
       physics_(physics),
@@ -27,7 +29,8 @@ JointControl::JointControl(const model::WorldModel& world, const model::BodyLayo
 
 int8_t JointControl::apply(int robot, const JointCommand& command) {
   const size_t n = command.names.size();
-  if (command.modes.size() != n || command.values.size() != n) return motion_status_t::REASON_BAD_VALUE;
+  if (command.modes.size() != n || command.values.size() != n)
+    return motion_status_t::REASON_BAD_VALUE;
   const auto& placement = layout_.robots[static_cast<size_t>(robot)];
   const auto& model = *world_.models[static_cast<size_t>(placement.instance)].model;
   const auto description = [&](int joint) -> const model::Joint& {
@@ -44,11 +47,13 @@ int8_t JointControl::apply(int robot, const JointCommand& command) {
                         : command.modes[i] == joint_command_t::VELOCITY ? quantity::kSpeed.most
                                                                         : quantity::kLength.most;
     if (std::abs(command.values[i]) > most) return motion_status_t::REASON_BAD_VALUE;
-    if (command.modes[i] < joint_command_t::POSITION || command.modes[i] > joint_command_t::EFFORT) {
+    if (command.modes[i] < joint_command_t::POSITION ||
+        command.modes[i] > joint_command_t::EFFORT) {
       return motion_status_t::REASON_BAD_KIND;
     }
     const int joint = find(command.names[i]);
-    if (joint < 0 || description(joint).leader >= 0) return motion_status_t::REASON_BAD_VALUE;    // one that mimics another takes no commands
+    if (joint < 0 || description(joint).leader >= 0)
+      return motion_status_t::REASON_BAD_VALUE;  // one that mimics another takes no commands
   }
   for (size_t i = 0; i < n; ++i) {
     const int joint = find(command.names[i]);
@@ -60,7 +65,10 @@ int8_t JointControl::apply(int robot, const JointCommand& command) {
       physics_.apply_joint_effort(joint, command.values[i]);
     } else {
       const bool limited = axis.lower <= axis.upper;
-      targets_.push_back({joint, limited ? std::clamp(command.values[i], axis.lower, axis.upper) : command.values[i], std::min(axis.position_gain, largest_gain_)});
+      targets_.push_back(
+          {joint,
+           limited ? std::clamp(command.values[i], axis.lower, axis.upper) : command.values[i],
+           std::min(axis.position_gain, largest_gain_)});
     }
     const auto& placed = layout_.joints[static_cast<size_t>(joint)];
     if (placed.parent_body >= 0) physics_.wake(placed.parent_body);
@@ -70,7 +78,9 @@ int8_t JointControl::apply(int robot, const JointCommand& command) {
 }
 
 void JointControl::forget(int instance) {
-  std::erase_if(targets_, [&](const Target& target) { return layout_.joints[static_cast<size_t>(target.joint)].instance == instance; });
+  std::erase_if(targets_, [&](const Target& target) {
+    return layout_.joints[static_cast<size_t>(target.joint)].instance == instance;
+  });
 }
 
 void JointControl::before_step() {
@@ -78,7 +88,8 @@ void JointControl::before_step() {
     const double error = target.position - physics_.joint_position(target.joint);
     const auto& placed = layout_.joints[static_cast<size_t>(target.joint)];
     const auto& model = *world_.models[static_cast<size_t>(placed.instance)].model;
-    physics_.drive_joint_velocity(target.joint, target.gain * error, model.joints[static_cast<size_t>(placed.joint)].axis.effort);
+    physics_.drive_joint_velocity(target.joint, target.gain * error,
+                                  model.joints[static_cast<size_t>(placed.joint)].axis.effort);
   }
 }
 

@@ -12,23 +12,27 @@ namespace ruedo::robot {
 
 namespace {
 
-constexpr double kSupportNormal = 0.5;       // cosine between a support's normal and the robot's up
-constexpr double kStanding_m = 2e-3;         // a wheel so near to the ground stands on it
-constexpr double kSeesBump_m = 1e-2;         // a bump so near makes the robot leave the plane's support
-// A robot so level, near and calm goes over to the plane's support; at the start its height may be further off,
-// as wheels of many models are a little in the ground.
+constexpr double kSupportNormal = 0.5;  // cosine between a support's normal and the robot's up
+constexpr double kStanding_m = 2e-3;    // a wheel so near to the ground stands on it
+constexpr double kSeesBump_m = 1e-2;    // a bump so near makes the robot leave the plane's support
+// A robot so level, near and calm goes over to the plane's support; at the start its height may be
+// further off, as wheels of many models are a little in the ground.
 constexpr double kLevel_rad = 5e-3, kNear_m = 2e-3, kCalm_m_s = 0.05, kNearAtStart_m = 5e-3;
-constexpr double kLeverWithoutWheels_m = 0.25;    // of the force that turns a robot without wheels
+constexpr double kLeverWithoutWheels_m = 0.25;  // of the force that turns a robot without wheels
 constexpr SimTime kFallAsleep_us = 500'000;
-constexpr double kStill_m_s = 2e-3, kStill_rad_s = 1e-2;    // of what Bullet moves
+constexpr double kStill_m_s = 2e-3, kStill_rad_s = 1e-2;  // of what Bullet moves
 
 // A lighter load than this part of its weight is a first touch, not what it stands with.
 constexpr double kFirstTouch = 0.05;
 
-bool have_shapes(const model::WorldModel& world, const model::BodyLayout& layout, const std::vector<int>& wheels) {
+bool have_shapes(const model::WorldModel& world, const model::BodyLayout& layout,
+                 const std::vector<int>& wheels) {
   return std::any_of(wheels.begin(), wheels.end(), [&](int wheel) {
-    const auto& link = layout.links[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].link)];
-    return !world.models[static_cast<size_t>(link.instance)].model->links[static_cast<size_t>(link.link)].collisions.empty();
+    const auto& link =
+        layout.links[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].link)];
+    return !world.models[static_cast<size_t>(link.instance)]
+                .model->links[static_cast<size_t>(link.link)]
+                .collisions.empty();
   });
 }
 
@@ -37,7 +41,8 @@ Quat about_z(double angle) { return {math::cos(0.5 * angle), 0.0, 0.0, math::sin
 }  // namespace
 
 KinematicDrive::KinematicDrive(const model::WorldModel& world, const model::BodyLayout& layout,
-                               physics::PhysicsWorld& physics, int robot, const std::vector<LevelPlane>& planes)
+                               physics::PhysicsWorld& physics, int robot,
+                               const std::vector<LevelPlane>& planes)
     : Drive(world, layout, physics, robot),
       wheel_angles_(layout, robot, description_),
       planes_(planes),
@@ -47,7 +52,8 @@ KinematicDrive::KinematicDrive(const model::WorldModel& world, const model::Body
       wheel_friction_(friction_of_wheels(world, layout, robot)),
       wheels_touch_(have_shapes(world, layout, wheels_)),
       mass_(physics.mass(body_)),
-      yaw_inertia_((X_WBase_.rotation * Vec3::UnitZ()).dot(physics.inertia(body_) * (X_WBase_.rotation * Vec3::UnitZ()))),
+      yaw_inertia_((X_WBase_.rotation * Vec3::UnitZ())
+                       .dot(physics.inertia(body_) * (X_WBase_.rotation * Vec3::UnitZ()))),
       lever_(description_.track > 0.0 ? 0.5 * description_.track : kLeverWithoutWheels_m),
       max_force_(std::min(description_.max_force, mass_ * world.gravity.norm())),
       gravity_(world.gravity) {
@@ -57,7 +63,9 @@ KinematicDrive::KinematicDrive(const model::WorldModel& world, const model::Body
 void KinematicDrive::stand_on_near_plane() {
   const auto plane = nearest_plane(planes_, X_WBase_.translation.z() + lowest_);
   const Vec3 up = X_WBase_.rotation * Vec3::UnitZ();
-  if (plane && std::abs(plane_gap(plane->height)) < kNearAtStart_m && up.z() > math::cos(kLevel_rad)) stand_on_plane(*plane);
+  if (plane && std::abs(plane_gap(plane->height)) < kNearAtStart_m &&
+      up.z() > math::cos(kLevel_rad))
+    stand_on_plane(*plane);
 }
 
 void KinematicDrive::stand_on_plane(const LevelPlane& plane) {
@@ -103,15 +111,20 @@ bool KinematicDrive::is_support(const Contact& contact, const Vec3& up) const {
 }
 
 bool KinematicDrive::on_wheel(const Contact& contact) const {
-  return !wheels_touch_ || (contact.link_a >= 0 && layout_.links[static_cast<size_t>(contact.link_a)].wheel >= 0);
+  return !wheels_touch_ ||
+         (contact.link_a >= 0 && layout_.links[static_cast<size_t>(contact.link_a)].wheel >= 0);
 }
 
 double KinematicDrive::friction(const Contact& contact) const {
   const auto of = [this](int link, int shape) {
     if (link < 0 || shape < 0) return 1.0;
     const auto& placed = layout_.links[static_cast<size_t>(link)];
-    const auto& collisions = world_.models[static_cast<size_t>(placed.instance)].model->links[static_cast<size_t>(placed.link)].collisions;
-    return static_cast<size_t>(shape) < collisions.size() ? collisions[static_cast<size_t>(shape)].surface.friction : 1.0;
+    const auto& collisions = world_.models[static_cast<size_t>(placed.instance)]
+                                 .model->links[static_cast<size_t>(placed.link)]
+                                 .collisions;
+    return static_cast<size_t>(shape) < collisions.size()
+               ? collisions[static_cast<size_t>(shape)].surface.friction
+               : 1.0;
   };
   return std::min(of(contact.link_a, contact.shape_a), of(contact.link_b, contact.shape_b));
 }
@@ -119,7 +132,8 @@ double KinematicDrive::friction(const Contact& contact) const {
 // With what it carries; what it leans on lightens it.
 double KinematicDrive::grip_on_plane() const {
   double load = mass_ * gravity_.norm();
-  for (const Contact& contact : physics_.contacts(body_)) load -= contact.normal.z() * contact.force;
+  for (const Contact& contact : physics_.contacts(body_))
+    load -= contact.normal.z() * contact.force;
   return std::min(wheel_friction_, plane_friction_) * std::max(load, 0.0);
 }
 
@@ -140,8 +154,8 @@ void KinematicDrive::choose_support() {
     bump |= contact.body_b >= 0 || contact.normal.z() < 1.0 - 1e-9 || !plane ||
             std::abs(contact.position.z() - plane->height) > kNear_m;
   }
-  if (plane && supported_ && !bump && up.z() > math::cos(kLevel_rad) && std::abs(plane_gap(plane->height)) < kNear_m &&
-      std::abs(twist_.linear.z()) < kCalm_m_s) {
+  if (plane && supported_ && !bump && up.z() > math::cos(kLevel_rad) &&
+      std::abs(plane_gap(plane->height)) < kNear_m && std::abs(twist_.linear.z()) < kCalm_m_s) {
     return stand_on_plane(*plane);
   }
   look_at_support();
@@ -180,7 +194,9 @@ void KinematicDrive::push_back(const Vec3& impulse) {
   for (const Contact& contact : carriers_) {
     if (physics_.mass(contact.body_b) <= 0.0) continue;
     const Vec3 share = -part * impulse;
-    physics_.apply_impulse(contact.body_b, share, (contact.position - physics_.center_of_mass(contact.body_b)).cross(share));
+    physics_.apply_impulse(
+        contact.body_b, share,
+        (contact.position - physics_.center_of_mass(contact.body_b)).cross(share));
   }
 }
 
@@ -196,9 +212,11 @@ void KinematicDrive::before_step(SimTime now) {
     wake();
   }
   way_ = planned_ = motion_.step(now, step_us_);
-  if (description_.on_odometry) {    // the wheels turn as the robot believes it must; what comes of it depends on what they are
+  if (description_.on_odometry) {  // the wheels turn as the robot believes it must; what comes of
+                                   // it depends on what they are
     believed_heading_ = wrap_angle(believed_heading_ + planned_.angle);
-    const SideRates turned = WheelKinematics::believed(description_).wheels({planned_.way, planned_.angle});
+    const SideRates turned =
+        WheelKinematics::believed(description_).wheels({planned_.way, planned_.angle});
     const PlaneMotion made = WheelKinematics::real(description_).motion(turned);
     way_ = along_arc(made.v, made.omega);
   }
@@ -216,9 +234,11 @@ void KinematicDrive::before_step(SimTime now) {
 }
 
 bool KinematicDrive::servo(Twist& twist, double force, const Vec3& gravity) {
-  double dx = way_.x / step_s_ + carrier_.linear.x() - twist.linear.x(), dy = way_.y / step_s_ + carrier_.linear.y() - twist.linear.y();
+  double dx = way_.x / step_s_ + carrier_.linear.x() - twist.linear.x(),
+         dy = way_.y / step_s_ + carrier_.linear.y() - twist.linear.y();
   double turn = way_.angle / step_s_ + carrier_.angular.z() - twist.angular.z();
-  if (touched_ && held_) {    // what contacts took in the last step they will take again: the servo gives it in advance
+  if (touched_ && held_) {  // what contacts took in the last step they will take again: the servo
+                            // gives it in advance
     dx += sent_.x() - twist.linear.x();
     dy += sent_.y() - twist.linear.y();
     turn += sent_.z() - twist.angular.z();
@@ -240,14 +260,15 @@ bool KinematicDrive::servo(Twist& twist, double force, const Vec3& gravity) {
   twist.linear.y() += dy;
   twist.angular.z() += turn;
   sent_ = {twist.linear.x(), twist.linear.y(), twist.angular.z()};
-  if (!carriers_.empty()) push_back(mass_ * (X_WBase_.rotation * Vec3(dx - fall_x, dy - fall_y, 0.0)));
+  if (!carriers_.empty())
+    push_back(mass_ * (X_WBase_.rotation * Vec3(dx - fall_x, dy - fall_y, 0.0)));
   return reached;
 }
 
 void KinematicDrive::before_on_plane() {
   Pose& next = next_;
   next = X_WBase_;
-  const double c2 = X_WBase_.rotation.w(), s2 = X_WBase_.rotation.z();    // of half the heading
+  const double c2 = X_WBase_.rotation.w(), s2 = X_WBase_.rotation.z();  // of half the heading
   const double c = c2 * c2 - s2 * s2, s = 2.0 * c2 * s2;
   next.translation.x() += c * way_.x - s * way_.y;
   next.translation.y() += s * way_.x + c * way_.y;
@@ -256,14 +277,17 @@ void KinematicDrive::before_on_plane() {
   if (touched_ || behind_) {
     Twist twist = twist_;
     carriers_.clear();
-    behind_ = !servo(twist, description_.traction ? std::min(max_force_, grip_on_plane()) : max_force_, Vec3::Zero());
+    behind_ =
+        !servo(twist, description_.traction ? std::min(max_force_, grip_on_plane()) : max_force_,
+               Vec3::Zero());
     if (behind_) {
       physics_.drive(body_, body_twist(X_WBase_, twist));
       return;
     }
   }
   const Pose X_WB = next * X_BaseB_;
-  const Twist mean{(X_WB.translation - physics_.pose(body_).translation) / step_s_, {0.0, 0.0, way_.angle / step_s_}};
+  const Twist mean{(X_WB.translation - physics_.pose(body_).translation) / step_s_,
+                   {0.0, 0.0, way_.angle / step_s_}};
   physics_.guide(body_, mean, X_WB);
 }
 
@@ -302,7 +326,8 @@ void KinematicDrive::after_step(SimTime now) {
 // What the wheels, at the rates of the plan, make of speed and turn rate.
 PlaneMotion KinematicDrive::of_wheels() const {
   if (!description_.on_odometry) return {motion_.v(), motion_.omega()};
-  return WheelKinematics::real(description_).motion(WheelKinematics::believed(description_).wheels({motion_.v(), motion_.omega()}));
+  return WheelKinematics::real(description_)
+      .motion(WheelKinematics::believed(description_).wheels({motion_.v(), motion_.omega()}));
 }
 
 // On odometry the wheels do as planned, and the robot believes them.
@@ -358,7 +383,9 @@ void KinematicDrive::after_on_contacts(SimTime now) {
   // Only the support: along the robot's own plane the plan holds, across it Bullet.
   const Vec3 carried = step_s_ * carrier_.linear;
   X_WBase.translation = X_WBase_ * Vec3(way_.x + carried.x(), way_.y + carried.y(), moved.z());
-  X_WBase.rotation = (X_WBase_.rotation * (turn * about_z(-bullet_angle)) * about_z(way_.angle + step_s_ * carrier_.angular.z())).normalized();
+  X_WBase.rotation = (X_WBase_.rotation * (turn * about_z(-bullet_angle)) *
+                      about_z(way_.angle + step_s_ * carrier_.angular.z()))
+                         .normalized();
   Twist twist = base_twist(X_WBase);
   finish(now, way_.way, way_.angle, false);
   const PlaneMotion wheels = of_wheels();
@@ -368,8 +395,10 @@ void KinematicDrive::after_on_contacts(SimTime now) {
   physics_.set_pose(body_, X_WBase * X_BaseB_);
   physics_.set_twist(body_, body_twist(X_WBase, twist));
   set_state(X_WBase, twist);
-  const bool carried_along = carrier_.linear.norm() > kStill_m_s || carrier_.angular.norm() > kStill_rad_s;
-  fall_asleep_when_still(!carried_along && std::abs(twist.linear.z()) < kStill_m_s && twist.angular.head<2>().norm() < kStill_rad_s);
+  const bool carried_along =
+      carrier_.linear.norm() > kStill_m_s || carrier_.angular.norm() > kStill_rad_s;
+  fall_asleep_when_still(!carried_along && std::abs(twist.linear.z()) < kStill_m_s &&
+                         twist.angular.head<2>().norm() < kStill_rad_s);
 }
 
 void KinematicDrive::fall_asleep_when_still(bool still) {

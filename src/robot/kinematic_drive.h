@@ -1,12 +1,15 @@
-// The kinematic drive: base_link follows the closed form of the plan; Bullet decides only what contacts change.
+// The kinematic drive: base_link follows the closed form of the plan; Bullet decides only what
+// contacts change.
 //
-// On a level plane the robot moves in x, y and yaw, and has no contact with the plane. Where wheels touch anything
-// else from above (a ramp, a step, a box, a lift, another robot), or on no plane, it has six degrees of freedom: a servo
-// gives it the velocities in its own plane, relative to what carries it; gravity along that plane is held by the drive, and
-// where only the support was touched, height, roll and pitch are Bullet's and the rest is the plan's, so that
-// nothing creeps. Where no drive wheel stands on anything it is a body like others. Against other contacts the servo pushes
-// with the drive's max_force at most, and with <ruedo:traction> no harder than friction under the wheels allows: on
-// contacts always, so that a slope can be too steep; on a level plane only against what it touches.
+// On a level plane the robot moves in x, y and yaw, and has no contact with the plane. Where wheels
+// touch anything else from above (a ramp, a step, a box, a lift, another robot), or on no plane, it
+// has six degrees of freedom: a servo gives it the velocities in its own plane, relative to what
+// carries it; gravity along that plane is held by the drive, and where only the support was
+// touched, height, roll and pitch are Bullet's and the rest is the plan's, so that nothing creeps.
+// Where no drive wheel stands on anything it is a body like others. Against other contacts the
+// servo pushes with the drive's max_force at most, and with <ruedo:traction> no harder than
+// friction under the wheels allows: on contacts always, so that a slope can be too steep; on a
+// level plane only against what it touches.
 #pragma once
 
 #include <vector>
@@ -20,8 +23,8 @@ namespace ruedo::robot {
 class KinematicDrive final : public Drive {
  public:
   // planes: heights of the world's level planes; must outlive the drive.
-  KinematicDrive(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics,
-                 int robot, const std::vector<LevelPlane>& planes);
+  KinematicDrive(const model::WorldModel& world, const model::BodyLayout& layout,
+                 physics::PhysicsWorld& physics, int robot, const std::vector<LevelPlane>& planes);
 
   void before_step(SimTime now) override;
   void after_step(SimTime now) override;
@@ -42,9 +45,9 @@ class KinematicDrive final : public Drive {
   PlaneMotion of_wheels() const;
   void finish(SimTime now, double way, double angle, bool touched);
   void fall_asleep_when_still(bool still);
-  // Brings `twist` (of base_link, in it) to the plan's mean velocities in the plane, relative to what carries it, as far
-  // as `force` (N) allows, which `gravity` (m/s^2, in base_link) along the plane takes its part of. Returns
-  // whether it got there.
+  // Brings `twist` (of base_link, in it) to the plan's mean velocities in the plane, relative to
+  // what carries it, as far as `force` (N) allows, which `gravity` (m/s^2, in base_link) along the
+  // plane takes its part of. Returns whether it got there.
   bool servo(Twist& twist, double force, const Vec3& gravity);
   bool is_support(const Contact& contact, const Vec3& up) const;
   bool on_wheel(const Contact& contact) const;
@@ -55,26 +58,28 @@ class KinematicDrive final : public Drive {
   double plane_gap(double height) const { return X_WBase_.translation.z() + lowest_ - height; }
 
   bool on_plane_ = false, asleep_ = false;
-  bool touched_ = false;         // by more than the support, in the last step
-  bool held_ = false;            // ... and in the step before
-  bool behind_ = false;          // the servo did not reach the plan's velocities
-  Vec3 sent_ = Vec3::Zero();     // what the servo gave last: m/s ahead, m/s to the left, rad/s
-  bool supported_ = false;       // on contacts: wheels stand on something
-  double grip_ = 0.0;            // on contacts: N that friction under the wheels can give
-  Twist carrier_{Vec3::Zero(), Vec3::Zero()};    // of what carries it, at base_link and in it; zero: it stands still
-  std::vector<Contact> carriers_;    // contacts of the wheels with what can move
-  double plane_friction_ = 1.0;  // of the plane that it stands on
-  Displacement way_, planned_;   // that the wheels make in this step, and the plan
-  double heading_ = 0.0;         // of base_link on a plane, rad
+  bool touched_ = false;      // by more than the support, in the last step
+  bool held_ = false;         // ... and in the step before
+  bool behind_ = false;       // the servo did not reach the plan's velocities
+  Vec3 sent_ = Vec3::Zero();  // what the servo gave last: m/s ahead, m/s to the left, rad/s
+  bool supported_ = false;    // on contacts: wheels stand on something
+  double grip_ = 0.0;         // on contacts: N that friction under the wheels can give
+  Twist carrier_{
+      Vec3::Zero(),
+      Vec3::Zero()};  // of what carries it, at base_link and in it; zero: it stands still
+  std::vector<Contact> carriers_;  // contacts of the wheels with what can move
+  double plane_friction_ = 1.0;    // of the plane that it stands on
+  Displacement way_, planned_;     // that the wheels make in this step, and the plan
+  double heading_ = 0.0;           // of base_link on a plane, rad
   WheelAngles wheel_angles_;
   SimTime still_us_ = 0;
-  Pose next_;                    // of base_link after this step, on a plane
+  Pose next_;  // of base_link after this step, on a plane
   const std::vector<LevelPlane>& planes_;
   const model::WorldModel& world_;
   const model::BodyLayout& layout_;
-  const double lowest_;          // of the wheels below base_link
+  const double lowest_;  // of the wheels below base_link
   const double wheel_friction_;
-  const bool wheels_touch_;      // they have shapes
+  const bool wheels_touch_;  // they have shapes
   const double mass_, yaw_inertia_, lever_, max_force_;
   const Vec3 gravity_;
 };

@@ -1,4 +1,5 @@
-// Commands to plans. The plan's clock is whole microseconds; what happens inside a step (the watchdog's end) splits it.
+// Commands to plans. The plan's clock is whole microseconds; what happens inside a step (the
+// watchdog's end) splits it.
 #include "robot/motion.h"
 
 #include <algorithm>
@@ -22,23 +23,26 @@ constexpr SimTime kNever = std::numeric_limits<SimTime>::max();
 constexpr double kFastest_m_s = 100.0, kFastest_rad_s = 100.0, kSlowestChange = 1e-6;
 // Speeds of a primitive on a robot that has no limits and is given none.
 constexpr double kUsualSpeed_m_s = 0.5, kUsualRate_rad_s = 1.0;
-constexpr double kLargestValue = 1e6;           // m or rad
-constexpr double kDone = 1e-6;                  // m or rad: a touched primitive is done when so near
-// A primitive is blocked when in so long a time something touched and less than this part of the plan was done.
+constexpr double kLargestValue = 1e6;  // m or rad
+constexpr double kDone = 1e-6;         // m or rad: a touched primitive is done when so near
+// A primitive is blocked when in so long a time something touched and less than this part of the
+// plan was done.
 constexpr SimTime kBlockWindow_us = 500'000;
 constexpr double kBlockedPart = 0.1;
-constexpr double kJitter = 5e-3;                // m or rad in that time: no way and no turn
-// Behind its plan by less, a robot has settled. One that does not within this time after the plan's end (a slope that it
-// slides on) is done as far as it came.
+constexpr double kJitter = 5e-3;  // m or rad in that time: no way and no turn
+// Behind its plan by less, a robot has settled. One that does not within this time after the plan's
+// end (a slope that it slides on) is done as far as it came.
 constexpr double kSettled_m = 5e-4, kSettled_rad = 1e-3;
 constexpr double kSettling_s = 1.0;
 
 Limits sane(double speed, double acceleration, double deceleration, double fastest) {
-  return {std::clamp(speed, 0.0, fastest), std::max(acceleration, kSlowestChange), std::max(deceleration, kSlowestChange)};
+  return {std::clamp(speed, 0.0, fastest), std::max(acceleration, kSlowestChange),
+          std::max(deceleration, kSlowestChange)};
 }
 
 bool all_finite(std::initializer_list<double> values) {
-  return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+  return std::all_of(values.begin(), values.end(),
+                     [](double value) { return std::isfinite(value); });
 }
 
 }  // namespace
@@ -46,22 +50,29 @@ bool all_finite(std::initializer_list<double> values) {
 Motion::Motion(const model::DriveDescription& drive, const std::vector<Vec3>& rims)
     : deadline_(kNever),
       drive_(drive),
-      kinematics_(drive.on_odometry ? WheelKinematics::believed(drive) : WheelKinematics::real(drive)),
+      kinematics_(drive.on_odometry ? WheelKinematics::believed(drive)
+                                    : WheelKinematics::real(drive)),
       way_limits_(sane(drive.max_speed, drive.acceleration, drive.deceleration, kFastest_m_s)),
-      angle_limits_(sane(drive.max_turn_rate, drive.turn_acceleration, drive.turn_acceleration, kFastest_rad_s)),
-      side_limits_(sane(drive.max_side_speed, drive.acceleration, drive.deceleration, kFastest_m_s)) {
+      angle_limits_(sane(drive.max_turn_rate, drive.turn_acceleration, drive.turn_acceleration,
+                         kFastest_rad_s)),
+      side_limits_(
+          sane(drive.max_side_speed, drive.acceleration, drive.deceleration, kFastest_m_s)) {
   if (moves_sideways() && rims.size() >= 3) rims_ = rims;
-  if (drive.max_wheel_rate * drive.wheel_radius < way_limits_.speed) way_limits_.speed = drive.max_wheel_rate * drive.wheel_radius;
+  if (drive.max_wheel_rate * drive.wheel_radius < way_limits_.speed)
+    way_limits_.speed = drive.max_wheel_rate * drive.wheel_radius;
   const double turning = 2.0 * drive.max_wheel_rate * drive.wheel_radius / drive.track;
   if (turning < angle_limits_.speed) angle_limits_.speed = turning;
 }
 
 using Steering = model::DriveDescription::Steering;
 
-bool Motion::is_steered() const { return drive_.steering == Steering::ackermann || drive_.steering == Steering::tricycle; }
+bool Motion::is_steered() const {
+  return drive_.steering == Steering::ackermann || drive_.steering == Steering::tricycle;
+}
 
 bool Motion::moves_sideways() const {
-  return drive_.steering == Steering::mecanum || drive_.steering == Steering::omni || drive_.steering == Steering::holonomic;
+  return drive_.steering == Steering::mecanum || drive_.steering == Steering::omni ||
+         drive_.steering == Steering::holonomic;
 }
 
 void Motion::show(int64_t id, int8_t kind, int8_t state, int8_t reason) {
@@ -93,16 +104,21 @@ void Motion::replace_running() {
 }
 
 void Motion::command(const VelocityCommand& command, SimTime now) {
-  if (!all_finite({command.vx, command.vy, command.omega})) return refuse(0, Status::KIND_VELOCITY, Status::REASON_NOT_FINITE);
-  if (command.vy != 0.0 && !moves_sideways()) return refuse(0, Status::KIND_VELOCITY, Status::REASON_BAD_VALUE);
+  if (!all_finite({command.vx, command.vy, command.omega}))
+    return refuse(0, Status::KIND_VELOCITY, Status::REASON_NOT_FINITE);
+  if (command.vy != 0.0 && !moves_sideways())
+    return refuse(0, Status::KIND_VELOCITY, Status::REASON_BAD_VALUE);
   hold(command.vx, command.vy, command.omega, now, Status::KIND_VELOCITY);
 }
 
 void Motion::command(const WheelCommand& command, SimTime now) {
-  const size_t left = drive_.left_joints.size(), right = drive_.right_joints.size(), n = command.rates.size();
+  const size_t left = drive_.left_joints.size(), right = drive_.right_joints.size(),
+               n = command.rates.size();
   if (!rims_.empty() && n == rims_.size()) return hold_wheels(command, now);
-  const bool sides = drive_.steering == Steering::differential || drive_.steering == Steering::tracked;
-  if (!sides || (n != 2 && n != left + right) || !(drive_.wheel_radius > 0.0) || !(drive_.track > 0.0)) {
+  const bool sides =
+      drive_.steering == Steering::differential || drive_.steering == Steering::tracked;
+  if (!sides || (n != 2 && n != left + right) || !(drive_.wheel_radius > 0.0) ||
+      !(drive_.track > 0.0)) {
     return refuse(0, Status::KIND_WHEELS, Status::REASON_BAD_VALUE);
   }
   for (const double rate : command.rates) {
@@ -123,7 +139,8 @@ void Motion::hold_wheels(const WheelCommand& command, SimTime now) {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Vec3 sum = Vec3::Zero();
   for (size_t i = 0; i < rims_.size(); ++i) {
-    if (!std::isfinite(command.rates[i])) return refuse(0, Status::KIND_WHEELS, Status::REASON_NOT_FINITE);
+    if (!std::isfinite(command.rates[i]))
+      return refuse(0, Status::KIND_WHEELS, Status::REASON_NOT_FINITE);
     normal += rims_[i] * rims_[i].transpose();
     sum += rims_[i] * (drive_.wheel_radius * command.rates[i]);
   }
@@ -138,7 +155,8 @@ void Motion::keep_wheel_rates(double& v, double& side, double& omega) const {
   double fastest = std::abs(v) + 0.5 * drive_.track * std::abs(omega);
   if (!rims_.empty()) {
     fastest = 0.0;
-    for (const Vec3& rim : rims_) fastest = std::max(fastest, std::abs(rim.dot(Vec3(v, side, omega))));
+    for (const Vec3& rim : rims_)
+      fastest = std::max(fastest, std::abs(rim.dot(Vec3(v, side, omega))));
   }
   const double allowed = drive_.max_wheel_rate * drive_.wheel_radius;
   if (fastest <= allowed) return;
@@ -150,8 +168,10 @@ void Motion::keep_wheel_rates(double& v, double& side, double& omega) const {
 // Standing still it can only turn its wheels.
 void Motion::steer_for(double v, double omega) {
   const double most = drive_.max_steering_angle;
-  if (v != 0.0) target_steering_ = std::clamp(math::atan(drive_.wheelbase * omega / v), -most, most);
-  else if (omega != 0.0) target_steering_ = std::copysign(most, omega * drive_.wheelbase);
+  if (v != 0.0)
+    target_steering_ = std::clamp(math::atan(drive_.wheelbase * omega / v), -most, most);
+  else if (omega != 0.0)
+    target_steering_ = std::copysign(most, omega * drive_.wheelbase);
 }
 
 void Motion::hold(double v, double side, double omega, SimTime now, int8_t kind) {
@@ -164,35 +184,43 @@ void Motion::hold(double v, double side, double omega, SimTime now, int8_t kind)
   const bool same = holding_ && v == target_v_ && omega == target_omega_ && side == target_side_;
   holding_ = true;
   deadline_ = drive_.watchdog_us > 0 ? now + drive_.watchdog_us : kNever;
-  const bool blocked = same && log_.current().kind == kind && log_.current().reason == Status::REASON_BLOCKED;
+  const bool blocked =
+      same && log_.current().kind == kind && log_.current().reason == Status::REASON_BLOCKED;
   show(0, kind, Status::STATE_RUNNING, blocked ? Status::REASON_BLOCKED : Status::REASON_NONE);
-  if (same) return;    // a repeated command only feeds the watchdog
+  if (same) return;  // a repeated command only feeds the watchdog
   begin_window(now);
   target_v_ = v;
   target_omega_ = omega;
   target_side_ = side;
   if (is_steered()) steer_for(v, omega);
-  set_plan(Profile::to_velocity(v_, v, way_limits_), Profile::to_velocity(omega_, omega, angle_limits_), now, side);
+  set_plan(Profile::to_velocity(v_, v, way_limits_),
+           Profile::to_velocity(omega_, omega, angle_limits_), now, side);
 }
 
 Limits Motion::stricter(const Limits& own, const MoveCommand& command, double fallback_speed) {
   Limits limits = own;
   if (command.speed > 0.0) limits.speed = std::min(limits.speed, command.speed);
   if (command.speed == 0.0 && limits.speed >= kFastest_m_s) limits.speed = fallback_speed;
-  if (command.acceleration > 0.0) limits.acceleration = std::min(limits.acceleration, command.acceleration);
-  const double deceleration = command.deceleration > 0.0 ? command.deceleration : command.acceleration;
+  if (command.acceleration > 0.0)
+    limits.acceleration = std::min(limits.acceleration, command.acceleration);
+  const double deceleration =
+      command.deceleration > 0.0 ? command.deceleration : command.acceleration;
   if (deceleration > 0.0) limits.deceleration = std::min(limits.deceleration, deceleration);
   return limits;
 }
 
 void Motion::command(const MoveCommand& command, SimTime now, double heading) {
   const auto refused = [&](int8_t reason) { refuse(command.id, command.kind, reason); };
-  if (command.kind < Move::ADVANCE || command.kind > Move::STOP) return refused(Status::REASON_BAD_KIND);
-  if (!all_finite({command.value, command.radius, command.speed, command.acceleration, command.deceleration})) {
+  if (command.kind < Move::ADVANCE || command.kind > Move::STOP)
+    return refused(Status::REASON_BAD_KIND);
+  if (!all_finite({command.value, command.radius, command.speed, command.acceleration,
+                   command.deceleration})) {
     return refused(Status::REASON_NOT_FINITE);
   }
-  if (is_steered() && (command.kind == Move::ROTATE || command.kind == Move::HEADING)) return refused(Status::REASON_NOT_POSSIBLE);
-  if (command.speed < 0.0 || command.acceleration < 0.0 || command.deceleration < 0.0) return refused(Status::REASON_BAD_VALUE);
+  if (is_steered() && (command.kind == Move::ROTATE || command.kind == Move::HEADING))
+    return refused(Status::REASON_NOT_POSSIBLE);
+  if (command.speed < 0.0 || command.acceleration < 0.0 || command.deceleration < 0.0)
+    return refused(Status::REASON_BAD_VALUE);
   Primitive next;
   switch (command.kind) {
     case Move::ADVANCE:
@@ -203,7 +231,8 @@ void Motion::command(const MoveCommand& command, SimTime now, double heading) {
     case Move::ROTATE:
     case Move::HEADING:
       next.axis = Axis::angle;
-      next.target = command.kind == Move::ROTATE ? command.value : wrap_angle(command.value - heading);
+      next.target =
+          command.kind == Move::ROTATE ? command.value : wrap_angle(command.value - heading);
       next.limits = stricter(angle_limits_, command, kUsualRate_rad_s);
       break;
     case Move::ARC:
@@ -212,23 +241,28 @@ void Motion::command(const MoveCommand& command, SimTime now, double heading) {
       next.target = std::abs(command.value) * command.radius;
       next.unit = command.value < 0.0 ? -1.0 / command.radius : 1.0 / command.radius;
       next.curvature = next.unit;
-      if (is_steered() && std::abs(drive_.wheelbase) > math::tan(drive_.max_steering_angle) * command.radius) return refused(Status::REASON_NOT_POSSIBLE);
+      if (is_steered() &&
+          std::abs(drive_.wheelbase) > math::tan(drive_.max_steering_angle) * command.radius)
+        return refused(Status::REASON_NOT_POSSIBLE);
       next.limits = stricter(way_limits_, command, kUsualSpeed_m_s);
       next.limits.speed = std::min(next.limits.speed, angle_limits_.speed * command.radius);
-      next.limits.acceleration = std::min(next.limits.acceleration, angle_limits_.acceleration * command.radius);
-      next.limits.deceleration = std::min(next.limits.deceleration, angle_limits_.deceleration * command.radius);
+      next.limits.acceleration =
+          std::min(next.limits.acceleration, angle_limits_.acceleration * command.radius);
+      next.limits.deceleration =
+          std::min(next.limits.deceleration, angle_limits_.deceleration * command.radius);
       if (std::isfinite(drive_.max_wheel_rate)) {
         const double outer = 1.0 + 0.5 * drive_.track / command.radius;
-        next.limits.speed = std::min(next.limits.speed, drive_.max_wheel_rate * drive_.wheel_radius / outer);
+        next.limits.speed =
+            std::min(next.limits.speed, drive_.max_wheel_rate * drive_.wheel_radius / outer);
       }
       break;
-    default:
-      break;    // STOP
+    default: break;  // STOP
   }
   const bool measured = next.axis != Axis::none;
-  if (measured && (std::abs(next.target) > kLargestValue || std::abs(command.value) > kLargestValue ||
-                   command.radius > kLargestValue || next.limits.speed < kSlowestChange ||
-                   next.limits.acceleration < kSlowestChange || next.limits.deceleration < kSlowestChange)) {
+  if (measured &&
+      (std::abs(next.target) > kLargestValue || std::abs(command.value) > kLargestValue ||
+       command.radius > kLargestValue || next.limits.speed < kSlowestChange ||
+       next.limits.acceleration < kSlowestChange || next.limits.deceleration < kSlowestChange)) {
     return refused(Status::REASON_BAD_VALUE);
   }
   replace_running();
@@ -240,8 +274,10 @@ void Motion::command(const MoveCommand& command, SimTime now, double heading) {
     plan_primitive(now);
   } else {
     Limits stopping = way_limits_;
-    if (command.deceleration > 0.0) stopping.deceleration = std::min(stopping.deceleration, command.deceleration);
-    set_plan(Profile::to_velocity(v_, 0.0, stopping), Profile::to_velocity(omega_, 0.0, angle_limits_), now);
+    if (command.deceleration > 0.0)
+      stopping.deceleration = std::min(stopping.deceleration, command.deceleration);
+    set_plan(Profile::to_velocity(v_, 0.0, stopping),
+             Profile::to_velocity(omega_, 0.0, angle_limits_), now);
   }
   begin_window(now);
 }
@@ -251,7 +287,8 @@ void Motion::set_plan(const Profile& v, const Profile& omega, SimTime now, doubl
   plan_v_ = v;
   plan_omega_ = omega;
   if (moves_sideways()) plan_side_ = Profile::to_velocity(side_, side, side_limits_);
-  if (is_steered()) plan_steering_ = SteeringPlan::between(steering_, target_steering_, drive_.max_steering_rate);
+  if (is_steered())
+    plan_steering_ = SteeringPlan::between(steering_, target_steering_, drive_.max_steering_rate);
   move_on(now);
 }
 
@@ -269,8 +306,10 @@ void Motion::move_on(SimTime to) {
     omega_ = v_ * math::tan(steering_) / drive_.wheelbase;
     steady_ = t >= plan_v_.end() && t >= plan_steering_.end;
   }
-  const bool stopping = log_.current().kind == Move::STOP && log_.current().state == Status::STATE_RUNNING;
-  resting_ = steady_ && v_ == 0.0 && omega_ == 0.0 && side_ == 0.0 && deadline_ == kNever && primitive_.axis == Axis::none && !stopping;
+  const bool stopping =
+      log_.current().kind == Move::STOP && log_.current().state == Status::STATE_RUNNING;
+  resting_ = steady_ && v_ == 0.0 && omega_ == 0.0 && side_ == 0.0 && deadline_ == kNever &&
+             primitive_.axis == Axis::none && !stopping;
 }
 
 void Motion::plan_primitive(SimTime now) {
@@ -283,9 +322,11 @@ void Motion::plan_primitive(SimTime now) {
     target_steering_ = p.axis == Axis::arc ? math::atan(drive_.wheelbase * p.curvature) : 0.0;
     if (p.axis == Axis::way || steering_ == target_steering_) {
       v = Profile::to_distance(v_, rest, p.limits);
-    } else {    // an arc begins at rest, when its wheels are steered
+    } else {  // an arc begins at rest, when its wheels are steered
       v = Profile::to_velocity(v_, 0.0, way_limits_);
-      p.begins = std::max(v.end(), SteeringPlan::between(steering_, target_steering_, drive_.max_steering_rate).end);
+      p.begins = std::max(
+          v.end(),
+          SteeringPlan::between(steering_, target_steering_, drive_.max_steering_rate).end);
       p.begins_at = v.position(p.begins);
       v.append(Profile::to_distance(0.0, rest, p.limits), p.begins);
     }
@@ -298,7 +339,7 @@ void Motion::plan_primitive(SimTime now) {
   } else if (std::abs(omega_ - p.curvature * v_) <= 1e-12 * (1.0 + std::abs(omega_))) {
     v = Profile::to_distance(v_, rest, p.limits);
     omega = v.scaled(p.curvature);
-  } else {    // an arc begins where its curvature can: at rest
+  } else {  // an arc begins where its curvature can: at rest
     v = Profile::to_velocity(v_, 0.0, way_limits_);
     omega = Profile::to_velocity(omega_, 0.0, angle_limits_);
     p.begins = std::max(v.end(), omega.end());
@@ -314,7 +355,8 @@ void Motion::brake(SimTime now) {
   primitive_ = {};
   holding_ = false;
   deadline_ = kNever;
-  set_plan(Profile::to_velocity(v_, 0.0, way_limits_), Profile::to_velocity(omega_, 0.0, angle_limits_), now);
+  set_plan(Profile::to_velocity(v_, 0.0, way_limits_),
+           Profile::to_velocity(omega_, 0.0, angle_limits_), now);
 }
 
 void Motion::stand_still(SimTime now) {
@@ -325,7 +367,7 @@ void Motion::stand_still(SimTime now) {
   if (state.state != Status::STATE_RUNNING) return;
   show(state.id, state.kind, Status::STATE_ENDED, Status::REASON_REPLACED);
   log_.progress(state.done, state.remaining);
-  move_on(now);    // at rest for good
+  move_on(now);  // at rest for good
 }
 
 void Motion::shift_time(SimTime us) {
@@ -345,15 +387,17 @@ Displacement Motion::step(SimTime now, int64_t step_us) {
   const SimTime end = now + step_us;
   if (steady_ && end < deadline_) {
     const double step_s = static_cast<double>(step_us) * 1e-6;
-    return side_ == 0.0 ? along_arc(v_ * step_s, omega_ * step_s) : along_twist(v_ * step_s, side_ * step_s, omega_ * step_s);
+    return side_ == 0.0 ? along_arc(v_ * step_s, omega_ * step_s)
+                        : along_twist(v_ * step_s, side_ * step_s, omega_ * step_s);
   }
   Displacement way;
-  if (deadline_ < end) {    // the watchdog ends the command within this step
+  if (deadline_ < end) {  // the watchdog ends the command within this step
     const SimTime deadline = std::max(deadline_, now);
     way = way_of(seconds(now), seconds(deadline));
     move_on(deadline);
     const int8_t kind = log_.current().kind;
-    const bool moving = target_v_ != 0.0 || target_omega_ != 0.0 || target_side_ != 0.0 || v_ != 0.0 || omega_ != 0.0 || side_ != 0.0;
+    const bool moving = target_v_ != 0.0 || target_omega_ != 0.0 || target_side_ != 0.0 ||
+                        v_ != 0.0 || omega_ != 0.0 || side_ != 0.0;
     if (moving) {
       show(0, kind, Status::STATE_ENDED, Status::REASON_WATCHDOG);
     } else {
@@ -370,14 +414,17 @@ Displacement Motion::step(SimTime now, int64_t step_us) {
 
 bool Motion::settled(SimTime now, const Lag& lag) const {
   const bool near = std::abs(lag.way) < kSettled_m && std::abs(lag.angle) < kSettled_rad;
-  return (near && !lag.moving) || seconds(now) > std::max({plan_v_.end(), plan_omega_.end(), plan_side_.end()}) + kSettling_s;
+  return (near && !lag.moving) ||
+         seconds(now) >
+             std::max({plan_v_.end(), plan_omega_.end(), plan_side_.end()}) + kSettling_s;
 }
 
 void Motion::finish(SimTime now, double way, double angle, bool touched, const Lag& lag) {
   if (resting_) return;
   Primitive& p = primitive_;
   if (p.axis == Axis::none) {
-    const bool stopping = log_.current().kind == Move::STOP && log_.current().state == Status::STATE_RUNNING;
+    const bool stopping =
+        log_.current().kind == Move::STOP && log_.current().state == Status::STATE_RUNNING;
     if (stopping && steady_ && settled(now, lag)) {
       show(log_.current().id, Move::STOP, Status::STATE_DONE);
       move_on(now);
@@ -406,7 +453,8 @@ void Motion::finish(SimTime now, double way, double angle, bool touched, const L
   }
   watch_for_block(now, touched);
   publish_progress();
-  if (touched && p.axis != Axis::none && t >= p.begins) plan_primitive(now);    // what is left, from where it really is
+  if (touched && p.axis != Axis::none && t >= p.begins)
+    plan_primitive(now);  // what is left, from where it really is
 }
 
 void Motion::begin_window(SimTime now) {
@@ -425,16 +473,22 @@ void Motion::watch_held(SimTime now, double way, double angle, bool touched) {
   if (now - window_start_ < kBlockWindow_us) return;
   const double seconds = static_cast<double>(now - window_start_) * 1e-6;
   const bool wanted = window_fastest_ > 0.0 || window_fastest_turn_ > 0.0;
-  const auto short_of = [&](double done, double fastest) { return std::abs(done) <= kJitter + kBlockedPart * fastest * seconds; };
-  const bool stuck = short_of(window_done_, window_fastest_) && short_of(window_turned_, window_fastest_turn_);
-  const int8_t reason = wanted && window_touched_ && stuck ? Status::REASON_BLOCKED : Status::REASON_NONE;
-  if (log_.current().state == Status::STATE_RUNNING && log_.current().reason != reason) show(0, log_.current().kind, Status::STATE_RUNNING, reason);
+  const auto short_of = [&](double done, double fastest) {
+    return std::abs(done) <= kJitter + kBlockedPart * fastest * seconds;
+  };
+  const bool stuck =
+      short_of(window_done_, window_fastest_) && short_of(window_turned_, window_fastest_turn_);
+  const int8_t reason =
+      wanted && window_touched_ && stuck ? Status::REASON_BLOCKED : Status::REASON_NONE;
+  if (log_.current().state == Status::STATE_RUNNING && log_.current().reason != reason)
+    show(0, log_.current().kind, Status::STATE_RUNNING, reason);
   begin_window(now);
 }
 
 void Motion::watch_for_block(SimTime now, bool touched) {
   window_touched_ |= touched;
-  window_fastest_ = std::max(window_fastest_, std::abs(primitive_.axis == Axis::angle ? omega_ : v_));
+  window_fastest_ =
+      std::max(window_fastest_, std::abs(primitive_.axis == Axis::angle ? omega_ : v_));
   if (now - window_start_ < kBlockWindow_us) return;
   const double wanted = window_fastest_ * static_cast<double>(now - window_start_) * 1e-6;
   if (window_touched_ && std::abs(primitive_.done - window_done_) < kBlockedPart * wanted) {
@@ -453,7 +507,8 @@ void Motion::watch_for_block(SimTime now, bool touched) {
 
 void Motion::publish_progress() {
   if (primitive_.axis == Axis::none) return;
-  log_.progress(primitive_.done * primitive_.unit, (primitive_.target - primitive_.done) * primitive_.unit);
+  log_.progress(primitive_.done * primitive_.unit,
+                (primitive_.target - primitive_.done) * primitive_.unit);
 }
 
 }  // namespace ruedo::robot

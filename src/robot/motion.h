@@ -1,17 +1,18 @@
-// What one robot has been asked to do: commands and motion primitives become a plan of speed and turn rate, which
-// keeps the robot's limits, and a state to be published.
+// What one robot has been asked to do: commands and motion primitives become a plan of speed and
+// turn rate, which keeps the robot's limits, and a state to be published.
 //
-// A plan starts at a whole microsecond and is evaluated in closed form, so that a robot's way does not depend on
-// the step size. A new command plans anew from the velocities of that moment, so that nothing jumps beyond the limits.
+// A plan starts at a whole microsecond and is evaluated in closed form, so that a robot's way does
+// not depend on the step size. A new command plans anew from the velocities of that moment, so that
+// nothing jumps beyond the limits.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
 #include "model/world_model.h"
+#include "robot/base_motion.h"
 #include "robot/motion_log.h"
 #include "robot/robots.h"
-#include "robot/base_motion.h"
 #include "robot/wheel_kinematics.h"
 #include "ruedo/math.h"
 
@@ -19,13 +20,14 @@ namespace ruedo::robot {
 
 // How far a robot is behind its plan. A drive that follows its plan exactly never is.
 struct Lag {
-  double way = 0.0, angle = 0.0;    // m, rad
-  bool moving = false;              // faster than a robot that has come to rest
+  double way = 0.0, angle = 0.0;  // m, rad
+  bool moving = false;            // faster than a robot that has come to rest
 };
 
 class Motion {
  public:
-  // rims: of its rolling wheels, in their order (model::WheelPlacement::rim); needed where they can roll sideways.
+  // rims: of its rolling wheels, in their order (model::WheelPlacement::rim); needed where they can
+  // roll sideways.
   explicit Motion(const model::DriveDescription& drive, const std::vector<Vec3>& rims = {});
 
   // Commands, at sim time now. Bad values are refused, and nothing changes but the log.
@@ -37,40 +39,45 @@ class Motion {
 
   // The robot was put somewhere, at rest: whatever it was asked to do is replaced by nothing.
   void stand_still(SimTime now);
-  void shift_time(SimTime us);    // sim time was set back by so much
+  void shift_time(SimTime us);  // sim time was set back by so much
 
   // The way that the plan makes from now to now + step_us.
   Displacement step(SimTime now, int64_t step_us);
-  // After step(): how it came out, with the way (m) and angle (rad) that base_link really made. `touched`: by
-  // something that may have changed them. Ends primitives: when the plan is over and the robot has settled, too.
+  // After step(): how it came out, with the way (m) and angle (rad) that base_link really made.
+  // `touched`: by something that may have changed them. Ends primitives: when the plan is over and
+  // the robot has settled, too.
   void finish(SimTime now, double way, double angle, bool touched, const Lag& lag = {});
 
-  double v() const { return v_; }            // m/s and rad/s at the end of the last step, as planned
+  double v() const { return v_; }  // m/s and rad/s at the end of the last step, as planned
   double omega() const { return omega_; }
-  double side() const { return side_; }      // m/s to the left
-  double curvature() const { return is_steered() ? math::tan(steering_) / drive_.wheelbase : 0.0; }    // 1/m
+  double side() const { return side_; }  // m/s to the left
+  double curvature() const {
+    return is_steered() ? math::tan(steering_) / drive_.wheelbase : 0.0;
+  }  // 1/m
   bool has_primitive() const { return primitive_.axis != Axis::none; }
-  bool by_wheels() const { return by_wheels_; }    // the last command was one of wheel rates
-  bool resting() const { return resting_; }  // stands still, and nothing happens until a command comes
+  bool by_wheels() const { return by_wheels_; }  // the last command was one of wheel rates
+  bool resting() const {
+    return resting_;
+  }  // stands still, and nothing happens until a command comes
   const MotionLog& log() const { return log_; }
   void show_step() { log_.advance(); }
 
  private:
   enum class Axis { none, way, angle, arc };
   struct Primitive {
-    Axis axis = Axis::none;      // none: nothing runs
-    double target = 0.0;         // m; rad for angle; an arc's way in m
-    double unit = 1.0;           // published measure for each m or rad of `target`
-    double curvature = 0.0;      // arc: 1/m
-    double done = 0.0;           // what was really done, m or rad
+    Axis axis = Axis::none;  // none: nothing runs
+    double target = 0.0;     // m; rad for angle; an arc's way in m
+    double unit = 1.0;       // published measure for each m or rad of `target`
+    double curvature = 0.0;  // arc: 1/m
+    double done = 0.0;       // what was really done, m or rad
     double done_before_plan = 0.0;
-    double begins = 0.0;         // s since the start of the plan, after which the primitive itself runs
-    double begins_at = 0.0;      // position of the profile then
+    double begins = 0.0;     // s since the start of the plan, after which the primitive itself runs
+    double begins_at = 0.0;  // position of the profile then
     Limits limits;
   };
 
   double seconds(SimTime now) const { return static_cast<double>(now - start_) * 1e-6; }
-  bool is_steered() const;       // turns by steering alone: not on the spot
+  bool is_steered() const;  // turns by steering alone: not on the spot
   bool moves_sideways() const;
   void hold(double v, double side, double omega, SimTime now, int8_t kind);
   void hold_wheels(const WheelCommand& command, SimTime now);
@@ -93,23 +100,24 @@ class Motion {
   // Hot: what a step of steady motion needs.
   double v_ = 0.0, omega_ = 0.0, side_ = 0.0, steering_ = 0.0;
   bool steady_ = true, resting_ = true;
-  SimTime deadline_;             // of the watchdog; far away when it does not run
+  SimTime deadline_;  // of the watchdog; far away when it does not run
   const model::DriveDescription& drive_;
-  WheelKinematics kinematics_;   // as the drive turns speeds into wheel rates
+  WheelKinematics kinematics_;  // as the drive turns speeds into wheel rates
   Limits way_limits_, angle_limits_, side_limits_;
-  std::vector<Vec3> rims_;       // of mecanum and omni wheels
+  std::vector<Vec3> rims_;  // of mecanum and omni wheels
   // The plan.
   SimTime start_ = 0;
   Profile plan_v_, plan_omega_, plan_side_;
   SteeringPlan plan_steering_;
   double target_v_ = 0.0, target_omega_ = 0.0, target_side_ = 0.0, target_steering_ = 0.0;
   bool by_wheels_ = false;
-  bool holding_ = false;         // a velocity or wheel command is in force
+  bool holding_ = false;  // a velocity or wheel command is in force
   Primitive primitive_;
-  // Watching for a block: since when, what was done then, the fastest that the plan was since, whether anything touched.
+  // Watching for a block: since when, what was done then, the fastest that the plan was since,
+  // whether anything touched.
   SimTime window_start_ = 0;
   double window_done_ = 0.0, window_fastest_ = 0.0;
-  double window_turned_ = 0.0, window_fastest_turn_ = 0.0;    // beside the way, of a velocity command
+  double window_turned_ = 0.0, window_fastest_turn_ = 0.0;  // beside the way, of a velocity command
   bool window_touched_ = false;
   MotionLog log_;
 };

@@ -8,7 +8,8 @@
 
 namespace ruedo::robot {
 
-Mover::Mover(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics, int instance)
+Mover::Mover(const model::WorldModel& world, const model::BodyLayout& layout,
+             physics::PhysicsWorld& physics, int instance)
     : physics_(physics), instance_(instance), step_us_(world.step_us) {
   const auto& placed = world.models[static_cast<size_t>(instance)];
   path_ = read(*placed.model->path);
@@ -33,24 +34,32 @@ Mover::Path Mover::read(const Element& path) {
   const bool ours = path.name.starts_with("ruedo:");
   result.loop = path.boolean(ours ? "ruedo:loop" : "loop", true);
   const auto add = [&waypoints](const Element& element, double time_s, const Pose& pose) {
-    if (time_s < 0.0 || time_s > quantity::kTime.most) element.fail("the time " + std::to_string(time_s) + " is not within 0 and 1e9 s");
+    if (time_s < 0.0 || time_s > quantity::kTime.most)
+      element.fail("the time " + std::to_string(time_s) + " is not within 0 and 1e9 s");
     const auto time = microseconds(time_s);
-    if (!waypoints.empty() && time <= waypoints.back().time) element.fail("its time is not after the one before");
+    if (!waypoints.empty() && time <= waypoints.back().time)
+      element.fail("its time is not after the one before");
     waypoints.push_back({time, pose});
   };
   if (ours) {
     for (const Element* waypoint : path.all("ruedo:waypoint")) {
       const std::vector<double> v = waypoint->as_numbers(Allowed::any(quantity::kTime));
-      if (v.size() != 7) waypoint->fail("has " + std::to_string(v.size()) + " numbers, needs time x y z roll pitch yaw");
+      if (v.size() != 7)
+        waypoint->fail("has " + std::to_string(v.size()) +
+                       " numbers, needs time x y z roll pitch yaw");
       for (size_t i = 1; i < v.size(); ++i) {
-        if (std::abs(v[i]) > quantity::kLength.most) waypoint->fail("'" + waypoint->text + "' leads too far; allowed is up to 1000000 m or rad");
+        if (std::abs(v[i]) > quantity::kLength.most)
+          waypoint->fail("'" + waypoint->text +
+                         "' leads too far; allowed is up to 1000000 m or rad");
       }
       add(*waypoint, v[0], Pose::from_xyz_rpy({v[1], v[2], v[3]}, {v[4], v[5], v[6]}));
     }
   } else {
     const Element* trajectory = path.name == "trajectory" ? &path : path.child("trajectory");
-    for (const Element* waypoint : trajectory ? trajectory->all("waypoint") : std::vector<const Element*>{}) {
-      add(*waypoint, waypoint->number("time", 0.0, Allowed::not_negative(quantity::kTime)), waypoint->pose("pose"));
+    for (const Element* waypoint :
+         trajectory ? trajectory->all("waypoint") : std::vector<const Element*>{}) {
+      add(*waypoint, waypoint->number("time", 0.0, Allowed::not_negative(quantity::kTime)),
+          waypoint->pose("pose"));
     }
   }
   if (waypoints.empty()) path.fail("has no waypoint");
@@ -63,10 +72,12 @@ Pose Mover::pose_at(SimTime time) const {
   if (path_.loop && time > last && last > first) time = first + (time - first) % (last - first);
   if (time <= first) return waypoints.front().X_WM;
   if (time >= last) return waypoints.back().X_WM;
-  const auto next = std::upper_bound(waypoints.begin(), waypoints.end(), time,
-                                     [](SimTime t, const Waypoint& waypoint) { return t < waypoint.time; });
+  const auto next =
+      std::upper_bound(waypoints.begin(), waypoints.end(), time,
+                       [](SimTime t, const Waypoint& waypoint) { return t < waypoint.time; });
   const Waypoint& from = *(next - 1);
-  const double part = static_cast<double>(time - from.time) / static_cast<double>(next->time - from.time);
+  const double part =
+      static_cast<double>(time - from.time) / static_cast<double>(next->time - from.time);
   return {from.X_WM.rotation.slerp(part, next->X_WM.rotation),
           from.X_WM.translation + part * (next->X_WM.translation - from.X_WM.translation)};
 }
@@ -78,7 +89,10 @@ void Mover::before_step(SimTime now) {
     const Pose end = (X_WM * part.X_MB).normalized();
     const Pose& begin = physics_.pose(part.body);
     const Eigen::AngleAxisd turn(end.rotation * begin.rotation.conjugate());
-    physics_.guide(part.body, {(end.translation - begin.translation) / step_s, turn.axis() * (turn.angle() / step_s)}, end);
+    physics_.guide(
+        part.body,
+        {(end.translation - begin.translation) / step_s, turn.axis() * (turn.angle() / step_s)},
+        end);
   }
 }
 

@@ -11,16 +11,20 @@ namespace ruedo::robot {
 class Mover {
  public:
   // Throws InputError for waypoints that are not numbers, or whose times do not grow.
-  Mover(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics, int instance);
+  Mover(const model::WorldModel& world, const model::BodyLayout& layout,
+        physics::PhysicsWorld& physics, int instance);
 
-  // The model's pose in the world at a time: linear between waypoints, rotations by slerp. Before the first one it
-  // is there already; after the last one it stays, or begins again where the path is a loop.
+  // The model's pose in the world at a time: linear between waypoints, rotations by slerp. Before
+  // the first one it is there already; after the last one it stays, or begins again where the path
+  // is a loop.
   Pose pose_at(SimTime time) const;
 
   int instance() const { return instance_; }
   // The path begins anew at that sim time.
   void start_again(SimTime now);
-  void shift_time(SimTime us) { offset_ += us; }    // sim time was set back by so much; the path goes on
+  void shift_time(SimTime us) {
+    offset_ += us;
+  }  // sim time was set back by so much; the path goes on
 
   // Sends its bodies to where they are one step later.
   void before_step(SimTime now);
@@ -45,7 +49,7 @@ class Mover {
   physics::PhysicsWorld& physics_;
   int instance_;
   int64_t step_us_;
-  SimTime offset_ = 0;    // time of the path less sim time
+  SimTime offset_ = 0;  // time of the path less sim time
   Path path_;
   std::vector<Part> parts_;
 };

@@ -32,13 +32,16 @@ void Profile::keep_at(double velocity, double position) {
 
 Profile Profile::to_velocity(double velocity, double target, const Limits& limits) {
   Profile profile;
-  if (velocity * target < 0.0) {    // first to rest
-    profile.add(std::abs(velocity) / limits.deceleration, velocity, std::copysign(limits.deceleration, -velocity));
+  if (velocity * target < 0.0) {  // first to rest
+    profile.add(std::abs(velocity) / limits.deceleration, velocity,
+                std::copysign(limits.deceleration, -velocity));
     velocity = 0.0;
   }
-  const double rate = std::abs(target) > std::abs(velocity) ? limits.acceleration : limits.deceleration;
+  const double rate =
+      std::abs(target) > std::abs(velocity) ? limits.acceleration : limits.deceleration;
   if (target != velocity) {
-    profile.add(std::abs(target - velocity) / rate, velocity, std::copysign(rate, target - velocity));
+    profile.add(std::abs(target - velocity) / rate, velocity,
+                std::copysign(rate, target - velocity));
   }
   profile.keep(target);
   return profile;
@@ -59,7 +62,7 @@ Profile Profile::to_distance(double velocity, double distance, const Limits& lim
   rest = std::abs(rest);
   v = std::abs(v);
   double way_to_stop = v * v / (2.0 * d);
-  if (v > limits.speed) {    // brake to the speed allowed
+  if (v > limits.speed) {  // brake to the speed allowed
     profile.add((v - limits.speed) / d, sign * v, -sign * d);
     rest -= way_to_stop - limits.speed * limits.speed / (2.0 * d);
     v = limits.speed;
@@ -67,7 +70,8 @@ Profile Profile::to_distance(double velocity, double distance, const Limits& lim
   }
   // Peak of the triangle: (peak^2 - v^2) / 2a + peak^2 / 2d = rest.
   const double reciprocals = 1.0 / a + 1.0 / d;
-  double peak = reciprocals > 0.0 ? std::sqrt((2.0 * rest + v * v / a) / reciprocals) : limits.speed;
+  double peak =
+      reciprocals > 0.0 ? std::sqrt((2.0 * rest + v * v / a) / reciprocals) : limits.speed;
   double cruise_way = 0.0;
   if (peak >= limits.speed) {
     peak = limits.speed;
@@ -113,7 +117,8 @@ const Profile::Segment& Profile::at(double time) const {
 
 double Profile::next_change(double time) const {
   for (int i = 1; i < count_; ++i) {
-    if (segments_[static_cast<size_t>(i)].time > time) return segments_[static_cast<size_t>(i)].time;
+    if (segments_[static_cast<size_t>(i)].time > time)
+      return segments_[static_cast<size_t>(i)].time;
   }
   return std::numeric_limits<double>::infinity();
 }

@@ -1,7 +1,8 @@
-// Velocity profiles: piecewise linear velocities over time, planned in closed form and evaluated exactly.
+// Velocity profiles: piecewise linear velocities over time, planned in closed form and evaluated
+// exactly.
 //
-// Nothing here depends on a step size. Units are m and s for translation, rad and s for rotation; time counts from
-// the start of the profile.
+// Nothing here depends on a step size. Units are m and s for translation, rad and s for rotation;
+// time counts from the start of the profile.
 #pragma once
 
 #include <array>
@@ -20,19 +21,20 @@ struct Limits {
 class Profile {
  public:
   struct Segment {
-    double time = 0.0, position = 0.0, velocity = 0.0;    // at its start
+    double time = 0.0, position = 0.0, velocity = 0.0;  // at its start
     double acceleration = 0.0;
   };
 
-  Profile() = default;    // at rest for ever
+  Profile() = default;  // at rest for ever
   // Reaches the velocity `target` from `velocity` as fast as the limits allow, and keeps it.
   static Profile to_velocity(double velocity, double target, const Limits& limits);
-  // Comes to rest at `distance` from here, as fast as the limits allow: trapezoid or triangle, after braking or
-  // turning round where the velocity asks for it. Needs speed > 0; unlimited acceleration is allowed.
+  // Comes to rest at `distance` from here, as fast as the limits allow: trapezoid or triangle,
+  // after braking or turning round where the velocity asks for it. Needs speed > 0; unlimited
+  // acceleration is allowed.
   static Profile to_distance(double velocity, double distance, const Limits& limits);
 
-  // Appends other: it begins `at` seconds from here, no earlier than this one has come to its last segment. It
-  // must begin with the velocity that this one keeps.
+  // Appends other: it begins `at` seconds from here, no earlier than this one has come to its last
+  // segment. It must begin with the velocity that this one keeps.
   void append(const Profile& other, double at);
   // This profile with velocities and positions times `factor`.
   Profile scaled(double factor) const;

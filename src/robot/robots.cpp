@@ -15,7 +15,8 @@ namespace ruedo::robot {
 
 class Robots::Impl {
  public:
-  Impl(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics);
+  Impl(const model::WorldModel& world, const model::BodyLayout& layout,
+       physics::PhysicsWorld& physics);
 
   void apply(const Command& command);
   void step();
@@ -39,7 +40,7 @@ class Robots::Impl {
       if (layout_.bodies[i].instance == instance) visit(static_cast<int>(i));
     }
   }
-  int robot_of(int instance) const;    // -1: it is none
+  int robot_of(int instance) const;  // -1: it is none
   void put(int body, const Pose& X_WB);
   void end_put(int instance);
   void read_driveless(size_t robot, RobotState& state) const;
@@ -49,22 +50,25 @@ class Robots::Impl {
   const model::BodyLayout& layout_;
   physics::PhysicsWorld& physics_;
   std::vector<LevelPlane> planes_;
-  std::vector<std::unique_ptr<Drive>> drives_;    // of each robot; null: it has none, or cannot move
-  std::vector<MotionLog> driveless_;              // refusals of those
+  std::vector<std::unique_ptr<Drive>> drives_;  // of each robot; null: it has none, or cannot move
+  std::vector<MotionLog> driveless_;            // refusals of those
   std::vector<std::unique_ptr<Mover>> movers_;
   JointControl joints_;
 };
 
-Robots::Impl::Impl(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics)
+Robots::Impl::Impl(const model::WorldModel& world, const model::BodyLayout& layout,
+                   physics::PhysicsWorld& physics)
     : world_(world),
       layout_(layout),
       physics_(physics),
       planes_(level_planes(world, layout)),
       driveless_(layout.robots.size()),
       joints_(world, layout, physics) {
-  for (size_t i = 0; i < layout.robots.size(); ++i) drives_.push_back(make_drive(static_cast<int>(i)));
+  for (size_t i = 0; i < layout.robots.size(); ++i)
+    drives_.push_back(make_drive(static_cast<int>(i)));
   for (size_t i = 0; i < world.models.size(); ++i) {
-    if (world.models[i].model->path) movers_.push_back(std::make_unique<Mover>(world, layout, physics, static_cast<int>(i)));
+    if (world.models[i].model->path)
+      movers_.push_back(std::make_unique<Mover>(world, layout, physics, static_cast<int>(i)));
   }
 }
 
@@ -72,7 +76,8 @@ std::unique_ptr<Drive> Robots::Impl::make_drive(int robot) {
   const model::RobotPlacement& placement = layout_.robots[static_cast<size_t>(robot)];
   const auto& drive = world_.models[static_cast<size_t>(placement.instance)].model->drive;
   if (!drive || placement.body < 0) return nullptr;
-  if (drive->kind == model::DriveDescription::Kind::wheels) return std::make_unique<WheelsDrive>(world_, layout_, physics_, robot);
+  if (drive->kind == model::DriveDescription::Kind::wheels)
+    return std::make_unique<WheelsDrive>(world_, layout_, physics_, robot);
   return std::make_unique<KinematicDrive>(world_, layout_, physics_, robot, planes_);
 }
 
@@ -89,7 +94,8 @@ void Robots::Impl::apply(const Command& command) {
     driveless_[static_cast<size_t>(command.robot)].mention(refused);
   };
   if (const auto* joint = std::get_if<JointCommand>(&command.what)) {
-    if (const int8_t reason = joints_.apply(command.robot, *joint)) refuse(0, motion_status_t::KIND_NONE, reason);
+    if (const int8_t reason = joints_.apply(command.robot, *joint))
+      refuse(0, motion_status_t::KIND_NONE, reason);
     if (drive) drive->wake();
     return;
   }
@@ -98,14 +104,17 @@ void Robots::Impl::apply(const Command& command) {
       refuse(move->id, move->kind, motion_status_t::REASON_NO_DRIVE);
     } else if (!std::holds_alternative<ResetOdometry>(command.what)) {
       const bool wheels = std::holds_alternative<WheelCommand>(command.what);
-      refuse(0, wheels ? motion_status_t::KIND_WHEELS : motion_status_t::KIND_VELOCITY, motion_status_t::REASON_NO_DRIVE);
+      refuse(0, wheels ? motion_status_t::KIND_WHEELS : motion_status_t::KIND_VELOCITY,
+             motion_status_t::REASON_NO_DRIVE);
     }
     return;
   }
   if (std::holds_alternative<ResetOdometry>(command.what)) return drive->reset_odometry();
   drive->wake();
-  if (const auto* velocity = std::get_if<VelocityCommand>(&command.what)) drive->motion().command(*velocity, now());
-  if (const auto* wheels = std::get_if<WheelCommand>(&command.what)) drive->motion().command(*wheels, now());
+  if (const auto* velocity = std::get_if<VelocityCommand>(&command.what))
+    drive->motion().command(*velocity, now());
+  if (const auto* wheels = std::get_if<WheelCommand>(&command.what))
+    drive->motion().command(*wheels, now());
   if (const auto* move = std::get_if<MoveCommand>(&command.what)) {
     drive->motion().command(*move, now(), drive->heading_in_odom());
   }
@@ -113,11 +122,13 @@ void Robots::Impl::apply(const Command& command) {
 
 void Robots::Impl::step() {
   for (auto& mover : movers_) mover->before_step(now());
-  for (auto& drive : drives_) if (drive) drive->before_step(now());
+  for (auto& drive : drives_)
+    if (drive) drive->before_step(now());
   joints_.before_step();
   physics_.step();
   ++step_;
-  for (auto& drive : drives_) if (drive) drive->after_step(now());
+  for (auto& drive : drives_)
+    if (drive) drive->after_step(now());
   for (MotionLog& log : driveless_) log.advance();
 }
 
@@ -127,7 +138,8 @@ void Robots::Impl::read(Snapshot& snapshot) const {
   snapshot.time = now();
   snapshot.robots.resize(drives_.size());
   snapshot.motion_ends.clear();
-  snapshot.wheel_angles.assign(layout_.wheels.size(), 0.0);    // of a robot that is gone, too: a snapshot is used again
+  snapshot.wheel_angles.assign(layout_.wheels.size(),
+                               0.0);  // of a robot that is gone, too: a snapshot is used again
   snapshot.wheel_rates.assign(layout_.wheels.size(), 0.0);
   for (size_t i = 0; i < drives_.size(); ++i) {
     if (drives_[i]) {
@@ -164,7 +176,8 @@ int Robots::Impl::robot_of(int instance) const {
 
 void Robots::Impl::change_ground() {
   planes_ = level_planes(world_, layout_);
-  for (auto& drive : drives_) if (drive) drive->ground_changed();
+  for (auto& drive : drives_)
+    if (drive) drive->ground_changed();
 }
 
 void Robots::Impl::add(int instance) {
@@ -188,13 +201,16 @@ void Robots::Impl::remove(int instance) {
 }
 
 Pose Robots::Impl::model_pose(int instance) const {
-  const auto& link = layout_.links[static_cast<size_t>(layout_.first_link[static_cast<size_t>(instance)])];
+  const auto& link =
+      layout_.links[static_cast<size_t>(layout_.first_link[static_cast<size_t>(instance)])];
   const Pose X_WL = link.body < 0 ? link.X_BL : physics_.pose(link.body) * link.X_BL;
-  return X_WL * world_.models[static_cast<size_t>(instance)].model->links[static_cast<size_t>(link.link)].X_ML.inverse();
+  return X_WL * world_.models[static_cast<size_t>(instance)]
+                    .model->links[static_cast<size_t>(link.link)]
+                    .X_ML.inverse();
 }
 
 void Robots::Impl::put(int body, const Pose& X_WB) {
-  physics_.disturb(body);    // what leaned on it
+  physics_.disturb(body);  // what leaned on it
   physics_.set_twist(body, {});
   physics_.set_pose(body, X_WB.normalized());
 }
@@ -215,7 +231,9 @@ void Robots::Impl::set_pose(int instance, const Pose& X_WM) {
 void Robots::Impl::set_twist(int instance, const Twist& twist) {
   const Vec3 p_M = model_pose(instance).translation;
   for_each_body(instance, [&](int body) {
-    physics_.set_twist(body, {twist.linear + twist.angular.cross(physics_.pose(body).translation - p_M), twist.angular});
+    physics_.set_twist(
+        body,
+        {twist.linear + twist.angular.cross(physics_.pose(body).translation - p_M), twist.angular});
     physics_.disturb(body);
   });
 }
@@ -223,35 +241,43 @@ void Robots::Impl::set_twist(int instance, const Twist& twist) {
 // A drive's wheels keep the angle that they have turned: encoders do not jump.
 void Robots::Impl::start_again(int instance) {
   const int robot = robot_of(instance);
-  const int base = robot >= 0 && drives_[static_cast<size_t>(robot)] ? layout_.robots[static_cast<size_t>(robot)].body : -1;
+  const int base = robot >= 0 && drives_[static_cast<size_t>(robot)]
+                       ? layout_.robots[static_cast<size_t>(robot)].body
+                       : -1;
   const auto is_wheel = [&](int body) {
     const auto& wheels = layout_.robots[static_cast<size_t>(robot)].wheels;
     return body != base && std::any_of(wheels.begin(), wheels.end(), [&](int wheel) {
-      return layout_.links[static_cast<size_t>(layout_.wheels[static_cast<size_t>(wheel)].link)].body == body;
-    });
+             return layout_
+                        .links[static_cast<size_t>(layout_.wheels[static_cast<size_t>(wheel)].link)]
+                        .body == body;
+           });
   };
   const Pose X_BaseW = base >= 0 ? physics_.pose(base).inverse() : Pose{};
   for_each_body(instance, [&](int body) {
     const bool wheel = base >= 0 && is_wheel(body);
-    put(body, wheel ? layout_.bodies[static_cast<size_t>(base)].X_WB * X_BaseW * physics_.pose(body) : layout_.bodies[static_cast<size_t>(body)].X_WB);
+    put(body, wheel ? layout_.bodies[static_cast<size_t>(base)].X_WB * X_BaseW * physics_.pose(body)
+                    : layout_.bodies[static_cast<size_t>(body)].X_WB);
   });
   for (size_t i = 0; i < layout_.joints.size(); ++i) {
     if (layout_.joints[i].instance == instance) physics_.start_again(static_cast<int>(i));
   }
   joints_.forget(instance);
-  for (auto& mover : movers_) if (mover->instance() == instance) mover->start_again(now());
+  for (auto& mover : movers_)
+    if (mover->instance() == instance) mover->start_again(now());
   end_put(instance);
 }
 
 SimTime Robots::Impl::set_time_to_zero() {
   const SimTime was = now();
-  for (auto& drive : drives_) if (drive) drive->motion().shift_time(was);
+  for (auto& drive : drives_)
+    if (drive) drive->motion().shift_time(was);
   for (auto& mover : movers_) mover->shift_time(was);
   step_ = 0;
   return was;
 }
 
-Robots::Robots(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics)
+Robots::Robots(const model::WorldModel& world, const model::BodyLayout& layout,
+               physics::PhysicsWorld& physics)
     : impl_(std::make_unique<Impl>(world, layout, physics)) {}
 Robots::~Robots() = default;
 void Robots::apply(const Command& command) { impl_->apply(command); }

@@ -1,5 +1,5 @@
-// The robots' execution layer: takes commands at step boundaries, runs drives and motion primitives, moves
-// the bodies. Belongs to the kinematics module; not thread safe.
+// The robots' execution layer: takes commands at step boundaries, runs drives and motion
+// primitives, moves the bodies. Belongs to the kinematics module; not thread safe.
 #pragma once
 
 #include <memory>
@@ -14,28 +14,44 @@
 
 namespace ruedo::robot {
 
-struct VelocityCommand { double vx, vy, omega; };
-struct WheelCommand { std::vector<double> rates; };
-struct MoveCommand { int64_t id; int8_t kind; double value, radius, speed, acceleration, deceleration; };
-struct JointCommand { std::vector<std::string> names; std::vector<int8_t> modes; std::vector<double> values; };
+struct VelocityCommand {
+  double vx, vy, omega;
+};
+struct WheelCommand {
+  std::vector<double> rates;
+};
+struct MoveCommand {
+  int64_t id;
+  int8_t kind;
+  double value, radius, speed, acceleration, deceleration;
+};
+struct JointCommand {
+  std::vector<std::string> names;
+  std::vector<int8_t> modes;
+  std::vector<double> values;
+};
 struct ResetOdometry {};
 
-// A command that has a robot and passed the checks of size and fingerprint; its values are not checked yet.
+// A command that has a robot and passed the checks of size and fingerprint; its values are not
+// checked yet.
 struct Command {
-  int robot = -1;    // index into BodyLayout::robots
+  int robot = -1;  // index into BodyLayout::robots
   std::variant<VelocityCommand, WheelCommand, MoveCommand, JointCommand, ResetOdometry> what;
 };
 
-// Throws InputError for a <ruedo:path> or trajectory with waypoints that are not numbers, or whose times do not grow.
+// Throws InputError for a <ruedo:path> or trajectory with waypoints that are not numbers, or whose
+// times do not grow.
 void check_path(const Element& path);
 
 class Robots {
  public:
   // All must outlive it.
-  Robots(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics);
+  Robots(const model::WorldModel& world, const model::BodyLayout& layout,
+         physics::PhysicsWorld& physics);
   ~Robots();
 
-  // Takes effect on the current state: at the beginning of the next step. Bad values refuse the command.
+  // Takes effect on the current state: at the beginning of the next step. Bad values refuse the
+  // command.
   void apply(const Command& command);
 
   // One step of everything: drives before, physics.step(), drives after.
@@ -47,14 +63,15 @@ class Robots {
   int64_t current_step() const;
 
   // Changes between two steps; instance is an index into WorldModel::models.
-  void add(int instance);       // the physics has it; the layout, too
-  void remove(int instance);    // the physics has it no more
-  Pose model_pose(int instance) const;                     // X_WM, of a model that can move
-  // Puts a model there, at rest: its joints stand as they stood, what it was asked to do ends, its odometry stays.
+  void add(int instance);               // the physics has it; the layout, too
+  void remove(int instance);            // the physics has it no more
+  Pose model_pose(int instance) const;  // X_WM, of a model that can move
+  // Puts a model there, at rest: its joints stand as they stood, what it was asked to do ends, its
+  // odometry stays.
   void set_pose(int instance, const Pose& X_WM);
-  void set_twist(int instance, const Twist& twist);        // of the model's frame, expressed in the world
-  void start_again(int instance);                          // back where it started, at rest; paths begin anew
-  SimTime set_time_to_zero();                              // nothing moves; returns what the time was
+  void set_twist(int instance, const Twist& twist);  // of the model's frame, expressed in the world
+  void start_again(int instance);  // back where it started, at rest; paths begin anew
+  SimTime set_time_to_zero();      // nothing moves; returns what the time was
 
  private:
   class Impl;

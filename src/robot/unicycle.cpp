@@ -12,10 +12,12 @@ namespace ruedo::robot {
 
 namespace {
 
-// Gauss-Legendre of order 8 on [-1, 1] (Abramowitz and Stegun, table 25.4): over an angle of 1 rad the error is
-// below 1e-18 of the way.
-constexpr std::array<double, 4> kNodes = {0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363};
-constexpr std::array<double, 4> kWeights = {0.3626837833783620, 0.3137066458778873, 0.2223810344533745, 0.1012285362903763};
+// Gauss-Legendre of order 8 on [-1, 1] (Abramowitz and Stegun, table 25.4): over an angle of 1 rad
+// the error is below 1e-18 of the way.
+constexpr std::array<double, 4> kNodes = {0.1834346424956498, 0.5255324099163290,
+                                          0.7966664774136267, 0.9602898564975363};
+constexpr std::array<double, 4> kWeights = {0.3626837833783620, 0.3137066458778873,
+                                            0.2223810344533745, 0.1012285362903763};
 constexpr double kLargestPanel_rad = 1.0;
 
 // v0 + a t and w0 + b t over `duration`, from heading 0.
@@ -23,7 +25,8 @@ Displacement over_piece(double v0, double a, double w0, double b, double duratio
   const double way = (v0 + 0.5 * a * duration) * duration;
   const double angle = (w0 + 0.5 * b * duration) * duration;
   // Constant curvature: v and omega in proportion, or one of them zero throughout.
-  if (std::abs(v0 * b - w0 * a) <= 1e-15 * (std::abs(v0 * b) + std::abs(w0 * a))) return along_arc(way, angle);
+  if (std::abs(v0 * b - w0 * a) <= 1e-15 * (std::abs(v0 * b) + std::abs(w0 * a)))
+    return along_arc(way, angle);
 
   Displacement result;
   result.way = way;
@@ -57,7 +60,8 @@ Displacement along_arc(double way, double angle) {
     return result;
   }
   const double half = 0.5 * angle, sine = math::sin(half);
-  const double chord = way * (sine / half);    // sin(h) / h is well conditioned down to the smallest angles
+  const double chord =
+      way * (sine / half);  // sin(h) / h is well conditioned down to the smallest angles
   result.x = chord * math::cos(half);
   result.y = chord * sine;
   return result;
@@ -65,8 +69,8 @@ Displacement along_arc(double way, double angle) {
 
 Displacement chained(const Displacement& first, const Displacement& second) {
   const double c = math::cos(first.angle), s = math::sin(first.angle);
-  return {first.x + c * second.x - s * second.y, first.y + s * second.x + c * second.y, first.angle + second.angle,
-          first.way + second.way, first.side + second.side};
+  return {first.x + c * second.x - s * second.y, first.y + s * second.x + c * second.y,
+          first.angle + second.angle, first.way + second.way, first.side + second.side};
 }
 
 Displacement integrate(const Profile& v, const Profile& omega, double begin, double end) {
@@ -76,9 +80,10 @@ Displacement integrate(const Profile& v, const Profile& omega, double begin, dou
     const double next = std::min({end, v.next_change(t), omega.next_change(t)});
     const Profile::Segment& of_v = v.at(t);
     const Profile::Segment& of_omega = omega.at(t);
-    const Displacement piece = over_piece(of_v.velocity + of_v.acceleration * (t - of_v.time), of_v.acceleration,
-                                          of_omega.velocity + of_omega.acceleration * (t - of_omega.time),
-                                          of_omega.acceleration, next - t);
+    const Displacement piece =
+        over_piece(of_v.velocity + of_v.acceleration * (t - of_v.time), of_v.acceleration,
+                   of_omega.velocity + of_omega.acceleration * (t - of_omega.time),
+                   of_omega.acceleration, next - t);
     sum = first ? piece : chained(sum, piece);
     first = false;
     t = next;

@@ -1,7 +1,8 @@
-// Exact motion of a unicycle (a differential drive's base_link) whose speed and turn rate follow profiles.
+// Exact motion of a unicycle (a differential drive's base_link) whose speed and turn rate follow
+// profiles.
 //
-// x' = v cos(theta), y' = v sin(theta), theta' = omega: eqs. 1 to 3 of Hernandez-Belmonte et al. (ROSSUM 2011) with
-// v = r (w_right + w_left) / 2 and omega = r (w_right - w_left) / track.
+// x' = v cos(theta), y' = v sin(theta), theta' = omega: eqs. 1 to 3 of Hernandez-Belmonte et al.
+// (ROSSUM 2011) with v = r (w_right + w_left) / 2 and omega = r (w_right - w_left) / track.
 #pragma once
 
 #include "robot/profile.h"
@@ -10,17 +11,18 @@ namespace ruedo::robot {
 
 // Displacement over a span of time, in the frame of base_link at its beginning.
 struct Displacement {
-  double x = 0.0, y = 0.0;        // m
-  double angle = 0.0;             // rad, not wrapped
-  double way = 0.0;               // m, integral of v
-  double side = 0.0;              // m, integral of the speed to the left, of bases that move sideways
+  double x = 0.0, y = 0.0;  // m
+  double angle = 0.0;       // rad, not wrapped
+  double way = 0.0;         // m, integral of v
+  double side = 0.0;        // m, integral of the speed to the left, of bases that move sideways
 };
 
 // With constant curvature (a line, an arc, or speed and turn rate in proportion): closed form.
 Displacement along_arc(double way, double angle);
 
-// From `begin` to `end` (s since the start of both profiles). Where v and omega vary apart from each other, by
-// Gauss-Legendre quadrature over each piece between changes of the profiles: exact to rounding.
+// From `begin` to `end` (s since the start of both profiles). Where v and omega vary apart from
+// each other, by Gauss-Legendre quadrature over each piece between changes of the profiles: exact
+// to rounding.
 Displacement integrate(const Profile& v, const Profile& omega, double begin, double end);
 
 // first, then second.

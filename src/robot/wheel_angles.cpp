@@ -7,13 +7,17 @@
 
 namespace ruedo::robot {
 
-WheelAngles::WheelAngles(const model::BodyLayout& layout, int robot, const model::DriveDescription& drive) : radius_(drive.wheel_radius) {
+WheelAngles::WheelAngles(const model::BodyLayout& layout, int robot,
+                         const model::DriveDescription& drive)
+    : radius_(drive.wheel_radius) {
   const model::RobotPlacement& placement = layout.robots[static_cast<size_t>(robot)];
   const Pose X_BaseB = placement.X_BBase.inverse();
   for (const int index : placement.wheels) {
     const model::WheelPlacement& wheel = layout.wheels[static_cast<size_t>(index)];
-    const model::WheelPlacement& place = wheel.on < 0 ? wheel : layout.wheels[static_cast<size_t>(wheel.on)];
-    const Vec3 p_Base = X_BaseB * (layout.links[static_cast<size_t>(place.link)].X_BL * place.center_in_L);
+    const model::WheelPlacement& place =
+        wheel.on < 0 ? wheel : layout.wheels[static_cast<size_t>(wheel.on)];
+    const Vec3 p_Base =
+        X_BaseB * (layout.links[static_cast<size_t>(place.link)].X_BL * place.center_in_L);
     wheels_.push_back({index, wheel.steers, wheel.on >= 0, wheel.rim, p_Base.x(), p_Base.y()});
   }
 }
@@ -23,7 +27,9 @@ void WheelAngles::advance(const Displacement& way) {
   side_ += way.side;
   angle_ += way.angle;
   for (Wheel& wheel : wheels_) {
-    if (wheel.steered) wheel.rolled += std::copysign(math::hypot(way.way - way.angle * wheel.y, way.angle * wheel.x), way.way);
+    if (wheel.steered)
+      wheel.rolled +=
+          std::copysign(math::hypot(way.way - way.angle * wheel.y, way.angle * wheel.x), way.way);
   }
 }
 
@@ -31,11 +37,13 @@ void WheelAngles::read(Snapshot& snapshot, const Vec3& twist, double curvature) 
   const Vec3 sums(way_, side_, angle_);
   for (const Wheel& wheel : wheels_) {
     double angle = 0.0, rate = 0.0;
-    if (wheel.steers) {    // across the line to the middle of the circle
+    if (wheel.steers) {  // across the line to the middle of the circle
       angle = math::atan2(curvature * wheel.x, 1.0 - curvature * wheel.y);
     } else if (radius_ > 0.0 && wheel.steered) {
       angle = wheel.rolled / radius_;
-      rate = std::copysign(math::hypot(twist.x() - twist.z() * wheel.y, twist.z() * wheel.x), twist.x()) / radius_;
+      rate = std::copysign(math::hypot(twist.x() - twist.z() * wheel.y, twist.z() * wheel.x),
+                           twist.x()) /
+             radius_;
     } else if (radius_ > 0.0) {
       angle = wheel.rim.dot(sums) / radius_;
       rate = wheel.rim.dot(twist) / radius_;

@@ -1,4 +1,5 @@
-// How far the wheels of a kinematic drive have turned, and where those that steer point, from the way of base_link.
+// How far the wheels of a kinematic drive have turned, and where those that steer point, from the
+// way of base_link.
 #pragma once
 
 #include <vector>
@@ -19,16 +20,17 @@ class WheelAngles {
 
  private:
   struct Wheel {
-    int index;                // into Snapshot::wheel_angles
-    bool steers, steered;     // it is a steering joint; it rolls and hangs on one
+    int index;             // into Snapshot::wheel_angles
+    bool steers, steered;  // it is a steering joint; it rolls and hangs on one
     Vec3 rim;
-    double x, y;              // m, in base_link: of a steered wheel the joint that steers it
-    double rolled = 0.0;      // m, of a steered wheel
+    double x, y;          // m, in base_link: of a steered wheel the joint that steers it
+    double rolled = 0.0;  // m, of a steered wheel
   };
 
   double radius_;
   std::vector<Wheel> wheels_;
-  double way_ = 0.0, side_ = 0.0, angle_ = 0.0;    // of base_link since the start: integrals of its twist
+  double way_ = 0.0, side_ = 0.0,
+         angle_ = 0.0;  // of base_link since the start: integrals of its twist
 };
 
 }  // namespace ruedo::robot

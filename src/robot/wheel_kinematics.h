@@ -1,20 +1,28 @@
-// What the wheels of a differential drive make of speed and turn rate, and the other way round: v = (r_l w_l + r_r w_r) / 2 and
-// omega = (r_r w_r - r_l w_l) / track. The same holds for ways and angles.
+// What the wheels of a differential drive make of speed and turn rate, and the other way round: v =
+// (r_l w_l + r_r w_r) / 2 and omega = (r_r w_r - r_l w_l) / track. The same holds for ways and
+// angles.
 #pragma once
 
 #include "model/world_model.h"
 
 namespace ruedo::robot {
 
-struct SideRates { double left, right; };      // rad/s, or rad
-struct PlaneMotion { double v, omega; };       // m/s and rad/s, or m and rad
+struct SideRates {
+  double left, right;
+};  // rad/s, or rad
+struct PlaneMotion {
+  double v, omega;
+};  // m/s and rad/s, or m and rad
 
 class WheelKinematics {
  public:
   // As the robot is, or as it believes to be: with the errors of <ruedo:odometry>.
-  static WheelKinematics real(const model::DriveDescription& drive) { return {drive.wheel_radius, drive.wheel_radius, drive.track}; }
+  static WheelKinematics real(const model::DriveDescription& drive) {
+    return {drive.wheel_radius, drive.wheel_radius, drive.track};
+  }
   static WheelKinematics believed(const model::DriveDescription& drive) {
-    return {drive.wheel_radius * (1.0 + drive.radius_error[0]), drive.wheel_radius * (1.0 + drive.radius_error[1]),
+    return {drive.wheel_radius * (1.0 + drive.radius_error[0]),
+            drive.wheel_radius * (1.0 + drive.radius_error[1]),
             drive.track * (1.0 + drive.track_error)};
   }
 
@@ -28,8 +36,9 @@ class WheelKinematics {
   }
 
  private:
-  WheelKinematics(double left, double right, double track) : left_(left), right_(right), track_(track) {}
-  double left_, right_, track_;    // m
+  WheelKinematics(double left, double right, double track)
+      : left_(left), right_(right), track_(track) {}
+  double left_, right_, track_;  // m
 };
 
 }  // namespace ruedo::robot

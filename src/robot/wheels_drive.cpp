@@ -10,21 +10,22 @@ namespace ruedo::robot {
 
 namespace {
 
-// Where the file gives no gains: a wheel with its share of the robot comes to its rate within so long, and loses what it
-// lags behind in so long.
+// Where the file gives no gains: a wheel with its share of the robot comes to its rate within so
+// long, and loses what it lags behind in so long.
 constexpr double kRateTime_s = 0.01, kAngleTime_s = 0.02;
 // What a servo may lag behind; a robot that is held does not wind it up further.
 constexpr double kLargestLag_m = 0.05;
-constexpr double kMostOfLag = 0.5;           // of it, that one step may make good: more would overshoot
+constexpr double kMostOfLag = 0.5;  // of it, that one step may make good: more would overshoot
 constexpr double kLargestYawError_rad = 0.3;
-constexpr double kSupportNormal = 0.5;       // cosine between a support's normal and the robot's up
+constexpr double kSupportNormal = 0.5;  // cosine between a support's normal and the robot's up
 constexpr SimTime kFallAsleep_us = 500'000;
-constexpr double kSettled_m_s = 2e-3, kSettled_rad_s = 1e-2;    // a primitive ends below these
+constexpr double kSettled_m_s = 2e-3, kSettled_rad_s = 1e-2;  // a primitive ends below these
 constexpr double kStill_m_s = 5e-3, kStill_rad_s = 2e-2;
 
 }  // namespace
 
-WheelsDrive::WheelsDrive(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics, int robot)
+WheelsDrive::WheelsDrive(const model::WorldModel& world, const model::BodyLayout& layout,
+                         physics::PhysicsWorld& physics, int robot)
     : Drive(world, layout, physics, robot),
       servos_(wheels_.size()),
       max_torque_(description_.max_wheel_torque),
@@ -39,21 +40,27 @@ WheelsDrive::WheelsDrive(const model::WorldModel& world, const model::BodyLayout
     mass += physics.mass(body);
   }
   const double r = description_.wheel_radius;
-  if (!wheels_.empty()) max_torque_ = std::min(max_torque_, description_.max_force * r / static_cast<double>(wheels_.size()));
+  if (!wheels_.empty())
+    max_torque_ =
+        std::min(max_torque_, description_.max_force * r / static_cast<double>(wheels_.size()));
   max_torque_ = std::min(max_torque_, description_.stall_torque * description_.gear);
   for (Servo& servo : servos_) {
     const double inertia = mass * r * r / static_cast<double>(wheels_.size());
-    servo.rate_gain = description_.servo_rate_gain > 0.0 ? description_.servo_rate_gain : inertia / kRateTime_s;
-    servo.angle_gain = description_.servo_angle_gain > 0.0 ? description_.servo_angle_gain : servo.rate_gain / kAngleTime_s;
+    servo.rate_gain =
+        description_.servo_rate_gain > 0.0 ? description_.servo_rate_gain : inertia / kRateTime_s;
+    servo.angle_gain = description_.servo_angle_gain > 0.0 ? description_.servo_angle_gain
+                                                           : servo.rate_gain / kAngleTime_s;
   }
   begin_at_rest();
 }
 
 SideRates WheelsDrive::mean_of_sides(double (physics::PhysicsWorld::*of_wheel)(int) const) const {
   SideRates sum{};
-  for (size_t i = 0; i < wheels_.size(); ++i) (is_left(i) ? sum.left : sum.right) += (physics_.*of_wheel)(wheels_[i]);
+  for (size_t i = 0; i < wheels_.size(); ++i)
+    (is_left(i) ? sum.left : sum.right) += (physics_.*of_wheel)(wheels_[i]);
   const size_t left = description_.left_joints.size();
-  return {sum.left / static_cast<double>(left), sum.right / static_cast<double>(wheels_.size() - left)};
+  return {sum.left / static_cast<double>(left),
+          sum.right / static_cast<double>(wheels_.size() - left)};
 }
 
 void WheelsDrive::begin_at_rest() {
@@ -84,7 +91,7 @@ double WheelsDrive::yaw_correction() {
   const double gain = description_.yaw_gain;
   if (gain <= 0.0 || motion_.by_wheels()) return 0.0;
   const double error = std::clamp(angle_missing_, -kLargestYawError_rad, kLargestYawError_rad);
-  yaw_integral_ += 0.25 * gain * gain * error * step_s_;    // critically damped
+  yaw_integral_ += 0.25 * gain * gain * error * step_s_;  // critically damped
   const double most = 3.0 * std::abs(motion_.omega()) + 0.1;
   yaw_integral_ = std::clamp(yaw_integral_, -most, most);
   return gain * error + yaw_integral_;
@@ -99,17 +106,26 @@ void WheelsDrive::drive_wheels(const SideRates& rates) {
 
 void WheelsDrive::drive_wheel(size_t wheel, double rate) {
   Servo& servo = servos_[wheel];
-  const double angle = physics_.wheel_angle(wheels_[wheel]), most = kLargestLag_m / description_.wheel_radius;
+  const double angle = physics_.wheel_angle(wheels_[wheel]),
+               most = kLargestLag_m / description_.wheel_radius;
   const double lag = std::clamp(servo.angle + rate * step_s_ - angle, -most, most);
   servo.angle = angle + lag;
   physics::WheelServo command;
   command.rate = rate + std::min(servo.angle_gain / servo.rate_gain, kMostOfLag / step_s_) * lag;
   command.gain = servo.rate_gain;
-  // The motor's line: less torque the faster it turns, and more against its turning, up to that at stall.
-  const double part = physics_.wheel_rate(wheels_[wheel]) * description_.gear / description_.no_load_rate;
-  const double stall = std::isfinite(description_.stall_torque) ? description_.stall_torque * description_.gear : max_torque_;
-  command.highest_torque = std::isfinite(stall) ? std::min(max_torque_, stall * std::clamp(1.0 - part, 0.0, 1.0)) : max_torque_;
-  command.lowest_torque = std::isfinite(stall) ? -std::min(max_torque_, stall * std::clamp(1.0 + part, 0.0, 1.0)) : -max_torque_;
+  // The motor's line: less torque the faster it turns, and more against its turning, up to that at
+  // stall.
+  const double part =
+      physics_.wheel_rate(wheels_[wheel]) * description_.gear / description_.no_load_rate;
+  const double stall = std::isfinite(description_.stall_torque)
+                           ? description_.stall_torque * description_.gear
+                           : max_torque_;
+  command.highest_torque = std::isfinite(stall)
+                               ? std::min(max_torque_, stall * std::clamp(1.0 - part, 0.0, 1.0))
+                               : max_torque_;
+  command.lowest_torque = std::isfinite(stall)
+                              ? -std::min(max_torque_, stall * std::clamp(1.0 + part, 0.0, 1.0))
+                              : -max_torque_;
   physics_.drive_wheel(wheels_[wheel], command);
 }
 
@@ -117,7 +133,8 @@ bool WheelsDrive::touches_something() const {
   const Vec3 up = X_WBase_.rotation * Vec3::UnitZ();
   for (const int body : bodies_) {
     for (const Contact& contact : physics_.contacts(body)) {
-      if (contact.normal.dot(up) < kSupportNormal && contact.normal.dot(up) > -kSupportNormal) return true;
+      if (contact.normal.dot(up) < kSupportNormal && contact.normal.dot(up) > -kSupportNormal)
+        return true;
     }
   }
   return false;
@@ -133,14 +150,17 @@ void WheelsDrive::after_step(SimTime now) {
   const Pose X_WBase = base_pose().normalized();
   const Quat turn = X_WBase_.rotation.conjugate() * X_WBase.rotation;
   const double turned = wrap_angle(2.0 * math::atan2(turn.z(), turn.w()));
-  const double ahead = (X_WBase_.rotation.conjugate() * (X_WBase.translation - X_WBase_.translation)).x();
+  const double ahead =
+      (X_WBase_.rotation.conjugate() * (X_WBase.translation - X_WBase_.translation)).x();
   set_state(X_WBase, base_twist(X_WBase));
   read_wheel_rates();
 
   const SideRates angles = mean_of_sides(&physics::PhysicsWorld::wheel_angle);
-  PlaneMotion made = believed_.motion({angles.left - last_angles_.left, angles.right - last_angles_.right});
+  PlaneMotion made =
+      believed_.motion({angles.left - last_angles_.left, angles.right - last_angles_.right});
   last_angles_ = angles;
-  if (description_.yaw_gain > 0.0) made.omega = turned * (1.0 + description_.gyro_scale_error) + description_.gyro_bias * step_s_;
+  if (description_.yaw_gain > 0.0)
+    made.omega = turned * (1.0 + description_.gyro_scale_error) + description_.gyro_bias * step_s_;
   believed_heading_ = wrap_angle(believed_heading_ + made.omega);
   way_missing_ -= made.v;
   angle_missing_ -= made.omega;
@@ -148,8 +168,10 @@ void WheelsDrive::after_step(SimTime now) {
   // A primitive ends by what the robot believes; whether a velocity leads anywhere, the room says.
   const bool believes = motion_.has_primitive();
   motion_.finish(now, believes ? made.v : ahead, believes ? made.omega : turned, touched, lag());
-  if (touched && motion_.has_primitive()) way_missing_ = angle_missing_ = 0.0;    // it was planned anew, from where the robot believes to be
-  if (!motion_.has_primitive()) {    // a velocity is not made up for later
+  if (touched && motion_.has_primitive())
+    way_missing_ = angle_missing_ =
+        0.0;                       // it was planned anew, from where the robot believes to be
+  if (!motion_.has_primitive()) {  // a velocity is not made up for later
     way_missing_ = 0.0;
     angle_missing_ = std::clamp(angle_missing_, -kLargestYawError_rad, kLargestYawError_rad);
   }
@@ -158,20 +180,22 @@ void WheelsDrive::after_step(SimTime now) {
 }
 
 Lag WheelsDrive::lag() const {
-  const bool moving = std::abs(wheel_v_) > kSettled_m_s || std::abs(wheel_omega_) > kSettled_rad_s ||
-                      (description_.yaw_gain > 0.0 && std::abs(twist_.angular.z()) > kSettled_rad_s);
+  const bool moving =
+      std::abs(wheel_v_) > kSettled_m_s || std::abs(wheel_omega_) > kSettled_rad_s ||
+      (description_.yaw_gain > 0.0 && std::abs(twist_.angular.z()) > kSettled_rad_s);
   return {way_missing_, angle_missing_, moving};
 }
 
 void WheelsDrive::read_wheel_rates() {
-  const PlaneMotion motion = WheelKinematics::real(description_).motion(mean_of_sides(&physics::PhysicsWorld::wheel_rate));
+  const PlaneMotion motion =
+      WheelKinematics::real(description_).motion(mean_of_sides(&physics::PhysicsWorld::wheel_rate));
   wheel_v_ = motion.v;
   wheel_omega_ = motion.omega;
 }
 
 void WheelsDrive::fall_asleep_when_still() {
-  const bool still = motion_.resting() && twist_.linear.norm() < kStill_m_s && twist_.angular.norm() < kStill_rad_s &&
-                     std::abs(wheel_v_) < kStill_m_s;
+  const bool still = motion_.resting() && twist_.linear.norm() < kStill_m_s &&
+                     twist_.angular.norm() < kStill_rad_s && std::abs(wheel_v_) < kStill_m_s;
   still_us_ = still ? still_us_ + step_us_ : 0;
   if (still_us_ < kFallAsleep_us) return;
   asleep_ = true;

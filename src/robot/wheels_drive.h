@@ -1,10 +1,13 @@
-// The wheels drive: motorised wheels in friction contact, and the controller that a real base has around them.
+// The wheels drive: motorised wheels in friction contact, and the controller that a real base has
+// around them.
 //
-// The plan of speed and turn rate (the same as the kinematic drive's) becomes wheel rates by the robot's own kinematics, with
-// what it believes of its radii and track. A servo at each wheel's encoder follows them: torque = rate gain * (rate missing)
-// + angle gain * (angle missing), within the torque limit and the motor's line from stall to no load. What the body
-// does is physics. The robot knows its encoders only: primitives measure their way by its odometry, so what slips,
-// it does not know. With <ruedo:yaw_gain> its gyro's heading takes the place of the odometry's, and a loop turns it there.
+// The plan of speed and turn rate (the same as the kinematic drive's) becomes wheel rates by the
+// robot's own kinematics, with what it believes of its radii and track. A servo at each wheel's
+// encoder follows them: torque = rate gain * (rate missing)
+// + angle gain * (angle missing), within the torque limit and the motor's line from stall to no
+// load. What the body does is physics. The robot knows its encoders only: primitives measure their
+// way by its odometry, so what slips, it does not know. With <ruedo:yaw_gain> its gyro's heading
+// takes the place of the odometry's, and a loop turns it there.
 #pragma once
 
 #include <vector>
@@ -15,7 +18,8 @@ namespace ruedo::robot {
 
 class WheelsDrive final : public Drive {
  public:
-  WheelsDrive(const model::WorldModel& world, const model::BodyLayout& layout, physics::PhysicsWorld& physics, int robot);
+  WheelsDrive(const model::WorldModel& world, const model::BodyLayout& layout,
+              physics::PhysicsWorld& physics, int robot);
 
   void before_step(SimTime now) override;
   void after_step(SimTime now) override;
@@ -35,17 +39,17 @@ class WheelsDrive final : public Drive {
   void fall_asleep_when_still();
 
   struct Servo {
-    double angle = 0.0;                  // rad, where the wheel should be
+    double angle = 0.0;  // rad, where the wheel should be
     double rate_gain = 0.0, angle_gain = 0.0;
   };
-  std::vector<Servo> servos_;            // as wheels_
-  std::vector<int> bodies_;              // the robot's own: chassis and wheels
-  double max_torque_;                    // N m, each wheel
+  std::vector<Servo> servos_;  // as wheels_
+  std::vector<int> bodies_;    // the robot's own: chassis and wheels
+  double max_torque_;          // N m, each wheel
   WheelKinematics believed_;
-  SideRates last_angles_{};              // of the encoders, mean of each side
-  Displacement way_;                     // that the plan makes in this step
-  double way_missing_ = 0.0, angle_missing_ = 0.0;    // m, rad: planned less believed
-  double yaw_integral_ = 0.0;            // rad/s
+  SideRates last_angles_{};                         // of the encoders, mean of each side
+  Displacement way_;                                // that the plan makes in this step
+  double way_missing_ = 0.0, angle_missing_ = 0.0;  // m, rad: planned less believed
+  double yaw_integral_ = 0.0;                       // rad/s
   SimTime still_us_ = 0;
   bool asleep_ = false;
 };

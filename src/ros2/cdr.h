@@ -1,5 +1,6 @@
-// CDR as ROS 2 has it on the wire: plain XCDR1, little endian, four bytes of header, each number aligned to its own size
-// counted from behind the header. Reading refuses what does not fit into the bytes, and never allocates more than they hold.
+// CDR as ROS 2 has it on the wire: plain XCDR1, little endian, four bytes of header, each number
+// aligned to its own size counted from behind the header. Reading refuses what does not fit into
+// the bytes, and never allocates more than they hold.
 #pragma once
 
 #include <bit>
@@ -57,7 +58,9 @@ class CdrWriter {
   const std::vector<uint8_t>& bytes() const { return bytes_; }
 
  private:
-  void align(size_t size) { bytes_.resize((bytes_.size() - kCdrHeader + size - 1) / size * size + kCdrHeader); }
+  void align(size_t size) {
+    bytes_.resize((bytes_.size() - kCdrHeader + size - 1) / size * size + kCdrHeader);
+  }
   void append(const void* data, size_t size) {
     const auto* from = static_cast<const uint8_t*>(data);
     bytes_.insert(bytes_.end(), from, from + size);
@@ -100,7 +103,7 @@ class CdrReader {
     if (!good_ || !fits(offset_, size)) return fail<std::string>();
     const char* begin = reinterpret_cast<const char*>(bytes_.data()) + kCdrHeader + offset_;
     offset_ += size;
-    if (size == 0) return {};    // not allowed, but some write an empty text so
+    if (size == 0) return {};  // not allowed, but some write an empty text so
     if (begin[size - 1] != 0) return fail<std::string>();
     return std::string(begin, size - 1);
   }
@@ -108,7 +111,8 @@ class CdrReader {
   // Length of a sequence whose elements take at least `element_size` bytes each.
   size_t get_length(size_t element_size) {
     const auto size = get<uint32_t>();
-    if (!good_ || size > (bytes_.size() - kCdrHeader - offset_) / element_size) return fail<size_t>();
+    if (!good_ || size > (bytes_.size() - kCdrHeader - offset_) / element_size)
+      return fail<size_t>();
     return size;
   }
 
@@ -143,7 +147,7 @@ class CdrReader {
   }
 
   std::span<const uint8_t> bytes_;
-  size_t offset_ = 0;    // behind the header
+  size_t offset_ = 0;  // behind the header
   bool good_ = false, swap_ = false;
 };
 

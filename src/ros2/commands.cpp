@@ -1,5 +1,5 @@
-// cmd_vel of either type is taken, since releases differ in it. A command's utime is 0: what is recorded of a run must not depend on
-// when a node wrote it.
+// cmd_vel of either type is taken, since releases differ in it. A command's utime is 0: what is
+// recorded of a run must not depend on when a node wrote it.
 #include "ros2/commands.h"
 
 #include "engine/outcome.h"
@@ -42,7 +42,8 @@ Bytes from_twist_stamped(std::span<const uint8_t> cdr, const std::vector<std::st
   return velocity_of(in);
 }
 
-std::vector<uint8_t> joint_command(const std::vector<std::string>& names, int8_t mode, const std::vector<double>& values) {
+std::vector<uint8_t> joint_command(const std::vector<std::string>& names, int8_t mode,
+                                   const std::vector<double>& values) {
   joint_command_t command;
   command.utime = 0;
   command.n = static_cast<int32_t>(values.size());
@@ -57,15 +58,16 @@ Bytes from_trajectory(std::span<const uint8_t> cdr, const std::vector<std::strin
   CdrReader in(cdr);
   skip_header(in);
   const std::vector<std::string> names = in.get_texts();
-  constexpr size_t kSmallestPoint = 24;    // four lengths and a time
+  constexpr size_t kSmallestPoint = 24;  // four lengths and a time
   const size_t points = in.get_length(kSmallestPoint);
-  std::vector<double> lists[4];    // positions, velocities, accelerations, effort
+  std::vector<double> lists[4];  // positions, velocities, accelerations, effort
   for (size_t i = 0; i < points && in.good(); ++i) {
     for (auto& list : lists) list = in.get_sequence<double>();
     in.skip<uint32_t>(2);
   }
   if (!in.good() || points == 0 || names.empty()) return std::nullopt;
-  constexpr std::pair<int, int8_t> kModes[] = {{0, joint_command_t::POSITION}, {1, joint_command_t::VELOCITY}, {3, joint_command_t::EFFORT}};
+  constexpr std::pair<int, int8_t> kModes[] = {
+      {0, joint_command_t::POSITION}, {1, joint_command_t::VELOCITY}, {3, joint_command_t::EFFORT}};
   for (const auto& [list, mode] : kModes) {
     if (lists[list].size() == names.size()) return joint_command(names, mode, lists[list]);
   }
@@ -97,32 +99,43 @@ struct Row {
 
 constexpr Row kRows[] = {
     {"velocity_command_t", "velocity", "cmd_vel", "geometry_msgs/msg/Twist", from_twist},
-    {"velocity_command_t", "velocity", "cmd_vel", "geometry_msgs/msg/TwistStamped", from_twist_stamped},
-    {"joint_command_t", "joint_command", "joint_trajectory_controller/joint_trajectory", "trajectory_msgs/msg/JointTrajectory", from_trajectory},
-    {"joint_command_t", "joint_command", "forward_position_controller/commands", "std_msgs/msg/Float64MultiArray", from_array<joint_command_t::POSITION>},
-    {"joint_command_t", "joint_command", "forward_velocity_controller/commands", "std_msgs/msg/Float64MultiArray", from_array<joint_command_t::VELOCITY>},
-    {"joint_command_t", "joint_command", "forward_effort_controller/commands", "std_msgs/msg/Float64MultiArray", from_array<joint_command_t::EFFORT>},
+    {"velocity_command_t", "velocity", "cmd_vel", "geometry_msgs/msg/TwistStamped",
+     from_twist_stamped},
+    {"joint_command_t", "joint_command", "joint_trajectory_controller/joint_trajectory",
+     "trajectory_msgs/msg/JointTrajectory", from_trajectory},
+    {"joint_command_t", "joint_command", "forward_position_controller/commands",
+     "std_msgs/msg/Float64MultiArray", from_array<joint_command_t::POSITION>},
+    {"joint_command_t", "joint_command", "forward_velocity_controller/commands",
+     "std_msgs/msg/Float64MultiArray", from_array<joint_command_t::VELOCITY>},
+    {"joint_command_t", "joint_command", "forward_effort_controller/commands",
+     "std_msgs/msg/Float64MultiArray", from_array<joint_command_t::EFFORT>},
 };
 
 }  // namespace
 
-std::vector<Command> commands_of(const std::vector<world_info_t>& info, const JointNames& joints, Names& names) {
+std::vector<Command> commands_of(const std::vector<world_info_t>& info, const JointNames& joints,
+                                 Names& names) {
   std::vector<Command> commands;
   for (const world_info_t& part : info) {
     for (const channel_info_t& channel : part.channels) {
       for (const Row& row : kRows) {
         if (!channel.input || channel.robot.empty() || channel.type != row.channel_type) continue;
-        commands.push_back({{names.topic(channel.robot, row.topic), row.type, kCommandQos}, channel.robot, channel.name,
-                            [convert = row.convert, list = joints(channel.robot)](std::span<const uint8_t> cdr) { return convert(cdr, list); }});
+        commands.push_back({{names.topic(channel.robot, row.topic), row.type, kCommandQos},
+                            channel.robot,
+                            channel.name,
+                            [convert = row.convert, list = joints(channel.robot)](
+                                std::span<const uint8_t> cdr) { return convert(cdr, list); }});
       }
     }
   }
   return commands;
 }
 
-std::vector<std::pair<std::string, std::string>> command_topics(const std::string& robot, Names& names) {
+std::vector<std::pair<std::string, std::string>> command_topics(const std::string& robot,
+                                                                Names& names) {
   std::vector<std::pair<std::string, std::string>> topics;
-  for (const Row& row : kRows) topics.emplace_back(names.topic(robot, row.topic), robot + "/" + row.channel);
+  for (const Row& row : kRows)
+    topics.emplace_back(names.topic(robot, row.topic), robot + "/" + row.channel);
   return topics;
 }
 

@@ -1,5 +1,6 @@
-// REP-103 (units, optical frames), 105 (frames), 117 (ranges without return), 145 (IMU). Covariances that nobody knows are 0, as
-// sensor_msgs says; what is not measured at all has -1 in its first element.
+// REP-103 (units, optical frames), 105 (frames), 117 (ranges without return), 145 (IMU).
+// Covariances that nobody knows are 0, as sensor_msgs says; what is not measured at all has -1 in
+// its first element.
 #include "ros2/conversions.h"
 
 #include <algorithm>
@@ -27,18 +28,20 @@ namespace {
 
 // Where a message comes from, for those who write it down.
 struct Source {
-  std::vector<std::string> wheels;        // names of their joints
+  std::vector<std::string> wheels;  // names of their joints
   device_info_t device{};
-  std::string part;                       // of the channel's name behind the device: "depth", "info", ...
-  double rate = 0.0;                      // Hz
+  std::string part;   // of the channel's name behind the device: "depth", "info", ...
+  double rate = 0.0;  // Hz
   std::string base, odom, frame, optical, world;
-  int element = -1;                       // of a sonar
+  int element = -1;  // of a sonar
   Distro distro = Distro::jazzy;
 };
 
 void put_vector(CdrWriter& out, double x, double y, double z) { out.put(x).put(y).put(z); }
 void put_vector(CdrWriter& out, const double* v) { put_vector(out, v[0], v[1], v[2]); }
-void put_quaternion(CdrWriter& out, const double* wxyz) { out.put(wxyz[1]).put(wxyz[2]).put(wxyz[3]).put(wxyz[0]); }
+void put_quaternion(CdrWriter& out, const double* wxyz) {
+  out.put(wxyz[1]).put(wxyz[2]).put(wxyz[3]).put(wxyz[0]);
+}
 
 template <size_t size>
 void put_zeros(CdrWriter& out, double first = 0.0) {
@@ -46,7 +49,8 @@ void put_zeros(CdrWriter& out, double first = 0.0) {
   out.put_array(std::span<const double>(zeros));
 }
 
-void put_transform(CdrWriter& out, int64_t utime, const std::string& parent, const std::string& child, const double* position, const double* wxyz) {
+void put_transform(CdrWriter& out, int64_t utime, const std::string& parent,
+                   const std::string& child, const double* position, const double* wxyz) {
   put_header(out, utime, parent);
   out.put(child);
   put_vector(out, position);
@@ -57,9 +61,11 @@ void write_scan(const planar_lidar_t& scan, const Source& from, CdrWriter& out) 
   put_header(out, scan.utime, from.frame);
   const float last = scan.rad0 + static_cast<float>(std::max(0, scan.nranges - 1)) * scan.radstep;
   out.put(scan.rad0).put(last).put(scan.radstep);
-  out.put(0.0f).put(from.rate > 0 ? static_cast<float>(1.0 / from.rate) : 0.0f);    // time between rays, and between scans
+  out.put(0.0f).put(from.rate > 0 ? static_cast<float>(1.0 / from.rate)
+                                  : 0.0f);  // time between rays, and between scans
   out.put(static_cast<float>(from.device.range_min)).put(static_cast<float>(from.device.range_max));
-  out.put_sequence(std::span<const float>(scan.ranges)).put_sequence(std::span<const float>(scan.intensities));
+  out.put_sequence(std::span<const float>(scan.ranges))
+      .put_sequence(std::span<const float>(scan.intensities));
 }
 
 void put_point_fields(CdrWriter& out) {
@@ -86,16 +92,20 @@ void write_points(const lidar_t& lidar, const Source& from, CdrWriter& out) {
     const double elevation = lidar.elevation0 + layer * static_cast<double>(lidar.elevation_step);
     for (uint32_t column = 0; column < columns; ++column) {
       const size_t i = size_t{layer} * columns + column;
-      const double range = lidar.ranges[i], azimuth = lidar.azimuth0 + column * static_cast<double>(lidar.azimuth_step);
+      const double range = lidar.ranges[i],
+                   azimuth = lidar.azimuth0 + column * static_cast<double>(lidar.azimuth_step);
       const bool hit = std::isfinite(range);
       dense &= hit;
-      values.push_back(hit ? static_cast<float>(range * math::cos(elevation) * math::cos(azimuth)) : kNone);
-      values.push_back(hit ? static_cast<float>(range * math::cos(elevation) * math::sin(azimuth)) : kNone);
+      values.push_back(hit ? static_cast<float>(range * math::cos(elevation) * math::cos(azimuth))
+                           : kNone);
+      values.push_back(hit ? static_cast<float>(range * math::cos(elevation) * math::sin(azimuth))
+                           : kNone);
       values.push_back(hit ? static_cast<float>(range * math::sin(elevation)) : kNone);
       values.push_back(i < lidar.intensities.size() ? lidar.intensities[i] : 0.0f);
     }
   }
-  out.put_array(std::span(reinterpret_cast<const uint8_t*>(values.data()), values.size() * sizeof(float)));
+  out.put_array(
+      std::span(reinterpret_cast<const uint8_t*>(values.data()), values.size() * sizeof(float)));
   out.put(dense);
 }
 
@@ -110,8 +120,10 @@ void write_range(const sonar_t& sonar, const Source& from, CdrWriter& out) {
   put_header(out, fired < 0 ? sonar.utime : fired, from.frame);
   constexpr uint8_t kUltrasound = 0;
   out.put(kUltrasound).put(static_cast<float>(from.device.fov_horizontal));
-  out.put(static_cast<float>(from.device.range_min)).put(static_cast<float>(from.device.range_max)).put(sonar.range[i]);
-  if (from.distro != Distro::humble) out.put(0.0f);    // variance: not known
+  out.put(static_cast<float>(from.device.range_min))
+      .put(static_cast<float>(from.device.range_max))
+      .put(sonar.range[i]);
+  if (from.distro != Distro::humble) out.put(0.0f);  // variance: not known
 }
 
 // Echoes alone, each on the axis of its transducer.
@@ -120,17 +132,20 @@ void write_sonar_points(const sonar_t& sonar, const Source& from, CdrWriter& out
   std::vector<float> points;
   const size_t count = std::min(sonar.range.size(), from.device.element_pose.size());
   for (size_t i = 0; i < count; ++i) {
-    if (!(sonar.range[i] < static_cast<float>(from.device.range_max)) || sonar.fired_utime[i] < 0) continue;
+    if (!(sonar.range[i] < static_cast<float>(from.device.range_max)) || sonar.fired_utime[i] < 0)
+      continue;
     const std::vector<double>& e = from.device.element_pose[i];
     const Pose X = Pose::from_xyz_rpy(Vec3(e[0], e[1], e[2]), Vec3(e[3], e[4], e[5]));
     const Vec3 p = X * Vec3(sonar.range[i], 0, 0);
     for (int k = 0; k < 3; ++k) points.push_back(static_cast<float>(p[k]));
   }
   out.put_length(points.size() / 3).put_array(std::span<const float>(points));
-  out.put_length(0);    // channels
+  out.put_length(0);  // channels
 }
 
-void put_yaw(CdrWriter& out, double yaw) { out.put(0.0).put(0.0).put(math::sin(yaw / 2)).put(math::cos(yaw / 2)); }
+void put_yaw(CdrWriter& out, double yaw) {
+  out.put(0.0).put(0.0).put(math::sin(yaw / 2)).put(math::cos(yaw / 2));
+}
 
 void write_odometry(const odometry_t& odometry, const Source& from, CdrWriter& out) {
   put_header(out, odometry.utime, from.odom);
@@ -155,7 +170,9 @@ void write_wheels(const odometry_t& odometry, const Source& from, CdrWriter& out
   const size_t count = std::min({from.wheels.size(), odometry.angle.size(), odometry.rate.size()});
   out.put_length(count);
   for (size_t i = 0; i < count; ++i) out.put(from.wheels[i]);
-  out.put_sequence(std::span(odometry.angle.data(), count)).put_sequence(std::span(odometry.rate.data(), count)).put_length(0);
+  out.put_sequence(std::span(odometry.angle.data(), count))
+      .put_sequence(std::span(odometry.rate.data(), count))
+      .put_length(0);
 }
 
 bool has_wheels(const Source& from) { return !from.wheels.empty(); }
@@ -164,14 +181,16 @@ void write_joints(const joint_state_t& joints, const Source&, CdrWriter& out) {
   put_header(out, joints.utime, "");
   out.put_length(joints.joint_name.size());
   for (const std::string& name : joints.joint_name) out.put(name);
-  for (const auto* values : {&joints.joint_position, &joints.joint_velocity, &joints.joint_effort}) {
+  for (const auto* values :
+       {&joints.joint_position, &joints.joint_velocity, &joints.joint_effort}) {
     out.put_length(values->size());
     for (const float value : *values) out.put(static_cast<double>(value));
   }
 }
 
 void write_imu(const imu_t& imu, const Source& from, CdrWriter& out) {
-  const bool oriented = imu.orientation[0] != 0 || imu.orientation[1] != 0 || imu.orientation[2] != 0 || imu.orientation[3] != 0;
+  const bool oriented = imu.orientation[0] != 0 || imu.orientation[1] != 0 ||
+                        imu.orientation[2] != 0 || imu.orientation[3] != 0;
   put_header(out, imu.utime, from.frame);
   put_quaternion(out, imu.orientation);
   put_zeros<9>(out, oriented ? 0.0 : -1.0);
@@ -211,14 +230,22 @@ void write_compressed(const image_t& image, const Source& from, CdrWriter& out) 
 
 void write_camera_info(const camera_info_t& camera, const Source& from, CdrWriter& out) {
   put_header(out, camera.utime, from.optical);
-  out.put(static_cast<uint32_t>(camera.height)).put(static_cast<uint32_t>(camera.width)).put("plumb_bob");
+  out.put(static_cast<uint32_t>(camera.height))
+      .put(static_cast<uint32_t>(camera.width))
+      .put("plumb_bob");
   out.put_sequence(std::span<const double>(camera.distortion));
   const double k[9] = {camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1};
   const double r[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   const double p[12] = {camera.fx, 0, camera.cx, 0, 0, camera.fy, camera.cy, 0, 0, 0, 1, 0};
-  out.put_array(std::span<const double>(k)).put_array(std::span<const double>(r)).put_array(std::span<const double>(p));
-  out.put(uint32_t{0}).put(uint32_t{0});                                               // binning
-  out.put(uint32_t{0}).put(uint32_t{0}).put(uint32_t{0}).put(uint32_t{0}).put(false);    // region of interest: all
+  out.put_array(std::span<const double>(k))
+      .put_array(std::span<const double>(r))
+      .put_array(std::span<const double>(p));
+  out.put(uint32_t{0}).put(uint32_t{0});  // binning
+  out.put(uint32_t{0})
+      .put(uint32_t{0})
+      .put(uint32_t{0})
+      .put(uint32_t{0})
+      .put(false);  // region of interest: all
 }
 
 void put_entity(CdrWriter& out, const std::string& name) {
@@ -243,13 +270,16 @@ void write_contacts(const contact_t& contact, const Source& from, CdrWriter& out
     put_header(out, contact.utime, from.world);
     out.put(own).put(uint32_t{0}).put(point.body).put(uint32_t{0});
     for (const double sign : {1.0, -1.0}) {
-      put_vector(out, sign * point.force * point.normal[0], sign * point.force * point.normal[1], sign * point.force * point.normal[2]);
+      put_vector(out, sign * point.force * point.normal[0], sign * point.force * point.normal[1],
+                 sign * point.force * point.normal[2]);
       put_vector(out, 0, 0, 0);
     }
   }
 }
 
-void write_bumper(const contact_t& contact, const Source&, CdrWriter& out) { out.put(static_cast<bool>(contact.pressed)); }
+void write_bumper(const contact_t& contact, const Source&, CdrWriter& out) {
+  out.put(static_cast<bool>(contact.pressed));
+}
 
 // Whose topic it is: a device's, each transducer's, the robot's, or one for all.
 enum class Scope { device, element, robot, world };
@@ -260,8 +290,8 @@ struct Row {
   const char* type;
   Qos qos;
   void (*write)(const Message&, const Source&, CdrWriter&);
-  bool (*applies)(const Source&) = nullptr;                    // null: always
-  bool (*is_due)(const Message&, const Source&) = nullptr;     // null: in every message
+  bool (*applies)(const Source&) = nullptr;                 // null: always
+  bool (*is_due)(const Message&, const Source&) = nullptr;  // null: in every message
   Scope scope = Scope::device;
 };
 
@@ -273,33 +303,39 @@ bool is_labels(const Source& from) { return from.part == "labels"; }
 template <class Message>
 std::span<const Row<Message>> rows();
 
-#define RUEDO_ROWS(Message, ...)                              \
-  template <>                                                 \
-  std::span<const Row<Message>> rows<Message>() {             \
-    static constexpr Row<Message> kRows[] = {__VA_ARGS__};    \
-    return kRows;                                             \
+#define RUEDO_ROWS(Message, ...)                           \
+  template <>                                              \
+  std::span<const Row<Message>> rows<Message>() {          \
+    static constexpr Row<Message> kRows[] = {__VA_ARGS__}; \
+    return kRows;                                          \
   }
 
 RUEDO_ROWS(planar_lidar_t, {"scan", "sensor_msgs/msg/LaserScan", kSensorQos, write_scan})
 RUEDO_ROWS(lidar_t, {"points", "sensor_msgs/msg/PointCloud2", kSensorQos, write_points})
 RUEDO_ROWS(sonar_t,
-           {"range", "sensor_msgs/msg/Range", kSensorQos, write_range, nullptr, is_fresh, Scope::element},
+           {"range", "sensor_msgs/msg/Range", kSensorQos, write_range, nullptr, is_fresh,
+            Scope::element},
            {"sonar", "sensor_msgs/msg/PointCloud", kSensorQos, write_sonar_points})
 RUEDO_ROWS(odometry_t,
-           {"odom", "nav_msgs/msg/Odometry", kStateQos, write_odometry, nullptr, nullptr, Scope::robot},
-           {"tf", "tf2_msgs/msg/TFMessage", kTfQos, write_odometry_frame, nullptr, nullptr, Scope::world},
-           {"joint_states", "sensor_msgs/msg/JointState", kStateQos, write_wheels, has_wheels, nullptr, Scope::robot})
-RUEDO_ROWS(joint_state_t, {"joint_states", "sensor_msgs/msg/JointState", kStateQos, write_joints, nullptr, nullptr, Scope::robot})
+           {"odom", "nav_msgs/msg/Odometry", kStateQos, write_odometry, nullptr, nullptr,
+            Scope::robot},
+           {"tf", "tf2_msgs/msg/TFMessage", kTfQos, write_odometry_frame, nullptr, nullptr,
+            Scope::world},
+           {"joint_states", "sensor_msgs/msg/JointState", kStateQos, write_wheels, has_wheels,
+            nullptr, Scope::robot})
+RUEDO_ROWS(joint_state_t, {"joint_states", "sensor_msgs/msg/JointState", kStateQos, write_joints,
+                           nullptr, nullptr, Scope::robot})
 RUEDO_ROWS(imu_t, {"imu", "sensor_msgs/msg/Imu", kSensorQos, write_imu})
-RUEDO_ROWS(pose_t, {"ground_truth", "nav_msgs/msg/Odometry", kStateQos, write_ground_truth, nullptr, nullptr, Scope::robot})
-RUEDO_ROWS(image_t,
-           {"image_raw", "sensor_msgs/msg/Image", kSensorQos, write_image, is_colour},
-           {"image_raw/compressed", "sensor_msgs/msg/CompressedImage", kSensorQos, write_compressed, is_colour},
+RUEDO_ROWS(pose_t, {"ground_truth", "nav_msgs/msg/Odometry", kStateQos, write_ground_truth, nullptr,
+                    nullptr, Scope::robot})
+RUEDO_ROWS(image_t, {"image_raw", "sensor_msgs/msg/Image", kSensorQos, write_image, is_colour},
+           {"image_raw/compressed", "sensor_msgs/msg/CompressedImage", kSensorQos, write_compressed,
+            is_colour},
            {"depth", "sensor_msgs/msg/Image", kSensorQos, write_image, is_depth},
            {"labels", "sensor_msgs/msg/Image", kSensorQos, write_image, is_labels})
-RUEDO_ROWS(camera_info_t, {"camera_info", "sensor_msgs/msg/CameraInfo", kSensorQos, write_camera_info})
-RUEDO_ROWS(contact_t,
-           {"contacts", "ros_gz_interfaces/msg/Contacts", kSensorQos, write_contacts},
+RUEDO_ROWS(camera_info_t,
+           {"camera_info", "sensor_msgs/msg/CameraInfo", kSensorQos, write_camera_info})
+RUEDO_ROWS(contact_t, {"contacts", "ros_gz_interfaces/msg/Contacts", kSensorQos, write_contacts},
            {"bumper", "std_msgs/msg/Bool", kSensorQos, write_bumper})
 
 #undef RUEDO_ROWS
@@ -316,14 +352,16 @@ struct Conversions::Plan {
   const ConversionOptions& options;
   Names& names;
   std::map<std::string, const robot_info_t*> robots;
-  std::map<std::string, const device_info_t*> devices;         // by "ROBOT/DEVICE"
-  std::map<std::pair<std::string, std::string>, int> uses;     // of a robot's topic, by its devices
+  std::map<std::string, const device_info_t*> devices;      // by "ROBOT/DEVICE"
+  std::map<std::pair<std::string, std::string>, int> uses;  // of a robot's topic, by its devices
 
   Source source(const channel_info_t& channel) const {
     Source from;
     const std::string name = channel.robot + "/" + channel.device;
-    if (const auto robot = robots.find(channel.robot); robot != robots.end()) from.wheels = robot->second->wheels;
-    if (const auto device = devices.find(name); device != devices.end()) from.device = *device->second;
+    if (const auto robot = robots.find(channel.robot); robot != robots.end())
+      from.wheels = robot->second->wheels;
+    if (const auto device = devices.find(name); device != devices.end())
+      from.device = *device->second;
     const std::string original = original_name(channel.name);
     if (original.starts_with(name + "/")) from.part = original.substr(name.size() + 1);
     from.rate = channel.rate;
@@ -353,8 +391,10 @@ struct Conversions::Plan {
   // "scan" where the robot has one; else "DEVICE/scan".
   template <class Message>
   std::string topic(const Row<Message>& row, const channel_info_t& channel) {
-    const bool alone = row.scope == Scope::robot || row.scope == Scope::world || uses[{channel.robot, row.topic}] == 1;
-    return names.topic(row.scope == Scope::world ? "" : channel.robot, (alone ? "" : ros_name(channel.device) + "/") + row.topic);
+    const bool alone = row.scope == Scope::robot || row.scope == Scope::world ||
+                       uses[{channel.robot, row.topic}] == 1;
+    return names.topic(row.scope == Scope::world ? "" : channel.robot,
+                       (alone ? "" : ros_name(channel.device) + "/") + row.topic);
   }
 };
 
@@ -363,13 +403,17 @@ namespace {
 template <class Message>
 class TypedRoute : public Conversions::Route {
  public:
-  void add(const Row<Message>& row, Source source, size_t topic) { entries_.push_back({&row, std::move(source), topic}); }
+  void add(const Row<Message>& row, Source source, size_t topic) {
+    entries_.push_back({&row, std::move(source), topic});
+  }
 
-  bool run(std::span<const uint8_t> message, const Conversions::Wanted& wanted, const Conversions::Emit& emit) override {
+  bool run(std::span<const uint8_t> message, const Conversions::Wanted& wanted,
+           const Conversions::Emit& emit) override {
     bool decoded = false;
     for (const Entry& entry : entries_) {
       if (!wanted(entry.topic)) continue;
-      if (!decoded && decode_checked(message.data(), message.size(), message_) != DecodeFault::none) return false;
+      if (!decoded && decode_checked(message.data(), message.size(), message_) != DecodeFault::none)
+        return false;
       decoded = true;
       if (entry.row->is_due && !entry.row->is_due(message_, entry.source)) continue;
       out_.clear();
@@ -390,18 +434,23 @@ class TypedRoute : public Conversions::Route {
   CdrWriter out_;
 };
 
-// Calls visit.operator()<Message>() with the type that has that name; the list of all types that become anything.
+// Calls visit.operator()<Message>() with the type that has that name; the list of all types that
+// become anything.
 template <class Visit>
 void with_type(const std::string& type, const Visit& visit) {
   const auto match = [&]<class... Messages>() {
-    (static_cast<void>(type == Messages::getTypeName() && (visit.template operator()<Messages>(), true)), ...);
+    (static_cast<void>(type == Messages::getTypeName() &&
+                       (visit.template operator()<Messages>(), true)),
+     ...);
   };
-  match.template operator()<planar_lidar_t, lidar_t, sonar_t, odometry_t, joint_state_t, imu_t, pose_t, image_t, camera_info_t, contact_t>();
+  match.template operator()<planar_lidar_t, lidar_t, sonar_t, odometry_t, joint_state_t, imu_t,
+                            pose_t, image_t, camera_info_t, contact_t>();
 }
 
 }  // namespace
 
-Conversions::Conversions(const std::vector<world_info_t>& info, const ConversionOptions& options, Names& names) {
+Conversions::Conversions(const std::vector<world_info_t>& info, const ConversionOptions& options,
+                         Names& names) {
   Plan plan{options, names, {}, {}, {}};
   const auto each_channel = [&](const auto& visit) {
     for (const world_info_t& part : info) {
@@ -412,10 +461,15 @@ Conversions::Conversions(const std::vector<world_info_t>& info, const Conversion
   };
   for (const world_info_t& part : info) {
     for (const robot_info_t& robot : part.robots) plan.robots[robot.name] = &robot;
-    for (const device_info_t& device : part.devices) plan.devices[device.robot + "/" + device.name] = &device;
+    for (const device_info_t& device : part.devices)
+      plan.devices[device.robot + "/" + device.name] = &device;
   }
-  each_channel([&](const channel_info_t& channel) { with_type(channel.type, [&]<class Message>() { plan.count<Message>(channel); }); });
-  each_channel([&](const channel_info_t& channel) { with_type(channel.type, [&]<class Message>() { add_route<Message>(channel, plan); }); });
+  each_channel([&](const channel_info_t& channel) {
+    with_type(channel.type, [&]<class Message>() { plan.count<Message>(channel); });
+  });
+  each_channel([&](const channel_info_t& channel) {
+    with_type(channel.type, [&]<class Message>() { add_route<Message>(channel, plan); });
+  });
   for (const auto& [name, device] : plan.devices) add_frames(*device, names);
 }
 
@@ -449,11 +503,14 @@ size_t Conversions::add_topic(Topic topic) {
 }
 
 void Conversions::add_frames(const device_info_t& device, const Names& names) {
-  constexpr double kOptical[4] = {0.5, -0.5, 0.5, -0.5};    // z ahead, x right, y down
+  constexpr double kOptical[4] = {0.5, -0.5, 0.5, -0.5};  // z ahead, x right, y down
   constexpr double kNowhere[3] = {0, 0, 0};
-  if (device.kind == "odometry" || device.kind == "pose" || device.kind == "motion" || device.kind == "joints") return;
+  if (device.kind == "odometry" || device.kind == "pose" || device.kind == "motion" ||
+      device.kind == "joints")
+    return;
   const std::string frame = names.frame(device.robot, ros_name(device.name));
-  const auto add = [this](const std::string& parent, const std::string& child, const double* position, const double* wxyz) {
+  const auto add = [this](const std::string& parent, const std::string& child,
+                          const double* position, const double* wxyz) {
     Frame& added = frames_.emplace_back(Frame{parent, child, {}, {}});
     std::copy(position, position + 3, added.position);
     std::copy(wxyz, wxyz + 4, added.orientation);
@@ -468,7 +525,8 @@ void Conversions::add_frames(const device_info_t& device, const Names& names) {
   }
 }
 
-bool Conversions::convert(const std::string& channel, std::span<const uint8_t> message, const Wanted& wanted, const Emit& emit) {
+bool Conversions::convert(const std::string& channel, std::span<const uint8_t> message,
+                          const Wanted& wanted, const Emit& emit) {
   const auto route = routes_.find(channel);
   return route != routes_.end() && route->second->run(message, wanted, emit);
 }
@@ -476,7 +534,8 @@ bool Conversions::convert(const std::string& channel, std::span<const uint8_t> m
 std::vector<uint8_t> Conversions::static_frames() const {
   CdrWriter out;
   out.put_length(frames_.size());
-  for (const Frame& frame : frames_) put_transform(out, 0, frame.parent, frame.child, frame.position, frame.orientation);
+  for (const Frame& frame : frames_)
+    put_transform(out, 0, frame.parent, frame.child, frame.position, frame.orientation);
   return out.bytes();
 }
 

@@ -1,6 +1,8 @@
-// The one table of what Ruedo publishes and how it is said in ROS: a bus message in, one or more ROS messages out.
+// The one table of what Ruedo publishes and how it is said in ROS: a bus message in, one or more
+// ROS messages out.
 //
-// It knows no network: `ruedo run --ros2` sends what comes out, `ruedo export --ros2` writes it into a bag.
+// It knows no network: `ruedo run --ros2` sends what comes out, `ruedo export --ros2` writes it
+// into a bag.
 #pragma once
 
 #include <cstdint>
@@ -21,9 +23,9 @@ namespace ruedo::ros2 {
 
 struct ConversionOptions {
   Distro distro = Distro::jazzy;
-  std::string root;                                             // the robot without a namespace; "": none
-  Remaps topics;                                                // of ROS names
-  std::vector<std::pair<std::string, std::string>> channels;    // the bus's --remap
+  std::string root;  // the robot without a namespace; "": none
+  Remaps topics;     // of ROS names
+  std::vector<std::pair<std::string, std::string>> channels;  // the bus's --remap
 };
 
 class Conversions {
@@ -32,13 +34,15 @@ class Conversions {
   using Emit = std::function<void(size_t topic, std::span<const uint8_t> cdr)>;
 
   // info: all parts of ruedo/info.
-  Conversions(const std::vector<world_info_t>& info, const ConversionOptions& options, Names& names);
+  Conversions(const std::vector<world_info_t>& info, const ConversionOptions& options,
+              Names& names);
   ~Conversions();
 
   const std::vector<Topic>& topics() const { return topics_; }
 
   // Converts what is wanted of a message. False: it is not of its channel's type, or damaged.
-  bool convert(const std::string& channel, std::span<const uint8_t> message, const Wanted& wanted, const Emit& emit);
+  bool convert(const std::string& channel, std::span<const uint8_t> message, const Wanted& wanted,
+               const Emit& emit);
 
   // /tf_static: where the devices sit on their robots.
   std::vector<uint8_t> static_frames() const;
@@ -53,11 +57,11 @@ class Conversions {
   void add_frames(const device_info_t& device, const Names& names);
 
   std::vector<Topic> topics_;
-  std::unordered_map<std::string, size_t> by_name_;                            // of topics
-  std::unordered_map<std::string, std::unique_ptr<Route>> routes_;             // by channel; looked up only
+  std::unordered_map<std::string, size_t> by_name_;                 // of topics
+  std::unordered_map<std::string, std::unique_ptr<Route>> routes_;  // by channel; looked up only
   struct Frame {
     std::string parent, child;
-    double position[3], orientation[4];    // w, x, y, z
+    double position[3], orientation[4];  // w, x, y, z
   };
   std::vector<Frame> frames_;
 };

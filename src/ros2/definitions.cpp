@@ -1,5 +1,6 @@
-// Names, types and order of the fields as the packages common_interfaces, rcl_interfaces, rmw_dds_common, geometry2 and ros_gz
-// have them from Humble to Lyrical, and simulation_interfaces in its versions 1.x.
+// Names, types and order of the fields as the packages common_interfaces, rcl_interfaces,
+// rmw_dds_common, geometry2 and ros_gz have them from Humble to Lyrical, and simulation_interfaces
+// in its versions 1.x.
 #include "ros2/definitions.h"
 
 namespace ruedo::ros2 {
@@ -22,7 +23,8 @@ constexpr Definition kDefinitions[] = {
     {"geometry_msgs/msg/Quaternion", "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n"},
     {"geometry_msgs/msg/Pose", "Point position\nQuaternion orientation\n"},
     {"geometry_msgs/msg/PoseWithCovariance", "Pose pose\nfloat64[36] covariance\n"},
-    {"geometry_msgs/msg/PoseWithCovarianceStamped", "std_msgs/Header header\nPoseWithCovariance pose\n"},
+    {"geometry_msgs/msg/PoseWithCovarianceStamped",
+     "std_msgs/Header header\nPoseWithCovariance pose\n"},
     {"geometry_msgs/msg/PoseStamped", "std_msgs/Header header\nPose pose\n"},
     {"geometry_msgs/msg/Twist", "Vector3 linear\nVector3 angular\n"},
     {"geometry_msgs/msg/TwistStamped", "std_msgs/Header header\nTwist twist\n"},
@@ -30,72 +32,102 @@ constexpr Definition kDefinitions[] = {
     {"geometry_msgs/msg/Accel", "Vector3 linear\nVector3 angular\n"},
     {"geometry_msgs/msg/Wrench", "Vector3 force\nVector3 torque\n"},
     {"geometry_msgs/msg/Transform", "Vector3 translation\nQuaternion rotation\n"},
-    {"geometry_msgs/msg/TransformStamped", "std_msgs/Header header\nstring child_frame_id\nTransform transform\n"},
+    {"geometry_msgs/msg/TransformStamped",
+     "std_msgs/Header header\nstring child_frame_id\nTransform transform\n"},
     {"tf2_msgs/msg/TFMessage", "geometry_msgs/TransformStamped[] transforms\n"},
     {"nav_msgs/msg/Odometry",
-     "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/PoseWithCovariance pose\ngeometry_msgs/TwistWithCovariance twist\n"},
+     "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/PoseWithCovariance "
+     "pose\ngeometry_msgs/TwistWithCovariance twist\n"},
     {"sensor_msgs/msg/LaserScan",
-     "std_msgs/Header header\nfloat32 angle_min\nfloat32 angle_max\nfloat32 angle_increment\nfloat32 time_increment\n"
-     "float32 scan_time\nfloat32 range_min\nfloat32 range_max\nfloat32[] ranges\nfloat32[] intensities\n"},
+     "std_msgs/Header header\nfloat32 angle_min\nfloat32 angle_max\nfloat32 "
+     "angle_increment\nfloat32 time_increment\n"
+     "float32 scan_time\nfloat32 range_min\nfloat32 range_max\nfloat32[] ranges\nfloat32[] "
+     "intensities\n"},
     {"sensor_msgs/msg/PointField", "string name\nuint32 offset\nuint8 datatype\nuint32 count\n"},
     {"sensor_msgs/msg/PointCloud2",
-     "std_msgs/Header header\nuint32 height\nuint32 width\nPointField[] fields\nbool is_bigendian\nuint32 point_step\n"
+     "std_msgs/Header header\nuint32 height\nuint32 width\nPointField[] fields\nbool "
+     "is_bigendian\nuint32 point_step\n"
      "uint32 row_step\nuint8[] data\nbool is_dense\n"},
     {"sensor_msgs/msg/ChannelFloat32", "string name\nfloat32[] values\n"},
-    {"sensor_msgs/msg/PointCloud", "std_msgs/Header header\ngeometry_msgs/Point32[] points\nChannelFloat32[] channels\n"},
+    {"sensor_msgs/msg/PointCloud",
+     "std_msgs/Header header\ngeometry_msgs/Point32[] points\nChannelFloat32[] channels\n"},
     {"sensor_msgs/msg/Range",
-     "std_msgs/Header header\nuint8 radiation_type\nfloat32 field_of_view\nfloat32 min_range\nfloat32 max_range\nfloat32 range\n"
+     "std_msgs/Header header\nuint8 radiation_type\nfloat32 field_of_view\nfloat32 "
+     "min_range\nfloat32 max_range\nfloat32 range\n"
      "float32 variance\n",
-     "std_msgs/Header header\nuint8 radiation_type\nfloat32 field_of_view\nfloat32 min_range\nfloat32 max_range\nfloat32 range\n"},
-    {"sensor_msgs/msg/JointState", "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n"},
+     "std_msgs/Header header\nuint8 radiation_type\nfloat32 field_of_view\nfloat32 "
+     "min_range\nfloat32 max_range\nfloat32 range\n"},
+    {"sensor_msgs/msg/JointState",
+     "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] "
+     "effort\n"},
     {"sensor_msgs/msg/Imu",
-     "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n"
+     "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] "
+     "orientation_covariance\n"
      "geometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\n"
      "geometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance\n"},
     {"sensor_msgs/msg/Image",
-     "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\nuint8[] data\n"},
+     "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 "
+     "is_bigendian\nuint32 step\nuint8[] data\n"},
     {"sensor_msgs/msg/CompressedImage", "std_msgs/Header header\nstring format\nuint8[] data\n"},
-    {"sensor_msgs/msg/RegionOfInterest", "uint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify\n"},
+    {"sensor_msgs/msg/RegionOfInterest",
+     "uint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify\n"},
     {"sensor_msgs/msg/CameraInfo",
-     "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] d\nfloat64[9] k\nfloat64[9] r\n"
+     "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] "
+     "d\nfloat64[9] k\nfloat64[9] r\n"
      "float64[12] p\nuint32 binning_x\nuint32 binning_y\nRegionOfInterest roi\n"},
     {"trajectory_msgs/msg/JointTrajectoryPoint",
-     "float64[] positions\nfloat64[] velocities\nfloat64[] accelerations\nfloat64[] effort\nbuiltin_interfaces/Duration time_from_start\n"},
-    {"trajectory_msgs/msg/JointTrajectory", "std_msgs/Header header\nstring[] joint_names\nJointTrajectoryPoint[] points\n"},
+     "float64[] positions\nfloat64[] velocities\nfloat64[] accelerations\nfloat64[] "
+     "effort\nbuiltin_interfaces/Duration time_from_start\n"},
+    {"trajectory_msgs/msg/JointTrajectory",
+     "std_msgs/Header header\nstring[] joint_names\nJointTrajectoryPoint[] points\n"},
     {"ros_gz_interfaces/msg/Entity", "uint64 id\nstring name\nuint8 type\n"},
     {"ros_gz_interfaces/msg/JointWrench",
-     "std_msgs/Header header\nstd_msgs/String body_1_name\nstd_msgs/UInt32 body_1_id\nstd_msgs/String body_2_name\n"
-     "std_msgs/UInt32 body_2_id\ngeometry_msgs/Wrench body_1_wrench\ngeometry_msgs/Wrench body_2_wrench\n"},
+     "std_msgs/Header header\nstd_msgs/String body_1_name\nstd_msgs/UInt32 "
+     "body_1_id\nstd_msgs/String body_2_name\n"
+     "std_msgs/UInt32 body_2_id\ngeometry_msgs/Wrench body_1_wrench\ngeometry_msgs/Wrench "
+     "body_2_wrench\n"},
     {"ros_gz_interfaces/msg/Contact",
-     "Entity collision1\nEntity collision2\ngeometry_msgs/Vector3[] positions\ngeometry_msgs/Vector3[] normals\nfloat64[] depths\n"
+     "Entity collision1\nEntity collision2\ngeometry_msgs/Vector3[] "
+     "positions\ngeometry_msgs/Vector3[] normals\nfloat64[] depths\n"
      "JointWrench[] wrenches\n"},
     {"ros_gz_interfaces/msg/Contacts", "std_msgs/Header header\nContact[] contacts\n"},
-    {"service_msgs/msg/ServiceEventInfo", "uint8 event_type\nbuiltin_interfaces/Time stamp\nchar[16] client_gid\nint64 sequence_number\n"},
+    {"service_msgs/msg/ServiceEventInfo",
+     "uint8 event_type\nbuiltin_interfaces/Time stamp\nchar[16] client_gid\nint64 "
+     "sequence_number\n"},
     {"simulation_interfaces/msg/Result", "uint8 result\nstring error_message\n"},
     {"simulation_interfaces/msg/EntityState",
-     "std_msgs/Header header\ngeometry_msgs/Pose pose\ngeometry_msgs/Twist twist\ngeometry_msgs/Accel acceleration\n"},
+     "std_msgs/Header header\ngeometry_msgs/Pose pose\ngeometry_msgs/Twist "
+     "twist\ngeometry_msgs/Accel acceleration\n"},
     {"simulation_interfaces/msg/EntityCategory", "uint8 category\n"},
     {"simulation_interfaces/msg/TagsFilter", "string[] tags\nuint8 filter_mode\n"},
     {"simulation_interfaces/msg/Bounds", "uint8 type\ngeometry_msgs/Vector3[] points\n"},
-    {"simulation_interfaces/msg/EntityFilters", "string filter\nEntityCategory[] categories\nTagsFilter tags\nBounds bounds\n"},
+    {"simulation_interfaces/msg/EntityFilters",
+     "string filter\nEntityCategory[] categories\nTagsFilter tags\nBounds bounds\n"},
     {"simulation_interfaces/msg/SimulationState", "uint8 state\n"},
-    {"simulation_interfaces/msg/SimulatorFeatures", "uint16[] features\nstring[] spawn_formats\nstring custom_info\n"},
+    {"simulation_interfaces/msg/SimulatorFeatures",
+     "uint16[] features\nstring[] spawn_formats\nstring custom_info\n"},
     {"simulation_interfaces/srv/GetSimulatorFeatures", "---\nSimulatorFeatures features\n"},
     {"simulation_interfaces/srv/ResetSimulation", "uint8 scope\n---\nResult result\n"},
     {"simulation_interfaces/srv/StepSimulation", "uint64 steps\n---\nResult result\n"},
     {"simulation_interfaces/srv/GetSimulationState", "---\nSimulationState state\nResult result\n"},
     {"simulation_interfaces/srv/SetSimulationState", "SimulationState state\n---\nResult result\n"},
     {"simulation_interfaces/srv/SpawnEntity",
-     "string name\nbool allow_renaming\nstring uri\nstring resource_string\nstring entity_namespace\n"
+     "string name\nbool allow_renaming\nstring uri\nstring resource_string\nstring "
+     "entity_namespace\n"
      "geometry_msgs/PoseStamped initial_pose\n---\nResult result\nstring entity_name\n"},
     {"simulation_interfaces/srv/DeleteEntity", "string entity\n---\nResult result\n"},
-    {"simulation_interfaces/srv/GetEntities", "EntityFilters filters\n---\nResult result\nstring[] entities\n"},
-    {"simulation_interfaces/srv/GetEntityState", "string entity\n---\nResult result\nEntityState state\n"},
-    {"simulation_interfaces/srv/SetEntityState", "string entity\nEntityState state\n---\nResult result\n"},
+    {"simulation_interfaces/srv/GetEntities",
+     "EntityFilters filters\n---\nResult result\nstring[] entities\n"},
+    {"simulation_interfaces/srv/GetEntityState",
+     "string entity\n---\nResult result\nEntityState state\n"},
+    {"simulation_interfaces/srv/SetEntityState",
+     "string entity\nEntityState state\n---\nResult result\n"},
     {"rmw_dds_common/msg/Gid", "char[16] data\n", "char[24] data\n"},
     {"rmw_dds_common/msg/NodeEntitiesInfo",
-     "string<=256 node_namespace\nstring<=256 node_name\nGid[] reader_gid_seq\nGid[] writer_gid_seq\n"},
-    {"rmw_dds_common/msg/ParticipantEntitiesInfo", "Gid gid\nNodeEntitiesInfo[] node_entities_info_seq\n"},
+     "string<=256 node_namespace\nstring<=256 node_name\nGid[] reader_gid_seq\nGid[] "
+     "writer_gid_seq\n"},
+    {"rmw_dds_common/msg/ParticipantEntitiesInfo",
+     "Gid gid\nNodeEntitiesInfo[] node_entities_info_seq\n"},
 };
 
 }  // namespace

@@ -1,4 +1,5 @@
-// The texts of the interfaces; interfaces.cpp reads them. Comments and constants are left out: no hash and no byte depends on them.
+// The texts of the interfaces; interfaces.cpp reads them. Comments and constants are left out: no
+// hash and no byte depends on them.
 #pragma once
 
 #include <span>
@@ -6,9 +7,10 @@
 namespace ruedo::ros2 {
 
 struct Definition {
-  const char* name;                // "sensor_msgs/msg/LaserScan"; a service's request and response are apart by "---"
+  const char*
+      name;  // "sensor_msgs/msg/LaserScan"; a service's request and response are apart by "---"
   const char* text;
-  const char* humble = nullptr;    // where Humble's is another
+  const char* humble = nullptr;  // where Humble's is another
 };
 
 std::span<const Definition> definitions();

@@ -23,8 +23,9 @@ constexpr std::array kDistros{"humble", "iron", "jazzy", "kilted", "lyrical"};
 
 // What type_description_interfaces/msg/FieldType calls the types.
 const std::map<std::string, int, std::less<>> kTypeIds{
-    {"int8", 2},    {"uint8", 3},    {"int16", 4}, {"uint16", 5}, {"int32", 6}, {"uint32", 7},  {"int64", 8},
-    {"uint64", 9},  {"float32", 10}, {"float64", 11}, {"char", 13},  {"bool", 15}, {"byte", 16},   {"string", 17},
+    {"int8", 2},   {"uint8", 3}, {"int16", 4},  {"uint16", 5},   {"int32", 6},
+    {"uint32", 7}, {"int64", 8}, {"uint64", 9}, {"float32", 10}, {"float64", 11},
+    {"char", 13},  {"bool", 15}, {"byte", 16},  {"string", 17},
 };
 constexpr int kNested = 1, kBoundedString = 21, kArray = 48, kBounded = 96, kSequence = 144;
 
@@ -43,7 +44,9 @@ Field read_field(const std::string& package, std::string type, const std::string
   field.name = name;
   if (const size_t bracket = type.find('['); bracket != std::string::npos) {
     const std::string size = type.substr(bracket + 1, type.size() - bracket - 2);
-    field.kind = size.empty() ? Field::Kind::sequence : size.starts_with("<=") ? Field::Kind::bounded : Field::Kind::array;
+    field.kind = size.empty()             ? Field::Kind::sequence
+                 : size.starts_with("<=") ? Field::Kind::bounded
+                                          : Field::Kind::array;
     field.capacity = number(field.kind == Field::Kind::bounded ? size.substr(2) : size);
     type.resize(bracket);
   }
@@ -90,7 +93,9 @@ struct Library {
     fields[name + "_Event"] = {{"service_msgs/msg/ServiceEventInfo", "info"},
                                {name + "_Request", "request", Field::Kind::bounded, 1},
                                {name + "_Response", "response", Field::Kind::bounded, 1}};
-    fields[name] = {{name + "_Request", "request_message"}, {name + "_Response", "response_message"}, {name + "_Event", "event_message"}};
+    fields[name] = {{name + "_Request", "request_message"},
+                    {name + "_Response", "response_message"},
+                    {name + "_Event", "event_message"}};
   }
 
   void put(const std::string& name, const std::string& text) {
@@ -108,14 +113,18 @@ const Library& library(Distro distro) {
 
 void collect(std::string_view type, Distro distro, std::set<std::string>& used) {
   for (const Field& field : fields_of(type, distro)) {
-    if (!kTypeIds.contains(field.type) && used.insert(field.type).second) collect(field.type, distro, used);
+    if (!kTypeIds.contains(field.type) && used.insert(field.type).second)
+      collect(field.type, distro, used);
   }
 }
 
 // .msg's char is an unsigned byte, which is what it becomes on the way to the description.
 int type_id(const Field& field) {
   const auto known = kTypeIds.find(field.type);
-  int id = known == kTypeIds.end() ? kNested : field.text_capacity > 0 ? kBoundedString : field.type == "char" ? kTypeIds.at("uint8") : known->second;
+  int id = known == kTypeIds.end()   ? kNested
+           : field.text_capacity > 0 ? kBoundedString
+           : field.type == "char"    ? kTypeIds.at("uint8")
+                                     : known->second;
   switch (field.kind) {
     case Field::Kind::one: break;
     case Field::Kind::array: id += kArray; break;
@@ -129,9 +138,10 @@ int type_id(const Field& field) {
 std::string description(std::string_view type, Distro distro) {
   std::string fields;
   for (const Field& field : fields_of(type, distro)) {
-    fields += fmt::format(R"({}{{"name": "{}", "type": {{"type_id": {}, "capacity": {}, "string_capacity": {}, "nested_type_name": "{}"}}}})",
-                          fields.empty() ? "" : ", ", field.name, type_id(field), field.capacity, field.text_capacity,
-                          kTypeIds.contains(field.type) ? "" : field.type);
+    fields += fmt::format(
+        R"({}{{"name": "{}", "type": {{"type_id": {}, "capacity": {}, "string_capacity": {}, "nested_type_name": "{}"}}}})",
+        fields.empty() ? "" : ", ", field.name, type_id(field), field.capacity, field.text_capacity,
+        kTypeIds.contains(field.type) ? "" : field.type);
   }
   return fmt::format(R"({{"type_name": "{}", "fields": [{}]}})", type, fields);
 }
@@ -145,7 +155,9 @@ std::string short_name(const std::string& type) {
 
 Distro parse_distro(const std::string& name) {
   const auto found = std::find(kDistros.begin(), kDistros.end(), name);
-  if (found == kDistros.end()) throw InputError({}, "there is no ROS 2 release '" + name + "' here: humble, iron, jazzy, kilted and lyrical are known");
+  if (found == kDistros.end())
+    throw InputError({}, "there is no ROS 2 release '" + name +
+                             "' here: humble, iron, jazzy, kilted and lyrical are known");
   return static_cast<Distro>(found - kDistros.begin());
 }
 
@@ -160,7 +172,8 @@ const std::vector<Field>& fields_of(std::string_view type, Distro distro) {
 std::vector<std::string> message_types() {
   std::vector<std::string> names;
   for (const Definition& each : definitions()) {
-    if (std::string_view(each.name).find("/msg/") != std::string_view::npos) names.push_back(each.name);
+    if (std::string_view(each.name).find("/msg/") != std::string_view::npos)
+      names.push_back(each.name);
   }
   return names;
 }
@@ -168,7 +181,8 @@ std::vector<std::string> message_types() {
 std::vector<std::string> service_types() {
   std::vector<std::string> names;
   for (const Definition& each : definitions()) {
-    if (std::string_view(each.name).find("/srv/") != std::string_view::npos) names.push_back(each.name);
+    if (std::string_view(each.name).find("/srv/") != std::string_view::npos)
+      names.push_back(each.name);
   }
   return names;
 }
@@ -179,7 +193,8 @@ std::string full_text(std::string_view type, Distro distro) {
   std::set<std::string> used;
   collect(type, distro, used);
   for (const std::string& each : used) {
-    text += std::string(80, '=') + "\nMSG: " + short_name(each) + "\n" + known.texts.find(each)->second;
+    text +=
+        std::string(80, '=') + "\nMSG: " + short_name(each) + "\n" + known.texts.find(each)->second;
   }
   return text;
 }
@@ -189,15 +204,18 @@ std::string type_hash(std::string_view type, Distro distro) {
   collect(type, distro, used);
   used.erase(std::string(type));
   std::string others;
-  for (const std::string& each : used) others += (others.empty() ? "" : ", ") + description(each, distro);
+  for (const std::string& each : used)
+    others += (others.empty() ? "" : ", ") + description(each, distro);
   const std::string json =
-      fmt::format(R"({{"type_description": {}, "referenced_type_descriptions": [{}]}})", description(type, distro), others);
+      fmt::format(R"({{"type_description": {}, "referenced_type_descriptions": [{}]}})",
+                  description(type, distro), others);
   return "RIHS01_" + sha256(reinterpret_cast<const uint8_t*>(json.data()), json.size());
 }
 
 std::string dds_type(std::string_view type) {
   std::string name(type);
-  for (size_t at = name.find('/'); at != std::string::npos; at = name.find('/')) name.replace(at, 1, "::");
+  for (size_t at = name.find('/'); at != std::string::npos; at = name.find('/'))
+    name.replace(at, 1, "::");
   const size_t last = name.rfind("::");
   return name.substr(0, last) + "::dds_" + name.substr(last) + "_";
 }

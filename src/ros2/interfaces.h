@@ -1,5 +1,6 @@
-// The ROS 2 interfaces that Ruedo speaks: their definitions, and what follows from them: the text that bags carry, the name
-// of a type in DDS, and its hash (REP-2011, RIHS01) by which tools see whether two nodes mean the same.
+// The ROS 2 interfaces that Ruedo speaks: their definitions, and what follows from them: the text
+// that bags carry, the name of a type in DDS, and its hash (REP-2011, RIHS01) by which tools see
+// whether two nodes mean the same.
 #pragma once
 
 #include <string>
@@ -16,15 +17,15 @@ Distro parse_distro(const std::string& name);
 const char* name_of(Distro distro);
 
 struct Field {
-  std::string type;           // "float64", "string", "geometry_msgs/msg/Point"
+  std::string type;  // "float64", "string", "geometry_msgs/msg/Point"
   std::string name;
   enum class Kind { one, array, bounded, sequence } kind = Kind::one;
-  size_t capacity = 0;        // of an array or a bounded sequence
-  size_t text_capacity = 0;   // of a bounded string; 0: none
+  size_t capacity = 0;       // of an array or a bounded sequence
+  size_t text_capacity = 0;  // of a bounded string; 0: none
 };
 
-// The fields of an interface, "pkg/msg/Name", or of a service's "pkg/srv/Name_Request" and "pkg/srv/Name_Response".
-// A name that is not known is a bug.
+// The fields of an interface, "pkg/msg/Name", or of a service's "pkg/srv/Name_Request" and
+// "pkg/srv/Name_Response". A name that is not known is a bug.
 const std::vector<Field>& fields_of(std::string_view type, Distro distro);
 
 // Every message, and every service as "pkg/srv/Name".

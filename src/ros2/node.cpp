@@ -21,8 +21,10 @@ bool is_same(const std::vector<world_info_t>& a, const std::vector<world_info_t>
   const auto names = [](const std::vector<world_info_t>& info) {
     std::vector<std::string> all;
     for (const world_info_t& part : info) {
-      for (const channel_info_t& channel : part.channels) all.push_back(channel.name + " " + channel.type);
-      for (const device_info_t& device : part.devices) all.push_back(device.robot + "/" + device.name);
+      for (const channel_info_t& channel : part.channels)
+        all.push_back(channel.name + " " + channel.type);
+      for (const device_info_t& device : part.devices)
+        all.push_back(device.robot + "/" + device.name);
     }
     return all;
   };
@@ -40,19 +42,25 @@ std::string channel_of(const std::vector<world_info_t>& info, const std::string&
 
 }  // namespace
 
-Node::Node(NodeOptions options, std::unique_ptr<Transport> transport, const std::vector<world_info_t>& info, Inject inject)
+Node::Node(NodeOptions options, std::unique_ptr<Transport> transport,
+           const std::vector<world_info_t>& info, Inject inject)
     : options_(std::move(options)),
       transport_(std::move(transport)),
       inject_(std::move(inject)),
       names_(options_.conversion.root, options_.conversion.topics),
-      requests_([this](const std::string& channel, std::span<const uint8_t> message) { inject_(channel, message); }),
+      requests_([this](const std::string& channel, std::span<const uint8_t> message) {
+        inject_(channel, message);
+      }),
       clock_period_us_(std::max<int64_t>(1, rounded(1e6 / options_.clock_hz))) {
   clock_topic_ = {names_.topic("", "clock"), "rosgraph_msgs/msg/Clock", kStateQos};
   static_frames_topic_ = {names_.topic("", "tf_static"), "tf2_msgs/msg/TFMessage", kLatchedQos};
   clock_ = transport_->add_writer(endpoint(clock_topic_));
   static_frames_ = transport_->add_writer(endpoint(static_frames_topic_));
-  services_ = std::make_unique<Services>(*transport_, options_.conversion.distro, names_, requests_);
-  graph_ = transport_->add_writer(endpoint({"ros_discovery_info", "rmw_dds_common/msg/ParticipantEntitiesInfo", kLatchedQos}, Role::graph));
+  services_ =
+      std::make_unique<Services>(*transport_, options_.conversion.distro, names_, requests_);
+  graph_ = transport_->add_writer(
+      endpoint({"ros_discovery_info", "rmw_dds_common/msg/ParticipantEntitiesInfo", kLatchedQos},
+               Role::graph));
   take_over(info);
   names_.check_remaps();
 }
@@ -69,10 +77,12 @@ void Node::stop() {
   transport_->stop();
 }
 
-Endpoint Node::endpoint(const Topic& topic, Role role) const { return {role, topic, type_hash(topic.type, options_.conversion.distro)}; }
+Endpoint Node::endpoint(const Topic& topic, Role role) const {
+  return {role, topic, type_hash(topic.type, options_.conversion.distro)};
+}
 
 void Node::announce(const std::shared_ptr<const run::Announcement>& announcement) {
-  next_clock_us_ = 0;    // sim time may begin again
+  next_clock_us_ = 0;  // sim time may begin again
   if (!is_same(announcement->info, info_)) take_over(announcement->info);
 }
 
@@ -84,15 +94,20 @@ void Node::begin_step(const run::Step& step) {
 }
 
 void Node::message(const run::Published& message) {
-  if (message.kind == run::Kind::service && message.channel == reply_channel_) requests_.reply({message.data, message.size});
+  if (message.kind == run::Kind::service && message.channel == reply_channel_)
+    requests_.reply({message.data, message.size});
   if (message.kind != run::Kind::sample) return;
-  conversions_->convert(message.channel, {message.data, message.size}, [this](size_t topic) { return writer_of_topic_[topic]->is_read(); },
-                        [this](size_t topic, std::span<const uint8_t> cdr) { send(*writer_of_topic_[topic], cdr); });
+  conversions_->convert(
+      message.channel, {message.data, message.size},
+      [this](size_t topic) { return writer_of_topic_[topic]->is_read(); },
+      [this](size_t topic, std::span<const uint8_t> cdr) { send(*writer_of_topic_[topic], cdr); });
 }
 
 void Node::send(Writer& writer, std::span<const uint8_t> cdr) {
-  if (writer.write(cdr)) ++sent_;
-  else ++dropped_;
+  if (writer.write(cdr))
+    ++sent_;
+  else
+    ++dropped_;
 }
 
 void Node::take_over(const std::vector<world_info_t>& info) {
@@ -106,7 +121,8 @@ void Node::take_over(const std::vector<world_info_t>& info) {
   for (const Topic& topic : conversions->topics()) {
     auto& writer = writers[key(topic)];
     const auto known = writers_.find(key(topic));
-    writer = known != writers_.end() ? std::move(known->second) : transport_->add_writer(endpoint(topic));
+    writer = known != writers_.end() ? std::move(known->second)
+                                     : transport_->add_writer(endpoint(topic));
     of_topic.push_back(writer.get());
   }
   conversions_ = std::move(conversions);
@@ -123,13 +139,19 @@ void Node::add_commands(const std::vector<world_info_t>& info) {
     const std::string name = key(command.topic);
     const auto [at, fresh] = commands_.try_emplace(name, std::move(command));
     if (!fresh) continue;
-    readers_[name] = transport_->add_reader(endpoint(at->second.topic), [this, added = &at->second](std::span<const uint8_t> cdr) { receive(*added, cdr); });
+    readers_[name] = transport_->add_reader(
+        endpoint(at->second.topic),
+        [this, added = &at->second](std::span<const uint8_t> cdr) { receive(*added, cdr); });
   }
   for (const world_info_t& part : info) {
     for (const robot_info_t& robot : part.robots) {
-      const Topic topic{names_.topic(robot.name, "initialpose"), "geometry_msgs/msg/PoseWithCovarianceStamped", kCommandQos};
+      const Topic topic{names_.topic(robot.name, "initialpose"),
+                        "geometry_msgs/msg/PoseWithCovarianceStamped", kCommandQos};
       if (!poses_.try_emplace(key(topic), topic).second) continue;
-      readers_[key(topic)] = transport_->add_reader(endpoint(topic), [this, name = robot.name, topic](std::span<const uint8_t> cdr) { receive_pose(name, topic.name, cdr); });
+      readers_[key(topic)] = transport_->add_reader(
+          endpoint(topic), [this, name = robot.name, topic](std::span<const uint8_t> cdr) {
+            receive_pose(name, topic.name, cdr);
+          });
     }
   }
 }
@@ -163,7 +185,8 @@ void Node::receive(const Command& command, std::span<const uint8_t> cdr) {
 }
 
 // Where somebody says that the robot is, there it is put: the map's frame is the world's.
-void Node::receive_pose(const std::string& robot, const std::string& topic, std::span<const uint8_t> cdr) {
+void Node::receive_pose(const std::string& robot, const std::string& topic,
+                        std::span<const uint8_t> cdr) {
   ++received_;
   if (!injecting_) return;
   CdrReader in(cdr);
@@ -173,7 +196,8 @@ void Node::receive_pose(const std::string& robot, const std::string& topic, std:
   pose.name = robot;
   for (double& x : pose.position) x = in.get<double>();
   for (const size_t i : {1, 2, 3, 0}) pose.orientation[i] = in.get<double>();
-  if (!in.good() || !(frame.empty() || frame == "map" || frame == "world")) return count_faulty(topic, "pose in the frame map", cdr.size());
+  if (!in.good() || !(frame.empty() || frame == "map" || frame == "world"))
+    return count_faulty(topic, "pose in the frame map", cdr.size());
   std::vector<uint8_t> body(static_cast<size_t>(pose.getEncodedSize()));
   pose.encode(body.data(), 0, static_cast<int>(body.size()));
   requests_.ask(request_t::SET_POSE, std::move(body), [topic](const reply_t& reply) {
@@ -186,16 +210,20 @@ void Node::count_faulty(const std::string& topic, const std::string& type, size_
   const int64_t now = std::chrono::steady_clock::now().time_since_epoch().count();
   if (now < last_warning_ns_ + 1'000'000'000 && last_warning_ns_ != 0) return;
   last_warning_ns_ = now;
-  spdlog::warn("ROS 2: {} got {} bytes that are no {} for this robot: ignored ({} such messages so far)", topic, size, type, faulty);
+  spdlog::warn(
+      "ROS 2: {} got {} bytes that are no {} for this robot: ignored ({} such messages so far)",
+      topic, size, type, faulty);
 }
 
 bool Node::is_read() const {
-  return std::any_of(writers_.begin(), writers_.end(), [](const auto& each) { return each.second->is_read(); });
+  return std::any_of(writers_.begin(), writers_.end(),
+                     [](const auto& each) { return each.second->is_read(); });
 }
 
 bool Node::is_written(const std::string& topic) const {
-  return std::any_of(commands_.begin(), commands_.end(),
-                     [&](const auto& each) { return each.second.topic.name == topic && readers_.at(each.first)->writers() > 0; });
+  return std::any_of(commands_.begin(), commands_.end(), [&](const auto& each) {
+    return each.second.topic.name == topic && readers_.at(each.first)->writers() > 0;
+  });
 }
 
 size_t Node::peers() const {

@@ -1,7 +1,7 @@
 // A run as a ROS 2 node: what the run publishes goes out as ROS messages, commands come in.
 //
-// It is a sink that may be slow: it belongs behind a QueuedSink. Nothing here reaches the run but through `inject`, as if it had
-// come over the bus.
+// It is a sink that may be slow: it belongs behind a QueuedSink. Nothing here reaches the run but
+// through `inject`, as if it had come over the bus.
 #pragma once
 
 #include <atomic>
@@ -24,7 +24,7 @@ namespace ruedo::ros2 {
 
 struct NodeOptions {
   ConversionOptions conversion;
-  double clock_hz = 100.0;      // of sim time, at most
+  double clock_hz = 100.0;  // of sim time, at most
   JointNames joints = [](const std::string&) { return std::vector<std::string>(); };
 };
 
@@ -33,14 +33,17 @@ class Node : public run::Sink {
   using Inject = std::function<void(const std::string& channel, std::span<const uint8_t> message)>;
 
   // info: of the run as it begins. Throws InputError for a remap of nothing, EnvironmentError.
-  Node(NodeOptions options, std::unique_ptr<Transport> transport, const std::vector<world_info_t>& info, Inject inject);
+  Node(NodeOptions options, std::unique_ptr<Transport> transport,
+       const std::vector<world_info_t>& info, Inject inject);
   ~Node() override;
 
   // Commands are taken from now on; and after stop() no more.
   void start();
   void stop();
 
-  Hears hears() const override { return {.samples = true, .records = false, .services = true, .repeated = false}; }
+  Hears hears() const override {
+    return {.samples = true, .records = false, .services = true, .repeated = false};
+  }
   void announce(const std::shared_ptr<const run::Announcement>& announcement) override;
   void begin_step(const run::Step& step) override;
   void message(const run::Published& message) override;
@@ -49,7 +52,8 @@ class Node : public run::Sink {
     uint64_t sent = 0, received = 0, dropped = 0, faulty = 0;
   };
   Counts counts() const { return {sent_, received_, dropped_, faulty_ + services_->faulty()}; }
-  // Before the run begins: whether anybody reads a sensor's topic, publishes on that one, and how many of both there are.
+  // Before the run begins: whether anybody reads a sensor's topic, publishes on that one, and how
+  // many of both there are.
   bool is_read() const;
   bool is_written(const std::string& topic) const;
   size_t peers() const;
@@ -59,29 +63,30 @@ class Node : public run::Sink {
   std::vector<Topic> services() const { return services_->list(); }
 
  private:
-  void take_over(const std::vector<world_info_t>& info);    // of robots that have come or gone
+  void take_over(const std::vector<world_info_t>& info);  // of robots that have come or gone
   void add_commands(const std::vector<world_info_t>& info);
-  void tell_graph();                                        // ros_discovery_info
+  void tell_graph();  // ros_discovery_info
   void receive(const Command& command, std::span<const uint8_t> cdr);
-  void receive_pose(const std::string& robot, const std::string& topic, std::span<const uint8_t> cdr);    // initialpose
+  void receive_pose(const std::string& robot, const std::string& topic,
+                    std::span<const uint8_t> cdr);  // initialpose
   void count_faulty(const std::string& topic, const std::string& type, size_t size);
   void send(Writer& writer, std::span<const uint8_t> cdr);
   Endpoint endpoint(const Topic& topic, Role role = Role::topic) const;
 
   NodeOptions options_;
   std::unique_ptr<Transport> transport_;
-  Inject inject_;    // before what uses it
+  Inject inject_;  // before what uses it
   Names names_;
 
   // Of the thread that the sink is called in.
   std::unique_ptr<Conversions> conversions_;
-  std::map<std::string, std::unique_ptr<Writer>> writers_;    // by name and type
+  std::map<std::string, std::unique_ptr<Writer>> writers_;  // by name and type
   std::vector<Writer*> writer_of_topic_;
   Topic clock_topic_, static_frames_topic_;
   std::unique_ptr<Writer> clock_, static_frames_, graph_;
   std::map<std::string, std::unique_ptr<Reader>> readers_;
-  std::map<std::string, Command> commands_;                   // by name and type
-  std::map<std::string, Topic> poses_;                        // initialpose of each robot, by name and type
+  std::map<std::string, Command> commands_;  // by name and type
+  std::map<std::string, Topic> poses_;       // initialpose of each robot, by name and type
   Requests requests_;
   std::unique_ptr<Services> services_;
   std::string reply_channel_;

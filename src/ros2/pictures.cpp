@@ -25,12 +25,14 @@ RawPicture raw_picture(const image_t& image) {
   if (image.pixelformat != image_t::PIXEL_FORMAT_MJPEG) {
     raw.width = static_cast<uint32_t>(image.width);
     raw.height = static_cast<uint32_t>(image.height);
-    raw.step = static_cast<uint32_t>(image.row_stride > 0 || image.height < 1 ? image.row_stride : image.size / image.height);
+    raw.step = static_cast<uint32_t>(
+        image.row_stride > 0 || image.height < 1 ? image.row_stride : image.size / image.height);
     raw.encoding = encoding_of(image.pixelformat);
     raw.data = image.data;
     return raw;
   }
-  const cv::Mat packed(1, static_cast<int>(image.data.size()), CV_8U, const_cast<uint8_t*>(image.data.data()));
+  const cv::Mat packed(1, static_cast<int>(image.data.size()), CV_8U,
+                       const_cast<uint8_t*>(image.data.data()));
   cv::Mat picture = image.data.empty() ? cv::Mat() : cv::imdecode(packed, cv::IMREAD_UNCHANGED);
   if (picture.empty() || picture.depth() != CV_8U) return raw;
   if (picture.channels() == 3) cv::cvtColor(picture, picture, cv::COLOR_BGR2RGB);
@@ -43,13 +45,16 @@ RawPicture raw_picture(const image_t& image) {
 }
 
 std::vector<uint8_t> jpeg_of(const image_t& image) {
-  const bool grey = image.pixelformat == image_t::PIXEL_FORMAT_GRAY, rgb = image.pixelformat == image_t::PIXEL_FORMAT_RGB;
+  const bool grey = image.pixelformat == image_t::PIXEL_FORMAT_GRAY,
+             rgb = image.pixelformat == image_t::PIXEL_FORMAT_RGB;
   const int type = grey ? CV_8UC1 : CV_8UC3;
   const size_t row = static_cast<size_t>(image.width) * CV_ELEM_SIZE(type);
   std::vector<uint8_t> packed;
   if (!grey && !rgb && image.pixelformat != image_t::PIXEL_FORMAT_BGR) return packed;
   const size_t stride = std::max(row, static_cast<size_t>(std::max(0, image.row_stride)));
-  if (image.width < 1 || image.height < 1 || image.data.size() < stride * static_cast<size_t>(image.height)) return packed;
+  if (image.width < 1 || image.height < 1 ||
+      image.data.size() < stride * static_cast<size_t>(image.height))
+    return packed;
   cv::Mat picture(image.height, image.width, type, const_cast<uint8_t*>(image.data.data()), stride);
   if (rgb) cv::cvtColor(picture, picture, cv::COLOR_RGB2BGR);
   cv::imencode(".jpg", picture, packed, {cv::IMWRITE_JPEG_QUALITY, 90});

@@ -9,8 +9,8 @@
 namespace ruedo::ros2 {
 
 struct RawPicture {
-  uint32_t width = 0, height = 0, step = 0;    // step: bytes in a row
-  const char* encoding = "rgb8";               // sensor_msgs/image_encodings.hpp
+  uint32_t width = 0, height = 0, step = 0;  // step: bytes in a row
+  const char* encoding = "rgb8";             // sensor_msgs/image_encodings.hpp
   std::vector<uint8_t> data;
 };
 

@@ -13,7 +13,8 @@ namespace {
 
 using engine::encoded;
 
-std::vector<uint8_t> request(int64_t session, int64_t sequence, int32_t kind, const std::vector<uint8_t>& body) {
+std::vector<uint8_t> request(int64_t session, int64_t sequence, int32_t kind,
+                             const std::vector<uint8_t>& body) {
   request_t message;
   message.utime = 0;
   message.run_id = 0;
@@ -113,7 +114,7 @@ void Requests::reply(std::span<const uint8_t> message) {
     lock.unlock();
     return asked.then(reply);
   }
-  session_ = 0;    // it was silent for long, and others took its place
+  session_ = 0;  // it was silent for long, and others took its place
   asked.again = true;
   waiting_.push_back(std::move(asked));
   if (join_sequence_ == 0) join(lock);

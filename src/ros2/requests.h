@@ -1,4 +1,5 @@
-// A client of the run's requests: it joins when it has something to ask, and hands each answer to who asked.
+// A client of the run's requests: it joins when it has something to ask, and hands each answer to
+// who asked.
 #pragma once
 
 #include <cstdint>
@@ -19,14 +20,15 @@ class Requests {
   using Inject = std::function<void(const std::string& channel, std::span<const uint8_t> message)>;
   using Then = std::function<void(const reply_t& reply)>;
 
-  static constexpr size_t kMostPending = 24;    // the run answers no more of a session at once
+  static constexpr size_t kMostPending = 24;  // the run answers no more of a session at once
 
   explicit Requests(Inject inject) : inject_(std::move(inject)) {}
 
   // Where requests go; "": the run takes none.
   void listen(const std::string& channel);
 
-  // Any thread. `then` is called once, in this thread (when nothing can be asked) or in that of reply().
+  // Any thread. `then` is called once, in this thread (when nothing can be asked) or in that of
+  // reply().
   void ask(int32_t kind, std::vector<uint8_t> body, Then then);
 
   // A message on ruedo/reply.
@@ -37,7 +39,7 @@ class Requests {
     int32_t kind = 0;
     std::vector<uint8_t> body;
     Then then;
-    bool again = false;    // after the session was lost
+    bool again = false;  // after the session was lost
   };
 
   void join(std::unique_lock<std::mutex>& lock);
@@ -45,11 +47,11 @@ class Requests {
   void joined(const reply_t& reply, std::unique_lock<std::mutex>& lock);
 
   Inject inject_;
-  std::mutex mutex_;    // not held while something is injected or answered
+  std::mutex mutex_;  // not held while something is injected or answered
   std::string channel_;
   int64_t session_ = 0, sequence_ = 0, join_sequence_ = 0;
-  std::deque<Asked> waiting_;             // for the session
-  std::map<int64_t, Asked> pending_;      // by sequence
+  std::deque<Asked> waiting_;         // for the session
+  std::map<int64_t, Asked> pending_;  // by sequence
 };
 
 }  // namespace ruedo::ros2

@@ -1,4 +1,5 @@
-// Each service is a reading of its request, a request of the run's own, and a writing of the answer.
+// Each service is a reading of its request, a request of the run's own, and a writing of the
+// answer.
 #include "ros2/services.h"
 
 #include <algorithm>
@@ -27,7 +28,8 @@ namespace ruedo::ros2 {
 
 class Services::Call {
  public:
-  Call(Writer& replies, std::span<const uint8_t> cdr) : bytes_(cdr.begin(), cdr.end()), in(bytes_), replies_(replies) {
+  Call(Writer& replies, std::span<const uint8_t> cdr)
+      : bytes_(cdr.begin(), cdr.end()), in(bytes_), replies_(replies) {
     client_ = in.get<uint64_t>();
     sequence_ = in.get<int64_t>();
   }
@@ -81,7 +83,9 @@ uint8_t result_of(int32_t kind, int32_t code) {
 }
 
 void put_result(CdrWriter& out, uint8_t code, const std::string& text) { out.put(code).put(text); }
-void put_result(CdrWriter& out, int32_t kind, const reply_t& reply) { put_result(out, result_of(kind, reply.code), reply.text); }
+void put_result(CdrWriter& out, int32_t kind, const reply_t& reply) {
+  put_result(out, result_of(kind, reply.code), reply.text);
+}
 
 void put_numbers(CdrWriter& out, std::initializer_list<double> numbers) {
   for (const double number : numbers) out.put(number);
@@ -94,7 +98,7 @@ void put_state(CdrWriter& out, const state_reply_t& state) {
   put_numbers(out, {q[1], q[2], q[3], q[0]});
   for (const double x : state.linear) out.put(x);
   for (const double x : state.angular) out.put(x);
-  put_numbers(out, {0, 0, 0, 0, 0, 0});    // acceleration
+  put_numbers(out, {0, 0, 0, 0, 0, 0});  // acceleration
 }
 
 void put_no_state(CdrWriter& out) {
@@ -104,7 +108,7 @@ void put_no_state(CdrWriter& out) {
 
 struct Placed {
   std::string frame;
-  double position[3], orientation[4];    // w, x, y, z
+  double position[3], orientation[4];  // w, x, y, z
 };
 
 Placed read_pose_stamped(CdrReader& in) {
@@ -114,19 +118,23 @@ Placed read_pose_stamped(CdrReader& in) {
   for (double& x : placed.position) x = in.get<double>();
   for (const size_t i : {1, 2, 3, 0}) placed.orientation[i] = in.get<double>();
   // An empty message is no rotation.
-  if (std::all_of(placed.orientation, placed.orientation + 4, [](double x) { return x == 0.0; })) placed.orientation[0] = 1.0;
+  if (std::all_of(placed.orientation, placed.orientation + 4, [](double x) { return x == 0.0; }))
+    placed.orientation[0] = 1.0;
   return placed;
 }
 
 bool is_world(const std::string& frame) { return frame.empty() || frame == "world"; }
 
-// Whether a name matches a POSIX extended regular expression as a whole or in part; null where the expression cannot be taken.
+// Whether a name matches a POSIX extended regular expression as a whole or in part; null where the
+// expression cannot be taken.
 class Filter {
  public:
   explicit Filter(const std::string& text) : empty_(text.empty()) {
     // Repeats of repeats, and references backwards, take time and memory without end.
-    const bool dear = std::count(text.begin(), text.end(), '{') > 1 || text.find('\\') != std::string::npos || text.size() > kLongestFilter;
-    good_ = empty_ || (!dear && text.find('\0') == std::string::npos && regcomp(&expression_, text.c_str(), REG_EXTENDED | REG_NOSUB) == 0);
+    const bool dear = std::count(text.begin(), text.end(), '{') > 1 ||
+                      text.find('\\') != std::string::npos || text.size() > kLongestFilter;
+    good_ = empty_ || (!dear && text.find('\0') == std::string::npos &&
+                       regcomp(&expression_, text.c_str(), REG_EXTENDED | REG_NOSUB) == 0);
   }
   ~Filter() {
     if (good_ && !empty_) regfree(&expression_);
@@ -135,15 +143,18 @@ class Filter {
   Filter& operator=(const Filter&) = delete;
 
   bool good() const { return good_; }
-  bool matches(const std::string& name) const { return empty_ || regexec(&expression_, name.c_str(), 0, nullptr, 0) == 0; }
+  bool matches(const std::string& name) const {
+    return empty_ || regexec(&expression_, name.c_str(), 0, nullptr, 0) == 0;
+  }
 
  private:
   bool empty_, good_ = false;
   regex_t expression_{};
 };
 
-// A client's first request may be here before it is known who reads the replies, which would then go to nobody: rmw_cyclonedds waits
-// for that, too. Each client has a writer and a reader; one that has no reader costs the wait once.
+// A client's first request may be here before it is known who reads the replies, which would then
+// go to nobody: rmw_cyclonedds waits for that, too. Each client has a writer and a reader; one that
+// has no reader costs the wait once.
 void await_reader(const Reader& requests, const Writer& replies, size_t& deaf) {
   constexpr auto kLongest = std::chrono::milliseconds(500), kLook = std::chrono::milliseconds(1);
   const auto missing = [&] {
@@ -152,13 +163,14 @@ void await_reader(const Reader& requests, const Writer& replies, size_t& deaf) {
   };
   deaf = std::min(deaf, missing());
   const auto deadline = std::chrono::steady_clock::now() + kLongest;
-  while (missing() > deaf && std::chrono::steady_clock::now() < deadline) std::this_thread::sleep_for(kLook);
+  while (missing() > deaf && std::chrono::steady_clock::now() < deadline)
+    std::this_thread::sleep_for(kLook);
   deaf = missing();
 }
 
 // Both ends of a service say that they belong together.
 std::string service_id(const Gid& gid, const std::string& name) {
-  uint64_t hash = 14695981039346656037u;    // FNV-1a
+  uint64_t hash = 14695981039346656037u;  // FNV-1a
   const auto mix = [&](uint8_t byte) { hash = (hash ^ byte) * 1099511628211u; };
   for (const uint8_t byte : gid) mix(byte);
   for (const char c : name) mix(static_cast<uint8_t>(c));
@@ -175,7 +187,8 @@ std::string service_id(const Gid& gid, const std::string& name) {
 
 }  // namespace
 
-Services::Services(Transport& transport, Distro distro, Names& names, Requests& requests) : requests_(requests) {
+Services::Services(Transport& transport, Distro distro, Names& names, Requests& requests)
+    : requests_(requests) {
   static constexpr Row kRows[] = {
       {"get_simulator_features", "GetSimulatorFeatures", &Services::get_simulator_features},
       {"reset_simulation", "ResetSimulation", &Services::reset_simulation},
@@ -195,10 +208,15 @@ void Services::add(Transport& transport, Distro distro, Names& names, const Row&
   auto service = std::make_unique<Service>();
   const std::string type = std::string("simulation_interfaces/srv/") + row.type;
   service->topic = {names.topic("", row.name), type, kCommandQos};
-  const std::string hash = type_hash(type, distro), id = service_id(transport.gid(), service->topic.name);
-  service->replies = transport.add_writer({Role::reply, {service->topic.name, type + "_Response", kCommandQos}, hash, id});
-  service->requests = transport.add_reader({Role::request, {service->topic.name, type + "_Request", kCommandQos}, hash, id},
-                                           [this, added = service.get(), handler = row.handler](std::span<const uint8_t> cdr) { receive(*added, handler, cdr); });
+  const std::string hash = type_hash(type, distro),
+                    id = service_id(transport.gid(), service->topic.name);
+  service->replies = transport.add_writer(
+      {Role::reply, {service->topic.name, type + "_Response", kCommandQos}, hash, id});
+  service->requests = transport.add_reader(
+      {Role::request, {service->topic.name, type + "_Request", kCommandQos}, hash, id},
+      [this, added = service.get(), handler = row.handler](std::span<const uint8_t> cdr) {
+        receive(*added, handler, cdr);
+      });
   services_.push_back(std::move(service));
 }
 
@@ -241,7 +259,8 @@ void Services::update(const std::vector<world_info_t>& info) {
     for (const body_info_t& body : part.bodies) {
       if (body.name.empty()) continue;
       const std::string name = body.name.substr(0, body.name.find('/'));
-      const auto [at, fresh] = categories.try_emplace(name, robots.contains(name) ? kRobot : kStatic);
+      const auto [at, fresh] =
+          categories.try_emplace(name, robots.contains(name) ? kRobot : kStatic);
       if (at->second == kStatic && !body.is_static) at->second = kDynamic;
     }
   }
@@ -259,8 +278,8 @@ void Services::pass_on(const CallPointer& call, int32_t kind, std::vector<uint8_
 }
 
 void Services::get_simulator_features(const CallPointer& call) {
-  // SimulatorFeatures' numbers: spawning, deleting, categories, from texts, states of entities, resets of time and state, state of the
-  // simulation with pausing, one step and many.
+  // SimulatorFeatures' numbers: spawning, deleting, categories, from texts, states of entities,
+  // resets of time and state, state of the simulation with pausing, one step and many.
   constexpr std::array<uint16_t, 14> kFeatures{0, 1, 8, 9, 10, 11, 20, 21, 22, 24, 25, 26, 31, 32};
   CdrWriter out = call->answer();
   out.put_sequence(std::span<const uint16_t>(kFeatures));
@@ -279,16 +298,19 @@ void Services::reset_simulation(const CallPointer& call) {
     reset.seed = -1;
     return encoded(reset);
   };
-  if (scope == 0 || (scope & kEach) == kEach) return pass_on(call, request_t::RESET, body(reset_request_t::ALL));
+  if (scope == 0 || (scope & kEach) == kEach)
+    return pass_on(call, request_t::RESET, body(reset_request_t::ALL));
   if (scope == kTime) return pass_on(call, request_t::RESET, body(reset_request_t::TIME));
   if (scope == kState) return pass_on(call, request_t::RESET, body(reset_request_t::POSES));
   if (scope == (kTime | kState)) {
-    requests_.ask(request_t::RESET, body(reset_request_t::POSES), [this, call, body](const reply_t& reply) {
-      if (reply.code == reply_t::OK) return pass_on(call, request_t::RESET, body(reset_request_t::TIME));
-      CdrWriter out = call->answer();
-      put_result(out, request_t::RESET, reply);
-      call->send(out);
-    });
+    requests_.ask(request_t::RESET, body(reset_request_t::POSES),
+                  [this, call, body](const reply_t& reply) {
+                    if (reply.code == reply_t::OK)
+                      return pass_on(call, request_t::RESET, body(reset_request_t::TIME));
+                    CdrWriter out = call->answer();
+                    put_result(out, request_t::RESET, reply);
+                    call->send(out);
+                  });
     return;
   }
   CdrWriter out = call->answer();
@@ -307,7 +329,9 @@ void Services::step_simulation(const CallPointer& call) {
 void Services::get_simulation_state(const CallPointer& call) {
   requests_.ask(request_t::GET_STATE, name_body(""), [this, call](const reply_t& reply) {
     state_reply_t state{};
-    const bool good = reply.code == reply_t::OK && decode_checked(reply.body.data(), reply.body.size(), state) == DecodeFault::none;
+    const bool good =
+        reply.code == reply_t::OK &&
+        decode_checked(reply.body.data(), reply.body.size(), state) == DecodeFault::none;
     CdrWriter out = call->answer();
     out.put(good ? state_of(state.paused) : kPlaying);
     put_result(out, request_t::GET_STATE, reply);
@@ -320,7 +344,8 @@ void Services::set_simulation_state(const CallPointer& call) {
   if (!call->in.good()) return void(++faulty_);
   requests_.ask(request_t::GET_STATE, name_body(""), [this, call, wanted](const reply_t& reply) {
     state_reply_t state{};
-    if (reply.code == reply_t::OK && decode_checked(reply.body.data(), reply.body.size(), state) == DecodeFault::none) {
+    if (reply.code == reply_t::OK &&
+        decode_checked(reply.body.data(), reply.body.size(), state) == DecodeFault::none) {
       return change_state(call, state_of(state.paused), wanted);
     }
     CdrWriter out = call->answer();
@@ -332,13 +357,14 @@ void Services::set_simulation_state(const CallPointer& call) {
 void Services::change_state(const CallPointer& call, uint8_t now, uint8_t wanted) {
   if (now == wanted || wanted > kQuitting) {
     CdrWriter out = call->answer();
-    put_result(out, now == wanted ? kAlreadyThere : kFailed, now == wanted ? "" : "there is no such state");
+    put_result(out, now == wanted ? kAlreadyThere : kFailed,
+               now == wanted ? "" : "there is no such state");
     return call->send(out);
   }
   if (wanted == kPlaying) stopped_ = false;
   if (wanted == kPlaying) return pass_on(call, request_t::RESUME, {});
   if (wanted == kQuitting) return pass_on(call, request_t::QUIT, {});
-  if (wanted == kPaused && now == kStopped) {    // it stands still already
+  if (wanted == kPaused && now == kStopped) {  // it stands still already
     stopped_ = false;
     CdrWriter out = call->answer();
     put_result(out, kOk, "");
@@ -365,7 +391,7 @@ void Services::spawn_entity(const CallPointer& call) {
   const bool renames = call->in.get<bool>();
   std::string uri = call->in.get_text();
   const std::string text = call->in.get_text();
-  call->in.get_text();    // a namespace: the robot's name is one
+  call->in.get_text();  // a namespace: the robot's name is one
   const Placed placed = read_pose_stamped(call->in);
   if (!call->in.good()) return void(++faulty_);
   const auto refuse = [&](uint8_t code, const std::string& why) {
@@ -376,14 +402,18 @@ void Services::spawn_entity(const CallPointer& call) {
   };
   if (uri.starts_with("file://")) uri = uri.substr(7);
   if (uri.empty() && text.empty()) return refuse(kNoResource, "give uri or resource_string");
-  if (!is_world(placed.frame)) return refuse(kFailed, "poses are in the frame world, not in '" + placed.frame + "'");
-  if (body.name.empty() && !renames) return refuse(kNameInvalid, "the name is empty, and allow_renaming is false");
+  if (!is_world(placed.frame))
+    return refuse(kFailed, "poses are in the frame world, not in '" + placed.frame + "'");
+  if (body.name.empty() && !renames)
+    return refuse(kNameInvalid, "the name is empty, and allow_renaming is false");
   {
     const std::lock_guard lock(mutex_);
     const auto taken = [&](const std::string& name) {
-      return std::any_of(entities_.begin(), entities_.end(), [&](const Entity& entity) { return entity.name == name; });
+      return std::any_of(entities_.begin(), entities_.end(),
+                         [&](const Entity& entity) { return entity.name == name; });
     };
-    if (taken(body.name) && !renames) return refuse(kNameNotUnique, "there is a '" + body.name + "' already");
+    if (taken(body.name) && !renames)
+      return refuse(kNameNotUnique, "there is a '" + body.name + "' already");
     const std::string wanted = body.name;
     for (int i = 2; taken(body.name); ++i) body.name = wanted + "_" + std::to_string(i);
   }
@@ -394,7 +424,9 @@ void Services::spawn_entity(const CallPointer& call) {
   std::copy(std::begin(placed.orientation), std::end(placed.orientation), body.orientation);
   requests_.ask(request_t::SPAWN, encoded(body), [call](const reply_t& reply) {
     state_reply_t state{};
-    const bool named = reply.code == reply_t::OK && decode_checked(reply.body.data(), reply.body.size(), state) == DecodeFault::none;
+    const bool named =
+        reply.code == reply_t::OK &&
+        decode_checked(reply.body.data(), reply.body.size(), state) == DecodeFault::none;
     CdrWriter out = call->answer();
     put_result(out, request_t::SPAWN, reply);
     out.put(named ? state.name : std::string());
@@ -413,13 +445,16 @@ void Services::get_entities(const CallPointer& call) {
   const std::string text = in.get_text();
   const std::vector<uint8_t> categories = in.get_sequence<uint8_t>();
   const std::vector<std::string> tags = in.get_texts();
-  in.skip<uint8_t>(2);    // how tags are joined; kind of the bounds
+  in.skip<uint8_t>(2);  // how tags are joined; kind of the bounds
   const size_t bounds = in.get_length(24);
   if (!in.good()) return void(++faulty_);
   const Filter filter(text);
   CdrWriter out = call->answer();
   if (bounds > 0 || !filter.good()) {
-    put_result(out, kUnsupported, bounds > 0 ? "bounds are not supported" : "the filter is no POSIX extended regular expression, or too dear a one");
+    put_result(out, kUnsupported,
+               bounds > 0
+                   ? "bounds are not supported"
+                   : "the filter is no POSIX extended regular expression, or too dear a one");
     out.put_length(0);
     return call->send(out);
   }
@@ -427,7 +462,8 @@ void Services::get_entities(const CallPointer& call) {
   {
     const std::lock_guard lock(mutex_);
     for (const Entity& entity : entities_) {
-      const bool wanted = categories.empty() || std::find(categories.begin(), categories.end(), entity.category) != categories.end();
+      const bool wanted = categories.empty() || std::find(categories.begin(), categories.end(),
+                                                          entity.category) != categories.end();
       if (wanted && tags.empty() && filter.matches(entity.name)) found.push_back(entity.name);
     }
   }
@@ -442,15 +478,19 @@ void Services::get_entity_state(const CallPointer& call) {
   if (!call->in.good()) return void(++faulty_);
   const auto answer = [call](const reply_t& reply) {
     state_reply_t state{};
-    const bool good = reply.code == reply_t::OK && decode_checked(reply.body.data(), reply.body.size(), state) == DecodeFault::none;
+    const bool good =
+        reply.code == reply_t::OK &&
+        decode_checked(reply.body.data(), reply.body.size(), state) == DecodeFault::none;
     CdrWriter out = call->answer();
     put_result(out, request_t::GET_STATE, reply);
-    if (good) put_state(out, state);
-    else put_no_state(out);
+    if (good)
+      put_state(out, state);
+    else
+      put_no_state(out);
     call->send(out);
   };
   if (!name.empty()) return requests_.ask(request_t::GET_STATE, name_body(name), answer);
-  reply_t nobody{};    // without a name the run tells of itself
+  reply_t nobody{};  // without a name the run tells of itself
   nobody.code = reply_t::UNKNOWN_NAME;
   nobody.text = "the name is empty";
   answer(nobody);
@@ -471,9 +511,10 @@ void Services::set_entity_state(const CallPointer& call) {
   }
   std::copy(std::begin(placed.position), std::end(placed.position), pose.position);
   std::copy(std::begin(placed.orientation), std::end(placed.orientation), pose.orientation);
-  const bool rests = std::all_of(twist.linear, twist.linear + 3, [](double x) { return x == 0.0; }) &&
-                     std::all_of(twist.angular, twist.angular + 3, [](double x) { return x == 0.0; });
-  if (rests) return pass_on(call, request_t::SET_POSE, encoded(pose));    // which brings it to rest
+  const bool rests =
+      std::all_of(twist.linear, twist.linear + 3, [](double x) { return x == 0.0; }) &&
+      std::all_of(twist.angular, twist.angular + 3, [](double x) { return x == 0.0; });
+  if (rests) return pass_on(call, request_t::SET_POSE, encoded(pose));  // which brings it to rest
   requests_.ask(request_t::SET_POSE, encoded(pose), [this, call, twist](const reply_t& reply) {
     if (reply.code == reply_t::OK) return pass_on(call, request_t::SET_TWIST, encoded(twist));
     CdrWriter out = call->answer();

@@ -1,5 +1,5 @@
-// The services of simulation_interfaces, as rmw_cyclonedds maps services: a client's mark and a sequence number go before each request,
-// and come back before its reply.
+// The services of simulation_interfaces, as rmw_cyclonedds maps services: a client's mark and a
+// sequence number go before each request, and come back before its reply.
 #pragma once
 
 #include <atomic>
@@ -28,7 +28,7 @@ class Services {
   // What there is in the run from now on. Any thread.
   void update(const std::vector<world_info_t>& info);
 
-  std::vector<Topic> list() const;             // names, and "pkg/srv/Name"
+  std::vector<Topic> list() const;  // names, and "pkg/srv/Name"
   std::vector<const Reader*> readers() const;
   std::vector<const Writer*> writers() const;
   uint64_t faulty() const { return faulty_; }
@@ -41,12 +41,12 @@ class Services {
     Topic topic;
     std::unique_ptr<Writer> replies;
     std::unique_ptr<Reader> requests;
-    size_t deaf = 0;    // clients that write requests, and read no replies
+    size_t deaf = 0;  // clients that write requests, and read no replies
   };
   using CallPointer = std::shared_ptr<Call>;
   using Handler = void (Services::*)(const CallPointer& call);
   struct Row {
-    const char* name;       // of the service
+    const char* name;  // of the service
     const char* type;
     Handler handler;
   };
@@ -82,7 +82,7 @@ class Services {
     std::string name;
     uint8_t category;
   };
-  std::mutex mutex_;    // of what follows
+  std::mutex mutex_;  // of what follows
   std::vector<Entity> entities_;
 };
 

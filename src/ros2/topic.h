@@ -8,11 +8,12 @@ namespace ruedo::ros2 {
 // The part of ROS's QoS that differs from topic to topic.
 struct Qos {
   bool reliable = true;
-  bool transient_local = false;    // who comes late gets the newest
+  bool transient_local = false;  // who comes late gets the newest
   int depth = 10;
 };
 
-// As drivers publish: reliable, so that readers of either kind (SensorDataQoS among them) are served.
+// As drivers publish: reliable, so that readers of either kind (SensorDataQoS among them) are
+// served.
 inline constexpr Qos kSensorQos{true, false, 5};
 inline constexpr Qos kStateQos{true, false, 10};
 inline constexpr Qos kTfQos{true, false, 100};
@@ -20,8 +21,8 @@ inline constexpr Qos kLatchedQos{true, true, 1};
 inline constexpr Qos kCommandQos{true, false, 10};
 
 struct Topic {
-  std::string name;    // "/p3at/scan"
-  std::string type;    // "sensor_msgs/msg/LaserScan"
+  std::string name;  // "/p3at/scan"
+  std::string type;  // "sensor_msgs/msg/LaserScan"
   Qos qos;
 };
 

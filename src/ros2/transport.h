@@ -1,4 +1,5 @@
-// What carries ROS messages: writers and readers of CDR bytes under ROS names. src/dds implements it over Cyclone DDS.
+// What carries ROS messages: writers and readers of CDR bytes under ROS names. src/dds implements
+// it over Cyclone DDS.
 #pragma once
 
 #include <array>
@@ -19,9 +20,9 @@ enum class Role { topic, request, reply, graph };
 
 struct Endpoint {
   Role role = Role::topic;
-  Topic topic;              // of a service: its name, and "pkg/srv/Name_Request" or "..._Response"
-  std::string hash;         // RIHS01_..., "": none
-  std::string service = {}; // what both ends of a service have in common; "": a topic
+  Topic topic;               // of a service: its name, and "pkg/srv/Name_Request" or "..._Response"
+  std::string hash;          // RIHS01_..., "": none
+  std::string service = {};  // what both ends of a service have in common; "": a topic
 };
 
 class Writer {
@@ -29,7 +30,7 @@ class Writer {
   virtual ~Writer() = default;
   // Never waits; false: it could not be sent.
   virtual bool write(std::span<const uint8_t> cdr) = 0;
-  virtual size_t readers() const = 0;    // of others
+  virtual size_t readers() const = 0;  // of others
   bool is_read() const { return readers() > 0; }
   virtual Gid gid() const = 0;
 };
@@ -37,7 +38,7 @@ class Writer {
 class Reader {
  public:
   virtual ~Reader() = default;
-  virtual size_t writers() const = 0;    // of others
+  virtual size_t writers() const = 0;  // of others
   virtual Gid gid() const = 0;
 };
 
@@ -55,9 +56,9 @@ class Transport {
   virtual void start() = 0;
   virtual void stop() = 0;
 
-  virtual Gid gid() const = 0;              // of this participant
-  virtual std::string where() const = 0;    // "domain 0, this machine only"
-  virtual uint64_t refused() const = 0;     // samples too large to be looked at
+  virtual Gid gid() const = 0;            // of this participant
+  virtual std::string where() const = 0;  // "domain 0, this machine only"
+  virtual uint64_t refused() const = 0;   // samples too large to be looked at
 };
 
 }  // namespace ruedo::ros2

@@ -1,8 +1,8 @@
 // All of it comes from the state that was published last.
 #include "run/beats.h"
 
-#include "ruedo/motion_status_t.hpp"
 #include "engine/world_state.h"
+#include "ruedo/motion_status_t.hpp"
 #include "run/journal.h"
 
 namespace ruedo::run {
@@ -46,13 +46,15 @@ state_hash_t HashBeat::now(bool last) const {
   hash.utime = publisher_.time_us();
   hash.step = publisher_.step();
   hash.epoch = publisher_.epoch();
-  hash.state_hash = publisher_.latest() ? engine::state_hash(*publisher_.latest()) : 0;    // a run may end before its first state
+  hash.state_hash = publisher_.latest() ? engine::state_hash(*publisher_.latest())
+                                        : 0;  // a run may end before its first state
   hash.last = last;
   return hash;
 }
 
 void HashBeat::end_step(const Step& step) {
-  if (beat_.due(step.step) && publisher_.has_recorders()) publisher_.record(kStateHashChannel, now(false));
+  if (beat_.due(step.step) && publisher_.has_recorders())
+    publisher_.record(kStateHashChannel, now(false));
 }
 
 void WatchdogWarnings::end_step(const Step& step) {

@@ -1,4 +1,5 @@
-// What a run says at fixed rates of sim time: ticks, ruedo/info, hashes of the state for logs, and warnings on the terminal.
+// What a run says at fixed rates of sim time: ticks, ruedo/info, hashes of the state for logs, and
+// warnings on the terminal.
 //
 // Each is a sink that speaks at the end of a step.
 #pragma once
@@ -23,7 +24,7 @@ class Beat {
 
  private:
   SampleClock clock_;
-  int64_t last_ = -1, next_ = 0;    // steps: that was asked for, that is the first due at or after it
+  int64_t last_ = -1, next_ = 0;  // steps: that was asked for, that is the first due at or after it
 };
 
 // ruedo/tick, with the list of the step's messages.
@@ -34,13 +35,16 @@ class Ticks : public Sink {
   using AddApplied = std::function<void(TickWriter& tick, int64_t step)>;
 
   Ticks(Publisher& publisher, int64_t run_id, Rate rate, int64_t step_us, AddApplied add_applied)
-      : publisher_(publisher), run_id_(run_id), beat_(rate, step_us), add_applied_(std::move(add_applied)) {}
+      : publisher_(publisher),
+        run_id_(run_id),
+        beat_(rate, step_us),
+        add_applied_(std::move(add_applied)) {}
 
   void begin_step(const Step& step) override;
   void message(const Published& message) override;
   void end_step(const Step& step) override;
 
-  Time last() const { return last_; }    // in real time
+  Time last() const { return last_; }  // in real time
 
  private:
   Publisher& publisher_;
@@ -62,14 +66,16 @@ class InfoBeat : public Sink {
 
   void say();
 
-  void announce(const std::shared_ptr<const Announcement>& announcement) override { info_ = announcement->info; }
+  void announce(const std::shared_ptr<const Announcement>& announcement) override {
+    info_ = announcement->info;
+  }
   Hears hears() const override { return {.samples = false}; }
   void message(const Published&) override {}
   void end_step(const Step& step) override {
     if (beat_.due(step.step)) say();
   }
 
-  Time last() const { return last_; }    // in real time
+  Time last() const { return last_; }  // in real time
 
  private:
   Publisher& publisher_;
@@ -100,7 +106,8 @@ class HashBeat : public Sink {
 class WatchdogWarnings : public Sink {
  public:
   // tell: about a robot, by its index in the layout.
-  WatchdogWarnings(const Publisher& publisher, int64_t step_us, std::function<void(size_t robot)> tell)
+  WatchdogWarnings(const Publisher& publisher, int64_t step_us,
+                   std::function<void(size_t robot)> tell)
       : publisher_(publisher), beat_(engine::kTickRate, step_us), tell_(std::move(tell)) {}
 
   Hears hears() const override { return {.samples = false}; }

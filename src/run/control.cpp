@@ -56,19 +56,22 @@ void Control::serve(const request_t& request) {
   reply.kind = request.kind;
   reply.code = reply_t::OK;
   reply.size = 0;
-  const auto answer_with = [&](int32_t code, std::string text) {    // at once; it is not kept for repeats
+  const auto answer_with = [&](int32_t code,
+                               std::string text) {  // at once; it is not kept for repeats
     reply.code = code;
     reply.text = std::move(text);
     publish(reply);
   };
-  if (request.run_id != 0 && request.run_id != run_id_) return answer_with(reply_t::WRONG_RUN, "this is another run of the server");
+  if (request.run_id != 0 && request.run_id != run_id_)
+    return answer_with(reply_t::WRONG_RUN, "this is another run of the server");
   if (request.kind == request_t::JOIN) return join(request, reply);
-  if (request.kind == request_t::LEAVE) {    // as often as one likes
+  if (request.kind == request_t::LEAVE) {  // as often as one likes
     if (host_.left) host_.left(request.session);
     sessions_.leave(request.session);
     return publish(reply);
   }
-  if (request.kind == request_t::INFO && request.session == 0) {    // who has not joined yet may ask what there is to join
+  if (request.kind == request_t::INFO &&
+      request.session == 0) {  // who has not joined yet may ask what there is to join
     host_.execute(request, Session{});
     return;
   }
@@ -76,7 +79,8 @@ void Control::serve(const request_t& request) {
   if (!session) return answer_with(reply_t::UNKNOWN_SESSION, "no such session: join first");
   session->last_heard = std::chrono::steady_clock::now();
   session->spoke = true;
-  if (request.kind == request_t::RESEND) {    // changes nothing: it may come as often as one likes, in any order
+  if (request.kind ==
+      request_t::RESEND) {  // changes nothing: it may come as often as one likes, in any order
     engine::Outcome outcome = host_.execute(request, *session);
     reply.body = std::move(outcome.body);
     reply.size = static_cast<int32_t>(reply.body.size());
@@ -85,7 +89,8 @@ void Control::serve(const request_t& request) {
   if (judge(request, *session, reply) != Sessions::Verdict::execute) return;
   if (host_.early && request.kind == request_t::GRANT && host_.early(request, *session)) return;
   // After the sequence: a repeated RESET, of the epoch that it ended, gets its answer again.
-  if (request.epoch != -1 && request.epoch != reply.epoch) return answer_with(reply_t::WRONG_EPOCH, "the world was reset since");
+  if (request.epoch != -1 && request.epoch != reply.epoch)
+    return answer_with(reply_t::WRONG_EPOCH, "the world was reset since");
   if (must_wait(request)) return hold(request);
   execute(request, *session, reply);
 }
@@ -93,7 +98,8 @@ void Control::serve(const request_t& request) {
 // Answers what is not to be executed.
 Sessions::Verdict Control::judge(const request_t& request, const Session& session, reply_t& reply) {
   const reply_t* kept = nullptr;
-  if (is_waiting(request.session, request.sequence)) return Sessions::Verdict::wait;    // later ones may have been executed
+  if (is_waiting(request.session, request.sequence))
+    return Sessions::Verdict::wait;  // later ones may have been executed
   const Sessions::Verdict verdict = sessions_.judge(session, request.sequence, kept);
   const std::string last = std::to_string(session.last_sequence);
   switch (verdict) {
@@ -106,7 +112,8 @@ Sessions::Verdict Control::judge(const request_t& request, const Session& sessio
       break;
     case Sessions::Verdict::too_far:
       reply.code = reply_t::BAD_REQUEST;
-      reply.text = "the sequence is " + std::to_string(request.sequence) + ", and the last request was " + last + ": 1 to " +
+      reply.text = "the sequence is " + std::to_string(request.sequence) +
+                   ", and the last request was " + last + ": 1 to " +
                    std::to_string(session.last_sequence + Sessions::kMostJump) + " is allowed";
       break;
   }
@@ -116,9 +123,12 @@ Sessions::Verdict Control::judge(const request_t& request, const Session& sessio
 
 void Control::execute(const request_t& request, Session& session, reply_t& reply) {
   sessions_.begin(session, request.sequence);
-  engine::Outcome outcome = has_too_many(request)
-                        ? engine::Outcome::refuse(reply_t::REFUSED, "too many requests of this client wait for their steps: wait for the answers")
-                        : host_.execute(request, session);
+  engine::Outcome outcome =
+      has_too_many(request)
+          ? engine::Outcome::refuse(
+                reply_t::REFUSED,
+                "too many requests of this client wait for their steps: wait for the answers")
+          : host_.execute(request, session);
   reply.code = outcome.code;
   reply.text = std::move(outcome.text);
   reply.body = std::move(outcome.body);
@@ -133,37 +143,48 @@ void Control::execute(const request_t& request, Session& session, reply_t& reply
 bool Control::must_wait(const request_t& request) const {
   const RequestKind* kind = find_request_kind(request.kind);
   if ((!kind || kind->waits == RequestKind::for_state) && host_.state_comes()) return true;
-  return std::any_of(held_.begin(), held_.end(), [&](const request_t& held) { return held.session == request.session; });
+  return std::any_of(held_.begin(), held_.end(),
+                     [&](const request_t& held) { return held.session == request.session; });
 }
 
 // Beyond its share a client repeats what it asks for.
 void Control::hold(const request_t& request) {
   const auto of_session = [&](const request_t& held) { return held.session == request.session; };
-  const auto same = [&](const request_t& held) { return of_session(held) && held.sequence >= request.sequence; };
+  const auto same = [&](const request_t& held) {
+    return of_session(held) && held.sequence >= request.sequence;
+  };
   if (std::any_of(held_.begin(), held_.end(), same)) return;
-  if (static_cast<size_t>(std::count_if(held_.begin(), held_.end(), of_session)) < kMostHeld) held_.push_back(request);
+  if (static_cast<size_t>(std::count_if(held_.begin(), held_.end(), of_session)) < kMostHeld)
+    held_.push_back(request);
 }
 
 // There is room for a PAUSE when there is none for a STEP.
 bool Control::has_too_many(const request_t& request) const {
-  const auto waiting = static_cast<size_t>(std::count_if(waiting_.begin(), waiting_.end(), [&](const Waiting& each) {
-    return each.reply.session == request.session;
-  }));
+  const auto waiting =
+      static_cast<size_t>(std::count_if(waiting_.begin(), waiting_.end(), [&](const Waiting& each) {
+        return each.reply.session == request.session;
+      }));
   return waiting >= (request.kind == request_t::STEP ? kMostSteppings : kMostUnanswered);
 }
 
 void Control::join(const request_t& request, reply_t& reply) {
   join_t body;
-  if (decode_checked(request.body.data(), request.body.size(), body) != DecodeFault::none || body.client.empty() ||
-      body.client.size() > 63 || for_terminal(body.client) != body.client || request.sequence <= 0) {
+  if (decode_checked(request.body.data(), request.body.size(), body) != DecodeFault::none ||
+      body.client.empty() || body.client.size() > 63 || for_terminal(body.client) != body.client ||
+      request.sequence <= 0) {
     reply.code = reply_t::BAD_REQUEST;
-    reply.text = "JOIN wants a join_t with a name of 1 to 63 bytes of UTF-8 without control characters, and a sequence above 0";
-  } else if (const Session* session = sessions_.join(body.client, request.sequence, std::chrono::steady_clock::now(), host_.keeps)) {
+    reply.text =
+        "JOIN wants a join_t with a name of 1 to 63 bytes of UTF-8 without control characters, and "
+        "a sequence above 0";
+  } else if (const Session* session = sessions_.join(
+                 body.client, request.sequence, std::chrono::steady_clock::now(), host_.keeps)) {
     reply.session = session->id;
   } else {
     reply.code = reply_t::REFUSED;
-    reply.text = std::to_string(Sessions::kMostSessions) + " clients have joined, and each was heard within the last " +
-                 std::to_string(Sessions::kMaySilence.count()) + " s or takes part in lockstep: try again";
+    reply.text = std::to_string(Sessions::kMostSessions) +
+                 " clients have joined, and each was heard within the last " +
+                 std::to_string(Sessions::kMaySilence.count()) +
+                 " s or takes part in lockstep: try again";
   }
   publish(reply);
 }
@@ -185,8 +206,10 @@ void Control::answer(reply_t& reply, bool quiet) {
 
 void Control::published(int64_t step) {
   if (waiting_.empty()) return;
-  const auto ready = std::stable_partition(waiting_.begin(), waiting_.end(),
-                                           [&](const Waiting& waiting) { return waiting.after_step > step || waiting.after_step == kPending; });
+  const auto ready =
+      std::stable_partition(waiting_.begin(), waiting_.end(), [&](const Waiting& waiting) {
+        return waiting.after_step > step || waiting.after_step == kPending;
+      });
   for (auto it = ready; it != waiting_.end(); ++it) {
     it->reply.body = host_.state();
     answer(it->reply);
@@ -196,7 +219,9 @@ void Control::published(int64_t step) {
 
 template <class Condition>
 void Control::refuse_waiting(const std::string& why, Condition condition) {
-  const auto refused = std::stable_partition(waiting_.begin(), waiting_.end(), [&](const Waiting& waiting) { return !condition(waiting); });
+  const auto refused =
+      std::stable_partition(waiting_.begin(), waiting_.end(),
+                            [&](const Waiting& waiting) { return !condition(waiting); });
   for (auto waiting = refused; waiting != waiting_.end(); ++waiting) {
     waiting->reply.code = reply_t::REFUSED;
     waiting->reply.text = why;
@@ -211,7 +236,9 @@ void Control::cancel(const std::string& why) {
 }
 
 void Control::cancel_after(int64_t step, const std::string& why) {
-  refuse_waiting(why, [step](const Waiting& waiting) { return waiting.after_step > step && waiting.after_step != kPending; });
+  refuse_waiting(why, [step](const Waiting& waiting) {
+    return waiting.after_step > step && waiting.after_step != kPending;
+  });
 }
 
 bool Control::is_waiting(int64_t session, int64_t sequence) const {
@@ -222,13 +249,15 @@ bool Control::is_waiting(int64_t session, int64_t sequence) const {
 
 bool Control::is_pending(int64_t session, int64_t sequence) const {
   return std::any_of(waiting_.begin(), waiting_.end(), [&](const Waiting& waiting) {
-    return waiting.after_step == kPending && waiting.reply.session == session && waiting.reply.sequence == sequence;
+    return waiting.after_step == kPending && waiting.reply.session == session &&
+           waiting.reply.sequence == sequence;
   });
 }
 
 void Control::finish(int64_t session, int64_t sequence, engine::Outcome outcome) {
   const auto found = std::find_if(waiting_.begin(), waiting_.end(), [&](const Waiting& waiting) {
-    return waiting.after_step == kPending && waiting.reply.session == session && waiting.reply.sequence == sequence;
+    return waiting.after_step == kPending && waiting.reply.session == session &&
+           waiting.reply.sequence == sequence;
   });
   if (found == waiting_.end()) return;
   reply_t reply = std::move(found->reply);

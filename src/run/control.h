@@ -1,7 +1,8 @@
 // Simulation control: requests in, each executed once, replies out.
 //
-// The bus's thread puts requests into a bounded inbox; the publisher executes them between batches. What a
-// request does is the server's; who may ask, and that nothing is done twice, is seen to here.
+// The bus's thread puts requests into a bounded inbox; the publisher executes them between batches.
+// What a request does is the server's; who may ask, and that nothing is done twice, is seen to
+// here.
 #pragma once
 
 #include <atomic>
@@ -23,13 +24,15 @@ inline constexpr int64_t kMostSteps = 1'000'000'000;
 
 class Control {
  public:
-  static constexpr size_t kMostWaiting = 256;             // requests; more are dropped, their clients repeat them
+  static constexpr size_t kMostWaiting =
+      256;  // requests; more are dropped, their clients repeat them
   static constexpr size_t kMostWaitingBytes = 16u << 20;
-  static constexpr size_t kMaxRequestSize = 1 << 20;      // bytes
-  static constexpr size_t kMostHeld = 8;                  // requests of one session that wait for the first state
-  static constexpr size_t kMostSteppings = 16;            // STEPs of one session that are not answered yet
-  static constexpr size_t kMostUnanswered = 32;           // requests of one session that are not answered yet
-  static constexpr size_t kLongestText = 1000;            // bytes of a reply's text
+  static constexpr size_t kMaxRequestSize = 1 << 20;  // bytes
+  static constexpr size_t kMostHeld = 8;  // requests of one session that wait for the first state
+  static constexpr size_t kMostSteppings = 16;  // STEPs of one session that are not answered yet
+  static constexpr size_t kMostUnanswered =
+      32;                                       // requests of one session that are not answered yet
+  static constexpr size_t kLongestText = 1000;  // bytes of a reply's text
 
   // The run that it serves.
   struct Host {
@@ -39,10 +42,11 @@ class Control {
     std::function<void(const reply_t& reply)> publish;
     std::function<int64_t()> utime;
     std::function<int32_t()> epoch;
-    // True while there is no state, and one comes by itself: from the start, or a reset, until state 0 was published.
+    // True while there is no state, and one comes by itself: from the start, or a reset, until
+    // state 0 was published.
     std::function<bool()> state_comes;
-    // Lockstep's; may be empty. early: the request waits, unanswered, until it is repeated in its turn. keeps: the place of
-    // this session may not be given away.
+    // Lockstep's; may be empty. early: the request waits, unanswered, until it is repeated in its
+    // turn. keeps: the place of this session may not be given away.
     std::function<bool(const request_t& request, const Session& session)> early = {};
     std::function<void(int64_t session)> left = {};
     std::function<bool(int64_t session)> keeps = {};
@@ -72,14 +76,14 @@ class Control {
  private:
   struct Waiting {
     reply_t reply;
-    int64_t after_step;                // kPending: for finish()
+    int64_t after_step;  // kPending: for finish()
   };
   static constexpr int64_t kPending = INT64_MAX;
 
   void serve(const request_t& request);
   void execute(const request_t& request, Session& session, reply_t& reply);
   Sessions::Verdict judge(const request_t& request, const Session& session, reply_t& reply);
-  bool is_waiting(int64_t session, int64_t sequence) const;    // executed, and not answered yet
+  bool is_waiting(int64_t session, int64_t sequence) const;  // executed, and not answered yet
   bool must_wait(const request_t& request) const;
   void hold(const request_t& request);
   bool has_too_many(const request_t& request) const;
@@ -93,8 +97,8 @@ class Control {
   Host host_;
   Sessions sessions_;
   std::vector<Waiting> waiting_;
-  std::vector<request_t> held_;        // judged, and waiting for the first state
-  std::mutex mutex_;                   // of the next two
+  std::vector<request_t> held_;  // judged, and waiting for the first state
+  std::mutex mutex_;             // of the next two
   std::vector<request_t> inbox_;
   size_t inbox_bytes_ = 0;
   std::vector<request_t> taken_;

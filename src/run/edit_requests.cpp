@@ -1,12 +1,12 @@
 // Requests that change the world between two steps, or the time.
 //
-// The pacer holds, what is under way is published, and then nothing moves: the simulation's thread waits in the pacer, the
-// modules at their queues. So the change needs no lock against any of them.
+// The pacer holds, what is under way is published, and then nothing moves: the simulation's thread
+// waits in the pacer, the modules at their queues. So the change needs no lock against any of them.
 #include <spdlog/spdlog.h>
 
-#include "ruedo/applied_t.hpp"
 #include "engine/edits.h"
 #include "log/header.h"
+#include "ruedo/applied_t.hpp"
 #include "run/run.h"
 
 namespace ruedo::run {
@@ -19,20 +19,25 @@ constexpr size_t kFindingsTold = 5;
 bool Run::stand_still() {
   const int64_t last = pacer_->hold();
   while (publisher_.step() < last) {
-    if (simulation_->over()) return false;    // a state that cannot be ends a run before its time
-    if (const engine::Batch* batch = simulation_->take()) publish(*batch);
-    else wakeup_.wait();
+    if (simulation_->over()) return false;  // a state that cannot be ends a run before its time
+    if (const engine::Batch* batch = simulation_->take())
+      publish(*batch);
+    else
+      wakeup_.wait();
   }
   return pacer_->wait_until_held();
 }
 
 void Run::let_go() {
   pacer_->release();
-  wakeup_.set();    // what came meanwhile
+  wakeup_.set();  // what came meanwhile
 }
 
-Run::Outcome Run::change(const request_t& request, bool models, const std::function<Outcome()>& apply) {
-  if (!mode().has_room()) return Outcome::refuse(reply_t::REFUSED, "not all clients have the messages of the last steps: ask again");
+Run::Outcome Run::change(const request_t& request, bool models,
+                         const std::function<Outcome()>& apply) {
+  if (!mode().has_room())
+    return Outcome::refuse(reply_t::REFUSED,
+                           "not all clients have the messages of the last steps: ask again");
   if (!stand_still()) return Outcome::refuse(reply_t::REFUSED, "the run is over");
   Outcome outcome;
   {
@@ -77,15 +82,21 @@ void Run::note_files(const std::vector<std::string>& files) {
 }
 
 Run::Outcome Run::reset(const request_t& request, const reset_request_t& body) {
-  const auto bad = [](std::string text) { return Outcome::refuse(reply_t::BAD_REQUEST, std::move(text)); };
+  const auto bad = [](std::string text) {
+    return Outcome::refuse(reply_t::BAD_REQUEST, std::move(text));
+  };
   switch (body.what) {
     case reset_request_t::ALL:
-      return body.seed < -1 ? bad("a seed is 0 or more, -1 for the one there is") : reset_all(request, body.seed);
+      return body.seed < -1 ? bad("a seed is 0 or more, -1 for the one there is")
+                            : reset_all(request, body.seed);
     case reset_request_t::TIME:
     case reset_request_t::POSES:
-      if (body.seed != -1) return bad("another seed goes with a reset of everything; -1 is allowed here");
+      if (body.seed != -1)
+        return bad("another seed goes with a reset of everything; -1 is allowed here");
       return body.what == reset_request_t::TIME ? reset_time(request) : reset_poses(request);
-    default: return bad("a reset of kind " + std::to_string(body.what) + "; there are 0 (all), 1 (time) and 2 (poses)");
+    default:
+      return bad("a reset of kind " + std::to_string(body.what) +
+                 "; there are 0 (all), 1 (time) and 2 (poses)");
   }
 }
 
@@ -98,7 +109,8 @@ Run::Outcome Run::reset_all(const request_t& request, int64_t seed) {
 }
 
 Run::Outcome Run::reset_poses(const request_t& request) {
-  const Outcome outcome = change(request, false, [&] { return engine::reset_poses(*simulation_), Outcome{}; });
+  const Outcome outcome =
+      change(request, false, [&] { return engine::reset_poses(*simulation_), Outcome{}; });
   return outcome.code == reply_t::OK ? Outcome::with(engine::encoded(state())) : outcome;
 }
 
@@ -138,14 +150,17 @@ void Run::spawn_ready() {
       enters_at_ = mode().granted();
     }
     const request_t& request = made_->request;
-    if (!control_.is_pending(request.session, request.sequence)) continue;    // the world was reset meanwhile
+    if (!control_.is_pending(request.session, request.sequence))
+      continue;  // the world was reset meanwhile
     if (publisher_.step() < enters_at_ && !pacer_->paused()) return;
     control_.finish(request.session, request.sequence,
-                    made_->fault.empty() ? put_in(request, made_->body, made_->loaded) : Outcome::refuse(reply_t::BAD_REQUEST, made_->fault));
+                    made_->fault.empty() ? put_in(request, made_->body, made_->loaded)
+                                         : Outcome::refuse(reply_t::BAD_REQUEST, made_->fault));
   }
 }
 
-Run::Outcome Run::put_in(const request_t& request, const spawn_request_t& body, const model::LoadedModel& loaded) {
+Run::Outcome Run::put_in(const request_t& request, const spawn_request_t& body,
+                         const model::LoadedModel& loaded) {
   std::string name;
   const Outcome outcome = change(request, true, [&] {
     return engine::spawn(body, loaded, publisher_.step() + 1, *simulation_, channels_, name);
@@ -157,7 +172,7 @@ Run::Outcome Run::put_in(const request_t& request, const spawn_request_t& body, 
     const Finding& finding = loaded.findings[i];
     spdlog::warn("{}: {}: {}", finding.source.str(), finding.element, finding.text);
   }
-  name_request_t which;    // the answer says what its name is, and where it stands
+  name_request_t which;  // the answer says what its name is, and where it stands
   which.name = name;
   return publisher_.latest() ? get_state(request, which) : outcome;
 }

@@ -1,4 +1,5 @@
-// What holds a run back: no state after the limit is computed. The pacer is one; tests of the modes bring their own.
+// What holds a run back: no state after the limit is computed. The pacer is one; tests of the modes
+// bring their own.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +11,8 @@ class Gate {
   virtual ~Gate() = default;
   // The step that waits for a higher limit is due at once when it comes.
   virtual void set_limit(int64_t step) = 0;
-  // The same, without waking the simulation thread: the caller computes the next steps itself, or wakes it later.
+  // The same, without waking the simulation thread: the caller computes the next steps itself, or
+  // wakes it later.
   virtual void set_limit_quietly(int64_t step) = 0;
   virtual bool paused() const = 0;
 };

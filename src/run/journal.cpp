@@ -22,14 +22,17 @@ constexpr const char* kSuffix = ".snapshot";
 int open_nameless(const std::string& folder) {
   const int file = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
   if (file >= 0) return file;
-  std::string path = folder + "/.journal-XXXXXX";    // a file system without O_TMPFILE
+  std::string path = folder + "/.journal-XXXXXX";  // a file system without O_TMPFILE
   const int named = ::mkstemp(path.data());
-  if (named < 0) throw EnvironmentError("--snapshots: cannot write in '" + folder + "': " + std::strerror(errno));
+  if (named < 0)
+    throw EnvironmentError("--snapshots: cannot write in '" + folder +
+                           "': " + std::strerror(errno));
   ::unlink(path.c_str());
   return named;
 }
 
-// A file that is removed again unless it is kept: what was written of a snapshot would go on taking a full disk's room.
+// A file that is removed again unless it is kept: what was written of a snapshot would go on taking
+// a full disk's room.
 class PartOfFile {
  public:
   explicit PartOfFile(std::string path) : path_(std::move(path)) {}
@@ -61,7 +64,8 @@ class PartOfFile {
 };
 
 template <class Message>
-void write(log::Writer& writer, SimTime stamp_us, const std::string& channel, const Message& message) {
+void write(log::Writer& writer, SimTime stamp_us, const std::string& channel,
+           const Message& message) {
   std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
   message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
   writer.write(stamp_us, channel, bytes.data(), bytes.size());
@@ -69,7 +73,8 @@ void write(log::Writer& writer, SimTime stamp_us, const std::string& channel, co
 
 }  // namespace
 
-Journal::Journal(const std::string& folder) : folder_(folder), writer_(open_nameless(folder), "the journal in " + folder) {}
+Journal::Journal(const std::string& folder)
+    : folder_(folder), writer_(open_nameless(folder), "the journal in " + folder) {}
 
 void Journal::begin(const log_header_t& header, SimTime stamp_us) {
   writer_.truncate();
@@ -84,19 +89,25 @@ void Journal::message(const Published& message) {
 
 std::string Journal::snapshot_path(const std::string& name) const {
   const auto allowed = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' || c == '.';
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+           c == '-' || c == '.';
   };
-  if (name.empty() || name.size() > 63 || name[0] == '.' || !std::all_of(name.begin(), name.end(), allowed)) return "";
+  if (name.empty() || name.size() > 63 || name[0] == '.' ||
+      !std::all_of(name.begin(), name.end(), allowed))
+    return "";
   return folder_ + "/" + name + kSuffix;
 }
 
-std::string Journal::save_snapshot(const std::string& name, const state_hash_t& state, SimTime stamp_us) {
+std::string Journal::save_snapshot(const std::string& name, const state_hash_t& state,
+                                   SimTime stamp_us) {
   const std::string path = snapshot_path(name);
   PartOfFile part(folder_ + "/." + name + ".part");
   std::error_code error;
   size_t files = 0;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) files += entry.path().extension() == kSuffix;
-  if (files >= kMostSnapshots && !fs::exists(path, error)) return "the folder holds " + std::to_string(files) + " snapshots already";
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error))
+    files += entry.path().extension() == kSuffix;
+  if (files >= kMostSnapshots && !fs::exists(path, error))
+    return "the folder holds " + std::to_string(files) + " snapshots already";
   writer_.flush();
   if (!writer_.error().empty()) return "the journal is incomplete: " + writer_.error();
   try {

@@ -1,26 +1,27 @@
 // What acted on the world since its epoch began, from which snapshots are made.
 //
-// A file without a name in the snapshots' folder: it grows with what acts on the world and with nothing else, and begins
-// again with the world.
+// A file without a name in the snapshots' folder: it grows with what acts on the world and with
+// nothing else, and begins again with the world.
 #pragma once
 
 #include <cstdint>
 #include <string>
 #include <vector>
 
+#include "log/writer.h"
 #include "ruedo/log_header_t.hpp"
 #include "ruedo/state_hash_t.hpp"
-#include "log/writer.h"
 #include "run/sink.h"
 
 namespace ruedo::run {
 
 // The channels of records.
-inline const std::string kHeaderChannel = "ruedo/header", kAppliedChannel = "ruedo/applied", kStateHashChannel = "ruedo/state_hash";
+inline const std::string kHeaderChannel = "ruedo/header", kAppliedChannel = "ruedo/applied",
+                         kStateHashChannel = "ruedo/state_hash";
 
 class Journal : public Sink {
  public:
-  static constexpr size_t kMostSnapshots = 1000;    // files in the folder; more are refused
+  static constexpr size_t kMostSnapshots = 1000;  // files in the folder; more are refused
 
   // Throws EnvironmentError when nothing can be written in the folder.
   explicit Journal(const std::string& folder);
@@ -31,16 +32,17 @@ class Journal : public Sink {
   Hears hears() const override { return {.samples = false, .records = true, .repeated = true}; }
   void message(const Published& message) override;
 
-  // Writes the journal and the state that it leads to into a file of the folder, which then is whole or not there.
-  // stamp_us: of the state. The error, or "".
+  // Writes the journal and the state that it leads to into a file of the folder, which then is
+  // whole or not there. stamp_us: of the state. The error, or "".
   std::string save_snapshot(const std::string& name, const state_hash_t& state, SimTime stamp_us);
-  // The file of a snapshot; "" for a name that is none: 1 to 63 of letters, digits, '_', '-' and '.', not first a '.'.
+  // The file of a snapshot; "" for a name that is none: 1 to 63 of letters, digits, '_', '-' and
+  // '.', not first a '.'.
   std::string snapshot_path(const std::string& name) const;
 
  private:
   const std::string folder_;
   log::Writer writer_;
-  SimTime base_us_ = 0;    // the stamp of its begin
+  SimTime base_us_ = 0;  // the stamp of its begin
 };
 
 }  // namespace ruedo::run

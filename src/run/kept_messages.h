@@ -17,17 +17,20 @@ class KeptMessages : public Sink {
 
   // Samples, and the ticks.
   Hears hears() const override { return {.samples = true, .services = true}; }
-  void announce(const std::shared_ptr<const Announcement>& announcement) override { tick_ = announcement->own.tick; }
+  void announce(const std::shared_ptr<const Announcement>& announcement) override {
+    tick_ = announcement->own.tick;
+  }
   void begin_step(const Step& step) override { begin_step(step.step); }
   void message(const Published& message) override {
-    if (message.kind == Kind::sample || message.index == tick_) keep(message.index, message.sequence, message.data, message.size);
+    if (message.kind == Kind::sample || message.index == tick_)
+      keep(message.index, message.sequence, message.data, message.size);
   }
 
   // Steps follow on one another. keep() belongs to the last one.
   void begin_step(int64_t step);
   void keep(int channel, int64_t sequence, const uint8_t* data, size_t size);
 
-  void forget(int64_t step);    // all up to and with that one
+  void forget(int64_t step);  // all up to and with that one
   void clear() { forget(INT64_MAX); }
 
   // A batch of steps may go beyond: who asks stops before the next.
@@ -39,17 +42,22 @@ class KeptMessages : public Sink {
   std::span<const uint8_t> find(int64_t step, int channel, int64_t sequence) const;
 
  private:
-  struct Entry { int channel; int64_t sequence; size_t offset, size; };
+  struct Entry {
+    int channel;
+    int64_t sequence;
+    size_t offset, size;
+  };
   struct KeptStep {
     int64_t step = 0;
     std::vector<Entry> entries;
     std::vector<uint8_t> bytes;
   };
-  static constexpr size_t kSpareBytes = 64u << 10;    // a buffer larger than this goes back to the system
+  static constexpr size_t kSpareBytes = 64u
+                                        << 10;  // a buffer larger than this goes back to the system
 
-  int tick_ = -1;    // channel
+  int tick_ = -1;  // channel
   std::deque<KeptStep> steps_;
-  std::vector<KeptStep> spare_;    // their memory is used again
+  std::vector<KeptStep> spare_;  // their memory is used again
   size_t bytes_ = 0;
 };
 

@@ -38,8 +38,11 @@ Mode::Attended Live::attend(const std::vector<Session>&, int64_t step, Time now)
   const std::string missing = wait_for_->waits_for(step);
   if (missing.empty()) return {};
   told_ = true;
-  spdlog::warn("the run waits at step {} ({:g} s): --wait-for wants {}, and nothing came for a second. Does its sender run, and did it "
-               "before this server started?", step, static_cast<double>(step * step_us_) * 1e-6, missing);
+  spdlog::warn(
+      "the run waits at step {} ({:g} s): --wait-for wants {}, and nothing came for a second. Does "
+      "its sender run, and did it "
+      "before this server started?",
+      step, static_cast<double>(step * step_us_) * 1e-6, missing);
   return {};
 }
 

@@ -1,4 +1,5 @@
-// A run that goes on by itself, paced by real time alone, or by messages that it waits for (--wait-for).
+// A run that goes on by itself, paced by real time alone, or by messages that it waits for
+// (--wait-for).
 #pragma once
 
 #include <memory>
@@ -19,10 +20,10 @@ class Live : public Mode {
 
  private:
   const int64_t step_us_;
-  std::unique_ptr<WaitFor> wait_for_;    // null: for nobody
+  std::unique_ptr<WaitFor> wait_for_;  // null: for nobody
   Gate* gate_ = nullptr;
-  int64_t wait_step_ = -1;               // the run has been at this step
-  Time wait_begin_{};                    // since then
+  int64_t wait_step_ = -1;  // the run has been at this step
+  Time wait_begin_{};       // since then
   bool told_ = false;
 };
 

@@ -12,7 +12,8 @@
 namespace ruedo::run {
 namespace {
 
-constexpr auto kLastWords = std::chrono::seconds(1);    // who wants something after the end asks within that
+constexpr auto kLastWords =
+    std::chrono::seconds(1);  // who wants something after the end asks within that
 
 // Reads what decides whether a grant is early, without decoding all of it.
 bool read_grant(const request_t& request, grant_request_t& grant) {
@@ -20,7 +21,8 @@ bool read_grant(const request_t& request, grant_request_t& grant) {
 }
 
 const Session* session_of(const std::vector<Session>& sessions, int64_t id) {
-  const auto found = std::find_if(sessions.begin(), sessions.end(), [&](const Session& session) { return session.id == id; });
+  const auto found = std::find_if(sessions.begin(), sessions.end(),
+                                  [&](const Session& session) { return session.id == id; });
   return found == sessions.end() ? nullptr : &*found;
 }
 
@@ -46,7 +48,8 @@ void Lockstep::begin(const Stage& stage, int64_t step) {
 }
 
 Lockstep::Member* Lockstep::find(int64_t session) {
-  const auto found = std::find_if(members_.begin(), members_.end(), [&](const Member& member) { return member.session == session; });
+  const auto found = std::find_if(members_.begin(), members_.end(),
+                                  [&](const Member& member) { return member.session == session; });
   return found == members_.end() ? nullptr : &*found;
 }
 
@@ -60,10 +63,14 @@ engine::Outcome Lockstep::stands(const Member& member) const {
 
 engine::Outcome Lockstep::take_part(const Session& session) {
   if (const Member* member = find(session.id)) return stands(*member);
-  const auto place = std::find_if(members_.begin(), members_.end(), [&](const Member& member) { return member.name >= session.client; });
+  const auto place = std::find_if(members_.begin(), members_.end(), [&](const Member& member) {
+    return member.name >= session.client;
+  });
   if (place != members_.end() && place->name == session.client) {
-    if (!place->silent) return engine::Outcome::refuse(reply_t::REFUSED, "a client called '" + session.client + "' takes part already");
-    place->session = session.id;    // its grants stand where they stood
+    if (!place->silent)
+      return engine::Outcome::refuse(reply_t::REFUSED,
+                                     "a client called '" + session.client + "' takes part already");
+    place->session = session.id;  // its grants stand where they stood
     place->silent = false;
     place->grants.clear();
     note(request_t::JOIN, *place);
@@ -90,22 +97,29 @@ bool Lockstep::early(const request_t& request, const Session& session) const {
   if (grant.granted == member->granted && member->grants.size() >= kMostGrants) return true;
   size_t bytes = 0;
   for (const grant_command_t& command : grant.commands) bytes += command.data.size();
-  return grant.granted == member->granted && !member->held.empty() && !has_room(*member, grant.commands.size(), bytes);
+  return grant.granted == member->granted && !member->held.empty() &&
+         !has_room(*member, grant.commands.size(), bytes);
 }
 
 // Each has the same share of what is held, so that nobody takes another's.
 bool Lockstep::has_room(const Member& member, size_t count, size_t bytes) const {
   const size_t share = std::max<size_t>(members_.size(), 1);
-  return member.held.size() + count <= kMostHeld / share && member.held_bytes + bytes <= kMostHeldBytes / share;
+  return member.held.size() + count <= kMostHeld / share &&
+         member.held_bytes + bytes <= kMostHeldBytes / share;
 }
 
 std::string Lockstep::fault_of(const grant_request_t& grant, const Member& member) const {
-  if (grant.granted != member.granted) return fmt::format("granted is {}, but this client's grants stand at {}", grant.granted, member.granted);
-  if (grant.step_until < grant.granted) return fmt::format("step_until is {}, below granted, {}", grant.step_until, grant.granted);
+  if (grant.granted != member.granted)
+    return fmt::format("granted is {}, but this client's grants stand at {}", grant.granted,
+                       member.granted);
+  if (grant.step_until < grant.granted)
+    return fmt::format("step_until is {}, below granted, {}", grant.step_until, grant.granted);
   if (grant.step_until - grant.granted > kMostSteps) {
-    return fmt::format("step_until is {}, and granted {}: at most {} steps at once are allowed", grant.step_until, grant.granted, kMostSteps);
+    return fmt::format("step_until is {}, and granted {}: at most {} steps at once are allowed",
+                       grant.step_until, grant.granted, kMostSteps);
   }
-  if (grant.received > published_) return fmt::format("received is {}, but the newest state is {}", grant.received, published_);
+  if (grant.received > published_)
+    return fmt::format("received is {}, but the newest state is {}", grant.received, published_);
   return "";
 }
 
@@ -116,47 +130,68 @@ std::string Lockstep::take_commands(const grant_request_t& grant, std::vector<He
     const grant_command_t& command = grant.commands[i];
     const std::string which = fmt::format("command {} ({})", i, command.channel);
     if (command.step < grant.granted || command.step >= grant.step_until) {
-      return fmt::format("{} is for step {}; {} to {} is granted", which, command.step, grant.granted, grant.step_until - 1);
+      return fmt::format("{} is for step {}; {} to {} is granted", which, command.step,
+                         grant.granted, grant.step_until - 1);
     }
-    const auto input = std::find_if(inputs.begin(), inputs.end(), [&](const engine::Input& one) { return one.channel == command.channel; });
-    if (input == inputs.end() || command.channel.empty()) return which + ": no robot takes commands on that channel";
-    if (command.data.size() > engine::CommandInbox::kMaxMessageSize) return which + " is larger than 64 kB";
-    const DecodeFault fault = engine::decode_command(input->kind, command.data.data(), command.data.size(), decoded);
+    const auto input = std::find_if(inputs.begin(), inputs.end(), [&](const engine::Input& one) {
+      return one.channel == command.channel;
+    });
+    if (input == inputs.end() || command.channel.empty())
+      return which + ": no robot takes commands on that channel";
+    if (command.data.size() > engine::CommandInbox::kMaxMessageSize)
+      return which + " is larger than 64 kB";
+    const DecodeFault fault =
+        engine::decode_command(input->kind, command.data.data(), command.data.size(), decoded);
     if (fault != DecodeFault::none) return which + ": " + describe(fault);
     if (!engine::is_finite(decoded)) return which + ": a value is not finite";
     held.push_back({command.step, static_cast<int>(input - inputs.begin()), command.data});
   }
-  std::stable_sort(held.begin(), held.end(), [](const Held& a, const Held& b) { return a.step < b.step; });
+  std::stable_sort(held.begin(), held.end(),
+                   [](const Held& a, const Held& b) { return a.step < b.step; });
   return "";
 }
 
 std::string Lockstep::refusal(int32_t kind, bool) const {
   switch (kind) {
-    case request_t::RESTORE: return "a run in lockstep cannot be set to a snapshot: start one with --restore";
+    case request_t::RESTORE:
+      return "a run in lockstep cannot be set to a snapshot: start one with --restore";
     case request_t::GRANT:
     case request_t::RESEND:
     case request_t::INFO:
     case request_t::QUIT:
-    case request_t::STEP: return "";    // a STEP says that grants step
-    default: return begun() ? "" : "lockstep has not begun: call step(0), or grant. It waits for " + waits_for();
+    case request_t::STEP: return "";  // a STEP says that grants step
+    default:
+      return begun()
+                 ? ""
+                 : "lockstep has not begun: call step(0), or grant. It waits for " + waits_for();
   }
 }
 
 engine::Outcome Lockstep::grant(const request_t& request, const Session& session) {
   if (request.kind == request_t::RESEND) return resend(request, session);
   grant_request_t grant;
-  if (!read_grant(request, grant)) return engine::Outcome::refuse(reply_t::BAD_REQUEST, "the body is not a grant_request_t");
+  if (!read_grant(request, grant))
+    return engine::Outcome::refuse(reply_t::BAD_REQUEST, "the body is not a grant_request_t");
   if (grant.granted == -1) return take_part(session);
   Member* member = find(session.id);
-  if (!member) return engine::Outcome::refuse(reply_t::BAD_REQUEST, "this client does not take part: a grant of granted -1 comes first");
-  if (over_) return engine::Outcome::refuse(reply_t::REFUSED, fmt::format("the run has ended at step {}", published_));
-  if (std::string wrong = fault_of(grant, *member); !wrong.empty()) return engine::Outcome::refuse(reply_t::BAD_REQUEST, std::move(wrong));
+  if (!member)
+    return engine::Outcome::refuse(
+        reply_t::BAD_REQUEST, "this client does not take part: a grant of granted -1 comes first");
+  if (over_)
+    return engine::Outcome::refuse(reply_t::REFUSED,
+                                   fmt::format("the run has ended at step {}", published_));
+  if (std::string wrong = fault_of(grant, *member); !wrong.empty())
+    return engine::Outcome::refuse(reply_t::BAD_REQUEST, std::move(wrong));
   std::vector<Held> held;
-  if (std::string wrong = take_commands(grant, held); !wrong.empty()) return engine::Outcome::refuse(reply_t::BAD_REQUEST, std::move(wrong));
+  if (std::string wrong = take_commands(grant, held); !wrong.empty())
+    return engine::Outcome::refuse(reply_t::BAD_REQUEST, std::move(wrong));
   size_t bytes = 0;
   for (const Held& command : held) bytes += command.bytes.size();
   if (!has_room(*member, held.size(), bytes)) {
-    return engine::Outcome::refuse(reply_t::REFUSED, fmt::format("{} commands of {} bytes are more than a client may send ahead", held.size(), bytes));
+    return engine::Outcome::refuse(
+        reply_t::REFUSED,
+        fmt::format("{} commands of {} bytes are more than a client may send ahead", held.size(),
+                    bytes));
   }
   member->held_bytes += bytes;
   std::move(held.begin(), held.end(), std::back_inserter(member->held));
@@ -178,15 +213,17 @@ void Lockstep::advance() {
     for (const Member& member : members_) note(request_t::JOIN, member);
   }
   int64_t until = members_.empty() ? limit_ : INT64_MAX;
-  for (const Member& member : members_) until = std::min(until, member.silent ? limit_ : member.granted);
+  for (const Member& member : members_)
+    until = std::min(until, member.silent ? limit_ : member.granted);
   until = std::min(until, std::max<int64_t>(published_, 0) + kMostAhead);
   if (until <= limit_) return;
   schedule(until);
   limit_ = until;
-  gate_->set_limit_quietly(limit_);    // the publisher goes on from here
+  gate_->set_limit_quietly(limit_);  // the publisher goes on from here
 }
 
-// Commands of one step go in the order of the clients' names, each client's in the order of its grants.
+// Commands of one step go in the order of the clients' names, each client's in the order of its
+// grants.
 void Lockstep::schedule(int64_t until) {
   for (int64_t step = std::max<int64_t>(limit_, 0); step < until;) {
     int64_t next = until;
@@ -197,8 +234,10 @@ void Lockstep::schedule(int64_t until) {
           next = std::min(next, command.step);
           break;
         }
-        if (inbox_->schedule(command.step, command.input, command.bytes.data(), command.bytes.size()) != engine::CommandInbox::Scheduled::kept) {
-          spdlog::error("lockstep: a command of '{}' for step {} found no place", member.name, command.step);
+        if (inbox_->schedule(command.step, command.input, command.bytes.data(),
+                             command.bytes.size()) != engine::CommandInbox::Scheduled::kept) {
+          spdlog::error("lockstep: a command of '{}' for step {} found no place", member.name,
+                        command.step);
         }
       }
     }
@@ -243,7 +282,9 @@ bool Lockstep::keeps(int64_t session) const {
 
 std::string Lockstep::waits_for() const {
   if (begun() && gate_->paused()) return "a RESUME: it is paused";
-  if (!started_) return fmt::format("{} more of {} clients", static_cast<size_t>(options_.clients) - members_.size(), options_.clients);
+  if (!started_)
+    return fmt::format("{} more of {} clients",
+                       static_cast<size_t>(options_.clients) - members_.size(), options_.clients);
   if (members_.empty()) return "a client that takes part";
   std::string names;
   for (const Member& member : members_) {
@@ -261,8 +302,10 @@ Mode::Attended Lockstep::attend(const std::vector<Session>& sessions, int64_t, T
 std::vector<int64_t> Lockstep::check_leases(const std::vector<Session>& sessions, Time now) {
   std::vector<int64_t> dropped;
   if (now < next_check_) return dropped;
-  const auto lease = std::chrono::duration_cast<Time::duration>(std::chrono::duration<double>(options_.lease_s));
-  next_check_ = now + std::clamp<Time::duration>(lease / 8, std::chrono::milliseconds(5), std::chrono::seconds(1));
+  const auto lease =
+      std::chrono::duration_cast<Time::duration>(std::chrono::duration<double>(options_.lease_s));
+  next_check_ = now + std::clamp<Time::duration>(lease / 8, std::chrono::milliseconds(5),
+                                                 std::chrono::seconds(1));
   for (size_t i = 0; i < members_.size();) {
     Member& member = members_[i];
     const Session* session = session_of(sessions, member.session);
@@ -273,8 +316,10 @@ std::vector<int64_t> Lockstep::check_leases(const std::vector<Session>& sessions
       note(request_t::JOIN, member);
     } else if (silent && !member.silent) {
       note(request_t::LEAVE, member);
-      const std::string what = fmt::format("lockstep: nothing was heard from '{}' for {:g} s", member.name, options_.lease_s);
-      if (options_.policy == LockstepOptions::Policy::fail) throw LeaseEnded(what + fmt::format(", at step {}", published_));
+      const std::string what = fmt::format("lockstep: nothing was heard from '{}' for {:g} s",
+                                           member.name, options_.lease_s);
+      if (options_.policy == LockstepOptions::Policy::fail)
+        throw LeaseEnded(what + fmt::format(", at step {}", published_));
       const bool drop = options_.policy == LockstepOptions::Policy::drop || !started_;
       spdlog::warn("{}: {}", what, drop ? "it takes part no longer" : "the run waits for it");
       if (drop) {
@@ -292,7 +337,8 @@ std::vector<int64_t> Lockstep::check_leases(const std::vector<Session>& sessions
 }
 
 void Lockstep::left(int64_t session) {
-  const auto found = std::find_if(members_.begin(), members_.end(), [&](const Member& member) { return member.session == session; });
+  const auto found = std::find_if(members_.begin(), members_.end(),
+                                  [&](const Member& member) { return member.session == session; });
   if (found == members_.end()) return;
   if (started_) note(request_t::LEAVE, *found);
   members_.erase(found);

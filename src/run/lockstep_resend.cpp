@@ -4,11 +4,11 @@
 
 #include <fmt/format.h>
 
+#include "engine/world_state.h"
 #include "ruedo/decode.h"
 #include "ruedo/resend_reply_t.hpp"
 #include "ruedo/resend_request_t.hpp"
 #include "run/lockstep.h"
-#include "engine/world_state.h"
 
 namespace ruedo::run {
 
@@ -19,25 +19,33 @@ engine::Outcome Lockstep::resend(const request_t& request, const Session& sessio
     return engine::Outcome::refuse(reply_t::BAD_REQUEST, "the body is not a resend_request_t");
   }
   Member* member = find(session.id);
-  if (!member) return engine::Outcome::refuse(reply_t::UNKNOWN_SESSION, "this client does not take part in lockstep (any more)");
+  if (!member)
+    return engine::Outcome::refuse(reply_t::UNKNOWN_SESSION,
+                                   "this client does not take part in lockstep (any more)");
   if (body.received > published_) {
-    return engine::Outcome::refuse(reply_t::BAD_REQUEST, fmt::format("received is {}, but the newest state is {}", body.received, published_));
+    return engine::Outcome::refuse(
+        reply_t::BAD_REQUEST,
+        fmt::format("received is {}, but the newest state is {}", body.received, published_));
   }
   member->received = std::max(member->received, body.received);
   forget();
   if (over_ && member->received == published_) {
-    return engine::Outcome::refuse(reply_t::REFUSED, fmt::format("the run has ended at step {}", published_));
+    return engine::Outcome::refuse(reply_t::REFUSED,
+                                   fmt::format("the run has ended at step {}", published_));
   }
   resend_reply_t reply;
   reply.step = published_;
   reply.waits_for = waits_for();
   size_t room = engine::kMaxPartSize;
-  for (const resend_wanted_t& wanted : std::span(body.wanted).first(std::min(body.wanted.size(), kMostWanted))) {
-    const std::span<const uint8_t> bytes = kept_.find(wanted.step, wanted.channel_index, wanted.sequence);
+  for (const resend_wanted_t& wanted :
+       std::span(body.wanted).first(std::min(body.wanted.size(), kMostWanted))) {
+    const std::span<const uint8_t> bytes =
+        kept_.find(wanted.step, wanted.channel_index, wanted.sequence);
     if (wanted.offset < 0 || static_cast<size_t>(wanted.offset) >= bytes.size()) continue;
     const size_t left = bytes.size() - static_cast<size_t>(wanted.offset);
     if (left > room && !reply.parts.empty()) break;
-    const std::span<const uint8_t> piece = bytes.subspan(static_cast<size_t>(wanted.offset), std::min(left, room));
+    const std::span<const uint8_t> piece =
+        bytes.subspan(static_cast<size_t>(wanted.offset), std::min(left, room));
     resend_part_t& part = reply.parts.emplace_back();
     part.step = wanted.step;
     part.channel_index = wanted.channel_index;

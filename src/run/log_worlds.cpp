@@ -1,11 +1,15 @@
-// Requests of the log are carried out on its world as the server did, but for the motion: names, and places in the lists
-// of bodies, come out the same.
+// Requests of the log are carried out on its world as the server did, but for the motion: names,
+// and places in the lists of bodies, come out the same.
 #include "run/log_worlds.h"
 
 #include <algorithm>
 #include <set>
 
 #include "core/utf8.h"
+#include "engine/edits.h"
+#include "engine/fleet.h"
+#include "engine/world_editor.h"
+#include "engine/world_info.h"
 #include "model/body_layout.h"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
@@ -13,15 +17,11 @@
 #include "ruedo/request_t.hpp"
 #include "ruedo/reset_request_t.hpp"
 #include "ruedo/world_info_t.hpp"
-#include "engine/edits.h"
-#include "engine/fleet.h"
-#include "engine/world_editor.h"
-#include "engine/world_info.h"
 
 namespace ruedo::run {
 namespace {
 
-constexpr size_t kMostPlaced = 50'000;    // models of all scenes together: each scene lists its own
+constexpr size_t kMostPlaced = 50'000;  // models of all scenes together: each scene lists its own
 
 using model::WorldModel;
 
@@ -31,8 +31,10 @@ bool read_body(const applied_t& applied, Body& body) {
 }
 
 // The world after a request; null when it changed no model.
-std::shared_ptr<const WorldModel> edited(const applied_t& applied, const std::shared_ptr<const WorldModel>& before,
-                                         const std::shared_ptr<const WorldModel>& first, engine::ModelStore& models) {
+std::shared_ptr<const WorldModel> edited(const applied_t& applied,
+                                         const std::shared_ptr<const WorldModel>& before,
+                                         const std::shared_ptr<const WorldModel>& first,
+                                         engine::ModelStore& models) {
   switch (applied.kind) {
     case request_t::RESET: {
       reset_request_t body;
@@ -50,10 +52,12 @@ std::shared_ptr<const WorldModel> edited(const applied_t& applied, const std::sh
     }
     default: {
       spawn_request_t body;
-      if (!read_body(applied, body) || engine::check_spawn(body).code != reply_t::OK) return nullptr;
+      if (!read_body(applied, body) || engine::check_spawn(body).code != reply_t::OK)
+        return nullptr;
       auto world = std::make_shared<WorldModel>(*before);
       const model::LoadedModel loaded = models.load(body);
-      const std::string name = body.name.empty() ? engine::unused_name(*world, loaded.name) : body.name;
+      const std::string name =
+          body.name.empty() ? engine::unused_name(*world, loaded.name) : body.name;
       const Pose X_WM = engine::spawn_pose(*world, *loaded.model, body);
       engine::WorldEditor(*world).place(name, X_WM, loaded.model);
       return world;
@@ -62,7 +66,8 @@ std::shared_ptr<const WorldModel> edited(const applied_t& applied, const std::sh
 }
 
 // ruedo/info of that world with the channels that the log has.
-std::vector<std::vector<uint8_t>> make_info(const log::Index& index, const LoggedRun& run, const WorldModel* world) {
+std::vector<std::vector<uint8_t>> make_info(const log::Index& index, const LoggedRun& run,
+                                            const WorldModel* world) {
   world_info_t head{};
   std::vector<world_info_t> parts;
   if (index.header()) {
@@ -78,7 +83,8 @@ std::vector<std::vector<uint8_t>> make_info(const log::Index& index, const Logge
     Findings findings;
     for (size_t r = 0; r < layout.robots.size(); ++r) {
       if (world->models[static_cast<size_t>(layout.robots[r].instance)].removed) continue;
-      const engine::FleetOptions options{.disabled = run.disabled, .keep_going = true, .only_robot = static_cast<int>(r)};
+      const engine::FleetOptions options{
+          .disabled = run.disabled, .keep_going = true, .only_robot = static_cast<int>(r)};
       engine::Fleet fleet = engine::make_fleet(*world, layout, options, channels, findings);
       devices.insert(devices.end(), fleet.devices.begin(), fleet.devices.end());
     }
@@ -90,7 +96,9 @@ std::vector<std::vector<uint8_t>> make_info(const log::Index& index, const Logge
   std::set<std::string> missing;
   for (const log::Index::Channel& channel : index.channels()) missing.insert(channel.name);
   for (world_info_t& part : parts) {
-    std::erase_if(part.channels, [&](const channel_info_t& channel) { return channel.input || missing.erase(channel.name) == 0; });
+    std::erase_if(part.channels, [&](const channel_info_t& channel) {
+      return channel.input || missing.erase(channel.name) == 0;
+    });
   }
   for (const log::Index::Channel& channel : index.channels()) {
     if (!missing.contains(channel.name)) continue;
@@ -118,19 +126,22 @@ LogWorlds::LogWorlds(const log::Index& index, const LoadRun& load) {
       run = load(*index.header());
       fault_ = run.warning;
     } else {
-      fault_ = "The log has no ruedo/header, so its world is not known: it was not recorded by ruedo run --record. Its channels are shown.";
+      fault_ =
+          "The log has no ruedo/header, so its world is not known: it was not recorded by ruedo "
+          "run --record. Its channels are shown.";
     }
   } catch (const std::exception& error) {
     fault_ = std::string("The world of the log cannot be shown: ") + error.what();
   }
   scenes_.push_back({index.begin_us(), run.world, make_info(index, run, run.world.get())});
   if (!run.world) return;
-  size_t placed = 0;    // models of all scenes together
+  size_t placed = 0;  // models of all scenes together
   engine::ModelStore models(index.header()->world_file);
   for (const log::Index::Edit& edit : index.edits()) {
     try {
       if (placed += scenes_.back().world->models.size(); placed > kMostPlaced) {
-        fault_ += (fault_.empty() ? "" : " ") + std::string("Only the first changes of the world are shown.");
+        fault_ += (fault_.empty() ? "" : " ") +
+                  std::string("Only the first changes of the world are shown.");
         return;
       }
       auto world = edited(edit.applied, scenes_.back().world, run.world, models);
@@ -138,15 +149,19 @@ LogWorlds::LogWorlds(const log::Index& index, const LoadRun& load) {
       auto info = make_info(index, run, world.get());
       scenes_.push_back({edit.time_us, std::move(world), std::move(info)});
     } catch (const std::exception& error) {
-      fault_ += (fault_.empty() ? "" : " ") + std::string("What was spawned in the log cannot be shown: ") + error.what();
-      return;    // the places of what comes after it are not known
+      fault_ += (fault_.empty() ? "" : " ") +
+                std::string("What was spawned in the log cannot be shown: ") + error.what();
+      return;  // the places of what comes after it are not known
     }
   }
-  if (index.edits().size() >= log::Index::kMostEdits) fault_ += "Only the first changes of the world are shown.";
+  if (index.edits().size() >= log::Index::kMostEdits)
+    fault_ += "Only the first changes of the world are shown.";
 }
 
 const LogWorlds::Scene& LogWorlds::at(SimTime time_us) const {
-  const auto after = std::upper_bound(scenes_.begin(), scenes_.end(), time_us, [](SimTime time, const Scene& scene) { return time < scene.from_us; });
+  const auto after =
+      std::upper_bound(scenes_.begin(), scenes_.end(), time_us,
+                       [](SimTime time, const Scene& scene) { return time < scene.from_us; });
   return after == scenes_.begin() ? scenes_.front() : *(after - 1);
 }
 

@@ -1,4 +1,5 @@
-// What ran at each moment of a log: its world, as requests changed it, and the ruedo/info that a log has not.
+// What ran at each moment of a log: its world, as requests changed it, and the ruedo/info that a
+// log has not.
 #pragma once
 
 #include <cstdint>
@@ -16,9 +17,9 @@ namespace ruedo::run {
 // The run of a log as its header has it.
 struct LoggedRun {
   std::shared_ptr<const model::WorldModel> world;
-  std::vector<std::string> disabled;                            // devices
+  std::vector<std::string> disabled;  // devices
   std::vector<std::pair<std::string, std::string>> remaps;
-  std::string warning;                                          // "" or in what it may not be that run's world
+  std::string warning;  // "" or in what it may not be that run's world
 };
 // Throws InputError when the world cannot be read, or EnvironmentError.
 using LoadRun = std::function<LoggedRun(const log_header_t&)>;
@@ -27,8 +28,8 @@ class LogWorlds {
  public:
   struct Scene {
     SimTime from_us = 0;
-    std::shared_ptr<const model::WorldModel> world;    // null: none is known
-    std::vector<std::vector<uint8_t>> info;            // encoded world_info_t, in parts
+    std::shared_ptr<const model::WorldModel> world;  // null: none is known
+    std::vector<std::vector<uint8_t>> info;          // encoded world_info_t, in parts
   };
 
   LogWorlds(const log::Index& index, const LoadRun& load);
@@ -38,7 +39,7 @@ class LogWorlds {
   const std::string& fault() const { return fault_; }
 
  private:
-  std::vector<Scene> scenes_;    // never empty
+  std::vector<Scene> scenes_;  // never empty
   std::string fault_;
 };
 

@@ -1,8 +1,10 @@
-// How a run goes on: by itself (Live), by what its clients grant (Lockstep), or by what is in a log (Repeating).
+// How a run goes on: by itself (Live), by what its clients grant (Lockstep), or by what is in a log
+// (Repeating).
 //
-// The run asks its mode whether it may go on, tells it what was published, and asks when it wants to be called again. What is said
-// of states, requests and messages is the same in all modes. The publisher's thread calls everything here; receive() comes from any
-// thread, never beside begin() or attend().
+// The run asks its mode whether it may go on, tells it what was published, and asks when it wants
+// to be called again. What is said of states, requests and messages is the same in all modes. The
+// publisher's thread calls everything here; receive() comes from any thread, never beside begin()
+// or attend().
 #pragma once
 
 #include <chrono>
@@ -11,10 +13,10 @@
 #include <string>
 #include <vector>
 
-#include "ruedo/request_t.hpp"
 #include "engine/channels.h"
 #include "engine/command_inbox.h"
 #include "engine/outcome.h"
+#include "ruedo/request_t.hpp"
 #include "run/gate.h"
 #include "run/sessions.h"
 #include "run/sink.h"
@@ -31,18 +33,18 @@ class Mode {
     engine::CommandInbox* inbox = nullptr;
     Gate* gate = nullptr;
     const engine::Channels* channels = nullptr;
-    SimTime base_us = 0;                              // the stamp of sim time 0
+    SimTime base_us = 0;  // the stamp of sim time 0
     std::function<std::string(int robot)> robot_name;
   };
   // What the run has to do before it goes on.
   struct Turn {
     enum class What { nothing, execute, change_mode, end };
     What what = What::nothing;
-    request_t request{};    // to execute
+    request_t request{};  // to execute
   };
   struct Attended {
-    Time next = Time::max();        // when attend() wants to be called again, at the latest
-    std::vector<int64_t> dropped;   // sessions that have ended
+    Time next = Time::max();       // when attend() wants to be called again, at the latest
+    std::vector<int64_t> dropped;  // sessions that have ended
   };
 
   virtual ~Mode() = default;
@@ -53,7 +55,8 @@ class Mode {
   virtual void begin(const Stage& stage, int64_t step) = 0;
   // False while somebody has to catch up with what was published: no batch is taken.
   virtual bool has_room() const { return true; }
-  // Clients say how far it goes: every step has its tick, and the publisher computes a few steps itself.
+  // Clients say how far it goes: every step has its tick, and the publisher computes a few steps
+  // itself.
   virtual bool takes_grants() const { return false; }
   // The last state that was granted; -1: none was.
   virtual int64_t granted() const { return -1; }
@@ -108,7 +111,8 @@ class Mode {
   // GRANT and RESEND, where it takes grants.
   virtual engine::Outcome grant(const request_t& request, const Session& session) {
     static_cast<void>(session);
-    return engine::Outcome::refuse(reply_t::NOT_SUPPORTED, "kind " + std::to_string(request.kind) + " is for runs in lockstep");
+    return engine::Outcome::refuse(reply_t::NOT_SUPPORTED, "kind " + std::to_string(request.kind) +
+                                                               " is for runs in lockstep");
   }
   // A grant that has to wait for one before it, or for room: it is ignored until it is repeated.
   virtual bool early(const request_t& request, const Session& session) const {

@@ -9,7 +9,8 @@
 
 namespace ruedo::run {
 
-ModelWorker::ModelWorker(engine::ModelStore& store, engine::Wakeup& ready, std::function<void()> before)
+ModelWorker::ModelWorker(engine::ModelStore& store, engine::Wakeup& ready,
+                         std::function<void()> before)
     : store_(store), ready_(ready), before_(std::move(before)) {}
 
 ModelWorker::~ModelWorker() {
@@ -26,11 +27,13 @@ ModelWorker::~ModelWorker() {
 engine::Outcome ModelWorker::add(Order order) {
   {
     const std::lock_guard lock(mutex_);
-    const auto of_session = std::count_if(waiting_.begin(), waiting_.end(), [&](const Order& other) {
-      return other.request.session == order.request.session;
-    });
+    const auto of_session = std::count_if(
+        waiting_.begin(), waiting_.end(),
+        [&](const Order& other) { return other.request.session == order.request.session; });
     if (waiting_.size() >= kMostWaiting || static_cast<size_t>(of_session) >= kMostOfSession) {
-      return engine::Outcome::refuse(reply_t::REFUSED, std::to_string(waiting_.size()) + " models are being made ready: ask again when they are there");
+      return engine::Outcome::refuse(
+          reply_t::REFUSED, std::to_string(waiting_.size()) +
+                                " models are being made ready: ask again when they are there");
     }
     waiting_.push_back(std::move(order));
     if (!thread_.joinable()) thread_ = std::thread([this] { work(); });
@@ -77,7 +80,8 @@ ModelWorker::Made ModelWorker::make(Order order) {
     made.fault = error.what();
   }
   // A mesh that cost too much may only be left out where a file is read on purpose.
-  if (!budget_->fault().empty()) made.fault = "the model costs too much to be made ready: " + budget_->fault();
+  if (!budget_->fault().empty())
+    made.fault = "the model costs too much to be made ready: " + budget_->fault();
   return made;
 }
 

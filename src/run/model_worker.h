@@ -1,7 +1,8 @@
-// Where the models of SPAWN requests are made ready: read, checked, their meshes imported, in a thread beside the run.
+// Where the models of SPAWN requests are made ready: read, checked, their meshes imported, in a
+// thread beside the run.
 //
-// One after the other, in the order of the requests, each under a budget of time and memory. What is ready is put in by the
-// publisher, between two steps.
+// One after the other, in the order of the requests, each under a budget of time and memory. What
+// is ready is put in by the publisher, between two steps.
 #pragma once
 
 #include <condition_variable>
@@ -13,18 +14,18 @@
 #include <string>
 #include <thread>
 
-#include "model/load_budget.h"
-#include "ruedo/request_t.hpp"
 #include "engine/edits.h"
 #include "engine/queue.h"
+#include "model/load_budget.h"
+#include "ruedo/request_t.hpp"
 
 namespace ruedo::run {
 
 class ModelWorker {
  public:
-  static constexpr size_t kMostWaiting = 32, kMostOfSession = 2;    // models; more are refused
-  static constexpr auto kTime = std::chrono::seconds(30);           // for a model
-  static constexpr size_t kMeshBytes = size_t{512} << 20;           // of a model
+  static constexpr size_t kMostWaiting = 32, kMostOfSession = 2;  // models; more are refused
+  static constexpr auto kTime = std::chrono::seconds(30);         // for a model
+  static constexpr size_t kMeshBytes = size_t{512} << 20;         // of a model
 
   struct Order {
     request_t request;
@@ -32,13 +33,13 @@ class ModelWorker {
   };
   struct Made : Order {
     model::LoadedModel loaded;
-    std::string fault;    // "": there is a model
+    std::string fault;  // "": there is a model
   };
 
-  // ready: set whenever take() may have something. before: called in the worker's thread before each model; may be empty.
-  // Both, and the store, must outlive it.
+  // ready: set whenever take() may have something. before: called in the worker's thread before
+  // each model; may be empty. Both, and the store, must outlive it.
   ModelWorker(engine::ModelStore& store, engine::Wakeup& ready, std::function<void()> before);
-  ~ModelWorker();    // leaves off
+  ~ModelWorker();  // leaves off
 
   // The publisher's, as take(). The outcome is pending, or a refusal.
   engine::Outcome add(Order order);
@@ -51,13 +52,13 @@ class ModelWorker {
   engine::ModelStore& store_;
   engine::Wakeup& ready_;
   const std::function<void()> before_;
-  std::mutex mutex_;                // of all that follows
+  std::mutex mutex_;  // of all that follows
   std::condition_variable changed_;
-  std::deque<Order> waiting_;       // the first is being made
+  std::deque<Order> waiting_;  // the first is being made
   std::deque<Made> made_;
   std::shared_ptr<model::LoadBudget> budget_;
   bool over_ = false;
-  std::thread thread_;              // started with the first order
+  std::thread thread_;  // started with the first order
 };
 
 }  // namespace ruedo::run

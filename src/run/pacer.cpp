@@ -1,5 +1,5 @@
-// Pacing by absolute deadlines on the monotonic clock; a condition variable's timed wait is the same kernel
-// timer as clock_nanosleep's, and a pause or the end of the run cuts it short.
+// Pacing by absolute deadlines on the monotonic clock; a condition variable's timed wait is the
+// same kernel timer as clock_nanosleep's, and a pause or the end of the run cuts it short.
 #include "run/pacer.h"
 
 #include <algorithm>
@@ -10,10 +10,15 @@
 namespace ruedo::run {
 
 Pacer::Pacer(int64_t step_us, double rate, int64_t last_step)
-    : step_us_(step_us), last_step_(last_step), rate_(rate), until_(last_step), origin_time_(Clock::now()) {}
+    : step_us_(step_us),
+      last_step_(last_step),
+      rate_(rate),
+      until_(last_step),
+      origin_time_(Clock::now()) {}
 
 Pacer::Clock::time_point Pacer::due(int64_t step) const {
-  const double real_us = static_cast<double>(step - origin_step_) * static_cast<double>(step_us_) / rate_;
+  const double real_us =
+      static_cast<double>(step - origin_step_) * static_cast<double>(step_us_) / rate_;
   return origin_time_ + std::chrono::nanoseconds(whole(std::min(real_us * 1e3, 9e18)));
 }
 
@@ -36,7 +41,7 @@ int Pacer::wait(int64_t& step, int limit) {
       sleep(lock);
       continue;
     }
-    step = granted_ + 1;    // some may have been borrowed
+    step = granted_ + 1;  // some may have been borrowed
     if (hold_ && !stopped_) {
       held_ = true;
       changed_.notify_all();
@@ -54,8 +59,9 @@ int Pacer::wait(int64_t& step, int limit) {
       sleep(lock);
       continue;
     }
-    int64_t count = std::min<int64_t>(limit - 1, until - step) + 1;    // until may be the largest number there is
-    if (std::isfinite(rate_) && !paused_) {    // single steps are taken at once
+    int64_t count =
+        std::min<int64_t>(limit - 1, until - step) + 1;  // until may be the largest number there is
+    if (std::isfinite(rate_) && !paused_) {              // single steps are taken at once
       const Clock::time_point now = Clock::now();
       const Clock::time_point due_now = due(step);
       if (now < due_now) {
@@ -66,7 +72,7 @@ int Pacer::wait(int64_t& step, int limit) {
         origin_step_ = step;
         origin_time_ = now - kMostCatchUp;
       }
-      int64_t late = 1;    // of a paced run, only what is already due goes together
+      int64_t late = 1;  // of a paced run, only what is already due goes together
       while (late < count && due(step + late) <= now) ++late;
       count = late;
     }
@@ -79,7 +85,7 @@ int Pacer::borrow(int64_t& step, int limit) {
   std::lock_guard lock(mutex_);
   const int64_t until = std::min(until_, limit_);
   if (lent_ || granted_ >= until) return 0;
-  const bool paced = std::isfinite(rate_) && !paused_;    // it is real time that says when
+  const bool paced = std::isfinite(rate_) && !paused_;  // it is real time that says when
   if (!asleep_ || hold_ || stopped_ || paced || until - granted_ > limit) {
     changed_.notify_all();
     return 0;
@@ -144,7 +150,7 @@ void Pacer::stop() {
 int64_t Pacer::pause() {
   std::lock_guard lock(mutex_);
   paused_ = true;
-  until_ = std::max<int64_t>(granted_, 0);    // the initial state is always published
+  until_ = std::max<int64_t>(granted_, 0);  // the initial state is always published
   return until_;
 }
 

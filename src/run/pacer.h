@@ -1,7 +1,9 @@
-// When the next steps may be computed: real time, pause, single steps and the end of the run in one place.
+// When the next steps may be computed: real time, pause, single steps and the end of the run in one
+// place.
 //
-// Step s of a run at rate r is due s dt / r after the start, by the monotonic clock: deadlines are absolute, so
-// that nothing drifts. None of this enters a result. Thread safe; wait() belongs to the simulation thread.
+// Step s of a run at rate r is due s dt / r after the start, by the monotonic clock: deadlines are
+// absolute, so that nothing drifts. None of this enters a result. Thread safe; wait() belongs to
+// the simulation thread.
 #pragma once
 
 #include <chrono>
@@ -18,26 +20,29 @@ class Pacer : public engine::Pace, public Gate {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // rate: simulated per real time, > 0; +inf: as fast as it goes. last_step: of the run, INT64_MAX: none.
+  // rate: simulated per real time, > 0; +inf: as fast as it goes. last_step: of the run, INT64_MAX:
+  // none.
   Pacer(int64_t step_us, double rate, int64_t last_step);
 
   int wait(int64_t& step, int limit) override;
   int borrow(int64_t& step, int limit) override;
   void give_back(int unused) override;
   void stop() override;
-  int64_t pause();                   // ends what allow() allowed, too; returns the last state that will still be computed
+  int64_t
+  pause();  // ends what allow() allowed, too; returns the last state that will still be computed
   void resume();
-  int64_t allow(int64_t steps);      // while paused: that many more; returns the last one of them
+  int64_t allow(int64_t steps);  // while paused: that many more; returns the last one of them
   void set_rate(double rate);
   void set_limit(int64_t step) override;
-  void set_limit_quietly(int64_t step) override;    // for who calls borrow() next
+  void set_limit_quietly(int64_t step) override;  // for who calls borrow() next
 
-  // Standing still for a change of the world. hold(): wait() lets nothing more go; returns the last state that it let go.
-  // wait_until_held(), when that state is done: until the simulation thread waits; false when the run is over.
+  // Standing still for a change of the world. hold(): wait() lets nothing more go; returns the last
+  // state that it let go. wait_until_held(), when that state is done: until the simulation thread
+  // waits; false when the run is over.
   int64_t hold();
   bool wait_until_held();
   void release();
-  void begin_time_anew();            // while held: the next state is 0
+  void begin_time_anew();  // while held: the next state is 0
 
   bool paused() const override;
   double rate() const;
@@ -48,7 +53,8 @@ class Pacer : public engine::Pace, public Gate {
   void start_anew();
   void sleep(std::unique_lock<std::mutex>& lock);
 
-  // A host that was held up catches up by at most this much; beyond it, the run is simply late from then on.
+  // A host that was held up catches up by at most this much; beyond it, the run is simply late from
+  // then on.
   static constexpr auto kMostCatchUp = std::chrono::milliseconds(250);
 
   const int64_t step_us_;
@@ -58,11 +64,12 @@ class Pacer : public engine::Pace, public Gate {
   double rate_;
   bool stopped_ = false, paused_ = false;
   bool hold_ = false, held_ = false, over_ = false;
-  bool asleep_ = false, lent_ = false;    // wait() waits for a higher limit; its steps are another thread's
-  int64_t until_;                    // last state that may be computed: by the end of the run, pause() and allow(),
-  int64_t limit_ = INT64_MAX;        // and by set_limit()
-  int64_t granted_ = -1;             // last state that wait() let go
-  int64_t origin_step_ = 0;          // was due at origin_time_
+  bool asleep_ = false,
+       lent_ = false;  // wait() waits for a higher limit; its steps are another thread's
+  int64_t until_;  // last state that may be computed: by the end of the run, pause() and allow(),
+  int64_t limit_ = INT64_MAX;  // and by set_limit()
+  int64_t granted_ = -1;       // last state that wait() let go
+  int64_t origin_step_ = 0;    // was due at origin_time_
   Clock::time_point origin_time_;
 };
 

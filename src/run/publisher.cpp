@@ -43,7 +43,8 @@ void Publisher::begin_epoch(int32_t epoch) {
   sequences_.assign(sequences_.size(), 0);
 }
 
-void Publisher::publish(engine::Simulation& simulation, const engine::Batch& batch, const Snapshot& state) {
+void Publisher::publish(engine::Simulation& simulation, const engine::Batch& batch,
+                        const Snapshot& state) {
   step_ = state.step;
   time_us_ = state.time;
   latest_ = &state;
@@ -52,7 +53,9 @@ void Publisher::publish(engine::Simulation& simulation, const engine::Batch& bat
   for (Sink* sink : audience_.steps) sink->begin_step(step);
   simulation.messages(batch, step_, [&](int64_t, int index, const uint8_t* data, size_t size) {
     int64_t& sequence = sequences_[static_cast<size_t>(index)];
-    const Published message{Kind::sample, time_us_, stamp_us, announcement_->channels[index].bus_name, index, sequence, data, size};
+    const Published message{
+        Kind::sample, time_us_, stamp_us, announcement_->channels[index].bus_name,
+        index,        sequence, data,     size};
     for (Sink* sink : audience_.samples) sink->message(message);
     ++sequence;
     ++messages_;
@@ -60,9 +63,12 @@ void Publisher::publish(engine::Simulation& simulation, const engine::Batch& bat
   for (Sink* sink : audience_.steps) sink->end_step(step);
 }
 
-void Publisher::send(Kind kind, SimTime time_us, const std::string& channel, int index, int64_t sequence) {
-  const Published message{kind, time_us, base_us_ + time_us, channel, index, sequence, buffer_.data(), buffer_.size()};
-  for (Sink* sink : kind == Kind::record ? audience_.records : audience_.services) sink->message(message);
+void Publisher::send(Kind kind, SimTime time_us, const std::string& channel, int index,
+                     int64_t sequence) {
+  const Published message{kind,  time_us,  base_us_ + time_us, channel,
+                          index, sequence, buffer_.data(),     buffer_.size()};
+  for (Sink* sink : kind == Kind::record ? audience_.records : audience_.services)
+    sink->message(message);
 }
 
 void Publisher::flush() {

@@ -1,6 +1,8 @@
-// Hands each state's messages, what acted on the run, and what the run itself says to all sinks, in one order.
+// Hands each state's messages, what acted on the run, and what the run itself says to all sinks, in
+// one order.
 //
-// It numbers the messages of each channel and stamps them for logs. Not thread safe: the thread of Run::run() publishes.
+// It numbers the messages of each channel and stamps them for logs. Not thread safe: the thread of
+// Run::run() publishes.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "ruedo/snapshot.h"
 #include "engine/simulation.h"
+#include "ruedo/snapshot.h"
 #include "run/sink.h"
 
 namespace ruedo::run {
@@ -59,8 +61,8 @@ class Publisher {
   }
 
   int32_t epoch() const { return epoch_; }
-  uint64_t messages() const { return messages_; }    // samples and services
-  SimTime base_us() const { return base_us_; }       // the stamp of sim time 0 in this epoch
+  uint64_t messages() const { return messages_; }  // samples and services
+  SimTime base_us() const { return base_us_; }     // the stamp of sim time 0 in this epoch
 
  private:
   // Who hears what now.
@@ -80,7 +82,7 @@ class Publisher {
   Audience audience_;
   bool muted_ = false;
   std::shared_ptr<const Announcement> announcement_;
-  std::vector<int64_t> sequences_;    // messages on each channel in this epoch
+  std::vector<int64_t> sequences_;  // messages on each channel in this epoch
   int32_t epoch_ = 0;
   int64_t step_ = -1;
   SimTime time_us_ = 0, base_us_ = 0;

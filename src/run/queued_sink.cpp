@@ -7,7 +7,8 @@
 
 namespace ruedo::run {
 
-QueuedSink::QueuedSink(Sink& sink, Options options) : sink_(sink), options_(std::move(options)), thread_([this] { work(); }) {}
+QueuedSink::QueuedSink(Sink& sink, Options options)
+    : sink_(sink), options_(std::move(options)), thread_([this] { work(); }) {}
 
 QueuedSink::~QueuedSink() {
   if (!page_.entries.empty()) hand_over();
@@ -32,7 +33,9 @@ QueuedSink::Entry& QueuedSink::add(What what) {
 }
 
 // Who misses messages must still know which channels there are.
-void QueuedSink::announce(const std::shared_ptr<const Announcement>& announcement) { add(What::announcement).announcement = announcement; }
+void QueuedSink::announce(const std::shared_ptr<const Announcement>& announcement) {
+  add(What::announcement).announcement = announcement;
+}
 
 void QueuedSink::begin_step(const Step& step) {
   in_step_ = true;
@@ -65,14 +68,17 @@ void QueuedSink::end_step(const Step& step) {
 
 void QueuedSink::flush() {
   if (page_.entries.empty()) return;
-  if (page_.cost() < kPageBytes && std::chrono::steady_clock::now() < page_begin_ + options_.latency) return;
+  if (page_.cost() < kPageBytes &&
+      std::chrono::steady_clock::now() < page_begin_ + options_.latency)
+    return;
   hand_over();
 }
 
 void QueuedSink::hand_over() {
   {
     std::unique_lock lock(mutex_);
-    if (options_.when_full == WhenFull::wait) changed_.wait(lock, [this] { return bytes_ == 0 || bytes_ < options_.most_bytes; });
+    if (options_.when_full == WhenFull::wait)
+      changed_.wait(lock, [this] { return bytes_ == 0 || bytes_ < options_.most_bytes; });
     bytes_ += page_.cost();
     full_ = bytes_ >= options_.most_bytes;
     pages_.push_back(std::move(page_));
@@ -123,8 +129,8 @@ void QueuedSink::deliver(const Page& page) {
       case What::begin: sink_.begin_step(entry.step); break;
       case What::end: sink_.end_step(entry.step); break;
       case What::message:
-        sink_.message({entry.kind, entry.time_us, entry.stamp_us, *entry.channel, entry.index, entry.sequence,
-                       page.bytes.data() + entry.offset, entry.size});
+        sink_.message({entry.kind, entry.time_us, entry.stamp_us, *entry.channel, entry.index,
+                       entry.sequence, page.bytes.data() + entry.offset, entry.size});
         break;
     }
   }

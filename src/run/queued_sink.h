@@ -1,8 +1,10 @@
-// A sink behind a bounded queue: what it hears is copied, and handed to the sink in a thread of its own.
+// A sink behind a bounded queue: what it hears is copied, and handed to the sink in a thread of its
+// own.
 //
-// Messages travel in pages, so that a queue costs a lock and a wake-up for many of them, and the pages' memory is used again.
-// When the sink is slower than the run, the run waits for it (a log, which must be whole), or the sink misses whole steps (whoever
-// only looks on, and must not slow the run).
+// Messages travel in pages, so that a queue costs a lock and a wake-up for many of them, and the
+// pages' memory is used again. When the sink is slower than the run, the run waits for it (a log,
+// which must be whole), or the sink misses whole steps (whoever only looks on, and must not slow
+// the run).
 #pragma once
 
 #include <atomic>
@@ -24,15 +26,15 @@ class QueuedSink : public Sink {
  public:
   enum class WhenFull { wait, miss };
   struct Options {
-    std::string thread;                             // its name, at most 15 characters
+    std::string thread;  // its name, at most 15 characters
     WhenFull when_full = WhenFull::miss;
-    size_t most_bytes = size_t{16} << 20;           // in the queue
-    std::chrono::milliseconds latency{0};           // that a message may wait for others to travel with
+    size_t most_bytes = size_t{16} << 20;  // in the queue
+    std::chrono::milliseconds latency{0};  // that a message may wait for others to travel with
   };
 
   // The sink must outlive it, and is called from the queue's thread alone, but for hears().
   QueuedSink(Sink& sink, Options options);
-  ~QueuedSink() override;    // hands on all there is, then ends the thread
+  ~QueuedSink() override;  // hands on all there is, then ends the thread
 
   Hears hears() const override { return sink_.hears(); }
   void announce(const std::shared_ptr<const Announcement>& announcement) override;
@@ -69,7 +71,7 @@ class QueuedSink : public Sink {
       bytes.clear();
     }
   };
-  static constexpr size_t kPageBytes = size_t{64} << 10;    // a page with more is handed over at once
+  static constexpr size_t kPageBytes = size_t{64} << 10;  // a page with more is handed over at once
 
   bool has_room();
   Entry& add(What what);
@@ -84,13 +86,14 @@ class QueuedSink : public Sink {
   Page page_;
   std::chrono::steady_clock::time_point page_begin_;
   bool in_step_ = false, misses_step_ = false;
-  std::unordered_set<std::string> names_;    // of channels; they stay where they are while others come
+  std::unordered_set<std::string>
+      names_;  // of channels; they stay where they are while others come
 
-  std::mutex mutex_;                         // of what follows
+  std::mutex mutex_;  // of what follows
   std::condition_variable changed_;
   std::deque<Page> pages_;
   std::vector<Page> spare_;
-  size_t bytes_ = 0;                         // of the pages, and of the one that is being delivered
+  size_t bytes_ = 0;  // of the pages, and of the one that is being delivered
   bool over_ = false;
   std::atomic<bool> full_{false};
   std::atomic<uint64_t> missed_{0};

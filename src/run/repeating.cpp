@@ -8,16 +8,19 @@
 
 namespace ruedo::run {
 
-Repeating::Repeating(const std::string& path, const Mode* after) : replay_(path), after_(after) { log::check_files_of_spawned(path); }
+Repeating::Repeating(const std::string& path, const Mode* after) : replay_(path), after_(after) {
+  log::check_files_of_spawned(path);
+}
 
 void Repeating::begin(const Stage& stage, int64_t) {
   stage_ = stage;
   if (begin_us_ < 0) begin_us_ = stage.base_us;
-  stage_.gate->set_limit(-1);    // turn() says how far
+  stage_.gate->set_limit(-1);  // turn() says how far
 }
 
 Mode::Turn Repeating::turn(int64_t step) {
-  const Replay::Target target{*stage_.inbox, *stage_.gate, [this](const applied_t& applied) { return input_of(applied); },
+  const Replay::Target target{*stage_.inbox, *stage_.gate,
+                              [this](const applied_t& applied) { return input_of(applied); },
                               stage_.base_us - begin_us_};
   if (const applied_t* applied = replay_.advance(step, target)) {
     Turn turn{Turn::What::execute};
@@ -33,8 +36,10 @@ Mode::Turn Repeating::turn(int64_t step) {
 
 void Repeating::executed(const engine::Outcome& outcome) {
   if (outcome.code != reply_t::OK) {
-    throw InputError({path()}, "cannot be repeated: its request of kind " + std::to_string(replay_.applied().kind) + " at step " +
-                                   std::to_string(replay_.applied().step) + " is refused: " + outcome.text);
+    throw InputError({path()}, "cannot be repeated: its request of kind " +
+                                   std::to_string(replay_.applied().kind) + " at step " +
+                                   std::to_string(replay_.applied().step) +
+                                   " is refused: " + outcome.text);
   }
   replay_.executed();
 }
@@ -42,13 +47,19 @@ void Repeating::executed(const engine::Outcome& outcome) {
 void Repeating::check_end(int64_t state_hash) const {
   if (!replay_.complete()) throw InputError({path()}, "is no snapshot: " + replay_.fault());
   if (state_hash != replay_.end().state_hash) {
-    throw InputError({path()}, "leads to another state here than where it was saved: its program, libraries or CPU are others");
+    throw InputError({path()},
+                     "leads to another state here than where it was saved: its program, libraries "
+                     "or CPU are others");
   }
 }
 
-std::string Repeating::refusal(int32_t, bool looks) const { return looks ? "" : "a snapshot is being restored: ask again when that is done"; }
+std::string Repeating::refusal(int32_t, bool looks) const {
+  return looks ? "" : "a snapshot is being restored: ask again when that is done";
+}
 
-bool Repeating::early(const request_t&, const Session&) const { return after_ && after_->takes_grants(); }
+bool Repeating::early(const request_t&, const Session&) const {
+  return after_ && after_->takes_grants();
+}
 
 int Repeating::input_of(const applied_t& applied) const {
   const bool is_request = applied.channel == "ruedo/request";
@@ -58,10 +69,12 @@ int Repeating::input_of(const applied_t& applied) const {
   const std::vector<engine::Input>& inputs = stage_.inbox->inputs();
   for (size_t i = 0; i < inputs.size(); ++i) {
     const bool reset = inputs[i].kind == engine::Input::Kind::reset_odometry;
-    const bool fits = is_request ? reset && stage_.robot_name(inputs[i].robot) == body.name : !reset && inputs[i].channel == applied.channel;
+    const bool fits = is_request ? reset && stage_.robot_name(inputs[i].robot) == body.name
+                                 : !reset && inputs[i].channel == applied.channel;
     if (fits) return static_cast<int>(i);
   }
-  throw InputError({path()}, "cannot be repeated: there is no channel '" + applied.channel + "' in this world");
+  throw InputError(
+      {path()}, "cannot be repeated: there is no channel '" + applied.channel + "' in this world");
 }
 
 }  // namespace ruedo::run

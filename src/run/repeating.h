@@ -1,7 +1,9 @@
-// A run that repeats a log, or the log that a snapshot is: for `ruedo verify`, and to restore a snapshot.
+// A run that repeats a log, or the log that a snapshot is: for `ruedo verify`, and to restore a
+// snapshot.
 //
-// A snapshot is what acted on the world up to its step. Physics keeps contacts, their impulses and the order of its pairs from
-// step to step; running up to the step gives them back exactly. Meanwhile commands are ignored, and requests that change something refused.
+// A snapshot is what acted on the world up to its step. Physics keeps contacts, their impulses and
+// the order of its pairs from step to step; running up to the step gives them back exactly.
+// Meanwhile commands are ignored, and requests that change something refused.
 #pragma once
 
 #include <string>
@@ -13,7 +15,8 @@ namespace ruedo::run {
 
 class Repeating : public Mode {
  public:
-  // after: the mode in which the run goes on; null: the run ends with the log. Throws InputError for what is no log.
+  // after: the mode in which the run goes on; null: the run ends with the log. Throws InputError
+  // for what is no log.
   Repeating(const std::string& path, const Mode* after);
 
   const log_header_t& header() const { return replay_.header(); }
@@ -29,12 +32,12 @@ class Repeating : public Mode {
   bool early(const request_t& request, const Session& session) const override;
 
  private:
-  int input_of(const applied_t& applied) const;    // -1: a request that the run executes
+  int input_of(const applied_t& applied) const;  // -1: a request that the run executes
 
   Replay replay_;
   const Mode* after_;
   Stage stage_;
-  SimTime begin_us_ = -1;    // the stamp at which the first epoch began; -1: it has not
+  SimTime begin_us_ = -1;  // the stamp at which the first epoch began; -1: it has not
 };
 
 }  // namespace ruedo::run

@@ -14,9 +14,11 @@ log_header_t first_event(log::Reader& reader, log::Event& event) {
   log_header_t header;
   if (reader.size() == 0) throw InputError({reader.path()}, "is empty: nothing was recorded");
   if (!reader.next(event) || event.channel != "ruedo/header") {
-    throw InputError({reader.path()}, "does not begin with ruedo/header: it was not recorded by ruedo run --record");
+    throw InputError({reader.path()},
+                     "does not begin with ruedo/header: it was not recorded by ruedo run --record");
   }
-  if (decode_checked(event.data.data(), event.data.size(), header) != DecodeFault::none || header.step_us < 1) {
+  if (decode_checked(event.data.data(), event.data.size(), header) != DecodeFault::none ||
+      header.step_us < 1) {
     throw InputError({reader.path()}, "its header is damaged, or another version of Ruedo's");
   }
   return header;
@@ -38,7 +40,9 @@ log_header_t read_header(const std::string& path) {
 
 Replay::Replay(const std::string& path) : reader_(path), header_(first_event(reader_, event_)) {}
 
-void Replay::damaged(const std::string& what) const { throw InputError({reader_.path()}, "cannot be repeated: " + what); }
+void Replay::damaged(const std::string& what) const {
+  throw InputError({reader_.path()}, "cannot be repeated: " + what);
+}
 
 const applied_t* Replay::advance(int64_t step, const Target& target) {
   const auto go_on_to = [&](int64_t last) {
@@ -48,12 +52,15 @@ const applied_t* Replay::advance(int64_t step, const Target& target) {
   for (;;) {
     if (waits_) {
       if (const int input = target.input_of(applied_); input >= 0) {
-        switch (target.inbox.schedule(applied_.step, input, reinterpret_cast<const uint8_t*>(applied_.data.data()), applied_.data.size())) {
+        switch (target.inbox.schedule(applied_.step, input,
+                                      reinterpret_cast<const uint8_t*>(applied_.data.data()),
+                                      applied_.data.size())) {
           case engine::CommandInbox::Scheduled::kept: waits_ = false; continue;
           case engine::CommandInbox::Scheduled::full: return go_on_to(applied_.step);
           case engine::CommandInbox::Scheduled::late:
           case engine::CommandInbox::Scheduled::faulty:
-            damaged("its command on " + applied_.channel + " at step " + std::to_string(applied_.step) + " is none");
+            damaged("its command on " + applied_.channel + " at step " +
+                    std::to_string(applied_.step) + " is none");
         }
       }
       if (!acts(applied_.kind)) {
@@ -61,7 +68,9 @@ const applied_t* Replay::advance(int64_t step, const Target& target) {
         continue;
       }
       if (applied_.step > step) return go_on_to(applied_.step);
-      if (applied_.step < step) damaged("its request for step " + std::to_string(applied_.step) + " comes after step " + std::to_string(step));
+      if (applied_.step < step)
+        damaged("its request for step " + std::to_string(applied_.step) + " comes after step " +
+                std::to_string(step));
       return &applied_;
     }
     if (ended_) return go_on_to(end_step_);
@@ -72,24 +81,29 @@ const applied_t* Replay::advance(int64_t step, const Target& target) {
 
 void Replay::executed() {
   waits_ = false;
-  known_ = -1;    // sim time may begin anew
+  known_ = -1;  // sim time may begin anew
 }
 
 void Replay::read(const Target& target) {
-  const bool more = reader_.next(event_, [](const std::string& channel) { return channel == "ruedo/applied" || channel == "ruedo/state_hash"; });
+  const bool more = reader_.next(event_, [](const std::string& channel) {
+    return channel == "ruedo/applied" || channel == "ruedo/state_hash";
+  });
   if (!more) {
     ended_ = true;
     end_step_ = end_.last ? end_.step : known_;
     return;
   }
   end_.last = false;
-  // The messages of a state, and what acted on it, come after everything that acted on those before it.
+  // The messages of a state, and what acted on it, come after everything that acted on those before
+  // it.
   known_ = std::max(known_, (event_.timestamp_us - target.begin_us) / header_.step_us);
   if (event_.channel == "ruedo/applied") {
-    if (decode_checked(event_.data.data(), event_.data.size(), applied_) != DecodeFault::none) damaged("a ruedo/applied in it is damaged");
+    if (decode_checked(event_.data.data(), event_.data.size(), applied_) != DecodeFault::none)
+      damaged("a ruedo/applied in it is damaged");
     waits_ = true;
   } else if (event_.channel == "ruedo/state_hash") {
-    if (decode_checked(event_.data.data(), event_.data.size(), end_) != DecodeFault::none) damaged("a ruedo/state_hash in it is damaged");
+    if (decode_checked(event_.data.data(), event_.data.size(), end_) != DecodeFault::none)
+      damaged("a ruedo/state_hash in it is damaged");
   }
 }
 

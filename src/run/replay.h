@@ -1,18 +1,19 @@
-// A run that is repeated: what acted on it is read from its log, or from a snapshot, and acts again on the same steps.
+// A run that is repeated: what acted on it is read from its log, or from a snapshot, and acts again
+// on the same steps.
 //
-// Commands go to the inbox ahead of time; the pacer lets the run go as far as is known what acts on it, and to the step
-// of a request, which the server then executes. The publisher's, all of it.
+// Commands go to the inbox ahead of time; the pacer lets the run go as far as is known what acts on
+// it, and to the step of a request, which the server then executes. The publisher's, all of it.
 #pragma once
 
 #include <cstdint>
 #include <functional>
 #include <string>
 
+#include "engine/command_inbox.h"
+#include "log/reader.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/log_header_t.hpp"
 #include "ruedo/state_hash_t.hpp"
-#include "engine/command_inbox.h"
-#include "log/reader.h"
 #include "run/gate.h"
 
 namespace ruedo::run {
@@ -23,9 +24,11 @@ class Replay {
   struct Target {
     engine::CommandInbox& inbox;
     Gate& gate;
-    // The input that takes it; -1: it is a request. Throws InputError for a channel that there is not.
+    // The input that takes it; -1: it is a request. Throws InputError for a channel that there is
+    // not.
     std::function<int(const applied_t&)> input_of;
-    SimTime begin_us;    // of the epoch, in stamps of the log: what went on before sim time was last set to 0
+    SimTime begin_us;  // of the epoch, in stamps of the log: what went on before sim time was last
+                       // set to 0
   };
 
   // Throws InputError for what is no log, or has no header of a run at its beginning.
@@ -34,12 +37,12 @@ class Replay {
   const log_header_t& header() const { return header_; }
   const std::string& path() const { return reader_.path(); }
 
-  // To be called when state `step` is out, or none is yet (-1). Returns a request that acts on that state: execute it,
-  // then call executed(), then this again. Null: the run goes on, or is at its end. Throws InputError for a log that
-  // does not fit what runs.
+  // To be called when state `step` is out, or none is yet (-1). Returns a request that acts on that
+  // state: execute it, then call executed(), then this again. Null: the run goes on, or is at its
+  // end. Throws InputError for a log that does not fit what runs.
   const applied_t* advance(int64_t step, const Target& target);
   void executed();
-  const applied_t& applied() const { return applied_; }    // that advance() returned
+  const applied_t& applied() const { return applied_; }  // that advance() returned
 
   // After advance() returned null: whether that was all.
   bool at_end(int64_t step) const { return ended_ && !waits_ && step >= end_step_; }
@@ -49,7 +52,7 @@ class Replay {
   std::string fault() const;
 
  private:
-  static constexpr int64_t kAhead = 1024;    // steps that are read ahead of what runs
+  static constexpr int64_t kAhead = 1024;  // steps that are read ahead of what runs
 
   void read(const Target& target);
   [[noreturn]] void damaged(const std::string& what) const;
@@ -57,10 +60,10 @@ class Replay {
   log::Reader reader_;
   log::Event event_;
   log_header_t header_;
-  applied_t applied_;          // the next thing that acted, if waits_
+  applied_t applied_;  // the next thing that acted, if waits_
   bool waits_ = false;
   bool ended_ = false;
-  int64_t known_ = -1;         // everything is known that acts on states before this one
+  int64_t known_ = -1;  // everything is known that acts on states before this one
   int64_t end_step_ = -1;
   state_hash_t end_{};
 };

@@ -1,16 +1,18 @@
-// What is known of each kind of request: whether this server serves it, when it may be executed, and what it does.
+// What is known of each kind of request: whether this server serves it, when it may be executed,
+// and what it does.
 //
-// A new request is a line of the table in requests.cpp and a function of Run. What clients are told of the server's features, what is
-// refused and why, and what a repetition of the log executes follow from the table.
+// A new request is a line of the table in requests.cpp and a function of Run. What clients are told
+// of the server's features, what is refused and why, and what a repetition of the log executes
+// follow from the table.
 #pragma once
 
 #include <cstdint>
 #include <string>
 #include <string_view>
 
+#include "engine/outcome.h"
 #include "ruedo/decode.h"
 #include "ruedo/request_t.hpp"
-#include "engine/outcome.h"
 #include "run/sessions.h"
 
 namespace ruedo::run {
@@ -18,9 +20,13 @@ namespace ruedo::run {
 class Run;
 
 struct RequestKind {
-  enum Needs { nothing, grants, snapshots };                   // of the server
-  enum Effect { looks, steers, acts };                         // reads; changes how the run goes on; changes the world, and is repeated from logs
-  enum Waits { for_nothing, for_state };                       // for the first state: what reads or changes the world
+  enum Needs { nothing, grants, snapshots };  // of the server
+  enum Effect {
+    looks,
+    steers,
+    acts
+  };  // reads; changes how the run goes on; changes the world, and is repeated from logs
+  enum Waits { for_nothing, for_state };  // for the first state: what reads or changes the world
 
   int32_t kind;
   Needs needs;
@@ -41,7 +47,8 @@ bool read_body(const request_t& request, Body& body) {
 
 template <class Body>
 engine::Outcome bad_body() {
-  return engine::Outcome::refuse(reply_t::BAD_REQUEST, std::string("the body is not a ") + Body::getTypeName());
+  return engine::Outcome::refuse(reply_t::BAD_REQUEST,
+                                 std::string("the body is not a ") + Body::getTypeName());
 }
 
 }  // namespace ruedo::run

@@ -1,11 +1,12 @@
-// The table of requests, and those that steer the run or look at it. Those that change the world are in edit_requests.cpp.
+// The table of requests, and those that steer the run or look at it. Those that change the world
+// are in edit_requests.cpp.
 #include <algorithm>
 #include <filesystem>
 #include <iterator>
 
-#include "ruedo/errors.h"
-#include "log/header.h"
 #include "engine/world_state.h"
+#include "log/header.h"
+#include "ruedo/errors.h"
 #include "run/request_table.h"
 #include "run/run.h"
 
@@ -27,7 +28,9 @@ class RequestTable {
     return read_body(request, body) ? (run.*function)(request, body) : bad_body<Body>();
   }
 
-  static Outcome grant(Run& run, const request_t& request, const Session& session) { return run.mode().grant(request, session); }
+  static Outcome grant(Run& run, const request_t& request, const Session& session) {
+    return run.mode().grant(request, session);
+  }
 
   static const RequestKind kKinds[];
   static const RequestKind* find(int32_t kind);
@@ -36,35 +39,53 @@ class RequestTable {
 const RequestKind RequestTable::kKinds[] = {
     // kind, needs, effect, waits, function
     {request_t::JOIN, RequestKind::nothing, RequestKind::steers, RequestKind::for_nothing, nullptr},
-    {request_t::LEAVE, RequestKind::nothing, RequestKind::steers, RequestKind::for_nothing, nullptr},
-    {request_t::PAUSE, RequestKind::nothing, RequestKind::steers, RequestKind::for_state, plain<&Run::pause>},
-    {request_t::RESUME, RequestKind::nothing, RequestKind::steers, RequestKind::for_state, plain<&Run::resume>},
-    {request_t::STEP, RequestKind::nothing, RequestKind::steers, RequestKind::for_state, with<step_request_t, &Run::step>},
-    {request_t::RATE, RequestKind::nothing, RequestKind::steers, RequestKind::for_state, with<rate_request_t, &Run::set_rate>},
-    {request_t::GET_STATE, RequestKind::nothing, RequestKind::looks, RequestKind::for_state, with<name_request_t, &Run::get_state>},
-    {request_t::INFO, RequestKind::nothing, RequestKind::looks, RequestKind::for_nothing, plain<&Run::say_info>},
-    {request_t::QUIT, RequestKind::nothing, RequestKind::looks, RequestKind::for_nothing, plain<&Run::quit>},
-    {request_t::RESET_ODOMETRY, RequestKind::nothing, RequestKind::steers, RequestKind::for_state, with<name_request_t, &Run::reset_odometry>},
-    {request_t::RESET, RequestKind::nothing, RequestKind::acts, RequestKind::for_state, with<reset_request_t, &Run::reset>},
-    {request_t::SPAWN, RequestKind::nothing, RequestKind::acts, RequestKind::for_state, with<spawn_request_t, &Run::spawn>},
-    {request_t::REMOVE, RequestKind::nothing, RequestKind::acts, RequestKind::for_state, with<name_request_t, &Run::remove>},
-    {request_t::SET_POSE, RequestKind::nothing, RequestKind::acts, RequestKind::for_state, with<set_pose_request_t, &Run::set_pose>},
-    {request_t::SET_TWIST, RequestKind::nothing, RequestKind::acts, RequestKind::for_state, with<set_twist_request_t, &Run::set_twist>},
+    {request_t::LEAVE, RequestKind::nothing, RequestKind::steers, RequestKind::for_nothing,
+     nullptr},
+    {request_t::PAUSE, RequestKind::nothing, RequestKind::steers, RequestKind::for_state,
+     plain<&Run::pause>},
+    {request_t::RESUME, RequestKind::nothing, RequestKind::steers, RequestKind::for_state,
+     plain<&Run::resume>},
+    {request_t::STEP, RequestKind::nothing, RequestKind::steers, RequestKind::for_state,
+     with<step_request_t, &Run::step>},
+    {request_t::RATE, RequestKind::nothing, RequestKind::steers, RequestKind::for_state,
+     with<rate_request_t, &Run::set_rate>},
+    {request_t::GET_STATE, RequestKind::nothing, RequestKind::looks, RequestKind::for_state,
+     with<name_request_t, &Run::get_state>},
+    {request_t::INFO, RequestKind::nothing, RequestKind::looks, RequestKind::for_nothing,
+     plain<&Run::say_info>},
+    {request_t::QUIT, RequestKind::nothing, RequestKind::looks, RequestKind::for_nothing,
+     plain<&Run::quit>},
+    {request_t::RESET_ODOMETRY, RequestKind::nothing, RequestKind::steers, RequestKind::for_state,
+     with<name_request_t, &Run::reset_odometry>},
+    {request_t::RESET, RequestKind::nothing, RequestKind::acts, RequestKind::for_state,
+     with<reset_request_t, &Run::reset>},
+    {request_t::SPAWN, RequestKind::nothing, RequestKind::acts, RequestKind::for_state,
+     with<spawn_request_t, &Run::spawn>},
+    {request_t::REMOVE, RequestKind::nothing, RequestKind::acts, RequestKind::for_state,
+     with<name_request_t, &Run::remove>},
+    {request_t::SET_POSE, RequestKind::nothing, RequestKind::acts, RequestKind::for_state,
+     with<set_pose_request_t, &Run::set_pose>},
+    {request_t::SET_TWIST, RequestKind::nothing, RequestKind::acts, RequestKind::for_state,
+     with<set_twist_request_t, &Run::set_twist>},
     {request_t::GRANT, RequestKind::grants, RequestKind::steers, RequestKind::for_nothing, grant},
     {request_t::RESEND, RequestKind::grants, RequestKind::steers, RequestKind::for_nothing, grant},
-    {request_t::SNAPSHOT, RequestKind::snapshots, RequestKind::steers, RequestKind::for_state, with<name_request_t, &Run::snapshot>},
-    {request_t::RESTORE, RequestKind::snapshots, RequestKind::steers, RequestKind::for_state, with<name_request_t, &Run::restore>},
+    {request_t::SNAPSHOT, RequestKind::snapshots, RequestKind::steers, RequestKind::for_state,
+     with<name_request_t, &Run::snapshot>},
+    {request_t::RESTORE, RequestKind::snapshots, RequestKind::steers, RequestKind::for_state,
+     with<name_request_t, &Run::restore>},
 };
 
 const RequestKind* RequestTable::find(int32_t kind) {
-  const auto found = std::find_if(std::begin(kKinds), std::end(kKinds), [kind](const RequestKind& each) { return each.kind == kind; });
+  const auto found = std::find_if(std::begin(kKinds), std::end(kKinds),
+                                  [kind](const RequestKind& each) { return each.kind == kind; });
   return found == std::end(kKinds) ? nullptr : &*found;
 }
 
 const RequestKind* find_request_kind(int32_t kind) { return RequestTable::find(kind); }
 
 bool Run::serves(const RequestKind& kind) const {
-  return kind.needs == RequestKind::nothing || (kind.needs == RequestKind::grants ? mode_->takes_grants() : journal_ != nullptr);
+  return kind.needs == RequestKind::nothing ||
+         (kind.needs == RequestKind::grants ? mode_->takes_grants() : journal_ != nullptr);
 }
 
 int64_t Run::features() const {
@@ -87,11 +108,14 @@ Outcome Run::ask(const request_t& request, const Session& session) {
 Outcome Run::execute(const request_t& request, const Session& session) {
   const RequestKind* kind = find_request_kind(request.kind);
   if (!kind || !kind->execute) {
-    return Outcome::refuse(reply_t::NOT_SUPPORTED, "this server does not know requests of kind " + std::to_string(request.kind));
+    return Outcome::refuse(reply_t::NOT_SUPPORTED, "this server does not know requests of kind " +
+                                                       std::to_string(request.kind));
   }
   if (serves(*kind)) return kind->execute(*this, request, session);
-  return Outcome::refuse(reply_t::NOT_SUPPORTED, kind->needs == RequestKind::grants ? "this run is not in lockstep: start the server with --lockstep N"
-                                                                                    : "start the server with --snapshots FOLDER");
+  return Outcome::refuse(reply_t::NOT_SUPPORTED,
+                         kind->needs == RequestKind::grants
+                             ? "this run is not in lockstep: start the server with --lockstep N"
+                             : "start the server with --snapshots FOLDER");
 }
 
 Outcome Run::pause(const request_t&) {
@@ -107,15 +131,20 @@ Outcome Run::resume(const request_t&) {
 
 Outcome Run::step(const request_t&, const step_request_t& body) {
   if (body.steps < 1 || body.steps > kMostSteps) {
-    return Outcome::refuse(reply_t::BAD_REQUEST, "steps is " + std::to_string(body.steps) + "; 1 to " + std::to_string(kMostSteps) + " is allowed");
+    return Outcome::refuse(reply_t::BAD_REQUEST, "steps is " + std::to_string(body.steps) +
+                                                     "; 1 to " + std::to_string(kMostSteps) +
+                                                     " is allowed");
   }
-  if (mode().takes_grants()) return Outcome::refuse(reply_t::REFUSED, "in lockstep it is the clients' grants that step");
-  if (!pacer_->paused()) return Outcome::refuse(reply_t::REFUSED, "steps are taken while paused: pause first");
+  if (mode().takes_grants())
+    return Outcome::refuse(reply_t::REFUSED, "in lockstep it is the clients' grants that step");
+  if (!pacer_->paused())
+    return Outcome::refuse(reply_t::REFUSED, "steps are taken while paused: pause first");
   return Outcome::after(pacer_->allow(body.steps));
 }
 
 Outcome Run::set_rate(const request_t&, const rate_request_t& body) {
-  if (!(body.rate > 0.0)) return Outcome::refuse(reply_t::BAD_REQUEST, "a rate is above 0, +inf for as fast as it goes");
+  if (!(body.rate > 0.0))
+    return Outcome::refuse(reply_t::BAD_REQUEST, "a rate is above 0, +inf for as fast as it goes");
   pacer_->set_rate(body.rate);
   return Outcome::with(engine::encoded(state()));
 }
@@ -172,16 +201,19 @@ Outcome Run::get_state(const request_t&, const name_request_t& body) {
     Twist twist;
     if (placement.body >= 0) {
       const Pose& X_WB = publisher_.latest()->bodies[static_cast<size_t>(placement.body)];
-      const Twist& body_twist = publisher_.latest()->body_twists[static_cast<size_t>(placement.body)];
+      const Twist& body_twist =
+          publisher_.latest()->body_twists[static_cast<size_t>(placement.body)];
       X_WL = X_WB * placement.X_BL;
       const Pose X_WF = whole_model ? X_WL * link.X_ML.inverse() : X_WL;
       twist.angular = body_twist.angular;
-      twist.linear = body_twist.linear + body_twist.angular.cross(X_WF.translation - X_WB.translation);
+      twist.linear =
+          body_twist.linear + body_twist.angular.cross(X_WF.translation - X_WB.translation);
     }
     put(whole_model ? X_WL * link.X_ML.inverse() : X_WL, twist, reply);
     return Outcome::with(engine::encoded(reply));
   }
-  return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no model or MODEL/LINK called '" + body.name + "'");
+  return Outcome::refuse(reply_t::UNKNOWN_NAME,
+                         "there is no model or MODEL/LINK called '" + body.name + "'");
 }
 
 Outcome Run::reset_odometry(const request_t& request, const name_request_t& body) {
@@ -196,14 +228,19 @@ Outcome Run::reset_odometry(const request_t& request, const name_request_t& body
 
 Outcome Run::snapshot(const request_t&, const name_request_t& body) {
   if (journal_->snapshot_path(body.name).empty()) {
-    return Outcome::refuse(reply_t::BAD_REQUEST, "'" + body.name + "' is no name of a snapshot: 1 to 63 letters, digits, '_', '-' and '.', not first a '.'");
+    return Outcome::refuse(reply_t::BAD_REQUEST, "'" + body.name +
+                                                     "' is no name of a snapshot: 1 to 63 letters, "
+                                                     "digits, '_', '-' and '.', not first a '.'");
   }
-  const std::string fault = journal_->save_snapshot(body.name, hashes_.now(true), publisher_.base_us() + publisher_.time_us());
-  if (!fault.empty()) return Outcome::refuse(reply_t::REFUSED, "the snapshot was not saved: " + fault);
+  const std::string fault = journal_->save_snapshot(body.name, hashes_.now(true),
+                                                    publisher_.base_us() + publisher_.time_us());
+  if (!fault.empty())
+    return Outcome::refuse(reply_t::REFUSED, "the snapshot was not saved: " + fault);
   return Outcome::with(engine::encoded(state()));
 }
 
-// In the log it is a reset, and the run up to the snapshot's step: so the log needs no other file to be repeated.
+// In the log it is a reset, and the run up to the snapshot's step: so the log needs no other file
+// to be repeated.
 Outcome Run::restore(const request_t& request, const name_request_t& body) {
   const std::string path = journal_->snapshot_path(body.name);
   if (path.empty() || !std::filesystem::exists(path)) {

@@ -5,10 +5,10 @@
 
 #include <spdlog/spdlog.h>
 
+#include "log/header.h"
 #include "physics/state_check.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/request_t.hpp"
-#include "log/header.h"
 #include "run/live.h"
 #include "run/request_table.h"
 
@@ -20,8 +20,10 @@ constexpr auto kPausedInfoPeriod = std::chrono::seconds(1);
 constexpr auto kDrainPeriod = std::chrono::milliseconds(50);
 
 // record: writes joins and ended leases into the log.
-std::unique_ptr<Mode> make_mode(const RunOptions& options, int64_t step_us, std::function<void(applied_t)> record) {
-  if (options.lockstep.clients > 0) return std::make_unique<Lockstep>(options.lockstep, std::move(record));
+std::unique_ptr<Mode> make_mode(const RunOptions& options, int64_t step_us,
+                                std::function<void(applied_t)> record) {
+  if (options.lockstep.clients > 0)
+    return std::make_unique<Lockstep>(options.lockstep, std::move(record));
   return std::make_unique<Live>(options.wait_for, step_us);
 }
 
@@ -34,17 +36,21 @@ Run::Run(std::shared_ptr<const model::WorldModel> world, RunOptions options, Bus
       bus_(bus),
       run_id_(random_id()),
       channels_(options_.remaps),
-      mode_(make_mode(options_, world_->step_us, [this](applied_t applied) {
-        applied.utime = publisher_.time_us();
-        applied.epoch = epoch_;
-        publisher_.record(kAppliedChannel, applied);
-      })),
+      mode_(make_mode(options_, world_->step_us,
+                      [this](applied_t applied) {
+                        applied.utime = publisher_.time_us();
+                        applied.epoch = epoch_;
+                        publisher_.record(kAppliedChannel, applied);
+                      })),
       wanted_{options_.rate, options_.paused},
       bus_sink_(bus),
       hashes_(publisher_, world_->step_us),
       watchdogs_(publisher_, world_->step_us, [this](size_t robot) { tell_watchdog(robot); }),
-      ticks_(publisher_, run_id_, mode_->takes_grants() ? Rate{} : engine::kTickRate, world_->step_us,
-             [this](TickWriter& tick, int64_t step) { mode().add_applied(tick, step, control_.sessions().list()); }),
+      ticks_(publisher_, run_id_, mode_->takes_grants() ? Rate{} : engine::kTickRate,
+             world_->step_us,
+             [this](TickWriter& tick, int64_t step) {
+               mode().add_applied(tick, step, control_.sessions().list());
+             }),
       info_beat_(publisher_, world_->step_us, [this] { return pacer_->paused(); }),
       worker_(models_, wakeup_, options_.before_model),
       control_(run_id_, control_host()) {
@@ -59,12 +65,14 @@ Run::Run(std::shared_ptr<const model::WorldModel> world, RunOptions options, Bus
   channels_.check_remaps();
   add_sinks();
   if (publisher_.has_recorders() || repeating_) {
-    header_ = log::make_log_header(*world_, options_.simulation.fleet.seed, options_.result_options);
+    header_ =
+        log::make_log_header(*world_, options_.simulation.fleet.seed, options_.result_options);
     header_.epoch = epoch_;
     publisher_.record(kHeaderChannel, header_);
     if (journal_) journal_->begin(header_, 0);
   }
-  if (repeating_ && !options_.end_with_repeat) log::check_same_run(repeating_->header(), header_, options_.repeat);
+  if (repeating_ && !options_.end_with_repeat)
+    log::check_same_run(repeating_->header(), header_, options_.repeat);
 }
 
 Run::~Run() { bus_.stop(); }
@@ -83,13 +91,15 @@ void Run::add_sinks() {
 }
 
 Control::Host Run::control_host() {
-  return {.execute = [this](const request_t& request, const Session& session) { return ask(request, session); },
+  return {.execute = [this](const request_t& request,
+                            const Session& session) { return ask(request, session); },
           .state = [this] { return engine::encoded(state()); },
           .publish = [this](const reply_t& reply) { publisher_.service(own_.reply, reply); },
           .utime = [this] { return publisher_.time_us(); },
           .epoch = [this] { return epoch_; },
           .state_comes = [this] { return !publisher_.latest() && mode().state_comes(); },
-          .early = [this](const request_t& request, const Session& session) { return mode().early(request, session); },
+          .early = [this](const request_t& request,
+                          const Session& session) { return mode().early(request, session); },
           .left = [this](int64_t session) { mode_->left(session); },
           .keeps = [this](int64_t session) { return mode_->keeps(session); }};
 }
@@ -109,8 +119,10 @@ void Run::stop() {
 }
 
 void Run::run() {
-  std::fesetenv(FE_DFL_ENV);    // as in the threads that compute: in lockstep this is one of them
-  bus_sink_.listen([this](const std::string& channel, const uint8_t* data, size_t size) { receive(channel, data, size); });
+  std::fesetenv(FE_DFL_ENV);  // as in the threads that compute: in lockstep this is one of them
+  bus_sink_.listen([this](const std::string& channel, const uint8_t* data, size_t size) {
+    receive(channel, data, size);
+  });
   simulation_->start(*pacer_);
   take_turns();
   next_status_ = Clock::now() + kStatusPeriod;
@@ -120,7 +132,8 @@ void Run::run() {
     serve();
     const Clock::time_point next = attend();
     if (compute_here()) continue;
-    if (!repeating_) control_.published(publisher_.step());    // a PAUSE may wait for a state that was out already
+    if (!repeating_)
+      control_.published(publisher_.step());  // a PAUSE may wait for a state that was out already
     publisher_.flush();
     if (!wakeup_.wait_until(next)) tell_status();
   }
@@ -147,7 +160,7 @@ void Run::publish_what_is_ready() {
 void Run::publish(const engine::Batch& batch) {
   for (int i = 0; i < batch.count; ++i) {
     const Snapshot& state = batch.snapshots[static_cast<size_t>(i)];
-    record_applied(batch, state.step - 1);    // on the state before this one, whose messages are out
+    record_applied(batch, state.step - 1);  // on the state before this one, whose messages are out
     publisher_.publish(*simulation_, batch, state);
     if (on_state_) on_state_(state);
   }
@@ -183,7 +196,8 @@ void Run::serve() {
 
 Run::Clock::time_point Run::attend() {
   const Clock::time_point now = Clock::now();
-  // A sign of life each second, also while the run stands still, a step takes long, or a snapshot is restored.
+  // A sign of life each second, also while the run stands still, a step takes long, or a snapshot
+  // is restored.
   const auto last_sign = [this] { return std::max(info_beat_.last(), ticks_.last()); };
   if (now >= last_sign() + kPausedInfoPeriod) info_beat_.say();
   Mode::Attended attended;
@@ -195,7 +209,9 @@ Run::Clock::time_point Run::attend() {
   return std::min({next_status_, last_sign() + kPausedInfoPeriod, attended.next});
 }
 
-Status Run::status() const { return {publisher_.step(), publisher_.time_us(), publisher_.messages(), pacer_->paused()}; }
+Status Run::status() const {
+  return {publisher_.step(), publisher_.time_us(), publisher_.messages(), pacer_->paused()};
+}
 
 void Run::tell_status() {
   const Clock::time_point now = Clock::now();
@@ -205,9 +221,13 @@ void Run::tell_status() {
 }
 
 void Run::tell_watchdog(size_t index) {
-  const model::ModelInstance& robot = world_->models[static_cast<size_t>(simulation_->layout().robots[index].instance)];
-  spdlog::warn("{} was stopped by its watchdog: no command came for {:g} s of sim time. A velocity or wheel command "
-               "wants repeating (this is said once)", robot.name, static_cast<double>(robot.model->drive->watchdog_us) * 1e-6);
+  const model::ModelInstance& robot =
+      world_->models[static_cast<size_t>(simulation_->layout().robots[index].instance)];
+  spdlog::warn(
+      "{} was stopped by its watchdog: no command came for {:g} s of sim time. A velocity or wheel "
+      "command "
+      "wants repeating (this is said once)",
+      robot.name, static_cast<double>(robot.model->drive->watchdog_us) * 1e-6);
 }
 
 // Clients may still fetch what they have lost.

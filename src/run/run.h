@@ -1,8 +1,9 @@
 // A run: one world, its mode, its sinks, and the requests of its clients.
 //
-// run() is the publisher: it takes finished batches in order, hands their messages to the sinks, executes requests between
-// batches, and ends when the run does. Everything goes out from its thread, in one order. How it goes on is its mode's (mode.h), what
-// goes where its sinks' (sink.h), what a request does is in the table of requests.cpp.
+// run() is the publisher: it takes finished batches in order, hands their messages to the sinks,
+// executes requests between batches, and ends when the run does. Everything goes out from its
+// thread, in one order. How it goes on is its mode's (mode.h), what goes where its sinks' (sink.h),
+// what a request does is in the table of requests.cpp.
 #pragma once
 
 #include <atomic>
@@ -15,15 +16,15 @@
 #include <utility>
 #include <vector>
 
+#include "engine/edits.h"
+#include "engine/simulation.h"
+#include "engine/world_info.h"
 #include "ruedo/bus.h"
 #include "ruedo/name_request_t.hpp"
 #include "ruedo/rate_request_t.hpp"
 #include "ruedo/reset_request_t.hpp"
 #include "ruedo/state_reply_t.hpp"
 #include "ruedo/step_request_t.hpp"
-#include "engine/edits.h"
-#include "engine/simulation.h"
-#include "engine/world_info.h"
 #include "run/beats.h"
 #include "run/control.h"
 #include "run/journal.h"
@@ -40,19 +41,20 @@ namespace ruedo::run {
 
 struct RunOptions {
   engine::SimulationOptions simulation;
-  double rate = 1.0;                       // simulated per real time; +inf: as fast as it goes
-  int64_t duration_us = -1;                // sim time; -1: without end
+  double rate = 1.0;         // simulated per real time; +inf: as fast as it goes
+  int64_t duration_us = -1;  // sim time; -1: without end
   bool paused = false;
-  bool control = true;                     // serve ruedo/request
-  LockstepOptions lockstep;                // wants control
-  std::string record;                      // file; "": none
-  std::string snapshots;                   // folder that SNAPSHOT and RESTORE use; "": none
+  bool control = true;       // serve ruedo/request
+  LockstepOptions lockstep;  // wants control
+  std::string record;        // file; "": none
+  std::string snapshots;     // folder that SNAPSHOT and RESTORE use; "": none
   std::vector<WaitForOption> wait_for;
-  std::string repeat;                      // log or snapshot to begin with: what acted on that run acts again
-  bool end_with_repeat = false;            // and then end; else go on, and publish from there on
-  Watcher watcher;                         // sees what a log would get
-  std::function<void()> before_model;      // for tests: called in the worker's thread before a SPAWN's model is made ready
-  std::vector<std::string> result_options; // for the log's header
+  std::string repeat;            // log or snapshot to begin with: what acted on that run acts again
+  bool end_with_repeat = false;  // and then end; else go on, and publish from there on
+  Watcher watcher;               // sees what a log would get
+  std::function<void()> before_model;  // for tests: called in the worker's thread before a SPAWN's
+                                       // model is made ready
+  std::vector<std::string> result_options;  // for the log's header
   std::vector<std::pair<std::string, std::string>> remaps;
 };
 
@@ -70,20 +72,23 @@ class Run {
   Run(std::shared_ptr<const model::WorldModel> world, RunOptions options, Bus& bus);
   ~Run();
 
-  // Runs until the duration is over, stop(), or QUIT. Throws EnvironmentError when the log cannot be written any
-  // more, and LeaseEnded; the log is then whole up to there.
+  // Runs until the duration is over, stop(), or QUIT. Throws EnvironmentError when the log cannot
+  // be written any more, and LeaseEnded; the log is then whole up to there.
   void run();
 
-  void stop();    // any thread, as the next
+  void stop();  // any thread, as the next
   bool stopping() const { return stop_; }
 
-  // Another sink for the run's messages, beside the bus and the log. Before run(); it must outlive the run.
+  // Another sink for the run's messages, beside the bus and the log. Before run(); it must outlive
+  // the run.
   void add(Sink& sink) { publisher_.add(sink); }
 
-  // A command on one of the input channels, or a request, as it would come over the bus: bytes that nobody has checked. For the
-  // bus and for whatever else clients speak. Any thread.
+  // A command on one of the input channels, or a request, as it would come over the bus: bytes that
+  // nobody has checked. For the bus and for whatever else clients speak. Any thread.
   void receive(const std::string& channel, const uint8_t* data, size_t size);
-  void receive(const std::string& channel, const std::vector<uint8_t>& bytes) { receive(channel, bytes.data(), bytes.size()); }
+  void receive(const std::string& channel, const std::vector<uint8_t>& bytes) {
+    receive(channel, bytes.data(), bytes.size());
+  }
 
   const engine::Channels& channels() const { return channels_; }
   // What clients are told of the world; until models come or go.
@@ -114,25 +119,28 @@ class Run {
   void publish_what_is_ready();
   void publish(const engine::Batch& batch);
   void record_applied(const engine::Batch& batch, int64_t step);
-  bool compute_here();                           // a few steps that were granted; false: there are none
-  void serve();                                  // requests, and models that are ready
-  Clock::time_point attend();                    // to what real time brings; returns when next
+  bool compute_here();         // a few steps that were granted; false: there are none
+  void serve();                // requests, and models that are ready
+  Clock::time_point attend();  // to what real time brings; returns when next
   void tell_status();
-  void finish();                                 // the run is over
+  void finish();  // the run is over
   Status status() const;
-  void tell_watchdog(size_t robot);              // on the terminal
+  void tell_watchdog(size_t robot);  // on the terminal
 
   // The world and the mode in which it runs; in run_world.cpp.
-  void make_world();                             // anew: what follows equals a fresh run
-  struct Pace { double rate; bool paused; };
+  void make_world();  // anew: what follows equals a fresh run
+  struct Pace {
+    double rate;
+    bool paused;
+  };
   void make_simulation(const Pace& pace);
-  void begin_epoch();                            // with a world made anew
+  void begin_epoch();  // with a world made anew
   void announce();
   Mode::Stage stage();
   Mode& mode() { return repeating_ ? static_cast<Mode&>(*repeating_) : *mode_; }
   const Mode& mode() const { return repeating_ ? static_cast<const Mode&>(*repeating_) : *mode_; }
-  void begin_repeat(const std::string& path);    // throws InputError
-  void take_turn();                              // what the mode wants done at this state
+  void begin_repeat(const std::string& path);  // throws InputError
+  void take_turn();                            // what the mode wants done at this state
   void take_turns();
   void end_repeat(bool paused);
 
@@ -141,8 +149,9 @@ class Run {
   Outcome execute(const request_t& request, const Session& session);
   bool serves(const RequestKind& kind) const;
   int64_t features() const;
-  void note(const request_t& request);           // in the log: it changed the state
-  void note_files(const std::vector<std::string>& files);    // that a model was read from which came since the start
+  void note(const request_t& request);  // in the log: it changed the state
+  void note_files(const std::vector<std::string>&
+                      files);  // that a model was read from which came since the start
   state_reply_t state() const;
   Outcome pause(const request_t&);
   Outcome resume(const request_t&);
@@ -156,7 +165,7 @@ class Run {
   Outcome restore(const request_t& request, const name_request_t& body);
 
   // Requests that change the world between two steps; in edit_requests.cpp.
-  bool stand_still();                            // false: the run is over
+  bool stand_still();  // false: the run is over
   void let_go();
   // Applies a change to the world that stands still, and notes it. models: some come or go.
   Outcome change(const request_t& request, bool models, const std::function<Outcome()>& apply);
@@ -164,14 +173,17 @@ class Run {
   Outcome reset_all(const request_t& request, int64_t seed);
   Outcome reset_poses(const request_t& request);
   Outcome reset_time(const request_t& request);
-  Outcome spawn(const request_t& request, const spawn_request_t& body);    // makes the model ready; of a log, puts it in at once
-  void spawn_ready();                            // puts in what is ready
-  Outcome put_in(const request_t& request, const spawn_request_t& body, const model::LoadedModel& loaded);
+  Outcome spawn(
+      const request_t& request,
+      const spawn_request_t& body);  // makes the model ready; of a log, puts it in at once
+  void spawn_ready();                // puts in what is ready
+  Outcome put_in(const request_t& request, const spawn_request_t& body,
+                 const model::LoadedModel& loaded);
   Outcome remove(const request_t& request, const name_request_t& body);
   Outcome set_pose(const request_t& request, const set_pose_request_t& body);
   Outcome set_twist(const request_t& request, const set_twist_request_t& body);
 
-  const std::shared_ptr<const model::WorldModel> first_world_;    // as it was loaded
+  const std::shared_ptr<const model::WorldModel> first_world_;  // as it was loaded
   std::shared_ptr<const model::WorldModel> world_;
   RunOptions options_;
   Bus& bus_;
@@ -179,37 +191,38 @@ class Run {
   int32_t epoch_ = 0;
   engine::Channels channels_;
   engine::SimulationChannels own_;
-  std::string request_channel_;                // as it is called on the bus; "": none
+  std::string request_channel_;  // as it is called on the bus; "": none
   Findings findings_;
-  engine::Wakeup wakeup_;                      // a batch is finished, a request has come, or the end
+  engine::Wakeup wakeup_;  // a batch is finished, a request has come, or the end
   std::atomic<bool> stop_{false};
 
-  std::mutex simulation_mutex_;                // of the world and the mode: commands reach them from other threads
+  std::mutex
+      simulation_mutex_;  // of the world and the mode: commands reach them from other threads
   std::unique_ptr<Pacer> pacer_;
   std::unique_ptr<engine::Simulation> simulation_;
   const std::unique_ptr<Mode> mode_;
-  std::unique_ptr<Repeating> repeating_;       // before that mode goes on; null: nothing is repeated
-  Pace wanted_;                                // by the clients, once nothing is repeated
+  std::unique_ptr<Repeating> repeating_;  // before that mode goes on; null: nothing is repeated
+  Pace wanted_;                           // by the clients, once nothing is repeated
 
   Publisher publisher_;
   BusSink bus_sink_;
-  std::unique_ptr<LogSink> log_;               // null: none, as the next two
+  std::unique_ptr<LogSink> log_;  // null: none, as the next two
   std::unique_ptr<WatcherSink> watcher_;
   std::unique_ptr<Journal> journal_;
   HashBeat hashes_;
   WatchdogWarnings watchdogs_;
   Ticks ticks_;
   InfoBeat info_beat_;
-  log_header_t header_;                        // of this epoch
-  Snapshot changed_;                           // the last state, after requests
+  log_header_t header_;  // of this epoch
+  Snapshot changed_;     // the last state, after requests
   std::function<void(const Status&)> on_status_;
   std::function<void(const Snapshot&)> on_state_;
   Clock::time_point next_status_;
 
   engine::ModelStore models_{first_world_->file};
-  ModelWorker worker_;                         // of SPAWNs
-  std::optional<ModelWorker::Made> made_;      // the next that is ready,
-  int64_t enters_at_ = -1;                     // and the state that it waits for
+  ModelWorker worker_;                     // of SPAWNs
+  std::optional<ModelWorker::Made> made_;  // the next that is ready,
+  int64_t enters_at_ = -1;                 // and the state that it waits for
   Control control_;
 };
 

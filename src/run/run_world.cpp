@@ -3,14 +3,15 @@
 
 #include <spdlog/spdlog.h>
 
-#include "ruedo/errors.h"
 #include "core/version.h"
 #include "engine/world_state.h"
+#include "ruedo/errors.h"
 #include "run/run.h"
 
 namespace ruedo::run {
 
-// Everything that has a state is made here. What is repeated goes as fast as it can, whatever the clients want.
+// Everything that has a state is made here. What is repeated goes as fast as it can, whatever the
+// clients want.
 void Run::make_world() {
   if (!repeating_ && pacer_) wanted_ = {pacer_->rate(), pacer_->paused()};
   const Pace pace = repeating_ ? Pace{std::numeric_limits<double>::infinity(), false} : wanted_;
@@ -18,7 +19,7 @@ void Run::make_world() {
     const std::lock_guard lock(simulation_mutex_);
     make_simulation(pace);
   }
-  announce();    // the bus may have to wait for a thread that waits for the lock
+  announce();  // the bus may have to wait for a thread that waits for the lock
 }
 
 void Run::make_simulation(const Pace& pace) {
@@ -26,11 +27,14 @@ void Run::make_simulation(const Pace& pace) {
   world_ = first_world_;
   channels_.clear();
   own_ = engine::add_simulation_channels(channels_, options_.control);
-  if (own_.request >= 0 && request_channel_.empty()) request_channel_ = channels_[own_.request].bus_name;    // once: other threads read it
+  if (own_.request >= 0 && request_channel_.empty())
+    request_channel_ = channels_[own_.request].bus_name;  // once: other threads read it
   options_.simulation.fleet.epoch = epoch_;
   findings_ = Findings();
-  simulation_ = std::make_unique<engine::Simulation>(world_, options_.simulation, channels_, findings_, wakeup_);
-  const int64_t last_step = options_.duration_us < 0 ? std::numeric_limits<int64_t>::max() : options_.duration_us / world_->step_us;
+  simulation_ = std::make_unique<engine::Simulation>(world_, options_.simulation, channels_,
+                                                     findings_, wakeup_);
+  const int64_t last_step = options_.duration_us < 0 ? std::numeric_limits<int64_t>::max()
+                                                     : options_.duration_us / world_->step_us;
   pacer_ = std::make_unique<Pacer>(world_->step_us, pace.rate, last_step);
   if (pace.paused) pacer_->pause();
   publisher_.begin_epoch(epoch_);
@@ -56,17 +60,23 @@ void Run::announce() {
   head.step_us = world_->step_us;
   head.features = options_.control ? features() : 0;
   head.paused = pacer_->paused();
-  publisher_.announce({channels_, own_, engine::make_world_info(head, *world_, simulation_->layout(), simulation_->devices(), channels_)});
+  publisher_.announce({channels_, own_,
+                       engine::make_world_info(head, *world_, simulation_->layout(),
+                                               simulation_->devices(), channels_)});
 }
 
 Mode::Stage Run::stage() {
   return {&simulation_->inbox(), pacer_.get(), &channels_, publisher_.base_us(), [this](int robot) {
-            return world_->models[static_cast<size_t>(simulation_->layout().robots[static_cast<size_t>(robot)].instance)].name;
+            return world_
+                ->models[static_cast<size_t>(
+                    simulation_->layout().robots[static_cast<size_t>(robot)].instance)]
+                .name;
           }};
 }
 
 void Run::begin_repeat(const std::string& path) {
-  auto repeating = std::make_unique<Repeating>(path, options_.end_with_repeat ? nullptr : mode_.get());
+  auto repeating =
+      std::make_unique<Repeating>(path, options_.end_with_repeat ? nullptr : mode_.get());
   if (pacer_) wanted_ = {pacer_->rate(), pacer_->paused()};
   options_.simulation.fleet.seed = static_cast<uint64_t>(repeating->header().seed);
   const std::lock_guard lock(simulation_mutex_);

@@ -14,11 +14,13 @@ int64_t random_id() {
 }
 
 Session* Sessions::find(int64_t id) {
-  const auto found = std::find_if(sessions_.begin(), sessions_.end(), [&](const Session& session) { return session.id == id; });
+  const auto found = std::find_if(sessions_.begin(), sessions_.end(),
+                                  [&](const Session& session) { return session.id == id; });
   return found == sessions_.end() ? nullptr : &*found;
 }
 
-Session* Sessions::join(const std::string& client, int64_t sequence, Time now, const std::function<bool(int64_t)>& keeps) {
+Session* Sessions::join(const std::string& client, int64_t sequence, Time now,
+                        const std::function<bool(int64_t)>& keeps) {
   for (Session& session : sessions_) {
     if (session.join_sequence == sequence && session.client == client) return &session;
   }
@@ -26,7 +28,9 @@ Session* Sessions::join(const std::string& client, int64_t sequence, Time now, c
     auto place = sessions_.end();
     for (auto session = sessions_.begin(); session != sessions_.end(); ++session) {
       if (now - session->last_heard < kMaySilence || (keeps && keeps(session->id))) continue;
-      if (place == sessions_.end() || std::tie(session->spoke, session->last_heard) < std::tie(place->spoke, place->last_heard)) place = session;
+      if (place == sessions_.end() ||
+          std::tie(session->spoke, session->last_heard) < std::tie(place->spoke, place->last_heard))
+        place = session;
     }
     if (place == sessions_.end()) return nullptr;
     sessions_.erase(place);
@@ -43,7 +47,8 @@ void Sessions::leave(int64_t id) {
   std::erase_if(sessions_, [&](const Session& session) { return session.id == id; });
 }
 
-Sessions::Verdict Sessions::judge(const Session& session, int64_t sequence, const reply_t*& reply) const {
+Sessions::Verdict Sessions::judge(const Session& session, int64_t sequence,
+                                  const reply_t*& reply) const {
   if (sequence < 1 || sequence - session.last_sequence > kMostJump) return Verdict::too_far;
   if (sequence > session.last_sequence) return Verdict::execute;
   for (const reply_t& kept : session.replies) {

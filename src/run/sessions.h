@@ -1,4 +1,5 @@
-// Who has joined, and which of their requests were executed: each request once, however often it is repeated.
+// Who has joined, and which of their requests were executed: each request once, however often it is
+// repeated.
 #pragma once
 
 #include <chrono>
@@ -14,13 +15,13 @@
 namespace ruedo::run {
 
 struct Session {
-  int64_t id = 0;                    // random
+  int64_t id = 0;  // random
   std::string client;
-  int64_t join_sequence = 0;         // the client's own random number
-  int64_t last_sequence = 0;         // executed, or being executed
-  std::deque<reply_t> replies;       // the last ones, oldest first
+  int64_t join_sequence = 0;    // the client's own random number
+  int64_t last_sequence = 0;    // executed, or being executed
+  std::deque<reply_t> replies;  // the last ones, oldest first
   std::chrono::steady_clock::time_point last_heard;
-  bool spoke = false;                // asked for something since it joined
+  bool spoke = false;  // asked for something since it joined
 };
 
 // Not thread safe.
@@ -29,23 +30,25 @@ class Sessions {
   using Time = std::chrono::steady_clock::time_point;
   static constexpr size_t kMostSessions = 64;
   static constexpr size_t kKeptReplies = 32;
-  static constexpr auto kMaySilence = std::chrono::seconds(3);    // then its place may go to another
-  static constexpr int64_t kMostJump = 1024;                      // of sequences that count up
+  static constexpr auto kMaySilence = std::chrono::seconds(3);  // then its place may go to another
+  static constexpr int64_t kMostJump = 1024;                    // of sequences that count up
 
-  // What is to be done with a request of a session. too_far: one forged message must not end a session for good.
+  // What is to be done with a request of a session. too_far: one forged message must not end a
+  // session for good.
   enum class Verdict { execute, answer_again, wait, too_old, too_far };
 
   Session* find(int64_t id);
-  // The session of a client that joins, the same one for a repeated JOIN. Where all places are taken, the most silent session
-  // gives way, first of those that only ever joined; but none that `keeps`, if there is such a function, holds on to. Null
-  // when there is no place.
-  Session* join(const std::string& client, int64_t sequence, Time now, const std::function<bool(int64_t)>& keeps = {});
+  // The session of a client that joins, the same one for a repeated JOIN. Where all places are
+  // taken, the most silent session gives way, first of those that only ever joined; but none that
+  // `keeps`, if there is such a function, holds on to. Null when there is no place.
+  Session* join(const std::string& client, int64_t sequence, Time now,
+                const std::function<bool(int64_t)>& keeps = {});
   void leave(int64_t id);
 
   // answer_again: `reply` is the one to send.
   Verdict judge(const Session& session, int64_t sequence, const reply_t*& reply) const;
   void begin(Session& session, int64_t sequence) { session.last_sequence = sequence; }
-  void keep(const reply_t& reply);    // by its session; nothing when that has left
+  void keep(const reply_t& reply);  // by its session; nothing when that has left
 
   const std::vector<Session>& list() const { return sessions_; }
 

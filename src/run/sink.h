@@ -1,8 +1,9 @@
 // Where the messages of a run go: the bus, a log, a watcher, another middleware.
 //
-// The publisher calls every sink from its own thread, in one order: announce(), then for each state begin_step(), its messages
-// in the order of the schedule, and end_step(). No sink may throw, hold up the run, or change what the others get: one that may be
-// slow works behind a QueuedSink, in a thread of its own. docs/architecture.md says how a sink is added.
+// The publisher calls every sink from its own thread, in one order: announce(), then for each state
+// begin_step(), its messages in the order of the schedule, and end_step(). No sink may throw, hold
+// up the run, or change what the others get: one that may be slow works behind a QueuedSink, in a
+// thread of its own. docs/architecture.md says how a sink is added.
 #pragma once
 
 #include <cstddef>
@@ -11,26 +12,27 @@
 #include <string>
 #include <vector>
 
+#include "engine/channels.h"
 #include "ruedo/sim_time.h"
 #include "ruedo/world_info_t.hpp"
-#include "engine/channels.h"
 
 namespace ruedo::run {
 
 enum class Kind {
-  sample,     // of a sensor, or ruedo/world: the result of the run, the same bytes for the same seed and commands
-  record,     // what acted on the run, and hashes of its state: for logs
-  service,    // ticks, ruedo/info and replies: of this run alone, and in no log
+  sample,   // of a sensor, or ruedo/world: the result of the run, the same bytes for the same seed
+            // and commands
+  record,   // what acted on the run, and hashes of its state: for logs
+  service,  // ticks, ruedo/info and replies: of this run alone, and in no log
 };
 
 // A message. What it refers to is valid during the call.
 struct Published {
   Kind kind;
-  SimTime time_us;               // sim time in this epoch
-  SimTime stamp_us;              // the same for logs: it goes on when sim time begins again
-  const std::string& channel;    // as it is called on the bus
-  int index;                     // of the channel in Announcement::channels; -1: a record, which has none
-  int64_t sequence;              // the how many-th on its channel in this epoch, from 0; of a tick: its part
+  SimTime time_us;             // sim time in this epoch
+  SimTime stamp_us;            // the same for logs: it goes on when sim time begins again
+  const std::string& channel;  // as it is called on the bus
+  int index;         // of the channel in Announcement::channels; -1: a record, which has none
+  int64_t sequence;  // the how many-th on its channel in this epoch, from 0; of a tick: its part
   const uint8_t* data;
   size_t size;
 };
@@ -44,15 +46,16 @@ struct Step {
 // What there is in the run from now on.
 struct Announcement {
   engine::Channels channels;
-  engine::SimulationChannels own;     // their indices
-  std::vector<world_info_t> info;     // robots, devices, frames, rates, in parts
+  engine::SimulationChannels own;  // their indices
+  std::vector<world_info_t> info;  // robots, devices, frames, rates, in parts
 };
 
 class Sink {
  public:
   struct Hears {
     bool samples = true, records = false, services = false;
-    bool repeated = false;    // also while a log or a snapshot is repeated: logs hear that, clients do not
+    bool repeated =
+        false;  // also while a log or a snapshot is repeated: logs hear that, clients do not
   };
 
   virtual ~Sink() = default;
@@ -61,12 +64,15 @@ class Sink {
   virtual Hears hears() const { return {}; }
 
   // Before anything else, and again whenever models have come or gone, or sim time begins again.
-  virtual void announce(const std::shared_ptr<const Announcement>& announcement) { static_cast<void>(announcement); }
+  virtual void announce(const std::shared_ptr<const Announcement>& announcement) {
+    static_cast<void>(announcement);
+  }
   virtual void begin_step(const Step& step) { static_cast<void>(step); }
   virtual void message(const Published& message) = 0;
   virtual void end_step(const Step& step) { static_cast<void>(step); }
 
-  // What came so far is to go on its way: once for each batch of steps, and when there is nothing else to do.
+  // What came so far is to go on its way: once for each batch of steps, and when there is nothing
+  // else to do.
   virtual void flush() {}
 };
 

@@ -27,7 +27,9 @@ void BusSink::announce(const std::shared_ptr<const Announcement>& announcement) 
 }
 
 LogSink::LogSink(const std::string& path)
-    : file_(path), queue_(file_, {.thread = "log", .when_full = QueuedSink::WhenFull::wait, .latency = kLogLatency}) {}
+    : file_(path),
+      queue_(file_,
+             {.thread = "log", .when_full = QueuedSink::WhenFull::wait, .latency = kLogLatency}) {}
 
 void LogSink::File::flush() {
   writer_.flush();
@@ -44,7 +46,8 @@ std::string LogSink::File::error() const {
 void LogSink::check(SimTime now) const {
   const std::string error = file_.error();
   if (error.empty()) return;
-  throw EnvironmentError("--record: " + file_.path() + ": " + error + ". The log is readable up to " + std::to_string(now / 1000000) +
+  throw EnvironmentError("--record: " + file_.path() + ": " + error +
+                         ". The log is readable up to " + std::to_string(now / 1000000) +
                          " s of sim time: make room, or record elsewhere");
 }
 

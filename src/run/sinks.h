@@ -18,12 +18,15 @@ class BusSink : public Sink {
  public:
   explicit BusSink(Bus& bus) : bus_(bus) {}
 
-  // From now on commands and requests come to the handler, in the bus's thread. Once, after the first announcement.
+  // From now on commands and requests come to the handler, in the bus's thread. Once, after the
+  // first announcement.
   void listen(Bus::Handler handler);
 
   Hears hears() const override { return {.samples = true, .services = true}; }
   void announce(const std::shared_ptr<const Announcement>& announcement) override;
-  void message(const Published& message) override { bus_.publish(message.channel, message.data, message.size); }
+  void message(const Published& message) override {
+    bus_.publish(message.channel, message.data, message.size);
+  }
   void flush() override { bus_.flush(); }
 
  private:
@@ -32,7 +35,8 @@ class BusSink : public Sink {
   std::vector<std::string> inputs_, outputs_;
 };
 
-// A standard LCM log, written in a thread of its own. The run waits when the disk is slower than it: a log is whole.
+// A standard LCM log, written in a thread of its own. The run waits when the disk is slower than
+// it: a log is whole.
 class LogSink : public Sink {
  public:
   // Throws EnvironmentError when the file cannot be created.
@@ -54,7 +58,9 @@ class LogSink : public Sink {
    public:
     explicit File(const std::string& path) : writer_(path), path_(path) {}
     Hears hears() const override { return {.samples = true, .records = true, .repeated = true}; }
-    void message(const Published& message) override { writer_.write(message.stamp_us, message.channel, message.data, message.size); }
+    void message(const Published& message) override {
+      writer_.write(message.stamp_us, message.channel, message.data, message.size);
+    }
     void flush() override;
     std::string error() const;
     const std::string& path() const { return path_; }
@@ -71,13 +77,16 @@ class LogSink : public Sink {
 };
 
 // Sees each message as a log would get it.
-using Watcher = std::function<void(SimTime stamp, const std::string& channel, const uint8_t* data, size_t size)>;
+using Watcher = std::function<void(SimTime stamp, const std::string& channel, const uint8_t* data,
+                                   size_t size)>;
 
 class WatcherSink : public Sink {
  public:
   explicit WatcherSink(Watcher watcher) : watcher_(std::move(watcher)) {}
   Hears hears() const override { return {.samples = true, .records = true, .repeated = true}; }
-  void message(const Published& message) override { watcher_(message.stamp_us, message.channel, message.data, message.size); }
+  void message(const Published& message) override {
+    watcher_(message.stamp_us, message.channel, message.data, message.size);
+  }
 
  private:
   const Watcher watcher_;

@@ -20,7 +20,8 @@ constexpr CrcTables kCrc = [] {
     tables[0][i] = value;
   }
   for (size_t k = 1; k < 8; ++k)
-    for (size_t i = 0; i < 256; ++i) tables[k][i] = tables[0][tables[k - 1][i] & 0xff] ^ tables[k - 1][i] >> 8;
+    for (size_t i = 0; i < 256; ++i)
+      tables[k][i] = tables[0][tables[k - 1][i] & 0xff] ^ tables[k - 1][i] >> 8;
   return tables;
 }();
 
@@ -31,8 +32,9 @@ uint32_t crc32(const uint8_t* data, size_t size, uint32_t before) {
   uint32_t crc = ~before;
   for (; size >= 8; data += 8, size -= 8) {
     const uint32_t low = crc ^ (data[0] | data[1] << 8 | data[2] << 16 | uint32_t{data[3]} << 24);
-    crc = kCrc[7][low & 0xff] ^ kCrc[6][low >> 8 & 0xff] ^ kCrc[5][low >> 16 & 0xff] ^ kCrc[4][low >> 24] ^
-          kCrc[3][data[4]] ^ kCrc[2][data[5]] ^ kCrc[1][data[6]] ^ kCrc[0][data[7]];
+    crc = kCrc[7][low & 0xff] ^ kCrc[6][low >> 8 & 0xff] ^ kCrc[5][low >> 16 & 0xff] ^
+          kCrc[4][low >> 24] ^ kCrc[3][data[4]] ^ kCrc[2][data[5]] ^ kCrc[1][data[6]] ^
+          kCrc[0][data[7]];
   }
   for (; size > 0; ++data, --size) crc = kCrc[0][(crc ^ *data) & 0xff] ^ crc >> 8;
   return ~crc;
@@ -63,7 +65,8 @@ void TickWriter::add_message(int channel, int64_t sequence, const uint8_t* data,
 
 void TickWriter::finish(int64_t state_hash, const std::function<void(const tick_t&)>& publish) {
   constexpr size_t kMessageSize = 4 + 8 + 4 + 4;
-  constexpr size_t kInPart = (engine::kMaxPartSize - 16'384) / kMessageSize;    // the rest: the head, and 64 clients' names
+  constexpr size_t kInPart =
+      (engine::kMaxPartSize - 16'384) / kMessageSize;  // the rest: the head, and 64 clients' names
   const size_t nparts = std::max<size_t>(1, (manifest_.size() + kInPart - 1) / kInPart);
   for (size_t part = 0; part < nparts; ++part) {
     part_.utime = head_.utime;
@@ -77,7 +80,8 @@ void TickWriter::finish(int64_t state_hash, const std::function<void(const tick_
     if (part == 0) part_.applied = applied_;
     part_.napplied = static_cast<int32_t>(part_.applied.size());
     const size_t first = part * kInPart, last = std::min(manifest_.size(), first + kInPart);
-    part_.manifest.assign(manifest_.begin() + static_cast<std::ptrdiff_t>(first), manifest_.begin() + static_cast<std::ptrdiff_t>(last));
+    part_.manifest.assign(manifest_.begin() + static_cast<std::ptrdiff_t>(first),
+                          manifest_.begin() + static_cast<std::ptrdiff_t>(last));
     part_.nmanifest = static_cast<int32_t>(part_.manifest.size());
     publish(part_);
   }

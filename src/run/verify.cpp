@@ -1,12 +1,13 @@
-// Two readers of one log: the replay drives the run from it, the comparison reads it again beside what the run records.
+// Two readers of one log: the replay drives the run from it, the comparison reads it again beside
+// what the run records.
 #include "run/verify.h"
 
 #include <algorithm>
 #include <set>
 
-#include "ruedo/decode.h"
 #include "log/header.h"
 #include "log/reader.h"
+#include "ruedo/decode.h"
 
 namespace ruedo::run {
 namespace {
@@ -22,14 +23,16 @@ using Values = std::vector<std::pair<std::string, std::string>>;
 // Every value of a message; false for a type that is not known, or a message that is none.
 bool values_of(const std::vector<uint8_t>& message, Values& values) {
   const Schema* schema = find_schema(fingerprint_of(message));
-  return schema && visit_message(*schema, message, [&](const FieldPath& path, const FieldValue& value) {
-    values.emplace_back(path.str(), to_string(value));
-    return true;
-  });
+  return schema &&
+         visit_message(*schema, message, [&](const FieldPath& path, const FieldValue& value) {
+           values.emplace_back(path.str(), to_string(value));
+           return true;
+         });
 }
 
 // The first value that differs; of equal texts (a NaN's bits, say) or unknown types the first byte.
-void name_field(const std::vector<uint8_t>& logged, const std::vector<uint8_t>& repeated, FirstDifference& difference) {
+void name_field(const std::vector<uint8_t>& logged, const std::vector<uint8_t>& repeated,
+                FirstDifference& difference) {
   Values then, now;
   if (values_of(logged, then) && values_of(repeated, now)) {
     for (size_t i = 0; i < std::max(then.size(), now.size()); ++i) {
@@ -37,13 +40,17 @@ void name_field(const std::vector<uint8_t>& logged, const std::vector<uint8_t>& 
       const bool same_field = i < then.size() && i < now.size() && then[i].first == now[i].first;
       difference.field = i < then.size() ? then[i].first : now[i].first;
       difference.logged = i < then.size() ? then[i].second : "(absent)";
-      difference.repeated = same_field ? now[i].second : i < then.size() ? "(absent)" : now[i].second;
+      difference.repeated = same_field        ? now[i].second
+                            : i < then.size() ? "(absent)"
+                                              : now[i].second;
       return;
     }
   }
   size_t at = 0;
   while (at < std::min(logged.size(), repeated.size()) && logged[at] == repeated[at]) ++at;
-  const auto byte = [at](const std::vector<uint8_t>& bytes) { return at < bytes.size() ? std::to_string(int{bytes[at]}) : "(absent)"; };
+  const auto byte = [at](const std::vector<uint8_t>& bytes) {
+    return at < bytes.size() ? std::to_string(int{bytes[at]}) : "(absent)";
+  };
   difference.field = "byte " + std::to_string(at);
   difference.logged = byte(logged);
   difference.repeated = byte(repeated);
@@ -53,13 +60,15 @@ void name_field(const std::vector<uint8_t>& logged, const std::vector<uint8_t>& 
 
 class Verifier::Impl {
  public:
-  Impl(const std::string& log, std::shared_ptr<const model::WorldModel> world, RunOptions options) : log_(log) {
+  Impl(const std::string& log, std::shared_ptr<const model::WorldModel> world, RunOptions options)
+      : log_(log) {
     step_us_ = world->step_us;
     find_kept_channels(log);
     options.repeat = log;
     options.end_with_repeat = true;
     options.control = false;
-    options.watcher = [this](SimTime stamp, const std::string& channel, const uint8_t* data, size_t size) { see(stamp, channel, data, size); };
+    options.watcher = [this](SimTime stamp, const std::string& channel, const uint8_t* data,
+                             size_t size) { see(stamp, channel, data, size); };
     server_ = std::make_unique<Run>(std::move(world), std::move(options), bus_);
   }
 
@@ -68,7 +77,8 @@ class Verifier::Impl {
     if (!verdict_.difference && more_ && next_logged()) {
       differ(logged_.timestamp_us, logged_.channel, "a message", "the end of the run");
     }
-    if (!verdict_.difference && !ended_) verdict_.fault = log_.fault().empty() ? "the end of the run is not in it" : log_.fault();
+    if (!verdict_.difference && !ended_)
+      verdict_.fault = log_.fault().empty() ? "the end of the run is not in it" : log_.fault();
     verdict_.time_us = last_stamp_;
     return verdict_;
   }
@@ -79,11 +89,12 @@ class Verifier::Impl {
  private:
   // What acted is what the repetition was given; the header is the machine's.
   bool is_compared(const std::string& channel) const {
-    return channel != "ruedo/applied" && channel != "ruedo/header" && (kept_.empty() || kept_.contains(channel));
+    return channel != "ruedo/applied" && channel != "ruedo/header" &&
+           (kept_.empty() || kept_.contains(channel));
   }
 
-  // Every run's log has ruedo/world. One without was thinned out, as campaigns keep them: the channels that it has are
-  // compared, the hashes of the state among them.
+  // Every run's log has ruedo/world. One without was thinned out, as campaigns keep them: the
+  // channels that it has are compared, the hashes of the state among them.
   void find_kept_channels(const std::string& path) {
     log::Reader reader(path);
     log::Event event;
@@ -119,12 +130,15 @@ class Verifier::Impl {
     last_stamp_ = stamp;
     if (logged_.channel != channel || logged_.timestamp_us != stamp) {
       const bool log_is_first = logged_.timestamp_us <= stamp;
-      const auto named = [](const std::string& name, SimTime time) { return "a message on " + name + " at stamp " + std::to_string(time) + " us"; };
-      differ(log_is_first ? logged_.timestamp_us : stamp, log_is_first ? logged_.channel : channel, named(logged_.channel, logged_.timestamp_us),
-             named(channel, stamp));
+      const auto named = [](const std::string& name, SimTime time) {
+        return "a message on " + name + " at stamp " + std::to_string(time) + " us";
+      };
+      differ(log_is_first ? logged_.timestamp_us : stamp, log_is_first ? logged_.channel : channel,
+             named(logged_.channel, logged_.timestamp_us), named(channel, stamp));
       return;
     }
-    if (logged_.data.size() != size || !std::equal(logged_.data.begin(), logged_.data.end(), data)) {
+    if (logged_.data.size() != size ||
+        !std::equal(logged_.data.begin(), logged_.data.end(), data)) {
       differ(stamp, channel, "", "");
       name_field(logged_.data, {data, data + size}, *verdict_.difference);
       return;
@@ -145,7 +159,8 @@ class Verifier::Impl {
     epoch_begin_us_ = stamp - hash.utime;
   }
 
-  void differ(SimTime stamp, const std::string& channel, const std::string& logged, const std::string& repeated) {
+  void differ(SimTime stamp, const std::string& channel, const std::string& logged,
+              const std::string& repeated) {
     FirstDifference& difference = verdict_.difference.emplace();
     difference.channel = channel;
     difference.epoch = epoch_;
@@ -159,7 +174,7 @@ class Verifier::Impl {
   log::Reader log_;
   log::Event logged_;
   bool more_ = true, ended_ = false;
-  std::set<std::string> kept_;    // channels of a log that was thinned out; empty: all
+  std::set<std::string> kept_;  // channels of a log that was thinned out; empty: all
   int64_t step_us_ = 1;
   SimTime last_stamp_ = 0, epoch_begin_us_ = 0;
   int32_t epoch_ = 0;
@@ -168,7 +183,8 @@ class Verifier::Impl {
   std::unique_ptr<Run> server_;
 };
 
-Verifier::Verifier(const std::string& log, std::shared_ptr<const model::WorldModel> world, RunOptions options)
+Verifier::Verifier(const std::string& log, std::shared_ptr<const model::WorldModel> world,
+                   RunOptions options)
     : impl_(std::make_unique<Impl>(log, std::move(world), std::move(options))), log_(log) {
   impl_->log_header = read_header(log);
   impl_->differences = log::machine_differences(impl_->log_header, impl_->header);
@@ -177,7 +193,9 @@ Verifier::Verifier(const std::string& log, std::shared_ptr<const model::WorldMod
 Verifier::~Verifier() = default;
 
 const std::vector<std::string>& Verifier::machine_differences() const { return impl_->differences; }
-void Verifier::check_same_run() const { log::check_same_run(impl_->log_header, impl_->header, log_); }
+void Verifier::check_same_run() const {
+  log::check_same_run(impl_->log_header, impl_->header, log_);
+}
 Verification Verifier::run() { return impl_->run(); }
 
 }  // namespace ruedo::run

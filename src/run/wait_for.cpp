@@ -1,4 +1,5 @@
-// Each message gets the step at which it acts when it comes, and the pacer's limit follows the slowest channel.
+// Each message gets the step at which it acts when it comes, and the pacer's limit follows the
+// slowest channel.
 #include "run/wait_for.h"
 
 #include <algorithm>
@@ -19,7 +20,8 @@ WaitFor::WaitFor(std::vector<WaitForOption> options, int64_t step_us) {
   }
 }
 
-void WaitFor::attach(const engine::Channels& channels, engine::CommandInbox& inbox, Gate& gate, int64_t step) {
+void WaitFor::attach(const engine::Channels& channels, engine::CommandInbox& inbox, Gate& gate,
+                     int64_t step) {
   inbox_ = &inbox;
   gate_ = &gate;
   for (Waited& waited : waited_) {
@@ -28,7 +30,8 @@ void WaitFor::attach(const engine::Channels& channels, engine::CommandInbox& inb
     for (const engine::Channel& channel : channels.list()) {
       if (!channel.input || channel.robot.empty()) continue;
       names.push_back(channel.name);
-      if (waited.option.channel == channel.name || waited.option.channel == channel.bus_name) waited.channel = channel.bus_name;
+      if (waited.option.channel == channel.name || waited.option.channel == channel.bus_name)
+        waited.channel = channel.bus_name;
     }
     const auto& inputs = inbox.inputs();
     const auto found = std::find_if(inputs.begin(), inputs.end(), [&](const engine::Input& input) {
@@ -46,23 +49,28 @@ void WaitFor::attach(const engine::Channels& channels, engine::CommandInbox& inb
 }
 
 bool WaitFor::receive(const std::string& channel, const uint8_t* data, size_t size) {
-  const auto waited = std::find_if(waited_.begin(), waited_.end(), [&](const Waited& w) { return w.channel == channel; });
+  const auto waited = std::find_if(waited_.begin(), waited_.end(),
+                                   [&](const Waited& w) { return w.channel == channel; });
   if (waited == waited_.end()) return false;
   if (!inbox_) return true;
   if (waited->next - waited->clock.samples_before(inbox_->next_step()) >= kMostAhead) {
     if (!waited->told) {
-      spdlog::warn("{}: its messages come faster than the {:g} Hz of --wait-for; those that find no room are ignored, and the run "
-                   "cannot be repeated that way (this is said once)", channel, waited->option.rate.hz());
+      spdlog::warn(
+          "{}: its messages come faster than the {:g} Hz of --wait-for; those that find no room "
+          "are ignored, and the run "
+          "cannot be repeated that way (this is said once)",
+          channel, waited->option.rate.hz());
     }
     waited->told = true;
     return true;
   }
-  if (inbox_->schedule(waited->clock.step_of(waited->next), waited->input, data, size) == engine::CommandInbox::Scheduled::kept) {
+  if (inbox_->schedule(waited->clock.step_of(waited->next), waited->input, data, size) ==
+      engine::CommandInbox::Scheduled::kept) {
     ++waited->next;
     limit();
     return true;
   }
-  return false;    // a faulty one: the inbox counts it
+  return false;  // a faulty one: the inbox counts it
 }
 
 void WaitFor::limit() {
@@ -75,7 +83,8 @@ std::string WaitFor::waits_for(int64_t step) const {
   std::string text;
   for (const Waited& waited : waited_) {
     if (waited.clock.step_of(waited.next) > step) continue;
-    text += fmt::format("{}message {} on {}", text.empty() ? "" : ", ", waited.next, waited.channel);
+    text +=
+        fmt::format("{}message {} on {}", text.empty() ? "" : ", ", waited.next, waited.channel);
   }
   return text;
 }

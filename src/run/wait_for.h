@@ -1,22 +1,23 @@
-// Input channels that the run waits for: a program that answers each sensor message with a command, and knows nothing of
-// steps, then drives a run that can be repeated, as fast as it can.
+// Input channels that the run waits for: a program that answers each sensor message with a command,
+// and knows nothing of steps, then drives a run that can be repeated, as fast as it can.
 //
-// Message k of such a channel (from 0) acts on the state of the first step at or after k / rate; the run goes no further
-// than that state before the message is there. Guarded by the server's lock of the simulation.
+// Message k of such a channel (from 0) acts on the state of the first step at or after k / rate;
+// the run goes no further than that state before the message is there. Guarded by the server's lock
+// of the simulation.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "ruedo/sim_time.h"
 #include "engine/channels.h"
 #include "engine/command_inbox.h"
+#include "ruedo/sim_time.h"
 #include "run/gate.h"
 
 namespace ruedo::run {
 
 struct WaitForOption {
-  std::string channel;    // its own name, or the one that --remap gives it
+  std::string channel;  // its own name, or the one that --remap gives it
   Rate rate;
 };
 
@@ -27,8 +28,10 @@ class WaitFor {
 
   WaitFor(std::vector<WaitForOption> options, int64_t step_us);
 
-  // For a simulation that was made anew, or is at `step` for another reason. Throws InputError for what is no input.
-  void attach(const engine::Channels& channels, engine::CommandInbox& inbox, Gate& gate, int64_t step);
+  // For a simulation that was made anew, or is at `step` for another reason. Throws InputError for
+  // what is no input.
+  void attach(const engine::Channels& channels, engine::CommandInbox& inbox, Gate& gate,
+              int64_t step);
 
   // False: the channel is none of these.
   bool receive(const std::string& channel, const uint8_t* data, size_t size);
@@ -41,8 +44,8 @@ class WaitFor {
     WaitForOption option;
     SampleClock clock;
     int input = -1;
-    std::string channel;     // on the bus
-    int64_t next = 0;        // number of the message that comes next
+    std::string channel;  // on the bus
+    int64_t next = 0;     // number of the message that comes next
     bool told = false;
   };
 

@@ -37,8 +37,8 @@ std::unique_ptr<GlContext> make_gl_context() {
   if (choice != "osmesa") {
     if (auto context = make_egl_context(why_not_egl)) return context;
   }
-  throw EnvironmentError("no renderer for cameras. OSMesa: " + why_not_osmesa + "; EGL: " + why_not_egl +
-                         ". Install libosmesa6, or libegl1 with libgl1-mesa-dri");
+  throw EnvironmentError("no renderer for cameras. OSMesa: " + why_not_osmesa + "; EGL: " +
+                         why_not_egl + ". Install libosmesa6, or libegl1 with libgl1-mesa-dri");
 }
 
 }  // namespace ruedo::scene

@@ -20,12 +20,14 @@ class EglContext : public GlContext {
   EglContext& operator=(const EglContext&) = delete;
 
   void make_current() override {
-    eglBindAPI(EGL_OPENGL_API);    // is a state of the thread
+    eglBindAPI(EGL_OPENGL_API);  // is a state of the thread
     if (eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_) == EGL_FALSE) {
       throw EnvironmentError("EGL refuses to make its context current");
     }
   }
-  void release() override { eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT); }
+  void release() override {
+    eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+  }
   Function function(const char* name) const override { return eglGetProcAddress(name); }
   std::string backend() const override { return "EGL"; }
 
@@ -37,8 +39,8 @@ class EglContext : public GlContext {
 }  // namespace
 
 std::unique_ptr<GlContext> make_egl_context(std::string& why) {
-  const auto get_display =
-      reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(eglGetProcAddress("eglGetPlatformDisplayEXT"));
+  const auto get_display = reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(
+      eglGetProcAddress("eglGetPlatformDisplayEXT"));
   if (get_display == nullptr) {
     why = "no eglGetPlatformDisplayEXT";
     return nullptr;
@@ -49,8 +51,13 @@ std::unique_ptr<GlContext> make_egl_context(std::string& why) {
     return nullptr;
   }
   eglBindAPI(EGL_OPENGL_API);
-  const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION, 3, EGL_CONTEXT_MINOR_VERSION, 3,
-                               EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
+  const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION,
+                               3,
+                               EGL_CONTEXT_MINOR_VERSION,
+                               3,
+                               EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                               EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+                               EGL_NONE};
   EGLContext context = eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, attributes);
   if (context == EGL_NO_CONTEXT) {
     why = "it gives no OpenGL 3.3 core context";

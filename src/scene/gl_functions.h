@@ -1,7 +1,7 @@
 // The OpenGL functions that the renderer uses, as one table per context.
 //
-// Names and types are those of Khronos' glcorearb.h; the pointers come from the context's own loader, so that
-// OSMesa and EGL need no loading library and link no libGL.
+// Names and types are those of Khronos' glcorearb.h; the pointers come from the context's own
+// loader, so that OSMesa and EGL need no loading library and link no libGL.
 #pragma once
 
 #include <GL/glcorearb.h>
@@ -88,7 +88,8 @@ struct GlFunctions {
 #undef RUEDO_GL_MEMBER
 };
 
-// Fills the table from a context that is current. Throws EnvironmentError that names a function it lacks.
+// Fills the table from a context that is current. Throws EnvironmentError that names a function it
+// lacks.
 GlFunctions load_gl_functions(const GlContext& context);
 
 }  // namespace ruedo::scene

@@ -30,7 +30,8 @@ class OsMesaContext : public GlContext {
   std::string backend() const override { return "OSMesa"; }
 
  private:
-  static constexpr int kSize = 16;    // OSMesa wants a picture of its own; everything is drawn to framebuffer objects
+  static constexpr int kSize =
+      16;  // OSMesa wants a picture of its own; everything is drawn to framebuffer objects
   OSMesaContext context_;
   std::array<uint8_t, 4 * kSize * kSize> unused_{};
 };
@@ -38,8 +39,15 @@ class OsMesaContext : public GlContext {
 }  // namespace
 
 std::unique_ptr<GlContext> make_osmesa_context(std::string& why) {
-  const int attributes[] = {OSMESA_FORMAT, OSMESA_RGBA, OSMESA_PROFILE, OSMESA_CORE_PROFILE,
-                            OSMESA_CONTEXT_MAJOR_VERSION, 3, OSMESA_CONTEXT_MINOR_VERSION, 3, 0};
+  const int attributes[] = {OSMESA_FORMAT,
+                            OSMESA_RGBA,
+                            OSMESA_PROFILE,
+                            OSMESA_CORE_PROFILE,
+                            OSMESA_CONTEXT_MAJOR_VERSION,
+                            3,
+                            OSMESA_CONTEXT_MINOR_VERSION,
+                            3,
+                            0};
   OSMesaContext context = OSMesaCreateContextAttribs(attributes, nullptr);
   if (context == nullptr) {
     why = "it gives no OpenGL 3.3 core context";

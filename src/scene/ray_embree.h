@@ -1,5 +1,5 @@
-// The little of Embree that rays need, the same over Embree 3 and 4: a device, packets of eight, and room for
-// data of our own beside Embree's context.
+// The little of Embree that rays need, the same over Embree 3 and 4: a device, packets of eight,
+// and room for data of our own beside Embree's context.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,7 @@
 
 namespace ruedo::scene {
 
-inline constexpr int kLanes = 8;    // rays in a packet
+inline constexpr int kLanes = 8;  // rays in a packet
 
 #if RUEDO_EMBREE == 4
 using EmbreeContext = RTCRayQueryContext;
@@ -42,7 +42,9 @@ inline void intersect(RTCScene scene, EmbreeContext& context, const int* valid, 
 #else
 using EmbreeContext = RTCIntersectContext;
 inline void init_context(EmbreeContext& context) { rtcInitIntersectContext(&context); }
-inline void intersect(RTCScene scene, EmbreeContext& context, RTCRayHit& ray) { rtcIntersect1(scene, &context, &ray); }
+inline void intersect(RTCScene scene, EmbreeContext& context, RTCRayHit& ray) {
+  rtcIntersect1(scene, &context, &ray);
+}
 inline void intersect(RTCScene scene, EmbreeContext& context, const int* valid, RTCRayHit8& rays) {
   rtcIntersect8(valid, scene, &context, &rays);
 }
@@ -71,8 +73,8 @@ struct ReleaseEmbree {
 using DevicePtr = std::unique_ptr<std::remove_pointer_t<RTCDevice>, ReleaseEmbree>;
 using ScenePtr = std::unique_ptr<std::remove_pointer_t<RTCScene>, ReleaseEmbree>;
 
-// Not with "threads=1", though only builds would use more: Embree would limit TBB in the whole process by it, and the
-// modules' pieces would find no second core.
+// Not with "threads=1", though only builds would use more: Embree would limit TBB in the whole
+// process by it, and the modules' pieces would find no second core.
 inline DevicePtr make_device() { return DevicePtr(rtcNewDevice("set_affinity=0")); }
 
 // A float a little above t >= 0.
@@ -127,19 +129,25 @@ struct Box {
   bool contains(const Vec3& p) const {
     return (p.array() >= lower.array()).all() && (p.array() <= upper.array()).all();
   }
-  // How far boxes within this one are grown, so that the single-precision traversal never misses what the
-  // test in double finds: rays start in this box, and their errors are a few parts in 2^22 of its coordinates.
+  // How far boxes within this one are grown, so that the single-precision traversal never misses
+  // what the test in double finds: rays start in this box, and their errors are a few parts in 2^22
+  // of its coordinates.
   double margin() const {
-    return empty() ? 0.0 : 1e-9 + 4e-6 * std::max(lower.cwiseAbs().maxCoeff(), upper.cwiseAbs().maxCoeff());
+    return empty()
+               ? 0.0
+               : 1e-9 + 4e-6 * std::max(lower.cwiseAbs().maxCoeff(), upper.cwiseAbs().maxCoeff());
   }
   RTCBounds bounds() const {
     return {round_down(lower.x()), round_down(lower.y()), round_down(lower.z()), 0.0f,
             round_up(upper.x()),   round_up(upper.y()),   round_up(upper.z()),   0.0f};
   }
   // Of coordinates of this size, generously; what is grown by it is not missed in double precision.
-  double rounding() const { return 1e-9 + 1e-12 * std::max(lower.cwiseAbs().maxCoeff(), upper.cwiseAbs().maxCoeff()); }
+  double rounding() const {
+    return 1e-9 + 1e-12 * std::max(lower.cwiseAbs().maxCoeff(), upper.cwiseAbs().maxCoeff());
+  }
   bool overlaps(const Box& other) const {
-    return (lower.array() <= other.upper.array()).all() && (other.lower.array() <= upper.array()).all();
+    return (lower.array() <= other.upper.array()).all() &&
+           (other.lower.array() <= upper.array()).all();
   }
   // Narrows [enter, exit] of the line to what is in the box; false when nothing is left.
   bool clip(const Vec3& o, const Vec3& d, double& enter, double& exit) const {
@@ -163,13 +171,13 @@ struct Box {
   }
 };
 
-// Eight rays on their way into Embree. Each starts where it enters the scene's box, so that its coordinates
-// are of the scene's size; `start` is that distance.
+// Eight rays on their way into Embree. Each starts where it enters the scene's box, so that its
+// coordinates are of the scene's size; `start` is that distance.
 struct Packet {
   RTCRayHit8 rays;
   alignas(32) int valid[kLanes];
   double start[kLanes];
-  int active = 0, last = 0;    // number of valid lanes, and one of them
+  int active = 0, last = 0;  // number of valid lanes, and one of them
 
   Packet() { clear(); }
   void clear() {
@@ -217,8 +225,8 @@ struct Packet {
     }
     const RTCRay8& r = rays.ray;
     RTCRayHit one;
-    one.ray = {r.org_x[last], r.org_y[last], r.org_z[last], 0.0f,     r.dir_x[last],   r.dir_y[last],
-               r.dir_z[last], 0.0f,          r.tfar[last],  ~0u,      r.id[last],      0u};
+    one.ray = {r.org_x[last], r.org_y[last], r.org_z[last], 0.0f, r.dir_x[last], r.dir_y[last],
+               r.dir_z[last], 0.0f,          r.tfar[last],  ~0u,  r.id[last],    0u};
     one.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     intersect(scene, context, one);
   }

@@ -9,14 +9,15 @@ struct RayMesh::Query : EmbreeContext {
   ShapeHit* hits = nullptr;
   const double* t_max = nullptr;
   Packet packet;
-  const Vec3* counting_from = nullptr;    // not null: count signed crossings instead
+  const Vec3* counting_from = nullptr;  // not null: count signed crossings instead
   Shear shear;
   int crossings = 0;
 
   // Keeps the nearer hit; of equals the lower triangle.
   void offer(int lane, double t, int triangle) {
     ShapeHit& hit = hits[lane];
-    if (t <= t_max[lane] && (t < hit.t || (t == hit.t && triangle < hit.feature))) hit = {t, triangle};
+    if (t <= t_max[lane] && (t < hit.t || (t == hit.t && triangle < hit.feature)))
+      hit = {t, triangle};
   }
 };
 
@@ -77,14 +78,19 @@ void RayMesh::intersect_pair(const RTCIntersectFunctionNArguments* arguments) {
   const RayMesh& mesh = *query.mesh;
   const unsigned lanes = lanes_of(*arguments);
   for (int i = mesh.pairs_[arguments->primID]; i < mesh.pairs_[arguments->primID + 1]; ++i) {
-    if (query.counting_from) query.crossings += mesh.crossing(i, *query.counting_from, query.shear);
-    else mesh.test(i, lanes, *query.rays, [&](int lane, double t) { query.offer(lane, t, i); });
+    if (query.counting_from)
+      query.crossings += mesh.crossing(i, *query.counting_from, query.shear);
+    else
+      mesh.test(i, lanes, *query.rays, [&](int lane, double t) { query.offer(lane, t, i); });
   }
   if (query.counting_from) return;
-  shorten(*arguments, [&](unsigned lane) { return std::min(query.hits[lane].t, query.t_max[lane]) - query.packet.start[lane]; });
+  shorten(*arguments, [&](unsigned lane) {
+    return std::min(query.hits[lane].t, query.t_max[lane]) - query.packet.start[lane];
+  });
 }
 
-void RayMesh::intersect(unsigned lanes, const FrameRays& rays, const double* t_max, ShapeHit* hits) const {
+void RayMesh::intersect(unsigned lanes, const FrameRays& rays, const double* t_max,
+                        ShapeHit* hits) const {
   Query query;
   query.mesh = this;
   query.rays = &rays;
@@ -94,7 +100,8 @@ void RayMesh::intersect(unsigned lanes, const FrameRays& rays, const double* t_m
     const int lane = std::countr_zero(rest);
     hits[lane] = {kNoHit, std::numeric_limits<int>::max()};
     const double enter = box_.entry(rays.o[lane], rays.d[lane]);
-    if (enter <= t_max[lane] && enter < kNoHit) query.packet.add(lane, rays.o[lane], rays.d[lane], enter, t_max[lane]);
+    if (enter <= t_max[lane] && enter < kNoHit)
+      query.packet.add(lane, rays.o[lane], rays.d[lane], enter, t_max[lane]);
   }
   if (scene_) {
     init_context(query);
@@ -107,7 +114,8 @@ void RayMesh::intersect(unsigned lanes, const FrameRays& rays, const double* t_m
 
 int RayMesh::crossing(int triangle, const Vec3& o, const Shear& shear) const {
   const Seen s = seen(triangle, o, shear);
-  const auto sign = [](double edge, double dy, double dx) {    // a tie is broken as if the ray were moved by (e, e^2)
+  const auto sign = [](double edge, double dy,
+                       double dx) {  // a tie is broken as if the ray were moved by (e, e^2)
     const double first = edge != 0.0 ? edge : dy != 0.0 ? dy : dx;
     return (first > 0.0) - (first < 0.0);
   };
@@ -115,11 +123,12 @@ int RayMesh::crossing(int triangle, const Vec3& o, const Shear& shear) const {
   const int v = sign(s.v, s.ay - s.cy, s.cx - s.ax);
   const int w = sign(s.w, s.by - s.ay, s.ax - s.bx);
   if (u == 0 || u != v || u != w || s.u + s.v + s.w == 0.0 || !(s.t(shear) > 0.0)) return 0;
-  return -u;    // positive when seen from the front: the ray enters
+  return -u;  // positive when seen from the front: the ray enters
 }
 
 const Vec3& RayMesh::way_out() {
-  static const Vec3 kUp = Vec3(0.0123, 0.0171, 1.0).normalized();    // along no face or edge that people draw
+  static const Vec3 kUp =
+      Vec3(0.0123, 0.0171, 1.0).normalized();  // along no face or edge that people draw
   return kUp;
 }
 
@@ -134,7 +143,8 @@ bool RayMesh::inside(const Vec3& point) const {
     query.packet.add(0, point, way_out(), 0.0, kNoHit);
     query.packet.cast(scene_.get(), query);
   } else {
-    for (int i = 0; i < static_cast<int>(size()); ++i) query.crossings += crossing(i, point, query.shear);
+    for (int i = 0; i < static_cast<int>(size()); ++i)
+      query.crossings += crossing(i, point, query.shear);
   }
   return query.crossings != 0;
 }

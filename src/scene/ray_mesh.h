@@ -1,7 +1,9 @@
-// A triangle mesh for rays: a watertight test in double precision, and an Embree tree over the triangles.
+// A triangle mesh for rays: a watertight test in double precision, and an Embree tree over the
+// triangles.
 //
-// The test is that of Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2013: corners are taken into
-// a plane across the ray, the same in all triangles, so no ray slips through at an edge or a corner.
+// The test is that of Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2013:
+// corners are taken into a plane across the ray, the same in all triangles, so no ray slips through
+// at an edge or a corner.
 #pragma once
 
 #include <array>
@@ -25,7 +27,7 @@ struct Shear {
     d.cwiseAbs().maxCoeff(&kz);
     kx = kz == 2 ? 0 : kz + 1;
     ky = kx == 2 ? 0 : kx + 1;
-    if (d[kz] < 0.0) std::swap(kx, ky);    // keeps the winding
+    if (d[kz] < 0.0) std::swap(kx, ky);  // keeps the winding
     sz = 1.0 / d[kz];
     sx = d[kx] * sz;
     sy = d[ky] * sz;
@@ -46,28 +48,30 @@ class RayMesh {
   // Makes a tree of its own, for intersect() and inside(); without it they loop over the triangles.
   void build_tree(RTCDevice device);
 
-  // The nearest hit of each of the lanes (bits) not beyond t_max[lane]; hits[lane].feature is the triangle.
+  // The nearest hit of each of the lanes (bits) not beyond t_max[lane]; hits[lane].feature is the
+  // triangle.
   void intersect(unsigned lanes, const FrameRays& rays, const double* t_max, ShapeHit* hits) const;
 
-  // Is the point inside the closed mesh? Counts the signed crossings of the surface on the way out (the winding
-  // number), so overlapping parts count once. False for an open mesh.
+  // Is the point inside the closed mesh? Counts the signed crossings of the surface on the way out
+  // (the winding number), so overlapping parts count once. False for an open mesh.
   bool inside(const Vec3& point) const;
 
   // Calls found(lane, t) for the lanes that hit the triangle.
   template <class Found>
   void test(int triangle, unsigned lanes, const FrameRays& rays, Found found) const;
-  // +1 where the ray leaves through the triangle, -1 where it enters, 0 where it misses. A ray through an edge or
-  // corner is moved aside by less than any number, the same way for all triangles: each crossing counts once.
+  // +1 where the ray leaves through the triangle, -1 where it enters, 0 where it misses. A ray
+  // through an edge or corner is moved aside by less than any number, the same way for all
+  // triangles: each crossing counts once.
   int crossing(int triangle, const Vec3& o, const Shear& shear) const;
-  static const Vec3& way_out();    // direction in which inside() counts
+  static const Vec3& way_out();  // direction in which inside() counts
 
-  Vec3 normal(int triangle) const;    // unit, by the winding
+  Vec3 normal(int triangle) const;  // unit, by the winding
   size_t size() const { return triangles_.size(); }
-  // Neighbours in the list that share an edge are one primitive of the trees: half the leaves. Primitive i holds the
-  // triangles from pairs()[i] up to pairs()[i + 1].
+  // Neighbours in the list that share an edge are one primitive of the trees: half the leaves.
+  // Primitive i holds the triangles from pairs()[i] up to pairs()[i + 1].
   const std::vector<int>& pairs() const { return pairs_; }
   Box pair_box(unsigned pair) const;
-  const Box& box() const { return box_; }    // grown by its margin()
+  const Box& box() const { return box_; }  // grown by its margin()
   bool closed() const { return closed_; }
   const std::vector<Vec3>& positions() const { return positions_; }
 
@@ -91,7 +95,9 @@ class RayMesh {
     }
     double t(const Shear& s) const { return s.sz * ((u * az + v * bz + w * cz) / (u + v + w)); }
   };
-  const Vec3& corner(int triangle, int i) const { return positions_[triangles_[static_cast<size_t>(triangle)][static_cast<size_t>(i)]]; }
+  const Vec3& corner(int triangle, int i) const {
+    return positions_[triangles_[static_cast<size_t>(triangle)][static_cast<size_t>(i)]];
+  }
   Seen seen(int triangle, const Vec3& o, const Shear& shear) const {
     return {corner(triangle, 0), corner(triangle, 1), corner(triangle, 2), o, shear};
   }
@@ -113,7 +119,7 @@ inline void RayMesh::test(int triangle, unsigned lanes, const FrameRays& rays, F
     const int lane = std::countr_zero(rest);
     const Seen s = seen(triangle, rays.o[lane], rays.shear[lane]);
     if ((s.u < 0.0 || s.v < 0.0 || s.w < 0.0) && (s.u > 0.0 || s.v > 0.0 || s.w > 0.0)) continue;
-    if (s.u + s.v + s.w == 0.0) continue;    // edge on, or no area
+    if (s.u + s.v + s.w == 0.0) continue;  // edge on, or no area
     const double t = s.t(rays.shear[lane]);
     if (t >= 0.0) found(lane, t);
   }

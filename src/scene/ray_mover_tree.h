@@ -1,5 +1,6 @@
-// The tree over the boxes of the movers: a binary tree of our own in double precision, because it is brought up to date
-// in a twentieth of the time that Embree takes (which builds user geometry anew, whatever quality is asked for).
+// The tree over the boxes of the movers: a binary tree of our own in double precision, because it
+// is brought up to date in a twentieth of the time that Embree takes (which builds user geometry
+// anew, whatever quality is asked for).
 //
 // What it gives does not depend on its shape: every mover whose box a ray meets is visited.
 #pragma once
@@ -15,10 +16,11 @@ class MoverTree {
   // One box a mover, numbered from 0; an empty box is met by no ray.
   void build(std::vector<Box> boxes);
   Box& box(size_t mover) { return boxes_[mover]; }
-  void refit();    // after boxes were changed
+  void refit();  // after boxes were changed
 
-  // Calls visit(mover, lanes, beam) for the movers whose boxes meet `beam`, the box around the pieces of these lanes
-  // (bits) up to t that lie within the box of all movers. Whether a lane meets the mover's own box is left to meeting().
+  // Calls visit(mover, lanes, beam) for the movers whose boxes meet `beam`, the box around the
+  // pieces of these lanes (bits) up to t that lie within the box of all movers. Whether a lane
+  // meets the mover's own box is left to meeting().
   template <class Visit>
   void visit(unsigned lanes, const FrameRays& rays, const double* t, Visit visit) const;
 
@@ -29,8 +31,8 @@ class MoverTree {
   // In depth-first order: the first child of node i is i + 1.
   struct Node {
     Box box;
-    int second = -1;    // index of the second child; -1: a leaf
-    int mover = -1;     // of a leaf
+    int second = -1;  // index of the second child; -1: a leaf
+    int mover = -1;   // of a leaf
   };
   void build_nodes();
   void split(int* first, int* last);
@@ -38,7 +40,7 @@ class MoverTree {
 
   std::vector<Box> boxes_;
   std::vector<Node> nodes_;
-  std::vector<int> order_;    // while building
+  std::vector<int> order_;  // while building
   double built_area_ = 0.0;
 };
 
@@ -65,7 +67,7 @@ void MoverTree::visit(unsigned lanes, const FrameRays& rays, const double* t, Vi
   }
   if (within == 0) return;
   beam.grow(root.rounding());
-  int stack[64];    // a tree of median splits is as deep as the binary logarithm of its leaves
+  int stack[64];  // a tree of median splits is as deep as the binary logarithm of its leaves
   int depth = 0;
   stack[depth++] = 0;
   while (depth > 0) {
@@ -81,7 +83,8 @@ void MoverTree::visit(unsigned lanes, const FrameRays& rays, const double* t, Vi
   }
 }
 
-inline unsigned MoverTree::meeting(size_t mover, unsigned lanes, const FrameRays& rays, const double* t) const {
+inline unsigned MoverTree::meeting(size_t mover, unsigned lanes, const FrameRays& rays,
+                                   const double* t) const {
   Box box = boxes_[mover];
   box.grow(box.rounding());
   unsigned meeting = 0;

@@ -1,5 +1,5 @@
-// The slow caster that the fast one is held against: each ray against every shape, one after another, without
-// trees, packets, bounds or single precision.
+// The slow caster that the fast one is held against: each ray against every shape, one after
+// another, without trees, packets, bounds or single precision.
 #include "scene/ray_static.h"
 
 namespace ruedo::scene {
@@ -8,8 +8,10 @@ namespace {
 
 class ReferenceRayScene : public RayScene {
  public:
-  explicit ReferenceRayScene(std::shared_ptr<const StaticRayScene> statics) : statics_(std::move(statics)) {
-    for (const model::BodyPlacement& body : statics_->layout.bodies) bodies_.emplace_back(body.X_WB);
+  explicit ReferenceRayScene(std::shared_ptr<const StaticRayScene> statics)
+      : statics_(std::move(statics)) {
+    for (const model::BodyPlacement& body : statics_->layout.bodies)
+      bodies_.emplace_back(body.X_WB);
     for (const TurningShape& shape : statics_->table.turning) turning_.push_back(shape.at(0.0));
   }
 

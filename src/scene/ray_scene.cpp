@@ -1,5 +1,5 @@
-// The fast caster: trees find the boxes that a ray may run through, the tests in double decide. Movers are one box
-// a body, so that bringing a thousand robots up to date means a thousand boxes.
+// The fast caster: trees find the boxes that a ray may run through, the tests in double decide.
+// Movers are one box a body, so that bringing a thousand robots up to date means a thousand boxes.
 #include "scene/ray_scene.h"
 
 #include "scene/ray_mover_tree.h"
@@ -18,13 +18,14 @@ class EmbreeRayScene : public RayScene {
 
  private:
   struct Mover {
-    int body = -1;                  // index into BodyLayout::bodies
-    Vec3 center_B, half_B;          // box around its shapes
-    IntoShape into;                 // world to body
-    bool there = false;             // false: its pose is not finite
+    int body = -1;          // index into BodyLayout::bodies
+    Vec3 center_B, half_B;  // box around its shapes
+    IntoShape into;         // world to body
+    bool there = false;     // false: its pose is not finite
   };
 
-  static void into_body(const Mover& mover, unsigned lanes, const FrameRays& world, FrameRays& body);
+  static void into_body(const Mover& mover, unsigned lanes, const FrameRays& world,
+                        FrameRays& body);
   void test_near(int index, unsigned lanes, const FrameRays& body, RayBatch& batch) const;
   void test_unbounded(const Mover& mover, unsigned lanes, RayBatch& batch) const;
   void test_bounded(size_t bounded, unsigned lanes, const Box& beam, RayBatch& batch) const;
@@ -33,12 +34,13 @@ class EmbreeRayScene : public RayScene {
 
   std::shared_ptr<const StaticRayScene> statics_;
   std::vector<Mover> bounded_, unbounded_;
-  std::vector<int> mover_of_body_;    // index into bounded_, or ~index into unbounded_
-  std::vector<IntoShape> turning_;    // as RayTable::turning, at the snapshot's wheel angles
+  std::vector<int> mover_of_body_;  // index into bounded_, or ~index into unbounded_
+  std::vector<IntoShape> turning_;  // as RayTable::turning, at the snapshot's wheel angles
   MoverTree tree_;
 };
 
-EmbreeRayScene::EmbreeRayScene(std::shared_ptr<const StaticRayScene> statics) : statics_(std::move(statics)) {
+EmbreeRayScene::EmbreeRayScene(std::shared_ptr<const StaticRayScene> statics)
+    : statics_(std::move(statics)) {
   const RayTable& table = statics_->table;
   std::vector<Box> boxes;
   mover_of_body_.resize(table.bodies.size());
@@ -55,14 +57,16 @@ EmbreeRayScene::EmbreeRayScene(std::shared_ptr<const StaticRayScene> statics) : 
     mover.body = static_cast<int>(body);
     mover.center_B = 0.5 * (box.lower + box.upper);
     mover.half_B = 0.5 * (box.upper - box.lower);
-    mover_of_body_[body] = fits ? static_cast<int>(bounded_.size()) : ~static_cast<int>(unbounded_.size());
+    mover_of_body_[body] =
+        fits ? static_cast<int>(bounded_.size()) : ~static_cast<int>(unbounded_.size());
     (fits ? bounded_ : unbounded_).push_back(mover);
     if (fits) boxes.push_back(box);
   }
   for (const TurningShape& shape : table.turning) turning_.push_back(shape.at(0.0));
   tree_.build(std::move(boxes));
   Snapshot start;
-  for (const model::BodyPlacement& body : statics_->layout.bodies) start.bodies.push_back(body.X_WB);
+  for (const model::BodyPlacement& body : statics_->layout.bodies)
+    start.bodies.push_back(body.X_WB);
   start.wheel_angles.resize(statics_->layout.wheels.size());
   update(start);
 }
@@ -78,7 +82,8 @@ void EmbreeRayScene::update(const Snapshot& snapshot) {
     Mover& mover = bounded_[i];
     place(mover);
     const Eigen::Matrix3d R_WB = mover.into.rotation.transpose();
-    const Vec3 center = snapshot.bodies[static_cast<size_t>(mover.body)].translation + R_WB * mover.center_B;
+    const Vec3 center =
+        snapshot.bodies[static_cast<size_t>(mover.body)].translation + R_WB * mover.center_B;
     const Vec3 half = R_WB.cwiseAbs() * mover.half_B;
     const Box box{center - half, center + half};
     tree_.box(i) = mover.there ? box : Box{};
@@ -90,7 +95,8 @@ void EmbreeRayScene::update(const Snapshot& snapshot) {
   tree_.refit();
 }
 
-void EmbreeRayScene::into_body(const Mover& mover, unsigned lanes, const FrameRays& world, FrameRays& body) {
+void EmbreeRayScene::into_body(const Mover& mover, unsigned lanes, const FrameRays& world,
+                               FrameRays& body) {
   for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
     const int lane = std::countr_zero(rest);
     body.o[lane] = mover.into.point(world.o[lane]);
@@ -98,7 +104,8 @@ void EmbreeRayScene::into_body(const Mover& mover, unsigned lanes, const FrameRa
   }
 }
 
-void EmbreeRayScene::test_near(int index, unsigned lanes, const FrameRays& body, RayBatch& batch) const {
+void EmbreeRayScene::test_near(int index, unsigned lanes, const FrameRays& body,
+                               RayBatch& batch) const {
   const RayShape& shape = statics_->table.shapes[static_cast<size_t>(index)];
   unsigned near = lanes;
   if (shape.kind != model::Shape::plane) {
@@ -108,7 +115,8 @@ void EmbreeRayScene::test_near(int index, unsigned lanes, const FrameRays& body,
       if (near_ball(shape, body.o[lane], body.d[lane])) near |= 1u << lane;
     }
   }
-  const IntoShape& into = shape.turning < 0 ? shape.into : turning_[static_cast<size_t>(shape.turning)];
+  const IntoShape& into =
+      shape.turning < 0 ? shape.into : turning_[static_cast<size_t>(shape.turning)];
   if (near) test_shape(shape, index, into, near, body, batch);
 }
 
@@ -116,12 +124,14 @@ void EmbreeRayScene::test_unbounded(const Mover& mover, unsigned lanes, RayBatch
   if (!mover.there) return;
   FrameRays body;
   into_body(mover, lanes, batch.world, body);
-  for (const int index : statics_->table.bodies[static_cast<size_t>(mover.body)]) test_near(index, lanes, body, batch);
+  for (const int index : statics_->table.bodies[static_cast<size_t>(mover.body)])
+    test_near(index, lanes, body, batch);
 }
 
-// Most packets that come near a mover start on it and pass over its wheels: the beam's box in the body's frame says so
-// for all lanes at once, before any ray is turned into that frame.
-void EmbreeRayScene::test_bounded(size_t bounded, unsigned lanes, const Box& beam, RayBatch& batch) const {
+// Most packets that come near a mover start on it and pass over its wheels: the beam's box in the
+// body's frame says so for all lanes at once, before any ray is turned into that frame.
+void EmbreeRayScene::test_bounded(size_t bounded, unsigned lanes, const Box& beam,
+                                  RayBatch& batch) const {
   const Mover& mover = bounded_[bounded];
   const Vec3 center = mover.into.point(0.5 * (beam.lower + beam.upper));
   const Vec3 half = mover.into.rotation.cwiseAbs() * (0.5 * (beam.upper - beam.lower));
@@ -145,7 +155,9 @@ void EmbreeRayScene::cast_batch(unsigned lanes, TreeQuery& query) const {
   statics_->cast(lanes, query);
   for (const Mover& mover : unbounded_) test_unbounded(mover, lanes, query.batch);
   tree_.visit(lanes, query.batch.world, query.batch.t,
-              [&](size_t mover, unsigned within, const Box& beam) { test_bounded(mover, within, beam, query.batch); });
+              [&](size_t mover, unsigned within, const Box& beam) {
+                test_bounded(mover, within, beam, query.batch);
+              });
 }
 
 void EmbreeRayScene::cast(std::span<const Ray> rays, std::span<Hit> hits, int ignored_link) const {
@@ -166,7 +178,8 @@ void EmbreeRayScene::cast(std::span<const Ray> rays, std::span<Hit> hits, int ig
       lanes |= 1u << lane;
     }
     if (lanes) cast_batch(lanes, query);
-    for (int lane = 0; lane < n; ++lane) write(batch, lane, hits[first + static_cast<size_t>(lane)]);
+    for (int lane = 0; lane < n; ++lane)
+      write(batch, lane, hits[first + static_cast<size_t>(lane)]);
   }
 }
 
@@ -184,7 +197,7 @@ void EmbreeRayScene::write(const RayBatch& batch, int lane, Hit& hit) const {
     hit.normal = -d;
     return;
   }
-  if (shape.kind == model::Shape::mesh && shape.body < 0) {    // in the world's frame
+  if (shape.kind == model::Shape::mesh && shape.body < 0) {  // in the world's frame
     const Vec3 normal = shape.mesh->normal(batch.feature[lane]);
     hit.normal = normal.dot(d) <= 0.0 ? normal : Vec3(-normal);
     return;
@@ -192,11 +205,13 @@ void EmbreeRayScene::write(const RayBatch& batch, int lane, Hit& hit) const {
   const IntoShape* body = nullptr;
   if (shape.body >= 0) {
     const int mover = mover_of_body_[static_cast<size_t>(shape.body)];
-    body = mover >= 0 ? &bounded_[static_cast<size_t>(mover)].into : &unbounded_[static_cast<size_t>(~mover)].into;
+    body = mover >= 0 ? &bounded_[static_cast<size_t>(mover)].into
+                      : &unbounded_[static_cast<size_t>(~mover)].into;
     o = body->point(o);
     d = body->vector(d);
   }
-  const IntoShape& into = shape.turning < 0 ? shape.into : turning_[static_cast<size_t>(shape.turning)];
+  const IntoShape& into =
+      shape.turning < 0 ? shape.into : turning_[static_cast<size_t>(shape.turning)];
   o = into.point(o);
   d = into.vector(d);
   Vec3 normal = into.vector_back(shape_normal(shape, batch.feature[lane], o + hit.range * d));

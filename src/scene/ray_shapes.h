@@ -1,7 +1,9 @@
-// Exact tests of rays against the primitive shapes, in double precision and in the shape's own frame.
+// Exact tests of rays against the primitive shapes, in double precision and in the shape's own
+// frame.
 //
-// Every shape here is convex and solid: the part of a line inside it is one interval. A ray that starts in
-// the interval has range 0, one that starts before it has its lower end. Directions are unit vectors.
+// Every shape here is convex and solid: the part of a line inside it is one interval. A ray that
+// starts in the interval has range 0, one that starts before it has its lower end. Directions are
+// unit vectors.
 #pragma once
 
 #include <algorithm>
@@ -14,11 +16,17 @@ namespace ruedo::scene {
 
 inline constexpr double kNoHit = std::numeric_limits<double>::infinity();
 
-// Where a shape was struck; with the point it gives the normal. Triangles of a mesh have feature = their index.
-enum Feature : int { kInside = -1, kSide = 0, kBottom = 1, kTop = 2 };    // box: 0 to 5, see intersect_box
+// Where a shape was struck; with the point it gives the normal. Triangles of a mesh have feature =
+// their index.
+enum Feature : int {
+  kInside = -1,
+  kSide = 0,
+  kBottom = 1,
+  kTop = 2
+};  // box: 0 to 5, see intersect_box
 
 struct ShapeHit {
-  double t = kNoHit;    // m; +inf: missed
+  double t = kNoHit;  // m; +inf: missed
   int feature = kInside;
 };
 
@@ -42,7 +50,8 @@ struct Interval {
   }
 };
 
-// Between the planes at -half and +half of one axis. Features: low for the plane at -half, high for +half.
+// Between the planes at -half and +half of one axis. Features: low for the plane at -half, high for
+// +half.
 inline Interval slab(double o, double d, double half, int low, int high) {
   if (d == 0.0) return std::abs(o) <= half ? Interval{} : Interval::none();
   const double inverse = 1.0 / d;
@@ -50,8 +59,8 @@ inline Interval slab(double o, double d, double half, int low, int high) {
   return d > 0.0 ? Interval{at_low, at_high, low} : Interval{at_high, at_low, high};
 }
 
-// Inside x^2 + y^2 + z^2 <= radius^2 for vectors of two or three components that are not zero in d. The
-// nearest point to the centre is taken first, so that distant origins lose no digits.
+// Inside x^2 + y^2 + z^2 <= radius^2 for vectors of two or three components that are not zero in d.
+// The nearest point to the centre is taken first, so that distant origins lose no digits.
 template <class Vector>
 Interval ball(const Vector& o, const Vector& d, double radius, int feature = kSide) {
   const double dd = d.squaredNorm();
@@ -73,7 +82,9 @@ inline ShapeHit intersect_box(const Vec3& o, const Vec3& d, const Vec3& half) {
   return inside.hit();
 }
 
-inline ShapeHit intersect_sphere(const Vec3& o, const Vec3& d, double radius) { return ball(o, d, radius).hit(); }
+inline ShapeHit intersect_sphere(const Vec3& o, const Vec3& d, double radius) {
+  return ball(o, d, radius).hit();
+}
 
 inline ShapeHit intersect_ellipsoid(const Vec3& o, const Vec3& d, const Vec3& radii) {
   const Vec3 scaled_o = o.cwiseQuotient(radii), scaled_d = d.cwiseQuotient(radii);
@@ -83,11 +94,13 @@ inline ShapeHit intersect_ellipsoid(const Vec3& o, const Vec3& d, const Vec3& ra
 // The infinite cylinder about z.
 inline Interval round_wall(const Vec3& o, const Vec3& d, double radius) {
   const Eigen::Vector2d o2 = o.head<2>(), d2 = d.head<2>();
-  if (d2.squaredNorm() == 0.0) return o2.squaredNorm() <= radius * radius ? Interval{} : Interval::none();
+  if (d2.squaredNorm() == 0.0)
+    return o2.squaredNorm() <= radius * radius ? Interval{} : Interval::none();
   return ball(o2, d2, radius);
 }
 
-inline ShapeHit intersect_cylinder(const Vec3& o, const Vec3& d, double radius, double half_length) {
+inline ShapeHit intersect_cylinder(const Vec3& o, const Vec3& d, double radius,
+                                   double half_length) {
   Interval inside = round_wall(o, d, radius);
   const Interval caps = slab(o.z(), d.z(), half_length, kBottom, kTop);
   inside.intersect(caps.enter, caps.exit, caps.feature);
@@ -108,32 +121,36 @@ inline ShapeHit intersect_capsule(const Vec3& o, const Vec3& d, double radius, d
 }
 
 // Apex at +half_length, base of that radius at -half_length.
-inline ShapeHit intersect_cone(const Vec3& origin, const Vec3& d, double radius, double half_length) {
-  const double shift = -origin.dot(d);    // work from the point nearest to the centre
+inline ShapeHit intersect_cone(const Vec3& origin, const Vec3& d, double radius,
+                               double half_length) {
+  const double shift = -origin.dot(d);  // work from the point nearest to the centre
   const Vec3 o = origin + shift * d;
   const double slope = radius / (2.0 * half_length), slope2 = slope * slope;
-  const double below = half_length - o.z();    // below the apex; below - t d.z at t
-  // Inside: x^2 + y^2 - (slope * below)^2 <= 0, that is a t^2 + 2 b t + c <= 0, in the lower half only.
+  const double below = half_length - o.z();  // below the apex; below - t d.z at t
+  // Inside: x^2 + y^2 - (slope * below)^2 <= 0, that is a t^2 + 2 b t + c <= 0, in the lower half
+  // only.
   const double a = d.x() * d.x() + d.y() * d.y() - slope2 * d.z() * d.z();
   const double b = o.x() * d.x() + o.y() * d.y() + slope2 * below * d.z();
   const double c = o.x() * o.x() + o.y() * o.y() - slope2 * below * below;
   const double discriminant = b * b - a * c;
   if (a > 0.0 && discriminant < 0.0) return {};
-  const double q = -(b + std::copysign(std::sqrt(std::max(discriminant, 0.0)), b));    // no difference of like numbers
+  const double q = -(b + std::copysign(std::sqrt(std::max(discriminant, 0.0)),
+                                       b));  // no difference of like numbers
   Interval inside;
   inside.feature = kSide;
-  if (a > 0.0) {    // flatter than the wall: through one half, from wall to wall
+  if (a > 0.0) {  // flatter than the wall: through one half, from wall to wall
     const double t0 = q / a, t1 = q != 0.0 ? c / q : t0;
     inside.enter = std::min(t0, t1);
     inside.exit = std::max(t0, t1);
-    if (below - 0.5 * (inside.enter + inside.exit) * d.z() < 0.0) return {};    // the half above the apex
-  } else {          // steeper: inside the lower half from the wall on downwards
+    if (below - 0.5 * (inside.enter + inside.exit) * d.z() < 0.0)
+      return {};  // the half above the apex
+  } else {        // steeper: inside the lower half from the wall on downwards
     double crossing;
     if (a < 0.0) {
       const double t0 = q / a, t1 = q != 0.0 ? c / q : t0;
       crossing = d.z() > 0.0 ? std::min(t0, t1) : std::max(t0, t1);
     } else {
-      if (!(b * d.z() > 0.0)) return {};    // parallel to the wall and below it nowhere
+      if (!(b * d.z() > 0.0)) return {};  // parallel to the wall and below it nowhere
       crossing = c / q;
     }
     (d.z() > 0.0 ? inside.exit : inside.enter) = crossing;
@@ -148,7 +165,8 @@ inline ShapeHit intersect_cone(const Vec3& origin, const Vec3& d, double radius,
 // The plane through the origin with that unit normal, seen from both sides; it has no inside.
 inline ShapeHit intersect_plane(const Vec3& o, const Vec3& d, const Vec3& normal) {
   const double t = -normal.dot(o) / normal.dot(d);
-  return t >= 0.0 && t < kNoHit ? ShapeHit{t, kSide} : ShapeHit{};    // NaN: within the plane, which is not seen
+  return t >= 0.0 && t < kNoHit ? ShapeHit{t, kSide}
+                                : ShapeHit{};  // NaN: within the plane, which is not seen
 }
 
 }  // namespace ruedo::scene

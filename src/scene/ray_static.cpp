@@ -4,7 +4,8 @@ namespace ruedo::scene {
 
 using model::Shape;
 
-StaticRayScene::StaticRayScene(const model::WorldModel& world, const model::BodyLayout& body_layout, bool visuals, Backend kind)
+StaticRayScene::StaticRayScene(const model::WorldModel& world, const model::BodyLayout& body_layout,
+                               bool visuals, Backend kind)
     : layout(body_layout),
       backend(kind),
       device_(kind == Backend::embree ? make_device() : nullptr),
@@ -33,14 +34,15 @@ StaticRayScene::StaticRayScene(const model::WorldModel& world, const model::Body
 }
 
 void StaticRayScene::cast(unsigned lanes, TreeQuery& query) const {
-  for (const int index : unbounded_) test_shape(shape(index), index, shape(index).into, lanes, query.batch.world, query.batch);
+  for (const int index : unbounded_)
+    test_shape(shape(index), index, shape(index).into, lanes, query.batch.world, query.batch);
   query.owner = this;
   if (!closed_.empty()) cast_inside(lanes, query);
   tree_.cast(lanes, query);
 }
 
-// Triangles know nothing of an inside, so the closed meshes around a ray's origin are looked for on their own: once
-// for all rays that start there.
+// Triangles know nothing of an inside, so the closed meshes around a ray's origin are looked for on
+// their own: once for all rays that start there.
 void StaticRayScene::cast_inside(unsigned lanes, TreeQuery& query) const {
   RayBatch& batch = query.batch;
   for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
@@ -54,7 +56,8 @@ void StaticRayScene::cast_inside(unsigned lanes, TreeQuery& query) const {
       closed_tree_.cast(1u << lane, query);
       batch.t[lane] = t;
     }
-    if (batch.inside_static != RayBatch::kNothing) batch.offer(lane, {0.0, kInside}, batch.inside_static);
+    if (batch.inside_static != RayBatch::kNothing)
+      batch.offer(lane, {0.0, kInside}, batch.inside_static);
   }
 }
 
@@ -75,10 +78,12 @@ void StaticRayScene::test_primitive(const RTCIntersectFunctionNArguments* argume
   const int index = statics.bounded_[arguments->primID];
   const RayShape& s = statics.shape(index);
   test_shape(s, index, s.into, lanes_of(*arguments), query.batch.world, query.batch);
-  shorten(*arguments, [&](unsigned lane) { return query.batch.t[lane] - query.packet.start[lane]; });
+  shorten(*arguments,
+          [&](unsigned lane) { return query.batch.t[lane] - query.packet.start[lane]; });
 }
 
-std::shared_ptr<const StaticRayScene> make_static_ray_scene(const model::WorldModel& world, const model::BodyLayout& layout,
+std::shared_ptr<const StaticRayScene> make_static_ray_scene(const model::WorldModel& world,
+                                                            const model::BodyLayout& layout,
                                                             bool visuals, Backend backend) {
   return std::make_shared<const StaticRayScene>(world, layout, visuals, backend);
 }

@@ -1,5 +1,5 @@
-// What ray scenes of all modules share: the table of shapes, the Embree device, and the tree of the static
-// shapes. Internal to src/scene.
+// What ray scenes of all modules share: the table of shapes, the Embree device, and the tree of the
+// static shapes. Internal to src/scene.
 #pragma once
 
 #include "scene/ray_scene.h"
@@ -11,17 +11,17 @@ namespace ruedo::scene {
 struct TreeQuery : EmbreeContext {
   RayBatch batch;
   Packet packet;
-  const void* owner = nullptr;            // for the callback
-  const RayMesh* counting = nullptr;      // not null: count the signed crossings of this mesh instead
+  const void* owner = nullptr;        // for the callback
+  const RayMesh* counting = nullptr;  // not null: count the signed crossings of this mesh instead
   Vec3 counting_from = Vec3::Zero();
-  Shear shear;                            // of the way out
+  Shear shear;  // of the way out
   int crossings = 0;
 
   TreeQuery() { init_context(*this); }
 };
 
-// An Embree tree over boxes of our own, with a callback that tests what is in them, and over the triangles of
-// meshes that are given in the world's frame.
+// An Embree tree over boxes of our own, with a callback that tests what is in them, and over the
+// triangles of meshes that are given in the world's frame.
 class RayTree {
  public:
   // Embree keeps its address.
@@ -42,12 +42,13 @@ class RayTree {
   struct Triangles {
     const RayTree* tree;
     const RayShape* shape;
-    int index;    // of the shape, in the table
+    int index;  // of the shape, in the table
   };
   static void bounds(const RTCBoundsFunctionArguments* arguments);
   static void pair_bounds(const RTCBoundsFunctionArguments* arguments);
   static void test_pair(const RTCIntersectFunctionNArguments* arguments);
-  void attach(RTCDevice device, size_t primitives, void* user, RTCBoundsFunction bounds, RTCIntersectFunctionN callback);
+  void attach(RTCDevice device, size_t primitives, void* user, RTCBoundsFunction bounds,
+              RTCIntersectFunctionN callback);
 
   std::vector<Box> boxes_;
   std::vector<Triangles> triangles_;
@@ -58,18 +59,19 @@ class RayTree {
 
 class StaticRayScene {
  public:
-  StaticRayScene(const model::WorldModel& world, const model::BodyLayout& layout, bool visuals, Backend backend);
+  StaticRayScene(const model::WorldModel& world, const model::BodyLayout& layout, bool visuals,
+                 Backend backend);
 
-  const model::BodyLayout layout;    // its own: worlds that share it come and go
+  const model::BodyLayout layout;  // its own: worlds that share it come and go
   const Backend backend;
 
  private:
-  DevicePtr device_;    // before what is made with it
+  DevicePtr device_;  // before what is made with it
 
  public:
   const RayTable table;
   RTCDevice device() const { return device_.get(); }
-  bool has_meshes() const { return has_meshes_; }    // rays in the world's frame need their shear
+  bool has_meshes() const { return has_meshes_; }  // rays in the world's frame need their shear
   // Static shapes, for the lanes (bits) of query.batch.
   void cast(unsigned lanes, TreeQuery& query) const;
 
@@ -79,18 +81,18 @@ class StaticRayScene {
   void cast_inside(unsigned lanes, TreeQuery& query) const;
   const RayShape& shape(int index) const { return table.shapes[static_cast<size_t>(index)]; }
 
-  std::vector<int> unbounded_, bounded_, closed_;    // indices into table.shapes
+  std::vector<int> unbounded_, bounded_, closed_;  // indices into table.shapes
   RayTree tree_, closed_tree_;
   bool has_meshes_ = false;
 };
 
 // Embree's limit on coordinates is 1.8e18.
-inline constexpr double kFarthest = 1e15;    // m
+inline constexpr double kFarthest = 1e15;  // m
 
 // Is there a ray at all? Others hit nothing.
 inline bool usable(const Ray& ray) {
-  return ray.origin.cwiseAbs().maxCoeff() <= kFarthest && ray.origin.allFinite() && ray.max_range >= 0.0 &&
-         std::abs(ray.direction.squaredNorm() - 1.0) <= 1e-3;
+  return ray.origin.cwiseAbs().maxCoeff() <= kFarthest && ray.origin.allFinite() &&
+         ray.max_range >= 0.0 && std::abs(ray.direction.squaredNorm() - 1.0) <= 1e-3;
 }
 
 inline bool fits_tree(const Box& box) {

@@ -31,7 +31,8 @@ Quat turned_to(const Vec3& n) {
 }
 
 // Does turning about the axis through that point of the link leave the shape as it is?
-bool round_about(const RayShape& shape, const Pose& X_LS, const Vec3& center_in_L, const Vec3& axis_in_L) {
+bool round_about(const RayShape& shape, const Pose& X_LS, const Vec3& center_in_L,
+                 const Vec3& axis_in_L) {
   const auto along_axis = [&](const Vec3& v) { return v.cross(axis_in_L).norm() <= 1e-9; };
   if (!along_axis(X_LS.translation - center_in_L)) return false;
   switch (shape.kind) {
@@ -45,7 +46,8 @@ bool round_about(const RayShape& shape, const Pose& X_LS, const Vec3& center_in_
 
 }  // namespace
 
-RayTable::RayTable(const model::WorldModel& world, const model::BodyLayout& layout, bool visuals, RTCDevice device)
+RayTable::RayTable(const model::WorldModel& world, const model::BodyLayout& layout, bool visuals,
+                   RTCDevice device)
     : bodies(layout.bodies.size()) {
   for (size_t i = 0; i < layout.links.size(); ++i) {
     const model::LinkPlacement& placement = layout.links[i];
@@ -56,16 +58,19 @@ RayTable::RayTable(const model::WorldModel& world, const model::BodyLayout& layo
     if (visuals) {
       for (size_t v = 0; v < link.visuals.size(); ++v)
         if (link.visuals[v].transparency < 1.0)
-          add(placement, link_index, static_cast<int>(v), link.visuals[v].X_LV, link.visuals[v].geometry, layout, true, device);
+          add(placement, link_index, static_cast<int>(v), link.visuals[v].X_LV,
+              link.visuals[v].geometry, layout, true, device);
     } else {
       for (size_t c = 0; c < link.collisions.size(); ++c)
-        add(placement, link_index, static_cast<int>(c), link.collisions[c].X_LC, link.collisions[c].geometry, layout, false, device);
+        add(placement, link_index, static_cast<int>(c), link.collisions[c].X_LC,
+            link.collisions[c].geometry, layout, false, device);
     }
   }
 }
 
-void RayTable::add(const model::LinkPlacement& link, int link_index, int shape_index, const Pose& X_LShape,
-                   const model::Geometry& geometry, const model::BodyLayout& layout, bool visuals, RTCDevice device) {
+void RayTable::add(const model::LinkPlacement& link, int link_index, int shape_index,
+                   const Pose& X_LShape, const model::Geometry& geometry,
+                   const model::BodyLayout& layout, bool visuals, RTCDevice device) {
   RayShape shape;
   Pose X_LS = X_LShape;
   shape.kind = geometry.shape;
@@ -81,7 +86,7 @@ void RayTable::add(const model::LinkPlacement& link, int link_index, int shape_i
     case Shape::cone: shape.size = Vec3(s.x(), 0.5 * s.y(), 0); break;
     case Shape::ellipsoid: shape.size = s; break;
     case Shape::plane:
-      if (visuals) {    // what is drawn is a rectangle: a box without height
+      if (visuals) {  // what is drawn is a rectangle: a box without height
         shape.kind = Shape::box;
         shape.size = Vec3(0.5 * geometry.extent.x(), 0.5 * geometry.extent.y(), 0.0);
         X_LS = X_LS * Pose{turned_to(geometry.normal.normalized()), Vec3::Zero()};
@@ -92,10 +97,12 @@ void RayTable::add(const model::LinkPlacement& link, int link_index, int shape_i
     case Shape::mesh: {
       if (!geometry.mesh || geometry.mesh->triangles.empty()) return;
       if (link.body < 0) {
-        shape.mesh = std::make_shared<RayMesh>(*geometry.mesh, geometry.scale, (link.X_BL * X_LS).normalized());
+        shape.mesh = std::make_shared<RayMesh>(*geometry.mesh, geometry.scale,
+                                               (link.X_BL * X_LS).normalized());
         break;
       }
-      auto& shared = meshes_[{geometry.mesh.get(), geometry.scale.x(), geometry.scale.y(), geometry.scale.z()}];
+      auto& shared = meshes_[{geometry.mesh.get(), geometry.scale.x(), geometry.scale.y(),
+                              geometry.scale.z()}];
       if (!shared) {
         const auto mesh = std::make_shared<RayMesh>(*geometry.mesh, geometry.scale, Pose());
         if (device) mesh->build_tree(device);
@@ -106,7 +113,8 @@ void RayTable::add(const model::LinkPlacement& link, int link_index, int shape_i
     }
   }
 
-  const Pose X_FL = link.X_BL, X_FS = shape.mesh && link.body < 0 ? Pose() : (X_FL * X_LS).normalized();
+  const Pose X_FL = link.X_BL,
+             X_FS = shape.mesh && link.body < 0 ? Pose() : (X_FL * X_LS).normalized();
   shape.into = IntoShape(X_FS);
   if (shape.kind == Shape::mesh) {
     for (const Vec3& p : shape.mesh->positions()) shape.box_F.add(X_FS * p);
@@ -123,7 +131,8 @@ void RayTable::add(const model::LinkPlacement& link, int link_index, int shape_i
     // Parts fixed to the wheel's own link turn about the same axis, seen from their frame.
     const model::WheelPlacement& wheel = layout.wheels[static_cast<size_t>(link.wheel)];
     const Pose X_LWheel = X_FL.inverse() * layout.links[static_cast<size_t>(wheel.link)].X_BL;
-    const Vec3 axis_in_L = (X_LWheel.rotation * wheel.axis_in_L).normalized(), center_in_L = X_LWheel * wheel.center_in_L;
+    const Vec3 axis_in_L = (X_LWheel.rotation * wheel.axis_in_L).normalized(),
+               center_in_L = X_LWheel * wheel.center_in_L;
     if (!round_about(shape, X_LS, center_in_L, axis_in_L)) {
       shape.turning = static_cast<int>(turning.size());
       turning.push_back({link.wheel, X_FL, X_LS, axis_in_L, center_in_L});
@@ -137,10 +146,12 @@ void RayTable::add(const model::LinkPlacement& link, int link_index, int shape_i
       shape.box_F.add(on_axis + Vec3::Constant(shape.radius));
     }
   }
-  shape.radius *= 1.0 + 1e-9;    // rounding of the test against it
+  shape.radius *= 1.0 + 1e-9;  // rounding of the test against it
   const int index = static_cast<int>(shapes.size());
-  if (shape.body < 0) statics.push_back(index);
-  else bodies[static_cast<size_t>(shape.body)].push_back(index);
+  if (shape.body < 0)
+    statics.push_back(index);
+  else
+    bodies[static_cast<size_t>(shape.body)].push_back(index);
   shapes.push_back(std::move(shape));
 }
 
@@ -157,22 +168,26 @@ bool RayBatch::inside_mesh(const RayShape& shape, int index, const Vec3& p_F, co
 namespace {
 
 template <class Test>
-inline void each_lane(int index, const IntoShape& into, unsigned lanes, const FrameRays& rays, RayBatch& batch, Test test) {
+inline void each_lane(int index, const IntoShape& into, unsigned lanes, const FrameRays& rays,
+                      RayBatch& batch, Test test) {
   for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
     const int lane = std::countr_zero(rest);
     batch.offer(lane, test(into.point(rays.o[lane]), into.vector(rays.d[lane])), index);
   }
 }
 
-void test_mesh(const RayShape& shape, int index, const IntoShape& into, unsigned lanes, const FrameRays& rays, RayBatch& batch) {
+void test_mesh(const RayShape& shape, int index, const IntoShape& into, unsigned lanes,
+               const FrameRays& rays, RayBatch& batch) {
   FrameRays local;
   unsigned outside = 0;
   for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
     const int lane = std::countr_zero(rest);
     local.o[lane] = into.point(rays.o[lane]);
     local.d[lane] = into.vector(rays.d[lane]);
-    if (batch.inside_mesh(shape, index, rays.o[lane], local.o[lane])) batch.offer(lane, {0.0, kInside}, index);
-    else outside |= 1u << lane;
+    if (batch.inside_mesh(shape, index, rays.o[lane], local.o[lane]))
+      batch.offer(lane, {0.0, kInside}, index);
+    else
+      outside |= 1u << lane;
     local.shear[lane] = Shear(local.d[lane]);
   }
   ShapeHit hits[kLanes];
@@ -185,18 +200,29 @@ void test_mesh(const RayShape& shape, int index, const IntoShape& into, unsigned
 
 }  // namespace
 
-void test_shape(const RayShape& shape, int index, const IntoShape& into, unsigned lanes, const FrameRays& rays, RayBatch& batch) {
+void test_shape(const RayShape& shape, int index, const IntoShape& into, unsigned lanes,
+                const FrameRays& rays, RayBatch& batch) {
   if (shape.link == batch.ignored_link) return;
   const Vec3& s = shape.size;
   const auto each = [&](auto test) { each_lane(index, into, lanes, rays, batch, test); };
   switch (shape.kind) {
-    case Shape::box: return each([&](const Vec3& o, const Vec3& d) { return intersect_box(o, d, s); });
-    case Shape::sphere: return each([&](const Vec3& o, const Vec3& d) { return intersect_sphere(o, d, s.x()); });
-    case Shape::cylinder: return each([&](const Vec3& o, const Vec3& d) { return intersect_cylinder(o, d, s.x(), s.y()); });
-    case Shape::capsule: return each([&](const Vec3& o, const Vec3& d) { return intersect_capsule(o, d, s.x(), s.y()); });
-    case Shape::ellipsoid: return each([&](const Vec3& o, const Vec3& d) { return intersect_ellipsoid(o, d, s); });
-    case Shape::cone: return each([&](const Vec3& o, const Vec3& d) { return intersect_cone(o, d, s.x(), s.y()); });
-    case Shape::plane: return each([&](const Vec3& o, const Vec3& d) { return intersect_plane(o, d, shape.normal); });
+    case Shape::box:
+      return each([&](const Vec3& o, const Vec3& d) { return intersect_box(o, d, s); });
+    case Shape::sphere:
+      return each([&](const Vec3& o, const Vec3& d) { return intersect_sphere(o, d, s.x()); });
+    case Shape::cylinder:
+      return each(
+          [&](const Vec3& o, const Vec3& d) { return intersect_cylinder(o, d, s.x(), s.y()); });
+    case Shape::capsule:
+      return each(
+          [&](const Vec3& o, const Vec3& d) { return intersect_capsule(o, d, s.x(), s.y()); });
+    case Shape::ellipsoid:
+      return each([&](const Vec3& o, const Vec3& d) { return intersect_ellipsoid(o, d, s); });
+    case Shape::cone:
+      return each([&](const Vec3& o, const Vec3& d) { return intersect_cone(o, d, s.x(), s.y()); });
+    case Shape::plane:
+      return each(
+          [&](const Vec3& o, const Vec3& d) { return intersect_plane(o, d, shape.normal); });
     case Shape::mesh: return test_mesh(shape, index, into, lanes, rays, batch);
   }
 }
@@ -208,12 +234,15 @@ Vec3 shape_normal(const RayShape& shape, int feature, const Vec3& p) {
     case Shape::box: return (feature % 2 == 0 ? -1.0 : 1.0) * Vec3::Unit(feature / 2);
     case Shape::sphere: return p.normalized();
     case Shape::ellipsoid: return p.cwiseQuotient(s).cwiseQuotient(s).normalized();
-    case Shape::cylinder: return feature == kSide ? Vec3(p.x(), p.y(), 0.0).normalized() : end(feature);
-    case Shape::capsule: return feature == kSide ? Vec3(p.x(), p.y(), 0.0).normalized() : (p - s.y() * end(feature)).normalized();
+    case Shape::cylinder:
+      return feature == kSide ? Vec3(p.x(), p.y(), 0.0).normalized() : end(feature);
+    case Shape::capsule:
+      return feature == kSide ? Vec3(p.x(), p.y(), 0.0).normalized()
+                              : (p - s.y() * end(feature)).normalized();
     case Shape::cone: {
       if (feature != kSide) return end(feature);
       const double around = math::hypot(p.x(), p.y());
-      if (around == 0.0) return Vec3::UnitZ();    // the apex
+      if (around == 0.0) return Vec3::UnitZ();  // the apex
       return Vec3(p.x() / around * 2.0 * s.y(), p.y() / around * 2.0 * s.y(), s.x()).normalized();
     }
     case Shape::plane: return shape.normal;

@@ -1,5 +1,6 @@
-// All shapes that rays can hit, ordered by link and shape, each with its place in the frame F that carries it:
-// the world for static links, the body's frame for movers. Built once and shared by all backends.
+// All shapes that rays can hit, ordered by link and shape, each with its place in the frame F that
+// carries it: the world for static links, the body's frame for movers. Built once and shared by all
+// backends.
 #pragma once
 
 #include <bit>
@@ -21,7 +22,8 @@ struct IntoShape {
 
   IntoShape() = default;
   explicit IntoShape(const Pose& X_FS)
-      : rotation(X_FS.rotation.conjugate().toRotationMatrix()), translation(-(rotation * X_FS.translation)) {}
+      : rotation(X_FS.rotation.conjugate().toRotationMatrix()),
+        translation(-(rotation * X_FS.translation)) {}
   Vec3 point(const Vec3& p_F) const { return rotation * p_F + translation; }
   Vec3 vector(const Vec3& v_F) const { return rotation * v_F; }
   Vec3 vector_back(const Vec3& v_S) const { return rotation.transpose() * v_S; }
@@ -29,12 +31,13 @@ struct IntoShape {
 
 struct RayShape {
   model::Shape kind = model::Shape::box;
-  int link = -1, shape = -1;     // as in Hit
-  int body = -1;                 // -1: static
-  int turning = -1;              // index into RayTable::turning: its place depends on a wheel's angle
-  IntoShape into;                // at wheel angle 0
-  Vec3 size = Vec3::Zero();      // box: half lengths; sphere, cylinder, capsule, cone: radius, half length; ellipsoid: radii
-  Vec3 normal = Vec3::UnitZ();   // plane
+  int link = -1, shape = -1;  // as in Hit
+  int body = -1;              // -1: static
+  int turning = -1;           // index into RayTable::turning: its place depends on a wheel's angle
+  IntoShape into;             // at wheel angle 0
+  Vec3 size = Vec3::Zero();   // box: half lengths; sphere, cylinder, capsule, cone: radius, half
+                              // length; ellipsoid: radii
+  Vec3 normal = Vec3::UnitZ();  // plane
   std::shared_ptr<const RayMesh> mesh;
   Box box_F;                     // around the shape at every wheel angle; empty for a plane
   Vec3 center_F = Vec3::Zero();  // ball around the same
@@ -43,10 +46,10 @@ struct RayShape {
 
 // A shape that is not round about its wheel's axis.
 struct TurningShape {
-  int wheel = -1;                // index into BodyLayout::wheels
-  Pose X_FL, X_LS;               // at angle 0
+  int wheel = -1;   // index into BodyLayout::wheels
+  Pose X_FL, X_LS;  // at angle 0
   Vec3 axis_in_L = Vec3::UnitY();
-  Vec3 center_in_L = Vec3::Zero();    // a point on the axis
+  Vec3 center_in_L = Vec3::Zero();  // a point on the axis
 
   IntoShape at(double angle_rad) const {
     const Quat turn(Eigen::AngleAxisd(angle_rad, axis_in_L));
@@ -60,14 +63,17 @@ struct RayTable {
   std::vector<int> statics;              // indices into shapes
   std::vector<TurningShape> turning;
 
-  // Meshes of static links are given in the world's frame, without a tree. Those of movers are shared and have one;
-  // device null: none.
-  RayTable(const model::WorldModel& world, const model::BodyLayout& layout, bool visuals, RTCDevice device);
+  // Meshes of static links are given in the world's frame, without a tree. Those of movers are
+  // shared and have one; device null: none.
+  RayTable(const model::WorldModel& world, const model::BodyLayout& layout, bool visuals,
+           RTCDevice device);
 
  private:
   void add(const model::LinkPlacement& link, int link_index, int shape_index, const Pose& X_LS,
-           const model::Geometry& geometry, const model::BodyLayout& layout, bool visuals, RTCDevice device);
-  std::map<std::tuple<const model::Mesh*, double, double, double>, std::shared_ptr<const RayMesh>> meshes_;
+           const model::Geometry& geometry, const model::BodyLayout& layout, bool visuals,
+           RTCDevice device);
+  std::map<std::tuple<const model::Mesh*, double, double, double>, std::shared_ptr<const RayMesh>>
+      meshes_;
 };
 
 // Eight rays, and the nearest hit of each so far.
@@ -75,20 +81,22 @@ struct RayBatch {
   static constexpr int kNothing = std::numeric_limits<int>::max();
 
   FrameRays world;
-  double t[kLanes];         // nearest hit, or the maximum range
-  int shape[kLanes];        // index into RayTable::shapes; kNothing: no hit yet
+  double t[kLanes];   // nearest hit, or the maximum range
+  int shape[kLanes];  // index into RayTable::shapes; kNothing: no hit yet
   int feature[kLanes];
   int ignored_link = -1;
 
-  // The last origin that the static closed meshes were asked about, and the first that it is inside of.
+  // The last origin that the static closed meshes were asked about, and the first that it is inside
+  // of.
   bool asked_statics = false;
   Vec3 asked_at = Vec3::Zero();
   int inside_static = kNothing;
 
   // Keeps the nearer hit; of equals the one of the lower shape and feature.
   void offer(int lane, const ShapeHit& hit, int index) {
-    if (hit.t < t[lane] || (hit.t == t[lane] && hit.t < kNoHit &&
-                            (index < shape[lane] || (index == shape[lane] && hit.feature < feature[lane])))) {
+    if (hit.t < t[lane] ||
+        (hit.t == t[lane] && hit.t < kNoHit &&
+         (index < shape[lane] || (index == shape[lane] && hit.feature < feature[lane])))) {
       t[lane] = hit.t;
       shape[lane] = index;
       feature[lane] = hit.feature;
@@ -109,7 +117,8 @@ struct RayBatch {
 };
 
 // Tests the lanes (bits) of rays in frame F against a shape.
-void test_shape(const RayShape& shape, int index, const IntoShape& into, unsigned lanes, const FrameRays& rays, RayBatch& batch);
+void test_shape(const RayShape& shape, int index, const IntoShape& into, unsigned lanes,
+                const FrameRays& rays, RayBatch& batch);
 
 // Outward normal in the shape's frame at a point of its surface.
 Vec3 shape_normal(const RayShape& shape, int feature, const Vec3& p_S);

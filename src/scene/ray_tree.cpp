@@ -3,8 +3,8 @@
 
 namespace ruedo::scene {
 
-void RayTree::attach(RTCDevice device, size_t primitives, void* user, RTCBoundsFunction bounds_function,
-                     RTCIntersectFunctionN callback) {
+void RayTree::attach(RTCDevice device, size_t primitives, void* user,
+                     RTCBoundsFunction bounds_function, RTCIntersectFunctionN callback) {
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
   rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(primitives));
   rtcSetGeometryUserData(geometry, user);
@@ -12,7 +12,7 @@ void RayTree::attach(RTCDevice device, size_t primitives, void* user, RTCBoundsF
   rtcSetGeometryIntersectFunction(geometry, callback);
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(scene_.get(), geometry);
-  rtcReleaseGeometry(geometry);    // the scene keeps it
+  rtcReleaseGeometry(geometry);  // the scene keeps it
 }
 
 void RayTree::build(RTCDevice device, std::vector<Box> boxes, RTCIntersectFunctionN callback,
@@ -29,7 +29,8 @@ void RayTree::build(RTCDevice device, std::vector<Box> boxes, RTCIntersectFuncti
   all_.grow(margin_);
   scene_.reset(rtcNewScene(device));
   if (!boxes_.empty()) attach(device, boxes_.size(), this, bounds, callback);
-  for (Triangles& part : triangles_) attach(device, part.shape->mesh->pairs().size() - 1, &part, pair_bounds, test_pair);
+  for (Triangles& part : triangles_)
+    attach(device, part.shape->mesh->pairs().size() - 1, &part, pair_bounds, test_pair);
   rtcCommitScene(scene_.get());
 }
 
@@ -56,8 +57,11 @@ void RayTree::test_pair(const RTCIntersectFunctionNArguments* arguments) {
   if (query.counting && query.counting != &mesh) return;
   const unsigned lanes = lanes_of(*arguments);
   for (int i = mesh.pairs()[arguments->primID]; i < mesh.pairs()[arguments->primID + 1]; ++i) {
-    if (query.counting) query.crossings += mesh.crossing(i, query.counting_from, query.shear);
-    else mesh.test(i, lanes, batch.world, [&](int lane, double t) { batch.offer(lane, {t, i}, part.index); });
+    if (query.counting)
+      query.crossings += mesh.crossing(i, query.counting_from, query.shear);
+    else
+      mesh.test(i, lanes, batch.world,
+                [&](int lane, double t) { batch.offer(lane, {t, i}, part.index); });
   }
   if (query.counting) return;
   shorten(*arguments, [&](unsigned lane) { return batch.t[lane] - query.packet.start[lane]; });
@@ -71,7 +75,8 @@ void RayTree::cast(unsigned lanes, TreeQuery& query) const {
     const int lane = std::countr_zero(rest);
     const Vec3 &o = query.batch.world.o[lane], &d = query.batch.world.d[lane];
     const double enter = all_.entry(o, d);
-    if (enter <= query.batch.t[lane] && enter < kNoHit) packet.add(lane, o, d, enter, query.batch.t[lane]);
+    if (enter <= query.batch.t[lane] && enter < kNoHit)
+      packet.add(lane, o, d, enter, query.batch.t[lane]);
   }
   packet.cast(scene_.get(), query);
 }

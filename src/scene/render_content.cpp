@@ -50,9 +50,11 @@ class Builder {
     return at->second;
   }
   template <class Make>
-  MeshPair round_mesh(model::Shape shape, const Vec3& scale, const Make& make, double a = 0, double b = 0) {
+  MeshPair round_mesh(model::Shape shape, const Vec3& scale, const Make& make, double a = 0,
+                      double b = 0) {
     const auto one = [&](int segments) {
-      return mesh({nullptr, static_cast<int>(shape), a, b, segments}, [&] { return make(segments); });
+      return mesh({nullptr, static_cast<int>(shape), a, b, segments},
+                  [&] { return make(segments); });
     };
     return {one(kSegments), one(kFewSegments), scale};
   }
@@ -64,24 +66,21 @@ class Builder {
     switch (g.shape) {
       case Shape::box:
         return only_mesh(mesh({nullptr, static_cast<int>(g.shape), 0, 0, 0}, box_mesh), g.size);
-      case Shape::sphere:
-        return round_mesh(Shape::sphere, {r, r, r}, sphere_mesh);
-      case Shape::ellipsoid:
-        return round_mesh(Shape::sphere, g.size, sphere_mesh);
-      case Shape::cylinder:
-        return round_mesh(g.shape, {r, r, length}, cylinder_mesh);
-      case Shape::cone:
-        return round_mesh(g.shape, {r, r, length}, cone_mesh);
+      case Shape::sphere: return round_mesh(Shape::sphere, {r, r, r}, sphere_mesh);
+      case Shape::ellipsoid: return round_mesh(Shape::sphere, g.size, sphere_mesh);
+      case Shape::cylinder: return round_mesh(g.shape, {r, r, length}, cylinder_mesh);
+      case Shape::cone: return round_mesh(g.shape, {r, r, length}, cone_mesh);
       case Shape::capsule:
-        return round_mesh(g.shape, Vec3::Ones(), [&](int segments) { return capsule_mesh(r, length, segments); }, r, length);
+        return round_mesh(
+            g.shape, Vec3::Ones(), [&](int segments) { return capsule_mesh(r, length, segments); },
+            r, length);
       case Shape::plane: {
         MeshPair pair = only_mesh(mesh({nullptr, static_cast<int>(g.shape), 0, 0, 0}, plane_mesh),
                                   {g.extent.x(), g.extent.y(), 1.0});
         pair.rotation = Quat::FromTwoVectors(Vec3::UnitZ(), g.normal);
         return pair;
       }
-      case Shape::mesh:
-        break;
+      case Shape::mesh: break;
     }
     return only_mesh(mesh({g.mesh.get(), 0, 0, 0, 0}, [&] { return file_mesh(*g.mesh); }), g.scale);
   }
@@ -91,14 +90,16 @@ class Builder {
     // Many materials name one file: it is uploaded once.
     for (size_t i = 0; i < content_.textures.size(); ++i) {
       const model::Texture& other = *content_.textures[i];
-      if (&other == texture.get() || (!texture->path.empty() && other.path == texture->path)) return static_cast<int>(i);
+      if (&other == texture.get() || (!texture->path.empty() && other.path == texture->path))
+        return static_cast<int>(i);
     }
     content_.textures.push_back(texture);
     return static_cast<int>(content_.textures.size()) - 1;
   }
 
   int batch(const Batch& wanted) {
-    const auto [at, inserted] = batches_.try_emplace(wanted, static_cast<int>(content_.batches.size()));
+    const auto [at, inserted] =
+        batches_.try_emplace(wanted, static_cast<int>(content_.batches.size()));
     if (inserted) content_.batches.push_back(wanted);
     return at->second;
   }
@@ -107,13 +108,15 @@ class Builder {
     const model::Geometry& g = visual.geometry;
     if (g.shape == model::Shape::mesh && !g.mesh) return;
     const MeshPair pair = meshes_of(g);
-    const Affine M_LP = compose(to_affine(visual.X_LV * Pose{pair.rotation, Vec3::Zero()}),
-                                (Affine() << Eigen::Matrix3d(pair.scale.asDiagonal()), Vec3::Zero()).finished());
+    const Affine M_LP =
+        compose(to_affine(visual.X_LV * Pose{pair.rotation, Vec3::Zero()}),
+                (Affine() << Eigen::Matrix3d(pair.scale.asDiagonal()), Vec3::Zero()).finished());
     const auto& pieces = content_.meshes[static_cast<size_t>(pair.mesh)].pieces;
     for (size_t i = 0; i < pieces.size(); ++i) {
       const RenderMesh::Piece& piece = pieces[i];
       if (piece.index_count == 0) continue;
-      const model::Material material = visual.material ? *visual.material : own_material(g, piece.material);
+      const model::Material material =
+          visual.material ? *visual.material : own_material(g, piece.material);
       RenderPart part;
       part.M_LP = M_LP;
       part.centre_L = M_LP.leftCols<3>() * piece.centre + M_LP.col(3);
@@ -121,19 +124,22 @@ class Builder {
       part.low = piece.low;
       part.high = piece.high;
       shade(material, visual, part);
-      if (part.diffuse[3] < 0.004f) continue;    // invisible
+      if (part.diffuse[3] < 0.004f) continue;  // invisible
       Batch b{pair.mesh, piece.first_index, piece.index_count, texture(material.texture), 0};
       if (b.texture >= 0) b.flags |= kTextured;
-      if (std::max({part.specular[0], part.specular[1], part.specular[2]}) > 0.02f) b.flags |= kSpecular;
+      if (std::max({part.specular[0], part.specular[1], part.specular[2]}) > 0.02f)
+        b.flags |= kSpecular;
       if (material.double_sided) b.flags |= kDoubleSided;
       if (M_LP.leftCols<3>().determinant() < 0.0) b.flags |= kMirrored;
-      if (g.shape == model::Shape::plane && b.texture < 0 && g.normal.z() > 0.999 && g.extent.minCoeff() >= kGroundExtent) {
+      if (g.shape == model::Shape::plane && b.texture < 0 && g.normal.z() > 0.999 &&
+          g.extent.minCoeff() >= kGroundExtent) {
         b.flags |= kGround;
       }
       if (g.shape == model::Shape::plane) part.casts_shadow = false;
       part.batch = batch(b);
       if (pair.small_mesh != pair.mesh) {
-        const RenderMesh::Piece& small = content_.meshes[static_cast<size_t>(pair.small_mesh)].pieces[i];
+        const RenderMesh::Piece& small =
+            content_.meshes[static_cast<size_t>(pair.small_mesh)].pieces[i];
         b.mesh = pair.small_mesh;
         b.first_index = small.first_index;
         b.index_count = small.index_count;
@@ -152,15 +158,17 @@ class Builder {
     return {};
   }
 
-  static void shade(const model::Material& material, const model::Visual& visual, RenderPart& part) {
+  static void shade(const model::Material& material, const model::Visual& visual,
+                    RenderPart& part) {
     part.diffuse = material.diffuse;
     // Old worlds often give the ambient colour only.
     const auto black = [](const Rgba& c) { return c[0] + c[1] + c[2] < 0.003f; };
     if (black(part.diffuse) && !black(material.ambient)) part.diffuse = material.ambient;
-    // Many files write the opacity 0 and mean 1 (COLLADA has two opposite conventions); what is to be invisible has
-    // SDF's transparency.
+    // Many files write the opacity 0 and mean 1 (COLLADA has two opposite conventions); what is to
+    // be invisible has SDF's transparency.
     const float opacity = material.diffuse[3] < 0.004f ? 1.0f : material.diffuse[3];
-    part.diffuse[3] = std::clamp(opacity * static_cast<float>(1.0 - visual.transparency), 0.0f, 1.0f);
+    part.diffuse[3] =
+        std::clamp(opacity * static_cast<float>(1.0 - visual.transparency), 0.0f, 1.0f);
     part.transparent = part.diffuse[3] < 0.996f;
     part.specular = material.specular;
     part.specular[3] = std::clamp(material.shininess, 1.0f, 128.0f);
@@ -169,7 +177,8 @@ class Builder {
   }
 
   RenderContent& content_;
-  std::map<std::tuple<const void*, int, double, double, int>, int> meshes_;    // looked up only: its order shows nowhere
+  std::map<std::tuple<const void*, int, double, double, int>, int>
+      meshes_;  // looked up only: its order shows nowhere
   std::map<Batch, int> batches_;
 };
 
@@ -192,17 +201,20 @@ Affine compose(const Affine& a, const Affine& b) {
 Pose link_pose(const model::BodyLayout& layout, const Snapshot& snapshot, size_t link) {
   const model::LinkPlacement& placement = layout.links[link];
   if (placement.body < 0) return placement.X_BL;
-  return snapshot.bodies[static_cast<size_t>(placement.body)] * layout.link_in_body(static_cast<int>(link), snapshot.wheel_angles);
+  return snapshot.bodies[static_cast<size_t>(placement.body)] *
+         layout.link_in_body(static_cast<int>(link), snapshot.wheel_angles);
 }
 
 RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLayout& layout) {
   Builder builder(*this);
-  std::map<const model::Link*, int> kinds;    // looked up only
+  std::map<const model::Link*, int> kinds;  // looked up only
   std::vector<size_t> label_of_body(layout.bodies.size()), label_of_static(layout.links.size());
   for (size_t i = 0; i < layout.listed.size(); ++i) {
     const model::ListedBody& listed = layout.listed[i];
-    if (listed.body >= 0) label_of_body[static_cast<size_t>(listed.body)] = i + 1;
-    else label_of_static[static_cast<size_t>(listed.link)] = i + 1;
+    if (listed.body >= 0)
+      label_of_body[static_cast<size_t>(listed.body)] = i + 1;
+    else
+      label_of_static[static_cast<size_t>(listed.link)] = i + 1;
   }
   bool first = true;
   for (size_t i = 0; i < layout.links.size(); ++i) {
@@ -213,7 +225,8 @@ RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLa
       label_of_link.push_back(0);
       continue;
     }
-    const model::Link& link = world.models[instance].model->links[static_cast<size_t>(placement.link)];
+    const model::Link& link =
+        world.models[instance].model->links[static_cast<size_t>(placement.link)];
     const auto [at, inserted] = kinds.try_emplace(&link, -1);
     if (inserted) {
       RenderLinkKind kind = builder.link_kind(link);
@@ -225,16 +238,19 @@ RenderContent::RenderContent(const model::WorldModel& world, const model::BodyLa
     kind_of_link.push_back(at->second);
     for (const model::Light& light : link.lights) lights.push_back({light, static_cast<int>(i)});
 
-    const size_t label = placement.body >= 0 ? label_of_body[static_cast<size_t>(placement.body)] : label_of_static[i];
+    const size_t label = placement.body >= 0 ? label_of_body[static_cast<size_t>(placement.body)]
+                                             : label_of_static[i];
     label_of_link.push_back(static_cast<uint16_t>(std::min<size_t>(label, 65535)));
 
     if (at->second < 0) continue;
     const Pose X_WL = placement.body < 0 ? placement.X_BL
-                                         : layout.bodies[static_cast<size_t>(placement.body)].X_WB * placement.X_BL;
+                                         : layout.bodies[static_cast<size_t>(placement.body)].X_WB *
+                                               placement.X_BL;
     for (const RenderPart& part : link_kinds[static_cast<size_t>(at->second)].parts) {
       if ((batches[static_cast<size_t>(part.batch)].flags & kGround) != 0) continue;
       for (int corner = 0; corner < 8; ++corner) {
-        const Vec3 p((corner & 1) != 0 ? part.high.x() : part.low.x(), (corner & 2) != 0 ? part.high.y() : part.low.y(),
+        const Vec3 p((corner & 1) != 0 ? part.high.x() : part.low.x(),
+                     (corner & 2) != 0 ? part.high.y() : part.low.y(),
                      (corner & 4) != 0 ? part.high.z() : part.low.z());
         const Vec3 p_W = X_WL * Vec3(part.M_LP.leftCols<3>() * p + part.M_LP.col(3));
         if (first) bounds = {p_W, p_W};

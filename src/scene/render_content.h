@@ -1,5 +1,6 @@
-// What there is to draw, worked out once from the world: meshes, surfaces, and for each kind of link its parts.
-// Plain data, without OpenGL. A thousand robots of one model share their parts; all boxes of a world share a mesh.
+// What there is to draw, worked out once from the world: meshes, surfaces, and for each kind of
+// link its parts. Plain data, without OpenGL. A thousand robots of one model share their parts; all
+// boxes of a world share a mesh.
 #pragma once
 
 #include <cstdint>
@@ -7,24 +8,24 @@
 #include <vector>
 
 #include "model/body_layout.h"
+#include "ruedo/snapshot.h"
 #include "scene/render_mesh.h"
 #include "scene/render_scene.h"
-#include "ruedo/snapshot.h"
 
 namespace ruedo::scene {
 
-using Affine = Eigen::Matrix<double, 3, 4>;    // [M | t]: p' = M p + t
+using Affine = Eigen::Matrix<double, 3, 4>;  // [M | t]: p' = M p + t
 
 Affine to_affine(const Pose& pose);
-Affine compose(const Affine& a, const Affine& b);    // first b, then a
+Affine compose(const Affine& a, const Affine& b);  // first b, then a
 
 // How a batch is shaded; a set of these picks the program and the culling.
 enum BatchFlags : uint32_t {
-  kTextured = 1,       // a texture multiplies the diffuse colour
-  kSpecular = 2,       // has a highlight
-  kGround = 4,         // an untextured ground plane: grid, and fades out at its edge
-  kDoubleSided = 8,    // back faces are drawn
-  kMirrored = 16,      // the scale has an odd number of negative factors: clockwise is outside
+  kTextured = 1,     // a texture multiplies the diffuse colour
+  kSpecular = 2,     // has a highlight
+  kGround = 4,       // an untextured ground plane: grid, and fades out at its edge
+  kDoubleSided = 8,  // back faces are drawn
+  kMirrored = 16,    // the scale has an odd number of negative factors: clockwise is outside
 };
 
 // Triangles that can be drawn in one call with many instances.
@@ -38,12 +39,13 @@ struct Batch {
 
 // A piece of a visual, in the frame of its link.
 struct RenderPart {
-  Affine M_LP;                          // from mesh coordinates to the link
-  Vec3 centre_L = Vec3::Zero();         // bounding sphere
+  Affine M_LP;                   // from mesh coordinates to the link
+  Vec3 centre_L = Vec3::Zero();  // bounding sphere
   double radius = 0.0;
-  Vec3 low = Vec3::Zero(), high = Vec3::Zero();    // bounding box, in mesh coordinates
-  int batch = 0, small_batch = 0;       // indices into RenderContent::batches; small: for a distant view
-  model::Rgba diffuse{}, specular{}, emissive{};    // specular[3] is the shininess; diffuse[3] the opacity
+  Vec3 low = Vec3::Zero(), high = Vec3::Zero();  // bounding box, in mesh coordinates
+  int batch = 0, small_batch = 0;  // indices into RenderContent::batches; small: for a distant view
+  model::Rgba diffuse{}, specular{},
+      emissive{};  // specular[3] is the shininess; diffuse[3] the opacity
   bool transparent = false;
   bool casts_shadow = true;
 };
@@ -57,7 +59,7 @@ struct RenderLinkKind {
 // A light and what carries it.
 struct RenderLight {
   model::Light light;
-  int link = -1;           // index into BodyLayout::links; -1: the world
+  int link = -1;  // index into BodyLayout::links; -1: the world
 };
 
 struct RenderContent {
@@ -65,10 +67,11 @@ struct RenderContent {
   std::vector<std::shared_ptr<const model::Texture>> textures;
   std::vector<Batch> batches;
   std::vector<RenderLinkKind> link_kinds;
-  std::vector<int> kind_of_link;        // of each of BodyLayout::links; -1: nothing to draw
+  std::vector<int> kind_of_link;  // of each of BodyLayout::links; -1: nothing to draw
   std::vector<uint16_t> label_of_link;
   std::vector<RenderLight> lights;
-  Bounds bounds{Vec3::Constant(-3.0), Vec3::Constant(3.0)};    // of all that is drawn at the start, but for the ground
+  Bounds bounds{Vec3::Constant(-3.0),
+                Vec3::Constant(3.0)};  // of all that is drawn at the start, but for the ground
 
   RenderContent(const model::WorldModel& world, const model::BodyLayout& layout);
 };

@@ -15,7 +15,8 @@ constexpr double kCoarseShadowRadius = 0.25;
 
 Region view_region(const View& view) {
   const auto& [rotation, eye] = view.X_WCamera;
-  const Vec3 ahead = rotation * Vec3::UnitX(), left = rotation * Vec3::UnitY(), up = rotation * Vec3::UnitZ();
+  const Vec3 ahead = rotation * Vec3::UnitX(), left = rotation * Vec3::UnitY(),
+             up = rotation * Vec3::UnitZ();
   // Edges of the picture, half a pixel beyond the outermost pixel centres.
   const double l = (view.cx + 0.5) / view.fx, r = (view.width - 0.5 - view.cx) / view.fx;
   const double t = (view.cy + 0.5) / view.fy, b = (view.height - 0.5 - view.cy) / view.fy;
@@ -41,7 +42,10 @@ Region view_region(const View& view) {
 }
 
 Culler::Culler(const model::BodyLayout& layout, const RenderContent& content)
-    : layout_(layout), content_(content), rank_(content.batches.size()), M_WL_(layout.links.size()) {
+    : layout_(layout),
+      content_(content),
+      rank_(content.batches.size()),
+      M_WL_(layout.links.size()) {
   for (size_t i = 0; i < layout.links.size(); ++i) {
     const bool is_static = layout.links[i].body < 0;
     if (is_static) M_WL_[i] = to_affine(layout.links[i].X_BL);
@@ -57,7 +61,8 @@ Culler::Culler(const model::BodyLayout& layout, const RenderContent& content)
     return std::make_tuple(b.flags & kGround, b.flags, b.texture, b.mesh, b.first_index);
   };
   std::sort(order.begin(), order.end(), [&](int a, int b) { return key(a) < key(b); });
-  for (size_t i = 0; i < order.size(); ++i) rank_[static_cast<size_t>(order[i])] = static_cast<int>(i);
+  for (size_t i = 0; i < order.size(); ++i)
+    rank_[static_cast<size_t>(order[i])] = static_cast<int>(i);
 }
 
 void Culler::update(const Snapshot& snapshot) {
@@ -86,12 +91,13 @@ void Culler::append(std::vector<Item>& items, const Vec3& origin, std::vector<Ru
   }
 }
 
-void Culler::collect(const Region& region, const Vec3& origin, double pixels_per_radian, bool orthographic,
-                     DrawList& list) {
+void Culler::collect(const Region& region, const Vec3& origin, double pixels_per_radian,
+                     bool orthographic, DrawList& list) {
   opaque_.clear();
   transparent_.clear();
   for (const uint32_t link : visible_links_) {
-    const RenderLinkKind& kind = content_.link_kinds[static_cast<size_t>(content_.kind_of_link[link])];
+    const RenderLinkKind& kind =
+        content_.link_kinds[static_cast<size_t>(content_.kind_of_link[link])];
     const Affine& M = M_WL_[link];
     if (!region.touches(M.leftCols<3>() * kind.centre_L + M.col(3), kind.radius)) continue;
     for (const RenderPart& part : kind.parts) {
@@ -104,11 +110,13 @@ void Culler::collect(const Region& region, const Vec3& origin, double pixels_per
       if (pixels < kInvisiblePixels) continue;
       const int batch = pixels < kSmallPixels ? part.small_batch : part.batch;
       (part.transparent ? transparent_ : opaque_)
-          .push_back({rank_[static_cast<size_t>(batch)], batch, static_cast<float>(distance), link, &part});
+          .push_back({rank_[static_cast<size_t>(batch)], batch, static_cast<float>(distance), link,
+                      &part});
     }
   }
   std::sort(opaque_.begin(), opaque_.end(), [](const Item& a, const Item& b) {
-    return std::tie(a.rank, a.distance, a.link, a.part) < std::tie(b.rank, b.distance, b.link, b.part);
+    return std::tie(a.rank, a.distance, a.link, a.part) <
+           std::tie(b.rank, b.distance, b.link, b.part);
   });
   std::sort(transparent_.begin(), transparent_.end(), [](const Item& a, const Item& b) {
     return std::tie(b.distance, a.link, a.part) < std::tie(a.distance, b.link, b.part);
@@ -120,17 +128,21 @@ void Culler::collect(const Region& region, const Vec3& origin, double pixels_per
   append(transparent_, origin, list.transparent, list.instances);
 }
 
-void Culler::collect_casters(const Region& region, const Vec3& origin, Movers movers, DrawList& list) {
+void Culler::collect_casters(const Region& region, const Vec3& origin, Movers movers,
+                             DrawList& list) {
   opaque_.clear();
   list.spheres.clear();
   for (const uint32_t link : movers == Movers::only_static ? static_links_ : moving_links_) {
-    const RenderLinkKind& kind = content_.link_kinds[static_cast<size_t>(content_.kind_of_link[link])];
+    const RenderLinkKind& kind =
+        content_.link_kinds[static_cast<size_t>(content_.kind_of_link[link])];
     const Affine& M = M_WL_[link];
     const Vec3 link_centre = M.leftCols<3>() * kind.centre_L + M.col(3);
     if (!region.touches(link_centre, kind.radius)) continue;
     list.spheres.emplace_back(link_centre, kind.radius);
     for (const RenderPart& part : kind.parts) {
-      if (!part.casts_shadow || !region.touches(M.leftCols<3>() * part.centre_L + M.col(3), part.radius)) continue;
+      if (!part.casts_shadow ||
+          !region.touches(M.leftCols<3>() * part.centre_L + M.col(3), part.radius))
+        continue;
       const int batch = part.radius < kCoarseShadowRadius ? part.small_batch : part.batch;
       opaque_.push_back({rank_[static_cast<size_t>(batch)], batch, 0.0f, link, &part});
     }

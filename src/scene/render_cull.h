@@ -14,7 +14,7 @@ namespace ruedo::scene {
 
 // One part to draw: the vertex attributes 3 to 9 of the shaders.
 struct Instance {
-  float rows[3][4];         // mesh coordinates to the world's axes around the eye
+  float rows[3][4];  // mesh coordinates to the world's axes around the eye
   model::Rgba diffuse, specular, emissive;
   uint32_t label;
   uint32_t padding[3];
@@ -22,14 +22,15 @@ struct Instance {
 
 struct Run {
   int batch;
-  uint32_t first, count;    // of DrawList::instances
+  uint32_t first, count;  // of DrawList::instances
 };
 
 struct DrawList {
   std::vector<Instance> instances;
-  std::vector<Run> opaque;         // by batch, near ones first
-  std::vector<Run> transparent;    // far ones first
-  std::vector<std::pair<Vec3, double>> spheres;    // collect_casters() only: bounds of the links, m, world
+  std::vector<Run> opaque;       // by batch, near ones first
+  std::vector<Run> transparent;  // far ones first
+  std::vector<std::pair<Vec3, double>>
+      spheres;  // collect_casters() only: bounds of the links, m, world
 };
 
 // A convex region of planes n.p + d >= 0, n pointing inwards, world coordinates.
@@ -59,9 +60,10 @@ class Culler {
   void update(const Snapshot& snapshot);
   const Affine& link_pose(size_t link) const { return M_WL_[link]; }
 
-  // Instances are relative to `origin`. pixels_per_radian: for leaving out what is smaller than a pixel and for
-  // coarser round shapes; 0: everything in full.
-  void collect(const Region& region, const Vec3& origin, double pixels_per_radian, bool orthographic, DrawList& list);
+  // Instances are relative to `origin`. pixels_per_radian: for leaving out what is smaller than a
+  // pixel and for coarser round shapes; 0: everything in full.
+  void collect(const Region& region, const Vec3& origin, double pixels_per_radian,
+               bool orthographic, DrawList& list);
   // What casts shadows in the region, relative to `origin`.
   void collect_casters(const Region& region, const Vec3& origin, Movers movers, DrawList& list);
 
@@ -72,13 +74,14 @@ class Culler {
     uint32_t link;
     const RenderPart* part;
   };
-  void append(std::vector<Item>& items, const Vec3& origin, std::vector<Run>& runs, std::vector<Instance>& instances) const;
+  void append(std::vector<Item>& items, const Vec3& origin, std::vector<Run>& runs,
+              std::vector<Instance>& instances) const;
 
   const model::BodyLayout& layout_;
   const RenderContent& content_;
-  std::vector<int> rank_;          // of a batch: the drawing order
+  std::vector<int> rank_;  // of a batch: the drawing order
   std::vector<Affine> M_WL_;
-  std::vector<uint32_t> visible_links_, moving_links_, static_links_;    // with something to draw
+  std::vector<uint32_t> visible_links_, moving_links_, static_links_;  // with something to draw
   std::vector<Item> opaque_, transparent_;
 };
 

@@ -15,8 +15,12 @@ const void* offset(size_t bytes) { return reinterpret_cast<const void*>(bytes); 
 
 }  // namespace
 
-RenderDevice::RenderDevice(std::unique_ptr<GlContext> context, RenderContent& content, const LightCounts& lights)
-    : context_(std::move(context)), content_(content), lights_(lights), textures_(content.textures.size()) {
+RenderDevice::RenderDevice(std::unique_ptr<GlContext> context, RenderContent& content,
+                           const LightCounts& lights)
+    : context_(std::move(context)),
+      content_(content),
+      lights_(lights),
+      textures_(content.textures.size()) {
   context_->make_current();
   gl = load_gl_functions(*context_);
   gl.ClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
@@ -37,13 +41,15 @@ RenderDevice::RenderDevice(std::unique_ptr<GlContext> context, RenderContent& co
   gl.BindBuffer(GL_ARRAY_BUFFER, overlay_buffer_);
   for (GLuint i = 0; i < 2; ++i) {
     gl.EnableVertexAttribArray(i);
-    gl.VertexAttribPointer(i, 4, GL_FLOAT, GL_FALSE, 8 * sizeof(float), offset(4 * i * sizeof(float)));
+    gl.VertexAttribPointer(i, 4, GL_FLOAT, GL_FALSE, 8 * sizeof(float),
+                           offset(4 * i * sizeof(float)));
   }
   gl.BindVertexArray(sky_array_);
   gl.BindBuffer(GL_ARRAY_BUFFER, sky_buffer_);
   for (GLuint i = 0; i < 2; ++i) {
     gl.EnableVertexAttribArray(i);
-    gl.VertexAttribPointer(i, i == 0 ? 4 : 3, GL_FLOAT, GL_FALSE, 7 * sizeof(float), offset(4 * i * sizeof(float)));
+    gl.VertexAttribPointer(i, i == 0 ? 4 : 3, GL_FLOAT, GL_FALSE, 7 * sizeof(float),
+                           offset(4 * i * sizeof(float)));
   }
   gl.BindVertexArray(0);
   sky_program_ = compile(sky_vertex_shader(), sky_fragment_shader());
@@ -51,13 +57,16 @@ RenderDevice::RenderDevice(std::unique_ptr<GlContext> context, RenderContent& co
 }
 
 std::string RenderDevice::description() const {
-  const auto text = [&](GLenum what) { return std::string(reinterpret_cast<const char*>(gl.GetString(what))); };
+  const auto text = [&](GLenum what) {
+    return std::string(reinterpret_cast<const char*>(gl.GetString(what)));
+  };
   return context_->backend() + ": " + text(GL_RENDERER) + ", OpenGL " + text(GL_VERSION);
 }
 
 GLuint RenderDevice::compile(const std::string& vertex, const std::string& fragment) {
   const GLuint program = gl.CreateProgram();
-  for (const auto& [type, text] : {std::pair{GL_VERTEX_SHADER, &vertex}, std::pair{GL_FRAGMENT_SHADER, &fragment}}) {
+  for (const auto& [type, text] :
+       {std::pair{GL_VERTEX_SHADER, &vertex}, std::pair{GL_FRAGMENT_SHADER, &fragment}}) {
     const GLuint shader = gl.CreateShader(static_cast<GLenum>(type));
     const char* source = text->c_str();
     gl.ShaderSource(shader, 1, &source, nullptr);
@@ -83,7 +92,8 @@ GLuint RenderDevice::compile(const std::string& vertex, const std::string& fragm
   const GLuint block = gl.GetUniformBlockIndex(program, "Frame");
   if (block != GL_INVALID_INDEX) gl.UniformBlockBinding(program, block, kFrameBinding);
   gl.UseProgram(program);
-  // Unit 0 is a part's texture, unit 1 the shadow map. Names that a program does not have are ignored.
+  // Unit 0 is a part's texture, unit 1 the shadow map. Names that a program does not have are
+  // ignored.
   gl.Uniform1i(gl.GetUniformLocation(program, "surface"), 0);
   gl.Uniform1i(gl.GetUniformLocation(program, "shadow_map"), 1);
   return program;
@@ -95,7 +105,9 @@ GLuint RenderDevice::program(Pass pass, uint32_t flags, bool cutout) {
   if (pass != Pass::colour) used = cutout && pass == Pass::geometry ? uint32_t{kTextured} : 0u;
   const ProgramKey key{pass, used, cutout && (used & kTextured) != 0};
   const auto [at, inserted] = programs_.try_emplace(key, 0);
-  if (inserted) at->second = compile(vertex_shader(pass, used), fragment_shader(pass, used, key.cutout, lights_));
+  if (inserted)
+    at->second =
+        compile(vertex_shader(pass, used), fragment_shader(pass, used, key.cutout, lights_));
   return at->second;
 }
 
@@ -106,10 +118,12 @@ void RenderDevice::upload(const RenderMesh& mesh) {
   gl.GenBuffers(2, names);
   gl.BindVertexArray(buffers.vertex_array);
   gl.BindBuffer(GL_ARRAY_BUFFER, names[0]);
-  gl.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(mesh.vertices.size() * sizeof(RenderVertex)),
+  gl.BufferData(GL_ARRAY_BUFFER,
+                static_cast<GLsizeiptr>(mesh.vertices.size() * sizeof(RenderVertex)),
                 mesh.vertices.data(), GL_STATIC_DRAW);
   gl.BindBuffer(GL_ELEMENT_ARRAY_BUFFER, names[1]);
-  gl.BufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(mesh.indices.size() * sizeof(uint32_t)),
+  gl.BufferData(GL_ELEMENT_ARRAY_BUFFER,
+                static_cast<GLsizeiptr>(mesh.indices.size() * sizeof(uint32_t)),
                 mesh.indices.data(), GL_STATIC_DRAW);
   const auto attribute = [&](GLuint index, int size, size_t at) {
     gl.EnableVertexAttribArray(index);
@@ -134,7 +148,8 @@ const RenderDevice::TextureState& RenderDevice::texture(int index) {
   gl.GenTextures(1, &state.name);
   gl.ActiveTexture(GL_TEXTURE0);
   gl.BindTexture(GL_TEXTURE_2D, state.name);
-  gl.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, pixels.width, pixels.height, 0, GL_RGBA, GL_UNSIGNED_BYTE, pixels.rgba.data());
+  gl.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, pixels.width, pixels.height, 0, GL_RGBA,
+                GL_UNSIGNED_BYTE, pixels.rgba.data());
   gl.GenerateMipmap(GL_TEXTURE_2D);
   gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
   gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
@@ -189,7 +204,7 @@ void RenderDevice::begin_colour(int width, int height, int samples) {
   gl.Viewport(0, 0, width, height);
   gl.DepthMask(GL_TRUE);
   const float far_depth = 0.0f;
-  gl.ClearBufferfv(GL_DEPTH, 0, &far_depth);    // colours need no clearing: the sky covers the rest
+  gl.ClearBufferfv(GL_DEPTH, 0, &far_depth);  // colours need no clearing: the sky covers the rest
   gl.Enable(GL_DEPTH_TEST);
   gl.DepthFunc(GL_GREATER);
   gl.Disable(GL_BLEND);
@@ -218,7 +233,8 @@ void RenderDevice::make_shadow_map(ShadowMap& map, int size) {
   gl.ActiveTexture(GL_TEXTURE1);
   gl.GenTextures(1, &map.texture);
   gl.BindTexture(GL_TEXTURE_2D, map.texture);
-  gl.TexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT16, size, size, 0, GL_DEPTH_COMPONENT, GL_UNSIGNED_SHORT, nullptr);
+  gl.TexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT16, size, size, 0, GL_DEPTH_COMPONENT,
+                GL_UNSIGNED_SHORT, nullptr);
   gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
   gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
   gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
@@ -238,7 +254,7 @@ void RenderDevice::make_shadow_map(ShadowMap& map, int size) {
 void RenderDevice::begin_still_shadow(int size) {
   if (still_shadow_.texture == 0) {
     make_shadow_map(still_shadow_, size);
-    make_shadow_map(shadow_, size);    // the later one stays bound to unit 1
+    make_shadow_map(shadow_, size);  // the later one stays bound to unit 1
     gl.ActiveTexture(GL_TEXTURE0);
   }
   gl.BindFramebuffer(GL_FRAMEBUFFER, still_shadow_.framebuffer);
@@ -252,8 +268,8 @@ void RenderDevice::begin_shadow(int size, const PixelBox& stale) {
   if (!stale.empty()) {
     gl.BindFramebuffer(GL_READ_FRAMEBUFFER, still_shadow_.framebuffer);
     gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, shadow_.framebuffer);
-    gl.BlitFramebuffer(stale.x0, stale.y0, stale.x1, stale.y1, stale.x0, stale.y0, stale.x1, stale.y1,
-                       GL_DEPTH_BUFFER_BIT, GL_NEAREST);
+    gl.BlitFramebuffer(stale.x0, stale.y0, stale.x1, stale.y1, stale.x0, stale.y0, stale.x1,
+                       stale.y1, GL_DEPTH_BUFFER_BIT, GL_NEAREST);
   }
   gl.BindFramebuffer(GL_FRAMEBUFFER, shadow_.framebuffer);
   set_shadow_state(size);
@@ -290,7 +306,8 @@ void RenderDevice::draw_run(Pass pass, const Run& run) {
   } else {
     gl.Enable(GL_CULL_FACE);
   }
-  // Rows go from the top, so that pictures need no turning: outside is clockwise in OpenGL's window.
+  // Rows go from the top, so that pictures need no turning: outside is clockwise in OpenGL's
+  // window.
   gl.FrontFace((flags & kMirrored) != 0 ? GL_CCW : GL_CW);
   gl.BindVertexArray(meshes_[static_cast<size_t>(batch.mesh)].vertex_array);
   const size_t at = run.first * sizeof(Instance);
@@ -301,16 +318,18 @@ void RenderDevice::draw_run(Pass pass, const Run& run) {
   attribute(6, offsetof(Instance, diffuse));
   attribute(7, offsetof(Instance, specular));
   attribute(8, offsetof(Instance, emissive));
-  gl.VertexAttribIPointer(9, 1, GL_UNSIGNED_INT, sizeof(Instance), offset(at + offsetof(Instance, label)));
+  gl.VertexAttribIPointer(9, 1, GL_UNSIGNED_INT, sizeof(Instance),
+                          offset(at + offsetof(Instance, label)));
   gl.DrawElementsInstanced(GL_TRIANGLES, static_cast<GLsizei>(batch.index_count), GL_UNSIGNED_INT,
-                           offset(batch.first_index * sizeof(uint32_t)), static_cast<GLsizei>(run.count));
+                           offset(batch.first_index * sizeof(uint32_t)),
+                           static_cast<GLsizei>(run.count));
 }
 
-void RenderDevice::draw(Pass pass, const std::vector<Instance>& instances, std::span<const Run> opaque,
-                        std::span<const Run> transparent) {
+void RenderDevice::draw(Pass pass, const std::vector<Instance>& instances,
+                        std::span<const Run> opaque, std::span<const Run> transparent) {
   gl.BindBuffer(GL_ARRAY_BUFFER, instance_buffer_);
-  gl.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(instances.size() * sizeof(Instance)), instances.data(),
-                GL_STREAM_DRAW);
+  gl.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(instances.size() * sizeof(Instance)),
+                instances.data(), GL_STREAM_DRAW);
   for (const Run& run : opaque) draw_run(pass, run);
   if (transparent.empty()) return;
   gl.Enable(GL_BLEND);
@@ -327,7 +346,7 @@ void RenderDevice::draw_sky(const std::array<float, 21>& corners) {
   gl.BufferData(GL_ARRAY_BUFFER, sizeof corners, corners.data(), GL_STREAM_DRAW);
   gl.UseProgram(sky_program_);
   gl.Disable(GL_CULL_FACE);
-  gl.DepthFunc(GL_EQUAL);    // at depth 0, where nothing is
+  gl.DepthFunc(GL_EQUAL);  // at depth 0, where nothing is
   gl.DepthMask(GL_FALSE);
   gl.DrawArrays(GL_TRIANGLES, 0, 3);
   gl.DepthMask(GL_TRUE);
@@ -338,7 +357,8 @@ void RenderDevice::draw_overlay(const std::vector<float>& vertices) {
   const auto count = static_cast<GLsizei>(vertices.size() / 8);
   gl.BindVertexArray(overlay_array_);
   gl.BindBuffer(GL_ARRAY_BUFFER, overlay_buffer_);
-  gl.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices.size() * sizeof(float)), vertices.data(), GL_STREAM_DRAW);
+  gl.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices.size() * sizeof(float)),
+                vertices.data(), GL_STREAM_DRAW);
   gl.UseProgram(line_program_);
   gl.Disable(GL_CULL_FACE);
   gl.Enable(GL_BLEND);
@@ -355,7 +375,8 @@ void RenderDevice::read_rgb(uint8_t* rgb) {
   if (resolve_) {
     gl.BindFramebuffer(GL_READ_FRAMEBUFFER, current_->framebuffer);
     gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, current_->resolved);
-    gl.BlitFramebuffer(0, 0, width_, height_, 0, 0, width_, height_, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+    gl.BlitFramebuffer(0, 0, width_, height_, 0, 0, width_, height_, GL_COLOR_BUFFER_BIT,
+                       GL_NEAREST);
     gl.BindFramebuffer(GL_READ_FRAMEBUFFER, current_->resolved);
   }
   gl.ReadPixels(0, 0, width_, height_, GL_RGB, GL_UNSIGNED_BYTE, rgb);

@@ -11,7 +11,8 @@ namespace {
 using Vec4 = FrameBlock::Vec4;
 
 Vec4 vec4(const Vec3& v, double w) {
-  return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z()), static_cast<float>(w)};
+  return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z()),
+          static_cast<float>(w)};
 }
 
 // A displayed colour as light: the square (see the shaders' curve).
@@ -39,14 +40,16 @@ Eigen::Matrix4d ShadowRegion::map_from_world(const Vec3& origin) const {
   return M;
 }
 
-RenderLights::RenderLights(const model::WorldModel& world, const RenderContent& content) : world_(world), content_(content) {
+RenderLights::RenderLights(const model::WorldModel& world, const RenderContent& content)
+    : world_(world), content_(content) {
   for (const RenderLight& light : content.lights) {
     auto& list = light.light.type == model::Light::Type::directional ? suns_ : lamps_;
     const size_t limit = &list == &suns_ ? kMaxDirectionalLights : kMaxLocalLights;
     if (list.size() < limit) list.push_back(&light);
   }
   // The first sun that casts shadows is the one with a shadow map.
-  std::stable_partition(suns_.begin(), suns_.end(), [](const RenderLight* l) { return l->light.cast_shadows; });
+  std::stable_partition(suns_.begin(), suns_.end(),
+                        [](const RenderLight* l) { return l->light.cast_shadows; });
   counts_.suns = static_cast<int>(suns_.size());
   counts_.lamps = static_cast<int>(lamps_.size());
   counts_.shadow = world.sky.shadows && !suns_.empty() && suns_[0]->light.cast_shadows;
@@ -76,8 +79,10 @@ void RenderLights::fill(const Culler& culler, const View& view, FrameBlock& fram
     frame.sun_colour[i] = light_colour(suns_[i]->light);
     if (i == 0 && counts_.shadow) {
       place_shadow(to_sun, view);
-      Eigen::Map<Eigen::Matrix4f>(frame.shadow_from_world.data()) = shadow_.map_from_world(eye).cast<float>();
-      // Surfaces are looked up a texel and a half before them, so that they do not shade themselves.
+      Eigen::Map<Eigen::Matrix4f>(frame.shadow_from_world.data()) =
+          shadow_.map_from_world(eye).cast<float>();
+      // Surfaces are looked up a texel and a half before them, so that they do not shade
+      // themselves.
       frame.origin[3] = static_cast<float>(1.5 * 2.0 * shadow_.half / ShadowRegion::kSize);
     }
   }
@@ -86,9 +91,11 @@ void RenderLights::fill(const Culler& culler, const View& view, FrameBlock& fram
     const Affine M = pose_of(*lamps_[i]);
     frame.lamp_position[i] = vec4(M.col(3) - eye, std::max(light.range, 1e-3));
     frame.lamp_colour[i] = light_colour(light);
-    frame.lamp_attenuation[i] = vec4({light.constant, light.linear, light.quadratic}, light.falloff);
+    frame.lamp_attenuation[i] =
+        vec4({light.constant, light.linear, light.quadratic}, light.falloff);
     frame.lamp_axis[i] = vec4((M.leftCols<3>() * light.direction).normalized(), 0.0);
-    frame.lamp_cone[i] = vec4({math::cos(0.5 * light.outer_angle), math::cos(0.5 * light.inner_angle), 0.0}, 0.0);
+    frame.lamp_cone[i] =
+        vec4({math::cos(0.5 * light.outer_angle), math::cos(0.5 * light.inner_angle), 0.0}, 0.0);
   }
 }
 
@@ -97,22 +104,25 @@ void RenderLights::place_shadow(const Vec3& to_sun, const View& view) {
   const Vec3 eye = view.X_WCamera.translation;
   const Vec3 middle = 0.5 * (content_.bounds.low + content_.bounds.high);
   const double whole = std::max(0.5 * (content_.bounds.high - content_.bounds.low).norm(), 1.0);
-  const double outside = (eye - eye.cwiseMax(content_.bounds.low).cwiseMin(content_.bounds.high)).norm();
+  const double outside =
+      (eye - eye.cwiseMax(content_.bounds.low).cwiseMin(content_.bounds.high)).norm();
   const double half = std::min(whole, std::max(kShadowReach, outside));
   Vec3 centre = middle;
   if (half < whole) {
     centre = eye + 0.6 * half * (view.X_WCamera.rotation * Vec3::UnitX());
     centre = centre.cwiseMax(content_.bounds.low).cwiseMin(content_.bounds.high);
   }
-  const Vec3 right = (std::abs(to_sun.z()) > 0.99 ? Vec3::UnitX() : Vec3::UnitZ()).cross(to_sun).normalized();
+  const Vec3 right =
+      (std::abs(to_sun.z()) > 0.99 ? Vec3::UnitX() : Vec3::UnitZ()).cross(to_sun).normalized();
   const Vec3 up = to_sun.cross(right);
   if (half < whole) {
     // In steps of a few metres, so that shadows' edges do not swim as the camera moves.
     const double step = 0.2 * half;
-    centre = right * step * std::round(centre.dot(right) / step) + up * step * std::round(centre.dot(up) / step) +
+    centre = right * step * std::round(centre.dot(right) / step) +
+             up * step * std::round(centre.dot(up) / step) +
              to_sun * step * std::round(centre.dot(to_sun) / step);
   }
-  const double reach = half + whole;    // along the rays: casters far above count too
+  const double reach = half + whole;  // along the rays: casters far above count too
   shadow_.centre = centre;
   shadow_.right = right;
   shadow_.up = up;

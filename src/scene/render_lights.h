@@ -1,4 +1,5 @@
-// The lights of a world for one frame: suns, lamps, ambient light, sky, and the region that has shadows.
+// The lights of a world for one frame: suns, lamps, ambient light, sky, and the region that has
+// shadows.
 #pragma once
 
 #include <vector>
@@ -11,17 +12,18 @@ namespace ruedo::scene {
 
 // Where the first sun's shadows are worked out: a box along its rays.
 struct ShadowRegion {
-  static constexpr int kSize = 2048;    // texels a side of the shadow map
+  static constexpr int kSize = 2048;  // texels a side of the shadow map
   Region region;
-  Vec3 centre = Vec3::Zero();           // m, world
-  Vec3 right = Vec3::UnitX(), up = Vec3::UnitY(), to_sun = Vec3::UnitZ();    // its axes
-  double half = 1.0;                    // m, half a side
-  double reach = 1.0;                   // m, half its length along the rays
+  Vec3 centre = Vec3::Zero();                                              // m, world
+  Vec3 right = Vec3::UnitX(), up = Vec3::UnitY(), to_sun = Vec3::UnitZ();  // its axes
+  double half = 1.0;                                                       // m, half a side
+  double reach = 1.0;  // m, half its length along the rays
 
   // From world coordinates relative to `origin` to the map: x and y in [-1, 1], depth in [0, 1].
   Eigen::Matrix4d map_from_world(const Vec3& origin) const;
   bool same_place(const ShadowRegion& other) const {
-    return centre == other.centre && to_sun == other.to_sun && half == other.half && reach == other.reach;
+    return centre == other.centre && to_sun == other.to_sun && half == other.half &&
+           reach == other.reach;
   }
 };
 
@@ -34,7 +36,7 @@ class RenderLights {
 
   // Writes all of the frame that is about light. The culler has the links' poses.
   void fill(const Culler& culler, const View& view, FrameBlock& frame);
-  const ShadowRegion& shadow() const { return shadow_; }    // of the last fill()
+  const ShadowRegion& shadow() const { return shadow_; }  // of the last fill()
 
  private:
   void place_shadow(const Vec3& to_sun, const View& view);

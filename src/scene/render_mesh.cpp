@@ -11,8 +11,8 @@ namespace {
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 
-// Pieces of mesh files have at most so many triangles: small enough for culling to pay, large enough that the
-// draw calls do not cost more than they save.
+// Pieces of mesh files have at most so many triangles: small enough for culling to pay, large
+// enough that the draw calls do not cost more than they save.
 constexpr uint32_t kPieceTriangles = 4000;
 
 void bound(const RenderMesh& mesh, RenderMesh::Piece& piece) {
@@ -24,7 +24,8 @@ void bound(const RenderMesh& mesh, RenderMesh::Piece& piece) {
   }
   const Vector3f centre = 0.5f * (low + high);
   float radius2 = 0.0f;
-  for (auto i = begin; i != end; ++i) radius2 = std::max(radius2, (mesh.vertices[*i].position - centre).squaredNorm());
+  for (auto i = begin; i != end; ++i)
+    radius2 = std::max(radius2, (mesh.vertices[*i].position - centre).squaredNorm());
   piece.centre = centre.cast<double>();
   piece.radius = std::sqrt(static_cast<double>(radius2));
   piece.low = low.cast<double>();
@@ -48,7 +49,8 @@ struct Ring {
 
 void revolve(RenderMesh& mesh, const std::vector<Ring>& rings, int segments) {
   const auto first = static_cast<uint32_t>(mesh.vertices.size());
-  const auto row = static_cast<uint32_t>(segments + 1);    // the seam twice, for its texture coordinates
+  const auto row =
+      static_cast<uint32_t>(segments + 1);  // the seam twice, for its texture coordinates
   for (const Ring& ring : rings) {
     for (int i = 0; i <= segments; ++i) {
       const double angle = 2.0 * M_PI * (i % segments) / segments;
@@ -74,21 +76,25 @@ void disc(RenderMesh& mesh, float z, float radius, bool up, int segments) {
   for (int i = 0; i < segments; ++i) {
     const double angle = 2.0 * M_PI * i / segments;
     const auto c = static_cast<float>(math::cos(angle)), s = static_cast<float>(math::sin(angle));
-    mesh.vertices.push_back({{radius * c, radius * s, z}, normal, {0.5f + 0.5f * c, 0.5f + (up ? 0.5f : -0.5f) * s}});
+    mesh.vertices.push_back(
+        {{radius * c, radius * s, z}, normal, {0.5f + 0.5f * c, 0.5f + (up ? 0.5f : -0.5f) * s}});
   }
   for (uint32_t i = 1; i + 1 < static_cast<uint32_t>(segments); ++i) {
-    mesh.indices.insert(mesh.indices.end(), {first, first + (up ? i : i + 1), first + (up ? i + 1 : i)});
+    mesh.indices.insert(mesh.indices.end(),
+                        {first, first + (up ? i : i + 1), first + (up ? i + 1 : i)});
   }
 }
 
-std::vector<Ring> half_circle(int segments, double from, double to, double radius, double shift, double v0, double v1) {
+std::vector<Ring> half_circle(int segments, double from, double to, double radius, double shift,
+                              double v0, double v1) {
   std::vector<Ring> rings;
   for (int i = 0; i <= segments; ++i) {
     const double part = static_cast<double>(i) / segments, angle = from + (to - from) * part;
     const bool pole = std::abs(std::abs(angle) - M_PI / 2) < 1e-9;
     rings.push_back({static_cast<float>(shift + radius * math::sin(angle)),
                      pole ? 0.0f : static_cast<float>(radius * math::cos(angle)),
-                     pole ? 0.0f : static_cast<float>(math::cos(angle)), static_cast<float>(math::sin(angle)),
+                     pole ? 0.0f : static_cast<float>(math::cos(angle)),
+                     static_cast<float>(math::sin(angle)),
                      static_cast<float>(v0 + (v1 - v0) * part)});
   }
   return rings;
@@ -106,7 +112,8 @@ RenderMesh box_mesh() {
       const Vector3f right = up.cross(normal);
       const auto first = static_cast<uint32_t>(mesh.vertices.size());
       for (const Vector2f& uv : {Vector2f(0, 0), Vector2f(1, 0), Vector2f(1, 1), Vector2f(0, 1)}) {
-        mesh.vertices.push_back({0.5f * normal + (uv.x() - 0.5f) * right + (uv.y() - 0.5f) * up, normal, uv});
+        mesh.vertices.push_back(
+            {0.5f * normal + (uv.x() - 0.5f) * right + (uv.y() - 0.5f) * up, normal, uv});
       }
       quad(mesh, first, first + 1, first + 2, first + 3);
     }
@@ -139,15 +146,17 @@ RenderMesh cylinder_mesh(int segments) {
 
 RenderMesh cone_mesh(int segments) {
   RenderMesh mesh;
-  const float slope = std::sqrt(0.5f);    // radius 1 over length 1; the scaled normal stays right
+  const float slope = std::sqrt(0.5f);  // radius 1 over length 1; the scaled normal stays right
   revolve(mesh, {{-0.5f, 1.0f, slope, slope, 0.0f}, {0.5f, 0.0f, slope, slope, 1.0f}}, segments);
   disc(mesh, -0.5f, 1.0f, false, segments);
   return finish(std::move(mesh));
 }
 
 RenderMesh capsule_mesh(double radius, double length, int segments) {
-  std::vector<Ring> rings = half_circle(segments / 4, -M_PI / 2, 0.0, radius, -0.5 * length, 0.0, 0.25);
-  const std::vector<Ring> top = half_circle(segments / 4, 0.0, M_PI / 2, radius, 0.5 * length, 0.75, 1.0);
+  std::vector<Ring> rings =
+      half_circle(segments / 4, -M_PI / 2, 0.0, radius, -0.5 * length, 0.0, 0.25);
+  const std::vector<Ring> top =
+      half_circle(segments / 4, 0.0, M_PI / 2, radius, 0.5 * length, 0.75, 1.0);
   rings.insert(rings.end(), top.begin(), top.end());
   RenderMesh mesh;
   revolve(mesh, rings, segments);
@@ -162,7 +171,8 @@ Vector3f centroid3(const model::Mesh& mesh, const Triangle& t) {
   return mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]];
 }
 
-// Halves the triangles along their longest axis until each part is a piece; [begin, end) get reordered.
+// Halves the triangles along their longest axis until each part is a piece; [begin, end) get
+// reordered.
 void cut(const model::Mesh& mesh, std::vector<Triangle>& triangles, size_t begin, size_t end,
          std::vector<std::pair<size_t, size_t>>& parts) {
   if (end - begin <= kPieceTriangles) {
@@ -180,9 +190,10 @@ void cut(const model::Mesh& mesh, std::vector<Triangle>& triangles, size_t begin
   const size_t middle = begin + (end - begin) / 2;
   const auto less = [&](const Triangle& a, const Triangle& b) {
     const float ca = centroid3(mesh, a)[axis], cb = centroid3(mesh, b)[axis];
-    return ca != cb ? ca < cb : a < b;    // a total order: the same pieces with every library
+    return ca != cb ? ca < cb : a < b;  // a total order: the same pieces with every library
   };
-  std::nth_element(triangles.begin() + static_cast<long>(begin), triangles.begin() + static_cast<long>(middle),
+  std::nth_element(triangles.begin() + static_cast<long>(begin),
+                   triangles.begin() + static_cast<long>(middle),
                    triangles.begin() + static_cast<long>(end), less);
   cut(mesh, triangles, begin, middle, parts);
   cut(mesh, triangles, middle, end, parts);
@@ -205,7 +216,8 @@ RenderMesh file_mesh(const model::Mesh& mesh) {
   if (parts.empty()) parts.push_back({"", 0, static_cast<uint32_t>(mesh.triangles.size()), -1});
   for (const model::Mesh::Part& part : parts) {
     std::vector<Triangle> triangles;
-    const size_t end = std::min<size_t>(size_t{part.first_triangle} + part.triangle_count, mesh.triangles.size());
+    const size_t end =
+        std::min<size_t>(size_t{part.first_triangle} + part.triangle_count, mesh.triangles.size());
     for (size_t i = part.first_triangle; i < end; ++i) {
       const Triangle& t = mesh.triangles[i];
       if (std::max({t[0], t[1], t[2]}) < count) triangles.push_back(t);
@@ -224,10 +236,12 @@ RenderMesh file_mesh(const model::Mesh& mesh) {
           continue;
         }
         const Vector3f& a = mesh.positions[t[0]];
-        const Vector3f normal = (mesh.positions[t[1]] - a).cross(mesh.positions[t[2]] - a).normalized();
+        const Vector3f normal =
+            (mesh.positions[t[1]] - a).cross(mesh.positions[t[2]] - a).normalized();
         for (const uint32_t corner : t) {
           out.indices.push_back(static_cast<uint32_t>(out.vertices.size()));
-          out.vertices.push_back({mesh.positions[corner], normal, mapped ? mesh.uvs[corner] : Vector2f(0, 0)});
+          out.vertices.push_back(
+              {mesh.positions[corner], normal, mapped ? mesh.uvs[corner] : Vector2f(0, 0)});
         }
       }
       bound(out, piece);

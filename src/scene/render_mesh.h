@@ -1,5 +1,5 @@
-// Triangles as the renderer uploads them: primitives tessellated at unit size, and mesh files cut into pieces
-// that can be culled one by one.
+// Triangles as the renderer uploads them: primitives tessellated at unit size, and mesh files cut
+// into pieces that can be culled one by one.
 #pragma once
 
 #include <cstdint>
@@ -11,34 +11,37 @@
 namespace ruedo::scene {
 
 struct RenderVertex {
-  Eigen::Vector3f position;    // m, or of a unit primitive
-  Eigen::Vector3f normal;      // unit
-  Eigen::Vector2f uv;          // v counts up
+  Eigen::Vector3f position;  // m, or of a unit primitive
+  Eigen::Vector3f normal;    // unit
+  Eigen::Vector2f uv;        // v counts up
 };
 
 struct RenderMesh {
   // A run of triangles of one material, small enough to be worth culling by its bounding sphere.
   struct Piece {
     uint32_t first_index = 0, index_count = 0;
-    int material = -1;              // index into the model::Mesh's materials; -1: none
-    Vec3 centre = Vec3::Zero();     // of the bounding sphere
+    int material = -1;           // index into the model::Mesh's materials; -1: none
+    Vec3 centre = Vec3::Zero();  // of the bounding sphere
     double radius = 0.0;
-    Vec3 low = Vec3::Zero(), high = Vec3::Zero();    // bounding box
+    Vec3 low = Vec3::Zero(), high = Vec3::Zero();  // bounding box
   };
   std::vector<RenderVertex> vertices;
-  std::vector<uint32_t> indices;    // three a triangle, counter-clockwise seen from outside
+  std::vector<uint32_t> indices;  // three a triangle, counter-clockwise seen from outside
   std::vector<Piece> pieces;
 };
 
 // Primitives, all centred at the origin, standing along z; with texture coordinates.
-RenderMesh box_mesh();                         // edges 1
-RenderMesh plane_mesh();                       // 1 x 1 in xy, normal z
-RenderMesh sphere_mesh(int segments);          // radius 1; `segments` around, half of them from pole to pole
-RenderMesh cylinder_mesh(int segments);        // radius 1, length 1
-RenderMesh cone_mesh(int segments);            // radius 1, length 1, apex up
-RenderMesh capsule_mesh(double radius, double length, int segments);    // length of the cylindrical part
+RenderMesh box_mesh();    // edges 1
+RenderMesh plane_mesh();  // 1 x 1 in xy, normal z
+RenderMesh sphere_mesh(
+    int segments);  // radius 1; `segments` around, half of them from pole to pole
+RenderMesh cylinder_mesh(int segments);  // radius 1, length 1
+RenderMesh cone_mesh(int segments);      // radius 1, length 1, apex up
+RenderMesh capsule_mesh(double radius, double length,
+                        int segments);  // length of the cylindrical part
 
-// A mesh file's triangles; flat normals where it has none. Triangles that name a vertex it does not have are left out.
+// A mesh file's triangles; flat normals where it has none. Triangles that name a vertex it does not
+// have are left out.
 RenderMesh file_mesh(const model::Mesh& mesh);
 
 }  // namespace ruedo::scene

@@ -27,10 +27,10 @@ Eigen::Matrix3d optical_from_world(const View& view) {
   return rows;
 }
 
-// Depth is near / Z in perspective (a little less, so that the far plane is at 0), linear in a parallel view:
-// floats keep their precision at both ends.
+// Depth is near / Z in perspective (a little less, so that the far plane is at 0), linear in a
+// parallel view: floats keep their precision at both ends.
 struct DepthCurve {
-  double a, b;    // perspective: d = a + b / Z; parallel: d = a + b Z
+  double a, b;  // perspective: d = a + b / Z; parallel: d = a + b Z
   explicit DepthCurve(const View& v) {
     const double n = v.near_m, f = v.far_m;
     a = v.orthographic ? f / (f - n) : -n / (f - n);
@@ -40,8 +40,8 @@ struct DepthCurve {
 
 Matrix4 clip_from_world(const View& v) {
   const DepthCurve depth(v);
-  // OpenGL counts pixels from their corners: half a pixel more. Rows count downwards in both, as pictures are
-  // drawn upside down.
+  // OpenGL counts pixels from their corners: half a pixel more. Rows count downwards in both, as
+  // pictures are drawn upside down.
   const double sx = 2.0 * v.fx / v.width, sy = 2.0 * v.fy / v.height;
   const double ox = 2.0 * (v.cx + 0.5) / v.width - 1.0, oy = 2.0 * (v.cy + 0.5) / v.height - 1.0;
   Matrix4 P = Matrix4::Zero();
@@ -58,17 +58,21 @@ Matrix4 clip_from_world(const View& v) {
 class GlRenderer : public Renderer {
  public:
   GlRenderer(const model::WorldModel& world, const model::BodyLayout& layout)
-      : content_(world, layout), culler_(layout, content_), lights_(world, content_),
+      : content_(world, layout),
+        culler_(layout, content_),
+        lights_(world, content_),
         device_(make_gl_context(), content_, lights_.counts()) {
     description_ = device_.description();
     device_.context().release();
   }
 
-  void draw(const Snapshot& snapshot, const View& view, Picture& picture, std::span<const Line> lines) override {
+  void draw(const Snapshot& snapshot, const View& view, Picture& picture,
+            std::span<const Line> lines) override {
     device_.context().make_current();
     culler_.update(snapshot);
     const Vec3 eye = view.X_WCamera.translation;
-    culler_.collect(view_region(view), eye, std::max(view.fx, view.fy), view.orthographic, visible_);
+    culler_.collect(view_region(view), eye, std::max(view.fx, view.fy), view.orthographic,
+                    visible_);
     FrameBlock frame{};
     fill(view, frame);
     lights_.fill(culler_, view, frame);
@@ -84,7 +88,8 @@ class GlRenderer : public Renderer {
       device_.begin_colour(view.width, view.height, samples);
       device_.draw(Pass::colour, visible_.instances, visible_.opaque);
       draw_sky(view);
-      if (!visible_.transparent.empty()) device_.draw(Pass::colour, visible_.instances, {}, visible_.transparent);
+      if (!visible_.transparent.empty())
+        device_.draw(Pass::colour, visible_.instances, {}, visible_.transparent);
       if (!lines.empty()) draw_lines(view, lines);
       device_.read_rgb(picture.rgb.data());
       if (picture.want_depth && depth_from_colour) device_.read_depth(picture.depth.data());
@@ -111,16 +116,18 @@ class GlRenderer : public Renderer {
     frame.clip_from_world = to_floats(clip_from_world(view));
     const Vec3 ahead = view.X_WCamera.rotation * Vec3::UnitX();
     const Vec3 to_eye = view.orthographic ? Vec3(-ahead) : Vec3::Zero();
-    frame.eye = {static_cast<float>(to_eye.x()), static_cast<float>(to_eye.y()), static_cast<float>(to_eye.z()),
-                 view.orthographic ? 0.0f : 1.0f};
+    frame.eye = {static_cast<float>(to_eye.x()), static_cast<float>(to_eye.y()),
+                 static_cast<float>(to_eye.z()), view.orthographic ? 0.0f : 1.0f};
     // The ground's pattern repeats every two metres.
     const Vec3& p = view.X_WCamera.translation;
     frame.origin = {static_cast<float>(p.x() - 2.0 * std::floor(0.5 * p.x())),
-                    static_cast<float>(p.y() - 2.0 * std::floor(0.5 * p.y())), static_cast<float>(view.exposure), 0.0f};
+                    static_cast<float>(p.y() - 2.0 * std::floor(0.5 * p.y())),
+                    static_cast<float>(view.exposure), 0.0f};
   }
 
-  // The map of what stands still is drawn once for each place of the region, and the movers each time. Both are
-  // worked out around the region's centre, not the eye: what was drawn before must not show.
+  // The map of what stands still is drawn once for each place of the region, and the movers each
+  // time. Both are worked out around the region's centre, not the eye: what was drawn before must
+  // not show.
   void draw_shadows() {
     if (!lights_.counts().shadow) return;
     const ShadowRegion& shadow = lights_.shadow();
@@ -143,7 +150,8 @@ class GlRenderer : public Renderer {
     device_.draw(Pass::shadow, casters_.instances, casters_.opaque);
     Eigen::AlignedBox2d box;
     for (const auto& [centre, radius] : casters_.spheres) {
-      const Eigen::Vector2d at(shadow.right.dot(centre - shadow.centre), shadow.up.dot(centre - shadow.centre));
+      const Eigen::Vector2d at(shadow.right.dot(centre - shadow.centre),
+                               shadow.up.dot(centre - shadow.centre));
       box.extend(at.array().matrix() - Eigen::Vector2d::Constant(radius));
       box.extend(at.array().matrix() + Eigen::Vector2d::Constant(radius));
     }
@@ -151,7 +159,8 @@ class GlRenderer : public Renderer {
       const double t = (metres / shadow.half + 1.0) * 0.5 * kSize;
       return whole<int>(std::clamp(std::floor(t) + rounding, 0.0, static_cast<double>(kSize)));
     };
-    stale_ = {texel(box.min().x(), -1.0), texel(box.min().y(), -1.0), texel(box.max().x(), 2.0), texel(box.max().y(), 2.0)};
+    stale_ = {texel(box.min().x(), -1.0), texel(box.min().y(), -1.0), texel(box.max().x(), 2.0),
+              texel(box.max().y(), 2.0)};
   }
 
   void draw_sky(const View& view) {
@@ -182,7 +191,7 @@ class GlRenderer : public Renderer {
       b << line.to - view.X_WCamera.translation, 1.0;
       a = M * a;
       b = M * b;
-      if (!view.orthographic) {    // cut at the near plane
+      if (!view.orthographic) {  // cut at the near plane
         if (a.w() < view.near_m && b.w() < view.near_m) continue;
         if (a.w() < view.near_m) a += (b - a) * ((view.near_m - a.w()) / (b.w() - a.w()));
         if (b.w() < view.near_m) b += (a - b) * ((view.near_m - b.w()) / (a.w() - b.w()));
@@ -191,11 +200,12 @@ class GlRenderer : public Renderer {
                             ((b.y() / b.w()) - (a.y() / a.w())) * view.height);
       if (along.norm() < 1e-9) continue;
       along.normalize();
-      const Eigen::Vector4d side(-along.y() * kLinePixels / view.width, along.x() * kLinePixels / view.height, 0, 0);
+      const Eigen::Vector4d side(-along.y() * kLinePixels / view.width,
+                                 along.x() * kLinePixels / view.height, 0, 0);
       const Eigen::Vector4d corners[6] = {a - a.w() * side, a + a.w() * side, b + b.w() * side,
                                           a - a.w() * side, b + b.w() * side, b - b.w() * side};
       for (Eigen::Vector4d corner : corners) {
-        corner.z() += 1e-4 * std::abs(corner.z());    // before the surface that a ray ends on
+        corner.z() += 1e-4 * std::abs(corner.z());  // before the surface that a ray ends on
         for (int i = 0; i < 4; ++i) overlay_.push_back(static_cast<float>(corner[i]));
         overlay_.insert(overlay_.end(), line.rgba.begin(), line.rgba.end());
       }
@@ -223,9 +233,9 @@ class GlRenderer : public Renderer {
   std::string description_;
   DrawList visible_, casters_;
   std::vector<float> overlay_;
-  ShadowRegion shadow_place_;      // of the kept shadow map
+  ShadowRegion shadow_place_;  // of the kept shadow map
   bool shadow_drawn_ = false;
-  PixelBox stale_;                 // where movers are in the shadow map in use
+  PixelBox stale_;  // where movers are in the shadow map in use
 };
 
 }  // namespace
@@ -241,7 +251,8 @@ View View::pinhole(const Pose& X_WCamera, int width, int height, double hfov_rad
   return view;
 }
 
-std::unique_ptr<Renderer> make_renderer(const model::WorldModel& world, const model::BodyLayout& layout) {
+std::unique_ptr<Renderer> make_renderer(const model::WorldModel& world,
+                                        const model::BodyLayout& layout) {
   return std::make_unique<GlRenderer>(world, layout);
 }
 

@@ -7,7 +7,8 @@ namespace {
 
 std::string head(const LightCounts& lights = {}) {
   std::string s = "#version 330 core\n";
-  s += "const int kSuns = " + std::to_string(lights.suns) + ", kLamps = " + std::to_string(lights.lamps) + ";\n";
+  s += "const int kSuns = " + std::to_string(lights.suns) +
+       ", kLamps = " + std::to_string(lights.lamps) + ";\n";
   s += "const int kMaxSuns = " + std::to_string(kMaxDirectionalLights) +
        ", kMaxLamps = " + std::to_string(kMaxLocalLights) + ";\n";
   s += R"(
@@ -29,8 +30,8 @@ layout(std140) uniform Frame {
   return s;
 }
 
-// Displayed values are the square roots of light: near enough to sRGB's curve, and cheap. Colours of files are
-// displayed values.
+// Displayed values are the square roots of light: near enough to sRGB's curve, and cheap. Colours
+// of files are displayed values.
 constexpr const char* kCurve = R"(
 vec3 to_light(vec3 c) { return c * c; }
 vec3 to_display(vec3 light) { return sqrt(light); }
@@ -63,7 +64,8 @@ layout(location = 9) in uint a_label;
   if (pass != Pass::shadow && (flags & kTextured) != 0) s += "out vec2 v_uv;\n";
   if (pass == Pass::geometry) s += "flat out uint v_label;\n";
   if (pass == Pass::colour) {
-    s += "out vec3 v_position;\nout vec3 v_normal;\nflat out vec4 v_diffuse;\nflat out vec4 v_emissive;\n";
+    s += "out vec3 v_position;\nout vec3 v_normal;\nflat out vec4 v_diffuse;\nflat out vec4 "
+         "v_emissive;\n";
     if ((flags & kSpecular) != 0) s += "flat out vec4 v_specular;\n";
     if ((flags & kGround) != 0) s += "out vec2 v_plane;\n";
   }
@@ -72,12 +74,14 @@ void main() {
   vec4 p = vec4(a_position, 1.0);
   vec3 position = vec3(dot(a_row0, p), dot(a_row1, p), dot(a_row2, p));
 )";
-  if (pass == Pass::shadow) return s + "  gl_Position = shadow_from_world * vec4(position, 1.0);\n}\n";
+  if (pass == Pass::shadow)
+    return s + "  gl_Position = shadow_from_world * vec4(position, 1.0);\n}\n";
   s += "  gl_Position = clip_from_world * vec4(position, 1.0);\n";
   if ((flags & kTextured) != 0) s += "  v_uv = a_uv;\n";
   if (pass == Pass::geometry) s += "  v_label = a_label;\n";
   if (pass == Pass::colour) {
-    // The cofactor matrix turns normals as the inverse transpose does, also for flat and mirrored scales.
+    // The cofactor matrix turns normals as the inverse transpose does, also for flat and mirrored
+    // scales.
     s += R"(
   v_position = position;
   vec3 c0 = cross(a_row1.xyz, a_row2.xyz), c1 = cross(a_row2.xyz, a_row0.xyz), c2 = cross(a_row0.xyz, a_row1.xyz);
@@ -102,7 +106,8 @@ std::string fragment_shader(Pass pass, uint32_t flags, bool cutout, const LightC
     return s + "  o_label = v_label;\n}\n";
   }
   s += kCurve;
-  s += "in vec3 v_position;\nin vec3 v_normal;\nflat in vec4 v_diffuse;\nflat in vec4 v_emissive;\n";
+  s +=
+      "in vec3 v_position;\nin vec3 v_normal;\nflat in vec4 v_diffuse;\nflat in vec4 v_emissive;\n";
   if ((flags & kSpecular) != 0) s += "flat in vec4 v_specular;\n";
   if ((flags & kGround) != 0) s += std::string("in vec2 v_plane;\n") + kSky;
   if (lights.shadow) s += "uniform sampler2DShadow shadow_map;\n";
@@ -135,7 +140,8 @@ std::string fragment_shader(Pass pass, uint32_t flags, bool cutout, const LightC
   }
   const auto highlight = [&](const std::string& colour) {
     return specular ? "    shine += " + colour +
-                          " * pow(max(dot(n, normalize(to_light_source + to_eye)), 1e-4), v_specular.w);\n"
+                          " * pow(max(dot(n, normalize(to_light_source + to_eye)), 1e-4), "
+                          "v_specular.w);\n"
                     : std::string();
   };
   s += "  for (int i = 0; i < kSuns; ++i) {\n    vec3 to_light_source = sun_direction[i].xyz;\n"
@@ -148,7 +154,8 @@ std::string fragment_shader(Pass pass, uint32_t flags, bool cutout, const LightC
     }
 )";
   }
-  s += "    light += facing * sun_colour[i].rgb;\n" + highlight("facing * sun_colour[i].rgb") + "  }\n";
+  s += "    light += facing * sun_colour[i].rgb;\n" + highlight("facing * sun_colour[i].rgb") +
+       "  }\n";
   s += R"(  for (int i = 0; i < kLamps; ++i) {
     vec3 way = lamp_position[i].xyz - v_position;
     float d = length(way);
@@ -161,7 +168,8 @@ std::string fragment_shader(Pass pass, uint32_t flags, bool cutout, const LightC
     strength *= mix(1.0, cone, lamp_colour[i].w);
     strength *= max(dot(n, to_light_source), 0.0);
     light += strength * lamp_colour[i].rgb;
-)" + highlight("strength * lamp_colour[i].rgb") + "  }\n";
+)" + highlight("strength * lamp_colour[i].rgb") +
+       "  }\n";
   // Light beyond what a picture can show is bent in softly.
   s += R"(
   vec3 over = max(light - 0.8, vec3(0.0));

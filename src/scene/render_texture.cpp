@@ -17,7 +17,7 @@ namespace {
 
 // Larger pictures are reduced: finer than any camera sees, and slow to draw from.
 constexpr int kMaxSide = 2048;
-constexpr int kMostPixels = 16384;    // each way; a larger one is not decoded
+constexpr int kMostPixels = 16384;  // each way; a larger one is not decoded
 
 cv::Mat to_rgba(cv::Mat image) {
   if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / 257.0);
@@ -38,18 +38,24 @@ std::vector<uint8_t> read_bytes(const std::string& path) {
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
-// libpng complains on stderr of colour profiles that many programs write, and that are not used here.
+// libpng complains on stderr of colour profiles that many programs write, and that are not used
+// here.
 void remove_png_profile(std::vector<uint8_t>& bytes) {
   constexpr std::string_view kSignature = "\x89PNG\r\n\x1a\n";
-  const auto text = [&](size_t at, size_t length) { return std::string_view(reinterpret_cast<const char*>(bytes.data()) + at, length); };
+  const auto text = [&](size_t at, size_t length) {
+    return std::string_view(reinterpret_cast<const char*>(bytes.data()) + at, length);
+  };
   if (bytes.size() < kSignature.size() || text(0, kSignature.size()) != kSignature) return;
-  for (size_t at = kSignature.size(); at + 12 <= bytes.size();) {    // a chunk: length, kind, data, checksum
-    const size_t length = static_cast<size_t>(bytes[at]) << 24 | static_cast<size_t>(bytes[at + 1]) << 16 |
+  for (size_t at = kSignature.size();
+       at + 12 <= bytes.size();) {  // a chunk: length, kind, data, checksum
+    const size_t length = static_cast<size_t>(bytes[at]) << 24 |
+                          static_cast<size_t>(bytes[at + 1]) << 16 |
                           static_cast<size_t>(bytes[at + 2]) << 8 | bytes[at + 3];
     const std::string_view kind = text(at + 4, 4);
     if (kind == "IDAT" || length > bytes.size() - at - 12) return;
     if (kind == "iCCP") {
-      bytes.erase(bytes.begin() + static_cast<std::ptrdiff_t>(at), bytes.begin() + static_cast<std::ptrdiff_t>(at + 12 + length));
+      bytes.erase(bytes.begin() + static_cast<std::ptrdiff_t>(at),
+                  bytes.begin() + static_cast<std::ptrdiff_t>(at + 12 + length));
       return;
     }
     at += 12 + length;
@@ -71,8 +77,10 @@ TexturePixels decode_texture(const model::Texture& texture) {
     const int side = std::max(image.cols, image.rows);
     if (side > kMaxSide) {
       const double factor = static_cast<double>(kMaxSide) / side;
-      cv::resize(image, image, cv::Size(std::max(1, static_cast<int>(image.cols * factor)),
-                                        std::max(1, static_cast<int>(image.rows * factor))), 0, 0, cv::INTER_AREA);
+      cv::resize(image, image,
+                 cv::Size(std::max(1, static_cast<int>(image.cols * factor)),
+                          std::max(1, static_cast<int>(image.rows * factor))),
+                 0, 0, cv::INTER_AREA);
     }
     cv::Mat rgba = to_rgba(image);
     if (rgba.empty()) return out;

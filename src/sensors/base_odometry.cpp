@@ -14,7 +14,9 @@ bool BaseOdometry::is_for(const model::DriveDescription& drive) {
   return drive.steering != Steering::tracked || drive.left_joints.empty();
 }
 
-BaseOdometry::BaseOdometry(const model::BodyLayout& layout, int robot, const model::DriveDescription& drive, double track_error, double steering_error)
+BaseOdometry::BaseOdometry(const model::BodyLayout& layout, int robot,
+                           const model::DriveDescription& drive, double track_error,
+                           double steering_error)
     : lever_(1.0 + track_error), steering_error_(steering_error) {
   const model::RobotPlacement& placement = layout.robots[static_cast<size_t>(robot)];
   if (drive.steering == Steering::mecanum || drive.steering == Steering::omni) {
@@ -29,10 +31,13 @@ BaseOdometry::BaseOdometry(const model::BodyLayout& layout, int robot, const mod
     const Pose X_BaseB = placement.X_BBase.inverse();
     for (const int index : placement.wheels) {
       const model::WheelPlacement& wheel = layout.wheels[static_cast<size_t>(index)];
-      const model::WheelPlacement& place = wheel.on < 0 ? wheel : layout.wheels[static_cast<size_t>(wheel.on)];
-      const Vec3 p = X_BaseB * (layout.links[static_cast<size_t>(place.link)].X_BL * place.center_in_L);
+      const model::WheelPlacement& place =
+          wheel.on < 0 ? wheel : layout.wheels[static_cast<size_t>(wheel.on)];
+      const Vec3 p =
+          X_BaseB * (layout.links[static_cast<size_t>(place.link)].X_BL * place.center_in_L);
       const auto on = std::find(placement.wheels.begin(), placement.wheels.end(), wheel.on);
-      wheels_.push_back({wheel.steers, wheel.on >= 0, static_cast<int>(on - placement.wheels.begin()), p.x(), p.y()});
+      wheels_.push_back({wheel.steers, wheel.on >= 0,
+                         static_cast<int>(on - placement.wheels.begin()), p.x(), p.y()});
     }
   }
 }
@@ -60,14 +65,17 @@ Vec3 BaseOdometry::moved(const std::vector<double>& ways, const std::vector<doub
   const double middle = started_ ? 0.5 * (curvature_before_ + now) : now;
   curvature_before_ = now;
   started_ = true;
-  const bool any_fixed = std::any_of(wheels_.begin(), wheels_.end(), [](const Wheel& wheel) { return !wheel.steers && !wheel.steered; });
+  const bool any_fixed = std::any_of(wheels_.begin(), wheels_.end(), [](const Wheel& wheel) {
+    return !wheel.steers && !wheel.steered;
+  });
   double way = 0.0;
   int count = 0;
   for (size_t i = 0; i < wheels_.size(); ++i) {
     const Wheel& wheel = wheels_[i];
     if (wheel.steers || (any_fixed && wheel.steered)) continue;
     // A wheel on a circle about the same middle; base_link's way is in proportion.
-    const double part = wheel.steered ? math::hypot(1.0 - middle * wheel.y, middle * wheel.x) : 1.0 - middle * wheel.y;
+    const double part = wheel.steered ? math::hypot(1.0 - middle * wheel.y, middle * wheel.x)
+                                      : 1.0 - middle * wheel.y;
     way += ways[i] / part;
     ++count;
   }
@@ -76,11 +84,14 @@ Vec3 BaseOdometry::moved(const std::vector<double>& ways, const std::vector<doub
 }
 
 Vec3 BaseOdometry::moved(const Pose& before, const Pose& after) const {
-  const double angle = wrap_angle(heading(after.rotation) - heading(before.rotation)), half = 0.5 * angle;
+  const double angle = wrap_angle(heading(after.rotation) - heading(before.rotation)),
+               half = 0.5 * angle;
   const Vec3 chord = after.translation - before.translation;
-  const double c = math::cos(heading(before.rotation) + half), s = math::sin(heading(before.rotation) + half);
-  const double part = half == 0.0 ? 1.0 : half / math::sin(half);    // of an arc to its chord
-  return {part * (c * chord.x() + s * chord.y()), part * (c * chord.y() - s * chord.x()), angle / lever_};
+  const double c = math::cos(heading(before.rotation) + half),
+               s = math::sin(heading(before.rotation) + half);
+  const double part = half == 0.0 ? 1.0 : half / math::sin(half);  // of an arc to its chord
+  return {part * (c * chord.x() + s * chord.y()), part * (c * chord.y() - s * chord.x()),
+          angle / lever_};
 }
 
 }  // namespace ruedo

@@ -1,8 +1,10 @@
-// Cameras: colour or grey pictures on ROBOT/CAMERA, depth on /depth, labels on /labels, intrinsics on /info.
+// Cameras: colour or grey pictures on ROBOT/CAMERA, depth on /depth, labels on /labels, intrinsics
+// on /info.
 //
-// A pinhole with square pixels, fx = width / (2 tan(hfov / 2)), bent by its lens (camera_lens.h), then developed: light
-// lost in the corners and noise in each pixel (pixel_noise.h). Depth is along the optical axis and has neither.
-// Pictures are drawn from visuals, by the renderer that the module gives.
+// A pinhole with square pixels, fx = width / (2 tan(hfov / 2)), bent by its lens (camera_lens.h),
+// then developed: light lost in the corners and noise in each pixel (pixel_noise.h). Depth is along
+// the optical axis and has neither. Pictures are drawn from visuals, by the renderer that the
+// module gives.
 #include "ruedo/camera_info_t.hpp"
 #include "ruedo/device_info_t.hpp"
 #include "ruedo/image_t.hpp"
@@ -41,12 +43,16 @@ const Element& camera_of(const SensorSetup& setup) {
 class Camera : public Sensor {
  public:
   explicit Camera(const SensorSetup& setup)
-      : random_(setup.random), lens_(camera_of(setup)), noise_(0, 0), vignette_(0, 0, 0),
-        channel_(setup.channel<image_t>()), info_channel_(setup.channel<camera_info_t>("info")) {
+      : random_(setup.random),
+        lens_(camera_of(setup)),
+        noise_(0, 0),
+        vignette_(0, 0, 0),
+        channel_(setup.channel<image_t>()),
+        info_channel_(setup.channel<camera_info_t>("info")) {
     const Element& element = setup.element;
     const Element& camera = camera_of(setup);
-    element.refuse_unknown({"ruedo:encoding", "ruedo:quality", "ruedo:depth", "ruedo:labels", "ruedo:exposure",
-                            "ruedo:vignetting", "ruedo:phase"});
+    element.refuse_unknown({"ruedo:encoding", "ruedo:quality", "ruedo:depth", "ruedo:labels",
+                            "ruedo:exposure", "ruedo:vignetting", "ruedo:phase"});
     const model::LinkPlacement& link = setup.layout.links[static_cast<size_t>(setup.link)];
     body_ = link.body;
     X_LC_ = setup.X_LS * camera.pose("pose");
@@ -54,7 +60,8 @@ class Camera : public Sensor {
     layout_ = &setup.layout;
     link_ = setup.link;
     read_noise(camera, setup);
-    vignette_ = Vignette(element.number("ruedo:vignetting", 0.0, Allowed::between(0.0, 1.0)), lens_.width, lens_.height);
+    vignette_ = Vignette(element.number("ruedo:vignetting", 0.0, Allowed::between(0.0, 1.0)),
+                         lens_.width, lens_.height);
     const std::string* type = element.attribute("type");
     const bool depth = element.boolean("ruedo:depth", type && wants_depth(*type));
     if (depth) depth_channel_ = setup.channel<image_t>("depth");
@@ -68,9 +75,11 @@ class Camera : public Sensor {
     if (map_) {
       view_ = map_->ideal();
     } else {
-      view_ = scene::View{{}, lens_.width, lens_.height, lens_.fx, lens_.fy, lens_.cx, lens_.cy, lens_.near_m, lens_.far_m};
+      view_ = scene::View{{},       lens_.width, lens_.height, lens_.fx,   lens_.fy,
+                          lens_.cx, lens_.cy,    lens_.near_m, lens_.far_m};
     }
-    view_.exposure = math::exp2(element.number("ruedo:exposure", 0.0, Allowed::between(-10.0, 10.0)));
+    view_.exposure =
+        math::exp2(element.number("ruedo:exposure", 0.0, Allowed::between(-10.0, 10.0)));
     view_.samples = camera.integer("image/anti_aliasing", 1, Allowed::between(0, 1e9)) > 1 ? 4 : 1;
     fill_info();
   }
@@ -79,8 +88,12 @@ class Camera : public Sensor {
     view_.X_WCamera = X_WC(input.snapshot);
     input.renderer->draw(input.snapshot, view_, picture_);
     publish_picture(input, out);
-    if (depth_channel_ >= 0) publish_plane(input, out, depth_channel_, image_t::PIXEL_FORMAT_FLOAT_GRAY32, CV_32F, picture_.depth.data());
-    if (labels_channel_ >= 0) publish_plane(input, out, labels_channel_, image_t::PIXEL_FORMAT_LE_GRAY16, CV_16U, picture_.labels.data());
+    if (depth_channel_ >= 0)
+      publish_plane(input, out, depth_channel_, image_t::PIXEL_FORMAT_FLOAT_GRAY32, CV_32F,
+                    picture_.depth.data());
+    if (labels_channel_ >= 0)
+      publish_plane(input, out, labels_channel_, image_t::PIXEL_FORMAT_LE_GRAY16, CV_16U,
+                    picture_.labels.data());
     info_.utime = input.snapshot.time;
     out.publish(info_channel_, info_);
   }
@@ -89,7 +102,8 @@ class Camera : public Sensor {
     info.width = lens_.width;
     info.height = lens_.height;
     info.fov_horizontal = lens_.hfov;
-    info.fov_vertical = math::atan((lens_.cy + 0.5) / lens_.fy) + math::atan((lens_.height - 0.5 - lens_.cy) / lens_.fy);
+    info.fov_vertical = math::atan((lens_.cy + 0.5) / lens_.fy) +
+                        math::atan((lens_.height - 0.5 - lens_.cy) / lens_.fy);
     info.range_min = lens_.near_m;
     info.range_max = lens_.far_m;
   }
@@ -103,20 +117,29 @@ class Camera : public Sensor {
   }
 
   void read_format(const Element& camera, const SensorSetup& setup) {
-    const std::string encoding = setup.element.choice("ruedo:encoding", "jpeg", {"jpeg", "rgb", "grey"});
-    encoding_ = encoding == "jpeg" ? Encoding::jpeg : encoding == "rgb" ? Encoding::rgb : Encoding::grey;
-    quality_ = first_quality_ = static_cast<int>(setup.element.integer("ruedo:quality", 85, Allowed::between(kMinQuality, 100)));
+    const std::string encoding =
+        setup.element.choice("ruedo:encoding", "jpeg", {"jpeg", "rgb", "grey"});
+    encoding_ = encoding == "jpeg"  ? Encoding::jpeg
+                : encoding == "rgb" ? Encoding::rgb
+                                    : Encoding::grey;
+    quality_ = first_quality_ = static_cast<int>(
+        setup.element.integer("ruedo:quality", 85, Allowed::between(kMinQuality, 100)));
     const std::string format = camera.string("image/format", "R8G8B8");
     grey_ = encoding_ == Encoding::grey || format == "L8" || format == "L_INT8";
-    const bool colour = format == "R8G8B8" || format == "RGB_INT8" || format == "B8G8R8" || format == "BGR_INT8";
-    const bool depth = depth_channel_ >= 0 && (format == "R_FLOAT32" || format == "FLOAT32");    // as it is published beside
+    const bool colour =
+        format == "R8G8B8" || format == "RGB_INT8" || format == "B8G8R8" || format == "BGR_INT8";
+    const bool depth = depth_channel_ >= 0 &&
+                       (format == "R_FLOAT32" || format == "FLOAT32");  // as it is published beside
     if (!grey_ && !colour && !depth && setup.findings) {
-      setup.findings->unsupported(camera.child("image/format")->source, "sensor " + setup.device + "/camera/image/format",
-                                  "the format '" + format + "' is not supported: the camera gives R8G8B8");
+      setup.findings->unsupported(
+          camera.child("image/format")->source, "sensor " + setup.device + "/camera/image/format",
+          "the format '" + format + "' is not supported: the camera gives R8G8B8");
     }
-    if (const Element* lens = camera.child("lens/type"); lens && lens->text != "gnomonical" && lens->text != "custom" && setup.findings) {
-      setup.findings->unsupported(lens->source, "sensor " + setup.device + "/camera/lens/type",
-                                  "the projection '" + lens->text + "' is not supported: the camera is a pinhole");
+    if (const Element* lens = camera.child("lens/type");
+        lens && lens->text != "gnomonical" && lens->text != "custom" && setup.findings) {
+      setup.findings->unsupported(
+          lens->source, "sensor " + setup.device + "/camera/lens/type",
+          "the projection '" + lens->text + "' is not supported: the camera is a pinhole");
     }
   }
 
@@ -125,8 +148,10 @@ class Camera : public Sensor {
     if (!noise) return;
     const std::string* attribute = noise->attribute("type");
     const std::string type = attribute ? *attribute : noise->string("type", "none");
-    if (type != "none" && type != "gaussian") noise->fail("type '" + type + "' is not allowed; allowed: none, gaussian");
-    const double mean = noise->number("mean", 0.0, Allowed::any(quantity::kNoise)), stddev = noise->number("stddev", 0.0, Allowed::not_negative(quantity::kNoise));
+    if (type != "none" && type != "gaussian")
+      noise->fail("type '" + type + "' is not allowed; allowed: none, gaussian");
+    const double mean = noise->number("mean", 0.0, Allowed::any(quantity::kNoise)),
+                 stddev = noise->number("stddev", 0.0, Allowed::not_negative(quantity::kNoise));
     if (setup.noise && type == "gaussian") noise_ = PixelNoise(mean, stddev);
   }
 
@@ -165,17 +190,19 @@ class Camera : public Sensor {
     } else {
       image_.data.assign(bytes.begin(), bytes.end());
       image_.row_stride = static_cast<int32_t>(lens_.width * pixels.channels());
-      image_.pixelformat = grey_ ? int32_t{image_t::PIXEL_FORMAT_GRAY} : int32_t{image_t::PIXEL_FORMAT_RGB};
+      image_.pixelformat =
+          grey_ ? int32_t{image_t::PIXEL_FORMAT_GRAY} : int32_t{image_t::PIXEL_FORMAT_RGB};
     }
     image_.size = static_cast<int32_t>(image_.data.size());
     out.publish(channel_, image_);
   }
 
-  // Lowers the quality until the picture fits a datagram, and comes back towards the wanted one picture by picture.
+  // Lowers the quality until the picture fits a datagram, and comes back towards the wanted one
+  // picture by picture.
   void encode_jpeg(const cv::Mat& pixels) {
     const cv::Mat* source = &pixels;
     if (!grey_) {
-      cv::cvtColor(pixels, bgr_, cv::COLOR_RGB2BGR);    // OpenCV's order
+      cv::cvtColor(pixels, bgr_, cv::COLOR_RGB2BGR);  // OpenCV's order
       source = &bgr_;
     }
     quality_ = std::min(quality_ + kQualityStep / 2, first_quality_);
@@ -189,10 +216,12 @@ class Camera : public Sensor {
     image_.pixelformat = image_t::PIXEL_FORMAT_MJPEG;
   }
 
-  void publish_plane(const SampleInput& input, Outbox& out, int channel, int32_t format, int cv_type, void* values) {
+  void publish_plane(const SampleInput& input, Outbox& out, int channel, int32_t format,
+                     int cv_type, void* values) {
     cv::Mat pixels(view_.height, view_.width, cv_type, values);
     if (map_) {
-      map_->pick(pixels, bent_plane_, cv_type == CV_32F ? std::numeric_limits<double>::infinity() : 0.0);
+      map_->pick(pixels, bent_plane_,
+                 cv_type == CV_32F ? std::numeric_limits<double>::infinity() : 0.0);
       pixels = bent_plane_;
     }
     plane_.utime = input.snapshot.time;
@@ -208,10 +237,10 @@ class Camera : public Sensor {
   PixelNoise noise_;
   Vignette vignette_;
   int channel_, info_channel_, depth_channel_ = -1, labels_channel_ = -1;
-  int body_ = -1;               // into BodyLayout::bodies; -1: does not move
-  Pose X_BC_;                   // X_WC when it does not move
+  int body_ = -1;  // into BodyLayout::bodies; -1: does not move
+  Pose X_BC_;      // X_WC when it does not move
   const model::BodyLayout* layout_ = nullptr;
-  int link_ = -1;               // into BodyLayout::links
+  int link_ = -1;  // into BodyLayout::links
   Pose X_LC_;
   Encoding encoding_ = Encoding::jpeg;
   bool grey_ = false;

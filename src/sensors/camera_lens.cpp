@@ -11,7 +11,7 @@
 namespace ruedo {
 namespace {
 
-constexpr double kMaxPixels = 8192;    // a side
+constexpr double kMaxPixels = 8192;  // a side
 // A pinhole's picture grows without end towards 180 degrees.
 constexpr double kMaxHfov = 3.0;
 // The ideal picture is at most so many times as wide and high as the lens's.
@@ -21,21 +21,27 @@ constexpr double kMaxGrowth = 2.5;
 
 Lens::Lens(const Element& camera) {
   width = static_cast<int>(camera.integer("image/width", width, Allowed::between(1, kMaxPixels)));
-  height = static_cast<int>(camera.integer("image/height", height, Allowed::between(1, kMaxPixels)));
-  hfov = camera.number("horizontal_fov", hfov, Allowed{.min = 0.0, .max = kMaxHfov, .min_excluded = true});
+  height =
+      static_cast<int>(camera.integer("image/height", height, Allowed::between(1, kMaxPixels)));
+  hfov = camera.number("horizontal_fov", hfov,
+                       Allowed{.min = 0.0, .max = kMaxHfov, .min_excluded = true});
   near_m = camera.number("clip/near", near_m, Allowed::positive(quantity::kRange));
   far_m = camera.number("clip/far", far_m, Allowed::positive(quantity::kRange));
   if (far_m <= near_m) {
     const Element* clip = camera.child("clip");
-    (clip ? clip : &camera)->fail("far (" + std::to_string(far_m) + " m) has to be beyond near (" + std::to_string(near_m) + " m)");
+    (clip ? clip : &camera)
+        ->fail("far (" + std::to_string(far_m) + " m) has to be beyond near (" +
+               std::to_string(near_m) + " m)");
   }
   const scene::View pinhole = scene::View::pinhole({}, width, height, hfov);
   const Allowed focal = Allowed::positive(quantity::kPixels);
   fx = camera.number("lens/intrinsics/fx", pinhole.fx, focal);
-  fy = camera.number("lens/intrinsics/fy", camera.has("lens/intrinsics/fx") ? fx : pinhole.fy, focal);
+  fy = camera.number("lens/intrinsics/fy", camera.has("lens/intrinsics/fx") ? fx : pinhole.fy,
+                     focal);
   cx = camera.number("lens/intrinsics/cx", pinhole.cx, Allowed::any(quantity::kPixels));
   cy = camera.number("lens/intrinsics/cy", pinhole.cy, Allowed::any(quantity::kPixels));
-  if (fx != pinhole.fx || cx != pinhole.cx) hfov = math::atan((cx + 0.5) / fx) + math::atan((width - 0.5 - cx) / fx);
+  if (fx != pinhole.fx || cx != pinhole.cx)
+    hfov = math::atan((cx + 0.5) / fx) + math::atan((width - 0.5 - cx) / fx);
   if (const Element* d = camera.child("distortion")) {
     const Allowed range = Allowed::between(-10.0, 10.0);
     distortion = {d->number("k1", 0, range), d->number("k2", 0, range), d->number("p1", 0, range),
@@ -47,13 +53,14 @@ Eigen::Vector2d Lens::distort(const Eigen::Vector2d& p) const {
   const auto& [k1, k2, p1, p2, k3] = distortion;
   const double x = p.x(), y = p.y(), r2 = x * x + y * y;
   const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-  return {x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x), y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y};
+  return {x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+          y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y};
 }
 
 bool Lens::undistort(const Eigen::Vector2d& distorted, Eigen::Vector2d& p) const {
   const auto& [k1, k2, p1, p2, k3] = distortion;
-  // Along the ray from the middle outwards, so that the branch is the one that begins there: beyond a fold of the
-  // lens there is no answer.
+  // Along the ray from the middle outwards, so that the branch is the one that begins there: beyond
+  // a fold of the lens there is no answer.
   p = Eigen::Vector2d::Zero();
   constexpr int kStages = 8;
   for (int stage = 1; stage <= kStages; ++stage) {
@@ -62,10 +69,11 @@ bool Lens::undistort(const Eigen::Vector2d& distorted, Eigen::Vector2d& p) const
     for (int i = 0; i < 20 && !converged; ++i) {
       const double x = p.x(), y = p.y(), r2 = x * x + y * y;
       const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-      const double slope = 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2));    // of radial, over x or y
+      const double slope = 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2));  // of radial, over x or y
       Eigen::Matrix2d J;
-      J << radial + slope * x * x + 2.0 * p1 * y + 6.0 * p2 * x, slope * x * y + 2.0 * p1 * x + 2.0 * p2 * y,
-          slope * x * y + 2.0 * p1 * x + 2.0 * p2 * y, radial + slope * y * y + 6.0 * p1 * y + 2.0 * p2 * x;
+      J << radial + slope * x * x + 2.0 * p1 * y + 6.0 * p2 * x,
+          slope * x * y + 2.0 * p1 * x + 2.0 * p2 * y, slope * x * y + 2.0 * p1 * x + 2.0 * p2 * y,
+          radial + slope * y * y + 6.0 * p1 * y + 2.0 * p2 * x;
       if (J.determinant() <= 1e-6 || J.trace() <= 0.0) return false;
       const Eigen::Vector2d error = distort(p) - target;
       p -= J.inverse() * error;
@@ -81,7 +89,8 @@ LensMap::LensMap(const Lens& lens) {
   cv::Mat x(lens.height, lens.width, CV_32F), y(lens.height, lens.width, CV_32F);
   const float nowhere = -1e6f;
   double x_min = 0, x_max = 0, y_min = 0, y_max = 0;
-  const double x_limit = kMaxGrowth * 0.5 * lens.width / lens.fx, y_limit = kMaxGrowth * 0.5 * lens.height / lens.fy;
+  const double x_limit = kMaxGrowth * 0.5 * lens.width / lens.fx,
+               y_limit = kMaxGrowth * 0.5 * lens.height / lens.fy;
   for (int v = 0; v < lens.height; ++v) {
     for (int u = 0; u < lens.width; ++u) {
       Eigen::Vector2d p;
@@ -117,7 +126,8 @@ void LensMap::blend(const cv::Mat& from, cv::Mat& to) const {
 }
 
 void LensMap::pick(const cv::Mat& from, cv::Mat& to, double nothing) const {
-  cv::remap(from, to, nearest_, cv::Mat(), cv::INTER_NEAREST, cv::BORDER_CONSTANT, cv::Scalar::all(nothing));
+  cv::remap(from, to, nearest_, cv::Mat(), cv::INTER_NEAREST, cv::BORDER_CONSTANT,
+            cv::Scalar::all(nothing));
 }
 
 }  // namespace ruedo

@@ -1,8 +1,9 @@
-// A camera's optics: SDF's <camera> read into a pinhole, and the maps that bend an ideal picture as its lens does.
+// A camera's optics: SDF's <camera> read into a pinhole, and the maps that bend an ideal picture as
+// its lens does.
 //
-// Distortion is the model of Brown and Conrady that SDF and OpenCV use (OpenCV, "Camera Calibration and 3D
-// Reconstruction"): the ideal point (x, y) at depth 1 is seen at
-// x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), y' = y (...) + p1 (r^2 + 2 y^2) + 2 p2 x y.
+// Distortion is the model of Brown and Conrady that SDF and OpenCV use (OpenCV, "Camera Calibration
+// and 3D Reconstruction"): the ideal point (x, y) at depth 1 is seen at x' = x (1 + k1 r^2 + k2 r^4
+// + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), y' = y (...) + p1 (r^2 + 2 y^2) + 2 p2 x y.
 #pragma once
 
 #include <array>
@@ -15,36 +16,38 @@
 namespace ruedo {
 
 struct Lens {
-  int width = 320, height = 240;              // pixels
-  double fx = 0, fy = 0, cx = 0, cy = 0;      // pixels; whole numbers are the middles of pixels
+  int width = 320, height = 240;          // pixels
+  double fx = 0, fy = 0, cx = 0, cy = 0;  // pixels; whole numbers are the middles of pixels
   double near_m = 0.1, far_m = 100.0;
-  double hfov = 1.047;                        // rad
-  std::array<double, 5> distortion{};         // k1, k2, p1, p2, k3: OpenCV's order
+  double hfov = 1.047;                 // rad
+  std::array<double, 5> distortion{};  // k1, k2, p1, p2, k3: OpenCV's order
 
-  // Reads <horizontal_fov>, <image>, <clip>, <distortion> and <lens><intrinsics>. Throws InputError.
+  // Reads <horizontal_fov>, <image>, <clip>, <distortion> and <lens><intrinsics>. Throws
+  // InputError.
   explicit Lens(const Element& camera);
 
   bool distorts() const { return distortion != std::array<double, 5>{}; }
   // Where the ideal point (x, y) at depth 1 is seen, in the same units.
   Eigen::Vector2d distort(const Eigen::Vector2d& p) const;
-  // The reverse, by Newton's method; false where the lens folds the picture over and nothing is seen.
+  // The reverse, by Newton's method; false where the lens folds the picture over and nothing is
+  // seen.
   bool undistort(const Eigen::Vector2d& distorted, Eigen::Vector2d& p) const;
 };
 
 // Draws a larger ideal picture and takes the lens's picture from it.
 class LensMap {
  public:
-  explicit LensMap(const Lens& lens);    // the lens distorts
+  explicit LensMap(const Lens& lens);  // the lens distorts
 
-  const scene::View& ideal() const { return ideal_; }    // what to draw; its pose is the caller's
-  // Colours and grey: blended between pixels. Depth and labels: the nearest pixel's. What the lens does not see is
-  // black, label 0 and `nothing`.
+  const scene::View& ideal() const { return ideal_; }  // what to draw; its pose is the caller's
+  // Colours and grey: blended between pixels. Depth and labels: the nearest pixel's. What the lens
+  // does not see is black, label 0 and `nothing`.
   void blend(const cv::Mat& from, cv::Mat& to) const;
   void pick(const cv::Mat& from, cv::Mat& to, double nothing) const;
 
  private:
   scene::View ideal_;
-  cv::Mat fixed_, fraction_, nearest_;    // OpenCV's maps in fixed point
+  cv::Mat fixed_, fraction_, nearest_;  // OpenCV's maps in fixed point
 };
 
 }  // namespace ruedo

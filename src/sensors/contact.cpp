@@ -1,5 +1,6 @@
-// A contact sensor (bumper): what the collision shapes named by SDF's <contact>, or the whole link, touch, on
-// ROBOT/CONTACT. A touch between two samples is not lost: `pressed` tells of every step since the last one.
+// A contact sensor (bumper): what the collision shapes named by SDF's <contact>, or the whole link,
+// touch, on ROBOT/CONTACT. A touch between two samples is not lost: `pressed` tells of every step
+// since the last one.
 #include <algorithm>
 
 #include "model/body_layout.h"
@@ -18,21 +19,30 @@ std::string without_scope(const std::string& name) {
 class ContactSensor : public Sensor {
  public:
   explicit ContactSensor(const SensorSetup& setup)
-      : world_(setup.world), layout_(setup.layout), link_(setup.link), channel_(setup.channel<contact_t>()) {
-    setup.element.refuse_unknown({"ruedo:phase"});    // the server reads it
+      : world_(setup.world),
+        layout_(setup.layout),
+        link_(setup.link),
+        channel_(setup.channel<contact_t>()) {
+    setup.element.refuse_unknown({"ruedo:phase"});  // the server reads it
     const Element* contact = setup.element.child("contact");
     if (!contact) return;
     const model::LinkPlacement& placement = layout_.links[static_cast<size_t>(link_)];
     const std::vector<model::Collision>& shapes =
-        world_.models[static_cast<size_t>(placement.instance)].model->links[static_cast<size_t>(placement.link)].collisions;
+        world_.models[static_cast<size_t>(placement.instance)]
+            .model->links[static_cast<size_t>(placement.link)]
+            .collisions;
     for (const Element* named : contact->all("collision")) {
       const std::string name = without_scope(named->text);
-      const auto found = std::find_if(shapes.begin(), shapes.end(), [&](const model::Collision& shape) { return shape.name == name; });
+      const auto found =
+          std::find_if(shapes.begin(), shapes.end(),
+                       [&](const model::Collision& shape) { return shape.name == name; });
       if (found != shapes.end()) {
         shapes_.push_back(static_cast<int>(found - shapes.begin()));
       } else if (name != "__default__" && setup.findings) {
-        setup.findings->unsupported(named->source, "sensor " + setup.device + "/contact/collision",
-                                    "'" + named->text + "' is no collision of the sensor's link; without another one, all of them count");
+        setup.findings->unsupported(
+            named->source, "sensor " + setup.device + "/contact/collision",
+            "'" + named->text +
+                "' is no collision of the sensor's link; without another one, all of them count");
       }
     }
   }
@@ -41,7 +51,8 @@ class ContactSensor : public Sensor {
 
   void observe(const Snapshot& now, Outbox&) override {
     if (!pressed_) {
-      pressed_ = std::any_of(now.contacts.begin(), now.contacts.end(), [this](const Contact& c) { return is_a(c) || is_b(c); });
+      pressed_ = std::any_of(now.contacts.begin(), now.contacts.end(),
+                             [this](const Contact& c) { return is_a(c) || is_b(c); });
     }
   }
 
@@ -52,7 +63,8 @@ class ContactSensor : public Sensor {
       const bool as_a = is_a(contact);
       if (!as_a && !is_b(contact)) continue;
       contact_point_t& point = message_.points.emplace_back();
-      point.body = as_a ? body_name(contact.body_b, contact.link_b) : body_name(contact.body_a, contact.link_a);
+      point.body = as_a ? body_name(contact.body_b, contact.link_b)
+                        : body_name(contact.body_a, contact.link_a);
       for (int i = 0; i < 3; ++i) {
         point.position[i] = contact.position[i];
         point.normal[i] = as_a ? contact.normal[i] : -contact.normal[i];
@@ -68,10 +80,15 @@ class ContactSensor : public Sensor {
 
  private:
   bool counts(int shape) const {
-    return shapes_.empty() || shape < 0 || std::find(shapes_.begin(), shapes_.end(), shape) != shapes_.end();
+    return shapes_.empty() || shape < 0 ||
+           std::find(shapes_.begin(), shapes_.end(), shape) != shapes_.end();
   }
-  bool is_a(const Contact& contact) const { return contact.link_a == link_ && counts(contact.shape_a); }
-  bool is_b(const Contact& contact) const { return contact.link_b == link_ && counts(contact.shape_b); }
+  bool is_a(const Contact& contact) const {
+    return contact.link_a == link_ && counts(contact.shape_a);
+  }
+  bool is_b(const Contact& contact) const {
+    return contact.link_b == link_ && counts(contact.shape_b);
+  }
 
   std::string body_name(int body, int link) const {
     if (body >= 0) return layout_.bodies[static_cast<size_t>(body)].name;
@@ -85,18 +102,19 @@ class ContactSensor : public Sensor {
   const model::BodyLayout& layout_;
   int link_;
   int channel_;
-  std::vector<int> shapes_;    // indices into the link's collisions; empty: all
+  std::vector<int> shapes_;  // indices into the link's collisions; empty: all
   bool pressed_ = false;
   contact_t message_;
 };
 
-const RegisterSensor kRegister{{.module = "contact",
-                                .order = 6,
-                                .types = {"contact"},
-                                .attach_to = "",
-                                .device_name = "",
-                                .default_rate = {50, 1},
-                                .make = [](const SensorSetup& setup) { return std::make_unique<ContactSensor>(setup); }}};
+const RegisterSensor kRegister{
+    {.module = "contact",
+     .order = 6,
+     .types = {"contact"},
+     .attach_to = "",
+     .device_name = "",
+     .default_rate = {50, 1},
+     .make = [](const SensorSetup& setup) { return std::make_unique<ContactSensor>(setup); }}};
 
 }  // namespace
 }  // namespace ruedo

@@ -1,10 +1,11 @@
-// An inertial measurement unit: gyroscope and accelerometer with noise, bias and wandering bias as SDF's <imu>
-// writes them, on ROBOT/IMU.
+// An inertial measurement unit: gyroscope and accelerometer with noise, bias and wandering bias as
+// SDF's <imu> writes them, on ROBOT/IMU.
 //
-// Ideal values, in the device's frame S at p = p_BS in the body B: the gyroscope shows omega; the accelerometer
-// the specific force a_S - g, with a_S = a_B + alpha x p + omega x (omega x p). a_B comes from the snapshot; alpha is
-// the change of omega over the last step. At rest it shows gravity upwards, on a ramp along the ramp's axes. A wheel that
-// is part of B turns the device about its hub H: the same from B to H, then from H to S with the wheel's own omega.
+// Ideal values, in the device's frame S at p = p_BS in the body B: the gyroscope shows omega; the
+// accelerometer the specific force a_S - g, with a_S = a_B + alpha x p + omega x (omega x p). a_B
+// comes from the snapshot; alpha is the change of omega over the last step. At rest it shows
+// gravity upwards, on a ramp along the ramp's axes. A wheel that is part of B turns the device
+// about its hub H: the same from B to H, then from H to S with the wheel's own omega.
 #include "model/body_layout.h"
 #include "ruedo/imu_t.hpp"
 #include "ruedo/sensor.h"
@@ -30,7 +31,7 @@ class Imu : public Sensor {
       hub_B_ = X_BWheel * wheel.center_in_L;
       axis_B_ = X_BWheel.rotation * wheel.axis_in_L;
     }
-    setup.element.refuse_unknown({"ruedo:phase"});    // the server reads it
+    setup.element.refuse_unknown({"ruedo:phase"});  // the server reads it
     if (const Element* imu = setup.element.child("imu")) configure(*imu, setup);
   }
 
@@ -58,7 +59,7 @@ class Imu : public Sensor {
   void sample(const SampleInput& input, Outbox& out) override {
     const Snapshot& now = input.snapshot;
     Pose X_WS = X_BS_;
-    Vec3 omega = Vec3::Zero(), acceleration = Vec3::Zero();    // of S, in the world's axes
+    Vec3 omega = Vec3::Zero(), acceleration = Vec3::Zero();  // of S, in the world's axes
     if (body_ >= 0) {
       const size_t body = static_cast<size_t>(body_);
       const Pose& X_WB = now.bodies[body];
@@ -84,8 +85,10 @@ class Imu : public Sensor {
     RandomStream stream = random_.stream(static_cast<uint64_t>(input.sample));
     imu_t message;
     message.utime = now.time;
-    for (int i = 0; i < 3; ++i) message.angular_velocity[i] = gyroscope_[i].apply(rate[i], dt_s, stream);
-    for (int i = 0; i < 3; ++i) message.linear_acceleration[i] = accelerometer_[i].apply(force[i], dt_s, stream);
+    for (int i = 0; i < 3; ++i)
+      message.angular_velocity[i] = gyroscope_[i].apply(rate[i], dt_s, stream);
+    for (int i = 0; i < 3; ++i)
+      message.linear_acceleration[i] = accelerometer_[i].apply(force[i], dt_s, stream);
     const Quat& q = X_WS.rotation;
     const double orientation[4] = {q.w(), q.x(), q.y(), q.z()};
     for (int i = 0; i < 4; ++i) message.orientation[i] = has_orientation_ ? orientation[i] : 0.0;
@@ -103,25 +106,30 @@ class Imu : public Sensor {
     has_orientation_ = imu.boolean("enable_orientation", true);
     if (const Element* frame = imu.child("orientation_reference_frame")) {
       if (setup.findings && frame->string("localization", "CUSTOM") != "ENU") {
-        setup.findings->unsupported(frame->source, "sensor " + setup.device + "/imu/orientation_reference_frame",
-                                    "the orientation is that of the device in the world (east, north, up)");
+        setup.findings->unsupported(
+            frame->source, "sensor " + setup.device + "/imu/orientation_reference_frame",
+            "the orientation is that of the device in the world (east, north, up)");
       }
     }
     constexpr const char* kAxes[3] = {"x", "y", "z"};
     for (int i = 0; i < 3; ++i) {
       gyroscope_[i] = Noise(imu.child(std::string("angular_velocity/") + kAxes[i] + "/noise"));
-      accelerometer_[i] = Noise(imu.child(std::string("linear_acceleration/") + kAxes[i] + "/noise"));
+      accelerometer_[i] =
+          Noise(imu.child(std::string("linear_acceleration/") + kAxes[i] + "/noise"));
     }
     // SDF up to 1.4: one <noise> with <rate> and <accel> for all axes.
     if (const Element* old = imu.child("noise")) {
       const std::string type = old->choice("type", "none", {"none", "gaussian"});
       for (int i = 0; i < 3 && type == "gaussian"; ++i) {
-        if (const Element* rate = old->child("rate")) gyroscope_[i] = Noise::from_parameters(*rate, false);
-        if (const Element* accel = old->child("accel")) accelerometer_[i] = Noise::from_parameters(*accel, false);
+        if (const Element* rate = old->child("rate"))
+          gyroscope_[i] = Noise::from_parameters(*rate, false);
+        if (const Element* accel = old->child("accel"))
+          accelerometer_[i] = Noise::from_parameters(*accel, false);
       }
     }
     RandomStream constants = random_.stream(kConstantDraws);
-    for (Noise* noise : {&gyroscope_[0], &gyroscope_[1], &gyroscope_[2], &accelerometer_[0], &accelerometer_[1], &accelerometer_[2]}) {
+    for (Noise* noise : {&gyroscope_[0], &gyroscope_[1], &gyroscope_[2], &accelerometer_[0],
+                         &accelerometer_[1], &accelerometer_[2]}) {
       if (!setup.noise) *noise = Noise();
       noise->draw_bias(constants);
     }
@@ -130,28 +138,29 @@ class Imu : public Sensor {
   RandomSource random_;
   Vec3 gravity_;
   int channel_;
-  int body_ = -1;          // into BodyLayout::bodies; -1: does not move
-  Pose X_LS_, X_BS_;       // X_BS_: X_WS when it does not move
-  const model::BodyLayout* layout_ = nullptr;    // only when a wheel of that body turns the device
+  int body_ = -1;                              // into BodyLayout::bodies; -1: does not move
+  Pose X_LS_, X_BS_;                           // X_BS_: X_WS when it does not move
+  const model::BodyLayout* layout_ = nullptr;  // only when a wheel of that body turns the device
   int link_ = -1;
   size_t wheel_ = 0;
-  Vec3 hub_B_ = Vec3::Zero(), axis_B_ = Vec3::Zero();    // p_BH; unit
+  Vec3 hub_B_ = Vec3::Zero(), axis_B_ = Vec3::Zero();  // p_BH; unit
   bool has_orientation_ = true;
   Noise gyroscope_[3], accelerometer_[3];
 
   SimTime time_ = -1, sample_time_ = 0;
   bool sampled_ = false;
-  Vec3 omega_before_ = Vec3::Zero(), alpha_ = Vec3::Zero();    // rad/s, rad/s^2, world
+  Vec3 omega_before_ = Vec3::Zero(), alpha_ = Vec3::Zero();  // rad/s, rad/s^2, world
   Vec3 omega_of_body_before_ = Vec3::Zero(), alpha_of_body_ = Vec3::Zero();
 };
 
-const RegisterSensor kRegister{{.module = "imu",
-                                .order = 5,
-                                .types = {"imu"},
-                                .attach_to = "",
-                                .device_name = "",
-                                .default_rate = {100, 1},
-                                .make = [](const SensorSetup& setup) { return std::make_unique<Imu>(setup); }}};
+const RegisterSensor kRegister{
+    {.module = "imu",
+     .order = 5,
+     .types = {"imu"},
+     .attach_to = "",
+     .device_name = "",
+     .default_rate = {100, 1},
+     .make = [](const SensorSetup& setup) { return std::make_unique<Imu>(setup); }}};
 
 }  // namespace
 }  // namespace ruedo

@@ -1,5 +1,5 @@
-// The joints of a robot that are neither fixed nor wheels of its drive, on ROBOT/joints: positions, velocities
-// and the motors' efforts, without noise.
+// The joints of a robot that are neither fixed nor wheels of its drive, on ROBOT/joints: positions,
+// velocities and the motors' efforts, without noise.
 #include "model/body_layout.h"
 #include "ruedo/joint_state_t.hpp"
 #include "ruedo/sensor.h"
@@ -10,11 +10,14 @@ namespace {
 class Joints : public Sensor {
  public:
   explicit Joints(const SensorSetup& setup) : channel_(setup.channel<joint_state_t>()) {
-    const model::RobotPlacement& robot = setup.layout.robots[static_cast<size_t>(setup.robot_index)];
+    const model::RobotPlacement& robot =
+        setup.layout.robots[static_cast<size_t>(setup.robot_index)];
     const model::Model& model = *setup.world.models[static_cast<size_t>(robot.instance)].model;
     joints_ = robot.joints;
     for (const int joint : joints_) {
-      message_.joint_name.push_back(model.joints[static_cast<size_t>(setup.layout.joints[static_cast<size_t>(joint)].joint)].name);
+      message_.joint_name.push_back(
+          model.joints[static_cast<size_t>(setup.layout.joints[static_cast<size_t>(joint)].joint)]
+              .name);
     }
     message_.num_joints = static_cast<int16_t>(joints_.size());
     message_.joint_position.resize(joints_.size());
@@ -35,18 +38,19 @@ class Joints : public Sensor {
 
  private:
   int channel_;
-  std::vector<int> joints_;    // indices into BodyLayout::joints
+  std::vector<int> joints_;  // indices into BodyLayout::joints
   joint_state_t message_;
 };
 
-const RegisterSensor kRegister{{.module = "odometry",
-                                .order = 1,
-                                .types = {},
-                                .attach_to = "joints",
-                                .device_name = "joints",
-                                .default_rate = {50, 1},
-                                .make = [](const SensorSetup& setup) { return std::make_unique<Joints>(setup); },
-                                .kind = "joints"}};
+const RegisterSensor kRegister{
+    {.module = "odometry",
+     .order = 1,
+     .types = {},
+     .attach_to = "joints",
+     .device_name = "joints",
+     .default_rate = {50, 1},
+     .make = [](const SensorSetup& setup) { return std::make_unique<Joints>(setup); },
+     .kind = "joints"}};
 
 }  // namespace
 }  // namespace ruedo

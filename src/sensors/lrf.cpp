@@ -1,10 +1,12 @@
-// A laser range finder, flat (planar_lidar_t) or of several layers (lidar_t), on ROBOT/LRF. docs/world-files.md lists
-// its elements.
+// A laser range finder, flat (planar_lidar_t) or of several layers (lidar_t), on ROBOT/LRF.
+// docs/world-files.md lists its elements.
 //
-// Model: each ray has its own exact range from the collision shapes. A surface with laser reflectance rho, of which the
-// part m leaves as from a mirror, returns the intensity m_way rho (1 - m) cos(incidence), m_way being the loss at mirrors
-// passed before, there and back; below kFaintest nothing comes back and the mirrored part, if any, goes on. Noise is
-// drawn for every ray, so that what one ray meets changes no other's noise; then follow the resolution and the limits.
+// Model: each ray has its own exact range from the collision shapes. A surface with laser
+// reflectance rho, of which the part m leaves as from a mirror, returns the intensity m_way rho (1
+// - m) cos(incidence), m_way being the loss at mirrors passed before, there and back; below
+// kFaintest nothing comes back and the mirrored part, if any, goes on. Noise is drawn for every
+// ray, so that what one ray meets changes no other's noise; then follow the resolution and the
+// limits.
 #include <cmath>
 #include <string>
 #include <vector>
@@ -23,33 +25,39 @@ namespace {
 using scene::Hit;
 using scene::Ray;
 
-constexpr double kFaintest = 0.02;     // part of the light; less is not seen
-constexpr int kMirrors = 4;            // that a ray follows, one after another
+constexpr double kFaintest = 0.02;  // part of the light; less is not seen
+constexpr int kMirrors = 4;         // that a ray follows, one after another
 constexpr int64_t kMaxRays = 1'000'000;
 
 // One of SDF's <horizontal> and <vertical>: evenly spaced angles, the ends included.
 struct Sweep {
   int64_t count = 1;
-  double first = 0.0, step = 0.0;    // rad
+  double first = 0.0, step = 0.0;  // rad
 
   Sweep() = default;
   // limit_rad: of the angles; whole_rad: of their span.
   Sweep(const Element& e, int64_t samples_if_absent, double limit_rad, double whole_rad) {
-    const int64_t samples = e.integer("samples", samples_if_absent, Allowed::between(0, static_cast<double>(kMaxRays)));
+    const int64_t samples =
+        e.integer("samples", samples_if_absent, Allowed::between(0, static_cast<double>(kMaxRays)));
     const double resolution = e.number("resolution", 1.0, Allowed::not_negative(quantity::kFactor));
-    // A widespread lidar has one layer, and a resolution of 0.01 for it: one ray at least, as in Gazebo.
+    // A widespread lidar has one layer, and a resolution of 0.01 for it: one ray at least, as in
+    // Gazebo.
     const double rays = std::max(1.0, std::round(static_cast<double>(samples) * resolution));
     if (rays > static_cast<double>(kMaxRays)) {
-      e.fail("<samples> times <resolution> is " + std::to_string(rays) + " rays; allowed: 1 to " + std::to_string(kMaxRays));
+      e.fail("<samples> times <resolution> is " + std::to_string(rays) + " rays; allowed: 1 to " +
+             std::to_string(kMaxRays));
     }
     count = whole(rays);
     const double low = e.number("min_angle", 0.0, Allowed::between(-limit_rad, limit_rad));
     const double high = e.number("max_angle", 0.0, Allowed::between(-limit_rad, limit_rad));
-    if (high < low) e.fail("<max_angle> " + std::to_string(high) + " is below <min_angle> " + std::to_string(low));
-    constexpr double kOverlap_rad = 0.1;    // -3.15 to 3.15 is a full turn, too
-    if (high - low > whole_rad + kOverlap_rad) e.fail("from <min_angle> to <max_angle> is more than a full turn");
+    if (high < low)
+      e.fail("<max_angle> " + std::to_string(high) + " is below <min_angle> " +
+             std::to_string(low));
+    constexpr double kOverlap_rad = 0.1;  // -3.15 to 3.15 is a full turn, too
+    if (high - low > whole_rad + kOverlap_rad)
+      e.fail("from <min_angle> to <max_angle> is more than a full turn");
     if (count == 1) {
-      first = 0.5 * (low + high);    // a lone ray looks along the middle
+      first = 0.5 * (low + high);  // a lone ray looks along the middle
     } else {
       first = low;
       step = (high - low) / static_cast<double>(count - 1);
@@ -62,16 +70,18 @@ class Lrf : public Sensor {
  public:
   explicit Lrf(const SensorSetup& setup) : mount_(setup), random_(setup.random) {
     const Element& e = setup.element;
-    e.refuse_unknown({"ruedo:own_link", "ruedo:hits", "ruedo:intensities", "ruedo:sweep_time", "ruedo:bearing_noise", "ruedo:phase"});
+    e.refuse_unknown({"ruedo:own_link", "ruedo:hits", "ruedo:intensities", "ruedo:sweep_time",
+                      "ruedo:bearing_noise", "ruedo:phase"});
     const Element* laser = e.child("lidar") ? e.child("lidar") : e.child("ray");
     if (!laser) e.fail("a laser range finder needs a <lidar> (or <ray>) with <scan> and <range>");
     const Element* horizontal = laser->child("scan/horizontal");
     if (!horizontal) laser->fail("needs <scan><horizontal>");
     columns_ = Sweep(*horizontal, 640, 2.0 * M_PI + 1e-3, 2.0 * M_PI);
-    if (const Element* vertical = laser->child("scan/vertical")) layers_ = Sweep(*vertical, 1, M_PI / 2 + 1e-3, M_PI);
+    if (const Element* vertical = laser->child("scan/vertical"))
+      layers_ = Sweep(*vertical, 1, M_PI / 2 + 1e-3, M_PI);
     if (columns_.count * layers_.count > kMaxRays) {
-      laser->fail(std::to_string(layers_.count) + " layers of " + std::to_string(columns_.count) + " rays; allowed: " +
-                  std::to_string(kMaxRays) + " rays in all");
+      laser->fail(std::to_string(layers_.count) + " layers of " + std::to_string(columns_.count) +
+                  " rays; allowed: " + std::to_string(kMaxRays) + " rays in all");
     }
     read_range(*laser);
     ignored_link_ = e.boolean("ruedo:own_link", false) ? -1 : setup.link;
@@ -82,7 +92,7 @@ class Lrf : public Sensor {
     noise_ = Noise(laser->child("noise"));
     RandomStream constants = random_.stream(kConstantDraws);
     noise_.draw_bias(constants);
-    if (!setup.noise) {    // the ideal value
+    if (!setup.noise) {  // the ideal value
       noise_ = Noise();
       bearing_noise_ = resolution_ = 0.0;
     }
@@ -95,7 +105,8 @@ class Lrf : public Sensor {
   bool observes() const override { return sweep_us_ > 0; }
   void observe(const Snapshot& now, Outbox&) override {
     track_.push_back({now.time, mount_.X_WS(now)});
-    while (track_.size() > 2 && track_[1].time <= now.time - sweep_us_) track_.erase(track_.begin());
+    while (track_.size() > 2 && track_[1].time <= now.time - sweep_us_)
+      track_.erase(track_.begin());
   }
 
   void shift_time(SimTime us) override {
@@ -107,16 +118,19 @@ class Lrf : public Sensor {
     RandomStream stream = random_.stream(static_cast<uint64_t>(input.sample));
     aim(input.snapshot, stream);
     input.rays->cast(rays_, hits_, ignored_link_);
-    const double dt_s = sampled_ ? 1e-6 * static_cast<double>(input.snapshot.time - sample_time_) : 0.0;
+    const double dt_s =
+        sampled_ ? 1e-6 * static_cast<double>(input.snapshot.time - sample_time_) : 0.0;
     sampled_ = true;
     sample_time_ = input.snapshot.time;
-    const bool drawn = !noise_.none() && !noise_.wanders();    // one draw a ray, all at once
+    const bool drawn = !noise_.none() && !noise_.wanders();  // one draw a ray, all at once
     if (drawn) stream.gaussians(draws_);
     for (size_t i = 0; i < rays_.size(); ++i) {
       const Return back = returned(*input.rays, rays_[i], hits_[i]);
-      const double measured = drawn ? noise_.apply_draw(back.range, draws_[i]) : noise_.apply(back.range, i == 0 ? dt_s : 0.0, stream);
+      const double measured = drawn ? noise_.apply_draw(back.range, draws_[i])
+                                    : noise_.apply(back.range, i == 0 ? dt_s : 0.0, stream);
       ranges()[i] = report(back.range, measured);
-      if (intensities_) brightness()[i] = std::isfinite(ranges()[i]) ? static_cast<float>(back.intensity) : 0.0f;
+      if (intensities_)
+        brightness()[i] = std::isfinite(ranges()[i]) ? static_cast<float>(back.intensity) : 0.0f;
     }
     if (flat()) {
       planar_.utime = input.snapshot.time;
@@ -138,8 +152,8 @@ class Lrf : public Sensor {
 
  private:
   struct Return {
-    double range = std::numeric_limits<double>::infinity();    // m, along the ray's way
-    double intensity = 0.0;                                     // 0 to 1
+    double range = std::numeric_limits<double>::infinity();  // m, along the ray's way
+    double intensity = 0.0;                                  // 0 to 1
   };
   struct Place {
     SimTime time;
@@ -152,17 +166,20 @@ class Lrf : public Sensor {
 
   void read_range(const Element& laser) {
     const Element* range = laser.child("range");
-    if (!range || !range->has("max")) laser.fail("needs <range> with <max>, the largest range in m");
+    if (!range || !range->has("max"))
+      laser.fail("needs <range> with <max>, the largest range in m");
     min_ = range->number("min", 0.0, Allowed::not_negative(quantity::kRange));
     max_ = range->number("max", 0.0, Allowed::positive(quantity::kRange));
-    if (max_ <= min_) range->fail("<max> " + std::to_string(max_) + " must be above <min> " + std::to_string(min_));
+    if (max_ <= min_)
+      range->fail("<max> " + std::to_string(max_) + " must be above <min> " + std::to_string(min_));
     resolution_ = range->number("resolution", 0.0, Allowed::not_negative(quantity::kRange));
   }
 
   // Directions in the device's frame, and messages of their final size: nothing grows later.
   void prepare(const SensorSetup& setup) {
     for (int64_t layer = 0; layer < layers_.count; ++layer)
-      for (int64_t column = 0; column < columns_.count; ++column) directions_.push_back(direction(layer, columns_.angle(column)));
+      for (int64_t column = 0; column < columns_.count; ++column)
+        directions_.push_back(direction(layer, columns_.angle(column)));
     const size_t n = directions_.size();
     rays_.resize(n);
     hits_.resize(n);
@@ -192,7 +209,8 @@ class Lrf : public Sensor {
 
   Vec3 direction(int64_t layer, double azimuth) const {
     const double elevation = layers_.angle(layer);
-    return {math::cos(elevation) * math::cos(azimuth), math::cos(elevation) * math::sin(azimuth), math::sin(elevation)};
+    return {math::cos(elevation) * math::cos(azimuth), math::cos(elevation) * math::sin(azimuth),
+            math::sin(elevation)};
   }
 
   // Puts the rays into the world. All layers of a column are taken at once.
@@ -201,14 +219,16 @@ class Lrf : public Sensor {
     Eigen::Matrix3d R_WS = X_WS.rotation.toRotationMatrix();
     if (bearing_noise_ > 0.0) stream.gaussians(draws_);
     for (size_t i = 0; i < rays_.size(); ++i) {
-      const auto column = static_cast<int64_t>(i) % columns_.count, layer = static_cast<int64_t>(i) / columns_.count;
+      const auto column = static_cast<int64_t>(i) % columns_.count,
+                 layer = static_cast<int64_t>(i) / columns_.count;
       if (sweep_us_ > 0 && columns_.count > 1) {
         X_WS = place(now.time - sweep_us_ * (columns_.count - 1 - column) / (columns_.count - 1));
         R_WS = X_WS.rotation.toRotationMatrix();
       }
       rays_[i].origin = X_WS.translation;
       if (bearing_noise_ > 0.0) {
-        rays_[i].direction = R_WS * direction(layer, columns_.angle(column) + bearing_noise_ * draws_[i]);
+        rays_[i].direction =
+            R_WS * direction(layer, columns_.angle(column) + bearing_noise_ * draws_[i]);
       } else {
         rays_[i].direction = R_WS * directions_[i];
       }
@@ -224,7 +244,8 @@ class Lrf : public Sensor {
     if (after == 0 || b.time == time) return b.X_WS;
     const Place& a = track_[after - 1];
     const double part = static_cast<double>(time - a.time) / static_cast<double>(b.time - a.time);
-    return {a.X_WS.rotation.slerp(part, b.X_WS.rotation), (1.0 - part) * a.X_WS.translation + part * b.X_WS.translation};
+    return {a.X_WS.rotation.slerp(part, b.X_WS.rotation),
+            (1.0 - part) * a.X_WS.translation + part * b.X_WS.translation};
   }
 
   Return returned(const scene::RayScene& scene, const Ray& first, const Hit& first_hit) const {
@@ -238,7 +259,8 @@ class Lrf : public Sensor {
       if (part >= kFaintest) return {way, part * std::abs(hit.normal.dot(ray.direction))};
       mirrored *= surface.laser_mirror * surface.laser_mirror;
       if (mirrored < kFaintest || mirrors == kMirrors || hit.range == 0.0) break;
-      ray.origin += hit.range * ray.direction + 1e-9 * hit.normal;    // off the mirror, or it would be met again
+      ray.origin += hit.range * ray.direction +
+                    1e-9 * hit.normal;  // off the mirror, or it would be met again
       ray.direction -= 2.0 * ray.direction.dot(hit.normal) * hit.normal;
       ray.max_range = max_ - way;
       hit = scene.cast(ray, ignored_link_);
@@ -257,33 +279,34 @@ class Lrf : public Sensor {
   RayMount mount_;
   RandomSource random_;
   Sweep columns_, layers_;
-  double min_ = 0.0, max_ = 0.0, resolution_ = 0.0;    // m
-  double bearing_noise_ = 0.0;                         // rad
+  double min_ = 0.0, max_ = 0.0, resolution_ = 0.0;  // m
+  double bearing_noise_ = 0.0;                       // rad
   Noise noise_;
   int ignored_link_ = -1;
   bool visuals_ = false, intensities_ = true;
   int64_t sweep_us_ = 0;
   int channel_ = -1;
 
-  std::vector<Place> track_;    // over the sweep time
+  std::vector<Place> track_;  // over the sweep time
   SimTime sample_time_ = 0;
   bool sampled_ = false;
-  std::vector<Vec3> directions_;    // in S, layer by layer
+  std::vector<Vec3> directions_;  // in S, layer by layer
   std::vector<Ray> rays_;
   std::vector<Hit> hits_;
-  std::vector<double> draws_;       // of the bearings, then of the ranges
+  std::vector<double> draws_;  // of the bearings, then of the ranges
   planar_lidar_t planar_{};
   lidar_t layered_{};
 };
 
-const RegisterSensor kRegister{{.module = "lrf",
-                                .order = 3,
-                                .types = {"ray", "gpu_ray", "lidar", "gpu_lidar"},
-                                .attach_to = "",
-                                .device_name = "",
-                                .default_rate = {10, 1},
-                                .needs_rays = true,
-                                .make = [](const SensorSetup& setup) { return std::make_unique<Lrf>(setup); }}};
+const RegisterSensor kRegister{
+    {.module = "lrf",
+     .order = 3,
+     .types = {"ray", "gpu_ray", "lidar", "gpu_lidar"},
+     .attach_to = "",
+     .device_name = "",
+     .default_rate = {10, 1},
+     .needs_rays = true,
+     .make = [](const SensorSetup& setup) { return std::make_unique<Lrf>(setup); }}};
 
 }  // namespace
 }  // namespace ruedo

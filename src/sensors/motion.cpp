@@ -1,5 +1,6 @@
-// What a robot is executing, on ROBOT/motion: at the drive's status rate, and at once when a command or a
-// primitive begins, ends or is refused. The last message of a step shows what holds; ends and refusals come before it.
+// What a robot is executing, on ROBOT/motion: at the drive's status rate, and at once when a
+// command or a primitive begins, ends or is refused. The last message of a step shows what holds;
+// ends and refusals come before it.
 #include <algorithm>
 
 #include "model/body_layout.h"
@@ -11,7 +12,8 @@ namespace {
 
 class MotionStatus : public Sensor {
  public:
-  explicit MotionStatus(const SensorSetup& setup) : robot_(setup.robot_index), channel_(setup.channel<motion_status_t>()) {}
+  explicit MotionStatus(const SensorSetup& setup)
+      : robot_(setup.robot_index), channel_(setup.channel<motion_status_t>()) {}
 
   bool observes() const override { return true; }
 
@@ -19,10 +21,11 @@ class MotionStatus : public Sensor {
     const MotionState& motion = now.robots[static_cast<size_t>(robot_)].motion;
     if (motion.changes == changes_) return;
     changes_ = motion.changes;
-    const auto ends = std::equal_range(now.motion_ends.begin(), now.motion_ends.end(), MotionEnd{robot_, {}},
-                                       [](const MotionEnd& a, const MotionEnd& b) { return a.robot < b.robot; });
+    const auto ends =
+        std::equal_range(now.motion_ends.begin(), now.motion_ends.end(), MotionEnd{robot_, {}},
+                         [](const MotionEnd& a, const MotionEnd& b) { return a.robot < b.robot; });
     for (auto end = ends.first; end != ends.second; ++end) publish(now, end->state, out);
-    if (now.step > 0) show(now, out);    // the initial state is a sample anyway
+    if (now.step > 0) show(now, out);  // the initial state is a sample anyway
   }
 
   void shift_time(SimTime) override { shown_step_ = -1; }
@@ -58,15 +61,16 @@ class MotionStatus : public Sensor {
   int64_t shown_step_ = -1;
 };
 
-const RegisterSensor kRegister{{.module = "odometry",
-                                .order = 1,
-                                .types = {},
-                                .attach_to = "drive",
-                                .device_name = "motion",
-                                .default_rate = {10, 1},
-                                .make = [](const SensorSetup& setup) { return std::make_unique<MotionStatus>(setup); },
-                                .kind = "motion",
-                                .drive_rate = [](const model::DriveDescription& drive) { return drive.status_rate; }}};
+const RegisterSensor kRegister{
+    {.module = "odometry",
+     .order = 1,
+     .types = {},
+     .attach_to = "drive",
+     .device_name = "motion",
+     .default_rate = {10, 1},
+     .make = [](const SensorSetup& setup) { return std::make_unique<MotionStatus>(setup); },
+     .kind = "motion",
+     .drive_rate = [](const model::DriveDescription& drive) { return drive.status_rate; }}};
 
 }  // namespace
 }  // namespace ruedo

@@ -1,22 +1,25 @@
-// Odometry: the pose that a robot computes from its wheel encoders, on ROBOT/odometry. What encoders see, and
-// what the robot makes of it, with the errors of both: ticks, wrap-around, slip, wrong radius, wrong track.
+// Odometry: the pose that a robot computes from its wheel encoders, on ROBOT/odometry. What
+// encoders see, and what the robot makes of it, with the errors of both: ticks, wrap-around, slip,
+// wrong radius, wrong track.
 //
-// The wheels are read at every step. With s_l and s_r the way of the left and right wheels in a step (the mean of
-// a side's wheels, times the radius that the robot believes in), d = (s_l + s_r) / 2 and
-// turn = (s_r - s_l) / track:
-// - arc: the robot moved on the circle through both, d sin(turn/2) / (turn/2) along heading theta + turn/2. Exact
-//   while v/omega is constant in a step: straight, on the spot, on a circle, ramps of them included. Where v and
-//   omega ramp independently, at a and alpha, a step leaves (v alpha - a omega) dt^3 / 12 to the side: 2e-9 m for
-//   0.3 m/s^2 at 0.5 rad/s and 5 ms.
-// - trapezoid: eqs. 4 to 8 of Hernandez-Belmonte et al., ROSSUM 2011, with omega from the difference of the wheel
+// The wheels are read at every step. With s_l and s_r the way of the left and right wheels in a
+// step (the mean of a side's wheels, times the radius that the robot believes in), d = (s_l + s_r)
+// / 2 and turn = (s_r - s_l) / track:
+// - arc: the robot moved on the circle through both, d sin(turn/2) / (turn/2) along heading theta +
+// turn/2. Exact
+//   while v/omega is constant in a step: straight, on the spot, on a circle, ramps of them
+//   included. Where v and omega ramp independently, at a and alpha, a step leaves (v alpha - a
+//   omega) dt^3 / 12 to the side: 2e-9 m for 0.3 m/s^2 at 0.5 rad/s and 5 ms.
+// - trapezoid: eqs. 4 to 8 of Hernandez-Belmonte et al., ROSSUM 2011, with omega from the
+// difference of the wheel
 //   rates (the printed eq. 4 has their sum): speeds at both ends of the step, averaged. It leaves
 //   v omega^2 dt^3 / 12 a step, 5e-10 m at 0.2 m/s, 0.5 rad/s and 5 ms.
 // Other drives take the arc, with what base_odometry.h makes of their wheels.
 #include <cmath>
 #include <optional>
 
-#include "model/body_layout.h"
 #include "core/whole.h"
+#include "model/body_layout.h"
 #include "ruedo/math.h"
 #include "ruedo/odometry_t.hpp"
 #include "ruedo/sensor.h"
@@ -35,23 +38,29 @@ struct Configuration {
   double steering_error = 0.0;          // rad, added to what the steering's encoder shows
 
   explicit Configuration(const Element& element) {
-    element.refuse_unknown({"ruedo:rate", "ruedo:integrator", "ruedo:ticks_per_turn", "ruedo:counter_bits",
-                            "ruedo:radius_error", "ruedo:track_error", "ruedo:slip_noise", "ruedo:steering_error"});
+    element.refuse_unknown({"ruedo:rate", "ruedo:integrator", "ruedo:ticks_per_turn",
+                            "ruedo:counter_bits", "ruedo:radius_error", "ruedo:track_error",
+                            "ruedo:slip_noise", "ruedo:steering_error"});
     trapezoid = element.choice("ruedo:integrator", "arc", {"arc", "trapezoid"}) == "trapezoid";
     ticks_per_turn = element.integer("ruedo:ticks_per_turn", 0, Allowed::between(0, 1e9));
-    counter_bits = static_cast<int>(element.integer("ruedo:counter_bits", 0, Allowed::between(0, 62)));
+    counter_bits =
+        static_cast<int>(element.integer("ruedo:counter_bits", 0, Allowed::between(0, 62)));
     if (counter_bits > 0 && ticks_per_turn == 0) {
-      element.child("ruedo:counter_bits")->fail("needs <ruedo:ticks_per_turn>: ideal encoders do not wrap");
+      element.child("ruedo:counter_bits")
+          ->fail("needs <ruedo:ticks_per_turn>: ideal encoders do not wrap");
     }
     if (const Element* errors = element.child("ruedo:radius_error")) {
       const std::vector<double> values = errors->as_numbers(Allowed::any(quantity::kFactor));
       if (values.size() != 2 || values[0] <= -1.0 || values[1] <= -1.0) {
-        errors->fail("'" + errors->text + "' is not allowed; allowed are two numbers above -1, for left and right");
+        errors->fail("'" + errors->text +
+                     "' is not allowed; allowed are two numbers above -1, for left and right");
       }
       radius_error[0] = values[0];
       radius_error[1] = values[1];
     }
-    track_error = element.number("ruedo:track_error", 0.0, {.min = -1.0, .min_excluded = true, .quantity = &quantity::kFactor});
+    track_error =
+        element.number("ruedo:track_error", 0.0,
+                       {.min = -1.0, .min_excluded = true, .quantity = &quantity::kFactor});
     slip_noise = element.number("ruedo:slip_noise", 0.0, Allowed::not_negative(quantity::kNoise));
     steering_error = element.number("ruedo:steering_error", 0.0, Allowed::between(-1.5, 1.5));
   }
@@ -66,9 +75,13 @@ double sinc(double x) {
 class Odometry : public Sensor {
  public:
   explicit Odometry(const SensorSetup& setup)
-      : configuration_(setup.element), random_(setup.random), robot_(setup.robot_index), channel_(setup.channel<odometry_t>()) {
+      : configuration_(setup.element),
+        random_(setup.random),
+        robot_(setup.robot_index),
+        channel_(setup.channel<odometry_t>()) {
     const model::RobotPlacement& robot = setup.layout.robots[static_cast<size_t>(robot_)];
-    const model::DriveDescription& drive = *setup.world.models[static_cast<size_t>(robot.instance)].model->drive;
+    const model::DriveDescription& drive =
+        *setup.world.models[static_cast<size_t>(robot.instance)].model->drive;
     if (!setup.noise) configuration_.slip_noise = 0.0;
     radius_ = drive.wheel_radius;
     track_ = drive.track * (1.0 + configuration_.track_error);
@@ -78,7 +91,9 @@ class Odometry : public Sensor {
       wheels_.push_back({wheel, side, placement.steers});
       if (!placement.steers) ++wheels_of_side_[side];
     }
-    if (BaseOdometry::is_for(drive)) base_.emplace(setup.layout, robot_, drive, configuration_.track_error, configuration_.steering_error);
+    if (BaseOdometry::is_for(drive))
+      base_.emplace(setup.layout, robot_, drive, configuration_.track_error,
+                    configuration_.steering_error);
     message_.n = static_cast<int32_t>(wheels_.size());
     message_.angle.resize(wheels_.size());
     message_.rate.resize(wheels_.size());
@@ -96,8 +111,10 @@ class Odometry : public Sensor {
     } else if (now.time > time_) {
       const double dt_s = 1e-6 * static_cast<double>(now.time - time_);
       turn_wheels(now, dt_s);
-      if (base_) integrate_base(now, dt_s);
-      else configuration_.trapezoid ? integrate_trapezoid(dt_s) : integrate_arc();
+      if (base_)
+        integrate_base(now, dt_s);
+      else
+        configuration_.trapezoid ? integrate_trapezoid(dt_s) : integrate_arc();
     }
     time_ = now.time;
     if (robot.odometry_resets != resets_) {
@@ -118,7 +135,8 @@ class Odometry : public Sensor {
       Wheel& wheel = wheels_[i];
       // Within a step ticks and slip say little of the rate: it is the mean since the last sample.
       double rate = wheel.rate;
-      if (configuration_.ticks_per_turn > 0 || configuration_.slip_noise > 0.0) rate = period_s > 0.0 ? (wheel.measured - wheel.sampled) / period_s : 0.0;
+      if (configuration_.ticks_per_turn > 0 || configuration_.slip_noise > 0.0)
+        rate = period_s > 0.0 ? (wheel.measured - wheel.sampled) / period_s : 0.0;
       wheel.sampled = wheel.measured;
       message_.angle[i] = wheel.measured;
       message_.rate[i] = rate;
@@ -139,20 +157,22 @@ class Odometry : public Sensor {
 
  private:
   struct Wheel {
-    int index;                  // into Snapshot::wheel_angles
-    int side;                   // 0 left, 1 right
-    bool steers;                // its angle is that of steering
-    double true_angle = 0.0;    // rad
-    double slipped = 0.0;       // rad, what slip has added to the encoder's angle so far
-    int64_t counter = 0;        // as the encoder shows it, wrapped
-    int64_t ticks = 0;          // as the robot unwraps it
-    double measured = 0.0;      // rad since the start
-    double rate = 0.0;          // rad/s
-    double turned = 0.0;        // rad, measured in the last step
-    double sampled = 0.0;       // rad, at the last sample
+    int index;                // into Snapshot::wheel_angles
+    int side;                 // 0 left, 1 right
+    bool steers;              // its angle is that of steering
+    double true_angle = 0.0;  // rad
+    double slipped = 0.0;     // rad, what slip has added to the encoder's angle so far
+    int64_t counter = 0;      // as the encoder shows it, wrapped
+    int64_t ticks = 0;        // as the robot unwraps it
+    double measured = 0.0;    // rad since the start
+    double rate = 0.0;        // rad/s
+    double turned = 0.0;      // rad, measured in the last step
+    double sampled = 0.0;     // rad, at the last sample
   };
 
-  double believed_radius(int side) const { return radius_ * (1.0 + configuration_.radius_error[side]); }
+  double believed_radius(int side) const {
+    return radius_ * (1.0 + configuration_.radius_error[side]);
+  }
 
   void start(Wheel& wheel, const Snapshot& now) const {
     wheel.true_angle = now.wheel_angles[static_cast<size_t>(wheel.index)];
@@ -170,10 +190,13 @@ class Odometry : public Sensor {
     return rounded_down(angle * static_cast<double>(configuration_.ticks_per_turn) / (2.0 * M_PI));
   }
   double angle_of(int64_t ticks) const {
-    return static_cast<double>(ticks) * (2.0 * M_PI) / static_cast<double>(configuration_.ticks_per_turn);
+    return static_cast<double>(ticks) * (2.0 * M_PI) /
+           static_cast<double>(configuration_.ticks_per_turn);
   }
   int64_t wrapped(int64_t ticks) const {
-    return configuration_.counter_bits == 0 ? ticks : ticks & ((int64_t{1} << configuration_.counter_bits) - 1);
+    return configuration_.counter_bits == 0
+               ? ticks
+               : ticks & ((int64_t{1} << configuration_.counter_bits) - 1);
   }
   // What the robot takes the difference of two counter values for: the smaller way round.
   int64_t unwrapped(int64_t difference) const {
@@ -185,7 +208,7 @@ class Odometry : public Sensor {
 
   // Reads the encoders: turned, measured, rate of every wheel.
   void turn_wheels(const Snapshot& now, double dt_s) {
-    double way[2] = {0.0, 0.0};    // m, of each side, true
+    double way[2] = {0.0, 0.0};  // m, of each side, true
     for (Wheel& wheel : wheels_) {
       const double angle = now.wheel_angles[static_cast<size_t>(wheel.index)];
       wheel.turned = angle - wheel.true_angle;
@@ -196,7 +219,9 @@ class Odometry : public Sensor {
     if (configuration_.slip_noise > 0.0 && (way[0] != 0.0 || way[1] != 0.0)) {
       RandomStream stream = random_.stream(static_cast<uint64_t>(now.step));
       double slip[2];
-      for (const int side : {0, 1}) slip[side] = configuration_.slip_noise * std::sqrt(std::abs(way[side])) * stream.gaussian() / radius_;
+      for (const int side : {0, 1})
+        slip[side] = configuration_.slip_noise * std::sqrt(std::abs(way[side])) *
+                     stream.gaussian() / radius_;
       for (Wheel& wheel : wheels_) {
         if (wheel.steers) continue;
         wheel.slipped += slip[wheel.side];
@@ -221,7 +246,8 @@ class Odometry : public Sensor {
 
   void integrate_arc() {
     double way[2] = {0.0, 0.0};
-    for (const Wheel& wheel : wheels_) way[wheel.side] += believed_radius(wheel.side) * wheel.turned / wheels_of_side_[wheel.side];
+    for (const Wheel& wheel : wheels_)
+      way[wheel.side] += believed_radius(wheel.side) * wheel.turned / wheels_of_side_[wheel.side];
     if (way[0] == 0.0 && way[1] == 0.0) return;
     const double turn = (way[1] - way[0]) / track_;
     const double chord = 0.5 * (way[0] + way[1]) * sinc(0.5 * turn);
@@ -246,7 +272,8 @@ class Odometry : public Sensor {
       moved = base_->moved(X_WBase_, X_WBase);
       if (configuration_.slip_noise > 0.0 && moved != Vec3::Zero()) {
         RandomStream stream = random_.stream(static_cast<uint64_t>(now.step));
-        for (int i = 0; i < 3; ++i) moved[i] += configuration_.slip_noise * std::sqrt(std::abs(moved[i])) * stream.gaussian();
+        for (int i = 0; i < 3; ++i)
+          moved[i] += configuration_.slip_noise * std::sqrt(std::abs(moved[i])) * stream.gaussian();
       }
     }
     X_WBase_ = X_WBase;
@@ -260,21 +287,23 @@ class Odometry : public Sensor {
   void side_rates(double (&speed)[2]) const {
     speed[0] = speed[1] = 0.0;
     for (const Wheel& wheel : wheels_) {
-      if (!wheel.steers) speed[wheel.side] += believed_radius(wheel.side) * wheel.rate / wheels_of_side_[wheel.side];
+      if (!wheel.steers)
+        speed[wheel.side] += believed_radius(wheel.side) * wheel.rate / wheels_of_side_[wheel.side];
     }
   }
 
   void integrate_trapezoid(double dt_s) {
     double speed[2];
     side_rates(speed);
-    const double v_before = 0.5 * (speed_before_[0] + speed_before_[1]);          // eq. 5
+    const double v_before = 0.5 * (speed_before_[0] + speed_before_[1]);  // eq. 5
     const double v = 0.5 * (speed[0] + speed[1]);
-    const double omega_before = (speed_before_[1] - speed_before_[0]) / track_;   // eq. 4, with the sign of eq. 3
+    const double omega_before =
+        (speed_before_[1] - speed_before_[0]) / track_;  // eq. 4, with the sign of eq. 3
     const double omega = (speed[1] - speed[0]) / track_;
     const double theta_before = theta_;
-    theta_ += dt_s * 0.5 * (omega + omega_before);                                                  // eq. 8
-    x_ += dt_s * 0.5 * (v * math::cos(theta_) + v_before * math::cos(theta_before));                  // eq. 6
-    y_ += dt_s * 0.5 * (v * math::sin(theta_) + v_before * math::sin(theta_before));                  // eq. 7
+    theta_ += dt_s * 0.5 * (omega + omega_before);                                    // eq. 8
+    x_ += dt_s * 0.5 * (v * math::cos(theta_) + v_before * math::cos(theta_before));  // eq. 6
+    y_ += dt_s * 0.5 * (v * math::sin(theta_) + v_before * math::sin(theta_before));  // eq. 7
     speed_before_[0] = speed[0];
     speed_before_[1] = speed[1];
   }
@@ -283,29 +312,30 @@ class Odometry : public Sensor {
   RandomSource random_;
   int robot_;
   int channel_;
-  double radius_ = 0.0, track_ = 0.0;    // m; the track is the one that the robot believes in
+  double radius_ = 0.0, track_ = 0.0;  // m; the track is the one that the robot believes in
   std::vector<Wheel> wheels_;
   int wheels_of_side_[2] = {0, 0};
-  std::optional<BaseOdometry> base_;     // of what is no differential drive
-  Pose X_WBase_;                         // at the step before
-  Vec3 rate_ = Vec3::Zero();             // m/s ahead and to the left, rad/s: of the last step, with base_
+  std::optional<BaseOdometry> base_;  // of what is no differential drive
+  Pose X_WBase_;                      // at the step before
+  Vec3 rate_ = Vec3::Zero();  // m/s ahead and to the left, rad/s: of the last step, with base_
   std::vector<double> ways_, angles_;
 
   SimTime time_ = -1, sample_time_ = 0;
-  double x_ = 0.0, y_ = 0.0, theta_ = 0.0;    // m, m, rad: base_link in odom
-  double speed_before_[2] = {0.0, 0.0};       // m/s, left and right at the step before
+  double x_ = 0.0, y_ = 0.0, theta_ = 0.0;  // m, m, rad: base_link in odom
+  double speed_before_[2] = {0.0, 0.0};     // m/s, left and right at the step before
   int32_t resets_ = 0;
   odometry_t message_;
 };
 
-const RegisterSensor kRegister{{.module = "odometry",
-                                .order = 1,
-                                .types = {},
-                                .attach_to = "drive",
-                                .device_name = "odometry",
-                                .default_rate = {50, 1},
-                                .make = [](const SensorSetup& setup) { return std::make_unique<Odometry>(setup); },
-                                .drive_rate = [](const model::DriveDescription& drive) { return drive.odometry_rate; }}};
+const RegisterSensor kRegister{
+    {.module = "odometry",
+     .order = 1,
+     .types = {},
+     .attach_to = "drive",
+     .device_name = "odometry",
+     .default_rate = {50, 1},
+     .make = [](const SensorSetup& setup) { return std::make_unique<Odometry>(setup); },
+     .drive_rate = [](const model::DriveDescription& drive) { return drive.odometry_rate; }}};
 
 }  // namespace
 }  // namespace ruedo

@@ -13,7 +13,8 @@ constexpr size_t kQuantiles = 65536;
 const std::vector<float>& normal_table() {
   static const std::vector<float> table = [] {
     std::vector<float> t(kQuantiles);
-    for (size_t i = 0; i < kQuantiles; ++i) t[i] = static_cast<float>(normal_quantile((static_cast<double>(i) + 0.5) / kQuantiles));
+    for (size_t i = 0; i < kQuantiles; ++i)
+      t[i] = static_cast<float>(normal_quantile((static_cast<double>(i) + 0.5) / kQuantiles));
     return t;
   }();
   return table;
@@ -29,7 +30,7 @@ uint64_t split_mix(uint64_t x) {
 
 PixelNoise::PixelNoise(double mean, double stddev)
     : mean_(static_cast<float>(255.0 * mean)), scale_(static_cast<float>(255.0 * stddev)) {
-  if (scale_ > 0.0f) normal_table();    // made now, not in the first sample
+  if (scale_ > 0.0f) normal_table();  // made now, not in the first sample
 }
 
 void PixelNoise::apply(RandomStream stream, std::span<uint8_t> pixels) const {
@@ -51,7 +52,8 @@ void PixelNoise::apply(RandomStream stream, std::span<uint8_t> pixels) const {
 Vignette::Vignette(double lost, int width, int height) {
   if (lost <= 0.0) return;
   factor_.reserve(static_cast<size_t>(width) * static_cast<size_t>(height));
-  const double cx = 0.5 * (width - 1), cy = 0.5 * (height - 1), corner2 = std::max(cx * cx + cy * cy, 1.0);
+  const double cx = 0.5 * (width - 1), cy = 0.5 * (height - 1),
+               corner2 = std::max(cx * cx + cy * cy, 1.0);
   for (int v = 0; v < height; ++v) {
     for (int u = 0; u < width; ++u) {
       const double r2 = ((u - cx) * (u - cx) + (v - cy) * (v - cy)) / corner2;
@@ -63,7 +65,8 @@ Vignette::Vignette(double lost, int width, int height) {
 void Vignette::apply(std::span<uint8_t> pixels, int channels) const {
   uint8_t* p = pixels.data();
   for (const uint16_t factor : factor_) {
-    for (int c = 0; c < channels; ++c, ++p) *p = static_cast<uint8_t>((*p * uint32_t{factor} + 16384u) >> 15);
+    for (int c = 0; c < channels; ++c, ++p)
+      *p = static_cast<uint8_t>((*p * uint32_t{factor} + 16384u) >> 15);
   }
 }
 

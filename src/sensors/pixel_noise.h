@@ -1,8 +1,9 @@
-// What a camera's sensor adds to the light that reaches it: less light in the corners, and noise in each pixel.
+// What a camera's sensor adds to the light that reaches it: less light in the corners, and noise in
+// each pixel.
 //
-// Noise is Gaussian, independent in every pixel and colour. Its draws come from a 16-bit quantile table and a
-// counter-based generator (SplitMix64, Steele et al., OOPSLA 2014) keyed by the sample's random stream: a picture of
-// 640 x 480 takes about 2 ms. The table ends at 4.3 sigma.
+// Noise is Gaussian, independent in every pixel and colour. Its draws come from a 16-bit quantile
+// table and a counter-based generator (SplitMix64, Steele et al., OOPSLA 2014) keyed by the
+// sample's random stream: a picture of 640 x 480 takes about 2 ms. The table ends at 4.3 sigma.
 #pragma once
 
 #include <cstdint>
@@ -23,20 +24,20 @@ class PixelNoise {
   void apply(RandomStream stream, std::span<uint8_t> pixels) const;
 
  private:
-  float mean_, scale_;    // of 255
+  float mean_, scale_;  // of 255
 };
 
 class Vignette {
  public:
-  // lost: part of the light that is lost in the corners, 0 to 1; it grows with the square of the distance from
-  // the picture's middle.
+  // lost: part of the light that is lost in the corners, 0 to 1; it grows with the square of the
+  // distance from the picture's middle.
   Vignette(double lost, int width, int height);
 
   // pixels: rows of `channels` bytes a pixel; displayed values, the square roots of light.
   void apply(std::span<uint8_t> pixels, int channels) const;
 
  private:
-  std::vector<uint16_t> factor_;    // of each pixel, in 1/32768
+  std::vector<uint16_t> factor_;  // of each pixel, in 1/32768
 };
 
 }  // namespace ruedo

@@ -1,4 +1,5 @@
-// The true pose of a robot's base_link, on ROBOT/pose: ground truth for the clients' errors. No noise.
+// The true pose of a robot's base_link, on ROBOT/pose: ground truth for the clients' errors. No
+// noise.
 #include "model/body_layout.h"
 #include "ruedo/pose_t.hpp"
 #include "ruedo/sensor.h"
@@ -8,7 +9,8 @@ namespace {
 
 class TruePose : public Sensor {
  public:
-  explicit TruePose(const SensorSetup& setup) : robot_(setup.robot_index), channel_(setup.channel<pose_t>()) {}
+  explicit TruePose(const SensorSetup& setup)
+      : robot_(setup.robot_index), channel_(setup.channel<pose_t>()) {}
 
   void sample(const SampleInput& input, Outbox& out) override {
     const RobotState& robot = input.snapshot.robots[static_cast<size_t>(robot_)];
@@ -31,15 +33,16 @@ class TruePose : public Sensor {
   int channel_;
 };
 
-const RegisterSensor kRegister{{.module = "odometry",
-                                .order = 1,
-                                .types = {},
-                                .attach_to = "robot",
-                                .device_name = "pose",
-                                .default_rate = {50, 1},
-                                .make = [](const SensorSetup& setup) { return std::make_unique<TruePose>(setup); },
-                                .kind = "pose",
-                                .drive_rate = [](const model::DriveDescription& drive) { return drive.pose_rate; }}};
+const RegisterSensor kRegister{
+    {.module = "odometry",
+     .order = 1,
+     .types = {},
+     .attach_to = "robot",
+     .device_name = "pose",
+     .default_rate = {50, 1},
+     .make = [](const SensorSetup& setup) { return std::make_unique<TruePose>(setup); },
+     .kind = "pose",
+     .drive_rate = [](const model::DriveDescription& drive) { return drive.pose_rate; }}};
 
 }  // namespace
 }  // namespace ruedo

@@ -1,4 +1,5 @@
-// What sensors that cast rays have in common: where the device is, and what the surfaces that it sees are like.
+// What sensors that cast rays have in common: where the device is, and what the surfaces that it
+// sees are like.
 #pragma once
 
 #include "model/body_layout.h"
@@ -19,7 +20,7 @@ class RayMount {
     turns_ = link.wheel >= 0;
   }
 
-  int link() const { return link_; }    // into BodyLayout::links
+  int link() const { return link_; }  // into BodyLayout::links
   Pose X_WS(const Snapshot& now) const {
     if (body_ < 0) return X_BS_;
     const Pose& X_WB = now.bodies[static_cast<size_t>(body_)];
@@ -32,15 +33,17 @@ class RayMount {
     if (visuals) return kDefault;
     const model::LinkPlacement& link = layout_->links[static_cast<size_t>(hit.link)];
     const model::Model& model = *world_->models[static_cast<size_t>(link.instance)].model;
-    return model.links[static_cast<size_t>(link.link)].collisions[static_cast<size_t>(hit.shape)].surface;
+    return model.links[static_cast<size_t>(link.link)]
+        .collisions[static_cast<size_t>(hit.shape)]
+        .surface;
   }
 
  private:
   const model::WorldModel* world_;
   const model::BodyLayout* layout_;
   int link_ = -1;
-  int body_ = -1;     // into BodyLayout::bodies; -1: does not move, X_BS_ is then X_WS
-  bool turns_ = false;    // with a wheel that is part of that body
+  int body_ = -1;       // into BodyLayout::bodies; -1: does not move, X_BS_ is then X_WS
+  bool turns_ = false;  // with a wheel that is part of that body
   Pose X_LS_;
   Pose X_BS_;
 };

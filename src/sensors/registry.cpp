@@ -1,5 +1,5 @@
-// The list of all kinds of sensors that are linked in. It lives among the sensors, which are an object
-// library, so that whoever links them has all of them.
+// The list of all kinds of sensors that are linked in. It lives among the sensors, which are an
+// object library, so that whoever links them has all of them.
 #include <algorithm>
 #include <tuple>
 
@@ -18,9 +18,10 @@ std::vector<SensorKind>& registered() {
 
 RegisterSensor::RegisterSensor(SensorKind kind) {
   std::vector<SensorKind>& kinds = registered();
-  const auto place = std::upper_bound(kinds.begin(), kinds.end(), kind, [](const SensorKind& a, const SensorKind& b) {
-    return std::tie(a.order, a.module, a.name()) < std::tie(b.order, b.module, b.name());
-  });
+  const auto place = std::upper_bound(
+      kinds.begin(), kinds.end(), kind, [](const SensorKind& a, const SensorKind& b) {
+        return std::tie(a.order, a.module, a.name()) < std::tie(b.order, b.module, b.name());
+      });
   kinds.insert(place, std::move(kind));
 }
 

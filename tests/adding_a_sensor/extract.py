@@ -6,7 +6,9 @@ import sys
 
 page, folder = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
 folder.mkdir(parents=True, exist_ok=True)
-files = re.findall(r"<!-- file: (\S+) -->\n```\w*\n(.*?)```\n", page.read_text(encoding="utf-8"), re.S)
+files = re.findall(
+    r"<!-- file: (\S+) -->\n```\w*\n(.*?)```\n", page.read_text(encoding="utf-8"), re.S
+)
 if len(files) != 3:
     sys.exit(f"{page}: {len(files)} files instead of three")
 for name, text in files:

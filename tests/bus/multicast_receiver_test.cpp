@@ -1,4 +1,5 @@
-// LCM's multicast taken apart: datagrams written by hand after LCM's format, and others that mean harm.
+// LCM's multicast taken apart: datagrams written by hand after LCM's format, and others that mean
+// harm.
 //
 // Messages of LCM's own to and from a server come in the wire tests (tests/clients, tests/cli).
 #include "bus/multicast_receiver.h"
@@ -27,7 +28,8 @@ Bytes short_message(const std::string& channel, const Bytes& data) {
 }
 
 // A message in fragments of `length` bytes of data.
-std::vector<Bytes> fragments(const std::string& channel, const Bytes& data, uint32_t sequence, size_t length) {
+std::vector<Bytes> fragments(const std::string& channel, const Bytes& data, uint32_t sequence,
+                             size_t length) {
   std::vector<Bytes> all;
   const size_t count = (data.size() + length - 1) / length;
   for (size_t i = 0; i < count; ++i) {
@@ -60,9 +62,10 @@ class Multicast : public testing::Test {
     if (!receiver_) GTEST_SKIP() << "no multicast route here";
   }
   void read(const Bytes& datagram, MulticastReceiver::Sender sender = {0x7f000001, 4000}) {
-    receiver_->read(datagram.data(), datagram.size(), sender, [&](std::string_view channel, const uint8_t* data, size_t size) {
-      heard_.emplace_back(channel, Bytes(data, data + size));
-    });
+    receiver_->read(datagram.data(), datagram.size(), sender,
+                    [&](std::string_view channel, const uint8_t* data, size_t size) {
+                      heard_.emplace_back(channel, Bytes(data, data + size));
+                    });
   }
   std::unique_ptr<MulticastReceiver> receiver_;
   std::vector<std::pair<std::string, Bytes>> heard_;
@@ -87,7 +90,7 @@ TEST_F(Multicast, LongMessagesInAnyOrderAndTwice) {
   for (const Bytes& part : parts) read(part);
   std::reverse(parts.begin(), parts.end());
   for (Bytes& part : parts) {
-    part[7] = 6;    // the next message
+    part[7] = 6;  // the next message
     read(part);
     if (&part != &parts.back()) read(part);
   }
@@ -100,23 +103,24 @@ TEST_F(Multicast, LongMessagesInAnyOrderAndTwice) {
 
 TEST_F(Multicast, SendersApartAndTheNewestMessageOfEach) {
   const Bytes data(100, 1), other(100, 2);
-  const std::vector<Bytes> a = fragments("a", data, 1, 60), b = fragments("b", other, 1, 60), later = fragments("a", other, 2, 60);
+  const std::vector<Bytes> a = fragments("a", data, 1, 60), b = fragments("b", other, 1, 60),
+                           later = fragments("a", other, 2, 60);
   read(a[0], {1, 1});
   read(b[1], {1, 2});
-  read(later[0], {1, 1});    // a's second part was lost
-  read(a[1], {1, 1});        // and now it is too late: this begins it anew, without its first part
+  read(later[0], {1, 1});  // a's second part was lost
+  read(a[1], {1, 1});      // and now it is too late: this begins it anew, without its first part
   read(b[0], {1, 2});
   ASSERT_EQ(heard_.size(), 1u);
   EXPECT_EQ(heard_[0], (std::pair<std::string, Bytes>("b", other)));
 }
 
 TEST_F(Multicast, WhatIsNotLcmIsPassedOver) {
-  for (const Bytes& bad : {Bytes{}, Bytes{'L', 'C', '0', '2'}, Bytes(8, 0), Bytes(100, 0xff), short_message("", {1}),
-                           short_message(std::string(64, 'n'), {1})}) {
+  for (const Bytes& bad : {Bytes{}, Bytes{'L', 'C', '0', '2'}, Bytes(8, 0), Bytes(100, 0xff),
+                           short_message("", {1}), short_message(std::string(64, 'n'), {1})}) {
     read(bad);
   }
-  const Bytes good = fragments("c", Bytes(100, 3), 1, 100)[0];    // one part, whole
-  for (size_t at = 8; at < 20; ++at) {    // sizes, offsets and numbers that contradict one another
+  const Bytes good = fragments("c", Bytes(100, 3), 1, 100)[0];  // one part, whole
+  for (size_t at = 8; at < 20; ++at) {  // sizes, offsets and numbers that contradict one another
     for (const uint8_t value : {0x00, 0x01, 0x7f, 0x80, 0xff}) {
       Bytes bad = good;
       if (bad[at] == value) continue;
@@ -129,7 +133,8 @@ TEST_F(Multicast, WhatIsNotLcmIsPassedOver) {
   std::minstd_rand random(2);
   for (int i = 0; i < 20'000; ++i) {
     Bytes bad = {'L', 'C', '0', static_cast<uint8_t>(random() % 2 ? '2' : '3')};
-    for (size_t n = random() % 60; n > 0; --n) bad.push_back(static_cast<uint8_t>(random() % 4 ? 0 : random() >> 8));
+    for (size_t n = random() % 60; n > 0; --n)
+      bad.push_back(static_cast<uint8_t>(random() % 4 ? 0 : random() >> 8));
     read(bad, {static_cast<uint32_t>(random()), 1});
   }
   heard_.clear();

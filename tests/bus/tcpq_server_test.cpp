@@ -7,12 +7,12 @@
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
-#include <lcm/lcm-cpp.hpp>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <lcm/lcm-cpp.hpp>
 
 #include "ruedo/errors.h"
 
@@ -36,16 +36,20 @@ struct Served {
   std::atomic<int> heard{0};
   std::string url = "tcpq://127.0.0.1:" + std::to_string(server.port());
   Served() {
-    server.listen({"in"}, [this](const std::string& channel, const uint8_t*, size_t) { heard += channel == "in" ? 1 : 1000; });
+    server.listen({"in"}, [this](const std::string& channel, const uint8_t*, size_t) {
+      heard += channel == "in" ? 1 : 1000;
+    });
   }
-  void publish(const std::string& channel, const std::vector<uint8_t>& data) { server.publish(channel, data.data(), data.size()); }
+  void publish(const std::string& channel, const std::vector<uint8_t>& data) {
+    server.publish(channel, data.data(), data.size());
+  }
 };
 
 // LCM's client, with a thread.
 struct Stock {
   lcm::LCM lcm;
   std::atomic<int> count{0};
-  std::atomic<size_t> bytes{0}, largest{0};    // of all messages, and of one
+  std::atomic<size_t> bytes{0}, largest{0};  // of all messages, and of one
   std::atomic<bool> end{false};
   std::thread thread;
   explicit Stock(const std::string& url, const std::string& pattern = "") : lcm(url) {
@@ -81,10 +85,14 @@ struct Raw {
     address.sin_family = AF_INET;
     address.sin_port = htons(port);
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    connected = ::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+    connected =
+        ::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
   }
-  bool send(const std::vector<uint8_t>& bytes) const { return ::send(socket.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL) >= 0; }
-  // Reads what comes until nothing does for so long (ms, above 0); true at the end of the connection.
+  bool send(const std::vector<uint8_t>& bytes) const {
+    return ::send(socket.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL) >= 0;
+  }
+  // Reads what comes until nothing does for so long (ms, above 0); true at the end of the
+  // connection.
   bool closed(int ms) const {
     timeval time{ms / 1000, ms % 1000 * 1000};
     ::setsockopt(socket.get(), SOL_SOCKET, SO_RCVTIMEO, &time, sizeof time);
@@ -97,7 +105,7 @@ struct Raw {
   }
 };
 
-const std::vector<uint8_t> &hello() {
+const std::vector<uint8_t>& hello() {
   static const std::vector<uint8_t> bytes{0x28, 0x76, 0x17, 0xfb, 0, 0, 1, 0};
   return bytes;
 }
@@ -116,12 +124,13 @@ TEST(TcpqServer, ServesStockClientsBothWays) {
   const int before = listener.count;
   served.publish("other", {1});
   speaker.lcm.publish("in", "x", 1);
-  speaker.lcm.publish("out/2", "four", 4);                          // from client to client
+  speaker.lcm.publish("out/2", "four", 4);  // from client to client
   ASSERT_TRUE(soon([&] { return served.heard == 1 && listener.count > before; }));
   EXPECT_EQ(served.server.failed(), 0u);
 }
 
-// Small messages do not wait for acknowledgements (Nagle's algorithm): of the sockets of this process, those that the server accepted.
+// Small messages do not wait for acknowledgements (Nagle's algorithm): of the sockets of this
+// process, those that the server accepted.
 TEST(TcpqServer, SendsAtOnce) {
   Served served;
   Stock client(served.url, "out");
@@ -130,8 +139,12 @@ TEST(TcpqServer, SendsAtOnce) {
   for (int fd = 0; fd < 1024; ++fd) {
     sockaddr_in own{}, peer{};
     socklen_t own_size = sizeof own, peer_size = sizeof peer;
-    if (::getsockname(fd, reinterpret_cast<sockaddr*>(&own), &own_size) != 0 || own.sin_family != AF_INET) continue;
-    if (ntohs(own.sin_port) != served.server.port() || ::getpeername(fd, reinterpret_cast<sockaddr*>(&peer), &peer_size) != 0) continue;
+    if (::getsockname(fd, reinterpret_cast<sockaddr*>(&own), &own_size) != 0 ||
+        own.sin_family != AF_INET)
+      continue;
+    if (ntohs(own.sin_port) != served.server.port() ||
+        ::getpeername(fd, reinterpret_cast<sockaddr*>(&peer), &peer_size) != 0)
+      continue;
     int at_once = 0;
     socklen_t size = sizeof at_once;
     EXPECT_EQ(::getsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &at_once, &size), 0);
@@ -147,7 +160,7 @@ TEST(TcpqServer, PassesRawPictures) {
   const std::vector<uint8_t> picture(921'600, 7);
   ASSERT_TRUE(soon([&] { return served.publish("camera", {1}), listener.count > 0; }));
   const int before = settled(served, listener, "camera");
-  for (int i = 1; i <= 150; ++i) {                                  // at a camera's pace: each arrives before the next
+  for (int i = 1; i <= 150; ++i) {  // at a camera's pace: each arrives before the next
     served.publish("camera", picture);
     ASSERT_TRUE(soon([&] { return listener.count == before + i; })) << i;
   }
@@ -171,13 +184,14 @@ TEST(TcpqServer, ASlowClientLosesMessagesAndHoldsNobodyUp) {
   Stock quick(served.url, "out");
   ASSERT_TRUE(soon([&] { return served.publish("out", {1}), quick.count > 0; }));
   const std::vector<uint8_t> block(60'000);
-  for (int i = 0; i < 2000; ++i) {                                  // 120 MB: more than the kernel and the ring hold
-    served.publish("bulk", block);                                  // who waited for the slow one here would do so for ever
+  for (int i = 0; i < 2000; ++i) {  // 120 MB: more than the kernel and the ring hold
+    served.publish("bulk", block);  // who waited for the slow one here would do so for ever
     if (i % 100 != 0) continue;
     const int before = quick.count;
     ASSERT_TRUE(soon([&] { return served.publish("out", {1}), quick.count > before; })) << i;
   }
-  ASSERT_TRUE(soon([&] { return slow.closed(100) || served.server.skipped() > 0; }));    // it reads again
+  ASSERT_TRUE(
+      soon([&] { return slow.closed(100) || served.server.skipped() > 0; }));  // it reads again
   EXPECT_FALSE(slow.closed(1));
 }
 
@@ -196,7 +210,7 @@ TEST(TcpqServer, StopDeliversWhatWasPublishedLast) {
 TEST(TcpqServer, BindsToItsHostAlone) {
   TcpqServer server(kAnyPort);
   LcmUrl other{"tcpq", "127.0.0.2", server.port(), ""};
-  EXPECT_NO_THROW(TcpqServer{other});                               // free: the first is not on all interfaces
+  EXPECT_NO_THROW(TcpqServer{other});  // free: the first is not on all interfaces
   other.host = "127.0.0.1";
   try {
     TcpqServer second(other);
@@ -226,7 +240,8 @@ TEST_F(TcpqHostile, Garbage) {
     Raw raw(served.server.port());
     if (i % 2 == 0) raw.send(hello());
     std::vector<uint8_t> noise(1 + i % 500);
-    for (uint8_t& byte : noise) byte = static_cast<uint8_t>((state = state * 1664525 + 1013904223) >> 24);
+    for (uint8_t& byte : noise)
+      byte = static_cast<uint8_t>((state = state * 1664525 + 1013904223) >> 24);
     raw.send(noise);
   }
   EXPECT_TRUE(soon([&] { return served.server.connections() == 2000; }));
@@ -245,14 +260,15 @@ TEST_F(TcpqHostile, HalfMessages) {
   for (int i = 0; i < 100; ++i) {
     many.emplace_back(served.server.port());
     many.back().send(hello());
-    many.back().send({0, 0, 0, 1, 0, 0, 0, 1, 'x', 0, 0x10, 0, 0, 1, 2, 3});    // of a megabyte, three bytes
+    many.back().send(
+        {0, 0, 0, 1, 0, 0, 0, 1, 'x', 0, 0x10, 0, 0, 1, 2, 3});  // of a megabyte, three bytes
   }
 }
 
 TEST_F(TcpqHostile, UnfinishedMessagesHaveABound) {
   std::vector<Raw> many;
   const std::vector<uint8_t> most(3 << 20);
-  for (int i = 0; i < 30; ++i) {                                    // 90 MB in all
+  for (int i = 0; i < 30; ++i) {  // 90 MB in all
     many.emplace_back(served.server.port());
     many.back().send(hello());
     many.back().send({0, 0, 0, 1, 0, 0, 0, 1, 'x', 0, 0x3f, 0, 0});
@@ -266,7 +282,7 @@ TEST_F(TcpqHostile, AThousandSilentConnections) {
   for (int i = 0; i < 1000; ++i) {
     many.emplace_back(served.server.port());
     if (i % 2 == 0 && many.back().connected) many.back().send(hello());
-    if (many.size() > 600) many.erase(many.begin());                // this process has a thousand files at most
+    if (many.size() > 600) many.erase(many.begin());  // this process has a thousand files at most
   }
   EXPECT_TRUE(soon([&] { return served.server.connections() == 1000; }));
 }

@@ -1,4 +1,5 @@
-// tcpq's frames and channel patterns, against bytes written out by hand and what a stock LCM client sends; the ring.
+// tcpq's frames and channel patterns, against bytes written out by hand and what a stock LCM client
+// sends; the ring.
 #include "bus/tcpq_wire.h"
 
 #include <random>
@@ -14,22 +15,28 @@ using Bytes = std::vector<uint8_t>;
 
 Bytes bytes(std::string_view text) { return {text.begin(), text.end()}; }
 
-// What LCM 1.5.3 for Python sends on subscribe("ruedo/in.*"), publish("x", b"abc"), unsubscribe of p3at/lrf.
+// What LCM 1.5.3 for Python sends on subscribe("ruedo/in.*"), publish("x", b"abc"), unsubscribe of
+// p3at/lrf.
 const std::string kHello("\x28\x76\x17\xfb\0\0\x01\0", 8);
-const std::string kStock("\0\0\0\2\0\0\0\x0aruedo/in.*\0\0\0\1\0\0\0\1x\0\0\0\3abc\0\0\0\3\0\0\0\x08p3at/lrf", 50);
+const std::string kStock(
+    "\0\0\0\2\0\0\0\x0aruedo/in.*\0\0\0\1\0\0\0\1x\0\0\0\3abc\0\0\0\3\0\0\0\x08p3at/lrf", 50);
 
 std::vector<std::string> read_all(Reader& reader, Reader::Result& result) {
   std::vector<std::string> read;
   Frame frame;
   while ((result = reader.next(frame)) == Reader::Result::frame) {
-    const char* kind = frame.kind == Frame::Kind::publish ? "publish " : frame.kind == Frame::Kind::subscribe ? "subscribe " : "unsubscribe ";
-    read.push_back(kind + std::string(frame.channel) + " " + std::string(frame.data.begin(), frame.data.end()));
+    const char* kind = frame.kind == Frame::Kind::publish     ? "publish "
+                       : frame.kind == Frame::Kind::subscribe ? "subscribe "
+                                                              : "unsubscribe ";
+    read.push_back(kind + std::string(frame.channel) + " " +
+                   std::string(frame.data.begin(), frame.data.end()));
   }
   reader.tidy();
   return read;
 }
 
-const std::vector<std::string> kWant{"subscribe ruedo/in.* ", "publish x abc", "unsubscribe p3at/lrf "};
+const std::vector<std::string> kWant{"subscribe ruedo/in.* ", "publish x abc",
+                                     "unsubscribe p3at/lrf "};
 
 TEST(TcpqReader, TakesAStockClientsStreamApart) {
   Reader reader;
@@ -59,14 +66,14 @@ TEST(TcpqReader, RefusesWhatIsNone) {
   const std::string name(64, 'n');
   for (const std::string& stream : {
            std::string("GET / HTTP/1.1\r\n\r\n"),
-           std::string("\x28\x76\x17\xfa\0\0\x01\0", 8),                               // the server's magic
-           std::string("\x28\x76\x17\xfb\0\0\x02\0", 8),                               // another version
-           kHello + std::string("\0\0\0\4\0\0\0\0", 8),                                // no such frame
-           kHello + std::string("\0\0\0\1\xff\xff\xff\xff", 8),                        // lengths that lie
+           std::string("\x28\x76\x17\xfa\0\0\x01\0", 8),         // the server's magic
+           std::string("\x28\x76\x17\xfb\0\0\x02\0", 8),         // another version
+           kHello + std::string("\0\0\0\4\0\0\0\0", 8),          // no such frame
+           kHello + std::string("\0\0\0\1\xff\xff\xff\xff", 8),  // lengths that lie
            kHello + std::string("\0\0\0\1\0\0\0\1x\xff\xff\xff\xff", 13),
-           kHello + std::string("\0\0\0\1\0\0\0\1x\0\x40\0\1", 13),                    // a byte more than 4 MiB
-           kHello + std::string("\0\0\0\2\0\1\0\1", 8),                                // a byte more than 64 KiB
-           kHello + std::string("\0\0\0\1\0\0\0\x40", 8) + name,                       // 64 characters
+           kHello + std::string("\0\0\0\1\0\0\0\1x\0\x40\0\1", 13),  // a byte more than 4 MiB
+           kHello + std::string("\0\0\0\2\0\1\0\1", 8),              // a byte more than 64 KiB
+           kHello + std::string("\0\0\0\1\0\0\0\x40", 8) + name,     // 64 characters
        }) {
     Reader reader;
     Reader::Result result;
@@ -76,7 +83,8 @@ TEST(TcpqReader, RefusesWhatIsNone) {
   }
 }
 
-// A hundred thousand streams of noise: nothing is read outside of the bytes (the sanitizers look), nothing is kept beyond them.
+// A hundred thousand streams of noise: nothing is read outside of the bytes (the sanitizers look),
+// nothing is kept beyond them.
 TEST(TcpqReader, SurvivesNoise) {
   std::mt19937 random(1);
   for (int i = 0; i < 100'000; ++i) {
@@ -84,7 +92,8 @@ TEST(TcpqReader, SurvivesNoise) {
     Reader::Result result;
     if (i % 2 == 0) reader.add(bytes(kHello));
     Bytes noise(random() % 64);
-    for (uint8_t& byte : noise) byte = static_cast<uint8_t>(random() % 4 == 0 ? random() : random() % 4);
+    for (uint8_t& byte : noise)
+      byte = static_cast<uint8_t>(random() % 4 == 0 ? random() : random() % 4);
     reader.add(noise);
     read_all(reader, result);
     EXPECT_LE(reader.held(), noise.size() + 8);
@@ -92,10 +101,14 @@ TEST(TcpqReader, SurvivesNoise) {
 }
 
 TEST(TcpqPattern, NamesAndBeginnings) {
-  const struct { const char* pattern; const char* text; bool whole; } cases[] = {
+  const struct {
+    const char* pattern;
+    const char* text;
+    bool whole;
+  } cases[] = {
       {"p3at/lrf", "p3at/lrf", true},
       {"p3at\\/lrf\\.x", "p3at/lrf.x", true},
-      {"\\Qruedo/info\\E", "ruedo/info", true},           // Java's Pattern.quote
+      {"\\Qruedo/info\\E", "ruedo/info", true},  // Java's Pattern.quote
       {"\\Qa.b\\Ec", "a.bc", true},
       {"\\Qa.b", "a.b", true},
       {".*", "", false},
@@ -161,7 +174,8 @@ TEST(MessageRing, KeepsTheNewest) {
     for (uint64_t place = ring.begin(); place < ring.end(); ++index) {
       const MessageRing::Message message = ring.at(place);
       ASSERT_EQ(message.channel, all[index].first);
-      ASSERT_TRUE(std::equal(message.bytes.begin(), message.bytes.end(), all[index].second.begin(), all[index].second.end()));
+      ASSERT_TRUE(std::equal(message.bytes.begin(), message.bytes.end(), all[index].second.begin(),
+                             all[index].second.end()));
       place = message.next;
     }
     ASSERT_LE(ring.end() - ring.begin(), 1024u);

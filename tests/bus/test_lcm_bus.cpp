@@ -1,4 +1,5 @@
-// Addresses, channel patterns, and the bus on memq. What needs the network is tested in tests/cli, in a namespace.
+// Addresses, channel patterns, and the bus on memq. What needs the network is tested in tests/cli,
+// in a namespace.
 #include "bus/lcm_bus.h"
 
 #include <algorithm>
@@ -26,7 +27,8 @@ TEST(LcmUrl, DefaultsAndOptions) {
   const LcmUrl url = parse_url("udpm://239.1.2.3:7777?recv_buf_size=100");
   EXPECT_EQ(url.host, "239.1.2.3");
   EXPECT_EQ(url.port, 7777);
-  EXPECT_EQ(url.str(), "udpm://239.1.2.3:7777?recv_buf_size=100&ttl=0");    // nothing leaves unless asked to
+  EXPECT_EQ(url.str(),
+            "udpm://239.1.2.3:7777?recv_buf_size=100&ttl=0");  // nothing leaves unless asked to
   EXPECT_EQ(url.option("recv_buf_size", ""), "100");
   EXPECT_EQ(url.option("nothing", "x"), "x");
   EXPECT_EQ(parse_url("udpm://").str(), "udpm://239.255.76.67:7667?ttl=0");
@@ -37,13 +39,16 @@ TEST(LcmUrl, DefaultsAndOptions) {
 }
 
 TEST(LcmUrl, RefusesWithAnExample) {
-  for (const char* text : {"foo", "http://x", "udpm://1.2.3.4:7667", "udpm://239.255.76.67:0", "udpm://239.255.76.67:99999",
-                           "udpm://239.255.76.67:7667x", "udpm://host:7667", "tcpq://no.such.host.invalid:1", "tcpq://127.0.0.1:x"}) {
+  for (const char* text :
+       {"foo", "http://x", "udpm://1.2.3.4:7667", "udpm://239.255.76.67:0",
+        "udpm://239.255.76.67:99999", "udpm://239.255.76.67:7667x", "udpm://host:7667",
+        "tcpq://no.such.host.invalid:1", "tcpq://127.0.0.1:x"}) {
     try {
       parse_url(text);
       ADD_FAILURE() << text;
     } catch (const InputError& error) {
-      EXPECT_NE(std::string(error.what()).find("udpm://239.255.76.67:7667"), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("udpm://239.255.76.67:7667"), std::string::npos)
+          << error.what();
     }
   }
 }
@@ -56,13 +61,16 @@ TEST(ChannelPatterns, OneForNamesThatCountUp) {
   ASSERT_EQ(patterns.size(), 2u);
   for (const std::string& name : names) {
     bool matched = false;
-    for (const std::string& pattern : patterns) matched |= std::regex_match(name, std::regex(pattern));
+    for (const std::string& pattern : patterns)
+      matched |= std::regex_match(name, std::regex(pattern));
     EXPECT_TRUE(matched) << name;
   }
-  for (const std::string& pattern : patterns) EXPECT_FALSE(std::regex_match("oddxname/move", std::regex(pattern)));
+  for (const std::string& pattern : patterns)
+    EXPECT_FALSE(std::regex_match("oddxname/move", std::regex(pattern)));
 }
 
-// Somebody accepts, and ends each connection at once: between one and the next there is a pause, which grows.
+// Somebody accepts, and ends each connection at once: between one and the next there is a pause,
+// which grows.
 TEST(LcmBus, LooksForALostServerWithPauses) {
   const FileHandle listener(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
   sockaddr_in address{};
@@ -76,11 +84,12 @@ TEST(LcmBus, LooksForALostServerWithPauses) {
   std::thread serving([&] {
     // LCM waits for the hello before its constructor returns.
     const std::vector<uint8_t> hello = tcpq::server_hello();
-    std::vector<FileHandle> ended;    // no reset, which would take back what was sent
+    std::vector<FileHandle> ended;  // no reset, which would take back what was sent
     for (;;) {
       FileHandle socket(::accept(listener.get(), nullptr, nullptr));
       if (!socket) return;
-      [[maybe_unused]] const ssize_t sent = ::send(socket.get(), hello.data(), hello.size(), MSG_NOSIGNAL);
+      [[maybe_unused]] const ssize_t sent =
+          ::send(socket.get(), hello.data(), hello.size(), MSG_NOSIGNAL);
       ::shutdown(socket.get(), SHUT_WR);
       ended.push_back(std::move(socket));
       ++connections;
@@ -102,7 +111,7 @@ TEST(LcmBus, TakesUpOtherChannels) {
   std::mutex mutex;
   std::condition_variable changed;
   std::vector<std::string> heard;
-  LcmBus bus("memq://");    // ends first: its thread uses the above
+  LcmBus bus("memq://");  // ends first: its thread uses the above
   bus.listen({"r1/velocity"}, [&](const std::string& channel, const uint8_t*, size_t) {
     {
       std::lock_guard lock(mutex);
@@ -111,7 +120,8 @@ TEST(LcmBus, TakesUpOtherChannels) {
     changed.notify_all();
   });
   const auto heard_when_said = [&] {
-    for (const char* channel : {"guest/velocity", "r1/velocity", "end"}) bus.publish(channel, nullptr, 0);
+    for (const char* channel : {"guest/velocity", "r1/velocity", "end"})
+      bus.publish(channel, nullptr, 0);
     std::unique_lock lock(mutex);
     changed.wait(lock, [&] { return !heard.empty() && heard.back() == "end"; });
     return std::exchange(heard, {});
@@ -126,16 +136,17 @@ TEST(LcmBus, HearsItsChannelsOnly) {
   std::mutex mutex;
   std::condition_variable changed;
   std::vector<std::pair<std::string, std::vector<uint8_t>>> heard;
-  LcmBus bus("memq://");    // ends first: its thread uses the above
-  bus.listen({"r1/velocity", "r2/move"}, [&](const std::string& channel, const uint8_t* data, size_t size) {
-    {
-      std::lock_guard lock(mutex);
-      heard.push_back({channel, {data, data + size}});
-    }
-    changed.notify_all();
-  });
+  LcmBus bus("memq://");  // ends first: its thread uses the above
+  bus.listen({"r1/velocity", "r2/move"},
+             [&](const std::string& channel, const uint8_t* data, size_t size) {
+               {
+                 std::lock_guard lock(mutex);
+                 heard.push_back({channel, {data, data + size}});
+               }
+               changed.notify_all();
+             });
   const uint8_t bytes[] = {7, 8, 9};
-  bus.publish("r3/velocity", bytes, 3);    // matches the pattern, is not in the list
+  bus.publish("r3/velocity", bytes, 3);  // matches the pattern, is not in the list
   bus.publish("other", bytes, 3);
   bus.publish("r1/velocity", bytes, 3);
   bus.publish("r2/move", bytes, 0);

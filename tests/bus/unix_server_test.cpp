@@ -31,7 +31,9 @@ struct Folder {
     path = ::mkdtemp(name.data());
   }
   ~Folder() { fs::remove_all(path); }
-  LcmUrl url(const std::string& name = "bus.sock") const { return {"unix", (path / name).string(), 0, ""}; }
+  LcmUrl url(const std::string& name = "bus.sock") const {
+    return {"unix", (path / name).string(), 0, ""};
+  }
 };
 
 // A server that keeps what it hears on "in".
@@ -61,7 +63,8 @@ struct Client {
   UnixConnection connection;
   std::vector<std::pair<std::string, std::string>> came;
   // Subscribed when the server has taken what follows the subscription.
-  Client(Served& served, const std::vector<std::string>& channels) : connection(served.folder.url().host) {
+  Client(Served& served, const std::vector<std::string>& channels)
+      : connection(served.folder.url().host) {
     size_t before = 0;
     {
       const std::lock_guard lock(served.mutex);
@@ -72,12 +75,14 @@ struct Client {
     served.wait_until_heard(before + 1);
   }
   void say(const std::string& channel, const std::string& text) {
-    EXPECT_TRUE(connection.publish(channel, reinterpret_cast<const uint8_t*>(text.data()), text.size()));
+    EXPECT_TRUE(
+        connection.publish(channel, reinterpret_cast<const uint8_t*>(text.data()), text.size()));
   }
   bool take(int timeout_ms = -1) {
-    return connection.take(timeout_ms, [this](std::string_view channel, const uint8_t* data, size_t size) {
-      came.emplace_back(channel, std::string(data, data + size));
-    });
+    return connection.take(timeout_ms,
+                           [this](std::string_view channel, const uint8_t* data, size_t size) {
+                             came.emplace_back(channel, std::string(data, data + size));
+                           });
   }
   void take_until(size_t count) {
     while (came.size() < count && !connection.is_over()) take();
@@ -99,7 +104,7 @@ TEST(UnixServer, BothWaysInOrder) {
   other.take_until(1);
   EXPECT_EQ(other.came, (Messages{{"b", "2"}}));
   one.say("in", "x");
-  one.say("b", "to the other");    // as on any LCM bus
+  one.say("b", "to the other");  // as on any LCM bus
   served.wait_until_heard(3);
   EXPECT_EQ(served.heard.back(), "x");
   other.take_until(2);
@@ -112,7 +117,7 @@ TEST(UnixServer, IsTheUsersOwn) {
   ASSERT_EQ(::stat(served.folder.url().host.c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 07777, 0600u);
   if (::geteuid() != 0) GTEST_SKIP() << "only root can be somebody else";
-  fs::permissions(served.folder.path, fs::perms::all);                // and even who could open it
+  fs::permissions(served.folder.path, fs::perms::all);  // and even who could open it
   ASSERT_EQ(::chmod(served.folder.url().host.c_str(), 0666), 0);
   const pid_t stranger = ::fork();
   if (stranger == 0) {
@@ -122,9 +127,10 @@ TEST(UnixServer, IsTheUsersOwn) {
     address.sun_family = AF_UNIX;
     const std::string path = served.folder.url().host;
     path.copy(address.sun_path, sizeof address.sun_path - 1);
-    if (::connect(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) ::_exit(8);
+    if (::connect(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
+      ::_exit(8);
     char byte;
-    ::_exit(::recv(socket, &byte, 1, 0) == 0 ? 1 : 2);                // it is closed at once
+    ::_exit(::recv(socket, &byte, 1, 0) == 0 ? 1 : 2);  // it is closed at once
   }
   int ended = 0;
   ::waitpid(stranger, &ended, 0);
@@ -136,7 +142,7 @@ TEST(UnixServer, NothingIsLostThatASlowClientTakesLater) {
   Served served;
   Client slow(served, {"bulk"});
   const std::string block(60'000, 'x');
-  for (int i = 0; i < 500; ++i) {    // 30 MB: more than any socket's buffer
+  for (int i = 0; i < 500; ++i) {  // 30 MB: more than any socket's buffer
     served.publish("bulk", std::to_string(i) + block);
     if (i % 10 == 0) served.server.flush();
   }
@@ -144,7 +150,8 @@ TEST(UnixServer, NothingIsLostThatASlowClientTakesLater) {
   EXPECT_EQ(served.server.failed(), 0u);
   slow.take_until(500);
   ASSERT_EQ(slow.came.size(), 500u);
-  for (int i = 0; i < 500; ++i) ASSERT_EQ(slow.came[static_cast<size_t>(i)].second, std::to_string(i) + block) << i;
+  for (int i = 0; i < 500; ++i)
+    ASSERT_EQ(slow.came[static_cast<size_t>(i)].second, std::to_string(i) + block) << i;
 }
 
 TEST(UnixServer, WhoTakesNothingHasABound) {
@@ -181,7 +188,9 @@ TEST(UnixServer, PathsAreClaimedAndCleared) {
     EXPECT_THROW(UnixServer{folder.url()}, EnvironmentError);
   }
   EXPECT_FALSE(fs::exists(folder.url().host));
-  { const FileHandle left = listen_unix(folder.url().host); }    // a server that was killed
+  {
+    const FileHandle left = listen_unix(folder.url().host);
+  }  // a server that was killed
   EXPECT_TRUE(fs::exists(folder.url().host));
   EXPECT_NO_THROW(UnixServer{folder.url()});
   std::ofstream(folder.url("file").host) << "not a socket";
@@ -199,7 +208,8 @@ TEST(UnixServer, GarbageEndsItsConnectionAlone) {
   for (int i = 0; i < 500; ++i) {
     const FileHandle raw = connect_unix(served.folder.url().host);
     std::vector<uint8_t> noise(1 + static_cast<size_t>(i) % 500);
-    for (uint8_t& byte : noise) byte = static_cast<uint8_t>((state = state * 1664525 + 1013904223) >> 24);
+    for (uint8_t& byte : noise)
+      byte = static_cast<uint8_t>((state = state * 1664525 + 1013904223) >> 24);
     if (i % 2 == 0) noise.insert(noise.begin(), {0x28, 0x76, 0x17, 0xfb, 0, 0, 1, 0});
     ::send(raw.get(), noise.data(), noise.size(), MSG_NOSIGNAL);
   }

@@ -41,7 +41,7 @@ TEST(UrlClaim, VanishesWithItsProcess) {
   const pid_t child = fork();
   if (child == 0) {
     UrlClaim claim(kUrl, "a child");
-    _Exit(claimed_by(kUrl) == "a child" ? 0 : 1);    // without a destructor
+    _Exit(claimed_by(kUrl) == "a child" ? 0 : 1);  // without a destructor
   }
   int status = -1;
   ASSERT_EQ(waitpid(child, &status, 0), child);
@@ -56,7 +56,10 @@ class FakeBus : public Bus {
   Handler handler;
   std::vector<std::string> channels;
   void publish(const std::string&, const uint8_t*, size_t) override {}
-  void listen(const std::vector<std::string>& names, Handler to, const std::vector<std::string>&) override { channels = names, handler = std::move(to); }
+  void listen(const std::vector<std::string>& names, Handler to,
+              const std::vector<std::string>&) override {
+    channels = names, handler = std::move(to);
+  }
 };
 
 std::vector<uint8_t> info_of(int64_t run_id) {
@@ -73,7 +76,9 @@ TEST(RivalWatch, NamesEachRivalOnceAndNeverItself) {
   FakeBus& fake = *made;
   std::vector<std::string> said, heard;
   RivalWatch watch(std::move(made), [&](const std::string& line) { said.push_back(line); });
-  watch.listen({"p3at/velocity"}, [&](const std::string& channel, const uint8_t*, size_t) { heard.push_back(channel); });
+  watch.listen({"p3at/velocity"}, [&](const std::string& channel, const uint8_t*, size_t) {
+    heard.push_back(channel);
+  });
   EXPECT_EQ(fake.channels, (std::vector<std::string>{"p3at/velocity", "ruedo/info"}));
   const std::vector<uint8_t> own = info_of(11), rival = info_of(22);
   watch.publish("ruedo/info", own.data(), own.size());
@@ -88,7 +93,8 @@ TEST(RivalWatch, NamesEachRivalOnceAndNeverItself) {
   // What only looks like an info, and a crowd.
   fake.handler("ruedo/info", rival.data(), 20);
   fake.handler("ruedo/info", info_of(33).data(), 30);
-  for (int64_t id = 100; id < 200; ++id) fake.handler("ruedo/info", info_of(id).data(), rival.size());
+  for (int64_t id = 100; id < 200; ++id)
+    fake.handler("ruedo/info", info_of(id).data(), rival.size());
   EXPECT_EQ(said.size(), 8u);
 }
 

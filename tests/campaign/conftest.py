@@ -12,7 +12,7 @@ import pytest
 SOURCE = Path(os.environ.get("RUEDO_SOURCE_DIR", Path(__file__).resolve().parents[2]))
 BUILD = Path(os.environ.get("RUEDO_BUILD_DIR", SOURCE / "build/release"))
 RUEDO = os.environ.setdefault("RUEDO", str(BUILD / "bin/ruedo"))
-PATIENCE = 400.0    # s, for what comes sooner or later, on a machine that does much else too
+PATIENCE = 400.0  # s, for what comes sooner or later, on a machine that does much else too
 os.environ["RUEDO_PYTHON"] = sys.executable
 os.environ["PATH"] = f"{BUILD / 'bin'}{os.pathsep}{os.environ['PATH']}"
 os.environ["PYTHONPATH"] = f"{BUILD / 'python'}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
@@ -59,7 +59,14 @@ def folder(tmp_path):
 
 def ruedo(*words, folder, code=0, **options):
     """The program's standard output and error; it must end with that exit code."""
-    done = subprocess.run([RUEDO, *map(str, words)], cwd=folder, capture_output=True, text=True, timeout=PATIENCE, **options)
+    done = subprocess.run(
+        [RUEDO, *map(str, words)],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        **options,
+    )
     assert done.returncode == code, (done.returncode, done.stdout, done.stderr)
     return done
 

@@ -26,7 +26,14 @@ def whole(tmp_path_factory):
 
 @pytest.fixture
 def cluster():
-    made = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "object_store_memory": 100 << 20, "include_dashboard": False})
+    made = Cluster(
+        initialize_head=True,
+        head_node_args={
+            "num_cpus": 1,
+            "object_store_memory": 100 << 20,
+            "include_dashboard": False,
+        },
+    )
     yield made
     ray.shutdown()
     made.shutdown()
@@ -34,10 +41,23 @@ def cluster():
 
 def test_one_node_gives_the_same_bytes(whole, cluster):
     folder, expected = whole
-    ruedo("campaign", "run", "c.yaml", "--ray", cluster.address, "--out", "ray1", "--quiet", folder=folder, code=1)
+    ruedo(
+        "campaign",
+        "run",
+        "c.yaml",
+        "--ray",
+        cluster.address,
+        "--out",
+        "ray1",
+        "--quiet",
+        folder=folder,
+        code=1,
+    )
     assert table(folder, "--out", "ray1") == expected
     log = next((folder / "ray1/logs").iterdir())
-    assert "repeated byte for byte" in ruedo("verify", log, folder=folder).stdout    # it names the files here
+    assert (
+        "repeated byte for byte" in ruedo("verify", log, folder=folder).stdout
+    )  # it names the files here
 
 
 def test_three_nodes_of_which_one_is_killed_give_the_same_bytes(whole, cluster):
@@ -49,14 +69,18 @@ def test_three_nodes_of_which_one_is_killed_give_the_same_bytes(whole, cluster):
 
     def kill_one(case, outcome):
         if not killed:
-            killed.append(threading.Thread(target=cluster.remove_node, args=(nodes[0],), kwargs={"allow_graceful": False}))
+            killed.append(
+                threading.Thread(
+                    target=cluster.remove_node, args=(nodes[0],), kwargs={"allow_graceful": False}
+                )
+            )
             killed[0].start()
 
     campaign = Campaign(folder / "c.yaml", out=folder / "ray3")
     campaign.run(ray=cluster.address, progress=kill_one)
     killed[0].join()
     until = time.monotonic() + PATIENCE
-    while sum(node["Alive"] for node in ray.nodes()) != 2:    # the head takes a moment to see it
+    while sum(node["Alive"] for node in ray.nodes()) != 2:  # the head takes a moment to see it
         assert time.monotonic() < until
         time.sleep(0.05)
     assert table(folder, "--out", "ray3") == expected
@@ -64,7 +88,18 @@ def test_three_nodes_of_which_one_is_killed_give_the_same_bytes(whole, cluster):
 
 def test_no_cluster_is_one_line(whole):
     folder, _ = whole
-    done = ruedo("campaign", "run", "c.yaml", "--ray", "127.0.0.1:1", "--out", "none", "--quiet", folder=folder, code=4)
+    done = ruedo(
+        "campaign",
+        "run",
+        "c.yaml",
+        "--ray",
+        "127.0.0.1:1",
+        "--out",
+        "none",
+        "--quiet",
+        folder=folder,
+        code=4,
+    )
     assert "no cluster answers" in done.stderr.splitlines()[-1]
 
 
@@ -74,13 +109,18 @@ def test_another_build_of_ruedo_on_a_node_is_one_line(whole, cluster):
     campaign = Campaign(folder / "c.yaml", out=folder / "other")
     assert campaign.cases
     campaign.version = "0.0.1"
-    with pytest.raises(CampaignError, match="^node .* has Ruedo .*, the campaign was started with 0.0.1: install one build"):
+    with pytest.raises(
+        CampaignError,
+        match="^node .* has Ruedo .*, the campaign was started with 0.0.1: install one build",
+    ):
         campaign.run(ray=cluster.address)
 
 
 def test_more_memory_than_any_node_has_is_one_line(whole, cluster):
     folder, _ = whole
-    (folder / "large.yaml").write_text(CAMPAIGN.replace("limits: {", "limits: {memory_mb: 100000000, "))
+    (folder / "large.yaml").write_text(
+        CAMPAIGN.replace("limits: {", "limits: {memory_mb: 100000000, ")
+    )
     ray.init(address=cluster.address, log_to_driver=False)
     with pytest.raises(CampaignError, match="no node of the cluster has more than"):
         Campaign(folder / "large.yaml").run(ray=cluster.address)

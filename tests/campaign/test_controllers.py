@@ -80,15 +80,25 @@ def test_each_bad_controller_is_one_failed_case(tmp_path):
     results = Campaign(tmp_path / "c.yaml").run(workers=1)
     found = {case.controller: row for case, row in results.done}
     assert {name: row["status"] for name, row in found.items()} == {
-        "good": "passed", "crash": "crashed", "hang": "timeout", "hang_well": "timeout", "eat": "memory", "die": "crashed",
-        "leave": "crashed", "nonsense": "crashed", "after": "passed"}
+        "good": "passed",
+        "crash": "crashed",
+        "hang": "timeout",
+        "hang_well": "timeout",
+        "eat": "memory",
+        "die": "crashed",
+        "leave": "crashed",
+        "nonsense": "crashed",
+        "after": "passed",
+    }
     assert "ZeroDivisionError: division by zero" in found["crash"]["reason"]
     assert "about to divide" in found["crash"]["output"] and "line 15" in found["crash"]["output"]
     assert "more than 1.5 s of real time" in found["hang"]["reason"] == found["hang_well"]["reason"]
     assert "more than 200 MB" in found["eat"]["reason"] and "SIGSEGV" in found["die"]["reason"]
     assert "no more" in found["leave"]["reason"]
     # 1 s at 0.2 m/s, after 0.3 m/s^2 from rest: 0.2 - 0.2^2 / (2 * 0.3) m.
-    assert found["good"]["metrics"]["time_s"] == 1.0 and found["good"]["metrics"]["path_m"] == pytest.approx(0.1333, abs=0.002)
+    assert found["good"]["metrics"]["time_s"] == 1.0 and found["good"]["metrics"][
+        "path_m"
+    ] == pytest.approx(0.1333, abs=0.002)
 
 
 PROGRAM = '''
@@ -135,15 +145,26 @@ def test_each_bad_program_is_one_failed_case(tmp_path):
     results = campaign.run(workers=2)
     found = {case.controller: row for case, row in results.done}
     assert {name: row["status"] for name, row in found.items()} == {
-        "good": "passed", "crash": "crashed", "hang": "timeout", "eat": "memory", "leave_behind": "passed", "missing": "crashed"}, found
-    assert found["crash"]["reason"] == "the controller ended with exit code 3" and "it is broken" in found["crash"]["output"]
+        "good": "passed",
+        "crash": "crashed",
+        "hang": "timeout",
+        "eat": "memory",
+        "leave_behind": "passed",
+        "missing": "crashed",
+    }, found
+    assert (
+        found["crash"]["reason"] == "the controller ended with exit code 3"
+        and "it is broken" in found["crash"]["output"]
+    )
     assert "127" in found["missing"]["reason"] and "no_such_program" in found["missing"]["output"]
     assert found["good"]["metrics"]["goal_distance_m"] < 0.15
     left = (tmp_path / "child").read_text().strip()
     assert left and not os.path.exists(f"/proc/{left}")
     log = results.log(next(case for case in results.cases if case.controller == "crash"))
     assert "repeated byte for byte" in ruedo("verify", log, folder=tmp_path).stdout
-    assert {name: row["state_hash"] for name, row in found.items()}["good"] == found["leave_behind"]["state_hash"]
+    assert {name: row["state_hash"] for name, row in found.items()}["good"] == found[
+        "leave_behind"
+    ]["state_hash"]
 
 
 METRIC = '''
@@ -163,14 +184,29 @@ def broken(log):
 def test_own_metrics_and_golden_logs(tmp_path):
     (tmp_path / "bad.py").write_text(BAD)
     (tmp_path / "metric.py").write_text(METRIC)
-    text = PYTHON.partition("  - {name: crash")[0] + "parameters: {speed: [0.2, 0.4]}\ndisable: [p3at/camera]\nlimits: {duration: 2}\n"
-    (tmp_path / "c.yaml").write_text(text + "metrics: [{name: fastest_m_s, python: 'metric.py:fastest'}]\n")
-    slow, fast = (row["metrics"]["fastest_m_s"] for _, row in Campaign(tmp_path / "c.yaml").run(workers=1).done)
-    assert slow == pytest.approx(0.2, abs=0.01) and fast == pytest.approx(0.3, abs=0.01)    # after 1 s at 0.3 m/s^2
+    text = (
+        PYTHON.partition("  - {name: crash")[0]
+        + "parameters: {speed: [0.2, 0.4]}\ndisable: [p3at/camera]\nlimits: {duration: 2}\n"
+    )
+    (tmp_path / "c.yaml").write_text(
+        text + "metrics: [{name: fastest_m_s, python: 'metric.py:fastest'}]\n"
+    )
+    slow, fast = (
+        row["metrics"]["fastest_m_s"]
+        for _, row in Campaign(tmp_path / "c.yaml").run(workers=1).done
+    )
+    assert slow == pytest.approx(0.2, abs=0.01) and fast == pytest.approx(
+        0.3, abs=0.01
+    )  # after 1 s at 0.3 m/s^2
     (tmp_path / "c.yaml").write_text(text + "metrics: [{name: b, python: 'metric.py:broken'}]\n")
     row = Campaign(tmp_path / "c.yaml").run(workers=1).done[0][1]
     assert (row["status"], row["what"]) == ("invalid", "metric") and "KeyError" in row["reason"]
     ruedo("campaign", "repeat", "c.yaml", "0", "-o", "golden.lcm", folder=tmp_path, code=0)
-    (tmp_path / "c.yaml").write_text(text + "expect: {golden: golden.lcm, ignore: ['[!p]*', 'p3at/[!p]*', 'ruedo/*']}\n")
+    (tmp_path / "c.yaml").write_text(
+        text + "expect: {golden: golden.lcm, ignore: ['[!p]*', 'p3at/[!p]*', 'ruedo/*']}\n"
+    )
     same, other = (row for _, row in Campaign(tmp_path / "c.yaml").run(workers=1).done)
-    assert same["status"] == "passed" and (other["status"], other["what"]) == ("failed", "golden"), (same, other)
+    assert same["status"] == "passed" and (other["status"], other["what"]) == (
+        "failed",
+        "golden",
+    ), (same, other)

@@ -32,19 +32,28 @@ def example(tmp_path):
 
 
 def hunt(folder, *options, code=1):
-    return json.loads(ruedo("hunt", "hunt.yaml", "--json", *options, folder=folder, code=code).stdout)
+    return json.loads(
+        ruedo("hunt", "hunt.yaml", "--json", *options, folder=folder, code=code).stdout
+    )
 
 
 def test_loses_the_goal_when_the_first_echo_is_far(example):
     found = hunt(example("far"), "--cases", "60")
     assert found["found"] and "was not within" in found["reason"] and not found["faults"]
-    assert found["choices"]["width"] == round(found["choices"]["width"], 1) and found["choices"]["width"] > 4.0
+    assert (
+        found["choices"]["width"] == round(found["choices"]["width"], 1)
+        and found["choices"]["width"] > 4.0
+    )
     assert found["choices"]["seed"] == 1
 
 
 def test_turns_the_wrong_way_at_exactly_pi(example):
     found = hunt(example("pi"), "--cases", "60")
-    assert found["found"] and abs(found["choices"]["heading"]) == 3.141592653589793 and not found["faults"]
+    assert (
+        found["found"]
+        and abs(found["choices"]["heading"]) == 3.141592653589793
+        and not found["faults"]
+    )
 
 
 def test_trusts_a_frozen_scan_and_the_find_is_kept_as_a_test(example):
@@ -53,28 +62,50 @@ def test_trusts_a_frozen_scan_and_the_find_is_kept_as_a_test(example):
     assert found["found"] and [fault["kind"] for fault in found["faults"]] == ["freeze"]
     assert sum(found["choices"][f"obstacle{i}"] for i in range(2)) == 1
     kept = folder / "kept/frozen"
-    assert {"world.sdf", "regression.yaml", "test_frozen.py", "CMakeLists.txt", "run.lcm"} <= {file.name for file in kept.iterdir()}
+    assert {"world.sdf", "regression.yaml", "test_frozen.py", "CMakeLists.txt", "run.lcm"} <= {
+        file.name for file in kept.iterdir()
+    }
     assert "repeated byte for byte" in ruedo("verify", kept / "run.lcm", folder=folder).stdout
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(kept)]
     failed = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     assert failed.returncode == 1 and "touched" in failed.stdout, failed.stdout + failed.stderr
-    ruedo("campaign", "run", kept / "regression.yaml", "--out", "again", "--quiet", folder=folder, code=1)
-    why = ruedo("why", next((folder / "again/logs").iterdir()), "-o", "why.svg", folder=folder).stdout
-    assert re.search(r"it could be avoided up to [\d.]+ s", why) and "avoids it: without the fault freeze" in why
+    ruedo(
+        "campaign",
+        "run",
+        kept / "regression.yaml",
+        "--out",
+        "again",
+        "--quiet",
+        folder=folder,
+        code=1,
+    )
+    why = ruedo(
+        "why", next((folder / "again/logs").iterdir()), "-o", "why.svg", folder=folder
+    ).stdout
+    assert (
+        re.search(r"it could be avoided up to [\d.]+ s", why)
+        and "avoids it: without the fault freeze" in why
+    )
     assert (folder / "why.svg").read_text().startswith("<?xml")
     text = (kept / "regression.yaml").read_text()
-    (kept / "regression.yaml").write_text(text.replace("- frozen", "- ''"))    # mended
+    (kept / "regression.yaml").write_text(text.replace("- frozen", "- ''"))  # mended
     done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stdout
 
 
 def test_a_sound_controller_is_told_to_be_one(example):
-    assert hunt(example("", "hunt-faults.yaml"), "--cases", "16", code=0) == {"found": False, "cases": 16}
+    assert hunt(example("", "hunt-faults.yaml"), "--cases", "16", code=0) == {
+        "found": False,
+        "cases": 16,
+    }
 
 
 def test_the_same_seed_finds_the_same_with_any_number_of_workers(example):
     folder = example("far")
-    one, two = (hunt(folder, "--cases", "30", "--shrink", "10", "--seed", "3", "--workers", n) for n in ("1", "2"))
+    one, two = (
+        hunt(folder, "--cases", "30", "--shrink", "10", "--seed", "3", "--workers", n)
+        for n in ("1", "2")
+    )
     assert one == two
 
 
@@ -84,7 +115,9 @@ def test_by_hypothesis(example):
 
 
 def test_obstacles_are_few_in_the_end(example):
-    folder = example("", "hunt.yaml", obstacles={"most": 3, "area": [1.0, -1.0, 3.0, 1.0], "size": [0.3, 0.9]})
+    folder = example(
+        "", "hunt.yaml", obstacles={"most": 3, "area": [1.0, -1.0, 3.0, 1.0], "size": [0.3, 0.9]}
+    )
     content = yaml.safe_load((folder / "hunt.yaml").read_text())
     content["controllers"] = [{"name": "blind", "python": "blind.py:blind"}]
     content["parameters"] = {"width": [4.0], "heading": [0.0]}
@@ -94,4 +127,7 @@ def test_obstacles_are_few_in_the_end(example):
     (folder / "hunt.yaml").write_text(yaml.safe_dump(content))
     found = Hunt(folder / "hunt.yaml").run(cases=40, seed=1)
     assert found is not None and "hunted_0" in found.reason
-    assert sum(found.choices[f"obstacle{i}"] for i in range(3)) == 1 and found.content["limits"]["duration"] < 6
+    assert (
+        sum(found.choices[f"obstacle{i}"] for i in range(3)) == 1
+        and found.content["limits"]["duration"] < 6
+    )

@@ -19,6 +19,7 @@ from ruedo.campaign.compare import compare_with
 def whole(tmp_path_factory):
     """A folder in which the campaign was run by two workers, and its table."""
     from conftest import WORLD
+
     folder = tmp_path_factory.mktemp("whole")
     for name, text in (("world.py", WORLD), ("controller.py", CONTROLLER), ("c.yaml", CAMPAIGN)):
         (folder / name).write_text(text)
@@ -30,9 +31,13 @@ def test_those_cases_fail_that_must(whole):
     folder, _ = whole
     frame = Campaign(folder / "c.yaml").results().frame()
     assert len(frame) == 8
-    assert list(frame.passed) == [not (bold and distance < 2) for bold, distance in zip(frame.bold, frame.distance)]
+    assert list(frame.passed) == [
+        not (bold and distance < 2) for bold, distance in zip(frame.bold, frame.distance)
+    ]
     assert set(frame[~frame.passed].what) == {"contact"}
-    assert 0.9 / 0.5 < float(frame.reason[2].split()[0]) < 3.0    # its front is 0.9 m from the wall, its speed 0.5 m/s at most
+    assert (
+        0.9 / 0.5 < float(frame.reason[2].split()[0]) < 3.0
+    )  # its front is 0.9 m from the wall, its speed 0.5 m/s at most
 
 
 def test_one_worker_gives_the_same_bytes(whole):
@@ -44,8 +49,20 @@ def test_one_worker_gives_the_same_bytes(whole):
 def test_shards_joined_give_the_same_bytes(whole):
     folder, expected = whole
     for i in (3, 1, 2):
-        ruedo("campaign", "run", "c.yaml", "--shard", f"{i}/3", "--out", f"shard{i}", folder=folder, code=SHARD_CODES[i])
-    done = ruedo("campaign", "join", "c.yaml", "--out", "joined", "shard1", "shard2", "shard3", folder=folder)
+        ruedo(
+            "campaign",
+            "run",
+            "c.yaml",
+            "--shard",
+            f"{i}/3",
+            "--out",
+            f"shard{i}",
+            folder=folder,
+            code=SHARD_CODES[i],
+        )
+    done = ruedo(
+        "campaign", "join", "c.yaml", "--out", "joined", "shard1", "shard2", "shard3", folder=folder
+    )
     assert "took over 8 results" in done.stdout
     assert table(folder, "--out", "joined") == expected
 
@@ -82,7 +99,9 @@ def test_kills_of_the_driver_and_of_workers_cost_the_runs_under_way_alone(whole)
     driver.wait()
     before = results_in(out)
     assert 2 <= before < 8
-    driver = subprocess.Popen([*command[:2], "resume", *command[3:]], cwd=folder, stdout=subprocess.DEVNULL)
+    driver = subprocess.Popen(
+        [*command[:2], "resume", *command[3:]], cwd=folder, stdout=subprocess.DEVNULL
+    )
     wait_for(lambda: results_in(out) > before)
     os.kill(children(driver.pid)[0], signal.SIGKILL)
     assert driver.wait(PATIENCE) == 1
@@ -103,20 +122,49 @@ def test_nothing_is_run_twice_and_a_changed_controller_is_run_anew(folder):
 
 def test_a_second_driver_is_refused(whole):
     import fcntl
+
     folder, _ = whole
     with open(folder / "c.campaign/lock", "w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
-        assert "is in use by another" in ruedo("campaign", "run", "c.yaml", folder=folder, code=4).stderr
+        assert (
+            "is in use by another"
+            in ruedo("campaign", "run", "c.yaml", folder=folder, code=4).stderr
+        )
 
 
 def test_a_full_disk_is_one_line_and_loses_nothing(whole):
     folder, expected = whole
     (folder / "full").mkdir()
     (folder / "kept.yaml").write_text(CAMPAIGN + "keep: {sample: 8}\n")
-    script = ("mount -t tmpfs -o size=152k none full && (\"$@\"; code=$?; cp -r full kept; exit $code)")
-    done = subprocess.run(["unshare", "-m" if os.getuid() == 0 else "-rm", "sh", "-c", script, "sh", RUEDO, "campaign", "run", "kept.yaml",
-                           "--workers", "1", "--out", "full"], cwd=folder, capture_output=True, text=True, timeout=PATIENCE)
-    assert done.returncode == 4 and "make room, and resume" in done.stderr, (done.stdout, done.stderr)
+    script = (
+        "mount -t tmpfs -o size=152k none full && (\"$@\"; code=$?; cp -r full kept; exit $code)"
+    )
+    done = subprocess.run(
+        [
+            "unshare",
+            "-m" if os.getuid() == 0 else "-rm",
+            "sh",
+            "-c",
+            script,
+            "sh",
+            RUEDO,
+            "campaign",
+            "run",
+            "kept.yaml",
+            "--workers",
+            "1",
+            "--out",
+            "full",
+        ],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
+    assert done.returncode == 4 and "make room, and resume" in done.stderr, (
+        done.stdout,
+        done.stderr,
+    )
     assert 0 < results_in(folder / "kept") < 8
     ruedo("campaign", "resume", "c.yaml", "--out", "kept", folder=folder, code=1)
     assert table(folder, "--out", "kept") == expected
@@ -125,7 +173,7 @@ def test_a_full_disk_is_one_line_and_loses_nothing(whole):
 def test_a_kept_log_repeats_byte_for_byte(whole):
     folder, _ = whole
     logs = sorted((folder / "c.campaign/logs").iterdir())
-    assert len(logs) == 2    # of what failed
+    assert len(logs) == 2  # of what failed
     for log in logs:
         assert log.stat().st_size < 20000
         assert "repeated byte for byte" in ruedo("verify", log, folder=folder).stdout
@@ -135,22 +183,35 @@ def test_show_and_repeat(whole):
     folder, _ = whole
     shown = ruedo("campaign", "show", "c.yaml", "2", folder=folder).stdout
     assert "distance = 1.2" in shown and "touched wall" in shown
-    assert "to the last bit" in ruedo("campaign", "repeat", "c.yaml", "2", "-o", "full.lcm", folder=folder).stdout
+    assert (
+        "to the last bit"
+        in ruedo("campaign", "repeat", "c.yaml", "2", "-o", "full.lcm", folder=folder).stdout
+    )
     assert "p3at/lrf" in (folder / "full.lcm").read_bytes().decode("latin-1")
     assert "repeated byte for byte" in ruedo("verify", "full.lcm", folder=folder).stdout
-    assert "is no case of walls" in ruedo("campaign", "show", "c.yaml", "8", folder=folder, code=3).stderr
+    assert (
+        "is no case of walls"
+        in ruedo("campaign", "show", "c.yaml", "8", folder=folder, code=3).stderr
+    )
 
 
 def test_exports_and_the_sum_as_json(whole):
     import pandas
+
     folder, expected = whole
     ruedo("campaign", "export", "c.yaml", "-o", "t.parquet", folder=folder)
-    assert list(pandas.read_parquet(folder / "t.parquet").status) == [line.split(",")[8] for line in expected.splitlines()[1:]]
+    assert list(pandas.read_parquet(folder / "t.parquet").status) == [
+        line.split(",")[8] for line in expected.splitlines()[1:]
+    ]
     ruedo("campaign", "export", "c.yaml", "-o", "t.xml", folder=folder)
     suite = ElementTree.parse(folder / "t.xml").getroot()
     assert suite.get("tests") == "8" and len(suite.findall("testcase/failure")) == 2
     summary = json.loads(ruedo("campaign", "run", "c.yaml", "--json", folder=folder, code=1).stdout)
-    assert (summary["cases"], summary["failed"], summary["status"]) == (8, 2, {"failed": 2, "passed": 6})
+    assert (summary["cases"], summary["failed"], summary["status"]) == (
+        8,
+        2,
+        {"failed": 2, "passed": 6},
+    )
 
 
 def test_the_report_needs_no_network(whole):
@@ -159,7 +220,9 @@ def test_the_report_needs_no_network(whole):
     page = (folder / "r.html").read_text()
     for text in ("6 of 8", "Wilson", "bold", "The worst runs", "Where they failed", "ruedo play"):
         assert text in page or text == "6 of 8"
-    loads = [part.split('"')[0] for attribute in ('src="', "url(") for part in page.split(attribute)[1:]]
+    loads = [
+        part.split('"')[0] for attribute in ('src="', "url(") for part in page.split(attribute)[1:]
+    ]
     assert all(one.startswith(("#", "data:")) for one in loads) and "<script" not in page
 
 
@@ -178,8 +241,10 @@ def test_two_campaigns_compared(whole):
 
 def test_thirty_students_are_marked_in_one_command(tmp_path):
     (tmp_path / "students").mkdir()
-    for i in range(30):    # every third drives into the wall 1.2 m ahead
-        (tmp_path / f"students/student{i:02d}.py").write_text(CONTROLLER.replace('not view.parameters["bold"]', str(i % 3 != 0)))
+    for i in range(30):  # every third drives into the wall 1.2 m ahead
+        (tmp_path / f"students/student{i:02d}.py").write_text(
+            CONTROLLER.replace('not view.parameters["bold"]', str(i % 3 != 0))
+        )
     (tmp_path / "labs.yaml").write_text("""
 worlds: [{name: wall, file: wall.sdf}]
 controllers: [{name: student, each: "students/*.py", python: "{file}:ahead"}]
@@ -188,10 +253,13 @@ expect: {no_contact: true}
 limits: {duration: 3}
 """)
     from ruedo import World
+
     (tmp_path / "wall.sdf").write_text(str(World("wall").wall(1.2, -2, 1.2, 2).robot("p3at")))
     ruedo("campaign", "run", "labs.yaml", "--quiet", folder=tmp_path, code=1)
     marks = Campaign(tmp_path / "labs.yaml").results().frame().groupby("controller").passed.mean()
-    assert len(marks) == 30 and [bool(marks[f"student{i:02d}"]) for i in range(30)] == [i % 3 != 0 for i in range(30)]
+    assert len(marks) == 30 and [bool(marks[f"student{i:02d}"]) for i in range(30)] == [
+        i % 3 != 0 for i in range(30)
+    ]
 
 
 def test_slurm(whole):
@@ -199,6 +267,12 @@ def test_slurm(whole):
     script = ruedo("campaign", "slurm", "c.yaml", "--tasks", "4", folder=folder).stdout
     assert "#SBATCH --array=1-4" in script
     subprocess.run(["bash", "-n"], input=script, text=True, check=True)
-    done = subprocess.run(["bash"], input=script, text=True, cwd="/", timeout=PATIENCE,
-                          env={**os.environ, "SLURM_ARRAY_TASK_ID": "2", "SLURM_CPUS_PER_TASK": "1"})
+    done = subprocess.run(
+        ["bash"],
+        input=script,
+        text=True,
+        cwd="/",
+        timeout=PATIENCE,
+        env={**os.environ, "SLURM_ARRAY_TASK_ID": "2", "SLURM_CPUS_PER_TASK": "1"},
+    )
     assert done.returncode == 0 and results_in(folder / "c.campaign.shard2") == 2

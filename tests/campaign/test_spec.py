@@ -9,26 +9,71 @@ from ruedo.campaign import Campaign, SpecError
 from ruedo.campaign.plan import points, substitute
 from ruedo.campaign.stats import mcnemar, paired_difference, wilson
 
-WRONG = [    # what is replaced, by what, line, what the message says
+WRONG = [  # what is replaced, by what, line, what the message says
     ("name: walls\nworlds", "nmae: walls\nworlds", 2, "nmae: is not known; .*did you mean 'name'"),
-    ("limits: {duration: 3}", "limits: {duration: -1}", 13, "limits.duration: is -1; allowed is more than 0"),
-    ("limits: {duration: 3}", "limits: {duration: .nan}", 13, "limits.duration: is nan; allowed is a finite number"),
+    (
+        "limits: {duration: 3}",
+        "limits: {duration: -1}",
+        13,
+        "limits.duration: is -1; allowed is more than 0",
+    ),
+    (
+        "limits: {duration: 3}",
+        "limits: {duration: .nan}",
+        13,
+        "limits.duration: is nan; allowed is a finite number",
+    ),
     ("limits: {duration: 3}", "limits: {}", 13, "limits: needs 'duration'"),
     ("limits: {duration: 3}", "", 2, "needs 'limits'"),
-    ("seeds: 2", "seeds: two", 10, "seeds: is 'two'; allowed is a whole number or a list or members with names"),
+    (
+        "seeds: 2",
+        "seeds: two",
+        10,
+        "seeds: is 'two'; allowed is a whole number or a list or members with names",
+    ),
     ("seeds: 2", "seeds: 0", 10, "seeds: is 0; allowed is 1 or more"),
     ("seeds: 2", "seeds: [1, -2]", 10, "seeds: has -2"),
-    ("distance: [1.2, 3.0]", "distance: {gird: {from: 1, to: 2, steps: 3}}", 8, "gird: is not known; .*did you mean 'grid'"),
-    ("distance: [1.2, 3.0]", "distance: {uniform: [3, 1]}", 8, r"uniform: is \[3, 1\]; allowed is \[low, high\]"),
+    (
+        "distance: [1.2, 3.0]",
+        "distance: {gird: {from: 1, to: 2, steps: 3}}",
+        8,
+        "gird: is not known; .*did you mean 'grid'",
+    ),
+    (
+        "distance: [1.2, 3.0]",
+        "distance: {uniform: [3, 1]}",
+        8,
+        r"uniform: is \[3, 1\]; allowed is \[low, high\]",
+    ),
     ("distance: [1.2, 3.0]", "seed: [1.2, 3.0]", 8, "seed: is no name of a parameter"),
-    ("distance: \"{distance}\"", "distance: \"{distanec}\"", 4, "{distanec} is no parameter; there are bold, distance"),
-    ("controller.py:ahead", "nowhere.py:ahead", 6, r"python: is 'nowhere.py:ahead', and there is no file"),
+    (
+        "distance: \"{distance}\"",
+        "distance: \"{distanec}\"",
+        4,
+        "{distanec} is no parameter; there are bold, distance",
+    ),
+    (
+        "controller.py:ahead",
+        "nowhere.py:ahead",
+        6,
+        r"python: is 'nowhere.py:ahead', and there is no file",
+    ),
     ("controller.py:ahead", "controller", 6, "it looks like FILE.py:NAME"),
     ("world.py:walls", "world.py:wall", 4, "world.py has no wall"),
     ("disable: [p3at/camera", "disable: [p3at/camera]]", 11, "no YAML"),
     ("seeds: 2", "seeds: 2\nseeds: 3", 11, "'seeds' is there twice"),
-    ("python: \"controller.py:ahead\"", "files: []", 6, "controllers.0.: needs either command or python"),
-    ("name: walls, generator: \"world.py:walls\", parameters: {distance: \"{distance}\"}", "file: nowhere.sdf", 4, "nowhere.sdf"),
+    (
+        "python: \"controller.py:ahead\"",
+        "files: []",
+        6,
+        "controllers.0.: needs either command or python",
+    ),
+    (
+        "name: walls, generator: \"world.py:walls\", parameters: {distance: \"{distance}\"}",
+        "file: nowhere.sdf",
+        4,
+        "nowhere.sdf",
+    ),
 ]
 
 
@@ -50,26 +95,56 @@ def test_the_command_line_says_it_in_one_line_with_exit_code_3(folder):
 
 def test_a_python_without_what_it_takes_is_told_in_one_line(folder):
     import os
-    (folder / "python").write_text("#!/bin/sh\nexec python3 -S \"$@\"\n")    # no site-packages
+
+    (folder / "python").write_text("#!/bin/sh\nexec python3 -S \"$@\"\n")  # no site-packages
     (folder / "python").chmod(0o755)
-    done = ruedo("campaign", "run", "c.yaml", folder=folder, code=4, env={**os.environ, "RUEDO_PYTHON": str(folder / "python")})
+    done = ruedo(
+        "campaign",
+        "run",
+        "c.yaml",
+        folder=folder,
+        code=4,
+        env={**os.environ, "RUEDO_PYTHON": str(folder / "python")},
+    )
     assert done.stderr.count("\n") == 1 and "pip install 'ruedo[campaign]'" in done.stderr
-    done = ruedo("campaign", "run", "c.yaml", folder=folder, code=4, env={**os.environ, "RUEDO_PYTHON": "/nowhere"})
+    done = ruedo(
+        "campaign",
+        "run",
+        "c.yaml",
+        folder=folder,
+        code=4,
+        env={**os.environ, "RUEDO_PYTHON": "/nowhere"},
+    )
     assert "'/nowhere' cannot be started (No such file or directory)" in done.stderr
 
 
 def test_the_same_is_checked_of_a_dict():
     with pytest.raises(SpecError, match="^campaign: limits.duration: is 'x'; allowed is a number$"):
-        Campaign({"worlds": ["arena"], "controllers": [{"name": "a", "command": "true"}], "limits": {"duration": "x"}})
+        Campaign(
+            {
+                "worlds": ["arena"],
+                "controllers": [{"name": "a", "command": "true"}],
+                "limits": {"duration": "x"},
+            }
+        )
 
 
 def test_lists_and_grids_are_crossed_in_the_order_of_the_file():
     found = points({"a": [1, 2], "b": {"grid": {"from": 0.0, "to": 1.0, "steps": 3}}}, {})
-    assert [(p["a"], p["b"]) for p in found] == [(1, 0.0), (1, 0.5), (1, 1.0), (2, 0.0), (2, 0.5), (2, 1.0)]
+    assert [(p["a"], p["b"]) for p in found] == [
+        (1, 0.0),
+        (1, 0.5),
+        (1, 1.0),
+        (2, 0.0),
+        (2, 0.5),
+        (2, 1.0),
+    ]
 
 
 def test_a_latin_hypercube_has_one_value_in_each_stratum():
-    found = points({"x": {"uniform": [10.0, 20.0]}, "y": {"log_uniform": [1.0, 256.0]}}, {"samples": 8})
+    found = points(
+        {"x": {"uniform": [10.0, 20.0]}, "y": {"log_uniform": [1.0, 256.0]}}, {"samples": 8}
+    )
     assert sorted(int((p["x"] - 10.0) / 10.0 * 8) for p in found) == list(range(8))
     assert sorted(int(math.log2(p["y"])) for p in found) == list(range(8))
     assert [p["x"] for p in found] != sorted(p["x"] for p in found)
@@ -98,7 +173,11 @@ def test_intervals_and_tests_of_counts():
     for p in (low, high):
         assert (p - 0.8) ** 2 == pytest.approx(1.959963984540054**2 * p * (1 - p) / 10)
     assert low < 0.8 < high and wilson(0, 0) == (0.0, 1.0)
-    assert mcnemar(1, 9) == pytest.approx(2 * (1 + 10) / 1024) and mcnemar(4, 4) == 1.0 and mcnemar(0, 0) == 1.0
+    assert (
+        mcnemar(1, 9) == pytest.approx(2 * (1 + 10) / 1024)
+        and mcnemar(4, 4) == 1.0
+        and mcnemar(0, 0) == 1.0
+    )
     change, low, high = paired_difference(40, 2, 10, 8)
     assert change == pytest.approx(8 / 60) and low < change < high
     other, low2, high2 = paired_difference(40, 10, 2, 8)

@@ -1,4 +1,5 @@
 """What the tests of recorded runs share: servers, logs, and commands to them."""
+
 import os
 import subprocess
 import time
@@ -13,7 +14,7 @@ RUEDO = os.environ["RUEDO"]
 SOURCE = Path(os.environ["RUEDO_SOURCE_DIR"])
 ARENA = str(SOURCE / "worlds" / "arena.sdf")
 QUICK = ["--disable", "p3at/camera", "--quiet"]
-PATIENCE = 400    # s, for what comes sooner or later, on a machine that does much else too
+PATIENCE = 400  # s, for what comes sooner or later, on a machine that does much else too
 
 
 def url(port):
@@ -21,7 +22,9 @@ def url(port):
 
 
 def program(*arguments, **options):
-    return subprocess.run([RUEDO, *map(str, arguments)], capture_output=True, text=True, timeout=PATIENCE, **options)
+    return subprocess.run(
+        [RUEDO, *map(str, arguments)], capture_output=True, text=True, timeout=PATIENCE, **options
+    )
 
 
 def until(condition):
@@ -46,7 +49,20 @@ def write(path, found):
 
 
 def record(path, *arguments, world=ARENA, seconds=3, port=7821):
-    result = program("run", world, *QUICK, "--rate", "max", "--duration", seconds, "--record", path, "--lcm", url(port), *arguments)
+    result = program(
+        "run",
+        world,
+        *QUICK,
+        "--rate",
+        "max",
+        "--duration",
+        seconds,
+        "--record",
+        path,
+        "--lcm",
+        url(port),
+        *arguments,
+    )
     assert result.returncode == 0, result.stderr
     return events(path)
 
@@ -56,8 +72,12 @@ class Server:
 
     def __init__(self, port, *arguments, world=ARENA):
         self.url = url(port)
-        self.process = subprocess.Popen([RUEDO, "run", world, *QUICK, "--lcm", self.url, *map(str, arguments)],
-                                        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        self.process = subprocess.Popen(
+            [RUEDO, "run", world, *QUICK, "--lcm", self.url, *map(str, arguments)],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         STARTED.append(self.process)
 
     def connect(self):
@@ -91,5 +111,7 @@ def command(simulation, vx, omega):
     simulation.state()
 
 
-BOX = ("<sdf version='1.9'><model name='crate'><link name='link'><inertial><mass>3</mass></inertial><collision name='c'><geometry>"
-       "<box><size>0.3 0.3 0.3</size></box></geometry></collision></link></model></sdf>")
+BOX = (
+    "<sdf version='1.9'><model name='crate'><link name='link'><inertial><mass>3</mass></inertial><collision name='c'><geometry>"
+    "<box><size>0.3 0.3 0.3</size></box></geometry></collision></link></model></sdf>"
+)

@@ -1,4 +1,5 @@
 """ruedo bench: every table has its rows, and the workload is the one that is described. No figure of speed is judged."""
+
 import json
 import os
 import shutil
@@ -33,7 +34,9 @@ def test_all_tables_run_by_themselves():
             # The same ranges as Embree's own, within single precision at 190 m, so both did the same work.
             assert row["largest_difference_m"] < 1e-3
             assert row["rays"] == 181 * max(200, row["robots"])
-            assert row["ratio_to_embree"] == pytest.approx(row["embree_rays_per_s"] / row["rays_per_s"], rel=1e-3)
+            assert row["ratio_to_embree"] == pytest.approx(
+                row["embree_rays_per_s"] / row["rays_per_s"], rel=1e-3
+            )
         else:
             assert row["lost"] == 0 and row["count"] > 0
             assert 0 <= row["median_ms"] <= row["p99_ms"] <= row["max_ms"]
@@ -49,7 +52,9 @@ def test_the_workload_is_the_one_described():
     # Each scan has two lists of 181 floats, so that is its least.
     assert row["bytes_per_sim_s"] > 7 * 10 * 2 * 181 * 4
     (with_cameras,) = rows_of("--only", "camera", "--robots", "2", "--duration", "2")
-    assert with_cameras["pictures_per_s"] * with_cameras["wall_s"] == pytest.approx(2 * 15 * 2 + 2, abs=1)
+    assert with_cameras["pictures_per_s"] * with_cameras["wall_s"] == pytest.approx(
+        2 * 15 * 2 + 2, abs=1
+    )
 
 
 def test_several_robots_give_several_rows_of_one_table():
@@ -60,7 +65,17 @@ def test_several_robots_give_several_rows_of_one_table():
 
 
 def test_a_table_that_cannot_be_measured_is_named_and_the_others_go_on():
-    result = bench("--only", "robots", "lcm", "--robots", "1", "--duration", "0.5", "--lcm", "tcpq://127.0.0.1:1")
+    result = bench(
+        "--only",
+        "robots",
+        "lcm",
+        "--robots",
+        "1",
+        "--duration",
+        "0.5",
+        "--lcm",
+        "tcpq://127.0.0.1:1",
+    )
     assert result.returncode == 4
     assert "'lcm'" in result.stderr
     assert "messages encoded and counted" in result.stdout and "1" in result.stdout
@@ -84,7 +99,9 @@ def test_the_world_can_be_written(tmp_path):
 @pytest.mark.parametrize("command", ["bench", "experiments"])
 def test_help_is_that_of_the_program_that_measures(command):
     result = subprocess.run([RUEDO, command, "--help"], capture_output=True, text=True, timeout=200)
-    assert result.returncode == 0 and ("--robots" if command == "bench" else "--out") in result.stdout
+    assert (
+        result.returncode == 0 and ("--robots" if command == "bench" else "--out") in result.stdout
+    )
 
 
 def test_wrong_options_are_named():

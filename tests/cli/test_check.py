@@ -1,4 +1,5 @@
 """ruedo check, as its users call it: what hostile and broken files give, the JSON list, exit codes, and colour on a terminal."""
+
 import json
 import os
 import pty
@@ -25,50 +26,157 @@ def in_link(inside):
 
 
 def mesh(name):
-    return in_link(f"<collision name='c'><geometry><mesh><uri>{name}</uri></mesh></geometry></collision>")
+    return in_link(
+        f"<collision name='c'><geometry><mesh><uri>{name}</uri></mesh></geometry></collision>"
+    )
 
 
 def heightmap(name):
-    return in_link(f"<collision name='c'><geometry><heightmap><uri>{name}</uri><size>1 1 1</size></heightmap></geometry></collision>")
+    return in_link(
+        f"<collision name='c'><geometry><heightmap><uri>{name}</uri><size>1 1 1</size></heightmap></geometry></collision>"
+    )
 
 
 def texture(name):
-    return in_link(f"<visual name='v'><geometry><box><size>1 1 1</size></box></geometry><material><pbr><metal><albedo_map>{name}</albedo_map></metal></pbr></material></visual>")
+    return in_link(
+        f"<visual name='v'><geometry><box><size>1 1 1</size></box></geometry><material><pbr><metal><albedo_map>{name}</albedo_map></metal></pbr></material></visual>"
+    )
 
 
 def png(width, height):
-    return PNG + struct.pack(">I", 13) + b"IHDR" + struct.pack(">II", width, height) + b"\x08\x02\0\0\0" + bytes(8)
+    return (
+        PNG
+        + struct.pack(">I", 13)
+        + b"IHDR"
+        + struct.pack(">II", width, height)
+        + b"\x08\x02\0\0\0"
+        + bytes(8)
+    )
 
 
 COLLISION = "model m/link l/collision c"
 # What the world says; other files beside it; the exit code; the finding's kind, line and element, and a part of its text.
 FILES = {
-    "broken mesh": (mesh("a.dae"), {"a.dae": b"<COLLADA>no"}, 1, ("error", 4, COLLISION, "the mesh 'a.dae' cannot be used: ")),
-    "bytes of the mesh in the importer's message": (mesh("a.stl"), {"a.stl": b"solid\xff\xfe" + bytes(range(256))}, 1,
-                                                    ("error", 4, COLLISION, "the mesh 'a.stl' cannot be used: ")),
-    "empty mesh": (mesh("a.stl"), {"a.stl": b""}, 1, ("error", 4, COLLISION, "the mesh 'a.stl' cannot be used: ")),
-    "unknown mesh": (mesh("a.blend"), {"a.blend": b"x"}, 1, ("error", 4, COLLISION, "'.blend' is no known kind of mesh; known are obj, dae")),
-    "folder as mesh": (mesh("sub"), {"sub/x": b""}, 1, ("error", 4, COLLISION, "the mesh 'sub' cannot be used: it is a folder; a file is needed")),
-    "missing mesh": (mesh("none.dae"), {}, 1, ("error", 4, COLLISION, "the mesh 'none.dae' is not found; the shape is left out")),
-    "missing picture": (heightmap("none.png"), {}, 1, ("error", 4, COLLISION, "the heightmap 'none.png' is not found")),
-    "broken picture": (heightmap("a.png"), {"a.png": PNG + bytes(40)}, 1, ("error", 4, COLLISION, "it is no picture that can be read (pgm, png, jpeg, bmp, tiff)")),
-    "huge picture": (heightmap("a.png"), {"a.png": png(200000, 200000)}, 1, ("error", 4, COLLISION, "200000 x 200000 pixels; allowed are 1025 each way")),
-    "missing texture": (texture("none.png"), {}, 0, ("unsupported", 4, "model m/link l/visual v", "the texture 'none.png' is not found")),
-    "broken texture": (texture("a.png"), {"a.png": PNG + bytes(40)}, 0, ("unsupported", 0, "", "the texture is no picture that can be read")),
-    "include of a folder": (world("<include><uri>sub</uri></include>"), {"sub/x": b""}, 1,
-                            ("error", 3, "world/include", "'sub' is a folder without model.config or model.sdf")),
-    "joint between models": (world("<joint name='j' type='fixed'><parent>a::l</parent><child>b::l</child></joint>\n" +
-                                   "".join(f"<model name='{name}'><link name='l'/></model>" for name in "ab")), {}, 0,
-                             ("unsupported", 3, "world w", "put both models, and the joint, into one <model>")),
-    "circle": (world("<include><uri>a.sdf</uri></include>"), {"a.sdf": b"<sdf version='1.9'><model name='a'><include><uri>a.sdf</uri></include></model></sdf>"}, 1,
-               [("error", 1, "model a", "an include that never ends: a.sdf includes a.sdf; the part is left out"),
-                ("error", 1, "model a", "it has no link; the model is left out")]),
-    "number": (in_link("<pose>1e999 0 0 0 0 0</pose>"), {}, 1,
-               [("error", 4, "model m", "'1e999' is too large for a number; the link is left out"),
-                ("error", 3, "model m", "it has no link; the model is left out")]),
-    "not a number": (in_link("<pose>nan 0 0 0 0 0</pose>"), {}, 1,
-                     [("error", 4, "model m", "'nan' is not finite; allowed is a number; the link is left out"),
-                      ("error", 3, "model m", "it has no link; the model is left out")]),
+    "broken mesh": (
+        mesh("a.dae"),
+        {"a.dae": b"<COLLADA>no"},
+        1,
+        ("error", 4, COLLISION, "the mesh 'a.dae' cannot be used: "),
+    ),
+    "bytes of the mesh in the importer's message": (
+        mesh("a.stl"),
+        {"a.stl": b"solid\xff\xfe" + bytes(range(256))},
+        1,
+        ("error", 4, COLLISION, "the mesh 'a.stl' cannot be used: "),
+    ),
+    "empty mesh": (
+        mesh("a.stl"),
+        {"a.stl": b""},
+        1,
+        ("error", 4, COLLISION, "the mesh 'a.stl' cannot be used: "),
+    ),
+    "unknown mesh": (
+        mesh("a.blend"),
+        {"a.blend": b"x"},
+        1,
+        ("error", 4, COLLISION, "'.blend' is no known kind of mesh; known are obj, dae"),
+    ),
+    "folder as mesh": (
+        mesh("sub"),
+        {"sub/x": b""},
+        1,
+        ("error", 4, COLLISION, "the mesh 'sub' cannot be used: it is a folder; a file is needed"),
+    ),
+    "missing mesh": (
+        mesh("none.dae"),
+        {},
+        1,
+        ("error", 4, COLLISION, "the mesh 'none.dae' is not found; the shape is left out"),
+    ),
+    "missing picture": (
+        heightmap("none.png"),
+        {},
+        1,
+        ("error", 4, COLLISION, "the heightmap 'none.png' is not found"),
+    ),
+    "broken picture": (
+        heightmap("a.png"),
+        {"a.png": PNG + bytes(40)},
+        1,
+        ("error", 4, COLLISION, "it is no picture that can be read (pgm, png, jpeg, bmp, tiff)"),
+    ),
+    "huge picture": (
+        heightmap("a.png"),
+        {"a.png": png(200000, 200000)},
+        1,
+        ("error", 4, COLLISION, "200000 x 200000 pixels; allowed are 1025 each way"),
+    ),
+    "missing texture": (
+        texture("none.png"),
+        {},
+        0,
+        ("unsupported", 4, "model m/link l/visual v", "the texture 'none.png' is not found"),
+    ),
+    "broken texture": (
+        texture("a.png"),
+        {"a.png": PNG + bytes(40)},
+        0,
+        ("unsupported", 0, "", "the texture is no picture that can be read"),
+    ),
+    "include of a folder": (
+        world("<include><uri>sub</uri></include>"),
+        {"sub/x": b""},
+        1,
+        ("error", 3, "world/include", "'sub' is a folder without model.config or model.sdf"),
+    ),
+    "joint between models": (
+        world(
+            "<joint name='j' type='fixed'><parent>a::l</parent><child>b::l</child></joint>\n"
+            + "".join(f"<model name='{name}'><link name='l'/></model>" for name in "ab")
+        ),
+        {},
+        0,
+        ("unsupported", 3, "world w", "put both models, and the joint, into one <model>"),
+    ),
+    "circle": (
+        world("<include><uri>a.sdf</uri></include>"),
+        {
+            "a.sdf": b"<sdf version='1.9'><model name='a'><include><uri>a.sdf</uri></include></model></sdf>"
+        },
+        1,
+        [
+            (
+                "error",
+                1,
+                "model a",
+                "an include that never ends: a.sdf includes a.sdf; the part is left out",
+            ),
+            ("error", 1, "model a", "it has no link; the model is left out"),
+        ],
+    ),
+    "number": (
+        in_link("<pose>1e999 0 0 0 0 0</pose>"),
+        {},
+        1,
+        [
+            ("error", 4, "model m", "'1e999' is too large for a number; the link is left out"),
+            ("error", 3, "model m", "it has no link; the model is left out"),
+        ],
+    ),
+    "not a number": (
+        in_link("<pose>nan 0 0 0 0 0</pose>"),
+        {},
+        1,
+        [
+            (
+                "error",
+                4,
+                "model m",
+                "'nan' is not finite; allowed is a number; the link is left out",
+            ),
+            ("error", 3, "model m", "it has no link; the model is left out"),
+        ],
+    ),
     "only a mark": ("\ufeff", {}, 3, ("error", 0, "", "the file is empty")),
 }
 
@@ -94,25 +202,73 @@ def test_files_that_are_wrong(name, tmp_path):
     assert check(tmp_path / "w.sdf", "--strict").returncode == (code or 1)
 
 
-SERVED = ["camera", "depth", "depth_camera", "rgbd", "rgbd_camera", "ray", "lidar", "gpu_ray", "gpu_lidar", "sonar", "imu", "contact"]
-NOT_SERVED = ["air_pressure", "air_speed", "altimeter", "boundingbox_camera", "custom", "dvl", "gps", "logical_camera", "magnetometer", "multicamera",
-              "navsat", "rfid", "rfidtag", "segmentation_camera", "thermal_camera", "wideanglecamera", "wireless_receiver", "wireless_transmitter"]
+SERVED = [
+    "camera",
+    "depth",
+    "depth_camera",
+    "rgbd",
+    "rgbd_camera",
+    "ray",
+    "lidar",
+    "gpu_ray",
+    "gpu_lidar",
+    "sonar",
+    "imu",
+    "contact",
+]
+NOT_SERVED = [
+    "air_pressure",
+    "air_speed",
+    "altimeter",
+    "boundingbox_camera",
+    "custom",
+    "dvl",
+    "gps",
+    "logical_camera",
+    "magnetometer",
+    "multicamera",
+    "navsat",
+    "rfid",
+    "rfidtag",
+    "segmentation_camera",
+    "thermal_camera",
+    "wideanglecamera",
+    "wireless_receiver",
+    "wireless_transmitter",
+]
 
 
 def test_every_kind_of_sensor_is_served_or_named(tmp_path):
     kinds = SERVED + NOT_SERVED
-    sensors = "\n".join(f"<sensor name='s{i}' type='{kind}'><update_rate>10</update_rate></sensor>" for i, kind in enumerate(kinds))
+    sensors = "\n".join(
+        f"<sensor name='s{i}' type='{kind}'><update_rate>10</update_rate></sensor>"
+        for i, kind in enumerate(kinds)
+    )
     joint = "<link name='arm'/><joint name='j' type='fixed'><parent>l</parent><child>arm</child>\n<sensor name='f' type='force_torque'/></joint>"
-    (tmp_path / "w.sdf").write_text(world(f"<model name='m'><link name='l'>\n{sensors}\n</link>{joint}</model>"))
-    named = {(f["line"], f["element"]): f["text"] for f in json.loads(check(tmp_path / "w.sdf", "--json").stdout) if f["kind"] == "unsupported"}
-    wanted = {(4 + i, f"model m/sensor s{i}"): f"sensors of type '{kind}' are not supported; the robot runs without it"
-              for i, kind in enumerate(kinds) if kind in NOT_SERVED}
+    (tmp_path / "w.sdf").write_text(
+        world(f"<model name='m'><link name='l'>\n{sensors}\n</link>{joint}</model>")
+    )
+    named = {
+        (f["line"], f["element"]): f["text"]
+        for f in json.loads(check(tmp_path / "w.sdf", "--json").stdout)
+        if f["kind"] == "unsupported"
+    }
+    wanted = {
+        (
+            4 + i,
+            f"model m/sensor s{i}",
+        ): f"sensors of type '{kind}' are not supported; the robot runs without it"
+        for i, kind in enumerate(kinds)
+        if kind in NOT_SERVED
+    }
     wanted[5 + len(kinds), "model m/joint j"] = "sensors on joints are not supported"
     assert named == wanted
 
 
 def test_equal_findings_are_one_with_all_its_places(tmp_path):
-    boxes = "\n".join(f"<collision name='{i}'><geometry><bx/></geometry></collision>" for i in range(3))
+    boxes = "\n".join(
+        f"<collision name='{i}'><geometry><bx/></geometry></collision>" for i in range(3)
+    )
     (tmp_path / "w.sdf").write_text(in_link(boxes))
     lines = check(tmp_path / "w.sdf").stdout.decode().splitlines()
     assert lines[0].startswith("unsupported: ") and "did you mean <box>?" in lines[0]
@@ -124,19 +280,37 @@ def test_names_cannot_speak_to_the_terminal(tmp_path):
     """ESC, and the control character that some terminals take for ESC and '['."""
     hostile = "&#27;[31m&#155;0m"
     link = f"<link name='l{hostile}'><inertial><mass>-1</mass></inertial><sensor name='s{hostile}' type='x{hostile}'/></link>"
-    (tmp_path / "w.sdf").write_text(f"<sdf version='1.9'><world name='w{hostile}'><model name='m{hostile}'>{link}</model></world></sdf>")
-    for command in (["check"], ["info"], ["run", "--duration", "0.1", "--lcm", "memq://"], ["run", "--spawn", "p3at\x1b[0m@0,0"]):
-        done = subprocess.run([RUEDO, command[0], str(tmp_path / "w.sdf"), *command[1:]], capture_output=True, timeout=60)
+    (tmp_path / "w.sdf").write_text(
+        f"<sdf version='1.9'><world name='w{hostile}'><model name='m{hostile}'>{link}</model></world></sdf>"
+    )
+    for command in (
+        ["check"],
+        ["info"],
+        ["run", "--duration", "0.1", "--lcm", "memq://"],
+        ["run", "--spawn", "p3at\x1b[0m@0,0"],
+    ):
+        done = subprocess.run(
+            [RUEDO, command[0], str(tmp_path / "w.sdf"), *command[1:]],
+            capture_output=True,
+            timeout=60,
+        )
         said = (done.stdout + done.stderr).decode()
         assert "?[31m?0m" in said or "p3at?[0m" in said, said
-        assert not any(ord(letter) < 32 and letter != "\n" or 127 <= ord(letter) < 160 for letter in said)
+        assert not any(
+            ord(letter) < 32 and letter != "\n" or 127 <= ord(letter) < 160 for letter in said
+        )
 
 
 def test_a_terminal_has_colours_and_no_one_else(tmp_path):
     (tmp_path / "w.sdf").write_text(mesh("none.dae"))
     ours, theirs = pty.openpty()
     environment = {name: value for name, value in os.environ.items() if name != "NO_COLOR"}
-    done = subprocess.run([RUEDO, "check", tmp_path / "w.sdf"], stdout=theirs, env={**environment, "TERM": "xterm"}, timeout=60)
+    done = subprocess.run(
+        [RUEDO, "check", tmp_path / "w.sdf"],
+        stdout=theirs,
+        env={**environment, "TERM": "xterm"},
+        timeout=60,
+    )
     os.close(theirs)
     shown = os.read(ours, 65536).decode()
     os.close(ours)

@@ -1,4 +1,5 @@
 """The program as its users start it: exit codes, messages, signals, logs, and the bus."""
+
 import json
 import os
 import select
@@ -14,7 +15,7 @@ RUEDO = os.environ["RUEDO"]
 WORLDS = Path(os.environ["RUEDO_SOURCE_DIR"]) / "worlds"
 ARENA = str(WORLDS / "arena.sdf")
 QUICK = ["--disable", "p3at/camera", "--quiet"]
-PATIENCE = 400    # s, for what comes sooner or later, on a machine that does much else too
+PATIENCE = 400  # s, for what comes sooner or later, on a machine that does much else too
 
 
 def url(port):
@@ -22,7 +23,9 @@ def url(port):
 
 
 def ruedo(*arguments, **options):
-    return subprocess.run([RUEDO, *arguments], capture_output=True, text=True, timeout=PATIENCE, **options)
+    return subprocess.run(
+        [RUEDO, *arguments], capture_output=True, text=True, timeout=PATIENCE, **options
+    )
 
 
 def one_line(text):
@@ -66,29 +69,46 @@ def test_version_and_help():
 
 
 def test_no_route_is_one_line_with_its_cure():
-    result = subprocess.run(["unshare", "-rn", RUEDO, "run", ARENA, "--lcm", url(7800)], capture_output=True, text=True, timeout=PATIENCE)
+    result = subprocess.run(
+        ["unshare", "-rn", RUEDO, "run", ARENA, "--lcm", url(7800)],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
     if "unshare" in result.stderr:
         pytest.skip("no network namespaces here")
     assert result.returncode == 4
     assert one_line(result.stderr) and "ip route add" in result.stderr
-    result = subprocess.run(["unshare", "-rn", RUEDO, "doctor"], capture_output=True, text=True, timeout=PATIENCE)
+    result = subprocess.run(
+        ["unshare", "-rn", RUEDO, "doctor"], capture_output=True, text=True, timeout=PATIENCE
+    )
     assert result.returncode == 4
     faults = [line for line in result.stdout.splitlines() if line.startswith("FAULT")]
     assert len(faults) == 1 and "ip route add" in faults[0]
 
 
 def test_a_firewall_is_one_line_with_its_cure():
-    closed = ("ip link set lo up; ip link set lo multicast on; ip route add 239.255.76.67/32 dev lo; nft add table inet f; "
-              "nft add chain inet f in '{ type filter hook input priority 0; }'; nft add rule inet f in udp dport 7667 drop; ")
+    closed = (
+        "ip link set lo up; ip link set lo multicast on; ip route add 239.255.76.67/32 dev lo; nft add table inet f; "
+        "nft add chain inet f in '{ type filter hook input priority 0; }'; nft add rule inet f in udp dport 7667 drop; "
+    )
     isolated = ["unshare", "-rn", "sh", "-ec"]
     if subprocess.run([*isolated, closed], capture_output=True).returncode != 0:
         pytest.skip("no network namespaces, or no nftables here")
     for port, faults in ((7667, ["FAULT  multicast"]), (7668, [])):
         address = f"udpm://239.255.76.67:{port}?ttl=0"
-        result = subprocess.run([*isolated, closed + f"{RUEDO} doctor --lcm '{address}'"], capture_output=True, text=True, timeout=PATIENCE)
+        result = subprocess.run(
+            [*isolated, closed + f"{RUEDO} doctor --lcm '{address}'"],
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+        )
         found = [line for line in result.stdout.splitlines() if line.startswith("FAULT")]
         assert [line[:16] for line in found] == faults and result.returncode == (4 if faults else 0)
-        assert all("does not come back" in line and f"let the firewall pass UDP port {port}" in line for line in found)
+        assert all(
+            "does not come back" in line and f"let the firewall pass UDP port {port}" in line
+            for line in found
+        )
 
 
 def needs(*command):
@@ -98,7 +118,12 @@ def needs(*command):
         before, begin = os.times(), time.monotonic()
         subprocess.run(command, capture_output=True, timeout=PATIENCE)
         after, took = os.times(), min(took, time.monotonic() - begin)
-        used = after.children_user + after.children_system - before.children_user - before.children_system
+        used = (
+            after.children_user
+            + after.children_system
+            - before.children_user
+            - before.children_system
+        )
         if took < 1.0:
             break
     return took, used
@@ -109,9 +134,17 @@ def test_the_network_is_judged_within_a_second():
     unrouted = ["unshare", "-rn"]
     if subprocess.run([*unrouted, "true"], capture_output=True).returncode != 0:
         unrouted = []
-    for command in ([RUEDO, "doctor", "--lcm", url(7805)], [*unrouted, RUEDO, "doctor"], [*unrouted, RUEDO, "run", ARENA, "--duration", "0", "--lcm", url(7805)]):
+    for command in (
+        [RUEDO, "doctor", "--lcm", url(7805)],
+        [*unrouted, RUEDO, "doctor"],
+        [*unrouted, RUEDO, "run", ARENA, "--duration", "0", "--lcm", url(7805)],
+    ):
         took, used = needs(*command)
-        assert took < 5.0 and used < 1.0, (command, took, used)    # five, where there is always something else to do
+        assert took < 5.0 and used < 1.0, (
+            command,
+            took,
+            used,
+        )  # five, where there is always something else to do
 
 
 def test_doctor_is_content_here():
@@ -125,7 +158,7 @@ def test_info_as_json():
     assert [robot["name"] for robot in info["robots"]] == ["p3at"]
     channels = {channel["name"]: channel for channel in info["channels"]}
     assert channels["p3at/lrf"]["type"] == "planar_lidar_t"
-    assert channels["p3at/lrf"]["fingerprint"] == "e3d17423180b5e8d"    # bot_core's
+    assert channels["p3at/lrf"]["fingerprint"] == "e3d17423180b5e8d"  # bot_core's
     assert channels["p3at/odometry"]["rate"] == 50
     assert channels["p3at/velocity"]["input"] is True
     lrf = next(device for device in info["devices"] if device["name"] == "lrf")
@@ -165,21 +198,53 @@ def events(path):
 def test_two_runs_write_the_same_bytes(tmp_path):
     logs = [tmp_path / name for name in ("a", "b", "c")]
     for log, threads in zip(logs, ("1", "2", "8")):
-        result = ruedo("run", ARENA, *QUICK, "--lcm", url(7802), "--rate", "max", "--duration", "5", "--record", str(log), "--threads", threads)
+        result = ruedo(
+            "run",
+            ARENA,
+            *QUICK,
+            "--lcm",
+            url(7802),
+            "--rate",
+            "max",
+            "--duration",
+            "5",
+            "--record",
+            str(log),
+            "--threads",
+            threads,
+        )
         assert result.returncode == 0, result.stderr
     assert logs[0].read_bytes() == logs[1].read_bytes() == logs[2].read_bytes()
     assert events(logs[0])[0][1] == "ruedo/header"
     other = tmp_path / "other"
-    ruedo("run", ARENA, *QUICK, "--lcm", url(7802), "--rate", "max", "--duration", "5", "--record", str(other), "--seed", "2")
+    ruedo(
+        "run",
+        ARENA,
+        *QUICK,
+        "--lcm",
+        url(7802),
+        "--rate",
+        "max",
+        "--duration",
+        "5",
+        "--record",
+        str(other),
+        "--seed",
+        "2",
+    )
     assert other.read_bytes() != logs[0].read_bytes()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_signals_end_it_cleanly(tmp_path, number):
     log = tmp_path / "log"
-    with subprocess.Popen([RUEDO, "run", ARENA, "--disable", "p3at/camera", "--lcm", url(7803), "--record", str(log)], stdout=subprocess.PIPE,
-                          stderr=subprocess.PIPE, text=True) as process:
-        assert select.select([process.stdout], [], [], PATIENCE)[0]    # the channels: it runs
+    with subprocess.Popen(
+        [RUEDO, "run", ARENA, "--disable", "p3at/camera", "--lcm", url(7803), "--record", str(log)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert select.select([process.stdout], [], [], PATIENCE)[0]  # the channels: it runs
         receiver = lcm.LCM(url(7803))
         seen = []
         receiver.subscribe("p3at/pose", lambda channel, data: seen.append(data))
@@ -197,7 +262,9 @@ def test_signals_end_it_cleanly(tmp_path, number):
 
 
 def test_survives_a_flood_of_channel_names():
-    with subprocess.Popen([RUEDO, "run", ARENA, *QUICK, "--lcm", url(7804)], stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        [RUEDO, "run", ARENA, *QUICK, "--lcm", url(7804)], stderr=subprocess.PIPE, text=True
+    ) as process:
         sender = lcm.LCM(url(7804))
         seen = []
         sender.subscribe("p3at/pose", lambda channel, data: seen.append(data))
@@ -217,7 +284,7 @@ def test_survives_a_flood_of_channel_names():
         flood(20_000, 0)
         before = resident_kb()
         flood(60_000, 20_000)
-        assert resident_kb() < before + 4_000    # without renewal it would be 12 MB
+        assert resident_kb() < before + 4_000  # without renewal it would be 12 MB
         seen.clear()
         while len(seen) < 5:
             assert sender.handle_timeout(1000 * PATIENCE) > 0

@@ -1,4 +1,5 @@
 """ruedo diff as CI calls it: exit codes, the first difference, tolerances, JUnit XML, and the page."""
+
 import os
 import subprocess
 from pathlib import Path
@@ -12,7 +13,9 @@ RUEDO = os.environ["RUEDO"]
 
 
 def diff(*arguments):
-    return subprocess.run([RUEDO, "diff", *map(str, arguments)], capture_output=True, text=True, timeout=400)
+    return subprocess.run(
+        [RUEDO, "diff", *map(str, arguments)], capture_output=True, text=True, timeout=400
+    )
 
 
 @pytest.fixture
@@ -48,13 +51,16 @@ def test_the_first_difference_is_named_and_reported(logs, tmp_path):
     assert "<svg" in page and "pos[0]" in page
 
 
-@pytest.mark.parametrize("options, code", [
-    (["--tolerance", "r/pose:pos=abs:0.003"], 0),
-    (["--tolerance", "r/pose:pos=abs:0.001"], 1),
-    (["--tolerance", "*:pos=rel:0.01"], 0),
-    (["--ignore", "r/pose:pos"], 0),
-    (["--ignore", "other"], 1),
-])
+@pytest.mark.parametrize(
+    "options, code",
+    [
+        (["--tolerance", "r/pose:pos=abs:0.003"], 0),
+        (["--tolerance", "r/pose:pos=abs:0.001"], 1),
+        (["--tolerance", "*:pos=rel:0.01"], 0),
+        (["--ignore", "r/pose:pos"], 0),
+        (["--ignore", "other"], 1),
+    ],
+)
 def test_tolerances_decide(logs, options, code):
     done = diff(*logs, *options)
     assert done.returncode == code, done.stdout + done.stderr

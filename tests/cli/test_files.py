@@ -1,4 +1,5 @@
 """What people bring: ruedo import, ruedo map, --drive, --allow-absolute and ruedo check, as their users call them."""
+
 import json
 import os
 import re
@@ -23,9 +24,16 @@ def ruedo(*arguments):
 
 def test_round_trip_of_a_map(tmp_path):
     one = ruedo("map", ARENA, "-o", tmp_path / "one.yaml", "--resolution", "0.1")
-    assert one.returncode == 0 and re.search(r"\d+ x \d+ cells of 0.1 m, \d+ occupied", one.stdout), one
+    assert one.returncode == 0 and re.search(
+        r"\d+ x \d+ cells of 0.1 m, \d+ occupied", one.stdout
+    ), one
     assert ruedo("import", tmp_path / "one.yaml", "-o", tmp_path / "walls.sdf").returncode == 0
-    assert ruedo("map", tmp_path / "walls.sdf", "-o", tmp_path / "two.yaml", "--resolution", "0.1").returncode == 0
+    assert (
+        ruedo(
+            "map", tmp_path / "walls.sdf", "-o", tmp_path / "two.yaml", "--resolution", "0.1"
+        ).returncode
+        == 0
+    )
     assert (tmp_path / "two.pgm").read_bytes() == (tmp_path / "one.pgm").read_bytes()
     assert ruedo("check", tmp_path / "walls.sdf", "--strict").returncode == 0
 
@@ -33,7 +41,7 @@ def test_round_trip_of_a_map(tmp_path):
 def test_import_of_a_bitmap_needs_its_size(tmp_path):
     (tmp_path / "cave.pgm").write_bytes(b"P5\n4 2\n255\n" + bytes([0, 255, 255, 0] * 2))
     assert "--resolution or --width" in ruedo("import", tmp_path / "cave.pgm").stderr
-    sdf = ruedo("import", tmp_path / "cave.pgm", "--width", "16").stdout    # 4 m a pixel
+    sdf = ruedo("import", tmp_path / "cave.pgm", "--width", "16").stdout  # 4 m a pixel
     assert "<pose>-6 0 0.5 0 0 0</pose><geometry><box><size>4 8 1</size>" in sdf
     assert sdf.count("<collision") == 2
 
@@ -44,7 +52,9 @@ def test_import_says_what_is_left_out(tmp_path):
     assert done.stdout.endswith("lab.sdf: 1 walls; left out: 1 Goal\n")
 
 
-@pytest.mark.parametrize("text", ["cart", "cart=jl", "=jl,jr", "cart=jl,", "cart=jl+,jr", "cart=jl,jr,x"])
+@pytest.mark.parametrize(
+    "text", ["cart", "cart=jl", "=jl,jr", "cart=jl,", "cart=jl+,jr", "cart=jl,jr,x"]
+)
 def test_a_drive_option_says_what_it_looks_like(text):
     done = ruedo("info", ARENA, "--drive", text)
     assert done.returncode == 2 and "ROBOT=LEFT[+LEFT...],RIGHT[+RIGHT...]" in done.stderr
@@ -52,10 +62,16 @@ def test_a_drive_option_says_what_it_looks_like(text):
 
 def test_a_urdf_without_a_plugin_gets_a_drive(tmp_path):
     (tmp_path / "cart.urdf").write_text(URDF)
-    guessed = json.loads(ruedo("check", tmp_path / "cart.urdf", "--json").stdout)    # from the joints' names and places, and it is said
+    guessed = json.loads(
+        ruedo("check", tmp_path / "cart.urdf", "--json").stdout
+    )  # from the joints' names and places, and it is said
     assert len(guessed) == 1 and "--drive" in guessed[0]["text"], guessed
-    robots = json.loads(ruedo("info", tmp_path / "cart.urdf", "--drive", "cart=jl,jr", "--json").stdout)["robots"]
-    assert [(robot["name"], robot["drive"], robot["wheels"]) for robot in robots] == [("cart", "kinematic", ["jl", "jr"])]
+    robots = json.loads(
+        ruedo("info", tmp_path / "cart.urdf", "--drive", "cart=jl,jr", "--json").stdout
+    )["robots"]
+    assert [(robot["name"], robot["drive"], robot["wheels"]) for robot in robots] == [
+        ("cart", "kinematic", ["jl", "jr"])
+    ]
     assert abs(robots[0]["track"] - 0.4) < 1e-9
 
 
@@ -65,11 +81,17 @@ def test_absolute_paths_are_let_in_by_the_user_only(tmp_path):
     (far / "cart.urdf").write_text(URDF)
     world = tmp_path / "a" / "b" / "w.sdf"
     world.parent.mkdir(parents=True)
-    world.write_text(f"<sdf version='1.9'><world name='w'><include><uri>{far}/cart.urdf</uri></include></world></sdf>")
+    world.write_text(
+        f"<sdf version='1.9'><world name='w'><include><uri>{far}/cart.urdf</uri></include></world></sdf>"
+    )
     refused = json.loads(ruedo("check", world, "--json").stdout)
-    assert len(refused) == 1 and "--allow-absolute" in refused[0]["text"] and refused[0]["line"] == 1
+    assert (
+        len(refused) == 1 and "--allow-absolute" in refused[0]["text"] and refused[0]["line"] == 1
+    )
     allowed = json.loads(ruedo("check", world, "--json", "--allow-absolute").stdout)
-    assert len(allowed) == 1 and "--drive" in allowed[0]["text"], allowed    # that its drive is guessed
+    assert len(allowed) == 1 and "--drive" in allowed[0]["text"], (
+        allowed
+    )  # that its drive is guessed
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="needs root to become a user without rights")
@@ -79,22 +101,46 @@ def test_a_file_without_permission_is_named(tmp_path):
     world.write_text("<sdf version='1.9'/>")
     world.chmod(0)
     try:
-        done = subprocess.run([RUEDO, "check", world], capture_output=True, text=True, timeout=60, preexec_fn=lambda: os.setuid(65534))
+        done = subprocess.run(
+            [RUEDO, "check", world],
+            capture_output=True,
+            text=True,
+            timeout=60,
+            preexec_fn=lambda: os.setuid(65534),
+        )
     except PermissionError:
         pytest.skip("the program lies where nobody may run it")
     finally:
         world.unlink()
-    assert done.returncode == 3 and f"{world}" in done.stdout and "Permission denied" in done.stdout, done
+    assert (
+        done.returncode == 3 and f"{world}" in done.stdout and "Permission denied" in done.stdout
+    ), done
 
 
 def test_a_thousand_robots_load_at_once(tmp_path):
     """1 000 P3-AT up to their first step: time of the processor, and memory."""
-    (tmp_path / "w.sdf").write_text("<sdf version='1.9'><world name='w'><include><uri>model://ground_plane</uri></include><ruedo:fleet name='r'>"
-                                    "<include><uri>model://p3at</uri></include><ruedo:count>1000</ruedo:count></ruedo:fleet></world></sdf>")
+    (tmp_path / "w.sdf").write_text(
+        "<sdf version='1.9'><world name='w'><include><uri>model://ground_plane</uri></include><ruedo:fleet name='r'>"
+        "<include><uri>model://p3at</uri></include><ruedo:count>1000</ruedo:count></ruedo:fleet></world></sdf>"
+    )
     no_pictures = [word for i in range(1000) for word in ("--disable", f"r_{i + 1}/camera")]
-    process = subprocess.Popen([RUEDO, "run", str(tmp_path / "w.sdf"), "--lcm", "memq://", "--rate", "max", "--duration", "0.005", "--quiet", *no_pictures])
+    process = subprocess.Popen(
+        [
+            RUEDO,
+            "run",
+            str(tmp_path / "w.sdf"),
+            "--lcm",
+            "memq://",
+            "--rate",
+            "max",
+            "--duration",
+            "0.005",
+            "--quiet",
+            *no_pictures,
+        ]
+    )
     _, status, used = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     assert process.returncode == 0
-    assert used.ru_utime + used.ru_stime < 3.0    # s
-    assert used.ru_maxrss < 1_000_000             # kB
+    assert used.ru_utime + used.ru_stime < 3.0  # s
+    assert used.ru_maxrss < 1_000_000  # kB

@@ -1,4 +1,5 @@
 """ruedo render: pictures of the right size that show something, and what it says of wrong options."""
+
 import os
 import struct
 import subprocess
@@ -13,7 +14,9 @@ ARENA = str(Path(os.environ["RUEDO_SOURCE_DIR"]) / "worlds/arena.sdf")
 
 
 def render(*arguments):
-    return subprocess.run([RUEDO, "render", *arguments], capture_output=True, text=True, timeout=120)
+    return subprocess.run(
+        [RUEDO, "render", *arguments], capture_output=True, text=True, timeout=120
+    )
 
 
 def read_png(path):
@@ -31,7 +34,9 @@ def read_png(path):
             packed += body
         at += 12 + length
     lines = np.frombuffer(zlib.decompress(packed), np.uint8).reshape(height, 1 + 3 * width)
-    rows = np.zeros((height + 1, 3 * width + 3), int)    # a row above and a pixel to the left, both black
+    rows = np.zeros(
+        (height + 1, 3 * width + 3), int
+    )  # a row above and a pixel to the left, both black
     for y in range(height):
         kind, above, row = lines[y, 0], rows[y], rows[y + 1]
         for x in range(3 * width):
@@ -90,7 +95,7 @@ def test_picture_of_a_camera(tmp_path):
     assert pixels.shape == (72, 96, 3)
     assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 20
     sky, ground = pixels[0].mean(axis=0), pixels[-1].mean(axis=0)
-    assert sky[2] > sky[0] + 20 and ground[2] <= ground[0] + 5    # blue above, not below
+    assert sky[2] > sky[0] + 20 and ground[2] <= ground[0] + 5  # blue above, not below
 
 
 @pytest.mark.parametrize(
@@ -100,7 +105,11 @@ def test_picture_of_a_camera(tmp_path):
         (["-o", "x.bmp"], 2, ".png"),
         (["-o", "/nowhere/x.png"], 4, "/nowhere/x.png"),
         (["-o", "x.png", "--camera", "p3at"], 2, "ROBOT/DEVICE"),
-        (["-o", "x.png", "--camera", "p3at/lrf"], 2, "--camera p3at/lrf: there is no such camera; there are: p3at/camera"),
+        (
+            ["-o", "x.png", "--camera", "p3at/lrf"],
+            2,
+            "--camera p3at/lrf: there is no such camera; there are: p3at/camera",
+        ),
         (["-o", "x.png", "--camera", "p3at/camrea"], 2, "did you mean p3at/camera"),
         (["-o", "x.png", "--camera", "p3at/camera", "--rays"], 2, "--rays"),
         (["-o", "x.png", "--view", "below"], 2, "top, iso"),

@@ -1,4 +1,5 @@
 """Runs that go on: logs played, snapshots restored, controllers that the run waits for."""
+
 import shutil
 import signal
 import subprocess
@@ -10,8 +11,23 @@ from pathlib import Path
 import lcm
 import pytest
 import ruedo
-from recorded import ARENA, BOX, PATIENCE, QUICK, RUEDO, SOURCE, STARTED, Server, command, events, program, record, until, url
-from recorded import no_process_outlives_its_test    # a fixture of every test here
+from recorded import (
+    ARENA,
+    BOX,
+    PATIENCE,
+    QUICK,
+    RUEDO,
+    SOURCE,
+    STARTED,
+    Server,
+    command,
+    events,
+    program,
+    record,
+    until,
+    url,
+)
+from recorded import no_process_outlives_its_test  # a fixture of every test here
 from ruedo.lcmtypes import log_header_t, world_state_t
 
 LOG_ONLY = {"ruedo/header", "ruedo/applied", "ruedo/state_hash"}
@@ -23,7 +39,9 @@ class Listener:
     def __init__(self, address):
         self.got, self.stop = [], False
         self.bus = lcm.LCM(address)
-        self.bus.subscribe(".*", lambda channel, data: self.got.append((channel, bytes(data)))).set_queue_capacity(0)
+        self.bus.subscribe(
+            ".*", lambda channel, data: self.got.append((channel, bytes(data)))
+        ).set_queue_capacity(0)
         self.thread = threading.Thread(target=self.listen)
         self.thread.start()
 
@@ -41,7 +59,11 @@ def exchange(tmp_path):
     """The address of a server of LCM over TCP, which passes on what the tests send. It serves a world without a body."""
     world = tmp_path / "empty.sdf"
     world.write_text("<sdf version='1.9'><world name='empty'/></sdf>")
-    process = subprocess.Popen([RUEDO, "run", world, "--quiet", "--paused", "--lcm", "auto-tcp"], stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [RUEDO, "run", world, "--quiet", "--paused", "--lcm", "auto-tcp"],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
     STARTED.append(process)
     yield process.stdout.readline().split("'")[1]
 
@@ -49,15 +71,27 @@ def exchange(tmp_path):
 def test_plays_at_its_own_time(tmp_path, exchange):
     """At a ten-thousandth of its speed, what comes a step later comes 50 s later: long after what is at the same time."""
     found = record(tmp_path / "a.lcm", seconds=2)
-    first = [(channel, data) for stamp, channel, data in found if stamp == found[0][0] and channel not in LOG_ONLY]
+    first = [
+        (channel, data)
+        for stamp, channel, data in found
+        if stamp == found[0][0] and channel not in LOG_ONLY
+    ]
     assert first
     listener = Listener(exchange)
     try:
         until(lambda: ("mark", b"x") in listener.got or lcm.LCM(exchange).publish("mark", b"x"))
-        STARTED.append(subprocess.Popen([RUEDO, "play", tmp_path / "a.lcm", "--speed", "0.0001", "--lcm", exchange]))
+        STARTED.append(
+            subprocess.Popen(
+                [RUEDO, "play", tmp_path / "a.lcm", "--speed", "0.0001", "--lcm", exchange]
+            )
+        )
 
         def played():
-            return [one for one in list(listener.got) if one[0] not in ("mark", "ruedo/info", "ruedo/tick") and not of_nothing(*one)]
+            return [
+                one
+                for one in list(listener.got)
+                if one[0] not in ("mark", "ruedo/info", "ruedo/tick") and not of_nothing(*one)
+            ]
 
         until(lambda: len(played()) >= len(first))
         until(lambda: ("mark", b"y") in listener.got or lcm.LCM(exchange).publish("mark", b"y"))
@@ -76,17 +110,30 @@ def test_plays_again(tmp_path, exchange, stock):
     wanted = [(channel, data) for _, channel, data in found if stock or channel not in LOG_ONLY]
     listener = Listener(exchange)
     try:
-        until(lambda: ("mark", b"x") in listener.got or lcm.LCM(exchange).publish("mark", b"x"))    # it listens from here on
-        if stock:    # LCM's own player reads the log
-            player = shutil.which("lcm-logplayer", path=str(Path(sys.executable).parent)) or "lcm-logplayer"
-            result = subprocess.run([player, "-s", "4", "-l", exchange, str(tmp_path / "a.lcm")], capture_output=True, timeout=PATIENCE)
+        until(
+            lambda: ("mark", b"x") in listener.got or lcm.LCM(exchange).publish("mark", b"x")
+        )  # it listens from here on
+        if stock:  # LCM's own player reads the log
+            player = (
+                shutil.which("lcm-logplayer", path=str(Path(sys.executable).parent))
+                or "lcm-logplayer"
+            )
+            result = subprocess.run(
+                [player, "-s", "4", "-l", exchange, str(tmp_path / "a.lcm")],
+                capture_output=True,
+                timeout=PATIENCE,
+            )
             assert result.returncode == 0
         else:
             result = program("play", tmp_path / "a.lcm", "--speed", "4", "--lcm", exchange)
             assert result.returncode == 0 and f"{len(wanted)} messages, 2 s" in result.stdout
 
         def played():
-            return [one for one in list(listener.got) if one[0] not in ("mark", "ruedo/info", "ruedo/tick") and not of_nothing(*one)]
+            return [
+                one
+                for one in list(listener.got)
+                if one[0] not in ("mark", "ruedo/info", "ruedo/tick") and not of_nothing(*one)
+            ]
 
         until(lambda: len(played()) >= len(wanted))
         assert played() == wanted
@@ -97,7 +144,11 @@ def test_plays_again(tmp_path, exchange, stock):
 def test_play_is_interrupted_cleanly(tmp_path):
     record(tmp_path / "a.lcm", seconds=2)
     listener = Listener(url(7827))
-    process = subprocess.Popen([RUEDO, "play", str(tmp_path / "a.lcm"), "--speed", "0.01", "--lcm", url(7827)], stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [RUEDO, "play", str(tmp_path / "a.lcm"), "--speed", "0.01", "--lcm", url(7827)],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
     STARTED.append(process)
     try:
         until(lambda: listener.got)
@@ -129,12 +180,29 @@ def test_a_snapshot_in_another_process(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["here.snapshot", "one.lcm"]
 
     snapshot = tmp_path / "here.snapshot"
-    result = program("run", ARENA, *QUICK, "--rate", "max", "--duration", "3", "--restore", snapshot, "--record", tmp_path / "two.lcm",
-                     "--lcm", url(7829))
+    result = program(
+        "run",
+        ARENA,
+        *QUICK,
+        "--rate",
+        "max",
+        "--duration",
+        "3",
+        "--restore",
+        snapshot,
+        "--record",
+        tmp_path / "two.lcm",
+        "--lcm",
+        url(7829),
+    )
     assert result.returncode == 0, result.stderr
     step_us = log_header_t.decode(events(snapshot)[0][2]).step_us
     one, two = events(tmp_path / "one.lcm"), events(tmp_path / "two.lcm")
-    stop = next(i for i, (_, channel, data) in enumerate(one) if channel == "ruedo/applied" and one[i][0] >= 250 * step_us)
+    stop = next(
+        i
+        for i, (_, channel, data) in enumerate(one)
+        if channel == "ruedo/applied" and one[i][0] >= 250 * step_us
+    )
     assert one[:stop] == two[:stop]
     assert program("verify", tmp_path / "two.lcm").returncode == 0
 
@@ -143,8 +211,11 @@ def test_a_snapshot_in_another_process(tmp_path):
 
 
 def test_a_snapshot_in_the_same_process(tmp_path):
-    server = Server(7830, "--rate", "max", "--paused", "--snapshots", tmp_path, "--record", tmp_path / "a.lcm")
+    server = Server(
+        7830, "--rate", "max", "--paused", "--snapshots", tmp_path, "--record", tmp_path / "a.lcm"
+    )
     with server.connect() as simulation:
+
         def go_on():
             simulation.step(200)
             return simulation.state().state_hash
@@ -160,7 +231,9 @@ def test_a_snapshot_in_the_same_process(tmp_path):
         assert go_on() == after
         simulation.quit()
     assert server.end()[0] == 0
-    result = program("verify", tmp_path / "a.lcm")    # without the snapshot's file, which the log does not need
+    result = program(
+        "verify", tmp_path / "a.lcm"
+    )  # without the snapshot's file, which the log does not need
     assert result.returncode == 0, result.stdout + result.stderr
 
 
@@ -197,7 +270,11 @@ def bot_core(tmp_path_factory):
         text = (SOURCE / "proto" / f"{name}.lcm").read_text()
         (folder / f"{name}.lcm").write_text(text.replace("package ruedo;", "package bot_core;"))
     generator = shutil.which("lcm-gen", path=str(Path(sys.executable).parent)) or "lcm-gen"
-    subprocess.run([generator, "-p", "--ppath", str(folder), *map(str, folder.glob("*.lcm"))], check=True, capture_output=True)
+    subprocess.run(
+        [generator, "-p", "--ppath", str(folder), *map(str, folder.glob("*.lcm"))],
+        check=True,
+        capture_output=True,
+    )
     (folder / "controller.py").write_text(CONTROLLER)
     return folder
 
@@ -210,23 +287,48 @@ def start_controller(bot_core, port, *clock):
     return controller
 
 
-WAITING = ["--remap", "p3at/lrf=LASER", "--remap", "p3at/velocity=VELOCITY", "--wait-for", "p3at/velocity@10", "--set", "p3at/lrf.update_rate=10",
-           "--rate", "max"]
+WAITING = [
+    "--remap",
+    "p3at/lrf=LASER",
+    "--remap",
+    "p3at/velocity=VELOCITY",
+    "--wait-for",
+    "p3at/velocity@10",
+    "--set",
+    "p3at/lrf.update_rate=10",
+    "--rate",
+    "max",
+]
 
 
 def test_an_unmodified_controller_runs_repeatably(tmp_path, bot_core):
     logs = []
-    for run, clock in enumerate(([], [], ["wall"])):    # the last one stamps its commands by the wall clock
+    for run, clock in enumerate(
+        ([], [], ["wall"])
+    ):  # the last one stamps its commands by the wall clock
         start_controller(bot_core, 7836 + run, *clock)
         logs.append(tmp_path / f"{run}.lcm")
-        result = program("run", ARENA, *QUICK, *WAITING, "--duration", 20, "--record", logs[-1], "--lcm", url(7836 + run))
+        result = program(
+            "run",
+            ARENA,
+            *QUICK,
+            *WAITING,
+            "--duration",
+            20,
+            "--record",
+            logs[-1],
+            "--lcm",
+            url(7836 + run),
+        )
         assert result.returncode == 0, result.stderr
     assert logs[0].read_bytes() == logs[1].read_bytes()
     seen = [[event for event in events(log) if event[1] != "ruedo/applied"] for log in logs]
     assert seen[0] == seen[2] and logs[0].read_bytes() != logs[2].read_bytes()
     found = events(logs[0])
     applied = [stamp for stamp, channel, _ in found if channel == "ruedo/applied"]
-    assert applied == [k * 100_000 for k in range(200)]    # message k acts on the state of its own scan
+    assert applied == [
+        k * 100_000 for k in range(200)
+    ]  # message k acts on the state of its own scan
     assert {"LASER", "p3at/odometry"} <= {channel for _, channel, _ in found}
     assert program("verify", logs[0]).returncode == 0
 
@@ -241,7 +343,7 @@ def test_a_controller_that_dies_is_said(bot_core):
         said.append(server.process.stderr.readline())
         assert said[-1], said
     assert "VELOCITY" in said[-1]
-    signs = []    # of life, one each second: time enough to say it again
+    signs = []  # of life, one each second: time enough to say it again
     bus = lcm.LCM(url(7833))
     bus.subscribe("ruedo/info", lambda channel, data: signs.append(data))
     until(lambda: bus.handle_timeout(100) and len(signs) >= 3)
@@ -249,8 +351,16 @@ def test_a_controller_that_dies_is_said(bot_core):
     assert code == 0 and "--wait-for wants message" not in errors
 
 
-@pytest.mark.parametrize("value, words", [("p3at/velocty@10", "did you mean 'p3at/velocity'"), ("p3at/velocity", "CHANNEL@HZ"),
-                                          ("p3at/velocity@0", "CHANNEL@HZ"), ("p3at/lrf@10", "no input channel"), ("p3at/velocity@x", "CHANNEL@HZ")])
+@pytest.mark.parametrize(
+    "value, words",
+    [
+        ("p3at/velocty@10", "did you mean 'p3at/velocity'"),
+        ("p3at/velocity", "CHANNEL@HZ"),
+        ("p3at/velocity@0", "CHANNEL@HZ"),
+        ("p3at/lrf@10", "no input channel"),
+        ("p3at/velocity@x", "CHANNEL@HZ"),
+    ],
+)
 def test_wait_for_is_read_strictly(value, words):
     result = program("run", ARENA, *QUICK, "--wait-for", value, "--lcm", url(7834))
     assert result.returncode == 2 and words in result.stderr

@@ -1,4 +1,5 @@
 """--sandbox: what a stranger's world or log may have is there, and nothing else; what comes of it is the same."""
+
 import os
 import shutil
 import socket
@@ -24,18 +25,36 @@ def place(tmp_path):
     (tmp_path / "world/models/cube/cube.obj").write_text(CUBE)
     (tmp_path / "elsewhere/cube.obj").write_text(CUBE)
     (tmp_path / "world/good.sdf").write_text(WORLD.format(mesh="model://cube/cube.obj"))
-    (tmp_path / "world/far.sdf").write_text(WORLD.format(mesh=f"file://{tmp_path}/elsewhere/cube.obj"))
+    (tmp_path / "world/far.sdf").write_text(
+        WORLD.format(mesh=f"file://{tmp_path}/elsewhere/cube.obj")
+    )
     return tmp_path
 
 
 def ruedo(place, *arguments):
     environment = {**os.environ, "XDG_CACHE_HOME": str(place / "cache")}
-    return subprocess.run([RUEDO, *map(str, arguments)], capture_output=True, text=True, env=environment, timeout=300)
+    return subprocess.run(
+        [RUEDO, *map(str, arguments)], capture_output=True, text=True, env=environment, timeout=300
+    )
 
 
 def run(place, log, *arguments, world="good.sdf"):
     address = f"unix://{place}/out/{log}.socket"
-    return ruedo(place, "run", place / "world" / world, "--quiet", "--rate", "max", "--duration", "1", "--lcm", address, "--record", place / "out" / log, *arguments)
+    return ruedo(
+        place,
+        "run",
+        place / "world" / world,
+        "--quiet",
+        "--rate",
+        "max",
+        "--duration",
+        "1",
+        "--lcm",
+        address,
+        "--record",
+        place / "out" / log,
+        *arguments,
+    )
 
 
 def messages(log):
@@ -49,10 +68,17 @@ def test_a_run_is_the_same_within(place):
     shutil.rmtree(place / "cache")
     (place / "cache").mkdir()
     walled = run(place, "walled.log", "--sandbox")
-    assert walled.returncode == 0 and "mesh" not in walled.stderr, walled    # imported by a child within
+    assert walled.returncode == 0 and "mesh" not in walled.stderr, (
+        walled
+    )  # imported by a child within
     assert messages(place / "out/free.log") == messages(place / "out/walled.log")
     for command in (["verify"], ["export"]):
-        done = ruedo(place, *command, place / "out/walled.log", *([place / "out/a.mcap"] if command == ["export"] else []))
+        done = ruedo(
+            place,
+            *command,
+            place / "out/walled.log",
+            *([place / "out/a.mcap"] if command == ["export"] else []),
+        )
         assert done.returncode == 0, done
 
 
@@ -70,7 +96,20 @@ def test_it_draws_and_views(place):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    done = ruedo(place, "run", ROOT / "worlds/arena.sdf", "--sandbox", "--rate", "max", "--duration", "0.3", "--lcm", f"unix://{place}/out/a.socket", "--view", f"127.0.0.1:{port}")
+    done = ruedo(
+        place,
+        "run",
+        ROOT / "worlds/arena.sdf",
+        "--sandbox",
+        "--rate",
+        "max",
+        "--duration",
+        "0.3",
+        "--lcm",
+        f"unix://{place}/out/a.socket",
+        "--view",
+        f"127.0.0.1:{port}",
+    )
     assert done.returncode == 0 and "renderer" not in done.stderr, done
 
 

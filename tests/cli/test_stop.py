@@ -1,4 +1,5 @@
 """A run ends soon after it is told to, however much work its modules have before them."""
+
 import os
 import signal
 import subprocess
@@ -15,7 +16,7 @@ WORLD = """<sdf version='1.9'><world name='w'><include><uri>model://ground_plane
 <ruedo:fleet name='r'><include><uri>model://p3at</uri></include><ruedo:count>200</ruedo:count></ruedo:fleet></world></sdf>"""
 
 
-PATIENCE = 400    # s
+PATIENCE = 400  # s
 
 
 def processor_seconds(process):
@@ -35,11 +36,18 @@ def test_it_does_not_wait_for_pictures(told, tmp_path):
     world, said = tmp_path / "w.sdf", tmp_path / "said"
     world.write_text(WORLD)
     # LCM over memory: nothing leaves the process.
-    with said.open("w") as out, subprocess.Popen([RUEDO, "run", world, "--rate", "max", "--lcm", "memq://"], stdout=out) as server:
+    with (
+        said.open("w") as out,
+        subprocess.Popen(
+            [RUEDO, "run", world, "--rate", "max", "--lcm", "memq://"], stdout=out
+        ) as server,
+    ):
         try:
-            until(lambda: said.read_text().count("\n") > 3, server)    # the list of channels, which is printed when all is loaded
+            until(
+                lambda: said.read_text().count("\n") > 3, server
+            )  # the list of channels, which is printed when all is loaded
             loaded = processor_seconds(server)
-            until(lambda: processor_seconds(server) > loaded + 4.0, server)    # in the midst of it
+            until(lambda: processor_seconds(server) > loaded + 4.0, server)  # in the midst of it
             before = processor_seconds(server)
             server.send_signal(told)
             _, status, used = os.wait4(server.pid, 0)
@@ -56,7 +64,9 @@ EMPTY = """<sdf version='1.9'><world name='w'><include><uri>model://ground_plane
 
 def verified(log, world):
     """A log that has its end repeats as a whole."""
-    repeated = subprocess.run([RUEDO, "verify", log], capture_output=True, text=True, cwd=world.parent)
+    repeated = subprocess.run(
+        [RUEDO, "verify", log], capture_output=True, text=True, cwd=world.parent
+    )
     assert repeated.returncode == 0, repeated.stdout + repeated.stderr
     assert "the end of the run is not in it" not in repeated.stdout + repeated.stderr
 
@@ -64,7 +74,13 @@ def verified(log, world):
 def test_a_closed_terminal_leaves_a_whole_log(tmp_path):
     world, said, log = tmp_path / "w.sdf", tmp_path / "said", tmp_path / "run.lcm"
     world.write_text(EMPTY)
-    with said.open("w") as out, subprocess.Popen([RUEDO, "run", world, "--lcm", "memq://", "--disable", "p3at/camera", "--record", log], stdout=out) as server:
+    with (
+        said.open("w") as out,
+        subprocess.Popen(
+            [RUEDO, "run", world, "--lcm", "memq://", "--disable", "p3at/camera", "--record", log],
+            stdout=out,
+        ) as server,
+    ):
         until(lambda: said.read_text().count("\n") > 3, server)
         server.send_signal(signal.SIGHUP)
         assert server.wait(PATIENCE) == 0
@@ -74,7 +90,12 @@ def test_a_closed_terminal_leaves_a_whole_log(tmp_path):
 def test_nohup_outlives_its_terminal(tmp_path):
     world, said = tmp_path / "w.sdf", tmp_path / "said"
     world.write_text(EMPTY)
-    with said.open("w") as out, subprocess.Popen(["nohup", RUEDO, "run", world, "--lcm", "memq://", "--duration", "2"], stdout=out) as server:
+    with (
+        said.open("w") as out,
+        subprocess.Popen(
+            ["nohup", RUEDO, "run", world, "--lcm", "memq://", "--duration", "2"], stdout=out
+        ) as server,
+    ):
         until(lambda: said.read_text().count("\n") > 3, server)
         server.send_signal(signal.SIGHUP)
         assert server.wait(PATIENCE) == 0
@@ -86,7 +107,10 @@ def test_a_pipe_that_nobody_reads_leaves_a_whole_log(tmp_path):
     world.write_text(EMPTY)
     read, write = os.pipe()
     os.close(read)
-    server = subprocess.Popen([RUEDO, "run", world, "--lcm", "memq://", "--disable", "p3at/camera", "--record", log], stdout=write)
+    server = subprocess.Popen(
+        [RUEDO, "run", world, "--lcm", "memq://", "--disable", "p3at/camera", "--record", log],
+        stdout=write,
+    )
     os.close(write)
     assert server.wait(PATIENCE) == 0
     verified(log, world)

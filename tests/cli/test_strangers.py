@@ -1,4 +1,5 @@
 """Files of strangers: logs that name what they should not, and small files that would cost much. Each ends soon, in one line."""
+
 import hashlib
 import os
 import resource
@@ -9,7 +10,7 @@ from ruedo.lcmtypes import log_file_t, log_header_t
 
 from recorded import events, program, url, write
 
-WORLD = ("<sdf version='1.9'><world name='w'><model name='m'><link name='l'><sensor name='imu' type='imu'/></link></model></world></sdf>")
+WORLD = "<sdf version='1.9'><world name='w'><model name='m'><link name='l'><sensor name='imu' type='imu'/></link></model></world></sdf>"
 SECRET = "<secret>the words of another</secret>"
 
 
@@ -20,7 +21,19 @@ def recorded(tmp_path_factory):
     folder.mkdir()
     (folder / "w.sdf").write_text(WORLD)
     log = folder / "good.log"
-    result = program("run", folder / "w.sdf", "--quiet", "--rate", "max", "--duration", "0.2", "--record", log, "--lcm", url(7841))
+    result = program(
+        "run",
+        folder / "w.sdf",
+        "--quiet",
+        "--rate",
+        "max",
+        "--duration",
+        "0.2",
+        "--record",
+        log,
+        "--lcm",
+        url(7841),
+    )
     assert result.returncode == 0, result
     return folder, events(log)
 
@@ -45,6 +58,7 @@ def names(path, digest="0" * 64):
         file = log_file_t()
         file.path, file.sha256 = str(path), digest
         header.files.append(file)
+
     return change
 
 
@@ -73,40 +87,107 @@ def test_a_log_that_names_other_files(recorded, kind, tmp_path):
 
 
 def test_a_log_allows_nothing_by_itself(recorded, tmp_path):
-    (tmp_path / "model.sdf").write_text("<sdf version='1.9'><model name='far'><link name='l'/></model></sdf>")
+    (tmp_path / "model.sdf").write_text(
+        "<sdf version='1.9'><model name='far'><link name='l'/></model></sdf>"
+    )
     folder, _ = recorded
-    (folder / "absolute.sdf").write_text(WORLD.replace("<model", f"<include><uri>{tmp_path}/model.sdf</uri></include><model", 1))
+    (folder / "absolute.sdf").write_text(
+        WORLD.replace("<model", f"<include><uri>{tmp_path}/model.sdf</uri></include><model", 1)
+    )
 
     def change(header):
         header.options.append("--allow-absolute")
         header.files = [file for file in header.files]
         header.files[0].path = header.world_file = str(folder / "absolute.sdf")
         header.files[0].sha256 = hashlib.sha256((folder / "absolute.sdf").read_bytes()).hexdigest()
+
     result = program("verify", with_header(recorded, "absolute.log", change))
-    assert result.returncode == 0, result    # without the model from elsewhere the run is the one that was recorded
+    assert result.returncode == 0, (
+        result
+    )  # without the model from elsewhere the run is the one that was recorded
 
 
 def test_escapes_of_a_log_stay_out_of_the_terminal(recorded, tmp_path):
     def change(header):
         header.files[0].path = "/nowhere/\x1b[31mred\x1b]0;title\x07"
+
     result = program("export", with_header(recorded, "escapes.log", change), tmp_path / "out.mcap")
-    assert "\x1b" not in result.stdout + result.stderr and "\x07" not in result.stdout + result.stderr, result
+    assert (
+        "\x1b" not in result.stdout + result.stderr and "\x07" not in result.stdout + result.stderr
+    ), result
 
 
 def tiff(width, height):
-    entries = [(256, 4, 1, width), (257, 4, 1, height), (258, 3, 1, 8), (259, 3, 1, 5), (262, 3, 1, 1), (273, 4, 1, 200), (277, 3, 1, 1), (278, 4, 1, height), (279, 4, 1, 30)]
-    return b"II*\0" + struct.pack("<IH", 8, len(entries)) + b"".join(struct.pack("<HHII", *e) for e in entries) + bytes(4) + bytes(30000)
+    entries = [
+        (256, 4, 1, width),
+        (257, 4, 1, height),
+        (258, 3, 1, 8),
+        (259, 3, 1, 5),
+        (262, 3, 1, 1),
+        (273, 4, 1, 200),
+        (277, 3, 1, 1),
+        (278, 4, 1, height),
+        (279, 4, 1, 30),
+    ]
+    return (
+        b"II*\0"
+        + struct.pack("<IH", 8, len(entries))
+        + b"".join(struct.pack("<HHII", *e) for e in entries)
+        + bytes(4)
+        + bytes(30000)
+    )
 
 
 COSTLY = {
-    "a large TIFF as a map": ("map.tiff", tiff(30000, 30000), ["import", "{0}", "--resolution", "0.1"], "30000 x 30000 pixels"),
-    "a checkerboard": ("map.pgm", b"P5\n4000 4000\n255\n" + (bytes([0, 255] * 2000) + bytes([255, 0] * 2000)) * 2000, ["import", "{0}", "--resolution", "0.1"], "walls"),
-    "attributes": ("w.sdf", ("<sdf version='1.9'><world name='w' " + " ".join(f"a{i}='1'" for i in range(10000)) + "/></sdf>").encode(), ["check", "{0}"], "64 attributes"),
-    "boxes in one place": ("w.sdf", ("<sdf version='1.9'><world name='w'>" + "".join(
-        f"<model name='m{i}'><link name='l'><collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision></link></model>" for i in range(3000)) +
-        "</world></sdf>").encode(), ["check", "{0}"], "200000 pairs"),
-    "depth": ("w.sdf", b"<sdf version='1.9'>" + b"<a>" * 300 + b"</a>" * 300 + b"</sdf>", ["check", "{0}"], "nested too deep"),
-    "text": ("w.sdf", b"<sdf version='1.9'><world name='w'><gravity>" + b"1 " * 600000 + b"</gravity></world></sdf>", ["check", "{0}"], "a text of"),
+    "a large TIFF as a map": (
+        "map.tiff",
+        tiff(30000, 30000),
+        ["import", "{0}", "--resolution", "0.1"],
+        "30000 x 30000 pixels",
+    ),
+    "a checkerboard": (
+        "map.pgm",
+        b"P5\n4000 4000\n255\n" + (bytes([0, 255] * 2000) + bytes([255, 0] * 2000)) * 2000,
+        ["import", "{0}", "--resolution", "0.1"],
+        "walls",
+    ),
+    "attributes": (
+        "w.sdf",
+        (
+            "<sdf version='1.9'><world name='w' "
+            + " ".join(f"a{i}='1'" for i in range(10000))
+            + "/></sdf>"
+        ).encode(),
+        ["check", "{0}"],
+        "64 attributes",
+    ),
+    "boxes in one place": (
+        "w.sdf",
+        (
+            "<sdf version='1.9'><world name='w'>"
+            + "".join(
+                f"<model name='m{i}'><link name='l'><collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision></link></model>"
+                for i in range(3000)
+            )
+            + "</world></sdf>"
+        ).encode(),
+        ["check", "{0}"],
+        "200000 pairs",
+    ),
+    "depth": (
+        "w.sdf",
+        b"<sdf version='1.9'>" + b"<a>" * 300 + b"</a>" * 300 + b"</sdf>",
+        ["check", "{0}"],
+        "nested too deep",
+    ),
+    "text": (
+        "w.sdf",
+        b"<sdf version='1.9'><world name='w'><gravity>"
+        + b"1 " * 600000
+        + b"</gravity></world></sdf>",
+        ["check", "{0}"],
+        "a text of",
+    ),
 }
 
 
@@ -114,16 +195,29 @@ def three_gigabytes():
     resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30))
 
 
-@pytest.mark.parametrize("kind, value, words", [(resource.RLIMIT_NOFILE, 5, "ulimit -n"), (resource.RLIMIT_NOFILE, 12, "ulimit -n"), (resource.RLIMIT_AS, 600_000_000, "ulimit -v")])
+@pytest.mark.parametrize(
+    "kind, value, words",
+    [
+        (resource.RLIMIT_NOFILE, 5, "ulimit -n"),
+        (resource.RLIMIT_NOFILE, 12, "ulimit -n"),
+        (resource.RLIMIT_AS, 600_000_000, "ulimit -v"),
+    ],
+)
 @pytest.mark.parametrize("command", ["run", "check"])
 def test_limits_of_the_shell_are_named(kind, value, words, command, recorded):
-    result = program(command, recorded[0] / "w.sdf", preexec_fn=lambda: resource.setrlimit(kind, (value, value)))
-    assert result.returncode == 4 and result.stderr.count("\n") == 1 and words in result.stderr, result
+    result = program(
+        command, recorded[0] / "w.sdf", preexec_fn=lambda: resource.setrlimit(kind, (value, value))
+    )
+    assert result.returncode == 4 and result.stderr.count("\n") == 1 and words in result.stderr, (
+        result
+    )
 
 
 @pytest.mark.parametrize("name", COSTLY)
 def test_what_costs_much_is_refused(name, tmp_path):
     file, content, arguments, words = COSTLY[name]
     (tmp_path / file).write_bytes(content)
-    result = program(*[a.format(tmp_path / file) for a in arguments], preexec_fn=three_gigabytes)    # what is refused is never made
+    result = program(
+        *[a.format(tmp_path / file) for a in arguments], preexec_fn=three_gigabytes
+    )  # what is refused is never made
     assert result.returncode == 3 and words in result.stdout + result.stderr, result

@@ -1,5 +1,6 @@
 """What check can load, run runs, and what it cannot, run refuses with the same words: over every bad file there is. And values
 that no robot needs: each is named with its place and what is allowed; where the rest of the world can do without it, it runs."""
+
 import json
 import os
 import subprocess
@@ -10,10 +11,12 @@ import pytest
 from test_check import FILES, in_link, world
 
 RUEDO = os.environ["RUEDO"]
-PATIENCE = 300    # s
+PATIENCE = 300  # s
 
-LIDAR = ("<sensor name='s' type='ray'>{0}<ray><scan><horizontal><samples>{samples}</samples><min_angle>{low}</min_angle><max_angle>{high}</max_angle>"
-         "</horizontal></scan><range><min>{near}</min><max>{far}</max></range></ray></sensor>")
+LIDAR = (
+    "<sensor name='s' type='ray'>{0}<ray><scan><horizontal><samples>{samples}</samples><min_angle>{low}</min_angle><max_angle>{high}</max_angle>"
+    "</horizontal></scan><range><min>{near}</min><max>{far}</max></range></ray></sensor>"
+)
 
 
 def lidar(inside="", samples="8", low="-1", high="1", near="0.1", far="10"):
@@ -30,38 +33,88 @@ def shape(geometry):
 
 
 def joint(inside="", mass="1", more=""):
-    return world("<gravity>0 0 -9.8</gravity><model name='m'>" + more + "<link name='a'/>"
-                 f"<link name='b'><pose>1 0 0 0 0 0</pose><inertial><mass>{mass}</mass></inertial></link>"
-                 f"<joint name='j' type='revolute'><parent>a</parent><child>b</child><axis><xyz>0 1 0</xyz>{inside}</axis></joint></model>")
+    return world(
+        "<gravity>0 0 -9.8</gravity><model name='m'>" + more + "<link name='a'/>"
+        f"<link name='b'><pose>1 0 0 0 0 0</pose><inertial><mass>{mass}</mass></inertial></link>"
+        f"<joint name='j' type='revolute'><parent>a</parent><child>b</child><axis><xyz>0 1 0</xyz>{inside}</axis></joint></model>"
+    )
 
 
 def path(*waypoints):
-    return world("<model name='m'><link name='l'/><ruedo:path>" + "".join(f"<ruedo:waypoint>{w}</ruedo:waypoint>\n" for w in waypoints) + "</ruedo:path></model>")
+    return world(
+        "<model name='m'><link name='l'/><ruedo:path>"
+        + "".join(f"<ruedo:waypoint>{w}</ruedo:waypoint>\n" for w in waypoints)
+        + "</ruedo:path></model>"
+    )
 
 
 def trajectory(*times):
-    return world("<actor name='a'><script><trajectory id='0' type='w'>" + "".join(
-        f"<waypoint><time>{t}</time><pose>0 0 0 0 0 0</pose></waypoint>\n" for t in times) + "</trajectory></script></actor>")
+    return world(
+        "<actor name='a'><script><trajectory id='0' type='w'>"
+        + "".join(f"<waypoint><time>{t}</time><pose>0 0 0 0 0 0</pose></waypoint>\n" for t in times)
+        + "</trajectory></script></actor>"
+    )
 
 
 HUGE = ("1e300", "-1e300", "1e101", "nan", "inf", "1e10000")
 # World, and a part of the error; None: it is good, or named and run.
 BAD = {
     **{f"gravity {v}": (world(f"<gravity>{v} 0.1 -9.7</gravity>"), "gravity") for v in HUGE},
-    **{f"gravity of the old kind {v}": (world(f"<physics type='ode'><gravity>{v} 0.1 -9.7</gravity></physics>" + joint()[len("<sdf version='1.9'>\n<world name='w'>\n"):-len("\n</world></sdf>")]), "gravity") for v in HUGE},
+    **{
+        f"gravity of the old kind {v}": (
+            world(
+                f"<physics type='ode'><gravity>{v} 0.1 -9.7</gravity></physics>"
+                + joint()[len("<sdf version='1.9'>\n<world name='w'>\n") : -len("\n</world></sdf>")]
+            ),
+            "gravity",
+        )
+        for v in HUGE
+    },
     **{f"pose {v}": (in_link(f"<pose>{v} 0 0 0 0 0</pose>"), "pose") for v in HUGE},
     **{f"box {v}": (shape(f"<box><size>1 {v} 1</size></box>"), "size") for v in HUGE},
     **{f"sphere {v}": (shape(f"<sphere><radius>{v}</radius></sphere>"), "radius") for v in HUGE},
     **{f"plane {v}": (shape(f"<plane><normal>0 0 {v}</normal></plane>"), "normal") for v in HUGE},
-    **{f"mass {v}": (link(f"<inertial><mass>{v}</mass></inertial>"), "mass") for v in ("1e300", "nan", "inf", "1e10000")},
-    **{f"moment {v}": (link(f"<inertial><inertia><ixx>{v}</ixx></inertia></inertial>"), "ixx") for v in ("1e300", "-1e300", "inf")},
-    **{f"density {v}": (link(f"<inertial auto='true'><density>{v}</density></inertial><collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"), "density") for v in HUGE},
-    **{f"rate {v}": (lidar(f"<update_rate>{v}</update_rate>"), "update_rate") for v in (*HUGE, "-3", "1e9", "1000001", "0.0000000001", "1e-300")},
-    **{f"phase {v}": (lidar(f"<ruedo:phase>{v}</ruedo:phase>"), "phase") for v in (*HUGE, "-1", "9.3e12", "1e13", "1000000001")},
-    **{f"samples {v}": (lidar(samples=v), "samples") for v in (*HUGE, "-1", "1e18", "9223372036854775807", "1.5")},
+    **{
+        f"mass {v}": (link(f"<inertial><mass>{v}</mass></inertial>"), "mass")
+        for v in ("1e300", "nan", "inf", "1e10000")
+    },
+    **{
+        f"moment {v}": (link(f"<inertial><inertia><ixx>{v}</ixx></inertia></inertial>"), "ixx")
+        for v in ("1e300", "-1e300", "inf")
+    },
+    **{
+        f"density {v}": (
+            link(
+                f"<inertial auto='true'><density>{v}</density></inertial><collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"
+            ),
+            "density",
+        )
+        for v in HUGE
+    },
+    **{
+        f"rate {v}": (lidar(f"<update_rate>{v}</update_rate>"), "update_rate")
+        for v in (*HUGE, "-3", "1e9", "1000001", "0.0000000001", "1e-300")
+    },
+    **{
+        f"phase {v}": (lidar(f"<ruedo:phase>{v}</ruedo:phase>"), "phase")
+        for v in (*HUGE, "-1", "9.3e12", "1e13", "1000000001")
+    },
+    **{
+        f"samples {v}": (lidar(samples=v), "samples")
+        for v in (*HUGE, "-1", "1e18", "9223372036854775807", "1.5")
+    },
     **{f"range {v}": (lidar(far=v), "max") for v in HUGE},
-    **{f"axis {v}": (joint(f"<dynamics><damping>{v}</damping></dynamics>"), "damping") for v in HUGE},
-    **{f"step {v}": (world(f"<physics type='ode'><max_step_size>{v}</max_step_size></physics>"), "max_step_size") for v in (*HUGE, "0", "-1", "1e-9", "2")},
+    **{
+        f"axis {v}": (joint(f"<dynamics><damping>{v}</damping></dynamics>"), "damping")
+        for v in HUGE
+    },
+    **{
+        f"step {v}": (
+            world(f"<physics type='ode'><max_step_size>{v}</max_step_size></physics>"),
+            "max_step_size",
+        )
+        for v in (*HUGE, "0", "-1", "1e-9", "2")
+    },
     **{f"waypoint at {v}": (path("0 0 0 0 0 0 0", f"{v} 1 0 0 0 0 0"), "waypoint") for v in HUGE},
     **{f"waypoint to {v}": (path("0 0 0 0 0 0 0", f"1 {v} 0 0 0 0 0"), "waypoint") for v in HUGE},
     "waypoints out of order": (path("1 0 0 0 0 0 0", "0 1 0 0 0 0 0"), "not after the one before"),
@@ -71,8 +124,16 @@ BAD = {
     **{f"time of an actor {v}": (trajectory(0, v), "time") for v in HUGE},
     "mass of nothing": (link("<inertial><mass>1e-300</mass></inertial>"), None),
     "axis of a heavy world": (joint(mass="1e9"), None),
-    **{name: (text, None) for name, (text, others, code, _) in FILES.items() if not others and code < 3},
-    **{name: (text, "") for name, (text, others, code, _) in FILES.items() if not others and code == 3},
+    **{
+        name: (text, None)
+        for name, (text, others, code, _) in FILES.items()
+        if not others and code < 3
+    },
+    **{
+        name: (text, "")
+        for name, (text, others, code, _) in FILES.items()
+        if not others and code == 3
+    },
 }
 
 
@@ -97,9 +158,14 @@ def test_check_and_run_agree(name, tmp_path):
     assert any(part in error["text"] for error in errors), (checked, run)
     if run.returncode == 3:
         assert len(errors) == 1 and message.count("\n") == 1, (checked, run)
-        assert f"{file}:{errors[0]['line']}: {errors[0]['text']}" in message or errors[0]["line"] == 0, (checked, run)
+        assert (
+            f"{file}:{errors[0]['line']}: {errors[0]['text']}" in message or errors[0]["line"] == 0
+        ), (checked, run)
     else:
-        assert checked.returncode == 1 and all(error["text"] in message for error in errors), (checked, run)
+        assert checked.returncode == 1 and all(error["text"] in message for error in errors), (
+            checked,
+            run,
+        )
 
 
 WALL = "<model name='wall'><static>true</static><link name='l'><collision name='c'><geometry><box><size>1 1 2</size></box></geometry></collision></link></model>"
@@ -108,11 +174,28 @@ WALL = "<model name='wall'><static>true</static><link name='l'><collision name='
 @pytest.mark.parametrize("x, stuck", [(0.2, True), (3, False)])
 def test_a_robot_that_stands_in_a_wall_is_named(x, stuck, tmp_path):
     file = tmp_path / "w.sdf"
-    file.write_text(world(WALL + f"\n<include><uri>model://p3at</uri><pose>{x} 0 0 0 0 0</pose></include>"), encoding="utf-8")
+    file.write_text(
+        world(WALL + f"\n<include><uri>model://p3at</uri><pose>{x} 0 0 0 0 0</pose></include>"),
+        encoding="utf-8",
+    )
     checked = ruedo("check", str(file), "--json")
-    run = ruedo("run", str(file), "--quiet", "--rate", "max", "--duration", "0.1", "--disable", "p3at/camera")
+    run = ruedo(
+        "run",
+        str(file),
+        "--quiet",
+        "--rate",
+        "max",
+        "--duration",
+        "0.1",
+        "--disable",
+        "p3at/camera",
+    )
     named = [f for f in json.loads(checked.stdout) if "stands in 'wall'" in f["text"]]
-    assert (len(named) == 1) == stuck and ("stands in 'wall'" in run.stderr.decode()) == stuck and run.returncode == 0
+    assert (
+        (len(named) == 1) == stuck
+        and ("stands in 'wall'" in run.stderr.decode()) == stuck
+        and run.returncode == 0
+    )
     assert checked.returncode == stuck
     spawned = ruedo("check", str(Path(os.environ["RUEDO_SOURCE_DIR"]) / "worlds/arena.sdf"))
     assert spawned.returncode == 0, spawned

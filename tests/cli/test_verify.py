@@ -1,4 +1,5 @@
 """ruedo verify: a recorded run is repeated, and what is not the same is named; logs that are damaged, cut off or no logs."""
+
 import os
 import random
 import signal
@@ -7,8 +8,21 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from recorded import ARENA, BOX, PATIENCE, QUICK, RUEDO, Server, events, program, record, until, url, write
-from recorded import no_process_outlives_its_test    # a fixture of every test here
+from recorded import (
+    ARENA,
+    BOX,
+    PATIENCE,
+    QUICK,
+    RUEDO,
+    Server,
+    events,
+    program,
+    record,
+    until,
+    url,
+    write,
+)
+from recorded import no_process_outlives_its_test  # a fixture of every test here
 from ruedo.lcmtypes import applied_t, log_header_t, planar_lidar_t, state_hash_t
 
 
@@ -54,7 +68,9 @@ def test_verifies_a_driven_run(driven, threads):
 
 def test_state_hash_each_second_and_at_the_end(tmp_path):
     found = record(tmp_path / "a.lcm", seconds=2.5)
-    hashes = [state_hash_t.decode(data) for _, channel, data in found if channel == "ruedo/state_hash"]
+    hashes = [
+        state_hash_t.decode(data) for _, channel, data in found if channel == "ruedo/state_hash"
+    ]
     assert [h.utime for h in hashes] == [0, 1_000_000, 2_000_000, 2_500_000]
     assert [h.last for h in hashes] == [False, False, False, True]
     assert len({h.state_hash for h in hashes}) == 4
@@ -62,7 +78,11 @@ def test_state_hash_each_second_and_at_the_end(tmp_path):
 
 def test_names_the_first_channel_step_and_field(tmp_path):
     found = record(tmp_path / "good.lcm")
-    at = max(i for i, (stamp, channel, _) in enumerate(found) if channel == "p3at/lrf" and stamp <= 1_500_000)
+    at = max(
+        i
+        for i, (stamp, channel, _) in enumerate(found)
+        if channel == "p3at/lrf" and stamp <= 1_500_000
+    )
     stamp, channel, data = found[at]
     scan = planar_lidar_t.decode(data)
     ranges = list(scan.ranges)
@@ -80,7 +100,10 @@ def test_names_the_first_channel_step_and_field(tmp_path):
     write(tmp_path / "short.lcm", found)
     result = program("verify", tmp_path / "short.lcm")
     assert result.returncode == 1
-    assert f" at step {stamp // step_us} (" in result.stdout and "the log has a message on" in result.stdout
+    assert (
+        f" at step {stamp // step_us} (" in result.stdout
+        and "the log has a message on" in result.stdout
+    )
     assert f"the repetition a message on p3at/lrf at stamp {stamp} us" in result.stdout
 
 
@@ -121,7 +144,11 @@ def test_another_machine_is_said_first_and_is_no_nondeterminism(tmp_path):
     assert result.returncode == 0
     lines = result.stdout.splitlines()
     assert [line.split(":")[1].strip() for line in lines[:2]] == ["processor", "libraries"]
-    assert "aarch64" in lines[0] and "libBulletCollision.so.1.0" in lines[1] and "byte for byte" in lines[2]
+    assert (
+        "aarch64" in lines[0]
+        and "libBulletCollision.so.1.0" in lines[1]
+        and "byte for byte" in lines[2]
+    )
 
     at = next(i for i, (_, channel, _) in enumerate(found) if channel == "p3at/odometry")
     found[at] = (*found[at][:2], found[at][2][:-1] + bytes([found[at][2][-1] ^ 1]))
@@ -137,7 +164,7 @@ def test_another_cpu_or_c_library_is_no_excuse(tmp_path):
     header.cpu, header.libc = "x86-64 sse4.2", "glibc 2.19"
     at = next(i for i, (_, channel, _) in enumerate(found) if channel == "p3at/odometry")
     found[at] = (*found[at][:2], found[at][2][:-1] + bytes([found[at][2][-1] ^ 1]))
-    for options, code in (([], 1), (["--fast-pixels"], 4)):    # those are drawn with what the CPU has
+    for options, code in (([], 1), (["--fast-pixels"], 4)):  # those are drawn with what the CPU has
         header.options, header.noptions = options, len(options)
         found[0] = (*found[0][:2], header.encode())
         write(tmp_path / "other.lcm", found)
@@ -150,26 +177,39 @@ def test_killed_in_the_middle(tmp_path):
     server = Server(7823, "--rate", "max", "--record", log)
     until(lambda: log.exists() and log.stat().st_size > 3_000_000)
     assert server.end(signal.SIGKILL)[0] == -signal.SIGKILL
-    begin = log.read_bytes().index(b"\xed\xa1\xda\x01", 2_000_000)    # of an event
-    os.truncate(log, begin + 40)    # and cut within it, wherever the kill was
+    begin = log.read_bytes().index(b"\xed\xa1\xda\x01", 2_000_000)  # of an event
+    os.truncate(log, begin + 40)  # and cut within it, wherever the kill was
     result = program("verify", log)
     assert result.returncode == 0, result.stdout + result.stderr
     assert "cut off" in result.stdout and "verified up to there" in result.stdout
 
-    whole = events(log)    # a kill between two events leaves no damage; that the end is missing is seen all the same
+    whole = events(
+        log
+    )  # a kill between two events leaves no damage; that the end is missing is seen all the same
     write(tmp_path / "whole.lcm", whole)
     result = program("verify", tmp_path / "whole.lcm")
-    assert result.returncode == 0 and "the end of the run is not in it; verified up to there" in result.stdout
+    assert (
+        result.returncode == 0
+        and "the end of the run is not in it; verified up to there" in result.stdout
+    )
 
 
 def test_a_full_disk(tmp_path):
     log = tmp_path / "full.lcm"
     command = f"ulimit -f 2000; exec {RUEDO} run {ARENA} {' '.join(QUICK)} --rate max --duration 600 --record {log} --lcm '{url(7824)}'"
     # Python ignores SIGXFSZ; its child does too, and is told by the write that there is no room.
-    result = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=PATIENCE, restore_signals=False)
+    result = subprocess.run(
+        ["sh", "-c", command],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        restore_signals=False,
+    )
     assert result.returncode == 4 and "readable up to" in result.stderr
     result = program("verify", log)
-    assert result.returncode == 0 and "verified up to there" in result.stdout, result.stdout + result.stderr
+    assert result.returncode == 0 and "verified up to there" in result.stdout, (
+        result.stdout + result.stderr
+    )
 
 
 def test_what_is_no_recording(tmp_path):
@@ -185,7 +225,9 @@ def test_damaged_logs_are_answered(tmp_path):
     record(tmp_path / "good.lcm", seconds=1)
     good = (tmp_path / "good.lcm").read_bytes()
     dice = random.Random(3)
-    header = good.index(b"p3at/", 100)    # the first message of a robot: before it, almost all is text
+    header = good.index(
+        b"p3at/", 100
+    )  # the first message of a robot: before it, almost all is text
     for k in range(60):
         bad = bytearray(good)
         for _ in range(dice.choice([1, 3])):
@@ -194,9 +236,17 @@ def test_damaged_logs_are_answered(tmp_path):
         assert program("verify", tmp_path / "bad.lcm").returncode in (0, 1, 3, 4)
 
 
-@pytest.mark.parametrize("option, words", [("--disable=p3at/ca}era", "no device 'ca}era'"), ("--disable=P3at/camera", "no robot 'P3at'"),
-                                           ("--set=p3at/lrf.update_rate", "--set 'p3at/lrf.update_rate'"), ("--remap=x", "--remap 'x'"),
-                                           ("--remap=p3at/nothing=A", "p3at/nothing"), ("--spawn=p3at@1", "--spawn 'p3at@1'")])
+@pytest.mark.parametrize(
+    "option, words",
+    [
+        ("--disable=p3at/ca}era", "no device 'ca}era'"),
+        ("--disable=P3at/camera", "no robot 'P3at'"),
+        ("--set=p3at/lrf.update_rate", "--set 'p3at/lrf.update_rate'"),
+        ("--remap=x", "--remap 'x'"),
+        ("--remap=p3at/nothing=A", "p3at/nothing"),
+        ("--spawn=p3at@1", "--spawn 'p3at@1'"),
+    ],
+)
 def test_a_damaged_option_is_the_logs_fault(tmp_path, option, words):
     found = record(tmp_path / "good.lcm", seconds=1)
     header = log_header_t.decode(found[0][2])

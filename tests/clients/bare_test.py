@@ -15,7 +15,7 @@ from docs_code import blocks
 
 HALL = str(HERE / "hall.sdf")
 LCM_GEN = shutil.which("lcm-gen", path=f"{Path(sys.executable).parent}:{os.environ['PATH']}")
-WHEEL = Path(lcm.__file__).resolve().parent.parent    # headers and liblcm.so of LCM 1.5.3
+WHEEL = Path(lcm.__file__).resolve().parent.parent  # headers and liblcm.so of LCM 1.5.3
 
 
 def run_in(folder, script):
@@ -42,11 +42,18 @@ def test_python(tmp_path):
     run_in(tmp_path, page["bare_python_types"].replace("pip install lcm==1.5.3", "true"))
     (tmp_path / "client.py").write_text(page["bare_python"])
     with ruedo_run("--no-noise", "--disable", "p3at/camera", world=HALL) as server:
-        done = subprocess.run([sys.executable, "client.py"], cwd=tmp_path, env=bare(server), capture_output=True, text=True, timeout=PATIENCE)
+        done = subprocess.run(
+            [sys.executable, "client.py"],
+            cwd=tmp_path,
+            env=bare(server),
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+        )
     assert done.returncode == 0, done.stderr
     lines = check_scans(done.stdout)
     assert all(line[1] == "181" for line in lines)
-    assert float(lines[0][2]) > float(lines[-1][2]) + 0.1    # it drove towards the wall
+    assert float(lines[0][2]) > float(lines[-1][2]) + 0.1  # it drove towards the wall
 
 
 def c_client(folder, headers, library):
@@ -65,9 +72,14 @@ def library_of(version):
             headers = next(WHEEL.glob("**/lcm/lcm.h")).parent.parent
     else:
         root = Path(os.environ.get("RUEDO_LCM_131", "/nonexistent"))
-        libraries = [*root.glob("usr/lib/*/liblcm.so.1.3*"), *Path("/usr/lib").glob("*/liblcm.so.1.3*")]
+        libraries = [
+            *root.glob("usr/lib/*/liblcm.so.1.3*"),
+            *Path("/usr/lib").glob("*/liblcm.so.1.3*"),
+        ]
         if not libraries:
-            pytest.skip("no LCM 1.3.1 here: neither liblcm-dev is installed nor could fetch_lcm131.sh get it")
+            pytest.skip(
+                "no LCM 1.3.1 here: neither liblcm-dev is installed nor could fetch_lcm131.sh get it"
+            )
         library = libraries[0]
         headers = root / "usr/include" if root.exists() else Path("/usr/include")
     return headers, library
@@ -77,10 +89,18 @@ def library_of(version):
 def test_c(tmp_path, version):
     headers, library = library_of(version)
     c_client(tmp_path, headers, library)
-    linked = subprocess.run(["ldd", str(tmp_path / "client")], capture_output=True, text=True).stdout
+    linked = subprocess.run(
+        ["ldd", str(tmp_path / "client")], capture_output=True, text=True
+    ).stdout
     assert str(library.parent) in linked
     with ruedo_run("--no-noise", "--disable", "p3at/camera", world=HALL) as server:
-        done = subprocess.run([str(tmp_path / "client")], env=bare(server), capture_output=True, text=True, timeout=PATIENCE)
+        done = subprocess.run(
+            [str(tmp_path / "client")],
+            env=bare(server),
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+        )
     assert done.returncode == 0, done.stderr
     lines = check_scans(done.stdout)
     assert lines[0][0] == "p3at/lrf" and lines[0][2] == "181"
@@ -103,7 +123,9 @@ class Bare:
             self.bus.handle_timeout(100)
             if any(ready(message) for message in self.heard):
                 return
-        pytest.fail(f"it did not happen within {seconds} s; the last message was {self.heard and vars_of(self.heard[-1])}")
+        pytest.fail(
+            f"it did not happen within {seconds} s; the last message was {self.heard and vars_of(self.heard[-1])}"
+        )
 
 
 def vars_of(message):
@@ -122,9 +144,11 @@ def test_the_watchdog_stops_a_command_that_is_not_repeated():
         bare.until(lambda m: m.kind == m.KIND_VELOCITY and m.state == m.STATE_RUNNING)
         bare.until(lambda m: m.state == m.STATE_ENDED and m.reason == m.REASON_WATCHDOG)
         end = bare.heard[-1].utime
-        bare.until(lambda m: m.utime > end + 300000)    # the terminal hears of it with the next tick, and not again
+        bare.until(
+            lambda m: m.utime > end + 300000
+        )  # the terminal hears of it with the next tick, and not again
         output = server.end()
-    assert output.count("watchdog") == 1, output    # said once on the terminal
+    assert output.count("watchdog") == 1, output  # said once on the terminal
 
 
 def test_a_primitive_needs_no_repeating():
@@ -145,8 +169,10 @@ def test_a_refused_primitive_says_why():
     with ruedo_run("--disable", "p3at/camera", world=HALL) as server:
         bare = Bare(server.url)
         bare.listen("p3at/motion", motion_status_t)
-        for id, kind, value, reason in ((5, move_command_t.ADVANCE, float("nan"), motion_status_t.REASON_NOT_FINITE),
-                                        (6, 99, 1.0, motion_status_t.REASON_BAD_KIND)):
+        for id, kind, value, reason in (
+            (5, move_command_t.ADVANCE, float("nan"), motion_status_t.REASON_NOT_FINITE),
+            (6, 99, 1.0, motion_status_t.REASON_BAD_KIND),
+        ):
             command = move_command_t()
             command.id, command.kind, command.value = id, kind, value
             bare.bus.publish("p3at/move", command.encode())

@@ -6,9 +6,9 @@ import pytest
 from conftest import HERE, PATIENCE, probe, ruedo_run
 
 HALL = str(HERE / "hall.sdf")
-WALL = 6.0                # m, the wall's face
-LRF_AHEAD = 0.16          # m, where the P3-AT carries its LRF
-WHEEL_RADIUS = 0.111      # m
+WALL = 6.0  # m, the wall's face
+LRF_AHEAD = 0.16  # m, where the P3-AT carries its LRF
+WHEEL_RADIUS = 0.111  # m
 
 
 @pytest.fixture(scope="module")
@@ -22,17 +22,28 @@ def test_list(language, server):
     said = probe(language, server.url, "list")
     assert said.words("world") == ["hall", "1", "0.005000"]
     name, drive, watchdog, track = said.words("robot")
-    assert (name, drive) == ("p3at", "kinematic") and (float(watchdog), float(track)) == (0.6, 0.394)
+    assert (name, drive) == ("p3at", "kinematic") and (float(watchdog), float(track)) == (
+        0.6,
+        0.394,
+    )
     devices = {words[1]: words[2:] for words in (line.split() for line in said.all("device"))}
     assert devices["lrf"][:3] == ["lrf", "planar_lidar_t", "10.000000"]
-    assert devices["sonar_front"][:2] == ["sonar", "sonar_t"] and devices["sonar_front"][3:] == ["5.000000", "8"]
+    assert devices["sonar_front"][:2] == ["sonar", "sonar_t"] and devices["sonar_front"][3:] == [
+        "5.000000",
+        "8",
+    ]
     assert devices["odometry"][:3] == ["odometry", "odometry_t", "50.000000"]
     assert devices["pose"][1] == "pose_t" and devices["motion"][1] == "motion_status_t"
     assert "camera" not in devices
-    bodies = {name: (static, float(mass)) for name, static, mass in (line.split() for line in said.all("body"))}
+    bodies = {
+        name: (static, float(mass))
+        for name, static, mass in (line.split() for line in said.all("body"))
+    }
     assert bodies["wall/link"] == ("True", 0.0) and bodies["ground_plane/link"] == ("True", 0.0)
     assert bodies["p3at/base_link"][0] == "False"
-    assert sum(mass for name, (_, mass) in bodies.items() if name.startswith("p3at/")) == pytest.approx(14 + 4 * 1.5)
+    assert sum(
+        mass for name, (_, mass) in bodies.items() if name.startswith("p3at/")
+    ) == pytest.approx(14 + 4 * 1.5)
 
 
 def test_read(language):
@@ -42,11 +53,11 @@ def test_read(language):
     assert (rays, intensities) == (181, 181)
     assert (first, last) == pytest.approx((-math.pi / 2, math.pi / 2), abs=1e-5)
     assert nearest == pytest.approx(WALL - LRF_AHEAD, abs=1e-4)
-    assert said.numbers("sonar") == [8, 5.0, 8, 8]    # the wall is beyond the sonar's 5 m
+    assert said.numbers("sonar") == [8, 5.0, 8, 8]  # the wall is beyond the sonar's 5 m
     assert said.numbers("odometry") == [0.0, 0.0, 0.0, 4]
     assert said.numbers("pose") == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
     gap = int(said.one("next"))
-    assert gap > 0 and gap % 100000 == 0    # us: a multiple of the LRF's period
+    assert gap > 0 and gap % 100000 == 0  # us: a multiple of the LRF's period
     width, height, format, data = said.words("image")
     assert int(width) > 0 and int(height) > 0 and (format, data) == ("jpeg", "True")
 
@@ -55,10 +66,14 @@ def test_velocity_holds_until_stopped(language, server):
     """3 s: five times the watchdog's time. The probe says once it was at its speed for so long."""
     said = probe(language, server.url, "velocity", "p3at", "0.3", "0.5", "3")
     kind, state, v, omega = said.words("status")
-    assert (kind, state) == ("velocity", "running") and (float(v), float(omega)) == pytest.approx((0.3, 0.5), abs=1e-6)
+    assert (kind, state) == ("velocity", "running") and (float(v), float(omega)) == pytest.approx(
+        (0.3, 0.5), abs=1e-6
+    )
     moved, turned, time = said.numbers("moved")
-    assert time > 2.5    # poses come at 50 Hz
-    assert moved == pytest.approx(abs(2 * 0.3 / 0.5 * math.sin(0.5 * time / 2)), abs=1e-3)    # a chord of a circle of v / omega
+    assert time > 2.5  # poses come at 50 Hz
+    assert moved == pytest.approx(
+        abs(2 * 0.3 / 0.5 * math.sin(0.5 * time / 2)), abs=1e-3
+    )  # a chord of a circle of v / omega
     assert math.remainder(turned - 0.5 * time, 2 * math.pi) == pytest.approx(0.0, abs=1e-3)
     assert said.numbers("stopped") == pytest.approx([0.0], abs=1e-9)
 
@@ -66,7 +81,9 @@ def test_velocity_holds_until_stopped(language, server):
 def test_wheels(language, server):
     said = probe(language, server.url, "wheels", "p3at", "2", "2", "2")
     kind, state, v, omega = said.words("status")
-    assert (kind, state) == ("wheels", "running") and (float(v), float(omega)) == pytest.approx((2 * WHEEL_RADIUS, 0.0), abs=1e-6)
+    assert (kind, state) == ("wheels", "running") and (float(v), float(omega)) == pytest.approx(
+        (2 * WHEEL_RADIUS, 0.0), abs=1e-6
+    )
     assert said.numbers("stopped") == pytest.approx([0.0], abs=1e-9)
 
 
@@ -80,7 +97,11 @@ def test_velocity_holds_faster_than_real_time(language):
 
 def test_primitives(language, server):
     said = probe(language, server.url, "primitives", "p3at")
-    for name, moved, turned in (("advance", 0.4, 0.0), ("rotate", 0.0, 1.2), ("arc", 2 * 0.5 * math.sin(0.8 / 2), 0.8)):
+    for name, moved, turned in (
+        ("advance", 0.4, 0.0),
+        ("rotate", 0.0, 1.2),
+        ("arc", 2 * 0.5 * math.sin(0.8 / 2), 0.8),
+    ):
         early, done, state, reason, distance, angle = said.words(name)
         assert (early, done, state, reason) == ("False", "True", "done", "-"), name
         assert (float(distance), float(angle)) == pytest.approx((moved, turned), abs=2e-6), name
@@ -94,7 +115,11 @@ def test_errors_name_what_exists(language, server):
     said = probe(language, server.url, "errors", "p3at")
     assert said.one("robot") == "UnknownName: there is no robot 'nobody'; there is p3at"
     device = said.one("device")
-    assert device.startswith("UnknownName: p3at has no device 'nothing'; it has ") and "lrf" in device and "sonar_rear" in device
+    assert (
+        device.startswith("UnknownName: p3at has no device 'nothing'; it has ")
+        and "lrf" in device
+        and "sonar_rear" in device
+    )
     assert said.one("nan").startswith("ValueError: v is ")
     assert said.one("radius").startswith("ValueError: radius is 0")
     assert said.one("limit").startswith("ValueError: speed is -1")

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-PATIENCE = 400.0    # s, for what comes sooner or later, on a machine that does much else too
+PATIENCE = 400.0  # s, for what comes sooner or later, on a machine that does much else too
 HERE = Path(__file__).resolve().parent
 SOURCE = Path(os.environ.get("RUEDO_SOURCE_DIR", HERE.parent.parent))
 BUILD = Path(os.environ.get("RUEDO_BUILD_DIR", SOURCE / "build/release"))
@@ -30,7 +30,14 @@ PROBES = {"python": [sys.executable, str(HERE / "probe/probe.py")]}
 if "RUEDO_PROBE_CPP" in os.environ:
     PROBES["cpp"] = [os.environ["RUEDO_PROBE_CPP"]]
 if "RUEDO_PROBE_JAVA" in os.environ:
-    PROBES["java"] = ["java", "-Xshare:auto", "-XX:TieredStopAtLevel=1", "-cp", f"{BUILD}/java/ruedo.jar:{os.environ['RUEDO_PROBE_JAVA']}", "Probe"]
+    PROBES["java"] = [
+        "java",
+        "-Xshare:auto",
+        "-XX:TieredStopAtLevel=1",
+        "-cp",
+        f"{BUILD}/java/ruedo.jar:{os.environ['RUEDO_PROBE_JAVA']}",
+        "Probe",
+    ]
 
 _taken: list[socket.socket] = []
 
@@ -61,7 +68,13 @@ class Server:
 
     def __init__(self, command: list[str], url: str):
         self.url = url
-        self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        self.process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
 
     def __enter__(self) -> Server:
         return self
@@ -98,7 +111,7 @@ def ruedo_run(*args: str, world: str = ARENA, url: str | None = None) -> Server:
 def tcp_server(*args: str, world: str = HALL) -> Server:
     """`ruedo run` over TCP."""
     url = free_url().replace("udpm://239.255.76.67", "tcpq://127.0.0.1").replace("?ttl=0", "")
-    _taken.pop().close()    # the token: the server itself listens there
+    _taken.pop().close()  # the token: the server itself listens there
     return ruedo_run(*args, world=world, url=url)
 
 
@@ -125,9 +138,15 @@ class Said:
 
 
 def probe(language: str, url: str, *command: str, timeout: float = PATIENCE) -> Said:
-    done = subprocess.run([*PROBES[language], url, *command], capture_output=True, text=True, timeout=timeout)
+    done = subprocess.run(
+        [*PROBES[language], url, *command], capture_output=True, text=True, timeout=timeout
+    )
     said = Said(done.stdout)
-    if "Traceback" in done.stderr or "Exception in thread" in done.stderr or (done.returncode and not said.all("failed")):
+    if (
+        "Traceback" in done.stderr
+        or "Exception in thread" in done.stderr
+        or (done.returncode and not said.all("failed"))
+    ):
         pytest.fail(f"the {language} probe broke: {done.stdout}\n{done.stderr}")
     return said
 

@@ -17,7 +17,14 @@ def server():
 
 
 def run(command, server, folder):
-    done = subprocess.run(command, env={**os.environ, "LCM_DEFAULT_URL": server.url}, cwd=folder, capture_output=True, text=True, timeout=PATIENCE)
+    done = subprocess.run(
+        command,
+        env={**os.environ, "LCM_DEFAULT_URL": server.url},
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -29,7 +36,9 @@ def test_python(server, tmp_path):
 
 def test_python_builds_a_world(tmp_path):
     (tmp_path / "world.py").write_text(blocks("clients.md")["world_python"])
-    done = subprocess.run([sys.executable, "world.py"], cwd=tmp_path, capture_output=True, text=True, timeout=PATIENCE)
+    done = subprocess.run(
+        [sys.executable, "world.py"], cwd=tmp_path, capture_output=True, text=True, timeout=PATIENCE
+    )
     assert done.stdout.startswith("Scan(utime=0, ranges=<181, "), done.stderr
 
 
@@ -38,7 +47,9 @@ def test_python_docstring_of_the_package(server, tmp_path):
     import ruedo
 
     lines = [line[4:] for line in ruedo.__doc__.splitlines() if line.startswith("    ")]
-    (tmp_path / "doc.py").write_text("\n".join(lines).replace("> 0.8", "> 5.0"))    # the hall's wall is far
+    (tmp_path / "doc.py").write_text(
+        "\n".join(lines).replace("> 0.8", "> 5.0")
+    )  # the hall's wall is far
     run([sys.executable, "doc.py"], server, tmp_path)
 
 
@@ -49,9 +60,26 @@ def test_cpp(server, tmp_path):
 
     (tmp_path / "ten.cpp").write_text(blocks("clients.md")["cpp"])
     library = next(Path(lcm.__file__).resolve().parent.parent.glob("**/liblcm.so"))
-    subprocess.run([os.environ.get("CXX", "c++"), "-std=c++17", "-Wall", "-Wextra", "-Werror", "-I", str(SOURCE / "include"), "ten.cpp",
-                    str(BUILD / "clients/cpp/libruedo_client.a"), str(library), f"-Wl,-rpath,{library.parent}", "-pthread", "-o", "ten"],
-                   cwd=tmp_path, check=True)
+    subprocess.run(
+        [
+            os.environ.get("CXX", "c++"),
+            "-std=c++17",
+            "-Wall",
+            "-Wextra",
+            "-Werror",
+            "-I",
+            str(SOURCE / "include"),
+            "ten.cpp",
+            str(BUILD / "clients/cpp/libruedo_client.a"),
+            str(library),
+            f"-Wl,-rpath,{library.parent}",
+            "-pthread",
+            "-o",
+            "ten",
+        ],
+        cwd=tmp_path,
+        check=True,
+    )
     assert run(["./ten"], server, tmp_path).startswith("181 rays, 5.")
 
 

@@ -15,17 +15,32 @@ from ruedo import lcmtypes
 
 def info(options):
     message = lcmtypes.world_info_t()
-    message.run_id, message.nparts, message.version, message.world, message.step_us = 7, 1, "9.9.9", "fake", 5000
+    message.run_id, message.nparts, message.version, message.world, message.step_us = (
+        7,
+        1,
+        "9.9.9",
+        "fake",
+        5000,
+    )
     message.paused = "--paused" in options
     robot = lcmtypes.robot_info_t()
     robot.name, robot.drive, robot.watchdog_us = "p3at", "kinematic", 600000
     message.robots, message.nrobots = [robot], 1
-    for name, kind, type_name, rate in (("LRF", "lrf", "planar_lidar_t", 20.0), ("odometry", "odometry", "odometry_t", 50.0)):
+    for name, kind, type_name, rate in (
+        ("LRF", "lrf", "planar_lidar_t", 20.0),
+        ("odometry", "odometry", "odometry_t", 50.0),
+    ):
         device = lcmtypes.device_info_t()
         device.robot, device.name, device.kind, device.rate = "p3at", name, kind, rate
         device.orientation = [1.0, 0.0, 0.0, 0.0]
         channel = lcmtypes.channel_info_t()
-        channel.name, channel.robot, channel.device, channel.type, channel.rate = f"p3at/{name}", "p3at", name, type_name, rate
+        channel.name, channel.robot, channel.device, channel.type, channel.rate = (
+            f"p3at/{name}",
+            "p3at",
+            name,
+            type_name,
+            rate,
+        )
         channel.fingerprint = getattr(lcmtypes, type_name)().get_hash()
         if channel.fingerprint >= 1 << 63:
             channel.fingerprint -= 1 << 64
@@ -39,14 +54,22 @@ def info(options):
 
 def scan(utime):
     message = lcmtypes.planar_lidar_t()
-    message.utime, message.nranges, message.ranges, message.rad0, message.radstep = utime, 3, [1.0, 2.0, 3.0], -0.5, 0.5
+    message.utime, message.nranges, message.ranges, message.rad0, message.radstep = (
+        utime,
+        3,
+        [1.0, 2.0, 3.0],
+        -0.5,
+        0.5,
+    )
     return message.encode()
 
 
 def garbage(utime):
     """The right fingerprint, then a length that lies, or too little, in turn."""
     good = scan(utime)
-    lies = [good[:16] + struct.pack(">i", n) + good[20:] for n in (-1, 0x7FFFFFFF, 0x20000001, 1000)]
+    lies = [
+        good[:16] + struct.pack(">i", n) + good[20:] for n in (-1, 0x7FFFFFFF, 0x20000001, 1000)
+    ]
     return (lies + [good[:8], good[:11], good[:-1], b""])[utime // 50000 % 8]
 
 
@@ -58,7 +81,9 @@ def main():
     while True:
         if utime % 200000 == 0:
             encoded = info(options).encode()
-            bus.publish("ruedo/info", b"\0" * 8 + encoded[8:] if "--wrong-info" in options else encoded)
+            bus.publish(
+                "ruedo/info", b"\0" * 8 + encoded[8:] if "--wrong-info" in options else encoded
+            )
         bus.publish("p3at/LRF", garbage(utime) if "--garbage" in options else scan(utime))
         tick = lcmtypes.tick_t()
         tick.utime, tick.run_id = utime, 7

@@ -12,11 +12,21 @@ HAMMERS = {"python": [sys.executable, str(HERE / "hammer/hammer.py")]}
 if "RUEDO_HAMMER_CPP" in os.environ:
     HAMMERS["cpp"] = [os.environ["RUEDO_HAMMER_CPP"]]
 if "RUEDO_PROBE_JAVA" in os.environ:
-    HAMMERS["java"] = ["java", "-cp", f"{BUILD}/java/ruedo.jar:{os.environ['RUEDO_PROBE_JAVA']}", "ruedo.Hammer"]
+    HAMMERS["java"] = [
+        "java",
+        "-cp",
+        f"{BUILD}/java/ruedo.jar:{os.environ['RUEDO_PROBE_JAVA']}",
+        "ruedo.Hammer",
+    ]
 
 
 def hammer(language, url):
-    done = subprocess.run([*HAMMERS[language], url, str(COUNT), SECONDS], capture_output=True, text=True, timeout=PATIENCE)
+    done = subprocess.run(
+        [*HAMMERS[language], url, str(COUNT), SECONDS],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
     assert done.returncode == 0, f"{done.returncode}: {done.stdout}\n{done.stderr}"
     assert done.stdout == "heard True\n", done.stderr
     # 8 x 2 callbacks at a time, each new one of which may fail: but none says so twice.
@@ -38,6 +48,9 @@ def test_a_good_client_beside_them():
     """The server hears of all that, too."""
     import ruedo
 
-    with ruedo_run("--disable", "p3at/camera", world=HALL) as server, ruedo.connect(server.url) as sim:
+    with (
+        ruedo_run("--disable", "p3at/camera", world=HALL) as server,
+        ruedo.connect(server.url) as sim,
+    ):
         hammer("python", server.url)
         assert sim.robot("p3at").rotate(0.2).wait(PATIENCE).done

@@ -10,7 +10,9 @@ from conftest import HERE, Server, free_url, probe
 def fake(*options):
     url = free_url()
     server = Server([sys.executable, str(HERE / "fake_server.py"), url, *options], url)
-    assert server.process.stdout.readline() == "up\n"    # a client waits 2 s, an interpreter may take longer to start
+    assert (
+        server.process.stdout.readline() == "up\n"
+    )  # a client waits 2 s, an interpreter may take longer to start
     return server
 
 
@@ -18,8 +20,15 @@ def test_no_server_is_said_within_two_seconds_with_the_url(language):
     url = free_url()
     start = time.monotonic()
     said = probe(language, url, "connect").one("failed")
-    assert time.monotonic() - start < 120.0    # two seconds, and the start of the program on a busy machine
-    assert said.startswith("NoServer: ") and url in said and "within 2 s" in said and "ruedo doctor" in said
+    assert (
+        time.monotonic() - start < 120.0
+    )  # two seconds, and the start of the program on a busy machine
+    assert (
+        said.startswith("NoServer: ")
+        and url in said
+        and "within 2 s" in said
+        and "ruedo doctor" in said
+    )
 
 
 @pytest.mark.parametrize("url", ["http://example.org", "nonsense", "udpm://239.255.76.67:notaport"])
@@ -35,16 +44,24 @@ def test_nothing_listens_on_a_tcp_port(language):
 def test_a_server_of_another_version_is_named(language):
     with fake("--wrong-info") as server:
         said = probe(language, server.url, "connect").one("failed")
-    assert said.startswith("TypeMismatch: ruedo/info carries another version of world_info_t (fingerprint 0000000000000000)")
+    assert said.startswith(
+        "TypeMismatch: ruedo/info carries another version of world_info_t (fingerprint 0000000000000000)"
+    )
 
 
 def test_a_channel_of_another_version_and_a_silent_one(language):
     with fake("--wrong-type") as server:
         said = probe(language, server.url, "streams", "p3at", "0.6")
     lrf, odometry = said.one("lrf"), said.one("odometry")
-    assert lrf.startswith("TypeMismatch: p3at/LRF carries another version of planar_lidar_t") and "9.9.9" in lrf
-    assert "e3d17423180b5e8d" in lrf    # bot_core's fingerprint, which this client reads
-    assert odometry.startswith("Timeout: no sample on p3at/odometry within 0.6 s") and "50 Hz" in odometry
+    assert (
+        lrf.startswith("TypeMismatch: p3at/LRF carries another version of planar_lidar_t")
+        and "9.9.9" in lrf
+    )
+    assert "e3d17423180b5e8d" in lrf  # bot_core's fingerprint, which this client reads
+    assert (
+        odometry.startswith("Timeout: no sample on p3at/odometry within 0.6 s")
+        and "50 Hz" in odometry
+    )
 
 
 def test_good_samples_come_through(language):

@@ -16,9 +16,16 @@ PREPARE = "ip link set lo up && ip route add 224.0.0.0/4 dev lo && exec \"$@\""
 def main() -> None:
     command = sys.argv[1:]
     for flags in ("-n", "-rn"):
-        if subprocess.run(["unshare", flags, "sh", "-c", PREPARE, "sh", "true"], capture_output=True).returncode == 0:
+        if (
+            subprocess.run(
+                ["unshare", flags, "sh", "-c", PREPARE, "sh", "true"], capture_output=True
+            ).returncode
+            == 0
+        ):
             os.execvp("unshare", ["unshare", flags, "sh", "-c", PREPARE, "sh", *command])
-    print("isolated.py: no network namespace here; running in the ordinary network", file=sys.stderr)
+    print(
+        "isolated.py: no network namespace here; running in the ordinary network", file=sys.stderr
+    )
     os.execvp(command[0], command)
 
 

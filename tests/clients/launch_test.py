@@ -37,7 +37,12 @@ def gone(url, seconds=PATIENCE):
 
 def start(language):
     """A probe that has launched a server, and the server's URL."""
-    client = subprocess.Popen([*PROBES[language], "-", "launch", HALL, "--disable", "p3at/camera"], stdout=subprocess.PIPE, text=True, preexec_fn=heed_ctrl_c)
+    client = subprocess.Popen(
+        [*PROBES[language], "-", "launch", HALL, "--disable", "p3at/camera"],
+        stdout=subprocess.PIPE,
+        text=True,
+        preexec_fn=heed_ctrl_c,
+    )
     url = client.stdout.readline().split()[1]
     assert client.stdout.readline().split() == ["ready", "True"]
     return client, url
@@ -77,7 +82,11 @@ def test_what_the_server_says_is_in_the_error(language, tmp_path):
 
 def test_the_program_is_looked_for(language, monkeypatch):
     monkeypatch.setenv("RUEDO", "/no/such/program")
-    assert probe(language, "-", "launch", HALL).one("failed").startswith("LaunchError: the environment's RUEDO is '/no/such/program'")
+    assert (
+        probe(language, "-", "launch", HALL)
+        .one("failed")
+        .startswith("LaunchError: the environment's RUEDO is '/no/such/program'")
+    )
 
 
 def test_python_closes_it_at_the_end_of_the_block():
@@ -96,7 +105,9 @@ def test_python_in_a_thread_that_ends():
     import ruedo
 
     made = []
-    thread = threading.Thread(target=lambda: made.append(ruedo.launch(HALL, args=["--disable", "p3at/camera"])))
+    thread = threading.Thread(
+        target=lambda: made.append(ruedo.launch(HALL, args=["--disable", "p3at/camera"]))
+    )
     thread.start()
     thread.join()
     with made[0] as sim:

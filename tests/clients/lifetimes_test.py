@@ -13,17 +13,29 @@ pytestmark = pytest.mark.skipif(not CLASSES, reason="there is no JDK")
 
 def test_callbacks_and_closing():
     with ruedo_run("--disable", "p3at/camera", world=HALL) as server:
-        done = subprocess.run([*COMMAND, server.url, "all"], capture_output=True, text=True, timeout=PATIENCE)
-    assert done.stdout.splitlines() == ["open true true", "newer true", "stolen false", "heard true true", "closed 16 of 16 hall"], done.stderr
-    assert done.stderr == ("ruedo: a callback on p3at/odometry failed: java.lang.AssertionError: a fault of the user's; it is called on, "
-                           "and this is said once\n")
+        done = subprocess.run(
+            [*COMMAND, server.url, "all"], capture_output=True, text=True, timeout=PATIENCE
+        )
+    assert done.stdout.splitlines() == [
+        "open true true",
+        "newer true",
+        "stolen false",
+        "heard true true",
+        "closed 16 of 16 hall",
+    ], done.stderr
+    assert done.stderr == (
+        "ruedo: a callback on p3at/odometry failed: java.lang.AssertionError: a fault of the user's; it is called on, "
+        "and this is said once\n"
+    )
     assert done.returncode == 0
 
 
 def test_a_server_that_was_started_anew_is_noticed():
     url = free_url()
     with ruedo_run("--disable", "p3at/camera", world=HALL, url=url) as first:
-        client = subprocess.Popen([*COMMAND, url, "new_run"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        client = subprocess.Popen(
+            [*COMMAND, url, "new_run"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
         assert client.stdout.readline() == "ready\n"
         first.end()
     with ruedo_run("--disable", "p3at/camera", world=HALL, url=url):

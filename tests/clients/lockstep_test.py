@@ -11,7 +11,7 @@ from conftest import HERE, PATIENCE, PROBES, SOURCE, free_url, probe, ruedo_run
 from docs_code import blocks
 
 HALL = str(HERE / "hall.sdf")
-STEPS = 300    # of 5 ms
+STEPS = 300  # of 5 ms
 
 
 @contextmanager
@@ -19,8 +19,20 @@ def bad_network(server_url, clients, loss):
     """URLs, one for each client, from which the server is reached with losses."""
     urls = [free_url() for _ in range(clients)]
     ports = ",".join(str(urlsplit(url).port) for url in urls)
-    relay = subprocess.Popen([sys.executable, str(HERE / "lossy_relay.py"), str(urlsplit(server_url).port), ports, str(loss), "0.1", "0.1", "4"],
-                             stdout=subprocess.PIPE, text=True)
+    relay = subprocess.Popen(
+        [
+            sys.executable,
+            str(HERE / "lossy_relay.py"),
+            str(urlsplit(server_url).port),
+            ports,
+            str(loss),
+            "0.1",
+            "0.1",
+            "4",
+        ],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
     try:
         assert relay.stdout.readline() == "ready\n"
         yield urls
@@ -31,10 +43,31 @@ def bad_network(server_url, clients, loss):
 
 def run(languages, loss):
     """What each client saw at its end: step, hash, messages, poses, digest. Both drive the same robot."""
-    with ruedo_run("--lockstep", str(len(languages)), "--lease", str(PATIENCE), "--disable", "p3at/camera", world=HALL) as server:
+    with ruedo_run(
+        "--lockstep",
+        str(len(languages)),
+        "--lease",
+        str(PATIENCE),
+        "--disable",
+        "p3at/camera",
+        world=HALL,
+    ) as server:
         with bad_network(server.url, len(languages), loss) as urls, ThreadPoolExecutor() as pool:
-            said = list(pool.map(lambda i: probe(languages[i], urls[i], "lockstep", f"client{i}", "p3at", str(STEPS), str((1, 6, 15)[i]), str(0.2 + 0.1 * i)),
-                                 range(len(languages))))
+            said = list(
+                pool.map(
+                    lambda i: probe(
+                        languages[i],
+                        urls[i],
+                        "lockstep",
+                        f"client{i}",
+                        "p3at",
+                        str(STEPS),
+                        str((1, 6, 15)[i]),
+                        str(0.2 + 0.1 * i),
+                    ),
+                    range(len(languages)),
+                )
+            )
     for one in said:
         assert one.words("begin") == ["0", "0.000000"]
         assert one.words("odometry")[0] == "1500000"
@@ -45,7 +78,7 @@ def test_the_same_whatever_is_lost():
     languages = sorted(PROBES)
     good = run(languages, 0.0)
     step, state_hash, messages, poses, digest = good[0]
-    assert (step, poses) == (str(STEPS), "76")    # 50 Hz, from 0 to 1.5 s
+    assert (step, poses) == (str(STEPS), "76")  # 50 Hz, from 0 to 1.5 s
     assert all(end == good[0] for end in good)
     for loss in (0.1, 0.3):
         assert run(languages, loss) == good, loss
@@ -55,7 +88,9 @@ def test_a_guest_comes_and_goes_whatever_is_lost():
     """In the three languages, two of them behind a network that loses every fifth datagram."""
     ends = []
     for language in sorted(PROBES):
-        with ruedo_run("--lockstep", "1", "--lease", str(PATIENCE), "--disable", "p3at/camera", world=HALL) as server:
+        with ruedo_run(
+            "--lockstep", "1", "--lease", str(PATIENCE), "--disable", "p3at/camera", world=HALL
+        ) as server:
             with bad_network(server.url, 1, 0.0 if language == "cpp" else 0.2) as [url]:
                 said = probe(language, url, "visited", "client", "p3at")
         assert said.one("guest") == "p3at_2"
@@ -69,7 +104,9 @@ def test_commands_beside_the_steps_are_refused(language):
     with ruedo_run("--lockstep", "1", "--disable", "p3at/camera", world=HALL) as server:
         said = probe(language, server.url, "lockstep", "one", "p3at", "4", "2", "0.3")
     assert said.words("end")[0] == "4"
-    assert said.one("past").startswith("ValueError: a command is for 1 steps on; of 1 steps 0 to 0 is allowed")
+    assert said.one("past").startswith(
+        "ValueError: a command is for 1 steps on; of 1 steps 0 to 0 is allowed"
+    )
 
 
 def test_without_lockstep_there_are_no_commands():
@@ -86,13 +123,18 @@ def test_without_lockstep_there_are_no_commands():
 def test_waiting_says_for_whom():
     import ruedo
 
-    with ruedo_run("--lockstep", "2", world=HALL) as server, ruedo.connect(server.url, name="first") as sim:
+    with (
+        ruedo_run("--lockstep", "2", world=HALL) as server,
+        ruedo.connect(server.url, name="first") as sim,
+    ):
         with pytest.raises(ruedo.Timeout, match="the run waits for 1 more of 2 clients"):
             sim.step(1, timeout=0.5)
         with ruedo.connect(server.url, name="second") as other:
             with pytest.raises(ruedo.Timeout, match="the run waits for 'first'"):
                 other.step(5, timeout=3.0)
-            assert sim.step(2, timeout=PATIENCE).step == 3    # goes on after the timeout: the step granted then, and two more
+            assert (
+                sim.step(2, timeout=PATIENCE).step == 3
+            )  # goes on after the timeout: the step granted then, and two more
             assert sim.step(0).step == 3
 
 
@@ -100,7 +142,12 @@ def test_a_lost_lease():
     """By policy drop; the client takes part anew. And by policy fail, with the exit code."""
     import ruedo
 
-    with ruedo_run("--lockstep", "1", "--lease", "2", "--lease-policy", "drop", world=HALL) as server, ruedo.connect(server.url) as sim:
+    with (
+        ruedo_run(
+            "--lockstep", "1", "--lease", "2", "--lease-policy", "drop", world=HALL
+        ) as server,
+        ruedo.connect(server.url) as sim,
+    ):
         sim.step(5)
         while "nothing was heard from" not in server.process.stdout.readline():
             assert server.process.poll() is None
@@ -117,7 +164,10 @@ def test_a_lost_lease():
 def test_the_run_ends_when_all_have_everything():
     import ruedo
 
-    with ruedo_run("--lockstep", "1", "--duration", "0.1", world=HALL) as server, ruedo.connect(server.url) as sim:
+    with (
+        ruedo_run("--lockstep", "1", "--duration", "0.1", world=HALL) as server,
+        ruedo.connect(server.url) as sim,
+    ):
         assert sim.step(15).step == 15
         with pytest.raises(ruedo.NoServer, match="ended at step 20"):
             sim.step(10, timeout=PATIENCE)
@@ -137,15 +187,34 @@ def test_a_reset_begins_anew():
 
 def test_the_program_of_the_docs():
     source = blocks("clients.md")["lockstep_python"]
-    said = [subprocess.run([sys.executable, "-c", source], cwd=SOURCE, capture_output=True, text=True, timeout=PATIENCE) for _ in range(2)]
-    assert said[0].stdout.startswith("400 "), said[0].stderr    # 2 s of 5 ms
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", source],
+            cwd=SOURCE,
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+        )
+        for _ in range(2)
+    ]
+    assert said[0].stdout.startswith("400 "), said[0].stderr  # 2 s of 5 ms
     assert said[0].stdout == said[1].stdout
 
 
 def test_what_a_newcomer_calls_before_the_first_step_is_answered():
     import ruedo
-    with ruedo_run("--lockstep", "1", "--disable", "p3at/camera", world=HALL) as server, ruedo.connect(server.url) as sim:
-        for call in (lambda: sim.set_pose("p3at", 0.0, 1.0), lambda: sim.state("p3at"), sim.pause, lambda: sim.spawn("p3at", 2.0, 1.0), sim.reset):
+
+    with (
+        ruedo_run("--lockstep", "1", "--disable", "p3at/camera", world=HALL) as server,
+        ruedo.connect(server.url) as sim,
+    ):
+        for call in (
+            lambda: sim.set_pose("p3at", 0.0, 1.0),
+            lambda: sim.state("p3at"),
+            sim.pause,
+            lambda: sim.spawn("p3at", 2.0, 1.0),
+            sim.reset,
+        ):
             with pytest.raises(ruedo.RequestError, match=r"lockstep has not begun: call step\(0\)"):
                 call()
         sim.step(0)
@@ -157,7 +226,11 @@ def test_what_a_newcomer_calls_before_the_first_step_is_answered():
 
 def test_a_pause_in_lockstep_is_named_by_who_waits():
     import ruedo
-    with ruedo_run("--lockstep", "1", "--disable", "p3at/camera", world=HALL) as server, ruedo.connect(server.url) as sim:
+
+    with (
+        ruedo_run("--lockstep", "1", "--disable", "p3at/camera", world=HALL) as server,
+        ruedo.connect(server.url) as sim,
+    ):
         sim.step(1)
         sim.pause()
         with pytest.raises(ruedo.Timeout, match="the run waits for a RESUME: it is paused"):

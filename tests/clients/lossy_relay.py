@@ -12,7 +12,7 @@ import struct
 import sys
 
 GROUP = "239.255.76.67"
-MOST = 65536    # bytes of a datagram
+MOST = 65536  # bytes of a datagram
 
 
 def listening(port):
@@ -21,7 +21,11 @@ def listening(port):
     here.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
     here.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
     here.bind((GROUP, port))
-    here.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, struct.pack("4s4s", socket.inet_aton(GROUP), socket.inet_aton("0.0.0.0")))
+    here.setsockopt(
+        socket.IPPROTO_IP,
+        socket.IP_ADD_MEMBERSHIP,
+        struct.pack("4s4s", socket.inet_aton(GROUP), socket.inet_aton("0.0.0.0")),
+    )
     return here
 
 
@@ -70,7 +74,7 @@ def main():
         for key, _ in selector.select():
             data, address = key.fileobj.recvfrom(MOST)
             if address[1] == own:
-                continue    # what this relay has sent
+                continue  # what this relay has sent
             for link in key.data:
                 link.pass_on(data)
 

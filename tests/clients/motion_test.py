@@ -27,5 +27,5 @@ def test_a_refused_command_leaves_what_runs():
     m._update(status(8, "refused", "bad value"))
     m._update(status(0, "refused", "not finite"))
     assert m.state == "running" and not m.done
-    m._update(status(8, "running"))    # its own end was lost
+    m._update(status(8, "running"))  # its own end was lost
     assert (m.state, m.reason) == ("ended", "replaced")

@@ -39,12 +39,22 @@ def test_the_libraries_work_over_tcp(language):
 
 def test_bare_python_over_tcp(tmp_path):
     page = blocks("protocol.md")
-    (tmp_path / "client.py").write_text(page["bare_python"].replace("from ruedo import", "from ruedo.lcmtypes import"))
+    (tmp_path / "client.py").write_text(
+        page["bare_python"].replace("from ruedo import", "from ruedo.lcmtypes import")
+    )
     with tcp_server("--no-noise", *QUICK) as server:
-        done = subprocess.run([sys.executable, "client.py"], cwd=tmp_path, env={**os.environ, "LCM_DEFAULT_URL": server.url},
-                              capture_output=True, text=True, timeout=PATIENCE)
+        done = subprocess.run(
+            [sys.executable, "client.py"],
+            cwd=tmp_path,
+            env={**os.environ, "LCM_DEFAULT_URL": server.url},
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+        )
     assert done.returncode == 0, done.stderr
-    lines = check_scans("\n".join(line for line in done.stdout.splitlines() if not line.startswith("LCM")))
+    lines = check_scans(
+        "\n".join(line for line in done.stdout.splitlines() if not line.startswith("LCM"))
+    )
     assert float(lines[0][2]) > float(lines[-1][2]) + 0.1
 
 
@@ -54,9 +64,17 @@ def test_bare_c_over_tcp(tmp_path, version):
 
     c_client(tmp_path, *library_of(version))
     with tcp_server("--no-noise", *QUICK) as server:
-        done = subprocess.run([str(tmp_path / "client")], env=bare(server), capture_output=True, text=True, timeout=PATIENCE)
+        done = subprocess.run(
+            [str(tmp_path / "client")],
+            env=bare(server),
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+        )
     assert done.returncode == 0, done.stderr
-    lines = check_scans("\n".join(line for line in done.stdout.splitlines() if not line.startswith("LCM")))
+    lines = check_scans(
+        "\n".join(line for line in done.stdout.splitlines() if not line.startswith("LCM"))
+    )
     assert float(lines[0][3]) > float(lines[-1][3]) + 0.1
 
 
@@ -64,8 +82,14 @@ def test_raw_pictures_over_tcp():
     """921 600 bytes each; over multicast, with the buffers that Linux gives, none arrives."""
     import ruedo
 
-    settings = ["--set", "p3at/camera.encoding=rgb", "--set", "p3at/camera.camera.image.width=640", "--set",
-                "p3at/camera.camera.image.height=480"]
+    settings = [
+        "--set",
+        "p3at/camera.encoding=rgb",
+        "--set",
+        "p3at/camera.camera.image.width=640",
+        "--set",
+        "p3at/camera.camera.image.height=480",
+    ]
     with tcp_server(*settings) as server, ruedo.connect(server.url, timeout=PATIENCE) as sim:
         camera = sim.robot("p3at").camera
         for _ in range(5):
@@ -80,7 +104,14 @@ def test_without_multicast_the_server_takes_tcp_and_clients_find_it(language, tm
         until grep -q '^hall' out; do kill -0 $server; sleep 0.05; done
         {shlex.join(PROBES[language])} '' list
     """
-    done = subprocess.run(unrouted("sh", "-ec", script), cwd=tmp_path, env=PLAIN, capture_output=True, text=True, timeout=PATIENCE)
+    done = subprocess.run(
+        unrouted("sh", "-ec", script),
+        cwd=tmp_path,
+        env=PLAIN,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
     said, warned = (tmp_path / "out").read_text(), (tmp_path / "err").read_text()
     assert done.returncode == 0, done.stdout + done.stderr + warned
     assert "world hall" in done.stdout
@@ -91,28 +122,41 @@ def test_without_multicast_the_server_takes_tcp_and_clients_find_it(language, tm
 def test_launch_needs_no_multicast(language):
     """A local socket in Python, TCP in the others, which say so."""
     command = [*PROBES[language], "-", "launch", HALL, "--disable", "p3at/camera"]
-    with subprocess.Popen(unrouted(*command), env=PLAIN, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as client:
+    with subprocess.Popen(
+        unrouted(*command), env=PLAIN, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as client:
         words = next(line for line in client.stdout if line.startswith("url")).split()
         assert words[1].startswith("unix:///" if language == "python" else "tcpq://127.0.0.1:")
         assert client.stdout.readline().split() == ["ready", "True"]
         client.terminate()
         said = client.stderr.read()
-    assert len([line for line in said.splitlines() if "no multicast route" in line]) == (0 if language == "python" else 1), said
+    assert len([line for line in said.splitlines() if "no multicast route" in line]) == (
+        0 if language == "python" else 1
+    ), said
 
 
 @pytest.mark.parametrize("scheme", ["udpm", "tcpq"])
 def test_a_second_server_refuses_and_names_the_first(scheme):
-    with (ruedo_run(*QUICK, world=HALL) if scheme == "udpm" else tcp_server(*QUICK)) as first:
-        second = subprocess.run([RUEDO, "run", HALL, "--lcm", first.url], capture_output=True, text=True, timeout=PATIENCE)
+    with ruedo_run(*QUICK, world=HALL) if scheme == "udpm" else tcp_server(*QUICK) as first:
+        second = subprocess.run(
+            [RUEDO, "run", HALL, "--lcm", first.url],
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+        )
         assert second.returncode == 4
         [line] = second.stderr.splitlines()
-        assert first.url in line and f"pid {first.process.pid}, world hall, run " in line and "--lcm auto" in line
+        assert (
+            first.url in line
+            and f"pid {first.process.pid}, world hall, run " in line
+            and "--lcm auto" in line
+        )
         import ruedo
 
         run = re.search(r"run (-?\d+)", line).group(1)
         with ruedo.connect(first.url, timeout=PATIENCE) as sim:
             assert str(sim._info.run_id) == run
-    with ruedo_run(*QUICK, world=HALL, url=first.url):    # and once that has ended, it is free
+    with ruedo_run(*QUICK, world=HALL, url=first.url):  # and once that has ended, it is free
         pass
 
 
@@ -122,17 +166,33 @@ def test_users_of_one_machine_do_not_meet():
 
     other = pwd.getpwnam("nobody").pw_uid
     try:
-        done = subprocess.run([RUEDO, "check", HALL], user=other, capture_output=True, timeout=PATIENCE)
+        done = subprocess.run(
+            [RUEDO, "check", HALL], user=other, capture_output=True, timeout=PATIENCE
+        )
     except PermissionError:
         pytest.skip("no right to become another user, or that one may not read this build")
     if done.returncode != 0:
         pytest.skip("another user may not read this tree")
     with ruedo_run(*QUICK, world=HALL) as first:
-        second = subprocess.run([RUEDO, "run", HALL, "--lcm", first.url], user=other, capture_output=True, text=True, timeout=PATIENCE)
-        assert second.returncode == 4 and f"pid {first.process.pid}, world hall, run " in second.stderr
+        second = subprocess.run(
+            [RUEDO, "run", HALL, "--lcm", first.url],
+            user=other,
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+        )
+        assert (
+            second.returncode == 4 and f"pid {first.process.pid}, world hall, run " in second.stderr
+        )
         command = [RUEDO, "run", HALL, "--quiet", "--lcm", "auto", "--duration", "0.1", *QUICK]
-        third = subprocess.run(command, user=other, capture_output=True, text=True, timeout=PATIENCE)
-        assert third.returncode == 0 and "export LCM_DEFAULT_URL='" in third.stdout and first.url not in third.stdout
+        third = subprocess.run(
+            command, user=other, capture_output=True, text=True, timeout=PATIENCE
+        )
+        assert (
+            third.returncode == 0
+            and "export LCM_DEFAULT_URL='" in third.stdout
+            and first.url not in third.stdout
+        )
 
 
 def auto_url(process):
@@ -146,12 +206,18 @@ def test_auto_takes_a_port_of_its_own():
     import ruedo
 
     def start():
-        return subprocess.Popen([RUEDO, "run", HALL, "--quiet", "--lcm", "auto", *QUICK], stdout=subprocess.PIPE, text=True)
+        return subprocess.Popen(
+            [RUEDO, "run", HALL, "--quiet", "--lcm", "auto", *QUICK],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
 
     servers = [start() for _ in range(3)]
     try:
         urls = [auto_url(server) for server in servers]
-        assert len(set(urls)) == 3 and all(url.startswith("udpm://239.255.76.67:") and url.endswith("?ttl=0") for url in urls)
+        assert len(set(urls)) == 3 and all(
+            url.startswith("udpm://239.255.76.67:") and url.endswith("?ttl=0") for url in urls
+        )
         for url in urls:
             with ruedo.connect(url, timeout=PATIENCE) as sim:
                 assert sim.world == "hall"
@@ -164,7 +230,9 @@ def test_auto_takes_a_port_of_its_own():
 def test_auto_without_multicast_is_tcp():
     command = unrouted(RUEDO, "run", HALL, "--quiet", "--lcm", "auto", "--duration", "0.1", *QUICK)
     said = subprocess.run(command, env=PLAIN, capture_output=True, text=True, timeout=PATIENCE)
-    assert re.match(r"export LCM_DEFAULT_URL='tcpq://127\.0\.0\.1:\d+'\n", said.stdout), said.stdout + said.stderr
+    assert re.match(r"export LCM_DEFAULT_URL='tcpq://127\.0\.0\.1:\d+'\n", said.stdout), (
+        said.stdout + said.stderr
+    )
 
 
 def test_two_hosts_that_share_an_address_both_say_so(tmp_path):
@@ -186,9 +254,21 @@ def test_two_hosts_that_share_an_address_both_say_so(tmp_path):
         wait $other
     """
     os.mkfifo(tmp_path / "pipe")
-    command = ["sh", "-c", f'exec {shlex.quote(RUEDO)} run {HALL} --quiet --disable p3at/camera --lcm "udpm://239.255.76.67:7667?ttl=1" 2>&1', "sh"]
+    command = [
+        "sh",
+        "-c",
+        f'exec {shlex.quote(RUEDO)} run {HALL} --quiet --disable p3at/camera --lcm "udpm://239.255.76.67:7667?ttl=1" 2>&1',
+        "sh",
+    ]
     flags = "-n" if os.geteuid() == 0 else "-rn"
-    done = subprocess.run(["unshare", flags, "sh", "-ec", script, "sh", *command], cwd=tmp_path, env=PLAIN, capture_output=True, text=True, timeout=PATIENCE)
+    done = subprocess.run(
+        ["unshare", flags, "sh", "-ec", script, "sh", *command],
+        cwd=tmp_path,
+        env=PLAIN,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
     if "Operation not" in done.stderr or "unshare" in done.stderr:
         pytest.skip("no network namespaces with a cable here: " + done.stderr)
     assert done.returncode == 0, done.stderr
@@ -197,7 +277,9 @@ def test_two_hosts_that_share_an_address_both_say_so(tmp_path):
         text = (tmp_path / name).read_text()
         said = [line for line in text.splitlines() if "another server" in line]
         assert len(said) == 1, (name, text)
-        runs.append(re.search(r"run (-?\d+), world hall; this one is run (-?\d+)", said[0]).groups())
+        runs.append(
+            re.search(r"run (-?\d+), world hall; this one is run (-?\d+)", said[0]).groups()
+        )
     assert runs[0] == runs[1][::-1]
 
 
@@ -205,18 +287,43 @@ def test_a_message_that_fits_no_buffer_is_said_once():
     buffer = int(open("/proc/sys/net/core/rmem_default").read())
     if buffer > 900_000:
         pytest.skip(f"receive buffers of {buffer} bytes: a raw picture fits")
-    settings = ["--set", "p3at/camera.encoding=rgb", "--set", "p3at/camera.camera.image.width=640", "--set",
-                "p3at/camera.camera.image.height=480", "--duration", "2"]
+    settings = [
+        "--set",
+        "p3at/camera.encoding=rgb",
+        "--set",
+        "p3at/camera.camera.image.width=640",
+        "--set",
+        "p3at/camera.camera.image.height=480",
+        "--duration",
+        "2",
+    ]
     url = free_url()
     with Server([RUEDO, "run", HALL, "--quiet", "--lcm", url, *settings], url) as server:
         server.process.wait(PATIENCE)
-        said = [line for line in server.end().splitlines() if "does not fit into a receive buffer" in line]
-    assert len(said) == 1 and "921" in said[0] and "sysctl -w net.core.rmem_max" in said[0] and "p3at/camera" in said[0]
+        said = [
+            line
+            for line in server.end().splitlines()
+            if "does not fit into a receive buffer" in line
+        ]
+    assert (
+        len(said) == 1
+        and "921" in said[0]
+        and "sysctl -w net.core.rmem_max" in said[0]
+        and "p3at/camera" in said[0]
+    )
 
 
 def test_doctor_names_who_serves():
     with ruedo_run(*QUICK, world=HALL) as server:
-        done = subprocess.run([RUEDO, "doctor", "--lcm", server.url], capture_output=True, text=True, timeout=PATIENCE)
-        assert re.search(rf"^ok +server +{re.escape(server.url)}: pid {server.process.pid}, world hall, run ", done.stdout, re.MULTILINE)
-    done = subprocess.run([RUEDO, "doctor", "--lcm", server.url], capture_output=True, text=True, timeout=PATIENCE)
+        done = subprocess.run(
+            [RUEDO, "doctor", "--lcm", server.url], capture_output=True, text=True, timeout=PATIENCE
+        )
+        assert re.search(
+            rf"^ok +server +{re.escape(server.url)}: pid {server.process.pid}, world hall, run ",
+            done.stdout,
+            re.MULTILINE,
+        )
+    done = subprocess.run(
+        [RUEDO, "doctor", "--lcm", server.url], capture_output=True, text=True, timeout=PATIENCE
+    )
     assert re.search(r"^hint +server +none on udpm://.*ruedo run", done.stdout, re.MULTILINE)

@@ -15,8 +15,23 @@ def test_wheel(tmp_path):
 
     shutil.copytree(SOURCE / "proto", tmp_path / "proto")
     shutil.copytree(SOURCE / "clients/python", tmp_path / "clients/python")
-    subprocess.run([sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--no-index", "-w", str(tmp_path),
-                    str(tmp_path / "clients/python")], check=True, timeout=600)
+    subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "pip",
+            "wheel",
+            "--quiet",
+            "--no-deps",
+            "--no-build-isolation",
+            "--no-index",
+            "-w",
+            str(tmp_path),
+            str(tmp_path / "clients/python"),
+        ],
+        check=True,
+        timeout=600,
+    )
     [wheel] = tmp_path.glob("*.whl")
     assert wheel.name.startswith("ruedo-") and wheel.name.endswith("-py3-none-any.whl")
     with zipfile.ZipFile(wheel) as archive:
@@ -28,9 +43,21 @@ def test_wheel(tmp_path):
         assert f"ruedo/lcmtypes/{proto.stem}.py" in names
     assert "Requires-Dist: lcm==1.5.3" in metadata and "Requires-Dist: numpy" in metadata
     environment = {**os.environ, "PYTHONPATH": str(tmp_path / "installed")}
-    code = "import ruedo; print(ruedo.__file__, f'{ruedo.lcmtypes.planar_lidar_t().get_hash():016x}')"
-    said = subprocess.run([sys.executable, "-c", code], env=environment, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
-    assert said.split() == [str(tmp_path / "installed/ruedo/__init__.py"), "e3d17423180b5e8d"]    # bot_core's fingerprint
+    code = (
+        "import ruedo; print(ruedo.__file__, f'{ruedo.lcmtypes.planar_lidar_t().get_hash():016x}')"
+    )
+    said = subprocess.run(
+        [sys.executable, "-c", code],
+        env=environment,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    assert said.split() == [
+        str(tmp_path / "installed/ruedo/__init__.py"),
+        "e3d17423180b5e8d",
+    ]  # bot_core's fingerprint
 
 
 def test_jar_is_whole_and_for_java_11():
@@ -39,11 +66,15 @@ def test_jar_is_whole_and_for_java_11():
         pytest.skip("no JDK here: there is no jar")
     with zipfile.ZipFile(jar) as archive:
         names = set(archive.namelist())
-        assert {"lcm/lcm/LCM.class", "ruedo/Ruedo.class", "ruedo/lcmtypes/world_info_t.class"} <= names
+        assert {
+            "lcm/lcm/LCM.class",
+            "ruedo/Ruedo.class",
+            "ruedo/lcmtypes/world_info_t.class",
+        } <= names
         for name in names:
             if name.endswith(".class"):
                 head = archive.read(name)[:8]
-                assert int.from_bytes(head[6:8], "big") <= 55, name    # 55 is Java 11
+                assert int.from_bytes(head[6:8], "big") <= 55, name  # 55 is Java 11
 
 
 def test_images_become_arrays():
@@ -52,9 +83,11 @@ def test_images_become_arrays():
     import ruedo
 
     def image(format, data, stride):
-        return ruedo.Image(utime=0, width=2, height=2, format=format, row_stride=stride, data=bytes(data))
+        return ruedo.Image(
+            utime=0, width=2, height=2, format=format, row_stride=stride, data=bytes(data)
+        )
 
-    grey = image("gray", [1, 2, 99, 3, 4, 99], 3)    # one byte of padding behind each row
+    grey = image("gray", [1, 2, 99, 3, 4, 99], 3)  # one byte of padding behind each row
     assert grey.array().tolist() == [[1, 2], [3, 4]]
     bgr = image("bgr", range(12), 6)
     assert bgr.array().tolist() == [[[2, 1, 0], [5, 4, 3]], [[8, 7, 6], [11, 10, 9]]]
@@ -84,4 +117,8 @@ def test_scan_nearest():
     import ruedo
 
     scan = ruedo.Scan(0, np.array([3.0, 1.0, 2.0]), np.array([-1.0, 0.0, 1.0]), np.array([]))
-    assert scan.nearest() == 1.0 and scan.nearest(0.5, 1.0) == 2.0 and scan.nearest(2.0, 3.0) == float("inf")
+    assert (
+        scan.nearest() == 1.0
+        and scan.nearest(0.5, 1.0) == 2.0
+        and scan.nearest(2.0, 3.0) == float("inf")
+    )

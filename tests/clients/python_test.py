@@ -19,16 +19,33 @@ QUICK = {"disable": ["p3at/camera"], "timeout": PATIENCE}
 
 def scan(*ranges, utime=1):
     message = ruedo.lcmtypes.planar_lidar_t()
-    message.utime, message.nranges, message.ranges, message.rad0, message.radstep = utime, len(ranges), list(ranges), -0.5, 0.25
+    message.utime, message.nranges, message.ranges, message.rad0, message.radstep = (
+        utime,
+        len(ranges),
+        list(ranges),
+        -0.5,
+        0.25,
+    )
     return samples.CONVERSIONS["planar_lidar_t"][1](message)
 
 
 def test_samples_are_values():
-    one, same, other, later = scan(1.0, math.inf), scan(1.0, math.inf), scan(1.0, 2.0), scan(1.0, math.inf, utime=2)
+    one, same, other, later = (
+        scan(1.0, math.inf),
+        scan(1.0, math.inf),
+        scan(1.0, 2.0),
+        scan(1.0, math.inf, utime=2),
+    )
     assert one == same and hash(one) == hash(same) and one in {same}
     assert one != other and one != later and one != "a scan" and len({one, same, other, later}) == 3
-    assert scan(math.nan) == scan(math.nan) and scan(0.0) == scan(-0.0) and hash(scan(0.0)) == hash(scan(-0.0))
-    assert samples.Imu(1, np.zeros(4), np.zeros(3), np.ones(3)) != samples.Imu(1, np.zeros(4), np.zeros(3), np.zeros(3))
+    assert (
+        scan(math.nan) == scan(math.nan)
+        and scan(0.0) == scan(-0.0)
+        and hash(scan(0.0)) == hash(scan(-0.0))
+    )
+    assert samples.Imu(1, np.zeros(4), np.zeros(3), np.ones(3)) != samples.Imu(
+        1, np.zeros(4), np.zeros(3), np.zeros(3)
+    )
 
 
 def test_samples_cannot_be_written_into():
@@ -40,23 +57,61 @@ def test_samples_cannot_be_written_into():
 
 
 def test_they_are_shown_in_a_line():
-    assert repr(scan(*[1.5] * 180, math.inf)) == "Scan(utime=1, ranges=<181, 1.5 to 1.5>, angles=<181, -0.5 to 44.5>, intensities=[])"
+    assert (
+        repr(scan(*[1.5] * 180, math.inf))
+        == "Scan(utime=1, ranges=<181, 1.5 to 1.5>, angles=<181, -0.5 to 44.5>, intensities=[])"
+    )
     picture = samples.Image(5, 200, 200, "jpeg", 0, bytes(40000))
-    assert repr(picture) == "Image(utime=5, width=200, height=200, format='jpeg', row_stride=0, data=<40000 bytes>)"
+    assert (
+        repr(picture)
+        == "Image(utime=5, width=200, height=200, format='jpeg', row_stride=0, data=<40000 bytes>)"
+    )
 
 
 def test_arguments_instead_of_options():
-    said = _options(3, "max", ["--record", "x"], True, ["p3at@0,0"], ["p3at/camera"], {"p3at/lrf.rate": 20, "p3at/lrf.on": True}, False)
-    assert said == ["--seed", "3", "--rate", "max", "--lockstep", "1", "--spawn", "p3at@0,0", "--disable", "p3at/camera",
-                    "--set", "p3at/lrf.rate=20", "--set", "p3at/lrf.on=true", "--no-noise", "--record", "x"]
+    said = _options(
+        3,
+        "max",
+        ["--record", "x"],
+        True,
+        ["p3at@0,0"],
+        ["p3at/camera"],
+        {"p3at/lrf.rate": 20, "p3at/lrf.on": True},
+        False,
+    )
+    assert said == [
+        "--seed",
+        "3",
+        "--rate",
+        "max",
+        "--lockstep",
+        "1",
+        "--spawn",
+        "p3at@0,0",
+        "--disable",
+        "p3at/camera",
+        "--set",
+        "p3at/lrf.rate=20",
+        "--set",
+        "p3at/lrf.on=true",
+        "--no-noise",
+        "--record",
+        "x",
+    ]
 
 
-@pytest.mark.parametrize("wrong, says", [
-    ({"args": "--lockstep 1"}, r"args is '--lockstep 1': it must be a list, args=\['--lockstep', '1'\]"),
-    ({"disable": "p3at/camera"}, "disable is 'p3at/camera': it must be a list"),
-    ({"set": ["p3at/lrf.rate=20"]}, "set is .*: it must be a dict"),
-    ({"text": "<sdf/>"}, "either a world or its text"),
-])
+@pytest.mark.parametrize(
+    "wrong, says",
+    [
+        (
+            {"args": "--lockstep 1"},
+            r"args is '--lockstep 1': it must be a list, args=\['--lockstep', '1'\]",
+        ),
+        ({"disable": "p3at/camera"}, "disable is 'p3at/camera': it must be a list"),
+        ({"set": ["p3at/lrf.rate=20"]}, "set is .*: it must be a dict"),
+        ({"text": "<sdf/>"}, "either a world or its text"),
+    ],
+)
 def test_wrong_arguments_say_what_is_right(wrong, says):
     with pytest.raises(TypeError, match=says):
         ruedo.launch(HALL, **wrong)
@@ -71,14 +126,26 @@ def test_worlds_are_found_by_name():
 
 def test_a_world_is_built_and_run():
     """A wall whose face is 3 m ahead of the robot, which carries its LRF 0.16 m ahead of its middle; a ball's worth of a box."""
-    world = ruedo.World("mine").wall(3.05, -2, 3.05, 2).box(0.0, 2.0, mass=3.0, name="crate").cylinder(0.0, -2.0).robot("p3at")
+    world = (
+        ruedo.World("mine")
+        .wall(3.05, -2, 3.05, 2)
+        .box(0.0, 2.0, mass=3.0, name="crate")
+        .cylinder(0.0, -2.0)
+        .robot("p3at")
+    )
     with ruedo.launch(world, lockstep=1, noise=False, **QUICK) as sim:
         assert sim.world == "mine" and [robot.name for robot in sim.robots] == ["p3at"]
-        assert {body.name: body.mass for body in sim.bodies if body.name.startswith("crate")} == {"crate/link": 3.0}
+        assert {body.name: body.mass for body in sim.bodies if body.name.startswith("crate")} == {
+            "crate/link": 3.0
+        }
         seen = sim.step(0)
-        assert seen.latest(sim.robot("p3at").lrf).nearest(-0.05, 0.05) == pytest.approx(3.0 - 0.16, abs=1e-3)
+        assert seen.latest(sim.robot("p3at").lrf).nearest(-0.05, 0.05) == pytest.approx(
+            3.0 - 0.16, abs=1e-3
+        )
         assert repr(seen) == f"Observations(step=0, time=0, {len(seen.messages)} messages)"
-        with pytest.raises(TypeError, match="n is 2.5: it must be a whole number of steps; 0.005 s is one"):
+        with pytest.raises(
+            TypeError, match="n is 2.5: it must be a whole number of steps; 0.005 s is one"
+        ):
             sim.step(2.5)
         with pytest.raises(TypeError, match=r"put it into a list, \[command\]"):
             sim.step(2, sim.robot("p3at").velocity_command(0.1, 0.0))
@@ -87,8 +154,16 @@ def test_a_world_is_built_and_run():
         assert sim.step(np.int64(2)).step == 2
 
 
-@pytest.mark.parametrize("call", [lambda: ruedo.World().box(math.nan, 0.0), lambda: ruedo.World().box(0, 0, size=(1, 0, 1)),
-                                  lambda: ruedo.World().wall(1, 1, 1, 1), lambda: ruedo.World().cylinder(0, 0, mass=-1), lambda: ruedo.World(step=0.0)])
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: ruedo.World().box(math.nan, 0.0),
+        lambda: ruedo.World().box(0, 0, size=(1, 0, 1)),
+        lambda: ruedo.World().wall(1, 1, 1, 1),
+        lambda: ruedo.World().cylinder(0, 0, mass=-1),
+        lambda: ruedo.World(step=0.0),
+    ],
+)
 def test_a_world_of_nonsense_is_refused(call):
     with pytest.raises(ValueError, match="it must be"):
         call()
@@ -119,13 +194,26 @@ def test_callbacks_are_taken_back_and_readers_do_not_meet(caplog):
             assert reader.next(PATIENCE).utime > now.utime
         assert len(heard) == count and len(failing) >= 2
         sim.close()
-        for call in (odometry.latest, odometry.next, first.next, sim.pause, sim.state, lambda: sim.sleep(1.0), lambda: sim.step(1),
-                     lambda: sim.robot("p3at").set_velocity(0.1, 0.0), lambda: sim.robot("p3at").rotate(1.0), lambda: odometry.on_sample(print),
-                     lambda: sim.on_new_run(print), sim.quit):
+        for call in (
+            odometry.latest,
+            odometry.next,
+            first.next,
+            sim.pause,
+            sim.state,
+            lambda: sim.sleep(1.0),
+            lambda: sim.step(1),
+            lambda: sim.robot("p3at").set_velocity(0.1, 0.0),
+            lambda: sim.robot("p3at").rotate(1.0),
+            lambda: odometry.on_sample(print),
+            lambda: sim.on_new_run(print),
+            sim.quit,
+        ):
             with pytest.raises(ruedo.NoServer, match="^this simulation was closed$"):
                 call()
         assert "this simulation was closed" in repr(sim)
-    assert [record.getMessage() for record in caplog.records] == ["a callback on p3at/odometry failed; it is called on, and this is said once"]
+    assert [record.getMessage() for record in caplog.records] == [
+        "a callback on p3at/odometry failed; it is called on, and this is said once"
+    ]
 
 
 def test_a_server_that_was_started_anew_is_noticed():
@@ -159,36 +247,54 @@ def test_the_child_of_a_fork_is_told():
             sim.close()
             os._exit(0)
         os.waitpid(child, 0)
-        assert os.read(reader, 1000).decode() == "this simulation is the parent process's: connect() again after a fork"
-        assert sim.state().step >= 0    # and the parent's goes on
+        assert (
+            os.read(reader, 1000).decode()
+            == "this simulation is the parent process's: connect() again after a fork"
+        )
+        assert sim.state().step >= 0  # and the parent's goes on
 
 
 def test_a_log_as_pandas_has_it(tmp_path):
     import pandas
+
     log = lcm.EventLog(str(tmp_path / "run.lcm"), "w", overwrite=True)
     for k in range(3):
         odometry = ruedo.lcmtypes.odometry_t()
-        odometry.utime, odometry.x, odometry.n, odometry.angle, odometry.rate, odometry.ticks = 20000 * k, 0.5 * k, 1, [float(k)], [1.0], [k]
+        odometry.utime, odometry.x, odometry.n, odometry.angle, odometry.rate, odometry.ticks = (
+            20000 * k,
+            0.5 * k,
+            1,
+            [float(k)],
+            [1.0],
+            [k],
+        )
         log.write_event(k, "p3at/odometry", odometry.encode())
     log.write_event(9, "other", b"something else")
     log.close()
     frames = ruedo.read_log(tmp_path / "run.lcm")
-    assert list(frames) == ["p3at/odometry"] and isinstance(frames["p3at/odometry"], pandas.DataFrame)
+    assert list(frames) == ["p3at/odometry"] and isinstance(
+        frames["p3at/odometry"], pandas.DataFrame
+    )
     frame = frames["p3at/odometry"]
-    assert list(frame["x"]) == [0.0, 0.5, 1.0] and list(frame.index) == pytest.approx([0.0, 0.02, 0.04]) and frame["angle"].iloc[2] == [2.0]
+    assert (
+        list(frame["x"]) == [0.0, 0.5, 1.0]
+        and list(frame.index) == pytest.approx([0.0, 0.02, 0.04])
+        and frame["angle"].iloc[2] == [2.0]
+    )
     assert ruedo.read_log(tmp_path / "run.lcm", ["nothing"]) == {}
 
 
 class At:
     """Something placed: 1 m ahead and 0.5 m up, a quarter turn to the left."""
+
     position = np.array([1.0, 0.0, 0.5])
     orientation = np.array([math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)])
 
 
 def test_points_of_a_scan():
-    found = scan(2.0, math.inf, 1.0, -math.inf).points()    # at -0.5, 0 and 0.5 rad from the third on
+    found = scan(2.0, math.inf, 1.0, -math.inf).points()  # at -0.5, 0 and 0.5 rad from the third on
     assert np.allclose(found, [[2 * math.cos(-0.5), 2 * math.sin(-0.5)], [1.0, 0.0]])
-    ahead = scan(math.inf, math.inf, 2.0)                   # along the device's x axis
+    ahead = scan(math.inf, math.inf, 2.0)  # along the device's x axis
     assert np.allclose(ahead.points(At()), [[1.0, 2.0, 0.5]])
     assert np.allclose(ahead.points(At(), At()), [[1.0 - 2.0, 1.0, 1.0]])
     with pytest.raises(TypeError, match="needs the device"):
@@ -200,7 +306,7 @@ def test_notebooks_show_pictures_and_scans():
     picture = samples.Image(5, 3, 2, "rgb", 9, pixels.tobytes())
     png = picture._repr_png_()
     assert png.startswith(b"\x89PNG\r\n\x1a\n") and picture._repr_jpeg_() is None
-    body = png[png.index(b"IDAT") + 4:]
+    body = png[png.index(b"IDAT") + 4 :]
     rows = np.frombuffer(zlib.decompressobj().decompress(body), np.uint8).reshape(2, 10)
     assert (rows[:, 1:].reshape(2, 3, 3) == pixels).all() and (rows[:, 0] == 0).all()
     assert samples.Image(5, 3, 2, "jpeg", 0, b"\xff\xd8")._repr_jpeg_() == b"\xff\xd8"
@@ -211,21 +317,42 @@ def test_notebooks_show_pictures_and_scans():
 
 
 def test_a_map_is_an_array(tmp_path):
-    (tmp_path / "m.pgm").write_bytes(b"P5\n# a comment\n3 2\n255\n" + bytes([0, 254, 205, 254, 254, 0]))
-    (tmp_path / "m.yaml").write_text("image: m.pgm\nresolution: 0.5\norigin: [-1, -2, 0]\noccupied_thresh: 0.65\nfree_thresh: 0.196\n")
+    (tmp_path / "m.pgm").write_bytes(
+        b"P5\n# a comment\n3 2\n255\n" + bytes([0, 254, 205, 254, 254, 0])
+    )
+    (tmp_path / "m.yaml").write_text(
+        "image: m.pgm\nresolution: 0.5\norigin: [-1, -2, 0]\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
     grid = ruedo.load_map(tmp_path / "m.yaml")
-    assert grid.cells.tolist() == [[0, 0, 100], [100, 0, -1]]    # the picture's last row is the southernmost
+    assert grid.cells.tolist() == [
+        [0, 0, 100],
+        [100, 0, -1],
+    ]  # the picture's last row is the southernmost
     assert grid.resolution == 0.5 and grid.origin == (-1.0, -2.0, 0.0)
-    assert grid.at(0.4, -1.9) == 100 and grid.at(-0.9, -1.4) == 100 and grid.at(-0.9, -1.9) == 0 and grid.at(5, 5) == -1
+    assert (
+        grid.at(0.4, -1.9) == 100
+        and grid.at(-0.9, -1.4) == 100
+        and grid.at(-0.9, -1.9) == 0
+        and grid.at(5, 5) == -1
+    )
 
 
-@pytest.mark.parametrize("text, says", [
-    ("image: m.pgm\n", "resolution, origin is missing"),
-    ("[1, 2]", "a map of image, resolution and origin is wanted"),
-    ("image: m.pgm\nresolution: -1\norigin: [0, 0, 0]\n", "resolution is -1: a number above 0 is wanted"),
-    ("image: m.pgm\nresolution: 1\norigin: [0, 0]\n", "origin is .*: three numbers are wanted"),
-    ("image: m.pgm\nresolution: 1\norigin: [0, 0, 0]\n", "a PGM of 8 bits with 9 x 9 pixels is wanted, and 1 bytes are there"),
-])
+@pytest.mark.parametrize(
+    "text, says",
+    [
+        ("image: m.pgm\n", "resolution, origin is missing"),
+        ("[1, 2]", "a map of image, resolution and origin is wanted"),
+        (
+            "image: m.pgm\nresolution: -1\norigin: [0, 0, 0]\n",
+            "resolution is -1: a number above 0 is wanted",
+        ),
+        ("image: m.pgm\nresolution: 1\norigin: [0, 0]\n", "origin is .*: three numbers are wanted"),
+        (
+            "image: m.pgm\nresolution: 1\norigin: [0, 0, 0]\n",
+            "a PGM of 8 bits with 9 x 9 pixels is wanted, and 1 bytes are there",
+        ),
+    ],
+)
 def test_a_wrong_map_says_what_is_wrong(text, says, tmp_path):
     (tmp_path / "m.pgm").write_bytes(b"P5 9 9 255\n1")
     (tmp_path / "m.yaml").write_text(text)
@@ -235,8 +362,11 @@ def test_a_wrong_map_says_what_is_wrong(text, says, tmp_path):
 
 def test_degrees_are_warned_of():
     from ruedo.robot import _radians
+
     for call, angle, usual in (("rotate", 90, 4 * math.pi), ("turn_to", -45, 2 * math.pi)):
-        with pytest.warns(UserWarning, match=rf"{call}\({angle}\) is .* turns: angles are in radians"):
+        with pytest.warns(
+            UserWarning, match=rf"{call}\({angle}\) is .* turns: angles are in radians"
+        ):
             _radians(call, angle, usual)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -14,8 +14,12 @@ STEPS = 300
 
 
 def lockstep(language, url=None):
-    with ruedo_run("--lockstep", "1", "--lease", str(PATIENCE), "--disable", "p3at/camera", world=HALL, url=url) as server:
-        return probe(language, server.url, "lockstep", "client0", "p3at", str(STEPS), "1", "0.2").words("end")
+    with ruedo_run(
+        "--lockstep", "1", "--lease", str(PATIENCE), "--disable", "p3at/camera", world=HALL, url=url
+    ) as server:
+        return probe(
+            language, server.url, "lockstep", "client0", "p3at", str(STEPS), "1", "0.2"
+        ).words("end")
 
 
 def test_lockstep_is_the_same_as_over_multicast(language, tmp_path):
@@ -35,11 +39,21 @@ def test_launch_takes_a_socket_of_its_own():
         address = urlsplit(sim.url)
         assert address.scheme == "unix"
         path = Path(address.path)
-        assert stat.S_IMODE(path.stat().st_mode) == 0o600 and stat.S_IMODE(path.parent.stat().st_mode) == 0o700
+        assert (
+            stat.S_IMODE(path.stat().st_mode) == 0o600
+            and stat.S_IMODE(path.parent.stat().st_mode) == 0o700
+        )
         sim.robot("p3at").pose.next()
-        heard = subprocess.run([RUEDO, "hz", "p3at/pose", "--lcm", sim.url, "-n", "1"], capture_output=True, text=True, timeout=PATIENCE)
+        heard = subprocess.run(
+            [RUEDO, "hz", "p3at/pose", "--lcm", sim.url, "-n", "1"],
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+        )
         assert "Hz" in heard.stdout, heard.stderr
-        told = subprocess.run([RUEDO, "run", HALL, "--lcm", sim.url], capture_output=True, text=True, timeout=PATIENCE)
+        told = subprocess.run(
+            [RUEDO, "run", HALL, "--lcm", sim.url], capture_output=True, text=True, timeout=PATIENCE
+        )
         assert told.returncode == 4 and "is taken by another server" in told.stderr
     assert not path.parent.exists()
 
@@ -49,7 +63,10 @@ def test_a_server_that_comes_back_is_heard_again(tmp_path):
     import ruedo
 
     url = f"unix://{tmp_path}/bus"
-    with ruedo_run("--disable", "p3at/camera", world=HALL, url=url) as server, ruedo.connect(url) as sim:
+    with (
+        ruedo_run("--disable", "p3at/camera", world=HALL, url=url) as server,
+        ruedo.connect(url) as sim,
+    ):
         sim.robot("p3at").pose.next()
         server.process.kill()
         server.process.wait()

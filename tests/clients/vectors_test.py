@@ -16,8 +16,17 @@ RUNNERS = {"python": [sys.executable, str(HERE / "vectors/runner.py")]}
 if "RUEDO_VECTORS_CPP" in os.environ:
     RUNNERS["cpp"] = [os.environ["RUEDO_VECTORS_CPP"]]
 if "RUEDO_PROBE_JAVA" in os.environ:
-    RUNNERS["java"] = ["java", "-cp", f"{BUILD}/java/ruedo.jar:{os.environ['RUEDO_PROBE_JAVA']}", "ruedo.VectorsRunner"]
-CONVERSATIONS = {name: one for name, one in json.loads((HERE / "vectors/conversations.json").read_text()).items() if name != "about"}
+    RUNNERS["java"] = [
+        "java",
+        "-cp",
+        f"{BUILD}/java/ruedo.jar:{os.environ['RUEDO_PROBE_JAVA']}",
+        "ruedo.VectorsRunner",
+    ]
+CONVERSATIONS = {
+    name: one
+    for name, one in json.loads((HERE / "vectors/conversations.json").read_text()).items()
+    if name != "about"
+}
 
 
 def messages():
@@ -35,7 +44,9 @@ def messages():
 def test_messages(runner):
     cases = messages()
     given = "".join(line + "\n" for line, _ in cases)
-    done = subprocess.run([*RUNNERS[runner], "decode"], input=given, capture_output=True, text=True, timeout=PATIENCE)
+    done = subprocess.run(
+        [*RUNNERS[runner], "decode"], input=given, capture_output=True, text=True, timeout=PATIENCE
+    )
     assert done.returncode == 0, done.stderr
     said = [one.split("\n") for one in done.stdout.split("\n.\n")[:-1]]
     assert len(said) == len(cases) > 50
@@ -47,14 +58,14 @@ class Script:
     """A server that says what a conversation has it say."""
 
     RUN, EPOCH = 7, 0
-    TICK, ODOMETRY = 0, 1    # channels
+    TICK, ODOMETRY = 0, 1  # channels
 
     def __init__(self, client):
         from ruedo import lcmtypes
 
         self.types, self.client = lcmtypes, client
-        self.granted = 0    # sequence of the client's newest grant
-        self.last = None    # of its requests that were awaited
+        self.granted = 0  # sequence of the client's newest grant
+        self.last = None  # of its requests that were awaited
 
     def odometry(self, state):
         message = self.types.odometry_t()
@@ -63,7 +74,13 @@ class Script:
 
     def tick(self, state, applied=False, of=""):
         message = self.types.tick_t()
-        message.utime, message.run_id, message.epoch, message.step, message.state_hash = 5000 * state, self.RUN, self.EPOCH, state, 100 + state
+        message.utime, message.run_id, message.epoch, message.step, message.state_hash = (
+            5000 * state,
+            self.RUN,
+            self.EPOCH,
+            state,
+            100 + state,
+        )
         message.nparts = 1
         message.run_id += of == "another run"
         message.epoch += of == "the next epoch"
@@ -79,27 +96,54 @@ class Script:
         return message.encode()
 
     def send(self, channel, data):
-        self.client.stdin.write(struct.pack(">ii", len(channel), len(data)) + channel.encode() + data)
+        self.client.stdin.write(
+            struct.pack(">ii", len(channel), len(data)) + channel.encode() + data
+        )
         self.client.stdin.flush()
 
     def reply(self, request, body=b"", code=0, text=""):
         message = self.types.reply_t()
-        message.run_id, message.epoch, message.session, message.sequence, message.kind = self.RUN, self.EPOCH, 5, request.sequence, request.kind
+        message.run_id, message.epoch, message.session, message.sequence, message.kind = (
+            self.RUN,
+            self.EPOCH,
+            5,
+            request.sequence,
+            request.kind,
+        )
         message.code, message.text, message.size, message.body = code, text, len(body), body
         self.send("ruedo/reply", message.encode())
 
     def info(self):
         message = self.types.world_info_t()
-        message.run_id, message.nparts, message.version, message.world, message.step_us = self.RUN, 1, "1", "script", 5000
-        message.features = 1 << 1 | 1 << self.types.request_t.GRANT | 1 << self.types.request_t.RESEND
+        message.run_id, message.nparts, message.version, message.world, message.step_us = (
+            self.RUN,
+            1,
+            "1",
+            "script",
+            5000,
+        )
+        message.features = (
+            1 << 1 | 1 << self.types.request_t.GRANT | 1 << self.types.request_t.RESEND
+        )
         robot = self.types.robot_info_t()
         robot.name, robot.drive = "p3at", "kinematic"
         message.robots, message.nrobots = [robot], 1
-        for name, owner, device, type, input in (("ruedo/tick", "", "", "tick_t", False), ("p3at/odometry", "p3at", "odometry", "odometry_t", False),
-                                                 ("p3at/velocity", "p3at", "velocity", "velocity_command_t", True)):
+        for name, owner, device, type, input in (
+            ("ruedo/tick", "", "", "tick_t", False),
+            ("p3at/odometry", "p3at", "odometry", "odometry_t", False),
+            ("p3at/velocity", "p3at", "velocity", "velocity_command_t", True),
+        ):
             channel = self.types.channel_info_t()
-            channel.name, channel.robot, channel.device, channel.type, channel.input = name, owner, device, type, input
-            channel.fingerprint = struct.unpack(">q", getattr(self.types, type)._get_packed_fingerprint())[0]
+            channel.name, channel.robot, channel.device, channel.type, channel.input = (
+                name,
+                owner,
+                device,
+                type,
+                input,
+            )
+            channel.fingerprint = struct.unpack(
+                ">q", getattr(self.types, type)._get_packed_fingerprint()
+            )[0]
             message.channels.append(channel)
         message.nchannels = len(message.channels)
         self.send("ruedo/info", message.encode())
@@ -120,7 +164,10 @@ class Script:
                 self.info()
             elif request.kind == request.JOIN:
                 self.reply(request)
-            elif request.kind == request.GRANT and self.types.grant_request_t.decode(request.body).granted < 0:    # takes part
+            elif (
+                request.kind == request.GRANT
+                and self.types.grant_request_t.decode(request.body).granted < 0
+            ):  # takes part
                 body = self.types.grant_reply_t()
                 body.granted, body.received, body.step = 0, -1, 0
                 self.reply(request, body.encode())
@@ -138,8 +185,11 @@ class Script:
                     continue
                 self.granted = request.sequence
             else:
-                wanted = [[w.step, "tick" if w.channel_index == self.TICK else w.offset] for w in self.types.resend_request_t.decode(request.body).wanted]
-                if wanted != wants:    # of before the last that came
+                wanted = [
+                    [w.step, "tick" if w.channel_index == self.TICK else w.offset]
+                    for w in self.types.resend_request_t.decode(request.body).wanted
+                ]
+                if wanted != wants:  # of before the last that came
                     continue
             self.last = request
             return
@@ -151,8 +201,10 @@ class Script:
             part = self.types.resend_part_t()
             data = self.tick(state) if offset == "tick" else self.odometry(state)
             part.step, part.total, part.offset = state, len(data), 0 if offset == "tick" else offset
-            part.channel_index, part.sequence = (self.TICK, 0) if offset == "tick" else (self.ODOMETRY, state)
-            part.data = data[part.offset:part.offset + size[0]] if size else data
+            part.channel_index, part.sequence = (
+                (self.TICK, 0) if offset == "tick" else (self.ODOMETRY, state)
+            )
+            part.data = data[part.offset : part.offset + size[0]] if size else data
             if spoilt:
                 part.data = bytes(len(part.data))
             part.size = len(part.data)
@@ -166,13 +218,18 @@ class Script:
         elif "again" in line:
             self.client_says(line["again"], again=True)
         elif "tick" in line:
-            self.send("ruedo/tick", self.tick(line["tick"], line.get("applied", False), line.get("of", "")))
+            self.send(
+                "ruedo/tick",
+                self.tick(line["tick"], line.get("applied", False), line.get("of", "")),
+            )
         elif "message" in line:
             self.send("p3at/odometry", self.odometry(line["message"]))
         elif "pieces" in line:
             self.pieces(line["pieces"], line.get("spoilt", False))
         elif "refuse" in line:
-            self.reply(self.last, code=getattr(self.types.reply_t, line["refuse"]), text=line["text"])
+            self.reply(
+                self.last, code=getattr(self.types.reply_t, line["refuse"]), text=line["text"]
+            )
         else:
             whole = self.tick(1, True)
             for end in (7, 30, len(whole) - 1):
@@ -184,12 +241,14 @@ class Script:
 def test_conversations(runner, name):
     one = CONVERSATIONS[name]
     command = [*RUNNERS[runner], "converse", *map(str, one["steps"])]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as client:
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as client:
         killer = threading.Timer(PATIENCE, client.kill)
         killer.start()
         script = Script(client)
         try:
-            while script.request() is not None:    # until it takes part
+            while script.request() is not None:  # until it takes part
                 pass
             for line in one["say"]:
                 script.say(line)

@@ -16,20 +16,38 @@ EXAMPLES = {
 
 
 def numbers(line):
-    return [float(word.strip(",;")) for word in line.split() if word.strip(",;").replace(".", "").replace("-", "").isdigit()]
+    return [
+        float(word.strip(",;"))
+        for word in line.split()
+        if word.strip(",;").replace(".", "").replace("-", "").isdigit()
+    ]
 
 
 @pytest.mark.parametrize("language", list(EXAMPLES))
 def test_wander(language, tmp_path):
     log, picture = tmp_path / "run.log", tmp_path / "seen.jpg"
     with ruedo_run("--record", str(log), world=ARENA) as server:
-        done = subprocess.run([*EXAMPLES[language], "--url", server.url, "--duration", "20", "--picture", str(picture)],
-                              capture_output=True, text=True, timeout=PATIENCE)
+        done = subprocess.run(
+            [
+                *EXAMPLES[language],
+                "--url",
+                server.url,
+                "--duration",
+                "20",
+                "--picture",
+                str(picture),
+            ],
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+        )
     assert done.returncode == 0, done.stdout + done.stderr
-    assert picture.read_bytes()[:3] == b"\xff\xd8\xff"    # a JPEG
+    assert picture.read_bytes()[:3] == b"\xff\xd8\xff"  # a JPEG
     lines = {line.split("  ")[0].split(" x")[0].strip(): line for line in done.stdout.splitlines()}
     truth, odometry = numbers(lines["true pose"]), numbers(lines["odometry"])
-    assert odometry[:2] == pytest.approx(truth[:2], abs=0.05)    # the robot started at the world's origin
+    assert odometry[:2] == pytest.approx(
+        truth[:2], abs=0.05
+    )  # the robot started at the world's origin
 
     from ruedo import lcmtypes
 
@@ -41,31 +59,50 @@ def test_wander(language, tmp_path):
             heard += 1
         elif event.channel == "p3at/motion":
             reasons.add(lcmtypes.motion_status_t.decode(event.data).reason)
-    assert heard >= 1000 and way > 2.0    # it did move
+    assert heard >= 1000 and way > 2.0  # it did move
     # Nothing blocked it, and its watchdog never had to stop it.
-    assert reasons <= {lcmtypes.motion_status_t.REASON_NONE, lcmtypes.motion_status_t.REASON_REPLACED}
+    assert reasons <= {
+        lcmtypes.motion_status_t.REASON_NONE,
+        lcmtypes.motion_status_t.REASON_REPLACED,
+    }
     # An untouched kinematic drive follows its wheels exactly, so a bump would show as odometry that is off.
-    assert odometry[2] == pytest.approx(truth[2], abs=0.05) or abs(abs(odometry[2] - truth[2]) - 6.2832) < 0.05
+    assert (
+        odometry[2] == pytest.approx(truth[2], abs=0.05)
+        or abs(abs(odometry[2] - truth[2]) - 6.2832) < 0.05
+    )
 
 
 @pytest.mark.parametrize("language", list(EXAMPLES))
 def test_ctrl_c_ends_the_example_in_order(language, tmp_path):
     picture = tmp_path / "seen.jpg"
     with ruedo_run(world=ARENA) as server:
-        example = subprocess.Popen([*EXAMPLES[language], "--url", server.url, "--picture", str(picture)], stdout=subprocess.PIPE,
-                                   stderr=subprocess.PIPE, text=True, preexec_fn=heed_ctrl_c)
+        example = subprocess.Popen(
+            [*EXAMPLES[language], "--url", server.url, "--picture", str(picture)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            preexec_fn=heed_ctrl_c,
+        )
         assert "Ctrl-C ends it" in example.stdout.readline()
         example.send_signal(signal.SIGINT)
         said, errors = example.communicate(timeout=PATIENCE)
-    assert [line.split()[0] for line in said.splitlines()] == ["camera", "true", "odometry"], said + errors
+    assert [line.split()[0] for line in said.splitlines()] == ["camera", "true", "odometry"], (
+        said + errors
+    )
     assert picture.read_bytes()[:3] == b"\xff\xd8\xff"
     assert not errors
-    assert example.returncode == (130 if language == "java" else 0)    # a JVM that a signal ends says so
+    assert example.returncode == (
+        130 if language == "java" else 0
+    )  # a JVM that a signal ends says so
 
 
 @pytest.mark.parametrize("language", list(EXAMPLES))
 def test_options_are_explained(language):
-    asked = subprocess.run([*EXAMPLES[language], "--help"], capture_output=True, text=True, timeout=PATIENCE)
-    wrong = subprocess.run([*EXAMPLES[language], "--robbot", "p3at"], capture_output=True, text=True, timeout=PATIENCE)
+    asked = subprocess.run(
+        [*EXAMPLES[language], "--help"], capture_output=True, text=True, timeout=PATIENCE
+    )
+    wrong = subprocess.run(
+        [*EXAMPLES[language], "--robbot", "p3at"], capture_output=True, text=True, timeout=PATIENCE
+    )
     assert asked.returncode == 0 and "--picture" in asked.stdout + asked.stderr
     assert wrong.returncode == 2 and "--robot" in wrong.stderr

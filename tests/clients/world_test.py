@@ -16,10 +16,15 @@ def test_models_come_and_go(language):
         said = probe(language, server.url, "world", BALL)
     x, robots, bodies = said.numbers("there")
     assert (x, robots) == (pytest.approx(3.0, abs=1e-9), 2) and bodies >= 1
-    assert said.words("drives") == ["True", "181"]    # the new robot takes commands, and its scans come
+    assert said.words("drives") == [
+        "True",
+        "181",
+    ]  # the new robot takes commands, and its scans come
     assert said.numbers("put") == pytest.approx([2.0], abs=1e-9)
     assert said.words("rolls") == ["True"]
-    assert said.one("taken").startswith("RequestError: SPAWN: ") and "'guest' is taken" in said.one("taken")
+    assert said.one("taken").startswith("RequestError: SPAWN: ") and "'guest' is taken" in said.one(
+        "taken"
+    )
     assert "it would stand in 'guest'" in said.one("room")
     assert "the text" in said.one("text")
     assert "has a drive" in said.one("driven")
@@ -31,7 +36,9 @@ def test_models_come_and_go(language):
 
 
 def test_snapshots_and_the_names_of_spawned_models(language, tmp_path):
-    with ruedo_run("--paused", "--disable", "p3at/camera", "--snapshots", str(tmp_path), world=HALL) as server:
+    with ruedo_run(
+        "--paused", "--disable", "p3at/camera", "--snapshots", str(tmp_path), world=HALL
+    ) as server:
         said = probe(language, server.url, "snapshots")
     assert said.words("names") == ["p3at_2", "p3at_3", "guest"]
     assert said.words("same") == ["True", "True", "True"]

@@ -1,4 +1,5 @@
-// The console's parts that need no socket: who may come in, the ring past the publisher, what is kept of each channel.
+// The console's parts that need no socket: who may come in, the ring past the publisher, what is
+// kept of each channel.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -28,17 +29,20 @@ TEST(Guard, AddressesAreRead) {
   EXPECT_EQ(parse_address("9000").port, 9000);
   EXPECT_EQ(parse_address("localhost:1").host, "127.0.0.1");
   EXPECT_FALSE(parse_address("0.0.0.0:8080").loopback());
-  for (const char* bad : {"worlds/arena.sdf", "127.0.0.1:", "127.0.0.1:65536", "1.2.3:80", ":x", "127.0.0.1:-1"}) {
+  for (const char* bad :
+       {"worlds/arena.sdf", "127.0.0.1:", "127.0.0.1:65536", "1.2.3:80", ":x", "127.0.0.1:-1"}) {
     EXPECT_THROW(parse_address(bad), InputError) << bad;
   }
 }
 
 TEST(Guard, OnLoopbackOnlyLoopbackNames) {
   const Address here;
-  for (const char* good : {"localhost:8080", "127.0.0.1:8080", "localhost", "[::1]:8080", "127.0.0.2:1"}) {
+  for (const char* good :
+       {"localhost:8080", "127.0.0.1:8080", "localhost", "[::1]:8080", "127.0.0.2:1"}) {
     EXPECT_EQ(refuse({.host = good}, here, ""), "") << good;
   }
-  for (const char* bad : {"", "evil.example:8080", "127.evil.example:8080", "localhost.evil.example", "10.0.0.1:8080"}) {
+  for (const char* bad : {"", "evil.example:8080", "127.evil.example:8080",
+                          "localhost.evil.example", "10.0.0.1:8080"}) {
     EXPECT_NE(refuse({.host = bad}, here, ""), "") << bad;
   }
 }
@@ -51,16 +55,23 @@ TEST(Guard, ElsewhereOnlyWithTheToken) {
   EXPECT_NE(refuse({.host = "robot:8080"}, anywhere, token), "");
   EXPECT_NE(refuse({.host = "robot:8080", .token = token.substr(1)}, anywhere, token), "");
   EXPECT_EQ(refuse({.host = "robot:8080", .token = token}, anywhere, token), "");
-  EXPECT_EQ(refuse({.host = "robot:8080", .cookie = "a=b; ruedo_token=" + token}, anywhere, token), "");
+  EXPECT_EQ(refuse({.host = "robot:8080", .cookie = "a=b; ruedo_token=" + token}, anywhere, token),
+            "");
   EXPECT_NE(refuse({.host = "robot:8080", .cookie = "xruedo_token=" + token}, anywhere, token), "");
 }
 
 TEST(Guard, SocketsOnlyForItsOwnPages) {
   const Address here;
-  EXPECT_EQ(refuse({.host = "localhost:8080", .origin = "http://localhost:8080", .socket = true}, here, ""), "");
-  EXPECT_EQ(refuse({.host = "localhost:8080", .socket = true}, here, ""), "");    // no browser
-  EXPECT_NE(refuse({.host = "localhost:8080", .origin = "http://evil.example", .socket = true}, here, ""), "");
-  EXPECT_NE(refuse({.host = "localhost:8080", .origin = "http://localhost:9090", .socket = true}, here, ""), "");
+  EXPECT_EQ(refuse({.host = "localhost:8080", .origin = "http://localhost:8080", .socket = true},
+                   here, ""),
+            "");
+  EXPECT_EQ(refuse({.host = "localhost:8080", .socket = true}, here, ""), "");  // no browser
+  EXPECT_NE(
+      refuse({.host = "localhost:8080", .origin = "http://evil.example", .socket = true}, here, ""),
+      "");
+  EXPECT_NE(refuse({.host = "localhost:8080", .origin = "http://localhost:9090", .socket = true},
+                   here, ""),
+            "");
   EXPECT_NE(refuse({.host = "localhost:8080", .origin = "null", .socket = true}, here, ""), "");
 }
 
@@ -121,14 +132,19 @@ TEST(Board, KeepsTheNewestAllPartsAndTheLastReplies) {
   reply_t reply{};
   for (int i = 0; i < 100; ++i) board.put(2, encoded(reply));
   EXPECT_EQ(board.channels()[2].newest.size(), Board::kKeptReplies);
-  board.put(0, {1, 2, 3});    // not a message at all
+  board.put(0, {1, 2, 3});  // not a message at all
   EXPECT_EQ(board.channels()[0].newest.size(), 1u);
 }
 
 class FakeBus : public Bus {
  public:
-  void publish(const std::string& channel, const uint8_t*, size_t) override { published.push_back(channel); }
-  void listen(const std::vector<std::string>&, Handler handler, const std::vector<std::string>&) override { received = std::move(handler); }
+  void publish(const std::string& channel, const uint8_t*, size_t) override {
+    published.push_back(channel);
+  }
+  void listen(const std::vector<std::string>&, Handler handler,
+              const std::vector<std::string>&) override {
+    received = std::move(handler);
+  }
   std::vector<std::string> published;
   Handler received;
 };
@@ -144,7 +160,7 @@ TEST(TeeBus, ForwardsAllAndOffersWhatIsWanted) {
     return count;
   };
   tee.publish("a", &byte, 1);
-  EXPECT_EQ(offered(), 0);    // nobody watches
+  EXPECT_EQ(offered(), 0);  // nobody watches
   tee.watch(true);
   tee.publish("a", &byte, 1);
   tee.publish("b", &byte, 1);
@@ -157,22 +173,23 @@ TEST(TeeBus, ForwardsAllAndOffersWhatIsWanted) {
   EXPECT_THAT(inner.published, testing::ElementsAre("a", "a", "b", "a"));
 }
 
-// On a bus that does not hear itself, as over the network, and on one that does, a command arrives once.
+// On a bus that does not hear itself, as over the network, and on one that does, a command arrives
+// once.
 TEST(TeeBus, ACommandGoesToTheListenerAndNotOverTheBus) {
   FakeBus inner;
   TeeBus tee(inner);
   std::vector<std::string> heard;
   const uint8_t byte = 1;
-  EXPECT_FALSE(tee.command("p3at/velocity", &byte, 1));    // nobody listens yet
+  EXPECT_FALSE(tee.command("p3at/velocity", &byte, 1));  // nobody listens yet
   tee.listen({"p3at/velocity"}, [&](const std::string& channel, const uint8_t* data, size_t size) {
     heard.push_back(channel + std::to_string(data[0]) + std::to_string(size));
   });
   tee.watch(true);
   EXPECT_TRUE(tee.command("p3at/velocity", &byte, 1));
-  EXPECT_FALSE(tee.command("ruedo/world", &byte, 1));    // nobody listens there
+  EXPECT_FALSE(tee.command("ruedo/world", &byte, 1));  // nobody listens there
   EXPECT_THAT(heard, testing::ElementsAre("p3at/velocity11"));
   EXPECT_THAT(inner.published, testing::IsEmpty());
-  EXPECT_EQ(tee.channel(0).messages, 1u);    // and it is shown, as what others send
+  EXPECT_EQ(tee.channel(0).messages, 1u);  // and it is shown, as what others send
   tee.stop();
   tee.command("p3at/velocity", &byte, 1);
   EXPECT_EQ(heard.size(), 1u);

@@ -1,4 +1,5 @@
 """What the console's tests share: a viewed run or log, its pages, its socket, and a browser."""
+
 import base64
 import gzip
 import http.client
@@ -25,8 +26,10 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 SEEN, WANT, COMMAND, TRAFFIC, PLAY, SEEK = range(1, 7)
 # A browser test is skipped only where scripts/test could not have installed the browser.
 MISSING = [name for name, path in (("node", NODE), ("chromium", CHROMIUM)) if not path]
-needs_browser = pytest.mark.skipif(bool(MISSING) and not shutil.which("apt-get"), reason=f"needs {' and '.join(MISSING)}")
-sys.path.insert(0, str(BUILD / "python"))    # the message types
+needs_browser = pytest.mark.skipif(
+    bool(MISSING) and not shutil.which("apt-get"), reason=f"needs {' and '.join(MISSING)}"
+)
+sys.path.insert(0, str(BUILD / "python"))  # the message types
 
 
 @contextmanager
@@ -43,7 +46,9 @@ def playing(log, *arguments, view="127.0.0.1:0"):
 
 @contextmanager
 def serving(*arguments):
-    process = subprocess.Popen([RUEDO, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [RUEDO, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     try:
         urls = []
         for line in process.stdout:
@@ -68,7 +73,11 @@ def get(port, path, method="GET", **headers):
     connection.endheaders()
     answer = connection.getresponse()
     body = answer.read()
-    return answer.status, gzip.decompress(body) if answer.headers.get("Content-Encoding") == "gzip" else body, answer.headers
+    return (
+        answer.status,
+        gzip.decompress(body) if answer.headers.get("Content-Encoding") == "gzip" else body,
+        answer.headers,
+    )
 
 
 class Socket:
@@ -76,9 +85,16 @@ class Socket:
 
     def __init__(self, port, path="/socket", **headers):
         self.socket = socket.create_connection(("127.0.0.1", port), timeout=20)
-        lines = [f"GET {path} HTTP/1.1", "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13",
-                 "Sec-WebSocket-Key: " + base64.b64encode(os.urandom(16)).decode()]
-        lines += [f"{name}: {value}" for name, value in ({"Host": f"localhost:{port}"} | headers).items()]
+        lines = [
+            f"GET {path} HTTP/1.1",
+            "Upgrade: websocket",
+            "Connection: Upgrade",
+            "Sec-WebSocket-Version: 13",
+            "Sec-WebSocket-Key: " + base64.b64encode(os.urandom(16)).decode(),
+        ]
+        lines += [
+            f"{name}: {value}" for name, value in ({"Host": f"localhost:{port}"} | headers).items()
+        ]
         self.socket.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
         self.file = self.socket.makefile("rb")
         self.status = int((self.file.readline() or b"x 0").split()[1])
@@ -86,15 +102,19 @@ class Socket:
             pass
 
     def send(self, payload, opcode=2):
-        size = struct.pack("!B", 0x80 | len(payload)) if len(payload) < 126 else struct.pack("!BQ", 0xFF, len(payload))
+        size = (
+            struct.pack("!B", 0x80 | len(payload))
+            if len(payload) < 126
+            else struct.pack("!BQ", 0xFF, len(payload))
+        )
         self.socket.sendall(bytes([0x80 | opcode]) + size + bytes(4) + payload)
 
     def receive(self):
         opcode, size = self.file.read(2)
         if size == 126:
-            size, = struct.unpack("!H", self.file.read(2))
+            (size,) = struct.unpack("!H", self.file.read(2))
         elif size == 127:
-            size, = struct.unpack("!Q", self.file.read(8))
+            (size,) = struct.unpack("!Q", self.file.read(8))
         return opcode & 15, self.file.read(size)
 
     def frame(self):
@@ -107,7 +127,7 @@ class Socket:
         found, at = {}, 4
         while at < len(data):
             channel, size = struct.unpack_from("<II", data, at)
-            found[channel] = data[at + 8:at + 8 + size]
+            found[channel] = data[at + 8 : at + 8 + size]
             at += 8 + size
         return found
 
@@ -123,10 +143,21 @@ class Socket:
 def browser(url, folder, scenario, given=None):
     """The browser as it goes through a scenario (browser.mjs)."""
     if MISSING:
-        pytest.fail(f"{' and '.join(MISSING)} missing: scripts/test installs what is needed", pytrace=False)
-    command = [NODE, SOURCE / "tests/console/browser.mjs", url, folder, scenario] + ([json.dumps(given)] if given else [])
-    process = subprocess.Popen(command, cwd=BUILD / "web", env=os.environ | {"CHROMIUM": CHROMIUM}, stdin=subprocess.PIPE,
-                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        pytest.fail(
+            f"{' and '.join(MISSING)} missing: scripts/test installs what is needed", pytrace=False
+        )
+    command = [NODE, SOURCE / "tests/console/browser.mjs", url, folder, scenario] + (
+        [json.dumps(given)] if given else []
+    )
+    process = subprocess.Popen(
+        command,
+        cwd=BUILD / "web",
+        env=os.environ | {"CHROMIUM": CHROMIUM},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
     try:
         yield process
     finally:
@@ -149,5 +180,8 @@ def judged(scenario, folder, said, code):
     if wrong or code != 0:
         seen = [line for line in said if line not in wrong]
         what = " | ".join(wrong) or f"the browser ended with {code}"
-        pytest.fail(f"{scenario}: {what} (last seen: {seen[-1] if seen else 'nothing'}; picture: {Path(folder) / 'failed.png'})", pytrace=False)
+        pytest.fail(
+            f"{scenario}: {what} (last seen: {seen[-1] if seen else 'nothing'}; picture: {Path(folder) / 'failed.png'})",
+            pytrace=False,
+        )
     return said

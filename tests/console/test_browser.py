@@ -1,4 +1,5 @@
 """The console's page in a headless browser: a run, all that steers it, the page itself, and recorded runs."""
+
 import contextlib
 import json
 import re
@@ -19,32 +20,58 @@ pytestmark = needs_browser
 def events(log):
     """(channel, time in us, bytes) of each event of an LCM log."""
     import lcm
+
     return [(event.channel, event.timestamp, event.data) for event in lcm.EventLog(str(log))]
 
 
 def states(log, body):
     """(log time in s, sim time in s, x, y of the body, how many bodies there are) of each ruedo/world of a log."""
     from ruedo.lcmtypes import world_state_t
+
     for channel, time_us, data in events(log):
         if channel == "ruedo/world":
             state = world_state_t.decode(data)
-            yield time_us * 1e-6, state.utime * 1e-6, *state.position[list(state.index).index(body)][:2], state.n
+            yield (
+                time_us * 1e-6,
+                state.utime * 1e-6,
+                *state.position[list(state.index).index(body)][:2],
+                state.n,
+            )
 
 
 def test_a_run_is_shown_and_steered(tmp_path):
     with running() as process:
         seen = browse(process.url, tmp_path, "live")
-    for what in ("robots are listed", "rays have appeared", "the robot moved when driven", "a picture has come", "pause holds the clock", "a step moves the clock"):
+    for what in (
+        "robots are listed",
+        "rays have appeared",
+        "the robot moved when driven",
+        "a picture has come",
+        "pause holds the clock",
+        "a step moves the clock",
+    ):
         assert what in seen
     for name in ("laptop", "plots", "channels", "phone"):
         assert (tmp_path / f"{name}.png").stat().st_size > 20_000
 
 
-@pytest.mark.parametrize("transport", [(), ("--lcm", "auto"), ("--lcm", "tcpq://127.0.0.1:7700"), ("--lcm", "memq://")], ids=["default", "auto", "tcpq", "memq"])
+@pytest.mark.parametrize(
+    "transport",
+    [(), ("--lcm", "auto"), ("--lcm", "tcpq://127.0.0.1:7700"), ("--lcm", "memq://")],
+    ids=["default", "auto", "tcpq", "memq"],
+)
 def test_every_transport_can_be_steered(tmp_path, transport):
     with running(*transport, "--disable", "p3at/camera") as process:
         seen = browse(process.url, tmp_path, "steer")
-    assert seen == ["space pauses", "a step is taken", "space goes on", "W drives", "a rate is taken", "a box is placed", "reset takes it away"]
+    assert seen == [
+        "space pauses",
+        "a step is taken",
+        "space goes on",
+        "W drives",
+        "a rate is taken",
+        "a box is placed",
+        "reset takes it away",
+    ]
 
 
 def test_the_order_of_loading_is_one(tmp_path):
@@ -52,14 +79,24 @@ def test_the_order_of_loading_is_one(tmp_path):
     with running(world=SOURCE / "tests/console/aside.sdf") as process:
         seen = browse(process.url, tmp_path, "order")
     parts = ("greeting", "messages", "names", "/scene.json", "/scene/meshes", "/scene/links")
-    assert {f"the odometry is right with {part} last" for part in parts} == set(seen) - {"the order is the same"} and len(seen) == len(parts) + 1
+    assert {f"the odometry is right with {part} last" for part in parts} == set(seen) - {
+        "the order is the same"
+    } and len(seen) == len(parts) + 1
 
 
 def test_everybody_can_use_it(tmp_path):
     with running() as process:
         seen = browse(process.url, tmp_path, "access")
-    assert {"axe-core is content", "a phone has all of the bar", "arrows go from tab to tab", "a robot among many is found by its name", "paused, all pixels are drawn",
-            "a new scene takes the place of the old one in the graphics memory", "and driven", "and plotted"} <= set(seen)
+    assert {
+        "axe-core is content",
+        "a phone has all of the bar",
+        "arrows go from tab to tab",
+        "a robot among many is found by its name",
+        "paused, all pixels are drawn",
+        "a new scene takes the place of the old one in the graphics memory",
+        "and driven",
+        "and plotted",
+    } <= set(seen)
 
 
 def test_the_page_loads_fast_fits_and_says_what_is_wrong(tmp_path):
@@ -90,7 +127,12 @@ def test_the_page_loads_fast_fits_and_says_what_is_wrong(tmp_path):
     finally:
         context.__exit__(None, None, None)
     judged("page", tmp_path, said, page.returncode)
-    assert {"the page is small", "nothing is wider than a phone", "and drives the new run", "and pauses it"} <= set(said)
+    assert {
+        "the page is small",
+        "nothing is wider than a phone",
+        "and drives the new run",
+        "and pauses it",
+    } <= set(said)
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +140,10 @@ def steered(tmp_path_factory):
     """The log of a run in which everything was steered, and what was seen then: nothing where that went wrong."""
     folder = tmp_path_factory.mktemp("steered")
     seen = []
-    with running("--record", folder / "run.lcm", world=BUMPER) as process, browser(process.url, folder, "controls") as page:
+    with (
+        running("--record", folder / "run.lcm", world=BUMPER) as process,
+        browser(process.url, folder, "controls") as page,
+    ):
         seen, _ = page.communicate(timeout=1200)
     return folder / "run.lcm", seen.splitlines(), page.returncode
 
@@ -106,52 +151,100 @@ def steered(tmp_path_factory):
 def test_everything_is_steered(steered):
     log, said, code = steered
     seen = set(judged("controls", log.parent, said, code))
-    wanted = ["the up arrow drives ahead", "S drives back", "A turns left", "D turns right", "the stick drives ahead", "the stick turns left",
-              "the stick let go stops the robot", "a gamepad drives ahead", "a gamepad turns left", "a motion primitive is done",
-              "it went as far as was asked", "both trails lead to where the robot is", "contact points are where the pad touches the ground",
-              *(f"{layer} can be switched" for layer in LAYERS), *(f"{layer} make a difference to the picture" for layer in LAYERS),
-              "a box was placed", "the box stands where the click was", "a robot was placed", "where there is no room, it says so",
-              "the server has the rate that was chosen", "at a quarter of the rate the clock goes a quarter as fast", "a reset sets the clock back",
-              "a reset takes away what was placed", "a reset puts the robot back", "all was steered"]
+    wanted = [
+        "the up arrow drives ahead",
+        "S drives back",
+        "A turns left",
+        "D turns right",
+        "the stick drives ahead",
+        "the stick turns left",
+        "the stick let go stops the robot",
+        "a gamepad drives ahead",
+        "a gamepad turns left",
+        "a motion primitive is done",
+        "it went as far as was asked",
+        "both trails lead to where the robot is",
+        "contact points are where the pad touches the ground",
+        *(f"{layer} can be switched" for layer in LAYERS),
+        *(f"{layer} make a difference to the picture" for layer in LAYERS),
+        "a box was placed",
+        "the box stands where the click was",
+        "a robot was placed",
+        "where there is no room, it says so",
+        "the server has the rate that was chosen",
+        "at a quarter of the rate the clock goes a quarter as fast",
+        "a reset sets the clock back",
+        "a reset takes away what was placed",
+        "a reset puts the robot back",
+        "all was steered",
+    ]
     assert [what for what in wanted if what not in seen] == []
 
 
 def test_what_was_steered_is_in_the_log(steered):
     """Each command as the page was asked for it, and what the robot did: whatever the page showed, and how late."""
     from ruedo.lcmtypes import applied_t, move_command_t, request_t, velocity_command_t
+
     log, said, _ = steered
     if "all was steered" not in said:
         pytest.skip("not everything was steered: see test_everything_is_steered")
-    applied = [applied_t.decode(data) for channel, _, data in events(log) if channel == "ruedo/applied"]
-    speeds = [velocity_command_t.decode(each.data) for each in applied if each.channel == "p3dx/velocity"]
-    shares = {(round(each.vx / 0.75, 1), round(each.omega / 1.5, 1)) for each in speeds}    # of what the page drives at most
-    keys, stick, gamepad = {(1, 0), (-1, 0), (0, 1), (0, -1)}, {(0.5, 0), (0, 0.5)}, {(0.9, 0), (0, 0.8)}
+    applied = [
+        applied_t.decode(data) for channel, _, data in events(log) if channel == "ruedo/applied"
+    ]
+    speeds = [
+        velocity_command_t.decode(each.data) for each in applied if each.channel == "p3dx/velocity"
+    ]
+    shares = {
+        (round(each.vx / 0.75, 1), round(each.omega / 1.5, 1)) for each in speeds
+    }  # of what the page drives at most
+    keys, stick, gamepad = (
+        {(1, 0), (-1, 0), (0, 1), (0, -1)},
+        {(0.5, 0), (0, 0.5)},
+        {(0.9, 0), (0, 0.8)},
+    )
     assert keys | stick | gamepad | {(0, 0)} <= shares
-    assert [move_command_t.decode(each.data).value for each in applied if each.channel == "p3dx/move"] == pytest.approx([0.4])    # typing drove nothing
+    assert [
+        move_command_t.decode(each.data).value for each in applied if each.channel == "p3dx/move"
+    ] == pytest.approx([0.4])  # typing drove nothing
     requests = [each.kind for each in applied if each.channel == "ruedo/request"]
     assert requests.count(request_t.SPAWN) == 2 and requests[-1] == request_t.RESET
-    assert len({each.client for each in applied if each.channel == "ruedo/request"}) == 1    # one session for all
+    assert (
+        len({each.client for each in applied if each.channel == "ruedo/request"}) == 1
+    )  # one session for all
 
 
 def test_a_recorded_run_is_scrubbed(tmp_path):
     """An arena run with a camera, driven along a curve; at each of ten moments the page shows the log's pose."""
     from ruedo.lcmtypes import velocity_command_t
+
     log = tmp_path / "run.lcm"
     command = velocity_command_t()
     command.vx, command.omega = 0.5, 0.4
     with running("--record", log, "--duration", "6") as process:
         driver = Socket(process.port)
         while process.poll() is None:
-            with contextlib.suppress(OSError):    # when it has just ended
+            with contextlib.suppress(OSError):  # when it has just ended
                 driver.command("p3at/velocity", command)
             time.sleep(0.1)
     found = list(states(log, 0))
-    assert abs(found[-1][2]) + abs(found[-1][3]) > 0.5    # it has moved
-    moments = [found[round(share * (len(found) - 1))] for share in (0.9, 0.1, 0.5, 1.0, 0.3, 0.0, 0.7, 0.2, 0.95, 0.6)]
-    given = {"rays": True, "moments": [{"time": t, "sim_time": sim, "body": 0, "pose": [x, y], "bodies": n} for t, sim, x, y, n in moments]}
+    assert abs(found[-1][2]) + abs(found[-1][3]) > 0.5  # it has moved
+    moments = [
+        found[round(share * (len(found) - 1))]
+        for share in (0.9, 0.1, 0.5, 1.0, 0.3, 0.0, 0.7, 0.2, 0.95, 0.6)
+    ]
+    given = {
+        "rays": True,
+        "moments": [
+            {"time": t, "sim_time": sim, "body": 0, "pose": [x, y], "bodies": n}
+            for t, sim, x, y, n in moments
+        ],
+    }
     with playing(log) as process:
         seen = browse(process.url, tmp_path, "log", given)
-    assert "the time line scrubs" in seen and "the robot is where the log has it, at each of many moments" in seen
+    assert (
+        "the time line scrubs" in seen
+        and "the robot is where the log has it, at each of many moments" in seen
+    )
 
 
 def test_what_was_placed_and_reset_is_in_the_log_too(steered, tmp_path):
@@ -161,10 +254,21 @@ def test_what_was_placed_and_reset_is_in_the_log_too(steered, tmp_path):
         pytest.skip("not everything was steered: see test_everything_is_steered")
     found = list(states(log, 0))
     most = max(state[4] for state in found)
-    assert most >= found[0][4] + 2    # box and robot
+    assert most >= found[0][4] + 2  # box and robot
     with_all = [state for state in found if state[4] == most]
-    moments = [found[0], with_all[len(with_all) // 2], found[-1], found[len(found) // 3], with_all[0]]
-    given = {"moments": [{"time": t, "sim_time": sim, "body": 0, "pose": [x, y], "bodies": n} for t, sim, x, y, n in moments]}
+    moments = [
+        found[0],
+        with_all[len(with_all) // 2],
+        found[-1],
+        found[len(found) // 3],
+        with_all[0],
+    ]
+    given = {
+        "moments": [
+            {"time": t, "sim_time": sim, "body": 0, "pose": [x, y], "bodies": n}
+            for t, sim, x, y, n in moments
+        ]
+    }
     with playing(log) as process:
         browse(process.url, tmp_path, "log", given)
 
@@ -174,11 +278,33 @@ def thousand_robots(path):
     model = (SOURCE / "worlds/robots/p3dx/model.sdf").read_text()
     shutil.copytree(SOURCE / "worlds/robots/p3dx/meshes", path / "meshes")
     (path / "plain.sdf").write_text(re.sub(r"<sensor.*?</sensor>", "", model, flags=re.DOTALL))
-    robots = "".join(f"<include><uri>plain.sdf</uri><name>r{i}</name><pose>{1.2 * (i % 40) - 24} {1.2 * (i // 40) - 15} 0 0 0 {i % 7}</pose></include>" for i in range(1000))
-    (path / "thousand.sdf").write_text(f"""<?xml version="1.0"?><sdf version="1.9"><world name="thousand"><include><uri>model://sun</uri></include>
+    robots = "".join(
+        f"<include><uri>plain.sdf</uri><name>r{i}</name><pose>{1.2 * (i % 40) - 24} {1.2 * (i // 40) - 15} 0 0 0 {i % 7}</pose></include>"
+        for i in range(1000)
+    )
+    (
+        path / "thousand.sdf"
+    ).write_text(f"""<?xml version="1.0"?><sdf version="1.9"><world name="thousand"><include><uri>model://sun</uri></include>
 <include><uri>model://ground_plane</uri></include>{robots}</world></sdf>""")
     log = path / "thousand.lcm"
-    subprocess.run([RUEDO, "run", path / "thousand.sdf", "--lcm", "memq://", "--quiet", "--rate", "max", "--duration", "4", "--record", log], check=True, timeout=500)
+    subprocess.run(
+        [
+            RUEDO,
+            "run",
+            path / "thousand.sdf",
+            "--lcm",
+            "memq://",
+            "--quiet",
+            "--rate",
+            "max",
+            "--duration",
+            "4",
+            "--record",
+            log,
+        ],
+        check=True,
+        timeout=500,
+    )
     return log
 
 
@@ -186,7 +312,9 @@ def test_a_thousand_robots_are_shown(tmp_path):
     """From a log, so that what is measured is the page and not the simulation beside it. What it says is in docs/console.md."""
     with playing(thousand_robots(tmp_path)) as process:
         seen = browse(process.url, tmp_path, "fleet", {"robots": 1000, "seconds": 3})
-    measured = [json.loads(line.split(": ", 1)[1]) for line in seen if line.startswith("measured: ")]
+    measured = [
+        json.loads(line.split(": ", 1)[1]) for line in seen if line.startswith("measured: ")
+    ]
     assert "they are a few draw calls" in seen
     # Whoever draws the pixels: what this page's thread needs for a frame leaves room for 20 a second. The least of many
     # frames, for this machine does other things, too.

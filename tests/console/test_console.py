@@ -1,4 +1,5 @@
 """The web console from outside: its pages and its socket in right and wrong hands."""
+
 import contextlib
 import os
 import re
@@ -8,7 +9,21 @@ import subprocess
 
 import pytest
 
-from harness import ARENA, BUILD, COMMAND, NODE, PLAY, RUEDO, SEEK, SEEN, TRAFFIC, WANT, Socket, get, running
+from harness import (
+    ARENA,
+    BUILD,
+    COMMAND,
+    NODE,
+    PLAY,
+    RUEDO,
+    SEEK,
+    SEEN,
+    TRAFFIC,
+    WANT,
+    Socket,
+    get,
+    running,
+)
 
 
 @pytest.fixture(scope="module")
@@ -28,8 +43,19 @@ def test_pages_are_served_from_the_program(server):
     assert get(server.port, "/scene/links")[0] == 200
 
 
-@pytest.mark.parametrize("path", ["/../../etc/passwd", "/scene/textures/../../etc/passwd", "/scene/textures/99999999999999999999",
-                                  "/scene/textures/-1", "/%2e%2e/%2e%2e/etc/passwd", "//etc/passwd", "/scene/", "/main.js/x"])
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/../../etc/passwd",
+        "/scene/textures/../../etc/passwd",
+        "/scene/textures/99999999999999999999",
+        "/scene/textures/-1",
+        "/%2e%2e/%2e%2e/etc/passwd",
+        "//etc/passwd",
+        "/scene/",
+        "/main.js/x",
+    ],
+)
 def test_no_path_escapes(server, path):
     status, body, _ = get(server.port, path)
     assert status in (400, 403, 404) and b"root:" not in body
@@ -54,7 +80,11 @@ def test_elsewhere_a_token_is_needed():
         assert get(process.port, "/?token=" + "0" * 32)[0] == 403
         assert Socket(process.port).status != 101
         status, _, headers = get(process.port, f"/?token={token}")
-        assert status == 200 and "HttpOnly" in headers["Set-Cookie"] and "SameSite=Strict" in headers["Set-Cookie"]
+        assert (
+            status == 200
+            and "HttpOnly" in headers["Set-Cookie"]
+            and "SameSite=Strict" in headers["Set-Cookie"]
+        )
         assert get(process.port, "/scene.json", Cookie=f"ruedo_token={token}")[0] == 200
         assert Socket(process.port, Cookie=f"ruedo_token={token}").status == 101
 
@@ -79,7 +109,7 @@ def test_a_slow_viewer_gets_no_more_than_it_takes(server):
         while True:
             opcode, data = slow.receive()
             frames += opcode == 2
-    assert frames == 2    # and none after that, for none was taken
+    assert frames == 2  # and none after that, for none was taken
     slow.close()
 
 
@@ -88,9 +118,20 @@ def test_garbage_and_a_hundred_viewers_do_not_hurt(server):
     assert all(viewer.status == 101 for viewer in viewers)
     for viewer in viewers:
         viewer.send(bytes([WANT]) + b"p3at/pose\np3at/lrf\nruedo/world\n" + b"x" * 50)
-    garbage = [b"", b"\0", b"\xff" * 100, bytes([COMMAND]), bytes([COMMAND, 255]), bytes([COMMAND, 3]) + b"abc" + b"\0" * 70000,
-               bytes([PLAY, 1]), bytes([PLAY, 1]) + b"\xff" * 8, bytes([SEEK]) + b"\xff" * 8, bytes([WANT]) + b"\n" * 100000,
-               bytes([COMMAND, 13]) + b"p3at/velocity" + b"junk", bytes([COMMAND, 13]) + b"ruedo/request" + os.urandom(5000)]
+    garbage = [
+        b"",
+        b"\0",
+        b"\xff" * 100,
+        bytes([COMMAND]),
+        bytes([COMMAND, 255]),
+        bytes([COMMAND, 3]) + b"abc" + b"\0" * 70000,
+        bytes([PLAY, 1]),
+        bytes([PLAY, 1]) + b"\xff" * 8,
+        bytes([SEEK]) + b"\xff" * 8,
+        bytes([WANT]) + b"\n" * 100000,
+        bytes([COMMAND, 13]) + b"p3at/velocity" + b"junk",
+        bytes([COMMAND, 13]) + b"ruedo/request" + os.urandom(5000),
+    ]
     for payload in garbage:
         wild = Socket(server.port)
         wild.send(payload)
@@ -114,7 +155,7 @@ def test_half_open_connections_give_way(server):
     """More than the console has places for; each has sent the beginning of a request, or nothing."""
     waiting = [socket.create_connection(("127.0.0.1", server.port), timeout=20) for _ in range(400)]
     for one in waiting[::2]:
-        with contextlib.suppress(OSError):    # it has given way
+        with contextlib.suppress(OSError):  # it has given way
             one.sendall(b"GET / HT")
     assert get(server.port, "/")[0] == 200
     viewer = Socket(server.port)
@@ -127,12 +168,30 @@ def test_half_open_connections_give_way(server):
 def test_viewers_change_no_byte(tmp_path):
     """The log of a run without the console, and of one with viewers that watch everything, one of them slow."""
     common = ["--duration", "3", "--seed", "7", "--record"]
-    subprocess.run([RUEDO, "run", ARENA, "--lcm", "memq://", "--quiet", "--rate", "max", *common, tmp_path / "alone.lcm"], check=True, timeout=120)
+    subprocess.run(
+        [
+            RUEDO,
+            "run",
+            ARENA,
+            "--lcm",
+            "memq://",
+            "--quiet",
+            "--rate",
+            "max",
+            *common,
+            tmp_path / "alone.lcm",
+        ],
+        check=True,
+        timeout=120,
+    )
     with running("--lcm", "auto", "--rate", "2", *common, tmp_path / "viewed.lcm") as process:
         viewers = [Socket(process.port) for _ in range(3)]
         for viewer in viewers:
             viewer.send(bytes([TRAFFIC, 1]))
-            viewer.send(bytes([WANT]) + b"p3at/pose\np3at/lrf\np3at/camera\np3at/odometry\np3at/sonar_front\nruedo/world\nruedo/tick")
+            viewer.send(
+                bytes([WANT])
+                + b"p3at/pose\np3at/lrf\np3at/camera\np3at/odometry\np3at/sonar_front\nruedo/world\nruedo/tick"
+            )
         ended = b""
         try:
             while b'"ended"' not in ended:
@@ -142,28 +201,37 @@ def test_viewers_change_no_byte(tmp_path):
         except (ValueError, OSError):
             pass
         assert process.wait(60) == 0
-        assert b'"ended"' in ended    # in words, before the connection ends
+        assert b'"ended"' in ended  # in words, before the connection ends
     assert (tmp_path / "alone.lcm").read_bytes() == (tmp_path / "viewed.lcm").read_bytes()
 
 
 def test_wrong_addresses_are_said():
     for address, code in (("nonsense:x", 2), ("192.0.2.1:80", 4)):
-        done = subprocess.run([RUEDO, "run", ARENA, "--lcm", "memq://", "--view", address], capture_output=True, text=True, timeout=60)
+        done = subprocess.run(
+            [RUEDO, "run", ARENA, "--lcm", "memq://", "--view", address],
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
         assert done.returncode == code and "--view" in done.stderr
 
 
 def test_types_decode_in_typescript_as_in_python(tmp_path):
     """The description made of proto/*.lcm gives the fingerprints that lcm-gen's code has, for every type."""
     import sys
+
     sys.path.insert(0, str(BUILD / "python"))
     import ruedo.lcmtypes as types
+
     script = tmp_path / "prints.mjs"
     script.write_text(f"""import {{ build }} from "{BUILD}/web/node_modules/esbuild/lib/main.js";
 const out = await build({{ stdin: {{ contents: 'import {{fingerprint}} from "./src/wire/lcm"; import {{kTypes}} from "./generated/messages"; for (const t in kTypes) console.log(t, BigInt.asUintN(64, fingerprint(t)).toString());',
   resolveDir: "{BUILD}/web", loader: "ts" }}, bundle: true, write: false, preserveSymlinks: true, format: "esm" }});
 await import("data:text/javascript," + encodeURIComponent(out.outputFiles[0].text));
 """)
-    lines = subprocess.run([NODE, script], capture_output=True, text=True, check=True, timeout=60).stdout.split("\n")[:-1]
+    lines = subprocess.run(
+        [NODE, script], capture_output=True, text=True, check=True, timeout=60
+    ).stdout.split("\n")[:-1]
     assert len(lines) > 30
     for line in lines:
         name, value = line.split()
@@ -186,7 +254,13 @@ console.log(software.now.ratio, draw(full, 50, 100), draw(hiccup, 4, 10), hiccup
 for (let i = 0; i < 50; ++i) {{ hiccup.drawn(at += 100); hiccup.idle(); }}
 console.log(hiccup.now.ratio);
 """)
-    lines = subprocess.run([NODE, script], capture_output=True, text=True, check=True, timeout=300).stdout.splitlines()
-    assert lines[0] == "2 1 0.6 0.4 0.4 0.6"    # the wait is 10, 20, 40 s: not over after 26 s, but after 46 s
-    assert lines[1] == "0.6 2 2 false 2"    # software begins low; full detail stays; one long frame changes nothing
-    assert lines[2] == "2"                  # nor do pauses between frames
+    lines = subprocess.run(
+        [NODE, script], capture_output=True, text=True, check=True, timeout=300
+    ).stdout.splitlines()
+    assert (
+        lines[0] == "2 1 0.6 0.4 0.4 0.6"
+    )  # the wait is 10, 20, 40 s: not over after 26 s, but after 46 s
+    assert (
+        lines[1] == "0.6 2 2 false 2"
+    )  # software begins low; full detail stays; one long frame changes nothing
+    assert lines[2] == "2"  # nor do pauses between frames

@@ -1,4 +1,5 @@
 """A run and the programs that go with it, as users start them: without --lcm and without LCM_DEFAULT_URL (in isolated.py's network)."""
+
 import os
 import pty
 import re
@@ -13,8 +14,10 @@ SOURCE = Path(__file__).resolve().parents[2]
 BUILD = Path(os.environ["RUEDO_BINARY_DIR"])
 RUEDO = BUILD / "bin" / "ruedo"
 ARENA = SOURCE / "worlds" / "arena.sdf"
-PATIENCE = 400    # s, for what comes sooner or later, on a machine that does much else too
-ENVIRONMENT = {name: value for name, value in os.environ.items() if name != "LCM_DEFAULT_URL"} | {"PYTHONPATH": str(BUILD / "python")}
+PATIENCE = 400  # s, for what comes sooner or later, on a machine that does much else too
+ENVIRONMENT = {name: value for name, value in os.environ.items() if name != "LCM_DEFAULT_URL"} | {
+    "PYTHONPATH": str(BUILD / "python")
+}
 EXAMPLES = {
     "python": [sys.executable, SOURCE / "clients/python/examples/wander.py"],
     "cpp": [BUILD / "bin/ruedo-wander-cpp"],
@@ -25,9 +28,11 @@ EXAMPLES = {
 @contextmanager
 def arena(*arguments):
     """`ruedo run worlds/arena.sdf`, from when it says what runs."""
-    process = subprocess.Popen([RUEDO, "run", ARENA, *arguments], env=ENVIRONMENT, stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [RUEDO, "run", ARENA, *arguments], env=ENVIRONMENT, stdout=subprocess.PIPE, text=True
+    )
     try:
-        assert any("ruedo/request" in line for line in process.stdout)    # the last that it lists
+        assert any("ruedo/request" in line for line in process.stdout)  # the last that it lists
         yield process
     finally:
         process.terminate()
@@ -35,7 +40,9 @@ def arena(*arguments):
 
 
 def said(*command, **more):
-    done = subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True, timeout=PATIENCE, **more)
+    done = subprocess.run(
+        command, env=ENVIRONMENT, capture_output=True, text=True, timeout=PATIENCE, **more
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -45,15 +52,24 @@ def test_hz_and_echo_hear_the_run_and_teleop_drives_it(tmp_path):
     with arena("--record", log):
         assert "p3at/pose: " in said(RUEDO, "hz", "p3at/pose", "-n", "1")
         parent, child = pty.openpty()
-        teleop = subprocess.Popen([RUEDO, "teleop", "p3at"], env=ENVIRONMENT, stdin=child, stdout=subprocess.DEVNULL)
+        teleop = subprocess.Popen(
+            [RUEDO, "teleop", "p3at"], env=ENVIRONMENT, stdin=child, stdout=subprocess.DEVNULL
+        )
         os.close(child)
-        while not re.search(r"vel\[0\] = 0\.[1-6]", said(RUEDO, "echo", "p3at/pose", "-n", "1")):    # m/s
-            os.write(parent, b"w")    # lost before it has the terminal
+        while not re.search(
+            r"vel\[0\] = 0\.[1-6]", said(RUEDO, "echo", "p3at/pose", "-n", "1")
+        ):  # m/s
+            os.write(parent, b"w")  # lost before it has the terminal
         os.write(parent, b"q")
         assert teleop.wait(PATIENCE) == 0
         os.close(parent)
-    listener = subprocess.Popen([RUEDO, "echo", "p3at/odometry", "-n", "1"], env=ENVIRONMENT, stdout=subprocess.PIPE, text=True)
-    while listener.poll() is None:    # it may begin to listen late
+    listener = subprocess.Popen(
+        [RUEDO, "echo", "p3at/odometry", "-n", "1"],
+        env=ENVIRONMENT,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    while listener.poll() is None:  # it may begin to listen late
         said(RUEDO, "play", log, "--speed", "max")
     assert listener.stdout.read().startswith("p3at/odometry (odometry_t, ")
 

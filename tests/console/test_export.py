@@ -1,4 +1,5 @@
 """ruedo export: the MCAP file is whole by the mcap package's reader, and says what the log says."""
+
 import base64
 import json
 import math
@@ -29,9 +30,32 @@ WORLD = """<?xml version="1.0"?><sdf version="1.9" xmlns:ruedo="http://ruedo/sch
 def exported(tmp_path_factory):
     folder = tmp_path_factory.mktemp("export")
     (folder / "wall.sdf").write_text(WORLD)
-    subprocess.run([RUEDO, "run", folder / "wall.sdf", "--lcm", "memq://", "--quiet", "--rate", "max", "--duration", "4", "--no-noise", "--record", folder / "run.lcm"],
-                   check=True, timeout=120)
-    done = subprocess.run([RUEDO, "export", folder / "run.lcm", folder / "run.mcap"], check=True, timeout=120, capture_output=True, text=True)
+    subprocess.run(
+        [
+            RUEDO,
+            "run",
+            folder / "wall.sdf",
+            "--lcm",
+            "memq://",
+            "--quiet",
+            "--rate",
+            "max",
+            "--duration",
+            "4",
+            "--no-noise",
+            "--record",
+            folder / "run.lcm",
+        ],
+        check=True,
+        timeout=120,
+    )
+    done = subprocess.run(
+        [RUEDO, "export", folder / "run.lcm", folder / "run.mcap"],
+        check=True,
+        timeout=120,
+        capture_output=True,
+        text=True,
+    )
     assert "left out" not in done.stdout and done.stderr == ""
     return folder
 
@@ -42,7 +66,9 @@ def messages(path):
     with open(path, "rb") as stream:
         for schema, channel, message in make_reader(stream, validate_crcs=True).iter_messages():
             assert schema.encoding == "jsonschema" and channel.message_encoding == "json"
-            found.setdefault(channel.topic, []).append((schema.name, message.log_time, json.loads(message.data)))
+            found.setdefault(channel.topic, []).append(
+                (schema.name, message.log_time, json.loads(message.data))
+            )
     return found
 
 
@@ -59,7 +85,10 @@ def fits(schema, value, path="$"):
     """Whether a value is what its JSON Schema says: of the words that are used here."""
     kind = schema["type"]
     if kind == "object":
-        assert isinstance(value, dict) and set(value) <= set(schema["properties"]), (path, set(value) - set(schema["properties"]))
+        assert isinstance(value, dict) and set(value) <= set(schema["properties"]), (
+            path,
+            set(value) - set(schema["properties"]),
+        )
         for name, each in value.items():
             fits(schema["properties"][name], each, f"{path}.{name}")
     elif kind == "array":
@@ -71,39 +100,59 @@ def fits(schema, value, path="$"):
         if schema.get("contentEncoding") == "base64":
             base64.b64decode(value, validate=True)
     elif kind == "integer":
-        assert isinstance(value, int) and not isinstance(value, bool) and schema.get("minimum", -math.inf) <= value <= schema.get("maximum", math.inf), path
+        assert (
+            isinstance(value, int)
+            and not isinstance(value, bool)
+            and schema.get("minimum", -math.inf) <= value <= schema.get("maximum", math.inf)
+        ), path
     else:
-        assert isinstance(value, bool) if kind == "boolean" else isinstance(value, (int, float)) and not isinstance(value, bool), path
+        assert (
+            isinstance(value, bool)
+            if kind == "boolean"
+            else isinstance(value, (int, float)) and not isinstance(value, bool)
+        ), path
 
 
 def test_the_container_is_whole(exported):
     """Every checksum, the order of records, and a summary that says what is there."""
     with open(exported / "run.mcap", "rb") as stream:
-        records = list(StreamReader(stream, validate_crcs=True).records)    # data section and chunks
+        records = list(StreamReader(stream, validate_crcs=True).records)  # data section and chunks
         counted = sum(type(record).__name__ == "Message" for record in records)
         stream.seek(0)
         reader = SeekingReader(stream, validate_crcs=True)
         summary = reader.get_summary()
         assert reader.get_header().library.startswith("Ruedo")
     assert summary.statistics.message_count == counted > 500
-    assert summary.statistics.chunk_count == len(summary.chunk_indexes) > 1    # of a MiB each
+    assert summary.statistics.chunk_count == len(summary.chunk_indexes) > 1  # of a MiB each
     assert sum(summary.statistics.channel_message_counts.values()) == counted
-    assert (summary.statistics.message_start_time, summary.statistics.message_end_time) == (0, 4_000_000_000)
+    assert (summary.statistics.message_start_time, summary.statistics.message_end_time) == (
+        0,
+        4_000_000_000,
+    )
     names = [type(record).__name__ for record in records]
     assert names[0] == "Header" and names[-1] == "Footer" and names.count("DataEnd") == 1
     # The checksum of the summary, which this reader does not look at.
     import struct
     import zlib
+
     data = (exported / "run.mcap").read_bytes()
-    begin, = struct.unpack_from("<Q", data, len(data) - 28)
-    assert zlib.crc32(data[begin:len(data) - 12]) == struct.unpack_from("<I", data, len(data) - 12)[0]
+    (begin,) = struct.unpack_from("<Q", data, len(data) - 28)
+    assert (
+        zlib.crc32(data[begin : len(data) - 12])
+        == struct.unpack_from("<I", data, len(data) - 12)[0]
+    )
 
 
 def test_a_moment_is_found_by_the_index(exported):
     with open(exported / "run.mcap", "rb") as stream:
         reader = SeekingReader(stream, validate_crcs=True)
-        found = [message.log_time for _, _, message in reader.iter_messages(["p3at/pose"], starting_at=1_000_000_000, ending_before=1_100_000_000)]
-    assert found == [1_000_000_000 + 20_000_000 * i for i in range(5)]    # 50 Hz
+        found = [
+            message.log_time
+            for _, _, message in reader.iter_messages(
+                ["p3at/pose"], starting_at=1_000_000_000, ending_before=1_100_000_000
+            )
+        ]
+    assert found == [1_000_000_000 + 20_000_000 * i for i in range(5)]  # 50 Hz
 
 
 def test_messages_are_as_their_schemas_say(exported):
@@ -116,15 +165,23 @@ def test_messages_are_as_their_schemas_say(exported):
 
 def test_a_scan(exported, topics):
     from ruedo.lcmtypes import planar_lidar_t
+
     scans = topics["p3at/lrf"]
     logged = events(exported, "p3at/lrf")
     assert len(scans) == len(logged) and {name for name, _, _ in scans} == {"foxglove.LaserScan"}
     _, time_ns, scan = scans[3]
     truth = planar_lidar_t.decode(logged[3].data)
-    assert time_ns == logged[3].timestamp * 1000 and scan["timestamp"] == {"sec": time_ns // 10**9, "nsec": time_ns % 10**9}
+    assert time_ns == logged[3].timestamp * 1000 and scan["timestamp"] == {
+        "sec": time_ns // 10**9,
+        "nsec": time_ns % 10**9,
+    }
     assert scan["ranges"] == pytest.approx(list(truth.ranges), rel=1e-6)
-    assert scan["start_angle"] == pytest.approx(truth.rad0) and scan["end_angle"] == pytest.approx(truth.rad0 + (truth.nranges - 1) * truth.radstep)
-    assert any(math.isinf(value) for value in scan["ranges"]) == any(math.isinf(value) for value in truth.ranges)
+    assert scan["start_angle"] == pytest.approx(truth.rad0) and scan["end_angle"] == pytest.approx(
+        truth.rad0 + (truth.nranges - 1) * truth.radstep
+    )
+    assert any(math.isinf(value) for value in scan["ranges"]) == any(
+        math.isinf(value) for value in truth.ranges
+    )
     # The ray straight ahead ends at the wall's face, 3.75 m before the robot: what the frames say, end to end.
     frames = {each["child_frame_id"]: each for each in topics["ruedo/frames"][0][2]["transforms"]}
     mount = frames["p3at/lrf"]
@@ -135,36 +192,64 @@ def test_a_scan(exported, topics):
 
 def test_poses_and_frames(exported, topics):
     from ruedo.lcmtypes import pose_t
+
     name, _, pose = topics["p3at/pose"][-1]
     truth = pose_t.decode(events(exported, "p3at/pose")[-1].data)
     assert name == "foxglove.PoseInFrame" and pose["frame_id"] == "world"
     assert [pose["pose"]["position"][k] for k in "xyz"] == list(truth.pos)
     assert [pose["pose"]["orientation"][k] for k in "wxyz"] == list(truth.orientation)
-    assert pose["pose"]["position"]["x"] == pytest.approx(1, abs=1e-3) and pose["pose"]["position"]["y"] == pytest.approx(2, abs=1e-3)
+    assert pose["pose"]["position"]["x"] == pytest.approx(1, abs=1e-3) and pose["pose"]["position"][
+        "y"
+    ] == pytest.approx(2, abs=1e-3)
     assert topics["p3at/pose/values"][-1][2]["vel"] == pytest.approx(list(truth.vel))
     name, _, odometry = topics["p3at/odometry"][-1]
-    assert name == "foxglove.PoseInFrame" and odometry["frame_id"] == "p3at/odom" and odometry["pose"]["position"]["x"] == pytest.approx(0, abs=1e-3)
+    assert (
+        name == "foxglove.PoseInFrame"
+        and odometry["frame_id"] == "p3at/odom"
+        and odometry["pose"]["position"]["x"] == pytest.approx(0, abs=1e-3)
+    )
     # odom is where the robot began, turned by a quarter.
     name, _, first = topics["ruedo/frames"][0]
     frames = {each["child_frame_id"]: each for each in first["transforms"]}
     assert name == "foxglove.FrameTransforms" and frames["p3at/odom"]["parent_frame_id"] == "world"
-    assert frames["p3at/odom"]["rotation"]["w"] == pytest.approx(math.cos(math.pi / 4)) and frames["p3at/odom"]["translation"]["y"] == pytest.approx(2, abs=1e-6)
+    assert frames["p3at/odom"]["rotation"]["w"] == pytest.approx(math.cos(math.pi / 4)) and frames[
+        "p3at/odom"
+    ]["translation"]["y"] == pytest.approx(2, abs=1e-6)
     # The robot's frame hangs on its body's, and that one moves.
     body = frames["p3at"]["parent_frame_id"]
     moving = topics["ruedo/world"][-1][2]["transforms"]
-    assert [each["parent_frame_id"] for each in moving if each["child_frame_id"] == body] == ["world"]
+    assert [each["parent_frame_id"] for each in moving if each["child_frame_id"] == body] == [
+        "world"
+    ]
 
 
 def test_pictures(exported, topics):
     from ruedo.lcmtypes import camera_info_t, image_t
+
     name, _, picture = topics["p3at/camera"][5]
     truth = image_t.decode(events(exported, "p3at/camera")[5].data)
-    assert name == "foxglove.CompressedImage" and picture["format"] == "jpeg" and picture["frame_id"] == "p3at/camera/optical"
-    assert base64.b64decode(picture["data"]) == bytes(truth.data) and bytes(truth.data).startswith(b"\xff\xd8\xff")
+    assert (
+        name == "foxglove.CompressedImage"
+        and picture["format"] == "jpeg"
+        and picture["frame_id"] == "p3at/camera/optical"
+    )
+    assert base64.b64decode(picture["data"]) == bytes(truth.data) and bytes(truth.data).startswith(
+        b"\xff\xd8\xff"
+    )
     name, _, camera = topics["p3at/camera/info"][5]
     intrinsics = camera_info_t.decode(events(exported, "p3at/camera/info")[5].data)
     assert name == "foxglove.CameraCalibration" and camera["width"] == intrinsics.width
-    assert camera["K"] == [intrinsics.fx, 0, intrinsics.cx, 0, intrinsics.fy, intrinsics.cy, 0, 0, 1]
+    assert camera["K"] == [
+        intrinsics.fx,
+        0,
+        intrinsics.cx,
+        0,
+        intrinsics.fy,
+        intrinsics.cy,
+        0,
+        0,
+        1,
+    ]
     frames = {each["child_frame_id"]: each for each in topics["ruedo/frames"][0][2]["transforms"]}
     q = frames["p3at/camera/optical"]["rotation"]
     # z of the optical frame is x of the device's, and x of it points to the right, which is -y.
@@ -175,12 +260,19 @@ def test_pictures(exported, topics):
 
 def test_the_scene(topics):
     assert {name for name, _, _ in topics["ruedo/scene"]} == {"foxglove.SceneUpdate"}
-    entities = {entity["id"]: entity for _, _, update in topics["ruedo/scene"] for entity in update["entities"]}
+    entities = {
+        entity["id"]: entity
+        for _, _, update in topics["ruedo/scene"]
+        for entity in update["entities"]
+    }
     wall = entities["wall/link"]
     assert wall["frame_id"] == "world" and wall["lifetime"] == {"sec": 0, "nsec": 0}
     points = [point for part in wall["triangles"] for point in part["points"]]
     for axis, low, high in (("x", -9, 11), ("y", 5.75, 6.25), ("z", 0, 1)):
-        assert (min(point[axis] for point in points), max(point[axis] for point in points)) == pytest.approx((low, high), abs=1e-4)
+        assert (
+            min(point[axis] for point in points),
+            max(point[axis] for point in points),
+        ) == pytest.approx((low, high), abs=1e-4)
     assert wall["triangles"][0]["color"] == pytest.approx({"r": 0.2, "g": 0.4, "b": 0.6, "a": 1})
     for part in wall["triangles"]:
         assert len(part["indices"]) % 3 == 0 and max(part["indices"]) < len(part["points"])
@@ -189,41 +281,79 @@ def test_the_scene(topics):
 
 def test_everything_else_goes_along(exported, topics):
     from ruedo.lcmtypes import log_header_t, sonar_t
+
     for channel in {event.channel for event in lcm.EventLog(str(exported / "run.lcm"))}:
         assert len(topics[channel]) == len(events(exported, channel)), channel
     name, _, sonar = topics["p3at/sonar_front"][7]
     truth = sonar_t.decode(events(exported, "p3at/sonar_front")[7].data)
-    assert name == "ruedo.sonar_t" and sonar["range"] == pytest.approx(list(truth.range), rel=1e-6) and sonar["fresh"] == list(truth.fresh)
+    assert (
+        name == "ruedo.sonar_t"
+        and sonar["range"] == pytest.approx(list(truth.range), rel=1e-6)
+        and sonar["fresh"] == list(truth.fresh)
+    )
     assert sonar["fired_utime"] == list(truth.fired_utime)
     header = log_header_t.decode(events(exported, "ruedo/header")[0].data)
-    assert topics["ruedo/header"][0][2]["files"] == [{"path": each.path, "sha256": each.sha256} for each in header.files]
+    assert topics["ruedo/header"][0][2]["files"] == [
+        {"path": each.path, "sha256": each.sha256} for each in header.files
+    ]
 
 
 def test_logs_that_are_cut_off_or_strange(exported, tmp_path):
     whole = (exported / "run.lcm").read_bytes()
-    begin = whole.index(b"\xed\xa1\xda\x01", len(whole) // 2)    # of an event
-    (tmp_path / "cut.lcm").write_bytes(whole[:begin + 3])
-    done = subprocess.run([RUEDO, "export", tmp_path / "cut.lcm", tmp_path / "cut.mcap"], capture_output=True, text=True, timeout=120)
+    begin = whole.index(b"\xed\xa1\xda\x01", len(whole) // 2)  # of an event
+    (tmp_path / "cut.lcm").write_bytes(whole[: begin + 3])
+    done = subprocess.run(
+        [RUEDO, "export", tmp_path / "cut.lcm", tmp_path / "cut.mcap"],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
     assert done.returncode == 0 and "cut off" in done.stderr
     assert len(messages(tmp_path / "cut.mcap")["p3at/lrf"]) > 3
     import struct
-    event = lambda channel, data: struct.pack("!IqqII", 0xEDA1DA01, 0, -5, len(channel), len(data)) + channel + data
-    (tmp_path / "odd.lcm").write_bytes(event(b"a\xff", b"") + event(b"b", os.urandom(999)) + event(b"p3at/pose", events(exported, "p3at/pose")[0].data))
-    done = subprocess.run([RUEDO, "export", tmp_path / "odd.lcm", tmp_path / "odd.mcap"], capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0 and "2 of types that are not known, or damaged, are left out" in done.stdout and "no ruedo/header" in done.stderr
+
+    event = lambda channel, data: (
+        struct.pack("!IqqII", 0xEDA1DA01, 0, -5, len(channel), len(data)) + channel + data
+    )
+    (tmp_path / "odd.lcm").write_bytes(
+        event(b"a\xff", b"")
+        + event(b"b", os.urandom(999))
+        + event(b"p3at/pose", events(exported, "p3at/pose")[0].data)
+    )
+    done = subprocess.run(
+        [RUEDO, "export", tmp_path / "odd.lcm", tmp_path / "odd.mcap"],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert (
+        done.returncode == 0
+        and "2 of types that are not known, or damaged, are left out" in done.stdout
+        and "no ruedo/header" in done.stderr
+    )
     assert list(messages(tmp_path / "odd.mcap")) == ["p3at/pose", "p3at/pose/values"]
 
 
 def test_what_cannot_be_done_is_said(exported, tmp_path):
     log = exported / "run.lcm"
     (tmp_path / "no.lcm").write_bytes(b"hello")
-    for arguments, code, words in (([tmp_path / "no.lcm", tmp_path / "out.mcap"], 3, "is not an LCM log"), ([tmp_path / "none.lcm", tmp_path / "out.mcap"], 3, "cannot be read"),
-                                   ([log, log], 2, "is the log itself"), ([log, tmp_path / "no" / "out.mcap"], 4, "cannot be written"), ([log, "/dev/full"], 4, "cannot be written")):
-        done = subprocess.run([RUEDO, "export", *arguments], capture_output=True, text=True, timeout=120)
+    for arguments, code, words in (
+        ([tmp_path / "no.lcm", tmp_path / "out.mcap"], 3, "is not an LCM log"),
+        ([tmp_path / "none.lcm", tmp_path / "out.mcap"], 3, "cannot be read"),
+        ([log, log], 2, "is the log itself"),
+        ([log, tmp_path / "no" / "out.mcap"], 4, "cannot be written"),
+        ([log, "/dev/full"], 4, "cannot be written"),
+    ):
+        done = subprocess.run(
+            [RUEDO, "export", *arguments], capture_output=True, text=True, timeout=120
+        )
         assert done.returncode == code and words in done.stderr, (done.returncode, done.stderr)
     assert not (tmp_path / "out.mcap").exists() and log.read_bytes().startswith(b"\xed\xa1\xda\x01")
     assert os.path.exists("/dev/full")
 
 
 def test_it_is_listed():
-    assert "export" in subprocess.run([RUEDO, "--help"], capture_output=True, text=True, timeout=20).stdout
+    assert (
+        "export"
+        in subprocess.run([RUEDO, "--help"], capture_output=True, text=True, timeout=20).stdout
+    )

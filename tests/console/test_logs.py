@@ -1,4 +1,5 @@
 """Recorded runs in the console: what a viewer gets at each moment, and logs that are cut off, strange, or none."""
+
 import json
 import os
 import struct
@@ -11,8 +12,25 @@ from harness import ARENA, PLAY, RUEDO, SEEK, SEEN, SOURCE, TRAFFIC, WANT, Socke
 
 
 def record(log, world=ARENA, *arguments):
-    subprocess.run([RUEDO, "run", world, "--lcm", "memq://", "--quiet", "--rate", "max", "--duration", "4",
-                    "--record", log, *arguments], check=True, timeout=120)
+    subprocess.run(
+        [
+            RUEDO,
+            "run",
+            world,
+            "--lcm",
+            "memq://",
+            "--quiet",
+            "--rate",
+            "max",
+            "--duration",
+            "4",
+            "--record",
+            log,
+            *arguments,
+        ],
+        check=True,
+        timeout=120,
+    )
     return log
 
 
@@ -53,7 +71,7 @@ def newest(viewer, wanted):
             at = 4
             while at < len(data):
                 index, size = struct.unpack_from("<II", data, at)
-                message, name = data[at + 8:at + 8 + size], viewer.names[index]
+                message, name = data[at + 8 : at + 8 + size], viewer.names[index]
                 if name in wanted and struct.unpack_from("!q", message, 8)[0] == wanted[name]:
                     found[name] = message
                 at += 8 + size
@@ -63,6 +81,7 @@ def newest(viewer, wanted):
 
 def test_each_channel_shows_its_newest_message_of_a_moment(log):
     import lcm
+
     events = [(event.channel, event.timestamp, event.data) for event in lcm.EventLog(str(log))]
     with playing(log) as process:
         viewer, hello = greeting(process.port)
@@ -70,18 +89,32 @@ def test_each_channel_shows_its_newest_message_of_a_moment(log):
         viewer.send(bytes([WANT]) + b"p3at/lrf\np3at/odometry")
         for moment in (3.017, 0.5, 2.0, 3.999):
             seek(viewer, moment)
-            last = {c: (t, d) for c, t, d in events if c in ("p3at/lrf", "p3at/odometry") and t <= moment * 1e6}
-            assert newest(viewer, {c: t for c, (t, _) in last.items()}) == {c: d for c, (_, d) in last.items()}
+            last = {
+                c: (t, d)
+                for c, t, d in events
+                if c in ("p3at/lrf", "p3at/odometry") and t <= moment * 1e6
+            }
+            assert newest(viewer, {c: t for c, (t, _) in last.items()}) == {
+                c: d for c, (_, d) in last.items()
+            }
         # What somebody begins to watch while it is paused is shown at once.
         viewer.send(bytes([WANT]) + b"p3at/pose")
-        newest(viewer, {"p3at/pose": [t for c, t, _ in events if c == "p3at/pose" and t <= 3_999_000][-1]})
+        newest(
+            viewer,
+            {"p3at/pose": [t for c, t, _ in events if c == "p3at/pose" and t <= 3_999_000][-1]},
+        )
 
 
 def test_the_time_line_goes_with_the_log(log):
     with playing(log, "--speed", "2") as process:
         viewer, _ = greeting(process.port)
         playback = texts_until(viewer, "playback")
-        assert (playback["begin"], playback["end"], playback["speed"], playback["playing"]) == (0, 4, 2, True)
+        assert (playback["begin"], playback["end"], playback["speed"], playback["playing"]) == (
+            0,
+            4,
+            2,
+            True,
+        )
         seek(viewer, 1e9)
         while playback["now"] != 4:
             playback = texts_until(viewer, "playback")
@@ -100,8 +133,8 @@ def test_the_log_is_not_steered(log):
 
 def test_a_log_that_was_cut_off_is_shown_up_to_there(log, tmp_path):
     whole = log.read_bytes()
-    begin = whole.index(b"\xed\xa1\xda\x01", len(whole) // 2)    # of an event
-    (tmp_path / "cut.lcm").write_bytes(whole[:begin + 5])
+    begin = whole.index(b"\xed\xa1\xda\x01", len(whole) // 2)  # of an event
+    (tmp_path / "cut.lcm").write_bytes(whole[: begin + 5])
     with playing(tmp_path / "cut.lcm") as process:
         viewer, hello = greeting(process.port)
         assert "cut off in the event that begins at byte" in hello["fault"]
@@ -129,16 +162,27 @@ def test_a_world_that_was_changed_or_is_gone_is_said(tmp_path):
 
 
 def event(number, time_us, channel, data):
-    return struct.pack("!IqqII", 0xEDA1DA01, number, time_us, len(channel), len(data)) + channel + data
+    return (
+        struct.pack("!IqqII", 0xEDA1DA01, number, time_us, len(channel), len(data)) + channel + data
+    )
 
 
 def test_strange_logs_do_not_hurt(log, tmp_path):
     """Times that go back and forth, names that are no text, lengths that lie, messages that are none."""
     pose = next(e.data for e in __import__("lcm").EventLog(str(log)) if e.channel == "p3at/pose")
     strange = tmp_path / "strange.lcm"
-    strange.write_bytes(event(0, 5, b"\xff\xfe\x00\n\xc3", b"") + event(1, -2**63, b"p3at/pose", pose) + event(2, 2**63 - 1, b"p3at/pose", pose) +
-                        event(3, 7, b"ruedo/world", os.urandom(500)) + event(4, 8, b"ruedo/header", os.urandom(50)) + event(5, 9, b"ruedo/applied", b"\0" * 9) +
-                        event(6, 10, b"", b"x" * 100_000) + event(7, 11, b"ruedo/info", bytes(8)) + b"\xed\xa1\xda\x01" + b"\x7f" * 24)
+    strange.write_bytes(
+        event(0, 5, b"\xff\xfe\x00\n\xc3", b"")
+        + event(1, -(2**63), b"p3at/pose", pose)
+        + event(2, 2**63 - 1, b"p3at/pose", pose)
+        + event(3, 7, b"ruedo/world", os.urandom(500))
+        + event(4, 8, b"ruedo/header", os.urandom(50))
+        + event(5, 9, b"ruedo/applied", b"\0" * 9)
+        + event(6, 10, b"", b"x" * 100_000)
+        + event(7, 11, b"ruedo/info", bytes(8))
+        + b"\xed\xa1\xda\x01"
+        + b"\x7f" * 24
+    )
     with playing(strange) as process:
         viewer, hello = greeting(process.port)
         assert "no ruedo/header" in hello["fault"] and "damaged at byte" in hello["fault"]
@@ -149,7 +193,7 @@ def test_strange_logs_do_not_hurt(log, tmp_path):
         for moment in (float("nan"), float("inf"), -float("inf"), 1e300, -1e300, 0.0, 9e12):
             viewer.send(bytes([SEEK]) + struct.pack("<d", moment))
             viewer.send(bytes([PLAY, 1]) + struct.pack("<d", moment))
-        viewer.send(bytes([SEEK, 1]))    # too short: that viewer must go
+        viewer.send(bytes([SEEK, 1]))  # too short: that viewer must go
         other, _ = greeting(process.port)
         other.send(bytes([WANT]) + b"p3at/pose")
         seek(other, 9.3e12)
@@ -157,26 +201,53 @@ def test_strange_logs_do_not_hurt(log, tmp_path):
         assert process.poll() is None and get(process.port, "/")[0] == 200
 
 
-@pytest.mark.parametrize("content, words", [(None, "cannot be read"), (b"", "holds no message"), (b"hello, world" * 100, "is not an LCM log"),
-                                            (b"\xed\xa1\xda\x01" + b"\xff" * 40, "holds no message: damaged at byte 0"), ("folder", "is not a file")])
+@pytest.mark.parametrize(
+    "content, words",
+    [
+        (None, "cannot be read"),
+        (b"", "holds no message"),
+        (b"hello, world" * 100, "is not an LCM log"),
+        (b"\xed\xa1\xda\x01" + b"\xff" * 40, "holds no message: damaged at byte 0"),
+        ("folder", "is not a file"),
+    ],
+)
 def test_what_is_no_log_is_said(tmp_path, content, words):
     path = tmp_path / "no.lcm"
     if content == "folder":
         path.mkdir()
     elif content is not None:
         path.write_bytes(content)
-    done = subprocess.run([RUEDO, "play", path, "--view", "0"], capture_output=True, text=True, timeout=60)
+    done = subprocess.run(
+        [RUEDO, "play", path, "--view", "0"], capture_output=True, text=True, timeout=60
+    )
     assert done.returncode == 3 and words in done.stderr and "no.lcm" in done.stderr
 
 
 def test_options_that_do_not_fit_are_said(log):
     for arguments in (["--speed", "max"], ["--lcm", "memq://"]):
-        done = subprocess.run([RUEDO, "play", log, "--view", "0", *arguments], capture_output=True, text=True, timeout=60)
+        done = subprocess.run(
+            [RUEDO, "play", log, "--view", "0", *arguments],
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
         assert done.returncode == 2 and "--view" in done.stderr
 
 
-@pytest.mark.parametrize("path", ["/../../etc/passwd", "/scene/textures/../../etc/passwd", "/%2e%2e/%2e%2e/etc/passwd", "//etc/passwd", "/run.lcm", "/scene/../run.lcm"])
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/../../etc/passwd",
+        "/scene/textures/../../etc/passwd",
+        "/%2e%2e/%2e%2e/etc/passwd",
+        "//etc/passwd",
+        "/run.lcm",
+        "/scene/../run.lcm",
+    ],
+)
 def test_no_path_escapes(log, path):
     with playing(log) as process:
         status, body, _ = get(process.port, path)
-        assert status in (400, 403, 404) and b"root:" not in body and b"\xed\xa1\xda\x01" not in body
+        assert (
+            status in (400, 403, 404) and b"root:" not in body and b"\xed\xa1\xda\x01" not in body
+        )

@@ -1,4 +1,5 @@
 """`ruedo play LOG --html`: one file that shows a run without a server, no larger than asked for; and regress leaves it where it fails."""
+
 import contextlib
 import re
 import subprocess
@@ -14,20 +15,26 @@ from test_browser import states
 def log(tmp_path_factory):
     """A run of a robot that drives along a curve at half a metre a second."""
     from ruedo.lcmtypes import velocity_command_t
+
     path = tmp_path_factory.mktemp("page") / "run.lcm"
     command = velocity_command_t()
     command.vx, command.omega = 0.5, 0.4
     with running("--record", path, "--duration", "5") as process:
         driver = Socket(process.port)
         while process.poll() is None:
-            with contextlib.suppress(OSError):    # when it has just ended
+            with contextlib.suppress(OSError):  # when it has just ended
                 driver.command("p3at/velocity", command)
             time.sleep(0.1)
     return path
 
 
 def page_of(log, path, *arguments):
-    return subprocess.run([RUEDO, "play", log, "--html", path, *arguments], capture_output=True, text=True, timeout=120)
+    return subprocess.run(
+        [RUEDO, "play", log, "--html", path, *arguments],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
 
 
 @needs_browser
@@ -38,13 +45,32 @@ def test_it_works_from_the_disk(log, tmp_path, size):
     path = folder / "out.html"
     done = page_of(log, path, "--html-size", size)
     assert done.returncode == 0, done.stderr
-    assert path.stat().st_size <= float(size) * 1e6 and done.stdout.startswith(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
+    assert path.stat().st_size <= float(size) * 1e6 and done.stdout.startswith(
+        f"{path}: {path.stat().st_size / 1e6:.1f} MB"
+    )
     found = list(states(log, 0))
-    moments = [{"time": t, "body": 0, "pose": [x, y]} for t, _, x, y, _ in (found[round(share * (len(found) - 1))] for share in (0.9, 0.1, 1.0, 0.5))]
+    moments = [
+        {"time": t, "body": 0, "pose": [x, y]}
+        for t, _, x, y, _ in (
+            found[round(share * (len(found) - 1))] for share in (0.9, 0.1, 1.0, 0.5)
+        )
+    ]
     interval = re.search(r"at least ([\d.]+) s apart", done.stdout)
-    near = 1e-3 + 0.5 * (2 * float(interval.group(1)) if interval else 0)    # m; the newest message may be that old
-    assert abs(found[-1][2]) + abs(found[-1][3]) > 0.5    # it has moved
-    browse(path.as_uri(), tmp_path, "disk", {"moments": moments, "near": near, "pictures": "without pictures" not in done.stdout, "folder": str(folder)})
+    near = 1e-3 + 0.5 * (
+        2 * float(interval.group(1)) if interval else 0
+    )  # m; the newest message may be that old
+    assert abs(found[-1][2]) + abs(found[-1][3]) > 0.5  # it has moved
+    browse(
+        path.as_uri(),
+        tmp_path,
+        "disk",
+        {
+            "moments": moments,
+            "near": near,
+            "pictures": "without pictures" not in done.stdout,
+            "folder": str(folder),
+        },
+    )
 
 
 def test_what_does_not_fit_is_said(log, tmp_path):
@@ -52,7 +78,12 @@ def test_what_does_not_fit_is_said(log, tmp_path):
     if done.returncode == 0:
         assert (tmp_path / "out.html").stat().st_size <= 1e6
     else:
-        assert done.returncode == 3 and "run.lcm" in done.stderr and "MB" in done.stderr and not (tmp_path / "out.html").exists()
+        assert (
+            done.returncode == 3
+            and "run.lcm" in done.stderr
+            and "MB" in done.stderr
+            and not (tmp_path / "out.html").exists()
+        )
     for arguments, words in ((("--html-size", "0.5"), "--html-size"), (("--view",), "--view")):
         done = page_of(log, tmp_path / "no.html", *arguments)
         assert done.returncode == 2 and words in done.stderr
@@ -61,7 +92,25 @@ def test_what_does_not_fit_is_said(log, tmp_path):
 
 
 def test_a_failed_regression_leaves_its_page(tmp_path):
-    done = subprocess.run([RUEDO, "regress", ARENA, "--duration", "0.5", "--disable", "p3at/camera", "--goal", "3,3,0.1,0.4", "--record", tmp_path / "run.lcm"],
-                          capture_output=True, text=True, timeout=300)
+    done = subprocess.run(
+        [
+            RUEDO,
+            "regress",
+            ARENA,
+            "--duration",
+            "0.5",
+            "--disable",
+            "p3at/camera",
+            "--goal",
+            "3,3,0.1,0.4",
+            "--record",
+            tmp_path / "run.lcm",
+        ],
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
     assert done.returncode == 1 and "FAILED" in done.stderr
-    assert (tmp_path / "run.lcm.html").read_bytes().startswith(b"<!doctype html>") and "run.lcm.html" in done.stdout
+    assert (tmp_path / "run.lcm.html").read_bytes().startswith(
+        b"<!doctype html>"
+    ) and "run.lcm.html" in done.stdout

@@ -1,4 +1,5 @@
-// Typed reads: what is accepted, what is refused, and that errors say place, element, value and what is allowed.
+// Typed reads: what is accepted, what is refused, and that errors say place, element, value and
+// what is allowed.
 #include "ruedo/element.h"
 
 #include <clocale>
@@ -41,43 +42,73 @@ std::string error_of(Read read) {
 }
 
 TEST(Element, ReadsNumbers) {
-  struct Case { const char* text; double value; };
-  for (const Case& c : {Case{"1.5", 1.5}, {" 2 ", 2}, {"-3e-2", -0.03}, {"+4", 4}, {".5", 0.5}, {"5.", 5}, {"1e8", 1e8},
-                        {"1e-400", 0.0}, {"\n\t7\r\n", 7}, {"0.1", 0.1}}) {
-    EXPECT_EQ(sensor(c.text).number("range/max", -1, Allowed::any(quantity::kRange)), c.value) << c.text;
+  struct Case {
+    const char* text;
+    double value;
+  };
+  for (const Case& c : {Case{"1.5", 1.5},
+                        {" 2 ", 2},
+                        {"-3e-2", -0.03},
+                        {"+4", 4},
+                        {".5", 0.5},
+                        {"5.", 5},
+                        {"1e8", 1e8},
+                        {"1e-400", 0.0},
+                        {"\n\t7\r\n", 7},
+                        {"0.1", 0.1}}) {
+    EXPECT_EQ(sensor(c.text).number("range/max", -1, Allowed::any(quantity::kRange)), c.value)
+        << c.text;
   }
   EXPECT_EQ(sensor("1").number("range/min", 0.25, Allowed::any(quantity::kRange)), 0.25);
   EXPECT_EQ(sensor("1").number("scan/min", 0.25, Allowed::any(quantity::kRange)), 0.25);
 }
 
 TEST(Element, NumbersThatAreNone) {
-  for (const char* text : {"", "abc", "1,5", "1.5m", "1 2", "0x10", "--1", "+-1", "nan", "inf", "-inf", "1e999", "1.5.2", "NaN", "٣"}) {
-    const std::string error = error_of([&] { sensor(text).number("range/max", -1, Allowed::any(quantity::kRange)); });
-    EXPECT_THAT(error, HasSubstr("robot.sdf:3: <sensor/range/max>: '" + std::string(text) + "'")) << text;
+  for (const char* text : {"", "abc", "1,5", "1.5m", "1 2", "0x10", "--1", "+-1", "nan", "inf",
+                           "-inf", "1e999", "1.5.2", "NaN", "٣"}) {
+    const std::string error =
+        error_of([&] { sensor(text).number("range/max", -1, Allowed::any(quantity::kRange)); });
+    EXPECT_THAT(error, HasSubstr("robot.sdf:3: <sensor/range/max>: '" + std::string(text) + "'"))
+        << text;
   }
 }
 
 TEST(Element, NumbersThatAreTooLarge) {
-  const auto read = [](const char* text, Allowed allowed) { return error_of([&] { sensor(text).number("range/max", 1, allowed); }); };
+  const auto read = [](const char* text, Allowed allowed) {
+    return error_of([&] { sensor(text).number("range/max", 1, allowed); });
+  };
   EXPECT_EQ(read("1e300", Allowed::positive(quantity::kMass)),
-            "robot.sdf:3: <sensor/range/max>: '1e300' is too large for a mass; allowed is up to 1000000000 kg");
+            "robot.sdf:3: <sensor/range/max>: '1e300' is too large for a mass; allowed is up to "
+            "1000000000 kg");
   EXPECT_EQ(read("-1000000.1", Allowed::any(quantity::kLength)),
-            "robot.sdf:3: <sensor/range/max>: '-1000000.1' is too large for a length; allowed is up to 1000000 m");
+            "robot.sdf:3: <sensor/range/max>: '-1000000.1' is too large for a length; allowed is "
+            "up to 1000000 m");
   EXPECT_EQ(read("1e7", Allowed::positive(quantity::kSpeed).or_infinite()),
-            "robot.sdf:3: <sensor/range/max>: '1e7' is too large for a speed; allowed is up to 1000000 m/s or rad/s, or inf");
+            "robot.sdf:3: <sensor/range/max>: '1e7' is too large for a speed; allowed is up to "
+            "1000000 m/s or rad/s, or inf");
   EXPECT_EQ(read("-1000000", Allowed::any(quantity::kLength)), "no error");
-  EXPECT_THAT(error_of([] { sensor("0 0 1e7").vector3("range/max", Vec3::Zero(), Allowed::any(quantity::kLength)); }), HasSubstr("'1e7' is too large for a length"));
-  EXPECT_THAT(error_of([] { sensor("0 0 1e7 0 0 0").pose("range/max"); }), HasSubstr("'1e7' is too large for a length"));
-  EXPECT_THAT(error_of([] { sensor("0 0 1 0 1e9 0").pose("range/max"); }), HasSubstr("'1e9' is too large for an angle"));
+  EXPECT_THAT(error_of([] {
+                sensor("0 0 1e7").vector3("range/max", Vec3::Zero(),
+                                          Allowed::any(quantity::kLength));
+              }),
+              HasSubstr("'1e7' is too large for a length"));
+  EXPECT_THAT(error_of([] { sensor("0 0 1e7 0 0 0").pose("range/max"); }),
+              HasSubstr("'1e7' is too large for a length"));
+  EXPECT_THAT(error_of([] { sensor("0 0 1 0 1e9 0").pose("range/max"); }),
+              HasSubstr("'1e9' is too large for an angle"));
 }
 
 TEST(Element, SaysWhatIsAllowed) {
-  EXPECT_EQ(error_of([] { sensor("0").number("range/max", 1, Allowed::positive(quantity::kRange)); }),
-            "robot.sdf:3: <sensor/range/max>: '0' is not allowed; allowed is a number above 0");
-  EXPECT_EQ(error_of([] { sensor("-0.5").number("range/max", 1, Allowed::not_negative(quantity::kRange)); }),
-            "robot.sdf:3: <sensor/range/max>: '-0.5' is not allowed; allowed is a number of at least 0");
-  EXPECT_EQ(error_of([] { sensor("1.01").number("range/max", 1, Allowed::between(0, 1)); }),
-            "robot.sdf:3: <sensor/range/max>: '1.01' is not allowed; allowed is a number from 0 to 1");
+  EXPECT_EQ(
+      error_of([] { sensor("0").number("range/max", 1, Allowed::positive(quantity::kRange)); }),
+      "robot.sdf:3: <sensor/range/max>: '0' is not allowed; allowed is a number above 0");
+  EXPECT_EQ(
+      error_of(
+          [] { sensor("-0.5").number("range/max", 1, Allowed::not_negative(quantity::kRange)); }),
+      "robot.sdf:3: <sensor/range/max>: '-0.5' is not allowed; allowed is a number of at least 0");
+  EXPECT_EQ(
+      error_of([] { sensor("1.01").number("range/max", 1, Allowed::between(0, 1)); }),
+      "robot.sdf:3: <sensor/range/max>: '1.01' is not allowed; allowed is a number from 0 to 1");
   EXPECT_EQ(error_of([] { sensor("far").number("range/max", 1, Allowed::any(quantity::kRange)); }),
             "robot.sdf:3: <sensor/range/max>: 'far' is not a number; allowed is a number");
   EXPECT_EQ(sensor("0").number("range/max", 1, Allowed::between(0, 1)), 0.0);
@@ -86,13 +117,24 @@ TEST(Element, SaysWhatIsAllowed) {
 
 TEST(Element, InfinityOnlyWhereItIsAskedFor) {
   const double infinity = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(sensor("inf").number("range/max", 1, Allowed::any(quantity::kRange).or_infinite()), infinity);
-  EXPECT_EQ(sensor("-inf").number("range/max", 1, Allowed::any(quantity::kRange).or_infinite()), -infinity);
-  EXPECT_EQ(sensor("INF").number("range/max", 1, Allowed::positive(quantity::kRange).or_infinite()), infinity);
-  EXPECT_THAT(error_of([] { sensor("-inf").number("range/max", 1, Allowed::positive(quantity::kRange).or_infinite()); }),
+  EXPECT_EQ(sensor("inf").number("range/max", 1, Allowed::any(quantity::kRange).or_infinite()),
+            infinity);
+  EXPECT_EQ(sensor("-inf").number("range/max", 1, Allowed::any(quantity::kRange).or_infinite()),
+            -infinity);
+  EXPECT_EQ(sensor("INF").number("range/max", 1, Allowed::positive(quantity::kRange).or_infinite()),
+            infinity);
+  EXPECT_THAT(error_of([] {
+                sensor("-inf").number("range/max", 1,
+                                      Allowed::positive(quantity::kRange).or_infinite());
+              }),
               HasSubstr("'-inf' is not allowed; allowed is a number above 0, or inf"));
-  EXPECT_THAT(error_of([] { sensor("nan").number("range/max", 1, Allowed::any(quantity::kRange).or_infinite()); }), HasSubstr("is not finite"));
-  EXPECT_THAT(error_of([] { sensor("inf").number("range/max", 1, Allowed::any(quantity::kRange)); }), HasSubstr("'inf' is not finite"));
+  EXPECT_THAT(error_of([] {
+                sensor("nan").number("range/max", 1, Allowed::any(quantity::kRange).or_infinite());
+              }),
+              HasSubstr("is not finite"));
+  EXPECT_THAT(
+      error_of([] { sensor("inf").number("range/max", 1, Allowed::any(quantity::kRange)); }),
+      HasSubstr("'inf' is not finite"));
 }
 
 // "1.5" is one and a half even where the user's decimal mark is a comma.
@@ -109,28 +151,41 @@ TEST(Element, ReadsIntegers) {
   EXPECT_EQ(sensor("181").integer("range/max", 0, Allowed::between(-0x1p63, 0x1p63)), 181);
   EXPECT_EQ(sensor("640.0").integer("range/max", 0, Allowed::between(-0x1p63, 0x1p63)), 640);
   EXPECT_EQ(sensor("1e3").integer("range/max", 0, Allowed::between(-0x1p63, 0x1p63)), 1000);
-  EXPECT_EQ(sensor("-9223372036854775808").integer("range/max", 0, Allowed::between(-0x1p63, 0x1p63)), std::numeric_limits<int64_t>::min());
+  EXPECT_EQ(
+      sensor("-9223372036854775808").integer("range/max", 0, Allowed::between(-0x1p63, 0x1p63)),
+      std::numeric_limits<int64_t>::min());
   EXPECT_EQ(sensor("1").integer("range/min", 7, Allowed::between(-0x1p63, 0x1p63)), 7);
-  for (const char* text : {"", "1.5", "abc", "1e30", "99999999999999999999", "inf", "nan", "0x1F", "3 rays"}) {
-    EXPECT_THROW(sensor(text).integer("range/max", 0, Allowed::between(-0x1p63, 0x1p63)), InputError) << text;
+  for (const char* text :
+       {"", "1.5", "abc", "1e30", "99999999999999999999", "inf", "nan", "0x1F", "3 rays"}) {
+    EXPECT_THROW(sensor(text).integer("range/max", 0, Allowed::between(-0x1p63, 0x1p63)),
+                 InputError)
+        << text;
   }
   EXPECT_EQ(error_of([] { sensor("0").integer("range/max", 0, Allowed::between(1, 10)); }),
-            "robot.sdf:3: <sensor/range/max>: '0' is not allowed; allowed is a whole number from 1 to 10");
+            "robot.sdf:3: <sensor/range/max>: '0' is not allowed; allowed is a whole number from 1 "
+            "to 10");
 }
 
 TEST(Element, ReadsBooleans) {
-  for (const char* text : {"true", "1", "True", " TRUE "}) EXPECT_TRUE(sensor(text).boolean("range/max", false)) << text;
-  for (const char* text : {"false", "0", "False"}) EXPECT_FALSE(sensor(text).boolean("range/max", true)) << text;
-  for (const char* text : {"", "yes", "2", "on"}) EXPECT_THROW(sensor(text).boolean("range/max", true), InputError) << text;
+  for (const char* text : {"true", "1", "True", " TRUE "})
+    EXPECT_TRUE(sensor(text).boolean("range/max", false)) << text;
+  for (const char* text : {"false", "0", "False"})
+    EXPECT_FALSE(sensor(text).boolean("range/max", true)) << text;
+  for (const char* text : {"", "yes", "2", "on"})
+    EXPECT_THROW(sensor(text).boolean("range/max", true), InputError) << text;
 }
 
 TEST(Element, ReadsVectorsAndRates) {
-  EXPECT_EQ(sensor("1  2\n3").vector3("range/max", Vec3::Zero(), Allowed::any(quantity::kLength)), Vec3(1, 2, 3));
+  EXPECT_EQ(sensor("1  2\n3").vector3("range/max", Vec3::Zero(), Allowed::any(quantity::kLength)),
+            Vec3(1, 2, 3));
   for (const char* text : {"", "1 2", "1 2 3 4", "1 2 x", "1,2,3", "1 2 inf"}) {
-    EXPECT_THROW(sensor(text).vector3("range/max", Vec3::Zero(), Allowed::any(quantity::kLength)), InputError) << text;
+    EXPECT_THROW(sensor(text).vector3("range/max", Vec3::Zero(), Allowed::any(quantity::kLength)),
+                 InputError)
+        << text;
   }
   EXPECT_EQ(sensor("29.97").rate("range/max", {1, 1}), (Rate{2997, 100}));
-  EXPECT_THAT(error_of([] { sensor("-5").rate("range/max", {1, 1}); }), HasSubstr("robot.sdf:3: <sensor/range/max>: '-5' is not a rate"));
+  EXPECT_THAT(error_of([] { sensor("-5").rate("range/max", {1, 1}); }),
+              HasSubstr("robot.sdf:3: <sensor/range/max>: '-5' is not a rate"));
 }
 
 TEST(Element, ReadsPoses) {
@@ -142,7 +197,8 @@ TEST(Element, ReadsPoses) {
   Pose X = root.pose("pose");
   EXPECT_EQ(X.translation, Vec3(1, 2, 3));
   EXPECT_TRUE((X.rotation * Vec3::UnitX()).isApprox(Vec3::UnitY(), 1e-15));
-  // Roll about x, then pitch about y, then yaw about z, all fixed: (0,0,1) goes to -y, stays, goes to x.
+  // Roll about x, then pitch about y, then yaw about z, all fixed: (0,0,1) goes to -y, stays, goes
+  // to x.
   pose.text = "0 0 0 1.5707963267948966 0 1.5707963267948966";
   pose.attributes.clear();
   EXPECT_TRUE((root.pose("pose").rotation * Vec3::UnitZ()).isApprox(Vec3::UnitX(), 1e-15));
@@ -157,7 +213,11 @@ TEST(Element, ReadsPoses) {
 }
 
 TEST(Element, PosesThatAreNone) {
-  struct Case { const char* text; std::vector<std::pair<std::string, std::string>> attributes; const char* error; };
+  struct Case {
+    const char* text;
+    std::vector<std::pair<std::string, std::string>> attributes;
+    const char* error;
+  };
   const Case cases[] = {
       {"1 2 3", {}, "has 3 numbers"},
       {"1 2 3 0 0 0 0", {}, "has 7 numbers"},
@@ -191,13 +251,20 @@ TEST(Element, ChoicesAndUnknownElements) {
   EXPECT_EQ(error_of([&] { root.refuse_unknown({"ruedo:integrator"}); }),
             "robot.sdf:12: <ruedo:rat> is not known in <sensor>; known: <ruedo:integrator>");
   EXPECT_NO_THROW(root.refuse_unknown({"ruedo:rat"}));
-  EXPECT_THAT(error_of([&] { root.refuse_unknown({"ruedo:rat"}, false); }), HasSubstr("robot.sdf:2: <range> is not known"));
+  EXPECT_THAT(error_of([&] { root.refuse_unknown({"ruedo:rat"}, false); }),
+              HasSubstr("robot.sdf:2: <range> is not known"));
 }
 
 TEST(Element, LongAndStrangeValuesDoNotSpoilTheMessage) {
-  const std::string error = error_of([] { sensor(std::string(100000, 'x') + "\n\x1b[31m").number("range/max", 0, Allowed::any(quantity::kRange)); });
+  const std::string error = error_of([] {
+    sensor(std::string(100000, 'x') + "\n\x1b[31m")
+        .number("range/max", 0, Allowed::any(quantity::kRange));
+  });
   EXPECT_LT(error.size(), 200u);
-  EXPECT_THAT(error_of([] { sensor("a\x1b[31m\nb").number("range/max", 0, Allowed::any(quantity::kRange)); }), HasSubstr("'a [31m b'"));
+  EXPECT_THAT(error_of([] {
+                sensor("a\x1b[31m\nb").number("range/max", 0, Allowed::any(quantity::kRange));
+              }),
+              HasSubstr("'a [31m b'"));
 }
 
 TEST(Element, CloneIsDeep) {
@@ -213,7 +280,8 @@ TEST(Element, CloneIsDeep) {
 }
 
 TEST(NearestWord, FindsTypingMistakesOnly) {
-  const std::vector<std::string> known{"ruedo:rate", "ruedo:integrator", "ruedo:track_error", "lidar"};
+  const std::vector<std::string> known{"ruedo:rate", "ruedo:integrator", "ruedo:track_error",
+                                       "lidar"};
   EXPECT_EQ(nearest_word("ruedo:Rate", known), "ruedo:rate");
   EXPECT_EQ(nearest_word("ruedo:intergator", known), "ruedo:integrator");
   EXPECT_EQ(nearest_word("lidra", known), "lidar");

@@ -1,5 +1,5 @@
-// Philox against the known answers of its authors; the normal quantile against values computed with 60
-// digits; streams against what "independent" and "keyed" mean.
+// Philox against the known answers of its authors; the normal quantile against values computed with
+// 60 digits; streams against what "independent" and "keyed" mean.
 #include "ruedo/random.h"
 
 #include <algorithm>
@@ -16,9 +16,11 @@ using Block = std::array<uint32_t, 4>;
 
 // Random123's kat_vectors, philox4x32 with 10 rounds.
 TEST(Philox, KnownAnswers) {
-  EXPECT_EQ(philox4x32({0, 0, 0, 0}, {0, 0}), (Block{0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8}));
+  EXPECT_EQ(philox4x32({0, 0, 0, 0}, {0, 0}),
+            (Block{0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8}));
   const uint32_t f = 0xffffffff;
-  EXPECT_EQ(philox4x32({f, f, f, f}, {f, f}), (Block{0x408f276d, 0x41c83b0e, 0xa20bc7c6, 0x6d5451fd}));
+  EXPECT_EQ(philox4x32({f, f, f, f}, {f, f}),
+            (Block{0x408f276d, 0x41c83b0e, 0xa20bc7c6, 0x6d5451fd}));
   EXPECT_EQ(philox4x32({0x243f6a88, 0x85a308d3, 0x13198a2e, 0x03707344}, {0xa4093822, 0x299f31d0}),
             (Block{0xd16cfe09, 0x94fdcceb, 0x5001e420, 0x24126ea1}));
 }
@@ -32,7 +34,8 @@ TEST(RandomStream, WalksThroughTheBlocks) {
 }
 
 TEST(RandomStream, UniformTakesThe53HighestBitsOfTwoWords) {
-  // The first two words of the zero key and counter, by hand: floor(0x6627e8d5e169c58d / 2^11) / 2^53.
+  // The first two words of the zero key and counter, by hand: floor(0x6627e8d5e169c58d / 2^11) /
+  // 2^53.
   RandomStream stream(0, 0);
   EXPECT_EQ(stream.uniform(), static_cast<double>(0x6627e8d5e169c58dull >> 11) * 0x1p-53);
 }
@@ -56,7 +59,9 @@ TEST(RandomStream, UniformIsUniform) {
 
 // Values by mpmath with 60 digits; p is exact in binary.
 TEST(NormalQuantile, AgreesWithHighPrecision) {
-  struct Case { double p, x; };
+  struct Case {
+    double p, x;
+  };
   const Case cases[] = {
       {0.5, 0.0},
       {0.5 + 0x1p-40, 2.279765135091111462694e-12},
@@ -67,7 +72,7 @@ TEST(NormalQuantile, AgreesWithHighPrecision) {
       {0x1p-10, -3.097269078198784462365},
       {1 - 0x1p-10, 3.097269078198784462365},
       {0x1p-30, -6.009353565530743893181},
-      {0x1p-36, -6.651035379893010546658},     // the two sides of r = 5
+      {0x1p-36, -6.651035379893010546658},  // the two sides of r = 5
       {0x1p-37, -6.752300431407014964608},
       {0x1p-53, -8.209536151601386855631},
       {0x1p-100, -11.48454043497303780722},
@@ -77,18 +82,23 @@ TEST(NormalQuantile, AgreesWithHighPrecision) {
 }
 
 TEST(NormalQuantile, IsOddAboutOneHalf) {
-  for (double p = 0x1p-12; p < 0.5; p += 0x1p-12) EXPECT_EQ(normal_quantile(p), -normal_quantile(1.0 - p)) << p;
+  for (double p = 0x1p-12; p < 0.5; p += 0x1p-12)
+    EXPECT_EQ(normal_quantile(p), -normal_quantile(1.0 - p)) << p;
 }
 
-// Many at once are the same draws, wherever in the stream they begin and end; the stream goes on as if nothing was.
+// Many at once are the same draws, wherever in the stream they begin and end; the stream goes on as
+// if nothing was.
 TEST(RandomStream, ManyGaussiansAreTheSameOneByOne) {
   for (const int before : {0, 1, 2, 3, 4, 5}) {
     for (const size_t count : {0u, 1u, 2u, 3u, 31u, 32u, 33u, 64u, 181u, 1000u}) {
-      RandomStream singly(0x1234567890abcdefu, ~uint64_t{6}), many(0x1234567890abcdefu, ~uint64_t{6});
+      RandomStream singly(0x1234567890abcdefu, ~uint64_t{6}),
+          many(0x1234567890abcdefu, ~uint64_t{6});
       for (int i = 0; i < before; ++i) EXPECT_EQ(singly.bits(), many.bits());
       std::vector<double> draws(count);
       many.gaussians(draws);
-      for (size_t i = 0; i < count; ++i) ASSERT_EQ(singly.gaussian(), draws[i]) << before << " bits before, draw " << i << " of " << count;
+      for (size_t i = 0; i < count; ++i)
+        ASSERT_EQ(singly.gaussian(), draws[i])
+            << before << " bits before, draw " << i << " of " << count;
       EXPECT_EQ(singly.bits(), many.bits());
     }
   }
@@ -108,7 +118,7 @@ TEST(RandomStream, GaussianIsNormal) {
     sum4 += g * g * g * g;
   }
   const double root = std::sqrt(kDraws);
-  constexpr double k999 = 3.29;    // two-sided 99.9 %
+  constexpr double k999 = 3.29;  // two-sided 99.9 %
   EXPECT_LT(std::abs(sum / kDraws), k999 * 1.0 / root);
   EXPECT_LT(std::abs(sum2 / kDraws - 1.0), k999 * std::sqrt(2.0) / root);
   EXPECT_LT(std::abs(sum3 / kDraws), k999 * std::sqrt(15.0) / root);
@@ -117,9 +127,10 @@ TEST(RandomStream, GaussianIsNormal) {
   double distance = 0.0;
   for (int i = 0; i < kDraws; ++i) {
     const double cdf = 0.5 * std::erfc(-draws[static_cast<size_t>(i)] / std::sqrt(2.0));
-    distance = std::max({distance, std::abs(cdf - double(i) / kDraws), std::abs(cdf - double(i + 1) / kDraws)});
+    distance = std::max(
+        {distance, std::abs(cdf - double(i) / kDraws), std::abs(cdf - double(i + 1) / kDraws)});
   }
-  EXPECT_LT(distance * root, 1.95);    // 99.9 %
+  EXPECT_LT(distance * root, 1.95);  // 99.9 %
 }
 
 TEST(RandomSource, IsKeyedBySeedRobotDeviceAndSample) {
@@ -129,8 +140,13 @@ TEST(RandomSource, IsKeyedBySeedRobotDeviceAndSample) {
   };
   const uint64_t one = first(1, "p3at", "LRF", 0);
   EXPECT_EQ(one, first(1, "p3at", "LRF", 0));
-  std::set<uint64_t> others{one, first(2, "p3at", "LRF", 0), first(1, "p3at_2", "LRF", 0), first(1, "p3at", "LRF2", 0),
-                            first(1, "p3at", "LRF", 1), first(1, "p3atL", "RF", 0), first(1, "LRF", "p3at", 0),
+  std::set<uint64_t> others{one,
+                            first(2, "p3at", "LRF", 0),
+                            first(1, "p3at_2", "LRF", 0),
+                            first(1, "p3at", "LRF2", 0),
+                            first(1, "p3at", "LRF", 1),
+                            first(1, "p3atL", "RF", 0),
+                            first(1, "LRF", "p3at", 0),
                             first(1, "", "p3atLRF", 0)};
   EXPECT_EQ(others.size(), 8u);
   // Names and seeds that differ by one collide nowhere.
@@ -146,7 +162,8 @@ TEST(RandomSource, IsKeyedBySeedRobotDeviceAndSample) {
 // Correlation between neighbours of every kind: within 99.9 % of what independent normals give.
 TEST(RandomSource, NeighboursAreIndependent) {
   constexpr int kSamples = 20000;
-  const RandomSource a(1, "p3at_1", "IMU"), b(1, "p3at_2", "IMU"), c(1, "p3at_1", "IMU2"), d(2, "p3at_1", "IMU");
+  const RandomSource a(1, "p3at_1", "IMU"), b(1, "p3at_2", "IMU"), c(1, "p3at_1", "IMU2"),
+      d(2, "p3at_1", "IMU");
   double ab = 0, ac = 0, ad = 0, next_sample = 0, next_draw = 0;
   double last = 0;
   for (int i = 0; i < kSamples; ++i) {

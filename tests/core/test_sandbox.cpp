@@ -73,9 +73,15 @@ TEST_F(SandboxTest, ReachesTheListedFilesAndNoOthers) {
     EXPECT_EQ(within(sandbox_, [&] { return opened(read_, O_RDONLY); }), 0);
     EXPECT_EQ(within(sandbox_, [&] { return opened(read_, O_WRONLY); }), EACCES);
     EXPECT_EQ(within(sandbox_, [&] { return opened(written_, O_RDWR | O_TRUNC); }), 0);
-    EXPECT_EQ(within(sandbox_, [&] { return opened(folder_.path() + "/written/new.txt", O_WRONLY | O_CREAT); }), 0);
+    EXPECT_EQ(
+        within(sandbox_,
+               [&] { return opened(folder_.path() + "/written/new.txt", O_WRONLY | O_CREAT); }),
+        0);
     EXPECT_EQ(within(sandbox_, [&] { return opened(outside_, O_RDONLY); }), EACCES);
-    EXPECT_EQ(within(sandbox_, [&] { return opened(folder_.path() + "/outside/new.txt", O_WRONLY | O_CREAT); }), EACCES);
+    EXPECT_EQ(
+        within(sandbox_,
+               [&] { return opened(folder_.path() + "/outside/new.txt", O_WRONLY | O_CREAT); }),
+        EACCES);
     EXPECT_EQ(within(sandbox_, [&] { return opened("/etc/shadow", O_RDONLY); }), EACCES);
     EXPECT_EQ(within(sandbox_, [&] { return unlink(outside_.c_str()) == 0 ? 0 : errno; }), EACCES);
     EXPECT_EQ(within(sandbox_, [&] { return opened("/proc/1/environ", O_RDONLY); }), EACCES);
@@ -85,7 +91,8 @@ TEST_F(SandboxTest, ReachesTheListedFilesAndNoOthers) {
 // A link is followed to where it leads.
 TEST_F(SandboxTest, LinksLeadNowhere) {
   ASSERT_EQ(symlink(outside_.c_str(), (folder_.path() + "/read/link").c_str()), 0);
-  EXPECT_EQ(within(sandbox_, [&] { return opened(folder_.path() + "/read/link", O_RDONLY); }), EACCES);
+  EXPECT_EQ(within(sandbox_, [&] { return opened(folder_.path() + "/read/link", O_RDONLY); }),
+            EACCES);
 }
 
 TEST_F(SandboxTest, AloneItReachesNobody) {
@@ -93,7 +100,9 @@ TEST_F(SandboxTest, AloneItReachesNobody) {
   EXPECT_EQ(within(sandbox_, [] { return ran("/bin/true"); }), 0);
   sandbox_.alone = true;
   EXPECT_EQ(within(sandbox_, connected), EPERM);
-  EXPECT_EQ(within(sandbox_, [] { return execl("/bin/true", "true", static_cast<char*>(nullptr)), errno; }), EPERM);
+  EXPECT_EQ(within(sandbox_,
+                   [] { return execl("/bin/true", "true", static_cast<char*>(nullptr)), errno; }),
+            EPERM);
   EXPECT_EQ(within(sandbox_, [] { return kill(getppid(), 0) == 0 ? 0 : errno; }), EPERM);
 }
 

@@ -51,10 +51,12 @@ TEST(Schema, FingerprintsAreLcmGens) {
 }
 
 TEST(Schema, BotCoresFingerprints) {
-  EXPECT_EQ(static_cast<uint64_t>(find_schema("planar_lidar_t")->fingerprint), 0xe3d17423180b5e8dULL);
+  EXPECT_EQ(static_cast<uint64_t>(find_schema("planar_lidar_t")->fingerprint),
+            0xe3d17423180b5e8dULL);
   EXPECT_EQ(static_cast<uint64_t>(find_schema("pose_t")->fingerprint), 0x2e16efb052b0105eULL);
   EXPECT_EQ(static_cast<uint64_t>(find_schema("image_t")->fingerprint), 0x14739ffe13d5f5f0ULL);
-  EXPECT_EQ(static_cast<uint64_t>(find_schema("image_metadata_t")->fingerprint), 0x9a4b634d0577fb8eULL);
+  EXPECT_EQ(static_cast<uint64_t>(find_schema("image_metadata_t")->fingerprint),
+            0x9a4b634d0577fb8eULL);
 }
 
 contact_t two_contacts() {
@@ -74,11 +76,12 @@ TEST(Schema, VisitsEveryValueByName) {
   const auto bytes = encode(two_contacts());
   std::map<std::string, std::string> values;
   std::vector<std::string> order;
-  ASSERT_TRUE(visit_message(*find_schema("contact_t"), bytes, [&](const FieldPath& path, const FieldValue& value) {
-    values[path.str()] = to_string(value);
-    order.push_back(path.pattern());
-    return true;
-  }));
+  ASSERT_TRUE(visit_message(*find_schema("contact_t"), bytes,
+                            [&](const FieldPath& path, const FieldValue& value) {
+                              values[path.str()] = to_string(value);
+                              order.push_back(path.pattern());
+                              return true;
+                            }));
   EXPECT_EQ(values.size(), 3u + 2u * 9u);
   EXPECT_EQ(values["utime"], "1234567");
   EXPECT_EQ(values["pressed"], "true");
@@ -93,7 +96,8 @@ TEST(Schema, VisitsEveryValueByName) {
 TEST(Schema, AVisitorMayEndEarly) {
   const auto bytes = encode(two_contacts());
   int calls = 0;
-  EXPECT_TRUE(visit_message(*find_schema("contact_t"), bytes, [&](const FieldPath&, const FieldValue&) { return ++calls < 4; }));
+  EXPECT_TRUE(visit_message(*find_schema("contact_t"), bytes,
+                            [&](const FieldPath&, const FieldValue&) { return ++calls < 4; }));
   EXPECT_EQ(calls, 4);
 }
 
@@ -132,7 +136,8 @@ TEST(Schema, SurvivesEveryByteChange) {
     for (const uint8_t value : {0x00, 0x01, 0x7f, 0x80, 0xff}) {
       auto bytes = good;
       bytes[at] = value;
-      const bool visited = visit_message(schema, bytes, [](const FieldPath&, const FieldValue&) { return true; });
+      const bool visited =
+          visit_message(schema, bytes, [](const FieldPath&, const FieldValue&) { return true; });
       EXPECT_EQ(visited, well_formed(schema, bytes)) << at;
     }
   }

@@ -27,15 +27,38 @@ TEST(Rate, ReadsDecimalsExactly) {
 }
 
 TEST(Rate, RefusesEverythingElse) {
-  for (const char* text : {"", " ", "-1", "-0.5", "abc", "10 Hz", "1,5", "1.2.3", "nan", "inf", "1e", "1e+", "1e+-3", "e5", ".", "+",
-                           "++1", "1000000.1", "1e7", "1e99", "1e999999999999", "0.0000000001", "1e-10", "0x10",
-                           "1.0000000001", "123456789012345678901"}) {
+  for (const char* text : {"",
+                           " ",
+                           "-1",
+                           "-0.5",
+                           "abc",
+                           "10 Hz",
+                           "1,5",
+                           "1.2.3",
+                           "nan",
+                           "inf",
+                           "1e",
+                           "1e+",
+                           "1e+-3",
+                           "e5",
+                           ".",
+                           "+",
+                           "++1",
+                           "1000000.1",
+                           "1e7",
+                           "1e99",
+                           "1e999999999999",
+                           "0.0000000001",
+                           "1e-10",
+                           "0x10",
+                           "1.0000000001",
+                           "123456789012345678901"}) {
     EXPECT_THROW(Rate::parse(text), std::invalid_argument) << text;
   }
 }
 
 TEST(SampleClock, TakesASampleAtTheFirstStepNotBefore) {
-  const SampleClock clock({30, 1}, 5000);    // 33.3 ms in steps of 5 ms
+  const SampleClock clock({30, 1}, 5000);  // 33.3 ms in steps of 5 ms
   const int64_t expected[] = {0, 7, 14, 20, 27, 34, 40};
   for (int k = 0; k < 7; ++k) EXPECT_EQ(clock.step_of(k), expected[k]) << k;
   EXPECT_EQ(clock.samples_before(0), 0);
@@ -45,9 +68,9 @@ TEST(SampleClock, TakesASampleAtTheFirstStepNotBefore) {
 }
 
 TEST(SampleClock, PhaseMovesTheFirstSample) {
-  const SampleClock clock({10, 1}, 5000, 12'000);    // 12 ms: the third step, 15 ms
+  const SampleClock clock({10, 1}, 5000, 12'000);  // 12 ms: the third step, 15 ms
   EXPECT_EQ(clock.step_of(0), 3);
-  EXPECT_EQ(clock.step_of(1), 23);                   // 112 ms
+  EXPECT_EQ(clock.step_of(1), 23);  // 112 ms
   EXPECT_EQ(clock.samples_before(3), 0);
   EXPECT_EQ(clock.samples_before(4), 1);
   const SampleClock each({0, 1}, 5000, 12'000);
@@ -67,7 +90,8 @@ TEST(SampleClock, ZeroAndRatesFromTheStepRateOnMeanEveryStep) {
   EXPECT_EQ(clock.samples_before(17), 17);
 }
 
-// An hour at 29.97 Hz in steps of 5 ms: floor(3600 * 29.97) + 1 samples up to its end, each at its place.
+// An hour at 29.97 Hz in steps of 5 ms: floor(3600 * 29.97) + 1 samples up to its end, each at its
+// place.
 TEST(SampleClock, AnHourAt2997) {
   const SampleClock clock(Rate::parse("29.97"), 5000);
   const int64_t steps = 3600 * 200;
@@ -87,7 +111,7 @@ TEST(SampleClock, AnHourAt2997) {
 TEST(SampleClock, AMillionHoursDoNotOverflow) {
   const int64_t seconds = 3'600'000'000;
   const SampleClock slow({999'999'999, 1'000'000'000}, 1);
-  EXPECT_EQ(slow.samples_before(seconds * 1'000'000 + 1), 3'599'999'996 + 1);    // 3.6e9 - 3.6
+  EXPECT_EQ(slow.samples_before(seconds * 1'000'000 + 1), 3'599'999'996 + 1);  // 3.6e9 - 3.6
   const SampleClock fast({999'999, 1}, 1);
   const int64_t k = seconds * 999'999;
   EXPECT_EQ(fast.step_of(k), seconds * 1'000'000);

@@ -8,11 +8,11 @@ namespace {
 
 TEST(Utf8, WhatIsNotUtf8BecomesAQuestionMark) {
   EXPECT_EQ(printable("a\u00e9\u20ac\U0001f916z"), "a\u00e9\u20ac\U0001f916z");
-  EXPECT_EQ(printable("a\xe9z"), "a?z");                       // Latin 1
-  EXPECT_EQ(printable("\xc0\xaf"), "??");                      // longer than it needs to be
-  EXPECT_EQ(printable("\xed\xa0\x80"), "???");                 // half of a UTF-16 pair
-  EXPECT_EQ(printable("\xf4\x90\x80\x80"), "????");            // beyond U+10FFFF
-  EXPECT_EQ(printable("\xe2\x82"), "??");                      // cut off
+  EXPECT_EQ(printable("a\xe9z"), "a?z");             // Latin 1
+  EXPECT_EQ(printable("\xc0\xaf"), "??");            // longer than it needs to be
+  EXPECT_EQ(printable("\xed\xa0\x80"), "???");       // half of a UTF-16 pair
+  EXPECT_EQ(printable("\xf4\x90\x80\x80"), "????");  // beyond U+10FFFF
+  EXPECT_EQ(printable("\xe2\x82"), "??");            // cut off
   EXPECT_EQ(printable(std::string_view("a\0\x1b", 3)), std::string_view("a\0\x1b", 3));
 }
 

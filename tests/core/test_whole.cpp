@@ -1,4 +1,5 @@
-// From floating-point numbers to whole ones, at the edges of each type; and the table of quantities.
+// From floating-point numbers to whole ones, at the edges of each type; and the table of
+// quantities.
 #include "core/whole.h"
 
 #include <algorithm>
@@ -14,7 +15,7 @@ namespace {
 
 TEST(Whole, HoldsWhatTheTypeHolds) {
   EXPECT_EQ(whole(-0x1p63), std::numeric_limits<int64_t>::min());
-  EXPECT_EQ(whole(9223372036854774784.0), 9223372036854774784);    // the largest double below 2^63
+  EXPECT_EQ(whole(9223372036854774784.0), 9223372036854774784);  // the largest double below 2^63
   EXPECT_EQ(whole<uint64_t>(18446744073709549568.0), 18446744073709549568u);
   EXPECT_EQ(whole<int>(2147483647.9), 2147483647);
   EXPECT_EQ(whole<int>(-2147483648.9), std::numeric_limits<int>::min());
@@ -27,10 +28,15 @@ TEST(Whole, HoldsWhatTheTypeHolds) {
 }
 
 TEST(Whole, ThrowsForWhatItDoesNot) {
-  const double infinity = std::numeric_limits<double>::infinity(), nan = std::numeric_limits<double>::quiet_NaN();
-  for (const double value : {0x1p63, -9223372036854777856.0, 1e300, -1e300, infinity, -infinity, nan}) EXPECT_THROW(whole(value), std::out_of_range) << value;
-  for (const double value : {2147483648.0, -2147483649.0, nan}) EXPECT_THROW(whole<int>(value), std::out_of_range) << value;
-  for (const double value : {256.0, -1.0, nan}) EXPECT_THROW(whole<uint8_t>(value), std::out_of_range) << value;
+  const double infinity = std::numeric_limits<double>::infinity(),
+               nan = std::numeric_limits<double>::quiet_NaN();
+  for (const double value :
+       {0x1p63, -9223372036854777856.0, 1e300, -1e300, infinity, -infinity, nan})
+    EXPECT_THROW(whole(value), std::out_of_range) << value;
+  for (const double value : {2147483648.0, -2147483649.0, nan})
+    EXPECT_THROW(whole<int>(value), std::out_of_range) << value;
+  for (const double value : {256.0, -1.0, nan})
+    EXPECT_THROW(whole<uint8_t>(value), std::out_of_range) << value;
   EXPECT_THROW(whole<uint64_t>(0x1p64), std::out_of_range);
   EXPECT_THROW(microseconds(1e300), std::out_of_range);
 }
@@ -47,7 +53,8 @@ TEST(Quantities, AreThoseOfTheDocumentation) {
   for (std::string line; std::getline(in, line);) rows.push_back(line);
   for (const Quantity& q : quantities()) {
     std::ostringstream row;
-    row << "| " << q.name << " | " << shown(q.most) << (q.unit.empty() ? "" : " ") << q.unit << " | " << q.examples << " |";
+    row << "| " << q.name << " | " << shown(q.most) << (q.unit.empty() ? "" : " ") << q.unit
+        << " | " << q.examples << " |";
     EXPECT_NE(std::find(rows.begin(), rows.end(), row.str()), rows.end()) << row.str();
   }
 }

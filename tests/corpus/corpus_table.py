@@ -4,6 +4,7 @@
 
 The table says for each file whether it ran, how long that took, and everything that `ruedo check` named.
 """
+
 import argparse
 import collections
 import json
@@ -31,7 +32,9 @@ def files(folder):
 
 def call(*arguments, timeout=60):
     try:
-        return subprocess.run([str(each) for each in arguments], capture_output=True, text=True, timeout=timeout)
+        return subprocess.run(
+            [str(each) for each in arguments], capture_output=True, text=True, timeout=timeout
+        )
     except subprocess.TimeoutExpired:
         return None
 
@@ -43,9 +46,17 @@ def what(ruedo, path):
         return "-"
     info = json.loads(done.stdout)
     kinds = collections.Counter(device["kind"] for device in info["devices"])
-    sensors = [f"{count} {kind}" if count > 1 else kind for kind, count in sorted(kinds.items()) if kind not in ("odometry", "pose", "motion", "joints")]
+    sensors = [
+        f"{count} {kind}" if count > 1 else kind
+        for kind, count in sorted(kinds.items())
+        if kind not in ("odometry", "pose", "motion", "joints")
+    ]
     drives = [robot["drive"] for robot in info["robots"] if robot["drive"]]
-    robots = f"{len(info['robots'])} robot{'s' if len(info['robots']) > 1 else ''}" if info["robots"] else "no robot"
+    robots = (
+        f"{len(info['robots'])} robot{'s' if len(info['robots']) > 1 else ''}"
+        if info["robots"]
+        else "no robot"
+    )
     return ", ".join([robots] + ([f"{drives[0]} drive"] if drives else []) + sensors)
 
 
@@ -54,8 +65,13 @@ def findings(ruedo, path):
     done = call(ruedo, "check", path, "--json")
     if done is None:
         return ["ruedo check took more than a minute"]
-    counts = collections.Counter((each["kind"], short(each["text"], path)) for each in json.loads(done.stdout))
-    return [f"{kind}: {text}" + (f" ({count} places)" if count > 1 else "") for (kind, text), count in counts.items()]
+    counts = collections.Counter(
+        (each["kind"], short(each["text"], path)) for each in json.loads(done.stdout)
+    )
+    return [
+        f"{kind}: {text}" + (f" ({count} places)" if count > 1 else "")
+        for (kind, text), count in counts.items()
+    ]
 
 
 def short(text, path):
@@ -65,7 +81,19 @@ def short(text, path):
 
 def run(ruedo, path, seconds, timeout):
     start = time.monotonic()
-    done = call(ruedo, "run", path, "--rate", "max", "--duration", seconds, "--lcm", "memq://", "--quiet", timeout=timeout)
+    done = call(
+        ruedo,
+        "run",
+        path,
+        "--rate",
+        "max",
+        "--duration",
+        seconds,
+        "--lcm",
+        "memq://",
+        "--quiet",
+        timeout=timeout,
+    )
     took = time.monotonic() - start
     if done is None:
         return f"not within {timeout} s"
@@ -88,11 +116,21 @@ def main():
         name = path.relative_to(arguments.folder)
         took = run(arguments.ruedo, path, arguments.seconds, arguments.timeout)
         said = findings(arguments.ruedo, path)
-        lines.append(f"| {name} | {what(arguments.ruedo, path)} | {took} | {'<br>'.join(said) if said else 'nothing'} |")
+        lines.append(
+            f"| {name} | {what(arguments.ruedo, path)} | {took} | {'<br>'.join(said) if said else 'nothing'} |"
+        )
         print(lines[-1], file=sys.stderr, flush=True)
         if arguments.pictures:
             arguments.pictures.mkdir(parents=True, exist_ok=True)
-            call(arguments.ruedo, "render", path, "-o", arguments.pictures / (str(name).replace("/", "_") + ".png"), "--size", "640x480")
+            call(
+                arguments.ruedo,
+                "render",
+                path,
+                "-o",
+                arguments.pictures / (str(name).replace("/", "_") + ".png"),
+                "--size",
+                "640x480",
+            )
     text = "\n".join(lines) + "\n"
     if arguments.out:
         put(arguments.out, TITLE, text)

@@ -5,6 +5,7 @@
 Each is told to drive 0.3 m/s for 2 s and to turn 0.5 rad/s for 2 s, in lockstep and without noise. A sensor publishes when at
 least one message of it came. What `ruedo check` names is grouped by what it says.
 """
+
 import argparse
 import collections
 import json
@@ -52,12 +53,18 @@ ROBOTS = {
 }
 
 # Their wheels' joints are fixed, or there is no plugin that drives them: in Gazebo they stand still, too.
-STAND_THERE_TOO = {"Pioneer 3-DX (MobileRobots, URDF)", "Pioneer 3-DX (MobileRobots, xacro)", "PowerBot (MobileRobots)"}
+STAND_THERE_TOO = {
+    "Pioneer 3-DX (MobileRobots, URDF)",
+    "Pioneer 3-DX (MobileRobots, xacro)",
+    "PowerBot (MobileRobots)",
+}
 
 
 def check(program, path):
     """What is named, in words, each once."""
-    done = subprocess.run([program, "check", path, "--json"], capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        [program, "check", path, "--json"], capture_output=True, text=True, timeout=120
+    )
     if not done.stdout.startswith("["):
         return [done.stderr.strip().splitlines()[-1]]
     texts = collections.Counter()
@@ -98,8 +105,19 @@ def drive(path):
         go(2.0, 0.5 if steered else 0.0, 0.5)
         turned = go(2.0, 0.0, 0.0)
         turn = math.remainder(turned.heading - straight.heading, 2 * math.pi)
-        sensors = [device for device in robot.devices if device.kind not in ("odometry", "pose", "motion", "joints")]
-        alive = sum(any(channel == f"{robot.name}/{each.name}" or channel.startswith(f"{robot.name}/{each.name}/") for channel in published) for each in sensors)
+        sensors = [
+            device
+            for device in robot.devices
+            if device.kind not in ("odometry", "pose", "motion", "joints")
+        ]
+        alive = sum(
+            any(
+                channel == f"{robot.name}/{each.name}"
+                or channel.startswith(f"{robot.name}/{each.name}/")
+                for channel in published
+            )
+            for each in sensors
+        )
         return robot.drive.partition(" ")[2] or "differential", way, turn, alive, len(sensors)
 
 
@@ -122,7 +140,16 @@ def table(program, folder, names=None):
         if names is None or name in names:
             rows.append(row(program, name, folder / path))
             print(rows[-1], file=sys.stderr, flush=True)
-    return "\n".join(["| Robot | Steering | Way for 0.6 m | Turn for 1 rad | Sensors | Named |", "|---|---|---|---|---|---|", *rows]) + "\n"
+    return (
+        "\n".join(
+            [
+                "| Robot | Steering | Way for 0.6 m | Turn for 1 rad | Sensors | Named |",
+                "|---|---|---|---|---|---|",
+                *rows,
+            ]
+        )
+        + "\n"
+    )
 
 
 def main():
@@ -132,7 +159,9 @@ def main():
     parser.add_argument("-o", "--out", type=Path)
     parser.add_argument("--only", action="append", help="a robot's name")
     arguments = parser.parse_args()
-    text = HEAD + "\n" + table(arguments.ruedo.resolve(), arguments.folder.resolve(), arguments.only)
+    text = (
+        HEAD + "\n" + table(arguments.ruedo.resolve(), arguments.folder.resolve(), arguments.only)
+    )
     if arguments.out:
         put(arguments.out, TITLE, text)
     else:

@@ -1,10 +1,13 @@
 """A document of which scripts write one section each."""
+
 import re
 
 
 def section(path, title):
     """The text of "## TITLE", to the next one; "" where there is none."""
-    found = re.search(rf"(?ms)^## {re.escape(title)}\n(.*?)(?=^## |\Z)", path.read_text(encoding="utf-8"))
+    found = re.search(
+        rf"(?ms)^## {re.escape(title)}\n(.*?)(?=^## |\Z)", path.read_text(encoding="utf-8")
+    )
     return found.group(1).strip("\n") if found else ""
 
 

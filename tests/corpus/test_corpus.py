@@ -1,4 +1,5 @@
 """Public robots that nobody here wrote drive a square in a room, and their laser range finders see its walls where they are."""
+
 import math
 import os
 from pathlib import Path
@@ -9,24 +10,41 @@ import pytest
 import ruedo
 
 CORPUS = Path(os.environ["RUEDO_SOURCE_DIR"]).parent / "shared" / "corpus"
-pytestmark = pytest.mark.skipif(not CORPUS.is_dir(), reason=f"the public files are not here ({CORPUS}); they are not part of Ruedo")
+pytestmark = pytest.mark.skipif(
+    not CORPUS.is_dir(),
+    reason=f"the public files are not here ({CORPUS}); they are not part of Ruedo",
+)
 
-HALF = 2.0    # m, from the middle of the room to its walls
+HALF = 2.0  # m, from the middle of the room to its walls
 # What a robot without a range finder gets in its <include>: nothing of its own file is changed.
 LIDAR = """<sensor name="lidar" type="lidar"><pose>0 0 0.6 0 0 0</pose><update_rate>10</update_rate><lidar><scan><horizontal><samples>360</samples>
 <min_angle>-3.13</min_angle><max_angle>3.13</max_angle></horizontal></scan><range><min>0.1</min><max>10</max></range></lidar></sensor>"""
-ROBOTS = {"turtlebot3_burger": "", "turtlebot3_waffle": "", "pioneer2dx": LIDAR, "pioneer3at": LIDAR}
+ROBOTS = {
+    "turtlebot3_burger": "",
+    "turtlebot3_waffle": "",
+    "pioneer2dx": LIDAR,
+    "pioneer3at": LIDAR,
+}
 
 
 def wall(name, x, y, dx, dy):
-    return (f"<model name='{name}'><static>true</static><pose>{x} {y} 1 0 0 0</pose><link name='l'><collision name='c'><geometry><box><size>{dx} {dy} 2</size>"
-            "</box></geometry></collision></link></model>")
+    return (
+        f"<model name='{name}'><static>true</static><pose>{x} {y} 1 0 0 0</pose><link name='l'><collision name='c'><geometry><box><size>{dx} {dy} 2</size>"
+        "</box></geometry></collision></link></model>"
+    )
 
 
 def room(model, inside):
-    walls = [wall("east", HALF + 0.1, 0, 0.2, 4.4), wall("west", -HALF - 0.1, 0, 0.2, 4.4), wall("north", 0, HALF + 0.1, 4.4, 0.2), wall("south", 0, -HALF - 0.1, 4.4, 0.2)]
-    return (f"<sdf version='1.9'><world name='room'><include><uri>model://ground_plane</uri></include>{''.join(walls)}"
-            f"<include><uri>model://{model}</uri><name>robot</name><pose>-0.5 -0.5 0 0 0 0</pose>{inside}</include></world></sdf>")
+    walls = [
+        wall("east", HALF + 0.1, 0, 0.2, 4.4),
+        wall("west", -HALF - 0.1, 0, 0.2, 4.4),
+        wall("north", 0, HALF + 0.1, 4.4, 0.2),
+        wall("south", 0, -HALF - 0.1, 4.4, 0.2),
+    ]
+    return (
+        f"<sdf version='1.9'><world name='room'><include><uri>model://ground_plane</uri></include>{''.join(walls)}"
+        f"<include><uri>model://{model}</uri><name>robot</name><pose>-0.5 -0.5 0 0 0 0</pose>{inside}</include></world></sdf>"
+    )
 
 
 def to_the_walls(x, y, angles):
@@ -45,17 +63,17 @@ def test_drives_a_square_and_sees_the_walls(model, tmp_path, monkeypatch):
     # Not as fast as it goes: a client that the server leaves behind sends its commands again.
     with ruedo.launch(world, rate=20, args=["--no-noise", *disabled], timeout=60) as sim:
         robot = sim.robot("robot")
-        start = robot.pose.next()    # base_link is not the model's origin for all of them
+        start = robot.pose.next()  # base_link is not the model's origin for all of them
         for x, y in [(1, 0), (1, 1), (0, 1), (0, 0)]:
             robot.advance(1.0, speed=0.2).wait(60)
             pose = robot.pose.next()
-            while pose.velocity.any():    # the client may be behind the server
+            while pose.velocity.any():  # the client may be behind the server
                 pose = robot.pose.next()
             scan = robot.lrf.next()
             while scan.utime < pose.utime:
                 scan = robot.lrf.next()
             assert math.hypot(pose.x - start.x - x, pose.y - start.y - y) < 0.005, (model, pose)
-            mount = robot.lrf.position    # in base_link
+            mount = robot.lrf.position  # in base_link
             heading = pose.heading
             at_x = pose.x + math.cos(heading) * mount[0] - math.sin(heading) * mount[1]
             at_y = pose.y + math.sin(heading) * mount[0] + math.cos(heading) * mount[1]

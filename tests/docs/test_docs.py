@@ -4,6 +4,7 @@ A block runs in an empty folder that has the tree's worlds/ and clients/ in it, 
 own, so that nothing leaves the machine. Commands run under bash -eu; a Python program finds a server with worlds/arena.sdf,
 and goes to pytest when it is a test. Links to files are followed, too.
 """
+
 import os
 import re
 import shutil
@@ -48,14 +49,28 @@ def run_block(language, content, folder):
     if language == "python":
         (folder / "block.py").write_text(content, encoding="utf-8")
         content = "python -m pytest -q block.py" if "def test_" in content else SERVED
-    environment = {**os.environ, "PATH": f"{BINARIES}:{ROOT / '.venv/bin'}:{os.environ['PATH']}",
-                   "PYTHONPATH": str(BINARIES.parent / "python")}
-    return subprocess.run([*isolated(), "bash", "-euo", "pipefail", "-c", content], cwd=folder, env=environment, text=True,
-                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=TIMEOUT_S)
+    environment = {
+        **os.environ,
+        "PATH": f"{BINARIES}:{ROOT / '.venv/bin'}:{os.environ['PATH']}",
+        "PYTHONPATH": str(BINARIES.parent / "python"),
+    }
+    return subprocess.run(
+        [*isolated(), "bash", "-euo", "pipefail", "-c", content],
+        cwd=folder,
+        env=environment,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        timeout=TIMEOUT_S,
+    )
 
 
-CASES = [pytest.param(language, content, id=f"{document.name}:{line}") for document in DOCUMENTS if document.exists()
-         for line, language, content in blocks(document.read_text(encoding="utf-8"))]
+CASES = [
+    pytest.param(language, content, id=f"{document.name}:{line}")
+    for document in DOCUMENTS
+    if document.exists()
+    for line, language, content in blocks(document.read_text(encoding="utf-8"))
+]
 
 
 @pytest.mark.parametrize("language, content", CASES)
@@ -69,7 +84,9 @@ def test_examples_of_the_documentation(language, content, tmp_path):
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda d: d.name)
 def test_links_lead_somewhere(document):
-    prose = re.sub(r"^```.*?^```", "", document.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    prose = re.sub(
+        r"^```.*?^```", "", document.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL
+    )
     for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", prose):
         if "://" not in target:
             assert (document.parent / target).exists(), f"{document.name}: {target}"

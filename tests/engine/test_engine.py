@@ -1,4 +1,5 @@
 """ruedo.Engine: arrays, commands, resets and errors. That its bytes are the server's is tests/run/engine_test.cpp's."""
+
 import math
 
 import numpy as np
@@ -24,9 +25,11 @@ WALL = "<static>true</static><link name='l'><collision name='c'><geometry><box><
 def world(robots=1):
     wheels = WHEEL.format(side="left", y=0.2) + WHEEL.format(side="right", y=-0.2)
     models = "".join(ROBOT.format(name=f"r{i}", y=2 * i, wheels=wheels) for i in range(robots))
-    return ("<sdf version='1.9' xmlns:ruedo='ruedo'><world name='w'><physics type='bullet'><max_step_size>0.005</max_step_size></physics>"
-            "<model name='ground'><static>true</static><link name='l'><collision name='c'><geometry><plane><normal>0 0 1</normal></plane>"
-            f"</geometry></collision></link></model><model name='wall'><pose>2.1 0 1 0 0 0</pose>{WALL}</model>{models}</world></sdf>")
+    return (
+        "<sdf version='1.9' xmlns:ruedo='ruedo'><world name='w'><physics type='bullet'><max_step_size>0.005</max_step_size></physics>"
+        "<model name='ground'><static>true</static><link name='l'><collision name='c'><geometry><plane><normal>0 0 1</normal></plane>"
+        f"</geometry></collision></link></model><model name='wall'><pose>2.1 0 1 0 0 0</pose>{WALL}</model>{models}</world></sdf>"
+    )
 
 
 def engine(robots=1, **options):
@@ -43,17 +46,19 @@ def test_arrays_show_the_runs_without_a_copy():
         angles = np.linspace(-0.4, 0.4, 5)
         np.testing.assert_allclose(ranges[2, 1], 2.0 / np.cos(angles), rtol=1e-6)
         commands = np.zeros((3, 2, 2))
-        commands[1, 0] = 0.4, 0.0       # m/s, rad/s
+        commands[1, 0] = 0.4, 0.0  # m/s, rad/s
         commands[2, 1] = 0.0, math.pi / 2
-        e.step(commands, 200)           # a second
+        e.step(commands, 200)  # a second
         np.testing.assert_allclose(position[1, 0], [0.4, 0.0, 0.0], atol=1e-12)
         np.testing.assert_allclose(position[0], [[0.0, 0.0, 0.0], [0.0, 2.0, 0.0]], atol=1e-12)
         np.testing.assert_allclose(ranges[1, 0], 1.6 / np.cos(angles), rtol=1e-6)
-        assert ranges[2, 1, 0] == pytest.approx(2.0 / math.sin(0.4), rel=1e-6)      # a quarter turn to the left: along the wall
+        assert ranges[2, 1, 0] == pytest.approx(
+            2.0 / math.sin(0.4), rel=1e-6
+        )  # a quarter turn to the left: along the wall
         assert np.isinf(ranges[2, 1, 1:]).all()
         with pytest.raises(ValueError, match="read-only"):
             ranges[0] = 0
-    assert math.isinf(ranges[2, 1, 4])          # what was observed stays readable
+    assert math.isinf(ranges[2, 1, 4])  # what was observed stays readable
 
 
 def test_commands_are_broadcast_and_nan_is_none():
@@ -61,7 +66,7 @@ def test_commands_are_broadcast_and_nan_is_none():
         x = e["pose.pos"][..., 0]
         e.step([0.2, 0.0], 100)
         np.testing.assert_allclose(x, 0.1, atol=1e-12)
-        e.step([[math.nan, math.nan], [0.0, 0.0]], 100)     # r0 goes on, r1 stops
+        e.step([[math.nan, math.nan], [0.0, 0.0]], 100)  # r0 goes on, r1 stops
         np.testing.assert_allclose(x, [[0.2, 0.1]] * 2, atol=1e-12)
         e.step(np.zeros((2, 2, 3)), 100)
         np.testing.assert_allclose(x, [[0.2, 0.1]] * 2, atol=1e-12)
@@ -84,7 +89,7 @@ def test_reset_begins_anew():
         e.reset(np.array([False, True, False, True]))
         assert [e.steps(i) for i in range(4)] == [50, 0, 50, 0]
         assert (ranges[[1, 3]] == beginning[[1, 3]]).all()
-        e.reset(2, seed=1)              # another copy's seed
+        e.reset(2, seed=1)  # another copy's seed
         assert (ranges[2] == beginning[0]).all()
         e.reset()
         assert (ranges[0] == beginning[0]).all() and (ranges[2] == beginning[0]).all()
@@ -93,27 +98,35 @@ def test_reset_begins_anew():
 def test_a_copy_may_get_another_world():
     with engine(worlds=2, noise=False) as e:
         x, ranges, touching = e["pose.pos"][..., 0], e["scan.ranges"], e.touching()
-        e.reset(1, text=world().replace("<pose>2.1 0 1", "<pose>1.1 0 1"))      # the wall is a metre nearer
+        e.reset(
+            1, text=world().replace("<pose>2.1 0 1", "<pose>1.1 0 1")
+        )  # the wall is a metre nearer
         assert ranges[0, 0, 2] == pytest.approx(2.0) and ranges[1, 0, 2] == pytest.approx(1.0)
         e.step([0.5, 0.0], 20)
         assert touching.tolist() == [[0], [0]]
-        e.step([0.5, 0.0], 280)         # 1.5 s; the robot's front is 0.25 m ahead of its centre
+        e.step([0.5, 0.0], 280)  # 1.5 s; the robot's front is 0.25 m ahead of its centre
         assert x[0, 0] == pytest.approx(0.75, abs=1e-9) and x[1, 0] == pytest.approx(0.75, abs=2e-3)
         e.step([0.5, 0.0], 100)
         assert x[0, 0] == pytest.approx(1.0, abs=1e-9) and x[1, 0] == pytest.approx(0.75, abs=2e-3)
-        assert touching[0, 0] == 0 and touching[1, 0] >= 99      # the first of them may still be on its way
-        e.reset(1)                      # keeps its world
+        assert (
+            touching[0, 0] == 0 and touching[1, 0] >= 99
+        )  # the first of them may still be on its way
+        e.reset(1)  # keeps its world
         assert ranges[1, 0, 2] == pytest.approx(1.0) and touching[1, 0] == 0
         with pytest.raises(ValueError, match="its robots and devices are not those of"):
             e.reset(0, text=world(robots=2))
-        assert ranges[0, 0, 2] == pytest.approx(1.0, abs=1e-6)      # as it was
+        assert ranges[0, 0, 2] == pytest.approx(1.0, abs=1e-6)  # as it was
 
 
 def test_messages_are_those_of_the_channels():
     with engine(worlds=2, record=True) as e:
         e.step(None, 40)
-        told = [lcmtypes.planar_lidar_t.decode(data) for world, step, channel, data in e.messages() if world == 1 and channel == "r0/scan"]
-        assert [scan.utime for scan in told] == [100_000, 200_000]      # 10 Hz
+        told = [
+            lcmtypes.planar_lidar_t.decode(data)
+            for world, step, channel, data in e.messages()
+            if world == 1 and channel == "r0/scan"
+        ]
+        assert [scan.utime for scan in told] == [100_000, 200_000]  # 10 Hz
         assert (np.float32(told[-1].ranges) == e["scan.ranges"][1, 0]).all()
         move = lcmtypes.move_command_t()
         move.id, move.kind, move.value, move.speed = 1, lcmtypes.move_command_t.ADVANCE, 0.1, 0.2
@@ -122,33 +135,63 @@ def test_messages_are_those_of_the_channels():
         np.testing.assert_allclose(e["pose.pos"][:, 0, 0], [0.1, 0.0], atol=1e-9)
 
 
-@pytest.mark.parametrize("call, error, text", [
-    (lambda e: e.step(None, 2.5), TypeError, "n is a whole number of steps, not 2.5; a step is 0.005 s"),
-    (lambda e: e.step(None, 0), ValueError, "1 step or more, not 0"),
-    (lambda e: e.step(3), ValueError, "their shape is ()"),
-    (lambda e: e.step(np.zeros((7, 2))), ValueError, "do not fit (worlds, robots, 2) = (2, 1, 2)"),
-    (lambda e: e.observe("ranges"), ValueError, "no DEVICE.FIELD"),
-    (lambda e: e.observe("lrf.rangs"), ValueError, "'rangs' is no field of numbers in planar_lidar_t; there are utime, nranges, ranges"),
-    (lambda e: e.observe("camera.data"), ValueError, "no robot has a device 'camera'; there are r0/motion"),
-    (lambda e: e.reset(2), IndexError, "world 2 of 2"),
-    (lambda e: e.reset([0, 1], seed=[1]), ValueError, "1 seeds for 2 worlds"),
-    (lambda e: e.command(0, "r0/scan", b""), ValueError, "no robot takes commands on 'r0/scan'"),
-    (lambda e: (e.close(), e.step()), RuntimeError, "closed"),
-])
+@pytest.mark.parametrize(
+    "call, error, text",
+    [
+        (
+            lambda e: e.step(None, 2.5),
+            TypeError,
+            "n is a whole number of steps, not 2.5; a step is 0.005 s",
+        ),
+        (lambda e: e.step(None, 0), ValueError, "1 step or more, not 0"),
+        (lambda e: e.step(3), ValueError, "their shape is ()"),
+        (
+            lambda e: e.step(np.zeros((7, 2))),
+            ValueError,
+            "do not fit (worlds, robots, 2) = (2, 1, 2)",
+        ),
+        (lambda e: e.observe("ranges"), ValueError, "no DEVICE.FIELD"),
+        (
+            lambda e: e.observe("lrf.rangs"),
+            ValueError,
+            "'rangs' is no field of numbers in planar_lidar_t; there are utime, nranges, ranges",
+        ),
+        (
+            lambda e: e.observe("camera.data"),
+            ValueError,
+            "no robot has a device 'camera'; there are r0/motion",
+        ),
+        (lambda e: e.reset(2), IndexError, "world 2 of 2"),
+        (lambda e: e.reset([0, 1], seed=[1]), ValueError, "1 seeds for 2 worlds"),
+        (
+            lambda e: e.command(0, "r0/scan", b""),
+            ValueError,
+            "no robot takes commands on 'r0/scan'",
+        ),
+        (lambda e: (e.close(), e.step()), RuntimeError, "closed"),
+    ],
+)
 def test_errors_say_what_is_wrong(call, error, text):
     with engine(worlds=2) as e, pytest.raises(error) as caught:
         call(e)
     assert text in str(caught.value)
 
 
-@pytest.mark.parametrize("options, error, text", [
-    ({"world": "no_such"}, ValueError, "no world of that name; there are arena, crossing, field, fleet, maze, office"),
-    ({"world": "no/such.sdf"}, ValueError, "no/such.sdf: no such file"),
-    ({"world": "arena", "worlds": 0}, ValueError, "1 world or more, not 0"),
-    ({"world": "arena", "disable": "p3at/camera"}, TypeError, "disable is a list of texts"),
-    ({"world": "arena", "spawn": ["p3at"]}, ValueError, "MODEL[:NAME]@X,Y[,YAW]"),
-    ({"world": "arena", "set": {"p3at/LRF.update_rate": "fast"}}, ValueError, "update_rate"),
-])
+@pytest.mark.parametrize(
+    "options, error, text",
+    [
+        (
+            {"world": "no_such"},
+            ValueError,
+            "no world of that name; there are arena, crossing, field, fleet, maze, office",
+        ),
+        ({"world": "no/such.sdf"}, ValueError, "no/such.sdf: no such file"),
+        ({"world": "arena", "worlds": 0}, ValueError, "1 world or more, not 0"),
+        ({"world": "arena", "disable": "p3at/camera"}, TypeError, "disable is a list of texts"),
+        ({"world": "arena", "spawn": ["p3at"]}, ValueError, "MODEL[:NAME]@X,Y[,YAW]"),
+        ({"world": "arena", "set": {"p3at/LRF.update_rate": "fast"}}, ValueError, "update_rate"),
+    ],
+)
 def test_bad_worlds_are_refused(options, error, text):
     with pytest.raises(error) as caught:
         ruedo.Engine(**options)
@@ -160,7 +203,12 @@ def test_worlds_are_found_by_name_from_anywhere(tmp_path, monkeypatch):
     (tmp_path / "mine.sdf").write_text(world())
     monkeypatch.setenv("RUEDO_PATH", str(tmp_path))
     assert ruedo.Engine("mine").robots == ("r0",)
-    e = ruedo.Engine("arena", spawn=["p3at:guest@1,1"], set={"p3at/lrf.update_rate": 10}, disable=["p3at/camera", "guest/camera"])
+    e = ruedo.Engine(
+        "arena",
+        spawn=["p3at:guest@1,1"],
+        set={"p3at/lrf.update_rate": 10},
+        disable=["p3at/camera", "guest/camera"],
+    )
     assert e.robots == ("p3at", "guest") and "2 " not in repr(e)
     assert e["lrf.ranges"].shape == (1, 2, 181)
 

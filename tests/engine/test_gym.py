@@ -1,4 +1,5 @@
 """ruedo.gym against Gymnasium's own checks, and against what a room's geometry says."""
+
 import math
 
 import gymnasium
@@ -15,7 +16,11 @@ def test_gymnasium_finds_nothing_wrong(recwarn):
     env = gymnasium.make("ruedo/Navigate-v0", beams=9)
     check_env(env.unwrapped, skip_render_check=True)
     env.close()
-    assert [str(w.message) for w in recwarn if "ruedo" in str(w.filename) or "env" in str(w.message).lower()] == []
+    assert [
+        str(w.message)
+        for w in recwarn
+        if "ruedo" in str(w.filename) or "env" in str(w.message).lower()
+    ] == []
 
 
 def test_an_episode_repeats_from_its_seed():
@@ -41,11 +46,17 @@ def test_the_goal_is_where_the_room_says():
     observation, _ = env.reset(seed=11)
     (x, y, heading), goal = env.room.start, env.room.goal
     distance, bearing = math.dist((x, y), goal), math.atan2(goal[1] - y, goal[0] - x) - heading
-    np.testing.assert_allclose(observation[5:], [min(distance / 8, 1), math.cos(bearing), math.sin(bearing), 0, 0], atol=1e-4)
+    np.testing.assert_allclose(
+        observation[5:],
+        [min(distance / 8, 1), math.cos(bearing), math.sin(bearing), 0, 0],
+        atol=1e-4,
+    )
     nearer = 0.0
-    for _ in range(40):     # turns towards the goal, and drives there
+    for _ in range(40):  # turns towards the goal, and drives there
         bearing = math.atan2(observation[7], observation[6])
-        observation, reward, terminated, truncated, info = env.step(np.array([-1.0 if abs(bearing) > 0.3 else 1.0, np.clip(2 * bearing, -1, 1)]))
+        observation, reward, terminated, truncated, info = env.step(
+            np.array([-1.0 if abs(bearing) > 0.3 else 1.0, np.clip(2 * bearing, -1, 1)])
+        )
         nearer += reward + 0.01
         if terminated:
             break
@@ -69,12 +80,23 @@ def test_modes_of_autoreset(mode):
     assert info["collision"][which] or info["success"][which]
     assert abs(rewards[which]) > 4.9
     if mode is AutoresetMode.SAME_STEP:
-        assert info["_final_obs"][which] and info["final_obs"][which].shape == observations[which].shape
-        assert observations[which][-2] == 0.0 and info["final_obs"][which][-2] != observations[which][-2]
+        assert (
+            info["_final_obs"][which]
+            and info["final_obs"][which].shape == observations[which].shape
+        )
+        assert (
+            observations[which][-2] == 0.0
+            and info["final_obs"][which][-2] != observations[which][-2]
+        )
     elif mode is AutoresetMode.NEXT_STEP:
         room = envs.rooms[which].number
         observations, rewards, terminated, truncated, _ = envs.step(ahead)
-        assert envs.rooms[which].number != room and rewards[which] == 0.0 and not terminated[which] and not truncated[which]
+        assert (
+            envs.rooms[which].number != room
+            and rewards[which] == 0.0
+            and not terminated[which]
+            and not truncated[which]
+        )
         assert observations[which][-2] == 0.0
     else:
         room = envs.rooms[which].number
@@ -98,8 +120,14 @@ def test_rooms_are_the_same_everywhere_and_their_start_is_free():
     envs.close()
 
 
-@pytest.mark.parametrize("options, text", [({"beams": 1}, "beams is 1; allowed are 2 to 1024"), ({"split": "all"}, "allowed are 'train' and 'test'"),
-                                           ({"render_mode": "human"}, "draw nothing yet")])
+@pytest.mark.parametrize(
+    "options, text",
+    [
+        ({"beams": 1}, "beams is 1; allowed are 2 to 1024"),
+        ({"split": "all"}, "allowed are 'train' and 'test'"),
+        ({"render_mode": "human"}, "draw nothing yet"),
+    ],
+)
 def test_wrong_options_are_refused(options, text):
     with pytest.raises(ValueError, match=text):
         ruedo.gym.NavigateVectorEnv(2, **options)

@@ -15,7 +15,9 @@ HIGH, LOW = "acceleration 4.2, deceleration 0.27", "acceleration 0.27, decelerat
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("experiments")
-    done = subprocess.run([RUEDO, "experiments", "--out", folder], capture_output=True, text=True, timeout=800)
+    done = subprocess.run(
+        [RUEDO, "experiments", "--out", folder], capture_output=True, text=True, timeout=800
+    )
     return folder, done
 
 
@@ -26,7 +28,11 @@ def numbers(run):
 
 
 def value(numbers, experiment, *words):
-    found = [n["value"] for n in numbers if n["experiment"] == experiment and all(w in n["quantity"] for w in words)]
+    found = [
+        n["value"]
+        for n in numbers
+        if n["experiment"] == experiment and all(w in n["quantity"] for w in words)
+    ]
     assert len(found) == 1, (experiment, words, found)
     return found[0]
 
@@ -36,7 +42,7 @@ def test_all_targets_are_met(run):
     assert "MISSED" not in done.stdout, done.stdout
     assert done.returncode == 0, done.stdout + done.stderr
     for experiment in ("E1", "E2", "E3", "E4", "E5"):
-        assert experiment + ":" in done.stderr    # progress was shown
+        assert experiment + ":" in done.stderr  # progress was shown
 
 
 def test_e1_the_papers_loop_gives_the_papers_numbers(numbers):
@@ -47,7 +53,7 @@ def test_e1_the_papers_loop_gives_the_papers_numbers(numbers):
 
 def test_e1_ruedos_primitive_is_exact(numbers):
     for case in (HIGH, LOW):
-        assert value(numbers, "E1", case, "kinematic drive: worst error") < 1e-3    # mm
+        assert value(numbers, "E1", case, "kinematic drive: worst error") < 1e-3  # mm
         assert value(numbers, "E1", case, "wheels drive") == pytest.approx(1000, abs=2)
 
 
@@ -56,7 +62,9 @@ def test_e2_odometry(numbers):
         assert value(numbers, "E2", "drive, arc: mean", "kinematic", component) < 1e-3
         assert 0 < value(numbers, "E2", "34 000 ticks", component) < 0.5
         # Slip is there, and a calibrated track takes most of it away.
-        assert value(numbers, "E2", "wheels drive, arc, track", component) < 0.5 * value(numbers, "E2", "wheels drive, arc: mean", component)
+        assert value(numbers, "E2", "wheels drive, arc, track", component) < 0.5 * value(
+            numbers, "E2", "wheels drive, arc: mean", component
+        )
     assert value(numbers, "E2", "drive, arc: mean", "kinematic", "in heading") < 1e-9
 
 
@@ -66,7 +74,11 @@ def test_e2_in_the_papers_setting_is_reported_without_a_target(numbers):
     assert all(n["target"] == "" and n["paper"] for n in rows)
     # Odometry that is up to 0.1 s old differs more than that of the same step.
     for component in ("in x", "in y", "in heading"):
-        assert value(numbers, "E2", "packet", component) > value(numbers, "E2", "odometry of each step", component) > 0
+        assert (
+            value(numbers, "E2", "packet", component)
+            > value(numbers, "E2", "odometry of each step", component)
+            > 0
+        )
 
 
 def test_e3_to_e5(numbers):
@@ -92,6 +104,11 @@ def test_the_page_names_pictures_that_are_there(run):
 
 def test_a_folder_that_cannot_be_written_is_told(tmp_path):
     (tmp_path / "file").write_text("")
-    done = subprocess.run([RUEDO, "experiments", "--out", tmp_path / "file"], capture_output=True, text=True, timeout=60)
+    done = subprocess.run(
+        [RUEDO, "experiments", "--out", tmp_path / "file"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
     assert done.returncode == 4
     assert "--out" in done.stderr

@@ -1,5 +1,6 @@
-// What one input may cost: CPU time is measured, since a slow input is a finding, too, and wall time would depend on what
-// else the machine does. Memory is libFuzzer's to measure (-malloc_limit_mb, -rss_limit_mb).
+// What one input may cost: CPU time is measured, since a slow input is a finding, too, and wall
+// time would depend on what else the machine does. Memory is libFuzzer's to measure
+// (-malloc_limit_mb, -rss_limit_mb).
 #pragma once
 
 #include <cstdio>
@@ -13,11 +14,12 @@ class Budget {
     const double took_s = now_s() - begin_s_;
     if (took_s <= kMost_s) return;
     std::fprintf(stderr, "slow input: %.1f s of CPU time, allowed are %.1f\n", took_s, kMost_s);
-    std::abort();    // libFuzzer keeps the input
+    std::abort();  // libFuzzer keeps the input
   }
 
  private:
-  static constexpr double kMost_s = 10.0;    // with the sanitizers, which cost a factor of two to five
+  static constexpr double kMost_s =
+      10.0;  // with the sanitizers, which cost a factor of two to five
   static double now_s() {
     timespec time{};
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);

@@ -1,4 +1,5 @@
-// Logs. The first byte says what the others are: 0: a file; else: the body of its header, ruedo/header, whose files are looked for.
+// Logs. The first byte says what the others are: 0: a file; else: the body of its header,
+// ruedo/header, whose files are looked for.
 #include <cstring>
 #include <string>
 #include <vector>
@@ -39,13 +40,15 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static const ScratchFolder folder;
   if (size < 1) return 0;
   const Budget budget;
-  const std::vector<uint8_t> bytes = data[0] == 0 ? std::vector<uint8_t>(data + 1, data + size) : as_header(data + 1, size - 1);
+  const std::vector<uint8_t> bytes =
+      data[0] == 0 ? std::vector<uint8_t>(data + 1, data + size) : as_header(data + 1, size - 1);
   const std::string path = folder.write("run.log", bytes.data(), bytes.size());
   try {
     const ruedo::log::Index index(path);
     if (index.header()) ruedo::log::check_files(*index.header(), path);
     ruedo::log::Reader reader(path);
-    for (ruedo::log::Event event; reader.next(event);) {}
+    for (ruedo::log::Event event; reader.next(event);) {
+    }
   } catch (const ruedo::InputError&) {
   }
   return 0;

@@ -15,7 +15,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }();
   if (size < 1) return 0;
   const Budget budget;
-  const std::string path = folder.write(data[0] % 4 == 2 ? "map.yaml" : "map.map", data + 1, size - 1);
+  const std::string path =
+      folder.write(data[0] % 4 == 2 ? "map.yaml" : "map.map", data + 1, size - 1);
   try {
     std::string left_out;
     switch (data[0] % 4) {
@@ -24,7 +25,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       case 2: walls_of(read_map(path)); break;
       default: world_of_walls("w", read_armap(path, 0.1, left_out), 1);
     }
-  } catch (const std::runtime_error&) {    // InputError is one
+  } catch (const std::runtime_error&) {  // InputError is one
   }
   return 0;
 }

@@ -1,5 +1,6 @@
-// Meshes: the first byte says what the others are. 0 to 7: a file of one of the known kinds, through the importer in its
-// child process; else: an entry of the cache, as it is unpacked in the server.
+// Meshes: the first byte says what the others are. 0 to 7: a file of one of the known kinds,
+// through the importer in its child process; else: an entry of the cache, as it is unpacked in the
+// server.
 #include <stdexcept>
 
 #include "model/mesh_format.h"
@@ -12,7 +13,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (size < 1) return 0;
   try {
     if (data[0] < 8) {
-      const std::string path = folder.write(std::string("mesh.") + kKinds[data[0]], data + 1, size - 1);
+      const std::string path =
+          folder.write(std::string("mesh.") + kKinds[data[0]], data + 1, size - 1);
       const ruedo::model::ResourceFinder finder(path, false);
       ruedo::model::MeshImport import;
       import.importer = RUEDO_IMPORTER;

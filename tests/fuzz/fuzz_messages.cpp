@@ -1,5 +1,5 @@
-// Messages from the network: what is decoded encodes to the same bytes again, and no bytes do harm. The fingerprint is
-// put in, so that every input reaches the decoders.
+// Messages from the network: what is decoded encodes to the same bytes again, and no bytes do harm.
+// The fingerprint is put in, so that every input reaches the decoders.
 #include <cstdlib>
 #include <cstring>
 #include <vector>
@@ -31,7 +31,8 @@ void try_as(std::vector<uint8_t> bytes) {
   const uint64_t fingerprint = static_cast<uint64_t>(Message::getHash());
   for (size_t i = 0; i < 8; ++i) bytes[i] = static_cast<uint8_t>(fingerprint >> (56 - 8 * i));
   Message message;
-  if (ruedo::decode_checked(bytes.data(), bytes.size(), message) != ruedo::DecodeFault::none) return;
+  if (ruedo::decode_checked(bytes.data(), bytes.size(), message) != ruedo::DecodeFault::none)
+    return;
   std::vector<uint8_t> again(static_cast<size_t>(message.getEncodedSize()));
   if (again.size() != bytes.size()) std::abort();
   message.encode(again.data(), 0, static_cast<int>(again.size()));
@@ -51,8 +52,9 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (size < 9) return 0;
   const Budget budget;
   using namespace ruedo;
-  try_one<velocity_command_t, wheel_command_t, move_command_t, joint_command_t, request_t, join_t, name_request_t, rate_request_t, reset_request_t,
-          set_pose_request_t, set_twist_request_t, spawn_request_t, step_request_t, grant_request_t, resend_request_t, log_header_t, world_info_t>(
-      data[0], {data + 1, data + size});
+  try_one<velocity_command_t, wheel_command_t, move_command_t, joint_command_t, request_t, join_t,
+          name_request_t, rate_request_t, reset_request_t, set_pose_request_t, set_twist_request_t,
+          spawn_request_t, step_request_t, grant_request_t, resend_request_t, log_header_t,
+          world_info_t>(data[0], {data + 1, data + size});
   return 0;
 }

@@ -1,4 +1,5 @@
-// Any text as a robot: the same, with <robot> around what does not begin so, that the mutations stay in the URDF reader.
+// Any text as a robot: the same, with <robot> around what does not begin so, that the mutations
+// stay in the URDF reader.
 #include <string>
 
 #include "budget.h"
@@ -8,7 +9,8 @@
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const Budget budget;
   std::string text(reinterpret_cast<const char*>(data), size);
-  if (text.find("<robot") == std::string::npos) text = "<robot name='r'><link name='base'/>" + text + "</robot>";
+  if (text.find("<robot") == std::string::npos)
+    text = "<robot name='r'><link name='base'/>" + text + "</robot>";
   try {
     const auto world = ruedo::model::load_world_text(text, "/nowhere/in/a/robot.urdf");
     const ruedo::model::BodyLayout layout(*world);

@@ -8,7 +8,8 @@
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const Budget budget;
   try {
-    const auto world = ruedo::model::load_world_text({reinterpret_cast<const char*>(data), size}, "/nowhere/in/a/world.sdf");
+    const auto world = ruedo::model::load_world_text({reinterpret_cast<const char*>(data), size},
+                                                     "/nowhere/in/a/world.sdf");
     const ruedo::model::BodyLayout layout(*world);
   } catch (const ruedo::InputError&) {
   }

@@ -1,4 +1,5 @@
-// Any text as the YAML of a map, beside a small picture: it is read and made into walls, or gives one InputError.
+// Any text as the YAML of a map, beside a small picture: it is read and made into walls, or gives
+// one InputError.
 #include <stdexcept>
 
 #include "budget.h"
@@ -16,7 +17,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const std::string path = folder.write("map.yaml", data, size);
   try {
     world_of_walls("w", walls_of(read_map(path)), 1);
-  } catch (const std::runtime_error&) {    // InputError is one
+  } catch (const std::runtime_error&) {  // InputError is one
   }
   return 0;
 }

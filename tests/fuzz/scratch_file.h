@@ -19,7 +19,8 @@ class ScratchFolder {
     std::filesystem::remove_all(path_, error);
   }
   std::string write(const std::string& name, const uint8_t* data, size_t size) const {
-    std::ofstream(path_ + "/" + name, std::ios::binary).write(reinterpret_cast<const char*>(data), static_cast<std::streamsize>(size));
+    std::ofstream(path_ + "/" + name, std::ios::binary)
+        .write(reinterpret_cast<const char*>(data), static_cast<std::streamsize>(size));
     return path_ + "/" + name;
   }
   const std::string& path() const { return path_; }

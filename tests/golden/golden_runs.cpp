@@ -1,6 +1,7 @@
-// golden_runs [--threads N] [NAME...]: runs each world of this folder's list for some seconds with fixed commands, and prints its name and the
-// SHA-256 of every message that it made: step, channel, bytes. The same on every processor and with any number of threads; what
-// it should print is kept in hashes.txt.
+// golden_runs [--threads N] [NAME...]: runs each world of this folder's list for some seconds with
+// fixed commands, and prints its name and the SHA-256 of every message that it made: step, channel,
+// bytes. The same on every processor and with any number of threads; what it should print is kept
+// in hashes.txt.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -21,17 +22,25 @@ namespace {
 
 struct Run {
   const char* name;
-  const char* world;    // by name, or of this folder
+  const char* world;  // by name, or of this folder
   double seconds;
   std::vector<std::string> spawns = {}, disabled = {};
-  const char* arm = "";    // the robot whose joints are commanded
+  const char* arm = "";  // the robot whose joints are commanded
 };
 
 const Run kRuns[] = {
-    {.name = "arena", .world = "arena", .seconds = 2.0, .spawns = {"p3dx:guest@3.8,3.8,-2.4"}, .disabled = {"p3at/camera"}},
+    {.name = "arena",
+     .world = "arena",
+     .seconds = 2.0,
+     .spawns = {"p3dx:guest@3.8,3.8,-2.4"},
+     .disabled = {"p3at/camera"}},
     {.name = "fleet", .world = "fleet", .seconds = 2.0, .disabled = {"alice/camera", "bob/camera"}},
-    {.name = "bases", .world = "arena", .seconds = 2.0,
-     .spawns = {"car@-3,0", "mecanum@-4,3", "omni@0,-3", "tricycle@3.8,-3.8,2", "crawler@-4,-4,1", "puck@0,4"}, .disabled = {"p3at/camera"}},
+    {.name = "bases",
+     .world = "arena",
+     .seconds = 2.0,
+     .spawns = {"car@-3,0", "mecanum@-4,3", "omni@0,-3", "tricycle@3.8,-3.8,2", "crawler@-4,-4,1",
+                "puck@0,4"},
+     .disabled = {"p3at/camera"}},
     {.name = "wheels", .world = "wheels.sdf", .seconds = 2.0},
     {.name = "arms", .world = "arms.sdf", .seconds = 2.0, .arm = "lift"},
     {.name = "meshes", .world = "office", .seconds = 0.4},
@@ -63,7 +72,8 @@ void drive(engine::Engine& engine, int turn) {
   std::vector<double> commands;
   for (size_t i = 0; i < engine.driven().size(); ++i) {
     const double phase = 0.7 * turn + 1.3 * static_cast<double>(i);
-    commands.insert(commands.end(), {turn % 7 == 6 ? -0.2 : 0.4 + 0.3 * math::sin(phase), 0.1 * math::cos(phase), 0.9 * math::sin(2.0 * phase)});
+    commands.insert(commands.end(), {turn % 7 == 6 ? -0.2 : 0.4 + 0.3 * math::sin(phase),
+                                     0.1 * math::cos(phase), 0.9 * math::sin(2.0 * phase)});
   }
   engine.drive(commands);
 }
@@ -73,7 +83,8 @@ void move_arm(engine::Engine& engine, const std::string& robot, int turn) {
   command.utime = 0;
   command.name = {"pan", "tilt", "fork"};
   command.mode = {joint_command_t::POSITION, joint_command_t::VELOCITY, joint_command_t::POSITION};
-  command.value = {math::sin(0.5 * turn), turn % 4 < 2 ? 0.4 : -0.4, 0.2 + 0.2 * math::cos(0.3 * turn)};
+  command.value = {math::sin(0.5 * turn), turn % 4 < 2 ? 0.4 : -0.4,
+                   0.2 + 0.2 * math::cos(0.3 * turn)};
   command.n = 3;
   std::vector<uint8_t> bytes(static_cast<size_t>(command.getEncodedSize()));
   command.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
@@ -84,18 +95,20 @@ std::string run(const Run& run, int threads) {
   model::LoadOptions load;
   for (const std::string& spawn : run.spawns) load.spawns.push_back(model::parse_spawn(spawn));
   load.disabled = run.disabled;
-  const std::string name = run.world, world = name.ends_with(".sdf") ? RUEDO_GOLDEN_DIR "/" + name : name;
+  const std::string name = run.world,
+                    world = name.ends_with(".sdf") ? RUEDO_GOLDEN_DIR "/" + name : name;
   engine::EngineOptions options;
   options.threads = threads;
   options.fleet.seed = 7;
   options.fleet.disabled = run.disabled;
   engine::Engine engine(model::load_world(world, load), options);
   Hash hash;
-  engine.on_message([&](int, int64_t step, const engine::Channel& channel, std::span<const uint8_t> bytes) {
-    const std::string head = fmt::format("{} {} {}\n", step, channel.bus_name, bytes.size());
-    hash.add(head.data(), head.size());
-    hash.add(bytes.data(), bytes.size());
-  });
+  engine.on_message(
+      [&](int, int64_t step, const engine::Channel& channel, std::span<const uint8_t> bytes) {
+        const std::string head = fmt::format("{} {} {}\n", step, channel.bus_name, bytes.size());
+        hash.add(head.data(), head.size());
+        hash.add(bytes.data(), bytes.size());
+      });
   constexpr int kTurn_us = 100'000;
   const int turns = std::max(1, static_cast<int>(run.seconds * 1e6 / kTurn_us));
   for (int turn = 0; turn < turns; ++turn) {
@@ -117,11 +130,14 @@ int main(int argc, char** argv) {
   std::vector<std::string> wanted;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
-    if (word == "--threads" && i + 1 < argc) threads = std::atoi(argv[++i]);
-    else wanted.push_back(word);
+    if (word == "--threads" && i + 1 < argc)
+      threads = std::atoi(argv[++i]);
+    else
+      wanted.push_back(word);
   }
   for (const ruedo::Run& run : ruedo::kRuns) {
-    if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), run.name) == wanted.end()) continue;
+    if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), run.name) == wanted.end())
+      continue;
     std::printf("%s %s\n", run.name, ruedo::run(run, threads).c_str());
     std::fflush(stdout);
   }

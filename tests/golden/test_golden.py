@@ -1,5 +1,6 @@
 """The runs of golden_runs.cpp make the bytes that are kept in hashes.txt: on this processor, or on the emulated one that
 RUEDO_PROCESSOR names (of `qemu-x86_64 -cpu help`), with one thread and with two."""
+
 import os
 import subprocess
 from pathlib import Path
@@ -7,7 +8,9 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).resolve().parent
-EXPECTED = dict(line.split() for line in (HERE / "hashes.txt").read_text(encoding="ascii").splitlines())
+EXPECTED = dict(
+    line.split() for line in (HERE / "hashes.txt").read_text(encoding="ascii").splitlines()
+)
 PROCESSOR = os.environ["RUEDO_PROCESSOR"]
 
 
@@ -16,6 +19,10 @@ PROCESSOR = os.environ["RUEDO_PROCESSOR"]
 def test_same_bytes(name, threads):
     emulator = [] if PROCESSOR == "native" else ["qemu-x86_64", "-cpu", PROCESSOR]
     program = Path(os.environ["RUEDO_BINARY_DIR"]) / "tests/golden/golden_runs"
-    result = subprocess.run([*emulator, program, "--threads", str(threads), name], capture_output=True, text=True)
+    result = subprocess.run(
+        [*emulator, program, "--threads", str(threads), name], capture_output=True, text=True
+    )
     assert result.returncode == 0, result.stderr
-    assert result.stdout.split() == [name, EXPECTED[name]], f"{name} on {PROCESSOR}; if results changed on purpose: target renew-golden-hashes"
+    assert result.stdout.split() == [name, EXPECTED[name]], (
+        f"{name} on {PROCESSOR}; if results changed on purpose: target renew-golden-hashes"
+    )

@@ -1,4 +1,5 @@
-// <ruedo:drive steering="">: what each kind needs, and what follows from its joints; plugins of Gazebo that mean the same.
+// <ruedo:drive steering="">: what each kind needs, and what follows from its joints; plugins of
+// Gazebo that mean the same.
 #include <cmath>
 
 #include <gmock/gmock.h>
@@ -15,24 +16,38 @@ using testing::ElementsAre;
 using Steering = DriveDescription::Steering;
 
 std::string link(const std::string& name, const std::string& pose) {
-  return "<link name='" + name + "'><pose>" + pose + "</pose><collision name='c'><pose>0 0 0 1.5707963267948966 0 0</pose><geometry><cylinder><radius>0.1</radius><length>0.04</length>"
+  return "<link name='" + name + "'><pose>" + pose +
+         "</pose><collision name='c'><pose>0 0 0 1.5707963267948966 0 "
+         "0</pose><geometry><cylinder><radius>0.1</radius><length>0.04</length>"
          "</cylinder></geometry></collision></link>";
 }
-std::string joint(const std::string& name, const std::string& parent, const std::string& child, const std::string& axis = "0 1 0", const std::string& limit = "") {
-  return "<joint name='" + name + "' type='revolute'><parent>" + parent + "</parent><child>" + child + "</child><axis><xyz>" + axis + "</xyz>" + limit + "</axis></joint>";
+std::string joint(const std::string& name, const std::string& parent, const std::string& child,
+                  const std::string& axis = "0 1 0", const std::string& limit = "") {
+  return "<joint name='" + name + "' type='revolute'><parent>" + parent + "</parent><child>" +
+         child + "</child><axis><xyz>" + axis + "</xyz>" + limit + "</axis></joint>";
 }
-std::string wheel(const std::string& name, const std::string& pose, const std::string& on = "base", const std::string& axis = "0 1 0") {
+std::string wheel(const std::string& name, const std::string& pose, const std::string& on = "base",
+                  const std::string& axis = "0 1 0") {
   return link(name, pose) + joint("j_" + name, on, name, axis);
 }
 
 // Wheels at x = 0 and x = 0.5 m, 0.4 m apart; those ahead hang on knuckles.
 std::string car(const std::string& drive) {
   const std::string limit = "<limit><lower>-0.6</lower><upper>0.5</upper></limit>";
-  return "<model name='m'><link name='base'/>" + wheel("rl", "0 0.2 0.1 0 0 0") + wheel("rr", "0 -0.2 0.1 0 0 0") + "<link name='kl'><pose>0.5 0.2 0.1 0 0 0</pose></link><link name='kr'><pose>0.5 -0.2 0.1 0 0 0</pose></link>" +
-         joint("sl", "base", "kl", "0 0 1", limit) + joint("sr", "base", "kr", "0 0 -1", limit) + wheel("fl", "0.5 0.2 0.1 0 0 0", "kl") + wheel("fr", "0.5 -0.2 0.1 0 0 0", "kr") + drive + "</model>";
+  return "<model name='m'><link name='base'/>" + wheel("rl", "0 0.2 0.1 0 0 0") +
+         wheel("rr", "0 -0.2 0.1 0 0 0") +
+         "<link name='kl'><pose>0.5 0.2 0.1 0 0 0</pose></link><link name='kr'><pose>0.5 -0.2 0.1 "
+         "0 0 0</pose></link>" +
+         joint("sl", "base", "kl", "0 0 1", limit) + joint("sr", "base", "kr", "0 0 -1", limit) +
+         wheel("fl", "0.5 0.2 0.1 0 0 0", "kl") + wheel("fr", "0.5 -0.2 0.1 0 0 0", "kr") + drive +
+         "</model>";
 }
-const char* const kCar = "<ruedo:drive steering='ackermann'><ruedo:left_joint>j_fl</ruedo:left_joint><ruedo:left_joint>j_rl</ruedo:left_joint><ruedo:right_joint>j_fr</ruedo:right_joint>"
-                         "<ruedo:right_joint>j_rr</ruedo:right_joint><ruedo:steer_joint>sl</ruedo:steer_joint><ruedo:steer_joint>sr</ruedo:steer_joint></ruedo:drive>";
+const char* const kCar =
+    "<ruedo:drive "
+    "steering='ackermann'><ruedo:left_joint>j_fl</ruedo:left_joint><ruedo:left_joint>j_rl</"
+    "ruedo:left_joint><ruedo:right_joint>j_fr</ruedo:right_joint>"
+    "<ruedo:right_joint>j_rr</ruedo:right_joint><ruedo:steer_joint>sl</"
+    "ruedo:steer_joint><ruedo:steer_joint>sr</ruedo:steer_joint></ruedo:drive>";
 
 TEST(DriveKinds, ACarTurnsAboutItsRearAxle) {
   const auto world = world_of(car(kCar));
@@ -40,15 +55,16 @@ TEST(DriveKinds, ACarTurnsAboutItsRearAxle) {
   EXPECT_EQ(drive.steering, Steering::ackermann);
   EXPECT_NEAR(drive.wheelbase, 0.5, 1e-12);
   EXPECT_NEAR(drive.track, 0.4, 1e-12);
-  EXPECT_NEAR(drive.max_steering_angle, 0.5, 1e-12);    // of the tighter limit
+  EXPECT_NEAR(drive.max_steering_angle, 0.5, 1e-12);  // of the tighter limit
   EXPECT_LT(drive.X_MBase.translation.norm(), 1e-12);
   const BodyLayout layout(*world);
   ASSERT_EQ(layout.wheels.size(), 6u);
   EXPECT_EQ(layout.bodies.size(), 1u);
   EXPECT_TRUE(layout.wheels[4].steers);
-  EXPECT_EQ(layout.wheels[0].on, 4);    // the front left one hangs on the left knuckle
+  EXPECT_EQ(layout.wheels[0].on, 4);  // the front left one hangs on the left knuckle
   EXPECT_EQ(layout.wheels[1].on, -1);
-  // Turned by a quarter and then rolled: the wheel's axle points ahead, whatever it has rolled; both knuckles turn the same way.
+  // Turned by a quarter and then rolled: the wheel's axle points ahead, whatever it has rolled;
+  // both knuckles turn the same way.
   std::vector<double> angles(6, 0.0);
   angles[4] = angles[5] = M_PI / 2;
   angles[0] = angles[2] = 1.0;
@@ -61,14 +77,20 @@ TEST(DriveKinds, ACarTurnsAboutItsRearAxle) {
 }
 
 TEST(DriveKinds, MecanumRims) {
-  std::string text = "<model name='m'><link name='base'/>" + wheel("fl", "0.2 0.15 0.1 0 0 0") + wheel("fr", "0.2 -0.15 0.1 0 0 0") + wheel("rl", "-0.2 0.15 0.1 0 0 0") + wheel("rr", "-0.2 -0.15 0.1 0 0 0");
-  for (const char* each : {"left_joint>j_fl", "left_joint>j_rl", "right_joint>j_fr", "right_joint>j_rr"}) {
+  std::string text = "<model name='m'><link name='base'/>" + wheel("fl", "0.2 0.15 0.1 0 0 0") +
+                     wheel("fr", "0.2 -0.15 0.1 0 0 0") + wheel("rl", "-0.2 0.15 0.1 0 0 0") +
+                     wheel("rr", "-0.2 -0.15 0.1 0 0 0");
+  for (const char* each :
+       {"left_joint>j_fl", "left_joint>j_rl", "right_joint>j_fr", "right_joint>j_rr"}) {
     const std::string tag = std::string(each).substr(0, std::string(each).find('>'));
-    text += (text.find("<ruedo:drive") == std::string::npos ? "<ruedo:drive steering='mecanum'>" : "") + std::string("<ruedo:") + each + "</ruedo:" + tag + ">";
+    text +=
+        (text.find("<ruedo:drive") == std::string::npos ? "<ruedo:drive steering='mecanum'>" : "") +
+        std::string("<ruedo:") + each + "</ruedo:" + tag + ">";
   }
   const auto world = world_of(text + "</ruedo:drive></model>");
   const BodyLayout layout(*world);
-  // (1, -1, -(lx + ly)) and so on: Muir and Neuman 1987, of rollers whose axes meet in the middle; lx + ly = 0.35 m.
+  // (1, -1, -(lx + ly)) and so on: Muir and Neuman 1987, of rollers whose axes meet in the middle;
+  // lx + ly = 0.35 m.
   const Vec3 wanted[] = {{1, -1, -0.35}, {1, 1, -0.35}, {1, 1, 0.35}, {1, -1, 0.35}};
   for (size_t i = 0; i < 4; ++i) EXPECT_LT((layout.wheels[i].rim - wanted[i]).norm(), 1e-12) << i;
 }
@@ -79,14 +101,19 @@ TEST(DriveKinds, OmniRimsAreAlongTheirWheels) {
   for (const double degrees : {0.0, 120.0, 240.0}) {
     const double a = degrees * M_PI / 180;
     const std::string name = "w" + std::to_string(static_cast<int>(degrees));
-    text += wheel(name, std::to_string(0.2 * std::cos(a)) + " " + std::to_string(0.2 * std::sin(a)) + " 0.1 0 0 " + std::to_string(a - M_PI / 2), "base");
+    text += wheel(name,
+                  std::to_string(0.2 * std::cos(a)) + " " + std::to_string(0.2 * std::sin(a)) +
+                      " 0.1 0 0 " + std::to_string(a - M_PI / 2),
+                  "base");
     joints += "<ruedo:wheel_joint>j_" + name + "</ruedo:wheel_joint>";
   }
-  const auto world = world_of(text + "<ruedo:drive steering='omni'>" + joints + "</ruedo:drive></model>");
+  const auto world =
+      world_of(text + "<ruedo:drive steering='omni'>" + joints + "</ruedo:drive></model>");
   const BodyLayout layout(*world);
   ASSERT_EQ(layout.wheels.size(), 3u);
   for (const WheelPlacement& wheel : layout.wheels) {
-    // Turning to the left alone, every wheel rolls backwards about the axle that points outwards: -0.2 m for 1 rad.
+    // Turning to the left alone, every wheel rolls backwards about the axle that points outwards:
+    // -0.2 m for 1 rad.
     EXPECT_NEAR(wheel.rim.z(), -0.2, 1e-5);
     EXPECT_NEAR(wheel.rim.head<2>().norm(), 1.0, 1e-6);
   }
@@ -99,13 +126,26 @@ struct BadDrive {
 
 TEST(DriveKinds, WhatIsMissingIsNamed) {
   const BadDrive table[] = {
-      {"<ruedo:drive steering='crab'/>", "<ruedo:drive>: steering 'crab' is not allowed; allowed are differential, tracked, ackermann, tricycle, mecanum, omni, holonomic"},
-      {"<ruedo:drive steering='mecanum'><ruedo:left_joint>j_rl</ruedo:left_joint><ruedo:right_joint>j_rr</ruedo:right_joint></ruedo:drive>", "<ruedo:drive>: a mecanum drive has two left and two right wheels"},
-      {"<ruedo:drive steering='omni'><ruedo:wheel_joint>j_rl</ruedo:wheel_joint></ruedo:drive>", "<ruedo:drive>: an omni drive has three wheels or more"},
-      {"<ruedo:drive steering='ackermann'><ruedo:left_joint>j_rl</ruedo:left_joint></ruedo:drive>", "<ruedo:drive>: has no <ruedo:steer_joint>"},
-      {"<ruedo:drive steering='tracked'/>", "<ruedo:drive>: has no <ruedo:track>, and no wheels to take it from"},
-      {"<ruedo:drive type='wheels' steering='holonomic'/>", "<ruedo:drive>: type 'wheels' is not allowed with steering 'holonomic'; allowed is kinematic"},
-      {"<ruedo:drive steering='ackermann'><ruedo:left_joint>j_rl</ruedo:left_joint><ruedo:steer_joint>j_rl</ruedo:steer_joint></ruedo:drive>", "<ruedo:drive>: the joint 'j_rl' is named twice"},
+      {"<ruedo:drive steering='crab'/>",
+       "<ruedo:drive>: steering 'crab' is not allowed; allowed are differential, tracked, "
+       "ackermann, tricycle, mecanum, omni, holonomic"},
+      {"<ruedo:drive "
+       "steering='mecanum'><ruedo:left_joint>j_rl</ruedo:left_joint><ruedo:right_joint>j_rr</"
+       "ruedo:right_joint></ruedo:drive>",
+       "<ruedo:drive>: a mecanum drive has two left and two right wheels"},
+      {"<ruedo:drive steering='omni'><ruedo:wheel_joint>j_rl</ruedo:wheel_joint></ruedo:drive>",
+       "<ruedo:drive>: an omni drive has three wheels or more"},
+      {"<ruedo:drive steering='ackermann'><ruedo:left_joint>j_rl</ruedo:left_joint></ruedo:drive>",
+       "<ruedo:drive>: has no <ruedo:steer_joint>"},
+      {"<ruedo:drive steering='tracked'/>",
+       "<ruedo:drive>: has no <ruedo:track>, and no wheels to take it from"},
+      {"<ruedo:drive type='wheels' steering='holonomic'/>",
+       "<ruedo:drive>: type 'wheels' is not allowed with steering 'holonomic'; allowed is "
+       "kinematic"},
+      {"<ruedo:drive "
+       "steering='ackermann'><ruedo:left_joint>j_rl</ruedo:left_joint><ruedo:steer_joint>j_rl</"
+       "ruedo:steer_joint></ruedo:drive>",
+       "<ruedo:drive>: the joint 'j_rl' is named twice"},
   };
   for (const BadDrive& each : table) {
     try {
@@ -120,17 +160,32 @@ TEST(DriveKinds, WhatIsMissingIsNamed) {
 TEST(DrivePlugins, OfEveryKindAreTranslated) {
   const auto steering = [](const std::string& plugin) {
     const auto world = world_of(car(plugin));
-    return world->models[0].model->drive ? std::optional(world->models[0].model->drive->steering) : std::nullopt;
+    return world->models[0].model->drive ? std::optional(world->models[0].model->drive->steering)
+                                         : std::nullopt;
   };
-  EXPECT_EQ(steering("<plugin name='gz::sim::systems::AckermannSteering' filename='gz-sim-ackermann-steering-system'><left_joint>j_fl</left_joint><left_joint>j_rl</left_joint>"
-                     "<right_joint>j_fr</right_joint><right_joint>j_rr</right_joint><left_steering_joint>sl</left_steering_joint><right_steering_joint>sr</right_steering_joint>"
-                     "<wheel_base>0.5</wheel_base><steering_limit>0.4</steering_limit></plugin>"),
-            Steering::ackermann);
-  EXPECT_EQ(steering("<plugin name='move' filename='libgazebo_ros_planar_move.so'/>"), Steering::holonomic);
-  EXPECT_EQ(steering("<plugin name='ignition::gazebo::systems::VelocityControl' filename='whatever'/>"), Steering::holonomic);
-  EXPECT_EQ(steering("<plugin name='gz::sim::systems::TrackedVehicle' filename='gz-sim-tracked-vehicle-system'><tracks_separation>0.4</tracks_separation></plugin>"), Steering::tracked);
-  EXPECT_EQ(steering("<plugin name='gz::sim::systems::MecanumDrive' filename='gz-sim-mecanum-drive-system'><front_left_joint>j_fl</front_left_joint><front_right_joint>j_fr</front_right_joint>"
-                     "<back_left_joint>j_rl</back_left_joint><back_right_joint>j_rr</back_right_joint></plugin>"),
+  EXPECT_EQ(
+      steering(
+          "<plugin name='gz::sim::systems::AckermannSteering' "
+          "filename='gz-sim-ackermann-steering-system'><left_joint>j_fl</"
+          "left_joint><left_joint>j_rl</left_joint>"
+          "<right_joint>j_fr</right_joint><right_joint>j_rr</right_joint><left_steering_joint>sl</"
+          "left_steering_joint><right_steering_joint>sr</right_steering_joint>"
+          "<wheel_base>0.5</wheel_base><steering_limit>0.4</steering_limit></plugin>"),
+      Steering::ackermann);
+  EXPECT_EQ(steering("<plugin name='move' filename='libgazebo_ros_planar_move.so'/>"),
+            Steering::holonomic);
+  EXPECT_EQ(
+      steering("<plugin name='ignition::gazebo::systems::VelocityControl' filename='whatever'/>"),
+      Steering::holonomic);
+  EXPECT_EQ(steering("<plugin name='gz::sim::systems::TrackedVehicle' "
+                     "filename='gz-sim-tracked-vehicle-system'><tracks_separation>0.4</"
+                     "tracks_separation></plugin>"),
+            Steering::tracked);
+  EXPECT_EQ(steering("<plugin name='gz::sim::systems::MecanumDrive' "
+                     "filename='gz-sim-mecanum-drive-system'><front_left_joint>j_fl</"
+                     "front_left_joint><front_right_joint>j_fr</front_right_joint>"
+                     "<back_left_joint>j_rl</back_left_joint><back_right_joint>j_rr</"
+                     "back_right_joint></plugin>"),
             Steering::mecanum);
 }
 
@@ -148,27 +203,39 @@ TEST(DrivePlugins, AreKnownByTheirLibraryOrTheirClass) {
   EXPECT_EQ(kind("x", "ignition-gazebo6-diff-drive-system").name, "DiffDrive");
   EXPECT_EQ(kind("gz::sim::systems::Physics", "gz-sim-physics-system").does, Does::served);
   EXPECT_EQ(kind("gz::sim::systems::WindEffects", "gz-sim-wind-effects-system").does, Does::dead);
-  EXPECT_EQ(kind("gz_ros2_control::GazeboSimROS2ControlPlugin", "gz_ros2_control-system").does, Does::control);
+  EXPECT_EQ(kind("gz_ros2_control::GazeboSimROS2ControlPlugin", "gz_ros2_control-system").does,
+            Does::control);
   EXPECT_EQ(kind("x", "gz-sim-imu-system").does, Does::served);
 }
 
 TEST(DrivePlugins, OfWhichNothingComesAreNamedWithWhatTheyWouldDo) {
-  const auto world = world_of("<model name='m'><link name='l'/><plugin name='a' filename='libhector_gazebo_ros_gps.so'/><plugin name='b' filename='libRayPlugin.so'/>"
-                              "<plugin name='c' filename='libgazebo_ros_p3d.so'/><plugin name='d' filename='libmine.so'/></model>");
-  EXPECT_THAT(texts(*world), ElementsAre("the plugin hector_gazebo_ros_gps does nothing here: it would make satellite navigation without a <sensor>", "plugins are not loaded: libmine.so"));
+  const auto world = world_of(
+      "<model name='m'><link name='l'/><plugin name='a' "
+      "filename='libhector_gazebo_ros_gps.so'/><plugin name='b' filename='libRayPlugin.so'/>"
+      "<plugin name='c' filename='libgazebo_ros_p3d.so'/><plugin name='d' "
+      "filename='libmine.so'/></model>");
+  EXPECT_THAT(texts(*world), ElementsAre("the plugin hector_gazebo_ros_gps does nothing here: it "
+                                         "would make satellite navigation without a <sensor>",
+                                         "plugins are not loaded: libmine.so"));
 }
 
 // hector's IMU has no <sensor>: it becomes one, on its body, with its rate and its noise.
 TEST(SensorPlugins, AnImuWithoutASensor) {
-  const auto world = world_of("<model name='m'><link name='a'/><link name='b'><pose>0 0 1 0 0 0</pose></link><plugin name='imu_controller' filename='libhector_gazebo_ros_imu.so'>"
-                              "<updateRate>50</updateRate><bodyName>b</bodyName><rateGaussianNoise>0.01 0.02 0.03</rateGaussianNoise></plugin></model>");
+  const auto world = world_of(
+      "<model name='m'><link name='a'/><link name='b'><pose>0 0 1 0 0 0</pose></link><plugin "
+      "name='imu_controller' filename='libhector_gazebo_ros_imu.so'>"
+      "<updateRate>50</updateRate><bodyName>b</bodyName><rateGaussianNoise>0.01 0.02 "
+      "0.03</rateGaussianNoise></plugin></model>");
   EXPECT_THAT(texts(*world), testing::IsEmpty());
   const Model& model = *world->models[0].model;
   ASSERT_EQ(model.sensors.size(), 1u);
   EXPECT_EQ(model.sensors[0].name, "imu_controller");
   EXPECT_EQ(model.links[static_cast<size_t>(model.sensors[0].link)].name, "b");
-  EXPECT_EQ(model.sensors[0].element->number("update_rate", 0, Allowed::any(quantity::kRange)), 50.0);
-  EXPECT_EQ(model.sensors[0].element->number("imu/angular_velocity/y/noise/stddev", 0, Allowed::any(quantity::kRange)), 0.02);
+  EXPECT_EQ(model.sensors[0].element->number("update_rate", 0, Allowed::any(quantity::kRange)),
+            50.0);
+  EXPECT_EQ(model.sensors[0].element->number("imu/angular_velocity/y/noise/stddev", 0,
+                                             Allowed::any(quantity::kRange)),
+            0.02);
 }
 
 }  // namespace

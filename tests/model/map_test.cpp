@@ -1,4 +1,5 @@
-// Occupancy maps: a world cut by hand, the round trip through map_server's files, ArMap, and wrong files.
+// Occupancy maps: a world cut by hand, the round trip through map_server's files, ArMap, and wrong
+// files.
 #include <fstream>
 #include <sstream>
 
@@ -11,49 +12,67 @@
 namespace ruedo::model {
 namespace {
 
-std::string world_of(const std::string& models) { return "<sdf version='1.9'><world name='w'>" + models + "</world></sdf>"; }
+std::string world_of(const std::string& models) {
+  return "<sdf version='1.9'><world name='w'>" + models + "</world></sdf>";
+}
 
-std::string shape(const std::string& name, const std::string& pose, const std::string& geometry, const std::string& beside = "<static>true</static>") {
-  return "<model name='" + name + "'>" + beside + "<pose>" + pose + "</pose><link name='l'><collision name='c'><geometry>" + geometry +
+std::string shape(const std::string& name, const std::string& pose, const std::string& geometry,
+                  const std::string& beside = "<static>true</static>") {
+  return "<model name='" + name + "'>" + beside + "<pose>" + pose +
+         "</pose><link name='l'><collision name='c'><geometry>" + geometry +
          "</geometry></collision></link></model>";
 }
 
-std::shared_ptr<const WorldModel> load(const std::string& models) { return load_world_text(world_of(models), "/nowhere/w.sdf"); }
+std::shared_ptr<const WorldModel> load(const std::string& models) {
+  return load_world_text(world_of(models), "/nowhere/w.sdf");
+}
 
 // As text, the far row first, as one looks at a map.
 std::string drawn(const OccupancyGrid& grid) {
   std::string text;
   for (int row = grid.height - 1; row >= 0; --row) {
-    for (int column = 0; column < grid.width; ++column) text += grid.at(column, row) == Cell::occupied ? '#' : grid.at(column, row) == Cell::free ? '.' : '?';
+    for (int column = 0; column < grid.width; ++column)
+      text += grid.at(column, row) == Cell::occupied ? '#'
+              : grid.at(column, row) == Cell::free   ? '.'
+                                                     : '?';
     text += '\n';
   }
   return text;
 }
 
 TEST(Map, WorldCutByHand) {
-  const auto world = load(shape("ground", "0 0 0 0 0 0", "<plane/>") +
-                          shape("wall", "1 0.25 0.5 0 0 0", "<box><size>2 0.5 1</size></box>") +             // x 0 to 2, y 0 to 0.5
-                          shape("crate", "1.75 0.75 0.2 0 0 0", "<box><size>0.5 0.5 0.4</size></box>", "") +   // moves, but is no robot
-                          shape("low", "0.25 1.25 0.05 0 0 0", "<box><size>0.5 0.5 0.1</size></box>") +
-                          shape("roof", "1 1 3 0 0 0", "<box><size>20 20 0.1</size></box>"));
+  const auto world =
+      load(shape("ground", "0 0 0 0 0 0", "<plane/>") +
+           shape("wall", "1 0.25 0.5 0 0 0",
+                 "<box><size>2 0.5 1</size></box>") +  // x 0 to 2, y 0 to 0.5
+           shape("crate", "1.75 0.75 0.2 0 0 0", "<box><size>0.5 0.5 0.4</size></box>",
+                 "") +  // moves, but is no robot
+           shape("low", "0.25 1.25 0.05 0 0 0", "<box><size>0.5 0.5 0.1</size></box>") +
+           shape("roof", "1 1 3 0 0 0", "<box><size>20 20 0.1</size></box>"));
   const OccupancyGrid grid = occupancy_of(*world, 0.5, 0.3);
-  EXPECT_EQ(grid.x, -1);    // a metre around what is cut
+  EXPECT_EQ(grid.x, -1);  // a metre around what is cut
   EXPECT_EQ(grid.y, -1);
   EXPECT_EQ(drawn(grid), "........\n........\n.....#..\n..####..\n........\n........\n");
-  const OccupancyGrid above = occupancy_of(*world, 0.5, 0.7);    // over the crate
+  const OccupancyGrid above = occupancy_of(*world, 0.5, 0.7);  // over the crate
   EXPECT_EQ(drawn(above), "........\n........\n..####..\n........\n........\n");
 }
 
 TEST(Map, RobotsAndWalkersAreNoWalls) {
-  const auto world = load(shape("robot", "0 0 0.5 0 0 0", "<box><size>1 1 1</size></box>", "<link name='s'><sensor name='imu' type='imu'/></link>") +
-                          shape("walker", "5 0 0.5 0 0 0", "<box><size>1 1 1</size></box>", "<ruedo:path><ruedo:waypoint>0 0 0 0 0 0 0</ruedo:waypoint></ruedo:path>"));
+  const auto world =
+      load(shape("robot", "0 0 0.5 0 0 0", "<box><size>1 1 1</size></box>",
+                 "<link name='s'><sensor name='imu' type='imu'/></link>") +
+           shape("walker", "5 0 0.5 0 0 0", "<box><size>1 1 1</size></box>",
+                 "<ruedo:path><ruedo:waypoint>0 0 0 0 0 0 0</ruedo:waypoint></ruedo:path>"));
   const OccupancyGrid grid = occupancy_of(*world, 0.5, 0.5);
   EXPECT_EQ(std::count(grid.cells.begin(), grid.cells.end(), Cell::occupied), 0);
 }
 
 TEST(Map, MeshesGiveTheirOutline) {
-  const auto world = load(shape("hall", "0 0 0 0 0 0", "<polyline><point>0.1 0.1</point><point>1.9 0.1</point><point>1.9 1.9</point><point>0.1 1.9</point><height>1</height></polyline>"));
-  EXPECT_EQ(drawn(occupancy_of(*world, 0.5, 0.5)), "........\n........\n..####..\n..#..#..\n..#..#..\n..####..\n........\n........\n");
+  const auto world = load(shape("hall", "0 0 0 0 0 0",
+                                "<polyline><point>0.1 0.1</point><point>1.9 0.1</point><point>1.9 "
+                                "1.9</point><point>0.1 1.9</point><height>1</height></polyline>"));
+  EXPECT_EQ(drawn(occupancy_of(*world, 0.5, 0.5)),
+            "........\n........\n..####..\n..#..#..\n..#..#..\n..####..\n........\n........\n");
 }
 
 TEST(Map, TooManyCellsAreRefused) {
@@ -68,36 +87,49 @@ TEST(Map, RoundTrip) {
     std::ifstream in(path, std::ios::binary);
     return std::string(std::istreambuf_iterator<char>(in), {});
   };
-  write_map(occupancy_of(*load_world(std::string(RUEDO_SOURCE_DIR) + "/worlds/arena.sdf"), 0.05, 0.2), folder / "one.yaml");
+  write_map(
+      occupancy_of(*load_world(std::string(RUEDO_SOURCE_DIR) + "/worlds/arena.sdf"), 0.05, 0.2),
+      folder / "one.yaml");
   const OccupancyGrid read = read_map(folder / "one.yaml");
   const std::vector<WallPiece> walls = walls_of(read);
   EXPECT_GT(walls.size(), 4u);
-  EXPECT_LT(walls.size(), static_cast<size_t>(std::count(read.cells.begin(), read.cells.end(), Cell::occupied)) / 4);
+  EXPECT_LT(
+      walls.size(),
+      static_cast<size_t>(std::count(read.cells.begin(), read.cells.end(), Cell::occupied)) / 4);
   const auto world = load_world(folder.write("walls.sdf", world_of_walls("walls", walls, 1)));
   EXPECT_TRUE(world->findings.empty());
   write_map(occupancy_of(*world, 0.05, 0.5), folder / "two.yaml");
   EXPECT_EQ(bytes(folder / "two.pgm"), bytes(folder / "one.pgm"));
-  EXPECT_NE(bytes(folder / "one.yaml").find("\nresolution: 0.05\norigin: ["), std::string::npos) << bytes(folder / "one.yaml");
+  EXPECT_NE(bytes(folder / "one.yaml").find("\nresolution: 0.05\norigin: ["), std::string::npos)
+      << bytes(folder / "one.yaml");
 }
 
-// A map of 3 x 2 pixels, turned by a quarter: the wall along the picture's left side lies along x = 10.
+// A map of 3 x 2 pixels, turned by a quarter: the wall along the picture's left side lies along x
+// = 10.
 TEST(Map, MapServerFile) {
   TemporaryFolder folder;
   folder.write("m.pgm", std::string("P5\n3 2\n255\n") + std::string("\x00\xfe\xcd\x00\xfe\xfe", 6));
-  const std::string path = folder.write("m.yaml", "# made by hand\nimage: \"m.pgm\"\nresolution: 0.5  # m\norigin:\n- 10\n- 20\n- 1.5707963267948966\nnegate: 0\n"
-                                                  "occupied_thresh: 0.65\nfree_thresh: 0.196\n");
+  const std::string path = folder.write("m.yaml",
+                                        "# made by hand\nimage: \"m.pgm\"\nresolution: 0.5  # "
+                                        "m\norigin:\n- 10\n- 20\n- 1.5707963267948966\nnegate: 0\n"
+                                        "occupied_thresh: 0.65\nfree_thresh: 0.196\n");
   const OccupancyGrid grid = read_map(path);
   EXPECT_EQ(drawn(grid), "#.?\n#..\n");
   const auto walls = walls_of(grid);
   ASSERT_EQ(walls.size(), 1u);
-  EXPECT_NEAR(walls[0].x, 9.5, 1e-12);    // (0.25, 0.5) in the map's frame
+  EXPECT_NEAR(walls[0].x, 9.5, 1e-12);  // (0.25, 0.5) in the map's frame
   EXPECT_NEAR(walls[0].y, 20.25, 1e-12);
   EXPECT_NEAR(walls[0].length, 0.5, 1e-12);
   EXPECT_NEAR(walls[0].width, 1.0, 1e-12);
   // A raw map has the per cent of being occupied, and 255 for what is unknown.
   folder.write("raw.pgm", std::string("P5\n3 1\n255\n") + "\x64\xff" + std::string(1, '\0'));
-  EXPECT_EQ(drawn(read_map(folder.write("raw.yaml", "image: raw.pgm\nresolution: 1\norigin: [0, 0, 0]\nmode: raw\nnegate: 0\n"))), "#?.\n");
-  EXPECT_THROW(read_map(folder.write("odd.yaml", "image: raw.pgm\nresolution: 1\norigin: [0, 0, 0]\nmode: row\n")), InputError);
+  EXPECT_EQ(
+      drawn(read_map(folder.write(
+          "raw.yaml", "image: raw.pgm\nresolution: 1\norigin: [0, 0, 0]\nmode: raw\nnegate: 0\n"))),
+      "#?.\n");
+  EXPECT_THROW(read_map(folder.write(
+                   "odd.yaml", "image: raw.pgm\nresolution: 1\norigin: [0, 0, 0]\nmode: row\n")),
+               InputError);
   const OccupancyGrid bitmap = read_bitmap(folder / "m.pgm", 2);
   EXPECT_EQ(drawn(bitmap), "#..\n#..\n");
   EXPECT_EQ(bitmap.x, -3);
@@ -106,9 +138,12 @@ TEST(Map, MapServerFile) {
 
 TEST(Map, ArMap) {
   TemporaryFolder folder;
-  const std::string head = "2D-Map\nLineMinPos: 0 0\nResolution: 20\nCairn: Goal 0 0 0 \"\" ICON \"door\"\nLINES\n";
+  const std::string head =
+      "2D-Map\nLineMinPos: 0 0\nResolution: 20\nCairn: Goal 0 0 0 \"\" ICON \"door\"\nLINES\n";
   std::string left_out;
-  const auto walls = read_armap(folder.write("a.map", head + "0 0 3000 0\r\n3000 0 3000 4000\nDATA\n5 5\n6 5\n"), 0.1, left_out);
+  const auto walls =
+      read_armap(folder.write("a.map", head + "0 0 3000 0\r\n3000 0 3000 4000\nDATA\n5 5\n6 5\n"),
+                 0.1, left_out);
   ASSERT_EQ(walls.size(), 2u);
   EXPECT_DOUBLE_EQ(walls[0].x, 1.5);
   EXPECT_DOUBLE_EQ(walls[0].length, 3.1);
@@ -117,7 +152,8 @@ TEST(Map, ArMap) {
   EXPECT_DOUBLE_EQ(walls[1].width, 0.1);
   EXPECT_EQ(left_out, "2 points, 1 Goal");
   left_out.clear();
-  const auto points = read_armap(folder.write("p.map", "2D-Map\nResolution: 20\nDATA\n1000 -500\n"), 0.1, left_out);
+  const auto points =
+      read_armap(folder.write("p.map", "2D-Map\nResolution: 20\nDATA\n1000 -500\n"), 0.1, left_out);
   ASSERT_EQ(points.size(), 1u);
   EXPECT_DOUBLE_EQ(points[0].y, -0.5);
   EXPECT_DOUBLE_EQ(points[0].length, 0.02);
@@ -131,22 +167,31 @@ TEST(Map, WrongFilesSayWhatIsWrong) {
     const std::string path = folder.write(name, text);
     std::string left_out;
     try {
-      if (name.ends_with(".yaml")) read_map(path);
-      else read_armap(path, 0.1, left_out);
+      if (name.ends_with(".yaml"))
+        read_map(path);
+      else
+        read_armap(path, 0.1, left_out);
     } catch (const InputError& e) {
       return e.source().str().substr(folder.path().size() + 1) + ": " + e.message();
     }
     return std::string();
   };
   EXPECT_EQ(error("a.yaml", "image: ok.pgm\nresolution: 0.05\n"), "a.yaml: has no 'origin'");
-  EXPECT_EQ(error("a.yaml", "image: ok.pgm\nresolution: fine\norigin: [0,0,0]\n"), "a.yaml:2: resolution: 'fine' is not a number");
-  EXPECT_EQ(error("a.yaml", "image: ok.pgm\nresolution: -1\norigin: [0,0,0]\n"), "a.yaml:2: resolution: '-1' is not allowed; allowed are numbers above 0, in m");
-  EXPECT_EQ(error("a.yaml", "image: ok.pgm\nresolution: 1\norigin: [0]\n"), "a.yaml:3: origin: '[0]' is not allowed; allowed is [x, y, yaw]");
-  EXPECT_EQ(error("a.yaml", "image: none.pgm\nresolution: 1\norigin: [0, 0, 0]\n"), "none.pgm: no such file");
-  EXPECT_EQ(error("a.yaml", "image: no.png\nresolution: 1\norigin: [0, 0, 0]\n"), "no.png: it is no picture that can be read (pgm, png, jpeg, bmp, tiff)");
+  EXPECT_EQ(error("a.yaml", "image: ok.pgm\nresolution: fine\norigin: [0,0,0]\n"),
+            "a.yaml:2: resolution: 'fine' is not a number");
+  EXPECT_EQ(error("a.yaml", "image: ok.pgm\nresolution: -1\norigin: [0,0,0]\n"),
+            "a.yaml:2: resolution: '-1' is not allowed; allowed are numbers above 0, in m");
+  EXPECT_EQ(error("a.yaml", "image: ok.pgm\nresolution: 1\norigin: [0]\n"),
+            "a.yaml:3: origin: '[0]' is not allowed; allowed is [x, y, yaw]");
+  EXPECT_EQ(error("a.yaml", "image: none.pgm\nresolution: 1\norigin: [0, 0, 0]\n"),
+            "none.pgm: no such file");
+  EXPECT_EQ(error("a.yaml", "image: no.png\nresolution: 1\norigin: [0, 0, 0]\n"),
+            "no.png: it is no picture that can be read (pgm, png, jpeg, bmp, tiff)");
   EXPECT_EQ(error("a.yaml", "hello\n"), "a.yaml:1: 'hello' is no 'key: value'");
-  EXPECT_EQ(error("a.map", "hello\n"), "a.map:1: is no map of MobileSim and ARIA: it does not begin with '2D-Map'");
-  EXPECT_EQ(error("a.map", "2D-Map\nLINES\n1 2 3\n"), "a.map:3: '1 2 3' is not allowed; allowed are x1 y1 x2 y2, in mm");
+  EXPECT_EQ(error("a.map", "hello\n"),
+            "a.map:1: is no map of MobileSim and ARIA: it does not begin with '2D-Map'");
+  EXPECT_EQ(error("a.map", "2D-Map\nLINES\n1 2 3\n"),
+            "a.map:3: '1 2 3' is not allowed; allowed are x1 y1 x2 y2, in mm");
   EXPECT_EQ(error("a.map", "2D-Map\nLINES\n1 2 3 x\n"), "a.map:3: LINES: 'x' is not a number");
   EXPECT_EQ(error("a.map", "2D-Map\n"), "a.map: holds no LINES and no DATA");
 }

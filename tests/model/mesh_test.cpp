@@ -1,5 +1,5 @@
-// Meshes: every format with its unit and up axis, the importer's faults and limits, the cache, and the shapes that
-// are made here.
+// Meshes: every format with its unit and up axis, the importer's faults and limits, the cache, and
+// the shapes that are made here.
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -17,16 +17,21 @@ namespace ruedo::model {
 namespace {
 
 // A box of 1 x 2 x 3 m with a corner at the origin, in +x, +y, +z: no two axes can be mistaken.
-constexpr float kCorners[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 2, 0}, {0, 2, 0}, {0, 0, 3}, {1, 0, 3}, {1, 2, 3}, {0, 2, 3}};
+constexpr float kCorners[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 2, 0}, {0, 2, 0},
+                                  {0, 0, 3}, {1, 0, 3}, {1, 2, 3}, {0, 2, 3}};
 constexpr int kFaces[12][3] = {{0, 2, 1}, {0, 3, 2}, {4, 5, 6}, {4, 6, 7}, {0, 1, 5}, {0, 5, 4},
                                {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}};
 
-std::string numbers(const float* p) { return std::to_string(p[0]) + " " + std::to_string(p[1]) + " " + std::to_string(p[2]); }
+std::string numbers(const float* p) {
+  return std::to_string(p[0]) + " " + std::to_string(p[1]) + " " + std::to_string(p[2]);
+}
 
 std::string obj() {
   std::string text = "mtllib box.mtl\nusemtl red\n";
   for (const auto& c : kCorners) text += "v " + numbers(c) + "\n";
-  for (const auto& f : kFaces) text += "f " + std::to_string(f[0] + 1) + " " + std::to_string(f[1] + 1) + " " + std::to_string(f[2] + 1) + "\n";
+  for (const auto& f : kFaces)
+    text += "f " + std::to_string(f[0] + 1) + " " + std::to_string(f[1] + 1) + " " +
+            std::to_string(f[2] + 1) + "\n";
   return text;
 }
 
@@ -41,10 +46,14 @@ std::string stl() {
 }
 
 std::string ply() {
-  std::string text = "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n"
-                     "element face 12\nproperty list uchar int vertex_indices\nend_header\n";
+  std::string text =
+      "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float "
+      "z\n"
+      "element face 12\nproperty list uchar int vertex_indices\nend_header\n";
   for (const auto& c : kCorners) text += numbers(c) + "\n";
-  for (const auto& f : kFaces) text += "3 " + std::to_string(f[0]) + " " + std::to_string(f[1]) + " " + std::to_string(f[2]) + "\n";
+  for (const auto& f : kFaces)
+    text += "3 " + std::to_string(f[0]) + " " + std::to_string(f[1]) + " " + std::to_string(f[2]) +
+            "\n";
   return text;
 }
 
@@ -55,16 +64,30 @@ std::string dae(const std::string& meter, const std::string& up, float scale) {
     const float p[3] = {c[0] * scale, c[1] * scale, c[2] * scale};
     positions += numbers(p) + " ";
   }
-  for (const auto& f : kFaces) indices += std::to_string(f[0]) + " " + std::to_string(f[1]) + " " + std::to_string(f[2]) + " ";
-  return "<?xml version='1.0'?><COLLADA xmlns='http://www.collada.org/2005/11/COLLADASchema' version='1.4.1'><asset><unit meter='" + meter +
-         "'/><up_axis>" + up + "</up_axis></asset><library_geometries><geometry id='g' name='box'><mesh><source id='p'><float_array id='pa' count='24'>" +
-         positions + "</float_array><technique_common><accessor source='#pa' count='8' stride='3'><param name='X' type='float'/><param name='Y' "
-         "type='float'/><param name='Z' type='float'/></accessor></technique_common></source><vertices id='v'><input semantic='POSITION' "
-         "source='#p'/></vertices><triangles count='12'><input semantic='VERTEX' source='#v' offset='0'/><p>" + indices +
-         "</p></triangles></mesh></geometry></library_geometries><library_visual_scenes><visual_scene id='s'>"
+  for (const auto& f : kFaces)
+    indices += std::to_string(f[0]) + " " + std::to_string(f[1]) + " " + std::to_string(f[2]) + " ";
+  return "<?xml version='1.0'?><COLLADA xmlns='http://www.collada.org/2005/11/COLLADASchema' "
+         "version='1.4.1'><asset><unit meter='" +
+         meter + "'/><up_axis>" + up +
+         "</up_axis></asset><library_geometries><geometry id='g' name='box'><mesh><source "
+         "id='p'><float_array id='pa' count='24'>" +
+         positions +
+         "</float_array><technique_common><accessor source='#pa' count='8' stride='3'><param "
+         "name='X' type='float'/><param name='Y' "
+         "type='float'/><param name='Z' "
+         "type='float'/></accessor></technique_common></source><vertices id='v'><input "
+         "semantic='POSITION' "
+         "source='#p'/></vertices><triangles count='12'><input semantic='VERTEX' source='#v' "
+         "offset='0'/><p>" +
+         indices +
+         "</p></triangles></mesh></geometry></"
+         "library_geometries><library_visual_scenes><visual_scene id='s'>"
          "<node id='n1' name='near'><instance_geometry url='#g'/></node>"
-         "<node id='n2' name='far'><translate>" + std::to_string(10 * scale) + " 0 0</translate><instance_geometry url='#g'/></node>"
-         "</visual_scene></library_visual_scenes><scene><instance_visual_scene url='#s'/></scene></COLLADA>";
+         "<node id='n2' name='far'><translate>" +
+         std::to_string(10 * scale) +
+         " 0 0</translate><instance_geometry url='#g'/></node>"
+         "</visual_scene></library_visual_scenes><scene><instance_visual_scene "
+         "url='#s'/></scene></COLLADA>";
 }
 
 // The box in glTF's axes (y up): our (x, y, z) is glTF's (x, z, -y).
@@ -84,7 +107,8 @@ std::string gltf_buffer() {
 }
 std::string gltf_json(const std::string& buffer) {
   return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"name":"box","mesh":0}],)"
-         R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],"buffers":[{)" + buffer +
+         R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],"buffers":[{)" +
+         buffer +
          R"("byteLength":168}],"bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":96},{"buffer":0,"byteOffset":96,"byteLength":72}],)"
          R"("accessors":[{"bufferView":0,"componentType":5126,"count":8,"type":"VEC3","min":[0,0,-2],"max":[1,3,0]},)"
          R"({"bufferView":1,"componentType":5123,"count":36,"type":"SCALAR"}]})";
@@ -118,7 +142,8 @@ std::string three_ds() {
     }
     faces.append("\x07\x00", 2);
   }
-  const std::string mesh = chunk_3ds(0x4100, chunk_3ds(0x4110, vertices) + chunk_3ds(0x4120, faces));
+  const std::string mesh =
+      chunk_3ds(0x4100, chunk_3ds(0x4110, vertices) + chunk_3ds(0x4120, faces));
   return chunk_3ds(0x4D4D, chunk_3ds(0x3D3D, chunk_3ds(0x4000, std::string("box\0", 4) + mesh)));
 }
 
@@ -126,22 +151,34 @@ std::string three_ds() {
 std::string fbx(int up, double unit) {
   std::string vertices, indices;
   for (const auto& c : kCorners) {
-    const double s = 100.0 / unit;    // file units in a metre
+    const double s = 100.0 / unit;  // file units in a metre
     const double p[3] = {c[0] * s, up == 1 ? c[2] * s : c[1] * s, up == 1 ? -c[1] * s : c[2] * s};
     for (const double v : p) vertices += (vertices.empty() ? "" : ",") + std::to_string(v);
   }
   for (const auto& f : kFaces) {
-    indices += (indices.empty() ? "" : ",") + std::to_string(f[0]) + "," + std::to_string(f[1]) + "," + std::to_string(-f[2] - 1);
+    indices += (indices.empty() ? "" : ",") + std::to_string(f[0]) + "," + std::to_string(f[1]) +
+               "," + std::to_string(-f[2] - 1);
   }
-  return "; FBX 7.3.0 project file\nFBXHeaderExtension:  {\n\tFBXHeaderVersion: 1003\n\tFBXVersion: 7300\n}\nGlobalSettings:  {\n\tVersion: 1000\n"
-         "\tProperties70:  {\n\t\tP: \"UpAxis\", \"int\", \"Integer\", \"\"," + std::to_string(up) +
-         "\n\t\tP: \"UpAxisSign\", \"int\", \"Integer\", \"\",1\n\t\tP: \"FrontAxis\", \"int\", \"Integer\", \"\"," + std::to_string(up == 1 ? 2 : 1) +
-         "\n\t\tP: \"FrontAxisSign\", \"int\", \"Integer\", \"\"," + std::string(up == 1 ? "1" : "-1") +
-         "\n\t\tP: \"CoordAxis\", \"int\", \"Integer\", \"\",0\n\t\tP: \"CoordAxisSign\", \"int\", \"Integer\", \"\",1\n"
-         "\t\tP: \"UnitScaleFactor\", \"double\", \"Number\", \"\"," + std::to_string(unit) + "\n\t}\n}\n"
-         "Objects:  {\n\tGeometry: 1000, \"Geometry::box\", \"Mesh\" {\n\t\tVertices: *24 {\n\t\t\ta: " + vertices +
-         "\n\t\t}\n\t\tPolygonVertexIndex: *36 {\n\t\t\ta: " + indices + "\n\t\t}\n\t\tGeometryVersion: 124\n\t}\n"
-         "\tModel: 2000, \"Model::box\", \"Mesh\" {\n\t\tVersion: 232\n\t}\n}\nConnections:  {\n\tC: \"OO\",2000,0\n\tC: \"OO\",1000,2000\n}\n";
+  return "; FBX 7.3.0 project file\nFBXHeaderExtension:  {\n\tFBXHeaderVersion: "
+         "1003\n\tFBXVersion: 7300\n}\nGlobalSettings:  {\n\tVersion: 1000\n"
+         "\tProperties70:  {\n\t\tP: \"UpAxis\", \"int\", \"Integer\", \"\"," +
+         std::to_string(up) +
+         "\n\t\tP: \"UpAxisSign\", \"int\", \"Integer\", \"\",1\n\t\tP: \"FrontAxis\", \"int\", "
+         "\"Integer\", \"\"," +
+         std::to_string(up == 1 ? 2 : 1) +
+         "\n\t\tP: \"FrontAxisSign\", \"int\", \"Integer\", \"\"," +
+         std::string(up == 1 ? "1" : "-1") +
+         "\n\t\tP: \"CoordAxis\", \"int\", \"Integer\", \"\",0\n\t\tP: \"CoordAxisSign\", \"int\", "
+         "\"Integer\", \"\",1\n"
+         "\t\tP: \"UnitScaleFactor\", \"double\", \"Number\", \"\"," +
+         std::to_string(unit) +
+         "\n\t}\n}\n"
+         "Objects:  {\n\tGeometry: 1000, \"Geometry::box\", \"Mesh\" {\n\t\tVertices: *24 "
+         "{\n\t\t\ta: " +
+         vertices + "\n\t\t}\n\t\tPolygonVertexIndex: *36 {\n\t\t\ta: " + indices +
+         "\n\t\t}\n\t\tGeometryVersion: 124\n\t}\n"
+         "\tModel: 2000, \"Model::box\", \"Mesh\" {\n\t\tVersion: 232\n\t}\n}\nConnections:  "
+         "{\n\tC: \"OO\",2000,0\n\tC: \"OO\",1000,2000\n}\n";
 }
 
 class Meshes : public testing::Test {
@@ -161,7 +198,8 @@ class Meshes : public testing::Test {
   static double volume(const Mesh& mesh) {
     double sum = 0;
     for (const auto& t : mesh.triangles) {
-      const Vec3 a = mesh.positions[t[0]].cast<double>(), b = mesh.positions[t[1]].cast<double>(), c = mesh.positions[t[2]].cast<double>();
+      const Vec3 a = mesh.positions[t[0]].cast<double>(), b = mesh.positions[t[1]].cast<double>(),
+                 c = mesh.positions[t[2]].cast<double>();
       sum += a.dot(b.cross(c)) / 6;
     }
     return sum;
@@ -183,8 +221,11 @@ TEST_F(Meshes, EveryFormatGivesTheSameBox) {
   folder.write("box.mtl", "newmtl red\nKd 0.8 0.1 0.2\n");
   folder.write("box.bin", gltf_buffer());
   const std::pair<std::string, std::string> files[] = {
-      {"box.obj", obj()}, {"box.stl", stl()}, {"box.ply", ply()}, {"box.gltf", gltf_json("\"uri\":\"box.bin\",")},
-      {"box.glb", glb()}, {"box.3ds", three_ds()}, {"zup_cm.fbx", fbx(2, 1)}, {"yup_cm.fbx", fbx(1, 1)}, {"zup_m.fbx", fbx(2, 100)}};
+      {"box.obj", obj()},        {"box.stl", stl()},
+      {"box.ply", ply()},        {"box.gltf", gltf_json("\"uri\":\"box.bin\",")},
+      {"box.glb", glb()},        {"box.3ds", three_ds()},
+      {"zup_cm.fbx", fbx(2, 1)}, {"yup_cm.fbx", fbx(1, 1)},
+      {"zup_m.fbx", fbx(2, 100)}};
   for (const auto& [name, content] : files) {
     const std::string path = folder.write(name, content);
     const ResourceFinder finder(path, true);
@@ -192,8 +233,10 @@ TEST_F(Meshes, EveryFormatGivesTheSameBox) {
     SCOPED_TRACE(name);
     std::shared_ptr<const Mesh> mesh;
     ASSERT_NO_THROW(mesh = loader.load(path));
-    EXPECT_LT((box_of(*mesh).min() - Eigen::Vector3f(0, 0, 0)).norm(), 1e-5f) << box_of(*mesh).min().transpose();
-    EXPECT_LT((box_of(*mesh).max() - Eigen::Vector3f(1, 2, 3)).norm(), 1e-5f) << box_of(*mesh).max().transpose();
+    EXPECT_LT((box_of(*mesh).min() - Eigen::Vector3f(0, 0, 0)).norm(), 1e-5f)
+        << box_of(*mesh).min().transpose();
+    EXPECT_LT((box_of(*mesh).max() - Eigen::Vector3f(1, 2, 3)).norm(), 1e-5f)
+        << box_of(*mesh).max().transpose();
     EXPECT_EQ(mesh->triangles.size(), 12u);
     EXPECT_NEAR(volume(*mesh), 6.0, 1e-4);
     EXPECT_TRUE(mesh->closed);
@@ -207,7 +250,8 @@ TEST_F(Meshes, ColladaUnitsAndNodes) {
     const ResourceFinder finder(path, true);
     MeshLoader loader(finder, import());
     const auto mesh = loader.load(path);
-    EXPECT_LT((box_of(*mesh).max() - Eigen::Vector3f(11, 2, 3)).norm(), 1e-4f) << up << " " << box_of(*mesh).max().transpose();
+    EXPECT_LT((box_of(*mesh).max() - Eigen::Vector3f(11, 2, 3)).norm(), 1e-4f)
+        << up << " " << box_of(*mesh).max().transpose();
     const auto far = loader.load_submesh(path, "far", false);
     EXPECT_LT((box_of(*far).min() - Eigen::Vector3f(10, 0, 0)).norm(), 1e-4f);
     EXPECT_TRUE(far->closed);
@@ -239,7 +283,8 @@ TEST_F(Meshes, MaterialsAndTheirFile) {
   folder.write("box.mtl", "newmtl red\nKd 0.3 0.1 0.2\n");
   MeshLoader again(finder, import());
   const auto changed = again.load(path);
-  EXPECT_FLOAT_EQ(changed->materials.at(static_cast<size_t>(changed->parts[0].material)).diffuse[0], 0.3f);
+  EXPECT_FLOAT_EQ(changed->materials.at(static_cast<size_t>(changed->parts[0].material)).diffuse[0],
+                  0.3f);
 }
 
 TEST_F(Meshes, CacheIsUsedAndABrokenEntryIsNot) {
@@ -249,7 +294,8 @@ TEST_F(Meshes, CacheIsUsedAndABrokenEntryIsNot) {
   none.importer = "/nowhere/importer";
   EXPECT_EQ(fault_of(path, none), "") << "the entry was not used";
   std::string entry;
-  for (const auto& each : std::filesystem::directory_iterator(folder / "cache")) entry = each.path().string();
+  for (const auto& each : std::filesystem::directory_iterator(folder / "cache"))
+    entry = each.path().string();
   ASSERT_FALSE(entry.empty());
   std::string bytes;
   {
@@ -260,12 +306,13 @@ TEST_F(Meshes, CacheIsUsedAndABrokenEntryIsNot) {
     std::string broken = bytes;
     broken[at] = static_cast<char>(broken[at] ^ 0x20);
     std::ofstream(entry, std::ios::binary) << broken;
-    EXPECT_EQ(fault_of(path, none), "the importer /nowhere/importer cannot be run") << "byte " << at;
+    EXPECT_EQ(fault_of(path, none), "the importer /nowhere/importer cannot be run")
+        << "byte " << at;
   }
   std::ofstream(entry, std::ios::binary) << bytes.substr(0, bytes.size() / 2);
   EXPECT_EQ(fault_of(path, none), "the importer /nowhere/importer cannot be run");
-  EXPECT_EQ(fault_of(path, import()), "");    // imported again
-  EXPECT_EQ(fault_of(path, none), "");        // and replaced
+  EXPECT_EQ(fault_of(path, import()), "");  // imported again
+  EXPECT_EQ(fault_of(path, none), "");      // and replaced
 }
 
 TEST_F(Meshes, ImportersThatFailDoNotHarmUs) {
@@ -279,20 +326,24 @@ TEST_F(Meshes, ImportersThatFailDoNotHarmUs) {
     return settings;
   };
   EXPECT_EQ(fault_of(path, fake("hang", "sleep 100")), "the importer took longer than 2 s");
-  EXPECT_EQ(fault_of(path, fake("abort", "kill -ABRT $$")), "the importer died of signal 6; the file is malformed");
+  EXPECT_EQ(fault_of(path, fake("abort", "kill -ABRT $$")),
+            "the importer died of signal 6; the file is malformed");
   MeshImport spin = fake("spin", "while :; do :; done");
   spin.wall_limit_s = 100;
   EXPECT_EQ(fault_of(path, spin), "the importer needed more than 1 s of CPU time");
   EXPECT_EQ(fault_of(path, fake("says", "echo 'line 3: bad' >&2; exit 1")), "line 3: bad");
   EXPECT_EQ(fault_of(path, fake("quiet", "exit 3")), "the importer failed");
   EXPECT_EQ(fault_of(path, fake("nothing", "exit 0")), "no such file");
-  EXPECT_EQ(fault_of(path, fake("lies", "echo garbage garbage > \"$2\"")), "its check sum is wrong");
+  EXPECT_EQ(fault_of(path, fake("lies", "echo garbage garbage > \"$2\"")),
+            "its check sum is wrong");
 }
 
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 TEST_F(Meshes, ImporterThatEatsMemoryIsStopped) {
   std::string huge = "solid s\n";
-  for (int i = 0; i < 200'000; ++i) huge += "facet normal 0 0 0\nouter loop\nvertex 0 0 " + std::to_string(i) + "\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
+  for (int i = 0; i < 200'000; ++i)
+    huge += "facet normal 0 0 0\nouter loop\nvertex 0 0 " + std::to_string(i) +
+            "\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
   const std::string path = folder.write("huge.stl", huge + "endsolid s\n");
   MeshImport settings = import();
   settings.memory_limit_bytes = size_t{90} << 20;
@@ -309,7 +360,8 @@ TEST_F(Meshes, MalformedFilesAreFaults) {
   std::string far = stl();
   far.replace(far.find("vertex 0.0"), 15, "vertex 1e30 0 0");
   EXPECT_NE(fault_of(folder.write("far.stl", far), import()), "");
-  // A cut file is a mesh or a fault, never more. This one, cut in its header, keeps assimp busy for ever.
+  // A cut file is a mesh or a fault, never more. This one, cut in its header, keeps assimp busy for
+  // ever.
   MeshImport impatient = import();
   impatient.cpu_limit_s = 1;
   EXPECT_NE(fault_of(folder.write("cut.ply", ply().substr(0, 151)), impatient), "");
@@ -332,32 +384,46 @@ TEST(MeshFormat, RefusesWhatDoesNotFit) {
     }
     return std::string();
   };
-  EXPECT_EQ(fault([](Mesh& m) { m.triangles[0][2] = 3; }), "a triangle names a vertex that is not there");
+  EXPECT_EQ(fault([](Mesh& m) { m.triangles[0][2] = 3; }),
+            "a triangle names a vertex that is not there");
   EXPECT_EQ(fault([](Mesh& m) { m.positions[1].x() = NAN; }), "it has a vertex that is not finite");
   EXPECT_EQ(fault([](Mesh& m) { m.positions[1].x() = 2e6f; }), "it reaches beyond 1000 km");
   EXPECT_EQ(fault([](Mesh& m) { m.normals.resize(2); }), "it has not one normal per vertex");
-  EXPECT_EQ(fault([](Mesh& m) { m.parts[0].triangle_count = 2; }), "a part names triangles that are not there");
-  EXPECT_EQ(fault([](Mesh& m) { m.parts[0].material = 0; }), "a part names a material that is not there");
-  EXPECT_EQ(fault([](Mesh& m) { m.triangles.clear(); m.parts.clear(); }), "it has no triangles");
+  EXPECT_EQ(fault([](Mesh& m) { m.parts[0].triangle_count = 2; }),
+            "a part names triangles that are not there");
+  EXPECT_EQ(fault([](Mesh& m) { m.parts[0].material = 0; }),
+            "a part names a material that is not there");
+  EXPECT_EQ(fault([](Mesh& m) {
+              m.triangles.clear();
+              m.parts.clear();
+            }),
+            "it has no triangles");
 }
 
 TEST(MadeMeshes, SquareWithAHole) {
-  const std::vector<Eigen::Vector2d> outer = {{0, 0}, {4, 0}, {4, 4}, {0, 4}}, hole = {{1, 1}, {3, 1}, {3, 3}, {1, 3}};
+  const std::vector<Eigen::Vector2d> outer = {{0, 0}, {4, 0}, {4, 4}, {0, 4}},
+                                     hole = {{1, 1}, {3, 1}, {3, 3}, {1, 3}};
   const Mesh mesh = extruded({outer, hole}, 2.0);
   double volume = 0;
   for (const auto& t : mesh.triangles) {
-    volume += mesh.positions[t[0]].cast<double>().dot(mesh.positions[t[1]].cast<double>().cross(mesh.positions[t[2]].cast<double>())) / 6;
+    volume += mesh.positions[t[0]].cast<double>().dot(
+                  mesh.positions[t[1]].cast<double>().cross(mesh.positions[t[2]].cast<double>())) /
+              6;
   }
   EXPECT_NEAR(volume, (16 - 4) * 2, 1e-5);
-  EXPECT_THROW(extruded({{{0, 0}, {1, 1}, {1, 0}, {0, 1}}}, 1), std::runtime_error);    // crosses itself
+  EXPECT_THROW(extruded({{{0, 0}, {1, 1}, {1, 0}, {0, 1}}}, 1),
+               std::runtime_error);  // crosses itself
   EXPECT_THROW(extruded({{{0, 0}, {1, 1}}}, 1), std::runtime_error);
 }
 
 TEST(MadeMeshes, ConcavePolygonIsClosed) {
-  const Mesh mesh = extruded({{{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}}}, 1.0);    // an L of area 3
+  const Mesh mesh =
+      extruded({{{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}}}, 1.0);  // an L of area 3
   double volume = 0;
   for (const auto& t : mesh.triangles) {
-    volume += mesh.positions[t[0]].cast<double>().dot(mesh.positions[t[1]].cast<double>().cross(mesh.positions[t[2]].cast<double>())) / 6;
+    volume += mesh.positions[t[0]].cast<double>().dot(
+                  mesh.positions[t[1]].cast<double>().cross(mesh.positions[t[2]].cast<double>())) /
+              6;
   }
   EXPECT_NEAR(volume, 3, 1e-6);
   EXPECT_TRUE(mesh.closed);
@@ -366,31 +432,48 @@ TEST(MadeMeshes, ConcavePolygonIsClosed) {
 TEST(MadeMeshes, HeightmapOfTwoByTwo) {
   TemporaryFolder folder;
   // A portable grey map: heights 0, 255 / 0, 51; the first row is at +y.
-  const std::string path = folder.write("h.pgm", std::string("P5\n2 2\n255\n") + std::string("\x00\xff\x00\x33", 4));
+  const std::string path =
+      folder.write("h.pgm", std::string("P5\n2 2\n255\n") + std::string("\x00\xff\x00\x33", 4));
   const Mesh mesh = heightmap(path, {4, 6, 10});
   ASSERT_EQ(mesh.positions.size(), 4u);
   EXPECT_TRUE(mesh.positions[1].isApprox(Eigen::Vector3f(2, 3, 10)));
   EXPECT_TRUE(mesh.positions[3].isApprox(Eigen::Vector3f(2, -3, 2)));
   for (const auto& t : mesh.triangles) {
-    EXPECT_GT((mesh.positions[t[1]] - mesh.positions[t[0]]).cross(mesh.positions[t[2]] - mesh.positions[t[0]]).z(), 0);
+    EXPECT_GT((mesh.positions[t[1]] - mesh.positions[t[0]])
+                  .cross(mesh.positions[t[2]] - mesh.positions[t[0]])
+                  .z(),
+              0);
   }
   EXPECT_THROW(heightmap(folder.write("x.png", "no picture"), {1, 1, 1}), std::runtime_error);
 }
 
 // A few bytes that ask for gigabytes: the head is read before anything is decoded.
 TEST(Pictures, TooLargeByTheirHeads) {
-  const std::string big("\x00\x00\xEA\x60", 4), small("\x00\x00\x00\x10", 4);    // 60000 and 16
-  const auto png = [](const std::string& w, const std::string& h) { return std::string("\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR", 16) + w + h; };
-  EXPECT_EQ(picture_fault(png(big, small), 1000), "it has 60000 x 16 pixels; allowed are 1000 each way");
-  EXPECT_EQ(picture_fault(png(small, big), 1000), "it has 16 x 60000 pixels; allowed are 1000 each way");
+  const std::string big("\x00\x00\xEA\x60", 4), small("\x00\x00\x00\x10", 4);  // 60000 and 16
+  const auto png = [](const std::string& w, const std::string& h) {
+    return std::string("\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR", 16) + w + h;
+  };
+  EXPECT_EQ(picture_fault(png(big, small), 1000),
+            "it has 60000 x 16 pixels; allowed are 1000 each way");
+  EXPECT_EQ(picture_fault(png(small, big), 1000),
+            "it has 16 x 60000 pixels; allowed are 1000 each way");
   EXPECT_EQ(picture_fault(png(small, small), 1000), "");
-  const std::string jpeg = std::string("\xFF\xD8\xFF\xE0\x00\x04" "ab" "\xFF\xC0\x00\x11\x08", 13) + "\xEA\x60" + std::string("\x00\x10\x03", 3);
+  const std::string jpeg = std::string(
+                               "\xFF\xD8\xFF\xE0\x00\x04"
+                               "ab"
+                               "\xFF\xC0\x00\x11\x08",
+                               13) +
+                           "\xEA\x60" + std::string("\x00\x10\x03", 3);
   EXPECT_EQ(picture_fault(jpeg, 1000), "it has 16 x 60000 pixels; allowed are 1000 each way");
-  EXPECT_EQ(picture_fault(std::string("P5 # wide\n60000\n16 255\n"), 1000), "it has 60000 x 16 pixels; allowed are 1000 each way");
+  EXPECT_EQ(picture_fault(std::string("P5 # wide\n60000\n16 255\n"), 1000),
+            "it has 60000 x 16 pixels; allowed are 1000 each way");
   std::string bmp(30, '\0');
-  bmp.replace(0, 2, "BM").replace(18, 4, std::string("\x10\0\0\0", 4)).replace(22, 4, std::string("\xA0\x15\xFF\xFF", 4));    // -60000: from the top
+  bmp.replace(0, 2, "BM")
+      .replace(18, 4, std::string("\x10\0\0\0", 4))
+      .replace(22, 4, std::string("\xA0\x15\xFF\xFF", 4));  // -60000: from the top
   EXPECT_EQ(picture_fault(bmp, 1000), "it has 16 x 60000 pixels; allowed are 1000 each way");
-  EXPECT_EQ(picture_fault(std::string("hello"), 1000), "it is no picture that can be read (pgm, png, jpeg, bmp, tiff)");
+  EXPECT_EQ(picture_fault(std::string("hello"), 1000),
+            "it is no picture that can be read (pgm, png, jpeg, bmp, tiff)");
 }
 
 }  // namespace

@@ -12,34 +12,49 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-const char* const kBox = "<model name='box'><link name='l'><collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision></link></model>";
+const char* const kBox =
+    "<model name='box'><link name='l'><collision name='c'><geometry><box><size>1 1 "
+    "1</size></box></geometry></collision></link></model>";
 
-std::string with_shape(const std::string& shape) { return "<model name='m'><link name='l'><collision name='c'><geometry>" + shape + "</geometry></collision></link></model>"; }
+std::string with_shape(const std::string& shape) {
+  return "<model name='m'><link name='l'><collision name='c'><geometry>" + shape +
+         "</geometry></collision></link></model>";
+}
 
 TEST(OddElements, AWorldMayBeNamedWorld) {
-  const auto world = load_world_text("<sdf version='1.6'><world name='world'>" + std::string(kBox) + "</world></sdf>", "/nowhere/w.sdf");
+  const auto world = load_world_text(
+      "<sdf version='1.6'><world name='world'>" + std::string(kBox) + "</world></sdf>",
+      "/nowhere/w.sdf");
   EXPECT_EQ(world->name, "world");
   EXPECT_THAT(texts(*world), IsEmpty());
   EXPECT_EQ(load_world_text("<sdf version='1.6'><world/></sdf>", "/nowhere/w.sdf")->name, "world");
 }
 
 TEST(OddElements, TheRestOfTheWorldStands) {
-  const auto world = world_of(with_shape("<mesh><uri>x.dae</uri><scale>1 0 0</scale></mesh>") + "<model name='odd'><pose>one two</pose><link name='l'/></model>" + kBox);
+  const auto world =
+      world_of(with_shape("<mesh><uri>x.dae</uri><scale>1 0 0</scale></mesh>") +
+               "<model name='odd'><pose>one two</pose><link name='l'/></model>" + kBox);
   ASSERT_EQ(world->models.size(), 2u);
-  EXPECT_THAT(texts(*world), ElementsAre("<scale>: '1 0 0' has a zero; a mesh cannot be flat; the shape is left out", HasSubstr("; the model is left out")));
+  EXPECT_THAT(
+      texts(*world),
+      ElementsAre("<scale>: '1 0 0' has a zero; a mesh cannot be flat; the shape is left out",
+                  HasSubstr("; the model is left out")));
   EXPECT_EQ(world->models[1].name, "box");
 }
 
 TEST(OddElements, ASphereWithoutARadiusHasTheFormatsOwn) {
   const auto world = world_of(with_shape("<sphere/>"));
   EXPECT_EQ(world->models[0].model->links[0].collisions.at(0).geometry.size.x(), 1.0);
-  EXPECT_THAT(texts(*world), ElementsAre("a <sphere> without <radius>; it is 1 as in SDF's description"));
+  EXPECT_THAT(texts(*world),
+              ElementsAre("a <sphere> without <radius>; it is 1 as in SDF's description"));
 }
 
 TEST(OddElements, APlaneOfThreeNumbers) {
   const auto world = world_of(with_shape("<plane><size>4 5 1</size></plane>"));
-  EXPECT_EQ(world->models[0].model->links[0].collisions.at(0).geometry.extent, Eigen::Vector2d(4, 5));
-  EXPECT_THAT(texts(*world), ElementsAre("<size> of a plane has two numbers; the third is left out"));
+  EXPECT_EQ(world->models[0].model->links[0].collisions.at(0).geometry.extent,
+            Eigen::Vector2d(4, 5));
+  EXPECT_THAT(texts(*world),
+              ElementsAre("<size> of a plane has two numbers; the third is left out"));
 }
 
 // A frame yields to what has its name, wherever it stands.
@@ -47,39 +62,64 @@ TEST(OddElements, AFrameNamedLikeSomethingElse) {
   const auto world = world_of("<frame name='box'/>" + std::string(kBox));
   ASSERT_EQ(world->models.size(), 1u);
   EXPECT_EQ(world->models[0].name, "box");
-  EXPECT_THAT(texts(*world), ElementsAre("<frame>: the name 'box' is taken in the world; the frame is left out"));
-  const auto inner = world_of("<model name='m'><frame name='l'><pose>0 0 5 0 0 0</pose></frame><link name='l'><pose>0 0 1 0 0 0</pose></link><link name='k'><pose relative_to='l'>0 0 1 0 0 0</pose></link></model>");
+  EXPECT_THAT(texts(*world),
+              ElementsAre("<frame>: the name 'box' is taken in the world; the frame is left out"));
+  const auto inner = world_of(
+      "<model name='m'><frame name='l'><pose>0 0 5 0 0 0</pose></frame><link name='l'><pose>0 0 1 "
+      "0 0 0</pose></link><link name='k'><pose relative_to='l'>0 0 1 0 0 0</pose></link></model>");
   EXPECT_EQ(link_of(*inner->models.at(0).model, "k").X_ML.translation.z(), 2.0);
 }
 
 TEST(OddElements, TwoRobotsOfOneName) {
-  const std::string robot = "<model name='r'><link name='l'><sensor name='odometry' type='imu'/></link></model>";
+  const std::string robot =
+      "<model name='r'><link name='l'><sensor name='odometry' type='imu'/></link></model>";
   const auto world = world_of(robot + robot);
   ASSERT_EQ(world->models.size(), 2u);
   EXPECT_EQ(world->models[1].name, "r_2");
-  EXPECT_EQ(world->models[0].model->sensors.at(0).name, "odometry_sensor");    // that name is the robot's own channel's
+  EXPECT_EQ(world->models[0].model->sensors.at(0).name,
+            "odometry_sensor");  // that name is the robot's own channel's
 }
 
 TEST(OddElements, AMissingPrefixIsGuessed) {
-  EXPECT_THAT(texts(*world_of("<model name='m'><link name='l'/><drive/></model>")), ElementsAre("<drive> is not supported and left out; did you mean <ruedo:drive>?"));
+  EXPECT_THAT(texts(*world_of("<model name='m'><link name='l'/><drive/></model>")),
+              ElementsAre("<drive> is not supported and left out; did you mean <ruedo:drive>?"));
 }
 
 TEST(OddElements, WhatWasSilentIsNamed) {
   const auto named = [](const std::string& inside) { return texts(*world_of(inside)); };
-  EXPECT_THAT(named("<wind><linear_velocity>1 0 0</linear_velocity></wind>"), ElementsAre("<wind> is not supported: no wind blows"));
-  EXPECT_THAT(named("<wind/><atmosphere type='adiabatic'/><magnetic_field>1e-5 0 0</magnetic_field>"), IsEmpty());    // written by Gazebo into every world
-  EXPECT_THAT(named("<spherical_coordinates><latitude_deg>48</latitude_deg></spherical_coordinates>"), ElementsAre(HasSubstr("<spherical_coordinates> is not supported")));
-  EXPECT_THAT(named("<model name='m'><link name='l'><battery name='b'/></link></model>"), ElementsAre(HasSubstr("<battery> is not supported")));
-  EXPECT_THAT(named("<model name='m'><link name='l'><inertial><mass>1</mass><fluid_added_mass/></inertial></link></model>"), ElementsAre(HasSubstr("<fluid_added_mass> is not supported")));
+  EXPECT_THAT(named("<wind><linear_velocity>1 0 0</linear_velocity></wind>"),
+              ElementsAre("<wind> is not supported: no wind blows"));
+  EXPECT_THAT(
+      named("<wind/><atmosphere type='adiabatic'/><magnetic_field>1e-5 0 0</magnetic_field>"),
+      IsEmpty());  // written by Gazebo into every world
+  EXPECT_THAT(
+      named("<spherical_coordinates><latitude_deg>48</latitude_deg></spherical_coordinates>"),
+      ElementsAre(HasSubstr("<spherical_coordinates> is not supported")));
+  EXPECT_THAT(named("<model name='m'><link name='l'><battery name='b'/></link></model>"),
+              ElementsAre(HasSubstr("<battery> is not supported")));
+  EXPECT_THAT(
+      named("<model name='m'><link "
+            "name='l'><inertial><mass>1</mass><fluid_added_mass/></inertial></link></model>"),
+      ElementsAre(HasSubstr("<fluid_added_mass> is not supported")));
   const std::string links = "<link name='a'/><link name='b'/>";
-  const auto joint = [&](const std::string& physics) { return "<model name='m'>" + links + "<joint name='j' type='fixed'><parent>a</parent><child>b</child>" + physics + "</joint></model>"; };
-  EXPECT_THAT(named(joint("<physics><ode><limit><cfm>0</cfm><erp>0.2</erp></limit></ode></physics>")), IsEmpty());
-  EXPECT_THAT(named(joint("<physics><ode><limit><cfm>0.01</cfm></limit></ode></physics>")), ElementsAre(HasSubstr("<physics> of a joint is not supported")));
+  const auto joint = [&](const std::string& physics) {
+    return "<model name='m'>" + links +
+           "<joint name='j' type='fixed'><parent>a</parent><child>b</child>" + physics +
+           "</joint></model>";
+  };
+  EXPECT_THAT(
+      named(joint("<physics><ode><limit><cfm>0</cfm><erp>0.2</erp></limit></ode></physics>")),
+      IsEmpty());
+  EXPECT_THAT(named(joint("<physics><ode><limit><cfm>0.01</cfm></limit></ode></physics>")),
+              ElementsAre(HasSubstr("<physics> of a joint is not supported")));
 }
 
 // A list of their addresses, with the command that fetches them, instead of a text each.
 TEST(OddElements, MissingModelsOfFuelAreOneList) {
-  const auto world = world_of("<include><uri>https://fuel.gazebosim.org/1.0/OpenRobotics/models/No Such One</uri></include><include><uri>https://fuel.gazebosim.org/1.0/OpenRobotics/models/Nor This</uri></include>");
+  const auto world = world_of(
+      "<include><uri>https://fuel.gazebosim.org/1.0/OpenRobotics/models/No Such "
+      "One</uri></include><include><uri>https://fuel.gazebosim.org/1.0/OpenRobotics/models/Nor "
+      "This</uri></include>");
   ASSERT_EQ(world->findings.size(), 2u);
   EXPECT_EQ(world->findings[0].text, world->findings[1].text);
   EXPECT_THAT(world->findings[1].element, HasSubstr("models/Nor This"));
@@ -88,7 +128,9 @@ TEST(OddElements, MissingModelsOfFuelAreOneList) {
 // assimp takes a colour with a blank before it for none, and with it gave up the mesh.
 TEST(OddElements, ColladaWithABlankBeforeItsColours) {
   TemporaryFolder folder;
-  folder.write("models/bench/m.dae", R"(<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset><unit meter="1"/><up_axis>Z_UP</up_axis></asset>
+  folder.write(
+      "models/bench/m.dae",
+      R"(<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset><unit meter="1"/><up_axis>Z_UP</up_axis></asset>
 <library_effects><effect id="e"><profile_COMMON><technique sid="c"><lambert><diffuse><color> 0.25 0.5 0.75 1</color></diffuse></lambert></technique></profile_COMMON></effect></library_effects>
 <library_materials><material id="m"><instance_effect url="#e"/></material></library_materials>
 <library_geometries><geometry id="g"><mesh><source id="p"><float_array id="a" count="12"> 0 0 0 1 0 0 0 1 0 0 0 1</float_array><technique_common><accessor source="#a" count="4" stride="3">
@@ -97,7 +139,11 @@ TEST(OddElements, ColladaWithABlankBeforeItsColours) {
 <library_visual_scenes><visual_scene id="vs"><node id="n"><instance_geometry url="#g"><bind_material><technique_common><instance_material symbol="s" target="#m"/></technique_common></bind_material></instance_geometry></node></visual_scene></library_visual_scenes>
 <scene><instance_visual_scene url="#vs"/></scene></COLLADA>)");
   // And by an address that begins at the folder above the models.
-  const auto world = load_world(folder.write("models/bench/model.sdf", "<sdf version='1.6'><model name='bench'><link name='l'><visual name='v'><geometry><mesh><uri>file://models/bench/m.dae</uri></mesh></geometry></visual></link></model></sdf>"));
+  const auto world =
+      load_world(folder.write("models/bench/model.sdf",
+                              "<sdf version='1.6'><model name='bench'><link name='l'><visual "
+                              "name='v'><geometry><mesh><uri>file://models/bench/m.dae</uri></"
+                              "mesh></geometry></visual></link></model></sdf>"));
   EXPECT_THAT(texts(*world), IsEmpty());
   const auto& visuals = world->models.back().model->links[0].visuals;
   ASSERT_EQ(visuals.size(), 1u);

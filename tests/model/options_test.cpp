@@ -22,7 +22,8 @@ const char* kRobot = R"(<sdf version='1.9'><model name='bot'>
 <ruedo:drive><ruedo:left_joint>jl</ruedo:left_joint><ruedo:right_joint>jr</ruedo:right_joint></ruedo:drive>
 </model></sdf>)";
 
-// Ground at 0; a static ramp of 0.2 m at x 5 (a box), a wall of 2 m at x 10, a roof over all, a light box at y 5.
+// Ground at 0; a static ramp of 0.2 m at x 5 (a box), a wall of 2 m at x 10, a roof over all, a
+// light box at y 5.
 const char* kWorld = R"(<sdf version='1.9'><world name='w'>
 <model name='ground'><static>true</static><link name='l'><collision name='c'><geometry><plane/></geometry></collision></link></model>
 <model name='stage'><static>true</static><pose>5 0 0.1 0 0 0</pose><link name='l'><collision name='c'><geometry><box><size>2 2 0.2</size></box></geometry></collision></link></model>
@@ -37,7 +38,8 @@ class Options : public testing::Test {
     world = folder.write("world.sdf", kWorld);
     folder.write("bot.sdf", kRobot);
   }
-  std::shared_ptr<const WorldModel> spawned(double x, double y, double yaw = 0, const std::string& name = "") const {
+  std::shared_ptr<const WorldModel> spawned(double x, double y, double yaw = 0,
+                                            const std::string& name = "") const {
     LoadOptions options;
     options.spawns.push_back({"bot.sdf", name, x, y, yaw});
     return load_world(world, options);
@@ -60,20 +62,27 @@ class Options : public testing::Test {
 };
 
 // Without the free place that it names.
-std::string without_place(const std::string& error) { return error.substr(0, error.find("; the nearest")); }
+std::string without_place(const std::string& error) {
+  return error.substr(0, error.find("; the nearest"));
+}
 
 TEST_F(Options, SpawnStandsOnTheGround) {
   const auto plain = spawned(1, 2, 0.5);
   EXPECT_EQ(plain->models.back().name, "bot");
-  EXPECT_NEAR(plain->models.back().X_WM.translation.z(), 0, 1e-7);    // its wheels reach down to its own 0
+  EXPECT_NEAR(plain->models.back().X_WM.translation.z(), 0,
+              1e-7);  // its wheels reach down to its own 0
   EXPECT_NEAR(heading(plain->models.back().X_WM.rotation), 0.5, 1e-12);
-  EXPECT_NEAR(spawned(5, 0)->models.back().X_WM.translation.z(), 0.2, 1e-7);    // on the stage, under the roof
+  EXPECT_NEAR(spawned(5, 0)->models.back().X_WM.translation.z(), 0.2,
+              1e-7);  // on the stage, under the roof
 }
 
-// A ramp that rises by 0.3 rad along x, its top at 0.25 m over (20, 0); and with a wall of 1 m on it.
+// A ramp that rises by 0.3 rad along x, its top at 0.25 m over (20, 0); and with a wall of 1 m on
+// it.
 TEST_F(Options, SpawnIsTiltedAsTheGround) {
-  const std::string ramp = "<model name='ramp'><static>true</static><pose>20.029552 0 0.154466 0 -0.3 0</pose><link name='l'><collision name='c'><geometry>"
-                           "<box><size>1.6 4 0.2</size></box></geometry></collision>WALL</link></model></world>";
+  const std::string ramp =
+      "<model name='ramp'><static>true</static><pose>20.029552 0 0.154466 0 -0.3 0</pose><link "
+      "name='l'><collision name='c'><geometry>"
+      "<box><size>1.6 4 0.2</size></box></geometry></collision>WALL</link></model></world>";
   const auto in_world = [&](const std::string& wall) {
     std::string text = kWorld, model = ramp;
     model.replace(model.find("WALL"), 4, wall);
@@ -84,33 +93,42 @@ TEST_F(Options, SpawnIsTiltedAsTheGround) {
   EXPECT_LT((X_WM.translation - Vec3(20, 0, 0.25)).norm(), 1e-6);
   EXPECT_LT((X_WM.rotation * Vec3::UnitZ() - Vec3(-std::sin(0.3), 0, std::cos(0.3))).norm(), 1e-6);
   EXPECT_NEAR(heading(X_WM.rotation), 0.5, 1e-9);
-  in_world("<collision name='s'><pose>0.3 0 0.6 0 0 0</pose><geometry><box><size>0.4 4 1</size></box></geometry></collision>");
+  in_world(
+      "<collision name='s'><pose>0.3 0 0.6 0 0 0</pose><geometry><box><size>0.4 4 "
+      "1</size></box></geometry></collision>");
   LoadOptions options;
   options.spawns.push_back({"bot.sdf", "", 20, 0, 0});
-  EXPECT_EQ(without_place(error_of(options)), "--spawn bot.sdf@20,0: there is no room, it would stand in 'ramp'");
+  EXPECT_EQ(without_place(error_of(options)),
+            "--spawn bot.sdf@20,0: there is no room, it would stand in 'ramp'");
 }
 
 TEST_F(Options, SpawnRefusesToStandInSomething) {
   LoadOptions options;
   options.spawns.push_back({"bot.sdf", "", 9.9, 0, 0});
-  EXPECT_EQ(without_place(error_of(options)), "--spawn bot.sdf@9.9,0: there is no room, it would stand in 'wall'");
+  EXPECT_EQ(without_place(error_of(options)),
+            "--spawn bot.sdf@9.9,0: there is no room, it would stand in 'wall'");
   options.spawns[0] = {"bot.sdf", "", 0.3, 5.3, 0};
-  EXPECT_EQ(without_place(error_of(options)), "--spawn bot.sdf@0.3,5.3: there is no room, it would stand in 'crate'");
-  options.spawns[0] = {"bot.sdf", "", 0.56, 5.56, 0};    // past the corner: their boxes are apart by a little
+  EXPECT_EQ(without_place(error_of(options)),
+            "--spawn bot.sdf@0.3,5.3: there is no room, it would stand in 'crate'");
+  options.spawns[0] = {"bot.sdf", "", 0.56, 5.56,
+                       0};  // past the corner: their boxes are apart by a little
   EXPECT_EQ(error_of(options), "");
   options.spawns = {{"bot.sdf", "", 0, 0, 0}, {"bot.sdf", "", 0.3, 0, 0}};
-  EXPECT_EQ(without_place(error_of(options)), "--spawn bot.sdf@0.3,0: there is no room, it would stand in 'bot'");
+  EXPECT_EQ(without_place(error_of(options)),
+            "--spawn bot.sdf@0.3,0: there is no room, it would stand in 'bot'");
   const std::string error = error_of(options), named = "; the nearest free place is ";
   const size_t at = error.find(named);
   ASSERT_NE(at, std::string::npos);
   const std::string place = error.substr(at + named.size());
   options.spawns[1].x = std::stod(place);
   options.spawns[1].y = std::stod(place.substr(place.find(',') + 1));
-  EXPECT_EQ(error_of(options), "");    // there it has room
+  EXPECT_EQ(error_of(options), "");  // there it has room
   options.spawns = {{"nobot", "", 0, 0, 0}};
-  EXPECT_EQ(error_of(options), "--spawn nobot: there is no such file, and no model of that name in the search path");
+  EXPECT_EQ(error_of(options),
+            "--spawn nobot: there is no such file, and no model of that name in the search path");
   options.spawns = {{"bot.sdf", "wall", 0, 0, 0}};
-  EXPECT_EQ(error_of(options), "--spawn bot.sdf: the name 'wall' is taken by another model of the world");
+  EXPECT_EQ(error_of(options),
+            "--spawn bot.sdf: the name 'wall' is taken by another model of the world");
 }
 
 TEST_F(Options, SpawnedNamesCountUp) {
@@ -126,16 +144,22 @@ TEST_F(Options, SpawnedNamesCountUp) {
 TEST_F(Options, SetChangesOneRobotOnly) {
   LoadOptions options = with_bot();
   options.spawns.push_back({"bot.sdf", "other", 2, 0, 0});
-  options.settings = {{"bot", "LRF", "update_rate", "25"}, {"bot", "LRF", "range.max", "4"}, {"bot", "LRF", "sweep_time", "0.01"},
-                      {"bot", "velocity", "max_speed", "0.5"}, {"bot", "odometry", "ticks_per_turn", "1000"}};
+  options.settings = {{"bot", "LRF", "update_rate", "25"},
+                      {"bot", "LRF", "range.max", "4"},
+                      {"bot", "LRF", "sweep_time", "0.01"},
+                      {"bot", "velocity", "max_speed", "0.5"},
+                      {"bot", "odometry", "ticks_per_turn", "1000"}};
   const auto loaded = load_world(world, options);
   const Model& bot = *loaded->models[5].model;
   const Model& other = *loaded->models[6].model;
   EXPECT_EQ(bot.sensors[0].element->number("update_rate", 0, Allowed::any(quantity::kRange)), 25);
-  EXPECT_EQ(bot.sensors[0].element->number("lidar/range/max", 0, Allowed::any(quantity::kRange)), 4);
-  EXPECT_EQ(bot.sensors[0].element->number("ruedo:sweep_time", 0, Allowed::any(quantity::kRange)), 0.01);
+  EXPECT_EQ(bot.sensors[0].element->number("lidar/range/max", 0, Allowed::any(quantity::kRange)),
+            4);
+  EXPECT_EQ(bot.sensors[0].element->number("ruedo:sweep_time", 0, Allowed::any(quantity::kRange)),
+            0.01);
   EXPECT_EQ(bot.drive->max_speed, 0.5);
-  EXPECT_EQ(bot.drive->odometry->integer("ruedo:ticks_per_turn", 0, Allowed::any(quantity::kRange)), 1000);
+  EXPECT_EQ(bot.drive->odometry->integer("ruedo:ticks_per_turn", 0, Allowed::any(quantity::kRange)),
+            1000);
   EXPECT_EQ(other.sensors[0].element->number("update_rate", 0, Allowed::any(quantity::kRange)), 10);
   EXPECT_EQ(other.drive->max_speed, std::numeric_limits<double>::infinity());
 }
@@ -146,14 +170,23 @@ TEST_F(Options, SetSaysWhatThereIs) {
     options.settings = {setting};
     return error_of(options);
   };
-  EXPECT_EQ(error({"bott", "LRF", "update_rate", "1"}), "--set bott/LRF.update_rate: there is no robot 'bott'; did you mean 'bot'?; there are bot");
+  EXPECT_EQ(
+      error({"bott", "LRF", "update_rate", "1"}),
+      "--set bott/LRF.update_rate: there is no robot 'bott'; did you mean 'bot'?; there are bot");
   EXPECT_EQ(error({"bot", "LRFF", "update_rate", "1"}),
-            "--set bot/LRFF.update_rate: the robot has no device 'LRFF'; did you mean 'LRF'?; there are velocity, wheels, odometry, pose, motion, move, LRF");
-  EXPECT_NE(error({"bot", "LRF", "update_rat", "1"}).find("did you mean 'update_rate'?; there are update_rate, lidar.scan.horizontal.samples"), std::string::npos);
+            "--set bot/LRFF.update_rate: the robot has no device 'LRFF'; did you mean 'LRF'?; "
+            "there are velocity, wheels, odometry, pose, motion, move, LRF");
+  EXPECT_NE(
+      error({"bot", "LRF", "update_rat", "1"})
+          .find(
+              "did you mean 'update_rate'?; there are update_rate, lidar.scan.horizontal.samples"),
+      std::string::npos);
   EXPECT_EQ(error({"bot", "LRF", "samples", "1"}),
-            "--set bot/LRF.samples: 'samples' could be lidar.scan.horizontal.samples, lidar.scan.vertical.samples");
+            "--set bot/LRF.samples: 'samples' could be lidar.scan.horizontal.samples, "
+            "lidar.scan.vertical.samples");
   EXPECT_EQ(error({"bot", "velocity", "max_speed", "fast"}),
-            "--set bot/velocity.max_speed: <ruedo:drive/ruedo:max_speed>: 'fast' is not a number; allowed is a number above 0, or inf");
+            "--set bot/velocity.max_speed: <ruedo:drive/ruedo:max_speed>: 'fast' is not a number; "
+            "allowed is a number above 0, or inf");
 }
 
 TEST_F(Options, Disable) {
@@ -163,7 +196,8 @@ TEST_F(Options, Disable) {
   EXPECT_TRUE(loaded->models.back().model->sensors.empty());
   EXPECT_EQ(loaded->disabled, (std::vector<std::string>{"bot/odometry"}));
   options.disabled = {"bot/SONAR"};
-  EXPECT_NE(error_of(options).find("--disable bot/SONAR: the robot has no device 'SONAR'"), std::string::npos);
+  EXPECT_NE(error_of(options).find("--disable bot/SONAR: the robot has no device 'SONAR'"),
+            std::string::npos);
 }
 
 TEST_F(Options, RobotsThatAreLeftTheSameStillShareTheirModel) {
@@ -185,27 +219,41 @@ TEST(Convex, OverlapByHand) {
     g.size = size;
     return g;
   };
-  const Geometry box = shape(Shape::box, {2, 2, 2}), sphere = shape(Shape::sphere, {1, 1, 1}), cylinder = shape(Shape::cylinder, {1, 2, 0}),
-                 cone = shape(Shape::cone, {1, 2, 0}), capsule = shape(Shape::capsule, {1, 2, 0}), ellipsoid = shape(Shape::ellipsoid, {1, 2, 3});
+  const Geometry box = shape(Shape::box, {2, 2, 2}), sphere = shape(Shape::sphere, {1, 1, 1}),
+                 cylinder = shape(Shape::cylinder, {1, 2, 0}), cone = shape(Shape::cone, {1, 2, 0}),
+                 capsule = shape(Shape::capsule, {1, 2, 0}),
+                 ellipsoid = shape(Shape::ellipsoid, {1, 2, 3});
   const auto at = [](double x, double y, double z) { return Pose{Quat::Identity(), {x, y, z}}; };
-  const auto hit = [&](const Geometry& a, const Geometry& b, const Pose& X) { return overlap({&a, {}, {}}, {&b, X, {}}); };
+  const auto hit = [&](const Geometry& a, const Geometry& b, const Pose& X) {
+    return overlap({&a, {}, {}}, {&b, X, {}});
+  };
   struct Case {
     const Geometry& a;
     const Geometry& b;
     Vec3 direction;
-    double touching;    // distance of the centres at which they touch
+    double touching;  // distance of the centres at which they touch
   };
   const double d = 1 / std::sqrt(2.0);
   const Case cases[] = {
-      {box, box, {1, 0, 0}, 2},           {box, sphere, {0, 1, 0}, 2},       {box, sphere, {d, d, 0}, std::sqrt(2.0) + 1},
-      {cylinder, cylinder, {d, d, 0}, 2}, {cylinder, sphere, {0, 0, 1}, 2},  {cylinder, box, {d, d, 0}, std::sqrt(2.0) + 1},
-      {capsule, sphere, {0, 0, 1}, 3},    {ellipsoid, sphere, {0, 0, 1}, 4}, {ellipsoid, sphere, {0, 1, 0}, 3},
-      {cone, sphere, {0, 0, 1}, 2},       {cone, box, {0, 0, -1}, 2},
+      {box, box, {1, 0, 0}, 2},
+      {box, sphere, {0, 1, 0}, 2},
+      {box, sphere, {d, d, 0}, std::sqrt(2.0) + 1},
+      {cylinder, cylinder, {d, d, 0}, 2},
+      {cylinder, sphere, {0, 0, 1}, 2},
+      {cylinder, box, {d, d, 0}, std::sqrt(2.0) + 1},
+      {capsule, sphere, {0, 0, 1}, 3},
+      {ellipsoid, sphere, {0, 0, 1}, 4},
+      {ellipsoid, sphere, {0, 1, 0}, 3},
+      {cone, sphere, {0, 0, 1}, 2},
+      {cone, box, {0, 0, -1}, 2},
   };
   for (const Case& each : cases) {
-    const Vec3 in = each.direction * (each.touching - 1e-4), out = each.direction * (each.touching + 1e-4);
-    EXPECT_TRUE(hit(each.a, each.b, at(in.x(), in.y(), in.z()))) << each.direction.transpose() << " " << each.touching;
-    EXPECT_FALSE(hit(each.a, each.b, at(out.x(), out.y(), out.z()))) << each.direction.transpose() << " " << each.touching;
+    const Vec3 in = each.direction * (each.touching - 1e-4),
+               out = each.direction * (each.touching + 1e-4);
+    EXPECT_TRUE(hit(each.a, each.b, at(in.x(), in.y(), in.z())))
+        << each.direction.transpose() << " " << each.touching;
+    EXPECT_FALSE(hit(each.a, each.b, at(out.x(), out.y(), out.z())))
+        << each.direction.transpose() << " " << each.touching;
   }
 }
 
@@ -231,7 +279,7 @@ TEST(Urdf, RobotInAnEmptyWorld) {
   ASSERT_EQ(world->models.size(), 2u);
   EXPECT_EQ(world->models[0].name, "ground_plane");
   const Model& bot = *world->models[1].model;
-  ASSERT_EQ(bot.links.size(), 4u);    // none lost, in the file's order
+  ASSERT_EQ(bot.links.size(), 4u);  // none lost, in the file's order
   EXPECT_EQ(bot.links[0].name, "base_footprint");
   EXPECT_LT(bot.links[0].inertial.mass, 0.01);
   EXPECT_EQ(bot.links[1].inertial.mass, 5);

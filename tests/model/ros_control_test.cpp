@@ -15,26 +15,41 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using Steering = DriveDescription::Steering;
 
-// A box on four wheels of radius 0.1 m, 0.6 m apart to the side and 0.5 m along. Wheels' names begin with `prefix`.
+// A box on four wheels of radius 0.1 m, 0.6 m apart to the side and 0.5 m along. Wheels' names
+// begin with `prefix`.
 std::string four_wheels(const std::string& more, const std::string& prefix = "") {
-  std::string text = "<robot name='bot'><link name='base'><inertial><mass value='9'/><inertia ixx='0.3' iyy='0.3' izz='0.3' ixy='0' ixz='0' iyz='0'/></inertial></link>";
-  const std::pair<const char*, const char*> places[] = {{"front_left", "0.25 0.3 0.1"}, {"rear_left", "-0.25 0.3 0.1"}, {"front_right", "0.25 -0.3 0.1"}, {"rear_right", "-0.25 -0.3 0.1"}};
+  std::string text =
+      "<robot name='bot'><link name='base'><inertial><mass value='9'/><inertia ixx='0.3' iyy='0.3' "
+      "izz='0.3' ixy='0' ixz='0' iyz='0'/></inertial></link>";
+  const std::pair<const char*, const char*> places[] = {{"front_left", "0.25 0.3 0.1"},
+                                                        {"rear_left", "-0.25 0.3 0.1"},
+                                                        {"front_right", "0.25 -0.3 0.1"},
+                                                        {"rear_right", "-0.25 -0.3 0.1"}};
   for (const auto& [place, xyz] : places) {
     const std::string name = prefix + place;
-    text += "<link name='" + name + "_link'><inertial><mass value='1'/><inertia ixx='0.01' iyy='0.01' izz='0.01' ixy='0' ixz='0' iyz='0'/></inertial>"
-            "<collision><origin rpy='1.5707963 0 0'/><geometry><cylinder radius='0.1' length='0.05'/></geometry></collision></link>"
-            "<joint name='" + name + "' type='continuous'><parent link='base'/><child link='" + name + "_link'/><origin xyz='" + xyz + "'/><axis xyz='0 1 0'/></joint>";
+    text += "<link name='" + name +
+            "_link'><inertial><mass value='1'/><inertia ixx='0.01' iyy='0.01' izz='0.01' ixy='0' "
+            "ixz='0' iyz='0'/></inertial>"
+            "<collision><origin rpy='1.5707963 0 0'/><geometry><cylinder radius='0.1' "
+            "length='0.05'/></geometry></collision></link>"
+            "<joint name='" +
+            name + "' type='continuous'><parent link='base'/><child link='" + name +
+            "_link'/><origin xyz='" + xyz + "'/><axis xyz='0 1 0'/></joint>";
   }
   return text + more + "</robot>";
 }
 
 std::string transmission(const std::string& joint) {
-  return "<transmission name='t_" + joint + "'><type>transmission_interface/SimpleTransmission</type><joint name='" + joint +
-         "'><hardwareInterface>hardware_interface/VelocityJointInterface</hardwareInterface></joint></transmission>";
+  return "<transmission name='t_" + joint +
+         "'><type>transmission_interface/SimpleTransmission</type><joint name='" + joint +
+         "'><hardwareInterface>hardware_interface/VelocityJointInterface</hardwareInterface></"
+         "joint></transmission>";
 }
 
 const char* const kPackage = "<package><name>%</name></package>";
-std::string package(const std::string& name) { return std::string(kPackage).replace(std::string(kPackage).find('%'), 1, name); }
+std::string package(const std::string& name) {
+  return std::string(kPackage).replace(std::string(kPackage).find('%'), 1, name);
+}
 
 const DriveDescription& drive_of(const WorldModel& world) {
   const auto& drive = world.models.back().model->drive;
@@ -44,11 +59,13 @@ const DriveDescription& drive_of(const WorldModel& world) {
 
 std::vector<std::string> names(const WorldModel& world, const std::vector<int>& joints) {
   std::vector<std::string> list;
-  for (const int joint : joints) list.push_back(world.models.back().model->joints[static_cast<size_t>(joint)].name);
+  for (const int joint : joints)
+    list.push_back(world.models.back().model->joints[static_cast<size_t>(joint)].name);
   return list;
 }
 
-// ROS 1: the package beside has the file, nobody names it; radius and separation are the robot's own, multiplied.
+// ROS 1: the package beside has the file, nobody names it; radius and separation are the robot's
+// own, multiplied.
 TEST(RosControl, DiffDriveOfRos1) {
   TemporaryFolder folder;
   folder.write("bot_description/package.xml", package("bot_description"));
@@ -77,9 +94,14 @@ bot_velocity_controller:
       has_acceleration_limits: false
       max_acceleration: 6.0
 )");
-  const auto world = load_world(folder.write("bot_description/urdf/bot.urdf", four_wheels(transmission("front_left") + "<gazebo><plugin name='c' filename='libgazebo_ros_control.so'/></gazebo>")));
-  EXPECT_THAT(texts(*world), ElementsAre("it drives as the controller 'bot_velocity_controller' of control.yaml says, which has its joints; no plugin names the file"));
-  EXPECT_EQ(world->findings[0].source.line, 4);    // yaml-cpp marks a map by its first entry
+  const auto world = load_world(folder.write(
+      "bot_description/urdf/bot.urdf",
+      four_wheels(transmission("front_left") +
+                  "<gazebo><plugin name='c' filename='libgazebo_ros_control.so'/></gazebo>")));
+  EXPECT_THAT(texts(*world),
+              ElementsAre("it drives as the controller 'bot_velocity_controller' of control.yaml "
+                          "says, which has its joints; no plugin names the file"));
+  EXPECT_EQ(world->findings[0].source.line, 4);  // yaml-cpp marks a map by its first entry
   const DriveDescription& drive = drive_of(*world);
   EXPECT_THAT(names(*world, drive.left_joints), ElementsAre("front_left", "rear_left"));
   EXPECT_THAT(names(*world, drive.right_joints), ElementsAre("front_right", "rear_right"));
@@ -88,12 +110,13 @@ bot_velocity_controller:
   EXPECT_EQ(drive.max_speed, 1.0);
   EXPECT_EQ(drive.acceleration, 3.0);
   EXPECT_EQ(drive.max_turn_rate, 2.0);
-  EXPECT_TRUE(std::isinf(drive.turn_acceleration));    // its switch is off
+  EXPECT_TRUE(std::isinf(drive.turn_acceleration));  // its switch is off
   EXPECT_EQ(drive.watchdog_us, 250'000);
   EXPECT_DOUBLE_EQ(drive.odometry_rate.hz(), 40.0);
 }
 
-// ROS 2: the plugin names the file as the author's machine had it; names and types are apart; keys with dots.
+// ROS 2: the plugin names the file as the author's machine had it; names and types are apart; keys
+// with dots.
 TEST(RosControl, DiffDriveOfRos2) {
   TemporaryFolder folder;
   folder.write("bot/package.xml", package("bot"));
@@ -117,19 +140,28 @@ base:
     linear.x.max_acceleration: .NaN
     angular.z.max_velocity: 1.5
 )");
-  const std::string control = "<ros2_control name='s' type='system'><joint name='front_left'><command_interface name='velocity'/></joint></ros2_control>";
+  const std::string control =
+      "<ros2_control name='s' type='system'><joint name='front_left'><command_interface "
+      "name='velocity'/></joint></ros2_control>";
   const auto world = load_world(folder.write(
-      "bot/urdf/bot.urdf", four_wheels(control + "<gazebo><plugin name='gz_ros2_control::GazeboSimROS2ControlPlugin' filename='libgz_ros2_control-system.so'>"
-                                                 "<parameters>/opt/ros/jazzy/share/bot/config/controllers.yaml</parameters></plugin></gazebo>")));
-  EXPECT_THAT(texts(*world), ElementsAre("controllers of type 'maker/StrangeController' are not known; 'strange' does nothing",
-                                         "controller 'base': min_velocity is not kept: it is as fast both ways as max_velocity says"));
+      "bot/urdf/bot.urdf",
+      four_wheels(control + "<gazebo><plugin name='gz_ros2_control::GazeboSimROS2ControlPlugin' "
+                            "filename='libgz_ros2_control-system.so'>"
+                            "<parameters>/opt/ros/jazzy/share/bot/config/controllers.yaml</"
+                            "parameters></plugin></gazebo>")));
+  EXPECT_THAT(
+      texts(*world),
+      ElementsAre(
+          "controllers of type 'maker/StrangeController' are not known; 'strange' does nothing",
+          "controller 'base': min_velocity is not kept: it is as fast both ways as max_velocity "
+          "says"));
   const DriveDescription& drive = drive_of(*world);
   EXPECT_EQ(drive.wheel_radius, 0.11);
   EXPECT_EQ(drive.track, 0.61);
   EXPECT_EQ(drive.max_speed, 0.8);
   EXPECT_TRUE(std::isinf(drive.acceleration));
   EXPECT_EQ(drive.max_turn_rate, 1.5);
-  EXPECT_EQ(drive.watchdog_us, 500'000);    // diff_drive_controller's own
+  EXPECT_EQ(drive.watchdog_us, 500'000);  // diff_drive_controller's own
 }
 
 TEST(RosControl, MecanumAndSteeringControllers) {
@@ -157,15 +189,22 @@ TEST(RosControl, MecanumAndSteeringControllers) {
 TEST(RosControl, JointsThatAreNotThereAreAnotherRobots) {
   TemporaryFolder folder;
   folder.write("package.xml", package("bot"));
-  folder.write("config/c.yaml", "c:\n  type: diff_drive_controller/DiffDriveController\n  left_wheel: port\n  right_wheel: starboard\n");
+  folder.write("config/c.yaml",
+               "c:\n  type: diff_drive_controller/DiffDriveController\n  left_wheel: port\n  "
+               "right_wheel: starboard\n");
   const auto world = load_world(folder.write("bot.urdf", four_wheels(transmission("front_left"))));
   EXPECT_TRUE(drive_of(*world).guessed);
 }
 
 TEST(RosControl, AFileThatIsNotThereIsNamed) {
   TemporaryFolder folder;
-  const auto world = load_world(folder.write("bot.urdf", four_wheels("<gazebo><plugin name='c' filename='libgazebo_ros2_control.so'><parameters>$(find x)/y.yaml</parameters></plugin></gazebo>")));
-  EXPECT_THAT(texts(*world), testing::Contains("the controllers' file '$(find x)/y.yaml' is not found"));
+  const auto world = load_world(folder.write(
+      "bot.urdf",
+      four_wheels(
+          "<gazebo><plugin name='c' filename='libgazebo_ros2_control.so'><parameters>$(find "
+          "x)/y.yaml</parameters></plugin></gazebo>")));
+  EXPECT_THAT(texts(*world),
+              testing::Contains("the controllers' file '$(find x)/y.yaml' is not found"));
 }
 
 TEST(Yaml, IsBounded) {
@@ -187,8 +226,12 @@ TEST(Yaml, IsBounded) {
 TEST(Guess, FourWheelsByNameAndPlace) {
   TemporaryFolder folder;
   const auto world = load_world(folder.write("bot.urdf", four_wheels("", "wheel_")));
-  EXPECT_THAT(texts(*world), ElementsAre("no file says how it drives; guessed from its wheels: differential, left wheel_front_left+wheel_rear_left, right "
-                                         "wheel_front_right+wheel_rear_right (--drive bot=LEFT+...,RIGHT+... says it otherwise)"));
+  EXPECT_THAT(
+      texts(*world),
+      ElementsAre(
+          "no file says how it drives; guessed from its wheels: differential, left "
+          "wheel_front_left+wheel_rear_left, right "
+          "wheel_front_right+wheel_rear_right (--drive bot=LEFT+...,RIGHT+... says it otherwise)"));
   EXPECT_TRUE(drive_of(*world).guessed);
   EXPECT_EQ(drive_of(*world).steering, Steering::differential);
   EXPECT_NEAR(drive_of(*world).track, 0.6, 1e-12);
@@ -213,17 +256,26 @@ TEST(Guess, TheFlagSaysItOtherwise) {
 // An arm has no wheels, a cart of furniture no driver.
 TEST(Guess, WhatIsNoRobotIsNoneAfterwards) {
   TemporaryFolder folder;
-  const auto arm = load_world(folder.write("arm.urdf", "<robot name='arm'><link name='a'/><link name='b'/><joint name='shoulder' type='continuous'><parent link='a'/><child link='b'/><axis xyz='0 0 1'/></joint></robot>"));
+  const auto arm = load_world(folder.write(
+      "arm.urdf",
+      "<robot name='arm'><link name='a'/><link name='b'/><joint name='shoulder' "
+      "type='continuous'><parent link='a'/><child link='b'/><axis xyz='0 0 1'/></joint></robot>"));
   EXPECT_FALSE(arm->models.back().model->drive);
   EXPECT_THAT(texts(*arm), IsEmpty());
   std::string cart = "<model name='cart'><link name='base'/>";
   for (const char* side : {"left", "right"}) {
     const std::string name = std::string(side) + "_wheel";
-    cart += "<link name='" + name + "'><pose>0 " + (side[0] == 'l' ? "0.2" : "-0.2") + " 0.1 0 0 0</pose><collision name='c'><geometry><sphere><radius>0.1</radius></sphere></geometry></collision></link>"
-            "<joint name='" + name + "_joint' type='revolute'><parent>base</parent><child>" + name + "</child><axis><xyz>0 1 0</xyz></axis></joint>";
+    cart += "<link name='" + name + "'><pose>0 " + (side[0] == 'l' ? "0.2" : "-0.2") +
+            " 0.1 0 0 0</pose><collision "
+            "name='c'><geometry><sphere><radius>0.1</radius></sphere></geometry></collision></link>"
+            "<joint name='" +
+            name + "_joint' type='revolute'><parent>base</parent><child>" + name +
+            "</child><axis><xyz>0 1 0</xyz></axis></joint>";
   }
   EXPECT_FALSE(world_of(cart + "</model>")->models[0].model->drive);
-  EXPECT_TRUE(world_of(cart + "<plugin name='c' filename='libgazebo_ros_control.so'/></model>")->models[0].model->drive);
+  EXPECT_TRUE(world_of(cart + "<plugin name='c' filename='libgazebo_ros_control.so'/></model>")
+                  ->models[0]
+                  .model->drive);
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
-// What a world looks like and where things are in it: lights, materials, terrain, saved states, actors.
+// What a world looks like and where things are in it: lights, materials, terrain, saved states,
+// actors.
 #include <cmath>
 
 #include <gmock/gmock.h>
@@ -12,12 +13,19 @@ namespace {
 
 TEST(Scene, LightsMaterialsAndSurfaces) {
   const auto world = world_of(
-      "<gravity>0 0 -1.6</gravity><scene><ambient>0.1 0.2 0.3 1</ambient><shadows>false</shadows><sky/></scene>"
-      "<light name='s' type='spot'><pose>0 0 4 0 0 0</pose><direction>0 0 -2</direction><spot><outer_angle>0.6</outer_angle></spot>"
+      "<gravity>0 0 -1.6</gravity><scene><ambient>0.1 0.2 0.3 "
+      "1</ambient><shadows>false</shadows><sky/></scene>"
+      "<light name='s' type='spot'><pose>0 0 4 0 0 0</pose><direction>0 0 "
+      "-2</direction><spot><outer_angle>0.6</outer_angle></spot>"
       "<attenuation><range>7</range></attenuation></light>"
-      "<model name='m'><link name='l'><collision name='c'><geometry><sphere><radius>1</radius></sphere></geometry><surface><friction><ode><mu>0.4</mu></ode></friction>"
-      "<bounce><restitution_coefficient>0.3</restitution_coefficient></bounce><ruedo:laser_reflectance>0.5</ruedo:laser_reflectance></surface></collision>"
-      "<visual name='v'><geometry><sphere><radius>1</radius></sphere></geometry><material><script><name>Gazebo/RedTransparent</name></script></material></visual>"
+      "<model name='m'><link name='l'><collision "
+      "name='c'><geometry><sphere><radius>1</radius></sphere></"
+      "geometry><surface><friction><ode><mu>0.4</mu></ode></friction>"
+      "<bounce><restitution_coefficient>0.3</restitution_coefficient></"
+      "bounce><ruedo:laser_reflectance>0.5</ruedo:laser_reflectance></surface></collision>"
+      "<visual "
+      "name='v'><geometry><sphere><radius>1</radius></sphere></"
+      "geometry><material><script><name>Gazebo/RedTransparent</name></script></material></visual>"
       "</link></model>");
   EXPECT_EQ(world->gravity, Vec3(0, 0, -1.6));
   EXPECT_FLOAT_EQ(world->sky.ambient[1], 0.2f);
@@ -36,8 +44,10 @@ TEST(Scene, LightsMaterialsAndSurfaces) {
 
 TEST(Scene, LightsOfLinksAreInTheirLinksFrames) {
   const auto world = world_of(
-      "<model name='m'><pose>10 0 0 0 0 0</pose><link name='l'><pose>0 0 1 0 0 0</pose><light name='lamp' type='point'><pose>0.5 0 0.25 0 0 0</pose>"
-      "<diffuse>1 0.5 0 1</diffuse><attenuation><range>3</range></attenuation></light></link></model>");
+      "<model name='m'><pose>10 0 0 0 0 0</pose><link name='l'><pose>0 0 1 0 0 0</pose><light "
+      "name='lamp' type='point'><pose>0.5 0 0.25 0 0 0</pose>"
+      "<diffuse>1 0.5 0 "
+      "1</diffuse><attenuation><range>3</range></attenuation></light></link></model>");
   EXPECT_TRUE(world->lights.empty());
   const Link& link = link_of(*world->models.at(0).model, "l");
   ASSERT_EQ(link.lights.size(), 1u);
@@ -52,14 +62,22 @@ TEST(Scene, LightsOfLinksAreInTheirLinksFrames) {
 TEST(Scene, OgreScriptsGiveColourAndTexture) {
   TemporaryFolder folder;
   folder.write("models/crate/materials/scripts/crate.material",
-               "// two materials, one a prefix of the other\nmaterial Crate/Side2\n{\n technique\n {\n  pass\n  {\n   diffuse 1 0 0\n  }\n }\n}\n"
-               "material Crate/Side\n{\n technique\n {\n  pass\n  {\n   ambient 0.1 0.2 0.3\n   diffuse 0.25 0.5 0.75 1.0\n"
-               "   specular 0.5 0.5 0.5 1.0 12\n   texture_unit\n   {\n    texture planks.png\n   }\n  }\n }\n}\n");
+               "// two materials, one a prefix of the other\nmaterial Crate/Side2\n{\n technique\n "
+               "{\n  pass\n  {\n   diffuse 1 0 0\n  }\n }\n}\n"
+               "material Crate/Side\n{\n technique\n {\n  pass\n  {\n   ambient 0.1 0.2 0.3\n   "
+               "diffuse 0.25 0.5 0.75 1.0\n"
+               "   specular 0.5 0.5 0.5 1.0 12\n   texture_unit\n   {\n    texture planks.png\n   "
+               "}\n  }\n }\n}\n");
   folder.write("models/crate/materials/textures/planks.png", "not decoded here");
   folder.write("models/crate/model.sdf",
-               "<sdf version='1.6'><model name='crate'><link name='l'><visual name='v'><geometry><box><size>1 1 1</size></box></geometry><material><script>"
-               "<uri>model://crate/materials/scripts</uri><uri>model://crate/materials/textures</uri><name>Crate/Side</name></script></material></visual></link></model></sdf>");
-  const auto world = load_world(folder.write("w.sdf", "<sdf version='1.6'><world name='w'><include><uri>model://crate</uri></include></world></sdf>"));
+               "<sdf version='1.6'><model name='crate'><link name='l'><visual "
+               "name='v'><geometry><box><size>1 1 1</size></box></geometry><material><script>"
+               "<uri>model://crate/materials/scripts</uri><uri>model://crate/materials/textures</"
+               "uri><name>Crate/Side</name></script></material></visual></link></model></sdf>");
+  const auto world = load_world(
+      folder.write("w.sdf",
+                   "<sdf version='1.6'><world "
+                   "name='w'><include><uri>model://crate</uri></include></world></sdf>"));
   const Visual& visual = world->models.at(0).model->links[0].visuals.at(0);
   ASSERT_TRUE(visual.material);
   EXPECT_EQ(visual.material->diffuse, (Rgba{0.25f, 0.5f, 0.75f, 1}));
@@ -70,30 +88,43 @@ TEST(Scene, OgreScriptsGiveColourAndTexture) {
   EXPECT_TRUE(texts(*world).empty());
 }
 
-// As Gazebo Classic saves a world whose models were moved. Names that the world lacks, and numbers that are none, change nothing.
+// As Gazebo Classic saves a world whose models were moved. Names that the world lacks, and numbers
+// that are none, change nothing.
 TEST(Scene, ASavedStateMovesItsModels) {
   const std::string model = "<link name='l'/></model>";
-  const auto world = world_of("<model name='moved'><pose>1 2 3 0 0 0</pose>" + model + "<model name='same'><pose>4 5 6 0 0 0</pose>" + model +
-                              "<state world_name='default'><sim_time>116 345000000</sim_time><model name='moved'><pose frame=''>7 8 9 0 0 1</pose><scale>1 1 1</scale>"
-                              "<link name='l'><pose>7 8 9 0 0 1</pose></link></model><model name='gone'><pose>0 0 0 0 0 0</pose></model>"
-                              "<model name='same'><pose>nan 0 0 0 0 0</pose></model></state>");
+  const auto world =
+      world_of("<model name='moved'><pose>1 2 3 0 0 0</pose>" + model +
+               "<model name='same'><pose>4 5 6 0 0 0</pose>" + model +
+               "<state world_name='default'><sim_time>116 345000000</sim_time><model "
+               "name='moved'><pose frame=''>7 8 9 0 0 1</pose><scale>1 1 1</scale>"
+               "<link name='l'><pose>7 8 9 0 0 1</pose></link></model><model name='gone'><pose>0 0 "
+               "0 0 0 0</pose></model>"
+               "<model name='same'><pose>nan 0 0 0 0 0</pose></model></state>");
   ASSERT_EQ(world->models.size(), 2u);
   EXPECT_EQ(world->models[0].X_WM.translation, Vec3(7, 8, 9));
   EXPECT_NEAR(heading(world->models[0].X_WM.rotation), 1.0, 1e-12);
   EXPECT_EQ(world->models[1].X_WM.translation, Vec3(4, 5, 6));
   EXPECT_THAT(texts(*world), testing::ElementsAre(testing::HasSubstr("'nan' is not finite")));
-  const auto door = world_of("<model name='door'><link name='frame'/><link name='leaf'><pose>1 0 0 0 0 0</pose></link></model><state><model name='door'>"
-                             "<pose>2 0 0 0 0 0</pose><link name='frame'><pose>2 0 0 0 0 0</pose></link><link name='leaf'><pose>2 1 0 0 0 1.57</pose></link></model></state>");
-  EXPECT_EQ(texts(*door), std::vector<std::string>{"its link 'leaf' was moved by a joint; it stands where the model has it"});
+  const auto door = world_of(
+      "<model name='door'><link name='frame'/><link name='leaf'><pose>1 0 0 0 0 "
+      "0</pose></link></model><state><model name='door'>"
+      "<pose>2 0 0 0 0 0</pose><link name='frame'><pose>2 0 0 0 0 0</pose></link><link "
+      "name='leaf'><pose>2 1 0 0 0 1.57</pose></link></model></state>");
+  EXPECT_EQ(texts(*door),
+            std::vector<std::string>{
+                "its link 'leaf' was moved by a joint; it stands where the model has it"});
 }
 
 // Three by three heights of which the middle one is full: a pyramid of 2 m on a square of 4 m.
 TEST(Scene, HeightmapsStandAtTheirPlaces) {
   TemporaryFolder folder;
   folder.write("hill.pgm", std::string("P5\n3 3\n255\n") + std::string("\0\0\0\0\xff\0\0\0\0", 9));
-  const auto world = load_world(folder.write("w.sdf",
-      "<sdf version='1.9'><world name='w'><model name='m'><static>true</static><link name='l'><collision name='c'><geometry><heightmap><uri>hill.pgm</uri>"
-      "<size>4 4 2</size><pos>1 0 0</pos></heightmap></geometry></collision></link></model></world></sdf>"));
+  const auto world = load_world(
+      folder.write("w.sdf",
+                   "<sdf version='1.9'><world name='w'><model name='m'><static>true</static><link "
+                   "name='l'><collision name='c'><geometry><heightmap><uri>hill.pgm</uri>"
+                   "<size>4 4 2</size><pos>1 0 "
+                   "0</pos></heightmap></geometry></collision></link></model></world></sdf>"));
   const Link& link = world->models.at(0).model->links[0];
   ASSERT_EQ(link.collisions.size(), 1u);
   const Geometry& hill = link.collisions[0].geometry;
@@ -110,32 +141,46 @@ TEST(Scene, HeightmapsStandAtTheirPlaces) {
   EXPECT_LT((top - Vec3(1, 0, 2)).norm(), 1e-6);
 }
 
-// A picture of 2 m by 2 m over 4 m: two tiles each way. Gazebo's own media path names a file that the model has itself.
+// A picture of 2 m by 2 m over 4 m: two tiles each way. Gazebo's own media path names a file that
+// the model has itself.
 TEST(Scene, HeightmapsAreCoveredByTheirFirstTexture) {
   TemporaryFolder folder;
   folder.write("hill.pgm", std::string("P5\n2 2\n255\n") + std::string(4, '\0'));
-  const std::string grass = folder.write("materials/textures/grass.ppm", std::string("P6\n1 1\n255\n") + "\1\2\3");
+  const std::string grass =
+      folder.write("materials/textures/grass.ppm", std::string("P6\n1 1\n255\n") + "\1\2\3");
   const auto heightmap = [&](const std::string& textures) {
-    return load_world(folder.write("w.sdf", "<sdf version='1.9'><world name='w'><model name='m'><static>true</static><link name='l'><visual name='v'>"
-        "<geometry><heightmap><uri>hill.pgm</uri><size>4 4 2</size>" + textures + "</heightmap></geometry></visual></link></model></world></sdf>"));
+    return load_world(folder.write(
+        "w.sdf",
+        "<sdf version='1.9'><world name='w'><model name='m'><static>true</static><link "
+        "name='l'><visual name='v'>"
+        "<geometry><heightmap><uri>hill.pgm</uri><size>4 4 2</size>" +
+            textures + "</heightmap></geometry></visual></link></model></world></sdf>"));
   };
-  const std::string texture = "<texture><size>2</size><diffuse>file://media/materials/textures/grass.ppm</diffuse></texture>";
+  const std::string texture =
+      "<texture><size>2</size><diffuse>file://media/materials/textures/grass.ppm</diffuse></"
+      "texture>";
   const auto world = heightmap(texture);
   EXPECT_TRUE(world->findings.empty());
   const Mesh& mesh = *world->models.at(0).model->links[0].visuals.at(0).geometry.mesh;
   ASSERT_EQ(mesh.materials.size(), 1u);
   EXPECT_EQ(mesh.materials[0].texture->path, grass);
   EXPECT_EQ(mesh.parts.at(0).material, 0);
-  EXPECT_EQ(mesh.uvs.at(1), Eigen::Vector2f(2, 2));    // the far right corner
-  EXPECT_THAT(texts(*heightmap(texture + texture)), testing::ElementsAre(testing::HasSubstr("not blended in")));
-  EXPECT_THAT(texts(*heightmap("<texture><diffuse>none.ppm</diffuse></texture>")), testing::ElementsAre(testing::HasSubstr("'none.ppm' is not found")));
-  EXPECT_THAT(texts(*heightmap("<texture><size>0</size><diffuse>grass.ppm</diffuse></texture>")), testing::ElementsAre(testing::HasSubstr("the shape is left out")));
+  EXPECT_EQ(mesh.uvs.at(1), Eigen::Vector2f(2, 2));  // the far right corner
+  EXPECT_THAT(texts(*heightmap(texture + texture)),
+              testing::ElementsAre(testing::HasSubstr("not blended in")));
+  EXPECT_THAT(texts(*heightmap("<texture><diffuse>none.ppm</diffuse></texture>")),
+              testing::ElementsAre(testing::HasSubstr("'none.ppm' is not found")));
+  EXPECT_THAT(texts(*heightmap("<texture><size>0</size><diffuse>grass.ppm</diffuse></texture>")),
+              testing::ElementsAre(testing::HasSubstr("the shape is left out")));
 }
 
 TEST(Scene, ActorsWalkAsCylinders) {
   const auto world = world_of(
-      "<actor name='p'><skin><filename>walk.dae</filename></skin><script><loop>false</loop><delay_start>1</delay_start><trajectory id='0' type='walk'>"
-      "<waypoint><time>0</time><pose>1 2 1.1 1.57 0 0</pose></waypoint><waypoint><time>4</time><pose>5 2 1.1 1.57 0 0.5</pose></waypoint>"
+      "<actor "
+      "name='p'><skin><filename>walk.dae</filename></skin><script><loop>false</"
+      "loop><delay_start>1</delay_start><trajectory id='0' type='walk'>"
+      "<waypoint><time>0</time><pose>1 2 1.1 1.57 0 "
+      "0</pose></waypoint><waypoint><time>4</time><pose>5 2 1.1 1.57 0 0.5</pose></waypoint>"
       "</trajectory></script></actor>");
   const ModelInstance& p = world->models.at(0);
   ASSERT_TRUE(p.model->path);
@@ -145,10 +190,15 @@ TEST(Scene, ActorsWalkAsCylinders) {
   EXPECT_FALSE(p.model->path->boolean("ruedo:loop", true));
   EXPECT_EQ(p.X_WM.translation, Vec3(1, 2, 0));
   EXPECT_FALSE(p.model->is_static);
-  const auto odd = world_of("<actor name='p'><script><trajectory id='0'><waypoint><time>1</time><pose>1 2 1 0 0 0</pose></waypoint><waypoint><time>1</time><pose>0 0 1 0 0 0</pose>"
-                            "</waypoint><waypoint><time>2</time><pose>3 2 4 0 0 0</pose></waypoint></trajectory><trajectory id='1'/></script></actor>");
+  const auto odd = world_of(
+      "<actor name='p'><script><trajectory id='0'><waypoint><time>1</time><pose>1 2 1 0 0 "
+      "0</pose></waypoint><waypoint><time>1</time><pose>0 0 1 0 0 0</pose>"
+      "</waypoint><waypoint><time>2</time><pose>3 2 4 0 0 "
+      "0</pose></waypoint></trajectory><trajectory id='1'/></script></actor>");
   EXPECT_EQ(odd->models.at(0).model->path->all("ruedo:waypoint").size(), 2u);
-  EXPECT_THAT(texts(*odd), testing::IsSupersetOf({testing::HasSubstr("one <trajectory>"), testing::HasSubstr("this one is left out"), testing::HasSubstr("walk on z = 0")}));
+  EXPECT_THAT(texts(*odd), testing::IsSupersetOf({testing::HasSubstr("one <trajectory>"),
+                                                  testing::HasSubstr("this one is left out"),
+                                                  testing::HasSubstr("walk on z = 0")}));
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
-// What a SPAWN request's text may reach: the world's folder and the models' folders, and nothing else, said or unsaid.
+// What a SPAWN request's text may reach: the world's folder and the models' folders, and nothing
+// else, said or unsaid.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -14,9 +15,11 @@ namespace fs = std::filesystem;
 
 // The findings and the error of a model that includes, or shows, what the uri names.
 std::string told(const std::string& uri, const std::string& world, bool as_mesh) {
-  const std::string shape = "<collision name='c'><geometry><mesh><uri>" + uri + "</uri></mesh></geometry></collision>";
-  const std::string text = "<sdf version='1.9'><model name='m'><link name='l'>" + (as_mesh ? shape : "") + "</link>" +
-                           (as_mesh ? "" : "<include><uri>" + uri + "</uri><name>i</name></include>") + "</model></sdf>";
+  const std::string shape =
+      "<collision name='c'><geometry><mesh><uri>" + uri + "</uri></mesh></geometry></collision>";
+  const std::string text =
+      "<sdf version='1.9'><model name='m'><link name='l'>" + (as_mesh ? shape : "") + "</link>" +
+      (as_mesh ? "" : "<include><uri>" + uri + "</uri><name>i</name></include>") + "</model></sdf>";
   std::string all;
   try {
     for (const Finding& finding : load_model_text(text, world).findings) all += finding.text + "\n";
@@ -28,23 +31,35 @@ std::string told(const std::string& uri, const std::string& world, bool as_mesh)
 
 TEST(Strangers, ReachTheWorldsFolderAndModelsOnly) {
   const TemporaryFolder folder;
-  const std::string good = "<sdf version='1.9'><model name='good'><link name='l'/></model></sdf>", secret = "the words of another";
+  const std::string good = "<sdf version='1.9'><model name='good'><link name='l'/></model></sdf>",
+                    secret = "the words of another";
   const fs::path top = fs::path(std::string(folder / "x")).parent_path();
-  for (const char* each : {"home/worlds/models/inside", "home/models/beside", "home/.ssh", "home/worlds/.hidden", "home/other"}) fs::create_directories(top / each);
-  const auto write = [&](const std::string& name, const std::string& text) { folder.write(name, text); };
+  for (const char* each : {"home/worlds/models/inside", "home/models/beside", "home/.ssh",
+                           "home/worlds/.hidden", "home/other"})
+    fs::create_directories(top / each);
+  const auto write = [&](const std::string& name, const std::string& text) {
+    folder.write(name, text);
+  };
   write("home/worlds/w.sdf", "<sdf version='1.9'><world name='w'/></sdf>");
-  for (const char* each : {"home/worlds/near.sdf", "home/worlds/models/inside/model.sdf", "home/models/beside/model.sdf"}) write(each, good);
-  for (const char* each : {"home/.ssh/id_rsa", "home/private.sdf", "home/worlds/.hidden/model.sdf", "home/other/model.sdf", "home/worlds/.dot.sdf"}) write(each, secret);
+  for (const char* each : {"home/worlds/near.sdf", "home/worlds/models/inside/model.sdf",
+                           "home/models/beside/model.sdf"})
+    write(each, good);
+  for (const char* each : {"home/.ssh/id_rsa", "home/private.sdf", "home/worlds/.hidden/model.sdf",
+                           "home/other/model.sdf", "home/worlds/.dot.sdf"})
+    write(each, secret);
   fs::create_symlink(top / "home/other/model.sdf", top / "home/worlds/link.sdf");
   fs::create_directories(top / "home/worlds/models/linked");
   fs::create_symlink(top / "home/other/model.sdf", top / "home/worlds/models/linked/model.sdf");
   const std::string world = (top / "home/worlds/w.sdf").string();
 
-  for (const char* uri : {"near.sdf", "model://inside", "model://beside", "../models/beside"}) EXPECT_EQ(told(uri, world, false), "") << uri;
-  for (const std::string uri : {"../private.sdf", "../.ssh/id_rsa", ".hidden", ".dot.sdf", "../other", "link.sdf", "model://linked", "model://.hidden", "model://../other",
-                                "file:///etc/passwd", "/etc/passwd", "/etc", "../nothing.sdf"}) {
+  for (const char* uri : {"near.sdf", "model://inside", "model://beside", "../models/beside"})
+    EXPECT_EQ(told(uri, world, false), "") << uri;
+  for (const std::string uri :
+       {"../private.sdf", "../.ssh/id_rsa", ".hidden", ".dot.sdf", "../other", "link.sdf",
+        "model://linked", "model://.hidden", "model://../other", "file:///etc/passwd",
+        "/etc/passwd", "/etc", "../nothing.sdf"}) {
     for (const bool as_mesh : {false, true}) {
-      if (as_mesh && uri == "model://linked") continue;    // a folder, which no mesh is
+      if (as_mesh && uri == "model://linked") continue;  // a folder, which no mesh is
       const std::string text = told(uri, world, as_mesh);
       EXPECT_THAT(text, testing::HasSubstr("is not found")) << uri;
       EXPECT_THAT(text, testing::Not(testing::HasSubstr("words"))) << uri;

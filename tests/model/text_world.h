@@ -12,11 +12,13 @@
 namespace ruedo::model {
 
 inline std::shared_ptr<const WorldModel> world_of(const std::string& inside) {
-  return load_world_text("<sdf version='1.9'><world name='w'>" + inside + "</world></sdf>", "/nowhere/world.sdf");
+  return load_world_text("<sdf version='1.9'><world name='w'>" + inside + "</world></sdf>",
+                         "/nowhere/world.sdf");
 }
 
 inline const Link& link_of(const Model& model, const char* name) {
-  const auto at = std::find_if(model.links.begin(), model.links.end(), [&](const Link& link) { return link.name == name; });
+  const auto at = std::find_if(model.links.begin(), model.links.end(),
+                               [&](const Link& link) { return link.name == name; });
   if (at == model.links.end()) throw std::runtime_error(std::string("no link ") + name);
   return *at;
 }

@@ -1,5 +1,6 @@
-// What robots' files do in the wild: URDF with a root named world, values as attributes, packages found by the folder
-// they are in; arms without sensors; names with spaces; SDF with the elements of its first versions.
+// What robots' files do in the wild: URDF with a root named world, values as attributes, packages
+// found by the folder they are in; arms without sensors; names with spaces; SDF with the elements
+// of its first versions.
 #include <cstdlib>
 
 #include <gtest/gtest.h>
@@ -18,7 +19,8 @@ std::vector<std::string> texts(const WorldModel& world) {
   return result;
 }
 
-// An arm on a table of the world, 0.7 m up: its links are not loose, and do not lose a link to the world.
+// An arm on a table of the world, 0.7 m up: its links are not loose, and do not lose a link to the
+// world.
 TEST(Urdf, ARootNamedWorldIsTheWorld) {
   TemporaryFolder folder;
   const auto world = load_world(folder.write("arm.urdf", R"(<robot name="arm"><link name="world"/>
@@ -45,20 +47,28 @@ TEST(Urdf, OnlyTheRootMayBeTheWorld) {
     load_world(file);
     FAIL() << "it loads";
   } catch (const InputError& error) {
-    EXPECT_EQ(std::string(error.what()), file + ":2: <link>: 'world' is a reserved name; only the root of all links may have it, which then is the world");
+    EXPECT_EQ(std::string(error.what()),
+              file +
+                  ":2: <link>: 'world' is a reserved name; only the root of all links may have it, "
+                  "which then is the world");
   }
 }
 
 TEST(Urdf, WhatTheWorldLinkShowsIsNamed) {
   TemporaryFolder folder;
-  const auto world = load_world(folder.write("arm.urdf", R"(<robot name="arm"><link name="world"><visual><geometry><box size="1 1 1"/></geometry></visual></link>
+  const auto world = load_world(folder.write(
+      "arm.urdf",
+      R"(<robot name="arm"><link name="world"><visual><geometry><box size="1 1 1"/></geometry></visual></link>
 <link name="base"/><joint name="j" type="fixed"><parent link="world"/><child link="base"/></joint></robot>)"));
-  EXPECT_EQ(texts(*world), (std::vector<std::string>{"the link 'world' is the world itself; its shapes and sensors are left out"}));
+  EXPECT_EQ(texts(*world),
+            (std::vector<std::string>{
+                "the link 'world' is the world itself; its shapes and sensors are left out"}));
 }
 
 TEST(Urdf, GravityIsTurnedOffByTextOrAttribute) {
   TemporaryFolder folder;
-  const auto world = load_world(folder.write("bot.urdf", R"(<robot name="bot"><link name="a"/><link name="b"/><link name="c"/>
+  const auto world = load_world(
+      folder.write("bot.urdf", R"(<robot name="bot"><link name="a"/><link name="b"/><link name="c"/>
 <joint name="ab" type="fixed"><parent link="a"/><child link="b"/></joint><joint name="bc" type="fixed"><parent link="b"/><child link="c"/></joint>
 <gazebo reference="a"><turnGravityOff value="true"/></gazebo><gazebo reference="b"><turnGravityOff>true</turnGravityOff></gazebo>
 <gazebo reference="c"><turnGravityOff value="false"/></gazebo></robot>)"));
@@ -69,27 +79,42 @@ TEST(Urdf, GravityIsTurnedOffByTextOrAttribute) {
 }
 
 constexpr const char* kHinged =
-    "<link name='a'/><link name='b'/><joint name='j' type='revolute'><parent>a</parent><child>b</child><axis><xyz>0 0 1</xyz></axis></joint>";
+    "<link name='a'/><link name='b'/><joint name='j' "
+    "type='revolute'><parent>a</parent><child>b</child><axis><xyz>0 0 1</xyz></axis></joint>";
 
-std::shared_ptr<const WorldModel> world_with(const TemporaryFolder& folder, const std::string& models) {
-  return load_world(folder.write("w.sdf", "<sdf version='1.9'><world name='w'>" + models + "</world></sdf>"));
+std::shared_ptr<const WorldModel> world_with(const TemporaryFolder& folder,
+                                             const std::string& models) {
+  return load_world(
+      folder.write("w.sdf", "<sdf version='1.9'><world name='w'>" + models + "</world></sdf>"));
 }
 
-// An arm without sensors is a robot: its joints can be told what to do. A door is none, until somebody says so.
+// An arm without sensors is a robot: its joints can be told what to do. A door is none, until
+// somebody says so.
 TEST(Robots, AreModelsWhoseJointsTakeCommands) {
   TemporaryFolder folder;
-  const std::string links = R"(<link name="a"/><link name="b"/><joint name="j" type=")", ends = R"("><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint></robot>)";
-  EXPECT_TRUE(load_world(folder.write("arm.urdf", "<robot name='arm'>" + links + "continuous" + ends))->models.back().is_robot());
-  EXPECT_FALSE(load_world(folder.write("box.urdf", "<robot name='box'>" + links + "fixed" + ends))->models.back().is_robot());
-  const auto is_robot = [&](const std::string& inside) { return world_with(folder, "<model name='m'>" + inside + "</model>")->models.at(0).is_robot(); };
+  const std::string
+      links = R"(<link name="a"/><link name="b"/><joint name="j" type=")",
+      ends = R"("><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint></robot>)";
+  EXPECT_TRUE(
+      load_world(folder.write("arm.urdf", "<robot name='arm'>" + links + "continuous" + ends))
+          ->models.back()
+          .is_robot());
+  EXPECT_FALSE(load_world(folder.write("box.urdf", "<robot name='box'>" + links + "fixed" + ends))
+                   ->models.back()
+                   .is_robot());
+  const auto is_robot = [&](const std::string& inside) {
+    return world_with(folder, "<model name='m'>" + inside + "</model>")->models.at(0).is_robot();
+  };
   const std::string hinged = kHinged;
   EXPECT_FALSE(is_robot(hinged));
   EXPECT_TRUE(is_robot(hinged + "<ruedo:joints/>"));
   EXPECT_FALSE(is_robot(hinged + "<ruedo:joints/><static>true</static>"));
   EXPECT_FALSE(is_robot("<link name='a'/><ruedo:joints/>"));
   EXPECT_TRUE(is_robot("<model name='arm'>" + hinged + "<ruedo:joints/></model>"));
-  for (const char* plugin : {"gz-sim-joint-position-controller-system", "libignition-gazebo-joint-controller-system.so", "libgazebo_ros_control.so",
-                             "libgz_ros2_control-system.so", "gz-sim-joint-state-publisher-system", "libgazebo_ros_joint_pose_trajectory.so"}) {
+  for (const char* plugin :
+       {"gz-sim-joint-position-controller-system", "libignition-gazebo-joint-controller-system.so",
+        "libgazebo_ros_control.so", "libgz_ros2_control-system.so",
+        "gz-sim-joint-state-publisher-system", "libgazebo_ros_joint_pose_trajectory.so"}) {
     EXPECT_TRUE(is_robot(hinged + "<plugin name='p' filename='" + plugin + "'/>")) << plugin;
   }
   EXPECT_FALSE(is_robot(hinged + "<plugin name='p' filename='gz-sim-wind-effects-system'/>"));
@@ -99,16 +124,20 @@ TEST(Robots, AreModelsWhoseJointsTakeCommands) {
 TEST(Robots, NamesAreMadeFitForChannels) {
   TemporaryFolder folder;
   const std::string eye = "<link name='l'><sensor name='front eye' type='imu'/></link>";
-  const auto world = world_with(folder, "<model name='cart 1'>" + eye + "</model><model name='cart/1'>" + eye + "</model><model name='a box'><link name='l'/></model>");
+  const auto world =
+      world_with(folder, "<model name='cart 1'>" + eye + "</model><model name='cart/1'>" + eye +
+                             "</model><model name='a box'><link name='l'/></model>");
   ASSERT_EQ(world->models.size(), 3u);
   EXPECT_EQ(world->models[0].name, "cart_1");
   EXPECT_EQ(world->models[1].name, "cart_1_2");
-  EXPECT_EQ(world->models[2].name, "a box");    // no robot: no channel
+  EXPECT_EQ(world->models[2].name, "a box");  // no robot: no channel
   EXPECT_EQ(world->models[0].model->sensors.at(0).name, "front_eye");
-  EXPECT_EQ(texts(*world), (std::vector<std::string>{"the sensor name 'front eye' is not fit for a channel; it is called 'front_eye'",
-                                                     "the sensor name 'front eye' is not fit for a channel; it is called 'front_eye'",
-                                                     "the name is not fit for a channel; the robot is called 'cart_1'",
-                                                     "the name is not fit for a channel; the robot is called 'cart_1_2'"}));
+  EXPECT_EQ(texts(*world),
+            (std::vector<std::string>{
+                "the sensor name 'front eye' is not fit for a channel; it is called 'front_eye'",
+                "the sensor name 'front eye' is not fit for a channel; it is called 'front_eye'",
+                "the name is not fit for a channel; the robot is called 'cart_1'",
+                "the name is not fit for a channel; the robot is called 'cart_1_2'"}));
   folder.write("cart.sdf", "<sdf version='1.9'><model name='cart 1'>" + eye + "</model></sdf>");
   LoadOptions options;
   options.spawns = {{folder / "cart.sdf", "", 3, 3, 0}};
@@ -117,16 +146,23 @@ TEST(Robots, NamesAreMadeFitForChannels) {
   EXPECT_EQ(load_model(folder / "cart.sdf", folder / "w.sdf").name, "cart_1");
 }
 
-// auto="true": a box of 0.2 x 0.4 x 0.6 m and 500 kg/m^3, 1 m up; two spheres on a line; a cylinder that lies.
+// auto="true": a box of 0.2 x 0.4 x 0.6 m and 500 kg/m^3, 1 m up; two spheres on a line; a cylinder
+// that lies.
 TEST(AutoInertia, IsThatOfTheSolids) {
   TemporaryFolder folder;
   const auto world = [&](const std::string& inertial, const std::string& collisions) {
-    return world_with(folder, "<model name='m'><link name='l'>" + inertial + collisions + "</link></model>");
+    return world_with(
+        folder, "<model name='m'><link name='l'>" + inertial + collisions + "</link></model>");
   };
-  const auto of = [&](const std::string& inertial, const std::string& collisions) { return world(inertial, collisions)->models.at(0).model->links[0].inertial; };
+  const auto of = [&](const std::string& inertial, const std::string& collisions) {
+    return world(inertial, collisions)->models.at(0).model->links[0].inertial;
+  };
   const auto moments = [](const Inertial& i) { return Vec3(i.inertia.diagonal()); };
-  const std::string sphere = "<geometry><sphere><radius>0.1</radius></sphere></geometry></collision>";
-  const std::string box = "<collision name='a'><density>500</density><pose>0 0 1 0 0 0</pose><geometry><box><size>0.2 0.4 0.6</size></box></geometry></collision>";
+  const std::string sphere =
+      "<geometry><sphere><radius>0.1</radius></sphere></geometry></collision>";
+  const std::string box =
+      "<collision name='a'><density>500</density><pose>0 0 1 0 0 0</pose><geometry><box><size>0.2 "
+      "0.4 0.6</size></box></geometry></collision>";
   const Inertial one = of("<inertial auto='true'/>", box);
   EXPECT_NEAR(one.mass, 24, 1e-9);
   EXPECT_LT((one.X_LI.translation - Vec3(0, 0, 1)).norm(), 1e-12);
@@ -135,67 +171,98 @@ TEST(AutoInertia, IsThatOfTheSolids) {
   EXPECT_EQ(told.mass, 12);
   EXPECT_LT((moments(told) - Vec3(0.52, 0.4, 0.2)).norm(), 1e-9);
 
-  const Inertial pair = of("<inertial auto='true'><density>3000</density></inertial>", "<collision name='a'><density>1000</density><pose>-0.5 0 0 0 0 0</pose>" + sphere +
-                           "<collision name='b'><pose>0.5 0 0 0 0 0</pose>" + sphere);
+  const Inertial pair =
+      of("<inertial auto='true'><density>3000</density></inertial>",
+         "<collision name='a'><density>1000</density><pose>-0.5 0 0 0 0 0</pose>" + sphere +
+             "<collision name='b'><pose>0.5 0 0 0 0 0</pose>" + sphere);
   const double light = 1000 * 4.0 / 3 * M_PI * 1e-3;
   EXPECT_NEAR(pair.mass, 4 * light, 1e-9);
   EXPECT_LT((pair.X_LI.translation - Vec3(0.25, 0, 0)).norm(), 1e-12);
   EXPECT_NEAR(pair.inertia(0, 0), 4 * light * 0.4 * 0.01, 1e-9);
-  EXPECT_NEAR(pair.inertia(1, 1), 4 * light * 0.4 * 0.01 + light * 0.75 * 0.75 + 3 * light * 0.25 * 0.25, 1e-9);
+  EXPECT_NEAR(pair.inertia(1, 1),
+              4 * light * 0.4 * 0.01 + light * 0.75 * 0.75 + 3 * light * 0.25 * 0.25, 1e-9);
 
-  const Inertial lying = of("<inertial auto='true'/>", "<collision name='a'><pose>0 0 0 0 1.5707963267948966 0</pose><geometry><cylinder><radius>0.1</radius><length>1</length></cylinder></geometry></collision>");
+  const Inertial lying = of("<inertial auto='true'/>",
+                            "<collision name='a'><pose>0 0 0 0 1.5707963267948966 "
+                            "0</pose><geometry><cylinder><radius>0.1</radius><length>1</length></"
+                            "cylinder></geometry></collision>");
   EXPECT_NEAR(lying.mass, 10 * M_PI, 1e-9);
   EXPECT_NEAR(lying.inertia(0, 0), 10 * M_PI * 0.005, 1e-9);
   EXPECT_NEAR(lying.inertia(2, 2), 10 * M_PI * (0.0025 + 1.0 / 12), 1e-9);
   EXPECT_EQ(texts(*world("<inertial auto='true'/>", box)), std::vector<std::string>{});
-  EXPECT_EQ(texts(*world("<inertial auto='true'/>", "")).size(), 1u);    // nothing to compute it from
+  EXPECT_EQ(texts(*world("<inertial auto='true'/>", "")).size(), 1u);  // nothing to compute it from
 }
 
 TEST(OldSdf, JointsNameLinksInAnElement) {
   TemporaryFolder folder;
-  const auto world = world_with(folder, "<model name='m'><link name='a'/><link name='b'><pose>0 0 2 0 0 0</pose></link>"
-      "<joint name='j' type='revolute'><pose>0 0 1 0 0 0</pose><parent><link_name>world</link_name></parent><child><link_name>b</link_name></child><axis><xyz>1 0 0</xyz></axis></joint></model>");
+  const auto world =
+      world_with(folder,
+                 "<model name='m'><link name='a'/><link name='b'><pose>0 0 2 0 0 0</pose></link>"
+                 "<joint name='j' type='revolute'><pose>0 0 1 0 0 "
+                 "0</pose><parent><link_name>world</link_name></parent><child><link_name>b</"
+                 "link_name></child><axis><xyz>1 0 0</xyz></axis></joint></model>");
   EXPECT_EQ(texts(*world), std::vector<std::string>{});
   const Joint& joint = world->models.at(0).model->joints.at(0);
   EXPECT_EQ(joint.parent, -1);
   EXPECT_EQ(joint.child, 1);
-  EXPECT_LT((joint.X_MJ.translation - Vec3(0, 0, 3)).norm(), 1e-12);    // in the child's frame
+  EXPECT_LT((joint.X_MJ.translation - Vec3(0, 0, 3)).norm(), 1e-12);  // in the child's frame
 }
 
 TEST(OldSdf, MaterialScriptsAreTexts) {
   TemporaryFolder folder;
   const auto colours = [&](const std::string& script) {
-    return world_with(folder, "<model name='m'><link name='l'><visual name='v'><geometry><box><size>1 1 1</size></box></geometry><material>" + script + "</material></visual></link></model>");
+    return world_with(folder,
+                      "<model name='m'><link name='l'><visual name='v'><geometry><box><size>1 1 "
+                      "1</size></box></geometry><material>" +
+                          script + "</material></visual></link></model>");
   };
   const auto red = colours("<script>Gazebo/Red</script>");
   EXPECT_EQ(texts(*red), std::vector<std::string>{});
-  EXPECT_EQ(red->models.at(0).model->links[0].visuals[0].material->diffuse, colours("<script><name>Gazebo/Red</name></script>")->models.at(0).model->links[0].visuals[0].material->diffuse);
-  EXPECT_EQ(texts(*colours("<script>Gazebo/Unheard</script>")), (std::vector<std::string>{"the material script 'Gazebo/Unheard' is not known; the colour is grey instead"}));
+  EXPECT_EQ(red->models.at(0).model->links[0].visuals[0].material->diffuse,
+            colours("<script><name>Gazebo/Red</name></script>")
+                ->models.at(0)
+                .model->links[0]
+                .visuals[0]
+                .material->diffuse);
+  EXPECT_EQ(texts(*colours("<script>Gazebo/Unheard</script>")),
+            (std::vector<std::string>{
+                "the material script 'Gazebo/Unheard' is not known; the colour is grey instead"}));
 }
 
 constexpr const char* kTetrahedron =
     "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
 
 std::string robot_with_mesh(const std::string& uri) {
-  return R"(<robot name="bot"><link name="a"><visual><geometry><mesh filename=")" + uri + R"("/></geometry></visual></link></robot>)";
+  return R"(<robot name="bot"><link name="a"><visual><geometry><mesh filename=")" + uri +
+         R"("/></geometry></visual></link></robot>)";
 }
 
-// Without a manifest, and with one of another name: the folder that the robot's file is in has the package's name.
+// Without a manifest, and with one of another name: the folder that the robot's file is in has the
+// package's name.
 TEST(Urdf, PackagesGoByTheFolderThatTheFileIsIn) {
   TemporaryFolder folder;
   folder.write("bot_description/meshes/a.obj", kTetrahedron);
-  const auto world = load_world(folder.write("bot_description/robots/eu/urdf/bot.urdf", robot_with_mesh("package://bot_description/meshes/a.obj")));
+  const auto world =
+      load_world(folder.write("bot_description/robots/eu/urdf/bot.urdf",
+                              robot_with_mesh("package://bot_description/meshes/a.obj")));
   EXPECT_EQ(texts(*world), std::vector<std::string>{});
   folder.write("bot_description/package.xml", "<package><name>bot_descriptions</name></package>");
-  EXPECT_EQ(texts(*load_world(folder / "bot_description/robots/eu/urdf/bot.urdf")), std::vector<std::string>{});
+  EXPECT_EQ(texts(*load_world(folder / "bot_description/robots/eu/urdf/bot.urdf")),
+            std::vector<std::string>{});
 }
 
 // urdfdom leaves out what comes after a fault in a link; here only the faulty part is.
 TEST(Urdf, AFaultInALinkCostsThatPartAlone) {
-  const std::string box = "<geometry><box size='1 1 1'/></geometry>", mass = "<mass value='2'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/>";
-  const auto world = load_world_text("<robot name='r'><link name='a'>\n<inertial>" + mass + "</inertial>\n<visual><origin xyz='0 0 0,5'/>" + box +
-                                     "</visual>\n<visual>" + box + "</visual>\n<visual><geometry/></visual>\n<collision>" + box +
-                                     "</collision>\n<collision><geometry><box size='1 1 ${h}'/></geometry></collision></link></robot>", "/nowhere/r.urdf");
+  const std::string
+      box = "<geometry><box size='1 1 1'/></geometry>",
+      mass = "<mass value='2'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/>";
+  const auto world = load_world_text(
+      "<robot name='r'><link name='a'>\n<inertial>" + mass +
+          "</inertial>\n<visual><origin xyz='0 0 0,5'/>" + box + "</visual>\n<visual>" + box +
+          "</visual>\n<visual><geometry/></visual>\n<collision>" + box +
+          "</collision>\n<collision><geometry><box size='1 1 "
+          "${h}'/></geometry></collision></link></robot>",
+      "/nowhere/r.urdf");
   const Link& link = world->models.back().model->links.at(0);
   EXPECT_EQ(link.visuals.size(), 1u);
   EXPECT_EQ(link.collisions.size(), 1u);
@@ -206,33 +273,45 @@ TEST(Urdf, AFaultInALinkCostsThatPartAlone) {
     lines.push_back(finding.source.line);
   }
   EXPECT_EQ(lines, (std::vector<int>{3, 5, 7}));
-  const auto heavy = load_world_text("<robot name='r'><link name='a'>\n<inertial><mass value='${m}'/></inertial>\n<collision>" + box + "</collision></link></robot>",
-                                     "/nowhere/r.urdf");
+  const auto heavy = load_world_text(
+      "<robot name='r'><link name='a'>\n<inertial><mass value='${m}'/></inertial>\n<collision>" +
+          box + "</collision></link></robot>",
+      "/nowhere/r.urdf");
   EXPECT_EQ(heavy->models.back().model->links.at(0).collisions.size(), 1u);
   ASSERT_FALSE(heavy->findings.empty());
   EXPECT_EQ(heavy->findings[0].source.line, 2);
 }
 
 TEST(Urdf, WhatGazebosBlocksHaveBesidesIsNamed) {
-  const auto world = load_world_text("<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='continuous'><parent link='a'/><child link='b'/></joint>"
-                                     "<gazebo reference='a'><mu1>0.5</mu1><kp>1e6</kp><colision/></gazebo>"
-                                     "<gazebo reference='j'><springStiffness>5</springStiffness><provideFeedback>true</provideFeedback></gazebo></robot>", "/nowhere/r.urdf");
-  EXPECT_EQ(texts(*world), (std::vector<std::string>{"<colision> in <gazebo reference=\"a\"> is not supported and left out",
-                                                     "<springStiffness> in <gazebo reference=\"j\"> is not supported and left out"}));
+  const auto world = load_world_text(
+      "<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='continuous'><parent "
+      "link='a'/><child link='b'/></joint>"
+      "<gazebo reference='a'><mu1>0.5</mu1><kp>1e6</kp><colision/></gazebo>"
+      "<gazebo "
+      "reference='j'><springStiffness>5</springStiffness><provideFeedback>true</provideFeedback></"
+      "gazebo></robot>",
+      "/nowhere/r.urdf");
+  EXPECT_EQ(texts(*world),
+            (std::vector<std::string>{
+                "<colision> in <gazebo reference=\"a\"> is not supported and left out",
+                "<springStiffness> in <gazebo reference=\"j\"> is not supported and left out"}));
 }
 
 // The user's own folder is no package, whatever a file calls it.
 TEST(Urdf, TheHomeFolderIsNoPackage) {
   TemporaryFolder folder;
   folder.write("ann/pictures/a.obj", kTetrahedron);
-  const std::string file = folder.write("ann/downloads/deep/bot.urdf", robot_with_mesh("package://ann/pictures/a.obj"));
+  const std::string file =
+      folder.write("ann/downloads/deep/bot.urdf", robot_with_mesh("package://ann/pictures/a.obj"));
   EXPECT_EQ(texts(*load_world(file)).size(), 0u);
   const char* home = std::getenv("HOME");
   const std::string before = home ? home : "";
   setenv("HOME", (folder / "ann").c_str(), 1);
   const auto told = texts(*load_world(file));
   setenv("HOME", before.c_str(), 1);
-  EXPECT_EQ(told, (std::vector<std::string>{"the mesh 'package://ann/pictures/a.obj' is not found; the shape is left out"}));
+  EXPECT_EQ(told,
+            (std::vector<std::string>{
+                "the mesh 'package://ann/pictures/a.obj' is not found; the shape is left out"}));
 }
 
 }  // namespace

@@ -29,7 +29,9 @@ const char* const kPart = R"xml(<robot xmlns:xacro="http://www.ros.org/wiki/xacr
 struct Packages {
   TemporaryFolder folder;
   Packages() {
-    folder.write("somewhere/package.xml", "<package format='3'><name>parts</name></package>");    // the folder's name is another
+    folder.write(
+        "somewhere/package.xml",
+        "<package format='3'><name>parts</name></package>");  // the folder's name is another
     folder.write("somewhere/urdf/box.xacro", kPart);
     folder.write("bot/package.xml", "<package><name>bot</name></package>");
   }
@@ -44,24 +46,33 @@ TEST(Xacro, IsExpandedWithArgumentsAndPackages) {
   EXPECT_EQ(model.name, "bot");
   EXPECT_EQ(link_of(model, "base").inertial.mass, 3.5);
   EXPECT_EQ(link_of(model, "left_box").collisions.at(0).geometry.size.x(), 1.0);
-  EXPECT_EQ(link_of(model, "left_box").source.str(), packages.folder / "somewhere/urdf/box.xacro:3");
+  EXPECT_EQ(link_of(model, "left_box").source.str(),
+            packages.folder / "somewhere/urdf/box.xacro:3");
   EXPECT_EQ(link_of(model, "base").source.line, 5);
   // A log's header has to know all of them.
-  EXPECT_THAT(world->files_read, testing::IsSupersetOf({packages.folder / "bot/urdf/bot.urdf.xacro", packages.folder / "somewhere/urdf/box.xacro"}));
+  EXPECT_THAT(world->files_read,
+              testing::IsSupersetOf({packages.folder / "bot/urdf/bot.urdf.xacro",
+                                     packages.folder / "somewhere/urdf/box.xacro"}));
   EXPECT_EQ(texts(*world), std::vector<std::string>{});
 }
 
 TEST(Xacro, IsKnownByItsElementsToo) {
   const Packages packages;
   packages.folder.write("bot/bot.urdf", kBase);
-  const auto world = load_world(packages.folder.write("bot/w.sdf", "<sdf version='1.9'><world name='w'><include><uri>bot.urdf</uri></include></world></sdf>"));
+  const auto world = load_world(packages.folder.write(
+      "bot/w.sdf",
+      "<sdf version='1.9'><world name='w'><include><uri>bot.urdf</uri></include></world></sdf>"));
   EXPECT_EQ(world->models.at(0).model->links.size(), 2u);
 }
 
 TEST(Xacro, AnIncludeThatIsNotThereIsPassedOver) {
   const Packages packages;
-  const auto world = load_world(packages.folder.write("bot/bot.xacro", "<robot name='b' xmlns:xacro='x'><xacro:include filename='$(find nowhere)/x.xacro'/><link name='l'/></robot>"));
-  EXPECT_THAT(texts(*world), ElementsAre("the include '$(find) nowhere/x.xacro' is not found; it is passed over"));
+  const auto world = load_world(
+      packages.folder.write("bot/bot.xacro",
+                            "<robot name='b' xmlns:xacro='x'><xacro:include filename='$(find "
+                            "nowhere)/x.xacro'/><link name='l'/></robot>"));
+  EXPECT_THAT(texts(*world),
+              ElementsAre("the include '$(find) nowhere/x.xacro' is not found; it is passed over"));
 }
 
 TEST(Xacro, WhatIsWrongIsSaidInOneLine) {
@@ -75,8 +86,11 @@ TEST(Xacro, WhatIsWrongIsSaidInOneLine) {
     return std::string();
   };
   const std::string head = "<robot name='b' xmlns:xacro='x'>";
-  EXPECT_THAT(error_of(head + "<link name='${nothing}'/></robot>"), testing::AllOf(HasSubstr("bad.xacro: the xacro file cannot be expanded: "), HasSubstr("'nothing' is not defined")));
-  EXPECT_THAT(error_of(head + "<xacro:unknown/></robot>"), HasSubstr("unknown macro name: xacro:unknown"));
+  EXPECT_THAT(error_of(head + "<link name='${nothing}'/></robot>"),
+              testing::AllOf(HasSubstr("bad.xacro: the xacro file cannot be expanded: "),
+                             HasSubstr("'nothing' is not defined")));
+  EXPECT_THAT(error_of(head + "<xacro:unknown/></robot>"),
+              HasSubstr("unknown macro name: xacro:unknown"));
   EXPECT_THAT(error_of(head + "<link"), HasSubstr("not XML"));
 }
 

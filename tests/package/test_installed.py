@@ -14,12 +14,23 @@ SOURCE = Path(os.environ["RUEDO_SOURCE_DIR"])
 BUILD = Path(os.environ["RUEDO_BINARY_DIR"])
 CMAKE = os.environ.get("CMAKE_COMMAND", "cmake")
 EXAMPLE = SOURCE / "docs/example-project"
-CLEAN = {k: v for k, v in os.environ.items() if not k.startswith("RUEDO") and k not in ("LCM_DEFAULT_URL", "PYTHONPATH", "LD_LIBRARY_PATH")}
+CLEAN = {
+    k: v
+    for k, v in os.environ.items()
+    if not k.startswith("RUEDO") and k not in ("LCM_DEFAULT_URL", "PYTHONPATH", "LD_LIBRARY_PATH")
+}
 
 
 def run(*command, good=True, **options):
-    done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                          env={**CLEAN, **options.pop("more", {})}, timeout=600, **options)
+    done = subprocess.run(
+        [str(word) for word in command],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env={**CLEAN, **options.pop("more", {})},
+        timeout=600,
+        **options,
+    )
     assert not good or done.returncode == 0, done.stdout
     return done
 
@@ -38,18 +49,43 @@ def project(prefix, tmp_path_factory):
     folder = tmp_path_factory.mktemp("project")
     shutil.copytree(EXAMPLE, folder / "gate")
     build = folder / "gate/build"
-    run(CMAKE, "-G", "Ninja", "-S", folder / "gate", "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}", f"-DPython3_EXECUTABLE={sys.executable}",
-        "-DCMAKE_BUILD_TYPE=Release")
+    run(
+        CMAKE,
+        "-G",
+        "Ninja",
+        "-S",
+        folder / "gate",
+        "-B",
+        build,
+        f"-DCMAKE_PREFIX_PATH={prefix}",
+        f"-DPython3_EXECUTABLE={sys.executable}",
+        "-DCMAKE_BUILD_TYPE=Release",
+    )
     run(CMAKE, "--build", build)
     return folder / "gate"
 
 
 def ctest(project, *options, good=True):
-    return run("ctest", "--test-dir", project / "build", "--output-on-failure", *options, good=good).stdout
+    return run(
+        "ctest", "--test-dir", project / "build", "--output-on-failure", *options, good=good
+    ).stdout
 
 
-def regress(prefix, *options, good=True, folder=None, world=EXAMPLE / "gate.sdf", client=True, more={}):
-    words = [prefix / "bin/ruedo", "regress", world, "--record", folder / "run.lcm", "--seed", "7", "--duration", "12", *options]
+def regress(
+    prefix, *options, good=True, folder=None, world=EXAMPLE / "gate.sdf", client=True, more={}
+):
+    words = [
+        prefix / "bin/ruedo",
+        "regress",
+        world,
+        "--record",
+        folder / "run.lcm",
+        "--seed",
+        "7",
+        "--duration",
+        "12",
+        *options,
+    ]
     if client:
         words += ["--lockstep", "1", "--client", f"{sys.executable} {EXAMPLE}/through_the_gate.py"]
     return run(*words, good=good, more={"PYTHONPATH": f"{prefix}/share/ruedo/python", **more})
@@ -62,26 +98,40 @@ def test_the_moved_program_finds_its_own(prefix):
     # Worlds and importer come from beside the program, not from where it was built.
     traced = subprocess.run(["strings", prefix / "bin/ruedo"], capture_output=True, text=True)
     if traced.returncode == 0:
-        said = run(prefix / "bin/ruedo", "info", EXAMPLE / "gate.sdf", "--json", cwd="/", good=False).stdout
+        said = run(
+            prefix / "bin/ruedo", "info", EXAMPLE / "gate.sdf", "--json", cwd="/", good=False
+        ).stdout
         assert str(SOURCE / "worlds") not in said
 
 
 def test_the_moved_engine_finds_its_own(prefix):
-    program = ("import ruedo\n"
-               "try: ruedo.Engine('nowhere')\n"
-               "except ValueError as error: print(error)\n"
-               "with ruedo.Engine('arena', disable=['p3at/camera']) as engine:\n"
-               "    engine.step([0.1, 0.0], 20)\n"
-               "    print(engine['lrf.ranges'].shape)\n")
-    said = run(sys.executable, "-c", program, cwd="/", more={"PYTHONPATH": f"{prefix}/share/ruedo/python"}).stdout
+    program = (
+        "import ruedo\n"
+        "try: ruedo.Engine('nowhere')\n"
+        "except ValueError as error: print(error)\n"
+        "with ruedo.Engine('arena', disable=['p3at/camera']) as engine:\n"
+        "    engine.step([0.1, 0.0], 20)\n"
+        "    print(engine['lrf.ranges'].shape)\n"
+    )
+    said = run(
+        sys.executable, "-c", program, cwd="/", more={"PYTHONPATH": f"{prefix}/share/ruedo/python"}
+    ).stdout
     assert f"(searched in {prefix}/share/ruedo/worlds)" in said and said.endswith("(1, 1, 181)\n")
 
 
 def test_pkg_config_leads_to_library_and_server(prefix, tmp_path):
     """Of the same installation."""
-    (tmp_path / "a.cpp").write_text('#include <ruedo/client.h>\n#include <cstdio>\n'
-                                    'int main() { std::puts(ruedo::client::LaunchOptions{}.program.c_str()); return &ruedo::client::launch == nullptr; }\n')
-    flags = run("pkg-config", "--cflags", "--libs", "ruedo", more={"PKG_CONFIG_PATH": str(next(prefix.glob("lib/**/pkgconfig")))}).stdout
+    (tmp_path / "a.cpp").write_text(
+        '#include <ruedo/client.h>\n#include <cstdio>\n'
+        'int main() { std::puts(ruedo::client::LaunchOptions{}.program.c_str()); return &ruedo::client::launch == nullptr; }\n'
+    )
+    flags = run(
+        "pkg-config",
+        "--cflags",
+        "--libs",
+        "ruedo",
+        more={"PKG_CONFIG_PATH": str(next(prefix.glob("lib/**/pkgconfig")))},
+    ).stdout
     run("sh", "-c", f"g++ -std=c++17 a.cpp -o a {flags.strip()}", cwd=tmp_path)
     assert Path(run(tmp_path / "a").stdout.strip()).resolve() == prefix / "bin/ruedo"
 
@@ -96,7 +146,7 @@ def test_the_example_from_nothing_to_green(project):
     assert 1_000 < len(first) < 400_000
     assert "100% tests passed" in ctest(project, "-j", "3")
     run(CMAKE, "--build", project / "build", "--target", "renew-goldens")
-    assert golden.read_bytes() == first    # repeatable: byte by byte
+    assert golden.read_bytes() == first  # repeatable: byte by byte
 
 
 def test_another_way_is_the_first_difference(prefix, tmp_path):
@@ -105,18 +155,28 @@ def test_another_way_is_the_first_difference(prefix, tmp_path):
     regress(prefix, *keep, "--renew", folder=tmp_path)
     regress(prefix, *keep, folder=tmp_path)
     said = regress(prefix, *keep, folder=tmp_path, good=False, more={"SPEED": "0.41"})
-    assert said.returncode == 1 and "the run differs from" in said.stdout and "p3at/pose" in said.stdout
+    assert (
+        said.returncode == 1
+        and "the run differs from" in said.stdout
+        and "p3at/pose" in said.stdout
+    )
 
 
-@pytest.mark.parametrize("options, words", [
-    (["--goal", "4,0,0.3,5"], r"5\.000 s: p3at was not within 0.3 m of \(4, 0\) by 5 s"),
-    (["--clearance", "0.6"], r"s: p3at was 0\.5\d\d m from (left|right)_post/link, at least 0\.6 m"),
-    (["--odometry-error", "0.0000001"], r"s: p3at's odometry was 0\.0\d\d m off"),
-    (["--script", "test -s $RUEDO_LOG && exit 7"], r"the script ended with exit code 7"),
-    (["--robot", "nobody"], r"--robot 'nobody': the world has p3at"),
-    (["--goal", "4,0,0.3"], r"X,Y,RADIUS,BY"),
-    (["--keep", "nothing/*", "--golden", "never.lcm"], r"no message is on such a channel"),
-])
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        (["--goal", "4,0,0.3,5"], r"5\.000 s: p3at was not within 0.3 m of \(4, 0\) by 5 s"),
+        (
+            ["--clearance", "0.6"],
+            r"s: p3at was 0\.5\d\d m from (left|right)_post/link, at least 0\.6 m",
+        ),
+        (["--odometry-error", "0.0000001"], r"s: p3at's odometry was 0\.0\d\d m off"),
+        (["--script", "test -s $RUEDO_LOG && exit 7"], r"the script ended with exit code 7"),
+        (["--robot", "nobody"], r"--robot 'nobody': the world has p3at"),
+        (["--goal", "4,0,0.3"], r"X,Y,RADIUS,BY"),
+        (["--keep", "nothing/*", "--golden", "never.lcm"], r"no message is on such a channel"),
+    ],
+)
 def test_what_does_not_hold_is_said(prefix, options, words, tmp_path):
     said = regress(prefix, *options, folder=tmp_path, good=False)
     assert said.returncode in (1, 2) and re.search(words, said.stdout), said.stdout
@@ -127,8 +187,21 @@ def test_contact_is_said(prefix, tmp_path):
     world = SOURCE / "tests/clients/hall.sdf"
     client = 'import ruedo\nsim = ruedo.connect(timeout=30)\nsim.step(2300, [sim.robot("p3at").move_command("advance", 7.0)])\n'
     (tmp_path / "blind.py").write_text(client)
-    said = regress(prefix, "--no-contact", "--lockstep", "1", "--client", f"{sys.executable} {tmp_path}/blind.py", folder=tmp_path, world=world, client=False, good=False)
-    assert said.returncode == 1 and re.search(r"p3at/\w+ touched wall/link at \(6\.0", said.stdout), said.stdout
+    said = regress(
+        prefix,
+        "--no-contact",
+        "--lockstep",
+        "1",
+        "--client",
+        f"{sys.executable} {tmp_path}/blind.py",
+        folder=tmp_path,
+        world=world,
+        client=False,
+        good=False,
+    )
+    assert said.returncode == 1 and re.search(
+        r"p3at/\w+ touched wall/link at \(6\.0", said.stdout
+    ), said.stdout
 
 
 def test_a_client_that_fails_fails_the_regression(prefix, tmp_path):
@@ -138,5 +211,12 @@ def test_a_client_that_fails_fails_the_regression(prefix, tmp_path):
 
 def test_without_namespaces_it_is_tcp(prefix, tmp_path):
     """The client is told an address of this machine's loopback device."""
-    said = regress(prefix, "--shared-network", "--client", "echo url $LCM_DEFAULT_URL", folder=tmp_path, client=False)
+    said = regress(
+        prefix,
+        "--shared-network",
+        "--client",
+        "echo url $LCM_DEFAULT_URL",
+        folder=tmp_path,
+        client=False,
+    )
     assert re.search(r"url tcpq://127\.0\.0\.1:\d+", said.stdout), said.stdout

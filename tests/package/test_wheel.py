@@ -12,11 +12,23 @@ import pytest
 
 SOURCE = Path(os.environ["RUEDO_SOURCE_DIR"])
 BUILD = Path(os.environ["RUEDO_BINARY_DIR"])
-CLEAN = {k: v for k, v in os.environ.items() if not k.startswith("RUEDO") and k not in ("LCM_DEFAULT_URL", "PYTHONPATH", "LD_LIBRARY_PATH")}
+CLEAN = {
+    k: v
+    for k, v in os.environ.items()
+    if not k.startswith("RUEDO") and k not in ("LCM_DEFAULT_URL", "PYTHONPATH", "LD_LIBRARY_PATH")
+}
 
 
 def run(*command, **options):
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, env=CLEAN, timeout=600, cwd="/", **options)
+    done = subprocess.run(
+        [str(word) for word in command],
+        capture_output=True,
+        text=True,
+        env=CLEAN,
+        timeout=600,
+        cwd="/",
+        **options,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -33,8 +45,23 @@ def venv(wheel, tmp_path_factory):
     """With this environment's numpy and lcm, so that nothing is fetched."""
     folder = tmp_path_factory.mktemp("wheel") / "venv"
     run(sys.executable, "-m", "venv", "--without-pip", folder)
-    run(sys.executable, "-m", "pip", "--python", folder / "bin/python", "install", "--quiet", "--no-deps", "--no-index", wheel)
-    packages = Path(run(folder / "bin/python", "-c", "import sysconfig; print(sysconfig.get_path('purelib'))").strip())
+    run(
+        sys.executable,
+        "-m",
+        "pip",
+        "--python",
+        folder / "bin/python",
+        "install",
+        "--quiet",
+        "--no-deps",
+        "--no-index",
+        wheel,
+    )
+    packages = Path(
+        run(
+            folder / "bin/python", "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"
+        ).strip()
+    )
     (packages / "others.pth").write_text(sysconfig.get_path("purelib") + "\n")
     return folder
 
@@ -43,16 +70,31 @@ def test_the_wheel_is_for_debian_12_and_holds_licences(wheel):
     assert wheel.name.endswith("-py3-none-manylinux_2_36_x86_64.whl")
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
-    assert any(name.endswith(".dist-info/licenses/musl") for name in names) and any(name.endswith(".dist-info/LICENSE") for name in names)
-    assert not [name for name in names if "glibc" in name or "/libc.so" in name or "/libm.so" in name]
+    assert any(name.endswith(".dist-info/licenses/musl") for name in names) and any(
+        name.endswith(".dist-info/LICENSE") for name in names
+    )
+    assert not [
+        name for name in names if "glibc" in name or "/libc.so" in name or "/libm.so" in name
+    ]
 
 
 def test_nothing_is_loaded_from_outside(venv):
     """But for what every Debian has."""
     prefix = run(venv / "bin/ruedo", "--prefix").strip()
-    loaded = [line.split() for line in run("ldd", f"{prefix}/bin/ruedo").splitlines() if "=>" in line]
+    loaded = [
+        line.split() for line in run("ldd", f"{prefix}/bin/ruedo").splitlines() if "=>" in line
+    ]
     outside = {words[0] for words in loaded if not words[2].startswith(str(venv))}
-    assert outside <= {"libstdc++.so.6", "libm.so.6", "libgcc_s.so.1", "libc.so.6", "libz.so.1", "libdl.so.2", "libpthread.so.0", "librt.so.1"}
+    assert outside <= {
+        "libstdc++.so.6",
+        "libm.so.6",
+        "libgcc_s.so.1",
+        "libc.so.6",
+        "libz.so.1",
+        "libdl.so.2",
+        "libpthread.so.0",
+        "librt.so.1",
+    }
 
 
 def test_the_program_finds_worlds_importer_and_renderer(venv, tmp_path):
@@ -60,12 +102,29 @@ def test_the_program_finds_worlds_importer_and_renderer(venv, tmp_path):
     assert str(venv) in run(ruedo, "info", "office")
     run(ruedo, "render", "office", "-o", tmp_path / "office.png")
     assert (tmp_path / "office.png").stat().st_size > 10_000
-    run(ruedo, "run", "arena", "--rate", "max", "--duration", "1", "--seed", "7", "--record", tmp_path / "a.lcm", "--lcm", f"unix://{tmp_path}/bus")
+    run(
+        ruedo,
+        "run",
+        "arena",
+        "--rate",
+        "max",
+        "--duration",
+        "1",
+        "--seed",
+        "7",
+        "--record",
+        tmp_path / "a.lcm",
+        "--lcm",
+        f"unix://{tmp_path}/bus",
+    )
     assert "byte for byte" in run(ruedo, "verify", tmp_path / "a.lcm")
 
 
 def test_launch_and_engine_are_of_the_wheel(venv):
-    said = run(venv / "bin/python", "-c", """
+    said = run(
+        venv / "bin/python",
+        "-c",
+        """
 import ruedo
 print(ruedo.find_ruedo())
 with ruedo.launch("arena", rate="max") as sim:
@@ -75,18 +134,25 @@ with ruedo.launch("arena", rate="max") as sim:
 with ruedo.Engine("arena", disable=["p3at/camera"]) as engine:
     engine.step([0.1, 0.0], 20)
     print(engine["lrf.ranges"].shape)
-""").split("\n")
+""",
+    ).split("\n")
     assert said[0].startswith(str(venv)) and said[1] == "(1, 1, 181)"
 
 
 def test_an_unknown_world_is_told_with_those_that_there_are(venv):
-    said = run(venv / "bin/python", "-c", "import ruedo\ntry: ruedo.launch('arenna')\nexcept ruedo.LaunchError as error: print(error)")
+    said = run(
+        venv / "bin/python",
+        "-c",
+        "import ruedo\ntry: ruedo.launch('arenna')\nexcept ruedo.LaunchError as error: print(error)",
+    )
     assert "arena" in said and "searched" in said and str(venv) in said
 
 
 def test_it_brings_the_cpp_package_and_the_jar(venv):
     prefix = Path(run(venv / "bin/ruedo", "--prefix").strip())
-    assert list(prefix.glob("lib/**/cmake/ruedo/ruedoConfig.cmake")) and list(prefix.glob("lib/**/libruedo_client.a"))
+    assert list(prefix.glob("lib/**/cmake/ruedo/ruedoConfig.cmake")) and list(
+        prefix.glob("lib/**/libruedo_client.a")
+    )
     assert (prefix / "include/ruedo/client.h").is_file()
     with zipfile.ZipFile(run(venv / "bin/ruedo", "--jar").strip()) as jar:
         assert "Automatic-Module-Name: ruedo" in jar.read("META-INF/MANIFEST.MF").decode()

@@ -7,14 +7,18 @@ namespace ruedo::physics::testing {
 namespace {
 
 std::string inertial(const std::string& pose, double mass, double ixx, double iyy, double izz) {
-  return "<inertial><pose>" + pose + "</pose><mass>" + std::to_string(mass) + "</mass><inertia><ixx>" + std::to_string(ixx) + "</ixx><iyy>" + std::to_string(iyy) +
+  return "<inertial><pose>" + pose + "</pose><mass>" + std::to_string(mass) +
+         "</mass><inertia><ixx>" + std::to_string(ixx) + "</ixx><iyy>" + std::to_string(iyy) +
          "</iyy><izz>" + std::to_string(izz) + "</izz></inertia></inertial>";
 }
-std::string hinge(const std::string& name, const std::string& parent, const std::string& child, const std::string& axis, const std::string& more = "") {
-  return "<joint name='" + name + "' type='revolute'><parent>" + parent + "</parent><child>" + child + "</child><axis><xyz>" + axis + "</xyz>" + more + "</axis></joint>";
+std::string hinge(const std::string& name, const std::string& parent, const std::string& child,
+                  const std::string& axis, const std::string& more = "") {
+  return "<joint name='" + name + "' type='revolute'><parent>" + parent + "</parent><child>" +
+         child + "</child><axis><xyz>" + axis + "</xyz>" + more + "</axis></joint>";
 }
 
-// The exact period of a pendulum of that amplitude: 4 sqrt(J / m g r) K(sin(a / 2)), by the arithmetic-geometric mean.
+// The exact period of a pendulum of that amplitude: 4 sqrt(J / m g r) K(sin(a / 2)), by the
+// arithmetic-geometric mean.
 double period(double J, double mgr, double amplitude) {
   double a = 1.0, b = std::cos(amplitude / 2);
   for (int i = 0; i < 30; ++i) {
@@ -28,14 +32,18 @@ double period(double J, double mgr, double amplitude) {
 // Let go at an amplitude, it is there again after its period.
 TEST(Articulated, APendulumHasItsPeriodAtAnyAmplitude) {
   for (const double amplitude : {0.1, 1.5, 3.0}) {
-    // Hangs from (0, 0, 1); at 0 the arm's centre is at x = 0.5, so the start is amplitude - pi / 2 about y.
-    World w("<model name='m'><link name='arm'><pose>0 0 1 0 " + std::to_string(M_PI / 2 - amplitude) + " 0</pose>" + inertial("0.5 0 0 0 0 0", 2, 0.01, 0.1, 0.1) +
-            "</link>" + hinge("j", "world", "arm", "0 1 0") + "</model>", 5000);
+    // Hangs from (0, 0, 1); at 0 the arm's centre is at x = 0.5, so the start is amplitude - pi / 2
+    // about y.
+    World w("<model name='m'><link name='arm'><pose>0 0 1 0 " +
+                std::to_string(M_PI / 2 - amplitude) + " 0</pose>" +
+                inertial("0.5 0 0 0 0 0", 2, 0.01, 0.1, 0.1) + "</link>" +
+                hinge("j", "world", "arm", "0 1 0") + "</model>",
+            5000);
     const double expected = period(0.1 + 2 * 0.25, 2 * 10 * 0.5, amplitude);
     double last = 0.0, crossed = 0.0;
     int crossings = 0;
     double first_crossing = 0.0;
-    for (int i = 1; i < 6000 && crossings < 3; ++i) {    // through the lowest point, each half period
+    for (int i = 1; i < 6000 && crossings < 3; ++i) {  // through the lowest point, each half period
       w.physics.step();
       const double angle = w.physics.joint_position(0) - amplitude;
       if (last < 0.0 && angle >= 0.0) {
@@ -50,16 +58,22 @@ TEST(Articulated, APendulumHasItsPeriodAtAnyAmplitude) {
 }
 
 TEST(Articulated, ADoublePendulumKeepsItsEnergy) {
-  World w("<model name='m'><link name='a'><pose>0 0 2 0 -1 0</pose>" + inertial("0.25 0 0 0 0 0", 1, 0.001, 0.02, 0.02) + "</link>"
-          "<link name='b'><pose relative_to='a'>0.5 0 0 0 0.5 0</pose>" + inertial("0.25 0 0 0 0 0", 1, 0.001, 0.02, 0.02) + "</link>" +
-          hinge("j", "world", "a", "0 1 0") + hinge("k", "a", "b", "0 1 0") + "</model>", 5000);
+  World w("<model name='m'><link name='a'><pose>0 0 2 0 -1 0</pose>" +
+              inertial("0.25 0 0 0 0 0", 1, 0.001, 0.02, 0.02) +
+              "</link>"
+              "<link name='b'><pose relative_to='a'>0.5 0 0 0 0.5 0</pose>" +
+              inertial("0.25 0 0 0 0 0", 1, 0.001, 0.02, 0.02) + "</link>" +
+              hinge("j", "world", "a", "0 1 0") + hinge("k", "a", "b", "0 1 0") + "</model>",
+          5000);
   const auto energy = [&] {
     double sum = 0.0;
     for (const int body : {0, 1}) {
       const Vec3 centre = w.physics.center_of_mass(body);
       const Twist& twist = w.physics.twist(body);
       const Vec3 v = twist.linear + twist.angular.cross(centre - w.physics.pose(body).translation);
-      sum += 0.5 * v.squaredNorm() + 0.5 * twist.angular.dot(w.physics.inertia(body) * twist.angular) + 10 * (centre.z() - 2);
+      sum += 0.5 * v.squaredNorm() +
+             0.5 * twist.angular.dot(w.physics.inertia(body) * twist.angular) +
+             10 * (centre.z() - 2);
     }
     return sum;
   };
@@ -68,13 +82,16 @@ TEST(Articulated, ADoublePendulumKeepsItsEnergy) {
   EXPECT_NEAR(energy(), before, 0.02 * (before - lowest));
 }
 
-// Six links of 0.2 m and 1 kg, and 5 kg at the tip, stretched out; every second joint turns about z, the others lift.
+// Six links of 0.2 m and 1 kg, and 5 kg at the tip, stretched out; every second joint turns about
+// z, the others lift.
 std::string arm() {
   std::string text = "<model name='m'>";
   for (int i = 0; i < 6; ++i) {
     const std::string n = std::to_string(i);
-    text += "<link name='l" + n + "'><pose>" + std::to_string(0.2 * i) + " 0 1 0 0 0</pose>" + inertial("0.1 0 0 0 0 0", i == 5 ? 6 : 1, 0.001, 0.004, 0.004) + "</link>" +
-            hinge("j" + n, i == 0 ? "world" : "l" + std::to_string(i - 1), "l" + n, i % 2 == 0 ? "0 1 0" : "0 0 1", "<limit><effort>500</effort></limit>");
+    text += "<link name='l" + n + "'><pose>" + std::to_string(0.2 * i) + " 0 1 0 0 0</pose>" +
+            inertial("0.1 0 0 0 0 0", i == 5 ? 6 : 1, 0.001, 0.004, 0.004) + "</link>" +
+            hinge("j" + n, i == 0 ? "world" : "l" + std::to_string(i - 1), "l" + n,
+                  i % 2 == 0 ? "0 1 0" : "0 0 1", "<limit><effort>500</effort></limit>");
   }
   return text + "</model>";
 }
@@ -86,16 +103,23 @@ TEST(Articulated, AnArmHoldsItsLoadWithoutCreeping) {
   const double before = w.physics.joint_position(0);
   w.run(10.0);
   for (int i = 0; i < 6; ++i) EXPECT_NEAR(w.physics.joint_velocity(i), 0.0, 1e-4);
-  EXPECT_NEAR(w.physics.joint_position(0), before, 1e-3);    // 1e-4 rad/s
+  EXPECT_NEAR(w.physics.joint_position(0), before, 1e-3);  // 1e-4 rad/s
   EXPECT_LT(std::abs(w.physics.joint_position(0)), 1e-3);
-  // 5 links of 1 kg and the last of 6 kg: 10 (0.1 + 0.3 + 0.5 + 0.7 + 0.9 + 6 * 1.1) N m at the shoulder.
+  // 5 links of 1 kg and the last of 6 kg: 10 (0.1 + 0.3 + 0.5 + 0.7 + 0.9 + 6 * 1.1) N m at the
+  // shoulder.
   EXPECT_NEAR(w.physics.joint_effort(0), -10 * (2.5 + 6.6), 0.5);
 }
 
-// A spring of 40 N m/rad under 2 kg at 0.5 m: k x = m g r cos x, and the friction of the joint lets it come to rest.
+// A spring of 40 N m/rad under 2 kg at 0.5 m: k x = m g r cos x, and the friction of the joint lets
+// it come to rest.
 TEST(Articulated, AJointsSpringHolds) {
-  World w("<model name='m'><link name='arm'><pose>0 0 1 0 0 0</pose>" + inertial("0.5 0 0 0 0 0", 2, 0.01, 0.1, 0.1) + "</link>" +
-          hinge("j", "world", "arm", "0 1 0", "<dynamics><damping>3</damping><spring_stiffness>40</spring_stiffness><spring_reference>0</spring_reference></dynamics>") + "</model>", 5000);
+  World w("<model name='m'><link name='arm'><pose>0 0 1 0 0 0</pose>" +
+              inertial("0.5 0 0 0 0 0", 2, 0.01, 0.1, 0.1) + "</link>" +
+              hinge("j", "world", "arm", "0 1 0",
+                    "<dynamics><damping>3</damping><spring_stiffness>40</"
+                    "spring_stiffness><spring_reference>0</spring_reference></dynamics>") +
+              "</model>",
+          5000);
   w.run(5.0);
   double x = 0.25;
   for (int i = 0; i < 50; ++i) x = 10 * std::cos(x) / 40;

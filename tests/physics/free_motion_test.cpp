@@ -17,9 +17,12 @@ TEST(FreeMotion, FlightIsTheParabolaAtAnyStep) {
   }
 }
 
-// What falls at the start accelerates by gravity in the first state, what stands does not; as soon as they are simulated they say so themselves.
+// What falls at the start accelerates by gravity in the first state, what stands does not; as soon
+// as they are simulated they say so themselves.
 TEST(FreeMotion, TheFirstStateKnowsWhatFalls) {
-  World w(kPlane + thing("falling", "0 0 5 0 0 0", kBall, 1) + thing("standing", "2 0 0.1 0 0 0", kBall, 1) + thing("post", "4 0 1 0 0 0", kBox, 0), 5000);
+  World w(kPlane + thing("falling", "0 0 5 0 0 0", kBall, 1) +
+              thing("standing", "2 0 0.1 0 0 0", kBall, 1) + thing("post", "4 0 1 0 0 0", kBox, 0),
+          5000);
   Snapshot first, second;
   w.physics.read(first);
   w.physics.step();
@@ -32,7 +35,11 @@ TEST(FreeMotion, TheFirstStateKnowsWhatFalls) {
 
 // A body with three moments, spun near its middle axis, tumbles; energy and angular momentum stay.
 TEST(FreeMotion, RotationKeepsEnergyAndAngularMomentum) {
-  World w("<model name='m'><link name='l'><gravity>0</gravity><inertial><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.02</iyy><izz>0.025</izz></inertia></inertial></link></model>", 5000);
+  World w(
+      "<model name='m'><link "
+      "name='l'><gravity>0</gravity><inertial><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.02</"
+      "iyy><izz>0.025</izz></inertia></inertial></link></model>",
+      5000);
   const auto momentum = [&] { return Vec3(w.physics.inertia(0) * w.physics.twist(0).angular); };
   const auto energy = [&] { return 0.5 * w.physics.twist(0).angular.dot(momentum()); };
   w.physics.set_twist(0, {Vec3::Zero(), {0.1, 5.0, 0.1}});
@@ -44,7 +51,7 @@ TEST(FreeMotion, RotationKeepsEnergyAndAngularMomentum) {
     w.physics.step();
     most_turned = std::max(most_turned, (w.physics.twist(0).angular - Vec3(0.1, 5.0, 0.1)).norm());
   }
-  EXPECT_GT(most_turned, 1.5);    // it did tumble
+  EXPECT_GT(most_turned, 1.5);  // it did tumble
   EXPECT_LT((momentum() - L).norm(), 1e-6 * L.norm());
   EXPECT_NEAR(energy() / E, 1.0, 1e-4);
 }

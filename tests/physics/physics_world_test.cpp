@@ -15,31 +15,35 @@ using namespace testing;
 
 struct ShapeCase {
   const char* geometry;
-  double top;       // height above its centre where a ball on the z axis rests
-  double bottom;    // depth below its centre on which it rests
+  double top;     // height above its centre where a ball on the z axis rests
+  double bottom;  // depth below its centre on which it rests
 };
 void PrintTo(const ShapeCase& shape, std::ostream* out) { *out << shape.geometry; }
 
 class EachShape : public ::testing::TestWithParam<ShapeCase> {};
 
 TEST_P(EachShape, CarriesABallAtItsExactHeight) {
-  World w(thing("s", "0 0 1 0 0 0", GetParam().geometry, 0) + thing("ball", "0 0 " + std::to_string(1.11 + GetParam().top) + " 0 0 0", kBall, 1));
+  World w(thing("s", "0 0 1 0 0 0", GetParam().geometry, 0) +
+          thing("ball", "0 0 " + std::to_string(1.11 + GetParam().top) + " 0 0 0", kBall, 1));
   w.run(0.3);
   EXPECT_NEAR(w.physics.pose(0).translation.z(), 1.1 + GetParam().top, 1e-3);
 }
 
 TEST_P(EachShape, RestsOnThePlaneAtItsExactHeight) {
-  World w(kPlane + thing("s", "0 0 " + std::to_string(GetParam().bottom + 0.01) + " 0 0 0", GetParam().geometry, 1));
+  World w(kPlane + thing("s", "0 0 " + std::to_string(GetParam().bottom + 0.01) + " 0 0 0",
+                         GetParam().geometry, 1));
   w.run(0.5);
   EXPECT_NEAR(w.physics.pose(0).translation.z(), GetParam().bottom, 1e-3);
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Shapes, EachShape,
-    ::testing::Values(ShapeCase{"<box><size>0.4 0.6 0.2</size></box>", 0.1, 0.1}, ShapeCase{"<sphere><radius>0.3</radius></sphere>", 0.3, 0.3},
-                      ShapeCase{"<cylinder><radius>0.3</radius><length>0.4</length></cylinder>", 0.2, 0.2},
-                      ShapeCase{"<capsule><radius>0.2</radius><length>0.4</length></capsule>", 0.4, 0.4},
-                      ShapeCase{"<ellipsoid><radii>0.3 0.4 0.2</radii></ellipsoid>", 0.2, 0.2}));
+    ::testing::Values(
+        ShapeCase{"<box><size>0.4 0.6 0.2</size></box>", 0.1, 0.1},
+        ShapeCase{"<sphere><radius>0.3</radius></sphere>", 0.3, 0.3},
+        ShapeCase{"<cylinder><radius>0.3</radius><length>0.4</length></cylinder>", 0.2, 0.2},
+        ShapeCase{"<capsule><radius>0.2</radius><length>0.4</length></capsule>", 0.4, 0.4},
+        ShapeCase{"<ellipsoid><radii>0.3 0.4 0.2</radii></ellipsoid>", 0.2, 0.2}));
 
 TEST(Physics, ABallFallsFreely) {
   World w(thing("ball", "0 0 5 0 0 0", kBall, 1));
@@ -54,7 +58,7 @@ TEST(Physics, TheGroundCarriesTheWeight) {
     w.run(1.0);
     double force = 0.0;
     for (const Contact& contact : w.physics.contacts(0)) {
-      EXPECT_NEAR(contact.normal.z(), 1.0, 1e-9);    // towards the box
+      EXPECT_NEAR(contact.normal.z(), 1.0, 1e-9);  // towards the box
       EXPECT_EQ(contact.body_b, -1);
       EXPECT_NEAR(contact.position.z(), 0.0, 1e-3);
       force += contact.force;
@@ -66,32 +70,40 @@ TEST(Physics, TheGroundCarriesTheWeight) {
 TEST(Physics, FrictionIsTheLowerOfBoth) {
   // On a plane, 1 m/s: stops after v^2 / (2 mu g).
   for (const auto& [of_box, of_floor] : {std::pair(0.2, 1.0), std::pair(1.0, 0.2)}) {
-    World w(thing("floor", "0 0 -0.5 0 0 0", "<box><size>20 20 1</size></box>", 0, of_floor) + thing("box", "0 0 0.1 0 0 0", kBox, 1, of_box));
+    World w(thing("floor", "0 0 -0.5 0 0 0", "<box><size>20 20 1</size></box>", 0, of_floor) +
+            thing("box", "0 0 0.1 0 0 0", kBox, 1, of_box));
     w.run(0.2);
-    w.physics.set_twist(0, {{1, 0, 0}, Vec3::Zero()});    // Eigen leaves {} unset
+    w.physics.set_twist(0, {{1, 0, 0}, Vec3::Zero()});  // Eigen leaves {} unset
     w.run(2.0);
     EXPECT_NEAR(w.physics.pose(0).translation.x(), 0.25, 0.02);
   }
 }
 
 TEST(Physics, ThingsAtRestSleepAndStay) {
-  World w(kPlane + thing("a", "0 0 0.1 0 0 0", kBox, 1) + thing("b", "0 0 0.3 0 0 0", kBox, 1), 5000);
+  World w(kPlane + thing("a", "0 0 0.1 0 0 0", kBox, 1) + thing("b", "0 0 0.3 0 0 0", kBox, 1),
+          5000);
   w.run(5.0);
   EXPECT_TRUE(w.physics.sleeping(0));
   const Vec3 rest = w.physics.pose(1).translation;
   w.run(10.0);
   EXPECT_EQ(w.physics.pose(1).translation, rest);
-  EXPECT_FALSE(w.physics.contacts(0).empty());    // and still touch
+  EXPECT_FALSE(w.physics.contacts(0).empty());  // and still touch
   w.physics.apply_impulse(1, {0.5, 0, 0}, {0, 0, 0});
   w.run(0.1);
   EXPECT_GT(w.physics.pose(1).translation.x(), rest.x() + 0.005);
 }
 
 TEST(Physics, MassCentreAndInertiaOfJoinedLinks) {
-  // 1 kg at the origin and 3 kg at x = 2: centre at 1.5; Izz = 0.1 + 0.3 + 1 * 1.5^2 + 3 * 0.5^2 = 3.4.
-  World w("<model name='m'><link name='a'><inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></inertial></link>"
-          "<link name='b'><pose>1 0 0 0 0 0</pose><inertial><pose>1 0 0 0 0 0</pose><mass>3</mass><inertia><ixx>0.3</ixx><iyy>0.3</iyy><izz>0.3</izz>"
-          "</inertia></inertial></link><joint name='j' type='fixed'><parent>a</parent><child>b</child></joint></model>");
+  // 1 kg at the origin and 3 kg at x = 2: centre at 1.5; Izz = 0.1 + 0.3 + 1 * 1.5^2 + 3 * 0.5^2
+  // = 3.4.
+  World w(
+      "<model name='m'><link "
+      "name='a'><inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></"
+      "inertia></inertial></link>"
+      "<link name='b'><pose>1 0 0 0 0 0</pose><inertial><pose>1 0 0 0 0 "
+      "0</pose><mass>3</mass><inertia><ixx>0.3</ixx><iyy>0.3</iyy><izz>0.3</izz>"
+      "</inertia></inertial></link><joint name='j' "
+      "type='fixed'><parent>a</parent><child>b</child></joint></model>");
   EXPECT_NEAR(w.physics.mass(0), 4.0, 1e-12);
   EXPECT_NEAR(w.physics.center_of_mass(0).x(), 1.5, 1e-12);
   EXPECT_NEAR(w.physics.inertia(0)(2, 2), 3.4, 1e-12);
@@ -101,22 +113,30 @@ TEST(Physics, MassCentreAndInertiaOfJoinedLinks) {
   EXPECT_NEAR(w.physics.twist(0).linear.y(), 1.0, 1e-12);
   w.physics.apply_impulse(0, {0, 0, 0}, {0, 0, 3.4});
   EXPECT_NEAR(w.physics.twist(0).angular.z(), 1.0, 1e-12);
-  EXPECT_NEAR(w.physics.twist(0).linear.y(), 1.0 - 1.5, 1e-12);    // omega x (origin - centre)
+  EXPECT_NEAR(w.physics.twist(0).linear.y(), 1.0 - 1.5, 1e-12);  // omega x (origin - centre)
 }
 
 TEST(Physics, ARotatedInertiaKeepsItsAxes) {
-  World w("<model name='m'><link name='a'><inertial><pose>0 0 0 0.3 0.2 0.9</pose><mass>1</mass><inertia><ixx>1</ixx><iyy>2</iyy><izz>2.5</izz>"
-          "</inertia></inertial></link></model>");
+  World w(
+      "<model name='m'><link name='a'><inertial><pose>0 0 0 0.3 0.2 "
+      "0.9</pose><mass>1</mass><inertia><ixx>1</ixx><iyy>2</iyy><izz>2.5</izz>"
+      "</inertia></inertial></link></model>");
   const Pose X = Pose::from_xyz_rpy({0, 0, 0}, {0.3, 0.2, 0.9});
   const Eigen::Matrix3d R = X.rotation.toRotationMatrix();
   const Eigen::Matrix3d expected = R * Vec3(1, 2, 2.5).asDiagonal() * R.transpose();
   EXPECT_LT((w.physics.inertia(0) - expected).norm(), 1e-9);
 }
 
-std::string hinged(const std::string& axis, const std::string& type = "revolute", const std::string& more = "") {
-  return "<model name='m'><link name='post'><inertial><mass>1</mass></inertial></link><joint name='w' type='fixed'><parent>world</parent><child>post</child></joint>"
-         "<link name='arm'><pose>0 0 1 0 0 0</pose><inertial><pose>0.5 0 0 0 0 0</pose><mass>2</mass><inertia><ixx>0.01</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></inertial></link>"
-         "<joint name='j' type='" + type + "'><parent>post</parent><child>arm</child><axis><xyz>" + axis + "</xyz>" + more + "</axis></joint></model>";
+std::string hinged(const std::string& axis, const std::string& type = "revolute",
+                   const std::string& more = "") {
+  return "<model name='m'><link name='post'><inertial><mass>1</mass></inertial></link><joint "
+         "name='w' type='fixed'><parent>world</parent><child>post</child></joint>"
+         "<link name='arm'><pose>0 0 1 0 0 0</pose><inertial><pose>0.5 0 0 0 0 "
+         "0</pose><mass>2</mass><inertia><ixx>0.01</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></"
+         "inertial></link>"
+         "<joint name='j' type='" +
+         type + "'><parent>post</parent><child>arm</child><axis><xyz>" + axis + "</xyz>" + more +
+         "</axis></joint></model>";
 }
 
 TEST(Joints, AMotorTurnsTheChildPositivelyAboutTheAxis) {
@@ -125,17 +145,22 @@ TEST(Joints, AMotorTurnsTheChildPositivelyAboutTheAxis) {
   w.physics.drive_joint_velocity(0, 2.0, 100.0);
   w.run(4.0);
   EXPECT_NEAR(w.physics.joint_velocity(0), 2.0, 1e-3);
-  EXPECT_NEAR(w.physics.joint_position(0), 8.0, 0.02);    // not wrapped
+  EXPECT_NEAR(w.physics.joint_position(0), 8.0, 0.02);  // not wrapped
   EXPECT_NEAR(heading(w.physics.pose(w.body("m/arm")).rotation), wrap_angle(8.0), 0.02);
 }
 
 TEST(Joints, APendulumKeepsItsPeriod) {
   // Physical pendulum: T = 2 pi sqrt((I + m r^2) / (m g r)), small angles about hanging down.
-  World w("<model name='m'><link name='arm'><pose>0 0 1 0 1.4708 0</pose><inertial><pose>0.5 0 0 0 0 0</pose><mass>2</mass><inertia><ixx>0.01</ixx><iyy>0.1</iyy>"
-          "<izz>0.1</izz></inertia></inertial></link><joint name='j' type='revolute'><parent>world</parent><child>arm</child><axis><xyz>0 1 0</xyz></axis></joint></model>", 1000);
+  World w(
+      "<model name='m'><link name='arm'><pose>0 0 1 0 1.4708 0</pose><inertial><pose>0.5 0 0 0 0 "
+      "0</pose><mass>2</mass><inertia><ixx>0.01</ixx><iyy>0.1</iyy>"
+      "<izz>0.1</izz></inertia></inertial></link><joint name='j' "
+      "type='revolute'><parent>world</parent><child>arm</child><axis><xyz>0 1 "
+      "0</xyz></axis></joint></model>",
+      1000);
   const double period = 2 * M_PI * std::sqrt((0.1 + 2 * 0.25) / (2 * 10 * 0.5));
   w.run(period / 2);
-  EXPECT_NEAR(w.physics.joint_position(0), 0.2, 5e-3);    // from 0.1 rad on one side to the other
+  EXPECT_NEAR(w.physics.joint_position(0), 0.2, 5e-3);  // from 0.1 rad on one side to the other
 }
 
 TEST(Joints, LimitsHold) {
@@ -156,7 +181,7 @@ TEST(Joints, LimitsHoldOnOneSideAndBeyondATurn) {
   EXPECT_NEAR(one.physics.joint_position(0), -0.5, 0.02);
   one.physics.drive_joint_velocity(0, 2.0, 20.0);
   one.run(5.0);
-  EXPECT_GT(one.physics.joint_position(0), 7.0);    // more than a turn
+  EXPECT_GT(one.physics.joint_position(0), 7.0);  // more than a turn
   World wide(hinged("0 0 1", "revolute", "<limit><lower>-4</lower><upper>8</upper></limit>"));
   wide.physics.drive_joint_velocity(0, 2.0, 20.0);
   wide.run(6.0);
@@ -169,13 +194,18 @@ TEST(Joints, LimitsHoldOnOneSideAndBeyondATurn) {
 // What is held more simply than the file says is told, once and with its name.
 TEST(Physics, SimplerJointsAndFrictionAreNamed) {
   const auto shape = [](const std::string& name, const std::string& friction) {
-    return "<collision name='" + name + "'><geometry>" + kBall + "</geometry><surface><friction>" + friction + "</friction></surface></collision>";
+    return "<collision name='" + name + "'><geometry>" + kBall + "</geometry><surface><friction>" +
+           friction + "</friction></surface></collision>";
   };
-  World w("<model name='m'><link name='a'>" + shape("one", "<ode><mu>0.5</mu><mu2>0.5</mu2></ode>") + shape("two", "<ode><mu>0.9</mu><mu2>0.5</mu2></ode>") +
-          shape("three", "<ode><mu>0.9</mu><mu2>0.5</mu2><fdir1>1 0 0</fdir1></ode>") + "</link><link name='b'>" +
-          shape("c", "<torsional><coefficient>1</coefficient></torsional>") +
-          shape("d", "<torsional><coefficient>1</coefficient><patch_radius>0.01</patch_radius></torsional>") +
-          "</link><joint name='j' type='ball'><parent>a</parent><child>b</child></joint></model>");
+  World w(
+      "<model name='m'><link name='a'>" + shape("one", "<ode><mu>0.5</mu><mu2>0.5</mu2></ode>") +
+      shape("two", "<ode><mu>0.9</mu><mu2>0.5</mu2></ode>") +
+      shape("three", "<ode><mu>0.9</mu><mu2>0.5</mu2><fdir1>1 0 0</fdir1></ode>") +
+      "</link><link name='b'>" + shape("c", "<torsional><coefficient>1</coefficient></torsional>") +
+      shape(
+          "d",
+          "<torsional><coefficient>1</coefficient><patch_radius>0.01</patch_radius></torsional>") +
+      "</link><joint name='j' type='ball'><parent>a</parent><child>b</child></joint></model>");
   ASSERT_EQ(w.physics.findings().size(), 3u);
   EXPECT_EQ(w.physics.findings()[0].element, "model m/joint j");
   EXPECT_EQ(w.physics.findings()[1].element, "model m/link a/collision two");
@@ -192,7 +222,7 @@ TEST(Joints, EffortAccelerates) {
 }
 
 TEST(Joints, AMotorHoldsAgainstGravityAndSaysItsEffort) {
-  World w(hinged("0 1 0"));    // the arm lies along x: 2 kg * 10 * 0.5 m = 10 N m, which y turns down
+  World w(hinged("0 1 0"));  // the arm lies along x: 2 kg * 10 * 0.5 m = 10 N m, which y turns down
   w.physics.drive_joint_velocity(0, 0.0, 100.0);
   w.run(0.5);
   EXPECT_NEAR(w.physics.joint_position(0), 0.0, 0.01);
@@ -216,7 +246,8 @@ TEST(Joints, DampingSlowsDownAndNeverReverses) {
 }
 
 TEST(Joints, FrictionHoldsUpToItsEffortAndStopsEvenly) {
-  // I = 0.6, friction 0.6: 6 N m for 0.2 s give (6 - 0.6) / 0.6 * 0.2 = 1.8 rad/s, which end after 1.8 s.
+  // I = 0.6, friction 0.6: 6 N m for 0.2 s give (6 - 0.6) / 0.6 * 0.2 = 1.8 rad/s, which end
+  // after 1.8 s.
   const std::string dry = "<dynamics><friction>0.6</friction></dynamics>";
   World w(hinged("0 0 1", "continuous", dry));
   w.physics.apply_joint_effort(0, 0.5);
@@ -232,11 +263,16 @@ TEST(Joints, FrictionHoldsUpToItsEffortAndStopsEvenly) {
   EXPECT_NEAR(w.physics.joint_velocity(0), 0.0, 1e-6);
 }
 
-// An arm that hangs from a ball or a universal joint, 0.1 rad off in the plane of x and z, or in that of y and z.
+// An arm that hangs from a ball or a universal joint, 0.1 rad off in the plane of x and z, or in
+// that of y and z.
 std::string pendulum(const std::string& type, const std::string& tilt) {
-  return "<model name='m'><link name='arm'><pose>0 0 1 " + tilt + "</pose><inertial><pose>0 0 -0.5 0 0 0</pose><mass>2</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy>"
-         "<izz>0.01</izz></inertia></inertial></link><joint name='j' type='" + type + "'><parent>world</parent><child>arm</child>" +
-         (type == "ball" ? "" : "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 1 0</xyz></axis2>") + "</joint></model>";
+  return "<model name='m'><link name='arm'><pose>0 0 1 " + tilt +
+         "</pose><inertial><pose>0 0 -0.5 0 0 "
+         "0</pose><mass>2</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy>"
+         "<izz>0.01</izz></inertia></inertial></link><joint name='j' type='" +
+         type + "'><parent>world</parent><child>arm</child>" +
+         (type == "ball" ? "" : "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 1 0</xyz></axis2>") +
+         "</joint></model>";
 }
 
 TEST(Joints, ABallAndAUniversalJointSwingBothWays) {
@@ -258,7 +294,8 @@ TEST(Joints, ABallAndAUniversalJointSwingBothWays) {
 // An arm along x that turns about z and then about itself. Its weight pulls about y, which is held.
 std::string cardan(const std::string& first = "", const std::string& second = "") {
   std::string text = hinged("0 0 1", "universal", first);
-  return text.replace(text.find("</joint></model>"), 8, "<axis2><xyz>1 0 0</xyz>" + second + "</axis2></joint>");
+  return text.replace(text.find("</joint></model>"), 8,
+                      "<axis2><xyz>1 0 0</xyz>" + second + "</axis2></joint>");
 }
 
 TEST(Joints, AUniversalJointTakesCommandsForItsFirstAxis) {
@@ -266,11 +303,11 @@ TEST(Joints, AUniversalJointTakesCommandsForItsFirstAxis) {
   w.physics.drive_joint_velocity(0, 2.0, 100.0);
   w.run(4.0);
   EXPECT_NEAR(w.physics.joint_velocity(0), 2.0, 5e-3);
-  EXPECT_NEAR(w.physics.joint_position(0), 8.0, 0.02);    // through more than a turn
+  EXPECT_NEAR(w.physics.joint_position(0), 8.0, 0.02);  // through more than a turn
   EXPECT_NEAR(heading(w.physics.pose(w.body("m/arm")).rotation), wrap_angle(8.0), 0.02);
   EXPECT_NEAR((w.physics.pose(w.body("m/arm")) * Vec3(0.5, 0, 0)).z(), 1.0, 2e-3);
   World pushed(cardan());
-  pushed.physics.apply_joint_effort(0, 0.6);    // on 0.6 kg m^2
+  pushed.physics.apply_joint_effort(0, 0.6);  // on 0.6 kg m^2
   pushed.run(1.0);
   EXPECT_NEAR(pushed.physics.joint_velocity(0), 1.0, 0.01);
 }
@@ -297,13 +334,16 @@ TEST(Joints, LimitsAndBrakesOfAUniversalJoint) {
   EXPECT_NEAR(damped.physics.joint_velocity(0) / rate, std::exp(-1.0), 0.02);
 }
 
-// The second axis is along y, and the arm's weight of 10 N m turns about it: to its limit, and not at all against more friction.
+// The second axis is along y, and the arm's weight of 10 N m turns about it: to its limit, and not
+// at all against more friction.
 TEST(Joints, TheSecondAxisOfAUniversalJointHasItsOwnLimits) {
   const auto fallen = [](const std::string& more) {
     std::string text = hinged("0 0 1", "universal");
-    World w(text.replace(text.find("</joint></model>"), 8, "<axis2><xyz>0 1 0</xyz>" + more + "</axis2></joint>"));
+    World w(text.replace(text.find("</joint></model>"), 8,
+                         "<axis2><xyz>0 1 0</xyz>" + more + "</axis2></joint>"));
     w.run(3.0);
-    return std::asin((1.0 - (w.physics.pose(w.body("m/arm")) * Vec3(0.5, 0, 0)).z()) / 0.5);    // positive about y is down
+    return std::asin((1.0 - (w.physics.pose(w.body("m/arm")) * Vec3(0.5, 0, 0)).z()) /
+                     0.5);  // positive about y is down
   };
   EXPECT_NEAR(fallen("<limit><lower>-0.2</lower><upper>0.3</upper></limit>"), 0.3, 0.02);
   EXPECT_NEAR(fallen("<dynamics><friction>12</friction></dynamics>"), 0.0, 0.01);
@@ -324,9 +364,13 @@ TEST(Joints, ASliderGoesAlongItsAxis) {
 
 TEST(Joints, LinksOfAModelCollideOnlyWhenItSaysSo) {
   const auto gap = [](bool self_collide) {
-    const std::string box = "<inertial><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia></inertial>"
-                            "<collision name='c'><geometry>" + kBox + "</geometry></collision>";
-    World w(kPlane + "<model name='m'><self_collide>" + (self_collide ? "true" : "false") + "</self_collide><link name='low'><pose>0 0 0.1 0 0 0</pose>" + box +
+    const std::string box =
+        "<inertial><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia></"
+        "inertial>"
+        "<collision name='c'><geometry>" +
+        kBox + "</geometry></collision>";
+    World w(kPlane + "<model name='m'><self_collide>" + (self_collide ? "true" : "false") +
+            "</self_collide><link name='low'><pose>0 0 0.1 0 0 0</pose>" + box +
             "</link><link name='high'><pose>0 0 0.31 0 0 0</pose>" + box + "</link></model>");
     w.run(1.0);
     return w.physics.pose(1).translation.z() - w.physics.pose(0).translation.z();
@@ -336,7 +380,9 @@ TEST(Joints, LinksOfAModelCollideOnlyWhenItSaysSo) {
 }
 
 TEST(Physics, AGuidedBodyEndsExactlyThereUnlessItTouches) {
-  World w(kPlane + thing("box", "0 0 0.5 0 0 0", kBox, 1) + thing("wall", "1 0 0.5 0 0 0", "<box><size>0.2 1 1</size></box>", 0), 10000);
+  World w(kPlane + thing("box", "0 0 0.5 0 0 0", kBox, 1) +
+              thing("wall", "1 0 0.5 0 0 0", "<box><size>0.2 1 1</size></box>", 0),
+          10000);
   const int box = w.body("box/l");
   for (int i = 1; i <= 60; ++i) {
     const Pose end{Quat::Identity(), {0.01 * i, 0, 0.5}};
@@ -345,19 +391,24 @@ TEST(Physics, AGuidedBodyEndsExactlyThereUnlessItTouches) {
     EXPECT_EQ(w.physics.pose(box).translation, end.translation);
   }
   for (int i = 61; i <= 120; ++i) {
-    w.physics.guide(box, {{1, 0, 0}, Vec3::Zero()}, {Quat::Identity(), {w.physics.pose(box).translation.x() + 0.01, 0, 0.5}});
+    w.physics.guide(box, {{1, 0, 0}, Vec3::Zero()},
+                    {Quat::Identity(), {w.physics.pose(box).translation.x() + 0.01, 0, 0.5}});
     w.physics.step();
-    EXPECT_LT(w.physics.pose(box).translation.x(), 0.801);    // the wall's face at 0.9, half a box before it
+    EXPECT_LT(w.physics.pose(box).translation.x(),
+              0.801);  // the wall's face at 0.9, half a box before it
   }
 }
 
-// A barrel lies on its side; pushed, it rolls on as fast as it was pushed, for nothing brakes it and nothing drives it.
+// A barrel lies on its side; pushed, it rolls on as fast as it was pushed, for nothing brakes it
+// and nothing drives it.
 TEST(Physics, ARollingCylinderKeepsItsSpeed) {
   const std::string barrel = "<cylinder><radius>0.15</radius><length>0.5</length></cylinder>";
-  const std::string floor = thing("floor", "0 0 -0.1 0 0 0", "<box><size>20 20 0.2</size></box>", 0);
+  const std::string floor =
+      thing("floor", "0 0 -0.1 0 0 0", "<box><size>20 20 0.2</size></box>", 0);
   for (const std::string& ground : {kPlane, floor}) {
     for (const int64_t step_us : {1000, 5000}) {
-      World w(ground + thing("barrel", "0 0 0.15 1.5707963267948966 0 0", barrel, 10, 0.5, 0.2), step_us);
+      World w(ground + thing("barrel", "0 0 0.15 1.5707963267948966 0 0", barrel, 10, 0.5, 0.2),
+              step_us);
       w.run(0.5);
       const int body = w.body("barrel/l");
       w.physics.set_twist(body, {{0.3, 0, 0}, {0, 2, 0}});
@@ -371,16 +422,23 @@ TEST(Physics, ARollingCylinderKeepsItsSpeed) {
 
 TEST(Physics, ConcaveMovingMeshesAreNamed) {
   // An L of two boxes as one polyline: extruded, it is a mesh.
-  const std::string l = "<polyline><point>0 0</point><point>1 0</point><point>1 0.2</point><point>0.2 0.2</point><point>0.2 1</point><point>0 1</point><height>0.2</height></polyline>";
-  const std::string square = "<polyline><point>0 0</point><point>1 0</point><point>1 1</point><point>0 1</point><height>0.2</height></polyline>";
+  const std::string l =
+      "<polyline><point>0 0</point><point>1 0</point><point>1 0.2</point><point>0.2 "
+      "0.2</point><point>0.2 1</point><point>0 1</point><height>0.2</height></polyline>";
+  const std::string square =
+      "<polyline><point>0 0</point><point>1 0</point><point>1 1</point><point>0 "
+      "1</point><height>0.2</height></polyline>";
   EXPECT_EQ(World(thing("m", "0 0 1 0 0 0", l, 1)).physics.findings().size(), 1u);
   EXPECT_EQ(World(thing("m", "0 0 1 0 0 0", square, 1)).physics.findings().size(), 0u);
   EXPECT_EQ(World(thing("m", "0 0 1 0 0 0", l, 0)).physics.findings().size(), 0u);
 }
 
 TEST(Physics, AStaticMeshCarriesAtItsExactHeight) {
-  const std::string slab = "<polyline><point>-1 -1</point><point>1 -1</point><point>1 1</point><point>-1 1</point><height>0.2</height></polyline>";
-  World w(thing("m", "0 0 1 0 0 0", slab, 0) + thing("ball", "0.3 0.2 1.31 0 0 0", kBall, 1) + thing("box", "-0.3 0.2 1.31 0 0 0", kBox, 1));
+  const std::string slab =
+      "<polyline><point>-1 -1</point><point>1 -1</point><point>1 1</point><point>-1 "
+      "1</point><height>0.2</height></polyline>";
+  World w(thing("m", "0 0 1 0 0 0", slab, 0) + thing("ball", "0.3 0.2 1.31 0 0 0", kBall, 1) +
+          thing("box", "-0.3 0.2 1.31 0 0 0", kBox, 1));
   w.run(0.5);
   EXPECT_NEAR(w.physics.pose(0).translation.z(), 1.3, 1e-3);
   EXPECT_NEAR(w.physics.pose(1).translation.z(), 1.3, 1e-3);
@@ -390,9 +448,13 @@ TEST(Physics, ContactsNameTheShapesThatTouch) {
   const auto two_boxes = [](const std::string& name, double height) {
     const std::string z = std::to_string(height);
     const std::string rest = " 0 0 0 0 0</pose><geometry>" + kBox + "</geometry></collision>";
-    return "<model name='" + name + "'><pose>0 0 " + z + " 0 0 0</pose>" + (height > 0 ? "" : "<static>true</static>") +
-           "<link name='l'><inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></inertial>"
-           "<collision name='left'><pose>-0.5" + rest + "<collision name='right'><pose>0.5" + rest + "</link></model>";
+    return "<model name='" + name + "'><pose>0 0 " + z + " 0 0 0</pose>" +
+           (height > 0 ? "" : "<static>true</static>") +
+           "<link "
+           "name='l'><inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></"
+           "inertia></inertial>"
+           "<collision name='left'><pose>-0.5" +
+           rest + "<collision name='right'><pose>0.5" + rest + "</link></model>";
   };
   World w(two_boxes("below", 0) + two_boxes("above", 0.21));
   w.run(0.5);
@@ -409,13 +471,17 @@ TEST(Physics, ContactsNameTheShapesThatTouch) {
 
 TEST(Physics, ContactsComeInAFixedOrder) {
   std::string models = kPlane;
-  for (int i = 0; i < 20; ++i) models += thing("b" + std::to_string(i), std::to_string(i % 5 * 0.25) + " " + std::to_string(i / 5 * 0.25) + " 0.1 0 0 0", kBox, 1);
+  for (int i = 0; i < 20; ++i)
+    models += thing(
+        "b" + std::to_string(i),
+        std::to_string(i % 5 * 0.25) + " " + std::to_string(i / 5 * 0.25) + " 0.1 0 0 0", kBox, 1);
   World w(models);
   w.run(0.3);
   Snapshot snapshot;
   w.physics.read(snapshot);
   ASSERT_GE(snapshot.contacts.size(), 20u);
-  for (size_t i = 1; i < snapshot.contacts.size(); ++i) EXPECT_LE(snapshot.contacts[i - 1].body_a, snapshot.contacts[i].body_a);
+  for (size_t i = 1; i < snapshot.contacts.size(); ++i)
+    EXPECT_LE(snapshot.contacts[i - 1].body_a, snapshot.contacts[i].body_a);
 }
 
 }  // namespace

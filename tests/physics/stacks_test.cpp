@@ -1,4 +1,5 @@
-// Things upon things: they stand, whatever stands on whatever, and nobody else's doings change a bit of them.
+// Things upon things: they stand, whatever stands on whatever, and nobody else's doings change a
+// bit of them.
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -13,7 +14,8 @@ std::string stack(int boxes, double top = 1.0, const std::string& at = "0 0") {
   std::string models;
   for (int i = 0; i < boxes; ++i) {
     const double mass = i + 1 == boxes ? top : 1.0;
-    models += thing("s" + std::to_string(i), at + " " + std::to_string(0.1 + 0.2 * i) + " 0 0 0", kBox, mass, 0.8, mass * 0.04 / 6);
+    models += thing("s" + std::to_string(i), at + " " + std::to_string(0.1 + 0.2 * i) + " 0 0 0",
+                    kBox, mass, 0.8, mass * 0.04 / 6);
   }
   return models;
 }
@@ -21,21 +23,24 @@ std::string stack(int boxes, double top = 1.0, const std::string& at = "0 0") {
 // The furthest that a body is from where it began, all kept awake.
 double drift(World& w, double seconds, const std::string& first = "s0/l") {
   std::vector<Vec3> start;
-  for (size_t i = 0; i < w.layout.bodies.size(); ++i) start.push_back(w.physics.pose(static_cast<int>(i)).translation);
+  for (size_t i = 0; i < w.layout.bodies.size(); ++i)
+    start.push_back(w.physics.pose(static_cast<int>(i)).translation);
   const int body = w.body(first);
   for (int i = 0; i < static_cast<int>(seconds * 1e6) / w.world->step_us; ++i) {
     w.physics.wake(body);
     w.physics.step();
   }
   double furthest = 0.0;
-  for (size_t i = 0; i < start.size(); ++i) furthest = std::max(furthest, (w.physics.pose(static_cast<int>(i)).translation - start[i]).norm());
+  for (size_t i = 0; i < start.size(); ++i)
+    furthest =
+        std::max(furthest, (w.physics.pose(static_cast<int>(i)).translation - start[i]).norm());
   return furthest;
 }
 
 // PyBullet at the same step: 22 mm for 15 boxes (multibodies, 50 iterations), and 100:1 falls.
 TEST(Stacks, FifteenBoxesStandForAMinute) {
   World w(kPlane + stack(15), 5000);
-  EXPECT_LT(drift(w, 5), 2e-3);    // kept awake
+  EXPECT_LT(drift(w, 5), 2e-3);  // kept awake
   w.run(55);
   EXPECT_LT((w.position("s14/l") - Vec3(0, 0, 2.9)).norm(), 3e-3);
 }
@@ -62,7 +67,9 @@ TEST(Stacks, AWallOfBricksStands) {
   int n = 0;
   for (int row = 0; row < 5; ++row) {
     for (int i = 0; i < 5 - row; ++i) {
-      bricks += thing("s" + std::to_string(n++), std::to_string(0.42 * i + 0.21 * row) + " 0 " + std::to_string(0.1 + 0.2 * row) + " 0 0 0",
+      bricks += thing("s" + std::to_string(n++),
+                      std::to_string(0.42 * i + 0.21 * row) + " 0 " +
+                          std::to_string(0.1 + 0.2 * row) + " 0 0 0",
                       "<box><size>0.4 0.2 0.2</size></box>", 2, 0.6, 0.03);
     }
   }
@@ -73,26 +80,34 @@ TEST(Stacks, AWallOfBricksStands) {
 // A hinged thing 70 m away wants shorter substeps, for itself.
 TEST(Stacks, WhatDoesNotTouchChangesNoBit) {
   const std::string windmill =
-      "<model name='mill'><pose>70 0 0 0 0 0</pose><link name='post'><inertial><mass>1</mass></inertial></link>"
-      "<joint name='w' type='fixed'><parent>world</parent><child>post</child></joint><link name='arm'><pose>0 0 1 0 0 0</pose><inertial><pose>0.5 0 0 0 0 0</pose>"
-      "<mass>2</mass></inertial><collision name='c'><geometry>" + kBall + "</geometry></collision></link><joint name='j' type='continuous'><parent>post</parent>"
+      "<model name='mill'><pose>70 0 0 0 0 0</pose><link "
+      "name='post'><inertial><mass>1</mass></inertial></link>"
+      "<joint name='w' type='fixed'><parent>world</parent><child>post</child></joint><link "
+      "name='arm'><pose>0 0 1 0 0 0</pose><inertial><pose>0.5 0 0 0 0 0</pose>"
+      "<mass>2</mass></inertial><collision name='c'><geometry>" +
+      kBall +
+      "</geometry></collision></link><joint name='j' type='continuous'><parent>post</parent>"
       "<child>arm</child><axis><xyz>0 1 0</xyz></axis></joint></model>";
   const auto poses = [](const std::string& others) {
-    World w(kPlane + stack(5) + others + thing("roller", "-70 0 0.1 0 0 0", kBall, others.empty() ? 1 : 2), 5000);
+    World w(kPlane + stack(5) + others +
+                thing("roller", "-70 0 0.1 0 0 0", kBall, others.empty() ? 1 : 2),
+            5000);
     std::vector<Pose> result;
     for (int i = 0; i < 400; ++i) {
       if (i == 50) w.physics.apply_impulse(w.body("s4/l"), {0.8, 0.1, 0}, {0, 0, 0});
       w.physics.step();
-      for (int k = 0; k < 5; ++k) result.push_back(w.physics.pose(w.body("s" + std::to_string(k) + "/l")));
+      for (int k = 0; k < 5; ++k)
+        result.push_back(w.physics.pose(w.body("s" + std::to_string(k) + "/l")));
     }
     return result;
   };
   const std::vector<Pose> alone = poses(""), with_others = poses(windmill);
   for (size_t i = 0; i < alone.size(); ++i) {
-    ASSERT_TRUE(alone[i].translation == with_others[i].translation && alone[i].rotation.coeffs() == with_others[i].rotation.coeffs())
+    ASSERT_TRUE(alone[i].translation == with_others[i].translation &&
+                alone[i].rotation.coeffs() == with_others[i].rotation.coeffs())
         << "box " << i % 5 << " at step " << i / 5;
   }
-  EXPECT_GT((alone.back().translation - alone[4].translation).norm(), 0.01);    // something happened
+  EXPECT_GT((alone.back().translation - alone[4].translation).norm(), 0.01);  // something happened
 }
 
 // The settings of the world act: with two sweeps a stack falls that stands with the default.

@@ -11,15 +11,24 @@
 namespace ruedo::physics {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(), kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(),
+                 kInfinity = std::numeric_limits<double>::infinity();
 
 // A wheel of the given mass and moment on a hinge, beside a heavy and a light box.
-std::shared_ptr<const model::WorldModel> hinged(const std::string& mass, const std::string& moment) {
-  const std::string inertial = "<inertial><mass>" + mass + "</mass><inertia><ixx>" + moment + "</ixx><iyy>" + moment + "</iyy><izz>" + moment + "</izz></inertia></inertial>";
-  return model::load_world_text("<sdf version='1.9'><world name='w'><model name='m'><link name='a'><pose>0 0 1 0 0 0</pose></link><link name='b'><pose>1 0 1 0 0 0</pose>" +
-                                    inertial + "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision></link>"
-                                    "<joint name='j' type='revolute'><parent>a</parent><child>b</child><axis><xyz>0 1 0</xyz></axis></joint></model></world></sdf>",
-                                "/tmp/hinged.sdf");
+std::shared_ptr<const model::WorldModel> hinged(const std::string& mass,
+                                                const std::string& moment) {
+  const std::string inertial = "<inertial><mass>" + mass + "</mass><inertia><ixx>" + moment +
+                               "</ixx><iyy>" + moment + "</iyy><izz>" + moment +
+                               "</izz></inertia></inertial>";
+  return model::load_world_text(
+      "<sdf version='1.9'><world name='w'><model name='m'><link name='a'><pose>0 0 1 0 0 "
+      "0</pose></link><link name='b'><pose>1 0 1 0 0 0</pose>" +
+          inertial +
+          "<collision name='c'><geometry><box><size>1 1 "
+          "1</size></box></geometry></collision></link>"
+          "<joint name='j' type='revolute'><parent>a</parent><child>b</child><axis><xyz>0 1 "
+          "0</xyz></axis></joint></model></world></sdf>",
+      "/tmp/hinged.sdf");
 }
 
 TEST(StateCheck, NamesWhatIsNotFinite) {
@@ -40,17 +49,30 @@ TEST(StateCheck, NamesWhatIsNotFinite) {
   };
   EXPECT_EQ(error_with([](Snapshot&) {}), "");
   using testing::HasSubstr;
-  EXPECT_THAT(error_with([](Snapshot& s) { s.bodies[1].translation.y() = kNaN; }), HasSubstr("at 1.5 s the state of the body 'm/b' is not finite"));
-  EXPECT_THAT(error_with([](Snapshot& s) { s.bodies[0].rotation.w() = kInfinity; }), HasSubstr("the body 'm/a'"));
-  EXPECT_THAT(error_with([](Snapshot& s) { s.body_twists[0].angular.z() = -kInfinity; }), HasSubstr("the body 'm/a'"));
-  EXPECT_THAT(error_with([](Snapshot& s) { s.body_accelerations[1].x() = kNaN; }), HasSubstr("the body 'm/b'"));
-  EXPECT_THAT(error_with([](Snapshot& s) { s.joint_efforts[0] = kInfinity; }), HasSubstr("the joint 'm/j'"));
-  EXPECT_THAT(error_with([](Snapshot& s) { s.contacts.push_back({}), s.contacts.back().body_b = 1, s.contacts.back().force = kNaN; }), HasSubstr("a contact of the body 'm/b'"));
+  EXPECT_THAT(error_with([](Snapshot& s) { s.bodies[1].translation.y() = kNaN; }),
+              HasSubstr("at 1.5 s the state of the body 'm/b' is not finite"));
+  EXPECT_THAT(error_with([](Snapshot& s) { s.bodies[0].rotation.w() = kInfinity; }),
+              HasSubstr("the body 'm/a'"));
+  EXPECT_THAT(error_with([](Snapshot& s) { s.body_twists[0].angular.z() = -kInfinity; }),
+              HasSubstr("the body 'm/a'"));
+  EXPECT_THAT(error_with([](Snapshot& s) { s.body_accelerations[1].x() = kNaN; }),
+              HasSubstr("the body 'm/b'"));
+  EXPECT_THAT(error_with([](Snapshot& s) { s.joint_efforts[0] = kInfinity; }),
+              HasSubstr("the joint 'm/j'"));
+  EXPECT_THAT(error_with([](Snapshot& s) {
+                s.contacts.push_back({}), s.contacts.back().body_b = 1,
+                                          s.contacts.back().force = kNaN;
+              }),
+              HasSubstr("a contact of the body 'm/b'"));
 }
 
 // The largest effort on the lightest and the heaviest of bodies.
 TEST(StateCheck, EffortsThatAreAllowedStayFinite) {
-  for (const auto& [mass, moment] : {std::pair{"1e-9", "1e-15"}, {"1e-9", "1e15"}, {"1e9", "1e-9"}, {"1e9", "1e15"}, {"1", "1"}}) {
+  for (const auto& [mass, moment] : {std::pair{"1e-9", "1e-15"},
+                                     {"1e-9", "1e15"},
+                                     {"1e9", "1e-9"},
+                                     {"1e9", "1e15"},
+                                     {"1", "1"}}) {
     const auto world = hinged(mass, moment);
     const model::BodyLayout layout(*world);
     PhysicsWorld physics(*world, layout);
@@ -59,9 +81,11 @@ TEST(StateCheck, EffortsThatAreAllowedStayFinite) {
       physics.apply_joint_effort(0, step % 2 ? quantity::kEffort.most : -quantity::kEffort.most);
       ASSERT_NO_THROW(physics.step()) << mass << " " << moment << " " << step;
       physics.read(snapshot);
-      ASSERT_NO_THROW(check_finite(snapshot, *world, layout)) << mass << " " << moment << " " << step;
+      ASSERT_NO_THROW(check_finite(snapshot, *world, layout))
+          << mass << " " << moment << " " << step;
     }
-    for (const Twist& twist : snapshot.body_twists) EXPECT_LE(twist.angular.norm(), quantity::kSpeed.most * 1.001);
+    for (const Twist& twist : snapshot.body_twists)
+      EXPECT_LE(twist.angular.norm(), quantity::kSpeed.most * 1.001);
   }
 }
 

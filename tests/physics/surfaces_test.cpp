@@ -1,4 +1,5 @@
-// What a file says of surfaces acts, shape by shape: friction and its directions, slip, torsion, rolling, stiffness, bounce.
+// What a file says of surfaces acts, shape by shape: friction and its directions, slip, torsion,
+// rolling, stiffness, bounce.
 #include <gtest/gtest.h>
 
 #include "world.h"
@@ -7,15 +8,21 @@ namespace ruedo::physics::testing {
 namespace {
 
 // A body of 1 kg of those shapes; `surface` is what stands in <surface> of each.
-std::string shape(const std::string& name, const std::string& pose, const std::string& geometry, const std::string& surface) {
-  return "<collision name='" + name + "'><pose>" + pose + "</pose><geometry>" + geometry + "</geometry><surface>" + surface + "</surface></collision>";
+std::string shape(const std::string& name, const std::string& pose, const std::string& geometry,
+                  const std::string& surface) {
+  return "<collision name='" + name + "'><pose>" + pose + "</pose><geometry>" + geometry +
+         "</geometry><surface>" + surface + "</surface></collision>";
 }
-std::string body(const std::string& name, const std::string& pose, const std::string& shapes, double inertia = 0.01) {
+std::string body(const std::string& name, const std::string& pose, const std::string& shapes,
+                 double inertia = 0.01) {
   const std::string i = std::to_string(inertia);
-  return "<model name='" + name + "'><pose>" + pose + "</pose><link name='l'><inertial><mass>1</mass><inertia><ixx>" + i + "</ixx><iyy>" + i + "</iyy><izz>" + i +
-         "</izz></inertia></inertial>" + shapes + "</link></model>";
+  return "<model name='" + name + "'><pose>" + pose +
+         "</pose><link name='l'><inertial><mass>1</mass><inertia><ixx>" + i + "</ixx><iyy>" + i +
+         "</iyy><izz>" + i + "</izz></inertia></inertial>" + shapes + "</link></model>";
 }
-std::string ode(const std::string& friction) { return "<friction><ode>" + friction + "</ode></friction>"; }
+std::string ode(const std::string& friction) {
+  return "<friction><ode>" + friction + "</ode></friction>";
+}
 
 // Pushed at 1 m/s at an angle (rad) to x; where it is 2 s later.
 Vec3 slide(const std::string& surface, double angle = 0.0, const std::string& yaw = "0") {
@@ -44,29 +51,46 @@ TEST(Surfaces, FrictionDirectionsTurnWithTheShape) {
   EXPECT_NEAR(slide(two, 0.0, "1.5707963267948966").norm(), 1.0 / 4, 5e-3);
 }
 
-// A slab on two feet, one of them of ice: pushed, it turns about the other. As one body of one friction it would not.
+// A slab on two feet, one of them of ice: pushed, it turns about the other. As one body of one
+// friction it would not.
 TEST(Surfaces, FrictionBelongsToAShape) {
   const std::string foot = "<box><size>0.1 0.1 0.1</size></box>";
-  World w(kPlane + body("b", "0 0 0.05 0 0 0", shape("rubber", "0 0.3 0 0 0 0", foot, ode("<mu>1</mu><mu2>1</mu2>")) +
-                                                 shape("ice", "0 -0.3 0 0 0 0", foot, ode("<mu>0</mu><mu2>0</mu2>")), 0.1), 5000);
+  World w(kPlane + body("b", "0 0 0.05 0 0 0",
+                        shape("rubber", "0 0.3 0 0 0 0", foot, ode("<mu>1</mu><mu2>1</mu2>")) +
+                            shape("ice", "0 -0.3 0 0 0 0", foot, ode("<mu>0</mu><mu2>0</mu2>")),
+                        0.1),
+          5000);
   w.run(0.2);
   w.physics.set_twist(w.body("b/l"), {{0.5, 0, 0}, Vec3::Zero()});
   w.run(0.3);
   EXPECT_GT(std::abs(heading(w.physics.pose(w.body("b/l")).rotation)), 0.05);
 }
 
-// slip1 of 0.05 m/s per N: 1 kg at a slope of 0.1 rad creeps at slip times m g sin(0.1), over all its contacts.
+// slip1 of 0.05 m/s per N: 1 kg at a slope of 0.1 rad creeps at slip times m g sin(0.1), over all
+// its contacts.
 TEST(Surfaces, SlipYieldsInProportionToTheForce) {
   const double angle = 0.1, slip = 0.4;
-  World w(thing("slope", "0 0 -0.5 0 " + std::to_string(angle) + " 0", "<box><size>10 10 1</size></box>", 0, 1) + body("b", "0 0 0.1035 0 " + std::to_string(angle) + " 0", shape("c", "0 0 0 0 0 0", kBox, ode("<mu>1</mu><mu2>1</mu2><slip1>" + std::to_string(slip) +
-          "</slip1><slip2>" + std::to_string(slip) + "</slip2>"))), 5000);
+  World w(thing("slope", "0 0 -0.5 0 " + std::to_string(angle) + " 0",
+                "<box><size>10 10 1</size></box>", 0, 1) +
+              body("b", "0 0 0.1035 0 " + std::to_string(angle) + " 0",
+                   shape("c", "0 0 0 0 0 0", kBox,
+                         ode("<mu>1</mu><mu2>1</mu2><slip1>" + std::to_string(slip) +
+                             "</slip1><slip2>" + std::to_string(slip) + "</slip2>"))),
+          5000);
   w.run(1.0);
-  EXPECT_NEAR(w.physics.twist(w.body("b/l")).linear.norm(), slip * 10 * std::sin(angle) / 4, 0.01);    // four contacts share it
+  EXPECT_NEAR(w.physics.twist(w.body("b/l")).linear.norm(), slip * 10 * std::sin(angle) / 4,
+              0.01);  // four contacts share it
 }
 
-// A ball that spins on a patch of 2 cm: moment 3 pi / 16 * mu * a * m g, and the spin ends after I w / M.
+// A ball that spins on a patch of 2 cm: moment 3 pi / 16 * mu * a * m g, and the spin ends after I
+// w / M.
 TEST(Surfaces, TorsionalFrictionEndsASpin) {
-  World w(kPlane + body("b", "0 0 0.1 0 0 0", shape("c", "0 0 0 0 0 0", kBall, "<friction><torsional><coefficient>0.5</coefficient><patch_radius>0.02</patch_radius></torsional></friction>")), 5000);
+  World w(
+      kPlane + body("b", "0 0 0.1 0 0 0",
+                    shape("c", "0 0 0 0 0 0", kBall,
+                          "<friction><torsional><coefficient>0.5</coefficient><patch_radius>0.02</"
+                          "patch_radius></torsional></friction>")),
+      5000);
   w.run(0.2);
   w.physics.set_twist(w.body("b/l"), {Vec3::Zero(), {0, 0, 5}});
   const double moment = 3 * M_PI / 16 * 0.5 * 0.02 * 10, ends = 0.01 * 5 / moment;
@@ -78,7 +102,14 @@ TEST(Surfaces, TorsionalFrictionEndsASpin) {
 
 // Rolling friction of c metres: m a r (1 + I / m r^2) = c m g.
 TEST(Surfaces, RollingFrictionBrakesABall) {
-  World w(kPlane + body("b", "0 0 0.1 0 0 0", shape("c", "0 0 0 0 0 0", kBall, "<friction><bullet><friction>1</friction><friction2>1</friction2><rolling_friction>0.002</rolling_friction></bullet></friction>"), 0.004), 5000);
+  World w(
+      kPlane +
+          body("b", "0 0 0.1 0 0 0",
+               shape("c", "0 0 0 0 0 0", kBall,
+                     "<friction><bullet><friction>1</friction><friction2>1</"
+                     "friction2><rolling_friction>0.002</rolling_friction></bullet></friction>"),
+               0.004),
+      5000);
   w.run(0.2);
   w.physics.set_twist(w.body("b/l"), {{1, 0, 0}, {0, 10, 0}});
   w.run(2.0);
@@ -88,19 +119,26 @@ TEST(Surfaces, RollingFrictionBrakesABall) {
 
 // A ball of 1 kg on a spring of 2000 N/m sinks by m g / k.
 TEST(Surfaces, StiffnessIsThatOfTheFile) {
-  World w(kPlane + body("b", "0 0 0.1 0 0 0", shape("c", "0 0 0 0 0 0", kBall, "<contact><ode><kp>2000</kp><kd>60</kd></ode></contact>")), 5000);
+  World w(kPlane + body("b", "0 0 0.1 0 0 0",
+                        shape("c", "0 0 0 0 0 0", kBall,
+                              "<contact><ode><kp>2000</kp><kd>60</kd></ode></contact>")),
+          5000);
   w.run(2.0);
   EXPECT_NEAR(w.position("b/l").z(), 0.1 - 10.0 / 2000, 1e-5);
 }
 
 // From a metre, the bounce reaches e^2 of the height: within a part in a thousand, at all steps.
 TEST(Surfaces, ABounceHasTheFilesRestitution) {
-  const auto bouncing = [](double e) { return "<bounce><restitution_coefficient>" + std::to_string(e) + "</restitution_coefficient></bounce>"; };
+  const auto bouncing = [](double e) {
+    return "<bounce><restitution_coefficient>" + std::to_string(e) +
+           "</restitution_coefficient></bounce>";
+  };
   std::string ground = kPlane;
   ground.insert(ground.find("</collision>"), "<surface>" + bouncing(1.0) + "</surface>");
   for (const int64_t step_us : {1000, 5000, 10'000}) {
     for (const double e : {0.2, 0.5, 1.0}) {
-      World w(ground + body("b", "0 0 1.1 0 0 0", shape("c", "0 0 0 0 0 0", kBall, bouncing(e))), step_us);
+      World w(ground + body("b", "0 0 1.1 0 0 0", shape("c", "0 0 0 0 0 0", kBall, bouncing(e))),
+              step_us);
       double highest = 0.0;
       bool hit = false;
       for (int64_t t = 0; t < 1'300'000; t += step_us) {

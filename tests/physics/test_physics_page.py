@@ -15,8 +15,18 @@ TESTS = ["flight", "tumbling", "pendulum_small", "creep", "bounce_0.5", "spinnin
 
 
 def page(*arguments):
-    environment = {**os.environ, "RUEDO": str(BUILD / "bin/ruedo"), "PYTHONPATH": str(BUILD / "python")}
-    return subprocess.run([sys.executable, PAGE, *arguments], capture_output=True, text=True, timeout=300, env=environment)
+    environment = {
+        **os.environ,
+        "RUEDO": str(BUILD / "bin/ruedo"),
+        "PYTHONPATH": str(BUILD / "python"),
+    }
+    return subprocess.run(
+        [sys.executable, PAGE, *arguments],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        env=environment,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -37,18 +47,28 @@ def test_every_test_has_a_row_with_its_number(out):
 
 def test_the_numbers_are_those_of_the_closed_forms(out):
     numbers = {n["test"]: n for n in json.loads((out / "physics/numbers.json").read_text())}
-    for test, allowed in (("flight", 1e-9), ("tumbling", 1e-4), ("pendulum_small", 1e-3), ("bounce_0.5", 2e-3), ("spinning", 1e-3)):
-        assert numbers[test]["values"]["Ruedo"] == pytest.approx(numbers[test]["reference"], abs=allowed), test
+    for test, allowed in (
+        ("flight", 1e-9),
+        ("tumbling", 1e-4),
+        ("pendulum_small", 1e-3),
+        ("bounce_0.5", 2e-3),
+        ("spinning", 1e-3),
+    ):
+        assert numbers[test]["values"]["Ruedo"] == pytest.approx(
+            numbers[test]["reference"], abs=allowed
+        ), test
     assert numbers["flight"]["reference"] == pytest.approx(5 + 3 - 9.81 / 2)
-    assert numbers["creep"]["values"]["Ruedo"] < 1.0             # mm in 10 s
-    assert numbers["arm_velocity"]["values"]["Ruedo"] < 1e-4     # rad/s
+    assert numbers["creep"]["values"]["Ruedo"] < 1.0  # mm in 10 s
+    assert numbers["arm_velocity"]["values"]["Ruedo"] < 1e-4  # rad/s
 
 
 def test_an_unknown_test_and_a_folder_that_cannot_be_written_are_told(tmp_path):
     done = page("--only", "nonsense")
     assert done.returncode == 2 and "nonsense" in done.stderr
     (tmp_path / "file").write_text("")
-    done = page("--out", tmp_path / "file" / "page", "--no-peers", "--only", "flight", "--steps", "5")
+    done = page(
+        "--out", tmp_path / "file" / "page", "--no-peers", "--only", "flight", "--steps", "5"
+    )
     assert done.returncode == 4 and "--out" in done.stderr
 
 

@@ -14,9 +14,13 @@ class World {
  public:
   // solver: what stands in <bullet>.
   explicit World(const std::string& models, int64_t step_us = 2000, const std::string& solver = "")
-      : world(model::load_world_text("<sdf version='1.9' xmlns:ruedo='https://ruedo.org'><world name='w'><gravity>0 0 -10</gravity>"
-                                     "<physics type='x'><max_step_size>" + std::to_string(static_cast<double>(step_us) * 1e-6) +
-                                     "</max_step_size><bullet>" + solver + "</bullet></physics>" + models + "</world></sdf>", "test.sdf", anywhere())),
+      : world(model::load_world_text("<sdf version='1.9' xmlns:ruedo='https://ruedo.org'><world "
+                                     "name='w'><gravity>0 0 -10</gravity>"
+                                     "<physics type='x'><max_step_size>" +
+                                         std::to_string(static_cast<double>(step_us) * 1e-6) +
+                                         "</max_step_size><bullet>" + solver +
+                                         "</bullet></physics>" + models + "</world></sdf>",
+                                     "test.sdf", anywhere())),
         layout(*world),
         physics(*world, layout) {}
   void run(double seconds) {
@@ -37,23 +41,28 @@ class World {
  private:
   static model::LoadOptions anywhere() {
     model::LoadOptions options;
-    options.allow_absolute = true;    // meshes that a test wrote
+    options.allow_absolute = true;  // meshes that a test wrote
     return options;
   }
 };
 
-inline const std::string kPlane = "<model name='ground'><static>true</static><link name='l'><collision name='c'><geometry><plane><normal>0 0 1"
-                           "</normal></plane></geometry></collision></link></model>";
+inline const std::string kPlane =
+    "<model name='ground'><static>true</static><link name='l'><collision "
+    "name='c'><geometry><plane><normal>0 0 1"
+    "</normal></plane></geometry></collision></link></model>";
 
-inline std::string thing(const std::string& name, const std::string& pose, const std::string& geometry, double mass, double mu = 0.5,
-                  double inertia = 0.01) {
+inline std::string thing(const std::string& name, const std::string& pose,
+                         const std::string& geometry, double mass, double mu = 0.5,
+                         double inertia = 0.01) {
   const std::string i = std::to_string(inertia);
-  return "<model name='" + name + "'><pose>" + pose + "</pose>" + (mass > 0 ? "" : "<static>true</static>") + "<link name='l'>" +
-         (mass > 0 ? "<inertial><mass>" + std::to_string(mass) + "</mass><inertia><ixx>" + i + "</ixx><iyy>" + i + "</iyy><izz>" + i +
-                         "</izz></inertia></inertial>"
+  return "<model name='" + name + "'><pose>" + pose + "</pose>" +
+         (mass > 0 ? "" : "<static>true</static>") + "<link name='l'>" +
+         (mass > 0 ? "<inertial><mass>" + std::to_string(mass) + "</mass><inertia><ixx>" + i +
+                         "</ixx><iyy>" + i + "</iyy><izz>" + i + "</izz></inertia></inertial>"
                    : "") +
-         "<collision name='c'><geometry>" + geometry + "</geometry><surface><friction><ode><mu>" + std::to_string(mu) + "</mu><mu2>" +
-         std::to_string(mu) + "</mu2></ode></friction></surface></collision></link></model>";
+         "<collision name='c'><geometry>" + geometry + "</geometry><surface><friction><ode><mu>" +
+         std::to_string(mu) + "</mu><mu2>" + std::to_string(mu) +
+         "</mu2></ode></friction></surface></collision></link></model>";
 }
 
 inline const std::string kBall = "<sphere><radius>0.1</radius></sphere>";

@@ -10,31 +10,49 @@
 namespace ruedo::robot::testing {
 namespace {
 
-constexpr int8_t kPosition = joint_command_t::POSITION, kVelocity = joint_command_t::VELOCITY, kEffort = joint_command_t::EFFORT;
+constexpr int8_t kPosition = joint_command_t::POSITION, kVelocity = joint_command_t::VELOCITY,
+                 kEffort = joint_command_t::EFFORT;
 
-// The pan turns about z and carries the tilt, which is balanced and turns about y; the lift goes up. Moments of 0.1 kg m^2.
+// The pan turns about z and carries the tilt, which is balanced and turns about y; the lift goes
+// up. Moments of 0.1 kg m^2.
 std::string gimbal() {
-  const std::string inertial = "<inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></inertial>";
+  const std::string inertial =
+      "<inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></"
+      "inertial>";
   std::string text = robot_sdf("r", "0 0 0 0 0 0", "<ruedo:watchdog>0</ruedo:watchdog>");
   text.resize(text.size() - std::string("</model>").size());
-  return text + "<link name='head'><pose>0 0 0.4 0 0 0</pose>" + inertial + "</link><link name='eye'><pose>0 0 0.5 0 0 0</pose>" + inertial +
-         "</link><link name='fork'><pose>0.4 0 0.3 0 0 0</pose>" + inertial + "</link>"
-         "<joint name='pan' type='revolute'><parent>base</parent><child>head</child><axis><xyz>0 0 1</xyz><limit><lower>-1.5</lower><upper>1.5</upper></limit></axis></joint>"
-         "<joint name='tilt' type='revolute'><parent>head</parent><child>eye</child><axis><xyz>0 1 0</xyz><limit><lower>-1</lower><upper>1</upper>"
+  return text + "<link name='head'><pose>0 0 0.4 0 0 0</pose>" + inertial +
+         "</link><link name='eye'><pose>0 0 0.5 0 0 0</pose>" + inertial +
+         "</link><link name='fork'><pose>0.4 0 0.3 0 0 0</pose>" + inertial +
+         "</link>"
+         "<joint name='pan' type='revolute'><parent>base</parent><child>head</child><axis><xyz>0 0 "
+         "1</xyz><limit><lower>-1.5</lower><upper>1.5</upper></limit></axis></joint>"
+         "<joint name='tilt' type='revolute'><parent>head</parent><child>eye</child><axis><xyz>0 1 "
+         "0</xyz><limit><lower>-1</lower><upper>1</upper>"
          "<velocity>0.5</velocity></limit></axis></joint>"
-         "<joint name='lift' type='prismatic'><parent>base</parent><child>fork</child><axis><xyz>0 0 1</xyz><limit><lower>0</lower><upper>0.6</upper></limit></axis></joint></model>";
+         "<joint name='lift' type='prismatic'><parent>base</parent><child>fork</child><axis><xyz>0 "
+         "0 1</xyz><limit><lower>0</lower><upper>0.6</upper></limit></axis></joint></model>";
 }
 
 struct Gimbal : ::testing::Test {
-  void tell(const std::string& joint, int8_t mode, double value) { sim.robots.apply({0, JointCommand{{joint}, {mode}, {value}}}); }
+  void tell(const std::string& joint, int8_t mode, double value) {
+    sim.robots.apply({0, JointCommand{{joint}, {mode}, {value}}});
+  }
   size_t index(const std::string& joint) const {
     for (size_t i = 0; i < sim.layout.joints.size(); ++i) {
-      if (sim.world->models[1].model->joints[static_cast<size_t>(sim.layout.joints[i].joint)].name == joint) return i;
+      if (sim.world->models[1]
+              .model->joints[static_cast<size_t>(sim.layout.joints[i].joint)]
+              .name == joint)
+        return i;
     }
     throw std::logic_error("no joint " + joint);
   }
-  double position(const std::string& joint) const { return sim.state.joint_positions.at(index(joint)); }
-  double rate(const std::string& joint) const { return sim.state.joint_velocities.at(index(joint)); }
+  double position(const std::string& joint) const {
+    return sim.state.joint_positions.at(index(joint));
+  }
+  double rate(const std::string& joint) const {
+    return sim.state.joint_velocities.at(index(joint));
+  }
   Sim sim{plane_sdf() + gimbal()};
 };
 
@@ -47,9 +65,10 @@ TEST_F(Gimbal, GoesToItsPositionsWhileItDrives) {
   EXPECT_NEAR(position("pan"), 0.8, 5e-3);
   EXPECT_NEAR(position("tilt"), -0.6, 5e-3);
   EXPECT_NEAR(position("lift"), 0.25, 5e-3);
-  EXPECT_NEAR(sim.yaw(), 0.8, 1e-9);    // the drive keeps to its closed form
+  EXPECT_NEAR(sim.yaw(), 0.8, 1e-9);  // the drive keeps to its closed form
   // Both turn about the vertical: the head looks where the sum points.
-  EXPECT_NEAR(heading(sim.state.bodies[static_cast<size_t>(sim.body("r/head"))].rotation), 1.6, 1e-2);
+  EXPECT_NEAR(heading(sim.state.bodies[static_cast<size_t>(sim.body("r/head"))].rotation), 1.6,
+              1e-2);
 }
 
 TEST_F(Gimbal, APositionBeyondTheLimitIsTheLimit) {
@@ -60,18 +79,18 @@ TEST_F(Gimbal, APositionBeyondTheLimitIsTheLimit) {
 
 TEST_F(Gimbal, HoldsVelocitiesWithinTheJointsOwn) {
   tell("lift", kVelocity, 0.1);
-  tell("tilt", kVelocity, 2.0);    // 0.5 rad/s is what it can
+  tell("tilt", kVelocity, 2.0);  // 0.5 rad/s is what it can
   sim.run(1.0);
   EXPECT_NEAR(position("lift"), 0.1, 2e-3);
   EXPECT_NEAR(rate("lift"), 0.1, 1e-3);
   EXPECT_NEAR(rate("tilt"), 0.5, 5e-3);
   tell("lift", kVelocity, 0.0);
   sim.run(2.0);
-  EXPECT_NEAR(position("lift"), 0.1, 3e-3);    // against its weight
+  EXPECT_NEAR(position("lift"), 0.1, 3e-3);  // against its weight
 }
 
 TEST_F(Gimbal, AnEffortAccelerates) {
-  tell("pan", kEffort, 0.04);    // on the head and the eye: 0.2 kg m^2
+  tell("pan", kEffort, 0.04);  // on the head and the eye: 0.2 kg m^2
   sim.run(2.0);
   EXPECT_NEAR(rate("pan"), 0.4, 0.01);
   EXPECT_NEAR(sim.state.joint_efforts.at(index("pan")), 0.04, 1e-12);
@@ -80,7 +99,9 @@ TEST_F(Gimbal, AnEffortAccelerates) {
 TEST_F(Gimbal, TheNewestCommandHoldsAndARefusedOneChangesNothing) {
   tell("pan", kVelocity, 0.3);
   tell("pan", kPosition, 0.5);
-  for (const auto& [joint, mode, value] : {std::tuple("pan", int8_t{3}, 1.0), std::tuple("pan", kPosition, std::nan("")), std::tuple("fl_joint", kVelocity, 1.0)}) {
+  for (const auto& [joint, mode, value] :
+       {std::tuple("pan", int8_t{3}, 1.0), std::tuple("pan", kPosition, std::nan("")),
+        std::tuple("fl_joint", kVelocity, 1.0)}) {
     tell(joint, mode, value);
     sim.step();
     ASSERT_EQ(sim.state.motion_ends.size(), 1u) << joint;

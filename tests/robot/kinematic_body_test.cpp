@@ -1,4 +1,5 @@
-// The kinematic robot as a body: cargo, slopes, falls, what carries it, and what it believes of its wheels.
+// The kinematic robot as a body: cargo, slopes, falls, what carries it, and what it believes of its
+// wheels.
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -12,10 +13,15 @@ const std::string kNoWatchdog = "<ruedo:watchdog>0</ruedo:watchdog>";
 
 // The chassis of robot_sdf ends 0.235 m above the ground.
 TEST(KinematicBody, CargoRidesOnItsDeck) {
-  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog + limits(0.6, 1.0, 0.3, 0.3, 0.5)) + box_sdf("cargo", "0 0 0.286 0 0 0", "0.1 0.1 0.1", 2.0, 0.8));
+  Sim sim(plane_sdf() +
+          robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog + limits(0.6, 1.0, 0.3, 0.3, 0.5)) +
+          box_sdf("cargo", "0 0 0.286 0 0 0", "0.1 0.1 0.1", 2.0, 0.8));
   sim.run(0.5);
   const int cargo = sim.body("cargo/l");
-  const auto on_deck = [&] { return Vec3(sim.robot().X_WBase.inverse() * sim.state.bodies[static_cast<size_t>(cargo)].translation); };
+  const auto on_deck = [&] {
+    return Vec3(sim.robot().X_WBase.inverse() *
+                sim.state.bodies[static_cast<size_t>(cargo)].translation);
+  };
   const Vec3 start = on_deck();
   sim.velocity(0.6, 0.0);
   sim.run(3.0);
@@ -27,22 +33,28 @@ TEST(KinematicBody, CargoRidesOnItsDeck) {
   EXPECT_LT((on_deck() - start).norm(), 0.01);
 }
 
-std::string slope(double angle, double mu) {    // through the origin, up along x
-  return box_sdf("slope", std::to_string(0.1 * std::sin(angle)) + " 0 " + std::to_string(-0.1 * std::cos(angle)) + " 0 " + std::to_string(-angle) + " 0", "40 4 0.2", 0.0, mu);
+std::string slope(double angle, double mu) {  // through the origin, up along x
+  return box_sdf("slope",
+                 std::to_string(0.1 * std::sin(angle)) + " 0 " +
+                     std::to_string(-0.1 * std::cos(angle)) + " 0 " + std::to_string(-angle) + " 0",
+                 "40 4 0.2", 0.0, mu);
 }
 
 // A robot climbs what friction holds it on: tan(angle) < mu.
 TEST(KinematicBody, ASlopeCanBeTooSteep) {
   for (const double degrees : {30.0, 45.0}) {
     const double angle = degrees * M_PI / 180;
-    Sim sim(slope(angle, 0.8) + robot_sdf("r", std::to_string(-0.003 * std::sin(angle)) + " 0 " + std::to_string(0.003 * std::cos(angle)) + " 0 " + std::to_string(-angle) + " 0",
+    Sim sim(slope(angle, 0.8) + robot_sdf("r",
+                                          std::to_string(-0.003 * std::sin(angle)) + " 0 " +
+                                              std::to_string(0.003 * std::cos(angle)) + " 0 " +
+                                              std::to_string(-angle) + " 0",
                                           kNoWatchdog + limits(1.0, 1.0, 1.0, 1.0, 1.0)));
     sim.velocity(0.5, 0.0);
     sim.run(3.0);
     const double along = sim.position().x() / std::cos(angle);
     if (degrees < 38.66) {
       EXPECT_NEAR(along, 0.5 * 3.0 - 0.125, 0.05);
-    } else {    // slides at g (sin - mu cos), 1.386 m/s^2
+    } else {  // slides at g (sin - mu cos), 1.386 m/s^2
       EXPECT_NEAR(along, -0.5 * 9.8 * (std::sin(angle) - 0.8 * std::cos(angle)) * 9.0, 0.7);
     }
   }
@@ -63,9 +75,13 @@ TEST(KinematicBody, OnItsBackItIsABody) {
 // On ice a robot pushes with mu m g at most.
 TEST(KinematicBody, OnIceItPushesLittle) {
   std::string ice = plane_sdf();
-  ice.insert(ice.find("</collision>"), "<surface><friction><ode><mu>0.1</mu><mu2>0.1</mu2></ode></friction></surface>");
+  ice.insert(ice.find("</collision>"),
+             "<surface><friction><ode><mu>0.1</mu><mu2>0.1</mu2></ode></friction></surface>");
   for (const bool traction : {true, false}) {
-    Sim sim(ice + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog + (traction ? "" : "<ruedo:traction>false</ruedo:traction>")) + box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"));
+    Sim sim(ice +
+            robot_sdf("r", "0 0 0 0 0 0",
+                      kNoWatchdog + (traction ? "" : "<ruedo:traction>false</ruedo:traction>")) +
+            box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"));
     sim.velocity(1.0, 0.0);
     sim.run(3.0);
     double force = 0.0;
@@ -75,14 +91,21 @@ TEST(KinematicBody, OnIceItPushesLittle) {
 }
 
 std::string mover(const std::string& size, const std::string& waypoints) {
-  return "<model name='mover'><link name='l'><collision name='c'><geometry>" + size + "</geometry></collision></link><ruedo:path>" + waypoints + "</ruedo:path></model>";
+  return "<model name='mover'><link name='l'><collision name='c'><geometry>" + size +
+         "</geometry></collision></link><ruedo:path>" + waypoints + "</ruedo:path></model>";
 }
 
-// A platform of 0.2 m, its top at 0.2 m, goes 2 m ahead in 4 s; the robot on it stays where it is on it, and drives on it.
+// A platform of 0.2 m, its top at 0.2 m, goes 2 m ahead in 4 s; the robot on it stays where it is
+// on it, and drives on it.
 TEST(KinematicBody, APlatformCarriesIt) {
   for (const double v : {0.0, 0.1}) {
-    Sim sim(plane_sdf() + mover("<box><size>3 2 0.2</size></box>", "<ruedo:waypoint>0 0 0 0.1 0 0 0</ruedo:waypoint><ruedo:waypoint>1 0 0 0.1 0 0 0</ruedo:waypoint>"
-                                "<ruedo:waypoint>5 2 0 0.1 0 0 0</ruedo:waypoint><ruedo:loop>false</ruedo:loop>") + robot_sdf("r", "0 0 0.203 0 0 0", kNoWatchdog));
+    Sim sim(
+        plane_sdf() +
+        mover("<box><size>3 2 0.2</size></box>",
+              "<ruedo:waypoint>0 0 0 0.1 0 0 0</ruedo:waypoint><ruedo:waypoint>1 0 0 0.1 0 0 "
+              "0</ruedo:waypoint>"
+              "<ruedo:waypoint>5 2 0 0.1 0 0 0</ruedo:waypoint><ruedo:loop>false</ruedo:loop>") +
+        robot_sdf("r", "0 0 0.203 0 0 0", kNoWatchdog));
     sim.run(1.0);
     sim.velocity(v, 0.0);
     sim.run(5.0);
@@ -92,19 +115,27 @@ TEST(KinematicBody, APlatformCarriesIt) {
 }
 
 TEST(KinematicBody, ATurntableTurnsIt) {
-  Sim sim(plane_sdf() + mover("<cylinder><radius>1</radius><length>0.2</length></cylinder>", "<ruedo:waypoint>0 0 0 0.1 0 0 0</ruedo:waypoint><ruedo:waypoint>1 0 0 0.1 0 0 0</ruedo:waypoint>"
-                              "<ruedo:waypoint>3 0 0 0.1 0 0 1</ruedo:waypoint><ruedo:loop>false</ruedo:loop>") + robot_sdf("r", "0.4 0 0.203 0 0 0", kNoWatchdog));
+  Sim sim(plane_sdf() +
+          mover("<cylinder><radius>1</radius><length>0.2</length></cylinder>",
+                "<ruedo:waypoint>0 0 0 0.1 0 0 0</ruedo:waypoint><ruedo:waypoint>1 0 0 0.1 0 0 "
+                "0</ruedo:waypoint>"
+                "<ruedo:waypoint>3 0 0 0.1 0 0 1</ruedo:waypoint><ruedo:loop>false</ruedo:loop>") +
+          robot_sdf("r", "0.4 0 0.203 0 0 0", kNoWatchdog));
   sim.run(4.0);
   EXPECT_NEAR(sim.yaw(), 1.0, 0.02);
   EXPECT_NEAR(sim.position().x(), 0.4 * std::cos(1.0), 0.02);
   EXPECT_NEAR(sim.position().y(), 0.4 * std::sin(1.0), 0.02);
 }
 
-// Primitives on the odometry: with a radius believed 2 % too large a metre is 1 / 1.02 m, with a track believed 5 % too wide a
-// quarter turn is 1.05 of one.
+// Primitives on the odometry: with a radius believed 2 % too large a metre is 1 / 1.02 m, with a
+// track believed 5 % too wide a quarter turn is 1.05 of one.
 TEST(KinematicBody, PrimitivesOnTheOdometryMissAsARealRobotDoes) {
-  std::string robot = robot_sdf("r", "0 0 0 0 0 0", limits(1, 1, 1, 1, 1) + "<ruedo:primitives>odometry</ruedo:primitives>");
-  robot.insert(robot.find("</model>"), "<ruedo:odometry><ruedo:radius_error>0.02 0.02</ruedo:radius_error><ruedo:track_error>0.05</ruedo:track_error></ruedo:odometry>");
+  std::string robot = robot_sdf(
+      "r", "0 0 0 0 0 0", limits(1, 1, 1, 1, 1) + "<ruedo:primitives>odometry</ruedo:primitives>");
+  robot.insert(
+      robot.find("</model>"),
+      "<ruedo:odometry><ruedo:radius_error>0.02 "
+      "0.02</ruedo:radius_error><ruedo:track_error>0.05</ruedo:track_error></ruedo:odometry>");
   Sim sim(plane_sdf() + robot);
   sim.move(Move::ADVANCE, 1.0);
   sim.run(4.0);

@@ -9,12 +9,14 @@ namespace ruedo::robot::testing {
 namespace {
 
 const std::string kNoWatchdog = "<ruedo:watchdog>0</ruedo:watchdog>";
-constexpr double kFront_m = 0.25;    // of the chassis before base_link
+constexpr double kFront_m = 0.25;  // of the chassis before base_link
 
 class WallAtAnyStep : public ::testing::TestWithParam<int64_t> {};
 
 TEST_P(WallAtAnyStep, AWallStopsTheRobotAtFullSpeed) {
-  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) + box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"), GetParam());
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) +
+              box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"),
+          GetParam());
   sim.velocity(1.2, 0.0);
   double furthest = 0.0;
   for (int i = 0; i < 2'000'000 / GetParam(); ++i) {
@@ -30,11 +32,13 @@ TEST_P(WallAtAnyStep, AWallStopsTheRobotAtFullSpeed) {
   EXPECT_EQ(sim.robot().wheel_v, 1.2);
   EXPECT_NEAR(sim.state.wheel_angles[0], 24.0, 1e-9);
   ASSERT_FALSE(sim.state.contacts.empty());
-  EXPECT_NEAR(sim.state.contacts[0].normal.x(), -1.0, 1e-6);    // from the wall towards the robot
+  EXPECT_NEAR(sim.state.contacts[0].normal.x(), -1.0, 1e-6);  // from the wall towards the robot
 }
 
 TEST_P(WallAtAnyStep, AwayFromTheWallItIsFreeAgain) {
-  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) + box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"), GetParam());
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) +
+              box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"),
+          GetParam());
   sim.velocity(0.8, 0.0);
   sim.run(1.5);
   sim.velocity(-0.5, 0.0);
@@ -47,7 +51,8 @@ TEST_P(WallAtAnyStep, AwayFromTheWallItIsFreeAgain) {
 INSTANTIATE_TEST_SUITE_P(Steps, WallAtAnyStep, ::testing::Values(1000, 5000, 10000, 20000, 50000));
 
 TEST(KinematicContact, TheForceOnAWallIsTheDrivesLimit) {
-  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog + "<ruedo:max_force>60</ruedo:max_force>") +
+  Sim sim(plane_sdf() +
+          robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog + "<ruedo:max_force>60</ruedo:max_force>") +
           box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"));
   sim.velocity(1.0, 0.0);
   sim.run(3.0);
@@ -58,7 +63,8 @@ TEST(KinematicContact, TheForceOnAWallIsTheDrivesLimit) {
 
 TEST(KinematicContact, SlidesAlongASlantedWall) {
   // A wall turned by 30 degrees to the robot's way.
-  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) + box_sdf("wall", "2 0.2 0.5 0 0 0.5236", "8 0.2 1"));
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) +
+          box_sdf("wall", "2 0.2 0.5 0 0 0.5236", "8 0.2 1"));
   sim.velocity(0.5, 0.0);
   sim.run(10.0);
   EXPECT_GT(sim.position().x(), 1.5);
@@ -66,26 +72,30 @@ TEST(KinematicContact, SlidesAlongASlantedWall) {
 
 TEST(KinematicContact, PushesALightBoxNotAHeavyOne) {
   const auto push = [](double mass) {
-    Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) + box_sdf("box", "0.6 0 0.15 0 0 0", "0.3 0.3 0.3", mass, 0.6));
+    Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) +
+            box_sdf("box", "0.6 0 0.15 0 0 0", "0.3 0.3 0.3", mass, 0.6));
     sim.velocity(0.3, 0.0);
     sim.run(4.0);
     return sim.state.bodies[1].translation.x() - 0.6;
   };
-  EXPECT_NEAR(push(5.0), 1.2 - 0.2, 0.05);       // 5 kg, 29 N of friction: pushed nearly as fast as commanded
-  EXPECT_LT(push(100.0), 0.01);                  // 590 N of friction against the robot's weight of 196 N
+  EXPECT_NEAR(push(5.0), 1.2 - 0.2,
+              0.05);             // 5 kg, 29 N of friction: pushed nearly as fast as commanded
+  EXPECT_LT(push(100.0), 0.01);  // 590 N of friction against the robot's weight of 196 N
 }
 
 TEST(KinematicContact, AnotherRobotStopsIt) {
-  Sim sim(plane_sdf() + robot_sdf("a", "0 0 0 0 0 0", kNoWatchdog) + robot_sdf("b", "1.5 0 0 0 0 3.14159265358979", kNoWatchdog));
+  Sim sim(plane_sdf() + robot_sdf("a", "0 0 0 0 0 0", kNoWatchdog) +
+          robot_sdf("b", "1.5 0 0 0 0 3.14159265358979", kNoWatchdog));
   sim.velocity(0.5, 0.0, 0);
   sim.velocity(0.5, 0.0, 1);
   sim.run(4.0);
   EXPECT_NEAR(sim.position(1).x() - sim.position(0).x(), 2 * kFront_m, 5e-3);
-  EXPECT_NEAR(sim.position(0).x(), 0.5, 0.03);    // alike, they hold each other in the middle
+  EXPECT_NEAR(sim.position(0).x(), 0.5, 0.03);  // alike, they hold each other in the middle
 }
 
 TEST(KinematicContact, APrimitiveBlockedByAWallEnds) {
-  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", limits(0.6, 1.0, 0.5, 0.5, 1.0)) + box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"));
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", limits(0.6, 1.0, 0.5, 0.5, 1.0)) +
+          box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"));
   sim.move(Move::ADVANCE, 3.0, 0, 0, 0, 0, 0, 9);
   sim.run(6.0);
   EXPECT_EQ(sim.robot().motion.id, 9);
@@ -98,15 +108,16 @@ TEST(KinematicContact, APrimitiveBlockedByAWallEnds) {
 
 // A velocity holds, and its status says that it leads nowhere, until it does again.
 TEST(KinematicContact, AVelocityBlockedByAWallSaysSo) {
-  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) + box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"));
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) +
+          box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"));
   sim.velocity(0.5, 0.0);
   sim.run(1.0);
-  EXPECT_EQ(sim.robot().motion.reason, Status::REASON_NONE);    // on its way
+  EXPECT_EQ(sim.robot().motion.reason, Status::REASON_NONE);  // on its way
   sim.run(3.0);
   EXPECT_EQ(sim.robot().motion.kind, Status::KIND_VELOCITY);
   EXPECT_EQ(sim.robot().motion.state, Status::STATE_RUNNING);
   EXPECT_EQ(sim.robot().motion.reason, Status::REASON_BLOCKED);
-  sim.velocity(0.5, 0.0);    // said again, it is still blocked
+  sim.velocity(0.5, 0.0);  // said again, it is still blocked
   sim.run(0.1);
   EXPECT_EQ(sim.robot().motion.reason, Status::REASON_BLOCKED);
   sim.velocity(-0.3, 0.0);
@@ -115,7 +126,8 @@ TEST(KinematicContact, AVelocityBlockedByAWallSaysSo) {
 }
 
 TEST(KinematicContact, APrimitiveThatPushesABoxStillEndsAtItsDistance) {
-  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", limits(0.5, 1.0, 0.5, 0.5, 1.0)) + box_sdf("box", "0.6 0 0.15 0 0 0", "0.3 0.3 0.3", 5.0));
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", limits(0.5, 1.0, 0.5, 0.5, 1.0)) +
+          box_sdf("box", "0.6 0 0.15 0 0 0", "0.3 0.3 0.3", 5.0));
   sim.move(Move::ADVANCE, 1.0);
   sim.run(8.0);
   EXPECT_EQ(sim.robot().motion.state, Status::STATE_DONE);
@@ -126,7 +138,9 @@ TEST(KinematicContact, APrimitiveThatPushesABoxStillEndsAtItsDistance) {
 std::string ramp_sdf() { return box_sdf("ramp", "2.435 0 0.2872 0 -0.2618 0", "3 3 0.2"); }
 
 TEST(KinematicContact, ClimbsARampAndHoldsThere) {
-  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog + limits(1.0, 1.0, 1.0, 1.0, 1.0)) + ramp_sdf());
+  Sim sim(plane_sdf() +
+          robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog + limits(1.0, 1.0, 1.0, 1.0, 1.0)) +
+          ramp_sdf());
   sim.velocity(0.5, 0.0);
   sim.run(4.5);
   EXPECT_GT(sim.position().z(), 0.15);
@@ -140,8 +154,9 @@ TEST(KinematicContact, ClimbsARampAndHoldsThere) {
 }
 
 TEST(KinematicContact, TheWayOnARampIsTheCommandedOne) {
-  Sim sim(plane_sdf() + robot_sdf("r", "2.2 0 0.4 0 -0.2618 0", limits(1.0, 1.0, 1.0, 1.0, 1.0)) + ramp_sdf());
-  sim.run(2.0);    // falls onto the ramp
+  Sim sim(plane_sdf() + robot_sdf("r", "2.2 0 0.4 0 -0.2618 0", limits(1.0, 1.0, 1.0, 1.0, 1.0)) +
+          ramp_sdf());
+  sim.run(2.0);  // falls onto the ramp
   const Vec3 before = sim.position();
   sim.move(Move::ADVANCE, 0.8);
   sim.run(3.0);
@@ -152,7 +167,9 @@ TEST(KinematicContact, TheWayOnARampIsTheCommandedOne) {
 }
 
 TEST(KinematicContact, BackOnThePlaneItIsAnalyticAgain) {
-  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog + limits(1.0, 1.0, 1.0, 1.0, 1.0)) + ramp_sdf());
+  Sim sim(plane_sdf() +
+          robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog + limits(1.0, 1.0, 1.0, 1.0, 1.0)) +
+          ramp_sdf());
   sim.velocity(0.5, 0.0);
   sim.run(4.0);
   EXPECT_GT(sim.position().z(), 0.1);
@@ -163,18 +180,20 @@ TEST(KinematicContact, BackOnThePlaneItIsAnalyticAgain) {
 }
 
 TEST(KinematicContact, DrivesOverALowStep) {
-  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog + limits(1.0, 1.0, 1.0, 1.0, 1.0)) +
+  Sim sim(plane_sdf() +
+          robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog + limits(1.0, 1.0, 1.0, 1.0, 1.0)) +
           box_sdf("step", "2 0 0.01 0 0 0", "1 3 0.02"));
   sim.velocity(0.5, 0.0);
   sim.run(4.0);
-  EXPECT_NEAR(sim.position().x(), 0.5 * 4.0 - 0.125, 0.01);    // 0.125 m less for the start
+  EXPECT_NEAR(sim.position().x(), 0.5 * 4.0 - 0.125, 0.01);  // 0.125 m less for the start
   EXPECT_NEAR(sim.position().z(), 0.02, 2e-3);
   sim.run(4.0);
   EXPECT_NEAR(sim.position().z(), 0.0, 1e-9);
 }
 
 TEST(KinematicContact, OnABoxFloorItDrivesTheClosedForm) {
-  Sim sim(box_sdf("floor", "0 0 -0.5 0 0 0", "20 20 1") + robot_sdf("r", "0 0 0.001 0 0 0", limits(1.0, 1.0, 0.5, 1.0, 1.0)));
+  Sim sim(box_sdf("floor", "0 0 -0.5 0 0 0", "20 20 1") +
+          robot_sdf("r", "0 0 0.001 0 0 0", limits(1.0, 1.0, 0.5, 1.0, 1.0)));
   sim.run(1.0);
   sim.move(Move::ADVANCE, 1.0);
   sim.run(4.0);
@@ -187,7 +206,7 @@ TEST(KinematicContact, FallsFreelyAndLands) {
   sim.velocity(0.5, 0.0);
   sim.run(0.3);
   EXPECT_NEAR(sim.position().z(), 1.0 - 0.5 * 9.8 * 0.09, 0.01);
-  EXPECT_NEAR(sim.position().x(), 0.0, 1e-9);    // wheels in the air drive nothing
+  EXPECT_NEAR(sim.position().x(), 0.0, 1e-9);  // wheels in the air drive nothing
   sim.run(3.0);
   EXPECT_NEAR(sim.position().z(), 0.0, 1e-9);
   EXPECT_GT(sim.position().x(), 0.5);
@@ -196,7 +215,8 @@ TEST(KinematicContact, FallsFreelyAndLands) {
 TEST(KinematicContact, APlaneThatIsNotLevelIsARamp) {
   // 0.1 rad about y: x goes down.
   const std::string slope =
-      "<model name='ground'><static>true</static><pose>0 0 0 0 0.1 0</pose><link name='l'><collision name='c'><geometry><plane>"
+      "<model name='ground'><static>true</static><pose>0 0 0 0 0.1 0</pose><link "
+      "name='l'><collision name='c'><geometry><plane>"
       "<normal>0 0 1</normal><size>100 100</size></plane></geometry></collision></link></model>";
   Sim sim(slope + robot_sdf("r", "0 0 0.002 0 0.1 0", limits(1.0, 1.0, 0.5, 1.0, 1.0)));
   sim.run(2.0);
@@ -211,11 +231,13 @@ TEST(KinematicContact, APlaneThatIsNotLevelIsARamp) {
 
 TEST(KinematicContact, AMoverPushesARestingRobot) {
   Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", "<ruedo:max_force>20</ruedo:max_force>") +
-          "<model name='mover'><link name='l'><collision name='c'><geometry><box><size>0.4 0.4 0.4</size></box></geometry></collision></link>"
-          "<ruedo:path><ruedo:waypoint>0 -1 0 0.25 0 0 0</ruedo:waypoint><ruedo:waypoint>4 0 0 0.25 0 0 0</ruedo:waypoint>"
+          "<model name='mover'><link name='l'><collision name='c'><geometry><box><size>0.4 0.4 "
+          "0.4</size></box></geometry></collision></link>"
+          "<ruedo:path><ruedo:waypoint>0 -1 0 0.25 0 0 0</ruedo:waypoint><ruedo:waypoint>4 0 0 "
+          "0.25 0 0 0</ruedo:waypoint>"
           "<ruedo:loop>false</ruedo:loop></ruedo:path></model>");
   sim.run(5.0);
-  EXPECT_NEAR(sim.state.bodies[1].translation.x(), 0.0, 1e-12);    // wherever the path says
+  EXPECT_NEAR(sim.state.bodies[1].translation.x(), 0.0, 1e-12);  // wherever the path says
   // Pushed at 0.25 m/s up to 0.45 m, then braked by 20 N on 20 kg: 1 m/s^2.
   EXPECT_NEAR(sim.position().x(), 0.45 + 0.5 * 0.25 * 0.25, 2e-3);
 }

@@ -1,4 +1,5 @@
-// The kinematic drive on a free plane: the closed form, whatever the step; primitives; the paper's experiment E1.
+// The kinematic drive on a free plane: the closed form, whatever the step; primitives; the paper's
+// experiment E1.
 #include <cmath>
 #include <utility>
 
@@ -15,8 +16,8 @@ std::string free_robot(const std::string& drive = limits(2.0, 2.0, 0.5, 1.0, 1.5
 
 class FreeAtAnyStep : public ::testing::TestWithParam<int64_t> {};
 
-// E1 of the paper: 1 m with a triangular profile, the acceleration limit above the deceleration limit and the other
-// way round. The paper's simulator made 1126.40 mm and 1016.96 mm of it.
+// E1 of the paper: 1 m with a triangular profile, the acceleration limit above the deceleration
+// limit and the other way round. The paper's simulator made 1126.40 mm and 1016.96 mm of it.
 TEST_P(FreeAtAnyStep, AdvanceOneMetreByTriangles) {
   for (const auto& [a, d] : {std::pair(4.2, 0.27), std::pair(0.27, 4.2)}) {
     Sim sim(free_robot(limits(5.0, 2.0, a, d, 1.0)), GetParam());
@@ -31,7 +32,8 @@ TEST_P(FreeAtAnyStep, AdvanceOneMetreByTriangles) {
   }
 }
 
-// The same commands at the same times: the same way, to rounding. Commands come on multiples of 50 ms.
+// The same commands at the same times: the same way, to rounding. Commands come on multiples of 50
+// ms.
 TEST_P(FreeAtAnyStep, FreeMotionDoesNotDependOnTheStep) {
   const auto drive = [](int64_t step_us) {
     Sim sim(free_robot(), step_us);
@@ -54,10 +56,11 @@ TEST_P(FreeAtAnyStep, FreeMotionDoesNotDependOnTheStep) {
   EXPECT_NEAR(wrap_angle(heading(pose.rotation) - heading(reference.rotation)), 0.0, 1e-10);
 }
 
-INSTANTIATE_TEST_SUITE_P(Steps, FreeAtAnyStep, ::testing::Values(100, 1000, 2000, 5000, 12500, 25000, 50000));
+INSTANTIATE_TEST_SUITE_P(Steps, FreeAtAnyStep,
+                         ::testing::Values(100, 1000, 2000, 5000, 12500, 25000, 50000));
 
 TEST(KinematicFree, CircleOfConstantTwist) {
-  Sim sim(free_robot(""));    // no limits: full speed at once
+  Sim sim(free_robot(""));  // no limits: full speed at once
   sim.velocity(0.5, 1.0);
   sim.run(0.5);
   EXPECT_NEAR(sim.position().x(), 0.5 * std::sin(0.5), 1e-14);
@@ -124,13 +127,14 @@ TEST(KinematicFree, ArcEndsOnItsCircle) {
 
 TEST(KinematicFree, HeadingIsInOdomAndTheShortestWay) {
   Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 3.0", limits(2.0, 2.0, 0.5, 1.0, 1.5)));
-  sim.move(Move::HEADING, 0.5);    // 3.5 rad in the world, by the left: through pi
+  sim.move(Move::HEADING, 0.5);  // 3.5 rad in the world, by the left: through pi
   sim.run(3.0);
   EXPECT_NEAR(sim.yaw(), 3.5 - 2 * M_PI, 1e-9);
   sim.move(Move::HEADING, -3.0);
   sim.run(5.0);
   EXPECT_NEAR(wrap_angle(sim.yaw() - (3.0 - 3.0)), 0.0, 1e-9);
-  EXPECT_NEAR(sim.robot().motion.done, 2 * M_PI - 3.5, 1e-9);    // -3.0 - 0.5 = -3.5: the other way is shorter
+  EXPECT_NEAR(sim.robot().motion.done, 2 * M_PI - 3.5,
+              1e-9);  // -3.0 - 0.5 = -3.5: the other way is shorter
   sim.robots.apply({0, ResetOdometry{}});
   sim.move(Move::HEADING, 0.25);
   sim.run(3.0);
@@ -155,7 +159,7 @@ TEST(KinematicFree, TakeOverWithinTheLimits) {
       omega = omega1;
     }
   };
-  sim.velocity(5.0, 9.0);    // above the limits: clamped
+  sim.velocity(5.0, 9.0);  // above the limits: clamped
   run(0.55);
   sim.move(Move::ADVANCE, -2.0);
   run(0.8);
@@ -188,7 +192,8 @@ TEST(KinematicFree, WatchdogStopsAtItsMicrosecond) {
 }
 
 TEST(KinematicFree, RepeatedCommandsFeedTheWatchdogAndChangeNothing) {
-  Sim repeated(free_robot()), once(free_robot("<ruedo:watchdog>0</ruedo:watchdog>" + limits(2.0, 2.0, 0.5, 1.0, 1.5)));
+  Sim repeated(free_robot()),
+      once(free_robot("<ruedo:watchdog>0</ruedo:watchdog>" + limits(2.0, 2.0, 0.5, 1.0, 1.5)));
   once.velocity(0.8, 0.3);
   for (int i = 0; i < 30; ++i) {
     repeated.velocity(0.8, 0.3);
@@ -239,7 +244,8 @@ TEST(Commands, RefusedOnesChangeNothingAndSayWhy) {
       {{0, JointCommand{{"arm"}, {1}, {}}}, Status::REASON_BAD_VALUE},
   };
   for (const Refused& refused : table) {
-    Sim sim(free_robot("<ruedo:watchdog>0</ruedo:watchdog>")), calm(free_robot("<ruedo:watchdog>0</ruedo:watchdog>"));
+    Sim sim(free_robot("<ruedo:watchdog>0</ruedo:watchdog>")),
+        calm(free_robot("<ruedo:watchdog>0</ruedo:watchdog>"));
     sim.velocity(0.5, 0.25);
     calm.velocity(0.5, 0.25);
     sim.step(10);
@@ -250,7 +256,8 @@ TEST(Commands, RefusedOnesChangeNothingAndSayWhy) {
     ASSERT_EQ(sim.state.motion_ends.size(), 1u) << "row " << (&refused - table);
     EXPECT_EQ(sim.state.motion_ends[0].robot, 0);
     EXPECT_EQ(sim.state.motion_ends[0].state.state, Status::STATE_REFUSED);
-    EXPECT_EQ(sim.state.motion_ends[0].state.reason, refused.reason) << "row " << (&refused - table);
+    EXPECT_EQ(sim.state.motion_ends[0].state.reason, refused.reason)
+        << "row " << (&refused - table);
     EXPECT_EQ(sim.robot().motion.changes, changes + 1);
     EXPECT_EQ(sim.robot().motion.state, Status::STATE_RUNNING);
     sim.step();
@@ -262,7 +269,8 @@ TEST(Commands, RefusedOnesChangeNothingAndSayWhy) {
 
 TEST(Commands, UnknownRobotsAndThoseWithoutADriveAreNotHarmed) {
   Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0") +
-          "<model name='mast'><static>true</static><link name='l'><sensor name='s' type='gpu_lidar'/></link></model>");
+          "<model name='mast'><static>true</static><link name='l'><sensor name='s' "
+          "type='gpu_lidar'/></link></model>");
   sim.robots.apply({-1, VelocityCommand{1, 0, 0}});
   sim.robots.apply({99, VelocityCommand{1, 0, 0}});
   ASSERT_EQ(sim.layout.robots.size(), 2u);
@@ -280,14 +288,14 @@ TEST(Commands, AReplacedPrimitiveAndItsSuccessorShowAtTheSameStep) {
   sim.step();
   EXPECT_EQ(sim.robot().motion.id, 41);
   sim.run(1.0);
-  sim.move(Move::ARC, 1.0, 1.0, 0, 0, 0, 0, 42);    // replaced before it began
+  sim.move(Move::ARC, 1.0, 1.0, 0, 0, 0, 0, 42);  // replaced before it began
   sim.move(Move::ROTATE, 1.0, 0, 0, 0, 0, 0, 43);
   const double done = sim.robot().motion.done;
-  EXPECT_NEAR(done, 0.25 * 1.005 * 1.005, 1e-12);    // half of 0.5 m/s^2 times the time's square
+  EXPECT_NEAR(done, 0.25 * 1.005 * 1.005, 1e-12);  // half of 0.5 m/s^2 times the time's square
   sim.step();
   EXPECT_EQ(sim.robot().motion.id, 43);
   EXPECT_EQ(sim.robot().motion.state, Status::STATE_RUNNING);
-  EXPECT_EQ(sim.robot().motion.changes, 4);          // 41 began; 41 and 42 ended, 43 began
+  EXPECT_EQ(sim.robot().motion.changes, 4);  // 41 began; 41 and 42 ended, 43 began
   ASSERT_EQ(sim.state.motion_ends.size(), 2u);
   for (const int64_t i : {0, 1}) {
     const MotionState& end = sim.state.motion_ends[static_cast<size_t>(i)].state;

@@ -13,7 +13,8 @@
 
 namespace ruedo::robot::testing {
 
-// Constants of the messages with an address, which gtest's comparisons need and lcm-gen's do not have.
+// Constants of the messages with an address, which gtest's comparisons need and lcm-gen's do not
+// have.
 struct Status {
   static constexpr int8_t KIND_VELOCITY = motion_status_t::KIND_VELOCITY;
   static constexpr int8_t KIND_WHEELS = motion_status_t::KIND_WHEELS;
@@ -39,56 +40,78 @@ struct Move {
   static constexpr int8_t STOP = move_command_t::STOP;
 };
 
-// A four-wheeled robot of 20 kg: wheel radius 0.1 m, track 0.4 m, chassis 0.5 x 0.3 x 0.15 m; base_link at its pose.
-// `drive` goes into <ruedo:drive>, beside the joints.
-inline std::string robot_sdf(const std::string& name, const std::string& pose, const std::string& drive = "",
-                             const std::string& type = "kinematic") {
-  std::string text = "<model name='" + name + "'><pose>" + pose + "</pose>"
-      "<link name='base'><inertial><pose>0 0 0.12 0 0 0</pose><mass>16</mass><inertia><ixx>0.3</ixx><iyy>0.5</iyy><izz>0.6</izz></inertia></inertial>"
-      "<collision name='c'><pose>0 0 0.16 0 0 0</pose><geometry><box><size>0.5 0.3 0.15</size></box></geometry></collision></link>";
-  const char* const wheels[4][2] = {{"fl", "0.13 0.2"}, {"rl", "-0.13 0.2"}, {"fr", "0.13 -0.2"}, {"rr", "-0.13 -0.2"}};
+// A four-wheeled robot of 20 kg: wheel radius 0.1 m, track 0.4 m, chassis 0.5 x 0.3 x 0.15 m;
+// base_link at its pose. `drive` goes into <ruedo:drive>, beside the joints.
+inline std::string robot_sdf(const std::string& name, const std::string& pose,
+                             const std::string& drive = "", const std::string& type = "kinematic") {
+  std::string text = "<model name='" + name + "'><pose>" + pose +
+                     "</pose>"
+                     "<link name='base'><inertial><pose>0 0 0.12 0 0 "
+                     "0</pose><mass>16</mass><inertia><ixx>0.3</ixx><iyy>0.5</iyy><izz>0.6</izz></"
+                     "inertia></inertial>"
+                     "<collision name='c'><pose>0 0 0.16 0 0 0</pose><geometry><box><size>0.5 0.3 "
+                     "0.15</size></box></geometry></collision></link>";
+  const char* const wheels[4][2] = {
+      {"fl", "0.13 0.2"}, {"rl", "-0.13 0.2"}, {"fr", "0.13 -0.2"}, {"rr", "-0.13 -0.2"}};
   for (const auto& wheel : wheels) {
     const std::string w = wheel[0];
-    text += "<link name='" + w + "'><pose>" + std::string(wheel[1]) + " 0.1 -1.5707963267948966 0 0</pose><inertial><mass>1</mass>"
-        "<inertia><ixx>0.003</ixx><iyy>0.003</iyy><izz>0.005</izz></inertia></inertial>"
-        "<collision name='c'><geometry><cylinder><radius>0.1</radius><length>0.06</length></cylinder></geometry></collision></link>"
-        "<joint name='" + w + "_joint' type='continuous'><parent>base</parent><child>" + w + "</child><axis><xyz>0 0 1</xyz></axis></joint>";
+    text += "<link name='" + w + "'><pose>" + std::string(wheel[1]) +
+            " 0.1 -1.5707963267948966 0 0</pose><inertial><mass>1</mass>"
+            "<inertia><ixx>0.003</ixx><iyy>0.003</iyy><izz>0.005</izz></inertia></inertial>"
+            "<collision "
+            "name='c'><geometry><cylinder><radius>0.1</radius><length>0.06</length></cylinder></"
+            "geometry></collision></link>"
+            "<joint name='" +
+            w + "_joint' type='continuous'><parent>base</parent><child>" + w +
+            "</child><axis><xyz>0 0 1</xyz></axis></joint>";
   }
-  text += "<ruedo:drive type='" + type + "'><ruedo:left_joint>fl_joint</ruedo:left_joint><ruedo:left_joint>rl_joint</ruedo:left_joint>"
-      "<ruedo:right_joint>fr_joint</ruedo:right_joint><ruedo:right_joint>rr_joint</ruedo:right_joint>" + drive + "</ruedo:drive></model>";
+  text +=
+      "<ruedo:drive type='" + type +
+      "'><ruedo:left_joint>fl_joint</ruedo:left_joint><ruedo:left_joint>rl_joint</ruedo:left_joint>"
+      "<ruedo:right_joint>fr_joint</ruedo:right_joint><ruedo:right_joint>rr_joint</"
+      "ruedo:right_joint>" +
+      drive + "</ruedo:drive></model>";
   return text;
 }
 
-inline std::string limits(double speed, double turn_rate, double acceleration, double deceleration, double turn_acceleration) {
+inline std::string limits(double speed, double turn_rate, double acceleration, double deceleration,
+                          double turn_acceleration) {
   const auto element = [](const char* name, double value) {
     return "<ruedo:" + std::string(name) + ">" + std::to_string(value) + "</ruedo:" + name + ">";
   };
-  return element("max_speed", speed) + element("max_turn_rate", turn_rate) + element("acceleration", acceleration) +
-         element("deceleration", deceleration) + element("turn_acceleration", turn_acceleration);
+  return element("max_speed", speed) + element("max_turn_rate", turn_rate) +
+         element("acceleration", acceleration) + element("deceleration", deceleration) +
+         element("turn_acceleration", turn_acceleration);
 }
 
 inline std::string plane_sdf() {
-  return "<model name='ground'><static>true</static><link name='l'><collision name='c'><geometry><plane><normal>0 0 1</normal>"
+  return "<model name='ground'><static>true</static><link name='l'><collision "
+         "name='c'><geometry><plane><normal>0 0 1</normal>"
          "<size>100 100</size></plane></geometry></collision></link></model>";
 }
 
-inline std::string box_sdf(const std::string& name, const std::string& pose, const std::string& size, double mass = 0.0,
-                           double friction = 0.5) {
-  const std::string m = std::to_string(mass), i = std::to_string(mass * 0.02), mu = std::to_string(friction);
-  return "<model name='" + name + "'><pose>" + pose + "</pose><static>" + (mass > 0.0 ? "false" : "true") + "</static><link name='l'>" +
-         (mass > 0.0 ? "<inertial><mass>" + m + "</mass><inertia><ixx>" + i + "</ixx><iyy>" + i + "</iyy><izz>" + i +
-                           "</izz></inertia></inertial>"
+inline std::string box_sdf(const std::string& name, const std::string& pose,
+                           const std::string& size, double mass = 0.0, double friction = 0.5) {
+  const std::string m = std::to_string(mass), i = std::to_string(mass * 0.02),
+                    mu = std::to_string(friction);
+  return "<model name='" + name + "'><pose>" + pose + "</pose><static>" +
+         (mass > 0.0 ? "false" : "true") + "</static><link name='l'>" +
+         (mass > 0.0 ? "<inertial><mass>" + m + "</mass><inertia><ixx>" + i + "</ixx><iyy>" + i +
+                           "</iyy><izz>" + i + "</izz></inertia></inertial>"
                      : "") +
-         "<collision name='c'><geometry><box><size>" + size + "</size></box></geometry><surface><friction><ode><mu>" + mu +
-         "</mu><mu2>" + mu + "</mu2></ode></friction></surface></collision></link></model>";
+         "<collision name='c'><geometry><box><size>" + size +
+         "</size></box></geometry><surface><friction><ode><mu>" + mu + "</mu><mu2>" + mu +
+         "</mu2></ode></friction></surface></collision></link></model>";
 }
 
 class Sim {
  public:
   explicit Sim(const std::string& models, int64_t step_us = 5000)
       : world(model::load_world_text(
-            "<sdf version='1.9' xmlns:ruedo='https://ruedo.org'><world name='w'><gravity>0 0 -9.8</gravity><physics type='x'><max_step_size>" +
-                std::to_string(static_cast<double>(step_us) * 1e-6) + "</max_step_size></physics>" + models + "</world></sdf>",
+            "<sdf version='1.9' xmlns:ruedo='https://ruedo.org'><world name='w'><gravity>0 0 "
+            "-9.8</gravity><physics type='x'><max_step_size>" +
+                std::to_string(static_cast<double>(step_us) * 1e-6) + "</max_step_size></physics>" +
+                models + "</world></sdf>",
             "test.sdf")),
         layout(*world),
         physics(*world, layout),
@@ -100,10 +123,14 @@ class Sim {
     for (int64_t i = 0; i < steps; ++i) robots.step();
     robots.read(state);
   }
-  void run(double seconds) { step(static_cast<int64_t>(std::llround(seconds * 1e6)) / world->step_us); }
-  void velocity(double v, double omega, int robot = 0) { robots.apply({robot, VelocityCommand{v, 0.0, omega}}); }
-  void move(int8_t kind, double value, double radius = 0, double speed = 0, double acceleration = 0, double deceleration = 0,
-            int robot = 0, int64_t id = 1) {
+  void run(double seconds) {
+    step(static_cast<int64_t>(std::llround(seconds * 1e6)) / world->step_us);
+  }
+  void velocity(double v, double omega, int robot = 0) {
+    robots.apply({robot, VelocityCommand{v, 0.0, omega}});
+  }
+  void move(int8_t kind, double value, double radius = 0, double speed = 0, double acceleration = 0,
+            double deceleration = 0, int robot = 0, int64_t id = 1) {
     robots.apply({robot, MoveCommand{id, kind, value, radius, speed, acceleration, deceleration}});
   }
   const RobotState& robot(int index = 0) const { return state.robots[static_cast<size_t>(index)]; }

@@ -1,4 +1,5 @@
-// The wheels drive: servos that follow wheel rates, odometry that believes them, and physics that decides what comes of it.
+// The wheels drive: servos that follow wheel rates, odometry that believes them, and physics that
+// decides what comes of it.
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -10,7 +11,8 @@ namespace {
 
 const std::string kNoWatchdog = "<ruedo:watchdog>0</ruedo:watchdog>";
 
-std::string wheeled(const std::string& pose, const std::string& drive = limits(0.7, 1.0, 0.5, 0.5, 1.5)) {
+std::string wheeled(const std::string& pose,
+                    const std::string& drive = limits(0.7, 1.0, 0.5, 0.5, 1.5)) {
   return robot_sdf("r", pose, kNoWatchdog + drive, "wheels");
 }
 
@@ -49,7 +51,9 @@ double run_until_done(Sim& sim) {
 
 // What a client sees that takes the primitive's end for its end: the robot is there, and stands.
 TEST(Wheels, IsAtItsGoalAndAtRestWhenItSaysDone) {
-  struct Case { double acceleration, deceleration, seconds; };    // of the plan: sqrt(2 s (1/a + 1/d))
+  struct Case {
+    double acceleration, deceleration, seconds;
+  };  // of the plan: sqrt(2 s (1/a + 1/d))
   for (const Case& c : {Case{4.2, 0.27, 2.808}, Case{0.27, 4.2, 2.808}, Case{0.3, 0.6, 3.162}}) {
     Sim sim(plane_sdf() + wheeled("0 0 0 0 0 0", limits(2.0, 2.0, 5.0, 5.0, 1.74)));
     sim.run(1.0);
@@ -62,20 +66,21 @@ TEST(Wheels, IsAtItsGoalAndAtRestWhenItSaysDone) {
     EXPECT_LT(sim.robot().twist.linear.norm(), 5e-3);
     EXPECT_NEAR(sim.robot().motion.remaining, 0.0, 5e-4);
     EXPECT_NEAR(sim.robot().motion.done + sim.robot().motion.remaining, 1.0, 1e-12);
-    sim.run(1.0);    // nor does it move on afterwards
+    sim.run(1.0);  // nor does it move on afterwards
     EXPECT_NEAR((sim.position() - start).norm(), 1.0, 2e-3) << c.acceleration;
   }
 }
 
-// Four wheels at (+-a, +-b) with the same friction in all directions: a turn on the spot is where the moment of what slips
-// vanishes, at omega = omega_wheels b^2 / (a^2 + b^2). Neither friction nor load nor heading is in it.
+// Four wheels at (+-a, +-b) with the same friction in all directions: a turn on the spot is where
+// the moment of what slips vanishes, at omega = omega_wheels b^2 / (a^2 + b^2). Neither friction
+// nor load nor heading is in it.
 TEST(Wheels, SkidSteeringTurnsAsCoulombHasIt) {
   const double a = 0.13, b = 0.2;
   for (const double heading : {0.0, 0.4, 2.0}) {
     Sim sim(plane_sdf() + wheeled("0 0 0 0 0 " + std::to_string(heading)));
     sim.velocity(0.0, 0.5);
     EXPECT_NEAR(rate_of(sim, 2.0, 4.0), 0.5 * b * b / (a * a + b * b), 0.007) << heading;
-    EXPECT_NEAR(sim.robot().wheel_omega, 0.5, 1e-3);    // as commanded: the servos see to that
+    EXPECT_NEAR(sim.robot().wheel_omega, 0.5, 1e-3);  // as commanded: the servos see to that
     EXPECT_LT(sim.position().head<2>().norm(), 0.02);
   }
 }
@@ -89,23 +94,29 @@ TEST(Wheels, WheelCommandsAreWheelRates) {
   EXPECT_NEAR(sim.state.wheel_rates[3], 3.0, 5e-3);
 }
 
-// 2 N m at the wheels are 80 N on the 20 kg and the four wheels' 0.005 kg m^2: a = 4 T / r / (m + 4 I / r^2).
+// 2 N m at the wheels are 80 N on the 20 kg and the four wheels' 0.005 kg m^2: a = 4 T / r / (m + 4
+// I / r^2).
 TEST(Wheels, TheTorqueLimitLimitsTheAcceleration) {
-  Sim sim(plane_sdf() + wheeled("0 0 0 0 0 0", limits(50, 50, 1e3, 1e3, 1e3) + "<ruedo:max_wheel_torque>2</ruedo:max_wheel_torque>"));
+  Sim sim(plane_sdf() +
+          wheeled("0 0 0 0 0 0", limits(50, 50, 1e3, 1e3, 1e3) +
+                                     "<ruedo:max_wheel_torque>2</ruedo:max_wheel_torque>"));
   sim.run(0.5);
   sim.velocity(5.0, 0.0);
   sim.run(0.5);
   EXPECT_NEAR(sim.robot().twist.linear.x(), 0.5 * 80.0 / (20.0 + 4 * 0.005 / 0.01), 0.03);
 }
 
-// A motor of 0.2 N m and 400 rad/s behind a gear of 20: 4 N m at stall, 20 rad/s without a load. The robot comes near to
-// that as v = v0 (1 - exp(-t / tau)), tau = M v0 / F, and no further.
+// A motor of 0.2 N m and 400 rad/s behind a gear of 20: 4 N m at stall, 20 rad/s without a load.
+// The robot comes near to that as v = v0 (1 - exp(-t / tau)), tau = M v0 / F, and no further.
 TEST(Wheels, TheMotorsLineEndsAtItsNoLoadRate) {
-  Sim sim(plane_sdf() + wheeled("0 0 0 0 0 0", limits(50, 50, 1e3, 1e3, 1e3) +
-          "<ruedo:gear>20</ruedo:gear><ruedo:stall_torque>0.2</ruedo:stall_torque><ruedo:no_load_rate>400</ruedo:no_load_rate>"));
+  Sim sim(plane_sdf() +
+          wheeled("0 0 0 0 0 0",
+                  limits(50, 50, 1e3, 1e3, 1e3) +
+                      "<ruedo:gear>20</ruedo:gear><ruedo:stall_torque>0.2</"
+                      "ruedo:stall_torque><ruedo:no_load_rate>400</ruedo:no_load_rate>"));
   sim.run(0.5);
   sim.velocity(10.0, 0.0);
-  const double tau = 22.0 * 2.0 / 160.0;    // 22 kg with the wheels' turning, 2 m/s, 160 N at stall
+  const double tau = 22.0 * 2.0 / 160.0;  // 22 kg with the wheels' turning, 2 m/s, 160 N at stall
   sim.run(tau);
   EXPECT_NEAR(sim.robot().twist.linear.x(), 2.0 * (1 - std::exp(-1.0)), 0.05);
   sim.run(10 * tau);
@@ -117,33 +128,40 @@ TEST(Wheels, FourWheelsShareTheWeight) {
   sim.velocity(0.0, 0.5);
   sim.run(2.0);
   ASSERT_EQ(sim.state.contacts.size(), 4u);
-  for (const Contact& contact : sim.state.contacts) EXPECT_NEAR(contact.force, 20.0 * 9.8 / 4.0, 2.0);
+  for (const Contact& contact : sim.state.contacts)
+    EXPECT_NEAR(contact.force, 20.0 * 9.8 / 4.0, 2.0);
 }
 
 // A loop over the gyro makes up for what skids; a wrong gyro is believed.
 TEST(Wheels, AYawLoopTurnsAtTheGyrosRate) {
   for (const double error : {0.0, 0.05}) {
-    Sim sim(plane_sdf() + wheeled("0 0 0 0 0 0.3", limits(0.7, 1.0, 0.5, 0.5, 1.5) + "<ruedo:yaw_gain>8</ruedo:yaw_gain><ruedo:gyro_scale_error>" +
-                                                       std::to_string(error) + "</ruedo:gyro_scale_error>"));
+    Sim sim(plane_sdf() + wheeled("0 0 0 0 0 0.3",
+                                  limits(0.7, 1.0, 0.5, 0.5, 1.5) +
+                                      "<ruedo:yaw_gain>8</ruedo:yaw_gain><ruedo:gyro_scale_error>" +
+                                      std::to_string(error) + "</ruedo:gyro_scale_error>"));
     sim.velocity(0.0, 0.5);
     EXPECT_NEAR(rate_of(sim, 2.0, 4.0), 0.5 / (1.0 + error), 0.005);
     EXPECT_GT(sim.robot().wheel_omega, 0.6);
   }
 }
 
-// Primitives end where the odometry has them: a rotation by 90 degrees that skids is done too early, and one of a robot whose
-// track is calibrated to what skids is right.
+// Primitives end where the odometry has them: a rotation by 90 degrees that skids is done too
+// early, and one of a robot whose track is calibrated to what skids is right.
 TEST(Wheels, PrimitivesBelieveTheOdometry) {
   const double skid = (0.13 * 0.13 + 0.2 * 0.2) / (0.2 * 0.2);
   for (const bool calibrated : {false, true}) {
     std::string robot = wheeled("0 0 0 0 0 0");
-    if (calibrated) robot.insert(robot.find("</model>"), "<ruedo:odometry><ruedo:track_error>" + std::to_string(skid - 1.0) + "</ruedo:track_error></ruedo:odometry>");
+    if (calibrated)
+      robot.insert(robot.find("</model>"), "<ruedo:odometry><ruedo:track_error>" +
+                                               std::to_string(skid - 1.0) +
+                                               "</ruedo:track_error></ruedo:odometry>");
     Sim sim(plane_sdf() + robot);
     sim.run(1.0);
     sim.move(Move::ROTATE, M_PI / 2);
     EXPECT_GT(run_until_done(sim), 0.0);
     EXPECT_NEAR(sim.yaw(), calibrated ? M_PI / 2 : M_PI / 2 / skid, 0.04);
-    EXPECT_NEAR(sim.robot().motion.done, M_PI / 2, 0.01);    // what stands on tyres sticks a little before
+    EXPECT_NEAR(sim.robot().motion.done, M_PI / 2,
+                0.01);  // what stands on tyres sticks a little before
   }
 }
 
@@ -156,14 +174,16 @@ TEST(Wheels, RestsWithoutDrift) {
     EXPECT_GT(rest.z(), ramp ? 0.2 : -0.01);
     sim.run(600.0);
     EXPECT_LT((sim.position() - rest).norm(), 1e-6);
-    sim.velocity(0.3, 0.0);    // and it wakes
+    sim.velocity(0.3, 0.0);  // and it wakes
     sim.run(2.0);
     EXPECT_GT((sim.position() - rest).norm(), 0.3);
   }
 }
 
 TEST(Wheels, AWallStopsIt) {
-  Sim sim(plane_sdf() + wheeled("0 0 0 0 0 0", limits(0.7, 1.0, 0.5, 0.5, 1.5) + "<ruedo:max_wheel_torque>5</ruedo:max_wheel_torque>") +
+  Sim sim(plane_sdf() +
+          wheeled("0 0 0 0 0 0", limits(0.7, 1.0, 0.5, 0.5, 1.5) +
+                                     "<ruedo:max_wheel_torque>5</ruedo:max_wheel_torque>") +
           box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"));
   sim.velocity(0.7, 0.0);
   sim.run(4.0);
@@ -179,19 +199,22 @@ TEST(Wheels, AnotherRobotPushesIt) {
   EXPECT_GT(sim.position(0).x(), 0.9);
 }
 
-// Across a slope of 25 degrees a robot stands with a friction of 1, and slides with 0.3: tan(25 degrees) is 0.466.
+// Across a slope of 25 degrees a robot stands with a friction of 1, and slides with 0.3: tan(25
+// degrees) is 0.466.
 TEST(Wheels, StandsAcrossASlopeWithTheFrictionOfItsFile) {
   for (const double mu : {1.0, 0.3}) {
     const double slope = 25.0 * M_PI / 180.0;
     Sim sim(box_sdf("slope", "0 0 0 " + std::to_string(-slope) + " 0 0", "20 20 0.2", 0.0, mu) +
-            wheeled("0 " + std::to_string(0.11 * std::sin(slope)) + " " + std::to_string(0.11 * std::cos(slope)) + " " + std::to_string(-slope) + " 0 0"));
+            wheeled("0 " + std::to_string(0.11 * std::sin(slope)) + " " +
+                    std::to_string(0.11 * std::cos(slope)) + " " + std::to_string(-slope) +
+                    " 0 0"));
     sim.run(1.0);
     const Vec3 start = sim.position();
     sim.run(2.0);
     const double way = (sim.position() - start).norm();
     if (mu == 1.0) {
       EXPECT_LT(way, 2e-3);
-    } else {    // a = g (sin - mu cos), 1.477 m/s^2, from 1 s to 3 s: 8 / 2 of it
+    } else {  // a = g (sin - mu cos), 1.477 m/s^2, from 1 s to 3 s: 8 / 2 of it
       EXPECT_NEAR(way, 0.5 * 9.8 * (std::sin(slope) - mu * std::cos(slope)) * 8.0, 0.6);
     }
   }

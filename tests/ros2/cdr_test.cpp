@@ -13,7 +13,7 @@ TEST(Cdr, NumbersAreAlignedFromBehindTheHeader) {
   CdrWriter out;
   out.put(uint8_t{7}).put(1.0).put(uint16_t{0x0102}).put(uint32_t{3});
   EXPECT_THAT(out.bytes(), ElementsAre(0, 1, 0, 0,                                            //
-                                       7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xF0, 0x3F,    //
+                                       7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xF0, 0x3F,  //
                                        2, 1, 0, 0, 3, 0, 0, 0));
 }
 
@@ -21,8 +21,9 @@ TEST(Cdr, TextsEndWithZeroAndSequencesBeginWithTheirLength) {
   CdrWriter out;
   const float values[] = {0.5f};
   out.put("ab").put_sequence(std::span<const float>(values)).put("");
-  EXPECT_THAT(out.bytes(), ElementsAre(0, 1, 0, 0,  //
-                                       3, 0, 0, 0, 'a', 'b', 0, 0, 1, 0, 0, 0, 0, 0, 0, 0x3F, 1, 0, 0, 0, 0));
+  EXPECT_THAT(out.bytes(),
+              ElementsAre(0, 1, 0, 0,  //
+                          3, 0, 0, 0, 'a', 'b', 0, 0, 1, 0, 0, 0, 0, 0, 0, 0x3F, 1, 0, 0, 0, 0));
 }
 
 TEST(Cdr, AnEmptySequenceAlignsNothing) {
@@ -52,7 +53,7 @@ TEST(Cdr, ReadsBigEndian) {
 }
 
 TEST(Cdr, RefusesOtherEncodings) {
-  for (const uint8_t kind : {2, 3, 6, 7, 10, 11}) {    // parameter lists, XCDR2
+  for (const uint8_t kind : {2, 3, 6, 7, 10, 11}) {  // parameter lists, XCDR2
     const uint8_t bytes[] = {0, kind, 0, 0, 1, 0, 0, 0};
     CdrReader in(bytes);
     EXPECT_EQ(in.get<uint32_t>(), 0u);

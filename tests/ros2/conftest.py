@@ -15,7 +15,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
-PATIENCE = float(os.environ.get("RUEDO_PATIENCE", "300"))    # s, for what comes sooner or later
+PATIENCE = float(os.environ.get("RUEDO_PATIENCE", "300"))  # s, for what comes sooner or later
 SOURCE = Path(os.environ.get("RUEDO_SOURCE_DIR", Path(__file__).resolve().parents[2]))
 RUEDO = os.environ.get("RUEDO", str(SOURCE / "build/release/bin/ruedo"))
 ARENA = str(SOURCE / "worlds/arena.sdf")
@@ -30,18 +30,34 @@ class Peer:
         self.participant = DomainParticipant(domain)
         self.entities: list[object] = []
 
-    def reader(self, topic: str, kind: type, latched: bool = False, reliable: bool = True, depth: int = 1000, prefix: str = "rt") -> DataReader:
+    def reader(
+        self,
+        topic: str,
+        kind: type,
+        latched: bool = False,
+        reliable: bool = True,
+        depth: int = 1000,
+        prefix: str = "rt",
+    ) -> DataReader:
         qos = [Policy.History.KeepLast(depth)]
-        qos.append(Policy.Reliability.Reliable(duration(seconds=1)) if reliable else Policy.Reliability.BestEffort)
+        qos.append(
+            Policy.Reliability.Reliable(duration(seconds=1))
+            if reliable
+            else Policy.Reliability.BestEffort
+        )
         if latched:
             qos.append(Policy.Durability.TransientLocal)
-        reader = DataReader(self.participant, Topic(self.participant, prefix + topic, kind), qos=Qos(*qos))
+        reader = DataReader(
+            self.participant, Topic(self.participant, prefix + topic, kind), qos=Qos(*qos)
+        )
         self.entities.append(reader)
         return reader
 
     def writer(self, topic: str, kind: type, prefix: str = "rt") -> DataWriter:
         qos = Qos(Policy.History.KeepLast(100), Policy.Reliability.Reliable(duration(seconds=1)))
-        writer = DataWriter(self.participant, Topic(self.participant, prefix + topic, kind), qos=qos)
+        writer = DataWriter(
+            self.participant, Topic(self.participant, prefix + topic, kind), qos=qos
+        )
         self.entities.append(writer)
         return writer
 
@@ -49,11 +65,19 @@ class Peer:
 class Run:
     """`ruedo run WORLD --ros2` in a domain of its own; ends with the with-block."""
 
-    def __init__(self, *arguments: str, world: str = ARENA, environment: dict[str, str] | None = None):
+    def __init__(
+        self, *arguments: str, world: str = ARENA, environment: dict[str, str] | None = None
+    ):
         self.domain = next(_domains)
         environment = {**os.environ, "ROS_DOMAIN_ID": str(self.domain), **(environment or {})}
-        self.process = subprocess.Popen([RUEDO, "run", world, "--ros2", "--lcm", "auto", *arguments], env=environment,
-                                        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        self.process = subprocess.Popen(
+            [RUEDO, "run", world, "--ros2", "--lcm", "auto", *arguments],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
 
     def __enter__(self) -> Run:
         return self
@@ -70,7 +94,7 @@ class Run:
         except subprocess.TimeoutExpired:
             self.process.kill()
             return self.process.communicate()[0]
-        except ValueError:    # read already
+        except ValueError:  # read already
             return ""
 
 

@@ -1,4 +1,5 @@
-// Hashes against those that ROS 2's own packages have; test_bag.py holds all of them against rosbags.
+// Hashes against those that ROS 2's own packages have; test_bag.py holds all of them against
+// rosbags.
 #include "ros2/interfaces.h"
 
 #include <gmock/gmock.h>
@@ -11,15 +12,18 @@ namespace ruedo::ros2 {
 namespace {
 
 TEST(Interfaces, HashesAreThoseOfRosPackages) {
-  EXPECT_EQ(type_hash("sensor_msgs/msg/LaserScan", Distro::jazzy), "RIHS01_64c191398013af96509d518dac71d5164f9382553fce5c1f8cca5be7924bd828");
+  EXPECT_EQ(type_hash("sensor_msgs/msg/LaserScan", Distro::jazzy),
+            "RIHS01_64c191398013af96509d518dac71d5164f9382553fce5c1f8cca5be7924bd828");
   // As rmw_cyclonedds and the Zenoh bridge have it: .msg's char is a uint8.
   EXPECT_EQ(type_hash("rmw_dds_common/msg/ParticipantEntitiesInfo", Distro::jazzy),
             "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e");
 }
 
 TEST(Interfaces, HumbleHasItsOwn) {
-  EXPECT_NE(type_hash("sensor_msgs/msg/Range", Distro::humble), type_hash("sensor_msgs/msg/Range", Distro::jazzy));
-  EXPECT_EQ(type_hash("sensor_msgs/msg/Imu", Distro::humble), type_hash("sensor_msgs/msg/Imu", Distro::lyrical));
+  EXPECT_NE(type_hash("sensor_msgs/msg/Range", Distro::humble),
+            type_hash("sensor_msgs/msg/Range", Distro::jazzy));
+  EXPECT_EQ(type_hash("sensor_msgs/msg/Imu", Distro::humble),
+            type_hash("sensor_msgs/msg/Imu", Distro::lyrical));
 }
 
 TEST(Interfaces, TypesHaveTheirNamesInDds) {
@@ -52,7 +56,7 @@ TEST(Names, OneRobotHasTheRootAndManyHaveNamespaces) {
   EXPECT_EQ(one.topic("p3at", "odom"), "/odom");
   EXPECT_EQ(one.topic("p3at", "scan"), "/front/scan");
   EXPECT_EQ(one.frame("p3at", "base_link"), "base_link");
-  EXPECT_EQ(one.topic("bob", "odom"), "/bob/odom");    // who comes later
+  EXPECT_EQ(one.topic("bob", "odom"), "/bob/odom");  // who comes later
   EXPECT_EQ(one.frame("bob", "base_link"), "bob/base_link");
   EXPECT_EQ(many.topic("alice", "scan"), "/alice/scan");
   EXPECT_EQ(many.topic("", "clock"), "/clock");

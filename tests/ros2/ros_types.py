@@ -6,9 +6,16 @@ The names are those that every RMW on DDS uses: pkg::msg::dds_::Type_.
 from dataclasses import dataclass
 
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import array, bounded_str, float32, float64, int32, sequence, uint8, uint32
-
-
+from cyclonedds.idl.types import (
+    array,
+    bounded_str,
+    float32,
+    float64,
+    int32,
+    sequence,
+    uint8,
+    uint32,
+)
 
 
 @dataclass
@@ -77,7 +84,9 @@ class PoseWithCovariance(IdlStruct, typename="geometry_msgs::msg::dds_::PoseWith
 
 
 @dataclass
-class PoseWithCovarianceStamped(IdlStruct, typename="geometry_msgs::msg::dds_::PoseWithCovarianceStamped_"):
+class PoseWithCovarianceStamped(
+    IdlStruct, typename="geometry_msgs::msg::dds_::PoseWithCovarianceStamped_"
+):
     header: Header
     pose: PoseWithCovariance
 
@@ -216,7 +225,9 @@ class NodeEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::NodeEntit
 
 
 @dataclass
-class ParticipantEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"):
+class ParticipantEntitiesInfo(
+    IdlStruct, typename="rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"
+):
     gid: Gid
     node_entities_info_seq: sequence[NodeEntitiesInfo]
 

@@ -94,7 +94,11 @@ class GotState(IdlStruct, typename=mark("GetSimulationState", "Response")):
 
 
 def part(service: str, which: str, fields: dict[str, type]) -> type:
-    return make_idl_struct(f"{service}{which}", mark(service, which), {"client": uint64, "sequence_number": int64, **fields})
+    return make_idl_struct(
+        f"{service}{which}",
+        mark(service, which),
+        {"client": uint64, "sequence_number": int64, **fields},
+    )
 
 
 def request(service: str, /, **fields: type) -> type:
@@ -108,13 +112,41 @@ def response(service: str, /, **fields: type) -> type:
 SERVICES = {
     "get_simulator_features": (Empty_, Features),
     "get_simulation_state": (GetState, GotState),
-    "set_simulation_state": (request("SetSimulationState", state=uint8), response("SetSimulationState", result=Result)),
-    "reset_simulation": (request("ResetSimulation", scope=uint8), response("ResetSimulation", result=Result)),
-    "step_simulation": (request("StepSimulation", steps=uint64), response("StepSimulation", result=Result)),
-    "spawn_entity": (request("SpawnEntity", name=str, allow_renaming=bool, uri=str, resource_string=str, entity_namespace=str, initial_pose=PoseStamped),
-                     response("SpawnEntity", result=Result, entity_name=str)),
+    "set_simulation_state": (
+        request("SetSimulationState", state=uint8),
+        response("SetSimulationState", result=Result),
+    ),
+    "reset_simulation": (
+        request("ResetSimulation", scope=uint8),
+        response("ResetSimulation", result=Result),
+    ),
+    "step_simulation": (
+        request("StepSimulation", steps=uint64),
+        response("StepSimulation", result=Result),
+    ),
+    "spawn_entity": (
+        request(
+            "SpawnEntity",
+            name=str,
+            allow_renaming=bool,
+            uri=str,
+            resource_string=str,
+            entity_namespace=str,
+            initial_pose=PoseStamped,
+        ),
+        response("SpawnEntity", result=Result, entity_name=str),
+    ),
     "delete_entity": (request("DeleteEntity", entity=str), response("DeleteEntity", result=Result)),
-    "get_entities": (request("GetEntities", filters=EntityFilters), response("GetEntities", result=Result, entities=sequence[str])),
-    "get_entity_state": (request("GetEntityState", entity=str), response("GetEntityState", result=Result, state=EntityState)),
-    "set_entity_state": (request("SetEntityState", entity=str, state=EntityState), response("SetEntityState", result=Result)),
+    "get_entities": (
+        request("GetEntities", filters=EntityFilters),
+        response("GetEntities", result=Result, entities=sequence[str]),
+    ),
+    "get_entity_state": (
+        request("GetEntityState", entity=str),
+        response("GetEntityState", result=Result, state=EntityState),
+    ),
+    "set_entity_state": (
+        request("SetEntityState", entity=str, state=EntityState),
+        response("SetEntityState", result=Result),
+    ),
 }

@@ -14,6 +14,7 @@ from ros_types import LaserScan, Odometry, Twist, Vector3
 @dataclass
 class NotATwist(IdlStruct, typename="geometry_msgs::msg::dds_::Twist_"):
     """Says it is a Twist."""
+
     data: sequence[uint8]
 
 
@@ -30,10 +31,20 @@ def drives(peer, cmd_vel, odometry):
     wait_for(moves, "0.3 m/s")
 
 
-@pytest.mark.parametrize("kind, samples", [
-    (NotATwist, [NotATwist(bytes(random.Random(i).randrange(256) for _ in range(n))) for i, n in enumerate((0, 1, 3, 7, 20, 31))]),
-    (ShortTwist, [ShortTwist(math.nan), ShortTwist(1e308)]),
-], ids=["bytes", "short"])
+@pytest.mark.parametrize(
+    "kind, samples",
+    [
+        (
+            NotATwist,
+            [
+                NotATwist(bytes(random.Random(i).randrange(256) for _ in range(n)))
+                for i, n in enumerate((0, 1, 3, 7, 20, 31))
+            ],
+        ),
+        (ShortTwist, [ShortTwist(math.nan), ShortTwist(1e308)]),
+    ],
+    ids=["bytes", "short"],
+)
 def test_bytes_that_are_no_message_are_counted(kind, samples):
     with Run("--no-noise") as run:
         peer = Peer(run.domain)

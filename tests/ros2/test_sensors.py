@@ -9,8 +9,17 @@ from pathlib import Path
 
 import pytest
 from conftest import PATIENCE, RUEDO, Peer, Run, wait_for
-from ros_types import (Duration, Float64MultiArray, Header, JointState, JointTrajectory, JointTrajectoryPoint, MultiArrayDimension, MultiArrayLayout,
-                       Time)
+from ros_types import (
+    Duration,
+    Float64MultiArray,
+    Header,
+    JointState,
+    JointTrajectory,
+    JointTrajectoryPoint,
+    MultiArrayDimension,
+    MultiArrayLayout,
+    Time,
+)
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -21,32 +30,64 @@ WORLD = str(Path(__file__).resolve().parent / "sensors.sdf")
 def bag(tmp_path_factory):
     """{topic: messages}"""
     folder = tmp_path_factory.mktemp("sensors")
-    for arguments in (["run", WORLD, "--no-noise", "--rate", "max", "--duration", "1", "--record", folder / "run.lcm", "--lcm", "auto", "--quiet"],
-                      ["export", folder / "run.lcm", "--ros2", folder / "run"]):
-        subprocess.run([RUEDO, *map(str, arguments)], check=True, timeout=PATIENCE, capture_output=True)
+    for arguments in (
+        [
+            "run",
+            WORLD,
+            "--no-noise",
+            "--rate",
+            "max",
+            "--duration",
+            "1",
+            "--record",
+            folder / "run.lcm",
+            "--lcm",
+            "auto",
+            "--quiet",
+        ],
+        ["export", folder / "run.lcm", "--ros2", folder / "run"],
+    ):
+        subprocess.run(
+            [RUEDO, *map(str, arguments)], check=True, timeout=PATIENCE, capture_output=True
+        )
     store, found = get_typestore(Stores.ROS2_JAZZY), {}
     with Reader(folder / "run") as reader:
         for connection in reader.connections:
             told = get_types_from_msg(connection.msgdef.data, connection.msgtype)
-            store.register({name: fields for name, fields in told.items() if name not in store.fielddefs})
+            store.register(
+                {name: fields for name, fields in told.items() if name not in store.fielddefs}
+            )
         for connection, _, raw in reader.messages():
             message = store.deserialize_cdr(raw, connection.msgtype)
-            assert bytes(store.serialize_cdr(message, connection.msgtype)) == bytes(raw), connection.topic
+            assert bytes(store.serialize_cdr(message, connection.msgtype)) == bytes(raw), (
+                connection.topic
+            )
             found.setdefault(connection.topic, []).append(message)
     return found
 
 
 def test_points_lie_on_the_wall_and_the_ground(bag):
     cloud = bag["/points"][-1]
-    assert (cloud.header.frame_id, cloud.width, cloud.height, cloud.point_step, cloud.row_step) == ("lidar", 3, 4, 16, 48)
-    assert [(f.name, f.offset, f.datatype, f.count) for f in cloud.fields] == [("x", 0, 7, 1), ("y", 4, 7, 1), ("z", 8, 7, 1), ("intensity", 12, 7, 1)]
+    assert (cloud.header.frame_id, cloud.width, cloud.height, cloud.point_step, cloud.row_step) == (
+        "lidar",
+        3,
+        4,
+        16,
+        48,
+    )
+    assert [(f.name, f.offset, f.datatype, f.count) for f in cloud.fields] == [
+        ("x", 0, 7, 1),
+        ("y", 4, 7, 1),
+        ("z", 8, 7, 1),
+        ("intensity", 12, 7, 1),
+    ]
     points = list(struct.iter_unpack("<4f", bytes(cloud.data)))
     assert len(points) == 12
     for i, (x, y, z, _) in enumerate(points):
         elevation, azimuth = -0.3 + 0.2 * (i // 3), -0.1 + 0.1 * (i % 3)
         assert math.atan2(y, x) == pytest.approx(azimuth, abs=1e-5)
         assert math.atan2(z, math.hypot(x, y)) == pytest.approx(elevation, abs=1e-5)
-        if elevation < -0.2:    # the ray meets the ground, half a metre below, before the wall
+        if elevation < -0.2:  # the ray meets the ground, half a metre below, before the wall
             assert z == pytest.approx(-0.5, abs=2e-3)
         else:
             assert x == pytest.approx(2.0, abs=2e-3)
@@ -62,7 +103,13 @@ def test_imu_at_rest_shows_gravity(bag):
 
 def test_depth_is_that_of_the_wall(bag):
     depth = bag["/depth"][-1]
-    assert (depth.encoding, depth.width, depth.height, depth.step, depth.header.frame_id) == ("32FC1", 32, 24, 128, "eye_optical")
+    assert (depth.encoding, depth.width, depth.height, depth.step, depth.header.frame_id) == (
+        "32FC1",
+        32,
+        24,
+        128,
+        "eye_optical",
+    )
     values = struct.unpack(f"<{32 * 24}f", bytes(depth.data))
     assert values[12 * 32 + 16] == pytest.approx(1.7, abs=0.01)
     assert len(bag["/image_raw"]) == len(bag["/camera_info"]) == len(bag["/depth"])
@@ -70,9 +117,16 @@ def test_depth_is_that_of_the_wall(bag):
 
 def test_contacts_carry_the_weight(bag):
     contacts = bag["/contacts"][-1].contacts
-    assert sum(c.wrenches[0].body_1_wrench.force.z for c in contacts) == pytest.approx(10.5 * 9.8, rel=0.1)
-    assert all(c.wrenches[0].body_2_wrench.force.z == -c.wrenches[0].body_1_wrench.force.z for c in contacts)
-    assert all(c.collision1.name == "rig/bumper" and c.normals[0].z == pytest.approx(1.0) for c in contacts)
+    assert sum(c.wrenches[0].body_1_wrench.force.z for c in contacts) == pytest.approx(
+        10.5 * 9.8, rel=0.1
+    )
+    assert all(
+        c.wrenches[0].body_2_wrench.force.z == -c.wrenches[0].body_1_wrench.force.z
+        for c in contacts
+    )
+    assert all(
+        c.collision1.name == "rig/bumper" and c.normals[0].z == pytest.approx(1.0) for c in contacts
+    )
     assert bag["/bumper"][-1].data is True
 
 
@@ -83,17 +137,30 @@ def test_frames_of_devices_hang_on_the_robot(bag):
 
 
 def trajectory(name: str, *points: float) -> JointTrajectory:
-    return JointTrajectory(Header(Time(), ""), [name], [JointTrajectoryPoint([p], [], [], [], Duration(i + 1, 0)) for i, p in enumerate(points)])
+    return JointTrajectory(
+        Header(Time(), ""),
+        [name],
+        [JointTrajectoryPoint([p], [], [], [], Duration(i + 1, 0)) for i, p in enumerate(points)],
+    )
 
 
 def numbers(*values: float) -> Float64MultiArray:
-    return Float64MultiArray(MultiArrayLayout([MultiArrayDimension("joints", len(values), len(values))], 0), list(values))
+    return Float64MultiArray(
+        MultiArrayLayout([MultiArrayDimension("joints", len(values), len(values))], 0), list(values)
+    )
 
 
-@pytest.mark.parametrize("topic, kind, message", [
-    ("/joint_trajectory_controller/joint_trajectory", JointTrajectory, trajectory("elbow", 0.1, 0.5)),
-    ("/forward_position_controller/commands", Float64MultiArray, numbers(0.5)),
-])
+@pytest.mark.parametrize(
+    "topic, kind, message",
+    [
+        (
+            "/joint_trajectory_controller/joint_trajectory",
+            JointTrajectory,
+            trajectory("elbow", 0.1, 0.5),
+        ),
+        ("/forward_position_controller/commands", Float64MultiArray, numbers(0.5)),
+    ],
+)
 def test_joints_go_where_they_are_sent(topic, kind, message):
     with Run(world=WORLD) as run:
         peer = Peer(run.domain)
@@ -101,16 +168,26 @@ def test_joints_go_where_they_are_sent(topic, kind, message):
 
         def arrived():
             commands.write(message)
-            return any(j.name == ["elbow"] and j.position[0] == pytest.approx(0.5, abs=0.02) for j in joints.take(N=100))
+            return any(
+                j.name == ["elbow"] and j.position[0] == pytest.approx(0.5, abs=0.02)
+                for j in joints.take(N=100)
+            )
 
         wait_for(arrived, "the elbow at 0.5 rad")
 
 
-@pytest.mark.parametrize("topic, kind, message", [
-    ("/joint_trajectory_controller/joint_trajectory", JointTrajectory, JointTrajectory(Header(Time(), ""), ["elbow"], [])),
-    ("/forward_position_controller/commands", Float64MultiArray, numbers(0.5, 0.5)),
-    ("/forward_velocity_controller/commands", Float64MultiArray, numbers()),
-])
+@pytest.mark.parametrize(
+    "topic, kind, message",
+    [
+        (
+            "/joint_trajectory_controller/joint_trajectory",
+            JointTrajectory,
+            JointTrajectory(Header(Time(), ""), ["elbow"], []),
+        ),
+        ("/forward_position_controller/commands", Float64MultiArray, numbers(0.5, 0.5)),
+        ("/forward_velocity_controller/commands", Float64MultiArray, numbers()),
+    ],
+)
 def test_commands_that_do_not_fit_the_joints_are_counted(topic, kind, message):
     with Run(world=WORLD) as run:
         peer = Peer(run.domain)

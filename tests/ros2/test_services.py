@@ -9,8 +9,29 @@ import pytest
 from conftest import Peer, Run, take, wait_for
 from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsSubscription
 from cyclonedds.core import Policy
-from ros_types import (Clock, Header, Odometry, Point, Pose, PoseWithCovariance, PoseWithCovarianceStamped, Quaternion, Time, Twist, Vector3)
-from simulation_types import SERVICES, Accel, Bounds, EntityCategory, EntityFilters, EntityState, PoseStamped, TagsFilter
+from ros_types import (
+    Clock,
+    Header,
+    Odometry,
+    Point,
+    Pose,
+    PoseWithCovariance,
+    PoseWithCovarianceStamped,
+    Quaternion,
+    Time,
+    Twist,
+    Vector3,
+)
+from simulation_types import (
+    SERVICES,
+    Accel,
+    Bounds,
+    EntityCategory,
+    EntityFilters,
+    EntityState,
+    PoseStamped,
+    TagsFilter,
+)
 
 OK, NOT_FOUND, INCORRECT_STATE, FAILED, UNSUPPORTED = 1, 2, 3, 4, 0
 STOPPED, PLAYING, PAUSED = 0, 1, 2
@@ -30,7 +51,10 @@ class Client:
         if service not in self.ends:
             writer = self.peer.writer(f"/{service}Request", question, prefix="rq")
             reader = self.peer.reader(f"/{service}Reply", answer, prefix="rr")
-            wait_for(lambda: writer.get_matched_subscriptions() and reader.get_matched_publications(), service)
+            wait_for(
+                lambda: writer.get_matched_subscriptions() and reader.get_matched_publications(),
+                service,
+            )
             self.ends[service] = writer, reader
         writer, reader = self.ends[service]
         sequence = next(self.sequence)
@@ -48,7 +72,12 @@ def at(x=0.0, y=0.0, z=0.0, frame="") -> PoseStamped:
 
 
 def filters(pattern="", categories=(), tags=(), points=()) -> EntityFilters:
-    return EntityFilters(pattern, [EntityCategory(c) for c in categories], TagsFilter(list(tags), 0), Bounds(0, list(points)))
+    return EntityFilters(
+        pattern,
+        [EntityCategory(c) for c in categories],
+        TagsFilter(list(tags), 0),
+        Bounds(0, list(points)),
+    )
 
 
 @pytest.fixture
@@ -90,7 +119,10 @@ def test_entities_are_listed_and_filtered(client):
     assert client.call("get_entities", filters(tags=["x"])).entities == []
     for bad in ("(", "(a{9}){9}", "a" * 1000):
         assert client.call("get_entities", filters(bad)).result.result == UNSUPPORTED
-    assert client.call("get_entities", filters(points=[Vector3(), Vector3()])).result.result == UNSUPPORTED
+    assert (
+        client.call("get_entities", filters(points=[Vector3(), Vector3()])).result.result
+        == UNSUPPORTED
+    )
 
 
 def test_states_of_entities_are_got_and_set(client):
@@ -99,7 +131,9 @@ def test_states_of_entities_are_got_and_set(client):
     assert client.call("get_entity_state", "nobody").result.result == NOT_FOUND
     assert client.call("get_entity_state", "").result.result == NOT_FOUND
     rest, none = Twist(Vector3(), Vector3()), Accel(Vector3(), Vector3())
-    there = EntityState(Header(Time(), "world"), Pose(Point(0.0, 1.5, 0.0), Quaternion()), rest, none)
+    there = EntityState(
+        Header(Time(), "world"), Pose(Point(0.0, 1.5, 0.0), Quaternion()), rest, none
+    )
     assert client.call("set_entity_state", "p3at", there).result.result == OK
     position = client.call("get_entity_state", "p3at").state.pose.position
     assert (position.x, position.y) == (pytest.approx(0.0), pytest.approx(1.5))
@@ -109,21 +143,48 @@ def test_states_of_entities_are_got_and_set(client):
 
 def test_robots_come_and_go_with_their_topics(client):
     assert client.call("spawn_entity", "", False, "p3at", "", "", at(0.0, 1.5)).result.result == 102
-    assert client.call("spawn_entity", "p3at", False, "p3at", "", "", at(0.0, 1.5)).result.result == 101
+    assert (
+        client.call("spawn_entity", "p3at", False, "p3at", "", "", at(0.0, 1.5)).result.result
+        == 101
+    )
     assert client.call("spawn_entity", "bob", False, "", "", "", at(0.0, 1.5)).result.result == 104
-    assert client.call("spawn_entity", "bob", False, "no_such_model", "", "", at(0.0, 1.5)).result.result == FAILED
-    assert client.call("spawn_entity", "bob", False, "p3at", "", "", at(0.0, 1.5, frame="mars")).result.result == FAILED
+    assert (
+        client.call(
+            "spawn_entity", "bob", False, "no_such_model", "", "", at(0.0, 1.5)
+        ).result.result
+        == FAILED
+    )
+    assert (
+        client.call(
+            "spawn_entity", "bob", False, "p3at", "", "", at(0.0, 1.5, frame="mars")
+        ).result.result
+        == FAILED
+    )
     spawned = client.call("spawn_entity", "p3at", True, "p3at", "", "", at(0.0, 1.5))
-    assert (spawned.result.result, spawned.entity_name) == (OK, "p3at_2"), spawned.result.error_message
+    assert (spawned.result.result, spawned.entity_name) == (OK, "p3at_2"), (
+        spawned.result.error_message
+    )
     wait_for(lambda: "p3at_2" in client.call("get_entities", filters()).entities, "p3at_2")
-    own, first = client.peer.reader("/p3at_2/ground_truth", Odometry), client.peer.reader("/ground_truth", Odometry)
-    assert all(o.child_frame_id == "p3at_2/base_link" and o.pose.pose.position.y == pytest.approx(1.5) for o in take(own, 5))
-    assert all(o.child_frame_id == "base_link" and o.pose.pose.position.y == pytest.approx(0.0) for o in take(first, 5))
+    own, first = (
+        client.peer.reader("/p3at_2/ground_truth", Odometry),
+        client.peer.reader("/ground_truth", Odometry),
+    )
+    assert all(
+        o.child_frame_id == "p3at_2/base_link" and o.pose.pose.position.y == pytest.approx(1.5)
+        for o in take(own, 5)
+    )
+    assert all(
+        o.child_frame_id == "base_link" and o.pose.pose.position.y == pytest.approx(0.0)
+        for o in take(first, 5)
+    )
     assert client.call("delete_entity", "p3at_2").result.result == OK
     assert client.call("delete_entity", "p3at_2").result.result == NOT_FOUND
 
 
-@pytest.mark.parametrize("scope, code", [(0, OK), (255, OK), (1, OK), (2, OK), (3, OK), (7, OK), (4, UNSUPPORTED), (5, UNSUPPORTED)])
+@pytest.mark.parametrize(
+    "scope, code",
+    [(0, OK), (255, OK), (1, OK), (2, OK), (3, OK), (7, OK), (4, UNSUPPORTED), (5, UNSUPPORTED)],
+)
 def test_resets_have_scopes(client, scope, code):
     assert client.call("reset_simulation", scope).result.result == code
 
@@ -134,7 +195,10 @@ def test_where_somebody_says_the_robot_is_there_it_is_put(client):
     truth = client.peer.reader("/ground_truth", Odometry)
     pose = PoseWithCovariance(Pose(Point(0.0, 1.5, 0.0), Quaternion()), [0.0] * 36)
     initial.write(PoseWithCovarianceStamped(Header(Time(), "map"), pose))
-    wait_for(lambda: any(abs(o.pose.pose.position.y - 1.5) < 1e-6 for o in truth.take(N=100)), "the robot at its new place")
+    wait_for(
+        lambda: any(abs(o.pose.pose.position.y - 1.5) < 1e-6 for o in truth.take(N=100)),
+        "the robot at its new place",
+    )
 
 
 def test_without_control_services_say_so():
@@ -154,5 +218,8 @@ def test_both_ends_of_a_service_have_its_hash_and_one_id(client):
 
     wait_for(all_there, "ten services")
     # As rosidl generated it for simulation_interfaces 1.x.
-    assert "typehash=RIHS01_4ce285d7ff9b8ac70dcc95161f32bf54c05a6f4b13427990e41ab40c36c39646;" in found["rq/reset_simulationRequest"]
+    assert (
+        "typehash=RIHS01_4ce285d7ff9b8ac70dcc95161f32bf54c05a6f4b13427990e41ab40c36c39646;"
+        in found["rq/reset_simulationRequest"]
+    )
     assert all(data.startswith("serviceid=") for data in found.values())

@@ -7,10 +7,28 @@ import re
 
 import pytest
 from conftest import Peer, Run, take, wait_for
-from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription
+from cyclonedds.builtin import (
+    BuiltinDataReader,
+    BuiltinTopicDcpsPublication,
+    BuiltinTopicDcpsSubscription,
+)
 from cyclonedds.core import Policy
-from ros_types import (CameraInfo, Clock, Image, JointState, LaserScan, Odometry, ParticipantEntitiesInfo, Range, TFMessage, Time, Header, Twist,
-                       TwistStamped, Vector3)
+from ros_types import (
+    CameraInfo,
+    Clock,
+    Image,
+    JointState,
+    LaserScan,
+    Odometry,
+    ParticipantEntitiesInfo,
+    Range,
+    TFMessage,
+    Time,
+    Header,
+    Twist,
+    TwistStamped,
+    Vector3,
+)
 from rosbags.typesys import Stores, get_typestore
 
 
@@ -55,13 +73,16 @@ def test_odometry_and_its_frame_agree(standing):
 
 
 def test_late_readers_get_where_the_devices_are(standing):
-    frames = {t.child_frame_id: t for t in take(standing.reader("/tf_static", TFMessage, latched=True))[-1].transforms}
+    frames = {
+        t.child_frame_id: t
+        for t in take(standing.reader("/tf_static", TFMessage, latched=True))[-1].transforms
+    }
     assert frames["lrf"].header.frame_id == "base_link"
     assert frames["lrf"].transform.translation.x == pytest.approx(0.16)
     optical = frames["camera_optical"]
     assert optical.header.frame_id == "camera"
     q = optical.transform.rotation
-    assert (q.x, q.y, q.z, q.w) == (-0.5, 0.5, -0.5, 0.5)    # REP-103: z ahead, x right, y down
+    assert (q.x, q.y, q.z, q.w) == (-0.5, 0.5, -0.5, 0.5)  # REP-103: z ahead, x right, y down
     assert {f"sonar_front_{i}" for i in range(8)} <= set(frames)
 
 
@@ -77,7 +98,9 @@ def test_pictures_are_raw_and_have_their_camera(standing):
 
 def test_wheels_are_joints(standing):
     joints = take(standing.reader("/joint_states", JointState))[0]
-    assert sorted(joints.name) == sorted(f"{end}_{side}_wheel_joint" for end in ("front", "rear") for side in ("left", "right"))
+    assert sorted(joints.name) == sorted(
+        f"{end}_{side}_wheel_joint" for end in ("front", "rear") for side in ("left", "right")
+    )
     assert len(joints.position) == len(joints.velocity) == 4
 
 
@@ -92,7 +115,10 @@ def test_cmd_vel_of_either_type_drives(stamped):
 
         def has_driven():
             cmd_vel.write(message)
-            return any(o.pose.pose.position.x > 0.2 and o.twist.twist.linear.x == pytest.approx(0.4) for o in odometry.take(N=100))
+            return any(
+                o.pose.pose.position.x > 0.2 and o.twist.twist.linear.x == pytest.approx(0.4)
+                for o in odometry.take(N=100)
+            )
 
         wait_for(has_driven, "a speed of 0.4 m/s")
 
@@ -109,7 +135,10 @@ def endpoints(peer, kind):
                 found[sample.topic_name, sample.type_name] = data
         return found
 
-    wait_for(lambda: len(all_there()) >= (2 if kind is BuiltinTopicDcpsSubscription else 28), "the run's endpoints")
+    wait_for(
+        lambda: len(all_there()) >= (2 if kind is BuiltinTopicDcpsSubscription else 28),
+        "the run's endpoints",
+    )
     return found
 
 
@@ -125,7 +154,7 @@ def test_type_hashes_are_those_of_rosbags(standing, kind):
         told = re.fullmatch(rb"typehash=(RIHS01_[0-9a-f]{64});", data)
         assert told, (topic, data)
         name = ros_name(dds_type)
-        if name.startswith("rmw_dds_common"):    # rosbags takes a char for another type than ROS does
+        if name.startswith("rmw_dds_common"):  # rosbags takes a char for another type than ROS does
             continue
         assert told.group(1).decode() == store.hash_rihs01(name), topic
         compared += 1
@@ -133,22 +162,29 @@ def test_type_hashes_are_those_of_rosbags(standing, kind):
 
 
 def test_the_node_is_in_the_graph(standing):
-    info = take(standing.reader("ros_discovery_info", ParticipantEntitiesInfo, latched=True, prefix=""))[-1]
+    info = take(
+        standing.reader("ros_discovery_info", ParticipantEntitiesInfo, latched=True, prefix="")
+    )[-1]
     (node,) = info.node_entities_info_seq
     assert (node.node_namespace, node.node_name) == ("/", "ruedo")
     found = BuiltinDataReader(standing.participant, BuiltinTopicDcpsPublication)
     guids = {bytes(s.key.bytes): s.topic_name for s in found.take(N=1000)}
     listed = {guids[bytes(g.data)] for g in node.writer_gid_seq if bytes(g.data) in guids}
     assert {"rt/scan", "rt/odom", "rt/clock", "rt/tf", "rt/tf_static"} <= listed
-    assert len(node.reader_gid_seq) == 3 + 10    # commands and services
+    assert len(node.reader_gid_seq) == 3 + 10  # commands and services
 
 
 def test_many_robots_have_namespaces_and_frames_of_their_own():
     with Run("--spawn", "p3at:bob@0,1.5") as run:
         peer = Peer(run.domain)
         for robot in ("p3at", "bob"):
-            assert take(peer.reader(f"/{robot}/scan", LaserScan))[0].header.frame_id == f"{robot}/lrf"
-            assert take(peer.reader(f"/{robot}/odom", Odometry))[0].child_frame_id == f"{robot}/base_link"
+            assert (
+                take(peer.reader(f"/{robot}/scan", LaserScan))[0].header.frame_id == f"{robot}/lrf"
+            )
+            assert (
+                take(peer.reader(f"/{robot}/odom", Odometry))[0].child_frame_id
+                == f"{robot}/base_link"
+            )
 
 
 def test_topics_are_remapped():
@@ -158,15 +194,22 @@ def test_topics_are_remapped():
         take(peer.reader("/sim/clock", Clock))
 
 
-@pytest.mark.parametrize("arguments, environment, words", [
-    (["--remap", "/scam=/x"], {}, "'/scam'; did you mean '/scan'?"),
-    ([], {"ROS_DOMAIN_ID": "233"}, "ROS_DOMAIN_ID is '233'; 0 to 232 is allowed"),
-    ([], {"ROS_DOMAIN_ID": "-1"}, "ROS_DOMAIN_ID is '-1'"),
-    ([], {"ROS_DOMAIN_ID": "x"}, "ROS_DOMAIN_ID is 'x'"),
-    ([], {"ROS_AUTOMATIC_DISCOVERY_RANGE": "EVERYWHERE"}, "ROS_AUTOMATIC_DISCOVERY_RANGE is 'EVERYWHERE'"),
-    ([], {"ROS_DISTRO": "noetic"}, "there is no ROS 2 release 'noetic'"),
-    (["--ros2-clock", "0"], {}, "--ros2-clock"),
-])
+@pytest.mark.parametrize(
+    "arguments, environment, words",
+    [
+        (["--remap", "/scam=/x"], {}, "'/scam'; did you mean '/scan'?"),
+        ([], {"ROS_DOMAIN_ID": "233"}, "ROS_DOMAIN_ID is '233'; 0 to 232 is allowed"),
+        ([], {"ROS_DOMAIN_ID": "-1"}, "ROS_DOMAIN_ID is '-1'"),
+        ([], {"ROS_DOMAIN_ID": "x"}, "ROS_DOMAIN_ID is 'x'"),
+        (
+            [],
+            {"ROS_AUTOMATIC_DISCOVERY_RANGE": "EVERYWHERE"},
+            "ROS_AUTOMATIC_DISCOVERY_RANGE is 'EVERYWHERE'",
+        ),
+        ([], {"ROS_DISTRO": "noetic"}, "there is no ROS 2 release 'noetic'"),
+        (["--ros2-clock", "0"], {}, "--ros2-clock"),
+    ],
+)
 def test_wrong_usage_is_named(arguments, environment, words):
     with Run(*arguments, environment=environment) as run:
         output = run.process.communicate(timeout=60)[0]

@@ -1,4 +1,5 @@
-// What one client asks for holds nobody else up, and is bounded: STEPs, sequences, sessions, texts, requests before there is a state.
+// What one client asks for holds nobody else up, and is bounded: STEPs, sequences, sessions, texts,
+// requests before there is a state.
 #include <gtest/gtest.h>
 
 #include "control_client.h"
@@ -42,13 +43,13 @@ TEST(Steps, AreBounded) {
 TEST(Steps, FewOfAClientWait) {
   Controlled client;
   client.begin(paused_server(), kRobot);
-  client.state();    // what comes before the first state waits apart
+  client.state();  // what comes before the first state waits apart
   for (size_t i = 0; i < Control::kMostSteppings; ++i) client.send(client.stepping(kMostSteps));
   const reply_t beyond = client.ask(client.stepping(1));
   EXPECT_EQ(beyond.code, reply_t::REFUSED);
   EXPECT_NE(beyond.text.find("too many requests"), std::string::npos) << beyond.text;
   EXPECT_EQ(client.ask(request_t::PAUSE).code, reply_t::OK);
-  EXPECT_EQ(client.ask(client.stepping(1)).code, reply_t::OK);    // there is room again
+  EXPECT_EQ(client.ask(client.stepping(1)).code, reply_t::OK);  // there is room again
 }
 
 TEST(Sequences, JumpLittle) {
@@ -57,14 +58,17 @@ TEST(Sequences, JumpLittle) {
   request_t first = client.request(request_t::GET_STATE, engine::encoded(name_request_t{}));
   const int64_t last = first.sequence;
   ASSERT_EQ(client.ask(first).code, reply_t::OK);
-  for (const int64_t sequence : {INT64_MIN, int64_t{-1}, int64_t{0}, last + Sessions::kMostJump + 1, INT64_MAX}) {
+  for (const int64_t sequence :
+       {INT64_MIN, int64_t{-1}, int64_t{0}, last + Sessions::kMostJump + 1, INT64_MAX}) {
     request_t forged = client.request(request_t::GET_STATE);
     forged.sequence = sequence;
     const reply_t reply = client.ask(forged);
     EXPECT_EQ(reply.code, reply_t::BAD_REQUEST) << sequence;
-    EXPECT_NE(reply.text.find("1 to " + std::to_string(last + Sessions::kMostJump)), std::string::npos) << reply.text;
+    EXPECT_NE(reply.text.find("1 to " + std::to_string(last + Sessions::kMostJump)),
+              std::string::npos)
+        << reply.text;
   }
-  EXPECT_EQ(client.step(1).step, 1);    // the session is as it was
+  EXPECT_EQ(client.step(1).step, 1);  // the session is as it was
 }
 
 TEST(Texts, OfRepliesAreShort) {
@@ -76,7 +80,8 @@ TEST(Texts, OfRepliesAreShort) {
   EXPECT_EQ(reply.code, reply_t::UNKNOWN_NAME);
   EXPECT_LE(reply.text.size(), Control::kLongestText + 3);
   body.name = "\033[2J";
-  EXPECT_EQ(client.ask(request_t::GET_STATE, engine::encoded(body)).text, "there is no model or MODEL/LINK called '?[2J'");
+  EXPECT_EQ(client.ask(request_t::GET_STATE, engine::encoded(body)).text,
+            "there is no model or MODEL/LINK called '?[2J'");
 }
 
 // The clock is the test's own.
@@ -84,9 +89,11 @@ TEST(Places, GoToNewcomersWithinSeconds) {
   Sessions sessions;
   const Sessions::Time begin{};
   std::vector<int64_t> ids;
-  for (size_t i = 0; i < Sessions::kMostSessions; ++i) ids.push_back(sessions.join("crashed", static_cast<int64_t>(i) + 1, begin)->id);
+  for (size_t i = 0; i < Sessions::kMostSessions; ++i)
+    ids.push_back(sessions.join("crashed", static_cast<int64_t>(i) + 1, begin)->id);
   EXPECT_EQ(sessions.join("new", 1000, begin + std::chrono::seconds(2)), nullptr);
-  for (size_t i = 0; i < 10; ++i) {    // they ask for something now and then; the others only ever joined
+  for (size_t i = 0; i < 10;
+       ++i) {  // they ask for something now and then; the others only ever joined
     Session* session = sessions.find(ids[i]);
     session->spoke = true;
     session->last_heard = begin + std::chrono::seconds(i == 3 ? 0 : 1);
@@ -94,11 +101,14 @@ TEST(Places, GoToNewcomersWithinSeconds) {
   const auto later = begin + std::chrono::seconds(4);
   const int64_t kept = ids.back();
   const auto keeps = [&](int64_t id) { return id == kept; };
-  for (size_t i = 0; i < Sessions::kMostSessions - 11; ++i) ASSERT_NE(sessions.join("new", 1000 + static_cast<int64_t>(i), later, keeps), nullptr) << i;
-  for (size_t i = 0; i < 10; ++i) EXPECT_NE(sessions.find(ids[i]), nullptr) << i;    // who only joined gives way first
+  for (size_t i = 0; i < Sessions::kMostSessions - 11; ++i)
+    ASSERT_NE(sessions.join("new", 1000 + static_cast<int64_t>(i), later, keeps), nullptr) << i;
+  for (size_t i = 0; i < 10; ++i)
+    EXPECT_NE(sessions.find(ids[i]), nullptr) << i;  // who only joined gives way first
   ASSERT_NE(sessions.join("new", 2000, later, keeps), nullptr);
-  EXPECT_EQ(sessions.find(ids[3]), nullptr);                                         // then the most silent
-  for (int64_t i = 1; i < 10; ++i) ASSERT_NE(sessions.join("new", 2000 + i, later, keeps), nullptr) << i;
+  EXPECT_EQ(sessions.find(ids[3]), nullptr);  // then the most silent
+  for (int64_t i = 1; i < 10; ++i)
+    ASSERT_NE(sessions.join("new", 2000 + i, later, keeps), nullptr) << i;
   EXPECT_EQ(sessions.join("new", 3000, later, keeps), nullptr);
   EXPECT_NE(sessions.find(kept), nullptr);
 }
@@ -126,16 +136,19 @@ TEST(BeforeLockstep, NobodyIsHeldUp) {
   request_t strange = client.request(request_t::GET_STATE, engine::encoded(name_request_t{}));
   strange.session = 0;
   EXPECT_EQ(client.ask(strange).code, reply_t::UNKNOWN_SESSION);
-  constexpr int32_t kinds[] = {request_t::GET_STATE, request_t::PAUSE, request_t::RESUME, request_t::SET_POSE, request_t::SPAWN, request_t::RESET};
+  constexpr int32_t kinds[] = {request_t::GET_STATE, request_t::PAUSE, request_t::RESUME,
+                               request_t::SET_POSE,  request_t::SPAWN, request_t::RESET};
   for (const int32_t kind : kinds) {
     const reply_t reply = client.ask(kind);
     EXPECT_EQ(reply.code, reply_t::REFUSED) << kind;
-    EXPECT_NE(reply.text.find("lockstep has not begun: call step(0)"), std::string::npos) << reply.text;
+    EXPECT_NE(reply.text.find("lockstep has not begun: call step(0)"), std::string::npos)
+        << reply.text;
     EXPECT_NE(reply.text.find("1 more of 1 clients"), std::string::npos) << reply.text;
   }
-  EXPECT_EQ(client.ask(request_t::STEP, engine::encoded(step_request_t{})).code, reply_t::BAD_REQUEST);
+  EXPECT_EQ(client.ask(request_t::STEP, engine::encoded(step_request_t{})).code,
+            reply_t::BAD_REQUEST);
   EXPECT_EQ(client.ask(request_t::GRANT, engine::encoded(grant(-1, -1))).code, reply_t::OK);
-  EXPECT_EQ(client.state().step, 0);    // waits for the state that comes now
+  EXPECT_EQ(client.state().step, 0);  // waits for the state that comes now
   EXPECT_EQ(client.ask(request_t::QUIT).code, reply_t::OK);
 }
 
@@ -150,7 +163,8 @@ TEST(InLockstep, APauseIsWhatTheRunWaitsFor) {
   resend_request_t look;
   look.received = -1;
   look.nwanted = 0;
-  const auto resent = decoded_as<resend_reply_t>(client.ask(request_t::RESEND, engine::encoded(look)).body);
+  const auto resent =
+      decoded_as<resend_reply_t>(client.ask(request_t::RESEND, engine::encoded(look)).body);
   EXPECT_EQ(resent.step, 0);
   EXPECT_EQ(resent.waits_for, "a RESUME: it is paused");
   EXPECT_EQ(client.ask(request_t::RESUME).code, reply_t::OK);

@@ -20,7 +20,8 @@ namespace ruedo::run {
 template <class T>
 T decoded_as(const std::vector<uint8_t>& bytes) {
   T message;
-  EXPECT_EQ(decode_checked(bytes.data(), bytes.size(), message), DecodeFault::none) << T::getTypeName();
+  EXPECT_EQ(decode_checked(bytes.data(), bytes.size(), message), DecodeFault::none)
+      << T::getTypeName();
   return message;
 }
 
@@ -51,7 +52,7 @@ class ControlledOn {
     if (server_) server_->stop();
     wait();
   }
-  void wait() {    // for the end of the run
+  void wait() {  // for the end of the run
     if (thread_.joinable()) thread_.join();
   }
 
@@ -61,11 +62,16 @@ class ControlledOn {
     return answer(request);
   }
   reply_t answer(const request_t& request) {
-    return decoded_as<reply_t>(bus.wait_for("ruedo/reply", from_, [&](const Message& message) {
-                                    return decoded_as<reply_t>(message.bytes).sequence == request.sequence;
-                                  }).bytes);
+    return decoded_as<reply_t>(bus.wait_for("ruedo/reply", from_,
+                                            [&](const Message& message) {
+                                              return decoded_as<reply_t>(message.bytes).sequence ==
+                                                     request.sequence;
+                                            })
+                                   .bytes);
   }
-  reply_t ask(int32_t kind, const std::vector<uint8_t>& body = {}) { return ask(request(kind, body)); }
+  reply_t ask(int32_t kind, const std::vector<uint8_t>& body = {}) {
+    return ask(request(kind, body));
+  }
 
   state_reply_t step(int64_t steps) {
     step_request_t body;
@@ -80,7 +86,8 @@ class ControlledOn {
     return decoded_as<state_reply_t>(reply.body);
   }
 
-  static spawn_request_t spawning(const std::string& text, double x, double y, const std::string& name = "") {
+  static spawn_request_t spawning(const std::string& text, double x, double y,
+                                  const std::string& name = "") {
     spawn_request_t body;
     body.name = name;
     body.text = text;
@@ -90,8 +97,12 @@ class ControlledOn {
     std::copy(orientation, orientation + 4, body.orientation);
     return body;
   }
-  reply_t spawn(const spawn_request_t& body) { return ask(request_t::SPAWN, engine::encoded(body)); }
-  reply_t spawn(const std::string& text, double x, double y, const std::string& name = "") { return spawn(spawning(text, x, y, name)); }
+  reply_t spawn(const spawn_request_t& body) {
+    return ask(request_t::SPAWN, engine::encoded(body));
+  }
+  reply_t spawn(const std::string& text, double x, double y, const std::string& name = "") {
+    return spawn(spawning(text, x, y, name));
+  }
 
   reply_t remove(const std::string& name) {
     name_request_t body;
@@ -168,7 +179,7 @@ class ControlledOn {
     return request(request_t::STEP, engine::encoded(body));
   }
 
-  void rewind() { from_ = 0; }    // after bus.forget(), or for an answer that came before another's
+  void rewind() { from_ = 0; }  // after bus.forget(), or for an answer that came before another's
   run::Run& server() { return *server_; }
   SomeBus bus;
 
@@ -192,11 +203,17 @@ inline std::string as_file(const std::string& model) {
   return "<?xml version='1.0'?><sdf version='1.9' xmlns:ruedo='ruedo'>" + model + "</sdf>";
 }
 
-inline std::string box_sdf(const std::string& name, const std::string& size, bool is_static, double x = 0, double y = 0, double z = 0) {
-  const std::string place = std::to_string(x) + " " + std::to_string(y) + " " + std::to_string(z) + " 0 0 0";
-  return "<model name='" + name + "'><pose>" + place + "</pose>" + (is_static ? "<static>true</static>" : "") +
-         "<link name='link'><inertial><mass>1</mass><inertia><ixx>0.02</ixx><iyy>0.02</iyy><izz>0.02</izz></inertia></inertial>"
-         "<collision name='c'><geometry><box><size>" + size + "</size></box></geometry></collision></link></model>";
+inline std::string box_sdf(const std::string& name, const std::string& size, bool is_static,
+                           double x = 0, double y = 0, double z = 0) {
+  const std::string place =
+      std::to_string(x) + " " + std::to_string(y) + " " + std::to_string(z) + " 0 0 0";
+  return "<model name='" + name + "'><pose>" + place + "</pose>" +
+         (is_static ? "<static>true</static>" : "") +
+         "<link "
+         "name='link'><inertial><mass>1</mass><inertia><ixx>0.02</ixx><iyy>0.02</iyy><izz>0.02</"
+         "izz></inertia></inertial>"
+         "<collision name='c'><geometry><box><size>" +
+         size + "</size></box></geometry></collision></link></model>";
 }
 
 }  // namespace ruedo::run

@@ -14,7 +14,8 @@ void* operator new(size_t size) {
   if (void* memory = std::malloc(size)) return memory;
   throw std::bad_alloc();
 }
-void* operator new(size_t size, const std::nothrow_t&) noexcept {    // not the sanitizer's: ours frees it
+void* operator new(size_t size,
+                   const std::nothrow_t&) noexcept {  // not the sanitizer's: ours frees it
   ++g_count;
   return std::malloc(size);
 }

@@ -5,6 +5,6 @@
 
 namespace ruedo::run {
 
-uint64_t allocations();    // calls of operator new so far, in all threads
+uint64_t allocations();  // calls of operator new so far, in all threads
 
 }  // namespace ruedo::run

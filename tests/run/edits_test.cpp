@@ -24,13 +24,16 @@ class EditsTest : public testing::Test, public Controlled {
 
 // One ray ahead from 0.1 m above the ground, 10 Hz.
 std::string one_ray() {
-  return "<sensor name='lrf' type='ray'><pose>0 0 0 0 0 0</pose><update_rate>10</update_rate><ray><scan><horizontal><samples>1</samples>"
-         "<min_angle>0</min_angle><max_angle>0</max_angle></horizontal></scan><range><min>0.01</min><max>20</max></range></ray></sensor>";
+  return "<sensor name='lrf' type='ray'><pose>0 0 0 0 0 "
+         "0</pose><update_rate>10</update_rate><ray><scan><horizontal><samples>1</samples>"
+         "<min_angle>0</min_angle><max_angle>0</max_angle></horizontal></scan><range><min>0.01</"
+         "min><max>20</max></range></ray></sensor>";
 }
 
 std::string noisy_ray() {
   std::string ray = one_ray();
-  return ray.insert(ray.find("</ray>"), "<noise><type>gaussian</type><mean>0</mean><stddev>0.05</stddev></noise>");
+  return ray.insert(ray.find("</ray>"),
+                    "<noise><type>gaussian</type><mean>0</mean><stddev>0.05</stddev></noise>");
 }
 
 TEST_F(EditsTest, ASpawnedRobotIsThereAndDrives) {
@@ -38,18 +41,19 @@ TEST_F(EditsTest, ASpawnedRobotIsThereAndDrives) {
   step(10);
   const reply_t reply = spawn(as_file(robot_sdf("guest", 0, 0, one_ray())), 2, 1);
   ASSERT_EQ(reply.code, reply_t::OK) << reply.text;
-  EXPECT_NEAR(state("guest").position[0], 2.0, 1e-12);    // at once, before any step
+  EXPECT_NEAR(state("guest").position[0], 2.0, 1e-12);  // at once, before any step
   EXPECT_NEAR(state("guest").position[1], 1.0, 1e-12);
-  EXPECT_NEAR(state("guest").position[2], 0.0, 1e-9);     // its wheels are at 0.1 +- 0.1
+  EXPECT_NEAR(state("guest").position[2], 0.0, 1e-9);  // its wheels are at 0.1 +- 0.1
 
   const world_info_t info = this->info();
   ASSERT_EQ(info.nrobots, 2);
   EXPECT_EQ(info.robots[1].name, "guest");
   int inputs = 0, devices = 0;
-  for (const channel_info_t& channel : info.channels) inputs += channel.robot == "guest" && channel.input;
+  for (const channel_info_t& channel : info.channels)
+    inputs += channel.robot == "guest" && channel.input;
   for (const device_info_t& device : info.devices) devices += device.robot == "guest";
-  EXPECT_EQ(inputs, 4);     // velocity, wheels, move, fault
-  EXPECT_EQ(devices, 4);    // odometry, pose, motion, lrf
+  EXPECT_EQ(inputs, 4);   // velocity, wheels, move, fault
+  EXPECT_EQ(devices, 4);  // odometry, pose, motion, lrf
 
   const size_t from = bus.count();
   drive("guest", 0.5);
@@ -64,7 +68,8 @@ TEST_F(EditsTest, ASpawnedRobotIsThereAndDrives) {
   const auto scans = on<planar_lidar_t>("guest/lrf", from);
   ASSERT_EQ(scans.size(), 10u);
   EXPECT_EQ(scans[1].utime, 155'000);
-  EXPECT_NEAR(on<odometry_t>("guest/odometry", from).back().x, on<pose_t>("guest/pose", from).back().pos[0] - 2.0, 1e-9);
+  EXPECT_NEAR(on<odometry_t>("guest/odometry", from).back().x,
+              on<pose_t>("guest/pose", from).back().pos[0] - 2.0, 1e-9);
 }
 
 TEST_F(EditsTest, RaysMeetWhatCameAndNotWhatWent) {
@@ -78,7 +83,7 @@ TEST_F(EditsTest, RaysMeetWhatCameAndNotWhatWent) {
   ASSERT_EQ(spawn(as_file(box_sdf("wall", "0.2 2 1", true)), 3, 0).code, reply_t::OK);
   EXPECT_NEAR(range(), 2.9, 1e-6);
   ASSERT_EQ(spawn(as_file(box_sdf("crate", "0.5 0.5 0.5", false)), 1.5, 0).code, reply_t::OK);
-  EXPECT_NEAR(range(), 1.25, 1e-4);    // it settles
+  EXPECT_NEAR(range(), 1.25, 1e-4);  // it settles
   ASSERT_EQ(remove("crate").code, reply_t::OK);
   EXPECT_NEAR(range(), 2.9, 1e-6);
   ASSERT_EQ(remove("wall").code, reply_t::OK);
@@ -100,7 +105,8 @@ TEST_F(EditsTest, ARemovedRobotIsSilentAndItsNameFree) {
   for (const auto& world : on<world_state_t>("ruedo/world", from)) EXPECT_EQ(world.n, 1);
   const world_info_t info = this->info();
   EXPECT_EQ(info.nrobots, 1);
-  for (const body_info_t& body : info.bodies) EXPECT_EQ(body.name.find("s/"), std::string::npos) << body.name;
+  for (const body_info_t& body : info.bodies)
+    EXPECT_EQ(body.name.find("s/"), std::string::npos) << body.name;
   name_request_t name;
   name.name = "s";
   EXPECT_EQ(ask(request_t::GET_STATE, engine::encoded(name)).code, reply_t::UNKNOWN_NAME);
@@ -111,16 +117,18 @@ TEST_F(EditsTest, ARemovedRobotIsSilentAndItsNameFree) {
 }
 
 TEST_F(EditsTest, WhatStoodOnARemovedModelFalls) {
-  begin(paused_server(), box_sdf("table", "1 1 1", true, 0, 0, 0.5) + box_sdf("cup", "0.2 0.2 0.2", false, 0, 0, 1.1) +
+  begin(paused_server(), box_sdf("table", "1 1 1", true, 0, 0, 0.5) +
+                             box_sdf("cup", "0.2 0.2 0.2", false, 0, 0, 1.1) +
                              robot_sdf("r", 3, 0));
-  step(600);    // 3 s: it sleeps
+  step(600);  // 3 s: it sleeps
   EXPECT_NEAR(state("cup").position[2], 1.1, 2e-3);
   ASSERT_EQ(remove("table").code, reply_t::OK);
   step(400);
   EXPECT_NEAR(state("cup").position[2], 0.1, 2e-3);
-  ASSERT_EQ(remove("ground").code, reply_t::OK);    // the plane that the robot stands on without a contact
+  ASSERT_EQ(remove("ground").code,
+            reply_t::OK);  // the plane that the robot stands on without a contact
   step(100);
-  EXPECT_NEAR(state("r").position[2], -0.5 * 9.8 * 0.25, 0.03);    // 0.5 s of fall
+  EXPECT_NEAR(state("r").position[2], -0.5 * 9.8 * 0.25, 0.03);  // 0.5 s of fall
 }
 
 TEST_F(EditsTest, RefusesToPutItIntoSomething) {
@@ -130,11 +138,12 @@ TEST_F(EditsTest, RefusesToPutItIntoSomething) {
   EXPECT_EQ(reply.code, reply_t::REFUSED);
   EXPECT_NE(reply.text.find("it would stand in 'r'"), std::string::npos) << reply.text;
   EXPECT_EQ(spawn(robot, 3, 0).code, reply_t::REFUSED);
-  ASSERT_EQ(set_pose("crate", {6, 0, 0.5}).code, reply_t::OK);    // where things are now counts, not where they began
+  ASSERT_EQ(set_pose("crate", {6, 0, 0.5}).code,
+            reply_t::OK);  // where things are now counts, not where they began
   EXPECT_EQ(spawn(robot, 6, 0).code, reply_t::REFUSED);
   EXPECT_EQ(spawn(robot, 3, 0).code, reply_t::OK);
-  EXPECT_EQ(spawn(robot, -3, 0, "r").code, reply_t::REFUSED);     // taken
-  EXPECT_EQ(spawn(robot, -3, 0).code, reply_t::OK);               // guest_2
+  EXPECT_EQ(spawn(robot, -3, 0, "r").code, reply_t::REFUSED);  // taken
+  EXPECT_EQ(spawn(robot, -3, 0).code, reply_t::OK);            // guest_2
   EXPECT_NEAR(state("guest_2").position[0], -3, 1e-12);
   EXPECT_EQ(info().nrobots, 3);
 }
@@ -149,17 +158,17 @@ TEST_F(EditsTest, PutsThingsElsewhereAtRest) {
   EXPECT_NEAR(state("r").position[1], 4.0, 1e-12);
   step(100);
   const state_reply_t robot = state("r");
-  EXPECT_NEAR(robot.position[0], -2.0, 1e-12);    // at rest: the command ended
+  EXPECT_NEAR(robot.position[0], -2.0, 1e-12);  // at rest: the command ended
   EXPECT_NEAR(robot.position[1], 4.0, 1e-12);
   EXPECT_NEAR(robot.linear[0], 0.0, 1e-12);
-  EXPECT_NEAR(on<odometry_t>("r/odometry").back().x, odometry, 1e-12);    // knows nothing of it
+  EXPECT_NEAR(on<odometry_t>("r/odometry").back().x, odometry, 1e-12);  // knows nothing of it
   EXPECT_NEAR(on<pose_t>("r/pose").back().pos[1], 4.0, 1e-12);
-  drive("r", 0.5);    // ahead is along y now
+  drive("r", 0.5);  // ahead is along y now
   step(200);
   EXPECT_NEAR(state("r").position[1], 4.5, 1e-9);
   EXPECT_NEAR(state("r").position[0], -2.0, 1e-9);
 
-  ASSERT_EQ(set_pose("box", {5, 1, 2.1}).code, reply_t::OK);    // falls, from rest
+  ASSERT_EQ(set_pose("box", {5, 1, 2.1}).code, reply_t::OK);  // falls, from rest
   step(100);
   EXPECT_NEAR(state("box").position[2], 2.1 - 0.5 * 9.8 * 0.25, 0.02);
   step(400);
@@ -167,10 +176,11 @@ TEST_F(EditsTest, PutsThingsElsewhereAtRest) {
 }
 
 TEST_F(EditsTest, PushesThings) {
-  begin(paused_server(), robot_sdf("r", 0, 0) + box_sdf("box", "0.2 0.2 0.2", false, 5, 0, 5) + box_sdf("post", "1 1 1", true, 9, 9));
+  begin(paused_server(), robot_sdf("r", 0, 0) + box_sdf("box", "0.2 0.2 0.2", false, 5, 0, 5) +
+                             box_sdf("post", "1 1 1", true, 9, 9));
   ASSERT_EQ(set_twist("box", {1, 2, 4.9}, {0, 0, 1}).code, reply_t::OK);
   EXPECT_NEAR(state("box").linear[1], 2.0, 1e-12);
-  step(100);    // 0.5 s of a throw: the top of it
+  step(100);  // 0.5 s of a throw: the top of it
   const state_reply_t box = state("box");
   EXPECT_NEAR(box.position[0], 5.5, 1e-6);
   EXPECT_NEAR(box.position[1], 1.0, 1e-6);
@@ -200,14 +210,20 @@ std::vector<std::vector<uint8_t>> bytes_of(MemoryBus& bus, const std::string& pr
 TEST(Edits, OthersHaveTheSameBytesWithAndWithoutAGuest) {
   const auto run = [](bool guest) {
     Controlled run;
-    run.begin(paused_server(), robot_sdf("r", 0, 0, noisy_ray()) + box_sdf("wall", "0.2 2 1", true, 4, 0, 0.5));
+    run.begin(paused_server(),
+              robot_sdf("r", 0, 0, noisy_ray()) + box_sdf("wall", "0.2 2 1", true, 4, 0, 0.5));
     velocity_command_t command{};
     command.vx = 0.2;
     run.bus.send("r/velocity", engine::encoded(command));
     run.step(37);
-    if (guest) { EXPECT_EQ(run.spawn(as_file(robot_sdf("guest", 0, 0, noisy_ray())), 50, 50).code, reply_t::OK); }
+    if (guest) {
+      EXPECT_EQ(run.spawn(as_file(robot_sdf("guest", 0, 0, noisy_ray())), 50, 50).code,
+                reply_t::OK);
+    }
     run.step(300);
-    if (guest) { EXPECT_EQ(run.remove("guest").code, reply_t::OK); }
+    if (guest) {
+      EXPECT_EQ(run.remove("guest").code, reply_t::OK);
+    }
     run.step(100);
     run.end();
     return bytes_of(run.bus, "r/");
@@ -222,26 +238,32 @@ TEST(Edits, ARunWithAGuestRepeatsWithAnyNumberOfThreads) {
     const engine::ThreadLimit limit(threads);
     Controlled run;
     RunOptions options = paused_server();
-    if (sleepy) options.simulation.before_batch = [](const std::string& module) {
-      std::this_thread::sleep_for(std::chrono::microseconds(module.size() * 40));
-    };
-    run.begin(options, robot_sdf("r", 0, 0, noisy_ray()) + box_sdf("crate", "0.3 0.3 0.3", false, 1.5, 0, 0.15));
+    if (sleepy)
+      options.simulation.before_batch = [](const std::string& module) {
+        std::this_thread::sleep_for(std::chrono::microseconds(module.size() * 40));
+      };
+    run.begin(options, robot_sdf("r", 0, 0, noisy_ray()) +
+                           box_sdf("crate", "0.3 0.3 0.3", false, 1.5, 0, 0.15));
     velocity_command_t command{};
     command.vx = 0.4;
     run.bus.send("r/velocity", engine::encoded(command));
     run.step(53);
-    for (int i = 0; i < 6; ++i) EXPECT_EQ(run.spawn(as_file(robot_sdf("guest", 0, 0, noisy_ray())), 2, i - 3).code, reply_t::OK);
+    for (int i = 0; i < 6; ++i)
+      EXPECT_EQ(run.spawn(as_file(robot_sdf("guest", 0, 0, noisy_ray())), 2, i - 3).code,
+                reply_t::OK);
     run.bus.send("guest_2/velocity", engine::encoded(command));
     run.step(150);
     EXPECT_EQ(run.set_pose("crate", {0.9, 0.9, 1.0}).code, reply_t::OK);
     EXPECT_EQ(run.remove("guest_3").code, reply_t::OK);
     run.step(150);
-    EXPECT_EQ(run.spawn(as_file(robot_sdf("guest", 0, 0, noisy_ray())), -3, 0, "late").code, reply_t::OK);
+    EXPECT_EQ(run.spawn(as_file(robot_sdf("guest", 0, 0, noisy_ray())), -3, 0, "late").code,
+              reply_t::OK);
     run.step(100);
     run.end();
     std::vector<std::pair<std::string, std::vector<uint8_t>>> all;
     for (const Message& message : run.bus.messages()) {
-      if (message.channel.find("ruedo/") != 0 || message.channel == "ruedo/world") all.emplace_back(message.channel, message.bytes);
+      if (message.channel.find("ruedo/") != 0 || message.channel == "ruedo/world")
+        all.emplace_back(message.channel, message.bytes);
     }
     return all;
   };

@@ -34,20 +34,28 @@ struct Command {
 // One message as both sides tell it.
 using Told = std::vector<std::pair<std::string, std::vector<uint8_t>>>;
 
-const char* const kScan = R"(<sensor name='scan' type='ray'><update_rate>40</update_rate><ray><scan><horizontal><samples>31</samples>
+const char* const kScan =
+    R"(<sensor name='scan' type='ray'><update_rate>40</update_rate><ray><scan><horizontal><samples>31</samples>
   <min_angle>-1.5</min_angle><max_angle>1.5</max_angle></horizontal></scan><range><min>0.1</min><max>8</max></range>
   <noise><type>gaussian</type><stddev>0.01</stddev></noise></ray></sensor>
   <sensor name='imu' type='imu'><update_rate>100</update_rate></sensor>)";
 
 // Robots that meet boxes, which move, and walls, which do not.
 std::string random_models(std::mt19937& random, int robots) {
-  const auto between = [&](double low, double high) { return low + (high - low) * static_cast<double>(random()) / 4294967296.0; };
+  const auto between = [&](double low, double high) {
+    return low + (high - low) * static_cast<double>(random()) / 4294967296.0;
+  };
   std::string models;
-  for (int i = 0; i < robots; ++i) models += robot_sdf("r" + std::to_string(i), 0.0, 1.5 * i, kScan);
+  for (int i = 0; i < robots; ++i)
+    models += robot_sdf("r" + std::to_string(i), 0.0, 1.5 * i, kScan);
   for (int i = 0; i < 6; ++i) {
-    const std::string place = std::to_string(0.7 + 0.5 * i) + " " + std::to_string(between(-0.5, 1.5 * robots)) + " 0.1 0 0 " + std::to_string(between(-3, 3));
-    models += "<model name='box" + std::to_string(i) + "'>" + (i % 2 ? "<static>true</static>" : "") + "<pose>" + place +
-              "</pose><link name='link'><inertial><mass>0.4</mass></inertial><collision name='c'><geometry><box><size>0.2 0.3 0.2</size></box>"
+    const std::string place = std::to_string(0.7 + 0.5 * i) + " " +
+                              std::to_string(between(-0.5, 1.5 * robots)) + " 0.1 0 0 " +
+                              std::to_string(between(-3, 3));
+    models += "<model name='box" + std::to_string(i) + "'>" +
+              (i % 2 ? "<static>true</static>" : "") + "<pose>" + place +
+              "</pose><link name='link'><inertial><mass>0.4</mass></inertial><collision "
+              "name='c'><geometry><box><size>0.2 0.3 0.2</size></box>"
               "</geometry></collision></link></model>";
   }
   return models;
@@ -56,13 +64,17 @@ std::string random_models(std::mt19937& random, int robots) {
 std::vector<Command> random_commands(std::mt19937& random, int robots, int64_t steps) {
   std::vector<Command> commands;
   for (int64_t step = 0; step < steps; step += 1 + static_cast<int64_t>(random() % 25)) {
-    commands.push_back({step, "r" + std::to_string(random() % static_cast<unsigned>(robots)) + "/velocity",
-                        0.01 * static_cast<double>(random() % 100) - 0.2, 0.01 * static_cast<double>(random() % 200) - 1.0});
+    commands.push_back(
+        {step, "r" + std::to_string(random() % static_cast<unsigned>(robots)) + "/velocity",
+         0.01 * static_cast<double>(random() % 100) - 0.2,
+         0.01 * static_cast<double>(random() % 200) - 1.0});
   }
   return commands;
 }
 
-std::map<int64_t, Told> by_server(const std::shared_ptr<const model::WorldModel>& world, uint64_t seed, const std::vector<Command>& commands, int64_t steps) {
+std::map<int64_t, Told> by_server(const std::shared_ptr<const model::WorldModel>& world,
+                                  uint64_t seed, const std::vector<Command>& commands,
+                                  int64_t steps) {
   LossyBus bus({}, 1);
   RunOptions options = fast(1e6, seed);
   options.lockstep.clients = 1;
@@ -71,7 +83,8 @@ std::map<int64_t, Told> by_server(const std::shared_ptr<const model::WorldModel>
   std::thread running([&] { server.run(); });
   LockstepClient client(bus, server.channels(), "test");
   client.take_part();
-  for (const Command& command : commands) client.command(command.step, command.channel, command.bytes());
+  for (const Command& command : commands)
+    client.command(command.step, command.channel, command.bytes());
   client.step(steps);
   server.stop();
   running.join();
@@ -83,15 +96,19 @@ std::map<int64_t, Told> by_server(const std::shared_ptr<const model::WorldModel>
 }
 
 // Each copy of the world, with the same commands.
-std::vector<std::map<int64_t, Told>> by_engine(Engine& engine, const std::vector<Command>& commands, int64_t steps) {
+std::vector<std::map<int64_t, Told>> by_engine(Engine& engine, const std::vector<Command>& commands,
+                                               int64_t steps) {
   std::vector<std::map<int64_t, Told>> told(static_cast<size_t>(engine.worlds()));
-  engine.on_message([&](int world, int64_t step, const engine::Channel& channel, std::span<const uint8_t> bytes) {
-    told[static_cast<size_t>(world)][step].emplace_back(channel.bus_name, std::vector<uint8_t>(bytes.begin(), bytes.end()));
-  });
+  engine.on_message(
+      [&](int world, int64_t step, const engine::Channel& channel, std::span<const uint8_t> bytes) {
+        told[static_cast<size_t>(world)][step].emplace_back(
+            channel.bus_name, std::vector<uint8_t>(bytes.begin(), bytes.end()));
+      });
   size_t next = 0;
   for (int64_t step = 0; step < steps;) {
     for (; next < commands.size() && commands[next].step == step; ++next) {
-      for (int world = 0; world < engine.worlds(); ++world) engine.command(world, commands[next].channel, commands[next].bytes());
+      for (int world = 0; world < engine.worlds(); ++world)
+        engine.command(world, commands[next].channel, commands[next].bytes());
     }
     const int64_t until = next < commands.size() ? commands[next].step : steps;
     engine.step(until - step);
@@ -116,7 +133,7 @@ TEST_P(EngineEqualsServer, ByteForByte) {
   const auto told = by_engine(engine, commands, kSteps);
   for (const int copy : {0, 2}) {
     auto expected = by_server(world, 7 + static_cast<uint64_t>(copy), commands, kSteps);
-    expected.erase(0);    // which the engine computed before anybody listened
+    expected.erase(0);  // which the engine computed before anybody listened
     ASSERT_EQ(told[static_cast<size_t>(copy)].size(), expected.size());
     EXPECT_TRUE(told[static_cast<size_t>(copy)] == expected) << "copy " << copy;
   }
@@ -128,7 +145,8 @@ INSTANTIATE_TEST_SUITE_P(Worlds, EngineEqualsServer, testing::Range(1u, 9u));
 TEST(Engine, ACopyThatIsResetIsAFreshOne) {
   std::mt19937 random(3);
   const auto world = load_text(random_models(random, 2));
-  const std::vector<Command> before = random_commands(random, 2, 300), after = random_commands(random, 2, 200);
+  const std::vector<Command> before = random_commands(random, 2, 300),
+                             after = random_commands(random, 2, 200);
   engine::EngineOptions options;
   options.worlds = 2;
   Engine used(world, options), fresh(world, options);
@@ -147,7 +165,8 @@ double value_of(const engine::FieldArray& array, size_t index) {
   return value;
 }
 
-// 0.3 m/s from the first step on, without limits: 0.3 m after one second. The first axis is the copy, the second the robot.
+// 0.3 m/s from the first step on, without limits: 0.3 m after one second. The first axis is the
+// copy, the second the robot.
 TEST(Engine, ArraysFollowTheRuns) {
   engine::EngineOptions options;
   options.worlds = 2;
@@ -157,8 +176,8 @@ TEST(Engine, ArraysFollowTheRuns) {
   EXPECT_EQ(position.type, Primitive::float64);
   EXPECT_EQ(position.shape, (std::vector<int64_t>{2, 2, 3}));
   const double none = std::nan("");
-  const double velocities[] = {0.3, 0, 0, none, none, none,    // copy 0: a drives, b is told nothing
-                               0, 0, 0, -0.2, 0, 0};
+  const double velocities[] = {0.3, 0, 0, none, none, none,  // copy 0: a drives, b is told nothing
+                               0,   0, 0, -0.2, 0,    0};
   engine.drive(velocities);
   engine.step(200);
   EXPECT_NEAR(value_of(position, 0), 0.3, 1e-12);
@@ -182,14 +201,21 @@ TEST(Engine, SaysWhatCannotBe) {
     return std::string("nothing");
   };
   EXPECT_THAT(message([&] { engine.step(0); }), testing::HasSubstr("1 step or more, not 0"));
-  EXPECT_THAT(message([&] { engine.observe("lrf", "ranges"); }), testing::HasSubstr("no robot has a device 'lrf'; there are a/motion, a/odometry, a/pose"));
-  EXPECT_THAT(message([&] { engine.observe("pose", "position"); }), testing::HasSubstr("'position' is no field of numbers in pose_t; there are utime, pos,"));
-  EXPECT_THAT(message([&] { engine.command(0, "a/pose", {}); }), testing::HasSubstr("no robot takes commands on 'a/pose'"));
-  EXPECT_THAT(message([&] { engine.command(0, "a/velocity", {}); }), testing::HasSubstr("no message for a/velocity"));
+  EXPECT_THAT(
+      message([&] { engine.observe("lrf", "ranges"); }),
+      testing::HasSubstr("no robot has a device 'lrf'; there are a/motion, a/odometry, a/pose"));
+  EXPECT_THAT(
+      message([&] { engine.observe("pose", "position"); }),
+      testing::HasSubstr("'position' is no field of numbers in pose_t; there are utime, pos,"));
+  EXPECT_THAT(message([&] { engine.command(0, "a/pose", {}); }),
+              testing::HasSubstr("no robot takes commands on 'a/pose'"));
+  EXPECT_THAT(message([&] { engine.command(0, "a/velocity", {}); }),
+              testing::HasSubstr("no message for a/velocity"));
   const double two[] = {0, 0};
   EXPECT_THAT(message([&] { engine.drive(two); }), testing::HasSubstr("1 rows of 3"));
   options.worlds = 0;
-  EXPECT_THAT(message([&] { Engine(load_text(""), options); }), testing::HasSubstr("1 world or more, not 0"));
+  EXPECT_THAT(message([&] { Engine(load_text(""), options); }),
+              testing::HasSubstr("1 world or more, not 0"));
 }
 
 }  // namespace

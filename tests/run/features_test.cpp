@@ -1,4 +1,5 @@
-// The bitmap in ruedo/info against what the server answers: a kind is served exactly where its bit says so.
+// The bitmap in ruedo/info against what the server answers: a kind is served exactly where its bit
+// says so.
 #include <filesystem>
 
 #include "control_client.h"
@@ -12,7 +13,7 @@ class Features : public testing::Test, protected Controlled {
   // Requests with an empty body: what is served finds something wrong with it, or does it.
   void expect_truth(const RunOptions& options) {
     begin(options, robot_sdf("r", 0, 0));
-    if (options.lockstep.clients > 0) {    // step 0 waits for its client
+    if (options.lockstep.clients > 0) {  // step 0 waits for its client
       grant_request_t taking_part;
       taking_part.granted = taking_part.step_until = taking_part.received = -1;
       taking_part.ncommands = 0;
@@ -22,9 +23,11 @@ class Features : public testing::Test, protected Controlled {
     EXPECT_TRUE(features >> request_t::LEAVE & 1);
     EXPECT_TRUE(features >> request_t::QUIT & 1);
     for (int32_t kind = 0; kind < 63; ++kind) {
-      if (kind == request_t::JOIN || kind == request_t::LEAVE || kind == request_t::QUIT) continue;    // they change who asks
+      if (kind == request_t::JOIN || kind == request_t::LEAVE || kind == request_t::QUIT)
+        continue;  // they change who asks
       const reply_t reply = ask(kind);
-      EXPECT_EQ(reply.code != reply_t::NOT_SUPPORTED, (features >> kind & 1) != 0) << "kind " << kind << ": " << reply.text;
+      EXPECT_EQ(reply.code != reply_t::NOT_SUPPORTED, (features >> kind & 1) != 0)
+          << "kind " << kind << ": " << reply.text;
     }
     served_ = features;
     end();
@@ -50,7 +53,8 @@ TEST_F(Features, OfLockstep) {
 
 TEST_F(Features, OfOneThatSavesSnapshots) {
   RunOptions options = paused_server();
-  options.snapshots = std::filesystem::temp_directory_path().string();    // nothing is saved: the name is missing
+  options.snapshots =
+      std::filesystem::temp_directory_path().string();  // nothing is saved: the name is missing
   expect_truth(options);
   EXPECT_TRUE(served_ >> request_t::SNAPSHOT & 1);
   EXPECT_TRUE(served_ >> request_t::RESTORE & 1);

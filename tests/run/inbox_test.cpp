@@ -5,10 +5,10 @@
 #include <atomic>
 #include <thread>
 
-#include "ruedo/velocity_command_t.hpp"
-#include "running.h"
 #include "engine/command_inbox.h"
+#include "ruedo/velocity_command_t.hpp"
 #include "run/control.h"
+#include "running.h"
 
 namespace ruedo::run {
 namespace {
@@ -69,7 +69,8 @@ TEST_F(InboxTest, ActsOnItsStepAndOnNoOther) {
 
 TEST_F(InboxTest, BeforeLiveOnesInTheOrderOfScheduling) {
   receive(1.0);
-  for (const double vx : {0.1, 0.2, 0.3, 0.4, 0.5, 0.6}) EXPECT_EQ(schedule(0, vx), Scheduled::kept);    // more than live ones are kept
+  for (const double vx : {0.1, 0.2, 0.3, 0.4, 0.5, 0.6})
+    EXPECT_EQ(schedule(0, vx), Scheduled::kept);  // more than live ones are kept
   receive(2.0);
   EXPECT_THAT(apply(0), ElementsAre(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 1.0, 2.0));
 }
@@ -88,10 +89,11 @@ TEST_F(InboxTest, RefusesWhatIsLateOrFaulty) {
 }
 
 TEST_F(InboxTest, IsBounded) {
-  for (size_t i = 0; i < engine::CommandInbox::kMostScheduled; ++i) ASSERT_EQ(schedule(static_cast<int64_t>(i % 2), 0.1), Scheduled::kept);
+  for (size_t i = 0; i < engine::CommandInbox::kMostScheduled; ++i)
+    ASSERT_EQ(schedule(static_cast<int64_t>(i % 2), 0.1), Scheduled::kept);
   EXPECT_EQ(schedule(0, 0.1), Scheduled::full);
   EXPECT_EQ(apply(0).size(), engine::CommandInbox::kMostScheduled / 2);
-  EXPECT_EQ(schedule(1, 0.2), Scheduled::kept);    // there is room again
+  EXPECT_EQ(schedule(1, 0.2), Scheduled::kept);  // there is room again
   EXPECT_EQ(apply(1).back(), 0.2);
 }
 
@@ -101,7 +103,8 @@ TEST_F(InboxTest, ManyThreads) {
   std::vector<std::thread> threads;
   for (int t = 0; t < 4; ++t) {
     threads.emplace_back([&, t] {
-      for (int i = 0; i < 2000; ++i) kept += schedule((i * 7 + t) % 500, 0.001 * ((i * 7 + t) % 500)) == Scheduled::kept;
+      for (int i = 0; i < 2000; ++i)
+        kept += schedule((i * 7 + t) % 500, 0.001 * ((i * 7 + t) % 500)) == Scheduled::kept;
     });
   }
   size_t applied = 0;

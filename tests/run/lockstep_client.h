@@ -1,4 +1,5 @@
-// A client of lockstep from the protocol's page alone: it knows the message types, and nothing of the client libraries.
+// A client of lockstep from the protocol's page alone: it knows the message types, and nothing of
+// the client libraries.
 #pragma once
 
 #include <chrono>
@@ -25,7 +26,8 @@ class LockstepClient {
  public:
   struct Seen {
     int64_t state_hash = 0;
-    std::vector<std::pair<std::string, std::vector<uint8_t>>> messages;    // of the manifest, in its order
+    std::vector<std::pair<std::string, std::vector<uint8_t>>>
+        messages;  // of the manifest, in its order
   };
 
   // channels: of the server, whose indices a manifest counts by.
@@ -40,13 +42,15 @@ class LockstepClient {
   void take_part() {
     join_t join;
     join.client = name_;
-    session_ = ask(request_t::JOIN, std::random_device{}() + int64_t{1}, engine::encoded(join)).session;
+    session_ =
+        ask(request_t::JOIN, std::random_device{}() + int64_t{1}, engine::encoded(join)).session;
     grant_request_t grant;
     grant.granted = grant.step_until = grant.received = -1;
     grant.ncommands = 0;
     const reply_t reply = ask(request_t::GRANT, ++sequence_, engine::encoded(grant));
     grant_reply_t stands;
-    if (reply.code != reply_t::OK || decode_checked(reply.body.data(), reply.body.size(), stands) != DecodeFault::none) {
+    if (reply.code != reply_t::OK ||
+        decode_checked(reply.body.data(), reply.body.size(), stands) != DecodeFault::none) {
       throw std::runtime_error("GRANT -1: " + reply.text);
     }
     granted_ = stands.granted;
@@ -80,7 +84,7 @@ class LockstepClient {
         taken |= take(*message, sequence);
         taken |= newest_ > from;
       }
-      if (Clock::now() >= again) {    // others are heard all the time: not after silence
+      if (Clock::now() >= again) {  // others are heard all the time: not after silence
         if (!taken) send(request_t::GRANT, sequence, body);
         ask_for_lost();
         again = Clock::now() + kAgain;
@@ -116,8 +120,10 @@ class LockstepClient {
         reply_t reply;
         if (message->channel != "ruedo/reply") {
           take(*message, 0);
-        } else if (decode_checked(message->bytes.data(), message->bytes.size(), reply) == DecodeFault::none &&
-                   reply.kind == kind && reply.sequence == sequence && (kind == request_t::JOIN || reply.session == session_)) {
+        } else if (decode_checked(message->bytes.data(), message->bytes.size(), reply) ==
+                       DecodeFault::none &&
+                   reply.kind == kind && reply.sequence == sequence &&
+                   (kind == request_t::JOIN || reply.session == session_)) {
           return reply;
         }
       }
@@ -127,7 +133,8 @@ class LockstepClient {
 
  private:
   using Clock = std::chrono::steady_clock;
-  static constexpr std::chrono::milliseconds kAgain{4};    // until what was not answered is said again
+  static constexpr std::chrono::milliseconds kAgain{
+      4};  // until what was not answered is said again
 
   struct Step {
     std::map<int, tick_t> parts;
@@ -142,12 +149,18 @@ class LockstepClient {
     } else if (message.channel == "ruedo/reply") {
       reply_t reply;
       resend_reply_t resent;
-      if (decode_checked(message.bytes.data(), message.bytes.size(), reply) != DecodeFault::none || reply.session != session_) return false;
+      if (decode_checked(message.bytes.data(), message.bytes.size(), reply) != DecodeFault::none ||
+          reply.session != session_)
+        return false;
       if (reply.code != reply_t::OK) throw std::runtime_error(name_ + ": " + reply.text);
       taken = reply.kind == request_t::GRANT && reply.sequence == sequence;
-      if (reply.kind == request_t::RESEND && decode_checked(reply.body.data(), reply.body.size(), resent) == DecodeFault::none) take_resent(resent);
+      if (reply.kind == request_t::RESEND &&
+          decode_checked(reply.body.data(), reply.body.size(), resent) == DecodeFault::none)
+        take_resent(resent);
     } else if (const auto channel = by_name_.find(message.channel); channel != by_name_.end()) {
-      early_[{channel->second, static_cast<int32_t>(crc32(message.bytes.data(), message.bytes.size()))}] = message.bytes;
+      early_[{channel->second,
+              static_cast<int32_t>(crc32(message.bytes.data(), message.bytes.size()))}] =
+          message.bytes;
       if (early_.size() > 4096) early_.clear();
     }
     complete();
@@ -167,7 +180,8 @@ class LockstepClient {
         take_tick(part.data);
       } else if (part.step > have_) {
         std::vector<uint8_t>& bytes = steps_[part.step].resent[{part.channel_index, part.sequence}];
-        if (bytes.size() == static_cast<size_t>(part.offset)) bytes.insert(bytes.end(), part.data.begin(), part.data.end());
+        if (bytes.size() == static_cast<size_t>(part.offset))
+          bytes.insert(bytes.end(), part.data.begin(), part.data.end());
       }
     }
   }
@@ -175,7 +189,8 @@ class LockstepClient {
   // Empty when it is not here.
   const std::vector<uint8_t>* find(const Step& step, const tick_message_t& entry) const {
     const auto whole = [&](const std::vector<uint8_t>& bytes) {
-      return bytes.size() == static_cast<size_t>(entry.size) && static_cast<int32_t>(crc32(bytes.data(), bytes.size())) == entry.crc;
+      return bytes.size() == static_cast<size_t>(entry.size) &&
+             static_cast<int32_t>(crc32(bytes.data(), bytes.size())) == entry.crc;
     };
     const auto early = early_.find({entry.channel_index, entry.crc});
     if (early != early_.end() && whole(early->second)) return &early->second;
@@ -186,7 +201,8 @@ class LockstepClient {
   void complete() {
     for (auto step = steps_.find(have_ + 1); step != steps_.end(); step = steps_.find(have_ + 1)) {
       const auto& parts = step->second.parts;
-      if (parts.empty() || parts.size() != static_cast<size_t>(parts.begin()->second.nparts)) return;
+      if (parts.empty() || parts.size() != static_cast<size_t>(parts.begin()->second.nparts))
+        return;
       Seen seen;
       for (const auto& [index, tick] : parts) {
         seen.state_hash = tick.state_hash;
@@ -218,7 +234,9 @@ class LockstepClient {
         }
         for (const tick_message_t& entry : tick->second.manifest) {
           const auto begun = step.resent.find({entry.channel_index, entry.sequence});
-          if (!find(step, entry)) want(number, entry.channel_index, entry.sequence, begun == step.resent.end() ? 0 : begun->second.size());
+          if (!find(step, entry))
+            want(number, entry.channel_index, entry.sequence,
+                 begun == step.resent.end() ? 0 : begun->second.size());
         }
       }
     }
@@ -241,10 +259,11 @@ class LockstepClient {
   std::string name_;
   int32_t tick_channel_ = -1;
   std::map<std::string, int32_t> by_name_;
-  int64_t session_ = 0, sequence_ = 0, resends_ = 0, granted_ = 0, have_ = -1, acknowledged_ = -1, newest_ = -1;
+  int64_t session_ = 0, sequence_ = 0, resends_ = 0, granted_ = 0, have_ = -1, acknowledged_ = -1,
+          newest_ = -1;
   std::vector<grant_command_t> commands_;
   std::map<int64_t, Step> steps_;
-  std::map<std::pair<int32_t, int32_t>, std::vector<uint8_t>> early_;    // by channel and crc
+  std::map<std::pair<int32_t, int32_t>, std::vector<uint8_t>> early_;  // by channel and crc
   std::map<int64_t, Seen> seen_;
 };
 

@@ -6,10 +6,10 @@
 #include <gtest/gtest.h>
 
 #include "lockstep_client.h"
+#include "log/reader.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
 #include "ruedo/wheel_command_t.hpp"
-#include "log/reader.h"
 
 namespace ruedo::run {
 namespace {
@@ -64,7 +64,8 @@ class LockstepTest : public testing::Test {
     body.nwanted = 0;
     const reply_t reply = client.ask(request_t::RESEND, 99, engine::encoded(body));
     resend_reply_t resent;
-    EXPECT_EQ(decode_checked(reply.body.data(), reply.body.size(), resent), DecodeFault::none) << reply.text;
+    EXPECT_EQ(decode_checked(reply.body.data(), reply.body.size(), resent), DecodeFault::none)
+        << reply.text;
     return resent.step;
   }
 
@@ -76,43 +77,46 @@ class LockstepTest : public testing::Test {
 };
 
 // Both join; then `a` steps on in a thread while `b` says nothing.
-#define TWO_CLIENTS                                    \
-  LockstepClient a = client("a"), b = client("b");     \
-  a.take_part();                                       \
-  b.take_part();                                       \
-  std::thread stepping([&] { a.step(10); });           \
+#define TWO_CLIENTS                                \
+  LockstepClient a = client("a"), b = client("b"); \
+  a.take_part();                                   \
+  b.take_part();                                   \
+  std::thread stepping([&] { a.step(10); });       \
   b.step(3);
 
 TEST_F(LockstepTest, PausesForASilentClientAndGoesOnWithIt) {
   begin(2, Policy::pause, 0.3);
   TWO_CLIENTS
-  // While its lease lasts nobody else has its name; when it has ended somebody may, and begins where it stood.
+  // While its lease lasts nobody else has its name; when it has ended somebody may, and begins
+  // where it stood.
   LockstepClient other = client("b");
   for (bool there = false; !there;) {
     try {
       other.take_part();
       there = true;
     } catch (const std::runtime_error& refused) {
-      ASSERT_NE(std::string(refused.what()).find("a client called 'b' takes part already"), std::string::npos) << refused.what();
+      ASSERT_NE(std::string(refused.what()).find("a client called 'b' takes part already"),
+                std::string::npos)
+          << refused.what();
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
   }
-  EXPECT_EQ(newest(other, -1), 3);    // and no further
+  EXPECT_EQ(newest(other, -1), 3);  // and no further
   other.step(7);
   stepping.join();
   EXPECT_EQ(a.have(), 10);
   EXPECT_EQ(other.have(), 10);
-  EXPECT_EQ(other.seen().begin()->first, 0);    // b had not said yet that it has anything
+  EXPECT_EQ(other.seen().begin()->first, 0);  // b had not said yet that it has anything
   EXPECT_EQ(a.seen().at(10).state_hash, other.seen().at(10).state_hash);
 }
 
 TEST_F(LockstepTest, DropsASilentClient) {
   begin(2, Policy::drop, 0.3);
   TWO_CLIENTS
-  stepping.join();    // without b
+  stepping.join();  // without b
   EXPECT_EQ(a.have(), 10);
-  EXPECT_THROW(b.step(20), std::runtime_error);    // no such session
-  b.take_part();                                   // anew, from where the run stands
+  EXPECT_THROW(b.step(20), std::runtime_error);  // no such session
+  b.take_part();                                 // anew, from where the run stands
   EXPECT_EQ(b.have(), 10);
   std::thread again([&] { a.step(2); });
   b.step(2);
@@ -146,9 +150,13 @@ TEST_F(LockstepTest, LeavingAndJoiningOnTheWayAreRecorded) {
   log::Event event;
   while (reader.next(event)) {
     applied_t applied;
-    if (event.channel != "ruedo/applied" || decode_checked(event.data.data(), event.data.size(), applied) != DecodeFault::none) continue;
-    found.push_back((applied.kind == request_t::JOIN ? "join " : applied.kind == request_t::LEAVE ? "leave " : "? ") + applied.client + " " +
-                    std::to_string(applied.step));
+    if (event.channel != "ruedo/applied" ||
+        decode_checked(event.data.data(), event.data.size(), applied) != DecodeFault::none)
+      continue;
+    found.push_back((applied.kind == request_t::JOIN    ? "join "
+                     : applied.kind == request_t::LEAVE ? "leave "
+                                                        : "? ") +
+                    applied.client + " " + std::to_string(applied.step));
   }
   EXPECT_EQ(found, (std::vector<std::string>{"join a 0", "join b 0", "leave b 3", "join c 10"}));
 }
@@ -157,7 +165,8 @@ TEST_F(LockstepTest, LeavingAndJoiningOnTheWayAreRecorded) {
 class HostileGrants : public LockstepTest {
  protected:
   int32_t code(const grant_request_t& grant) {
-    const reply_t reply = client_->ask(request_t::GRANT, client_->next_sequence(), engine::encoded(grant));
+    const reply_t reply =
+        client_->ask(request_t::GRANT, client_->next_sequence(), engine::encoded(grant));
     text_ = reply.text;
     return reply.code;
   }
@@ -169,7 +178,8 @@ class HostileGrants : public LockstepTest {
     grant.ncommands = 0;
     return grant;
   }
-  static grant_request_t with(grant_request_t grant, int64_t step, const std::string& channel, const std::vector<uint8_t>& bytes) {
+  static grant_request_t with(grant_request_t grant, int64_t step, const std::string& channel,
+                              const std::vector<uint8_t>& bytes) {
     grant_command_t command;
     command.step = step;
     command.channel = channel;
@@ -191,26 +201,41 @@ class HostileGrants : public LockstepTest {
 
 TEST_F(HostileGrants, AreRefusedWithWhatIsWrong) {
   const std::vector<uint8_t> good = velocity(0.1);
-  const struct { const char* what; grant_request_t grant; int32_t code; const char* text; } cases[] = {
-      {"past", with(grant(4, 6), 3, "r/velocity", good), reply_t::BAD_REQUEST, "is for step 3; 4 to 5 is granted"},
+  const struct {
+    const char* what;
+    grant_request_t grant;
+    int32_t code;
+    const char* text;
+  } cases[] = {
+      {"past", with(grant(4, 6), 3, "r/velocity", good), reply_t::BAD_REQUEST,
+       "is for step 3; 4 to 5 is granted"},
       {"beyond", with(grant(4, 6), 6, "r/velocity", good), reply_t::BAD_REQUEST, "is for step 6"},
-      {"least", with(grant(4, 6), INT64_MIN, "r/velocity", good), reply_t::BAD_REQUEST, "is for step"},
-      {"channel", with(grant(4, 6), 4, "nobody/velocity", good), reply_t::BAD_REQUEST, "no robot takes commands"},
-      {"output", with(grant(4, 6), 4, "r/pose", good), reply_t::BAD_REQUEST, "no robot takes commands"},
-      {"no channel", with(grant(4, 6), 4, "", good), reply_t::BAD_REQUEST, "no robot takes commands"},
+      {"least", with(grant(4, 6), INT64_MIN, "r/velocity", good), reply_t::BAD_REQUEST,
+       "is for step"},
+      {"channel", with(grant(4, 6), 4, "nobody/velocity", good), reply_t::BAD_REQUEST,
+       "no robot takes commands"},
+      {"output", with(grant(4, 6), 4, "r/pose", good), reply_t::BAD_REQUEST,
+       "no robot takes commands"},
+      {"no channel", with(grant(4, 6), 4, "", good), reply_t::BAD_REQUEST,
+       "no robot takes commands"},
       {"bytes", with(grant(4, 6), 4, "r/velocity", {1, 2, 3}), reply_t::BAD_REQUEST, "too short"},
       {"type", with(grant(4, 6), 4, "r/wheels", good), reply_t::BAD_REQUEST, "fingerprint"},
-      {"large", with(grant(4, 6), 4, "r/velocity", std::vector<uint8_t>(70'000)), reply_t::BAD_REQUEST, "larger than 64 kB"},
+      {"large", with(grant(4, 6), 4, "r/velocity", std::vector<uint8_t>(70'000)),
+       reply_t::BAD_REQUEST, "larger than 64 kB"},
       {"backwards", grant(4, 3), reply_t::BAD_REQUEST, "below granted"},
       {"least until", grant(4, INT64_MIN), reply_t::BAD_REQUEST, "below granted"},
       {"again", grant(0, 4), reply_t::BAD_REQUEST, "grants stand at 4"},
       {"negative", grant(-2, 4), reply_t::BAD_REQUEST, "grants stand at 4"},
-      {"farther than is allowed", grant(4, 5 + kMostSteps), reply_t::BAD_REQUEST, "at most 1000000000 steps"},
+      {"farther than is allowed", grant(4, 5 + kMostSteps), reply_t::BAD_REQUEST,
+       "at most 1000000000 steps"},
       {"most until", grant(4, INT64_MAX), reply_t::BAD_REQUEST, "at most 1000000000 steps"},
-      {"no number", with(grant(4, 6), 4, "r/velocity", velocity(std::nan(""))), reply_t::BAD_REQUEST, "command 0 (r/velocity): a value is not finite"},
-      {"infinite", with(grant(4, 6), 4, "r/velocity", velocity(-HUGE_VAL)), reply_t::BAD_REQUEST, "a value is not finite"},
-      {"no number in the last", with(with(grant(4, 6), 4, "r/velocity", good), 5, "r/wheels", wheels(std::nan(""))), reply_t::BAD_REQUEST,
-       "command 1 (r/wheels): a value is not finite"},
+      {"no number", with(grant(4, 6), 4, "r/velocity", velocity(std::nan(""))),
+       reply_t::BAD_REQUEST, "command 0 (r/velocity): a value is not finite"},
+      {"infinite", with(grant(4, 6), 4, "r/velocity", velocity(-HUGE_VAL)), reply_t::BAD_REQUEST,
+       "a value is not finite"},
+      {"no number in the last",
+       with(with(grant(4, 6), 4, "r/velocity", good), 5, "r/wheels", wheels(std::nan(""))),
+       reply_t::BAD_REQUEST, "command 1 (r/wheels): a value is not finite"},
       {"received", grant(4, 5, 5), reply_t::BAD_REQUEST, "the newest state is 4"},
       {"most received", grant(4, 5, INT64_MAX), reply_t::BAD_REQUEST, "the newest state is 4"},
   };
@@ -218,7 +243,7 @@ TEST_F(HostileGrants, AreRefusedWithWhatIsWrong) {
     EXPECT_EQ(code(test.grant), test.code) << test.what;
     EXPECT_NE(text_.find(test.text), std::string::npos) << test.what << ": " << text_;
   }
-  client_->step(2);    // nothing of it has done anything
+  client_->step(2);  // nothing of it has done anything
   EXPECT_EQ(client_->have(), 6);
   const int64_t hash = client_->seen().at(6).state_hash;
   client_.reset();
@@ -235,17 +260,20 @@ TEST_F(HostileGrants, MoreCommandsThanAreHeldAreRefused) {
   for (size_t i = 0; i <= Lockstep::kMostHeld; ++i) many = with(std::move(many), 1'000'000, "", {});
   std::vector<uint8_t> bytes = engine::encoded(many);
   ASSERT_GT(bytes.size(), 1u << 19);
-  EXPECT_EQ(code(many), reply_t::BAD_REQUEST);    // the first has no channel
-  // 512 kB a grant, all for a far step: at the limit they wait without an answer, and the run goes on.
+  EXPECT_EQ(code(many), reply_t::BAD_REQUEST);  // the first has no channel
+  // 512 kB a grant, all for a far step: at the limit they wait without an answer, and the run goes
+  // on.
   const std::vector<uint8_t> good = velocity(0.1);
   int taken = 0;
   int64_t granted = 4;
   for (; taken < 40; ++taken) {
     grant_request_t full = grant(granted, granted + 1'000'000);
-    for (int i = 0; i < 4000; ++i) full = with(std::move(full), granted + 900'000, "r/velocity", good);
+    for (int i = 0; i < 4000; ++i)
+      full = with(std::move(full), granted + 900'000, "r/velocity", good);
     const int64_t sequence = client_->next_sequence();
     client_->send(request_t::GRANT, sequence, engine::encoded(full));
-    const reply_t stands = client_->ask(request_t::GRANT, client_->next_sequence(), engine::encoded(grant(-1, 0)));
+    const reply_t stands =
+        client_->ask(request_t::GRANT, client_->next_sequence(), engine::encoded(grant(-1, 0)));
     grant_reply_t reply;
     ASSERT_EQ(decode_checked(stands.body.data(), stands.body.size(), reply), DecodeFault::none);
     if (reply.granted == granted) break;
@@ -259,34 +287,44 @@ TEST_F(HostileGrants, WaitTheirTurn) {
   const std::vector<uint8_t> later = engine::encoded(grant(7, 9, 4));
   const auto granted = [&](const reply_t& reply) {
     grant_reply_t stands;
-    EXPECT_EQ(decode_checked(reply.body.data(), reply.body.size(), stands), DecodeFault::none) << reply.text;
+    EXPECT_EQ(decode_checked(reply.body.data(), reply.body.size(), stands), DecodeFault::none)
+        << reply.text;
     return stands.granted;
   };
-  client_->send(request_t::GRANT, second, later);    // ignored: the one before it was lost
+  client_->send(request_t::GRANT, second, later);  // ignored: the one before it was lost
   EXPECT_EQ(granted(client_->ask(request_t::GRANT, first, engine::encoded(grant(4, 7, 4)))), 7);
-  EXPECT_EQ(granted(client_->ask(request_t::GRANT, first, engine::encoded(grant(4, 7, 4)))), 7);    // executed once
+  EXPECT_EQ(granted(client_->ask(request_t::GRANT, first, engine::encoded(grant(4, 7, 4)))),
+            7);  // executed once
   EXPECT_EQ(granted(client_->ask(request_t::GRANT, second, later)), 9);
-  EXPECT_EQ(granted(client_->ask(request_t::GRANT, client_->next_sequence(), engine::encoded(grant(-1, 0)))), 9);
+  EXPECT_EQ(granted(client_->ask(request_t::GRANT, client_->next_sequence(),
+                                 engine::encoded(grant(-1, 0)))),
+            9);
 }
 
 TEST_F(HostileGrants, AllAtOnceGoesAsFarAsIsKept) {
   const auto asked = [&](int64_t received) { return newest(*client_, received); };
-  client_->send(request_t::GRANT, client_->next_sequence(), engine::encoded(grant(4, 4 + kMostSteps, 4)));
+  client_->send(request_t::GRANT, client_->next_sequence(),
+                engine::encoded(grant(4, 4 + kMostSteps, 4)));
   int64_t step = 0;
-  do step = asked(4); while (step < 4 + static_cast<int64_t>(KeptMessages::kMostSteps));
-  for (int i = 0; i < 50; ++i) EXPECT_EQ(asked(4), step);    // full: it waits
-  EXPECT_LT(step, 4 + static_cast<int64_t>(KeptMessages::kMostSteps) + 32);    // a batch more
-  while (asked(step) < step + 100) {}                        // what is received makes room
+  do step = asked(4);
+  while (step < 4 + static_cast<int64_t>(KeptMessages::kMostSteps));
+  for (int i = 0; i < 50; ++i) EXPECT_EQ(asked(4), step);                    // full: it waits
+  EXPECT_LT(step, 4 + static_cast<int64_t>(KeptMessages::kMostSteps) + 32);  // a batch more
+  while (asked(step) < step + 100) {
+  }  // what is received makes room
   resend_request_t body;
   body.received = 0;
   body.wanted.resize(2);
-  body.wanted[0].step = INT64_MIN, body.wanted[0].channel_index = -1, body.wanted[0].sequence = 0, body.wanted[0].offset = -1;
-  body.wanted[1].step = step + 1, body.wanted[1].channel_index = INT32_MAX, body.wanted[1].sequence = INT64_MAX, body.wanted[1].offset = INT32_MAX;
+  body.wanted[0].step = INT64_MIN, body.wanted[0].channel_index = -1, body.wanted[0].sequence = 0,
+  body.wanted[0].offset = -1;
+  body.wanted[1].step = step + 1, body.wanted[1].channel_index = INT32_MAX,
+  body.wanted[1].sequence = INT64_MAX, body.wanted[1].offset = INT32_MAX;
   body.nwanted = 2;
   EXPECT_EQ(client_->ask(request_t::RESEND, 100, engine::encoded(body)).code, reply_t::OK);
   body.wanted.resize(Lockstep::kMostWanted + 1, body.wanted[0]);
   body.nwanted = static_cast<int32_t>(body.wanted.size());
-  EXPECT_EQ(client_->ask(request_t::RESEND, 101, engine::encoded(body)).code, reply_t::OK);    // the last one is not looked at
+  EXPECT_EQ(client_->ask(request_t::RESEND, 101, engine::encoded(body)).code,
+            reply_t::OK);  // the last one is not looked at
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
-// Lockstep over a bus that loses, doubles and reorders: the same states and every message, whatever is lost.
+// Lockstep over a bus that loses, doubles and reorders: the same states and every message, whatever
+// is lost.
 #include <cmath>
 #include <map>
 #include <set>
@@ -11,7 +12,7 @@
 namespace ruedo::run {
 namespace {
 
-constexpr int64_t kSteps = 240;    // 1.2 s
+constexpr int64_t kSteps = 240;  // 1.2 s
 
 std::vector<uint8_t> velocity(double vx, double omega) {
   velocity_command_t command;
@@ -22,13 +23,15 @@ std::vector<uint8_t> velocity(double vx, double omega) {
   return engine::encoded(command);
 }
 
-const char* const kSonar = R"(<sensor name='scan' type='ray'><update_rate>40</update_rate><ray><scan><horizontal><samples>60</samples>
+const char* const kSonar =
+    R"(<sensor name='scan' type='ray'><update_rate>40</update_rate><ray><scan><horizontal><samples>60</samples>
   <min_angle>-1.5</min_angle><max_angle>1.5</max_angle></horizontal></scan><range><min>0.1</min><max>8</max></range>
   <noise><type>gaussian</type><stddev>0.01</stddev></noise></ray></sensor>)";
 
 std::string robots(int count) {
   std::string models;
-  for (int i = 0; i < count; ++i) models += robot_sdf("r" + std::to_string(i), 0.0, 1.5 * i, i == 0 ? kSonar : "");
+  for (int i = 0; i < count; ++i)
+    models += robot_sdf("r" + std::to_string(i), 0.0, 1.5 * i, i == 0 ? kSonar : "");
   return models;
 }
 
@@ -38,8 +41,8 @@ struct Result {
   size_t lost = 0;
 };
 
-// A run with `clients` clients, each in a thread of its own and with grants of its own length. Each drives the robot of
-// its number, and all of them say something different to r0 at every 50th step.
+// A run with `clients` clients, each in a thread of its own and with grants of its own length. Each
+// drives the robot of its number, and all of them say something different to r0 at every 50th step.
 Result run(int clients, Faults faults, unsigned seed) {
   LossyBus bus(faults, seed);
   RunOptions options = fast(1e6);
@@ -60,7 +63,9 @@ Result run(int clients, Faults faults, unsigned seed) {
         const int64_t n = std::min(length, kSteps - step);
         for (int64_t k = step; k < step + n; ++k) {
           const double phase = 0.05 * static_cast<double>(k);
-          if (k % 20 == 0) client.command(k, "r" + std::to_string(i) + "/velocity", velocity(0.3 + 0.1 * i, std::sin(phase)));
+          if (k % 20 == 0)
+            client.command(k, "r" + std::to_string(i) + "/velocity",
+                           velocity(0.3 + 0.1 * i, std::sin(phase)));
           if (k % 50 == 0) client.command(k, "r0/velocity", velocity(0.1 * (i + 1), 0.2 * i));
         }
         client.step(n);
@@ -87,27 +92,30 @@ class Lossy : public testing::TestWithParam<int> {};
 TEST_P(Lossy, SameStatesAndNoMessageMissing) {
   const int clients = GetParam();
   const Result good = run(clients, {}, 1);
-  ASSERT_EQ(good.seen.size(), static_cast<size_t>(kSteps + 1));    // state 0, too
+  ASSERT_EQ(good.seen.size(), static_cast<size_t>(kSteps + 1));  // state 0, too
   std::map<std::string, int> counts;
   for (const auto& [step, seen] : good.seen) {
     for (const auto& message : seen.messages) ++counts[message.first];
   }
-  EXPECT_EQ(counts["r0/scan"], 49);    // 40 Hz: at 0, 25, ... 1200 ms
-  EXPECT_EQ(counts["r0/pose"], 61);    // 50 Hz
-  EXPECT_EQ(counts["ruedo/world"], 37);    // 30 Hz: the 36th at 1.2 s
+  EXPECT_EQ(counts["r0/scan"], 49);      // 40 Hz: at 0, 25, ... 1200 ms
+  EXPECT_EQ(counts["r0/pose"], 61);      // 50 Hz
+  EXPECT_EQ(counts["ruedo/world"], 37);  // 30 Hz: the 36th at 1.2 s
   for (const double loss : {0.1, 0.3}) {
     const Result bad = run(clients, {loss, 0.2, 0.2}, 7);
     EXPECT_GT(bad.lost, 0u);
     EXPECT_EQ(bad.hash, good.hash) << loss;
     ASSERT_EQ(bad.seen.size(), good.seen.size());
     for (const auto& [step, seen] : good.seen) {
-      EXPECT_EQ(seen.state_hash, bad.seen.at(step).state_hash) << "step " << step << ", loss " << loss;
-      EXPECT_TRUE(seen.messages == bad.seen.at(step).messages) << "step " << step << ", loss " << loss;
+      EXPECT_EQ(seen.state_hash, bad.seen.at(step).state_hash)
+          << "step " << step << ", loss " << loss;
+      EXPECT_TRUE(seen.messages == bad.seen.at(step).messages)
+          << "step " << step << ", loss " << loss;
     }
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Clients, Lossy, testing::Values(1, 3), [](const auto& info) { return std::to_string(info.param) + "clients"; });
+INSTANTIATE_TEST_SUITE_P(Clients, Lossy, testing::Values(1, 3),
+                         [](const auto& info) { return std::to_string(info.param) + "clients"; });
 
 }  // namespace
 }  // namespace ruedo::run

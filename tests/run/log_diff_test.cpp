@@ -6,11 +6,11 @@
 #include <filesystem>
 #include <fstream>
 
+#include "log/reader.h"
+#include "log/writer.h"
 #include "ruedo/errors.h"
 #include "ruedo/odometry_t.hpp"
 #include "ruedo/planar_lidar_t.hpp"
-#include "log/reader.h"
-#include "log/writer.h"
 
 namespace ruedo::run {
 namespace {
@@ -35,7 +35,8 @@ odometry_t odometry(int64_t utime, double x, double theta) {
 class LogDiffTest : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::path(testing::TempDir()) / testing::UnitTest::GetInstance()->current_test_info()->name();
+    folder_ = std::filesystem::path(testing::TempDir()) /
+              testing::UnitTest::GetInstance()->current_test_info()->name();
     std::filesystem::create_directories(folder_);
     golden_ = folder_ / "golden.lcm";
     other_ = folder_ / "new.lcm";
@@ -43,14 +44,18 @@ class LogDiffTest : public testing::Test {
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
   // A log of 1 s of odometry at 10 Hz; theta turns through pi.
-  void write_log(const std::string& path, double x_offset, double theta_offset = 0.0, int without = -1) {
+  void write_log(const std::string& path, double x_offset, double theta_offset = 0.0,
+                 int without = -1) {
     log::Writer log(path);
     for (int i = 0; i < 10; ++i) {
-      if (i != without) write(log, "p3at/odometry", odometry(i * 100'000, 0.1 * i + x_offset, 3.0 + 0.05 * i + theta_offset));
+      if (i != without)
+        write(log, "p3at/odometry",
+              odometry(i * 100'000, 0.1 * i + x_offset, 3.0 + 0.05 * i + theta_offset));
     }
   }
 
-  log::Diff diff(const std::vector<std::string>& tolerances = {}, const std::vector<std::string>& ignored = {}) {
+  log::Diff diff(const std::vector<std::string>& tolerances = {},
+                 const std::vector<std::string>& ignored = {}) {
     std::vector<log::DiffRule> rules;
     for (const auto& text : tolerances) rules.push_back(log::DiffRule::parse(text, false));
     for (const auto& text : ignored) rules.push_back(log::DiffRule::parse(text, true));
@@ -79,7 +84,8 @@ TEST_F(LogDiffTest, NamesTheFirstFieldWithBothValues) {
   EXPECT_DOUBLE_EQ(x.worst, 0.5);
   EXPECT_EQ(x.first_golden, "0");
   EXPECT_EQ(x.first_other, "0.5");
-  EXPECT_THAT(log::diff_text(result), HasSubstr("x of p3at/odometry at 0.000000 s: golden 0, new 0.5 (10 values differ, by 0.5 at most)"));
+  EXPECT_THAT(log::diff_text(result), HasSubstr("x of p3at/odometry at 0.000000 s: golden 0, new "
+                                                "0.5 (10 values differ, by 0.5 at most)"));
 }
 
 TEST_F(LogDiffTest, Tolerances) {
@@ -118,10 +124,16 @@ TEST_F(LogDiffTest, ArraysOfDifferentLengths) {
   planar_lidar_t scan{};
   scan.nranges = 3;
   scan.ranges = {1, 2, 3};
-  { log::Writer log(golden_); write(log, "p3at/lrf", scan); }
+  {
+    log::Writer log(golden_);
+    write(log, "p3at/lrf", scan);
+  }
   scan.nranges = 2;
   scan.ranges = {1, 2.5};
-  { log::Writer log(other_); write(log, "p3at/lrf", scan); }
+  {
+    log::Writer log(other_);
+    write(log, "p3at/lrf", scan);
+  }
   const auto result = diff();
   const auto& fields = result.channels.at("p3at/lrf").fields;
   ASSERT_TRUE(fields.contains("ranges"));
@@ -166,17 +178,27 @@ TEST_F(LogDiffTest, ALengthThatLiesDoesNotTakeMemory) {
 }
 
 TEST(DiffRule, RefusesWhatItCannotRead) {
-  for (const char* text : {"", "a", "a:b", "a:b=x", "a:b=abs:-1", "a:b=abs:nan", "a:b=abs:1e-3x", "a:b=size:1", ":b=1", "a:=1"}) {
+  for (const char* text : {"", "a", "a:b", "a:b=x", "a:b=abs:-1", "a:b=abs:nan", "a:b=abs:1e-3x",
+                           "a:b=size:1", ":b=1", "a:=1"}) {
     EXPECT_THROW(log::DiffRule::parse(text, false), InputError) << text;
   }
   EXPECT_THROW(log::DiffRule::parse("", true), InputError);
 }
 
 TEST_F(LogDiffTest, ReportsEscapeWhatComesFromFiles) {
-  { log::Writer log(golden_); write(log, "<b>&\"", odometry(0, 1, 0)); write(log, "<b>&\"", odometry(5, 1, 0)); }
-  { log::Writer log(other_); write(log, "<b>&\"", odometry(0, 2, 0)); write(log, "<b>&\"", odometry(5, 3, 0)); }
+  {
+    log::Writer log(golden_);
+    write(log, "<b>&\"", odometry(0, 1, 0));
+    write(log, "<b>&\"", odometry(5, 1, 0));
+  }
+  {
+    log::Writer log(other_);
+    write(log, "<b>&\"", odometry(0, 2, 0));
+    write(log, "<b>&\"", odometry(5, 3, 0));
+  }
   const log::Diff result = diff();
-  for (const std::string& report : {log::diff_junit(result), log::diff_html(result, golden_, other_)}) {
+  for (const std::string& report :
+       {log::diff_junit(result), log::diff_html(result, golden_, other_)}) {
     EXPECT_THAT(report, HasSubstr("&lt;b&gt;&amp;&quot;"));
     EXPECT_THAT(report, testing::Not(HasSubstr("<b>&")));
   }

@@ -1,4 +1,5 @@
-// A bus that loses, doubles and reorders messages, each way and for each listener apart, by a seeded generator.
+// A bus that loses, doubles and reorders messages, each way and for each listener apart, by a
+// seeded generator.
 #pragma once
 
 #include <chrono>
@@ -17,7 +18,8 @@
 namespace ruedo::run {
 
 struct Faults {
-  double loss = 0.0, twice = 0.0, late = 0.0;    // probabilities; a late message comes after the next one
+  double loss = 0.0, twice = 0.0,
+         late = 0.0;  // probabilities; a late message comes after the next one
 };
 
 // One direction to one listener.
@@ -54,7 +56,7 @@ class LossyBus : public Bus {
  public:
   LossyBus(Faults faults, unsigned seed) : faults_(faults), to_server_(faults, seed), seed_(seed) {}
 
-  class Listener {    // a client's end
+  class Listener {  // a client's end
    public:
     Listener(Faults faults, unsigned seed) : link_(faults, seed) {}
     std::optional<Message> receive(std::chrono::milliseconds timeout) {
@@ -84,20 +86,24 @@ class LossyBus : public Bus {
     std::lock_guard lock(mutex_);
     for (const auto& listener : listeners_) {
       std::lock_guard listener_lock(listener->mutex_);
-      listener->link_.pass(message, [&](const Message& arrived) { listener->queue_.push_back(arrived); });
+      listener->link_.pass(message,
+                           [&](const Message& arrived) { listener->queue_.push_back(arrived); });
       listener->news_.notify_one();
     }
   }
 
-  void listen(const std::vector<std::string>&, Handler handler, const std::vector<std::string>&) override {
+  void listen(const std::vector<std::string>&, Handler handler,
+              const std::vector<std::string>&) override {
     std::lock_guard lock(sending_);
     handler_ = std::move(handler);
   }
 
   void send(const std::string& channel, const std::vector<uint8_t>& bytes) {
     std::lock_guard lock(sending_);
-    if (!handler_) return;    // nobody listens yet: lost
-    to_server_.pass({channel, bytes}, [&](const Message& arrived) { handler_(arrived.channel, arrived.bytes.data(), arrived.bytes.size()); });
+    if (!handler_) return;  // nobody listens yet: lost
+    to_server_.pass({channel, bytes}, [&](const Message& arrived) {
+      handler_(arrived.channel, arrived.bytes.data(), arrived.bytes.size());
+    });
   }
 
   void stop() override {

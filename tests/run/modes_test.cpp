@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include "log/writer.h"
-#include "running.h"
 #include "ruedo/errors.h"
 #include "ruedo/grant_reply_t.hpp"
 #include "ruedo/resend_request_t.hpp"
@@ -15,6 +14,7 @@
 #include "run/live.h"
 #include "run/lockstep.h"
 #include "run/repeating.h"
+#include "running.h"
 
 namespace ruedo::run {
 namespace {
@@ -36,7 +36,9 @@ class FakeGate : public Gate {
 // A world with a robot that takes velocities.
 struct FakeWorld {
   FakeWorld() {
-    engine::Channel velocity{"r/velocity", "r/velocity", "r", "", "velocity_command_t", velocity_command_t::getHash(), Rate{}, true};
+    engine::Channel velocity{
+        "r/velocity", "r/velocity", "r", "", "velocity_command_t", velocity_command_t::getHash(),
+        Rate{},       true};
     channels.add(velocity);
   }
   Mode::Stage stage(SimTime base_us = 0) {
@@ -59,7 +61,7 @@ TEST(Live, GoesOnByItself) {
   live.begin(world.stage(), -1);
   EXPECT_EQ(world.gate.limit, std::numeric_limits<int64_t>::max());
   EXPECT_TRUE(live.has_room() && live.state_comes() && !live.takes_grants());
-  EXPECT_FALSE(live.receive("r/velocity", nullptr, 0));    // it acts when it comes
+  EXPECT_FALSE(live.receive("r/velocity", nullptr, 0));  // it acts when it comes
   EXPECT_EQ(live.attend({}, 0, kStart).next, Mode::Time::max());
   EXPECT_EQ(live.turn(0).what, Mode::Turn::What::nothing);
   EXPECT_EQ(live.refusal(request_t::RESET, false), "");
@@ -69,13 +71,14 @@ TEST(Live, WaitsForTheMessagesOfAChannel) {
   FakeWorld world;
   Live live({{"r/velocity", {10, 1}}}, kStep_us);
   live.begin(world.stage(), -1);
-  EXPECT_EQ(world.gate.limit, 0);    // message 0 acts on state 0, message k on state 20 k
+  EXPECT_EQ(world.gate.limit, 0);  // message 0 acts on state 0, message k on state 20 k
   const std::vector<uint8_t> command = forward();
   EXPECT_TRUE(live.receive("r/velocity", command.data(), command.size()));
   EXPECT_EQ(world.gate.limit, 20);
   EXPECT_TRUE(live.receive("r/velocity", command.data(), command.size()));
   EXPECT_EQ(world.gate.limit, 40);
-  EXPECT_EQ(live.attend({}, 40, kStart).next, kStart + seconds(1));    // then it says for whom it waits
+  EXPECT_EQ(live.attend({}, 40, kStart).next,
+            kStart + seconds(1));  // then it says for whom it waits
   live.begin(world.stage(), 50);
   EXPECT_EQ(world.gate.limit, 60);
 }
@@ -89,7 +92,9 @@ TEST(Live, RefusesToWaitForWhatIsNoInput) {
 class LockstepModeTest : public testing::Test {
  protected:
   void begin(int clients, LockstepOptions::Policy policy = LockstepOptions::Policy::pause) {
-    lockstep_ = std::make_unique<Lockstep>(LockstepOptions{clients, 10.0, policy}, [this](const applied_t& applied) { noted_.push_back(applied); });
+    lockstep_ =
+        std::make_unique<Lockstep>(LockstepOptions{clients, 10.0, policy},
+                                   [this](const applied_t& applied) { noted_.push_back(applied); });
     lockstep_->begin(world_.stage(), -1);
     for (int i = 0; i < clients; ++i) {
       Session session;
@@ -110,7 +115,8 @@ class LockstepModeTest : public testing::Test {
     return lockstep_->grant(request, sessions_[static_cast<size_t>(client)]);
   }
   void join_all() {
-    for (size_t i = 0; i < sessions_.size(); ++i) EXPECT_EQ(grant(static_cast<int>(i), -1, -1).code, reply_t::OK);
+    for (size_t i = 0; i < sessions_.size(); ++i)
+      EXPECT_EQ(grant(static_cast<int>(i), -1, -1).code, reply_t::OK);
   }
   void publish(int64_t step) {
     lockstep_->sink()->begin_step({step, step * kStep_us, 0});
@@ -131,7 +137,7 @@ TEST_F(LockstepModeTest, GoesToTheSmallestGrant) {
   grant(0, -1, -1);
   EXPECT_EQ(world_.gate.limit, -1);
   grant(1, -1, -1);
-  EXPECT_EQ(world_.gate.limit, 0);    // both are there
+  EXPECT_EQ(world_.gate.limit, 0);  // both are there
   EXPECT_EQ(noted_.size(), 2u);
   EXPECT_EQ(lockstep_->refusal(request_t::GET_STATE, true), "");
   EXPECT_NE(lockstep_->refusal(request_t::RESTORE, false), "");
@@ -152,7 +158,7 @@ TEST_F(LockstepModeTest, BeginsAgainWithAWorldMadeAnew) {
   grant(0, 0, 50);
   lockstep_->begin(world_.stage(), -1);
   EXPECT_EQ(world_.gate.limit, 0);
-  EXPECT_EQ(grant(0, 0, 3).code, reply_t::OK);    // grants stand at 0 again
+  EXPECT_EQ(grant(0, 0, 3).code, reply_t::OK);  // grants stand at 0 again
 }
 
 TEST_F(LockstepModeTest, HasNoRoomBeforeTheMessagesAreReceived) {
@@ -228,7 +234,8 @@ class RepeatingTest : public testing::Test {
   }
 
   template <class T>
-  static void write(log::Writer& writer, int64_t stamp, const std::string& channel, const T& message) {
+  static void write(log::Writer& writer, int64_t stamp, const std::string& channel,
+                    const T& message) {
     const std::vector<uint8_t> bytes = engine::encoded(message);
     writer.write(stamp, channel, bytes.data(), bytes.size());
   }
@@ -246,7 +253,7 @@ TEST_F(RepeatingTest, GoesFromRequestToRequestAndEnds) {
   const Mode::Turn reset = repeating.turn(20);
   ASSERT_EQ(reset.what, Mode::Turn::What::execute);
   EXPECT_EQ(reset.request.kind, request_t::RESET);
-  repeating.begin(world_.stage(20 * kStep_us), -1);    // as that request does
+  repeating.begin(world_.stage(20 * kStep_us), -1);  // as that request does
   repeating.executed({});
   EXPECT_EQ(repeating.turn(-1).what, Mode::Turn::What::nothing);
   EXPECT_EQ(world_.gate.limit, 30);
@@ -261,7 +268,7 @@ TEST_F(RepeatingTest, IsNotDisturbed) {
   Repeating repeating(file_.path(), &after);
   repeating.begin(world_.stage(), -1);
   const std::vector<uint8_t> command = forward();
-  EXPECT_TRUE(repeating.receive("r/velocity", command.data(), command.size()));    // and ignored
+  EXPECT_TRUE(repeating.receive("r/velocity", command.data(), command.size()));  // and ignored
   EXPECT_NE(repeating.refusal(request_t::SPAWN, false), "");
   EXPECT_EQ(repeating.refusal(request_t::GET_STATE, true), "");
   repeating.turn(-1);
@@ -270,7 +277,9 @@ TEST_F(RepeatingTest, IsNotDisturbed) {
     repeating.executed(engine::Outcome::refuse(reply_t::REFUSED, "no room"));
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr(file_.path()), testing::HasSubstr("step 20"), testing::HasSubstr("no room")));
+    EXPECT_THAT(error.what(),
+                testing::AllOf(testing::HasSubstr(file_.path()), testing::HasSubstr("step 20"),
+                               testing::HasSubstr("no room")));
   }
 }
 

@@ -15,10 +15,10 @@
 
 #include <unistd.h>
 
+#include "engine/thread_limit.h"
 #include "model/load.h"
 #include "ruedo/bus.h"
 #include "run/run.h"
-#include "engine/thread_limit.h"
 
 namespace ruedo::run {
 
@@ -30,7 +30,7 @@ struct Message {
 // Keeps what is published, and lets a test send.
 class MemoryBus : public Bus {
  public:
-  bool keep = true;                               // false: only counts
+  bool keep = true;  // false: only counts
   std::function<void(const std::string&)> on_publish;
 
   void publish(const std::string& channel, const uint8_t* data, size_t size) override {
@@ -43,7 +43,8 @@ class MemoryBus : public Bus {
     if (on_publish) on_publish(channel);
   }
 
-  void listen(const std::vector<std::string>& channels, Handler handler, const std::vector<std::string>&) override {
+  void listen(const std::vector<std::string>& channels, Handler handler,
+              const std::vector<std::string>&) override {
     {
       std::lock_guard lock(mutex_);
       channels_ = channels;
@@ -60,13 +61,15 @@ class MemoryBus : public Bus {
     handler(channel, bytes.data(), bytes.size());
   }
 
-  // The first message at or after index `from` on a channel that `good` accepts; waits for it. The test fails by its
-  // own time limit when there is none.
-  Message wait_for(const std::string& channel, size_t& from, const std::function<bool(const Message&)>& good = {}) {
+  // The first message at or after index `from` on a channel that `good` accepts; waits for it. The
+  // test fails by its own time limit when there is none.
+  Message wait_for(const std::string& channel, size_t& from,
+                   const std::function<bool(const Message&)>& good = {}) {
     std::unique_lock lock(mutex_);
     for (;;) {
       for (; from < messages_.size(); ++from) {
-        if (messages_[from].channel == channel && (!good || good(messages_[from]))) return messages_[from++];
+        if (messages_[from].channel == channel && (!good || good(messages_[from])))
+          return messages_[from++];
       }
       changed_.wait(lock);
     }
@@ -76,7 +79,7 @@ class MemoryBus : public Bus {
     std::lock_guard lock(mutex_);
     return messages_;
   }
-  void forget() {    // what was published so far
+  void forget() {  // what was published so far
     std::lock_guard lock(mutex_);
     messages_.clear();
   }
@@ -110,28 +113,40 @@ class TemporaryFile {
   std::filesystem::path path_;
 };
 
-// A two-wheeled robot of 10 kg: wheels of radius 0.1 m, track 0.4 m, no limits, no watchdog. `inside` goes into its link.
-inline std::string robot_sdf(const std::string& name, double x, double y, const std::string& inside = "") {
+// A two-wheeled robot of 10 kg: wheels of radius 0.1 m, track 0.4 m, no limits, no watchdog.
+// `inside` goes into its link.
+inline std::string robot_sdf(const std::string& name, double x, double y,
+                             const std::string& inside = "") {
   const std::string place = std::to_string(x) + " " + std::to_string(y) + " 0 0 0 0";
   const auto wheel = [](const std::string& side, const std::string& y_m) {
-    return "<link name='" + side + "'><pose>0 " + y_m + " 0.1 -1.5707963267948966 0 0</pose><inertial><mass>0.5</mass></inertial>"
-           "<collision name='c'><geometry><cylinder><radius>0.1</radius><length>0.05</length></cylinder></geometry></collision></link>"
-           "<joint name='" + side + "_joint' type='revolute'><parent>body</parent><child>" + side +
+    return "<link name='" + side + "'><pose>0 " + y_m +
+           " 0.1 -1.5707963267948966 0 0</pose><inertial><mass>0.5</mass></inertial>"
+           "<collision "
+           "name='c'><geometry><cylinder><radius>0.1</radius><length>0.05</length></cylinder></"
+           "geometry></collision></link>"
+           "<joint name='" +
+           side + "_joint' type='revolute'><parent>body</parent><child>" + side +
            "</child><axis><xyz expressed_in='__model__'>0 1 0</xyz></axis></joint>";
   };
-  return "<model name='" + name + "'><pose>" + place + "</pose><link name='body'><pose>0 0 0.15 0 0 0</pose>"
+  return "<model name='" + name + "'><pose>" + place +
+         "</pose><link name='body'><pose>0 0 0.15 0 0 0</pose>"
          "<inertial><mass>10</mass></inertial>"
-         "<collision name='c'><geometry><box><size>0.5 0.3 0.2</size></box></geometry></collision>" + inside + "</link>" +
-         wheel("left", "0.2") + wheel("right", "-0.2") +
-         "<ruedo:drive><ruedo:left_joint>left_joint</ruedo:left_joint><ruedo:right_joint>right_joint</ruedo:right_joint>"
+         "<collision name='c'><geometry><box><size>0.5 0.3 "
+         "0.2</size></box></geometry></collision>" +
+         inside + "</link>" + wheel("left", "0.2") + wheel("right", "-0.2") +
+         "<ruedo:drive><ruedo:left_joint>left_joint</"
+         "ruedo:left_joint><ruedo:right_joint>right_joint</ruedo:right_joint>"
          "<ruedo:watchdog>0</ruedo:watchdog></ruedo:drive></model>";
 }
 
 inline std::string world_sdf(const std::string& models) {
-  return "<?xml version='1.0'?><sdf version='1.9' xmlns:ruedo='ruedo'><world name='test'><physics type='bullet'>"
+  return "<?xml version='1.0'?><sdf version='1.9' xmlns:ruedo='ruedo'><world name='test'><physics "
+         "type='bullet'>"
          "<max_step_size>0.005</max_step_size></physics>"
-         "<model name='ground'><static>true</static><link name='link'><collision name='c'><geometry><plane><normal>0 0 1</normal>"
-         "</plane></geometry></collision></link></model>" + models + "</world></sdf>";
+         "<model name='ground'><static>true</static><link name='link'><collision "
+         "name='c'><geometry><plane><normal>0 0 1</normal>"
+         "</plane></geometry></collision></link></model>" +
+         models + "</world></sdf>";
 }
 
 inline std::shared_ptr<const model::WorldModel> load_text(const std::string& models) {

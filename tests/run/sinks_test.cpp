@@ -23,7 +23,8 @@ class Notes : public Sink {
   }
   void begin_step(const Step& step) override { note("begin " + std::to_string(step.step)); }
   void message(const Published& message) override {
-    note(message.channel + " " + std::to_string(message.sequence) + " of " + std::to_string(message.size));
+    note(message.channel + " " + std::to_string(message.sequence) + " of " +
+         std::to_string(message.size));
   }
   void end_step(const Step& step) override { note("end " + std::to_string(step.step)); }
 
@@ -65,7 +66,8 @@ class Notes : public Sink {
 void send_step(Sink& sink, int64_t step, const std::vector<uint8_t>& bytes) {
   const std::string channel = "r/camera";
   sink.begin_step({step, step * 5000, 0});
-  sink.message({Kind::sample, step * 5000, step * 5000, channel, 3, step, bytes.data(), bytes.size()});
+  sink.message(
+      {Kind::sample, step * 5000, step * 5000, channel, 3, step, bytes.data(), bytes.size()});
   sink.end_step({step, step * 5000, 0});
   sink.flush();
 }
@@ -74,18 +76,20 @@ TEST(QueuedSink, WaitsWhereNothingMayBeMissing) {
   Notes notes;
   std::vector<std::string> expected;
   {
-    QueuedSink queue(notes, {.thread = "notes", .when_full = QueuedSink::WhenFull::wait, .most_bytes = 1});
+    QueuedSink queue(notes,
+                     {.thread = "notes", .when_full = QueuedSink::WhenFull::wait, .most_bytes = 1});
     for (int64_t step = 0; step < 100; ++step) {
       send_step(queue, step, std::vector<uint8_t>(1000));
       const std::string number = std::to_string(step);
-      expected.insert(expected.end(), {"begin " + number, "r/camera " + number + " of 1000", "end " + number});
+      expected.insert(expected.end(),
+                      {"begin " + number, "r/camera " + number + " of 1000", "end " + number});
     }
     queue.drain();
     EXPECT_EQ(notes.lines(), expected);
     send_step(queue, 100, {});
     EXPECT_EQ(queue.missed(), 0u);
   }
-  EXPECT_EQ(notes.lines().size(), 303u);    // what is in the queue at its end is handed on
+  EXPECT_EQ(notes.lines().size(), 303u);  // what is in the queue at its end is handed on
 }
 
 TEST(QueuedSink, MissesWholeStepsRatherThanWaiting) {
@@ -93,7 +97,7 @@ TEST(QueuedSink, MissesWholeStepsRatherThanWaiting) {
   notes.hold();
   QueuedSink queue(notes, {.thread = "notes", .most_bytes = 10'000});
   send_step(queue, 0, std::vector<uint8_t>(1000));
-  notes.wait_until_waiting();    // in the first call, and nothing comes out from here on
+  notes.wait_until_waiting();  // in the first call, and nothing comes out from here on
   constexpr int64_t kSteps = 1000;
   for (int64_t step = 1; step < kSteps; ++step) send_step(queue, step, std::vector<uint8_t>(1000));
   queue.announce(std::make_shared<const Announcement>());
@@ -103,11 +107,14 @@ TEST(QueuedSink, MissesWholeStepsRatherThanWaiting) {
   send_step(queue, kSteps, {});
   queue.drain();
   const std::vector<std::string> lines = notes.lines();
-  const auto begun = std::count_if(lines.begin(), lines.end(), [](const std::string& line) { return line.starts_with("begin"); });
+  const auto begun = std::count_if(lines.begin(), lines.end(), [](const std::string& line) {
+    return line.starts_with("begin");
+  });
   EXPECT_EQ(static_cast<uint64_t>(begun) + queue.missed(), kSteps + 1u);
   ASSERT_GE(lines.size(), 7u);
-  for (size_t i = 0; i + 4 < lines.size(); i += 3) EXPECT_TRUE(lines[i].starts_with("begin") && lines[i + 2].starts_with("end")) << i;
-  EXPECT_EQ(lines[lines.size() - 4], "channels 0");    // which are known in any case
+  for (size_t i = 0; i + 4 < lines.size(); i += 3)
+    EXPECT_TRUE(lines[i].starts_with("begin") && lines[i + 2].starts_with("end")) << i;
+  EXPECT_EQ(lines[lines.size() - 4], "channels 0");  // which are known in any case
   EXPECT_EQ(lines.back(), "end 1000");
 }
 
@@ -125,11 +132,11 @@ TEST(Run, HandsTheSameMessagesToEverySink) {
   };
   count(samples, by_samples);
   count(all, by_all);
-  EXPECT_EQ(by_samples["r/pose"], 6);    // at 0, 20, ..., 100 ms
+  EXPECT_EQ(by_samples["r/pose"], 6);  // at 0, 20, ..., 100 ms
   EXPECT_EQ(by_samples["begin"], 21);
   EXPECT_EQ(by_samples["channels"], 1);
   EXPECT_EQ(by_samples.count("ruedo/tick") + by_samples.count("ruedo/state_hash"), 0u);
-  EXPECT_EQ(by_all["ruedo/state_hash"], 2);    // at 0 s, and at the end
+  EXPECT_EQ(by_all["ruedo/state_hash"], 2);  // at 0 s, and at the end
   for (const auto& [channel, messages] : by_bus) EXPECT_EQ(by_all[channel], messages) << channel;
   EXPECT_GT(by_bus["ruedo/tick"], 0);
 }
@@ -159,14 +166,15 @@ TEST(Run, TakesCommandsFromASink) {
   server.on_state([&](const Snapshot& state) {
     if (state.bodies[0].translation.x() > 0.1) server.stop();
   });
-  server.run();    // ends because the robot drives
+  server.run();  // ends because the robot drives
 }
 
 // The robot is there again, and its commands are heard again.
 TEST(Run, ListensToARobotThatAResetBringsBack) {
   class ListeningBus : public MemoryBus {
    public:
-    void listen_to(const std::vector<std::string>& channels, const std::vector<std::string>&) override {
+    void listen_to(const std::vector<std::string>& channels,
+                   const std::vector<std::string>&) override {
       const std::lock_guard lock(mutex_);
       heard_ = channels;
     }

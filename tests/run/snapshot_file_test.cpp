@@ -38,14 +38,16 @@ TEST(SnapshotFile, OneThatFailsLeavesNothing) {
     const state_hash_t state{};
     ASSERT_EQ(journal.save_snapshot("good", state, 0), "");
     const uint64_t whole = fs::file_size(folder + "/good.snapshot");
-    for (const uint64_t room : {whole - 1, whole / 4}) {    // for all but its end; not even for its beginning
+    for (const uint64_t room :
+         {whole - 1, whole / 4}) {  // for all but its end; not even for its beginning
       const FileLimit limit(room);
       EXPECT_NE(journal.save_snapshot("bad", state, 0), "") << room;
     }
     ASSERT_EQ(journal.save_snapshot("again", state, 0), "");
   }
   std::vector<std::string> left;
-  for (const auto& entry : fs::directory_iterator(folder)) left.push_back(entry.path().filename().string());
+  for (const auto& entry : fs::directory_iterator(folder))
+    left.push_back(entry.path().filename().string());
   std::sort(left.begin(), left.end());
   EXPECT_EQ(left, (std::vector<std::string>{"again.snapshot", "good.snapshot"}));
   fs::remove_all(folder);

@@ -4,9 +4,9 @@
 #include <gtest/gtest.h>
 
 #include "control_client.h"
+#include "log/reader.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/grant_request_t.hpp"
-#include "log/reader.h"
 #include "run/verify.h"
 
 namespace ruedo::run {
@@ -37,12 +37,13 @@ TEST(SpawnWorker, TheRunAndOthersGoOnMeanwhile) {
   options.record = log.path();
   options.before_model = gate.wait();
   client.begin(options, kRobot);
-  const request_t spawn = client.request(request_t::SPAWN, engine::encoded(Controlled::spawning(kBox, 2, 0)));
+  const request_t spawn =
+      client.request(request_t::SPAWN, engine::encoded(Controlled::spawning(kBox, 2, 0)));
   client.send(spawn);
   gate.reached.get_future().wait();
-  EXPECT_EQ(client.step(7).step, 7);                        // requests of the same client, too
+  EXPECT_EQ(client.step(7).step, 7);  // requests of the same client, too
   EXPECT_EQ(client.set_pose("r", {0, 3, 0}).code, reply_t::OK);
-  client.send(spawn);                                       // a repeated one is not a second one
+  client.send(spawn);  // a repeated one is not a second one
   gate.open.set_value();
   const reply_t reply = client.answer(spawn);
   ASSERT_EQ(reply.code, reply_t::OK) << reply.text;
@@ -58,7 +59,8 @@ TEST(SpawnWorker, TheRunAndOthersGoOnMeanwhile) {
     const auto one = decoded_as<applied_t>(event.data);
     applied.emplace_back(one.step, one.kind);
   }
-  EXPECT_EQ(applied, (std::vector<std::pair<int64_t, int32_t>>{{7, request_t::SET_POSE}, {7, request_t::SPAWN}}));
+  EXPECT_EQ(applied, (std::vector<std::pair<int64_t, int32_t>>{{7, request_t::SET_POSE},
+                                                               {7, request_t::SPAWN}}));
   Verifier verifier(log.path(), load_text(kRobot), RunOptions{});
   const Verification verdict = verifier.run();
   EXPECT_FALSE(verdict.difference);
@@ -71,14 +73,16 @@ TEST(SpawnWorker, AResetEndsWhatIsNotReady) {
   RunOptions options = paused_server();
   options.before_model = gate.wait();
   client.begin(options, kRobot);
-  const request_t spawn = client.request(request_t::SPAWN, engine::encoded(Controlled::spawning(kBox, 2, 0)));
+  const request_t spawn =
+      client.request(request_t::SPAWN, engine::encoded(Controlled::spawning(kBox, 2, 0)));
   client.send(spawn);
   gate.reached.get_future().wait();
   ASSERT_EQ(client.reset(reset_request_t::ALL).code, reply_t::OK);
   client.rewind();
   EXPECT_EQ(client.answer(spawn).text, "the world was reset");
   gate.open.set_value();
-  EXPECT_EQ(client.spawn(kBox, 2, 1, "another").code, reply_t::OK);    // made after the first, which is in no world
+  EXPECT_EQ(client.spawn(kBox, 2, 1, "another").code,
+            reply_t::OK);  // made after the first, which is in no world
   name_request_t name;
   name.name = "box";
   EXPECT_EQ(client.ask(request_t::GET_STATE, engine::encoded(name)).code, reply_t::UNKNOWN_NAME);
@@ -90,8 +94,11 @@ TEST(SpawnWorker, FewWait) {
   RunOptions options = paused_server();
   options.before_model = gate.wait();
   client.begin(options, kRobot);
-  const auto spawning = [&](int i) { return client.request(request_t::SPAWN, engine::encoded(Controlled::spawning(kBox, 2, i))); };
-  for (size_t i = 0; i < ModelWorker::kMostOfSession; ++i) client.send(spawning(static_cast<int>(i)));
+  const auto spawning = [&](int i) {
+    return client.request(request_t::SPAWN, engine::encoded(Controlled::spawning(kBox, 2, i)));
+  };
+  for (size_t i = 0; i < ModelWorker::kMostOfSession; ++i)
+    client.send(spawning(static_cast<int>(i)));
   const reply_t beyond = client.ask(spawning(9));
   EXPECT_EQ(beyond.code, reply_t::REFUSED);
   EXPECT_NE(beyond.text.find("are being made ready"), std::string::npos) << beyond.text;
@@ -105,7 +112,8 @@ TEST(SpawnWorker, TheEndWaitsForNoModel) {
   RunOptions options = paused_server();
   options.before_model = gate.wait();
   client.begin(options, kRobot);
-  const request_t spawn = client.request(request_t::SPAWN, engine::encoded(Controlled::spawning(kBox, 2, 0)));
+  const request_t spawn =
+      client.request(request_t::SPAWN, engine::encoded(Controlled::spawning(kBox, 2, 0)));
   client.send(spawn);
   gate.reached.get_future().wait();
   EXPECT_EQ(client.ask(request_t::QUIT).code, reply_t::OK);
@@ -114,7 +122,8 @@ TEST(SpawnWorker, TheEndWaitsForNoModel) {
   gate.open.set_value();
 }
 
-// The client grants 100 steps, asks for a model while they are computed, and waits for the answer: the model enters at step 100.
+// The client grants 100 steps, asks for a model while they are computed, and waits for the answer:
+// the model enters at step 100.
 TEST(SpawnWorker, InLockstepTheStepIsThatOfTheGrants) {
   Controlled client;
   RunOptions options = fast(1e6);

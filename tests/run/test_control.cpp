@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "control_client.h"
 #include "ruedo/decode.h"
 #include "ruedo/join_t.hpp"
 #include "ruedo/joint_command_t.hpp"
@@ -18,7 +19,6 @@
 #include "ruedo/velocity_command_t.hpp"
 #include "ruedo/wheel_command_t.hpp"
 #include "ruedo/world_info_t.hpp"
-#include "control_client.h"
 
 namespace ruedo::run {
 namespace {
@@ -30,11 +30,13 @@ T decoded(const std::vector<uint8_t>& bytes) {
 
 class ControlTest : public testing::Test, protected Controlled {
  protected:
-  void begin(RunOptions options, const std::string& models = robot_sdf("r", 0, 0)) { start(std::move(options), models); }
+  void begin(RunOptions options, const std::string& models = robot_sdf("r", 0, 0)) {
+    start(std::move(options), models);
+  }
   void join() {
     const reply_t reply = Controlled::join();
     ASSERT_EQ(reply.code, reply_t::OK) << reply.text;
-    EXPECT_EQ(Controlled::join().session, reply.session);    // a repeated JOIN: the same session
+    EXPECT_EQ(Controlled::join().session, reply.session);  // a repeated JOIN: the same session
   }
   reply_t step(int64_t steps) { return ask(stepping(steps)); }
 
@@ -72,10 +74,10 @@ TEST_F(ControlTest, PausesAndResumes) {
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
   const reply_t again = ask(request_t::PAUSE);
   EXPECT_EQ(decoded<state_reply_t>(again.body).step, step_then);
-  EXPECT_LE(bus_.count(), count + 3);    // the reply, and an info at most
+  EXPECT_LE(bus_.count(), count + 3);  // the reply, and an info at most
   EXPECT_EQ(step(1).utime, (step_then + 1) * 5000);
   EXPECT_EQ(ask(request_t::RESUME).code, reply_t::OK);
-  EXPECT_EQ(step(1).code, reply_t::REFUSED);    // not paused
+  EXPECT_EQ(step(1).code, reply_t::REFUSED);  // not paused
 }
 
 TEST_F(ControlTest, ExecutesEachRequestOnce) {
@@ -91,7 +93,7 @@ TEST_F(ControlTest, ExecutesEachRequestOnce) {
     EXPECT_EQ(repeated.body, first.body);
   }
   EXPECT_EQ(decoded<state_reply_t>(step(1).body).step, 11);
-  for (int i = 0; i < 40; ++i) step(1);    // more than the replies that are kept
+  for (int i = 0; i < 40; ++i) step(1);  // more than the replies that are kept
   EXPECT_EQ(ask(request).code, reply_t::OLD_SEQUENCE);
   EXPECT_EQ(decoded<state_reply_t>(step(1).body).step, 52);
 }
@@ -130,7 +132,9 @@ TEST_F(ControlTest, ResetEqualsAFreshRun) {
   const state_reply_t first = drive();
   name_request_t name;
   name.name = "r";
-  EXPECT_NEAR(decoded<state_reply_t>(ask(request_t::GET_STATE, engine::encoded(name)).body).position[0], 0.5, 1e-9);
+  EXPECT_NEAR(
+      decoded<state_reply_t>(ask(request_t::GET_STATE, engine::encoded(name)).body).position[0],
+      0.5, 1e-9);
   reset_request_t reset;
   reset.what = reset_request_t::ALL;
   reset.seed = -1;
@@ -139,7 +143,7 @@ TEST_F(ControlTest, ResetEqualsAFreshRun) {
   ASSERT_EQ(reply.code, reply_t::OK) << reply.text;
   EXPECT_EQ(reply.epoch, 1);
   EXPECT_EQ(decoded<state_reply_t>(reply.body).step, 0);
-  EXPECT_EQ(ask(request).epoch, 1);    // a repeated reset is not a second one
+  EXPECT_EQ(ask(request).epoch, 1);  // a repeated reset is not a second one
   const state_reply_t second = drive();
   EXPECT_EQ(first.step, second.step);
   EXPECT_EQ(first.state_hash, second.state_hash);
@@ -162,13 +166,16 @@ TEST_F(ControlTest, InfoTellsAllThereIs) {
   bool velocity = false;
   for (const channel_info_t& channel : info.channels) {
     if (channel.name != "r/velocity") continue;
-    velocity = channel.input && channel.type == "velocity_command_t" && channel.fingerprint == velocity_command_t::getHash();
+    velocity = channel.input && channel.type == "velocity_command_t" &&
+               channel.fingerprint == velocity_command_t::getHash();
   }
   EXPECT_TRUE(velocity);
 }
 
-std::vector<uint8_t> with_bytes(std::vector<uint8_t> bytes, size_t at, const std::vector<uint8_t>& replacement) {
-  std::copy(replacement.begin(), replacement.end(), bytes.begin() + static_cast<std::ptrdiff_t>(at));
+std::vector<uint8_t> with_bytes(std::vector<uint8_t> bytes, size_t at,
+                                const std::vector<uint8_t>& replacement) {
+  std::copy(replacement.begin(), replacement.end(),
+            bytes.begin() + static_cast<std::ptrdiff_t>(at));
   return bytes;
 }
 
@@ -212,10 +219,10 @@ TEST_F(ControlTest, SurvivesHostileMessages) {
       {"r/velocity", wheels},
       {"r/velocity", move},
       {"r/wheels", velocity},
-      {"r/wheels", with_bytes(wheels, 16, {0x7f, 0xff, 0xff, 0xff})},    // n = 2^31 - 1
-      {"r/wheels", with_bytes(wheels, 16, {0x80, 0, 0, 0})},             // n = -2^31
-      {"r/wheels", with_bytes(wheels, 16, {0xff, 0xff, 0xff, 0xff})},    // n = -1
-      {"r/wheels", with_bytes(wheels, 16, {0x20, 0, 0, 0})},             // 8 n = 2^32
+      {"r/wheels", with_bytes(wheels, 16, {0x7f, 0xff, 0xff, 0xff})},  // n = 2^31 - 1
+      {"r/wheels", with_bytes(wheels, 16, {0x80, 0, 0, 0})},           // n = -2^31
+      {"r/wheels", with_bytes(wheels, 16, {0xff, 0xff, 0xff, 0xff})},  // n = -1
+      {"r/wheels", with_bytes(wheels, 16, {0x20, 0, 0, 0})},           // 8 n = 2^32
       {"r/wheels", with_bytes(wheels, 16, {0, 0, 0, 3})},
       {"r/wheels", with_bytes(wheels, 16, {0, 0, 0, 1})},
       {"r/wheels", cut(wheels, 20)},
@@ -226,7 +233,8 @@ TEST_F(ControlTest, SurvivesHostileMessages) {
   for (const auto& [channel, bytes] : table) {
     const uint64_t before = server().inbox().refused();
     bus_.send(channel, bytes);
-    EXPECT_EQ(server().inbox().refused(), before + 1) << channel << " with " << bytes.size() << " bytes";
+    EXPECT_EQ(server().inbox().refused(), before + 1)
+        << channel << " with " << bytes.size() << " bytes";
   }
   // Of other channels, or of robots that there are not: nothing at all.
   bus_.send("nobody/velocity", velocity);
@@ -239,7 +247,8 @@ TEST_F(ControlTest, SurvivesHostileMessages) {
     bus_.send("r/velocity", engine::encoded(command));
   }
   // Requests that are none.
-  for (const auto& bytes : {std::vector<uint8_t>{}, std::vector<uint8_t>(8, 0xff), velocity}) bus_.send("ruedo/request", bytes);
+  for (const auto& bytes : {std::vector<uint8_t>{}, std::vector<uint8_t>(8, 0xff), velocity})
+    bus_.send("ruedo/request", bytes);
   std::vector<uint8_t> bad = engine::encoded(request(request_t::PAUSE));
   bus_.send("ruedo/request", with_bytes(bad, bad.size() - 4, {0x7f, 0xff, 0xff, 0xff}));
   bus_.send("ruedo/request", std::vector<uint8_t>(2'000'000, 1));
@@ -248,7 +257,7 @@ TEST_F(ControlTest, SurvivesHostileMessages) {
   name_request_t name;
   name.name = "r";
   const auto state = decoded<state_reply_t>(ask(request_t::GET_STATE, engine::encoded(name)).body);
-  EXPECT_NEAR(state.position[0], 0.25, 1e-9);    // 1 s at 0.25 m/s, without a gap
+  EXPECT_NEAR(state.position[0], 0.25, 1e-9);  // 1 s at 0.25 m/s, without a gap
 }
 
 // A flood costs nothing but the flooder's own commands: the newest count.
@@ -264,7 +273,9 @@ TEST_F(ControlTest, KeepsTheNewestCommands) {
   EXPECT_EQ(server().inbox().displaced(), 100'000u - engine::CommandInbox::kKeptPerRobot);
   name_request_t name;
   name.name = "r";
-  EXPECT_NEAR(decoded<state_reply_t>(ask(request_t::GET_STATE, engine::encoded(name)).body).position[0], 0.1, 1e-9);
+  EXPECT_NEAR(
+      decoded<state_reply_t>(ask(request_t::GET_STATE, engine::encoded(name)).body).position[0],
+      0.1, 1e-9);
 }
 
 TEST_F(ControlTest, QuitEndsTheRun) {
@@ -290,7 +301,11 @@ TEST(Control, WaitsForTheFirstState) {
   bool state_comes = true;
   std::vector<int32_t> executed;
   std::vector<reply_t> replies;
-  Control control(7, {.execute = [&](const request_t& request, const Session&) { executed.push_back(request.kind); return engine::Outcome{}; },
+  Control control(7, {.execute =
+                          [&](const request_t& request, const Session&) {
+                            executed.push_back(request.kind);
+                            return engine::Outcome{};
+                          },
                       .state = [] { return std::vector<uint8_t>{}; },
                       .publish = [&](const reply_t& reply) { replies.push_back(reply); },
                       .utime = [] { return int64_t{0}; },
@@ -319,9 +334,10 @@ TEST(Control, WaitsForTheFirstState) {
   ask(request_t::SPAWN);
   control.serve();
   EXPECT_EQ(executed, std::vector<int32_t>{});
-  state_comes = false;    // it is there
+  state_comes = false;  // it is there
   control.serve();
-  EXPECT_EQ(executed, (std::vector<int32_t>{request_t::GET_STATE, request_t::QUIT, request_t::SPAWN}));
+  EXPECT_EQ(executed,
+            (std::vector<int32_t>{request_t::GET_STATE, request_t::QUIT, request_t::SPAWN}));
   EXPECT_EQ(replies.size(), 4U);
 }
 

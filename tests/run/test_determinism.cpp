@@ -1,12 +1,13 @@
-// The bytes of a run depend on the world, the seed and the commands, and on nothing that threads do.
+// The bytes of a run depend on the world, the seed and the commands, and on nothing that threads
+// do.
 #include <random>
 
 #include <gtest/gtest.h>
 
 #include "ruedo/pose_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
-#include "running.h"
 #include "run/control.h"
+#include "running.h"
 
 namespace ruedo::run {
 namespace {
@@ -14,7 +15,8 @@ namespace {
 // A sensor that tells pure noise, at 50 Hz.
 class Noise : public Sensor {
  public:
-  explicit Noise(const SensorSetup& setup) : random_(setup.random), channel_(setup.channel<pose_t>()) {}
+  explicit Noise(const SensorSetup& setup)
+      : random_(setup.random), channel_(setup.channel<pose_t>()) {}
   void sample(const SampleInput& input, Outbox& out) override {
     RandomStream stream = random_.stream(static_cast<uint64_t>(input.sample));
     pose_t message{};
@@ -68,7 +70,8 @@ std::string fleet(int robots, const std::string& type) {
   std::string models;
   for (int i = 0; i < robots; ++i) {
     std::string sensors;
-    for (int k = 0; k < 4; ++k) sensors += "<sensor name='S" + std::to_string(k) + "' type='" + type + "'/>";
+    for (int k = 0; k < 4; ++k)
+      sensors += "<sensor name='S" + std::to_string(k) + "' type='" + type + "'/>";
     models += robot_sdf("r" + std::to_string(i), 2.0 * i, 0.0, sensors);
   }
   return models;
@@ -83,7 +86,8 @@ struct Variation {
 };
 
 // The log of two seconds of driving robots. The commands wait before the first step.
-std::string log_of(const std::shared_ptr<const model::WorldModel>& world, const Variation& variation) {
+std::string log_of(const std::shared_ptr<const model::WorldModel>& world,
+                   const Variation& variation) {
   const TemporaryFile file("determinism.lcmlog");
   const engine::ThreadLimit limit(variation.threads);
   RunOptions options = fast(1.0, variation.seed);
@@ -130,12 +134,14 @@ TEST(Determinism, ThreadsBatchesAndSleepsChangeNothing) {
   EXPECT_TRUE(one == log_of(world, {.rate = 20.0}));
 }
 
-// Were this to fail, the comparison above would prove nothing: a module whose devices share a generator must show.
+// Were this to fail, the comparison above would prove nothing: a module whose devices share a
+// generator must show.
 TEST(Determinism, SharedGeneratorIsCaught) {
   const auto world = load_text(fleet(40, "test_shared"));
   const std::string first = log_of(world, {.threads = 4, .sleeps = true});
   bool caught = false;
-  for (int i = 0; i < 10 && !caught; ++i) caught = first != log_of(world, {.threads = 4, .sleeps = true});
+  for (int i = 0; i < 10 && !caught; ++i)
+    caught = first != log_of(world, {.threads = 4, .sleeps = true});
   EXPECT_TRUE(caught);
 }
 

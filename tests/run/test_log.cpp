@@ -2,26 +2,29 @@
 #include <gtest/gtest.h>
 #include <lcm/lcm-cpp.hpp>
 
+#include "core/sha256.h"
+#include "log/writer.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
 #include "ruedo/log_header_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
 #include "running.h"
-#include "log/writer.h"
-#include "core/sha256.h"
 
 namespace ruedo::run {
 namespace {
 
 TEST(Sha256, KnownAnswers) {
-  const auto of = [](const std::string& text) { return sha256(reinterpret_cast<const uint8_t*>(text.data()), text.size()); };
+  const auto of = [](const std::string& text) {
+    return sha256(reinterpret_cast<const uint8_t*>(text.data()), text.size());
+  };
   // The examples of FIPS 180-4.
   EXPECT_EQ(of(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
   EXPECT_EQ(of("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
   EXPECT_EQ(of("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq"),
             "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1");
-  EXPECT_EQ(of(std::string(1'000'000, 'a')), "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
+  EXPECT_EQ(of(std::string(1'000'000, 'a')),
+            "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
 }
 
 TEST(Writer, LcmReadsItsEvents) {
@@ -109,9 +112,10 @@ TEST(Recording, HoldsWhatARepetitionNeeds) {
     ++applied_count;
     applied_t applied;
     ASSERT_EQ(decode_checked(data, size, applied), DecodeFault::none);
-    EXPECT_EQ(applied.step, 0);    // it acted on the initial state
+    EXPECT_EQ(applied.step, 0);  // it acted on the initial state
     EXPECT_EQ(applied.channel, "r/velocity");
-    EXPECT_EQ(std::vector<uint8_t>(applied.data.begin(), applied.data.end()), engine::encoded(command));
+    EXPECT_EQ(std::vector<uint8_t>(applied.data.begin(), applied.data.end()),
+              engine::encoded(command));
   }
   EXPECT_EQ(applied_count, 1);
   EXPECT_EQ(last, 1'000'000);

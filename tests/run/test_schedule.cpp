@@ -1,15 +1,16 @@
-// The order of messages, sample counts over an hour, slow sinks, and allocations in the steady state.
+// The order of messages, sample counts over an hour, slow sinks, and allocations in the steady
+// state.
 #include <atomic>
 
 #include <gtest/gtest.h>
 
+#include "counting_new.h"
 #include "ruedo/decode.h"
 #include "ruedo/odometry_t.hpp"
 #include "ruedo/pose_t.hpp"
 #include "ruedo/tick_t.hpp"
 #include "ruedo/world_info_t.hpp"
 #include "ruedo/world_state_t.hpp"
-#include "counting_new.h"
 #include "running.h"
 
 namespace ruedo::run {
@@ -25,7 +26,8 @@ TEST(Schedule, StepThenModuleThenRobot) {
   MemoryBus bus;
   run::Run server(load_text(robot_sdf("b", 0, 0) + robot_sdf("a", 2, 0)), fast(0.1), bus);
   server.run();
-  // At 0 and at every 20 ms: odometry and pose of b (first in the world), then of a; and the world at 30 Hz, last.
+  // At 0 and at every 20 ms: odometry and pose of b (first in the world), then of a; and the world
+  // at 30 Hz, last.
   std::map<int64_t, std::vector<std::string>> at;
   int64_t last = 0;
   for (const Message& message : bus.messages()) {
@@ -38,13 +40,15 @@ TEST(Schedule, StepThenModuleThenRobot) {
   const auto names_at = [&](int64_t us) {
     Names names;
     for (const std::string& name : at[us]) {
-      if (name.find("/motion") == std::string::npos && name.find("/joints") == std::string::npos) names.push_back(name);
+      if (name.find("/motion") == std::string::npos && name.find("/joints") == std::string::npos)
+        names.push_back(name);
     }
     return names;
   };
   EXPECT_EQ(names_at(20'000), (Names{"b/odometry", "b/pose", "a/odometry", "a/pose"}));
-  EXPECT_EQ(names_at(35'000), (Names{"ruedo/world"}));    // the first step at or after 33.3 ms
-  EXPECT_EQ(names_at(100'000), (Names{"b/odometry", "b/pose", "a/odometry", "a/pose", "ruedo/world"}));
+  EXPECT_EQ(names_at(35'000), (Names{"ruedo/world"}));  // the first step at or after 33.3 ms
+  EXPECT_EQ(names_at(100'000),
+            (Names{"b/odometry", "b/pose", "a/odometry", "a/pose", "ruedo/world"}));
 }
 
 // An hour of sim time: sample k is at the first step at or after k / rate, and none is missing.
@@ -118,9 +122,9 @@ TEST(Schedule, SteadyStateAllocatesNothing) {
   int64_t worlds = 0;
   bus.on_publish = [&](const std::string& channel) {
     if (channel != "ruedo/world") return;
-    ++worlds;    // 30 a second
+    ++worlds;  // 30 a second
     if (worlds == 301) at_start = allocations();
-    if (worlds == 451) at_end = allocations();    // 5 s, 1000 steps later
+    if (worlds == 451) at_end = allocations();  // 5 s, 1000 steps later
   };
   RunOptions options = fast(20.0);
   options.control = false;
@@ -139,19 +143,21 @@ TEST(Schedule, TickListsTheMessagesOfItsStep) {
   for (size_t i = 0; i < messages.size(); ++i) {
     if (messages[i].channel != "ruedo/tick") continue;
     tick_t tick;
-    ASSERT_EQ(decode_checked(messages[i].bytes.data(), messages[i].bytes.size(), tick), DecodeFault::none);
+    ASSERT_EQ(decode_checked(messages[i].bytes.data(), messages[i].bytes.size(), tick),
+              DecodeFault::none);
     ASSERT_LE(static_cast<size_t>(tick.nmanifest), i);
     for (int32_t k = 0; k < tick.nmanifest; ++k) {
       const Message& message = messages[i - static_cast<size_t>(tick.nmanifest - k)];
       EXPECT_EQ(server.channels()[tick.manifest[k].channel_index].bus_name, message.channel);
       EXPECT_EQ(static_cast<size_t>(tick.manifest[k].size), message.bytes.size());
-      EXPECT_EQ(static_cast<uint32_t>(tick.manifest[k].crc), crc32(message.bytes.data(), message.bytes.size()));
+      EXPECT_EQ(static_cast<uint32_t>(tick.manifest[k].crc),
+                crc32(message.bytes.data(), message.bytes.size()));
       ++checked;
     }
   }
   EXPECT_GE(checked, 6u);
   const uint8_t nine[] = {'1', '2', '3', '4', '5', '6', '7', '8', '9'};
-  EXPECT_EQ(crc32(nine, 9), 0xCBF43926u);    // the check value of CRC-32
+  EXPECT_EQ(crc32(nine, 9), 0xCBF43926u);  // the check value of CRC-32
 }
 
 }  // namespace

@@ -22,7 +22,10 @@ TEST(WorldEditor, FindsTheFirstUnusedName) {
   EXPECT_EQ(unused_name(with({"cart", "cart_2", "cart_4"}), "cart"), "cart_3");
   EXPECT_EQ(unused_name(with({"cart", "cart_3"}), "cart"), "cart_2");
   // Not of that row: 0 and 1, what is no number, and numbers written otherwise.
-  EXPECT_EQ(unused_name(with({"cart", "cart_0", "cart_1", "cart_x", "cart_", "cart_02", "cart_2x", "cart_-2", "carts_2"}), "cart"), "cart_2");
+  EXPECT_EQ(unused_name(with({"cart", "cart_0", "cart_1", "cart_x", "cart_", "cart_02", "cart_2x",
+                              "cart_-2", "carts_2"}),
+                        "cart"),
+            "cart_2");
   EXPECT_EQ(unused_name(with({"cart", "cart_99999999999999999999"}), "cart"), "cart_2");
 }
 
@@ -49,14 +52,14 @@ TEST(WorldEditor, PlacesAModelWhereOneOfItsKindWas) {
   EXPECT_EQ(world.models[1].name, "e");
   EXPECT_FALSE(world.models[1].removed);
   EXPECT_EQ(world.models[1].X_WM.translation, Vec3(1, 2, 3));
-  EXPECT_EQ(editor.place("f", Pose{}, model).instance, 4);    // its place is taken
+  EXPECT_EQ(editor.place("f", Pose{}, model).instance, 4);  // its place is taken
 }
 
 TEST(WorldEditor, SpawnsWhereTheRequestSays) {
   spawn_request_t request{};
   request.position[0] = 1.0;
   request.position[2] = 0.5;
-  request.orientation[0] = 1.0005;    // as good as a unit quaternion
+  request.orientation[0] = 1.0005;  // as good as a unit quaternion
   const Pose X_WM = spawn_pose(model::WorldModel{}, model::Model{}, request);
   EXPECT_EQ(X_WM.translation, Vec3(1.0, 0.0, 0.5));
   EXPECT_EQ(X_WM.rotation.w(), 1.0);

@@ -1,5 +1,5 @@
-// The fast caster against the slow one, ray by ray and bit by bit, in random worlds; and what a scene promises: movers,
-// ignored links, ties, limits, bad rays, threads.
+// The fast caster against the slow one, ray by ray and bit by bit, in random worlds; and what a
+// scene promises: movers, ignored links, ties, limits, bad rays, threads.
 #include <cstring>
 #include <thread>
 
@@ -18,12 +18,14 @@ namespace {
 using model::Shape;
 
 bool same_bits(const Hit& a, const Hit& b) {
-  return std::memcmp(&a.range, &b.range, sizeof a.range) == 0 && a.link == b.link && a.shape == b.shape &&
+  return std::memcmp(&a.range, &b.range, sizeof a.range) == 0 && a.link == b.link &&
+         a.shape == b.shape &&
          std::memcmp(a.normal.data(), b.normal.data(), 3 * sizeof(double)) == 0;
 }
 
 model::Geometry random_geometry(RandomStream& random) {
-  const Vec3 size(0.2 + 2 * random.uniform(), 0.2 + 2 * random.uniform(), 0.2 + 2 * random.uniform());
+  const Vec3 size(0.2 + 2 * random.uniform(), 0.2 + 2 * random.uniform(),
+                  0.2 + 2 * random.uniform());
   switch (random.bits() % 9) {
     case 0: return geometry(Shape::sphere, size);
     case 1: return geometry(Shape::cylinder, size);
@@ -62,7 +64,8 @@ std::vector<Ray> random_rays(RandomStream& random, int count, double size) {
   for (int i = 0; i < count; ++i) {
     if (i % 20 == 0 || i > count / 2) origin = random_vector(random, i % 7 ? size : 20 * size);
     const Vec3 direction = i % 5 ? random_direction(random) : Vec3::Unit(i % 3);
-    rays.push_back({origin, direction, i % 3 ? std::numeric_limits<double>::infinity() : 3 * size * random.uniform()});
+    rays.push_back({origin, direction,
+                    i % 3 ? std::numeric_limits<double>::infinity() : 3 * size * random.uniform()});
   }
   return rays;
 }
@@ -76,19 +79,22 @@ TEST(RayScene, RandomWorldsEqualTheReference) {
     if (seed % 2) scenes.world.add(at({0, 0, -size / 2}), plane({0, 0, 1}));
     for (int i = 0; i < 25; ++i) {
       std::vector<std::pair<Pose, model::Geometry>> shapes;
-      for (uint32_t k = random.bits() % 4; k < 4; ++k) shapes.emplace_back(random_pose(random, 1.5), random_geometry(random));
+      for (uint32_t k = random.bits() % 4; k < 4; ++k)
+        shapes.emplace_back(random_pose(random, 1.5), random_geometry(random));
       scenes.world.add(random_pose(random, size), std::move(shapes), i % 2 == 0);
     }
     scenes.make();
     const std::vector<Ray> rays = random_rays(random, 600, size);
     std::vector<Hit> fast(rays.size()), slow(rays.size());
     for (int round = 0; round < 3; ++round) {
-      const int ignored = round == 0 ? -1 : static_cast<int>(random.bits() % scenes.layout->links.size());
+      const int ignored =
+          round == 0 ? -1 : static_cast<int>(random.bits() % scenes.layout->links.size());
       scenes.fast->cast(rays, fast, ignored);
       scenes.slow->cast(rays, slow, ignored);
       for (size_t i = 0; i < rays.size(); ++i) {
-        ASSERT_TRUE(same_bits(fast[i], slow[i])) << "world " << seed << " round " << round << " ray " << i << ": "
-                                                 << fast[i].range << " and " << slow[i].range;
+        ASSERT_TRUE(same_bits(fast[i], slow[i]))
+            << "world " << seed << " round " << round << " ray " << i << ": " << fast[i].range
+            << " and " << slow[i].range;
         ASSERT_TRUE(same_bits(fast[i], scenes.fast->cast(rays[i], ignored))) << "single ray " << i;
         hits += fast[i].hit();
         inside += fast[i].range == 0.0;
@@ -105,7 +111,8 @@ TEST(RayScene, RandomWorldsEqualTheReference) {
 TEST(RayScene, MoversStayRightAfterManySteps) {
   RandomStream random = RandomSource(8, "rays", "movers").stream(0);
   Scenes scenes;
-  for (int i = 0; i < 60; ++i) scenes.world.add(random_pose(random, 5.0), random_geometry(random), false);
+  for (int i = 0; i < 60; ++i)
+    scenes.world.add(random_pose(random, 5.0), random_geometry(random), false);
   scenes.make();
   const std::vector<Ray> rays = random_rays(random, 100, 6.0);
   std::vector<Hit> fast(rays.size()), slow(rays.size());
@@ -114,7 +121,8 @@ TEST(RayScene, MoversStayRightAfterManySteps) {
     scenes.update();
     scenes.fast->cast(rays, fast);
     scenes.slow->cast(rays, slow);
-    for (size_t i = 0; i < rays.size(); ++i) ASSERT_TRUE(same_bits(fast[i], slow[i])) << step << " " << i;
+    for (size_t i = 0; i < rays.size(); ++i)
+      ASSERT_TRUE(same_bits(fast[i], slow[i])) << step << " " << i;
   }
 }
 
@@ -123,7 +131,11 @@ TEST(RayScene, TiesGoToTheLowestLinkAndShape) {
     Scenes scenes;
     const Pose there = at({5, 0, 0});
     scenes.world.add(at({7, 0, 0}), geometry(Shape::box, {2, 2, 2}), true);
-    scenes.world.add(there, {{Pose(), geometry(Shape::box, {1, 1, 1})}, {Pose(), geometry(Shape::box, {2, 2, 2})}, {Pose(), geometry(Shape::box, {2, 2, 2})}}, is_static);
+    scenes.world.add(there,
+                     {{Pose(), geometry(Shape::box, {1, 1, 1})},
+                      {Pose(), geometry(Shape::box, {2, 2, 2})},
+                      {Pose(), geometry(Shape::box, {2, 2, 2})}},
+                     is_static);
     scenes.world.add(there, geometry(Shape::box, {2, 2, 2}), !is_static);
     scenes.make();
     for (const RayScene* scene : {scenes.fast.get(), scenes.slow.get()}) {
@@ -134,7 +146,7 @@ TEST(RayScene, TiesGoToTheLowestLinkAndShape) {
       hit = scene->cast({Vec3::Zero(), Vec3::UnitX()}, 1);
       EXPECT_EQ(hit.range, 4.0);
       EXPECT_EQ(hit.link, 2);
-      EXPECT_EQ(scene->cast({{5, 0, 0}, Vec3::UnitX()}).link, 1);    // inside of all
+      EXPECT_EQ(scene->cast({{5, 0, 0}, Vec3::UnitX()}).link, 1);  // inside of all
       EXPECT_EQ(scene->cast({{5, 0, 0}, Vec3::UnitX()}).shape, 0);
     }
   }
@@ -172,7 +184,7 @@ TEST(RayScene, BadRaysHitNothing) {
   rays.push_back({{-5, 0, 0}, {0, 0, 0}});
   rays.push_back({{-5, 0, 0}, {1e200, 0, 0}});
   rays.push_back({{-1e200, 0, 0}, {1, 0, 0}});
-  rays.push_back({{-5, 0, 0}, {1, 0, 0}});    // a good one among them
+  rays.push_back({{-5, 0, 0}, {1, 0, 0}});  // a good one among them
   std::vector<Hit> hits(rays.size());
   scenes.fast->cast(rays, hits);
   for (size_t i = 0; i + 1 < rays.size(); ++i) EXPECT_FALSE(hits[i].hit()) << i;
@@ -206,7 +218,8 @@ TEST(RayScene, WheelsTurn) {
   wheel.axis_in_L = Vec3::UnitY();
   scenes.layout->wheels.push_back(wheel);
   for (const Backend backend : {Backend::embree, Backend::reference}) {
-    const auto scene = make_ray_scene(make_static_ray_scene(scenes.world.model, *scenes.layout, false, backend));
+    const auto scene =
+        make_ray_scene(make_static_ray_scene(scenes.world.model, *scenes.layout, false, backend));
     Snapshot snapshot;
     snapshot.bodies.resize(1);
     snapshot.wheel_angles = {0.0};
@@ -220,8 +233,9 @@ TEST(RayScene, WheelsTurn) {
   }
 }
 
-// A bar that turns about its middle, 1 m ahead of its link's origin, and a cube fixed to it, whose link is turned left by
-// a right angle. The wheel's quarter turn about y takes what is above the axis ahead of it.
+// A bar that turns about its middle, 1 m ahead of its link's origin, and a cube fixed to it, whose
+// link is turned left by a right angle. The wheel's quarter turn about y takes what is above the
+// axis ahead of it.
 TEST(RayScene, WheelsTurnAboutTheirAxisWhereverTheirLinksAre) {
   World world;
   world.add({}, {{at({1, 0, 0}), geometry(Shape::box, {0.1, 0.1, 1.0})}}, false);
@@ -230,7 +244,7 @@ TEST(RayScene, WheelsTurnAboutTheirAxisWhereverTheirLinksAre) {
   cap.name = "cap";
   cap.X_ML = {Quat(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ())), Vec3(1, 0, 0)};
   cap.collisions.emplace_back();
-  cap.collisions[0].X_LC = at({2, 0, 0.5});    // in the model: (1, 2, 0.5)
+  cap.collisions[0].X_LC = at({2, 0, 0.5});  // in the model: (1, 2, 0.5)
   cap.collisions[0].geometry = geometry(Shape::box, {0.2, 0.2, 0.2});
   model->links.push_back(cap);
   model::Joint joint;
@@ -269,12 +283,12 @@ TEST(RayScene, VisualsWhenAsked) {
   visual.geometry = geometry(Shape::sphere, {0.5, 0, 0});
   model->links[0].visuals.push_back(visual);
   visual.X_LV.translation.x() = -1.0;
-  visual.transparency = 1.0;    // nothing to be seen
+  visual.transparency = 1.0;  // nothing to be seen
   model->links[0].visuals.push_back(visual);
   visual.transparency = 0.0;
   visual.X_LV.translation.x() = 3.0;
   visual.geometry = plane(-Vec3::UnitX());
-  visual.geometry.extent = {1.0, 2.0};    // a wall of 1 m (along z: x of the plane) by 2 m
+  visual.geometry.extent = {1.0, 2.0};  // a wall of 1 m (along z: x of the plane) by 2 m
   model->links[0].visuals.push_back(visual);
   world.model.models[0].model = model;
   const model::BodyLayout layout(world.model);
@@ -296,7 +310,8 @@ TEST(RayScene, EmptyWorld) {
 TEST(RayScene, ThreadsCastTheSame) {
   RandomStream random = RandomSource(9, "rays", "threads").stream(0);
   Scenes scenes;
-  for (int i = 0; i < 40; ++i) scenes.world.add(random_pose(random, 5.0), random_geometry(random), i % 2 == 0);
+  for (int i = 0; i < 40; ++i)
+    scenes.world.add(random_pose(random, 5.0), random_geometry(random), i % 2 == 0);
   scenes.make();
   const std::vector<Ray> rays = random_rays(random, 4000, 6.0);
   std::vector<std::vector<Hit>> hits(4, std::vector<Hit>(rays.size()));
@@ -307,10 +322,11 @@ TEST(RayScene, ThreadsCastTheSame) {
     for (size_t i = 0; i < rays.size(); ++i) ASSERT_TRUE(same_bits(hits[0][i], hits[k][i])) << i;
 }
 
-// Embree takes its threads from TBB, as the modules do for their pieces: it must not keep them from those.
+// Embree takes its threads from TBB, as the modules do for their pieces: it must not keep them from
+// those.
 TEST(RayScene, LeavesTbbItsThreads) {
   constexpr auto kThreads = tbb::global_control::max_allowed_parallelism;
-  const tbb::global_control four(kThreads, 4);    // on one core, too
+  const tbb::global_control four(kThreads, 4);  // on one core, too
   Scenes scenes;
   scenes.world.add(at({1, 0, 0}), geometry(model::Shape::box, {1, 1, 1}));
   scenes.make();
@@ -319,9 +335,10 @@ TEST(RayScene, LeavesTbbItsThreads) {
 
 #if defined(__SSE2__)
 TEST(RayScene, FloatModeStays) {
-  const unsigned before = _mm_getcsr() & ~0x3fu;    // but for the sticky exception flags
+  const unsigned before = _mm_getcsr() & ~0x3fu;  // but for the sticky exception flags
   Scenes scenes;
-  for (int i = 0; i < 100; ++i) scenes.world.add(at({double(i), 0, 0}), mesh_geometry(ball_mesh(12, 0.3f)), i % 2 == 0);
+  for (int i = 0; i < 100; ++i)
+    scenes.world.add(at({double(i), 0, 0}), mesh_geometry(ball_mesh(12, 0.3f)), i % 2 == 0);
   scenes.make();
   scenes.update();
   scenes.fast->cast({Vec3::Zero(), Vec3::UnitX()});

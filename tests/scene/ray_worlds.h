@@ -26,7 +26,8 @@ inline model::Geometry plane(const Vec3& normal) {
   return g;
 }
 
-inline model::Geometry mesh_geometry(std::shared_ptr<const model::Mesh> mesh, const Vec3& scale = Vec3::Ones()) {
+inline model::Geometry mesh_geometry(std::shared_ptr<const model::Mesh> mesh,
+                                     const Vec3& scale = Vec3::Ones()) {
   model::Geometry g;
   g.shape = model::Shape::mesh;
   g.mesh = std::move(mesh);
@@ -39,8 +40,10 @@ inline Pose at(const Vec3& position) { return {Quat::Identity(), position}; }
 struct World {
   model::WorldModel model;
 
-  // A model of one link with these collisions, each at its pose in the link. Returns the link's index.
-  int add(const Pose& X_WM, std::vector<std::pair<Pose, model::Geometry>> shapes, bool is_static = true) {
+  // A model of one link with these collisions, each at its pose in the link. Returns the link's
+  // index.
+  int add(const Pose& X_WM, std::vector<std::pair<Pose, model::Geometry>> shapes,
+          bool is_static = true) {
     auto m = std::make_shared<model::Model>();
     m->name = "m" + std::to_string(model.models.size());
     m->is_static = is_static;
@@ -55,11 +58,14 @@ struct World {
     model.models.push_back({m->name, X_WM, m});
     return static_cast<int>(model.models.size()) - 1;
   }
-  int add(const Pose& X_WM, model::Geometry g, bool is_static = true) { return add(X_WM, {{Pose(), std::move(g)}}, is_static); }
+  int add(const Pose& X_WM, model::Geometry g, bool is_static = true) {
+    return add(X_WM, {{Pose(), std::move(g)}}, is_static);
+  }
 };
 
 inline Vec3 random_vector(RandomStream& random, double size) {
-  return {size * (2 * random.uniform() - 1), size * (2 * random.uniform() - 1), size * (2 * random.uniform() - 1)};
+  return {size * (2 * random.uniform() - 1), size * (2 * random.uniform() - 1),
+          size * (2 * random.uniform() - 1)};
 }
 
 inline Vec3 random_direction(RandomStream& random) {
@@ -80,10 +86,16 @@ inline std::shared_ptr<model::Mesh> ball_mesh(int n, float radius) {
   for (int i = 1; i < rings; ++i)
     for (int j = 0; j < n; ++j) {
       const double polar = M_PI * i / rings, around = 2 * M_PI * j / n;
-      mesh->positions.push_back((radius * Vec3(std::sin(polar) * std::cos(around), std::sin(polar) * std::sin(around), std::cos(polar))).cast<float>());
+      mesh->positions.push_back((radius * Vec3(std::sin(polar) * std::cos(around),
+                                               std::sin(polar) * std::sin(around), std::cos(polar)))
+                                    .cast<float>());
     }
   mesh->positions.push_back({0, 0, -radius});
-  const auto at = [&](int i, int j) { return static_cast<uint32_t>(i == 0 ? 0 : i == rings ? 1 + (rings - 1) * n : 1 + (i - 1) * n + j % n); };
+  const auto at = [&](int i, int j) {
+    return static_cast<uint32_t>(i == 0       ? 0
+                                 : i == rings ? 1 + (rings - 1) * n
+                                              : 1 + (i - 1) * n + j % n);
+  };
   for (int i = 0; i < rings; ++i)
     for (int j = 0; j < n; ++j) {
       if (i > 0) mesh->triangles.push_back({at(i, j), at(i + 1, j), at(i, j + 1)});
@@ -96,8 +108,10 @@ inline std::shared_ptr<model::Mesh> ball_mesh(int n, float radius) {
 inline std::shared_ptr<model::Mesh> cube_mesh() {
   auto mesh = std::make_shared<model::Mesh>();
   mesh->closed = true;
-  for (int i = 0; i < 8; ++i) mesh->positions.push_back({i & 1 ? 1.f : -1.f, i & 2 ? 1.f : -1.f, i & 4 ? 1.f : -1.f});
-  const uint32_t faces[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+  for (int i = 0; i < 8; ++i)
+    mesh->positions.push_back({i & 1 ? 1.f : -1.f, i & 2 ? 1.f : -1.f, i & 4 ? 1.f : -1.f});
+  const uint32_t faces[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
+                                {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
   for (const auto& f : faces) {
     mesh->triangles.push_back({f[0], f[1], f[2]});
     mesh->triangles.push_back({f[0], f[2], f[3]});

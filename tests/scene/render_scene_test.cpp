@@ -1,4 +1,5 @@
-// Pictures against what geometry says they must show: depth, labels and places in the picture worked out by hand.
+// Pictures against what geometry says they must show: depth, labels and places in the picture
+// worked out by hand.
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -30,7 +31,8 @@ struct World {
     world.models.push_back({name, X_WM, std::move(model)});
     return link;
   }
-  static model::Visual& show(model::Link& link, Shape shape, const Vec3& size, const model::Rgba& colour) {
+  static model::Visual& show(model::Link& link, Shape shape, const Vec3& size,
+                             const model::Rgba& colour) {
     model::Visual visual;
     visual.geometry.shape = shape;
     visual.geometry.size = size;
@@ -39,7 +41,8 @@ struct World {
     link.visuals.push_back(visual);
     return link.visuals.back();
   }
-  model::Visual& box(const std::string& name, const Vec3& at, const Vec3& size, const model::Rgba& colour, bool is_static = true) {
+  model::Visual& box(const std::string& name, const Vec3& at, const Vec3& size,
+                     const model::Rgba& colour, bool is_static = true) {
     return show(add(name, is_static, {Quat::Identity(), at}), Shape::box, size, colour);
   }
 };
@@ -51,9 +54,12 @@ Snapshot start(const model::BodyLayout& layout) {
   return snapshot;
 }
 
-constexpr model::Rgba kRed{0.9f, 0.1f, 0.1f, 1.0f}, kGreen{0.1f, 0.9f, 0.1f, 1.0f}, kGrey{0.5f, 0.5f, 0.5f, 1.0f};
+constexpr model::Rgba kRed{0.9f, 0.1f, 0.1f, 1.0f}, kGreen{0.1f, 0.9f, 0.1f, 1.0f},
+    kGrey{0.5f, 0.5f, 0.5f, 1.0f};
 
-View ahead(double z = 1.0) { return View::pinhole({Quat::Identity(), Vec3(0, 0, z)}, 320, 240, 1.2); }
+View ahead(double z = 1.0) {
+  return View::pinhole({Quat::Identity(), Vec3(0, 0, z)}, 320, 240, 1.2);
+}
 
 Picture draw(const World& w, const View& view, bool depth = true, bool labels = true) {
   const model::BodyLayout layout(w.world);
@@ -68,13 +74,13 @@ size_t at(const View& view, int u, int v) { return static_cast<size_t>(v * view.
 
 TEST(RenderScene, DepthOfAWallAndOfTheFloor) {
   World w;
-  w.box("wall", {3.5, 0, 1}, {1, 40, 2}, kGrey);    // its near face at x = 3, up to z = 2
+  w.box("wall", {3.5, 0, 1}, {1, 40, 2}, kGrey);  // its near face at x = 3, up to z = 2
   World::show(w.add("floor", true, {}), Shape::plane, Vec3::Ones(), kGrey);
   const View view = ahead();
   const Picture picture = draw(w, view);
   EXPECT_NEAR(view.fx, 160.0 / std::tan(0.6), 1e-9);
   for (int v = 0; v < view.height; ++v) {
-    const double below = (v - view.cy) / view.fy;    // per metre ahead
+    const double below = (v - view.cy) / view.fy;  // per metre ahead
     const float depth = picture.depth[at(view, 57, v)];
     if (below < -1.0 / 3.0 - 0.01) {
       EXPECT_EQ(depth, std::numeric_limits<float>::infinity()) << "over the wall, row " << v;
@@ -109,10 +115,12 @@ TEST(RenderScene, NothingNearerOrFartherThanTheClip) {
 }
 
 TEST(RenderScene, PlacesInThePicture) {
-  // A small cube 4 m ahead, 1 m to the right, 0.5 m below the camera, which looks along the world's y.
+  // A small cube 4 m ahead, 1 m to the right, 0.5 m below the camera, which looks along the world's
+  // y.
   World w;
   w.box("cube", {2 + 1, 1 + 4, 3 - 0.5}, {0.08, 0.08, 0.08}, kRed);
-  View view = View::pinhole({Quat(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ())), Vec3(2, 1, 3)}, 321, 241, 1.0);
+  View view = View::pinhole({Quat(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ())), Vec3(2, 1, 3)}, 321,
+                            241, 1.0);
   const Picture picture = draw(w, view);
   double u = 0, v = 0, n = 0;
   for (int row = 0; row < view.height; ++row) {
@@ -129,8 +137,9 @@ TEST(RenderScene, PlacesInThePicture) {
   EXPECT_NEAR(v / n, view.cy + view.fy * 0.5 / 4.0, 0.6);
 }
 
-// A bar that turns about its middle, 3 m ahead of its link's origin, and a cube fixed to it, whose link is turned left by
-// a right angle. The quarter turn about y takes what is above the axis ahead of it.
+// A bar that turns about its middle, 3 m ahead of its link's origin, and a cube fixed to it, whose
+// link is turned left by a right angle. The quarter turn about y takes what is above the axis ahead
+// of it.
 TEST(RenderScene, WheelsTurnAboutTheirAxisWhereverTheirLinksAre) {
   World w;
   w.box("wheel", {0, 0, 0}, {0.1, 0.1, 1.6}, kRed, false).X_LV.translation = Vec3(3, 0, 1);
@@ -139,7 +148,8 @@ TEST(RenderScene, WheelsTurnAboutTheirAxisWhereverTheirLinksAre) {
   model::Link& cap = model->links.back();
   cap.name = "cap";
   cap.X_ML = {Quat(Eigen::AngleAxisd(M_PI / 2, Vec3::UnitZ())), Vec3(3, 0, 1)};
-  World::show(cap, Shape::box, {0.2, 0.2, 0.2}, kGreen).X_LV.translation = Vec3(1, 0, 0.5);    // in the model: (3, 1, 1.5)
+  World::show(cap, Shape::box, {0.2, 0.2, 0.2}, kGreen).X_LV.translation =
+      Vec3(1, 0, 0.5);  // in the model: (3, 1, 1.5)
   model::Joint joint;
   joint.type = model::JointType::fixed;
   joint.parent = 0;
@@ -155,7 +165,7 @@ TEST(RenderScene, WheelsTurnAboutTheirAxisWhereverTheirLinksAre) {
   Snapshot snapshot = start(layout);
   const View view = ahead();
   const auto renderer = make_renderer(w.world, layout);
-  const auto depth_of = [&](const Vec3& p) {    // of what is seen in the direction of that point
+  const auto depth_of = [&](const Vec3& p) {  // of what is seen in the direction of that point
     Picture picture;
     picture.want_depth = true;
     renderer->draw(snapshot, view, picture);
@@ -172,7 +182,8 @@ TEST(RenderScene, WheelsTurnAboutTheirAxisWhereverTheirLinksAre) {
 }
 
 TEST(RenderScene, AnOddPictureIsCentredOnWholePixels) {
-  // A wall's vertical edge at y = 0 falls between the pixel left of cx and the one right of it, exactly.
+  // A wall's vertical edge at y = 0 falls between the pixel left of cx and the one right of it,
+  // exactly.
   World w;
   w.box("right half", {3, -5, 1}, {1, 10, 20}, kRed);
   View view = ahead();
@@ -187,7 +198,7 @@ TEST(RenderScene, ParallelView) {
   w.box("box", {1, -2, 0.5}, {1, 1, 1}, kGrey);
   View view = View::pinhole(Pose::from_xyz_rpy({0, 0, 10}, {0, M_PI / 2, 0}), 200, 200, 1.0);
   view.orthographic = true;
-  view.fx = view.fy = 20;    // pixels per metre: world x is up in the picture, y is left
+  view.fx = view.fy = 20;  // pixels per metre: world x is up in the picture, y is left
   const Picture picture = draw(w, view);
   EXPECT_NEAR(picture.depth[at(view, 100 + 40, 100 - 20)], 9.0, 1e-5);
   EXPECT_EQ(picture.labels[at(view, 140 + 9, 80)], 1);
@@ -204,21 +215,29 @@ TEST(RenderScene, LabelsAreThePlacesInInfo) {
   const View view = ahead();
   const Picture picture = draw(w, view);
   const auto label = [&](const Vec3& p) {
-    return picture.labels[at(view, static_cast<int>(view.cx - view.fx * p.y() / p.x()), static_cast<int>(view.cy - view.fy * (p.z() - 1) / p.x()))];
+    return picture.labels[at(view, static_cast<int>(view.cx - view.fx * p.y() / p.x()),
+                             static_cast<int>(view.cy - view.fy * (p.z() - 1) / p.x()))];
   };
-  EXPECT_EQ(label({5, 0, 1}), 1);      // the moving bodies first
+  EXPECT_EQ(label({5, 0, 1}), 1);  // the moving bodies first
   EXPECT_EQ(label({3, 0, 0.2}), 2);
-  EXPECT_EQ(label({5, 2, 1}), 3);      // then the links that stand still
+  EXPECT_EQ(label({5, 2, 1}), 3);  // then the links that stand still
   EXPECT_EQ(label({5, -2, 1}), 4);
   EXPECT_EQ(picture.labels[0], 0);
 }
 
 TEST(RenderScene, ShapesHaveTheirSizes) {
-  struct Case { Shape shape; Vec3 size; double front, half_width, half_height; };
+  struct Case {
+    Shape shape;
+    Vec3 size;
+    double front, half_width, half_height;
+  };
   // Seen from x = 0 at the height of the middle; half sizes at the shape's middle plane x = 4.
-  const Case cases[] = {{Shape::box, {0.6, 0.8, 1.0}, 3.7, 0.4, 0.5},       {Shape::sphere, {0.5, 0, 0}, 3.5, 0.5, 0.5},
-                        {Shape::cylinder, {0.5, 1.2, 0}, 3.5, 0.5, 0.6},    {Shape::cone, {0.5, 1.2, 0}, 3.75, 0.5, 0.6},
-                        {Shape::capsule, {0.3, 0.8, 0}, 3.7, 0.3, 0.7},     {Shape::ellipsoid, {0.2, 0.5, 0.4}, 3.8, 0.5, 0.4}};
+  const Case cases[] = {{Shape::box, {0.6, 0.8, 1.0}, 3.7, 0.4, 0.5},
+                        {Shape::sphere, {0.5, 0, 0}, 3.5, 0.5, 0.5},
+                        {Shape::cylinder, {0.5, 1.2, 0}, 3.5, 0.5, 0.6},
+                        {Shape::cone, {0.5, 1.2, 0}, 3.75, 0.5, 0.6},
+                        {Shape::capsule, {0.3, 0.8, 0}, 3.7, 0.3, 0.7},
+                        {Shape::ellipsoid, {0.2, 0.5, 0.4}, 3.8, 0.5, 0.4}};
   for (const Case& c : cases) {
     World w;
     World::show(w.add("thing", true, {Quat::Identity(), Vec3(4, 0, 0)}), c.shape, c.size, kGrey);
@@ -231,7 +250,8 @@ TEST(RenderScene, ShapesHaveTheirSizes) {
     for (int v = 0; v < view.height; ++v) {
       for (int u = 0; u < view.width; ++u) {
         if (picture.labels[at(view, u, v)] == 0) continue;
-        low_u = std::min(low_u, u), high_u = std::max(high_u, u), low_v = std::min(low_v, v), high_v = std::max(high_v, v);
+        low_u = std::min(low_u, u), high_u = std::max(high_u, u), low_v = std::min(low_v, v),
+        high_v = std::max(high_v, v);
       }
     }
     EXPECT_NEAR(high_u - low_u + 1, 200 * c.half_width, 2.0) << static_cast<int>(c.shape);
@@ -240,7 +260,8 @@ TEST(RenderScene, ShapesHaveTheirSizes) {
 }
 
 TEST(RenderScene, OutsideFacesOfMeshesAreSeen) {
-  // A tetrahedron, counter-clockwise from outside; mirrored by a negative scale it is seen from outside all the same.
+  // A tetrahedron, counter-clockwise from outside; mirrored by a negative scale it is seen from
+  // outside all the same.
   auto mesh = std::make_shared<model::Mesh>();
   mesh->positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   mesh->triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
@@ -254,7 +275,9 @@ TEST(RenderScene, OutsideFacesOfMeshesAreSeen) {
     const View view = ahead(1.2);
     const Picture picture = draw(w, view);
     // The face x = 0, at y = +-0.2, at the height of the eye.
-    EXPECT_NEAR(picture.depth[at(view, static_cast<int>(view.cx - view.fx * sign * 0.2 / 4), 120)], 4.0, 1e-5) << sign;
+    EXPECT_NEAR(picture.depth[at(view, static_cast<int>(view.cx - view.fx * sign * 0.2 / 4), 120)],
+                4.0, 1e-5)
+        << sign;
   }
 }
 
@@ -302,7 +325,7 @@ TEST(RenderScene, ExposureIsAFactorOnLight) {
   lamp.material->ambient = {0, 0, 0, 1};
   lamp.material->emissive = {0.4f, 0.4f, 0.4f, 1.0f};
   View view = ahead();
-  view.exposure = 4.0;    // light is the square of what is displayed
+  view.exposure = 4.0;  // light is the square of what is displayed
   EXPECT_NEAR(draw(w, view).rgb[3 * at(view, 160, 120)], 204, 1);
 }
 
@@ -314,12 +337,13 @@ TEST(RenderScene, ShadowsLieWhereTheSunIsHidden) {
   sun.cast_shadows = true;
   w.world.lights.push_back(sun);
   World::show(w.add("floor", true, {}), Shape::box, {20, 20, 0.02}, kGrey);
-  w.box("screen", {0, 0, 2}, {2, 2, 0.05}, kGrey, false);    // its shadow's middle is at y = -2
+  w.box("screen", {0, 0, 2}, {2, 2, 0.05}, kGrey, false);  // its shadow's middle is at y = -2
   View view = View::pinhole(Pose::from_xyz_rpy({0, 0, 30}, {0, M_PI / 2, 0}), 200, 200, 1.0);
   view.orthographic = true;
   view.fx = view.fy = 20;
   const auto brightness = [&](const Picture& p, double x, double y) {
-    return static_cast<int>(p.rgb[3 * at(view, static_cast<int>(100 - 20 * y), static_cast<int>(100 - 20 * x))]);
+    return static_cast<int>(
+        p.rgb[3 * at(view, static_cast<int>(100 - 20 * y), static_cast<int>(100 - 20 * x))]);
   };
   const Picture with = draw(w, view);
   EXPECT_LT(brightness(with, 0, -2), 0.7 * brightness(with, 0, 4));
@@ -333,7 +357,7 @@ TEST(RenderScene, ShadowsLieWhereTheSunIsHidden) {
 TEST(RenderScene, DepthLooksThroughGlassAndColourIsMixed) {
   World w;
   w.box("wall", {5.5, 0, 1}, {1, 40, 20}, kRed);
-  w.box("glass", {3, 5, 1}, {0.1, 10, 20}, kGreen).transparency = 0.5;    // the left half of the view
+  w.box("glass", {3, 5, 1}, {0.1, 10, 20}, kGreen).transparency = 0.5;  // the left half of the view
   const View view = ahead();
   const Picture picture = draw(w, view);
   EXPECT_NEAR(picture.depth[at(view, 60, 120)], 5.0, 1e-5);
@@ -346,8 +370,9 @@ TEST(RenderScene, DepthLooksThroughGlassAndColourIsMixed) {
 
 TEST(RenderScene, TexturesWithHolesAndWithout) {
   const std::string folder = testing::TempDir();
-  cv::Mat texture(8, 8, CV_8UC4, cv::Scalar(0, 255, 255, 255));    // BGR: yellow
-  texture(cv::Rect(2, 0, 4, 8)).setTo(cv::Scalar(0, 0, 0, 0));     // a hole in the middle, also of the far face
+  cv::Mat texture(8, 8, CV_8UC4, cv::Scalar(0, 255, 255, 255));  // BGR: yellow
+  texture(cv::Rect(2, 0, 4, 8))
+      .setTo(cv::Scalar(0, 0, 0, 0));  // a hole in the middle, also of the far face
   ASSERT_TRUE(cv::imwrite(folder + "/hole.png", texture));
   std::ofstream(folder + "/broken.png") << "not a picture";
   const auto make = [&](const std::string& file) {
@@ -380,7 +405,8 @@ struct Sequence {
   World w;
   Sequence() {
     World::show(w.add("floor", true, {}), Shape::plane, Vec3::Ones(), kGrey);
-    for (int i = 0; i < 30; ++i) w.box("pillar" + std::to_string(i), {3.0 + 2 * i, (i % 5) - 2.0, 1}, {0.3, 0.3, 2}, kRed);
+    for (int i = 0; i < 30; ++i)
+      w.box("pillar" + std::to_string(i), {3.0 + 2 * i, (i % 5) - 2.0, 1}, {0.3, 0.3, 2}, kRed);
     w.box("mover", {4, 1, 0.5}, {0.5, 0.5, 1}, kGreen, false);
   }
   static constexpr int kStates = 3;
@@ -389,7 +415,10 @@ struct Sequence {
     snapshot.bodies[0].translation += Vec3(0.7 * i, -0.9 * i, 0.3 * i);
     return snapshot;
   }
-  View view(int i) const { return View::pinhole(Pose::from_xyz_rpy({9.0 * i, 0.2 * i, 1.0}, {0, 0.1, 0.1 * i}), 160, 120, 1.2); }
+  View view(int i) const {
+    return View::pinhole(Pose::from_xyz_rpy({9.0 * i, 0.2 * i, 1.0}, {0, 0.1, 0.1 * i}), 160, 120,
+                         1.2);
+  }
 };
 
 TEST(RenderScene, WhatWasDrawnBeforeDoesNotShow) {
@@ -412,7 +441,8 @@ TEST(RenderScene, ThreadsDrawTheSame) {
   const model::BodyLayout layout(s.w.world);
   const auto run = [&](std::vector<Picture>& pictures) {
     const auto renderer = make_renderer(s.w.world, layout);
-    for (int i = 0; i < Sequence::kStates; ++i) renderer->draw(s.state(layout, i), s.view(i), pictures.emplace_back());
+    for (int i = 0; i < Sequence::kStates; ++i)
+      renderer->draw(s.state(layout, i), s.view(i), pictures.emplace_back());
   };
   std::vector<Picture> alone, first, second;
   run(alone);
@@ -443,7 +473,8 @@ TEST(RenderScene, BothBackendsDrawTheSame) {
     setenv("RUEDO_RENDERER", backend, 1);
     try {
       const auto renderer = make_renderer(s.w.world, layout);
-      if (renderer->description().find("llvmpipe") == std::string::npos) GTEST_SKIP() << "not drawn in software: " << renderer->description();
+      if (renderer->description().find("llvmpipe") == std::string::npos)
+        GTEST_SKIP() << "not drawn in software: " << renderer->description();
       pictures.emplace_back().want_depth = true;
       renderer->draw(s.state(layout, 1), s.view(1), pictures.back());
     } catch (const EnvironmentError& error) {
@@ -485,14 +516,18 @@ TEST(RenderScene, LinesAreDrawnOverThePicture) {
   w.box("wall", {3.5, 0, 1}, {1, 40, 20}, kGrey);
   const model::BodyLayout layout(w.world);
   const View view = ahead();
-  const Line lines[] = {{{2, -1, 1}, {2, 1, 1}, {1, 0, 0, 1}}, {{4, -1, 1.2}, {4, 1, 1.2}, {1, 0, 0, 1}},
+  const Line lines[] = {{{2, -1, 1}, {2, 1, 1}, {1, 0, 0, 1}},
+                        {{4, -1, 1.2}, {4, 1, 1.2}, {1, 0, 0, 1}},
                         {{-5, 0, 1.4}, {2.9, 0, 1.4}, {0, 1, 0, 1}}};
   Picture picture;
   make_renderer(w.world, layout)->draw(start(layout), view, picture, lines);
-  const auto pixel = [&](int u, double v) { return &picture.rgb[3 * at(view, u, static_cast<int>(std::lround(v)))]; };
+  const auto pixel = [&](int u, double v) {
+    return &picture.rgb[3 * at(view, u, static_cast<int>(std::lround(v)))];
+  };
   EXPECT_EQ(pixel(120, 120)[0], 255);
   EXPECT_EQ(pixel(120, 120)[1], 0);
-  EXPECT_EQ(pixel(120, 120 - view.fy * 0.2 / 4)[0], pixel(120, 120 - view.fy * 0.2 / 4)[1]) << "hidden by the wall";
+  EXPECT_EQ(pixel(120, 120 - view.fy * 0.2 / 4)[0], pixel(120, 120 - view.fy * 0.2 / 4)[1])
+      << "hidden by the wall";
   EXPECT_EQ(pixel(160, 120 - view.fy * 0.4 / 2.0)[1], 255) << "cut where it is behind the eye";
 }
 

@@ -1,4 +1,5 @@
 """scripts/lib.sh with stand-ins for apt and dpkg: what is asked for, of whom, and when nothing is done."""
+
 import os
 import shutil
 import subprocess
@@ -32,21 +33,49 @@ class Machine:
         self.folder = Path(tempfile.mkdtemp(prefix="ruedo-scripts-"))
         self.folder.chmod(0o777)
         shutil.copytree(ROOT / "scripts", self.folder / "scripts")
-        for name, text in {"dpkg-query": DPKG_QUERY, "apt-cache": APT_CACHE, "apt-get": APT_GET, "sudo": SUDO_REFUSED}.items():
+        for name, text in {
+            "dpkg-query": DPKG_QUERY,
+            "apt-cache": APT_CACHE,
+            "apt-get": APT_GET,
+            "sudo": SUDO_REFUSED,
+        }.items():
             path = self.folder / "bin" / name
             path.parent.mkdir(exist_ok=True)
             path.write_text(text)
             path.chmod(0o755)
-        for name, packages in {"installed": installed, "known": known, "on_the_mirror": on_the_mirror, "calls": []}.items():
+        for name, packages in {
+            "installed": installed,
+            "known": known,
+            "on_the_mirror": on_the_mirror,
+            "calls": [],
+        }.items():
             (self.folder / name).write_text("".join(p + "\n" for p in packages))
             (self.folder / name).chmod(0o666)
 
     def ensure(self, *specifications, user=None):
         """Runs ensure_packages and returns (exit code, output, calls of apt-get)."""
-        environment = {**os.environ, "PATH": f"{self.folder / 'bin'}:{os.environ['PATH']}", "WORLD": str(self.folder)}
-        command = ["bash", "-c", 'set -euo pipefail; source "$WORLD/scripts/lib.sh"; ensure_packages "$@"', "x", *specifications]
-        result = subprocess.run(command, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                                stdin=subprocess.DEVNULL, user=user, cwd=self.folder)
+        environment = {
+            **os.environ,
+            "PATH": f"{self.folder / 'bin'}:{os.environ['PATH']}",
+            "WORLD": str(self.folder),
+        }
+        command = [
+            "bash",
+            "-c",
+            'set -euo pipefail; source "$WORLD/scripts/lib.sh"; ensure_packages "$@"',
+            "x",
+            *specifications,
+        ]
+        result = subprocess.run(
+            command,
+            env=environment,
+            text=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL,
+            user=user,
+            cwd=self.folder,
+        )
         return result.returncode, result.stdout, (self.folder / "calls").read_text().splitlines()
 
 
@@ -87,7 +116,9 @@ def test_alternatives_and_optional_ones_follow_the_distribution(machine):
 
 @as_root
 def test_fresh_machine_learns_names_from_the_update(machine):
-    _, _, calls = machine(known=[], on_the_mirror=["old_b", "kept"]).ensure("old_b|new_b", "?kept", "?gone")
+    _, _, calls = machine(known=[], on_the_mirror=["old_b", "kept"]).ensure(
+        "old_b|new_b", "?kept", "?gone"
+    )
     assert calls[-1].endswith("-q old_b kept")
 
 
@@ -97,7 +128,9 @@ def test_optional_package_that_nobody_has_is_no_reason_to_ask(machine):
 
 def test_without_rights_the_line_to_ask_for_is_printed(machine):
     user = NOBODY if os.geteuid() == 0 else None
-    code, output, calls = machine(installed=["a"], known=["a", "b", "c"]).ensure("a", "b", "c", user=user)
+    code, output, calls = machine(installed=["a"], known=["a", "b", "c"]).ensure(
+        "a", "b", "c", user=user
+    )
     assert code == 4
     assert "    apt-get install --no-install-recommends -y b c\n" in output
     assert calls == []
@@ -124,8 +157,22 @@ add_test(late "sh" "-c" "echo begun; sleep 9")
 set_tests_properties(late PROPERTIES TIMEOUT 1)
 """)
     report = tmp_path / "tests.xml"
-    assert subprocess.run(["ctest", "--output-junit", report], cwd=tmp_path, capture_output=True).returncode != 0
-    told = subprocess.run([sys.executable, ROOT / "scripts/failed_tests.py", report], capture_output=True, text=True, check=True).stdout
+    assert (
+        subprocess.run(
+            ["ctest", "--output-junit", report], cwd=tmp_path, capture_output=True
+        ).returncode
+        != 0
+    )
+    told = subprocess.run(
+        [sys.executable, ROOT / "scripts/failed_tests.py", report],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
     first, *output = told.splitlines()
-    assert first.startswith("--- bad failed after ") and output[:2] == ["42", "43"] and output[59] == "red <&]]>"
+    assert (
+        first.startswith("--- bad failed after ")
+        and output[:2] == ["42", "43"]
+        and output[59] == "red <&]]>"
+    )
     assert output[60].startswith("--- late failed after 1") and output[61:] == ["begun", "---"]

@@ -1,5 +1,5 @@
-// Cameras against geometry, optics and statistics: a fiducial marker's pose, a wall's depth, a lens's bending, the
-// distribution of the noise.
+// Cameras against geometry, optics and statistics: a fiducial marker's pose, a wall's depth, a
+// lens's bending, the distribution of the noise.
 #include <cmath>
 #include <cstdlib>
 
@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #ifdef RUEDO_ARUCO
 #include <opencv2/calib3d.hpp>
-#if __has_include(<opencv2/objdetect/aruco_detector.hpp>)    // from 4.7 on
+#if __has_include(<opencv2/objdetect/aruco_detector.hpp>)  // from 4.7 on
 #define RUEDO_ARUCO_DETECTOR
 #include <opencv2/objdetect/aruco_detector.hpp>
 #else
@@ -31,30 +31,38 @@ using test::Device;
 using test::SensorBench;
 
 // A camera at (0, 0, 1) looking along x at `things`. <camera> and <sensor> take more elements.
-std::string world_with(const std::string& things, const std::string& in_camera = "", const std::string& in_sensor = "",
-                       const std::string& type = "camera") {
+std::string world_with(const std::string& things, const std::string& in_camera = "",
+                       const std::string& in_sensor = "", const std::string& type = "camera") {
   return R"(<?xml version="1.0"?><sdf version="1.9"><world name="w">
     <light name="sun" type="directional"><direction>0.6 0.2 -0.5</direction><diffuse>0.8 0.8 0.8 1</diffuse></light>
-    )" + things + R"(
+    )" + things +
+         R"(
     <model name="eye"><static>true</static><pose>0 0 1 0 0 0</pose><link name="link">
-      <sensor name="camera" type=")" + type + R"("><update_rate>10</update_rate>)" + in_sensor + R"(
+      <sensor name="camera" type=")" +
+         type + R"("><update_rate>10</update_rate>)" + in_sensor + R"(
         <camera><horizontal_fov>1.2</horizontal_fov><image><width>640</width><height>480</height></image>
-        <clip><near>0.05</near><far>50</far></clip>)" + in_camera + R"(</camera>
+        <clip><near>0.05</near><far>50</far></clip>)" +
+         in_camera + R"(</camera>
       </sensor></link></model></world></sdf>)";
 }
 
-std::string box(const std::string& name, const std::string& pose, const std::string& size, const std::string& material) {
-  return "<model name='" + name + "'><static>true</static><pose>" + pose + "</pose><link name='link'><visual name='v'><geometry><box><size>" +
-         size + "</size></box></geometry><material>" + material + "</material></visual></link></model>";
+std::string box(const std::string& name, const std::string& pose, const std::string& size,
+                const std::string& material) {
+  return "<model name='" + name + "'><static>true</static><pose>" + pose +
+         "</pose><link name='link'><visual name='v'><geometry><box><size>" + size +
+         "</size></box></geometry><material>" + material + "</material></visual></link></model>";
 }
 
-const std::string kWall = box("wall", "3.5 0 1 0 0 0", "1 40 40", "<diffuse>0.5 0.5 0.5 1</diffuse>");
+const std::string kWall =
+    box("wall", "3.5 0 1 0 0 0", "1 40 40", "<diffuse>0.5 0.5 0.5 1</diffuse>");
 const std::string kRaw = "<ruedo:encoding>rgb</ruedo:encoding>";
 
 // A camera with what it sent for one sample.
 struct Shot {
   explicit Shot(const std::string& sdf, SensorBench::Options options = {}, int64_t sample = 0)
-      : bench(sdf), device(bench.make("eye", "camera", options)), renderer(scene::make_renderer(*bench.world, bench.layout)) {
+      : bench(sdf),
+        device(bench.make("eye", "camera", options)),
+        renderer(scene::make_renderer(*bench.world, bench.layout)) {
     take(sample);
   }
   void take(int64_t sample) {
@@ -68,11 +76,14 @@ struct Shot {
     }
     return -1;
   }
-  image_t image(const std::string& suffix = "") const { return Device::decode<image_t>(out, channel(suffix)).at(0); }
+  image_t image(const std::string& suffix = "") const {
+    return Device::decode<image_t>(out, channel(suffix)).at(0);
+  }
   camera_info_t info() const { return Device::decode<camera_info_t>(out, channel("/info")).at(0); }
   // Bytes of channel c at (u, v) of a raw picture.
   static int value(const image_t& image, int u, int v, int c = 0) {
-    return image.data[static_cast<size_t>(v * image.row_stride + u * (image.row_stride / image.width) + c)];
+    return image
+        .data[static_cast<size_t>(v * image.row_stride + u * (image.row_stride / image.width) + c)];
   }
   float depth(int u, int v) const {
     const image_t image = this->image("/depth");
@@ -90,17 +101,23 @@ struct Shot {
 #ifdef RUEDO_ARUCO
 #ifdef RUEDO_ARUCO_DETECTOR
 void draw_marker(int id, int pixels, cv::Mat& picture) {
-  cv::aruco::generateImageMarker(cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50), id, pixels, picture);
+  cv::aruco::generateImageMarker(cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50), id,
+                                 pixels, picture);
 }
-void find_markers(const cv::Mat& picture, std::vector<std::vector<cv::Point2f>>& corners, std::vector<int>& ids) {
-  cv::aruco::ArucoDetector(cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50)).detectMarkers(picture, corners, ids);
+void find_markers(const cv::Mat& picture, std::vector<std::vector<cv::Point2f>>& corners,
+                  std::vector<int>& ids) {
+  cv::aruco::ArucoDetector(cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50))
+      .detectMarkers(picture, corners, ids);
 }
 #else
 void draw_marker(int id, int pixels, cv::Mat& picture) {
-  cv::aruco::drawMarker(cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50), id, pixels, picture);
+  cv::aruco::drawMarker(cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50), id, pixels,
+                        picture);
 }
-void find_markers(const cv::Mat& picture, std::vector<std::vector<cv::Point2f>>& corners, std::vector<int>& ids) {
-  cv::aruco::detectMarkers(picture, cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50), corners, ids);
+void find_markers(const cv::Mat& picture, std::vector<std::vector<cv::Point2f>>& corners,
+                  std::vector<int>& ids) {
+  cv::aruco::detectMarkers(picture, cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50),
+                           corners, ids);
 }
 #endif
 
@@ -110,8 +127,11 @@ TEST(Camera, AMarkersPoseComesBack) {
   draw_marker(7, 600, marker);
   cv::copyMakeBorder(marker, board, 100, 100, 100, 100, cv::BORDER_CONSTANT, 255);
   ASSERT_TRUE(cv::imwrite(testing::TempDir() + "/marker.png", board));
-  const std::string poster = "<diffuse>1 1 1 1</diffuse><pbr><metal><albedo_map>marker.png</albedo_map></metal></pbr>";
-  for (const std::string& distortion : {std::string(), std::string("<distortion><k1>-0.2</k1><k2>0.05</k2><p1>0.001</p1></distortion>")}) {
+  const std::string poster =
+      "<diffuse>1 1 1 1</diffuse><pbr><metal><albedo_map>marker.png</albedo_map></metal></pbr>";
+  for (const std::string& distortion :
+       {std::string(),
+        std::string("<distortion><k1>-0.2</k1><k2>0.05</k2><p1>0.001</p1></distortion>")}) {
     Shot shot(world_with(box("board", "2 0.3 1.1 0 0.2 0.3", "0.01 0.4 0.4", poster), distortion));
     const image_t image = shot.image();
     const cv::Mat picture = cv::imdecode(image.data, cv::IMREAD_COLOR);
@@ -122,13 +142,22 @@ TEST(Camera, AMarkersPoseComesBack) {
     std::vector<std::vector<cv::Point2f>> corners;
     find_markers(picture, corners, ids);
     ASSERT_EQ(ids, std::vector<int>{7});
-    cv::cornerSubPix([&] { cv::Mat grey; cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY); return grey; }(), corners[0],
-                     cv::Size(3, 3), cv::Size(-1, -1), cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30, 0.01));
-    // The marker's own frame: x to its right, y up, from its middle; corners from the upper left one, clockwise.
-    const std::vector<cv::Point3d> square{{-0.15, 0.15, 0}, {0.15, 0.15, 0}, {0.15, -0.15, 0}, {-0.15, -0.15, 0}};
+    cv::cornerSubPix(
+        [&] {
+          cv::Mat grey;
+          cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
+          return grey;
+        }(),
+        corners[0], cv::Size(3, 3), cv::Size(-1, -1),
+        cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30, 0.01));
+    // The marker's own frame: x to its right, y up, from its middle; corners from the upper left
+    // one, clockwise.
+    const std::vector<cv::Point3d> square{
+        {-0.15, 0.15, 0}, {0.15, 0.15, 0}, {0.15, -0.15, 0}, {-0.15, -0.15, 0}};
     cv::Vec3d rotation, translation;
     ASSERT_TRUE(cv::solvePnP(square, corners[0], K, D, rotation, translation));
-    // The near face's middle, 5 mm before the board's: in the optical frame x right, y down, z ahead.
+    // The near face's middle, 5 mm before the board's: in the optical frame x right, y down, z
+    // ahead.
     const Pose X_WBoard = Pose::from_xyz_rpy({2, 0.3, 1.1}, {0, 0.2, 0.3});
     const Vec3 p = X_WBoard * Vec3(-0.005, 0, 0) - Vec3(0, 0, 1);
     EXPECT_NEAR(translation[0], -p.y(), 0.01);
@@ -144,7 +173,9 @@ TEST(Camera, AMarkersPoseComesBack) {
   }
 }
 #else
-TEST(Camera, AMarkersPoseComesBack) { GTEST_SKIP() << "OpenCV's aruco (libopencv-contrib-dev) is not installed"; }
+TEST(Camera, AMarkersPoseComesBack) {
+  GTEST_SKIP() << "OpenCV's aruco (libopencv-contrib-dev) is not installed";
+}
 #endif
 
 TEST(Camera, IntrinsicsOfAPinhole) {
@@ -152,7 +183,7 @@ TEST(Camera, IntrinsicsOfAPinhole) {
   const camera_info_t info = shot.info();
   EXPECT_EQ(info.width, 640);
   EXPECT_EQ(info.height, 480);
-  EXPECT_NEAR(info.fx, 320.0 / std::tan(0.6), 1e-9);    // 467.7424...
+  EXPECT_NEAR(info.fx, 320.0 / std::tan(0.6), 1e-9);  // 467.7424...
   EXPECT_EQ(info.fx, info.fy);
   EXPECT_EQ(info.cx, 320.0);
   EXPECT_EQ(info.cy, 240.0);
@@ -192,7 +223,8 @@ TEST(Camera, ColoursKeepTheirOrder) {
   EXPECT_EQ(raw.row_stride, 3 * 640);
   EXPECT_GT(Shot::value(raw, 100, 100, 0), 80);
   EXPECT_LT(Shot::value(raw, 100, 100, 2), 5);
-  const cv::Vec3b bgr = cv::imdecode(Shot(world_with(red)).image().data, cv::IMREAD_COLOR).at<cv::Vec3b>(100, 100);
+  const cv::Vec3b bgr =
+      cv::imdecode(Shot(world_with(red)).image().data, cv::IMREAD_COLOR).at<cv::Vec3b>(100, 100);
   EXPECT_NEAR(bgr[2], Shot::value(raw, 100, 100, 0), 6);
   EXPECT_NEAR(bgr[0], Shot::value(raw, 100, 100, 2), 6);
 }
@@ -203,11 +235,13 @@ TEST(Camera, Grey) {
   EXPECT_EQ(image.pixelformat, image_t::PIXEL_FORMAT_GRAY);
   EXPECT_EQ(image.row_stride, 640);
   EXPECT_EQ(image.data.size(), 640u * 480u);
-  EXPECT_EQ(Shot::value(image, 320, 240), Shot::value(Shot(world_with(kWall, "", kRaw)).image(), 320, 240));
+  EXPECT_EQ(Shot::value(image, 320, 240),
+            Shot::value(Shot(world_with(kWall, "", kRaw)).image(), 320, 240));
 }
 
 TEST(Camera, DepthOfAWallAndOfTheFloor) {
-  const std::string floor = box("floor", "0 0 -0.5 0 0 0", "40 40 1", "<diffuse>0.5 0.5 0.5 1</diffuse>");
+  const std::string floor =
+      box("floor", "0 0 -0.5 0 0 0", "40 40 1", "<diffuse>0.5 0.5 0.5 1</diffuse>");
   Shot shot(world_with(kWall + floor, "", "", "rgbd_camera"));
   const double fy = 320.0 / std::tan(0.6);
   EXPECT_EQ(shot.image("/depth").pixelformat, image_t::PIXEL_FORMAT_FLOAT_GRAY32);
@@ -231,12 +265,13 @@ TEST(Camera, AFormatThatIsNotGivenIsNamed) {
   EXPECT_EQ(named("camera", "R8G8B8"), 0u);
   EXPECT_EQ(named("camera", "BAYER_RGGB8"), 1u);
   EXPECT_EQ(named("camera", "R_FLOAT32"), 1u);
-  EXPECT_EQ(named("depth_camera", "R_FLOAT32"), 0u);    // that is what its depth is
+  EXPECT_EQ(named("depth_camera", "R_FLOAT32"), 0u);  // that is what its depth is
 }
 
 TEST(Camera, Labels) {
-  Shot shot(world_with(box("left", "4 1 1 0 0 0", "1 1 1", "") + box("right", "4 -1 1 0 0 0", "1 1 1", ""), "",
-                       "<ruedo:labels>true</ruedo:labels>"));
+  Shot shot(world_with(
+      box("left", "4 1 1 0 0 0", "1 1 1", "") + box("right", "4 -1 1 0 0 0", "1 1 1", ""), "",
+      "<ruedo:labels>true</ruedo:labels>"));
   const image_t image = shot.image("/labels");
   EXPECT_EQ(image.pixelformat, image_t::PIXEL_FORMAT_LE_GRAY16);
   EXPECT_EQ(image.row_stride, 2 * 640);
@@ -266,44 +301,57 @@ struct Moments {
 Moments moments(const std::vector<double>& values) {
   Moments m;
   for (double v : values) m.mean += v / static_cast<double>(values.size());
-  for (double v : values) m.sigma += (v - m.mean) * (v - m.mean) / static_cast<double>(values.size());
+  for (double v : values)
+    m.sigma += (v - m.mean) * (v - m.mean) / static_cast<double>(values.size());
   m.sigma = std::sqrt(m.sigma);
   return m;
 }
 
 TEST(Camera, NoiseHasItsDistribution) {
   const image_t ideal = Shot(world_with(kWall, "", kRaw)).image();
-  Shot noisy(world_with(kWall, "<noise><type>gaussian</type><mean>0.02</mean><stddev>0.03</stddev></noise>", kRaw));
+  Shot noisy(world_with(
+      kWall, "<noise><type>gaussian</type><mean>0.02</mean><stddev>0.03</stddev></noise>", kRaw));
   const image_t first = noisy.image();
   std::vector<double> errors, products, standard;
-  for (size_t i = 0; i < ideal.data.size(); ++i) errors.push_back(double(first.data[i]) - ideal.data[i]);
+  for (size_t i = 0; i < ideal.data.size(); ++i)
+    errors.push_back(double(first.data[i]) - ideal.data[i]);
   const Moments m = moments(errors);
-  // 921 600 draws: the mean to 5 sigma / sqrt(n), and sigma with the variance 1/12 of rounding to whole values.
-  const double n = static_cast<double>(errors.size()), sigma = std::sqrt(255 * 255 * 0.03 * 0.03 + 1.0 / 12);
+  // 921 600 draws: the mean to 5 sigma / sqrt(n), and sigma with the variance 1/12 of rounding to
+  // whole values.
+  const double n = static_cast<double>(errors.size()),
+               sigma = std::sqrt(255 * 255 * 0.03 * 0.03 + 1.0 / 12);
   EXPECT_NEAR(m.mean, 255 * 0.02, 5 * sigma / std::sqrt(n));
   EXPECT_NEAR(m.sigma, sigma, 5 * sigma / std::sqrt(2 * n));
-  // Kolmogorov's distance to the normal distribution, read where the rounding does not matter (half values).
+  // Kolmogorov's distance to the normal distribution, read where the rounding does not matter (half
+  // values).
   double worst = 0;
   for (int edge = -20; edge <= 30; ++edge) {
-    const double below = static_cast<double>(std::count_if(errors.begin(), errors.end(), [&](double e) { return e < edge + 0.5; })) / n;
-    worst = std::max(worst, std::abs(below - 0.5 * std::erfc(-(edge + 0.5 - 255 * 0.02) / (255 * 0.03) / std::sqrt(2.0))));
+    const double below =
+        static_cast<double>(
+            std::count_if(errors.begin(), errors.end(), [&](double e) { return e < edge + 0.5; })) /
+        n;
+    worst = std::max(worst, std::abs(below - 0.5 * std::erfc(-(edge + 0.5 - 255 * 0.02) /
+                                                             (255 * 0.03) / std::sqrt(2.0))));
   }
-  EXPECT_LT(worst, 1.95 / std::sqrt(n));    // 0.1 % of true ones would fail
+  EXPECT_LT(worst, 1.95 / std::sqrt(n));  // 0.1 % of true ones would fail
   // Independent from pixel to pixel, colour to colour, and sample to sample.
   noisy.take(1);
   const image_t second = noisy.image();
   for (const size_t lag : {size_t{1}, size_t{2}, size_t{3}, size_t{4}, size_t{640 * 3}}) {
     double sum = 0;
-    for (size_t i = lag; i < errors.size(); ++i) sum += (errors[i] - m.mean) * (errors[i - lag] - m.mean);
+    for (size_t i = lag; i < errors.size(); ++i)
+      sum += (errors[i] - m.mean) * (errors[i - lag] - m.mean);
     EXPECT_LT(std::abs(sum / n), 5 * m.sigma * m.sigma / std::sqrt(n)) << lag;
   }
   double sum = 0;
-  for (size_t i = 0; i < errors.size(); ++i) sum += (errors[i] - m.mean) * (double(second.data[i]) - ideal.data[i] - m.mean);
+  for (size_t i = 0; i < errors.size(); ++i)
+    sum += (errors[i] - m.mean) * (double(second.data[i]) - ideal.data[i] - m.mean);
   EXPECT_LT(std::abs(sum / n), 5 * m.sigma * m.sigma / std::sqrt(n));
 }
 
 TEST(Camera, NoiseDependsOnSeedNamesAndSampleOnly) {
-  const std::string sdf = world_with(kWall, "<noise type='gaussian'><stddev>0.03</stddev></noise>", kRaw);
+  const std::string sdf =
+      world_with(kWall, "<noise type='gaussian'><stddev>0.03</stddev></noise>", kRaw);
   SensorBench::Options other_seed, other_robot;
   other_seed.seed = 2;
   other_robot.named_robot = "another";
@@ -321,22 +369,29 @@ TEST(PixelNoise, SaturatesAtBothEnds) {
   noise.apply(RandomStream(1, 1), bright);
   EXPECT_GT(std::count(dark.begin(), dark.end(), 0), 400);
   EXPECT_GT(std::count(bright.begin(), bright.end(), 255), 400);
-  EXPECT_EQ(*std::max_element(dark.begin(), dark.end()), 255);    // some of a thousand draws reach beyond 2 sigma
+  EXPECT_EQ(*std::max_element(dark.begin(), dark.end()),
+            255);  // some of a thousand draws reach beyond 2 sigma
   EXPECT_EQ(*std::min_element(bright.begin(), bright.end()), 0);
 }
 
 TEST(Camera, VignettingTakesLightInTheCorners) {
   const image_t plain = Shot(world_with(kWall, "", kRaw)).image();
-  const image_t dark = Shot(world_with(kWall, "", kRaw + "<ruedo:vignetting>0.75</ruedo:vignetting>")).image();
+  const image_t dark =
+      Shot(world_with(kWall, "", kRaw + "<ruedo:vignetting>0.75</ruedo:vignetting>")).image();
   EXPECT_EQ(Shot::value(dark, 320, 240), Shot::value(plain, 320, 240));
   // Light is the square of the value: a quarter of the light is half the value.
   EXPECT_NEAR(Shot::value(dark, 0, 0), 0.5 * Shot::value(plain, 0, 0), 1.0);
 }
 
 TEST(Camera, ExposureInStops) {
-  const std::string lamp = box("wall", "3.5 0 1 0 0 0", "1 40 40", "<diffuse>0 0 0 1</diffuse><ambient>0 0 0 1</ambient><emissive>0.4 0.4 0.4 1</emissive>");
+  const std::string lamp =
+      box("wall", "3.5 0 1 0 0 0", "1 40 40",
+          "<diffuse>0 0 0 1</diffuse><ambient>0 0 0 1</ambient><emissive>0.4 0.4 0.4 1</emissive>");
   EXPECT_NEAR(Shot::value(Shot(world_with(lamp, "", kRaw)).image(), 320, 240), 102, 1);
-  EXPECT_NEAR(Shot::value(Shot(world_with(lamp, "", kRaw + "<ruedo:exposure>2</ruedo:exposure>")).image(), 320, 240), 204, 1);
+  EXPECT_NEAR(
+      Shot::value(Shot(world_with(lamp, "", kRaw + "<ruedo:exposure>2</ruedo:exposure>")).image(),
+                  320, 240),
+      204, 1);
 }
 
 Lens lens_of(const std::string& in_camera) {
@@ -345,11 +400,13 @@ Lens lens_of(const std::string& in_camera) {
 }
 
 TEST(CameraLens, DistortionIsOpenCvs) {
-  const Lens lens = lens_of("<distortion><k1>-0.25</k1><k2>0.1</k2><k3>-0.02</k3><p1>0.003</p1><p2>-0.002</p2></distortion>");
+  const Lens lens = lens_of(
+      "<distortion><k1>-0.25</k1><k2>0.1</k2><k3>-0.02</k3><p1>0.003</p1><p2>-0.002</p2></"
+      "distortion>");
   EXPECT_EQ(lens.distortion, (std::array<double, 5>{-0.25, 0.1, 0.003, -0.002, -0.02}));
-  // By hand, x = 0.5, y = -0.4: r^2 = 0.41, radial = 1 - 0.1025 + 0.01681 - 0.00137842 = 0.91293158;
-  // x' = 0.45646579 + 2 p1 x y (-0.0012) + p2 (0.41 + 0.5) (-0.00182) = 0.45344579;
-  // y' = -0.365172632 + p1 (0.41 + 0.32) (0.00219) + 2 p2 x y (0.0008) = -0.362182632.
+  // By hand, x = 0.5, y = -0.4: r^2 = 0.41, radial = 1 - 0.1025 + 0.01681 - 0.00137842 =
+  // 0.91293158; x' = 0.45646579 + 2 p1 x y (-0.0012) + p2 (0.41 + 0.5) (-0.00182) = 0.45344579; y'
+  // = -0.365172632 + p1 (0.41 + 0.32) (0.00219) + 2 p2 x y (0.0008) = -0.362182632.
   const Eigen::Vector2d seen = lens.distort({0.5, -0.4});
   EXPECT_NEAR(seen.x(), 0.45344579, 1e-9);
   EXPECT_NEAR(seen.y(), -0.362182632, 1e-9);
@@ -371,9 +428,13 @@ TEST(CameraLens, NothingIsSeenBeyondAFold) {
 
 TEST(Camera, ThingsAreSeenWhereTheLensBendsThem) {
   // A small lamp; its middle is ideally at x = y = 0.4 in the optical frame.
-  const std::string lamp = box("lamp", "2.5 -1.0 0 0 0 0", "0.001 0.03 0.03", "<diffuse>0 0 0 1</diffuse><emissive>1 1 1 1</emissive>");
-  for (const auto& [xml, k1] : {std::pair{"", 0.0}, {"<distortion><k1>-0.3</k1></distortion>", -0.3}, {"<distortion><k1>0.2</k1></distortion>", 0.2}}) {
-    Shot shot(world_with(lamp, xml, kRaw + "<ruedo:labels>true</ruedo:labels><ruedo:depth>true</ruedo:depth>"));
+  const std::string lamp = box("lamp", "2.5 -1.0 0 0 0 0", "0.001 0.03 0.03",
+                               "<diffuse>0 0 0 1</diffuse><emissive>1 1 1 1</emissive>");
+  for (const auto& [xml, k1] : {std::pair{"", 0.0},
+                                {"<distortion><k1>-0.3</k1></distortion>", -0.3},
+                                {"<distortion><k1>0.2</k1></distortion>", 0.2}}) {
+    Shot shot(world_with(
+        lamp, xml, kRaw + "<ruedo:labels>true</ruedo:labels><ruedo:depth>true</ruedo:depth>"));
     const image_t labels = shot.image("/labels");
     double u = 0, v = 0, n = 0;
     for (int row = 0; row < 480; ++row) {
@@ -392,7 +453,9 @@ TEST(Camera, ThingsAreSeenWhereTheLensBendsThem) {
 }
 
 TEST(Camera, RefusesWhatItCannotBe) {
-  struct Case { const char *in_camera, *in_sensor, *says; };
+  struct Case {
+    const char *in_camera, *in_sensor, *says;
+  };
   const Case cases[] = {
       {"<horizontal_fov>-1</horizontal_fov>", "", "horizontal_fov"},
       {"<horizontal_fov>3.5</horizontal_fov>", "", "horizontal_fov"},

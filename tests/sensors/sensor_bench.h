@@ -1,5 +1,5 @@
-// A bench on which one sensor is tested without physics and server: an inline world, a snapshot that the test
-// writes itself, and the sensor's messages decoded.
+// A bench on which one sensor is tested without physics and server: an inline world, a snapshot
+// that the test writes itself, and the sensor's messages decoded.
 #pragma once
 
 #include <memory>
@@ -20,7 +20,7 @@ struct Device {
   const SensorKind* kind = nullptr;
   Rate rate;
   std::unique_ptr<Sensor> sensor;
-  std::vector<std::string> channels;    // by the index that the sensor publishes with
+  std::vector<std::string> channels;  // by the index that the sensor publishes with
 
   template <class Message>
   static std::vector<Message> decode(const Outbox& out, int channel = 0) {
@@ -28,7 +28,8 @@ struct Device {
     for (const Outbox::Entry& entry : out.entries()) {
       if (entry.channel != channel) continue;
       Message message;
-      if (message.decode(out.data(entry), 0, static_cast<int>(entry.size)) != static_cast<int>(entry.size)) {
+      if (message.decode(out.data(entry), 0, static_cast<int>(entry.size)) !=
+          static_cast<int>(entry.size)) {
         throw std::logic_error("a message does not decode");
       }
       messages.push_back(std::move(message));
@@ -42,7 +43,7 @@ class SensorBench {
   struct Options {
     uint64_t seed = 1;
     bool noise = true;
-    std::string named_robot;     // other than the model's instance, for the random numbers
+    std::string named_robot;  // other than the model's instance, for the random numbers
     std::string named_device;
   };
 
@@ -64,7 +65,9 @@ class SensorBench {
     s.robots.resize(layout.robots.size());
     for (size_t i = 0; i < layout.robots.size(); ++i) {
       const model::RobotPlacement& robot = layout.robots[i];
-      s.robots[i].X_WBase = robot.body < 0 ? robot.X_BBase : s.bodies[static_cast<size_t>(robot.body)] * robot.X_BBase;
+      s.robots[i].X_WBase = robot.body < 0
+                                ? robot.X_BBase
+                                : s.bodies[static_cast<size_t>(robot.body)] * robot.X_BBase;
     }
     return s;
   }
@@ -72,7 +75,8 @@ class SensorBench {
   // The index of a robot in the layout, by its name in the world.
   int robot(const std::string& name) const {
     for (size_t i = 0; i < layout.robots.size(); ++i) {
-      if (world->models[static_cast<size_t>(layout.robots[i].instance)].name == name) return static_cast<int>(i);
+      if (world->models[static_cast<size_t>(layout.robots[i].instance)].name == name)
+        return static_cast<int>(i);
     }
     throw std::logic_error("no robot " + name);
   }
@@ -108,16 +112,29 @@ class SensorBench {
     static const Element kNothing;
     const std::string robot_key = options.named_robot.empty() ? robot_name : options.named_robot;
     const std::string device_key = options.named_device.empty() ? device : options.named_device;
-    const SensorSetup setup{*world, layout, element ? *element : kNothing, robot_name, device, index, link, X_LS,
-                            RandomSource(options.seed, robot_key, device_key), options.noise, made.rate, &findings,
-                            [&made, &robot_name, &device](const std::string& suffix, const std::string&, int64_t) {
-                              made.channels.push_back(robot_name + "/" + device + (suffix.empty() ? "" : "/" + suffix));
-                              return static_cast<int>(made.channels.size()) - 1;
-                            }};
+    const SensorSetup setup{
+        *world,
+        layout,
+        element ? *element : kNothing,
+        robot_name,
+        device,
+        index,
+        link,
+        X_LS,
+        RandomSource(options.seed, robot_key, device_key),
+        options.noise,
+        made.rate,
+        &findings,
+        [&made, &robot_name, &device](const std::string& suffix, const std::string&, int64_t) {
+          made.channels.push_back(robot_name + "/" + device + (suffix.empty() ? "" : "/" + suffix));
+          return static_cast<int>(made.channels.size()) - 1;
+        }};
     made.sensor = made.kind->make(setup);
     return made;
   }
-  Device make(const std::string& robot_name, const std::string& device) { return make(robot_name, device, Options{}); }
+  Device make(const std::string& robot_name, const std::string& device) {
+    return make(robot_name, device, Options{});
+  }
 
   std::shared_ptr<const model::WorldModel> world;
   model::BodyLayout layout;

@@ -1,4 +1,5 @@
-// The contact sensor: which contacts are its own, from whose side they are shown, and that no touch is lost.
+// The contact sensor: which contacts are its own, from whose side they are shown, and that no touch
+// is lost.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -14,17 +15,26 @@ using test::SensorBench;
 // A robot with a bumper link of two shapes, a free box, and a static wall.
 std::string world(const std::string& contact) {
   return "<sdf version='1.9'><world name='w'>"
-         "<model name='robot'><link name='body'><collision name='hull'><geometry><sphere><radius>0.1</radius></sphere></geometry></collision></link>"
-         "<link name='bumper'><collision name='left'><geometry><sphere><radius>0.1</radius></sphere></geometry></collision>"
-         "<collision name='right'><geometry><sphere><radius>0.1</radius></sphere></geometry></collision>"
-         "<sensor name='BUMPER' type='contact'><update_rate>20</update_rate>" + contact + "</sensor></link>"
+         "<model name='robot'><link name='body'><collision "
+         "name='hull'><geometry><sphere><radius>0.1</radius></sphere></geometry></collision></link>"
+         "<link name='bumper'><collision "
+         "name='left'><geometry><sphere><radius>0.1</radius></sphere></geometry></collision>"
+         "<collision "
+         "name='right'><geometry><sphere><radius>0.1</radius></sphere></geometry></collision>"
+         "<sensor name='BUMPER' type='contact'><update_rate>20</update_rate>" +
+         contact +
+         "</sensor></link>"
          "<joint name='j' type='fixed'><parent>body</parent><child>bumper</child></joint></model>"
-         "<model name='box'><pose>2 0 0 0 0 0</pose><link name='link'><collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision></link></model>"
-         "<model name='wall'><static>true</static><pose>4 0 0 0 0 0</pose><link name='bricks'><collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision></link></model>"
+         "<model name='box'><pose>2 0 0 0 0 0</pose><link name='link'><collision "
+         "name='c'><geometry><box><size>1 1 1</size></box></geometry></collision></link></model>"
+         "<model name='wall'><static>true</static><pose>4 0 0 0 0 0</pose><link "
+         "name='bricks'><collision name='c'><geometry><box><size>1 1 "
+         "1</size></box></geometry></collision></link></model>"
          "</world></sdf>";
 }
 
-// Links in world order: robot/body 0, robot/bumper 1, box/link 2, wall/bricks 3. Bodies: robot 0, box 1.
+// Links in world order: robot/body 0, robot/bumper 1, box/link 2, wall/bricks 3. Bodies: robot 0,
+// box 1.
 constexpr int kHull = 0, kBumper = 1, kBox = 2, kWall = 3;
 
 Contact touch(int link_a, int link_b, int shape_a = 0, int shape_b = 0) {
@@ -44,7 +54,8 @@ Contact touch(int link_a, int link_b, int shape_a = 0, int shape_b = 0) {
 }
 
 struct Bench {
-  explicit Bench(const std::string& contact) : bench(world(contact)), device(bench.make("robot", "BUMPER")), now(bench.snapshot()) {}
+  explicit Bench(const std::string& contact)
+      : bench(world(contact)), device(bench.make("robot", "BUMPER")), now(bench.snapshot()) {}
   contact_t with(std::vector<Contact> contacts) {
     now.contacts = std::move(contacts);
     ++now.step;
@@ -85,7 +96,7 @@ TEST(ContactSensor, ShowsThePointFromItsOwnSide) {
   EXPECT_EQ(m.points[0].normal[0], -1.0);
   EXPECT_EQ(m.points[0].force, 12.5);
   EXPECT_EQ(m.points[0].depth, 0.001);
-  m = bench.with({touch(kWall, kBumper)});    // the sensor is b: the normal is turned round
+  m = bench.with({touch(kWall, kBumper)});  // the sensor is b: the normal is turned round
   ASSERT_EQ(m.n, 1);
   EXPECT_EQ(m.points[0].body, "wall/bricks");
   EXPECT_EQ(m.points[0].normal[0], 1.0);
@@ -103,7 +114,8 @@ TEST(ContactSensor, NamedShapesOnly) {
     EXPECT_FALSE(bench.with({touch(kBumper, kBox, 0)}).pressed) << name;
     EXPECT_TRUE(bench.with({touch(kBumper, kBox, 1)}).pressed) << name;
     EXPECT_TRUE(bench.with({touch(kBox, kBumper, 0, 1)}).pressed) << name;
-    EXPECT_TRUE(bench.with({touch(kBumper, kBox, -1)}).pressed) << "a shape that is not known counts";
+    EXPECT_TRUE(bench.with({touch(kBumper, kBox, -1)}).pressed)
+        << "a shape that is not known counts";
     EXPECT_TRUE(bench.bench.findings.list().empty());
   }
   Bench both("<contact><collision>left</collision><collision>right</collision></contact>");
@@ -116,7 +128,8 @@ TEST(ContactSensor, AShapeThatIsNotThereIsToldAndTheLinkCounts) {
   ASSERT_EQ(bench.bench.findings.list().size(), 1u);
   EXPECT_THAT(bench.bench.findings.list()[0].text, testing::HasSubstr("'middle' is no collision"));
   EXPECT_TRUE(bench.with({touch(kBumper, kBox, 0)}).pressed);
-  EXPECT_TRUE(Bench("<contact><collision>__default__</collision></contact>").bench.findings.list().empty());
+  EXPECT_TRUE(
+      Bench("<contact><collision>__default__</collision></contact>").bench.findings.list().empty());
 }
 
 TEST(ContactSensor, ATouchBetweenTwoSamplesIsNotLost) {
@@ -125,7 +138,7 @@ TEST(ContactSensor, ATouchBetweenTwoSamplesIsNotLost) {
   bench.pass({});
   contact_t m = bench.with({});
   EXPECT_TRUE(m.pressed);
-  EXPECT_EQ(m.n, 0);    // but it is over
+  EXPECT_EQ(m.n, 0);  // but it is over
   EXPECT_FALSE(bench.with({}).pressed);
 }
 

@@ -1,4 +1,5 @@
-// The IMU against hand-computed accelerations: at rest, on a ramp, on a lever arm; its noise; its refusals.
+// The IMU against hand-computed accelerations: at rest, on a ramp, on a lever arm; its noise; its
+// refusals.
 #include <cmath>
 #include <functional>
 
@@ -14,21 +15,29 @@ namespace {
 using test::Device;
 using test::SensorBench;
 
-constexpr double kG = 9.8;    // m/s^2, SDF's default
+constexpr double kG = 9.8;  // m/s^2, SDF's default
 
-std::string world(const std::string& imu, const std::string& pose = "0 0 0 0 0 0", const std::string& model_pose = "0 0 0.5 0 0 0") {
-  return "<sdf version='1.9'><world name='w'><model name='box'><pose>" + model_pose + "</pose><link name='base'>"
-         "<sensor name='IMU' type='imu'><pose>" + pose + "</pose><update_rate>100</update_rate>" + imu + "</sensor>"
-         "<sensor name='IMU2' type='imu'><pose>" + pose + "</pose>" + imu + "</sensor></link></model></world></sdf>";
+std::string world(const std::string& imu, const std::string& pose = "0 0 0 0 0 0",
+                  const std::string& model_pose = "0 0 0.5 0 0 0") {
+  return "<sdf version='1.9'><world name='w'><model name='box'><pose>" + model_pose +
+         "</pose><link name='base'>"
+         "<sensor name='IMU' type='imu'><pose>" +
+         pose + "</pose><update_rate>100</update_rate>" + imu +
+         "</sensor>"
+         "<sensor name='IMU2' type='imu'><pose>" +
+         pose + "</pose>" + imu + "</sensor></link></model></world></sdf>";
 }
 
 // One axis of SDF's gyroscope or accelerometer.
-std::string axis_noise(const std::string& what, const std::string& axis, const std::string& parameters) {
-  return "<" + what + "><" + axis + "><noise type='gaussian'>" + parameters + "</noise></" + axis + "></" + what + ">";
+std::string axis_noise(const std::string& what, const std::string& axis,
+                       const std::string& parameters) {
+  return "<" + what + "><" + axis + "><noise type='gaussian'>" + parameters + "</noise></" + axis +
+         "></" + what + ">";
 }
 
 struct Bench {
-  explicit Bench(const std::string& sdf, SensorBench::Options options = {}, const char* name = "IMU")
+  explicit Bench(const std::string& sdf, SensorBench::Options options = {},
+                 const char* name = "IMU")
       : bench(sdf), device(bench.make("box", name, options)), now(bench.snapshot()) {}
 
   imu_t sample(int64_t index = 0) {
@@ -75,7 +84,8 @@ TEST(Imu, InFreeFallItShowsNothing) {
   expect_vector(bench.sample().linear_acceleration, {0, 0, 0}, 0.0);
 }
 
-// Half a metre ahead of the body's origin, turning at 2 rad/s: centripetal 2 m/s^2 towards the origin.
+// Half a metre ahead of the body's origin, turning at 2 rad/s: centripetal 2 m/s^2 towards the
+// origin.
 TEST(Imu, LeverArmTurningSteadily) {
   Bench bench(world("", "0.5 0 0 0 0 0"));
   bench.now.body_twists[0].angular = {0, 0, 2};
@@ -102,19 +112,23 @@ TEST(Imu, MeasuresInItsOwnFrame) {
 }
 
 TEST(Imu, OnAStaticModelItOnlyFeelsGravity) {
-  Bench bench("<sdf version='1.9'><world name='w'><gravity>0 0 -1.6</gravity><model name='box'><static>true</static>"
-              "<link name='base'><sensor name='IMU' type='imu'/></link></model></world></sdf>");
+  Bench bench(
+      "<sdf version='1.9'><world name='w'><gravity>0 0 -1.6</gravity><model "
+      "name='box'><static>true</static>"
+      "<link name='base'><sensor name='IMU' type='imu'/></link></model></world></sdf>");
   EXPECT_FALSE(bench.device.sensor->observes());
   expect_vector(bench.sample().linear_acceleration, {0, 0, 1.6}, 0.0);
 }
 
 TEST(Imu, OrientationCanBeSwitchedOff) {
-  const imu_t m = Bench(world("<imu><enable_orientation>false</enable_orientation></imu>")).sample();
+  const imu_t m =
+      Bench(world("<imu><enable_orientation>false</enable_orientation></imu>")).sample();
   for (const double component : m.orientation) EXPECT_EQ(component, 0.0);
 }
 
 TEST(Imu, NoiseOnOneAxisLeavesTheOthersIdeal) {
-  Bench bench(world("<imu>" + axis_noise("angular_velocity", "y", "<stddev>0.01</stddev>") + "</imu>"));
+  Bench bench(
+      world("<imu>" + axis_noise("angular_velocity", "y", "<stddev>0.01</stddev>") + "</imu>"));
   const imu_t m = bench.sample();
   EXPECT_NE(m.angular_velocity[1], 0.0);
   EXPECT_EQ(m.angular_velocity[0], 0.0);
@@ -126,11 +140,14 @@ const char* const kNoisy =
     "<imu><angular_velocity>"
     "<x><noise type='gaussian'><stddev>0.002</stddev></noise></x>"
     "<y><noise type='gaussian'><stddev>0.003</stddev></noise></y>"
-    "<z><noise type='gaussian'><stddev>0.004</stddev><bias_mean>0.1</bias_mean></noise></z></angular_velocity>"
+    "<z><noise "
+    "type='gaussian'><stddev>0.004</stddev><bias_mean>0.1</bias_mean></noise></z></"
+    "angular_velocity>"
     "<linear_acceleration>"
     "<x><noise type='gaussian'><stddev>0.02</stddev></noise></x>"
     "<y><noise type='gaussian'><stddev>0.03</stddev></noise></y>"
-    "<z><noise type='gaussian'><stddev>0.04</stddev><mean>0.5</mean></noise></z></linear_acceleration></imu>";
+    "<z><noise "
+    "type='gaussian'><stddev>0.04</stddev><mean>0.5</mean></noise></z></linear_acceleration></imu>";
 
 // Each axis against its own sigma (99.9 %); no two axes, samples, devices or robots together.
 TEST(Imu, NoiseHasItsDistributionAndIsIndependent) {
@@ -140,8 +157,10 @@ TEST(Imu, NoiseHasItsDistributionAndIsIndependent) {
   SensorBench::Options other_robot, other_seed;
   other_robot.named_robot = "box_2";
   other_seed.seed = 2;
-  Bench bench(world(kNoisy)), device2(world(kNoisy), {}, "IMU2"), robot2(world(kNoisy), other_robot), seed2(world(kNoisy), other_seed);
-  double sum[6] = {}, products[6][6] = {}, with_last = 0, with_device = 0, with_robot = 0, with_seed = 0, last = 0;
+  Bench bench(world(kNoisy)), device2(world(kNoisy), {}, "IMU2"),
+      robot2(world(kNoisy), other_robot), seed2(world(kNoisy), other_seed);
+  double sum[6] = {}, products[6][6] = {}, with_last = 0, with_device = 0, with_robot = 0,
+         with_seed = 0, last = 0;
   for (int k = 0; k < kSamples; ++k) {
     for (Bench* each : {&bench, &device2, &robot2, &seed2}) each->advance(10'000);
     const imu_t m = bench.sample(k);
@@ -160,13 +179,14 @@ TEST(Imu, NoiseHasItsDistributionAndIsIndependent) {
     with_robot += z[0] * robot2.sample(k).angular_velocity[0] / sigma[0];
     with_seed += z[0] * seed2.sample(k).angular_velocity[0] / sigma[0];
   }
-  const double bound = 3.9 * std::sqrt(kSamples);    // 99.99 %: 31 comparisons
+  const double bound = 3.9 * std::sqrt(kSamples);  // 99.99 %: 31 comparisons
   for (int i = 0; i < 6; ++i) {
     EXPECT_LT(std::abs(sum[i]), bound) << i;
     EXPECT_NEAR(products[i][i] / kSamples, 1.0, 3.9 * std::sqrt(2.0 / kSamples)) << i;
     for (int j = 0; j < i; ++j) EXPECT_LT(std::abs(products[i][j]), bound) << i << j;
   }
-  for (const double product : {with_last, with_device, with_robot, with_seed}) EXPECT_LT(std::abs(product), bound);
+  for (const double product : {with_last, with_device, with_robot, with_seed})
+    EXPECT_LT(std::abs(product), bound);
 }
 
 TEST(Imu, WithoutNoiseItIsIdealBitByBit) {
@@ -185,7 +205,10 @@ TEST(Imu, WithoutNoiseItIsIdealBitByBit) {
 }
 
 TEST(Imu, BiasIsTheDevicesOwnAndStays) {
-  const std::string imu = "<imu>" + axis_noise("angular_velocity", "z", "<bias_mean>0.5</bias_mean><bias_stddev>0.1</bias_stddev>") + "</imu>";
+  const std::string imu = "<imu>" +
+                          axis_noise("angular_velocity", "z",
+                                     "<bias_mean>0.5</bias_mean><bias_stddev>0.1</bias_stddev>") +
+                          "</imu>";
   Bench bench(world(imu)), again(world(imu)), device2(world(imu), {}, "IMU2");
   const double bias = bench.sample(0).angular_velocity[2];
   EXPECT_NE(bias, 0.5);
@@ -196,8 +219,9 @@ TEST(Imu, BiasIsTheDevicesOwnAndStays) {
 }
 
 TEST(Imu, OldFilesHaveOneNoiseForAllAxes) {
-  Bench bench(world("<imu><noise><type>gaussian</type><rate><bias_mean>0.25</bias_mean></rate>"
-                    "<accel><bias_mean>-0.5</bias_mean></accel></noise></imu>"));
+  Bench bench(
+      world("<imu><noise><type>gaussian</type><rate><bias_mean>0.25</bias_mean></rate>"
+            "<accel><bias_mean>-0.5</bias_mean></accel></noise></imu>"));
   const imu_t m = bench.sample();
   expect_vector(m.angular_velocity, {0.25, 0.25, 0.25}, 0.0);
   expect_vector(m.linear_acceleration, {-0.5, -0.5, kG - 0.5}, 0.0);
@@ -224,7 +248,8 @@ TEST(Imu, ManyEqualSingle) {
   }
   const auto bytes = [](const Outbox& out) {
     std::string all;
-    for (const Outbox::Entry& e : out.entries()) all.append(reinterpret_cast<const char*>(out.data(e)), e.size);
+    for (const Outbox::Entry& e : out.entries())
+      all.append(reinterpret_cast<const char*>(out.data(e)), e.size);
     return all;
   };
   EXPECT_EQ(bytes(out1), bytes(out3));
@@ -233,13 +258,22 @@ TEST(Imu, ManyEqualSingle) {
 }
 
 TEST(Imu, RefusedConfigurations) {
-  struct Case { std::string imu; const char* error; };
+  struct Case {
+    std::string imu;
+    const char* error;
+  };
   for (const Case& c : {
-           Case{"<imu>" + axis_noise("angular_velocity", "x", "<stddev>-0.1</stddev>") + "</imu>", "<noise/stddev>: '-0.1' is not allowed"},
-           {"<imu>" + axis_noise("linear_acceleration", "z", "<bias_mean>nan</bias_mean>") + "</imu>", "<noise/bias_mean>: 'nan' is not finite"},
-           {"<imu><angular_velocity><x><noise type='white'/></x></angular_velocity></imu>", "type 'white' is not allowed"},
-           {"<imu><enable_orientation>maybe</enable_orientation></imu>", "'maybe' is neither true nor false"},
-           {"<imu><noise><type>loud</type></noise></imu>", "'loud' is not allowed; allowed: none, gaussian"},
+           Case{"<imu>" + axis_noise("angular_velocity", "x", "<stddev>-0.1</stddev>") + "</imu>",
+                "<noise/stddev>: '-0.1' is not allowed"},
+           {"<imu>" + axis_noise("linear_acceleration", "z", "<bias_mean>nan</bias_mean>") +
+                "</imu>",
+            "<noise/bias_mean>: 'nan' is not finite"},
+           {"<imu><angular_velocity><x><noise type='white'/></x></angular_velocity></imu>",
+            "type 'white' is not allowed"},
+           {"<imu><enable_orientation>maybe</enable_orientation></imu>",
+            "'maybe' is neither true nor false"},
+           {"<imu><noise><type>loud</type></noise></imu>",
+            "'loud' is not allowed; allowed: none, gaussian"},
            {"<ruedo:bias>1</ruedo:bias>", "<ruedo:bias> is not known in <sensor>"},
        }) {
     try {

@@ -9,7 +9,8 @@
 namespace ruedo {
 namespace {
 
-Element noise_element(const std::string& type, const std::vector<std::pair<std::string, std::string>>& parameters) {
+Element noise_element(const std::string& type,
+                      const std::vector<std::pair<std::string, std::string>>& parameters) {
   Element noise;
   noise.name = "noise";
   noise.source = {"n.sdf", 1};
@@ -33,12 +34,13 @@ TEST(Noise, WithoutAnyTheIdealValueComesBackBitByBit) {
     RandomStream stream(1, 1), untouched(1, 1);
     EXPECT_EQ(noise.apply(0.1, 0.01, stream), 0.1);
     EXPECT_EQ(noise.apply(-0.0, 0.01, stream), -0.0);
-    EXPECT_EQ(stream.bits(), untouched.bits());    // nothing was drawn
+    EXPECT_EQ(stream.bits(), untouched.bits());  // nothing was drawn
   }
 }
 
 TEST(Noise, OneValueByHand) {
-  const Element element = noise_element("gaussian", {{"mean", "0.5"}, {"stddev", "2"}, {"bias_mean", "0.25"}});
+  const Element element =
+      noise_element("gaussian", {{"mean", "0.5"}, {"stddev", "2"}, {"bias_mean", "0.25"}});
   Noise noise(&element);
   RandomStream stream(3, 4), same(3, 4);
   EXPECT_EQ(noise.apply(10.0, 0.0, stream), 10.0 + 0.5 + 2.0 * same.gaussian() + 0.25);
@@ -86,17 +88,18 @@ TEST(Noise, BiasIsDrawnOnce) {
   EXPECT_NEAR(squares / kDevices / 0.04, 1.0, 3.29 * std::sqrt(2.0 / kDevices));
 }
 
-// sigma 0.5, tau 0.8 s: the process has the variance sigma^2 tau/2 = 0.1 and the correlation exp(-dt/tau).
+// sigma 0.5, tau 0.8 s: the process has the variance sigma^2 tau/2 = 0.1 and the correlation
+// exp(-dt/tau).
 TEST(Noise, WanderingBiasIsAGaussMarkovProcess) {
-  const Element element =
-      noise_element("gaussian", {{"dynamic_bias_stddev", "0.5"}, {"dynamic_bias_correlation_time", "0.8"}});
+  const Element element = noise_element(
+      "gaussian", {{"dynamic_bias_stddev", "0.5"}, {"dynamic_bias_correlation_time", "0.8"}});
   constexpr int kDevices = 4000;
   constexpr double kDt = 0.2;
   double at_end = 0, squares = 0, neighbours = 0;
   for (uint64_t key = 0; key < kDevices; ++key) {
     Noise noise(&element);
     double last = 0, value = 0;
-    for (uint64_t k = 0; k <= 40; ++k) {    // ten times tau
+    for (uint64_t k = 0; k <= 40; ++k) {  // ten times tau
       RandomStream stream(key * 0x9e3779b97f4a7c15u, k);
       last = value;
       value = noise.apply(0.0, k == 0 ? 0.0 : kDt, stream);
@@ -111,7 +114,8 @@ TEST(Noise, WanderingBiasIsAGaussMarkovProcess) {
   const double variance = 0.1;
   EXPECT_LT(std::abs(at_end / kDevices), 3.29 * std::sqrt(variance / kDevices));
   EXPECT_NEAR(squares / kDevices / variance, 1.0, 3.29 * std::sqrt(2.0 / kDevices));
-  EXPECT_NEAR(neighbours / kDevices / variance, std::exp(-kDt / 0.8), 3.29 * std::sqrt(2.0 / kDevices));
+  EXPECT_NEAR(neighbours / kDevices / variance, std::exp(-kDt / 0.8),
+              3.29 * std::sqrt(2.0 / kDevices));
 }
 
 // Without a correlation time it is a random walk: the variance after T is sigma^2 T.
@@ -138,19 +142,29 @@ TEST(Noise, QuantisationRoundsToMultiples) {
   EXPECT_EQ(noise.apply(1.1, 0.01, stream), 1.0);
   EXPECT_EQ(noise.apply(-1.2, 0.01, stream), -1.25);
   const Element plain = noise_element("gaussian", {{"precision", "0.25"}});
-  EXPECT_TRUE(Noise(&plain).none());    // SDF: for gaussian_quantized only
+  EXPECT_TRUE(Noise(&plain).none());  // SDF: for gaussian_quantized only
 }
 
 TEST(Noise, RefusedConfigurations) {
-  struct Case { const char* type; const char* name; const char* text; const char* error; };
-  for (const Case& c : {Case{"gauss", "mean", "0", "n.sdf:1: <noise>: type 'gauss' is not allowed; allowed: none, gaussian, gaussian_quantized"},
-                        {"gaussian", "stddev", "-1", "n.sdf:2: <noise/stddev>: '-1' is not allowed; allowed is a number of at least 0"},
-                        {"gaussian", "stddev", "nan", "n.sdf:2: <noise/stddev>: 'nan' is not finite"},
-                        {"gaussian", "mean", "1e999", "n.sdf:2: <noise/mean>: '1e999' is too large"},
-                        {"gaussian", "bias_mean", "x", "n.sdf:2: <noise/bias_mean>: 'x' is not a number"},
-                        {"gaussian", "bias_stddev", "inf", "n.sdf:2: <noise/bias_stddev>: 'inf' is not finite"},
-                        {"gaussian", "dynamic_bias_correlation_time", "-3", "n.sdf:2: <noise/dynamic_bias_correlation_time>: '-3'"},
-                        {"gaussian_quantized", "precision", "-0.1", "n.sdf:2: <noise/precision>: '-0.1'"}}) {
+  struct Case {
+    const char* type;
+    const char* name;
+    const char* text;
+    const char* error;
+  };
+  for (const Case& c :
+       {Case{"gauss", "mean", "0",
+             "n.sdf:1: <noise>: type 'gauss' is not allowed; allowed: none, gaussian, "
+             "gaussian_quantized"},
+        {"gaussian", "stddev", "-1",
+         "n.sdf:2: <noise/stddev>: '-1' is not allowed; allowed is a number of at least 0"},
+        {"gaussian", "stddev", "nan", "n.sdf:2: <noise/stddev>: 'nan' is not finite"},
+        {"gaussian", "mean", "1e999", "n.sdf:2: <noise/mean>: '1e999' is too large"},
+        {"gaussian", "bias_mean", "x", "n.sdf:2: <noise/bias_mean>: 'x' is not a number"},
+        {"gaussian", "bias_stddev", "inf", "n.sdf:2: <noise/bias_stddev>: 'inf' is not finite"},
+        {"gaussian", "dynamic_bias_correlation_time", "-3",
+         "n.sdf:2: <noise/dynamic_bias_correlation_time>: '-3'"},
+        {"gaussian_quantized", "precision", "-0.1", "n.sdf:2: <noise/precision>: '-0.1'"}}) {
     const Element element = noise_element(c.type, {{c.name, c.text}});
     try {
       Noise noise(&element);

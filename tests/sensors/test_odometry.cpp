@@ -1,4 +1,5 @@
-// Odometry against paths that are known in closed form: the wheels are turned by the test, the world is empty.
+// Odometry against paths that are known in closed form: the wheels are turned by the test, the
+// world is empty.
 #include <cmath>
 
 #include <gmock/gmock.h>
@@ -13,7 +14,7 @@ namespace {
 using test::Device;
 using test::SensorBench;
 
-constexpr double kRadius = 0.1, kTrack = 0.4;    // m
+constexpr double kRadius = 0.1, kTrack = 0.4;  // m
 
 // A robot with two wheels (or four), and what is in <ruedo:odometry>.
 std::string world(const std::string& odometry, bool four_wheels = false) {
@@ -23,28 +24,41 @@ std::string world(const std::string& odometry, bool four_wheels = false) {
     for (const char* side : {"left", "right"}) {
       const std::string name = std::string(end) + "_" + side;
       const std::string y = side == std::string("left") ? "0.2" : "-0.2";
-      wheels += "<link name='" + name + "'><pose>" + (end == std::string("front") ? "0.1 " : "-0.1 ") + y + " 0.1 0 0 0</pose></link>"
-                "<joint name='" + name + "_joint' type='revolute'><parent>base</parent><child>" + name + "</child>"
+      wheels += "<link name='" + name + "'><pose>" +
+                (end == std::string("front") ? "0.1 " : "-0.1 ") + y +
+                " 0.1 0 0 0</pose></link>"
+                "<joint name='" +
+                name + "_joint' type='revolute'><parent>base</parent><child>" + name +
+                "</child>"
                 "<axis><xyz>0 1 0</xyz></axis></joint>";
-      drive += "<ruedo:" + std::string(side) + "_joint>" + name + "_joint</ruedo:" + side + "_joint>";
+      drive +=
+          "<ruedo:" + std::string(side) + "_joint>" + name + "_joint</ruedo:" + side + "_joint>";
     }
   }
   return "<sdf version='1.9'><world name='w'><model name='rover'><pose>3 -2 0 0 0 0.7</pose>"
-         "<link name='base'><pose>0 0 0.1 0 0 0</pose><collision name='c'><geometry><box><size>0.4 0.3 0.1</size></box></geometry></collision></link>" +
-         wheels + "<ruedo:drive>" + drive + "<ruedo:wheel_radius>0.1</ruedo:wheel_radius><ruedo:track>0.4</ruedo:track></ruedo:drive>"
-         "<ruedo:odometry>" + odometry + "</ruedo:odometry></model></world></sdf>";
+         "<link name='base'><pose>0 0 0.1 0 0 0</pose><collision name='c'><geometry><box><size>0.4 "
+         "0.3 0.1</size></box></geometry></collision></link>" +
+         wheels + "<ruedo:drive>" + drive +
+         "<ruedo:wheel_radius>0.1</ruedo:wheel_radius><ruedo:track>0.4</ruedo:track></ruedo:drive>"
+         "<ruedo:odometry>" +
+         odometry + "</ruedo:odometry></model></world></sdf>";
 }
 
 // Turns the wheels of one robot and hands the states to its odometry.
 class Drive {
  public:
-  explicit Drive(const std::string& odometry, bool four_wheels = false, SensorBench::Options options = {})
-      : bench(world(odometry, four_wheels)), device(bench.make("rover", "odometry", options)), now(bench.snapshot()) {
+  explicit Drive(const std::string& odometry, bool four_wheels = false,
+                 SensorBench::Options options = {})
+      : bench(world(odometry, four_wheels)),
+        device(bench.make("rover", "odometry", options)),
+        now(bench.snapshot()) {
     test::step(device, now, out, 0);
   }
 
-  // The state after dt_us in which the sides have turned to these angles, at these rates at its end.
-  void to(double left, double right, int64_t dt_us, double left_rate = 0.0, double right_rate = 0.0, bool due = true) {
+  // The state after dt_us in which the sides have turned to these angles, at these rates at its
+  // end.
+  void to(double left, double right, int64_t dt_us, double left_rate = 0.0, double right_rate = 0.0,
+          bool due = true) {
     ++now.step;
     now.time += dt_us;
     for (size_t i = 0; i < now.wheel_angles.size(); ++i) {
@@ -91,7 +105,7 @@ TEST(Odometry, StraightAndOnTheSpot) {
   EXPECT_NEAR(m.v, 0.4, 1e-16);
   EXPECT_EQ(m.omega, 0.0);
   EXPECT_EQ(m.ticks[0], 0);
-  drive.to(0.0, 2.0, 5000, -3.0, 3.0);    // right ahead, left back: to the left by 2 * 0.1 / 0.4
+  drive.to(0.0, 2.0, 5000, -3.0, 3.0);  // right ahead, left back: to the left by 2 * 0.1 / 0.4
   m = drive.last();
   EXPECT_NEAR(m.x, kRadius, 1e-16);
   EXPECT_NEAR(m.theta, 0.5, 1e-16);
@@ -117,7 +131,7 @@ TEST(Odometry, FourWheelsAreAveragedOnEachSide) {
   ++drive.now.step;
   drive.now.time += 5000;
   double next_left = 1.0;
-  for (size_t i = 0; i < 4; ++i) {    // left: 1 and 3; right: 2 and 2
+  for (size_t i = 0; i < 4; ++i) {  // left: 1 and 3; right: 2 and 2
     const bool left = drive.bench.layout.wheels[i].left;
     drive.now.wheel_angles[i] = left ? next_left : 2.0;
     if (left) next_left = 3.0;
@@ -159,7 +173,8 @@ struct Profile {
   }
 };
 
-// Drives the square of 1 m with legs and turns of trapezoidal speed, `laps` times; ends where it began.
+// Drives the square of 1 m with legs and turns of trapezoidal speed, `laps` times; ends where it
+// began.
 void drive_square(Drive& drive, int laps, int64_t dt_us) {
   const Profile leg{1.0, 0.4, 0.3}, turn{M_PI / 2, 1.2, 1.7};
   double left = 0, right = 0;
@@ -187,7 +202,7 @@ TEST(Odometry, SquaresCloseWithArcAtEveryStepSize) {
     Drive drive("");
     drive_square(drive, dt_us < 1000 ? 1 : 3, dt_us);
     const odometry_t m = drive.last();
-    EXPECT_NEAR(m.x, 0.0, 1e-9) << dt_us;    // the target is 1e-6 m, 1e-9 rad
+    EXPECT_NEAR(m.x, 0.0, 1e-9) << dt_us;  // the target is 1e-6 m, 1e-9 rad
     EXPECT_NEAR(m.y, 0.0, 1e-9) << dt_us;
     EXPECT_NEAR(m.theta, (dt_us < 1000 ? 1 : 3) * 2 * M_PI, 1e-10) << dt_us;
   }
@@ -195,7 +210,9 @@ TEST(Odometry, SquaresCloseWithArcAtEveryStepSize) {
 
 TEST(Odometry, EncoderTicksKeepTheSquareWithinHalfAMillimetre) {
   // A P3-AT counts some 34 000 ticks a turn of its wheels; with as many the error is below 0.5 mm.
-  Drive drive("<ruedo:ticks_per_turn>34000</ruedo:ticks_per_turn><ruedo:counter_bits>16</ruedo:counter_bits>");
+  Drive drive(
+      "<ruedo:ticks_per_turn>34000</ruedo:ticks_per_turn><ruedo:counter_bits>16</"
+      "ruedo:counter_bits>");
   drive_square(drive, 3, 5000);
   EXPECT_NEAR(drive.last().x, 0.0, 0.5e-3);
   EXPECT_NEAR(drive.last().y, 0.0, 0.5e-3);
@@ -204,11 +221,11 @@ TEST(Odometry, EncoderTicksKeepTheSquareWithinHalfAMillimetre) {
 
 TEST(Odometry, TicksAreCountedDownwardsToo) {
   Drive drive("<ruedo:ticks_per_turn>500</ruedo:ticks_per_turn>");
-  drive.to(1.0, -0.001, 100'000);    // 79.58 ticks, -0.08 ticks
+  drive.to(1.0, -0.001, 100'000);  // 79.58 ticks, -0.08 ticks
   odometry_t m = drive.last();
   EXPECT_EQ(m.ticks, (std::vector<int64_t>{79, -1}));
   EXPECT_NEAR(m.angle[0], 79 * 2 * M_PI / 500, 1e-15);
-  EXPECT_NEAR(m.rate[0], 79 * 2 * M_PI / 500 / 0.1, 1e-13);    // mean since the last sample
+  EXPECT_NEAR(m.rate[0], 79 * 2 * M_PI / 500 / 0.1, 1e-13);  // mean since the last sample
   EXPECT_NEAR(m.v, 0.5 * kRadius * (79 - 1) * 2 * M_PI / 500 / 0.1, 1e-13);
   drive.to(0.0, 0.0, 100'000);
   EXPECT_EQ(drive.last().ticks, (std::vector<int64_t>{0, 0}));
@@ -216,30 +233,35 @@ TEST(Odometry, TicksAreCountedDownwardsToo) {
 }
 
 TEST(Odometry, CountersWrapAndTheRobotUnwrapsThem) {
-  Drive narrow("<ruedo:ticks_per_turn>500</ruedo:ticks_per_turn><ruedo:counter_bits>8</ruedo:counter_bits>");
+  Drive narrow(
+      "<ruedo:ticks_per_turn>500</ruedo:ticks_per_turn><ruedo:counter_bits>8</ruedo:counter_bits>");
   Drive wide("<ruedo:ticks_per_turn>500</ruedo:ticks_per_turn>");
-  for (int i = 1; i <= 100; ++i) {    // up to 127 ticks a step: 1.59 rad, both ways
+  for (int i = 1; i <= 100; ++i) {  // up to 127 ticks a step: 1.59 rad, both ways
     const double left = 1.59 * i, right = -1.58 * i;
     narrow.to(left, right, 5000);
     wide.to(left, right, 5000);
     EXPECT_EQ(narrow.last().ticks[0], wide.last().ticks[0] & 255);
     EXPECT_EQ(narrow.last().ticks[1], wide.last().ticks[1] & 255);
   }
-  EXPECT_EQ(wide.last().ticks[0], 12652);    // floor(159 * 500 / 2 pi)
+  EXPECT_EQ(wide.last().ticks[0], 12652);  // floor(159 * 500 / 2 pi)
   EXPECT_EQ(narrow.last().x, wide.last().x);
   EXPECT_EQ(narrow.last().y, wide.last().y);
   EXPECT_EQ(narrow.last().theta, wide.last().theta);
   EXPECT_EQ(narrow.last().angle, wide.last().angle);
-  // More than half the range in a step is taken for the other way, as on the real robot: 200 is -56.
-  Drive fast("<ruedo:ticks_per_turn>500</ruedo:ticks_per_turn><ruedo:counter_bits>8</ruedo:counter_bits>");
+  // More than half the range in a step is taken for the other way, as on the real robot: 200 is
+  // -56.
+  Drive fast(
+      "<ruedo:ticks_per_turn>500</ruedo:ticks_per_turn><ruedo:counter_bits>8</ruedo:counter_bits>");
   fast.to(2 * M_PI * 200.5 / 500, 0, 5000);
   EXPECT_EQ(fast.last().ticks[0], 200);
   EXPECT_NEAR(fast.last().angle[0], -56 * 2 * M_PI / 500, 1e-15);
 }
 
 TEST(Odometry, BelievesInAWrongRadiusAndTrack) {
-  Drive drive("<ruedo:radius_error>0.1 -0.05</ruedo:radius_error><ruedo:track_error>0.25</ruedo:track_error>");
-  drive.to(1.0, 1.0, 5000, 2.0, 2.0);    // 0.11 m and 0.095 m on a track of 0.5 m
+  Drive drive(
+      "<ruedo:radius_error>0.1 "
+      "-0.05</ruedo:radius_error><ruedo:track_error>0.25</ruedo:track_error>");
+  drive.to(1.0, 1.0, 5000, 2.0, 2.0);  // 0.11 m and 0.095 m on a track of 0.5 m
   const odometry_t m = drive.last();
   EXPECT_NEAR(m.theta, -0.015 / 0.5, 1e-16);
   EXPECT_NEAR(m.x, 0.1025 * std::sin(0.015) / 0.015 * std::cos(0.015), 1e-16);
@@ -271,7 +293,8 @@ TEST(Odometry, SlipHasItsSigmaAndIsIndependent) {
   Drive second("<ruedo:slip_noise>0.02</ruedo:slip_noise>", false, other);
   constexpr int kSteps = 10000;
   const double sigma = 0.02 * std::sqrt(0.004);
-  double squares = 0, sum = 0, across = 0, along = 0, robots = 0, last_left = 0, last_slip = 0, last_right = 0, last_other = 0;
+  double squares = 0, sum = 0, across = 0, along = 0, robots = 0, last_left = 0, last_slip = 0,
+         last_right = 0, last_other = 0;
   for (int i = 1; i <= kSteps; ++i) {
     drive.to(0.04 * i, 0.04 * i, 5000);
     second.to(0.04 * i, 0.04 * i, 5000);
@@ -279,7 +302,7 @@ TEST(Odometry, SlipHasItsSigmaAndIsIndependent) {
     const double theirs = second.last().angle[0] - 0.04 * i;
     drive.out.clear();
     second.out.clear();
-    const double slip = (left - last_left) * kRadius / sigma;    // N(0, 1)
+    const double slip = (left - last_left) * kRadius / sigma;  // N(0, 1)
     sum += slip;
     squares += slip * slip;
     across += slip * (right - last_right) * kRadius / sigma;
@@ -292,13 +315,15 @@ TEST(Odometry, SlipHasItsSigmaAndIsIndependent) {
   }
   EXPECT_LT(std::abs(sum), 3.29 * std::sqrt(kSteps));
   EXPECT_NEAR(squares / kSteps, 1.0, 3.29 * std::sqrt(2.0 / kSteps));
-  for (const double product : {across, along, robots}) EXPECT_LT(std::abs(product), 3.29 * std::sqrt(kSteps));
+  for (const double product : {across, along, robots})
+    EXPECT_LT(std::abs(product), 3.29 * std::sqrt(kSteps));
 }
 
 TEST(Odometry, SlipCanBeSwitchedOffAndAStandingRobotHasNone) {
   SensorBench::Options quiet;
   quiet.noise = false;
-  Drive off("<ruedo:slip_noise>0.5</ruedo:slip_noise>", false, quiet), ideal(""), on("<ruedo:slip_noise>0.5</ruedo:slip_noise>");
+  Drive off("<ruedo:slip_noise>0.5</ruedo:slip_noise>", false, quiet), ideal(""),
+      on("<ruedo:slip_noise>0.5</ruedo:slip_noise>");
   for (Drive* drive : {&off, &ideal, &on}) {
     for (int i = 0; i < 10; ++i) drive->to(0, 0, 5000);
     EXPECT_EQ(drive->last().x, 0.0);
@@ -314,11 +339,14 @@ TEST(Odometry, SlipCanBeSwitchedOffAndAStandingRobotHasNone) {
 
 // The pose does not depend on how often it is published.
 TEST(Odometry, SampledRarelyOrAtEveryStepItIsTheSame) {
-  for (const char* odometry : {"", "<ruedo:integrator>trapezoid</ruedo:integrator>",
-                               "<ruedo:slip_noise>0.01</ruedo:slip_noise><ruedo:ticks_per_turn>1000</ruedo:ticks_per_turn>"}) {
+  for (const char* odometry :
+       {"", "<ruedo:integrator>trapezoid</ruedo:integrator>",
+        "<ruedo:slip_noise>0.01</ruedo:slip_noise><ruedo:ticks_per_turn>1000</"
+        "ruedo:ticks_per_turn>"}) {
     Drive often(odometry), rarely(odometry);
     for (int i = 1; i <= 200; ++i) {
-      const double left = std::sin(0.01 * i), right = 0.02 * i, lr = 2.0 * std::cos(0.01 * i), rr = 4.0;
+      const double left = std::sin(0.01 * i), right = 0.02 * i, lr = 2.0 * std::cos(0.01 * i),
+                   rr = 4.0;
       often.to(left, right, 5000, lr, rr, true);
       rarely.to(left, right, 5000, lr, rr, i == 200);
     }
@@ -344,24 +372,35 @@ TEST(Odometry, ReturnsAndMirrors) {
   EXPECT_NEAR(there_and_back.last().y, -mirrored.last().y, 1e-15);
   EXPECT_NEAR(there_and_back.last().theta, -mirrored.last().theta, 1e-15);
   EXPECT_GT(std::abs(there_and_back.last().y), 0.01);
-  for (auto at = angles.rbegin(); at != angles.rend(); ++at) there_and_back.to(at->first, at->second, 5000);
+  for (auto at = angles.rbegin(); at != angles.rend(); ++at)
+    there_and_back.to(at->first, at->second, 5000);
   EXPECT_NEAR(there_and_back.last().x, 0.0, 1e-14);
   EXPECT_NEAR(there_and_back.last().y, 0.0, 1e-14);
   EXPECT_NEAR(there_and_back.last().theta, 0.0, 1e-14);
 }
 
 TEST(Odometry, RefusedConfigurations) {
-  struct Case { const char* odometry; const char* error; };
+  struct Case {
+    const char* odometry;
+    const char* error;
+  };
   for (const Case& c : {
-           Case{"<ruedo:integrator>simpson</ruedo:integrator>", "<ruedo:odometry/ruedo:integrator>: 'simpson' is not allowed; allowed: arc, trapezoid"},
-           {"<ruedo:ticks_per_turn>-1</ruedo:ticks_per_turn>", "'-1' is not allowed; allowed is a whole number from 0 to 1000000000"},
+           Case{"<ruedo:integrator>simpson</ruedo:integrator>",
+                "<ruedo:odometry/ruedo:integrator>: 'simpson' is not allowed; allowed: arc, "
+                "trapezoid"},
+           {"<ruedo:ticks_per_turn>-1</ruedo:ticks_per_turn>",
+            "'-1' is not allowed; allowed is a whole number from 0 to 1000000000"},
            {"<ruedo:ticks_per_turn>1.5</ruedo:ticks_per_turn>", "'1.5' is not a whole number"},
-           {"<ruedo:counter_bits>63</ruedo:counter_bits>", "'63' is not allowed; allowed is a whole number from 0 to 62"},
+           {"<ruedo:counter_bits>63</ruedo:counter_bits>",
+            "'63' is not allowed; allowed is a whole number from 0 to 62"},
            {"<ruedo:counter_bits>16</ruedo:counter_bits>", "needs <ruedo:ticks_per_turn>"},
-           {"<ruedo:radius_error>0.1</ruedo:radius_error>", "'0.1' is not allowed; allowed are two numbers above -1"},
+           {"<ruedo:radius_error>0.1</ruedo:radius_error>",
+            "'0.1' is not allowed; allowed are two numbers above -1"},
            {"<ruedo:radius_error>0 -1</ruedo:radius_error>", "'0 -1' is not allowed"},
-           {"<ruedo:track_error>-1</ruedo:track_error>", "'-1' is not allowed; allowed is a number above -1"},
-           {"<ruedo:slip_noise>-0.1</ruedo:slip_noise>", "'-0.1' is not allowed; allowed is a number of at least 0"},
+           {"<ruedo:track_error>-1</ruedo:track_error>",
+            "'-1' is not allowed; allowed is a number above -1"},
+           {"<ruedo:slip_noise>-0.1</ruedo:slip_noise>",
+            "'-0.1' is not allowed; allowed is a number of at least 0"},
            {"<ruedo:slip_noise>much</ruedo:slip_noise>", "'much' is not a number"},
            {"<ruedo:intergator>arc</ruedo:intergator>", "did you mean <ruedo:integrator>?"},
        }) {

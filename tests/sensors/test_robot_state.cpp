@@ -18,13 +18,20 @@ using test::SensorBench;
 const char* const kWorld =
     "<sdf version='1.9'><world name='w'>"
     "<model name='rover'><pose>1 2 0 0 0 0</pose><link name='base'/>"
-    "<link name='l'><pose>0 0.2 0.1 0 0 0</pose></link><link name='r'><pose>0 -0.2 0.1 0 0 0</pose></link><link name='head'/><link name='lift'/>"
-    "<joint name='lj' type='revolute'><parent>base</parent><child>l</child><axis><xyz>0 1 0</xyz></axis></joint>"
-    "<joint name='rj' type='revolute'><parent>base</parent><child>r</child><axis><xyz>0 1 0</xyz></axis></joint>"
-    "<joint name='pan' type='revolute'><parent>base</parent><child>head</child><axis><xyz>0 0 1</xyz></axis></joint>"
-    "<joint name='mast' type='prismatic'><parent>base</parent><child>lift</child><axis><xyz>0 0 1</xyz></axis></joint>"
-    "<ruedo:drive><ruedo:left_joint>lj</ruedo:left_joint><ruedo:right_joint>rj</ruedo:right_joint><ruedo:wheel_radius>0.1</ruedo:wheel_radius>"
-    "<ruedo:pose_rate>25</ruedo:pose_rate><ruedo:status_rate>4</ruedo:status_rate></ruedo:drive></model>"
+    "<link name='l'><pose>0 0.2 0.1 0 0 0</pose></link><link name='r'><pose>0 -0.2 0.1 0 0 "
+    "0</pose></link><link name='head'/><link name='lift'/>"
+    "<joint name='lj' type='revolute'><parent>base</parent><child>l</child><axis><xyz>0 1 "
+    "0</xyz></axis></joint>"
+    "<joint name='rj' type='revolute'><parent>base</parent><child>r</child><axis><xyz>0 1 "
+    "0</xyz></axis></joint>"
+    "<joint name='pan' type='revolute'><parent>base</parent><child>head</child><axis><xyz>0 0 "
+    "1</xyz></axis></joint>"
+    "<joint name='mast' type='prismatic'><parent>base</parent><child>lift</child><axis><xyz>0 0 "
+    "1</xyz></axis></joint>"
+    "<ruedo:drive><ruedo:left_joint>lj</ruedo:left_joint><ruedo:right_joint>rj</"
+    "ruedo:right_joint><ruedo:wheel_radius>0.1</ruedo:wheel_radius>"
+    "<ruedo:pose_rate>25</ruedo:pose_rate><ruedo:status_rate>4</ruedo:status_rate></ruedo:drive></"
+    "model>"
     "</world></sdf>";
 
 TEST(TruePose, ShowsTheRobotsState) {
@@ -49,7 +56,7 @@ TEST(TruePose, ShowsTheRobotsState) {
     EXPECT_EQ(m.rotation_rate[i], 7 + i);
     EXPECT_EQ(m.accel[i], 10 + i);
   }
-  const double expected[4] = {0.6, 0, 0, 0.8};    // w, x, y, z
+  const double expected[4] = {0.6, 0, 0, 0.8};  // w, x, y, z
   for (int i = 0; i < 4; ++i) EXPECT_EQ(m.orientation[i], expected[i]);
 }
 
@@ -68,16 +75,22 @@ TEST(MotionStatus, AtItsRateAndAtOnceWhenItChanges) {
     }
   };
   run(3, false);
-  EXPECT_EQ(out.entries().size(), 1u);    // nothing happened, nothing is due
+  EXPECT_EQ(out.entries().size(), 1u);  // nothing happened, nothing is due
   MotionState& motion = now.robots[0].motion;
-  motion = {.id = 42, .kind = 1, .state = motion_status_t::STATE_RUNNING, .reason = 0, .done = 0.25, .remaining = 0.75, .changes = 1};
+  motion = {.id = 42,
+            .kind = 1,
+            .state = motion_status_t::STATE_RUNNING,
+            .reason = 0,
+            .done = 0.25,
+            .remaining = 0.75,
+            .changes = 1};
   now.robots[0].twist = {{0.5, 0, 0}, {0, 0, 0.1}};
-  run(1, false);    // step 4: at once
+  run(1, false);  // step 4: at once
   run(1, false);
-  run(1, true);     // step 6: its time
+  run(1, true);  // step 6: its time
   motion.state = motion_status_t::STATE_DONE;
   motion.changes = 2;
-  run(1, true);     // step 7: both, told once
+  run(1, true);  // step 7: both, told once
   const auto messages = Device::decode<motion_status_t>(out);
   ASSERT_EQ(messages.size(), 4u);
   EXPECT_EQ(messages[0].utime, 0);
@@ -103,10 +116,17 @@ TEST(MotionStatus, TheSuccessorShowsAtTheStepOfItsCommand) {
   Outbox out;
   now.step = 7;
   now.time = 35'000;
-  now.robots[0].motion = {.id = 43, .kind = 2, .state = motion_status_t::STATE_RUNNING, .changes = 2};
-  now.motion_ends = {{0, {.id = 42, .kind = 1, .state = motion_status_t::STATE_ENDED, .reason = motion_status_t::REASON_REPLACED, .done = 0.5}},
-                     {1, {.id = 99, .kind = 1, .state = motion_status_t::STATE_REFUSED}}};    // another robot's
-  test::step(device, now, out, 1);    // also due: told once
+  now.robots[0].motion = {
+      .id = 43, .kind = 2, .state = motion_status_t::STATE_RUNNING, .changes = 2};
+  now.motion_ends = {
+      {0,
+       {.id = 42,
+        .kind = 1,
+        .state = motion_status_t::STATE_ENDED,
+        .reason = motion_status_t::REASON_REPLACED,
+        .done = 0.5}},
+      {1, {.id = 99, .kind = 1, .state = motion_status_t::STATE_REFUSED}}};  // another robot's
+  test::step(device, now, out, 1);                                           // also due: told once
   const auto messages = Device::decode<motion_status_t>(out);
   ASSERT_EQ(messages.size(), 2u);
   EXPECT_EQ(messages[0].id, 42);

@@ -1,4 +1,5 @@
-// Sends a server everything that it should not get, so often and at most at a given rate, and counts it: hostile URL COUNT RATE [SEED]
+// Sends a server everything that it should not get, so often and at most at a given rate, and
+// counts it: hostile URL COUNT RATE [SEED]
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -42,7 +43,8 @@ Bytes noise(size_t size) {
 Bytes broken(Bytes bytes) {
   switch (random_bits() % 3) {
     case 0:
-      for (int i = 0; i < 4; ++i) bytes[8 + random_bits() % (bytes.size() - 8)] = random_bits() % 2 ? 0x7f : 0xff;
+      for (int i = 0; i < 4; ++i)
+        bytes[8 + random_bits() % (bytes.size() - 8)] = random_bits() % 2 ? 0x7f : 0xff;
       break;
     case 1: bytes.resize(random_bits() % bytes.size()); break;
     default: bytes.resize(bytes.size() + 1 + random_bits() % 5000);
@@ -75,10 +77,22 @@ struct Case {
 };
 
 Case cases[] = {
-    {"commands of noise", [](std::string& channel, Bytes& bytes) { channel = "p3at/velocity", bytes = noise(random_bits() % 300); }},
-    {"commands with a right beginning", [](std::string& channel, Bytes& bytes) { channel = "p3at/velocity", bytes = broken(encoded(velocity(0.1))); }},
-    {"commands that are not finite", [](std::string& channel, Bytes& bytes) { channel = "p3at/velocity", bytes = encoded(velocity(random_bits() % 2 ? NAN : INFINITY)); }},
-    {"good commands, too many", [](std::string& channel, Bytes& bytes) { channel = "p3at/velocity", bytes = encoded(velocity(0.05)); }},
+    {"commands of noise",
+     [](std::string& channel, Bytes& bytes) {
+       channel = "p3at/velocity", bytes = noise(random_bits() % 300);
+     }},
+    {"commands with a right beginning",
+     [](std::string& channel, Bytes& bytes) {
+       channel = "p3at/velocity", bytes = broken(encoded(velocity(0.1)));
+     }},
+    {"commands that are not finite",
+     [](std::string& channel, Bytes& bytes) {
+       channel = "p3at/velocity", bytes = encoded(velocity(random_bits() % 2 ? NAN : INFINITY));
+     }},
+    {"good commands, too many",
+     [](std::string& channel, Bytes& bytes) {
+       channel = "p3at/velocity", bytes = encoded(velocity(0.05));
+     }},
     {"wheel commands whose lengths lie",
      [](std::string& channel, Bytes& bytes) {
        ruedo::wheel_command_t command{};
@@ -94,8 +108,14 @@ Case cases[] = {
        command.value = random_bits() % 2 ? NAN : 1e300;
        channel = "p3at/move", bytes = encoded(command);
      }},
-    {"requests of strangers", [](std::string& channel, Bytes& bytes) { channel = "ruedo/request", bytes = encoded(request()); }},
-    {"broken requests", [](std::string& channel, Bytes& bytes) { channel = "ruedo/request", bytes = broken(encoded(request())); }},
+    {"requests of strangers",
+     [](std::string& channel, Bytes& bytes) {
+       channel = "ruedo/request", bytes = encoded(request());
+     }},
+    {"broken requests",
+     [](std::string& channel, Bytes& bytes) {
+       channel = "ruedo/request", bytes = broken(encoded(request()));
+     }},
     {"clients that join and are gone",
      [](std::string& channel, Bytes& bytes) {
        ruedo::request_t join = request();
@@ -114,7 +134,10 @@ Case cases[] = {
        info.run_id = static_cast<int64_t>(random_bits());
        channel = "ruedo/info", bytes = encoded(info);
      }},
-    {"channels of nobody", [](std::string& channel, Bytes& bytes) { channel = "nobody/" + std::to_string(random_bits()), bytes = noise(16); }},
+    {"channels of nobody",
+     [](std::string& channel, Bytes& bytes) {
+       channel = "nobody/" + std::to_string(random_bits()), bytes = noise(16);
+     }},
     {"large messages",
      [](std::string& channel, Bytes& bytes) {
        channel = random_bits() % 2 ? "p3at/velocity" : "ruedo/request";
@@ -137,7 +160,8 @@ int main(int argc, char** argv) {
   int64_t sent = 0;
   while (sent < count) {
     const auto now = std::chrono::steady_clock::now();
-    const auto due = std::min(count, static_cast<int64_t>(std::chrono::duration<double>(now - begin).count() * rate));
+    const auto due = std::min(
+        count, static_cast<int64_t>(std::chrono::duration<double>(now - begin).count() * rate));
     for (int i = 0; i < 1000 && sent < due; ++i, ++sent) {
       Case& one = cases[random_bits() % std::size(cases)];
       one.make(channel, bytes);
@@ -146,5 +170,6 @@ int main(int argc, char** argv) {
     }
     if (sent >= due) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
-  for (const Case& one : cases) std::printf("%lld %s\n", static_cast<long long>(one.sent), one.name);
+  for (const Case& one : cases)
+    std::printf("%lld %s\n", static_cast<long long>(one.sent), one.name);
 }

@@ -19,9 +19,13 @@ RUEDO = str(BUILD / "bin/ruedo")
 HOSTILE = os.environ["RUEDO_HOSTILE"]
 HALL = str(Path(os.environ["RUEDO_SOURCE_DIR"]) / "tests/clients/hall.sdf")
 SECONDS = float(os.environ.get("RUEDO_SOAK_SECONDS", "60"))
-FLOOD, FLOOD_RATE, RATE = 300_000, 100_000, 4_000    # messages, messages/s: at the start; then for long, in half of the time for each network
+FLOOD, FLOOD_RATE, RATE = (
+    300_000,
+    100_000,
+    4_000,
+)  # messages, messages/s: at the start; then for long, in half of the time for each network
 LOAD = int(RATE * SECONDS / 2)
-PATIENCE = 400.0    # s, for what comes sooner or later, on a machine that does much else too
+PATIENCE = 400.0  # s, for what comes sooner or later, on a machine that does much else too
 MOST_GROWTH_KB = 8_000
 sys.path.insert(0, str(BUILD / "python"))
 
@@ -29,7 +33,9 @@ import ruedo  # noqa: E402
 
 
 def resident_kb(process):
-    return int(re.search(r"VmRSS:\s+(\d+)", Path(f"/proc/{process.pid}/status").read_text()).group(1))
+    return int(
+        re.search(r"VmRSS:\s+(\d+)", Path(f"/proc/{process.pid}/status").read_text()).group(1)
+    )
 
 
 class TcpHarm(threading.Thread):
@@ -54,13 +60,21 @@ class TcpHarm(threading.Thread):
                 elif kind == 2:
                     one.sendall(hello + struct.pack(">II", 1, 0xFFFFFFFF))
                 elif kind == 3:
-                    one.sendall(hello + struct.pack(">II1sI", 1, 1, b"x", 4_000_000) + b"y" * 100_000)    # and no more
+                    one.sendall(
+                        hello + struct.pack(">II1sI", 1, 1, b"x", 4_000_000) + b"y" * 100_000
+                    )  # and no more
                 elif kind == 4:
-                    one.sendall(hello + struct.pack(">II2s", 2, 2, b".*"))    # everything, and reads nothing
+                    one.sendall(
+                        hello + struct.pack(">II2s", 2, 2, b".*")
+                    )  # everything, and reads nothing
                 elif kind == 5:
                     one.sendall(hello)
                     for _ in range(200):
-                        one.sendall(struct.pack(">II13sI64s", 1, 13, b"p3at/velocity", 64, noise.randbytes(64)))
+                        one.sendall(
+                            struct.pack(
+                                ">II13sI64s", 1, 13, b"p3at/velocity", 64, noise.randbytes(64)
+                            )
+                        )
                 self.kept.append(one)
                 self.count += 1
             except OSError:
@@ -78,7 +92,11 @@ def test_nothing_stops_and_nothing_grows(scheme, record_property):
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     url = f"udpm://239.255.76.67:{port}?ttl=0" if scheme == "udpm" else f"tcpq://127.0.0.1:{port}"
-    with subprocess.Popen([RUEDO, "run", HALL, "--quiet", "--disable", "p3at/camera", "--lcm", url], stderr=subprocess.PIPE, text=True) as server:
+    with subprocess.Popen(
+        [RUEDO, "run", HALL, "--quiet", "--disable", "p3at/camera", "--lcm", url],
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as server:
         said = []
         threading.Thread(target=lambda: said.extend(server.stderr), daemon=True).start()
         begin = time.monotonic()
@@ -90,10 +108,14 @@ def test_nothing_stops_and_nothing_grows(scheme, record_property):
     assert server.returncode == 0
     third = len(sizes) // 3
     first, last = max(sizes[:third]), max(sizes[-third:])
-    print(f"{scheme}: {count} bad inputs; {first} kB at first, {last} kB at the end; {len(said)} lines")
+    print(
+        f"{scheme}: {count} bad inputs; {first} kB at first, {last} kB at the end; {len(said)} lines"
+    )
     assert count >= FLOOD + LOAD
     assert last < first + MOST_GROWTH_KB, sizes
-    assert len(said) < 30 + 4 * (time.monotonic() - begin)    # what is wrong is said once a second at most, by each who says it
+    assert len(said) < 30 + 4 * (
+        time.monotonic() - begin
+    )  # what is wrong is said once a second at most, by each who says it
 
 
 def soak(server, url, scheme, port):
@@ -110,19 +132,25 @@ def soak(server, url, scheme, port):
     sizes, count, refused = [], 0, 0
     try:
         lrf = sim.robot("p3at").lrf
-        count += sent_by(subprocess.Popen([HOSTILE, url, str(FLOOD), str(FLOOD_RATE)], stdout=subprocess.PIPE, text=True))
-        load = subprocess.Popen([HOSTILE, url, str(LOAD), str(RATE), "2"], stdout=subprocess.PIPE, text=True)
+        count += sent_by(
+            subprocess.Popen(
+                [HOSTILE, url, str(FLOOD), str(FLOOD_RATE)], stdout=subprocess.PIPE, text=True
+            )
+        )
+        load = subprocess.Popen(
+            [HOSTILE, url, str(LOAD), str(RATE), "2"], stdout=subprocess.PIPE, text=True
+        )
         while load.poll() is None:
             assert server.poll() is None, "the server ended"
             lrf.next(PATIENCE)
             try:
                 sim.state()
-            except ruedo.RequestError:    # its session went to one of the many that joined
+            except ruedo.RequestError:  # its session went to one of the many that joined
                 refused += 1
             sizes.append(resident_kb(server))
             time.sleep(0.1)
         count += sent_by(load)
-        sim.robot("p3at").rotate(0.3).wait(PATIENCE)    # with the load gone, it does as it is told
+        sim.robot("p3at").rotate(0.3).wait(PATIENCE)  # with the load gone, it does as it is told
     finally:
         harm.end = True
         if scheme == "tcpq":
@@ -134,4 +162,8 @@ def soak(server, url, scheme, port):
 
 
 def sent_by(process):
-    return sum(int(line.split()[0]) for line in process.communicate(timeout=2 * SECONDS + PATIENCE)[0].splitlines() if line[0].isdigit())
+    return sum(
+        int(line.split()[0])
+        for line in process.communicate(timeout=2 * SECONDS + PATIENCE)[0].splitlines()
+        if line[0].isdigit()
+    )

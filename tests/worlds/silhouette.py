@@ -3,6 +3,7 @@
 A silhouette is drawn on a grid of RESOLUTION_M; outlines are compared by their Hausdorff distance, so a result is right to
 about one cell.
 """
+
 import struct
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
@@ -30,16 +31,22 @@ def read_obj(path):
             vertices.append([float(w) for w in words[1:4]])
         elif words[:1] == ["f"]:
             corners = [int(w.split("/")[0]) - 1 for w in words[1:]]
-            triangles += [(corners[0], corners[i], corners[i + 1]) for i in range(1, len(corners) - 1)]
+            triangles += [
+                (corners[0], corners[i], corners[i + 1]) for i in range(1, len(corners) - 1)
+            ]
     return np.array(vertices)[np.array(triangles)]
 
 
 def moved(triangles, xyz, rpy=(0, 0, 0)):
     """The triangles in the frame in which theirs has this pose (SDF's convention: Rz(yaw) Ry(pitch) Rx(roll))."""
     (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
-    rotation = np.array([[cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-                         [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-                         [-sp, cp * sr, cp * cr]])
+    rotation = np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
     return triangles @ rotation.T + np.asarray(xyz, float)
 
 
@@ -79,11 +86,15 @@ def _raster(triangles, low, shape):
     for corners in (triangles - low) / RESOLUTION_M:
         first = np.floor(corners.min(axis=0)).astype(int)
         last = np.ceil(corners.max(axis=0)).astype(int) + 1
-        x, y = np.meshgrid(np.arange(first[0], last[0]) + 0.5, np.arange(first[1], last[1]) + 0.5, indexing="ij")
-        sides = [(q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0])
-                 for p, q in zip(corners, np.roll(corners, -1, axis=0))]
+        x, y = np.meshgrid(
+            np.arange(first[0], last[0]) + 0.5, np.arange(first[1], last[1]) + 0.5, indexing="ij"
+        )
+        sides = [
+            (q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0])
+            for p, q in zip(corners, np.roll(corners, -1, axis=0))
+        ]
         inside = np.all([s >= 0 for s in sides], axis=0) | np.all([s <= 0 for s in sides], axis=0)
-        covered[first[0]:last[0], first[1]:last[1]] |= inside
+        covered[first[0] : last[0], first[1] : last[1]] |= inside
     return covered
 
 
@@ -94,7 +105,10 @@ def _border(covered):
     count = 0
     while count != outside.sum():
         count = outside.sum()
-        for axis in (0, 1):    # sweeps that run on along rows and columns until something covered stops them
+        for axis in (
+            0,
+            1,
+        ):  # sweeps that run on along rows and columns until something covered stops them
             for order in (slice(None), slice(None, None, -1)):
                 open_, free = (np.moveaxis(a, axis, 0)[order] for a in (outside, ~covered))
                 for i in range(1, len(open_)):

@@ -1,4 +1,5 @@
 """People who walk, and things on paths, as every kind of sensor sees them; and the same again in a second run."""
+
 import os
 import subprocess
 import sys
@@ -6,9 +7,13 @@ from pathlib import Path
 
 import pytest
 
-BINARY_DIR = Path(os.environ.get("RUEDO_BINARY_DIR", Path(__file__).resolve().parents[2] / "build/release"))
-RADIUS = 0.25    # m, of an actor's cylinder
-FACE = 0.3       # m, from the robot's middle to its bumper; the other sensors are in the middle, 1 m high
+BINARY_DIR = Path(
+    os.environ.get("RUEDO_BINARY_DIR", Path(__file__).resolve().parents[2] / "build/release")
+)
+RADIUS = 0.25  # m, of an actor's cylinder
+FACE = (
+    0.3  # m, from the robot's middle to its bumper; the other sensors are in the middle, 1 m high
+)
 SCAN = "<scan><horizontal><samples>1</samples><min_angle>0</min_angle><max_angle>0</max_angle></horizontal>{}</scan><range><min>0.1</min><max>10</max></range>"
 
 
@@ -40,12 +45,37 @@ def runs(tmp_path_factory):
     sys.path.insert(0, str(BINARY_DIR / "python"))
     import lcm
     from ruedo import lcmtypes
+
     folder = tmp_path_factory.mktemp("actors")
     (folder / "w.sdf").write_text(WORLD)
     for name in ("one", "two"):
-        subprocess.run([BINARY_DIR / "bin/ruedo", "run", "w.sdf", "--no-noise", "--rate", "max", "--duration", "4.6", "--quiet", "--lcm", "memq://",
-                        "--record", f"{name}.lcm"], cwd=folder, check=True, timeout=300)
-    kinds = {"r/lrf": lcmtypes.planar_lidar_t, "r/cloud": lcmtypes.lidar_t, "r/sonar": lcmtypes.sonar_t, "r/eye/depth": lcmtypes.image_t, "r/touch": lcmtypes.contact_t}
+        subprocess.run(
+            [
+                BINARY_DIR / "bin/ruedo",
+                "run",
+                "w.sdf",
+                "--no-noise",
+                "--rate",
+                "max",
+                "--duration",
+                "4.6",
+                "--quiet",
+                "--lcm",
+                "memq://",
+                "--record",
+                f"{name}.lcm",
+            ],
+            cwd=folder,
+            check=True,
+            timeout=300,
+        )
+    kinds = {
+        "r/lrf": lcmtypes.planar_lidar_t,
+        "r/cloud": lcmtypes.lidar_t,
+        "r/sonar": lcmtypes.sonar_t,
+        "r/eye/depth": lcmtypes.image_t,
+        "r/touch": lcmtypes.contact_t,
+    }
     seen = {channel: [] for channel in kinds}
     for event in lcm.EventLog(str(folder / "one.lcm")):
         if event.channel in kinds:
@@ -56,13 +86,20 @@ def runs(tmp_path_factory):
 
 def middle_of(picture):
     import struct
+
     at = (picture.height // 2) * picture.row_stride + 4 * (picture.width // 2)
     return struct.unpack_from("<f", picture.data, at)[0]
 
 
-@pytest.mark.parametrize("channel, distance, tolerance", [
-    ("r/lrf", lambda m: m.ranges[0], 5e-4), ("r/cloud", lambda m: m.ranges[0], 5e-4), ("r/sonar", lambda m: m.range[0], 5e-4),
-    ("r/eye/depth", middle_of, 0.01)])    # drawn with flat sides
+@pytest.mark.parametrize(
+    "channel, distance, tolerance",
+    [
+        ("r/lrf", lambda m: m.ranges[0], 5e-4),
+        ("r/cloud", lambda m: m.ranges[0], 5e-4),
+        ("r/sonar", lambda m: m.range[0], 5e-4),
+        ("r/eye/depth", middle_of, 0.01),
+    ],
+)  # drawn with flat sides
 def test_a_walker_is_where_its_trajectory_says(runs, channel, distance, tolerance):
     seen = [(time, distance(message)) for time, message in runs[0][channel] if time < 4.0]
     assert len(seen) >= 39

@@ -1,4 +1,5 @@
 """What scripts generate is what they generate now: meshes of the robots, the office world, its textures."""
+
 import importlib.util
 import shutil
 import subprocess
@@ -14,7 +15,11 @@ WORLDS = Path(__file__).resolve().parents[2] / "worlds"
 def run_copy(tmp_path, script):
     """Runs a generator in a copy of worlds/ without its outputs, and returns that copy."""
     copy = tmp_path / "worlds"
-    shutil.copytree(WORLDS, copy, ignore=shutil.ignore_patterns("*.obj", "*.mtl", "*.png", "office.sdf", "__pycache__"))
+    shutil.copytree(
+        WORLDS,
+        copy,
+        ignore=shutil.ignore_patterns("*.obj", "*.mtl", "*.png", "office.sdf", "__pycache__"),
+    )
     subprocess.run([sys.executable, copy / script], check=True)
     return copy
 
@@ -24,9 +29,12 @@ def png_pixels(path):
     data = path.read_bytes()
     position, pixels = 8, b""
     while position < len(data):
-        size, kind = int.from_bytes(data[position:position + 4], "big"), data[position + 4:position + 8]
+        size, kind = (
+            int.from_bytes(data[position : position + 4], "big"),
+            data[position + 4 : position + 8],
+        )
         if kind in (b"IHDR", b"IDAT"):
-            content = data[position + 8:position + 8 + size]
+            content = data[position + 8 : position + 8 + size]
             pixels += zlib.decompress(content) if kind == b"IDAT" else content
         position += 12 + size
     return pixels
@@ -37,7 +45,9 @@ def test_bases_are_what_the_script_makes(tmp_path):
     made = sorted(path for path in tmp_path.rglob("*") if path.is_file())
     assert len(made) == 16
     for path in made:
-        assert path.read_text() == (WORLDS / "robots" / path.relative_to(tmp_path)).read_text(), path
+        assert path.read_text() == (WORLDS / "robots" / path.relative_to(tmp_path)).read_text(), (
+            path
+        )
 
 
 def test_worlds_are_what_the_script_makes(tmp_path):
@@ -52,11 +62,14 @@ def test_worlds_are_what_the_script_makes(tmp_path):
             assert path.read_text() == kept.read_text(), kept
 
 
-@pytest.mark.parametrize("script, outputs", [
-    ("robots/p3at/make_meshes.py", "robots/p3at/meshes"),
-    ("robots/p3dx/make_meshes.py", "robots/p3dx/meshes"),
-    ("office/make_office.py", "office"),
-])
+@pytest.mark.parametrize(
+    "script, outputs",
+    [
+        ("robots/p3at/make_meshes.py", "robots/p3at/meshes"),
+        ("robots/p3dx/make_meshes.py", "robots/p3dx/meshes"),
+        ("office/make_office.py", "office"),
+    ],
+)
 def test_files_are_what_the_script_makes(tmp_path, script, outputs):
     copy = run_copy(tmp_path, script)
     made = [p for p in (copy / outputs).rglob("*") if p.suffix in (".obj", ".mtl", ".png")]
@@ -83,6 +96,8 @@ def test_doors_let_a_pioneer_through():
     for x0, y0, x1, y1, doors in office.WALLS:
         for door in doors:
             x, y = (x0 + door, y0) if y0 == y1 else (x0, y0 + door)
-            things = [t[:3] for t in office.furniture()] + [("poster", *t[:2]) for t in office.POSTERS]
+            things = [t[:3] for t in office.furniture()] + [
+                ("poster", *t[:2]) for t in office.POSTERS
+            ]
             blocked = [thing for thing, tx, ty in things if abs(tx - x) < 1.0 and abs(ty - y) < 1.0]
             assert not blocked, f"door at ({x}, {y}): {blocked}"

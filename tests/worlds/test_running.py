@@ -1,4 +1,5 @@
 """Our robots alone on a plane, as a running server sees them: no device may see its own robot or the floor."""
+
 import math
 import os
 import subprocess
@@ -7,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
-BINARY_DIR = Path(os.environ.get("RUEDO_BINARY_DIR", Path(__file__).resolve().parents[2] / "build/release"))
+BINARY_DIR = Path(
+    os.environ.get("RUEDO_BINARY_DIR", Path(__file__).resolve().parents[2] / "build/release")
+)
 WORLD = """<sdf version="1.9"><world name="plane">
   <include><uri>model://ground_plane</uri></include>
   <include><uri>model://p3at</uri></include>
@@ -21,13 +24,37 @@ def last_messages(tmp_path_factory):
     sys.path.insert(0, str(BINARY_DIR / "python"))
     import lcm
     from ruedo import lcmtypes
+
     folder = tmp_path_factory.mktemp("plane")
     (folder / "plane.sdf").write_text(WORLD)
-    subprocess.run([BINARY_DIR / "bin/ruedo", "run", "plane.sdf", "--no-noise", "--rate", "max", "--duration", "2", "--quiet",
-                    "--lcm", "memq://", "--record", "plane.lcm"], cwd=folder, check=True, timeout=120)
+    subprocess.run(
+        [
+            BINARY_DIR / "bin/ruedo",
+            "run",
+            "plane.sdf",
+            "--no-noise",
+            "--rate",
+            "max",
+            "--duration",
+            "2",
+            "--quiet",
+            "--lcm",
+            "memq://",
+            "--record",
+            "plane.lcm",
+        ],
+        cwd=folder,
+        check=True,
+        timeout=120,
+    )
     last = {event.channel: event.data for event in lcm.EventLog(str(folder / "plane.lcm"))}
     kinds = {"sonar": lcmtypes.sonar_t, "lrf": lcmtypes.planar_lidar_t}
-    return {channel: kind.decode(data) for channel, data in last.items() for name, kind in kinds.items() if f"/{name}" in channel}
+    return {
+        channel: kind.decode(data)
+        for channel, data in last.items()
+        for name, kind in kinds.items()
+        if f"/{name}" in channel
+    }
 
 
 @pytest.mark.parametrize("channel", ["p3at/sonar_front", "p3at/sonar_rear", "p3dx/sonar_front"])

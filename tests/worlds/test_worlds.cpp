@@ -1,5 +1,5 @@
-// Our own worlds as our own reader sees them: nothing to complain of, and the robots' numbers are those of the
-// sources that they name (masses, axles, devices, limits).
+// Our own worlds as our own reader sees them: nothing to complain of, and the robots' numbers are
+// those of the sources that they name (masses, axles, devices, limits).
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -49,15 +49,19 @@ TEST_P(OurWorlds, LoadWithNothingToReport) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, OurWorlds, testing::Values("arena.sdf", "office.sdf", "fleet.sdf"),
-                         [](const auto& info) { return info.param.substr(0, info.param.find('.')); });
+                         [](const auto& info) {
+                           return info.param.substr(0, info.param.find('.'));
+                         });
 
 TEST(P3at, HasTheSourcesNumbers) {
   const auto world = load_world(kWorlds + "arena.sdf");
   const Model& p3at = *instance(*world, "p3at").model;
   EXPECT_DOUBLE_EQ(mass(p3at), 14 + 4 * 1.5);
 
-  const std::map<std::string, Vec3> axles{{"front_left_wheel", {0.135, 0.197, 0.111}}, {"front_right_wheel", {0.135, -0.197, 0.111}},
-                                          {"rear_left_wheel", {-0.134, 0.197, 0.111}}, {"rear_right_wheel", {-0.134, -0.197, 0.111}}};
+  const std::map<std::string, Vec3> axles{{"front_left_wheel", {0.135, 0.197, 0.111}},
+                                          {"front_right_wheel", {0.135, -0.197, 0.111}},
+                                          {"rear_left_wheel", {-0.134, 0.197, 0.111}},
+                                          {"rear_right_wheel", {-0.134, -0.197, 0.111}}};
   for (const auto& [name, at] : axles) {
     const int link = link_of(p3at, name);
     ASSERT_GE(link, 0) << name;
@@ -84,11 +88,13 @@ TEST(P3at, ScanPlaneIsFree) {
   const Model& p3at = *instance(*world, "p3at").model;
   for (const auto& sensor : p3at.sensors) {
     if (sensor.name != "lrf") continue;
-    const double plane = (p3at.links[static_cast<size_t>(sensor.link)].X_ML * sensor.X_LS).translation.z();
+    const double plane =
+        (p3at.links[static_cast<size_t>(sensor.link)].X_ML * sensor.X_LS).translation.z();
     for (size_t i = 0; i < p3at.links.size(); ++i) {
       if (static_cast<int>(i) == sensor.link) continue;
       for (const auto& collision : p3at.links[i].collisions) {
-        const double top = (p3at.links[i].X_ML * collision.X_LC).translation.z() + collision.geometry.size.x();
+        const double top =
+            (p3at.links[i].X_ML * collision.X_LC).translation.z() + collision.geometry.size.x();
         EXPECT_LT(top, plane) << p3at.links[i].name;
       }
     }

@@ -1,4 +1,5 @@
-// Our own worlds as libsdformat sees them: users load them with other programs too, so they must be clean there.
+// Our own worlds as libsdformat sees them: users load them with other programs too, so they must be
+// clean there.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -21,7 +22,7 @@ std::string find_model(const std::string& uri) {
 class Libsdformat : public testing::TestWithParam<std::string> {};
 
 TEST_P(Libsdformat, LoadsOurFileCleanly) {
-  std::ostringstream console;    // unknown elements are said there only
+  std::ostringstream console;  // unknown elements are said there only
   sdf::Console::Instance()->GetMsgStream().SetStream(&console);
   sdf::ParserConfig config;
   config.SetFindCallback(find_model);
@@ -29,7 +30,8 @@ TEST_P(Libsdformat, LoadsOurFileCleanly) {
   config.SetUnrecognizedElementsPolicy(sdf::EnforcementPolicy::ERR);
   sdf::Root root;
   for (const auto& error : root.Load(kWorlds + GetParam(), config)) {
-    // It reads elements of other namespaces, and reports them under this policy: ours are meant to be there.
+    // It reads elements of other namespaces, and reports them under this policy: ours are meant to
+    // be there.
     if (error.Message().find("ruedo:") == std::string::npos) ADD_FAILURE() << error.Message();
   }
   EXPECT_TRUE(root.WorldCount() == 1 || root.Model() || root.Light());
@@ -37,11 +39,14 @@ TEST_P(Libsdformat, LoadsOurFileCleanly) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Libsdformat,
-                         testing::Values("arena.sdf", "office.sdf", "fleet.sdf", "robots/p3at/model.sdf", "robots/p3dx/model.sdf",
-                                         "models/sun/model.sdf", "models/ground_plane/model.sdf", "models/desk/model.sdf"),
+                         testing::Values("arena.sdf", "office.sdf", "fleet.sdf",
+                                         "robots/p3at/model.sdf", "robots/p3dx/model.sdf",
+                                         "models/sun/model.sdf", "models/ground_plane/model.sdf",
+                                         "models/desk/model.sdf"),
                          [](const auto& info) {
                            std::string name = info.param;
-                           for (char& c : name) c = std::isalnum(static_cast<unsigned char>(c)) ? c : '_';
+                           for (char& c : name)
+                             c = std::isalnum(static_cast<unsigned char>(c)) ? c : '_';
                            return name;
                          });
 

@@ -1,4 +1,5 @@
 """Procedural textures of the office: small PNGs that repeat, drawn pixel by pixel from a seeded generator."""
+
 import random
 import struct
 import zlib
@@ -7,13 +8,22 @@ import zlib
 def write_png(path, rows):
     """Writes rows of (red, green, blue) in 0 to 255."""
     height, width = len(rows), len(rows[0])
-    raw = b"".join(b"\0" + bytes(min(255, max(0, round(c))) for pixel in row for c in pixel) for row in rows)
+    raw = b"".join(
+        b"\0" + bytes(min(255, max(0, round(c))) for pixel in row for c in pixel) for row in rows
+    )
 
     def chunk(kind, data):
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        return (
+            struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        )
 
     header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(raw, 9)) + chunk(b"IEND", b""))
+    path.write_bytes(
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(b"IHDR", header)
+        + chunk(b"IDAT", zlib.compress(raw, 9))
+        + chunk(b"IEND", b"")
+    )
 
 
 def shaded(colour, factor):
@@ -23,7 +33,10 @@ def shaded(colour, factor):
 def speckled(size, colour, spread, seed):
     """Even colour with a grain: plaster, carpet."""
     rng = random.Random(seed)
-    return [[shaded(colour, 1 + spread * (rng.random() - 0.5)) for _ in range(size)] for _ in range(size)]
+    return [
+        [shaded(colour, 1 + spread * (rng.random() - 0.5)) for _ in range(size)]
+        for _ in range(size)
+    ]
 
 
 def tiles(size, colour, joint, seed):
@@ -31,8 +44,15 @@ def tiles(size, colour, joint, seed):
     rng = random.Random(seed)
     tones = [1 + 0.06 * (rng.random() - 0.5) for _ in range(4)]
     half = size // 2
-    return [[joint if x % half < 2 or y % half < 2 else shaded(colour, tones[2 * (y // half) + x // half] + 0.02 * rng.random())
-             for x in range(size)] for y in range(size)]
+    return [
+        [
+            joint
+            if x % half < 2 or y % half < 2
+            else shaded(colour, tones[2 * (y // half) + x // half] + 0.02 * rng.random())
+            for x in range(size)
+        ]
+        for y in range(size)
+    ]
 
 
 def planks(size, colour, count, seed):
@@ -44,15 +64,31 @@ def planks(size, colour, count, seed):
         if y % board == 0:
             tone, end = 1 + 0.22 * (rng.random() - 0.5), rng.randrange(size)
         grain = 1 + 0.07 * (rng.random() - 0.5)
-        rows.append([shaded(colour, 0.6 if y % board == 0 or x == end else tone * grain * (1 + 0.02 * (rng.random() - 0.5)))
-                     for x in range(size)])
+        rows.append(
+            [
+                shaded(
+                    colour,
+                    0.6
+                    if y % board == 0 or x == end
+                    else tone * grain * (1 + 0.02 * (rng.random() - 0.5)),
+                )
+                for x in range(size)
+            ]
+        )
     return rows
 
 
 def poster(width, height, seed):
     """An abstract painting: coloured fields between black lines, in a white margin."""
     rng = random.Random(seed)
-    palette = [(200, 40, 30), (30, 70, 150), (235, 200, 50), (240, 238, 230), (240, 238, 230), (40, 120, 80)]
+    palette = [
+        (200, 40, 30),
+        (30, 70, 150),
+        (235, 200, 50),
+        (240, 238, 230),
+        (240, 238, 230),
+        (40, 120, 80),
+    ]
     xs = [0] + sorted(rng.sample(range(15, width - 15), 3)) + [width]
     ys = [0] + sorted(rng.sample(range(15, height - 15), 4)) + [height]
     fields = [[rng.choice(palette) for _ in xs[1:]] for _ in ys[1:]]

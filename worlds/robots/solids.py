@@ -3,6 +3,7 @@
 The robots' meshes are made with it (robots/*/make_meshes.py). Metres, x ahead, y left, z up; faces are
 counter-clockwise seen from outside.
 """
+
 import math
 from pathlib import Path
 
@@ -43,11 +44,19 @@ class Solids:
 
         def point(along, radius, i):
             a = 2 * math.pi * (i % segments) / segments
-            return tuple(centre[k] + along * axis[k] + radius * (math.cos(a) * u[k] + math.sin(a) * v[k]) for k in range(3))
+            return tuple(
+                centre[k] + along * axis[k] + radius * (math.cos(a) * u[k] + math.sin(a) * v[k])
+                for k in range(3)
+            )
 
         for (s0, r0), (s1, r1) in zip(profile, profile[1:]):
             for i in range(segments):
-                corners = [point(s0, r0, i), point(s0, r0, i + 1), point(s1, r1, i + 1), point(s1, r1, i)]
+                corners = [
+                    point(s0, r0, i),
+                    point(s0, r0, i + 1),
+                    point(s1, r1, i + 1),
+                    point(s1, r1, i),
+                ]
                 if r0 == 0:
                     corners.pop(0)
                 elif r1 == 0:
@@ -60,11 +69,15 @@ class Solids:
         with open(path.with_suffix(".mtl"), "w", encoding="ascii", newline="\n") as out:
             for material in self._faces:
                 r, g, b, shine = colours[material]
-                out.write(f"newmtl {material}\nKa {r} {g} {b}\nKd {r} {g} {b}\nKs {shine} {shine} {shine}\nNs 40\n\n")
+                out.write(
+                    f"newmtl {material}\nKa {r} {g} {b}\nKd {r} {g} {b}\nKs {shine} {shine} {shine}\nNs 40\n\n"
+                )
         with open(path.with_suffix(".obj"), "w", encoding="ascii", newline="\n") as out:
             out.write(f"mtllib {path.stem}.mtl\n")
             for x, y, z in self._vertices:
-                out.write(f"v {x + 0.0:.5f} {y + 0.0:.5f} {z + 0.0:.5f}\n".replace("-0.00000", "0.00000"))
+                out.write(
+                    f"v {x + 0.0:.5f} {y + 0.0:.5f} {z + 0.0:.5f}\n".replace("-0.00000", "0.00000")
+                )
             for material, faces in self._faces.items():
                 out.write(f"usemtl {material}\n")
                 for face in faces:
@@ -90,7 +103,7 @@ def faceted(transducers):
     for i, (n1, d1) in enumerate(lines):
         n0, d0 = lines[i - 1]
         det = n0[0] * n1[1] - n0[1] * n1[0]
-        if abs(det) > 1e-6:    # two transducers may share a face
+        if abs(det) > 1e-6:  # two transducers may share a face
             corners.append(((d0 * n1[1] - d1 * n0[1]) / det, (n0[0] * d1 - n1[0] * d0) / det))
     return corners
 
@@ -98,8 +111,12 @@ def faceted(transducers):
 def lms200(solids, x, z):
     """The housing of a SICK LMS200 around its scan plane at height z, axis at x: 156 x 155 x 185 mm."""
     solids.box("blue", (x - 0.094, -0.0775, z - 0.113), (x + 0.062, 0.0775, z - 0.035))
-    solids.box("blue", (x - 0.094, -0.0775, z - 0.035), (x - 0.030, 0.0775, z + 0.035))    # behind the window
-    solids.lathe("window", [(-0.035, 0), (-0.035, 0.055), (0.035, 0.055), (0.035, 0)], (x, 0, z), (0, 0, 1))
+    solids.box(
+        "blue", (x - 0.094, -0.0775, z - 0.035), (x - 0.030, 0.0775, z + 0.035)
+    )  # behind the window
+    solids.lathe(
+        "window", [(-0.035, 0), (-0.035, 0.055), (0.035, 0.055), (0.035, 0)], (x, 0, z), (0, 0, 1)
+    )
     solids.box("blue", (x - 0.094, -0.0775, z + 0.035), (x + 0.062, 0.0775, z + 0.072))
 
 
@@ -109,8 +126,18 @@ def vc_c4(solids, x, z):
     for side in (-1, 1):
         y = sorted((side * 0.036, side * 0.046))
         solids.box("dark", (x - 0.080, y[0], z - 0.030), (x - 0.040, y[1], z + 0.020))
-    solids.lathe("dark", [(-0.100, 0), (-0.100, 0.026), (-0.090, 0.034), (-0.015, 0.034), (-0.015, 0)], (x, 0, z), (1, 0, 0))
-    solids.lathe("glass", [(-0.015, 0), (-0.015, 0.020), (-0.002, 0.020), (-0.006, 0.014), (-0.006, 0)], (x, 0, z), (1, 0, 0))
+    solids.lathe(
+        "dark",
+        [(-0.100, 0), (-0.100, 0.026), (-0.090, 0.034), (-0.015, 0.034), (-0.015, 0)],
+        (x, 0, z),
+        (1, 0, 0),
+    )
+    solids.lathe(
+        "glass",
+        [(-0.015, 0), (-0.015, 0.020), (-0.002, 0.020), (-0.006, 0.014), (-0.006, 0)],
+        (x, 0, z),
+        (1, 0, 0),
+    )
 
 
 COLOURS = {

@@ -1,5 +1,5 @@
-// Wanders without bumping into things, by laser range finder and sonar; saves a camera picture and compares
-// odometry with the true pose at the end.
+// Wanders without bumping into things, by laser range finder and sonar; saves a camera picture and
+// compares odometry with the true pose at the end.
 #include <algorithm>
 #include <cmath>
 #include <csignal>
@@ -17,9 +17,9 @@ namespace {
 
 volatile std::sig_atomic_t interrupted = 0;
 
-constexpr double kClearance = 0.7;    // m, from here on it turns away
-constexpr double kSpeed = 0.35;       // m/s
-constexpr double kTurnRate = 0.6;     // rad/s
+constexpr double kClearance = 0.7;  // m, from here on it turns away
+constexpr double kSpeed = 0.35;     // m/s
+constexpr double kTurnRate = 0.6;   // rad/s
 
 constexpr const char* kUsage =
     "ruedo-wander-cpp [OPTION VALUE]...\n"
@@ -30,13 +30,15 @@ constexpr const char* kUsage =
     "  --picture FILE      default: wander.jpg\n";
 const std::set<std::string> kOptions = {"--robot", "--duration", "--url", "--launch", "--picture"};
 
-// The nearest echo (m) of the transducers that look ahead, on the left (positive heading) or the right.
+// The nearest echo (m) of the transducers that look ahead, on the left (positive heading) or the
+// right.
 double nearest_echo(const rc::SonarReading& reading, const rc::DeviceInfo& sonar, bool left) {
   double nearest = std::numeric_limits<double>::infinity();
   for (size_t i = 0; i < reading.ranges.size() && i < sonar.elements.size(); ++i) {
     const double heading = sonar.elements[i][5];
     const bool ahead = std::abs(heading) < 1.0 && (heading >= 0.0) == left;
-    if (ahead && reading.fired_utime[i] >= 0) nearest = std::min(nearest, static_cast<double>(reading.ranges[i]));
+    if (ahead && reading.fired_utime[i] >= 0)
+      nearest = std::min(nearest, static_cast<double>(reading.ranges[i]));
   }
   return nearest;
 }
@@ -44,9 +46,11 @@ double nearest_echo(const rc::SonarReading& reading, const rc::DeviceInfo& sonar
 void wander(const rc::Robot& robot, double duration) {
   const auto lrf = robot.lrf();
   const auto devices = robot.devices();
-  const bool has_sonar = std::any_of(devices.begin(), devices.end(), [](const auto& d) { return d.type == "sonar_t"; });
+  const bool has_sonar = std::any_of(devices.begin(), devices.end(),
+                                     [](const auto& d) { return d.type == "sonar_t"; });
   const double start = lrf.latest().time();
-  double turning = 0.0;    // rad/s while it turns away; it keeps to one side, or it would get stuck in corners
+  double turning =
+      0.0;  // rad/s while it turns away; it keeps to one side, or it would get stuck in corners
   double now = start;
   while (!interrupted && now - start < duration) {
     const rc::Scan scan = lrf.next();
@@ -69,12 +73,13 @@ void wander(const rc::Robot& robot, double duration) {
 }
 
 struct Place {
-  double x, y, heading;    // m, rad
+  double x, y, heading;  // m, rad
 };
 
 // From one place to another, seen from the first.
 Place moved(const Place& start, const Place& end) {
-  const double x = end.x - start.x, y = end.y - start.y, c = std::cos(start.heading), s = std::sin(start.heading);
+  const double x = end.x - start.x, y = end.y - start.y, c = std::cos(start.heading),
+               s = std::sin(start.heading);
   return {c * x + s * y, c * y - s * x, std::remainder(end.heading - start.heading, 2.0 * M_PI)};
 }
 
@@ -82,11 +87,16 @@ Place place(const rc::Pose& pose) { return {pose.x(), pose.y(), pose.heading()};
 Place place(const rc::Odometry& odometry) { return {odometry.x, odometry.y, odometry.theta}; }
 
 int run(std::map<std::string, std::string>& options) {
-  rc::Simulation sim = options.count("--launch") ? rc::launch(options["--launch"]) : rc::connect(options["--url"]);
-  const rc::Robot robot = options.count("--robot") ? sim.robot(options["--robot"]) : sim.robots().at(0);
-  const double duration = options.count("--duration") ? std::stod(options["--duration"]) : rc::kForever;
-  const Place pose_start = place(robot.pose().latest()), odometry_start = place(robot.odometry().latest());
-  std::printf("%s wanders in %s%s\n", robot.name().c_str(), sim.world().c_str(), duration < rc::kForever ? "" : "; Ctrl-C ends it");
+  rc::Simulation sim =
+      options.count("--launch") ? rc::launch(options["--launch"]) : rc::connect(options["--url"]);
+  const rc::Robot robot =
+      options.count("--robot") ? sim.robot(options["--robot"]) : sim.robots().at(0);
+  const double duration =
+      options.count("--duration") ? std::stod(options["--duration"]) : rc::kForever;
+  const Place pose_start = place(robot.pose().latest()),
+              odometry_start = place(robot.odometry().latest());
+  std::printf("%s wanders in %s%s\n", robot.name().c_str(), sim.world().c_str(),
+              duration < rc::kForever ? "" : "; Ctrl-C ends it");
   std::fflush(stdout);
 
   wander(robot, duration);
@@ -101,9 +111,10 @@ int run(std::map<std::string, std::string>& options) {
   }
   const Place truth = moved(pose_start, place(robot.pose().next()));
   const Place belief = moved(odometry_start, place(robot.odometry().next()));
-  std::printf("true pose x %.3f m, y %.3f m, heading %.3f rad from where it began\n", truth.x, truth.y, truth.heading);
-  std::printf("odometry  x %.3f m, y %.3f m, heading %.3f rad, which is %.3f m off\n", belief.x, belief.y, belief.heading,
-              std::hypot(truth.x - belief.x, truth.y - belief.y));
+  std::printf("true pose x %.3f m, y %.3f m, heading %.3f rad from where it began\n", truth.x,
+              truth.y, truth.heading);
+  std::printf("odometry  x %.3f m, y %.3f m, heading %.3f rad, which is %.3f m off\n", belief.x,
+              belief.y, belief.heading, std::hypot(truth.x - belief.x, truth.y - belief.y));
   return 0;
 }
 

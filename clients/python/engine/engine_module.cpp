@@ -1,4 +1,5 @@
-// The module ruedo._engine: the engine in the process of a Python program. ruedo/engine.py is what people call.
+// The module ruedo._engine: the engine in the process of a Python program. ruedo/engine.py is what
+// people call.
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -15,10 +16,10 @@
 #include "core/version.h"
 #include "engine/engine.h"
 #include "log/header.h"
-#include "watched_run.h"
 #include "model/load.h"
 #include "ruedo/errors.h"
 #include "scene/gl_context.h"
+#include "watched_run.h"
 
 namespace nb = nanobind;
 using ruedo::Primitive;
@@ -40,12 +41,16 @@ nb::dlpack::dtype dtype_of(Primitive type) {
   }
 }
 
-// A view of the engine's own memory, which stays as long as any view of it, and is written by step() and reset().
+// A view of the engine's own memory, which stays as long as any view of it, and is written by
+// step() and reset().
 nb::object view_of(std::shared_ptr<const FieldArray> array) {
   const auto* held = new std::shared_ptr<const FieldArray>(std::move(array));
-  const nb::capsule owner(held, [](void* pointer) noexcept { delete static_cast<std::shared_ptr<const FieldArray>*>(pointer); });
+  const nb::capsule owner(held, [](void* pointer) noexcept {
+    delete static_cast<std::shared_ptr<const FieldArray>*>(pointer);
+  });
   const std::vector<size_t> shape((*held)->shape.begin(), (*held)->shape.end());
-  return nb::cast(nb::ndarray<nb::numpy, nb::ro>((*held)->values.data(), shape.size(), shape.data(), owner, nullptr, dtype_of((*held)->type)));
+  return nb::cast(nb::ndarray<nb::numpy, nb::ro>((*held)->values.data(), shape.size(), shape.data(),
+                                                 owner, nullptr, dtype_of((*held)->type)));
 }
 
 struct Recorded {
@@ -57,13 +62,16 @@ struct Recorded {
 
 class PyEngine {
  public:
-  PyEngine(const std::string& world, const std::optional<std::string>& text, int worlds, uint64_t seed, bool noise, int threads,
-           const std::vector<std::string>& spawns, const std::vector<std::string>& drives, const std::vector<std::string>& settings,
-           const std::vector<std::string>& disabled, const std::vector<std::string>& faults, bool record) {
+  PyEngine(const std::string& world, const std::optional<std::string>& text, int worlds,
+           uint64_t seed, bool noise, int threads, const std::vector<std::string>& spawns,
+           const std::vector<std::string>& drives, const std::vector<std::string>& settings,
+           const std::vector<std::string>& disabled, const std::vector<std::string>& faults,
+           bool record) {
     ruedo::model::LoadOptions& options = options_;
     for (const std::string& one : spawns) options.spawns.push_back(ruedo::model::parse_spawn(one));
     for (const std::string& one : drives) options.drives.push_back(ruedo::model::parse_drive(one));
-    for (const std::string& one : settings) options.settings.push_back(ruedo::model::parse_setting(one));
+    for (const std::string& one : settings)
+      options.settings.push_back(ruedo::model::parse_setting(one));
     options.disabled = disabled;
     for (const std::string& one : faults) options.faults.push_back(ruedo::model::parse_fault(one));
     ruedo::engine::EngineOptions engine;
@@ -73,9 +81,11 @@ class PyEngine {
     engine.fleet.noise = noise;
     engine.fleet.disabled = disabled;
     const nb::gil_scoped_release release;
-    const auto model = text ? ruedo::model::load_world_text(*text, world, options) : ruedo::model::load_world(world, options);
+    const auto model = text ? ruedo::model::load_world_text(*text, world, options)
+                            : ruedo::model::load_world(world, options);
     engine_ = std::make_unique<Engine>(model, engine);
-    for (const ruedo::Finding& finding : model->findings) findings_.push_back(finding.source.str() + ": " + finding.element + ": " + finding.text);
+    for (const ruedo::Finding& finding : model->findings)
+      findings_.push_back(finding.source.str() + ": " + finding.element + ": " + finding.text);
     world_ = model;
     for (const std::string& one : spawns) result_options_.push_back("--spawn=" + one);
     for (const std::string& one : drives) result_options_.push_back("--drive=" + one);
@@ -84,8 +94,12 @@ class PyEngine {
     for (const std::string& one : faults) result_options_.push_back("--fault=" + one);
     if (!noise) result_options_.push_back("--no-noise");
     if (record) {
-      engine_->on_message([this](int copy, int64_t step, const ruedo::engine::Channel& channel, std::span<const uint8_t> bytes) {
-        recorded_.push_back({copy, step, channel.bus_name, {reinterpret_cast<const char*>(bytes.data()), bytes.size()}});
+      engine_->on_message([this](int copy, int64_t step, const ruedo::engine::Channel& channel,
+                                 std::span<const uint8_t> bytes) {
+        recorded_.push_back({copy,
+                             step,
+                             channel.bus_name,
+                             {reinterpret_cast<const char*>(bytes.data()), bytes.size()}});
       });
     }
   }
@@ -112,17 +126,22 @@ class PyEngine {
     engine().command(world, channel, {static_cast<const uint8_t*>(message.data()), message.size()});
   }
 
-  void reset(const std::vector<int>& worlds, const std::vector<uint64_t>& seeds, const std::optional<std::string>& text, const std::string& name) {
+  void reset(const std::vector<int>& worlds, const std::vector<uint64_t>& seeds,
+             const std::optional<std::string>& text, const std::string& name) {
     Engine& engine = this->engine();
     recorded_.clear();
     const nb::gil_scoped_release release;
     const auto model = text ? ruedo::model::load_world_text(*text, name, options_) : nullptr;
-    for (size_t i = 0; i < worlds.size(); ++i) model ? engine.reset(worlds[i], seeds[i], model) : engine.reset(worlds[i], seeds[i]);
+    for (size_t i = 0; i < worlds.size(); ++i)
+      model ? engine.reset(worlds[i], seeds[i], model) : engine.reset(worlds[i], seeds[i]);
   }
 
-  // Copy 0 begins anew with that seed and is watched from its first state on. log: "" or the file of what acts on it.
-  void begin_run(uint64_t seed, const std::vector<std::string>& goals, bool no_contact, std::optional<double> clearance,
-                 std::optional<double> odometry_error, double clearance_reach, const std::string& robot, const std::string& log, bool everything) {
+  // Copy 0 begins anew with that seed and is watched from its first state on. log: "" or the file
+  // of what acts on it.
+  void begin_run(uint64_t seed, const std::vector<std::string>& goals, bool no_contact,
+                 std::optional<double> clearance, std::optional<double> odometry_error,
+                 double clearance_reach, const std::string& robot, const std::string& log,
+                 bool everything) {
     Engine& engine = this->engine();
     ruedo::judge::Expectations expected;
     expected.robot = robot;
@@ -133,13 +152,17 @@ class PyEngine {
     expected.clearance_reach = clearance_reach;
     const nb::gil_scoped_release release;
     run_.reset();
-    if (!header_) header_ = ruedo::log::make_log_header(*world_, seed, result_options_);    // it hashes the world's files: once
+    if (!header_)
+      header_ = ruedo::log::make_log_header(*world_, seed,
+                                            result_options_);  // it hashes the world's files: once
     header_->seed = static_cast<int64_t>(seed);
     run_ = std::make_unique<WatchedRun>(*world_, std::move(expected), *header_, log);
-    engine.on_state([this](int copy, const ruedo::Snapshot& snapshot, const ruedo::engine::Batch& batch) {
-      if (copy == 0 && run_) run_->see(snapshot, batch, engine_->inputs(0));
-    });
-    engine.on_message([this, everything](int copy, int64_t, const ruedo::engine::Channel& channel, std::span<const uint8_t> bytes) {
+    engine.on_state(
+        [this](int copy, const ruedo::Snapshot& snapshot, const ruedo::engine::Batch& batch) {
+          if (copy == 0 && run_) run_->see(snapshot, batch, engine_->inputs(0));
+        });
+    engine.on_message([this, everything](int copy, int64_t, const ruedo::engine::Channel& channel,
+                                         std::span<const uint8_t> bytes) {
       if (copy != 0 || !run_) return;
       run_->judge().see(channel.name, bytes);
       if (everything) run_->record_message(channel.bus_name, bytes);
@@ -160,8 +183,10 @@ class PyEngine {
       one["text"] = failure.text;
       failures.append(one);
     }
-    for (const ruedo::judge::Metric& metric : run_->judge().metrics()) metrics[metric.name.c_str()] = metric.value;
-    for (const ruedo::judge::Judge::Place& place : run_->judge().track()) track.append(nb::make_tuple(place.time_s, place.x, place.y));
+    for (const ruedo::judge::Metric& metric : run_->judge().metrics())
+      metrics[metric.name.c_str()] = metric.value;
+    for (const ruedo::judge::Judge::Place& place : run_->judge().track())
+      track.append(nb::make_tuple(place.time_s, place.x, place.y));
     verdict["failures"] = failures;
     verdict["metrics"] = metrics;
     verdict["track"] = track;
@@ -175,17 +200,22 @@ class PyEngine {
 
   nb::object touching() const { return view_of(engine().touching()); }
 
-  nb::object observe(const std::string& device, const std::string& field) { return view_of(engine().observe(device, field)); }
+  nb::object observe(const std::string& device, const std::string& field) {
+    return view_of(engine().observe(device, field));
+  }
 
   nb::list messages() const {
     nb::list list;
-    for (const Recorded& one : recorded_) list.append(nb::make_tuple(one.world, one.step, one.channel, nb::bytes(one.bytes.data(), one.bytes.size())));
+    for (const Recorded& one : recorded_)
+      list.append(nb::make_tuple(one.world, one.step, one.channel,
+                                 nb::bytes(one.bytes.data(), one.bytes.size())));
     return list;
   }
 
   std::vector<std::tuple<std::string, std::string, std::string>> devices() const {
     std::vector<std::tuple<std::string, std::string, std::string>> list;
-    for (const auto& device : engine().devices()) list.emplace_back(device.robot, device.name, device.kind);
+    for (const auto& device : engine().devices())
+      list.emplace_back(device.robot, device.name, device.kind);
     return list;
   }
 
@@ -204,26 +234,32 @@ class PyEngine {
 }  // namespace
 
 NB_MODULE(_engine, module) {
-  ruedo::scene::draw_the_same_everywhere();    // an import has the interpreter to itself
+  ruedo::scene::draw_the_same_everywhere();  // an import has the interpreter to itself
   module.attr("version") = ruedo::version();
   module.attr("build") = ruedo::log::own_version();
   nb::exception<ruedo::InputError>(module, "InputError", PyExc_ValueError);
   nb::exception<ruedo::EnvironmentError>(module, "EnvironmentError", PyExc_OSError);
   nb::class_<PyEngine>(module, "Engine")
-      .def(nb::init<const std::string&, const std::optional<std::string>&, int, uint64_t, bool, int, const std::vector<std::string>&,
-                    const std::vector<std::string>&, const std::vector<std::string>&, const std::vector<std::string>&, const std::vector<std::string>&, bool>(),
-           nb::arg("world"), nb::kw_only(), nb::arg("text") = nb::none(), nb::arg("worlds") = 1, nb::arg("seed") = 1, nb::arg("noise") = true,
-           nb::arg("threads") = 0, nb::arg("spawn") = nb::list(), nb::arg("drive") = nb::list(), nb::arg("set") = nb::list(),
-           nb::arg("disable") = nb::list(), nb::arg("fault") = nb::list(), nb::arg("record") = false)
+      .def(nb::init<const std::string&, const std::optional<std::string>&, int, uint64_t, bool, int,
+                    const std::vector<std::string>&, const std::vector<std::string>&,
+                    const std::vector<std::string>&, const std::vector<std::string>&,
+                    const std::vector<std::string>&, bool>(),
+           nb::arg("world"), nb::kw_only(), nb::arg("text") = nb::none(), nb::arg("worlds") = 1,
+           nb::arg("seed") = 1, nb::arg("noise") = true, nb::arg("threads") = 0,
+           nb::arg("spawn") = nb::list(), nb::arg("drive") = nb::list(),
+           nb::arg("set") = nb::list(), nb::arg("disable") = nb::list(),
+           nb::arg("fault") = nb::list(), nb::arg("record") = false)
       .def("close", &PyEngine::close)
       .def("step", &PyEngine::step)
       .def("drive", &PyEngine::drive)
       .def("command", &PyEngine::command)
-      .def("reset", &PyEngine::reset, nb::arg("worlds"), nb::arg("seeds"), nb::arg("text") = nb::none(), nb::arg("name") = "world")
+      .def("reset", &PyEngine::reset, nb::arg("worlds"), nb::arg("seeds"),
+           nb::arg("text") = nb::none(), nb::arg("name") = "world")
       .def("observe", &PyEngine::observe)
-      .def("begin_run", &PyEngine::begin_run, nb::arg("seed"), nb::kw_only(), nb::arg("goals"), nb::arg("no_contact"),
-           nb::arg("clearance") = nb::none(), nb::arg("odometry_error") = nb::none(), nb::arg("clearance_reach"), nb::arg("robot"), nb::arg("log"),
-           nb::arg("everything"))
+      .def("begin_run", &PyEngine::begin_run, nb::arg("seed"), nb::kw_only(), nb::arg("goals"),
+           nb::arg("no_contact"), nb::arg("clearance") = nb::none(),
+           nb::arg("odometry_error") = nb::none(), nb::arg("clearance_reach"), nb::arg("robot"),
+           nb::arg("log"), nb::arg("everything"))
       .def("end_run", &PyEngine::end_run)
       .def("files_read", &PyEngine::files_read)
       .def("touching", &PyEngine::touching)
@@ -232,7 +268,9 @@ NB_MODULE(_engine, module) {
       .def("findings", &PyEngine::findings)
       .def("worlds", [](const PyEngine& self) { return self.engine().worlds(); })
       .def("step_us", [](const PyEngine& self) { return self.engine().step_us(); })
-      .def("current_step", [](const PyEngine& self, int world) { return self.engine().current_step(world); })
+      .def("current_step",
+           [](const PyEngine& self, int world) { return self.engine().current_step(world); })
       .def("driven", [](const PyEngine& self) { return self.engine().driven(); })
-      .def("state_hash", [](const PyEngine& self, int world) { return self.engine().state_hash(world); });
+      .def("state_hash",
+           [](const PyEngine& self, int world) { return self.engine().state_hash(world); });
 }

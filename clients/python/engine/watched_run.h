@@ -1,4 +1,5 @@
-// A run of the engine that is judged, and recorded as `ruedo verify` repeats it: of a campaign's case, a few kB of what acted.
+// A run of the engine that is judged, and recorded as `ruedo verify` repeats it: of a campaign's
+// case, a few kB of what acted.
 #pragma once
 
 #include <memory>
@@ -20,8 +21,11 @@
 class WatchedRun {
  public:
   // log: a file; "": none. The world must outlive it.
-  WatchedRun(const ruedo::model::WorldModel& world, ruedo::judge::Expectations expected, const ruedo::log_header_t& header, const std::string& log)
-      : step_us_(world.step_us), hash_clock_(ruedo::Rate{1, 1}, world.step_us), judge_(world, std::move(expected)) {
+  WatchedRun(const ruedo::model::WorldModel& world, ruedo::judge::Expectations expected,
+             const ruedo::log_header_t& header, const std::string& log)
+      : step_us_(world.step_us),
+        hash_clock_(ruedo::Rate{1, 1}, world.step_us),
+        judge_(world, std::move(expected)) {
     if (log.empty()) return;
     log_ = std::make_unique<ruedo::log::Writer>(log);
     record("ruedo/header", header);
@@ -30,7 +34,8 @@ class WatchedRun {
   ruedo::judge::Judge& judge() { return judge_; }
 
   // Each state in order, with the batch that it came in.
-  void see(const ruedo::Snapshot& snapshot, const ruedo::engine::Batch& batch, const std::vector<ruedo::engine::Input>& inputs) {
+  void see(const ruedo::Snapshot& snapshot, const ruedo::engine::Batch& batch,
+           const std::vector<ruedo::engine::Input>& inputs) {
     judge_.see(snapshot);
     record_hash();
     hash_.utime = snapshot.time;
@@ -39,7 +44,8 @@ class WatchedRun {
     hash_.state_hash = ruedo::engine::state_hash(snapshot);
     for (int i = 0; i < batch.applied_count; ++i) {
       const ruedo::engine::AppliedCommand& command = batch.applied[static_cast<size_t>(i)];
-      if (command.step == snapshot.step - 1) record_applied(command, inputs[static_cast<size_t>(command.input)].channel);
+      if (command.step == snapshot.step - 1)
+        record_applied(command, inputs[static_cast<size_t>(command.input)].channel);
     }
     hash_due_ = snapshot.step == next_hash_;
     if (hash_due_) next_hash_ = hash_clock_.step_of(++hashes_);
@@ -91,7 +97,7 @@ class WatchedRun {
   ruedo::SampleClock hash_clock_;
   int64_t next_hash_ = 0, hashes_ = 0;
   ruedo::judge::Judge judge_;
-  ruedo::state_hash_t hash_{};    // of the state that was seen last
+  ruedo::state_hash_t hash_{};  // of the state that was seen last
   bool hash_due_ = false;
   std::unique_ptr<ruedo::log::Writer> log_;
   std::vector<uint8_t> buffer_;

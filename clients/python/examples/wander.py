@@ -9,9 +9,9 @@ import math
 
 import ruedo
 
-CLEARANCE = 0.7    # m, from here on it turns away
-SPEED = 0.35       # m/s
-TURN_RATE = 0.6    # rad/s
+CLEARANCE = 0.7  # m, from here on it turns away
+SPEED = 0.35  # m/s
+TURN_RATE = 0.6  # rad/s
 
 
 def nearest_echo(reading: ruedo.SonarReading, elements, left: bool) -> float:
@@ -24,7 +24,9 @@ def nearest_echo(reading: ruedo.SonarReading, elements, left: bool) -> float:
 def wander(robot: ruedo.Robot, duration: float) -> None:
     sonar = next((d for d in robot.devices if d.type == "sonar_t"), None)
     start = now = robot.lrf.latest().time
-    turning = 0.0    # rad/s while it turns away; it keeps to one side, or it would get stuck in corners
+    turning = (
+        0.0  # rad/s while it turns away; it keeps to one side, or it would get stuck in corners
+    )
     while now - start < duration:
         scan = robot.lrf.next()
         now = scan.time
@@ -41,7 +43,9 @@ def wander(robot: ruedo.Robot, duration: float) -> None:
             robot.set_velocity(0.0, turning)
 
 
-def moved(start: tuple[float, float, float], end: tuple[float, float, float]) -> tuple[float, float, float]:
+def moved(
+    start: tuple[float, float, float], end: tuple[float, float, float]
+) -> tuple[float, float, float]:
     """From one x, y, heading (m, rad) to another, seen from the first."""
     x, y, turned = (b - a for a, b in zip(start, end))
     cos, sin = math.cos(start[2]), math.sin(start[2])
@@ -51,7 +55,9 @@ def moved(start: tuple[float, float, float], end: tuple[float, float, float]) ->
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--robot", help="default: the first")
-    parser.add_argument("--duration", type=float, default=math.inf, help="s of sim time; default: until Ctrl-C")
+    parser.add_argument(
+        "--duration", type=float, default=math.inf, help="s of sim time; default: until Ctrl-C"
+    )
     parser.add_argument("--url", help="of the server; default: LCM_DEFAULT_URL")
     parser.add_argument("--launch", metavar="WORLD", help="start a private server with this world")
     parser.add_argument("--picture", default="wander.jpg")
@@ -60,9 +66,15 @@ def main() -> None:
     with ruedo.launch(options.launch) if options.launch else ruedo.connect(options.url) as sim:
         robot = sim.robot(options.robot) if options.robot else sim.robots[0]
         pose, odometry = robot.pose.latest(), robot.odometry.latest()
-        pose_start, odometry_start = (pose.x, pose.y, pose.heading), (odometry.x, odometry.y, odometry.theta)
+        pose_start, odometry_start = (
+            (pose.x, pose.y, pose.heading),
+            (odometry.x, odometry.y, odometry.theta),
+        )
         try:
-            print(f"{robot.name} wanders in {sim.world}{'; Ctrl-C ends it' if options.duration == math.inf else ''}", flush=True)
+            print(
+                f"{robot.name} wanders in {sim.world}{'; Ctrl-C ends it' if options.duration == math.inf else ''}",
+                flush=True,
+            )
             wander(robot, options.duration)
         except KeyboardInterrupt:
             pass
@@ -74,9 +86,13 @@ def main() -> None:
         pose, odometry = robot.pose.next(), robot.odometry.next()
         truth = moved(pose_start, (pose.x, pose.y, pose.heading))
         belief = moved(odometry_start, (odometry.x, odometry.y, odometry.theta))
-        print(f"true pose x {truth[0]:.3f} m, y {truth[1]:.3f} m, heading {truth[2]:.3f} rad from where it began")
-        print(f"odometry  x {belief[0]:.3f} m, y {belief[1]:.3f} m, heading {belief[2]:.3f} rad, "
-              f"which is {math.dist(truth[:2], belief[:2]):.3f} m off")
+        print(
+            f"true pose x {truth[0]:.3f} m, y {truth[1]:.3f} m, heading {truth[2]:.3f} rad from where it began"
+        )
+        print(
+            f"odometry  x {belief[0]:.3f} m, y {belief[1]:.3f} m, heading {belief[2]:.3f} rad, "
+            f"which is {math.dist(truth[:2], belief[:2]):.3f} m off"
+        )
 
 
 if __name__ == "__main__":

@@ -14,25 +14,50 @@ Units are SI, angles radians; x ahead, y left, z up. `ruedo.lcmtypes` has the me
 
 from ._installation import load_glib
 
-load_glib()    # before anything imports lcm
+load_glib()  # before anything imports lcm
 
 try:
     from . import lcmtypes
 except ImportError as _error:
-    raise ImportError("ruedo's message types were not generated: install the package (pip install clients/python) or "
-                      "build the target python_types and use BUILD/python") from _error
+    raise ImportError(
+        "ruedo's message types were not generated: install the package (pip install clients/python) or "
+        "build the target python_types and use BUILD/python"
+    ) from _error
 from .bus import Subscription
 from .control import State
-from .errors import (LaunchError, LeaseLost, MotionError, NoServer, NotSupported, RequestError, RuedoError, Timeout, TypeMismatch,
-                     UnknownName)
+from .errors import (
+    LaunchError,
+    LeaseLost,
+    MotionError,
+    NoServer,
+    NotSupported,
+    RequestError,
+    RuedoError,
+    Timeout,
+    TypeMismatch,
+    UnknownName,
+)
 from .launch import find_ruedo, launch
 from .lockstep import Command, Message, Observations
 from .logs import read_log
 from .maps import OccupancyMap, load_map
 from .motion import Motion
 from .robot import Camera, Device, Robot
-from .samples import (CameraInfo, Contact, ContactPoint, Image, Imu, Joints, LidarScan, MotionStatus, Odometry, Pose, Sample,
-                      Scan, SonarReading)
+from .samples import (
+    CameraInfo,
+    Contact,
+    ContactPoint,
+    Image,
+    Imu,
+    Joints,
+    LidarScan,
+    MotionStatus,
+    Odometry,
+    Pose,
+    Sample,
+    Scan,
+    SonarReading,
+)
 from .simulation import Simulation, connect
 from .stream import Reader, Stream
 from .world import World
@@ -48,13 +73,56 @@ def __getattr__(name: str) -> object:
     try:
         from .engine import Engine
     except ImportError as error:
-        raise ImportError("ruedo.Engine is not in this installation of the client (it was installed without a build of Ruedo): "
-                          f"use BUILD/python, or an installed Ruedo ({error})") from error
+        raise ImportError(
+            "ruedo.Engine is not in this installation of the client (it was installed without a build of Ruedo): "
+            f"use BUILD/python, or an installed Ruedo ({error})"
+        ) from error
     return Engine
 
+
 __all__ = [
-    "Body", "Camera", "CameraInfo", "Command", "Contact", "ContactPoint", "Device", "Image", "Imu", "Joints", "LaunchError", "LeaseLost",
-    "LidarScan", "Message", "Motion", "MotionError", "MotionStatus", "NoServer", "NotSupported", "Observations", "OccupancyMap", "Odometry", "Pose", "Reader", "RequestError", "Robot",
-    "RuedoError", "Sample", "Scan", "Simulation", "SonarReading", "State", "Stream", "Subscription", "Timeout", "TypeMismatch",
-    "UnknownName", "World", "connect", "find_ruedo", "launch", "lcmtypes", "load_map", "read_log",
+    "Body",
+    "Camera",
+    "CameraInfo",
+    "Command",
+    "Contact",
+    "ContactPoint",
+    "Device",
+    "Image",
+    "Imu",
+    "Joints",
+    "LaunchError",
+    "LeaseLost",
+    "LidarScan",
+    "Message",
+    "Motion",
+    "MotionError",
+    "MotionStatus",
+    "NoServer",
+    "NotSupported",
+    "Observations",
+    "OccupancyMap",
+    "Odometry",
+    "Pose",
+    "Reader",
+    "RequestError",
+    "Robot",
+    "RuedoError",
+    "Sample",
+    "Scan",
+    "Simulation",
+    "SonarReading",
+    "State",
+    "Stream",
+    "Subscription",
+    "Timeout",
+    "TypeMismatch",
+    "UnknownName",
+    "World",
+    "connect",
+    "find_ruedo",
+    "launch",
+    "lcmtypes",
+    "load_map",
+    "read_log",
 ]

@@ -13,12 +13,16 @@ from . import unix_transport
 from .errors import NoServer
 
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0"
-FALLBACK_URL = "tcpq://127.0.0.1:7700"    # what `ruedo run` serves where there is no multicast route
+FALLBACK_URL = "tcpq://127.0.0.1:7700"  # what `ruedo run` serves where there is no multicast route
 
 
 def resolve_url(url: str | None) -> str:
     """url, or LCM_DEFAULT_URL, or LCM's default group and port with ttl 0, or TCP where multicast has no route."""
-    return url or os.environ.get("LCM_DEFAULT_URL") or (DEFAULT_URL if has_multicast_route() else FALLBACK_URL)
+    return (
+        url
+        or os.environ.get("LCM_DEFAULT_URL")
+        or (DEFAULT_URL if has_multicast_route() else FALLBACK_URL)
+    )
 
 
 def has_multicast_route(group: str = "239.255.76.67") -> bool:
@@ -39,22 +43,30 @@ def check_reachable(url: str) -> None:
         raise NoServer(f"{url}: the port is not a number from 0 to 65535") from None
     if parts.scheme == "udpm":
         if not has_multicast_route(host or "239.255.76.67"):
-            raise NoServer(f"{url}: this machine has no route for multicast. On Linux: "
-                           "sudo ip route add 224.0.0.0/4 dev lo; `ruedo doctor` tells more")
+            raise NoServer(
+                f"{url}: this machine has no route for multicast. On Linux: "
+                "sudo ip route add 224.0.0.0/4 dev lo; `ruedo doctor` tells more"
+            )
     elif parts.scheme == "tcpq":
         try:
             socket.create_connection((host or "127.0.0.1", port or 7700), 2.0).close()
         except OSError as error:
-            raise NoServer(f"no Ruedo server at {url} ({error.strerror or error}). Is `ruedo run` started with this "
-                           "--lcm? `ruedo doctor` looks for what is wrong") from None
+            raise NoServer(
+                f"no Ruedo server at {url} ({error.strerror or error}). Is `ruedo run` started with this "
+                "--lcm? `ruedo doctor` looks for what is wrong"
+            ) from None
     elif parts.scheme == "unix":
         try:
             unix_transport.connect(parts.path).close()
         except OSError as error:
-            raise NoServer(f"no Ruedo server at {url} ({error.strerror or error}). Is `ruedo run` started with this --lcm, "
-                           "by the same user?") from None
+            raise NoServer(
+                f"no Ruedo server at {url} ({error.strerror or error}). Is `ruedo run` started with this --lcm, "
+                "by the same user?"
+            ) from None
     elif parts.scheme not in ("memq", "file"):
-        raise NoServer(f"{url}: not an LCM URL; udpm://GROUP:PORT?ttl=0, tcpq://HOST:PORT or unix:///PATH is")
+        raise NoServer(
+            f"{url}: not an LCM URL; udpm://GROUP:PORT?ttl=0, tcpq://HOST:PORT or unix:///PATH is"
+        )
 
 
 def is_claimed(url: str) -> bool:
@@ -62,9 +74,18 @@ def is_claimed(url: str) -> bool:
     parts = urlsplit(url)
     if parts.scheme == "unix":
         return unix_transport.is_served(parts.path)
-    host, port = (parts.hostname, parts.port) if parts.hostname else ("239.255.76.67", 7667) if parts.scheme == "udpm" else ("127.0.0.1", 7700)
+    host, port = (
+        (parts.hostname, parts.port)
+        if parts.hostname
+        else ("239.255.76.67", 7667)
+        if parts.scheme == "udpm"
+        else ("127.0.0.1", 7700)
+    )
     try:
         with open("/proc/net/unix", encoding="ascii", errors="replace") as sockets:
-            return any(line.rstrip("\n").endswith(f" @ruedo/{parts.scheme}/{host}:{port}") for line in sockets)
+            return any(
+                line.rstrip("\n").endswith(f" @ruedo/{parts.scheme}/{host}:{port}")
+                for line in sockets
+            )
     except OSError:
         return False

@@ -20,7 +20,9 @@ class Subscription:
     """A callback that is called until close(), which a with-block does at its end. What it raises is logged once, and
     hurts nobody else."""
 
-    def __init__(self, callback: Callable[..., Any], what: str, leave: Callable[[Subscription], None]):
+    def __init__(
+        self, callback: Callable[..., Any], what: str, leave: Callable[[Subscription], None]
+    ):
         self._callback, self._what, self._leave = callback, what, leave
         self._failed = False
         self.closed = False
@@ -46,11 +48,16 @@ class Subscription:
         try:
             self._callback(*arguments)
         except BaseException as error:
-            if isinstance(error, KeyboardInterrupt) and threading.current_thread() is threading.main_thread():
-                raise    # Ctrl-C, while step() receives for itself
+            if (
+                isinstance(error, KeyboardInterrupt)
+                and threading.current_thread() is threading.main_thread()
+            ):
+                raise  # Ctrl-C, while step() receives for itself
             if not self._failed:
                 self._failed = True
-                log.exception("a callback on %s failed; it is called on, and this is said once", self._what)
+                log.exception(
+                    "a callback on %s failed; it is called on, and this is said once", self._what
+                )
 
 
 class Bus:
@@ -61,8 +68,8 @@ class Bus:
         self._closed = threading.Event()
         self._handlers: dict[str, tuple[Subscription, ...]] = {}
         self._lock = threading.Lock()
-        self._turn = threading.Lock()    # to receive
-        self._lent_until = 0.0           # until then the thread leaves it to who has received last
+        self._turn = threading.Lock()  # to receive
+        self._lent_until = 0.0  # until then the thread leaves it to who has received last
         self._thread = threading.Thread(target=self._receive, name="ruedo-receive", daemon=True)
 
     def start(self) -> None:

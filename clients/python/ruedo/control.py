@@ -20,10 +20,14 @@ _REPEAT_SECONDS = 0.1
 
 
 def _names(of: Any) -> dict[int, str]:
-    return {value: name for name, value in vars(of).items() if name.isupper() and isinstance(value, int)}
+    return {
+        value: name for name, value in vars(of).items() if name.isupper() and isinstance(value, int)
+    }
 
 
-_REQUEST = struct.Struct(">8sqqiqqii")    # request_t but for the body; encode() takes as long as a step
+_REQUEST = struct.Struct(
+    ">8sqqiqqii"
+)  # request_t but for the body; encode() takes as long as a step
 _REQUEST_FINGERPRINT = lcmtypes.request_t._get_packed_fingerprint()
 _KINDS = _names(lcmtypes.request_t)
 _CODES = _names(lcmtypes.reply_t)
@@ -33,16 +37,16 @@ _CODES = _names(lcmtypes.reply_t)
 class State(_Value):
     """The state of the simulation, and of the model or MODEL/LINK that was asked for (else name is "")."""
 
-    utime: int           # us, sim time
-    step: int            # number of the state
-    state_hash: int      # of all bodies' and robots' state
+    utime: int  # us, sim time
+    step: int  # number of the state
+    state_hash: int  # of all bodies' and robots' state
     paused: bool
-    rate: float          # sim time per real time that is asked for; inf: as fast as it goes
+    rate: float  # sim time per real time that is asked for; inf: as fast as it goes
     name: str
-    position: Floats     # (3,) m, world
+    position: Floats  # (3,) m, world
     orientation: Floats  # (4,) w, x, y, z: to world
-    linear: Floats       # (3,) m/s, world
-    angular: Floats      # (3,) rad/s, world
+    linear: Floats  # (3,) m/s, world
+    angular: Floats  # (3,) rad/s, world
 
     @property
     def time(self) -> float:
@@ -62,7 +66,7 @@ class Session:
         self._session = 0
         self._run_id = 0
         self._sequence = 0
-        self._awaited: tuple[int, int] | None = None    # kind, sequence
+        self._awaited: tuple[int, int] | None = None  # kind, sequence
         self._reply: Any = None
 
     def request(self, kind: int, body: Any = None, timeout: float = 5.0) -> Any:
@@ -81,7 +85,7 @@ class Session:
             reply = self._exchange(kind, self._session, self.next_sequence(), body, timeout)
             if reply.code != lcmtypes.reply_t.UNKNOWN_SESSION or attempt == 2:
                 break
-            self._session = 0    # its place went to another: join again
+            self._session = 0  # its place went to another: join again
         return self._checked(reply)
 
     def turn(self) -> threading.Lock:
@@ -123,7 +127,9 @@ class Session:
     def _join(self, run_id: int, timeout: float) -> None:
         join = lcmtypes.join_t()
         join.client = self._name
-        reply = self._checked(self._exchange(lcmtypes.request_t.JOIN, 0, random.getrandbits(62) + 1, join, timeout))
+        reply = self._checked(
+            self._exchange(lcmtypes.request_t.JOIN, 0, random.getrandbits(62) + 1, join, timeout)
+        )
         self._session, self._run_id, self._sequence = reply.session, run_id, 0
 
     def _exchange(self, kind: int, session: int, sequence: int, body: Any, timeout: float) -> Any:
@@ -142,14 +148,26 @@ class Session:
         return reply
 
     def publish(self, kind: int, session: int, sequence: int, body: bytes, epoch: int = -1) -> None:
-        head = _REQUEST.pack(_REQUEST_FINGERPRINT, self._sim._utime, self._sim._info.run_id, epoch, session, sequence, kind, len(body))
+        head = _REQUEST.pack(
+            _REQUEST_FINGERPRINT,
+            self._sim._utime,
+            self._sim._info.run_id,
+            epoch,
+            session,
+            sequence,
+            kind,
+            len(body),
+        )
         self._sim._bus.publish("ruedo/request", head + body)
 
     @staticmethod
     def _checked(reply: Any) -> Any:
         if reply.code == lcmtypes.reply_t.OK:
             return reply
-        code, kind = _CODES.get(reply.code, str(reply.code)), _KINDS.get(reply.kind, str(reply.kind))
+        code, kind = (
+            _CODES.get(reply.code, str(reply.code)),
+            _KINDS.get(reply.kind, str(reply.kind)),
+        )
         if reply.code == lcmtypes.reply_t.NOT_SUPPORTED:
             raise NotSupported(f"{kind}: {reply.text or 'this server does not have it'}")
         raise RequestError(f"{kind}: {reply.text or code}", code)
@@ -159,6 +177,18 @@ def state_of(reply: Any) -> State:
     try:
         m = lcmtypes.state_reply_t.decode(reply.body)
     except Exception:
-        raise TypeMismatch("the reply's body is no state_reply_t of this client's version") from None
-    return State(m.utime, m.step, m.state_hash, m.paused, m.rate, m.name, _floats(m.position), _floats(m.orientation),
-                 _floats(m.linear), _floats(m.angular))
+        raise TypeMismatch(
+            "the reply's body is no state_reply_t of this client's version"
+        ) from None
+    return State(
+        m.utime,
+        m.step,
+        m.state_hash,
+        m.paused,
+        m.rate,
+        m.name,
+        _floats(m.position),
+        _floats(m.orientation),
+        _floats(m.linear),
+        _floats(m.angular),
+    )

@@ -35,16 +35,45 @@ class Engine:
     what the machine lacks. Not for several threads at once; ``step`` lets other Python threads run.
     """
 
-    def __init__(self, world: str = "world", *, text: str | None = None, worlds: int = 1, seed: int = 1, noise: bool = True,
-                 threads: int = 0, spawn: Iterable[str] = (), drive: Iterable[str] = (), set: Mapping[str, object] | None = None,
-                 disable: Iterable[str] = (), fault: Iterable[str] = (), record: bool = False) -> None:
-        for name, value in (("spawn", spawn), ("drive", drive), ("disable", disable), ("fault", fault)):
+    def __init__(
+        self,
+        world: str = "world",
+        *,
+        text: str | None = None,
+        worlds: int = 1,
+        seed: int = 1,
+        noise: bool = True,
+        threads: int = 0,
+        spawn: Iterable[str] = (),
+        drive: Iterable[str] = (),
+        set: Mapping[str, object] | None = None,
+        disable: Iterable[str] = (),
+        fault: Iterable[str] = (),
+        record: bool = False,
+    ) -> None:
+        for name, value in (
+            ("spawn", spawn),
+            ("drive", drive),
+            ("disable", disable),
+            ("fault", fault),
+        ):
             if isinstance(value, str):
                 raise TypeError(f"{name} is a list of texts, not one: {name}=[{value!r}]")
         settings = [f"{key}={value}" for key, value in (set or {}).items()]
-        self._core = _engine.Engine(str(world), text=text, worlds=operator.index(worlds), seed=operator.index(seed), noise=bool(noise),
-                                    threads=operator.index(threads), spawn=list(spawn), drive=list(drive), set=settings,
-                                    disable=list(disable), fault=list(fault), record=bool(record))
+        self._core = _engine.Engine(
+            str(world),
+            text=text,
+            worlds=operator.index(worlds),
+            seed=operator.index(seed),
+            noise=bool(noise),
+            threads=operator.index(threads),
+            spawn=list(spawn),
+            drive=list(drive),
+            set=settings,
+            disable=list(disable),
+            fault=list(fault),
+            record=bool(record),
+        )
         self._name = str(world)
         self._worlds = self._core.worlds()
         self._seeds = [seed + i for i in range(self._worlds)]
@@ -81,17 +110,35 @@ class Engine:
         """The files that the world was read from, in the order of reading."""
         return list(self._core.files_read())
 
-    def begin_run(self, seed: int, *, goals: Iterable[str] = (), no_contact: bool = False, clearance: float | None = None,
-                  odometry_error: float | None = None, clearance_reach: float = 0.0, robot: str = "", log: str = "",
-                  everything: bool = False) -> None:
+    def begin_run(
+        self,
+        seed: int,
+        *,
+        goals: Iterable[str] = (),
+        no_contact: bool = False,
+        clearance: float | None = None,
+        odometry_error: float | None = None,
+        clearance_reach: float = 0.0,
+        robot: str = "",
+        log: str = "",
+        everything: bool = False,
+    ) -> None:
         """Begins copy 0 anew with that seed, and judges it as ``ruedo regress`` does.
 
         goals: "X,Y,RADIUS,BY". clearance_reach: m, smaller clearances are measured. log: a file that ``ruedo verify`` repeats; with
         everything: all messages, else only what acted on the run and hashes of its state.
         """
-        self._core.begin_run(operator.index(seed), goals=list(goals), no_contact=no_contact, clearance=clearance,
-                             odometry_error=odometry_error, clearance_reach=float(clearance_reach), robot=robot, log=log,
-                             everything=everything)
+        self._core.begin_run(
+            operator.index(seed),
+            goals=list(goals),
+            no_contact=no_contact,
+            clearance=clearance,
+            odometry_error=odometry_error,
+            clearance_reach=float(clearance_reach),
+            robot=robot,
+            log=log,
+            everything=everything,
+        )
         self._seeds[0] = operator.index(seed)
 
     def end_run(self) -> dict[str, Any]:
@@ -139,7 +186,9 @@ class Engine:
         try:
             count = operator.index(n)
         except TypeError:
-            raise TypeError(f"n is a whole number of steps, not {n!r}; a step is {self.dt:g} s") from None
+            raise TypeError(
+                f"n is a whole number of steps, not {n!r}; a step is {self.dt:g} s"
+            ) from None
         self._core.step(count)
 
     def command(self, world: int, channel: str, message: Any) -> None:
@@ -147,7 +196,11 @@ class Engine:
 
         message: one of ``ruedo.lcmtypes``, or its bytes.
         """
-        self._core.command(self._checked(world), channel, message if isinstance(message, bytes) else message.encode())
+        self._core.command(
+            self._checked(world),
+            channel,
+            message if isinstance(message, bytes) else message.encode(),
+        )
 
     def touching(self) -> NDArray[np.int32]:
         """(worlds, driven robots): in how many of the states of the last ``step`` a robot touched something that does not carry it.
@@ -157,8 +210,12 @@ class Engine:
         array: NDArray[np.int32] = self._core.touching()
         return array
 
-    def reset(self, worlds: int | Sequence[int] | NDArray[Any] | None = None, seed: int | Sequence[int] | None = None,
-              text: str | None = None) -> None:
+    def reset(
+        self,
+        worlds: int | Sequence[int] | NDArray[Any] | None = None,
+        seed: int | Sequence[int] | None = None,
+        text: str | None = None,
+    ) -> None:
         """Makes copies as they were at the beginning; what follows equals a fresh run.
 
         worlds: an index, several, a mask, or None for all. seed: of each of them, or one for the first, counted up; None: the one that
@@ -166,12 +223,18 @@ class Engine:
         """
         indices = self._indices(worlds)
         if seed is not None:
-            seeds = [seed + i for i in range(len(indices))] if isinstance(seed, (int, np.integer)) else [operator.index(s) for s in seed]
+            seeds = (
+                [seed + i for i in range(len(indices))]
+                if isinstance(seed, (int, np.integer))
+                else [operator.index(s) for s in seed]
+            )
             if len(seeds) != len(indices):
                 raise ValueError(f"{len(seeds)} seeds for {len(indices)} worlds")
             for index, one in zip(indices, seeds):
                 self._seeds[index] = one
-        self._core.reset(indices, [self._seeds[index] for index in indices], text=text, name=self._name)
+        self._core.reset(
+            indices, [self._seeds[index] for index in indices], text=text, name=self._name
+        )
 
     def messages(self) -> list[tuple[int, int, str, bytes]]:
         """(world, step, channel, bytes) of every message of the last call of ``step`` or ``reset``; with ``record=True``."""
@@ -193,13 +256,17 @@ class Engine:
     def _velocities(self, commands: ArrayLike) -> NDArray[np.float64]:
         given = np.asarray(commands, dtype=np.float64)
         if given.ndim == 0 or given.shape[-1] not in (2, 3):
-            raise ValueError(f"commands have 2 values for a robot (m/s, rad/s) or 3 (m/s ahead, m/s left, rad/s) in their last axis; "
-                             f"their shape is {given.shape}")
+            raise ValueError(
+                f"commands have 2 values for a robot (m/s, rad/s) or 3 (m/s ahead, m/s left, rad/s) in their last axis; "
+                f"their shape is {given.shape}"
+            )
         shape = (self._worlds, len(self._robots), given.shape[-1])
         try:
             rows = np.broadcast_to(given, shape)
         except ValueError:
-            raise ValueError(f"commands of shape {given.shape} do not fit (worlds, robots, {shape[2]}) = {shape}") from None
+            raise ValueError(
+                f"commands of shape {given.shape} do not fit (worlds, robots, {shape[2]}) = {shape}"
+            ) from None
         if shape[2] == 3:
             return np.ascontiguousarray(rows)
         full = np.zeros((*shape[:2], 3))
@@ -219,6 +286,8 @@ class Engine:
         given = np.asarray(worlds)
         if given.dtype == bool:
             if given.shape != (self._worlds,):
-                raise ValueError(f"a mask has one value for each of {self._worlds} worlds; its shape is {given.shape}")
+                raise ValueError(
+                    f"a mask has one value for each of {self._worlds} worlds; its shape is {given.shape}"
+                )
             return [int(i) for i in np.flatnonzero(given)]
         return [self._checked(i) for i in np.atleast_1d(given)]

@@ -14,18 +14,22 @@ class Placed(Protocol):
     """What has a place in another frame: a device in base_link, a robot's pose in the world."""
 
     @property
-    def position(self) -> Floats: ...    # (3,) m
+    def position(self) -> Floats: ...  # (3,) m
 
     @property
-    def orientation(self) -> Floats: ...    # (4,) w, x, y, z
+    def orientation(self) -> Floats: ...  # (4,) w, x, y, z
 
 
 def rotation(orientation: Floats) -> Floats:
     """The (3, 3) matrix of a unit quaternion w, x, y, z: from the frame of what is turned to that which it is given in."""
     w, x, y, z = orientation
-    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def transformed(points: Floats, by: Placed) -> Floats:

@@ -45,18 +45,33 @@ def find_ruedo() -> str:
         for candidate in [*sorted(folder.glob("build/*/bin/ruedo")), folder / "build/bin/ruedo"]:
             if _is_program(candidate):
                 return str(candidate)
-    raise LaunchError("the program `ruedo` was not found: not in RUEDO, not beside this package, not on the PATH "
-                      "(`pip install` of Ruedo's wheel brings it, `scripts/run` builds it)")
+    raise LaunchError(
+        "the program `ruedo` was not found: not in RUEDO, not beside this package, not on the PATH "
+        "(`pip install` of Ruedo's wheel brings it, `scripts/run` builds it)"
+    )
 
 
 def _is_program(path: Path) -> bool:
     return path.is_file() and os.access(path, os.X_OK)
 
 
-def launch(world: str | os.PathLike[str] | World | None = None, *, seed: int | None = None, rate: float | Literal["max"] | None = None,
-           args: Sequence[str] = (), url: str | None = None, name: str = "client", timeout: float = 30.0, verbose: bool = False,
-           text: str | None = None, lockstep: int | bool = 0, spawn: Sequence[str] = (), disable: Sequence[str] = (),
-           set: Mapping[str, object] | None = None, noise: bool = True) -> Simulation:
+def launch(
+    world: str | os.PathLike[str] | World | None = None,
+    *,
+    seed: int | None = None,
+    rate: float | Literal["max"] | None = None,
+    args: Sequence[str] = (),
+    url: str | None = None,
+    name: str = "client",
+    timeout: float = 30.0,
+    verbose: bool = False,
+    text: str | None = None,
+    lockstep: int | bool = 0,
+    spawn: Sequence[str] = (),
+    disable: Sequence[str] = (),
+    set: Mapping[str, object] | None = None,
+    noise: bool = True,
+) -> Simulation:
     """Starts `ruedo run WORLD` and joins it.
 
     world: a file, the name of one that comes with Ruedo or lies in a folder of RUEDO_PATH ("arena"), or a World; text: the world's SDF or URDF itself instead.
@@ -75,7 +90,9 @@ def launch(world: str | os.PathLike[str] | World | None = None, *, seed: int | N
         text = str(world)
     if text is not None:
         folder = tempfile.TemporaryDirectory(prefix="ruedo-")
-        file = os.path.join(folder.name, "world.urdf" if "<robot" in text and "<sdf" not in text else "world.sdf")
+        file = os.path.join(
+            folder.name, "world.urdf" if "<robot" in text and "<sdf" not in text else "world.sdf"
+        )
         Path(file).write_text(text, encoding="utf-8")
     else:
         assert world is not None and not isinstance(world, World)
@@ -86,12 +103,21 @@ def launch(world: str | os.PathLike[str] | World | None = None, *, seed: int | N
     elif url is None:
         token = _Folder()
         url = f"unix://{token.path}/bus"
-    server = _Server([program, "run", file, "--lcm", url, "--watch-stdin", *options], token, verbose, folder)
+    server = _Server(
+        [program, "run", file, "--lcm", url, "--watch-stdin", *options], token, verbose, folder
+    )
     try:
         until = time.monotonic() + timeout
         server.await_port(url, until)
-        return Simulation(url, name, max(until - time.monotonic(), 1.0), server.ended, server.end, forked=server.forked)
-    except NoServer as error:    # with what the server said, when it ended
+        return Simulation(
+            url,
+            name,
+            max(until - time.monotonic(), 1.0),
+            server.ended,
+            server.end,
+            forked=server.forked,
+        )
+    except NoServer as error:  # with what the server said, when it ended
         server.end()
         raise LaunchError(str(error)) from None
     except BaseException:
@@ -99,12 +125,22 @@ def launch(world: str | os.PathLike[str] | World | None = None, *, seed: int | N
         raise
 
 
-def _options(seed: int | None, rate: float | str | None, args: Sequence[str], lockstep: int | bool, spawn: Sequence[str],
-             disable: Sequence[str], set: Mapping[str, object] | None, noise: bool) -> list[str]:
+def _options(
+    seed: int | None,
+    rate: float | str | None,
+    args: Sequence[str],
+    lockstep: int | bool,
+    spawn: Sequence[str],
+    disable: Sequence[str],
+    set: Mapping[str, object] | None,
+    noise: bool,
+) -> list[str]:
     """Of `ruedo run`."""
     for name, several in (("args", args), ("spawn", spawn), ("disable", disable)):
         if isinstance(several, (str, bytes)):
-            raise TypeError(f"{name} is {several!r}: it must be a list, {name}={str(several).split()!r}")
+            raise TypeError(
+                f"{name} is {several!r}: it must be a list, {name}={str(several).split()!r}"
+            )
     if set is not None and not isinstance(set, Mapping):
         raise TypeError(f"set is {set!r}: it must be a dict, such as {{'p3at/lrf.rate': 20}}")
     options = []
@@ -130,7 +166,9 @@ class _Folder:
 
     def __init__(self) -> None:
         runtime = os.environ.get("XDG_RUNTIME_DIR", "")
-        usable = 0 < len(runtime) < 60 and os.access(runtime, os.W_OK | os.X_OK)    # a socket's path has 107 bytes at most
+        usable = 0 < len(runtime) < 60 and os.access(
+            runtime, os.W_OK | os.X_OK
+        )  # a socket's path has 107 bytes at most
         self.path = tempfile.mkdtemp(prefix="ruedo-", dir=runtime if usable else "/tmp")
 
     def close(self) -> None:
@@ -145,12 +183,14 @@ def _free_url() -> tuple[socket.socket, str]:
         token.bind(("127.0.0.1", 0))
         port = token.getsockname()[1]
         if not has_multicast_route():
-            token.close()    # the server itself will listen on it
-            _say_once(f"ruedo: no multicast route here: launch() speaks LCM over TCP, LCM_DEFAULT_URL=tcpq://127.0.0.1:{port}")
+            token.close()  # the server itself will listen on it
+            _say_once(
+                f"ruedo: no multicast route here: launch() speaks LCM over TCP, LCM_DEFAULT_URL=tcpq://127.0.0.1:{port}"
+            )
             return token, f"tcpq://127.0.0.1:{port}"
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             try:
-                probe.bind(("0.0.0.0", port))    # exclusive: fails when any LCM program uses the port
+                probe.bind(("0.0.0.0", port))  # exclusive: fails when any LCM program uses the port
             except OSError:
                 token.close()
                 continue
@@ -171,15 +211,26 @@ def _say_once(line: str) -> None:
 class _Server:
     """The server process."""
 
-    def __init__(self, command: list[str], token: socket.socket | _Folder | None, verbose: bool, folder: Any = None):
+    def __init__(
+        self,
+        command: list[str],
+        token: socket.socket | _Folder | None,
+        verbose: bool,
+        folder: Any = None,
+    ):
         self._command = command
-        self._folder = folder    # of the world's file, when it is ours
+        self._folder = folder  # of the world's file, when it is ours
         self._token = token
         self._output: IO[bytes] | None = None if verbose else tempfile.TemporaryFile()
         try:
             # A session of its own: Ctrl-C in a terminal reaches the client alone, which may still use the server.
-            self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=self._output,
-                                             stderr=subprocess.STDOUT if self._output else None, start_new_session=True)
+            self._process = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=self._output,
+                stderr=subprocess.STDOUT if self._output else None,
+                start_new_session=True,
+            )
         except OSError as error:
             if token:
                 token.close()
@@ -205,7 +256,9 @@ class _Server:
                 time.sleep(0.005)
                 continue
             try:
-                socket.create_connection((parts.hostname or "127.0.0.1", parts.port or 7700), 1.0).close()
+                socket.create_connection(
+                    (parts.hostname or "127.0.0.1", parts.port or 7700), 1.0
+                ).close()
                 return
             except OSError:
                 time.sleep(0.02)

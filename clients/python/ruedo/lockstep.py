@@ -27,15 +27,17 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-_FIRST_REPEAT, _LAST_REPEAT = 0.005, 0.1    # s
-_ACKNOWLEDGED_TOGETHER = 32                 # steps
-_MOST_WANTED = 256                          # messages asked for at once
-_MOST_EARLY = 512                           # messages of one channel that wait for their ticks
-_MOST_AHEAD = 1024                          # steps beyond what is here: no server is that far
+_FIRST_REPEAT, _LAST_REPEAT = 0.005, 0.1  # s
+_ACKNOWLEDGED_TOGETHER = 32  # steps
+_MOST_WANTED = 256  # messages asked for at once
+_MOST_EARLY = 512  # messages of one channel that wait for their ticks
+_MOST_AHEAD = 1024  # steps beyond what is here: no server is that far
 _LONGEST = 2**63 - 1
 
-_TICK = struct.Struct(">8sqqiqqhh")         # fingerprint, utime, run_id, epoch, step, state_hash, part, nparts
-_ENTRY = struct.Struct(">iqiI")             # channel_index, sequence, size, crc
+_TICK = struct.Struct(
+    ">8sqqiqqhh"
+)  # fingerprint, utime, run_id, epoch, step, state_hash, part, nparts
+_ENTRY = struct.Struct(">iqiI")  # channel_index, sequence, size, crc
 _INT = struct.Struct(">i")
 _TICK_FINGERPRINT = lcmtypes.tick_t._get_packed_fingerprint()
 
@@ -44,9 +46,9 @@ _TICK_FINGERPRINT = lcmtypes.tick_t._get_packed_fingerprint()
 class Command:
     """A command for Simulation.step(), as Robot.velocity_command() and its like make it."""
 
-    channel: str      # one of the command channels of ruedo/info
-    data: bytes       # the encoded message
-    after: int = 0    # steps from where the call begins to the state that it acts on
+    channel: str  # one of the command channels of ruedo/info
+    data: bytes  # the encoded message
+    after: int = 0  # steps from where the call begins to the state that it acts on
 
     def at(self, steps: int) -> Command:
         """The same, for the state so many steps on."""
@@ -101,7 +103,15 @@ def observed(state: State | tuple[int, int, int], messages: list[Message]) -> Ob
         values.update(state.__dict__)
     else:
         values["utime"], values["step"], values["state_hash"] = state
-        values.update(paused=False, rate=math.inf, name="", position=_NOTHING, orientation=_LEVEL, linear=_NOTHING, angular=_NOTHING)
+        values.update(
+            paused=False,
+            rate=math.inf,
+            name="",
+            position=_NOTHING,
+            orientation=_LEVEL,
+            linear=_NOTHING,
+            angular=_NOTHING,
+        )
     values["messages"] = messages
     return made
 
@@ -109,11 +119,15 @@ def observed(state: State | tuple[int, int, int], messages: list[Message]) -> Ob
 def _sample(data: bytes, stream: Stream[T]) -> T:
     message, convert = samples.CONVERSIONS.get(stream.type, (None, None))
     if message is None or convert is None or data[:8] != message._get_packed_fingerprint():
-        raise TypeMismatch(f"{stream.channel} carries another type than {stream.type}, or another version of it")
+        raise TypeMismatch(
+            f"{stream.channel} carries another type than {stream.type}, or another version of it"
+        )
     try:
         sample: T = convert(message.decode(data))
     except Exception as error:
-        raise TypeMismatch(f"{stream.channel}: a message is no valid {stream.type} ({error})") from None
+        raise TypeMismatch(
+            f"{stream.channel}: a message is no valid {stream.type} ({error})"
+        ) from None
     return sample
 
 
@@ -144,48 +158,71 @@ class Stepper:
 
     def __init__(self, sim: Simulation):
         self._sim = sim
-        self._part = False                        # takes part
-        self._info: Any = None                    # whose channels are subscribed
-        self._sources: dict[int, tuple[str, Subscription]] = {}    # of each channel
+        self._part = False  # takes part
+        self._info: Any = None  # whose channels are subscribed
+        self._sources: dict[int, tuple[str, Subscription]] = {}  # of each channel
         self._run_id = self._epoch = 0
-        self._granted, self._have = 0, -1         # all of the states up to _have are here
+        self._granted, self._have = 0, -1  # all of the states up to _have are here
         self._acknowledged = self._newest = -1
-        self._last = (0, -1, 0)                   # utime, step and hash of what was collected
-        self._grant: tuple[int, int, bytes] = (0, -1, b"")    # the one under way: sequence, from, body
+        self._last = (0, -1, 0)  # utime, step and hash of what was collected
+        self._grant: tuple[int, int, bytes] = (
+            0,
+            -1,
+            b"",
+        )  # the one under way: sequence, from, body
         self._taken = True
         self._resends = 0
-        self._steps: dict[int, _Step] = {}        # those not collected yet
-        self._early: dict[int, deque[tuple[int, int, int, bytes]]] = {}    # of each channel: crc, size, utime, message
+        self._steps: dict[int, _Step] = {}  # those not collected yet
+        self._early: dict[
+            int, deque[tuple[int, int, int, bytes]]
+        ] = {}  # of each channel: crc, size, utime, message
         self._waits_for = ""
         self._fault: RuedoError | None = None
-        self._ask_now = False                     # without waiting for a silence
+        self._ask_now = False  # without waiting for a silence
 
     def step(self, n: int, commands: Sequence[Command], timeout: float) -> Observations:
         if isinstance(n, bool) or not isinstance(n, (int, np.integer)):
-            raise TypeError(f"n is {n!r}: it must be a whole number of steps; {self._sim.step_size:g} s is one")
+            raise TypeError(
+                f"n is {n!r}: it must be a whole number of steps; {self._sim.step_size:g} s is one"
+            )
         if isinstance(commands, Command):
             raise TypeError("commands is one Command: put it into a list, [command]")
         if n < 0:
             raise ValueError(f"n is {n}: it must be at least 0")
         for command in commands:
             if not 0 <= command.after < n:
-                raise ValueError(f"a command is for {command.after} steps on; of {n} steps 0 to {n - 1} is allowed")
+                raise ValueError(
+                    f"a command is for {command.after} steps on; of {n} steps 0 to {n - 1} is allowed"
+                )
         session = self._sim._session
         with session.turn():
             self._sim._check_open()
             if self._part and self._sim._info.run_id != self._run_id:
                 self._part = False
-                raise NoServer(f"the run that this client took part in has ended; another is at {self._sim.url} now")
+                raise NoServer(
+                    f"the run that this client took part in has ended; another is at {self._sim.url} now"
+                )
             if not self._part:
                 self._take_part(timeout)
             until = min(self._granted + n, _LONGEST)
-            self._wait(self._have, timeout)    # for nothing, unless the call before gave up
+            self._wait(self._have, timeout)  # for nothing, unless the call before gave up
             if n > 0:
-                self._grant = (session.next_sequence(), self._granted, self._grant_body(until, commands))
-                self._granted, self._taken, self._acknowledged = until, False, self._have    # the grant says what is here
+                self._grant = (
+                    session.next_sequence(),
+                    self._granted,
+                    self._grant_body(until, commands),
+                )
+                self._granted, self._taken, self._acknowledged = (
+                    until,
+                    False,
+                    self._have,
+                )  # the grant says what is here
                 self._grant_again()
             self._wait(until, timeout)
-            if max(self._early, default=0) >= len(self._info.channel_list) or self._info is not self._sim._info:    # a model came
+            if (
+                max(self._early, default=0) >= len(self._info.channel_list)
+                or self._info is not self._sim._info
+            ):  # a model came
                 if max(self._early, default=0) >= len(self._sim._info.channel_list):
                     self._sim._refresh_info()
                 self._subscribe()
@@ -203,7 +240,9 @@ class Stepper:
         try:
             stands = lcmtypes.grant_reply_t.decode(reply.body)
         except Exception:
-            raise TypeMismatch("the reply to GRANT is no grant_reply_t of this client's version") from None
+            raise TypeMismatch(
+                "the reply to GRANT is no grant_reply_t of this client's version"
+            ) from None
         self._run_id, self._epoch = self._sim._info.run_id, reply.epoch
         self._granted, self._have, self._newest = stands.granted, stands.received, stands.step
         self._acknowledged = self._have
@@ -216,8 +255,11 @@ class Stepper:
         info = self._sim._info
         if self._info is info:
             return
-        wanted = {index: channel.name for index, channel in enumerate(info.channel_list)
-                  if not channel.input and (channel.robot or channel.type == "world_state_t")}
+        wanted = {
+            index: channel.name
+            for index, channel in enumerate(info.channel_list)
+            if not channel.input and (channel.robot or channel.type == "world_state_t")
+        }
         for index, (name, source) in list(self._sources.items()):
             if wanted.get(index) != name:
                 source.close()
@@ -225,7 +267,9 @@ class Stepper:
         for index, name in wanted.items():
             self._early.setdefault(index, deque(maxlen=_MOST_EARLY))
             if index not in self._sources:
-                source = self._sim._bus.subscribe(name, lambda data, index=index: self._on_message(index, data))
+                source = self._sim._bus.subscribe(
+                    name, lambda data, index=index: self._on_message(index, data)
+                )
                 self._sources[index] = (name, source)
         self._info = info
 
@@ -251,7 +295,12 @@ class Stepper:
             while True:
                 had, quiet_at = self._have, time.monotonic() + repeat
                 heard = True
-                while heard and not self._fault and not self._ask_now and self._have - self._acknowledged < _ACKNOWLEDGED_TOGETHER:
+                while (
+                    heard
+                    and not self._fault
+                    and not self._ask_now
+                    and self._have - self._acknowledged < _ACKNOWLEDGED_TOGETHER
+                ):
                     if self._taken and self._have >= until:
                         return
                     heard = receive(max(0.0, quiet_at - time.monotonic()))
@@ -265,7 +314,7 @@ class Stepper:
                 elif silence or self._ask_now:
                     self._ask_for_lost(until)
                 elif self._have - self._acknowledged >= _ACKNOWLEDGED_TOGETHER:
-                    self._ask_for_lost(self._have)    # for nothing: it says what is here
+                    self._ask_for_lost(self._have)  # for nothing: it says what is here
                 self._ask_now = False
                 repeat = min(2.0 * repeat, _LAST_REPEAT) if silence else _FIRST_REPEAT
                 if self._have > had:
@@ -274,11 +323,15 @@ class Stepper:
                     self._sim._check_server()
                     if time.monotonic() >= deadline:
                         waits = f": the run waits for {self._waits_for}" if self._waits_for else ""
-                        raise Timeout(f"step {self._have + 1} did not come within {timeout:g} s{waits}")
+                        raise Timeout(
+                            f"step {self._have + 1} did not come within {timeout:g} s{waits}"
+                        )
 
     def _grant_again(self) -> None:
         session = self._sim._session
-        session.publish(lcmtypes.request_t.GRANT, session.id, self._grant[0], self._grant[2], self._epoch)
+        session.publish(
+            lcmtypes.request_t.GRANT, session.id, self._grant[0], self._grant[2], self._epoch
+        )
 
     def _ask_for_lost(self, until: int) -> None:
         body = lcmtypes.resend_request_t()
@@ -290,16 +343,26 @@ class Stepper:
             if step is None:
                 body.wanted.append(_wanted(number, tick, 0, 0))
             else:
-                body.wanted += [_wanted(number, tick, part, 0) for part in range(step.nparts) if part not in step.parts]
-                body.wanted += [_wanted(number, entry.channel, entry.sequence, len(entry.data))
-                                for part in step.parts.values() for entry in part if not entry.here]
+                body.wanted += [
+                    _wanted(number, tick, part, 0)
+                    for part in range(step.nparts)
+                    if part not in step.parts
+                ]
+                body.wanted += [
+                    _wanted(number, entry.channel, entry.sequence, len(entry.data))
+                    for part in step.parts.values()
+                    for entry in part
+                    if not entry.here
+                ]
             if len(body.wanted) >= _MOST_WANTED:
                 break
-        del body.wanted[_MOST_WANTED:]    # the rest when these have come
+        del body.wanted[_MOST_WANTED:]  # the rest when these have come
         body.nwanted = len(body.wanted)
         self._resends += 1
         session = self._sim._session
-        session.publish(lcmtypes.request_t.RESEND, session.id, self._resends, body.encode(), self._epoch)
+        session.publish(
+            lcmtypes.request_t.RESEND, session.id, self._resends, body.encode(), self._epoch
+        )
 
     def _collect(self) -> Observations:
         messages = []
@@ -307,7 +370,9 @@ class Stepper:
             step = self._steps.pop(number)
             self._last = (step.utime, number, step.state_hash)
             for part in range(step.nparts):
-                messages += [Message(number, self._name(e.channel), e.data) for e in step.parts[part]]
+                messages += [
+                    Message(number, self._name(e.channel), e.data) for e in step.parts[part]
+                ]
         return observed(self._last, messages)
 
     def _name(self, channel: int) -> str:
@@ -320,16 +385,23 @@ class Stepper:
         if not self._part or len(data) < 16:
             return
         crc, size = zlib.crc32(data), len(data)
-        for step in self._steps.values():    # a tick may come before its messages
+        for step in self._steps.values():  # a tick may come before its messages
             if step.missing and self._fill(step, channel, crc, data):
                 return self._progress()
-        self._early[channel].append((crc, size, int.from_bytes(data[8:16], "big", signed=True), data))
+        self._early[channel].append(
+            (crc, size, int.from_bytes(data[8:16], "big", signed=True), data)
+        )
 
     @staticmethod
     def _fill(step: _Step, channel: int, crc: int, data: bytes) -> bool:
         for part in step.parts.values():
             for entry in part:
-                if not entry.here and entry.channel == channel and entry.crc == crc and entry.size == len(data):
+                if (
+                    not entry.here
+                    and entry.channel == channel
+                    and entry.crc == crc
+                    and entry.size == len(data)
+                ):
                     entry.data, entry.here = data, True
                     step.missing -= 1
                     return True
@@ -338,12 +410,16 @@ class Stepper:
     def on_tick(self, data: bytes) -> None:
         if not self._part or len(data) < _TICK.size:
             return
-        fingerprint, utime, run_id, epoch, number, state_hash, part, nparts = _TICK.unpack_from(data)
+        fingerprint, utime, run_id, epoch, number, state_hash, part, nparts = _TICK.unpack_from(
+            data
+        )
         if fingerprint != _TICK_FINGERPRINT or run_id != self._run_id or not 0 <= part < nparts:
             return
         if epoch != self._epoch:
             if epoch > self._epoch and not self._fault:
-                self._fault = RuedoError("the world was reset by another client: the next step begins anew")
+                self._fault = RuedoError(
+                    "the world was reset by another client: the next step begins anew"
+                )
             return
         self._newest = max(self._newest, number)
         try:
@@ -366,24 +442,30 @@ class Stepper:
         """Only this says that the grant was executed. Returns where the manifest begins."""
         at = _TICK.size + 4
         for _ in range(_INT.unpack_from(data, at - 4)[0]):
-            size, = _INT.unpack_from(data, at)
+            (size,) = _INT.unpack_from(data, at)
             if size < 1:
                 raise ValueError("a string without an end")
             at += 4 + size
-            if not self._taken and number > self._grant[1] and data[at - size:at - 1] == self._sim._session.name:
-                self._taken = int.from_bytes(data[at:at + 8], "big", signed=True) >= self._grant[0]
+            if (
+                not self._taken
+                and number > self._grant[1]
+                and data[at - size : at - 1] == self._sim._session.name
+            ):
+                self._taken = (
+                    int.from_bytes(data[at : at + 8], "big", signed=True) >= self._grant[0]
+                )
             at += 8
         return at
 
     def _manifest(self, data: bytes, at: int) -> tuple[list[_Entry], int]:
-        count, = _INT.unpack_from(data, at)
+        (count,) = _INT.unpack_from(data, at)
         at += 4
         if count < 0 or at + count * _ENTRY.size != len(data):
             raise ValueError("the manifest's length")
         entries, missing = [], 0
         for channel, sequence, size, crc in _ENTRY.iter_unpack(data[at:]):
             early = self._early.get(channel)
-            if early is None:    # of a model that came since
+            if early is None:  # of a model that came since
                 early = self._early[channel] = deque(maxlen=_MOST_EARLY)
             found = None
             for i, one in enumerate(early):
@@ -400,7 +482,7 @@ class Stepper:
         while step is not None and step.complete():
             self._have += 1
             for part in step.parts.values():
-                for entry in part:    # what is left of the time before came twice
+                for entry in part:  # what is left of the time before came twice
                     early = self._early[entry.channel]
                     while early and early[0][2] <= step.utime:
                         early.popleft()
@@ -412,15 +494,17 @@ class Stepper:
             return
         granting = reply.kind == lcmtypes.request_t.GRANT
         if reply.code != lcmtypes.reply_t.OK:
-            if reply.sequence == (self._grant[0] if granting else self._resends) and not (granting and self._taken):
+            if reply.sequence == (self._grant[0] if granting else self._resends) and not (
+                granting and self._taken
+            ):
                 self._fault = self._fault or _fault_of(reply)
         elif not granting:
             try:
                 self._take_pieces(lcmtypes.resend_reply_t.decode(reply.body))
             except Exception:
-                return    # broken: it is asked for again
+                return  # broken: it is asked for again
         elif reply.sequence == self._grant[0] and not self._taken:
-            self._taken = self._ask_now = True    # it was repeated: its ticks may be lost
+            self._taken = self._ask_now = True  # it was repeated: its ticks may be lost
 
     def _take_pieces(self, reply: Any) -> None:
         self._newest, self._waits_for = max(self._newest, reply.step), reply.waits_for
@@ -432,12 +516,16 @@ class Stepper:
             elif step is not None:
                 for part in step.parts.values():
                     for entry in part:
-                        if (entry.channel, entry.sequence, len(entry.data)) == (piece.channel_index, piece.sequence, piece.offset):
+                        if (entry.channel, entry.sequence, len(entry.data)) == (
+                            piece.channel_index,
+                            piece.sequence,
+                            piece.offset,
+                        ):
                             self._add_piece(step, entry, bytes(piece.data))
         for tick in ticks:
             self.on_tick(tick)
         self._progress()
-        self._ask_now = bool(reply.parts)    # more may be missing than goes into one reply
+        self._ask_now = bool(reply.parts)  # more may be missing than goes into one reply
 
     @staticmethod
     def _add_piece(step: _Step, entry: _Entry, data: bytes) -> None:
@@ -450,12 +538,17 @@ class Stepper:
             entry.here = True
             step.missing -= 1
         else:
-            entry.data = b""    # from the start again
+            entry.data = b""  # from the start again
 
 
 def _wanted(step: int, channel: int, sequence: int, offset: int) -> Any:
     wanted = lcmtypes.resend_wanted_t()
-    wanted.step, wanted.channel_index, wanted.sequence, wanted.offset = step, channel, sequence, offset
+    wanted.step, wanted.channel_index, wanted.sequence, wanted.offset = (
+        step,
+        channel,
+        sequence,
+        offset,
+    )
     return wanted
 
 
@@ -466,4 +559,9 @@ def _fault_of(reply: Any) -> RuedoError:
         return LeaseLost(text, "UNKNOWN_SESSION")
     if reply.code in (codes.WRONG_RUN, codes.REFUSED):
         return NoServer(text)
-    return RequestError(text, next((k for k, v in vars(codes).items() if k.isupper() and v == reply.code), str(reply.code)))
+    return RequestError(
+        text,
+        next(
+            (k for k, v in vars(codes).items() if k.isupper() and v == reply.code), str(reply.code)
+        ),
+    )

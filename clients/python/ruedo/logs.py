@@ -21,7 +21,11 @@ def read_log(path: str | os.PathLike[str], channels: list[str] | None = None) ->
         import pandas
     except ImportError:
         raise NotSupported("read_log() needs pandas: pip install 'ruedo[logs]'") from None
-    types = {one._get_packed_fingerprint(): one for name, one in vars(lcmtypes).items() if name.endswith("_t") and isinstance(one, type)}
+    types = {
+        one._get_packed_fingerprint(): one
+        for name, one in vars(lcmtypes).items()
+        if name.endswith("_t") and isinstance(one, type)
+    }
     rows: dict[str, list[dict[str, Any]]] = {}
     if not os.path.isfile(path):
         raise FileNotFoundError(f"{os.fspath(path)}: no such file")
@@ -33,7 +37,9 @@ def read_log(path: str | os.PathLike[str], channels: list[str] | None = None) ->
             message = message_type.decode(event.data)
         except Exception:
             continue
-        rows.setdefault(event.channel, []).append({name: _plain(getattr(message, name)) for name in message.__slots__})
+        rows.setdefault(event.channel, []).append(
+            {name: _plain(getattr(message, name)) for name in message.__slots__}
+        )
     frames = {}
     for channel, all_of_it in rows.items():
         frame = pandas.DataFrame(all_of_it)

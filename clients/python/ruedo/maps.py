@@ -21,8 +21,8 @@ class OccupancyMap:
     origin + resolution * (column + 0.5, row + 0.5), in m."""
 
     cells: NDArray[np.int8]
-    resolution: float                        # m, of a cell
-    origin: tuple[float, float, float]       # x, y (m) of the south-western corner, and heading (rad)
+    resolution: float  # m, of a cell
+    origin: tuple[float, float, float]  # x, y (m) of the south-western corner, and heading (rad)
 
     def __repr__(self) -> str:
         rows, columns = self.cells.shape
@@ -30,8 +30,15 @@ class OccupancyMap:
 
     def at(self, x: float, y: float) -> int:
         """The cell at a place of the world (m); unknown outside of the map."""
-        turn = np.array([[np.cos(self.origin[2]), np.sin(self.origin[2])], [-np.sin(self.origin[2]), np.cos(self.origin[2])]])
-        column, row = np.floor(turn @ (np.array([x, y]) - self.origin[:2]) / self.resolution).astype(int)
+        turn = np.array(
+            [
+                [np.cos(self.origin[2]), np.sin(self.origin[2])],
+                [-np.sin(self.origin[2]), np.cos(self.origin[2])],
+            ]
+        )
+        column, row = np.floor(
+            turn @ (np.array([x, y]) - self.origin[:2]) / self.resolution
+        ).astype(int)
         inside = 0 <= row < self.cells.shape[0] and 0 <= column < self.cells.shape[1]
         return int(self.cells[row, column]) if inside else UNKNOWN
 
@@ -56,8 +63,14 @@ def load_map(path: str | os.PathLike[str]) -> OccupancyMap:
     if missing:
         raise ValueError(f"{file}: {', '.join(missing)} is missing")
     resolution, origin = _number(file, head, "resolution"), head["origin"]
-    if not (isinstance(origin, list) and len(origin) == 3 and all(isinstance(one, (int, float)) for one in origin)):
-        raise ValueError(f"{file}: origin is {origin!r}: three numbers are wanted, x, y and heading")
+    if not (
+        isinstance(origin, list)
+        and len(origin) == 3
+        and all(isinstance(one, (int, float)) for one in origin)
+    ):
+        raise ValueError(
+            f"{file}: origin is {origin!r}: three numbers are wanted, x, y and heading"
+        )
     grey = _grey(file.parent / str(head["image"])).astype(np.float64) / 255.0
     dark = grey if head.get("negate") else 1.0 - grey
     cells = np.full(grey.shape, UNKNOWN, np.int8)
@@ -79,13 +92,15 @@ def _grey(picture: Path) -> NDArray[np.uint8]:
     content = picture.read_bytes()
     if not content.startswith(b"P5"):
         try:
-            from PIL import Image    # type: ignore[import-not-found, unused-ignore]
+            from PIL import Image  # type: ignore[import-not-found, unused-ignore]
         except ImportError:
-            raise NotSupported(f"{picture}: pictures other than PGM need Pillow: pip install pillow") from None
+            raise NotSupported(
+                f"{picture}: pictures other than PGM need Pillow: pip install pillow"
+            ) from None
         return np.asarray(Image.open(picture).convert("L"))
     words: list[bytes] = []
     rest = content[2:]
-    while len(words) < 3:    # width, height and largest value; comments between them
+    while len(words) < 3:  # width, height and largest value; comments between them
         rest = rest.lstrip()
         if rest.startswith(b"#"):
             rest = rest.partition(b"\n")[2]
@@ -94,8 +109,10 @@ def _grey(picture: Path) -> NDArray[np.uint8]:
         if not word.isdigit():
             raise ValueError(f"{picture}: is no PGM")
         words.append(word)
-        rest = rest[len(word):]
+        rest = rest[len(word) :]
     width, height, largest = map(int, words)
     if largest != 255 or len(rest) - 1 < width * height:
-        raise ValueError(f"{picture}: a PGM of 8 bits with {width} x {height} pixels is wanted, and {len(rest) - 1} bytes are there")
+        raise ValueError(
+            f"{picture}: a PGM of 8 bits with {width} x {height} pixels is wanted, and {len(rest) - 1} bytes are there"
+        )
     return np.frombuffer(rest, np.uint8, width * height, 1).reshape(height, width)

@@ -28,12 +28,14 @@ class Motion:
     def __init__(self, sim: Simulation, robot: str, id: int, kind: str, amount: float):
         self.id, self.kind = id, kind
         self.state = "sent"
-        self.progress = 0.0               # m or rad done
-        self.remaining = amount           # m or rad
-        self.reason = ""                  # why it ended early or was refused: MotionStatus's, "removed", "new run"
+        self.progress = 0.0  # m or rad done
+        self.remaining = amount  # m or rad
+        self.reason = ""  # why it ended early or was refused: MotionStatus's, "removed", "new run"
         self._sim, self._robot = sim, robot
         self._unseen = 0
-        self._utime = -1                  # of the newest status; before it is another run's, or of a reset that info will tell of
+        self._utime = (
+            -1
+        )  # of the newest status; before it is another run's, or of a reset that info will tell of
         self._sent = time.monotonic()
         self._news = threading.Condition()
 
@@ -49,14 +51,19 @@ class Motion:
         with self._news:
             while not self.done:
                 if deadline is not None and time.monotonic() >= deadline:
-                    raise Timeout(f"{self._robot}: {self.kind} was not done within {timeout:g} s "
-                                  f"({self.remaining:.3f} remain)")
+                    raise Timeout(
+                        f"{self._robot}: {self.kind} was not done within {timeout:g} s "
+                        f"({self.remaining:.3f} remain)"
+                    )
                 left = 0.5 if deadline is None else max(0.0, min(0.5, deadline - time.monotonic()))
                 self._news.wait(left)
                 self._sim._check_server()
         if self.state != "done":
-            raise MotionError(f"{self._robot}: {self.kind} {'was refused' if self.state == 'refused' else 'ended'}: "
-                              f"{self.reason}, {self.remaining:.3f} remain", self.reason)
+            raise MotionError(
+                f"{self._robot}: {self.kind} {'was refused' if self.state == 'refused' else 'ended'}: "
+                f"{self.reason}, {self.remaining:.3f} remain",
+                self.reason,
+            )
         return self
 
     def _update(self, status: MotionStatus) -> None:
@@ -68,12 +75,18 @@ class Motion:
                 self.progress, self.remaining = status.progress, status.remaining
                 self.state, self.reason = status.state, status.reason
             elif status.state == "refused":
-                pass                             # another command, which changed nothing
+                pass  # another command, which changed nothing
             elif self.state != "sent":
-                self.state, self.reason = "ended", "replaced"    # its own end fell between two statuses
+                self.state, self.reason = (
+                    "ended",
+                    "replaced",
+                )  # its own end fell between two statuses
             else:
                 self._unseen += 1
-                if self._unseen >= _UNSEEN_STATUSES and time.monotonic() - self._sent >= _UNSEEN_SECONDS:
+                if (
+                    self._unseen >= _UNSEEN_STATUSES
+                    and time.monotonic() - self._sent >= _UNSEEN_SECONDS
+                ):
                     self.state, self.reason = "ended", "replaced"
             self._news.notify_all()
 
@@ -97,7 +110,7 @@ class Driver:
         self._held: tuple[str, bytes] | None = None
         self._motions: list[Motion] = []
         self._statuses: Subscription | None = None
-        self._running = False          # a status has shown the held command
+        self._running = False  # a status has shown the held command
         self._watchdog_told = False
         self._ended = ""
 
@@ -124,7 +137,7 @@ class Driver:
         self._listen()
         motion = Motion(self._sim, self._robot, command.id, kind, abs(command.value))
         with self._lock:
-            self._held = None    # a repetition after this would replace the primitive
+            self._held = None  # a repetition after this would replace the primitive
             self._motions = [m for m in self._motions if not m.done] + [motion]
             self._sim._bus.publish(channel, command.encode())
         return motion
@@ -147,12 +160,12 @@ class Driver:
                 motion._utime = -1
 
     def _watchdog(self) -> float:
-        robot = self._sim._info.robots.get(self._robot)    # None: removed meanwhile
+        robot = self._sim._info.robots.get(self._robot)  # None: removed meanwhile
         return float(robot.watchdog_us) * 1e-6 if robot else 0.0
 
     def _listen(self) -> None:
         with self._lock:
-            if self._ended:    # while the command was being made
+            if self._ended:  # while the command was being made
                 raise UnknownName(f"{self._robot} is gone: {self._ended}")
             if self._statuses is None:
                 self._statuses = self._sim.robot(self._robot).motion.on_sample(self._on_status)
@@ -160,11 +173,22 @@ class Driver:
     def _on_status(self, status: MotionStatus) -> None:
         with self._lock:
             motions = list(self._motions)
-            self._running = self._running or (self._held is not None and status.id == 0 and status.state == "running")
-            stopped = self._running and self._held is not None and status.reason == "watchdog" and not self._watchdog_told
+            self._running = self._running or (
+                self._held is not None and status.id == 0 and status.state == "running"
+            )
+            stopped = (
+                self._running
+                and self._held is not None
+                and status.reason == "watchdog"
+                and not self._watchdog_told
+            )
             self._watchdog_told = self._watchdog_told or stopped
         if stopped:
-            log.warning("%s: stopped by its watchdog: no command came for %g s of sim time", self._robot, self._watchdog())
+            log.warning(
+                "%s: stopped by its watchdog: no command came for %g s of sim time",
+                self._robot,
+                self._watchdog(),
+            )
         for motion in motions:
             if not motion.done:
                 motion._update(status)

@@ -34,17 +34,35 @@ class RegressionFailed(RuedoError, AssertionError):
 class Regression:
     """A run that was as expected."""
 
-    log: Path          # of the whole run, a standard LCM log
-    output: str        # what the client and `ruedo regress` printed
+    log: Path  # of the whole run, a standard LCM log
+    output: str  # what the client and `ruedo regress` printed
 
 
-def run_regression(world: _PathLike, *, client: Sequence[_PathLike] | str | None = None, duration: float, seed: int = 1,
-                   record: _PathLike = "run.lcm", robot: str | None = None, goal: tuple[float, float] | None = None,
-                   radius: float | None = None, by: float | None = None, no_contact: bool = False, clearance: float | None = None,
-                   odometry_error: float | None = None, golden: _PathLike | None = None, keep: Sequence[str] = (),
-                   tolerances: Sequence[str] = (), ignore: Sequence[str] = (), lockstep: int = 0, wait_for: Sequence[str] = (),
-                   script: Sequence[_PathLike] | str | None = None, options: Sequence[str] = (), folder: _PathLike | None = None,
-                   timeout: float = 300.0) -> Regression:
+def run_regression(
+    world: _PathLike,
+    *,
+    client: Sequence[_PathLike] | str | None = None,
+    duration: float,
+    seed: int = 1,
+    record: _PathLike = "run.lcm",
+    robot: str | None = None,
+    goal: tuple[float, float] | None = None,
+    radius: float | None = None,
+    by: float | None = None,
+    no_contact: bool = False,
+    clearance: float | None = None,
+    odometry_error: float | None = None,
+    golden: _PathLike | None = None,
+    keep: Sequence[str] = (),
+    tolerances: Sequence[str] = (),
+    ignore: Sequence[str] = (),
+    lockstep: int = 0,
+    wait_for: Sequence[str] = (),
+    script: Sequence[_PathLike] | str | None = None,
+    options: Sequence[str] = (),
+    folder: _PathLike | None = None,
+    timeout: float = 300.0,
+) -> Regression:
     """`ruedo regress` with these options; raises RegressionFailed.
 
     client, script: words, or a line for a shell; the client finds the run by LCM_DEFAULT_URL, the script its log by
@@ -52,31 +70,64 @@ def run_regression(world: _PathLike, *, client: Sequence[_PathLike] | str | None
     options: more of `ruedo regress`, such as ["--spawn", "p3at@1,2"]. folder: where client and script run. timeout: s of
     real time.
     """
-    command = [find_ruedo(), "regress", os.fspath(world), "--duration", str(duration), "--seed", str(seed),
-               "--record", os.path.abspath(record)]
+    command = [
+        find_ruedo(),
+        "regress",
+        os.fspath(world),
+        "--duration",
+        str(duration),
+        "--seed",
+        str(seed),
+        "--record",
+        os.path.abspath(record),
+    ]
     if goal is not None:
         if radius is None or by is None:
             raise ValueError("a goal needs its radius (m) and by (s)")
         command.append(f"--goal={goal[0]!r},{goal[1]!r},{radius!r},{by!r}")
     for name, value in (("client", client), ("script", script)):
         if value is not None:
-            command += [f"--{name}", value if isinstance(value, str) else shlex.join(os.fspath(word) for word in value)]
-    for name, one in (("robot", robot), ("clearance", clearance), ("odometry-error", odometry_error), ("lockstep", lockstep or None)):
+            command += [
+                f"--{name}",
+                value if isinstance(value, str) else shlex.join(os.fspath(word) for word in value),
+            ]
+    for name, one in (
+        ("robot", robot),
+        ("clearance", clearance),
+        ("odometry-error", odometry_error),
+        ("lockstep", lockstep or None),
+    ):
         if one is not None:
             command += [f"--{name}", str(one)]
     if golden is not None:
         command += ["--golden", os.path.abspath(golden)]
-    for name, several in (("keep", keep), ("tolerance", tolerances), ("ignore", ignore), ("wait-for", wait_for)):
+    for name, several in (
+        ("keep", keep),
+        ("tolerance", tolerances),
+        ("ignore", ignore),
+        ("wait-for", wait_for),
+    ):
         for item in several:
             command += [f"--{name}", item]
     if no_contact:
         command.append("--no-contact")
     try:
-        done = subprocess.run([*command, *options], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=timeout)
+        done = subprocess.run(
+            [*command, *options],
+            cwd=folder,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=timeout,
+        )
     except subprocess.TimeoutExpired as error:
-        raise RegressionFailed(f"the regression took more than {timeout:g} s of real time; {shlex.join(command)}\n{error.output or ''}") from None
+        raise RegressionFailed(
+            f"the regression took more than {timeout:g} s of real time; {shlex.join(command)}\n{error.output or ''}"
+        ) from None
     if done.returncode != 0:
-        raise RegressionFailed(f"{done.stdout}\n(exit code {done.returncode} of {shlex.join(command)})")
+        raise RegressionFailed(
+            f"{done.stdout}\n(exit code {done.returncode} of {shlex.join(command)})"
+        )
     return Regression(Path(record).absolute(), done.stdout)
 
 
@@ -92,7 +143,7 @@ def ruedo_regression(request: pytest.FixtureRequest, tmp_path: Path) -> Callable
         if options.get("golden") is not None:
             options["golden"] = here / str(options["golden"])
         beside = here / world
-        result = run_regression(beside if beside.exists() else world, **options)    # type: ignore[arg-type]
+        result = run_regression(beside if beside.exists() else world, **options)  # type: ignore[arg-type]
         print(result.output, file=sys.stderr)
         return result
 

@@ -12,8 +12,20 @@ from . import lcmtypes
 from .errors import NotSupported, UnknownName
 from .lockstep import Command
 from .motion import Motion
-from .samples import (CameraInfo, Contact, Floats, Image, Imu, Joints, LidarScan, MotionStatus, Odometry, Pose, Scan,
-                      SonarReading)
+from .samples import (
+    CameraInfo,
+    Contact,
+    Floats,
+    Image,
+    Imu,
+    Joints,
+    LidarScan,
+    MotionStatus,
+    Odometry,
+    Pose,
+    Scan,
+    SonarReading,
+)
 from .stream import Stream
 
 if TYPE_CHECKING:
@@ -76,7 +88,7 @@ class Robot:
     def __init__(self, sim: Simulation, name: str):
         self.name = name
         self._sim = sim
-        self._devices_of: Any = None    # the info that _devices_now was made from
+        self._devices_of: Any = None  # the info that _devices_now was made from
         self._devices_now: list[Device[Any]] = []
 
     def __repr__(self) -> str:
@@ -141,7 +153,9 @@ class Robot:
         for device in devices:
             if device.name == name:
                 return device
-        raise UnknownName(f"{self.name} has no device {name!r}; it has {', '.join(d.name for d in devices) or 'none'}")
+        raise UnknownName(
+            f"{self.name} has no device {name!r}; it has {', '.join(d.name for d in devices) or 'none'}"
+        )
 
     @property
     def lrf(self) -> Device[Scan]:
@@ -209,7 +223,12 @@ class Robot:
     def velocity_command(self, v: float, omega: float, vy: float = 0.0) -> Command:
         """What set_velocity() sends, once, for Simulation.step()."""
         command = lcmtypes.velocity_command_t()
-        command.utime, command.vx, command.vy, command.omega = self._sim._utime, _finite("v", v), _finite("vy", vy), _finite("omega", omega)
+        command.utime, command.vx, command.vy, command.omega = (
+            self._sim._utime,
+            _finite("v", v),
+            _finite("vy", vy),
+            _finite("omega", omega),
+        )
         return Command(self._input("velocity_command_t"), command.encode())
 
     def wheel_command(self, left: float, right: float) -> Command:
@@ -219,18 +238,36 @@ class Robot:
         command.rate = [_finite("left", left), _finite("right", right)]
         return Command(self._input("wheel_command_t"), command.encode())
 
-    def move_command(self, kind: str, value: float, speed: float = 0.0, acceleration: float = 0.0, deceleration: float = 0.0,
-                     radius: float = 0.0) -> Command:
+    def move_command(
+        self,
+        kind: str,
+        value: float,
+        speed: float = 0.0,
+        acceleration: float = 0.0,
+        deceleration: float = 0.0,
+        radius: float = 0.0,
+    ) -> Command:
         """A motion primitive for Simulation.step(). kind: "advance", "rotate", "heading", "arc" or "stop"; value in m or
         rad, of a stop 0; limits and radius as in advance() and its like."""
-        kinds = {name: getattr(lcmtypes.move_command_t, name.upper()) for name in ("advance", "rotate", "heading", "arc", "stop")}
+        kinds = {
+            name: getattr(lcmtypes.move_command_t, name.upper())
+            for name in ("advance", "rotate", "heading", "arc", "stop")
+        }
         if kind not in kinds:
             raise ValueError(f"kind is {kind!r}: it must be one of {', '.join(map(repr, kinds))}")
         command = self._move_message(kinds[kind], value, radius, speed, acceleration, deceleration)
         return Command(self._input("move_command_t"), command.encode())
 
-    def fault_command(self, kind: str, target: str = "", *, duration: float = 0.0, value: float = 0.0, view: tuple[float, float] = (0.0, 1.0),
-                      place: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Command:
+    def fault_command(
+        self,
+        kind: str,
+        target: str = "",
+        *,
+        duration: float = 0.0,
+        value: float = 0.0,
+        view: tuple[float, float] = (0.0, 1.0),
+        place: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    ) -> Command:
         """A fault for Simulation.step(), or for inject(). kind and target as in proto/fault_t.lcm: "freeze" of "lrf", "kidnapped".
 
         duration: s of sim time, 0: to the end. view: of "blocked", parts of the field of view. place: of "kidnapped", m, m, rad.
@@ -251,35 +288,94 @@ class Robot:
         """Comes to rest. deceleration: limit in m/s^2, 0: the robot's own."""
         return self._move("stop", lcmtypes.move_command_t.STOP, 0.0, deceleration=deceleration)
 
-    def advance(self, distance: float, speed: float = 0.0, acceleration: float = 0.0, deceleration: float = 0.0) -> Motion:
+    def advance(
+        self,
+        distance: float,
+        speed: float = 0.0,
+        acceleration: float = 0.0,
+        deceleration: float = 0.0,
+    ) -> Motion:
         """Drives straight on by a distance (m, negative: back), and comes to rest. Returns at once; wait() on what
         it returns waits for the end. Limits in m/s and m/s^2, 0: the robot's own."""
-        return self._move("advance", lcmtypes.move_command_t.ADVANCE, distance, 0.0, speed, acceleration, deceleration)
+        return self._move(
+            "advance",
+            lcmtypes.move_command_t.ADVANCE,
+            distance,
+            0.0,
+            speed,
+            acceleration,
+            deceleration,
+        )
 
-    def rotate(self, angle: float, speed: float = 0.0, acceleration: float = 0.0, deceleration: float = 0.0) -> Motion:
+    def rotate(
+        self, angle: float, speed: float = 0.0, acceleration: float = 0.0, deceleration: float = 0.0
+    ) -> Motion:
         """Turns on the spot by an angle (rad, more than a turn is allowed). Limits in rad/s and rad/s^2."""
         _radians("rotate", angle, 4.0 * math.pi)
-        return self._move("rotate", lcmtypes.move_command_t.ROTATE, angle, 0.0, speed, acceleration, deceleration)
+        return self._move(
+            "rotate", lcmtypes.move_command_t.ROTATE, angle, 0.0, speed, acceleration, deceleration
+        )
 
-    def turn_to(self, heading: float, speed: float = 0.0, acceleration: float = 0.0, deceleration: float = 0.0) -> Motion:
+    def turn_to(
+        self,
+        heading: float,
+        speed: float = 0.0,
+        acceleration: float = 0.0,
+        deceleration: float = 0.0,
+    ) -> Motion:
         """Turns on the spot, the shorter way, to a heading (rad, in the frame odom). Limits in rad/s and rad/s^2."""
         _radians("turn_to", heading, 2.0 * math.pi)
-        return self._move("turn_to", lcmtypes.move_command_t.HEADING, heading, 0.0, speed, acceleration, deceleration)
+        return self._move(
+            "turn_to",
+            lcmtypes.move_command_t.HEADING,
+            heading,
+            0.0,
+            speed,
+            acceleration,
+            deceleration,
+        )
 
-    def arc(self, angle: float, radius: float, speed: float = 0.0, acceleration: float = 0.0, deceleration: float = 0.0) -> Motion:
+    def arc(
+        self,
+        angle: float,
+        radius: float,
+        speed: float = 0.0,
+        acceleration: float = 0.0,
+        deceleration: float = 0.0,
+    ) -> Motion:
         """Drives ahead along a circle of a radius (m, > 0) until it has turned by an angle (rad; positive: to the
         left). Limits in m/s and m/s^2."""
         if not radius > 0.0:
-            raise ValueError(f"radius is {radius}: it must be > 0 m; the sign of the angle says left or right")
+            raise ValueError(
+                f"radius is {radius}: it must be > 0 m; the sign of the angle says left or right"
+            )
         _radians("arc", angle, 4.0 * math.pi)
-        return self._move("arc", lcmtypes.move_command_t.ARC, angle, radius, speed, acceleration, deceleration)
+        return self._move(
+            "arc", lcmtypes.move_command_t.ARC, angle, radius, speed, acceleration, deceleration
+        )
 
-    def _move(self, name: str, kind: int, value: float, radius: float = 0.0, speed: float = 0.0, acceleration: float = 0.0,
-              deceleration: float = 0.0) -> Motion:
+    def _move(
+        self,
+        name: str,
+        kind: int,
+        value: float,
+        radius: float = 0.0,
+        speed: float = 0.0,
+        acceleration: float = 0.0,
+        deceleration: float = 0.0,
+    ) -> Motion:
         command = self._move_message(kind, value, radius, speed, acceleration, deceleration)
         return self._sim._driver(self.name).move(self._input("move_command_t"), command, name)
 
-    def _move_message(self, kind: int, value: float, radius: float, speed: float, acceleration: float, deceleration: float) -> Any:
+    def _move_message(
+        self,
+        kind: int,
+        value: float,
+        radius: float,
+        speed: float,
+        acceleration: float,
+        deceleration: float,
+    ) -> Any:
         command = lcmtypes.move_command_t()
         command.utime, command.id, command.kind = self._sim._utime, self._sim._next_id(), kind
         command.value, command.radius = _finite("value", value), _finite("radius", radius)
@@ -296,7 +392,9 @@ class Robot:
 
     def _input(self, type: str) -> str:
         if not self.drive:
-            raise NotSupported(f"{self.name} cannot be driven: its model has no drive; --drive {self.name}=LEFT+...,RIGHT+... gives it one, by its wheel joints")
+            raise NotSupported(
+                f"{self.name} cannot be driven: its model has no drive; --drive {self.name}=LEFT+...,RIGHT+... gives it one, by its wheel joints"
+            )
         for channel in self._channels:
             if channel.input and channel.type == type:
                 return str(channel.name)
@@ -306,7 +404,9 @@ class Robot:
         for channel in self._channels:
             if channel.device == info.name and not channel.input:
                 make = Camera if channel.type == "image_t" else Device
-                stream = self._sim._stream(channel, lambda: make(self._sim, self.name, info, channel))
+                stream = self._sim._stream(
+                    channel, lambda: make(self._sim, self.name, info, channel)
+                )
                 return stream if isinstance(stream, Device) else None
         return None
 
@@ -315,7 +415,9 @@ class Robot:
         for device in devices:
             if device.type == type:
                 return device
-        raise UnknownName(f"{self.name} has no {what}; it has {', '.join(d.name for d in devices) or 'no devices'}")
+        raise UnknownName(
+            f"{self.name} has no {what}; it has {', '.join(d.name for d in devices) or 'no devices'}"
+        )
 
     def _stream(self, type: str, what: str) -> Any:
         for device in self.devices:
@@ -328,19 +430,31 @@ class Robot:
 
     def _camera_part(self, camera: str, part: str) -> Any:
         for channel in self._channels:
-            named = channel.device == f"{camera}/{part}" or (channel.device == camera and channel.name.endswith("/" + part))
+            named = channel.device == f"{camera}/{part}" or (
+                channel.device == camera and channel.name.endswith("/" + part)
+            )
             if named and not channel.input:
                 return self._plain(channel)
-        raise UnknownName(f"{self.name}/{camera} publishes no {part}; <ruedo:{part}> in the world file switches it on")
+        raise UnknownName(
+            f"{self.name}/{camera} publishes no {part}; <ruedo:{part}> in the world file switches it on"
+        )
 
     def _plain(self, channel: Any) -> Stream[Any]:
-        return self._sim._stream(channel, lambda: Stream(self._sim, channel.name, channel.type, channel.fingerprint, channel.rate))
+        return self._sim._stream(
+            channel,
+            lambda: Stream(
+                self._sim, channel.name, channel.type, channel.fingerprint, channel.rate
+            ),
+        )
 
 
 def _radians(call: str, angle: float, usual: float) -> None:
     """Whole degrees that are many turns as radians are taken for a mistake, and named; they are obeyed all the same."""
     if abs(angle) > usual and float(angle).is_integer():
-        warnings.warn(f"{call}({angle:g}) is {abs(angle) / (2.0 * math.pi):.1f} turns: angles are in radians, {call}(math.radians({angle:g}))", stacklevel=3)
+        warnings.warn(
+            f"{call}({angle:g}) is {abs(angle) / (2.0 * math.pi):.1f} turns: angles are in radians, {call}(math.radians({angle:g}))",
+            stacklevel=3,
+        )
 
 
 def _finite(name: str, value: float) -> float:
@@ -351,5 +465,7 @@ def _finite(name: str, value: float) -> float:
 
 def _limit(name: str, value: float) -> float:
     if not (math.isfinite(value) and value >= 0.0):
-        raise ValueError(f"{name} is {value}: it must be a finite number >= 0; 0 is the robot's own limit")
+        raise ValueError(
+            f"{name} is {value}: it must be a finite number >= 0; 0 is the robot's own limit"
+        )
     return float(value)

@@ -26,10 +26,27 @@ _PIXEL_FORMATS = {
     lcmtypes.image_t.PIXEL_FORMAT_LE_GRAY16: "gray16",
     lcmtypes.image_t.PIXEL_FORMAT_FLOAT_GRAY32: "float32",
 }
-_MOTION_KINDS = {0: "none", 1: "advance", 2: "rotate", 3: "heading", 4: "arc", 5: "stop", 16: "velocity", 17: "wheels"}
+_MOTION_KINDS = {
+    0: "none",
+    1: "advance",
+    2: "rotate",
+    3: "heading",
+    4: "arc",
+    5: "stop",
+    16: "velocity",
+    17: "wheels",
+}
 _MOTION_STATES = {0: "idle", 1: "running", 2: "done", 3: "ended", 4: "refused"}
 _MOTION_REASONS = {
-    0: "", 1: "replaced", 2: "blocked", 3: "watchdog", 4: "not finite", 5: "bad kind", 6: "bad value", 7: "no drive", 8: "not possible",
+    0: "",
+    1: "replaced",
+    2: "blocked",
+    3: "watchdog",
+    4: "not finite",
+    5: "bad kind",
+    6: "bad value",
+    7: "no drive",
+    8: "not possible",
 }
 
 
@@ -37,22 +54,24 @@ class _Value:
     """Equal when all is equal, NaN to NaN too; hashed alike; and shown in a line."""
 
     def _key(self) -> tuple[Any, ...]:
-        return tuple(_comparable(getattr(self, field.name)) for field in fields(self))    # type: ignore[arg-type]
+        return tuple(_comparable(getattr(self, field.name)) for field in fields(self))  # type: ignore[arg-type]
 
     def __eq__(self, other: object) -> bool:
-        return self is other or (type(self) is type(other) and self._key() == other._key())    # type: ignore[attr-defined]
+        return self is other or (type(self) is type(other) and self._key() == other._key())  # type: ignore[attr-defined]
 
     def __hash__(self) -> int:
         return hash((type(self), self._key()))
 
     def __repr__(self) -> str:
-        shown = ", ".join(f"{field.name}={_short(getattr(self, field.name))}" for field in fields(self))    # type: ignore[arg-type]
+        shown = ", ".join(
+            f"{field.name}={_short(getattr(self, field.name))}" for field in fields(self)
+        )  # type: ignore[arg-type]
         return f"{type(self).__name__}({shown})"
 
 
 def _comparable(value: Any) -> Any:
     if isinstance(value, np.ndarray):
-        return value.shape, value.dtype.str, (value + 0).tobytes()    # -0 as 0
+        return value.shape, value.dtype.str, (value + 0).tobytes()  # -0 as 0
     if isinstance(value, list):
         return tuple(_comparable(one) for one in value)
     return "nan" if isinstance(value, float) and math.isnan(value) else value
@@ -87,9 +106,9 @@ class Sample(_Value):
 class Scan(Sample):
     """A scan of a planar laser range finder with n rays, in the device's frame."""
 
-    ranges: Floats         # (n,) m; +inf: no return, -inf: nearer than the minimum range
-    angles: Floats         # (n,) rad from the device's x axis towards y (left)
-    intensities: Floats    # (n,) 0 to 1; (0,) when the device has none
+    ranges: Floats  # (n,) m; +inf: no return, -inf: nearer than the minimum range
+    angles: Floats  # (n,) rad from the device's x axis towards y (left)
+    intensities: Floats  # (n,) 0 to 1; (0,) when the device has none
 
     def nearest(self, from_angle: float = -math.pi, to_angle: float = math.pi) -> float:
         """The smallest range (m) between two angles (rad); +inf when nothing is there, -inf when something
@@ -132,45 +151,47 @@ class Scan(Sample):
 class LidarScan(Sample):
     """A scan of a laser scanner with m layers of n rays, in the device's frame."""
 
-    ranges: Floats         # (m, n) m, lowest layer first; +inf: no return, -inf: nearer than the minimum range
-    azimuths: Floats       # (n,) rad, left is positive
-    elevations: Floats     # (m,) rad, up is positive
-    intensities: Floats    # (m, n) 0 to 1, or (0, 0)
+    ranges: (
+        Floats  # (m, n) m, lowest layer first; +inf: no return, -inf: nearer than the minimum range
+    )
+    azimuths: Floats  # (n,) rad, left is positive
+    elevations: Floats  # (m,) rad, up is positive
+    intensities: Floats  # (m, n) 0 to 1, or (0, 0)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SonarReading(Sample):
     """The last reading of each of an array's n transducers; their poses are the device's `elements`."""
 
-    ranges: Floats               # (n,) m from the transducer's face; without an echo: the maximum range
-    fired_utime: NDArray[np.int64]    # (n,) us of sim time at which each fired last; -1: not yet
-    fresh: NDArray[np.bool_]     # (n,) true where the reading is of this very message
+    ranges: Floats  # (n,) m from the transducer's face; without an echo: the maximum range
+    fired_utime: NDArray[np.int64]  # (n,) us of sim time at which each fired last; -1: not yet
+    fresh: NDArray[np.bool_]  # (n,) true where the reading is of this very message
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Odometry(Sample):
     """What the robot believes of its motion from its wheels; pose of base_link in the frame odom."""
 
-    x: float                     # m
-    y: float                     # m
-    theta: float                 # rad, not wrapped
-    v: float                     # m/s
-    omega: float                 # rad/s
-    wheel_angles: Floats         # (n,) rad since the start, positive ahead; order of Robot.wheels
-    wheel_rates: Floats          # (n,) rad/s
-    ticks: NDArray[np.int64]     # (n,) encoder counts
-    resets: int                  # how often the pose was reset
+    x: float  # m
+    y: float  # m
+    theta: float  # rad, not wrapped
+    v: float  # m/s
+    omega: float  # rad/s
+    wheel_angles: Floats  # (n,) rad since the start, positive ahead; order of Robot.wheels
+    wheel_rates: Floats  # (n,) rad/s
+    ticks: NDArray[np.int64]  # (n,) encoder counts
+    resets: int  # how often the pose was reset
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Pose(Sample):
     """The true pose of base_link in the world; velocities are expressed in base_link."""
 
-    position: Floats         # (3,) m
-    orientation: Floats      # (4,) w, x, y, z
-    velocity: Floats         # (3,) m/s
-    rotation_rate: Floats    # (3,) rad/s
-    acceleration: Floats     # (3,) m/s^2, without gravity
+    position: Floats  # (3,) m
+    orientation: Floats  # (4,) w, x, y, z
+    velocity: Floats  # (3,) m/s
+    rotation_rate: Floats  # (3,) rad/s
+    acceleration: Floats  # (3,) m/s^2, without gravity
 
     @property
     def x(self) -> float:
@@ -192,21 +213,23 @@ class Image(Sample):
     """A picture. format: "jpeg", "rgb", "bgr", "gray", "gray16" (labels: body index + 1) or "float32"
     (depth, m along the optical axis, +inf: nothing)."""
 
-    width: int         # pixels
-    height: int        # pixels
+    width: int  # pixels
+    height: int  # pixels
     format: str
-    row_stride: int    # bytes in a row, 0 for jpeg
-    data: bytes        # as they came
+    row_stride: int  # bytes in a row, 0 for jpeg
+    data: bytes  # as they came
 
     def array(self) -> NDArray[Any]:
         """The pixels, rows from the top: (height, width, 3) uint8 in the order R, G, B for "jpeg", "rgb" and
         "bgr"; (height, width) uint8, uint16 or float32 for the others. Pictures in "jpeg" need Pillow."""
         if self.format == "jpeg":
             try:
-                from PIL import Image as pillow    # type: ignore[import-not-found, unused-ignore]
+                from PIL import Image as pillow  # type: ignore[import-not-found, unused-ignore]
             except ImportError:
-                raise ImportError("the picture is a JPEG: array() needs Pillow (pip install pillow); "
-                                  "save(path) writes it without") from None
+                raise ImportError(
+                    "the picture is a JPEG: array() needs Pillow (pip install pillow); "
+                    "save(path) writes it without"
+                ) from None
             import io
 
             return np.asarray(pillow.open(io.BytesIO(self.data)).convert("RGB"))
@@ -216,8 +239,10 @@ class Image(Sample):
         pixel_bytes = np.dtype(dtype).itemsize * channels
         stride = self.row_stride or self.width * pixel_bytes
         if stride < self.width * pixel_bytes or len(self.data) < stride * self.height:
-            raise ValueError(f"a {self.format} picture of {self.width} x {self.height} pixels needs more than "
-                             f"{len(self.data)} bytes in rows of {stride}")
+            raise ValueError(
+                f"a {self.format} picture of {self.width} x {self.height} pixels needs more than "
+                f"{len(self.data)} bytes in rows of {stride}"
+            )
         rows = np.frombuffer(self.data, np.uint8, stride * self.height).reshape(self.height, stride)
         pixels = np.ascontiguousarray(rows[:, : self.width * pixel_bytes]).view(dtype)
         if channels == 1:
@@ -242,38 +267,44 @@ class Image(Sample):
         Path(path).write_bytes(content)
 
 
-_RAW = {"gray": ("u1", 1), "rgb": ("u1", 3), "bgr": ("u1", 3), "gray16": ("<u2", 1), "float32": ("<f4", 1)}
+_RAW = {
+    "gray": ("u1", 1),
+    "rgb": ("u1", 3),
+    "bgr": ("u1", 3),
+    "gray16": ("<u2", 1),
+    "float32": ("<f4", 1),
+}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CameraInfo(Sample):
     """Intrinsics: a pinhole with OpenCV's distortion."""
 
-    width: int             # pixels
-    height: int            # pixels
-    fx: float              # pixels
-    fy: float              # pixels
-    cx: float              # pixels
-    cy: float              # pixels
-    distortion: Floats     # (5,) k1, k2, p1, p2, k3
+    width: int  # pixels
+    height: int  # pixels
+    fx: float  # pixels
+    fy: float  # pixels
+    cx: float  # pixels
+    cy: float  # pixels
+    distortion: Floats  # (5,) k1, k2, p1, p2, k3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Imu(Sample):
     """An inertial measurement unit, in the device's frame."""
 
-    orientation: Floats            # (4,) w, x, y, z: device to world
-    angular_velocity: Floats       # (3,) rad/s
-    linear_acceleration: Floats    # (3,) m/s^2, specific force: at rest gravity upwards
+    orientation: Floats  # (4,) w, x, y, z: device to world
+    angular_velocity: Floats  # (3,) rad/s
+    linear_acceleration: Floats  # (3,) m/s^2, specific force: at rest gravity upwards
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ContactPoint(_Value):
-    body: str            # the other body
-    position: Floats     # (3,) m, world
-    normal: Floats       # (3,) unit vector, world, towards the sensor's body
-    force: float         # N
-    depth: float         # m
+    body: str  # the other body
+    position: Floats  # (3,) m, world
+    normal: Floats  # (3,) unit vector, world, towards the sensor's body
+    force: float  # N
+    depth: float  # m
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -287,23 +318,23 @@ class Contact(Sample):
 @dataclass(frozen=True, eq=False, repr=False)
 class Joints(Sample):
     names: list[str]
-    positions: Floats     # (n,) rad or m
-    velocities: Floats    # (n,) rad/s or m/s
-    efforts: Floats       # (n,) N m or N
+    positions: Floats  # (n,) rad or m
+    velocities: Floats  # (n,) rad/s or m/s
+    efforts: Floats  # (n,) N m or N
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MotionStatus(Sample):
     """What a robot is executing."""
 
-    id: int             # of the primitive; 0 for velocity and wheel commands
-    kind: str           # "none", "advance", "rotate", "heading", "arc", "stop", "velocity", "wheels"
-    state: str          # "idle", "running", "done", "ended", "refused"
-    reason: str         # "", "replaced", "blocked", "watchdog", "not finite", "bad kind", "bad value", "no drive", "not possible"
-    progress: float     # m or rad done
-    remaining: float    # m or rad
-    v: float            # m/s
-    omega: float        # rad/s
+    id: int  # of the primitive; 0 for velocity and wheel commands
+    kind: str  # "none", "advance", "rotate", "heading", "arc", "stop", "velocity", "wheels"
+    state: str  # "idle", "running", "done", "ended", "refused"
+    reason: str  # "", "replaced", "blocked", "watchdog", "not finite", "bad kind", "bad value", "no drive", "not possible"
+    progress: float  # m or rad done
+    remaining: float  # m or rad
+    v: float  # m/s
+    omega: float  # rad/s
 
 
 def _fixed(values: NDArray[Any]) -> NDArray[Any]:
@@ -316,7 +347,12 @@ def _floats(values: Any) -> Floats:
 
 
 def _scan(m: Any) -> Scan:
-    return Scan(m.utime, _floats(m.ranges), _fixed(m.rad0 + m.radstep * np.arange(m.nranges)), _floats(m.intensities))
+    return Scan(
+        m.utime,
+        _floats(m.ranges),
+        _fixed(m.rad0 + m.radstep * np.arange(m.nranges)),
+        _floats(m.intensities),
+    )
 
 
 def _lidar(m: Any) -> LidarScan:
@@ -324,29 +360,60 @@ def _lidar(m: Any) -> LidarScan:
         raise ValueError("sizes that do not fit each other")
     shape = (m.nlayers, m.ncolumns)
     return LidarScan(
-        m.utime, _floats(m.ranges).reshape(shape), _fixed(m.azimuth0 + m.azimuth_step * np.arange(m.ncolumns)),
+        m.utime,
+        _floats(m.ranges).reshape(shape),
+        _fixed(m.azimuth0 + m.azimuth_step * np.arange(m.ncolumns)),
         _fixed(m.elevation0 + m.elevation_step * np.arange(m.nlayers)),
-        _floats(m.intensities).reshape(shape if m.nintensities else (0, 0)))
+        _floats(m.intensities).reshape(shape if m.nintensities else (0, 0)),
+    )
 
 
 def _sonar(m: Any) -> SonarReading:
-    return SonarReading(m.utime, _floats(m.range), _fixed(np.array(m.fired_utime, np.int64)), _fixed(np.array(m.fresh, np.bool_)))
+    return SonarReading(
+        m.utime,
+        _floats(m.range),
+        _fixed(np.array(m.fired_utime, np.int64)),
+        _fixed(np.array(m.fresh, np.bool_)),
+    )
 
 
 def _odometry(m: Any) -> Odometry:
-    return Odometry(m.utime, m.x, m.y, m.theta, m.v, m.omega, _floats(m.angle), _floats(m.rate),
-                    _fixed(np.array(m.ticks, np.int64)), m.resets)
+    return Odometry(
+        m.utime,
+        m.x,
+        m.y,
+        m.theta,
+        m.v,
+        m.omega,
+        _floats(m.angle),
+        _floats(m.rate),
+        _fixed(np.array(m.ticks, np.int64)),
+        m.resets,
+    )
 
 
 def _pose(m: Any) -> Pose:
-    return Pose(m.utime, _floats(m.pos), _floats(m.orientation), _floats(m.vel), _floats(m.rotation_rate), _floats(m.accel))
+    return Pose(
+        m.utime,
+        _floats(m.pos),
+        _floats(m.orientation),
+        _floats(m.vel),
+        _floats(m.rotation_rate),
+        _floats(m.accel),
+    )
 
 
 def _image(m: Any) -> Image:
-    if m.nmetadata < 0:    # lcm-gen's Python reads none then
+    if m.nmetadata < 0:  # lcm-gen's Python reads none then
         raise ValueError(f"a length of {m.nmetadata}")
-    return Image(m.utime, m.width, m.height, _PIXEL_FORMATS.get(m.pixelformat, f"0x{m.pixelformat:08x}"), m.row_stride,
-                 bytes(m.data))
+    return Image(
+        m.utime,
+        m.width,
+        m.height,
+        _PIXEL_FORMATS.get(m.pixelformat, f"0x{m.pixelformat:08x}"),
+        m.row_stride,
+        bytes(m.data),
+    )
 
 
 def _camera_info(m: Any) -> CameraInfo:
@@ -354,23 +421,43 @@ def _camera_info(m: Any) -> CameraInfo:
 
 
 def _imu(m: Any) -> Imu:
-    return Imu(m.utime, _floats(m.orientation), _floats(m.angular_velocity), _floats(m.linear_acceleration))
+    return Imu(
+        m.utime, _floats(m.orientation), _floats(m.angular_velocity), _floats(m.linear_acceleration)
+    )
 
 
 def _contact(m: Any) -> Contact:
-    if m.n < 0:    # lcm-gen's Python reads none then
+    if m.n < 0:  # lcm-gen's Python reads none then
         raise ValueError(f"a length of {m.n}")
-    points = [ContactPoint(p.body, _floats(p.position), _floats(p.normal), p.force, p.depth) for p in m.points]
+    points = [
+        ContactPoint(p.body, _floats(p.position), _floats(p.normal), p.force, p.depth)
+        for p in m.points
+    ]
     return Contact(m.utime, bool(m.pressed), points)
 
 
 def _joints(m: Any) -> Joints:
-    return Joints(m.utime, list(m.joint_name), _floats(m.joint_position), _floats(m.joint_velocity), _floats(m.joint_effort))
+    return Joints(
+        m.utime,
+        list(m.joint_name),
+        _floats(m.joint_position),
+        _floats(m.joint_velocity),
+        _floats(m.joint_effort),
+    )
 
 
 def _motion(m: Any) -> MotionStatus:
-    return MotionStatus(m.utime, m.id, _MOTION_KINDS.get(m.kind, str(m.kind)), _MOTION_STATES.get(m.state, str(m.state)),
-                        _MOTION_REASONS.get(m.reason, str(m.reason)), m.done, m.remaining, m.v, m.omega)
+    return MotionStatus(
+        m.utime,
+        m.id,
+        _MOTION_KINDS.get(m.kind, str(m.kind)),
+        _MOTION_STATES.get(m.state, str(m.state)),
+        _MOTION_REASONS.get(m.reason, str(m.reason)),
+        m.done,
+        m.remaining,
+        m.v,
+        m.omega,
+    )
 
 
 # Message type -> (generated class, conversion to a sample). A type that is not here is delivered as generated.

@@ -29,7 +29,7 @@ from .world_info import Body, WorldInfo, WorldInfoAssembler
 
 _SILENCE_SECONDS = 5.0
 _CLOSED = "this simulation was closed"
-_TICK = struct.Struct(">8sqq")    # fingerprint, utime, run_id
+_TICK = struct.Struct(">8sqq")  # fingerprint, utime, run_id
 _TICK_FINGERPRINT = lcmtypes.tick_t._get_packed_fingerprint()
 log = logging.getLogger("ruedo")
 
@@ -64,10 +64,18 @@ class Simulation:
     Works as a context manager; close() (or leaving it) ends a server that launch() started.
     """
 
-    def __init__(self, url: str, name: str, timeout: float, server_ended: Callable[[], str | None] = lambda: None,
-                 end_server: Callable[[], None] = lambda: None, transport: Transport | None = None, forked: Callable[[], None] = lambda: None):
+    def __init__(
+        self,
+        url: str,
+        name: str,
+        timeout: float,
+        server_ended: Callable[[], str | None] = lambda: None,
+        end_server: Callable[[], None] = lambda: None,
+        transport: Transport | None = None,
+        forked: Callable[[], None] = lambda: None,
+    ):
         self.url = url
-        self._server_ended = server_ended    # why a private server is gone, None while it runs
+        self._server_ended = server_ended  # why a private server is gone, None while it runs
         self._end_server = end_server
         self._forked = forked
         self._news = threading.Condition()
@@ -79,16 +87,16 @@ class Simulation:
         self._robots: dict[str, Robot] = {}
         self._session = Session(self, name)
         self._stepper = Stepper(self)
-        self._ids = _name_hash(name) << 20    # two clients number their primitives apart
-        self._streams: dict[str, Stream[Any]] = {}    # by channel
-        self._drivers: dict[str, Driver] = {}         # by robot
+        self._ids = _name_hash(name) << 20  # two clients number their primitives apart
+        self._streams: dict[str, Stream[Any]] = {}  # by channel
+        self._drivers: dict[str, Driver] = {}  # by robot
         self._repeating: set[Driver] = set()
-        self._another_run = False    # is what the last tick was of
-        self._asked = 0.0            # for info, s of time.monotonic()
+        self._another_run = False  # is what the last tick was of
+        self._asked = 0.0  # for info, s of time.monotonic()
         self._on_new_run: tuple[Subscription, ...] = ()
         self._wake = threading.Condition()
         self._repeater: threading.Thread | None = None
-        self._closed = ""    # why: what every call says
+        self._closed = ""  # why: what every call says
         self._bus = Bus(transport or open_transport(url))
         atexit.register(self.close)
         _all.add(self)
@@ -179,7 +187,9 @@ class Simulation:
     def resume(self) -> None:
         self._session.request(lcmtypes.request_t.RESUME)
 
-    def step(self, n: int = 1, commands: Sequence[Command] = (), timeout: float = 60.0) -> Observations:
+    def step(
+        self, n: int = 1, commands: Sequence[Command] = (), timeout: float = 60.0
+    ) -> Observations:
         """Takes n steps, at most timeout seconds of real time each time that nothing goes on, and returns what was seen.
 
         In lockstep (`ruedo run --lockstep N`): takes part from the first call on, grants n steps with their commands,
@@ -191,12 +201,18 @@ class Simulation:
             self._note_time(observations.utime)
             return observations
         if commands:
-            raise NotSupported("commands go with steps where the server runs in lockstep: start it with `ruedo run --lockstep N`")
+            raise NotSupported(
+                "commands go with steps where the server runs in lockstep: start it with `ruedo run --lockstep N`"
+            )
         if isinstance(n, bool) or not isinstance(n, (int, np.integer)):
-            raise TypeError(f"n is {n!r}: it must be a whole number of steps; {self.step_size:g} s is one")
+            raise TypeError(
+                f"n is {n!r}: it must be a whole number of steps; {self.step_size:g} s is one"
+            )
         body = lcmtypes.step_request_t()
         body.steps = int(n)
-        return observed(control.state_of(self._session.request(lcmtypes.request_t.STEP, body, timeout)), [])
+        return observed(
+            control.state_of(self._session.request(lcmtypes.request_t.STEP, body, timeout)), []
+        )
 
     @property
     def lockstep(self) -> bool:
@@ -222,8 +238,17 @@ class Simulation:
             self._utime = 0
         self._stepper.forget()
 
-    def spawn(self, model: str = "", x: float = 0.0, y: float = 0.0, heading: float = 0.0, *, name: str = "", text: str = "",
-              z: float | None = None) -> str:
+    def spawn(
+        self,
+        model: str = "",
+        x: float = 0.0,
+        y: float = 0.0,
+        heading: float = 0.0,
+        *,
+        name: str = "",
+        text: str = "",
+        z: float | None = None,
+    ) -> str:
         """Adds a model: one of Ruedo's ("p3at"), a file in the server's search folders, or SDF or URDF sent along
         as text. It stands on the ground below x, y (m), or at z (m) where that is given; heading in rad. The server
         refuses to put it into something. Returns the model's name: the server numbers one that is taken, unless it
@@ -242,15 +267,24 @@ class Simulation:
         self._session.request(lcmtypes.request_t.REMOVE, _name_body(name))
         self._refresh_info(before)
 
-    def set_pose(self, name: str, x: float, y: float, heading: float = 0.0, z: float = 0.0,
-                 orientation: Sequence[float] | None = None) -> None:
+    def set_pose(
+        self,
+        name: str,
+        x: float,
+        y: float,
+        heading: float = 0.0,
+        z: float = 0.0,
+        orientation: Sequence[float] | None = None,
+    ) -> None:
         """Puts a model at x, y, z (m), at rest. orientation: w, x, y, z instead of the heading (rad)."""
         body = lcmtypes.set_pose_request_t()
         body.name, body.position = name, [x, y, z]
         body.orientation = list(orientation) if orientation is not None else _about_z(heading)
         self._session.request(lcmtypes.request_t.SET_POSE, body)
 
-    def set_twist(self, name: str, linear: Sequence[float], angular: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
+    def set_twist(
+        self, name: str, linear: Sequence[float], angular: Sequence[float] = (0.0, 0.0, 0.0)
+    ) -> None:
         """Gives a model a velocity (m/s) and a turn rate (rad/s), in the world."""
         body = lcmtypes.set_twist_request_t()
         body.name, body.linear, body.angular = name, list(linear), list(angular)
@@ -258,7 +292,9 @@ class Simulation:
 
     def state(self, name: str = "") -> State:
         """Time, step and state hash, and pose and twist of a model or MODEL/LINK when one is named."""
-        return control.state_of(self._session.request(lcmtypes.request_t.GET_STATE, _name_body(name)))
+        return control.state_of(
+            self._session.request(lcmtypes.request_t.GET_STATE, _name_body(name))
+        )
 
     def reset_odometry(self, robot: str) -> None:
         """Sets a robot's odometry to zero where it stands."""
@@ -267,12 +303,16 @@ class Simulation:
     def snapshot(self, name: str) -> State:
         """Saves the state under a name, in the folder that the server was started with (`--snapshots FOLDER`), and
         returns it. A snapshot is what acted on the world so far."""
-        return control.state_of(self._session.request(lcmtypes.request_t.SNAPSHOT, _name_body(name), 60.0))
+        return control.state_of(
+            self._session.request(lcmtypes.request_t.SNAPSHOT, _name_body(name), 60.0)
+        )
 
     def restore(self, name: str) -> State:
         """Puts the world back to a snapshot; what follows equals what followed it. The server runs there from the
         beginning of the snapshot's run, in silence: this takes as long as that part takes at rate max. A new epoch."""
-        state = control.state_of(self._session.request(lcmtypes.request_t.RESTORE, _name_body(name), 3600.0))
+        state = control.state_of(
+            self._session.request(lcmtypes.request_t.RESTORE, _name_body(name), 3600.0)
+        )
         self._utime = state.utime
         self._stepper.forget()
         return state
@@ -283,7 +323,7 @@ class Simulation:
 
     def close(self) -> None:
         """Leaves the simulation: repeated commands end, and so does a server that launch() started."""
-        if self._closed:    # in a fork's child the lock may be held for ever
+        if self._closed:  # in a fork's child the lock may be held for ever
             return
         with self._wake:
             if self._closed:
@@ -299,7 +339,12 @@ class Simulation:
     def __enter__(self) -> Simulation:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self.close()
 
     def __repr__(self) -> str:
@@ -335,7 +380,9 @@ class Simulation:
         if ended:
             raise NoServer(ended)
         if time.monotonic() - self._last_sign > _SILENCE_SECONDS and not is_claimed(self.url):
-            raise NoServer(f"nothing was heard from the server at {self.url} for {_SILENCE_SECONDS:g} s")
+            raise NoServer(
+                f"nothing was heard from the server at {self.url} for {_SILENCE_SECONDS:g} s"
+            )
 
     def _what_is_known(self, rate: float) -> str:
         silence = time.monotonic() - self._last_sign
@@ -343,7 +390,11 @@ class Simulation:
             return f"nothing at all was heard from the server for {silence:.1f} s"
         if self._info.paused:
             return "the simulation is paused"
-        return f"its rate is {rate:g} Hz of sim time, which is now {self.time:.2f} s" if rate else "it sends when something happens"
+        return (
+            f"its rate is {rate:g} Hz of sim time, which is now {self.time:.2f} s"
+            if rate
+            else "it sends when something happens"
+        )
 
     def _note_time(self, utime: int) -> None:
         with self._news:
@@ -355,7 +406,7 @@ class Simulation:
         """The stream of a channel, made on first use."""
         with self._news:
             known = self._streams.get(channel.name)
-            if known is None or known.type != channel.type:    # the next run's may be another
+            if known is None or known.type != channel.type:  # the next run's may be another
                 known = self._streams[channel.name] = make()
             return known
 
@@ -368,7 +419,9 @@ class Simulation:
         with self._wake:
             self._repeating.add(driver)
             if self._repeater is None:
-                self._repeater = threading.Thread(target=self._repeat, name="ruedo-repeat", daemon=True)
+                self._repeater = threading.Thread(
+                    target=self._repeat, name="ruedo-repeat", daemon=True
+                )
                 self._repeater.start()
             self._wake.notify_all()
 
@@ -399,7 +452,9 @@ class Simulation:
         with self._news:
             channels = {channel.name for channel in info.channel_list}
             gone = [name for name in self._drivers if name not in info.robots]
-            streams = [self._streams.pop(name) for name in list(self._streams) if name not in channels]
+            streams = [
+                self._streams.pop(name) for name in list(self._streams) if name not in channels
+            ]
             for name in [name for name in self._robots if name not in info.robots]:
                 del self._robots[name]
         self._end_drivers(gone, "removed")
@@ -410,7 +465,11 @@ class Simulation:
         """The server was started anew, or another has taken its place."""
         with self._news:
             self._utime = 0
-            drivers, streams, callbacks = list(self._drivers), list(self._streams.values()), self._on_new_run
+            drivers, streams, callbacks = (
+                list(self._drivers),
+                list(self._streams.values()),
+                self._on_new_run,
+            )
         self._end_drivers(drivers, "new run")
         for stream in streams:
             stream._forget()
@@ -453,7 +512,7 @@ class Simulation:
         if fingerprint != _TICK_FINGERPRINT or known is None:
             return
         self._another_run = run_id != known.run_id
-        if self._another_run:    # it may be the server's next one
+        if self._another_run:  # it may be the server's next one
             if time.monotonic() - self._asked > 0.1:
                 self._ask_info()
             return
@@ -473,8 +532,10 @@ class Simulation:
                 if ended:
                     raise NoServer(ended)
                 if time.monotonic() >= deadline:
-                    raise NoServer(f"no Ruedo server answered at {self.url} within {timeout:g} s. Is `ruedo run` started, "
-                                   "with the same --lcm or LCM_DEFAULT_URL? `ruedo doctor` looks for what is wrong")
+                    raise NoServer(
+                        f"no Ruedo server answered at {self.url} within {timeout:g} s. Is `ruedo run` started, "
+                        "with the same --lcm or LCM_DEFAULT_URL? `ruedo doctor` looks for what is wrong"
+                    )
                 self._ask_info()
                 self._news.wait(0.1)
 

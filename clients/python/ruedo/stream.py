@@ -21,7 +21,7 @@ class Reader(Generic[T]):
 
     def __init__(self, stream: Stream[T]):
         self._stream = stream
-        self._seen = 0    # of the samples received, the newest that a call has returned
+        self._seen = 0  # of the samples received, the newest that a call has returned
 
     def latest(self, timeout: float = 5.0) -> T:
         """The newest sample. Before the first one it waits, at most timeout seconds of real time."""
@@ -48,7 +48,7 @@ class Stream(Reader[T]):
         self._news = threading.Condition()
         self._source: Subscription | None = None
         self._sample: T | None = None
-        self._count = 0    # samples received
+        self._count = 0  # samples received
         self._fault: RuedoError | None = None
         self._callbacks: tuple[Subscription, ...] = ()
 
@@ -75,8 +75,10 @@ class Stream(Reader[T]):
             if self._source:
                 return
             if self.type not in samples.CONVERSIONS:
-                raise TypeMismatch(f"{self.channel}: this client does not know the type {self.type} of the server's "
-                                   f"Ruedo {self._sim.version}")
+                raise TypeMismatch(
+                    f"{self.channel}: this client does not know the type {self.type} of the server's "
+                    f"Ruedo {self._sim.version}"
+                )
             message, self._convert = samples.CONVERSIONS[self.type]
             self._decode = message.decode
             self._expected: bytes = message._get_packed_fingerprint()
@@ -97,19 +99,26 @@ class Stream(Reader[T]):
             self._sample = self._fault = None
 
     def _mismatch(self, fingerprint: int) -> TypeMismatch:
-        return TypeMismatch(f"{self.channel} carries another version of {self.type} (fingerprint {fingerprint:016x}) than "
-                            f"this client reads ({int.from_bytes(self._expected, 'big'):016x}): the server is Ruedo "
-                            f"{self._sim.version}; install the client of the same version")
+        return TypeMismatch(
+            f"{self.channel} carries another version of {self.type} (fingerprint {fingerprint:016x}) than "
+            f"this client reads ({int.from_bytes(self._expected, 'big'):016x}): the server is Ruedo "
+            f"{self._sim.version}; install the client of the same version"
+        )
 
     def _receive(self, data: bytes) -> None:
         try:
             if data[:8] != self._expected:
                 raise self._mismatch(int.from_bytes(data[:8], "big"))
             sample = self._convert(self._decode(data))
-        except Exception as error:    # whatever came, the receiving thread lives
+        except Exception as error:  # whatever came, the receiving thread lives
             with self._news:
-                self._fault = error if isinstance(error, RuedoError) else TypeMismatch(
-                    f"{self.channel}: a message of {len(data)} bytes is no valid {self.type} ({error})")
+                self._fault = (
+                    error
+                    if isinstance(error, RuedoError)
+                    else TypeMismatch(
+                        f"{self.channel}: a message of {len(data)} bytes is no valid {self.type} ({error})"
+                    )
+                )
                 self._news.notify_all()
             return
         with self._news:
@@ -123,8 +132,10 @@ class Stream(Reader[T]):
 
     def _read(self, reader: Reader[T], a_new_one: bool, timeout: float) -> T:
         if isinstance(timeout, bool) or not isinstance(timeout, (int, float)):
-            raise TypeError(f"timeout is {timeout!r}: it must be a number of seconds of real time; of lockstep's observations "
-                            "latest(device) and all(device) are the samples")
+            raise TypeError(
+                f"timeout is {timeout!r}: it must be a number of seconds of real time; of lockstep's observations "
+                "latest(device) and all(device) are the samples"
+            )
         self._subscribe()
         deadline = time.monotonic() + timeout
         with self._news:
@@ -134,7 +145,9 @@ class Stream(Reader[T]):
                     raise fault
                 left = deadline - time.monotonic()
                 if left <= 0.0:
-                    raise Timeout(f"no sample on {self.channel} within {timeout:g} s ({self._sim._what_is_known(self.rate)})")
+                    raise Timeout(
+                        f"no sample on {self.channel} within {timeout:g} s ({self._sim._what_is_known(self.rate)})"
+                    )
                 self._news.wait(min(left, 0.5))
                 self._sim._check_server()
             reader._seen = self._count

@@ -55,7 +55,9 @@ class LcmTransport:
     def __init__(self, url: str):
         self._lcm = lcm.LCM(url)
         self._lock = threading.Lock()
-        self._sending: ContextManager[Any] = nullcontext() if url.startswith("udpm:") else self._lock    # multicast has a lock of its own
+        self._sending: ContextManager[Any] = (
+            nullcontext() if url.startswith("udpm:") else self._lock
+        )  # multicast has a lock of its own
         self._subscriptions: dict[str, Any] = {}
         self._arrived: list[tuple[str, bytes]] = []
         self._poll = select.poll()
@@ -63,7 +65,9 @@ class LcmTransport:
         self._closed = False
 
     def subscribe(self, channel: str) -> None:
-        escaped = "".join("\\" + c if c in ".^$*+?{}[]\\|()" else c for c in channel)    # LCM takes a regex
+        escaped = "".join(
+            "\\" + c if c in ".^$*+?{}[]\\|()" else c for c in channel
+        )  # LCM takes a regex
         with self._lock:
             self._subscriptions[channel] = self._lcm.subscribe(escaped, self._arrive)
 
@@ -81,7 +85,7 @@ class LcmTransport:
             if self._wait(seconds):
                 with self._lock:
                     self._lcm.handle_timeout(0)
-        except OSError:    # TCP: the server is gone; those who wait find out by their timeouts
+        except OSError:  # TCP: the server is gone; those who wait find out by their timeouts
             time.sleep(min(seconds, 0.1))
         arrived, self._arrived = self._arrived, []
         for channel, data in arrived:
@@ -96,12 +100,12 @@ class LcmTransport:
 
     def _wait(self, seconds: float) -> bool:
         file = self._lcm.fileno()
-        if file != self._polled:    # TCP: connected again
+        if file != self._polled:  # TCP: connected again
             if self._polled >= 0:
                 self._poll.unregister(self._polled)
             if file >= 0:
                 self._poll.register(file, select.POLLIN)
             self._polled = file
-        if file < 0:    # TCP without a server: publish() tries to connect
+        if file < 0:  # TCP without a server: publish() tries to connect
             raise OSError
         return bool(self._poll.poll(math.ceil(seconds * 1e3)))

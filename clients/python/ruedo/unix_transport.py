@@ -13,13 +13,13 @@ import threading
 import time
 from typing import Callable
 
-Receiver = Callable[[str, bytes], None]    # channel, message
+Receiver = Callable[[str, bytes], None]  # channel, message
 
 _HELLO = struct.pack(">II", 0x287617FB, 0x0100)
-_HEAD = struct.Struct(">II")    # kind, length of the channel's name
+_HEAD = struct.Struct(">II")  # kind, length of the channel's name
 _SIZE = struct.Struct(">I")
 _PUBLISH, _SUBSCRIBE, _UNSUBSCRIBE = 1, 2, 3
-_CHUNK = 1 << 18                # bytes received at a time
+_CHUNK = 1 << 18  # bytes received at a time
 _LONGEST_CHANNEL, _LARGEST = 63, 1 << 26
 
 
@@ -47,9 +47,9 @@ class UnixTransport:
 
     def __init__(self, path: str):
         self._path = path
-        self._lock = threading.Lock()    # of what is sent, and of the connection
+        self._lock = threading.Lock()  # of what is sent, and of the connection
         self._channels: set[str] = set()
-        self._names: dict[bytes, str] = {}    # of channels that came
+        self._names: dict[bytes, str] = {}  # of channels that came
         self._socket: socket.socket | None = None
         self._rest = b""
         self._closed = False
@@ -72,7 +72,7 @@ class UnixTransport:
 
     def receive(self, seconds: float, receiver: Receiver) -> bool:
         connection = self._socket
-        if connection is None:    # those who wait find out by their timeouts
+        if connection is None:  # those who wait find out by their timeouts
             time.sleep(min(seconds, 0.1))
             with self._lock:
                 if not self._closed:
@@ -105,14 +105,16 @@ class UnixTransport:
         self._poll = select.poll()
         self._poll.register(self._socket, select.POLLIN)
         self._rest, self._greeted = b"", False
-        self._send(_HELLO + b"".join(_named(_SUBSCRIBE, _pattern(channel)) for channel in self._channels))
+        self._send(
+            _HELLO + b"".join(_named(_SUBSCRIBE, _pattern(channel)) for channel in self._channels)
+        )
 
     def _send(self, frames: bytes) -> None:
         try:
             if self._socket is not None:
                 self._socket.sendall(frames)
         except OSError:
-            pass    # receive() notices
+            pass  # receive() notices
 
     def _taken_apart(self, came: bytes) -> list[tuple[str, bytes]] | None:
         """The whole messages; None for what no server of Ruedo's sends."""
@@ -128,19 +130,19 @@ class UnixTransport:
             name_end = at + 8 + length
             if name_end + 4 > end:
                 break
-            size, = _SIZE.unpack_from(data, name_end)
+            (size,) = _SIZE.unpack_from(data, name_end)
             if size > _LARGEST:
                 return None
             message_end = name_end + 4 + size
             if message_end > end:
                 break
-            name = data[at + 8:name_end]
+            name = data[at + 8 : name_end]
             channel = self._names.get(name)
             if channel is None:
                 channel = name.decode(errors="replace")
                 if len(self._names) < 65536:
                     self._names[name] = channel
-            arrived.append((channel, data[name_end + 4:message_end]))
+            arrived.append((channel, data[name_end + 4 : message_end]))
             at = message_end
         self._rest = data[at:]
         return arrived

@@ -23,55 +23,131 @@ class World:
         self._models: list[str] = []
         self._names: set[str] = set()
 
-    def box(self, x: float, y: float, *, size: tuple[float, float, float] = (0.5, 0.5, 0.5), heading: float = 0.0,
-            mass: float | None = None, name: str = "box") -> World:
+    def box(
+        self,
+        x: float,
+        y: float,
+        *,
+        size: tuple[float, float, float] = (0.5, 0.5, 0.5),
+        heading: float = 0.0,
+        mass: float | None = None,
+        name: str = "box",
+    ) -> World:
         """size: along x, y, z. mass: kg, of one that can be pushed; None: it never moves."""
         a, b, c = (_positive("size", s) for s in size)
         inertia = None if mass is None else (b * b + c * c, a * a + c * c, a * a + b * b)
         shape = f"<box><size>{a!r} {b!r} {c!r}</size></box>"
-        return self._add(name, shape, (x, y, c / 2.0), heading, mass, inertia and [i / 12.0 for i in inertia])
+        return self._add(
+            name, shape, (x, y, c / 2.0), heading, mass, inertia and [i / 12.0 for i in inertia]
+        )
 
-    def cylinder(self, x: float, y: float, *, radius: float = 0.25, height: float = 0.5, mass: float | None = None,
-                 name: str = "cylinder") -> World:
+    def cylinder(
+        self,
+        x: float,
+        y: float,
+        *,
+        radius: float = 0.25,
+        height: float = 0.5,
+        mass: float | None = None,
+        name: str = "cylinder",
+    ) -> World:
         """Upright. mass: kg, of one that can be pushed; None: it never moves."""
         r, h = _positive("radius", radius), _positive("height", height)
         side = (3.0 * r * r + h * h) / 12.0
-        return self._add(name, f"<cylinder><radius>{r!r}</radius><length>{h!r}</length></cylinder>", (x, y, h / 2.0), 0.0, mass,
-                         None if mass is None else [side, side, r * r / 2.0])
+        return self._add(
+            name,
+            f"<cylinder><radius>{r!r}</radius><length>{h!r}</length></cylinder>",
+            (x, y, h / 2.0),
+            0.0,
+            mass,
+            None if mass is None else [side, side, r * r / 2.0],
+        )
 
-    def wall(self, x1: float, y1: float, x2: float, y2: float, *, height: float = 1.0, thickness: float = 0.1, name: str = "wall") -> World:
+    def wall(
+        self,
+        x1: float,
+        y1: float,
+        x2: float,
+        y2: float,
+        *,
+        height: float = 1.0,
+        thickness: float = 0.1,
+        name: str = "wall",
+    ) -> World:
         """From one point to another, which are the middle of its ends."""
-        length = _positive("the length of a wall", math.hypot(_finite("x2 - x1", x2 - x1), _finite("y2 - y1", y2 - y1)))
-        return self.box((x1 + x2) / 2.0, (y1 + y2) / 2.0, size=(length, thickness, height), heading=math.atan2(y2 - y1, x2 - x1), name=name)
+        length = _positive(
+            "the length of a wall",
+            math.hypot(_finite("x2 - x1", x2 - x1), _finite("y2 - y1", y2 - y1)),
+        )
+        return self.box(
+            (x1 + x2) / 2.0,
+            (y1 + y2) / 2.0,
+            size=(length, thickness, height),
+            heading=math.atan2(y2 - y1, x2 - x1),
+            name=name,
+        )
 
-    def robot(self, model: str, x: float = 0.0, y: float = 0.0, heading: float = 0.0, *, name: str | None = None) -> World:
+    def robot(
+        self,
+        model: str,
+        x: float = 0.0,
+        y: float = 0.0,
+        heading: float = 0.0,
+        *,
+        name: str | None = None,
+    ) -> World:
         """model: one of Ruedo's ("p3at"), or a file or model:// that the server finds. name: default the model's."""
         uri = model if "://" in model or os.sep in model else f"model://{model}"
         own = self._unused(name or Path(model).stem)
-        self._models.append(f"<include><uri>{escape(uri)}</uri><name>{escape(own)}</name>"
-                            f"<pose>{_finite('x', x)!r} {_finite('y', y)!r} 0 0 0 {_finite('heading', heading)!r}</pose></include>")
+        self._models.append(
+            f"<include><uri>{escape(uri)}</uri><name>{escape(own)}</name>"
+            f"<pose>{_finite('x', x)!r} {_finite('y', y)!r} 0 0 0 {_finite('heading', heading)!r}</pose></include>"
+        )
         return self
 
     def __str__(self) -> str:
-        lines = "\n    ".join(["<include><uri>model://sun</uri></include>", "<include><uri>model://ground_plane</uri></include>", *self._models])
-        return (f'<sdf version="1.9">\n  <world name={quoteattr(self._name)}>\n'
-                f'    <physics name="step" type="bullet"><max_step_size>{self._step!r}</max_step_size></physics>\n    {lines}\n  </world>\n</sdf>\n')
+        lines = "\n    ".join(
+            [
+                "<include><uri>model://sun</uri></include>",
+                "<include><uri>model://ground_plane</uri></include>",
+                *self._models,
+            ]
+        )
+        return (
+            f'<sdf version="1.9">\n  <world name={quoteattr(self._name)}>\n'
+            f'    <physics name="step" type="bullet"><max_step_size>{self._step!r}</max_step_size></physics>\n    {lines}\n  </world>\n</sdf>\n'
+        )
 
     def __repr__(self) -> str:
         return f"<World {self._name}: {', '.join(sorted(self._names)) or 'empty'}>"
 
-    def _add(self, name: str, shape: str, position: tuple[float, float, float], heading: float, mass: float | None,
-             inertia_of_1_kg: list[float] | None) -> World:
-        pose = " ".join(repr(_finite("position", p)) for p in position) + f" 0 0 {_finite('heading', heading)!r}"
+    def _add(
+        self,
+        name: str,
+        shape: str,
+        position: tuple[float, float, float],
+        heading: float,
+        mass: float | None,
+        inertia_of_1_kg: list[float] | None,
+    ) -> World:
+        pose = (
+            " ".join(repr(_finite("position", p)) for p in position)
+            + f" 0 0 {_finite('heading', heading)!r}"
+        )
         geometry = f"<geometry>{shape}</geometry>"
         if mass is None or inertia_of_1_kg is None:
             body = "<static>true</static><link name='link'>"
         else:
             kg = _positive("mass", mass)
-            moments = "".join(f"<i{axis}{axis}>{kg * i!r}</i{axis}{axis}>" for axis, i in zip("xyz", inertia_of_1_kg))
+            moments = "".join(
+                f"<i{axis}{axis}>{kg * i!r}</i{axis}{axis}>"
+                for axis, i in zip("xyz", inertia_of_1_kg)
+            )
             body = f"<link name='link'><inertial><mass>{kg!r}</mass><inertia>{moments}</inertia></inertial>"
-        self._models.append(f"<model name={quoteattr(self._unused(name))}><pose>{pose}</pose>{body}"
-                            f"<collision name='collision'>{geometry}</collision><visual name='visual'>{geometry}</visual></link></model>")
+        self._models.append(
+            f"<model name={quoteattr(self._unused(name))}><pose>{pose}</pose>{body}"
+            f"<collision name='collision'>{geometry}</collision><visual name='visual'>{geometry}</visual></link></model>"
+        )
         return self
 
     def _unused(self, name: str) -> str:

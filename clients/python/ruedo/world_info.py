@@ -10,16 +10,16 @@ from typing import Any
 from . import lcmtypes
 from .errors import TypeMismatch
 
-_HEAD = struct.Struct(">qqqihh")    # fingerprint, utime, run_id, epoch, part, nparts
+_HEAD = struct.Struct(">qqqihh")  # fingerprint, utime, run_id, epoch, part, nparts
 
 
 @dataclass(frozen=True)
 class Body:
     """A set of links that do not move against each other, as ruedo/info lists it."""
 
-    name: str          # MODEL/LINK: what Simulation.state() takes
-    is_static: bool    # it never moves
-    mass: float        # kg; 0 of what never moves
+    name: str  # MODEL/LINK: what Simulation.state() takes
+    is_static: bool  # it never moves
+    mass: float  # kg; 0 of what never moves
 
 
 class WorldInfo:
@@ -36,12 +36,18 @@ class WorldInfo:
         self.features: int = head.features
         self.paused: bool = head.paused
         self.robots: dict[str, Any] = {r.name: r for p in parts for r in p.robots}
-        self.devices: dict[str, list[Any]] = defaultdict(list)     # by robot
-        self.channels: dict[str, list[Any]] = defaultdict(list)    # by robot
-        self.channel_list: list[Any] = [c for p in parts for c in p.channels]    # as ruedo/tick counts them
-        self.tick_channel = next((i for i, c in enumerate(self.channel_list) if c.type == "tick_t"), -1)
+        self.devices: dict[str, list[Any]] = defaultdict(list)  # by robot
+        self.channels: dict[str, list[Any]] = defaultdict(list)  # by robot
+        self.channel_list: list[Any] = [
+            c for p in parts for c in p.channels
+        ]  # as ruedo/tick counts them
+        self.tick_channel = next(
+            (i for i, c in enumerate(self.channel_list) if c.type == "tick_t"), -1
+        )
         # One that was removed has no name.
-        self.bodies: list[Body] = [Body(b.name, b.is_static, b.mass) for p in parts for b in p.bodies if b.name]
+        self.bodies: list[Body] = [
+            Body(b.name, b.is_static, b.mass) for p in parts for b in p.bodies if b.name
+        ]
         for part in parts:
             for device in part.devices:
                 self.devices[device.robot].append(device)
@@ -65,8 +71,10 @@ class WorldInfoAssembler:
         """The info, when this message completed a new one. Raises TypeMismatch for another version of the type."""
         expected = lcmtypes.world_info_t._get_packed_fingerprint()
         if data[:8] != expected:
-            raise TypeMismatch(f"ruedo/info carries another version of world_info_t (fingerprint {data[:8].hex()}) than this "
-                               f"client reads ({expected.hex()}): install the client of the server's version")
+            raise TypeMismatch(
+                f"ruedo/info carries another version of world_info_t (fingerprint {data[:8].hex()}) than this "
+                f"client reads ({expected.hex()}): install the client of the server's version"
+            )
         if len(data) < _HEAD.size:
             return None
         _, utime, run_id, epoch, part, nparts = _HEAD.unpack_from(data)
@@ -79,12 +87,14 @@ class WorldInfoAssembler:
             return None
         parts = [self._parts[i] for i in range(nparts)]
         self._key, self._parts = None, {}
-        content = [p[16:] for p in parts]    # all but fingerprint and utime
+        content = [p[16:] for p in parts]  # all but fingerprint and utime
         if content == self._last:
             return None
         try:
             info = WorldInfo([lcmtypes.world_info_t.decode(p) for p in parts])
         except Exception as error:
-            raise TypeMismatch(f"a message on ruedo/info is no valid world_info_t ({error})") from None
+            raise TypeMismatch(
+                f"a message on ruedo/info is no valid world_info_t ({error})"
+            ) from None
         self._last = content
         return info

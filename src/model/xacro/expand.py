@@ -7,6 +7,7 @@ that were read, a line each; OUT.missing "FILE\tWHAT" for includes that are not 
 the folder whose package.xml has that name: above the file, beside its package, or in the folders given. Errors go to stderr,
 in one line; the exit code is 1, or 2 where the package xacro is missing.
 """
+
 import argparse
 import os
 import re
@@ -14,12 +15,14 @@ import sys
 import types
 import xml.dom.expatbuilder
 
-MOST_FOLDERS = 2000    # that are looked at for packages
+MOST_FOLDERS = 2000  # that are looked at for packages
 
 
 def package_name(folder):
     try:
-        with open(os.path.join(folder, "package.xml"), encoding="utf-8", errors="replace") as manifest:
+        with open(
+            os.path.join(folder, "package.xml"), encoding="utf-8", errors="replace"
+        ) as manifest:
             found = re.search(r"<name>\s*([^<\s]+)\s*</name>", manifest.read(1 << 20))
     except OSError:
         return None
@@ -41,7 +44,11 @@ def packages(roots):
                 if name:
                     known.setdefault(name, folder)
                 try:
-                    below += sorted(entry.path for entry in os.scandir(folder) if entry.is_dir() and not entry.name.startswith("."))
+                    below += sorted(
+                        entry.path
+                        for entry in os.scandir(folder)
+                        if entry.is_dir() and not entry.name.startswith(".")
+                    )
                 except OSError:
                     pass
             level = below
@@ -70,7 +77,9 @@ def note_lines(files):
         plain(self, name, attributes)
         node = self.curNode
         if not node.tagName.startswith("xacro:"):
-            node.setAttribute("ruedo_at", f"{files[-1] if files else ''}:{self.getParser().CurrentLineNumber}")
+            node.setAttribute(
+                "ruedo_at", f"{files[-1] if files else ''}:{self.getParser().CurrentLineNumber}"
+            )
 
     builder.start_element_handler = start_element_handler
 
@@ -85,7 +94,10 @@ def main():
     try:
         import xacro
     except ImportError:
-        print("the Python package xacro is missing: pip install xacro, beside Ruedo's Python client", file=sys.stderr)
+        print(
+            "the Python package xacro is missing: pip install xacro, beside Ruedo's Python client",
+            file=sys.stderr,
+        )
         return 2
 
     file = os.path.abspath(arguments.file)
@@ -96,7 +108,10 @@ def main():
             return known[name]
         return os.path.join("/package-not-found", name)
 
-    index, inner = types.ModuleType("ament_index_python"), types.ModuleType("ament_index_python.packages")
+    index, inner = (
+        types.ModuleType("ament_index_python"),
+        types.ModuleType("ament_index_python.packages"),
+    )
     inner.get_package_share_directory = get_package_share_directory
     index.packages = inner
     sys.modules.update({"ament_index_python": index, "ament_index_python.packages": inner})
@@ -124,7 +139,9 @@ def main():
         name = xacro.eval_text(elt.getAttribute("filename"), symbols)
         path = xacro.abs_filename_spec(name)
         if not re.search(r"[*?\[]", path) and not os.path.exists(path):
-            missing.append((xacro.filestack[-1] or file, name.replace("/package-not-found/", "$(find) ")))
+            missing.append(
+                (xacro.filestack[-1] or file, name.replace("/package-not-found/", "$(find) "))
+            )
             elt.setAttribute("optional", "true")
         return include(elt, macros, symbols, func)
 
@@ -132,9 +149,13 @@ def main():
     if "load_yaml" in xacro._global_symbols.get("xacro", {}):
         xacro._global_symbols["xacro"]["load_yaml"] = noted_yaml
     try:
-        document = xacro.process_file(file, mappings=dict(each.split(":=", 1) for each in arguments.argument))
+        document = xacro.process_file(
+            file, mappings=dict(each.split(":=", 1) for each in arguments.argument)
+        )
     except Exception as error:
-        where = next((os.path.abspath(each) for each in reversed(xacro.filestack or []) if each), file)
+        where = next(
+            (os.path.abspath(each) for each in reversed(xacro.filestack or []) if each), file
+        )
         text = " ".join(str(error).split()) or type(error).__name__
         lost = "; not found: " + ", ".join(sorted({name for _, name in missing})) if missing else ""
         print(f"{where}: {text}{lost}", file=sys.stderr)

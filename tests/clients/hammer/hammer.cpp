@@ -1,4 +1,5 @@
-// Eight threads that subscribe, publish and leave while a ninth receives; hammer.py says what it does.
+// Eight threads that subscribe, publish and leave while a ninth receives; hammer.py says what it
+// does.
 #include <atomic>
 #include <chrono>
 #include <cstdio>
@@ -19,16 +20,20 @@ void publish(Bus& bus, const std::string& channel, const std::string& text) {
   bus.publish(channel, reinterpret_cast<const uint8_t*>(text.data()), text.size());
 }
 
-void hammer(Bus& bus, int number, int count, std::chrono::steady_clock::time_point end, std::atomic<int64_t>& heard) {
+void hammer(Bus& bus, int number, int count, std::chrono::steady_clock::time_point end,
+            std::atomic<int64_t>& heard) {
   const std::string name = "hammer/" + std::to_string(number) + "/";
   const Bus::Handler hear = [&](const uint8_t*, size_t) {
     const int64_t now = ++heard;
-    if (now % 7 == 0) bus.subscribe("hammer/within" + std::to_string(number), [](const uint8_t*, size_t) {}).close();
-    if (now % 50 == 1) throw 42;    // what a callback throws hurts nobody
+    if (now % 7 == 0)
+      bus.subscribe("hammer/within" + std::to_string(number), [](const uint8_t*, size_t) {})
+          .close();
+    if (now % 50 == 1) throw 42;  // what a callback throws hurts nobody
   };
   for (int done = 0; done < count || std::chrono::steady_clock::now() < end; ++done) {
     const Subscription own = bus.subscribe(name + std::to_string(done % kChannels), hear);
-    const Subscription shared = bus.subscribe("hammer/shared" + std::to_string(done % kChannels), hear);
+    const Subscription shared =
+        bus.subscribe("hammer/shared" + std::to_string(done % kChannels), hear);
     for (int k = 0; k < kChannels; ++k) {
       publish(bus, "hammer/shared" + std::to_string(k), "shared");
       publish(bus, name + std::to_string(k), std::string(300, 'o'));
@@ -44,13 +49,16 @@ int main(int argc, char** argv) {
   std::atomic<int64_t> heard{0};
   Subscription first = bus.subscribe("hammer/first", [](const uint8_t*, size_t) {});
   bus.start();
-  const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(static_cast<int64_t>(1e3 * std::atof(argv[3])));
+  const auto end = std::chrono::steady_clock::now() +
+                   std::chrono::milliseconds(static_cast<int64_t>(1e3 * std::atof(argv[3])));
   std::vector<std::thread> threads;
-  for (int i = 0; i < kThreads; ++i) threads.emplace_back([&, i] { hammer(bus, i, std::atoi(argv[2]), end, heard); });
+  for (int i = 0; i < kThreads; ++i)
+    threads.emplace_back([&, i] { hammer(bus, i, std::atoi(argv[2]), end, heard); });
   for (std::thread& thread : threads) thread.join();
   first.close();
   std::atomic<bool> through{false};
-  const Subscription last = bus.subscribe("hammer/last", [&](const uint8_t*, size_t) { through = true; });
+  const Subscription last =
+      bus.subscribe("hammer/last", [&](const uint8_t*, size_t) { through = true; });
   while (!through) {
     publish(bus, "hammer/last", "last");
     std::this_thread::sleep_for(std::chrono::milliseconds(5));

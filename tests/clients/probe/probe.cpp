@@ -1,5 +1,5 @@
-// The C++ probe: does what a test asks of a client and prints what came of it. probe.py and Probe.java are its twins:
-// same commands, same output.
+// The C++ probe: does what a test asks of a client and prints what came of it. probe.py and
+// Probe.java are its twins: same commands, same output.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -16,21 +16,25 @@ namespace rc = ruedo::client;
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kPatience = 300.0;    // s, for what comes sooner or later
+constexpr double kPatience = 300.0;  // s, for what comes sooner or later
 
 std::string word(const std::string& text) { return text; }
 std::string word(const char* text) { return text; }
 std::string word(bool value) { return value ? "True" : "False"; }
 std::string word(rc::MotionKind value) { return to_string(value); }
 std::string word(rc::MotionState value) { return to_string(value); }
-std::string word(rc::MotionReason value) { return value == rc::MotionReason::none ? "-" : to_string(value); }
+std::string word(rc::MotionReason value) {
+  return value == rc::MotionReason::none ? "-" : to_string(value);
+}
 std::string word(double value) {
   char text[64];
   std::snprintf(text, sizeof text, "%.6f", value);
   return text;
 }
 template <class Integer>
-std::string word(Integer value) { return std::to_string(value); }
+std::string word(Integer value) {
+  return std::to_string(value);
+}
 
 template <class... Words>
 void say(const Words&... words) {
@@ -45,16 +49,26 @@ void report(const std::string& what, const std::function<void()>& call) {
   try {
     call();
     say(what, "none");
-  } catch (const rc::NoServer& e) { say(what, "NoServer:", e.what());
-  } catch (const rc::LaunchError& e) { say(what, "LaunchError:", e.what());
-  } catch (const rc::UnknownName& e) { say(what, "UnknownName:", e.what());
-  } catch (const rc::Timeout& e) { say(what, "Timeout:", e.what());
-  } catch (const rc::TypeMismatch& e) { say(what, "TypeMismatch:", e.what());
-  } catch (const rc::NotSupported& e) { say(what, "NotSupported:", e.what());
-  } catch (const rc::MotionError& e) { say(what, "MotionError:", e.what());
-  } catch (const rc::LeaseLost& e) { say(what, "LeaseLost:", e.what());
-  } catch (const rc::RequestError& e) { say(what, "RequestError:", e.what());
-  } catch (const std::invalid_argument& e) { say(what, "ValueError:", e.what());
+  } catch (const rc::NoServer& e) {
+    say(what, "NoServer:", e.what());
+  } catch (const rc::LaunchError& e) {
+    say(what, "LaunchError:", e.what());
+  } catch (const rc::UnknownName& e) {
+    say(what, "UnknownName:", e.what());
+  } catch (const rc::Timeout& e) {
+    say(what, "Timeout:", e.what());
+  } catch (const rc::TypeMismatch& e) {
+    say(what, "TypeMismatch:", e.what());
+  } catch (const rc::NotSupported& e) {
+    say(what, "NotSupported:", e.what());
+  } catch (const rc::MotionError& e) {
+    say(what, "MotionError:", e.what());
+  } catch (const rc::LeaseLost& e) {
+    say(what, "LeaseLost:", e.what());
+  } catch (const rc::RequestError& e) {
+    say(what, "RequestError:", e.what());
+  } catch (const std::invalid_argument& e) {
+    say(what, "ValueError:", e.what());
   }
 }
 
@@ -79,9 +93,11 @@ void list_all(const rc::Simulation& sim) {
 void read(const rc::Simulation& sim, const std::string& name) {
   const rc::Robot robot = sim.robot(name);
   const auto scan = robot.lrf().latest();
-  say("scan", scan.ranges.size(), scan.angle(0), scan.angle(scan.ranges.size() - 1), scan.nearest(-kPi, kPi), scan.intensities.size());
+  say("scan", scan.ranges.size(), scan.angle(0), scan.angle(scan.ranges.size() - 1),
+      scan.nearest(-kPi, kPi), scan.intensities.size());
   const auto reading = robot.sonar().latest();
-  say("sonar", reading.ranges.size(), static_cast<double>(*std::max_element(reading.ranges.begin(), reading.ranges.end())),
+  say("sonar", reading.ranges.size(),
+      static_cast<double>(*std::max_element(reading.ranges.begin(), reading.ranges.end())),
       reading.fired_utime.size(), reading.fresh.size());
   const auto odometry = robot.odometry().latest();
   say("odometry", odometry.x, odometry.y, odometry.theta, odometry.wheel_angles.size());
@@ -93,7 +109,8 @@ void read(const rc::Simulation& sim, const std::string& name) {
   for (const auto& device : robot.devices()) {
     if (device.type != "image_t") continue;
     const auto image = robot.camera().latest();
-    say("image", image.width, image.height, image.format == rc::Image::Format::jpeg ? "jpeg" : "other", !image.data.empty());
+    say("image", image.width, image.height,
+        image.format == rc::Image::Format::jpeg ? "jpeg" : "other", !image.data.empty());
     break;
   }
 }
@@ -102,12 +119,14 @@ double chord(double v, double omega, double time) {
   return std::abs(omega == 0.0 ? v * time : 2.0 * v / omega * std::sin(omega * time / 2.0));
 }
 
-// At its speed, and for so long without an interruption: a client that gets no time for long has to begin anew.
+// At its speed, and for so long without an interruption: a client that gets no time for long has to
+// begin anew.
 void drive(const rc::Simulation& sim, const std::vector<std::string>& a, bool wheels) {
   const rc::Robot robot = sim.robot(a[0]);
   const double first = std::stod(a[1]), second = std::stod(a[2]);
   wheels ? robot.set_wheels(first, second) : robot.set_velocity(first, second);
-  const double v = wheels ? robot.info().wheel_radius * first : first, omega = wheels ? 0.0 : second;    // both sides alike
+  const double v = wheels ? robot.info().wheel_radius * first : first,
+               omega = wheels ? 0.0 : second;  // both sides alike
   (void)robot.pose().latest(kPatience);
   rc::MotionStatus status;
   double moved = 0.0, turned = 0.0, time = 0.0;
@@ -120,7 +139,8 @@ void drive(const rc::Simulation& sim, const std::vector<std::string>& a, bool wh
     time = end.time() - begin.time();
     moved = std::hypot(end.x() - begin.x(), end.y() - begin.y());
     turned = std::remainder(end.heading() - begin.heading(), 2 * kPi);
-    steady = std::abs(moved - chord(v, omega, time)) < 1e-3 && std::abs(std::remainder(turned - omega * time, 2 * kPi)) < 1e-3;
+    steady = std::abs(moved - chord(v, omega, time)) < 1e-3 &&
+             std::abs(std::remainder(turned - omega * time, 2 * kPi)) < 1e-3;
   }
   say("status", status.kind, status.state, status.v, status.omega);
   say("moved", moved, turned, time);
@@ -138,20 +158,24 @@ void primitives(const rc::Simulation& sim, const std::string& name) {
     motion.wait(kPatience);
     const double stood = sim.time();
     auto end = robot.pose().next(kPatience);
-    while (end.time() < stood) end = robot.pose().next(kPatience);    // poses come at 50 Hz, the end of a motion at its step
+    while (end.time() < stood)
+      end = robot.pose().next(kPatience);  // poses come at 50 Hz, the end of a motion at its step
     say(what, early, motion.done(), motion.state(), motion.reason(),
-        std::hypot(end.x() - begin.x(), end.y() - begin.y()), std::remainder(end.heading() - begin.heading(), 2 * kPi));
+        std::hypot(end.x() - begin.x(), end.y() - begin.y()),
+        std::remainder(end.heading() - begin.heading(), 2 * kPi));
   };
   run("advance", [&] { return robot.advance(0.4, {.speed = 0.5}); });
   run("rotate", [&] { return robot.rotate(1.2); });
   run("turn_to", [&] { return robot.turn_to(0.0); });
   run("arc", [&] { return robot.arc(0.8, 0.5); });
-  const rc::Motion replaced = robot.advance(5.0, {.speed = 0.05});    // slowly: whoever is late finds it under way
+  const rc::Motion replaced =
+      robot.advance(5.0, {.speed = 0.05});  // slowly: whoever is late finds it under way
   sim.sleep(0.5);
   robot.stop().wait(kPatience);
   report("replaced", [&] { replaced.wait(); });
   const rc::Motion running = robot.advance(5.0, {.speed = 0.05});
-  report("refused", [&] { robot.advance(2e6).wait(); });    // further than the server allows: what runs goes on
+  report("refused",
+         [&] { robot.advance(2e6).wait(); });  // further than the server allows: what runs goes on
   report("too_long", [&] { running.wait(0.3); });
   robot.stop().wait(kPatience);
 }
@@ -197,7 +221,8 @@ void snapshots(const rc::Simulation& sim) {
   const rc::State saved = sim.snapshot("here");
   const rc::State later = sim.step(60);
   const rc::State back = sim.restore("here");
-  say("same", back.step == saved.step, back.state_hash == saved.state_hash, sim.step(60).state_hash == later.state_hash);
+  say("same", back.step == saved.step, back.state_hash == saved.state_hash,
+      sim.step(60).state_hash == later.state_hash);
   say("steps", saved.step, later.step);
 }
 
@@ -248,7 +273,8 @@ void lockstep(const rc::Simulation& sim, const std::vector<std::string>& a) {
   rc::Odometry odometry;
   const auto take = [&](const rc::Observations& observations) {
     for (const auto& message : observations.messages) {
-      digest = crc32(digest, reinterpret_cast<const uint8_t*>(message.channel.data()), message.channel.size());
+      digest = crc32(digest, reinterpret_cast<const uint8_t*>(message.channel.data()),
+                     message.channel.size());
       digest = crc32(digest, message.bytes.data(), message.bytes.size());
       ++messages;
     }
@@ -260,7 +286,9 @@ void lockstep(const rc::Simulation& sim, const std::vector<std::string>& a) {
   take(last);
   for (int64_t step = 0; step < steps; step += chunk) {
     std::vector<rc::Command> commands;
-    for (int64_t k = 0; k < chunk; ++k) commands.push_back(robot.velocity_command(std::stod(a[4]), 0.1 * static_cast<double>(k)).at(k));
+    for (int64_t k = 0; k < chunk; ++k)
+      commands.push_back(
+          robot.velocity_command(std::stod(a[4]), 0.1 * static_cast<double>(k)).at(k));
     last = sim.step(chunk, commands);
     take(last);
   }
@@ -282,10 +310,12 @@ void visited(const rc::Simulation& sim, const std::vector<std::string>& a) {
     }
     if (turn == 6) sim.remove(guest);
     std::vector<rc::Command> commands{robot.velocity_command(0.3, 0.2)};
-    if (turn >= 3 && turn < 6) commands.push_back(sim.robot(guest).velocity_command(0.2, -0.3).at(5));
+    if (turn >= 3 && turn < 6)
+      commands.push_back(sim.robot(guest).velocity_command(0.2, -0.3).at(5));
     last = sim.step(10, commands);
     for (const auto& message : last.messages) {
-      digest = crc32(digest, reinterpret_cast<const uint8_t*>(message.channel.data()), message.channel.size());
+      digest = crc32(digest, reinterpret_cast<const uint8_t*>(message.channel.data()),
+                     message.channel.size());
       digest = crc32(digest, message.bytes.data(), message.bytes.size());
       ++messages;
       of_guest += message.channel.rfind("p3at_2/", 0) == 0;
@@ -306,7 +336,9 @@ void visited(const rc::Simulation& sim, const std::vector<std::string>& a) {
 
 void act(const std::string& url, const std::string& command, const std::vector<std::string>& a) {
   if (command == "launch") launched(a);
-  const rc::Simulation sim = rc::connect(url, {.name = command == "lockstep" || command == "visited" ? a[0] : "", .timeout = command == "connect" ? 2.0 : 60.0});
+  const rc::Simulation sim =
+      rc::connect(url, {.name = command == "lockstep" || command == "visited" ? a[0] : "",
+                        .timeout = command == "connect" ? 2.0 : 60.0});
   if (command == "lockstep") lockstep(sim, a);
   if (command == "visited") visited(sim, a);
   if (command == "connect") say("connected", sim.world());

@@ -8,7 +8,7 @@ import zlib
 
 import ruedo
 
-PATIENCE = 300.0    # s, for what comes sooner or later
+PATIENCE = 300.0  # s, for what comes sooner or later
 
 
 def say(*words):
@@ -28,7 +28,16 @@ def list_all(sim):
     for robot in sim.robots:
         say("robot", robot.name, robot.drive or "-", robot.watchdog, robot.track)
         for device in robot.devices:
-            say("device", robot.name, device.name, device.kind, device.type, device.rate, device.range_max, len(device.elements))
+            say(
+                "device",
+                robot.name,
+                device.name,
+                device.kind,
+                device.type,
+                device.rate,
+                device.range_max,
+                len(device.elements),
+            )
     for body in sim.bodies:
         say("body", body.name, body.is_static, float(body.mass))
 
@@ -36,9 +45,22 @@ def list_all(sim):
 def read(sim, name):
     robot = sim.robot(name)
     scan = robot.lrf.latest()
-    say("scan", len(scan.ranges), float(scan.angles[0]), float(scan.angles[-1]), scan.nearest(-math.pi, math.pi), len(scan.intensities))
+    say(
+        "scan",
+        len(scan.ranges),
+        float(scan.angles[0]),
+        float(scan.angles[-1]),
+        scan.nearest(-math.pi, math.pi),
+        len(scan.intensities),
+    )
     reading = robot.sonar.latest()
-    say("sonar", len(reading.ranges), float(reading.ranges.max()), len(reading.fired_utime), len(reading.fresh))
+    say(
+        "sonar",
+        len(reading.ranges),
+        float(reading.ranges.max()),
+        len(reading.fired_utime),
+        len(reading.fresh),
+    )
     odometry = robot.odometry.latest()
     say("odometry", odometry.x, odometry.y, odometry.theta, len(odometry.wheel_angles))
     pose = robot.pose.latest()
@@ -56,7 +78,7 @@ def drive(sim, name, first, second, seconds, wheels):
     robot = sim.robot(name)
     first, second = float(first), float(second)
     (robot.set_wheels if wheels else robot.set_velocity)(first, second)
-    v, omega = (robot.wheel_radius * first, 0.0) if wheels else (first, second)    # both sides alike
+    v, omega = (robot.wheel_radius * first, 0.0) if wheels else (first, second)  # both sides alike
     robot.pose.latest(PATIENCE)
     while True:
         status = robot.motion.next(PATIENCE)
@@ -66,8 +88,14 @@ def drive(sim, name, first, second, seconds, wheels):
         sim.sleep(float(seconds))
         end = robot.pose.next(PATIENCE)
         time = end.time - begin.time
-        moved, turned = math.hypot(end.x - begin.x, end.y - begin.y), math.remainder(end.heading - begin.heading, 2 * math.pi)
-        if abs(moved - chord(v, omega, time)) < 1e-3 and abs(math.remainder(turned - omega * time, 2 * math.pi)) < 1e-3:
+        moved, turned = (
+            math.hypot(end.x - begin.x, end.y - begin.y),
+            math.remainder(end.heading - begin.heading, 2 * math.pi),
+        )
+        if (
+            abs(moved - chord(v, omega, time)) < 1e-3
+            and abs(math.remainder(turned - omega * time, 2 * math.pi)) < 1e-3
+        ):
             break
     say("status", status.kind, status.state, status.v, status.omega)
     say("moved", moved, turned, time)
@@ -89,21 +117,28 @@ def primitives(sim, name):
         early = motion.done
         motion.wait(PATIENCE)
         stood, end = sim.time, robot.pose.next(PATIENCE)
-        while end.time < stood:    # poses come at 50 Hz, the end of a motion at its step
+        while end.time < stood:  # poses come at 50 Hz, the end of a motion at its step
             end = robot.pose.next(PATIENCE)
-        say(what, early, motion.done, motion.state, motion.reason or "-", math.hypot(end.x - begin.x, end.y - begin.y),
-            math.remainder(end.heading - begin.heading, 2 * math.pi))
+        say(
+            what,
+            early,
+            motion.done,
+            motion.state,
+            motion.reason or "-",
+            math.hypot(end.x - begin.x, end.y - begin.y),
+            math.remainder(end.heading - begin.heading, 2 * math.pi),
+        )
 
     run("advance", lambda: robot.advance(0.4, speed=0.5))
     run("rotate", lambda: robot.rotate(1.2))
     run("turn_to", lambda: robot.turn_to(0.0))
     run("arc", lambda: robot.arc(0.8, 0.5))
-    replaced = robot.advance(5.0, speed=0.05)    # slowly: whoever is late finds it under way
+    replaced = robot.advance(5.0, speed=0.05)  # slowly: whoever is late finds it under way
     sim.sleep(0.5)
     robot.stop().wait(PATIENCE)
     attempt("replaced", replaced.wait)
     running = robot.advance(5.0, speed=0.05)
-    attempt("refused", robot.advance(2e6).wait)    # further than the server allows: what runs goes on
+    attempt("refused", robot.advance(2e6).wait)  # further than the server allows: what runs goes on
     attempt("too_long", lambda: running.wait(0.3))
     robot.stop().wait(PATIENCE)
 
@@ -143,19 +178,34 @@ def control(sim, name):
 
 
 def snapshots(sim):
-    say("names", sim.spawn("p3at", 3.0, 1.0), sim.spawn("p3at", 3.0, -1.0), sim.spawn("p3at", -3.0, 1.0, name="guest"))
+    say(
+        "names",
+        sim.spawn("p3at", 3.0, 1.0),
+        sim.spawn("p3at", 3.0, -1.0),
+        sim.spawn("p3at", -3.0, 1.0, name="guest"),
+    )
     sim.step(40)
     saved = sim.snapshot("here")
     later = sim.step(60)
     back = sim.restore("here")
-    say("same", back.step == saved.step, back.state_hash == saved.state_hash, sim.step(60).state_hash == later.state_hash)
+    say(
+        "same",
+        back.step == saved.step,
+        back.state_hash == saved.state_hash,
+        sim.step(60).state_hash == later.state_hash,
+    )
     say("steps", saved.step, later.step)
 
 
 def world(sim, text):
     sim.spawn("p3at", 3.0, 1.0, name="guest")
     guest = sim.robot("guest")
-    say("there", sim.state("guest").position[0], len(sim.robots), sum(body.name.startswith("guest/") for body in sim.bodies))
+    say(
+        "there",
+        sim.state("guest").position[0],
+        len(sim.robots),
+        sum(body.name.startswith("guest/") for body in sim.bodies),
+    )
     guest.set_velocity(0.3, 0.0)
     while sim.state("guest").position[0] <= 3.05:
         sim.sleep(0.1)
@@ -230,12 +280,27 @@ def main():
     try:
         if command == "launch":
             launched(ruedo.launch(rest[0], seed=3, args=rest[1:]))
-        with ruedo.connect(url, name=rest[0] if command in ("lockstep", "visited") else None, timeout=2.0 if command == "connect" else 60.0) as sim:
-            actions = {"lockstep": lambda: lockstep(sim, *rest[1:]), "visited": lambda: visited(sim, *rest[1:]), "connect": lambda: say("connected", sim.world), "list": lambda: list_all(sim), "read": lambda: read(sim, *rest),
-                       "velocity": lambda: drive(sim, *rest, False), "wheels": lambda: drive(sim, *rest, True),
-                       "primitives": lambda: primitives(sim, *rest), "errors": lambda: errors(sim, *rest),
-                       "streams": lambda: streams(sim, *rest), "control": lambda: control(sim, *rest), "world": lambda: world(sim, *rest), "snapshots": lambda: snapshots(sim),
-                       "quit": lambda: (sim.quit(), say("quit", True))}
+        with ruedo.connect(
+            url,
+            name=rest[0] if command in ("lockstep", "visited") else None,
+            timeout=2.0 if command == "connect" else 60.0,
+        ) as sim:
+            actions = {
+                "lockstep": lambda: lockstep(sim, *rest[1:]),
+                "visited": lambda: visited(sim, *rest[1:]),
+                "connect": lambda: say("connected", sim.world),
+                "list": lambda: list_all(sim),
+                "read": lambda: read(sim, *rest),
+                "velocity": lambda: drive(sim, *rest, False),
+                "wheels": lambda: drive(sim, *rest, True),
+                "primitives": lambda: primitives(sim, *rest),
+                "errors": lambda: errors(sim, *rest),
+                "streams": lambda: streams(sim, *rest),
+                "control": lambda: control(sim, *rest),
+                "world": lambda: world(sim, *rest),
+                "snapshots": lambda: snapshots(sim),
+                "quit": lambda: (sim.quit(), say("quit", True)),
+            }
             actions[command]()
     except ruedo.RuedoError as error:
         say("failed", f"{type(error).__name__}:", str(error).replace("\n", " "))

@@ -1,4 +1,5 @@
-// A server in memory, as far as a client needs one: it says what there is, takes sessions, and notes what it hears.
+// A server in memory, as far as a client needs one: it says what there is, takes sessions, and
+// notes what it hears.
 #pragma once
 
 #include <chrono>
@@ -83,7 +84,8 @@ class FakeServer {
     odometry.x = x;
     send(robot + "/odometry", odometry);
   }
-  void send_motion(const std::string& robot, int64_t utime, int64_t id, int8_t state, int8_t reason = 0) {
+  void send_motion(const std::string& robot, int64_t utime, int64_t id, int8_t state,
+                   int8_t reason = 0) {
     motion_status_t status{};
     status.utime = utime;
     status.id = id;
@@ -110,7 +112,8 @@ class FakeServer {
  private:
   friend class FakeTransport;
 
-  static void add(world_info_t& info, const std::string& robot, const std::string& name, const std::string& type, int64_t fingerprint, bool input) {
+  static void add(world_info_t& info, const std::string& robot, const std::string& name,
+                  const std::string& type, int64_t fingerprint, bool input) {
     channel_info_t channel{};
     channel.name = robot + "/" + name;
     channel.robot = robot;
@@ -164,10 +167,13 @@ class FakeTransport : public Transport {
     const std::lock_guard lock(mutex_);
     subscribed_.erase(channel);
   }
-  void publish(const std::string& channel, const uint8_t* bytes, size_t size) override { server_->hear(channel, bytes, size); }
+  void publish(const std::string& channel, const uint8_t* bytes, size_t size) override {
+    server_->hear(channel, bytes, size);
+  }
   bool receive(std::chrono::milliseconds timeout, const Receiver& receiver) override {
     std::unique_lock lock(server_->mutex_);
-    if (!server_->news_.wait_for(lock, timeout, [&] { return !server_->to_client_.empty(); })) return false;
+    if (!server_->news_.wait_for(lock, timeout, [&] { return !server_->to_client_.empty(); }))
+      return false;
     auto [channel, bytes] = std::move(server_->to_client_.front());
     server_->to_client_.pop_front();
     server_->delivering_ = true;
@@ -192,7 +198,8 @@ class FakeTransport : public Transport {
 
 // A simulation that is served from memory.
 inline Simulation simulation(const std::shared_ptr<FakeServer>& server) {
-  auto core = std::make_shared<Core>("memq://", "test", nullptr, std::make_unique<FakeTransport>(server));
+  auto core =
+      std::make_shared<Core>("memq://", "test", nullptr, std::make_unique<FakeTransport>(server));
   core->join(300.0);
   return Simulation(std::move(core));
 }

@@ -1,4 +1,5 @@
-// Handles and callbacks that outlive what they belong to, or go before it. Under the sanitizers: nothing is used once it is freed.
+// Handles and callbacks that outlive what they belong to, or go before it. Under the sanitizers:
+// nothing is used once it is freed.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -50,14 +51,14 @@ TEST_F(Lifetimes, HandlesOutliveTheirSimulation) {
   sim.reset();
 
   const std::string closed = "this simulation was closed";
-  EXPECT_EQ(error_of([&] { (void)odometry.latest(); }), closed);    // though one is there
+  EXPECT_EQ(error_of([&] { (void)odometry.latest(); }), closed);  // though one is there
   EXPECT_EQ(error_of([&] { odometry.next(); }), closed);
   EXPECT_EQ(error_of([&] { (void)odometry.on_sample([](const Odometry&) {}); }), closed);
   EXPECT_EQ(error_of([&] { motion.next(); }), closed);
   EXPECT_EQ(error_of([&] { robot.set_velocity(0.1, 0.0); }), closed);
   EXPECT_EQ(error_of([&] { robot.advance(1.0); }), closed);
   EXPECT_EQ(error_of([&] { under_way.wait(); }), closed);
-  EXPECT_EQ(robot.info().name, "p3at");    // what is known stays known
+  EXPECT_EQ(robot.info().name, "p3at");  // what is known stays known
   EXPECT_EQ(odometry.channel(), "p3at/odometry");
 }
 
@@ -65,20 +66,32 @@ TEST_F(Lifetimes, AfterCloseEveryRequestSaysSo) {
   Simulation sim = simulation(server);
   sim.close();
   sim.close();
-  const std::vector<std::function<void()>> calls = {
-      [&] { sim.pause(); }, [&] { sim.resume(); }, [&] { sim.step(); }, [&] { sim.set_rate(1.0); }, [&] { sim.reset(); },
-      [&] { sim.spawn("p3at", 0.0, 0.0); }, [&] { sim.remove("p3at"); }, [&] { sim.set_pose("p3at", 0.0, 0.0); },
-      [&] { sim.set_twist("p3at", {}); }, [&] { (void)sim.state(); }, [&] { sim.reset_odometry("p3at"); },
-      [&] { sim.snapshot("s"); }, [&] { sim.restore("s"); }, [&] { sim.quit(); }, [&] { sim.sleep(1.0); },
-      [&] { (void)sim.on_new_run([] {}); }};
-  for (size_t i = 0; i < calls.size(); ++i) EXPECT_EQ(error_of(calls[i]), "this simulation was closed") << i;
+  const std::vector<std::function<void()>> calls = {[&] { sim.pause(); },
+                                                    [&] { sim.resume(); },
+                                                    [&] { sim.step(); },
+                                                    [&] { sim.set_rate(1.0); },
+                                                    [&] { sim.reset(); },
+                                                    [&] { sim.spawn("p3at", 0.0, 0.0); },
+                                                    [&] { sim.remove("p3at"); },
+                                                    [&] { sim.set_pose("p3at", 0.0, 0.0); },
+                                                    [&] { sim.set_twist("p3at", {}); },
+                                                    [&] { (void)sim.state(); },
+                                                    [&] { sim.reset_odometry("p3at"); },
+                                                    [&] { sim.snapshot("s"); },
+                                                    [&] { sim.restore("s"); },
+                                                    [&] { sim.quit(); },
+                                                    [&] { sim.sleep(1.0); },
+                                                    [&] { (void)sim.on_new_run([] {}); }};
+  for (size_t i = 0; i < calls.size(); ++i)
+    EXPECT_EQ(error_of(calls[i]), "this simulation was closed") << i;
   EXPECT_EQ(sim.world(), "memory");
 }
 
 TEST_F(Lifetimes, OneThatWasMovedFromSaysTheSame) {
   Simulation sim = simulation(server);
   Simulation other = std::move(sim);
-  EXPECT_EQ(error_of([&] { (void)sim.world(); }), "this simulation was closed");    // NOLINT: moved from on purpose
+  EXPECT_EQ(error_of([&] { (void)sim.world(); }),
+            "this simulation was closed");  // NOLINT: moved from on purpose
   EXPECT_EQ(error_of([&] { sim.pause(); }), "this simulation was closed");
   EXPECT_EQ(error_of([&] { (void)sim.robot("p3at"); }), "this simulation was closed");
   sim.close();
@@ -88,7 +101,9 @@ TEST_F(Lifetimes, OneThatWasMovedFromSaysTheSame) {
 
 TEST_F(Lifetimes, CloseWakesThoseWhoWait) {
   Simulation sim = simulation(server);
-  auto waiting = std::async(std::launch::async, [&] { return error_of([&] { sim.robot("p3at").odometry().next(kPatience); }); });
+  auto waiting = std::async(std::launch::async, [&] {
+    return error_of([&] { sim.robot("p3at").odometry().next(kPatience); });
+  });
   auto sleeping = std::async(std::launch::async, [&] { return error_of([&] { sim.sleep(1e6); }); });
   std::this_thread::sleep_for(1ms);
   sim.close();
@@ -108,7 +123,7 @@ TEST_F(Lifetimes, ACallbackIsNotCalledOnceItsSubscriptionWent) {
     server->await_delivery();
     EXPECT_EQ(*count, 1);
   }
-  count.reset();    // a call after this would be seen
+  count.reset();  // a call after this would be seen
   server->send_odometry("p3at", 2000, 0.0);
   server->await_delivery();
   kept.close();
@@ -152,10 +167,13 @@ TEST_F(Lifetimes, ACallbackMayTakeItselfBack) {
 TEST_F(Lifetimes, ACallbackMayDestroyTheSimulation) {
   std::optional<Simulation> sim(simulation(server));
   std::promise<void> done;
-  sim->robot("p3at").odometry().on_sample([&](const Odometry&) {
-    sim.reset();
-    done.set_value();
-  }).keep();
+  sim->robot("p3at")
+      .odometry()
+      .on_sample([&](const Odometry&) {
+        sim.reset();
+        done.set_value();
+      })
+      .keep();
   server->send_odometry("p3at", 1000, 0.0);
   done.get_future().wait();
   EXPECT_FALSE(sim);
@@ -166,14 +184,17 @@ TEST_F(Lifetimes, WhatACallbackThrowsIsSaidOnceAndHurtsNobody) {
   const auto odometry = sim.robot("p3at").odometry();
   int heard = 0;
   testing::internal::CaptureStderr();
-  const Subscription first = odometry.on_sample([](const Odometry&) { throw std::runtime_error("a fault of the user's"); });
+  const Subscription first = odometry.on_sample(
+      [](const Odometry&) { throw std::runtime_error("a fault of the user's"); });
   const Subscription second = odometry.on_sample([](const Odometry&) { throw 42; });
   const Subscription third = odometry.on_sample([&](const Odometry&) { ++heard; });
   for (int i = 1; i <= 3; ++i) server->send_odometry("p3at", 1000 * i, 0.0);
   server->await_delivery();
   EXPECT_EQ(testing::internal::GetCapturedStderr(),
-            "ruedo: a callback on p3at/odometry failed: a fault of the user's; it is called on, and this is said once\n"
-            "ruedo: a callback on p3at/odometry failed: what it threw is no std::exception; it is called on, and this is said once\n");
+            "ruedo: a callback on p3at/odometry failed: a fault of the user's; it is called on, "
+            "and this is said once\n"
+            "ruedo: a callback on p3at/odometry failed: what it threw is no std::exception; it is "
+            "called on, and this is said once\n");
   EXPECT_EQ(heard, 3);
 }
 
@@ -185,8 +206,9 @@ TEST_F(Lifetimes, EachReaderHasACursorOfItsOwn) {
   server->send_odometry("p3at", 1000, 1.0);
   server->await_delivery();
   EXPECT_EQ(first.next(kPatience).x, 1.0);
-  EXPECT_EQ(second.next(kPatience).x, 1.0);                       // it is not stolen
-  EXPECT_THROW(robot.odometry().next(0.01), Timeout);             // a new one begins where the channel was last read
+  EXPECT_EQ(second.next(kPatience).x, 1.0);  // it is not stolen
+  EXPECT_THROW(robot.odometry().next(0.01),
+               Timeout);  // a new one begins where the channel was last read
   EXPECT_EQ(robot.odometry().latest(kPatience).x, 1.0);
   server->send_odometry("p3at", 2000, 2.0);
   server->await_delivery();
@@ -200,7 +222,7 @@ TEST_F(Lifetimes, ANewRobotOfTheSameNameDoesNotGetTheOldCommands) {
   robot.set_velocity(0.1, 0.0);
   const Motion motion = robot.advance(1.0);
   robot.set_velocity(0.2, 0.0);
-  server->await([&] { return server->heard("p3at/velocity") >= 4; });    // it is repeated
+  server->await([&] { return server->heard("p3at/velocity") >= 4; });  // it is repeated
   server->robots = {"other"};
   server->send_info();
   server->await_delivery();
@@ -210,11 +232,12 @@ TEST_F(Lifetimes, ANewRobotOfTheSameNameDoesNotGetTheOldCommands) {
   server->send_info();
   server->await_delivery();
   const int64_t before = server->heard("p3at/velocity");
-  for (int i = 1; i <= 20; ++i) server->send_tick(1000 * i);    // each was a repetition
-  for (int i = 1; i <= 20; ++i) server->send_motion("p3at", 1000 * i, 0, ruedo::motion_status_t::STATE_RUNNING);
+  for (int i = 1; i <= 20; ++i) server->send_tick(1000 * i);  // each was a repetition
+  for (int i = 1; i <= 20; ++i)
+    server->send_motion("p3at", 1000 * i, 0, ruedo::motion_status_t::STATE_RUNNING);
   server->await_delivery();
   EXPECT_EQ(server->heard("p3at/velocity"), before);
-  robot.set_velocity(0.3, 0.0);    // the old handle drives the new robot
+  robot.set_velocity(0.3, 0.0);  // the old handle drives the new robot
   server->send_motion("p3at", 30'000, 0, ruedo::motion_status_t::STATE_RUNNING);
   server->await([&] { return server->heard("p3at/velocity") >= before + 3; });
 }
@@ -231,25 +254,28 @@ TEST_F(Lifetimes, ANewRunIsNoticedAndNotDriven) {
   const Motion motion = robot.advance(1.0);
   robot.set_velocity(0.2, 0.0);
   server->send_motion("p3at", 5'000'000, motion.id(), ruedo::motion_status_t::STATE_RUNNING);
-  server->send_motion("p3at", 1000, 0, ruedo::motion_status_t::STATE_IDLE);    // of the next run, whose first word it is
+  server->send_motion(
+      "p3at", 1000, 0,
+      ruedo::motion_status_t::STATE_IDLE);  // of the next run, whose first word it is
   server->await_delivery();
   EXPECT_EQ(motion.state(), MotionState::running);
   testing::internal::CaptureStderr();
   server->run_id = 8;
   server->await([&] {
-    server->send_tick(1000);    // it asks who that is
+    server->send_tick(1000);  // it asks who that is
     return events == 1;
   });
   server->await_delivery();
-  EXPECT_EQ(testing::internal::GetCapturedStderr(), "ruedo: another run has begun at memq://: commands are not repeated into it\n");
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "ruedo: another run has begun at memq://: commands are not repeated into it\n");
   const int64_t before = server->heard("p3at/velocity");
   for (int i = 2; i <= 20; ++i) server->send_tick(1000 * i);
   server->await_delivery();
   EXPECT_EQ(server->heard("p3at/velocity"), before);
   EXPECT_EQ(motion.reason(), MotionReason::new_run);
-  EXPECT_THROW((void)odometry.latest(0.01), Timeout);    // what is known is of the run before
+  EXPECT_THROW((void)odometry.latest(0.01), Timeout);  // what is known is of the run before
   EXPECT_LT(sim.time(), 1.0);
-  sim.pause();    // it joins anew
+  sim.pause();  // it joins anew
 }
 
 TEST_F(Lifetimes, WhatALaterServerSaysOfAMotionIsUnknown) {
@@ -281,7 +307,7 @@ TEST_F(Lifetimes, EightThreadsAndAllThatAClientMayDo) {
           if (number == 2) sim->pause();
           if (number == 3) robot.advance(0.1);
           if (number == 7 && i == 50) sim->close();
-        } catch (const NoServer&) {    // once it was closed
+        } catch (const NoServer&) {  // once it was closed
         } catch (...) {
           ++unexpected;
         }

@@ -7,29 +7,111 @@ from ruedo import lcmtypes
 
 INF = math.inf
 CASES = [
-    ("planar_lidar_t", dict(utime=1000, nranges=3, ranges=[1.5, INF, -INF], nintensities=3, intensities=[0.0, 0.5, 1.0], rad0=-0.5, radstep=0.25),
-     "utime 1000|ranges 1.500000 inf -inf|intensities 0.000000 0.500000 1.000000|angles -0.500000 0.000000"),
-    ("planar_lidar_t", dict(utime=-1, nranges=0, ranges=[], nintensities=0, intensities=[], rad0=0.0, radstep=0.0),
-     "utime -1|ranges|intensities|angles"),
-    ("sonar_t", dict(utime=2000, n=2, range=[5.0, 0.125], fired_utime=[-1, 1500], fresh=[False, True]),
-     "utime 2000|ranges 5.000000 0.125000|fired_utime -1 1500|fresh 0 1"),
-    ("odometry_t", dict(utime=9007199254740993, x=1.0, y=-2.5, theta=7.0, v=0.25, omega=-0.5, n=2, angle=[0.5, -0.5], rate=[1.0, 2.0],
-                        ticks=[-3, 4294967296], resets=2),
-     "utime 9007199254740993|pose 1.000000 -2.500000 7.000000|twist 0.250000 -0.500000|angles 0.500000 -0.500000|rates 1.000000 2.000000|ticks -3 4294967296|resets 2"),
-    ("pose_t", dict(utime=3, pos=[1.0, 2.0, 0.5], vel=[0.25, 0.0, 0.0], orientation=[0.0, 0.0, 0.0, 1.0], rotation_rate=[0.0, 0.0, -1.0],
-                    accel=[0.5, 0.0, 0.0]),
-     "utime 3|position 1.000000 2.000000 0.500000|orientation 0.000000 0.000000 0.000000 1.000000|velocity 0.250000 0.000000 0.000000"
-     "|rotation_rate 0.000000 0.000000 -1.000000|acceleration 0.500000 0.000000 0.000000|heading 3.141593"),
-    ("imu_t", dict(utime=4, orientation=[1.0, 0.0, 0.0, 0.0], angular_velocity=[0.5, 0.25, 0.125], linear_acceleration=[0.0, 0.0, 9.75]),
-     "utime 4|orientation 1.000000 0.000000 0.000000 0.000000|angular_velocity 0.500000 0.250000 0.125000|linear_acceleration 0.000000 0.000000 9.750000"),
-    ("contact_t", dict(utime=5, pressed=True, n=1, points=[dict(body="wall/link", position=[1.0, 2.0, 3.0], normal=[0.0, -1.0, 0.0], force=12.5, depth=0.25)]),
-     "utime 5|pressed 1|point wall/link 1.000000 2.000000 3.000000 0.000000 -1.000000 0.000000 12.500000 0.250000"),
-    ("joint_state_t", dict(utime=6, num_joints=2, joint_name=["left", "right wheel"], joint_position=[0.5, -0.5], joint_velocity=[1.0, -1.0], joint_effort=[0.25, 0.0]),
-     "utime 6|joint left 0.500000 1.000000 0.250000|joint right wheel -0.500000 -1.000000 0.000000"),
-    ("motion_status_t", dict(utime=7, id=-8, kind=3, state=4, reason=6, done=0.5, remaining=1.5, v=0.25, omega=-0.25),
-     "utime 7|id -8|heading refused bad value|amounts 0.500000 1.500000|twist 0.250000 -0.250000"),
-    ("motion_status_t", dict(utime=8, id=0, kind=17, state=1, reason=0, done=0.0, remaining=0.0, v=0.0, omega=0.0),
-     "utime 8|id 0|wheels running |amounts 0.000000 0.000000|twist 0.000000 0.000000"),
+    (
+        "planar_lidar_t",
+        dict(
+            utime=1000,
+            nranges=3,
+            ranges=[1.5, INF, -INF],
+            nintensities=3,
+            intensities=[0.0, 0.5, 1.0],
+            rad0=-0.5,
+            radstep=0.25,
+        ),
+        "utime 1000|ranges 1.500000 inf -inf|intensities 0.000000 0.500000 1.000000|angles -0.500000 0.000000",
+    ),
+    (
+        "planar_lidar_t",
+        dict(utime=-1, nranges=0, ranges=[], nintensities=0, intensities=[], rad0=0.0, radstep=0.0),
+        "utime -1|ranges|intensities|angles",
+    ),
+    (
+        "sonar_t",
+        dict(utime=2000, n=2, range=[5.0, 0.125], fired_utime=[-1, 1500], fresh=[False, True]),
+        "utime 2000|ranges 5.000000 0.125000|fired_utime -1 1500|fresh 0 1",
+    ),
+    (
+        "odometry_t",
+        dict(
+            utime=9007199254740993,
+            x=1.0,
+            y=-2.5,
+            theta=7.0,
+            v=0.25,
+            omega=-0.5,
+            n=2,
+            angle=[0.5, -0.5],
+            rate=[1.0, 2.0],
+            ticks=[-3, 4294967296],
+            resets=2,
+        ),
+        "utime 9007199254740993|pose 1.000000 -2.500000 7.000000|twist 0.250000 -0.500000|angles 0.500000 -0.500000|rates 1.000000 2.000000|ticks -3 4294967296|resets 2",
+    ),
+    (
+        "pose_t",
+        dict(
+            utime=3,
+            pos=[1.0, 2.0, 0.5],
+            vel=[0.25, 0.0, 0.0],
+            orientation=[0.0, 0.0, 0.0, 1.0],
+            rotation_rate=[0.0, 0.0, -1.0],
+            accel=[0.5, 0.0, 0.0],
+        ),
+        "utime 3|position 1.000000 2.000000 0.500000|orientation 0.000000 0.000000 0.000000 1.000000|velocity 0.250000 0.000000 0.000000"
+        "|rotation_rate 0.000000 0.000000 -1.000000|acceleration 0.500000 0.000000 0.000000|heading 3.141593",
+    ),
+    (
+        "imu_t",
+        dict(
+            utime=4,
+            orientation=[1.0, 0.0, 0.0, 0.0],
+            angular_velocity=[0.5, 0.25, 0.125],
+            linear_acceleration=[0.0, 0.0, 9.75],
+        ),
+        "utime 4|orientation 1.000000 0.000000 0.000000 0.000000|angular_velocity 0.500000 0.250000 0.125000|linear_acceleration 0.000000 0.000000 9.750000",
+    ),
+    (
+        "contact_t",
+        dict(
+            utime=5,
+            pressed=True,
+            n=1,
+            points=[
+                dict(
+                    body="wall/link",
+                    position=[1.0, 2.0, 3.0],
+                    normal=[0.0, -1.0, 0.0],
+                    force=12.5,
+                    depth=0.25,
+                )
+            ],
+        ),
+        "utime 5|pressed 1|point wall/link 1.000000 2.000000 3.000000 0.000000 -1.000000 0.000000 12.500000 0.250000",
+    ),
+    (
+        "joint_state_t",
+        dict(
+            utime=6,
+            num_joints=2,
+            joint_name=["left", "right wheel"],
+            joint_position=[0.5, -0.5],
+            joint_velocity=[1.0, -1.0],
+            joint_effort=[0.25, 0.0],
+        ),
+        "utime 6|joint left 0.500000 1.000000 0.250000|joint right wheel -0.500000 -1.000000 0.000000",
+    ),
+    (
+        "motion_status_t",
+        dict(
+            utime=7, id=-8, kind=3, state=4, reason=6, done=0.5, remaining=1.5, v=0.25, omega=-0.25
+        ),
+        "utime 7|id -8|heading refused bad value|amounts 0.500000 1.500000|twist 0.250000 -0.250000",
+    ),
+    (
+        "motion_status_t",
+        dict(utime=8, id=0, kind=17, state=1, reason=0, done=0.0, remaining=0.0, v=0.0, omega=0.0),
+        "utime 8|id 0|wheels running |amounts 0.000000 0.000000|twist 0.000000 0.000000",
+    ),
 ]
 
 
@@ -48,12 +130,22 @@ def main():
     for type, values, meaning in CASES:
         encoded = message(type, values).encode()
         lines += [f"{type} {encoded.hex()}", *("  " + line for line in meaning.split("|"))]
-        lines += [f"{type} {encoded[:-1].hex()}", "  broken", f"{type} {encoded[:7].hex()}", "  broken"]    # its end is missing
-        lines += [f"{type} {(bytes(8) + encoded[8:]).hex()}", "  broken"]    # another version
-    for type, at in (("planar_lidar_t", 16), ("sonar_t", 16), ("odometry_t", 56), ("contact_t", 17)):    # a length that lies
+        lines += [
+            f"{type} {encoded[:-1].hex()}",
+            "  broken",
+            f"{type} {encoded[:7].hex()}",
+            "  broken",
+        ]  # its end is missing
+        lines += [f"{type} {(bytes(8) + encoded[8:]).hex()}", "  broken"]  # another version
+    for type, at in (
+        ("planar_lidar_t", 16),
+        ("sonar_t", 16),
+        ("odometry_t", 56),
+        ("contact_t", 17),
+    ):  # a length that lies
         encoded = next(message(t, v).encode() for t, v, _ in CASES if t == type)
         for lie in (b"\xff\xff\xff\xff", b"\x7f\xff\xff\xff", b"\x20\x00\x00\x01"):
-            lines += [f"{type} {(encoded[:at] + lie + encoded[at + 4:]).hex()}", "  broken"]
+            lines += [f"{type} {(encoded[:at] + lie + encoded[at + 4 :]).hex()}", "  broken"]
     (Path(__file__).parent / "messages.txt").write_text("\n".join(lines) + "\n")
 
 

@@ -44,7 +44,9 @@ void mean(const std::string& type, const Sample& sample) {
   if (const auto* scan = as<Scan>(type, sample)) {
     row("ranges", scan->ranges);
     row("intensities", scan->intensities);
-    row("angles", scan->ranges.empty() ? std::vector<double>() : std::vector{scan->angle(0), scan->angle(scan->ranges.size() - 1)});
+    row("angles", scan->ranges.empty()
+                      ? std::vector<double>()
+                      : std::vector{scan->angle(0), scan->angle(scan->ranges.size() - 1)});
   } else if (const auto* sonar = as<SonarReading>(type, sample)) {
     row("ranges", sonar->ranges);
     row("fired_utime", sonar->fired_utime);
@@ -70,15 +72,18 @@ void mean(const std::string& type, const Sample& sample) {
   } else if (const auto* contact = as<Contact>(type, sample)) {
     row("pressed", std::vector{int64_t{contact->pressed}});
     for (const ContactPoint& p : contact->points) {
-      row("point " + p.body, std::vector{p.position[0], p.position[1], p.position[2], p.normal[0], p.normal[1], p.normal[2], p.force, p.depth});
+      row("point " + p.body, std::vector{p.position[0], p.position[1], p.position[2], p.normal[0],
+                                         p.normal[1], p.normal[2], p.force, p.depth});
     }
   } else if (const auto* joints = as<Joints>(type, sample)) {
     for (size_t i = 0; i < joints->names.size(); ++i) {
-      row("joint " + joints->names[i], std::vector{joints->positions[i], joints->velocities[i], joints->efforts[i]});
+      row("joint " + joints->names[i],
+          std::vector{joints->positions[i], joints->velocities[i], joints->efforts[i]});
     }
   } else if (const auto* motion = as<MotionStatus>(type, sample)) {
     row("id", std::vector{motion->id});
-    std::printf("%s %s %s\n", to_string(motion->kind), to_string(motion->state), to_string(motion->reason));
+    std::printf("%s %s %s\n", to_string(motion->kind), to_string(motion->state),
+                to_string(motion->reason));
     row("amounts", std::vector{motion->progress, motion->remaining});
     row("twist", std::vector{motion->v, motion->omega});
   }
@@ -90,7 +95,8 @@ void decode() {
     std::string type, hex;
     words >> type >> hex;
     std::vector<uint8_t> bytes;
-    for (size_t i = 0; i + 1 < hex.size(); i += 2) bytes.push_back(static_cast<uint8_t>(std::stoul(hex.substr(i, 2), nullptr, 16)));
+    for (size_t i = 0; i + 1 < hex.size(); i += 2)
+      bytes.push_back(static_cast<uint8_t>(std::stoul(hex.substr(i, 2), nullptr, 16)));
     const SampleDecoder& decoder = *find_decoder(type);
     try {
       WireReader in(bytes.data(), bytes.size());
@@ -109,7 +115,8 @@ class PipeTransport : public Transport {
   void unsubscribe(const std::string&) override {}
   void publish(const std::string& channel, const uint8_t* bytes, size_t size) override {
     const std::lock_guard lock(mutex_);
-    const uint32_t head[] = {htonl(static_cast<uint32_t>(channel.size())), htonl(static_cast<uint32_t>(size))};
+    const uint32_t head[] = {htonl(static_cast<uint32_t>(channel.size())),
+                             htonl(static_cast<uint32_t>(size))};
     std::fwrite(head, 1, sizeof head, stdout);
     std::fwrite(channel.data(), 1, channel.size(), stdout);
     std::fwrite(bytes, 1, size, stdout);
@@ -147,10 +154,15 @@ void converse(int argc, char** argv) {
     const Robot robot = sim.robot("p3at");
     for (int i = 2; i < argc; ++i) {
       const int64_t n = std::atoll(argv[i]);
-      const Observations seen = sim.step(n, n > 0 ? std::vector<Command>{robot.velocity_command(0.5, 0.0)} : std::vector<Command>{}, 300.0);
-      std::string line = "step " + std::to_string(seen.step) + " " + std::to_string(seen.utime) + " " + std::to_string(seen.state_hash);
+      const Observations seen = sim.step(
+          n,
+          n > 0 ? std::vector<Command>{robot.velocity_command(0.5, 0.0)} : std::vector<Command>{},
+          300.0);
+      std::string line = "step " + std::to_string(seen.step) + " " + std::to_string(seen.utime) +
+                         " " + std::to_string(seen.state_hash);
       for (const auto& m : seen.messages) {
-        line += " " + std::to_string(m.step) + ":" + m.channel + ":" + std::to_string(crc32(m.bytes.data(), m.bytes.size()));
+        line += " " + std::to_string(m.step) + ":" + m.channel + ":" +
+                std::to_string(crc32(m.bytes.data(), m.bytes.size()));
       }
       std::fprintf(stderr, "%s\n", line.c_str());
     }
@@ -171,5 +183,5 @@ int main(int argc, char** argv) {
   if (argc < 2) return 2;
   std::string(argv[1]) == "decode" ? decode() : converse(argc, argv);
   std::fflush(stdout);
-  std::_Exit(0);    // a conversation ends where it ends: the script may be gone
+  std::_Exit(0);  // a conversation ends where it ends: the script may be gone
 }

@@ -1,7 +1,7 @@
 """What the Python client makes of the test vectors; runner.cpp and Runner.java are its twins.
 
-    runner.py decode                 reads lines TYPE BYTES, says what each means
-    runner.py converse N...          steps so often, over a transport on standard input and output; says what it saw
+runner.py decode                 reads lines TYPE BYTES, says what each means
+runner.py converse N...          steps so often, over a transport on standard input and output; says what it saw
 """
 
 import select
@@ -65,7 +65,14 @@ def decode():
     for line in sys.stdin:
         type, *data = line.split()
         try:
-            lines = list(meaning(type, _sample(bytes.fromhex("".join(data)), types.SimpleNamespace(channel="c", type=type))))
+            lines = list(
+                meaning(
+                    type,
+                    _sample(
+                        bytes.fromhex("".join(data)), types.SimpleNamespace(channel="c", type=type)
+                    ),
+                )
+            )
         except ruedo.TypeMismatch:
             lines = ["broken"]
         print("\n".join(lines), end="\n.\n")
@@ -96,7 +103,9 @@ class PipeTransport:
     def _read(self, size):
         data = b""
         while len(data) < size:
-            more = self._in.raw.read(size - len(data))    # unbuffered, so that select() sees what is left
+            more = self._in.raw.read(
+                size - len(data)
+            )  # unbuffered, so that select() sees what is left
             if not more:
                 sys.exit(3)
             data += more

@@ -1,5 +1,5 @@
-// Our SDF reader against libsdformat 12: on every file of the corpus that both load, names, poses, shapes,
-// inertias, joints, sensors and noise agree to 1e-9.
+// Our SDF reader against libsdformat 12: on every file of the corpus that both load, names, poses,
+// shapes, inertias, joints, sensors and noise agree to 1e-9.
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -25,12 +25,14 @@ constexpr double kTolerance = 1e-9;
 const fs::path kCorpus = fs::path(RUEDO_SOURCE_DIR) / ".." / "shared" / "corpus";
 
 Pose pose_of(const ignition::math::Pose3d& p) {
-  return {ruedo::Quat(p.Rot().W(), p.Rot().X(), p.Rot().Y(), p.Rot().Z()), {p.Pos().X(), p.Pos().Y(), p.Pos().Z()}};
+  return {ruedo::Quat(p.Rot().W(), p.Rot().X(), p.Rot().Y(), p.Rot().Z()),
+          {p.Pos().X(), p.Pos().Y(), p.Pos().Z()}};
 }
 Vec3 vec(const ignition::math::Vector3d& v) { return {v.X(), v.Y(), v.Z()}; }
 
 std::string dotted(std::string name) {
-  for (size_t at = name.find("::"); at != std::string::npos; at = name.find("::")) name.replace(at, 2, ".");
+  for (size_t at = name.find("::"); at != std::string::npos; at = name.find("::"))
+    name.replace(at, 2, ".");
   return name;
 }
 
@@ -66,7 +68,8 @@ struct Their {
 void collect(const sdf::Model& model, const std::string& prefix, const Pose& X_WM, Their& their) {
   for (uint64_t i = 0; i < model.LinkCount(); ++i) {
     const sdf::Link& link = *model.LinkByIndex(i);
-    their.links[prefix + dotted(link.Name())] = {X_WM * resolved(link.SemanticPose(), "__model__"), &link};
+    their.links[prefix + dotted(link.Name())] = {X_WM * resolved(link.SemanticPose(), "__model__"),
+                                                 &link};
   }
   for (uint64_t i = 0; i < model.JointCount(); ++i) {
     const sdf::Joint& joint = *model.JointByIndex(i);
@@ -80,12 +83,16 @@ void collect(const sdf::Model& model, const std::string& prefix, const Pose& X_W
   }
   for (uint64_t i = 0; i < model.ModelCount(); ++i) {
     const sdf::Model& nested = *model.ModelByIndex(i);
-    collect(nested, prefix + dotted(nested.Name()) + ".", X_WM * resolved(nested.SemanticPose(), "__model__"), their);
+    collect(nested, prefix + dotted(nested.Name()) + ".",
+            X_WM * resolved(nested.SemanticPose(), "__model__"), their);
   }
 }
 
-void compare_geometry(const model::Geometry& ours, const sdf::Geometry& theirs, const std::string& what) {
-  const auto near = [&](const Vec3& a, const Vec3& b) { EXPECT_LT((a - b).norm(), kTolerance) << what; };
+void compare_geometry(const model::Geometry& ours, const sdf::Geometry& theirs,
+                      const std::string& what) {
+  const auto near = [&](const Vec3& a, const Vec3& b) {
+    EXPECT_LT((a - b).norm(), kTolerance) << what;
+  };
   switch (theirs.Type()) {
     case sdf::GeometryType::BOX:
       ASSERT_EQ(ours.shape, model::Shape::box) << what;
@@ -108,9 +115,7 @@ void compare_geometry(const model::Geometry& ours, const sdf::Geometry& theirs, 
       ASSERT_EQ(ours.shape, model::Shape::mesh) << what;
       near(ours.scale, vec(theirs.MeshShape()->Scale()));
       break;
-    case sdf::GeometryType::HEIGHTMAP:
-      ASSERT_EQ(ours.shape, model::Shape::mesh) << what;
-      break;
+    case sdf::GeometryType::HEIGHTMAP: ASSERT_EQ(ours.shape, model::Shape::mesh) << what; break;
     default: ADD_FAILURE() << what << ": a kind of shape that this test does not know";
   }
 }
@@ -118,33 +123,61 @@ void compare_geometry(const model::Geometry& ours, const sdf::Geometry& theirs, 
 void compare_noise(const Element* ours, const sdf::Noise& theirs, const std::string& what) {
   if (theirs.Type() == sdf::NoiseType::NONE) return;
   ASSERT_NE(ours, nullptr) << what;
-  EXPECT_NEAR(ours->number("mean", 0, ruedo::Allowed::any(ruedo::quantity::kRange)), theirs.Mean(), kTolerance) << what;
-  EXPECT_NEAR(ours->number("stddev", 0, ruedo::Allowed::any(ruedo::quantity::kRange)), theirs.StdDev(), kTolerance) << what;
+  EXPECT_NEAR(ours->number("mean", 0, ruedo::Allowed::any(ruedo::quantity::kRange)), theirs.Mean(),
+              kTolerance)
+      << what;
+  EXPECT_NEAR(ours->number("stddev", 0, ruedo::Allowed::any(ruedo::quantity::kRange)),
+              theirs.StdDev(), kTolerance)
+      << what;
 }
 
-void compare_sensor(const model::SensorDescription& ours, const sdf::Sensor& theirs, const std::string& what) {
+void compare_sensor(const model::SensorDescription& ours, const sdf::Sensor& theirs,
+                    const std::string& what) {
   expect_near(ours.X_LS, resolved(theirs.SemanticPose()), what);
   const Element& e = *ours.element;
-  EXPECT_NEAR(e.number("update_rate", 0, ruedo::Allowed::any(ruedo::quantity::kRange)), theirs.UpdateRate(), kTolerance) << what;
+  EXPECT_NEAR(e.number("update_rate", 0, ruedo::Allowed::any(ruedo::quantity::kRange)),
+              theirs.UpdateRate(), kTolerance)
+      << what;
   if (const sdf::Lidar* lidar = theirs.LidarSensor()) {
     const Element* l = e.child("lidar") ? e.child("lidar") : e.child("ray");
     ASSERT_NE(l, nullptr) << what;
-    EXPECT_EQ(l->integer("scan/horizontal/samples", 640, ruedo::Allowed::any(ruedo::quantity::kRange)), lidar->HorizontalScanSamples()) << what;
-    EXPECT_NEAR(l->number("scan/horizontal/min_angle", 0, ruedo::Allowed::any(ruedo::quantity::kRange)), lidar->HorizontalScanMinAngle().Radian(), kTolerance) << what;
-    EXPECT_NEAR(l->number("scan/horizontal/max_angle", 0, ruedo::Allowed::any(ruedo::quantity::kRange)), lidar->HorizontalScanMaxAngle().Radian(), kTolerance) << what;
-    EXPECT_NEAR(l->number("range/min", 0, ruedo::Allowed::any(ruedo::quantity::kRange)), lidar->RangeMin(), kTolerance) << what;
-    EXPECT_NEAR(l->number("range/max", 0, ruedo::Allowed::any(ruedo::quantity::kRange)), lidar->RangeMax(), kTolerance) << what;
+    EXPECT_EQ(
+        l->integer("scan/horizontal/samples", 640, ruedo::Allowed::any(ruedo::quantity::kRange)),
+        lidar->HorizontalScanSamples())
+        << what;
+    EXPECT_NEAR(
+        l->number("scan/horizontal/min_angle", 0, ruedo::Allowed::any(ruedo::quantity::kRange)),
+        lidar->HorizontalScanMinAngle().Radian(), kTolerance)
+        << what;
+    EXPECT_NEAR(
+        l->number("scan/horizontal/max_angle", 0, ruedo::Allowed::any(ruedo::quantity::kRange)),
+        lidar->HorizontalScanMaxAngle().Radian(), kTolerance)
+        << what;
+    EXPECT_NEAR(l->number("range/min", 0, ruedo::Allowed::any(ruedo::quantity::kRange)),
+                lidar->RangeMin(), kTolerance)
+        << what;
+    EXPECT_NEAR(l->number("range/max", 0, ruedo::Allowed::any(ruedo::quantity::kRange)),
+                lidar->RangeMax(), kTolerance)
+        << what;
     compare_noise(l->child("noise"), lidar->LidarNoise(), what);
   }
   if (const sdf::Camera* camera = theirs.CameraSensor()) {
-    EXPECT_NEAR(e.number("camera/horizontal_fov", 1.047, ruedo::Allowed::any(ruedo::quantity::kRange)), camera->HorizontalFov().Radian(), kTolerance) << what;
-    EXPECT_EQ(e.integer("camera/image/width", 320, ruedo::Allowed::any(ruedo::quantity::kRange)), camera->ImageWidth()) << what;
-    EXPECT_NEAR(e.number("camera/clip/far", 100, ruedo::Allowed::any(ruedo::quantity::kRange)), camera->FarClip(), kTolerance) << what;
+    EXPECT_NEAR(
+        e.number("camera/horizontal_fov", 1.047, ruedo::Allowed::any(ruedo::quantity::kRange)),
+        camera->HorizontalFov().Radian(), kTolerance)
+        << what;
+    EXPECT_EQ(e.integer("camera/image/width", 320, ruedo::Allowed::any(ruedo::quantity::kRange)),
+              camera->ImageWidth())
+        << what;
+    EXPECT_NEAR(e.number("camera/clip/far", 100, ruedo::Allowed::any(ruedo::quantity::kRange)),
+                camera->FarClip(), kTolerance)
+        << what;
     compare_noise(e.child("camera/noise"), camera->ImageNoise(), what);
   }
   if (const sdf::Imu* imu = theirs.ImuSensor()) {
     compare_noise(e.child("imu/angular_velocity/x/noise"), imu->AngularVelocityXNoise(), what);
-    compare_noise(e.child("imu/linear_acceleration/z/noise"), imu->LinearAccelerationZNoise(), what);
+    compare_noise(e.child("imu/linear_acceleration/z/noise"), imu->LinearAccelerationZNoise(),
+                  what);
   }
 }
 
@@ -153,7 +186,8 @@ struct Counts {
   int files = 0, links = 0, shapes = 0, joints = 0, sensors = 0;
 };
 
-void compare_instance(const model::ModelInstance& ours, const Their& their, const std::string& findings, const std::string& file, Counts& counts) {
+void compare_instance(const model::ModelInstance& ours, const Their& their,
+                      const std::string& findings, const std::string& file, Counts& counts) {
   const model::Model& m = *ours.model;
   EXPECT_EQ(m.links.size(), their.links.size()) << file << " " << ours.name;
   for (const model::Link& link : m.links) {
@@ -193,13 +227,17 @@ void compare_instance(const model::ModelInstance& ours, const Their& their, cons
     // What we left out, we said.
     for (uint64_t i = 0; i < theirs.CollisionCount(); ++i) {
       const std::string name = theirs.CollisionByIndex(i)->Name();
-      const bool here = std::any_of(link.collisions.begin(), link.collisions.end(), [&](const auto& c) { return c.name == name; });
-      EXPECT_TRUE(here || findings.find("collision " + name) != std::string::npos) << what << " collision " << name;
+      const bool here = std::any_of(link.collisions.begin(), link.collisions.end(),
+                                    [&](const auto& c) { return c.name == name; });
+      EXPECT_TRUE(here || findings.find("collision " + name) != std::string::npos)
+          << what << " collision " << name;
     }
     for (uint64_t i = 0; i < theirs.VisualCount(); ++i) {
       const std::string name = theirs.VisualByIndex(i)->Name();
-      const bool here = std::any_of(link.visuals.begin(), link.visuals.end(), [&](const auto& v) { return v.name == name; });
-      EXPECT_TRUE(here || findings.find("visual " + name) != std::string::npos) << what << " visual " << name;
+      const bool here = std::any_of(link.visuals.begin(), link.visuals.end(),
+                                    [&](const auto& v) { return v.name == name; });
+      EXPECT_TRUE(here || findings.find("visual " + name) != std::string::npos)
+          << what << " visual " << name;
     }
     const int index = static_cast<int>(&link - m.links.data());
     for (const model::SensorDescription& sensor : m.sensors) {
@@ -214,7 +252,8 @@ void compare_instance(const model::ModelInstance& ours, const Their& their, cons
     const std::string what = file + " " + ours.name + " joint " + joint.name;
     const auto at = their.joints.find(joint.name);
     if (at == their.joints.end()) {
-      EXPECT_NE(joint.name.find(".anchor"), std::string::npos) << what << ": libsdformat has no such joint";
+      EXPECT_NE(joint.name.find(".anchor"), std::string::npos)
+          << what << ": libsdformat has no such joint";
       continue;
     }
     expect_near(ours.X_WM * joint.X_MJ, at->second.X_WJ, what);
@@ -237,10 +276,14 @@ std::string find_for_oracle(const std::string& uri, const fs::path& file) {
   }
   if (name.rfind("https://", 0) == 0) {
     name = name.substr(name.rfind('/') + 1);
-    std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return c == ' ' ? '_' : static_cast<char>(std::tolower(c)); });
+    std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) {
+      return c == ' ' ? '_' : static_cast<char>(std::tolower(c));
+    });
   }
-  for (const fs::path& root : {file.parent_path(), file.parent_path() / "models", file.parent_path() / "../models", file.parent_path() / "..",
-                               fs::path(RUEDO_SOURCE_DIR) / "worlds/models", kCorpus / "gazebo_models"}) {
+  for (const fs::path& root :
+       {file.parent_path(), file.parent_path() / "models", file.parent_path() / "../models",
+        file.parent_path() / "..", fs::path(RUEDO_SOURCE_DIR) / "worlds/models",
+        kCorpus / "gazebo_models"}) {
     if (fs::exists(root / name)) return (root / name).string();
   }
   return "";
@@ -253,7 +296,7 @@ bool compare_file(const fs::path& path, Counts& counts) {
   sdf::Root root;
   try {
     if (const sdf::Errors errors = root.Load(path.string(), config); !errors.empty()) return false;
-  } catch (const sdf::Exception&) {    // no std::exception
+  } catch (const sdf::Exception&) {  // no std::exception
     return false;
   } catch (const std::exception&) {
     return false;
@@ -267,9 +310,11 @@ bool compare_file(const fs::path& path, Counts& counts) {
     return true;
   }
   std::string findings;
-  for (const auto& finding : ours->findings) findings += finding.element + ": " + finding.text + "\n";
+  for (const auto& finding : ours->findings)
+    findings += finding.element + ": " + finding.text + "\n";
   const auto compare = [&](const sdf::Model& theirs, const Pose& X_WM, const std::string& name) {
-    const auto at = std::find_if(ours->models.begin(), ours->models.end(), [&](const auto& each) { return each.name == dotted(name); });
+    const auto at = std::find_if(ours->models.begin(), ours->models.end(),
+                                 [&](const auto& each) { return each.name == dotted(name); });
     ASSERT_NE(at, ours->models.end()) << path << " " << name;
     if (theirs.Static()) EXPECT_TRUE(at->model->is_static) << path << " " << name;
     Their their;
@@ -281,26 +326,32 @@ bool compare_file(const fs::path& path, Counts& counts) {
     for (uint64_t i = 0; i < world->ModelCount(); ++i) {
       const sdf::Model& theirs = *world->ModelByIndex(i);
       Pose X_WM = resolved(theirs.SemanticPose(), "world");
-      if (world->Element()->HasElement("state")) {    // libsdformat reads it, and leaves it to its users
-        for (auto state = world->Element()->FindElement("state")->FindElement("model"); state; state = state->GetNextElement("model")) {
-          if (state->Get<std::string>("name") == theirs.Name()) X_WM = pose_of(state->Get<ignition::math::Pose3d>("pose"));
+      if (world->Element()->HasElement(
+              "state")) {  // libsdformat reads it, and leaves it to its users
+        for (auto state = world->Element()->FindElement("state")->FindElement("model"); state;
+             state = state->GetNextElement("model")) {
+          if (state->Get<std::string>("name") == theirs.Name())
+            X_WM = pose_of(state->Get<ignition::math::Pose3d>("pose"));
         }
       }
       compare(theirs, X_WM, theirs.Name());
     }
     EXPECT_LT((ours->gravity - vec(world->Gravity())).norm(), kTolerance);
     if (world->Element()->HasElement("physics")) {
-      EXPECT_NEAR(static_cast<double>(ours->step_us) * 1e-6, world->PhysicsDefault()->MaxStepSize(), kTolerance);
+      EXPECT_NEAR(static_cast<double>(ours->step_us) * 1e-6, world->PhysicsDefault()->MaxStepSize(),
+                  kTolerance);
     }
     for (uint64_t i = 0; i < world->LightCount(); ++i) {
       const sdf::Light& light = *world->LightByIndex(i);
-      const auto at = std::find_if(ours->lights.begin(), ours->lights.end(), [&](const auto& each) { return each.name == light.Name(); });
+      const auto at = std::find_if(ours->lights.begin(), ours->lights.end(),
+                                   [&](const auto& each) { return each.name == light.Name(); });
       if (at == ours->lights.end()) {
         ADD_FAILURE() << light.Name();
         continue;
       }
       expect_near(at->pose, pose_of(light.RawPose()), light.Name());
-      EXPECT_LT((at->direction - vec(light.Direction()).normalized()).norm(), kTolerance) << light.Name();
+      EXPECT_LT((at->direction - vec(light.Direction()).normalized()).norm(), kTolerance)
+          << light.Name();
     }
   } else if (const sdf::Model* theirs = root.Model()) {
     compare(*theirs, pose_of(theirs->RawPose()), theirs->Name());
@@ -326,7 +377,8 @@ void silence() {
 TEST(Oracle, FixturesAgree) {
   silence();
   Counts counts;
-  for (const fs::path& path : sdf_files(fs::path(RUEDO_SOURCE_DIR) / "tests/model/oracle/fixtures")) {
+  for (const fs::path& path :
+       sdf_files(fs::path(RUEDO_SOURCE_DIR) / "tests/model/oracle/fixtures")) {
     EXPECT_TRUE(compare_file(path, counts)) << path << ": libsdformat refuses it";
   }
   EXPECT_EQ(counts.files, 5);

@@ -42,7 +42,7 @@ def unpack(bundle: Bundle, name: str) -> str:
         file.chmod(0o755)
     try:
         part.rename(folder)
-    except OSError:    # another worker was first
+    except OSError:  # another worker was first
         if not folder.is_dir():
             raise
     return str(folder)
@@ -53,7 +53,10 @@ def moved(what: dict[str, Any], folder: str, to: str) -> dict[str, Any]:
     file = what["world"]["file"]
     if not _is_inside(file, Path(folder)):
         return what
-    return {**what, "world": {**what["world"], "file": os.path.join(to, os.path.relpath(file, folder))}}
+    return {
+        **what,
+        "world": {**what["world"], "file": os.path.join(to, os.path.relpath(file, folder))},
+    }
 
 
 def log_moved(log: bytes, folder: str, to: str) -> bytes:
@@ -61,6 +64,7 @@ def log_moved(log: bytes, folder: str, to: str) -> bytes:
     import lcm
 
     from ..lcmtypes import log_header_t
+
     if not log or folder == to:
         return log
     with tempfile.TemporaryDirectory() as scratch:
@@ -81,8 +85,12 @@ def log_moved(log: bytes, folder: str, to: str) -> bytes:
 
 
 def _moved_path(path: str, folder: str, to: str) -> str:
-    return to + path[len(folder):] if path.startswith(folder + "/") else path
+    return to + path[len(folder) :] if path.startswith(folder + "/") else path
 
 
 def _is_inside(file: str, folder: Path) -> bool:
-    return os.path.isabs(file) and Path(file).is_file() and Path(os.path.realpath(file)).is_relative_to(os.path.realpath(folder))
+    return (
+        os.path.isabs(file)
+        and Path(file).is_file()
+        and Path(os.path.realpath(file)).is_relative_to(os.path.realpath(folder))
+    )

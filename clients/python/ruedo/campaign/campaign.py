@@ -29,8 +29,13 @@ class Campaign:
     results go, default NAME.campaign beside the file. Raises SpecError for what is wrong in the file.
     """
 
-    def __init__(self, spec: str | os.PathLike[str] | dict[str, Any], *, folder: str | os.PathLike[str] = ".",
-                 out: str | os.PathLike[str] | None = None) -> None:
+    def __init__(
+        self,
+        spec: str | os.PathLike[str] | dict[str, Any],
+        *,
+        folder: str | os.PathLike[str] = ".",
+        out: str | os.PathLike[str] | None = None,
+    ) -> None:
         if isinstance(spec, dict):
             self._content, self._source = json.loads(json.dumps(spec)), Source("campaign")
             self.folder = Path(folder).resolve()
@@ -51,7 +56,7 @@ class Campaign:
         self.version = str(getattr(_engine, "build", _engine.version))
         self._cases: list[Case] | None = None
         self.worlds = WorldFiles(self.folder, self.out / "worlds")
-        self._files: set[str] = set()    # that the cases are made from
+        self._files: set[str] = set()  # that the cases are made from
 
     @property
     def content(self) -> dict[str, Any]:
@@ -62,13 +67,27 @@ class Campaign:
     def cases(self) -> list[Case]:
         """All cases, in the order of the file. Worlds are made and read when this is first asked for."""
         if self._cases is None:
-            planner = Planner(self._content, self._source, self.folder, self.out / "worlds", self.version, self.worlds)
+            planner = Planner(
+                self._content,
+                self._source,
+                self.folder,
+                self.out / "worlds",
+                self.version,
+                self.worlds,
+            )
             self._cases = planner.cases()
             self._files = planner.files
         return self._cases
 
-    def run(self, *, workers: int | None = None, ray: str | None = None, shard: str | None = None,
-            progress: Progress | None = None, stop: Callable[[], bool] = lambda: False) -> Results:
+    def run(
+        self,
+        *,
+        workers: int | None = None,
+        ray: str | None = None,
+        shard: str | None = None,
+        progress: Progress | None = None,
+        stop: Callable[[], bool] = lambda: False,
+    ) -> Results:
         """Runs what has no result yet, and returns all results.
 
         workers: processes on this machine, default one a core. ray: "auto" or an address, the same on a
@@ -77,14 +96,30 @@ class Campaign:
         cases = shard_of(self.cases, shard) if shard else self.cases
         store = Store(self.out)
         with _lock(self.out):
-            store.set_about("campaign", json.dumps({"name": self.name, "content": self._content,
-                                                    "folder": str(self.folder), "version": self.version}))
-            store.set_about("cases", json.dumps([{key: getattr(case, key) for key in _REMEMBERED} for case in cases]))
+            store.set_about(
+                "campaign",
+                json.dumps(
+                    {
+                        "name": self.name,
+                        "content": self._content,
+                        "folder": str(self.folder),
+                        "version": self.version,
+                    }
+                ),
+            )
+            store.set_about(
+                "cases",
+                json.dumps([{key: getattr(case, key) for key in _REMEMBERED} for case in cases]),
+            )
             known = store.known()
             missing = [case for case in cases if case.id not in known]
             sample = self._sampled()
             for case, outcome, wall_s in self._outcomes(missing, workers, ray):
-                keep = outcome["status"] != "passed" if self._content.get("keep", {}).get("failures", True) else False
+                keep = (
+                    outcome["status"] != "passed"
+                    if self._content.get("keep", {}).get("failures", True)
+                    else False
+                )
                 store.add(case.id, outcome, wall_s, keep or case.id in sample)
                 if progress:
                     progress(case, outcome)
@@ -102,16 +137,24 @@ class Campaign:
         """Takes over the results of shards; how many."""
         store = Store(self.out)
         with _lock(self.out):
-            store.set_about("cases", json.dumps([{key: getattr(case, key) for key in _REMEMBERED} for case in self.cases]))
+            store.set_about(
+                "cases",
+                json.dumps(
+                    [{key: getattr(case, key) for key in _REMEMBERED} for case in self.cases]
+                ),
+            )
             return sum(store.take(Store(Path(one), write=False)) for one in folders)
 
     def case(self, text: str) -> Case:
         """By its number, or by the beginning of its id."""
         found = [case for case in self.cases if str(case.number) == text] or [
-            case for case in self.cases if len(text) >= 4 and case.id.startswith(text)]
+            case for case in self.cases if len(text) >= 4 and case.id.startswith(text)
+        ]
         if len(found) != 1:
-            raise SpecError(f"{text} is {'no case' if not found else 'several cases'} of {self.name}: a number from 0 "
-                            f"to {len(self.cases) - 1}, or the first 4 digits or more of an id")
+            raise SpecError(
+                f"{text} is {'no case' if not found else 'several cases'} of {self.name}: a number from 0 "
+                f"to {len(self.cases) - 1}, or the first 4 digits or more of an id"
+            )
         return found[0]
 
     def _each_controller(self) -> Iterator[dict[str, Any]]:
@@ -122,10 +165,17 @@ class Campaign:
                 continue
             files = sorted(file for file in self.folder.glob(one["each"]) if file.is_file())
             if not files:
-                raise self._source.error(("controllers", i, "each"), f"is {one['each']!r}, and no file is called so in {self.folder}")
+                raise self._source.error(
+                    ("controllers", i, "each"),
+                    f"is {one['each']!r}, and no file is called so in {self.folder}",
+                )
             for file in files:
                 path = str(file.relative_to(self.folder))
-                made = {key: value.replace("{file}", path) if isinstance(value, str) else value for key, value in one.items() if key != "each"}
+                made = {
+                    key: value.replace("{file}", path) if isinstance(value, str) else value
+                    for key, value in one.items()
+                    if key != "each"
+                }
                 yield {**made, "name": file.stem}
 
     def _sampled(self) -> set[str]:
@@ -154,7 +204,9 @@ class _lock:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             self._file.close()
-            raise CampaignError(f"{self._folder} is in use by another `ruedo campaign run`") from None
+            raise CampaignError(
+                f"{self._folder} is in use by another `ruedo campaign run`"
+            ) from None
 
     def __exit__(self, *_: object) -> None:
         self._file.close()

@@ -23,8 +23,8 @@ from .controller import DONE, View, make_controller
 from .functions import Function
 from .processes import die_with_parent, end_descendants, limit_memory
 
-_TAIL = 4000        # characters of a controller's output that are kept
-_ENGINES = 4        # that a worker keeps
+_TAIL = 4000  # characters of a controller's output that are kept
+_ENGINES = 4  # that a worker keeps
 
 
 @dataclass
@@ -73,7 +73,9 @@ class Runner:
         """full_log: a file for all messages of the run; "": what acted on it is in the outcome."""
         outcome = Outcome()
         everything = bool(full_log or what["metrics"] or "golden" in what["expect"])
-        with tempfile.TemporaryDirectory(prefix="ruedo-case-", dir=_scratch(everything, what)) as scratch:
+        with tempfile.TemporaryDirectory(
+            prefix="ruedo-case-", dir=_scratch(everything, what)
+        ) as scratch:
             log = full_log or os.path.join(scratch, "run.lcm")
             try:
                 if "python" in what["controller"]:
@@ -91,14 +93,23 @@ class Runner:
 
     # ---- In the engine.
 
-    def _run_in_engine(self, what: dict[str, Any], log: str, everything: bool, outcome: Outcome) -> None:
+    def _run_in_engine(
+        self, what: dict[str, Any], log: str, everything: bool, outcome: Outcome
+    ) -> None:
         engine = self._engine(what)
         expect, limits = what["expect"], what["limits"]
         robot = expect.get("robot") or (engine.robots[0] if engine.robots else "")
-        engine.begin_run(what["seed"], goals=_goals(what), no_contact=expect.get("no_contact", False),
-                         clearance=expect.get("clearance"), odometry_error=expect.get("odometry_error"),
-                         clearance_reach=expect.get("clearance_reach", 0.0), robot=expect.get("robot", ""),
-                         log=log, everything=everything)
+        engine.begin_run(
+            what["seed"],
+            goals=_goals(what),
+            no_contact=expect.get("no_contact", False),
+            clearance=expect.get("clearance"),
+            odometry_error=expect.get("odometry_error"),
+            clearance_reach=expect.get("clearance_reach", 0.0),
+            robot=expect.get("robot", ""),
+            log=log,
+            everything=everything,
+        )
         try:
             with _time_limit(limits["wall"]), limit_memory(limits["memory_mb"]):
                 self._drive(engine, robot, what)
@@ -110,9 +121,15 @@ class Runner:
             outcome.fail("memory", "controller", too_large(limits["memory_mb"]))
         except SystemExit as error:
             if error.code not in (None, 0):
-                outcome.fail("crashed", "controller", f"the controller ended with SystemExit: {error.code}")
+                outcome.fail(
+                    "crashed", "controller", f"the controller ended with SystemExit: {error.code}"
+                )
         except Exception as error:
-            outcome.fail("crashed", "controller", f"the controller raised {type(error).__name__}: {error}"[:300])
+            outcome.fail(
+                "crashed",
+                "controller",
+                f"the controller raised {type(error).__name__}: {error}"[:300],
+            )
             traceback.print_exc()
         finally:
             verdict = engine.end_run()
@@ -122,7 +139,9 @@ class Runner:
         made = what["controller"]
         steps = max(1, round(1.0 / (made.get("hz", 10.0) * engine.dt)))
         last = round(what["limits"]["duration"] / engine.dt)
-        controller = make_controller(Function(made["python"], self._folder).load(), what["parameters"])
+        controller = make_controller(
+            Function(made["python"], self._folder).load(), what["parameters"]
+        )
         view = View(engine, robot, what["parameters"], what["seed"])
         index = engine.robots.index(robot) if robot in engine.robots else -1
         commands = _no_commands(len(engine.robots))
@@ -141,12 +160,18 @@ class Runner:
 
     def _engine(self, what: dict[str, Any]) -> Engine:
         world = what["world"]
-        options: dict[str, Any] = {"spawn": [world["spawn"]] if world["spawn"] else [], "set": what["settings"],
-                                   "disable": what["disable"], "noise": what["noise"]}
+        options: dict[str, Any] = {
+            "spawn": [world["spawn"]] if world["spawn"] else [],
+            "set": what["settings"],
+            "disable": what["disable"],
+            "noise": what["noise"],
+        }
         if what["faults"]:
             options["fault"] = [fault_text(one) for one in what["faults"]]
         key = json.dumps([world["file"], world["sha256"], options], sort_keys=True)
-        engine = self._engines.pop(key, None) or Engine(world["file"], threads=1, seed=what["seed"], **options)
+        engine = self._engines.pop(key, None) or Engine(
+            world["file"], threads=1, seed=what["seed"], **options
+        )
         self._engines[key] = engine
         while len(self._engines) > _ENGINES:
             self._engines.popitem(last=False)[1].close()
@@ -156,13 +181,27 @@ class Runner:
 
     def _run_command(self, what: dict[str, Any], log: str, scratch: str, outcome: Outcome) -> None:
         limits, made = what["limits"], what["controller"]
-        verdict_file, output_file = os.path.join(scratch, "verdict.json"), os.path.join(scratch, "output")
-        environment = {**os.environ, "RUEDO_PARAMETERS": json.dumps(what["parameters"], sort_keys=True),
-                       "RUEDO_SEED": str(what["seed"]), **{k: str(v) for k, v in made.get("environment", {}).items()}}
+        verdict_file, output_file = (
+            os.path.join(scratch, "verdict.json"),
+            os.path.join(scratch, "output"),
+        )
+        environment = {
+            **os.environ,
+            "RUEDO_PARAMETERS": json.dumps(what["parameters"], sort_keys=True),
+            "RUEDO_SEED": str(what["seed"]),
+            **{k: str(v) for k, v in made.get("environment", {}).items()},
+        }
         with open(output_file, "wb") as output:
-            process = subprocess.Popen(regress_command(what, log, verdict_file), cwd=self._folder, stdin=subprocess.DEVNULL,
-                                       stdout=output, stderr=subprocess.STDOUT, env=environment,
-                                       start_new_session=True, preexec_fn=die_with_parent)
+            process = subprocess.Popen(
+                regress_command(what, log, verdict_file),
+                cwd=self._folder,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                env=environment,
+                start_new_session=True,
+                preexec_fn=die_with_parent,
+            )
             try:
                 code: int | None = process.wait(limits["wall"])
             except subprocess.TimeoutExpired:
@@ -182,14 +221,20 @@ class Runner:
             outcome.fail("timeout", "controller", too_slow(limits["wall"]))
         else:
             said = [line for line in outcome.output.splitlines() if line.startswith("ruedo: ")]
-            outcome.fail("invalid", "case", said[-1][7:] if said else f"ruedo regress ended with exit code {code}")
+            outcome.fail(
+                "invalid",
+                "case",
+                said[-1][7:] if said else f"ruedo regress ended with exit code {code}",
+            )
 
     def _take_fault(self, fault: str, memory_mb: int, outcome: Outcome) -> None:
         starved = ("MemoryError", "bad_alloc", "OutOfMemoryError", "Cannot allocate memory")
         if fault.startswith("the client ended with"):
             if any(word in outcome.output for word in starved):
                 return outcome.fail("memory", "controller", too_large(memory_mb))
-            return outcome.fail("crashed", "controller", fault.replace("the client", "the controller"))
+            return outcome.fail(
+                "crashed", "controller", fault.replace("the client", "the controller")
+            )
         if fault.startswith("the run differs from"):
             return outcome.fail("failed", "golden", fault.splitlines()[0])
         outcome.fail("crashed", "controller", fault.splitlines()[0])
@@ -198,8 +243,14 @@ class Runner:
 
     def _take(self, verdict: dict[str, Any], outcome: Outcome) -> None:
         for failure in verdict["failures"]:
-            outcome.fail("failed", failure["what"].split(" ")[0], f"{failure['time_s']:.3f} s: {failure['text']}")
-        outcome.metrics.update({name: value for name, value in verdict["metrics"].items() if value is not None})
+            outcome.fail(
+                "failed",
+                failure["what"].split(" ")[0],
+                f"{failure['time_s']:.3f} s: {failure['text']}",
+            )
+        outcome.metrics.update(
+            {name: value for name, value in verdict["metrics"].items() if value is not None}
+        )
         outcome.track = [[round(value, 4) for value in place] for place in verdict["track"]]
 
     def _measure(self, what: dict[str, Any], log: str, outcome: Outcome) -> None:
@@ -207,9 +258,15 @@ class Runner:
             self._compare_with_golden(what["expect"], log, outcome)
         for metric in what["metrics"]:
             try:
-                outcome.metrics[metric["name"]] = float(Function(metric["python"], self._folder).load()(log))
+                outcome.metrics[metric["name"]] = float(
+                    Function(metric["python"], self._folder).load()(log)
+                )
             except Exception as error:
-                outcome.fail("invalid", "metric", f"{metric['python']} raised {type(error).__name__}: {error}"[:300])
+                outcome.fail(
+                    "invalid",
+                    "metric",
+                    f"{metric['python']} raised {type(error).__name__}: {error}"[:300],
+                )
 
     def _compare_with_golden(self, expect: dict[str, Any], log: str, outcome: Outcome) -> None:
         kept = log + ".kept"
@@ -221,48 +278,94 @@ class Runner:
         done = subprocess.run(command, capture_output=True, text=True)
         if done.returncode != 0:
             first = (done.stdout or done.stderr).strip().splitlines()
-            outcome.fail("failed", "golden", f"the run differs from {expect['golden']}: {first[0] if first else ''}")
+            outcome.fail(
+                "failed",
+                "golden",
+                f"the run differs from {expect['golden']}: {first[0] if first else ''}",
+            )
 
 
 def regress_command(what: dict[str, Any], log: str, verdict: str = "") -> list[str]:
     """The `ruedo regress` that is a case with a program; to be run in the campaign's folder."""
     world, made, expect, limits = what["world"], what["controller"], what["expect"], what["limits"]
     client = f"ulimit -d {limits['memory_mb'] * 1024}; {made['command']}"
-    command = [find_ruedo(), "regress", world["file"], "--client", client, "--seed", str(what["seed"]),
-               "--duration", str(limits["duration"]), "--record", log, "--no-page"]
+    command = [
+        find_ruedo(),
+        "regress",
+        world["file"],
+        "--client",
+        client,
+        "--seed",
+        str(what["seed"]),
+        "--duration",
+        str(limits["duration"]),
+        "--record",
+        log,
+        "--no-page",
+    ]
     if verdict:
         command += ["--json", verdict]
     if world["spawn"]:
         command += ["--spawn", world["spawn"]]
     for key, value in what["settings"].items():
         command += ["--set", f"{key}={str(value).lower() if isinstance(value, bool) else value}"]
-    for option, values in (("disable", what["disable"]), ("wait-for", made.get("wait_for", ())),
-                           ("remap", made.get("remap", ())), ("goal", _goals(what)),
-                           ("tolerance", expect.get("tolerances", ())), ("ignore", expect.get("ignore", ())),
-                           ("fault", [fault_text(one) for one in what["faults"]])):
+    for option, values in (
+        ("disable", what["disable"]),
+        ("wait-for", made.get("wait_for", ())),
+        ("remap", made.get("remap", ())),
+        ("goal", _goals(what)),
+        ("tolerance", expect.get("tolerances", ())),
+        ("ignore", expect.get("ignore", ())),
+        ("fault", [fault_text(one) for one in what["faults"]]),
+    ):
         command += [f"--{option}={value}" for value in values]
-    for option, value in (("lockstep", made.get("lockstep")), ("robot", expect.get("robot")), ("golden", expect.get("golden")),
-                          ("clearance", expect.get("clearance")), ("odometry-error", expect.get("odometry_error")),
-                          ("clearance-reach", expect.get("clearance_reach"))):
+    for option, value in (
+        ("lockstep", made.get("lockstep")),
+        ("robot", expect.get("robot")),
+        ("golden", expect.get("golden")),
+        ("clearance", expect.get("clearance")),
+        ("odometry-error", expect.get("odometry_error")),
+        ("clearance-reach", expect.get("clearance_reach")),
+    ):
         if value is not None:
             command += [f"--{option}", str(value)]
-    return command + (["--no-contact"] if expect.get("no_contact") else []) + ([] if what["noise"] else ["--no-noise"])
+    return (
+        command
+        + (["--no-contact"] if expect.get("no_contact") else [])
+        + ([] if what["noise"] else ["--no-noise"])
+    )
 
 
 def fault_text(fault: dict[str, Any]) -> str:
     """As `--fault` has it: ROBOT/TARGET:KIND@AT,for=S,value=V."""
     target = fault.get("robot", "") + ("/" + fault["target"] if fault.get("target") else "")
-    numbers = "".join(f",{name}={fault[key]}" for key, name in (
-        ("duration", "for"), ("value", "value"), ("from", "from"), ("to", "to"), ("x", "x"), ("y", "y"), ("heading", "heading"))
-        if key in fault)
+    numbers = "".join(
+        f",{name}={fault[key]}"
+        for key, name in (
+            ("duration", "for"),
+            ("value", "value"),
+            ("from", "from"),
+            ("to", "to"),
+            ("x", "x"),
+            ("y", "y"),
+            ("heading", "heading"),
+        )
+        if key in fault
+    )
     return f"{target}:{fault['kind']}@{fault.get('at', 0)}{numbers}"
 
 
 def thinned(log: str) -> tuple[bytes, str]:
     """What acted on the run and the hashes of its state, as a log; and the last of the hashes."""
     from ..lcmtypes import state_hash_t
+
     kept = log + ".thin"
-    last = _copy_channels(log, kept, {"ruedo/header", "ruedo/applied", "ruedo/state_hash"}.__contains__, "ruedo/state_hash")
+    last = _copy_channels(
+        log,
+        kept,
+        {"ruedo/header", "ruedo/applied", "ruedo/state_hash"}.__contains__,
+        "ruedo/state_hash",
+    )
     content = Path(kept).read_bytes()
     os.unlink(kept)
     return content, f"{state_hash_t.decode(last).state_hash & (2**64 - 1):016x}" if last else ""
@@ -270,6 +373,7 @@ def thinned(log: str) -> tuple[bytes, str]:
 
 def _copy_channels(log: str, to: str, kept: Any, last_of: str = "") -> bytes:
     import lcm
+
     written = lcm.EventLog(to, "w", overwrite=True)
     last = b""
     for event in lcm.EventLog(log, "r"):
@@ -282,8 +386,10 @@ def _copy_channels(log: str, to: str, kept: Any, last_of: str = "") -> bytes:
 
 def _goals(what: dict[str, Any]) -> list[str]:
     by = what["limits"]["duration"]
-    return [f"{float(one['x'])!r},{float(one['y'])!r},{float(one['radius'])!r},{float(one.get('by', by))!r}"
-            for one in what["expect"].get("goal", [])]
+    return [
+        f"{float(one['x'])!r},{float(one['y'])!r},{float(one['radius'])!r},{float(one.get('by', by))!r}"
+        for one in what["expect"].get("goal", [])
+    ]
 
 
 def _scratch(everything: bool, what: dict[str, Any]) -> str | None:
@@ -302,6 +408,7 @@ def too_large(memory_mb: int) -> str:
 
 def _no_commands(robots: int) -> Any:
     import numpy as np
+
     return np.full((1, robots, 3), np.nan)
 
 
@@ -333,6 +440,7 @@ def _time_limit(seconds: float) -> Iterator[None]:
 def _captured(file: str, outcome: Outcome) -> Iterator[None]:
     """What is printed, by Python or by a library, goes into the outcome."""
     import sys
+
     with open(file, "wb") as output:
         sys.stdout.flush(), sys.stderr.flush()
         kept = os.dup(1), os.dup(2)

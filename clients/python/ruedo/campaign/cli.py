@@ -30,7 +30,10 @@ def main(words: list[str]) -> int:
         print(f"ruedo: {error}; pip install 'ruedo[campaign]'", file=sys.stderr)
         return ENVIRONMENT
     except KeyboardInterrupt:
-        print("ruedo: interrupted; what was run is kept, `ruedo campaign resume` does the rest", file=sys.stderr)
+        print(
+            "ruedo: interrupted; what was run is kept, `ruedo campaign resume` does the rest",
+            file=sys.stderr,
+        )
         return ENVIRONMENT
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
@@ -38,7 +41,9 @@ def main(words: list[str]) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    top = argparse.ArgumentParser(prog="ruedo", formatter_class=argparse.RawDescriptionHelpFormatter)
+    top = argparse.ArgumentParser(
+        prog="ruedo", formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     commands = top.add_subparsers(required=True, metavar="COMMAND")
     _add_campaign(commands.add_parser("campaign", help="many runs, judged and reported"))
     for module, function in (("ruedo.hunt.cli", "add_hunt"), ("ruedo.hunt.why_cli", "add_why")):
@@ -51,28 +56,49 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_campaign(parser: argparse.ArgumentParser) -> None:
-    kinds = parser.add_subparsers(required=True, metavar="run|resume|status|report|show|repeat|slurm|join|export|compare")
+    kinds = parser.add_subparsers(
+        required=True, metavar="run|resume|status|report|show|repeat|slurm|join|export|compare"
+    )
 
-    def add(name: str, action: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
+    def add(
+        name: str, action: Callable[[argparse.Namespace], int], text: str
+    ) -> argparse.ArgumentParser:
         one = kinds.add_parser(name, help=text, description=text)
         one.set_defaults(action=action)
         one.add_argument("FILE", help="the campaign's YAML file")
-        one.add_argument("--out", metavar="FOLDER", help="where the results are (default: FILE's name with .campaign)")
+        one.add_argument(
+            "--out",
+            metavar="FOLDER",
+            help="where the results are (default: FILE's name with .campaign)",
+        )
         return one
 
     for name in ("run", "resume"):
         one = add(name, _run, "run all cases that have no result yet")
-        one.add_argument("--workers", type=int, metavar="N", help="processes on this machine (default: one a core)")
+        one.add_argument(
+            "--workers",
+            type=int,
+            metavar="N",
+            help="processes on this machine (default: one a core)",
+        )
         one.add_argument("--ray", metavar="auto|ADDRESS", help="on a Ray cluster")
         one.add_argument("--shard", metavar="I/N", help="every N-th case, from the I-th on")
         one.add_argument("--quiet", action="store_true", help="no progress; the sum at the end")
         one.add_argument("--json", action="store_true", help="the sum at the end as JSON")
         one.add_argument("--junit", metavar="FILE", help="write the results for CI")
-    add("status", _status, "how far it is, and how it goes").add_argument("--json", action="store_true")
+    add("status", _status, "how far it is, and how it goes").add_argument(
+        "--json", action="store_true"
+    )
     one = add("report", _report, "write one HTML page that needs no network")
-    one.add_argument("-o", "--output", metavar="FILE", help="default: report.html in the results' folder")
-    one.add_argument("--baseline", metavar="FOLDER", help="results of another campaign, to compare with")
-    add("show", _show, "all there is of a case").add_argument("CASE", help="its number, or the beginning of its id")
+    one.add_argument(
+        "-o", "--output", metavar="FILE", help="default: report.html in the results' folder"
+    )
+    one.add_argument(
+        "--baseline", metavar="FOLDER", help="results of another campaign, to compare with"
+    )
+    add("show", _show, "all there is of a case").add_argument(
+        "CASE", help="its number, or the beginning of its id"
+    )
     one = add("repeat", _repeat, "run a case again, with a log of all its messages")
     one.add_argument("CASE", help="its number, or the beginning of its id")
     one.add_argument("-o", "--output", metavar="LOG", help="default: ID.lcm here")
@@ -82,22 +108,31 @@ def _add_campaign(parser: argparse.ArgumentParser) -> None:
     one.add_argument("--time", default="04:00:00", metavar="H:M:S")
     add("join", _join, "take over the results of shards").add_argument("FOLDERS", nargs="+")
     one = add("export", _export, "write the table of results")
-    one.add_argument("-o", "--output", required=True, metavar="FILE", help="*.csv, *.parquet or *.xml (JUnit)")
+    one.add_argument(
+        "-o", "--output", required=True, metavar="FILE", help="*.csv, *.parquet or *.xml (JUnit)"
+    )
     one = add("compare", _compare, "which cases became worse, with an exact test")
-    one.add_argument("BASELINE", help="folder of the other campaign's results, or a controller of this one after a colon (:NAME)")
+    one.add_argument(
+        "BASELINE",
+        help="folder of the other campaign's results, or a controller of this one after a colon (:NAME)",
+    )
     one.add_argument("--json", action="store_true")
 
 
 def _campaign(arguments: argparse.Namespace) -> Any:
     from .campaign import Campaign
+
     return Campaign(arguments.FILE, out=arguments.out)
 
 
 def _run(arguments: argparse.Namespace) -> int:
     from .progress import shown
+
     campaign = _campaign(arguments)
     with shown(campaign, arguments.shard, arguments.quiet or arguments.json) as progress:
-        results = campaign.run(workers=arguments.workers, ray=arguments.ray, shard=arguments.shard, progress=progress)
+        results = campaign.run(
+            workers=arguments.workers, ray=arguments.ray, shard=arguments.shard, progress=progress
+        )
     if arguments.junit:
         Path(arguments.junit).write_text(results.junit(campaign.name), encoding="utf-8")
     if arguments.json:
@@ -111,14 +146,22 @@ def _summary(campaign: Any, results: Any) -> dict[str, Any]:
     statuses: dict[str, int] = {}
     for _, row in results.done:
         statuses[row["status"]] = statuses.get(row["status"], 0) + 1
-    return {"campaign": campaign.name, "cases": len(results.cases), "done": len(results.done), "failed": len(results.failed),
-            "status": dict(sorted(statuses.items())), "folder": str(campaign.out)}
+    return {
+        "campaign": campaign.name,
+        "cases": len(results.cases),
+        "done": len(results.done),
+        "failed": len(results.failed),
+        "status": dict(sorted(statuses.items())),
+        "folder": str(campaign.out),
+    }
 
 
 def _print_summary(campaign: Any, results: Any) -> None:
     summary = _summary(campaign, results)
     kinds = ", ".join(f"{count} {status}" for status, count in summary["status"].items()) or "none"
-    print(f"{campaign.name}: {summary['done']} of {summary['cases']} cases: {kinds}; in {campaign.out}")
+    print(
+        f"{campaign.name}: {summary['done']} of {summary['cases']} cases: {kinds}; in {campaign.out}"
+    )
     for case, row in results.failed[:10]:
         print(f"  {case.number} {case.id} {row['status']}: {row['reason']}")
     if len(results.failed) > 10:
@@ -137,6 +180,7 @@ def _status(arguments: argparse.Namespace) -> int:
 
 def _report(arguments: argparse.Namespace) -> int:
     from .report import write_report
+
     campaign = _campaign(arguments)
     file = Path(arguments.output or campaign.out / "report.html")
     write_report(campaign, file, arguments.baseline)
@@ -149,7 +193,9 @@ def _show(arguments: argparse.Namespace) -> int:
     case = campaign.case(arguments.CASE)
     results = campaign.results()
     row = results.row(case)
-    print(f"case {case.number}, id {case.id}: world {case.world}, {case.robot or 'its robot'}, controller {case.controller}, seed {case.seed}")
+    print(
+        f"case {case.number}, id {case.id}: world {case.world}, {case.robot or 'its robot'}, controller {case.controller}, seed {case.seed}"
+    )
     for name, value in case.parameters.items():
         print(f"  {name} = {value}")
     if row is None:
@@ -161,7 +207,9 @@ def _show(arguments: argparse.Namespace) -> int:
     log = results.log(case)
     if log:
         print(f"log of what acted: {log} (ruedo verify {log})")
-    print(f"again, with all messages: ruedo campaign repeat {shlex.quote(arguments.FILE)} {case.number}")
+    print(
+        f"again, with all messages: ruedo campaign repeat {shlex.quote(arguments.FILE)} {case.number}"
+    )
     if row["output"]:
         print("---- the end of the controller's output\n" + row["output"].rstrip())
     return GOOD
@@ -169,6 +217,7 @@ def _show(arguments: argparse.Namespace) -> int:
 
 def _repeat(arguments: argparse.Namespace) -> int:
     from .case import Runner
+
     campaign = _campaign(arguments)
     case = campaign.case(arguments.CASE)
     log = Path(arguments.output or f"{case.id}.lcm").resolve()
@@ -178,10 +227,17 @@ def _repeat(arguments: argparse.Namespace) -> int:
     print(f"{log}: ruedo play {log} --console, ruedo verify {log}")
     if row is None:
         return GOOD
-    same = (outcome.status, outcome.reason, outcome.state_hash) == (row["status"], row["reason"], row["state_hash"])
-    print("as in the campaign, to the last bit of the state" if same else
-          f"in the campaign it was another run: {row['status']}{': ' + row['reason'] if row['reason'] else ''}; a controller that is not "
-          "in lockstep may differ from run to run (docs/regressions.md)")
+    same = (outcome.status, outcome.reason, outcome.state_hash) == (
+        row["status"],
+        row["reason"],
+        row["state_hash"],
+    )
+    print(
+        "as in the campaign, to the last bit of the state"
+        if same
+        else f"in the campaign it was another run: {row['status']}{': ' + row['reason'] if row['reason'] else ''}; a controller that is not "
+        "in lockstep may differ from run to run (docs/regressions.md)"
+    )
     return GOOD if same else FAILED
 
 
@@ -214,6 +270,7 @@ def _join(arguments: argparse.Namespace) -> int:
 
 def _export(arguments: argparse.Namespace) -> int:
     from .errors import SpecError
+
     campaign = _campaign(arguments)
     results = campaign.results()
     file = Path(arguments.output)
@@ -231,6 +288,13 @@ def _export(arguments: argparse.Namespace) -> int:
 
 def _compare(arguments: argparse.Namespace) -> int:
     from .compare import compare_with
+
     comparison = compare_with(_campaign(arguments), arguments.BASELINE)
     print(json.dumps(comparison.as_dict()) if arguments.json else comparison.text())
-    return FAILED if comparison.worse and comparison.p < 0.05 and len(comparison.worse) > len(comparison.better) else GOOD
+    return (
+        FAILED
+        if comparison.worse
+        and comparison.p < 0.05
+        and len(comparison.worse) > len(comparison.better)
+        else GOOD
+    )

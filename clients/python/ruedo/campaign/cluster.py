@@ -12,12 +12,14 @@ from .errors import CampaignError, missing
 from .local import Done, Worker, failed, run_local
 from .plan import DEFAULT_MEMORY_MB, Case
 
-_AHEAD = 4          # cases that wait at the cluster for each core
-_RETRIES = 5        # of a case whose node was lost
-_worker: tuple[str, Worker] | None = None    # of a process of Ray's: stays from case to case
+_AHEAD = 4  # cases that wait at the cluster for each core
+_RETRIES = 5  # of a case whose node was lost
+_worker: tuple[str, Worker] | None = None  # of a process of Ray's: stays from case to case
 
 
-def run_on_ray(cases: list[Case], folder: str, files: Iterable[str], address: str, version: str) -> Iterator[Done]:
+def run_on_ray(
+    cases: list[Case], folder: str, files: Iterable[str], address: str, version: str
+) -> Iterator[Done]:
     """Outcomes as they come. files: of the campaign; those in its folder are brought to each node once."""
     try:
         import ray
@@ -29,12 +31,16 @@ def run_on_ray(cases: list[Case], folder: str, files: Iterable[str], address: st
         try:
             ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
         except Exception as error:
-            raise CampaignError(f"--ray {address}: no cluster answers: {str(error).splitlines()[0]}") from None
+            raise CampaignError(
+                f"--ray {address}: no cluster answers: {str(error).splitlines()[0]}"
+            ) from None
     try:
         yield from _run(ray, cases, folder, pack(Path(folder), files), version)
     except (ray.exceptions.RaySystemError, ray.exceptions.RayActorError, ConnectionError) as error:
-        raise CampaignError(f"the Ray cluster was lost: {str(error).splitlines()[0]}; what was run is kept, `ruedo campaign resume` "
-                            "does the rest") from None
+        raise CampaignError(
+            f"the Ray cluster was lost: {str(error).splitlines()[0]}; what was run is kept, `ruedo campaign resume` "
+            "does the rest"
+        ) from None
     finally:
         if joined:
             ray.shutdown()
@@ -44,20 +50,26 @@ def _knock(address: str) -> None:
     """Ray itself takes minutes to say that nobody is there."""
     host, colon, port = address.removeprefix("ray://").rpartition(":")
     if not colon or not port.isdigit():
-        return    # "auto", "local", a name that Ray knows
+        return  # "auto", "local", a name that Ray knows
     try:
         socket.create_connection((host, int(port)), 10.0).close()
     except OSError as error:
-        raise CampaignError(f"--ray {address}: no cluster answers: {error.strerror or error}") from None
+        raise CampaignError(
+            f"--ray {address}: no cluster answers: {error.strerror or error}"
+        ) from None
 
 
 def _run(ray: Any, cases: list[Case], folder: str, bundle: Bundle, version: str) -> Iterator[Done]:
     limits = {case.what["limits"]["memory_mb"] for case in cases}
     memory = 0 if limits <= {DEFAULT_MEMORY_MB} else max(limits) << 20
-    largest = max((node["Resources"].get("memory", 0) for node in ray.nodes() if node["Alive"]), default=0)
+    largest = max(
+        (node["Resources"].get("memory", 0) for node in ray.nodes() if node["Alive"]), default=0
+    )
     if memory > largest:
-        raise CampaignError(f"a case may take {memory >> 20} MB (limits.memory_mb), and no node of the cluster has more than "
-                            f"{int(largest) >> 20} MB")
+        raise CampaignError(
+            f"a case may take {memory >> 20} MB (limits.memory_mb), and no node of the cluster has more than "
+            f"{int(largest) >> 20} MB"
+        )
     name, packed = name_of(bundle), ray.put(bundle)
     remote = ray.remote(_remote).options(num_cpus=1, memory=memory, max_retries=_RETRIES)
     waiting, running = list(reversed(cases)), {}
@@ -72,30 +84,51 @@ def _run(ray: Any, cases: list[Case], folder: str, bundle: Bundle, version: str)
             try:
                 outcome, wall_s, there = ray.get(one)
             except ray.exceptions.RayTaskError as error:
-                raise CampaignError(str(error.cause if hasattr(error, "cause") else error).strip().splitlines()[-1]) from None
+                raise CampaignError(
+                    str(error.cause if hasattr(error, "cause") else error).strip().splitlines()[-1]
+                ) from None
             except ray.exceptions.RayError as error:
-                outcome, wall_s, there = failed("crashed", f"its node was lost {_RETRIES + 1} times: {type(error).__name__}"), 0.0, folder
+                outcome, wall_s, there = (
+                    failed(
+                        "crashed", f"its node was lost {_RETRIES + 1} times: {type(error).__name__}"
+                    ),
+                    0.0,
+                    folder,
+                )
             outcome["log"] = log_moved(outcome["log"], there, folder)
             yield case, outcome, wall_s
 
 
-def _remote(packed: list[Any], name: str, case: Case, folder: str, version: str) -> tuple[dict[str, Any], float, str]:
+def _remote(
+    packed: list[Any], name: str, case: Case, folder: str, version: str
+) -> tuple[dict[str, Any], float, str]:
     """In a process of Ray's, on some node: the case, in a worker of its own as on one machine."""
     import ray
 
     from .. import _engine
+
     here = str(getattr(_engine, "build", _engine.version))
     if here != version:
-        raise CampaignError(f"node {ray.util.get_node_ip_address()} has Ruedo {here}, the campaign was started with {version}: "
-                            "install one build on all of them")
+        raise CampaignError(
+            f"node {ray.util.get_node_ip_address()} has Ruedo {here}, the campaign was started with {version}: "
+            "install one build on all of them"
+        )
     there = unpack(ray.get(packed[0]), name)
     global _worker
     if _worker and _worker[0] != there:
         _worker[1].end()
         _worker = None
     crew = [_worker[1]] if _worker else []
-    case = Case(case.number, case.id, case.world, case.robot, case.controller, case.seed, case.parameters,
-                moved(case.what, folder, there))
-    (_, outcome, wall_s), = run_local([case], there, 1, crew)
+    case = Case(
+        case.number,
+        case.id,
+        case.world,
+        case.robot,
+        case.controller,
+        case.seed,
+        case.parameters,
+        moved(case.what, folder, there),
+    )
+    ((_, outcome, wall_s),) = run_local([case], there, 1, crew)
     _worker = (there, crew[0])
     return outcome, wall_s, there

@@ -12,7 +12,9 @@ from .plan import Case
 from .stats import mcnemar, paired_difference
 from .store import Results, Store
 
-Pair = tuple[Case, dict[str, Any], dict[str, Any]]    # the new case, its result before, its result now
+Pair = tuple[
+    Case, dict[str, Any], dict[str, Any]
+]  # the new case, its result before, its result now
 
 
 @dataclass
@@ -42,17 +44,33 @@ class Comparison:
 
     def as_dict(self) -> dict[str, Any]:
         change, low, high = self.change
-        return {"before": self.before, "now": self.now, "pairs": self.count, "both": self.both, "neither": self.neither,
-                "worse": [case.number for case, _, _ in self.worse], "better": [case.number for case, _, _ in self.better],
-                "p": self.p, "change": change, "interval": [low, high]}
+        return {
+            "before": self.before,
+            "now": self.now,
+            "pairs": self.count,
+            "both": self.both,
+            "neither": self.neither,
+            "worse": [case.number for case, _, _ in self.worse],
+            "better": [case.number for case, _, _ in self.better],
+            "p": self.p,
+            "change": change,
+            "interval": [low, high],
+        }
 
     def text(self) -> str:
         change, low, high = self.change
-        lines = [f"{self.now} after {self.before}: {self.count} cases in both",
-                 f"success {change:+.1%} (95 % interval {low:+.1%} to {high:+.1%}), {len(self.worse)} worse, "
-                 f"{len(self.better)} better, exact p = {self.p:.3g} (McNemar)"]
-        lines += [f"  worse: {case.number} {case.id}: {now['reason']}" for case, _, now in self.worse[:20]]
-        lines += [f"  better: {case.number} {case.id}: it was {before['reason']}" for case, before, _ in self.better[:20]]
+        lines = [
+            f"{self.now} after {self.before}: {self.count} cases in both",
+            f"success {change:+.1%} (95 % interval {low:+.1%} to {high:+.1%}), {len(self.worse)} worse, "
+            f"{len(self.better)} better, exact p = {self.p:.3g} (McNemar)",
+        ]
+        lines += [
+            f"  worse: {case.number} {case.id}: {now['reason']}" for case, _, now in self.worse[:20]
+        ]
+        lines += [
+            f"  better: {case.number} {case.id}: it was {before['reason']}"
+            for case, before, _ in self.better[:20]
+        ]
         return "\n".join(lines)
 
 
@@ -79,7 +97,9 @@ def compare(before: Results, now: Results, names: tuple[str, str]) -> Comparison
         else:
             result.neither += 1
     if result.count == 0:
-        raise CampaignError(f"{names[0]} and {names[1]} have no case in common: the same world, robot, parameters and seed")
+        raise CampaignError(
+            f"{names[0]} and {names[1]} have no case in common: the same world, robot, parameters and seed"
+        )
     return result
 
 
@@ -91,7 +111,9 @@ def compare_with(campaign: Any, baseline: str) -> Comparison:
     name = baseline[1:]
     controllers = sorted({case.controller for case in campaign.cases})
     if name not in controllers or len(controllers) != 2:
-        raise CampaignError(f"{baseline}: the campaign's controllers are {', '.join(controllers)}; one of two is needed")
+        raise CampaignError(
+            f"{baseline}: the campaign's controllers are {', '.join(controllers)}; one of two is needed"
+        )
     other = next(one for one in controllers if one != name)
 
     def only(controller: str) -> Results:

@@ -60,11 +60,13 @@ def make_controller(thing: Any, parameters: dict[str, Any]) -> Callable[[View], 
     """A class is made anew for each run, with the parameters that it takes; a function is as it is."""
     if not inspect.isclass(thing):
         if not callable(thing):
-            raise TypeError(f"{thing!r} is no controller: a function of a View, or a class of such objects")
-        return thing    # type: ignore[no-any-return]
+            raise TypeError(
+                f"{thing!r} is no controller: a function of a View, or a class of such objects"
+            )
+        return thing  # type: ignore[no-any-return]
     accepted = inspect.signature(thing).parameters.values()
     if any(one.kind is one.VAR_KEYWORD for one in accepted):
-        return thing(**parameters)    # type: ignore[no-any-return]
+        return thing(**parameters)  # type: ignore[no-any-return]
     names = {one.name for one in accepted}
     made = thing(**{name: value for name, value in parameters.items() if name in names})
-    return made    # type: ignore[no-any-return]
+    return made  # type: ignore[no-any-return]

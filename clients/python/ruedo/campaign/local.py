@@ -17,10 +17,10 @@ from .case import Outcome, too_slow
 from .errors import CampaignError
 from .plan import Case
 
-_GRACE = 5.0        # s beyond a case's own limit, before its worker is killed
-_TRIES = 2          # of a case whose worker was killed
+_GRACE = 5.0  # s beyond a case's own limit, before its worker is killed
+_TRIES = 2  # of a case whose worker was killed
 
-Done = tuple[Case, dict[str, Any], float]    # the case, its outcome, and how long it took (s)
+Done = tuple[Case, dict[str, Any], float]  # the case, its outcome, and how long it took (s)
 
 
 class Worker:
@@ -32,8 +32,11 @@ class Worker:
         path = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "ruedo.campaign.worker", str(theirs.fileno()), folder], pass_fds=[theirs.fileno()],
-                stdin=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": path})
+                [sys.executable, "-m", "ruedo.campaign.worker", str(theirs.fileno()), folder],
+                pass_fds=[theirs.fileno()],
+                stdin=subprocess.DEVNULL,
+                env={**os.environ, "PYTHONPATH": path},
+            )
         except OSError as error:
             raise CampaignError(f"a worker cannot be started: {error.strerror}") from None
         theirs.close()
@@ -48,7 +51,7 @@ class Worker:
         try:
             self.pipe.send(case.what)
         except OSError:
-            pass    # it was killed while idle: its pipe is at its end
+            pass  # it was killed while idle: its pipe is at its end
 
     def left_s(self) -> float:
         """Until it must have answered."""
@@ -70,7 +73,9 @@ class Worker:
         return code
 
 
-def run_local(cases: Iterable[Case], folder: str, workers: int, kept: list[Worker] | None = None) -> Iterator[Done]:
+def run_local(
+    cases: Iterable[Case], folder: str, workers: int, kept: list[Worker] | None = None
+) -> Iterator[Done]:
     """Outcomes as they come. A case whose worker is killed is run once more, then it has failed.
 
     kept: workers that are there already, and stay; new ones that take their place stand in it afterwards.
@@ -100,7 +105,7 @@ def _collect(crew: list[Worker], waiting: deque[tuple[Case, int]], folder: str) 
         if answer:
             one.case = None
             if waiting:
-                one.give(*waiting.popleft())    # before the result is dealt with: no core waits
+                one.give(*waiting.popleft())  # before the result is dealt with: no core waits
             yield case, *answer
             continue
         late = one.left_s() == 0.0
@@ -109,11 +114,22 @@ def _collect(crew: list[Worker], waiting: deque[tuple[Case, int]], folder: str) 
         code = one.end()
         crew[crew.index(one)] = Worker(folder)
         if one.pipe not in ready:
-            yield case, failed("timeout", too_slow(case.what["limits"]["wall"])), case.what["limits"]["wall"]
+            yield (
+                case,
+                failed("timeout", too_slow(case.what["limits"]["wall"])),
+                case.what["limits"]["wall"],
+            )
         elif tries < _TRIES:
             waiting.appendleft((case, tries + 1))
         else:
-            yield case, failed("crashed", f"the controller took its process with it ({how(code)}), {_TRIES} times"), 0.0
+            yield (
+                case,
+                failed(
+                    "crashed",
+                    f"the controller took its process with it ({how(code)}), {_TRIES} times",
+                ),
+                0.0,
+            )
 
 
 def failed(status: str, reason: str) -> dict[str, Any]:

@@ -56,8 +56,10 @@ def substitute(value: Any, names: dict[str, Any], wrong: Callable[[str], Excepti
 
     def named(match: re.Match[str]) -> Any:
         if match.group(1) not in names:
-            raise wrong(f"{{{match.group(1)}}} is no parameter; there are {', '.join(sorted(names))} "
-                        "(a brace of your own is written twice, {{ and }})")
+            raise wrong(
+                f"{{{match.group(1)}}} is no parameter; there are {', '.join(sorted(names))} "
+                "(a brace of your own is written twice, {{ and }})"
+            )
         return names[match.group(1)]
 
     whole = _HOLE.fullmatch(value)
@@ -84,7 +86,9 @@ def points(parameters: dict[str, Any], sampling: dict[str, Any]) -> list[dict[st
             drawn[name] = (kind, values)
     samples = _draw(drawn, sampling) if drawn else [{}]
     grid = [dict(zip(crossed, one)) for one in itertools.product(*crossed.values())]
-    return [{name: {**at, **sample}[name] for name in parameters} for at in grid for sample in samples]
+    return [
+        {name: {**at, **sample}[name] for name in parameters} for at in grid for sample in samples
+    ]
 
 
 def _grid(low: float, high: float, steps: int) -> list[float]:
@@ -93,7 +97,9 @@ def _grid(low: float, high: float, steps: int) -> list[float]:
     return [_round(low + (high - low) * i / (steps - 1)) for i in range(steps)]
 
 
-def _draw(drawn: dict[str, tuple[str, list[float]]], sampling: dict[str, Any]) -> list[dict[str, Any]]:
+def _draw(
+    drawn: dict[str, tuple[str, list[float]]], sampling: dict[str, Any]
+) -> list[dict[str, Any]]:
     count = sampling.get("samples", 10)
     latin = sampling.get("method", "latin") == "latin"
     columns = {}
@@ -102,7 +108,9 @@ def _draw(drawn: dict[str, tuple[str, list[float]]], sampling: dict[str, Any]) -
         # the numbers of random() for a seed, and of nothing else.
         draw = random.Random(f"{sampling.get('seed', 1)}/{name}")
         strata = sorted(range(count), key=lambda _: draw.random()) if latin else None
-        column = [(strata[i] + draw.random()) / count if strata else draw.random() for i in range(count)]
+        column = [
+            (strata[i] + draw.random()) / count if strata else draw.random() for i in range(count)
+        ]
         columns[name] = [_at(kind, bounds, p) for p in column]
     return [{name: column[i] for name, column in columns.items()} for i in range(count)]
 
@@ -129,17 +137,33 @@ def check_values(content: dict[str, Any], source: Source) -> None:
         if isinstance(value, float) and not math.isfinite(value):
             raise source.error(path, f"is {value}; allowed is a finite number")
     for name, given in content.get("parameters", {}).items():
-        if not name.isidentifier() or name in ("seed", "case", "world", "robot", "controller", "folder"):
-            raise source.error(("parameters", name), "is no name of a parameter: letters, digits and '_', and "
-                               "not seed, case, world, robot, controller or folder")
+        if not name.isidentifier() or name in (
+            "seed",
+            "case",
+            "world",
+            "robot",
+            "controller",
+            "folder",
+        ):
+            raise source.error(
+                ("parameters", name),
+                "is no name of a parameter: letters, digits and '_', and "
+                "not seed, case, world, robot, controller or folder",
+            )
         kind = None if isinstance(given, list) else next(iter(given))
         if kind in ("uniform", "log_uniform", "integers"):
             low, high = given[kind]
             if low > high or (kind == "log_uniform" and low <= 0):
-                raise source.error(("parameters", name, kind), f"is {given[kind]}; allowed is [low, high]"
-                                   + (", both above 0" if kind == "log_uniform" else ""))
+                raise source.error(
+                    ("parameters", name, kind),
+                    f"is {given[kind]}; allowed is [low, high]"
+                    + (", both above 0" if kind == "log_uniform" else ""),
+                )
         if kind == "normal" and given[kind][1] < 0:
-            raise source.error(("parameters", name, kind), f"is {given[kind]}; allowed is [mean, sigma], sigma 0 or more")
+            raise source.error(
+                ("parameters", name, kind),
+                f"is {given[kind]}; allowed is [mean, sigma], sigma 0 or more",
+            )
     for member, ways in (("worlds", ("file", "generator")), ("controllers", ("command", "python"))):
         names: set[str] = set()
         for i, one in enumerate(content[member]):
@@ -148,10 +172,18 @@ def check_values(content: dict[str, Any], source: Source) -> None:
             if sum(way in one for way in ways) != 1:
                 raise source.error((member, i), f"needs either {ways[0]} or {ways[1]}")
             if one.get("name") in names:
-                raise source.error((member, i, "name"), f"is {one['name']!r}, which another one is called")
+                raise source.error(
+                    (member, i, "name"), f"is {one['name']!r}, which another one is called"
+                )
             names |= {one["name"]} if "name" in one else set()
     seeds = content.get("seeds", 1)
-    low = min(seeds) if isinstance(seeds, list) else seeds.get("first", 1) if isinstance(seeds, dict) else 1
+    low = (
+        min(seeds)
+        if isinstance(seeds, list)
+        else seeds.get("first", 1)
+        if isinstance(seeds, dict)
+        else 1
+    )
     if low < 0:
         raise source.error(("seeds",), f"has {low}; allowed are whole numbers from 0 on")
 
@@ -182,8 +214,15 @@ class Planner:
     worlds: of an earlier plan of the same folder, which has read them already.
     """
 
-    def __init__(self, content: dict[str, Any], source: Source, folder: Path, store: Path, version: str,
-                 worlds: WorldFiles | None = None) -> None:
+    def __init__(
+        self,
+        content: dict[str, Any],
+        source: Source,
+        folder: Path,
+        store: Path,
+        version: str,
+        worlds: WorldFiles | None = None,
+    ) -> None:
         self._content, self._source, self._folder, self._version = content, source, folder, version
         self._worlds = worlds or WorldFiles(folder, store)
         self._hashes: dict[str, str] = {}
@@ -196,25 +235,42 @@ class Planner:
         robots = content.get("robots", [""])
         made: list[Case] = []
         for (w, world), robot, controller, at, seed in itertools.product(
-                enumerate(content["worlds"]), robots, enumerate(content["controllers"]), grid,
-                seeds_of(content.get("seeds", 1))):
+            enumerate(content["worlds"]),
+            robots,
+            enumerate(content["controllers"]),
+            grid,
+            seeds_of(content.get("seeds", 1)),
+        ):
             made.append(self._case(len(made), w, world, robot, controller, at, seed))
         twice = {one.id: one for one in made}
         if len(twice) != len(made):
             seen: set[str] = set()
-            first = next(one for one in made if one.id in seen or seen.add(one.id))    # type: ignore[func-returns-value]
-            raise SpecError(f"{self._source.name}: case {first.number} is the same as another one: two of its "
-                            "worlds, robots, controllers or parameters do not differ in what they do")
+            first = next(one for one in made if one.id in seen or seen.add(one.id))  # type: ignore[func-returns-value]
+            raise SpecError(
+                f"{self._source.name}: case {first.number} is the same as another one: two of its "
+                "worlds, robots, controllers or parameters do not differ in what they do"
+            )
         return made
 
     @property
     def files(self) -> set[str]:
         """All that the cases are made from."""
-        return self._worlds.files | {str(self._folder / name) for name in self._hashes} | {
-            str(function.file) for function in self._functions.values()}
+        return (
+            self._worlds.files
+            | {str(self._folder / name) for name in self._hashes}
+            | {str(function.file) for function in self._functions.values()}
+        )
 
-    def _case(self, number: int, w: int, world: Any, robot: str, controller: tuple[int, dict[str, Any]],
-              at: dict[str, Any], seed: int) -> Case:
+    def _case(
+        self,
+        number: int,
+        w: int,
+        world: Any,
+        robot: str,
+        controller: tuple[int, dict[str, Any]],
+        at: dict[str, Any],
+        seed: int,
+    ) -> Case:
         c, asked = controller
         names = {**at, "seed": seed, "folder": str(self._folder)}
 
@@ -228,22 +284,47 @@ class Planner:
         limits = content["limits"]
         what: dict[str, Any] = {
             "world": self._world(w, world, robot, fill, at, seed),
-            "settings": fill(("set",), content.get("set", {})), "disable": content.get("disable", []),
-            "noise": content.get("noise", True), "seed": seed, "parameters": at,
-            "controller": self._controller(c, asked, fill), "expect": expect,
+            "settings": fill(("set",), content.get("set", {})),
+            "disable": content.get("disable", []),
+            "noise": content.get("noise", True),
+            "seed": seed,
+            "parameters": at,
+            "controller": self._controller(c, asked, fill),
+            "expect": expect,
             "faults": fill(("faults",), content.get("faults", [])),
-            "metrics": [{**one, "sha256": self._function(("metrics", i, "python"), one["python"]).sha256}
-                        for i, one in enumerate(content.get("metrics", []))],
-            "limits": {"duration": limits["duration"], "wall": limits.get("wall", 300),
-                       "memory_mb": limits.get("memory_mb", DEFAULT_MEMORY_MB)}}
+            "metrics": [
+                {**one, "sha256": self._function(("metrics", i, "python"), one["python"]).sha256}
+                for i, one in enumerate(content.get("metrics", []))
+            ],
+            "limits": {
+                "duration": limits["duration"],
+                "wall": limits.get("wall", 300),
+                "memory_mb": limits.get("memory_mb", DEFAULT_MEMORY_MB),
+            },
+        }
         if "golden" in expect:
             expect["golden_sha256"] = self._sha256(("expect", "golden"), expect["golden"])
         digest = hashlib.sha256(canonical([self._version, _acting(what)])).hexdigest()[:16]
-        return Case(number, digest, what["world"]["name"], what["world"]["spawn"] or "", asked["name"], seed,
-                    at, what)
+        return Case(
+            number,
+            digest,
+            what["world"]["name"],
+            what["world"]["spawn"] or "",
+            asked["name"],
+            seed,
+            at,
+            what,
+        )
 
-    def _world(self, w: int, world: Any, robot: str, fill: Callable[..., Any], at: dict[str, Any],
-               seed: int) -> dict[str, Any]:
+    def _world(
+        self,
+        w: int,
+        world: Any,
+        robot: str,
+        fill: Callable[..., Any],
+        at: dict[str, Any],
+        seed: int,
+    ) -> dict[str, Any]:
         asked = {"file": world} if isinstance(world, str) else world
         path = ("worlds", w)
         spawn = fill(("robots",), robot)
@@ -261,15 +342,27 @@ class Planner:
             raise self._source.error(path, str(error)) from None
         return {"name": name, "file": file, "spawn": spawn, "sha256": hashed}
 
-    def _controller(self, c: int, asked: dict[str, Any], fill: Callable[..., Any]) -> dict[str, Any]:
+    def _controller(
+        self, c: int, asked: dict[str, Any], fill: Callable[..., Any]
+    ) -> dict[str, Any]:
         path = ("controllers", c)
-        made = {key: fill((*path, key), value) for key, value in asked.items() if key not in ("name", "files")}
+        made = {
+            key: fill((*path, key), value)
+            for key, value in asked.items()
+            if key not in ("name", "files")
+        }
         files: dict[str, str] = {}
         for i, pattern in enumerate(asked.get("files", [])):
             found = sorted(one for one in self._folder.glob(pattern) if one.is_file())
             if not found:
-                raise self._source.error((*path, "files", i), f"is {pattern!r}, and no file is called so in {self._folder}")
-            files |= {str(one.relative_to(self._folder)): self._sha256((*path, "files", i), str(one)) for one in found}
+                raise self._source.error(
+                    (*path, "files", i),
+                    f"is {pattern!r}, and no file is called so in {self._folder}",
+                )
+            files |= {
+                str(one.relative_to(self._folder)): self._sha256((*path, "files", i), str(one))
+                for one in found
+            }
         if "command" in made:
             for word in re.split(r"[\s'\"=]+", made["command"]):
                 if word and (self._folder / word).is_file():
@@ -313,4 +406,4 @@ def shard_of(cases: list[Case], shard: str) -> list[Case]:
     match = re.fullmatch(r"(\d+)/(\d+)", shard)
     if not match or not 1 <= int(match.group(1)) <= int(match.group(2)):
         raise SpecError(f"--shard {shard}: it looks like I/N with I from 1 to N, for example 2/4")
-    return cases[int(match.group(1)) - 1::int(match.group(2))]
+    return cases[int(match.group(1)) - 1 :: int(match.group(2))]

@@ -13,8 +13,8 @@ from .plan import Case
 from .stats import wilson
 from .store import Results
 
-_BINS = 8           # of a parameter with more values than that
-_WORST = 12         # runs that are drawn
+_BINS = 8  # of a parameter with more values than that
+_WORST = 12  # runs that are drawn
 _STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; color: #1d2330; background: #fff; max-width: 1080px; margin: 2em auto; padding: 0 1em }
 h1 { font-size: 1.5em } h2 { font-size: 1.15em; margin-top: 2.2em; border-bottom: 1px solid #d6dae3; padding-bottom: .2em }
@@ -30,29 +30,48 @@ code { background: #f2f4f8; padding: .1em .3em; user-select: all } svg { max-wid
 def write_report(campaign: Any, file: Path, baseline: str | None = None) -> None:
     """Of what there is so far. baseline: as of compare_with()."""
     results: Results = campaign.results()
-    parts = [_head(campaign, results), *_by_parameter(results), *_reasons(results), *_distributions(results),
-             *_heat_map(results), *_worst(campaign, results)]
+    parts = [
+        _head(campaign, results),
+        *_by_parameter(results),
+        *_reasons(results),
+        *_distributions(results),
+        *_heat_map(results),
+        *_worst(campaign, results),
+    ]
     if baseline:
         parts += _comparison(campaign, baseline)
     title = html.escape(campaign.name)
-    page = (f"<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'><title>{title}</title><style>{_STYLE}</style></head><body>"
-            f"{''.join(parts)}</body></html>\n")
+    page = (
+        f"<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'><title>{title}</title><style>{_STYLE}</style></head><body>"
+        f"{''.join(parts)}</body></html>\n"
+    )
     file.write_text(page, encoding="utf-8")
 
 
 def _head(campaign: Any, results: Results) -> str:
     done, failed = len(results.done), len(results.failed)
     low, high = wilson(done - failed, done)
-    rate = f"{(done - failed) / done:.1%} passed (95 % interval {low:.1%} to {high:.1%})" if done else "nothing was run yet"
-    return (f"<h1>{html.escape(campaign.name)}</h1><p>{done} of {len(results.cases)} cases, {failed} failed: {rate}. "
-            f"Ruedo {html.escape(campaign.version)}.</p>")
+    rate = (
+        f"{(done - failed) / done:.1%} passed (95 % interval {low:.1%} to {high:.1%})"
+        if done
+        else "nothing was run yet"
+    )
+    return (
+        f"<h1>{html.escape(campaign.name)}</h1><p>{done} of {len(results.cases)} cases, {failed} failed: {rate}. "
+        f"Ruedo {html.escape(campaign.version)}.</p>"
+    )
 
 
 # ---- Success by parameter.
 
+
 def _by_parameter(results: Results) -> Iterable[str]:
     yield "<h2>Success</h2><p>With Wilson's 95 % interval.</p>"
-    keys = {"world": lambda case: case.world, "robot": lambda case: case.robot, "controller": lambda case: case.controller}
+    keys = {
+        "world": lambda case: case.world,
+        "robot": lambda case: case.robot,
+        "controller": lambda case: case.controller,
+    }
     names = list(dict.fromkeys(name for case in results.cases for name in case.parameters))
     for name in names:
         keys[name] = _binned(name, [case.parameters.get(name) for case in results.cases])
@@ -78,7 +97,7 @@ def _binned(name: str, values: list[Any]) -> Any:
     return key
 
 
-class _Bin(tuple):    # type: ignore[type-arg]
+class _Bin(tuple):  # type: ignore[type-arg]
     """From and to, of a parameter's values."""
 
     def __new__(cls, low: float, high: float) -> _Bin:
@@ -99,10 +118,12 @@ def _success_table(name: str, groups: list[tuple[Any, list[bool]]]) -> str:
     for value, good in groups:
         low, high = wilson(sum(good), len(good))
         share = sum(good) / len(good)
-        bar = (f"<span class='bar'><b style='left:{low:.1%};right:{1 - high:.1%}'></b><i style='left:{share:.1%}'></i></span>")
-        rows.append(f"<tr><td>{html.escape(str(value))}</td><td class='n'>{sum(good)} of {len(good)}</td><td class='n'>{share:.1%}</td>"
-                    f"<td>{bar}</td><td class='n'>{low:.1%} to {high:.1%}</td></tr>")
-    return (f"<table><tr><th>{html.escape(name)}</th><th>passed</th><th></th><th></th><th>interval</th></tr>{''.join(rows)}</table>")
+        bar = f"<span class='bar'><b style='left:{low:.1%};right:{1 - high:.1%}'></b><i style='left:{share:.1%}'></i></span>"
+        rows.append(
+            f"<tr><td>{html.escape(str(value))}</td><td class='n'>{sum(good)} of {len(good)}</td><td class='n'>{share:.1%}</td>"
+            f"<td>{bar}</td><td class='n'>{low:.1%} to {high:.1%}</td></tr>"
+        )
+    return f"<table><tr><th>{html.escape(name)}</th><th>passed</th><th></th><th></th><th>interval</th></tr>{''.join(rows)}</table>"
 
 
 def _reasons(results: Results) -> Iterable[str]:
@@ -115,12 +136,15 @@ def _reasons(results: Results) -> Iterable[str]:
     for (status, what), cases in sorted(counts.items(), key=lambda one: -len(one[1])):
         row = results.row(cases[0])
         assert row is not None
-        yield (f"<tr><td>{status}</td><td>{html.escape(what)}</td><td class='n'>{len(cases)}</td><td>{cases[0].number}: "
-               f"{html.escape(row['reason'])}</td></tr>")
+        yield (
+            f"<tr><td>{status}</td><td>{html.escape(what)}</td><td class='n'>{len(cases)}</td><td>{cases[0].number}: "
+            f"{html.escape(row['reason'])}</td></tr>"
+        )
     yield "</table>"
 
 
 # ---- Plots.
+
 
 def new_figure(width: float = 3.4, height: float = 2.5) -> Any:
     try:
@@ -128,8 +152,16 @@ def new_figure(width: float = 3.4, height: float = 2.5) -> Any:
     except ImportError:
         raise missing("matplotlib", "campaign") from None
     matplotlib.use("svg")
-    matplotlib.rcParams.update({"svg.hashsalt": "ruedo", "font.size": 8, "axes.spines.top": False, "axes.spines.right": False})
+    matplotlib.rcParams.update(
+        {
+            "svg.hashsalt": "ruedo",
+            "font.size": 8,
+            "axes.spines.top": False,
+            "axes.spines.right": False,
+        }
+    )
     from matplotlib.figure import Figure
+
     return Figure(figsize=(width, height), layout="constrained")
 
 
@@ -137,20 +169,34 @@ def _svg(figure: Any) -> str:
     text = io.StringIO()
     figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     whole = text.getvalue()
-    return whole[whole.index("<svg"):]
+    return whole[whole.index("<svg") :]
 
 
 def _distributions(results: Results) -> Iterable[str]:
     names = sorted({name for _, row in results.done for name in row["metrics"]})
     plots = []
     for name in names:
-        good = [row["metrics"][name] for _, row in results.done if name in row["metrics"] and row["status"] == "passed"]
-        bad = [row["metrics"][name] for _, row in results.done if name in row["metrics"] and row["status"] != "passed"]
+        good = [
+            row["metrics"][name]
+            for _, row in results.done
+            if name in row["metrics"] and row["status"] == "passed"
+        ]
+        bad = [
+            row["metrics"][name]
+            for _, row in results.done
+            if name in row["metrics"] and row["status"] != "passed"
+        ]
         if len(set(good + bad)) < 2:
             continue
         figure = new_figure()
         axes = figure.add_subplot()
-        axes.hist([good, bad], bins=20, stacked=True, color=["#8fb7e8", "#d96b5b"], label=["passed", "failed"])
+        axes.hist(
+            [good, bad],
+            bins=20,
+            stacked=True,
+            color=["#8fb7e8", "#d96b5b"],
+            label=["passed", "failed"],
+        )
         axes.set_xlabel(name)
         axes.legend(frameon=False)
         plots.append(f"<figure>{_svg(figure)}</figure>")
@@ -172,7 +218,9 @@ def _heat_map(results: Results) -> Iterable[str]:
         axes.set_aspect("equal", adjustable="datalim")
         axes.set_xlabel("x (m)")
         axes.set_ylabel("y (m)")
-        plots.append(f"<figure>{_svg(figure)}<figcaption>{html.escape(world)}: {len(known)} failures, where the robot was then</figcaption></figure>")
+        plots.append(
+            f"<figure>{_svg(figure)}<figcaption>{html.escape(world)}: {len(known)} failures, where the robot was then</figcaption></figure>"
+        )
     if plots:
         yield f"<h2>Where they failed</h2><div class='plots'>{''.join(plots)}</div>"
 
@@ -193,7 +241,12 @@ def badness(row: dict[str, Any]) -> tuple[float, ...]:
     """The worst first: crashes, then contacts, then what missed its goal by most."""
     metrics = row["metrics"]
     order = {"crashed": 0, "memory": 0, "timeout": 0, "invalid": 1}.get(row["status"], 2)
-    return order, 0 if "contact_time_s" in metrics else 1, -metrics.get("goal_distance_m", 0.0), metrics.get("clearance_m", 0.0)
+    return (
+        order,
+        0 if "contact_time_s" in metrics else 1,
+        -metrics.get("goal_distance_m", 0.0),
+        metrics.get("clearance_m", 0.0),
+    )
 
 
 def _worst(campaign: Any, results: Results) -> Iterable[str]:
@@ -218,6 +271,7 @@ def _path(case: Case, row: dict[str, Any]) -> str:
             axes.plot(*place, "x", color="#c23b22", markersize=7)
     for goal in case.what.get("expect", {}).get("goal", []):
         from matplotlib.patches import Circle
+
         axes.add_patch(Circle((goal["x"], goal["y"]), goal["radius"], fill=False, color="#3b8f4a"))
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.1)
@@ -237,11 +291,15 @@ def _caption(results: Results, case: Case, row: dict[str, Any]) -> str:
 def _comparison(campaign: Any, baseline: str) -> Iterable[str]:
     found = compare_with(campaign, baseline)
     change, low, high = found.change
-    yield (f"<h2>Compared with {html.escape(found.before)}</h2><p>{found.count} cases in both: {len(found.worse)} became worse, "
-           f"{len(found.better)} better. The success rate changed by {change:+.1%} (95 % interval {low:+.1%} to {high:+.1%}); "
-           f"exact p = {found.p:.3g} (McNemar).</p><table><tr><th></th><th>case</th><th>before</th><th>now</th></tr>")
+    yield (
+        f"<h2>Compared with {html.escape(found.before)}</h2><p>{found.count} cases in both: {len(found.worse)} became worse, "
+        f"{len(found.better)} better. The success rate changed by {change:+.1%} (95 % interval {low:+.1%} to {high:+.1%}); "
+        f"exact p = {found.p:.3g} (McNemar).</p><table><tr><th></th><th>case</th><th>before</th><th>now</th></tr>"
+    )
     for kind, pairs in (("worse", found.worse), ("better", found.better)):
         for case, before, now in pairs[:50]:
-            yield (f"<tr><td>{kind}</td><td>{case.number}</td><td>{html.escape(before['reason'] or 'passed')}</td>"
-                   f"<td>{html.escape(now['reason'] or 'passed')}</td></tr>")
+            yield (
+                f"<tr><td>{kind}</td><td>{case.number}</td><td>{html.escape(before['reason'] or 'passed')}</td>"
+                f"<td>{html.escape(now['reason'] or 'passed')}</td></tr>"
+            )
     yield "</table>"

@@ -17,71 +17,156 @@ _PAIR = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2}
 
 
 def _object(properties: dict[str, Any], required: tuple[str, ...] = ()) -> dict[str, Any]:
-    return {"type": "object", "properties": properties, "required": list(required),
-            "additionalProperties": False}
+    return {
+        "type": "object",
+        "properties": properties,
+        "required": list(required),
+        "additionalProperties": False,
+    }
 
 
-_GOAL = _object({"x": _NUMBER_OR_NAME, "y": _NUMBER_OR_NAME, "radius": _NUMBER_OR_NAME,
-                 "by": _NUMBER_OR_NAME}, ("x", "y", "radius"))
-_GRID = _object({"from": _NUMBER, "to": _NUMBER, "steps": {"type": "integer", "minimum": 1}},
-                ("from", "to", "steps"))
+_GOAL = _object(
+    {"x": _NUMBER_OR_NAME, "y": _NUMBER_OR_NAME, "radius": _NUMBER_OR_NAME, "by": _NUMBER_OR_NAME},
+    ("x", "y", "radius"),
+)
+_GRID = _object(
+    {"from": _NUMBER, "to": _NUMBER, "steps": {"type": "integer", "minimum": 1}},
+    ("from", "to", "steps"),
+)
 _PARAMETER = {
-    "type": ["array", "object"], "items": _VALUE, "minItems": 1, "minProperties": 1, "maxProperties": 1,
-    "properties": {"list": {"type": "array", "items": _VALUE, "minItems": 1}, "grid": _GRID,
-                   "uniform": _PAIR, "log_uniform": _PAIR, "normal": _PAIR,
-                   "integers": {"type": "array", "items": {"type": "integer"}, "minItems": 2,
-                                "maxItems": 2}},
-    "additionalProperties": False}
+    "type": ["array", "object"],
+    "items": _VALUE,
+    "minItems": 1,
+    "minProperties": 1,
+    "maxProperties": 1,
+    "properties": {
+        "list": {"type": "array", "items": _VALUE, "minItems": 1},
+        "grid": _GRID,
+        "uniform": _PAIR,
+        "log_uniform": _PAIR,
+        "normal": _PAIR,
+        "integers": {"type": "array", "items": {"type": "integer"}, "minItems": 2, "maxItems": 2},
+    },
+    "additionalProperties": False,
+}
 _WORLD = {
     "type": ["string", "object"],
-    "properties": {"name": _NAME, "file": {"type": "string"}, "generator": {"type": "string"},
-                   "parameters": {"type": "object"}},
-    "additionalProperties": False}
+    "properties": {
+        "name": _NAME,
+        "file": {"type": "string"},
+        "generator": {"type": "string"},
+        "parameters": {"type": "object"},
+    },
+    "additionalProperties": False,
+}
 _CONTROLLER = _object(
-    {"name": _NAME, "each": {"type": "string"}, "command": {"type": "string"}, "python": {"type": "string"}, "files": _TEXTS,
-     "lockstep": {"type": "integer", "minimum": 1, "maximum": 64}, "wait_for": _TEXTS, "remap": _TEXTS,
-     "hz": _POSITIVE, "environment": {"type": "object", "additionalProperties": _VALUE}}, ("name",))
+    {
+        "name": _NAME,
+        "each": {"type": "string"},
+        "command": {"type": "string"},
+        "python": {"type": "string"},
+        "files": _TEXTS,
+        "lockstep": {"type": "integer", "minimum": 1, "maximum": 64},
+        "wait_for": _TEXTS,
+        "remap": _TEXTS,
+        "hz": _POSITIVE,
+        "environment": {"type": "object", "additionalProperties": _VALUE},
+    },
+    ("name",),
+)
 _FAULT = _object(
-    {"robot": {"type": "string"}, "kind": {"type": "string"}, "target": {"type": "string"},
-     "at": _NUMBER_OR_NAME, "duration": _NUMBER_OR_NAME, "value": _NUMBER_OR_NAME,
-     "from": _NUMBER_OR_NAME, "to": _NUMBER_OR_NAME, "x": _NUMBER_OR_NAME, "y": _NUMBER_OR_NAME,
-     "heading": _NUMBER_OR_NAME}, ("kind",))
+    {
+        "robot": {"type": "string"},
+        "kind": {"type": "string"},
+        "target": {"type": "string"},
+        "at": _NUMBER_OR_NAME,
+        "duration": _NUMBER_OR_NAME,
+        "value": _NUMBER_OR_NAME,
+        "from": _NUMBER_OR_NAME,
+        "to": _NUMBER_OR_NAME,
+        "x": _NUMBER_OR_NAME,
+        "y": _NUMBER_OR_NAME,
+        "heading": _NUMBER_OR_NAME,
+    },
+    ("kind",),
+)
 _HUNT = _object(
-    {"obstacles": _object({"most": {"type": "integer", "minimum": 1, "maximum": 20},
-                           "area": {"type": "array", "items": _NUMBER, "minItems": 4, "maxItems": 4},
-                           "size": _PAIR}, ("most", "area")),
-     "faults": {"type": "array", "items": _FAULT, "minItems": 1},
-     "seeds": {"type": "integer", "minimum": 1}})
+    {
+        "obstacles": _object(
+            {
+                "most": {"type": "integer", "minimum": 1, "maximum": 20},
+                "area": {"type": "array", "items": _NUMBER, "minItems": 4, "maxItems": 4},
+                "size": _PAIR,
+            },
+            ("most", "area"),
+        ),
+        "faults": {"type": "array", "items": _FAULT, "minItems": 1},
+        "seeds": {"type": "integer", "minimum": 1},
+    }
+)
 _EXPECT = _object(
-    {"robot": {"type": "string"}, "goal": {**_GOAL, "type": ["object", "array"], "items": _GOAL},
-     "no_contact": {"type": "boolean"}, "clearance": _NUMBER_OR_NAME, "odometry_error": _NUMBER_OR_NAME,
-     "clearance_reach": {"type": "number", "minimum": 0, "maximum": 100},
-     "golden": {"type": "string"}, "tolerances": _TEXTS, "ignore": _TEXTS})
+    {
+        "robot": {"type": "string"},
+        "goal": {**_GOAL, "type": ["object", "array"], "items": _GOAL},
+        "no_contact": {"type": "boolean"},
+        "clearance": _NUMBER_OR_NAME,
+        "odometry_error": _NUMBER_OR_NAME,
+        "clearance_reach": {"type": "number", "minimum": 0, "maximum": 100},
+        "golden": {"type": "string"},
+        "tolerances": _TEXTS,
+        "ignore": _TEXTS,
+    }
+)
 
 SCHEMA: dict[str, Any] = _object(
-    {"name": _NAME,
-     "worlds": {"type": "array", "items": _WORLD, "minItems": 1},
-     "robots": {"type": "array", "items": {"type": "string"}, "minItems": 1},
-     "controllers": {"type": "array", "items": _CONTROLLER, "minItems": 1},
-     "parameters": {"type": "object", "additionalProperties": _PARAMETER},
-     "sampling": _object({"method": {"enum": ["latin", "random"]},
-                          "samples": {"type": "integer", "minimum": 1}, "seed": {"type": "integer"}}),
-     "seeds": {"type": ["integer", "array", "object"], "minimum": 1, "items": {"type": "integer"},
-               "minItems": 1, "properties": {"first": {"type": "integer"},
-                                             "count": {"type": "integer", "minimum": 1}},
-               "additionalProperties": False},
-     "set": {"type": "object", "additionalProperties": _VALUE},
-     "disable": _TEXTS, "noise": {"type": "boolean"},
-     "faults": {"type": "array", "items": _FAULT},
-     "expect": _EXPECT,
-     "metrics": {"type": "array", "items": _object({"name": _NAME, "python": {"type": "string"}},
-                                                   ("name", "python"))},
-     "limits": _object({"duration": {"type": "number", "exclusiveMinimum": 0, "maximum": 1e6},
-                        "wall": _POSITIVE, "memory_mb": {"type": "integer", "minimum": 16}},
-                       ("duration",)),
-     "hunt": _HUNT,
-     "keep": _object({"failures": {"type": "boolean"}, "sample": {"type": "integer", "minimum": 0}})},
-    ("worlds", "controllers", "limits"))
+    {
+        "name": _NAME,
+        "worlds": {"type": "array", "items": _WORLD, "minItems": 1},
+        "robots": {"type": "array", "items": {"type": "string"}, "minItems": 1},
+        "controllers": {"type": "array", "items": _CONTROLLER, "minItems": 1},
+        "parameters": {"type": "object", "additionalProperties": _PARAMETER},
+        "sampling": _object(
+            {
+                "method": {"enum": ["latin", "random"]},
+                "samples": {"type": "integer", "minimum": 1},
+                "seed": {"type": "integer"},
+            }
+        ),
+        "seeds": {
+            "type": ["integer", "array", "object"],
+            "minimum": 1,
+            "items": {"type": "integer"},
+            "minItems": 1,
+            "properties": {
+                "first": {"type": "integer"},
+                "count": {"type": "integer", "minimum": 1},
+            },
+            "additionalProperties": False,
+        },
+        "set": {"type": "object", "additionalProperties": _VALUE},
+        "disable": _TEXTS,
+        "noise": {"type": "boolean"},
+        "faults": {"type": "array", "items": _FAULT},
+        "expect": _EXPECT,
+        "metrics": {
+            "type": "array",
+            "items": _object({"name": _NAME, "python": {"type": "string"}}, ("name", "python")),
+        },
+        "limits": _object(
+            {
+                "duration": {"type": "number", "exclusiveMinimum": 0, "maximum": 1e6},
+                "wall": _POSITIVE,
+                "memory_mb": {"type": "integer", "minimum": 16},
+            },
+            ("duration",),
+        ),
+        "hunt": _HUNT,
+        "keep": _object(
+            {"failures": {"type": "boolean"}, "sample": {"type": "integer", "minimum": 0}}
+        ),
+    },
+    ("worlds", "controllers", "limits"),
+)
 
 
 class Source:
@@ -93,10 +178,14 @@ class Source:
 
     def error(self, path: tuple[Any, ...], text: str) -> SpecError:
         """path: of the member that is wrong, from the top."""
-        line = next((self._lines[path[:n]] for n in range(len(path), -1, -1) if path[:n] in self._lines),
-                    None)
+        line = next(
+            (self._lines[path[:n]] for n in range(len(path), -1, -1) if path[:n] in self._lines),
+            None,
+        )
         where = f"{self.name}:{line}" if line else self.name
-        member = "".join(f"[{one}]" if isinstance(one, int) else f".{one}" for one in path).lstrip(".")
+        member = "".join(f"[{one}]" if isinstance(one, int) else f".{one}" for one in path).lstrip(
+            "."
+        )
         return SpecError(f"{where}: {member + ': ' if member else ''}{text}")
 
 
@@ -122,7 +211,9 @@ def read_yaml(path: str, text: str) -> tuple[Any, Source]:
             seen = set()
             for key, value in one.value:
                 if key.value in seen:
-                    raise SpecError(f"{path}:{key.start_mark.line + 1}: '{key.value}' is there twice")
+                    raise SpecError(
+                        f"{path}:{key.start_mark.line + 1}: '{key.value}' is there twice"
+                    )
                 seen.add(key.value)
                 lines[(*at, key.value)] = key.start_mark.line + 1
                 walk(value, (*at, key.value))
@@ -141,8 +232,10 @@ def check(content: Any, source: Source) -> None:
         import jsonschema
     except ImportError:
         raise missing("jsonschema", "campaign") from None
-    errors = sorted(jsonschema.Draft202012Validator(SCHEMA).iter_errors(content),
-                    key=lambda error: [str(one) for one in error.absolute_path])
+    errors = sorted(
+        jsonschema.Draft202012Validator(SCHEMA).iter_errors(content),
+        key=lambda error: [str(one) for one in error.absolute_path],
+    )
     if errors:
         _raise(errors[0], source)
 
@@ -158,22 +251,40 @@ def _raise(error: Any, source: Source) -> None:
         hint = f"; did you mean '{near[0]}'?" if near else ""
         raise source.error((*path, wrong), f"is not known; allowed are {', '.join(known)}{hint}")
     if kind == "required":
-        raise source.error(path, f"needs {' and '.join(repr(one) for one in wanted if one not in value)}")
+        raise source.error(
+            path, f"needs {' and '.join(repr(one) for one in wanted if one not in value)}"
+        )
     if kind == "type":
         types = [wanted] if isinstance(wanted, str) else wanted
-        raise source.error(path, f"is {_short(value)}; allowed is {' or '.join(_TYPES[one] for one in types)}")
+        raise source.error(
+            path, f"is {_short(value)}; allowed is {' or '.join(_TYPES[one] for one in types)}"
+        )
     if kind == "enum":
         raise source.error(path, f"is {_short(value)}; allowed are {', '.join(map(str, wanted))}")
-    allowed = {"minimum": "{} or more", "exclusiveMinimum": "more than {}", "maximum": "{} or less",
-               "minItems": "{} members or more", "maxItems": "{} members or fewer",
-               "minProperties": "one of list, grid, uniform, log_uniform, normal, integers",
-               "maxProperties": "one of list, grid, uniform, log_uniform, normal, integers, not several",
-               "pattern": "1 to 63 letters, digits, '_', '-' and '.', first a letter or digit"}
-    raise source.error(path, f"is {_short(value)}; allowed is {allowed.get(kind, error.message).format(wanted)}")
+    allowed = {
+        "minimum": "{} or more",
+        "exclusiveMinimum": "more than {}",
+        "maximum": "{} or less",
+        "minItems": "{} members or more",
+        "maxItems": "{} members or fewer",
+        "minProperties": "one of list, grid, uniform, log_uniform, normal, integers",
+        "maxProperties": "one of list, grid, uniform, log_uniform, normal, integers, not several",
+        "pattern": "1 to 63 letters, digits, '_', '-' and '.', first a letter or digit",
+    }
+    raise source.error(
+        path, f"is {_short(value)}; allowed is {allowed.get(kind, error.message).format(wanted)}"
+    )
 
 
-_TYPES = {"string": "a text", "number": "a number", "integer": "a whole number", "boolean": "true or false",
-          "array": "a list", "object": "members with names", "null": "nothing"}
+_TYPES = {
+    "string": "a text",
+    "number": "a number",
+    "integer": "a whole number",
+    "boolean": "true or false",
+    "array": "a list",
+    "object": "members with names",
+    "null": "nothing",
+}
 
 
 def _short(value: Any) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-Z95 = 1.959963984540054    # of a normal variable, two-sided 95 %
+Z95 = 1.959963984540054  # of a normal variable, two-sided 95 %
 
 
 def wilson(successes: int, count: int, z: float = Z95) -> tuple[float, float]:
@@ -26,7 +26,9 @@ def mcnemar(worse: int, better: int) -> float:
     return min(1.0, 2 * tail)
 
 
-def paired_difference(both: int, worse: int, better: int, neither: int) -> tuple[float, float, float]:
+def paired_difference(
+    both: int, worse: int, better: int, neither: int
+) -> tuple[float, float, float]:
     """The change of a success rate over pairs, with its 95 % interval.
 
     Newcombe's method 10 (R. G. Newcombe, Statistics in Medicine 17, 1998, 2635-2650). worse: pairs that
@@ -40,7 +42,7 @@ def paired_difference(both: int, worse: int, better: int, neither: int) -> tuple
     product = (both + worse) * (better + neither) * (both + better) * (worse + neither)
     numerator = both * neither - worse * better
     if numerator > 0:
-        numerator = max(numerator - count / 2, 0.0)    # the paper's correction for continuity
+        numerator = max(numerator - count / 2, 0.0)  # the paper's correction for continuity
     phi = numerator / math.sqrt(product) if product else 0.0
     difference = after - before
     d1, d2 = after - l1, u2 - before

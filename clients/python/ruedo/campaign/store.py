@@ -18,7 +18,18 @@ CREATE TABLE IF NOT EXISTS results (
   id TEXT PRIMARY KEY, status TEXT NOT NULL, what TEXT NOT NULL, reason TEXT NOT NULL, time_s REAL NOT NULL,
   state_hash TEXT NOT NULL, metrics TEXT NOT NULL, track TEXT NOT NULL, output TEXT NOT NULL, wall_s REAL NOT NULL);
 """
-_COLUMNS = ("id", "status", "what", "reason", "time_s", "state_hash", "metrics", "track", "output", "wall_s")
+_COLUMNS = (
+    "id",
+    "status",
+    "what",
+    "reason",
+    "time_s",
+    "state_hash",
+    "metrics",
+    "track",
+    "output",
+    "wall_s",
+)
 _FORMAT = "1"
 
 
@@ -60,10 +71,21 @@ class Store:
         """On the disk when this returns. Raises CampaignError for a full one; nothing that was there is lost."""
         if keep_log and outcome["log"]:
             self._keep_log(id, outcome["log"])
-        self._write(f"INSERT OR REPLACE INTO results VALUES ({', '.join('?' * len(_COLUMNS))})",
-                    (id, outcome["status"], outcome["what"], outcome["reason"], outcome["time_s"], outcome["state_hash"],
-                     json.dumps(outcome["metrics"], sort_keys=True), json.dumps(outcome["track"]),
-                     outcome["output"] if outcome["status"] != "passed" else "", wall_s))
+        self._write(
+            f"INSERT OR REPLACE INTO results VALUES ({', '.join('?' * len(_COLUMNS))})",
+            (
+                id,
+                outcome["status"],
+                outcome["what"],
+                outcome["reason"],
+                outcome["time_s"],
+                outcome["state_hash"],
+                json.dumps(outcome["metrics"], sort_keys=True),
+                json.dumps(outcome["track"]),
+                outcome["output"] if outcome["status"] != "passed" else "",
+                wall_s,
+            ),
+        )
 
     def rows(self, ids: Iterable[str]) -> dict[str, dict[str, Any]]:
         """Of those cases, those that have a result."""
@@ -102,13 +124,17 @@ class Store:
             part.write_bytes(content)
             part.rename(self.log(id))
         except OSError as error:
-            raise CampaignError(f"{self.log(id)}: {error.strerror}; what was run so far is kept: make room, and resume") from None
+            raise CampaignError(
+                f"{self.log(id)}: {error.strerror}; what was run so far is kept: make room, and resume"
+            ) from None
 
     def _write(self, statement: str, values: tuple[Any, ...]) -> None:
         try:
             self._db.execute(statement, values)
         except sqlite3.Error as error:
-            raise CampaignError(f"{self.folder / 'results.sqlite'}: {error}; what was run so far is kept: make room, and resume") from None
+            raise CampaignError(
+                f"{self.folder / 'results.sqlite'}: {error}; what was run so far is kept: make room, and resume"
+            ) from None
 
 
 class Results:
@@ -143,11 +169,22 @@ class Results:
         metrics = sorted({name for _, row in self.done for name in row["metrics"]})
         table = []
         for case, row in self.done:
-            one: dict[str, Any] = {"number": case.number, "id": case.id, "world": case.world, "robot": case.robot,
-                                   "controller": case.controller, "seed": case.seed}
+            one: dict[str, Any] = {
+                "number": case.number,
+                "id": case.id,
+                "world": case.world,
+                "robot": case.robot,
+                "controller": case.controller,
+                "seed": case.seed,
+            }
             one |= {name: case.parameters.get(name) for name in parameters}
-            one |= {"status": row["status"], "passed": row["status"] == "passed", "what": row["what"], "reason": row["reason"],
-                    "state_hash": row["state_hash"]}
+            one |= {
+                "status": row["status"],
+                "passed": row["status"] == "passed",
+                "what": row["what"],
+                "reason": row["reason"],
+                "state_hash": row["state_hash"],
+            }
             table.append(one | {name: row["metrics"].get(name) for name in metrics})
         return table
 
@@ -177,17 +214,39 @@ class Results:
     def junit(self, name: str) -> str:
         """For CI: a test case for each."""
         from xml.etree import ElementTree
-        suite = ElementTree.Element("testsuite", name=name, tests=str(len(self.done)), failures=str(len(self.failed)))
+
+        suite = ElementTree.Element(
+            "testsuite", name=name, tests=str(len(self.done)), failures=str(len(self.failed))
+        )
         for case, row in self.done:
             title = ", ".join(f"{key}={value}" for key, value in case.parameters.items())
-            test = ElementTree.SubElement(suite, "testcase", classname=f"{case.world}.{case.controller}",
-                                          name=f"{case.number} seed={case.seed} {title}".strip(), time=f"{row['wall_s']:.3f}")
+            test = ElementTree.SubElement(
+                suite,
+                "testcase",
+                classname=f"{case.world}.{case.controller}",
+                name=f"{case.number} seed={case.seed} {title}".strip(),
+                time=f"{row['wall_s']:.3f}",
+            )
             if row["status"] != "passed":
-                failure = ElementTree.SubElement(test, "failure", type=f"{row['status']}: {row['what']}", message=_printable(row["reason"]))
+                failure = ElementTree.SubElement(
+                    test,
+                    "failure",
+                    type=f"{row['status']}: {row['what']}",
+                    message=_printable(row["reason"]),
+                )
                 failure.text = _printable(row["output"])
-        return "<?xml version='1.0' encoding='UTF-8'?>\n" + ElementTree.tostring(suite, encoding="unicode") + "\n"
+        return (
+            "<?xml version='1.0' encoding='UTF-8'?>\n"
+            + ElementTree.tostring(suite, encoding="unicode")
+            + "\n"
+        )
 
 
 def _printable(text: str) -> str:
     """What XML may hold."""
-    return "".join(c for c in text if c in "\t\n" or (ord(c) >= 32 and not 0xD800 <= ord(c) < 0xE000 and ord(c) not in (0xFFFE, 0xFFFF)))
+    return "".join(
+        c
+        for c in text
+        if c in "\t\n"
+        or (ord(c) >= 32 and not 0xD800 <= ord(c) < 0xE000 and ord(c) not in (0xFFFE, 0xFFFF))
+    )

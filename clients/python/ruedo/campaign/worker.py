@@ -13,7 +13,7 @@ from .processes import adopt_orphans, die_with_parent
 
 def work(pipe: Connection, folder: str) -> None:
     die_with_parent()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)    # Ctrl-C is the driver's
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the driver's
     adopt_orphans()
     runner = Runner(folder)
     while True:

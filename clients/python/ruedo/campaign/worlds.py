@@ -22,7 +22,7 @@ class WorldFiles:
         self._made: dict[str, str] = {}
         self._hashed: dict[tuple[str, str], str] = {}
         self._read: dict[tuple[Any, ...], str] = {}
-        self.files: set[str] = set()    # all that were read
+        self.files: set[str] = set()  # all that were read
 
     def find(self, name: str) -> str:
         """A file beside the campaign's, or the name of a world that comes with Ruedo."""
@@ -36,9 +36,13 @@ class WorldFiles:
             try:
                 text = str(generator.load()(**parameters))
             except Exception as error:
-                raise ValueError(f"{generator.name}({_arguments(parameters)}) raised {type(error).__name__}: {error}") from None
+                raise ValueError(
+                    f"{generator.name}({_arguments(parameters)}) raised {type(error).__name__}: {error}"
+                ) from None
             if "<sdf" not in text and "<robot" not in text:
-                raise ValueError(f"{generator.name}({_arguments(parameters)}) made no world, but {text[:60]!r}")
+                raise ValueError(
+                    f"{generator.name}({_arguments(parameters)}) made no world, but {text[:60]!r}"
+                )
             self._made[key] = str(keep_text(text, self._store))
         return self._made[key]
 

@@ -9,24 +9,34 @@ from typing import Any
 
 
 def add_hunt(commands: Any) -> None:
-    one = commands.add_parser("hunt", help="search for the case that breaks a controller",
-                              description="Search for the case that breaks a controller, shrink it, and keep it as a regression test. "
-                                          "Exit code 1: one was found.")
+    one = commands.add_parser(
+        "hunt",
+        help="search for the case that breaks a controller",
+        description="Search for the case that breaks a controller, shrink it, and keep it as a regression test. "
+        "Exit code 1: one was found.",
+    )
     one.set_defaults(action=_hunt)
     one.add_argument("FILE", help="a campaign's YAML file with ranges, and `hunt`")
-    one.add_argument("--cases", type=int, default=200, metavar="N", help="most cases to search (default 200)")
-    one.add_argument("--shrink", type=int, default=100, metavar="N", help="most cases to shrink (default 100)")
+    one.add_argument(
+        "--cases", type=int, default=200, metavar="N", help="most cases to search (default 200)"
+    )
+    one.add_argument(
+        "--shrink", type=int, default=100, metavar="N", help="most cases to shrink (default 100)"
+    )
     one.add_argument("--seed", type=int, default=1, metavar="N")
     one.add_argument("--by", choices=("optuna", "hypothesis"), default="optuna")
     one.add_argument("--workers", type=int, metavar="N")
     one.add_argument("--out", metavar="FOLDER", help="of the made worlds")
-    one.add_argument("--keep", metavar="FOLDER", help="keep what is found there, as a regression test")
+    one.add_argument(
+        "--keep", metavar="FOLDER", help="keep what is found there, as a regression test"
+    )
     one.add_argument("--quiet", action="store_true")
     one.add_argument("--json", action="store_true")
 
 
 def _hunt(arguments: argparse.Namespace) -> int:
     from .hunt import Hunt
+
     hunt = Hunt(arguments.FILE, out=arguments.out)
     best = 1.0
 
@@ -34,23 +44,54 @@ def _hunt(arguments: argparse.Namespace) -> int:
         nonlocal best
         if score < best:
             best = score
-            print(f"{count}: score {score:.3f} {outcome['status']} {outcome['reason']}", file=sys.stderr)
+            print(
+                f"{count}: score {score:.3f} {outcome['status']} {outcome['reason']}",
+                file=sys.stderr,
+            )
 
-    found = hunt.run(cases=arguments.cases, seed=arguments.seed, by=arguments.by, workers=arguments.workers, shrink_cases=arguments.shrink,
-                     progress=None if arguments.quiet or arguments.json else progress)
+    found = hunt.run(
+        cases=arguments.cases,
+        seed=arguments.seed,
+        by=arguments.by,
+        workers=arguments.workers,
+        shrink_cases=arguments.shrink,
+        progress=None if arguments.quiet or arguments.json else progress,
+    )
     if found is None:
-        print(json.dumps({"found": False, "cases": arguments.cases}) if arguments.json else f"{hunt.name}: nothing was found in {arguments.cases} cases")
+        print(
+            json.dumps({"found": False, "cases": arguments.cases})
+            if arguments.json
+            else f"{hunt.name}: nothing was found in {arguments.cases} cases"
+        )
         return 0
     if arguments.keep:
         found.keep(arguments.keep)
     if arguments.json:
-        print(json.dumps({"found": True, "cases": found.cases, "shrink_cases": found.shrink_cases, "status": found.status, "reason": found.reason,
-                          "choices": found.choices, "faults": found.content["faults"], "kept": arguments.keep}))
+        print(
+            json.dumps(
+                {
+                    "found": True,
+                    "cases": found.cases,
+                    "shrink_cases": found.shrink_cases,
+                    "status": found.status,
+                    "reason": found.reason,
+                    "choices": found.choices,
+                    "faults": found.content["faults"],
+                    "kept": arguments.keep,
+                }
+            )
+        )
         return 1
-    print(f"{hunt.name}: {found.status} after {found.cases} cases, shrunk by {found.shrink_cases} more: {found.reason}")
+    print(
+        f"{hunt.name}: {found.status} after {found.cases} cases, shrunk by {found.shrink_cases} more: {found.reason}"
+    )
     for name, value in found.choices.items():
         print(f"  {name} = {value}")
     for fault in found.content["faults"]:
         print(f"  fault: {', '.join(f'{key} {value}' for key, value in fault.items())}")
-    print(f"kept in {arguments.keep}: pytest {arguments.keep}" if arguments.keep else "keep it as a regression test with --keep FOLDER")
+    print(
+        f"kept in {arguments.keep}: pytest {arguments.keep}"
+        if arguments.keep
+        else "keep it as a regression test with --keep FOLDER"
+    )
     return 1

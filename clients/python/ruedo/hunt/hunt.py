@@ -19,8 +19,8 @@ from .shrink import shrink
 from .space import Choices, Space
 
 Outcome = dict[str, Any]
-Progress = Callable[[int, Outcome, float], None]    # how many cases, the outcome, its score
-_REACH_M = 3.0      # clearances below it steer
+Progress = Callable[[int, Outcome, float], None]  # how many cases, the outcome, its score
+_REACH_M = 3.0  # clearances below it steer
 
 
 @dataclass
@@ -54,7 +54,9 @@ class Found:
 class Hunt:
     """spec: a campaign's file, or dict, with one controller and one world; `hunt` in it says what else may be chosen."""
 
-    def __init__(self, spec: Any, *, folder: str | Path = ".", out: str | Path | None = None) -> None:
+    def __init__(
+        self, spec: Any, *, folder: str | Path = ".", out: str | Path | None = None
+    ) -> None:
         self._campaign = Campaign(spec, folder=folder, out=out)
         self.name = self._campaign.name
         self.content: dict[str, Any] = self._campaign.content
@@ -62,8 +64,16 @@ class Hunt:
         self.space = Space(self.content)
         self._store = self._campaign.out / "worlds"
 
-    def run(self, *, cases: int = 200, seed: int = 1, by: str = "optuna", workers: int | None = None, shrink_cases: int = 100,
-            progress: Progress | None = None) -> Found | None:
+    def run(
+        self,
+        *,
+        cases: int = 200,
+        seed: int = 1,
+        by: str = "optuna",
+        workers: int | None = None,
+        shrink_cases: int = 100,
+        progress: Progress | None = None,
+    ) -> Found | None:
         """The first case that fails, shrunk; None: none was found. The same seed finds the same, with any number of workers.
 
         by: "optuna" (TPE, after the corners) or "hypothesis" (its own draws, steered by target()).
@@ -87,13 +97,22 @@ class Hunt:
             hit = SEARCHES[by](self.space, evaluate, cases, seed)
             if hit is None:
                 if 2 * invalid > count:
-                    raise CampaignError(f"{self.name}: {invalid} of {count} cases could not be run: {first_invalid}")
+                    raise CampaignError(
+                        f"{self.name}: {invalid} of {count} cases could not be run: {first_invalid}"
+                    )
                 return None
             choices, outcome = hit
             found_after = count
             choices, outcome = shrink(self.space, choices, outcome, evaluate, shrink_cases)
-            return Found(self.space.used(choices), outcome, self.case(choices), found_after, count - found_after, self.content_of(choices),
-                         self.folder)
+            return Found(
+                self.space.used(choices),
+                outcome,
+                self.case(choices),
+                found_after,
+                count - found_after,
+                self.content_of(choices),
+                self.folder,
+            )
 
     def score(self, outcome: Outcome) -> float:
         """How well it went: below 0 it failed; else the smaller of the clearance (of 3 m) and what was left of the time."""
@@ -110,7 +129,9 @@ class Hunt:
     def content_of(self, choices: Choices) -> dict[str, Any]:
         """A campaign's file of this one case."""
         space = self.space
-        content = json.loads(json.dumps({key: value for key, value in self.content.items() if key != "hunt"}))
+        content = json.loads(
+            json.dumps({key: value for key, value in self.content.items() if key != "hunt"})
+        )
         content["parameters"] = {name: [choices[name]] for name in space.parameters}
         content["seeds"] = [choices["seed"]]
         content["faults"] = content.get("faults", []) + space.fault(choices)
@@ -118,7 +139,7 @@ class Hunt:
         expect.setdefault("clearance_reach", _REACH_M)
         if "duration" in choices:
             content["limits"]["duration"] = choices["duration"]
-        return content    # type: ignore[no-any-return]
+        return content  # type: ignore[no-any-return]
 
     def case(self, choices: Choices) -> Case:
         """What is to be run."""
@@ -126,9 +147,14 @@ class Hunt:
         made = self._campaign_of(content)
         boxes = self.space.boxes(choices)
         if boxes:
-            content["worlds"] = [{"name": made.cases[0].world, "file": str(self._with_boxes(made.cases[0].what["world"]["file"], boxes))}]
+            content["worlds"] = [
+                {
+                    "name": made.cases[0].world,
+                    "file": str(self._with_boxes(made.cases[0].what["world"]["file"], boxes)),
+                }
+            ]
             made = self._campaign_of(content)
-        case, = made.cases
+        (case,) = made.cases
         return case
 
     def _case_or_why_not(self, choices: Choices) -> Case | Outcome:
@@ -142,7 +168,7 @@ class Hunt:
 
     def _campaign_of(self, content: dict[str, Any]) -> Campaign:
         made = Campaign(content, folder=self.folder, out=self._campaign.out)
-        made.worlds = self._campaign.worlds    # what was read once is known
+        made.worlds = self._campaign.worlds  # what was read once is known
         return made
 
     def _with_boxes(self, world: str, boxes: list[tuple[float, float, float]]) -> Path:
@@ -151,7 +177,8 @@ class Hunt:
             f"<model name='hunted_{i}'><static>true</static><pose>{x!r} {y!r} 0.5 0 0 0</pose><link name='link'>"
             f"<collision name='c'><geometry><box><size>{side!r} {side!r} 1</size></box></geometry></collision>"
             f"<visual name='v'><geometry><box><size>{side!r} {side!r} 1</size></box></geometry></visual></link></model>"
-            for i, (x, y, side) in enumerate(boxes))
+            for i, (x, y, side) in enumerate(boxes)
+        )
         before, end, after = text.rpartition("</world>")
         return keep_text(before + models + end + after, self._store)
 

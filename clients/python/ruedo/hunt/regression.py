@@ -29,6 +29,7 @@ add_test(NAME hunt.{name} COMMAND ruedo campaign run ${{CMAKE_CURRENT_SOURCE_DIR
 def keep(found: Any, folder: Path) -> Path:
     """world.sdf, regression.yaml (a campaign of one case), test_NAME.py, CMakeLists.txt, and run.lcm, the log of the run that failed."""
     import yaml
+
     folder.mkdir(parents=True, exist_ok=True)
     name = re.sub(r"\W", "_", folder.name)
     content = dict(found.content)
@@ -39,9 +40,16 @@ def keep(found: Any, folder: Path) -> Path:
     home = os.path.relpath(found.folder, folder)
     content["controllers"] = [_moved(one, home) for one in content["controllers"]]
     text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
-    (folder / "regression.yaml").write_text(f"# Found by `ruedo hunt`: {found.reason}\n{text}", encoding="utf-8")
-    (folder / f"test_{name}.py").write_text(_PYTEST.format(name=name, reason=found.reason.replace('"""', "'''").replace("\\", "/")), encoding="utf-8")
-    (folder / "CMakeLists.txt").write_text(_CMAKE.format(name=name, folder=folder.name), encoding="utf-8")
+    (folder / "regression.yaml").write_text(
+        f"# Found by `ruedo hunt`: {found.reason}\n{text}", encoding="utf-8"
+    )
+    (folder / f"test_{name}.py").write_text(
+        _PYTEST.format(name=name, reason=found.reason.replace('"""', "'''").replace("\\", "/")),
+        encoding="utf-8",
+    )
+    (folder / "CMakeLists.txt").write_text(
+        _CMAKE.format(name=name, folder=folder.name), encoding="utf-8"
+    )
     (folder / "run.lcm").write_bytes(found.outcome["log"])
     return folder
 
@@ -53,7 +61,11 @@ def _moved(controller: dict[str, Any], home: str) -> dict[str, Any]:
         moved["python"] = os.path.join(home, moved["python"])
     if "command" in moved:
         moved["files"] = [*moved.get("files", []), *re.findall(r"[\w./-]+\.\w+", moved["command"])]
-        moved["files"] = [one for one in dict.fromkeys(moved["files"]) if (Path(home) / one).exists() or "*" in one]
+        moved["files"] = [
+            one
+            for one in dict.fromkeys(moved["files"])
+            if (Path(home) / one).exists() or "*" in one
+        ]
         moved["command"] = f"cd {home} && {moved['command']}"
     moved["files"] = [os.path.join(home, one) for one in moved.get("files", [])]
     return {key: value for key, value in moved.items() if value != []}

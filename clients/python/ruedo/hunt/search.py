@@ -10,7 +10,7 @@ from .space import Choices, Space
 
 Evaluate = Callable[[list[Choices]], list[tuple[dict[str, Any], float]]]
 Hit = tuple[Choices, dict[str, Any]]
-_BATCH = 8      # proposals at a time: fixed, so that more workers change nothing
+_BATCH = 8  # proposals at a time: fixed, so that more workers change nothing
 
 
 def corners(space: Space, seed: int) -> list[Choices]:
@@ -21,14 +21,21 @@ def corners(space: Space, seed: int) -> list[Choices]:
         if one.name == "seed" or one.name.startswith(("obstacle", "fault_")):
             continue
         made += [{**neutral, one.name: corner} for corner in one.corners()]
-    if space.obstacles:    # something in the way: alone, and with each fault from the beginning on
+    if space.obstacles:  # something in the way: alone, and with each fault from the beginning on
         blocked = {**neutral, "obstacle0": True}
         made += [blocked, *({**blocked, "fault": str(i)} for i in range(len(space.faults)))]
     draw = random.Random(seed)
     first, rest = made[:1], made[1:]
     rest.sort(key=lambda _: draw.random())
-    several = [{one.name: one.corners()[int(draw.random() * len(one.corners()))] if draw.random() < 0.5 else one.at(draw.random())
-                for one in space.dimensions} for _ in range(_BATCH)]
+    several = [
+        {
+            one.name: one.corners()[int(draw.random() * len(one.corners()))]
+            if draw.random() < 0.5
+            else one.at(draw.random())
+            for one in space.dimensions
+        }
+        for _ in range(_BATCH)
+    ]
     unique: list[Choices] = []
     for case in first + rest + several:
         if case not in unique:
@@ -44,17 +51,21 @@ def by_optuna(space: Space, evaluate: Evaluate, cases: int, seed: int) -> Hit | 
         raise missing("Optuna", "hunt") from None
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     study = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=seed, n_startup_trials=16))
-    for case in corners(space, seed)[:max(1, cases // 2)]:
+    for case in corners(space, seed)[: max(1, cases // 2)]:
         study.enqueue_trial(case)
     left = cases
     while left > 0:
         trials = [study.ask() for _ in range(min(_BATCH, left))]
-        proposals = [{one.name: _suggest(trial, one) for one in space.dimensions} for trial in trials]
+        proposals = [
+            {one.name: _suggest(trial, one) for one in space.dimensions} for trial in trials
+        ]
         results = evaluate(proposals)
         for trial, choices, (outcome, score) in zip(trials, proposals, results):
             if outcome["status"] not in ("passed", "invalid"):
                 return choices, outcome
-            study.tell(trial, score if outcome["status"] == "passed" else 1.0)    # a world that cannot be made breaks nobody
+            study.tell(
+                trial, score if outcome["status"] == "passed" else 1.0
+            )  # a world that cannot be made breaks nobody
         left -= len(trials)
     return None
 
@@ -78,7 +89,11 @@ def by_hypothesis(space: Space, evaluate: Evaluate, cases: int, seed: int) -> Hi
     def strategy(one: Any) -> Any:
         if one.options:
             return st.sampled_from(one.options)
-        return st.integers(int(one.low), int(one.high)) if one.whole else st.floats(one.low, one.high, allow_nan=False)
+        return (
+            st.integers(int(one.low), int(one.high))
+            if one.whole
+            else st.floats(one.low, one.high, allow_nan=False)
+        )
 
     hits: dict[str, Hit] = {}
     left = cases
@@ -88,22 +103,34 @@ def by_hypothesis(space: Space, evaluate: Evaluate, cases: int, seed: int) -> Hi
         if left <= 0:
             return False
         left -= 1
-        (outcome, score), = evaluate([choices])
+        ((outcome, score),) = evaluate([choices])
         hypothesis.target(-score)
         broken = outcome["status"] not in ("passed", "invalid")
         if broken:
             hits[repr(choices)] = (choices, outcome)
         return broken
 
-    settings = hypothesis.settings(max_examples=cases, database=None, deadline=None, derandomize=False,
-                                   phases=[hypothesis.Phase.generate, hypothesis.Phase.target],
-                                   suppress_health_check=list(hypothesis.HealthCheck))
+    settings = hypothesis.settings(
+        max_examples=cases,
+        database=None,
+        deadline=None,
+        derandomize=False,
+        phases=[hypothesis.Phase.generate, hypothesis.Phase.target],
+        suppress_health_check=list(hypothesis.HealthCheck),
+    )
     try:
-        smallest = hypothesis.find(st.fixed_dictionaries({one.name: strategy(one) for one in space.dimensions}), breaks,
-                                   settings=settings, random=random.Random(seed))
+        smallest = hypothesis.find(
+            st.fixed_dictionaries({one.name: strategy(one) for one in space.dimensions}),
+            breaks,
+            settings=settings,
+            random=random.Random(seed),
+        )
     except hypothesis.errors.NoSuchExample:
         return None
     return hits[repr(smallest)]
 
 
-SEARCHES: dict[str, Callable[[Space, Evaluate, int, int], Hit | None]] = {"optuna": by_optuna, "hypothesis": by_hypothesis}
+SEARCHES: dict[str, Callable[[Space, Evaluate, int, int], Hit | None]] = {
+    "optuna": by_optuna,
+    "hypothesis": by_hypothesis,
+}

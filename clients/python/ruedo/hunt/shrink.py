@@ -11,7 +11,9 @@ from .space import Choices, Dimension, Space
 Evaluate = Callable[[list[Choices]], list[tuple[dict[str, Any], float]]]
 
 
-def shrink(space: Space, choices: Choices, outcome: dict[str, Any], evaluate: Evaluate, most: int) -> tuple[Choices, dict[str, Any]]:
+def shrink(
+    space: Space, choices: Choices, outcome: dict[str, Any], evaluate: Evaluate, most: int
+) -> tuple[Choices, dict[str, Any]]:
     """At most so many cases more. Failing the same way: the same status, and the same expectation."""
     same = outcome["status"], outcome["what"]
     left = most
@@ -21,7 +23,7 @@ def shrink(space: Space, choices: Choices, outcome: dict[str, Any], evaluate: Ev
         if left <= 0 or smaller == choices:
             return False
         left -= 1
-        (tried, _), = evaluate([smaller])
+        ((tried, _),) = evaluate([smaller])
         if (tried["status"], tried["what"]) != same:
             return False
         choices, outcome = smaller, tried

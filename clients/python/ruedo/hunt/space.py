@@ -8,7 +8,7 @@ from typing import Any
 
 from ..campaign.errors import SpecError
 
-Choices = dict[str, Any]    # a value for each dimension
+Choices = dict[str, Any]  # a value for each dimension
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,18 @@ class Dimension:
 
 
 # Of the faults whose value a hunt chooses: from, to.
-_VALUES = {"lag": (0.1, 3.0), "bias": (-1.0, 1.0), "scale": (0.2, 2.0), "blocked": (0.05, 0.5), "clock_drift": (-0.1, 0.1),
-           "wheel_slip": (0.05, 0.8), "weak_motor": (0.1, 0.9), "commands_lost": (0.1, 1.0), "commands_late": (0.05, 2.0),
-           "commands_doubled": (0.05, 2.0)}
+_VALUES = {
+    "lag": (0.1, 3.0),
+    "bias": (-1.0, 1.0),
+    "scale": (0.2, 2.0),
+    "blocked": (0.05, 0.5),
+    "clock_drift": (-0.1, 0.1),
+    "wheel_slip": (0.05, 0.8),
+    "weak_motor": (0.1, 0.9),
+    "commands_lost": (0.1, 1.0),
+    "commands_late": (0.05, 2.0),
+    "commands_doubled": (0.05, 2.0),
+}
 
 
 class Space:
@@ -74,14 +83,20 @@ class Space:
         x1, y1, x2, y2 = obstacles["area"]
         small, large = obstacles.get("size", [0.2, 0.6])
         for i in range(self.obstacles):
-            self.dimensions += [Dimension(f"obstacle{i}", False, options=(False, True)),
-                                Dimension(f"obstacle{i}_x", (x1 + x2) / 2, x1, x2), Dimension(f"obstacle{i}_y", (y1 + y2) / 2, y1, y2),
-                                Dimension(f"obstacle{i}_size", small, small, large)]
+            self.dimensions += [
+                Dimension(f"obstacle{i}", False, options=(False, True)),
+                Dimension(f"obstacle{i}_x", (x1 + x2) / 2, x1, x2),
+                Dimension(f"obstacle{i}_y", (y1 + y2) / 2, y1, y2),
+                Dimension(f"obstacle{i}_size", small, small, large),
+            ]
 
     def _add_fault(self) -> None:
-        self.dimensions += [Dimension("fault", "", options=("", *map(str, range(len(self.faults))))),
-                            Dimension("fault_at", 0.0, 0.0, self._duration), Dimension("fault_for", self._duration, 0.1, self._duration),
-                            Dimension("fault_value", 0.5, 0.0, 1.0)]
+        self.dimensions += [
+            Dimension("fault", "", options=("", *map(str, range(len(self.faults))))),
+            Dimension("fault_at", 0.0, 0.0, self._duration),
+            Dimension("fault_for", self._duration, 0.1, self._duration),
+            Dimension("fault_value", 0.5, 0.0, 1.0),
+        ]
 
     def fault(self, choices: Choices) -> list[dict[str, Any]]:
         """The case's faults: one, or none."""
@@ -99,14 +114,21 @@ class Space:
 
     def boxes(self, choices: Choices) -> list[tuple[float, float, float]]:
         """The case's obstacles: x, y, side (m)."""
-        return [(choices[f"obstacle{i}_x"], choices[f"obstacle{i}_y"], choices[f"obstacle{i}_size"])
-                for i in range(self.obstacles) if choices[f"obstacle{i}"]]
+        return [
+            (choices[f"obstacle{i}_x"], choices[f"obstacle{i}_y"], choices[f"obstacle{i}_size"])
+            for i in range(self.obstacles)
+            if choices[f"obstacle{i}"]
+        ]
 
     def used(self, choices: Choices) -> Choices:
         """Without what belongs to an obstacle or fault that is not there."""
         absent = [f"obstacle{i}_" for i in range(self.obstacles) if not choices[f"obstacle{i}"]]
         absent += [] if choices.get("fault") else ["fault_"]
-        return {name: value for name, value in choices.items() if not name.startswith(tuple(absent or ["\0"]))}
+        return {
+            name: value
+            for name, value in choices.items()
+            if not name.startswith(tuple(absent or ["\0"]))
+        }
 
 
 def _of_parameter(name: str, given: Any) -> Dimension:
@@ -115,8 +137,14 @@ def _of_parameter(name: str, given: Any) -> Dimension:
         return Dimension(name, values[0], options=tuple(values))
     if kind == "grid":
         low, high, steps = values["from"], values["to"], values["steps"]
-        return Dimension(name, low, options=tuple(low + (high - low) * i / max(steps - 1, 1) for i in range(steps)))
-    low, high = values if kind != "normal" else (values[0] - 3 * values[1], values[0] + 3 * values[1])
+        return Dimension(
+            name,
+            low,
+            options=tuple(low + (high - low) * i / max(steps - 1, 1) for i in range(steps)),
+        )
+    low, high = (
+        values if kind != "normal" else (values[0] - 3 * values[1], values[0] + 3 * values[1])
+    )
     if not (math.isfinite(low) and math.isfinite(high)):
         raise SpecError(f"parameters.{name}: a hunt needs its ends")
     middle = math.sqrt(low * high) if kind == "log_uniform" else (low + high) / 2

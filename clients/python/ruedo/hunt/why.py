@@ -18,11 +18,16 @@ from ..campaign.errors import CampaignError, SpecError
 from ..engine import Engine
 
 # What somebody could have done from a moment on: m/s, rad/s.
-MANOEUVRES = {"stop": (0.0, 0.0), "go back": (-0.3, 0.0), "turn left": (0.0, 0.8), "turn right": (0.0, -0.8)}
-_PERIOD_S = 0.25        # between moments that are tried
-_AFTER_S = 3.0          # how long a branch goes on after the run failed
-_MOST = 80              # moments
-_SEEDS = 5              # others that are tried
+MANOEUVRES = {
+    "stop": (0.0, 0.0),
+    "go back": (-0.3, 0.0),
+    "turn left": (0.0, 0.8),
+    "turn right": (0.0, -0.8),
+}
+_PERIOD_S = 0.25  # between moments that are tried
+_AFTER_S = 3.0  # how long a branch goes on after the run failed
+_MOST = 80  # moments
+_SEEDS = 5  # others that are tried
 
 
 @dataclass
@@ -33,7 +38,7 @@ class Recorded:
     world: str
     seed: int
     options: dict[str, Any]
-    commands: list[tuple[int, str, bytes]]      # step, channel, message
+    commands: list[tuple[int, str, bytes]]  # step, channel, message
     steps: int
 
     @staticmethod
@@ -41,6 +46,7 @@ class Recorded:
         import lcm
 
         from ..lcmtypes import applied_t, log_header_t, state_hash_t
+
         if not os.path.isfile(path):
             raise SpecError(f"{path}: no such file")
         header = None
@@ -52,13 +58,17 @@ class Recorded:
             elif event.channel == "ruedo/applied":
                 applied = applied_t.decode(event.data)
                 if applied.channel.startswith("ruedo/"):
-                    raise SpecError(f"{path}: a request acted on the run (at {applied.utime * 1e-6:g} s); runs with commands alone can be branched")
+                    raise SpecError(
+                        f"{path}: a request acted on the run (at {applied.utime * 1e-6:g} s); runs with commands alone can be branched"
+                    )
                 commands.append((applied.step, applied.channel, bytes(applied.data)))
             elif event.channel == "ruedo/state_hash":
                 steps = max(steps, state_hash_t.decode(event.data).step)
         if header is None:
             raise SpecError(f"{path}: is no log of a run")
-        return Recorded(path, header.world_file, header.seed, _options(header.options, path), commands, steps)
+        return Recorded(
+            path, header.world_file, header.seed, _options(header.options, path), commands, steps
+        )
 
     def engine(self, worlds: int = 1, **changed: Any) -> Engine:
         return Engine(self.world, worlds=worlds, seed=self.seed, **{**self.options, **changed})
@@ -77,7 +87,14 @@ class Recorded:
 
 
 def _options(texts: list[str], path: str) -> dict[str, Any]:
-    made: dict[str, Any] = {"spawn": [], "drive": [], "set": {}, "disable": [], "fault": [], "noise": True}
+    made: dict[str, Any] = {
+        "spawn": [],
+        "drive": [],
+        "set": {},
+        "disable": [],
+        "fault": [],
+        "noise": True,
+    }
     for text in texts:
         name, _, value = text.removeprefix("--").partition("=")
         if name == "no-noise":
@@ -88,7 +105,9 @@ def _options(texts: list[str], path: str) -> dict[str, Any]:
         elif name in made:
             made[name].append(value)
         elif name not in ("remap",):
-            raise SpecError(f"{path}: its run had the option {text}, which `ruedo why` cannot repeat")
+            raise SpecError(
+                f"{path}: its run had the option {text}, which `ruedo why` cannot repeat"
+            )
     return made
 
 
@@ -113,11 +132,16 @@ class Answer:
             at = self.too_late_s
             first = min(at for tries in self.rescues.values() for at, _ in tries)
             best = [name for name, tries in self.rescues.items() if (at, True) in tries]
-            lines.append(f"from {first:g} s on nothing that was tried avoids it: {', '.join(self.rescues)}" if at is None else
-                         f"it could be avoided up to {at:g} s ({' or '.join(best)}), {self.failed_s - at:.2f} s before it happened; "
-                         f"from {at + _PERIOD_S:g} s on no more")
+            lines.append(
+                f"from {first:g} s on nothing that was tried avoids it: {', '.join(self.rescues)}"
+                if at is None
+                else f"it could be avoided up to {at:g} s ({' or '.join(best)}), {self.failed_s - at:.2f} s before it happened; "
+                f"from {at + _PERIOD_S:g} s on no more"
+            )
         for what, good, reason in self.changes:
-            lines.append(f"{'avoids it' if good else 'does not'}: {what}" + ("" if good else f" ({reason})"))
+            lines.append(
+                f"{'avoids it' if good else 'does not'}: {what}" + ("" if good else f" ({reason})")
+            )
         return "\n".join(lines)
 
 
@@ -136,6 +160,7 @@ def _case_of(path: str) -> tuple[Any, Any] | None:
     """The campaign and case of a log in a campaign's folder."""
     from ..campaign import Campaign
     from ..campaign.store import Store
+
     folder = Path(path).resolve().parent.parent
     if not (folder / "results.sqlite").is_file():
         return None
@@ -146,20 +171,30 @@ def _case_of(path: str) -> tuple[Any, Any] | None:
     campaign = Campaign(about["content"], folder=about["folder"], out=folder)
     found = [case for case in campaign.cases if case.id == Path(path).stem]
     if not found:
-        raise CampaignError(f"{path}: its case is no case of {campaign.name} any more: its files were changed since")
+        raise CampaignError(
+            f"{path}: its case is no case of {campaign.name} any more: its files were changed since"
+        )
     return campaign, found[0]
 
 
 def _as_it_was(recorded: Recorded, case: tuple[Any, Any] | None) -> Answer:
     from ..campaign.case import _goals
+
     expect = case[1].what["expect"] if case else {"no_contact": True}
     with recorded.engine() as engine:
-        engine.begin_run(recorded.seed, goals=_goals(case[1].what) if case else (), no_contact=expect.get("no_contact", False),
-                         clearance=expect.get("clearance"), robot=expect.get("robot", ""))
+        engine.begin_run(
+            recorded.seed,
+            goals=_goals(case[1].what) if case else (),
+            no_contact=expect.get("no_contact", False),
+            clearance=expect.get("clearance"),
+            robot=expect.get("robot", ""),
+        )
         recorded.replay(engine, recorded.steps)
         failures = engine.end_run()["failures"]
     if not failures:
-        raise CampaignError(f"{recorded.path}: this run did not fail: {'its controller did' if case else 'nothing was touched'}")
+        raise CampaignError(
+            f"{recorded.path}: this run did not fail: {'its controller did' if case else 'nothing was touched'}"
+        )
     return Answer(failures[0]["time_s"], f"{failures[0]['time_s']:.3f} s: {failures[0]['text']}")
 
 
@@ -176,7 +211,9 @@ def _rescues(recorded: Recorded, failed_s: float) -> dict[str, list[tuple[float,
             touched = np.zeros(len(MANOEUVRES), bool)
             pace = max(1, round(0.1 / engine.dt))
             while engine.time() < failed_s + _AFTER_S:
-                engine.step(np.broadcast_to(commands, (len(MANOEUVRES), len(engine.robots), 2)), pace)
+                engine.step(
+                    np.broadcast_to(commands, (len(MANOEUVRES), len(engine.robots), 2)), pace
+                )
                 touched |= engine.touching()[:, 0] > 0
             for name, hit in zip(MANOEUVRES, touched):
                 found[name].append((moment, not bool(hit)))
@@ -190,7 +227,11 @@ def _changes(recorded: Recorded, case: tuple[Any, Any] | None) -> Iterator[tuple
     """Each alone. Of a campaign's case the controller answers to the change; of another log the commands stay as they were."""
     if case is None:
         for fault in recorded.options["fault"]:
-            yield _open_loop(recorded, f"without the fault {fault}", fault=[one for one in recorded.options["fault"] if one != fault])
+            yield _open_loop(
+                recorded,
+                f"without the fault {fault}",
+                fault=[one for one in recorded.options["fault"] if one != fault],
+            )
         return
     campaign, one = case
     runner = Runner(str(campaign.folder))
@@ -200,7 +241,10 @@ def _changes(recorded: Recorded, case: tuple[Any, Any] | None) -> Iterator[tuple
         return text, outcome.status == "passed", outcome.reason
 
     for i, fault in enumerate(one.what["faults"]):
-        yield tried(f"without the fault {fault['kind']}", faults=one.what["faults"][:i] + one.what["faults"][i + 1:])
+        yield tried(
+            f"without the fault {fault['kind']}",
+            faults=one.what["faults"][:i] + one.what["faults"][i + 1 :],
+        )
     for seed in [number for number in range(1, _SEEDS + 2) if number != one.seed][:_SEEDS]:
         yield tried(f"seed {seed}", seed=seed)
     if one.what["noise"]:
@@ -218,12 +262,19 @@ def _open_loop(recorded: Recorded, text: str, **changed: Any) -> tuple[str, bool
 def plot(answer: Answer, file: str) -> None:
     """The moments that were tried, and what saved the run: SVG, PNG or PDF by the file's name."""
     from ..campaign.report import new_figure
+
     drawn = new_figure(6.4, 2.6)
     axes = drawn.add_subplot()
     for row, (name, tries) in enumerate(answer.rescues.items()):
         for good, mark, colour in ((True, "o", "#3b8f4a"), (False, "x", "#c23b22")):
             times = [at for at, saved in tries if saved == good]
-            axes.plot(times, [row] * len(times), mark, color=colour, label=("avoids it" if good else "does not") if row == 0 else None)
+            axes.plot(
+                times,
+                [row] * len(times),
+                mark,
+                color=colour,
+                label=("avoids it" if good else "does not") if row == 0 else None,
+            )
     axes.axvline(answer.failed_s, color="#1d2330", linewidth=1)
     axes.text(answer.failed_s, len(answer.rescues) - 0.4, " failed", fontsize=8)
     axes.set_yticks(range(len(answer.rescues)), list(answer.rescues))
