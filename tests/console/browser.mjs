@@ -1,5 +1,6 @@
-// The console in a headless browser: node browser.mjs URL FOLDER SCENARIO [JSON], in a folder with playwright-core. The
-// scenario is a file beside this one. Prints a line for each thing that was seen, and "error: ..." for what went wrong.
+// The console in a headless browser: node browser.mjs URL FOLDER SCENARIO [JSON], in a folder with
+// playwright-core. The scenario is a file beside this one. Prints a line for each thing that was
+// seen, and "error: ..." for what went wrong.
 import { createRequire } from "node:module";
 import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -9,77 +10,173 @@ import { createInterface } from "node:readline";
 const require = createRequire(join(process.cwd(), "x.js"));
 const { chromium } = require("playwright-core");
 // The page's own encoder of messages.
-const bundle = await require("esbuild").build({ entryPoints: ["src/wire/lcm.ts"], bundle: true, write: false, preserveSymlinks: true, format: "esm" });
-const { encode } = await import(`data:text/javascript,${encodeURIComponent(bundle.outputFiles[0].text)}`);
+const bundle = await require("esbuild").build({
+  entryPoints: ["src/wire/lcm.ts"],
+  bundle: true,
+  write: false,
+  preserveSymlinks: true,
+  format: "esm",
+});
+const { encode } = await import(
+  `data:text/javascript,${encodeURIComponent(bundle.outputFiles[0].text)}`
+);
 const kAnyBody = [...encode("name_request_t", { name: "" })];
 const [url, folder, scenario, given] = process.argv.slice(2);
-const kPatience_ms = Number(process.env.RUEDO_PATIENCE_S ?? 180) * 1000;    // software draws every pixel, on a machine that does other things, too
+// Software draws every pixel, on a machine that does other things, too
+const kPatience_ms = Number(process.env.RUEDO_PATIENCE_S ?? 180) * 1000;
 const profile = mkdtempSync(join(tmpdir(), "ruedo-browser-"));
 const context = await chromium.launchPersistentContext(profile, {
-  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", headless: true, viewport: { width: 900, height: 520 }, timeout: kPatience_ms,
-  args: ["--no-sandbox", "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage"],
+  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+  headless: true,
+  viewport: { width: 900, height: 520 },
+  timeout: kPatience_ms,
+  args: [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-dev-shm-usage",
+  ],
 });
 const page = await context.newPage();
 const errors = [];
-let expected = null;    // errors that belong to the scenario
-const wrong = (text) => { if (!expected?.test(text)) errors.push(text); };
-page.on("console", (message) => { if (message.type() === "error") wrong(message.text()); });
+let expected = null; // errors that belong to the scenario
+const wrong = (text) => {
+  if (!expected?.test(text)) errors.push(text);
+};
+page.on("console", (message) => {
+  if (message.type() === "error") wrong(message.text());
+});
 page.on("pageerror", (error) => wrong(String(error)));
 // A picture that the next one replaces while it is read is no error.
-page.on("requestfailed", (request) => { if (!request.url().startsWith("blob:")) wrong(`${request.url()}: ${request.failure()?.errorText}`); });
-page.on("request", (request) => { if (!/^(blob|data):/.test(request.url()) && request.url() !== url && (url.startsWith("file:") || !request.url().startsWith(new URL(url).origin))) errors.push(`asked ${request.url()}`); });
+page.on("requestfailed", (request) => {
+  if (!request.url().startsWith("blob:"))
+    wrong(`${request.url()}: ${request.failure()?.errorText}`);
+});
+page.on("request", (request) => {
+  if (
+    !/^(blob|data):/.test(request.url()) &&
+    request.url() !== url &&
+    (url.startsWith("file:") || !request.url().startsWith(new URL(url).origin))
+  )
+    errors.push(`asked ${request.url()}`);
+});
 page.setDefaultTimeout(kPatience_ms);
 // All notes that the page has shown: they go away by themselves, maybe before a busy machine looks.
 await page.addInitScript(() => {
   window.notes = [];
-  addEventListener("DOMContentLoaded", () => new MutationObserver((changes) => {
-    for (const change of changes) for (const node of change.addedNodes) window.notes.push(node.textContent);
-  }).observe(document.getElementById("toasts"), { childList: true }));
+  addEventListener("DOMContentLoaded", () =>
+    new MutationObserver((changes) => {
+      for (const change of changes)
+        for (const node of change.addedNodes) window.notes.push(node.textContent);
+    }).observe(document.getElementById("toasts"), { childList: true }),
+  );
 });
 
 // What the page shows, in one line.
-const shown = () => page.evaluate(() => {
-  const text = (selector) => document.querySelector(selector)?.textContent ?? "";
-  const facts = [...document.querySelectorAll("[data-fact]")].map((fact) => `${fact.dataset.fact} ${fact.textContent}`);
-  const { playback } = window.ruedo?.page.now ?? {};
-  return [`state ${text("#state")}`, `clock ${text("#clock")}`, `${window.ruedo?.stage.frames} frames drawn`, ...facts, text("#notice"),
-    ...window.notes.slice(-3), playback ? `playback ${JSON.stringify(playback)}` : ""].filter(Boolean).join("; ");
-}).catch((error) => `no page: ${error.message.split("\n")[0]}`);
+const shown = () =>
+  page
+    .evaluate(() => {
+      const text = (selector) => document.querySelector(selector)?.textContent ?? "";
+      const facts = [...document.querySelectorAll("[data-fact]")].map(
+        (fact) => `${fact.dataset.fact} ${fact.textContent}`,
+      );
+      const { playback } = window.ruedo?.page.now ?? {};
+      return [
+        `state ${text("#state")}`,
+        `clock ${text("#clock")}`,
+        `${window.ruedo?.stage.frames} frames drawn`,
+        ...facts,
+        text("#notice"),
+        ...window.notes.slice(-3),
+        playback ? `playback ${JSON.stringify(playback)}` : "",
+      ]
+        .filter(Boolean)
+        .join("; ");
+    })
+    .catch((error) => `no page: ${error.message.split("\n")[0]}`);
 
 const lines = createInterface({ input: process.stdin })[Symbol.asyncIterator]();
 const seen = (text) => console.log(text);
 const tools = {
-  page, url, seen, context, given: given ? JSON.parse(given) : null,
-  expect: (pattern) => { expected = pattern; },
+  page,
+  url,
+  seen,
+  context,
+  given: given ? JSON.parse(given) : null,
+  expect: (pattern) => {
+    expected = pattern;
+  },
   // Waits for a line from who started this.
   told: async () => (await lines.next()).value,
-  // Waits until a test in the page holds. No limit is meant to be reached by a page that works, however slow the machine.
-  until: (what, test, argument) => page.waitForFunction(test, argument, { timeout: kPatience_ms, polling: 100 })
-    .then(() => { if (!what.startsWith("(")) seen(what); }, async (error) => { throw new Error(`waited for: ${what}; there was: ${await shown()}${/Timeout/.test(error.message) ? "" : `; ${error.message.split("\n")[0]}`}`); }),
-  check: (what, good, found = "") => { if (!good) throw new Error(`not so: ${what}; there was: ${found}`); seen(what); },
+  // Waits until a test in the page holds. No limit is meant to be reached by a page that works,
+  // however slow the machine.
+  until: (what, test, argument) =>
+    page.waitForFunction(test, argument, { timeout: kPatience_ms, polling: 100 }).then(
+      () => {
+        if (!what.startsWith("(")) seen(what);
+      },
+      async (error) => {
+        throw new Error(
+          `waited for: ${what}; there was: ${await shown()}${/Timeout/.test(error.message) ? "" : `; ${error.message.split("\n")[0]}`}`,
+        );
+      },
+    ),
+  check: (what, good, found = "") => {
+    if (!good) throw new Error(`not so: ${what}; there was: ${found}`);
+    seen(what);
+  },
   picture: (name) => page.screenshot({ path: join(folder, `${name}.png`) }),
   fact: (name) => page.locator(`[data-fact="${name}"]`).innerText(),
   clock: async () => parseFloat(await page.locator("#clock").innerText()),
   // What the server says of itself: sim time in us, paused, rate.
-  server: () => page.evaluate(async (body) => {
-    const { session } = window.ruedo, begun = performance.now(), state = session.state(await session.ask(12, new Uint8Array(body)));    // GET_STATE
-    return { utime: Number(state.utime), step: Number(state.step), paused: state.paused, rate: state.rate, asked_ms: begun, answered_ms: performance.now() };
-  }, kAnyBody),
+  server: () =>
+    page.evaluate(async (body) => {
+      const { session } = window.ruedo,
+        begun = performance.now(),
+        state = session.state(await session.ask(12, new Uint8Array(body))); // GET_STATE
+      return {
+        utime: Number(state.utime),
+        step: Number(state.step),
+        paused: state.paused,
+        rate: state.rate,
+        asked_ms: begun,
+        answered_ms: performance.now(),
+      };
+    }, kAnyBody),
   // Until nothing moves on the canvas: the camera has come to rest.
-  still: () => tools.until("(the camera is at rest)", () => {
-    const is = [...window.ruedo.stage.camera.matrixWorld.elements].map((v) => v.toFixed(3)).join(), was = window.camera;
-    window.camera = is;
-    return is === was;
-  }),
-  ready: () => tools.until("(the world is drawn)", () => window.ruedo?.page.now.world?.robots.length > 0 && window.ruedo.stage.description && window.ruedo.stage.frames > 1),
+  still: () =>
+    tools.until("(the camera is at rest)", () => {
+      const is = [...window.ruedo.stage.camera.matrixWorld.elements]
+          .map((v) => v.toFixed(3))
+          .join(),
+        was = window.camera;
+      window.camera = is;
+      return is === was;
+    }),
+  ready: () =>
+    tools.until(
+      "(the world is drawn)",
+      () =>
+        window.ruedo?.page.now.world?.robots.length > 0 &&
+        window.ruedo.stage.description &&
+        window.ruedo.stage.frames > 1,
+    ),
 };
 try {
   await page.goto(url, { waitUntil: "load" });
   await (await import(`./${scenario}.mjs`)).default(tools);
 } catch (error) {
   console.log(`error: ${error.message.split("\n")[0]}`);
-  await page.screenshot({ path: join(folder, "failed.png"), timeout: 10_000 }).catch(() => undefined);
+  await page
+    .screenshot({ path: join(folder, "failed.png"), timeout: 10_000 })
+    .catch(() => undefined);
 }
 for (const error of errors) console.log(`error: ${error}`);
 await context.close();

@@ -1,9 +1,15 @@
-// Everything by which the page steers: driving by keys, stick and gamepad, motion primitives, layers, placing, rate, reset.
-// What came of it is in the run's log, too, which test_browser.py reads.
-const kLayers = {    // layer: what it switches, in the overlay of a robot
-  rays: (o) => [...o.scans.values()].map((s) => s.lines.object), points: (o) => [...o.scans.values()].map((s) => s.points.object),
-  sonar: (o) => [...o.sonars.values()].map((s) => s.group), trail: (o) => [o.truth.strip.object], odometry: (o) => [o.odometry.strip.object],
-  contacts: (o) => [o.contacts.object], frames: (o) => [o.frames],
+// Everything by which the page steers: driving by keys, stick and gamepad, motion primitives,
+// layers, placing, rate, reset. What came of it is in the run's log, too, which test_browser.py
+// reads.
+const kLayers = {
+  // layer: what it switches, in the overlay of a robot
+  rays: (o) => [...o.scans.values()].map((s) => s.lines.object),
+  points: (o) => [...o.scans.values()].map((s) => s.points.object),
+  sonar: (o) => [...o.sonars.values()].map((s) => s.group),
+  trail: (o) => [o.truth.strip.object],
+  odometry: (o) => [o.odometry.strip.object],
+  contacts: (o) => [o.contacts.object],
+  frames: (o) => [o.frames],
 };
 
 export default async function controls(tools) {
@@ -11,18 +17,31 @@ export default async function controls(tools) {
   await ready();
   // Greatest and least speed ahead and turn rate since the last mark: a slow page sees few of them.
   await page.evaluate(() => {
-    const { pages } = window.ruedo, pose = pages.pose.bind(pages);
-    window.mark = () => { window.speeds = { ahead: [0, 0], turn: [0, 0] }; };
+    const { pages } = window.ruedo,
+      pose = pages.pose.bind(pages);
+    window.mark = () => {
+      window.speeds = { ahead: [0, 0], turn: [0, 0] };
+    };
     window.mark();
     pages.pose = (m) => {
       pose(m);
-      for (const [name, v] of [["ahead", m.vel[0]], ["turn", m.rotation_rate[2]]]) window.speeds[name] = [Math.min(window.speeds[name][0], v), Math.max(window.speeds[name][1], v)];
+      for (const [name, v] of [
+        ["ahead", m.vel[0]],
+        ["turn", m.rotation_rate[2]],
+      ])
+        window.speeds[name] = [
+          Math.min(window.speeds[name][0], v),
+          Math.max(window.speeds[name][1], v),
+        ];
       window.stands = Math.hypot(...m.vel) < 0.01 && Math.abs(m.rotation_rate[2]) < 0.01;
     };
   });
-  const moved = (what, name, sign) => until(what, ([n, s]) => Math.max(...window.speeds[n].map((v) => s * v)) > 0.05, [name, sign]);
+  const moved = (what, name, sign) =>
+    until(what, ([n, s]) => Math.max(...window.speeds[n].map((v) => s * v)) > 0.05, [name, sign]);
   const stands = (what) => until(what, () => window.stands);
-  await page.evaluate(() => window.ruedo.choose(window.ruedo.page.now.world.robots.findIndex((r) => r.name === "p3dx")));
+  await page.evaluate(() =>
+    window.ruedo.choose(window.ruedo.page.now.world.robots.findIndex((r) => r.name === "p3dx")),
+  );
   await page.locator("#canvas").focus();
 
   // From the start, whatever the last drive came to while a busy machine looked away.
@@ -31,13 +50,18 @@ export default async function controls(tools) {
     const epoch = await page.evaluate(() => window.ruedo.clock.epoch);
     await page.locator("#canvas").focus();
     await page.keyboard.press("r");
-    await page.keyboard.press("Enter");    // it asks
+    await page.keyboard.press("Enter"); // it asks
     await until("(a reset)", (e) => window.ruedo.clock.epoch > e && window.stands, epoch);
     await page.evaluate(() => window.mark());
   };
 
   // ---- driving
-  for (const [what, key, name, sign] of [["the up arrow drives ahead", "ArrowUp", "ahead", 1], ["S drives back", "KeyS", "ahead", -1], ["A turns left", "KeyA", "turn", 1], ["D turns right", "KeyD", "turn", -1]]) {
+  for (const [what, key, name, sign] of [
+    ["the up arrow drives ahead", "ArrowUp", "ahead", 1],
+    ["S drives back", "KeyS", "ahead", -1],
+    ["A turns left", "KeyA", "turn", 1],
+    ["D turns right", "KeyD", "turn", -1],
+  ]) {
     await page.keyboard.down(key);
     await moved(what, name, sign);
     await page.keyboard.up(key);
@@ -54,40 +78,87 @@ export default async function controls(tools) {
   await page.mouse.up();
   await stands("the stick let go stops the robot");
   await again();
-  await page.evaluate(() => { navigator.getGamepads = () => [null, { axes: [0, -0.9, 0, 0], buttons: [] }]; });
+  await page.evaluate(() => {
+    navigator.getGamepads = () => [null, { axes: [0, -0.9, 0, 0], buttons: [] }];
+  });
   await moved("a gamepad drives ahead", "ahead", 1);
-  await page.evaluate(() => { navigator.getGamepads = () => [null, { axes: [-0.8, 0.05, 0, 0], buttons: [] }]; });    // 0.05: within the dead zone
+  await page.evaluate(() => {
+    navigator.getGamepads = () => [null, { axes: [-0.8, 0.05, 0, 0], buttons: [] }];
+  }); // 0.05: within the dead zone
   await moved("a gamepad turns left", "turn", 1);
-  await page.evaluate(() => { navigator.getGamepads = () => []; });
+  await page.evaluate(() => {
+    navigator.getGamepads = () => [];
+  });
   await again();
 
   // ---- a motion primitive
-  const place = () => page.evaluate(() => document.querySelector('[data-fact="pose"]').textContent.split(/[^-.0-9]+/).slice(0, 2).map(Number));
+  const place = () =>
+    page.evaluate(() =>
+      document
+        .querySelector('[data-fact="pose"]')
+        .textContent.split(/[^-.0-9]+/)
+        .slice(0, 2)
+        .map(Number),
+    );
   const before = await place();
   await page.getByLabel("how far").fill("0.4");
   await page.locator("#move").click();
-  await until("a motion primitive is done", () => /advance done/.test(document.querySelector('[data-fact="motion"]')?.textContent ?? ""));
+  await until("a motion primitive is done", () =>
+    /advance done/.test(document.querySelector('[data-fact="motion"]')?.textContent ?? ""),
+  );
   await stands("(it stands)");
-  const after = await place(), went = Math.hypot(after[0] - before[0], after[1] - before[1]);
+  const after = await place(),
+    went = Math.hypot(after[0] - before[0], after[1] - before[1]);
   check("it went as far as was asked", Math.abs(went - 0.4) < 0.02, `${went} m`);
 
   // ---- layers
   const chosen = await page.evaluate(() => [...window.ruedo.page.now.layers]);
-  check("frames are off at first, all else is on", chosen.length === 6 && !chosen.includes("frames"), chosen);
-  await until("both trails lead to where the robot is", ([x, y]) => {
-    const { truth, odometry } = window.ruedo.overlays.of.get("p3dx");
-    return [truth, odometry].every(({ strip: { object: { geometry } } }) => {
-      const n = geometry.drawRange.count, p = geometry.getAttribute("position")?.array;
-      return n >= 2 && Math.hypot(p[3 * n - 3] - x, p[3 * n - 2] - y) < 0.05 && Math.hypot(p[3 * n - 3] - p[0], p[3 * n - 2] - p[1]) > 0.2;
-    });
-  }, after);
+  check(
+    "frames are off at first, all else is on",
+    chosen.length === 6 && !chosen.includes("frames"),
+    chosen,
+  );
+  await until(
+    "both trails lead to where the robot is",
+    ([x, y]) => {
+      const { truth, odometry } = window.ruedo.overlays.of.get("p3dx");
+      return [truth, odometry].every(
+        ({
+          strip: {
+            object: { geometry },
+          },
+        }) => {
+          const n = geometry.drawRange.count,
+            p = geometry.getAttribute("position")?.array;
+          return (
+            n >= 2 &&
+            Math.hypot(p[3 * n - 3] - x, p[3 * n - 2] - y) < 0.05 &&
+            Math.hypot(p[3 * n - 3] - p[0], p[3 * n - 2] - p[1]) > 0.2
+          );
+        },
+      );
+    },
+    after,
+  );
   await until("contact points are where the pad touches the ground", () => {
-    const { geometry } = window.ruedo.overlays.of.get("pad").contacts.object, p = geometry.getAttribute("position")?.array ?? [], n = geometry.drawRange.count;
-    return n >= 3 && Array.from({ length: n }, (_, i) => Math.abs(p[3 * i] - 1.5) < 0.26 && Math.abs(p[3 * i + 1] - 1) < 0.26 && Math.abs(p[3 * i + 2]) < 0.02).every(Boolean);
+    const { geometry } = window.ruedo.overlays.of.get("pad").contacts.object,
+      p = geometry.getAttribute("position")?.array ?? [],
+      n = geometry.drawRange.count;
+    return (
+      n >= 3 &&
+      Array.from(
+        { length: n },
+        (_, i) =>
+          Math.abs(p[3 * i] - 1.5) < 0.26 &&
+          Math.abs(p[3 * i + 1] - 1) < 0.26 &&
+          Math.abs(p[3 * i + 2]) < 0.02,
+      ).every(Boolean)
+    );
   });
   await page.locator("#pause").click();
   await until("(it is paused)", () => document.getElementById("state").textContent === "paused");
-  await page.evaluate(() => {    // from where the points on the wall can be seen
+  await page.evaluate(() => {
+    // from where the points on the wall can be seen
     const { stage } = window.ruedo;
     stage.controls.target.set(0, -1, 0);
     stage.camera.position.set(-2, 5, 6);
@@ -95,26 +166,41 @@ export default async function controls(tools) {
   });
   await still();
   // Whether the page draws after a click, and something else than before.
-  const draw = () => page.evaluate(() => {
-    const { stage } = window.ruedo;
-    stage.renderer.render(stage.scene, stage.camera);
-    return document.getElementById("canvas").toDataURL();
+  const draw = () =>
+    page.evaluate(() => {
+      const { stage } = window.ruedo;
+      stage.renderer.render(stage.scene, stage.camera);
+      return document.getElementById("canvas").toDataURL();
+    });
+  await until("(nothing is left to draw)", () => {
+    const { stage } = window.ruedo,
+      was = window.drawn;
+    window.drawn = stage.frames;
+    return was === stage.frames;
   });
-  await until("(nothing is left to draw)", () => { const { stage } = window.ruedo, was = window.drawn; window.drawn = stage.frames; return was === stage.frames; });
   for (const [layer, objects] of Object.entries(kLayers)) {
-    const visible = () => page.evaluate(`(() => { const of = ${objects}; return [...window.ruedo.overlays.of.values()].flatMap(of).map((o) => o.visible); })()`);
+    const visible = () =>
+      page.evaluate(
+        `(() => { const of = ${objects}; return [...window.ruedo.overlays.of.values()].flatMap(of).map((o) => o.visible); })()`,
+      );
     const click = async () => {
       const frames = await page.evaluate(() => window.ruedo.stage.frames);
       await page.locator(`[data-layer="${layer}"]`).click();
       await until(`(${layer} are drawn again)`, (n) => window.ruedo.stage.frames > n, frames);
     };
-    const was = await visible(), drawn = await draw();
+    const was = await visible(),
+      drawn = await draw();
     await click();
-    const is = await visible(), other = await draw();
-    check(`${layer} can be switched`, was.length > 0 && was.every((v, i) => v !== is[i]), `${was} before and ${is} after`);
+    const is = await visible(),
+      other = await draw();
+    check(
+      `${layer} can be switched`,
+      was.length > 0 && was.every((v, i) => v !== is[i]),
+      `${was} before and ${is} after`,
+    );
     check(`${layer} make a difference to the picture`, drawn !== other, "the same picture");
     await click();
-    check(`(${layer} are as they were)`, drawn === await draw(), "another picture");
+    check(`(${layer} are as they were)`, drawn === (await draw()), "another picture");
   }
   await page.evaluate(() => window.ruedo.stage.setAutomatic(true));
   await page.locator("#pause").click();
@@ -130,9 +216,11 @@ export default async function controls(tools) {
     await page.keyboard.press("b");
     // Where those metres are on the screen, by the page's own camera.
     const [px, py, gx, gy] = await page.evaluate(([gx, gy]) => {
-      const { stage } = window.ruedo, box = document.getElementById("canvas").getBoundingClientRect();
+      const { stage } = window.ruedo,
+        box = document.getElementById("canvas").getBoundingClientRect();
       const p = stage.camera.position.clone().set(gx, gy, 0).project(stage.camera);
-      const sx = Math.round(box.left + (p.x + 1) / 2 * box.width), sy = Math.round(box.top + (1 - p.y) / 2 * box.height);
+      const sx = Math.round(box.left + ((p.x + 1) / 2) * box.width),
+        sy = Math.round(box.top + ((1 - p.y) / 2) * box.height);
       const { ground } = stage.pick(sx, sy);
       return [sx, sy, ground.x, ground.y];
     }, at);
@@ -140,15 +228,37 @@ export default async function controls(tools) {
     return [gx, gy];
   };
   const clicked = await put("a box", [-1.5, 1]);
-  await until("a box was placed", () => window.ruedo.page.now.world.bodies.some((b) => b.name === "box/link") && window.ruedo.stage.description.models.some((m) => m.name === "box"));
-  await until("the box stands where the click was", ([x, y]) => {
-    const { page: { now: { world } }, poses } = window.ruedo, index = world.bodies.find((b) => b.name === "box/link").index;
-    return Math.hypot(poses.now[7 * index] - x, poses.now[7 * index + 1] - y) < 0.01 && Math.abs(poses.now[7 * index + 2] - 0.2) < 0.01;
-  }, clicked);
+  await until(
+    "a box was placed",
+    () =>
+      window.ruedo.page.now.world.bodies.some((b) => b.name === "box/link") &&
+      window.ruedo.stage.description.models.some((m) => m.name === "box"),
+  );
+  await until(
+    "the box stands where the click was",
+    ([x, y]) => {
+      const {
+          page: {
+            now: { world },
+          },
+          poses,
+        } = window.ruedo,
+        index = world.bodies.find((b) => b.name === "box/link").index;
+      return (
+        Math.hypot(poses.now[7 * index] - x, poses.now[7 * index + 1] - y) < 0.01 &&
+        Math.abs(poses.now[7 * index + 2] - 0.2) < 0.01
+      );
+    },
+    clicked,
+  );
   await put("Pioneer 3-DX", [-1.5, -1]);
-  await until("a robot was placed", () => window.ruedo.page.now.world.robots.some((r) => r.name === "p3dx_2"));
+  await until("a robot was placed", () =>
+    window.ruedo.page.now.world.robots.some((r) => r.name === "p3dx_2"),
+  );
   await put("a box", [-1.5, -1]);
-  await until("where there is no room, it says so", () => window.notes.some((note) => /there is no room for/.test(note)));
+  await until("where there is no room, it says so", () =>
+    window.notes.some((note) => /there is no room for/.test(note)),
+  );
   await picture("placed");
 
   // ---- rate
@@ -159,10 +269,12 @@ export default async function controls(tools) {
     check(what, state.rate === rate, JSON.stringify(state));
   };
   await rated("the server has the rate that was chosen", "0.25", 0.25);
-  // Sim time between two answers against real time from before the first question to after the second: never too little.
+  // Sim time between two answers against real time from before the first question to after the
+  // second: never too little.
   const first = await server();
   await page.waitForTimeout(3000);
-  const second = await server(), pace = (second.utime - first.utime) * 1e-3 / (second.answered_ms - first.asked_ms);
+  const second = await server(),
+    pace = ((second.utime - first.utime) * 1e-3) / (second.answered_ms - first.asked_ms);
   check("at a quarter of the rate the clock goes a quarter as fast", pace < 0.3 && pace > 0, pace);
   await rated("as fast as it goes is a rate, too", "max", Infinity);
   await rated("(a rate of one)", "1", 1);
@@ -171,10 +283,22 @@ export default async function controls(tools) {
   const epoch = await page.evaluate(() => window.ruedo.clock.epoch);
   await page.locator("#canvas").focus();
   await page.keyboard.press("r");
-  await page.keyboard.press("Enter");    // it asks
+  await page.keyboard.press("Enter"); // it asks
   await until("a reset sets the clock back", (e) => window.ruedo.clock.epoch > e, epoch);
-  await until("a reset takes away what was placed", () => !window.ruedo.page.now.world.bodies.some((b) => b.name === "box/link") && window.ruedo.stage.description.models.every((m) => m.name !== "box") && window.ruedo.page.now.world.robots.length === 2);
+  await until(
+    "a reset takes away what was placed",
+    () =>
+      !window.ruedo.page.now.world.bodies.some((b) => b.name === "box/link") &&
+      window.ruedo.stage.description.models.every((m) => m.name !== "box") &&
+      window.ruedo.page.now.world.robots.length === 2,
+  );
   await page.getByRole("tab", { name: "Robot" }).click();
-  await until("a reset puts the robot back", () => { const [a, b] = document.querySelector('[data-fact="pose"]')?.textContent.split(/[^-.0-9]+/).map(Number) ?? [9, 9]; return Math.hypot(a, b) < 0.01; });
+  await until("a reset puts the robot back", () => {
+    const [a, b] = document
+      .querySelector('[data-fact="pose"]')
+      ?.textContent.split(/[^-.0-9]+/)
+      .map(Number) ?? [9, 9];
+    return Math.hypot(a, b) < 0.01;
+  });
   seen("all was steered");
 }

@@ -1,36 +1,87 @@
-// A run as a user sees it: robots, rays, pictures, plots, channels, pause and step. Takes pictures of the page.
-export default async function live({ page, seen, until, fact, clock, picture, check, ready, still, server }) {
+// A run as a user sees it: robots, rays, pictures, plots, channels, pause and step. Takes pictures
+// of the page.
+export default async function live({
+  page,
+  seen,
+  until,
+  fact,
+  clock,
+  picture,
+  check,
+  ready,
+  still,
+  server,
+}) {
   await page.setViewportSize({ width: 1366, height: 820 });
   await ready();
   seen("robots are listed");
-  await until("rays have appeared", () => [...window.ruedo.overlays.of.values()].some((o) => [...o.scans.values()].some((s) => s.lines.object.geometry.drawRange.count > 100)));
+  await until("rays have appeared", () =>
+    [...window.ruedo.overlays.of.values()].some((o) =>
+      [...o.scans.values()].some((s) => s.lines.object.geometry.drawRange.count > 100),
+    ),
+  );
   await page.locator("canvas#canvas").focus();
   const before = parseFloat(await fact("pose"));
   await page.keyboard.down("KeyW");
-  await until("the robot moved when driven", (x) => Math.abs(parseFloat(document.querySelector('[data-fact="pose"]').textContent) - x) > 0.2, before);
+  await until(
+    "the robot moved when driven",
+    (x) => Math.abs(parseFloat(document.querySelector('[data-fact="pose"]').textContent) - x) > 0.2,
+    before,
+  );
   await page.keyboard.up("KeyW");
   await until("a picture has come", () => document.querySelector("img.picture")?.naturalWidth > 0);
   await picture("laptop");
-  await page.setViewportSize({ width: 900, height: 480 });    // software draws every pixel
+  await page.setViewportSize({ width: 900, height: 480 }); // software draws every pixel
   await page.getByRole("tab", { name: "Plots" }).click();
-  await until("the odometry's error is known", () => /m, .*°/.test(window.ruedo.pages.values.get("odometry error")?.textContent ?? ""));
-  await until("plots grow", () => document.querySelectorAll(".plot canvas").length === 3 && ["speed", "path", "error"].every((name) => window.ruedo.pages[name].data[0].length > 10));
+  await until("the odometry's error is known", () =>
+    /m, .*°/.test(window.ruedo.pages.values.get("odometry error")?.textContent ?? ""),
+  );
+  await until(
+    "plots grow",
+    () =>
+      document.querySelectorAll(".plot canvas").length === 3 &&
+      ["speed", "path", "error"].every((name) => window.ruedo.pages[name].data[0].length > 10),
+  );
   await picture("plots");
   await page.getByRole("tab", { name: "Channels" }).click();
   await page.locator('tr[data-channel$="/odometry"]').first().click();
-  await until("values of a channel are shown", () => /theta/.test(document.querySelector(".channels pre")?.textContent ?? ""));
-  await until("rates are shown", () => [...document.querySelectorAll(".channels .number")].some((cell) => parseFloat(cell.textContent) > 1));
+  await until("values of a channel are shown", () =>
+    /theta/.test(document.querySelector(".channels pre")?.textContent ?? ""),
+  );
+  await until("rates are shown", () =>
+    [...document.querySelectorAll(".channels .number")].some(
+      (cell) => parseFloat(cell.textContent) > 1,
+    ),
+  );
   await picture("channels");
   await page.locator("#pause").click();
-  await until("it says that it is paused", () => document.getElementById("state").textContent === "paused");
+  await until(
+    "it says that it is paused",
+    () => document.getElementById("state").textContent === "paused",
+  );
   const held = await server();
-  await until("(the page shows the last state)", (t) => Math.abs(window.ruedo.page.now.time_s - t) < 1e-6, held.utime * 1e-6);
+  await until(
+    "(the page shows the last state)",
+    (t) => Math.abs(window.ruedo.page.now.time_s - t) < 1e-6,
+    held.utime * 1e-6,
+  );
   await page.waitForTimeout(1500);
   const later = await server();
-  check("pause holds the clock", held.paused && later.paused && later.utime === held.utime && Math.abs(await clock() - held.utime * 1e-6) < 0.006, JSON.stringify([held, later, await clock()]));
+  check(
+    "pause holds the clock",
+    held.paused &&
+      later.paused &&
+      later.utime === held.utime &&
+      Math.abs((await clock()) - held.utime * 1e-6) < 0.006,
+    JSON.stringify([held, later, await clock()]),
+  );
   await page.keyboard.press(".");
   await until("a step moves the clock", (t) => window.ruedo.page.now.time_s > t, held.utime * 1e-6);
-  check("(by one step)", (await server()).step === held.step + 1, JSON.stringify([held, await server()]));
+  check(
+    "(by one step)",
+    (await server()).step === held.step + 1,
+    JSON.stringify([held, await server()]),
+  );
   await page.locator("#pause").click();
   await until("it goes on", () => document.getElementById("state").textContent === "running");
   await page.getByRole("tab", { name: "Robot" }).click();

@@ -1,51 +1,99 @@
-// The page itself: how fast it is there, on small screens, dark and light, and what it says when the server is gone.
-// Channels of a colour such as rgb(1, 2, 3).
-const channels = (colour) => colour.match(/[\d.]+/g).slice(0, 3).map(Number);
-function contrast(a, b) {    // of WCAG
-  const light = (colour) => channels(colour).map((v) => v / 255).map((v) => (v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)).reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
+// The page itself: how fast it is there, on small screens, dark and light, and what it says when
+// the server is gone. Channels of a colour such as rgb(1, 2, 3).
+const channels = (colour) =>
+  colour
+    .match(/[\d.]+/g)
+    .slice(0, 3)
+    .map(Number);
+function contrast(a, b) {
+  // of WCAG
+  const light = (colour) =>
+    channels(colour)
+      .map((v) => v / 255)
+      .map((v) => (v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4))
+      .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
   const [low, high] = [light(a), light(b)].sort((x, y) => x - y);
   return (high + 0.05) / (low + 0.05);
 }
 
 export default async function looks(tools) {
   const { page, url, seen, told, until, check, ready, picture, expect } = tools;
-  // ---- from the address to the first drawn frame, best of three. It is said and not judged: this machine draws by software, and
-  // does other things, too. Judged is what makes a page slow anywhere.
+  // ---- from the address to the first drawn frame, best of three. It is said and not judged: this
+  // machine draws by software, and does other things, too. Judged is what makes a page slow
+  // anywhere.
   await page.setViewportSize({ width: 640, height: 400 });
   const loads = [];
   for (let i = 0; i < 3; ++i) {
     await page.goto(url, { waitUntil: "load" });
     await until("(the first frame is drawn)", () => window.ruedo?.stage.firstDrawn_ms > 0);
-    loads.push(await page.evaluate(() => {
-      const parts = [...performance.getEntriesByType("navigation"), ...performance.getEntriesByType("resource")];
-      return { drawn_ms: Math.round(window.ruedo.stage.firstDrawn_ms), loaded_ms: Math.round(parts[0].loadEventEnd), requests: parts.length, kilobytes: Math.round(parts.reduce((sum, p) => sum + p.transferSize, 0) / 1024) };
-    }));
+    loads.push(
+      await page.evaluate(() => {
+        const parts = [
+          ...performance.getEntriesByType("navigation"),
+          ...performance.getEntriesByType("resource"),
+        ];
+        return {
+          drawn_ms: Math.round(window.ruedo.stage.firstDrawn_ms),
+          loaded_ms: Math.round(parts[0].loadEventEnd),
+          requests: parts.length,
+          kilobytes: Math.round(parts.reduce((sum, p) => sum + p.transferSize, 0) / 1024),
+        };
+      }),
+    );
   }
   const best = loads.sort((a, b) => a.drawn_ms - b.drawn_ms)[0];
   console.log(`measured: ${JSON.stringify(best)}`);
-  check("the page is small", best.requests > 4 && best.requests < 20 && best.kilobytes < 1000, JSON.stringify(best));
+  check(
+    "the page is small",
+    best.requests > 4 && best.requests < 20 && best.kilobytes < 1000,
+    JSON.stringify(best),
+  );
   check("the world is drawn soon", best.drawn_ms < 60_000, `${best.drawn_ms} ms`);
   await page.setViewportSize({ width: 900, height: 520 });
   await ready();
 
   // ---- small screens
-  for (const [width, height] of [[390, 844], [360, 640], [844, 390]]) {
+  for (const [width, height] of [
+    [390, 844],
+    [360, 640],
+    [844, 390],
+  ]) {
     await page.setViewportSize({ width, height });
     for (const tab of ["Robot", "Plots", "Channels", "World"]) {
-      if (await page.evaluate(() => document.getElementById("app").classList.contains("closed"))) await page.keyboard.press("p");
+      if (await page.evaluate(() => document.getElementById("app").classList.contains("closed")))
+        await page.keyboard.press("p");
       await page.getByRole("tab", { name: tab }).click();
       await page.waitForTimeout(150);
       const wide = await page.evaluate(() => {
-        const outside = [...document.querySelectorAll("#bar button, #bar select, .tabs button, .page *, #timeline *")].filter((e) => { const box = e.getBoundingClientRect(); return box.width > 0 && (box.right > innerWidth + 1 || box.left < -1); });
-        const scrolls = [...document.querySelectorAll("html, body, .page")].some((e) => e.scrollWidth > e.clientWidth + 1);
-        return outside.map((e) => `${e.tagName} ${e.className} ${e.textContent.slice(0, 20)}`).concat(scrolls ? ["scrolls"] : []);
+        const outside = [
+          ...document.querySelectorAll(
+            "#bar button, #bar select, .tabs button, .page *, #timeline *",
+          ),
+        ].filter((e) => {
+          const box = e.getBoundingClientRect();
+          return box.width > 0 && (box.right > innerWidth + 1 || box.left < -1);
+        });
+        const scrolls = [...document.querySelectorAll("html, body, .page")].some(
+          (e) => e.scrollWidth > e.clientWidth + 1,
+        );
+        return outside
+          .map((e) => `${e.tagName} ${e.className} ${e.textContent.slice(0, 20)}`)
+          .concat(scrolls ? ["scrolls"] : []);
       });
-      if (wide.length > 0) throw new Error(`${width} x ${height}, ${tab}: wider than the screen: ${wide.slice(0, 5).join("; ")}`);
+      if (wide.length > 0)
+        throw new Error(
+          `${width} x ${height}, ${tab}: wider than the screen: ${wide.slice(0, 5).join("; ")}`,
+        );
     }
     if (width === 390) await picture("phone_world");
   }
   seen("nothing is wider than a phone");
-  const small = await page.evaluate(() => [...document.querySelectorAll("#bar button, .tabs button")].map((e) => e.getBoundingClientRect()).filter((box) => box.width > 0 && Math.min(box.width, box.height) < 34).length);
+  const small = await page.evaluate(
+    () =>
+      [...document.querySelectorAll("#bar button, .tabs button")]
+        .map((e) => e.getBoundingClientRect())
+        .filter((box) => box.width > 0 && Math.min(box.width, box.height) < 34).length,
+  );
   check("buttons are large enough for fingers", small === 0, small);
   await page.setViewportSize({ width: 900, height: 520 });
 
@@ -56,25 +104,43 @@ export default async function looks(tools) {
     await page.evaluate(() => localStorage.removeItem("ruedo.theme"));
     await page.reload();
     await ready();
-    check(`${theme} is taken from the system`, await page.evaluate(() => document.documentElement.dataset.theme) === theme);
+    check(
+      `${theme} is taken from the system`,
+      (await page.evaluate(() => document.documentElement.dataset.theme)) === theme,
+    );
     await page.getByRole("tab", { name: "Robot" }).click();
     await page.waitForTimeout(500);
-    colours[theme] = await page.evaluate(() => ["#panel", ".facts dt", ".facts dd", "h2", "#bar", ".pill"].map((selector) => {
-      const element = document.querySelector(selector);
-      let behind = element;
-      while (getComputedStyle(behind).backgroundColor === "rgba(0, 0, 0, 0)") behind = behind.parentElement;
-      return [selector, getComputedStyle(element).color, getComputedStyle(behind).backgroundColor];
-    }));
-    for (const [selector, front, back] of colours[theme]) if (contrast(front, back) < 4.5) throw new Error(`${theme}: ${selector} is hard to read: ${front} on ${back}`);
+    colours[theme] = await page.evaluate(() =>
+      ["#panel", ".facts dt", ".facts dd", "h2", "#bar", ".pill"].map((selector) => {
+        const element = document.querySelector(selector);
+        let behind = element;
+        while (getComputedStyle(behind).backgroundColor === "rgba(0, 0, 0, 0)")
+          behind = behind.parentElement;
+        return [
+          selector,
+          getComputedStyle(element).color,
+          getComputedStyle(behind).backgroundColor,
+        ];
+      }),
+    );
+    for (const [selector, front, back] of colours[theme])
+      if (contrast(front, back) < 4.5)
+        throw new Error(`${theme}: ${selector} is hard to read: ${front} on ${back}`);
     seen(`texts can be read in ${theme}`);
     await picture(theme);
   }
   await page.locator("#canvas").focus();
   await page.keyboard.press("t");
-  check("T changes to light", await page.evaluate(() => document.documentElement.dataset.theme) === "light");
+  check(
+    "T changes to light",
+    (await page.evaluate(() => document.documentElement.dataset.theme)) === "light",
+  );
   await page.reload();
   await ready();
-  check("and it is remembered", await page.evaluate(() => document.documentElement.dataset.theme) === "light");
+  check(
+    "and it is remembered",
+    (await page.evaluate(() => document.documentElement.dataset.theme)) === "light",
+  );
   await page.keyboard.press("?");
   check("the keys are shown", /arrow keys/.test(await page.locator("#help").innerText()));
   // ---- dialogs: keys are theirs alone
@@ -83,40 +149,73 @@ export default async function looks(tools) {
   await page.keyboard.down("KeyW");
   for (const key of [".", "r", "2", "n", " "]) await page.keyboard.press(key);
   await page.keyboard.up("KeyW");
-  check("no key acts behind a dialog", await page.evaluate(() => document.getElementById("readout").textContent === "" && window.ruedo.page.now.mode === "orbit" && !window.ruedo.page.now.paused) && await open() <= 1);
-  if (await open() === 0) await page.keyboard.press("?");    // space was on its button
+  check(
+    "no key acts behind a dialog",
+    (await page.evaluate(
+      () =>
+        document.getElementById("readout").textContent === "" &&
+        window.ruedo.page.now.mode === "orbit" &&
+        !window.ruedo.page.now.paused,
+    )) && (await open()) <= 1,
+  );
+  if ((await open()) === 0) await page.keyboard.press("?"); // space was on its button
   await page.keyboard.press("Escape");
-  check("Esc closes the keys", await open() === 0);
+  check("Esc closes the keys", (await open()) === 0);
   await page.locator("#canvas").focus();
   await page.keyboard.press("r");
-  check("a reset is asked about", /Reset the world/i.test(await page.locator("dialog[open]").innerText()));
+  check(
+    "a reset is asked about",
+    /Reset the world/i.test(await page.locator("dialog[open]").innerText()),
+  );
   await picture("reset");
   await page.keyboard.press("Escape");
-  check("Esc says no", await open() === 0 && (await tools.server()).step > step);
+  check("Esc says no", (await open()) === 0 && (await tools.server()).step > step);
 
   // ---- the server ends, and comes back
   expect(/WebSocket|ERR_CONNECTION|Failed to load|socket/);
   const notice = () => page.locator("#notice").innerText();
   seen("end the server");
   await told();
-  await until("it says that the server has ended", () => document.getElementById("notice").textContent === "The server has ended.");
-  check("and shows it in the bar", await page.locator("#state").innerText() === "ended");
+  await until(
+    "it says that the server has ended",
+    () => document.getElementById("notice").textContent === "The server has ended.",
+  );
+  check("and shows it in the bar", (await page.locator("#state").innerText()) === "ended");
   await picture("ended");
   seen("begin the server");
   await told();
-  await until("it comes back by itself", () => document.getElementById("notice").hidden && document.getElementById("state").textContent === "running");
-  check("and says so", await page.evaluate(() => window.notes.includes("Connected again.")), "no such note");
+  await until(
+    "it comes back by itself",
+    () =>
+      document.getElementById("notice").hidden &&
+      document.getElementById("state").textContent === "running",
+  );
+  check(
+    "and says so",
+    await page.evaluate(() => window.notes.includes("Connected again.")),
+    "no such note",
+  );
   seen("kill the server");
   await told();
-  await until("it says that the connection is lost", () => /connection to the server is lost/.test(document.getElementById("notice").textContent));
+  await until("it says that the connection is lost", () =>
+    /connection to the server is lost/.test(document.getElementById("notice").textContent),
+  );
   check("and that it tries again", /Trying again/.test(await notice()));
   await picture("lost");
   seen("begin the server");
   await told();
-  await until("it comes back from that, too", () => document.getElementById("notice").hidden && document.getElementById("state").textContent === "running");
+  await until(
+    "it comes back from that, too",
+    () =>
+      document.getElementById("notice").hidden &&
+      document.getElementById("state").textContent === "running",
+  );
   await page.locator("#canvas").focus();
   await page.keyboard.down("KeyW");
-  await until("and drives the new run", () => parseFloat(document.querySelector('[data-fact="speed"]')?.textContent) > 0.1);
+  await until(
+    "and drives the new run",
+    () => parseFloat(document.querySelector('[data-fact="speed"]')?.textContent) > 0.1,
+  );
   await page.keyboard.up("KeyW");
   await page.keyboard.press(" ");
   await until("and pauses it", () => document.getElementById("state").textContent === "paused");

@@ -1,9 +1,15 @@
-// What everybody does first, in short: pause, step, drive, place, rate, reset. For each transport; controls.mjs has the details.
+// What everybody does first, in short: pause, step, drive, place, rate, reset. For each transport;
+// controls.mjs has the details.
 export default async function steer({ page, seen, until, ready, server, check }) {
-  await page.setViewportSize({ width: 900, height: 300 });    // software draws every pixel
+  await page.setViewportSize({ width: 900, height: 300 }); // software draws every pixel
   await ready();
   await page.locator("#canvas").focus();
-  const state = (text) => until(`(it is ${text})`, (wanted) => document.getElementById("state").textContent === wanted, text);
+  const state = (text) =>
+    until(
+      `(it is ${text})`,
+      (wanted) => document.getElementById("state").textContent === wanted,
+      text,
+    );
   await page.keyboard.press(" ");
   await state("paused");
   seen("space pauses");
@@ -17,7 +23,11 @@ export default async function steer({ page, seen, until, ready, server, check })
   const x = () => parseFloat(document.querySelector('[data-fact="pose"]')?.textContent ?? "NaN");
   const begin = await page.evaluate(x);
   await page.keyboard.down("KeyW");
-  await until("W drives", (from) => parseFloat(document.querySelector('[data-fact="pose"]').textContent) > from + 0.2, begin);
+  await until(
+    "W drives",
+    (from) => parseFloat(document.querySelector('[data-fact="pose"]').textContent) > from + 0.2,
+    begin,
+  );
   await page.keyboard.up("KeyW");
   await page.getByLabel("rate").selectOption("0.25");
   let is = await server();
@@ -25,9 +35,14 @@ export default async function steer({ page, seen, until, ready, server, check })
   check("a rate is taken", is.rate === 0.25, is.rate);
   await page.keyboard.press("b");
   await page.locator("#canvas").click({ position: { x: 330, y: 200 } });
-  await until("a box is placed", () => window.ruedo.page.now.world.bodies.some((b) => b.name === "box/link"));
+  await until("a box is placed", () =>
+    window.ruedo.page.now.world.bodies.some((b) => b.name === "box/link"),
+  );
   await page.locator("#canvas").focus();
   await page.keyboard.press("r");
-  await page.keyboard.press("Enter");    // it asks
-  await until("reset takes it away", () => !window.ruedo.page.now.world.bodies.some((b) => b.name === "box/link"));
+  await page.keyboard.press("Enter"); // it asks
+  await until(
+    "reset takes it away",
+    () => !window.ruedo.page.now.world.bodies.some((b) => b.name === "box/link"),
+  );
 }

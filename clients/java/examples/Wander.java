@@ -1,8 +1,3 @@
-import java.nio.file.Path;
-import java.util.HashMap;
-import java.util.List;
-import java.util.Map;
-import java.util.Set;
 import ruedo.Device;
 import ruedo.Odometry;
 import ruedo.Pose;
@@ -13,22 +8,31 @@ import ruedo.Scan;
 import ruedo.Simulation;
 import ruedo.SonarReading;
 
+import java.nio.file.Path;
+import java.util.HashMap;
+import java.util.List;
+import java.util.Map;
+import java.util.Set;
+
 /**
- * Wanders without bumping into things, by laser range finder and sonar; saves a camera picture and compares odometry with
- * the true pose at the end.
+ * Wanders without bumping into things, by laser range finder and sonar; saves a camera picture and
+ * compares odometry with the true pose at the end.
  */
 public final class Wander {
-    private static final double CLEARANCE = 0.7;    // m, from here on it turns away
-    private static final double SPEED = 0.35;       // m/s
-    private static final double TURN_RATE = 0.6;    // rad/s
-    private static final String USAGE = String.join(System.lineSeparator(),
-            "java -cp ruedo.jar:ruedo-examples.jar Wander [OPTION VALUE]...",
-            "  --robot NAME        default: the first",
-            "  --duration SECONDS  of sim time; default: until Ctrl-C",
-            "  --url URL           of the server; default: LCM_DEFAULT_URL",
-            "  --launch WORLD      start a private server with this world",
-            "  --picture FILE      default: wander.jpg");
-    private static final Set<String> OPTIONS = Set.of("--robot", "--duration", "--url", "--launch", "--picture");
+    private static final double CLEARANCE = 0.7; // m, from here on it turns away
+    private static final double SPEED = 0.35; // m/s
+    private static final double TURN_RATE = 0.6; // rad/s
+    private static final String USAGE =
+            String.join(
+                    System.lineSeparator(),
+                    "java -cp ruedo.jar:ruedo-examples.jar Wander [OPTION VALUE]...",
+                    "  --robot NAME        default: the first",
+                    "  --duration SECONDS  of sim time; default: until Ctrl-C",
+                    "  --url URL           of the server; default: LCM_DEFAULT_URL",
+                    "  --launch WORLD      start a private server with this world",
+                    "  --picture FILE      default: wander.jpg");
+    private static final Set<String> OPTIONS =
+            Set.of("--robot", "--duration", "--url", "--launch", "--picture");
     private static volatile boolean interrupted;
 
     private Wander() {}
@@ -55,7 +59,8 @@ public final class Wander {
         boolean hasSonar = has(robot, "sonar_t");
         double start = robot.lrf().latest().time();
         double now = start;
-        double turning = 0.0;    // rad/s while it turns away; it keeps to one side, or it would get stuck in corners
+        // rad/s while it turns away; it keeps to one side, or it would get stuck in corners
+        double turning = 0.0;
         while (!interrupted && now - start < duration) {
             Scan scan = robot.lrf().next();
             now = scan.time();
@@ -90,17 +95,29 @@ public final class Wander {
         double y = end[1] - start[1];
         double cos = Math.cos(start[2]);
         double sin = Math.sin(start[2]);
-        return new double[] {cos * x + sin * y, cos * y - sin * x, Math.IEEEremainder(end[2] - start[2], 2.0 * Math.PI)};
+        return new double[] {
+            cos * x + sin * y,
+            cos * y - sin * x,
+            Math.IEEEremainder(end[2] - start[2], 2.0 * Math.PI)
+        };
     }
 
     private static void run(Map<String, String> options) throws java.io.IOException {
         String world = options.get("--launch");
-        try (Simulation sim = world != null ? Ruedo.launch(world) : Ruedo.connect(options.get("--url"))) {
-            Robot robot = options.containsKey("--robot") ? sim.robot(options.get("--robot")) : sim.robots().get(0);
+        try (Simulation sim =
+                world != null ? Ruedo.launch(world) : Ruedo.connect(options.get("--url"))) {
+            Robot robot =
+                    options.containsKey("--robot")
+                            ? sim.robot(options.get("--robot"))
+                            : sim.robots().get(0);
             double duration = Double.parseDouble(options.getOrDefault("--duration", "Infinity"));
             double[] poseStart = place(robot.pose().latest());
             double[] odometryStart = place(robot.odometry().latest());
-            System.out.println(robot.name + " wanders in " + sim.world() + (Double.isInfinite(duration) ? "; Ctrl-C ends it" : ""));
+            System.out.println(
+                    robot.name
+                            + " wanders in "
+                            + sim.world()
+                            + (Double.isInfinite(duration) ? "; Ctrl-C ends it" : ""));
 
             wander(robot, duration);
             robot.stop().await(10.0);
@@ -112,8 +129,14 @@ public final class Wander {
             }
             double[] truth = moved(poseStart, place(robot.pose().next()));
             double[] belief = moved(odometryStart, place(robot.odometry().next()));
-            System.out.printf("true pose x %.3f m, y %.3f m, heading %.3f rad from where it began%n", truth[0], truth[1], truth[2]);
-            System.out.printf("odometry  x %.3f m, y %.3f m, heading %.3f rad, which is %.3f m off%n", belief[0], belief[1], belief[2],
+            System.out.printf(
+                    "true pose x %.3f m, y %.3f m, heading %.3f rad from where it began%n",
+                    truth[0], truth[1], truth[2]);
+            System.out.printf(
+                    "odometry  x %.3f m, y %.3f m, heading %.3f rad, which is %.3f m off%n",
+                    belief[0],
+                    belief[1],
+                    belief[2],
                     Math.hypot(truth[0] - belief[0], truth[1] - belief[1]));
         }
     }
@@ -136,19 +159,23 @@ public final class Wander {
             System.exit(List.of(args).contains("--help") ? 0 : 2);
         }
         Thread main = Thread.currentThread();
-        Runtime.getRuntime().addShutdownHook(new Thread(() -> {    // Ctrl-C: wait until the robot stands
-            interrupted = true;
-            try {
-                main.join(15000);
-            } catch (InterruptedException error) {
-                Thread.currentThread().interrupt();
-            }
-        }));
+        Runtime.getRuntime()
+                .addShutdownHook(
+                        new Thread(
+                                () -> { // Ctrl-C: wait until the robot stands
+                                    interrupted = true;
+                                    try {
+                                        main.join(15000);
+                                    } catch (InterruptedException error) {
+                                        Thread.currentThread().interrupt();
+                                    }
+                                }));
         try {
             run(options);
         } catch (RuedoException error) {
             System.err.println("wander: " + error.getMessage());
-            Runtime.getRuntime().halt(1);    // exit() would wait for the hook, which waits for this thread
+            Runtime.getRuntime()
+                    .halt(1); // exit() would wait for the hook, which waits for this thread
         }
     }
 }

@@ -1,4 +1,5 @@
-// The page as a whole: makes its parts and connects them. What is known is in `page`; who shows it watches it there.
+// The page as a whole: makes its parts and connects them. What is known is in `page`; who shows it
+// watches it there.
 import { Control } from "./control";
 import { loadScene, type SceneFiles } from "./scene/description";
 import { OverlaySet } from "./scene/overlay_set";
@@ -25,14 +26,20 @@ import { LogFile } from "./wire/log_file";
 import { Router } from "./wire/router";
 import { Session } from "./wire/session";
 
-const kTurn_rad = Math.PI / 24, kPan = 0.06, kZoom = 1.15;    // of one press of a key
+const kTurn_rad = Math.PI / 24,
+  kPan = 0.06,
+  kZoom = 1.15; // of one press of a key
 
 const byId = (id: string) => document.getElementById(id)!;
 
 export class App {
   readonly page = makePage();
   readonly poses = new Poses();
-  readonly stage = new Stage(byId("canvas") as HTMLCanvasElement, this.poses, recall("detail") === "full");
+  readonly stage = new Stage(
+    byId("canvas") as HTMLCanvasElement,
+    this.poses,
+    recall("detail") === "full",
+  );
   readonly overlays = new OverlaySet(this.page, this.stage);
   readonly clock = new Clock(this.page, () => this.forgetPast());
   readonly notice = new Notice(byId("notice"), this.page);
@@ -47,34 +54,71 @@ export class App {
   readonly link: RunLink = this.file ?? new Link();
   readonly session = new Session((channel, message) => this.link.command(channel, message));
   readonly control = new Control(this.page, this.link, this.session, this.clock);
-  readonly pages = new RobotPages((command) => this.control.move(command), () => this.control.stop());
+  readonly pages = new RobotPages(
+    (command) => this.control.move(command),
+    () => this.control.stop(),
+  );
   readonly channels = new ChannelList(() => this.want());
-  readonly panel = new Panel(byId("panel"), this.page, this.stage, { Robot: this.pages.statePage, Plots: this.pages.plotPage, Channels: this.channels.element }, (robot) => this.choose(robot));
+  readonly panel = new Panel(
+    byId("panel"),
+    this.page,
+    this.stage,
+    { Robot: this.pages.statePage, Plots: this.pages.plotPage, Channels: this.channels.element },
+    (robot) => this.choose(robot),
+  );
   private readonly router = new Router(this.page, this);
-  private shown = "";    // run and name of the robot in the panel
+  private shown = ""; // run and name of the robot in the panel
 
   constructor() {
     const { page, control } = this;
     const help = byId("help") as HTMLDialogElement;
     fillHelp(help);
     new Bar(byId("bar"), page, {
-      pauseOrResume: () => control.pauseOrResume(), step: () => control.step(), reset: () => void control.reset(), rate: (rate) => control.rate(rate),
-      mode: (mode) => this.setMode(mode), theme: () => this.toggleTheme(), help: () => help.showModal(), panel: () => this.togglePanel(),
+      pauseOrResume: () => control.pauseOrResume(),
+      step: () => control.step(),
+      reset: () => void control.reset(),
+      rate: (rate) => control.rate(rate),
+      mode: (mode) => this.setMode(mode),
+      theme: () => this.toggleTheme(),
+      help: () => help.showModal(),
+      panel: () => this.togglePanel(),
     });
-    new Timeline(byId("timeline"), page, (on, speed) => this.link.play(on, speed), (time_s) => this.link.seek(time_s));
+    new Timeline(
+      byId("timeline"),
+      page,
+      (on, speed) => this.link.play(on, speed),
+      (time_s) => this.link.seek(time_s),
+    );
     makeLegend(byId("legend"), page);
     this.stage.onDetail = (reduced) => page.set({ reduced });
     if (!this.stage.renderer) byId("flat").hidden = false;
     this.makePad();
     this.listenToClicks();
     listenToKeys({
-      " ": () => control.pauseOrResume(), ".": () => control.step(), r: () => void control.reset(), x: () => control.stop(),
-      "1": () => this.setMode("orbit"), "2": () => this.setMode("follow"), "3": () => this.setMode("top"), Home: () => this.stage.home(),
-      n: () => this.choose((page.now.robot + 1) % Math.max(1, page.now.world?.robots.length ?? 1)), p: () => this.togglePanel(), t: () => this.toggleTheme(),
-      j: () => this.stage.turn(-kTurn_rad, 0), l: () => this.stage.turn(kTurn_rad, 0), i: () => this.stage.turn(0, kTurn_rad), k: () => this.stage.turn(0, -kTurn_rad),
-      J: () => this.stage.pan(-kPan, 0), L: () => this.stage.pan(kPan, 0), I: () => this.stage.pan(0, kPan), K: () => this.stage.pan(0, -kPan),
-      "+": () => this.stage.zoom(1 / kZoom), "-": () => this.stage.zoom(kZoom),
-      b: () => this.panel.startPlacing(), Escape: () => this.panel.stopPlacing(), "?": () => help.showModal(),
+      " ": () => control.pauseOrResume(),
+      ".": () => control.step(),
+      r: () => void control.reset(),
+      x: () => control.stop(),
+      "1": () => this.setMode("orbit"),
+      "2": () => this.setMode("follow"),
+      "3": () => this.setMode("top"),
+      Home: () => this.stage.home(),
+      n: () => this.choose((page.now.robot + 1) % Math.max(1, page.now.world?.robots.length ?? 1)),
+      p: () => this.togglePanel(),
+      t: () => this.toggleTheme(),
+      j: () => this.stage.turn(-kTurn_rad, 0),
+      l: () => this.stage.turn(kTurn_rad, 0),
+      i: () => this.stage.turn(0, kTurn_rad),
+      k: () => this.stage.turn(0, -kTurn_rad),
+      J: () => this.stage.pan(-kPan, 0),
+      L: () => this.stage.pan(kPan, 0),
+      I: () => this.stage.pan(0, kPan),
+      K: () => this.stage.pan(0, -kPan),
+      "+": () => this.stage.zoom(1 / kZoom),
+      "-": () => this.stage.zoom(kZoom),
+      b: () => this.panel.startPlacing(),
+      Escape: () => this.panel.stopPlacing(),
+      "?": () => help.showModal(),
     });
     page.watch(["theme"], ({ theme }) => {
       document.documentElement.dataset.theme = theme;
@@ -90,7 +134,13 @@ export class App {
       playback: (playback) => this.onPlayback(playback),
       message: (channel, bytes) => this.router.onMessage(channel, bytes),
       traffic: (channels, messages, sizes) => this.channels.traffic(channels, messages, sizes),
-      refused: (channel) => toast(page.now.hello?.mode === "log" ? "A recorded run cannot be steered." : `Nobody listens on ${channel}.`, "error"),
+      refused: (channel) =>
+        toast(
+          page.now.hello?.mode === "log"
+            ? "A recorded run cannot be steered."
+            : `Nobody listens on ${channel}.`,
+          "error",
+        ),
     });
     requestAnimationFrame((at) => this.frame(at));
   }
@@ -108,18 +158,26 @@ export class App {
   }
 
   private onWorld(world: World): void {
-    const request = inputOf(world, "", "request_t") ?? "", live = this.page.now.hello?.mode === "live";
+    const request = inputOf(world, "", "request_t") ?? "",
+      live = this.page.now.hello?.mode === "live";
     this.session.begin(world.runId, request);
-    this.page.set({ controlled: request !== "" || !live, ...(live ? { paused: world.paused } : {}) });
+    this.page.set({
+      controlled: request !== "" || !live,
+      ...(live ? { paused: world.paused } : {}),
+    });
     if (live) this.clock.tell(Number(world.utime) * 1e-6, world.epoch);
   }
 
   // The chosen robot stays, by its name.
   private onComplete(world: World, files: SceneFiles | null): void {
-    const { world: before, robot } = this.page.now, name = before?.robots[robot]?.name;
+    const { world: before, robot } = this.page.now,
+      name = before?.robots[robot]?.name;
     this.stage.show(files);
     this.channels.show(world);
-    const at = Math.max(world.robots.findIndex((r) => r.name === name), world.robots.length > 0 ? 0 : -1);
+    const at = Math.max(
+      world.robots.findIndex((r) => r.name === name),
+      world.robots.length > 0 ? 0 : -1,
+    );
     this.page.set({ world, scene: files?.description ?? null, robot: at });
   }
 
@@ -144,13 +202,18 @@ export class App {
 
   // The chosen robot in panel and view.
   private showRobot(): void {
-    const { world, scene, robot: at } = this.page.now, robot = world?.robots[at];
+    const { world, scene, robot: at } = this.page.now,
+      robot = world?.robots[at];
     if (!robot) return;
     const base = scene?.bases.findIndex((b) => b.robot === robot.name) ?? -1;
     this.stage.follow(base);
     this.pages.beginAt(scene ? scene.bases[base]?.start : [0, 0, 0, 1, 0, 0, 0]);
     const key = `${world!.runId} ${robot.name}`;
-    if (key !== this.shown) this.pages.show(robot, world!.devices.filter((device) => device.robot === robot.name));
+    if (key !== this.shown)
+      this.pages.show(
+        robot,
+        world!.devices.filter((device) => device.robot === robot.name),
+      );
     this.shown = key;
   }
 
@@ -189,7 +252,11 @@ export class App {
     const readout = h("div", { class: "readout", id: "readout" });
     const drive = new Drive((ahead, left) => {
       const speeds = this.control.drive(ahead, left);
-      if (speeds) say(readout, `${speeds.robot}\n${speeds.vx.toFixed(2)} m/s  ${speeds.omega.toFixed(2)} rad/s`);
+      if (speeds)
+        say(
+          readout,
+          `${speeds.robot}\n${speeds.vx.toFixed(2)} m/s  ${speeds.omega.toFixed(2)} rad/s`,
+        );
     });
     byId("pad").append(drive.stick, readout);
   }
@@ -198,10 +265,14 @@ export class App {
   private listenToClicks(): void {
     const canvas = byId("canvas");
     let down = { x: 0, y: 0 };
-    canvas.addEventListener("pointerdown", (event) => { down = { x: event.clientX, y: event.clientY }; });
+    canvas.addEventListener("pointerdown", (event) => {
+      down = { x: event.clientX, y: event.clientY };
+    });
     canvas.addEventListener("pointerup", (event) => {
-      if (event.button !== 0 || Math.hypot(event.clientX - down.x, event.clientY - down.y) > 5) return;
-      const { robot, ground } = this.stage.pick(event.clientX, event.clientY), thing = this.panel.placing();
+      if (event.button !== 0 || Math.hypot(event.clientX - down.x, event.clientY - down.y) > 5)
+        return;
+      const { robot, ground } = this.stage.pick(event.clientX, event.clientY),
+        thing = this.panel.placing();
       if (thing && ground) {
         this.panel.stopPlacing();
         void this.control.place(thing, ground.x, ground.y);

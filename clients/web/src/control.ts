@@ -10,19 +10,38 @@ import { encode } from "./wire/lcm";
 import type { RunLink } from "./wire/link";
 import type { Session } from "./wire/session";
 
-const kFastest_m_s = 1.0, kQuickestTurn_rad_s = 1.5;    // that the page drives at
+const kFastest_m_s = 1.0,
+  kQuickestTurn_rad_s = 1.5; // that the page drives at
 const kLogStep_s = 0.1;
-const kStop = { kind: move_command_t.STOP, value: 0, radius: 0, speed: 0, acceleration: 0, deceleration: 0 };
+const kStop = {
+  kind: move_command_t.STOP,
+  value: 0,
+  radius: 0,
+  speed: 0,
+  acceleration: 0,
+  deceleration: 0,
+};
 
 export type Move = Omit<move_command_t, "utime" | "id">;
-export interface Speeds { robot: string; vx: number; omega: number }
+export interface Speeds {
+  robot: string;
+  vx: number;
+  omega: number;
+}
 
 export class Control {
   private motionId = BigInt(Date.now());
 
-  constructor(private readonly page: Page, private readonly link: RunLink, private readonly session: Session, private readonly clock: Clock) {}
+  constructor(
+    private readonly page: Page,
+    private readonly link: RunLink,
+    private readonly session: Session,
+    private readonly clock: Clock,
+  ) {}
 
-  private get isLog(): boolean { return this.page.now.hello?.mode === "log"; }
+  private get isLog(): boolean {
+    return this.page.now.hello?.mode === "log";
+  }
 
   async request(kind: number, body?: Uint8Array): Promise<boolean> {
     try {
@@ -51,17 +70,29 @@ export class Control {
     else if (playback) this.link.seek(playback.now + kLogStep_s);
   }
 
-  rate(rate: number): void { void this.request(request_t.RATE, encode("rate_request_t", { rate })); }
+  rate(rate: number): void {
+    void this.request(request_t.RATE, encode("rate_request_t", { rate }));
+  }
 
   async reset(): Promise<void> {
     if (this.isLog) return;
-    if (!await confirmed("Reset the world?", "The run begins anew at 0 s: everything goes back to where it started, and what was placed goes away.", "Reset")) return;
+    if (
+      !(await confirmed(
+        "Reset the world?",
+        "The run begins anew at 0 s: everything goes back to where it started, and what was " +
+          "placed goes away.",
+        "Reset",
+      ))
+    )
+      return;
     await this.request(request_t.RESET, encode("reset_request_t", { what: 0, seed: -1n }));
   }
 
-  // A share of the chosen robot's speed ahead and of its turn rate to the left; null where it takes no velocities.
+  // A share of the chosen robot's speed ahead and of its turn rate to the left; null where it takes
+  // no velocities.
   drive(ahead: number, left: number): Speeds | null {
-    const { world, robot: chosen } = this.page.now, robot = world?.robots[chosen];
+    const { world, robot: chosen } = this.page.now,
+      robot = world?.robots[chosen];
     const channel = robot && inputOf(world!, robot.name, "velocity_command_t");
     if (!robot || !channel) return null;
     const vx = ahead * Math.min(robot.max_speed, kFastest_m_s);
@@ -71,17 +102,30 @@ export class Control {
   }
 
   move(command: Move): void {
-    const { world, robot: chosen } = this.page.now, robot = world?.robots[chosen];
+    const { world, robot: chosen } = this.page.now,
+      robot = world?.robots[chosen];
     const channel = robot && inputOf(world!, robot.name, "move_command_t");
     if (!channel) return toast("This robot takes no motion primitives.", "error");
-    this.link.command(channel, encode("move_command_t", { ...command, utime: 0n, id: ++this.motionId }));
+    this.link.command(
+      channel,
+      encode("move_command_t", { ...command, utime: 0n, id: ++this.motionId }),
+    );
   }
 
-  stop(): void { this.move(kStop); }
+  stop(): void {
+    this.move(kStop);
+  }
 
   // Puts a thing onto the ground there.
   async place({ model, text }: Thing, x: number, y: number): Promise<void> {
-    const body = encode("spawn_request_t", { name: "", model, text, on_ground: true, position: new Float64Array([x, y, 0]), orientation: new Float64Array([1, 0, 0, 0]) });
+    const body = encode("spawn_request_t", {
+      name: "",
+      model,
+      text,
+      on_ground: true,
+      position: new Float64Array([x, y, 0]),
+      orientation: new Float64Array([1, 0, 0, 0]),
+    });
     if (await this.request(request_t.SPAWN, body)) toast("Placed.");
   }
 }

@@ -3,7 +3,9 @@ import "./style.css";
 import { App } from "./app";
 
 declare global {
-  interface Window { ruedo: App }    // for tests and the curious
+  interface Window {
+    ruedo: App;
+  } // for tests and the curious
 }
 try {
   window.ruedo = new App();

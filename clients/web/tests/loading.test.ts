@@ -8,19 +8,36 @@ const kHello: Hello = { mode: "live", title: "w", version: "1", info: "ruedo/inf
 
 function info(robots: string[], more: Partial<world_info_t> = {}): world_info_t {
   return {
-    utime: 0n, run_id: 1n, epoch: 0, part: 0, nparts: 1, version: "1", world: "w", seed: 1n, step_us: 5000n, features: 0n, paused: false,
-    robots: robots.map((name) => ({ name })), devices: [], channels: robots.map((name) => ({ name: `${name}/pose` })), bodies: [], ...more,
+    utime: 0n,
+    run_id: 1n,
+    epoch: 0,
+    part: 0,
+    nparts: 1,
+    version: "1",
+    world: "w",
+    seed: 1n,
+    step_us: 5000n,
+    features: 0n,
+    paused: false,
+    robots: robots.map((name) => ({ name })),
+    devices: [],
+    channels: robots.map((name) => ({ name: `${name}/pose` })),
+    bodies: [],
+    ...more,
   } as unknown as world_info_t;
 }
 
 // A page with a scene on the server, whose answers come when they are let go.
 function page() {
-  const told: string[] = [], waiting: { answer: () => void; fail: () => void }[] = [];
+  const told: string[] = [],
+    waiting: { answer: () => void; fail: () => void }[] = [];
   const server = { scene: "scene" as string | null };
   const loading = new Loading<string>({
     fetchScene: () => {
       const scene = server.scene;
-      return new Promise((resolve, reject) => waiting.push({ answer: () => resolve(scene), fail: () => reject(new Error("no")) }));
+      return new Promise((resolve, reject) =>
+        waiting.push({ answer: () => resolve(scene), fail: () => reject(new Error("no")) }),
+      );
     },
     greeted: () => told.push("greeted"),
     running: (world) => told.push(`runs ${world.robots.map((r) => r.name)}`),
@@ -108,7 +125,7 @@ describe("the order of loading", () => {
     expect(loading.complete).toBe(false);
     waiting[1]!.answer();
     await settle();
-    expect(loading.complete).toBe(false);    // the world of before may be another
+    expect(loading.complete).toBe(false); // the world of before may be another
     loading.onInfo(info(["c"], { run_id: 2n }));
     expect(last()).toBe("c in scene");
   });

@@ -6,13 +6,24 @@ import { inWorld } from "../src/ui/odometry";
 import { plainKinds } from "../src/scene/plain";
 import { Quality } from "../src/scene/quality";
 
-function stateAt(utime: number, bodies: [index: number, x: number, yaw: number][], more: Partial<world_state_t> = {}): world_state_t {
+function stateAt(
+  utime: number,
+  bodies: [index: number, x: number, yaw: number][],
+  more: Partial<world_state_t> = {},
+): world_state_t {
   return {
-    utime: BigInt(utime), epoch: 0, part: 0, nparts: 1, index: bodies.map(([index]) => index),
-    position: bodies.flatMap(([, x]) => [x, 0, 0]), orientation: bodies.flatMap(([, , yaw]) => [Math.cos(yaw / 2), 0, 0, Math.sin(yaw / 2)]), ...more,
+    utime: BigInt(utime),
+    epoch: 0,
+    part: 0,
+    nparts: 1,
+    index: bodies.map(([index]) => index),
+    position: bodies.flatMap(([, x]) => [x, 0, 0]),
+    orientation: bodies.flatMap(([, , yaw]) => [Math.cos(yaw / 2), 0, 0, Math.sin(yaw / 2)]),
+    ...more,
   } as unknown as world_state_t;
 }
-const yawOf = (poses: Poses, body: number) => 2 * Math.atan2(poses.now[7 * body + 6]!, poses.now[7 * body + 3]!);
+const yawOf = (poses: Poses, body: number) =>
+  2 * Math.atan2(poses.now[7 * body + 6]!, poses.now[7 * body + 3]!);
 
 describe("poses between two states", () => {
   // 100 ms between states, often enough that this is the interval.
@@ -50,7 +61,12 @@ describe("poses between two states", () => {
   });
 
   it("do not fly to a new place, after a jump or in another epoch", () => {
-    for (const [utime, x, epoch, jump] of [[10_100_000, 20, 0, false], [10_100_000, 10.5, 0, true], [0, 10.5, 1, false], [5_000_000, 10.5, 0, false]] as const) {
+    for (const [utime, x, epoch, jump] of [
+      [10_100_000, 20, 0, false],
+      [10_100_000, 10.5, 0, true],
+      [0, 10.5, 1, false],
+      [5_000_000, 10.5, 0, false],
+    ] as const) {
       const poses = moving();
       if (jump) poses.jump();
       poses.add(stateAt(utime, [[0, x, 0]], { epoch }), 10_100);
@@ -73,16 +89,21 @@ describe("poses between two states", () => {
 });
 
 it("kinds of links are drawn plainly when the scene is above its budget, the costliest first, and few links never", () => {
-  expect(plainKinds([1620], [100])).toEqual(new Set([0]));           // 162 000 triangles
-  expect(plainKinds([1620, 100], [30, 50])).toEqual(new Set());      // 53 600
-  expect(plainKinds([1000, 30], [60, 1000])).toEqual(new Set([0]));  // 60 000 and 30 000: the first is enough
-  expect(plainKinds([500_000], [1])).toEqual(new Set());             // one house
+  expect(plainKinds([1620], [100])).toEqual(new Set([0])); // 162 000 triangles
+  expect(plainKinds([1620, 100], [30, 50])).toEqual(new Set()); // 53 600
+  // 60 000 and 30 000: the first is enough
+  expect(plainKinds([1000, 30], [60, 1000])).toEqual(new Set([0]));
+  expect(plainKinds([500_000], [1])).toEqual(new Set()); // one house
   expect(plainKinds([500_000, 50], [1, 400])).toEqual(new Set([1]));
 });
 
 it("odometry that begins turned and aside is turned and moved", () => {
   const [x, y, heading] = inWorld({ x: 2, y: 1, theta: 0.25 }, [10, 20, Math.PI / 2]);
-  expect([x, y, heading].map((v) => Number(v.toFixed(9)))).toEqual([9, 22, Number((Math.PI / 2 + 0.25).toFixed(9))]);
+  expect([x, y, heading].map((v) => Number(v.toFixed(9)))).toEqual([
+    9,
+    22,
+    Number((Math.PI / 2 + 0.25).toFixed(9)),
+  ]);
 });
 
 describe("quality", () => {
@@ -140,7 +161,7 @@ describe("quality", () => {
     expect([quality.moves(0), quality.reduced]).toEqual([false, true]);
     expect([quality.idle(100), quality.reduced]).toEqual([false, true]);
     expect([quality.idle(400), quality.reduced, quality.now.shadows]).toEqual([true, false, true]);
-    expect([quality.idle(1000), quality.reduced]).toEqual([false, false]);    // once is enough
+    expect([quality.idle(1000), quality.reduced]).toEqual([false, false]); // once is enough
     expect([quality.moves(1100), quality.reduced]).toEqual([true, true]);
     expect(quality.idle(1200)).toBe(false);
     expect(quality.idle(1400)).toBe(true);

@@ -7,23 +7,73 @@ import type { World } from "../src/state/world";
 import { encode, fingerprint, type TypeName } from "../src/wire/lcm";
 import { Router, routesOf, type Views } from "../src/wire/router";
 
-const channel = (name: string, type: string, robot = "", device = "", hash = fingerprint(type)) => ({ name, type, robot, device, fingerprint: hash, input: false });
+const channel = (
+  name: string,
+  type: string,
+  robot = "",
+  device = "",
+  hash = fingerprint(type),
+) => ({ name, type, robot, device, fingerprint: hash, input: false });
 
 const kWorld = {
-  robots: [{ name: "a" }, { name: "b" }], devices: [{ robot: "a", name: "bumper" }, { robot: "b", name: "bumper" }],
-  channels: [channel("ruedo/tick", "tick_t"), channel("a/pose", "pose_t", "a", "pose"), channel("b/pose", "pose_t", "b", "pose"), channel("b/bumper", "contact_t", "b", "bumper"),
-    channel("a/odd", "pose_t", "a", "odd", 7n), channel("renamed", "odometry_t", "b", "odometry")],
+  robots: [{ name: "a" }, { name: "b" }],
+  devices: [
+    { robot: "a", name: "bumper" },
+    { robot: "b", name: "bumper" },
+  ],
+  channels: [
+    channel("ruedo/tick", "tick_t"),
+    channel("a/pose", "pose_t", "a", "pose"),
+    channel("b/pose", "pose_t", "b", "pose"),
+    channel("b/bumper", "contact_t", "b", "bumper"),
+    channel("a/odd", "pose_t", "a", "odd", 7n),
+    channel("renamed", "odometry_t", "b", "odometry"),
+  ],
 } as unknown as World;
 
-const kPose = encode("pose_t", { utime: 1n, pos: new Float64Array(3), vel: new Float64Array(3), orientation: new Float64Array([1, 0, 0, 0]), rotation_rate: new Float64Array(3), accel: new Float64Array(3) });
+const kPose = encode("pose_t", {
+  utime: 1n,
+  pos: new Float64Array(3),
+  vel: new Float64Array(3),
+  orientation: new Float64Array([1, 0, 0, 0]),
+  rotation_rate: new Float64Array(3),
+  accel: new Float64Array(3),
+});
 
 function made(complete = true) {
   const called: string[] = [];
-  const note = (name: string) => new Proxy({}, { get: (_, method) => (...given: unknown[]) => void called.push(`${name}.${String(method)}${typeof given[0] === "number" ? ` ${String(given[0])}` : ""}`) });
+  const note = (name: string) =>
+    new Proxy(
+      {},
+      {
+        get:
+          (_, method) =>
+          (...given: unknown[]) =>
+            void called.push(
+              `${name}.${String(method)}${typeof given[0] === "number" ? ` ${String(given[0])}` : ""}`,
+            ),
+      },
+    );
   const views = {
-    loading: new Proxy({}, { get: (_, key) => (key === "complete" ? complete : () => called.push(`loading.${String(key)}`)) }),
-    session: note("session"), poses: note("poses"), clock: note("clock"), stage: { wheelAngles: new Map() }, pages: note("pages"), channels: note("channels"),
-    overlays: { of: new Map([["a", note("overlay a")], ["b", note("overlay b")]]) },
+    loading: new Proxy(
+      {},
+      {
+        get: (_, key) =>
+          key === "complete" ? complete : () => called.push(`loading.${String(key)}`),
+      },
+    ),
+    session: note("session"),
+    poses: note("poses"),
+    clock: note("clock"),
+    stage: { wheelAngles: new Map() },
+    pages: note("pages"),
+    channels: note("channels"),
+    overlays: {
+      of: new Map([
+        ["a", note("overlay a")],
+        ["b", note("overlay b")],
+      ]),
+    },
   } as unknown as Views;
   const page = new Store({ world: kWorld, robot: 1 } as PageState);
   return { router: new Router(page, views), called, views, page };
@@ -31,7 +81,13 @@ function made(complete = true) {
 
 describe("routes", () => {
   it("are of types that both sides know alike", () => {
-    expect([...routesOf(kWorld).keys()]).toEqual(["ruedo/tick", "a/pose", "b/pose", "b/bumper", "renamed"]);
+    expect([...routesOf(kWorld).keys()]).toEqual([
+      "ruedo/tick",
+      "a/pose",
+      "b/pose",
+      "b/bumper",
+      "renamed",
+    ]);
   });
 });
 
@@ -40,13 +96,33 @@ describe("a message", () => {
     const { router, called } = made();
     router.onMessage("a/pose", kPose);
     router.onMessage("b/pose", kPose);
-    expect(called).toEqual(["channels.message", "overlay a.pose", "channels.message", "overlay b.pose", "pages.pose"]);
+    expect(called).toEqual([
+      "channels.message",
+      "overlay a.pose",
+      "channels.message",
+      "overlay b.pose",
+      "pages.pose",
+    ]);
   });
 
   it("goes by its channel's robot, whatever the channel's name", () => {
     const { router, called, views } = made();
     const none = new Float64Array();
-    router.onMessage("renamed", encode("odometry_t", { utime: 1n, x: 0, y: 0, theta: 0, v: 0, omega: 0, n: 0, angle: none, rate: none, ticks: [] } as never));
+    router.onMessage(
+      "renamed",
+      encode("odometry_t", {
+        utime: 1n,
+        x: 0,
+        y: 0,
+        theta: 0,
+        v: 0,
+        omega: 0,
+        n: 0,
+        angle: none,
+        rate: none,
+        ticks: [],
+      } as never),
+    );
     expect(called).toContain("overlay b.odometer");
     expect(views.stage.wheelAngles.has(1)).toBe(true);
   });
@@ -57,11 +133,15 @@ describe("a message", () => {
     router.onMessage("ruedo/tick", encodeEmpty("tick_t"));
     router.onMessage("ruedo/info", encodeEmpty("world_info_t"));
     router.onMessage("ruedo/reply", encodeEmpty("reply_t"));
-    expect(called.filter((call) => !call.startsWith("channels"))).toEqual(["loading.onInfo", "session.onReply"]);
+    expect(called.filter((call) => !call.startsWith("channels"))).toEqual([
+      "loading.onInfo",
+      "session.onReply",
+    ]);
   });
 
   it("that is cut or of no known type harms nothing", () => {
-    const { router, called } = made(), warn = vi.spyOn(console, "warn").mockImplementation(() => undefined);
+    const { router, called } = made(),
+      warn = vi.spyOn(console, "warn").mockImplementation(() => undefined);
     router.onMessage("b/pose", kPose.subarray(0, 40));
     router.onMessage("b/pose", new Uint8Array());
     router.onMessage("stranger", new Uint8Array([1, 2, 3]));
@@ -75,7 +155,16 @@ describe("a message", () => {
 function encodeEmpty(name: TypeName): Uint8Array {
   const value: Record<string, unknown> = {};
   for (const field of kTypes[name]!) {
-    value[field.name] = field.sizes.length > 0 ? [] : field.type === "string" ? "" : field.type === "int64_t" ? 0n : field.type === "boolean" ? false : 0;
+    value[field.name] =
+      field.sizes.length > 0
+        ? []
+        : field.type === "string"
+          ? ""
+          : field.type === "int64_t"
+            ? 0n
+            : field.type === "boolean"
+              ? false
+              : 0;
   }
   return encode(name, value as never);
 }

@@ -6,24 +6,61 @@ import { Store } from "../src/state/store";
 import { wantedChannels } from "../src/state/wanted";
 import type { World } from "../src/state/world";
 
-const kTypes = ["pose_t", "odometry_t", "planar_lidar_t", "sonar_t", "image_t", "contact_t", "motion_status_t", "imu_t"];
+const kTypes = [
+  "pose_t",
+  "odometry_t",
+  "planar_lidar_t",
+  "sonar_t",
+  "image_t",
+  "contact_t",
+  "motion_status_t",
+  "imu_t",
+];
 
 function worldOf(robots: string[]): World {
-  const own = [["ruedo/tick", "tick_t"], ["ruedo/world", "world_state_t"], ["ruedo/reply", "reply_t"], ["ruedo/info", "world_info_t"]].map(([name, type]) => ({ name, type, robot: "", input: false }));
-  const theirs = robots.flatMap((robot) => [...kTypes.map((type) => ({ name: `${robot}/${type}`, type, robot, input: false })), { name: `${robot}/velocity`, type: "velocity_command_t", robot, input: true }]);
-  return { robots: robots.map((name) => ({ name })), channels: [...own, ...theirs] } as unknown as World;
+  const own = [
+    ["ruedo/tick", "tick_t"],
+    ["ruedo/world", "world_state_t"],
+    ["ruedo/reply", "reply_t"],
+    ["ruedo/info", "world_info_t"],
+  ].map(([name, type]) => ({ name, type, robot: "", input: false }));
+  const theirs = robots.flatMap((robot) => [
+    ...kTypes.map((type) => ({ name: `${robot}/${type}`, type, robot, input: false })),
+    { name: `${robot}/velocity`, type: "velocity_command_t", robot, input: true },
+  ]);
+  return {
+    robots: robots.map((name) => ({ name })),
+    channels: [...own, ...theirs],
+  } as unknown as World;
 }
 
 function state(more: Partial<PageState> = {}): PageState {
   return {
-    link: "open", hello: { mode: "live", title: "", version: "", info: "ruedo/info", fault: "" }, controlled: true, world: worldOf(["a"]), scene: null, robot: 0, paused: false,
-    time_s: 0, factor: null, playback: null, layers: new Set(), mode: "orbit", reduced: false, theme: "dark", tab: "World", panel: true, ...more,
+    link: "open",
+    hello: { mode: "live", title: "", version: "", info: "ruedo/info", fault: "" },
+    controlled: true,
+    world: worldOf(["a"]),
+    scene: null,
+    robot: 0,
+    paused: false,
+    time_s: 0,
+    factor: null,
+    playback: null,
+    layers: new Set(),
+    mode: "orbit",
+    reduced: false,
+    theme: "dark",
+    tab: "World",
+    panel: true,
+    ...more,
   };
 }
 
 describe("the store", () => {
   it("tells who watches what has changed, and nobody else", () => {
-    const store = new Store({ a: 1, b: "x" }), a: number[] = [], both: string[] = [];
+    const store = new Store({ a: 1, b: "x" }),
+      a: number[] = [],
+      both: string[] = [];
     store.watch(["a"], (now) => a.push(now.a));
     store.watch(["a", "b"], (now) => both.push(`${now.a}${now.b}`));
     store.set({ b: "y" });
@@ -36,34 +73,47 @@ describe("the store", () => {
 
 describe("the clock", () => {
   it("has the decimals of a step, two at least", () => {
-    expect([[1.5, 10_000], [1.5, 5000], [1.5, 100_000], [0.0625, 500], [2, 33_333], [1, 0]].map(([t, step]) => clockText(t!, step!))).toEqual(
-      ["1.50 s", "1.500 s", "1.50 s", "0.0625 s", "2.000000 s", "1.00 s"]);
+    expect(
+      [
+        [1.5, 10_000],
+        [1.5, 5000],
+        [1.5, 100_000],
+        [0.0625, 500],
+        [2, 33_333],
+        [1, 0],
+      ].map(([t, step]) => clockText(t!, step!)),
+    ).toEqual(["1.50 s", "1.500 s", "1.50 s", "0.0625 s", "2.000000 s", "1.00 s"]);
   });
 
   let forgotten = 0;
-  const clockOf = (page: Store<PageState>) => new Clock(page, () => { ++forgotten; });
+  const clockOf = (page: Store<PageState>) =>
+    new Clock(page, () => {
+      ++forgotten;
+    });
   beforeEach(() => {
     forgotten = 0;
     vi.useFakeTimers({ now: 5_000_000, toFake: ["performance", "Date"] });
   });
 
   it("goes back for a state of another epoch or another past, and for nothing else", () => {
-    const page = new Store(state()), clock = clockOf(page);
+    const page = new Store(state()),
+      clock = clockOf(page);
     clock.tell(3, 0, true);
-    clock.tell(2.9, 0);           // came late
+    clock.tell(2.9, 0); // came late
     expect(page.now.time_s).toBe(3);
-    clock.tell(0, 1);             // no state: of which epoch this is, is not known yet
+    clock.tell(0, 1); // no state: of which epoch this is, is not known yet
     expect(page.now.time_s).toBe(3);
-    clock.tell(2.6, 0, true);     // a state that came late
+    clock.tell(2.6, 0, true); // a state that came late
     expect([page.now.time_s, forgotten]).toEqual([3, 1]);
-    clock.tell(2, 0, true);       // a reset of the time
+    clock.tell(2, 0, true); // a reset of the time
     expect([page.now.time_s, forgotten]).toEqual([2, 2]);
     clock.tell(0, 1, true);
     expect([page.now.time_s, clock.epoch, forgotten]).toEqual([0, 1, 3]);
   });
 
   it("measures sim time per real time over a second", () => {
-    const page = new Store(state()), clock = clockOf(page);
+    const page = new Store(state()),
+      clock = clockOf(page);
     clock.tell(0, 0, true);
     vi.advanceTimersByTime(500);
     clock.tell(2, 0);
@@ -80,25 +130,36 @@ describe("wanted channels", () => {
 
   it("are none before the greeting, then what runs, and messages of the run when all is there", () => {
     expect([...wantedChannels(state({ hello: null }), false, [])]).toEqual([]);
-    expect([...wantedChannels(state({ world: null }), false, [])]).toEqual(["ruedo/info", "ruedo/reply"]);
+    expect([...wantedChannels(state({ world: null }), false, [])]).toEqual([
+      "ruedo/info",
+      "ruedo/reply",
+    ]);
     expect([...wantedChannels(state(), false, [])].sort()).toEqual(["ruedo/info", "ruedo/reply"]);
     expect([...wantedChannels(state(), true, [])].sort()).toEqual([...own, "a/odometry_t"].sort());
   });
 
   it("are those of the layers and of the open page", () => {
-    const wanted = (more: Partial<PageState>) => [...wantedChannels(state(more), true, [])].filter((name) => name.startsWith("a/")).sort();
+    const wanted = (more: Partial<PageState>) =>
+      [...wantedChannels(state(more), true, [])].filter((name) => name.startsWith("a/")).sort();
     expect(wanted({ layers: new Set(["rays"]) })).toEqual(of("a", "odometry_t", "planar_lidar_t"));
-    expect(wanted({ layers: new Set(["sonar", "trail", "contacts", "frames"]) })).toEqual(of("a", "contact_t", "odometry_t", "pose_t", "sonar_t"));
+    expect(wanted({ layers: new Set(["sonar", "trail", "contacts", "frames"]) })).toEqual(
+      of("a", "contact_t", "odometry_t", "pose_t", "sonar_t"),
+    );
     expect(wanted({ tab: "Plots" })).toEqual(of("a", "odometry_t", "pose_t"));
     expect(wanted({ tab: "Robot" })).toEqual(of("a", ...[...kTypes].sort()));
     expect(wanted({ tab: "Robot", panel: false })).toEqual(of("a", "odometry_t"));
   });
 
   it("are of all robots while these are few, else of the chosen one", () => {
-    const few = state({ world: worldOf(["a", "b", "c", "d"]), robot: 1 }), many = state({ world: worldOf(["a", "b", "c", "d", "e"]), robot: 1 });
+    const few = state({ world: worldOf(["a", "b", "c", "d"]), robot: 1 }),
+      many = state({ world: worldOf(["a", "b", "c", "d", "e"]), robot: 1 });
     expect([shownRobots(few), shownRobots(many)]).toEqual([["a", "b", "c", "d"], ["b"]]);
-    expect([...wantedChannels(few, true, [])].filter((name) => name.endsWith("odometry_t"))).toHaveLength(4);
-    expect([...wantedChannels(many, true, [])].filter((name) => name.endsWith("odometry_t"))).toEqual(["b/odometry_t"]);
+    expect(
+      [...wantedChannels(few, true, [])].filter((name) => name.endsWith("odometry_t")),
+    ).toHaveLength(4);
+    expect(
+      [...wantedChannels(many, true, [])].filter((name) => name.endsWith("odometry_t")),
+    ).toEqual(["b/odometry_t"]);
   });
 
   it("are those whose values are opened, too", () => {
@@ -107,12 +168,16 @@ describe("wanted channels", () => {
 });
 
 it("what is said of the run", () => {
-  const log = { mode: "log", title: "", version: "", info: "", fault: "" } as const, playback = { begin: 0, end: 1, now: 0, speed: 1, playing: true, jumps: 0 };
+  const log = { mode: "log", title: "", version: "", info: "", fault: "" } as const,
+    playback = { begin: 0, end: 1, now: 0, speed: 1, playing: true, jumps: 0 };
   expect(stateWords(state({ link: "lost" }))).toEqual(["no connection", false]);
   expect(stateWords(state({ link: "ended" }))).toEqual(["ended", false]);
   expect(stateWords(state({ world: null }))).toEqual(["connected", true]);
   expect(stateWords(state())).toEqual(["running", true]);
   expect(stateWords(state({ paused: true }))).toEqual(["paused", false]);
   expect(stateWords(state({ hello: log, playback }))).toEqual(["log", null]);
-  expect(stateWords(state({ hello: log, playback: { ...playback, playing: false } }))).toEqual(["log, paused", null]);
+  expect(stateWords(state({ hello: log, playback: { ...playback, playing: false } }))).toEqual([
+    "log, paused",
+    null,
+  ]);
 });

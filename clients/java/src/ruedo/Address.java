@@ -11,7 +11,10 @@ import java.nio.charset.StandardCharsets;
 import java.nio.file.Files;
 import java.nio.file.Path;
 
-/** An LCM URL: udpm://GROUP:PORT?ttl=0 or tcpq://HOST:PORT; or unix:///PATH, a local socket, which is none of LCM's. */
+/**
+ * An LCM URL: udpm://GROUP:PORT?ttl=0 or tcpq://HOST:PORT; or unix:///PATH, a local socket, which
+ * is none of LCM's.
+ */
 final class Address {
     static final String DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0";
 
@@ -22,7 +25,7 @@ final class Address {
     final boolean multicast;
     final String host;
     final int port;
-    final String path;    // of a local socket; else null
+    final String path; // of a local socket; else null
     private final String options;
 
     /** Throws NoServer for what is no such URL. */
@@ -44,7 +47,8 @@ final class Address {
         }
         path = null;
         boolean bare = uri.getAuthority() == null || uri.getAuthority().isEmpty();
-        if ((!multicast && !"tcpq".equals(uri.getScheme())) || (!bare && uri.getHost() == null)) throw notOne();
+        if ((!multicast && !"tcpq".equals(uri.getScheme())) || (!bare && uri.getHost() == null))
+            throw notOne();
         host = bare ? multicast ? "239.255.76.67" : "127.0.0.1" : uri.getHost();
         port = uri.getPort() < 0 ? multicast ? 7667 : 7700 : uri.getPort();
         if (port > 65535) throw notOne();
@@ -52,7 +56,10 @@ final class Address {
     }
 
     private RuedoException.NoServer notOne() {
-        return new RuedoException.NoServer(url + ": not an LCM URL; udpm://GROUP:PORT?ttl=0, tcpq://HOST:PORT or unix:///PATH is");
+        return new RuedoException.NoServer(
+                url
+                        + ": not an LCM URL; udpm://GROUP:PORT?ttl=0, tcpq://HOST:PORT or"
+                        + " unix:///PATH is");
     }
 
     /** The number that the URL gives as an option. */
@@ -88,7 +95,8 @@ final class Address {
     boolean isClaimed() {
         if (path != null) return isServed();
         String claim = " @ruedo/" + (multicast ? "udpm" : "tcpq") + "/" + host + ":" + port;
-        try (java.util.stream.Stream<String> sockets = Files.lines(Path.of("/proc/net/unix"), StandardCharsets.ISO_8859_1)) {
+        try (java.util.stream.Stream<String> sockets =
+                Files.lines(Path.of("/proc/net/unix"), StandardCharsets.ISO_8859_1)) {
             return sockets.anyMatch(line -> line.endsWith(claim));
         } catch (IOException | java.io.UncheckedIOException error) {
             return false;
@@ -99,14 +107,21 @@ final class Address {
     void checkReachable() {
         if (multicast) {
             if (hasMulticastRoute(host)) return;
-            throw new RuedoException.NoServer(url + ": this machine has no route for multicast. On Linux: "
-                    + "sudo ip route add 224.0.0.0/4 dev lo; `ruedo doctor` tells more");
+            throw new RuedoException.NoServer(
+                    url
+                            + ": this machine has no route for multicast. On Linux: "
+                            + "sudo ip route add 224.0.0.0/4 dev lo; `ruedo doctor` tells more");
         }
         try {
             probe();
         } catch (IOException error) {
-            throw new RuedoException.NoServer("no Ruedo server at " + url + " (" + error.getMessage() + "). Is `ruedo run` "
-                    + "started with this --lcm? `ruedo doctor` looks for what is wrong");
+            throw new RuedoException.NoServer(
+                    "no Ruedo server at "
+                            + url
+                            + " ("
+                            + error.getMessage()
+                            + "). Is `ruedo run` "
+                            + "started with this --lcm? `ruedo doctor` looks for what is wrong");
         }
     }
 

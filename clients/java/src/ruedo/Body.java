@@ -4,8 +4,10 @@ package ruedo;
 public final class Body {
     /** MODEL/LINK: what {@link Simulation#state(String)} takes. */
     public final String name;
+
     /** True when it never moves. */
     public final boolean isStatic;
+
     /** kg; 0 of what never moves. */
     public final double mass;
 

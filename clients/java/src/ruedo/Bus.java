@@ -1,18 +1,23 @@
 package ruedo;
 
+import lcm.lcm.LCMDataOutputStream;
+import lcm.lcm.LCMEncodable;
+
 import java.io.IOException;
 import java.util.ArrayList;
 import java.util.List;
 import java.util.Map;
 import java.util.concurrent.ConcurrentHashMap;
 import java.util.function.Consumer;
-import lcm.lcm.LCMDataOutputStream;
-import lcm.lcm.LCMEncodable;
 
-/** The messages of a client: raw bytes to handlers. Thread safe; the transport's thread calls the handlers. */
+/**
+ * The messages of a client: raw bytes to handlers. Thread safe; the transport's thread calls the
+ * handlers.
+ */
 final class Bus implements Transport.Receiver {
     private final Transport transport;
-    private final Map<String, List<Subscription>> handlers = new ConcurrentHashMap<>();    // lists are never changed
+    private final Map<String, List<Subscription>> handlers =
+            new ConcurrentHashMap<>(); // lists are never changed
     private volatile boolean closed;
 
     Bus(Transport transport) {

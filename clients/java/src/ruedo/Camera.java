@@ -3,7 +3,10 @@ package ruedo;
 import ruedo.lcmtypes.channel_info_t;
 import ruedo.lcmtypes.device_info_t;
 
-/** A camera; its further channels, where the world file asks for them. They throw UnknownName where it does not. */
+/**
+ * A camera; its further channels, where the world file asks for them. They throw UnknownName where
+ * it does not.
+ */
 public final class Camera extends Device<Image> {
     Camera(Simulation sim, device_info_t info, channel_info_t channel) {
         super(sim, info, channel);

@@ -1,11 +1,16 @@
 package ruedo;
 
-/** A command for {@link Simulation#step(long, java.util.List)}, as {@link Robot#velocityCommand} and its like make it. */
+/**
+ * A command for {@link Simulation#step(long, java.util.List)}, as {@link Robot#velocityCommand} and
+ * its like make it.
+ */
 public final class Command {
     /** One of the command channels of ruedo/info. */
     public final String channel;
+
     /** Steps from where the call begins to the state that it acts on. */
     public final long after;
+
     final byte[] data;
 
     /** data: the encoded message. */

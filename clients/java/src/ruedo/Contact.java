@@ -6,6 +6,7 @@ import java.util.List;
 public final class Contact extends Sample {
     /** True when anything is touched. */
     public final boolean pressed;
+
     /** Where. */
     public final List<Point> points;
 
@@ -19,12 +20,16 @@ public final class Contact extends Sample {
     public static final class Point {
         /** The other body. */
         public final String body;
+
         /** m, world. */
         public final double[] position;
+
         /** Unit vector, world, towards the sensor's body. */
         public final double[] normal;
+
         /** N. */
         public final double force;
+
         /** m. */
         public final double depth;
 

@@ -1,9 +1,5 @@
 package ruedo;
 
-import java.io.IOException;
-import java.util.ArrayList;
-import java.util.List;
-import java.util.Map;
 import ruedo.lcmtypes.camera_info_t;
 import ruedo.lcmtypes.contact_t;
 import ruedo.lcmtypes.image_t;
@@ -16,7 +12,15 @@ import ruedo.lcmtypes.planar_lidar_t;
 import ruedo.lcmtypes.pose_t;
 import ruedo.lcmtypes.sonar_t;
 
-/** How each message type becomes a sample. Arguments are evaluated from left to right, which is the order on the wire. */
+import java.io.IOException;
+import java.util.ArrayList;
+import java.util.List;
+import java.util.Map;
+
+/**
+ * How each message type becomes a sample. Arguments are evaluated from left to right, which is the
+ * order on the wire.
+ */
 final class Conversions {
     /** A message type: its fingerprint, and how its bytes become a sample. */
     static final class Conversion {
@@ -33,23 +37,48 @@ final class Conversions {
         Sample decode(WireReader in) throws IOException;
     }
 
-    private static final Map<String, Conversion> ALL = Map.ofEntries(
-            Map.entry("planar_lidar_t", new Conversion(planar_lidar_t.LCM_FINGERPRINT, Conversions::scan)),
-            Map.entry("lidar_t", new Conversion(lidar_t.LCM_FINGERPRINT, Conversions::lidar)),
-            Map.entry("sonar_t", new Conversion(sonar_t.LCM_FINGERPRINT, Conversions::sonar)),
-            Map.entry("odometry_t", new Conversion(odometry_t.LCM_FINGERPRINT, Conversions::odometry)),
-            Map.entry("pose_t", new Conversion(pose_t.LCM_FINGERPRINT, Conversions::pose)),
-            Map.entry("image_t", new Conversion(image_t.LCM_FINGERPRINT, Conversions::image)),
-            Map.entry("camera_info_t", new Conversion(camera_info_t.LCM_FINGERPRINT, Conversions::cameraInfo)),
-            Map.entry("imu_t", new Conversion(imu_t.LCM_FINGERPRINT, Conversions::imu)),
-            Map.entry("contact_t", new Conversion(contact_t.LCM_FINGERPRINT, Conversions::contact)),
-            Map.entry("joint_state_t", new Conversion(joint_state_t.LCM_FINGERPRINT, Conversions::joints)),
-            Map.entry("motion_status_t", new Conversion(motion_status_t.LCM_FINGERPRINT, Conversions::motion)));
+    private static final Map<String, Conversion> ALL =
+            Map.ofEntries(
+                    Map.entry(
+                            "planar_lidar_t",
+                            new Conversion(planar_lidar_t.LCM_FINGERPRINT, Conversions::scan)),
+                    Map.entry(
+                            "lidar_t", new Conversion(lidar_t.LCM_FINGERPRINT, Conversions::lidar)),
+                    Map.entry(
+                            "sonar_t", new Conversion(sonar_t.LCM_FINGERPRINT, Conversions::sonar)),
+                    Map.entry(
+                            "odometry_t",
+                            new Conversion(odometry_t.LCM_FINGERPRINT, Conversions::odometry)),
+                    Map.entry("pose_t", new Conversion(pose_t.LCM_FINGERPRINT, Conversions::pose)),
+                    Map.entry(
+                            "image_t", new Conversion(image_t.LCM_FINGERPRINT, Conversions::image)),
+                    Map.entry(
+                            "camera_info_t",
+                            new Conversion(camera_info_t.LCM_FINGERPRINT, Conversions::cameraInfo)),
+                    Map.entry("imu_t", new Conversion(imu_t.LCM_FINGERPRINT, Conversions::imu)),
+                    Map.entry(
+                            "contact_t",
+                            new Conversion(contact_t.LCM_FINGERPRINT, Conversions::contact)),
+                    Map.entry(
+                            "joint_state_t",
+                            new Conversion(joint_state_t.LCM_FINGERPRINT, Conversions::joints)),
+                    Map.entry(
+                            "motion_status_t",
+                            new Conversion(motion_status_t.LCM_FINGERPRINT, Conversions::motion)));
 
     private static final String[] KINDS = {"none", "advance", "rotate", "heading", "arc", "stop"};
     private static final String[] STATES = {"idle", "running", "done", "ended", "refused"};
-    private static final String[] REASONS =
-            {"", "replaced", "blocked", "watchdog", "not finite", "bad kind", "bad value", "no drive", "not possible"};
+    private static final String[] REASONS = {
+        "",
+        "replaced",
+        "blocked",
+        "watchdog",
+        "not finite",
+        "bad kind",
+        "bad value",
+        "no drive",
+        "not possible"
+    };
 
     private Conversions() {}
 
@@ -59,14 +88,30 @@ final class Conversions {
     }
 
     private static Sample scan(WireReader in) throws IOException {
-        return new Scan(in.int64(), in.floats(in.count(4)), in.floats(in.count(4)), in.float32(), in.float32());
+        return new Scan(
+                in.int64(),
+                in.floats(in.count(4)),
+                in.floats(in.count(4)),
+                in.float32(),
+                in.float32());
     }
 
     private static Sample lidar(WireReader in) throws IOException {
-        LidarScan scan = new LidarScan(in.int64(), in.int32(), in.int32(), in.floats(in.count(4)), in.floats(in.count(4)),
-                in.float32(), in.float32(), in.float32(), in.float32());
-        boolean fits = (long) scan.layers * scan.columns == scan.ranges.length
-                && (scan.intensities.length == 0 || scan.intensities.length == scan.ranges.length);
+        LidarScan scan =
+                new LidarScan(
+                        in.int64(),
+                        in.int32(),
+                        in.int32(),
+                        in.floats(in.count(4)),
+                        in.floats(in.count(4)),
+                        in.float32(),
+                        in.float32(),
+                        in.float32(),
+                        in.float32());
+        boolean fits =
+                (long) scan.layers * scan.columns == scan.ranges.length
+                        && (scan.intensities.length == 0
+                                || scan.intensities.length == scan.ranges.length);
         if (!fits) throw new IOException("sizes that do not fit each other");
         return scan;
     }
@@ -81,7 +126,17 @@ final class Conversions {
         long utime = in.int64();
         double[] pose = in.doubles(5);
         int n = in.count(8 + 8 + 8);
-        return new Odometry(utime, pose[0], pose[1], pose[2], pose[3], pose[4], in.doubles(n), in.doubles(n), in.int64s(n), in.int32());
+        return new Odometry(
+                utime,
+                pose[0],
+                pose[1],
+                pose[2],
+                pose[3],
+                pose[4],
+                in.doubles(n),
+                in.doubles(n),
+                in.int64s(n),
+                in.int32());
     }
 
     private static Sample pose(WireReader in) throws IOException {
@@ -97,23 +152,43 @@ final class Conversions {
         int height = in.int32();
         int stride = in.int32();
         String format = pixelFormat(in.int32());
-        return new Image(utime, width, height, format, stride, in.bytes(in.count(1)));    // the metadata behind is not used
+        return new Image(
+                utime,
+                width,
+                height,
+                format,
+                stride,
+                in.bytes(in.count(1))); // the metadata behind is not used
     }
 
     private static String pixelFormat(int format) {
         switch (format) {
-            case image_t.PIXEL_FORMAT_GRAY: return "gray";
-            case image_t.PIXEL_FORMAT_RGB: return "rgb";
-            case image_t.PIXEL_FORMAT_BGR: return "bgr";
-            case image_t.PIXEL_FORMAT_MJPEG: return "jpeg";
-            case image_t.PIXEL_FORMAT_LE_GRAY16: return "gray16";
-            case image_t.PIXEL_FORMAT_FLOAT_GRAY32: return "float32";
-            default: return String.format("0x%08x", format);
+            case image_t.PIXEL_FORMAT_GRAY:
+                return "gray";
+            case image_t.PIXEL_FORMAT_RGB:
+                return "rgb";
+            case image_t.PIXEL_FORMAT_BGR:
+                return "bgr";
+            case image_t.PIXEL_FORMAT_MJPEG:
+                return "jpeg";
+            case image_t.PIXEL_FORMAT_LE_GRAY16:
+                return "gray16";
+            case image_t.PIXEL_FORMAT_FLOAT_GRAY32:
+                return "float32";
+            default:
+                return String.format("0x%08x", format);
         }
     }
 
     private static Sample cameraInfo(WireReader in) throws IOException {
-        return new CameraInfo(in.int64(), in.int32(), in.int32(), in.float64(), in.float64(), in.float64(), in.float64(),
+        return new CameraInfo(
+                in.int64(),
+                in.int32(),
+                in.int32(),
+                in.float64(),
+                in.float64(),
+                in.float64(),
+                in.float64(),
                 in.doubles(5));
     }
 
@@ -126,7 +201,9 @@ final class Conversions {
         boolean pressed = in.bool();
         List<Contact.Point> points = new ArrayList<>();
         for (int n = in.count(5 + 8 * 8); n > 0; n--) {
-            points.add(new Contact.Point(in.string(), in.doubles(3), in.doubles(3), in.float64(), in.float64()));
+            points.add(
+                    new Contact.Point(
+                            in.string(), in.doubles(3), in.doubles(3), in.float64(), in.float64()));
         }
         return new Contact(utime, pressed, List.copyOf(points));
     }
@@ -134,17 +211,28 @@ final class Conversions {
     private static Sample joints(WireReader in) throws IOException {
         long utime = in.int64();
         int n = in.fits(in.int16(), 5 + 3 * 4);
-        return new Joints(utime, List.copyOf(in.strings(n)), in.floats(n), in.floats(n), in.floats(n));
+        return new Joints(
+                utime, List.copyOf(in.strings(n)), in.floats(n), in.floats(n), in.floats(n));
     }
 
     private static Sample motion(WireReader in) throws IOException {
         long utime = in.int64();
         long id = in.int64();
         byte kind = in.int8();
-        String kindName = kind == motion_status_t.KIND_VELOCITY ? "velocity"
-                : kind == motion_status_t.KIND_WHEELS ? "wheels" : word(KINDS, kind);
-        return new MotionStatus(utime, id, kindName, word(STATES, in.int8()), word(REASONS, in.int8()), in.float64(),
-                in.float64(), in.float64(), in.float64());
+        String kindName =
+                kind == motion_status_t.KIND_VELOCITY
+                        ? "velocity"
+                        : kind == motion_status_t.KIND_WHEELS ? "wheels" : word(KINDS, kind);
+        return new MotionStatus(
+                utime,
+                id,
+                kindName,
+                word(STATES, in.int8()),
+                word(REASONS, in.int8()),
+                in.float64(),
+                in.float64(),
+                in.float64(),
+                in.float64());
     }
 
     private static String word(String[] words, int index) {

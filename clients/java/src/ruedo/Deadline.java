@@ -18,7 +18,10 @@ final class Deadline {
         return seconds - (System.nanoTime() - start) * 1e-9;
     }
 
-    /** Waits for a notification, at most until here, at most so many milliseconds. The monitor must be held. */
+    /**
+     * Waits for a notification, at most until here, at most so many milliseconds. The monitor must
+     * be held.
+     */
     void waitOn(Object monitor, long atMostMillis) {
         long millis = Math.max(1L, Math.min(atMostMillis, (long) Math.ceil(left() * 1e3)));
         try {
@@ -31,6 +34,8 @@ final class Deadline {
 
     /** Seconds as a user wrote them: 5, not 5.0. */
     static String text(double seconds) {
-        return seconds == Math.rint(seconds) && Math.abs(seconds) < 1e9 ? Long.toString((long) seconds) : Double.toString(seconds);
+        return seconds == Math.rint(seconds) && Math.abs(seconds) < 1e9
+                ? Long.toString((long) seconds)
+                : Double.toString(seconds);
     }
 }

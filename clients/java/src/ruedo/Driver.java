@@ -1,11 +1,15 @@
 package ruedo;
 
-import java.util.ArrayList;
-import java.util.List;
 import ruedo.lcmtypes.move_command_t;
 import ruedo.lcmtypes.robot_info_t;
 
-/** The commands to one robot: what is repeated, and the primitives under way. The simulation has one for each name. */
+import java.util.ArrayList;
+import java.util.List;
+
+/**
+ * The commands to one robot: what is repeated, and the primitives under way. The simulation has one
+ * for each name.
+ */
 final class Driver {
     private final Simulation sim;
     private final String robot;
@@ -13,7 +17,7 @@ final class Driver {
     private byte[] held;
     private List<Motion> motions = new ArrayList<>();
     private Subscription statuses;
-    private boolean running;          // a status has shown the held command
+    private boolean running; // a status has shown the held command
     private boolean watchdogTold;
     private String ended = "";
 
@@ -42,7 +46,9 @@ final class Driver {
     /** ms of real time between repetitions: a quarter of the watchdog's time, at most 100. */
     long periodMillis() {
         double watchdog = watchdog();
-        return watchdog > 0.0 ? Math.round(Math.min(100.0, Math.max(10.0, watchdog * 250.0))) : 100L;
+        return watchdog > 0.0
+                ? Math.round(Math.min(100.0, Math.max(10.0, watchdog * 250.0)))
+                : 100L;
     }
 
     /** s; 0: none, or the robot was removed meanwhile. */
@@ -55,7 +61,7 @@ final class Driver {
         listen();
         Motion motion = new Motion(sim, robot, command.id, kind, Math.abs(command.value));
         synchronized (this) {
-            held = null;    // a repetition after this would replace the primitive
+            held = null; // a repetition after this would replace the primitive
             List<Motion> underWay = new ArrayList<>();
             for (Motion other : motions) {
                 if (!other.done()) underWay.add(other);
@@ -90,7 +96,9 @@ final class Driver {
     }
 
     private synchronized void listen() {
-        if (!ended.isEmpty()) throw new RuedoException.UnknownName(robot + " is gone: " + ended);    // while the command was made
+        if (!ended.isEmpty())
+            throw new RuedoException.UnknownName(
+                    robot + " is gone: " + ended); // while the command was made
         if (statuses == null) statuses = sim.robot(robot).motion().onSample(this::onStatus);
     }
 
@@ -104,8 +112,12 @@ final class Driver {
             watchdogTold = watchdogTold || stopped;
         }
         if (stopped) {
-            System.err.println("ruedo: " + robot + ": stopped by its watchdog: no command came for " + watchdog()
-                    + " s of sim time");
+            System.err.println(
+                    "ruedo: "
+                            + robot
+                            + ": stopped by its watchdog: no command came for "
+                            + watchdog()
+                            + " s of sim time");
         }
         for (Motion motion : underWay) motion.update(status);
     }

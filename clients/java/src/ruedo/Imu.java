@@ -4,8 +4,10 @@ package ruedo;
 public final class Imu extends Sample {
     /** w, x, y, z: device to world. */
     public final double[] orientation;
+
     /** rad/s. */
     public final double[] angularVelocity;
+
     /** m/s^2, specific force: at rest gravity upwards. */
     public final double[] linearAcceleration;
 

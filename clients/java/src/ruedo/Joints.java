@@ -6,10 +6,13 @@ import java.util.List;
 public final class Joints extends Sample {
     /** As in the model. */
     public final List<String> names;
+
     /** rad or m. */
     public final float[] positions;
+
     /** rad/s or m/s. */
     public final float[] velocities;
+
     /** N m or N. */
     public final float[] efforts;
 

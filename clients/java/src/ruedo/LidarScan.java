@@ -4,23 +4,38 @@ package ruedo;
 public final class LidarScan extends Sample {
     /** Layers, lowest first. */
     public final int layers;
+
     /** Rays in a layer. */
     public final int columns;
+
     /** m; +inf: no return, -inf: nearer than the minimum range. */
     public final float[] ranges;
+
     /** 0 to 1; empty when the device has none. */
     public final float[] intensities;
+
     /** rad, left is positive. */
     public final double azimuthMin;
+
     /** rad. */
     public final double azimuthStep;
+
     /** rad, up is positive. */
     public final double elevationMin;
+
     /** rad. */
     public final double elevationStep;
 
-    LidarScan(long utime, int layers, int columns, float[] ranges, float[] intensities, double azimuthMin,
-        double azimuthStep, double elevationMin, double elevationStep) {
+    LidarScan(
+            long utime,
+            int layers,
+            int columns,
+            float[] ranges,
+            float[] intensities,
+            double azimuthMin,
+            double azimuthStep,
+            double elevationMin,
+            double elevationStep) {
         super(utime);
         this.layers = layers;
         this.columns = columns;

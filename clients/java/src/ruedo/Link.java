@@ -9,7 +9,10 @@ import java.net.SocketAddress;
 import java.nio.ByteBuffer;
 import java.nio.channels.SocketChannel;
 
-/** A connection to a server: over TCP, or a Unix-domain socket. One thread reads while another writes. */
+/**
+ * A connection to a server: over TCP, or a Unix-domain socket. One thread reads while another
+ * writes.
+ */
 abstract class Link implements Closeable {
     abstract InputStream input() throws IOException;
 
@@ -64,7 +67,10 @@ abstract class Link implements Closeable {
         Local(String path) throws IOException {
             Object address;
             try {
-                address = Class.forName("java.net.UnixDomainSocketAddress").getMethod("of", String.class).invoke(null, path);
+                address =
+                        Class.forName("java.net.UnixDomainSocketAddress")
+                                .getMethod("of", String.class)
+                                .invoke(null, path);
             } catch (ReflectiveOperationException error) {
                 throw new IOException("unix:// addresses need Java 16 or later", error);
             }
@@ -95,7 +101,7 @@ abstract class Link implements Closeable {
         }
 
         @Override
-        void setTimeout(int millis) {}    // a server on this machine answers
+        void setTimeout(int millis) {} // a server on this machine answers
 
         @Override
         public void close() throws IOException {

@@ -2,12 +2,14 @@ package ruedo;
 
 /** A motion primitive under way. Thread safe. */
 public final class Motion {
-    // A primitive that no status has shown after this many statuses and seconds was lost or replaced at once.
+    // A primitive that no status has shown after this many statuses and seconds was lost or
+    // replaced at once.
     private static final int UNSEEN_STATUSES = 20;
     private static final double UNSEEN_SECONDS = 1.0;
 
     /** As {@link MotionStatus#id} shows it. */
     public final long id;
+
     private final Simulation sim;
     private final String robot;
     private final String kind;
@@ -17,7 +19,8 @@ public final class Motion {
     private double progress;
     private double remaining;
     private int unseen;
-    private long utime = -1;    // of the newest status; before it is another run's, or of a reset that info will tell of
+    // Of the newest status; an earlier one is another run's, or of a reset that info will tell of.
+    private long utime = -1;
 
     Motion(Simulation sim, String robot, long id, String kind, double amount) {
         this.sim = sim;
@@ -37,7 +40,10 @@ public final class Motion {
         return state;
     }
 
-    /** Why it ended early or was refused, as in {@link MotionStatus#reason}; "removed", "new run": its robot, its run is gone. */
+    /**
+     * Why it ended early or was refused, as in {@link MotionStatus#reason}; "removed", "new run":
+     * its robot, its run is gone.
+     */
     public synchronized String reason() {
         return reason;
     }
@@ -67,15 +73,24 @@ public final class Motion {
         Deadline deadline = new Deadline(timeout);
         while (!done()) {
             if (deadline.passed()) {
-                throw new RuedoException.Timeout(String.format("%s: %s was not done within %s s (%.3f remain)", robot, kind,
-                        Deadline.text(timeout), remaining));
+                throw new RuedoException.Timeout(
+                        String.format(
+                                "%s: %s was not done within %s s (%.3f remain)",
+                                robot, kind, Deadline.text(timeout), remaining));
             }
             deadline.waitOn(this, 500);
             sim.checkServer();
         }
         if (!state.equals("done")) {
-            throw new RuedoException.MotionError(String.format("%s: %s %s: %s, %.3f remain", robot, kind,
-                    state.equals("refused") ? "was refused" : "ended", reason, remaining), reason);
+            throw new RuedoException.MotionError(
+                    String.format(
+                            "%s: %s %s: %s, %.3f remain",
+                            robot,
+                            kind,
+                            state.equals("refused") ? "was refused" : "ended",
+                            reason,
+                            remaining),
+                    reason);
         }
         return this;
     }
@@ -101,9 +116,9 @@ public final class Motion {
             state = status.state;
             reason = status.reason;
         } else if (status.state.equals("refused")) {
-            return;    // another command, which changed nothing
+            return; // another command, which changed nothing
         } else if (!state.equals("sent") || (++unseen >= UNSEEN_STATUSES && unseenUntil.passed())) {
-            state = "ended";    // its own end fell between two statuses
+            state = "ended"; // its own end fell between two statuses
             reason = "replaced";
         }
         notifyAll();

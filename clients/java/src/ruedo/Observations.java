@@ -10,8 +10,10 @@ public final class Observations extends State {
     public static final class Message {
         /** Number of the state. */
         public final long step;
+
         /** Its channel. */
         public final String channel;
+
         /** All of its bytes. */
         public final byte[] data;
 
@@ -22,22 +24,45 @@ public final class Observations extends State {
         }
     }
 
-    /** In the order in which the simulation made them; empty when a paused simulation is stepped. */
+    /**
+     * In the order in which the simulation made them; empty when a paused simulation is stepped.
+     */
     public final List<Message> messages;
 
     Observations(State state, List<Message> messages) {
-        super(state.utime, state.step, state.stateHash, state.paused, state.rate, state.name, state.position, state.orientation,
-                state.linear, state.angular);
+        super(
+                state.utime,
+                state.step,
+                state.stateHash,
+                state.paused,
+                state.rate,
+                state.name,
+                state.position,
+                state.orientation,
+                state.linear,
+                state.angular);
         this.messages = messages;
     }
 
     Observations(long utime, long step, long stateHash, List<Message> messages) {
-        super(utime, step, stateHash, false, Double.POSITIVE_INFINITY, "", new double[3], new double[] {1.0, 0.0, 0.0, 0.0},
-                new double[3], new double[3]);
+        super(
+                utime,
+                step,
+                stateHash,
+                false,
+                Double.POSITIVE_INFINITY,
+                "",
+                new double[3],
+                new double[] {1.0, 0.0, 0.0, 0.0},
+                new double[3],
+                new double[3]);
         this.messages = messages;
     }
 
-    /** The samples of a device or stream, decoded, in order; none when none was due. Throws TypeMismatch. */
+    /**
+     * The samples of a device or stream, decoded, in order; none when none was due. Throws
+     * TypeMismatch.
+     */
     public <T extends Sample> List<T> all(Stream<T> stream) {
         List<T> samples = new ArrayList<>();
         for (Message message : messages) {
@@ -49,7 +74,8 @@ public final class Observations extends State {
     /** The last of them, or null. */
     public <T extends Sample> T latest(Stream<T> stream) {
         for (int i = messages.size() - 1; i >= 0; i--) {
-            if (messages.get(i).channel.equals(stream.channel)) return sample(messages.get(i), stream);
+            if (messages.get(i).channel.equals(stream.channel))
+                return sample(messages.get(i), stream);
         }
         return null;
     }
@@ -59,10 +85,20 @@ public final class Observations extends State {
         Conversions.Conversion conversion = Conversions.of(stream.type);
         try {
             WireReader in = new WireReader(message.data);
-            if (conversion != null && in.int64() == conversion.fingerprint) return (T) conversion.decoder.decode(in);
+            if (conversion != null && in.int64() == conversion.fingerprint)
+                return (T) conversion.decoder.decode(in);
         } catch (IOException error) {
-            throw new RuedoException.TypeMismatch(stream.channel + ": a message is no valid " + stream.type + ": " + error.getMessage());
+            throw new RuedoException.TypeMismatch(
+                    stream.channel
+                            + ": a message is no valid "
+                            + stream.type
+                            + ": "
+                            + error.getMessage());
         }
-        throw new RuedoException.TypeMismatch(stream.channel + " carries another type than " + stream.type + ", or another version of it");
+        throw new RuedoException.TypeMismatch(
+                stream.channel
+                        + " carries another type than "
+                        + stream.type
+                        + ", or another version of it");
     }
 }

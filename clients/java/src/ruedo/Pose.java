@@ -4,17 +4,26 @@ package ruedo;
 public final class Pose extends Sample {
     /** x, y, z, m. */
     public final double[] position;
+
     /** w, x, y, z. */
     public final double[] orientation;
+
     /** m/s. */
     public final double[] velocity;
+
     /** rad/s. */
     public final double[] rotationRate;
+
     /** m/s^2, without gravity. */
     public final double[] acceleration;
 
-    Pose(long utime, double[] position, double[] orientation, double[] velocity, double[] rotationRate, double[]
-        acceleration) {
+    Pose(
+            long utime,
+            double[] position,
+            double[] orientation,
+            double[] velocity,
+            double[] rotationRate,
+            double[] acceleration) {
         super(utime);
         this.position = position;
         this.orientation = orientation;

@@ -1,15 +1,17 @@
 package ruedo;
 
 /**
- * Reads a stream at a pace of its own, which other readers of the stream do not change. Thread safe.
+ * Reads a stream at a pace of its own, which other readers of the stream do not change. Thread
+ * safe.
  *
  * @param <T> kind of sample
  */
 public class Reader<T extends Sample> {
-    static final double DEFAULT_TIMEOUT = 5.0;    // s
+    static final double DEFAULT_TIMEOUT = 5.0; // s
 
     private final Stream<T> stream;
-    long seen;    // of the samples received, the newest that a call has returned; under the stream's monitor
+    // Of the samples received, the newest that a call has returned; under the stream's monitor.
+    long seen;
 
     /** stream: null for a stream, which is a reader of itself. */
     @SuppressWarnings("unchecked")
@@ -33,8 +35,9 @@ public class Reader<T extends Sample> {
     }
 
     /**
-     * The newest sample that neither latest() nor next() has returned yet; waits for one, at most timeout seconds of real
-     * time. A reader slower than the rate skips samples; onSample() skips none.
+     * The newest sample that neither latest() nor next() has returned yet; waits for one, at most
+     * timeout seconds of real time. A reader slower than the rate skips samples; onSample() skips
+     * none.
      */
     public T next(double timeout) {
         return stream.read(this, true, timeout);

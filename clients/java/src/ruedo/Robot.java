@@ -1,7 +1,5 @@
 package ruedo;
 
-import java.util.ArrayList;
-import java.util.List;
 import ruedo.lcmtypes.channel_info_t;
 import ruedo.lcmtypes.device_info_t;
 import ruedo.lcmtypes.move_command_t;
@@ -9,10 +7,17 @@ import ruedo.lcmtypes.robot_info_t;
 import ruedo.lcmtypes.velocity_command_t;
 import ruedo.lcmtypes.wheel_command_t;
 
-/** A robot of the simulation. Lengths in m, angles in rad, counter-clockwise is positive. Thread safe. */
+import java.util.ArrayList;
+import java.util.List;
+
+/**
+ * A robot of the simulation. Lengths in m, angles in rad, counter-clockwise is positive. Thread
+ * safe.
+ */
 public final class Robot {
     /** As in the world file. */
     public final String name;
+
     final Simulation sim;
 
     Robot(Simulation sim, String name) {
@@ -89,7 +94,8 @@ public final class Robot {
         for (Device<?> device : all) {
             if (device.name.equals(name)) return device;
         }
-        throw new RuedoException.UnknownName(this.name + " has no device '" + name + "'; it has " + names(all));
+        throw new RuedoException.UnknownName(
+                this.name + " has no device '" + name + "'; it has " + names(all));
     }
 
     /** The first laser range finder with one layer. */
@@ -154,8 +160,9 @@ public final class Robot {
     // Driving.
 
     /**
-     * Drives with v (m/s ahead) and omega (rad/s), within the robot's limits, until the next command of any kind: the
-     * command is repeated in the background, so that the watchdog does not stop the robot.
+     * Drives with v (m/s ahead) and omega (rad/s), within the robot's limits, until the next
+     * command of any kind: the command is repeated in the background, so that the watchdog does not
+     * stop the robot.
      */
     public void setVelocity(double v, double omega) {
         setVelocity(v, omega, 0.0);
@@ -198,17 +205,30 @@ public final class Robot {
     }
 
     /**
-     * A motion primitive for {@link Simulation#step(long, List)}. kind: "advance", "rotate", "heading", "arc" or "stop";
-     * value in m or rad, of a stop 0; radius, of an arc, in m.
+     * A motion primitive for {@link Simulation#step(long, List)}. kind: "advance", "rotate",
+     * "heading", "arc" or "stop"; value in m or rad, of a stop 0; radius, of an arc, in m.
      */
     public Command moveCommand(String kind, double value, Limits limits, double radius) {
         int index = List.of("advance", "rotate", "heading", "arc", "stop").indexOf(kind);
-        if (index < 0) throw new IllegalArgumentException("kind is '" + kind + "': it must be advance, rotate, heading, arc or stop");
-        byte[] kinds = {move_command_t.ADVANCE, move_command_t.ROTATE, move_command_t.HEADING, move_command_t.ARC, move_command_t.STOP};
-        return new Command(input("move_command_t"), Bus.encode(moveMessage(kinds[index], value, radius, limits)));
+        if (index < 0)
+            throw new IllegalArgumentException(
+                    "kind is '" + kind + "': it must be advance, rotate, heading, arc or stop");
+        byte[] kinds = {
+            move_command_t.ADVANCE,
+            move_command_t.ROTATE,
+            move_command_t.HEADING,
+            move_command_t.ARC,
+            move_command_t.STOP
+        };
+        return new Command(
+                input("move_command_t"),
+                Bus.encode(moveMessage(kinds[index], value, radius, limits)));
     }
 
-    /** Comes to rest. Like all primitives it returns at once; await() on what it returns waits for the end. */
+    /**
+     * Comes to rest. Like all primitives it returns at once; await() on what it returns waits for
+     * the end.
+     */
     public Motion stop() {
         return move("stop", move_command_t.STOP, 0.0, 0.0, Limits.NONE);
     }
@@ -248,10 +268,16 @@ public final class Robot {
         return arc(angle, radius, Limits.NONE);
     }
 
-    /** Drives ahead along a circle of a radius (m, > 0) until it has turned by an angle (rad; positive: to the left). */
+    /**
+     * Drives ahead along a circle of a radius (m, > 0) until it has turned by an angle (rad;
+     * positive: to the left).
+     */
     public Motion arc(double angle, double radius, Limits limits) {
         if (!(radius > 0.0)) {
-            throw new IllegalArgumentException("radius is " + radius + ": it must be > 0 m; the sign of the angle says left or right");
+            throw new IllegalArgumentException(
+                    "radius is "
+                            + radius
+                            + ": it must be > 0 m; the sign of the angle says left or right");
         }
         return move("arc", move_command_t.ARC, angle, radius, limits);
     }
@@ -278,8 +304,11 @@ public final class Robot {
 
     private String input(String type) {
         if (drive().isEmpty()) {
-            throw new RuedoException.NotSupported(name + " cannot be driven: its model has no drive; --drive " + name
-                    + "=LEFT+...,RIGHT+... gives it one, by its wheel joints");
+            throw new RuedoException.NotSupported(
+                    name
+                            + " cannot be driven: its model has no drive; --drive "
+                            + name
+                            + "=LEFT+...,RIGHT+... gives it one, by its wheel joints");
         }
         for (channel_info_t channel : sim.info().channels(name)) {
             if (channel.input && channel.type.equals(type)) return channel.name;
@@ -308,12 +337,20 @@ public final class Robot {
     @SuppressWarnings("unchecked")
     <T extends Sample> Stream<T> cameraPart(String camera, String part, String type) {
         for (channel_info_t channel : sim.info().channels(name)) {
-            boolean named = channel.device.equals(camera + "/" + part)
-                    || (channel.device.equals(camera) && channel.name.endsWith("/" + part));
+            boolean named =
+                    channel.device.equals(camera + "/" + part)
+                            || (channel.device.equals(camera) && channel.name.endsWith("/" + part));
             if (named && channel.type.equals(type)) return (Stream<T>) stream(channel);
         }
-        throw new RuedoException.UnknownName(name + "/" + camera + " publishes no " + part + "; <ruedo:" + part
-                + "> in the world file switches it on");
+        throw new RuedoException.UnknownName(
+                name
+                        + "/"
+                        + camera
+                        + " publishes no "
+                        + part
+                        + "; <ruedo:"
+                        + part
+                        + "> in the world file switches it on");
     }
 
     private Stream<?> stream(channel_info_t channel) {
@@ -321,8 +358,13 @@ public final class Robot {
     }
 
     private Device<?> device(device_info_t info, channel_info_t channel) {
-        return (Device<?>) sim.stream(channel,
-                () -> channel.type.equals("image_t") ? new Camera(sim, info, channel) : new Device<>(sim, info, channel));
+        return (Device<?>)
+                sim.stream(
+                        channel,
+                        () ->
+                                channel.type.equals("image_t")
+                                        ? new Camera(sim, info, channel)
+                                        : new Device<>(sim, info, channel));
     }
 
     private static String names(List<Device<?>> devices) {

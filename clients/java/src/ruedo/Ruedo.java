@@ -17,12 +17,17 @@ package ruedo;
 public final class Ruedo {
     private Ruedo() {}
 
-    /** Joins the simulation at LCM_DEFAULT_URL, else LCM's default group and port with ttl 0. Throws NoServer. */
+    /**
+     * Joins the simulation at LCM_DEFAULT_URL, else LCM's default group and port with ttl 0. Throws
+     * NoServer.
+     */
     public static Simulation connect() {
         return connect("");
     }
 
-    /** Joins the simulation at an LCM URL; a server that does not answer within 2 s is a NoServer. */
+    /**
+     * Joins the simulation at an LCM URL; a server that does not answer within 2 s is a NoServer.
+     */
     public static Simulation connect(String url) {
         return connect(url, "client-" + ProcessHandle.current().pid(), 2.0);
     }
@@ -38,8 +43,9 @@ public final class Ruedo {
     }
 
     /**
-     * Starts `ruedo run WORLD` (found by RUEDO, the PATH, or above this jar) and joins it. The server ends with the
-     * Simulation, and with this process however that ends. Throws LaunchError with what the server said.
+     * Starts `ruedo run WORLD` (found by RUEDO, the PATH, or above this jar) and joins it. The
+     * server ends with the Simulation, and with this process however that ends. Throws LaunchError
+     * with what the server said.
      */
     public static Simulation launch(String world, LaunchOptions options) {
         ServerProcess server = new ServerProcess(world, options);
@@ -48,7 +54,8 @@ public final class Ruedo {
             return new Simulation(server.url, options.name, options.timeout, server);
         } catch (RuedoException.NoServer error) {
             server.end();
-            throw new RuedoException.LaunchError(error.getMessage());    // with what the server said, when it ended
+            throw new RuedoException.LaunchError(
+                    error.getMessage()); // with what the server said, when it ended
         } catch (RuntimeException error) {
             server.end();
             throw error;

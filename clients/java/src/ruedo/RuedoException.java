@@ -1,6 +1,9 @@
 package ruedo;
 
-/** What can go wrong, in words that say what to do next. Bad arguments are IllegalArgumentExceptions. */
+/**
+ * What can go wrong, in words that say what to do next. Bad arguments are
+ * IllegalArgumentExceptions.
+ */
 public class RuedoException extends RuntimeException {
     private static final long serialVersionUID = 1L;
 
@@ -65,6 +68,7 @@ public class RuedoException extends RuntimeException {
     /** A motion primitive ended before it was done, or was refused. */
     public static final class MotionError extends RuedoException {
         private static final long serialVersionUID = 1L;
+
         /** Why, as in {@link MotionStatus#reason}. */
         public final String reason;
 
@@ -77,6 +81,7 @@ public class RuedoException extends RuntimeException {
     /** The server refused a request. */
     public static class RequestError extends RuedoException {
         private static final long serialVersionUID = 1L;
+
         /** Of reply_t. */
         public final int code;
 
@@ -86,7 +91,10 @@ public class RuedoException extends RuntimeException {
         }
     }
 
-    /** Lockstep goes on without this client, which was silent for too long; the next step() takes part again. */
+    /**
+     * Lockstep goes on without this client, which was silent for too long; the next step() takes
+     * part again.
+     */
     public static final class LeaseLost extends RequestError {
         private static final long serialVersionUID = 1L;
 

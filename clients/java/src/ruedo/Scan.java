@@ -4,10 +4,13 @@ package ruedo;
 public final class Scan extends Sample {
     /** m; +inf: no return, -inf: nearer than the minimum range. */
     public final float[] ranges;
+
     /** 0 to 1; empty when the device has none. */
     public final float[] intensities;
+
     /** rad, of ray 0, from the device's x axis towards y (left). */
     public final double angleMin;
+
     /** rad, between neighbouring rays. */
     public final double angleStep;
 
@@ -28,7 +31,8 @@ public final class Scan extends Sample {
     public double nearest(double fromAngle, double toAngle) {
         double nearest = Double.POSITIVE_INFINITY;
         for (int i = 0; i < ranges.length; i++) {
-            if (angle(i) >= fromAngle && angle(i) <= toAngle) nearest = Math.min(nearest, ranges[i]);
+            if (angle(i) >= fromAngle && angle(i) <= toAngle)
+                nearest = Math.min(nearest, ranges[i]);
         }
         return nearest;
     }

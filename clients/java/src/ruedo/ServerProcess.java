@@ -18,35 +18,41 @@ import java.util.concurrent.TimeUnit;
 import java.util.concurrent.atomic.AtomicBoolean;
 
 /**
- * A private server: on a free port, and ended when this process is, however that ends. The server watches its standard
- * input (--watch-stdin) and ends when the pipe closes: the kernel closes it for a process that was killed, too.
+ * A private server: on a free port, and ended when this process is, however that ends. The server
+ * watches its standard input (--watch-stdin) and ends when the pipe closes: the kernel closes it
+ * for a process that was killed, too.
  */
 final class ServerProcess {
     final String url;
     private final List<String> command;
     private final Process process;
-    private final Path output;    // null when verbose
-    private ServerSocket token;   // see freeUrl()
+    private final Path output; // null when verbose
+    private ServerSocket token; // see freeUrl()
 
     ServerProcess(String world, LaunchOptions options) {
         String program = findRuedo();
         url = options.url.isEmpty() ? freeUrl() : options.url;
         command = new ArrayList<>(List.of(program, "run", world, "--lcm", url, "--watch-stdin"));
         if (options.seed != null) command.addAll(List.of("--seed", Long.toString(options.seed)));
-        command.addAll(List.of("--rate", Double.isInfinite(options.rate) ? "max" : Double.toString(options.rate)));
+        command.addAll(
+                List.of(
+                        "--rate",
+                        Double.isInfinite(options.rate) ? "max" : Double.toString(options.rate)));
         command.addAll(options.args);
         try {
             output = options.verbose ? null : Files.createTempFile("ruedo-", ".log");
             if (output != null) output.toFile().deleteOnExit();
             ProcessBuilder builder = new ProcessBuilder(command);
             if (output == null) {
-                builder.redirectOutput(ProcessBuilder.Redirect.INHERIT).redirectError(ProcessBuilder.Redirect.INHERIT);
+                builder.redirectOutput(ProcessBuilder.Redirect.INHERIT)
+                        .redirectError(ProcessBuilder.Redirect.INHERIT);
             } else {
                 builder.redirectErrorStream(true).redirectOutput(output.toFile());
             }
             process = builder.start();
         } catch (IOException error) {
-            throw new RuedoException.LaunchError(program + " cannot be started: " + error.getMessage());
+            throw new RuedoException.LaunchError(
+                    program + " cannot be started: " + error.getMessage());
         }
     }
 
@@ -76,8 +82,13 @@ final class ServerProcess {
     synchronized String ended() {
         if (process.isAlive()) return null;
         String said = lastLines();
-        return "the server ended (exit code " + process.exitValue() + "): " + (said.isEmpty() ? "it said nothing" : said)
-                + "\n(`" + String.join(" ", command) + "`)";
+        return "the server ended (exit code "
+                + process.exitValue()
+                + "): "
+                + (said.isEmpty() ? "it said nothing" : said)
+                + "\n(`"
+                + String.join(" ", command)
+                + "`)";
     }
 
     /** Closes the pipe, which ends the server; kills it when it has not ended after 5 s. */
@@ -98,25 +109,34 @@ final class ServerProcess {
     private String lastLines() {
         try {
             if (output == null || !Files.exists(output)) return "";
-            String[] lines = new String(Files.readAllBytes(output), StandardCharsets.UTF_8).trim().split("\n");
-            return String.join("\n", Arrays.copyOfRange(lines, Math.max(0, lines.length - 12), lines.length));
+            String[] lines =
+                    new String(Files.readAllBytes(output), StandardCharsets.UTF_8)
+                            .trim()
+                            .split("\n");
+            return String.join(
+                    "\n", Arrays.copyOfRange(lines, Math.max(0, lines.length - 12), lines.length));
         } catch (IOException error) {
             return "";
         }
     }
 
-    /** RUEDO, else that of the installation which this jar belongs to, else the PATH, else one built in a folder above this jar. */
+    /**
+     * RUEDO, else that of the installation which this jar belongs to, else the PATH, else one built
+     * in a folder above this jar.
+     */
     private static String findRuedo() {
         String named = System.getenv("RUEDO");
         if (named != null && !named.isEmpty()) {
             if (isProgram(new File(named))) return named;
-            throw new RuedoException.LaunchError("the environment's RUEDO is '" + named + "', which is no program");
+            throw new RuedoException.LaunchError(
+                    "the environment's RUEDO is '" + named + "', which is no program");
         }
         List<File> above = foldersAbove();
         List<File> candidates = new ArrayList<>();
         for (File folder : above) candidates.add(new File(folder, "bin/ruedo"));
         String path = System.getenv("PATH");
-        for (String folder : (path == null ? "" : path).split(File.pathSeparator)) candidates.add(new File(folder, "ruedo"));
+        for (String folder : (path == null ? "" : path).split(File.pathSeparator))
+            candidates.add(new File(folder, "ruedo"));
         for (File folder : above) {
             candidates.add(new File(folder, "build/bin/ruedo"));
             File[] builds = new File(folder, "build").listFiles(File::isDirectory);
@@ -127,16 +147,25 @@ final class ServerProcess {
         for (File candidate : candidates) {
             if (isProgram(candidate)) return candidate.getPath();
         }
-        throw new RuedoException.LaunchError("the program `ruedo` was not found: not in RUEDO, not beside this jar, not on the PATH "
-                + "(a Maven project names it by RUEDO; `scripts/run` builds it)");
+        throw new RuedoException.LaunchError(
+                "the program `ruedo` was not found: not in RUEDO, not beside this jar, not on the"
+                        + " PATH (a Maven project names it by RUEDO; `scripts/run` builds it)");
     }
 
     /** Those that this jar lies in, from the nearest on; none for a jar in a strange place. */
     private static List<File> foldersAbove() {
         List<File> folders = new ArrayList<>();
         try {
-            File here = new File(Ruedo.class.getProtectionDomain().getCodeSource().getLocation().toURI());
-            for (File folder = here.getParentFile(); folder != null; folder = folder.getParentFile()) folders.add(folder);
+            File here =
+                    new File(
+                            Ruedo.class
+                                    .getProtectionDomain()
+                                    .getCodeSource()
+                                    .getLocation()
+                                    .toURI());
+            for (File folder = here.getParentFile();
+                    folder != null;
+                    folder = folder.getParentFile()) folders.add(folder);
         } catch (URISyntaxException error) {
             // not a file
         }
@@ -148,8 +177,8 @@ final class ServerProcess {
     }
 
     /**
-     * A URL that nothing else uses. The TCP socket on the same port, kept open, is the token by which launches of any
-     * process, in any language, stay apart from each other.
+     * A URL that nothing else uses. The TCP socket on the same port, kept open, is the token by
+     * which launches of any process, in any language, stay apart from each other.
      */
     private String freeUrl() {
         for (int i = 0; i < 100; i++) {
@@ -157,18 +186,24 @@ final class ServerProcess {
                 token = new ServerSocket(0, 1, InetAddress.getByName("127.0.0.1"));
                 int port = token.getLocalPort();
                 if (!Address.hasMulticastRoute("239.255.76.67")) {
-                    token.close();    // the server itself will listen on it
-                    sayOnce("ruedo: no multicast route here: launch() speaks LCM over TCP, LCM_DEFAULT_URL=tcpq://127.0.0.1:" + port);
+                    token.close(); // the server itself will listen on it
+                    sayOnce(
+                            "ruedo: no multicast route here: launch() speaks LCM over TCP,"
+                                    + " LCM_DEFAULT_URL=tcpq://127.0.0.1:"
+                                    + port);
                     return "tcpq://127.0.0.1:" + port;
                 }
                 try (DatagramChannel probe = DatagramChannel.open(StandardProtocolFamily.INET)) {
-                    probe.bind(new InetSocketAddress("0.0.0.0", port));    // fails when any LCM program uses the port
+                    probe.bind(
+                            new InetSocketAddress(
+                                    "0.0.0.0", port)); // fails when any LCM program uses the port
                     return "udpm://239.255.76.67:" + port + "?ttl=0";
                 } catch (IOException error) {
                     token.close();
                 }
             } catch (IOException error) {
-                throw new RuedoException.LaunchError("no port for the server: " + error.getMessage());
+                throw new RuedoException.LaunchError(
+                        "no port for the server: " + error.getMessage());
             }
         }
         throw new RuedoException.LaunchError("no free UDP port was found in 100 tries");

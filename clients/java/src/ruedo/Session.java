@@ -1,25 +1,50 @@
 package ruedo;
 
-import java.io.IOException;
-import java.security.SecureRandom;
 import lcm.lcm.LCMEncodable;
+
 import ruedo.lcmtypes.join_t;
 import ruedo.lcmtypes.reply_t;
 import ruedo.lcmtypes.request_t;
 
-/** A client's session with the server: requests are repeated until they are answered, and executed once. */
+import java.io.IOException;
+import java.security.SecureRandom;
+
+/**
+ * A client's session with the server: requests are repeated until they are answered, and executed
+ * once.
+ */
 final class Session {
     private static final long REPEAT_MILLIS = 100;
-    private static final String[] KINDS = {"", "JOIN", "LEAVE", "PAUSE", "RESUME", "STEP", "RATE", "RESET", "SPAWN", "REMOVE",
-        "SET_POSE", "SET_TWIST", "GET_STATE", "INFO", "QUIT", "GRANT", "RESEND", "SNAPSHOT", "RESTORE", "RESET_ODOMETRY"};
+    private static final String[] KINDS = {
+        "",
+        "JOIN",
+        "LEAVE",
+        "PAUSE",
+        "RESUME",
+        "STEP",
+        "RATE",
+        "RESET",
+        "SPAWN",
+        "REMOVE",
+        "SET_POSE",
+        "SET_TWIST",
+        "GET_STATE",
+        "INFO",
+        "QUIT",
+        "GRANT",
+        "RESEND",
+        "SNAPSHOT",
+        "RESTORE",
+        "RESET_ODOMETRY"
+    };
 
     private final Simulation sim;
     private final String name;
     private final Object news = new Object();
-    private long runId;             // these two under this object's monitor
+    private long runId; // these two under this object's monitor
     private long sequence;
     private volatile long session;
-    private int awaitedKind;        // these under news; 0: none
+    private int awaitedKind; // these under news; 0: none
     private long awaitedSequence;
     private reply_t reply;
 
@@ -33,14 +58,19 @@ final class Session {
         sim.checkOpen();
         WorldInfo info = sim.info();
         if (!info.supports(kind)) {
-            throw new RuedoException.NotSupported("this server (Ruedo " + info.head.version + ") has no " + KINDS[kind] + " request");
+            throw new RuedoException.NotSupported(
+                    "this server (Ruedo "
+                            + info.head.version
+                            + ") has no "
+                            + KINDS[kind]
+                            + " request");
         }
         byte[] encoded = body == null ? new byte[0] : Bus.encode(body);
-        for (int attempt = 1;; attempt++) {
+        for (int attempt = 1; ; attempt++) {
             if (session == 0 || runId != info.head.run_id) join(info.head.run_id, timeout);
             reply_t answer = exchange(kind, session, ++sequence, encoded, timeout);
             if (answer.code != reply_t.UNKNOWN_SESSION || attempt == 2) return checked(answer);
-            session = 0;    // its place went to another: join again
+            session = 0; // its place went to another: join again
         }
     }
 
@@ -57,8 +87,8 @@ final class Session {
         try {
             WireReader in = new WireReader(message);
             if (in.int64() != reply_t.LCM_FINGERPRINT) return;
-            in.int64();    // utime
-            in.int64();    // run
+            in.int64(); // utime
+            in.int64(); // run
             received.epoch = in.int32();
             received.session = in.int64();
             received.sequence = in.int64();
@@ -78,7 +108,8 @@ final class Session {
                 return;
             }
         }
-        if (received.kind == request_t.GRANT || received.kind == request_t.RESEND) sim.stepper().onReply(received);
+        if (received.kind == request_t.GRANT || received.kind == request_t.RESEND)
+            sim.stepper().onReply(received);
     }
 
     private void join(long run, double timeout) {
@@ -99,8 +130,12 @@ final class Session {
             while (reply == null) {
                 if (deadline.passed()) {
                     awaitedKind = 0;
-                    throw new RuedoException.Timeout("no reply to " + KINDS[kind] + " on ruedo/reply within "
-                            + Deadline.text(timeout) + " s");
+                    throw new RuedoException.Timeout(
+                            "no reply to "
+                                    + KINDS[kind]
+                                    + " on ruedo/reply within "
+                                    + Deadline.text(timeout)
+                                    + " s");
                 }
                 publish(kind, toSession, number, body);
                 deadline.waitOn(news, REPEAT_MILLIS);
@@ -143,8 +178,14 @@ final class Session {
 
     private static reply_t checked(reply_t reply) {
         if (reply.code == reply_t.OK) return reply;
-        String kind = reply.kind > 0 && reply.kind < KINDS.length ? KINDS[reply.kind] : Integer.toString(reply.kind);
-        String text = kind + ": " + (reply.text.isEmpty() ? "refused with code " + reply.code : reply.text);
+        String kind =
+                reply.kind > 0 && reply.kind < KINDS.length
+                        ? KINDS[reply.kind]
+                        : Integer.toString(reply.kind);
+        String text =
+                kind
+                        + ": "
+                        + (reply.text.isEmpty() ? "refused with code " + reply.code : reply.text);
         if (reply.code == reply_t.NOT_SUPPORTED) throw new RuedoException.NotSupported(text);
         throw new RuedoException.RequestError(text, reply.code);
     }

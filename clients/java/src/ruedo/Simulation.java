@@ -1,16 +1,7 @@
 package ruedo;
 
-import java.io.IOException;
-import java.util.ArrayList;
-import java.util.HashMap;
-import java.util.HashSet;
-import java.util.List;
-import java.util.Map;
-import java.util.Set;
-import java.util.concurrent.ConcurrentHashMap;
-import java.util.concurrent.atomic.AtomicLong;
-import java.util.function.Supplier;
 import lcm.lcm.LCMEncodable;
+
 import ruedo.lcmtypes.channel_info_t;
 import ruedo.lcmtypes.name_request_t;
 import ruedo.lcmtypes.rate_request_t;
@@ -23,12 +14,25 @@ import ruedo.lcmtypes.spawn_request_t;
 import ruedo.lcmtypes.step_request_t;
 import ruedo.lcmtypes.tick_t;
 
+import java.io.IOException;
+import java.util.ArrayList;
+import java.util.HashMap;
+import java.util.HashSet;
+import java.util.List;
+import java.util.Map;
+import java.util.Set;
+import java.util.concurrent.ConcurrentHashMap;
+import java.util.concurrent.atomic.AtomicLong;
+import java.util.function.Supplier;
+
 /**
- * A running simulation. Made by {@link Ruedo#connect} or {@link Ruedo#launch}; thread safe. close() ends a server that
- * launch() started. Requests throw NotSupported where the server does not have them, RequestError when it refuses.
+ * A running simulation. Made by {@link Ruedo#connect} or {@link Ruedo#launch}; thread safe. close()
+ * ends a server that launch() started. Requests throw NotSupported where the server does not have
+ * them, RequestError when it refuses.
  */
 public final class Simulation implements AutoCloseable {
-    private static final double SILENCE_SECONDS = 5.0;    // without any message: a server gives a sign of life each second
+    private static final double SILENCE_SECONDS =
+            5.0; // without any message: a server gives a sign of life each second
     private static final double REPLY_SECONDS = 5.0;
     private static final long ASK_AGAIN_NANOS = 100_000_000;
     private static final double SLOW_REPLY_SECONDS = 60.0;
@@ -36,25 +40,27 @@ public final class Simulation implements AutoCloseable {
 
     /** Where it is. */
     public final String url;
+
     final Bus bus;
     private final Address address;
-    private final ServerProcess server;    // null: not ours
+    private final ServerProcess server; // null: not ours
     private final Session session;
     private final Stepper stepper;
     private final WorldInfo.Assembler assembler = new WorldInfo.Assembler();
     private final Map<String, Robot> robots = new HashMap<>();
-    private final Map<String, Stream<?>> streams = new HashMap<>();    // by channel; robots, streams, drivers under robots' monitor
-    private final Map<String, Driver> drivers = new HashMap<>();        // by robot
+    private final Map<String, Stream<?>> streams =
+            new HashMap<>(); // by channel; robots, streams, drivers under robots' monitor
+    private final Map<String, Driver> drivers = new HashMap<>(); // by robot
     private final Set<Driver> repeating = ConcurrentHashMap.newKeySet();
     private final Set<Subscription> newRun = ConcurrentHashMap.newKeySet();
     private final AtomicLong ids;
-    private WorldInfo known;               // these under this object's monitor
+    private WorldInfo known; // these under this object's monitor
     private RuedoException fault;
     private Thread repeater;
     private volatile long utime;
     private volatile long lastSign = System.nanoTime();
-    private volatile long asked = System.nanoTime();    // for info
-    private volatile boolean anotherRun;                // is what the last tick was of
+    private volatile long asked = System.nanoTime(); // for info
+    private volatile boolean anotherRun; // is what the last tick was of
     private volatile boolean closed;
 
     Simulation(String url, String name, double timeout, ServerProcess server) {
@@ -62,12 +68,18 @@ public final class Simulation implements AutoCloseable {
     }
 
     /** transport: null opens the address's. */
-    Simulation(Address address, String name, double timeout, ServerProcess server, Transport transport) {
+    Simulation(
+            Address address,
+            String name,
+            double timeout,
+            ServerProcess server,
+            Transport transport) {
         this.address = address;
         url = address.url;
         this.server = server;
-        int hash = 0x811c9dc5;    // FNV-1a of the name: two clients number their primitives apart
-        for (byte b : name.getBytes(java.nio.charset.StandardCharsets.UTF_8)) hash = (hash ^ (b & 255)) * 16777619;
+        int hash = 0x811c9dc5; // FNV-1a of the name: two clients number their primitives apart
+        for (byte b : name.getBytes(java.nio.charset.StandardCharsets.UTF_8))
+            hash = (hash ^ (b & 255)) * 16777619;
         ids = new AtomicLong((long) (hash & 0x7fffffff) << 20);
         session = new Session(this, name);
         stepper = new Stepper(this, session);
@@ -137,8 +149,9 @@ public final class Simulation implements AutoCloseable {
     }
 
     /**
-     * Calls back in the receiving thread when another server, or the same one started anew, answers at this address. Commands
-     * are not repeated into the new run, and primitives under way have ended.
+     * Calls back in the receiving thread when another server, or the same one started anew, answers
+     * at this address. Commands are not repeated into the new run, and primitives under way have
+     * ended.
      */
     public Subscription onNewRun(Runnable callback) {
         checkOpen();
@@ -181,10 +194,11 @@ public final class Simulation implements AutoCloseable {
     }
 
     /**
-     * Takes n steps, at most timeout seconds of real time each time that nothing goes on, and returns what was seen. In
-     * lockstep (`ruedo run --lockstep N`): takes part from the first call on, grants n steps with their commands, and has
-     * every message of every step; the first call's observations begin with those of the state it found. n = 0 takes no
-     * step. Throws LeaseLost. Else: steps a paused simulation; there are no commands, and the messages are in the streams.
+     * Takes n steps, at most timeout seconds of real time each time that nothing goes on, and
+     * returns what was seen. In lockstep (`ruedo run --lockstep N`): takes part from the first call
+     * on, grants n steps with their commands, and has every message of every step; the first call's
+     * observations begin with those of the state it found. n = 0 takes no step. Throws LeaseLost.
+     * Else: steps a paused simulation; there are no commands, and the messages are in the streams.
      */
     public Observations step(long n, List<Command> commands, double timeout) {
         if (lockstep()) {
@@ -193,12 +207,14 @@ public final class Simulation implements AutoCloseable {
             return observations;
         }
         if (!commands.isEmpty()) {
-            throw new RuedoException.NotSupported("commands go with steps where the server runs in lockstep: start it with "
-                    + "`ruedo run --lockstep N`");
+            throw new RuedoException.NotSupported(
+                    "commands go with steps where the server runs in lockstep: start it with "
+                            + "`ruedo run --lockstep N`");
         }
         step_request_t body = new step_request_t();
         body.steps = n;
-        return new Observations(State.of(session.request(request_t.STEP, body, timeout)), List.of());
+        return new Observations(
+                State.of(session.request(request_t.STEP, body, timeout)), List.of());
     }
 
     /** Whether the server runs in lockstep. */
@@ -231,7 +247,10 @@ public final class Simulation implements AutoCloseable {
     /** Starts anew. seed: of what follows, -1: the same again. */
     public void reset(Reset what, long seed) {
         reset_request_t body = new reset_request_t();
-        body.what = what == Reset.ALL ? reset_request_t.ALL : what == Reset.TIME ? reset_request_t.TIME : reset_request_t.POSES;
+        body.what =
+                what == Reset.ALL
+                        ? reset_request_t.ALL
+                        : what == Reset.TIME ? reset_request_t.TIME : reset_request_t.POSES;
         body.seed = seed;
         session.request(request_t.RESET, body, SLOW_REPLY_SECONDS);
         if (what == Reset.POSES) return;
@@ -239,17 +258,27 @@ public final class Simulation implements AutoCloseable {
         stepper.forget();
     }
 
-    /** Adds one of Ruedo's models ("p3at"), or a file in the server's search folders, on the ground below x, y (m). */
+    /**
+     * Adds one of Ruedo's models ("p3at"), or a file in the server's search folders, on the ground
+     * below x, y (m).
+     */
     public String spawn(String model, double x, double y, double heading, String name) {
         return spawn(model, "", name, new double[] {x, y, 0.0}, aboutZ(heading), true);
     }
 
     /**
-     * Adds a model. model: a name, or "" for SDF or URDF in text. name: "" is the model's own. position: m; orientation:
-     * w, x, y, z. onGround: it stands on the ground below. The server refuses to put it into something. Returns the
-     * model's name: the server numbers one that is taken, unless it was asked for.
+     * Adds a model. model: a name, or "" for SDF or URDF in text. name: "" is the model's own.
+     * position: m; orientation: w, x, y, z. onGround: it stands on the ground below. The server
+     * refuses to put it into something. Returns the model's name: the server numbers one that is
+     * taken, unless it was asked for.
      */
-    public String spawn(String model, String text, String name, double[] position, double[] orientation, boolean onGround) {
+    public String spawn(
+            String model,
+            String text,
+            String name,
+            double[] position,
+            double[] orientation,
+            boolean onGround) {
         spawn_request_t body = new spawn_request_t();
         body.model = model;
         body.text = text;
@@ -308,14 +337,18 @@ public final class Simulation implements AutoCloseable {
         session.request(request_t.RESET_ODOMETRY, nameBody(robot), REPLY_SECONDS);
     }
 
-    /** Saves the state under a name, in the folder that the server was started with (--snapshots FOLDER), and returns it. */
+    /**
+     * Saves the state under a name, in the folder that the server was started with (--snapshots
+     * FOLDER), and returns it.
+     */
     public State snapshot(String name) {
         return State.of(session.request(request_t.SNAPSHOT, nameBody(name), SLOW_REPLY_SECONDS));
     }
 
     /**
-     * Puts the world back to a snapshot; what follows equals what followed it. The server runs there from the beginning of
-     * the snapshot's run, in silence: this takes as long as that part takes at rate max. A new epoch.
+     * Puts the world back to a snapshot; what follows equals what followed it. The server runs
+     * there from the beginning of the snapshot's run, in silence: this takes as long as that part
+     * takes at rate max. A new epoch.
      */
     public State restore(String name) {
         State state = State.of(session.request(request_t.RESTORE, nameBody(name), RESTORE_SECONDS));
@@ -330,8 +363,9 @@ public final class Simulation implements AutoCloseable {
     }
 
     /**
-     * Ends repeated commands, and a server that launch() started. A program that ends without it leaves nothing behind
-     * either: the watchdog stops its robots, and its server ends with the pipe to it.
+     * Ends repeated commands, and a server that launch() started. A program that ends without it
+     * leaves nothing behind either: the watchdog stops its robots, and its server ends with the
+     * pipe to it.
      */
     @Override
     public void close() {
@@ -360,8 +394,11 @@ public final class Simulation implements AutoCloseable {
         Map<String, robot_info_t> all = info().robots;
         robot_info_t robot = all.get(name);
         if (robot != null) return robot;
-        throw new RuedoException.UnknownName("there is no robot '" + name + "'; there is "
-                + (all.isEmpty() ? "none" : String.join(", ", all.keySet())));
+        throw new RuedoException.UnknownName(
+                "there is no robot '"
+                        + name
+                        + "'; there is "
+                        + (all.isEmpty() ? "none" : String.join(", ", all.keySet())));
     }
 
     long utime() {
@@ -390,15 +427,21 @@ public final class Simulation implements AutoCloseable {
         checkOpen();
         String ended = server == null ? null : server.ended();
         if (ended != null) throw new RuedoException.NoServer(ended);
-        if (silence() > SILENCE_SECONDS && !address.isClaimed()) {    // one that is stopped, or in a debugger, is waited for
-            throw new RuedoException.NoServer("nothing was heard from the server at " + url + " for 5 s");
+        if (silence() > SILENCE_SECONDS
+                && !address.isClaimed()) { // one that is stopped, or in a debugger, is waited for
+            throw new RuedoException.NoServer(
+                    "nothing was heard from the server at " + url + " for 5 s");
         }
     }
 
     String whatIsKnown(double rate) {
-        if (silence() > 3.0) return String.format("nothing at all was heard from the server for %.1f s", silence());
+        if (silence() > 3.0)
+            return String.format("nothing at all was heard from the server for %.1f s", silence());
         if (paused()) return "the simulation is paused";
-        return rate > 0.0 ? String.format("its rate is %s Hz of sim time, which is now %.2f s", Deadline.text(rate), time())
+        return rate > 0.0
+                ? String.format(
+                        "its rate is %s Hz of sim time, which is now %.2f s",
+                        Deadline.text(rate), time())
                 : "it sends when something happens";
     }
 
@@ -434,7 +477,8 @@ public final class Simulation implements AutoCloseable {
     Stream<?> stream(channel_info_t channel, Supplier<Stream<?>> make) {
         synchronized (robots) {
             Stream<?> known = streams.get(channel.name);
-            if (known == null || !known.type.equals(channel.type)) {    // the next run's may be another
+            if (known == null
+                    || !known.type.equals(channel.type)) { // the next run's may be another
                 known = make.get();
                 streams.put(channel.name, known);
             }
@@ -457,13 +501,15 @@ public final class Simulation implements AutoCloseable {
         List<Stream<?>> ended = new ArrayList<>();
         synchronized (robots) {
             robots.keySet().retainAll(info.robots.keySet());
-            drivers.forEach((name, driver) -> {
-                if (!info.robots.containsKey(name)) gone.add(driver);
-            });
+            drivers.forEach(
+                    (name, driver) -> {
+                        if (!info.robots.containsKey(name)) gone.add(driver);
+                    });
             drivers.keySet().retainAll(info.robots.keySet());
-            streams.forEach((name, stream) -> {
-                if (!channels.contains(name)) ended.add(stream);
-            });
+            streams.forEach(
+                    (name, stream) -> {
+                        if (!channels.contains(name)) ended.add(stream);
+                    });
             streams.keySet().retainAll(channels);
         }
         endDrivers(gone, "removed");
@@ -487,7 +533,8 @@ public final class Simulation implements AutoCloseable {
         }
         endDrivers(all, "new run");
         for (Stream<?> stream : known) stream.forget();
-        System.err.println("ruedo: another run has begun at " + url + ": commands are not repeated into it");
+        System.err.println(
+                "ruedo: another run has begun at " + url + ": commands are not repeated into it");
         for (Subscription callback : newRun) callback.call(null);
     }
 
@@ -531,7 +578,7 @@ public final class Simulation implements AutoCloseable {
             WorldInfo known = info();
             if (known == null) return;
             anotherRun = in.int64() != known.head.run_id;
-            if (anotherRun) {    // it may be the server's next one
+            if (anotherRun) { // it may be the server's next one
                 if (System.nanoTime() - asked > ASK_AGAIN_NANOS) askInfo();
                 return;
             }
@@ -540,7 +587,8 @@ public final class Simulation implements AutoCloseable {
         } catch (IOException error) {
             return;
         }
-        // Sim time may run a hundred times faster than real time: the watchdog is fed by its beat, too.
+        // Sim time may run a hundred times faster than real time: the watchdog is fed by its beat,
+        // too.
         for (Driver driver : repeating) driver.repeat();
     }
 
@@ -551,9 +599,13 @@ public final class Simulation implements AutoCloseable {
             String ended = server == null ? null : server.ended();
             if (ended != null) throw new RuedoException.NoServer(ended);
             if (deadline.passed()) {
-                throw new RuedoException.NoServer("no Ruedo server answered at " + url + " within " + Deadline.text(timeout)
-                        + " s. Is `ruedo run` started, with the same --lcm or LCM_DEFAULT_URL? `ruedo doctor` looks for what "
-                        + "is wrong");
+                throw new RuedoException.NoServer(
+                        "no Ruedo server answered at "
+                                + url
+                                + " within "
+                                + Deadline.text(timeout)
+                                + " s. Is `ruedo run` started, with the same --lcm or"
+                                + " LCM_DEFAULT_URL? `ruedo doctor` looks for what is wrong");
             }
             askInfo();
             deadline.waitOn(this, 100);

@@ -4,8 +4,10 @@ package ruedo;
 public final class SonarReading extends Sample {
     /** m from the transducer's face; without an echo: the maximum range. */
     public final float[] ranges;
+
     /** us of sim time at which each fired last; -1: not yet. */
     public final long[] firedUtime;
+
     /** True where the reading is of this very message. */
     public final boolean[] fresh;
 

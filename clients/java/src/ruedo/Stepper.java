@@ -1,12 +1,5 @@
 package ruedo;
 
-import java.io.IOException;
-import java.util.ArrayDeque;
-import java.util.ArrayList;
-import java.util.Iterator;
-import java.util.List;
-import java.util.TreeMap;
-import java.util.zip.CRC32;
 import ruedo.lcmtypes.channel_info_t;
 import ruedo.lcmtypes.grant_command_t;
 import ruedo.lcmtypes.grant_request_t;
@@ -16,17 +9,26 @@ import ruedo.lcmtypes.resend_request_t;
 import ruedo.lcmtypes.resend_wanted_t;
 import ruedo.lcmtypes.tick_t;
 
+import java.io.IOException;
+import java.util.ArrayDeque;
+import java.util.ArrayList;
+import java.util.Iterator;
+import java.util.List;
+import java.util.TreeMap;
+import java.util.zip.CRC32;
+
 /**
- * The client's side of lockstep: grants, and the messages of every step, whatever is lost on the way. The receiving thread
- * puts ticks and messages together; the caller of step() grants, waits, and asks again.
+ * The client's side of lockstep: grants, and the messages of every step, whatever is lost on the
+ * way. The receiving thread puts ticks and messages together; the caller of step() grants, waits,
+ * and asks again.
  */
 final class Stepper {
     private static final long FIRST_REPEAT_MILLIS = 5;
     private static final long LAST_REPEAT_MILLIS = 100;
-    private static final long ACKNOWLEDGED_TOGETHER = 32;    // steps
-    private static final int MOST_WANTED = 256;              // messages asked for at once
-    private static final int MOST_EARLY = 512;               // messages of one channel that wait for their ticks
-    private static final long MOST_AHEAD = 1024;             // steps beyond what is here: no server is that far
+    private static final long ACKNOWLEDGED_TOGETHER = 32; // steps
+    private static final int MOST_WANTED = 256; // messages asked for at once
+    private static final int MOST_EARLY = 512; // messages of one channel that wait for their ticks
+    private static final long MOST_AHEAD = 1024; // steps beyond what is here: no server is that far
 
     /** Of a manifest. */
     private static final class Entry {
@@ -34,7 +36,7 @@ final class Stepper {
         long sequence;
         int size;
         int crc;
-        byte[] data = {};    // as much as is here
+        byte[] data = {}; // as much as is here
         boolean here;
     }
 
@@ -43,7 +45,7 @@ final class Stepper {
         long stateHash;
         int missing;
         int partsHere;
-        List<List<Entry>> parts = new ArrayList<>();    // null where one is missing
+        List<List<Entry>> parts = new ArrayList<>(); // null where one is missing
 
         boolean complete() {
             return missing == 0 && partsHere == parts.size();
@@ -66,28 +68,29 @@ final class Stepper {
     private final Simulation sim;
     private final Session session;
     // All under this object's monitor.
-    private boolean part;                       // takes part
-    private WorldInfo info;                     // whose channels are subscribed
-    private final List<String> names = new ArrayList<>();              // of what is subscribed, by the channel's index; "": not
+    private boolean part; // takes part
+    private WorldInfo info; // whose channels are subscribed
+    private final List<String> names =
+            new ArrayList<>(); // of what is subscribed, by the channel's index; "": not
     private final List<Subscription> sources = new ArrayList<>();
     private long runId;
     private int epoch;
     private long granted;
-    private long have = -1;                     // all of the states up to that one are here
+    private long have = -1; // all of the states up to that one are here
     private long acknowledged = -1;
     private long newest = -1;
     private long wantedUntil = -1;
-    private long[] last = {0, -1, 0};           // utime, step and hash of what was collected
-    private long grantSequence;                 // the grant under way
+    private long[] last = {0, -1, 0}; // utime, step and hash of what was collected
+    private long grantSequence; // the grant under way
     private long grantFrom = -1;
     private byte[] grantBody = {};
     private boolean taken = true;
     private long resends;
-    private final TreeMap<Long, Step> steps = new TreeMap<>();    // those not collected yet
-    private final List<ArrayDeque<Early>> early = new ArrayList<>();    // of each channel
+    private final TreeMap<Long, Step> steps = new TreeMap<>(); // those not collected yet
+    private final List<ArrayDeque<Early>> early = new ArrayList<>(); // of each channel
     private String waitsFor = "";
     private RuedoException fault;
-    private boolean askNow;                     // without waiting for a silence
+    private boolean askNow; // without waiting for a silence
 
     Stepper(Simulation sim, Session session) {
         this.sim = sim;
@@ -98,27 +101,34 @@ final class Stepper {
         if (n < 0) throw new IllegalArgumentException("n is " + n + ": it must be at least 0");
         for (Command command : commands) {
             if (command.after >= 0 && command.after < n) continue;
-            throw new IllegalArgumentException("a command is for " + command.after + " steps on; of " + n + " steps 0 to " + (n - 1)
-                    + " is allowed");
+            throw new IllegalArgumentException(
+                    "a command is for "
+                            + command.after
+                            + " steps on; of "
+                            + n
+                            + " steps 0 to "
+                            + (n - 1)
+                            + " is allowed");
         }
-        synchronized (session) {    // its turn: other requests wait
+        synchronized (session) { // its turn: other requests wait
             sim.checkOpen();
             if (!takesPart()) takePart(timeout);
             synchronized (this) {
-                await(have, timeout);    // for nothing, unless the call before gave up
+                await(have, timeout); // for nothing, unless the call before gave up
                 long until = n > Long.MAX_VALUE - granted ? Long.MAX_VALUE : granted + n;
                 if (n > 0) {
                     grantBody = body(until, commands);
                     grantSequence = session.nextSequence();
                     grantFrom = granted;
                     granted = until;
-                    acknowledged = have;    // the grant says it
+                    acknowledged = have; // the grant says it
                     taken = false;
                     grantAgain();
                 }
                 await(until, timeout);
             }
-            if (early.size() > info.channelList.size() || info != sim.info()) {    // a model came on the way
+            if (early.size() > info.channelList.size()
+                    || info != sim.info()) { // a model came on the way
                 if (early.size() > sim.info().channelList.size()) sim.refreshInfo();
                 subscribe();
             }
@@ -134,7 +144,10 @@ final class Stepper {
     private synchronized boolean takesPart() {
         if (!part || sim.info().head.run_id == runId) return part;
         part = false;
-        throw new RuedoException.NoServer("the run that this client took part in has ended; another is at " + sim.url + " now");
+        throw new RuedoException.NoServer(
+                "the run that this client took part in has ended; another is at "
+                        + sim.url
+                        + " now");
     }
 
     private void takePart(double timeout) {
@@ -147,12 +160,13 @@ final class Stepper {
         synchronized (this) {
             try {
                 WireReader in = new WireReader(reply.body);
-                in.int64();    // fingerprint
+                in.int64(); // fingerprint
                 granted = in.int64();
                 have = in.int64();
                 newest = in.int64();
             } catch (IOException error) {
-                throw new RuedoException.TypeMismatch("the reply to GRANT is no grant_reply_t of this client's version");
+                throw new RuedoException.TypeMismatch(
+                        "the reply to GRANT is no grant_reply_t of this client's version");
             }
             runId = sim.info().head.run_id;
             epoch = reply.epoch;
@@ -174,7 +188,12 @@ final class Stepper {
             synchronized (this) {
                 if (early.size() == i) early.add(new ArrayDeque<>());
             }
-            String wanted = channel.input || (channel.robot.isEmpty() && !channel.type.equals("world_state_t")) ? "" : channel.name;
+            String wanted =
+                    channel.input
+                                    || (channel.robot.isEmpty()
+                                            && !channel.type.equals("world_state_t"))
+                            ? ""
+                            : channel.name;
             if (names.size() == i) {
                 names.add("");
                 sources.add(null);
@@ -183,7 +202,12 @@ final class Stepper {
             if (sources.get(i) != null) sources.get(i).close();
             int index = i;
             names.set(i, wanted);
-            sources.set(i, wanted.isEmpty() ? null : sim.bus.subscribe(wanted, (byte[] message) -> onMessage(index, message)));
+            sources.set(
+                    i,
+                    wanted.isEmpty()
+                            ? null
+                            : sim.bus.subscribe(
+                                    wanted, (byte[] message) -> onMessage(index, message)));
         }
         for (int i = names.size() - 1; i >= found.channelList.size(); i--) {
             if (sources.get(i) != null) sources.get(i).close();
@@ -213,8 +237,8 @@ final class Stepper {
     }
 
     /**
-     * Until the states up to `until` are here with all their messages. After a silence the grant, or the request for what
-     * is missing, goes out again, sooner at first.
+     * Until the states up to `until` are here with all their messages. After a silence the grant,
+     * or the request for what is missing, goes out again, sooner at first.
      */
     private void await(long until, double timeout) {
         long repeat = FIRST_REPEAT_MILLIS;
@@ -226,7 +250,11 @@ final class Stepper {
             long quietAt = System.nanoTime() + repeat * 1_000_000;
             Deadline never = new Deadline(Double.POSITIVE_INFINITY);
             long left = repeat;
-            while (left > 0 && !(have >= until && taken) && fault == null && !askNow && have - acknowledged < ACKNOWLEDGED_TOGETHER) {
+            while (left > 0
+                    && !(have >= until && taken)
+                    && fault == null
+                    && !askNow
+                    && have - acknowledged < ACKNOWLEDGED_TOGETHER) {
                 never.waitOn(this, left);
                 left = (quietAt - System.nanoTime() + 999_999) / 1_000_000;
             }
@@ -243,7 +271,7 @@ final class Stepper {
             } else if (silence || askNow) {
                 askForLost(until);
             } else if (have - acknowledged >= ACKNOWLEDGED_TOGETHER) {
-                askForLost(have);    // for nothing: it says what is here
+                askForLost(have); // for nothing: it says what is here
             }
             askNow = false;
             repeat = silence ? Math.min(2 * repeat, LAST_REPEAT_MILLIS) : FIRST_REPEAT_MILLIS;
@@ -252,8 +280,13 @@ final class Stepper {
             } else if (silence) {
                 sim.checkServer();
                 if (!deadline.passed()) continue;
-                throw new RuedoException.Timeout("step " + (have + 1) + " did not come within " + Deadline.text(timeout) + " s"
-                        + (waitsFor.isEmpty() ? "" : ": the run waits for " + waitsFor));
+                throw new RuedoException.Timeout(
+                        "step "
+                                + (have + 1)
+                                + " did not come within "
+                                + Deadline.text(timeout)
+                                + " s"
+                                + (waitsFor.isEmpty() ? "" : ": the run waits for " + waitsFor));
             }
         }
     }
@@ -278,11 +311,14 @@ final class Stepper {
                     continue;
                 }
                 for (Entry entry : step.parts.get(i)) {
-                    if (!entry.here) wanted.add(wanted(number, entry.channel, entry.sequence, entry.data.length));
+                    if (!entry.here)
+                        wanted.add(
+                                wanted(number, entry.channel, entry.sequence, entry.data.length));
                 }
             }
         }
-        if (wanted.size() > MOST_WANTED) wanted = wanted.subList(0, MOST_WANTED);    // the rest when these have come
+        if (wanted.size() > MOST_WANTED)
+            wanted = wanted.subList(0, MOST_WANTED); // the rest when these have come
         resend_request_t body = new resend_request_t();
         body.received = have;
         body.nwanted = wanted.size();
@@ -301,13 +337,19 @@ final class Stepper {
 
     private synchronized Observations collect() {
         List<Observations.Message> messages = new ArrayList<>();
-        for (Iterator<java.util.Map.Entry<Long, Step>> all = steps.headMap(have, true).entrySet().iterator(); all.hasNext(); all.remove()) {
+        for (Iterator<java.util.Map.Entry<Long, Step>> all =
+                        steps.headMap(have, true).entrySet().iterator();
+                all.hasNext();
+                all.remove()) {
             java.util.Map.Entry<Long, Step> next = all.next();
             Step step = next.getValue();
             last = new long[] {step.utime, next.getKey(), step.stateHash};
             for (List<Entry> entries : step.parts) {
                 for (Entry entry : entries) {
-                    String name = entry.channel < info.channelList.size() ? info.channelList.get(entry.channel).name : "";
+                    String name =
+                            entry.channel < info.channelList.size()
+                                    ? info.channelList.get(entry.channel).name
+                                    : "";
                     messages.add(new Observations.Message(next.getKey(), name, entry.data));
                 }
             }
@@ -326,12 +368,15 @@ final class Stepper {
     private synchronized void onMessage(int channel, byte[] data) {
         if (!part || data.length < 16) return;
         int crc = crc(data);
-        for (Step step : steps.values()) {    // a tick may come before its messages
+        for (Step step : steps.values()) { // a tick may come before its messages
             if (step.missing == 0) continue;
             for (List<Entry> entries : step.parts) {
                 if (entries == null) continue;
                 for (Entry entry : entries) {
-                    if (entry.here || entry.channel != channel || entry.crc != crc || entry.size != data.length) continue;
+                    if (entry.here
+                            || entry.channel != channel
+                            || entry.crc != crc
+                            || entry.size != data.length) continue;
                     entry.data = data;
                     entry.here = true;
                     step.missing--;
@@ -366,13 +411,17 @@ final class Stepper {
         if (run != runId || index < 0 || index >= nparts) return;
         if (tickEpoch != epoch) {
             if (tickEpoch > epoch && fault == null) {
-                fault = new RuedoException("the world was reset by another client: the next step begins anew");
+                fault =
+                        new RuedoException(
+                                "the world was reset by another client: the next step begins anew");
             }
             notifyAll();
             return;
         }
         newest = Math.max(newest, number);
-        for (int n = in.count(13); n > 0; n--) {    // applied: only this says that the grant was executed
+        for (int n = in.count(13);
+                n > 0;
+                n--) { // applied: only this says that the grant was executed
             boolean mine = in.string().equals(session.name());
             if (in.int64() >= grantSequence && mine && number > grantFrom) taken = true;
         }
@@ -390,9 +439,12 @@ final class Stepper {
             entry.sequence = in.int64();
             entry.size = in.int32();
             entry.crc = in.int32();
-            if (entry.channel < 0 || entry.channel >= 1 << 20) throw new IOException("a channel's index");
-            while (entry.channel >= early.size()) early.add(new ArrayDeque<>());    // of a model that came since
-            for (Iterator<Early> all = early.get(entry.channel).iterator(); all.hasNext() && !entry.here;) {
+            if (entry.channel < 0 || entry.channel >= 1 << 20)
+                throw new IOException("a channel's index");
+            while (entry.channel >= early.size())
+                early.add(new ArrayDeque<>()); // of a model that came since
+            for (Iterator<Early> all = early.get(entry.channel).iterator();
+                    all.hasNext() && !entry.here; ) {
                 Early one = all.next();
                 if (one.crc != entry.crc || one.data.length != entry.size) continue;
                 entry.data = one.data;
@@ -409,12 +461,15 @@ final class Stepper {
     }
 
     private void progress() {
-        for (Step step = steps.get(have + 1); step != null && step.complete(); step = steps.get(have + 1)) {
+        for (Step step = steps.get(have + 1);
+                step != null && step.complete();
+                step = steps.get(have + 1)) {
             have++;
             for (List<Entry> entries : step.parts) {
-                for (Entry entry : entries) {    // what is left of the time before came twice
+                for (Entry entry : entries) { // what is left of the time before came twice
                     ArrayDeque<Early> queue = early.get(entry.channel);
-                    while (!queue.isEmpty() && queue.peekFirst().utime <= step.utime) queue.removeFirst();
+                    while (!queue.isEmpty() && queue.peekFirst().utime <= step.utime)
+                        queue.removeFirst();
                 }
             }
         }
@@ -426,23 +481,24 @@ final class Stepper {
         if (!part) return;
         boolean granting = reply.kind == request_t.GRANT;
         if (reply.code != reply_t.OK) {
-            if (reply.sequence != (granting ? grantSequence : resends) || (granting && taken)) return;
+            if (reply.sequence != (granting ? grantSequence : resends) || (granting && taken))
+                return;
             if (fault == null) fault = faultOf(reply);
         } else if (!granting) {
             try {
                 takePieces(new WireReader(reply.body));
             } catch (IOException error) {
-                return;    // broken: it is asked for again
+                return; // broken: it is asked for again
             }
         } else if (reply.sequence == grantSequence && !taken) {
-            taken = true;    // it was repeated: its ticks may be lost
+            taken = true; // it was repeated: its ticks may be lost
             askNow = true;
         }
         notifyAll();
     }
 
     private void takePieces(WireReader in) throws IOException {
-        in.int64();    // fingerprint
+        in.int64(); // fingerprint
         newest = Math.max(newest, in.int64());
         waitsFor = in.string();
         int count = in.count(32);
@@ -451,7 +507,7 @@ final class Stepper {
             Step step = steps.get(in.int64());
             int channel = in.int32();
             long sequence = in.int64();
-            in.int32();    // total
+            in.int32(); // total
             int offset = in.int32();
             byte[] piece = in.bytes(in.count(1));
             if (channel == info.tickChannel) {
@@ -462,14 +518,17 @@ final class Stepper {
         }
         for (byte[] tick : ticks) takeTick(tick);
         progress();
-        askNow = count > 0;    // more may be missing than goes into one reply
+        askNow = count > 0; // more may be missing than goes into one reply
     }
 
     private static void addPiece(Step step, int channel, long sequence, int offset, byte[] piece) {
         for (List<Entry> entries : step.parts) {
             if (entries == null) continue;
             for (Entry entry : entries) {
-                if (entry.here || entry.channel != channel || entry.sequence != sequence || entry.data.length != offset) continue;
+                if (entry.here
+                        || entry.channel != channel
+                        || entry.sequence != sequence
+                        || entry.data.length != offset) continue;
                 if (piece.length > entry.size - offset) continue;
                 byte[] longer = java.util.Arrays.copyOf(entry.data, offset + piece.length);
                 System.arraycopy(piece, 0, longer, offset, piece.length);
@@ -479,7 +538,7 @@ final class Stepper {
                     entry.here = true;
                     step.missing--;
                 } else {
-                    entry.data = new byte[0];    // from the start again
+                    entry.data = new byte[0]; // from the start again
                 }
             }
         }
@@ -487,8 +546,10 @@ final class Stepper {
 
     private static RuedoException faultOf(reply_t reply) {
         String text = (reply.kind == request_t.GRANT ? "GRANT: " : "RESEND: ") + reply.text;
-        if (reply.code == reply_t.UNKNOWN_SESSION) return new RuedoException.LeaseLost(text, reply.code);
-        if (reply.code == reply_t.WRONG_RUN || reply.code == reply_t.REFUSED) return new RuedoException.NoServer(text);
+        if (reply.code == reply_t.UNKNOWN_SESSION)
+            return new RuedoException.LeaseLost(text, reply.code);
+        if (reply.code == reply_t.WRONG_RUN || reply.code == reply_t.REFUSED)
+            return new RuedoException.NoServer(text);
         return new RuedoException.RequestError(text, reply.code);
     }
 }

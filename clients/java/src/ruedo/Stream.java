@@ -1,22 +1,25 @@
 package ruedo;
 
+import ruedo.lcmtypes.channel_info_t;
+
 import java.io.IOException;
 import java.util.List;
 import java.util.concurrent.CopyOnWriteArrayList;
 import java.util.function.Consumer;
-import ruedo.lcmtypes.channel_info_t;
 
 /**
- * A stream of samples from one channel. Thread safe; the first use subscribes. It is a reader of itself; who reads beside it
- * takes a {@link #reader()} of its own.
+ * A stream of samples from one channel. Thread safe; the first use subscribes. It is a reader of
+ * itself; who reads beside it takes a {@link #reader()} of its own.
  *
  * @param <T> kind of sample
  */
 public class Stream<T extends Sample> extends Reader<T> {
     /** Its name on the bus. */
     public final String channel;
+
     /** Its message type. */
     public final String type;
+
     /** Hz of sim time; 0: every step, or when something happens. */
     public final double rate;
 
@@ -24,9 +27,9 @@ public class Stream<T extends Sample> extends Reader<T> {
     private final long fingerprint;
     private final Conversions.Conversion conversion;
     private final List<Subscription> callbacks = new CopyOnWriteArrayList<>();
-    private Subscription source;    // these under this object's monitor
+    private Subscription source; // these under this object's monitor
     private T sample;
-    private long count;             // samples received
+    private long count; // samples received
     private RuedoException fault;
 
     Stream(Simulation sim, channel_info_t info) {
@@ -45,8 +48,9 @@ public class Stream<T extends Sample> extends Reader<T> {
     }
 
     /**
-     * Calls back in the receiving thread for every sample from now on, until what it returns is closed (or the simulation).
-     * The callback must be quick, and must not wait for other samples or replies.
+     * Calls back in the receiving thread for every sample from now on, until what it returns is
+     * closed (or the simulation). The callback must be quick, and must not wait for other samples
+     * or replies.
      */
     public Subscription onSample(Consumer<? super T> callback) {
         Subscription subscription = Subscription.of(channel, callback, callbacks::remove);
@@ -60,8 +64,12 @@ public class Stream<T extends Sample> extends Reader<T> {
         synchronized (this) {
             if (source != null) return;
             if (conversion == null) {
-                throw new RuedoException.TypeMismatch(channel + ": this client does not know the type " + type
-                        + " of the server's Ruedo " + sim.version());
+                throw new RuedoException.TypeMismatch(
+                        channel
+                                + ": this client does not know the type "
+                                + type
+                                + " of the server's Ruedo "
+                                + sim.version());
             }
             if (fingerprint != conversion.fingerprint) throw mismatch(fingerprint);
             source = sim.bus.subscribe(channel, this::receive);
@@ -85,9 +93,12 @@ public class Stream<T extends Sample> extends Reader<T> {
     }
 
     private RuedoException.TypeMismatch mismatch(long found) {
-        return new RuedoException.TypeMismatch(String.format(
-                "%s carries another version of %s (fingerprint %016x) than this client reads (%016x): the server is Ruedo %s; "
-                + "use the client of the same version", channel, type, found, conversion.fingerprint, sim.version()));
+        return new RuedoException.TypeMismatch(
+                String.format(
+                        "%s carries another version of %s (fingerprint %016x) than this client"
+                            + " reads (%016x): the server is Ruedo %s; use the client of the same"
+                            + " version",
+                        channel, type, found, conversion.fingerprint, sim.version()));
     }
 
     @SuppressWarnings("unchecked")
@@ -102,8 +113,15 @@ public class Stream<T extends Sample> extends Reader<T> {
         } catch (RuedoException error) {
             wrong = error;
         } catch (IOException error) {
-            wrong = new RuedoException.TypeMismatch(channel + ": a message of " + message.length + " bytes is no valid " + type
-                    + ": " + error.getMessage());
+            wrong =
+                    new RuedoException.TypeMismatch(
+                            channel
+                                    + ": a message of "
+                                    + message.length
+                                    + " bytes is no valid "
+                                    + type
+                                    + ": "
+                                    + error.getMessage());
         }
         synchronized (this) {
             fault = wrong;
@@ -129,8 +147,10 @@ public class Stream<T extends Sample> extends Reader<T> {
                     throw thrown;
                 }
                 if (deadline.passed()) {
-                    throw new RuedoException.Timeout(String.format("no sample on %s within %s s (%s)", channel,
-                            Deadline.text(timeout), sim.whatIsKnown(rate)));
+                    throw new RuedoException.Timeout(
+                            String.format(
+                                    "no sample on %s within %s s (%s)",
+                                    channel, Deadline.text(timeout), sim.whatIsKnown(rate)));
                 }
                 deadline.waitOn(this, 500);
                 sim.checkServer();

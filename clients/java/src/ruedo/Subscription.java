@@ -3,8 +3,8 @@ package ruedo;
 import java.util.function.Consumer;
 
 /**
- * A callback that is called until close(), which try-with-resources does at its end. What it throws, an Error too, is said on
- * the terminal once, and hurts nobody else.
+ * A callback that is called until close(), which try-with-resources does at its end. What it
+ * throws, an Error too, is said on the terminal once, and hurts nobody else.
  */
 public final class Subscription implements AutoCloseable {
     private final Runnable callback;
@@ -14,7 +14,8 @@ public final class Subscription implements AutoCloseable {
     private volatile boolean closed;
     private boolean failed;
 
-    private Subscription(String what, Runnable callback, Consumer<Object> taker, Consumer<Subscription> leave) {
+    private Subscription(
+            String what, Runnable callback, Consumer<Object> taker, Consumer<Subscription> leave) {
         this.what = what;
         this.callback = callback;
         this.taker = taker;
@@ -23,7 +24,8 @@ public final class Subscription implements AutoCloseable {
 
     /** leave: what takes it from those that are called. */
     @SuppressWarnings("unchecked")
-    static <T> Subscription of(String what, Consumer<? super T> callback, Consumer<Subscription> leave) {
+    static <T> Subscription of(
+            String what, Consumer<? super T> callback, Consumer<Subscription> leave) {
         return new Subscription(what, null, (Consumer<Object>) callback, leave);
     }
 
@@ -51,10 +53,15 @@ public final class Subscription implements AutoCloseable {
         try {
             if (taker != null) taker.accept(argument);
             else callback.run();
-        } catch (Throwable error) {    // an Error, too, leaves the receiving thread alive
+        } catch (Throwable error) { // an Error, too, leaves the receiving thread alive
             if (failed) return;
             failed = true;
-            System.err.println("ruedo: a callback on " + what + " failed: " + error + "; it is called on, and this is said once");
+            System.err.println(
+                    "ruedo: a callback on "
+                            + what
+                            + " failed: "
+                            + error
+                            + "; it is called on, and this is said once");
         }
     }
 

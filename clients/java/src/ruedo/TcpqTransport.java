@@ -9,8 +9,9 @@ import java.util.LinkedHashSet;
 import java.util.Set;
 
 /**
- * LCM over TCP, or a Unix-domain socket with the same frames, connected again when the server comes back. LCM's own class for it is not used: it walks through its
- * subscriptions while others add to them, and its thread ends by that, or by an Error in a callback.
+ * LCM over TCP, or a Unix-domain socket with the same frames, connected again when the server comes
+ * back. LCM's own class for it is not used: it walks through its subscriptions while others add to
+ * them, and its thread ends by that, or by an Error in a callback.
  */
 final class TcpqTransport implements Transport {
     private static final int CLIENT = 0x287617fb;
@@ -19,13 +20,14 @@ final class TcpqTransport implements Transport {
     private static final int PUBLISH = 1;
     private static final int SUBSCRIBE = 2;
     private static final int UNSUBSCRIBE = 3;
-    private static final int LONGEST_CHANNEL = 1 << 10;    // bytes
+    private static final int LONGEST_CHANNEL = 1 << 10; // bytes
     private static final int LONGEST = 256 << 20;
     private static final long AGAIN_MILLIS = 500;
 
     private final Address address;
-    private final Set<String> subscriptions = new LinkedHashSet<>();    // these under this object's monitor
-    private Link link;    // null: not connected
+    private final Set<String> subscriptions =
+            new LinkedHashSet<>(); // these under this object's monitor
+    private Link link; // null: not connected
     private volatile boolean closed;
 
     TcpqTransport(Address address) {
@@ -33,8 +35,11 @@ final class TcpqTransport implements Transport {
         try {
             connect();
         } catch (IOException error) {
-            throw new RuedoException.NoServer(address.url + ": it cannot be used (" + error.getMessage()
-                    + "); `ruedo doctor` looks for what is wrong");
+            throw new RuedoException.NoServer(
+                    address.url
+                            + ": it cannot be used ("
+                            + error.getMessage()
+                            + "); `ruedo doctor` looks for what is wrong");
         }
     }
 
@@ -74,7 +79,10 @@ final class TcpqTransport implements Transport {
 
     private static ByteBuffer named(int kind, String channel, int more) {
         byte[] name = channel.getBytes(StandardCharsets.US_ASCII);
-        return ByteBuffer.allocate(8 + name.length + more).putInt(kind).putInt(name.length).put(name);
+        return ByteBuffer.allocate(8 + name.length + more)
+                .putInt(kind)
+                .putInt(name.length)
+                .put(name);
     }
 
     private synchronized void send(ByteBuffer bytes) {
@@ -88,7 +96,7 @@ final class TcpqTransport implements Transport {
 
     private synchronized void drop() {
         try {
-            if (link != null) link.close();    // a read under way ends
+            if (link != null) link.close(); // a read under way ends
         } catch (IOException error) {
             // it is gone
         }
@@ -101,7 +109,8 @@ final class TcpqTransport implements Transport {
             made.setTimeout(2000);
             made.write(ByteBuffer.allocate(8).putInt(CLIENT).putInt(VERSION).array(), 8);
             ByteBuffer hello = ByteBuffer.wrap(made.input().readNBytes(8));
-            if (hello.remaining() < 8 || hello.getInt() != SERVER) throw new IOException("no LCM server answers there");
+            if (hello.remaining() < 8 || hello.getInt() != SERVER)
+                throw new IOException("no LCM server answers there");
             made.setTimeout(0);
         } catch (IOException error) {
             made.close();
@@ -111,7 +120,10 @@ final class TcpqTransport implements Transport {
         for (String channel : subscriptions) send(named(SUBSCRIBE, pattern(channel), 0));
     }
 
-    /** The connection that there is, made again if need be; null: none can be had now, or this is closed. */
+    /**
+     * The connection that there is, made again if need be; null: none can be had now, or this is
+     * closed.
+     */
     private synchronized DataInputStream input() throws IOException {
         if (link == null && !closed) {
             try {
@@ -124,7 +136,9 @@ final class TcpqTransport implements Transport {
                 }
             }
         }
-        return link == null ? null : new DataInputStream(new BufferedInputStream(link.input(), 1 << 16));
+        return link == null
+                ? null
+                : new DataInputStream(new BufferedInputStream(link.input(), 1 << 16));
     }
 
     private void run(Receiver receiver) {
@@ -139,13 +153,14 @@ final class TcpqTransport implements Transport {
     }
 
     private static void takeOne(DataInputStream in, Receiver receiver) throws IOException {
-        in.readInt();    // kind
-        String channel = new String(in.readNBytes(length(in, LONGEST_CHANNEL)), StandardCharsets.US_ASCII);
+        in.readInt(); // kind
+        String channel =
+                new String(in.readNBytes(length(in, LONGEST_CHANNEL)), StandardCharsets.US_ASCII);
         byte[] message = new byte[length(in, LONGEST)];
         in.readFully(message);
         try {
             if (receiver.wants(channel)) receiver.receive(channel, message);
-        } catch (Throwable error) {    // whatever came, the receiving thread lives
+        } catch (Throwable error) { // whatever came, the receiving thread lives
             System.err.println("ruedo: a message was passed over: " + error);
         }
     }

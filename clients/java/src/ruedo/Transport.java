@@ -2,7 +2,10 @@ package ruedo;
 
 /** What carries messages. Thread safe, also within the receiver. */
 interface Transport {
-    /** Called by the transport's own thread, one message at a time. What it throws does not end that thread. */
+    /**
+     * Called by the transport's own thread, one message at a time. What it throws does not end that
+     * thread.
+     */
     interface Receiver {
         /** Whether anybody listens to that channel: else its messages are passed over. */
         boolean wants(String channel);

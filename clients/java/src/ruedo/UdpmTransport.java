@@ -16,16 +16,16 @@ import java.util.LinkedHashMap;
 import java.util.Map;
 
 /**
- * LCM over multicast: short messages in one datagram, long ones in fragments. LCM's own class for it is not used: its reader
- * thread ends at the first broken datagram, and at an Error in a callback; it holds a lock while callbacks run; it cannot be
- * closed in silence.
+ * LCM over multicast: short messages in one datagram, long ones in fragments. LCM's own class for
+ * it is not used: its reader thread ends at the first broken datagram, and at an Error in a
+ * callback; it holds a lock while callbacks run; it cannot be closed in silence.
  */
 final class UdpmTransport implements Transport {
-    private static final int SHORT = 0x4c433032;          // "LC02"
-    private static final int LONG = 0x4c433033;           // "LC03"
-    private static final int MOST_IN_A_DATAGRAM = 64000;  // bytes of channel and message
-    private static final int LONGEST = 64 << 20;          // bytes of a message that is put together
-    private static final int MOST_SENDERS = 32;           // of messages that are not whole yet
+    private static final int SHORT = 0x4c433032; // "LC02"
+    private static final int LONG = 0x4c433033; // "LC03"
+    private static final int MOST_IN_A_DATAGRAM = 64000; // bytes of channel and message
+    private static final int LONGEST = 64 << 20; // bytes of a message that is put together
+    private static final int MOST_SENDERS = 32; // of messages that are not whole yet
 
     /** Of each sender the newest message that is not whole yet. */
     private static final class Partial {
@@ -44,21 +44,23 @@ final class UdpmTransport implements Transport {
 
     private final InetSocketAddress group;
     private final DatagramChannel socket;
-    private int sequence;    // under this object's monitor
+    private int sequence; // under this object's monitor
     private volatile boolean closed;
-    private final Map<SocketAddress, Partial> partials = new LinkedHashMap<>() {    // the receiving thread's
-        private static final long serialVersionUID = 1L;
+    private final Map<SocketAddress, Partial> partials =
+            new LinkedHashMap<>() { // the receiving thread's
+                private static final long serialVersionUID = 1L;
 
-        @Override
-        protected boolean removeEldestEntry(Map.Entry<SocketAddress, Partial> eldest) {
-            return size() > MOST_SENDERS;
-        }
-    };
+                @Override
+                protected boolean removeEldestEntry(Map.Entry<SocketAddress, Partial> eldest) {
+                    return size() > MOST_SENDERS;
+                }
+            };
 
     UdpmTransport(Address address) {
         try {
             group = new InetSocketAddress(InetAddress.getByName(address.host), address.port);
-            // Of IPv4: multicast over IPv6 sockets does not reach IPv4 groups everywhere, and java.net.preferIPv4Stack is read
+            // Of IPv4: multicast over IPv6 sockets does not reach IPv4 groups everywhere, and
+            // java.net.preferIPv4Stack is read
             // before this could set it when Java starts from a module path.
             socket = DatagramChannel.open(StandardProtocolFamily.INET);
             socket.setOption(StandardSocketOptions.SO_REUSEADDR, true);
@@ -66,11 +68,16 @@ final class UdpmTransport implements Transport {
             int buffer = address.option("recv_buf_size", 0);
             if (buffer > 0) socket.setOption(StandardSocketOptions.SO_RCVBUF, buffer);
             socket.setOption(StandardSocketOptions.IP_MULTICAST_LOOP, true);
-            socket.setOption(StandardSocketOptions.IP_MULTICAST_TTL, Math.max(0, Math.min(255, address.option("ttl", 0))));
+            socket.setOption(
+                    StandardSocketOptions.IP_MULTICAST_TTL,
+                    Math.max(0, Math.min(255, address.option("ttl", 0))));
             socket.join(group.getAddress(), routeTo(group));
         } catch (IOException | RuntimeException error) {
-            throw new RuedoException.NoServer(address.url + ": it cannot be used (" + error.getMessage()
-                    + "); `ruedo doctor` looks for what is wrong");
+            throw new RuedoException.NoServer(
+                    address.url
+                            + ": it cannot be used ("
+                            + error.getMessage()
+                            + "); `ruedo doctor` looks for what is wrong");
         }
     }
 
@@ -79,9 +86,11 @@ final class UdpmTransport implements Transport {
         try (DatagramChannel probe = DatagramChannel.open(StandardProtocolFamily.INET)) {
             probe.connect(group);
             InetAddress own = ((InetSocketAddress) probe.getLocalAddress()).getAddress();
-            if (own.isAnyLocalAddress()) own = InetAddress.getByName("127.0.0.1");    // loopback's own is given to no way out
+            if (own.isAnyLocalAddress())
+                own = InetAddress.getByName("127.0.0.1"); // loopback's own is given to no way out
             NetworkInterface found = NetworkInterface.getByInetAddress(own);
-            if (found == null) throw new IOException("no interface has the address " + own.getHostAddress());
+            if (found == null)
+                throw new IOException("no interface has the address " + own.getHostAddress());
             return found;
         }
     }
@@ -94,7 +103,7 @@ final class UdpmTransport implements Transport {
     }
 
     @Override
-    public void subscribe(String channel) {}    // all come
+    public void subscribe(String channel) {} // all come
 
     @Override
     public void unsubscribe(String channel) {}
@@ -112,12 +121,17 @@ final class UdpmTransport implements Transport {
     @Override
     public void publish(String channel, byte[] message) {
         byte[] name = (channel + "\0").getBytes(StandardCharsets.US_ASCII);
-        boolean interrupted = Thread.interrupted();    // sending with that set would close the channel
+        boolean interrupted = Thread.interrupted(); // sending with that set would close the channel
         try {
             synchronized (this) {
                 sequence++;
                 if (name.length + message.length <= MOST_IN_A_DATAGRAM) {
-                    send(ByteBuffer.allocate(8 + name.length + message.length).putInt(SHORT).putInt(sequence).put(name).put(message));
+                    send(
+                            ByteBuffer.allocate(8 + name.length + message.length)
+                                    .putInt(SHORT)
+                                    .putInt(sequence)
+                                    .put(name)
+                                    .put(message));
                 } else {
                     sendFragments(name, message);
                 }
@@ -134,8 +148,14 @@ final class UdpmTransport implements Transport {
         int fragments = 1 + (message.length - first + MOST_IN_A_DATAGRAM - 1) / MOST_IN_A_DATAGRAM;
         for (int i = 0, at = 0; i < fragments; i++) {
             int size = Math.min(i == 0 ? first : MOST_IN_A_DATAGRAM, message.length - at);
-            ByteBuffer out = ByteBuffer.allocate(20 + name.length + size).putInt(LONG).putInt(sequence).putInt(message.length)
-                    .putInt(at).putShort((short) i).putShort((short) fragments);
+            ByteBuffer out =
+                    ByteBuffer.allocate(20 + name.length + size)
+                            .putInt(LONG)
+                            .putInt(sequence)
+                            .putInt(message.length)
+                            .putInt(at)
+                            .putShort((short) i)
+                            .putShort((short) fragments);
             if (i == 0) out.put(name);
             send(out.put(message, at, size));
             at += size;
@@ -157,7 +177,7 @@ final class UdpmTransport implements Transport {
                 take(packet, sender, receiver);
             } catch (IOException error) {
                 if (!closed) pause();
-            } catch (Throwable error) {    // whatever came, the receiving thread lives
+            } catch (Throwable error) { // whatever came, the receiving thread lives
                 System.err.println("ruedo: a message was passed over: " + error);
             }
         }

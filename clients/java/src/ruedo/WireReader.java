@@ -8,11 +8,12 @@ import java.util.ArrayList;
 import java.util.List;
 
 /**
- * Reads an LCM message field by field: what a length promises must be there before memory is taken for it. (lcm-gen's own
- * decoders allocate first, 8 GB for a length that lies.) Every method throws IOException for bytes that are too few.
+ * Reads an LCM message field by field: what a length promises must be there before memory is taken
+ * for it. (lcm-gen's own decoders allocate first, 8 GB for a length that lies.) Every method throws
+ * IOException for bytes that are too few.
  */
 final class WireReader {
-    private final ByteBuffer bytes;    // big endian, as LCM writes
+    private final ByteBuffer bytes; // big endian, as LCM writes
 
     WireReader(byte[] message) {
         bytes = ByteBuffer.wrap(message);
@@ -58,20 +59,23 @@ final class WireReader {
         return get(bytes::getDouble);
     }
 
-    /** An int32_t that counts elements of at least so many bytes each, which must still be there. */
+    /**
+     * An int32_t that counts elements of at least so many bytes each, which must still be there.
+     */
     int count(int elementSize) throws IOException {
         return fits(int32(), elementSize);
     }
 
     int fits(int n, int elementSize) throws IOException {
         if (n < 0 || n > bytes.remaining() / elementSize) {
-            throw new IOException("a length of " + n + " with " + bytes.remaining() + " bytes left");
+            throw new IOException(
+                    "a length of " + n + " with " + bytes.remaining() + " bytes left");
         }
         return n;
     }
 
     String string() throws IOException {
-        int length = count(1);    // with its closing zero
+        int length = count(1); // with its closing zero
         if (length == 0) throw new IOException("a string without an end");
         byte[] text = bytes(length);
         return new String(text, 0, length - 1, StandardCharsets.UTF_8);

@@ -1,5 +1,11 @@
 package ruedo;
 
+import ruedo.lcmtypes.body_info_t;
+import ruedo.lcmtypes.channel_info_t;
+import ruedo.lcmtypes.device_info_t;
+import ruedo.lcmtypes.robot_info_t;
+import ruedo.lcmtypes.world_info_t;
+
 import java.io.IOException;
 import java.nio.ByteBuffer;
 import java.util.ArrayList;
@@ -8,19 +14,14 @@ import java.util.HashMap;
 import java.util.LinkedHashMap;
 import java.util.List;
 import java.util.Map;
-import ruedo.lcmtypes.body_info_t;
-import ruedo.lcmtypes.channel_info_t;
-import ruedo.lcmtypes.device_info_t;
-import ruedo.lcmtypes.robot_info_t;
-import ruedo.lcmtypes.world_info_t;
 
 /** One complete ruedo/info; immutable. */
 final class WorldInfo {
     final world_info_t head;
     final Map<String, robot_info_t> robots = new LinkedHashMap<>();
-    final List<channel_info_t> channelList = new ArrayList<>();    // as ruedo/tick counts them
-    final List<Body> bodies;                                       // that are there now
-    final int tickChannel;                                         // in that list; -1: there is none
+    final List<channel_info_t> channelList = new ArrayList<>(); // as ruedo/tick counts them
+    final List<Body> bodies; // that are there now
+    final int tickChannel; // in that list; -1: there is none
     private final Map<String, List<device_info_t>> devices = new HashMap<>();
     private final Map<String, List<channel_info_t>> channels = new HashMap<>();
 
@@ -33,7 +34,7 @@ final class WorldInfo {
             for (device_info_t device : part.devices) {
                 devices.computeIfAbsent(device.robot, key -> new ArrayList<>()).add(device);
             }
-            for (body_info_t body : part.bodies) {    // one that was removed has no name
+            for (body_info_t body : part.bodies) { // one that was removed has no name
                 if (!body.name.isEmpty()) there.add(new Body(body.name, body.is_static, body.mass));
             }
             for (channel_info_t channel : part.channels) {
@@ -60,7 +61,7 @@ final class WorldInfo {
 
     private static world_info_t readPart(WireReader in) throws IOException {
         world_info_t part = new world_info_t();
-        in.int64();    // fingerprint
+        in.int64(); // fingerprint
         part.utime = in.int64();
         part.run_id = in.int64();
         part.epoch = in.int32();
@@ -144,29 +145,37 @@ final class WorldInfo {
     }
 
     /**
-     * Takes messages of ruedo/info as they come. The parts of one info share run, epoch and utime. An info that says again
-     * what the last one said, which is the rule, is known by its bytes and not decoded.
+     * Takes messages of ruedo/info as they come. The parts of one info share run, epoch and utime.
+     * An info that says again what the last one said, which is the rule, is known by its bytes and
+     * not decoded.
      */
     static final class Assembler {
-        private static final int HEAD = 8 + 8 + 8 + 4 + 2 + 2;    // bytes: fingerprint, utime, run, epoch, part, nparts
+        private static final int HEAD =
+                8 + 8 + 8 + 4 + 2 + 2; // bytes: fingerprint, utime, run, epoch, part, nparts
         private byte[] key = {};
         private Map<Integer, byte[]> parts = new HashMap<>();
         private List<byte[]> last = List.of();
 
-        /** The info, when this message completed a new one, else null. Throws TypeMismatch for another version. */
+        /**
+         * The info, when this message completed a new one, else null. Throws TypeMismatch for
+         * another version.
+         */
         WorldInfo add(byte[] bytes) {
             if (bytes.length < HEAD) return null;
             ByteBuffer head = ByteBuffer.wrap(bytes);
             long fingerprint = head.getLong();
             if (fingerprint != world_info_t.LCM_FINGERPRINT) {
-                throw new RuedoException.TypeMismatch(String.format("ruedo/info carries another version of world_info_t "
-                        + "(fingerprint %016x) than this client reads (%016x): use the client of the server's version",
-                        fingerprint, world_info_t.LCM_FINGERPRINT));
+                throw new RuedoException.TypeMismatch(
+                        String.format(
+                                "ruedo/info carries another version of world_info_t (fingerprint"
+                                    + " %016x) than this client reads (%016x): use the client of"
+                                    + " the server's version",
+                                fingerprint, world_info_t.LCM_FINGERPRINT));
             }
             int part = head.getShort(28);
             int nparts = head.getShort(30);
             if (part < 0 || part >= nparts) return null;
-            byte[] found = Arrays.copyOfRange(bytes, 8, 28);    // utime, run, epoch
+            byte[] found = Arrays.copyOfRange(bytes, 8, 28); // utime, run, epoch
             if (!Arrays.equals(found, key)) parts = new HashMap<>();
             key = found;
             parts.put(part, bytes);
@@ -176,7 +185,11 @@ final class WorldInfo {
             for (int i = 0; i < nparts; i++) {
                 if (!parts.containsKey(i)) return null;
                 whole.add(parts.get(i));
-                content.add(Arrays.copyOfRange(parts.get(i), 16, parts.get(i).length));    // all but fingerprint and utime
+                content.add(
+                        Arrays.copyOfRange(
+                                parts.get(i),
+                                16,
+                                parts.get(i).length)); // all but fingerprint and utime
             }
             parts = new HashMap<>();
             if (same(content, last)) return null;
@@ -184,7 +197,8 @@ final class WorldInfo {
             try {
                 for (byte[] message : whole) decoded.add(readPart(new WireReader(message)));
             } catch (IOException error) {
-                throw new RuedoException.TypeMismatch("a message on ruedo/info is no valid world_info_t: " + error.getMessage());
+                throw new RuedoException.TypeMismatch(
+                        "a message on ruedo/info is no valid world_info_t: " + error.getMessage());
             }
             last = content;
             return new WorldInfo(decoded);

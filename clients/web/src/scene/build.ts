@@ -1,16 +1,24 @@
-// Turns the description into instanced meshes: all links of a kind are one mesh for each of its surfaces, so that a
-// thousand robots are a few draw calls.
+// Turns the description into instanced meshes: all links of a kind are one mesh for each of its
+// surfaces, so that a thousand robots are a few draw calls.
 import * as THREE from "three";
 import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 import { plainKinds } from "./plain";
 import { Flag, type LinkData, type Part, type SceneFiles } from "./description";
 
-const kSmall = 0.5;        // of a link's largest part: smaller ones are left out far away
+const kSmall = 0.5; // of a link's largest part: smaller ones are left out far away
 
 // Links of one kind that move, and the meshes that show them.
-export interface Movers { links: LinkData[]; indices: number[]; meshes: THREE.InstancedMesh[]; far: Far | null }
+export interface Movers {
+  links: LinkData[];
+  indices: number[];
+  meshes: THREE.InstancedMesh[];
+  far: Far | null;
+}
 // Of many links: what shows those far away, and the matrices of all of them.
-export interface Far { mesh: THREE.InstancedMesh; matrices: Float32Array }
+export interface Far {
+  mesh: THREE.InstancedMesh;
+  matrices: Float32Array;
+}
 export interface Built {
   still: THREE.Group;
   moving: THREE.Group;
@@ -18,9 +26,15 @@ export interface Built {
   grounds: THREE.Mesh[];
 }
 
-interface Surface { geometry: THREE.BufferGeometry; material: THREE.Material; shadow: boolean; ground: boolean }
+interface Surface {
+  geometry: THREE.BufferGeometry;
+  material: THREE.Material;
+  shadow: boolean;
+  ground: boolean;
+}
 
-const sRGB = (rgb: number[]) => new THREE.Color().setRGB(rgb[0]!, rgb[1]!, rgb[2]!, THREE.SRGBColorSpace);
+const sRGB = (rgb: number[]) =>
+  new THREE.Color().setRGB(rgb[0]!, rgb[1]!, rgb[2]!, THREE.SRGBColorSpace);
 
 function gridTexture(): THREE.Texture {
   const size = 256;
@@ -45,17 +59,22 @@ export class SceneBuilder {
   constructor(private readonly files: SceneFiles) {}
 
   build(): Built {
-    const still = new THREE.Group(), moving = new THREE.Group();
+    const still = new THREE.Group(),
+      moving = new THREE.Group();
     const built: Built = { still, moving, movers: [], grounds: [] };
-    const { kinds } = this.files.description, indicesOf: number[][] = kinds.map(() => []);
+    const { kinds } = this.files.description,
+      indicesOf: number[][] = kinds.map(() => []);
     this.files.links.forEach((link, index) => indicesOf[link.kind]?.push(index));
-    const plain = plainKinds(kinds.map((parts) => this.triangles(parts)), indicesOf.map(({ length }) => length));
+    const plain = plainKinds(
+      kinds.map((parts) => this.triangles(parts)),
+      indicesOf.map(({ length }) => length),
+    );
     kinds.forEach((parts, kind) => {
       const indices = indicesOf[kind]!;
       if (indices.length === 0) return;
       const surfaces = this.surfaces(parts, plain.has(kind));
       const place = (moves: boolean, into: THREE.Group): Movers | undefined => {
-        const chosen = indices.filter((index) => (this.files.links[index]!.body >= 0) === moves);
+        const chosen = indices.filter((index) => this.files.links[index]!.body >= 0 === moves);
         if (chosen.length === 0) return undefined;
         const links = chosen.map((index) => this.files.links[index]!);
         const meshes = surfaces.map((surface) => {
@@ -69,11 +88,19 @@ export class SceneBuilder {
           if (surface.ground) built.grounds.push(mesh);
           return mesh;
         });
-        return { links, indices: chosen, meshes, far: moves && plain.has(kind) ? this.far(parts, links.length, into) : null };
+        return {
+          links,
+          indices: chosen,
+          meshes,
+          far: moves && plain.has(kind) ? this.far(parts, links.length, into) : null,
+        };
       };
       const stillOnes = place(false, still);
       if (stillOnes) {
-        const matrix = new THREE.Matrix4(), one = new THREE.Vector3(1, 1, 1), position = new THREE.Vector3(), turn = new THREE.Quaternion();
+        const matrix = new THREE.Matrix4(),
+          one = new THREE.Vector3(1, 1, 1),
+          position = new THREE.Vector3(),
+          turn = new THREE.Quaternion();
         for (const mesh of stillOnes.meshes) {
           stillOnes.links.forEach(({ pose }, i) => {
             position.set(pose[0]!, pose[1]!, pose[2]!);
@@ -89,61 +116,135 @@ export class SceneBuilder {
     return built;
   }
 
-  private triangles(parts: Part[]): number { return parts.reduce((sum, part) => sum + this.batch(part, false)[2] / 3, 0); }
+  private triangles(parts: Part[]): number {
+    return parts.reduce((sum, part) => sum + this.batch(part, false)[2] / 3, 0);
+  }
 
-  // What a kind of link looks like, in the link's frame: all plain opaque parts are one surface with coloured corners.
+  // What a kind of link looks like, in the link's frame: all plain opaque parts are one surface
+  // with coloured corners.
   private surfaces(parts: Part[], many: boolean): Surface[] {
     const groups = new Map<string, Part[]>();
     for (const part of parts) {
       const flags = this.batch(part, many)[4];
       const alone = part.diffuse[3]! < 0.996 || flags & (Flag.textured | Flag.ground);
-      const key = alone ? `alone ${groups.size}` : `${flags & Flag.doubleSided} ${part.specular[0]! > 0.3} ${part.emissive.join()} ${part.shadow}`;
+      const key = alone
+        ? `alone ${groups.size}`
+        : `${flags & Flag.doubleSided} ${part.specular[0]! > 0.3} ${part.emissive.join()} ${part.shadow}`;
       groups.set(key, [...(groups.get(key) ?? []), part]);
     }
     return [...groups.values()].map((group) => {
       const first = group[0]!;
       const [, , , texture, flags] = this.batch(first, many);
-      return { geometry: this.merge(group, many), material: this.material(first, texture, flags), shadow: first.shadow, ground: (flags & Flag.ground) !== 0 };
+      return {
+        geometry: this.merge(group, many),
+        material: this.material(first, texture, flags),
+        shadow: first.shadow,
+        ground: (flags & Flag.ground) !== 0,
+      };
     });
   }
 
   // The boxes around the larger parts: a dozen triangles each, for links of a few pixels.
   private far(parts: Part[], links: number, into: THREE.Group): Far | null {
-    const boxes = parts.map((part) => {
-      const [meshIndex, first, count] = this.batch(part, true);
-      const { vertices, indices } = this.files.meshes[meshIndex]!;
-      const box = new THREE.Box3(), point = new THREE.Vector3(), m = part.matrix;
-      for (let i = first; i < first + count; ++i) box.expandByPoint(point.fromArray(vertices, 8 * indices[i]!));
-      const matrix = new THREE.Matrix4().set(m[0]!, m[1]!, m[2]!, m[3]!, m[4]!, m[5]!, m[6]!, m[7]!, m[8]!, m[9]!, m[10]!, m[11]!, 0, 0, 0, 1);
-      const size = box.getSize(new THREE.Vector3()), centre = box.getCenter(new THREE.Vector3());
-      const geometry = new THREE.BoxGeometry(size.x, size.y, size.z).translate(centre.x, centre.y, centre.z).applyMatrix4(matrix);
-      const colour = sRGB(part.diffuse), corners = geometry.getAttribute("position").count;
-      geometry.setAttribute("color", new THREE.Float32BufferAttribute(Array.from({ length: corners }, () => colour.toArray()).flat(), 3));
-      geometry.computeBoundingSphere();
-      geometry.computeBoundingBox();
-      return geometry;
-    }).sort((a, b) => b.boundingSphere!.radius - a.boundingSphere!.radius);
-    const seen = boxes.filter((box, i) => box.boundingSphere!.radius >= kSmall * boxes[0]!.boundingSphere!.radius &&
-      !boxes.slice(0, i).some((larger) => larger.boundingBox!.containsBox(box.boundingBox!)));
+    const boxes = parts
+      .map((part) => {
+        const [meshIndex, first, count] = this.batch(part, true);
+        const { vertices, indices } = this.files.meshes[meshIndex]!;
+        const box = new THREE.Box3(),
+          point = new THREE.Vector3(),
+          m = part.matrix;
+        for (let i = first; i < first + count; ++i)
+          box.expandByPoint(point.fromArray(vertices, 8 * indices[i]!));
+        const matrix = new THREE.Matrix4().set(
+          m[0]!,
+          m[1]!,
+          m[2]!,
+          m[3]!,
+          m[4]!,
+          m[5]!,
+          m[6]!,
+          m[7]!,
+          m[8]!,
+          m[9]!,
+          m[10]!,
+          m[11]!,
+          0,
+          0,
+          0,
+          1,
+        );
+        const size = box.getSize(new THREE.Vector3()),
+          centre = box.getCenter(new THREE.Vector3());
+        const geometry = new THREE.BoxGeometry(size.x, size.y, size.z)
+          .translate(centre.x, centre.y, centre.z)
+          .applyMatrix4(matrix);
+        const colour = sRGB(part.diffuse),
+          corners = geometry.getAttribute("position").count;
+        geometry.setAttribute(
+          "color",
+          new THREE.Float32BufferAttribute(
+            Array.from({ length: corners }, () => colour.toArray()).flat(),
+            3,
+          ),
+        );
+        geometry.computeBoundingSphere();
+        geometry.computeBoundingBox();
+        return geometry;
+      })
+      .sort((a, b) => b.boundingSphere!.radius - a.boundingSphere!.radius);
+    const seen = boxes.filter(
+      (box, i) =>
+        box.boundingSphere!.radius >= kSmall * boxes[0]!.boundingSphere!.radius &&
+        !boxes.slice(0, i).some((larger) => larger.boundingBox!.containsBox(box.boundingBox!)),
+    );
     const geometry = seen.length > 0 ? mergeGeometries(seen) : null;
     if (!geometry) return null;
-    const mesh = new THREE.InstancedMesh(geometry, new THREE.MeshLambertMaterial({ vertexColors: true, side: THREE.DoubleSide }), links);
+    const mesh = new THREE.InstancedMesh(
+      geometry,
+      new THREE.MeshLambertMaterial({ vertexColors: true, side: THREE.DoubleSide }),
+      links,
+    );
     mesh.instanceMatrix.setUsage(THREE.DynamicDrawUsage);
     mesh.frustumCulled = false;
     into.add(mesh);
     return { mesh, matrices: new Float32Array(16 * links) };
   }
 
-  private batch(part: Part, many: boolean) { return this.files.description.batches[many ? part.small : part.batch]!; }
+  private batch(part: Part, many: boolean) {
+    return this.files.description.batches[many ? part.small : part.batch]!;
+  }
 
   private merge(parts: Part[], many: boolean): THREE.BufferGeometry {
-    const positions: number[] = [], normals: number[] = [], uvs: number[] = [], colours: number[] = [], indices: number[] = [];
-    const p = new THREE.Vector3(), matrix = new THREE.Matrix4(), normalMatrix = new THREE.Matrix3();
+    const positions: number[] = [],
+      normals: number[] = [],
+      uvs: number[] = [],
+      colours: number[] = [],
+      indices: number[] = [];
+    const p = new THREE.Vector3(),
+      matrix = new THREE.Matrix4(),
+      normalMatrix = new THREE.Matrix3();
     for (const part of parts) {
       const [meshIndex, first, count, , flags] = this.batch(part, many);
       const mesh = this.files.meshes[meshIndex]!;
       const m = part.matrix;
-      matrix.set(m[0]!, m[1]!, m[2]!, m[3]!, m[4]!, m[5]!, m[6]!, m[7]!, m[8]!, m[9]!, m[10]!, m[11]!, 0, 0, 0, 1);
+      matrix.set(
+        m[0]!,
+        m[1]!,
+        m[2]!,
+        m[3]!,
+        m[4]!,
+        m[5]!,
+        m[6]!,
+        m[7]!,
+        m[8]!,
+        m[9]!,
+        m[10]!,
+        m[11]!,
+        0,
+        0,
+        0,
+        1,
+      );
       normalMatrix.getNormalMatrix(matrix);
       const colour = sRGB(part.diffuse);
       const places = new Map<number, number>();
@@ -155,10 +256,13 @@ export class SceneBuilder {
         if (place === undefined) {
           place = positions.length / 3;
           places.set(vertex, place);
-          const at = 8 * vertex, v = mesh.vertices;
+          const at = 8 * vertex,
+            v = mesh.vertices;
           p.set(v[at]!, v[at + 1]!, v[at + 2]!).applyMatrix4(matrix);
           positions.push(p.x, p.y, p.z);
-          p.set(v[at + 3]!, v[at + 4]!, v[at + 5]!).applyMatrix3(normalMatrix).normalize();
+          p.set(v[at + 3]!, v[at + 4]!, v[at + 5]!)
+            .applyMatrix3(normalMatrix)
+            .normalize();
           normals.push(p.x, p.y, p.z);
           uvs.push(v[at + 6]!, v[at + 7]!);
           colours.push(colour.r, colour.g, colour.b);
@@ -192,13 +296,20 @@ export class SceneBuilder {
     const opacity = part.diffuse[3]!;
     const shiny = Math.max(...part.specular.slice(0, 3)) > 0.3;
     const material = new THREE.MeshStandardMaterial({
-      vertexColors: true, roughness: shiny ? 0.45 : 0.85, metalness: 0, emissive: sRGB(part.emissive),
-      side: flags & Flag.doubleSided ? THREE.DoubleSide : THREE.FrontSide, shadowSide: THREE.DoubleSide,
-      transparent: opacity < 0.996, opacity, depthWrite: opacity >= 0.996,
+      vertexColors: true,
+      roughness: shiny ? 0.45 : 0.85,
+      metalness: 0,
+      emissive: sRGB(part.emissive),
+      side: flags & Flag.doubleSided ? THREE.DoubleSide : THREE.FrontSide,
+      shadowSide: THREE.DoubleSide,
+      transparent: opacity < 0.996,
+      opacity,
+      depthWrite: opacity >= 0.996,
     });
     if (flags & Flag.ground) {
       material.map = gridTexture();
-      const extent = Math.hypot(part.matrix[0]!, part.matrix[4]!, part.matrix[8]!), across = Math.hypot(part.matrix[1]!, part.matrix[5]!, part.matrix[9]!);
+      const extent = Math.hypot(part.matrix[0]!, part.matrix[4]!, part.matrix[8]!),
+        across = Math.hypot(part.matrix[1]!, part.matrix[5]!, part.matrix[9]!);
       material.map.repeat.set(extent, across);
     } else if (flags & Flag.textured) {
       material.map = this.texture(textureIndex);

@@ -1,36 +1,76 @@
 // The still part of the scene, as the program serves it: one JSON text and two blobs.
 export interface Part {
-  batch: number; small: number; shadow: boolean;
-  matrix: number[];                       // rows of [M | t], from the mesh to the link
-  diffuse: number[]; specular: number[]; emissive: number[];
+  batch: number;
+  small: number;
+  shadow: boolean;
+  matrix: number[]; // rows of [M | t], from the mesh to the link
+  diffuse: number[];
+  specular: number[];
+  emissive: number[];
 }
 export interface LightDescription {
-  type: "directional" | "point" | "spot"; link: number; position: number[]; direction: number[]; colour: number[];
-  range: number; outer_angle: number; inner_angle: number; intensity: number; constant: number; linear: number; quadratic: number;
+  type: "directional" | "point" | "spot";
+  link: number;
+  position: number[];
+  direction: number[];
+  colour: number[];
+  range: number;
+  outer_angle: number;
+  inner_angle: number;
+  intensity: number;
+  constant: number;
+  linear: number;
+  quadratic: number;
   shadows: boolean;
 }
 export interface Description {
-  version: number; world: string; sky: boolean; shadows: boolean;
-  ambient: number[]; background: number[]; low: number[]; high: number[];
+  version: number;
+  world: string;
+  sky: boolean;
+  shadows: boolean;
+  ambient: number[];
+  background: number[];
+  low: number[];
+  high: number[];
   meshes: [vertices: number, indices: number][];
   textures: boolean[];
   batches: [mesh: number, first: number, count: number, texture: number, flags: number][];
   kinds: Part[][];
   lights: LightDescription[];
   models: { name: string; first_link: number }[];
-  wheels: number[][];                     // link, robot, place among its wheels, a point on the axis, the axis
+  wheels: number[][]; // link, robot, place among its wheels, a point on the axis, the axis
   bases: { robot: string; body: number; pose: number[]; start: number[] }[];
 }
-export const enum Flag { textured = 1, specular = 2, ground = 4, doubleSided = 8, mirrored = 16 }
+export const enum Flag {
+  textured = 1,
+  specular = 2,
+  ground = 4,
+  doubleSided = 8,
+  mirrored = 16,
+}
 
-export interface MeshData { vertices: Float32Array; indices: Uint32Array }    // a vertex: position, normal, u, v
-export interface LinkData { kind: number; body: number; pose: Float32Array }
+export interface MeshData {
+  vertices: Float32Array;
+  indices: Uint32Array;
+} // a vertex: position, normal, u, v
+export interface LinkData {
+  kind: number;
+  body: number;
+  pose: Float32Array;
+}
 
 // textureUrl: where the picture of that number is.
-export interface SceneFiles { description: Description; meshes: MeshData[]; links: LinkData[]; textureUrl(index: number): string }
+export interface SceneFiles {
+  description: Description;
+  meshes: MeshData[];
+  links: LinkData[];
+  textureUrl(index: number): string;
+}
 
 // A page that has its run in itself has the scene's files, too.
-export interface FileStore { file(path: string): Uint8Array<ArrayBuffer> | null }
+export interface FileStore {
+  file(path: string): Uint8Array<ArrayBuffer> | null;
+}
 
 // Null when there is no world to show. store: null for the program that serves this page.
 export async function loadScene(store: FileStore | null): Promise<SceneFiles | null> {
@@ -54,14 +94,21 @@ export async function loadScene(store: FileStore | null): Promise<SceneFiles | n
   ]);
   let at = 0;
   const meshes = description.meshes.map(([vertices, indices]) => {
-    const data = { vertices: new Float32Array(meshBytes, at, 8 * vertices), indices: new Uint32Array(meshBytes, at + 32 * vertices, indices) };
+    const data = {
+      vertices: new Float32Array(meshBytes, at, 8 * vertices),
+      indices: new Uint32Array(meshBytes, at + 32 * vertices, indices),
+    };
     at += 32 * vertices + 4 * indices;
     return data;
   });
   const links: LinkData[] = [];
   const view = new DataView(linkBytes);
   for (let offset = 0; offset + 36 <= linkBytes.byteLength; offset += 36) {
-    links.push({ kind: view.getInt32(offset, true), body: view.getInt32(offset + 4, true), pose: new Float32Array(linkBytes, offset + 8, 7) });
+    links.push({
+      kind: view.getInt32(offset, true),
+      body: view.getInt32(offset + 4, true),
+      pose: new Float32Array(linkBytes, offset + 8, 7),
+    });
   }
   const textureUrl = (index: number) => {
     const path = `/scene/textures/${index}`;

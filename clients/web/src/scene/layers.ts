@@ -1,8 +1,21 @@
 // What can be drawn over the scene, and in which colour.
-export const kLayers = ["rays", "points", "sonar", "trail", "odometry", "contacts", "frames"] as const;
+export const kLayers = [
+  "rays",
+  "points",
+  "sonar",
+  "trail",
+  "odometry",
+  "contacts",
+  "frames",
+] as const;
 export type Layer = (typeof kLayers)[number];
 
 export const kLayerColours: Record<Layer, string> = {
-  rays: "#ff6b5e", points: "#ffd24a", sonar: "#3fb6ff", trail: "#27c46b", odometry: "#ff9d2e", contacts: "#ff2d8a",
+  rays: "#ff6b5e",
+  points: "#ffd24a",
+  sonar: "#3fb6ff",
+  trail: "#27c46b",
+  odometry: "#ff9d2e",
+  contacts: "#ff2d8a",
   frames: "linear-gradient(90deg,#e33,#3c3,#36f)",
 };

@@ -1,7 +1,9 @@
 // Poses as they come in messages, as matrices.
 import * as THREE from "three";
 
-const kPosition = new THREE.Vector3(), kRotation = new THREE.Quaternion(), kOne = new THREE.Vector3(1, 1, 1);
+const kPosition = new THREE.Vector3(),
+  kRotation = new THREE.Quaternion(),
+  kOne = new THREE.Vector3(1, 1, 1);
 
 // The matrix of a pose x, y, z, qw, qx, qy, qz at that place of an array.
 export function matrixOf(pose: ArrayLike<number>, at: number, into: THREE.Matrix4): THREE.Matrix4 {

@@ -5,12 +5,24 @@ import { RobotOverlay } from "./overlays";
 import type { Stage } from "./stage";
 
 export class OverlaySet {
-  readonly of = new Map<string, RobotOverlay>();    // by the robot's name
+  readonly of = new Map<string, RobotOverlay>(); // by the robot's name
   private readonly marker: THREE.Mesh;
   private readonly base = new THREE.Matrix4();
 
-  constructor(private readonly page: Page, private readonly stage: Stage) {
-    this.marker = new THREE.Mesh(new THREE.RingGeometry(0.38, 0.44, 48), new THREE.MeshBasicMaterial({ color: 0x35c2ad, transparent: true, opacity: 0.9, depthWrite: false, toneMapped: false }));
+  constructor(
+    private readonly page: Page,
+    private readonly stage: Stage,
+  ) {
+    this.marker = new THREE.Mesh(
+      new THREE.RingGeometry(0.38, 0.44, 48),
+      new THREE.MeshBasicMaterial({
+        color: 0x35c2ad,
+        transparent: true,
+        opacity: 0.9,
+        depthWrite: false,
+        toneMapped: false,
+      }),
+    );
     this.marker.visible = false;
     stage.scene.add(this.marker);
     page.watch(["world", "scene", "robot"], () => this.make());
@@ -19,14 +31,21 @@ export class OverlaySet {
 
   // An overlay, with its trails, stays as long as its robot is the same one.
   private make(): void {
-    const { world, scene } = this.page.now, before = new Map(this.of);
+    const { world, scene } = this.page.now,
+      before = new Map(this.of);
     this.of.clear();
     for (const name of shownRobots(this.page.now)) {
-      const start = scene ? scene.bases.find(({ robot }) => robot === name)?.start : [0, 0, 0, 1, 0, 0, 0];
-      if (!start) continue;    // it has just come, and is not in the scene yet
+      const start = scene
+        ? scene.bases.find(({ robot }) => robot === name)?.start
+        : [0, 0, 0, 1, 0, 0, 0];
+      if (!start) continue; // it has just come, and is not in the scene yet
       const devices = world!.devices.filter((device) => device.robot === name);
-      const key = [...start, ...devices.flatMap((d) => [d.name, d.kind, ...d.position, ...d.orientation])].join();
-      const old = before.get(name), overlay = old?.key === key ? old : new RobotOverlay(devices, start, key);
+      const key = [
+        ...start,
+        ...devices.flatMap((d) => [d.name, d.kind, ...d.position, ...d.orientation]),
+      ].join();
+      const old = before.get(name),
+        overlay = old?.key === key ? old : new RobotOverlay(devices, start, key);
       if (overlay !== old) this.stage.scene.add(overlay.group);
       else before.delete(name);
       this.of.set(name, overlay);
@@ -40,10 +59,12 @@ export class OverlaySet {
 
   // Where the robots are now; true when there is something to draw.
   place(): boolean {
-    const { world, scene, robot, layers } = this.page.now, chosen = world?.robots[robot]?.name;
+    const { world, scene, robot, layers } = this.page.now,
+      chosen = world?.robots[robot]?.name;
     let changed = false;
     for (const [name, overlay] of this.of) {
-      if (!this.stage.base(scene?.bases.findIndex((base) => base.robot === name) ?? -1, this.base)) continue;
+      if (!this.stage.base(scene?.bases.findIndex((base) => base.robot === name) ?? -1, this.base))
+        continue;
       changed = overlay.place(this.base, layers) || changed;
       if (name !== chosen) continue;
       this.marker.visible = world!.robots.length > 1;
@@ -53,5 +74,7 @@ export class OverlaySet {
     return changed;
   }
 
-  forget(): void { for (const overlay of this.of.values()) overlay.forget(); }
+  forget(): void {
+    for (const overlay of this.of.values()) overlay.forget();
+  }
 }

@@ -1,12 +1,27 @@
-// What robots sense and where they have been, drawn over the scene: rays and points of range finders, sonar cones, trails,
-// contacts and frames. Of the chosen robot, or of all while they are few.
+// What robots sense and where they have been, drawn over the scene: rays and points of range
+// finders, sonar cones, trails, contacts and frames. Of the chosen robot, or of all while they are
+// few.
 import * as THREE from "three";
-import type { contact_t, device_info_t, odometry_t, planar_lidar_t, pose_t, sonar_t } from "../../generated/messages";
+import type {
+  contact_t,
+  device_info_t,
+  odometry_t,
+  planar_lidar_t,
+  pose_t,
+  sonar_t,
+} from "../../generated/messages";
 import type { Layer } from "./layers";
 import { matrixOf } from "./matrix";
 
-const kColours = { rays: 0xff5a4d, points: 0xffd24a, sonar: 0x3fb6ff, trail: 0x27c46b, odometry: 0xff9d2e, contacts: 0xff2d8a };
-const kMostTrail = 20000;         // points
+const kColours = {
+  rays: 0xff5a4d,
+  points: 0xffd24a,
+  sonar: 0x3fb6ff,
+  trail: 0x27c46b,
+  odometry: 0xff9d2e,
+  contacts: 0xff2d8a,
+};
+const kMostTrail = 20000; // points
 const kTrailStep_m = 0.02;
 
 function devicePose(device: device_info_t, into: THREE.Matrix4): THREE.Matrix4 {
@@ -16,13 +31,21 @@ function devicePose(device: device_info_t, into: THREE.Matrix4): THREE.Matrix4 {
 // Vertices of a geometry that changes its length.
 class Strip<T extends THREE.Object3D & { geometry: THREE.BufferGeometry }> {
   private capacity = 0;
-  constructor(readonly object: T) { object.frustumCulled = false; }
+  constructor(readonly object: T) {
+    object.frustumCulled = false;
+  }
   write(count: number, fill: (positions: Float32Array) => void): void {
     if (count > this.capacity) {
       this.capacity = Math.max(256, 2 * count);
-      this.object.geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(3 * this.capacity), 3).setUsage(THREE.DynamicDrawUsage));
+      this.object.geometry.setAttribute(
+        "position",
+        new THREE.BufferAttribute(new Float32Array(3 * this.capacity), 3).setUsage(
+          THREE.DynamicDrawUsage,
+        ),
+      );
     }
-    const attribute = this.object.geometry.getAttribute("position") as THREE.BufferAttribute | undefined;
+    const attribute = this.object.geometry.getAttribute("position") as
+      THREE.BufferAttribute | undefined;
     if (attribute) {
       fill(attribute.array as Float32Array);
       attribute.needsUpdate = true;
@@ -32,13 +55,45 @@ class Strip<T extends THREE.Object3D & { geometry: THREE.BufferGeometry }> {
 }
 
 const glow = (colour: number, opacity: number) =>
-  new THREE.MeshBasicMaterial({ color: colour, transparent: true, opacity, side: THREE.DoubleSide, depthWrite: false, fog: false, toneMapped: false });
+  new THREE.MeshBasicMaterial({
+    color: colour,
+    transparent: true,
+    opacity,
+    side: THREE.DoubleSide,
+    depthWrite: false,
+    fog: false,
+    toneMapped: false,
+  });
 
 class ScanView {
   readonly group = new THREE.Group();
-  private readonly fan = new Strip(new THREE.Mesh(new THREE.BufferGeometry(), glow(kColours.rays, 0.1)));
-  private readonly lines = new Strip(new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: kColours.rays, transparent: true, opacity: 0.35, toneMapped: false, fog: false })));
-  private readonly points = new Strip(new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ color: kColours.points, size: 4, sizeAttenuation: false, toneMapped: false, fog: false })));
+  private readonly fan = new Strip(
+    new THREE.Mesh(new THREE.BufferGeometry(), glow(kColours.rays, 0.1)),
+  );
+  private readonly lines = new Strip(
+    new THREE.LineSegments(
+      new THREE.BufferGeometry(),
+      new THREE.LineBasicMaterial({
+        color: kColours.rays,
+        transparent: true,
+        opacity: 0.35,
+        toneMapped: false,
+        fog: false,
+      }),
+    ),
+  );
+  private readonly points = new Strip(
+    new THREE.Points(
+      new THREE.BufferGeometry(),
+      new THREE.PointsMaterial({
+        color: kColours.points,
+        size: 4,
+        sizeAttenuation: false,
+        toneMapped: false,
+        fog: false,
+      }),
+    ),
+  );
   private readonly mount = new THREE.Matrix4();
 
   constructor(private readonly device: device_info_t) {
@@ -48,15 +103,22 @@ class ScanView {
   }
 
   show(scan: planar_lidar_t): void {
-    const { ranges, rad0, radstep } = scan, limit = this.device.range_max, n = ranges.length;
-    const end = (i: number) => { const r = ranges[i]!; return r === -Infinity ? 0 : Math.min(r, limit); };
+    const { ranges, rad0, radstep } = scan,
+      limit = this.device.range_max,
+      n = ranges.length;
+    const end = (i: number) => {
+      const r = ranges[i]!;
+      return r === -Infinity ? 0 : Math.min(r, limit);
+    };
     let hits = 0;
     this.points.write(n, (p) => {
       for (let i = 0; i < n; ++i) {
         const r = ranges[i]!;
         if (!Number.isFinite(r)) continue;
         const a = rad0 + i * radstep;
-        p[3 * hits] = r * Math.cos(a); p[3 * hits + 1] = r * Math.sin(a); p[3 * hits + 2] = 0;
+        p[3 * hits] = r * Math.cos(a);
+        p[3 * hits + 1] = r * Math.sin(a);
+        p[3 * hits + 2] = 0;
         ++hits;
       }
     });
@@ -65,17 +127,25 @@ class ScanView {
     const shown = Math.ceil(n / every);
     this.lines.write(2 * shown, (p) => {
       for (let k = 0; k < shown; ++k) {
-        const i = k * every, a = rad0 + i * radstep, r = end(i);
+        const i = k * every,
+          a = rad0 + i * radstep,
+          r = end(i);
         p.fill(0, 6 * k, 6 * k + 6);
-        p[6 * k + 3] = r * Math.cos(a); p[6 * k + 4] = r * Math.sin(a);
+        p[6 * k + 3] = r * Math.cos(a);
+        p[6 * k + 4] = r * Math.sin(a);
       }
     });
     this.fan.write(3 * Math.max(0, n - 1), (p) => {
       for (let i = 0; i + 1 < n; ++i) {
-        const a = rad0 + i * radstep, b = a + radstep, r = end(i), s = end(i + 1);
+        const a = rad0 + i * radstep,
+          b = a + radstep,
+          r = end(i),
+          s = end(i + 1);
         p.fill(0, 9 * i, 9 * i + 9);
-        p[9 * i + 3] = r * Math.cos(a); p[9 * i + 4] = r * Math.sin(a);
-        p[9 * i + 6] = s * Math.cos(b); p[9 * i + 7] = s * Math.sin(b);
+        p[9 * i + 3] = r * Math.cos(a);
+        p[9 * i + 4] = r * Math.sin(a);
+        p[9 * i + 6] = s * Math.cos(b);
+        p[9 * i + 7] = s * Math.sin(b);
       }
     });
   }
@@ -89,8 +159,21 @@ class ScanView {
 
 class SonarView {
   readonly group = new THREE.Group();
-  private readonly cones = new Strip(new THREE.Mesh(new THREE.BufferGeometry(), glow(kColours.sonar, 0.16)));
-  private readonly arcs = new Strip(new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: kColours.sonar, transparent: true, opacity: 0.9, toneMapped: false, fog: false })));
+  private readonly cones = new Strip(
+    new THREE.Mesh(new THREE.BufferGeometry(), glow(kColours.sonar, 0.16)),
+  );
+  private readonly arcs = new Strip(
+    new THREE.LineSegments(
+      new THREE.BufferGeometry(),
+      new THREE.LineBasicMaterial({
+        color: kColours.sonar,
+        transparent: true,
+        opacity: 0.9,
+        toneMapped: false,
+        fog: false,
+      }),
+    ),
+  );
   private readonly mount = new THREE.Matrix4();
 
   constructor(private readonly device: device_info_t) {
@@ -100,13 +183,16 @@ class SonarView {
   }
 
   show(sonar: sonar_t): void {
-    const pieces = 8, half = this.device.fov_horizontal / 2;
+    const pieces = 8,
+      half = this.device.fov_horizontal / 2;
     const shown: number[] = [];
     for (let i = 0; i < Math.min(sonar.n, this.device.nelements); ++i) {
       if (Number(sonar.fired_utime[i]!) >= 0) shown.push(i);
     }
     const arc = (element: number, share: number, p: Float32Array, at: number) => {
-      const pose = this.device.element_pose, yaw = pose[6 * element + 5]! + half * (2 * share - 1), r = sonar.range[element]!;
+      const pose = this.device.element_pose,
+        yaw = pose[6 * element + 5]! + half * (2 * share - 1),
+        r = sonar.range[element]!;
       p[at] = pose[6 * element]! + r * Math.cos(yaw);
       p[at + 1] = pose[6 * element + 1]! + r * Math.sin(yaw);
       p[at + 2] = pose[6 * element + 2]!;
@@ -142,11 +228,17 @@ class Trail {
   readonly strip: Strip<THREE.Line>;
   private points: number[] = [];
   constructor(colour: number) {
-    this.strip = new Strip(new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: colour, toneMapped: false, fog: false })));
+    this.strip = new Strip(
+      new THREE.Line(
+        new THREE.BufferGeometry(),
+        new THREE.LineBasicMaterial({ color: colour, toneMapped: false, fog: false }),
+      ),
+    );
   }
   add(x: number, y: number, z: number): void {
     const n = this.points.length;
-    if (n >= 3 && Math.hypot(x - this.points[n - 3]!, y - this.points[n - 2]!) < kTrailStep_m) return;
+    if (n >= 3 && Math.hypot(x - this.points[n - 3]!, y - this.points[n - 2]!) < kTrailStep_m)
+      return;
     this.points.push(x, y, z);
     if (this.points.length > 3 * kMostTrail) this.points.splice(0, 3 * (kMostTrail / 4));
     this.strip.write(this.points.length / 3, (p) => p.set(this.points));
@@ -164,14 +256,29 @@ export class RobotOverlay {
   private readonly sonars = new Map<string, SonarView>();
   private readonly truth = new Trail(kColours.trail);
   private readonly odometry = new Trail(kColours.odometry);
-  private readonly contacts = new Strip(new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ color: kColours.contacts, size: 9, sizeAttenuation: false, depthTest: false, toneMapped: false })));
+  private readonly contacts = new Strip(
+    new THREE.Points(
+      new THREE.BufferGeometry(),
+      new THREE.PointsMaterial({
+        color: kColours.contacts,
+        size: 9,
+        sizeAttenuation: false,
+        depthTest: false,
+        toneMapped: false,
+      }),
+    ),
+  );
   private readonly frames = new THREE.Group();
   private readonly baseFrame = new THREE.AxesHelper(0.5);
-  private readonly odom = new THREE.Matrix4();    // odom in the world
+  private readonly odom = new THREE.Matrix4(); // odom in the world
   private readonly point = new THREE.Vector3();
   private changed = true;
 
-  constructor(devices: device_info_t[], start: number[], readonly key: string) {
+  constructor(
+    devices: device_info_t[],
+    start: number[],
+    readonly key: string,
+  ) {
     matrixOf(start, 0, this.odom);
     const odomFrame = new THREE.AxesHelper(0.35);
     odomFrame.applyMatrix4(this.odom);
@@ -184,7 +291,12 @@ export class RobotOverlay {
         this.baseFrame.add(axes);
       }
     }
-    this.group.add(this.truth.strip.object, this.odometry.strip.object, this.contacts.object, this.frames);
+    this.group.add(
+      this.truth.strip.object,
+      this.odometry.strip.object,
+      this.contacts.object,
+      this.frames,
+    );
   }
 
   scan(device: device_info_t, message: planar_lidar_t): void {
@@ -205,12 +317,19 @@ export class RobotOverlay {
     this.changed = true;
   }
   contact(message: contact_t): void {
-    this.contacts.write(message.n, (p) => message.points.forEach(({ position }, i) => p.set(position, 3 * i)));
+    this.contacts.write(message.n, (p) =>
+      message.points.forEach(({ position }, i) => p.set(position, 3 * i)),
+    );
     this.changed = true;
   }
   dispose(): void {
     this.group.traverse((object) => {
-      if (!(object instanceof THREE.Mesh || object instanceof THREE.Line || object instanceof THREE.Points)) return;
+      if (!(
+        object instanceof THREE.Mesh ||
+        object instanceof THREE.Line ||
+        object instanceof THREE.Points
+      ))
+        return;
       object.geometry.dispose();
       (object.material as THREE.Material).dispose();
     });
@@ -235,7 +354,11 @@ export class RobotOverlay {
     return changed;
   }
 
-  private view<V extends ScanView | SonarView>(views: Map<string, V>, device: device_info_t, Make: new (device: device_info_t) => V): V {
+  private view<V extends ScanView | SonarView>(
+    views: Map<string, V>,
+    device: device_info_t,
+    Make: new (device: device_info_t) => V,
+  ): V {
     let view = views.get(device.name);
     if (!view) {
       view = new Make(device);

@@ -1,48 +1,73 @@
-// How finely is drawn: as finely as the display can, and less where a frame takes too long, as on machines without a GPU.
-// Without it, a page that draws by software answers keys late, and the robot's watchdog stops it between two commands.
-export interface Level { ratio: number; shadows: boolean }    // pixels of the canvas per pixel of the page, at most
+// How finely is drawn: as finely as the display can, and less where a frame takes too long, as on
+// machines without a GPU. Without it, a page that draws by software answers keys late, and the
+// robot's watchdog stops it between two commands.
+export interface Level {
+  ratio: number;
+  shadows: boolean;
+} // pixels of the canvas per pixel of the page, at most
 
-const kLevels: Level[] = [{ ratio: 2, shadows: true }, { ratio: 1, shadows: false }, { ratio: 0.6, shadows: false }, { ratio: 0.4, shadows: false }];
-const kSlow_ms = 50;          // a frame: less than 20 a second
+const kLevels: Level[] = [
+  { ratio: 2, shadows: true },
+  { ratio: 1, shadows: false },
+  { ratio: 0.6, shadows: false },
+  { ratio: 0.4, shadows: false },
+];
+const kSlow_ms = 50; // a frame: less than 20 a second
 const kQuick_ms = 25;
-const kFrames = 5;            // frames in a row of which the median counts
+const kFrames = 5; // frames in a row of which the median counts
 const kFirstWait_ms = 10_000; // until a finer level is tried; each time twice as long
-const kStill_ms = 250;        // without motion, and one frame is drawn as finely as can be
+const kStill_ms = 250; // without motion, and one frame is drawn as finely as can be
 
 // Whether WebGL is done by the processor here.
 export function drawnBySoftware(): boolean {
   const gl = document.createElement("canvas").getContext("webgl2");
   const names = gl?.getExtension("WEBGL_debug_renderer_info");
-  const name = gl ? String(gl.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER)) : "";
+  const name = gl
+    ? String(gl.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER))
+    : "";
   gl?.getExtension("WEBGL_lose_context")?.loseContext();
   return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
 }
 
 export class Quality {
-  automatic = true;           // false: always the finest
+  automatic = true; // false: always the finest
   private level: number;
   private last_ms = -1;
   private intervals: number[] = [];
-  private finer_ms = 0;       // when a finer level is tried
+  private finer_ms = 0; // when a finer level is tried
   private wait_ms = kFirstWait_ms;
-  private moved_ms = -1;      // when something was drawn last
-  private still = false;      // one frame is, or was, drawn as finely as can be: nothing moves
+  private moved_ms = -1; // when something was drawn last
+  private still = false; // one frame is, or was, drawn as finely as can be: nothing moves
 
-  constructor(software: boolean) { this.level = software ? 2 : 0; }
+  constructor(software: boolean) {
+    this.level = software ? 2 : 0;
+  }
 
-  get now(): Level { return kLevels[this.automatic && !this.still ? this.level : 0]!; }
-  get reduced(): boolean { return this.now.ratio < 1; }
+  get now(): Level {
+    return kLevels[this.automatic && !this.still ? this.level : 0]!;
+  }
+  get reduced(): boolean {
+    return this.now.ratio < 1;
+  }
 
-  // Nothing is to be drawn: the next frame's interval says nothing. True when it has been so for a while, and what is seen is to be
-  // drawn once more, as finely as can be.
+  // Nothing is to be drawn: the next frame's interval says nothing. True when it has been so for a
+  // while, and what is seen is to be drawn once more, as finely as can be.
   idle(at_ms: number): boolean {
     this.last_ms = -1;
-    if (this.still || !this.automatic || this.level === 0 || this.moved_ms < 0 || at_ms - this.moved_ms < kStill_ms) return false;
+    if (
+      this.still ||
+      !this.automatic ||
+      this.level === 0 ||
+      this.moved_ms < 0 ||
+      at_ms - this.moved_ms < kStill_ms
+    )
+      return false;
     this.still = true;
     return true;
   }
 
-  // Something is to be drawn that moves. True when that is at another level than what was drawn before.
+  // Something is to be drawn that moves. True when that is at another level than what was drawn
+  // before.
   moves(at_ms: number): boolean {
     this.moved_ms = at_ms;
     const was = this.still;

@@ -1,4 +1,5 @@
-// The 3-D view: renderer, camera, lights and the bodies at their poses. Draws only when something has changed.
+// The 3-D view: renderer, camera, lights and the bodies at their poses. Draws only when something
+// has changed.
 import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { SceneBuilder, type Built, type Movers } from "./build";
@@ -10,36 +11,45 @@ import type { Poses } from "../state/poses";
 export type ViewMode = "orbit" | "follow" | "top";
 const kShadowReach_m = 14;
 const kMostLamps = 6;
-const kFar_m = 18;    // from the camera; a robot of half a metre is then some 24 pixels of a laptop's screen
+// From the camera: a robot of half a metre is then some 24 pixels of a laptop's screen.
+const kFar_m = 18;
 const kNoWheels_m = 50;
 
 export class Stage {
   readonly scene = new THREE.Scene();
   readonly camera = new THREE.PerspectiveCamera(50, 1, 0.05, 400);
-  readonly renderer: THREE.WebGLRenderer | null;    // null: no WebGL here, and nothing is drawn
+  readonly renderer: THREE.WebGLRenderer | null; // null: no WebGL here, and nothing is drawn
   readonly controls: OrbitControls;
   readonly quality: Quality;
   description: Description | null = null;
   mode: ViewMode = "orbit";
-  frames = 0;                        // drawn so far
-  frameCost_ms = 0;                  // of this thread, smoothed
-  firstDrawn_ms = 0;                 // when the world was drawn first, since the page was asked for
+  frames = 0; // drawn so far
+  frameCost_ms = 0; // of this thread, smoothed
+  firstDrawn_ms = 0; // when the world was drawn first, since the page was asked for
   shadows = true;
   private built: Built | null = null;
   private lights = new THREE.Group();
   private sun: THREE.DirectionalLight | null = null;
   private dirty = true;
   private moved = false;
-  private regroup = false;           // what is near and what is far has changed
-  private linkWheel = new Map<number, { robot: number; place: number; axis: THREE.Vector3; centre: THREE.Vector3 }>();
+  private regroup = false; // what is near and what is far has changed
+  private linkWheel = new Map<
+    number,
+    { robot: number; place: number; axis: THREE.Vector3; centre: THREE.Vector3 }
+  >();
   private readonly followed = new THREE.Vector3();
-  private following = -1;            // index into the description's bases
+  private following = -1; // index into the description's bases
   private lastBase: THREE.Vector3 | null = null;
-  wheelAngles = new Map<number, Float64Array>();    // of robots whose odometry is known
-  onDetail: (reduced: boolean) => void = () => undefined;    // with each frame: whether it has fewer pixels than the page
+  wheelAngles = new Map<number, Float64Array>(); // of robots whose odometry is known
+  // With each frame: whether it has fewer pixels than the page
+  onDetail: (reduced: boolean) => void = () => undefined;
 
   // full: in full detail even where the processor draws.
-  constructor(private readonly canvas: HTMLCanvasElement, readonly poses: Poses, full: boolean) {
+  constructor(
+    private readonly canvas: HTMLCanvasElement,
+    readonly poses: Poses,
+    full: boolean,
+  ) {
     const software = !full && drawnBySoftware();
     this.quality = new Quality(software);
     this.renderer = makeRenderer(canvas, !software);
@@ -48,7 +58,9 @@ export class Stage {
     this.controls = new OrbitControls(this.camera, canvas);
     const calm = matchMedia("(prefers-reduced-motion: reduce)");
     this.controls.enableDamping = !calm.matches;
-    calm.addEventListener("change", () => { this.controls.enableDamping = !calm.matches; });
+    calm.addEventListener("change", () => {
+      this.controls.enableDamping = !calm.matches;
+    });
     this.controls.dampingFactor = 0.15;
     this.controls.maxPolarAngle = Math.PI / 2 - 0.02;
     this.controls.addEventListener("change", () => {
@@ -60,7 +72,9 @@ export class Stage {
     this.resize();
   }
 
-  touch(): void { this.dirty = true; }
+  touch(): void {
+    this.dirty = true;
+  }
 
   setTheme(dark: boolean): void {
     const colour = new THREE.Color(dark ? 0x171b21 : 0xdde4ec);
@@ -80,7 +94,9 @@ export class Stage {
     this.refine();
   }
 
-  private get casts(): boolean { return this.shadows && this.quality.now.shadows; }
+  private get casts(): boolean {
+    return this.shadows && this.quality.now.shadows;
+  }
 
   private refine(): void {
     if (this.sun) this.sun.castShadow = this.casts;
@@ -105,14 +121,30 @@ export class Stage {
     const first = this.description === null;
     this.built = null;
     this.description = files?.description ?? null;
-    for (const light of this.lights.children) if (light instanceof THREE.Light || light instanceof THREE.GridHelper) light.dispose();    // a light has its shadows' picture
+    for (const light of this.lights.children)
+      if (light instanceof THREE.Light || light instanceof THREE.GridHelper) light.dispose(); // a light has its shadows' picture
     this.lights.clear();
     this.linkWheel.clear();
     if (files) {
       this.built = new SceneBuilder(files).build();
       this.scene.add(this.built.still, this.built.moving);
-      for (const [link, robot, place, x, y, z, ax, ay, az] of files.description.wheels as [number, number, number, number, number, number, number, number, number][]) {
-        this.linkWheel.set(link, { robot, place, centre: new THREE.Vector3(x, y, z), axis: new THREE.Vector3(ax, ay, az) });
+      for (const [link, robot, place, x, y, z, ax, ay, az] of files.description.wheels as [
+        number,
+        number,
+        number,
+        number,
+        number,
+        number,
+        number,
+        number,
+        number,
+      ][]) {
+        this.linkWheel.set(link, {
+          robot,
+          place,
+          centre: new THREE.Vector3(x, y, z),
+          axis: new THREE.Vector3(ax, ay, az),
+        });
       }
       this.makeLights(files.description);
       if (first) this.home();
@@ -128,7 +160,10 @@ export class Stage {
   }
 
   private makeLights(description: Description): void {
-    const ambient = Math.max(0.25, (description.ambient[0]! + description.ambient[1]! + description.ambient[2]!) / 3);
+    const ambient = Math.max(
+      0.25,
+      (description.ambient[0]! + description.ambient[1]! + description.ambient[2]!) / 3,
+    );
     this.lights.add(new THREE.HemisphereLight(0xf4f7ff, 0xa8a098, 2.6 * ambient + 0.7));
     this.sun = null;
     let lamps = 0;
@@ -142,21 +177,34 @@ export class Stage {
   }
 
   private makeLight(light: LightDescription): THREE.Light {
-    const colour = new THREE.Color().setRGB(light.colour[0]!, light.colour[1]!, light.colour[2]!, THREE.SRGBColorSpace);
-    const position = new THREE.Vector3().fromArray(light.position), direction = new THREE.Vector3().fromArray(light.direction);
+    const colour = new THREE.Color().setRGB(
+      light.colour[0]!,
+      light.colour[1]!,
+      light.colour[2]!,
+      THREE.SRGBColorSpace,
+    );
+    const position = new THREE.Vector3().fromArray(light.position),
+      direction = new THREE.Vector3().fromArray(light.direction);
     if (light.type === "directional") {
       const sun = new THREE.DirectionalLight(colour, 2.2 * light.intensity);
       sun.userData.direction = direction.normalize();
       sun.position.copy(direction).multiplyScalar(-20);
       return sun;
     }
-    const strength = 4 * light.intensity / Math.max(0.3, light.constant);
+    const strength = (4 * light.intensity) / Math.max(0.3, light.constant);
     if (light.type === "point") {
       const lamp = new THREE.PointLight(colour, strength, 2 * light.range, 1);
       lamp.position.copy(position);
       return lamp;
     }
-    const spot = new THREE.SpotLight(colour, strength, 2 * light.range, Math.min(1.5, light.outer_angle / 2 || 0.6), 0.4, 1);
+    const spot = new THREE.SpotLight(
+      colour,
+      strength,
+      2 * light.range,
+      Math.min(1.5, light.outer_angle / 2 || 0.6),
+      0.4,
+      1,
+    );
     spot.position.copy(position);
     spot.target.position.copy(position).add(direction);
     return spot;
@@ -170,15 +218,26 @@ export class Stage {
     sun.shadow.bias = -0.0004;
     sun.shadow.normalBias = 0.02;
     sun.shadow.intensity = 0.85;
-    Object.assign(sun.shadow.camera, { left: -kShadowReach_m, right: kShadowReach_m, top: kShadowReach_m, bottom: -kShadowReach_m, near: 1, far: 80 });
+    Object.assign(sun.shadow.camera, {
+      left: -kShadowReach_m,
+      right: kShadowReach_m,
+      top: kShadowReach_m,
+      bottom: -kShadowReach_m,
+      near: 1,
+      far: 80,
+    });
     this.moved = true;
   }
 
   // All of the world in view.
   home(): void {
-    const low = this.description?.low ?? [-3, -3, 0], high = this.description?.high ?? [3, 3, 1];
+    const low = this.description?.low ?? [-3, -3, 0],
+      high = this.description?.high ?? [3, 3, 1];
     const centre = new THREE.Vector3((low[0]! + high[0]!) / 2, (low[1]! + high[1]!) / 2, 0);
-    const reach = Math.max(3, Math.min(60, 0.5 * Math.hypot(high[0]! - low[0]!, high[1]! - low[1]!)));
+    const reach = Math.max(
+      3,
+      Math.min(60, 0.5 * Math.hypot(high[0]! - low[0]!, high[1]! - low[1]!)),
+    );
     const back = reach * 1.9 * Math.max(1, 1.1 / this.camera.aspect);
     this.controls.target.copy(centre);
     this.camera.position.set(centre.x - 0.5 * back, centre.y - 0.62 * back, 0.62 * back);
@@ -192,7 +251,11 @@ export class Stage {
     this.controls.enableRotate = mode !== "top";
     if (mode === "top") {
       const height = Math.max(4, this.camera.position.distanceTo(this.controls.target));
-      this.camera.position.set(this.controls.target.x, this.controls.target.y - 0.001 * height, this.controls.target.z + height);
+      this.camera.position.set(
+        this.controls.target.x,
+        this.controls.target.y - 0.001 * height,
+        this.controls.target.z + height,
+      );
     }
     this.controls.minPolarAngle = 0;
     this.controls.update();
@@ -201,7 +264,8 @@ export class Stage {
 
   // Turns the view by radians to the right and upwards.
   turn(right: number, up: number): void {
-    const offset = this.camera.position.clone().sub(this.controls.target), at = new THREE.Spherical().setFromVector3(new THREE.Vector3(offset.x, offset.z, -offset.y));
+    const offset = this.camera.position.clone().sub(this.controls.target),
+      at = new THREE.Spherical().setFromVector3(new THREE.Vector3(offset.x, offset.z, -offset.y));
     at.theta -= right;
     at.phi = Math.max(0.02, Math.min(this.controls.maxPolarAngle, at.phi - up));
     const turned = new THREE.Vector3().setFromSpherical(at);
@@ -209,15 +273,20 @@ export class Stage {
   }
 
   // As many times as far from what is looked at.
-  zoom(times: number): void { this.look(this.camera.position.clone().sub(this.controls.target).multiplyScalar(times)); }
+  zoom(times: number): void {
+    this.look(this.camera.position.clone().sub(this.controls.target).multiplyScalar(times));
+  }
 
   // Shares of the distance, to the right and ahead over the ground.
   pan(right: number, ahead: number): void {
-    const offset = this.camera.position.clone().sub(this.controls.target), reach = offset.length();
+    const offset = this.camera.position.clone().sub(this.controls.target),
+      reach = offset.length();
     const forward = this.camera.getWorldDirection(new THREE.Vector3()).setZ(0);
     if (forward.lengthSq() < 1e-6) forward.set(0, 1, 0);
     forward.normalize();
-    this.controls.target.addScaledVector(forward, ahead * reach).addScaledVector(new THREE.Vector3(forward.y, -forward.x, 0), right * reach);
+    this.controls.target
+      .addScaledVector(forward, ahead * reach)
+      .addScaledVector(new THREE.Vector3(forward.y, -forward.x, 0), right * reach);
     this.look(offset);
   }
 
@@ -253,9 +322,14 @@ export class Stage {
   pick(x: number, y: number): { robot: number; ground: THREE.Vector3 | null } {
     const caster = new THREE.Raycaster();
     caster.setFromCamera(this.ndc(x, y), this.camera);
-    const ground = caster.ray.intersectPlane(new THREE.Plane(new THREE.Vector3(0, 0, 1), 0), new THREE.Vector3());
-    let robot = -1, nearest = 0.45;
-    const place = new THREE.Matrix4(), at = new THREE.Vector3();
+    const ground = caster.ray.intersectPlane(
+      new THREE.Plane(new THREE.Vector3(0, 0, 1), 0),
+      new THREE.Vector3(),
+    );
+    let robot = -1,
+      nearest = 0.45;
+    const place = new THREE.Matrix4(),
+      at = new THREE.Vector3();
     for (let i = 0; i < (this.description?.bases.length ?? 0); ++i) {
       if (!this.base(i, place)) continue;
       at.setFromMatrixPosition(place);
@@ -268,7 +342,10 @@ export class Stage {
 
   private ndc(x: number, y: number): THREE.Vector2 {
     const box = this.canvas.getBoundingClientRect();
-    return new THREE.Vector2(2 * (x - box.left) / box.width - 1, 1 - 2 * (y - box.top) / box.height);
+    return new THREE.Vector2(
+      (2 * (x - box.left)) / box.width - 1,
+      1 - (2 * (y - box.top)) / box.height,
+    );
   }
 
   private resize(): void {
@@ -313,34 +390,47 @@ export class Stage {
   }
 
   private placeMovers({ links, indices, meshes, far }: Movers): void {
-    const array = far?.matrices ?? meshes[0]!.instanceMatrix.array as Float32Array;
+    const array = far?.matrices ?? (meshes[0]!.instanceMatrix.array as Float32Array);
     for (let i = 0; i < links.length; ++i) {
       const link = links[i]!;
       matrixOf(link.pose, 0, kLocal);
       const wheel = this.linkWheel.get(indices[i]!);
       const angle = wheel && this.wheelAngles.get(wheel.robot)?.[wheel.place];
       if (wheel && angle) {
-        kTurn.makeTranslation(wheel.centre).multiply(kSpin.makeRotationAxis(wheel.axis, angle)).multiply(kBack.makeTranslation(-wheel.centre.x, -wheel.centre.y, -wheel.centre.z));
+        kTurn
+          .makeTranslation(wheel.centre)
+          .multiply(kSpin.makeRotationAxis(wheel.axis, angle))
+          .multiply(kBack.makeTranslation(-wheel.centre.x, -wheel.centre.y, -wheel.centre.z));
         kLocal.multiply(kTurn);
       }
-      if (link.body < this.poses.size) kLocal.premultiply(matrixOf(this.poses.now, 7 * link.body, kScratch));
+      if (link.body < this.poses.size)
+        kLocal.premultiply(matrixOf(this.poses.now, 7 * link.body, kScratch));
       else kLocal.multiplyScalar(0);
       kLocal.toArray(array, 16 * i);
     }
     if (!far) spread(meshes);
   }
 
-  // Shares many links out: those far from the camera are shown as boxes, wheels still farther not at all.
+  // Shares many links out: those far from the camera are shown as boxes, wheels still farther not
+  // at all.
   private group({ links, indices, meshes, far }: Movers): void {
     if (!far) return;
-    const near = meshes[0]!.instanceMatrix.array as Float32Array, away = far.mesh.instanceMatrix.array as Float32Array;
-    const { matrices } = far, eye = this.camera.position;
-    let nearOnes = 0, farOnes = 0;
+    const near = meshes[0]!.instanceMatrix.array as Float32Array,
+      away = far.mesh.instanceMatrix.array as Float32Array;
+    const { matrices } = far,
+      eye = this.camera.position;
+    let nearOnes = 0,
+      farOnes = 0;
     for (let i = 0; i < links.length; ++i) {
-      const at = 16 * i, dx = matrices[at + 12]! - eye.x, dy = matrices[at + 13]! - eye.y, dz = matrices[at + 14]! - eye.z;
+      const at = 16 * i,
+        dx = matrices[at + 12]! - eye.x,
+        dy = matrices[at + 13]! - eye.y,
+        dz = matrices[at + 14]! - eye.z;
       const away_m = Math.hypot(dx, dy, dz);
       if (away_m > kNoWheels_m && this.linkWheel.has(indices[i]!)) continue;
-      const isFar = away_m > kFar_m, into = isFar ? away : near, place = 16 * (isFar ? farOnes++ : nearOnes++);
+      const isFar = away_m > kFar_m,
+        into = isFar ? away : near,
+        place = 16 * (isFar ? farOnes++ : nearOnes++);
       for (let k = 0; k < 16; ++k) into[place + k] = matrices[at + k]!;
     }
     far.mesh.count = farOnes;
@@ -372,7 +462,9 @@ export class Stage {
     const target = this.controls.target;
     if (!this.moved && this.sun.target.position.distanceToSquared(target) < 0.25) return;
     this.sun.target.position.copy(target);
-    this.sun.position.copy(target).addScaledVector(this.sun.userData.direction as THREE.Vector3, -30);
+    this.sun.position
+      .copy(target)
+      .addScaledVector(this.sun.userData.direction as THREE.Vector3, -30);
     this.renderer!.shadowMap.needsUpdate = true;
     this.moved = false;
   }
@@ -380,7 +472,11 @@ export class Stage {
 
 function makeRenderer(canvas: HTMLCanvasElement, antialias: boolean): THREE.WebGLRenderer | null {
   try {
-    const renderer = new THREE.WebGLRenderer({ canvas, antialias, powerPreference: "high-performance" });
+    const renderer = new THREE.WebGLRenderer({
+      canvas,
+      antialias,
+      powerPreference: "high-performance",
+    });
     renderer.shadowMap.enabled = true;
     renderer.shadowMap.type = THREE.PCFShadowMap;
     renderer.shadowMap.autoUpdate = false;
@@ -391,12 +487,18 @@ function makeRenderer(canvas: HTMLCanvasElement, antialias: boolean): THREE.WebG
   }
 }
 
-const kScratch = new THREE.Matrix4(), kScratch2 = new THREE.Matrix4(), kLocal = new THREE.Matrix4(), kTurn = new THREE.Matrix4(), kSpin = new THREE.Matrix4(), kBack = new THREE.Matrix4();
+const kScratch = new THREE.Matrix4(),
+  kScratch2 = new THREE.Matrix4(),
+  kLocal = new THREE.Matrix4(),
+  kTurn = new THREE.Matrix4(),
+  kSpin = new THREE.Matrix4(),
+  kBack = new THREE.Matrix4();
 
 // Gives the first mesh's matrices to the others.
 function spread(meshes: THREE.InstancedMesh[]): void {
   for (const mesh of meshes) {
-    if (mesh !== meshes[0]) (mesh.instanceMatrix.array as Float32Array).set(meshes[0]!.instanceMatrix.array);
+    if (mesh !== meshes[0])
+      (mesh.instanceMatrix.array as Float32Array).set(meshes[0]!.instanceMatrix.array);
     mesh.instanceMatrix.needsUpdate = true;
   }
 }

@@ -1,16 +1,20 @@
 // The time that is shown, from the messages that tell one.
 import type { Page } from "./page";
 
-const kBack_s = 0.5;    // further back than this is another past, not a message that came late
+const kBack_s = 0.5; // further back than this is another past, not a message that came late
 
 export class Clock {
   epoch = -1;
   private last: { wall_s: number; sim_s: number } | null = null;
 
   // forget: what was drawn along the way is not of this moment.
-  constructor(private readonly page: Page, private readonly forget: () => void) {}
+  constructor(
+    private readonly page: Page,
+    private readonly forget: () => void,
+  ) {}
 
-  // isState: only states say that the past is over; of what else comes, some is older than they are.
+  // isState: only states say that the past is over; of what else comes, some is older than they
+  // are.
   tell(time_s: number, epoch: number, isState = false): void {
     const before_s = this.page.now.time_s;
     if (isState && (epoch !== this.epoch || time_s < before_s - kBack_s)) {
@@ -20,7 +24,8 @@ export class Clock {
     this.page.set({ time_s });
     const wall_s = performance.now() / 1000;
     if (this.last && wall_s - this.last.wall_s < 1) return;
-    if (this.last) this.page.set({ factor: (time_s - this.last.sim_s) / (wall_s - this.last.wall_s) });
+    if (this.last)
+      this.page.set({ factor: (time_s - this.last.sim_s) / (wall_s - this.last.wall_s) });
     this.last = { wall_s, sim_s: time_s };
   }
 

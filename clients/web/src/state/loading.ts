@@ -1,12 +1,13 @@
-// The one order in which a page comes together, in whatever order its parts arrive: the greeting says what is shown, ruedo/info
-// what runs, the scene what it looks like. Both of the last are told together, for the one says little without the other, and
-// only from then on messages of the run are asked for and taken.
+// The one order in which a page comes together, in whatever order its parts arrive: the greeting
+// says what is shown, ruedo/info what runs, the scene what it looks like. Both of the last are told
+// together, for the one says little without the other, and only from then on messages of the run
+// are asked for and taken.
 import type { world_info_t } from "../../generated/messages";
 import type { Hello } from "../wire/link";
 import { InfoAssembler, type World } from "./world";
 
 export interface LoadingEvents<Scene> {
-  fetchScene(): Promise<Scene | null>;            // null: there is no scene to show
+  fetchScene(): Promise<Scene | null>; // null: there is no scene to show
   greeted(hello: Hello): void;
   // The world has come, maybe before its scene: it can be steered.
   running(world: World): void;
@@ -25,7 +26,9 @@ export class Loading<Scene> {
 
   constructor(private readonly events: LoadingEvents<Scene>) {}
 
-  get complete(): boolean { return this.world !== null && this.hasScene; }
+  get complete(): boolean {
+    return this.world !== null && this.hasScene;
+  }
 
   // A connection is there: what was known may be of another run.
   onHello(hello: Hello): void {
@@ -56,7 +59,7 @@ export class Loading<Scene> {
         break;
       } catch (error) {
         if (fetch !== this.fetches) return;
-        if (tries === 0) continue;    // it may have changed while it was read
+        if (tries === 0) continue; // it may have changed while it was read
         this.events.failed((error as Error).message);
         this.scene = null;
         break;
@@ -66,8 +69,13 @@ export class Loading<Scene> {
     this.tell();
   }
 
-  private tell(): void { if (this.world && this.hasScene) this.events.complete(this.world, this.scene); }
+  private tell(): void {
+    if (this.world && this.hasScene) this.events.complete(this.world, this.scene);
+  }
 }
 
 const sameWorld = (a: World, b: World) =>
-  a.runId === b.runId && a.channels.length === b.channels.length && a.bodies.length === b.bodies.length && a.channels.every(({ name }, i) => name === b.channels[i]!.name);
+  a.runId === b.runId &&
+  a.channels.length === b.channels.length &&
+  a.bodies.length === b.bodies.length &&
+  a.channels.every(({ name }, i) => name === b.channels[i]!.name);

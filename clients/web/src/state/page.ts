@@ -13,20 +13,20 @@ export type Tab = (typeof kTabs)[number];
 export interface PageState {
   link: LinkState;
   hello: Hello | null;
-  controlled: boolean;              // the run takes requests
-  world: World | null;              // and its scene: both of one moment, by Loading
+  controlled: boolean; // the run takes requests
+  world: World | null; // and its scene: both of one moment, by Loading
   scene: Description | null;
-  robot: number;                    // chosen, index into world.robots; -1 for none
+  robot: number; // chosen, index into world.robots; -1 for none
   paused: boolean;
-  time_s: number;                   // sim time
-  factor: number | null;            // sim time per real time
-  playback: Playback | null;        // of a log
+  time_s: number; // sim time
+  factor: number | null; // sim time per real time
+  playback: Playback | null; // of a log
   layers: ReadonlySet<Layer>;
   mode: ViewMode;
-  reduced: boolean;                 // drawn with fewer pixels than the page has
+  reduced: boolean; // drawn with fewer pixels than the page has
   theme: string;
   tab: Tab;
-  panel: boolean;                   // is open
+  panel: boolean; // is open
 }
 
 export type Page = Store<PageState>;
@@ -35,16 +35,36 @@ export function makePage(): Page {
   const layers = recall("layers")?.split(",") ?? kLayers.filter((layer) => layer !== "frames");
   const tab = recall("page");
   return new Store<PageState>({
-    link: "connecting", hello: null, controlled: false, world: null, scene: null, robot: -1, paused: false, time_s: 0, factor: null, playback: null,
-    layers: new Set(kLayers.filter((layer) => layers.includes(layer))), mode: "orbit", reduced: false,
-    theme: recall("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"),
-    tab: kTabs.find((name) => name === tab) ?? "Robot", panel: innerWidth >= 860 && recall("panel") !== "closed",
+    link: "connecting",
+    hello: null,
+    controlled: false,
+    world: null,
+    scene: null,
+    robot: -1,
+    paused: false,
+    time_s: 0,
+    factor: null,
+    playback: null,
+    layers: new Set(kLayers.filter((layer) => layers.includes(layer))),
+    mode: "orbit",
+    reduced: false,
+    theme:
+      recall("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"),
+    tab: kTabs.find((name) => name === tab) ?? "Robot",
+    panel: innerWidth >= 860 && recall("panel") !== "closed",
   });
 }
 
 // What is said of the run in the bar, and whether that is good; null: neither.
-export function stateWords({ link, hello, world, paused, playback }: Readonly<PageState>): [words: string, good: boolean | null] {
-  if (link !== "open") return [link === "ended" ? "ended" : link === "lost" ? "no connection" : "connecting", false];
+export function stateWords({
+  link,
+  hello,
+  world,
+  paused,
+  playback,
+}: Readonly<PageState>): [words: string, good: boolean | null] {
+  if (link !== "open")
+    return [link === "ended" ? "ended" : link === "lost" ? "no connection" : "connecting", false];
   if (hello?.mode === "log" && playback) return [playback.playing ? "log" : "log, paused", null];
   if (!world) return ["connected", true];
   return paused ? ["paused", false] : ["running", true];

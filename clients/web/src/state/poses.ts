@@ -1,13 +1,14 @@
-// Where the bodies are, at the display's rate: between the last two states, one interval behind the newest.
+// Where the bodies are, at the display's rate: between the last two states, one interval behind the
+// newest.
 import type { world_state_t } from "../../generated/messages";
 
 const kMostBodies = 1_000_000;
-const kJump_m = 1.5;    // further in one interval is no motion but a new place
+const kJump_m = 1.5; // further in one interval is no motion but a new place
 
 export class Poses {
-  size = 0;                             // bodies known
-  now = new Float32Array(0);            // x, y, z, qw, qx, qy, qz of each body
-  utime = 0;                            // us, of the newest state
+  size = 0; // bodies known
+  now = new Float32Array(0); // x, y, z, qw, qx, qy, qz of each body
+  utime = 0; // us, of the newest state
   private from = new Float32Array(0);
   private to = new Float32Array(0);
   private known = new Uint8Array(0);
@@ -18,11 +19,17 @@ export class Poses {
   settled = false;
 
   // What comes next is another moment, not the next one: nothing moves there.
-  jump(): void { this.jumped = true; }
+  jump(): void {
+    this.jumped = true;
+  }
 
   private grow(size: number): void {
     if (size <= this.size) return;
-    const larger = (old: Float32Array) => { const next = new Float32Array(7 * size); next.set(old); return next; };
+    const larger = (old: Float32Array) => {
+      const next = new Float32Array(7 * size);
+      next.set(old);
+      return next;
+    };
     this.now = larger(this.now);
     this.from = larger(this.from);
     this.to = larger(this.to);
@@ -41,7 +48,8 @@ export class Poses {
     const utime = Number(state.utime);
     const fresh = state.epoch !== this.epoch || utime < this.utime || this.jumped;
     if (state.part === 0) {
-      if (!fresh && at_ms > this.arrived) this.interval += 0.2 * (Math.min(500, at_ms - this.arrived) - this.interval);
+      if (!fresh && at_ms > this.arrived)
+        this.interval += 0.2 * (Math.min(500, at_ms - this.arrived) - this.interval);
       this.arrived = at_ms;
       this.from.set(this.now);
     }
@@ -50,11 +58,17 @@ export class Poses {
     this.utime = utime;
     this.settled = false;
     for (let i = 0; i < state.index.length; ++i) {
-      const body = state.index[i]!, at = 7 * body;
+      const body = state.index[i]!,
+        at = 7 * body;
       for (let k = 0; k < 3; ++k) this.to[at + k] = state.position[3 * i + k]!;
       for (let k = 0; k < 4; ++k) this.to[at + 3 + k] = state.orientation[4 * i + k]!;
-      const moved = Math.hypot(this.to[at]! - this.from[at]!, this.to[at + 1]! - this.from[at + 1]!, this.to[at + 2]! - this.from[at + 2]!);
-      if (fresh || !this.known[body] || moved > kJump_m) this.from.set(this.to.subarray(at, at + 7), at);
+      const moved = Math.hypot(
+        this.to[at]! - this.from[at]!,
+        this.to[at + 1]! - this.from[at + 1]!,
+        this.to[at + 2]! - this.from[at + 2]!,
+      );
+      if (fresh || !this.known[body] || moved > kJump_m)
+        this.from.set(this.to.subarray(at, at + 7), at);
       this.known[body] = 1;
     }
   }

@@ -1,17 +1,23 @@
-// What the page knows, in one place: whoever learns something sets it here, and views are told of what they watch.
+// What the page knows, in one place: whoever learns something sets it here, and views are told of
+// what they watch.
 export class Store<State extends object> {
   private readonly watchers: { keys: (keyof State)[]; call: () => void }[] = [];
 
   constructor(private readonly values: State) {}
 
-  get now(): Readonly<State> { return this.values; }
+  get now(): Readonly<State> {
+    return this.values;
+  }
 
   // Tells who watches a value that is another one now.
   set(patch: Partial<State>): void {
-    const changed = (Object.keys(patch) as (keyof State)[]).filter((key) => !Object.is(patch[key], this.values[key]));
+    const changed = (Object.keys(patch) as (keyof State)[]).filter(
+      (key) => !Object.is(patch[key], this.values[key]),
+    );
     if (changed.length === 0) return;
     Object.assign(this.values, patch);
-    for (const { keys, call } of this.watchers) if (keys.some((key) => changed.includes(key))) call();
+    for (const { keys, call } of this.watchers)
+      if (keys.some((key) => changed.includes(key))) call();
   }
 
   // Calls at once, and whenever one of these values is another.

@@ -4,28 +4,56 @@ import { shownRobots, type PageState, type Tab } from "./page";
 
 const kOfPage = ["world_state_t", "tick_t", "reply_t"];
 const kOfTab: Record<Tab, string[]> = {
-  Robot: ["pose_t", "odometry_t", "motion_status_t", "planar_lidar_t", "sonar_t", "image_t", "imu_t", "contact_t"],
-  Plots: ["pose_t", "odometry_t"], Channels: [], World: [],
+  Robot: [
+    "pose_t",
+    "odometry_t",
+    "motion_status_t",
+    "planar_lidar_t",
+    "sonar_t",
+    "image_t",
+    "imu_t",
+    "contact_t",
+  ],
+  Plots: ["pose_t", "odometry_t"],
+  Channels: [],
+  World: [],
 };
-const kOfLayer: Partial<Record<Layer, string>> = { rays: "planar_lidar_t", points: "planar_lidar_t", sonar: "sonar_t", trail: "pose_t", contacts: "contact_t" };
+const kOfLayer: Partial<Record<Layer, string>> = {
+  rays: "planar_lidar_t",
+  points: "planar_lidar_t",
+  sonar: "sonar_t",
+  trail: "pose_t",
+  contacts: "contact_t",
+};
 
 // complete: the world and its scene are there; until then messages of the run mean nothing.
-export function wantedChannels(state: Readonly<PageState>, complete: boolean, opened: Iterable<string>): Set<string> {
+export function wantedChannels(
+  state: Readonly<PageState>,
+  complete: boolean,
+  opened: Iterable<string>,
+): Set<string> {
   const { hello, world, robot, layers, tab, panel } = state;
   const wanted = new Set<string>();
   if (!hello) return wanted;
   wanted.add(hello.info);
   if (!world) {
-    wanted.add("ruedo/reply");    // of the first requests
+    wanted.add("ruedo/reply"); // of the first requests
     return wanted;
   }
-  const shown = new Set(shownRobots(state)), chosen = world.robots[robot]?.name;
-  const drawn = new Set<string | undefined>(["odometry_t", ...[...layers].map((layer) => kOfLayer[layer])]);    // the wheels turn by odometry
+  const shown = new Set(shownRobots(state)),
+    chosen = world.robots[robot]?.name;
+  const drawn = new Set<string | undefined>([
+    "odometry_t",
+    ...[...layers].map((layer) => kOfLayer[layer]),
+  ]); // the wheels turn by odometry
   for (const { name, type, robot: of, input } of world.channels) {
     if (input) continue;
     if (!of) {
       if (type === "reply_t" || (complete && kOfPage.includes(type))) wanted.add(name);
-    } else if (complete && ((shown.has(of) && drawn.has(type)) || (of === chosen && panel && kOfTab[tab].includes(type)))) {
+    } else if (
+      complete &&
+      ((shown.has(of) && drawn.has(type)) || (of === chosen && panel && kOfTab[tab].includes(type)))
+    ) {
       wanted.add(name);
     }
   }

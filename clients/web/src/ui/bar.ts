@@ -5,8 +5,12 @@ import type { ViewMode } from "../scene/stage";
 import { h, say } from "./dom";
 
 const kIcons = {
-  pause: "M5 3h4v14H5zM11 3h4v14h-4z", play: "M5 3l12 7-12 7z", step: "M4 3l9 7-9 7zM14 3h3v14h-3z",
-  reset: "M10 3a7 7 0 1 0 7 7h-2.4A4.6 4.6 0 1 1 10 5.4V9l5-4.5L10 0z", panel: "M2 3h16v14H2zM12 5v10h4V5z", theme: "M10 2a8 8 0 1 0 0 16zM10 2a8 8 0 0 1 0 16",
+  pause: "M5 3h4v14H5zM11 3h4v14h-4z",
+  play: "M5 3l12 7-12 7z",
+  step: "M4 3l9 7-9 7zM14 3h3v14h-3z",
+  reset: "M10 3a7 7 0 1 0 7 7h-2.4A4.6 4.6 0 1 1 10 5.4V9l5-4.5L10 0z",
+  panel: "M2 3h16v14H2zM12 5v10h4V5z",
+  theme: "M10 2a8 8 0 1 0 0 16zM10 2a8 8 0 0 1 0 16",
   help: "M10 1a9 9 0 1 0 0 18 9 9 0 0 0 0-18zm-1 12h2v2H9zm1-8c2 0 3.4 1.2 3.4 3 0 2.2-2.4 2.4-2.4 4H9c0-2.6 2.4-2.7 2.4-4 0-.7-.6-1.1-1.4-1.1S8.600 7.300 8.500 8.200L6.600 7.900C6.800 6.100 8.100 5 10 5z",
 };
 export function icon(name: keyof typeof kIcons): SVGSVGElement {
@@ -17,44 +21,98 @@ export function icon(name: keyof typeof kIcons): SVGSVGElement {
   svg.append(path);
   return svg;
 }
-export const iconButton = (name: keyof typeof kIcons, title: string, click: () => void, more = "") =>
-  h("button", { class: `icon ${more}`, title, "aria-label": title, click }, icon(name));
+export const iconButton = (
+  name: keyof typeof kIcons,
+  title: string,
+  click: () => void,
+  more = "",
+) => h("button", { class: `icon ${more}`, title, "aria-label": title, click }, icon(name));
 
 export interface BarActions {
-  pauseOrResume(): void; step(): void; rate(rate: number): void; reset(): void; mode(mode: ViewMode): void;
-  theme(): void; help(): void; panel(): void;
+  pauseOrResume(): void;
+  step(): void;
+  rate(rate: number): void;
+  reset(): void;
+  mode(mode: ViewMode): void;
+  theme(): void;
+  help(): void;
+  panel(): void;
 }
 
 export class Bar {
   private readonly name = h("span");
   private readonly state = h("span", { class: "pill", id: "state" }, "connecting");
   private readonly clock = h("span", { class: "clock", id: "clock", title: "sim time" }, "–");
-  private readonly factor = h("span", { class: "pill roomy", title: "sim time per real time" }, "–");
+  private readonly factor = h(
+    "span",
+    { class: "pill roomy", title: "sim time per real time" },
+    "–",
+  );
   private readonly pause: HTMLButtonElement;
   private readonly stepButton: HTMLButtonElement;
   private readonly resetButton: HTMLButtonElement;
-  private readonly rate = h("select", { class: "roomy", title: "sim time per real time that is asked for", "aria-label": "rate" },
-    h("option", { value: "", hidden: true }, "rate"),    // nobody has asked for one here; what it is stands beside
-    ...["0.1", "0.25", "0.5", "1", "2", "5", "10", "max"].map((value) => h("option", { value }, value === "max" ? "max" : `× ${value}`)));
+  private readonly rate = h(
+    "select",
+    { class: "roomy", title: "sim time per real time that is asked for", "aria-label": "rate" },
+    // Nobody has asked for one here; what it is stands beside
+    h("option", { value: "", hidden: true }, "rate"),
+    ...["0.1", "0.25", "0.5", "1", "2", "5", "10", "max"].map((value) =>
+      h("option", { value }, value === "max" ? "max" : `× ${value}`),
+    ),
+  );
   private readonly modes = new Map<string, HTMLButtonElement>();
 
-  constructor(place: HTMLElement, private readonly page: Page, actions: BarActions) {
+  constructor(
+    place: HTMLElement,
+    private readonly page: Page,
+    actions: BarActions,
+  ) {
     this.pause = iconButton("pause", "pause (space)", () => actions.pauseOrResume());
     this.pause.id = "pause";
     this.stepButton = iconButton("step", "one step while paused (.)", () => actions.step());
     this.resetButton = iconButton("reset", "reset the world (R)", () => actions.reset());
     this.rate.value = "";
     this.rate.addEventListener("change", () => this.rate.blur());
-    this.rate.addEventListener("change", () => actions.rate(this.rate.value === "max" ? Infinity : Number(this.rate.value)));
+    this.rate.addEventListener("change", () =>
+      actions.rate(this.rate.value === "max" ? Infinity : Number(this.rate.value)),
+    );
     const view = h("span", { class: "row", style: "flex-wrap: nowrap; gap: 4px" });
-    for (const [mode, key] of [["orbit", "1"], ["follow", "2"], ["top", "3"]] as const) {
-      const button = h("button", { class: "roomy", title: `${mode} view (${key})`, click: () => actions.mode(mode) }, mode);
+    for (const [mode, key] of [
+      ["orbit", "1"],
+      ["follow", "2"],
+      ["top", "3"],
+    ] as const) {
+      const button = h(
+        "button",
+        { class: "roomy", title: `${mode} view (${key})`, click: () => actions.mode(mode) },
+        mode,
+      );
       this.modes.set(mode, button);
       view.append(button);
     }
-    place.append(h("h1", { class: "name" }, h("img", { src: document.querySelector<HTMLLinkElement>("link[rel=icon]")!.href, alt: "Ruedo" }), this.name), this.state, h("span", { class: "grow" }),
-      this.clock, this.factor, this.pause, this.stepButton, this.rate, this.resetButton, view,
-      iconButton("theme", "dark or light (T)", () => actions.theme(), "roomy"), iconButton("help", "keys (?)", () => actions.help()), iconButton("panel", "panel (P)", () => actions.panel()));
+    place.append(
+      h(
+        "h1",
+        { class: "name" },
+        h("img", {
+          src: document.querySelector<HTMLLinkElement>("link[rel=icon]")!.href,
+          alt: "Ruedo",
+        }),
+        this.name,
+      ),
+      this.state,
+      h("span", { class: "grow" }),
+      this.clock,
+      this.factor,
+      this.pause,
+      this.stepButton,
+      this.rate,
+      this.resetButton,
+      view,
+      iconButton("theme", "dark or light (T)", () => actions.theme(), "roomy"),
+      iconButton("help", "keys (?)", () => actions.help()),
+      iconButton("panel", "panel (P)", () => actions.panel()),
+    );
     this.show();
   }
 
@@ -63,15 +121,24 @@ export class Bar {
     const { page } = this;
     page.watch(["hello"], ({ hello }) => {
       say(this.name, hello?.title ?? "");
-      if (hello?.mode === "log") for (const element of [this.stepButton, this.rate, this.resetButton, this.factor]) element.remove();
+      if (hello?.mode === "log")
+        for (const element of [this.stepButton, this.rate, this.resetButton, this.factor])
+          element.remove();
     });
     page.watch(["link", "hello", "world", "paused", "playback"], (state) => {
       const [words, good] = stateWords(state);
       say(this.state, words);
       this.state.className = `pill ${good === null ? "" : good ? "good" : "bad"}`;
     });
-    page.watch(["time_s", "world"], ({ time_s, world }) => { if (world) say(this.clock, clockText(time_s, world.step_us)); });
-    page.watch(["factor"], ({ factor }) => say(this.factor, factor === null ? "–" : `× ${factor >= 9.95 ? factor.toFixed(0) : factor.toFixed(2)}`));
+    page.watch(["time_s", "world"], ({ time_s, world }) => {
+      if (world) say(this.clock, clockText(time_s, world.step_us));
+    });
+    page.watch(["factor"], ({ factor }) =>
+      say(
+        this.factor,
+        factor === null ? "–" : `× ${factor >= 9.95 ? factor.toFixed(0) : factor.toFixed(2)}`,
+      ),
+    );
     page.watch(["mode"], ({ mode }) => {
       for (const [name, button] of this.modes) {
         button.classList.toggle("on", name === mode);
@@ -82,7 +149,8 @@ export class Bar {
       this.pause.replaceChildren(icon(paused ? "play" : "pause"));
       this.pause.title = paused ? "go on (space)" : "pause (space)";
       this.pause.setAttribute("aria-label", this.pause.title);
-      for (const element of [this.pause, this.rate, this.resetButton]) element.disabled = !controlled;
+      for (const element of [this.pause, this.rate, this.resetButton])
+        element.disabled = !controlled;
       this.stepButton.disabled = !controlled || !paused;
     });
   }

@@ -4,21 +4,34 @@ import type { World } from "../state/world";
 import { h, say } from "./dom";
 
 const kMostRows = 300;
-const kMostShown = 12;      // elements of an array
+const kMostShown = 12; // elements of an array
 
-interface Row { element: HTMLElement; rate: HTMLElement; size: HTMLElement; values: HTMLElement | null; last: number; at: number; hz: number }
+interface Row {
+  element: HTMLElement;
+  rate: HTMLElement;
+  size: HTMLElement;
+  values: HTMLElement | null;
+  last: number;
+  at: number;
+  hz: number;
+}
 
 export function textOf(value: unknown, depth = 0): string {
-  if (typeof value === "number") return Number.isInteger(value) ? String(value) : value.toPrecision(5);
+  if (typeof value === "number")
+    return Number.isInteger(value) ? String(value) : value.toPrecision(5);
   if (typeof value === "bigint" || typeof value === "boolean") return String(value);
   if (typeof value === "string") return JSON.stringify(value);
   if (value instanceof Uint8Array) return `${value.length} bytes`;
   if (ArrayBuffer.isView(value) || Array.isArray(value)) {
     const list = value as unknown as ArrayLike<unknown>;
-    const shown = Array.from({ length: Math.min(list.length, kMostShown) }, (_, i) => textOf(list[i], depth + 1));
+    const shown = Array.from({ length: Math.min(list.length, kMostShown) }, (_, i) =>
+      textOf(list[i], depth + 1),
+    );
     return `[${shown.join(", ")}${list.length > kMostShown ? `, … ${list.length}` : ""}]`;
   }
-  const members = Object.entries(value as object).map(([name, inner]) => `${name}: ${textOf(inner, depth + 1)}`);
+  const members = Object.entries(value as object).map(
+    ([name, inner]) => `${name}: ${textOf(inner, depth + 1)}`,
+  );
   return depth > 0 ? `{${members.join(", ")}}` : members.join("\n");
 }
 
@@ -27,14 +40,39 @@ export class ChannelList {
   readonly opened = new Set<string>();
   private readonly rows = new Map<string, Row>();
   private readonly body = h("tbody");
-  private readonly filter = h("input", { type: "search", placeholder: "filter channels", "aria-label": "filter channels" });
+  private readonly filter = h("input", {
+    type: "search",
+    placeholder: "filter channels",
+    "aria-label": "filter channels",
+  });
   private readonly more = h("p", { class: "dim" });
   private world: World | null = null;
 
   constructor(private readonly onOpened: () => void) {
     this.filter.addEventListener("input", () => this.fill());
-    this.element = h("section", {}, this.filter,
-      h("table", { class: "channels" }, h("thead", {}, h("tr", {}, h("th", {}, "channel"), h("th", {}, "type"), h("th", { class: "number" }, "Hz"), h("th", { class: "number" }, "bytes"))), this.body), this.more);
+    this.element = h(
+      "section",
+      {},
+      this.filter,
+      h(
+        "table",
+        { class: "channels" },
+        h(
+          "thead",
+          {},
+          h(
+            "tr",
+            {},
+            h("th", {}, "channel"),
+            h("th", {}, "type"),
+            h("th", { class: "number" }, "Hz"),
+            h("th", { class: "number" }, "bytes"),
+          ),
+        ),
+        this.body,
+      ),
+      this.more,
+    );
   }
 
   show(world: World): void {
@@ -44,26 +82,56 @@ export class ChannelList {
 
   private fill(): void {
     const wanted = this.filter.value.toLowerCase();
-    const channels = (this.world?.channels ?? []).filter((c) => `${c.name} ${c.type}`.toLowerCase().includes(wanted));
+    const channels = (this.world?.channels ?? []).filter((c) =>
+      `${c.name} ${c.type}`.toLowerCase().includes(wanted),
+    );
     this.body.replaceChildren();
     const before = new Map(this.rows);
     this.rows.clear();
     for (const channel of channels.slice(0, kMostRows)) {
       const old = before.get(channel.name);
-      const rate = h("td", { class: "number" }), size = h("td", { class: "number" });
-      const row: Row = { element: h("tr", { tabindex: 0, "data-channel": channel.name }, h("td", {}, channel.input ? "→ " : "", channel.name), h("td", { class: "dim" }, channel.type), rate, size), rate, size, values: null, last: old?.last ?? 0, at: old?.at ?? 0, hz: old?.hz ?? 0 };
+      const rate = h("td", { class: "number" }),
+        size = h("td", { class: "number" });
+      const row: Row = {
+        element: h(
+          "tr",
+          { tabindex: 0, "data-channel": channel.name },
+          h("td", {}, channel.input ? "→ " : "", channel.name),
+          h("td", { class: "dim" }, channel.type),
+          rate,
+          size,
+        ),
+        rate,
+        size,
+        values: null,
+        last: old?.last ?? 0,
+        at: old?.at ?? 0,
+        hz: old?.hz ?? 0,
+      };
       const toggle = () => {
-        if (this.opened.delete(channel.name)) { row.values?.parentElement?.parentElement?.remove(); row.values = null; }
-        else { this.opened.add(channel.name); this.open(row); }
+        if (this.opened.delete(channel.name)) {
+          row.values?.parentElement?.parentElement?.remove();
+          row.values = null;
+        } else {
+          this.opened.add(channel.name);
+          this.open(row);
+        }
         this.onOpened();
       };
       row.element.addEventListener("click", toggle);
-      row.element.addEventListener("keydown", (event) => { if (event.key === "Enter") toggle(); });
+      row.element.addEventListener("keydown", (event) => {
+        if (event.key === "Enter") toggle();
+      });
       this.rows.set(channel.name, row);
       this.body.append(row.element);
       if (this.opened.has(channel.name)) this.open(row);
     }
-    say(this.more, channels.length > kMostRows ? `${channels.length - kMostRows} more: narrow them down by the filter` : "");
+    say(
+      this.more,
+      channels.length > kMostRows
+        ? `${channels.length - kMostRows} more: narrow them down by the filter`
+        : "",
+    );
   }
 
   private open(row: Row): void {
@@ -78,7 +146,7 @@ export class ChannelList {
       if (!row || i >= messages.length) return;
       const count = messages[i]!;
       if (row.at > 0 && now > row.at) {
-        const hz = ((count - row.last) >>> 0) * 1000 / (now - row.at);
+        const hz = (((count - row.last) >>> 0) * 1000) / (now - row.at);
         row.hz = row.hz === 0 || hz === 0 ? hz : 0.6 * row.hz + 0.4 * hz;
         say(row.rate, row.hz >= 9.95 ? row.hz.toFixed(0) : row.hz.toFixed(1));
       }
@@ -93,7 +161,10 @@ export class ChannelList {
     if (!values) return;
     const type = typeOf(bytes);
     try {
-      say(values, type ? textOf(decode(type, bytes)) : `${bytes.length} bytes of a type that is not known`);
+      say(
+        values,
+        type ? textOf(decode(type, bytes)) : `${bytes.length} bytes of a type that is not known`,
+      );
     } catch (error) {
       say(values, (error as Error).message);
     }

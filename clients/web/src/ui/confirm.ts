@@ -2,8 +2,18 @@
 import { h } from "./dom";
 
 export function confirmed(question: string, words: string, yes: string): Promise<boolean> {
-  const dialog = h("dialog", { class: "confirm", "aria-labelledby": "question" }, h("h2", { id: "question" }, question), h("p", {}, words),
-    h("form", { method: "dialog", class: "row" }, h("button", { value: "yes", class: "on", autofocus: true }, yes), h("button", { value: "" }, "Cancel (Esc)")));
+  const dialog = h(
+    "dialog",
+    { class: "confirm", "aria-labelledby": "question" },
+    h("h2", { id: "question" }, question),
+    h("p", {}, words),
+    h(
+      "form",
+      { method: "dialog", class: "row" },
+      h("button", { value: "yes", class: "on", autofocus: true }, yes),
+      h("button", { value: "" }, "Cancel (Esc)"),
+    ),
+  );
   document.body.append(dialog);
   dialog.showModal();
   return new Promise((resolve) => {

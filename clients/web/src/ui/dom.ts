@@ -2,14 +2,22 @@
 type Child = Node | string | null | undefined | false;
 type Attributes = Record<string, string | number | boolean | ((event: Event) => void) | undefined>;
 
-export function h<K extends keyof HTMLElementTagNameMap>(tag: K, attributes: Attributes = {}, ...children: Child[]): HTMLElementTagNameMap[K] {
+export function h<K extends keyof HTMLElementTagNameMap>(
+  tag: K,
+  attributes: Attributes = {},
+  ...children: Child[]
+): HTMLElementTagNameMap[K] {
   const element = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
     if (typeof value === "function") element.addEventListener(name, value);
     else if (value === true) element.setAttribute(name, "");
     else if (value !== false && value !== undefined) element.setAttribute(name, String(value));
   }
-  element.append(...children.filter((child): child is Node | string => child !== null && child !== undefined && child !== false));
+  element.append(
+    ...children.filter(
+      (child): child is Node | string => child !== null && child !== undefined && child !== false,
+    ),
+  );
   return element;
 }
 
@@ -27,5 +35,17 @@ export function toast(text: string, kind: "info" | "error" = "info"): void {
   setTimeout(() => note.remove(), kToast_ms);
 }
 
-export const remember = (key: string, value: string) => { try { localStorage.setItem(`ruedo.${key}`, value); } catch { /* private mode */ } };
-export const recall = (key: string) => { try { return localStorage.getItem(`ruedo.${key}`); } catch { return null; } };
+export const remember = (key: string, value: string) => {
+  try {
+    localStorage.setItem(`ruedo.${key}`, value);
+  } catch {
+    /* private mode */
+  }
+};
+export const recall = (key: string) => {
+  try {
+    return localStorage.getItem(`ruedo.${key}`);
+  } catch {
+    return null;
+  }
+};

@@ -1,16 +1,33 @@
-// Driving by keyboard, gamepad and an on-screen stick: all of them give a share of the robot's speed and turn rate, which
-// is sent as velocity commands ten times a second, and a stop when it is let go.
+// Driving by keyboard, gamepad and an on-screen stick: all of them give a share of the robot's
+// speed and turn rate, which is sent as velocity commands ten times a second, and a stop when it is
+// let go.
 import { dialogIsOpen } from "./confirm";
 import { h } from "./dom";
 
 const kPeriod_ms = 100;
 const kKeys: Record<string, [number, number]> = {
-  KeyW: [1, 0], ArrowUp: [1, 0], KeyS: [-1, 0], ArrowDown: [-1, 0], KeyA: [0, 1], ArrowLeft: [0, 1], KeyD: [0, -1], ArrowRight: [0, -1],
+  KeyW: [1, 0],
+  ArrowUp: [1, 0],
+  KeyS: [-1, 0],
+  ArrowDown: [-1, 0],
+  KeyA: [0, 1],
+  ArrowLeft: [0, 1],
+  KeyD: [0, -1],
+  ArrowRight: [0, -1],
 };
 const kDeadZone = 0.15;
 
 export class Drive {
-  readonly stick = h("div", { class: "stick", role: "group", title: "drag to drive (W A S D)", "aria-label": "driving stick" }, h("div", { class: "knob" }));
+  readonly stick = h(
+    "div",
+    {
+      class: "stick",
+      role: "group",
+      title: "drag to drive (W A S D)",
+      "aria-label": "driving stick",
+    },
+    h("div", { class: "knob" }),
+  );
   private readonly held = new Set<string>();
   private fromStick: [number, number] = [0, 0];
   private active = false;
@@ -18,33 +35,55 @@ export class Drive {
   // send: a share of speed ahead and of turn rate to the left, each from -1 to 1.
   constructor(private readonly send: (ahead: number, left: number) => void) {
     addEventListener("keydown", (event) => {
-      if (!(event.code in kKeys) || event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target) || dialogIsOpen()) return;
+      if (
+        !(event.code in kKeys) ||
+        event.ctrlKey ||
+        event.metaKey ||
+        event.altKey ||
+        isTyping(event.target) ||
+        dialogIsOpen()
+      )
+        return;
       this.held.add(event.code);
       event.preventDefault();
       this.tick();
     });
-    addEventListener("keyup", (event) => { if (this.held.delete(event.code)) this.tick(); });
-    addEventListener("blur", () => { this.held.clear(); this.tick(); });
+    addEventListener("keyup", (event) => {
+      if (this.held.delete(event.code)) this.tick();
+    });
+    addEventListener("blur", () => {
+      this.held.clear();
+      this.tick();
+    });
     this.stick.addEventListener("pointerdown", (event) => {
       this.stick.setPointerCapture(event.pointerId);
       this.onStick(event);
     });
-    this.stick.addEventListener("pointermove", (event) => { if (this.stick.hasPointerCapture(event.pointerId)) this.onStick(event); });
-    for (const end of ["pointerup", "pointercancel"]) this.stick.addEventListener(end, () => this.setStick(0, 0));
+    this.stick.addEventListener("pointermove", (event) => {
+      if (this.stick.hasPointerCapture(event.pointerId)) this.onStick(event);
+    });
+    for (const end of ["pointerup", "pointercancel"])
+      this.stick.addEventListener(end, () => this.setStick(0, 0));
     setInterval(() => this.tick(), kPeriod_ms);
   }
 
   private onStick(event: PointerEvent): void {
-    const box = this.stick.getBoundingClientRect(), reach = box.width / 2;
-    let x = (event.clientX - box.left - reach) / reach, y = (event.clientY - box.top - reach) / reach;
+    const box = this.stick.getBoundingClientRect(),
+      reach = box.width / 2;
+    let x = (event.clientX - box.left - reach) / reach,
+      y = (event.clientY - box.top - reach) / reach;
     const length = Math.hypot(x, y);
-    if (length > 1) { x /= length; y /= length; }
+    if (length > 1) {
+      x /= length;
+      y /= length;
+    }
     this.setStick(-y, -x);
   }
 
   private setStick(ahead: number, left: number): void {
     this.fromStick = [ahead, left];
-    (this.stick.firstElementChild as HTMLElement).style.transform = `translate(${-left * 40}px, ${-ahead * 40}px)`;
+    (this.stick.firstElementChild as HTMLElement).style.transform =
+      `translate(${-left * 40}px, ${-ahead * 40}px)`;
     this.tick();
   }
 
@@ -56,7 +95,10 @@ export class Drive {
     }
     for (const pad of navigator.getGamepads?.() ?? []) {
       if (!pad) continue;
-      const value = (axis: number) => { const v = pad.axes[axis] ?? 0; return Math.abs(v) > kDeadZone ? v : 0; };
+      const value = (axis: number) => {
+        const v = pad.axes[axis] ?? 0;
+        return Math.abs(v) > kDeadZone ? v : 0;
+      };
       ahead -= value(1);
       left -= value(0) || value(2);
     }
@@ -66,10 +108,12 @@ export class Drive {
     }
     const clamp = (v: number) => Math.max(-1, Math.min(1, v));
     const moving = ahead !== 0 || left !== 0;
-    if (moving || this.active) this.send(clamp(ahead), clamp(left));    // once more than needed: the stop
+    // Once more than needed: the stop
+    if (moving || this.active) this.send(clamp(ahead), clamp(left));
     this.active = moving;
   }
 }
 
 export const isTyping = (target: EventTarget | null) =>
-  target instanceof HTMLElement && (target.isContentEditable || ["INPUT", "SELECT", "TEXTAREA"].includes(target.tagName));
+  target instanceof HTMLElement &&
+  (target.isContentEditable || ["INPUT", "SELECT", "TEXTAREA"].includes(target.tagName));

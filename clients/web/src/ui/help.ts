@@ -2,13 +2,40 @@
 import { h } from "./dom";
 
 const kKeys: [string[], string][] = [
-  [["W", "A", "S", "D"], "drive the chosen robot (arrow keys, a gamepad and the stick, too)"], [["X"], "stop it"], [["Space"], "pause and go on"], [["."], "one step, while paused; in a log, 0.1 s ahead"],
-  [["R"], "reset the world"], [["1", "2", "3"], "orbit, follow and top view"], [["I", "J", "K", "L"], "turn the view; with Shift, move it"], [["+", "-"], "nearer, farther"], [["Home"], "the whole world in view"], [["N"], "next robot"], [["P"], "panel"], [["T"], "dark or light"],
-  [["B"], "place something with the next click"], [["Esc"], "do not"], [["?"], "these keys"],
+  [["W", "A", "S", "D"], "drive the chosen robot (arrow keys, a gamepad and the stick, too)"],
+  [["X"], "stop it"],
+  [["Space"], "pause and go on"],
+  [["."], "one step, while paused; in a log, 0.1 s ahead"],
+  [["R"], "reset the world"],
+  [["1", "2", "3"], "orbit, follow and top view"],
+  [["I", "J", "K", "L"], "turn the view; with Shift, move it"],
+  [["+", "-"], "nearer, farther"],
+  [["Home"], "the whole world in view"],
+  [["N"], "next robot"],
+  [["P"], "panel"],
+  [["T"], "dark or light"],
+  [["B"], "place something with the next click"],
+  [["Esc"], "do not"],
+  [["?"], "these keys"],
 ];
 
 export function fillHelp(dialog: HTMLDialogElement): void {
-  dialog.append(h("h2", {}, "Keys"), h("div", { class: "keys" }, ...kKeys.flatMap(([keys, text]) => [h("span", {}, ...keys.map((key) => h("kbd", {}, key))), h("span", {}, text)])),
-    h("p", { class: "dim" }, "Drag to turn the view, with the right button or two fingers to move it, turn the wheel to come nearer. Click a robot to choose it."),
-    h("div", { class: "row" }, h("button", { click: () => dialog.close() }, "Close")));
+  dialog.append(
+    h("h2", {}, "Keys"),
+    h(
+      "div",
+      { class: "keys" },
+      ...kKeys.flatMap(([keys, text]) => [
+        h("span", {}, ...keys.map((key) => h("kbd", {}, key))),
+        h("span", {}, text),
+      ]),
+    ),
+    h(
+      "p",
+      { class: "dim" },
+      "Drag to turn the view, with the right button or two fingers to move it, turn the wheel to " +
+        "come nearer. Click a robot to choose it.",
+    ),
+    h("div", { class: "row" }, h("button", { click: () => dialog.close() }, "Close")),
+  );
 }

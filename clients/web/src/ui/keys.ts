@@ -7,9 +7,16 @@ const kRepeat = new Set([..."ijklIJKL+-"]);
 
 export function listenToKeys(actions: Record<string, () => void>): void {
   addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target) || dialogIsOpen()) return;
-    const action = actions[event.key] ?? (event.key.length === 1 ? actions[event.key.toLowerCase()] : undefined);
-    if (!action || (event.repeat && !kRepeat.has(event.key)) || ((event.key === " " || event.key === "Enter") && event.target instanceof HTMLButtonElement)) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target) || dialogIsOpen())
+      return;
+    const action =
+      actions[event.key] ?? (event.key.length === 1 ? actions[event.key.toLowerCase()] : undefined);
+    if (
+      !action ||
+      (event.repeat && !kRepeat.has(event.key)) ||
+      ((event.key === " " || event.key === "Enter") && event.target instanceof HTMLButtonElement)
+    )
+      return;
     event.preventDefault();
     action();
   });

@@ -4,10 +4,35 @@ import type { Page } from "../state/page";
 import { h, remember } from "./dom";
 
 export function makeLegend(place: HTMLElement, page: Page): void {
-  const chips = new Map(kLayers.map((layer) => [layer, h("button", { class: "chip", "data-layer": layer, style: `--colour: ${kLayerColours[layer]}`, click: () => toggle(page, layer) }, h("i"), layer)]));
-  const sign = h("span", { class: "chip sign", id: "reduced", title: "drawing is slow here; when nothing moves, all pixels are drawn" }, "reduced detail");
+  const chips = new Map(
+    kLayers.map((layer) => [
+      layer,
+      h(
+        "button",
+        {
+          class: "chip",
+          "data-layer": layer,
+          style: `--colour: ${kLayerColours[layer]}`,
+          click: () => toggle(page, layer),
+        },
+        h("i"),
+        layer,
+      ),
+    ]),
+  );
+  const sign = h(
+    "span",
+    {
+      class: "chip sign",
+      id: "reduced",
+      title: "drawing is slow here; when nothing moves, all pixels are drawn",
+    },
+    "reduced detail",
+  );
   place.append(...chips.values(), sign);
-  page.watch(["reduced"], ({ reduced }) => { sign.hidden = !reduced; });
+  page.watch(["reduced"], ({ reduced }) => {
+    sign.hidden = !reduced;
+  });
   page.watch(["layers"], ({ layers }) => {
     for (const [layer, chip] of chips) {
       chip.classList.toggle("on", layers.has(layer));

@@ -6,7 +6,10 @@ import { say, toast } from "./dom";
 export class Notice {
   private wasOpen = false;
 
-  constructor(private readonly element: HTMLElement, private readonly page: Page) {
+  constructor(
+    private readonly element: HTMLElement,
+    private readonly page: Page,
+  ) {
     element.addEventListener("click", () => this.show(""));
   }
 

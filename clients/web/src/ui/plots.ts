@@ -1,13 +1,20 @@
-// Live plots of the chosen robot: velocity profile, path and odometry error over time, and ranges around the robot.
+// Live plots of the chosen robot: velocity profile, path and odometry error over time, and ranges
+// around the robot.
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import type { planar_lidar_t, sonar_t, device_info_t } from "../../generated/messages";
 import { h } from "./dom";
 
 const kWindow_s = 30;
-const css = (name: string) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const css = (name: string) =>
+  getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
-export interface SeriesDescription { label: string; colour: string; scale?: string; dash?: number[] }
+export interface SeriesDescription {
+  label: string;
+  colour: string;
+  scale?: string;
+  dash?: number[];
+}
 
 // Values over sim time, the last half minute of them.
 export class TimePlot {
@@ -16,7 +23,11 @@ export class TimePlot {
   private data: number[][];
   private dirty = false;
 
-  constructor(private readonly title: string, private readonly unit: string, private readonly series: SeriesDescription[]) {
+  constructor(
+    private readonly title: string,
+    private readonly unit: string,
+    private readonly series: SeriesDescription[],
+  ) {
     this.data = [[], ...series.map(() => [])];
     new ResizeObserver(() => this.build()).observe(this.element);
   }
@@ -30,7 +41,11 @@ export class TimePlot {
       this.data[series + 1]![times.length - 1] = value;
     } else {
       times.push(time_s);
-      this.data.slice(1).forEach((column, i) => column.push(i === series ? value : column[column.length - 1] ?? NaN));
+      this.data
+        .slice(1)
+        .forEach((column, i) =>
+          column.push(i === series ? value : (column[column.length - 1] ?? NaN)),
+        );
     }
     const first = times.findIndex((t) => t >= time_s - kWindow_s);
     if (first > 64) for (const column of this.data) column.splice(0, first);
@@ -51,20 +66,55 @@ export class TimePlot {
     this.plot?.setScale("x", { min: Math.max(0, end - kWindow_s), max: Math.max(5, end) });
   }
 
-  restyle(): void { this.build(); }
+  restyle(): void {
+    this.build();
+  }
 
   private build(): void {
     const width = this.element.clientWidth;
     if (width === 0) return;
     this.plot?.destroy();
-    const axis = { stroke: css("--dim"), grid: { stroke: css("--line"), width: 1 }, ticks: { stroke: css("--line"), width: 1 }, font: "11px system-ui" };
+    const axis = {
+      stroke: css("--dim"),
+      grid: { stroke: css("--line"), width: 1 },
+      ticks: { stroke: css("--line"), width: 1 },
+      font: "11px system-ui",
+    };
     const wide = this.series.some((s) => s.scale);
-    this.plot = new uPlot({
-      width, height: 190, title: this.title, cursor: { points: { size: 6 } }, legend: { live: false },
-      scales: { x: { time: false }, y: { range: (_, low, high) => padded(low, high) }, w: { range: (_, low, high) => padded(low, high) } },
-      axes: [{ ...axis, size: 32, values: (_, splits) => splits.map((s) => `${s} s`) }, { ...axis, size: 46 }, ...(wide ? [{ ...axis, scale: "w", side: 1 as const, size: 46, grid: { show: false } }] : [])],
-      series: [{}, ...this.series.map((s) => ({ label: `${s.label}`, stroke: css(s.colour), width: 1.6, scale: s.scale ?? "y", dash: s.dash, points: { show: false } }))],
-    }, this.data as uPlot.AlignedData, this.element);
+    this.plot = new uPlot(
+      {
+        width,
+        height: 190,
+        title: this.title,
+        cursor: { points: { size: 6 } },
+        legend: { live: false },
+        scales: {
+          x: { time: false },
+          y: { range: (_, low, high) => padded(low, high) },
+          w: { range: (_, low, high) => padded(low, high) },
+        },
+        axes: [
+          { ...axis, size: 32, values: (_, splits) => splits.map((s) => `${s} s`) },
+          { ...axis, size: 46 },
+          ...(wide
+            ? [{ ...axis, scale: "w", side: 1 as const, size: 46, grid: { show: false } }]
+            : []),
+        ],
+        series: [
+          {},
+          ...this.series.map((s) => ({
+            label: `${s.label}`,
+            stroke: css(s.colour),
+            width: 1.6,
+            scale: s.scale ?? "y",
+            dash: s.dash,
+            points: { show: false },
+          })),
+        ],
+      },
+      this.data as uPlot.AlignedData,
+      this.element,
+    );
     this.element.title = this.unit;
     this.dirty = true;
   }
@@ -83,24 +133,48 @@ export class PolarPlot {
   private readonly sonars = new Map<string, [device_info_t, sonar_t]>();
   private dirty = true;
 
-  scan(device: device_info_t, message: planar_lidar_t): void { this.scans.set(device.name, [device, message]); this.dirty = true; }
-  sonar(device: device_info_t, message: sonar_t): void { this.sonars.set(device.name, [device, message]); this.dirty = true; }
-  clear(): void { this.scans.clear(); this.sonars.clear(); this.dirty = true; }
-  restyle(): void { this.dirty = true; }
+  scan(device: device_info_t, message: planar_lidar_t): void {
+    this.scans.set(device.name, [device, message]);
+    this.dirty = true;
+  }
+  sonar(device: device_info_t, message: sonar_t): void {
+    this.sonars.set(device.name, [device, message]);
+    this.dirty = true;
+  }
+  clear(): void {
+    this.scans.clear();
+    this.sonars.clear();
+    this.dirty = true;
+  }
+  restyle(): void {
+    this.dirty = true;
+  }
 
   draw(): void {
     const { element } = this;
-    const width = element.clientWidth, height = element.clientHeight, ratio = Math.min(2, devicePixelRatio);
+    const width = element.clientWidth,
+      height = element.clientHeight,
+      ratio = Math.min(2, devicePixelRatio);
     if (!this.dirty || width === 0) return;
     this.dirty = false;
     element.width = width * ratio;
     element.height = height * ratio;
     const pen = element.getContext("2d")!;
     pen.scale(ratio, ratio);
-    const limit = Math.max(1, ...[...this.scans.values(), ...this.sonars.values()].map(([device]) => Math.min(device.range_max, 30)));
+    const limit = Math.max(
+      1,
+      ...[...this.scans.values(), ...this.sonars.values()].map(([device]) =>
+        Math.min(device.range_max, 30),
+      ),
+    );
     const behind = [...this.sonars.values()].length > 0;
-    const cx = width / 2, cy = behind ? height / 2 : height - 18, reach = Math.min(width / 2 - 8, behind ? height / 2 - 8 : height - 30);
-    const at = (x: number, y: number): [number, number] => [cx - (y / limit) * reach, cy - (x / limit) * reach];
+    const cx = width / 2,
+      cy = behind ? height / 2 : height - 18,
+      reach = Math.min(width / 2 - 8, behind ? height / 2 - 8 : height - 30);
+    const at = (x: number, y: number): [number, number] => [
+      cx - (y / limit) * reach,
+      cy - (x / limit) * reach,
+    ];
     pen.strokeStyle = css("--line");
     pen.fillStyle = css("--dim");
     pen.font = "10px system-ui";
@@ -117,12 +191,20 @@ export class PolarPlot {
       pen.lineWidth = 2;
       const yaw0 = 2 * Math.atan2(device.orientation[3]!, device.orientation[0]!);
       for (let i = 0; i < Math.min(sonar.n, device.nelements); ++i) {
-        const r = sonar.range[i]!, p = device.element_pose, yaw = yaw0 + p[6 * i + 5]!, half = device.fov_horizontal / 2;
+        const r = sonar.range[i]!,
+          p = device.element_pose,
+          yaw = yaw0 + p[6 * i + 5]!,
+          half = device.fov_horizontal / 2;
         if (r >= device.range_max - 1e-3) continue;
         pen.beginPath();
         for (let k = 0; k <= 6; ++k) {
           const a = yaw + half * (k / 3 - 1);
-          pen.lineTo(...at(device.position[0]! + p[6 * i]! + r * Math.cos(a), device.position[1]! + p[6 * i + 1]! + r * Math.sin(a)));
+          pen.lineTo(
+            ...at(
+              device.position[0]! + p[6 * i]! + r * Math.cos(a),
+              device.position[1]! + p[6 * i + 1]! + r * Math.sin(a),
+            ),
+          );
         }
         pen.stroke();
       }
@@ -133,8 +215,11 @@ export class PolarPlot {
       pen.beginPath();
       pen.moveTo(...at(device.position[0]!, device.position[1]!));
       scan.ranges.forEach((range, i) => {
-        const r = range === -Infinity ? 0 : Math.min(range, limit), a = yaw0 + scan.rad0 + i * scan.radstep;
-        pen.lineTo(...at(device.position[0]! + r * Math.cos(a), device.position[1]! + r * Math.sin(a)));
+        const r = range === -Infinity ? 0 : Math.min(range, limit),
+          a = yaw0 + scan.rad0 + i * scan.radstep;
+        pen.lineTo(
+          ...at(device.position[0]! + r * Math.cos(a), device.position[1]! + r * Math.sin(a)),
+        );
       });
       pen.closePath();
       pen.globalAlpha = 0.22;
@@ -142,7 +227,11 @@ export class PolarPlot {
       pen.globalAlpha = 1;
       scan.ranges.forEach((range, i) => {
         if (!Number.isFinite(range)) return;
-        const a = yaw0 + scan.rad0 + i * scan.radstep, [x, y] = at(device.position[0]! + range * Math.cos(a), device.position[1]! + range * Math.sin(a));
+        const a = yaw0 + scan.rad0 + i * scan.radstep,
+          [x, y] = at(
+            device.position[0]! + range * Math.cos(a),
+            device.position[1]! + range * Math.sin(a),
+          );
         pen.fillRect(x - 1, y - 1, 2, 2);
       });
     }

@@ -1,16 +1,46 @@
 // The panel's pages about one robot: its state, pictures, ranges, motion primitives, and its plots.
-import { image_t, motion_status_t, move_command_t, type contact_t, type device_info_t, type imu_t, type odometry_t, type planar_lidar_t, type pose_t, type robot_info_t, type sonar_t } from "../../generated/messages";
+import {
+  image_t,
+  motion_status_t,
+  move_command_t,
+  type contact_t,
+  type device_info_t,
+  type imu_t,
+  type odometry_t,
+  type planar_lidar_t,
+  type pose_t,
+  type robot_info_t,
+  type sonar_t,
+} from "../../generated/messages";
 import { h, say } from "./dom";
 import { inWorld, type Heading } from "./odometry";
 import { PolarPlot, TimePlot } from "./plots";
 
 const kStates = ["idle", "running", "done", "ended", "refused"];
-const kReasons = ["", "replaced by a newer command", "blocked by contact", "stopped by the watchdog: no command came", "refused: not a finite number", "refused: unknown kind", "refused: value out of range", "refused: the robot cannot move",
-  "refused: its drive cannot do that"];
-const kKinds: Record<number, string> = { 1: "advance", 2: "rotate", 3: "heading", 4: "arc", 5: "stop", [motion_status_t.KIND_VELOCITY]: "velocity", [motion_status_t.KIND_WHEELS]: "wheels" };
-const degrees = (rad: number) => `${(rad * 180 / Math.PI).toFixed(1)}°`;
-const heading = (rad: number) => degrees(wrap(rad));    // all headings alike, from -180 to 180
-const yawOf = (q: ArrayLike<number>) => Math.atan2(2 * (q[0]! * q[3]! + q[1]! * q[2]!), 1 - 2 * (q[2]! ** 2 + q[3]! ** 2));
+const kReasons = [
+  "",
+  "replaced by a newer command",
+  "blocked by contact",
+  "stopped by the watchdog: no command came",
+  "refused: not a finite number",
+  "refused: unknown kind",
+  "refused: value out of range",
+  "refused: the robot cannot move",
+  "refused: its drive cannot do that",
+];
+const kKinds: Record<number, string> = {
+  1: "advance",
+  2: "rotate",
+  3: "heading",
+  4: "arc",
+  5: "stop",
+  [motion_status_t.KIND_VELOCITY]: "velocity",
+  [motion_status_t.KIND_WHEELS]: "wheels",
+};
+const degrees = (rad: number) => `${((rad * 180) / Math.PI).toFixed(1)}°`;
+const heading = (rad: number) => degrees(wrap(rad)); // all headings alike, from -180 to 180
+const yawOf = (q: ArrayLike<number>) =>
+  Math.atan2(2 * (q[0]! * q[3]! + q[1]! * q[2]!), 1 - 2 * (q[2]! ** 2 + q[3]! ** 2));
 const wrap = (angle: number) => Math.atan2(Math.sin(angle), Math.cos(angle));
 
 // Pictures of a camera: JPEG as it comes, raw formats by way of a canvas.
@@ -30,27 +60,36 @@ export class Picture {
 
   show(message: image_t): void {
     const { width, height, pixelformat, data, row_stride } = message;
-    say(this.caption, `${this.name} · ${width} × ${height} · ${(Number(message.utime) * 1e-6).toFixed(2)} s`);
+    say(
+      this.caption,
+      `${this.name} · ${width} × ${height} · ${(Number(message.utime) * 1e-6).toFixed(2)} s`,
+    );
     const jpeg = pixelformat === image_t.PIXEL_FORMAT_MJPEG;
     this.image.hidden = !jpeg;
     this.canvas.hidden = jpeg;
     if (jpeg) {
       const old = this.url;
       this.url = URL.createObjectURL(new Blob([data as BlobPart], { type: "image/jpeg" }));
-      this.image.onload = () => { if (old) URL.revokeObjectURL(old); };
+      this.image.onload = () => {
+        if (old) URL.revokeObjectURL(old);
+      };
       this.image.src = this.url;
       return;
     }
     if (width <= 0 || height <= 0 || width * height > 1 << 24) return;
     this.canvas.width = width;
     this.canvas.height = height;
-    const pixels = new ImageData(width, height), view = new DataView(data.buffer, data.byteOffset, data.byteLength);
+    const pixels = new ImageData(width, height),
+      view = new DataView(data.buffer, data.byteOffset, data.byteLength);
     const stride = row_stride || data.length / height;
     for (let y = 0; y < height; ++y) {
       for (let x = 0; x < width; ++x) {
         const to = 4 * (y * width + x);
         const [r, g, b] = pixel(pixelformat, view, y * stride, x);
-        pixels.data[to] = r; pixels.data[to + 1] = g; pixels.data[to + 2] = b; pixels.data[to + 3] = 255;
+        pixels.data[to] = r;
+        pixels.data[to + 1] = g;
+        pixels.data[to + 2] = b;
+        pixels.data[to + 3] = 255;
       }
     }
     this.canvas.getContext("2d")!.putImageData(pixels, 0, 0);
@@ -60,18 +99,28 @@ export class Picture {
 function pixel(format: number, view: DataView, row: number, x: number): [number, number, number] {
   const byte = (at: number) => (at < view.byteLength ? view.getUint8(at) : 0);
   switch (format) {
-    case image_t.PIXEL_FORMAT_RGB: return [byte(row + 3 * x), byte(row + 3 * x + 1), byte(row + 3 * x + 2)];
-    case image_t.PIXEL_FORMAT_BGR: return [byte(row + 3 * x + 2), byte(row + 3 * x + 1), byte(row + 3 * x)];
-    case image_t.PIXEL_FORMAT_FLOAT_GRAY32: {    // near is bright
-      const depth = row + 4 * x + 4 <= view.byteLength ? view.getFloat32(row + 4 * x, true) : Infinity;
+    case image_t.PIXEL_FORMAT_RGB:
+      return [byte(row + 3 * x), byte(row + 3 * x + 1), byte(row + 3 * x + 2)];
+    case image_t.PIXEL_FORMAT_BGR:
+      return [byte(row + 3 * x + 2), byte(row + 3 * x + 1), byte(row + 3 * x)];
+    case image_t.PIXEL_FORMAT_FLOAT_GRAY32: {
+      // near is bright
+      const depth =
+        row + 4 * x + 4 <= view.byteLength ? view.getFloat32(row + 4 * x, true) : Infinity;
       const grey = Number.isFinite(depth) ? 255 / (1 + depth / 3) : 0;
       return [grey, grey, grey];
     }
-    case image_t.PIXEL_FORMAT_LE_GRAY16: {       // a colour for each label
+    case image_t.PIXEL_FORMAT_LE_GRAY16: {
+      // a colour for each label
       const label = row + 2 * x + 2 <= view.byteLength ? view.getUint16(row + 2 * x, true) : 0;
-      return label === 0 ? [0, 0, 0] : [(label * 97) % 200 + 55, (label * 57) % 200 + 55, (label * 151) % 200 + 55];
+      return label === 0
+        ? [0, 0, 0]
+        : [((label * 97) % 200) + 55, ((label * 57) % 200) + 55, ((label * 151) % 200) + 55];
     }
-    default: { const grey = byte(row + x); return [grey, grey, grey]; }
+    default: {
+      const grey = byte(row + x);
+      return [grey, grey, grey];
+    }
   }
 }
 
@@ -84,22 +133,54 @@ export class RobotPages {
   private readonly values = new Map<string, HTMLElement>();
   private readonly polar = new PolarPlot();
   private readonly speed = new TimePlot("Velocity profile", "m/s, rad/s", [
-    { label: "v true, m/s", colour: "--true" }, { label: "v odometry", colour: "--odometry", dash: [5, 3] },
-    { label: "ω true, rad/s", colour: "--sonar", scale: "w" }, { label: "ω odometry", colour: "--rays", scale: "w", dash: [5, 3] }]);
+    { label: "v true, m/s", colour: "--true" },
+    { label: "v odometry", colour: "--odometry", dash: [5, 3] },
+    { label: "ω true, rad/s", colour: "--sonar", scale: "w" },
+    { label: "ω odometry", colour: "--rays", scale: "w", dash: [5, 3] },
+  ]);
   private readonly path = new TimePlot("Path", "m", [
-    { label: "x true, m", colour: "--true" }, { label: "x odometry", colour: "--odometry", dash: [5, 3] },
-    { label: "y true", colour: "--sonar" }, { label: "y odometry", colour: "--rays", dash: [5, 3] }]);
+    { label: "x true, m", colour: "--true" },
+    { label: "x odometry", colour: "--odometry", dash: [5, 3] },
+    { label: "y true", colour: "--sonar" },
+    { label: "y odometry", colour: "--rays", dash: [5, 3] },
+  ]);
   private readonly error = new TimePlot("Odometry error", "m, degrees", [
-    { label: "distance, m", colour: "--rays" }, { label: "heading, °", colour: "--sonar", scale: "w" }]);
-  private start: Heading | null = null;    // odom in the world; null: not known
+    { label: "distance, m", colour: "--rays" },
+    { label: "heading, °", colour: "--sonar", scale: "w" },
+  ]);
+  private start: Heading | null = null; // odom in the world; null: not known
   private truth: pose_t | null = null;
   private reckoned: odometry_t | null = null;
 
   constructor(move: (command: Omit<move_command_t, "utime" | "id">) => void, stop: () => void) {
-    const kind = h("select", { "aria-label": "motion primitive" }, ...[[1, "advance"], [2, "rotate"], [3, "turn to heading"], [4, "arc"]].map(([value, text]) => h("option", { value: value! }, text as string)));
-    const value = h("input", { type: "number", step: 0.1, value: 1, "aria-label": "how far" }), unit = h("span", { class: "dim" }, "m");
-    const radius = h("input", { type: "number", step: 0.1, value: 1, min: 0.05, "aria-label": "radius" }), radiusRow = h("label", { class: "row" }, "radius", radius, h("span", { class: "dim" }, "m"));
-    const speed = h("input", { type: "number", step: 0.1, value: 0, min: 0, "aria-label": "speed", title: "0: the robot's own" });
+    const kind = h(
+      "select",
+      { "aria-label": "motion primitive" },
+      ...[
+        [1, "advance"],
+        [2, "rotate"],
+        [3, "turn to heading"],
+        [4, "arc"],
+      ].map(([value, text]) => h("option", { value: value! }, text as string)),
+    );
+    const value = h("input", { type: "number", step: 0.1, value: 1, "aria-label": "how far" }),
+      unit = h("span", { class: "dim" }, "m");
+    const radius = h("input", {
+        type: "number",
+        step: 0.1,
+        value: 1,
+        min: 0.05,
+        "aria-label": "radius",
+      }),
+      radiusRow = h("label", { class: "row" }, "radius", radius, h("span", { class: "dim" }, "m"));
+    const speed = h("input", {
+      type: "number",
+      step: 0.1,
+      value: 0,
+      min: 0,
+      "aria-label": "speed",
+      title: "0: the robot's own",
+    });
     radiusRow.hidden = true;
     kind.addEventListener("change", () => {
       const turns = kind.value !== "1";
@@ -110,17 +191,43 @@ export class RobotPages {
     });
     const send = () => {
       const turns = kind.value !== "1";
-      move({ kind: Number(kind.value), value: Number(value.value) * (turns ? Math.PI / 180 : 1), radius: kind.value === "4" ? Number(radius.value) : 0, speed: Number(speed.value), acceleration: 0, deceleration: 0 });
+      move({
+        kind: Number(kind.value),
+        value: Number(value.value) * (turns ? Math.PI / 180 : 1),
+        radius: kind.value === "4" ? Number(radius.value) : 0,
+        speed: Number(speed.value),
+        acceleration: 0,
+        deceleration: 0,
+      });
     };
-    this.statePage = h("section", {}, this.facts, h("h2", {}, "Motion primitive"),
-      h("div", { class: "row" }, kind, value, unit, radiusRow, h("label", { class: "row" }, "speed", speed),
-        h("button", { id: "move", click: send }, "Go"), h("button", { click: stop, title: "stop (X)" }, "Stop")),
-      h("h2", {}, "Ranges"), this.polar.element, h("h2", {}, "Pictures"), this.pictureList);
+    this.statePage = h(
+      "section",
+      {},
+      this.facts,
+      h("h2", {}, "Motion primitive"),
+      h(
+        "div",
+        { class: "row" },
+        kind,
+        value,
+        unit,
+        radiusRow,
+        h("label", { class: "row" }, "speed", speed),
+        h("button", { id: "move", click: send }, "Go"),
+        h("button", { click: stop, title: "stop (X)" }, "Stop"),
+      ),
+      h("h2", {}, "Ranges"),
+      this.polar.element,
+      h("h2", {}, "Pictures"),
+      this.pictureList,
+    );
     this.plotPage = h("section", {}, this.speed.element, this.path.element, this.error.element);
   }
 
   // Where odometry begins, as a pose; undefined: not known yet.
-  beginAt(start: number[] | undefined): void { this.start = start ? [start[0]!, start[1]!, yawOf(start.slice(3))] : null; }
+  beginAt(start: number[] | undefined): void {
+    this.start = start ? [start[0]!, start[1]!, yawOf(start.slice(3))] : null;
+  }
 
   show(robot: robot_info_t, devices: device_info_t[]): void {
     this.values.clear();
@@ -131,7 +238,9 @@ export class RobotPages {
     for (const plot of [this.speed, this.path, this.error]) plot.clear();
     this.fact("drive", `${robot.model}, ${robot.drive || "no drive"}`);
     const cameras = devices.filter((d) => d.kind === "camera");
-    this.pictureList.replaceChildren(cameras.length === 0 ? h("p", { class: "dim" }, "This robot has no camera.") : "");
+    this.pictureList.replaceChildren(
+      cameras.length === 0 ? h("p", { class: "dim" }, "This robot has no camera.") : "",
+    );
   }
 
   // Plots begin anew.
@@ -153,7 +262,10 @@ export class RobotPages {
   pose(m: pose_t): void {
     this.truth = m;
     const t = Number(m.utime) * 1e-6;
-    this.fact("pose", `${m.pos[0]!.toFixed(3)} m, ${m.pos[1]!.toFixed(3)} m, ${heading(yawOf(m.orientation))}`);
+    this.fact(
+      "pose",
+      `${m.pos[0]!.toFixed(3)} m, ${m.pos[1]!.toFixed(3)} m, ${heading(yawOf(m.orientation))}`,
+    );
     this.fact("speed", `${m.vel[0]!.toFixed(3)} m/s, ${m.rotation_rate[2]!.toFixed(3)} rad/s`);
     this.speed.add(0, t, m.vel[0]!);
     this.speed.add(2, t, m.rotation_rate[2]!);
@@ -179,26 +291,55 @@ export class RobotPages {
   private compare(): void {
     const { truth, reckoned } = this;
     if (!this.start || !truth || !reckoned || truth.utime !== reckoned.utime) return;
-    const t = Number(truth.utime) * 1e-6, [x, y, heading] = inWorld(reckoned, this.start);
-    const away = Math.hypot(x - truth.pos[0]!, y - truth.pos[1]!), turn = wrap(heading - yawOf(truth.orientation));
+    const t = Number(truth.utime) * 1e-6,
+      [x, y, heading] = inWorld(reckoned, this.start);
+    const away = Math.hypot(x - truth.pos[0]!, y - truth.pos[1]!),
+      turn = wrap(heading - yawOf(truth.orientation));
     this.error.add(0, t, away);
-    this.error.add(1, t, turn * 180 / Math.PI);
+    this.error.add(1, t, (turn * 180) / Math.PI);
     this.fact("odometry error", `${away.toFixed(3)} m, ${degrees(turn)}`);
   }
 
   motion(m: motion_status_t): void {
-    const kind = kKinds[m.kind] ?? "", unit = m.kind === 1 ? "m" : "rad";
-    const far = m.kind >= 1 && m.kind <= 4 ? ` · ${m.done.toFixed(2)} of ${(m.done + m.remaining).toFixed(2)} ${unit}` : "";
-    this.fact("motion", `${kind} ${kStates[m.state] ?? ""}${far}${m.reason ? ` (${kReasons[m.reason] ?? m.reason})` : ""}`.trim());
+    const kind = kKinds[m.kind] ?? "",
+      unit = m.kind === 1 ? "m" : "rad";
+    const far =
+      m.kind >= 1 && m.kind <= 4
+        ? ` · ${m.done.toFixed(2)} of ${(m.done + m.remaining).toFixed(2)} ${unit}`
+        : "";
+    this.fact(
+      "motion",
+      `${kind} ${kStates[m.state] ?? ""}${far}${m.reason ? ` (${kReasons[m.reason] ?? m.reason})` : ""}`.trim(),
+    );
   }
-  imu(device: device_info_t, m: imu_t): void { this.fact(device.name, `${[...m.linear_acceleration].map((v) => v.toFixed(2)).join(", ")} m/s²`); }
-  contact(device: device_info_t, m: contact_t): void { this.fact(device.name, m.pressed ? `touches ${[...new Set(m.points.map((p) => p.body))].join(", ") || "something"}` : "free"); }
+  imu(device: device_info_t, m: imu_t): void {
+    this.fact(
+      device.name,
+      `${[...m.linear_acceleration].map((v) => v.toFixed(2)).join(", ")} m/s²`,
+    );
+  }
+  contact(device: device_info_t, m: contact_t): void {
+    this.fact(
+      device.name,
+      m.pressed
+        ? `touches ${[...new Set(m.points.map((p) => p.body))].join(", ") || "something"}`
+        : "free",
+    );
+  }
   scan(device: device_info_t, m: planar_lidar_t): void {
     this.polar.scan(device, m);
-    const nearest = m.ranges.reduce((least, r) => (Number.isFinite(r) && r < least ? r : least), Infinity);
-    this.fact(device.name, `${m.ranges.length} rays, nearest ${Number.isFinite(nearest) ? `${nearest.toFixed(2)} m` : "nothing"}`);
+    const nearest = m.ranges.reduce(
+      (least, r) => (Number.isFinite(r) && r < least ? r : least),
+      Infinity,
+    );
+    this.fact(
+      device.name,
+      `${m.ranges.length} rays, nearest ${Number.isFinite(nearest) ? `${nearest.toFixed(2)} m` : "nothing"}`,
+    );
   }
-  sonar(device: device_info_t, m: sonar_t): void { this.polar.sonar(device, m); }
+  sonar(device: device_info_t, m: sonar_t): void {
+    this.polar.sonar(device, m);
+  }
   camera(name: string, m: image_t): void {
     let picture = this.pictures.get(name);
     if (!picture) {
@@ -211,7 +352,8 @@ export class RobotPages {
 
   draw(): void {
     if (this.statePage.isConnected) this.polar.draw();
-    if (this.plotPage.isConnected) for (const plot of [this.speed, this.path, this.error]) plot.draw();
+    if (this.plotPage.isConnected)
+      for (const plot of [this.speed, this.path, this.error]) plot.draw();
   }
   restyle(): void {
     this.polar.restyle();

@@ -1,5 +1,5 @@
-// Reads and writes LCM messages of any type from the description that was made of proto/*.lcm. Arrays of several
-// dimensions are one array, row by row.
+// Reads and writes LCM messages of any type from the description that was made of proto/*.lcm.
+// Arrays of several dimensions are one array, row by row.
 import { kTypes, type Field, type Messages } from "../../generated/messages";
 
 export type TypeName = keyof Messages & string;
@@ -13,7 +13,8 @@ function stirText(hash: bigint, text: string): bigint {
   return result;
 }
 
-// LCM's hash of a type: of its members' names, primitive types and dimensions, and of the types inside.
+// LCM's hash of a type: of its members' names, primitive types and dimensions, and of the types
+// inside.
 function computeFingerprint(name: string, parents: string[] = []): bigint {
   if (parents.includes(name)) return 0n;
   let hash = 0x12345678n;
@@ -23,7 +24,8 @@ function computeFingerprint(name: string, parents: string[] = []): bigint {
     if (kTypes[field.type]) inner += computeFingerprint(field.type, [...parents, name]);
     else hash = stirText(hash, field.type);
     hash = stir(hash, field.sizes.length);
-    for (const size of field.sizes) hash = stirText(stir(hash, typeof size === "number" ? 0 : 1), String(size));
+    for (const size of field.sizes)
+      hash = stirText(stir(hash, typeof size === "number" ? 0 : 1), String(size));
   }
   const sum = mask(hash + inner);
   return mask((sum << 1n) + ((sum >> 63n) & 1n));
@@ -38,7 +40,10 @@ export function fingerprint(name: string): bigint {
 
 let typesByFingerprint: Map<bigint, TypeName> | undefined;
 export function typeOf(message: Uint8Array): TypeName | undefined {
-  if (!typesByFingerprint) typesByFingerprint = new Map(Object.keys(kTypes).map((name) => [fingerprint(name), name as TypeName]));
+  if (!typesByFingerprint)
+    typesByFingerprint = new Map(
+      Object.keys(kTypes).map((name) => [fingerprint(name), name as TypeName]),
+    );
   if (message.length < 8) return undefined;
   return typesByFingerprint.get(new DataView(message.buffer, message.byteOffset).getBigInt64(0));
 }
@@ -56,32 +61,52 @@ class Reader {
   one(type: string): Value {
     const { view, at } = this;
     switch (type) {
-      case "boolean": this.at += 1; return view.getInt8(at) !== 0;
-      case "byte": this.at += 1; return view.getUint8(at);
-      case "int8_t": this.at += 1; return view.getInt8(at);
-      case "int16_t": this.at += 2; return view.getInt16(at);
-      case "int32_t": this.at += 4; return view.getInt32(at);
-      case "int64_t": this.at += 8; return view.getBigInt64(at);
-      case "float": this.at += 4; return view.getFloat32(at);
-      case "double": this.at += 8; return view.getFloat64(at);
+      case "boolean":
+        this.at += 1;
+        return view.getInt8(at) !== 0;
+      case "byte":
+        this.at += 1;
+        return view.getUint8(at);
+      case "int8_t":
+        this.at += 1;
+        return view.getInt8(at);
+      case "int16_t":
+        this.at += 2;
+        return view.getInt16(at);
+      case "int32_t":
+        this.at += 4;
+        return view.getInt32(at);
+      case "int64_t":
+        this.at += 8;
+        return view.getBigInt64(at);
+      case "float":
+        this.at += 4;
+        return view.getFloat32(at);
+      case "double":
+        this.at += 8;
+        return view.getFloat64(at);
       case "string": {
         const size = view.getInt32(at);
-        if (size < 1 || at + 4 + size > this.bytes.length) throw new RangeError("a text is longer than the message");
+        if (size < 1 || at + 4 + size > this.bytes.length)
+          throw new RangeError("a text is longer than the message");
         this.at += 4 + size;
         return utf8.decode(this.bytes.subarray(at + 4, at + 3 + size));
       }
-      default: return this.struct(type);
+      default:
+        return this.struct(type);
     }
   }
 
   private many(type: string, count: number): Value {
-    if (count < 0 || count > this.bytes.length - this.at) throw new RangeError("an array is longer than the message");
+    if (count < 0 || count > this.bytes.length - this.at)
+      throw new RangeError("an array is longer than the message");
     if (type === "byte") return this.bytes.slice(this.at, (this.at += count));
     const { view } = this;
     let at = this.at;
     if (type === "double" || type === "float" || type === "int32_t") {
       const width = type === "double" ? 8 : 4;
-      if (count * width > this.bytes.length - at) throw new RangeError("an array is longer than the message");
+      if (count * width > this.bytes.length - at)
+        throw new RangeError("an array is longer than the message");
       this.at += count * width;
       if (type === "double") {
         const values = new Float64Array(count);
@@ -89,7 +114,8 @@ class Reader {
         return values;
       }
       const values = type === "float" ? new Float32Array(count) : new Int32Array(count);
-      for (let i = 0; i < count; ++i, at += 4) values[i] = type === "float" ? view.getFloat32(at) : view.getInt32(at);
+      for (let i = 0; i < count; ++i, at += 4)
+        values[i] = type === "float" ? view.getFloat32(at) : view.getInt32(at);
       return values;
     }
     return Array.from({ length: count }, () => this.one(type));
@@ -98,14 +124,20 @@ class Reader {
   struct(name: string): Record<string, Value> {
     const result: Record<string, Value> = {};
     for (const field of kTypes[name]!) {
-      result[field.name] = field.sizes.length === 0 ? this.one(field.type) : this.many(field.type, countOf(field, result));
+      result[field.name] =
+        field.sizes.length === 0
+          ? this.one(field.type)
+          : this.many(field.type, countOf(field, result));
     }
     return result;
   }
 }
 
 function countOf(field: Field, message: Record<string, Value>): number {
-  return field.sizes.reduce<number>((count, size) => count * Number(typeof size === "number" ? size : message[size]), 1);
+  return field.sizes.reduce<number>(
+    (count, size) => count * Number(typeof size === "number" ? size : message[size]),
+    1,
+  );
 }
 
 // Throws RangeError for bytes that are not such a message.
@@ -113,7 +145,8 @@ export function decode<T extends TypeName>(type: T, bytes: Uint8Array): Messages
   const reader = new Reader(bytes);
   if (reader.one("int64_t") !== fingerprint(type)) throw new RangeError(`this is no ${type}`);
   const message = reader.struct(type);
-  if (reader.at !== bytes.length) throw new RangeError(`a ${type} with ${bytes.length - reader.at} bytes left over`);
+  if (reader.at !== bytes.length)
+    throw new RangeError(`a ${type} with ${bytes.length - reader.at} bytes left over`);
   return message as unknown as Messages[T];
 }
 
@@ -136,14 +169,46 @@ class Writer {
 
   one(type: string, value: Value): void {
     switch (type) {
-      case "boolean": { const at = this.room(1); this.view.setInt8(at, value ? 1 : 0); return; }
-      case "byte": { const at = this.room(1); this.view.setUint8(at, Number(value)); return; }
-      case "int8_t": { const at = this.room(1); this.view.setInt8(at, Number(value)); return; }
-      case "int16_t": { const at = this.room(2); this.view.setInt16(at, Number(value)); return; }
-      case "int32_t": { const at = this.room(4); this.view.setInt32(at, Number(value)); return; }
-      case "int64_t": { const at = this.room(8); this.view.setBigInt64(at, BigInt(value as bigint)); return; }
-      case "float": { const at = this.room(4); this.view.setFloat32(at, Number(value)); return; }
-      case "double": { const at = this.room(8); this.view.setFloat64(at, Number(value)); return; }
+      case "boolean": {
+        const at = this.room(1);
+        this.view.setInt8(at, value ? 1 : 0);
+        return;
+      }
+      case "byte": {
+        const at = this.room(1);
+        this.view.setUint8(at, Number(value));
+        return;
+      }
+      case "int8_t": {
+        const at = this.room(1);
+        this.view.setInt8(at, Number(value));
+        return;
+      }
+      case "int16_t": {
+        const at = this.room(2);
+        this.view.setInt16(at, Number(value));
+        return;
+      }
+      case "int32_t": {
+        const at = this.room(4);
+        this.view.setInt32(at, Number(value));
+        return;
+      }
+      case "int64_t": {
+        const at = this.room(8);
+        this.view.setBigInt64(at, BigInt(value as bigint));
+        return;
+      }
+      case "float": {
+        const at = this.room(4);
+        this.view.setFloat32(at, Number(value));
+        return;
+      }
+      case "double": {
+        const at = this.room(8);
+        this.view.setFloat64(at, Number(value));
+        return;
+      }
       case "string": {
         const text = new TextEncoder().encode(String(value));
         const at = this.room(5 + text.length);
@@ -152,7 +217,8 @@ class Writer {
         this.view.setUint8(at + 4 + text.length, 0);
         return;
       }
-      default: this.struct(type, value as Record<string, Value>);
+      default:
+        this.struct(type, value as Record<string, Value>);
     }
   }
 
@@ -164,7 +230,9 @@ class Writer {
     }
   }
 
-  take(): Uint8Array { return this.bytes.subarray(0, this.size); }
+  take(): Uint8Array {
+    return this.bytes.subarray(0, this.size);
+  }
 }
 
 export function encode<T extends TypeName>(type: T, message: Messages[T]): Uint8Array {

@@ -1,7 +1,20 @@
-// The WebSocket to the program: texts, frames of messages, and what this page asks for. Comes back by itself when the
-// connection is lost.
-export interface Hello { mode: "live" | "log"; title: string; version: string; info: string; fault: string }
-export interface Playback { begin: number; end: number; now: number; speed: number; playing: boolean; jumps: number }
+// The WebSocket to the program: texts, frames of messages, and what this page asks for. Comes back
+// by itself when the connection is lost.
+export interface Hello {
+  mode: "live" | "log";
+  title: string;
+  version: string;
+  info: string;
+  fault: string;
+}
+export interface Playback {
+  begin: number;
+  end: number;
+  now: number;
+  speed: number;
+  playing: boolean;
+  jumps: number;
+}
 export type LinkState = "connecting" | "open" | "lost" | "ended";
 
 export interface LinkHandler {
@@ -24,8 +37,18 @@ export interface RunLink {
   seek(time_s: number): void;
 }
 
-const enum Operation { seen = 1, want = 2, command = 3, traffic = 4, play = 5, seek = 6 }
-const enum Frame { messages = 1, traffic = 2 }
+const enum Operation {
+  seen = 1,
+  want = 2,
+  command = 3,
+  traffic = 4,
+  play = 5,
+  seek = 6,
+}
+const enum Frame {
+  messages = 1,
+  traffic = 2,
+}
 
 export class Link implements RunLink {
   private handler!: LinkHandler;
@@ -47,7 +70,7 @@ export class Link implements RunLink {
     socket.onopen = () => {
       this.retry_ms = 300;
       this.over = false;
-      this.wanted.clear();    // what is wanted of whom comes with the greeting
+      this.wanted.clear(); // what is wanted of whom comes with the greeting
       this.handler.state("open", "");
       if (this.wantsTraffic) this.send([Operation.traffic, 1]);
     };
@@ -57,7 +80,8 @@ export class Link implements RunLink {
     };
     socket.onclose = () => {
       if (this.socket !== socket) return;
-      if (!this.over) this.handler.state("lost", "The connection to the server is lost. Trying again …");
+      if (!this.over)
+        this.handler.state("lost", "The connection to the server is lost. Trying again …");
       setTimeout(() => this.connect(handler), this.retry_ms);
       this.retry_ms = Math.min(3000, this.retry_ms * 1.5);
     };
@@ -65,7 +89,8 @@ export class Link implements RunLink {
 
   want(channels: Iterable<string>): void {
     const wanted = new Set(channels);
-    if (wanted.size === this.wanted.size && [...wanted].every((name) => this.wanted.has(name))) return;
+    if (wanted.size === this.wanted.size && [...wanted].every((name) => this.wanted.has(name)))
+      return;
     this.wanted = wanted;
     this.sendWanted();
   }
@@ -109,12 +134,21 @@ export class Link implements RunLink {
 
   private onText(text: string): void {
     const said = JSON.parse(text) as {
-      hello?: Hello; scene?: number; playback?: Playback; first?: number; channels?: string[]; ended?: string; refused?: string;
+      hello?: Hello;
+      scene?: number;
+      playback?: Playback;
+      first?: number;
+      channels?: string[];
+      ended?: string;
+      refused?: string;
     };
     if (said.hello) this.handler.hello(said.hello);
     if (said.scene !== undefined) this.handler.scene();
     if (said.playback) this.handler.playback(said.playback);
-    if (said.channels) said.channels.forEach((name, i) => { this.channels[said.first! + i] = name; });
+    if (said.channels)
+      said.channels.forEach((name, i) => {
+        this.channels[said.first! + i] = name;
+      });
     if (said.refused !== undefined) this.handler.refused(said.refused);
     if (said.ended !== undefined) {
       this.over = true;
@@ -126,7 +160,8 @@ export class Link implements RunLink {
     const view = new DataView(buffer);
     if (view.getUint32(0, true) === Frame.traffic) {
       const count = (buffer.byteLength - 4) / 8;
-      const messages = new Uint32Array(count), sizes = new Uint32Array(count);
+      const messages = new Uint32Array(count),
+        sizes = new Uint32Array(count);
       for (let i = 0; i < count; ++i) {
         messages[i] = view.getUint32(4 + 8 * i, true);
         sizes[i] = view.getUint32(8 + 8 * i, true);
@@ -137,7 +172,8 @@ export class Link implements RunLink {
     for (let at = 4; at + 8 <= buffer.byteLength;) {
       const channel = this.channels[view.getUint32(at, true)];
       const size = view.getUint32(at + 4, true);
-      if (channel !== undefined) this.handler.message(channel, new Uint8Array(buffer, at + 8, size));
+      if (channel !== undefined)
+        this.handler.message(channel, new Uint8Array(buffer, at + 8, size));
       at += 8 + size;
     }
     // Answered when the page has drawn: who is slow gets fewer frames, not a queue of them.

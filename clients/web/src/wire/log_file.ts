@@ -1,21 +1,35 @@
-// A recorded run that is in the page itself: it answers as the program would, from the bytes behind the page.
+// A recorded run that is in the page itself: it answers as the program would, from the bytes behind
+// the page.
 import type { Hello, LinkHandler, Playback, RunLink } from "./link";
 
 interface Head {
-  title: string; info: string; fault: string; begin: number; end: number; interval: number; pictures: number; messages: number; channels: string[];
+  title: string;
+  info: string;
+  fault: string;
+  begin: number;
+  end: number;
+  interval: number;
+  pictures: number;
+  messages: number;
+  channels: string[];
   scenes: { from: number; files: Record<string, [at: number, size: number]> }[];
 }
-interface Entry { time: number; messages: Uint8Array[] }
+interface Entry {
+  time: number;
+  messages: Uint8Array[];
+}
 
 const kTick_ms = 33;
 const kTraffic_ms = 500;
-const kLongestPause_s = 0.5;    // between two looks at the clock; after a longer one the log does not jump
+// Between two looks at the clock; after a longer one the log does not jump
+const kLongestPause_s = 0.5;
 
 const bytesOf = (base64: string) => Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
 
 // The newest entry at that time; -1: none yet.
 export function newestAt(entries: { time: number }[], time: number): number {
-  let low = 0, high = entries.length;
+  let low = 0,
+    high = entries.length;
   while (low < high) {
     const middle = (low + high) >> 1;
     if (entries[middle]!.time <= time) low = middle + 1;
@@ -32,21 +46,29 @@ export class LogFile implements RunLink {
   private traffic = false;
   private scene = 0;
   private last_ms = 0;
-  private traffic_ms = -Infinity;    // when it was told
+  private traffic_ms = -Infinity; // when it was told
   private handler: LinkHandler | undefined;
 
   // Null where the page has none.
   static inPage(): LogFile | null {
-    const head = document.getElementById("log"), bytes = document.getElementById("bytes");
-    return head && bytes ? new LogFile(JSON.parse(head.textContent!) as Head, bytesOf(bytes.textContent!)) : null;
+    const head = document.getElementById("log"),
+      bytes = document.getElementById("bytes");
+    return head && bytes
+      ? new LogFile(JSON.parse(head.textContent!) as Head, bytesOf(bytes.textContent!))
+      : null;
   }
 
-  constructor(private readonly head: Head, private readonly bytes: Uint8Array) {
+  constructor(
+    private readonly head: Head,
+    private readonly bytes: Uint8Array,
+  ) {
     this.entries = head.channels.map(() => []);
     this.shown = head.channels.map(() => -1);
     const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
     for (let at = head.messages; at + 16 <= bytes.length;) {
-      const channel = view.getUint32(at, true), count = view.getUint32(at + 4, true), entry: Entry = { time: view.getFloat64(at + 8, true), messages: [] };
+      const channel = view.getUint32(at, true),
+        count = view.getUint32(at + 4, true),
+        entry: Entry = { time: view.getFloat64(at + 8, true), messages: [] };
       at += 16;
       for (let i = 0; i < count; ++i) {
         const size = view.getUint32(at, true);
@@ -55,24 +77,45 @@ export class LogFile implements RunLink {
       }
       this.entries[channel]!.push(entry);
     }
-    this.playback = { begin: head.begin, end: head.end, now: head.begin, speed: 1, playing: true, jumps: 0 };
+    this.playback = {
+      begin: head.begin,
+      end: head.end,
+      now: head.begin,
+      speed: 1,
+      playing: true,
+      jumps: 0,
+    };
   }
 
   get note(): string {
-    const { interval, pictures, fault } = this.head, thin = (what: string, s: number) => (s > 0 ? `${what} ${s.toFixed(2)} s apart` : "");
-    const parts = [thin("messages", interval), pictures < 0 ? "no pictures" : thin("pictures", pictures)].filter(Boolean);
-    return [fault, parts.length > 0 ? `This page has a part of the log: ${parts.join(", ")}.` : ""].filter(Boolean).join(" ");
+    const { interval, pictures, fault } = this.head,
+      thin = (what: string, s: number) => (s > 0 ? `${what} ${s.toFixed(2)} s apart` : "");
+    const parts = [
+      thin("messages", interval),
+      pictures < 0 ? "no pictures" : thin("pictures", pictures),
+    ].filter(Boolean);
+    return [fault, parts.length > 0 ? `This page has a part of the log: ${parts.join(", ")}.` : ""]
+      .filter(Boolean)
+      .join(" ");
   }
 
   // A file of the scene of this moment.
   file(path: string): Uint8Array<ArrayBuffer> | null {
     const place = this.head.scenes[this.scene]?.files[path];
-    return place ? this.bytes.slice(place[0], place[0] + place[1]) as Uint8Array<ArrayBuffer> : null;
+    return place
+      ? (this.bytes.slice(place[0], place[0] + place[1]) as Uint8Array<ArrayBuffer>)
+      : null;
   }
 
   connect(handler: LinkHandler): void {
     this.handler = handler;
-    const hello: Hello = { mode: "log", title: this.head.title, version: "", info: this.head.info, fault: this.note };
+    const hello: Hello = {
+      mode: "log",
+      title: this.head.title,
+      version: "",
+      info: this.head.info,
+      fault: this.note,
+    };
     this.last_ms = performance.now();
     setTimeout(() => {
       handler.state("open", "");
@@ -84,12 +127,16 @@ export class LogFile implements RunLink {
 
   want(channels: Iterable<string>): void {
     const wanted = new Set(channels);
-    this.head.channels.forEach((name, i) => { if (!wanted.has(name)) this.shown[i] = -1; });
+    this.head.channels.forEach((name, i) => {
+      if (!wanted.has(name)) this.shown[i] = -1;
+    });
     this.wanted = wanted;
     queueMicrotask(() => this.show());
   }
 
-  watchTraffic(on: boolean): void { this.traffic = on; }
+  watchTraffic(on: boolean): void {
+    this.traffic = on;
+  }
   command(channel: string): boolean {
     this.handler?.refused(channel);
     return false;
@@ -113,10 +160,14 @@ export class LogFile implements RunLink {
     this.show();
   }
 
-  private tell(): void { this.handler?.playback({ ...this.playback }); }
+  private tell(): void {
+    this.handler?.playback({ ...this.playback });
+  }
 
   private tick(): void {
-    const { playback } = this, now = performance.now(), passed_s = Math.min(kLongestPause_s, (now - this.last_ms) / 1000);
+    const { playback } = this,
+      now = performance.now(),
+      passed_s = Math.min(kLongestPause_s, (now - this.last_ms) / 1000);
     this.last_ms = now;
     if (!playback.playing) return;
     playback.now = Math.min(playback.end, playback.now + passed_s * playback.speed);
@@ -126,8 +177,15 @@ export class LogFile implements RunLink {
   }
 
   private show(): void {
-    const { now } = this.playback, { scenes, channels } = this.head;
-    const scene = Math.max(0, newestAt(scenes.map(({ from }) => ({ time: from })), now));
+    const { now } = this.playback,
+      { scenes, channels } = this.head;
+    const scene = Math.max(
+      0,
+      newestAt(
+        scenes.map(({ from }) => ({ time: from })),
+        now,
+      ),
+    );
     if (scene !== this.scene) {
       this.scene = scene;
       this.handler?.scene();
@@ -138,7 +196,8 @@ export class LogFile implements RunLink {
       if (newest < 0 && name === this.head.info) newest = 0;
       if (newest === this.shown[i] || newest < 0) return;
       this.shown[i] = newest;
-      for (const message of this.entries[i]![newest]?.messages ?? []) this.handler?.message(name, message);
+      for (const message of this.entries[i]![newest]?.messages ?? [])
+        this.handler?.message(name, message);
     });
     if (this.traffic && performance.now() - this.traffic_ms >= kTraffic_ms) this.tellTraffic(now);
   }
@@ -146,7 +205,9 @@ export class LogFile implements RunLink {
   private tellTraffic(now: number): void {
     this.traffic_ms = performance.now();
     const counts = this.entries.map((entries) => newestAt(entries, now) + 1);
-    const sizes = this.entries.map((entries, i) => entries[counts[i]! - 1]?.messages[0]?.length ?? 0);
+    const sizes = this.entries.map(
+      (entries, i) => entries[counts[i]! - 1]?.messages[0]?.length ?? 0,
+    );
     this.handler?.traffic(this.head.channels, Uint32Array.from(counts), Uint32Array.from(sizes));
   }
 }

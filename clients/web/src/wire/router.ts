@@ -12,27 +12,45 @@ import type { RobotPages } from "../ui/robot";
 import { decode, fingerprint, typeOf, type TypeName } from "./lcm";
 import type { Session } from "./session";
 
-interface Route { type: TypeName; robot: string; device: device_info_t | undefined }
+interface Route {
+  type: TypeName;
+  robot: string;
+  device: device_info_t | undefined;
+}
 
 // The channels whose types this page knows as the server does.
 export function routesOf(world: World): Map<string, Route> {
   const routes = new Map<string, Route>();
   for (const { name, type, robot, device, fingerprint: hash } of world.channels) {
     if (fingerprint(type) !== hash) continue;
-    routes.set(name, { type: type as TypeName, robot, device: world.devices.find((d) => d.robot === robot && d.name === device) });
+    routes.set(name, {
+      type: type as TypeName,
+      robot,
+      device: world.devices.find((d) => d.robot === robot && d.name === device),
+    });
   }
   return routes;
 }
 
 export interface Views {
-  loading: Loading<unknown>; session: Session; poses: Poses; clock: Clock; stage: Stage; overlays: OverlaySet; pages: RobotPages; channels: ChannelList;
+  loading: Loading<unknown>;
+  session: Session;
+  poses: Poses;
+  clock: Clock;
+  stage: Stage;
+  overlays: OverlaySet;
+  pages: RobotPages;
+  channels: ChannelList;
 }
 
 export class Router {
   private routes = new Map<string, Route>();
-  private told = "";    // the type that tells the time
+  private told = ""; // the type that tells the time
 
-  constructor(private readonly page: Page, private readonly views: Views) {
+  constructor(
+    private readonly page: Page,
+    private readonly views: Views,
+  ) {
     page.watch(["world"], ({ world }) => {
       this.routes = world ? routesOf(world) : new Map<string, Route>();
       this.told = world && channelOfType(world, "world_state_t") ? "world_state_t" : "tick_t";
@@ -41,7 +59,8 @@ export class Router {
 
   onMessage(channel: string, bytes: Uint8Array): void {
     this.views.channels.message(channel, bytes);
-    const route = this.routes.get(channel), type = route?.type ?? typeOf(bytes);
+    const route = this.routes.get(channel),
+      type = route?.type ?? typeOf(bytes);
     if (!type) return;
     try {
       this.dispatch(type, route, channel, bytes);
@@ -50,7 +69,12 @@ export class Router {
     }
   }
 
-  private dispatch(type: TypeName, route: Route | undefined, channel: string, bytes: Uint8Array): void {
+  private dispatch(
+    type: TypeName,
+    route: Route | undefined,
+    channel: string,
+    bytes: Uint8Array,
+  ): void {
     const read = <T extends TypeName>(name: T): Messages[T] => decode(name, bytes);
     const { loading, session, poses, clock } = this.views;
     if (type === "world_info_t") return loading.onInfo(read(type));
@@ -68,26 +92,64 @@ export class Router {
     if (route?.robot) this.ofRobot(route, channel, read);
   }
 
-  private ofRobot({ type, robot, device }: Route, channel: string, read: <T extends TypeName>(name: T) => Messages[T]): void {
+  private ofRobot(
+    { type, robot, device }: Route,
+    channel: string,
+    read: <T extends TypeName>(name: T) => Messages[T],
+  ): void {
     const { world, robot: chosen } = this.page.now;
     const overlay = this.views.overlays.of.get(robot);
     const pages = world?.robots[chosen]?.name === robot ? this.views.pages : null;
     switch (type) {
-      case "planar_lidar_t": { const m = read(type); if (device) { overlay?.scan(device, m); pages?.scan(device, m); } return; }
-      case "sonar_t": { const m = read(type); if (device) { overlay?.sonar(device, m); pages?.sonar(device, m); } return; }
-      case "pose_t": { const m = read(type); overlay?.pose(m); pages?.pose(m); return; }
+      case "planar_lidar_t": {
+        const m = read(type);
+        if (device) {
+          overlay?.scan(device, m);
+          pages?.scan(device, m);
+        }
+        return;
+      }
+      case "sonar_t": {
+        const m = read(type);
+        if (device) {
+          overlay?.sonar(device, m);
+          pages?.sonar(device, m);
+        }
+        return;
+      }
+      case "pose_t": {
+        const m = read(type);
+        overlay?.pose(m);
+        pages?.pose(m);
+        return;
+      }
       case "odometry_t": {
         const m = read(type);
         overlay?.odometer(m);
         pages?.odometry(m);
-        this.views.stage.wheelAngles.set(world!.robots.findIndex(({ name }) => name === robot), m.angle);
+        this.views.stage.wheelAngles.set(
+          world!.robots.findIndex(({ name }) => name === robot),
+          m.angle,
+        );
         return;
       }
-      case "contact_t": { const m = read(type); overlay?.contact(m); if (device) pages?.contact(device, m); return; }
-      case "motion_status_t": pages?.motion(read(type)); return;
-      case "imu_t": if (device) pages?.imu(device, read(type)); return;
-      case "image_t": pages?.camera(channel.slice(channel.indexOf("/") + 1), read(type)); return;
-      default: return;
+      case "contact_t": {
+        const m = read(type);
+        overlay?.contact(m);
+        if (device) pages?.contact(device, m);
+        return;
+      }
+      case "motion_status_t":
+        pages?.motion(read(type));
+        return;
+      case "imu_t":
+        if (device) pages?.imu(device, read(type));
+        return;
+      case "image_t":
+        pages?.camera(channel.slice(channel.indexOf("/") + 1), read(type));
+        return;
+      default:
+        return;
     }
   }
 }

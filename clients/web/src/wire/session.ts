@@ -1,5 +1,5 @@
-// Requests to the simulation, as every client makes them: JOIN, then each request with a sequence, repeated until it is
-// answered.
+// Requests to the simulation, as every client makes them: JOIN, then each request with a sequence,
+// repeated until it is answered.
 import { reply_t, request_t, type state_reply_t } from "../../generated/messages";
 import { decode, encode } from "./lcm";
 
@@ -7,14 +7,20 @@ const kRepeat_ms = 200;
 const kPatience_ms = 8000;
 const kNothing = new Uint8Array();
 
-interface Asked { kind: number; body: Uint8Array; resolve: (reply: reply_t) => void; reject: (error: Error) => void }
+interface Asked {
+  kind: number;
+  body: Uint8Array;
+  resolve: (reply: reply_t) => void;
+  reject: (error: Error) => void;
+}
 
 export class Session {
   requestChannel = "";
   private runId = 0n;
   private session = 0n;
   private sequence = 0n;
-  private waiting: { sequence: bigint; kind: number; resolve: (reply: reply_t) => void } | undefined;
+  private waiting:
+    { sequence: bigint; kind: number; resolve: (reply: reply_t) => void } | undefined;
   private queue: Asked[] = [];
   private busy = false;
 
@@ -36,7 +42,9 @@ export class Session {
     });
   }
 
-  state(reply: reply_t): state_reply_t { return decode("state_reply_t", reply.body); }
+  state(reply: reply_t): state_reply_t {
+    return decode("state_reply_t", reply.body);
+  }
 
   // Asks for ruedo/info; needs no session.
   askForInfo(channel: string): void {
@@ -51,8 +59,23 @@ export class Session {
     waiting.resolve(reply);
   }
 
-  private request(kind: number, sequence: bigint, body: Uint8Array, session: bigint, runId: bigint): Uint8Array {
-    return encode("request_t", { utime: 0n, run_id: runId, epoch: -1, session, sequence, kind, size: body.length, body });
+  private request(
+    kind: number,
+    sequence: bigint,
+    body: Uint8Array,
+    session: bigint,
+    runId: bigint,
+  ): Uint8Array {
+    return encode("request_t", {
+      utime: 0n,
+      run_id: runId,
+      epoch: -1,
+      session,
+      sequence,
+      kind,
+      size: body.length,
+      body,
+    });
   }
 
   private async work(): Promise<void> {
@@ -61,7 +84,8 @@ export class Session {
     for (let asked = this.queue.shift(); asked; asked = this.queue.shift()) {
       try {
         let reply = await this.once(asked);
-        if (reply.code === reply_t.UNKNOWN_SESSION) {    // forgotten after a long silence: join again
+        if (reply.code === reply_t.UNKNOWN_SESSION) {
+          // forgotten after a long silence: join again
           this.session = 0n;
           reply = await this.once(asked);
         }
@@ -87,7 +111,13 @@ export class Session {
     return this.repeat(asked.kind, ++this.sequence, asked.body, this.session, this.runId);
   }
 
-  private repeat(kind: number, sequence: bigint, body: Uint8Array, session: bigint, runId: bigint): Promise<reply_t> {
+  private repeat(
+    kind: number,
+    sequence: bigint,
+    body: Uint8Array,
+    session: bigint,
+    runId: bigint,
+  ): Promise<reply_t> {
     const message = this.request(kind, sequence, body, session, runId);
     return new Promise((resolve, reject) => {
       const begun = performance.now();
@@ -99,7 +129,15 @@ export class Session {
         } else this.publish(this.requestChannel, message);
       };
       const timer = setInterval(send, kRepeat_ms);
-      this.waiting = { sequence, kind, resolve: (reply) => { clearInterval(timer); this.waiting = undefined; resolve(reply); } };
+      this.waiting = {
+        sequence,
+        kind,
+        resolve: (reply) => {
+          clearInterval(timer);
+          this.waiting = undefined;
+          resolve(reply);
+        },
+      };
       send();
     });
   }
