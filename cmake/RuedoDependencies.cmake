@@ -1,6 +1,6 @@
 # Finds what Ruedo is built on; docs/getting-started.md lists the packages.
 find_package(PkgConfig REQUIRED)
-find_package(Threads REQUIRED)
+find_package(Threads REQUIRED GLOBAL)    # of ruedo::client, which others link
 find_package(Eigen3 REQUIRED NO_MODULE)
 find_package(TBB REQUIRED)
 find_package(CLI11 REQUIRED)
@@ -70,11 +70,23 @@ add_library(ruedo_opencv INTERFACE)
 target_include_directories(ruedo_opencv SYSTEM INTERFACE ${OPENCV_INCLUDE})
 target_link_libraries(ruedo_opencv INTERFACE opencv_imgcodecs opencv_imgproc opencv_core)
 
-# LCM 1.5.3 from its wheel: the .venv that scripts/run makes, unless lcm_DIR says otherwise.
+# LCM 1.5.3 from its wheel: lcm_DIR where that is given, the .venv that scripts/run makes, or that of the Python on the PATH.
 if(NOT lcm_DIR)
-  file(GLOB RUEDO_LCM_CMAKE ${CMAKE_CURRENT_SOURCE_DIR}/.venv/lib/python3*/site-packages/lib/lcm/cmake)
-  if(RUEDO_LCM_CMAKE)
-    list(GET RUEDO_LCM_CMAKE 0 lcm_DIR)
+  file(GLOB found ${CMAKE_CURRENT_SOURCE_DIR}/.venv/lib/python3*/site-packages/lib/lcm/cmake)
+  if(NOT found)
+    execute_process(COMMAND python3 -c "import sysconfig; print(sysconfig.get_path('platlib'), end='')" OUTPUT_VARIABLE found ERROR_QUIET)
+    string(APPEND found /lib/lcm/cmake)
   endif()
+  list(GET found 0 found)
+  set(lcm_DIR ${found})
 endif()
-find_package(lcm 1.5.3 REQUIRED)
+find_package(lcm 1.5.3 QUIET)
+if(NOT lcm_FOUND)
+  message(FATAL_ERROR "LCM 1.5.3 was not found: pip install lcm==1.5.3 into a virtual environment, and give the folder of its lcmConfig.cmake "
+    "as -Dlcm_DIR=VENV/lib/python3.X/site-packages/lib/lcm/cmake")
+endif()
+# LCM's package has targets of general names, `lcm` and `lcm-gen`, for this folder; who uses ours meets this one.
+add_library(ruedo::lcm SHARED IMPORTED GLOBAL)
+get_target_property(location lcm LOCATION)
+get_target_property(headers lcm INTERFACE_INCLUDE_DIRECTORIES)
+set_target_properties(ruedo::lcm PROPERTIES IMPORTED_LOCATION ${location} IMPORTED_SONAME liblcm.so.1 INTERFACE_INCLUDE_DIRECTORIES "${headers}")

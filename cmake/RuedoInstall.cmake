@@ -5,31 +5,37 @@ set(package ${CMAKE_INSTALL_LIBDIR}/cmake/ruedo)
 
 set_target_properties(ruedo ruedo-measure ruedo-import-mesh PROPERTIES INSTALL_RPATH "\$ORIGIN/../${CMAKE_INSTALL_LIBDIR}/ruedo")
 install(TARGETS ruedo ruedo-measure ruedo-import-mesh RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(DIRECTORY ${CMAKE_SOURCE_DIR}/worlds DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo)
-install(FILES ${CMAKE_SOURCE_DIR}/src/model/xacro/expand.py DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo/xacro)
-install(DIRECTORY ${CMAKE_SOURCE_DIR}/proto DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo FILES_MATCHING PATTERN "*.lcm")
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/worlds DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo)
+install(FILES ${PROJECT_SOURCE_DIR}/src/model/xacro/expand.py DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo/xacro)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/proto DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo FILES_MATCHING PATTERN "*.lcm")
 
 # LCM, which came from a wheel and may not be there where this is moved to; libraries that call our elementary functions.
-get_target_property(lcm_library lcm LOCATION)
+get_target_property(lcm_library ruedo::lcm LOCATION)
 install(FILES ${lcm_library} DESTINATION ${CMAKE_INSTALL_LIBDIR}/ruedo RENAME liblcm.so.1)
 get_property(copies GLOBAL PROPERTY RUEDO_OWN_MATH_COPIES)
 install(FILES ${copies} DESTINATION ${CMAKE_INSTALL_LIBDIR}/ruedo)
 
-# find_package(ruedo)
+# find_package(ruedo): target ruedo::client in the export set ruedo.
+install(TARGETS ruedo_client EXPORT ruedo ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(FILES ${PROJECT_SOURCE_DIR}/include/ruedo/client.h ${PROJECT_SOURCE_DIR}/include/ruedo/client_samples.h
+  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ruedo)
+if(TARGET ruedo_jar)
+  install(FILES ${PROJECT_BINARY_DIR}/java/ruedo.jar DESTINATION ${CMAKE_INSTALL_DATADIR}/java)
+endif()
 install(EXPORT ruedo FILE ruedoTargets.cmake NAMESPACE ruedo:: DESTINATION ${package})
-configure_package_config_file(cmake/ruedoConfig.cmake.in ${CMAKE_BINARY_DIR}/cmake/ruedoConfig.cmake INSTALL_DESTINATION ${package})
-write_basic_package_version_file(${CMAKE_BINARY_DIR}/cmake/ruedoConfigVersion.cmake COMPATIBILITY SameMinorVersion)
-install(FILES ${CMAKE_BINARY_DIR}/cmake/ruedoConfig.cmake ${CMAKE_BINARY_DIR}/cmake/ruedoConfigVersion.cmake
+configure_package_config_file(cmake/ruedoConfig.cmake.in ${PROJECT_BINARY_DIR}/cmake/ruedoConfig.cmake INSTALL_DESTINATION ${package})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/cmake/ruedoConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/cmake/ruedoConfig.cmake ${PROJECT_BINARY_DIR}/cmake/ruedoConfigVersion.cmake
   cmake/RuedoRegression.cmake DESTINATION ${package})
 
 # For those who do not use CMake: pkg-config --cflags --libs ruedo
 string(REGEX REPLACE "[^/]+" ".." up ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
-configure_file(cmake/ruedo.pc.in ${CMAKE_BINARY_DIR}/cmake/ruedo.pc @ONLY)
-install(FILES ${CMAKE_BINARY_DIR}/cmake/ruedo.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+configure_file(cmake/ruedo.pc.in ${PROJECT_BINARY_DIR}/cmake/ruedo.pc @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/cmake/ruedo.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 
 # The Python client with its pytest fixture, to put on PYTHONPATH; the metadata let pytest find the fixture there.
 set(python ${CMAKE_INSTALL_DATADIR}/ruedo/python)
-install(DIRECTORY ${CMAKE_BINARY_DIR}/python/ruedo DESTINATION ${python} PATTERN __pycache__ EXCLUDE PATTERN "_engine*" EXCLUDE)
+install(DIRECTORY ${PROJECT_BINARY_DIR}/python/ruedo DESTINATION ${python} PATTERN __pycache__ EXCLUDE PATTERN "_engine*" EXCLUDE)
 if(TARGET ruedo_python_engine)
   set_target_properties(ruedo_python_engine PROPERTIES INSTALL_RPATH "\$ORIGIN/../../../../${CMAKE_INSTALL_LIBDIR}/ruedo")
   install(TARGETS ruedo_python_engine LIBRARY DESTINATION ${python}/ruedo)
@@ -38,7 +44,7 @@ if(TARGET ruedo_python_engine_stable)
   set_target_properties(ruedo_python_engine_stable PROPERTIES INSTALL_RPATH "\$ORIGIN/../../../../${CMAKE_INSTALL_LIBDIR}/ruedo")
   install(TARGETS ruedo_python_engine_stable LIBRARY DESTINATION ${python}/ruedo)
 endif()
-set(metadata ${CMAKE_BINARY_DIR}/cmake/ruedo-${PROJECT_VERSION}.dist-info)
+set(metadata ${PROJECT_BINARY_DIR}/cmake/ruedo-${PROJECT_VERSION}.dist-info)
 file(WRITE ${metadata}/METADATA "Metadata-Version: 2.1\nName: ruedo\nVersion: ${PROJECT_VERSION}\nRequires-Dist: lcm==1.5.3\nRequires-Dist: numpy\n")
 file(WRITE ${metadata}/entry_points.txt "[pytest11]\nruedo = ruedo.regression\n")
 install(DIRECTORY ${metadata} DESTINATION ${python})

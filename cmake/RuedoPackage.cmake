@@ -1,11 +1,11 @@
 # The Debian package, by `cpack -G DEB` in the build folder: what `cmake --install` puts into /usr, with man pages and completion.
-install(FILES ${CMAKE_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright)
-install(FILES ${CMAKE_SOURCE_DIR}/packaging/ruedo.bash-completion DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME ruedo)
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright)
+install(FILES ${PROJECT_SOURCE_DIR}/packaging/ruedo.bash-completion DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME ruedo)
 # The pages are made by the target man-pages, which a release builds: it starts the program twice for each command.
-set(pages ${CMAKE_BINARY_DIR}/man1)
+set(pages ${PROJECT_BINARY_DIR}/man1)
 add_custom_command(OUTPUT ${pages}/ruedo.1.gz
-  COMMAND ${CMAKE_SOURCE_DIR}/packaging/man_pages.sh $<TARGET_FILE:ruedo> ${pages}
-  DEPENDS ruedo ${CMAKE_SOURCE_DIR}/packaging/man_pages.sh VERBATIM)
+  COMMAND ${PROJECT_SOURCE_DIR}/packaging/man_pages.sh $<TARGET_FILE:ruedo> ${pages}
+  DEPENDS ruedo ${PROJECT_SOURCE_DIR}/packaging/man_pages.sh VERBATIM)
 add_custom_target(man-pages DEPENDS ${pages}/ruedo.1.gz)
 file(MAKE_DIRECTORY ${pages})
 install(DIRECTORY ${pages} DESTINATION ${CMAKE_INSTALL_MANDIR})
@@ -22,7 +22,7 @@ set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${CMAKE_BINARY_DIR}/math)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${PROJECT_BINARY_DIR}/math)
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "python3, python3-numpy")
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS "default-jre-headless")
 include(CPack)

@@ -1,7 +1,7 @@
 # The console's page: packages by npm from the lock file, types checked by tsc, bundled by esbuild, and put into the
 # program as a C++ file. npm runs when the lock file has changed and at no other time.
-set(web ${CMAKE_SOURCE_DIR}/clients/web)
-set(page ${CMAKE_BINARY_DIR}/web)
+set(web ${PROJECT_SOURCE_DIR}/clients/web)
+set(page ${PROJECT_BINARY_DIR}/web)
 file(MAKE_DIRECTORY ${page}/generated)
 file(CREATE_LINK ${web}/src ${page}/src SYMBOLIC)
 file(CREATE_LINK ${web}/tests ${page}/tests SYMBOLIC)
@@ -15,7 +15,7 @@ add_custom_command(OUTPUT ${page}/packages.stamp
   WORKING_DIRECTORY ${page} COMMENT "Packages of the web console" VERBATIM)
 
 add_custom_command(OUTPUT ${page}/generated/messages.ts
-  COMMAND ${RUEDO_NODE} ${web}/generate.mjs ${CMAKE_SOURCE_DIR}/proto ${page}/generated/messages.ts
+  COMMAND ${RUEDO_NODE} ${web}/generate.mjs ${PROJECT_SOURCE_DIR}/proto ${page}/generated/messages.ts
   DEPENDS ${RUEDO_LCM_FILES} ${web}/generate.mjs VERBATIM)
 
 file(GLOB_RECURSE RUEDO_WEB_SOURCES CONFIGURE_DEPENDS ${web}/src/*)

@@ -1,8 +1,8 @@
-"""Generates the message types as the Python package ruedo.lcmtypes, with lcm-gen, from the .lcm files.
+"""Generates the message types as the Python package ruedo.lcmtypes, with lcm-gen, from the .lcm files, and ruedo._version.
 
     generate_types.py PROTO_FOLDER OUTPUT_FOLDER [--lcm-gen PROGRAM]
 
-They come out in OUTPUT_FOLDER/ruedo/lcmtypes. The types' package is `ruedo`, as the client's own; so that they
+They come out in OUTPUT_FOLDER/ruedo/lcmtypes; the version is that of the file VERSION beside PROTO_FOLDER. The types' package is `ruedo`, as the client's own; so that they
 do not meet, it is renamed on the way, which LCM's fingerprints do not depend on.
 """
 
@@ -24,6 +24,11 @@ def find_lcm_gen() -> str:
     if not found:
         raise SystemExit("lcm-gen was not found: pip install lcm==1.5.3")
     return found
+
+
+def read_version(proto: Path) -> str:
+    """The repository's version, which stands in one file."""
+    return (proto.parent / "VERSION").read_text(encoding="utf-8").strip()
 
 
 def generate(proto: Path, output: Path, lcm_gen: str | None = None) -> None:
@@ -50,6 +55,7 @@ def generate(proto: Path, output: Path, lcm_gen: str | None = None) -> None:
         target = output / "ruedo" / "lcmtypes"
         shutil.rmtree(target, ignore_errors=True)
         shutil.copytree(made / "ruedo" / "lcmtypes", target)
+    (output / "ruedo" / "_version.py").write_text(f'__version__ = "{read_version(proto)}"\n')
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
-"""Adds the message types, generated from ../../proto, to what is built. The rest is in pyproject.toml."""
+"""Adds the message types, generated from ../../proto, and the version to what is built. The rest is in pyproject.toml."""
 
+import runpy
 import sys
 from pathlib import Path
 
@@ -11,7 +12,7 @@ HERE = Path(__file__).resolve().parent
 PROTO = HERE.parent.parent / "proto"
 sys.path.insert(0, str(HERE))
 
-from generate_types import generate  # noqa: E402
+from generate_types import generate, read_version  # noqa: E402
 
 
 class BuildWithTypes(build_py):
@@ -31,4 +32,13 @@ class SdistWithTypes(sdist):
 packages = ["ruedo", "ruedo.campaign", "ruedo.hunt"] + (
     [] if PROTO.is_dir() else ["ruedo.lcmtypes"]
 )
-setup(packages=packages, cmdclass={"build_py": BuildWithTypes, "sdist": SdistWithTypes})
+version = (
+    read_version(PROTO)
+    if PROTO.is_dir()
+    else runpy.run_path(str(HERE / "ruedo/_version.py"))["__version__"]
+)
+setup(
+    version=version,
+    packages=packages,
+    cmdclass={"build_py": BuildWithTypes, "sdist": SdistWithTypes},
+)

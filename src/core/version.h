@@ -1,8 +1,8 @@
-// The version of Ruedo, as CMakeLists.txt has it.
+// The version of Ruedo, as the file VERSION has it.
 #pragma once
 
 namespace ruedo {
 
-const char* version();  // "0.1.0"
+const char* version();
 
 }  // namespace ruedo

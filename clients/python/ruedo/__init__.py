@@ -18,6 +18,7 @@ load_glib()  # before anything imports lcm
 
 try:
     from . import lcmtypes
+    from ._version import __version__
 except ImportError as _error:
     raise ImportError(
         "ruedo's message types were not generated: install the package (pip install clients/python) or "
@@ -62,8 +63,6 @@ from .simulation import Simulation, connect
 from .stream import Reader, Stream
 from .world import World
 from .world_info import Body
-
-__version__ = "0.1.0"
 
 
 def __getattr__(name: str) -> object:
