@@ -21,6 +21,7 @@ struct Contact {
   Vec3 position = Vec3::Zero();    // m, world
   Vec3 normal = Vec3::UnitZ();     // unit, world, from b towards a
   double force = 0.0;              // N along the normal, mean over the step
+  Vec3 friction = Vec3::Zero();    // N on a, world, mean over the step
   double depth = 0.0;              // m, positive inside
   int shape_a = -1, shape_b = -1;  // indices into the links' collisions; -1: not known
 };

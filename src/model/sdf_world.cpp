@@ -5,6 +5,7 @@
 #include <set>
 
 #include "core/whole.h"
+#include "model/environment.h"
 #include "model/material.h"
 #include "model/plugins.h"
 #include "model/sdf_link.h"
@@ -73,28 +74,15 @@ void read_physics(const Element& world_element, WorldModel& world, Findings& fin
 
 // Of a world, what changes things in Gazebo and does not here, where it says more than the format's
 // own default.
-void name_what_has_no_effect(const Element& world, const std::string& where, Findings& findings) {
+void name_what_has_no_effect(const Element& world, const Environment& environment,
+                             const std::string& where, Findings& findings) {
   const auto name = [&](const char* path, const std::string& text) {
     if (const Element* element = world.child(path))
       findings.unsupported(element->source, where,
                            "<" + element->name + "> is not supported: " + text);
   };
-  try {
-    if (world.vector3("wind/linear_velocity", Vec3::Zero(), Allowed::any(quantity::kSpeed)) !=
-        Vec3::Zero())
-      name("wind", "no wind blows");
-  } catch (const InputError&) {
-    name("wind", "no wind blows");
-  }
-  if (world.string("atmosphere/temperature", "288.15") != "288.15" ||
-      world.has("atmosphere/pressure"))
-    name("atmosphere", "the air has no temperature and no pressure");
-  const auto degrees = [&](const char* path) {
-    return world.string(path, "0").find_first_of("123456789") != std::string::npos;
-  };
-  if (degrees("spherical_coordinates/latitude_deg") ||
-      degrees("spherical_coordinates/longitude_deg"))
-    name("spherical_coordinates", "the world lies nowhere on Earth, and no sensor asks");
+  if (environment.wind != Vec3::Zero())
+    name("wind", "only air speed sensors feel it, and nothing is pushed");
   name("population", "what it would place is left out");
   name("audio", "nothing sounds");
 }
@@ -291,19 +279,19 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     world.name = "world";
     findings.repaired(element.source, "world", "the world has no name; it is called 'world'");
   }
-  report_other_children(element,
-                        {"model", "include", "light", "frame", "physics", "gravity", "scene",
-                         "actor", "joint", "ruedo:fleet", "ruedo:fault"},
-                        {"gui", "atmosphere", "magnetic_field", "spherical_coordinates", "wind",
-                         "audio", "plugin", "state", "population"},
-                        "world " + world.name, findings);
+  report_other_children(
+      element,
+      {"model", "include", "light", "frame", "physics", "gravity", "scene", "actor", "joint",
+       "atmosphere", "magnetic_field", "spherical_coordinates", "ruedo:fleet", "ruedo:fault"},
+      {"gui", "wind", "audio", "plugin", "state", "population"}, "world " + world.name, findings);
   const std::string in_world = "world " + world.name;
   read_or_leave_out(in_world, "what is usual is taken", findings,
                     [&] { read_physics(element, world, findings); });
+  read_environment(element, world.environment, findings);
   if (const Element* scene = element.child("scene"))
     read_or_leave_out(in_world, "what is usual is taken", findings,
                       [&] { read_scene(*scene, world.sky, findings); });
-  name_what_has_no_effect(element, in_world, findings);
+  name_what_has_no_effect(element, world.environment, in_world, findings);
 
   std::set<std::string> named;
   for (const Element* plugin : element.all("plugin")) {

@@ -70,6 +70,9 @@ struct Visual {
   std::optional<Material> material;  // absent: the mesh's own, or grey
   double transparency = 0.0;         // 0 opaque, 1 invisible
   bool cast_shadows = true;
+  // Of gz-sim's plugins Label and Thermal, in the visual, its link or its model.
+  int label = 0;             // 1 to 255: the class that segmentation and boxes show; 0: none
+  double temperature = 0.0;  // K, what thermal cameras see; 0: that of the air
 };
 
 struct Light {
@@ -140,6 +143,7 @@ struct SensorDescription {
   int link = 0;
   Pose X_LS;
   std::shared_ptr<const Element> element;
+  int joint = -1;  // index into Model::joints: the one that carries it; link is then its child
 };
 
 // How a robot drives: read from <ruedo:drive>, or mapped from a Gazebo plugin. See
@@ -234,11 +238,29 @@ struct SolverDescription {
       0;  // of a step, for everything; 0: as many as steps of 5 ms take, of 1 ms where joints are
 };
 
+// Where the world lies, and what surrounds it: <spherical_coordinates>, <atmosphere>, <wind> and
+// <magnetic_field>.
+struct Environment {
+  bool placed = false;                                        // the file says where
+  double equatorial_radius = 6378137.0;                       // m, WGS 84
+  double polar_radius = 6378137.0 * (1 - 1 / 298.257223563);  // m
+  double latitude = 0.0, longitude = 0.0;                     // rad, of the world's origin
+  double elevation = 0.0;                                     // m above the ellipsoid
+  double heading = 0.0;                   // rad from east to the world's x axis, towards north
+  double temperature = 288.15;            // K, at sea level
+  double temperature_gradient = -0.0065;  // K/m
+  double pressure = 101325.0;             // Pa, at sea level
+  Vec3 wind = Vec3::Zero();               // m/s, in the world's axes
+  std::optional<Vec3> magnetic_field;     // T, in the world's axes; empty: the earth's dipole where
+                                          // the world is placed, else SDF's default
+};
+
 struct WorldModel {
   std::string name;
   std::string file;
   int64_t step_us = 5000;
   Vec3 gravity{0, 0, -9.8};
+  Environment environment;
   SolverDescription solver;
   Sky sky;
   std::vector<Light> lights;

@@ -37,6 +37,7 @@ Contact swapped(const Contact& contact) {
   std::swap(other.shape_a, other.shape_b);
   std::swap(other.body_a, other.body_b);
   other.normal = -contact.normal;
+  other.friction = -contact.friction;
   return other;
 }
 
@@ -95,7 +96,13 @@ void ContactBook::add(const std::vector<btPersistentManifold*>& manifolds, int s
       contact.normal = from_bt(point.m_normalWorldOnB);
       contact.depth = -point.getDistance();
       const bool touches = point.getAppliedImpulse() > 0.0 || contact.depth >= 0.0;
-      if (touches) contact.force = point.getAppliedImpulse() * substeps / step_s_;
+      if (touches) {
+        const double per_s = substeps / step_s_;
+        contact.force = point.getAppliedImpulse() * per_s;
+        contact.friction =
+            per_s * from_bt(point.m_appliedImpulseLateral1 * point.m_lateralFrictionDir1 +
+                            point.m_appliedImpulseLateral2 * point.m_lateralFrictionDir2);
+      }
       // Static things come second; of two bodies the lower number comes first.
       if (contact.body_a < 0 || (contact.body_b >= 0 && contact.body_b < contact.body_a))
         contact = swapped(contact);
@@ -126,6 +133,7 @@ void ContactBook::merge() {
       merged_.push_back(contact);
     } else {
       same->force += contact.force;
+      same->friction += contact.friction;
       same->depth = std::max(same->depth, contact.depth);
     }
   }
