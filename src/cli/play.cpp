@@ -13,6 +13,7 @@
 #include "cli/commands.h"
 #include "cli/sandboxed.h"
 #include "cli/view.h"
+#include "log/header.h"
 #include "log/reader.h"
 #include "ruedo/errors.h"
 
@@ -33,7 +34,8 @@ struct PlayArguments {
 
 // Channels that a log has for those who read it, and that nobody published.
 bool in_logs_only(const std::string& channel) {
-  return channel == "ruedo/header" || channel == "ruedo/applied" || channel == "ruedo/state_hash";
+  return channel == log::kHeaderChannel || channel == log::kAppliedChannel ||
+         channel == log::kStateHashChannel;
 }
 
 bool sleep_until(Clock::time_point time) {

@@ -24,6 +24,7 @@
 #include "cli/view.h"
 #include "core/utf8.h"
 #include "engine/thread_limit.h"
+#include "log/ring.h"
 #include "model/world_name.h"
 #include "ruedo/errors.h"
 #include "run/run.h"
@@ -35,6 +36,7 @@ struct RunArguments {
   WorldArguments world;
   uint64_t seed = 1;
   std::string rate, duration, lcm, record, control = "on", lease_policy = "pause";
+  uint64_t record_limit = 0;
   int lockstep = 0;
   double lease = 10.0;
   std::string snapshots, restore;
@@ -162,6 +164,7 @@ run::RunOptions server_options(const RunArguments& arguments) {
   options.lockstep = lockstep_options(arguments);
   options.control = arguments.control == "on";
   options.record = arguments.record;
+  options.record_limit = static_cast<int64_t>(arguments.record_limit);
   options.result_options = result_options(arguments.world);
   for (const std::string& text : arguments.remaps) {
     if (text.starts_with('/')) continue;  // ROS's names, which change nothing of the run
@@ -294,7 +297,17 @@ void add_run(CLI::App& app, Action& chosen) {
                    "LCM address, or auto for a free port (default: $LCM_DEFAULT_URL, or LCM's "
                    "group with ttl 0)")
       ->type_name("URL|auto");
-  command->add_option("--record", arguments->record, "write a standard LCM log")->type_name("FILE");
+  CLI::Option* record =
+      command->add_option("--record", arguments->record, "write a standard LCM log")
+          ->type_name("FILE");
+  command
+      ->add_option("--record-limit", arguments->record_limit,
+                   "keep all that acted, and of the messages the last: FILE repeats the run, files "
+                   "numbered beside it hold what was published; 16MB at least, 2GB say, in all")
+      ->type_name("SIZE")
+      ->transform(CLI::AsSizeValue(false))
+      ->check(CLI::Range(uint64_t{log::Ring::kLeastLimit}, uint64_t{1} << 60))
+      ->needs(record);
   command->add_option("--remap", arguments->remaps, "give a channel another name: CHANNEL=NAME")
       ->type_name("REMAP")
       ->allow_extra_args(false);

@@ -169,6 +169,7 @@ void Module::process_piece(const Batch& batch, Outbox& outbox, int piece, int be
     for (size_t k = first; k < last; ++k) {
       Slot& slot = slots_[k];
       Sensor& sensor = *setup_.devices[k].sensor;
+      at_work_.store(static_cast<int>(k), std::memory_order_relaxed);
       if (batch.sensor_faults) {
         sample_with_faults(batch, snapshot, k, outbox);
         continue;

@@ -100,6 +100,11 @@ class Module {
   void replace_sensor(std::unique_ptr<Sensor> sensor);  // of the only device, whose samples go on
   void begin_time_anew(SimTime us);  // sim time was set back by so much, and steps count from 0
 
+  // The device that began to work last, by its place; -1: none has. Any thread.
+  int at_work() const { return at_work_.load(std::memory_order_relaxed); }
+  const Device& device(int place) const { return setup_.devices[static_cast<size_t>(place)]; }
+  int devices() const { return static_cast<int>(setup_.devices.size()); }
+
   int rank() const { return setup_.rank; }
   bool wants_visual_rays() const { return setup_.wants_visual_rays; }
   // True when it serves a robot that comes after that one.
@@ -130,7 +135,8 @@ class Module {
 
   ModuleSetup setup_;
   bool observes_ = false;
-  std::vector<Slot> slots_;            // one per device
+  std::vector<Slot> slots_;  // one per device
+  std::atomic<int> at_work_{-1};
   DueSteps to_hand_over_, to_sample_;  // of who makes batches, of who processes them
   std::unique_ptr<scene::RayScene> rays_, visual_rays_;
   std::unique_ptr<scene::Renderer> renderer_;

@@ -35,6 +35,7 @@ class ModuleThread {
   bool running() const { return thread_.joinable(); }
 
   const Module& module() const { return module_; }
+  bool has_batches() const { return in_hand_.load(std::memory_order_relaxed) > 0; }
   void set_index(size_t index) { index_ = index; }  // of its output in each batch
 
   // For the thread that makes batches: hands one over.

@@ -163,6 +163,7 @@ void Simulation::compute(Batch& batch, int64_t first_step, int count) {
   batch.applied_count = 0;
   batch.end.clear();
   const auto begin = std::chrono::steady_clock::now();
+  computing_.store(first_step, std::memory_order_relaxed);
   try {
     for (int i = 0; i < count && !batch.last; ++i) {
       if (left_off_)
@@ -183,6 +184,7 @@ void Simulation::compute(Batch& batch, int64_t first_step, int count) {
     batch.count = 0;
     batch.last = true;
   }
+  computing_.store(-1, std::memory_order_relaxed);
   if (count > 0)
     step_ns_ = (std::chrono::steady_clock::now() - begin) / std::chrono::nanoseconds(count);
 }
@@ -207,6 +209,24 @@ void Simulation::dispatch(Batch& batch, bool here) {
     if (batch.outputs[m].here) threads_[m]->work_here(batch, last_step);
   }
   if (batch.pending.fetch_sub(1, std::memory_order_acq_rel) == 1) finished_.set();
+}
+
+std::string Simulation::at_work() const {
+  for (const auto& thread : threads_) {
+    const Module& module = thread->module();
+    if (!thread->has_batches()) continue;
+    const int place = module.at_work();
+    if (place < 0 || place >= module.devices()) return "the module " + module.name() + " works";
+    const Device& device = module.device(place);
+    std::string name = device.name;
+    if (device.robot >= 0) {
+      const int instance = layout().robots[static_cast<size_t>(device.robot)].instance;
+      name = world().models[static_cast<size_t>(instance)].name + "/" + name;
+    }
+    return "the module " + module.name() + " works for " + name;
+  }
+  const int64_t step = computing_.load(std::memory_order_relaxed);
+  return step < 0 ? "" : "step " + std::to_string(step) + " is being computed";
 }
 
 void Simulation::leave_off() {

@@ -61,6 +61,10 @@ class Simulation {
   bool over() const { return last_taken_; }
   const std::string& end() const { return end_; }
 
+  // What is at work when take() has nothing, in words: a sensor, or a step; "": nothing. The
+  // publisher's.
+  std::string at_work() const;
+
   // Ends the run here: what was not taken yet is left unfinished, so that the last batch comes
   // soon, and no steps with it.
   void leave_off();
@@ -101,6 +105,7 @@ class Simulation {
   std::function<void(const std::string&)> before_batch_;
   Wakeup& finished_;
   std::atomic<bool> left_off_{false};
+  std::atomic<int64_t> computing_{-1};  // the first step that is being computed; -1: none
   std::vector<std::unique_ptr<ModuleThread>> threads_;  // of the world's modules, in their order
   std::vector<Batch> batches_;
   Wakeup batch_freed_;

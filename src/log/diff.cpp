@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "log/header.h"
 #include "log/reader.h"
 #include "ruedo/errors.h"
 #include "ruedo/pose.h"
@@ -16,7 +17,6 @@ namespace ruedo::log {
 namespace {
 
 constexpr size_t kMaxSamples = 1000;  // for a plot
-constexpr std::string_view kHeaderChannel = "ruedo/header";
 
 double parse_tolerance(std::string_view text, std::string_view whole) {
   double value = 0.0;

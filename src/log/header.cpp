@@ -160,9 +160,9 @@ void check_files_of_spawned(const std::string& log) {
   Reader reader(log);
   Event event;
   bool first = true;
-  while (reader.next(event, [](const std::string& channel) { return channel == "ruedo/header"; })) {
+  while (reader.next(event, [](const std::string& channel) { return channel == kHeaderChannel; })) {
     log_header_t header;
-    if (event.channel != "ruedo/header" || std::exchange(first, false)) continue;
+    if (event.channel != kHeaderChannel || std::exchange(first, false)) continue;
     if (decode_checked(event.data.data(), event.data.size(), header) == DecodeFault::none)
       check_files(header, log);
   }

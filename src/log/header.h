@@ -9,6 +9,10 @@
 
 namespace ruedo::log {
 
+// The channels of records, which are in logs alone.
+inline const std::string kHeaderChannel = "ruedo/header", kAppliedChannel = "ruedo/applied",
+                         kStateHashChannel = "ruedo/state_hash";
+
 // The processor's family, then the vector extensions of this CPU that libraries choose code by:
 // "x86-64 sse4.2 avx".
 std::string cpu_features();

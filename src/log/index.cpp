@@ -5,20 +5,15 @@
 #include <algorithm>
 #include <unordered_map>
 
+#include "log/header.h"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
 #include "ruedo/request_t.hpp"
 
 namespace ruedo::log {
-namespace {
-
-constexpr const char *kHeader = "ruedo/header", *kApplied = "ruedo/applied";
-
 bool changes_world(int32_t kind) {
   return kind == request_t::SPAWN || kind == request_t::REMOVE || kind == request_t::RESET;
 }
-
-}  // namespace
 
 size_t Index::Channel::count_until(SimTime time_us) const {
   const auto after =
@@ -32,7 +27,7 @@ Index::Index(const std::string& path) {
   Event event;
   std::unordered_map<std::string, size_t> known;  // looked up only
   const auto wanted = [&](const std::string& channel) {
-    return channel == kApplied || !known.contains(channel);
+    return channel == kAppliedChannel || !known.contains(channel);
   };
   size_t messages = 0;
   bool crowded = false;
@@ -61,14 +56,14 @@ Index::Index(const std::string& path) {
 
 void Index::add(const Event& event, int64_t offset, int64_t end, size_t channel) {
   const bool first = channels_[channel].entries.empty();
-  if (first && event.channel == kHeader) {
+  if (first && event.channel == kHeaderChannel) {
     log_header_t header;
     if (decode_checked(event.data.data(), event.data.size(), header) == DecodeFault::none)
       header_ = std::move(header);
   }
   end_us_ = std::max(end_us_, event.timestamp_us);
   channels_[channel].entries.push_back({end_us_, offset, static_cast<uint32_t>(end - offset)});
-  if (event.channel != kApplied || edits_.size() >= kMostEdits) return;
+  if (event.channel != kAppliedChannel || edits_.size() >= kMostEdits) return;
   applied_t applied;
   if (decode_checked(event.data.data(), event.data.size(), applied) == DecodeFault::none &&
       changes_world(applied.kind)) {

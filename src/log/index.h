@@ -16,6 +16,9 @@
 
 namespace ruedo::log {
 
+// Whether a request of that kind changes which models there are.
+bool changes_world(int32_t kind);
+
 class Index {
  public:
   static constexpr size_t kMostMessages =

@@ -37,6 +37,8 @@ class Writer {
   // event that had room.
   const std::string& error() const { return error_; }
   const std::string& path() const { return path_; }
+  // Bytes so far, with what is not handed over yet.
+  int64_t size() const { return written_ + static_cast<int64_t>(buffer_.size()); }
 
  private:
   void fail(int error_number);

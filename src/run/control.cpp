@@ -10,6 +10,11 @@
 #include "run/request_table.h"
 
 namespace ruedo::run {
+namespace {
+
+constexpr std::chrono::seconds kHeldUp{1};
+
+}  // namespace
 
 bool Control::receive(const uint8_t* data, size_t size) {
   request_t request;
@@ -35,6 +40,9 @@ std::string fit_text(const std::string& text) {
 }  // namespace
 
 void Control::serve() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now - last_served_ > kHeldUp) sessions_.forgive(now - last_served_);
+  last_served_ = now;
   if (!held_.empty() && !host_.state_comes()) {
     for (const request_t& request : std::exchange(held_, {})) serve(request);
   }

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <mutex>
@@ -57,7 +58,8 @@ class Control {
   // Any thread. False for what is not a request.
   bool receive(const uint8_t* data, size_t size);
 
-  // The publisher's: executes what waits.
+  // The publisher's, often: executes what waits. Where it was not called for seconds (a long
+  // request, a stopped process), no client is blamed for its silence.
   void serve();
   // Answers those that waited for a state up to `step`.
   void published(int64_t step);
@@ -103,6 +105,7 @@ class Control {
   size_t inbox_bytes_ = 0;
   std::vector<request_t> taken_;
   std::atomic<uint64_t> refused_{0};
+  std::chrono::steady_clock::time_point last_served_ = std::chrono::steady_clock::now();
 };
 
 }  // namespace ruedo::run

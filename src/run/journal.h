@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "log/header.h"
 #include "log/writer.h"
 #include "ruedo/log_header_t.hpp"
 #include "ruedo/state_hash_t.hpp"
@@ -15,9 +16,7 @@
 
 namespace ruedo::run {
 
-// The channels of records.
-inline const std::string kHeaderChannel = "ruedo/header", kAppliedChannel = "ruedo/applied",
-                         kStateHashChannel = "ruedo/state_hash";
+using log::kAppliedChannel, log::kHeaderChannel, log::kStateHashChannel;
 
 class Journal : public Sink {
  public:

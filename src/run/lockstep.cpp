@@ -161,9 +161,9 @@ std::string Lockstep::refusal(int32_t kind, bool) const {
     case request_t::QUIT:
     case request_t::STEP: return "";  // a STEP says that grants step
     default:
-      return begun()
-                 ? ""
-                 : "lockstep has not begun: call step(0), or grant. It waits for " + waits_for();
+      return begun() ? ""
+                     : "lockstep has not begun: call step(0), or grant. It waits for " +
+                           waits_for(published_);
   }
 }
 
@@ -280,7 +280,7 @@ bool Lockstep::keeps(int64_t session) const {
   return member && !member->silent;
 }
 
-std::string Lockstep::waits_for() const {
+std::string Lockstep::waits_for(int64_t) const {
   if (begun() && gate_->paused()) return "a RESUME: it is paused";
   if (!started_)
     return fmt::format("{} more of {} clients",

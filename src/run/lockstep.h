@@ -57,6 +57,7 @@ class Lockstep : public Mode {
   // False when the messages that not everybody has received are as many as are kept.
   bool has_room() const override { return !kept_.full(); }
   bool takes_grants() const override { return true; }
+  std::string waits_for(int64_t step) const override;
   int64_t granted() const override { return limit_; }
   bool state_comes() const override { return begun(); }
 
@@ -98,7 +99,6 @@ class Lockstep : public Mode {
   };
 
   bool begun() const { return limit_ >= 0; }
-  std::string waits_for() const;  // in words; "": for nobody
   engine::Outcome resend(const request_t& request, const Session& session);
   std::vector<int64_t> check_leases(const std::vector<Session>& sessions, Time now);
   Member* find(int64_t session);

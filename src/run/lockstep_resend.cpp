@@ -35,7 +35,7 @@ engine::Outcome Lockstep::resend(const request_t& request, const Session& sessio
   }
   resend_reply_t reply;
   reply.step = published_;
-  reply.waits_for = waits_for();
+  reply.waits_for = waits_for(published_);
   size_t room = engine::kMaxPartSize;
   for (const resend_wanted_t& wanted :
        std::span(body.wanted).first(std::min(body.wanted.size(), kMostWanted))) {

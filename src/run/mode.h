@@ -58,6 +58,11 @@ class Mode {
   // Clients say how far it goes: every step has its tick, and the publisher computes a few steps
   // itself.
   virtual bool takes_grants() const { return false; }
+  // Who has to do what before the state after `step` can be computed, in words; "": nobody.
+  virtual std::string waits_for(int64_t step) const {
+    static_cast<void>(step);
+    return "";
+  }
   // The last state that was granted; -1: none was.
   virtual int64_t granted() const { return -1; }
   // Whether the first state comes by itself.

@@ -200,6 +200,13 @@ bool Pacer::paused() const {
   return paused_;
 }
 
+bool Pacer::rests() const {
+  const std::lock_guard lock(mutex_);
+  if (granted_ >= until_) return true;
+  const bool paced = std::isfinite(rate_) && !paused_;
+  return paced && granted_ < limit_ && Clock::now() < due(granted_ + 1);
+}
+
 double Pacer::rate() const {
   std::lock_guard lock(mutex_);
   return rate_;

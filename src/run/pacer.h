@@ -45,6 +45,8 @@ class Pacer : public engine::Pace, public Gate {
   void begin_time_anew();  // while held: the next state is 0
 
   bool paused() const override;
+  // Whether nothing is to be computed now: a pause, the end of the run, or real time.
+  bool rests() const;
   double rate() const;
   int64_t last_step() const { return last_step_; }
 

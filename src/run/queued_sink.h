@@ -46,7 +46,9 @@ class QueuedSink : public Sink {
   // Returns when the sink has all that came so far, and has flushed it.
   void drain();
 
-  // Messages that found no room. Any thread.
+  // Whether the run waits for the sink, or it misses steps. Any thread, as the next.
+  bool is_full() const { return full_; }
+  // Messages that found no room.
   uint64_t missed() const { return missed_; }
 
  private:

@@ -5,6 +5,7 @@
 
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
+#include "run/journal.h"
 #include "run/request_table.h"
 
 namespace ruedo::run {
@@ -13,7 +14,7 @@ namespace {
 log_header_t first_event(log::Reader& reader, log::Event& event) {
   log_header_t header;
   if (reader.size() == 0) throw InputError({reader.path()}, "is empty: nothing was recorded");
-  if (!reader.next(event) || event.channel != "ruedo/header") {
+  if (!reader.next(event) || event.channel != kHeaderChannel) {
     throw InputError({reader.path()},
                      "does not begin with ruedo/header: it was not recorded by ruedo run --record");
   }
@@ -86,7 +87,7 @@ void Replay::executed() {
 
 void Replay::read(const Target& target) {
   const bool more = reader_.next(event_, [](const std::string& channel) {
-    return channel == "ruedo/applied" || channel == "ruedo/state_hash";
+    return channel == kAppliedChannel || channel == kStateHashChannel;
   });
   if (!more) {
     ended_ = true;
@@ -97,11 +98,11 @@ void Replay::read(const Target& target) {
   // The messages of a state, and what acted on it, come after everything that acted on those before
   // it.
   known_ = std::max(known_, (event_.timestamp_us - target.begin_us) / header_.step_us);
-  if (event_.channel == "ruedo/applied") {
+  if (event_.channel == kAppliedChannel) {
     if (decode_checked(event_.data.data(), event_.data.size(), applied_) != DecodeFault::none)
       damaged("a ruedo/applied in it is damaged");
     waits_ = true;
-  } else if (event_.channel == "ruedo/state_hash") {
+  } else if (event_.channel == kStateHashChannel) {
     if (decode_checked(event_.data.data(), event_.data.size(), end_) != DecodeFault::none)
       damaged("a ruedo/state_hash in it is damaged");
   }

@@ -28,6 +28,7 @@ struct RequestKind {
   };  // reads; changes how the run goes on; changes the world, and is repeated from logs
   enum Waits { for_nothing, for_state };  // for the first state: what reads or changes the world
 
+  const char* name;
   int32_t kind;
   Needs needs;
   Effect effect;

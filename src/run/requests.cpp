@@ -37,42 +37,45 @@ class RequestTable {
 };
 
 const RequestKind RequestTable::kKinds[] = {
-    // kind, needs, effect, waits, function
-    {request_t::JOIN, RequestKind::nothing, RequestKind::steers, RequestKind::for_nothing, nullptr},
-    {request_t::LEAVE, RequestKind::nothing, RequestKind::steers, RequestKind::for_nothing,
+    // name, kind, needs, effect, waits, function
+    {"JOIN", request_t::JOIN, RequestKind::nothing, RequestKind::steers, RequestKind::for_nothing,
      nullptr},
-    {request_t::PAUSE, RequestKind::nothing, RequestKind::steers, RequestKind::for_state,
+    {"LEAVE", request_t::LEAVE, RequestKind::nothing, RequestKind::steers, RequestKind::for_nothing,
+     nullptr},
+    {"PAUSE", request_t::PAUSE, RequestKind::nothing, RequestKind::steers, RequestKind::for_state,
      plain<&Run::pause>},
-    {request_t::RESUME, RequestKind::nothing, RequestKind::steers, RequestKind::for_state,
+    {"RESUME", request_t::RESUME, RequestKind::nothing, RequestKind::steers, RequestKind::for_state,
      plain<&Run::resume>},
-    {request_t::STEP, RequestKind::nothing, RequestKind::steers, RequestKind::for_state,
+    {"STEP", request_t::STEP, RequestKind::nothing, RequestKind::steers, RequestKind::for_state,
      with<step_request_t, &Run::step>},
-    {request_t::RATE, RequestKind::nothing, RequestKind::steers, RequestKind::for_state,
+    {"RATE", request_t::RATE, RequestKind::nothing, RequestKind::steers, RequestKind::for_state,
      with<rate_request_t, &Run::set_rate>},
-    {request_t::GET_STATE, RequestKind::nothing, RequestKind::looks, RequestKind::for_state,
-     with<name_request_t, &Run::get_state>},
-    {request_t::INFO, RequestKind::nothing, RequestKind::looks, RequestKind::for_nothing,
+    {"GET_STATE", request_t::GET_STATE, RequestKind::nothing, RequestKind::looks,
+     RequestKind::for_state, with<name_request_t, &Run::get_state>},
+    {"INFO", request_t::INFO, RequestKind::nothing, RequestKind::looks, RequestKind::for_nothing,
      plain<&Run::say_info>},
-    {request_t::QUIT, RequestKind::nothing, RequestKind::looks, RequestKind::for_nothing,
+    {"QUIT", request_t::QUIT, RequestKind::nothing, RequestKind::looks, RequestKind::for_nothing,
      plain<&Run::quit>},
-    {request_t::RESET_ODOMETRY, RequestKind::nothing, RequestKind::steers, RequestKind::for_state,
-     with<name_request_t, &Run::reset_odometry>},
-    {request_t::RESET, RequestKind::nothing, RequestKind::acts, RequestKind::for_state,
+    {"RESET_ODOMETRY", request_t::RESET_ODOMETRY, RequestKind::nothing, RequestKind::steers,
+     RequestKind::for_state, with<name_request_t, &Run::reset_odometry>},
+    {"RESET", request_t::RESET, RequestKind::nothing, RequestKind::acts, RequestKind::for_state,
      with<reset_request_t, &Run::reset>},
-    {request_t::SPAWN, RequestKind::nothing, RequestKind::acts, RequestKind::for_state,
+    {"SPAWN", request_t::SPAWN, RequestKind::nothing, RequestKind::acts, RequestKind::for_state,
      with<spawn_request_t, &Run::spawn>},
-    {request_t::REMOVE, RequestKind::nothing, RequestKind::acts, RequestKind::for_state,
+    {"REMOVE", request_t::REMOVE, RequestKind::nothing, RequestKind::acts, RequestKind::for_state,
      with<name_request_t, &Run::remove>},
-    {request_t::SET_POSE, RequestKind::nothing, RequestKind::acts, RequestKind::for_state,
-     with<set_pose_request_t, &Run::set_pose>},
-    {request_t::SET_TWIST, RequestKind::nothing, RequestKind::acts, RequestKind::for_state,
-     with<set_twist_request_t, &Run::set_twist>},
-    {request_t::GRANT, RequestKind::grants, RequestKind::steers, RequestKind::for_nothing, grant},
-    {request_t::RESEND, RequestKind::grants, RequestKind::steers, RequestKind::for_nothing, grant},
-    {request_t::SNAPSHOT, RequestKind::snapshots, RequestKind::steers, RequestKind::for_state,
-     with<name_request_t, &Run::snapshot>},
-    {request_t::RESTORE, RequestKind::snapshots, RequestKind::steers, RequestKind::for_state,
-     with<name_request_t, &Run::restore>},
+    {"SET_POSE", request_t::SET_POSE, RequestKind::nothing, RequestKind::acts,
+     RequestKind::for_state, with<set_pose_request_t, &Run::set_pose>},
+    {"SET_TWIST", request_t::SET_TWIST, RequestKind::nothing, RequestKind::acts,
+     RequestKind::for_state, with<set_twist_request_t, &Run::set_twist>},
+    {"GRANT", request_t::GRANT, RequestKind::grants, RequestKind::steers, RequestKind::for_nothing,
+     grant},
+    {"RESEND", request_t::RESEND, RequestKind::grants, RequestKind::steers,
+     RequestKind::for_nothing, grant},
+    {"SNAPSHOT", request_t::SNAPSHOT, RequestKind::snapshots, RequestKind::steers,
+     RequestKind::for_state, with<name_request_t, &Run::snapshot>},
+    {"RESTORE", request_t::RESTORE, RequestKind::snapshots, RequestKind::steers,
+     RequestKind::for_state, with<name_request_t, &Run::restore>},
 };
 
 const RequestKind* RequestTable::find(int32_t kind) {
@@ -111,7 +114,11 @@ Outcome Run::execute(const request_t& request, const Session& session) {
     return Outcome::refuse(reply_t::NOT_SUPPORTED, "this server does not know requests of kind " +
                                                        std::to_string(request.kind));
   }
-  if (serves(*kind)) return kind->execute(*this, request, session);
+  if (serves(*kind)) {
+    if (kind->effect == RequestKind::acts || kind->needs == RequestKind::snapshots)
+      stall_watch_.beat(std::string(kind->name) + " of '" + session.client + "'");
+    return kind->execute(*this, request, session);
+  }
   return Outcome::refuse(reply_t::NOT_SUPPORTED,
                          kind->needs == RequestKind::grants
                              ? "this run is not in lockstep: start the server with --lockstep N"

@@ -52,9 +52,14 @@ Run::Run(std::shared_ptr<const model::WorldModel> world, RunOptions options, Bus
                mode().add_applied(tick, step, control_.sessions().list());
              }),
       info_beat_(publisher_, world_->step_us, [this] { return pacer_->paused(); }),
+      on_stall_(
+          [](const std::string& reason) { spdlog::warn("the run does not go on: {}", reason); }),
       worker_(models_, wakeup_, options_.before_model),
-      control_(run_id_, control_host()) {
-  if (!options_.record.empty()) log_ = std::make_unique<LogSink>(options_.record);
+      control_(run_id_, control_host()),
+      stall_watch_({.tell = [this](const std::string& reason) { on_stall_(reason); },
+                    .takes_none = [this] { return takes_no_messages(); }}) {
+  if (!options_.record.empty())
+    log_ = std::make_unique<LogSink>(options_.record, options_.record_limit);
   if (!options_.snapshots.empty()) journal_ = std::make_unique<Journal>(options_.snapshots);
   if (options_.watcher) watcher_ = std::make_unique<WatcherSink>(options_.watcher);
   if (!options_.repeat.empty()) {
@@ -135,6 +140,7 @@ void Run::run() {
     if (!repeating_)
       control_.published(publisher_.step());  // a PAUSE may wait for a state that was out already
     publisher_.flush();
+    stall_watch_.beat(StallWatch::At::rest);
     if (!wakeup_.wait_until(next)) tell_status();
   }
   finish();
@@ -142,6 +148,7 @@ void Run::run() {
 
 void Run::publish_what_is_ready() {
   for (;;) {
+    stall_watch_.beat(StallWatch::At::messages);
     if (stop_) simulation_->leave_off();
     const engine::Batch* batch = mode().has_room() || stop_ ? simulation_->take() : nullptr;
     if (!batch) return;
@@ -164,7 +171,9 @@ void Run::publish(const engine::Batch& batch) {
     publisher_.publish(*simulation_, batch, state);
     if (on_state_) on_state_(state);
   }
-  if (batch.count > 0) mode().published(publisher_.step());
+  if (batch.count == 0) return;
+  mode().published(publisher_.step());
+  stall_watch_.moved(Clock::now());
 }
 
 void Run::record_applied(const engine::Batch& batch, int64_t step) {
@@ -187,9 +196,14 @@ void Run::record_applied(const engine::Batch& batch, int64_t step) {
   }
 }
 
-bool Run::compute_here() { return mode().takes_grants() && mode().has_room() && simulation_->go(); }
+bool Run::compute_here() {
+  if (!mode().takes_grants() || !mode().has_room()) return false;
+  stall_watch_.beat(StallWatch::At::steps);
+  return simulation_->go();
+}
 
 void Run::serve() {
+  stall_watch_.beat(StallWatch::At::messages);  // replies
   control_.serve();
   spawn_ready();
 }
@@ -206,6 +220,8 @@ Run::Clock::time_point Run::attend() {
     attended = mode().attend(control_.sessions().list(), publisher_.step(), now);
   }
   for (const int64_t session : attended.dropped) control_.drop(session);
+  if (pacer_->rests()) stall_watch_.moved(now);
+  stall_watch_.idle(now, [this] { return why_idle(); });
   return std::min({next_status_, last_sign() + kPausedInfoPeriod, attended.next});
 }
 
@@ -218,6 +234,22 @@ void Run::tell_status() {
   if (now < next_status_) return;
   if (on_status_) on_status_(status());
   next_status_ = now + kStatusPeriod;
+}
+
+std::string Run::why_idle() {
+  std::string who;
+  {
+    const std::lock_guard lock(simulation_mutex_);
+    who = mode().waits_for(publisher_.step());
+  }
+  std::string why = who.empty() ? simulation_->at_work() : "it waits for " + who;
+  if (why.empty()) return "";
+  return fmt::format("{} (the last state was that of step {})", why, publisher_.step());
+}
+
+std::string Run::takes_no_messages() const {
+  return log_ && log_->waits() ? "the disk of --record does not take the log as fast as it grows"
+                               : "the bus takes no messages";
 }
 
 void Run::tell_watchdog(size_t index) {

@@ -35,6 +35,7 @@
 #include "run/repeating.h"
 #include "run/request_table.h"
 #include "run/sinks.h"
+#include "run/stall_watch.h"
 #include "run/wait_for.h"
 
 namespace ruedo::run {
@@ -47,6 +48,7 @@ struct RunOptions {
   bool control = true;       // serve ruedo/request
   LockstepOptions lockstep;  // wants control
   std::string record;        // file; "": none
+  int64_t record_limit = 0;  // bytes of all files that --record makes; 0: none
   std::string snapshots;     // folder that SNAPSHOT and RESTORE use; "": none
   std::vector<WaitForOption> wait_for;
   std::string repeat;            // log or snapshot to begin with: what acted on that run acts again
@@ -105,6 +107,10 @@ class Run {
   // Called by run() with each state that is published. Set before run().
   void on_state(std::function<void(const Snapshot&)> handler) { on_state_ = std::move(handler); }
 
+  // Called when the run does not go on for two seconds, with the reason; in any thread. Set before
+  // run(); else the reason is logged.
+  void on_stall(std::function<void(const std::string&)> handler) { on_stall_ = std::move(handler); }
+
   // Called by run() every half second of real time.
   void on_status(std::function<void(const Status&)> handler) { on_status_ = std::move(handler); }
 
@@ -123,6 +129,8 @@ class Run {
   void serve();                // requests, and models that are ready
   Clock::time_point attend();  // to what real time brings; returns when next
   void tell_status();
+  std::string why_idle();
+  std::string takes_no_messages() const;
   void finish();  // the run is over
   Status status() const;
   void tell_watchdog(size_t robot);  // on the terminal
@@ -216,6 +224,7 @@ class Run {
   log_header_t header_;  // of this epoch
   Snapshot changed_;     // the last state, after requests
   std::function<void(const Status&)> on_status_;
+  std::function<void(const std::string&)> on_stall_;
   std::function<void(const Snapshot&)> on_state_;
   Clock::time_point next_status_;
 
@@ -224,6 +233,7 @@ class Run {
   std::optional<ModelWorker::Made> made_;  // the next that is ready,
   int64_t enters_at_ = -1;                 // and the state that it waits for
   Control control_;
+  StallWatch stall_watch_;
 };
 
 }  // namespace ruedo::run

@@ -44,6 +44,8 @@ class Sessions {
   Session* join(const std::string& client, int64_t sequence, Time now,
                 const std::function<bool(int64_t)>& keeps = {});
   void leave(int64_t id);
+  // Nobody could be heard for so long: nobody was silent.
+  void forgive(Time::duration deaf);
 
   // answer_again: `reply` is the one to send.
   Verdict judge(const Session& session, int64_t sequence, const reply_t*& reply) const;

@@ -1,6 +1,10 @@
 // The bus follows the announcements; the log tells its faults across threads.
 #include "run/sinks.h"
 
+#include <utility>
+
+#include <spdlog/spdlog.h>
+
 #include "ruedo/errors.h"
 
 namespace ruedo::run {
@@ -26,16 +30,36 @@ void BusSink::announce(const std::shared_ptr<const Announcement>& announcement) 
   if (listening_ && !same) bus_.listen_to(inputs_, outputs_);
 }
 
-LogSink::LogSink(const std::string& path)
-    : file_(path),
+LogSink::LogSink(const std::string& path, int64_t limit)
+    : file_(path, limit),
       queue_(file_,
              {.thread = "log", .when_full = QueuedSink::WhenFull::wait, .latency = kLogLatency}) {}
 
+LogSink::File::File(const std::string& path, int64_t limit) : path_(path) {
+  if (limit > 0)
+    ring_ = std::make_unique<log::Ring>(path, limit);
+  else
+    writer_ = std::make_unique<log::Writer>(path);
+}
+
+void LogSink::File::message(const Published& message) {
+  if (writer_) return writer_->write(message.stamp_us, message.channel, message.data, message.size);
+  if (std::exchange(step_begins_, false)) ring_->begin_step(message.stamp_us);
+  ring_->write(message.stamp_us, message.channel, message.data, message.size,
+               message.kind == Kind::record);
+}
+
 void LogSink::File::flush() {
-  writer_.flush();
-  if (writer_.error().empty()) return;
+  ring_ ? ring_->flush() : writer_->flush();
+  const std::string& error = ring_ ? ring_->error() : writer_->error();
+  if (ring_ && !ring_->repeats() && !std::exchange(told_, true))
+    spdlog::warn(
+        "what acted on the run takes half of --record-limit: {} repeats it up to here, and no "
+        "further",
+        path_);
+  if (error.empty()) return;
   const std::lock_guard lock(mutex_);
-  error_ = writer_.error();
+  error_ = error;
 }
 
 std::string LogSink::File::error() const {

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <vector>
 
+#include "log/ring.h"
 #include "log/writer.h"
 #include "ruedo/bus.h"
 #include "run/queued_sink.h"
@@ -40,7 +42,8 @@ class BusSink : public Sink {
 class LogSink : public Sink {
  public:
   // Throws EnvironmentError when the file cannot be created.
-  explicit LogSink(const std::string& path);
+  // limit: bytes of all files of a ring (log/ring.h); 0: one file without a limit.
+  LogSink(const std::string& path, int64_t limit);
 
   Hears hears() const override { return queue_.hears(); }
   void begin_step(const Step& step) override { queue_.begin_step(step); }
@@ -48,6 +51,8 @@ class LogSink : public Sink {
   void end_step(const Step& step) override { queue_.end_step(step); }
   void flush() override { queue_.flush(); }
 
+  // Whether the run waits for the disk. Any thread.
+  bool waits() const { return queue_.is_full(); }
   // Returns when all that came so far was handed to the operating system.
   void drain() { queue_.drain(); }
   // Throws EnvironmentError when the log cannot be written any more. now: sim time.
@@ -56,17 +61,18 @@ class LogSink : public Sink {
  private:
   class File : public Sink {
    public:
-    explicit File(const std::string& path) : writer_(path), path_(path) {}
+    File(const std::string& path, int64_t limit);
     Hears hears() const override { return {.samples = true, .records = true, .repeated = true}; }
-    void message(const Published& message) override {
-      writer_.write(message.stamp_us, message.channel, message.data, message.size);
-    }
+    void begin_step(const Step&) override { step_begins_ = true; }
+    void message(const Published& message) override;
     void flush() override;
     std::string error() const;
     const std::string& path() const { return path_; }
 
    private:
-    log::Writer writer_;
+    std::unique_ptr<log::Writer> writer_;  // one of the two
+    std::unique_ptr<log::Ring> ring_;
+    bool step_begins_ = false, told_ = false;
     const std::string path_;
     mutable std::mutex mutex_;
     std::string error_;

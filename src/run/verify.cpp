@@ -89,7 +89,7 @@ class Verifier::Impl {
  private:
   // What acted is what the repetition was given; the header is the machine's.
   bool is_compared(const std::string& channel) const {
-    return channel != "ruedo/applied" && channel != "ruedo/header" &&
+    return channel != kAppliedChannel && channel != kHeaderChannel &&
            (kept_.empty() || kept_.contains(channel));
   }
 
@@ -102,7 +102,7 @@ class Verifier::Impl {
     while (reader.next(event, [](const std::string&) { return false; })) {
       if (event.channel == "ruedo/world") return kept_.clear();
       kept_.insert(event.channel);
-      hashed |= event.channel == "ruedo/state_hash";
+      hashed |= event.channel == kStateHashChannel;
     }
     if (!hashed) kept_.clear();
   }
@@ -116,12 +116,12 @@ class Verifier::Impl {
   }
 
   void see(SimTime stamp, const std::string& channel, const uint8_t* data, size_t size) {
-    if (channel == "ruedo/header") {
+    if (channel == kHeaderChannel) {
       decode_checked(data, size, header);
       return;
     }
     if (stamp < last_stamp_ || verdict_.difference || !is_compared(channel)) return;
-    if (channel == "ruedo/state_hash") note_epoch(stamp, data, size);
+    if (channel == kStateHashChannel) note_epoch(stamp, data, size);
     if (!next_logged()) {
       // A log that was cut off ends before the run does; one that has its end holds all of it.
       if (ended_) differ(stamp, channel, "the end of the run", "a message");
@@ -145,7 +145,7 @@ class Verifier::Impl {
     }
     ++verdict_.messages;
     verdict_.bytes += static_cast<int64_t>(size);
-    if (channel == "ruedo/state_hash") {
+    if (channel == kStateHashChannel) {
       state_hash_t hash;
       ended_ = decode_checked(data, size, hash) == DecodeFault::none && hash.last;
     }

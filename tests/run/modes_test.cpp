@@ -77,8 +77,8 @@ TEST(Live, WaitsForTheMessagesOfAChannel) {
   EXPECT_EQ(world.gate.limit, 20);
   EXPECT_TRUE(live.receive("r/velocity", command.data(), command.size()));
   EXPECT_EQ(world.gate.limit, 40);
-  EXPECT_EQ(live.attend({}, 40, kStart).next,
-            kStart + seconds(1));  // then it says for whom it waits
+  EXPECT_THAT(live.waits_for(40), testing::HasSubstr("message 2 on r/velocity"));
+  EXPECT_EQ(live.waits_for(39), "");
   live.begin(world.stage(), 50);
   EXPECT_EQ(world.gate.limit, 60);
 }

@@ -3,6 +3,8 @@
 #include <lcm/lcm-cpp.hpp>
 
 #include "core/sha256.h"
+#include "full_disk.h"
+#include "log/reader.h"
 #include "log/writer.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/decode.h"
@@ -60,6 +62,30 @@ TEST(Writer, AFullDiskIsSaid) {
   log.flush();
   EXPECT_NE(log.error().find("No space left on device"), std::string::npos);
   EXPECT_THROW(log::Writer("/nowhere/at/all.lcmlog"), EnvironmentError);
+}
+
+// However many bytes there is room for, the log ends with the last whole event.
+TEST(Writer, ADiskThatIsFullAtAnyByteLeavesAWholeLog) {
+  const uint8_t bytes[100] = {};
+  constexpr int64_t kEvent = 28 + 7 + 100;  // head, channel, data
+  for (rlim_t room = 0; room <= 5 * kEvent; room += 5) {
+    const TemporaryFile file("full.lcm");
+    {
+      const FullDisk disk(room);
+      log::Writer log(file.path());
+      for (int64_t time = 0; time < 5; ++time) {
+        log.write(time, "channel", bytes, sizeof bytes);
+        if (time % 2 == 1) log.flush();  // one or two events in a write
+      }
+      log.flush();
+      EXPECT_EQ(log.error().empty(), room == 5 * kEvent) << room << log.error();
+    }
+    log::Reader reader(file.path());
+    int64_t events = 0;
+    for (log::Event event; reader.next(event);) EXPECT_EQ(event.timestamp_us, events++);
+    EXPECT_EQ(reader.fault(), "") << room;
+    EXPECT_EQ(events, static_cast<int64_t>(room) / kEvent);
+  }
 }
 
 TEST(Recording, AFullDiskEndsTheRun) {

@@ -1,0 +1,115 @@
+// Two writers: one for what acted, one for the file that is being filled.
+#include "log/ring.h"
+
+#include <filesystem>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "log/header.h"
+#include "log/index.h"
+#include "ruedo/applied_t.hpp"
+#include "ruedo/decode.h"
+#include "ruedo/errors.h"
+
+namespace ruedo::log {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path folder_of(const fs::path& path) {
+  return path.has_parent_path() ? path.parent_path() : fs::path(".");
+}
+
+// Only what a ring of that name has written: run.000001.lcm of run.lcm.
+void remove_numbered(const fs::path& path) {
+  const std::string stem = path.stem().string(), suffix = path.extension().string();
+  std::error_code error;
+  std::vector<fs::path> found;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_of(path), error)) {
+    const std::string name = entry.path().filename().string();
+    if (name.size() < stem.size() + suffix.size() + 7 || !name.starts_with(stem + ".") ||
+        !name.ends_with(suffix))
+      continue;
+    const std::string number =
+        name.substr(stem.size() + 1, name.size() - stem.size() - suffix.size() - 1);
+    if (number.find_first_not_of("0123456789") == std::string::npos && number.size() >= 6)
+      found.push_back(entry.path());
+  }
+  for (const fs::path& old : found) fs::remove(old, error);
+}
+
+}  // namespace
+
+Ring::Ring(const std::string& path, int64_t limit) : path_(path), limit_(limit), acted_(path) {
+  remove_numbered(path);
+}
+
+std::string Ring::name_of(int64_t number) const {
+  const fs::path path(path_);
+  return (path.parent_path() /
+          fmt::format("{}.{:06}{}", path.stem().string(), number, path.extension().string()))
+      .string();
+}
+
+void Ring::begin_file(int64_t timestamp_us) {
+  if (file_) {
+    file_->flush();
+    full_.push_back({file_->path(), file_->size()});
+    full_bytes_ += file_->size();
+  }
+  try {
+    file_ = std::make_unique<Writer>(name_of(++number_));
+  } catch (const EnvironmentError& fault) {
+    file_.reset();
+    error_ = fault.what();
+    return;
+  }
+  for (const Event& event : preamble_)
+    file_->write(timestamp_us, event.channel, event.data.data(), event.data.size());
+  remove_old();
+}
+
+void Ring::remove_old() {
+  const int64_t next = limit_ / kFiles;  // room for the file that begins
+  while (!full_.empty() && acted_.size() + full_bytes_ + next > limit_) {
+    std::error_code error;
+    fs::remove(full_.front().path, error);
+    full_bytes_ -= full_.front().size;
+    full_.pop_front();
+  }
+}
+
+void Ring::begin_step(int64_t timestamp_us) {
+  if (error_.empty() && (!file_ || file_->size() >= limit_ / kFiles)) begin_file(timestamp_us);
+}
+
+void Ring::write(int64_t timestamp_us, const std::string& channel, const uint8_t* data, size_t size,
+                 bool record) {
+  if (!error_.empty()) return;
+  if (record && repeats_) {
+    acted_.write(timestamp_us, channel, data, size);
+    repeats_ = acted_.size() <= limit_ / 2;
+  }
+  if (record) keep_for_later(channel, data, size);
+  if (file_) file_->write(timestamp_us, channel, data, size);
+}
+
+// Headers, and the requests that changed the world, as the console and `export` follow them.
+void Ring::keep_for_later(const std::string& channel, const uint8_t* data, size_t size) {
+  if (preamble_.size() >= 2 * Index::kMostEdits) return;
+  applied_t applied;
+  if (channel == kHeaderChannel ||
+      (channel == kAppliedChannel && decode_checked(data, size, applied) == DecodeFault::none &&
+       changes_world(applied.kind)))
+    preamble_.push_back({channel, {data, data + size}});
+}
+
+void Ring::flush() {
+  acted_.flush();
+  if (file_) file_->flush();
+  if (error_.empty()) error_ = acted_.error();
+  if (error_.empty() && file_) error_ = file_->error();
+}
+
+}  // namespace ruedo::log

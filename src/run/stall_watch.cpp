@@ -1,0 +1,88 @@
+// Two ways to notice: the publisher's own, while it is idle, and the thread's, while it is not.
+#include "run/stall_watch.h"
+
+#include <utility>
+
+#include <fmt/format.h>
+#include <pthread.h>
+
+namespace ruedo::run {
+
+StallWatch::StallWatch(Host host) : host_(std::move(host)), thread_([this] { watch(); }) {}
+
+StallWatch::~StallWatch() {
+  {
+    const std::lock_guard lock(mutex_);
+    is_over_ = true;
+  }
+  over_.notify_all();
+  thread_.join();
+}
+
+void StallWatch::beat(std::string request) {
+  {
+    const std::lock_guard lock(mutex_);
+    request_ = std::move(request);
+  }
+  beat(At::request);
+}
+
+void StallWatch::moved(Clock::time_point now) {
+  moved_ = now;
+  told_ = false;
+}
+
+void StallWatch::idle(Clock::time_point now, const std::function<std::string()>& why) {
+  if (told_ || now < moved_ + kPatience) return;
+  const std::string reason = why();
+  if (reason.empty()) return;
+  told_ = true;
+  const std::lock_guard lock(mutex_);
+  say(reason, now);
+}
+
+void StallWatch::say(const std::string& reason, Clock::time_point now) {
+  if (reason == last_reason_ && now < last_told_ + kQuiet) return;
+  last_reason_ = reason;
+  last_told_ = now;
+  host_.tell(reason);
+}
+
+std::string StallWatch::reason(At at) {
+  switch (at) {
+    case At::rest: return "";  // idle() tells
+    case At::steps: return "a step is being computed";
+    case At::messages: return host_.takes_none();
+    case At::request: return "a request is being executed: " + request_;
+  }
+  return "";
+}
+
+void StallWatch::watch() {
+  pthread_setname_np(pthread_self(), "stall watch");
+  std::unique_lock lock(mutex_);
+  uint64_t beats = 0;
+  Clock::time_point last_look = Clock::now(), last_beat = last_look;
+  bool told = false;
+  while (!over_.wait_for(lock, kPatience / 6, [this] { return is_over_; })) {
+    const Clock::time_point now = Clock::now();
+    const Clock::duration blind = now - std::exchange(last_look, now);
+    const uint64_t beats_now = beats_.load(std::memory_order_acquire);
+    if (blind > kPatience) {
+      host_.tell(fmt::format(
+          "this process was held up for {:.1f} s: stopped by a signal, or without a processor. "
+          "Sim time goes on from where it was",
+          std::chrono::duration<double>(blind).count()));
+      last_beat = now;  // nobody else is to blame
+    } else if (beats_now != std::exchange(beats, beats_now)) {
+      last_beat = now;
+      told = false;
+    } else if (!told && now >= last_beat + kPatience) {
+      const std::string why = reason(at_.load(std::memory_order_relaxed));
+      told = true;
+      if (!why.empty()) say(why, now);
+    }
+  }
+}
+
+}  // namespace ruedo::run

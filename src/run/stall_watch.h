@@ -1,0 +1,73 @@
+// Says within two seconds why a run does not go on, once for each time that it stands.
+//
+// While the publisher has nothing to do it asks for the reason itself: a client, a sensor, a step.
+// What holds the publisher up, a request or a disk, is told by a thread of the watch's own, which
+// sees that the publisher's beats have ended; so is that the whole process stood.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+
+namespace ruedo::run {
+
+class StallWatch {
+ public:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::milliseconds kPatience{1500};
+  // A client that takes seconds for each answer is told of at most once in this time.
+  static constexpr std::chrono::seconds kQuiet{60};
+
+  enum class At { rest, steps, messages, request };  // what the publisher is at
+
+  struct Host {
+    // Gets the reason in words. Any thread, one call at a time.
+    std::function<void(const std::string& reason)> tell;
+    // What takes no messages, in words. The watch's thread.
+    std::function<std::string()> takes_none;
+  };
+
+  explicit StallWatch(Host host);
+  ~StallWatch();
+
+  // ---- The publisher's.
+
+  // It begins with the next thing.
+  void beat(At at) {
+    at_.store(at, std::memory_order_relaxed);
+    beats_.fetch_add(1, std::memory_order_release);
+  }
+  // It begins with a request that may take long: "SPAWN of 'planner'".
+  void beat(std::string request);
+  // A state was published, or the run stands because somebody wants it to.
+  void moved(Clock::time_point now);
+  // It has nothing to do. why: who or what is waited for; "" when it need not be said.
+  void idle(Clock::time_point now, const std::function<std::string()>& why);
+
+ private:
+  void watch();
+  std::string reason(At at);
+  void say(const std::string& reason, Clock::time_point now);
+
+  const Host host_;
+  std::atomic<At> at_{At::rest};
+  std::atomic<uint64_t> beats_{0};
+
+  Clock::time_point moved_ = Clock::now();  // the publisher's, and the next
+  bool told_ = false;
+
+  std::mutex mutex_;  // of what follows
+  std::condition_variable over_;
+  bool is_over_ = false;
+  std::string request_;
+  std::string last_reason_;
+  Clock::time_point last_told_;
+  std::thread thread_;
+};
+
+}  // namespace ruedo::run

@@ -1,0 +1,139 @@
+// A run that does not go on says why: whom it waits for, which sensor, which request, which sink.
+#include <condition_variable>
+#include <mutex>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "control_client.h"
+#include "run/stall_watch.h"
+
+namespace ruedo::run {
+namespace {
+
+using std::chrono::seconds;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+const StallWatch::Clock::time_point kStart = StallWatch::Clock::now();
+
+TEST(StallWatch, TellsOnceWhoIsWaitedFor) {
+  std::vector<std::string> told;
+  StallWatch watch({.tell = [&](const std::string& reason) { told.push_back(reason); },
+                    .takes_none = [] { return std::string(); }});
+  std::string why = "it waits for 'a'";
+  const auto idle = [&](int second) { watch.idle(kStart + seconds(second), [&] { return why; }); };
+  watch.moved(kStart);
+  idle(1);
+  EXPECT_THAT(told, ElementsAre());
+  idle(2);
+  idle(3);
+  EXPECT_THAT(told, ElementsAre("it waits for 'a'"));
+  watch.moved(kStart + seconds(4));  // it takes some seconds each time, and is told of once
+  idle(8);
+  EXPECT_EQ(told.size(), 1u);
+  why = "it waits for 'b'";
+  watch.moved(kStart + seconds(9));
+  idle(12);
+  EXPECT_THAT(told, ElementsAre("it waits for 'a'", "it waits for 'b'"));
+  watch.moved(kStart + seconds(20));
+  why = "";  // it rests, as it should
+  idle(40);
+  EXPECT_EQ(told.size(), 2u);
+}
+
+// What is told; and something that waits until it was.
+class Told {
+ public:
+  void tell(const std::string& reason) {
+    const std::lock_guard lock(mutex_);
+    reason_ = reason;
+    changed_.notify_all();
+  }
+  std::string wait() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return !reason_.empty(); });
+    return reason_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::string reason_;
+};
+
+TEST(StallWatch, TellsWhichRequestHoldsThePublisherUp) {
+  Told told;
+  StallWatch watch({.tell = [&](const std::string& reason) { told.tell(reason); },
+                    .takes_none = [] { return std::string("the bus"); }});
+  watch.beat("RESTORE of 'planner'");
+  EXPECT_EQ(told.wait(), "a request is being executed: RESTORE of 'planner'");
+}
+
+// A run that is held up until it has said why.
+std::string reason_of(RunOptions options, const std::string& inside, MemoryBus& bus, Told& told) {
+  Run run(load_text(robot_sdf("r", 0, 0, inside)), std::move(options), bus);
+  run.on_stall([&](const std::string& reason) {
+    told.tell(reason);
+    run.stop();
+  });
+  run.run();
+  return told.wait();
+}
+
+TEST(StallWatch, NamesTheClientsThatLockstepWaitsFor) {
+  MemoryBus bus;
+  Told told;
+  RunOptions options = fast(1);
+  options.lockstep.clients = 2;
+  EXPECT_THAT(reason_of(options, "", bus, told), HasSubstr("it waits for 2 more of 2 clients"));
+}
+
+TEST(StallWatch, NamesTheChannelThatIsWaitedFor) {
+  MemoryBus bus;
+  Told told;
+  RunOptions options = fast(1);
+  options.wait_for = {{"r/velocity", {10, 1}}};
+  EXPECT_THAT(reason_of(options, "", bus, told),
+              HasSubstr("--wait-for wants, message 0 on r/velocity"));
+}
+
+TEST(StallWatch, NamesTheModuleThatIsAtWork) {
+  MemoryBus bus;
+  Told told;
+  RunOptions options = fast(1);
+  options.simulation.before_batch = [&](const std::string& module) {
+    if (module == "lrf") told.wait();
+  };
+  const std::string lrf =
+      "<sensor name='front' type='gpu_ray'><update_rate>10</update_rate><ray><scan><horizontal>"
+      "<samples>5</samples><min_angle>-1</min_angle><max_angle>1</max_angle></horizontal></scan>"
+      "<range><min>0.1</min><max>8</max></range></ray></sensor>";
+  EXPECT_THAT(reason_of(options, lrf, bus, told), HasSubstr("the module lrf works"));
+}
+
+TEST(StallWatch, NamesTheBus) {
+  MemoryBus bus;
+  Told told;
+  bus.on_publish = [&](const std::string& channel) {
+    if (channel == "r/odometry") told.wait();
+  };
+  EXPECT_EQ(reason_of(fast(1), "", bus, told), "the bus takes no messages");
+}
+
+TEST(StallWatch, APausedOrSlowRunIsNotHeldUp) {
+  Pacer pacer(5000, 0.001, 1000);  // a step takes 5 s
+  EXPECT_FALSE(pacer.rests());     // step 0 is due
+  int64_t step = -1;
+  EXPECT_EQ(pacer.wait(step, 8), 1);
+  EXPECT_TRUE(pacer.rests());
+  pacer.set_rate(std::numeric_limits<double>::infinity());
+  EXPECT_FALSE(pacer.rests());
+  pacer.pause();
+  EXPECT_TRUE(pacer.rests());
+  pacer.allow(2);
+  EXPECT_FALSE(pacer.rests());
+}
+
+}  // namespace
+}  // namespace ruedo::run
