@@ -1,0 +1,138 @@
+"""A long run in lockstep (RUEDO_DAY_SECONDS of sim time; a day in the nightly run), once alone and once beside programs that
+send what they should not, join and die, and bring bad models: the same log, and memory that stays flat."""
+
+from __future__ import annotations
+
+import os
+import random
+import subprocess
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from soak_test import HALL, HOSTILE, MOST_GROWTH_KB, PATIENCE, RATE, RUEDO, resident_kb
+
+import ruedo
+
+SECONDS = int(os.environ.get("RUEDO_DAY_SECONDS", "300"))
+BAD_MODELS = [
+    one.read_bytes().decode("utf-8", "replace")
+    for kind in ("world", "spawn", "urdf")
+    for one in sorted((Path(os.environ["RUEDO_SOURCE_DIR"]) / "tests/fuzz/kept" / kind).iterdir())
+    if one.name != "mass_1e300"  # that is repaired, and said
+]
+
+
+class Harm(threading.Thread):
+    """Floods the server's address, and joins with bad models, until it is told to end."""
+
+    def __init__(self, url: str, folder: Path):
+        super().__init__()
+        self.url, self.folder, self.end = url, folder, False
+        self.messages = self.models = self.files = 0
+        self.accepted: list[str] = []
+
+    def run(self) -> None:
+        seed = 0
+        while not self.end:
+            seed += 1
+            flood = subprocess.Popen(
+                [HOSTILE, self.url, str(5 * RATE), str(RATE), str(seed)],
+                stdout=subprocess.PIPE,
+                text=True,
+            )
+            self.bring_models()
+            self.check_files()
+            said = flood.communicate(timeout=PATIENCE)[0]
+            self.messages += sum(int(line.split()[0]) for line in said.splitlines())
+
+    def bring_models(self) -> None:
+        try:
+            with ruedo.connect(self.url, timeout=5) as guest:
+                for text in BAD_MODELS:
+                    try:
+                        guest.spawn(text=text, x=3, y=3)
+                        self.accepted.append(text)
+                    except ruedo.RuedoError:
+                        self.models += 1
+        except ruedo.RuedoError:  # there is no place for one more
+            pass
+
+    def check_files(self) -> None:
+        for i, text in enumerate(BAD_MODELS):
+            path = self.folder / f"bad_{i}.sdf"
+            path.write_text(text)
+            code = subprocess.run([RUEDO, "check", path], capture_output=True).returncode
+            assert code in (0, 1, 3), (code, path)
+            self.files += 1
+
+
+def a_day(log: Path, url: str, harm: Harm | None) -> list[int]:
+    """Sizes of the server, in kB."""
+    commands = random.Random(1)
+    sizes = []
+    with subprocess.Popen(
+        [RUEDO, "run", HALL, "--quiet", "--disable", "p3at/camera", "--lcm", url]
+        + ["--lockstep", "1", "--record", str(log), "--record-limit", "16MB"],
+        stderr=subprocess.DEVNULL,
+    ) as server:
+        try:
+            sim = connected(url, server)
+            if harm:
+                harm.start()
+            for second in range(SECONDS):
+                command = sim.robot("p3at").velocity_command(
+                    commands.uniform(-0.5, 0.5), commands.uniform(-1, 1)
+                )
+                sim.step(round(1 / sim.step_size), [command], timeout=PATIENCE)
+                if second % max(1, SECONDS // 300) == 0:
+                    sizes.append(resident_kb(server))
+            sim.close()
+        finally:
+            if harm:
+                harm.end = True
+                harm.join()
+            server.terminate()
+            server.wait(PATIENCE)
+    assert server.returncode == 0
+    return sizes
+
+
+def connected(url: str, server: subprocess.Popen) -> ruedo.Simulation:
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        try:
+            return ruedo.connect(url, timeout=5.0)
+        except ruedo.NoServer:
+            assert server.poll() is None and time.monotonic() < deadline
+
+
+def test_the_log_is_the_same_beside_a_flood(tmp_path: Path, free_port) -> None:
+    quiet, loud = tmp_path / "quiet.lcm", tmp_path / "loud.lcm"
+    a_day(quiet, f"udpm://239.255.76.67:{free_port()}?ttl=0", None)
+    url = f"udpm://239.255.76.67:{free_port()}?ttl=0"
+    harm = Harm(url, tmp_path)
+    sizes = a_day(loud, url, harm)
+    third = len(sizes) // 3
+    first, last = max(sizes[:third]), max(sizes[-third:])
+    print(
+        f"{SECONDS} s: {harm.messages} bad messages, {harm.models} bad models, {harm.files} bad files, "
+        f"{len(harm.accepted)} accepted; {first} kB at first, {last} kB at the end"
+    )
+    assert not harm.accepted
+    assert harm.messages > 0
+    assert last < first + MOST_GROWTH_KB, sizes
+    assert loud.read_bytes() == quiet.read_bytes()
+
+
+@pytest.fixture
+def free_port():
+    import socket
+
+    def port() -> int:
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            return probe.getsockname()[1]
+
+    return port
