@@ -38,7 +38,7 @@ class Harm(threading.Thread):
         while not self.end:
             seed += 1
             flood = subprocess.Popen(
-                [HOSTILE, self.url, str(5 * RATE), str(RATE), str(seed)],
+                [HOSTILE, self.url, str(5 * RATE), str(RATE), str(seed), "only-bad"],
                 stdout=subprocess.PIPE,
                 text=True,
             )

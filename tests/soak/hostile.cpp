@@ -1,11 +1,13 @@
 // Sends a server everything that it should not get, so often and at most at a given rate, and
-// counts it: hostile URL COUNT RATE [SEED]
+// counts it: hostile URL COUNT RATE [SEED [only-bad]]; only-bad: none that a
+// robot would answer
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <random>
 #include <string>
 #include <thread>
@@ -73,6 +75,7 @@ ruedo::request_t request() {
 struct Case {
   const char* name;
   void (*make)(std::string& channel, Bytes& bytes);
+  bool may_act = false;  // a robot drives on some of them, or answers why it does not
   int64_t sent = 0;
 };
 
@@ -84,22 +87,26 @@ Case cases[] = {
     {"commands with a right beginning",
      [](std::string& channel, Bytes& bytes) {
        channel = "p3at/velocity", bytes = broken(encoded(velocity(0.1)));
-     }},
+     },
+     true},
     {"commands that are not finite",
      [](std::string& channel, Bytes& bytes) {
        channel = "p3at/velocity", bytes = encoded(velocity(random_bits() % 2 ? NAN : INFINITY));
-     }},
+     },
+     true},
     {"good commands, too many",
      [](std::string& channel, Bytes& bytes) {
        channel = "p3at/velocity", bytes = encoded(velocity(0.05));
-     }},
+     },
+     true},
     {"wheel commands whose lengths lie",
      [](std::string& channel, Bytes& bytes) {
        ruedo::wheel_command_t command{};
        command.n = 2;
        command.rate = {0.0, 0.0};
        channel = "p3at/wheels", bytes = broken(encoded(command));
-     }},
+     },
+     true},
     {"primitives of no kind",
      [](std::string& channel, Bytes& bytes) {
        ruedo::move_command_t command{};
@@ -107,7 +114,8 @@ Case cases[] = {
        command.kind = static_cast<int8_t>(random_bits());
        command.value = random_bits() % 2 ? NAN : 1e300;
        channel = "p3at/move", bytes = encoded(command);
-     }},
+     },
+     true},
     {"requests of strangers",
      [](std::string& channel, Bytes& bytes) {
        channel = "ruedo/request", bytes = encoded(request());
@@ -152,6 +160,7 @@ int main(int argc, char** argv) {
   lcm::LCM bus(argv[1]);
   if (!bus.good()) return 4;
   random_bits.seed(argc > 4 ? std::strtoull(argv[4], nullptr, 10) : 1);
+  const bool only_bad = argc > 5 && std::strcmp(argv[5], "only-bad") == 0;
   const double rate = std::atof(argv[3]);
   const auto begin = std::chrono::steady_clock::now();
   const int64_t count = std::atoll(argv[2]);
@@ -164,6 +173,7 @@ int main(int argc, char** argv) {
         count, static_cast<int64_t>(std::chrono::duration<double>(now - begin).count() * rate));
     for (int i = 0; i < 1000 && sent < due; ++i, ++sent) {
       Case& one = cases[random_bits() % std::size(cases)];
+      if (only_bad && one.may_act) continue;
       one.make(channel, bytes);
       bus.publish(channel, bytes.data(), static_cast<unsigned>(bytes.size()));
       ++one.sent;
