@@ -39,20 +39,10 @@ std::optional<SampleType> Observations::latest(const Stream<SampleType>& stream)
   return std::nullopt;
 }
 
-#define RUEDO_OBSERVATIONS(SampleType)                                                 \
+#define RUEDO_OBSERVATIONS(SampleType, type)                                           \
   template std::vector<SampleType> Observations::all(const Stream<SampleType>&) const; \
   template std::optional<SampleType> Observations::latest(const Stream<SampleType>&) const;
-RUEDO_OBSERVATIONS(Scan)
-RUEDO_OBSERVATIONS(LidarScan)
-RUEDO_OBSERVATIONS(SonarReading)
-RUEDO_OBSERVATIONS(Odometry)
-RUEDO_OBSERVATIONS(Pose)
-RUEDO_OBSERVATIONS(Image)
-RUEDO_OBSERVATIONS(CameraInfo)
-RUEDO_OBSERVATIONS(Imu)
-RUEDO_OBSERVATIONS(Contact)
-RUEDO_OBSERVATIONS(Joints)
-RUEDO_OBSERVATIONS(MotionStatus)
+RUEDO_SAMPLE_TYPES(RUEDO_OBSERVATIONS)
 #undef RUEDO_OBSERVATIONS
 
 }  // namespace ruedo::client

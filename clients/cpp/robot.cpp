@@ -188,16 +188,10 @@ Device<SampleType> Robot::device(const std::string& name) const {
   throw UnknownName(name_ + " has no device '" + name + "'; it has " + names_of(all));
 }
 
-template Device<Scan> Robot::device(const std::string&) const;
-template Device<LidarScan> Robot::device(const std::string&) const;
-template Device<SonarReading> Robot::device(const std::string&) const;
-template Device<Odometry> Robot::device(const std::string&) const;
-template Device<Pose> Robot::device(const std::string&) const;
-template Device<Image> Robot::device(const std::string&) const;
-template Device<Imu> Robot::device(const std::string&) const;
-template Device<Contact> Robot::device(const std::string&) const;
-template Device<Joints> Robot::device(const std::string&) const;
-template Device<MotionStatus> Robot::device(const std::string&) const;
+#define RUEDO_DEVICE(SampleType, type) \
+  template Device<SampleType> Robot::device(const std::string&) const;
+RUEDO_SAMPLE_TYPES(RUEDO_DEVICE)
+#undef RUEDO_DEVICE
 
 Device<Scan> Robot::lrf() const { return first_device<Scan>(*core_, name_, "laser range finder"); }
 Device<LidarScan> Robot::lidar() const {

@@ -3,13 +3,19 @@
 #include <cmath>
 #include <fstream>
 
+#include "ruedo/air_pressure_t.hpp"
+#include "ruedo/air_speed_t.hpp"
+#include "ruedo/altimeter_t.hpp"
 #include "ruedo/camera_info_t.hpp"
 #include "ruedo/contact_t.hpp"
+#include "ruedo/force_torque_t.hpp"
 #include "ruedo/image_t.hpp"
 #include "ruedo/imu_t.hpp"
 #include "ruedo/joint_state_t.hpp"
 #include "ruedo/lidar_t.hpp"
+#include "ruedo/magnetometer_t.hpp"
 #include "ruedo/motion_status_t.hpp"
+#include "ruedo/navsat_t.hpp"
 #include "ruedo/odometry_t.hpp"
 #include "ruedo/planar_lidar_t.hpp"
 #include "ruedo/pose_t.hpp"
@@ -256,6 +262,54 @@ std::shared_ptr<const Sample> decode_motion(WireReader& in) {
   return s;
 }
 
+std::shared_ptr<const Sample> decode_navsat(WireReader& in) {
+  auto s = std::make_shared<NavSat>();
+  s->utime = in.int64();
+  s->latitude_deg = in.float64();
+  s->longitude_deg = in.float64();
+  s->altitude = in.float64();
+  s->velocity = in.array<3>();
+  return s;
+}
+
+std::shared_ptr<const Sample> decode_magnetometer(WireReader& in) {
+  auto s = std::make_shared<Magnetometer>();
+  s->utime = in.int64();
+  s->field = in.array<3>();
+  return s;
+}
+
+std::shared_ptr<const Sample> decode_altimeter(WireReader& in) {
+  auto s = std::make_shared<Altimeter>();
+  s->utime = in.int64();
+  s->altitude = in.float64();
+  s->velocity = in.float64();
+  return s;
+}
+
+std::shared_ptr<const Sample> decode_air_pressure(WireReader& in) {
+  auto s = std::make_shared<AirPressure>();
+  s->utime = in.int64();
+  s->pressure = in.float64();
+  return s;
+}
+
+std::shared_ptr<const Sample> decode_air_speed(WireReader& in) {
+  auto s = std::make_shared<AirSpeed>();
+  s->utime = in.int64();
+  s->differential_pressure = in.float64();
+  s->temperature = in.float64();
+  return s;
+}
+
+std::shared_ptr<const Sample> decode_force_torque(WireReader& in) {
+  auto s = std::make_shared<ForceTorque>();
+  s->utime = in.int64();
+  s->force = in.array<3>();
+  s->torque = in.array<3>();
+  return s;
+}
+
 const SampleDecoder kDecoders[] = {
     {"planar_lidar_t", planar_lidar_t::getHash(), decode_scan},
     {"lidar_t", lidar_t::getHash(), decode_lidar},
@@ -268,6 +322,12 @@ const SampleDecoder kDecoders[] = {
     {"contact_t", contact_t::getHash(), decode_contact},
     {"joint_state_t", joint_state_t::getHash(), decode_joints},
     {"motion_status_t", motion_status_t::getHash(), decode_motion},
+    {"navsat_t", navsat_t::getHash(), decode_navsat},
+    {"magnetometer_t", magnetometer_t::getHash(), decode_magnetometer},
+    {"altimeter_t", altimeter_t::getHash(), decode_altimeter},
+    {"air_pressure_t", air_pressure_t::getHash(), decode_air_pressure},
+    {"air_speed_t", air_speed_t::getHash(), decode_air_speed},
+    {"force_torque_t", force_torque_t::getHash(), decode_force_torque},
 };
 
 }  // namespace
@@ -288,49 +348,12 @@ const SampleDecoder* find_decoder(const std::string& type) {
   return nullptr;
 }
 
-template <>
-const char* message_type<Scan>() {
-  return "planar_lidar_t";
-}
-template <>
-const char* message_type<LidarScan>() {
-  return "lidar_t";
-}
-template <>
-const char* message_type<SonarReading>() {
-  return "sonar_t";
-}
-template <>
-const char* message_type<Odometry>() {
-  return "odometry_t";
-}
-template <>
-const char* message_type<Pose>() {
-  return "pose_t";
-}
-template <>
-const char* message_type<Image>() {
-  return "image_t";
-}
-template <>
-const char* message_type<CameraInfo>() {
-  return "camera_info_t";
-}
-template <>
-const char* message_type<Imu>() {
-  return "imu_t";
-}
-template <>
-const char* message_type<Contact>() {
-  return "contact_t";
-}
-template <>
-const char* message_type<Joints>() {
-  return "joint_state_t";
-}
-template <>
-const char* message_type<MotionStatus>() {
-  return "motion_status_t";
-}
+#define RUEDO_MESSAGE_TYPE(SampleType, type) \
+  template <>                                \
+  const char* message_type<SampleType>() {   \
+    return #type;                            \
+  }
+RUEDO_SAMPLE_TYPES(RUEDO_MESSAGE_TYPE)
+#undef RUEDO_MESSAGE_TYPE
 
 }  // namespace ruedo::client

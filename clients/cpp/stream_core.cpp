@@ -146,16 +146,8 @@ Subscription Stream<SampleType>::on_sample(std::function<void(const SampleType&)
   });
 }
 
-template class Stream<Scan>;
-template class Stream<LidarScan>;
-template class Stream<SonarReading>;
-template class Stream<Odometry>;
-template class Stream<Pose>;
-template class Stream<Image>;
-template class Stream<CameraInfo>;
-template class Stream<Imu>;
-template class Stream<Contact>;
-template class Stream<Joints>;
-template class Stream<MotionStatus>;
+#define RUEDO_STREAM(SampleType, type) template class Stream<SampleType>;
+RUEDO_SAMPLE_TYPES(RUEDO_STREAM)
+#undef RUEDO_STREAM
 
 }  // namespace ruedo::client

@@ -122,7 +122,7 @@ struct TypeMismatch : Error {
 };  // a channel carries another version of a type
 struct NotSupported : Error {
   using Error::Error;
-};                            // the server or the robot cannot do that
+};  // the server or the robot cannot do that
 struct MotionError : Error {  // a primitive ended early or was refused
   MotionError(const std::string& text, MotionReason why) : Error(text), reason(why) {}
   MotionReason reason;
@@ -216,6 +216,38 @@ struct Imu : Sample {             // in the device's frame
   Quaternion orientation{};       // device to world
   Vector3 angular_velocity{};     // rad/s
   Vector3 linear_acceleration{};  // m/s^2, specific force: at rest gravity upwards
+};
+
+// Satellite navigation (GPS).
+struct NavSat : Sample {
+  double latitude_deg = 0.0, longitude_deg = 0.0;  // degrees, north and east are positive
+  double altitude = 0.0;                           // m above the ellipsoid
+  Vector3 velocity{};                              // m/s, to the east, to the north, upwards
+};
+
+struct Magnetometer : Sample {
+  Vector3 field{};  // T, in the device's frame
+};
+
+struct Altimeter : Sample {
+  double altitude = 0.0;  // m above where the device was at the start
+  double velocity = 0.0;  // m/s, upwards
+};
+
+struct AirPressure : Sample {
+  double pressure = 0.0;  // Pa
+};
+
+// A Pitot tube along the device's x axis.
+struct AirSpeed : Sample {
+  double differential_pressure = 0.0;  // Pa, total less static; negative: from behind
+  double temperature = 0.0;            // K, of the air
+};
+
+// In a joint: what the child puts on the parent, unless the world file says otherwise.
+struct ForceTorque : Sample {
+  Vector3 force{};   // N
+  Vector3 torque{};  // N m, about the joint's origin
 };
 
 struct ContactPoint {

@@ -190,9 +190,6 @@ Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
   }
   joint.X_MJ = frames.pose(required_name(element), element);
 
-  if (const Element* sensor = element.child("sensor")) {
-    context.findings.unsupported(sensor->source, where, "sensors on joints are not supported");
-  }
   const bool needs_axis = joint.type == JointType::revolute ||
                           joint.type == JointType::continuous ||
                           joint.type == JointType::prismatic || joint.type == JointType::screw;

@@ -53,6 +53,7 @@ void append_nested(const Nested& nested, const Pose& X_MN, Model& into, Findings
   for (SensorDescription sensor : from.sensors) {
     sensor.name = prefix + sensor.name;
     sensor.link += first_link;
+    if (sensor.joint >= 0) sensor.joint += first_joint;
     into.sensors.push_back(std::move(sensor));
   }
   into.commanded |= from.commanded;
@@ -85,6 +86,23 @@ void bring_to_front(int canonical, ScopedModel& scope, Model& model) {
   for (Joint& joint : model.joints) moved(joint.parent), moved(joint.child);
   for (SensorDescription& sensor : model.sensors) moved(sensor.link);
   for (auto& [name, frame] : scope.frames) moved(frame.link);
+}
+
+// A sensor of a joint sits on the joint's child.
+SensorDescription joint_sensor(const Element& element, const Joint& joint, const Pose& X_MS,
+                               const Model& model) {
+  const Pose& X_ML = model.links[static_cast<size_t>(joint.child)].X_ML;
+  SensorDescription sensor = read_sensor(element, joint.child, X_ML.inverse() * X_MS);
+  sensor.joint = static_cast<int>(&joint - model.joints.data());
+  return sensor;
+}
+
+// Without a frame of its own its <pose> is in the joint's.
+void read_joint_sensor(const Element& element, FrameGraph& frames, Model& model) {
+  const Joint& joint = model.joints.back();
+  const std::string frame = relative_to(element);
+  const Pose X_MF = frame.empty() ? joint.X_MJ : frames.pose(frame, element);
+  model.sensors.push_back(joint_sensor(element, joint, X_MF * element.pose("pose"), model));
 }
 
 }  // namespace
@@ -243,19 +261,12 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
       }
     }
   }
-  for (const Element* plugin : element.all("plugin")) {
-    read_or_leave_out(where, "the sensor is left out", context_.findings, [&] {
-      const PluginSensor made = sensor_from_plugin(*plugin);
-      if (!made.sensor) return;
-      const int link = made.link.empty() ? 0 : frames.link(made.link, *plugin);
-      if (link < 0) plugin->fail("'" + made.link + "' is no link");
-      model->sensors.push_back(read_sensor(*made.sensor, link, {}));
-    });
-  }
   if (all_static) model->is_static = true;
 
   read_joints(element, version, frames, left_out, parts_missing, where, *model);
   if (!model->is_static) model->joints.insert(model->joints.end(), anchors.begin(), anchors.end());
+
+  read_plugin_sensors(element, frames, where, *model);
 
   // Every name's pose and link, for whoever nests or places this model.
   for (const std::string& name : frames.names()) {
@@ -291,6 +302,28 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
   return scope;
 }
 
+void SdfReader::read_plugin_sensors(const Element& element, FrameGraph& frames,
+                                    const std::string& where, Model& model) {
+  for (const Element* plugin : element.all("plugin")) {
+    read_or_leave_out(where, "the sensor is left out", context_.findings, [&] {
+      const PluginSensor made = sensor_from_plugin(*plugin, where, context_.findings);
+      if (!made.sensor) return;
+      const Pose pose = made.sensor->pose("pose");
+      if (made.joint.empty()) {
+        const int link = made.link.empty() ? 0 : frames.link(made.link, *plugin);
+        if (link < 0) plugin->fail("'" + made.link + "' is no link");
+        model.sensors.push_back(read_sensor(*made.sensor, link, pose));
+        return;
+      }
+      const auto joint =
+          std::find_if(model.joints.begin(), model.joints.end(),
+                       [&](const Joint& each) { return each.name == dotted(made.joint); });
+      if (joint == model.joints.end()) plugin->fail("'" + made.joint + "' is no joint");
+      model.sensors.push_back(joint_sensor(*made.sensor, *joint, joint->X_MJ * pose, model));
+    });
+  }
+}
+
 void SdfReader::read_joints(const Element& element, SdfVersion version, FrameGraph& frames,
                             const std::set<const Element*>& left_out, bool parts_missing,
                             const std::string& where, Model& model) {
@@ -311,7 +344,14 @@ void SdfReader::read_joints(const Element& element, SdfVersion version, FrameGra
     const bool read = read_or_leave_out(here, "the joint is left out", context_.findings, [&] {
       model.joints.push_back(read_joint(*child, version, frames, model.links, here, context_));
     });
-    if (!read) frames.drop(name);
+    if (!read) {
+      frames.drop(name);
+      continue;
+    }
+    for (const Element* sensor : child->all("sensor")) {
+      read_or_leave_out(here, "the sensor is left out", context_.findings,
+                        [&] { read_joint_sensor(*sensor, frames, model); });
+    }
   }
   for (const auto& child : element.children) {
     if (child->name != "joint") continue;

@@ -1,4 +1,4 @@
-// Plugins of Gazebo Classic that make a sensor without a <sensor>: the <sensor> that says the same.
+// Plugins that make a sensor without a <sensor>: the <sensor> that says the same.
 #pragma once
 
 #include <memory>
@@ -11,8 +11,11 @@ namespace ruedo::model {
 struct PluginSensor {
   std::unique_ptr<Element> sensor;  // null: the plugin makes none that there is here
   std::string link;                 // whose it is; "": the model's first
+  std::string joint;                // of a sensor in a joint, instead
 };
 
-PluginSensor sensor_from_plugin(const Element& plugin);
+// What of the plugin has no effect goes to `findings`.
+PluginSensor sensor_from_plugin(const Element& plugin, const std::string& where,
+                                Findings& findings);
 
 }  // namespace ruedo::model

@@ -139,6 +139,7 @@ struct Converter {
   Findings& findings;
   const urdf::ModelInterface& urdf;
   std::map<std::string, GazeboLink> gazebo;
+  std::map<std::string, std::vector<const Element*>> joint_sensors = {};
   std::unique_ptr<Element> model = std::make_unique<Element>();
 
   void read_gazebo() {
@@ -184,7 +185,12 @@ struct Converter {
                                    "\"> is not supported and left out");
         };
         if (!urdf.getLink(*reference)) {
-          if (urdf.getJoint(*reference)) leave_out();
+          if (urdf.getJoint(*reference)) {
+            if (name == "sensor")
+              joint_sensors[*reference].push_back(child.get());
+            else
+              leave_out();
+          }
           continue;
         }
         GazeboLink& link = gazebo[*reference];
@@ -324,6 +330,8 @@ struct Converter {
     joint.attributes.emplace_back("type", type->second);
     add(joint, "parent", source, from->parent_link_name);
     add(joint, "child", source, from->child_link_name);
+    for (const Element* sensor : joint_sensors[from->name])
+      joint.children.push_back(sensor->clone());
     if (from->type == urdf::Joint::FIXED) return;
     Element& axis = add(joint, "axis", source);
     add(axis, "xyz", source, numbers({from->axis.x, from->axis.y, from->axis.z}));

@@ -9,14 +9,20 @@
 #include <map>
 
 #include "ros2/pictures.h"
+#include "ruedo/air_pressure_t.hpp"
+#include "ruedo/air_speed_t.hpp"
+#include "ruedo/altimeter_t.hpp"
 #include "ruedo/camera_info_t.hpp"
 #include "ruedo/contact_t.hpp"
 #include "ruedo/decode.h"
+#include "ruedo/force_torque_t.hpp"
 #include "ruedo/image_t.hpp"
 #include "ruedo/imu_t.hpp"
 #include "ruedo/joint_state_t.hpp"
 #include "ruedo/lidar_t.hpp"
+#include "ruedo/magnetometer_t.hpp"
 #include "ruedo/math.h"
+#include "ruedo/navsat_t.hpp"
 #include "ruedo/odometry_t.hpp"
 #include "ruedo/planar_lidar_t.hpp"
 #include "ruedo/pose.h"
@@ -200,6 +206,57 @@ void write_imu(const imu_t& imu, const Source& from, CdrWriter& out) {
   put_zeros<9>(out);
 }
 
+void write_fix(const navsat_t& navsat, const Source& from, CdrWriter& out) {
+  constexpr int8_t kFix = 0;
+  constexpr uint16_t kGps = 1;
+  constexpr uint8_t kCovarianceUnknown = 0;
+  put_header(out, navsat.utime, from.frame);
+  out.put(kFix).put(kGps);
+  out.put(navsat.latitude_deg).put(navsat.longitude_deg).put(navsat.altitude);
+  put_zeros<9>(out);
+  out.put(kCovarianceUnknown);
+}
+
+// To the east, the north and upwards, as drivers of receivers have it.
+void write_fix_velocity(const navsat_t& navsat, const Source& from, CdrWriter& out) {
+  put_header(out, navsat.utime, from.frame);
+  put_vector(out, navsat.velocity);
+  put_vector(out, 0.0, 0.0, 0.0);
+}
+
+void write_magnetic_field(const magnetometer_t& magnetometer, const Source& from, CdrWriter& out) {
+  put_header(out, magnetometer.utime, from.frame);
+  put_vector(out, magnetometer.field);
+  put_zeros<9>(out);
+}
+
+void write_wrench(const force_torque_t& sensor, const Source& from, CdrWriter& out) {
+  put_header(out, sensor.utime, from.frame);
+  put_vector(out, sensor.force);
+  put_vector(out, sensor.torque);
+}
+
+void write_altimeter(const altimeter_t& altimeter, const Source& from, CdrWriter& out) {
+  put_header(out, altimeter.utime, from.frame);
+  out.put(altimeter.altitude).put(altimeter.velocity).put(0.0);
+}
+
+void write_pressure(const air_pressure_t& air, const Source& from, CdrWriter& out) {
+  put_header(out, air.utime, from.frame);
+  out.put(air.pressure).put(0.0);
+}
+
+void write_differential_pressure(const air_speed_t& air, const Source& from, CdrWriter& out) {
+  put_header(out, air.utime, from.frame);
+  out.put(air.differential_pressure).put(0.0);
+}
+
+void write_air_temperature(const air_speed_t& air, const Source& from, CdrWriter& out) {
+  constexpr double kZeroCelsius = 273.15;
+  put_header(out, air.utime, from.frame);
+  out.put(air.temperature - kZeroCelsius).put(0.0);
+}
+
 void write_ground_truth(const pose_t& pose, const Source& from, CdrWriter& out) {
   put_header(out, pose.utime, from.world);
   out.put(from.base);
@@ -210,6 +267,16 @@ void write_ground_truth(const pose_t& pose, const Source& from, CdrWriter& out) 
   put_vector(out, pose.rotation_rate);
   put_zeros<36>(out);
 }
+
+// Of a plugin's device: the frame is its own.
+void write_device_pose(const pose_t& pose, const Source& from, CdrWriter& out) {
+  Source device = from;
+  device.base = from.frame;
+  write_ground_truth(pose, device, out);
+}
+
+bool is_own_pose(const Source& from) { return from.device.kind == "pose"; }
+bool is_device_pose(const Source& from) { return !is_own_pose(from); }
 
 void write_image(const image_t& image, const Source& from, CdrWriter& out) {
   const RawPicture raw = raw_picture(image);
@@ -326,8 +393,23 @@ RUEDO_ROWS(odometry_t,
 RUEDO_ROWS(joint_state_t, {"joint_states", "sensor_msgs/msg/JointState", kStateQos, write_joints,
                            nullptr, nullptr, Scope::robot})
 RUEDO_ROWS(imu_t, {"imu", "sensor_msgs/msg/Imu", kSensorQos, write_imu})
-RUEDO_ROWS(pose_t, {"ground_truth", "nav_msgs/msg/Odometry", kStateQos, write_ground_truth, nullptr,
-                    nullptr, Scope::robot})
+RUEDO_ROWS(navsat_t, {"fix", "sensor_msgs/msg/NavSatFix", kSensorQos, write_fix},
+           {"fix_velocity", "geometry_msgs/msg/TwistStamped", kSensorQos, write_fix_velocity})
+RUEDO_ROWS(magnetometer_t,
+           {"magnetic_field", "sensor_msgs/msg/MagneticField", kSensorQos, write_magnetic_field})
+RUEDO_ROWS(force_torque_t, {"wrench", "geometry_msgs/msg/WrenchStamped", kSensorQos, write_wrench})
+RUEDO_ROWS(altimeter_t,
+           {"altimeter", "ros_gz_interfaces/msg/Altimeter", kSensorQos, write_altimeter})
+RUEDO_ROWS(air_pressure_t,
+           {"pressure", "sensor_msgs/msg/FluidPressure", kSensorQos, write_pressure})
+RUEDO_ROWS(air_speed_t,
+           {"differential_pressure", "sensor_msgs/msg/FluidPressure", kSensorQos,
+            write_differential_pressure},
+           {"air_temperature", "sensor_msgs/msg/Temperature", kSensorQos, write_air_temperature})
+RUEDO_ROWS(pose_t,
+           {"ground_truth", "nav_msgs/msg/Odometry", kStateQos, write_ground_truth, is_own_pose,
+            nullptr, Scope::robot},
+           {"pose", "nav_msgs/msg/Odometry", kStateQos, write_device_pose, is_device_pose})
 RUEDO_ROWS(image_t, {"image_raw", "sensor_msgs/msg/Image", kSensorQos, write_image, is_colour},
            {"image_raw/compressed", "sensor_msgs/msg/CompressedImage", kSensorQos, write_compressed,
             is_colour},
@@ -444,7 +526,8 @@ void with_type(const std::string& type, const Visit& visit) {
      ...);
   };
   match.template operator()<planar_lidar_t, lidar_t, sonar_t, odometry_t, joint_state_t, imu_t,
-                            pose_t, image_t, camera_info_t, contact_t>();
+                            pose_t, image_t, camera_info_t, contact_t, navsat_t, magnetometer_t,
+                            altimeter_t, air_pressure_t, air_speed_t, force_torque_t>();
 }
 
 }  // namespace

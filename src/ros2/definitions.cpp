@@ -31,6 +31,7 @@ constexpr Definition kDefinitions[] = {
     {"geometry_msgs/msg/TwistWithCovariance", "Twist twist\nfloat64[36] covariance\n"},
     {"geometry_msgs/msg/Accel", "Vector3 linear\nVector3 angular\n"},
     {"geometry_msgs/msg/Wrench", "Vector3 force\nVector3 torque\n"},
+    {"geometry_msgs/msg/WrenchStamped", "std_msgs/Header header\nWrench wrench\n"},
     {"geometry_msgs/msg/Transform", "Vector3 translation\nQuaternion rotation\n"},
     {"geometry_msgs/msg/TransformStamped",
      "std_msgs/Header header\nstring child_frame_id\nTransform transform\n"},
@@ -75,11 +76,25 @@ constexpr Definition kDefinitions[] = {
      "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] "
      "d\nfloat64[9] k\nfloat64[9] r\n"
      "float64[12] p\nuint32 binning_x\nuint32 binning_y\nRegionOfInterest roi\n"},
+    {"sensor_msgs/msg/NavSatStatus", "int8 status\nuint16 service\n"},
+    {"sensor_msgs/msg/NavSatFix",
+     "std_msgs/Header header\nNavSatStatus status\nfloat64 latitude\nfloat64 longitude\nfloat64 "
+     "altitude\nfloat64[9] position_covariance\nuint8 position_covariance_type\n"},
+    {"sensor_msgs/msg/MagneticField",
+     "std_msgs/Header header\ngeometry_msgs/Vector3 magnetic_field\nfloat64[9] "
+     "magnetic_field_covariance\n"},
+    {"sensor_msgs/msg/FluidPressure",
+     "std_msgs/Header header\nfloat64 fluid_pressure\nfloat64 variance\n"},
+    {"sensor_msgs/msg/Temperature",
+     "std_msgs/Header header\nfloat64 temperature\nfloat64 variance\n"},
     {"trajectory_msgs/msg/JointTrajectoryPoint",
      "float64[] positions\nfloat64[] velocities\nfloat64[] accelerations\nfloat64[] "
      "effort\nbuiltin_interfaces/Duration time_from_start\n"},
     {"trajectory_msgs/msg/JointTrajectory",
      "std_msgs/Header header\nstring[] joint_names\nJointTrajectoryPoint[] points\n"},
+    {"ros_gz_interfaces/msg/Altimeter",
+     "std_msgs/Header header\nfloat64 vertical_position\nfloat64 vertical_velocity\nfloat64 "
+     "vertical_reference\n"},
     {"ros_gz_interfaces/msg/Entity", "uint64 id\nstring name\nuint8 type\n"},
     {"ros_gz_interfaces/msg/JointWrench",
      "std_msgs/Header header\nstd_msgs/String body_1_name\nstd_msgs/UInt32 "

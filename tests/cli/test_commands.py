@@ -174,7 +174,7 @@ def test_check_finds_all_with_lines(tmp_path):
     <include><uri>model://p3at</uri></include>
     <model name="m"><link name="l">
       <sensor name="s1" type="lidar"><lidar><scan><horizontal><samples>-1</samples></horizontal></scan></lidar></sensor>
-      <sensor name="s2" type="air_pressure"/>
+      <sensor name="s2" type="dvl"/>
     </link></model>
   </world>
 </sdf>

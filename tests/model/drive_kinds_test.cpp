@@ -211,11 +211,11 @@ TEST(DrivePlugins, AreKnownByTheirLibraryOrTheirClass) {
 TEST(DrivePlugins, OfWhichNothingComesAreNamedWithWhatTheyWouldDo) {
   const auto world = world_of(
       "<model name='m'><link name='l'/><plugin name='a' "
-      "filename='libhector_gazebo_ros_gps.so'/><plugin name='b' filename='libRayPlugin.so'/>"
+      "filename='libWindPlugin.so'/><plugin name='b' filename='libRayPlugin.so'/>"
       "<plugin name='c' filename='libgazebo_ros_p3d.so'/><plugin name='d' "
       "filename='libmine.so'/></model>");
-  EXPECT_THAT(texts(*world), ElementsAre("the plugin hector_gazebo_ros_gps does nothing here: it "
-                                         "would make satellite navigation without a <sensor>",
+  EXPECT_THAT(texts(*world), ElementsAre("the plugin WindPlugin does nothing here: the wind would "
+                                         "push what is loose",
                                          "plugins are not loaded: libmine.so"));
 }
 

@@ -87,11 +87,7 @@ INSTANTIATE_TEST_SUITE_P(
             "<collide_without_contact> is not supported: the shape collides as others do"},
         Part{"SecondDrive",
              "<model name='n'>" + driven() + "</model><model name='k'>" + driven() + "</model>",
-             "a second drive, of the nested model 'k', is not supported: its wheels turn freely"},
-        Part{"SensorOnAJoint",
-             "<joint name='j' type='fixed'><parent>a</parent><child>b</child><sensor name='s' "
-             "type='force_torque'/></joint>",
-             "sensors on joints are not supported"}),
+             "a second drive, of the nested model 'k', is not supported: its wheels turn freely"}),
     [](const auto& info) { return std::string(info.param.name); });
 
 TEST(Mimic, UrdfAndSdfSayWhoLeads) {

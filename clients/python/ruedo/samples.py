@@ -299,6 +299,54 @@ class Imu(Sample):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class NavSat(Sample):
+    """Satellite navigation (GPS)."""
+
+    latitude_deg: float  # degrees, north is positive
+    longitude_deg: float  # degrees, east is positive
+    altitude: float  # m above the ellipsoid
+    velocity: Floats  # (3,) m/s, to the east, to the north, upwards
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Magnetometer(Sample):
+    """The magnetic field, in the device's frame."""
+
+    field: Floats  # (3,) T
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Altimeter(Sample):
+    """Height above where the device was at the start."""
+
+    altitude: float  # m
+    velocity: float  # m/s, upwards
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AirPressure(Sample):
+    """A barometer."""
+
+    pressure: float  # Pa
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AirSpeed(Sample):
+    """A Pitot tube along the device's x axis."""
+
+    differential_pressure: float  # Pa, total less static; negative: from behind
+    temperature: float  # K, of the air
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ForceTorque(Sample):
+    """In a joint: what the child puts on the parent, unless the world file says otherwise."""
+
+    force: Floats  # (3,) N
+    torque: Floats  # (3,) N m, about the joint's origin
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class ContactPoint(_Value):
     body: str  # the other body
     position: Floats  # (3,) m, world
@@ -426,6 +474,30 @@ def _imu(m: Any) -> Imu:
     )
 
 
+def _navsat(m: Any) -> NavSat:
+    return NavSat(m.utime, m.latitude_deg, m.longitude_deg, m.altitude, _floats(m.velocity))
+
+
+def _magnetometer(m: Any) -> Magnetometer:
+    return Magnetometer(m.utime, _floats(m.field))
+
+
+def _altimeter(m: Any) -> Altimeter:
+    return Altimeter(m.utime, m.altitude, m.velocity)
+
+
+def _air_pressure(m: Any) -> AirPressure:
+    return AirPressure(m.utime, m.pressure)
+
+
+def _air_speed(m: Any) -> AirSpeed:
+    return AirSpeed(m.utime, m.differential_pressure, m.temperature)
+
+
+def _force_torque(m: Any) -> ForceTorque:
+    return ForceTorque(m.utime, _floats(m.force), _floats(m.torque))
+
+
 def _contact(m: Any) -> Contact:
     if m.n < 0:  # lcm-gen's Python reads none then
         raise ValueError(f"a length of {m.n}")
@@ -473,4 +545,10 @@ CONVERSIONS: dict[str, tuple[Any, Callable[[Any], Any]]] = {
     "contact_t": (lcmtypes.contact_t, _contact),
     "joint_state_t": (lcmtypes.joint_state_t, _joints),
     "motion_status_t": (lcmtypes.motion_status_t, _motion),
+    "navsat_t": (lcmtypes.navsat_t, _navsat),
+    "magnetometer_t": (lcmtypes.magnetometer_t, _magnetometer),
+    "altimeter_t": (lcmtypes.altimeter_t, _altimeter),
+    "air_pressure_t": (lcmtypes.air_pressure_t, _air_pressure),
+    "air_speed_t": (lcmtypes.air_speed_t, _air_speed),
+    "force_torque_t": (lcmtypes.force_torque_t, _force_torque),
 }

@@ -20,12 +20,17 @@ const kWorld = {
   devices: [
     { robot: "a", name: "bumper" },
     { robot: "b", name: "bumper" },
+    { robot: "b", name: "pose", kind: "pose" },
+    { robot: "b", name: "p3d", kind: "body_pose" },
+    { robot: "b", name: "gps", kind: "navsat" },
   ],
   channels: [
     channel("ruedo/tick", "tick_t"),
     channel("a/pose", "pose_t", "a", "pose"),
     channel("b/pose", "pose_t", "b", "pose"),
     channel("b/bumper", "contact_t", "b", "bumper"),
+    channel("b/p3d", "pose_t", "b", "p3d"),
+    channel("b/gps", "navsat_t", "b", "gps"),
     channel("a/odd", "pose_t", "a", "odd", 7n),
     channel("renamed", "odometry_t", "b", "odometry"),
   ],
@@ -86,6 +91,8 @@ describe("routes", () => {
       "a/pose",
       "b/pose",
       "b/bumper",
+      "b/p3d",
+      "b/gps",
       "renamed",
     ]);
   });
@@ -102,6 +109,18 @@ describe("a message", () => {
       "channels.message",
       "overlay b.pose",
       "pages.pose",
+    ]);
+  });
+
+  it("of a device that the page does not know is shown as values, and is no robot's pose", () => {
+    const { router, called } = made();
+    router.onMessage("b/p3d", kPose);
+    const velocity = new Float64Array(3);
+    const place = { utime: 1n, latitude_deg: 47, longitude_deg: 8, altitude: 400, velocity };
+    router.onMessage("b/gps", encode("navsat_t", place));
+    expect(called.filter((call) => !call.startsWith("channels"))).toEqual([
+      "pages.other",
+      "pages.other",
     ]);
   });
 

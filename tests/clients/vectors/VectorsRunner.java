@@ -70,6 +70,22 @@ public final class VectorsRunner {
             row("orientation", (Object) s.orientation);
             row("angular_velocity", (Object) s.angularVelocity);
             row("linear_acceleration", (Object) s.linearAcceleration);
+        } else if (sample instanceof NavSat) {
+            NavSat s = (NavSat) sample;
+            row("place", s.latitudeDeg, s.longitudeDeg, s.altitude);
+            row("velocity", (Object) s.velocity);
+        } else if (sample instanceof Magnetometer) {
+            row("field", (Object) ((Magnetometer) sample).field);
+        } else if (sample instanceof Altimeter) {
+            row("altitude", ((Altimeter) sample).altitude, ((Altimeter) sample).velocity);
+        } else if (sample instanceof AirPressure) {
+            row("pressure", ((AirPressure) sample).pressure);
+        } else if (sample instanceof AirSpeed) {
+            AirSpeed s = (AirSpeed) sample;
+            row("air", s.differentialPressure, s.temperature);
+        } else if (sample instanceof ForceTorque) {
+            row("force", (Object) ((ForceTorque) sample).force);
+            row("torque", (Object) ((ForceTorque) sample).torque);
         } else if (sample instanceof Contact) {
             Contact s = (Contact) sample;
             row("pressed", s.pressed);

@@ -71,6 +71,38 @@ CASES = [
         "utime 4|orientation 1.000000 0.000000 0.000000 0.000000|angular_velocity 0.500000 0.250000 0.125000|linear_acceleration 0.000000 0.000000 9.750000",
     ),
     (
+        "navsat_t",
+        dict(
+            utime=9,
+            latitude_deg=-33.5,
+            longitude_deg=151.25,
+            altitude=20.5,
+            velocity=[1.0, -2.0, 0.5],
+        ),
+        "utime 9|place -33.500000 151.250000 20.500000|velocity 1.000000 -2.000000 0.500000",
+    ),
+    (
+        "magnetometer_t",
+        dict(utime=10, field=[0.25, -0.5, 0.125]),
+        "utime 10|field 0.250000 -0.500000 0.125000",
+    ),
+    (
+        "altimeter_t",
+        dict(utime=11, altitude=-1.5, velocity=0.25),
+        "utime 11|altitude -1.500000 0.250000",
+    ),
+    ("air_pressure_t", dict(utime=12, pressure=101325.0), "utime 12|pressure 101325.000000"),
+    (
+        "air_speed_t",
+        dict(utime=13, differential_pressure=-61.25, temperature=288.15),
+        "utime 13|air -61.250000 288.150000",
+    ),
+    (
+        "force_torque_t",
+        dict(utime=14, force=[1.0, -2.0, 29.5], torque=[0.25, 0.0, -0.5]),
+        "utime 14|force 1.000000 -2.000000 29.500000|torque 0.250000 0.000000 -0.500000",
+    ),
+    (
         "contact_t",
         dict(
             utime=5,

@@ -69,6 +69,20 @@ void mean(const std::string& type, const Sample& sample) {
     row("orientation", imu->orientation);
     row("angular_velocity", imu->angular_velocity);
     row("linear_acceleration", imu->linear_acceleration);
+  } else if (const auto* navsat = as<NavSat>(type, sample)) {
+    row("place", std::vector{navsat->latitude_deg, navsat->longitude_deg, navsat->altitude});
+    row("velocity", navsat->velocity);
+  } else if (const auto* magnetometer = as<Magnetometer>(type, sample)) {
+    row("field", magnetometer->field);
+  } else if (const auto* altimeter = as<Altimeter>(type, sample)) {
+    row("altitude", std::vector{altimeter->altitude, altimeter->velocity});
+  } else if (const auto* air = as<AirPressure>(type, sample)) {
+    row("pressure", std::vector{air->pressure});
+  } else if (const auto* pitot = as<AirSpeed>(type, sample)) {
+    row("air", std::vector{pitot->differential_pressure, pitot->temperature});
+  } else if (const auto* wrench = as<ForceTorque>(type, sample)) {
+    row("force", wrench->force);
+    row("torque", wrench->torque);
   } else if (const auto* contact = as<Contact>(type, sample)) {
     row("pressed", std::vector{int64_t{contact->pressed}});
     for (const ContactPoint& p : contact->points) {

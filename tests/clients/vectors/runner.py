@@ -47,6 +47,20 @@ def meaning(type, s):
     elif type == "imu_t":
         for name in ("orientation", "angular_velocity", "linear_acceleration"):
             yield row(name, floats(getattr(s, name)))
+    elif type == "navsat_t":
+        yield row("place", [s.latitude_deg, s.longitude_deg, s.altitude])
+        yield row("velocity", floats(s.velocity))
+    elif type == "magnetometer_t":
+        yield row("field", floats(s.field))
+    elif type == "altimeter_t":
+        yield row("altitude", [s.altitude, s.velocity])
+    elif type == "air_pressure_t":
+        yield row("pressure", [s.pressure])
+    elif type == "air_speed_t":
+        yield row("air", [s.differential_pressure, s.temperature])
+    elif type == "force_torque_t":
+        yield row("force", floats(s.force))
+        yield row("torque", floats(s.torque))
     elif type == "contact_t":
         yield row("pressed", [s.pressed])
         for p in s.points:

@@ -1,12 +1,18 @@
 package ruedo;
 
+import ruedo.lcmtypes.air_pressure_t;
+import ruedo.lcmtypes.air_speed_t;
+import ruedo.lcmtypes.altimeter_t;
 import ruedo.lcmtypes.camera_info_t;
 import ruedo.lcmtypes.contact_t;
+import ruedo.lcmtypes.force_torque_t;
 import ruedo.lcmtypes.image_t;
 import ruedo.lcmtypes.imu_t;
 import ruedo.lcmtypes.joint_state_t;
 import ruedo.lcmtypes.lidar_t;
+import ruedo.lcmtypes.magnetometer_t;
 import ruedo.lcmtypes.motion_status_t;
+import ruedo.lcmtypes.navsat_t;
 import ruedo.lcmtypes.odometry_t;
 import ruedo.lcmtypes.planar_lidar_t;
 import ruedo.lcmtypes.pose_t;
@@ -64,7 +70,28 @@ final class Conversions {
                             new Conversion(joint_state_t.LCM_FINGERPRINT, Conversions::joints)),
                     Map.entry(
                             "motion_status_t",
-                            new Conversion(motion_status_t.LCM_FINGERPRINT, Conversions::motion)));
+                            new Conversion(motion_status_t.LCM_FINGERPRINT, Conversions::motion)),
+                    Map.entry(
+                            "navsat_t",
+                            new Conversion(navsat_t.LCM_FINGERPRINT, Conversions::navSat)),
+                    Map.entry(
+                            "magnetometer_t",
+                            new Conversion(
+                                    magnetometer_t.LCM_FINGERPRINT, Conversions::magnetometer)),
+                    Map.entry(
+                            "altimeter_t",
+                            new Conversion(altimeter_t.LCM_FINGERPRINT, Conversions::altimeter)),
+                    Map.entry(
+                            "air_pressure_t",
+                            new Conversion(
+                                    air_pressure_t.LCM_FINGERPRINT, Conversions::airPressure)),
+                    Map.entry(
+                            "air_speed_t",
+                            new Conversion(air_speed_t.LCM_FINGERPRINT, Conversions::airSpeed)),
+                    Map.entry(
+                            "force_torque_t",
+                            new Conversion(
+                                    force_torque_t.LCM_FINGERPRINT, Conversions::forceTorque)));
 
     private static final String[] KINDS = {"none", "advance", "rotate", "heading", "arc", "stop"};
     private static final String[] STATES = {"idle", "running", "done", "ended", "refused"};
@@ -194,6 +221,31 @@ final class Conversions {
 
     private static Sample imu(WireReader in) throws IOException {
         return new Imu(in.int64(), in.doubles(4), in.doubles(3), in.doubles(3));
+    }
+
+    private static Sample navSat(WireReader in) throws IOException {
+        return new NavSat(
+                in.int64(), in.float64(), in.float64(), in.float64(), in.doubles(3));
+    }
+
+    private static Sample magnetometer(WireReader in) throws IOException {
+        return new Magnetometer(in.int64(), in.doubles(3));
+    }
+
+    private static Sample altimeter(WireReader in) throws IOException {
+        return new Altimeter(in.int64(), in.float64(), in.float64());
+    }
+
+    private static Sample airPressure(WireReader in) throws IOException {
+        return new AirPressure(in.int64(), in.float64());
+    }
+
+    private static Sample airSpeed(WireReader in) throws IOException {
+        return new AirSpeed(in.int64(), in.float64(), in.float64());
+    }
+
+    private static Sample forceTorque(WireReader in) throws IOException {
+        return new ForceTorque(in.int64(), in.doubles(3), in.doubles(3));
     }
 
     private static Sample contact(WireReader in) throws IOException {

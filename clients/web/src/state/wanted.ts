@@ -3,21 +3,12 @@ import type { Layer } from "../scene/layers";
 import { shownRobots, type PageState, type Tab } from "./page";
 
 const kOfPage = ["world_state_t", "tick_t", "reply_t"];
-const kOfTab: Record<Tab, string[]> = {
-  Robot: [
-    "pose_t",
-    "odometry_t",
-    "motion_status_t",
-    "planar_lidar_t",
-    "sonar_t",
-    "image_t",
-    "imu_t",
-    "contact_t",
-  ],
+const kOfTab: Record<Exclude<Tab, "Robot">, string[]> = {
   Plots: ["pose_t", "odometry_t"],
   Channels: [],
   World: [],
 };
+const kNotOnRobotPage = ["lidar_t", "camera_info_t", "joint_state_t"]; // it shows all others
 const kOfLayer: Partial<Record<Layer, string>> = {
   rays: "planar_lidar_t",
   points: "planar_lidar_t",
@@ -25,6 +16,9 @@ const kOfLayer: Partial<Record<Layer, string>> = {
   trail: "pose_t",
   contacts: "contact_t",
 };
+
+const onTab = (tab: Tab, type: string) =>
+  tab === "Robot" ? !kNotOnRobotPage.includes(type) : kOfTab[tab].includes(type);
 
 // complete: the world and its scene are there; until then messages of the run mean nothing.
 export function wantedChannels(
@@ -52,7 +46,7 @@ export function wantedChannels(
       if (type === "reply_t" || (complete && kOfPage.includes(type))) wanted.add(name);
     } else if (
       complete &&
-      ((shown.has(of) && drawn.has(type)) || (of === chosen && panel && kOfTab[tab].includes(type)))
+      ((shown.has(of) && drawn.has(type)) || (of === chosen && panel && onTab(tab, type)))
     ) {
       wanted.add(name);
     }

@@ -12,6 +12,7 @@ import {
   type robot_info_t,
   type sonar_t,
 } from "../../generated/messages";
+import { textOf } from "./channels";
 import { h, say } from "./dom";
 import { inWorld, type Heading } from "./odometry";
 import { PolarPlot, TimePlot } from "./plots";
@@ -316,6 +317,16 @@ export class RobotPages {
     this.fact(
       device.name,
       `${[...m.linear_acceleration].map((v) => v.toFixed(2)).join(", ")} m/s²`,
+    );
+  }
+  // Of a device that the page does not know: its members by name.
+  other(device: device_info_t, m: object): void {
+    const shown = (value: unknown) =>
+      typeof value === "number" ? String(Number(value.toPrecision(9))) : textOf(value, 1);
+    const members = Object.entries(m).filter(([name]) => name !== "utime" && name !== "n");
+    this.fact(
+      device.name,
+      members.map(([name, value]) => `${name.replaceAll("_", " ")} ${shown(value)}`).join(" · "),
     );
   }
   contact(device: device_info_t, m: contact_t): void {

@@ -119,6 +119,7 @@ export class Router {
       }
       case "pose_t": {
         const m = read(type);
+        if (device && device.kind !== "pose") return pages?.other(device, m);
         overlay?.pose(m);
         pages?.pose(m);
         return;
@@ -149,7 +150,7 @@ export class Router {
         pages?.camera(channel.slice(channel.indexOf("/") + 1), read(type));
         return;
       default:
-        return;
+        if (device) pages?.other(device, read(type));
     }
   }
 }

@@ -1,0 +1,65 @@
+// A Pitot tube: the differential pressure rho v |v| / 2 of the air that comes along the device's x
+// axis at v, and the temperature of the air, on ROBOT/AIRSPEED. Density and temperature are those
+// of the standard atmosphere at its height (air.h). The air moves with the
+// world's <wind>, the same everywhere.
+#include <cmath>
+
+#include "ruedo/air_speed_t.hpp"
+#include "sensors/air.h"
+#include "sensors/mount.h"
+
+namespace ruedo {
+namespace {
+
+// gz-sim reads <pressure>, SDF's page has <airspeed>.
+std::array<std::string, 1> noise_path(const SensorSetup& setup) {
+  const bool older = setup.element.has("air_speed/airspeed/noise") &&
+                     !setup.element.has("air_speed/pressure/noise");
+  return {older ? "air_speed/airspeed/noise" : "air_speed/pressure/noise"};
+}
+
+class AirSpeed : public Sensor {
+ public:
+  explicit AirSpeed(const SensorSetup& setup)
+      : environment_(setup.world.environment),
+        mount_(setup),
+        noises_(setup, noise_path(setup)),
+        channel_(setup.channel<air_speed_t>()) {
+    setup.element.refuse_unknown({"ruedo:phase"});
+    name_what_does_not_act(setup, setup.element.child("air_speed"), {"pressure", "airspeed"});
+  }
+
+  void sample(const SampleInput& input, Outbox& out) override {
+    const Pose X_WS = mount_.pose(input.snapshot);
+    const Air air = air_at(environment_, environment_.elevation + X_WS.translation.z());
+    const Vec3 ahead = X_WS.rotation * Vec3::UnitX();
+    const double v = (mount_.twist(input.snapshot).linear - environment_.wind).dot(ahead);
+    air_speed_t message;
+    message.utime = input.snapshot.time;
+    message.differential_pressure =
+        noises_.apply({0.5 * air.density * v * std::abs(v)}, input.snapshot.time, input.sample)[0];
+    message.temperature = air.temperature;
+    out.publish(channel_, message);
+  }
+
+  void shift_time(SimTime us) override { noises_.shift_time(us); }
+
+ private:
+  const model::Environment& environment_;
+  Mount mount_;
+  Noises<1> noises_;
+  int channel_;
+};
+
+const RegisterSensor kRegister{
+    {.module = "instruments",
+     .order = 7,
+     .types = {"air_speed"},
+     .attach_to = "",
+     .device_name = "",
+     .default_rate = {20, 1},
+     .make = [](const SensorSetup& setup) { return std::make_unique<AirSpeed>(setup); },
+     .kind = "air_speed"}};
+
+}  // namespace
+}  // namespace ruedo

@@ -1,0 +1,259 @@
+// A force-torque sensor in a joint of any kind, on ROBOT/SENSOR.
+//
+// Newton and Euler for what the joint carries: of the links beyond it, sum m (a - g) less the
+// forces of their contacts is what the parent puts on the child, and the sum of their moments about
+// the joint's origin its torque; forces in joints among them cancel. Accelerations are the changes
+// of velocities over the last step, contacts (normal force and friction along the surface, not the
+// friction of turning and rolling) the mean over it: so is the value. Where something holds the
+// child that tells no force - the world, a path, the kinematic drive - the parent's side is weighed
+// instead; where that is held as well, or the joint is part of a loop, there is no value.
+#include <algorithm>
+
+#include "model/body_layout.h"
+#include "ruedo/force_torque_t.hpp"
+#include "sensors/mount.h"
+
+namespace ruedo {
+namespace {
+
+using model::DriveDescription;
+using model::Joint;
+
+std::array<std::string, 6> noise_paths() {
+  std::array<std::string, 6> paths;
+  for (size_t i = 0; i < 6; ++i) {
+    paths[i] =
+        std::string("force_torque/") + (i < 3 ? "force/" : "torque/") + "xyz"[i % 3] + "/noise";
+  }
+  return paths;
+}
+
+// The links of a model that hang together when one joint is cut.
+std::vector<bool> side(const model::Model& model, int link, int cut) {
+  std::vector<bool> in(model.links.size(), false);
+  in[static_cast<size_t>(link)] = true;
+  for (bool grown = true; grown;) {
+    grown = false;
+    for (size_t j = 0; j < model.joints.size(); ++j) {
+      const Joint& joint = model.joints[j];
+      if (static_cast<int>(j) == cut || joint.parent < 0) continue;
+      const size_t a = static_cast<size_t>(joint.parent), b = static_cast<size_t>(joint.child);
+      if (in[a] == in[b]) continue;
+      in[a] = in[b] = grown = true;
+    }
+  }
+  return in;
+}
+
+class ForceTorque : public Sensor {
+ public:
+  explicit ForceTorque(const SensorSetup& setup)
+      : layout_(setup.layout),
+        gravity_(setup.world.gravity),
+        noises_(setup, noise_paths()),
+        channel_(setup.channel<force_torque_t>()) {
+    setup.element.refuse_unknown({"ruedo:phase"});
+    const Element* own = setup.element.child("force_torque");
+    name_what_does_not_act(setup, own, {"frame", "measure_direction", "force", "torque"});
+    frame_ = setup.element.choice("force_torque/frame", "child", {"child", "parent", "sensor"});
+    by_parent_ = setup.element.choice("force_torque/measure_direction", "child_to_parent",
+                                      {"child_to_parent", "parent_to_child"}) == "parent_to_child";
+    instance_ = layout_.links[static_cast<size_t>(setup.link)].instance;
+    model_ = setup.world.models[static_cast<size_t>(instance_)].model.get();
+    find_joint(setup);
+    choose_side(setup);
+  }
+
+  bool observes() const override { return !weighed_.empty(); }
+
+  void observe(const Snapshot& now, Outbox&) override {
+    const bool first = omega_.empty();
+    const double dt_s = 1e-6 * static_cast<double>(now.time - time_);
+    omega_.resize(now.bodies.size(), Vec3::Zero());
+    alpha_.resize(now.bodies.size(), Vec3::Zero());
+    for (const int body : bodies_) {
+      const size_t b = static_cast<size_t>(body);
+      const Vec3& omega = now.body_twists[b].angular;
+      alpha_[b] = first || dt_s <= 0.0 ? Vec3(Vec3::Zero()) : Vec3((omega - omega_[b]) / dt_s);
+      omega_[b] = omega;
+    }
+    time_ = now.time;
+  }
+
+  void sample(const SampleInput& input, Outbox& out) override {
+    if (weighed_.empty()) return;
+    const Snapshot& now = input.snapshot;
+    const Pose X_WC = link_pose(now, child_);
+    const Vec3 p_WJ = X_WC * p_CJ_;
+    Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  // on the weighed side, world
+    for (const int link : weighed_) weigh(now, link, p_WJ, force, torque);
+    for (const Contact& contact : now.contacts) take_contact(contact, p_WJ, force, torque);
+    // So far what the other side puts on this one.
+    if (weighs_child_ != by_parent_) force = -force, torque = -torque;
+    const Quat R_FW = axes(now, X_WC).conjugate();
+    force = R_FW * force;
+    torque = R_FW * torque;
+    const auto m =
+        noises_.apply({force.x(), force.y(), force.z(), torque.x(), torque.y(), torque.z()},
+                      now.time, input.sample);
+    force_torque_t message;
+    message.utime = now.time;
+    std::copy(m.begin(), m.begin() + 3, message.force);
+    std::copy(m.begin() + 3, m.end(), message.torque);
+    out.publish(channel_, message);
+  }
+
+  void shift_time(SimTime us) override {
+    noises_.shift_time(us);
+    time_ -= us;
+  }
+
+ private:
+  void find_joint(const SensorSetup& setup) {
+    for (const model::SensorDescription& sensor : model_->sensors) {
+      if (sensor.name == setup.device) joint_ = sensor.joint;
+    }
+    if (joint_ < 0) {  // on a link: in the joint that carries the link
+      const int link = layout_.links[static_cast<size_t>(setup.link)].link;
+      for (size_t j = 0; j < model_->joints.size() && joint_ < 0; ++j) {
+        if (model_->joints[j].child == link) joint_ = static_cast<int>(j);
+      }
+    }
+    if (joint_ < 0)
+      setup.element.fail("a force-torque sensor stands in a <joint>, or on a joint's child");
+  }
+
+  int layout_link(int link) const {
+    return layout_.first_link[static_cast<size_t>(instance_)] + link;
+  }
+
+  // Held by what tells no force.
+  bool held(const std::vector<bool>& in, int cut) const {
+    for (size_t j = 0; j < model_->joints.size(); ++j) {
+      const Joint& joint = model_->joints[j];
+      if (static_cast<int>(j) != cut && joint.parent < 0 && in[static_cast<size_t>(joint.child)])
+        return true;
+    }
+    const bool driven = model_->drive && model_->drive->kind == DriveDescription::Kind::kinematic;
+    const DriveDescription* drive = driven ? &*model_->drive : nullptr;
+    const bool wheelless = drive && drive->left_joints.empty() && drive->right_joints.empty();
+    for (size_t i = 0; i < in.size(); ++i) {
+      const model::LinkPlacement& link =
+          layout_.links[static_cast<size_t>(layout_link(static_cast<int>(i)))];
+      if (!in[i]) continue;
+      if (model_->is_static || model_->links[i].kinematic) return true;
+      if (driven && (link.wheel >= 0 || (wheelless && i == 0))) return true;
+    }
+    return false;
+  }
+
+  void choose_side(const SensorSetup& setup) {
+    const Joint& joint = model_->joints[static_cast<size_t>(joint_)];
+    child_ = layout_link(joint.child);
+    parent_ = joint.parent < 0 ? -1 : layout_link(joint.parent);
+    const Pose& X_MC = model_->links[static_cast<size_t>(joint.child)].X_ML;
+    p_CJ_ = (X_MC.inverse() * joint.X_MJ).translation;
+    X_CS_ = setup.X_LS;
+    const std::vector<bool> with_child = side(*model_, joint.child, joint_);
+    const bool loop = joint.parent >= 0 && with_child[static_cast<size_t>(joint.parent)];
+    if (!loop && !held(with_child, joint_)) {
+      take_side(with_child, true);
+    } else if (!loop && joint.parent >= 0) {
+      const std::vector<bool> with_parent = side(*model_, joint.parent, joint_);
+      if (!held(with_parent, joint_)) take_side(with_parent, false);
+    }
+    if (weighed_.empty() && setup.findings) {
+      setup.findings->unsupported(
+          setup.element.source, "sensor " + setup.device,
+          loop ? "its joint is part of a loop of joints: it has no value"
+               : "both sides of its joint are held by what tells no force: it has no value");
+    }
+  }
+
+  void take_side(const std::vector<bool>& in, bool child) {
+    weighs_child_ = child;
+    for (size_t i = 0; i < in.size(); ++i) {
+      if (!in[i]) continue;
+      weighed_.push_back(layout_link(static_cast<int>(i)));
+      const int body = layout_.links[static_cast<size_t>(weighed_.back())].body;
+      if (body >= 0 && std::find(bodies_.begin(), bodies_.end(), body) == bodies_.end())
+        bodies_.push_back(body);
+    }
+  }
+
+  Pose link_pose(const Snapshot& now, int link) const {
+    const model::LinkPlacement& placement = layout_.links[static_cast<size_t>(link)];
+    if (placement.body < 0) return placement.X_BL;
+    return now.bodies[static_cast<size_t>(placement.body)] *
+           layout_.link_in_body(link, now.wheel_angles);
+  }
+
+  Quat axes(const Snapshot& now, const Pose& X_WC) const {
+    if (frame_ == "sensor") return X_WC.rotation * X_CS_.rotation;
+    if (frame_ == "child") return X_WC.rotation;
+    return parent_ < 0 ? Quat::Identity() : link_pose(now, parent_).rotation;
+  }
+
+  // Adds what moves a link as it moves, against gravity.
+  void weigh(const Snapshot& now, int link, const Vec3& p_WJ, Vec3& force, Vec3& torque) const {
+    const model::LinkPlacement& placement = layout_.links[static_cast<size_t>(link)];
+    const model::Link& described = model_->links[static_cast<size_t>(placement.link)];
+    const Pose X_WI = link_pose(now, link) * described.inertial.X_LI;
+    Vec3 a = Vec3::Zero(), omega = Vec3::Zero(), alpha = Vec3::Zero();
+    if (placement.body >= 0) {  // else it is fixed to the world
+      const size_t body = static_cast<size_t>(placement.body);
+      const Vec3 arm = X_WI.translation - now.bodies[body].translation;
+      omega = omega_[body];
+      alpha = alpha_[body];
+      a = now.body_accelerations[body] + alpha.cross(arm) + omega.cross(omega.cross(arm));
+    }
+    if (described.gravity) a -= gravity_;
+    const Vec3 f = described.inertial.mass * a;
+    const Eigen::Matrix3d R = X_WI.rotation.toRotationMatrix();
+    const Eigen::Matrix3d inertia = R * described.inertial.inertia * R.transpose();
+    force += f;
+    torque += (X_WI.translation - p_WJ).cross(f) + inertia * alpha + omega.cross(inertia * omega);
+  }
+
+  // Takes off what contacts put on the weighed links.
+  void take_contact(const Contact& contact, const Vec3& p_WJ, Vec3& force, Vec3& torque) const {
+    const Vec3 on_a = contact.force * contact.normal + contact.friction;
+    for (const int link : weighed_) {
+      const double sign = (contact.link_a == link) - (contact.link_b == link);
+      if (sign == 0.0) continue;
+      force -= sign * on_a;
+      torque -= (contact.position - p_WJ).cross(sign * on_a);
+    }
+  }
+
+  const model::BodyLayout& layout_;
+  const model::Model* model_ = nullptr;
+  Vec3 gravity_;
+  Noises<6> noises_;
+  int channel_;
+  std::string frame_;
+  bool by_parent_ = false;
+  int instance_ = -1;
+  int joint_ = -1;                // into Model::joints
+  int child_ = -1, parent_ = -1;  // into BodyLayout::links; -1: the world
+  Vec3 p_CJ_ = Vec3::Zero();      // the joint's origin in the child
+  Pose X_CS_;
+  bool weighs_child_ = true;
+  std::vector<int> weighed_;         // into BodyLayout::links; empty: there is no value
+  std::vector<int> bodies_;          // theirs
+  std::vector<Vec3> omega_, alpha_;  // of bodies, world
+  SimTime time_ = 0;
+};
+
+const RegisterSensor kRegister{
+    {.module = "instruments",
+     .order = 7,
+     .types = {"force_torque"},
+     .attach_to = "",
+     .device_name = "",
+     .default_rate = {100, 1},
+     .make = [](const SensorSetup& setup) { return std::make_unique<ForceTorque>(setup); },
+     .kind = "force_torque"}};
+
+}  // namespace
+}  // namespace ruedo

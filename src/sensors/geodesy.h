@@ -1,0 +1,42 @@
+// Between the world's frame and places on an ellipsoid, by way of earth-centred, earth-fixed
+// coordinates (ECEF); no flat-earth approximation.
+//
+// Geodetic to ECEF is the closed form; back by Bowring's iteration for the parametric latitude
+// ("Transformation from spatial to geographical coordinates", Survey Review 23 (1976) 323), to
+// rounding.
+#pragma once
+
+#include "model/world_model.h"
+
+namespace ruedo {
+
+struct Geodetic {
+  double latitude = 0.0, longitude = 0.0;  // rad
+  double altitude = 0.0;                   // m above the ellipsoid
+};
+
+// East, north and up of a place, as the columns of the rotation to ECEF.
+Eigen::Matrix3d east_north_up(double latitude, double longitude);
+
+class Globe {
+ public:
+  explicit Globe(const model::Environment& environment);
+
+  Vec3 to_ecef(const Geodetic& place) const;
+  Geodetic from_ecef(const Vec3& p) const;
+
+  Geodetic geodetic(const Vec3& p_W) const;  // of a point of the world
+  // A vector of the world in the east, north and up of a place.
+  Vec3 east_north_up_at(const Geodetic& place, const Vec3& v_W) const;
+  // The reverse, in the world's axes.
+  Vec3 in_world(const Vec3& v_ecef) const { return R_EW_.transpose() * v_ecef; }
+  Vec3 in_ecef(const Vec3& v_W) const { return R_EW_ * v_W; }
+  Vec3 to_ecef(const Vec3& p_W) const { return origin_ + R_EW_ * p_W; }
+
+ private:
+  double a_, b_, e2_;  // m, m, first eccentricity squared
+  Vec3 origin_;        // ECEF
+  Eigen::Matrix3d R_EW_;
+};
+
+}  // namespace ruedo

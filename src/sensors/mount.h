@@ -1,0 +1,71 @@
+// Where a device is and how it moves, from a snapshot. On a wheel it turns with the wheel.
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "ruedo/sensor.h"
+#include "sensors/noise.h"
+
+namespace ruedo {
+
+class Mount {
+ public:
+  explicit Mount(const SensorSetup& setup);
+
+  int body() const { return body_; }       // into BodyLayout::bodies; -1: does not move
+  Pose start() const;                      // X_WS of the world's first state
+  Pose pose(const Snapshot& now) const;    // X_WS
+  Twist twist(const Snapshot& now) const;  // of S's origin, in the world's axes
+
+ private:
+  const model::BodyLayout& layout_;
+  int link_;
+  int body_;
+  Pose X_LS_;
+};
+
+// The noises of a device: read in one order, drawn in that order from the device's own numbers.
+template <size_t count>
+class Noises {
+ public:
+  // Where each is in the sensor's element: "altimeter/vertical_position/noise"; several may name
+  // the same.
+  Noises(const SensorSetup& setup, const std::array<std::string, count>& paths)
+      : random_(setup.random) {
+    RandomStream constants = random_.stream(kConstantDraws);
+    for (size_t i = 0; i < count; ++i) {
+      const Noise read(setup.element.child(paths[i]));
+      if (setup.noise) noises_[i] = read;
+      noises_[i].draw_bias(constants);
+    }
+  }
+
+  // The measured values of a sample at that time.
+  std::array<double, count> apply(const std::array<double, count>& ideal, SimTime time,
+                                  int64_t sample) {
+    const double dt_s = sampled_ ? 1e-6 * static_cast<double>(time - time_) : 0.0;
+    sampled_ = true;
+    time_ = time;
+    RandomStream stream = random_.stream(static_cast<uint64_t>(sample));
+    std::array<double, count> measured;
+    for (size_t i = 0; i < count; ++i) measured[i] = noises_[i].apply(ideal[i], dt_s, stream);
+    return measured;
+  }
+
+  void shift_time(SimTime us) { time_ -= us; }
+  const Noise& operator[](size_t i) const { return noises_[i]; }
+
+ private:
+  RandomSource random_;
+  std::array<Noise, count> noises_;
+  SimTime time_ = 0;
+  bool sampled_ = false;
+};
+
+// Of a <sensor>'s own element (<navsat>, <altimeter>): children that are not in `read` are named as
+// without effect.
+void name_what_does_not_act(const SensorSetup& setup, const Element* element,
+                            const std::vector<std::string>& read);
+
+}  // namespace ruedo
