@@ -28,6 +28,16 @@ constexpr double kContactReach_m = 0.02;
 // place.
 constexpr int kMostPairs = 200'000;
 
+// Bullet's pools, of pairs and of their contacts, are 8 MB for 4096 of each, written when they are
+// made: of a small world that is most of what making it costs. What goes beyond them is allocated.
+btDefaultCollisionConstructionInfo pools_for(size_t bodies) {
+  constexpr size_t kPairsOfABody = 8, kLeast = 16, kMost = 4096;
+  btDefaultCollisionConstructionInfo info;
+  info.m_defaultMaxPersistentManifoldPoolSize = info.m_defaultMaxCollisionAlgorithmPoolSize =
+      static_cast<int>(std::min(kLeast + kPairsOfABody * bodies, kMost));
+  return info;
+}
+
 }  // namespace
 
 bool MayTouch::may_touch(const btCollisionObject& object_a,
@@ -50,6 +60,7 @@ PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout
       layout_(layout),
       step_us_(world.step_us),
       ground_(btRigidBody::btRigidBodyConstructionInfo(0.0, nullptr, nullptr)),
+      configuration_(pools_for(layout.bodies.size())),
       dispatcher_(&configuration_),
       broadphase_(filter_),
       dynamics_(dispatcher_, broadphase_, configuration_, surfaces_,

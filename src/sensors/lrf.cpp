@@ -218,6 +218,13 @@ class Lrf : public Sensor {
     Pose X_WS = mount_.X_WS(now);
     Eigen::Matrix3d R_WS = X_WS.rotation.toRotationMatrix();
     if (bearing_noise_ > 0.0) stream.gaussians(draws_);
+    if (sweep_us_ == 0 && bearing_noise_ == 0.0) {
+      for (size_t i = 0; i < rays_.size(); ++i) {
+        rays_[i].origin = X_WS.translation;
+        rays_[i].direction = R_WS * directions_[i];
+      }
+      return;
+    }
     for (size_t i = 0; i < rays_.size(); ++i) {
       const auto column = static_cast<int64_t>(i) % columns_.count,
                  layer = static_cast<int64_t>(i) / columns_.count;
