@@ -1,6 +1,8 @@
 """Lockstep over the wire: steps a second, one step to a round trip, from Python.
 
-bench_lockstep.py WORLD [STEPS] [ROUNDS]      starts a server of its own; prints each round and the median
+bench_lockstep.py WORLD [STEPS] [ROUNDS]
+
+Starts a server of its own; prints each round and the median.
 """
 
 import statistics

@@ -1,6 +1,9 @@
-"""Lockstep from Python with many robots of 24 beams: robot-decisions a second at 10 Hz, over each transport in turn.
+"""Lockstep from Python with many robots of 24 beams: robot-decisions a second at 10 Hz, over each
+transport in turn.
 
-bench_lockstep_fleet.py [DECISIONS] [ROUNDS] [ROBOTS,...]      starts servers of its own; prints the median of each
+bench_lockstep_fleet.py [DECISIONS] [ROUNDS] [ROBOTS,...]
+
+Starts servers of its own; prints the median of each.
 """
 
 import statistics

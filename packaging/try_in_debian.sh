@@ -53,6 +53,7 @@ for suite in "$@"; do
   cp "$folder/inside.sh" "$root/inside.sh"
   chroot "$root" id user >/dev/null 2>&1 || chroot "$root" useradd --create-home user
   # A network of its own with nothing in it but the loopback interface; /proc for the program's way to its own files.
+  # shellcheck disable=SC2016  # the inner shell expands $0
   unshare --net --mount bash -c 'ip link set lo up; mount -t proc proc "$0/proc"
     exec chroot --userspec=user:user "$0" env -i HOME=/home/user PATH=/usr/bin:/bin LANG=C.UTF-8 bash /inside.sh' "$root"
   echo "$suite: all of it works"

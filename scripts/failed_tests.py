@@ -1,4 +1,6 @@
-"""failed_tests.py REPORT: the failed tests of a JUnit report by ctest, each with the end of its output."""
+"""failed_tests.py REPORT: the failed tests of a JUnit report by ctest, each with the end of its
+output.
+"""
 
 import sys
 from xml.etree import ElementTree

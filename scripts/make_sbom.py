@@ -1,4 +1,6 @@
-"""make_sbom.py WHEEL OUT: what is inside of Ruedo's wheel, as SPDX 2.3 in JSON: each package that a file of it came from, with its version."""
+"""make_sbom.py WHEEL OUT: what is inside of Ruedo's wheel, as SPDX 2.3 in JSON: each package that a
+file of it came from, with its version.
+"""
 
 import hashlib
 import json
@@ -53,7 +55,7 @@ def main(wheel: Path, out: Path) -> None:
         for name in sorted(inside)
     ]
     created = time.strftime(
-        "%Y-%m-%dT%H:%M:%SZ", time.gmtime(int(os.environ.get("SOURCE_DATE_EPOCH", 0)))
+        "%Y-%m-%dT%H:%M:%SZ", time.gmtime(int(os.environ.get("SOURCE_DATE_EPOCH", "0")))
     )
     document = {
         "spdxVersion": "SPDX-2.3",

@@ -1,9 +1,11 @@
 """Makes the wheel that has everything inside, from a build: make_wheel.py BUILD OUT [COMPRESSION].
 
-The package `ruedo` is the prefix of an installation (bin, lib, include, share) and the Python client at once, so that the program,
-importer, worlds, C++ package and jar are found by the paths between them. auditwheel copies the shared libraries that a bare
-Debian 12 does not have into ruedo.libs. The module that runs a world in a Python process is there for the build's own Python and, where the
-headers of 3.12 or newer are given, in the stable ABI for all from 3.12 on. Twice the same build gives twice the same bytes.
+The package `ruedo` is the prefix of an installation (bin, lib, include, share) and the Python
+client at once, so that the program, importer, worlds, C++ package and jar are found by the paths
+between them. auditwheel copies the shared libraries that a bare Debian 12 does not have into
+ruedo.libs. The module that runs a world in a Python process is there for the build's own Python
+and, where the headers of 3.12 or newer are given, in the stable ABI for all from 3.12 on. Twice the
+same build gives twice the same bytes.
 """
 
 import base64
@@ -19,7 +21,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PLATFORM = f"manylinux_2_36_{os.uname().machine}"  # Debian 12's C library
-# What Debian's libraries are linked to and nothing here calls, by the library that is: each some 10 MB.
+# What Debian's libraries are linked to and nothing here calls, by the library that is: each some 10
+# MB.
 UNUSED = {
     "libLLVM": ["libz3", "libxml2", "libedit"],
     "libopencv_imgcodecs": ["libgdal", "libgdcm"],
@@ -46,7 +49,9 @@ def run(*command: object, **options) -> str:
 
 
 def symbols(library: Path, which: str) -> set[str]:
-    """Of the dynamic symbols, --defined-only or --undefined-only, each with its version: "xmlFree@LIBXML2_2.4.30"."""
+    """Of the dynamic symbols, --defined-only or --undefined-only, each with its version:
+    "xmlFree@LIBXML2_2.4.30".
+    """
     return {
         line.split()[-1].replace("@@", "@") for line in run("nm", "-D", which, library).splitlines()
     }
@@ -104,8 +109,8 @@ def stub_unused(program: Path, folder: Path) -> None:
 
 
 def add_licences(tree: Path) -> None:
-    """Of what the wheel brings along, as Debian's packages have them: shared libraries (auditwheel puts a hash into their names,
-    we "-ruedo"), musl, LCM."""
+    """Of what the wheel brings along, as Debian's packages have them: shared libraries (auditwheel
+    puts a hash into their names, we "-ruedo"), musl, LCM."""
     folder = next(tree.glob("*.dist-info")) / "licenses"
     folder.mkdir(exist_ok=True)
     libraries = [

@@ -1,7 +1,8 @@
 """The walls between the layers; run by pytest.
 
-The layers and what each may use are read from the ruedo_layer() lines of the top CMakeLists.txt, so that there is one list.
-Libraries that live in one layer alone are listed below. The rule is also run on small trees that break it.
+The layers and what each may use are read from the ruedo_layer() lines of the top CMakeLists.txt, so
+that there is one list. Libraries that live in one layer alone are listed below. The rule is also
+run on small trees that break it.
 """
 
 import os
@@ -27,7 +28,9 @@ LIBRARIES = {
 
 
 def layers(root):
-    """{layer: the layers it may include, itself among them}, from CMakeLists.txt; the command line may include all."""
+    """{layer: the layers it may include, itself among them}, from CMakeLists.txt; the command line
+    may include all.
+    """
     text = (root / "CMakeLists.txt").read_text(encoding="utf-8")
     found = {}
     for name, links in re.findall(r"^\s*ruedo_layer\((\w+)([^)]*)\)", text, re.MULTILINE):
@@ -93,7 +96,9 @@ def argument(text, begin):
 
 
 def without_calls(text):
-    """The expression, without what goes into functions that give something else: the size of a list, an element of it."""
+    """The expression, without what goes into functions that give something else: the size of a
+    list, an element of it.
+    """
     call = re.compile(r"[\w.:>-]*(?:<\w+>)?\((?:[^()]|\([^()]*\))*\)")
     return call.sub(
         lambda match: match.group(0) if FLOATING.search(match.group(0).split("(")[0]) else "f", text
@@ -101,7 +106,9 @@ def without_calls(text):
 
 
 def bare_conversions(root):
-    """Casts of floating-point numbers to whole ones: undefined for what does not fit, which core/whole.h refuses."""
+    """Casts of floating-point numbers to whole ones: undefined for what does not fit, which
+    core/whole.h refuses.
+    """
     problems = []
     for path in sorted(
         p

@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""Makes worlds for those who have none: a corridor with rooms, a maze, a warehouse, a hill, a football field, a crossing.
+"""Makes worlds for those who have none: a corridor with rooms, a maze, a warehouse, a hill, a
+football field, a crossing.
 
     worlds/make_worlds.py [FOLDER]
 
-Writes NAME.sdf (and terrain/hill.png) into FOLDER, this one where none is given. All is made of boxes, cylinders, spheres and one
-height map; places that look drawn by chance come from a generator with a fixed seed. Measures are ours.
+Writes NAME.sdf (and terrain/hill.png) into FOLDER, this one where none is given. All is made of
+boxes, cylinders, spheres and one height map; places that look drawn by chance come from a generator
+with a fixed seed. Measures are ours.
 """
 
 import math
@@ -125,7 +127,9 @@ def moving(waypoints):
 
 
 def rooms():
-    """A corridor of 16 m with four rooms on each side, their doors 1 m wide, and a door at the end that opens and closes."""
+    """A corridor of 16 m with four rooms on each side, their doors 1 m wide, and a door at the end
+    that opens and closes.
+    """
     parts = (
         wall("south", 0, -5, 16, -5)
         + wall("north", 0, 5, 16, 5)
@@ -169,7 +173,9 @@ def rooms():
 
 
 def maze():
-    """A maze of 8 x 8 cells of 1.5 m with one way between any two of them: the P3-AT starts in a corner, the goal is the red disc."""
+    """A maze of 8 x 8 cells of 1.5 m with one way between any two of them: the P3-AT starts in a
+    corner, the goal is the red disc.
+    """
     cells, pitch = 8, 1.5
     draw = random.Random(3)
     open_walls, known, stack = set(), {(0, 0)}, [(0, 0)]
@@ -214,7 +220,9 @@ def maze():
 
 
 def warehouse():
-    """A hall of 24 x 16 m with four rows of racks, pallets that can be pushed, and two carts that go round."""
+    """A hall of 24 x 16 m with four rows of racks, pallets that can be pushed, and two carts that
+    go round.
+    """
     parts = wall("south", -12, -8, 12, -8, height=2.5) + wall("north", -12, 8, 12, 8, height=2.5)
     parts += wall("west", -12, -8, -12, 8, height=2.5) + wall("east", 12, -8, 12, 8, height=2.5)
     content = include("p3dx", (-10.5, 0, 0, 0, 0, 0)) + model("walls", parts)
@@ -421,7 +429,9 @@ def field():
 
 
 def crossing():
-    """A crossing of two roads with pavements, eight people who walk to and fro over it, and a car to drive through."""
+    """A crossing of two roads with pavements, eight people who walk to and fro over it, and a car
+    to drive through.
+    """
     ground = seen("asphalt_x", (0, 0, 0.001, 0, 0, 0), box(40, 7, 0.002), DARK) + seen(
         "asphalt_y", (0, 0, 0.001, 0, 0, 0), box(7, 40, 0.002), DARK
     )

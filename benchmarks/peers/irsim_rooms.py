@@ -8,9 +8,8 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 
 import irsim
 import numpy as np
-import yaml
-
 import rooms as bench
+import yaml
 
 STEP_S = 0.1
 

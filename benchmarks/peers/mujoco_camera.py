@@ -9,7 +9,6 @@ import os
 os.environ.setdefault("MUJOCO_GL", "osmesa")
 
 import mujoco
-
 import rooms as bench
 
 

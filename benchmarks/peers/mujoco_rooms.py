@@ -1,10 +1,9 @@
-"""MuJoCo on the benchmark's map: free bodies on a plane whose velocity is imposed, LRFs by mj_multiRay."""
-
-import math
+"""MuJoCo on the benchmark's map: free bodies on a plane whose velocity is imposed, LRFs by
+mj_multiRay.
+"""
 
 import mujoco
 import numpy as np
-
 import rooms as bench
 
 STEP_S = 0.005

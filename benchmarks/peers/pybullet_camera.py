@@ -1,9 +1,10 @@
-"""PyBullet's pictures of the benchmark's walls, 640 x 480, by its TinyRenderer: frames per second."""
+"""PyBullet's pictures of the benchmark's walls, 640 x 480, by its TinyRenderer: frames per
+second.
+"""
 
 import math
 
 import pybullet as p
-
 import rooms as bench
 
 

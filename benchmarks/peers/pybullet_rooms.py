@@ -1,9 +1,10 @@
-"""PyBullet on the benchmark's map: boxes on a plane whose velocity is imposed, LRFs by rayTestBatch."""
+"""PyBullet on the benchmark's map: boxes on a plane whose velocity is imposed, LRFs by
+rayTestBatch.
+"""
 
 import math
 
 import pybullet as p
-
 import rooms as bench
 
 STEP_S = 1.0 / 240.0

@@ -67,7 +67,9 @@ def ray_angles() -> list[float]:
 
 
 def main(simulator: str, step_s: float, run) -> None:
-    """Times `run(rooms, sim_seconds)`, which returns a function that advances by that long, and prints a JSON row."""
+    """Times `run(rooms, sim_seconds)`, which returns a function that advances by that long, and
+    prints a JSON row.
+    """
     parser = argparse.ArgumentParser(description=f"{simulator} on Ruedo's benchmark map")
     parser.add_argument("world", help="file written by ruedo bench --write-world")
     parser.add_argument(
@@ -100,7 +102,8 @@ def vertical_view_rad() -> float:
 
 
 def camera_main(simulator: str, prepare) -> None:
-    """Times pictures of the walls from the first robot's start, 10 degrees further each, and prints a JSON row.
+    """Times pictures of the walls from the first robot's start, 10 degrees further each, and prints
+    a JSON row.
 
     `prepare(walls, eye)` returns a function that draws the picture at a yaw in radians.
     """

@@ -6,8 +6,8 @@ import tempfile
 import time
 from pathlib import Path
 
-import ruedo
 import rows
+import ruedo
 from scenes import PLANE, Body, Scene, Shape
 from simulators import Simulator, sdf, with_friction
 
@@ -71,7 +71,9 @@ def falling() -> Scene:
 
 
 def cost(make, scene: Scene, joints: bool) -> float:
-    """ms of CPU time for a second of sim time: the least of several runs, from the same beginning."""
+    """ms of CPU time for a second of sim time: the least of several runs, from the same
+    beginning.
+    """
     best = float("inf")
     for _ in range(REPEATS):
         with make(scene, STEP_S) as sim:

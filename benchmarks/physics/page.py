@@ -1,4 +1,5 @@
-"""Writes docs/physics.md: every test of rows.py in Ruedo, MuJoCo and PyBullet, in one run, at several steps, with plots.
+"""Writes docs/physics.md: every test of rows.py in Ruedo, MuJoCo and PyBullet, in one run, at
+several steps, with plots.
 
 scripts/physics runs it.
 """

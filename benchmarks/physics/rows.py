@@ -1,16 +1,17 @@
-"""The tests: each sets a scene up, measures one number in any simulator, and knows what it should be."""
+"""The tests: each sets a scene up, measures one number in any simulator, and knows what it should
+be.
+"""
 
 from __future__ import annotations
 
 import math
 import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Callable
 
 import numpy as np
-
 from scenes import (
     BOUNCING_PLANE,
     GRAVITY,
@@ -153,7 +154,9 @@ def double_pendulum(make: Make, step_s: float, series: Series) -> float:
 
 
 def arm() -> str:
-    """Six links of 0.2 m and 1 kg, stretched out, 5 kg at the tip; every second joint turns about z."""
+    """Six links of 0.2 m and 1 kg, stretched out, 5 kg at the tip; every second joint turns about
+    z.
+    """
     chain = Chain()
     for i in range(6):
         chain.add(
@@ -180,7 +183,9 @@ def arm_creep(make: Make, step_s: float, series: Series) -> float:
 
 
 def arm_error(make: Make, step_s: float, series: Series) -> float:
-    """Told 0.2 rad everywhere, from stretched out: where its last joint is 4 s later, against the product of its rotations."""
+    """Told 0.2 rad everywhere, from stretched out: where its last joint is 4 s later, against the
+    product of its rotations.
+    """
     at, turned = np.array([0.0, 0.0, 1.0]), np.eye(3)
     c, s = math.cos(0.2), math.sin(0.2)
     about_y, about_z = (
@@ -350,7 +355,9 @@ def rolling(
 
 
 def skidding(left: float, right: float) -> Callable[[Make, float, Series], float]:
-    """How much wider its wheels' rates would have the track than it is, for the turn that the robot makes."""
+    """How much wider its wheels' rates would have the track than it is, for the turn that the robot
+    makes.
+    """
 
     def measure(make: Make, step_s: float, series: Series) -> float:
         half_base, half_track, radius = 0.1345, 0.197, 0.111

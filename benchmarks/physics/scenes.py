@@ -1,6 +1,8 @@
-"""What a test is made of, said once for all simulators: free bodies, things that never move, and mechanisms as URDF.
+"""What a test is made of, said once for all simulators: free bodies, things that never move, and
+mechanisms as URDF.
 
-Lengths in m, angles in rad, kg, s. Every mechanism is one URDF text, which all three simulators read themselves.
+Lengths in m, angles in rad, kg, s. Every mechanism is one URDF text, which all three simulators
+read themselves.
 """
 
 from __future__ import annotations
@@ -14,7 +16,9 @@ GRAVITY = 9.81
 
 @dataclass(frozen=True)
 class Shape:
-    """kind and size: box (x, y, z), sphere (radius), cylinder (radius, length along z), plane (), mesh ()."""
+    """kind and size: box (x, y, z), sphere (radius), cylinder (radius, length along z), plane (),
+    mesh ().
+    """
 
     kind: str
     size: tuple[float, ...] = ()
@@ -110,7 +114,9 @@ def skid_steered(
     body_kg: float,
     wheel_kg: float,
 ) -> str:
-    """A robot of four wheels as URDF; its first link, "base", has its origin on the ground, in the middle."""
+    """A robot of four wheels as URDF; its first link, "base", has its origin on the ground, in the
+    middle.
+    """
     side, axle = wheel_kg * (3 * radius**2 + width**2) / 12, wheel_kg * radius**2 / 2
     wheels = ""
     for name, x, y in (("fl", 1, 1), ("rl", -1, 1), ("fr", 1, -1), ("rr", -1, -1)):

@@ -1,15 +1,16 @@
-"""Ruedo, MuJoCo and PyBullet behind one small interface. Each has its defaults, but for what its class comment says."""
+"""Ruedo, MuJoCo and PyBullet behind one small interface. Each has its defaults, but for what its
+class comment says.
+"""
 
 from __future__ import annotations
 
 import importlib.util
 import math
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Sequence
 
 import numpy as np
-
 import ruedo
 from scenes import Body, Scene, Shape, quaternion
 
@@ -17,8 +18,8 @@ Vec = np.ndarray
 
 
 class Simulator:
-    """A scene at a step. Bodies are asked for by name, links of the mechanism, too; poses and velocities are those of the
-    centre of mass, or of the link's origin."""
+    """A scene at a step. Bodies are asked for by name, links of the mechanism, too; poses and
+    velocities are those of the centre of mass, or of the link's origin."""
 
     name = ""
 
@@ -60,7 +61,9 @@ def matrix(q: Sequence[float]) -> Vec:
 
 
 class Ruedo(Simulator):
-    """A server of its own, stepped while it is paused, or in lockstep where joints are told something."""
+    """A server of its own, stepped while it is paused, or in lockstep where joints are told
+    something.
+    """
 
     name = "Ruedo"
 
@@ -118,8 +121,9 @@ class Ruedo(Simulator):
 
 
 class MuJoCo(Simulator):
-    """implicitfast, its recommended integrator, and elliptic cones; the rest as it comes. Meshes are a height field, since it takes a mesh
-    for its convex hull. It has no coefficient of restitution."""
+    """implicitfast, its recommended integrator, and elliptic cones; the rest as it comes. Meshes
+    are a height field, since it takes a mesh for its convex hull. It has no coefficient of
+    restitution."""
 
     name = "MuJoCo"
 
@@ -255,8 +259,8 @@ class MuJoCo(Simulator):
 
 
 class PyBullet(Simulator):
-    """Bodies are multibodies, 50 iterations, as createMultiBody and loadURDF make them; damping of 0.04 that it gives every body is
-    taken away, and sleep stays off as it is."""
+    """Bodies are multibodies, 50 iterations, as createMultiBody and loadURDF make them; damping of
+    0.04 that it gives every body is taken away, and sleep stays off as it is."""
 
     name = "PyBullet"
 

@@ -1,9 +1,11 @@
-"""Generates the message types as the Python package ruedo.lcmtypes, with lcm-gen, from the .lcm files, and ruedo._version.
+"""Generates the message types as the Python package ruedo.lcmtypes, with lcm-gen, from the .lcm
+files, and ruedo._version.
 
     generate_types.py PROTO_FOLDER OUTPUT_FOLDER [--lcm-gen PROGRAM]
 
-They come out in OUTPUT_FOLDER/ruedo/lcmtypes; the version is that of the file VERSION beside PROTO_FOLDER. The types' package is `ruedo`, as the client's own; so that they
-do not meet, it is renamed on the way, which LCM's fingerprints do not depend on.
+They come out in OUTPUT_FOLDER/ruedo/lcmtypes; the version is that of the file VERSION beside
+PROTO_FOLDER. The types' package is `ruedo`, as the client's own; so that they do not meet, it is
+renamed on the way, which LCM's fingerprints do not depend on.
 """
 
 from __future__ import annotations

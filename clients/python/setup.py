@@ -1,4 +1,6 @@
-"""Adds the message types, generated from ../../proto, and the version to what is built. The rest is in pyproject.toml."""
+"""Adds the message types, generated from ../../proto, and the version to what is built. The rest is
+in pyproject.toml.
+"""
 
 import runpy
 import sys
@@ -12,7 +14,7 @@ HERE = Path(__file__).resolve().parent
 PROTO = HERE.parent.parent / "proto"
 sys.path.insert(0, str(HERE))
 
-from generate_types import generate, read_version  # noqa: E402
+from generate_types import generate, read_version
 
 
 class BuildWithTypes(build_py):

@@ -1,6 +1,8 @@
-"""Nav2 (or slam_toolbox with it) and rviz2 beside `ruedo run WORLD --ros2`, for Jazzy and Kilted, with Nav2's own parameters.
+"""Nav2 (or slam_toolbox with it) and rviz2 beside `ruedo run WORLD --ros2`, for Jazzy and Kilted,
+with Nav2's own parameters.
 
-    ros2 launch clients/ros2/ruedo_nav2.launch.py map:=arena.yaml          # ruedo map worlds/arena.sdf -o arena.yaml
+    # Ruedo map worlds/arena.sdf -o arena.yaml
+    ros2 launch clients/ros2/ruedo_nav2.launch.py map:=arena.yaml
     ros2 launch clients/ros2/ruedo_nav2.launch.py slam:=True
 
 Written from Nav2's documentation; nobody has run it with a real ROS 2 yet.
@@ -18,7 +20,8 @@ from nav2_common.launch import RewrittenYaml
 def generate_launch_description() -> LaunchDescription:
     bringup = FindPackageShare("nav2_bringup")
     defaults = PathJoinSubstitution([bringup, "params", "nav2_params.yaml"])
-    # A P3-AT is larger than the TurtleBot that Nav2's parameters are for; 0.22 is right for a TurtleBot.
+    # A P3-AT is larger than the TurtleBot that Nav2's parameters are for; 0.22 is right for a
+    # TurtleBot.
     parameters = RewrittenYaml(
         source_file=defaults,
         param_rewrites={"robot_radius": LaunchConfiguration("robot_radius")},

@@ -1,9 +1,12 @@
 #!/usr/bin/env python3
-"""The services of simulation_interfaces 1.x on any ROS 2 middleware: a node of rclpy over Ruedo's Python client.
+"""The services of simulation_interfaces 1.x on any ROS 2 middleware: a node of rclpy over Ruedo's
+Python client.
 
-    python3 simulation_node.py            # beside `ruedo run WORLD --ros2`, with LCM's address in LCM_DEFAULT_URL where it is not the default
+    python3 simulation_node.py
 
-It needs rclpy and simulation_interfaces of a ROS 2 installation, and the package `ruedo`. Nobody has run it with a real ROS 2 yet.
+beside `ruedo run WORLD --ros2`, with LCM's address in LCM_DEFAULT_URL where it is not the default.
+It needs rclpy and simulation_interfaces of a ROS 2 installation, and the package `ruedo`. Nobody
+has run it with a real ROS 2 yet.
 """
 
 from __future__ import annotations

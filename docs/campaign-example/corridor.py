@@ -1,9 +1,10 @@
-"""A hall with a robot in it, and a controller that drives to a goal, with three faults that hide well."""
+"""A hall with a robot in it, and a controller that drives to a goal, with three faults that hide
+well.
+"""
 
 import math
 
 import numpy as np
-
 from ruedo import World
 
 GOAL = (4.0, 0.0)

@@ -105,35 +105,43 @@ inline std::ostream& operator<<(std::ostream& out, MotionReason reason) {
 struct Error : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
+/// None answered, it fell silent or ended, or the Simulation was closed.
 struct NoServer : Error {
   using Error::Error;
-};  // none answered, it fell silent or ended, or the Simulation was closed
+};
+/// A private server could not be started.
 struct LaunchError : Error {
   using Error::Error;
-};  // a private server could not be started
+};
+/// The text lists the names that exist.
 struct UnknownName : Error {
   using Error::Error;
-};  // the text lists the names that exist
+};
 struct Timeout : Error {
   using Error::Error;
 };
+/// A channel carries another version of a type.
 struct TypeMismatch : Error {
   using Error::Error;
-};  // a channel carries another version of a type
+};
+/// The server or the robot cannot do that.
 struct NotSupported : Error {
   using Error::Error;
-};  // the server or the robot cannot do that
-struct MotionError : Error {  // a primitive ended early or was refused
+};
+/// A primitive ended early or was refused.
+struct MotionError : Error {
   MotionError(const std::string& text, MotionReason why) : Error(text), reason(why) {}
   MotionReason reason;
 };
-struct RequestError : Error {  // the server refused a request
+/// The server refused a request.
+struct RequestError : Error {
   RequestError(const std::string& text, ReplyCode reply_code) : Error(text), code(reply_code) {}
   ReplyCode code;
 };
-struct LeaseLost
-    : RequestError {  // lockstep goes on without this client, which was silent too long;
-  using RequestError::RequestError;  // the next step() takes part again
+/// Lockstep goes on without this client, which was silent too long; the next step() takes part
+/// again.
+struct LeaseLost : RequestError {
+  using RequestError::RequestError;
 };
 
 // ---- Samples.

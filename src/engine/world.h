@@ -53,9 +53,8 @@ class World {
   const Faults& faults() const { return faults_; }
   const physics::PhysicsWorld& physics() const { return *physics_; }
   robot::Robots& robots() { return *robots_; }
-  std::vector<std::unique_ptr<Module>>& modules() {
-    return modules_;
-  }                                  // in the order of the schedule
+  // In the order of the schedule.
+  std::vector<std::unique_ptr<Module>>& modules() { return modules_; }
   SceneMakers scene_makers() const;  // valid until a model comes or goes
 
   // ---- Changes between two steps, while no module is at work; in world_edits.cpp. When models

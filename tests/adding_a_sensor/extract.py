@@ -1,4 +1,5 @@
-# Takes the files of docs/adding-a-sensor.md out of the page: each code block that follows a "file:" comment.
+# Takes the files of docs/adding-a-sensor.md out of the page: each code block that follows a "file:"
+# comment.
 #   extract.py PAGE FOLDER
 import pathlib
 import re
@@ -7,7 +8,7 @@ import sys
 page, folder = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
 folder.mkdir(parents=True, exist_ok=True)
 files = re.findall(
-    r"<!-- file: (\S+) -->\n```\w*\n(.*?)```\n", page.read_text(encoding="utf-8"), re.S
+    r"<!-- file: (\S+) -->\n```\w*\n(.*?)```\n", page.read_text(encoding="utf-8"), re.DOTALL
 )
 if len(files) != 3:
     sys.exit(f"{page}: {len(files)} files instead of three")

@@ -1,4 +1,6 @@
-"""What the tests of campaigns share: a small campaign in a folder, and the program as its users start it."""
+"""What the tests of campaigns share: a small campaign in a folder, and the program as its users
+start it.
+"""
 
 from __future__ import annotations
 

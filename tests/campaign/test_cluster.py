@@ -1,4 +1,6 @@
-"""A Ray cluster of several nodes on this machine: the same table, with one node, with three, and with one of them killed."""
+"""A Ray cluster of several nodes on this machine: the same table, with one node, with three, and
+with one of them killed.
+"""
 
 import os
 import threading
@@ -10,7 +12,6 @@ from conftest import CAMPAIGN, CONTROLLER, PATIENCE, WORLD, ruedo, table
 os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 import ray
 from ray.cluster_utils import Cluster
-
 from ruedo.campaign import Campaign, CampaignError
 
 

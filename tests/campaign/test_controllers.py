@@ -1,11 +1,12 @@
-"""Controllers that hang, crash, eat memory, or end: one failed case each, with output and reason. Programs, too."""
+"""Controllers that hang, crash, eat memory, or end: one failed case each, with output and reason.
+Programs, too.
+"""
 
 import os
 import sys
 
 import pytest
 from conftest import ruedo
-
 from ruedo.campaign import Campaign
 
 BAD = '''

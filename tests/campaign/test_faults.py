@@ -1,12 +1,13 @@
-"""Faults as inputs of a run: what each does to what, in the world's file, as an option, and from a client; and they repeat."""
+"""Faults as inputs of a run: what each does to what, in the world's file, as an option, and from a
+client; and they repeat.
+"""
 
 import math
 import re
 
 import pytest
-from conftest import SOURCE, ruedo
-
 import ruedo as client
+from conftest import SOURCE, ruedo
 from ruedo import World
 from ruedo.lcmtypes import fault_t, odometry_t, planar_lidar_t, pose_t
 

@@ -1,4 +1,6 @@
-"""Hunts find what was planted, shrink it, and keep it as a test that fails until it is mended; why says since when."""
+"""Hunts find what was planted, shrink it, and keep it as a test that fails until it is mended; why
+says since when.
+"""
 
 import json
 import re
@@ -7,8 +9,7 @@ import sys
 
 import pytest
 import yaml
-from conftest import PATIENCE, RUEDO, SOURCE, ruedo
-
+from conftest import PATIENCE, SOURCE, ruedo
 from ruedo.hunt import Hunt
 
 EXAMPLE = SOURCE / "docs/campaign-example"
@@ -16,7 +17,9 @@ EXAMPLE = SOURCE / "docs/campaign-example"
 
 @pytest.fixture
 def example(tmp_path):
-    """The documentation's example in a folder of its own; returns a function that plants a fault."""
+    """The documentation's example in a folder of its own; returns a function that plants a
+    fault.
+    """
     for file in EXAMPLE.iterdir():
         if file.suffix in (".py", ".yaml"):
             (tmp_path / file.name).write_text(file.read_text())

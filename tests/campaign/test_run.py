@@ -10,7 +10,6 @@ import xml.etree.ElementTree as ElementTree
 
 import pytest
 from conftest import CAMPAIGN, CONTROLLER, PATIENCE, RUEDO, ruedo, table
-
 from ruedo.campaign import Campaign
 from ruedo.campaign.compare import compare_with
 

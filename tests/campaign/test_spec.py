@@ -4,7 +4,6 @@ import math
 
 import pytest
 from conftest import CAMPAIGN, ruedo
-
 from ruedo.campaign import Campaign, SpecError
 from ruedo.campaign.plan import points, substitute
 from ruedo.campaign.stats import mcnemar, paired_difference, wilson
@@ -82,7 +81,7 @@ def test_a_wrong_file_is_told_with_line_and_what_is_allowed(folder, old, new, li
     assert old in CAMPAIGN
     (folder / "c.yaml").write_text(CAMPAIGN.replace(old, new, 1))
     with pytest.raises(SpecError, match=text) as caught:
-        Campaign(folder / "c.yaml").cases
+        _ = Campaign(folder / "c.yaml").cases
     assert str(caught.value).startswith(f"{folder / 'c.yaml'}:{line}: ")
 
 

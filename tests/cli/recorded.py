@@ -104,7 +104,9 @@ def no_process_outlives_its_test():
 
 
 def command(simulation, vx, omega):
-    """One command to a paused server, which has it when it answers a request that was sent behind it."""
+    """One command to a paused server, which has it when it answers a request that was sent behind
+    it.
+    """
     message = velocity_command_t()
     message.vx, message.omega = vx, omega
     lcm.LCM(simulation.url).publish("p3at/velocity", message.encode())

@@ -1,4 +1,6 @@
-"""ruedo bench: every table has its rows, and the workload is the one that is described. No figure of speed is judged."""
+"""ruedo bench: every table has its rows, and the workload is the one that is described. No figure
+of speed is judged.
+"""
 
 import json
 import os
@@ -31,7 +33,8 @@ def test_all_tables_run_by_themselves():
             assert row["real_time_factor"] > 0 and row["memory_mb"] > 1
             assert row["real_time_factor"] == pytest.approx(row["sim_s"] / row["wall_s"], rel=1e-3)
         elif row["table"] == "rays":
-            # The same ranges as Embree's own, within single precision at 190 m, so both did the same work.
+            # The same ranges as Embree's own, within single precision at 190 m, so both did the
+            # same work.
             assert row["largest_difference_m"] < 1e-3
             assert row["rays"] == 181 * max(200, row["robots"])
             assert row["ratio_to_embree"] == pytest.approx(
@@ -46,8 +49,9 @@ def test_all_tables_run_by_themselves():
 
 def test_the_workload_is_the_one_described():
     (row,) = rows_of("--robots", "7", "--duration", "4")
-    # A second of a robot: 10 scans, 25 of each of two sonar arrays, 50 odometry, 50 poses, 10 motions. Beside them the
-    # world's: 30 states, 10 ticks, 1 info. Each starts at 0, so there may be one more of each, and of motions at once two.
+    # A second of a robot: 10 scans, 25 of each of two sonar arrays, 50 odometry, 50 poses, 10
+    # motions. Beside them the world's: 30 states, 10 ticks, 1 info. Each starts at 0, so there may
+    # be one more of each, and of motions at once two.
     assert 170 * 7 + 40 <= row["messages_per_sim_s"] <= 170 * 7 + 45 + 7 * 9 / 4
     # Each scan has two lists of 181 floats, so that is its least.
     assert row["bytes_per_sim_s"] > 7 * 10 * 2 * 181 * 4

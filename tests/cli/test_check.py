@@ -1,4 +1,6 @@
-"""ruedo check, as its users call it: what hostile and broken files give, the JSON list, exit codes, and colour on a terminal."""
+"""ruedo check, as its users call it: what hostile and broken files give, the JSON list, exit codes,
+and colour on a terminal.
+"""
 
 import json
 import os
@@ -55,7 +57,8 @@ def png(width, height):
 
 
 COLLISION = "model m/link l/collision c"
-# What the world says; other files beside it; the exit code; the finding's kind, line and element, and a part of its text.
+# What the world says; other files beside it; the exit code; the finding's kind, line and element,
+# and a part of its text.
 FILES = {
     "broken mesh": (
         mesh("a.dae"),
@@ -296,7 +299,7 @@ def test_names_cannot_speak_to_the_terminal(tmp_path):
         said = (done.stdout + done.stderr).decode()
         assert "?[31m?0m" in said or "p3at?[0m" in said, said
         assert not any(
-            ord(letter) < 32 and letter != "\n" or 127 <= ord(letter) < 160 for letter in said
+            (ord(letter) < 32 and letter != "\n") or 127 <= ord(letter) < 160 for letter in said
         )
 
 

@@ -112,7 +112,9 @@ def test_a_firewall_is_one_line_with_its_cure():
 
 
 def needs(*command):
-    """s of real time, of the best of some tries, since on a busy machine each may have to wait; s of processors' time."""
+    """s of real time, of the best of some tries, since on a busy machine each may have to wait; s
+    of processors' time.
+    """
     took, used = 1e9, 0.0
     for _ in range(20):
         before, begin = os.times(), time.monotonic()

@@ -1,8 +1,9 @@
-"""ruedo diff as CI calls it: exit codes, the first difference, tolerances, JUnit XML, and the page."""
+"""ruedo diff as CI calls it: exit codes, the first difference, tolerances, JUnit XML, and the
+page.
+"""
 
 import os
 import subprocess
-from pathlib import Path
 from xml.etree import ElementTree
 
 import lcm

@@ -1,4 +1,6 @@
-"""What people bring: ruedo import, ruedo map, --drive, --allow-absolute and ruedo check, as their users call them."""
+"""What people bring: ruedo import, ruedo map, --drive, --allow-absolute and ruedo check, as their
+users call them.
+"""
 
 import json
 import os

@@ -1,4 +1,6 @@
-"""Lockstep with models that come and go and snapshots; logs that know the files they were made from; a server that is killed."""
+"""Lockstep with models that come and go and snapshots; logs that know the files they were made
+from; a server that is killed.
+"""
 
 import os
 import signal
@@ -66,7 +68,9 @@ def published(log):
 
 
 def in_lockstep(port, log, clients):
-    """Two robots' worth of changes at fixed steps, by the first of `clients`; all of them step beside it."""
+    """Two robots' worth of changes at fixed steps, by the first of `clients`; all of them step
+    beside it.
+    """
     steps, length = 120, 6
     server = serve(
         port,

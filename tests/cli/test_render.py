@@ -1,4 +1,6 @@
-"""ruedo render: pictures of the right size that show something, and what it says of wrong options."""
+"""ruedo render: pictures of the right size that show something, and what it says of wrong
+options.
+"""
 
 import os
 import struct

@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from pathlib import Path
 
 import lcm
@@ -22,19 +21,21 @@ from recorded import (
     Server,
     command,
     events,
+    no_process_outlives_its_test,  # noqa: F401 (a fixture of every test here)
     program,
     record,
     until,
     url,
 )
-from recorded import no_process_outlives_its_test  # a fixture of every test here
 from ruedo.lcmtypes import log_header_t, world_state_t
 
 LOG_ONLY = {"ruedo/header", "ruedo/applied", "ruedo/state_hash"}
 
 
 class Listener:
-    """All messages of a bus. Over TCP: multicast may lose some where the listener gets no time to listen."""
+    """All messages of a bus. Over TCP: multicast may lose some where the listener gets no time to
+    listen.
+    """
 
     def __init__(self, address):
         self.got, self.stop = [], False
@@ -56,7 +57,9 @@ class Listener:
 
 @pytest.fixture
 def exchange(tmp_path):
-    """The address of a server of LCM over TCP, which passes on what the tests send. It serves a world without a body."""
+    """The address of a server of LCM over TCP, which passes on what the tests send. It serves a
+    world without a body.
+    """
     world = tmp_path / "empty.sdf"
     world.write_text("<sdf version='1.9'><world name='empty'/></sdf>")
     process = subprocess.Popen(
@@ -69,7 +72,9 @@ def exchange(tmp_path):
 
 
 def test_plays_at_its_own_time(tmp_path, exchange):
-    """At a ten-thousandth of its speed, what comes a step later comes 50 s later: long after what is at the same time."""
+    """At a ten-thousandth of its speed, what comes a step later comes 50 s later: long after what
+    is at the same time.
+    """
     found = record(tmp_path / "a.lcm", seconds=2)
     first = [
         (channel, data)

@@ -1,4 +1,6 @@
-"""--sandbox: what a stranger's world or log may have is there, and nothing else; what comes of it is the same."""
+"""--sandbox: what a stranger's world or log may have is there, and nothing else; what comes of it
+is the same.
+"""
 
 import os
 import shutil

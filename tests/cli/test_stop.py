@@ -10,8 +10,8 @@ import pytest
 
 RUEDO = os.environ["RUEDO"]
 
-# As fast as they go, batches of 160 ms are on their way, four at a time: with 200 cameras at 30 Hz thousands of pictures,
-# which take minutes.
+# As fast as they go, batches of 160 ms are on their way, four at a time: with 200 cameras at 30 Hz
+# thousands of pictures, which take minutes.
 WORLD = """<sdf version='1.9'><world name='w'><include><uri>model://ground_plane</uri></include>
 <ruedo:fleet name='r'><include><uri>model://p3at</uri></include><ruedo:count>200</ruedo:count></ruedo:fleet></world></sdf>"""
 

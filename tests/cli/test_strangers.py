@@ -1,4 +1,6 @@
-"""Files of strangers: logs that name what they should not, and small files that would cost much. Each ends soon, in one line."""
+"""Files of strangers: logs that name what they should not, and small files that would cost much.
+Each ends soon, in one line.
+"""
 
 import hashlib
 import os
@@ -6,9 +8,8 @@ import resource
 import struct
 
 import pytest
-from ruedo.lcmtypes import log_file_t, log_header_t
-
 from recorded import events, program, url, write
+from ruedo.lcmtypes import log_file_t, log_header_t
 
 WORLD = "<sdf version='1.9'><world name='w'><model name='m'><link name='l'><sensor name='imu' type='imu'/></link></model></world></sdf>"
 SECRET = "<secret>the words of another</secret>"
@@ -97,7 +98,7 @@ def test_a_log_allows_nothing_by_itself(recorded, tmp_path):
 
     def change(header):
         header.options.append("--allow-absolute")
-        header.files = [file for file in header.files]
+        header.files = list(header.files)
         header.files[0].path = header.world_file = str(folder / "absolute.sdf")
         header.files[0].sha256 = hashlib.sha256((folder / "absolute.sdf").read_bytes()).hexdigest()
 

@@ -1,5 +1,6 @@
-"""What check can load, run runs, and what it cannot, run refuses with the same words: over every bad file there is. And values
-that no robot needs: each is named with its place and what is allowed; where the rest of the world can do without it, it runs."""
+"""What check can load, run runs, and what it cannot, run refuses with the same words: over every
+bad file there is. And values that no robot needs: each is named with its place and what is allowed;
+where the rest of the world can do without it, it runs."""
 
 import json
 import os
@@ -7,7 +8,6 @@ import subprocess
 from pathlib import Path
 
 import pytest
-
 from test_check import FILES, in_link, world
 
 RUEDO = os.environ["RUEDO"]

@@ -1,4 +1,6 @@
-"""ruedo verify: a recorded run is repeated, and what is not the same is named; logs that are damaged, cut off or no logs."""
+"""ruedo verify: a recorded run is repeated, and what is not the same is named; logs that are
+damaged, cut off or no logs.
+"""
 
 import os
 import random
@@ -16,19 +18,21 @@ from recorded import (
     RUEDO,
     Server,
     events,
+    no_process_outlives_its_test,  # noqa: F401 (a fixture of every test here)
     program,
     record,
     until,
     url,
     write,
 )
-from recorded import no_process_outlives_its_test  # a fixture of every test here
 from ruedo.lcmtypes import applied_t, log_header_t, planar_lidar_t, state_hash_t
 
 
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory):
-    """A log with commands at times of the client's own, a reset with another seed, and models that come and go."""
+    """A log with commands at times of the client's own, a reset with another seed, and models that
+    come and go.
+    """
     log = tmp_path_factory.mktemp("driven") / "driven.lcm"
     server = Server(7822, "--rate", "20", "--record", log)
     with server.connect() as simulation:

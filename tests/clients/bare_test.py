@@ -1,5 +1,5 @@
-"""LCM programs that know nothing of the client libraries: the bare clients of docs/protocol.md, in Python and C, the
-latter on LCM 1.5.3 and on Debian's 1.3.1; and what the protocol promises them."""
+"""LCM programs that know nothing of the client libraries: the bare clients of docs/protocol.md, in
+Python and C, the latter on LCM 1.5.3 and on Debian's 1.3.1; and what the protocol promises them."""
 
 import os
 import shutil
@@ -176,4 +176,5 @@ def test_a_refused_primitive_says_why():
             command = move_command_t()
             command.id, command.kind, command.value = id, kind, value
             bare.bus.publish("p3at/move", command.encode())
-            bare.until(lambda m: m.id == id and m.state == m.STATE_REFUSED and m.reason == reason)
+            refused = (id, motion_status_t.STATE_REFUSED, reason)
+            bare.until(lambda m, refused=refused: (m.id, m.state, m.reason) == refused)

@@ -1,4 +1,6 @@
-"""The vocabulary, in each language, against the real server: the probes print what they saw, the numbers are known."""
+"""The vocabulary, in each language, against the real server: the probes print what they saw, the
+numbers are known.
+"""
 
 import math
 
@@ -88,8 +90,8 @@ def test_wheels(language, server):
 
 
 def test_velocity_holds_faster_than_real_time(language):
-    """At eight times real time a repetition every 100 ms would come 800 ms of sim time apart, and the watchdog stops the
-    robot after 600: the ticks of the server set the pace."""
+    """At eight times real time a repetition every 100 ms would come 800 ms of sim time apart, and
+    the watchdog stops the robot after 600: the ticks of the server set the pace."""
     with ruedo_run("--rate", "8", "--disable", "p3at/camera", world=HALL) as server:
         said = probe(language, server.url, "velocity", "p3at", "0.0", "0.4", "2")
         assert said.words("status")[:2] == ["velocity", "running"], said.text

@@ -1,4 +1,5 @@
-"""What the wire tests share: the programs under test, a port for each server, servers that end with their test.
+"""What the wire tests share: the programs under test, a port for each server, servers that end with
+their test.
 
 Each server has a URL of its own, so that the tests of one file may run beside each other.
 """

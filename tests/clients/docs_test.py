@@ -55,8 +55,9 @@ def test_python_docstring_of_the_package(server, tmp_path):
 
 def test_cpp(server, tmp_path):
     """Compiled against the header and the library alone, as a user's program is."""
-    import lcm
     from pathlib import Path
+
+    import lcm
 
     (tmp_path / "ten.cpp").write_text(blocks("clients.md")["cpp"])
     library = next(Path(lcm.__file__).resolve().parent.parent.glob("**/liblcm.so"))

@@ -1,4 +1,5 @@
-"""A server that lies, for what the real one never does: other versions of a type, broken messages, silence.
+"""A server that lies, for what the real one never does: other versions of a type, broken messages,
+silence.
 
     fake_server.py URL [--wrong-type] [--garbage] [--wrong-info] [--paused]
 

@@ -1,19 +1,17 @@
-"""What befalls machines and networks: lost, doubled and late datagrams, a stopped process, clocks that jump, an interface that
-goes down."""
+"""What befalls machines and networks: lost, doubled and late datagrams, a stopped process, clocks
+that jump, an interface that goes down."""
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import time
 from pathlib import Path
-from urllib.parse import urlsplit
 
 import lcm
 import pytest
 import ruedo
-from conftest import HALL, PATIENCE, free_url, ruedo_run
+from conftest import HALL, PATIENCE, ruedo_run
 from lockstep_test import bad_network
 from ruedo.lcmtypes import applied_t, request_t
 
@@ -33,7 +31,9 @@ def wait_until(condition, what: str) -> None:
 
 @pytest.mark.parametrize("loss", [0.1, 0.3])
 def test_each_request_acts_exactly_once(loss: float, tmp_path: Path) -> None:
-    """A live run behind a network that loses, doubles and delays: each request acts once, in the order of the calls."""
+    """A live run behind a network that loses, doubles and delays: each request acts once, in the
+    order of the calls.
+    """
     log = str(tmp_path / "run.lcm")
     with ruedo_run("--record", log, *NO_CAMERA, world=HALL) as server:
         with bad_network(server.url, 1, loss) as [url]:
@@ -54,7 +54,9 @@ def test_each_request_acts_exactly_once(loss: float, tmp_path: Path) -> None:
 
 
 def test_a_stopped_server_goes_on_from_where_it_was() -> None:
-    """It does not race to catch up, says what happened, and blames no client: the lease is shorter than the stop."""
+    """It does not race to catch up, says what happened, and blames no client: the lease is shorter
+    than the stop.
+    """
     with ruedo_run(*NO_CAMERA, world=HALL) as server:
         with ruedo.connect(server.url, timeout=PATIENCE) as sim:
             sim.sleep(0.2)
@@ -104,7 +106,9 @@ def jumping_clock(tmp_path: Path, offset: str) -> dict[str, str]:
 def test_a_clock_that_jumps_changes_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The time of day goes ahead by a year and back by two, while the run is paced and while it is in lockstep."""
+    """The time of day goes ahead by a year and back by two, while the run is paced and while it is
+    in lockstep.
+    """
     for name, value in jumping_clock(tmp_path, "+0").items():
         monkeypatch.setenv(name, value)
     logs = []

@@ -1,4 +1,6 @@
-"""Eight threads subscribe, publish and leave at once, over both of LCM's networks: RUEDO_HAMMER_SECONDS, or a bounded count."""
+"""Eight threads subscribe, publish and leave at once, over both of LCM's networks:
+RUEDO_HAMMER_SECONDS, or a bounded count.
+"""
 
 import os
 import subprocess

@@ -1,4 +1,6 @@
-"""Servers that lie, or are not there: each first mistake is answered in words, and nothing breaks."""
+"""Servers that lie, or are not there: each first mistake is answered in words, and nothing
+breaks.
+"""
 
 import sys
 import time

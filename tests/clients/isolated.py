@@ -1,9 +1,11 @@
-"""Runs a command in a network namespace of its own, in which multicast goes over the loopback device alone.
+"""Runs a command in a network namespace of its own, in which multicast goes over the loopback
+device alone.
 
     isolated.py COMMAND...
 
-As root, or as an ordinary user where user namespaces are allowed. Where they are not, the command runs in the
-ordinary network: tests take a free port each and ttl 0, which keeps the data on this machine.
+As root, or as an ordinary user where user namespaces are allowed. Where they are not, the command
+runs in the ordinary network: tests take a free port each and ttl 0, which keeps the data on this
+machine.
 """
 
 import os

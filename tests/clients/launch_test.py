@@ -13,7 +13,9 @@ HALL = str(HERE / "hall.sdf")
 
 
 def servers_of(url):
-    """Process ids of the programs that have the URL in their command line; another network's ports are others."""
+    """Process ids of the programs that have the URL in their command line; another network's ports
+    are others.
+    """
     found, network = [], os.readlink("/proc/self/ns/net")
     for folder in Path("/proc").glob("[0-9]*"):
         try:

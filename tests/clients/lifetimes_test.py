@@ -1,4 +1,6 @@
-"""The Java client's callbacks, readers, and ends (unit/Lifetimes.java); those of C++ are unit/lifetimes_test.cpp, of Python python_test.py."""
+"""The Java client's callbacks, readers, and ends (unit/Lifetimes.java); those of C++ are
+unit/lifetimes_test.cpp, of Python python_test.py.
+"""
 
 import os
 import subprocess

@@ -1,4 +1,6 @@
-"""Lockstep over the wire, each client behind a network that loses, doubles and reorders; and its errors."""
+"""Lockstep over the wire, each client behind a network that loses, doubles and reorders; and its
+errors.
+"""
 
 import subprocess
 import sys
@@ -42,7 +44,9 @@ def bad_network(server_url, clients, loss):
 
 
 def run(languages, loss):
-    """What each client saw at its end: step, hash, messages, poses, digest. Both drive the same robot."""
+    """What each client saw at its end: step, hash, messages, poses, digest. Both drive the same
+    robot.
+    """
     with ruedo_run(
         "--lockstep",
         str(len(languages)),
@@ -77,7 +81,7 @@ def run(languages, loss):
 def test_the_same_whatever_is_lost():
     languages = sorted(PROBES)
     good = run(languages, 0.0)
-    step, state_hash, messages, poses, digest = good[0]
+    step, _state_hash, _messages, poses, _digest = good[0]
     assert (step, poses) == (str(STEPS), "76")  # 50 Hz, from 0 to 1.5 s
     assert all(end == good[0] for end in good)
     for loss in (0.1, 0.3):

@@ -1,8 +1,10 @@
-"""A bad network: passes datagrams between a server's port and one port for each client, and loses, doubles and reorders.
+"""A bad network: passes datagrams between a server's port and one port for each client, and loses,
+doubles and reorders.
 
     lossy_relay.py SERVER_PORT CLIENT_PORT,... LOSS TWICE LATE SEED
 
-Probabilities from 0 to 1, for each datagram, each way and each client apart; a late one comes after the next.
+Probabilities from 0 to 1, for each datagram, each way and each client apart; a late one comes after
+the next.
 """
 
 import random

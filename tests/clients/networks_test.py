@@ -1,4 +1,6 @@
-"""Networks as they are: LCM over TCP from the server itself, no multicast route, one server an address, two hosts."""
+"""Networks as they are: LCM over TCP from the server itself, no multicast route, one server an
+address, two hosts.
+"""
 
 import math
 import os
@@ -7,7 +9,6 @@ import shlex
 import subprocess
 import sys
 
-import lcm
 import pytest
 from bare_test import bare, c_client, check_scans
 from conftest import HERE, PATIENCE, PROBES, RUEDO, Server, free_url, probe, ruedo_run, tcp_server
@@ -161,7 +162,9 @@ def test_a_second_server_refuses_and_names_the_first(scheme):
 
 
 def test_users_of_one_machine_do_not_meet():
-    """Another user's server on the same address is refused, too, and names the first; --lcm auto finds its own place."""
+    """Another user's server on the same address is refused, too, and names the first; --lcm auto
+    finds its own place.
+    """
     import pwd
 
     other = pwd.getpwnam("nobody").pw_uid

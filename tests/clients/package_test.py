@@ -79,7 +79,6 @@ def test_jar_is_whole_and_for_java_11():
 
 def test_images_become_arrays():
     import numpy as np
-
     import ruedo
 
     def image(format, data, stride):
@@ -113,7 +112,6 @@ def test_images_are_saved(tmp_path):
 
 def test_scan_nearest():
     import numpy as np
-
     import ruedo
 
     scan = ruedo.Scan(0, np.array([3.0, 1.0, 2.0]), np.array([-1.0, 0.0, 1.0]), np.array([]))

@@ -1,4 +1,6 @@
-"""Python as people expect it: arguments, worlds by name and by building, samples as values, errors for wrong types, forks, logs."""
+"""Python as people expect it: arguments, worlds by name and by building, samples as values, errors
+for wrong types, forks, logs.
+"""
 
 import math
 import os
@@ -125,7 +127,9 @@ def test_worlds_are_found_by_name():
 
 
 def test_a_world_is_built_and_run():
-    """A wall whose face is 3 m ahead of the robot, which carries its LRF 0.16 m ahead of its middle; a ball's worth of a box."""
+    """A wall whose face is 3 m ahead of the robot, which carries its LRF 0.16 m ahead of its
+    middle; a ball's worth of a box.
+    """
     world = (
         ruedo.World("mine")
         .wall(3.05, -2, 3.05, 2)

@@ -1,4 +1,6 @@
-"""The local socket: whose it is, and that the three libraries see over it what they see over multicast."""
+"""The local socket: whose it is, and that the three libraries see over it what they see over
+multicast.
+"""
 
 import os
 import stat

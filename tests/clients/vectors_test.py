@@ -1,5 +1,6 @@
-"""The test vectors, in each language: messages and what they mean, and scripted conversations with loss and reordering. The
-runners have a transport of their own, on standard input and output: nothing is lost but what the script loses."""
+"""The test vectors, in each language: messages and what they mean, and scripted conversations with
+loss and reordering. The runners have a transport of their own, on standard input and output:
+nothing is lost but what the script loses."""
 
 import json
 import os
@@ -154,7 +155,9 @@ class Script:
         return data
 
     def request(self):
-        """The next that the conversation is about; joining and asking what there is is answered here."""
+        """The next that the conversation is about; joining and asking what there is is answered
+        here.
+        """
         while True:
             name, size = struct.unpack(">ii", self.read(8))
             channel, data = self.read(name).decode(), self.read(size)

@@ -1,4 +1,6 @@
-"""The example of each language, 20 s of sim time in the arena without touching anything; and as its user ends it."""
+"""The example of each language, 20 s of sim time in the arena without touching anything; and as its
+user ends it.
+"""
 
 import signal
 import subprocess
@@ -51,7 +53,7 @@ def test_wander(language, tmp_path):
 
     from ruedo import lcmtypes
 
-    way, last, reasons, heard = 0.0, None, set(), 0
+    way, _last, reasons, heard = 0.0, None, set(), 0
     for event in lcm.EventLog(str(log), "r"):
         if event.channel == "p3at/pose":
             pose = lcmtypes.pose_t.decode(event.data)
@@ -65,7 +67,8 @@ def test_wander(language, tmp_path):
         lcmtypes.motion_status_t.REASON_NONE,
         lcmtypes.motion_status_t.REASON_REPLACED,
     }
-    # An untouched kinematic drive follows its wheels exactly, so a bump would show as odometry that is off.
+    # An untouched kinematic drive follows its wheels exactly, so a bump would show as odometry that
+    # is off.
     assert (
         odometry[2] == pytest.approx(truth[2], abs=0.05)
         or abs(abs(odometry[2] - truth[2]) - 6.2832) < 0.05

@@ -1,4 +1,6 @@
-"""Models that come and go, over the wire, in each language: what the probes saw has known numbers."""
+"""Models that come and go, over the wire, in each language: what the probes saw has known
+numbers.
+"""
 
 import pytest
 from conftest import HERE, probe, ruedo_run

@@ -3,7 +3,7 @@
 // view works.
 import { readFileSync } from "node:fs";
 
-export default async function access({ page, seen, until, check, ready, picture, server, expect }) {
+export default async function access({ page, until, check, ready, picture, expect }) {
   const axe = readFileSync("node_modules/axe-core/axe.min.js", "utf8");
   const faults = () =>
     page.evaluate(async () =>

@@ -1,7 +1,7 @@
 // A thousand robots: frames a second, and what a frame costs this page's own thread: states taken,
 // matrices made, draw calls given. The rest of a frame is the rasteriser's. Given: {"robots": how
 // many there must be, "seconds": of each measurement}.
-export default async function fleet({ page, given, until, check, still, picture }) {
+export default async function fleet({ page, given, until, check, picture }) {
   await until(
     "robots are listed",
     (n) => window.ruedo?.page.now.world?.robots.length >= n,

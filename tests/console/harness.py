@@ -11,7 +11,6 @@ import socket
 import struct
 import subprocess
 import sys
-import time
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -34,7 +33,9 @@ sys.path.insert(0, str(BUILD / "python"))  # the message types
 
 @contextmanager
 def running(*arguments, view="127.0.0.1:0", world=ARENA):
-    """A viewed run as users start it: on the default transport, unless the arguments name another one."""
+    """A viewed run as users start it: on the default transport, unless the arguments name another
+    one.
+    """
     with serving("run", world, "--quiet", "--view", view, *arguments) as process:
         yield process
 
@@ -166,7 +167,9 @@ def browser(url, folder, scenario, given=None):
 
 
 def browse(url, folder, scenario, given=None):
-    """What the browser saw in a scenario, line by line; fails, in one line, where something went wrong."""
+    """What the browser saw in a scenario, line by line; fails, in one line, where something went
+    wrong.
+    """
     with browser(url, folder, scenario, given) as process:
         said, _ = process.communicate(timeout=1200)
     return judged(scenario, folder, said.splitlines(), process.returncode)

@@ -1,6 +1,6 @@
 // A recorded run: the time line, and that the page shows what the log has at each moment. Given:
 // moments of the log, with the pose of the robot's body then, and the bodies that there are then.
-export default async function log({ page, given, seen, until, check, clock, picture }) {
+export default async function log({ page, given, seen, until, check, picture }) {
   await until("the time line is there", () => !document.getElementById("timeline").hidden);
   await until("robots are listed", () => window.ruedo?.page.now.world?.robots.length > 0);
   await until(

@@ -1,4 +1,6 @@
-"""The console's page in a headless browser: a run, all that steers it, the page itself, and recorded runs."""
+"""The console's page in a headless browser: a run, all that steers it, the page itself, and
+recorded runs.
+"""
 
 import contextlib
 import json
@@ -9,7 +11,6 @@ import subprocess
 import time
 
 import pytest
-
 from harness import RUEDO, SOURCE, Socket, browse, browser, judged, needs_browser, playing, running
 
 BUMPER = SOURCE / "tests" / "console" / "bumper.sdf"
@@ -25,7 +26,9 @@ def events(log):
 
 
 def states(log, body):
-    """(log time in s, sim time in s, x, y of the body, how many bodies there are) of each ruedo/world of a log."""
+    """(log time in s, sim time in s, x, y of the body, how many bodies there are) of each
+    ruedo/world of a log.
+    """
     from ruedo.lcmtypes import world_state_t
 
     for channel, time_us, data in events(log):
@@ -75,7 +78,9 @@ def test_every_transport_can_be_steered(tmp_path, transport):
 
 
 def test_the_order_of_loading_is_one(tmp_path):
-    """Greeting, messages, names of channels, and each file of the scene held back in turn: nothing that is shown depends on it."""
+    """Greeting, messages, names of channels, and each file of the scene held back in turn: nothing
+    that is shown depends on it.
+    """
     with running(world=SOURCE / "tests/console/aside.sdf") as process:
         seen = browse(process.url, tmp_path, "order")
     parts = ("greeting", "messages", "names", "/scene.json", "/scene/meshes", "/scene/links")
@@ -137,7 +142,9 @@ def test_the_page_loads_fast_fits_and_says_what_is_wrong(tmp_path):
 
 @pytest.fixture(scope="module")
 def steered(tmp_path_factory):
-    """The log of a run in which everything was steered, and what was seen then: nothing where that went wrong."""
+    """The log of a run in which everything was steered, and what was seen then: nothing where that
+    went wrong.
+    """
     folder = tmp_path_factory.mktemp("steered")
     seen = []
     with (
@@ -182,7 +189,9 @@ def test_everything_is_steered(steered):
 
 
 def test_what_was_steered_is_in_the_log(steered):
-    """Each command as the page was asked for it, and what the robot did: whatever the page showed, and how late."""
+    """Each command as the page was asked for it, and what the robot did: whatever the page showed,
+    and how late.
+    """
     from ruedo.lcmtypes import applied_t, move_command_t, request_t, velocity_command_t
 
     log, said, _ = steered
@@ -214,7 +223,9 @@ def test_what_was_steered_is_in_the_log(steered):
 
 
 def test_a_recorded_run_is_scrubbed(tmp_path):
-    """An arena run with a camera, driven along a curve; at each of ten moments the page shows the log's pose."""
+    """An arena run with a camera, driven along a curve; at each of ten moments the page shows the
+    log's pose.
+    """
     from ruedo.lcmtypes import velocity_command_t
 
     log = tmp_path / "run.lcm"
@@ -248,7 +259,9 @@ def test_a_recorded_run_is_scrubbed(tmp_path):
 
 
 def test_what_was_placed_and_reset_is_in_the_log_too(steered, tmp_path):
-    """The log of the steered run: a box and a robot that come on the way, and are gone after the reset."""
+    """The log of the steered run: a box and a robot that come on the way, and are gone after the
+    reset.
+    """
     log, said, _ = steered
     if "all was steered" not in said:
         pytest.skip("not everything was steered: see test_everything_is_steered")
@@ -309,13 +322,15 @@ def thousand_robots(path):
 
 
 def test_a_thousand_robots_are_shown(tmp_path):
-    """From a log, so that what is measured is the page and not the simulation beside it. What it says is in docs/console.md."""
+    """From a log, so that what is measured is the page and not the simulation beside it. What it
+    says is in docs/console.md.
+    """
     with playing(thousand_robots(tmp_path)) as process:
         seen = browse(process.url, tmp_path, "fleet", {"robots": 1000, "seconds": 3})
     measured = [
         json.loads(line.split(": ", 1)[1]) for line in seen if line.startswith("measured: ")
     ]
     assert "they are a few draw calls" in seen
-    # Whoever draws the pixels: what this page's thread needs for a frame leaves room for 20 a second. The least of many
-    # frames, for this machine does other things, too.
+    # Whoever draws the pixels: what this page's thread needs for a frame leaves room for 20 a
+    # second. The least of many frames, for this machine does other things, too.
     assert min(each["own_ms_least"] for each in measured if "own_ms_least" in each) < 50

@@ -8,7 +8,6 @@ import struct
 import subprocess
 
 import pytest
-
 from harness import (
     ARENA,
     BUILD,
@@ -94,8 +93,7 @@ def test_messages_come_as_they_are_published(server):
     viewer.send(bytes([WANT]) + b"p3at/pose\nruedo/world")
     times = []
     while len(times) < 10:
-        for message in viewer.frame().values():
-            times.append(struct.unpack_from("!q", message, 8)[0])
+        times += [struct.unpack_from("!q", message, 8)[0] for message in viewer.frame().values()]
     assert sorted(times) == times or len(set(times)) > 3
     viewer.close()
 
@@ -107,7 +105,7 @@ def test_a_slow_viewer_gets_no_more_than_it_takes(server):
     frames = 0
     with pytest.raises(TimeoutError):
         while True:
-            opcode, data = slow.receive()
+            opcode, _data = slow.receive()
             frames += opcode == 2
     assert frames == 2  # and none after that, for none was taken
     slow.close()
@@ -152,7 +150,9 @@ def test_garbage_and_a_hundred_viewers_do_not_hurt(server):
 
 
 def test_half_open_connections_give_way(server):
-    """More than the console has places for; each has sent the beginning of a request, or nothing."""
+    """More than the console has places for; each has sent the beginning of a request, or
+    nothing.
+    """
     waiting = [socket.create_connection(("127.0.0.1", server.port), timeout=20) for _ in range(400)]
     for one in waiting[::2]:
         with contextlib.suppress(OSError):  # it has given way
@@ -166,7 +166,9 @@ def test_half_open_connections_give_way(server):
 
 
 def test_viewers_change_no_byte(tmp_path):
-    """The log of a run without the console, and of one with viewers that watch everything, one of them slow."""
+    """The log of a run without the console, and of one with viewers that watch everything, one of
+    them slow.
+    """
     common = ["--duration", "3", "--seed", "7", "--record"]
     subprocess.run(
         [
@@ -217,7 +219,9 @@ def test_wrong_addresses_are_said():
 
 
 def test_types_decode_in_typescript_as_in_python(tmp_path):
-    """The description made of proto/*.lcm gives the fingerprints that lcm-gen's code has, for every type."""
+    """The description made of proto/*.lcm gives the fingerprints that lcm-gen's code has, for every
+    type.
+    """
     import sys
 
     sys.path.insert(0, str(BUILD / "python"))
@@ -240,7 +244,9 @@ await import("data:text/javascript," + encodeURIComponent(out.outputFiles[0].tex
 
 
 def test_less_is_drawn_where_drawing_is_slow(tmp_path):
-    """Frames 100 ms apart take the page down level by level, after five each; when they are 10 ms apart for long, up again."""
+    """Frames 100 ms apart take the page down level by level, after five each; when they are 10 ms
+    apart for long, up again.
+    """
     script = tmp_path / "quality.mjs"
     script.write_text(f"""import {{ build }} from "{BUILD}/web/node_modules/esbuild/lib/main.js";
 const out = await build({{ entryPoints: ["{BUILD}/web/src/scene/quality.ts"], bundle: true, write: false, preserveSymlinks: true, format: "esm" }});

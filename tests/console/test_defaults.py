@@ -1,4 +1,6 @@
-"""A run and the programs that go with it, as users start them: without --lcm and without LCM_DEFAULT_URL (in isolated.py's network)."""
+"""A run and the programs that go with it, as users start them: without --lcm and without
+LCM_DEFAULT_URL (in isolated.py's network).
+"""
 
 import os
 import pty

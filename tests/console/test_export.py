@@ -18,7 +18,8 @@ BUILD = Path(os.environ["RUEDO_BINARY_DIR"])
 RUEDO = BUILD / "bin" / "ruedo"
 sys.path.insert(0, str(BUILD / "python"))
 
-# A robot beside a wall, a scan straight ahead: what there is to see is known. The mast carries the scanner.
+# A robot beside a wall, a scan straight ahead: what there is to see is known. The mast carries the
+# scanner.
 WORLD = """<?xml version="1.0"?><sdf version="1.9" xmlns:ruedo="http://ruedo/schema"><world name="wall">
 <include><uri>model://ground_plane</uri></include><include><uri>model://p3at</uri><pose>1 2 0 0 0 1.5707963267948966</pose></include>
 <model name="wall"><static>true</static><pose>1 6 0.5 0 0 0</pose><link name="link"><collision name="c"><geometry><box><size>20 0.5 1</size></box></geometry></collision>
@@ -182,7 +183,8 @@ def test_a_scan(exported, topics):
     assert any(math.isinf(value) for value in scan["ranges"]) == any(
         math.isinf(value) for value in truth.ranges
     )
-    # The ray straight ahead ends at the wall's face, 3.75 m before the robot: what the frames say, end to end.
+    # The ray straight ahead ends at the wall's face, 3.75 m before the robot: what the frames say,
+    # end to end.
     frames = {each["child_frame_id"]: each for each in topics["ruedo/frames"][0][2]["transforms"]}
     mount = frames["p3at/lrf"]
     assert mount["parent_frame_id"] == "p3at"
@@ -312,9 +314,9 @@ def test_logs_that_are_cut_off_or_strange(exported, tmp_path):
     assert len(messages(tmp_path / "cut.mcap")["p3at/lrf"]) > 3
     import struct
 
-    event = lambda channel, data: (
-        struct.pack("!IqqII", 0xEDA1DA01, 0, -5, len(channel), len(data)) + channel + data
-    )
+    def event(channel, data):
+        return struct.pack("!IqqII", 0xEDA1DA01, 0, -5, len(channel), len(data)) + channel + data
+
     (tmp_path / "odd.lcm").write_bytes(
         event(b"a\xff", b"")
         + event(b"b", os.urandom(999))

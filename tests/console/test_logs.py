@@ -1,4 +1,6 @@
-"""Recorded runs in the console: what a viewer gets at each moment, and logs that are cut off, strange, or none."""
+"""Recorded runs in the console: what a viewer gets at each moment, and logs that are cut off,
+strange, or none.
+"""
 
 import json
 import os
@@ -7,7 +9,6 @@ import subprocess
 import time
 
 import pytest
-
 from harness import ARENA, PLAY, RUEDO, SEEK, SEEN, SOURCE, TRAFFIC, WANT, Socket, get, playing
 
 
@@ -168,7 +169,9 @@ def event(number, time_us, channel, data):
 
 
 def test_strange_logs_do_not_hurt(log, tmp_path):
-    """Times that go back and forth, names that are no text, lengths that lie, messages that are none."""
+    """Times that go back and forth, names that are no text, lengths that lie, messages that are
+    none.
+    """
     pose = next(e.data for e in __import__("lcm").EventLog(str(log)) if e.channel == "p3at/pose")
     strange = tmp_path / "strange.lcm"
     strange.write_bytes(

@@ -1,4 +1,6 @@
-"""`ruedo play LOG --html`: one file that shows a run without a server, no larger than asked for; and regress leaves it where it fails."""
+"""`ruedo play LOG --html`: one file that shows a run without a server, no larger than asked for;
+and regress leaves it where it fails.
+"""
 
 import contextlib
 import re
@@ -6,7 +8,6 @@ import subprocess
 import time
 
 import pytest
-
 from harness import ARENA, RUEDO, Socket, browse, needs_browser, running
 from test_browser import states
 

@@ -1,4 +1,6 @@
-"""ruedo.jar makes lcm-spy decode every channel: its own database of types, of LCM's jar, finds and reads each type."""
+"""ruedo.jar makes lcm-spy decode every channel: its own database of types, of LCM's jar, finds and
+reads each type.
+"""
 
 import os
 import shutil

@@ -1,4 +1,6 @@
-"""ruedo echo, hz and teleop, on a bus of their own (isolated.py): what they say is what was published."""
+"""ruedo echo, hz and teleop, on a bus of their own (isolated.py): what they say is what was
+published.
+"""
 
 import os
 import pty
@@ -115,7 +117,9 @@ def test_hz_counts_what_comes():
 
 
 def test_teleop_drives_as_keys_are_pressed():
-    """In a terminal: w and a twice each, an arrow, the space that stops, q; what is published then, and that it stands at the end."""
+    """In a terminal: w and a twice each, an arrow, the space that stops, q; what is published then,
+    and that it stands at the end.
+    """
     from ruedo.lcmtypes import velocity_command_t
 
     bus, found = lcm.LCM(URL), []

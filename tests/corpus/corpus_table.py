@@ -1,8 +1,11 @@
-"""Runs every world, model and robot of a folder for a simulated minute and writes what came of it as a table.
+"""Runs every world, model and robot of a folder for a simulated minute and writes what came of it
+as a table.
 
-    tests/corpus/corpus_table.py build/release/bin/ruedo ../shared/corpus -o docs/corpus.md [--pictures FOLDER]
+    tests/corpus/corpus_table.py build/release/bin/ruedo ../shared/corpus -o docs/corpus.md
+    [--pictures FOLDER]
 
-The table says for each file whether it ran, how long that took, and everything that `ruedo check` named.
+The table says for each file whether it ran, how long that took, and everything that `ruedo check`
+named.
 """
 
 import argparse

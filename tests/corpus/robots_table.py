@@ -2,8 +2,9 @@
 
     tests/corpus/robots_table.py build/release/bin/ruedo ../shared/corpus [-o docs/corpus.md]
 
-Each is told to drive 0.3 m/s for 2 s and to turn 0.5 rad/s for 2 s, in lockstep and without noise. A sensor publishes when at
-least one message of it came. What `ruedo check` names is grouped by what it says.
+Each is told to drive 0.3 m/s for 2 s and to turn 0.5 rad/s for 2 s, in lockstep and without noise.
+A sensor publishes when at least one message of it came. What `ruedo check` names is grouped by what
+it says.
 """
 
 import argparse
@@ -14,7 +15,6 @@ import os
 import re
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 import ruedo
@@ -52,7 +52,8 @@ ROBOTS = {
     "neobotix MPO-700": "neobotix/robots/mpo_700/mpo_700.urdf",
 }
 
-# Their wheels' joints are fixed, or there is no plugin that drives them: in Gazebo they stand still, too.
+# Their wheels' joints are fixed, or there is no plugin that drives them: in Gazebo they stand
+# still, too.
 STAND_THERE_TOO = {
     "Pioneer 3-DX (MobileRobots, URDF)",
     "Pioneer 3-DX (MobileRobots, xacro)",
@@ -87,7 +88,6 @@ def drive(path):
         if not robot.drive:
             return "stands still", math.nan, math.nan, 0, 0
         steered = robot.drive.endswith(("ackermann", "tricycle"))
-        poses = [seen.latest(robot.pose)]
         second = round(1.0 / sim.step_size)
 
         def go(seconds, v, omega):

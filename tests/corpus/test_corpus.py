@@ -1,4 +1,6 @@
-"""Public robots that nobody here wrote drive a square in a room, and their laser range finders see its walls where they are."""
+"""Public robots that nobody here wrote drive a square in a room, and their laser range finders see
+its walls where they are.
+"""
 
 import math
 import os
@@ -6,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 import ruedo
 
 CORPUS = Path(os.environ["RUEDO_SOURCE_DIR"]).parent / "shared" / "corpus"

@@ -1,11 +1,12 @@
-"""docs/corpus.md says of every public robot what it does: here it does it again. And at least 95 % of them drive."""
+"""docs/corpus.md says of every public robot what it does: here it does it again. And at least 95 %
+of them drive.
+"""
 
 import os
 import re
 from pathlib import Path
 
 import pytest
-
 from robots_table import ROBOTS, STAND_THERE_TOO, TITLE, table
 from sections import section
 

@@ -1,8 +1,10 @@
-"""The documentation's examples, run as they stand: every fenced block that begins with ```sh test or ```python test.
+"""The documentation's examples, run as they stand: every fenced block that begins with ```sh test
+or ```python test.
 
-A block runs in an empty folder that has the tree's worlds/ and clients/ in it, the built ruedo in the path and a network of its
-own, so that nothing leaves the machine. Commands run under bash -eu; a Python program finds a server with worlds/arena.sdf,
-and goes to pytest when it is a test. Links to files are followed, too.
+A block runs in an empty folder that has the tree's worlds/ and clients/ in it, the built ruedo in
+the path and a network of its own, so that nothing leaves the machine. Commands run under bash -eu;
+a Python program finds a server with worlds/arena.sdf, and goes to pytest when it is a test. Links
+to files are followed, too.
 """
 
 import os
@@ -35,7 +37,9 @@ def blocks(text):
 
 
 def isolated():
-    """The command line that gives a program a network of its own, or [] where the system refuses."""
+    """The command line that gives a program a network of its own, or [] where the system
+    refuses.
+    """
     for flags in (["-n"], ["-rn"]):
         command = ["unshare", *flags, "sh", "-c", NETWORK + 'exec "$@"', "sh"]
         if subprocess.run([*command, "true"], capture_output=True).returncode == 0:

@@ -1,14 +1,16 @@
-"""ruedo.Engine: arrays, commands, resets and errors. That its bytes are the server's is tests/run/engine_test.cpp's."""
+"""ruedo.Engine: arrays, commands, resets and errors. That its bytes are the server's is
+tests/run/engine_test.cpp's.
+"""
 
 import math
 
 import numpy as np
 import pytest
-
 import ruedo
 from ruedo import lcmtypes
 
-# A two-wheeled robot without limits and watchdog, and a lidar of five beams that looks at a wall 2 m ahead of it.
+# A two-wheeled robot without limits and watchdog, and a lidar of five beams that looks at a wall 2
+# m ahead of it.
 ROBOT = """<model name='{name}'><pose>0 {y} 0 0 0 0</pose><link name='body'><pose>0 0 0.15 0 0 0</pose><inertial><mass>10</mass></inertial>
 <collision name='c'><geometry><box><size>0.5 0.3 0.2</size></box></geometry></collision>
 <sensor name='scan' type='gpu_lidar'><update_rate>10</update_rate><lidar><scan><horizontal><samples>5</samples><min_angle>-0.4</min_angle>

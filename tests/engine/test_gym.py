@@ -5,10 +5,9 @@ import math
 import gymnasium
 import numpy as np
 import pytest
+import ruedo.gym
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
-
-import ruedo.gym
 from ruedo.rooms import TEST_ROOMS, make_room
 
 
@@ -54,7 +53,7 @@ def test_the_goal_is_where_the_room_says():
     nearer = 0.0
     for _ in range(40):  # turns towards the goal, and drives there
         bearing = math.atan2(observation[7], observation[6])
-        observation, reward, terminated, truncated, info = env.step(
+        observation, reward, terminated, _truncated, _info = env.step(
             np.array([-1.0 if abs(bearing) > 0.3 else 1.0, np.clip(2 * bearing, -1, 1)])
         )
         nearer += reward + 0.01
@@ -66,7 +65,8 @@ def test_the_goal_is_where_the_room_says():
     env.close()
 
 
-# A robot that drives straight on touches a wall or an obstacle sooner or later; the mode says what is seen then.
+# A robot that drives straight on touches a wall or an obstacle sooner or later; the mode says what
+# is seen then.
 @pytest.mark.parametrize("mode", list(AutoresetMode))
 def test_modes_of_autoreset(mode):
     envs = ruedo.gym.NavigateVectorEnv(2, beams=8, autoreset_mode=mode)

@@ -1,4 +1,6 @@
-"""`ruedo experiments`: the page, its pictures, and its numbers against the paper's and the targets."""
+"""`ruedo experiments`: the page, its pictures, and its numbers against the paper's and the
+targets.
+"""
 
 import json
 import os
@@ -46,7 +48,8 @@ def test_all_targets_are_met(run):
 
 
 def test_e1_the_papers_loop_gives_the_papers_numbers(numbers):
-    # 1126.40 and 1016.96 mm in the paper; a loop of its kind, computed by hand, 1126.44 and 1016.82 mm.
+    # 1126.40 and 1016.96 mm in the paper; a loop of its kind, computed by hand, 1126.44 and 1016.82
+    # mm.
     assert value(numbers, "E1", HIGH, "late braking") == pytest.approx(1126.44, abs=0.01)
     assert value(numbers, "E1", LOW, "late braking") == pytest.approx(1016.82, abs=0.01)
 

@@ -1,5 +1,6 @@
-"""Collects seeds for the fuzzers: seeds.py OUT FOLDER... copies what is small among the files of the folders (worlds,
-robots, meshes, pictures, maps), each where its fuzzer takes it, with the byte before it that says what it is."""
+"""Collects seeds for the fuzzers: seeds.py OUT FOLDER... copies what is small among the files of
+the folders (worlds, robots, meshes, pictures, maps), each where its fuzzer takes it, with the byte
+before it that says what it is."""
 
 import shutil
 import sys

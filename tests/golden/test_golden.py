@@ -1,5 +1,6 @@
-"""The runs of golden_runs.cpp make the bytes that are kept in hashes.txt: on this processor, or on the emulated one that
-RUEDO_PROCESSOR names (of `qemu-x86_64 -cpu help`), with one thread and with two."""
+"""The runs of golden_runs.cpp make the bytes that are kept in hashes.txt: on this processor, or on
+the emulated one that RUEDO_PROCESSOR names (of `qemu-x86_64 -cpu help`), with one thread and with
+two."""
 
 import os
 import subprocess

@@ -1,5 +1,5 @@
-"""Installs Ruedo into a folder, moves that, and runs docs/example-project against it; then what each of a regression's
-expectations says when it does not hold."""
+"""Installs Ruedo into a folder, moves that, and runs docs/example-project against it; then what
+each of a regression's expectations says when it does not hold."""
 
 import os
 import re
@@ -72,7 +72,7 @@ def ctest(project, *options, good=True):
 
 
 def regress(
-    prefix, *options, good=True, folder=None, world=EXAMPLE / "gate.sdf", client=True, more={}
+    prefix, *options, good=True, folder=None, world=EXAMPLE / "gate.sdf", client=True, more=None
 ):
     words = [
         prefix / "bin/ruedo",
@@ -88,7 +88,9 @@ def regress(
     ]
     if client:
         words += ["--lockstep", "1", "--client", f"{sys.executable} {EXAMPLE}/through_the_gate.py"]
-    return run(*words, good=good, more={"PYTHONPATH": f"{prefix}/share/ruedo/python", **more})
+    return run(
+        *words, good=good, more={"PYTHONPATH": f"{prefix}/share/ruedo/python", **(more or {})}
+    )
 
 
 def test_the_moved_program_finds_its_own(prefix):
@@ -137,7 +139,9 @@ def test_pkg_config_leads_to_library_and_server(prefix, tmp_path):
 
 
 def test_the_example_from_nothing_to_green(project):
-    """Without goldens it says what to do; renewed, all is green, in parallel; twice gives the same."""
+    """Without goldens it says what to do; renewed, all is green, in parallel; twice gives the
+    same.
+    """
     said = ctest(project, "-R", "^gate$", good=False)
     assert "there is no golden log" in said and "RUEDO_RENEW=1" in said
     said = run(CMAKE, "--build", project / "build", "--target", "renew-goldens").stdout

@@ -1,5 +1,6 @@
-"""A project that uses Ruedo by find_package, by add_subdirectory and by FetchContent: the same target, and nothing of Ruedo's own
-flags, options and names reaches it. The page docs/cmake.md names every option and preset."""
+"""A project that uses Ruedo by find_package, by add_subdirectory and by FetchContent: the same
+target, and nothing of Ruedo's own flags, options and names reaches it. The page docs/cmake.md names
+every option and preset."""
 
 import json
 import os

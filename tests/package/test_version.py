@@ -52,7 +52,9 @@ def test_the_changes_begin_with_it():
 
 
 def test_it_stands_nowhere_else():
-    """Where a file says what version this project has; a log's version and others' are no affair of this test."""
+    """Where a file says what version this project has; a log's version and others' are no affair of
+    this test.
+    """
     places = {
         "CMakeLists.txt": r"project\(ruedo VERSION \d",
         "clients/python/pyproject.toml": r'^version = "',

@@ -1,5 +1,6 @@
-"""The wheel with everything inside, installed into a virtual environment of its own and used from anywhere: program, server, engine,
-picture, what C++ and Java need. In bare Debians it is tried by packaging/try_in_debian.sh."""
+"""The wheel with everything inside, installed into a virtual environment of its own and used from
+anywhere: program, server, engine, picture, what C++ and Java need. In bare Debians it is tried by
+packaging/try_in_debian.sh."""
 
 import os
 import subprocess

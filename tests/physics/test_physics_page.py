@@ -1,4 +1,6 @@
-"""benchmarks/physics/page.py, which scripts/physics runs: the page of a few tests, and its numbers against closed forms."""
+"""benchmarks/physics/page.py, which scripts/physics runs: the page of a few tests, and its numbers
+against closed forms.
+"""
 
 import json
 import os

@@ -1,4 +1,6 @@
-"""`ruedo run --ros2` and an independent peer: the PyPI package cyclonedds, with types written from the ROS interfaces."""
+"""`ruedo run --ros2` and an independent peer: the PyPI package cyclonedds, with types written from
+the ROS interfaces.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""A controller over plain DDS that knows nothing of Ruedo: one command for each scan, away from what is near."""
+"""A controller over plain DDS that knows nothing of Ruedo: one command for each scan, away from
+what is near.
+"""
 
 import sys
 import time

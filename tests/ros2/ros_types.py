@@ -1,4 +1,5 @@
-"""ROS 2 interfaces as IDL types of the PyPI package cyclonedds, written from the interfaces' own definitions.
+"""ROS 2 interfaces as IDL types of the PyPI package cyclonedds, written from the interfaces' own
+definitions.
 
 The names are those that every RMW on DDS uses: pkg::msg::dds_::Type_.
 """

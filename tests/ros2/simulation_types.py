@@ -1,4 +1,6 @@
-"""simulation_interfaces 1.x as rmw_cyclonedds has services on the wire: 16 bytes of header, then the request or the response."""
+"""simulation_interfaces 1.x as rmw_cyclonedds has services on the wire: 16 bytes of header, then
+the request or the response.
+"""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,6 @@
-"""`ruedo export --ros2`: bags that rosbags and mcap-ros2-support read message by message equal to the log."""
+"""`ruedo export --ros2`: bags that rosbags and mcap-ros2-support read message by message equal to
+the log.
+"""
 
 from __future__ import annotations
 

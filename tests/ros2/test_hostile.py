@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import pytest
 from conftest import Peer, Run, take, wait_for
-from cyclonedds.idl.types import float64, sequence, uint8
 from cyclonedds.idl import IdlStruct
+from cyclonedds.idl.types import float64, sequence, uint8
 from ros_types import LaserScan, Odometry, Twist, Vector3
 
 

@@ -1,4 +1,6 @@
-"""--wait-for on ROS topics: a controller that knows nothing of steps drives twice, and both runs have the same bytes."""
+"""--wait-for on ROS topics: a controller that knows nothing of steps drives twice, and both runs
+have the same bytes.
+"""
 
 from __future__ import annotations
 

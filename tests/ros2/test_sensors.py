@@ -1,4 +1,6 @@
-"""The sensors that the arena's robot has not, in a bag against what geometry says; and joints that are moved over DDS."""
+"""The sensors that the arena's robot has not, in a bag against what geometry says; and joints that
+are moved over DDS.
+"""
 
 from __future__ import annotations
 
@@ -192,7 +194,7 @@ def test_commands_that_do_not_fit_the_joints_are_counted(topic, kind, message):
     with Run(world=WORLD) as run:
         peer = Peer(run.domain)
         commands = peer.writer(topic, kind)
-        wait_for(lambda: commands.get_matched_subscriptions(), "a reader")
+        wait_for(commands.get_matched_subscriptions, "a reader")
         commands.write(message)
         wait_for(lambda: "ignored (1 such" in (run.process.stdout.readline() or ""), "the warning")
         assert "1 messages that came were faulty" in run.end()

@@ -1,4 +1,6 @@
-"""simulation_interfaces over DDS, as rmw_cyclonedds maps services, called by a peer that no one here wrote."""
+"""simulation_interfaces over DDS, as rmw_cyclonedds maps services, called by a peer that no one
+here wrote.
+"""
 
 from __future__ import annotations
 
@@ -191,7 +193,7 @@ def test_resets_have_scopes(client, scope, code):
 
 def test_where_somebody_says_the_robot_is_there_it_is_put(client):
     initial = client.peer.writer("/initialpose", PoseWithCovarianceStamped)
-    wait_for(lambda: initial.get_matched_subscriptions(), "a reader")
+    wait_for(initial.get_matched_subscriptions, "a reader")
     truth = client.peer.reader("/ground_truth", Odometry)
     pose = PoseWithCovariance(Pose(Point(0.0, 1.5, 0.0), Quaternion()), [0.0] * 36)
     initial.write(PoseWithCovarianceStamped(Header(Time(), "map"), pose))

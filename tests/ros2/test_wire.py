@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 
@@ -16,6 +17,7 @@ from cyclonedds.core import Policy
 from ros_types import (
     CameraInfo,
     Clock,
+    Header,
     Image,
     JointState,
     LaserScan,
@@ -24,7 +26,6 @@ from ros_types import (
     Range,
     TFMessage,
     Time,
-    Header,
     Twist,
     TwistStamped,
     Vector3,
@@ -61,7 +62,7 @@ def test_best_effort_readers_are_served(standing):
 
 def test_clock_is_sim_time_at_100_hz(standing):
     stamps = [c.clock.us for c in take(standing.reader("/clock", Clock), 50)]
-    assert {b - a for a, b in zip(stamps, stamps[1:])} == {10_000}
+    assert {b - a for a, b in itertools.pairwise(stamps)} == {10_000}
 
 
 def test_odometry_and_its_frame_agree(standing):

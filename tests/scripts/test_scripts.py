@@ -1,4 +1,6 @@
-"""scripts/lib.sh with stand-ins for apt and dpkg: what is asked for, of whom, and when nothing is done."""
+"""scripts/lib.sh with stand-ins for apt and dpkg: what is asked for, of whom, and when nothing is
+done.
+"""
 
 import os
 import shutil
@@ -10,7 +12,6 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-SCRIPTS = [ROOT / "scripts/run", ROOT / "scripts/test", ROOT / "scripts/lib.sh", ROOT / ".ci/run"]
 NOBODY = 65534
 
 DPKG_QUERY = """#!/bin/bash
@@ -139,14 +140,6 @@ def test_without_rights_the_line_to_ask_for_is_printed(machine):
 def test_help_installs_nothing():
     result = subprocess.run([ROOT / "scripts/test", "--help"], capture_output=True, text=True)
     assert result.returncode == 0 and "--sanitizers" in result.stdout
-
-
-@pytest.mark.parametrize("script", SCRIPTS, ids=lambda p: p.name)
-def test_shellcheck(script):
-    if not shutil.which("shellcheck"):
-        pytest.skip("shellcheck is not installed")
-    result = subprocess.run(["shellcheck", "-x", script], capture_output=True, text=True)
-    assert result.returncode == 0, result.stdout
 
 
 def test_failed_tests_are_told_again_at_the_end(tmp_path):

@@ -1,5 +1,6 @@
-"""Hostile load for a minute (RUEDO_SOAK_SECONDS; ten in the nightly run): a server over multicast and one over TCP get all
-that they should not get, while a good client goes on working; their memory stays flat."""
+"""Hostile load for a minute (RUEDO_SOAK_SECONDS; ten in the nightly run): a server over multicast
+and one over TCP get all that they should not get, while a good client goes on working; their memory
+stays flat."""
 
 import os
 import random
@@ -29,7 +30,7 @@ PATIENCE = 400.0  # s, for what comes sooner or later, on a machine that does mu
 MOST_GROWTH_KB = 8_000
 sys.path.insert(0, str(BUILD / "python"))
 
-import ruedo  # noqa: E402
+import ruedo
 
 
 def resident_kb(process):

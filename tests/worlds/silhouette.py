@@ -1,7 +1,8 @@
-"""Silhouettes of triangle soups along an axis, and how far apart two of them are; for robots' models and meshes.
+"""Silhouettes of triangle soups along an axis, and how far apart two of them are; for robots'
+models and meshes.
 
-A silhouette is drawn on a grid of RESOLUTION_M; outlines are compared by their Hausdorff distance, so a result is right to
-about one cell.
+A silhouette is drawn on a grid of RESOLUTION_M; outlines are compared by their Hausdorff distance,
+so a result is right to about one cell.
 """
 
 import struct
@@ -23,7 +24,9 @@ def read_stl(path):
 
 
 def read_obj(path):
-    """Triangles (n, 3, 3) of a Wavefront OBJ with polygons that a fan from their first corner covers."""
+    """Triangles (n, 3, 3) of a Wavefront OBJ with polygons that a fan from their first corner
+    covers.
+    """
     vertices, triangles = [], []
     for line in Path(path).read_text(encoding="ascii").splitlines():
         words = line.split()
@@ -38,7 +41,9 @@ def read_obj(path):
 
 
 def moved(triangles, xyz, rpy=(0, 0, 0)):
-    """The triangles in the frame in which theirs has this pose (SDF's convention: Rz(yaw) Ry(pitch) Rx(roll))."""
+    """The triangles in the frame in which theirs has this pose (SDF's convention: Rz(yaw) Ry(pitch)
+    Rx(roll)).
+    """
     (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
     rotation = np.array(
         [
@@ -51,7 +56,9 @@ def moved(triangles, xyz, rpy=(0, 0, 0)):
 
 
 def model_triangles(sdf_path, skip=()):
-    """Triangles of the mesh visuals of a model.sdf in the model's frame; visuals named in `skip` are left out."""
+    """Triangles of the mesh visuals of a model.sdf in the model's frame; visuals named in `skip`
+    are left out.
+    """
     folder = Path(sdf_path).parent
     parts = []
     for link in ElementTree.parse(sdf_path).getroot().find("model").findall("link"):
@@ -68,7 +75,8 @@ def model_triangles(sdf_path, skip=()):
 
 
 def outline_distance_m(first, second, axes):
-    """Hausdorff distance between the outlines of two triangle soups projected onto two axes (0 x, 1 y, 2 z), in metres.
+    """Hausdorff distance between the outlines of two triangle soups projected onto two axes (0 x, 1
+    y, 2 z), in metres.
 
     An outline is the border towards the open: holes inside a silhouette do not count.
     """

@@ -1,4 +1,6 @@
-"""People who walk, and things on paths, as every kind of sensor sees them; and the same again in a second run."""
+"""People who walk, and things on paths, as every kind of sensor sees them; and the same again in a
+second run.
+"""
 
 import os
 import subprocess
@@ -21,7 +23,8 @@ def sensor(name, kind, inside):
     return f"<sensor name='{name}' type='{kind}'><pose>0 0 1 0 0 0</pose><update_rate>10</update_rate>{inside}</sensor>"
 
 
-# It walks at 1 m/s towards the robot, from 5 m; a trolley crosses behind it, at 6 m, twice as fast, and comes again.
+# It walks at 1 m/s towards the robot, from 5 m; a trolley crosses behind it, at 6 m, twice as fast,
+# and comes again.
 WORLD = f"""<sdf version='1.9'><world name='w'><include><uri>model://ground_plane</uri></include>
 <model name='r'><link name='l'><pose>0 0 0.15 0 0 0</pose><inertial><mass>500</mass><inertia><ixx>9</ixx><iyy>9</iyy><izz>9</izz></inertia></inertial>
   <collision name='foot'><geometry><box><size>{FACE} {FACE} 0.3</size></box></geometry></collision>

@@ -1,4 +1,6 @@
-"""What scripts generate is what they generate now: meshes of the robots, the office world, its textures."""
+"""What scripts generate is what they generate now: meshes of the robots, the office world, its
+textures.
+"""
 
 import importlib.util
 import shutil
@@ -25,7 +27,9 @@ def run_copy(tmp_path, script):
 
 
 def png_pixels(path):
-    """The inflated scan lines of a PNG with one IDAT chunk: equal for equal pictures, whatever the compressor."""
+    """The inflated scan lines of a PNG with one IDAT chunk: equal for equal pictures, whatever the
+    compressor.
+    """
     data = path.read_bytes()
     position, pixels = 8, b""
     while position < len(data):
@@ -93,7 +97,7 @@ def test_doors_let_a_pioneer_through():
     sys.path.insert(0, str(WORLDS / "office"))
     spec.loader.exec_module(office)
     sys.path.pop(0)
-    for x0, y0, x1, y1, doors in office.WALLS:
+    for x0, y0, _x1, y1, doors in office.WALLS:
         for door in doors:
             x, y = (x0 + door, y0) if y0 == y1 else (x0, y0 + door)
             things = [t[:3] for t in office.furniture()] + [

@@ -1,4 +1,6 @@
-"""Each world that ships with Ruedo, by its name: nothing in it is wrong, and its robots drive as told."""
+"""Each world that ships with Ruedo, by its name: nothing in it is wrong, and its robots drive as
+told.
+"""
 
 import json
 import math
@@ -51,7 +53,9 @@ def test_nothing_in_it_is_wrong(name, tmp_path):
 
 @pytest.mark.parametrize("name", ["rooms", "maze", "warehouse", "field", "crossing"])
 def test_a_robot_drives_as_told(name):
-    """0.2 m/s for 1 s, where it starts: 0.2 m, but for what starting and stopping take (below 0.1 m)."""
+    """0.2 m/s for 1 s, where it starts: 0.2 m, but for what starting and stopping take (below 0.1
+    m).
+    """
     with engine(name) as world:
         before = world["pose.pos"][0, 0].copy()
         for _ in range(10):

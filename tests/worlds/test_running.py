@@ -1,4 +1,6 @@
-"""Our robots alone on a plane, as a running server sees them: no device may see its own robot or the floor."""
+"""Our robots alone on a plane, as a running server sees them: no device may see its own robot or
+the floor.
+"""
 
 import math
 import os

@@ -1,10 +1,11 @@
-"""The P3-AT's silhouettes against those of MobileRobots' own mesh, and the measure itself against known outlines."""
+"""The P3-AT's silhouettes against those of MobileRobots' own mesh, and the measure itself against
+known outlines.
+"""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
-
 import silhouette
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
-"""Makes the office world: ../office.sdf, its meshes and its textures. Run it again after changing the plan below.
+"""Makes the office world: ../office.sdf, its meshes and its textures. Run it again after changing
+the plan below.
 
-The plan: 40 x 30 m, the origin in the middle of a corridor 4 m wide along x. North of it five offices, south a
-meeting room, a large open office and a lounge; doors 1.2 m wide, with a lintel at 2.1 m. No ceiling.
+The plan: 40 x 30 m, the origin in the middle of a corridor 4 m wide along x. North of it five
+offices, south a meeting room, a large open office and a lounge; doors 1.2 m wide, with a lintel at
+2.1 m. No ceiling.
 """
 
 import math
@@ -11,7 +13,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
-import textures  # noqa: E402
+import textures
 
 HEIGHT, THICK, DOOR, LINTEL = 2.6, 0.15, 1.2, 2.1
 
@@ -113,7 +115,9 @@ POSTERS = [
 
 
 def wall_boxes():
-    """The walls as boxes ((cx, cy, cz), (sx, sy, sz)): pieces between doors, and lintels above them."""
+    """The walls as boxes ((cx, cy, cz), (sx, sy, sz)): pieces between doors, and lintels above
+    them.
+    """
     boxes = []
     for x0, y0, x1, y1, doors in WALLS:
         length = math.hypot(x1 - x0, y1 - y0)
@@ -148,14 +152,14 @@ class TexturedMesh:
 
     def write(self, path):
         with open(path.with_suffix(".mtl"), "w", encoding="ascii", newline="\n") as out:
-            for name in self.faces:
-                out.write(
-                    f"newmtl {name}\nKa 1 1 1\nKd 1 1 1\nKs 0 0 0\nmap_Kd ../textures/{name}.png\n\n"
-                )
+            out.writelines(
+                f"newmtl {name}\nKa 1 1 1\nKd 1 1 1\nKs 0 0 0\nmap_Kd ../textures/{name}.png\n\n"
+                for name in self.faces
+            )
         with open(path.with_suffix(".obj"), "w", encoding="ascii", newline="\n") as out:
             out.write(f"mtllib {path.stem}.mtl\n")
-            out.writelines("v %.4f %.4f %.4f\n" % v for v in self.vertices)
-            out.writelines("vt %.4f %.4f\n" % t for t in self.coordinates)
+            out.writelines("v {:.4f} {:.4f} {:.4f}\n".format(*v) for v in self.vertices)
+            out.writelines("vt {:.4f} {:.4f}\n".format(*t) for t in self.coordinates)
             for name, faces in self.faces.items():
                 out.write(f"usemtl {name}\n")
                 out.writelines("f " + " ".join(f"{i}/{i}" for i in face) + "\n" for face in faces)

@@ -1,4 +1,6 @@
-"""Procedural textures of the office: small PNGs that repeat, drawn pixel by pixel from a seeded generator."""
+"""Procedural textures of the office: small PNGs that repeat, drawn pixel by pixel from a seeded
+generator.
+"""
 
 import random
 import struct

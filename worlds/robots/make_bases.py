@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Makes the robots that show each way to steer: a car, a tricycle, a mecanum, an omni, a holonomic and a tracked base; a small one for
-lessons, and one with an arm.
+"""Makes the robots that show each way to steer: a car, a tricycle, a mecanum, an omni, a holonomic
+and a tracked base; a small one for lessons, and one with an arm.
 
     worlds/robots/make_bases.py [FOLDER]
 
-Writes NAME/model.sdf and NAME/model.config below FOLDER (this one, where none is given). Bodies are boxes and cylinders, so
-that no mesh is needed; every robot has a laser range finder and an IMU. Measures and masses are ours.
+Writes NAME/model.sdf and NAME/model.config below FOLDER (this one, where none is given). Bodies are
+boxes and cylinders, so that no mesh is needed; every robot has a laser range finder and an IMU.
+Measures and masses are ours.
 """
 
 import math
@@ -58,7 +59,7 @@ GREY, BLUE, RED, GREEN, DARK = (
 
 def body(mass, size, ground, rgb, sensors, extra=""):
     """The base link: a box whose underside is `ground` above the floor."""
-    x, y, z = size
+    _x, _y, z = size
     middle = ground + z / 2
     text = (
         f'    <link name="base_link">\n      <inertial><pose>0 0 {number(middle)} 0 0 0</pose><mass>{number(mass)}</mass>'

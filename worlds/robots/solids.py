@@ -1,9 +1,10 @@
 """Simple solids, written as Wavefront OBJ: prisms over an outline and bodies of revolution.
 
-The robots' meshes are made with it (robots/*/make_meshes.py). Metres, x ahead, y left, z up; faces are
-counter-clockwise seen from outside.
+The robots' meshes are made with it (robots/*/make_meshes.py). Metres, x ahead, y left, z up; faces
+are counter-clockwise seen from outside.
 """
 
+import itertools
 import math
 from pathlib import Path
 
@@ -21,7 +22,9 @@ class Solids:
         self._faces.setdefault(material, []).append(range(first, first + len(points)))
 
     def prism(self, material, outline, z0, z1):
-        """The upright prism between z0 and z1 over a counter-clockwise outline [(x, y)], star-shaped about its centre."""
+        """The upright prism between z0 and z1 over a counter-clockwise outline [(x, y)],
+        star-shaped about its centre.
+        """
         cx = sum(x for x, _ in outline) / len(outline)
         cy = sum(y for _, y in outline) / len(outline)
         for (ax, ay), (bx, by) in zip(outline, outline[1:] + outline[:1]):
@@ -35,7 +38,8 @@ class Solids:
         self.prism(material, [(x0, y0), (x1, y0), (x1, y1), (x0, y1)], z0, z1)
 
     def lathe(self, material, profile, centre, axis, segments=24):
-        """The closed body that a profile [(along the axis, radius)] sweeps about `axis` (unit vector) through `centre`.
+        """The closed body that a profile [(along the axis, radius)] sweeps about `axis` (unit
+        vector) through `centre`.
 
         The profile begins and ends on the axis (radius 0), ascending along it.
         """
@@ -49,7 +53,7 @@ class Solids:
                 for k in range(3)
             )
 
-        for (s0, r0), (s1, r1) in zip(profile, profile[1:]):
+        for (s0, r0), (s1, r1) in itertools.pairwise(profile):
             for i in range(segments):
                 corners = [
                     point(s0, r0, i),
@@ -64,7 +68,9 @@ class Solids:
                 self._face(material, corners)
 
     def write(self, path, colours):
-        """Writes PATH.obj and PATH.mtl; `colours` gives (red, green, blue, shine) of each material, in [0, 1]."""
+        """Writes PATH.obj and PATH.mtl; `colours` gives (red, green, blue, shine) of each material,
+        in [0, 1].
+        """
         path = Path(path)
         with open(path.with_suffix(".mtl"), "w", encoding="ascii", newline="\n") as out:
             for material in self._faces:
@@ -74,14 +80,13 @@ class Solids:
                 )
         with open(path.with_suffix(".obj"), "w", encoding="ascii", newline="\n") as out:
             out.write(f"mtllib {path.stem}.mtl\n")
-            for x, y, z in self._vertices:
-                out.write(
-                    f"v {x + 0.0:.5f} {y + 0.0:.5f} {z + 0.0:.5f}\n".replace("-0.00000", "0.00000")
-                )
+            out.writelines(
+                f"v {x + 0.0:.5f} {y + 0.0:.5f} {z + 0.0:.5f}\n".replace("-0.00000", "0.00000")
+                for x, y, z in self._vertices
+            )
             for material, faces in self._faces.items():
                 out.write(f"usemtl {material}\n")
-                for face in faces:
-                    out.write("f " + " ".join(map(str, face)) + "\n")
+                out.writelines("f " + " ".join(map(str, face)) + "\n" for face in faces)
 
 
 def arc(centre_x, radius, first_rad, last_rad, steps):
@@ -91,9 +96,11 @@ def arc(centre_x, radius, first_rad, last_rad, steps):
 
 
 def faceted(transducers):
-    """The outline whose faces carry sonar transducers (x_m, y_m, heading_deg), listed counter-clockwise.
+    """The outline whose faces carry sonar transducers (x_m, y_m, heading_deg), listed
+    counter-clockwise.
 
-    Each transducer lies in its face and looks along the face's normal; neighbouring faces are cut with each other.
+    Each transducer lies in its face and looks along the face's normal; neighbouring faces are cut
+    with each other.
     """
     lines = []
     for x, y, heading in transducers:
@@ -109,7 +116,9 @@ def faceted(transducers):
 
 
 def lms200(solids, x, z):
-    """The housing of a SICK LMS200 around its scan plane at height z, axis at x: 156 x 155 x 185 mm."""
+    """The housing of a SICK LMS200 around its scan plane at height z, axis at x: 156 x 155 x 185
+    mm.
+    """
     solids.box("blue", (x - 0.094, -0.0775, z - 0.113), (x + 0.062, 0.0775, z - 0.035))
     solids.box(
         "blue", (x - 0.094, -0.0775, z - 0.035), (x - 0.030, 0.0775, z + 0.035)
@@ -121,7 +130,9 @@ def lms200(solids, x, z):
 
 
 def vc_c4(solids, x, z):
-    """A Canon VC-C4 whose lens ends at x, its optical axis at height z: foot, fork, head and lens."""
+    """A Canon VC-C4 whose lens ends at x, its optical axis at height z: foot, fork, head and
+    lens.
+    """
     solids.box("dark", (x - 0.105, -0.050, z - 0.055), (x - 0.015, 0.050, z - 0.030))
     for side in (-1, 1):
         y = sorted((side * 0.036, side * 0.046))

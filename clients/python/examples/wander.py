@@ -1,7 +1,8 @@
-"""Wanders without bumping into things, by laser range finder and sonar; saves a camera picture and compares
-odometry with the true pose at the end.
+"""Wanders without bumping into things, by laser range finder and sonar; saves a camera picture and
+compares odometry with the true pose at the end.
 
-    python wander.py [--robot NAME] [--duration SECONDS] [--url URL] [--launch WORLD] [--picture FILE]
+    python wander.py [--robot NAME] [--duration SECONDS] [--url URL] [--launch WORLD] [--picture
+    FILE]
 """
 
 import argparse
@@ -99,4 +100,4 @@ if __name__ == "__main__":
     try:
         main()
     except ruedo.RuedoError as error:
-        raise SystemExit(f"wander: {error}")
+        raise SystemExit(f"wander: {error}") from None

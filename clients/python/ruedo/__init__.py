@@ -9,7 +9,8 @@
             pass
         robot.stop().wait()
 
-Units are SI, angles radians; x ahead, y left, z up. `ruedo.lcmtypes` has the message types themselves.
+Units are SI, angles radians; x ahead, y left, z up. `ruedo.lcmtypes` has the message types
+themselves.
 """
 
 from ._installation import load_glib
@@ -18,7 +19,7 @@ load_glib()  # before anything imports lcm
 
 try:
     from . import lcmtypes
-    from ._version import __version__
+    from ._version import __version__ as __version__
 except ImportError as _error:
     raise ImportError(
         "ruedo's message types were not generated: install the package (pip install clients/python) or "
@@ -72,7 +73,9 @@ from .world_info import Body
 
 
 def __getattr__(name: str) -> object:
-    """``ruedo.Engine``, which needs the compiled part of the package: loaded when it is first asked for."""
+    """``ruedo.Engine``, which needs the compiled part of the package: loaded when it is first asked
+    for.
+    """
     if name != "Engine":
         raise AttributeError(f"module 'ruedo' has no attribute {name!r}")
     try:

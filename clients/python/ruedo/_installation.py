@@ -1,4 +1,6 @@
-"""What Ruedo's wheel brings along for LCM's: a bare Debian has no GLib, which LCM's compiled part is linked to."""
+"""What Ruedo's wheel brings along for LCM's: a bare Debian has no GLib, which LCM's compiled part
+is linked to.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 """LCM URLs: which one is meant, and whether anything can come from it.
 
-The route is checked before LCM sees the URL, because its own self-test blocks for ten seconds where multicast has no route.
+The route is checked before LCM sees the URL, because its own self-test blocks for ten seconds where
+multicast has no route.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ FALLBACK_URL = "tcpq://127.0.0.1:7700"  # what `ruedo run` serves where there is
 
 
 def resolve_url(url: str | None) -> str:
-    """url, or LCM_DEFAULT_URL, or LCM's default group and port with ttl 0, or TCP where multicast has no route."""
+    """url, or LCM_DEFAULT_URL, or LCM's default group and port with ttl 0, or TCP where multicast
+    has no route.
+    """
     return (
         url
         or os.environ.get("LCM_DEFAULT_URL")

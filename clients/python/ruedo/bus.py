@@ -6,8 +6,9 @@ import logging
 import math
 import threading
 import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, Callable, Iterator
+from typing import Any
 
 from .transport import Transport
 
@@ -17,8 +18,8 @@ _LEND_SECONDS = 0.02
 
 
 class Subscription:
-    """A callback that is called until close(), which a with-block does at its end. What it raises is logged once, and
-    hurts nobody else."""
+    """A callback that is called until close(), which a with-block does at its end. What it raises
+    is logged once, and hurts nobody else."""
 
     def __init__(
         self, callback: Callable[..., Any], what: str, leave: Callable[[Subscription], None]
@@ -111,8 +112,8 @@ class Bus:
 
     @contextmanager
     def receiving(self) -> Iterator[Callable[[float], bool]]:
-        """The caller receives instead of the thread: calls what it is given, which handles what came, or waits for it
-        at most so many seconds and returns False."""
+        """The caller receives instead of the thread: calls what it is given, which handles what
+        came, or waits for it at most so many seconds and returns False."""
         self._lent_until = math.inf
         with self._turn:
             try:

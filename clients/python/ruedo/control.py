@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from . import lcmtypes
 from .errors import NotSupported, RequestError, Timeout, TypeMismatch
-from .samples import Floats, _floats, _Value
+from .geometry import Floats
+from .samples import _floats, _Value
 
 if TYPE_CHECKING:
     from .simulation import Simulation
@@ -35,7 +36,9 @@ _CODES = _names(lcmtypes.reply_t)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class State(_Value):
-    """The state of the simulation, and of the model or MODEL/LINK that was asked for (else name is "")."""
+    """The state of the simulation, and of the model or MODEL/LINK that was asked for (else name is
+    "").
+    """
 
     utime: int  # us, sim time
     step: int  # number of the state
@@ -70,7 +73,9 @@ class Session:
         self._reply: Any = None
 
     def request(self, kind: int, body: Any = None, timeout: float = 5.0) -> Any:
-        """The reply. Raises NotSupported, RequestError, Timeout (after timeout seconds of real time)."""
+        """The reply. Raises NotSupported, RequestError, Timeout (after timeout seconds of real
+        time).
+        """
         with self._one_at_a_time:
             return self.request_in_turn(kind, body, timeout)
 
@@ -89,7 +94,9 @@ class Session:
         return self._checked(reply)
 
     def turn(self) -> threading.Lock:
-        """For grants, which are not answered by replies: keeps other requests waiting while it is held."""
+        """For grants, which are not answered by replies: keeps other requests waiting while it is
+        held.
+        """
         return self._one_at_a_time
 
     def next_sequence(self) -> int:

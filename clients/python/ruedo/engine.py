@@ -5,8 +5,9 @@
     commands = np.zeros((64, 1, 2))                # (worlds, driven robots, (m/s, rad/s))
     engine.step(commands, 20)                      # 20 steps of 5 ms
 
-It is the server's own code and gives the server's own bytes: copy i has the seed ``seed + i``, and its messages are those of
-``ruedo run WORLD --seed seed+i --lockstep 1`` for the same commands at the same steps. There is no network and no clock.
+It is the server's own code and gives the server's own bytes: copy i has the seed ``seed + i``, and
+its messages are those of ``ruedo run WORLD --seed seed+i --lockstep 1`` for the same commands at
+the same steps. There is no network and no clock.
 """
 
 from __future__ import annotations
@@ -26,13 +27,16 @@ __all__ = ["Engine"]
 class Engine:
     """Copies of one world.
 
-    world: a file, or the name of a world that comes with Ruedo or lies in a folder of RUEDO_PATH; with ``text``, what the text is
-    called. worlds: how many copies. seed: of copy 0; copy i has ``seed + i``. noise: False gives ideal sensors. threads: at most so
-    many cores, 0 for all. spawn ("p3at:guest@1,2,0.5"), drive ("rover=left_joint,right_joint"), set ({"p3at/LRF.update_rate": 10}) and
-    disable ("p3at/camera") and fault ("p3at/lrf:freeze@3") are those of ``ruedo run``. record: keep the messages of the last call, for :meth:`messages`.
+    world: a file, or the name of a world that comes with Ruedo or lies in a folder of RUEDO_PATH;
+    with ``text``, what the text is called. worlds: how many copies. seed: of copy 0; copy i has
+    ``seed + i``. noise: False gives ideal sensors. threads: at most so many cores, 0 for all. spawn
+    ("p3at:guest@1,2,0.5"), drive ("rover=left_joint,right_joint"), set ({"p3at/LRF.update_rate":
+    10}) and disable ("p3at/camera") and fault ("p3at/lrf:freeze@3") are those of ``ruedo run``.
+    record: keep the messages of the last call, for :meth:`messages`.
 
-    Raises ValueError for what is wrong in the file or an argument, with file, line, value and what is allowed; OSError for
-    what the machine lacks. Not for several threads at once; ``step`` lets other Python threads run.
+    Raises ValueError for what is wrong in the file or an argument, with file, line, value and what
+    is allowed; OSError for what the machine lacks. Not for several threads at once; ``step`` lets
+    other Python threads run.
     """
 
     def __init__(
@@ -102,7 +106,9 @@ class Engine:
 
     @property
     def findings(self) -> list[str]:
-        """What of the world file is not supported, or was repaired: file, line, element, what was done."""
+        """What of the world file is not supported, or was repaired: file, line, element, what was
+        done.
+        """
         return self._core.findings()
 
     @property
@@ -125,8 +131,9 @@ class Engine:
     ) -> None:
         """Begins copy 0 anew with that seed, and judges it as ``ruedo regress`` does.
 
-        goals: "X,Y,RADIUS,BY". clearance_reach: m, smaller clearances are measured. log: a file that ``ruedo verify`` repeats; with
-        everything: all messages, else only what acted on the run and hashes of its state.
+        goals: "X,Y,RADIUS,BY". clearance_reach: m, smaller clearances are measured. log: a file
+        that ``ruedo verify`` repeats; with everything: all messages, else only what acted on the
+        run and hashes of its state.
         """
         self._core.begin_run(
             operator.index(seed),
@@ -142,7 +149,9 @@ class Engine:
         self._seeds[0] = operator.index(seed)
 
     def end_run(self) -> dict[str, Any]:
-        """What came of it: {"failures": [{"what", "time_s", "text"}], "metrics": {name: number}, "track": [(s, m, m)]}."""
+        """What came of it: {"failures": [{"what", "time_s", "text"}], "metrics": {name: number},
+        "track": [(s, m, m)]}.
+        """
         verdict: dict[str, Any] = self._core.end_run()
         return verdict
 
@@ -159,11 +168,13 @@ class Engine:
         return self._core.state_hash(self._checked(world))
 
     def observe(self, name: str) -> NDArray[Any]:
-        """An array of (worlds, robots, ...) that always shows the newest message of each robot's device.
+        """An array of (worlds, robots, ...) that always shows the newest message of each robot's
+        device.
 
-        name: DEVICE.FIELD; the device by its name ("LRF.ranges") or its kind ("lrf.ranges", "odometry.theta", "pose.pos"), the
-        field as in the message type. It is a view of the engine's memory, cannot be written to, and is written anew by ``step`` and
-        ``reset``: copy what you keep. Robots are those that have the device, in the order of the world file.
+        name: DEVICE.FIELD; the device by its name ("LRF.ranges") or its kind ("lrf.ranges",
+        "odometry.theta", "pose.pos"), the field as in the message type. It is a view of the
+        engine's memory, cannot be written to, and is written anew by ``step`` and ``reset``: copy
+        what you keep. Robots are those that have the device, in the order of the world file.
         """
         device, dot, field = name.rpartition(".")
         if not dot or not device or not field:
@@ -177,9 +188,10 @@ class Engine:
     def step(self, commands: ArrayLike | None = None, n: int = 1) -> None:
         """Computes n states of every copy.
 
-        commands: velocities on the states that there are, broadcast to (worlds, robots, 2) as (m/s ahead, rad/s) or
-        (worlds, robots, 3) as (m/s ahead, m/s left, rad/s); a row with NaN is no command. What was commanded before holds, until
-        the robot's watchdog (600 ms of sim time by default).
+        commands: velocities on the states that there are, broadcast to (worlds, robots, 2) as (m/s
+        ahead, rad/s) or (worlds, robots, 3) as (m/s ahead, m/s left, rad/s); a row with NaN is no
+        command. What was commanded before holds, until the robot's watchdog (600 ms of sim time by
+        default).
         """
         if commands is not None:
             self._core.drive(self._velocities(commands))
@@ -192,7 +204,8 @@ class Engine:
         self._core.step(count)
 
     def command(self, world: int, channel: str, message: Any) -> None:
-        """A message on one of the channels that take commands ("p3at/move"), on the state that the copy is in.
+        """A message on one of the channels that take commands ("p3at/move"), on the state that the
+        copy is in.
 
         message: one of ``ruedo.lcmtypes``, or its bytes.
         """
@@ -203,9 +216,11 @@ class Engine:
         )
 
     def touching(self) -> NDArray[np.int32]:
-        """(worlds, driven robots): in how many of the states of the last ``step`` a robot touched something that does not carry it.
+        """(worlds, driven robots): in how many of the states of the last ``step`` a robot touched
+        something that does not carry it.
 
-        A contact counts whose normal is nearer to level than to upright. Like what ``observe`` gives, it is a view.
+        A contact counts whose normal is nearer to level than to upright. Like what ``observe``
+        gives, it is a view.
         """
         array: NDArray[np.int32] = self._core.touching()
         return array
@@ -218,8 +233,9 @@ class Engine:
     ) -> None:
         """Makes copies as they were at the beginning; what follows equals a fresh run.
 
-        worlds: an index, several, a mask, or None for all. seed: of each of them, or one for the first, counted up; None: the one that
-        the copy has. text: another world for these copies from now on, as SDF, with the same robots and devices.
+        worlds: an index, several, a mask, or None for all. seed: of each of them, or one for the
+        first, counted up; None: the one that the copy has. text: another world for these copies
+        from now on, as SDF, with the same robots and devices.
         """
         indices = self._indices(worlds)
         if seed is not None:
@@ -237,7 +253,9 @@ class Engine:
         )
 
     def messages(self) -> list[tuple[int, int, str, bytes]]:
-        """(world, step, channel, bytes) of every message of the last call of ``step`` or ``reset``; with ``record=True``."""
+        """(world, step, channel, bytes) of every message of the last call of ``step`` or ``reset``;
+        with ``record=True``.
+        """
         return self._core.messages()
 
     def close(self) -> None:

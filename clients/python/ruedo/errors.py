@@ -1,6 +1,7 @@
 """What can go wrong, in words that say what to do next.
 
-Every error of this package is a RuedoError. Bad arguments (NaN, a radius of 0) are plain ValueErrors.
+Every error of this package is a RuedoError. Bad arguments (NaN, a radius of 0) are plain
+ValueErrors.
 """
 
 from __future__ import annotations
@@ -51,4 +52,6 @@ class RequestError(RuedoError):
 
 
 class LeaseLost(RequestError):
-    """Lockstep goes on without this client, which was silent for too long; the next step() takes part again."""
+    """Lockstep goes on without this client, which was silent for too long; the next step() takes
+    part again.
+    """

@@ -21,7 +21,9 @@ class Placed(Protocol):
 
 
 def rotation(orientation: Floats) -> Floats:
-    """The (3, 3) matrix of a unit quaternion w, x, y, z: from the frame of what is turned to that which it is given in."""
+    """The (3, 3) matrix of a unit quaternion w, x, y, z: from the frame of what is turned to that
+    which it is given in.
+    """
     w, x, y, z = orientation
     return np.array(
         [

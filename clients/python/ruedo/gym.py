@@ -4,18 +4,24 @@
     import ruedo.gym                                # registers them
 
     env = gymnasium.make("ruedo/Navigate-v0", beams=24)
-    envs = gymnasium.make_vec("ruedo/Navigate-v0", num_envs=64, beams=24)     # one engine, all cores
+    # One engine, all cores
+    envs = gymnasium.make_vec("ruedo/Navigate-v0", num_envs=64, beams=24)
 
 **Navigate-v0**: a Pioneer 3-AT drives to a goal through a room that is another one in each episode.
 
-- Observation, float32: ``beams`` ranges of a scan over 180 degrees, from right to left, divided by 8 m and cut at 1; the goal's
-  distance divided by 8 m, cut at 1, and the cosine and sine of its bearing; the speed ahead in units of 0.5 m/s and the turn rate in
-  rad/s, from the odometry. Sensors have their noise; the goal's place is that of the true pose.
-- Action, float32 in [-1, 1]: the speed ahead, from 0 to 0.5 m/s, and the turn rate, 1 rad/s at 1; held for 0.1 s.
-- Reward: metres nearer to the goal (of the straight way), + 5 at the goal, - 5 for touching something, - 0.01 each step.
-- An episode is terminated at the goal (nearer than 0.4 m) or by touching something, truncated after 400 actions (40 s).
-  ``info["success"]`` and ``info["collision"]`` say which, apart from the reward.
-- ``split="train"`` draws its rooms from the numbers below 1 000 000, ``split="test"`` from those above: no room is in both.
+- Observation, float32: ``beams`` ranges of a scan over 180 degrees, from right to left, divided by
+  8 m and cut at 1; the goal's distance divided by 8 m, cut at 1, and the cosine and sine of its
+  bearing; the speed ahead in units of 0.5 m/s and the turn rate in rad/s, from the odometry.
+  Sensors have their noise; the goal's place is that of the true pose.
+- Action, float32 in [-1, 1]: the speed ahead, from 0 to 0.5 m/s, and the turn rate, 1 rad/s at 1;
+  held for 0.1 s.
+- Reward: metres nearer to the goal (of the straight way), + 5 at the goal, - 5 for touching
+  something, - 0.01 each step.
+- An episode is terminated at the goal (nearer than 0.4 m) or by touching something, truncated after
+  400 actions (40 s). ``info["success"]`` and ``info["collision"]`` say which, apart from the
+  reward.
+- ``split="train"`` draws its rooms from the numbers below 1 000 000, ``split="test"`` from those
+  above: no room is in both.
 """
 
 from __future__ import annotations
@@ -48,7 +54,7 @@ MOST_ACTIONS = 400
 Info = dict[str, Any]
 
 
-class NavigateVectorEnv(VectorEnv):  # type: ignore[misc]    # gymnasium's generics
+class NavigateVectorEnv(VectorEnv):
     """Navigate-v0, ``num_envs`` of them in one engine. The modes of autoreset are Gymnasium's."""
 
     metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
@@ -91,7 +97,8 @@ class NavigateVectorEnv(VectorEnv):  # type: ignore[misc]    # gymnasium's gener
         )
         low = np.concatenate([np.zeros(beams + 1), [-1.0, -1.0, -2.0, -4.0]]).astype(np.float32)
         high = np.concatenate([np.ones(beams + 1), [1.0, 1.0, 2.0, 4.0]]).astype(np.float32)
-        self.single_observation_space = spaces.Box(low, high, dtype=np.float32)
+        self._box = spaces.Box(low, high, dtype=np.float32)
+        self.single_observation_space = self._box
         self.single_action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -109,7 +116,9 @@ class NavigateVectorEnv(VectorEnv):  # type: ignore[misc]    # gymnasium's gener
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: Info | None = None
     ) -> tuple[NDArray[np.float32], Info]:
-        """Begins new episodes: in all environments, or in those of ``options={"reset_mask": ...}``."""
+        """Begins new episodes: in all environments, or in those of ``options={"reset_mask":
+        ...}``.
+        """
         if isinstance(seed, list):
             self._generators = [np.random.default_rng(one) for one in seed]
         elif seed is not None or not hasattr(self, "_generators"):
@@ -213,12 +222,10 @@ class NavigateVectorEnv(VectorEnv):  # type: ignore[misc]    # gymnasium's gener
             self._turn[:, None],
         ]
         observations = np.concatenate(columns, axis=1).astype(np.float32)
-        return np.clip(
-            observations, self.single_observation_space.low, self.single_observation_space.high
-        )
+        return np.clip(observations, self._box.low, self._box.high)
 
 
-class NavigateEnv(gymnasium.Env):  # type: ignore[misc]
+class NavigateEnv(gymnasium.Env):
     """Navigate-v0, one of them."""
 
     metadata = {"render_modes": []}

@@ -1,7 +1,8 @@
 """launch(): a private server on a free port, which ends when its client does, however that ends.
 
-The server watches its standard input (--watch-stdin) and ends when the pipe closes: the kernel closes it
-for a client that was killed, too, and it works from any thread of a notebook, as PR_SET_PDEATHSIG does not.
+The server watches its standard input (--watch-stdin) and ends when the pipe closes: the kernel
+closes it for a client that was killed, too, and it works from any thread of a notebook, as
+PR_SET_PDEATHSIG does not.
 """
 
 from __future__ import annotations
@@ -15,9 +16,10 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import IO, Any, Literal
 from urllib.parse import urlsplit
-from typing import IO, Any, Literal, Mapping, Sequence
 
 from .address import has_multicast_route
 from .errors import LaunchError, NoServer
@@ -27,8 +29,8 @@ from .world import World
 
 
 def find_ruedo() -> str:
-    """The ruedo program: RUEDO, else that of the installation which this package belongs to, else PATH, else one built in a
-    folder above this package."""
+    """The ruedo program: RUEDO, else that of the installation which this package belongs to, else
+    PATH, else one built in a folder above this package."""
     named = os.environ.get("RUEDO")
     if named:
         if not os.access(named, os.X_OK) or os.path.isdir(named):
@@ -74,12 +76,15 @@ def launch(
 ) -> Simulation:
     """Starts `ruedo run WORLD` and joins it.
 
-    world: a file, the name of one that comes with Ruedo or lies in a folder of RUEDO_PATH ("arena"), or a World; text: the world's SDF or URDF itself instead.
-    rate: sim time per real time, "max" or math.inf: as fast as it goes; None: real time. lockstep: how many clients
-    the run waits for (True: for this one). spawn: models as "p3at@0,0" or "p3at:NAME@X,Y,YAW". disable: devices that are left out,
-    "p3at/camera". set: {"p3at/lrf.rate": 20}. noise: False gives ideal values. args: further options of `ruedo run`. url: None takes a local
-    socket, which no other user of the machine reads, and plain LCM programs do not know; "auto" a free port for LCM. name: of this
-    client. timeout: s of real time until the world is loaded. verbose: show what the server prints (else it is shown in the errors alone). Raises LaunchError with what the server said.
+    world: a file, the name of one that comes with Ruedo or lies in a folder of RUEDO_PATH
+    ("arena"), or a World; text: the world's SDF or URDF itself instead. rate: sim time per real
+    time, "max" or math.inf: as fast as it goes; None: real time. lockstep: how many clients the run
+    waits for (True: for this one). spawn: models as "p3at@0,0" or "p3at:NAME@X,Y,YAW". disable:
+    devices that are left out, "p3at/camera". set: {"p3at/lrf.rate": 20}. noise: False gives ideal
+    values. args: further options of `ruedo run`. url: None takes a local socket, which no other
+    user of the machine reads, and plain LCM programs do not know; "auto" a free port for LCM. name:
+    of this client. timeout: s of real time until the world is loaded. verbose: show what the server
+    prints (else it is shown in the errors alone). Raises LaunchError with what the server said.
     """
     options = _options(seed, rate, args, lockstep, spawn, disable, set, noise)
     program = find_ruedo()
@@ -176,8 +181,8 @@ class _Folder:
 
 
 def _free_url() -> tuple[socket.socket, str]:
-    """A URL that nothing else uses. The TCP socket on the same port, kept open, is the token by which launches of
-    any process, in any language, stay apart from each other."""
+    """A URL that nothing else uses. The TCP socket on the same port, kept open, is the token by
+    which launches of any process, in any language, stay apart from each other."""
     for _ in range(100):
         token = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         token.bind(("127.0.0.1", 0))
@@ -223,7 +228,8 @@ class _Server:
         self._token = token
         self._output: IO[bytes] | None = None if verbose else tempfile.TemporaryFile()
         try:
-            # A session of its own: Ctrl-C in a terminal reaches the client alone, which may still use the server.
+            # A session of its own: Ctrl-C in a terminal reaches the client alone, which may still
+            # use the server.
             self._process = subprocess.Popen(
                 command,
                 stdin=subprocess.PIPE,
@@ -245,7 +251,9 @@ class _Server:
         return f"the server ended ({how}): {self._last_lines() or 'it said nothing'}\n(`{' '.join(self._command)}`)"
 
     def await_port(self, url: str, until: float) -> None:
-        """Waits for a tcpq or unix server to listen; one that does not until then is the connection's affair."""
+        """Waits for a tcpq or unix server to listen; one that does not until then is the
+        connection's affair.
+        """
         parts = urlsplit(url)
         if parts.scheme not in ("tcpq", "unix"):
             return

@@ -1,7 +1,8 @@
-"""The client's side of lockstep: grants, and the messages of every step, whatever is lost on the way.
+"""The client's side of lockstep: grants, and the messages of every step, whatever is lost on the
+way.
 
-The caller of step() receives for itself meanwhile: handing each message from thread to thread would take longer
-than the step.
+The caller of step() receives for itself meanwhile: handing each message from thread to thread would
+take longer than the step.
 """
 
 from __future__ import annotations
@@ -11,8 +12,10 @@ import struct
 import time
 import zlib
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, Sequence, TypeVar
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -66,7 +69,8 @@ class Message(NamedTuple):
 class Observations(State):
     """What step() saw: the state after its last step, and the sensor messages of all its steps.
 
-    messages: in the order in which the simulation made them; empty when a paused simulation is stepped.
+    messages: in the order in which the simulation made them; empty when a paused simulation is
+    stepped.
     """
 
     messages: list[Message]
@@ -78,7 +82,9 @@ class Observations(State):
         return f"Observations(step={self.step}, time={self.time:g}, {len(self.messages)} messages)"
 
     def all(self, stream: Stream[T]) -> list[T]:
-        """The samples of a device or stream, decoded, in order; none when none was due. Raises TypeMismatch."""
+        """The samples of a device or stream, decoded, in order; none when none was due. Raises
+        TypeMismatch.
+        """
         return [_sample(m.data, stream) for m in self.messages if m.channel == stream.channel]
 
     def latest(self, stream: Stream[T]) -> T | None:
@@ -134,7 +140,7 @@ def _sample(data: bytes, stream: Stream[T]) -> T:
 class _Entry:
     """Of a manifest. data: as much as is here; None: nothing."""
 
-    __slots__ = ("channel", "sequence", "size", "crc", "data", "here")
+    __slots__ = ("channel", "crc", "data", "here", "sequence", "size")
 
     def __init__(self, channel: int, sequence: int, size: int, crc: int, data: bytes | None):
         self.channel, self.sequence, self.size, self.crc = channel, sequence, size, crc
@@ -142,7 +148,7 @@ class _Entry:
 
 
 class _Step:
-    __slots__ = ("utime", "state_hash", "nparts", "parts", "missing")
+    __slots__ = ("missing", "nparts", "parts", "state_hash", "utime")
 
     def __init__(self, utime: int, state_hash: int, nparts: int):
         self.utime, self.state_hash, self.nparts = utime, state_hash, nparts
@@ -267,9 +273,7 @@ class Stepper:
         for index, name in wanted.items():
             self._early.setdefault(index, deque(maxlen=_MOST_EARLY))
             if index not in self._sources:
-                source = self._sim._bus.subscribe(
-                    name, lambda data, index=index: self._on_message(index, data)
-                )
+                source = self._sim._bus.subscribe(name, partial(self._on_message, index))
                 self._sources[index] = (name, source)
         self._info = info
 
@@ -286,8 +290,8 @@ class Stepper:
         return encoded
 
     def _wait(self, until: int, timeout: float) -> None:
-        """Until the states up to `until` are here with all their messages. After a silence the grant, or the request
-        for what is missing, goes out again, sooner at first."""
+        """Until the states up to `until` are here with all their messages. After a silence the
+        grant, or the request for what is missing, goes out again, sooner at first."""
         if self._taken and self._have >= until:
             return
         repeat, deadline = _FIRST_REPEAT, time.monotonic() + timeout
@@ -387,7 +391,8 @@ class Stepper:
         crc, size = zlib.crc32(data), len(data)
         for step in self._steps.values():  # a tick may come before its messages
             if step.missing and self._fill(step, channel, crc, data):
-                return self._progress()
+                self._progress()
+                return
         self._early[channel].append(
             (crc, size, int.from_bytes(data[8:16], "big", signed=True), data)
         )

@@ -12,19 +12,22 @@ from .errors import NotSupported
 
 
 def read_log(path: str | os.PathLike[str], channels: list[str] | None = None) -> dict[str, Any]:
-    """The messages of a log, a DataFrame for each channel: the index is `time` (s of sim time), the columns are the type's
-    fields; an array's cells are lists. channels: those that are wanted, None: all whose type is one of Ruedo's.
+    """The messages of a log, a DataFrame for each channel: the index is `time` (s of sim time), the
+    columns are the type's fields; an array's cells are lists. channels: those that are wanted,
+    None: all whose type is one of Ruedo's.
 
-    Needs pandas (pip install 'ruedo[logs]'). A message that is no valid one of its type is left out.
+    Needs pandas (pip install 'ruedo[logs]'). A message that is no valid one of its type is left
+    out.
     """
     try:
         import pandas
     except ImportError:
         raise NotSupported("read_log() needs pandas: pip install 'ruedo[logs]'") from None
-    types = {
+    every: dict[str, Any] = vars(lcmtypes)
+    types: dict[bytes, Any] = {
         one._get_packed_fingerprint(): one
-        for name, one in vars(lcmtypes).items()
-        if name.endswith("_t") and isinstance(one, type)
+        for one in every.values()
+        if hasattr(one, "_get_packed_fingerprint")
     }
     rows: dict[str, list[dict[str, Any]]] = {}
     if not os.path.isfile(path):

@@ -17,8 +17,8 @@ FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 
 @dataclass(frozen=True, eq=False)
 class OccupancyMap:
-    """cells (rows, columns): 0 free, 100 occupied, -1 unknown; row 0 is the southernmost, so that cells[row, column] is about
-    origin + resolution * (column + 0.5, row + 0.5), in m."""
+    """cells (rows, columns): 0 free, 100 occupied, -1 unknown; row 0 is the southernmost, so that
+    cells[row, column] is about origin + resolution * (column + 0.5, row + 0.5), in m."""
 
     cells: NDArray[np.int8]
     resolution: float  # m, of a cell
@@ -44,7 +44,8 @@ class OccupancyMap:
 
 
 def load_map(path: str | os.PathLike[str]) -> OccupancyMap:
-    """Reads NAME.yaml and the picture that it names: what ``ruedo map`` writes and map_server reads. Pictures other than PGM need Pillow.
+    """Reads NAME.yaml and the picture that it names: what ``ruedo map`` writes and map_server
+    reads. Pictures other than PGM need Pillow.
 
     Raises ValueError, which names the file and what is wrong with it.
     """

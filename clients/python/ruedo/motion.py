@@ -1,4 +1,6 @@
-"""Driving: commands that are repeated until changed, and motion primitives with a handle to wait on."""
+"""Driving: commands that are repeated until changed, and motion primitives with a handle to wait
+on.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("ruedo")
 
-# A primitive that no status has shown after this many statuses and seconds was lost or replaced at once.
+# A primitive that no status has shown after this many statuses and seconds was lost or replaced at
+# once.
 _UNSEEN_STATUSES = 20
 _UNSEEN_SECONDS = 1.0
 
@@ -45,8 +48,8 @@ class Motion:
         return self.state in ("done", "ended", "refused")
 
     def wait(self, timeout: float | None = None) -> Motion:
-        """Waits until it is done, at most timeout seconds of real time. Raises MotionError when it ended early or
-        was refused, Timeout when it still runs; the robot goes on then."""
+        """Waits until it is done, at most timeout seconds of real time. Raises MotionError when it
+        ended early or was refused, Timeout when it still runs; the robot goes on then."""
         deadline = None if timeout is None else time.monotonic() + timeout
         with self._news:
             while not self.done:
@@ -102,7 +105,9 @@ class Motion:
 
 
 class Driver:
-    """The commands to one robot: what is repeated, and the primitives under way. The simulation has one for each name."""
+    """The commands to one robot: what is repeated, and the primitives under way. The simulation has
+    one for each name.
+    """
 
     def __init__(self, sim: Simulation, robot: str):
         self._sim, self._robot = sim, robot

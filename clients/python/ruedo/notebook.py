@@ -1,4 +1,6 @@
-"""How samples show in a notebook: pictures as pictures, scans as small plots. No package but numpy is needed."""
+"""How samples show in a notebook: pictures as pictures, scans as small plots. No package but numpy
+is needed.
+"""
 
 from __future__ import annotations
 

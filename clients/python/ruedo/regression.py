@@ -1,9 +1,12 @@
-"""pytest's fixture `ruedo_regression`: runs a world with a client as fast as it goes, on a port of its own, and
-fails with the first thing that is not as expected. It is there once the package `ruedo` is installed.
+"""pytest's fixture `ruedo_regression`: runs a world with a client as fast as it goes, on a port of
+its own, and fails with the first thing that is not as expected. It is there once the package
+`ruedo` is installed.
 
     def test_drives_to_the_door(ruedo_regression):
-        ruedo_regression("office.sdf", client=["python3", "drive.py"], duration=60, goal=(3.0, 2.0), radius=0.3, by=50.0,
-                         no_contact=True, golden="goldens/door.lcm", tolerances=["*/pose:pos=abs:1e-3"])
+        ruedo_regression("office.sdf", client=["python3", "drive.py"], duration=60, goal=(3.0, 2.0),
+        radius=0.3, by=50.0,
+                         no_contact=True, golden="goldens/door.lcm",
+                         tolerances=["*/pose:pos=abs:1e-3"])
 
 RUEDO_RENEW=1 in the environment writes the golden logs anew.
 """
@@ -14,9 +17,10 @@ import os
 import shlex
 import subprocess
 import sys
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Callable, Sequence
+from typing import Any
 
 import pytest
 
@@ -65,10 +69,10 @@ def run_regression(
 ) -> Regression:
     """`ruedo regress` with these options; raises RegressionFailed.
 
-    client, script: words, or a line for a shell; the client finds the run by LCM_DEFAULT_URL, the script its log by
-    RUEDO_LOG. duration, by: s of sim time; goal, radius, clearance, odometry_error: m. lockstep: clients to wait for.
-    options: more of `ruedo regress`, such as ["--spawn", "p3at@1,2"]. folder: where client and script run. timeout: s of
-    real time.
+    client, script: words, or a line for a shell; the client finds the run by LCM_DEFAULT_URL, the
+    script its log by RUEDO_LOG. duration, by: s of sim time; goal, radius, clearance,
+    odometry_error: m. lockstep: clients to wait for. options: more of `ruedo regress`, such as
+    ["--spawn", "p3at@1,2"]. folder: where client and script run. timeout: s of real time.
     """
     command = [
         find_ruedo(),
@@ -133,17 +137,17 @@ def run_regression(
 
 @pytest.fixture
 def ruedo_regression(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[..., Regression]:
-    """run_regression() with the log in the test's temporary folder; world and golden are relative to the test's file,
-    and client and script run beside it."""
+    """run_regression() with the log in the test's temporary folder; world and golden are relative
+    to the test's file, and client and script run beside it."""
     here = request.path.parent
 
-    def run(world: _PathLike, **options: object) -> Regression:
+    def run(world: _PathLike, **options: Any) -> Regression:
         options.setdefault("record", tmp_path / "run.lcm")
         options.setdefault("folder", here)
         if options.get("golden") is not None:
             options["golden"] = here / str(options["golden"])
         beside = here / world
-        result = run_regression(beside if beside.exists() else world, **options)  # type: ignore[arg-type]
+        result = run_regression(beside if beside.exists() else world, **options)
         print(result.output, file=sys.stderr)
         return result
 

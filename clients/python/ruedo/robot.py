@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 import warnings
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from . import lcmtypes
 from .errors import NotSupported, UnknownName
+from .geometry import Floats
 from .lockstep import Command
 from .motion import Motion
 from .samples import (
     CameraInfo,
     Contact,
-    Floats,
     Image,
     Imu,
     Joints,
@@ -37,10 +38,10 @@ T = TypeVar("T")
 class Device(Stream[T]):
     """A sensor of a robot: latest(), next() and on_sample() deliver its samples.
 
-    kind: "lrf", "sonar", "odometry", "camera", "pose", "motion", "imu", "contact", ...
-    position (3,) m and orientation (4,) w, x, y, z: the device's frame in base_link at the start.
-    range_min, range_max: m. fov_horizontal, fov_vertical: rad. width, height: rays and layers,
-    transducers, or pixels. elements (n, 6): a sonar's transducers, x, y, z, roll, pitch, yaw in its frame.
+    kind: "lrf", "sonar", "odometry", "camera", "pose", "motion", "imu", "contact", ... position
+    (3,) m and orientation (4,) w, x, y, z: the device's frame in base_link at the start. range_min,
+    range_max: m. fov_horizontal, fov_vertical: rad. width, height: rays and layers, transducers, or
+    pixels. elements (n, 6): a sonar's transducers, x, y, z, roll, pitch, yaw in its frame.
     """
 
     def __init__(self, sim: Simulation, robot: str, info: Any, channel: Any):
@@ -60,7 +61,9 @@ class Device(Stream[T]):
 
 
 class Camera(Device[Image]):
-    """A camera; its further channels, where the world file asks for them: depth, labels, intrinsics."""
+    """A camera; its further channels, where the world file asks for them: depth, labels,
+    intrinsics.
+    """
 
     @property
     def depth(self) -> Stream[Image]:
@@ -81,8 +84,9 @@ class Camera(Device[Image]):
 class Robot:
     """A robot of the simulation. Lengths in m, angles in rad, counter-clockwise is positive.
 
-    drive: "kinematic", "wheels", or "" for a robot that only senses; "kinematic mecanum" and its like name another steering. watchdog: s of sim time without a
-    command after which it stops, 0: never. wheels: names of the wheel joints.
+    drive: "kinematic", "wheels", or "" for a robot that only senses; "kinematic mecanum" and its
+    like name another steering. watchdog: s of sim time without a command after which it stops, 0:
+    never. wheels: names of the wheel joints.
     """
 
     def __init__(self, sim: Simulation, name: str):
@@ -209,14 +213,17 @@ class Robot:
     # Driving.
 
     def set_velocity(self, v: float, omega: float, vy: float = 0.0) -> None:
-        """Drives with v (m/s ahead) and omega (rad/s), within the robot's limits, until the next command of any
-        kind: the command is repeated in the background, so that the watchdog does not stop the robot. vy: m/s to the
-        left, of a robot that moves sideways; others refuse it."""
+        """Drives with v (m/s ahead) and omega (rad/s), within the robot's limits, until the next
+        command of any kind: the command is repeated in the background, so that the watchdog does
+        not stop the robot. vy: m/s to the left, of a robot that moves sideways; others refuse
+        it."""
         command = self.velocity_command(v, omega, vy)
         self._sim._driver(self.name).hold(command.channel, command.data)
 
     def set_wheels(self, left: float, right: float) -> None:
-        """Turns the wheels of the left and right side (rad/s, positive ahead), until the next command."""
+        """Turns the wheels of the left and right side (rad/s, positive ahead), until the next
+        command.
+        """
         command = self.wheel_command(left, right)
         self._sim._driver(self.name).hold(command.channel, command.data)
 
@@ -247,8 +254,8 @@ class Robot:
         deceleration: float = 0.0,
         radius: float = 0.0,
     ) -> Command:
-        """A motion primitive for Simulation.step(). kind: "advance", "rotate", "heading", "arc" or "stop"; value in m or
-        rad, of a stop 0; limits and radius as in advance() and its like."""
+        """A motion primitive for Simulation.step(). kind: "advance", "rotate", "heading", "arc" or
+        "stop"; value in m or rad, of a stop 0; limits and radius as in advance() and its like."""
         kinds = {
             name: getattr(lcmtypes.move_command_t, name.upper())
             for name in ("advance", "rotate", "heading", "arc", "stop")
@@ -268,9 +275,11 @@ class Robot:
         view: tuple[float, float] = (0.0, 1.0),
         place: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> Command:
-        """A fault for Simulation.step(), or for inject(). kind and target as in proto/fault_t.lcm: "freeze" of "lrf", "kidnapped".
+        """A fault for Simulation.step(), or for inject(). kind and target as in proto/fault_t.lcm:
+        "freeze" of "lrf", "kidnapped".
 
-        duration: s of sim time, 0: to the end. view: of "blocked", parts of the field of view. place: of "kidnapped", m, m, rad.
+        duration: s of sim time, 0: to the end. view: of "blocked", parts of the field of view.
+        place: of "kidnapped", m, m, rad.
         """
         fault = lcmtypes.fault_t()
         fault.utime, fault.kind, fault.target = self._sim._utime, kind, target
@@ -280,7 +289,9 @@ class Robot:
         return Command(self._input("fault_t"), fault.encode())
 
     def inject(self, kind: str, target: str = "", **how: Any) -> None:
-        """Something goes wrong from now on; what it takes is fault_command()'s. The server's log says what acted; a wrong one is ignored."""
+        """Something goes wrong from now on; what it takes is fault_command()'s. The server's log
+        says what acted; a wrong one is ignored.
+        """
         command = self.fault_command(kind, target, **how)
         self._sim._bus.publish(command.channel, command.data)
 
@@ -295,8 +306,8 @@ class Robot:
         acceleration: float = 0.0,
         deceleration: float = 0.0,
     ) -> Motion:
-        """Drives straight on by a distance (m, negative: back), and comes to rest. Returns at once; wait() on what
-        it returns waits for the end. Limits in m/s and m/s^2, 0: the robot's own."""
+        """Drives straight on by a distance (m, negative: back), and comes to rest. Returns at once;
+        wait() on what it returns waits for the end. Limits in m/s and m/s^2, 0: the robot's own."""
         return self._move(
             "advance",
             lcmtypes.move_command_t.ADVANCE,
@@ -310,7 +321,9 @@ class Robot:
     def rotate(
         self, angle: float, speed: float = 0.0, acceleration: float = 0.0, deceleration: float = 0.0
     ) -> Motion:
-        """Turns on the spot by an angle (rad, more than a turn is allowed). Limits in rad/s and rad/s^2."""
+        """Turns on the spot by an angle (rad, more than a turn is allowed). Limits in rad/s and
+        rad/s^2.
+        """
         _radians("rotate", angle, 4.0 * math.pi)
         return self._move(
             "rotate", lcmtypes.move_command_t.ROTATE, angle, 0.0, speed, acceleration, deceleration
@@ -323,7 +336,9 @@ class Robot:
         acceleration: float = 0.0,
         deceleration: float = 0.0,
     ) -> Motion:
-        """Turns on the spot, the shorter way, to a heading (rad, in the frame odom). Limits in rad/s and rad/s^2."""
+        """Turns on the spot, the shorter way, to a heading (rad, in the frame odom). Limits in
+        rad/s and rad/s^2.
+        """
         _radians("turn_to", heading, 2.0 * math.pi)
         return self._move(
             "turn_to",
@@ -343,8 +358,8 @@ class Robot:
         acceleration: float = 0.0,
         deceleration: float = 0.0,
     ) -> Motion:
-        """Drives ahead along a circle of a radius (m, > 0) until it has turned by an angle (rad; positive: to the
-        left). Limits in m/s and m/s^2."""
+        """Drives ahead along a circle of a radius (m, > 0) until it has turned by an angle (rad;
+        positive: to the left). Limits in m/s and m/s^2."""
         if not radius > 0.0:
             raise ValueError(
                 f"radius is {radius}: it must be > 0 m; the sign of the angle says left or right"
@@ -405,7 +420,7 @@ class Robot:
             if channel.device == info.name and not channel.input:
                 make = Camera if channel.type == "image_t" else Device
                 stream = self._sim._stream(
-                    channel, lambda: make(self._sim, self.name, info, channel)
+                    channel, partial(make, self._sim, self.name, info, channel)
                 )
                 return stream if isinstance(stream, Device) else None
         return None
@@ -449,7 +464,9 @@ class Robot:
 
 
 def _radians(call: str, angle: float, usual: float) -> None:
-    """Whole degrees that are many turns as radians are taken for a mistake, and named; they are obeyed all the same."""
+    """Whole degrees that are many turns as radians are taken for a mistake, and named; they are
+    obeyed all the same.
+    """
     if abs(angle) > usual and float(angle).is_integer():
         warnings.warn(
             f"{call}({angle:g}) is {abs(angle) / (2.0 * math.pi):.1f} turns: angles are in radians, {call}(math.radians({angle:g}))",

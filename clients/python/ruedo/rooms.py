@@ -1,4 +1,6 @@
-"""Rooms for learning: a walled square with boxes and pillars, as SDF, from a number. The same number gives the same room everywhere."""
+"""Rooms for learning: a walled square with boxes and pillars, as SDF, from a number. The same
+number gives the same room everywhere.
+"""
 
 from __future__ import annotations
 
@@ -41,12 +43,15 @@ def _pillar(name: str, x: float, y: float, radius: float) -> str:
 def make_room(
     number: int, robot: str = "p3at", size: float = 8.0, obstacles: int = 8, start_free: float = 1.0
 ) -> Room:
-    """The room of that number: a square of ``size`` m with obstacles, a start, and a goal at least half of the square away.
+    """The room of that number: a square of ``size`` m with obstacles, a start, and a goal at least
+    half of the square away.
 
-    No obstacle is nearer than ``start_free`` m to the start's or the goal's centre. A way from the start to the goal is likely, not
-    certain: obstacles are drawn without looking at each other, at most 0.8 m wide.
+    No obstacle is nearer than ``start_free`` m to the start's or the goal's centre. A way from the
+    start to the goal is likely, not certain: obstacles are drawn without looking at each other, at
+    most 0.8 m wide.
     """
-    # random.Random's own numbers for one seed are promised to stay; shuffle() and the like are not, so only random() is used.
+    # random.Random's own numbers for one seed are promised to stay; shuffle() and the like are not,
+    # so only random() is used.
     draw = random.Random(number)
 
     def between(low: float, high: float) -> float:

@@ -1,15 +1,16 @@
 """What devices deliver: one frozen class for each kind of sample, with numpy arrays.
 
-SI units and radians. x ahead, y left, z up; quaternions w, x, y, z. `utime` is the sim time of the state
-shown, in integer microseconds; `time` is the same in seconds.
+SI units and radians. x ahead, y left, z up; quaternions w, x, y, z. `utime` is the sim time of the
+state shown, in integer microseconds; `time` is the same in seconds.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,18 +55,20 @@ class _Value:
     """Equal when all is equal, NaN to NaN too; hashed alike; and shown in a line."""
 
     def _key(self) -> tuple[Any, ...]:
-        return tuple(_comparable(getattr(self, field.name)) for field in fields(self))  # type: ignore[arg-type]
+        values: Any = self  # every subclass is a dataclass
+        return tuple(_comparable(getattr(self, field.name)) for field in fields(values))
 
     def __eq__(self, other: object) -> bool:
-        return self is other or (type(self) is type(other) and self._key() == other._key())  # type: ignore[attr-defined]
+        return self is other or (type(self) is type(other) and self._key() == other._key())
 
     def __hash__(self) -> int:
         return hash((type(self), self._key()))
 
     def __repr__(self) -> str:
+        values: Any = self
         shown = ", ".join(
-            f"{field.name}={_short(getattr(self, field.name))}" for field in fields(self)
-        )  # type: ignore[arg-type]
+            f"{field.name}={_short(getattr(self, field.name))}" for field in fields(values)
+        )
         return f"{type(self).__name__}({shown})"
 
 
@@ -92,7 +95,9 @@ def _short(value: Any) -> str:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sample(_Value):
-    """utime: us of sim time. Nothing in a sample can be written into: others may have the same one."""
+    """utime: us of sim time. Nothing in a sample can be written into: others may have the same
+    one.
+    """
 
     utime: int
 
@@ -111,14 +116,14 @@ class Scan(Sample):
     intensities: Floats  # (n,) 0 to 1; (0,) when the device has none
 
     def nearest(self, from_angle: float = -math.pi, to_angle: float = math.pi) -> float:
-        """The smallest range (m) between two angles (rad); +inf when nothing is there, -inf when something
-        is nearer than the device can measure."""
+        """The smallest range (m) between two angles (rad); +inf when nothing is there, -inf when
+        something is nearer than the device can measure."""
         part = self.ranges[(self.angles >= from_angle) & (self.angles <= to_angle)]
         return float(part.min()) if part.size else math.inf
 
     def points(self, device: Placed | None = None, pose: Placed | None = None) -> Floats:
-        """Where the rays ended, of those that returned: (k, 2) m in the device's frame; with the device (``robot.lrf``) (k, 3)
-        in base_link, and with the robot's pose, too, in the world."""
+        """Where the rays ended, of those that returned: (k, 2) m in the device's frame; with the
+        device (``robot.lrf``) (k, 3) in base_link, and with the robot's pose, too, in the world."""
         good = np.isfinite(self.ranges)
         ranges, angles = self.ranges[good], self.angles[good]
         points = np.stack([ranges * np.cos(angles), ranges * np.sin(angles)], axis=1)
@@ -130,7 +135,9 @@ class Scan(Sample):
         return above if pose is None else transformed(above, pose)
 
     def plot(self, axes: Any = None) -> Any:
-        """Draws the scan, x upwards as the robot looks, y to the left. axes: matplotlib's; None: new ones. Returns them. Needs matplotlib."""
+        """Draws the scan, x upwards as the robot looks, y to the left. axes: matplotlib's; None:
+        new ones. Returns them. Needs matplotlib.
+        """
         if axes is None:
             try:
                 from matplotlib import pyplot
@@ -161,7 +168,9 @@ class LidarScan(Sample):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SonarReading(Sample):
-    """The last reading of each of an array's n transducers; their poses are the device's `elements`."""
+    """The last reading of each of an array's n transducers; their poses are the device's
+    `elements`.
+    """
 
     ranges: Floats  # (n,) m from the transducer's face; without an echo: the maximum range
     fired_utime: NDArray[np.int64]  # (n,) us of sim time at which each fired last; -1: not yet
@@ -170,7 +179,9 @@ class SonarReading(Sample):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Odometry(Sample):
-    """What the robot believes of its motion from its wheels; pose of base_link in the frame odom."""
+    """What the robot believes of its motion from its wheels; pose of base_link in the frame
+    odom.
+    """
 
     x: float  # m
     y: float  # m
@@ -210,8 +221,8 @@ class Pose(Sample):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Image(Sample):
-    """A picture. format: "jpeg", "rgb", "bgr", "gray", "gray16" (labels: body index + 1) or "float32"
-    (depth, m along the optical axis, +inf: nothing)."""
+    """A picture. format: "jpeg", "rgb", "bgr", "gray", "gray16" (labels: body index + 1) or
+    "float32" (depth, m along the optical axis, +inf: nothing)."""
 
     width: int  # pixels
     height: int  # pixels
@@ -220,8 +231,9 @@ class Image(Sample):
     data: bytes  # as they came
 
     def array(self) -> NDArray[Any]:
-        """The pixels, rows from the top: (height, width, 3) uint8 in the order R, G, B for "jpeg", "rgb" and
-        "bgr"; (height, width) uint8, uint16 or float32 for the others. Pictures in "jpeg" need Pillow."""
+        """The pixels, rows from the top: (height, width, 3) uint8 in the order R, G, B for "jpeg",
+        "rgb" and "bgr"; (height, width) uint8, uint16 or float32 for the others. Pictures in "jpeg"
+        need Pillow."""
         if self.format == "jpeg":
             try:
                 from PIL import Image as pillow  # type: ignore[import-not-found, unused-ignore]
@@ -532,7 +544,8 @@ def _motion(m: Any) -> MotionStatus:
     )
 
 
-# Message type -> (generated class, conversion to a sample). A type that is not here is delivered as generated.
+# Message type -> (generated class, conversion to a sample). A type that is not here is delivered as
+# generated.
 CONVERSIONS: dict[str, tuple[Any, Callable[[Any], Any]]] = {
     "planar_lidar_t": (lcmtypes.planar_lidar_t, _scan),
     "lidar_t": (lcmtypes.lidar_t, _lidar),

@@ -10,8 +10,9 @@ import struct
 import threading
 import time
 import weakref
+from collections.abc import Callable, Sequence
 from types import TracebackType
-from typing import Any, Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from . import control, lcmtypes
 from .address import is_claimed, resolve_url
 from .bus import Bus, Subscription
 from .control import Session, State
-from .errors import NoServer, NotSupported, RuedoError, Timeout, UnknownName
+from .errors import NoServer, NotSupported, RuedoError, UnknownName
 from .lockstep import Command, Observations, Stepper, observed
 from .motion import Driver
 from .robot import Robot
@@ -48,7 +49,9 @@ _all: weakref.WeakSet[Simulation] = weakref.WeakSet()
 
 
 def _after_fork() -> None:
-    """Connections are the parent's: its threads do not run here, and its server is not this process's to end."""
+    """Connections are the parent's: its threads do not run here, and its server is not this
+    process's to end.
+    """
     for sim in list(_all):
         sim._closed = "this simulation is the parent process's: connect() again after a fork"
         sim._forked()
@@ -157,8 +160,9 @@ class Simulation:
             return self._robots.setdefault(name, Robot(self, name))
 
     def on_new_run(self, callback: Callable[[Simulation], None]) -> Subscription:
-        """Calls callback(simulation) in the receiving thread when another server, or the same one started anew, answers
-        at this address. Commands are not repeated into the new run, and primitives under way have ended."""
+        """Calls callback(simulation) in the receiving thread when another server, or the same one
+        started anew, answers at this address. Commands are not repeated into the new run, and
+        primitives under way have ended."""
         subscription = Subscription(callback, "a new run", self._leave_new_run)
         self._check_open()
         with self._news:
@@ -178,7 +182,8 @@ class Simulation:
                 self._news.wait(0.5)
                 self._check_server()
 
-    # Control. Every call raises NotSupported where the server has no such request, RequestError when it refuses.
+    # Control. Every call raises NotSupported where the server has no such request, RequestError
+    # when it refuses.
 
     def pause(self) -> None:
         """Stops sim time after the current step."""
@@ -190,12 +195,13 @@ class Simulation:
     def step(
         self, n: int = 1, commands: Sequence[Command] = (), timeout: float = 60.0
     ) -> Observations:
-        """Takes n steps, at most timeout seconds of real time each time that nothing goes on, and returns what was seen.
+        """Takes n steps, at most timeout seconds of real time each time that nothing goes on, and
+        returns what was seen.
 
-        In lockstep (`ruedo run --lockstep N`): takes part from the first call on, grants n steps with their commands,
-        and has every message of every step; the first call's observations begin with those of the state it found.
-        n = 0 takes no step. Raises LeaseLost. Else: steps a paused simulation; there are no commands, and the messages
-        are in the streams."""
+        In lockstep (`ruedo run --lockstep N`): takes part from the first call on, grants n steps
+        with their commands, and has every message of every step; the first call's observations
+        begin with those of the state it found. n = 0 takes no step. Raises LeaseLost. Else: steps a
+        paused simulation; there are no commands, and the messages are in the streams."""
         if self.lockstep:
             observations = self._stepper.step(n, commands, timeout)
             self._note_time(observations.utime)
@@ -226,8 +232,8 @@ class Simulation:
         self._session.request(lcmtypes.request_t.RATE, body)
 
     def reset(self, what: str = "all", seed: int | None = None) -> None:
-        """Starts anew. what: "all" (equals a fresh run), "time" (sim time alone) or "poses" (everything back to where
-        it started). seed: of what follows, None: the same again."""
+        """Starts anew. what: "all" (equals a fresh run), "time" (sim time alone) or "poses"
+        (everything back to where it started). seed: of what follows, None: the same again."""
         body = lcmtypes.reset_request_t()
         kinds = {"all": body.ALL, "time": body.TIME, "poses": body.POSES}
         if what not in kinds:
@@ -249,10 +255,10 @@ class Simulation:
         text: str = "",
         z: float | None = None,
     ) -> str:
-        """Adds a model: one of Ruedo's ("p3at"), a file in the server's search folders, or SDF or URDF sent along
-        as text. It stands on the ground below x, y (m), or at z (m) where that is given; heading in rad. The server
-        refuses to put it into something. Returns the model's name: the server numbers one that is taken, unless it
-        was asked for."""
+        """Adds a model: one of Ruedo's ("p3at"), a file in the server's search folders, or SDF or
+        URDF sent along as text. It stands on the ground below x, y (m), or at z (m) where that is
+        given; heading in rad. The server refuses to put it into something. Returns the model's
+        name: the server numbers one that is taken, unless it was asked for."""
         body = lcmtypes.spawn_request_t()
         body.name, body.model, body.text, body.on_ground = name, model, text, z is None
         body.position, body.orientation = [x, y, z or 0.0], _about_z(heading)
@@ -276,7 +282,9 @@ class Simulation:
         z: float = 0.0,
         orientation: Sequence[float] | None = None,
     ) -> None:
-        """Puts a model at x, y, z (m), at rest. orientation: w, x, y, z instead of the heading (rad)."""
+        """Puts a model at x, y, z (m), at rest. orientation: w, x, y, z instead of the heading
+        (rad).
+        """
         body = lcmtypes.set_pose_request_t()
         body.name, body.position = name, [x, y, z]
         body.orientation = list(orientation) if orientation is not None else _about_z(heading)
@@ -291,7 +299,9 @@ class Simulation:
         self._session.request(lcmtypes.request_t.SET_TWIST, body)
 
     def state(self, name: str = "") -> State:
-        """Time, step and state hash, and pose and twist of a model or MODEL/LINK when one is named."""
+        """Time, step and state hash, and pose and twist of a model or MODEL/LINK when one is
+        named.
+        """
         return control.state_of(
             self._session.request(lcmtypes.request_t.GET_STATE, _name_body(name))
         )
@@ -301,15 +311,16 @@ class Simulation:
         self._session.request(lcmtypes.request_t.RESET_ODOMETRY, _name_body(robot))
 
     def snapshot(self, name: str) -> State:
-        """Saves the state under a name, in the folder that the server was started with (`--snapshots FOLDER`), and
-        returns it. A snapshot is what acted on the world so far."""
+        """Saves the state under a name, in the folder that the server was started with
+        (`--snapshots FOLDER`), and returns it. A snapshot is what acted on the world so far."""
         return control.state_of(
             self._session.request(lcmtypes.request_t.SNAPSHOT, _name_body(name), 60.0)
         )
 
     def restore(self, name: str) -> State:
-        """Puts the world back to a snapshot; what follows equals what followed it. The server runs there from the
-        beginning of the snapshot's run, in silence: this takes as long as that part takes at rate max. A new epoch."""
+        """Puts the world back to a snapshot; what follows equals what followed it. The server runs
+        there from the beginning of the snapshot's run, in silence: this takes as long as that part
+        takes at rate max. A new epoch."""
         state = control.state_of(
             self._session.request(lcmtypes.request_t.RESTORE, _name_body(name), 3600.0)
         )
@@ -322,7 +333,9 @@ class Simulation:
         self._session.request(lcmtypes.request_t.QUIT)
 
     def close(self) -> None:
-        """Leaves the simulation: repeated commands end, and so does a server that launch() started."""
+        """Leaves the simulation: repeated commands end, and so does a server that launch()
+        started.
+        """
         if self._closed:  # in a fork's child the lock may be held for ever
             return
         with self._wake:
@@ -373,8 +386,9 @@ class Simulation:
             raise NoServer(self._closed)
 
     def _check_server(self) -> None:
-        """Raises NoServer when the private server ended, or nothing was heard for long; a server gives a sign of life each
-        second. One of this machine that is stopped, or in a debugger, is waited for."""
+        """Raises NoServer when the private server ended, or nothing was heard for long; a server
+        gives a sign of life each second. One of this machine that is stopped, or in a debugger, is
+        waited for."""
         self._check_open()
         ended = self._server_ended()
         if ended:
@@ -518,7 +532,8 @@ class Simulation:
             return
         self._note_time(utime)
         self._stepper.on_tick(data)
-        # Sim time may run a hundred times faster than real time: the watchdog is fed by its beat, too.
+        # Sim time may run a hundred times faster than real time: the watchdog is fed by its beat,
+        # too.
         for driver in tuple(self._repeating):
             driver.repeat()
 
@@ -546,7 +561,9 @@ class Simulation:
         self._bus.publish("ruedo/request", request.encode())
 
     def _refresh_info(self, before: WorldInfo | None = None) -> None:
-        """Waits for another info than `before`, by default than the one that is known. The new one may be there already."""
+        """Waits for another info than `before`, by default than the one that is known. The new one
+        may be there already.
+        """
         before, deadline = before or self._known, time.monotonic() + 10.0
         with self._news:
             while self._known is before and time.monotonic() < deadline:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import TYPE_CHECKING, Any, Callable, Generic, TypeVar
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from . import samples
 from .bus import Subscription
@@ -24,20 +25,24 @@ class Reader(Generic[T]):
         self._seen = 0  # of the samples received, the newest that a call has returned
 
     def latest(self, timeout: float = 5.0) -> T:
-        """The newest sample. Before the first one it waits, at most timeout seconds of real time."""
+        """The newest sample. Before the first one it waits, at most timeout seconds of real
+        time.
+        """
         return self._stream._read(self, False, timeout)
 
     def next(self, timeout: float = 5.0) -> T:
-        """The newest sample that neither latest() nor next() has returned yet; waits for one, at most timeout seconds
-        of real time. A reader slower than the rate skips samples; on_sample() skips none."""
+        """The newest sample that neither latest() nor next() has returned yet; waits for one, at
+        most timeout seconds of real time. A reader slower than the rate skips samples; on_sample()
+        skips none."""
         return self._stream._read(self, True, timeout)
 
 
 class Stream(Reader[T]):
     """Safe to use from any thread; the first use subscribes.
 
-    channel: its name on the bus. type: its message type. rate: Hz of sim time, 0: every step or when
-    something happens. It is a reader of itself; who reads beside it takes a reader() of its own.
+    channel: its name on the bus. type: its message type. rate: Hz of sim time, 0: every step or
+    when something happens. It is a reader of itself; who reads beside it takes a reader() of its
+    own.
     """
 
     def __init__(self, sim: Simulation, channel: str, type: str, fingerprint: int, rate: float):
@@ -57,8 +62,9 @@ class Stream(Reader[T]):
         return Reader(self)
 
     def on_sample(self, callback: Callable[[T], None]) -> Subscription:
-        """Calls callback(sample) in the receiving thread for every sample from now on, until close() of what it returns
-        (or of the simulation). It must be quick, and must not wait for other samples or replies."""
+        """Calls callback(sample) in the receiving thread for every sample from now on, until
+        close() of what it returns (or of the simulation). It must be quick, and must not wait for
+        other samples or replies."""
         subscription = Subscription(callback, self.channel, self._leave)
         self._subscribe()
         with self._news:

@@ -6,8 +6,8 @@ import math
 import select
 import threading
 import time
-from contextlib import nullcontext
-from typing import Any, ContextManager, Protocol
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any, Protocol
 from urllib.parse import urlsplit
 
 import lcm
@@ -17,7 +17,9 @@ from .unix_transport import Receiver, UnixTransport
 
 
 class Transport(Protocol):
-    """receive() is called by one thread at a time, the rest by any, also while receive() waits or its receiver runs."""
+    """receive() is called by one thread at a time, the rest by any, also while receive() waits or
+    its receiver runs.
+    """
 
     def subscribe(self, channel: str) -> None:
         """From the return on, every message of that channel is received."""
@@ -43,19 +45,21 @@ def open_transport(url: str) -> Transport:
 class LcmTransport:
     """LCM, which forbids most of what Transport promises:
 
-    - Its module runs callbacks from handle() without the interpreter's lock until it has read its subscription. Beside
-      that, subscribe() has a subscription called before its fields are set, and unsubscribe() frees it: both crash.
+    - Its module runs callbacks from handle() without the interpreter's lock until it has read its
+      subscription. Beside that, subscribe() has a subscription called before its fields are set,
+      and unsubscribe() frees it: both crash.
     - lcm_unsubscribe() changes the list that a dispatch in another thread walks through.
-    - Over TCP publish(), subscribe() and handle() use one socket without a lock: they mix their bytes, and one closes what
-      another writes to.
+    - Over TCP publish(), subscribe() and handle() use one socket without a lock: they mix their
+      bytes, and one closes what another writes to.
 
-    So one lock is around every call; what comes is handed over after it was released, and waiting is done outside.
+    So one lock is around every call; what comes is handed over after it was released, and waiting
+    is done outside.
     """
 
     def __init__(self, url: str):
         self._lcm = lcm.LCM(url)
         self._lock = threading.Lock()
-        self._sending: ContextManager[Any] = (
+        self._sending: AbstractContextManager[Any] = (
             nullcontext() if url.startswith("udpm:") else self._lock
         )  # multicast has a lock of its own
         self._subscriptions: dict[str, Any] = {}

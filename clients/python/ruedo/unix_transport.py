@@ -1,17 +1,20 @@
-"""A Unix-domain socket to a server on this machine: no other user reads it, nothing is lost, and it is faster.
+"""A Unix-domain socket to a server on this machine: no other user reads it, nothing is lost, and it
+is faster.
 
-The frames are those of LCM's tcpq. All that a server publishes at once comes in one piece, and is taken apart here.
+The frames are those of LCM's tcpq. All that a server publishes at once comes in one piece, and is
+taken apart here.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
 import select
 import socket
 import struct
 import threading
 import time
-from typing import Callable
+from collections.abc import Callable
 
 Receiver = Callable[[str, bytes], None]  # channel, message
 
@@ -76,10 +79,8 @@ class UnixTransport:
             time.sleep(min(seconds, 0.1))
             with self._lock:
                 if not self._closed:
-                    try:
+                    with contextlib.suppress(OSError):
                         self._connect()
-                    except OSError:
-                        pass
             return False
         try:
             if not self._poll.poll(math.ceil(seconds * 1e3)):

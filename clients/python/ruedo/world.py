@@ -9,7 +9,8 @@ from xml.sax.saxutils import escape, quoteattr
 
 
 class World:
-    """Builds a world: a plane, and what is put on it. Lengths in m, angles in rad, positions of centres.
+    """Builds a world: a plane, and what is put on it. Lengths in m, angles in rad, positions of
+    centres.
 
         world = World().wall(0, 3, 6, 3).box(2, 1).robot("p3at", 0, 0)
         with ruedo.launch(world) as sim: ...
@@ -96,7 +97,9 @@ class World:
         *,
         name: str | None = None,
     ) -> World:
-        """model: one of Ruedo's ("p3at"), or a file or model:// that the server finds. name: default the model's."""
+        """model: one of Ruedo's ("p3at"), or a file or model:// that the server finds. name:
+        default the model's.
+        """
         uri = model if "://" in model or os.sep in model else f"model://{model}"
         own = self._unused(name or Path(model).stem)
         self._models.append(

@@ -58,8 +58,9 @@ class WorldInfo:
 class WorldInfoAssembler:
     """Takes messages of ruedo/info as they come. Used by the receiving thread alone.
 
-    The parts of one info share run, epoch and utime. An info that says again what the last one said, which is
-    the rule, is known by its bytes and not decoded: with a thousand robots decoding takes half a second.
+    The parts of one info share run, epoch and utime. An info that says again what the last one
+    said, which is the rule, is known by its bytes and not decoded: with a thousand robots decoding
+    takes half a second.
     """
 
     def __init__(self) -> None:
@@ -68,7 +69,9 @@ class WorldInfoAssembler:
         self._last: list[bytes] = []
 
     def add(self, data: bytes) -> WorldInfo | None:
-        """The info, when this message completed a new one. Raises TypeMismatch for another version of the type."""
+        """The info, when this message completed a new one. Raises TypeMismatch for another version
+        of the type.
+        """
         expected = lcmtypes.world_info_t._get_packed_fingerprint()
         if data[:8] != expected:
             raise TypeMismatch(

@@ -40,8 +40,8 @@ function page() {
       );
     },
     greeted: () => told.push("greeted"),
-    running: (world) => told.push(`runs ${world.robots.map((r) => r.name)}`),
-    complete: (world, scene) => told.push(`${world.robots.map((r) => r.name)} in ${scene}`),
+    running: (world) => told.push(`runs ${world.robots.map((r) => r.name).join()}`),
+    complete: (world, scene) => told.push(`${world.robots.map((r) => r.name).join()} in ${scene}`),
     failed: (words) => told.push(`failed: ${words}`),
   });
   const settle = () => new Promise((resolve) => setTimeout(resolve));

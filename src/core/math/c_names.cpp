@@ -17,13 +17,14 @@
   [[gnu::visibility("hidden")]] float name(float x, float y) noexcept { return ruedo_##name(x, y); }
 
 extern "C" {
-OURS(sin)
-OURS(cos) OURS(tan) OURS(asin) OURS(acos) OURS(atan) OURS(exp) OURS(exp2) OURS(expm1) OURS(log)
-    OURS(log10) OURS_2(atan2) OURS_2(pow) OURS_2(hypot) OURS_F(sinf) OURS_F(cosf) OURS_F(tanf)
-        OURS_F(asinf) OURS_F(acosf) OURS_F(atanf) OURS_F(expf) OURS_F(logf) OURS_2F(atan2f)
-            OURS_2F(powf)
+// clang-format off
+OURS(sin) OURS(cos) OURS(tan) OURS(asin) OURS(acos) OURS(atan) OURS(exp) OURS(exp2) OURS(expm1)
+OURS(log) OURS(log10) OURS_2(atan2) OURS_2(pow) OURS_2(hypot)
+OURS_F(sinf) OURS_F(cosf) OURS_F(tanf) OURS_F(asinf) OURS_F(acosf) OURS_F(atanf)
+OURS_F(expf) OURS_F(logf) OURS_2F(atan2f) OURS_2F(powf)
+    // clang-format on
 
-                void ruedo_sincos(double, double*, double*);
+    void ruedo_sincos(double, double*, double*);
 [[gnu::visibility("hidden")]] void sincos(double x, double* s, double* c) noexcept {
   ruedo_sincos(x, s, c);
 }

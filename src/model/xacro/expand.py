@@ -2,13 +2,15 @@
 
     expand.py FILE OUT [--folder FOLDER]... [--argument NAME:=VALUE]...
 
-OUT gets the robot, each element with the attribute ruedo_at="FILE:LINE" that says where it was written; OUT.files the files
-that were read, a line each; OUT.missing "FILE\tWHAT" for includes that are not there and were passed over. $(find PKG) is
-the folder whose package.xml has that name: above the file, beside its package, or in the folders given. Errors go to stderr,
-in one line; the exit code is 1, or 2 where the package xacro is missing.
+OUT gets the robot, each element with the attribute ruedo_at="FILE:LINE" that says where it was
+written; OUT.files the files that were read, a line each; OUT.missing "FILE\tWHAT" for includes that
+are not there and were passed over. $(find PKG) is the folder whose package.xml has that name: above
+the file, beside its package, or in the folders given. Errors go to stderr, in one line; the exit
+code is 1, or 2 where the package xacro is missing.
 """
 
 import argparse
+import contextlib
 import os
 import re
 import sys
@@ -43,14 +45,12 @@ def packages(roots):
                 name = package_name(folder)
                 if name:
                     known.setdefault(name, folder)
-                try:
+                with contextlib.suppress(OSError):
                     below += sorted(
                         entry.path
                         for entry in os.scandir(folder)
                         if entry.is_dir() and not entry.name.startswith(".")
                     )
-                except OSError:
-                    pass
             level = below
     return known
 

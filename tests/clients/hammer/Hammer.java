@@ -8,7 +8,10 @@ import java.util.concurrent.TimeUnit;
 import java.util.concurrent.atomic.AtomicLong;
 import java.util.function.Consumer;
 
-/** Eight threads that subscribe, publish and leave while a ninth receives; hammer.py says what it does. */
+/**
+ * Eight threads that subscribe, publish and leave while a ninth receives; hammer.py says what it
+ * does.
+ */
 public final class Hammer {
     private static final int THREADS = 8;
     private static final int CHANNELS = 4;
@@ -16,19 +19,24 @@ public final class Hammer {
     private Hammer() {}
 
     private static void hammer(Bus bus, int number, int count, long end, AtomicLong heard) {
-        Consumer<byte[]> hear = message -> {
-            long now = heard.incrementAndGet();
-            if (now % 7 == 0) bus.subscribe("hammer/within" + number, (byte[] other) -> {}).close();
-            if (now % 50 == 1) throw new AssertionError("what a callback throws hurts nobody");
-        };
+        Consumer<byte[]> hear =
+                message -> {
+                    long now = heard.incrementAndGet();
+                    if (now % 7 == 0)
+                        bus.subscribe("hammer/within" + number, (byte[] other) -> {}).close();
+                    if (now % 50 == 1)
+                        throw new AssertionError("what a callback throws hurts nobody");
+                };
         for (int done = 0; done < count || System.nanoTime() - end < 0; done++) {
-            try (Subscription own = bus.subscribe("hammer/" + number + "/" + done % CHANNELS, hear);
+            try (Subscription own =
+                            bus.subscribe("hammer/" + number + "/" + done % CHANNELS, hear);
                     Subscription shared = bus.subscribe("hammer/shared" + done % CHANNELS, hear)) {
                 for (int k = 0; k < CHANNELS; k++) {
                     bus.publish("hammer/shared" + k, "shared".getBytes(StandardCharsets.US_ASCII));
                     bus.publish("hammer/" + number + "/" + k, new byte[300]);
                 }
-                if (own.closed() || shared.closed()) throw new IllegalStateException("closed by nobody");
+                if (own.closed() || shared.closed())
+                    throw new IllegalStateException("closed by nobody");
             }
         }
     }
@@ -42,7 +50,8 @@ public final class Hammer {
         List<Thread> threads = new ArrayList<>();
         for (int i = 0; i < THREADS; i++) {
             int number = i;
-            threads.add(new Thread(() -> hammer(bus, number, Integer.parseInt(args[1]), end, heard)));
+            threads.add(
+                    new Thread(() -> hammer(bus, number, Integer.parseInt(args[1]), end, heard)));
         }
         for (Thread thread : threads) thread.start();
         for (Thread thread : threads) thread.join();

@@ -1,5 +1,6 @@
-"""Eight threads that subscribe, publish and leave while a ninth receives, until each has done so COUNT times or for SECONDS;
-then a message still gets through. hammer.cpp and Hammer.java are its twins.
+"""Eight threads that subscribe, publish and leave while a ninth receives, until each has done so
+COUNT times or for SECONDS; then a message still gets through. hammer.cpp and Hammer.java are its
+twins.
 
     hammer.py URL COUNT SECONDS
 """

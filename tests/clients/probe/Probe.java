@@ -1,10 +1,3 @@
-import java.nio.charset.StandardCharsets;
-import java.util.ArrayList;
-import java.util.Arrays;
-import java.util.List;
-import java.util.Locale;
-import java.util.function.Supplier;
-import java.util.zip.CRC32;
 import ruedo.Body;
 import ruedo.Command;
 import ruedo.Device;
@@ -24,12 +17,20 @@ import ruedo.Simulation;
 import ruedo.SonarReading;
 import ruedo.State;
 
+import java.nio.charset.StandardCharsets;
+import java.util.ArrayList;
+import java.util.Arrays;
+import java.util.List;
+import java.util.Locale;
+import java.util.function.Supplier;
+import java.util.zip.CRC32;
+
 /**
- * The Java probe: does what a test asks of a client and prints what came of it. probe.py and probe.cpp are its twins:
- * same commands, same output.
+ * The Java probe: does what a test asks of a client and prints what came of it. probe.py and
+ * probe.cpp are its twins: same commands, same output.
  */
 public final class Probe {
-    private static final double PATIENCE = 300.0;    // s, for what comes sooner or later
+    private static final double PATIENCE = 300.0; // s, for what comes sooner or later
 
     private Probe() {}
 
@@ -62,9 +63,22 @@ public final class Probe {
     private static void listAll(Simulation sim) {
         say("world", sim.world(), sim.seed(), sim.stepSize());
         for (Robot robot : sim.robots()) {
-            say("robot", robot.name, robot.drive().isEmpty() ? "-" : robot.drive(), robot.watchdog(), robot.track());
+            say(
+                    "robot",
+                    robot.name,
+                    robot.drive().isEmpty() ? "-" : robot.drive(),
+                    robot.watchdog(),
+                    robot.track());
             for (Device<?> d : robot.devices()) {
-                say("device", robot.name, d.name, d.kind, d.type, d.rate, d.rangeMax, d.elements.length);
+                say(
+                        "device",
+                        robot.name,
+                        d.name,
+                        d.kind,
+                        d.type,
+                        d.rate,
+                        d.rangeMax,
+                        d.elements.length);
             }
         }
         for (Body body : sim.bodies()) say("body", body.name, body.isStatic, body.mass);
@@ -73,12 +87,22 @@ public final class Probe {
     private static void read(Simulation sim, String name) {
         Robot robot = sim.robot(name);
         Scan scan = robot.lrf().latest();
-        say("scan", scan.ranges.length, scan.angle(0), scan.angle(scan.ranges.length - 1), scan.nearest(-Math.PI, Math.PI),
+        say(
+                "scan",
+                scan.ranges.length,
+                scan.angle(0),
+                scan.angle(scan.ranges.length - 1),
+                scan.nearest(-Math.PI, Math.PI),
                 scan.intensities.length);
         SonarReading reading = robot.sonar().latest();
         double largest = 0.0;
         for (float range : reading.ranges) largest = Math.max(largest, range);
-        say("sonar", reading.ranges.length, largest, reading.firedUtime.length, reading.fresh.length);
+        say(
+                "sonar",
+                reading.ranges.length,
+                largest,
+                reading.firedUtime.length,
+                reading.fresh.length);
         Odometry odometry = robot.odometry().latest();
         say("odometry", odometry.x, odometry.y, odometry.theta, odometry.wheelAngles.length);
         Pose pose = robot.pose().latest();
@@ -98,7 +122,10 @@ public final class Probe {
         return Math.abs(omega == 0.0 ? v * time : 2.0 * v / omega * Math.sin(omega * time / 2.0));
     }
 
-    /** At its speed, and for so long without an interruption: a client that gets no time for long has to begin anew. */
+    /**
+     * At its speed, and for so long without an interruption: a client that gets no time for long
+     * has to begin anew.
+     */
     private static void drive(Simulation sim, String[] a, boolean wheels) {
         Robot robot = sim.robot(a[0]);
         double first = Double.parseDouble(a[1]);
@@ -108,7 +135,7 @@ public final class Probe {
         } else {
             robot.setVelocity(first, second);
         }
-        double v = wheels ? robot.wheelRadius() * first : first;    // both sides alike
+        double v = wheels ? robot.wheelRadius() * first : first; // both sides alike
         double omega = wheels ? 0.0 : second;
         robot.pose().latest(PATIENCE);
         while (true) {
@@ -137,8 +164,16 @@ public final class Probe {
         motion.await(PATIENCE);
         double stood = sim.time();
         Pose end = robot.pose().next(PATIENCE);
-        while (end.time() < stood) end = robot.pose().next(PATIENCE);    // poses come at 50 Hz, the end of a motion at its step
-        say(what, early, motion.done(), motion.state(), motion.reason().isEmpty() ? "-" : motion.reason(),
+        while (end.time() < stood)
+            end =
+                    robot.pose()
+                            .next(PATIENCE); // poses come at 50 Hz, the end of a motion at its step
+        say(
+                what,
+                early,
+                motion.done(),
+                motion.state(),
+                motion.reason().isEmpty() ? "-" : motion.reason(),
                 Math.hypot(end.x() - begin.x(), end.y() - begin.y()),
                 Math.IEEEremainder(end.heading() - begin.heading(), 2 * Math.PI));
     }
@@ -150,12 +185,19 @@ public final class Probe {
         run(sim, robot, "rotate", () -> robot.rotate(1.2));
         run(sim, robot, "turn_to", () -> robot.turnTo(0.0));
         run(sim, robot, "arc", () -> robot.arc(0.8, 0.5));
-        Motion replaced = robot.advance(5.0, new Limits(0.05, 0.0, 0.0));    // slowly: whoever is late finds it under way
+        Motion replaced =
+                robot.advance(
+                        5.0,
+                        new Limits(0.05, 0.0, 0.0)); // slowly: whoever is late finds it under way
         sim.sleep(0.5);
         robot.stop().await(PATIENCE);
         attempt("replaced", () -> replaced.await());
         Motion running = robot.advance(5.0, new Limits(0.05, 0.0, 0.0));
-        attempt("refused", () -> robot.advance(2e6).await());    // further than the server allows: what runs goes on
+        attempt(
+                "refused",
+                () ->
+                        robot.advance(2e6)
+                                .await()); // further than the server allows: what runs goes on
         attempt("too_long", () -> running.await(0.3));
         robot.stop().await(PATIENCE);
     }
@@ -195,13 +237,18 @@ public final class Probe {
     }
 
     private static void snapshots(Simulation sim) {
-        String first = sim.spawn("p3at", 3.0, 1.0, 0.0, ""), second = sim.spawn("p3at", 3.0, -1.0, 0.0, "");
+        String first = sim.spawn("p3at", 3.0, 1.0, 0.0, ""),
+                second = sim.spawn("p3at", 3.0, -1.0, 0.0, "");
         say("names", first, second, sim.spawn("p3at", -3.0, 1.0, 0.0, "guest"));
         sim.step(40);
         State saved = sim.snapshot("here");
         State later = sim.step(60);
         State back = sim.restore("here");
-        say("same", back.step == saved.step, back.stateHash == saved.stateHash, sim.step(60).stateHash == later.stateHash);
+        say(
+                "same",
+                back.step == saved.step,
+                back.stateHash == saved.stateHash,
+                sim.step(60).stateHash == later.stateHash);
         say("steps", saved.step, later.step);
     }
 
@@ -222,7 +269,9 @@ public final class Probe {
         say("rolls", sim.state("ball").position[1] > 2.05);
         attempt("taken", () -> sim.spawn("p3at", -3.0, -2.0, 0.0, "guest"));
         attempt("room", () -> sim.spawn("p3at", 3.0, 2.0, 0.0, ""));
-        attempt("text", () -> sim.spawn("", "<sdf", "", new double[] {0.0, -3.0, 0.0}, ahead, true));
+        attempt(
+                "text",
+                () -> sim.spawn("", "<sdf", "", new double[] {0.0, -3.0, 0.0}, ahead, true));
         attempt("driven", () -> sim.setTwist("guest", new double[] {1.0, 0.0, 0.0}, new double[3]));
         sim.reset(Simulation.Reset.POSES, -1);
         say("poses", sim.state("guest").position[1], sim.state().time() > 1.0);
@@ -246,7 +295,8 @@ public final class Probe {
         for (int step = -1; step < steps; step = step < 0 ? 0 : step + chunk) {
             if (step >= 0) {
                 List<Command> commands = new ArrayList<>();
-                for (int k = 0; k < chunk; k++) commands.add(robot.velocityCommand(Double.parseDouble(a[4]), 0.1 * k).at(k));
+                for (int k = 0; k < chunk; k++)
+                    commands.add(robot.velocityCommand(Double.parseDouble(a[4]), 0.1 * k).at(k));
                 last = sim.step(chunk, commands);
             }
             for (Observations.Message message : last.messages) {
@@ -276,7 +326,8 @@ public final class Probe {
             }
             if (turn == 6) sim.remove(guest);
             List<Command> commands = new ArrayList<>(List.of(robot.velocityCommand(0.3, 0.2)));
-            if (turn >= 3 && turn < 6) commands.add(sim.robot(guest).velocityCommand(0.2, -0.3).at(5));
+            if (turn >= 3 && turn < 6)
+                commands.add(sim.robot(guest).velocityCommand(0.2, -0.3).at(5));
             last = sim.step(10, commands);
             for (Observations.Message message : last.messages) {
                 digest.update(message.channel.getBytes(StandardCharsets.UTF_8));
@@ -289,7 +340,8 @@ public final class Probe {
     }
 
     private static void launched(String[] a) throws InterruptedException {
-        LaunchOptions options = new LaunchOptions().seed(3).args(Arrays.copyOfRange(a, 1, a.length));
+        LaunchOptions options =
+                new LaunchOptions().seed(3).args(Arrays.copyOfRange(a, 1, a.length));
         Simulation sim = Ruedo.launch(a[0], options);
         say("url", sim.url);
         say("ready", sim.robots().get(0).odometry().latest().time() >= 0.0);
@@ -299,23 +351,56 @@ public final class Probe {
     private static void act(String url, String command, String[] a) throws InterruptedException {
         if (command.equals("launch")) launched(a);
         boolean named = command.equals("lockstep") || command.equals("visited");
-        try (Simulation sim = command.equals("connect") ? Ruedo.connect(url) : Ruedo.connect(url, named ? a[0] : "probe", 60.0)) {
+        try (Simulation sim =
+                command.equals("connect")
+                        ? Ruedo.connect(url)
+                        : Ruedo.connect(url, named ? a[0] : "probe", 60.0)) {
             switch (command) {
-                case "lockstep": lockstep(sim, a); break;
-                case "visited": visited(sim, a); break;
-                case "connect": say("connected", sim.world()); break;
-                case "list": listAll(sim); break;
-                case "read": read(sim, a[0]); break;
-                case "velocity": drive(sim, a, false); break;
-                case "wheels": drive(sim, a, true); break;
-                case "primitives": primitives(sim, a[0]); break;
-                case "errors": errors(sim, a[0]); break;
-                case "streams": streams(sim, a[0], Double.parseDouble(a[1])); break;
-                case "control": control(sim, a[0]); break;
-                case "world": world(sim, a[0]); break;
-                case "snapshots": snapshots(sim); break;
-                case "quit": sim.quit(); say("quit", true); break;
-                default: throw new IllegalArgumentException(command);
+                case "lockstep":
+                    lockstep(sim, a);
+                    break;
+                case "visited":
+                    visited(sim, a);
+                    break;
+                case "connect":
+                    say("connected", sim.world());
+                    break;
+                case "list":
+                    listAll(sim);
+                    break;
+                case "read":
+                    read(sim, a[0]);
+                    break;
+                case "velocity":
+                    drive(sim, a, false);
+                    break;
+                case "wheels":
+                    drive(sim, a, true);
+                    break;
+                case "primitives":
+                    primitives(sim, a[0]);
+                    break;
+                case "errors":
+                    errors(sim, a[0]);
+                    break;
+                case "streams":
+                    streams(sim, a[0], Double.parseDouble(a[1]));
+                    break;
+                case "control":
+                    control(sim, a[0]);
+                    break;
+                case "world":
+                    world(sim, a[0]);
+                    break;
+                case "snapshots":
+                    snapshots(sim);
+                    break;
+                case "quit":
+                    sim.quit();
+                    say("quit", true);
+                    break;
+                default:
+                    throw new IllegalArgumentException(command);
             }
         }
     }

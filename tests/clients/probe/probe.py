@@ -1,5 +1,5 @@
-"""The Python probe: does what a test asks of a client and prints what came of it. probe.cpp and Probe.java are its
-twins: same commands, same output."""
+"""The Python probe: does what a test asks of a client and prints what came of it. probe.cpp and
+Probe.java are its twins: same commands, same output."""
 
 import math
 import sys
@@ -74,7 +74,9 @@ def read(sim, name):
 
 
 def drive(sim, name, first, second, seconds, wheels):
-    """At its speed, and for so long without an interruption: a client that gets no time for long has to begin anew."""
+    """At its speed, and for so long without an interruption: a client that gets no time for long
+    has to begin anew.
+    """
     robot = sim.robot(name)
     first, second = float(first), float(second)
     (robot.set_wheels if wheels else robot.set_velocity)(first, second)

@@ -1,7 +1,3 @@
-import java.util.ArrayList;
-import java.util.List;
-import java.util.concurrent.CountDownLatch;
-import java.util.concurrent.atomic.AtomicInteger;
 import ruedo.Motion;
 import ruedo.Odometry;
 import ruedo.Reader;
@@ -12,9 +8,17 @@ import ruedo.Simulation;
 import ruedo.Stream;
 import ruedo.Subscription;
 
-/** Callbacks that are taken back or throw, readers, closing, and a server that is started anew; lifetimes_test.py says what is right. */
+import java.util.ArrayList;
+import java.util.List;
+import java.util.concurrent.CountDownLatch;
+import java.util.concurrent.atomic.AtomicInteger;
+
+/**
+ * Callbacks that are taken back or throw, readers, closing, and a server that is started anew;
+ * lifetimes_test.py says what is right.
+ */
 public final class Lifetimes {
-    private static final double PATIENCE = 300.0;    // s
+    private static final double PATIENCE = 300.0; // s
 
     private Lifetimes() {}
 
@@ -22,10 +26,13 @@ public final class Lifetimes {
         Stream<Odometry> odometry = sim.robot("p3at").odometry();
         AtomicInteger heard = new AtomicInteger();
         AtomicInteger failed = new AtomicInteger();
-        try (Subscription first = odometry.onSample(sample -> {
-            failed.incrementAndGet();
-            throw new AssertionError("a fault of the user's");
-        }); Subscription second = odometry.onSample(sample -> heard.incrementAndGet())) {
+        try (Subscription first =
+                        odometry.onSample(
+                                sample -> {
+                                    failed.incrementAndGet();
+                                    throw new AssertionError("a fault of the user's");
+                                });
+                Subscription second = odometry.onSample(sample -> heard.incrementAndGet())) {
             while (heard.get() < 3) odometry.next(PATIENCE);
             System.out.println("open " + !first.closed() + " " + !second.closed());
         }
@@ -44,9 +51,25 @@ public final class Lifetimes {
         odometry.latest(PATIENCE);
         sim.close();
         sim.close();
-        List<Runnable> calls = new ArrayList<>(List.of(sim::pause, sim::resume, () -> sim.step(1), () -> sim.setRate(1.0), sim::reset, sim::state,
-                () -> sim.remove("p3at"), sim::quit, () -> sim.sleep(1.0), () -> sim.onNewRun(() -> {}), odometry::latest, odometry::next,
-                () -> odometry.onSample(sample -> {}), () -> robot.setVelocity(0.1, 0.0), () -> robot.advance(1.0), () -> robot.stop()));
+        List<Runnable> calls =
+                new ArrayList<>(
+                        List.of(
+                                sim::pause,
+                                sim::resume,
+                                () -> sim.step(1),
+                                () -> sim.setRate(1.0),
+                                sim::reset,
+                                sim::state,
+                                () -> sim.remove("p3at"),
+                                sim::quit,
+                                () -> sim.sleep(1.0),
+                                () -> sim.onNewRun(() -> {}),
+                                odometry::latest,
+                                odometry::next,
+                                () -> odometry.onSample(sample -> {}),
+                                () -> robot.setVelocity(0.1, 0.0),
+                                () -> robot.advance(1.0),
+                                () -> robot.stop()));
         int right = 0;
         for (Runnable call : calls) {
             try {

@@ -19,7 +19,9 @@ public final class VectorsRunner {
         if (value instanceof Boolean) return (Boolean) value ? "1" : "0";
         if (!(value instanceof Double)) return value.toString();
         double one = (Double) value;
-        return Double.isInfinite(one) ? one > 0 ? "inf" : "-inf" : String.format(Locale.ROOT, "%.6f", one);
+        return Double.isInfinite(one)
+                ? one > 0 ? "inf" : "-inf"
+                : String.format(Locale.ROOT, "%.6f", one);
     }
 
     /** values: numbers, or arrays of them. */
@@ -43,7 +45,12 @@ public final class VectorsRunner {
             Scan s = (Scan) sample;
             row("ranges", (Object) s.ranges);
             row("intensities", (Object) s.intensities);
-            row("angles", (Object) (s.ranges.length == 0 ? new double[0] : new double[] {s.angle(0), s.angle(s.ranges.length - 1)}));
+            row(
+                    "angles",
+                    (Object)
+                            (s.ranges.length == 0
+                                    ? new double[0]
+                                    : new double[] {s.angle(0), s.angle(s.ranges.length - 1)}));
         } else if (sample instanceof SonarReading) {
             SonarReading s = (SonarReading) sample;
             row("ranges", (Object) s.ranges);
@@ -89,10 +96,12 @@ public final class VectorsRunner {
         } else if (sample instanceof Contact) {
             Contact s = (Contact) sample;
             row("pressed", s.pressed);
-            for (Contact.Point p : s.points) row("point " + p.body, p.position, p.normal, p.force, p.depth);
+            for (Contact.Point p : s.points)
+                row("point " + p.body, p.position, p.normal, p.force, p.depth);
         } else if (sample instanceof Joints) {
             Joints s = (Joints) sample;
-            for (int i = 0; i < s.names.size(); i++) row("joint " + s.names.get(i), s.positions[i], s.velocities[i], s.efforts[i]);
+            for (int i = 0; i < s.names.size(); i++)
+                row("joint " + s.names.get(i), s.positions[i], s.velocities[i], s.efforts[i]);
         } else if (sample instanceof MotionStatus) {
             MotionStatus s = (MotionStatus) sample;
             row("id", s.id);
@@ -103,11 +112,13 @@ public final class VectorsRunner {
     }
 
     private static void decode() throws IOException {
-        BufferedReader lines = new BufferedReader(new InputStreamReader(System.in, StandardCharsets.US_ASCII));
+        BufferedReader lines =
+                new BufferedReader(new InputStreamReader(System.in, StandardCharsets.US_ASCII));
         for (String line = lines.readLine(); line != null; line = lines.readLine()) {
             String[] words = line.split(" ");
             byte[] bytes = new byte[words.length > 1 ? words[1].length() / 2 : 0];
-            for (int i = 0; i < bytes.length; i++) bytes[i] = (byte) Integer.parseInt(words[1].substring(2 * i, 2 * i + 2), 16);
+            for (int i = 0; i < bytes.length; i++)
+                bytes[i] = (byte) Integer.parseInt(words[1].substring(2 * i, 2 * i + 2), 16);
             Conversions.Conversion conversion = Conversions.of(words[0]);
             try {
                 WireReader in = new WireReader(bytes);
@@ -127,19 +138,23 @@ public final class VectorsRunner {
 
         @Override
         public void start(Receiver receiver) {
-            Thread thread = new Thread(() -> {
-                try {
-                    while (true) {
-                        byte[] channel = new byte[in.readInt()];
-                        byte[] message = new byte[in.readInt()];
-                        in.readFully(channel);
-                        in.readFully(message);
-                        receiver.receive(new String(channel, StandardCharsets.US_ASCII), message);
-                    }
-                } catch (IOException error) {
-                    Runtime.getRuntime().halt(3);
-                }
-            });
+            Thread thread =
+                    new Thread(
+                            () -> {
+                                try {
+                                    while (true) {
+                                        byte[] channel = new byte[in.readInt()];
+                                        byte[] message = new byte[in.readInt()];
+                                        in.readFully(channel);
+                                        in.readFully(message);
+                                        receiver.receive(
+                                                new String(channel, StandardCharsets.US_ASCII),
+                                                message);
+                                    }
+                                } catch (IOException error) {
+                                    Runtime.getRuntime().halt(3);
+                                }
+                            });
             thread.setDaemon(true);
             thread.start();
         }
@@ -168,22 +183,38 @@ public final class VectorsRunner {
     }
 
     private static void converse(String[] args) {
-        Simulation sim = new Simulation(new Address(Address.DEFAULT_URL), "test", 300.0, null, new PipeTransport());
+        Simulation sim =
+                new Simulation(
+                        new Address(Address.DEFAULT_URL), "test", 300.0, null, new PipeTransport());
         try {
             Robot robot = sim.robot("p3at");
             for (int i = 1; i < args.length; i++) {
                 long n = Long.parseLong(args[i]);
-                Observations seen = sim.step(n, n > 0 ? List.of(robot.velocityCommand(0.5, 0.0)) : List.of(), 300.0);
-                StringBuilder line = new StringBuilder("step " + seen.step + " " + seen.utime + " " + seen.stateHash);
+                Observations seen =
+                        sim.step(
+                                n,
+                                n > 0 ? List.of(robot.velocityCommand(0.5, 0.0)) : List.of(),
+                                300.0);
+                StringBuilder line =
+                        new StringBuilder(
+                                "step " + seen.step + " " + seen.utime + " " + seen.stateHash);
                 for (Observations.Message m : seen.messages) {
                     CRC32 crc = new CRC32();
                     crc.update(m.data);
-                    line.append(' ').append(m.step).append(':').append(m.channel).append(':').append(crc.getValue());
+                    line.append(' ')
+                            .append(m.step)
+                            .append(':')
+                            .append(m.channel)
+                            .append(':')
+                            .append(crc.getValue());
                 }
                 System.err.println(line);
             }
         } catch (RuedoException error) {
-            String kind = error.getClass() == RuedoException.class ? "RuedoError" : error.getClass().getSimpleName();
+            String kind =
+                    error.getClass() == RuedoException.class
+                            ? "RuedoError"
+                            : error.getClass().getSimpleName();
             System.err.println(kind + ": " + error.getMessage());
         }
         Runtime.getRuntime().halt(0);

@@ -1,4 +1,6 @@
-"""Writes messages.txt: messages as lcm-gen's Python encodes them, and what they mean. The values are chosen here, by hand."""
+"""Writes messages.txt: messages as lcm-gen's Python encodes them, and what they mean. The values
+are chosen here, by hand.
+"""
 
 import math
 from pathlib import Path

@@ -1,7 +1,8 @@
 """What the Python client makes of the test vectors; runner.cpp and Runner.java are its twins.
 
-runner.py decode                 reads lines TYPE BYTES, says what each means
-runner.py converse N...          steps so often, over a transport on standard input and output; says what it saw
+runner.py decode         reads lines TYPE BYTES, says what each means
+runner.py converse N...  steps so often, over a transport on standard input and output; says what
+                         it saw
 """
 
 import select

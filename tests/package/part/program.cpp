@@ -1,4 +1,5 @@
-// Says which server launch() would start; compiled as C++17, which the public headers are written in.
+// Says which server launch() would start; compiled as C++17, which the public headers are written
+// in.
 #include <ruedo/client.h>
 
 #include <cstdio>

@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""Makes the P3-AT's meshes (meshes/*.obj) from the robot's measures: run it again after changing one."""
+"""Makes the P3-AT's meshes (meshes/*.obj) from the robot's measures: run it again after changing
+one.
+"""
 
 import math
 import sys
@@ -7,9 +9,10 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
-from solids import COLOURS, Solids, arc, faceted, lms200, vc_c4  # noqa: E402
+from solids import COLOURS, Solids, arc, faceted, lms200, vc_c4
 
-# Transducers (x m, y m, heading deg) counter-clockwise from the right rear side; the two arrays of ARIA's p3at.
+# Transducers (x m, y m, heading deg) counter-clockwise from the right rear side; the two arrays of
+# ARIA's p3at.
 SONARS = [
     (-0.144, -0.136, -90),
     (0.147, -0.136, -90),
@@ -102,7 +105,9 @@ def wheel():
 
 
 def devices():
-    """The SICK LMS200 and the camera on top of it; the poses are those of the sensors in model.sdf."""
+    """The SICK LMS200 and the camera on top of it; the poses are those of the sensors in
+    model.sdf.
+    """
     solids = Solids()
     lms200(solids, 0.160, DECK_TOP + 0.113)
     vc_c4(solids, 0.190, DECK_TOP + 0.185 + 0.055)

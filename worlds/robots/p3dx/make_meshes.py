@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""Makes the P3-DX's meshes (meshes/*.obj) from the robot's measures: run it again after changing one."""
+"""Makes the P3-DX's meshes (meshes/*.obj) from the robot's measures: run it again after changing
+one.
+"""
 
 import math
 import sys
@@ -7,10 +9,10 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
-from solids import COLOURS, Solids, faceted  # noqa: E402
+from solids import COLOURS, Solids, faceted
 
-# Transducers (x m, y m, heading deg) counter-clockwise from the right rear side. The front array carries the
-# sonars of ARIA's p3dx-sh; the rear rim has the same facets.
+# Transducers (x m, y m, heading deg) counter-clockwise from the right rear side. The front array
+# carries the sonars of ARIA's p3dx-sh; the rear rim has the same facets.
 FRONT = [
     (0.069, -0.136, -90),
     (0.114, -0.119, -50),

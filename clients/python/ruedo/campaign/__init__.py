@@ -10,10 +10,10 @@ A campaign is one YAML file (docs/campaigns.md); `ruedo campaign run FILE` does 
 shell. Needs `pip install 'ruedo[campaign]'`.
 """
 
+from .campaign import Campaign
 from .controller import DONE, View
 from .errors import CampaignError, SpecError
 from .plan import Case
-from .campaign import Campaign
 from .store import Results
 
 __all__ = ["DONE", "Campaign", "CampaignError", "Case", "Results", "SpecError", "View"]

@@ -5,14 +5,17 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Iterable
+from typing import Any
 
 Bundle = dict[str, bytes]
 
 
 def pack(folder: Path, files: Iterable[str]) -> Bundle:
-    """Those of the files that lie in the folder, by their path in it; others have to be everywhere."""
+    """Those of the files that lie in the folder, by their path in it; others have to be
+    everywhere.
+    """
     inside = sorted({os.path.relpath(file, folder) for file in files if _is_inside(file, folder)})
     return {name: (folder / name).read_bytes() for name in inside}
 
@@ -60,7 +63,9 @@ def moved(what: dict[str, Any], folder: str, to: str) -> dict[str, Any]:
 
 
 def log_moved(log: bytes, folder: str, to: str) -> bytes:
-    """A log whose header names files of one folder, as if it had been made with those of the other."""
+    """A log whose header names files of one folder, as if it had been made with those of the
+    other.
+    """
     import lcm
 
     from ..lcmtypes import log_header_t

@@ -5,8 +5,9 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any, Callable, Iterable, Iterator
+from typing import Any
 
 from .. import _engine
 from .cluster import run_on_ray
@@ -25,8 +26,9 @@ Progress = Callable[[Case, dict[str, Any]], None]
 class Campaign:
     """Many runs of one experiment.
 
-    spec: a YAML file, or the same members as a dict; a dict's paths begin in `folder`. out: where the
-    results go, default NAME.campaign beside the file. Raises SpecError for what is wrong in the file.
+    spec: a YAML file, or the same members as a dict; a dict's paths begin in `folder`. out: where
+    the results go, default NAME.campaign beside the file. Raises SpecError for what is wrong in the
+    file.
     """
 
     def __init__(
@@ -53,7 +55,7 @@ class Campaign:
         check_values(self._content, self._source)
         self.name = str(self._content.get("name", stem))
         self.out = Path(out) if out else self.folder / f"{stem}.campaign"
-        self.version = str(getattr(_engine, "build", _engine.version))
+        self.version = str(_engine.build)
         self._cases: list[Case] | None = None
         self.worlds = WorldFiles(self.folder, self.out / "worlds")
         self._files: set[str] = set()  # that the cases are made from
@@ -65,7 +67,9 @@ class Campaign:
 
     @property
     def cases(self) -> list[Case]:
-        """All cases, in the order of the file. Worlds are made and read when this is first asked for."""
+        """All cases, in the order of the file. Worlds are made and read when this is first asked
+        for.
+        """
         if self._cases is None:
             planner = Planner(
                 self._content,
@@ -90,8 +94,9 @@ class Campaign:
     ) -> Results:
         """Runs what has no result yet, and returns all results.
 
-        workers: processes on this machine, default one a core. ray: "auto" or an address, the same on a
-        Ray cluster. shard: "I/N", every N-th case from the I-th on. stop: True ends the campaign early.
+        workers: processes on this machine, default one a core. ray: "auto" or an address, the same
+        on a Ray cluster. shard: "I/N", every N-th case from the I-th on. stop: True ends the
+        campaign early.
         """
         cases = shard_of(self.cases, shard) if shard else self.cases
         store = Store(self.out)
@@ -158,7 +163,9 @@ class Campaign:
         return found[0]
 
     def _each_controller(self) -> Iterator[dict[str, Any]]:
-        """A controller with `each` is one for each file: {file} is its path, and its name, without ending, the controller's."""
+        """A controller with `each` is one for each file: {file} is its path, and its name, without
+        ending, the controller's.
+        """
         for i, one in enumerate(self._content["controllers"]):
             if "each" not in one:
                 yield one
@@ -179,7 +186,9 @@ class Campaign:
                 yield {**made, "name": file.stem}
 
     def _sampled(self) -> set[str]:
-        """Cases whose log is kept however they end: those with the lowest ids, which are as good as drawn."""
+        """Cases whose log is kept however they end: those with the lowest ids, which are as good as
+        drawn.
+        """
         count = self._content.get("keep", {}).get("sample", 0)
         return set(sorted(case.id for case in self.cases)[:count])
 

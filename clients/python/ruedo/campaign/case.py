@@ -12,10 +12,11 @@ import subprocess
 import tempfile
 import traceback
 from collections import OrderedDict
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Iterator
+from typing import Any
 
 from ..engine import Engine
 from ..launch import find_ruedo
@@ -31,8 +32,9 @@ _ENGINES = 4  # that a worker keeps
 class Outcome:
     """What came of a case.
 
-    status: passed, failed (an expectation), crashed, timeout or memory (the controller), or invalid (the
-    case cannot be run). what: which expectation, or what went wrong. reason: in a line. log: its content.
+    status: passed, failed (an expectation), crashed, timeout or memory (the controller), or invalid
+    (the case cannot be run). what: which expectation, or what went wrong. reason: in a line. log:
+    its content.
     """
 
     status: str = "passed"
@@ -231,13 +233,13 @@ class Runner:
         starved = ("MemoryError", "bad_alloc", "OutOfMemoryError", "Cannot allocate memory")
         if fault.startswith("the client ended with"):
             if any(word in outcome.output for word in starved):
-                return outcome.fail("memory", "controller", too_large(memory_mb))
-            return outcome.fail(
-                "crashed", "controller", fault.replace("the client", "the controller")
-            )
-        if fault.startswith("the run differs from"):
-            return outcome.fail("failed", "golden", fault.splitlines()[0])
-        outcome.fail("crashed", "controller", fault.splitlines()[0])
+                outcome.fail("memory", "controller", too_large(memory_mb))
+            else:
+                outcome.fail("crashed", "controller", fault.replace("the client", "the controller"))
+        elif fault.startswith("the run differs from"):
+            outcome.fail("failed", "golden", fault.splitlines()[0])
+        else:
+            outcome.fail("crashed", "controller", fault.splitlines()[0])
 
     # ---- Of both.
 
@@ -393,7 +395,9 @@ def _goals(what: dict[str, Any]) -> list[str]:
 
 
 def _scratch(everything: bool, what: dict[str, Any]) -> str | None:
-    """Where a case's files are while it runs: in memory when they are a few kB, since a closed log waits for its disk."""
+    """Where a case's files are while it runs: in memory when they are a few kB, since a closed log
+    waits for its disk.
+    """
     small = not everything and "python" in what["controller"]
     return "/dev/shm" if small and os.access("/dev/shm", os.W_OK | os.X_OK) else None
 

@@ -1,4 +1,6 @@
-"""The command line of campaigns. Exit codes: 0 good, 1 a case failed, 2 wrong usage, 3 bad file, 4 environment."""
+"""The command line of campaigns. Exit codes: 0 good, 1 a case failed, 2 wrong usage, 3 bad file, 4
+environment.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +10,9 @@ import json
 import os
 import shlex
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Callable
+from typing import Any
 
 GOOD, FAILED, USAGE, BAD_INPUT, ENVIRONMENT = range(5)
 
@@ -252,8 +255,9 @@ def _slurm(arguments: argparse.Namespace) -> int:
 #SBATCH --cpus-per-task={arguments.cores}
 #SBATCH --time={arguments.time}
 #SBATCH --output={out}.%a.out
-# Each task has a folder of its own. After the last: ruedo campaign join {file} {shlex.quote(out)}.shard*
-# A task that was cut off goes on where it was when this script is submitted again.
+# Each task has a folder of its own. After the last: ruedo campaign join {file}
+# {shlex.quote(out)}.shard* A task that was cut off goes on where it was when this script is
+# submitted again.
 ruedo campaign run {file} --quiet --workers "$SLURM_CPUS_PER_TASK" \\
   --shard "$SLURM_ARRAY_TASK_ID/{count}" --out {shlex.quote(out)}.shard"$SLURM_ARRAY_TASK_ID"
 [ $? -le 1 ]    # a case that failed is a result, not a failure of the task""")

@@ -1,11 +1,14 @@
-"""The same cases on a Ray cluster: Ray places them, moves what they need, and starts again what it lost."""
+"""The same cases on a Ray cluster: Ray places them, moves what they need, and starts again what it
+lost.
+"""
 
 from __future__ import annotations
 
 import logging
 import socket
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, Iterable, Iterator
+from typing import Any
 
 from .bundle import Bundle, log_moved, moved, name_of, pack, unpack
 from .errors import CampaignError, missing
@@ -20,7 +23,9 @@ _worker: tuple[str, Worker] | None = None  # of a process of Ray's: stays from c
 def run_on_ray(
     cases: list[Case], folder: str, files: Iterable[str], address: str, version: str
 ) -> Iterator[Done]:
-    """Outcomes as they come. files: of the campaign; those in its folder are brought to each node once."""
+    """Outcomes as they come. files: of the campaign; those in its folder are brought to each node
+    once.
+    """
     try:
         import ray
     except ImportError:
@@ -72,7 +77,8 @@ def _run(ray: Any, cases: list[Case], folder: str, bundle: Bundle, version: str)
         )
     name, packed = name_of(bundle), ray.put(bundle)
     remote = ray.remote(_remote).options(num_cpus=1, memory=memory, max_retries=_RETRIES)
-    waiting, running = list(reversed(cases)), {}
+    waiting = list(reversed(cases))
+    running: dict[Any, Case] = {}
     while waiting or running:
         cores = int(ray.cluster_resources().get("CPU", 1))
         while waiting and len(running) < _AHEAD * max(cores, 1):
@@ -107,7 +113,7 @@ def _remote(
 
     from .. import _engine
 
-    here = str(getattr(_engine, "build", _engine.version))
+    here = str(_engine.build)
     if here != version:
         raise CampaignError(
             f"node {ray.util.get_node_ip_address()} has Ruedo {here}, the campaign was started with {version}: "

@@ -104,7 +104,9 @@ def compare(before: Results, now: Results, names: tuple[str, str]) -> Comparison
 
 
 def compare_with(campaign: Any, baseline: str) -> Comparison:
-    """baseline: a folder of results, or ":NAME", the campaign's own results with that controller."""
+    """baseline: a folder of results, or ":NAME", the campaign's own results with that
+    controller.
+    """
     now = campaign.results()
     if not baseline.startswith(":"):
         return compare(results_of(Path(baseline)), now, (baseline, str(campaign.out)))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import inspect
-from typing import Any, Callable
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +18,14 @@ DONE = "done"
 class View:
     """What a controller in the engine sees of its robot at a decision.
 
-    view["lrf.ranges"]: the newest message's field, DEVICE.FIELD as in Engine.observe(). view.time: s of
-    sim time. view.parameters and view.seed: of the case. view.send(channel, message): a command other
-    than a velocity.
+    view["lrf.ranges"]: the newest message's field, DEVICE.FIELD as in Engine.observe(). view.time:
+    s of sim time. view.parameters and view.seed: of the case. view.send(channel, message): a
+    command other than a velocity.
     """
 
     def __init__(self, engine: Engine, robot: str, parameters: dict[str, Any], seed: int) -> None:
         self._engine = engine
-        self._row = {device: i for device, i in _rows(engine, robot).items()}
+        self._row = dict(_rows(engine, robot).items())
         self.robot = robot
         self.parameters = parameters
         self.seed = seed
@@ -57,16 +58,18 @@ def _rows(engine: Engine, robot: str) -> dict[str, int]:
 
 
 def make_controller(thing: Any, parameters: dict[str, Any]) -> Callable[[View], Any]:
-    """A class is made anew for each run, with the parameters that it takes; a function is as it is."""
+    """A class is made anew for each run, with the parameters that it takes; a function is as it
+    is.
+    """
     if not inspect.isclass(thing):
         if not callable(thing):
             raise TypeError(
                 f"{thing!r} is no controller: a function of a View, or a class of such objects"
             )
-        return thing  # type: ignore[no-any-return]
-    accepted = inspect.signature(thing).parameters.values()
+        return thing
+    make: Any = thing
+    accepted = inspect.signature(make).parameters.values()
     if any(one.kind is one.VAR_KEYWORD for one in accepted):
-        return thing(**parameters)  # type: ignore[no-any-return]
+        return make(**parameters)
     names = {one.name for one in accepted}
-    made = thing(**{name: value for name, value in parameters.items() if name in names})
-    return made  # type: ignore[no-any-return]
+    return make(**{name: value for name, value in parameters.items() if name in names})

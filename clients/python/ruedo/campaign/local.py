@@ -9,9 +9,10 @@ import subprocess
 import sys
 import time
 from collections import deque
+from collections.abc import Iterable, Iterator
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any, Iterable, Iterator
+from typing import Any
 
 from .case import Outcome, too_slow
 from .errors import CampaignError
@@ -78,7 +79,8 @@ def run_local(
 ) -> Iterator[Done]:
     """Outcomes as they come. A case whose worker is killed is run once more, then it has failed.
 
-    kept: workers that are there already, and stay; new ones that take their place stand in it afterwards.
+    kept: workers that are there already, and stay; new ones that take their place stand in it
+    afterwards.
     """
     waiting = deque((case, 1) for case in cases)
     crew: list[Worker] = [] if kept is None else kept

@@ -1,4 +1,6 @@
-"""The cases of a campaign: every combination of its members, each with the hash of all that acts on it."""
+"""The cases of a campaign: every combination of its members, each with the hash of all that acts on
+it.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +10,11 @@ import json
 import math
 import random
 import re
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import NormalDist
-from typing import Any, Callable, Iterator
+from typing import Any
 
 from .errors import SpecError
 from .functions import Function
@@ -74,8 +77,11 @@ def _text(value: Any) -> str:
 
 
 def points(parameters: dict[str, Any], sampling: dict[str, Any]) -> list[dict[str, Any]]:
-    """Lists and grids are crossed; distributions are drawn together, as a Latin hypercube by default."""
+    """Lists and grids are crossed; distributions are drawn together, as a Latin hypercube by
+    default.
+    """
     crossed, drawn = {}, {}
+    values: Any
     for name, given in parameters.items():
         kind, values = ("list", given) if isinstance(given, list) else next(iter(given.items()))
         if kind == "list":
@@ -104,8 +110,8 @@ def _draw(
     latin = sampling.get("method", "latin") == "latin"
     columns = {}
     for name, (kind, bounds) in drawn.items():
-        # A column has draws of its own, so that another parameter leaves it as it is. Python promises
-        # the numbers of random() for a seed, and of nothing else.
+        # A column has draws of its own, so that another parameter leaves it as it is. Python
+        # promises the numbers of random() for a seed, and of nothing else.
         draw = random.Random(f"{sampling.get('seed', 1)}/{name}")
         strata = sorted(range(count), key=lambda _: draw.random()) if latin else None
         column = [
@@ -209,7 +215,8 @@ def seeds_of(given: Any) -> list[int]:
 
 
 class Planner:
-    """Makes the cases of a checked campaign. folder: where its paths begin; store: where made worlds go.
+    """Makes the cases of a checked campaign. folder: where its paths begin; store: where made
+    worlds go.
 
     worlds: of an earlier plan of the same folder, which has read them already.
     """
@@ -242,14 +249,14 @@ class Planner:
             seeds_of(content.get("seeds", 1)),
         ):
             made.append(self._case(len(made), w, world, robot, controller, at, seed))
-        twice = {one.id: one for one in made}
-        if len(twice) != len(made):
-            seen: set[str] = set()
-            first = next(one for one in made if one.id in seen or seen.add(one.id))  # type: ignore[func-returns-value]
-            raise SpecError(
-                f"{self._source.name}: case {first.number} is the same as another one: two of its "
-                "worlds, robots, controllers or parameters do not differ in what they do"
-            )
+        seen: set[str] = set()
+        for case in made:
+            if case.id in seen:
+                raise SpecError(
+                    f"{self._source.name}: case {case.number} is the same as another one: two of its "
+                    "worlds, robots, controllers or parameters do not differ in what they do"
+                )
+            seen.add(case.id)
         return made
 
     @property

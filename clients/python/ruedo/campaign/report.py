@@ -1,11 +1,14 @@
-"""A campaign as one HTML page that needs nothing but a browser: tables, plots as SVG, paths of the worst runs."""
+"""A campaign as one HTML page that needs nothing but a browser: tables, plots as SVG, paths of the
+worst runs.
+"""
 
 from __future__ import annotations
 
 import html
 import io
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any, Iterable
+from typing import Any
 
 from .compare import compare_with
 from .errors import missing
@@ -67,7 +70,7 @@ def _head(campaign: Any, results: Results) -> str:
 
 def _by_parameter(results: Results) -> Iterable[str]:
     yield "<h2>Success</h2><p>With Wilson's 95 % interval.</p>"
-    keys = {
+    keys: dict[str, Callable[[Case], Any]] = {
         "world": lambda case: case.world,
         "robot": lambda case: case.robot,
         "controller": lambda case: case.controller,
@@ -134,11 +137,11 @@ def _reasons(results: Results) -> Iterable[str]:
         return
     yield "<h2>Why they failed</h2><table><tr><th>status</th><th>what</th><th>cases</th><th>first</th></tr>"
     for (status, what), cases in sorted(counts.items(), key=lambda one: -len(one[1])):
-        row = results.row(cases[0])
-        assert row is not None
+        first = results.row(cases[0])
+        assert first is not None
         yield (
             f"<tr><td>{status}</td><td>{html.escape(what)}</td><td class='n'>{len(cases)}</td><td>{cases[0].number}: "
-            f"{html.escape(row['reason'])}</td></tr>"
+            f"{html.escape(first['reason'])}</td></tr>"
         )
     yield "</table>"
 
@@ -226,7 +229,9 @@ def _heat_map(results: Results) -> Iterable[str]:
 
 
 def _place_of_failure(row: dict[str, Any]) -> tuple[float, float] | None:
-    """Where the robot was when the first expectation did not hold; at the end, if that has no time."""
+    """Where the robot was when the first expectation did not hold; at the end, if that has no
+    time.
+    """
     if not row["track"]:
         return None
     try:

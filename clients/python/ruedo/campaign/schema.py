@@ -1,4 +1,6 @@
-"""What a campaign's file may hold, as a JSON schema, and how a wrong one is told: file, line, allowed."""
+"""What a campaign's file may hold, as a JSON schema, and how a wrong one is told: file, line,
+allowed.
+"""
 
 from __future__ import annotations
 

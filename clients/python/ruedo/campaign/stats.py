@@ -18,7 +18,9 @@ def wilson(successes: int, count: int, z: float = Z95) -> tuple[float, float]:
 
 
 def mcnemar(worse: int, better: int) -> float:
-    """The exact two-sided p of McNemar's test: of pairs that differ, so many got worse and so many better."""
+    """The exact two-sided p of McNemar's test: of pairs that differ, so many got worse and so many
+    better.
+    """
     count = worse + better
     if count == 0:
         return 1.0
@@ -31,8 +33,8 @@ def paired_difference(
 ) -> tuple[float, float, float]:
     """The change of a success rate over pairs, with its 95 % interval.
 
-    Newcombe's method 10 (R. G. Newcombe, Statistics in Medicine 17, 1998, 2635-2650). worse: pairs that
-    succeeded before and not after; better: the other way round.
+    Newcombe's method 10 (R. G. Newcombe, Statistics in Medicine 17, 1998, 2635-2650). worse: pairs
+    that succeeded before and not after; better: the other way round.
     """
     count = both + worse + better + neither
     if count == 0:
@@ -40,7 +42,7 @@ def paired_difference(
     before, after = (both + worse) / count, (both + better) / count
     (l1, u1), (l2, u2) = wilson(both + better, count), wilson(both + worse, count)
     product = (both + worse) * (better + neither) * (both + better) * (worse + neither)
-    numerator = both * neither - worse * better
+    numerator = float(both * neither - worse * better)
     if numerator > 0:
         numerator = max(numerator - count / 2, 0.0)  # the paper's correction for continuity
     phi = numerator / math.sqrt(product) if product else 0.0

@@ -6,8 +6,9 @@ import csv
 import io
 import json
 import sqlite3
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Iterable
+from typing import Any
 
 from .errors import CampaignError, missing
 from .plan import Case
@@ -68,7 +69,9 @@ class Store:
         return {row[0] for row in self._db.execute("SELECT id FROM results")}
 
     def add(self, id: str, outcome: dict[str, Any], wall_s: float, keep_log: bool) -> None:
-        """On the disk when this returns. Raises CampaignError for a full one; nothing that was there is lost."""
+        """On the disk when this returns. Raises CampaignError for a full one; nothing that was
+        there is lost.
+        """
         if keep_log and outcome["log"]:
             self._keep_log(id, outcome["log"])
         self._write(
@@ -164,7 +167,9 @@ class Results:
         return self.store.log(case.id) if self.store.log(case.id).exists() else None
 
     def table(self) -> list[dict[str, Any]]:
-        """A row a case. Wall-clock times are not in it: the table is the same from every machine."""
+        """A row a case. Wall-clock times are not in it: the table is the same from every
+        machine.
+        """
         parameters = list(dict.fromkeys(name for case in self.cases for name in case.parameters))
         metrics = sorted({name for _, row in self.done for name in row["metrics"]})
         table = []

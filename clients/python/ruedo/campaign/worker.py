@@ -1,4 +1,6 @@
-"""A worker's process: python -m ruedo.campaign.worker FD FOLDER. Cases come in by the pipe, outcomes go out."""
+"""A worker's process: python -m ruedo.campaign.worker FD FOLDER. Cases come in by the pipe,
+outcomes go out.
+"""
 
 from __future__ import annotations
 

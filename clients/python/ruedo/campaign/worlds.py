@@ -1,4 +1,6 @@
-"""The worlds of a campaign: files and what they refer to, by content; and worlds that functions make."""
+"""The worlds of a campaign: files and what they refer to, by content; and worlds that functions
+make.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,9 @@ class WorldFiles:
         return str(beside) if beside.is_file() else name
 
     def generate(self, generator: Function, parameters: dict[str, Any]) -> str:
-        """The file of the world that generator(**parameters) makes: SDF as text, or a ruedo.World."""
+        """The file of the world that generator(**parameters) makes: SDF as text, or a
+        ruedo.World.
+        """
         key = f"{generator.sha256}{generator.name}{sorted(parameters.items())!r}"
         if key not in self._made:
             try:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Callable
+from typing import Any
 
 from ..campaign import Campaign
 from ..campaign.case import Outcome as OutcomeOfCase
@@ -52,7 +53,9 @@ class Found:
 
 
 class Hunt:
-    """spec: a campaign's file, or dict, with one controller and one world; `hunt` in it says what else may be chosen."""
+    """spec: a campaign's file, or dict, with one controller and one world; `hunt` in it says what
+    else may be chosen.
+    """
 
     def __init__(
         self, spec: Any, *, folder: str | Path = ".", out: str | Path | None = None
@@ -74,7 +77,8 @@ class Hunt:
         shrink_cases: int = 100,
         progress: Progress | None = None,
     ) -> Found | None:
-        """The first case that fails, shrunk; None: none was found. The same seed finds the same, with any number of workers.
+        """The first case that fails, shrunk; None: none was found. The same seed finds the same,
+        with any number of workers.
 
         by: "optuna" (TPE, after the corners) or "hypothesis" (its own draws, steered by target()).
         """
@@ -115,7 +119,9 @@ class Hunt:
             )
 
     def score(self, outcome: Outcome) -> float:
-        """How well it went: below 0 it failed; else the smaller of the clearance (of 3 m) and what was left of the time."""
+        """How well it went: below 0 it failed; else the smaller of the clearance (of 3 m) and what
+        was left of the time.
+        """
         if outcome["status"] != "passed":
             return -1.0
         metrics = outcome["metrics"]
@@ -139,7 +145,7 @@ class Hunt:
         expect.setdefault("clearance_reach", _REACH_M)
         if "duration" in choices:
             content["limits"]["duration"] = choices["duration"]
-        return content  # type: ignore[no-any-return]
+        return content
 
     def case(self, choices: Choices) -> Case:
         """What is to be run."""

@@ -27,7 +27,9 @@ add_test(NAME hunt.{name} COMMAND ruedo campaign run ${{CMAKE_CURRENT_SOURCE_DIR
 
 
 def keep(found: Any, folder: Path) -> Path:
-    """world.sdf, regression.yaml (a campaign of one case), test_NAME.py, CMakeLists.txt, and run.lcm, the log of the run that failed."""
+    """world.sdf, regression.yaml (a campaign of one case), test_NAME.py, CMakeLists.txt, and
+    run.lcm, the log of the run that failed.
+    """
     import yaml
 
     folder.mkdir(parents=True, exist_ok=True)

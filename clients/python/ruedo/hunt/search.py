@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import random
-from typing import Any, Callable
+from collections.abc import Callable
+from typing import Any
 
 from ..campaign.errors import missing
 from .space import Choices, Space
@@ -14,7 +15,9 @@ _BATCH = 8  # proposals at a time: fixed, so that more workers change nothing
 
 
 def corners(space: Space, seed: int) -> list[Choices]:
-    """The neutral case; each dimension at each of its ends, alone; an obstacle with each fault; then all of them at ends that are drawn."""
+    """The neutral case; each dimension at each of its ends, alone; an obstacle with each fault;
+    then all of them at ends that are drawn.
+    """
     neutral = space.neutral()
     made = [neutral]
     for one in space.dimensions:

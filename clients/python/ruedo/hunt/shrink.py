@@ -1,10 +1,11 @@
-"""What was found becomes as small as it goes and still fails the same way: fewest obstacles, no fault that is not
-needed, simple numbers, the shortest time."""
+"""What was found becomes as small as it goes and still fails the same way: fewest obstacles, no
+fault that is not needed, simple numbers, the shortest time."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, Callable, Iterator
+from collections.abc import Callable, Iterator
+from typing import Any
 
 from .space import Choices, Dimension, Space
 
@@ -14,7 +15,9 @@ Evaluate = Callable[[list[Choices]], list[tuple[dict[str, Any], float]]]
 def shrink(
     space: Space, choices: Choices, outcome: dict[str, Any], evaluate: Evaluate, most: int
 ) -> tuple[Choices, dict[str, Any]]:
-    """At most so many cases more. Failing the same way: the same status, and the same expectation."""
+    """At most so many cases more. Failing the same way: the same status, and the same
+    expectation.
+    """
     same = outcome["status"], outcome["what"]
     left = most
 

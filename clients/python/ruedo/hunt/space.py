@@ -1,4 +1,6 @@
-"""What a hunt may choose, as dimensions with a neutral value each: parameters, obstacles, faults, the seed."""
+"""What a hunt may choose, as dimensions with a neutral value each: parameters, obstacles, faults,
+the seed.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ Choices = dict[str, Any]  # a value for each dimension
 
 @dataclass(frozen=True)
 class Dimension:
-    """A number from low to high (whole: of whole ones), or one of `options`. simple: where shrinking goes."""
+    """A number from low to high (whole: of whole ones), or one of `options`. simple: where
+    shrinking goes.
+    """
 
     name: str
     simple: Any
@@ -132,6 +136,7 @@ class Space:
 
 
 def _of_parameter(name: str, given: Any) -> Dimension:
+    values: Any
     kind, values = ("list", given) if isinstance(given, list) else next(iter(given.items()))
     if kind == "list":
         return Dimension(name, values[0], options=tuple(values))

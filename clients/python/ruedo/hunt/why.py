@@ -1,15 +1,17 @@
 """Since when a failed run could not be saved any more, and which single change would have saved it.
 
-The run is branched: up to a moment everything acts as in its log, from there on something else does.
+The run is branched: up to a moment everything acts as in its log, from there on something else
+does.
 """
 
 from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Iterator
+from typing import Any
 
 import numpy as np
 
@@ -104,7 +106,7 @@ def _options(texts: list[str], path: str) -> dict[str, Any]:
             made["set"][key] = setting
         elif name in made:
             made[name].append(value)
-        elif name not in ("remap",):
+        elif name != "remap":
             raise SpecError(
                 f"{path}: its run had the option {text}, which `ruedo why` cannot repeat"
             )
@@ -113,7 +115,9 @@ def _options(texts: list[str], path: str) -> dict[str, Any]:
 
 @dataclass
 class Answer:
-    """failed_s: when. rescues: of each manoeuvre and moment, whether it saved the run. changes: what was changed, and what came of it."""
+    """failed_s: when. rescues: of each manoeuvre and moment, whether it saved the run. changes:
+    what was changed, and what came of it.
+    """
 
     failed_s: float
     reason: str
@@ -146,7 +150,9 @@ class Answer:
 
 
 def why(path: str) -> Answer:
-    """Of a log that a campaign kept, or another one of a run in which the first robot touched something."""
+    """Of a log that a campaign kept, or another one of a run in which the first robot touched
+    something.
+    """
     recorded = Recorded.read(path)
     case = _case_of(path)
     answer = _as_it_was(recorded, case)
@@ -180,7 +186,7 @@ def _case_of(path: str) -> tuple[Any, Any] | None:
 def _as_it_was(recorded: Recorded, case: tuple[Any, Any] | None) -> Answer:
     from ..campaign.case import _goals
 
-    expect = case[1].what["expect"] if case else {"no_contact": True}
+    expect: dict[str, Any] = case[1].what["expect"] if case else {"no_contact": True}
     with recorded.engine() as engine:
         engine.begin_run(
             recorded.seed,
@@ -199,7 +205,9 @@ def _as_it_was(recorded: Recorded, case: tuple[Any, Any] | None) -> Answer:
 
 
 def _rescues(recorded: Recorded, failed_s: float) -> dict[str, list[tuple[float, bool]]]:
-    """Earlier and earlier, until all manoeuvres save it at two moments in a row, or the run is at its beginning."""
+    """Earlier and earlier, until all manoeuvres save it at two moments in a row, or the run is at
+    its beginning.
+    """
     found: dict[str, list[tuple[float, bool]]] = {name: [] for name in MANOEUVRES}
     commands = np.array([[pair] for pair in MANOEUVRES.values()])
     with recorded.engine(len(MANOEUVRES)) as engine:
@@ -224,7 +232,9 @@ def _rescues(recorded: Recorded, failed_s: float) -> dict[str, list[tuple[float,
 
 
 def _changes(recorded: Recorded, case: tuple[Any, Any] | None) -> Iterator[tuple[str, bool, str]]:
-    """Each alone. Of a campaign's case the controller answers to the change; of another log the commands stay as they were."""
+    """Each alone. Of a campaign's case the controller answers to the change; of another log the
+    commands stay as they were.
+    """
     if case is None:
         for fault in recorded.options["fault"]:
             yield _open_loop(
@@ -265,7 +275,7 @@ def plot(answer: Answer, file: str) -> None:
 
     drawn = new_figure(6.4, 2.6)
     axes = drawn.add_subplot()
-    for row, (name, tries) in enumerate(answer.rescues.items()):
+    for row, (_name, tries) in enumerate(answer.rescues.items()):
         for good, mark, colour in ((True, "o", "#3b8f4a"), (False, "x", "#c23b22")):
             times = [at for at, saved in tries if saved == good]
             axes.plot(

@@ -330,7 +330,7 @@ export class RobotOverlay {
         object instanceof THREE.Points
       ))
         return;
-      object.geometry.dispose();
+      (object.geometry as THREE.BufferGeometry).dispose();
       (object.material as THREE.Material).dispose();
     });
   }

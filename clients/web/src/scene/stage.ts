@@ -110,7 +110,7 @@ export class Stage {
       for (const group of [this.built.still, this.built.moving]) {
         group.traverse((object) => {
           if (!(object instanceof THREE.InstancedMesh)) return;
-          object.geometry.dispose();
+          (object.geometry as THREE.BufferGeometry).dispose();
           const material = object.material as THREE.MeshStandardMaterial;
           material.map?.dispose();
           material.dispose();

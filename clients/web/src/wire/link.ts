@@ -158,7 +158,7 @@ export class Link implements RunLink {
 
   private onFrame(buffer: ArrayBuffer): void {
     const view = new DataView(buffer);
-    if (view.getUint32(0, true) === Frame.traffic) {
+    if ((view.getUint32(0, true) as Frame) === Frame.traffic) {
       const count = (buffer.byteLength - 4) / 8;
       const messages = new Uint32Array(count),
         sizes = new Uint32Array(count);
