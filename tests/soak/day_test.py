@@ -1,5 +1,6 @@
-"""A long run in lockstep (RUEDO_DAY_SECONDS of sim time; a day in the nightly run), once alone and once beside programs that
-send what they should not, join and die, and bring bad models: the same log, and memory that stays flat."""
+"""A long run in lockstep (RUEDO_DAY_SECONDS of sim time; a day in the nightly run), once alone and
+once beside programs that send what they should not, join and die, and bring bad models: the same
+log, and memory that stays flat."""
 
 from __future__ import annotations
 
@@ -11,9 +12,8 @@ import time
 from pathlib import Path
 
 import pytest
-from soak_test import HALL, HOSTILE, MOST_GROWTH_KB, PATIENCE, RATE, RUEDO, resident_kb
-
 import ruedo
+from soak_test import HALL, HOSTILE, MOST_GROWTH_KB, PATIENCE, RATE, RUEDO, resident_kb
 
 SECONDS = int(os.environ.get("RUEDO_DAY_SECONDS", "300"))
 BAD_MODELS = [
