@@ -4,6 +4,7 @@ package ruedo;
 public final class AirSpeed extends Sample {
     /** Pa, total less static; negative: from behind. */
     public final double differentialPressure;
+
     /** K, of the air. */
     public final double temperature;
 

@@ -4,6 +4,7 @@ package ruedo;
 public final class Altimeter extends Sample {
     /** m. */
     public final double altitude;
+
     /** m/s, upwards. */
     public final double velocity;
 

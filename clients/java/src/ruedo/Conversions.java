@@ -224,8 +224,7 @@ final class Conversions {
     }
 
     private static Sample navSat(WireReader in) throws IOException {
-        return new NavSat(
-                in.int64(), in.float64(), in.float64(), in.float64(), in.doubles(3));
+        return new NavSat(in.int64(), in.float64(), in.float64(), in.float64(), in.doubles(3));
     }
 
     private static Sample magnetometer(WireReader in) throws IOException {
