@@ -80,7 +80,8 @@ void export_foxglove(const ExportArguments& arguments, const log::Index& index,
   if (std::filesystem::equivalent(arguments.log, arguments.out, error))
     throw InputError({}, "OUT is the log itself: " + arguments.out);
   McapWriter out(arguments.out);
-  FoxgloveExport foxglove(out);
+  FoxgloveFile file(out);
+  FoxgloveExport foxglove(file);
   const uint64_t read = read_log(arguments.log, index, worlds, foxglove);
   out.finish();
   fmt::print("{}: {} messages of {}, as {} of Foxglove's and Ruedo's types", arguments.out, read,

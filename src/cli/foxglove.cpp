@@ -27,8 +27,6 @@ namespace {
 
 constexpr int kManyLinks =
     150;  // of a kind: round shapes get fewer triangles then, as on the console's page
-constexpr const char* kFrames = "ruedo/frames";
-constexpr const char* kScene = "ruedo/scene";
 
 void write_time(JsonWriter& json, const char* name, uint64_t time_ns) {
   json.name(name)
@@ -208,9 +206,9 @@ void write_part(JsonWriter& json, const scene::RenderContent& content,
 uint16_t FoxgloveExport::channel(const std::string& topic, const std::string& name,
                                  const std::string& schema) {
   const auto [known, fresh] = schemas_.try_emplace(name);
-  if (fresh) known->second = out_.add_schema(name, "jsonschema", schema);
+  if (fresh) known->second = out_.add_schema(name, schema);
   const auto [at, first] = channels_.try_emplace(topic + '\n' + name);
-  if (first) at->second = out_.add_channel(known->second, topic, "json");
+  if (first) at->second = out_.add_channel(known->second, topic);
   return at->second;
 }
 
@@ -392,6 +390,7 @@ bool FoxgloveExport::convert(const std::string& channel, uint64_t time_ns,
 void FoxgloveExport::add(const std::string& name, uint64_t time_ns,
                          std::span<const uint8_t> message) {
   const std::string topic = printable(name);
+  if (!out_.wants(topic)) return;
   bool all = false;
   const bool converted = convert(topic, time_ns, message, all);
   if (converted && all) return;

@@ -1,4 +1,4 @@
-// A log's messages as Foxglove shows them: frames, scans, pictures, poses, the scene. What it has
+// Messages as Foxglove shows them: frames, scans, pictures, poses, the scene. What it has
 // no type for, and what its type leaves out, goes along as JSON of Ruedo's own types.
 #pragma once
 
@@ -17,9 +17,44 @@
 
 namespace ruedo::cli {
 
+// Where the messages go: a file, or who looks on.
+class FoxgloveOutput {
+ public:
+  virtual ~FoxgloveOutput() = default;
+  // Both return an id. schema: JSON Schema; messages are JSON.
+  virtual uint16_t add_schema(const std::string& name, const std::string& schema) = 0;
+  virtual uint16_t add_channel(uint16_t schema, const std::string& topic) = 0;
+  virtual void add_message(uint16_t channel, uint64_t time_ns, const std::string& json) = 0;
+  // False when nobody wants what comes on this topic, or on TOPIC/values.
+  virtual bool wants(const std::string& topic) const {
+    static_cast<void>(topic);
+    return true;
+  }
+};
+
+class FoxgloveFile : public FoxgloveOutput {
+ public:
+  explicit FoxgloveFile(McapWriter& file) : file_(file) {}
+  uint16_t add_schema(const std::string& name, const std::string& schema) override {
+    return file_.add_schema(name, "jsonschema", schema);
+  }
+  uint16_t add_channel(uint16_t schema, const std::string& topic) override {
+    return file_.add_channel(schema, topic, "json");
+  }
+  void add_message(uint16_t channel, uint64_t time_ns, const std::string& json) override {
+    file_.add_message(channel, time_ns, json);
+  }
+
+ private:
+  McapWriter& file_;
+};
+
 class FoxgloveExport {
  public:
-  explicit FoxgloveExport(McapWriter& out) : out_(out) {}
+  // Topics of what holds until another scene begins.
+  static constexpr const char *kFrames = "ruedo/frames", *kScene = "ruedo/scene";
+
+  explicit FoxgloveExport(FoxgloveOutput& out) : out_(out) {}
 
   // What runs from now on: frames of robots and devices, and what the world looks like.
   void begin_scene(const run::LogWorlds::Scene& scene, uint64_t time_ns);
@@ -39,7 +74,7 @@ class FoxgloveExport {
   bool convert(const std::string& channel, uint64_t time_ns, std::span<const uint8_t> message,
                bool& all);
 
-  McapWriter& out_;
+  FoxgloveOutput& out_;
   std::map<std::string, uint16_t> schemas_, channels_;
   std::map<std::string, std::string> device_of_channel_;  // "p3at/camera/info": "p3at/camera"
   std::map<int, std::string> bodies_;                     // names, by index

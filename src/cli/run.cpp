@@ -18,6 +18,7 @@
 #include "bus/rival_watch.h"
 #include "bus/server_bus.h"
 #include "cli/commands.h"
+#include "cli/foxglove_server.h"
 #include "cli/listing.h"
 #include "cli/ros2.h"
 #include "cli/sandboxed.h"
@@ -46,6 +47,8 @@ struct RunArguments {
   bool paused = false, quiet = false, watch_stdin = false, sandboxed = false;
   int threads = 0;
   Ros2Arguments ros2;
+  bool foxglove = false;
+  std::string foxglove_address;
 };
 
 // Takes SIGINT, SIGTERM, and SIGHUP where it is not ignored (nohup), in a thread of its own: a
@@ -236,6 +239,8 @@ int run(const RunArguments& arguments) {
   options.wait_for = with_channels(std::move(options.wait_for), *world, ros2);
   run::Run server(world, std::move(options), viewed.bus());
   const std::unique_ptr<Ros2Node> node = Ros2Node::open(server, ros2);
+  const std::unique_ptr<FoxgloveServer> foxglove =
+      arguments.foxglove ? FoxgloveServer::open(server, arguments.foxglove_address) : nullptr;
   place.claim->describe(
       fmt::format("pid {}, world {}, run {}", getpid(), world->name, server.run_id()));
   std::shared_ptr<void> view;
@@ -248,6 +253,7 @@ int run(const RunArguments& arguments) {
     if (!arguments.quiet) print_world(server, *world, place.url);
     view = viewed.open(server, world->name);
     if (node && !arguments.quiet) node->print();
+    if (foxglove) foxglove->print();
   });
   if (!is_read)
     server.on_state(
@@ -314,6 +320,10 @@ void add_run(CLI::App& app, Action& chosen) {
   CLI::Option* view = command->add_option("--view", arguments->view,
                                           "serve the web console (default: 127.0.0.1:8080)");
   view->type_name("[ADDRESS:PORT]")->expected(0, 1);
+  CLI::Option* foxglove = command->add_option(
+      "--foxglove", arguments->foxglove_address,
+      "show the run in Foxglove, by its WebSocket protocol (default: 127.0.0.1:8765)");
+  foxglove->type_name("[ADDRESS:PORT]")->expected(0, 1);
   CLI::Option* ros2 =
       command->add_option("--ros2", arguments->ros2.distro,
                           "be a ROS 2 node, of that release (default: $ROS_DISTRO, or jazzy)");
@@ -367,8 +377,9 @@ void add_run(CLI::App& app, Action& chosen) {
                     "end when standard input does: for programs that start a server");
   command->add_flag("--quiet", arguments->quiet, "do not list the channels");
   add_sandbox_argument(*command, arguments->sandboxed);
-  command->callback([arguments, view, ros2, &chosen] {
+  command->callback([arguments, view, ros2, foxglove, &chosen] {
     arguments->viewed = view->count() > 0;
+    arguments->foxglove = foxglove->count() > 0;
     arguments->ros2.on = ros2->count() > 0;
     chosen = [arguments] { return run(*arguments); };
   });

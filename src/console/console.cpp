@@ -148,7 +148,8 @@ Console::Console(const Address& address, std::unique_ptr<Source> source, const s
     if (impl.stage.viewers >= kMostViewers) return nullptr;
     return std::make_unique<Viewer>(impl.stage);
   };
-  impl.web = std::make_unique<WebServer>(address, token, std::move(handler));
+  impl.web = std::make_unique<WebServer>(
+      WebPlace{.address = address, .token = token, .origins = {}}, std::move(handler));
   for (const std::string& host : reachable_hosts(address)) {
     urls_.push_back("http://" + host + ":" + std::to_string(impl.web->port()) + "/" +
                     (token.empty() ? "" : "?token=" + token));

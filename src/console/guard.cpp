@@ -18,10 +18,10 @@
 namespace ruedo::console {
 namespace {
 
-[[noreturn]] void bad_address(const std::string& text) {
+[[noreturn]] void bad_address(const std::string& option, const std::string& text) {
   throw InputError(
       {},
-      "--view: '" + text +
+      option + ": '" + text +
           "' is not allowed; an address is ADDRESS:PORT, such as 127.0.0.1:8080 or 0.0.0.0:8080");
 }
 
@@ -40,8 +40,9 @@ bool equal(std::string_view a,
 
 }  // namespace
 
-Address parse_address(const std::string& text) {
+Address parse_address(const std::string& text, const std::string& option, int default_port) {
   Address address;
+  address.port = default_port;
   if (text.empty()) return address;
   const size_t colon = text.rfind(':');
   std::string host = text.substr(0, colon),
@@ -50,18 +51,18 @@ Address parse_address(const std::string& text) {
     host.clear();
     port = text;
   } else if (colon != std::string::npos && port.empty()) {
-    bad_address(text);
+    bad_address(option, text);
   }
   if (!port.empty()) {
     const auto [end, error] = std::from_chars(port.data(), port.data() + port.size(), address.port);
     if (error != std::errc() || end != port.data() + port.size() || address.port < 0 ||
         address.port > 65535)
-      bad_address(text);
+      bad_address(option, text);
   }
   if (host == "localhost") host = "127.0.0.1";
   if (!host.empty()) {
     in_addr parsed{};
-    if (inet_pton(AF_INET, host.c_str(), &parsed) != 1) bad_address(text);
+    if (inet_pton(AF_INET, host.c_str(), &parsed) != 1) bad_address(option, text);
     address.host = host;
   }
   return address;

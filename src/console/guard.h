@@ -15,7 +15,9 @@ struct Address {
 };
 
 // "", "PORT", "ADDRESS" or "ADDRESS:PORT", localhost among them. Throws InputError, without a file.
-Address parse_address(const std::string& text);
+// option: whose text it is.
+Address parse_address(const std::string& text, const std::string& option = "--view",
+                      int default_port = 8080);
 
 // A new token: 32 hexadecimal digits from the kernel's generator.
 std::string make_token();

@@ -7,6 +7,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -31,7 +32,8 @@ constexpr lws_retry_bo_t kIdlePolicy = {nullptr, 0,  0,
 
 // The port that the address gives, or a free one for 0. libwebsockets itself says only that it
 // failed.
-int checked_port(const Address& address) {
+int checked_port(const WebPlace& place) {
+  const Address& address = place.address;
   const int probe = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   const int one = 1;
   ::setsockopt(probe, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
@@ -46,9 +48,9 @@ int checked_port(const Address& address) {
   if (bound) ::getsockname(probe, reinterpret_cast<sockaddr*>(&wanted), &size);
   ::close(probe);
   if (!bound) {
-    throw EnvironmentError("--view: " + address.host + ":" + std::to_string(address.port) +
+    throw EnvironmentError(place.option + ": " + address.host + ":" + std::to_string(address.port) +
                            " cannot be served: " + std::strerror(error) +
-                           ". Another port is chosen by --view " + address.host +
+                           ". Another port is chosen by " + place.option + " " + address.host +
                            ":PORT, a free one by PORT 0");
   }
   return ntohs(wanted.sin_port);
@@ -70,9 +72,9 @@ struct WebServer::Impl {
     Impl* owner = nullptr;
   };
 
-  Address address;
-  std::string token;
+  WebPlace place;
   WebHandler handler;
+  std::vector<lws_protocols> protocols;  // the last is none
   lws_context* context = nullptr;
   lws_vhost* vhost = nullptr;
   Timer timer;
@@ -99,7 +101,9 @@ struct WebServer::Impl {
     const char* given = lws_get_urlarg_by_name(wsi, "token=", value, sizeof value);
     Visit visit{header(wsi, WSI_TOKEN_HOST), header(wsi, WSI_TOKEN_ORIGIN),
                 header(wsi, WSI_TOKEN_HTTP_COOKIE), given ? given : "", socket};
-    return refuse(visit, address, token);
+    if (std::find(place.origins.begin(), place.origins.end(), visit.origin) != place.origins.end())
+      visit.origin.clear();
+    return refuse(visit, place.address, place.token);
   }
   int respond(lws* wsi, HttpResponse response);
   int request(lws* wsi, std::string_view path);
@@ -138,7 +142,7 @@ int WebServer::Impl::dispatch(lws* wsi, lws_callback_reasons reason, void* in, s
     case LWS_CALLBACK_HTTP_WRITEABLE: return send_chunk(wsi);
     case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
       std::erase(silent, wsi);
-      if (header(wsi, WSI_TOKEN_GET_URI) != "/socket" || !refusal(wsi, true).empty()) {
+      if (header(wsi, WSI_TOKEN_GET_URI) != place.socket || !refusal(wsi, true).empty()) {
         lws_return_http_status(wsi, HTTP_STATUS_FORBIDDEN, nullptr);
         return 1;
       }
@@ -207,8 +211,8 @@ int WebServer::Impl::respond(lws* wsi, HttpResponse response) {
   add("referrer-policy:", "no-referrer");
   add("cache-control:", response.lasting ? "private, max-age=86400" : "no-store");
   if (response.gzip) add("content-encoding:", "gzip");
-  if (!token.empty() && response.status == 200)
-    add("set-cookie:", "ruedo_token=" + token + "; HttpOnly; SameSite=Strict; Path=/");
+  if (!place.token.empty() && response.status == 200)
+    add("set-cookie:", "ruedo_token=" + place.token + "; HttpOnly; SameSite=Strict; Path=/");
   if (!fits || lws_finalize_write_http_header(wsi, start, &at, end) != 0) return 1;
   if (size == 0) return lws_http_transaction_completed(wsi) != 0 ? -1 : 0;
   transfers[wsi] = {std::move(response.body), 0};
@@ -263,21 +267,20 @@ int WebServer::Impl::write(lws* wsi) {
   return 0;
 }
 
-WebServer::WebServer(const Address& address, const std::string& token, WebHandler handler)
-    : impl_(std::make_unique<Impl>()) {
-  static const std::array<lws_protocols, 2> kProtocols = {
-      lws_protocols{"ruedo", &Impl::callback, 0, 16384, 0, nullptr, 0},
-      lws_protocols{nullptr, nullptr, 0, 0, 0, nullptr, 0}};
-  impl_->address = address;
-  impl_->address.port = checked_port(address);
-  impl_->token = token;
+WebServer::WebServer(WebPlace place, WebHandler handler) : impl_(std::make_unique<Impl>()) {
+  impl_->place = std::move(place);
+  for (const std::string& name : impl_->place.protocols)
+    impl_->protocols.push_back({name.c_str(), &Impl::callback, 0, 16384, 0, nullptr, 0});
+  impl_->protocols.push_back({nullptr, nullptr, 0, 0, 0, nullptr, 0});
+  Address& address = impl_->place.address;
+  address.port = checked_port(impl_->place);
   impl_->handler = std::move(handler);
   impl_->timer.owner = impl_.get();
   lws_set_log_level(0, nullptr);
   lws_context_creation_info info{};
-  info.port = impl_->address.port;
-  info.iface = address.host == "0.0.0.0" ? nullptr : impl_->address.host.c_str();
-  info.protocols = kProtocols.data();
+  info.port = address.port;
+  info.iface = address.host == "0.0.0.0" ? nullptr : address.host.c_str();
+  info.protocols = impl_->protocols.data();
   info.gid = static_cast<gid_t>(-1);
   info.uid = static_cast<uid_t>(-1);
   info.user = impl_.get();
@@ -293,14 +296,14 @@ WebServer::WebServer(const Address& address, const std::string& token, WebHandle
   impl_->vhost = impl_->context ? lws_create_vhost(impl_->context, &info) : nullptr;
   if (!impl_->vhost) {
     if (impl_->context) lws_context_destroy(impl_->context);
-    throw EnvironmentError("--view: libwebsockets cannot serve " + impl_->address.host + ":" +
-                           std::to_string(impl_->address.port));
+    throw EnvironmentError(impl_->place.option + ": libwebsockets cannot serve " + address.host +
+                           ":" + std::to_string(address.port));
   }
 }
 
 WebServer::~WebServer() { lws_context_destroy(impl_->context); }
 
-int WebServer::port() const { return impl_->address.port; }
+int WebServer::port() const { return impl_->place.address.port; }
 
 void WebServer::run() {
   lws_sul_schedule(impl_->context, 0, &impl_->timer.entry, &Impl::on_timer, kTick_us);

@@ -34,6 +34,16 @@ class Connection {
   virtual bool next(std::vector<uint8_t>& message, bool& text) = 0;
 };
 
+// What is served where, and who may come.
+struct WebPlace {
+  Address address;
+  std::string token;                               // "": none is asked for
+  std::string option = "--view";                   // that gives the address, for messages
+  std::string socket = "/socket";                  // the WebSocket's path
+  std::vector<std::string> protocols = {"ruedo"};  // WebSocket subprotocols
+  std::vector<std::string> origins;  // of pages from elsewhere that may open the WebSocket
+};
+
 struct WebHandler {
   std::function<HttpResponse(std::string_view path)> get;
   std::function<std::unique_ptr<Connection>()> open;  // null: there are too many
@@ -52,7 +62,7 @@ class WebServer {
   static constexpr size_t kMostHeaders = 4096;   // bytes of a request's headers
 
   // Binds the port. Throws EnvironmentError, with the cure, when that cannot be had.
-  WebServer(const Address& address, const std::string& token, WebHandler handler);
+  WebServer(WebPlace place, WebHandler handler);
   ~WebServer();
   WebServer(const WebServer&) = delete;
   WebServer& operator=(const WebServer&) = delete;

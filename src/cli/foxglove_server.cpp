@@ -1,0 +1,447 @@
+// Two threads meet here, under one lock: the run's messages come in one and become JSON, browsers
+// are served in the other.
+//
+// The protocol is foxglove.websocket.v1 (github.com/foxglove/ws-protocol, docs/spec.md), which
+// foxglove.sdk.v1 repeats: JSON texts with "op", and binary messages that begin with an opcode.
+#include "cli/foxglove_server.h"
+
+#include "ruedo/errors.h"
+
+#ifdef RUEDO_CONSOLE
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <set>
+#include <stdexcept>
+#include <thread>
+
+#include <fmt/format.h>
+#include <pthread.h>
+#include <spdlog/spdlog.h>
+#include <nlohmann/json.hpp>
+
+#include "cli/foxglove.h"
+#include "console/web_server.h"
+#include "core/utf8.h"
+#include "core/version.h"
+#include "engine/outcome.h"
+#include "ruedo/velocity_command_t.hpp"
+#include "run/queued_sink.h"
+#include "run/run.h"
+
+namespace ruedo::cli {
+namespace {
+
+using nlohmann::json;
+using Text = std::shared_ptr<const std::string>;
+
+constexpr int kPort = 8765;                        // Foxglove's own default
+constexpr size_t kMostQueued = size_t{64} << 20;   // bytes between the run and this
+constexpr size_t kMostWaiting = size_t{32} << 20;  // bytes that wait for one viewer
+constexpr size_t kMostViewers = 16;
+constexpr size_t kMostChannels = 65'000;
+constexpr size_t kMostSubscriptions = 100'000, kMostPublished = 100;  // of one viewer
+constexpr SimTime kClockPeriod_us = 20'000;
+// Pages that may come in beside programs, which have no origin: anyone's page could else look on.
+const std::vector<std::string> kOrigins = {"https://app.foxglove.dev",
+                                           "https://studio.foxglove.dev"};
+
+enum Opcode : uint8_t { kMessageData = 1, kTime = 2 };  // kMessageData: of both sides
+
+template <class Integer>
+void put(std::string& bytes, Integer value) {
+  for (size_t i = 0; i < sizeof value; ++i) bytes += static_cast<char>(value >> (8 * i));
+}
+
+struct Channel {
+  std::string topic, schema_name, schema;
+  std::vector<std::pair<uint64_t, Text>> kept;  // for who comes later
+  bool lasts = false;                           // keeps its messages
+};
+
+// A velocity from Foxglove's Teleop panel: a geometry_msgs/Twist as JSON. Nothing for what is none.
+std::vector<uint8_t> velocity_of(std::string_view text) {
+  const json twist = json::parse(text, nullptr, false);
+  const auto number = [&](const char* part, const char* axis) {
+    const auto at = json::json_pointer(fmt::format("/{}/{}", part, axis));
+    return twist.contains(at) && twist[at].is_number() ? twist[at].get<double>() : NAN;
+  };
+  velocity_command_t command{};
+  command.vx = number("linear", "x");
+  command.vy = number("linear", "y");
+  command.omega = number("angular", "z");
+  if (!twist.is_object() || !std::isfinite(command.vx + command.vy + command.omega)) return {};
+  return engine::encoded(command);
+}
+
+struct BadMessage : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+uint32_t id_of(const json& value) {
+  if (!value.is_number_unsigned() || value.get<uint64_t>() > UINT32_MAX)
+    throw BadMessage("an id is a whole number of 32 bits");
+  return static_cast<uint32_t>(value.get<uint64_t>());
+}
+
+class Viewer;
+
+// What both threads share.
+struct Hub {
+  std::mutex mutex;               // of all that follows
+  std::vector<Channel> channels;  // by id
+  std::set<Viewer*> viewers;
+  std::map<std::string, std::string> inputs;  // names that publish velocities to: the bus's
+  uint64_t dropped = 0;
+  bool news = false;
+
+  std::function<void(const std::string& channel, const std::vector<uint8_t>&)> inject;
+
+  std::string advertised(const std::vector<size_t>& which) const {
+    json list = json::array();
+    for (const size_t id : which) {
+      const Channel& channel = channels[id];
+      list.push_back({{"id", id},
+                      {"topic", channel.topic},
+                      {"encoding", "json"},
+                      {"schemaName", channel.schema_name},
+                      {"schema", channel.schema},
+                      {"schemaEncoding", "jsonschema"}});
+    }
+    return json{{"op", "advertise"}, {"channels", list}}.dump();
+  }
+};
+
+// One program that looks on. All but the constructor and the destructor under the hub's lock.
+class Viewer : public console::Connection {
+ public:
+  explicit Viewer(Hub& hub, const std::string& greeting) : hub_(hub) {
+    const std::lock_guard lock(hub_.mutex);
+    say(greeting);
+    std::vector<size_t> all(hub_.channels.size());
+    for (size_t i = 0; i < all.size(); ++i) all[i] = i;
+    if (!all.empty()) say(hub_.advertised(all));
+    hub_.viewers.insert(this);
+  }
+  ~Viewer() override {
+    const std::lock_guard lock(hub_.mutex);
+    hub_.viewers.erase(this);
+  }
+
+  void say(std::string text) { push({std::make_shared<const std::string>(std::move(text)), {}}); }
+  void send_time(uint64_t time_ns) {
+    std::string head(1, kTime);
+    put(head, time_ns);
+    push({nullptr, std::move(head)});
+  }
+  void send(size_t channel, uint64_t time_ns, const Text& message) {
+    const auto [begin, end] = subscribed_.equal_range(channel);
+    for (auto at = begin; at != end; ++at) {
+      std::string head(1, kMessageData);
+      put(head, at->second);
+      put(head, time_ns);
+      push({message, std::move(head)});
+    }
+  }
+  bool wants(size_t channel) const { return subscribed_.contains(channel); }
+
+  bool receive(std::span<const uint8_t> message) override {
+    const std::string_view text(reinterpret_cast<const char*>(message.data()), message.size());
+    const std::lock_guard lock(hub_.mutex);
+    if (text.empty()) return true;
+    if (text[0] == kMessageData) return publish(text.substr(1)), true;
+    const json asked = json::parse(text, nullptr, false);
+    try {
+      return obey(asked);
+    } catch (const BadMessage& bad) {
+      complain(bad.what());
+    } catch (const json::exception&) {
+      complain("a message that is none of the protocol's was ignored");
+    }
+    return true;
+  }
+
+  bool next(std::vector<uint8_t>& message, bool& text) override {
+    const std::lock_guard lock(hub_.mutex);
+    if (waiting_.empty()) return false;
+    const Waiting& first = waiting_.front();
+    text = first.head.empty();
+    message.insert(message.end(), first.head.begin(), first.head.end());
+    if (first.body) message.insert(message.end(), first.body->begin(), first.body->end());
+    bytes_ -= first.size();
+    waiting_.pop_front();
+    return true;
+  }
+
+ private:
+  struct Waiting {
+    Text body;
+    std::string head;  // of a binary message
+    size_t size() const { return head.size() + (body ? body->size() : 0); }
+  };
+
+  void push(Waiting message) {
+    if (bytes_ > kMostWaiting) {
+      ++hub_.dropped;
+      if (!std::exchange(told_, true)) {
+        waiting_.clear();  // it is far behind: it goes on with what comes from now on
+        bytes_ = 0;
+        complain("messages were dropped: this connection is slower than the run");
+      }
+      return;
+    }
+    told_ = false;
+    bytes_ += message.size();
+    waiting_.push_back(std::move(message));
+    hub_.news = true;
+  }
+
+  void complain(const std::string& words) {
+    say(json{{"op", "status"}, {"level", 1}, {"message", words}}.dump());
+  }
+
+  bool obey(const json& asked) {
+    const std::string op = asked.at("op");
+    if (op == "subscribe") {
+      for (const json& one : asked.at("subscriptions"))
+        subscribe(id_of(one.at("id")), id_of(one.at("channelId")));
+    } else if (op == "unsubscribe") {
+      for (const json& one : asked.at("subscriptionIds")) {
+        const auto id = id_of(one);
+        std::erase_if(subscribed_, [id](const auto& each) { return each.second == id; });
+      }
+    } else if (op == "advertise") {
+      for (const json& one : asked.at("channels")) advertise(one);
+    } else if (op == "unadvertise") {
+      for (const json& one : asked.at("channelIds")) published_.erase(id_of(one));
+    }
+    return true;  // what else there is in the protocol is not offered
+  }
+
+  void subscribe(uint32_t id, size_t channel) {
+    if (channel >= hub_.channels.size()) return complain(fmt::format("no channel {}", channel));
+    if (subscribed_.size() >= kMostSubscriptions) return complain("too many subscriptions");
+    for (const auto& each : subscribed_) {
+      if (each.second == id) return complain(fmt::format("subscription {} is there already", id));
+    }
+    subscribed_.emplace(channel, id);
+    for (const auto& [time_ns, message] : hub_.channels[channel].kept) {
+      std::string head(1, kMessageData);
+      put(head, id);
+      put(head, time_ns);
+      push({message, std::move(head)});
+    }
+  }
+
+  void advertise(const json& channel) {
+    std::string topic = channel.at("topic");
+    if (topic.starts_with('/')) topic.erase(0, 1);
+    const auto input = hub_.inputs.find(topic);
+    if (channel.at("encoding") != "json" || input == hub_.inputs.end()) {
+      std::string names;
+      for (const auto& [name, bus] : hub_.inputs) names += (names.empty() ? "" : ", ") + name;
+      return complain("publishing is for velocities (geometry_msgs/Twist as json) on: " + names);
+    }
+    if (published_.size() < kMostPublished) published_[id_of(channel.at("id"))] = input->second;
+  }
+
+  void publish(std::string_view message) {
+    if (message.size() < 4) return complain("a message without a channel");
+    uint32_t id = 0;
+    for (int i = 3; i >= 0; --i)
+      id = id << 8 | static_cast<uint8_t>(message[static_cast<size_t>(i)]);
+    const auto known = published_.find(id);
+    if (known == published_.end()) return complain(fmt::format("no channel {} was advertised", id));
+    const std::vector<uint8_t> command = velocity_of(message.substr(4));
+    if (command.empty()) return complain("a Twist wants finite numbers in linear and angular");
+    hub_.inject(known->second, command);
+  }
+
+  Hub& hub_;
+  std::deque<Waiting> waiting_;
+  size_t bytes_ = 0;
+  bool told_ = false;
+  std::multimap<size_t, uint32_t> subscribed_;  // ids, by channel
+  std::map<uint32_t, std::string> published_;   // the bus's channels
+};
+
+class LiveFoxglove : public FoxgloveServer, public run::Sink, private FoxgloveOutput {
+ public:
+  LiveFoxglove(run::Run& server, const console::Address& address)
+      : server_(server),
+        export_(*this),
+        queue_(*this, {.thread = "foxglove", .most_bytes = kMostQueued}) {
+    hub_.inject = [&server](const std::string& channel, const std::vector<uint8_t>& bytes) {
+      server.receive(channel, bytes);
+    };
+    const json greeting = {{"op", "serverInfo"},
+                           {"name", std::string("Ruedo ") + version()},
+                           {"capabilities", {"time", "clientPublish"}},
+                           {"supportedEncodings", {"json"}},
+                           {"sessionId", std::to_string(server.run_id())}};
+    console::WebHandler handler;
+    handler.get = [](std::string_view) {
+      static const std::string words =
+          "A Foxglove WebSocket. In Foxglove: Open connection, Foxglove WebSocket, this address.\n";
+      console::HttpResponse response;
+      response.body = std::make_shared<const std::vector<uint8_t>>(words.begin(), words.end());
+      return response;
+    };
+    handler.open = [this, text = greeting.dump()]() -> std::unique_ptr<console::Connection> {
+      {
+        const std::lock_guard lock(hub_.mutex);
+        if (hub_.viewers.size() >= kMostViewers) return nullptr;
+      }
+      return std::make_unique<Viewer>(hub_, text);
+    };
+    handler.end = [] {};
+    handler.tick = [this] {
+      const std::lock_guard lock(hub_.mutex);
+      return std::exchange(hub_.news, false);
+    };
+    const std::string token = address.loopback() ? "" : console::make_token();
+    for (const std::string& host : console::reachable_hosts(address)) hosts_.push_back(host);
+    web_ = std::make_unique<console::WebServer>(
+        console::WebPlace{.address = address,
+                          .token = token,
+                          .option = "--foxglove",
+                          .socket = "/",
+                          .protocols = {"foxglove.websocket.v1", "foxglove.sdk.v1"},
+                          .origins = kOrigins},
+        std::move(handler));
+    rest_ = fmt::format(":{}/{}", web_->port(), token.empty() ? "" : "?token=" + token);
+    thread_ = std::thread([this] {
+      pthread_setname_np(pthread_self(), "foxglove web");
+      try {
+        web_->run();
+      } catch (const std::exception& error) {
+        spdlog::error("--foxglove has ended: {}", error.what());
+      }
+    });
+    server.add(queue_);
+  }
+  ~LiveFoxglove() override {
+    web_->stop();
+    thread_.join();
+    web_.reset();  // its viewers, before the hub
+  }
+
+  void print() const override {
+    for (const std::string& host : hosts_) fmt::print("Foxglove: ws://{}{}\n", host, rest_);
+    std::fflush(stdout);
+  }
+
+  // ---- The run's, in the queue's thread.
+
+  Hears hears() const override { return {.samples = true}; }
+  void announce(const std::shared_ptr<const run::Announcement>& announcement) override {
+    run::LogWorlds::Scene scene;
+    scene.world = server_.world();
+    for (const world_info_t& part : announcement->info) scene.info.push_back(engine::encoded(part));
+    {
+      const std::lock_guard lock(hub_.mutex);
+      for (Channel& channel : hub_.channels) channel.kept.clear();
+      find_inputs(announcement->channels);
+    }
+    export_.begin_scene(scene, nanoseconds(last_us_));
+  }
+  void message(const run::Published& message) override {
+    last_us_ = message.stamp_us;
+    export_.add(message.channel, nanoseconds(message.stamp_us), {message.data, message.size});
+  }
+  void flush() override {
+    if (last_us_ < clock_us_ + kClockPeriod_us) return;
+    clock_us_ = last_us_;
+    const std::lock_guard lock(hub_.mutex);
+    for (Viewer* viewer : hub_.viewers) viewer->send_time(nanoseconds(last_us_));
+  }
+
+ private:
+  static uint64_t nanoseconds(SimTime time_us) { return static_cast<uint64_t>(time_us) * 1000; }
+
+  // A robot takes velocities on ROBOT/velocity and ROBOT/cmd_vel, the only one on cmd_vel, too.
+  void find_inputs(const engine::Channels& channels) {
+    hub_.inputs.clear();
+    for (const engine::Channel& channel : channels.list()) {
+      if (!channel.input || channel.gone || channel.type != "velocity_command_t") continue;
+      hub_.inputs[channel.name] = channel.bus_name;
+      hub_.inputs[channel.robot + "/cmd_vel"] = channel.bus_name;
+    }
+    if (hub_.inputs.size() == 2) hub_.inputs["cmd_vel"] = hub_.inputs.begin()->second;
+  }
+
+  // ---- The export's.
+
+  uint16_t add_schema(const std::string& name, const std::string& schema) override {
+    schemas_.push_back({name, schema});
+    return static_cast<uint16_t>(schemas_.size() - 1);
+  }
+  uint16_t add_channel(uint16_t schema, const std::string& topic) override {
+    const std::lock_guard lock(hub_.mutex);
+    const size_t id = hub_.channels.size();
+    hub_.channels.push_back({topic,
+                             schemas_[schema].first,
+                             schemas_[schema].second,
+                             {},
+                             topic == FoxgloveExport::kFrames || topic == FoxgloveExport::kScene});
+    by_topic_[topic] = id;
+    for (Viewer* viewer : hub_.viewers) viewer->say(hub_.advertised({id}));
+    return static_cast<uint16_t>(id);
+  }
+  void add_message(uint16_t id, uint64_t time_ns, const std::string& text) override {
+    const auto message = std::make_shared<const std::string>(text);
+    const std::lock_guard lock(hub_.mutex);
+    if (hub_.channels[id].lasts) hub_.channels[id].kept.emplace_back(time_ns, message);
+    for (Viewer* viewer : hub_.viewers) viewer->send(id, time_ns, message);
+  }
+  // The first message of a topic says which channels there are.
+  bool wants(const std::string& topic) const override {
+    const std::lock_guard lock(hub_.mutex);
+    const auto known = by_topic_.find(topic), values = by_topic_.find(topic + "/values");
+    if (known == by_topic_.end()) return hub_.channels.size() < kMostChannels;
+    for (const Viewer* viewer : hub_.viewers) {
+      if (viewer->wants(known->second) ||
+          (values != by_topic_.end() && viewer->wants(values->second)))
+        return true;
+    }
+    return false;
+  }
+
+  run::Run& server_;
+  mutable Hub hub_;
+  std::map<std::string, size_t> by_topic_;  // channels
+  std::vector<std::pair<std::string, std::string>> schemas_;
+  FoxgloveExport export_;
+  SimTime last_us_ = 0, clock_us_ = -kClockPeriod_us;
+  std::unique_ptr<console::WebServer> web_;
+  std::thread thread_;
+  std::vector<std::string> hosts_;
+  std::string rest_;
+  run::QueuedSink queue_;  // its thread ends first
+};
+
+}  // namespace
+
+std::unique_ptr<FoxgloveServer> FoxgloveServer::open(run::Run& server, const std::string& address) {
+  return std::make_unique<LiveFoxglove>(server,
+                                        console::parse_address(address, "--foxglove", kPort));
+}
+
+}  // namespace ruedo::cli
+
+#else
+
+namespace ruedo::cli {
+
+std::unique_ptr<FoxgloveServer> FoxgloveServer::open(run::Run&, const std::string&) {
+  throw EnvironmentError(
+      "--foxglove: this build has no web server: it was made without the console");
+}
+
+}  // namespace ruedo::cli
+
+#endif

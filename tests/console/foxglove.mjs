@@ -1,0 +1,44 @@
+// A viewer by Foxglove's own client library: foxglove.mjs URL SECONDS TOPIC... Subscribes to what is
+// advertised of these topics, publishes a Twist on /cmd_vel four times a second, and prints a line of
+// JSON for all that it hears.
+import { createRequire } from "node:module";
+
+const require = createRequire(`${process.cwd()}/`); // the build's folder, where the packages are
+const { FoxgloveClient } = require("@foxglove/ws-protocol");
+const { WebSocket } = require("ws");
+
+const [url, seconds, ...topics] = process.argv.slice(2);
+const say = (line) => process.stdout.write(JSON.stringify(line) + "\n");
+const socket = new WebSocket(url, [FoxgloveClient.SUPPORTED_SUBPROTOCOL]);
+const client = new FoxgloveClient({ ws: socket });
+const topicOf = new Map();
+
+client.on("error", (error) => say({ error: String(error.message ?? error) }));
+client.on("close", () => process.exit(0));
+client.on("serverInfo", (info) => {
+  say({ info });
+  const channel = client.advertise({
+    topic: "/cmd_vel",
+    encoding: "json",
+    schemaName: "geometry_msgs/Twist",
+  });
+  const twist = { linear: { x: 0.2, y: 0, z: 0 }, angular: { x: 0, y: 0, z: 0.3 } };
+  const bytes = new TextEncoder().encode(JSON.stringify(twist));
+  setInterval(() => client.sendMessage(channel, bytes), 250);
+});
+client.on("advertise", (channels) => {
+  for (const channel of channels) {
+    say({ channel });
+    if (topics.includes(channel.topic)) topicOf.set(client.subscribe(channel.id), channel.topic);
+  }
+});
+client.on("status", (status) => say({ status }));
+client.on("time", ({ timestamp }) => say({ time: String(timestamp) }));
+client.on("message", ({ subscriptionId, timestamp, data }) =>
+  say({
+    topic: topicOf.get(subscriptionId),
+    at: String(timestamp),
+    text: new TextDecoder().decode(data),
+  }),
+);
+setTimeout(() => client.close(), 1000 * Number(seconds));

@@ -1,0 +1,189 @@
+"""ruedo run --foxglove: seen by Foxglove's own client library, message by message as `ruedo export` writes the same run."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import re
+import socket
+import struct
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from harness import ARENA, BUILD, NODE, RUEDO
+from mcap.reader import make_reader
+
+TOPICS = ["p3at/lrf", "p3at/odometry", "ruedo/world", "ruedo/frames", "ruedo/scene"]
+
+
+@contextmanager
+def serving(*arguments: str) -> Iterator[tuple[subprocess.Popen, str]]:
+    process = subprocess.Popen(
+        [RUEDO, "run", ARENA, "--foxglove", "127.0.0.1:0", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        for line in process.stdout:
+            if found := re.match(r"Foxglove: (ws://\S+)", line):
+                yield process, found.group(1)
+                break
+        else:
+            pytest.fail(process.stderr.read())
+    finally:
+        process.terminate()
+        process.communicate(timeout=100)
+
+
+def seen(url: str, seconds: float, *topics: str) -> list[dict]:
+    viewer = subprocess.run(
+        [NODE, Path(__file__).with_name("foxglove.mjs"), url, str(seconds), *topics],
+        cwd=BUILD / "web",
+        capture_output=True,
+        text=True,
+        timeout=200,
+    )
+    assert viewer.returncode == 0, viewer.stderr
+    return [json.loads(line) for line in viewer.stdout.splitlines()]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[dict], dict]:
+    """What a viewer saw in six seconds of a run, and the same run's messages as an exported file has them."""
+    folder = tmp_path_factory.mktemp("foxglove")
+    with serving("--record", str(folder / "run.lcm")) as (_, url):
+        lines = seen(url, 6, *TOPICS)
+    subprocess.run([RUEDO, "export", folder / "run.lcm", folder / "run.mcap"], check=True)
+    exported: dict = {}
+    with open(folder / "run.mcap", "rb") as file:
+        for schema, channel, message in make_reader(file).iter_messages():
+            key = (channel.topic, message.log_time)
+            exported.setdefault(key, []).append((schema.name, message.data.decode()))
+    return lines, exported
+
+
+def test_what_is_seen_is_what_export_writes(run: tuple[list[dict], dict]) -> None:
+    lines, exported = run
+    assert not [line for line in lines if "error" in line or "status" in line]
+    messages = [line for line in lines if "topic" in line]
+    for topic in TOPICS:
+        here = [line for line in messages if line["topic"] == topic]
+        assert here, f"nothing came on {topic}"
+        if topic in ("ruedo/frames", "ruedo/scene"):  # as they were for who came first
+            texts = {
+                text for (name, _), all in exported.items() if name == topic for _, text in all
+            }
+            assert {line["text"] for line in here} <= texts
+            continue
+        for line in here:
+            assert line["text"] in [text for _, text in exported[topic, int(line["at"])]]
+    scans = [int(line["at"]) for line in messages if line["topic"] == "p3at/lrf"]
+    assert len(scans) > 20 and scans == list(range(scans[0], scans[-1] + 1, 100_000_000))
+
+
+def test_channels_have_foxgloves_schemas(run: tuple[list[dict], dict]) -> None:
+    lines, exported = run
+    schemas = {
+        line["channel"]["topic"]: line["channel"]["schemaName"]
+        for line in lines
+        if "channel" in line
+    }
+    assert schemas["p3at/lrf"] == "foxglove.LaserScan"
+    assert schemas["ruedo/world"] == "foxglove.FrameTransforms"
+    for (topic, _), messages in exported.items():
+        if topic in schemas:
+            assert schemas[topic] in [name for name, _ in messages]
+    info = next(line["info"] for line in lines if "info" in line)
+    assert info["capabilities"] == ["time", "clientPublish"]
+    assert info["supportedEncodings"] == ["json"]
+
+
+def test_a_twist_drives_the_only_robot(run: tuple[list[dict], dict]) -> None:
+    lines, _ = run
+    poses = [
+        json.loads(line["text"])["pose"]["position"]
+        for line in lines
+        if line.get("topic") == "p3at/odometry"
+    ]
+    assert abs(poses[-1]["x"] - poses[0]["x"]) + abs(poses[-1]["y"] - poses[0]["y"]) > 0.2
+
+
+def test_time_is_the_simulations(run: tuple[list[dict], dict]) -> None:
+    times = [int(line["time"]) for line in run[0] if "time" in line]
+    assert times == sorted(times) and len(times) > 50
+    assert times[-1] < 60_000_000_000
+
+
+def open_socket(url: str, origin: str = "") -> tuple[socket.socket, bytes]:
+    host, port = url.removeprefix("ws://").rstrip("/").split(":")
+    one = socket.create_connection((host, int(port)), timeout=60)
+    key = base64.b64encode(os.urandom(16)).decode()
+    one.sendall(
+        (
+            f"GET / HTTP/1.1\r\nHost: {host}:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            f"Sec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n"
+            "Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n"
+            + (f"Origin: {origin}\r\n" if origin else "")
+            + "\r\n"
+        ).encode()
+    )
+    return one, one.recv(4096)
+
+
+def frame(payload: bytes, opcode: int) -> bytes:
+    mask = b"\1\2\3\4"
+    body = bytes(b ^ mask[i % 4] for i, b in enumerate(payload))
+    size = (
+        struct.pack("!B", 0x80 | len(payload))
+        if len(payload) < 126
+        else struct.pack("!BH", 0xFE, len(payload))
+    )
+    return struct.pack("!B", 0x80 | opcode) + size + mask + body
+
+
+HOSTILE = [
+    (1, b"{"),
+    (1, b"[]"),
+    (1, b"{}"),
+    (1, b'{"op":7}'),
+    (1, b'{"op":"subscribe"}'),
+    (1, b'{"op":"subscribe","subscriptions":[{"id":-1,"channelId":1e300}]}'),
+    (1, b'{"op":"subscribe","subscriptions":[{"id":1,"channelId":99999999}]}'),
+    (1, b'{"op":"unsubscribe","subscriptionIds":["x",null]}'),
+    (1, b'{"op":"advertise","channels":[{"id":1,"topic":"/cmd_vel","encoding":"cdr"}]}'),
+    (1, b'{"op":"advertise","channels":[{"id":"1","topic":5,"encoding":"json"}]}'),
+    (1, b'{"op":"advertise","channels":[{"id":1,"topic":"/cmd_vel","encoding":"json"}]}'),
+    (2, b"\1"),
+    (2, b"\1\1\0\0\0"),
+    (2, b'\1\1\0\0\0{"linear":{"x":1e999},"angular":{}}'),
+    (2, b'\1\1\0\0\0{"linear":{"x":"fast","y":0},"angular":{"z":0}}'),
+    (2, b"\1\7\0\0\0{}"),
+    (2, b"\2\0"),
+    (2, bytes(range(256)) * 8),
+    (1, b'{"op":"' + b"[" * 20000),
+]
+
+
+def test_what_a_viewer_should_not_send_harms_nothing() -> None:
+    with serving() as (process, url):
+        for opcode, payload in HOSTILE:
+            one, answer = open_socket(url)
+            assert b"101 " in answer and b"foxglove.sdk.v1" in answer
+            one.sendall(frame(payload, opcode))
+            one.close()
+        lines = seen(url, 2, "p3at/lrf")
+        assert [line for line in lines if line.get("topic") == "p3at/lrf"]
+        assert process.poll() is None
+
+
+def test_only_foxgloves_own_pages_and_programs_come_in() -> None:
+    with serving() as (_, url):
+        for origin in ("http://evil.example", "https://app.foxglove.dev.evil.example", "null"):
+            assert b"403" in open_socket(url, origin)[1], origin
+        for origin in ("https://app.foxglove.dev", ""):
+            assert b"101 " in open_socket(url, origin)[1], origin
