@@ -11,24 +11,27 @@
 namespace ruedo::client {
 
 // All kinds of samples, each with its message type.
-#define RUEDO_SAMPLE_TYPES(X)      \
-  X(Scan, planar_lidar_t)          \
-  X(LidarScan, lidar_t)            \
-  X(SonarReading, sonar_t)         \
-  X(Odometry, odometry_t)          \
-  X(Pose, pose_t)                  \
-  X(Image, image_t)                \
-  X(CameraInfo, camera_info_t)     \
-  X(Imu, imu_t)                    \
-  X(Contact, contact_t)            \
-  X(Joints, joint_state_t)         \
-  X(MotionStatus, motion_status_t) \
-  X(NavSat, navsat_t)              \
-  X(Magnetometer, magnetometer_t)  \
-  X(Altimeter, altimeter_t)        \
-  X(AirPressure, air_pressure_t)   \
-  X(AirSpeed, air_speed_t)         \
-  X(ForceTorque, force_torque_t)
+#define RUEDO_SAMPLE_TYPES(X)        \
+  X(Scan, planar_lidar_t)            \
+  X(LidarScan, lidar_t)              \
+  X(SonarReading, sonar_t)           \
+  X(Odometry, odometry_t)            \
+  X(Pose, pose_t)                    \
+  X(Image, image_t)                  \
+  X(CameraInfo, camera_info_t)       \
+  X(Imu, imu_t)                      \
+  X(Contact, contact_t)              \
+  X(Joints, joint_state_t)           \
+  X(MotionStatus, motion_status_t)   \
+  X(NavSat, navsat_t)                \
+  X(Magnetometer, magnetometer_t)    \
+  X(Altimeter, altimeter_t)          \
+  X(AirPressure, air_pressure_t)     \
+  X(AirSpeed, air_speed_t)           \
+  X(ForceTorque, force_torque_t)     \
+  X(LogicalCamera, logical_camera_t) \
+  X(Boxes2D, boxes_2d_t)             \
+  X(Boxes3D, boxes_3d_t)
 
 // A message type: its name and fingerprint, and how it becomes a sample.
 struct SampleDecoder {

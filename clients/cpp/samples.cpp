@@ -6,6 +6,8 @@
 #include "ruedo/air_pressure_t.hpp"
 #include "ruedo/air_speed_t.hpp"
 #include "ruedo/altimeter_t.hpp"
+#include "ruedo/boxes_2d_t.hpp"
+#include "ruedo/boxes_3d_t.hpp"
 #include "ruedo/camera_info_t.hpp"
 #include "ruedo/contact_t.hpp"
 #include "ruedo/force_torque_t.hpp"
@@ -13,6 +15,7 @@
 #include "ruedo/imu_t.hpp"
 #include "ruedo/joint_state_t.hpp"
 #include "ruedo/lidar_t.hpp"
+#include "ruedo/logical_camera_t.hpp"
 #include "ruedo/magnetometer_t.hpp"
 #include "ruedo/motion_status_t.hpp"
 #include "ruedo/navsat_t.hpp"
@@ -310,6 +313,46 @@ std::shared_ptr<const Sample> decode_force_torque(WireReader& in) {
   return s;
 }
 
+std::shared_ptr<const Sample> decode_logical_camera(WireReader& in) {
+  auto s = std::make_shared<LogicalCamera>();
+  s->utime = in.int64();
+  s->objects.resize(in.count(5 + 7 * 8));
+  for (LogicalObject& object : s->objects) {
+    object.name = in.string();
+    object.position = in.array<3>();
+    object.orientation = in.array<4>();
+  }
+  return s;
+}
+
+std::shared_ptr<const Sample> decode_boxes_2d(WireReader& in) {
+  auto s = std::make_shared<Boxes2D>();
+  s->utime = in.int64();
+  s->width = in.int32();
+  s->height = in.int32();
+  s->boxes.resize(in.count(4 + 5 + 4 * 8));
+  for (Box2D& box : s->boxes) {
+    box.label = in.int32();
+    box.name = in.string();
+    for (double* value : {&box.x, &box.y, &box.width, &box.height}) *value = in.float64();
+  }
+  return s;
+}
+
+std::shared_ptr<const Sample> decode_boxes_3d(WireReader& in) {
+  auto s = std::make_shared<Boxes3D>();
+  s->utime = in.int64();
+  s->boxes.resize(in.count(4 + 5 + 10 * 8));
+  for (Box3D& box : s->boxes) {
+    box.label = in.int32();
+    box.name = in.string();
+    box.center = in.array<3>();
+    box.orientation = in.array<4>();
+    box.size = in.array<3>();
+  }
+  return s;
+}
+
 const SampleDecoder kDecoders[] = {
     {"planar_lidar_t", planar_lidar_t::getHash(), decode_scan},
     {"lidar_t", lidar_t::getHash(), decode_lidar},
@@ -328,6 +371,9 @@ const SampleDecoder kDecoders[] = {
     {"air_pressure_t", air_pressure_t::getHash(), decode_air_pressure},
     {"air_speed_t", air_speed_t::getHash(), decode_air_speed},
     {"force_torque_t", force_torque_t::getHash(), decode_force_torque},
+    {"logical_camera_t", logical_camera_t::getHash(), decode_logical_camera},
+    {"boxes_2d_t", boxes_2d_t::getHash(), decode_boxes_2d},
+    {"boxes_3d_t", boxes_3d_t::getHash(), decode_boxes_3d},
 };
 
 }  // namespace

@@ -258,6 +258,39 @@ struct ForceTorque : Sample {
   Vector3 torque{};  // N m, about the joint's origin
 };
 
+// A model that a logical camera sees, in the device's frame.
+struct LogicalObject {
+  std::string name;
+  Vector3 position{};        // m
+  Quaternion orientation{};  // model to device
+};
+struct LogicalCamera : Sample {
+  std::vector<LogicalObject> objects;
+};
+
+// A labelled object in a picture; whole numbers are the middles of pixels.
+struct Box2D {
+  int label = 0;
+  std::string name;                                    // of the model
+  double x = 0.0, y = 0.0, width = 0.0, height = 0.0;  // pixels; x, y: the middle
+};
+struct Boxes2D : Sample {
+  int width = 0, height = 0;  // pixels, of the picture
+  std::vector<Box2D> boxes;
+};
+
+// A labelled object before the camera, in the device's frame.
+struct Box3D {
+  int label = 0;
+  std::string name;          // of the model
+  Vector3 center{};          // m
+  Quaternion orientation{};  // box to device
+  Vector3 size{};            // m, full lengths
+};
+struct Boxes3D : Sample {
+  std::vector<Box3D> boxes;
+};
+
 struct ContactPoint {
   std::string body;    // the other body
   Vector3 position{};  // m, world

@@ -6,6 +6,7 @@
 #include "model/sdf_link.h"
 #include "model/sdf_reader.h"
 #include "model/sensor_plugins.h"
+#include "model/visual_plugins.h"
 
 namespace ruedo::model {
 namespace {
@@ -267,6 +268,7 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
   if (!model->is_static) model->joints.insert(model->joints.end(), anchors.begin(), anchors.end());
 
   read_plugin_sensors(element, frames, where, *model);
+  read_labels_and_temperatures(element, where, context_.findings, *model);
 
   // Every name's pose and link, for whoever nests or places this model.
   for (const std::string& name : frames.names()) {

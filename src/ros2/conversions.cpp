@@ -12,6 +12,8 @@
 #include "ruedo/air_pressure_t.hpp"
 #include "ruedo/air_speed_t.hpp"
 #include "ruedo/altimeter_t.hpp"
+#include "ruedo/boxes_2d_t.hpp"
+#include "ruedo/boxes_3d_t.hpp"
 #include "ruedo/camera_info_t.hpp"
 #include "ruedo/contact_t.hpp"
 #include "ruedo/decode.h"
@@ -20,6 +22,7 @@
 #include "ruedo/imu_t.hpp"
 #include "ruedo/joint_state_t.hpp"
 #include "ruedo/lidar_t.hpp"
+#include "ruedo/logical_camera_t.hpp"
 #include "ruedo/magnetometer_t.hpp"
 #include "ruedo/math.h"
 #include "ruedo/navsat_t.hpp"
@@ -348,6 +351,54 @@ void write_bumper(const contact_t& contact, const Source&, CdrWriter& out) {
   out.put(static_cast<bool>(contact.pressed));
 }
 
+// What a detection is taken for, and where; sure of it.
+void put_hypothesis(CdrWriter& out, const std::string& what, const double* position,
+                    const double* wxyz) {
+  out.put_length(1).put(what).put(1.0);
+  put_vector(out, position);
+  put_quaternion(out, wxyz);
+  put_zeros<36>(out);
+}
+
+constexpr double kNowhere[3] = {0, 0, 0}, kUnturned[4] = {1, 0, 0, 0};
+
+void write_logical_camera(const logical_camera_t& seen, const Source& from, CdrWriter& out) {
+  put_header(out, seen.utime, from.frame);
+  out.put_length(seen.objects.size());
+  for (const logical_object_t& object : seen.objects) {
+    put_header(out, seen.utime, from.frame);
+    put_hypothesis(out, object.name, object.position, object.orientation);
+    put_vector(out, object.position);
+    put_quaternion(out, object.orientation);
+    put_vector(out, kNowhere);  // its size is not known
+    out.put(object.name);
+  }
+}
+
+// The class is the label's number, the id the model's name.
+void write_boxes_2d(const boxes_2d_t& seen, const Source& from, CdrWriter& out) {
+  put_header(out, seen.utime, from.optical);
+  out.put_length(seen.boxes.size());
+  for (const box_2d_t& box : seen.boxes) {
+    put_header(out, seen.utime, from.optical);
+    put_hypothesis(out, std::to_string(box.label), kNowhere, kUnturned);
+    out.put(box.x).put(box.y).put(0.0).put(box.width).put(box.height).put(box.name);
+  }
+}
+
+void write_boxes_3d(const boxes_3d_t& seen, const Source& from, CdrWriter& out) {
+  put_header(out, seen.utime, from.frame);
+  out.put_length(seen.boxes.size());
+  for (const box_3d_t& box : seen.boxes) {
+    put_header(out, seen.utime, from.frame);
+    put_hypothesis(out, std::to_string(box.label), box.center, box.orientation);
+    put_vector(out, box.center);
+    put_quaternion(out, box.orientation);
+    put_vector(out, box.size);
+    out.put(box.name);
+  }
+}
+
 // Whose topic it is: a device's, each transducer's, the robot's, or one for all.
 enum class Scope { device, element, robot, world };
 
@@ -362,7 +413,14 @@ struct Row {
   Scope scope = Scope::device;
 };
 
-bool is_colour(const Source& from) { return from.part.empty(); }
+bool is_camera(const std::string& kind) {
+  return kind == "camera" || (kind.ends_with("_camera") && kind != "logical_camera");
+}
+bool is_segmentation(const Source& from) { return from.device.kind == "segmentation_camera"; }
+bool is_thermal(const Source& from) { return from.device.kind == "thermal_camera"; }
+bool is_colour(const Source& from) {
+  return from.part.empty() && !is_segmentation(from) && !is_thermal(from);
+}
 bool is_depth(const Source& from) { return from.part == "depth"; }
 bool is_labels(const Source& from) { return from.part == "labels"; }
 
@@ -414,7 +472,15 @@ RUEDO_ROWS(image_t, {"image_raw", "sensor_msgs/msg/Image", kSensorQos, write_ima
            {"image_raw/compressed", "sensor_msgs/msg/CompressedImage", kSensorQos, write_compressed,
             is_colour},
            {"depth", "sensor_msgs/msg/Image", kSensorQos, write_image, is_depth},
-           {"labels", "sensor_msgs/msg/Image", kSensorQos, write_image, is_labels})
+           {"labels", "sensor_msgs/msg/Image", kSensorQos, write_image, is_labels},
+           {"segmentation", "sensor_msgs/msg/Image", kSensorQos, write_image, is_segmentation},
+           {"thermal", "sensor_msgs/msg/Image", kSensorQos, write_image, is_thermal})
+RUEDO_ROWS(logical_camera_t,
+           {"detections", "vision_msgs/msg/Detection3DArray", kSensorQos, write_logical_camera})
+RUEDO_ROWS(boxes_2d_t,
+           {"detections", "vision_msgs/msg/Detection2DArray", kSensorQos, write_boxes_2d})
+RUEDO_ROWS(boxes_3d_t,
+           {"detections", "vision_msgs/msg/Detection3DArray", kSensorQos, write_boxes_3d})
 RUEDO_ROWS(camera_info_t,
            {"camera_info", "sensor_msgs/msg/CameraInfo", kSensorQos, write_camera_info})
 RUEDO_ROWS(contact_t, {"contacts", "ros_gz_interfaces/msg/Contacts", kSensorQos, write_contacts},
@@ -525,9 +591,10 @@ void with_type(const std::string& type, const Visit& visit) {
                        (visit.template operator()<Messages>(), true)),
      ...);
   };
-  match.template operator()<planar_lidar_t, lidar_t, sonar_t, odometry_t, joint_state_t, imu_t,
-                            pose_t, image_t, camera_info_t, contact_t, navsat_t, magnetometer_t,
-                            altimeter_t, air_pressure_t, air_speed_t, force_torque_t>();
+  match.template
+  operator()<planar_lidar_t, lidar_t, sonar_t, odometry_t, joint_state_t, imu_t, pose_t, image_t,
+             camera_info_t, contact_t, navsat_t, magnetometer_t, altimeter_t, air_pressure_t,
+             air_speed_t, force_torque_t, logical_camera_t, boxes_2d_t, boxes_3d_t>();
 }
 
 }  // namespace
@@ -599,7 +666,7 @@ void Conversions::add_frames(const device_info_t& device, const Names& names) {
     std::copy(wxyz, wxyz + 4, added.orientation);
   };
   add(names.frame(device.robot, "base_link"), frame, device.position, device.orientation);
-  if (device.kind == "camera") add(frame, frame + "_optical", kNowhere, kOptical);
+  if (is_camera(device.kind)) add(frame, frame + "_optical", kNowhere, kOptical);
   for (size_t i = 0; i < device.element_pose.size(); ++i) {
     const std::vector<double>& e = device.element_pose[i];
     const Pose X = Pose::from_xyz_rpy(Vec3(e[0], e[1], e[2]), Vec3(e[3], e[4], e[5]));

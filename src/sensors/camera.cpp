@@ -19,6 +19,7 @@
 #include "model/body_layout.h"
 #include "scene/render_scene.h"
 #include "sensors/camera_lens.h"
+#include "sensors/camera_view.h"
 #include "sensors/pixel_noise.h"
 
 namespace ruedo {
@@ -32,12 +33,6 @@ enum class Encoding { jpeg, rgb, grey };
 
 bool wants_depth(const std::string& type) {
   return type == "depth" || type == "depth_camera" || type == "rgbd" || type == "rgbd_camera";
-}
-
-const Element& camera_of(const SensorSetup& setup) {
-  const Element* camera = setup.element.child("camera");
-  if (!camera) setup.element.fail("a camera needs a <camera> element");
-  return *camera;
 }
 
 class Camera : public Sensor {
@@ -98,15 +93,7 @@ class Camera : public Sensor {
     out.publish(info_channel_, info_);
   }
 
-  void describe(device_info_t& info) const override {
-    info.width = lens_.width;
-    info.height = lens_.height;
-    info.fov_horizontal = lens_.hfov;
-    info.fov_vertical = math::atan((lens_.cy + 0.5) / lens_.fy) +
-                        math::atan((lens_.height - 0.5 - lens_.cy) / lens_.fy);
-    info.range_min = lens_.near_m;
-    info.range_max = lens_.far_m;
-  }
+  void describe(device_info_t& info) const override { describe_lens(lens_, info); }
 
  private:
   Pose X_WC(const Snapshot& now) const {
@@ -156,15 +143,7 @@ class Camera : public Sensor {
   }
 
   void fill_info() {
-    info_.width = lens_.width;
-    info_.height = lens_.height;
-    info_.fx = lens_.fx;
-    info_.fy = lens_.fy;
-    info_.cx = lens_.cx;
-    info_.cy = lens_.cy;
-    std::copy(lens_.distortion.begin(), lens_.distortion.end(), info_.distortion);
-    info_.near_clip = lens_.near_m;
-    info_.far_clip = lens_.far_m;
+    info_ = camera_info(lens_);
     image_.nmetadata = plane_.nmetadata = 0;
     image_.width = plane_.width = lens_.width;
     image_.height = plane_.height = lens_.height;

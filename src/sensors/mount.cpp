@@ -7,11 +7,11 @@
 
 namespace ruedo {
 
-Mount::Mount(const SensorSetup& setup)
+Mount::Mount(const SensorSetup& setup, const Pose& X_SD)
     : layout_(setup.layout),
       link_(setup.link),
       body_(setup.layout.links[static_cast<size_t>(setup.link)].body),
-      X_LS_(setup.X_LS) {}
+      X_LS_(setup.X_LS * X_SD) {}
 
 Pose Mount::start() const {
   const Pose X_BS = layout_.links[static_cast<size_t>(link_)].X_BL * X_LS_;

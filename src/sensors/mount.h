@@ -11,7 +11,8 @@ namespace ruedo {
 
 class Mount {
  public:
-  explicit Mount(const SensorSetup& setup);
+  // X_SD: of what is measured, in the device's frame.
+  explicit Mount(const SensorSetup& setup, const Pose& X_SD = {});
 
   int body() const { return body_; }       // into BodyLayout::bodies; -1: does not move
   Pose start() const;                      // X_WS of the world's first state

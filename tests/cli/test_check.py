@@ -224,18 +224,18 @@ SERVED = [
     "gps",
     "magnetometer",
     "navsat",
-]
-NOT_SERVED = [
     "boundingbox_camera",
-    "custom",
-    "dvl",
     "logical_camera",
-    "multicamera",
-    "rfid",
-    "rfidtag",
     "segmentation_camera",
     "thermal_camera",
     "wideanglecamera",
+]
+NOT_SERVED = [
+    "custom",
+    "dvl",
+    "multicamera",
+    "rfid",
+    "rfidtag",
     "wireless_receiver",
     "wireless_transmitter",
 ]

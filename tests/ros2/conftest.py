@@ -16,6 +16,8 @@ from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
+from rosbags.rosbag2 import Reader
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 PATIENCE = float(os.environ.get("RUEDO_PATIENCE", "300"))  # s, for what comes sooner or later
 SOURCE = Path(os.environ.get("RUEDO_SOURCE_DIR", Path(__file__).resolve().parents[2]))
@@ -120,3 +122,45 @@ def take(reader: DataReader, count: int = 1) -> list:
 
     wait_for(enough, f"{count} samples on {reader.topic.name}")
     return samples
+
+
+def bag_of(world: str, folder: Path) -> dict[str, list]:
+    """{topic: messages} of a second of a world without noise.
+
+    Each encodes again to the bytes that it came in.
+    """
+    for arguments in (
+        [
+            "run",
+            world,
+            "--no-noise",
+            "--rate",
+            "max",
+            "--duration",
+            "1",
+            "--record",
+            folder / "run.lcm",
+            "--lcm",
+            "auto",
+            "--quiet",
+        ],
+        ["export", folder / "run.lcm", "--ros2", folder / "run"],
+    ):
+        subprocess.run(
+            [RUEDO, *map(str, arguments)], check=True, timeout=PATIENCE, capture_output=True
+        )
+    store = get_typestore(Stores.ROS2_JAZZY)
+    found: dict[str, list] = {}
+    with Reader(folder / "run") as reader:
+        for connection in reader.connections:
+            told = get_types_from_msg(connection.msgdef.data, connection.msgtype)
+            store.register(
+                {name: fields for name, fields in told.items() if name not in store.fielddefs}
+            )
+        for connection, _, raw in reader.messages():
+            message = store.deserialize_cdr(raw, connection.msgtype)
+            assert bytes(store.serialize_cdr(message, connection.msgtype)) == bytes(raw), (
+                connection.topic
+            )
+            found.setdefault(connection.topic, []).append(message)
+    return found

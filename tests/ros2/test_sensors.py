@@ -6,11 +6,10 @@ from __future__ import annotations
 
 import math
 import struct
-import subprocess
 from pathlib import Path
 
 import pytest
-from conftest import PATIENCE, RUEDO, Peer, Run, wait_for
+from conftest import Peer, Run, bag_of, wait_for
 from ros_types import (
     Duration,
     Float64MultiArray,
@@ -22,8 +21,6 @@ from ros_types import (
     MultiArrayLayout,
     Time,
 )
-from rosbags.rosbag2 import Reader
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 WORLD = str(Path(__file__).resolve().parent / "sensors.sdf")
 
@@ -31,41 +28,7 @@ WORLD = str(Path(__file__).resolve().parent / "sensors.sdf")
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory):
     """{topic: messages}"""
-    folder = tmp_path_factory.mktemp("sensors")
-    for arguments in (
-        [
-            "run",
-            WORLD,
-            "--no-noise",
-            "--rate",
-            "max",
-            "--duration",
-            "1",
-            "--record",
-            folder / "run.lcm",
-            "--lcm",
-            "auto",
-            "--quiet",
-        ],
-        ["export", folder / "run.lcm", "--ros2", folder / "run"],
-    ):
-        subprocess.run(
-            [RUEDO, *map(str, arguments)], check=True, timeout=PATIENCE, capture_output=True
-        )
-    store, found = get_typestore(Stores.ROS2_JAZZY), {}
-    with Reader(folder / "run") as reader:
-        for connection in reader.connections:
-            told = get_types_from_msg(connection.msgdef.data, connection.msgtype)
-            store.register(
-                {name: fields for name, fields in told.items() if name not in store.fielddefs}
-            )
-        for connection, _, raw in reader.messages():
-            message = store.deserialize_cdr(raw, connection.msgtype)
-            assert bytes(store.serialize_cdr(message, connection.msgtype)) == bytes(raw), (
-                connection.topic
-            )
-            found.setdefault(connection.topic, []).append(message)
-    return found
+    return bag_of(WORLD, tmp_path_factory.mktemp("sensors"))
 
 
 def test_points_lie_on_the_wall_and_the_ground(bag):

@@ -359,6 +359,55 @@ class ForceTorque(Sample):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class LogicalObject(_Value):
+    """A model that a logical camera sees, in the device's frame."""
+
+    name: str
+    position: Floats  # (3,) m
+    orientation: Floats  # (4,) w, x, y, z: model to device
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LogicalCamera(Sample):
+    objects: list[LogicalObject]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Box2D(_Value):
+    """A labelled object in a picture; whole numbers are the middles of pixels."""
+
+    label: int
+    name: str  # of the model
+    x: float  # pixels, the middle
+    y: float
+    width: float  # pixels
+    height: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Boxes2D(Sample):
+    width: int  # pixels, of the picture
+    height: int
+    boxes: list[Box2D]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Box3D(_Value):
+    """A labelled object before the camera, in the device's frame."""
+
+    label: int
+    name: str  # of the model
+    center: Floats  # (3,) m
+    orientation: Floats  # (4,) w, x, y, z: box to device
+    size: Floats  # (3,) m, full lengths
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Boxes3D(Sample):
+    boxes: list[Box3D]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class ContactPoint(_Value):
     body: str  # the other body
     position: Floats  # (3,) m, world
@@ -464,8 +513,7 @@ def _pose(m: Any) -> Pose:
 
 
 def _image(m: Any) -> Image:
-    if m.nmetadata < 0:  # lcm-gen's Python reads none then
-        raise ValueError(f"a length of {m.nmetadata}")
+    _counted(m.nmetadata)
     return Image(
         m.utime,
         m.width,
@@ -510,9 +558,36 @@ def _force_torque(m: Any) -> ForceTorque:
     return ForceTorque(m.utime, _floats(m.force), _floats(m.torque))
 
 
+def _logical_camera(m: Any) -> LogicalCamera:
+    _counted(m.n)
+    return LogicalCamera(
+        m.utime,
+        [LogicalObject(o.name, _floats(o.position), _floats(o.orientation)) for o in m.objects],
+    )
+
+
+def _boxes_2d(m: Any) -> Boxes2D:
+    _counted(m.n)
+    boxes = [Box2D(b.label, b.name, b.x, b.y, b.width, b.height) for b in m.boxes]
+    return Boxes2D(m.utime, m.width, m.height, boxes)
+
+
+def _boxes_3d(m: Any) -> Boxes3D:
+    _counted(m.n)
+    boxes = [
+        Box3D(b.label, b.name, _floats(b.center), _floats(b.orientation), _floats(b.size))
+        for b in m.boxes
+    ]
+    return Boxes3D(m.utime, boxes)
+
+
+def _counted(length: int) -> None:
+    if length < 0:  # lcm-gen's Python reads none then
+        raise ValueError(f"a length of {length}")
+
+
 def _contact(m: Any) -> Contact:
-    if m.n < 0:  # lcm-gen's Python reads none then
-        raise ValueError(f"a length of {m.n}")
+    _counted(m.n)
     points = [
         ContactPoint(p.body, _floats(p.position), _floats(p.normal), p.force, p.depth)
         for p in m.points
@@ -564,4 +639,7 @@ CONVERSIONS: dict[str, tuple[Any, Callable[[Any], Any]]] = {
     "air_pressure_t": (lcmtypes.air_pressure_t, _air_pressure),
     "air_speed_t": (lcmtypes.air_speed_t, _air_speed),
     "force_torque_t": (lcmtypes.force_torque_t, _force_torque),
+    "logical_camera_t": (lcmtypes.logical_camera_t, _logical_camera),
+    "boxes_2d_t": (lcmtypes.boxes_2d_t, _boxes_2d),
+    "boxes_3d_t": (lcmtypes.boxes_3d_t, _boxes_3d),
 }

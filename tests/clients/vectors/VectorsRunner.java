@@ -93,6 +93,17 @@ public final class VectorsRunner {
         } else if (sample instanceof ForceTorque) {
             row("force", (Object) ((ForceTorque) sample).force);
             row("torque", (Object) ((ForceTorque) sample).torque);
+        } else if (sample instanceof LogicalCamera) {
+            for (LogicalCamera.LogicalObject o : ((LogicalCamera) sample).objects)
+                row("object " + o.name, o.position, o.orientation);
+        } else if (sample instanceof Boxes2D) {
+            Boxes2D s = (Boxes2D) sample;
+            row("picture", s.width, s.height);
+            for (Boxes2D.Box2D b : s.boxes)
+                row("box " + b.name, b.label, b.x, b.y, b.width, b.height);
+        } else if (sample instanceof Boxes3D) {
+            for (Boxes3D.Box3D b : ((Boxes3D) sample).boxes)
+                row("box " + b.name, b.label, b.center, b.orientation, b.size);
         } else if (sample instanceof Contact) {
             Contact s = (Contact) sample;
             row("pressed", s.pressed);

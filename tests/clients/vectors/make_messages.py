@@ -105,6 +105,45 @@ CASES = [
         "utime 14|force 1.000000 -2.000000 29.500000|torque 0.250000 0.000000 -0.500000",
     ),
     (
+        "logical_camera_t",
+        dict(
+            utime=15,
+            n=1,
+            objects=[
+                dict(name="crate", position=[1.0, -2.0, 0.5], orientation=[1.0, 0.0, 0.0, 0.0])
+            ],
+        ),
+        "utime 15|object crate 1.000000 -2.000000 0.500000 1.000000 0.000000 0.000000 0.000000",
+    ),
+    (
+        "boxes_2d_t",
+        dict(
+            utime=16,
+            width=320,
+            height=240,
+            n=1,
+            boxes=[dict(label=7, name="crate", x=10.5, y=20.0, width=4.0, height=8.0)],
+        ),
+        "utime 16|picture 320 240|box crate 7 10.500000 20.000000 4.000000 8.000000",
+    ),
+    (
+        "boxes_3d_t",
+        dict(
+            utime=17,
+            n=1,
+            boxes=[
+                dict(
+                    label=7,
+                    name="crate",
+                    center=[1.0, 2.0, 3.0],
+                    orientation=[0.0, 1.0, 0.0, 0.0],
+                    size=[0.5, 0.25, 0.125],
+                )
+            ],
+        ),
+        "utime 17|box crate 7 1.000000 2.000000 3.000000 0.000000 1.000000 0.000000 0.000000 0.500000 0.250000 0.125000",
+    ),
+    (
         "contact_t",
         dict(
             utime=5,
@@ -149,12 +188,20 @@ CASES = [
 ]
 
 
+PARTS = {
+    "contact_t": "contact_point_t",
+    "logical_camera_t": "logical_object_t",
+    "boxes_2d_t": "box_2d_t",
+    "boxes_3d_t": "box_3d_t",
+}
+
+
 def message(type, values):
     made = getattr(lcmtypes, type)()
     for name, value in values.items():
         assert hasattr(made, name), (type, name)
         if isinstance(value, list) and value and isinstance(value[0], dict):
-            value = [message("contact_point_t", one) for one in value]
+            value = [message(PARTS[type], one) for one in value]
         setattr(made, name, value)
     return made
 
@@ -176,6 +223,9 @@ def main():
         ("sonar_t", 16),
         ("odometry_t", 56),
         ("contact_t", 17),
+        ("logical_camera_t", 16),
+        ("boxes_2d_t", 24),
+        ("boxes_3d_t", 16),
     ):  # a length that lies
         encoded = next(message(t, v).encode() for t, v, _ in CASES if t == type)
         for lie in (b"\xff\xff\xff\xff", b"\x7f\xff\xff\xff", b"\x20\x00\x00\x01"):

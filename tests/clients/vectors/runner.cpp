@@ -83,6 +83,24 @@ void mean(const std::string& type, const Sample& sample) {
   } else if (const auto* wrench = as<ForceTorque>(type, sample)) {
     row("force", wrench->force);
     row("torque", wrench->torque);
+  } else if (const auto* logical = as<LogicalCamera>(type, sample)) {
+    for (const LogicalObject& o : logical->objects) {
+      std::vector<double> values(o.position.begin(), o.position.end());
+      values.insert(values.end(), o.orientation.begin(), o.orientation.end());
+      row("object " + o.name, values);
+    }
+  } else if (const auto* flat = as<Boxes2D>(type, sample)) {
+    row("picture", std::vector{flat->width, flat->height});
+    for (const Box2D& b : flat->boxes)
+      row("box " + b.name + " " + std::to_string(b.label),
+          std::vector{b.x, b.y, b.width, b.height});
+  } else if (const auto* solid = as<Boxes3D>(type, sample)) {
+    for (const Box3D& b : solid->boxes) {
+      std::vector<double> values(b.center.begin(), b.center.end());
+      values.insert(values.end(), b.orientation.begin(), b.orientation.end());
+      values.insert(values.end(), b.size.begin(), b.size.end());
+      row("box " + b.name + " " + std::to_string(b.label), values);
+    }
   } else if (const auto* contact = as<Contact>(type, sample)) {
     row("pressed", std::vector{int64_t{contact->pressed}});
     for (const ContactPoint& p : contact->points) {

@@ -62,6 +62,16 @@ def meaning(type, s):
     elif type == "force_torque_t":
         yield row("force", floats(s.force))
         yield row("torque", floats(s.torque))
+    elif type == "logical_camera_t":
+        for o in s.objects:
+            yield row(f"object {o.name}", floats([*o.position, *o.orientation]))
+    elif type == "boxes_2d_t":
+        yield row("picture", [s.width, s.height])
+        for b in s.boxes:
+            yield row(f"box {b.name}", [b.label, b.x, b.y, b.width, b.height])
+    elif type == "boxes_3d_t":
+        for b in s.boxes:
+            yield row(f"box {b.name}", [b.label, *floats([*b.center, *b.orientation, *b.size])])
     elif type == "contact_t":
         yield row("pressed", [s.pressed])
         for p in s.points:

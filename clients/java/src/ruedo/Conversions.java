@@ -3,6 +3,8 @@ package ruedo;
 import ruedo.lcmtypes.air_pressure_t;
 import ruedo.lcmtypes.air_speed_t;
 import ruedo.lcmtypes.altimeter_t;
+import ruedo.lcmtypes.boxes_2d_t;
+import ruedo.lcmtypes.boxes_3d_t;
 import ruedo.lcmtypes.camera_info_t;
 import ruedo.lcmtypes.contact_t;
 import ruedo.lcmtypes.force_torque_t;
@@ -10,6 +12,7 @@ import ruedo.lcmtypes.image_t;
 import ruedo.lcmtypes.imu_t;
 import ruedo.lcmtypes.joint_state_t;
 import ruedo.lcmtypes.lidar_t;
+import ruedo.lcmtypes.logical_camera_t;
 import ruedo.lcmtypes.magnetometer_t;
 import ruedo.lcmtypes.motion_status_t;
 import ruedo.lcmtypes.navsat_t;
@@ -91,7 +94,17 @@ final class Conversions {
                     Map.entry(
                             "force_torque_t",
                             new Conversion(
-                                    force_torque_t.LCM_FINGERPRINT, Conversions::forceTorque)));
+                                    force_torque_t.LCM_FINGERPRINT, Conversions::forceTorque)),
+                    Map.entry(
+                            "logical_camera_t",
+                            new Conversion(
+                                    logical_camera_t.LCM_FINGERPRINT, Conversions::logicalCamera)),
+                    Map.entry(
+                            "boxes_2d_t",
+                            new Conversion(boxes_2d_t.LCM_FINGERPRINT, Conversions::boxes2D)),
+                    Map.entry(
+                            "boxes_3d_t",
+                            new Conversion(boxes_3d_t.LCM_FINGERPRINT, Conversions::boxes3D)));
 
     private static final String[] KINDS = {"none", "advance", "rotate", "heading", "arc", "stop"};
     private static final String[] STATES = {"idle", "running", "done", "ended", "refused"};
@@ -245,6 +258,44 @@ final class Conversions {
 
     private static Sample forceTorque(WireReader in) throws IOException {
         return new ForceTorque(in.int64(), in.doubles(3), in.doubles(3));
+    }
+
+    private static Sample logicalCamera(WireReader in) throws IOException {
+        long utime = in.int64();
+        List<LogicalCamera.LogicalObject> objects = new ArrayList<>();
+        for (int n = in.count(5 + 7 * 8); n > 0; n--) {
+            objects.add(new LogicalCamera.LogicalObject(in.string(), in.doubles(3), in.doubles(4)));
+        }
+        return new LogicalCamera(utime, List.copyOf(objects));
+    }
+
+    private static Sample boxes2D(WireReader in) throws IOException {
+        long utime = in.int64();
+        int width = in.int32();
+        int height = in.int32();
+        List<Boxes2D.Box2D> boxes = new ArrayList<>();
+        for (int n = in.count(4 + 5 + 4 * 8); n > 0; n--) {
+            boxes.add(
+                    new Boxes2D.Box2D(
+                            in.int32(),
+                            in.string(),
+                            in.float64(),
+                            in.float64(),
+                            in.float64(),
+                            in.float64()));
+        }
+        return new Boxes2D(utime, width, height, List.copyOf(boxes));
+    }
+
+    private static Sample boxes3D(WireReader in) throws IOException {
+        long utime = in.int64();
+        List<Boxes3D.Box3D> boxes = new ArrayList<>();
+        for (int n = in.count(4 + 5 + 10 * 8); n > 0; n--) {
+            boxes.add(
+                    new Boxes3D.Box3D(
+                            in.int32(), in.string(), in.doubles(3), in.doubles(4), in.doubles(3)));
+        }
+        return new Boxes3D(utime, List.copyOf(boxes));
     }
 
     private static Sample contact(WireReader in) throws IOException {

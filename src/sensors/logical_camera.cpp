@@ -1,0 +1,92 @@
+// A logical camera: the models whose origins lie in its frustum, on ROBOT/CAMERA. Nothing hides
+// them; the camera's own model is not among them. The frustum has <horizontal_fov> and <near> and
+// <far> along x, and its height is its width divided by <aspect_ratio>.
+#include "model/body_layout.h"
+#include "ruedo/device_info_t.hpp"
+#include "ruedo/logical_camera_t.hpp"
+#include "ruedo/math.h"
+#include "sensors/mount.h"
+#include "sensors/placed_models.h"
+
+namespace ruedo {
+namespace {
+
+class LogicalCamera : public Sensor {
+ public:
+  explicit LogicalCamera(const SensorSetup& setup)
+      : world_(setup.world),
+        layout_(setup.layout),
+        own_(setup.layout.links[static_cast<size_t>(setup.link)].instance),
+        mount_(setup),
+        channel_(setup.channel<logical_camera_t>()) {
+    setup.element.refuse_unknown({"ruedo:phase"});
+    const Element* own = setup.element.child("logical_camera");
+    name_what_does_not_act(setup, own, {"near", "far", "aspect_ratio", "horizontal_fov"});
+    static const Element kNothing;
+    const Element& camera = own ? *own : kNothing;
+    near_m_ = camera.number("near", 0.0, Allowed::not_negative(quantity::kRange));
+    far_m_ = camera.number("far", 1.0, Allowed::positive(quantity::kRange));
+    if (far_m_ <= near_m_) camera.fail("far has to be beyond near");
+    hfov_ =
+        camera.number("horizontal_fov", 1.0, Allowed{.min = 0.0, .max = 3.1, .min_excluded = true});
+    const double aspect = camera.number("aspect_ratio", 1.0, Allowed::positive(quantity::kFactor));
+    half_width_ = math::tan(hfov_ / 2);
+    half_height_ = half_width_ / aspect;
+  }
+
+  void sample(const SampleInput& input, Outbox& out) override {
+    const Snapshot& now = input.snapshot;
+    const Pose X_SW = mount_.pose(now).inverse();
+    message_.utime = now.time;
+    message_.objects.clear();
+    for (size_t i = 0; i < world_.models.size(); ++i) {
+      const model::ModelInstance& instance = world_.models[i];
+      if (instance.removed || static_cast<int>(i) == own_) continue;
+      const Pose X_SM = X_SW * model_pose(world_, layout_, static_cast<int>(i), now);
+      if (!sees(X_SM.translation)) continue;
+      logical_object_t& object = message_.objects.emplace_back();
+      object.name = instance.name;
+      const Quat& q = X_SM.rotation;
+      const double wxyz[] = {q.w(), q.x(), q.y(), q.z()};
+      std::copy(std::begin(wxyz), std::end(wxyz), object.orientation);
+      std::copy_n(X_SM.translation.data(), 3, object.position);
+    }
+    message_.n = static_cast<int32_t>(message_.objects.size());
+    out.publish(channel_, message_);
+  }
+
+  void describe(device_info_t& info) const override {
+    info.range_min = near_m_;
+    info.range_max = far_m_;
+    info.fov_horizontal = hfov_;
+    info.fov_vertical = 2 * math::atan(half_height_);
+  }
+
+ private:
+  bool sees(const Vec3& p) const {
+    return p.x() >= near_m_ && p.x() <= far_m_ && std::abs(p.y()) <= half_width_ * p.x() &&
+           std::abs(p.z()) <= half_height_ * p.x();
+  }
+
+  const model::WorldModel& world_;
+  const model::BodyLayout& layout_;
+  int own_;  // into WorldModel::models
+  Mount mount_;
+  int channel_;
+  double near_m_ = 0.0, far_m_ = 1.0, hfov_ = 1.0;
+  double half_width_ = 0.0, half_height_ = 0.0;  // m at a distance of 1 m
+  logical_camera_t message_;
+};
+
+const RegisterSensor kRegister{
+    {.module = "instruments",
+     .order = 7,
+     .types = {"logical_camera"},
+     .attach_to = "",
+     .device_name = "",
+     .default_rate = {10, 1},
+     .make = [](const SensorSetup& setup) { return std::make_unique<LogicalCamera>(setup); },
+     .kind = "logical_camera"}};
+
+}  // namespace
+}  // namespace ruedo
