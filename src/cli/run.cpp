@@ -274,6 +274,18 @@ int run(const RunArguments& arguments) {
   return kGood;
 }
 
+// "2GB" becomes a number of bytes; what is wrong with it, or "".
+std::string to_bytes(std::string& text) {
+  const std::string given = text;
+  try {
+    if (CLI::AsSizeValue(false)(text).empty() && text.size() <= 18 && given[0] != '-' &&
+        std::stoll(text) >= log::Ring::kLeastLimit)
+      return "";
+  } catch (const CLI::Error&) {
+  }
+  return "'" + given + "' is not allowed; 16MB and more is, such as 2GB";
+}
+
 void add_run(CLI::App& app, Action& chosen) {
   CLI::App* command =
       app.add_subcommand("run", "serve a world: step it, publish its sensors, take commands");
@@ -311,8 +323,7 @@ void add_run(CLI::App& app, Action& chosen) {
                    "keep all that acted, and of the messages the last: FILE repeats the run, files "
                    "numbered beside it hold what was published; 16MB at least, 2GB say, in all")
       ->type_name("SIZE")
-      ->transform(CLI::AsSizeValue(false))
-      ->check(CLI::Range(uint64_t{log::Ring::kLeastLimit}, uint64_t{1} << 60))
+      ->transform(CLI::Validator(to_bytes, "", ""))
       ->needs(record);
   command->add_option("--remap", arguments->remaps, "give a channel another name: CHANNEL=NAME")
       ->type_name("REMAP")
