@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include <benchmark/benchmark.h>
-#include <opencv2/imgcodecs.hpp>
 
+#include "model/codecs.h"
 #include "model/load.h"
 #include "scene/render_scene.h"
 #include "sensors/pixel_noise.h"
@@ -120,7 +120,8 @@ void BM_Jpeg(benchmark::State& state) {
           picture);
   const cv::Mat pixels(480, 640, CV_8UC3, picture.rgb.data());
   std::vector<uint8_t> bytes;
-  for (auto _ : state) cv::imencode(".jpg", pixels, bytes, {cv::IMWRITE_JPEG_QUALITY, 85});
+  for (auto _ : state)
+    ruedo::model::encode_picture(".jpg", pixels, bytes, {cv::IMWRITE_JPEG_QUALITY, 85});
   state.SetLabel(std::to_string(bytes.size()) + " bytes");
 }
 

@@ -50,9 +50,8 @@ target_compile_definitions(ruedo_embree INTERFACE RUEDO_EMBREE=${RUEDO_EMBREE})
 
 # OSMesa where there is one (gone from Mesa 25.1 on), surfaceless EGL beside it.
 add_library(ruedo_opengl INTERFACE)
-pkg_check_modules(OSMESA IMPORTED_TARGET osmesa)
+pkg_check_modules(OSMESA IMPORTED_TARGET osmesa)    # linked to libruedo_osmesa.so alone
 if(OSMESA_FOUND)
-  target_link_libraries(ruedo_opengl INTERFACE PkgConfig::OSMESA)
   target_compile_definitions(ruedo_opengl INTERFACE RUEDO_OSMESA=1)
 endif()
 pkg_check_modules(EGL IMPORTED_TARGET egl)
@@ -68,7 +67,7 @@ endif()
 find_path(OPENCV_INCLUDE opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)
 add_library(ruedo_opencv INTERFACE)
 target_include_directories(ruedo_opencv SYSTEM INTERFACE ${OPENCV_INCLUDE})
-target_link_libraries(ruedo_opencv INTERFACE opencv_imgcodecs opencv_imgproc opencv_core)
+target_link_libraries(ruedo_opencv INTERFACE opencv_imgproc opencv_core)
 
 # LCM 1.5.3 from its wheel: lcm_DIR where that is given, the .venv that scripts/run makes, or that of the Python on the PATH.
 if(NOT lcm_DIR)

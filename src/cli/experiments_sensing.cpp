@@ -6,11 +6,11 @@
 #include <optional>
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "cli/experiments.h"
 #include "cli/svg_plot.h"
 #include "engine/fleet.h"
+#include "model/codecs.h"
 #include "model/load.h"
 #include "robot/robots.h"
 #include "ruedo/math.h"
@@ -191,7 +191,7 @@ void draw_picture(const Experiments& all, const LaserBench& bench,
     std::swap(picture.rgb[i], picture.rgb[i + 2]);  // OpenCV's order
   const cv::Mat image(view.height, view.width, CV_8UC3, picture.rgb.data());
   std::vector<uint8_t> png;
-  cv::imencode(".png", image, png);
+  model::encode_picture(".png", image, png);
   all.write("e3_picture.png", std::string(png.begin(), png.end()));
 }
 

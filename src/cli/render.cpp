@@ -2,14 +2,16 @@
 // it.
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "cli/commands.h"
 #include "cli/render_devices.h"
 #include "cli/render_view.h"
+#include "core/progress.h"
+#include "model/codecs.h"
 #include "model/settings.h"
 #include "ruedo/errors.h"
 #include "ruedo/image_t.hpp"
@@ -84,7 +86,7 @@ cv::Mat picture_of_camera(const RenderArguments& arguments, const model::WorldMo
     image_t image;
     if (image.decode(out.data(entry), 0, static_cast<int>(entry.size)) < 0) break;
     if (image.pixelformat == image_t::PIXEL_FORMAT_MJPEG)
-      return cv::imdecode(image.data, cv::IMREAD_COLOR);
+      return model::decode_picture(image.data.data(), image.data.size(), cv::IMREAD_COLOR);
     const bool grey = image.pixelformat == image_t::PIXEL_FORMAT_GRAY;
     cv::Mat bgr, pixels(image.height, image.width, grey ? CV_8UC1 : CV_8UC3, image.data.data(),
                         static_cast<size_t>(image.row_stride));
@@ -135,14 +137,16 @@ int render(const RenderArguments& arguments) {
   const auto world = load(arguments);
   print_findings(world->findings);
   const model::BodyLayout layout(*world);
+  const Progress progress("drawing " + world->name);
   const cv::Mat bgr = arguments.camera.empty() ? picture_of_world(arguments, *world, layout)
                                                : picture_of_camera(arguments, *world, layout);
-  bool written = false;
-  try {
-    written = cv::imwrite(arguments.output, bgr);
-  } catch (const cv::Exception&) {
-  }
-  if (!written) throw EnvironmentError("cannot write " + arguments.output);
+  std::vector<uint8_t> bytes;
+  model::encode_picture(extension, bgr, bytes);
+  std::ofstream out(arguments.output, std::ios::binary);
+  out.write(reinterpret_cast<const char*>(bytes.data()),
+            static_cast<std::streamsize>(bytes.size()));
+  out.close();
+  if (!out) throw EnvironmentError("cannot write " + arguments.output);
   fmt::print("{}: {} x {} pixels\n", arguments.output, bgr.cols, bgr.rows);
   return kGood;
 }

@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "core/late_library.h"
 #include "core/sandbox.h"
 #include "model/mesh_loader.h"
 #include "model/resources.h"
@@ -40,6 +41,7 @@ std::string own_folder() {
 void enter_sandbox(const std::string& file, const std::vector<std::string>& written) {
   if (const std::string missing = missing_for_sandbox(); !missing.empty())
     throw EnvironmentError("--sandbox: " + missing);
+  load_late_libraries();  // they may lie where files cannot be reached any more
   Sandbox sandbox;
   sandbox.readable = model::ResourceFinder::for_strangers(file).folders();
   sandbox.readable.push_back(fs::absolute(file).parent_path().string());

@@ -8,11 +8,11 @@
 #include <fstream>
 #include <iterator>
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "core/json.h"
 #include "model/body_layout.h"
+#include "model/codecs.h"
 #include "scene/render_content.h"
 #include "scene/render_texture.h"
 
@@ -78,7 +78,7 @@ Picture picture(const model::Texture& texture) {
   cv::cvtColor(rgba, bgra, cv::COLOR_RGBA2BGRA);
   cv::flip(bgra, bgra, 0);
   std::vector<uint8_t> png;
-  cv::imencode(".png", bgra, png);
+  model::encode_picture(".png", bgra, png);
   return {"image/png", std::make_shared<const std::vector<uint8_t>>(std::move(png))};
 }
 

@@ -123,7 +123,7 @@ void bound_files(const Sandbox& sandbox, int version) {
   if (!sandbox.alone) {
     for (const char* path : kSystem) allow(ruleset, path, reading);
     for (const char* path : kDevices) allow(ruleset, path, all);
-    for (const char* part : {"bin", "lib", "math", "share", "python"}) {
+    for (const char* part : {"bin", "lib", "math", "share", "python", "ruedo.libs"}) {
       if (const std::string installed = find_installed(part); !installed.empty())
         allow(ruleset, installed, reading);
     }

@@ -4,8 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include <opencv2/imgcodecs.hpp>
-
+#include "model/codecs.h"
 #include "model/geometry.h"
 #include "model/mesh_format.h"
 #include "model/picture.h"
@@ -173,9 +172,7 @@ Mesh heightmap(const std::string& picture, const Vec3& size) {
     throw std::runtime_error(fault);
   cv::Mat grey;
   try {
-    grey = cv::imdecode(
-        cv::Mat(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data())),
-        cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
+    grey = decode_picture(bytes.data(), bytes.size(), cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
   } catch (const cv::Exception&) {
     throw std::runtime_error("the picture is broken");
   }

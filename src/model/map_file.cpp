@@ -7,8 +7,8 @@
 #include <map>
 #include <sstream>
 
-#include <opencv2/imgcodecs.hpp>
-
+#include "core/progress.h"
+#include "model/codecs.h"
 #include "model/document.h"
 #include "model/occupancy.h"
 #include "model/picture.h"
@@ -115,11 +115,10 @@ cv::Mat read_picture(const std::string& path) {
   if (bytes.empty()) throw InputError({path, 0}, "the file is empty");
   if (const std::string fault = picture_fault(bytes, kMostPixels); !fault.empty())
     throw InputError({path, 0}, fault);
+  const Progress progress("reading " + path);
   cv::Mat grey;
   try {
-    grey = cv::imdecode(
-        cv::Mat(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data())),
-        cv::IMREAD_GRAYSCALE);
+    grey = decode_picture(bytes.data(), bytes.size(), cv::IMREAD_GRAYSCALE);
   } catch (const cv::Exception&) {
     throw InputError({path, 0}, "the picture is broken");
   }

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+
+#include "model/codecs.h"
 
 namespace ruedo::ros2 {
 namespace {
@@ -31,9 +32,9 @@ RawPicture raw_picture(const image_t& image) {
     raw.data = image.data;
     return raw;
   }
-  const cv::Mat packed(1, static_cast<int>(image.data.size()), CV_8U,
-                       const_cast<uint8_t*>(image.data.data()));
-  cv::Mat picture = image.data.empty() ? cv::Mat() : cv::imdecode(packed, cv::IMREAD_UNCHANGED);
+  cv::Mat picture;
+  if (!image.data.empty())
+    picture = model::decode_picture(image.data.data(), image.data.size(), cv::IMREAD_UNCHANGED);
   if (picture.empty() || picture.depth() != CV_8U) return raw;
   if (picture.channels() == 3) cv::cvtColor(picture, picture, cv::COLOR_BGR2RGB);
   raw.width = static_cast<uint32_t>(picture.cols);
@@ -57,7 +58,7 @@ std::vector<uint8_t> jpeg_of(const image_t& image) {
     return packed;
   cv::Mat picture(image.height, image.width, type, const_cast<uint8_t*>(image.data.data()), stride);
   if (rgb) cv::cvtColor(picture, picture, cv::COLOR_RGB2BGR);
-  cv::imencode(".jpg", picture, packed, {cv::IMWRITE_JPEG_QUALITY, 90});
+  model::encode_picture(".jpg", picture, packed, {cv::IMWRITE_JPEG_QUALITY, 90});
   return packed;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 
+#include "core/late_library.h"
 #include "ruedo/errors.h"
 
 namespace ruedo::scene {
@@ -22,6 +23,17 @@ void draw_the_same_everywhere() {
 void draw_as_fast_as_it_goes() {
   if (set_by_us) ::unsetenv(kMesasCpu);
   set_by_us = false;
+}
+
+std::unique_ptr<GlContext> make_osmesa_context(std::string& why) {
+#ifdef RUEDO_OSMESA
+  auto* make = late_function<GlContext*(std::string&)>(LateLibrary::osmesa,
+                                                       "ruedo_make_osmesa_context", why);
+  return std::unique_ptr<GlContext>(make == nullptr ? nullptr : make(why));
+#else
+  why = "not built in (libosmesa6-dev was absent)";
+  return nullptr;
+#endif
 }
 
 std::unique_ptr<GlContext> make_gl_context() {

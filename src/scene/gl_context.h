@@ -31,7 +31,8 @@ std::unique_ptr<GlContext> make_gl_context();
 void draw_the_same_everywhere();
 void draw_as_fast_as_it_goes();
 
-// The backends; null when it was not built in or does not work here, with the reason in `why`.
+// The backends; null when it is not there or does not work here, with the reason in `why`. OSMesa
+// is loaded by the first call.
 std::unique_ptr<GlContext> make_osmesa_context(std::string& why);
 std::unique_ptr<GlContext> make_egl_context(std::string& why);
 

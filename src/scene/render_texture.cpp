@@ -7,9 +7,9 @@
 #include <string_view>
 #include <vector>
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "model/codecs.h"
 #include "model/picture.h"
 
 namespace ruedo::scene {
@@ -72,7 +72,7 @@ TexturePixels decode_texture(const model::Texture& texture) {
     std::vector<uint8_t> bytes = texture.path.empty() ? texture.embedded : read_bytes(texture.path);
     remove_png_profile(bytes);
     if (bytes.empty() || !model::picture_fault(bytes, kMostPixels).empty()) return out;
-    cv::Mat image = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
+    cv::Mat image = model::decode_picture(bytes.data(), bytes.size(), cv::IMREAD_UNCHANGED);
     if (image.empty()) return out;
     const int side = std::max(image.cols, image.rows);
     if (side > kMaxSide) {

@@ -13,10 +13,10 @@
 
 #include <optional>
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "model/body_layout.h"
+#include "model/codecs.h"
 #include "scene/render_scene.h"
 #include "sensors/camera_lens.h"
 #include "sensors/camera_view.h"
@@ -187,7 +187,7 @@ class Camera : public Sensor {
     quality_ = std::min(quality_ + kQualityStep / 2, first_quality_);
     for (;;) {
       jpeg_parameters_ = {cv::IMWRITE_JPEG_QUALITY, quality_};
-      cv::imencode(".jpg", *source, image_.data, jpeg_parameters_);
+      model::encode_picture(".jpg", *source, image_.data, jpeg_parameters_);
       if (image_.data.size() <= kMaxMessage || quality_ <= kMinQuality) break;
       quality_ = std::max(quality_ - kQualityStep, kMinQuality);
     }

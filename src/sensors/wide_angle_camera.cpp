@@ -9,10 +9,10 @@
 #include <cmath>
 #include <optional>
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "core/whole.h"
+#include "model/codecs.h"
 #include "ruedo/image_t.hpp"
 #include "ruedo/math.h"
 #include "sensors/camera_view.h"
@@ -227,7 +227,7 @@ class WideAngleCamera : public Sensor {
   void encode_jpeg() {
     cv::cvtColor(bent_, bgr_, cv::COLOR_RGB2BGR);
     for (int quality = quality_;; quality = std::max(quality - kQualityStep, kMinQuality)) {
-      cv::imencode(".jpg", bgr_, image_.data, {cv::IMWRITE_JPEG_QUALITY, quality});
+      model::encode_picture(".jpg", bgr_, image_.data, {cv::IMWRITE_JPEG_QUALITY, quality});
       if (image_.data.size() <= kMaxMessage || quality <= kMinQuality) break;
     }
     image_.row_stride = 0;

@@ -1,7 +1,6 @@
-// The OSMesa backend: Mesa's software renderer in this process, with no driver and no device.
+// libruedo_osmesa.so, the OSMesa backend: Mesa's software renderer in this process, with no driver
+// and no device. A library of its own, since Mesa's compiler takes long to load.
 #include "scene/gl_context.h"
-
-#ifdef RUEDO_OSMESA
 
 #include <array>
 #include <cstdint>
@@ -37,8 +36,10 @@ class OsMesaContext : public GlContext {
 };
 
 }  // namespace
+}  // namespace ruedo::scene
 
-std::unique_ptr<GlContext> make_osmesa_context(std::string& why) {
+// Null, with the reason in `why`; else the caller's.
+extern "C" ruedo::scene::GlContext* ruedo_make_osmesa_context(std::string& why) {
   const int attributes[] = {OSMESA_FORMAT,
                             OSMESA_RGBA,
                             OSMESA_PROFILE,
@@ -53,18 +54,5 @@ std::unique_ptr<GlContext> make_osmesa_context(std::string& why) {
     why = "it gives no OpenGL 3.3 core context";
     return nullptr;
   }
-  return std::make_unique<OsMesaContext>(context);
+  return new ruedo::scene::OsMesaContext(context);
 }
-
-}  // namespace ruedo::scene
-
-#else
-
-namespace ruedo::scene {
-std::unique_ptr<GlContext> make_osmesa_context(std::string& why) {
-  why = "not built in (libosmesa6-dev was absent)";
-  return nullptr;
-}
-}  // namespace ruedo::scene
-
-#endif

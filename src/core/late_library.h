@@ -1,0 +1,25 @@
+// Shared libraries of ours that are loaded when they are first needed. What they are linked to
+// takes a tenth of a second to load: a picture's codecs, the renderer. They lie where the program's
+// own copies of libraries lie.
+#pragma once
+
+#include <string>
+
+namespace ruedo {
+
+enum class LateLibrary { codecs, osmesa };
+
+// A function of such a library, which stays loaded. Null where it cannot be loaded, with the reason
+// in `why`. May be called by several threads at once.
+void* late_symbol(LateLibrary library, const char* name, std::string& why);
+
+template <class Function>
+Function* late_function(LateLibrary library, const char* name, std::string& why) {
+  return reinterpret_cast<Function*>(late_symbol(library, name, why));
+}
+
+// Loads all that there are: before files are out of reach, or before somebody asks which libraries
+// this process has.
+void load_late_libraries();
+
+}  // namespace ruedo
