@@ -1,13 +1,8 @@
-# Makes ruedo.jar: PROTO, SOURCES, OUTPUT, VERSION, LCM_GEN, LCM_JAR, JAVAC and JAR say from what and with what.
+# Makes ruedo.jar: PROTO, SOURCES, OUTPUT, VERSION, LICENSE, LCM_GEN, JAVAC and JAR say from what and with what.
 #
 # The message types come out as the package ruedo.lcmtypes: renamed on the way, so that they do not meet the
-# library's own classes; LCM's fingerprints do not depend on it.
-function(run)
-  execute_process(COMMAND ${ARGN} RESULT_VARIABLE result)
-  if(result)
-    message(FATAL_ERROR "failed: ${ARGN}")
-  endif()
-endfunction()
+# library's own classes; LCM's fingerprints do not depend on it. They need no class of LCM's, which may lie beside them.
+include(${CMAKE_CURRENT_LIST_DIR}/jar.cmake)
 
 set(work ${OUTPUT}/work)
 file(REMOVE_RECURSE ${work})
@@ -23,22 +18,22 @@ endforeach()
 file(GLOB protos ${work}/proto/*.lcm)
 run(${LCM_GEN} -j --jpath ${work}/java ${protos})
 
-# LCM's own classes, without its graphical tools.
-execute_process(COMMAND ${JAR} xf ${LCM_JAR} lcm/lcm lcm/util WORKING_DIRECTORY ${work}/classes)
-
 file(GLOB generated ${work}/java/ruedo/lcmtypes/*.java)
+foreach(type ${generated})
+  file(READ ${type} text)
+  string(REPLACE "import lcm.lcm.*;\n" "" text "${text}")
+  string(REPLACE "lcm.lcm.LCMEncodable" "Message" text "${text}")
+  string(REPLACE "new LCMDataInputStream(data)" "new DataInputStream(new ByteArrayInputStream(data))" text "${text}")
+  file(WRITE ${type} "${text}")
+endforeach()
 file(GLOB library ${SOURCES}/src/ruedo/*.java)
-run(${JAVAC} --release 11 -nowarn -encoding UTF-8 -cp ${work}/classes -d ${work}/classes ${generated})
+file(GLOB message ${SOURCES}/src/ruedo/lcmtypes/*.java)
+run(${JAVAC} --release 11 -nowarn -encoding UTF-8 -cp ${work}/classes -d ${work}/classes ${generated} ${message})
 run(${JAVAC} --release 11 -Xlint:all -encoding UTF-8 -cp ${work}/classes -d ${work}/classes ${library})
+file(COPY ${LICENSE} DESTINATION ${work}/classes/META-INF)
 file(WRITE ${work}/manifest "Automatic-Module-Name: ruedo\nImplementation-Title: ruedo\nImplementation-Version: ${VERSION}\n")
-# The same bytes from the same classes, where jar can (from 17 on).
-execute_process(COMMAND ${JAR} --help OUTPUT_VARIABLE help)
-set(date "")
-if(help MATCHES "--date=")
-  set(date --date=2020-01-01T00:00:00Z)
-endif()
-run(${JAR} --create --file ${OUTPUT}/ruedo.jar ${date} --manifest ${work}/manifest -C ${work}/classes .)
+make_jar(${OUTPUT}/ruedo.jar ${work}/classes --manifest ${work}/manifest)
 
 file(GLOB examples ${SOURCES}/examples/*.java)
 run(${JAVAC} --release 11 -Xlint:all -encoding UTF-8 -cp ${work}/classes -d ${work}/examples ${examples})
-run(${JAR} cf ${OUTPUT}/ruedo-examples.jar -C ${work}/examples .)
+make_jar(${OUTPUT}/ruedo-examples.jar ${work}/examples)

@@ -3,12 +3,12 @@
 // the class decodes it. Reads lines "NAME HEX" and prints "NAME CLASS HEX", the bytes as the class
 // encodes them again.
 import lcm.lcm.LCMDataInputStream;
-import lcm.lcm.LCMEncodable;
 import lcm.spy.LCMTypeDatabase;
 
 import java.io.BufferedReader;
 import java.io.ByteArrayOutputStream;
 import java.io.DataInput;
+import java.io.DataOutput;
 import java.io.DataOutputStream;
 import java.io.InputStreamReader;
 import java.nio.ByteBuffer;
@@ -25,12 +25,11 @@ public class SpyTypes {
                 System.out.println("= " + words[0] + " unknown -");
                 continue;
             }
-            LCMEncodable decoded =
-                    (LCMEncodable)
-                            type.getConstructor(DataInput.class)
+            Object decoded =
+                    type.getConstructor(DataInput.class)
                                     .newInstance(new LCMDataInputStream(message));
             ByteArrayOutputStream encoded = new ByteArrayOutputStream();
-            decoded.encode(new DataOutputStream(encoded));
+            type.getMethod("encode", DataOutput.class).invoke(decoded, new DataOutputStream(encoded));
             System.out.println(
                     "= "
                             + words[0]

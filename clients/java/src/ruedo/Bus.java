@@ -1,8 +1,9 @@
 package ruedo;
 
-import lcm.lcm.LCMDataOutputStream;
-import lcm.lcm.LCMEncodable;
+import ruedo.lcmtypes.Message;
 
+import java.io.ByteArrayOutputStream;
+import java.io.DataOutputStream;
 import java.io.IOException;
 import java.util.ArrayList;
 import java.util.List;
@@ -60,7 +61,7 @@ final class Bus implements Transport.Receiver {
         }
     }
 
-    void publish(String channel, LCMEncodable message) {
+    void publish(String channel, Message message) {
         publish(channel, encode(message));
     }
 
@@ -68,11 +69,11 @@ final class Bus implements Transport.Receiver {
         if (!closed) transport.publish(channel, bytes);
     }
 
-    static byte[] encode(LCMEncodable message) {
+    static byte[] encode(Message message) {
         try {
-            LCMDataOutputStream out = new LCMDataOutputStream();
-            message.encode(out);
-            return out.toByteArray();
+            ByteArrayOutputStream bytes = new ByteArrayOutputStream();
+            message.encode(new DataOutputStream(bytes));
+            return bytes.toByteArray();
         } catch (IOException error) {
             throw new IllegalStateException(error);
         }

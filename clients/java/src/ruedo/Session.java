@@ -1,6 +1,6 @@
 package ruedo;
 
-import lcm.lcm.LCMEncodable;
+import ruedo.lcmtypes.Message;
 
 import ruedo.lcmtypes.join_t;
 import ruedo.lcmtypes.reply_t;
@@ -54,7 +54,7 @@ final class Session {
     }
 
     /** Joins on the first request. body: null for none. timeout: s of real time. */
-    synchronized reply_t request(int kind, LCMEncodable body, double timeout) {
+    synchronized reply_t request(int kind, Message body, double timeout) {
         sim.checkOpen();
         WorldInfo info = sim.info();
         if (!info.supports(kind)) {

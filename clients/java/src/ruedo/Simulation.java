@@ -1,6 +1,6 @@
 package ruedo;
 
-import lcm.lcm.LCMEncodable;
+import ruedo.lcmtypes.Message;
 
 import ruedo.lcmtypes.channel_info_t;
 import ruedo.lcmtypes.name_request_t;
@@ -634,7 +634,7 @@ public final class Simulation implements AutoCloseable {
         }
     }
 
-    private static LCMEncodable nameBody(String name) {
+    private static Message nameBody(String name) {
         name_request_t body = new name_request_t();
         body.name = name;
         return body;

@@ -1,0 +1,25 @@
+# What BuildJar.cmake and MavenArtifact.cmake share.
+function(run)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE result)
+  if(result)
+    message(FATAL_ERROR "failed: ${ARGN}")
+  endif()
+endfunction()
+
+# make_jar(FILE FOLDER [OPTION...]): of all files in the folder, in the order of their names: the same bytes from the same files, where
+# jar can set a time (from 17 on).
+function(make_jar file folder)
+  execute_process(COMMAND ${JAR} --help OUTPUT_VARIABLE help)
+  set(date "")
+  if(help MATCHES "--date=")
+    set(date --date=2020-01-01T00:00:00Z)
+  endif()
+  file(GLOB_RECURSE names LIST_DIRECTORIES false RELATIVE ${folder} ${folder}/*)
+  list(SORT names)
+  set(lines "")
+  foreach(name ${names})
+    string(APPEND lines "-C \"${folder}\" \"${name}\"\n")
+  endforeach()
+  file(WRITE ${folder}.names "${lines}")
+  run(${JAR} --create --file ${file} ${date} ${ARGN} @${folder}.names)
+endfunction()

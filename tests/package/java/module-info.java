@@ -1,0 +1,3 @@
+module trial {
+  requires ruedo;
+}
