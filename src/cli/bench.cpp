@@ -15,6 +15,7 @@
 #include "cli/bench_rows.h"
 #include "cli/bench_world.h"
 #include "cli/commands.h"
+#include "core/progress.h"
 #include "ruedo/errors.h"
 
 extern char** environ;
@@ -114,37 +115,23 @@ void print_row(Table table, const std::string& row) {
   std::fflush(stdout);
 }
 
-// On a terminal: what is being measured, and how far all of it is.
-void show_progress(size_t done, const std::vector<BenchTask>& tasks) {
-  if (isatty(STDERR_FILENO) == 0) return;
-  fmt::print(stderr, "\r\033[K");
-  if (done < tasks.size()) {
-    const BenchTask& task = tasks[done];
-    constexpr size_t kWidth = 24;
-    const size_t filled = kWidth * done / tasks.size();
-    fmt::print(stderr, "[{}{}] {} of {}: {}, {} robot{} ...", std::string(filled, '#'),
-               std::string(kWidth - filled, '.'), done + 1, tasks.size(), name_of(task.table),
-               task.robots, task.robots == 1 ? "" : "s");
-  }
-  std::fflush(stderr);
-}
-
 int run_all(const BenchArguments& arguments) {
   const std::vector<BenchTask> tasks = tasks_of(arguments);
   int code = kGood;
   for (size_t i = 0; i < tasks.size(); ++i) {
     const Table table = tasks[i].table;
-    show_progress(i, tasks);
     std::vector<std::string> rows;
     std::string fault;
     try {
+      const Progress task(fmt::format("measuring {}, {} robot{} ({} of {})", name_of(table),
+                                      tasks[i].robots, tasks[i].robots == 1 ? "" : "s", i + 1,
+                                      tasks.size()));
       rows = measure_apart(tasks[i]);
     } catch (const EnvironmentError&
                  error) {  // no multicast, say, or no renderer: the other tables are still good
       fault = error.what();
       code = kEnvironment;
     }
-    show_progress(tasks.size(), tasks);
     if (!arguments.json && (i == 0 || tasks[i - 1].table != table)) {
       if (i > 0) fmt::print("\n");
       print_head(table);
@@ -222,7 +209,7 @@ const RegisterCommand kRegister{80, add_bench};
 
 // The row's lines come back through a pipe; what goes wrong is said on stderr by the child.
 std::vector<std::string> measure_apart(const BenchTask& task) {
-  std::vector<std::string> words{"/proc/self/exe",    "bench", "--one", "--only",
+  std::vector<std::string> words{"/proc/self/exe",    "bench", "--one", "--quiet", "--only",
                                  name_of(task.table), "--lcm", task.lcm};
   words.insert(words.end(), {"--robots", std::to_string(task.robots)});
   if (task.duration_s > 0.0)

@@ -30,7 +30,7 @@ sys.exit(main(sys.argv[1:]))
 // The folder that holds the package: of an installation, of a build, or "" where Python has to know
 // it by itself.
 std::string package_folder() {
-  for (const char* path : {"share/ruedo/python/ruedo", "python/ruedo"}) {
+  for (const char* path : {"lib/ruedo/python/ruedo", "python/ruedo"}) {
     if (const std::string found = find_installed(path); !found.empty())
       return fs::path(found).parent_path().string();
   }

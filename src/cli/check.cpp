@@ -7,6 +7,7 @@
 #include "cli/listing.h"
 #include "cli/sandboxed.h"
 #include "core/json.h"
+#include "core/progress.h"
 #include "core/utf8.h"
 #include "engine/world.h"
 #include "model/world_name.h"
@@ -54,7 +55,10 @@ std::vector<Finding> find_all(const CheckArguments& arguments, bool& loaded) {
   try {
     const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
     findings = world->findings;
-    check_textures(*world, findings);
+    {
+      const Progress progress("reading textures");
+      check_textures(*world, findings);
+    }
     // All that `ruedo run` makes before it starts; but it stops at the first device that cannot be
     // made.
     engine::Channels channels;
@@ -62,6 +66,7 @@ std::vector<Finding> find_all(const CheckArguments& arguments, bool& loaded) {
     engine::FleetOptions options;
     options.disabled = arguments.world.disabled;
     options.keep_going = true;
+    const Progress progress("making " + world->name);
     const engine::World made(world, options, channels, of_run);
     const auto is_error = [](const Finding& finding) {
       return finding.kind == Finding::Kind::error;

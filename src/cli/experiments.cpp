@@ -7,7 +7,6 @@
 #include <fstream>
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include "cli/commands.h"
 #include "ruedo/errors.h"
@@ -139,17 +138,12 @@ int run_experiments(const std::string& out) {
   if (error)
     throw EnvironmentError("cannot make the folder " + all.pictures.string() + " (" +
                            error.message() + "): choose another with --out");
-  const bool terminal = isatty(STDERR_FILENO) != 0;
-  all.progress = [terminal](const std::string& text) {
-    std::fprintf(stderr, terminal ? "\r\033[K%s ..." : "%s ...\n", text.c_str());
-    std::fflush(stderr);
-  };
   advance_experiment(all);
   square_experiment(all);
   laser_experiment(all);
   overload_experiment(all);
   noise_experiment(all);
-  if (terminal) std::fprintf(stderr, "\r\033[K");
+  all.running.reset();
 
   bool met = true;
   for (const Outcome& o : all.outcomes) {

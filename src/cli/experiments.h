@@ -4,9 +4,11 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "core/progress.h"
 
 namespace ruedo::cli {
 
@@ -25,8 +27,9 @@ struct Outcome {
 struct Experiments {
   std::filesystem::path pictures;  // folder for plots
   std::vector<Outcome> outcomes;
-  std::function<void(const std::string&)> progress = [](const std::string&) {};
+  std::optional<Progress> running;
 
+  void progress(const std::string& what) { running.emplace(what); }
   void report(Outcome outcome) { outcomes.push_back(std::move(outcome)); }
   void write(const std::string& file, const std::string& text) const;  // into `pictures`
 };

@@ -12,6 +12,7 @@
 #include <spdlog/spdlog.h>
 
 #include "cli/commands.h"
+#include "cli/progress_line.h"
 #include "core/installation.h"
 #include "core/utf8.h"
 #include "core/version.h"
@@ -91,6 +92,15 @@ void add_place(CLI::App& app, const std::string& option, const std::string& path
   app.add_flag_callback(option, show, description);
 }
 
+// To each command that has no such option of its own, and no other program to hand it to.
+void add_quiet(CLI::App& app) {
+  const std::string description = "do not show on a terminal how far it is";
+  for (CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+    if (!command->get_prefix_command() && command->get_option_no_throw("--quiet") == nullptr)
+      command->add_flag("--quiet", description);
+  }
+}
+
 int run(int argc, char** argv) {
   CLI::App app{
       "Ruedo: a simulation server for mobile robots. Robots are data servers; LCM carries commands "
@@ -108,6 +118,7 @@ int run(int argc, char** argv) {
       "state that is not finite.");
   Action action;
   for (const RegisterCommand::Add add : registered_commands()) add(app, action);
+  add_quiet(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -117,6 +128,9 @@ int run(int argc, char** argv) {
     return kWrongUsage;
   }
   check_limits();
+  const CLI::App* command = app.get_subcommands().front();
+  const CLI::Option* quiet = command->get_option_no_throw("--quiet");
+  if (quiet == nullptr ? !command->get_prefix_command() : quiet->empty()) begin_progress_line();
   return action();
 }
 

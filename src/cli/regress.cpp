@@ -16,6 +16,7 @@
 #include "cli/isolation.h"
 #include "cli/view.h"
 #include "core/json.h"
+#include "core/progress.h"
 #include "judge/judge.h"
 #include "log/diff.h"
 #include "log/reader.h"
@@ -68,7 +69,11 @@ std::string run(const RegressArguments& arguments,
   bus::ServerBus place = bus::open_server_bus(isolated ? "auto" : "auto-tcp", world->name);
   bus::RivalWatch bus(std::move(place.bus), [](const std::string& line) { spdlog::warn(line); });
   run::Run server(world, server_options(arguments), bus);
-  server.on_state([&](const Snapshot& snapshot) { judge.see(snapshot); });
+  Progress progress("running " + world->name, parse_duration_us(arguments.duration));
+  server.on_state([&](const Snapshot& snapshot) {
+    judge.see(snapshot);
+    progress.to(snapshot.time);
+  });
   std::unique_ptr<ClientProcess> client;
   if (!arguments.client.empty()) {
     client = std::make_unique<ClientProcess>(

@@ -20,6 +20,7 @@
 #include "cli/commands.h"
 #include "cli/foxglove_server.h"
 #include "cli/listing.h"
+#include "cli/progress_line.h"
 #include "cli/ros2.h"
 #include "cli/sandboxed.h"
 #include "cli/view.h"
@@ -119,7 +120,7 @@ bool is_printed(const std::function<void()>& print) {
 
 class StatusLine {
  public:
-  StatusLine() : shown_(isatty(STDERR_FILENO) != 0) {}
+  explicit StatusLine(bool quiet) : shown_(!quiet && isatty(STDERR_FILENO) != 0) {}
   ~StatusLine() {
     if (drawn_) is_printed([] { fmt::print(stderr, "\n"); });
   }
@@ -259,7 +260,8 @@ int run(const RunArguments& arguments) {
     server.on_state(
         [&server](const Snapshot&) { server.stop(); });   // as by SIGTERM: the log gets its end
   if (!is_read && arguments.lockstep > 0) server.stop();  // no state comes by itself
-  StatusLine status;
+  end_progress_line();
+  StatusLine status(arguments.quiet);
   server.on_status([&](const run::Status& now) { status.draw(now); });
   signals.serve(&server);
   if (node) node->wait_for_peers();
@@ -386,7 +388,8 @@ void add_run(CLI::App& app, Action& chosen) {
       ->check(CLI::IsMember({"on", "off"}));
   command->add_flag("--watch-stdin", arguments->watch_stdin,
                     "end when standard input does: for programs that start a server");
-  command->add_flag("--quiet", arguments->quiet, "do not list the channels");
+  command->add_flag("--quiet", arguments->quiet,
+                    "neither list the channels nor show on a terminal how far it is");
   add_sandbox_argument(*command, arguments->sandboxed);
   command->callback([arguments, view, ros2, foxglove, &chosen] {
     arguments->viewed = view->count() > 0;

@@ -57,8 +57,10 @@ int repeat(const VerifyArguments& arguments, const log_header_t& header) {
                for_terminal(describe(*result.difference)), for_terminal(so_far));
     if (same_machine) return kCheckFailed;
     fmt::print(
-        "What is not as in the log may be why: bytes hold for one version with its libraries. "
-        "Repeat it there.\n");
+        "What is not as in the log may be why: bytes hold for one version with its libraries. The "
+        "log needs Ruedo {0}: `pip install ruedo=={0}` in a virtual environment of its own, and "
+        "`ruedo verify` there.\n",
+        for_terminal(header.version.substr(0, header.version.find(' '))));
     return kEnvironment;
   }
   fmt::print("{}: repeated byte for byte: {}\n", arguments.log, for_terminal(so_far));

@@ -12,6 +12,7 @@
 #include <gnu/libc-version.h>
 #include <link.h>
 
+#include "core/late_library.h"
 #include "core/sha256.h"
 #include "core/version.h"
 #include "log/reader.h"
@@ -116,6 +117,7 @@ std::string own_version() {
 std::string libc_version() { return std::string("glibc ") + gnu_get_libc_version(); }
 
 std::vector<std::string> libraries_that_matter() {
+  load_late_libraries();  // whether or not a picture was drawn by now
   std::set<std::string> names;
   dl_iterate_phdr(
       [](dl_phdr_info* info, size_t, void* data) {
@@ -156,6 +158,32 @@ std::vector<log_file_t> hashed_files(const std::vector<std::string>& paths) {
   return files;
 }
 
+void find_files_again(log_header_t& header, const std::string& log) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::path beside = fs::absolute(log, error).parent_path();
+  for (log_file_t& file : header.files) {
+    if (fs::is_regular_file(file.path, error)) continue;  // changed or not: that is told
+    const fs::path was = fs::path(file.path).lexically_normal();
+    const auto found = [&]() -> std::string {
+      for (auto begin = was.begin(); begin != was.end(); ++begin) {
+        fs::path end;
+        for (auto part = begin; part != was.end(); ++part) end /= *part;
+        if (end.is_absolute()) continue;
+        for (const fs::path& folder : {beside, fs::path(model::shipped_worlds())}) {
+          const fs::path here = folder / end;
+          if (fs::is_regular_file(here, error) && sha256_of_file(here.string()) == file.sha256)
+            return here.string();
+        }
+      }
+      return "";
+    }();
+    if (found.empty()) continue;
+    if (header.world_file == file.path) header.world_file = found;
+    file.path = found;
+  }
+}
+
 void check_files_of_spawned(const std::string& log) {
   Reader reader(log);
   Event event;
@@ -163,8 +191,9 @@ void check_files_of_spawned(const std::string& log) {
   while (reader.next(event, [](const std::string& channel) { return channel == kHeaderChannel; })) {
     log_header_t header;
     if (event.channel != kHeaderChannel || std::exchange(first, false)) continue;
-    if (decode_checked(event.data.data(), event.data.size(), header) == DecodeFault::none)
-      check_files(header, log);
+    if (decode_checked(event.data.data(), event.data.size(), header) != DecodeFault::none) continue;
+    find_files_again(header, log);
+    check_files(header, log);
   }
 }
 
@@ -182,7 +211,9 @@ void check_files(const log_header_t& header, const std::string& log) {
     throw InputError({file.path}, std::filesystem::is_regular_file(file.path, error)
                                       ? "was changed since " + log +
                                             " was made from it (its sha256 was " + file.sha256 + ")"
-                                      : "cannot be read; " + log + " was made from it");
+                                      : "cannot be read; " + log +
+                                            " was made from it, and it lies neither beside the log "
+                                            "nor among Ruedo's own worlds");
   }
 }
 
@@ -215,10 +246,10 @@ void check_same_run(const log_header_t& log, const log_header_t& here, const std
   for (size_t i = 0; i < std::max(log.files.size(), here.files.size()); ++i) {
     if (i >= here.files.size()) refuse("it was made from " + log.files[i].path + ", too");
     if (i >= log.files.size()) refuse("it was not made from " + here.files[i].path);
+    if (log.files[i].sha256 == here.files[i].sha256) continue;  // wherever it lies
     if (log.files[i].path != here.files[i].path)
       refuse("it was made from " + log.files[i].path + ", not from " + here.files[i].path);
-    if (log.files[i].sha256 != here.files[i].sha256)
-      refuse(here.files[i].path + " was changed since");
+    refuse(here.files[i].path + " was changed since");
   }
   if (log.options != here.options)
     refuse("its options are " + joined(log.options) + "; here they are " + joined(here.options));

@@ -30,6 +30,11 @@ log_header_t make_log_header(const model::WorldModel& world, uint64_t seed,
 // With their SHA-256.
 std::vector<log_file_t> hashed_files(const std::vector<std::string>& paths);
 
+// A log may have been made elsewhere: a file that is not where it was is looked for beside the log,
+// and among Ruedo's own worlds, by the end of its path and its SHA-256. The header then names that
+// one.
+void find_files_again(log_header_t& header, const std::string& log);
+
 // Throws InputError when a file that the log was made from is gone or was changed: names the first.
 void check_files(const log_header_t& header, const std::string& log);
 // The same for the models that came later in the log.

@@ -52,6 +52,7 @@ Index::Index(const std::string& path) {
         "has more than " + std::to_string(kMostChannels) + " channels: the others are not shown";
   if (messages == 0)
     throw InputError({path}, "holds no message" + (fault_.empty() ? "" : ": " + fault_));
+  if (header_) find_files_again(*header_, path);
 }
 
 void Index::add(const Event& event, int64_t offset, int64_t end, size_t channel) {

@@ -41,6 +41,7 @@ Reader::Reader(const std::string& path) : path_(path) {
   }
   std::rewind(file_.get());
   offset_ = 0;
+  progress_.emplace("reading " + path, size_);
 }
 
 bool Reader::read(void* into, size_t size) {
@@ -56,6 +57,7 @@ bool Reader::skip(size_t size) {
 }
 
 void Reader::seek(int64_t offset) {
+  progress_.reset();
   std::clearerr(file_.get());
   fault_ = std::fseek(file_.get(), static_cast<long>(offset), SEEK_SET) == 0
                ? ""
@@ -64,6 +66,15 @@ void Reader::seek(int64_t offset) {
 }
 
 bool Reader::next(Event& event, const std::function<bool(const std::string&)>& wanted) {
+  const bool found = read_event(event, wanted);
+  if (!found)
+    progress_.reset();
+  else if (progress_)
+    progress_->to(offset_);
+  return found;
+}
+
+bool Reader::read_event(Event& event, const std::function<bool(const std::string&)>& wanted) {
   if (!fault_.empty()) return false;
   const int64_t begin = offset_;
   std::array<uint8_t, kHeadSize> head{};

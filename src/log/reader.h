@@ -5,9 +5,11 @@
 #include <cstdio>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "core/progress.h"
 #include "ruedo/sim_time.h"
 
 namespace ruedo::log {
@@ -39,6 +41,7 @@ class Reader {
   int64_t offset() const { return offset_; }  // bytes read so far
 
  private:
+  bool read_event(Event& event, const std::function<bool(const std::string&)>& wanted);
   bool read(void* into, size_t size);
   bool skip(size_t size);
 
@@ -50,6 +53,7 @@ class Reader {
   int64_t size_ = 0;
   int64_t offset_ = 0;
   std::string fault_;
+  std::optional<Progress> progress_;  // while it is read from one end to the other
 };
 
 }  // namespace ruedo::log

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "core/progress.h"
 #include "model/drive.h"
 #include "model/placement.h"
 #include "model/sdf_link.h"
@@ -244,6 +245,7 @@ std::shared_ptr<const WorldModel> load_world(const std::string& name, const Load
   std::error_code error;
   fs::path full = fs::weakly_canonical(fs::absolute(path), error);
   if (error) full = fs::absolute(path);
+  const Progress progress("loading " + path);
   Loader loader(full.string(), options);
   const auto root = loader.documents().read(full.string());
   return loader.load(*root, options);

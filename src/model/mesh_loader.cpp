@@ -20,6 +20,7 @@
 #include <Eigen/Geometry>
 
 #include "core/installation.h"
+#include "core/progress.h"
 #include "model/document.h"
 #include "model/mesh_format.h"
 
@@ -248,6 +249,7 @@ Mesh MeshLoader::import_or_cached(const std::string& path) {
       }
     }
   }
+  const Progress progress("importing " + path);
   TemporaryFolder folder;
   run_importer(import_, path, folder / "mesh", folder / "log");
   const std::string bytes = bytes_of(folder / "mesh", kMostBytes);

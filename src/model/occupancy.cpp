@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "core/progress.h"
 #include "core/whole.h"
 #include "model/convex.h"
 #include "model/geometry.h"
@@ -50,11 +51,18 @@ class Cut {
   Box bounds() const { return bounds_; }
 
   void draw(OccupancyGrid& grid) const {
-    for (const auto& [shape, box] : shapes_) mark(shape, box, grid);
+    Progress progress("drawing the map",
+                      static_cast<int64_t>(shapes_.size() + triangles_.size() + planes_.size()));
+    int64_t done = 0;
+    for (const auto& [shape, box] : shapes_) {
+      mark(shape, box, grid);
+      progress.to(++done);
+    }
     for (const auto& t : triangles_) {
       Box box;
       for (const Vec3& corner : t) box.extend(corner);
       mark({nullptr, {}, t}, box, grid);
+      progress.to(++done);
     }
     for (const auto& plane : planes_) {
       for_each_cell(bounds_of(grid), grid, [&](Cell& cell, const std::array<Vec3, 4>& square) {
@@ -161,7 +169,9 @@ std::vector<WallPiece> walls_of(const OccupancyGrid& grid) {
                  static_cast<size_t>(column)];
   };
   const double cosine = math::cos(grid.yaw), sine = math::sin(grid.yaw);
+  Progress progress("finding walls", grid.height);
   for (int row = 0; row < grid.height; ++row) {
+    progress.to(row);
     for (int column = 0; column < grid.width; ++column) {
       if (!open(column, row)) continue;
       int right = column, top = row;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "log/header.h"
 #include "ruedo/decode.h"
 #include "ruedo/errors.h"
 #include "run/journal.h"
@@ -22,6 +23,7 @@ log_header_t first_event(log::Reader& reader, log::Event& event) {
       header.step_us < 1) {
     throw InputError({reader.path()}, "its header is damaged, or another version of Ruedo's");
   }
+  log::find_files_again(header, reader.path());
   return header;
 }
 

@@ -3,8 +3,10 @@
 #include "run/verify.h"
 
 #include <algorithm>
+#include <optional>
 #include <set>
 
+#include "core/progress.h"
 #include "log/header.h"
 #include "log/reader.h"
 #include "ruedo/decode.h"
@@ -73,7 +75,9 @@ class Verifier::Impl {
   }
 
   Verification run() {
+    progress_.emplace("repeating " + log_.path(), log_.size());
     server_->run();
+    progress_.reset();
     if (!verdict_.difference && more_ && next_logged()) {
       differ(logged_.timestamp_us, logged_.channel, "a message", "the end of the run");
     }
@@ -121,6 +125,7 @@ class Verifier::Impl {
       return;
     }
     if (stamp < last_stamp_ || verdict_.difference || !is_compared(channel)) return;
+    if (progress_) progress_->to(log_.offset());
     if (channel == kStateHashChannel) note_epoch(stamp, data, size);
     if (!next_logged()) {
       // A log that was cut off ends before the run does; one that has its end holds all of it.
@@ -173,6 +178,7 @@ class Verifier::Impl {
 
   log::Reader log_;
   log::Event logged_;
+  std::optional<Progress> progress_;
   bool more_ = true, ended_ = false;
   std::set<std::string> kept_;  // channels of a log that was thinned out; empty: all
   int64_t step_us_ = 1;

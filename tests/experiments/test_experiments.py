@@ -43,8 +43,7 @@ def test_all_targets_are_met(run):
     _, done = run
     assert "MISSED" not in done.stdout, done.stdout
     assert done.returncode == 0, done.stdout + done.stderr
-    for experiment in ("E1", "E2", "E3", "E4", "E5"):
-        assert experiment + ":" in done.stderr  # progress was shown
+    assert done.stderr == ""  # a pipe is not told how far it is
 
 
 def test_e1_the_papers_loop_gives_the_papers_numbers(numbers):

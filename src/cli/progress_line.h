@@ -1,0 +1,13 @@
+// One line on a terminal that says how far a command is, when it takes longer than a second: what
+// it does, the part that is done, and the time that is left. Standard error only; nothing where
+// that is no terminal.
+#pragma once
+
+namespace ruedo::cli {
+
+// From now on, until end() or the end of the program: once, in main().
+void begin_progress_line();
+// For a command that draws a line of its own from now on.
+void end_progress_line();
+
+}  // namespace ruedo::cli

@@ -1,0 +1,71 @@
+"""A log and a client of the last version: they work, or it is said what to do (README.md beside
+this says what is kept).
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+BUILD = Path(os.environ["RUEDO_BINARY_DIR"])
+RUEDO = BUILD / "bin/ruedo"
+sys.path.insert(0, str(BUILD / "python"))
+
+
+@pytest.fixture
+def log(tmp_path):
+    shutil.copy(HERE / "run.lcm", tmp_path)
+    return tmp_path / "run.lcm"
+
+
+def program(*words):
+    return subprocess.run(
+        [str(word) for word in (RUEDO, *words)], capture_output=True, text=True, timeout=300
+    )
+
+
+def test_its_log_repeats_or_says_which_version_it_needs(log):
+    """Its world lay in a folder that is not here: Ruedo's own worlds are found again."""
+    done = program("verify", log)
+    if done.returncode == 3:  # a file of the world was changed since
+        assert "was changed since" in done.stderr or "neither beside the log" in done.stderr
+        return
+    assert done.returncode in (0, 4), done.stdout + done.stderr
+    assert "Ruedo: the log has 0.1.0 (build " in done.stdout
+    if done.returncode == 4:
+        assert "pip install ruedo==0.1.0" in done.stdout
+
+
+def test_its_log_can_be_read(log, tmp_path):
+    import ruedo
+
+    assert len(ruedo.read_log(log)["p3at/pose"]["utime"]) == 26  # 50 Hz, 0 to 0.5 s
+    done = program("export", log, tmp_path / "run.mcap")
+    assert done.returncode == 0 and (tmp_path / "run.mcap").stat().st_size > 10_000, done.stderr
+    done = program("diff", log, log)
+    assert done.returncode == 0, done.stdout
+
+
+def test_its_client_drives_this_server():
+    code = (
+        "import ruedo\n"
+        "assert ruedo.__file__.endswith('client.zip/ruedo/__init__.py')\n"
+        "with ruedo.launch('arena', rate='max', seed=1) as sim:\n"
+        "    robot = sim.robot('p3at')\n"
+        "    robot.advance(0.5).wait(60)\n"
+        "    print(round(robot.pose.latest().x, 3), len(robot.lrf.next(60).ranges))\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(HERE / "client.zip"), "RUEDO": str(RUEDO)}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "0.5 181\n"
