@@ -14,6 +14,8 @@ get_target_property(lcm_library ruedo::lcm LOCATION)
 install(FILES ${lcm_library} DESTINATION ${CMAKE_INSTALL_LIBDIR}/ruedo RENAME liblcm.so.1)
 get_property(copies GLOBAL PROPERTY RUEDO_OWN_MATH_COPIES)
 install(FILES ${copies} DESTINATION ${CMAKE_INSTALL_LIBDIR}/ruedo)
+get_property(late GLOBAL PROPERTY RUEDO_LATE_LIBRARIES)
+install(TARGETS ${late} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/ruedo)
 
 # find_package(ruedo): target ruedo::client in the export set ruedo.
 install(TARGETS ruedo_client EXPORT ruedo ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
@@ -34,7 +36,7 @@ configure_file(cmake/ruedo.pc.in ${PROJECT_BINARY_DIR}/cmake/ruedo.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/cmake/ruedo.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 
 # The Python client with its pytest fixture, to put on PYTHONPATH; the metadata let pytest find the fixture there.
-set(python ${CMAKE_INSTALL_DATADIR}/ruedo/python)
+set(python lib/ruedo/python)
 install(DIRECTORY ${PROJECT_BINARY_DIR}/python/ruedo DESTINATION ${python} PATTERN __pycache__ EXCLUDE PATTERN "_engine*" EXCLUDE)
 if(TARGET ruedo_python_engine)
   set_target_properties(ruedo_python_engine PROPERTIES INSTALL_RPATH "\$ORIGIN/../../../../${CMAKE_INSTALL_LIBDIR}/ruedo")
@@ -48,3 +50,19 @@ set(metadata ${PROJECT_BINARY_DIR}/cmake/ruedo-${PROJECT_VERSION}.dist-info)
 file(WRITE ${metadata}/METADATA "Metadata-Version: 2.1\nName: ruedo\nVersion: ${PROJECT_VERSION}\nRequires-Dist: lcm==1.5.3\nRequires-Dist: numpy\n")
 file(WRITE ${metadata}/entry_points.txt "[pytest11]\nruedo = ruedo.regression\n")
 install(DIRECTORY ${metadata} DESTINATION ${python})
+
+# The licences of all that lies here.
+set(copyright ${PROJECT_BINARY_DIR}/licences/copyright)
+file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/licences)
+add_custom_command(OUTPUT ${copyright}
+  COMMAND ${RUEDO_PYTHON} ${PROJECT_SOURCE_DIR}/packaging/copyright.py ${PROJECT_BINARY_DIR} ${copyright}
+  DEPENDS ${PROJECT_SOURCE_DIR}/packaging/copyright.py ${PROJECT_SOURCE_DIR}/LICENSE ruedo VERBATIM)
+add_custom_target(licences ALL DEPENDS ${copyright})
+install(FILES ${copyright} DESTINATION ${CMAKE_INSTALL_DOCDIR})
+
+# The types of all messages as C++, for programs that speak LCM themselves; with LCM's headers, apart, where no other LCM's are.
+install(DIRECTORY ${PROJECT_BINARY_DIR}/proto/ruedo DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.hpp")
+get_filename_component(lcm_wheel ${lcm_DIR}/../../.. ABSOLUTE)
+install(DIRECTORY ${lcm_wheel}/include/lcm DESTINATION lib/ruedo/include FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
+# LCM's Python module, which the Python client is built on: of the Python that builds this.
+install(DIRECTORY ${lcm_wheel}/lcm DESTINATION ${python} PATTERN __pycache__ EXCLUDE)

@@ -1,14 +1,22 @@
-# The Debian package, by `cpack -G DEB` in the build folder: what `cmake --install` puts into /usr, with man pages and completion.
-install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright)
+# The Debian package, by `cpack -G DEB` in the build folder: what `cmake --install` puts into /usr, with man pages, completion and what
+# Debian wants besides.
 install(FILES ${PROJECT_SOURCE_DIR}/packaging/ruedo.bash-completion DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME ruedo)
 # The pages are made by the target man-pages, which a release builds: it starts the program twice for each command.
 set(pages ${PROJECT_BINARY_DIR}/man1)
 add_custom_command(OUTPUT ${pages}/ruedo.1.gz
   COMMAND ${PROJECT_SOURCE_DIR}/packaging/man_pages.sh $<TARGET_FILE:ruedo> ${pages}
-  DEPENDS ruedo ${PROJECT_SOURCE_DIR}/packaging/man_pages.sh VERBATIM)
+  DEPENDS ruedo ruedo-measure ${PROJECT_SOURCE_DIR}/packaging/man_pages.sh VERBATIM)
 add_custom_target(man-pages DEPENDS ${pages}/ruedo.1.gz)
 file(MAKE_DIRECTORY ${pages})
 install(DIRECTORY ${pages} DESTINATION ${CMAKE_INSTALL_MANDIR})
+
+# What the package alone holds, beside what is installed: changelog, lintian's overrides, the way for Python.
+set(debian ${PROJECT_BINARY_DIR}/debian)
+file(GLOB of_debian ${PROJECT_SOURCE_DIR}/packaging/debian/*)
+add_custom_command(OUTPUT ${debian}/usr/share/doc/ruedo/changelog.gz
+  COMMAND ${RUEDO_PYTHON} ${PROJECT_SOURCE_DIR}/packaging/debian_tree.py ${debian}
+  DEPENDS ${PROJECT_SOURCE_DIR}/packaging/debian_tree.py ${PROJECT_SOURCE_DIR}/CHANGELOG.md ${of_debian} VERBATIM)
+add_custom_target(debian_tree DEPENDS ${debian}/usr/share/doc/ruedo/changelog.gz)
 
 set(CPACK_PACKAGE_NAME ruedo)
 set(CPACK_PACKAGE_VENDOR "The Ruedo authors")
@@ -18,11 +26,13 @@ set(CPACK_PACKAGE_DESCRIPTION "Loads worlds and robots in SDF and URDF, steps th
 sensors over LCM, with clients for C++, Python and Java. The same seed and
 commands give the same bytes.")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_INSTALLED_DIRECTORIES ${debian} /)
+set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/packaging/debian/prerm)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${PROJECT_BINARY_DIR}/math)
-set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "python3, python3-numpy")
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "python3 (>= 3.10), python3-numpy")
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS "default-jre-headless")
 include(CPack)

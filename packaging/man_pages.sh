@@ -10,6 +10,18 @@ page() {    # NAME WHAT COMMAND...
     sed "s/^\.TH .*/.TH ${name^^} 1 \"\" \"$("$ruedo" --version)\" \"User Commands\"/" | gzip -9n >"$folder/$name.1.gz"
 }
 page ruedo "a simulation server for mobile robots" "$ruedo"
+# The two programs that ruedo starts.
+page ruedo-measure "what ruedo bench and ruedo experiments start" "$(dirname "$ruedo")/ruedo-measure"
+cat <<PAGE | gzip -9n >"$folder/ruedo-import-mesh.1.gz"
+.TH RUEDO-IMPORT-MESH 1 "" "$("$ruedo" --version)" "User Commands"
+.SH NAME
+ruedo-import-mesh \- reads one mesh file for ruedo
+.SH DESCRIPTION
+ruedo starts this program to read the meshes of worlds and robots, within limits of time and memory and apart from other files. It is
+not for other uses.
+.SH SEE ALSO
+.BR ruedo (1)
+PAGE
 "$ruedo" --help | sed -n '/^Subcommands:/,/^[A-Z][a-z]* codes/s/^  \([a-z0-9-]\+\) \+\(.*\)/\1 \2/p' | while read -r command what; do
   "$ruedo" "$command" --help >/dev/null 2>&1 </dev/null || continue    # a command of the Python client, which is not there
   page "ruedo-$command" "$what" "$ruedo" "$command" </dev/null

@@ -1,9 +1,12 @@
 #!/usr/bin/env bash
 # try_in_debian.sh FOLDER SUITE...: installs and tries Ruedo's wheel in a bare Debian of each suite (bookworm, trixie), made by debootstrap below
 # FOLDER/SUITE: as an ordinary user, without compiler, network, GPU or display. FOLDER/wheels holds Ruedo's wheel and those of lcm and numpy
-# for each suite's Python. Prints what happens; fails when something does not work, or the results of two suites differ. Wants root.
+# for each suite's Python; with those of pytest, pandas, gymnasium and matplotlib, too, the tests of the Python client and engine run
+# there (RUEDO_TESTS: which; all by default). Prints what happens; fails when something does not work, or the results of two suites differ.
+# Wants root.
 set -euo pipefail
 folder=$(realpath "$1")
+here=$(dirname "$(realpath "$0")")
 shift
 
 cat >"$folder/inside.sh" <<'INSIDE'
@@ -41,6 +44,21 @@ for world in ("arena", "fleet", "office"):
                 digest.update(repr(one).encode())
         print(world, digest.hexdigest())
 PYTHON
+# Beside another environment: each starts the server of its own.
+python3 -m venv other
+other/bin/pip install -q --no-index --find-links /wheels ruedo
+for one in venv other; do
+  [[ $($one/bin/ruedo --prefix) == "$PWD/$one/"* ]]
+  $one/bin/python -c "import importlib; found = importlib.import_module('ruedo.launch').find_ruedo(); assert found.startswith('$PWD/$one/'), found"
+done
+if compgen -G '/wheels/pytest-*' >/dev/null; then
+  venv/bin/pip install -q --no-index --find-links /wheels pytest pandas gymnasium matplotlib
+  export RUEDO=$PWD/venv/bin/ruedo RUEDO_SOURCE_DIR=/src RUEDO_BUILD_DIR=/nowhere
+  cd /src/tests
+  tests=(clients/{client,lockstep,unix,world,motion,launch,hostile,python}_test.py engine)
+  [[ -z $RUEDO_TESTS ]] || read -ra tests <<<"$RUEDO_TESTS"
+  ~/venv/bin/python -m pytest -q -p no:cacheprovider "${tests[@]}"
+fi
 INSIDE
 
 for suite in "$@"; do
@@ -51,11 +69,14 @@ for suite in "$@"; do
   rm -rf "$root/wheels"
   cp -r "$folder/wheels" "$root/wheels"
   cp "$folder/inside.sh" "$root/inside.sh"
+  rm -rf "$root/src"
+  mkdir "$root/src"
+  cp -r "$here/../tests" "$here/../worlds" "$here/../proto" "$here/../docs" "$root/src"
   chroot "$root" id user >/dev/null 2>&1 || chroot "$root" useradd --create-home user
   # A network of its own with nothing in it but the loopback interface; /proc for the program's way to its own files.
   # shellcheck disable=SC2016  # the inner shell expands $0
-  unshare --net --mount bash -c 'ip link set lo up; mount -t proc proc "$0/proc"
-    exec chroot --userspec=user:user "$0" env -i HOME=/home/user PATH=/usr/bin:/bin LANG=C.UTF-8 bash /inside.sh' "$root"
+  unshare --net --mount bash -c 'ip link set lo up; ip route add 224.0.0.0/4 dev lo; mount -t proc proc "$0/proc"
+    exec chroot --userspec=user:user "$0" env -i HOME=/home/user PATH=/usr/bin:/bin LANG=C.UTF-8 RUEDO_TESTS="${RUEDO_TESTS-}" bash /inside.sh' "$root"
   echo "$suite: all of it works"
   cp "$root/home/user/results" "$folder/$suite.results"
 done

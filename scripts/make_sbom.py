@@ -1,88 +1,125 @@
-"""make_sbom.py WHEEL OUT: what is inside of Ruedo's wheel, as SPDX 2.3 in JSON: each package that a
-file of it came from, with its version.
+"""make_sbom.py BUILD OUT WHEEL FILE...: what the files of a release are and what is inside of
+them, as SPDX 2.3 in JSON: each package that something of it came from, with its version.
 """
 
 import hashlib
+import importlib.metadata
 import json
 import os
+import re
 import subprocess
 import sys
 import time
 import zipfile
 from pathlib import Path
 
-
-def version_of(name: str) -> str:
-    """Of a Debian package that a licence is named by."""
-    return subprocess.run(
-        ["dpkg-query", "-W", "-f=${Version}", name], capture_output=True, text=True
-    ).stdout
+ROOT = Path(__file__).resolve().parents[1]
+# Compiled into the programs: what is linked to them as a shared library is found in the wheel.
+LINKED = ("musl-dev", "libcli11-dev", "libeigen3-dev")
 
 
-def main(wheel: Path, out: Path) -> None:
-    version = wheel.name.split("-")[1]
+def debian(name: str) -> tuple[str, str, str]:
+    """(name, version, what registries call it) of a package that is installed here."""
+    version = subprocess.run(
+        ["dpkg-query", "-W", "-f=${Version}\n", name], capture_output=True, text=True, check=True
+    ).stdout.splitlines()[0]
+    return name, version, f"pkg:deb/debian/{name}@{version}"
+
+
+def inside(build: Path, wheel: Path) -> list[tuple[str, str, str]]:
+    """Of the wheel's shared libraries, which are named by the licences there; of what is linked;
+    of what Python and npm gave.
+    """
     with zipfile.ZipFile(wheel) as archive:
-        licences = sorted(
-            {Path(name).name for name in archive.namelist() if ".dist-info/licenses/" in name}
-        )
-    inside = {
-        name: version_of("musl-dev" if name == "musl" else name)
-        for name in licences
-        if not name.startswith("lcm-")
+        folders = (Path(name) for name in archive.namelist() if ".dist-info/licenses/" in name)
+        licences = {path.name for path in folders if path.parent.name == "debian"}
+    found = [debian(name) for name in sorted(licences | set(LINKED))]
+    for name in ("lcm", "nanobind"):
+        version = importlib.metadata.version(name)
+        found.append((name, version, f"pkg:pypi/{name}@{version}"))
+    lock = json.loads((build / "web/package-lock.json").read_text(encoding="utf-8"))
+    for folder, about in lock["packages"].items():
+        if folder and not about.get("dev"):
+            name = folder.removeprefix("node_modules/")
+            found.append((name, about["version"], f"pkg:npm/{name}@{about['version']}"))
+    return found
+
+
+def identifier(name: str) -> str:
+    return "SPDXRef-" + re.sub(r"[^A-Za-z0-9.-]", "-", name)
+
+
+def package_of_file(file: Path, version: str) -> dict[str, object]:
+    return {
+        "SPDXID": identifier(file.name),
+        "name": file.name,
+        "versionInfo": version,
+        "licenseConcluded": "BSD-3-Clause",
+        "licenseDeclared": "BSD-3-Clause",
+        "copyrightText": "NOASSERTION",
+        "downloadLocation": "NOASSERTION",
+        "filesAnalyzed": False,
+        "packageFileName": file.name,
+        "checksums": [
+            {
+                "algorithm": "SHA256",
+                "checksumValue": hashlib.sha256(file.read_bytes()).hexdigest(),
+            }
+        ],
     }
-    inside["lcm"] = "1.5.3"
-    digest = hashlib.sha256(wheel.read_bytes()).hexdigest()
-    packages = [
-        {
-            "SPDXID": "SPDXRef-ruedo",
-            "name": "ruedo",
-            "versionInfo": version,
-            "licenseConcluded": "BSD-3-Clause",
-            "downloadLocation": "NOASSERTION",
-            "packageFileName": wheel.name,
-            "checksums": [{"algorithm": "SHA256", "checksumValue": digest}],
-        }
+
+
+def package_inside(name: str, version: str, locator: str) -> dict[str, object]:
+    return {
+        "SPDXID": identifier(name),
+        "name": name,
+        "versionInfo": version,
+        "licenseConcluded": "NOASSERTION",
+        "licenseDeclared": "NOASSERTION",
+        "copyrightText": "NOASSERTION",
+        "downloadLocation": "NOASSERTION",
+        "filesAnalyzed": False,
+        "comment": "its licence is in share/doc/ruedo/copyright, or in licenses/debian of the wheel",
+        "externalRefs": [
+            {
+                "referenceCategory": "PACKAGE-MANAGER",
+                "referenceType": "purl",
+                "referenceLocator": locator,
+            }
+        ],
+    }
+
+
+def main(build: Path, out: Path, wheel: Path, files: list[Path]) -> None:
+    version = (ROOT / "VERSION").read_text(encoding="utf-8").strip()
+    made = [package_of_file(file, version) for file in files]
+    found = [package_inside(*one) for one in inside(build, wheel)]
+
+    def related(one: str, kind: str, other: str) -> dict[str, str]:
+        return {"spdxElementId": one, "relationshipType": kind, "relatedSpdxElement": other}
+
+    relationships = [related("SPDXRef-DOCUMENT", "DESCRIBES", str(one["SPDXID"])) for one in made]
+    relationships += [
+        related(identifier(wheel.name), "CONTAINS", str(one["SPDXID"])) for one in found
     ]
-    packages += [
-        {
-            "SPDXID": f"SPDXRef-{name}",
-            "name": name,
-            "versionInfo": inside[name],
-            "licenseConcluded": "NOASSERTION",
-            "licenseComments": f"licenses/{name} in the wheel's metadata",
-            "downloadLocation": "NOASSERTION",
-        }
-        for name in sorted(inside)
-    ]
-    created = time.strftime(
-        "%Y-%m-%dT%H:%M:%SZ", time.gmtime(int(os.environ.get("SOURCE_DATE_EPOCH", "0")))
-    )
+    digest = hashlib.sha256("".join(str(one["checksums"]) for one in made).encode()).hexdigest()
+    created = time.gmtime(int(os.environ.get("SOURCE_DATE_EPOCH", "0")))
     document = {
         "spdxVersion": "SPDX-2.3",
         "dataLicense": "CC0-1.0",
         "SPDXID": "SPDXRef-DOCUMENT",
-        "name": wheel.name,
+        "name": f"ruedo-{version}",
         "documentNamespace": f"urn:ruedo:{version}:{digest}",
-        "creationInfo": {"created": created, "creators": ["Tool: make_sbom.py"]},
-        "packages": packages,
-        "relationships": [
-            {
-                "spdxElementId": "SPDXRef-DOCUMENT",
-                "relationshipType": "DESCRIBES",
-                "relatedSpdxElement": "SPDXRef-ruedo",
-            }
-        ]
-        + [
-            {
-                "spdxElementId": "SPDXRef-ruedo",
-                "relationshipType": "CONTAINS",
-                "relatedSpdxElement": f"SPDXRef-{name}",
-            }
-            for name in sorted(inside)
-        ],
+        "creationInfo": {
+            "created": time.strftime("%Y-%m-%dT%H:%M:%SZ", created),
+            "creators": ["Tool: make_sbom.py"],
+        },
+        "packages": made + found,
+        "relationships": relationships,
     }
     out.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), Path(sys.argv[2]))
+    build, out, wheel, *files = (Path(word) for word in sys.argv[1:])
+    main(build, out, wheel, [wheel, *files])

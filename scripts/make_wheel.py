@@ -57,11 +57,13 @@ def symbols(library: Path, which: str) -> set[str]:
     }
 
 
-def resolved(program: Path) -> dict[str, Path]:
-    """{soname: file} of all that a program loads."""
+def resolved(package: Path) -> dict[str, Path]:
+    """{soname: file} of all that the program loads, at its start or later."""
+    files = [package / "bin/ruedo", *package.glob("lib/**/libruedo_*.so")]
     return {
         name: Path(path).resolve()
-        for name, path in re.findall(r"(\S+) => (/\S+)", run("ldd", program))
+        for file in files
+        for name, path in re.findall(r"(\S+) => (/\S+)", run("ldd", file))
     }
 
 
@@ -97,9 +99,9 @@ def make_stub(soname: str, names: set[str], folder: Path) -> None:
     )
 
 
-def stub_unused(program: Path, folder: Path) -> None:
+def stub_unused(package: Path, folder: Path) -> None:
     """For what UNUSED says, libraries in `folder` that take the place of the real ones."""
-    libraries = resolved(program)
+    libraries = resolved(package)
     folder.mkdir()
     for start, ends in UNUSED.items():
         for user in (path for soname, path in libraries.items() if soname.startswith(start)):
@@ -109,10 +111,14 @@ def stub_unused(program: Path, folder: Path) -> None:
 
 
 def add_licences(tree: Path) -> None:
-    """Of what the wheel brings along, as Debian's packages have them: shared libraries (auditwheel
-    puts a hash into their names, we "-ruedo"), musl, LCM."""
-    folder = next(tree.glob("*.dist-info")) / "licenses"
-    folder.mkdir(exist_ok=True)
+    """Of what the wheel brings along: the installation's text about what is linked in or lies in
+    it, and, as Debian's packages have them, those of the shared libraries (auditwheel puts a hash
+    into their names, we "-ruedo").
+    """
+    licenses = next(tree.glob("*.dist-info")) / "licenses"
+    folder = licenses / "debian"
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copy(tree / "ruedo/share/doc/ruedo/copyright", licenses / "copyright")
     libraries = [
         *tree.glob("ruedo.libs/*"),
         *tree.glob("ruedo/lib/**/*.so*"),
@@ -124,27 +130,21 @@ def add_licences(tree: Path) -> None:
         for path in libraries
         if not path.name.startswith(stubs)
     }
-    patterns = [f"*/{name}" for name in sorted(names) if ".so" in name] + [
-        "*-linux-musl/libc.a",
-        "*/libassimp.so.5*",
-    ]
+    patterns = [f"*/{name}" for name in sorted(names) if ".so" in name] + ["*/libassimp.so.5*"]
     owners = subprocess.run(
         ["dpkg", "-S", *patterns], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
     ).stdout
     for package in sorted({line.split(":")[0] for line in owners.splitlines()}):
         text = Path("/usr/share/doc") / package / "copyright"
         if text.is_file():
-            shutil.copy(text, folder / package.replace("musl-dev", "musl"))
-    for path in Path(sys.prefix).glob("lib/python3*/site-packages/lcm-*.dist-info/licenses/**/*"):
-        if path.is_file():
-            shutil.copy(path, folder / f"lcm-{path.name}")
+            shutil.copy(text, folder / package)
 
 
 def stage(build: Path, tree: Path) -> str:
     """The installation as the package; gives the version."""
     prefix = tree / "installed"
     run("cmake", "--install", build, "--prefix", prefix)
-    python = prefix / "share/ruedo/python"
+    python = prefix / "lib/ruedo/python"
     package = tree / "wheel/ruedo"
     shutil.move(python / "ruedo", package)
     metadata = next(python.glob("ruedo-*.dist-info"))
@@ -155,7 +155,7 @@ def stage(build: Path, tree: Path) -> str:
     libraries = next((package / "lib").glob("**/liblcm.so.1")).parent
     for engine in package.glob("_engine*.so"):
         run("patchelf", "--set-rpath", f"$ORIGIN/{libraries.relative_to(package)}", engine)
-    for soname, path in resolved(package / "bin/ruedo").items():
+    for soname, path in resolved(package).items():
         if soname.startswith(NOT_THERE):
             shutil.copy(path, libraries / soname)
     run("patchelf", "--set-rpath", "$ORIGIN", libraries / "liblcm.so.1")
@@ -238,7 +238,7 @@ def main(build: Path, out: Path, level: int) -> Path:
         raw = tree / f"ruedo-{version}-py3-none-linux_{os.uname().machine}.whl"
         pack(tree / "wheel", raw, 0)
         stubs = tree / "stubs"
-        stub_unused(tree / "wheel/ruedo/bin/ruedo", stubs)
+        stub_unused(tree / "wheel/ruedo", stubs)
         run(
             tools / "auditwheel",
             "repair",

@@ -11,7 +11,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int kMostAbove = 4;  // PREFIX/share/ruedo/python/ruedo, of the Python module
+constexpr int kMostAbove = 4;  // PREFIX/lib/ruedo/python/ruedo, of the Python module
 
 // The folder of the program or library: absolute, without links.
 fs::path own_folder() {
