@@ -51,7 +51,9 @@ struct Engine::Arena {
 };
 
 struct Engine::Copy {
-  std::shared_ptr<const model::WorldModel> model;
+  std::shared_ptr<const model::WorldModel> model;  // before anything was drawn
+  model::Drawn drawn;
+  std::shared_ptr<StaticScenes> statics;
   Channels channels;
   std::unique_ptr<World> world;
   Batch batch;
@@ -84,7 +86,8 @@ Engine::Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions opt
   copies_.resize(static_cast<size_t>(options_.worlds));
   copies_[0] = make_copy(
       world_, options_.fleet.seed);  // the first says what is wrong, and builds what all share
-  for_each_copy([this](size_t i) {
+  first_made_ = true;
+  for_each(copies_.size(), [this](size_t i) {
     if (i > 0) copies_[i] = make_copy(world_, options_.fleet.seed + i);
   });
   const std::vector<Input>& inputs = copies_[0]->world->inbox().inputs();
@@ -99,7 +102,7 @@ Engine::Engine(std::shared_ptr<const model::WorldModel> world, EngineOptions opt
   touching_->type = Primitive::int32;
   touching_->shape = {options_.worlds, static_cast<int64_t>(driven_.size())};
   touching_->values.resize(copies_.size() * driven_.size() * sizeof(int32_t));
-  for_each_copy([this](size_t i) { compute(i, 1); });
+  for_each(copies_.size(), [this](size_t i) { compute(i, 1); });
 }
 
 Engine::~Engine() = default;
@@ -110,9 +113,11 @@ std::unique_ptr<Engine::Copy> Engine::make_copy(std::shared_ptr<const model::Wor
   FleetOptions fleet = options_.fleet;
   fleet.seed = seed;
   Findings findings;
-  copy->world =
-      std::make_unique<World>(model, fleet, copy->channels, copies_[0] ? findings : findings_,
-                              model == world_ ? statics_ : nullptr);
+  const bool own = !options_.draws.empty();
+  const auto drawn = own ? randomized(*model, options_.draws, seed, &copy->drawn) : model;
+  copy->statics = own ? nullptr : statics_of(model);
+  copy->world = std::make_unique<World>(drawn, fleet, copy->channels,
+                                        first_made_ ? findings : findings_, copy->statics);
   copy->model = std::move(model);
   copy->batch.snapshots.resize(kBatchSteps);
   for (const auto& module : copy->world->modules()) {
@@ -122,13 +127,26 @@ std::unique_ptr<Engine::Copy> Engine::make_copy(std::shared_ptr<const model::Wor
   return copy;
 }
 
-void Engine::for_each_copy(const std::function<void(size_t)>& body) {
-  if (handler_ || state_handler_ || copies_.size() == 1) {
-    for (size_t i = 0; i < copies_.size(); ++i) body(i);
+std::shared_ptr<StaticScenes> Engine::statics_of(
+    const std::shared_ptr<const model::WorldModel>& model) {
+  const std::lock_guard lock(shared_mutex_);
+  std::erase_if(shared_, [](const auto& each) { return each.second.statics.expired(); });
+  Shared& shared = shared_[model.get()];
+  auto statics = shared.model.lock() == model ? shared.statics.lock() : nullptr;
+  if (!statics) {
+    statics = std::make_shared<StaticScenes>();
+    shared = {model, statics};
+  }
+  return statics;
+}
+
+void Engine::for_each(size_t count, const std::function<void(size_t)>& body) {
+  if (handler_ || state_handler_ || count == 1) {
+    for (size_t i = 0; i < count; ++i) body(i);
     return;
   }
   arena_->tasks.execute([&] {
-    parallel_pieces(static_cast<int>(copies_.size()), [&](int i) {
+    parallel_pieces(static_cast<int>(count), [&](int i) {
       const DefaultFloatingPoint floating_point;
       body(static_cast<size_t>(i));
     });
@@ -240,10 +258,15 @@ void Engine::update(Observer& observer, size_t world) {
   }
 }
 
-void Engine::step(int64_t steps) {
+void Engine::step(int64_t steps, std::span<const uint8_t> which) {
   if (steps < 1) throw InputError({}, "step() takes 1 step or more, not " + std::to_string(steps));
+  if (!which.empty() && which.size() != copies_.size())
+    throw InputError({}, "which worlds to step: " + std::to_string(copies_.size()) +
+                             " values, one for each, not " + std::to_string(which.size()));
   const DefaultFloatingPoint floating_point;
-  for_each_copy([&](size_t i) { compute(i, steps); });
+  for_each(copies_.size(), [&](size_t i) {
+    if (which.empty() || which[i] != 0) compute(i, steps);
+  });
 }
 
 void Engine::drive(std::span<const double> velocities) {
@@ -290,20 +313,29 @@ void Engine::command(int world, const std::string& channel, std::span<const uint
   }
 }
 
-void Engine::reset(int world, uint64_t seed) {
-  reset(world, seed, copies_.at(static_cast<size_t>(world))->model);
+void Engine::reset(std::span<const Reset> resets) {
+  const DefaultFloatingPoint floating_point;
+  std::vector<bool> named(copies_.size(), false);
+  for (const Reset& reset : resets) {
+    if (named.at(static_cast<size_t>(reset.world)))
+      throw InputError({},
+                       "world " + std::to_string(reset.world) + " is to be reset twice at once");
+    named[static_cast<size_t>(reset.world)] = true;
+  }
+  for_each(resets.size(), [&](size_t i) { reset_one(resets[i]); });
 }
 
-void Engine::reset(int world, uint64_t seed, std::shared_ptr<const model::WorldModel> model) {
-  const DefaultFloatingPoint floating_point;
-  const auto index = static_cast<size_t>(world);
-  const bool other = copies_.at(index)->model != model;
-  auto copy = make_copy(std::move(model), seed);
+void Engine::reset_one(const Reset& reset) {
+  const auto index = static_cast<size_t>(reset.world);
+  const auto& before = copies_[index]->model;
+  const bool other = reset.model && reset.model != before;
+  auto copy = make_copy(other ? reset.model : before, reset.seed);
   if (other) {
     const auto same = [](const Channel& a, const Channel& b) {
       return a.name == b.name && a.fingerprint == b.fingerprint;
     };
-    const std::vector<Channel>&here = copies_[0]->channels.list(), &there = copy->channels.list();
+    const std::vector<Channel>&here = copies_[index]->channels.list(),
+          &there = copy->channels.list();
     if (!std::equal(here.begin(), here.end(), there.begin(), there.end(), same)) {
       throw InputError({copy->model->file},
                        "its robots and devices are not those of " + world_->file +
@@ -312,6 +344,10 @@ void Engine::reset(int world, uint64_t seed, std::shared_ptr<const model::WorldM
   }
   copies_[index] = std::move(copy);
   compute(index, 1);
+}
+
+const model::Drawn& Engine::drawn(int world) const {
+  return copies_.at(static_cast<size_t>(world))->drawn;
 }
 
 std::vector<int> Engine::channels_of(const std::string& device) const {

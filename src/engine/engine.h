@@ -8,20 +8,24 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "engine/field_reader.h"
 #include "engine/world.h"
+#include "model/randomization.h"
 
 namespace ruedo::engine {
 
 struct EngineOptions {
   int worlds = 1;
-  FleetOptions fleet;  // its seed is that of copy 0
-  int threads = 0;     // 0: one a core
+  FleetOptions fleet;              // its seed is that of copy 0
+  int threads = 0;                 // 0: one a core
+  std::vector<model::Draw> draws;  // of each copy and reset, from the seed
 };
 
 // A field of one device on all robots that have it, in all copies. It follows the runs: after each
@@ -54,9 +58,9 @@ class Engine {
   const std::vector<std::string>& driven() const { return driven_; }
   const Findings& findings() const { return findings_; }
 
-  // Computes that many states of every copy, 1 or more. Throws std::runtime_error when a module
-  // failed.
-  void step(int64_t steps);
+  // Computes that many states, 1 or more: of every copy, or of those that have a 1 in `which`.
+  // Throws std::runtime_error when a module failed.
+  void step(int64_t steps, std::span<const uint8_t> which = {});
 
   // A velocity for every driven robot of every copy, on the states that there are: copies x driven
   // robots x (m/s ahead, m/s left, rad/s), row by row. A row with a NaN gives no command: what was
@@ -67,11 +71,24 @@ class Engine {
   // channel that takes no commands, or bytes that are no such message.
   void command(int world, const std::string& channel, std::span<const uint8_t> message);
 
-  // Makes a copy as it was at the beginning, with that seed: what follows equals a fresh run.
-  void reset(int world, uint64_t seed);
-  // The same with another world, which from then on is that copy's. Throws InputError where its
-  // channels are not the first one's: the same robots with the same devices, in the same order.
-  void reset(int world, uint64_t seed, std::shared_ptr<const model::WorldModel> model);
+  // A copy begins anew.
+  struct Reset {
+    int world = 0;
+    uint64_t seed = 1;
+    // Another world, which from then on is that copy's; null: the one that it has. Its channels are
+    // the first one's: the same robots with the same devices, in the same order.
+    std::shared_ptr<const model::WorldModel> model = nullptr;
+  };
+  // Makes copies as they were at the beginning, each with its seed: what follows equals a fresh
+  // run. Throws InputError; then some of them may be as they were.
+  void reset(std::span<const Reset> resets);
+  void reset(int world, uint64_t seed, std::shared_ptr<const model::WorldModel> model = nullptr) {
+    const Reset one{world, seed, std::move(model)};
+    reset(std::span(&one, 1));
+  }
+
+  // What was drawn for a copy.
+  const model::Drawn& drawn(int world) const;
 
   // The array of a field, kept up to date as long as the engine lives. device: the name of one
   // ("LRF"), or of its kind
@@ -98,18 +115,27 @@ class Engine {
   struct Observer;
 
   std::unique_ptr<Copy> make_copy(std::shared_ptr<const model::WorldModel> model, uint64_t seed);
+  void reset_one(const Reset& reset);
+  std::shared_ptr<StaticScenes> statics_of(const std::shared_ptr<const model::WorldModel>& model);
   void count_touching(size_t world, int32_t* counts) const;
   void compute(size_t world, int64_t steps);
   void tell(size_t world);
   void update(Observer& observer, size_t world);
-  void for_each_copy(const std::function<void(size_t)>& body);
+  void for_each(size_t count, const std::function<void(size_t)>& body);
   std::vector<int> channels_of(const std::string& device) const;
 
   std::shared_ptr<const model::WorldModel> world_;
   EngineOptions options_;
-  std::shared_ptr<StaticScenes> statics_ = std::make_shared<StaticScenes>();
+  // What never moves, of worlds that several copies may have: while one of them has it.
+  struct Shared {
+    std::weak_ptr<const model::WorldModel> model;
+    std::weak_ptr<StaticScenes> statics;
+  };
+  std::mutex shared_mutex_;
+  std::map<const model::WorldModel*, Shared> shared_;  // looked up only
   Findings findings_;
   std::vector<std::unique_ptr<Copy>> copies_;
+  bool first_made_ = false;  // the first copy tells what is wrong with the world
   std::vector<std::string> driven_;
   std::vector<int> velocity_inputs_;  // of the driven robots
   std::vector<int> driven_robots_;    // indices into BodyLayout::robots

@@ -244,7 +244,7 @@ std::vector<std::string> DocumentStore::files_read() const {
 
 void DocumentStore::add(const std::string& path, std::shared_ptr<const Element> root) {
   documents_[path] = std::move(root);
-  files_.push_back(path);
+  note(path);
 }
 
 }  // namespace ruedo::model

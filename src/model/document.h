@@ -4,6 +4,7 @@
 // Bad files give one InputError: too large, too deep, not UTF-8, a folder, no permission, not XML.
 #pragma once
 
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <string>
@@ -26,7 +27,9 @@ class DocumentStore {
   std::shared_ptr<const Element> read(const std::string& path);
   void add(const std::string& path, std::shared_ptr<const Element> root);
   // What else was read for the world: pictures, scripts.
-  void note(const std::string& path) { files_.push_back(path); }
+  void note(const std::string& path) {
+    if (std::find(files_.begin(), files_.end(), path) == files_.end()) files_.push_back(path);
+  }
   // In the order of first reading, each once.
   std::vector<std::string> files_read() const;
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <optional>
 
 #include "core/progress.h"
 #include "model/drive.h"
@@ -41,6 +42,8 @@ class Loader {
         path_(path) {}
 
   std::shared_ptr<const WorldModel> load(const Element& written, const LoadOptions& options) {
+    findings_ = {};
+    world_ = {};
     world_.file = path_;
     const std::shared_ptr<const Element> expanded =
         is_xacro(path_, &written) ? expand_xacro(path_, context_) : nullptr;
@@ -251,14 +254,44 @@ std::shared_ptr<const WorldModel> load_world(const std::string& name, const Load
   return loader.load(*root, options);
 }
 
+class TextLoader::Impl {
+ public:
+  Impl(const std::string& path, LoadOptions options)
+      : path_(absolute(path)), options_(std::move(options)) {}
+
+  std::shared_ptr<const WorldModel> load(const std::string& text) {
+    const std::shared_ptr<const Element> root = parse_document(text, path_);
+    if (!loader_) loader_.emplace(path_, options_);
+    try {
+      loader_->documents().add(path_, root);
+      return loader_->load(*root, options_);
+    } catch (...) {  // it was left in the middle
+      loader_.reset();
+      throw;
+    }
+  }
+
+ private:
+  static std::string absolute(const std::string& path) {
+    std::error_code error;
+    return fs::weakly_canonical(fs::absolute(path), error).string();
+  }
+
+  std::string path_;
+  LoadOptions options_;
+  std::optional<Loader> loader_;
+};
+
+TextLoader::TextLoader(std::string path, LoadOptions options)
+    : impl_(std::make_unique<Impl>(path, std::move(options))) {}
+TextLoader::~TextLoader() = default;
+std::shared_ptr<const WorldModel> TextLoader::load(const std::string& text) {
+  return impl_->load(text);
+}
+
 std::shared_ptr<const WorldModel> load_world_text(const std::string& text, const std::string& path,
                                                   const LoadOptions& options) {
-  std::error_code error;
-  const std::string full = fs::weakly_canonical(fs::absolute(path), error).string();
-  Loader loader(full, options);
-  std::shared_ptr<const Element> root = parse_document(text, full);
-  loader.documents().add(full, root);
-  return loader.load(*root, options);
+  return TextLoader(path, options).load(text);
 }
 
 }  // namespace ruedo::model

@@ -58,4 +58,17 @@ std::shared_ptr<const WorldModel> load_world(const std::string& name,
 std::shared_ptr<const WorldModel> load_world_text(const std::string& text, const std::string& path,
                                                   const LoadOptions& options = {});
 
+// Loads one text after another as load_world_text() does, each with the same options; the files
+// that they name are read once. Not for several threads at once.
+class TextLoader {
+ public:
+  TextLoader(std::string path, LoadOptions options);
+  ~TextLoader();
+  std::shared_ptr<const WorldModel> load(const std::string& text);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
 }  // namespace ruedo::model

@@ -11,16 +11,21 @@ from ruedo import lcmtypes
 
 # A two-wheeled robot without limits and watchdog, and a lidar of five beams that looks at a wall 2
 # m ahead of it.
-ROBOT = """<model name='{name}'><pose>0 {y} 0 0 0 0</pose><link name='body'><pose>0 0 0.15 0 0 0</pose><inertial><mass>10</mass></inertial>
-<collision name='c'><geometry><box><size>0.5 0.3 0.2</size></box></geometry></collision>
-<sensor name='scan' type='gpu_lidar'><update_rate>10</update_rate><lidar><scan><horizontal><samples>5</samples><min_angle>-0.4</min_angle>
+ROBOT = """<model name='{name}'><pose>0 {y} 0 0 0 0</pose><link name='body'><pose>0 0 0.15 0 0
+0</pose><inertial><mass>10</mass></inertial> <collision name='c'><geometry><box><size>0.5 0.3
+0.2</size></box></geometry></collision> <sensor name='scan'
+type='gpu_lidar'><update_rate>10</update_rate><lidar><scan><horizontal><samples>5</samples><min_angle>-0.4</min_angle>
 <max_angle>0.4</max_angle></horizontal></scan><range><min>0.05</min><max>8</max></range>
 <noise><type>gaussian</type><stddev>0.01</stddev></noise></lidar></sensor></link>
 {wheels}<ruedo:drive><ruedo:left_joint>left_joint</ruedo:left_joint><ruedo:right_joint>right_joint</ruedo:right_joint>
-<ruedo:watchdog>0</ruedo:watchdog></ruedo:drive></model>"""
-WHEEL = """<link name='{side}'><pose>0 {y} 0.1 -1.5707963267948966 0 0</pose><inertial><mass>0.5</mass></inertial>
-<collision name='c'><geometry><cylinder><radius>0.1</radius><length>0.05</length></cylinder></geometry></collision></link>
-<joint name='{side}_joint' type='revolute'><parent>body</parent><child>{side}</child><axis><xyz expressed_in='__model__'>0 1 0</xyz></axis></joint>"""
+<ruedo:watchdog>0</ruedo:watchdog></ruedo:drive></model>
+"""
+WHEEL = """<link name='{side}'><pose>0 {y} 0.1 -1.5707963267948966 0
+0</pose><inertial><mass>0.5</mass></inertial> <collision
+name='c'><geometry><cylinder><radius>0.1</radius><length>0.05</length></cylinder></geometry></collision></link>
+<joint name='{side}_joint' type='revolute'><parent>body</parent><child>{side}</child><axis><xyz
+expressed_in='__model__'>0 1 0</xyz></axis></joint>
+"""
 WALL = "<static>true</static><link name='l'><collision name='c'><geometry><box><size>0.2 40 2</size></box></geometry></collision></link>"
 
 

@@ -1,6 +1,9 @@
-"""ruedo.gym against Gymnasium's own checks, and against what a room's geometry says."""
+"""ruedo.gym against Gymnasium's and PettingZoo's own checks, and against what a scene's geometry
+says.
+"""
 
 import math
+import xml.etree.ElementTree as ET
 
 import gymnasium
 import numpy as np
@@ -8,11 +11,22 @@ import pytest
 import ruedo.gym
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
-from ruedo.rooms import TEST_ROOMS, make_room
+from pettingzoo.test import parallel_api_test
+from ruedo.rooms import (
+    TEST_ROOMS,
+    make_corridor,
+    make_fleet_room,
+    make_landmark_room,
+    make_push_room,
+    make_room,
+)
+
+TASKS = ["Navigate", "Corridor", "Push", "Camera"]
 
 
-def test_gymnasium_finds_nothing_wrong(recwarn):
-    env = gymnasium.make("ruedo/Navigate-v0", beams=9)
+@pytest.mark.parametrize("task", TASKS)
+def test_gymnasium_finds_nothing_wrong(task, recwarn):
+    env = gymnasium.make(f"ruedo/{task}-v0")
     check_env(env.unwrapped, skip_render_check=True)
     env.close()
     assert [
@@ -22,18 +36,19 @@ def test_gymnasium_finds_nothing_wrong(recwarn):
     ] == []
 
 
-def test_an_episode_repeats_from_its_seed():
+@pytest.mark.parametrize("task", TASKS)
+def test_an_episode_repeats_from_its_seed(task):
     def episode(envs):
         seen = [envs.reset(seed=3)[0]]
         envs.action_space.seed(5)
-        for _ in range(60):
+        for _ in range(15):
             observations, rewards, *ends, _ = envs.step(envs.action_space.sample())
             seen += [observations, rewards, *ends]
         return seen
 
     runs = []
     for threads in (1, 2):
-        envs = gymnasium.make_vec("ruedo/Navigate-v0", num_envs=4, beams=16, threads=threads)
+        envs = gymnasium.make_vec(f"ruedo/{task}-v0", num_envs=3, threads=threads)
         runs += [episode(envs), episode(envs)]
         envs.close()
     for other in runs[1:]:
@@ -53,15 +68,14 @@ def test_the_goal_is_where_the_room_says():
     nearer = 0.0
     for _ in range(40):  # turns towards the goal, and drives there
         bearing = math.atan2(observation[7], observation[6])
-        observation, reward, terminated, _truncated, _info = env.step(
+        observation, reward, terminated, *_ = env.step(
             np.array([-1.0 if abs(bearing) > 0.3 else 1.0, np.clip(2 * bearing, -1, 1)])
         )
         nearer += reward + 0.01
         if terminated:
             break
-    end = distance - nearer if not terminated else None
-    if end is not None:
-        assert observation[5] == pytest.approx(min(end / 8, 1), abs=1e-4)
+    if not terminated:
+        assert observation[5] == pytest.approx(min((distance - nearer) / 8, 1), abs=1e-4)
     env.close()
 
 
@@ -79,6 +93,7 @@ def test_modes_of_autoreset(mode):
     which = int(np.flatnonzero(terminated)[0])
     assert info["collision"][which] or info["success"][which]
     assert abs(rewards[which]) > 4.9
+    room = envs.scenes[which].number
     if mode is AutoresetMode.SAME_STEP:
         assert (
             info["_final_obs"][which]
@@ -89,21 +104,19 @@ def test_modes_of_autoreset(mode):
             and info["final_obs"][which][-2] != observations[which][-2]
         )
     elif mode is AutoresetMode.NEXT_STEP:
-        room = envs.rooms[which].number
         observations, rewards, terminated, truncated, _ = envs.step(ahead)
         assert (
-            envs.rooms[which].number != room
+            envs.scenes[which].number != room
             and rewards[which] == 0.0
             and not terminated[which]
             and not truncated[which]
         )
         assert observations[which][-2] == 0.0
     else:
-        room = envs.rooms[which].number
         mask = np.zeros(2, bool)
         mask[which] = True
         envs.reset(options={"reset_mask": mask})
-        assert envs.rooms[which].number != room
+        assert envs.scenes[which].number != room
     envs.close()
 
 
@@ -112,12 +125,160 @@ def test_rooms_are_the_same_everywhere_and_their_start_is_free():
         room = make_room(number)
         assert room == make_room(number)
         assert math.dist(room.start[:2], room.goal) >= 4.0
-    first = make_room(0)
-    assert first.start != make_room(1).start
-    envs = ruedo.gym.NavigateVectorEnv(1, split="test", beams=4)
-    envs.reset(seed=0)
-    assert envs.rooms[0].number >= TEST_ROOMS
+        corridor = make_corridor(number)
+        assert (
+            corridor == make_corridor(number)
+            and 12.0
+            <= sum(math.dist(a, b) for a, b in zip(corridor.middle, corridor.middle[1:]))
+            <= 18.0
+        )
+        push = make_push_room(number)
+        assert 0.8 <= math.dist(push.box[:2], push.goal) <= 1.6
+        assert math.dist(push.box[:2], push.start[:2]) >= 1.0
+        assert (
+            math.dist(make_landmark_room(number).start[:2], make_landmark_room(number).goal) > 1.5
+        )
+        _, goals = make_fleet_room(number, 5)
+        assert len(set(goals)) == 5
+    assert make_room(0).start != make_room(1).start
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_rooms_for_tests_are_none_of_those_for_training(task):
+    for split, numbers in (
+        ("train", range(TEST_ROOMS)),
+        ("test", range(TEST_ROOMS, 2 * TEST_ROOMS)),
+    ):
+        envs = gymnasium.make_vec(f"ruedo/{task}-v0", num_envs=2, split=split)
+        envs.reset(seed=0)
+        assert all(scene.number in numbers for scene in envs.unwrapped.scenes)
+        envs.close()
+
+
+# The walls of a piece are half the corridor's width from its middle: the wall's face is 0.05 m
+# nearer.
+def test_a_corridor_is_as_wide_as_it_says():
+    for number in range(20):
+        corridor = make_corridor(number)
+        (ax, ay), (bx, by) = corridor.middle[2:4]
+        heading = math.atan2(by - ay, bx - ax)
+        for side in (1, -1):
+            wall = ET.fromstring(corridor.sdf).find(f".//model[@name='wall{side}_3']")
+            x, y, _, _, _, turned = (float(v) for v in wall.findtext("pose").split())
+            across = -(x - ax) * math.sin(heading) + (y - ay) * math.cos(heading)
+            assert across == pytest.approx(side * corridor.width / 2, abs=2e-3)
+            assert turned == pytest.approx(heading, abs=2e-3)
+
+
+# Following the middle: the way is its length, and the rewards are the way, less 0.01 each step, and
+# 5 at the end.
+def test_a_corridor_leads_to_its_end():
+    env = ruedo.gym.CorridorEnv(noise=False, beams=8)
+    env.reset(seed=4)
+    middle = np.array(env.scene.middle)
+    length = np.linalg.norm(np.diff(middle, axis=0), axis=1).sum()
+    core, total, steps, target = env._one, 0.0, 0, 1
+    terminated = truncated = False
+    while not terminated and not truncated:
+        x, y = core._places[0, 0, :2]
+        if target < len(middle) - 1 and math.dist((x, y), middle[target]) < 0.5:
+            target += 1
+        bearing = math.remainder(
+            math.atan2(middle[target][1] - y, middle[target][0] - x) - core._headings()[0], math.tau
+        )
+        _, reward, terminated, truncated, info = env.step(
+            np.array([1.0 if abs(bearing) < 0.3 else -0.8, np.clip(3 * bearing, -1, 1)])
+        )
+        total += reward
+        steps += 1
+    assert info["success"] and not info["collision"]
+    assert total == pytest.approx(length - 0.5 + 5.0 - 0.01 * steps, abs=0.15)
+    env.close()
+
+
+# The robot drives to behind the box, as seen from the place, and pushes.
+def test_a_box_can_be_pushed_to_its_place():
+    env = ruedo.gym.PushEnv()
+    for seed in range(3):
+        env.reset(seed=seed)
+        core, goal = env._one, np.array(env.scene.goal)
+        done = info = False
+        while not done:
+            robot, box = core._places[0, 0, :2], core._places[0, 1, :2]
+            way = (goal - box) / np.linalg.norm(goal - box)
+            side = np.array([-way[1], way[0]])
+            behind, beside = (robot - box) @ way, (robot - box) @ side
+            if behind < -0.3 and abs(beside) < 0.12:
+                target = box + 0.3 * way  # push
+            elif behind < -0.55:
+                target = box - 0.75 * way
+            else:  # round the box
+                target = box - 1.0 * way + (0.9 if beside > 0 else -0.9) * side
+                if behind > 0.2:
+                    target = box + (1.0 if beside > 0 else -1.0) * side
+            ahead = target - robot
+            bearing = math.remainder(math.atan2(ahead[1], ahead[0]) - core._headings()[0], math.tau)
+            speed = 0.6 if abs(bearing) < 0.3 else 0.0
+            _, _, terminated, truncated, info = env.step(
+                np.array([speed, np.clip(2.5 * bearing, -1, 1)])
+            )
+            done = terminated or truncated
+        if info["success"]:
+            break
+    assert info["success"]
+    env.close()
+
+
+def test_a_camera_sees_the_red_pillar_ahead():
+    env = ruedo.gym.CameraEnv()
+    picture, _ = env.reset(seed=2)
+    assert picture.shape == (64, 64, 3)
+
+    def red(picture):
+        return (picture[..., 0] > 90) & (picture[..., 1] < 60) & (picture[..., 2] < 60)
+
+    for _ in range(120):  # turns until it is ahead
+        if red(picture)[:, 27:37].sum() > 10:
+            break
+        picture, *_ = env.step(np.array([-1.0, 0.7]))
+    assert red(picture).any()
+    core = env._one
+    ahead = core._goals[0] - core._places[0, 0, :2]
+    bearing = math.remainder(math.atan2(ahead[1], ahead[0]) - core._headings()[0], math.tau)
+    assert abs(bearing) < 0.2
+    env.close()
+
+
+# From above, x goes up in the picture and y to the left; the robot is red, the room's floor grey.
+def test_a_frame_shows_the_scene_from_above():
+    envs = gymnasium.make_vec("ruedo/Push-v0", num_envs=2, render_mode="rgb_array")
+    envs.reset(seed=5)
+    frames = envs.render()
+    assert len(frames) == 2 and frames[0].shape == (256, 256, 3) and frames[0].dtype == np.uint8
+    for frame, scene in zip([frame.astype(int) for frame in frames], envs.unwrapped.scenes):
+        green = (frame[..., 1] > frame[..., 0] + 40) & (frame[..., 1] > frame[..., 2] + 40)
+        rows, columns = np.nonzero(green)
+        metres = 8.6 * 2 * math.tan(0.475) / 256  # a pixel, on the floor
+        assert (127.5 - rows.mean()) * metres == pytest.approx(scene.goal[0], abs=0.15)
+        assert (127.5 - columns.mean()) * metres == pytest.approx(scene.goal[1], abs=0.15)
     envs.close()
+
+
+def test_pettingzoo_finds_nothing_wrong():
+    env = ruedo.gym.FleetEnv(3, beams=6)
+    parallel_api_test(env, num_cycles=40)
+    env.close()
+
+
+def test_a_fleet_sees_its_goals():
+    env = ruedo.gym.FleetEnv(2, beams=5, noise=False)
+    observations, _ = env.reset(seed=1)
+    again, _ = env.reset(seed=1)
+    for name in env.agents:
+        assert (observations[name] == again[name]).all()
+    place, goal = env._places[1, :2], env._goals[1]
+    assert observations["robot1"][5] == pytest.approx(math.dist(place, goal) / 8, abs=1e-6)
+    env.close()
 
 
 @pytest.mark.parametrize(
@@ -125,7 +286,8 @@ def test_rooms_are_the_same_everywhere_and_their_start_is_free():
     [
         ({"beams": 1}, "beams is 1; allowed are 2 to 1024"),
         ({"split": "all"}, "allowed are 'train' and 'test'"),
-        ({"render_mode": "human"}, "draw nothing yet"),
+        ({"render_mode": "ansi"}, "allowed are None, 'rgb_array' and 'human'"),
+        ({"render_mode": "human"}, "'human' is for one environment"),
     ],
 )
 def test_wrong_options_are_refused(options, text):

@@ -4,11 +4,13 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
@@ -17,6 +19,7 @@
 #include "engine/engine.h"
 #include "log/header.h"
 #include "model/load.h"
+#include "model/randomization.h"
 #include "ruedo/errors.h"
 #include "scene/gl_context.h"
 #include "watched_run.h"
@@ -66,8 +69,8 @@ class PyEngine {
            uint64_t seed, bool noise, int threads, const std::vector<std::string>& spawns,
            const std::vector<std::string>& drives, const std::vector<std::string>& settings,
            const std::vector<std::string>& disabled, const std::vector<std::string>& faults,
-           bool record) {
-    ruedo::model::LoadOptions& options = options_;
+           const std::vector<std::string>& draws, bool record) {
+    ruedo::model::LoadOptions options;
     for (const std::string& one : spawns) options.spawns.push_back(ruedo::model::parse_spawn(one));
     for (const std::string& one : drives) options.drives.push_back(ruedo::model::parse_drive(one));
     for (const std::string& one : settings)
@@ -80,9 +83,11 @@ class PyEngine {
     engine.fleet.seed = seed;
     engine.fleet.noise = noise;
     engine.fleet.disabled = disabled;
+    for (const std::string& one : draws) engine.draws.push_back(ruedo::model::parse_draw(one));
+    randomized_ = !draws.empty();
     const nb::gil_scoped_release release;
-    const auto model = text ? ruedo::model::load_world_text(*text, world, options)
-                            : ruedo::model::load_world(world, options);
+    texts_ = std::make_unique<ruedo::model::TextLoader>(world, options);
+    const auto model = text ? read(*text) : ruedo::model::load_world(world, options);
     engine_ = std::make_unique<Engine>(model, engine);
     for (const ruedo::Finding& finding : model->findings)
       findings_.push_back(finding.source.str() + ": " + finding.element + ": " + finding.text);
@@ -111,11 +116,12 @@ class PyEngine {
 
   void close() { engine_.reset(); }
 
-  void step(int64_t steps) {
+  void step(int64_t steps,
+            const std::optional<nb::ndarray<const uint8_t, nb::c_contig, nb::device::cpu>>& which) {
     Engine& engine = this->engine();
     recorded_.clear();
     const nb::gil_scoped_release release;
-    engine.step(steps);
+    which ? engine.step(steps, {which->data(), which->size()}) : engine.step(steps);
   }
 
   void drive(const nb::ndarray<const double, nb::c_contig, nb::device::cpu>& velocities) {
@@ -126,14 +132,20 @@ class PyEngine {
     engine().command(world, channel, {static_cast<const uint8_t*>(message.data()), message.size()});
   }
 
+  // texts: none, or one for each world.
   void reset(const std::vector<int>& worlds, const std::vector<uint64_t>& seeds,
-             const std::optional<std::string>& text, const std::string& name) {
+             const std::vector<std::string>& texts) {
     Engine& engine = this->engine();
     recorded_.clear();
     const nb::gil_scoped_release release;
-    const auto model = text ? ruedo::model::load_world_text(*text, name, options_) : nullptr;
+    std::vector<Engine::Reset> resets;
     for (size_t i = 0; i < worlds.size(); ++i)
-      model ? engine.reset(worlds[i], seeds[i], model) : engine.reset(worlds[i], seeds[i]);
+      resets.push_back({worlds[i], seeds[i], texts.empty() ? nullptr : read(texts[i])});
+    engine.reset(resets);
+  }
+
+  std::vector<std::pair<std::string, double>> drawn(int world) const {
+    return engine().drawn(world);
   }
 
   // Copy 0 begins anew with that seed and is watched from its first state on. log: "" or the file
@@ -143,6 +155,7 @@ class PyEngine {
                  double clearance_reach, const std::string& robot, const std::string& log,
                  bool everything) {
     Engine& engine = this->engine();
+    if (randomized_) throw ruedo::InputError({}, "a run that is judged cannot be randomized");
     ruedo::judge::Expectations expected;
     expected.robot = robot;
     for (const std::string& goal : goals) expected.goals.push_back(ruedo::judge::parse_goal(goal));
@@ -222,8 +235,19 @@ class PyEngine {
   const std::vector<std::string>& findings() const { return findings_; }
 
  private:
-  ruedo::model::LoadOptions options_;
+  // Texts that come again are read once.
+  std::shared_ptr<const ruedo::model::WorldModel> read(const std::string& text) {
+    constexpr size_t kMostKept = 256;
+    if (const auto known = read_.find(text); known != read_.end()) return known->second;
+    auto model = texts_->load(text);
+    if (read_.size() == kMostKept) read_.clear();
+    return read_[text] = std::move(model);
+  }
+
+  std::unique_ptr<ruedo::model::TextLoader> texts_;
+  std::unordered_map<std::string, std::shared_ptr<const ruedo::model::WorldModel>> read_;
   std::unique_ptr<Engine> engine_;
+  bool randomized_ = false;
   std::shared_ptr<const ruedo::model::WorldModel> world_;
   std::vector<std::string> findings_, result_options_;
   std::optional<ruedo::log_header_t> header_;
@@ -243,18 +267,20 @@ NB_MODULE(_engine, module) {
       .def(nb::init<const std::string&, const std::optional<std::string>&, int, uint64_t, bool, int,
                     const std::vector<std::string>&, const std::vector<std::string>&,
                     const std::vector<std::string>&, const std::vector<std::string>&,
-                    const std::vector<std::string>&, bool>(),
+                    const std::vector<std::string>&, const std::vector<std::string>&, bool>(),
            nb::arg("world"), nb::kw_only(), nb::arg("text") = nb::none(), nb::arg("worlds") = 1,
            nb::arg("seed") = 1, nb::arg("noise") = true, nb::arg("threads") = 0,
            nb::arg("spawn") = nb::list(), nb::arg("drive") = nb::list(),
            nb::arg("set") = nb::list(), nb::arg("disable") = nb::list(),
-           nb::arg("fault") = nb::list(), nb::arg("record") = false)
+           nb::arg("fault") = nb::list(), nb::arg("randomize") = nb::list(),
+           nb::arg("record") = false)
       .def("close", &PyEngine::close)
-      .def("step", &PyEngine::step)
+      .def("step", &PyEngine::step, nb::arg("steps"), nb::arg("which") = nb::none())
       .def("drive", &PyEngine::drive)
       .def("command", &PyEngine::command)
       .def("reset", &PyEngine::reset, nb::arg("worlds"), nb::arg("seeds"),
-           nb::arg("text") = nb::none(), nb::arg("name") = "world")
+           nb::arg("texts") = nb::list())
+      .def("drawn", &PyEngine::drawn)
       .def("observe", &PyEngine::observe)
       .def("begin_run", &PyEngine::begin_run, nb::arg("seed"), nb::kw_only(), nb::arg("goals"),
            nb::arg("no_contact"), nb::arg("clearance") = nb::none(),

@@ -32,7 +32,9 @@ class Engine:
     ``seed + i``. noise: False gives ideal sensors. threads: at most so many cores, 0 for all. spawn
     ("p3at:guest@1,2,0.5"), drive ("rover=left_joint,right_joint"), set ({"p3at/LRF.update_rate":
     10}) and disable ("p3at/camera") and fault ("p3at/lrf:freeze@3") are those of ``ruedo run``.
-    record: keep the messages of the last call, for :meth:`messages`.
+    randomize: what is drawn anew for each seed, see :meth:`drawn`: {"p3at.x": "uniform(-2, 2)",
+    "p3at/lrf.lidar.noise.stddev": "log_uniform(0.003, 0.03)"}. record: keep the messages of the
+    last call, for :meth:`messages`.
 
     Raises ValueError for what is wrong in the file or an argument, with file, line, value and what
     is allowed; OSError for what the machine lacks. Not for several threads at once; ``step`` lets
@@ -53,6 +55,7 @@ class Engine:
         set: Mapping[str, object] | None = None,
         disable: Iterable[str] = (),
         fault: Iterable[str] = (),
+        randomize: Mapping[str, str] | None = None,
         record: bool = False,
     ) -> None:
         for name, value in (
@@ -76,9 +79,9 @@ class Engine:
             set=settings,
             disable=list(disable),
             fault=list(fault),
+            randomize=[f"{target}={drawn}" for target, drawn in (randomize or {}).items()],
             record=bool(record),
         )
-        self._name = str(world)
         self._worlds = self._core.worlds()
         self._seeds = [seed + i for i in range(self._worlds)]
         self._robots: tuple[str, ...] = tuple(self._core.driven())
@@ -185,23 +188,35 @@ class Engine:
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.observe(name)
 
-    def step(self, commands: ArrayLike | None = None, n: int = 1) -> None:
-        """Computes n states of every copy.
+    def step(
+        self,
+        commands: ArrayLike | None = None,
+        n: int = 1,
+        worlds: NDArray[np.bool_] | None = None,
+    ) -> None:
+        """Computes n states of every copy, or of those that a mask names; the others stay as they
+        are, whatever is commanded.
 
         commands: velocities on the states that there are, broadcast to (worlds, robots, 2) as (m/s
         ahead, rad/s) or (worlds, robots, 3) as (m/s ahead, m/s left, rad/s); a row with NaN is no
         command. What was commanded before holds, until the robot's watchdog (600 ms of sim time by
         default).
         """
+        which = None
+        if worlds is not None:
+            which = np.ascontiguousarray(worlds, bool).view(np.uint8)
         if commands is not None:
-            self._core.drive(self._velocities(commands))
+            rows = self._velocities(commands)
+            if which is not None:
+                rows[which == 0] = np.nan
+            self._core.drive(rows)
         try:
             count = operator.index(n)
         except TypeError:
             raise TypeError(
                 f"n is a whole number of steps, not {n!r}; a step is {self.dt:g} s"
             ) from None
-        self._core.step(count)
+        self._core.step(count, which)
 
     def command(self, world: int, channel: str, message: Any) -> None:
         """A message on one of the channels that take commands ("p3at/move"), on the state that the
@@ -229,13 +244,14 @@ class Engine:
         self,
         worlds: int | Sequence[int] | NDArray[Any] | None = None,
         seed: int | Sequence[int] | None = None,
-        text: str | None = None,
+        text: str | Sequence[str] | None = None,
     ) -> None:
         """Makes copies as they were at the beginning; what follows equals a fresh run.
 
         worlds: an index, several, a mask, or None for all. seed: of each of them, or one for the
         first, counted up; None: the one that the copy has. text: another world for these copies
-        from now on, as SDF, with the same robots and devices.
+        from now on, as SDF, or one for each of them, with the same robots and devices. The files
+        that texts name are read once, when they are first named.
         """
         indices = self._indices(worlds)
         if seed is not None:
@@ -248,9 +264,22 @@ class Engine:
                 raise ValueError(f"{len(seeds)} seeds for {len(indices)} worlds")
             for index, one in zip(indices, seeds):
                 self._seeds[index] = one
-        self._core.reset(
-            indices, [self._seeds[index] for index in indices], text=text, name=self._name
-        )
+        texts = [text] * len(indices) if isinstance(text, str) else list(text or ())
+        if texts and len(texts) != len(indices):
+            raise ValueError(f"{len(texts)} texts for {len(indices)} worlds")
+        self._core.reset(indices, [self._seeds[index] for index in indices], texts)
+
+    def drawn(self, world: int = 0) -> dict[str, float]:
+        """What was drawn for a copy, by target, from ``randomize`` and its seed.
+
+        Targets are MODEL.x, .y, .z and .yaw (where it stands at the start), MODEL.mass (a factor),
+        MODEL.friction, LIGHT.brightness (a factor) and ROBOT/DEVICE.KEY as in ``set``; "*" in MODEL
+        or LIGHT stands for any text, and each that it names draws for itself. Distributions are
+        uniform(LOW, HIGH), log_uniform(LOW, HIGH), normal(MEAN, STDDEV) and choice(VALUE, ...). A
+        value depends on the seed and its target alone. Robots that are put somewhere are drawn
+        again while they would share space with something.
+        """
+        return dict(self._core.drawn(self._checked(world)))
 
     def messages(self) -> list[tuple[int, int, str, bytes]]:
         """(world, step, channel, bytes) of every message of the last call of ``step`` or ``reset``;
@@ -286,7 +315,7 @@ class Engine:
                 f"commands of shape {given.shape} do not fit (worlds, robots, {shape[2]}) = {shape}"
             ) from None
         if shape[2] == 3:
-            return np.ascontiguousarray(rows)
+            return np.array(rows)
         full = np.zeros((*shape[:2], 3))
         full[..., 0] = rows[..., 0]
         full[..., 2] = rows[..., 1]

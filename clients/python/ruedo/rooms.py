@@ -1,25 +1,81 @@
-"""Rooms for learning: a walled square with boxes and pillars, as SDF, from a number. The same
-number gives the same room everywhere.
+"""Scenes for learning, as SDF, from a number: rooms and corridors. The same number gives the same
+scene everywhere.
 """
 
 from __future__ import annotations
 
+import math
 import random
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
-__all__ = ["Room", "make_room"]
+__all__ = [
+    "Corridor",
+    "PushRoom",
+    "Room",
+    "Scene",
+    "make_corridor",
+    "make_fleet_room",
+    "make_landmark_room",
+    "make_push_room",
+    "make_room",
+]
 
-TEST_ROOMS = 1_000_000  # rooms from this number on are never used for training
+TEST_ROOMS = 1_000_000  # scenes from this number on are never used for training
 
 
 @dataclass(frozen=True)
-class Room:
-    """A room with a start that is free around it, and a goal."""
+class Scene:
+    """A world with a robot, which is called "robot" where it is alone."""
 
     number: int
     sdf: str
+
+    def seen_from_above(self) -> str:
+        """The same with a camera of 256 x 256 pixels above it, ten times a second: the device
+        "overview".
+        """
+        x, y, width = self._extent()
+        camera = (
+            f"<model name='overview'><static>true</static><pose>{x:.3f} {y:.3f} {width:.3f} 0 1.5707963 0</pose><link name='link'>"
+            "<sensor name='overview' type='camera'><update_rate>10</update_rate><ruedo:encoding>rgb</ruedo:encoding><camera>"
+            "<horizontal_fov>0.95</horizontal_fov><image><width>256</width><height>256</height></image>"
+            "<clip><near>0.1</near><far>100</far></clip></camera></sensor></link></model>"
+        )
+        return self.sdf.replace("</world>", camera + "</world>")
+
+    def _extent(self) -> tuple[float, float, float]:
+        """The middle, and the width of what is to be seen, m."""
+        return 0.0, 0.0, 8.6
+
+
+@dataclass(frozen=True)
+class Room(Scene):
+    """A room with a start that is free around it, and a goal."""
+
     start: tuple[float, float, float]  # m, m, rad
     goal: tuple[float, float]  # m
+
+
+@dataclass(frozen=True)
+class PushRoom(Room):
+    """A room whose goal is one for a box."""
+
+    box: tuple[float, float, float]  # m, m, rad
+
+
+@dataclass(frozen=True)
+class Corridor(Scene):
+    """A corridor that winds, and its middle from the start to the end."""
+
+    middle: tuple[tuple[float, float], ...]  # m
+    width: float  # m
+
+    def _extent(self) -> tuple[float, float, float]:
+        ys = [y for _, y in self.middle]
+        length = self.middle[-1][0]
+        return length / 2, (min(ys) + max(ys)) / 2, max(length, max(ys) - min(ys)) + 3.0
 
 
 def _wall(name: str, x: float, y: float, heading: float, size: tuple[float, float, float]) -> str:
@@ -30,13 +86,13 @@ def _wall(name: str, x: float, y: float, heading: float, size: tuple[float, floa
     )
 
 
-def _pillar(name: str, x: float, y: float, radius: float) -> str:
+def _pillar(name: str, x: float, y: float, radius: float, colour: str = "") -> str:
     shape = (
         f"<geometry><cylinder><radius>{radius:.4f}</radius><length>1</length></cylinder></geometry>"
     )
     return (
         f"<model name='{name}'><static>true</static><pose>{x:.4f} {y:.4f} 0.5 0 0 0</pose><link name='link'>"
-        f"<collision name='c'>{shape}</collision><visual name='v'>{shape}</visual></link></model>"
+        f"<collision name='c'>{shape}</collision><visual name='v'>{shape}{colour}</visual></link></model>"
     )
 
 
@@ -50,29 +106,14 @@ def make_room(
     start to the goal is likely, not certain: obstacles are drawn without looking at each other, at
     most 0.8 m wide.
     """
-    # random.Random's own numbers for one seed are promised to stay; shuffle() and the like are not,
-    # so only random() is used.
     draw = random.Random(number)
-
-    def between(low: float, high: float) -> float:
-        return low + (high - low) * draw.random()
-
+    between = _between(draw)
     reach = size / 2 - 0.7
     start = (between(-reach, reach), between(-reach, reach), between(-3.1, 3.1))
     goal = start[:2]
     while (goal[0] - start[0]) ** 2 + (goal[1] - start[1]) ** 2 < (size / 2) ** 2:
         goal = (between(-reach, reach), between(-reach, reach))
-    models = [
-        _wall(f"wall{i}", *place, (size + 0.2, 0.1, 1.0))
-        for i, place in enumerate(
-            [
-                (0, size / 2, 0),
-                (0, -size / 2, 0),
-                (size / 2, 0, 1.5707963),
-                (-size / 2, 0, 1.5707963),
-            ]
-        )
-    ]
+    models = _square(size)
     while len(models) < 4 + obstacles:
         x, y = between(-size / 2, size / 2), between(-size / 2, size / 2)
         radius = between(0.1, 0.4)
@@ -88,12 +129,167 @@ def make_room(
             if draw.random() < 0.5
             else _wall(name, x, y, between(-3.1, 3.1), (1.4 * radius, 1.4 * radius, 1.0))
         )
-    place = f"{start[0]:.4f} {start[1]:.4f} 0 0 0 {start[2]:.4f}"
-    sdf = (
-        "<sdf version='1.9' xmlns:ruedo='urn:ruedo'>"
-        f"<world name='room-{number}'>"
-        "<physics type='bullet'><max_step_size>0.005</max_step_size></physics>"
-        "<include><uri>model://ground_plane</uri></include>"
-        f"<include><uri>model://{robot}</uri><name>robot</name><pose>{place}</pose></include>{''.join(models)}</world></sdf>"
+    return Room(
+        number, _world(f"room-{number}", [_robot("robot", robot, start), *models]), start, goal
     )
-    return Room(number, sdf, start, goal)
+
+
+def _square(size: float) -> list[str]:
+    walls = [
+        (0, size / 2, 0),
+        (0, -size / 2, 0),
+        (size / 2, 0, 1.5707963),
+        (-size / 2, 0, 1.5707963),
+    ]
+    return [_wall(f"wall{i}", *place, (size + 0.2, 0.1, 1.0)) for i, place in enumerate(walls)]
+
+
+def _robot(name: str, model: str, start: tuple[float, float, float]) -> str:
+    place = f"{start[0]:.4f} {start[1]:.4f} 0 0 0 {start[2]:.4f}"
+    return f"<include><uri>model://{model}</uri><name>{name}</name><pose>{place}</pose></include>"
+
+
+def _world(name: str, models: list[str]) -> str:
+    return (
+        "<sdf version='1.9' xmlns:ruedo='urn:ruedo'>"
+        f"<world name='{name}'>"
+        "<physics type='bullet'><max_step_size>0.005</max_step_size></physics>"
+        "<include><uri>model://sun</uri></include><include><uri>model://ground_plane</uri></include>"
+        f"{''.join(models)}</world></sdf>"
+    )
+
+
+def _between(draw: random.Random) -> Callable[[float, float], float]:
+    # random.Random's own numbers for one seed are promised to stay; shuffle() and the like are not,
+    # so only random() is used.
+    return lambda low, high: low + (high - low) * draw.random()
+
+
+def make_corridor(number: int, robot: str = "p3at", pieces: int = 6) -> Corridor:
+    """The corridor of that number: straight pieces of 2 to 3 m, each turned by up to 50 degrees
+    against the x axis, 1.6 to 2.4 m wide.
+    """
+    between = _between(random.Random(number))
+    width = between(1.6, 2.4)
+    middle, headings = [(0.0, 0.0)], []
+    for _ in range(pieces):
+        headings.append(between(-0.87, 0.87))
+        length, (x, y) = between(2.0, 3.0), middle[-1]
+        middle.append((x + length * math.cos(headings[-1]), y + length * math.sin(headings[-1])))
+    # The walls' corners lie on the lines that halve the angles of the middle's.
+    at_corners = [headings[0], *((a + b) / 2 for a, b in pairwise(headings)), headings[-1]]
+    opened = [
+        0.0,
+        *((b - a) / 2 for a, b in pairwise(headings)),
+        0.0,
+    ]
+    models = []
+    for side in (1, -1):
+        corners = [
+            (
+                x - side * width / 2 / math.cos(half) * math.sin(heading),
+                y + side * width / 2 / math.cos(half) * math.cos(heading),
+            )
+            for (x, y), heading, half in zip(middle, at_corners, opened)
+        ]
+        back = (corners[0][0] - math.cos(headings[0]), corners[0][1] - math.sin(headings[0]))
+        for i, (a, b) in enumerate(zip([back, *corners], corners)):
+            models.append(_wall_between(f"wall{side}_{i}", a, b))
+    end = (-math.cos(headings[0]), -math.sin(headings[0]))
+    across = (-math.sin(headings[0]) * width / 2, math.cos(headings[0]) * width / 2)
+    models.append(
+        _wall_between(
+            "wall_back",
+            (end[0] - across[0], end[1] - across[1]),
+            (end[0] + across[0], end[1] + across[1]),
+        )
+    )
+    start = (0.0, between(-0.1, 0.1), headings[0] + between(-0.3, 0.3))
+    sdf = _world(f"corridor-{number}", [_robot("robot", robot, start), *models])
+    return Corridor(number, sdf, tuple(middle), width)
+
+
+def _wall_between(name: str, a: tuple[float, float], b: tuple[float, float]) -> str:
+    x, y = (a[0] + b[0]) / 2, (a[1] + b[1]) / 2
+    heading = math.atan2(b[1] - a[1], b[0] - a[0])
+    return _wall(name, x, y, heading, (math.dist(a, b) + 0.1, 0.1, 1.0))
+
+
+BOX_M = 0.4
+
+
+def make_push_room(number: int, robot: str = "p3at", size: float = 6.0) -> PushRoom:
+    """The room of that number: a square with a box of 0.4 m and 3 kg near its middle, a place for
+    it, and a robot.
+    """
+    between = _between(random.Random(number))
+    box = (between(-1.2, 1.2), between(-1.2, 1.2), between(-3.1, 3.1))
+    goal, start = box[:2], box
+    while math.dist(goal, box[:2]) < 0.8 or math.dist(goal, box[:2]) > 1.6:
+        goal = (between(-2.0, 2.0), between(-2.0, 2.0))
+    while math.dist(start[:2], box[:2]) < 1.0:
+        start = (between(-2.2, 2.2), between(-2.2, 2.2), between(-3.1, 3.1))
+    inertia = 3.0 * BOX_M * BOX_M / 6.0
+    # With a sensor it is a robot that only senses, and so has a pose that can be observed.
+    model = (
+        f"<model name='box'><pose>{box[0]:.4f} {box[1]:.4f} {BOX_M / 2} 0 0 {box[2]:.4f}</pose><link name='link'>"
+        f"<inertial><mass>3</mass><inertia><ixx>{inertia:.5f}</ixx><iyy>{inertia:.5f}</iyy><izz>{inertia:.5f}</izz></inertia></inertial>"
+        f"<collision name='c'><geometry><box><size>{BOX_M} {BOX_M} {BOX_M}</size></box></geometry>"
+        "<surface><friction><ode><mu>0.4</mu><mu2>0.4</mu2></ode></friction></surface></collision>"
+        f"<visual name='v'><geometry><box><size>{BOX_M} {BOX_M} {BOX_M}</size></box></geometry>{_colour(0.9, 0.6, 0.1)}</visual>"
+        "<sensor name='imu' type='imu'><update_rate>10</update_rate></sensor></link></model>"
+    )
+    place = (
+        f"<model name='place'><static>true</static><pose>{goal[0]:.4f} {goal[1]:.4f} 0.003 0 0 0</pose><link name='link'>"
+        f"<visual name='v'><geometry><cylinder><radius>0.3</radius><length>0.004</length></cylinder></geometry>{_colour(0.1, 0.7, 0.2)}"
+        "</visual></link></model>"
+    )
+    models = [_robot("robot", robot, start), model, place, *_square(size)]
+    return PushRoom(number, _world(f"push-{number}", models), start, goal, box)
+
+
+def _colour(red: float, green: float, blue: float) -> str:
+    rgb = f"{red:.3f} {green:.3f} {blue:.3f} 1"
+    return f"<material><ambient>{rgb}</ambient><diffuse>{rgb}</diffuse></material>"
+
+
+def make_landmark_room(number: int, robot: str = "p3at", size: float = 6.0) -> Room:
+    """The room of that number: a square with a red pillar, the goal, and four others of other
+    colours.
+    """
+    draw = random.Random(number)
+    between = _between(draw)
+    reach = size / 2 - 0.8
+    start = (between(-reach, reach), between(-reach, reach), between(-3.1, 3.1))
+    places: list[tuple[float, float]] = []
+    while len(places) < 5:
+        place = (between(-reach, reach), between(-reach, reach))
+        others = [start[:2], *places]
+        if math.dist(place, start[:2]) > 1.5 and all(math.dist(place, o) > 1.2 for o in others):
+            places.append(place)
+    models = [_robot("robot", robot, start), *_square(size)]
+    for i, (x, y) in enumerate(places):
+        hue = (0.85, 0.05, 0.05) if i == 0 else (0.1, between(0.2, 0.9), between(0.2, 0.9))
+        models.append(_pillar(f"pillar{i}", x, y, 0.2, _colour(*hue)))
+    return Room(number, _world(f"landmark-{number}", models), start, places[0])
+
+
+def make_fleet_room(
+    number: int, robots: int, robot: str = "p3at", size: float = 10.0
+) -> tuple[Scene, list[tuple[float, float]]]:
+    """An empty square with robots on places of a grid, and goals on others: of each robot."""
+    draw = random.Random(number)
+    between = _between(draw)
+    aside = math.ceil(math.sqrt(2 * robots))
+    cell = (size - 1.0) / aside
+    free = [
+        ((i % aside + 0.5) * cell - (size - 1.0) / 2, (i // aside + 0.5) * cell - (size - 1.0) / 2)
+        for i in range(aside * aside)
+    ]
+    taken = [free.pop(int(draw.random() * len(free))) for _ in range(2 * robots)]
+    models = [
+        _robot(f"robot{i}", robot, (*place, between(-3.1, 3.1)))
+        for i, place in enumerate(taken[:robots])
+    ]
+    scene = Scene(number, _world(f"fleet-{number}", [*models, *_square(size)]))
+    return scene, taken[robots:]

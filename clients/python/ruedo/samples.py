@@ -193,6 +193,13 @@ class Odometry(Sample):
     ticks: NDArray[np.int64]  # (n,) encoder counts
     resets: int  # how often the pose was reset
 
+    @property
+    def heading(self) -> float:
+        """theta, wrapped as Pose.heading is: rad, counter-clockwise from odom's x axis, in [-pi,
+        pi].
+        """
+        return math.remainder(self.theta, math.tau)
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Pose(Sample):

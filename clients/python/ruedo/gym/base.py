@@ -1,0 +1,302 @@
+"""What the tasks have in common: episodes in the copies of one engine, Gymnasium's modes of
+autoreset, pictures of the scene.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from ..engine import Engine
+from ..rooms import TEST_ROOMS, Scene
+
+if TYPE_CHECKING:
+    from .console import Console
+
+STEPS = 20  # of the world in an action: 0.1 s
+PICTURE = 256  # pixels, the width and height of a rendered frame
+MODES = (None, "rgb_array", "human")
+
+Info = dict[str, Any]
+Outcome = tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]
+
+
+class TaskVectorEnv(VectorEnv):  # type: ignore[misc]    # gymnasium's generics
+    """``num_envs`` episodes of a task, each in a scene of its own.
+
+    A task says which scene has which number (`_scene`), what an action commands (`_commands`), what
+    came of it (`_outcome`) and what is observed (`_observe`).
+    """
+
+    metadata: ClassVar[Info] = {  # type: ignore[misc]
+        "render_modes": ["rgb_array", "human"],
+        "render_fps": 10,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+    most_actions = 400
+
+    def __init__(
+        self,
+        num_envs: int,
+        observations: spaces.Space[Any],
+        actions: spaces.Space[Any],
+        *,
+        split: Literal["train", "test"],
+        noise: bool,
+        threads: int,
+        autoreset_mode: AutoresetMode | str,
+        render_mode: Literal["rgb_array", "human"] | None,
+        settings: dict[str, object] | None = None,
+        disabled: tuple[str, ...] = (),
+        randomize: dict[str, str] | None = None,
+    ) -> None:
+        if split not in ("train", "test"):
+            raise ValueError(f"split is {split!r}; allowed are 'train' and 'test'")
+        if render_mode not in MODES:
+            raise ValueError(
+                f"render_mode is {render_mode!r}; allowed are None, 'rgb_array' and 'human'"
+            )
+        if render_mode == "human" and num_envs != 1:
+            raise ValueError("render_mode 'human' is for one environment: the console shows one")
+        self.num_envs = num_envs
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
+        self.render_mode = render_mode
+        self.single_observation_space = observations
+        self.single_action_space = actions
+        self.observation_space = batch_space(observations, num_envs)
+        self.action_space = batch_space(actions, num_envs)
+        self._first = 0 if split == "train" else TEST_ROOMS
+        self._options: Info = {
+            "set": settings or {},
+            "disable": list(disabled),
+            "noise": noise,
+            "randomize": randomize or {},
+        }
+        scene = self._scene(self._first)
+        self._scenes = [scene] * num_envs
+        self._engine = Engine(
+            type(self).__name__,
+            text=self._text(scene),
+            worlds=num_envs,
+            threads=threads,
+            **self._options,
+        )
+        self._console: Console | None = None
+        self._places = self._engine.observe("pose.pos")
+        self._turned = self._engine.observe("pose.orientation")
+        self._frames = (
+            self._engine.observe("overview.data")[:, 0] if render_mode == "rgb_array" else None
+        )
+        self._actions = np.zeros(num_envs, int)
+        self._over = np.ones(num_envs, bool)  # wait for a reset
+
+    # ---- What a task says.
+
+    def _scene(self, number: int) -> Scene:
+        """The scene of that number."""
+        raise NotImplementedError
+
+    def _begun(self, indices: NDArray[np.intp]) -> None:
+        """New episodes have begun in these environments."""
+
+    def _commands(self, actions: NDArray[Any]) -> NDArray[np.float64]:
+        """(environments, robots, (m/s, rad/s))"""
+        raise NotImplementedError
+
+    def _outcome(self) -> Outcome:
+        """Rewards, who has succeeded, who has failed."""
+        raise NotImplementedError
+
+    def _observe(self) -> NDArray[Any]:
+        raise NotImplementedError
+
+    # ---- Gymnasium's interface.
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: Info | None = None
+    ) -> tuple[NDArray[Any], Info]:
+        """Begins new episodes in all environments, or where ``options["reset_mask"]`` says."""
+        if isinstance(seed, list):
+            self._generators = [np.random.default_rng(one) for one in seed]
+        elif seed is not None or not hasattr(self, "_generators"):
+            self._generators = [
+                np.random.default_rng(None if seed is None else seed + i)
+                for i in range(self.num_envs)
+            ]
+        mask = (
+            np.ones(self.num_envs, bool)
+            if not options or "reset_mask" not in options
+            else np.asarray(options["reset_mask"], bool)
+        )
+        self._begin(np.flatnonzero(mask))
+        return self._observe(), {}
+
+    def step(
+        self, actions: NDArray[Any]
+    ) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Info]:
+        """One action of 0.1 s in every environment."""
+        begun = None  # these show their beginning: their first action is the next one
+        if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._over.any():
+            begun = self._over.copy()
+            self._begin(np.flatnonzero(begun))
+        commands = self._commands(actions)
+        if begun is not None:
+            commands[begun] = np.nan
+        self._engine.step(commands, STEPS, worlds=None if begun is None else ~begun)
+        if self._console:
+            self._console.step(commands[0])
+        self._actions += 1
+        rewards, success, failure = self._outcome()
+        if begun is not None:
+            rewards[begun], success[begun], failure[begun] = 0.0, False, False
+            self._actions[begun] = 0
+        terminated = success | failure
+        truncated = (self._actions >= self.most_actions) & ~terminated
+        self._over = terminated | truncated
+        info: Info = {"success": success, "collision": failure}
+        observations = self._observe()
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
+            observations = self._begin_at_once(observations, info)
+        return observations, rewards, terminated, truncated, info
+
+    def _begin_at_once(self, observations: NDArray[Any], info: Info) -> NDArray[Any]:
+        info["final_obs"] = np.full(self.num_envs, None, object)
+        for i in np.flatnonzero(self._over):
+            info["final_obs"][i] = observations[i]
+        info["final_info"] = {name: info[name].copy() for name in ("success", "collision")}
+        info["_final_obs"] = info["_final_info"] = self._over.copy()
+        self._begin(np.flatnonzero(self._over))
+        return self._observe()
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Seen from above: a picture of (256, 256, 3) for each environment; None where the console
+        shows it.
+        """
+        if self._frames is None:
+            return None
+        return tuple(self._frames.reshape(self.num_envs, PICTURE, PICTURE, 3).copy())
+
+    def close_extras(self, **_: object) -> None:
+        if self._console:
+            self._console.close()
+        self._engine.close()
+
+    @property
+    def scenes(self) -> list[Any]:
+        """The scene of each environment's episode."""
+        return list(self._scenes)
+
+    def _begin(self, indices: NDArray[np.intp]) -> None:
+        seeds = []
+        for i in indices:
+            draw = self._generators[i].integers
+            self._scenes[i] = self._scene(self._first + int(draw(TEST_ROOMS)))
+            seeds.append(int(draw(2**31)))
+        texts = [self._text(self._scenes[i]) for i in indices]
+        self._engine.reset(indices, seed=seeds, text=texts)
+        self._actions[indices] = 0
+        self._over[indices] = False
+        self._begun(indices)
+        if self.render_mode == "human":
+            self._show(texts[0], seeds[0])
+
+    def _show(self, text: str, seed: int) -> None:
+        from .console import Console
+
+        if self._console is None:
+            self._console = Console()
+        self._console.begin(text, seed, self._options, self._engine.robots)
+
+    def _text(self, scene: Scene) -> str:
+        return scene.seen_from_above() if self.render_mode == "rgb_array" else scene.sdf
+
+    def _headings(self, robot: int = 0) -> NDArray[np.float64]:
+        w, x, y, z = self._turned[:, robot].T
+        heading: NDArray[np.float64] = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        return heading
+
+
+class TaskEnv(gymnasium.Env):  # type: ignore[misc]
+    """One episode of a task at a time."""
+
+    metadata: ClassVar[Info] = {"render_modes": ["rgb_array", "human"], "render_fps": 10}
+    task: type[TaskVectorEnv]
+
+    def __init__(
+        self, render_mode: Literal["rgb_array", "human"] | None = None, **options: Any
+    ) -> None:
+        self._one = self.task(
+            num_envs=1, autoreset_mode=AutoresetMode.DISABLED, render_mode=render_mode, **options
+        )
+        self.observation_space = self._one.single_observation_space
+        self.action_space = self._one.single_action_space
+        self.render_mode = render_mode
+
+    def reset(
+        self, *, seed: int | None = None, options: Info | None = None
+    ) -> tuple[NDArray[Any], Info]:
+        super().reset(seed=seed)
+        observations, _ = self._one.reset(seed=seed)
+        return observations[0], {}
+
+    def step(self, action: NDArray[Any]) -> tuple[NDArray[Any], float, bool, bool, Info]:
+        observations, rewards, terminated, truncated, info = self._one.step(
+            np.asarray(action)[None]
+        )
+        return (
+            observations[0],
+            float(rewards[0]),
+            bool(terminated[0]),
+            bool(truncated[0]),
+            {name: bool(values[0]) for name, values in info.items()},
+        )
+
+    def render(self) -> NDArray[np.uint8] | None:
+        frames = self._one.render()
+        return None if frames is None else frames[0]
+
+    @property
+    def scene(self) -> Any:
+        """The scene of this episode."""
+        return self._one.scenes[0]
+
+    def close(self) -> None:
+        self._one.close()
+
+
+SPEED_M_S = 0.5
+TURN_RAD_S = 1.0
+RANGE_M = 8.0
+
+
+def drive_commands(actions: NDArray[Any]) -> NDArray[np.float64]:
+    """Actions in [-1, 1]: the speed ahead, from 0 to 0.5 m/s, and the turn rate, 1 rad/s at 1."""
+    wanted = np.clip(np.asarray(actions, np.float64).reshape(-1, 2), -1.0, 1.0)
+    commands = np.empty((len(wanted), 1, 2))
+    commands[:, 0, 0] = (wanted[:, 0] + 1.0) * (0.5 * SPEED_M_S)
+    commands[:, 0, 1] = wanted[:, 1] * TURN_RAD_S
+    return commands
+
+
+def seen(ranges: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A scan as a network likes it: divided by 8 m and cut at 1; what is nearer than the device can
+    measure is 0.
+    """
+    scaled: NDArray[np.float32] = np.clip(ranges * np.float32(1.0 / RANGE_M), 0.0, 1.0)
+    return scaled
+
+
+def checked_beams(beams: int) -> int:
+    if not 2 <= beams <= 1024:
+        raise ValueError(f"beams is {beams}; allowed are 2 to 1024")
+    return beams
+
+
+DRIVE = spaces.Box(-1.0, 1.0, (2,), np.float32)

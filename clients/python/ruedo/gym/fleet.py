@@ -1,0 +1,166 @@
+"""FleetEnv: several Pioneers in one room, each with a goal of its own, as a parallel environment of
+PettingZoo.
+
+Observations and actions are those of Navigate-v0, for each robot; its scan sees the others.
+Rewards, too, but that touching something costs 5 and ends the episode of that robot, which then
+stands where it is, seen by the others. ``infos[robot]`` has ``success`` and ``collision``.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+from pettingzoo import ParallelEnv
+
+from ..engine import Engine
+from ..rooms import TEST_ROOMS, make_fleet_room
+from .base import DRIVE, PICTURE, STEPS, checked_beams, drive_commands
+from .navigate import GOAL_M, LIMITS, observation
+
+Each = dict[str, Any]
+
+
+class FleetEnv(ParallelEnv):  # type: ignore[misc]    # PettingZoo's generics
+    """``robots`` of them, called robot0, robot1, ..."""
+
+    metadata: ClassVar[Each] = {
+        "name": "ruedo_fleet_v0",
+        "render_modes": ["rgb_array"],
+        "render_fps": 10,
+    }
+    most_actions = 600
+
+    def __init__(
+        self,
+        robots: int = 4,
+        *,
+        beams: int = 24,
+        split: Literal["train", "test"] = "train",
+        noise: bool = True,
+        render_mode: Literal["rgb_array"] | None = None,
+    ) -> None:
+        if not 1 <= robots <= 32:
+            raise ValueError(f"robots is {robots}; allowed are 1 to 32")
+        if split not in ("train", "test"):
+            raise ValueError(f"split is {split!r}; allowed are 'train' and 'test'")
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"render_mode is {render_mode!r}; allowed are None and 'rgb_array'")
+        self.possible_agents = [f"robot{i}" for i in range(robots)]
+        self.agents: list[str] = []
+        self.render_mode = render_mode
+        low = np.concatenate([np.zeros(checked_beams(beams) + 1), -LIMITS[1:]]).astype(np.float32)
+        high = np.concatenate([np.ones(beams), LIMITS]).astype(np.float32)
+        self._spaces = {
+            name: spaces.Box(low, high, dtype=np.float32) for name in self.possible_agents
+        }
+        self._drives = {
+            name: spaces.Box(DRIVE.low, DRIVE.high, dtype=np.float32)
+            for name in self.possible_agents
+        }
+        self._first = 0 if split == "train" else TEST_ROOMS
+        self._generator = np.random.default_rng()
+        self._engine = Engine(
+            "FleetEnv",
+            text=self._text(0),
+            noise=noise,
+            set={
+                f"{name}/lrf.lidar.scan.horizontal.samples": beams for name in self.possible_agents
+            },
+            disable=[
+                f"{name}/{device}"
+                for name in self.possible_agents
+                for device in ("camera", "sonar_front", "sonar_rear")
+            ],
+        )
+        observe = self._engine.observe
+        self._places, self._turned = observe("pose.pos")[0], observe("pose.orientation")[0]
+        self._ranges = observe("lrf.ranges")[0]
+        self._speed, self._turn = observe("odometry.v")[0], observe("odometry.omega")[0]
+        self._touching = self._engine.touching()[0]
+        self._actions = 0
+
+    def observation_space(self, agent: str) -> spaces.Box:
+        return self._spaces[agent]
+
+    def action_space(self, agent: str) -> spaces.Box:
+        return self._drives[agent]
+
+    def reset(self, seed: int | None = None, options: Each | None = None) -> tuple[Each, Each]:
+        if seed is not None:
+            self._generator = np.random.default_rng(seed)
+        number = int(self._generator.integers(TEST_ROOMS))
+        self._engine.reset(
+            0, seed=int(self._generator.integers(2**31)), text=self._text(self._first + number)
+        )
+        self.agents = list(self.possible_agents)
+        self._actions = 0
+        self._distance = self._distances()
+        return self._of_agents(self._observations()), {name: {} for name in self.agents}
+
+    def step(self, actions: Each) -> tuple[Each, Each, Each, Each, Each]:
+        commands = np.zeros((1, len(self.possible_agents), 2))
+        for i, name in enumerate(self.possible_agents):
+            if name in self.agents:
+                commands[0, i] = drive_commands(actions[name])[0, 0]
+        self._engine.step(commands, STEPS)
+        self._actions += 1
+        before, self._distance = self._distance, self._distances()
+        success = self._distance < GOAL_M
+        collision = (self._touching > 0) & ~success
+        rewards = before - self._distance + 5.0 * success - 5.0 * collision - 0.01
+        over = success | collision
+        late = np.full(len(over), self._actions >= self.most_actions) & ~over
+        infos = {
+            name: {"success": bool(success[i]), "collision": bool(collision[i])}
+            for i, name in enumerate(self.possible_agents)
+            if name in self.agents
+        }
+        result = (
+            self._of_agents(self._observations()),
+            self._of_agents(rewards.tolist()),
+            self._of_agents(over.tolist()),
+            self._of_agents(late.tolist()),
+            infos,
+        )
+        self.agents = [
+            name
+            for i, name in enumerate(self.possible_agents)
+            if name in self.agents and not over[i] and not late[i]
+        ]
+        return result
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Seen from above, (256, 256, 3)."""
+        if self.render_mode is None:
+            return None
+        frame: NDArray[np.uint8] = self._engine.observe("overview.data")[0, 0]
+        return frame.reshape(PICTURE, PICTURE, 3).copy()
+
+    def close(self) -> None:
+        self._engine.close()
+
+    def _text(self, number: int) -> str:
+        scene, self._goals = make_fleet_room(number, len(self.possible_agents))
+        return scene.seen_from_above() if self.render_mode else scene.sdf
+
+    def _distances(self) -> NDArray[np.float64]:
+        count = len(self.possible_agents)
+        distances: NDArray[np.float64] = np.linalg.norm(
+            np.array(self._goals) - self._places[:count, :2], axis=1
+        )
+        return distances
+
+    def _observations(self) -> NDArray[np.float32]:
+        count = len(self.possible_agents)
+        w, x, y, z = self._turned[:count].T
+        heading = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        to_goal = np.array(self._goals) - self._places[:count, :2]
+        return observation(self._ranges, to_goal, heading, self._speed, self._turn)
+
+    def _of_agents(self, values: Any) -> Each:
+        return {
+            name: values[i] for i, name in enumerate(self.possible_agents) if name in self.agents
+        }

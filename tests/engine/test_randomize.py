@@ -1,0 +1,158 @@
+"""Domain randomisation: what is drawn, that it acts, and that a reset equals a fresh engine."""
+
+import math
+
+import numpy as np
+import pytest
+import ruedo
+
+ARENA = {"world": "arena", "disable": ["p3at/camera", "p3at/sonar_front", "p3at/sonar_rear"]}
+ALL = {
+    "p3at.x": "uniform(-3, 3)",
+    "p3at.y": "uniform(-3, 3)",
+    "p3at.yaw": "uniform(-3.1, 3.1)",
+    "p3at.mass": "uniform(0.8, 1.3)",
+    "p3at/lrf.lidar.noise.stddev": "log_uniform(0.003, 0.03)",
+    "p3at/odometry.track_error": "normal(0, 0.02)",
+    "ground_plane.friction": "choice(0.4, 0.7, 1.0)",
+    "sun.brightness": "uniform(0.5, 1.5)",
+}
+
+
+def observed(engine):
+    return {
+        name: engine.observe(name)
+        for name in ("lrf.ranges", "pose.pos", "pose.orientation", "odometry.x", "odometry.theta")
+    }
+
+
+# Several copies at once, each drawn, driven and begun anew, against a fresh engine each: 1 000
+# episodes.
+def test_a_reset_equals_a_fresh_start_over_1000_episodes():
+    worlds, rounds = 50, 20
+    settings = {"p3at/lrf.lidar.scan.horizontal.samples": 5}
+    generator = np.random.default_rng(1)
+    with ruedo.Engine(**ARENA, worlds=worlds, set=settings, randomize=ALL) as used:
+        seen = observed(used)
+        for round in range(rounds):
+            seeds = [int(seed) for seed in generator.integers(2**31, size=worlds)]
+            used.step(generator.uniform(-0.5, 0.5, (worlds, 1, 2)), 7)
+            used.reset(generator.permutation(worlds), seed=seeds)
+            order = {used.drawn(i)["p3at.x"]: i for i in range(worlds)}
+            commands = generator.uniform(-0.5, 0.5, 2)
+            used.step(commands, 5)
+            with ruedo.Engine(
+                **ARENA, worlds=1, seed=seeds[round], set=settings, randomize=ALL
+            ) as fresh:
+                again = observed(fresh)
+                same = order[fresh.drawn()["p3at.x"]]
+                assert used.drawn(same) == fresh.drawn()
+                fresh.step(commands, 5)
+                assert used.state_hash(same) == fresh.state_hash()
+                for name, array in seen.items():
+                    assert np.array_equal(array[same], again[name][0]), name
+                for seed in seeds:  # every episode: the fresh engine's copy begins with that seed
+                    fresh.reset(0, seed=seed)
+                    copy = order[fresh.drawn()["p3at.x"]]
+                    fresh.step(commands, 5)
+                    assert used.state_hash(copy) == fresh.state_hash()
+                    for name, array in seen.items():
+                        assert np.array_equal(array[copy], again[name][0]), name
+
+
+def test_what_is_drawn_follows_its_distribution():
+    worlds = 400
+    draws = {
+        "p3at.yaw": "uniform(-1, 1)",
+        "p3at.mass": "log_uniform(0.5, 2)",
+        "p3at.friction": "normal(1, 0.1)",
+        "ground_plane.friction": "choice(0.25, 0.5)",
+    }
+    with ruedo.Engine(**ARENA, worlds=worlds, noise=False, randomize=draws) as engine:
+        drawn = [engine.drawn(i) for i in range(worlds)]
+        orientation = engine.observe("pose.orientation")[:, 0]
+    yaw = np.array([one["p3at.yaw"] for one in drawn])
+    assert yaw.min() >= -1 and yaw.max() <= 1
+    assert yaw.mean() == pytest.approx(0, abs=4 / math.sqrt(3 * worlds))
+    assert yaw.var() == pytest.approx(1 / 3, rel=0.2)
+    np.testing.assert_allclose(2 * np.arctan2(orientation[:, 3], orientation[:, 0]), yaw, atol=1e-9)
+    mass = np.log2([one["p3at.mass"] for one in drawn])
+    assert abs(mass).max() <= 1 and mass.mean() == pytest.approx(0, abs=4 / math.sqrt(3 * worlds))
+    friction = np.array([one["p3at.friction"] for one in drawn])
+    assert friction.mean() == pytest.approx(1, abs=0.02)
+    assert friction.std() == pytest.approx(0.1, rel=0.2)
+    ground = [one["ground_plane.friction"] for one in drawn]
+    assert set(ground) == {0.25, 0.5} and 140 < ground.count(0.25) < 260
+
+
+# A value is its target's and its seed's: other draws and their order change nothing of it.
+def test_a_draw_depends_on_seed_and_target_alone():
+    with (
+        ruedo.Engine(**ARENA, seed=9, randomize={"p3at.mass": "uniform(1, 2)"}) as alone,
+        ruedo.Engine(
+            **ARENA, seed=9, randomize=dict(reversed(ALL.items())) | {"p3at.mass": "uniform(1, 2)"}
+        ) as among,
+    ):
+        assert alone.drawn()["p3at.mass"] == among.drawn()["p3at.mass"]
+        assert list(among.drawn()) != []
+
+
+def test_settings_are_as_with_set():
+    with ruedo.Engine(
+        **ARENA, seed=3, randomize={"p3at/lrf.lidar.range.max": "uniform(2, 3)"}
+    ) as drawn:
+        limit = drawn.drawn()["p3at/lrf.lidar.range.max"]
+        with ruedo.Engine(**ARENA, seed=3, set={"p3at/lrf.lidar.range.max": repr(limit)}) as told:
+            assert np.array_equal(drawn.observe("lrf.ranges"), told.observe("lrf.ranges"))
+
+
+@pytest.mark.parametrize(
+    "draws, text",
+    [
+        ({"p3at.x": "uniform(1)"}, "it looks like TARGET=uniform(LOW,HIGH)"),
+        ({"p3at.x": "uniform(2, 1)"}, "HIGH must not be below LOW"),
+        ({"p3at.mass": "log_uniform(0, 1)"}, "LOW must be above 0"),
+        ({"p3at.mass": "normal(1, -1)"}, "STDDEV must not be negative"),
+        ({"p3at.mass": "normal(-1, 0)"}, "must not be negative"),
+        ({"p3at.colour": "uniform(0, 1)"}, "TARGET is MODEL.x"),
+        ({"p3at.x": "triangle(0, 1)"}, "it looks like"),
+        ({"p3at.x": "uniform(0, nan)"}, "it looks like"),
+        ({"p3dx.x": "uniform(0, 1)"}, "there is no model 'p3dx'"),
+        ({"moon.brightness": "uniform(0, 1)"}, "there is no light 'moon'"),
+        ({"p3at/lrf.no_such": "uniform(0, 1)"}, "there is no 'no_such'"),
+        ({"p3at.x": "choice(500)"}, None),
+        (
+            {"p3at.x": "choice(0)", "p3at.y": "choice(0)", "p3at.z": "choice(-0.3)"},
+            "no place that is free",
+        ),
+    ],
+)
+def test_wrong_descriptions_are_refused(draws, text):
+    if text is None:
+        ruedo.Engine(**ARENA, randomize=draws).close()
+        return
+    with pytest.raises(ValueError) as caught:
+        ruedo.Engine(**ARENA, randomize=draws)
+    assert text in str(caught.value)
+
+
+def test_texts_that_come_again_are_read_once_and_differ():
+    from ruedo.rooms import make_room
+
+    rooms = [make_room(i) for i in range(3)]
+    with ruedo.Engine("room", text=rooms[0].sdf, worlds=3, noise=False) as engine:
+        place = engine.observe("pose.pos")[:, 0, :2]
+        for _ in range(2):
+            engine.reset(text=[room.sdf for room in rooms])
+            np.testing.assert_allclose(place, [room.start[:2] for room in rooms], atol=1e-4)
+        before = engine.state_hash(0)
+        engine.step([0.2, 0.0], 10, worlds=np.array([False, True, True]))
+        assert engine.state_hash(0) == before and [engine.steps(i) for i in range(3)] == [0, 10, 10]
+        with pytest.raises(ValueError, match="2 texts for 3 worlds"):
+            engine.reset(text=["", ""])
+        with pytest.raises(ValueError, match="reset twice"):
+            engine.reset([1, 1])
+        with pytest.raises(ValueError):
+            engine.reset(0, text="<sdf version='1.9'><world/>")
+        engine.reset(0, text=rooms[1].sdf)  # a text that was refused leaves nothing behind
+        np.testing.assert_allclose(place[0], rooms[1].start[:2], atol=1e-4)
