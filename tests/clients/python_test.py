@@ -376,3 +376,21 @@ def test_degrees_are_warned_of():
         warnings.simplefilter("error")
         for angle in (math.pi, 3 * math.pi, 2, -6, 13.37):
             _radians("rotate", angle, 4 * math.pi)
+
+
+def test_show_opens_the_console_of_its_server(monkeypatch):
+    import webbrowser
+    from urllib.request import urlopen
+
+    opened = []
+    monkeypatch.setattr(webbrowser, "open", opened.append)
+    with ruedo.launch(HALL, view=True, **QUICK) as sim:
+        address = sim.show()
+        assert opened == [address]
+        with urlopen(address, timeout=PATIENCE) as page:
+            assert page.status == 200 and "text/html" in page.headers["Content-Type"]
+    with (
+        ruedo.launch(HALL, **QUICK) as sim,
+        pytest.raises(ruedo.NotSupported, match="view=True"),
+    ):
+        sim.show()

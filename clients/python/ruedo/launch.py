@@ -73,6 +73,7 @@ def launch(
     disable: Sequence[str] = (),
     set: Mapping[str, object] | None = None,
     noise: bool = True,
+    view: bool = False,
 ) -> Simulation:
     """Starts `ruedo run WORLD` and joins it.
 
@@ -84,9 +85,13 @@ def launch(
     values. args: further options of `ruedo run`. url: None takes a local socket, which no other
     user of the machine reads, and plain LCM programs do not know; "auto" a free port for LCM. name:
     of this client. timeout: s of real time until the world is loaded. verbose: show what the server
-    prints (else it is shown in the errors alone). Raises LaunchError with what the server said.
+    prints (else it is shown in the errors alone). view: the web console, which show() of the
+    simulation opens. Raises LaunchError with what the server said.
     """
     options = _options(seed, rate, args, lockstep, spawn, disable, set, noise)
+    port = _free_port() if view else 0
+    if port:
+        options += ["--view", str(port)]
     program = find_ruedo()
     folder = None
     if (world is None) == (text is None):
@@ -121,6 +126,7 @@ def launch(
             server.ended,
             server.end,
             forked=server.forked,
+            view=f"http://127.0.0.1:{port}/" if port else None,
         )
     except NoServer as error:  # with what the server said, when it ended
         server.end()
@@ -128,6 +134,13 @@ def launch(
     except BaseException:
         server.end()
         raise
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
 
 
 def _options(

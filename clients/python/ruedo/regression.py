@@ -74,6 +74,7 @@ def run_regression(
     odometry_error: m. lockstep: clients to wait for. options: more of `ruedo regress`, such as
     ["--spawn", "p3at@1,2"]. folder: where client and script run. timeout: s of real time.
     """
+    __tracebackhide__ = True
     command = [
         find_ruedo(),
         "regress",
@@ -142,6 +143,7 @@ def ruedo_regression(request: pytest.FixtureRequest, tmp_path: Path) -> Callable
     here = request.path.parent
 
     def run(world: _PathLike, **options: Any) -> Regression:
+        __tracebackhide__ = True  # a failure shows the test's own line
         options.setdefault("record", tmp_path / "run.lcm")
         options.setdefault("folder", here)
         if options.get("golden") is not None:

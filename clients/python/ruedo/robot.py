@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 
@@ -247,7 +247,7 @@ class Robot:
 
     def move_command(
         self,
-        kind: str,
+        kind: Literal["advance", "rotate", "heading", "arc", "stop"],
         value: float,
         speed: float = 0.0,
         acceleration: float = 0.0,

@@ -7,12 +7,14 @@ import logging
 import math
 import os
 import struct
+import sys
 import threading
 import time
 import weakref
+import webbrowser
 from collections.abc import Callable, Sequence
 from types import TracebackType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -76,8 +78,10 @@ class Simulation:
         end_server: Callable[[], None] = lambda: None,
         transport: Transport | None = None,
         forked: Callable[[], None] = lambda: None,
+        view: str | None = None,
     ):
         self.url = url
+        self._view = view  # the address of its console
         self._server_ended = server_ended  # why a private server is gone, None while it runs
         self._end_server = end_server
         self._forked = forked
@@ -231,7 +235,19 @@ class Simulation:
         body.rate = rate
         self._session.request(lcmtypes.request_t.RATE, body)
 
-    def reset(self, what: str = "all", seed: int | None = None) -> None:
+    def show(self, width: int | str = "100%", height: int = 500) -> Any:
+        """The console of a server that was launched with ``view=True``: in a notebook below the
+        cell, elsewhere in the browser. Returns the notebook's frame, or the address."""
+        if self._view is None:
+            raise NotSupported("show() needs a console: launch(..., view=True)")
+        if "IPython" in sys.modules and sys.modules["IPython"].get_ipython() is not None:
+            from IPython.display import IFrame  # type: ignore[import-not-found, unused-ignore]
+
+            return IFrame(self._view, width, height)
+        webbrowser.open(self._view)
+        return self._view
+
+    def reset(self, what: Literal["all", "time", "poses"] = "all", seed: int | None = None) -> None:
         """Starts anew. what: "all" (equals a fresh run), "time" (sim time alone) or "poses"
         (everything back to where it started). seed: of what follows, None: the same again."""
         body = lcmtypes.reset_request_t()

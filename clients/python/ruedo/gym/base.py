@@ -4,7 +4,7 @@ autoreset, pictures of the scene.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import gymnasium
 import numpy as np
@@ -27,14 +27,14 @@ Info = dict[str, Any]
 Outcome = tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]
 
 
-class TaskVectorEnv(VectorEnv):  # type: ignore[misc]    # gymnasium's generics
+class TaskVectorEnv(VectorEnv):
     """``num_envs`` episodes of a task, each in a scene of its own.
 
     A task says which scene has which number (`_scene`), what an action commands (`_commands`), what
     came of it (`_outcome`) and what is observed (`_observe`).
     """
 
-    metadata: ClassVar[Info] = {  # type: ignore[misc]
+    metadata: Info = {
         "render_modes": ["rgb_array", "human"],
         "render_fps": 10,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
@@ -223,10 +223,10 @@ class TaskVectorEnv(VectorEnv):  # type: ignore[misc]    # gymnasium's generics
         return heading
 
 
-class TaskEnv(gymnasium.Env):  # type: ignore[misc]
+class TaskEnv(gymnasium.Env):
     """One episode of a task at a time."""
 
-    metadata: ClassVar[Info] = {"render_modes": ["rgb_array", "human"], "render_fps": 10}
+    metadata: Info = {"render_modes": ["rgb_array", "human"], "render_fps": 10}
     task: type[TaskVectorEnv]
 
     def __init__(

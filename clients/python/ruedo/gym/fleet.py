@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
-from pettingzoo import ParallelEnv
+from pettingzoo import ParallelEnv  # type: ignore[import-untyped, unused-ignore]
 
 from ..engine import Engine
 from ..rooms import TEST_ROOMS, make_fleet_room
