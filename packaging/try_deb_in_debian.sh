@@ -5,6 +5,7 @@
 #
 # First as the Containerfile has it, with nothing else there: server, camera, ROS 2, Python. Then with a compiler, CMake and a JDK: C++ and
 # Java. Then it is purged.
+# shellcheck disable=SC2016  # what is quoted is for the shells inside
 set -euo pipefail
 folder=$(realpath "$1") deb=$(realpath "$2") suite=$3
 here=$(dirname "$(realpath "$0")")
@@ -57,7 +58,7 @@ source /usr/share/bash-completion/completions/ruedo
 COMP_WORDS=(ruedo ver) COMP_CWORD=1; _ruedo; test "${COMPREPLY[*]}" = verify
 COMP_WORDS=(ruedo run --rec) COMP_CWORD=2; _ruedo; test "${COMPREPLY[*]}" = --record'
 
-inside 'apt-get -q install --no-install-recommends -y g++ cmake pkg-config default-jdk-headless' >"$folder/$suite.apt.log" 2>&1 ||
+inside 'apt-get -q update >/dev/null; apt-get -q install --no-install-recommends -y g++ cmake pkg-config default-jdk-headless' >"$folder/$suite.apt.log" 2>&1 ||
   { cat "$folder/$suite.apt.log"; exit 1; }
 as_user 'rm -rf cpp && mkdir cpp && cd cpp
 cat > drive.cpp <<CPP
@@ -68,7 +69,7 @@ int main() {
   auto sim = ruedo::client::launch("arena", options);
   auto robot = sim.robot("p3at");
   robot.advance(0.5).wait();
-  std::printf("%.3f from %s\n", robot.pose().latest()->x, options.program.c_str());
+  std::printf("%.3f from %s\n", robot.pose().latest().x(), options.program.c_str());
 }
 CPP
 g++ -std=c++17 drive.cpp -o by-pkg-config $(pkg-config --cflags --libs ruedo) && ./by-pkg-config
@@ -81,7 +82,7 @@ public class Drive {
     try (Simulation sim = Ruedo.launch("arena")) {
       Robot robot = sim.robot("p3at");
       robot.advance(0.5).await(30);
-      System.out.printf("java: %.3f%n", robot.pose().latest().x);
+      System.out.printf("java: %.3f%n", robot.pose().latest().x());
     }
   }
 }

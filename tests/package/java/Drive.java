@@ -15,7 +15,7 @@ public final class Drive {
       System.out.printf(
           "%s %.3f %s%n",
           System.getProperty("java.specification.version"),
-          robot.pose().latest().x,
+          robot.pose().latest().x(),
           Ruedo.class.getModule().isNamed() ? Ruedo.class.getModule().getName() : "class path");
     }
   }
