@@ -21,7 +21,7 @@
 #include "cli/foxglove_server.h"
 #include "cli/listing.h"
 #include "cli/progress_line.h"
-#include "cli/ros2.h"
+#include "cli/run_command.h"
 #include "cli/sandboxed.h"
 #include "cli/view.h"
 #include "core/utf8.h"
@@ -33,24 +33,6 @@
 
 namespace ruedo::cli {
 namespace {
-
-struct RunArguments {
-  WorldArguments world;
-  uint64_t seed = 1;
-  std::string rate, duration, lcm, record, control = "on", lease_policy = "pause";
-  uint64_t record_limit = 0;
-  int lockstep = 0;
-  double lease = 10.0;
-  std::string snapshots, restore;
-  std::vector<std::string> remaps, wait_for;
-  std::string view;
-  bool viewed = false;
-  bool paused = false, quiet = false, watch_stdin = false, sandboxed = false;
-  int threads = 0;
-  Ros2Arguments ros2;
-  bool foxglove = false;
-  std::string foxglove_address;
-};
 
 // Takes SIGINT, SIGTERM, and SIGHUP where it is not ignored (nohup), in a thread of its own: a
 // handler could do next to nothing. Make it before any other thread, which then inherits that the
@@ -179,6 +161,8 @@ run::RunOptions server_options(const RunArguments& arguments) {
     options.wait_for.push_back(parse_wait_for(text));
   if (arguments.lockstep > 0 && !arguments.wait_for.empty())
     throw InputError({}, "--lockstep does not go with --wait-for");
+  options.edited = arguments.viewed;
+  options.save = arguments.save;
   options.snapshots = arguments.snapshots;
   options.repeat = arguments.restore;
   options.simulation.fleet.seed = arguments.seed;
@@ -224,7 +208,9 @@ std::string socket_of(const std::string& lcm) {
   return url.scheme == "unix" ? url.host : "";
 }
 
-int run(const RunArguments& arguments) {
+}  // namespace
+
+int run_world(const RunArguments& arguments) {
   run::RunOptions options = server_options(arguments);
   if (arguments.sandboxed)
     enter_sandbox(model::world_file(arguments.world.world),
@@ -252,7 +238,7 @@ int run(const RunArguments& arguments) {
                     server.findings().list().end());
     print_findings(findings);
     if (!arguments.quiet) print_world(server, *world, place.url);
-    view = viewed.open(server, world->name);
+    view = viewed.open(server, world->name, arguments.save);
     if (node && !arguments.quiet) node->print();
     if (foxglove) foxglove->print();
   });
@@ -275,6 +261,8 @@ int run(const RunArguments& arguments) {
   signals.serve(nullptr);
   return kGood;
 }
+
+namespace {
 
 // "2GB" becomes a number of bytes; what is wrong with it, or "".
 std::string to_bytes(std::string& text) {
@@ -395,7 +383,7 @@ void add_run(CLI::App& app, Action& chosen) {
     arguments->viewed = view->count() > 0;
     arguments->foxglove = foxglove->count() > 0;
     arguments->ros2.on = ros2->count() > 0;
-    chosen = [arguments] { return run(*arguments); };
+    chosen = [arguments] { return run_world(*arguments); };
   });
 }
 

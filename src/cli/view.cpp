@@ -42,14 +42,17 @@ ViewedBus::~ViewedBus() = default;
 
 Bus& ViewedBus::bus() { return impl_ ? impl_->tee : inner_; }
 
-std::shared_ptr<void> ViewedBus::open(run::Run& server, const std::string& title) {
+std::shared_ptr<void> ViewedBus::open(run::Run& server, const std::string& title,
+                                      const std::string& save) {
   if (!impl_) return nullptr;
   std::string info;
   for (const engine::Channel& channel : server.channels().list()) {
     if (channel.name == "ruedo/info") info = channel.bus_name;
   }
-  auto source =
-      std::make_unique<console::LiveSource>(impl_->tee, [&server] { return server.world(); }, info);
+  console::LiveHost host{[&server] { return server.world(); },
+                         [&server](const std::string& name) { return server.model_text(name); },
+                         save.empty() ? "" : std::filesystem::path(save).filename().string()};
+  auto source = std::make_unique<console::LiveSource>(impl_->tee, std::move(host), info);
   auto serving =
       std::make_shared<console::Console>(impl_->address, std::move(source), "live", title);
   print_urls(*serving);
@@ -110,7 +113,9 @@ ViewedBus::~ViewedBus() = default;
 
 Bus& ViewedBus::bus() { return inner_; }
 
-std::shared_ptr<void> ViewedBus::open(run::Run&, const std::string&) { return nullptr; }
+std::shared_ptr<void> ViewedBus::open(run::Run&, const std::string&, const std::string&) {
+  return nullptr;
+}
 
 std::shared_ptr<void> view_log(const std::string&, const std::string&, double) { no_console(); }
 

@@ -24,7 +24,8 @@ class ViewedBus {
 
   // Serves the console for as long as the returned object lives, and prints where. Null without
   // --view. Throws EnvironmentError when the address cannot be had. The server must outlive it.
-  std::shared_ptr<void> open(run::Run& server, const std::string& title);
+  // save: the file that SAVE writes; "" for none.
+  std::shared_ptr<void> open(run::Run& server, const std::string& title, const std::string& save);
 
  private:
   struct Impl;

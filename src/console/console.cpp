@@ -5,12 +5,14 @@
 #include <charconv>
 #include <chrono>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include <pthread.h>
 #include <spdlog/spdlog.h>
 
 #include "console/assets.h"
+#include "console/library.h"
 #include "console/scene_data.h"
 #include "console/viewer.h"
 #include "console/web_server.h"
@@ -34,12 +36,23 @@ HttpResponse not_found() {
   return response;
 }
 
+// The number that stands after that beginning, and nothing behind it.
+std::optional<size_t> number_after(std::string_view begin, std::string_view path) {
+  if (!path.starts_with(begin)) return std::nullopt;
+  path.remove_prefix(begin.size());
+  size_t number = 0;
+  const auto [end, error] = std::from_chars(path.data(), path.data() + path.size(), number);
+  if (error != std::errc() || end != path.data() + path.size()) return std::nullopt;
+  return number;
+}
+
 }  // namespace
 
 struct Console::Impl {
   Stage stage;
   std::shared_ptr<const model::WorldModel> world;
   std::unique_ptr<SceneData> scene;  // of that world; null: not made yet
+  std::unique_ptr<Library> library;  // null: nobody has asked for it
   Playback told;                     // to the viewers
   std::chrono::steady_clock::time_point told_at;
   std::unique_ptr<WebServer> web;
@@ -48,6 +61,9 @@ struct Console::Impl {
   std::string words = "The server has ended.";
 
   HttpResponse get(std::string_view path);
+  HttpResponse scene_file(const SceneData& data, std::string_view path);
+  HttpResponse library_file(std::string_view path);
+  HttpResponse model_text(size_t index);
   HttpResponse blob(Bytes body, const std::string& type);
   bool tick();
   const SceneData* current_scene();
@@ -77,21 +93,42 @@ HttpResponse Console::Impl::get(std::string_view path) {
     response.gzip = true;
     return response;
   }
+  if (path.starts_with("/library"))
+    return library_file(path.substr(std::string_view("/library").size()));
+  if (const auto model = number_after("/scene/models/", path)) return model_text(*model);
   if (!path.starts_with("/scene")) return not_found();
   const SceneData* data = current_scene();
   if (!data) return not_found();
-  if (path == "/scene.json") return blob(bytes_of(data->json), "application/json");
-  if (path == "/scene/meshes") return blob(data->meshes, "application/octet-stream");
-  if (path == "/scene/links") return blob(data->links, "application/octet-stream");
-  constexpr std::string_view kTextures = "/scene/textures/";
-  if (!path.starts_with(kTextures)) return not_found();
-  const std::string_view number = path.substr(kTextures.size());
-  size_t index = 0;
-  const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), index);
-  if (error != std::errc() || end != number.data() + number.size() ||
-      index >= data->pictures.size())
-    return not_found();
-  return blob(data->pictures[index].bytes, data->pictures[index].type);
+  return scene_file(*data, path.substr(std::string_view("/scene").size()));
+}
+
+// A file of a scene: ".json", "/meshes", "/links", "/textures/NUMBER".
+HttpResponse Console::Impl::scene_file(const SceneData& data, std::string_view path) {
+  if (path == ".json") return blob(bytes_of(data.json), "application/json");
+  if (path == "/meshes") return blob(data.meshes, "application/octet-stream");
+  if (path == "/links") return blob(data.links, "application/octet-stream");
+  const auto picture = number_after("/textures/", path);
+  if (!picture || *picture >= data.pictures.size()) return not_found();
+  return blob(data.pictures[*picture].bytes, data.pictures[*picture].type);
+}
+
+// What SPAWN would take to make that model.
+HttpResponse Console::Impl::model_text(size_t index) {
+  if (!world || index >= world->models.size() || world->models[index].removed) return not_found();
+  const std::string text = stage.source->model_text(world->models[index].name);
+  return text.empty() ? not_found() : blob(bytes_of(text), "text/plain; charset=utf-8");
+}
+
+// "/library.json", and of each of its models "/library/NUMBER/scene" with the files of a scene.
+HttpResponse Console::Impl::library_file(std::string_view path) {
+  if (!world || stage.source->playback()) return not_found();
+  if (!library) library = std::make_unique<Library>(world->file);
+  if (path == ".json") return blob(bytes_of(library->list()), "application/json");
+  const size_t end = path.find("/scene");
+  const auto index = number_after("/", path.substr(0, end));
+  const SceneData* data = index ? library->scene(*index) : nullptr;
+  if (!data || end == std::string_view::npos) return not_found();
+  return scene_file(*data, path.substr(end + std::string_view("/scene").size()));
 }
 
 bool Console::Impl::tick() {
@@ -131,6 +168,7 @@ Console::Console(const Address& address, std::unique_ptr<Source> source, const s
       .member("version", version());
   json.member("info", impl.stage.source->info_channel())
       .member("fault", printable(impl.stage.source->fault()))
+      .member("save", printable(impl.stage.source->save_name()))
       .close('}')
       .close('}');
   impl.stage.greeting = json.text();

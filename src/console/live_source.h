@@ -8,13 +8,18 @@
 
 namespace ruedo::console {
 
-using WorldOf = std::function<std::shared_ptr<const model::WorldModel>()>;  // safe from any thread
+// What it asks the run for; from any thread.
+struct LiveHost {
+  std::function<std::shared_ptr<const model::WorldModel>()> world;
+  std::function<std::string(const std::string& name)> model_text;
+  std::string save_name;  // of the file that SAVE writes
+};
 
 class LiveSource : public Source {
  public:
   // The bus must outlive it.
-  LiveSource(TeeBus& bus, WorldOf world, std::string info_channel)
-      : bus_(bus), world_(std::move(world)), info_channel_(std::move(info_channel)) {}
+  LiveSource(TeeBus& bus, LiveHost host, std::string info_channel)
+      : bus_(bus), host_(std::move(host)), info_channel_(std::move(info_channel)) {}
   ~LiveSource() override { bus_.watch(false); }
 
   void pump(Board& board, bool viewers) override {
@@ -37,12 +42,14 @@ class LiveSource : public Source {
   bool command(const std::string& channel, std::span<const uint8_t> message) override {
     return bus_.command(channel, message.data(), message.size());
   }
-  std::shared_ptr<const model::WorldModel> world() override { return world_(); }
+  std::shared_ptr<const model::WorldModel> world() override { return host_.world(); }
+  std::string model_text(const std::string& name) override { return host_.model_text(name); }
+  std::string save_name() const override { return host_.save_name; }
   std::string info_channel() const override { return info_channel_; }
 
  private:
   TeeBus& bus_;
-  WorldOf world_;
+  LiveHost host_;
   std::string info_channel_;
 };
 

@@ -100,6 +100,22 @@ void write_light(JsonWriter& json, const scene::RenderLight& light) {
   json.member("shadows", l.cast_shadows).close('}');
 }
 
+// fast: it stands fast. body: that carries the model; -1: none, and the pose is that in the world.
+void write_model(JsonWriter& json, const model::ModelInstance& instance,
+                 const model::BodyLayout& layout, size_t index) {
+  const model::LinkPlacement& first = layout.links[static_cast<size_t>(layout.first_link[index])];
+  json.open('{')
+      .member("name", instance.name)
+      .member("first_link", layout.first_link[index])
+      .member("links", static_cast<int64_t>(instance.model->links.size()))
+      .member("fast", instance.model->is_static)
+      .member("robot", instance.is_robot())
+      .member("path", instance.model->path != nullptr)
+      .member("body", first.body);
+  list(json.name("pose"), numbers(first.X_BL * instance.model->links[0].X_ML.inverse()).data(), 7);
+  json.close('}');
+}
+
 }  // namespace
 
 SceneData::SceneData(const model::WorldModel& world, int version) {
@@ -164,12 +180,7 @@ SceneData::SceneData(const model::WorldModel& world, int version) {
   out.close(']').name("lights").open('[');
   for (const scene::RenderLight& light : content.lights) write_light(out, light);
   out.close(']').name("models").open('[');
-  for (size_t i = 0; i < world.models.size(); ++i) {
-    out.open('{')
-        .member("name", world.models[i].name)
-        .member("first_link", layout.first_link[i])
-        .close('}');
-  }
+  for (size_t i = 0; i < world.models.size(); ++i) write_model(out, world.models[i], layout, i);
   // The wheels of robots whose wheels are no bodies: link, robot, place among its wheels, a point
   // on the axis, the axis.
   out.close(']').name("wheels").open('[');

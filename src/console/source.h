@@ -43,6 +43,14 @@ class Source {
   // The channel of world_info_t.
   virtual std::string info_channel() const = 0;
 
+  // SDF or URDF of a model of the world, as SPAWN takes it; "" where it is not told.
+  virtual std::string model_text(const std::string& name) {
+    static_cast<void>(name);
+    return {};
+  }
+  // Of the file that SAVE writes; "" for none.
+  virtual std::string save_name() const { return {}; }
+
   // Of logs.
   virtual const Playback* playback() const { return nullptr; }
   virtual void play(bool on, double speed) { static_cast<void>(on), static_cast<void>(speed); }

@@ -10,11 +10,11 @@ void TeeBus::publish(const std::string& channel, const uint8_t* data, size_t siz
 
 void TeeBus::listen(const std::vector<std::string>& channels, Handler handler,
                     const std::vector<std::string>& own) {
-  allow(channels);
   {
     const std::lock_guard lock(handler_mutex_);
     handler_ = std::move(handler);
   }
+  allow(channels);  // what is allowed is heard
   inner_.listen(
       channels,
       [this](const std::string& channel, const uint8_t* data, size_t size) {

@@ -164,23 +164,29 @@ bool Viewer::next_text(std::string& text) {
   return false;
 }
 
-// A frame: its kind (4 bytes), then of each message channel (4 bytes), size (4 bytes), bytes.
+// A frame: its kind (4 bytes), then of each message channel (4 bytes), size (4 bytes), bytes. In
+// the order in which they came, over all channels: an answer is newer than what was said before it.
 bool Viewer::next_messages(std::vector<uint8_t>& frame) {
   if (wanted_names_.empty()) return false;
   match_names();
   const size_t begin = frame.size();
   const auto& channels = stage_.board.channels();
-  for (size_t i = 0; i < sights_.size() && frame.size() - begin < kMostFrame; ++i) {
-    Sight& sight = sights_[i];
-    if (!sight.wanted || sight.sent == channels[i].last_number) continue;
+  std::vector<std::pair<const Board::Message*, size_t>> fresh;  // and the channel
+  for (size_t i = 0; i < sights_.size(); ++i) {
+    if (!sights_[i].wanted || sights_[i].sent == channels[i].last_number) continue;
     for (const Board::Message& message : channels[i].newest) {
-      if (message.number <= sight.sent) continue;
-      if (frame.size() == begin) append(frame, uint32_t{static_cast<uint8_t>(Frame::messages)});
-      append(frame, static_cast<uint32_t>(i));
-      append(frame, static_cast<uint32_t>(message.bytes->size()));
-      frame.insert(frame.end(), message.bytes->begin(), message.bytes->end());
+      if (message.number > sights_[i].sent) fresh.emplace_back(&message, i);
     }
-    sight.sent = channels[i].last_number;
+  }
+  std::sort(fresh.begin(), fresh.end(),
+            [](const auto& a, const auto& b) { return a.first->number < b.first->number; });
+  for (const auto& [message, i] : fresh) {
+    if (frame.size() - begin >= kMostFrame) break;
+    if (frame.size() == begin) append(frame, uint32_t{static_cast<uint8_t>(Frame::messages)});
+    append(frame, static_cast<uint32_t>(i));
+    append(frame, static_cast<uint32_t>(message->bytes->size()));
+    frame.insert(frame.end(), message->bytes->begin(), message->bytes->end());
+    sights_[i].sent = message->number;
   }
   if (frame.size() == begin) return false;
   ++unseen_;

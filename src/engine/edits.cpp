@@ -68,7 +68,7 @@ Outcome unknown(const std::string& name) {
   return Outcome::refuse(reply_t::UNKNOWN_NAME, "there is no model called '" + name + "'");
 }
 
-// Why a model cannot be put elsewhere or pushed; "": it can.
+// Why a model cannot be pushed; "": it can.
 std::string why_immovable(const Simulation& simulation, int instance) {
   const model::Model& model = *simulation.world().models[static_cast<size_t>(instance)].model;
   if (model.path) return "moves along its path";
@@ -78,7 +78,7 @@ std::string why_immovable(const Simulation& simulation, int instance) {
   for (size_t link = first; link < first + model.links.size(); ++link)
     (layout.links[link].body >= 0 ? moves : stands) = true;
   for (const model::Joint& joint : model.joints) stands |= joint.parent < 0;
-  if (!moves) return "is static: remove it, and spawn it where it should stand";
+  if (!moves) return "is static";
   return stands ? "is fixed to the world by a joint" : "";
 }
 
@@ -175,15 +175,37 @@ Outcome remove(const std::string& name, Simulation& simulation, Channels& channe
   return {};
 }
 
-Outcome set_pose(const set_pose_request_t& request, Simulation& simulation) {
+Pose pose_of(const set_pose_request_t& request) {
+  return pose_of(request.position, request.orientation);
+}
+
+bool stands_fast(const model::WorldModel& world, const std::string& name) {
+  const int instance = find_model(world, name);
+  if (instance < 0) return false;
+  const model::Model& model = *world.models[static_cast<size_t>(instance)].model;
+  return !model.path && (model.is_static ||
+                         std::any_of(model.joints.begin(), model.joints.end(),
+                                     [](const model::Joint& joint) { return joint.parent < 0; }));
+}
+
+Outcome set_pose(const set_pose_request_t& request, int64_t step, Simulation& simulation,
+                 Channels& channels) {
   if (const std::string fault = fault_of_pose(request.position, request.orientation);
       !fault.empty())
     return bad(fault);
   const int instance = find_model(simulation.world(), request.name);
   if (instance < 0) return unknown(request.name);
+  const Pose X_WM = pose_of(request);
+  if (stands_fast(simulation.world(), request.name)) {
+    const auto model = simulation.world().models[static_cast<size_t>(instance)].model;
+    Findings findings;
+    simulation.remove_model(instance, channels);
+    simulation.add_model(request.name, X_WM, model, step, channels, findings);
+    return {};
+  }
   if (const std::string why = why_immovable(simulation, instance); !why.empty())
     return refused("'" + request.name + "' " + why);
-  simulation.robots().set_pose(instance, pose_of(request.position, request.orientation));
+  simulation.robots().set_pose(instance, X_WM);
   return {};
 }
 

@@ -53,7 +53,13 @@ Outcome check_spawn(const spawn_request_t& request);
 Outcome spawn(const spawn_request_t& request, const model::LoadedModel& loaded, int64_t step,
               Simulation& simulation, Channels& channels, std::string& name);
 Outcome remove(const std::string& name, Simulation& simulation, Channels& channels);
-Outcome set_pose(const set_pose_request_t& request, Simulation& simulation);
+// A model that stands fast, static or by a joint with the world, is taken out and put in again.
+// step: of the first state that shows it.
+Outcome set_pose(const set_pose_request_t& request, int64_t step, Simulation& simulation,
+                 Channels& channels);
+Pose pose_of(const set_pose_request_t& request);
+// Whether the model of that name is one of those; false where there is none.
+bool stands_fast(const model::WorldModel& world, const std::string& name);
 Outcome set_twist(const set_twist_request_t& request, Simulation& simulation);
 // Everything that is there back to where it started or was spawned, at rest.
 void reset_poses(Simulation& simulation);

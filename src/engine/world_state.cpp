@@ -5,8 +5,6 @@
 #include <bit>
 #include <limits>
 
-#include "ruedo/world_state_t.hpp"
-
 namespace ruedo::engine {
 namespace {
 
@@ -33,16 +31,20 @@ class WorldState : public Sensor {
   }
 
   void sample(const SampleInput& input, Outbox& out) override {
+    for (const world_state_t& message : shown(input.snapshot)) out.publish(channel_, message);
+  }
+
+  const std::vector<world_state_t>& shown(const Snapshot& state) {
     for (world_state_t& message : parts_) {
-      message.utime = input.snapshot.time;
+      message.utime = state.time;
       for (size_t i = 0; i < message.index.size(); ++i) {
-        const Pose& X_WB = input.snapshot.bodies[static_cast<size_t>(message.index[i])];
+        const Pose& X_WB = state.bodies[static_cast<size_t>(message.index[i])];
         for (int k = 0; k < 3; ++k) message.position[i][k] = X_WB.translation[k];
         message.orientation[i] = {X_WB.rotation.w(), X_WB.rotation.x(), X_WB.rotation.y(),
                                   X_WB.rotation.z()};
       }
-      out.publish(channel_, message);
     }
+    return parts_;
   }
 
  private:
@@ -75,15 +77,30 @@ class Hash {
 
 }  // namespace
 
-std::unique_ptr<Sensor> world_state_sensor(const model::WorldModel& world,
-                                           const model::BodyLayout& layout, int epoch,
-                                           int channel) {
+namespace {
+
+// The bodies of models that are there.
+std::vector<int32_t> bodies_of(const model::WorldModel& world, const model::BodyLayout& layout) {
   std::vector<int32_t> there;
   for (size_t i = 0; i < layout.bodies.size(); ++i) {
     if (!world.models[static_cast<size_t>(layout.bodies[i].instance)].removed)
       there.push_back(static_cast<int32_t>(i));
   }
-  return std::make_unique<WorldState>(there, epoch, channel);
+  return there;
+}
+
+}  // namespace
+
+std::unique_ptr<Sensor> world_state_sensor(const model::WorldModel& world,
+                                           const model::BodyLayout& layout, int epoch,
+                                           int channel) {
+  return std::make_unique<WorldState>(bodies_of(world, layout), epoch, channel);
+}
+
+std::vector<world_state_t> world_states(const model::WorldModel& world,
+                                        const model::BodyLayout& layout, int epoch,
+                                        const Snapshot& state) {
+  return WorldState(bodies_of(world, layout), epoch, -1).shown(state);
 }
 
 ModuleSetup world_state_module(const model::WorldModel& world, const model::BodyLayout& layout,

@@ -4,6 +4,8 @@
 #include "engine/channels.h"
 #include "engine/module.h"
 #include "model/body_layout.h"
+#include "ruedo/snapshot.h"
+#include "ruedo/world_state_t.hpp"
 
 namespace ruedo::engine {
 
@@ -16,6 +18,11 @@ ModuleSetup world_state_module(const model::WorldModel& world, const model::Body
 // Its device, for bodies or an epoch that are others now. channel: as the module announced it.
 std::unique_ptr<Sensor> world_state_sensor(const model::WorldModel& world,
                                            const model::BodyLayout& layout, int epoch, int channel);
+
+// The same of one state.
+std::vector<world_state_t> world_states(const model::WorldModel& world,
+                                        const model::BodyLayout& layout, int epoch,
+                                        const Snapshot& state);
 
 // A hash of what a step's state is, for ruedo/tick: of every body's and robot's pose and motion,
 // bit for bit.

@@ -64,12 +64,15 @@ void Index::add(const Event& event, int64_t offset, int64_t end, size_t channel)
   }
   end_us_ = std::max(end_us_, event.timestamp_us);
   channels_[channel].entries.push_back({end_us_, offset, static_cast<uint32_t>(end - offset)});
-  if (event.channel != kAppliedChannel || edits_.size() >= kMostEdits) return;
+  if (event.channel != kAppliedChannel) return;
   applied_t applied;
-  if (decode_checked(event.data.data(), event.data.size(), applied) == DecodeFault::none &&
-      changes_world(applied.kind)) {
-    edits_.push_back({end_us_, std::move(applied)});
-  }
+  if (decode_checked(event.data.data(), event.data.size(), applied) != DecodeFault::none) return;
+  // SET_POSE does where what it puts elsewhere stands fast. Counted by itself: a program that puts
+  // something elsewhere all the time hides no other change.
+  const bool puts = applied.kind == request_t::SET_POSE;
+  if (!puts && !changes_world(applied.kind)) return;
+  size_t& count = puts ? poses_ : others_;
+  if (count++ < kMostEdits) edits_.push_back({end_us_, std::move(applied)});
 }
 
 }  // namespace ruedo::log

@@ -25,7 +25,7 @@ class Index {
       20'000'000;  // 24 bytes each; what comes after them is not shown
   static constexpr size_t kMostChannels = 65'536;  // what is on others is not shown
   static constexpr size_t kMostEdits =
-      1'000;  // requests that changed the world; later ones are not followed
+      1'000;  // requests that changed the world, and as many SET_POSE; later ones are not followed
 
   struct Entry {
     SimTime time_us;
@@ -64,6 +64,7 @@ class Index {
   std::vector<Channel> channels_;
   std::optional<log_header_t> header_;
   std::vector<Edit> edits_;
+  size_t poses_ = 0, others_ = 0;
   SimTime begin_us_ = 0, end_us_ = 0;
   std::string fault_;
 };

@@ -14,6 +14,7 @@
 #include "model/settings.h"
 #include "model/urdf.h"
 #include "model/world_name.h"
+#include "model/world_text.h"
 #include "model/xacro.h"
 #include "ruedo/math.h"
 
@@ -21,16 +22,6 @@ namespace fs = std::filesystem;
 
 namespace ruedo::model {
 namespace {
-
-// Where a robot or a model stands that is loaded without a world.
-constexpr const char* kEmptyWorld = R"(<sdf version="1.9"><world name="empty">
-  <light name="sun" type="directional"><cast_shadows>true</cast_shadows><pose>0 0 10 0 0 0</pose>
-    <diffuse>0.8 0.8 0.8 1</diffuse><specular>0.2 0.2 0.2 1</specular><direction>-0.5 0.1 -0.9</direction></light>
-  <model name="ground_plane"><static>true</static><link name="link">
-    <collision name="collision"><geometry><plane><normal>0 0 1</normal><size>100 100</size></plane></geometry></collision>
-    <visual name="visual"><geometry><plane><normal>0 0 1</normal><size>100 100</size></plane></geometry>
-      <material><ambient>0.8 0.8 0.8 1</ambient><diffuse>0.8 0.8 0.8 1</diffuse></material></visual>
-  </link></model></world></sdf>)";
 
 class Loader {
  public:
@@ -87,6 +78,7 @@ class Loader {
                                        (names.empty() ? "no robot" : names));
   }
 
+  // Where a robot or a model stands that is loaded without a world.
   void read_empty_world() {
     const auto root = parse_document(kEmptyWorld, path_);
     reader_.read_world(*root->child("world"), {1, 9}, world_);

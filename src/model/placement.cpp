@@ -236,8 +236,10 @@ struct Room::Index {
       }
     }
     if (parts.empty()) return "";
+    // Walls meet in corners: what never moves may stand in what never moves.
     const auto counts = [&](int solid) {
-      return !of_static || solids[static_cast<size_t>(solid)].is_static;
+      const bool is_static = solids[static_cast<size_t>(solid)].is_static;
+      return of_static ? is_static : !(is_static && model.is_static);
     };
     const auto name = [&](int solid) {
       return instances[static_cast<size_t>(solids[static_cast<size_t>(solid)].instance)].first;

@@ -35,7 +35,8 @@ class Room {
 
   // The name of a model whose collisions the model would share space with, 2 cm of it from the
   // ground up left out;
-  // "" when there is room. Meshes of the placed model count as their convex hulls.
+  // "" when there is room. Static models may stand in each other. Meshes of the placed model count
+  // as their convex hulls.
   std::string overlapped(const Model& model, const Pose& X_WM) const;
 
  private:

@@ -85,6 +85,12 @@ SdfReader::Included SdfReader::read_file(const std::string& path, const Element&
       result.name = required_name(*child);
       break;
     }
+    if (child->name == "include") {  // of a SPAWN's text: as it stands in a world
+      const auto inner = include(*child, "include");
+      if (!inner) child->fail("the model that it names is not found");
+      result = *inner;
+      break;
+    }
     if (child->name == "world")
       child->fail("is a world; only models, lights and actors can be included");
   }

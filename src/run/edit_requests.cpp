@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include "engine/edits.h"
+#include "engine/world_state.h"
 #include "log/header.h"
 #include "ruedo/applied_t.hpp"
 #include "run/run.h"
@@ -54,9 +55,24 @@ Run::Outcome Run::change(const request_t& request, bool models,
     publisher_.change_latest(changed_);
     if (models) announce();
     if (models && !repeating_) info_beat_.say();
+    show_change();
   }
   let_go();
   return outcome;
+}
+
+// Who edits a world that stands still sees what has become of it, though no state comes. To the bus
+// alone: a log is the same with and without viewers.
+void Run::show_change() {
+  if (!options_.edited || repeating_ || !pacer_->paused() || !publisher_.latest()) return;
+  for (const engine::Channel& channel : channels_.list()) {
+    if (channel.name != "ruedo/world") continue;
+    for (const world_state_t& state :
+         engine::world_states(*world_, simulation_->layout(), epoch_, changed_)) {
+      const std::vector<uint8_t> bytes = engine::encoded(state);
+      bus_.publish(channel.bus_name, bytes.data(), bytes.size());
+    }
+  }
 }
 
 void Run::note(const request_t& request) {
@@ -166,6 +182,7 @@ Run::Outcome Run::put_in(const request_t& request, const spawn_request_t& body,
     return engine::spawn(body, loaded, publisher_.step() + 1, *simulation_, channels_, name);
   });
   if (outcome.code == reply_t::OK) note_files(loaded.files_read);
+  if (outcome.code == reply_t::OK && edited_) edited_->spawned(name, body);
   if (outcome.code != reply_t::OK || repeating_) return outcome;
   spdlog::info("{} was spawned at step {}", name, publisher_.step());
   for (size_t i = 0; i < std::min(loaded.findings.size(), kFindingsTold); ++i) {
@@ -178,11 +195,41 @@ Run::Outcome Run::put_in(const request_t& request, const spawn_request_t& body,
 }
 
 Run::Outcome Run::remove(const request_t& request, const name_request_t& body) {
-  return change(request, true, [&] { return engine::remove(body.name, *simulation_, channels_); });
+  const Outcome outcome =
+      change(request, true, [&] { return engine::remove(body.name, *simulation_, channels_); });
+  if (outcome.code == reply_t::OK && edited_) edited_->removed(body.name);
+  return outcome;
 }
 
 Run::Outcome Run::set_pose(const request_t& request, const set_pose_request_t& body) {
-  return change(request, false, [&] { return engine::set_pose(body, *simulation_); });
+  const bool fast = engine::stands_fast(*world_, body.name);
+  const Outcome outcome = change(request, fast, [&] {
+    return engine::set_pose(body, publisher_.step() + 1, *simulation_, channels_);
+  });
+  if (outcome.code == reply_t::OK && edited_) edited_->put(body.name);
+  return outcome;
+}
+
+// The poses that the file gets are those of the last state that is out.
+Run::Outcome Run::save(const request_t&) {
+  const model::BodyLayout& layout = simulation_->layout();
+  const EditedWorld::Saved saved = edited_->save(*world_, [&](size_t instance) {
+    const model::ModelInstance& model = world_->models[instance];
+    const model::LinkPlacement& link =
+        layout.links[static_cast<size_t>(layout.first_link[instance])];
+    if (link.body < 0) return link.X_BL * model.model->links[0].X_ML.inverse();
+    return publisher_.latest()->bodies[static_cast<size_t>(link.body)] * link.X_BL *
+           model.model->links[0].X_ML.inverse();
+  });
+  if (!saved.fault.empty()) return Outcome::refuse(reply_t::REFUSED, saved.fault);
+  spdlog::info("the world is saved");
+  Outcome outcome;
+  outcome.text = saved.note;
+  return outcome;
+}
+
+std::string Run::model_text(const std::string& name) const {
+  return edited_ ? edited_->model_text(name) : "";
 }
 
 Run::Outcome Run::set_twist(const request_t& request, const set_twist_request_t& body) {

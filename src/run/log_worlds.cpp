@@ -50,6 +50,17 @@ std::shared_ptr<const WorldModel> edited(const applied_t& applied,
       engine::WorldEditor(*world).remove(instance);
       return world;
     }
+    case request_t::SET_POSE: {
+      set_pose_request_t body;
+      if (!read_body(applied, body) || !engine::stands_fast(*before, body.name)) return nullptr;
+      auto world = std::make_shared<WorldModel>(*before);
+      engine::WorldEditor editor(*world);
+      const int instance = engine::find_model(*before, body.name);
+      const auto model = world->models[static_cast<size_t>(instance)].model;
+      editor.remove(instance);
+      editor.place(body.name, engine::pose_of(body), model);
+      return world;
+    }
     default: {
       spawn_request_t body;
       if (!read_body(applied, body) || engine::check_spawn(body).code != reply_t::OK)

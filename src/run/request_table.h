@@ -20,7 +20,7 @@ namespace ruedo::run {
 class Run;
 
 struct RequestKind {
-  enum Needs { nothing, grants, snapshots };  // of the server
+  enum Needs { nothing, grants, snapshots, save_file };  // of the server
   enum Effect {
     looks,
     steers,

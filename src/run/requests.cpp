@@ -72,6 +72,8 @@ const RequestKind RequestTable::kKinds[] = {
      grant},
     {"RESEND", request_t::RESEND, RequestKind::grants, RequestKind::steers,
      RequestKind::for_nothing, grant},
+    {"SAVE", request_t::SAVE, RequestKind::save_file, RequestKind::looks, RequestKind::for_state,
+     plain<&Run::save>},
     {"SNAPSHOT", request_t::SNAPSHOT, RequestKind::snapshots, RequestKind::steers,
      RequestKind::for_state, with<name_request_t, &Run::snapshot>},
     {"RESTORE", request_t::RESTORE, RequestKind::snapshots, RequestKind::steers,
@@ -87,8 +89,13 @@ const RequestKind* RequestTable::find(int32_t kind) {
 const RequestKind* find_request_kind(int32_t kind) { return RequestTable::find(kind); }
 
 bool Run::serves(const RequestKind& kind) const {
-  return kind.needs == RequestKind::nothing ||
-         (kind.needs == RequestKind::grants ? mode_->takes_grants() : journal_ != nullptr);
+  switch (kind.needs) {
+    case RequestKind::nothing: return true;
+    case RequestKind::grants: return mode_->takes_grants();
+    case RequestKind::snapshots: return journal_ != nullptr;
+    case RequestKind::save_file: return edited_ && edited_->saves();
+  }
+  return false;
 }
 
 int64_t Run::features() const {
@@ -119,10 +126,13 @@ Outcome Run::execute(const request_t& request, const Session& session) {
       stall_watch_.beat(std::string(kind->name) + " of '" + session.client + "'");
     return kind->execute(*this, request, session);
   }
-  return Outcome::refuse(reply_t::NOT_SUPPORTED,
-                         kind->needs == RequestKind::grants
-                             ? "this run is not in lockstep: start the server with --lockstep N"
-                             : "start the server with --snapshots FOLDER");
+  const char* const cure =
+      kind->needs == RequestKind::grants
+          ? "this run is not in lockstep: start the server with --lockstep N"
+      : kind->needs == RequestKind::save_file
+          ? "this run has no file to save the world to: start the server with ruedo edit"
+          : "start the server with --snapshots FOLDER";
+  return Outcome::refuse(reply_t::NOT_SUPPORTED, cure);
 }
 
 Outcome Run::pause(const request_t&) {

@@ -61,6 +61,8 @@ Run::Run(std::shared_ptr<const model::WorldModel> world, RunOptions options, Bus
   if (!options_.record.empty())
     log_ = std::make_unique<LogSink>(options_.record, options_.record_limit);
   if (!options_.snapshots.empty()) journal_ = std::make_unique<Journal>(options_.snapshots);
+  if (options_.edited || !options_.save.empty())
+    edited_ = std::make_unique<EditedWorld>(*first_world_, options_.save);
   if (options_.watcher) watcher_ = std::make_unique<WatcherSink>(options_.watcher);
   if (!options_.repeat.empty()) {
     begin_repeat(options_.repeat);

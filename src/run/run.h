@@ -27,6 +27,7 @@
 #include "ruedo/step_request_t.hpp"
 #include "run/beats.h"
 #include "run/control.h"
+#include "run/edited_world.h"
 #include "run/journal.h"
 #include "run/lockstep.h"
 #include "run/model_worker.h"
@@ -49,6 +50,8 @@ struct RunOptions {
   LockstepOptions lockstep;  // wants control
   std::string record;        // file; "": none
   int64_t record_limit = 0;  // bytes of all files that --record makes; 0: none
+  bool edited = false;       // models are told as text, for who edits the world
+  std::string save;          // file that SAVE writes; "": none
   std::string snapshots;     // folder that SNAPSHOT and RESTORE use; "": none
   std::vector<WaitForOption> wait_for;
   std::string repeat;            // log or snapshot to begin with: what acted on that run acts again
@@ -102,6 +105,8 @@ class Run {
     return world_;
   }
   int64_t run_id() const { return run_id_; }
+  // SDF or URDF of a model that is there, as SPAWN takes it; "": it is not told. Any thread.
+  std::string model_text(const std::string& name) const;
   const engine::CommandInbox& inbox() const { return simulation_->inbox(); }
 
   // Called by run() with each state that is published. Set before run().
@@ -177,6 +182,7 @@ class Run {
   void let_go();
   // Applies a change to the world that stands still, and notes it. models: some come or go.
   Outcome change(const request_t& request, bool models, const std::function<Outcome()>& apply);
+  void show_change();
   Outcome reset(const request_t& request, const reset_request_t& body);
   Outcome reset_all(const request_t& request, int64_t seed);
   Outcome reset_poses(const request_t& request);
@@ -190,6 +196,7 @@ class Run {
   Outcome remove(const request_t& request, const name_request_t& body);
   Outcome set_pose(const request_t& request, const set_pose_request_t& body);
   Outcome set_twist(const request_t& request, const set_twist_request_t& body);
+  Outcome save(const request_t&);
 
   const std::shared_ptr<const model::WorldModel> first_world_;  // as it was loaded
   std::shared_ptr<const model::WorldModel> world_;
@@ -228,6 +235,7 @@ class Run {
   std::function<void(const Snapshot&)> on_state_;
   Clock::time_point next_status_;
 
+  std::unique_ptr<EditedWorld> edited_;  // null: nobody edits it
   engine::ModelStore models_{first_world_->file};
   ModelWorker worker_;                     // of SPAWNs
   std::optional<ModelWorker::Made> made_;  // the next that is ready,

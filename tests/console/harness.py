@@ -46,9 +46,9 @@ def playing(log, *arguments, view="127.0.0.1:0"):
 
 
 @contextmanager
-def serving(*arguments):
+def serving(*arguments, cwd=None):
     process = subprocess.Popen(
-        [RUEDO, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [RUEDO, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=cwd
     )
     try:
         urls = []

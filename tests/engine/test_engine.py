@@ -190,7 +190,7 @@ def test_errors_say_what_is_wrong(call, error, text):
         (
             {"world": "no_such"},
             ValueError,
-            "no world of that name; there are arena, crossing, field, fleet, maze, office",
+            "no world of that name; there are arena, crossing, empty, field, fleet, maze, office",
         ),
         ({"world": "no/such.sdf"}, ValueError, "no/such.sdf: no such file"),
         ({"world": "arena", "worlds": 0}, ValueError, "1 world or more, not 0"),

@@ -195,7 +195,25 @@ TEST_F(EditsTest, PushesThings) {
   refused("r", "has a drive");
   refused("post", "is static");
   EXPECT_EQ(set_twist("nobody", {1, 0, 0}).code, reply_t::UNKNOWN_NAME);
-  EXPECT_EQ(set_pose("post", {0, 0, 0}).code, reply_t::REFUSED);
+}
+
+TEST_F(EditsTest, WhatStandsFastIsPutElsewhereToo) {
+  const std::string arm =
+      "<model name='arm'><pose>0 5 0 0 0 0</pose><link name='l'><inertial><mass>1</mass></inertial>"
+      "</link><joint name='j' type='fixed'><parent>world</parent><child>l</child></joint></model>";
+  begin(paused_server(), robot_sdf("r", 0, 0, one_ray()) + box_sdf("post", "1 1 1", true, 9, 9) +
+                             box_sdf("wall", "1 1 1", true, 5, 0, 0.5) + arm);
+  step(20);
+  EXPECT_NEAR(on<planar_lidar_t>("r/lrf").back().ranges[0], 4.5, 1e-5);  // to the face at x = 4.5
+  ASSERT_EQ(set_pose("wall", {3, 0, 0.5}).code, reply_t::OK);
+  EXPECT_NEAR(state("wall").position[0], 3.0, 1e-12);
+  ASSERT_EQ(set_pose("post", {3, 0.5, 0.5}).code, reply_t::OK);  // static in static
+  step(40);
+  EXPECT_NEAR(on<planar_lidar_t>("r/lrf").back().ranges[0], 2.5, 1e-5);
+  ASSERT_EQ(set_pose("arm", {0, 6, 0}).code, reply_t::OK);
+  step(20);
+  EXPECT_NEAR(state("arm").position[1], 6.0, 1e-9);
+  EXPECT_EQ(info().nrobots, 1);
 }
 
 // All that the named channels carry, in order.

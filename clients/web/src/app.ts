@@ -1,6 +1,13 @@
 // The page as a whole: makes its parts and connects them. What is known is in `page`; who shows it
 // watches it there.
+import { request_t } from "../generated/messages";
 import { Control } from "./control";
+import { listenToClicks } from "./edit/clicks";
+import { Draw } from "./edit/draw";
+import { Editor } from "./edit/editor";
+import { Gizmo } from "./edit/gizmo";
+import { listenToEditing } from "./edit/keys";
+import { Outline } from "./edit/outline";
 import { loadScene, type SceneFiles } from "./scene/description";
 import { OverlaySet } from "./scene/overlay_set";
 import { Stage, type ViewMode } from "./scene/stage";
@@ -14,6 +21,7 @@ import { Bar } from "./ui/bar";
 import { ChannelList } from "./ui/channels";
 import { Drive } from "./ui/drive";
 import { h, recall, remember, say, toast } from "./ui/dom";
+import { EditPage } from "./ui/edit_page";
 import { fillHelp } from "./ui/help";
 import { listenToKeys } from "./ui/keys";
 import { makeLegend } from "./ui/legend";
@@ -21,11 +29,15 @@ import { Notice } from "./ui/notice";
 import { Panel } from "./ui/panel";
 import { RobotPages } from "./ui/robot";
 import { Timeline } from "./ui/timeline";
+import { encode } from "./wire/lcm";
 import { Link, type Hello, type Playback, type RunLink } from "./wire/link";
-import { LogFile } from "./wire/log_file";
+import { LogFile, newestAt } from "./wire/log_file";
+import { Rewind, type Past } from "./wire/rewind";
 import { Router } from "./wire/router";
 import { Session } from "./wire/session";
 
+const kMostScenes = 32; // that are kept for the past
+const kJump_s = 0.5; // further is another moment, not the next one
 const kTurn_rad = Math.PI / 24,
   kPan = 0.06,
   kZoom = 1.15; // of one press of a key
@@ -41,7 +53,7 @@ export class App {
     recall("detail") === "full",
   );
   readonly overlays = new OverlaySet(this.page, this.stage);
-  readonly clock = new Clock(this.page, () => this.forgetPast());
+  readonly clock = new Clock(this.page, (anew) => this.forgetPast(anew));
   readonly notice = new Notice(byId("notice"), this.page);
   readonly loading = new Loading<SceneFiles>({
     fetchScene: () => loadScene(this.file),
@@ -51,9 +63,26 @@ export class App {
     failed: (words) => toast(`The scene cannot be loaded: ${words}`, "error"),
   });
   private readonly file = LogFile.inPage();
-  readonly link: RunLink = this.file ?? new Link();
+  readonly rewind = this.file ? null : new Rewind(new Link()); // of what may be live
+  readonly link: RunLink = this.file ?? this.rewind!;
+  private readonly scenes: { from: number; world: World; files: SceneFiles | null }[] = []; // of the past that is kept
   readonly session = new Session((channel, message) => this.link.command(channel, message));
   readonly control = new Control(this.page, this.link, this.session, this.clock);
+  readonly editor = new Editor(
+    this.page,
+    this.poses,
+    this.control,
+    (model) => this.stage.boxOf(model).min.z,
+  );
+  readonly gizmo = new Gizmo(
+    this.page,
+    this.stage,
+    this.editor,
+    byId("canvas") as HTMLCanvasElement,
+  );
+  readonly outline = new Outline(this.page, this.stage, this.editor);
+  readonly draw = new Draw(this.page, this.stage, this.editor, byId("canvas") as HTMLCanvasElement);
+  readonly editPage = new EditPage(this.page, this.stage, this.editor, this.draw);
   readonly pages = new RobotPages(
     (command) => this.control.move(command),
     () => this.control.stop(),
@@ -62,11 +91,16 @@ export class App {
   readonly panel = new Panel(
     byId("panel"),
     this.page,
-    this.stage,
-    { Robot: this.pages.statePage, Plots: this.pages.plotPage, Channels: this.channels.element },
+    {
+      Robot: this.pages.statePage,
+      Plots: this.pages.plotPage,
+      Channels: this.channels.element,
+      World: this.editPage.element,
+    },
     (robot) => this.choose(robot),
   );
   private readonly router = new Router(this.page, this);
+  private asked = false; // for the state, on this connection
   private shown = ""; // run and name of the robot in the panel
 
   constructor() {
@@ -83,17 +117,25 @@ export class App {
       help: () => help.showModal(),
       panel: () => this.togglePanel(),
     });
-    new Timeline(
-      byId("timeline"),
-      page,
-      (on, speed) => this.link.play(on, speed),
-      (time_s) => this.link.seek(time_s),
-    );
+    new Timeline(byId("timeline"), page, {
+      play: (on, speed) => this.link.play(on, speed),
+      seek: (time_s) => this.seek(time_s),
+      live: () => this.rewind?.live(),
+    });
+    if (this.rewind) this.rewind.onPast = (past, kept) => this.onPast(past, kept);
     makeLegend(byId("legend"), page);
     this.stage.onDetail = (reduced) => page.set({ reduced });
     if (!this.stage.renderer) byId("flat").hidden = false;
     this.makePad();
-    this.listenToClicks();
+    listenToClicks(
+      byId("canvas"),
+      page,
+      this.stage,
+      this.editor,
+      this.editPage.door,
+      () => this.gizmo.seized,
+    );
+    listenToEditing(page, this.editor);
     listenToKeys({
       " ": () => control.pauseOrResume(),
       ".": () => control.step(),
@@ -116,8 +158,11 @@ export class App {
       K: () => this.stage.pan(0, -kPan),
       "+": () => this.stage.zoom(1 / kZoom),
       "-": () => this.stage.zoom(kZoom),
-      b: () => this.panel.startPlacing(),
-      Escape: () => this.panel.stopPlacing(),
+      b: () => this.editPage.startPlacing(),
+      Escape: () => this.stopEditing(),
+      m: () => page.set({ handle: "translate" }),
+      e: () => page.set({ handle: "rotate" }),
+      z: () => page.set({ handle: "scale" }),
       "?": () => help.showModal(),
     });
     page.watch(["theme"], ({ theme }) => {
@@ -149,9 +194,12 @@ export class App {
 
   private onHello(hello: Hello): void {
     const before = this.page.now.hello;
+    this.asked = false;
     document.title = `${hello.title} – Ruedo`;
     document.body.dataset.mode = hello.mode;
+    if (this.rewind) this.scenes.length = 0;
     const other = before !== null && (before.title !== hello.title || before.mode !== hello.mode);
+    if (hello.save && !before) this.page.set({ tab: "World" });
     this.page.set({ hello, ...(other ? { world: null, scene: null, robot: -1 } : {}) });
     if (hello.fault) this.notice.show(hello.fault);
     if (hello.mode === "live") this.session.askForInfo("ruedo/request");
@@ -165,11 +213,23 @@ export class App {
       controlled: request !== "" || !live,
       ...(live ? { paused: world.paused } : {}),
     });
+    // The info that was kept for newcomers may be older than the last pause: the state itself is asked for.
+    if (live && request !== "" && !this.asked) {
+      this.asked = true;
+      void this.control.request(request_t.GET_STATE, encode("name_request_t", { name: "" }));
+    }
     if (live) this.clock.tell(Number(world.utime) * 1e-6, world.epoch);
   }
 
-  // The chosen robot stays, by its name.
+  // Kept for who looks back; shown, unless the past is.
   private onComplete(world: World, files: SceneFiles | null): void {
+    this.scenes.push({ from: this.rewind?.range.end ?? 0, world, files });
+    if (this.scenes.length > kMostScenes) this.scenes.shift();
+    if (!this.page.now.past) this.present(world, files);
+  }
+
+  // The chosen robot stays, by its name.
+  private present(world: World, files: SceneFiles | null): void {
     const { world: before, robot } = this.page.now,
       name = before?.robots[robot]?.name;
     this.stage.show(files);
@@ -181,6 +241,34 @@ export class App {
     this.page.set({ world, scene: files?.description ?? null, robot: at });
   }
 
+  // A moment of a log, or of the past of a live run.
+  seek(time_s: number): void {
+    if (this.page.now.hello?.mode === "log") this.link.seek(time_s);
+    else this.rewind?.show(time_s);
+  }
+
+  // What is shown is another moment of a live run, or the present again.
+  private onPast(past: Past | null, kept: { begin: number; end: number }): void {
+    if (this.page.now.hello?.mode !== "live") return;
+    const before = this.page.now.past;
+    if (past === null && before === null && kept.end === this.page.now.kept.end) return;
+    this.page.set({ past, kept });
+    if (past?.now === before?.now) return;
+    if (!past || !before || Math.abs(past.now - before.now) > kJump_s) this.poses.jump();
+    const shown =
+      this.scenes[
+        Math.max(
+          0,
+          newestAt(
+            this.scenes.map(({ from }) => ({ time: from })),
+            past?.now ?? Infinity,
+          ),
+        )
+      ];
+    if (shown && shown.files?.description !== this.page.now.scene)
+      this.present(shown.world, shown.files);
+  }
+
   private onPlayback(playback: Playback): void {
     const { playback: before } = this.page.now;
     if (before && before.jumps !== playback.jumps) this.clock.jump();
@@ -188,7 +276,8 @@ export class App {
   }
 
   // What was drawn along the way is not of this moment.
-  private forgetPast(): void {
+  private forgetPast(anew: boolean): void {
+    if (anew) this.editor.history.clear();
     this.overlays.forget();
     this.pages.forget();
     this.poses.jump();
@@ -224,6 +313,9 @@ export class App {
   }
 
   private frame(at: number): void {
+    this.gizmo.follow();
+    this.outline.follow();
+    this.editPage.transform.show();
     this.stage.frame(at, () => this.overlays.place());
     this.pages.draw();
     requestAnimationFrame((next) => this.frame(next));
@@ -259,27 +351,14 @@ export class App {
         );
     });
     byId("pad").append(drive.stick, readout);
+    this.page.watch(["world"], ({ world }) => {
+      byId("pad").hidden = world !== null && world.robots.length === 0;
+    });
   }
 
-  // A click places what is to be placed, or chooses the robot there.
-  private listenToClicks(): void {
-    const canvas = byId("canvas");
-    let down = { x: 0, y: 0 };
-    canvas.addEventListener("pointerdown", (event) => {
-      down = { x: event.clientX, y: event.clientY };
-    });
-    canvas.addEventListener("pointerup", (event) => {
-      if (event.button !== 0 || Math.hypot(event.clientX - down.x, event.clientY - down.y) > 5)
-        return;
-      const { robot, ground } = this.stage.pick(event.clientX, event.clientY),
-        thing = this.panel.placing();
-      if (thing && ground) {
-        this.panel.stopPlacing();
-        void this.control.place(thing, ground.x, ground.y);
-      } else if (!thing) {
-        const name = this.page.now.scene?.bases[robot]?.robot;
-        this.choose(this.page.now.world?.robots.findIndex((r) => r.name === name) ?? -1);
-      }
-    });
+  // What was begun is left; then, what was selected.
+  private stopEditing(): void {
+    if (this.page.now.tool !== "select") this.editPage.stop();
+    else this.page.set({ selected: "" });
   }
 }

@@ -1,11 +1,10 @@
 // What the user does with the run: requests, driving, motion primitives, placing.
-import { move_command_t, request_t } from "../generated/messages";
+import { move_command_t, request_t, type reply_t } from "../generated/messages";
 import type { Clock } from "./state/clock";
 import type { Page } from "./state/page";
 import { inputOf } from "./state/world";
 import { confirmed } from "./ui/confirm";
 import { toast } from "./ui/dom";
-import type { Thing } from "./ui/things";
 import { encode } from "./wire/lcm";
 import type { RunLink } from "./wire/link";
 import type { Session } from "./wire/session";
@@ -43,7 +42,8 @@ export class Control {
     return this.page.now.hello?.mode === "log";
   }
 
-  async request(kind: number, body?: Uint8Array): Promise<boolean> {
+  // The reply, when it was done; else says why not.
+  async ask(kind: number, body?: Uint8Array): Promise<reply_t | null> {
     try {
       const reply = await this.session.ask(kind, body);
       if (reply.body.length > 0) {
@@ -51,11 +51,15 @@ export class Control {
         this.page.set({ paused: state.paused });
         this.clock.tell(Number(state.utime) * 1e-6, reply.epoch);
       }
-      return true;
+      return reply;
     } catch (error) {
       toast((error as Error).message, "error");
-      return false;
+      return null;
     }
+  }
+
+  async request(kind: number, body?: Uint8Array): Promise<boolean> {
+    return (await this.ask(kind, body)) !== null;
   }
 
   pauseOrResume(): void {
@@ -114,18 +118,5 @@ export class Control {
 
   stop(): void {
     this.move(kStop);
-  }
-
-  // Puts a thing onto the ground there.
-  async place({ model, text }: Thing, x: number, y: number): Promise<void> {
-    const body = encode("spawn_request_t", {
-      name: "",
-      model,
-      text,
-      on_ground: true,
-      position: new Float64Array([x, y, 0]),
-      orientation: new Float64Array([1, 0, 0, 0]),
-    });
-    if (await this.request(request_t.SPAWN, body)) toast("Placed.");
   }
 }

@@ -4,7 +4,14 @@ import type { world_info_t } from "../generated/messages";
 import { Loading } from "../src/state/loading";
 import type { Hello } from "../src/wire/link";
 
-const kHello: Hello = { mode: "live", title: "w", version: "1", info: "ruedo/info", fault: "" };
+const kHello: Hello = {
+  mode: "live",
+  title: "w",
+  version: "1",
+  info: "ruedo/info",
+  fault: "",
+  save: "",
+};
 
 function info(robots: string[], more: Partial<world_info_t> = {}): world_info_t {
   return {

@@ -37,7 +37,7 @@ function worldOf(robots: string[]): World {
 function state(more: Partial<PageState> = {}): PageState {
   return {
     link: "open",
-    hello: { mode: "live", title: "", version: "", info: "ruedo/info", fault: "" },
+    hello: { mode: "live", title: "", version: "", info: "ruedo/info", fault: "", save: "" },
     controlled: true,
     world: worldOf(["a"]),
     scene: null,
@@ -46,10 +46,18 @@ function state(more: Partial<PageState> = {}): PageState {
     time_s: 0,
     factor: null,
     playback: null,
+    past: null,
+    kept: { begin: 0, end: 0 },
     layers: new Set(),
     mode: "orbit",
     reduced: false,
     theme: "dark",
+    selected: "",
+    tool: "select",
+    handle: "translate",
+    snap_m: 0.1,
+    edits: { undo: null, redo: null, changes: 0 },
+    saved: 0,
     tab: "World",
     panel: true,
     ...more,
@@ -168,7 +176,7 @@ describe("wanted channels", () => {
 });
 
 it("what is said of the run", () => {
-  const log = { mode: "log", title: "", version: "", info: "", fault: "" } as const,
+  const log = { mode: "log", title: "", version: "", info: "", fault: "", save: "" } as const,
     playback = { begin: 0, end: 1, now: 0, speed: 1, playing: true, jumps: 0 };
   expect(stateWords(state({ link: "lost" }))).toEqual(["no connection", false]);
   expect(stateWords(state({ link: "ended" }))).toEqual(["ended", false]);

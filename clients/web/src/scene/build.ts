@@ -13,16 +13,19 @@ export interface Movers {
   indices: number[];
   meshes: THREE.InstancedMesh[];
   far: Far | null;
-}
+  shown: number[];
+} // shown: what stands near, as places in indices
 // Of many links: what shows those far away, and the matrices of all of them.
 export interface Far {
   mesh: THREE.InstancedMesh;
   matrices: Float32Array;
+  shown: number[];
 }
 export interface Built {
   still: THREE.Group;
   moving: THREE.Group;
   movers: Movers[];
+  standing: Movers[]; // what does not move
   grounds: THREE.Mesh[];
 }
 
@@ -53,7 +56,22 @@ function gridTexture(): THREE.Texture {
   return texture;
 }
 
+// Gives back what the graphics memory holds of it.
+export function disposeOf({ still, moving }: Built): void {
+  for (const group of [still, moving]) {
+    group.traverse((object) => {
+      if (!(object instanceof THREE.InstancedMesh)) return;
+      (object.geometry as THREE.BufferGeometry).dispose();
+      const material = object.material as THREE.MeshStandardMaterial;
+      material.map?.dispose();
+      material.dispose();
+      object.dispose();
+    });
+  }
+}
+
 export class SceneBuilder {
+  readonly loading: Promise<void>[] = []; // pictures that are on their way
   private readonly textures = new Map<number, THREE.Texture>();
 
   constructor(private readonly files: SceneFiles) {}
@@ -61,7 +79,7 @@ export class SceneBuilder {
   build(): Built {
     const still = new THREE.Group(),
       moving = new THREE.Group();
-    const built: Built = { still, moving, movers: [], grounds: [] };
+    const built: Built = { still, moving, movers: [], standing: [], grounds: [] };
     const { kinds } = this.files.description,
       indicesOf: number[][] = kinds.map(() => []);
     this.files.links.forEach((link, index) => indicesOf[link.kind]?.push(index));
@@ -92,24 +110,12 @@ export class SceneBuilder {
           links,
           indices: chosen,
           meshes,
+          shown: chosen.map((_, i) => i),
           far: moves && plain.has(kind) ? this.far(parts, links.length, into) : null,
         };
       };
       const stillOnes = place(false, still);
-      if (stillOnes) {
-        const matrix = new THREE.Matrix4(),
-          one = new THREE.Vector3(1, 1, 1),
-          position = new THREE.Vector3(),
-          turn = new THREE.Quaternion();
-        for (const mesh of stillOnes.meshes) {
-          stillOnes.links.forEach(({ pose }, i) => {
-            position.set(pose[0]!, pose[1]!, pose[2]!);
-            turn.set(pose[4]!, pose[5]!, pose[6]!, pose[3]!);
-            mesh.setMatrixAt(i, matrix.compose(position, turn, one));
-          });
-          mesh.computeBoundingSphere();
-        }
-      }
+      if (stillOnes) built.standing.push(stillOnes);
       const movers = place(true, moving);
       if (movers) built.movers.push(movers);
     });
@@ -207,7 +213,7 @@ export class SceneBuilder {
     mesh.instanceMatrix.setUsage(THREE.DynamicDrawUsage);
     mesh.frustumCulled = false;
     into.add(mesh);
-    return { mesh, matrices: new Float32Array(16 * links) };
+    return { mesh, matrices: new Float32Array(16 * links), shown: [] };
   }
 
   private batch(part: Part, many: boolean) {
@@ -283,7 +289,18 @@ export class SceneBuilder {
     if (index < 0 || !this.files.description.textures[index]) return null;
     let texture = this.textures.get(index);
     if (!texture) {
-      texture = new THREE.TextureLoader().load(this.files.textureUrl(index));
+      let loaded = () => {};
+      this.loading.push(
+        new Promise<void>((resolve) => {
+          loaded = resolve;
+        }),
+      );
+      texture = new THREE.TextureLoader().load(
+        this.files.textureUrl(index),
+        loaded,
+        undefined,
+        loaded,
+      );
       texture.colorSpace = THREE.SRGBColorSpace;
       texture.wrapS = texture.wrapT = THREE.RepeatWrapping;
       texture.anisotropy = 8;

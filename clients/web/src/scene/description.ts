@@ -23,6 +23,18 @@ export interface LightDescription {
   quadratic: number;
   shadows: boolean;
 }
+// fast: it never moves. body: that carries the model, -1 for none; pose: x, y, z, qw, qx, qy, qz of the model in it, or in the
+// world. A model that was removed has no name.
+export interface ModelDescription {
+  name: string;
+  first_link: number;
+  links: number;
+  fast: boolean;
+  robot: boolean;
+  path: boolean;
+  body: number;
+  pose: number[];
+}
 export interface Description {
   version: number;
   world: string;
@@ -37,7 +49,7 @@ export interface Description {
   batches: [mesh: number, first: number, count: number, texture: number, flags: number][];
   kinds: Part[][];
   lights: LightDescription[];
-  models: { name: string; first_link: number }[];
+  models: ModelDescription[];
   wheels: number[][]; // link, robot, place among its wheels, a point on the axis, the axis
   bases: { robot: string; body: number; pose: number[]; start: number[] }[];
 }
@@ -72,8 +84,11 @@ export interface FileStore {
   file(path: string): Uint8Array<ArrayBuffer> | null;
 }
 
-// Null when there is no world to show. store: null for the program that serves this page.
-export async function loadScene(store: FileStore | null): Promise<SceneFiles | null> {
+// Null when there is no world to show. base: where its files are. store: null for the program that serves this page.
+export async function loadScene(
+  store: FileStore | null,
+  base = "/scene",
+): Promise<SceneFiles | null> {
   const ask = async (path: string): Promise<Response> => {
     if (!store) return fetch(path);
     const bytes = store.file(path);
@@ -84,13 +99,13 @@ export async function loadScene(store: FileStore | null): Promise<SceneFiles | n
     if (!response.ok) throw new Error(`${path}: ${response.status}`);
     return response;
   };
-  const answer = await ask("/scene.json");
+  const answer = await ask(`${base}.json`);
   if (answer.status === 404) return null;
   if (!answer.ok) throw new Error(await answer.text());
   const [description, meshBytes, linkBytes] = await Promise.all([
     answer.json() as Promise<Description>,
-    get("/scene/meshes").then((r) => r.arrayBuffer()),
-    get("/scene/links").then((r) => r.arrayBuffer()),
+    get(`${base}/meshes`).then((r) => r.arrayBuffer()),
+    get(`${base}/links`).then((r) => r.arrayBuffer()),
   ]);
   let at = 0;
   const meshes = description.meshes.map(([vertices, indices]) => {
@@ -111,7 +126,7 @@ export async function loadScene(store: FileStore | null): Promise<SceneFiles | n
     });
   }
   const textureUrl = (index: number) => {
-    const path = `/scene/textures/${index}`;
+    const path = `${base}/textures/${index}`;
     return store ? URL.createObjectURL(new Blob([store.file(path) ?? new Uint8Array()])) : path;
   };
   return { description, meshes, links, textureUrl };

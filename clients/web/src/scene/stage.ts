@@ -2,8 +2,8 @@
 // has changed.
 import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import { SceneBuilder, type Built, type Movers } from "./build";
-import type { Description, LightDescription, SceneFiles } from "./description";
+import { disposeOf, SceneBuilder, type Built, type Movers } from "./build";
+import type { Description, LightDescription, ModelDescription, SceneFiles } from "./description";
 import { matrixOf } from "./matrix";
 import { drawnBySoftware, Quality } from "./quality";
 import type { Poses } from "../state/poses";
@@ -32,6 +32,7 @@ export class Stage {
   private sun: THREE.DirectionalLight | null = null;
   private dirty = true;
   private moved = false;
+  private moving: { first: number; end: number; by: THREE.Matrix4 } | null = null; // links that are shown elsewhere
   private regroup = false; // what is near and what is far has changed
   private linkWheel = new Map<
     number,
@@ -107,19 +108,10 @@ export class Stage {
   show(files: SceneFiles | null): void {
     if (this.built) {
       this.scene.remove(this.built.still, this.built.moving);
-      for (const group of [this.built.still, this.built.moving]) {
-        group.traverse((object) => {
-          if (!(object instanceof THREE.InstancedMesh)) return;
-          (object.geometry as THREE.BufferGeometry).dispose();
-          const material = object.material as THREE.MeshStandardMaterial;
-          material.map?.dispose();
-          material.dispose();
-          object.dispose();
-        });
-      }
+      disposeOf(this.built);
     }
     const first = this.description === null;
-    this.built = null;
+    this.built = this.moving = null;
     this.description = files?.description ?? null;
     for (const light of this.lights.children)
       if (light instanceof THREE.Light || light instanceof THREE.GridHelper) light.dispose(); // a light has its shadows' picture
@@ -318,26 +310,110 @@ export class Stage {
     return true;
   }
 
-  // The robot under a point of the canvas; -1 for none. Else where the ground is there.
-  pick(x: number, y: number): { robot: number; ground: THREE.Vector3 | null } {
-    const caster = new THREE.Raycaster();
-    caster.setFromCamera(this.ndc(x, y), this.camera);
-    const ground = caster.ray.intersectPlane(
+  // Where the floor is under a point of the canvas; null above the horizon.
+  ground(x: number, y: number): THREE.Vector3 | null {
+    return this.caster(x, y).ray.intersectPlane(
       new THREE.Plane(new THREE.Vector3(0, 0, 1), 0),
       new THREE.Vector3(),
     );
-    let robot = -1,
+  }
+
+  // What is under a point of the canvas: a robot (-1 for none), the name of a model ("" for none) and the point of it that is seen, and
+  // where the floor is there.
+  pick(
+    x: number,
+    y: number,
+  ): { robot: number; model: string; point: THREE.Vector3 | null; ground: THREE.Vector3 | null } {
+    const caster = this.caster(x, y),
+      ground = this.ground(x, y),
+      seen = this.seen(caster);
+    const { bases = [], models = [] } = this.description ?? {};
+    const model = models[seen?.model ?? -1]?.name ?? "";
+    let robot = bases.findIndex((base) => base.robot === model),
       nearest = 0.45;
     const place = new THREE.Matrix4(),
       at = new THREE.Vector3();
-    for (let i = 0; i < (this.description?.bases.length ?? 0); ++i) {
+    for (let i = 0; robot < 0 && !model && i < bases.length; ++i) {
+      // near it is enough
       if (!this.base(i, place)) continue;
       at.setFromMatrixPosition(place);
       at.z += 0.2;
       const away = caster.ray.distanceToPoint(at);
       if (away < nearest) [robot, nearest] = [i, away];
     }
-    return { robot, ground };
+    return {
+      robot,
+      model: model || (bases[robot]?.robot ?? ""),
+      point: seen?.point ?? null,
+      ground,
+    };
+  }
+
+  private caster(x: number, y: number): THREE.Raycaster {
+    const caster = new THREE.Raycaster();
+    caster.setFromCamera(this.ndc(x, y), this.camera);
+    return caster;
+  }
+
+  // The nearest model, but for the floor.
+  private seen(caster: THREE.Raycaster): { model: number; point: THREE.Vector3 } | null {
+    let nearest = Infinity,
+      found: { model: number; point: THREE.Vector3 } | null = null;
+    for (const { indices, meshes, far, shown } of [
+      ...(this.built?.standing ?? []),
+      ...(this.built?.movers ?? []),
+    ]) {
+      for (const mesh of far ? [...meshes, far.mesh] : meshes) {
+        if (mesh.userData.ground) continue;
+        mesh.boundingSphere = null; // of all instances, where they were once
+        for (const { distance, instanceId, point } of caster.intersectObject(mesh, false)) {
+          if (distance >= nearest) continue;
+          nearest = distance;
+          const place = (mesh === far?.mesh ? far.shown : shown)[instanceId!]!;
+          found = { model: this.modelOf(indices[place]!), point: point.clone() };
+        }
+      }
+    }
+    return found;
+  }
+
+  // The model that a link belongs to.
+  private modelOf(link: number): number {
+    return this.description!.models.findIndex(
+      ({ first_link, links }) => link >= first_link && link < first_link + links,
+    );
+  }
+
+  // Shows a model elsewhere, by what it is moved from where it is; null: as it is.
+  preview(model: ModelDescription | null, by: THREE.Matrix4): void {
+    this.moving = model
+      ? { first: model.first_link, end: model.first_link + model.links, by: by.clone() }
+      : null;
+    this.place(true);
+    this.touch();
+  }
+
+  // The box around a model as it is seen; empty where it shows nothing.
+  boxOf(model: ModelDescription): THREE.Box3 {
+    const box = new THREE.Box3(),
+      part = new THREE.Box3(),
+      matrix = new THREE.Matrix4();
+    for (const { indices, meshes, far } of [
+      ...(this.built?.standing ?? []),
+      ...(this.built?.movers ?? []),
+    ]) {
+      indices.forEach((link, place) => {
+        if (link < model.first_link || link >= model.first_link + model.links) return;
+        for (const mesh of meshes) {
+          if (mesh.userData.ground) continue;
+          if (!mesh.geometry.boundingBox) mesh.geometry.computeBoundingBox();
+          if (far) matrix.fromArray(far.matrices, 16 * place);
+          else mesh.getMatrixAt(place, matrix);
+          box.union(part.copy(mesh.geometry.boundingBox!).applyMatrix4(matrix));
+        }
+      });
+    }
+    return box;
   }
 
   private ndc(x: number, y: number): THREE.Vector2 {
@@ -386,6 +462,7 @@ export class Stage {
   private place(all: boolean): void {
     if (!this.built || (this.poses.size === 0 && !all)) return;
     for (const movers of this.built.movers) this.placeMovers(movers);
+    if (all) for (const standing of this.built.standing) this.placeStanding(standing);
     this.moved = this.regroup = true;
   }
 
@@ -406,15 +483,35 @@ export class Stage {
       if (link.body < this.poses.size)
         kLocal.premultiply(matrixOf(this.poses.now, 7 * link.body, kScratch));
       else kLocal.multiplyScalar(0);
-      kLocal.toArray(array, 16 * i);
+      this.shift(indices[i]!, kLocal).toArray(array, 16 * i);
     }
     if (!far) spread(meshes);
   }
 
+  private placeStanding({ links, indices, meshes }: Movers): void {
+    links.forEach(({ pose }, i) => {
+      this.shift(indices[i]!, matrixOf(pose, 0, kLocal)).toArray(
+        meshes[0]!.instanceMatrix.array as Float32Array,
+        16 * i,
+      );
+    });
+    spread(meshes);
+    for (const mesh of meshes) mesh.computeBoundingSphere();
+  }
+
+  // A link's place while its model is shown elsewhere.
+  private shift(link: number, matrix: THREE.Matrix4): THREE.Matrix4 {
+    const { moving } = this;
+    return moving && link >= moving.first && link < moving.end
+      ? matrix.premultiply(moving.by)
+      : matrix;
+  }
+
   // Shares many links out: those far from the camera are shown as boxes, wheels still farther not
   // at all.
-  private group({ links, indices, meshes, far }: Movers): void {
+  private group({ links, indices, meshes, far, shown }: Movers): void {
     if (!far) return;
+    shown.length = far.shown.length = 0;
     const near = meshes[0]!.instanceMatrix.array as Float32Array,
       away = far.mesh.instanceMatrix.array as Float32Array;
     const { matrices } = far,
@@ -432,6 +529,7 @@ export class Stage {
         into = isFar ? away : near,
         place = 16 * (isFar ? farOnes++ : nearOnes++);
       for (let k = 0; k < 16; ++k) into[place + k] = matrices[at + k]!;
+      (isFar ? far.shown : shown).push(i);
     }
     far.mesh.count = farOnes;
     far.mesh.instanceMatrix.needsUpdate = true;

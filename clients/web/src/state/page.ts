@@ -1,14 +1,22 @@
 // The page's state: what runs, what is shown of it, and how.
 import type { Hello, LinkState, Playback } from "../wire/link";
+import type { Past } from "../wire/rewind";
 import type { Description } from "../scene/description";
 import { kLayers, type Layer } from "../scene/layers";
 import type { ViewMode } from "../scene/stage";
 import { recall } from "../ui/dom";
+import type { HistoryState } from "../edit/history";
+import type { Thing } from "../ui/things";
 import { Store } from "./store";
 import type { World } from "./world";
 
 export const kTabs = ["Robot", "Plots", "Channels", "World"] as const;
 export type Tab = (typeof kTabs)[number];
+
+// What a click on the scene does: selects, places a thing, or draws.
+export type Tool = "select" | "wall" | "room" | "door" | Thing;
+// What the handles of the selected model do.
+export type Handle = "translate" | "rotate" | "scale";
 
 export interface PageState {
   link: LinkState;
@@ -21,10 +29,18 @@ export interface PageState {
   time_s: number; // sim time
   factor: number | null; // sim time per real time
   playback: Playback | null; // of a log
+  past: Past | null; // of a live run: the earlier moment that is shown; null: the present
+  kept: { begin: number; end: number }; // what can be shown of it
   layers: ReadonlySet<Layer>;
   mode: ViewMode;
   reduced: boolean; // drawn with fewer pixels than the page has
   theme: string;
+  selected: string; // name of the model that is being edited; "" for none
+  tool: Tool;
+  handle: Handle;
+  snap_m: number; // 0: off
+  edits: HistoryState;
+  saved: number; // changes that were done when the world was saved
   tab: Tab;
   panel: boolean; // is open
 }
@@ -45,11 +61,19 @@ export function makePage(): Page {
     time_s: 0,
     factor: null,
     playback: null,
+    past: null,
+    kept: { begin: 0, end: 0 },
     layers: new Set(kLayers.filter((layer) => layers.includes(layer))),
     mode: "orbit",
     reduced: false,
     theme:
       recall("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"),
+    selected: "",
+    tool: "select",
+    handle: "translate",
+    snap_m: Number(recall("snap") ?? 0.1),
+    edits: { undo: null, redo: null, changes: 0 },
+    saved: 0,
     tab: kTabs.find((name) => name === tab) ?? "Robot",
     panel: innerWidth >= 860 && recall("panel") !== "closed",
   });
@@ -62,11 +86,13 @@ export function stateWords({
   world,
   paused,
   playback,
+  past,
 }: Readonly<PageState>): [words: string, good: boolean | null] {
   if (link !== "open")
     return [link === "ended" ? "ended" : link === "lost" ? "no connection" : "connecting", false];
   if (hello?.mode === "log" && playback) return [playback.playing ? "log" : "log, paused", null];
   if (!world) return ["connected", true];
+  if (past) return [`${(past.end - past.now).toFixed(1)} s ago`, null];
   return paused ? ["paused", false] : ["running", true];
 }
 

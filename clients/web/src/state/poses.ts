@@ -10,7 +10,7 @@ export class Poses {
   now = new Float32Array(0); // x, y, z, qw, qx, qy, qz of each body
   utime = 0; // us, of the newest state
   private from = new Float32Array(0);
-  private to = new Float32Array(0);
+  to = new Float32Array(0); // of the newest state
   private known = new Uint8Array(0);
   private arrived = 0;
   private interval = 33;

@@ -15,7 +15,12 @@ const kKeys: [string[], string][] = [
   [["P"], "panel"],
   [["T"], "dark or light"],
   [["B"], "place something with the next click"],
-  [["Esc"], "do not"],
+  [["M", "E", "Z"], "move, turn or scale what is selected on the page World"],
+  [["Ctrl Z", "Ctrl Y"], "take back, do again"],
+  [["Ctrl D"], "a copy of it"],
+  [["Del"], "delete it"],
+  [["Ctrl S"], "save the world"],
+  [["Esc"], "leave a tool, select nothing"],
   [["?"], "these keys"],
 ];
 

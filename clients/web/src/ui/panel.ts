@@ -1,8 +1,6 @@
 // The panel beside the view: pages for the robot, its plots, the channels, and the world.
 import { kTabs, type Page, type Tab } from "../state/page";
-import type { Stage } from "../scene/stage";
-import { h, recall, remember } from "./dom";
-import { kThings, type Thing } from "./things";
+import { h, remember } from "./dom";
 
 const kSearched = 12; // more robots than these can be searched
 
@@ -17,23 +15,11 @@ export class Panel {
     "aria-label": "find a robot",
   });
   private names: string[] = [];
-  private readonly thing = h(
-    "select",
-    { class: "wide", "aria-label": "what to place" },
-    ...kThings.map(({ name }, i) => h("option", { value: i }, name)),
-  );
-  private readonly place = h(
-    "button",
-    { id: "place", click: () => this.arm(!this.armed) },
-    "Place by click (B)",
-  );
-  private armed = false;
 
   constructor(
     element: HTMLElement,
     private readonly page: Page,
-    private readonly stage: Stage,
-    pages: Record<Exclude<Tab, "World">, HTMLElement>,
+    pages: Record<Tab, HTMLElement>,
     choose: (robot: number) => void,
   ) {
     const tabs = h("div", { class: "tabs", role: "tablist", "aria-label": "panel" });
@@ -55,8 +41,7 @@ export class Panel {
         choose(this.names.indexOf(this.robots.options[0]!.value));
     });
     element.append(tabs, this.content);
-    const contents: Record<Tab, HTMLElement> = { ...pages, World: this.worldPage() };
-    page.watch(["tab"], ({ tab }) => this.show(tab, contents[tab]));
+    page.watch(["tab"], ({ tab }) => this.show(tab, pages[tab]));
     page.watch(["panel"], ({ panel }) =>
       document.getElementById("app")!.classList.toggle("closed", !panel),
     );
@@ -116,44 +101,5 @@ export class Panel {
     event.stopPropagation(); // arrows drive elsewhere
     this.open(kTabs[to]!);
     this.tabs.get(kTabs[to]!)!.focus();
-  }
-
-  private worldPage(): HTMLElement {
-    const { stage } = this;
-    const shadows = h("input", { type: "checkbox", checked: true });
-    shadows.addEventListener("change", () => stage.setShadows(shadows.checked));
-    const less = h("input", { type: "checkbox", checked: recall("detail") !== "full" });
-    less.addEventListener("change", () => {
-      remember("detail", less.checked ? "automatic" : "full");
-      stage.setAutomatic(less.checked);
-    });
-    stage.setAutomatic(less.checked);
-    return h(
-      "section",
-      {},
-      h("h2", {}, "Place"),
-      h("div", { class: "row" }, this.thing, this.place),
-      h("p", { class: "dim" }, "Then click on the ground."),
-      h("h2", {}, "View"),
-      h("label", { class: "check" }, shadows, "shadows"),
-      h("label", { class: "check" }, less, "less detail where drawing is slow"),
-      h("div", { class: "row" }, h("button", { click: () => stage.home() }, "Whole world (Home)")),
-    );
-  }
-
-  // What the next click on the ground places; null: nothing.
-  placing(): Thing | null {
-    return this.armed ? kThings[this.thing.selectedIndex]! : null;
-  }
-  startPlacing(): void {
-    this.arm(true);
-  }
-  stopPlacing(): void {
-    this.arm(false);
-  }
-  private arm(on: boolean): void {
-    this.armed = on;
-    this.place.classList.toggle("on", on);
-    document.getElementById("canvas")!.classList.toggle("placing", on);
   }
 }

@@ -1,17 +1,18 @@
-// What can be placed in a running world.
+// What can be placed in a world.
+import { boxModel, cylinderModel, sphereModel } from "../edit/sdf";
+
+// name: its model gets; a model of the server's, or SDF.
 export interface Thing {
   name: string;
   model: string;
   text: string;
-} // a model's name, or SDF
-
-const kBox = `<?xml version="1.0"?><sdf version="1.9"><model name="box"><link name="link"><inertial><mass>5</mass>
-<inertia><ixx>0.13</ixx><iyy>0.13</iyy><izz>0.13</izz><ixy>0</ixy><ixz>0</ixz><iyz>0</iyz></inertia></inertial>
-<collision name="c"><geometry><box><size>0.4 0.4 0.4</size></box></geometry></collision>
-<visual name="v"><geometry><box><size>0.4 0.4 0.4</size></box></geometry><material><diffuse>0.85 0.6 0.25 1</diffuse></material></visual></link></model></sdf>`;
+  label?: string;
+}
 
 export const kThings: Thing[] = [
-  { name: "a box", model: "", text: kBox },
-  { name: "Pioneer 3-AT", model: "p3at", text: "" },
-  { name: "Pioneer 3-DX", model: "p3dx", text: "" },
+  { label: "a box", name: "box", model: "", text: boxModel("box", [0.4, 0.4, 0.4]) },
+  { label: "a cylinder", name: "cylinder", model: "", text: cylinderModel("cylinder", 0.2, 0.5) },
+  { label: "a ball", name: "ball", model: "", text: sphereModel("ball", 0.2) },
+  { label: "Pioneer 3-AT", name: "p3at", model: "p3at", text: "" },
+  { label: "Pioneer 3-DX", name: "p3dx", model: "p3dx", text: "" },
 ];

@@ -1,11 +1,14 @@
 // The WebSocket to the program: texts, frames of messages, and what this page asks for. Comes back
 // by itself when the connection is lost.
+
+// save: the file that SAVE writes; "" for none.
 export interface Hello {
   mode: "live" | "log";
   title: string;
   version: string;
   info: string;
   fault: string;
+  save: string;
 }
 export interface Playback {
   begin: number;

@@ -115,6 +115,7 @@ export class LogFile implements RunLink {
       version: "",
       info: this.head.info,
       fault: this.note,
+      save: "",
     };
     this.last_ms = performance.now();
     setTimeout(() => {

@@ -1,0 +1,63 @@
+// A click on the scene: chooses, selects, places a thing, or makes a door.
+import * as THREE from "three";
+import { matrixOf } from "../scene/matrix";
+import type { Stage } from "../scene/stage";
+import type { Page } from "../state/page";
+import { toast } from "../ui/dom";
+import type { Editor } from "./editor";
+import type { Door } from "./sdf";
+
+const kClick_px = 5; // what the pointer may have moved
+
+export function listenToClicks(
+  canvas: HTMLElement,
+  page: Page,
+  stage: Stage,
+  editor: Editor,
+  door: Door,
+  busy: () => boolean,
+): void {
+  let down = { x: 0, y: 0 },
+    taken = false;
+  canvas.addEventListener("pointerdown", (event) => {
+    down = { x: event.clientX, y: event.clientY };
+    taken = busy();
+  });
+  canvas.addEventListener("pointerup", (event) => {
+    if (
+      event.button !== 0 ||
+      taken ||
+      Math.hypot(event.clientX - down.x, event.clientY - down.y) > kClick_px
+    )
+      return;
+    const { tool } = page.now,
+      picked = stage.pick(event.clientX, event.clientY);
+    if (tool === "wall" || tool === "room") return;
+    if (tool === "door") return makeDoor(picked.model, picked.point, editor, door);
+    if (tool !== "select") {
+      if (!picked.ground) return;
+      page.set({ tool: "select" });
+      void editor
+        .add(tool, [picked.ground.x, picked.ground.y, 0, 1, 0, 0, 0], true)
+        .then((good) => {
+          if (good) toast("Placed.");
+        });
+      return;
+    }
+    if (page.now.tab === "World" && page.now.controlled && page.now.hello?.mode === "live")
+      page.set({ selected: picked.model });
+    const robot =
+      page.now.world?.robots.findIndex(
+        ({ name }) => name === page.now.scene?.bases[picked.robot]?.robot,
+      ) ?? -1;
+    if (robot >= 0) page.set({ robot });
+  });
+}
+
+// Doors go all the way through: where along the wall is what counts.
+function makeDoor(name: string, point: THREE.Vector3 | null, editor: Editor, door: Door): void {
+  const pose = editor.pose(name);
+  if (!name || !point || !pose) return toast("There is no wall here.", "error");
+  const at = point.clone().applyMatrix4(matrixOf(pose, 0, new THREE.Matrix4()).invert());
+  void editor.door(name, [at.x, at.y], door);
+}

@@ -1,0 +1,127 @@
+// Walls and rooms, drawn on the floor by a drag.
+import * as THREE from "three";
+import type { Stage } from "../scene/stage";
+import type { Page } from "../state/page";
+import type { Editor } from "./editor";
+import { roomModel, wallModel, type WallStyle } from "./sdf";
+
+const kShortest_m = 0.2;
+type Point = { x: number; y: number };
+
+export class Draw {
+  style: WallStyle = { height: 1.2, thickness: 0.1 };
+  onLength: (words: string) => void = () => undefined; // what is being drawn, in words
+  private from: Point | null = null;
+  private to: Point = { x: 0, y: 0 };
+  private readonly ghost = new THREE.LineSegments(
+    new THREE.EdgesGeometry(new THREE.BoxGeometry(1, 1, 1)),
+    new THREE.LineBasicMaterial({
+      color: 0x35c2ad,
+      toneMapped: false,
+      fog: false,
+      depthTest: false,
+    }),
+  );
+
+  constructor(
+    private readonly page: Page,
+    private readonly stage: Stage,
+    private readonly editor: Editor,
+    canvas: HTMLCanvasElement,
+  ) {
+    this.ghost.visible = false;
+    stage.scene.add(this.ghost);
+    page.watch(["tool"], () => {
+      this.cancel();
+      stage.controls.enabled = !this.drawing;
+    });
+    canvas.addEventListener("pointerdown", (event) => {
+      if (this.drawing && event.button === 0) this.begin(canvas, event);
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      if (this.from) this.drag(event);
+    });
+    canvas.addEventListener("pointerup", () => void this.finish());
+    canvas.addEventListener("pointercancel", () => this.cancel());
+  }
+
+  get drawing(): boolean {
+    return this.page.now.tool === "wall" || this.page.now.tool === "room";
+  }
+
+  cancel(): void {
+    this.from = null;
+    this.ghost.visible = false;
+    this.onLength("");
+    this.stage.touch();
+  }
+
+  private ground(event: PointerEvent): Point | null {
+    const point = this.stage.ground(event.clientX, event.clientY),
+      snap = this.page.now.snap_m;
+    if (!point) return null;
+    const near = (value: number) => (snap > 0 ? Math.round(value / snap) * snap : value);
+    return { x: near(point.x), y: near(point.y) };
+  }
+
+  private begin(canvas: HTMLCanvasElement, event: PointerEvent): void {
+    this.from = this.ground(event);
+    if (this.from) this.to = this.from;
+    canvas.setPointerCapture(event.pointerId);
+  }
+
+  private drag(event: PointerEvent): void {
+    const point = this.ground(event);
+    if (!point || !this.from) return;
+    this.to = point;
+    const { from, to } = this,
+      { height, thickness } = this.style,
+      dx = to.x - from.x,
+      dy = to.y - from.y,
+      room = this.page.now.tool === "room";
+    const length = Math.hypot(dx, dy);
+    this.onLength(
+      room
+        ? `${Math.abs(dx).toFixed(2)} × ${Math.abs(dy).toFixed(2)} m`
+        : `${length.toFixed(2)} m, ${((Math.atan2(dy, dx) * 180) / Math.PI).toFixed(0)}°`,
+    );
+    this.ghost.visible = true;
+    this.ghost.position.set((from.x + to.x) / 2, (from.y + to.y) / 2, height / 2);
+    this.ghost.rotation.z = room ? 0 : Math.atan2(dy, dx);
+    this.ghost.scale.set(
+      Math.max(0.01, room ? Math.abs(dx) : length),
+      Math.max(thickness, room ? Math.abs(dy) : 0),
+      height,
+    );
+    this.stage.touch();
+  }
+
+  private async finish(): Promise<void> {
+    const { from, to } = this;
+    if (!from) return;
+    const { tool } = this.page.now,
+      dx = to.x - from.x,
+      dy = to.y - from.y,
+      x = (from.x + to.x) / 2,
+      y = (from.y + to.y) / 2;
+    this.cancel();
+    if (tool === "wall" && Math.hypot(dx, dy) >= kShortest_m) {
+      const half = Math.atan2(dy, dx) / 2;
+      await this.editor.add(
+        { name: "wall", model: "", text: wallModel("wall", Math.hypot(dx, dy), this.style) },
+        [x, y, 0, Math.cos(half), 0, 0, Math.sin(half)],
+        false,
+      );
+    } else if (tool === "room" && Math.min(Math.abs(dx), Math.abs(dy)) >= kShortest_m) {
+      await this.editor.add(
+        {
+          name: "room",
+          model: "",
+          text: roomModel("room", Math.abs(dx), Math.abs(dy), this.style),
+        },
+        [x, y, 0, 1, 0, 0, 0],
+        false,
+      );
+    }
+  }
+}

@@ -1,0 +1,249 @@
+// Changes of the world, as requests that any client could make, each of which can be taken back.
+import { request_t } from "../../generated/messages";
+import type { Control } from "../control";
+import type { ModelDescription } from "../scene/description";
+import type { Page } from "../state/page";
+import type { Poses } from "../state/poses";
+import { toast } from "../ui/dom";
+import type { Thing } from "../ui/things";
+import { encode } from "../wire/lcm";
+import { History } from "./history";
+import { poseNow, samePose, type Pose7 } from "./pose";
+import { scaled, withDoor, type Door, type Size } from "./sdf";
+
+const kCopyAside_m = 0.5;
+const kRest_m = 2e-4; // in a moment: less is rest
+const kLook_ms = 250; // between two looks at what settles
+const kLongestSettling_s = 10; // of sim time
+
+export class Editor {
+  readonly history: History;
+  private readonly given = new Set<string>(); // names of what was placed, maybe not in the scene yet
+
+  // lowest: height of a model's lowest point as it is seen.
+  constructor(
+    private readonly page: Page,
+    private readonly poses: Poses,
+    private readonly control: Control,
+    private readonly lowest: (model: ModelDescription) => number,
+  ) {
+    this.history = new History((edits) => page.set({ edits }));
+    page.watch(["scene"], ({ scene, selected }) => {
+      if (selected && scene && !this.given.has(selected) && !this.find(selected))
+        page.set({ selected: "" });
+    });
+  }
+
+  // The models that are there.
+  get models(): ModelDescription[] {
+    return this.page.now.scene?.models.filter(({ name }) => name !== "") ?? [];
+  }
+  find(name: string): ModelDescription | undefined {
+    return this.models.find((model) => model.name === name);
+  }
+  pose(name: string): Pose7 | null {
+    const model = this.find(name);
+    return model ? poseNow(model, this.poses) : null;
+  }
+
+  // ---- what can be done
+
+  move(name: string, to: Pose7): Promise<boolean> {
+    const from = this.pose(name);
+    if (!from || samePose(from, to)) return Promise.resolve(false);
+    return this.history.do({
+      name: `move ${name}`,
+      apply: () => this.setPose(name, to),
+      revert: () => this.setPose(name, from),
+    });
+  }
+
+  // Onto the ground there, or at a pose.
+  add({ name: base, model, text }: Thing, to: Pose7, onGround: boolean): Promise<boolean> {
+    const name = this.unusedName(base);
+    this.given.add(name);
+    return this.history.do({
+      name: `place ${name}`,
+      apply: () => this.spawn(name, { model, text }, to, onGround),
+      revert: () => this.take(name),
+    });
+  }
+
+  async remove(name: string): Promise<boolean> {
+    const from = this.pose(name),
+      text = await this.text(name);
+    if (!from || text === null) return false;
+    return this.history.do({
+      name: `delete ${name}`,
+      apply: () => this.take(name),
+      revert: () => this.spawn(name, { model: "", text }, from, false),
+    });
+  }
+
+  async duplicate(name: string): Promise<boolean> {
+    const from = this.pose(name),
+      text = await this.text(name);
+    if (!from || text === null) return false;
+    const copy = this.unusedName(name),
+      to = [from[0]! + kCopyAside_m, ...from.slice(1)];
+    this.given.add(copy);
+    const good = await this.history.do({
+      name: `duplicate ${name}`,
+      apply: () => this.spawn(copy, { model: "", text }, to, false),
+      revert: () => this.take(copy),
+    });
+    if (good) this.page.set({ selected: copy });
+    return good;
+  }
+
+  // What stands on the ground goes on standing there.
+  scale(name: string, factor: Size): Promise<boolean> {
+    const model = this.find(name),
+      pose = this.pose(name),
+      low = model ? this.lowest(model) : 0;
+    const raise = pose && Number.isFinite(low) ? (pose[2]! - low) * (factor[2] - 1) : 0;
+    return this.rewrite(name, `scale ${name}`, (text) => scaled(text, factor), raise);
+  }
+
+  // at: a point in the model's frame.
+  door(name: string, at: [x: number, y: number], door: Door): Promise<boolean> {
+    return this.rewrite(name, `door in ${name}`, (text) => withDoor(text, at, door));
+  }
+
+  // Lets physics go on until nothing moves any more.
+  settle(): Promise<boolean> {
+    let before = new Map<string, Pose7>();
+    return this.history.do({
+      name: "settle",
+      apply: async () => {
+        before = new Map(
+          this.models
+            .filter(({ fast, path }) => !fast && !path)
+            .map((model) => [model.name, poseNow(model, this.poses)]),
+        );
+        if (!(await this.control.request(request_t.RESUME))) return false;
+        await this.rest();
+        return this.control.request(request_t.PAUSE);
+      },
+      revert: async () => {
+        let good = true;
+        for (const [name, pose] of before) {
+          const now = this.pose(name);
+          if (now && !samePose(now, pose, 1e-4)) good = (await this.setPose(name, pose)) && good;
+        }
+        return good;
+      },
+    });
+  }
+
+  async save(): Promise<boolean> {
+    const { changes } = this.page.now.edits,
+      reply = await this.control.ask(request_t.SAVE);
+    if (!reply) return false;
+    this.page.set({ saved: changes });
+    toast(reply.text ? `Saved; but ${reply.text}.` : `Saved to ${this.page.now.hello?.save}.`);
+    return true;
+  }
+
+  // ---- how it is asked for
+
+  private setPose(name: string, pose: Pose7): Promise<boolean> {
+    return this.control.request(
+      request_t.SET_POSE,
+      encode("set_pose_request_t", { name, ...placeOf(pose) }),
+    );
+  }
+
+  private spawn(
+    name: string,
+    { model, text }: { model: string; text: string },
+    pose: Pose7,
+    onGround: boolean,
+  ): Promise<boolean> {
+    return this.control.request(
+      request_t.SPAWN,
+      encode("spawn_request_t", { name, model, text, on_ground: onGround, ...placeOf(pose) }),
+    );
+  }
+
+  private take(name: string): Promise<boolean> {
+    this.given.delete(name);
+    return this.control.request(request_t.REMOVE, encode("name_request_t", { name }));
+  }
+
+  // Another text for a model, raised by so much; where the new one cannot stand there, the old one comes back.
+  private async rewrite(
+    name: string,
+    what: string,
+    change: (text: string) => string,
+    raise = 0,
+  ): Promise<boolean> {
+    const from = this.pose(name),
+      old = await this.text(name);
+    if (!from || old === null) return false;
+    let fresh: string;
+    try {
+      fresh = change(old);
+    } catch (error) {
+      toast(`${name}: ${(error as Error).message}.`, "error");
+      return false;
+    }
+    const exchange = async (text: string, back: string, up: number) => {
+      const pose = this.pose(name) ?? from,
+        raised = [pose[0]!, pose[1]!, pose[2]! + up, ...pose.slice(3)];
+      this.given.add(name); // it is gone for a moment
+      if (!(await this.control.request(request_t.REMOVE, encode("name_request_t", { name }))))
+        return false;
+      if (await this.spawn(name, { model: "", text }, raised, false)) return true;
+      await this.spawn(name, { model: "", text: back }, pose, false);
+      return false;
+    };
+    return this.history.do({
+      name: what,
+      apply: () => exchange(fresh, old, raise),
+      revert: () => exchange(old, fresh, -raise),
+    });
+  }
+
+  // What SPAWN takes to make that model; null, said in a note, where there is none.
+  private async text(name: string): Promise<string | null> {
+    const index = this.page.now.scene?.models.findIndex((model) => model.name === name) ?? -1;
+    const answer = index >= 0 ? await fetch(`/scene/models/${index}`).catch(() => null) : null;
+    if (answer?.ok) return answer.text();
+    toast(
+      `${name} has no text of its own in the file, as robots of a fleet: it can be moved, and nothing else.`,
+      "error",
+    );
+    return null;
+  }
+
+  private unusedName(name: string): string {
+    const taken = new Set([...this.models.map((model) => model.name), ...this.given]);
+    if (!taken.has(name)) return name;
+    const stem = name.replace(/_\d+$/, "");
+    let number = 2;
+    while (taken.has(`${stem}_${number}`)) ++number;
+    return `${stem}_${number}`;
+  }
+
+  private async rest(): Promise<void> {
+    const begun_s = this.page.now.time_s;
+    let before: number[] = [],
+      still = 0;
+    while (this.page.now.time_s - begun_s < kLongestSettling_s && still < 3) {
+      await new Promise((resolve) => setTimeout(resolve, kLook_ms));
+      if (this.page.now.link !== "open") return;
+      const now = [...this.poses.to],
+        moved =
+          now.length !== before.length ||
+          now.some((value, i) => Math.abs(value - before[i]!) > kRest_m);
+      still = moved || this.page.now.time_s === begun_s ? 0 : still + 1;
+      before = now;
+    }
+  }
+}
+
+const placeOf = (pose: Pose7) => ({
+  position: new Float64Array(pose.slice(0, 3)),
+  orientation: new Float64Array(pose.slice(3)),
+});

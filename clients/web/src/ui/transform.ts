@@ -1,0 +1,162 @@
+// The selected model in numbers: where it stands, its handles, its copy and its end.
+import type { Editor } from "../edit/editor";
+import { numbersOf, poseFrom, samePose } from "../edit/pose";
+import type { Handle, Page } from "../state/page";
+import { h, recall, remember, say } from "./dom";
+
+const kFields = [
+  ["x", "m"],
+  ["y", "m"],
+  ["z", "m"],
+  ["roll", "°"],
+  ["pitch", "°"],
+  ["yaw", "°"],
+] as const;
+const kHandles: [Handle, string, string][] = [
+  ["translate", "Move", "M"],
+  ["rotate", "Turn", "E"],
+  ["scale", "Scale", "Z"],
+];
+const kSnaps = [0, 0.01, 0.05, 0.1, 0.25, 0.5, 1];
+
+export class Transform {
+  readonly element: HTMLElement;
+  private readonly title = h("h2", { id: "selected" });
+  private readonly fields = kFields.map(([name]) =>
+    h("input", {
+      type: "number",
+      step: name.length === 1 ? 0.1 : 15,
+      "aria-label": name,
+      "data-number": name,
+    }),
+  );
+  private readonly factors = ["x", "y", "z"].map((axis) =>
+    h("input", {
+      type: "number",
+      step: 0.1,
+      min: 0.01,
+      value: 1,
+      "aria-label": `factor along ${axis}`,
+    }),
+  );
+  private readonly body: HTMLElement;
+
+  constructor(
+    private readonly page: Page,
+    private readonly editor: Editor,
+  ) {
+    for (const field of this.fields) field.addEventListener("change", () => this.put());
+    const handles = kHandles.map(([handle, name, key]) =>
+      h(
+        "button",
+        {
+          "data-handle": handle,
+          title: `${name.toLowerCase()} by handles (${key})`,
+          click: () => page.set({ handle }),
+        },
+        name,
+      ),
+    );
+    const snap = h(
+      "select",
+      { "aria-label": "snap" },
+      ...kSnaps.map((value) => h("option", { value }, value === 0 ? "no snap" : `snap ${value} m`)),
+    );
+    snap.value = String(page.now.snap_m);
+    snap.addEventListener("change", () => {
+      remember("snap", snap.value);
+      page.set({ snap_m: Number(snap.value) });
+    });
+    if (recall("snap") === null) snap.value = "0.1";
+    this.body = h(
+      "div",
+      {},
+      h("div", { class: "row" }, ...handles, snap),
+      h(
+        "div",
+        { class: "numbers" },
+        ...this.fields.map((field, i) =>
+          h(
+            "label",
+            {},
+            h("span", { class: "dim" }, `${kFields[i]![0]}, ${kFields[i]![1]}`),
+            field,
+          ),
+        ),
+      ),
+      h(
+        "div",
+        { class: "row" },
+        h("span", { class: "dim" }, "scale"),
+        ...this.factors,
+        h("button", { id: "scale", click: () => this.scale() }, "Scale"),
+      ),
+      h(
+        "div",
+        { class: "row" },
+        h(
+          "button",
+          {
+            id: "duplicate",
+            title: "a copy beside it (Ctrl D)",
+            click: () => void editor.duplicate(page.now.selected),
+          },
+          "Duplicate",
+        ),
+        h(
+          "button",
+          {
+            id: "delete",
+            title: "take it away (Delete)",
+            click: () => void editor.remove(page.now.selected),
+          },
+          "Delete",
+        ),
+      ),
+    );
+    this.element = h("section", {}, this.title, this.body);
+    page.watch(["handle"], ({ handle }) => {
+      for (const button of handles) {
+        button.classList.toggle("on", button.dataset.handle === handle);
+        button.setAttribute("aria-pressed", button.dataset.handle === handle ? "true" : "false");
+      }
+    });
+    page.watch(["selected", "scene"], () => this.show());
+  }
+
+  // The numbers, as things move; what is being typed stays.
+  show(): void {
+    const { selected } = this.page.now,
+      pose = this.editor.pose(selected);
+    say(this.title, selected || "Nothing is selected: click a model");
+    this.body.hidden = !pose;
+    if (!pose || this.fields.includes(document.activeElement as HTMLInputElement)) return;
+    numbersOf(pose).forEach((value, i) => {
+      const text = String(Number(value.toFixed(i < 3 ? 4 : 2)) || 0),
+        field = this.fields[i]!;
+      if (field.value !== text) field.value = text;
+    });
+  }
+
+  private put(): void {
+    const { selected } = this.page.now,
+      numbers = this.fields.map((field) => Number(field.value)),
+      pose = this.editor.pose(selected);
+    if (!pose || numbers.some((value) => !Number.isFinite(value))) return;
+    // What was not typed is as it was, to the last digit.
+    const before = numbersOf(pose),
+      to = poseFrom(
+        numbers.map((value, i) =>
+          Math.abs(value - before[i]!) < (i < 3 ? 6e-5 : 6e-3) ? before[i]! : value,
+        ),
+      );
+    if (!samePose(pose, to)) void this.editor.move(selected, to);
+  }
+
+  private scale(): void {
+    const [x, y, z] = this.factors.map((field) => Number(field.value)) as [number, number, number];
+    void this.editor.scale(this.page.now.selected, [x, y, z]).then((good) => {
+      if (good) for (const field of this.factors) field.value = "1";
+    });
+  }
+}

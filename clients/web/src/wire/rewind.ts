@@ -1,0 +1,232 @@
+// The last minutes of a live run as this page has seen them: a link that keeps what passes, so that an earlier moment can be shown
+// while the run goes on. What the page steers acts on the run, whatever is shown.
+
+import { kTypes } from "../../generated/messages";
+import type { LinkHandler, RunLink } from "./link";
+import { newestAt } from "./log_file";
+import { typeOf } from "./lcm";
+
+export const kMostBytes = 96 * 1024 * 1024,
+  kMostSeconds = 180;
+const kTick_ms = 33;
+
+interface Entry {
+  time: number;
+  messages: Uint8Array[];
+} // parts of one message stand together
+export interface Past {
+  begin: number;
+  end: number;
+  now: number;
+  playing: boolean;
+  speed: number;
+}
+
+// The offset of a message's int16 `part`, after its utime; -1: it has none.
+function partOffset(type: string): number {
+  let at = 8;
+  for (const { name, type: of, sizes } of kTypes[type] ?? []) {
+    if (name === "part" && of === "int16_t") return at;
+    const size = (
+      {
+        int64_t: 8,
+        double: 8,
+        int32_t: 4,
+        float: 4,
+        int16_t: 2,
+        int8_t: 1,
+        byte: 1,
+        boolean: 1,
+      } as Record<string, number>
+    )[of];
+    if (size === undefined || sizes.length > 0) return -1;
+    at += size;
+  }
+  return -1;
+}
+
+const kNow = new Set(["reply_t", "world_info_t"]); // go to the page whatever is shown
+const offsets = new Map<string, number>();
+
+export class Rewind implements RunLink {
+  private handler!: LinkHandler;
+  private readonly entries = new Map<string, Entry[]>();
+  private readonly order: { channel: string; size: number; time: number }[] = []; // of all entries, the oldest first from `first` on
+  private first = 0;
+  private bytes = 0;
+  private newest_s = 0;
+  private epoch = -1;
+  private past: { now: number; playing: boolean; speed: number } | null = null; // null: the present is shown
+  private shown = new Map<string, Entry>();
+  private last_ms = 0;
+  onPast: (past: Past | null, range: { begin: number; end: number }) => void = () => undefined;
+
+  constructor(private readonly inner: RunLink) {
+    setInterval(() => this.tick(), kTick_ms);
+  }
+
+  get range(): { begin: number; end: number } {
+    return { begin: this.order[this.first]?.time ?? this.newest_s, end: this.newest_s };
+  }
+
+  connect(handler: LinkHandler): void {
+    this.handler = handler;
+    this.inner.connect({
+      ...(Object.fromEntries(
+        (["state", "hello", "scene", "playback", "traffic", "refused"] as const).map((name) => [
+          name,
+          (...values: never[]) =>
+            (handler[name] as (...values: never[]) => void).call(handler, ...values),
+        ]),
+      ) as unknown as LinkHandler),
+      message: (channel, bytes) => this.onMessage(channel, bytes),
+    });
+  }
+  want(channels: Iterable<string>): void {
+    this.inner.want(channels);
+  }
+  watchTraffic(on: boolean): void {
+    this.inner.watchTraffic(on);
+  }
+  command(channel: string, message: Uint8Array): boolean {
+    return this.inner.command(channel, message);
+  }
+  play(on: boolean, speed: number): void {
+    if (!this.past) return this.inner.play(on, speed);
+    Object.assign(this.past, { playing: on, speed });
+    this.tell();
+  }
+  seek(time_s: number): void {
+    this.inner.seek(time_s);
+  }
+
+  // Shows that moment of sim time, as far as it is kept.
+  show(time_s: number): void {
+    const { begin, end } = this.range,
+      now = Math.max(begin, Math.min(end, time_s));
+    this.past = { now, playing: false, speed: this.past?.speed ?? 1 };
+    this.shown.clear();
+    this.last_ms = performance.now();
+    this.tell();
+    this.bring();
+  }
+
+  // Back to what runs.
+  live(): void {
+    if (!this.past) return;
+    this.past = null;
+    this.tell();
+    for (const [channel, entries] of this.entries)
+      for (const message of entries.at(-1)?.messages ?? []) this.handler.message(channel, message);
+  }
+
+  // Nothing of it holds any more.
+  clear(): void {
+    this.entries.clear();
+    this.order.length = this.first = this.bytes = this.newest_s = 0;
+    this.live();
+    this.tell();
+  }
+
+  // What was kept of a channel, in order: for plots.
+  *kept(channel: string): Iterable<Uint8Array> {
+    for (const entry of this.entries.get(channel) ?? []) yield* entry.messages;
+  }
+
+  private onMessage(channel: string, bytes: Uint8Array): void {
+    const type = typeOf(bytes);
+    if (!type || kNow.has(type)) return this.handler.message(channel, bytes);
+    if (type === "world_state_t" || type === "tick_t") this.heed(type, bytes);
+    this.keep(channel, type, bytes);
+    if (!this.past) this.handler.message(channel, bytes);
+  }
+
+  // A world that begins anew has no past.
+  private heed(type: string, bytes: Uint8Array): void {
+    const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength),
+      at = type === "world_state_t" ? 16 : epochOffset();
+    if (bytes.length < at + 4) return;
+    const epoch = view.getInt32(at);
+    if (epoch === this.epoch) return;
+    this.epoch = epoch;
+    this.clear();
+  }
+
+  private keep(channel: string, type: string, bytes: Uint8Array): void {
+    const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength),
+      hasTime = kTypes[type]?.[0]?.name === "utime" && bytes.length >= 16;
+    const time = hasTime ? Number(view.getBigInt64(8)) * 1e-6 : this.newest_s;
+    this.newest_s = Math.max(this.newest_s, time);
+    let offset = offsets.get(type);
+    if (offset === undefined) offsets.set(type, (offset = partOffset(type)));
+    let entries = this.entries.get(channel);
+    if (!entries) this.entries.set(channel, (entries = []));
+    const last = entries.at(-1),
+      later = offset >= 0 && bytes.length >= offset + 2 && view.getInt16(offset) !== 0;
+    const copy = bytes.slice(); // of its own: a frame is not held by its smallest message
+    if (later && last) last.messages.push(copy);
+    else if (last && last.time >= time)
+      last.messages = [copy]; // of the same moment, the newer one
+    else {
+      entries.push({ time, messages: [copy] });
+      this.order.push({ channel, size: 0, time });
+    }
+    this.bytes += bytes.length;
+    this.order.at(-1)!.size += bytes.length;
+    this.forget();
+  }
+
+  private forget(): void {
+    while (
+      this.first < this.order.length - 1 &&
+      (this.bytes > kMostBytes || this.order[this.first]!.time < this.newest_s - kMostSeconds)
+    ) {
+      const { channel, size } = this.order[this.first++]!;
+      this.entries.get(channel)?.shift();
+      this.bytes -= size;
+    }
+    if (this.first > 4096) (this.order.splice(0, this.first), (this.first = 0));
+  }
+
+  private tick(): void {
+    const { past } = this,
+      now_ms = performance.now(),
+      passed_s = Math.min(0.5, (now_ms - this.last_ms) / 1000);
+    this.last_ms = now_ms;
+    if (past) {
+      const { begin, end } = this.range;
+      past.now = Math.max(
+        begin,
+        past.playing ? Math.min(end, past.now + passed_s * past.speed) : past.now,
+      );
+      past.playing &&= past.now < end;
+      this.bring();
+    }
+    this.tell();
+  }
+
+  private bring(): void {
+    if (!this.past) return;
+    for (const [channel, entries] of this.entries) {
+      const entry = entries[newestAt(entries, this.past.now)];
+      if (!entry || this.shown.get(channel) === entry) continue;
+      this.shown.set(channel, entry);
+      for (const message of entry.messages) this.handler.message(channel, message);
+    }
+  }
+
+  private tell(): void {
+    this.onPast(this.past && { ...this.range, ...this.past }, this.range);
+  }
+}
+
+let tickEpoch = -1;
+function epochOffset(): number {
+  if (tickEpoch >= 0) return tickEpoch;
+  let at = 8;
+  for (const { name, type } of kTypes.tick_t!) {
+    if (name === "epoch") break;
+    at += type === "int64_t" || type === "double" ? 8 : 4;
+  }
+  return (tickEpoch = at);
+}

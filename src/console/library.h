@@ -1,0 +1,40 @@
+// The models that a world can be furnished with: those of Ruedo, and those in the `models` folders
+// beside the world's file. Served as a list, and each as a scene of its own for a picture.
+#pragma once
+
+#include <list>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "console/scene_data.h"
+
+namespace ruedo::console {
+
+class Library {
+ public:
+  static constexpr size_t kMostModels = 1000;
+  static constexpr size_t kKept = 8;  // scenes that are kept
+
+  explicit Library(std::string world_file) : world_file_(std::move(world_file)) {}
+
+  // [{"name": "desk", "robot": false}, ...]: names that SPAWN takes.
+  std::string list();
+  // Null for a number that is not in the list, and for a model that cannot be read.
+  const SceneData* scene(size_t index);
+
+ private:
+  struct Entry {
+    std::string name;
+    bool robot;
+  };
+  const std::vector<Entry>& entries();
+
+  std::string world_file_;
+  std::vector<Entry> entries_;
+  bool listed_ = false;
+  std::list<std::pair<size_t, std::unique_ptr<SceneData>>> scenes_;  // the last used first
+};
+
+}  // namespace ruedo::console

@@ -1,0 +1,73 @@
+// A world's file as text, and the text of the same world with models elsewhere, gone, and new. What
+// has not changed stays as it was written, to the byte: comments, order, spaces.
+#pragma once
+
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "model/world_model.h"
+#include "model/xml_text.h"
+
+namespace ruedo::model {
+
+// A model of the world as it is now.
+struct ModelNow {
+  std::string name;
+  Pose X_WM;
+  std::string spawned;  // SDF or URDF that it came from; "": it is of the file
+  bool put = false;     // somebody put it there: micrometres count, else what is less than a
+                        // millimetre is the solver's
+};
+
+class WorldText {
+ public:
+  // text: SDF with a <world>, from which `first` was loaded. Throws InputError.
+  WorldText(std::string text, const WorldModel& first);
+
+  // SDF of a model of the file, as SPAWN takes it; "" where it has no element of its own.
+  std::string model_text(const std::string& name) const;
+
+  struct Written {
+    std::string text;
+    std::vector<std::string> left_out;  // what cannot be said in the file: one sentence each
+  };
+  // Throws InputError for a model whose text cannot stand in a world.
+  Written with(const std::vector<ModelNow>& models) const;
+
+ private:
+  struct Entry {  // a model and its element
+    std::string name;
+    Pose X_WM;
+    const TextElement* place;
+    const Element* element;
+  };
+
+  void match(const WorldModel& first);
+  std::set<std::string> moved_with(std::set<std::string> changed) const;
+  void drop(const TextElement& element, TextPatch& patch) const;
+  void drop_states(const std::set<std::string>& names, TextPatch& patch) const;
+  std::string tail(const std::string& elements) const;
+
+  std::string text_;
+  std::unique_ptr<const Element> root_;
+  TextElement places_;
+  const Element* world_ = nullptr;
+  const TextElement* world_place_ = nullptr;
+  std::vector<Entry> entries_;
+  std::vector<ModelInstance> others_;  // without an element of their own: of a fleet, actors
+};
+
+// The text of the world that a file is loaded as: the file's own, or, of a robot or a model, that
+// of a floor with it.
+std::string world_text_of(const WorldModel& world);
+
+// A floor and a sun.
+extern const char* const kEmptyWorld;
+
+// The same text for a file in another folder: relative paths lead to the same files.
+std::string moved_to(const std::string& text, const std::string& from_folder,
+                     const std::string& to_folder);
+
+}  // namespace ruedo::model

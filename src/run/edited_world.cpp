@@ -1,0 +1,173 @@
+// A file is written beside the old one, and takes its name when it is on the disk.
+#include "run/edited_world.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include "model/document.h"
+#include "ruedo/errors.h"
+
+namespace fs = std::filesystem;
+
+namespace ruedo::run {
+namespace {
+
+// The bytes of a file; none where it cannot be read.
+std::optional<std::string> bytes_of(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return std::nullopt;
+  return std::string{std::istreambuf_iterator<char>(file), {}};
+}
+
+mode_t mode_for(const std::string& path) {
+  struct stat info{};
+  if (::stat(path.c_str(), &info) == 0) return info.st_mode & 07777;
+  return 0644;
+}
+
+bool write_all(int file, const std::string& bytes) {
+  for (size_t done = 0; done < bytes.size();) {
+    const ssize_t count = ::write(file, bytes.data() + done, bytes.size() - done);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) return false;
+    done += static_cast<size_t>(count);
+  }
+  return true;
+}
+
+// What went wrong, or "". The old file stays whole until the new one is.
+std::string write_file(const std::string& path, const std::string& bytes) {
+  const fs::path folder = fs::path(path).parent_path();
+  std::string part = (folder / ("." + fs::path(path).filename().string() + ".XXXXXX")).string();
+  const int file = ::mkostemp(part.data(), O_CLOEXEC);
+  if (file < 0) return std::strerror(errno);
+  bool good = write_all(file, bytes) && ::fchmod(file, mode_for(path)) == 0 && ::fsync(file) == 0;
+  std::string fault = good ? "" : std::strerror(errno);
+  ::close(file);
+  if (good && ::rename(part.c_str(), path.c_str()) != 0) {
+    fault = std::strerror(errno);
+    good = false;
+  }
+  if (!good) {
+    ::unlink(part.c_str());
+    return fault;
+  }
+  if (const int opened = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC); opened >= 0) {
+    ::fsync(opened);
+    ::close(opened);
+  }
+  return "";
+}
+
+// Links are followed: what they lead to is written.
+std::string full(const std::string& file) {
+  if (file.empty()) return "";
+  std::error_code error;
+  const fs::path path = fs::weakly_canonical(fs::absolute(file), error);
+  return error ? fs::absolute(file).string() : path.string();
+}
+
+}  // namespace
+
+EditedWorld::EditedWorld(const model::WorldModel& first, std::string file)
+    : first_(first), file_(full(file)) {
+  try {
+    source_ = model::world_text_of(first);
+  } catch (const InputError& error) {
+    fault_ = error.what();
+  }
+  if (saves()) known_ = bytes_of(file_);
+}
+
+void EditedWorld::begin() {
+  const std::lock_guard lock(mutex_);
+  spawned_.clear();
+  put_.clear();
+}
+
+void EditedWorld::spawned(const std::string& name, const spawn_request_t& body) {
+  const bool named = !body.model.empty();
+  const bool path = body.model.find("://") != std::string::npos ||
+                    fs::path(body.model).has_extension() || fs::path(body.model).is_absolute();
+  const std::lock_guard lock(mutex_);
+  put_.insert(name);
+  spawned_[name] = named
+                       ? "<?xml version=\"1.0\"?>\n<sdf version=\"1.9\">\n<include>\n      <uri>" +
+                             model::escaped((path ? "" : "model://") + body.model) +
+                             "</uri>\n    </include>\n</sdf>\n"
+                       : body.text;
+}
+
+void EditedWorld::put(const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  put_.insert(name);
+}
+
+void EditedWorld::removed(const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  spawned_.erase(name);
+  put_.erase(name);
+}
+
+const model::WorldText& EditedWorld::text() const {
+  if (!fault_.empty()) throw InputError({}, fault_);
+  if (!text_) text_ = std::make_unique<model::WorldText>(source_, first_);
+  return *text_;
+}
+
+std::string EditedWorld::model_text(const std::string& name) const {
+  const std::lock_guard lock(mutex_);
+  if (const auto at = spawned_.find(name); at != spawned_.end()) return at->second;
+  try {
+    return text().model_text(name);
+  } catch (const InputError&) {
+    return "";
+  }
+}
+
+// "" or why what is on the disk must not be lost.
+std::string EditedWorld::overwritten() const {
+  if (bytes_of(file_) == known_) return "";
+  return known_ ? file_ +
+                      " was changed, or removed, by another program since: keep that, and save "
+                      "this world by another name (ruedo edit --save-as FILE)"
+                : file_ + " exists by now: another program made it";
+}
+
+EditedWorld::Saved EditedWorld::save(const model::WorldModel& now,
+                                     const std::function<Pose(size_t)>& X_WM) {
+  const std::lock_guard lock(mutex_);
+  if (const std::string fault = overwritten(); !fault.empty()) return {fault, ""};
+  std::vector<model::ModelNow> models;
+  for (size_t i = 0; i < now.models.size(); ++i) {
+    if (now.models[i].removed) continue;
+    const std::string& name = now.models[i].name;
+    const auto spawned = spawned_.find(name);
+    models.push_back(
+        {name, X_WM(i), spawned == spawned_.end() ? "" : spawned->second, put_.contains(name)});
+  }
+  try {
+    model::WorldText::Written written = text().with(models);
+    written.text = model::moved_to(written.text, fs::path(first_.file).parent_path().string(),
+                                   fs::path(file_).parent_path().string());
+    model::parse_document(written.text, file_);
+    if (std::string fault = write_file(file_, written.text); !fault.empty())
+      return {file_ + " cannot be written: " + fault, ""};
+    known_ = std::move(written.text);
+    std::string note;
+    for (const std::string& sentence : written.left_out)
+      note += (note.empty() ? "" : "; ") + sentence;
+    return {"", note};
+  } catch (const InputError& error) {
+    return {error.what(), ""};
+  }
+}
+
+}  // namespace ruedo::run

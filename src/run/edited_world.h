@@ -1,0 +1,56 @@
+// What a run's world has become, as text: models for SPAWN, and all of it for the one file that may
+// be written.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "model/world_model.h"
+#include "model/world_text.h"
+#include "ruedo/spawn_request_t.hpp"
+
+namespace ruedo::run {
+
+class EditedWorld {
+ public:
+  // file: what save() writes; "": nothing. The world as it was loaded must outlive it.
+  EditedWorld(const model::WorldModel& first, std::string file);
+
+  // The run tells what requests have done.
+  void begin();  // the world is made anew
+  void spawned(const std::string& name, const spawn_request_t& body);
+  void put(const std::string& name);
+  void removed(const std::string& name);
+
+  bool saves() const { return !file_.empty(); }
+  // SDF or URDF of a model, as SPAWN takes it; "" where there is none. Any thread.
+  std::string model_text(const std::string& name) const;
+
+  struct Saved {
+    std::string fault;  // "": it is on the disk
+    std::string note;   // what the file cannot say
+  };
+  // X_WM: of a model now, by its place in the list.
+  Saved save(const model::WorldModel& now, const std::function<Pose(size_t)>& X_WM);
+
+ private:
+  const model::WorldText& text() const;
+  std::string overwritten() const;
+
+  const model::WorldModel& first_;
+  const std::string file_;
+  std::string source_;                              // the text that the world was loaded from
+  std::string fault_;                               // why there is none
+  std::optional<std::string> known_;                // what the file holds; none: there is none
+  mutable std::unique_ptr<model::WorldText> text_;  // made when it is asked for
+  mutable std::mutex mutex_;                        // of that, and of what follows
+  std::map<std::string, std::string> spawned_;      // texts, by name
+  std::set<std::string> put_;
+};
+
+}  // namespace ruedo::run

@@ -1,0 +1,190 @@
+// A world is edited as a user does it: drawn, placed, moved by handles and numbers, cut, undone, settled, saved.
+export default async function edit({ page, seen, until, check, picture, still, given }) {
+  await page.setViewportSize({ width: 1100, height: 640 });
+  await until(
+    "(the world is drawn)",
+    () =>
+      window.ruedo?.page.now.world &&
+      window.ruedo.stage.description &&
+      window.ruedo.stage.frames > 1,
+  );
+  check(
+    "it opens with the page World",
+    (await page.getByRole("tab", { name: "World" }).getAttribute("aria-selected")) === "true",
+  );
+  check(
+    "it says where it saves to",
+    /Save to .*\.sdf/.test(await page.locator("#save").innerText()),
+    await page.locator("#save").innerText(),
+  );
+  await page.keyboard.press("3");
+  await still();
+  const has = (name) =>
+    until(`(${name} is there)`, (wanted) => window.ruedo.editor.find(wanted) !== undefined, name);
+  const gone = (name) =>
+    until(`(${name} is gone)`, (wanted) => window.ruedo.editor.find(wanted) === undefined, name);
+  // Where those metres are on the screen, by the page's own camera.
+  const at = (x, y, z = 0) =>
+    page.evaluate(
+      ([x, y, z]) => {
+        const { stage } = window.ruedo,
+          box = document.getElementById("canvas").getBoundingClientRect(),
+          p = stage.camera.position.clone().set(x, y, z).project(stage.camera);
+        return [
+          Math.round(box.left + ((p.x + 1) / 2) * box.width),
+          Math.round(box.top + ((1 - p.y) / 2) * box.height),
+        ];
+      },
+      [x, y, z],
+    );
+  const drag = async (from, to) => {
+    await page.mouse.move(...(await at(...from)));
+    await page.mouse.down();
+    await page.mouse.move(...(await at((from[0] + to[0]) / 2, (from[1] + to[1]) / 2)), {
+      steps: 3,
+    });
+    await page.mouse.move(...(await at(...to)), { steps: 3 });
+    await page.mouse.up();
+  };
+  const pose = (name) => page.evaluate((wanted) => window.ruedo.editor.pose(wanted), name);
+  const near = (a, b, within = 1e-3) => a && b.every((v, i) => Math.abs(v - a[i]) < within);
+  const tool = (name) => page.locator(`[data-tool="${name}"]`).click();
+
+  // ---- drawn
+  await tool("wall");
+  await drag([-2, 1], [1, 1]);
+  await has("wall");
+  check(
+    "a wall stands where it was drawn",
+    near(await pose("wall"), [-0.5, 1, 0, 1, 0, 0, 0]),
+    JSON.stringify(await pose("wall")),
+  );
+  await tool("room");
+  await drag([-2, -2], [1, 0]);
+  await has("room");
+  check(
+    "a room stands where it was drawn",
+    near(await pose("room"), [-0.5, -1, 0, 1, 0, 0, 0]),
+    JSON.stringify(await pose("room")),
+  );
+  await tool("door");
+  await page.mouse.click(...(await at(-0.5, 1, 1.2)));
+  await until("a door is cut", () => window.ruedo.page.now.edits.undo === "door in wall");
+  await has("wall");
+
+  // ---- placed
+  await tool("select");
+  await page.getByLabel("what to place").selectOption({ label: "a box" });
+  await page.locator("#place").click();
+  await page.mouse.click(...(await at(1.7, 0.5)));
+  await has("box");
+  await until(
+    "pictures of the library are there",
+    () =>
+      [...document.querySelectorAll("#library button")].length > 5 &&
+      [...document.querySelectorAll("#library img")].every((image) => image.naturalWidth > 0),
+  );
+  await page.locator('[data-library="p3dx"]').click();
+  await page.mouse.click(...(await at(-0.5, -1)));
+  await has("p3dx");
+  seen("a robot from the library stands there");
+  await picture("edit");
+
+  // ---- selected, moved
+  await page.mouse.click(...(await at(1.7, 0.5, 0.4)));
+  await until("a click selects", () => window.ruedo.page.now.selected === "box");
+  await page.locator('[data-number="x"]').fill("2.25");
+  await page.locator('[data-number="x"]').press("Enter");
+  await until("numbers move it", () => Math.abs(window.ruedo.editor.pose("box")[0] - 2.25) < 1e-6);
+  await page.locator("#canvas").focus();
+  await page.locator('[data-number="yaw"]').fill("30");
+  await page.locator('[data-number="yaw"]').press("Tab");
+  await until(
+    "numbers turn it",
+    () =>
+      Math.abs(
+        2 * Math.atan2(window.ruedo.editor.pose("box")[6], window.ruedo.editor.pose("box")[3]) -
+          Math.PI / 6,
+      ) < 1e-6,
+  );
+  const before = await pose("box"),
+    [hx, hy] = await at(before[0], before[1], before[2]);
+  await page.mouse.move(hx + 60, hy); // the handle along x, seen from above
+  await until("(the pointer is on a handle)", () => window.ruedo.gizmo.seized);
+  await page.mouse.down();
+  await page.mouse.move(hx + 90, hy, { steps: 4 });
+  await page.mouse.move(hx + 120, hy, { steps: 4 });
+  await page.mouse.up();
+  await until("a handle moves it", (x) => window.ruedo.editor.pose("box")[0] > x + 0.05, before[0]);
+  const moved = await pose("box");
+  check(
+    "along one axis, with a snap",
+    Math.abs(moved[1] - before[1]) < 1e-6 && Math.abs(moved[2] - before[2]) < 1e-6,
+    JSON.stringify([before, moved]),
+  );
+  await page.locator("#find-model").fill("roo");
+  await page.locator("#find-model").press("Enter");
+  await until("the tree's search selects", () => window.ruedo.page.now.selected === "room");
+  await page.locator("#find-model").fill("");
+  await page.locator("#canvas").focus();
+
+  // ---- what stands fast, too; copies, and what goes
+  await page.locator('[data-model="wall"]').click();
+  await page.locator('[data-number="y"]').fill("1.5");
+  await page.locator('[data-number="y"]').press("Enter");
+  await until("a wall is moved", () => Math.abs(window.ruedo.editor.pose("wall")[1] - 1.5) < 1e-6);
+  await page.locator("#duplicate").click();
+  await has("wall_2");
+  seen("a copy stands beside it");
+  await page.locator("#canvas").focus();
+  await page.keyboard.press("Delete");
+  await gone("wall_2");
+  seen("it is deleted");
+  await page.keyboard.press("Control+z");
+  await has("wall_2");
+  await page.keyboard.press("Control+z");
+  await gone("wall_2");
+  seen("undo takes both back");
+  await page.keyboard.press("Control+y");
+  await has("wall_2");
+  seen("redo does it again");
+  await page.locator('[data-model="box"]').click();
+  await page.locator('[aria-label="factor along z"]').fill("2");
+  await page.locator("#scale").click();
+  await until("it is scaled", () => window.ruedo.page.now.edits.undo === "scale box");
+  await has("box");
+
+  // ---- settled: the box, now 0.8 m high, was put back where it stood before: its lower half in the ground
+  await page.locator('[data-model="box"]').click();
+  await page.locator('[data-number="z"]').fill("1");
+  await page.locator('[data-number="z"]').press("Enter");
+  await until(
+    "(it hangs in the air)",
+    () => Math.abs(window.ruedo.editor.pose("box")[2] - 1) < 1e-6,
+  );
+  await page.locator("#settle").click();
+  await until(
+    "physics settles it",
+    () =>
+      window.ruedo.page.now.edits.undo === "settle" &&
+      window.ruedo.page.now.paused &&
+      Math.abs(window.ruedo.editor.pose("box")[2] - 0.4) < 5e-3,
+  );
+
+  // ---- saved
+  await page.locator("#canvas").focus();
+  await page.keyboard.press("Control+s");
+  await until("it is saved", () => window.notes.some((note) => /^Saved to/.test(note)));
+  check(
+    "nothing is left to save",
+    !/•/.test(await page.locator("#save").innerText()),
+    await page.locator("#save").innerText(),
+  );
+  console.log(
+    `poses: ${JSON.stringify(await page.evaluate(() => Object.fromEntries(window.ruedo.editor.models.map(({ name }) => [name, window.ruedo.editor.pose(name)]))))}`,
+  );
+  await page.setViewportSize({ width: 390, height: 844 });
+  await still();
+  await picture("edit-phone");
+  if (given?.dark) await picture("edit-dark");
+}

@@ -1,0 +1,219 @@
+"""ruedo edit: worlds drawn, moved and saved in a browser, on the default transport; what is saved, and what is refused."""
+
+import json
+import re
+import struct
+import subprocess
+
+import pytest
+
+from harness import (
+    ARENA,
+    RUEDO,
+    SEEN,
+    SOURCE,
+    WANT,
+    Socket,
+    browse,
+    get,
+    needs_browser,
+    serving,
+)
+
+KINDS = {"JOIN": 1, "SPAWN": 8, "REMOVE": 9, "SET_POSE": 10, "SAVE": 20}
+
+
+def editing(*arguments, folder):
+    return serving("edit", *arguments, "--view", "127.0.0.1:0", cwd=folder)
+
+
+class Client:
+    """Requests over the console's socket, as a page makes them."""
+
+    def __init__(self, port):
+        from ruedo.lcmtypes import join_t
+
+        self.socket = Socket(port)
+        self.session = self.sequence = 0
+        self.socket.send(bytes([WANT]) + b"ruedo/reply")
+        join = join_t()
+        join.client = "test"
+        self.session = self.ask("JOIN", join, sequence=4711).session
+
+    def ask(self, kind, body=None, sequence=0):
+        from ruedo.lcmtypes import reply_t, request_t
+
+        request = request_t()
+        request.epoch = -1
+        request.session = self.session
+        self.sequence += 1 if self.session else 0
+        request.sequence = sequence or self.sequence
+        request.kind = KINDS[kind]
+        request.body = body.encode() if body else b""
+        request.size = len(request.body)
+        self.socket.command("ruedo/request", request)
+        while True:
+            opcode, data = self.socket.receive()
+            if opcode == 1 and b'"refused"' in data:  # it does not listen yet: again
+                self.socket.command("ruedo/request", request)
+            if opcode != 2:
+                continue
+            self.socket.send(bytes([SEEN]))
+            at = 4
+            while at < len(data):
+                (size,) = struct.unpack_from("<I", data, at + 4)
+                reply = reply_t.decode(data[at + 8 : at + 8 + size])
+                at += 8 + size
+                if reply.sequence == request.sequence and reply.kind == request.kind:
+                    return reply
+
+    def remove(self, name):
+        from ruedo.lcmtypes import name_request_t
+
+        body = name_request_t()
+        body.name = name
+        return self.ask("REMOVE", body)
+
+
+def listed(world):
+    """What ruedo check says of a world."""
+    return subprocess.run([RUEDO, "check", world], capture_output=True, text=True, check=False)
+
+
+@needs_browser
+def test_a_world_is_made_in_the_browser(tmp_path):
+    with editing("lab.sdf", "--record", "run.lcm", folder=tmp_path) as process:
+        seen = browse(process.url, tmp_path, "edit")
+    for what in (
+        "it opens with the page World",
+        "it says where it saves to",
+        "a wall stands where it was drawn",
+        "a room stands where it was drawn",
+        "a door is cut",
+        "pictures of the library are there",
+        "a robot from the library stands there",
+        "a click selects",
+        "numbers move it",
+        "numbers turn it",
+        "a handle moves it",
+        "along one axis, with a snap",
+        "the tree's search selects",
+        "a wall is moved",
+        "a copy stands beside it",
+        "it is deleted",
+        "undo takes both back",
+        "redo does it again",
+        "it is scaled",
+        "physics settles it",
+        "it is saved",
+        "nothing is left to save",
+    ):
+        assert what in seen
+    saved = (tmp_path / "lab.sdf").read_text()
+    empty = (SOURCE / "worlds/empty.sdf").read_text()
+    assert saved.startswith(empty[: empty.index("  </world>")].rstrip())  # what it began with
+    assert re.findall(r"<(?:model|visual) name=\"(.*?)\"", saved).count("wall_above") == 2
+    check = listed(tmp_path / "lab.sdf")
+    assert check.returncode == 0, check.stdout + check.stderr
+    # Each model is in the file where the page showed it.
+    poses = json.loads(next(line for line in seen if line.startswith("poses: ")).split(": ", 1)[1])
+    with editing("lab.sdf", folder=tmp_path) as process:
+        scene = json.loads(get(process.port, "/scene.json")[1])
+        found = {model["name"]: model["pose"] for model in scene["models"] if model["fast"]}
+        for name, pose in found.items():
+            assert pose == pytest.approx(poses[name], abs=1e-5)
+        assert {model["name"] for model in scene["models"]} == set(poses)
+    # The run with all these changes is repeated bit for bit.
+    verified = subprocess.run(
+        [RUEDO, "verify", tmp_path / "run.lcm"], capture_output=True, text=True, check=False
+    )
+    assert verified.returncode == 0, verified.stdout + verified.stderr
+
+
+def test_what_was_not_changed_is_saved_to_the_byte(tmp_path):
+    with editing(ARENA, "--save-as", "mine.sdf", folder=tmp_path) as process:
+        reply = Client(process.port).ask("SAVE")
+        assert (reply.code, reply.text) == (0, "")
+    assert (tmp_path / "mine.sdf").read_bytes() == ARENA.read_bytes()
+
+
+def test_the_named_file_is_written_and_no_other(tmp_path):
+    world = tmp_path / "w.sdf"
+    world.write_bytes(ARENA.read_bytes())
+    world.chmod(0o640)
+    with editing("w.sdf", folder=tmp_path) as process:
+        client = Client(process.port)
+        assert client.remove("box_1").code == 0
+        assert client.ask("SAVE").code == 0
+        text = ARENA.read_text()
+        begin = text.index('    <model name="box_1">')
+        end = text.index("</model>\n", begin) + len("</model>\n")
+        assert world.read_text() == text[:begin] + text[end:]
+        assert world.stat().st_mode & 0o777 == 0o640
+        assert [path.name for path in tmp_path.iterdir()] == ["w.sdf"]  # nothing is left beside it
+        # Another program's change is not lost.
+        world.write_text("<mine/>")
+        reply = client.ask("SAVE")
+        assert reply.code == 3 and "changed" in reply.text
+        assert world.read_text() == "<mine/>"
+
+
+def test_only_a_server_that_edits_saves(tmp_path):
+    with serving("run", ARENA, "--quiet", "--view", "127.0.0.1:0", cwd=tmp_path) as process:
+        reply = Client(process.port).ask("SAVE")
+        assert reply.code == 8 and "ruedo edit" in reply.text
+        # No path leads out of what is served.
+        for path in (
+            "/library/../../etc/passwd",
+            "/library/x/scene.json",
+            "/library/99999/scene.json",
+            "/scene/models/-1",
+            "/scene/models/1e3",
+            "/scene/models/99999",
+            "/library/0",
+            "/library/18446744073709551616/scene.json",
+            "/library/0/scene/textures/9",
+        ):
+            assert get(process.port, path)[0] == 404
+        assert b"<model" in get(process.port, "/scene/models/3")[1]
+    assert list(tmp_path.iterdir()) == []
+
+
+def said(*arguments, folder):
+    result = subprocess.run(
+        [RUEDO, "edit", *arguments, "--view", "127.0.0.1:0"],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        timeout=60,
+        check=False,
+    )
+    return result.returncode, result.stderr
+
+
+def test_what_cannot_be_saved_is_said_first(tmp_path):
+    (tmp_path / "world.sdf").write_text("<sdf/>")
+    (tmp_path / "r.urdf").write_text("<robot name='r'><link name='l'/></robot>")
+    for arguments, code, words in [
+        ([], 2, "world.sdf is there already"),
+        (["arena"], 2, "--save-as"),
+        (["r.urdf"], 2, "--save-as"),
+        (["arena", "--save-as", "notes.txt"], 2, "FILE.sdf"),
+        (["arena", "--save-as", "/no/such/folder/w.sdf"], 4, "cannot be written"),
+        (["no_such_world"], 3, "no world of that name"),
+    ]:
+        found = said(*arguments, folder=tmp_path)
+        assert found[0] == code and words in found[1], (arguments, found)
+    assert (tmp_path / "world.sdf").read_text() == "<sdf/>"
+
+
+def test_a_urdf_is_saved_as_a_world(tmp_path):
+    (tmp_path / "r.urdf").write_text(
+        "<robot name='r'><link name='l'><inertial><mass value='1'/><inertia ixx='1' ixy='0' ixz='0' iyy='1' "
+        "iyz='0' izz='1'/></inertial><collision><geometry><box size='1 1 1'/></geometry></collision>"
+        "</link></robot>"
+    )
+    with editing("r.urdf", "--save-as", "w.sdf", folder=tmp_path) as process:
+        assert Client(process.port).ask("SAVE").code == 0
+    assert listed(tmp_path / "w.sdf").returncode == 0
+    assert "<uri>r.urdf</uri>" in (tmp_path / "w.sdf").read_text()

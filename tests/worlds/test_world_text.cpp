@@ -1,0 +1,231 @@
+// Worlds as text: what was not touched stays to the byte, and what was reads back as it is.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "model/load.h"
+#include "model/world_text.h"
+#include "ruedo/errors.h"
+
+namespace ruedo::model {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+const std::string kWorlds = std::string(RUEDO_SOURCE_DIR) + "/worlds/";
+
+std::string bytes(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::vector<ModelNow> as_loaded(const WorldModel& world) {
+  std::vector<ModelNow> models;
+  for (const ModelInstance& model : world.models)
+    models.push_back({model.name, model.X_WM, "", false});
+  return models;
+}
+
+ModelNow& named(std::vector<ModelNow>& models, const std::string& name) {
+  for (ModelNow& model : models) {
+    if (model.name == name) return model;
+  }
+  throw std::out_of_range(name);
+}
+
+// A world of a few lines, and what becomes of it.
+class Text {
+ public:
+  explicit Text(const std::string& inside, const std::string& version = "1.9")
+      : text_("<?xml version=\"1.0\"?>\n<!-- first -->\n<sdf version='" + version +
+              "'>\n  <world name=\"w\">\n" + inside + "  </world>\n</sdf>\n<!-- last -->\n"),
+        world_(load_world_text(text_, kWorlds + "w.sdf")),
+        places_(text_, *world_),
+        models(as_loaded(*world_)) {}
+
+  std::string saved() { return places_.with(models).text; }
+  // Where the saved text puts a model.
+  Pose put(const std::string& name) {
+    const auto again = load_world_text(saved(), kWorlds + "w.sdf");
+    for (const ModelInstance& model : again->models) {
+      if (model.name == name) return model.X_WM;
+    }
+    throw std::out_of_range(name);
+  }
+  const std::string& text() const { return text_; }
+  const WorldText& places() const { return places_; }
+
+ private:
+  std::string text_;
+  std::shared_ptr<const WorldModel> world_;
+  WorldText places_;
+
+ public:
+  std::vector<ModelNow> models;
+};
+
+std::string box(const std::string& name, const std::string& pose) {
+  return "    <model name=\"" + name + "\">\n      <static>1</static>\n" + pose +
+         "      <link name=\"l\"><collision name=\"c\"><geometry><box><size>1 1 1</size></box>"
+         "</geometry></collision></link>\n    </model>\n";
+}
+
+void expect_near(const Pose& a, const Pose& b) {
+  EXPECT_LT((a.translation - b.translation).norm(), 2e-6);
+  EXPECT_LT(a.rotation.angularDistance(b.rotation), 5e-6);
+}
+
+class OurWorlds : public testing::TestWithParam<const char*> {};
+
+TEST_P(OurWorlds, GoThroughToTheByte) {
+  const auto world = load_world(kWorlds + GetParam());
+  const WorldText::Written written =
+      WorldText(bytes(kWorlds + GetParam()), *world).with(as_loaded(*world));
+  EXPECT_EQ(written.text, bytes(kWorlds + GetParam()));
+  EXPECT_TRUE(written.left_out.empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, OurWorlds,
+    testing::Values("arena.sdf", "rooms.sdf", "maze.sdf", "office.sdf", "warehouse.sdf",
+                    "field.sdf", "crossing.sdf", "fleet.sdf", "terrain.sdf", "empty.sdf"),
+    [](const auto& info) {
+      return std::string(info.param).substr(0, std::string(info.param).find('.'));
+    });
+
+TEST(WorldTextTest, AMovedModelHasAnotherPoseAndNothingElseChanges) {
+  Text world(box("a", "      <pose>1 2 0.5 0 0 0</pose>  <!-- here -->\n") + box("b", ""));
+  named(world.models, "a").X_WM = Pose::from_xyz_rpy({3, -1.25, 0.5}, {0, 0, 0.5});
+  std::string expected = world.text();
+  expected.replace(expected.find("1 2 0.5 0 0 0"), 13, "3 -1.25 0.5 0 0 0.5");
+  EXPECT_EQ(world.saved(), expected);
+  named(world.models, "b").X_WM = Pose::from_xyz_rpy({0, 7, 0}, {0.1, -0.2, 3});
+  expect_near(world.put("b"), Pose::from_xyz_rpy({0, 7, 0}, {0.1, -0.2, 3}));
+  EXPECT_THAT(world.saved(),
+              HasSubstr("<static>1</static>\n      <pose>0 7 0 0.1 -0.2 3</pose>\n"));
+}
+
+TEST(WorldTextTest, EveryRotationReadsBack) {
+  Text world(box("a", ""));
+  for (const Vec3& rpy : {Vec3(0.3, M_PI / 2, 1), Vec3(0.3, -M_PI / 2, 1), Vec3(3, 1, -3),
+                          Vec3(0, 0, M_PI), Vec3(M_PI, 0, 0)}) {
+    const Pose X = Pose::from_xyz_rpy({1e-3, 2, 3}, rpy);
+    named(world.models, "a") = {"a", X, "", true};
+    expect_near(world.put("a"), X);
+  }
+}
+
+TEST(WorldTextTest, WhatTheSolverMovesIsNoChangeAndWhatSomebodyPutsIs) {
+  Text world(box("a", ""));
+  named(world.models, "a").X_WM.translation.z() = -5e-4;
+  EXPECT_EQ(world.saved(), world.text());
+  named(world.models, "a").put = true;
+  EXPECT_NEAR(world.put("a").translation.z(), -5e-4, 1e-9);
+}
+
+TEST(WorldTextTest, ARemovedModelTakesItsLinesAlong) {
+  Text world("    <!-- of a -->\n" + box("a", "") + box("b", ""));
+  std::erase_if(world.models, [](const ModelNow& model) { return model.name == "a"; });
+  std::string expected = world.text();
+  expected.erase(expected.find(box("a", "")), box("a", "").size());
+  EXPECT_EQ(world.saved(), expected);
+}
+
+TEST(WorldTextTest, ANewModelStandsAtTheEndUnderItsName) {
+  Text world(box("a", ""));
+  world.models.push_back({"c & d", Pose::from_xyz_rpy({1, 0, 0}, {0, 0, 0}),
+                          "<sdf version='1.9'>" + box("x", "") + "</sdf>", true});
+  world.models.push_back(
+      {"guest", Pose::from_xyz_rpy({0, 2, 0}, {0, 0, 1}),
+       "<sdf version='1.9'>\n<include>\n      <uri>model://p3dx</uri>\n    </include>\n</sdf>",
+       true});
+  const std::string saved = world.saved();
+  EXPECT_EQ(saved.substr(0, saved.find("    <model name=\"c &amp; d\">")),
+            world.text().substr(0, world.text().find("  </world>")));
+  EXPECT_THAT(saved, HasSubstr("<include>\n      <uri>model://p3dx</uri>\n      <pose>0 2 0 0 0 1"
+                               "</pose>\n      <name>guest</name>\n    </include>\n  </world>"));
+  expect_near(world.put("guest"), Pose::from_xyz_rpy({0, 2, 0}, {0, 0, 1}));
+}
+
+TEST(WorldTextTest, AUrdfThatWasSpawnedIsWrittenAsSdf) {
+  Text world(box("a", ""));
+  world.models.push_back({"u", Pose::from_xyz_rpy({4, 0, 0}, {0, 0, 0}),
+                          "<robot name='r'><link name='l'><inertial><mass value='2'/><inertia "
+                          "ixx='1' ixy='0' ixz='0' iyy='1' iyz='0' izz='1'/></inertial>"
+                          "</link></robot>",
+                          true});
+  expect_near(world.put("u"), Pose::from_xyz_rpy({4, 0, 0}, {0, 0, 0}));
+}
+
+TEST(WorldTextTest, WhatIsRemovedAndComesBackIsAsItWas) {
+  Text world(box("a", "      <pose>1 2 3 0 0 0</pose>\n") +
+             "    <include><uri>model://p3dx</uri></include>\n");
+  for (const char* name : {"a", "p3dx"}) {
+    named(world.models, name).spawned = world.places().model_text(name);
+    named(world.models, name).put = true;
+  }
+  EXPECT_EQ(world.saved(), world.text());
+}
+
+TEST(WorldTextTest, FramesThatMoveWithAModelDoNotMoveWhatStandsInThem) {
+  Text world(box("table", "      <pose>5 0 0 0 0 0</pose>\n") +
+             "    <frame name=\"top\" attached_to=\"table\"><pose>0 0 1 0 0 0</pose></frame>\n" +
+             box("cup", "      <pose relative_to=\"top\">0.1 0 0 0 0 0</pose>\n") +
+             box("far", "      <pose relative_to=\"world\">9 0 0 0 0 0</pose>\n"));
+  named(world.models, "table").X_WM.translation.x() = 6;
+  expect_near(world.put("cup"), Pose::from_xyz_rpy({5.1, 0, 1}, {0, 0, 0}));
+  EXPECT_THAT(world.saved(), HasSubstr("<pose relative_to=\"world\">9 0 0 0 0 0</pose>"));
+  EXPECT_THAT(world.saved(), Not(HasSubstr("relative_to=\"top\"")));
+}
+
+TEST(WorldTextTest, ASavedStateOfAMovedModelIsDropped) {
+  Text world(
+      box("a", "") + box("b", "") +
+      "    <state world_name=\"w\">\n      <model name=\"a\"><pose>1 1 0 0 0 0</pose></model>\n"
+      "      <model name=\"b\"><pose>2 2 0 0 0 0</pose></model>\n    </state>\n");
+  named(world.models, "a").X_WM.translation.x() = 3;
+  expect_near(world.put("a"), Pose::from_xyz_rpy({3, 1, 0}, {0, 0, 0}));
+  expect_near(world.put("b"), Pose::from_xyz_rpy({2, 2, 0}, {0, 0, 0}));
+}
+
+TEST(WorldTextTest, SaysWhatTheFileCannotSay) {
+  Text world(box("a", "") +
+             "    <ruedo:fleet name=\"r\"><include><uri>model://p3dx</uri></include>"
+             "<ruedo:count>3</ruedo:count></ruedo:fleet>\n");
+  EXPECT_TRUE(world.places().with(world.models).left_out.empty());
+  named(world.models, "r_2").X_WM.translation.x() += 1;
+  const WorldText::Written written = world.places().with(world.models);
+  EXPECT_EQ(written.text, world.text());
+  ASSERT_EQ(written.left_out.size(), 1u);
+  EXPECT_THAT(written.left_out[0], HasSubstr("'r_2'"));
+}
+
+TEST(WorldTextTest, PathsLeadToTheSameFilesFromAnotherFolder) {
+  const std::string folder = std::filesystem::temp_directory_path().string();
+  const std::string text =
+      "<sdf><uri>robots/p3dx/model.sdf</uri><uri>model://p3dx</uri><uri>no/such</uri></sdf>";
+  const std::string moved = moved_to(text, kWorlds, folder);
+  EXPECT_THAT(moved, HasSubstr("<uri>model://p3dx</uri><uri>no/such</uri>"));
+  const size_t begin = moved.find("<uri>") + 5;
+  EXPECT_TRUE(std::filesystem::equivalent(
+      std::filesystem::path(folder) / moved.substr(begin, moved.find('<', begin) - begin),
+      kWorlds + "robots/p3dx/model.sdf"));
+  EXPECT_EQ(moved_to(text, kWorlds, kWorlds + "../worlds"), text);
+}
+
+TEST(WorldTextTest, ARobotStandsOnAFloorThatReadsBack) {
+  const auto world = load_world(kWorlds + "robots/p3dx/model.sdf");
+  const std::string text = world_text_of(*world);
+  const auto again = load_world_text(text, kWorlds + "robots/p3dx/w.sdf");
+  ASSERT_EQ(again->models.size(), 2u);
+  EXPECT_EQ(again->models[1].name, world->models[1].name);
+  expect_near(again->models[1].X_WM, world->models[1].X_WM);
+  EXPECT_EQ(WorldText(text, *world).with(as_loaded(*world)).text, text);
+}
+
+}  // namespace
+}  // namespace ruedo::model
