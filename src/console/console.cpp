@@ -93,6 +93,10 @@ HttpResponse Console::Impl::get(std::string_view path) {
     response.gzip = true;
     return response;
   }
+  constexpr std::string_view kHistory = "/history/";
+  if (path.starts_with(kHistory))
+    return blob(stage.source->history(std::string(path.substr(kHistory.size()))),
+                "application/octet-stream");
   if (path.starts_with("/library"))
     return library_file(path.substr(std::string_view("/library").size()));
   if (const auto model = number_after("/scene/models/", path)) return model_text(*model);

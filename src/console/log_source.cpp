@@ -103,6 +103,26 @@ bool LogSource::read(size_t channel, size_t entry) {
   return reader_.next(event_);  // false when the file is no longer what it was
 }
 
+Bytes LogSource::history(const std::string& name) {
+  const auto& channels = index_.channels();
+  const auto found = std::find_if(
+      channels.begin(), channels.end(),
+      [&](const log::Index::Channel& channel) { return printable(channel.name) == name; });
+  if (found == channels.end()) return nullptr;
+  const auto channel = static_cast<size_t>(found - channels.begin());
+  const size_t every = 1 + found->entries.size() / kMostHistory;
+  std::vector<uint8_t> bytes;
+  for (size_t entry = 0; entry < found->entries.size() && bytes.size() < kMostHistoryBytes;
+       entry += every) {
+    if (!read(channel, entry)) continue;
+    const auto size = static_cast<uint32_t>(event_.data.size());
+    const auto* head = reinterpret_cast<const uint8_t*>(&size);
+    bytes.insert(bytes.end(), head, head + sizeof size);
+    bytes.insert(bytes.end(), event_.data.begin(), event_.data.end());
+  }
+  return std::make_shared<const std::vector<uint8_t>>(std::move(bytes));
+}
+
 Source::Count LogSource::traffic(size_t channel) const {
   if (channel >= index_.channels().size()) return {};
   const log::Index::Channel& of = index_.channels()[channel];

@@ -51,6 +51,13 @@ class Source {
   // Of the file that SAVE writes; "" for none.
   virtual std::string save_name() const { return {}; }
 
+  // All messages of a channel of a log, or so many of them evenly, each with its size (uint32,
+  // little endian) before it; null where there is no such channel.
+  virtual Bytes history(const std::string& channel) {
+    static_cast<void>(channel);
+    return nullptr;
+  }
+
   // Of logs.
   virtual const Playback* playback() const { return nullptr; }
   virtual void play(bool on, double speed) { static_cast<void>(on), static_cast<void>(speed); }

@@ -79,6 +79,26 @@ await page.addInitScript(() => {
   );
 });
 
+// RUEDO_PAGE=sources: the page as its sources are now, though the program was built with another.
+async function serveSources() {
+  const { outputFiles } = await require("esbuild").build({
+    entryPoints: { main: "src/main.ts" },
+    outdir: "out",
+    bundle: true,
+    write: false,
+    preserveSymlinks: true,
+    format: "esm",
+    target: "es2022",
+  });
+  for (const [ending, contentType] of [
+    ["js", "text/javascript"],
+    ["css", "text/css"],
+  ]) {
+    const body = outputFiles.find(({ path }) => path.endsWith(`.${ending}`)).text;
+    await page.route(`**/main.${ending}`, (route) => route.fulfill({ contentType, body }));
+  }
+}
+
 // What the page shows, in one line.
 const shown = () =>
   page
@@ -170,6 +190,7 @@ const tools = {
     ),
 };
 try {
+  if (process.env.RUEDO_PAGE === "sources") await serveSources();
   await page.goto(url, { waitUntil: "load" });
   await (await import(`./${scenario}.mjs`)).default(tools);
 } catch (error) {

@@ -77,6 +77,63 @@ def test_every_transport_can_be_steered(tmp_path, transport):
     ]
 
 
+def test_the_past_of_a_live_run_is_looked_at(tmp_path):
+    with running("--disable", "p3at/camera") as process:
+        seen = browse(process.url, tmp_path, "past")
+    assert {
+        "a live run has a time line",
+        "the robot is where it was",
+        "what came later is not there",
+        "it says how long ago that was",
+        "values are of that moment",
+        "the run goes on meanwhile",
+        "the past plays on",
+        "Live shows what runs now",
+        "with all that came",
+        "all was seen",
+    } <= set(seen)
+
+
+def test_any_field_is_plotted(tmp_path):
+    """Of a live run what is known, and of a log the whole of it: its times, least and most are the log's."""
+    from ruedo.lcmtypes import odometry_t
+
+    log = tmp_path / "run.lcm"
+    with running("--disable", "p3at/camera", "--record", log) as process:
+        seen = browse(process.url, tmp_path, "fields")
+    assert {
+        "a click on a field plots it",
+        "a drag onto Plots does, too",
+        "the plot grows",
+        "it is a table",
+        "panes are kept",
+    } <= set(seen)
+    found = [
+        odometry_t.decode(data) for channel, _, data in events(log) if channel == "p3at/odometry"
+    ]
+    given = {
+        "begin": found[0].utime * 1e-6,
+        "end": found[-1].utime * 1e-6,
+        "most": max(each.x for each in found),
+    }
+    with playing(log) as process:
+        seen = browse(process.url, tmp_path, "fields_log", given)
+    assert {"the whole run is plotted", "a click in a plot seeks"} <= set(seen)
+
+
+def test_the_view_tells_and_gives(tmp_path):
+    with running("--disable", "p3at/camera") as process:
+        seen = browse(process.url, tmp_path, "looks")
+    assert {
+        "coordinates are those under the pointer",
+        "a way is measured",
+        "edges alone are drawn",
+        "a screenshot is a picture",
+        "a video is one",
+        "a link leads back to camera and selection",
+    } <= set(seen)
+
+
 def test_the_order_of_loading_is_one(tmp_path):
     """Greeting, messages, names of channels, and each file of the scene held back in turn: nothing
     that is shown depends on it.

@@ -9,19 +9,23 @@ import { Gizmo } from "./edit/gizmo";
 import { listenToEditing } from "./edit/keys";
 import { Outline } from "./edit/outline";
 import { loadScene, type SceneFiles } from "./scene/description";
+import { Measure } from "./scene/measure";
 import { OverlaySet } from "./scene/overlay_set";
 import { Stage, type ViewMode } from "./scene/stage";
 import { Clock } from "./state/clock";
 import { Loading } from "./state/loading";
 import { makePage } from "./state/page";
+import { hashOf, placeOf, type Place } from "./state/place";
 import { Poses } from "./state/poses";
 import { wantedChannels } from "./state/wanted";
 import { inputOf, type World } from "./state/world";
 import { Bar } from "./ui/bar";
+import { Capture } from "./ui/capture";
 import { ChannelList } from "./ui/channels";
 import { Drive } from "./ui/drive";
 import { h, recall, remember, say, toast } from "./ui/dom";
 import { EditPage } from "./ui/edit_page";
+import { FieldPlots } from "./ui/field_plots";
 import { fillHelp } from "./ui/help";
 import { listenToKeys } from "./ui/keys";
 import { makeLegend } from "./ui/legend";
@@ -37,6 +41,7 @@ import { Router } from "./wire/router";
 import { Session } from "./wire/session";
 
 const kMostScenes = 32; // that are kept for the past
+const kMoment_s = 0.1; // of what is past: from one to the next
 const kJump_s = 0.5; // further is another moment, not the next one
 const kTurn_rad = Math.PI / 24,
   kPan = 0.06,
@@ -88,12 +93,19 @@ export class App {
     () => this.control.stop(),
   );
   readonly channels = new ChannelList(() => this.want());
+  readonly measure = new Measure(this.page, this.stage, byId("canvas"));
+  readonly plots = new FieldPlots(
+    this.page,
+    this.link,
+    (time_s) => this.seek(time_s),
+    () => this.want(),
+  );
   readonly panel = new Panel(
     byId("panel"),
     this.page,
     {
       Robot: this.pages.statePage,
-      Plots: this.pages.plotPage,
+      Plots: h("div", {}, this.pages.plotPage, this.plots.element),
       Channels: this.channels.element,
       World: this.editPage.element,
     },
@@ -122,10 +134,17 @@ export class App {
       seek: (time_s) => this.seek(time_s),
       live: () => this.rewind?.live(),
     });
-    if (this.rewind) this.rewind.onPast = (past, kept) => this.onPast(past, kept);
+    if (this.rewind) {
+      this.rewind.onPast = (past, kept) => this.onPast(past, kept);
+      this.rewind.onKept = (channel, bytes) => this.plots.message(channel, bytes);
+    }
     makeLegend(byId("legend"), page);
     this.stage.onDetail = (reduced) => page.set({ reduced });
     if (!this.stage.renderer) byId("flat").hidden = false;
+    this.channels.onPlot = (channel, path) => {
+      this.plots.plot(channel, path, false);
+      page.set({ tab: "Plots" });
+    };
     this.makePad();
     listenToClicks(
       byId("canvas"),
@@ -134,11 +153,22 @@ export class App {
       this.editor,
       this.editPage.door,
       () => this.gizmo.seized,
+      (point) => this.measure.click(point),
     );
+    this.editPage.extras.append(
+      new Capture(this.stage, byId("canvas") as HTMLCanvasElement).element,
+      h(
+        "div",
+        { class: "row" },
+        h("button", { id: "link", click: () => void this.copyLink() }, "Copy link"),
+      ),
+    );
+    byId("view").append(this.measure.readout);
     listenToEditing(page, this.editor);
     listenToKeys({
       " ": () => control.pauseOrResume(),
-      ".": () => control.step(),
+      ".": () => this.step(1),
+      ",": () => this.step(-1),
       r: () => void control.reset(),
       x: () => control.stop(),
       "1": () => this.setMode("orbit"),
@@ -169,6 +199,7 @@ export class App {
       document.documentElement.dataset.theme = theme;
       this.stage.setTheme(theme === "dark");
       this.pages.restyle();
+      this.plots.restyle();
     });
     page.watch(["world", "scene", "robot"], () => this.showRobot());
     page.watch(["hello", "world", "scene", "robot", "layers", "tab", "panel"], () => this.want());
@@ -238,7 +269,37 @@ export class App {
       world.robots.findIndex((r) => r.name === name),
       world.robots.length > 0 ? 0 : -1,
     );
+    const first = this.page.now.world === null;
     this.page.set({ world, scene: files?.description ?? null, robot: at });
+    if (!first) return;
+    if (this.plots.channels.length === 0) this.plots.restore();
+    this.goTo(placeOf(location.hash));
+  }
+
+  // Where the address leads.
+  private goTo({ time_s, camera, robot, selected }: Place): void {
+    const { world } = this.page.now,
+      at = world?.robots.findIndex(({ name }) => name === robot) ?? -1;
+    if (camera) this.stage.viewpoint = camera;
+    if (at >= 0) this.page.set({ robot: at });
+    if (selected) this.page.set({ selected });
+    if (time_s !== null && this.page.now.hello?.mode === "log") {
+      this.link.play(false, 1);
+      this.link.seek(time_s);
+    }
+  }
+
+  private async copyLink(): Promise<void> {
+    const { hello, playback, past, world, robot, selected } = this.page.now,
+      time_s = hello?.mode === "log" ? (playback?.now ?? null) : (past?.now ?? null);
+    const name = world?.robots[robot]?.name ?? "";
+    location.hash = hashOf({ time_s, camera: this.stage.viewpoint, robot: name, selected });
+    try {
+      await navigator.clipboard.writeText(location.href);
+      toast("The link is copied.");
+    } catch {
+      toast("The link is in the address bar.");
+    }
   }
 
   // A moment of a log, or of the past of a live run.
@@ -278,6 +339,7 @@ export class App {
   // What was drawn along the way is not of this moment.
   private forgetPast(anew: boolean): void {
     if (anew) this.editor.history.clear();
+    if (anew) this.plots.clear();
     this.overlays.forget();
     this.pages.forget();
     this.poses.jump();
@@ -308,11 +370,17 @@ export class App {
 
   private want(): void {
     const { tab, panel } = this.page.now;
-    this.link.want(wantedChannels(this.page.now, this.loading.complete, this.channels.opened));
+    this.link.want(
+      wantedChannels(this.page.now, this.loading.complete, [
+        ...this.channels.opened,
+        ...this.plots.channels,
+      ]),
+    );
     this.link.watchTraffic(panel && tab === "Channels");
   }
 
   private frame(at: number): void {
+    this.plots.draw();
     this.gizmo.follow();
     this.outline.follow();
     this.editPage.transform.show();
@@ -322,6 +390,14 @@ export class App {
   }
 
   // ---- what the user does with the page
+
+  // A step of a live run, or a moment of what is past, to and fro.
+  private step(by: number): void {
+    const { past, playback, hello } = this.page.now,
+      now = hello?.mode === "log" ? playback?.now : past?.now;
+    if (now !== undefined) this.seek(now + by * kMoment_s);
+    else if (by > 0) this.control.step();
+  }
 
   setMode(mode: ViewMode): void {
     this.stage.setMode(mode);

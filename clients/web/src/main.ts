@@ -16,4 +16,5 @@ try {
   throw error;
 }
 // The token of the address is kept by a cookie.
-if (location.search && location.protocol !== "file:") history.replaceState(null, "", "/");
+if (location.search && location.protocol !== "file:")
+  history.replaceState(null, "", `/${location.hash}`);

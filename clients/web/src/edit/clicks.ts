@@ -16,6 +16,7 @@ export function listenToClicks(
   editor: Editor,
   door: Door,
   busy: () => boolean,
+  measured: (point: THREE.Vector3) => void,
 ): void {
   let down = { x: 0, y: 0 },
     taken = false;
@@ -33,6 +34,11 @@ export function listenToClicks(
     const { tool } = page.now,
       picked = stage.pick(event.clientX, event.clientY);
     if (tool === "wall" || tool === "room") return;
+    if (tool === "measure") {
+      const point = picked.point ?? picked.ground;
+      if (point) measured(point);
+      return;
+    }
     if (tool === "door") return makeDoor(picked.model, picked.point, editor, door);
     if (tool !== "select") {
       if (!picked.ground) return;

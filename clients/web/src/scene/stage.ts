@@ -32,6 +32,7 @@ export class Stage {
   private sun: THREE.DirectionalLight | null = null;
   private dirty = true;
   private moved = false;
+  private wireframe = false;
   private moving: { first: number; end: number; by: THREE.Matrix4 } | null = null; // links that are shown elsewhere
   private regroup = false; // what is near and what is far has changed
   private linkWheel = new Map<
@@ -147,6 +148,7 @@ export class Stage {
       grid.rotation.x = Math.PI / 2;
       this.lights.add(grid);
     }
+    if (this.wireframe) this.setWireframe(true);
     this.place(true);
     this.touch();
   }
@@ -254,6 +256,18 @@ export class Stage {
     this.touch();
   }
 
+  // Where the camera stands and where it looks.
+  get viewpoint(): number[] {
+    return [...this.camera.position.toArray(), ...this.controls.target.toArray()];
+  }
+  set viewpoint(at: number[]) {
+    this.camera.position.fromArray(at);
+    this.controls.target.fromArray(at, 3);
+    this.controls.update();
+    this.regroup = true;
+    this.touch();
+  }
+
   // Turns the view by radians to the right and upwards.
   turn(right: number, up: number): void {
     const offset = this.camera.position.clone().sub(this.controls.target),
@@ -316,6 +330,29 @@ export class Stage {
       new THREE.Plane(new THREE.Vector3(0, 0, 1), 0),
       new THREE.Vector3(),
     );
+  }
+
+  // What is seen under a point of the canvas, the floor included.
+  point(x: number, y: number): THREE.Vector3 | null {
+    return this.seen(this.caster(x, y))?.point ?? this.ground(x, y);
+  }
+
+  // Draws at once, and all pixels of it.
+  redraw(): void {
+    this.renderer?.render(this.scene, this.camera);
+  }
+
+  // Edges alone, or surfaces.
+  setWireframe(on: boolean): void {
+    this.wireframe = on;
+    for (const { meshes, far } of [
+      ...(this.built?.standing ?? []),
+      ...(this.built?.movers ?? []),
+    ]) {
+      for (const mesh of far ? [...meshes, far.mesh] : meshes)
+        (mesh.material as THREE.MeshStandardMaterial).wireframe = on;
+    }
+    this.touch();
   }
 
   // What is under a point of the canvas: a robot (-1 for none), the name of a model ("" for none) and the point of it that is seen, and

@@ -14,7 +14,7 @@ export const kTabs = ["Robot", "Plots", "Channels", "World"] as const;
 export type Tab = (typeof kTabs)[number];
 
 // What a click on the scene does: selects, places a thing, or draws.
-export type Tool = "select" | "wall" | "room" | "door" | Thing;
+export type Tool = "select" | "wall" | "room" | "door" | "measure" | Thing;
 // What the handles of the selected model do.
 export type Handle = "translate" | "rotate" | "scale";
 

@@ -1,9 +1,12 @@
 // The list of all channels: type, rate, size, and the last values of the ones that are opened.
 import { decode, typeOf } from "../wire/lcm";
 import type { World } from "../state/world";
+import { fieldsOf } from "../state/fields";
 import { h, say } from "./dom";
+import { kDragType } from "./field_plots";
 
 const kMostRows = 300;
+const kMostFields = 60; // to plot
 const kMostShown = 12; // elements of an array
 
 interface Row {
@@ -47,6 +50,7 @@ export class ChannelList {
   });
   private readonly more = h("p", { class: "dim" });
   private world: World | null = null;
+  onPlot: (channel: string, path: string) => void = () => undefined;
 
   constructor(private readonly onOpened: () => void) {
     this.filter.addEventListener("input", () => this.fill());
@@ -139,6 +143,30 @@ export class ChannelList {
     row.element.after(h("tr", {}, h("td", { colspan: 4 }, row.values)));
   }
 
+  // Fields to plot, by a click or a drag onto the page Plots; once for each row that is opened.
+  private offerFields(channel: string, type: string, values: HTMLElement): void {
+    if (values.nextElementSibling) return;
+    const fields = fieldsOf(type).filter((path) => path !== "utime");
+    const chips = fields.slice(0, kMostFields).map((path) => {
+      const chip = h(
+        "button",
+        {
+          class: "chip",
+          draggable: "true",
+          "data-field": path,
+          title: `plot ${channel} ${path}`,
+          click: () => this.onPlot(channel, path),
+        },
+        path,
+      );
+      chip.addEventListener("dragstart", (event) =>
+        event.dataTransfer?.setData(kDragType, `${channel}\n${path}`),
+      );
+      return chip;
+    });
+    values.after(h("div", { class: "row" }, ...chips));
+  }
+
   traffic(channels: string[], messages: Uint32Array, sizes: Uint32Array): void {
     const now = performance.now();
     channels.forEach((name, i) => {
@@ -165,6 +193,7 @@ export class ChannelList {
         values,
         type ? textOf(decode(type, bytes)) : `${bytes.length} bytes of a type that is not known`,
       );
+      if (type) this.offerFields(channel, type, values);
     } catch (error) {
       say(values, (error as Error).message);
     }

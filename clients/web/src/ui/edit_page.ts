@@ -24,6 +24,7 @@ export interface DoorSize {
 export class EditPage {
   readonly element: HTMLElement;
   readonly door: DoorSize = { width: 0.9, height: 1 };
+  readonly extras = h("div"); // more of the view
   readonly transform: Transform;
   readonly library: Library;
 
@@ -182,12 +183,32 @@ export class EditPage {
       stage.setAutomatic(less.checked);
     });
     stage.setAutomatic(less.checked);
+    const { page } = this,
+      measure = h(
+        "button",
+        {
+          id: "measure",
+          title: "the way between two points that are clicked",
+          click: () => page.set({ tool: page.now.tool === "measure" ? "select" : "measure" }),
+        },
+        "Measure",
+      );
+    page.watch(["tool"], ({ tool }) => measure.classList.toggle("on", tool === "measure"));
+    const edges = h("input", { type: "checkbox", id: "wireframe" });
+    edges.addEventListener("change", () => stage.setWireframe(edges.checked));
     return h(
       "div",
       {},
+      h("label", { class: "check" }, edges, "wireframe"),
       h("label", { class: "check" }, shadows, "shadows"),
       h("label", { class: "check" }, less, "less detail where drawing is slow"),
-      h("div", { class: "row" }, h("button", { click: () => stage.home() }, "Whole world (Home)")),
+      h(
+        "div",
+        { class: "row" },
+        h("button", { click: () => stage.home() }, "Whole world (Home)"),
+        measure,
+      ),
+      this.extras,
     );
   }
 }

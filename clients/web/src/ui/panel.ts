@@ -33,6 +33,11 @@ export class Panel {
       tabs.append(button);
     }
     tabs.addEventListener("keydown", (event) => this.byArrows(event));
+    const plots = this.tabs.get("Plots")!; // a field that is dragged onto it is plotted
+    plots.addEventListener("dragover", (event) => {
+      event.preventDefault();
+      this.open("Plots");
+    });
     this.robots.addEventListener("change", () => choose(this.names.indexOf(this.robots.value)));
     this.search.addEventListener("input", () => this.fill());
     this.search.addEventListener("keydown", (event) => {

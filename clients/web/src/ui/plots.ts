@@ -120,7 +120,8 @@ export class TimePlot {
   }
 }
 
-function padded(low: number, high: number): [number, number] {
+// Some room below and above.
+export function padded(low: number, high: number): [number, number] {
   if (!Number.isFinite(low) || !Number.isFinite(high)) return [-0.1, 0.1];
   const pad = Math.max(0.02, 0.1 * (high - low));
   return [low - pad, high + pad];

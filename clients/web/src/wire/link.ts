@@ -38,6 +38,8 @@ export interface RunLink {
   command(channel: string, message: Uint8Array): boolean;
   play(on: boolean, speed: number): void;
   seek(time_s: number): void;
+  // What is known of a channel so far, in order; of long logs not every message.
+  history(channel: string): Promise<Uint8Array[]>;
 }
 
 const enum Operation {
@@ -119,6 +121,21 @@ export class Link implements RunLink {
     const bytes = new DataView(new ArrayBuffer(8));
     bytes.setFloat64(0, time_s, true);
     this.send([Operation.seek], new Uint8Array(bytes.buffer));
+  }
+
+  async history(channel: string): Promise<Uint8Array[]> {
+    const path = channel.split("/").map(encodeURIComponent).join("/");
+    const answer = await fetch(`/history/${path}`).catch(() => null);
+    if (!answer?.ok) return [];
+    const bytes = await answer.arrayBuffer(),
+      view = new DataView(bytes),
+      messages: Uint8Array[] = [];
+    for (let at = 0; at + 4 <= bytes.byteLength;) {
+      const size = view.getUint32(at, true);
+      messages.push(new Uint8Array(bytes, at + 4, size));
+      at += 4 + size;
+    }
+    return messages;
   }
 
   private sendWanted(): void {

@@ -161,6 +161,11 @@ export class LogFile implements RunLink {
     this.show();
   }
 
+  history(channel: string): Promise<Uint8Array[]> {
+    const index = this.head.channels.indexOf(channel);
+    return Promise.resolve((this.entries[index] ?? []).flatMap(({ messages }) => messages));
+  }
+
   private tell(): void {
     this.handler?.playback({ ...this.playback });
   }

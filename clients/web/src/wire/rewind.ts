@@ -56,10 +56,13 @@ export class Rewind implements RunLink {
   private bytes = 0;
   private newest_s = 0;
   private epoch = -1;
+  private isLive = true;
   private past: { now: number; playing: boolean; speed: number } | null = null; // null: the present is shown
   private shown = new Map<string, Entry>();
   private last_ms = 0;
   onPast: (past: Past | null, range: { begin: number; end: number }) => void = () => undefined;
+
+  onKept: (channel: string, bytes: Uint8Array) => void = () => undefined;
 
   constructor(private readonly inner: RunLink) {
     setInterval(() => this.tick(), kTick_ms);
@@ -72,14 +75,16 @@ export class Rewind implements RunLink {
   connect(handler: LinkHandler): void {
     this.handler = handler;
     this.inner.connect({
-      ...(Object.fromEntries(
-        (["state", "hello", "scene", "playback", "traffic", "refused"] as const).map((name) => [
-          name,
-          (...values: never[]) =>
-            (handler[name] as (...values: never[]) => void).call(handler, ...values),
-        ]),
-      ) as unknown as LinkHandler),
+      state: (link, words) => handler.state(link, words),
+      hello: (hello) => {
+        this.isLive = hello.mode === "live";
+        handler.hello(hello);
+      },
+      scene: () => handler.scene(),
+      playback: (playback) => handler.playback(playback),
       message: (channel, bytes) => this.onMessage(channel, bytes),
+      traffic: (channels, messages, sizes) => handler.traffic(channels, messages, sizes),
+      refused: (channel) => handler.refused(channel),
     });
   }
   want(channels: Iterable<string>): void {
@@ -128,16 +133,19 @@ export class Rewind implements RunLink {
     this.tell();
   }
 
-  // What was kept of a channel, in order: for plots.
-  *kept(channel: string): Iterable<Uint8Array> {
-    for (const entry of this.entries.get(channel) ?? []) yield* entry.messages;
+  // Of a live run what is kept.
+  history(channel: string): Promise<Uint8Array[]> {
+    const kept = this.entries.get(channel);
+    if (!this.isLive) return this.inner.history(channel);
+    return Promise.resolve((kept ?? []).flatMap(({ messages }) => messages));
   }
 
   private onMessage(channel: string, bytes: Uint8Array): void {
     const type = typeOf(bytes);
-    if (!type || kNow.has(type)) return this.handler.message(channel, bytes);
+    if (!type || kNow.has(type) || !this.isLive) return this.handler.message(channel, bytes);
     if (type === "world_state_t" || type === "tick_t") this.heed(type, bytes);
     this.keep(channel, type, bytes);
+    this.onKept(channel, bytes);
     if (!this.past) this.handler.message(channel, bytes);
   }
 

@@ -1,0 +1,61 @@
+// Pictures and videos of the view, as files: made by the browser, of what it draws.
+import type { Stage } from "../scene/stage";
+import { h, say, toast } from "./dom";
+
+const kFrames_hz = 30;
+const kTypes = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm", "video/mp4"];
+
+function download(blob: Blob, name: string): void {
+  const link = h("a", { href: URL.createObjectURL(blob), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+export class Capture {
+  readonly element: HTMLElement;
+  private readonly record = h(
+    "button",
+    { id: "record", click: () => this.toggle() },
+    "Record video",
+  );
+  private recorder: MediaRecorder | null = null;
+
+  constructor(
+    private readonly stage: Stage,
+    private readonly canvas: HTMLCanvasElement,
+  ) {
+    const picture = h("button", { id: "screenshot", click: () => this.picture() }, "Screenshot");
+    picture.disabled = this.record.disabled = !stage.renderer;
+    this.element = h("div", { class: "row" }, picture, this.record);
+  }
+
+  private picture(): void {
+    this.stage.redraw(); // what was drawn last may be gone
+    this.canvas.toBlob((blob) => {
+      if (blob) download(blob, "ruedo.png");
+    }, "image/png");
+  }
+
+  private toggle(): void {
+    if (this.recorder) return this.recorder.stop();
+    const mimeType = kTypes.find((type) => globalThis.MediaRecorder?.isTypeSupported(type));
+    if (!mimeType) return toast("This browser records no videos.", "error");
+    const parts: Blob[] = [],
+      recorder = new MediaRecorder(this.canvas.captureStream(kFrames_hz), { mimeType });
+    recorder.ondataavailable = ({ data }) => parts.push(data);
+    recorder.onstop = () => {
+      this.recorder = null;
+      this.show();
+      const kind = mimeType.startsWith("video/mp4") ? "mp4" : "webm";
+      download(new Blob(parts, { type: mimeType }), `ruedo.${kind}`);
+    };
+    recorder.start(1000);
+    this.recorder = recorder;
+    this.show();
+  }
+
+  private show(): void {
+    say(this.record, this.recorder ? "Stop recording" : "Record video");
+    this.record.classList.toggle("on", this.recorder !== null);
+  }
+}

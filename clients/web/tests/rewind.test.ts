@@ -1,0 +1,110 @@
+// The past of a live run: what is kept, what is shown of it, and what goes on meanwhile.
+import { beforeEach, describe, expect, it, vi } from "vitest";
+import { decode, encode } from "../src/wire/lcm";
+import type { LinkHandler, RunLink } from "../src/wire/link";
+import { kMostSeconds, Rewind, type Past } from "../src/wire/rewind";
+
+// A link whose end is in the test's hands.
+class Hand implements RunLink {
+  handler!: LinkHandler;
+  sent: string[] = [];
+  connect(handler: LinkHandler) {
+    this.handler = handler;
+  }
+  want() {}
+  watchTraffic() {}
+  command(channel: string) {
+    this.sent.push(channel);
+    return true;
+  }
+  history() {
+    return Promise.resolve([]);
+  }
+  play() {}
+  seek() {}
+}
+
+const state = (time_s: number, x: number, epoch = 0, part = 0, nparts = 1) =>
+  encode("world_state_t", {
+    utime: BigInt(Math.round(time_s * 1e6)),
+    epoch,
+    part,
+    nparts,
+    n: 1,
+    index: new Int32Array([part]),
+    position: new Float64Array([x, 0, 0]),
+    orientation: new Float64Array([1, 0, 0, 0]),
+  }).slice();
+
+describe("the past", () => {
+  let hand: Hand, rewind: Rewind, seen: [string, number, number][], pasts: (Past | null)[];
+  beforeEach(() => {
+    vi.useFakeTimers();
+    hand = new Hand();
+    rewind = new Rewind(hand);
+    seen = [];
+    pasts = [];
+    rewind.onPast = (past) => pasts.push(past);
+    rewind.connect({
+      message: (channel: string, bytes: Uint8Array) => {
+        if (channel !== "ruedo/world") return seen.push([channel, 0, 0]);
+        const { utime, position } = decode("world_state_t", bytes);
+        return seen.push([channel, Number(utime) * 1e-6, position[0]!]);
+      },
+    } as unknown as LinkHandler);
+  });
+  const come = (time_s: number, x = time_s) =>
+    hand.handler.message("ruedo/world", state(time_s, x));
+  const last = () => seen.at(-1);
+
+  it("is shown while the run goes on, and the present comes back", () => {
+    for (let t = 0; t <= 10; ++t) come(t);
+    expect(last()).toEqual(["ruedo/world", 10, 10]);
+    rewind.show(3.4);
+    expect(last()).toEqual(["ruedo/world", 3, 3]);
+    come(11);
+    expect(last()).toEqual(["ruedo/world", 3, 3]);
+    expect(rewind.range).toEqual({ begin: 0, end: 11 });
+    rewind.live();
+    expect(last()).toEqual(["ruedo/world", 11, 11]);
+    come(12);
+    expect(last()).toEqual(["ruedo/world", 12, 12]);
+  });
+
+  it("plays from there to the present", () => {
+    for (let t = 0; t <= 10; ++t) come(t);
+    rewind.show(2);
+    rewind.play(true, 2);
+    vi.advanceTimersByTime(1000);
+    expect(last()![1]).toBeGreaterThanOrEqual(3);
+    expect(last()![1]).toBeLessThanOrEqual(4);
+  });
+
+  it("is bounded", () => {
+    for (let t = 0; t <= 2 * kMostSeconds; ++t) come(t);
+    expect(rewind.range).toEqual({ begin: kMostSeconds, end: 2 * kMostSeconds });
+    rewind.show(1);
+    expect(last()![1]).toBe(kMostSeconds);
+  });
+
+  it("ends where the world begins anew", () => {
+    come(5);
+    rewind.show(5);
+    hand.handler.message("ruedo/world", state(0, 7, 1));
+    expect(pasts.at(-1)).toBeNull();
+    expect(last()).toEqual(["ruedo/world", 0, 7]);
+    expect(rewind.range).toEqual({ begin: 0, end: 0 });
+  });
+
+  it("shows messages in parts whole, and steers what runs", () => {
+    for (const t of [1, 2]) {
+      hand.handler.message("ruedo/world", state(t, 10 * t, 0, 0, 2));
+      hand.handler.message("ruedo/world", state(t, 10 * t + 1, 0, 1, 2));
+    }
+    seen.length = 0;
+    rewind.show(1.5);
+    expect(seen.map(([, , x]) => x)).toEqual([10, 11]);
+    rewind.command("p3at/velocity", new Uint8Array());
+    expect(hand.sent).toEqual(["p3at/velocity"]);
+  });
+});

@@ -1,0 +1,31 @@
+// A field of a log: all of the run at once, and a click in the plot is a moment of it.
+export default async function fieldsOfLog({ page, until, check, ready, given, picture }) {
+  await page.setViewportSize({ width: 1000, height: 620 });
+  await ready();
+  await page.keyboard.press(" ");
+  await page.getByRole("tab", { name: "Plots" }).click();
+  await page.getByLabel("channel to plot").selectOption("p3at/odometry");
+  await page.getByLabel("field to plot").selectOption("x");
+  await page.locator("#plot").click();
+  await until(
+    "the whole run is plotted",
+    ({ begin, end, most }) => {
+      const { times, values } = window.ruedo.plots.panes[0].series[0];
+      if (times.length === 0) return false;
+      const whole = Math.abs(times[0] - begin) < 1e-6 && Math.abs(times.at(-1) - end) < 1e-6;
+      return whole && Math.abs(Math.max(...values) - most) < 1e-9;
+    },
+    given,
+  );
+  await page.locator(".pane").scrollIntoViewIfNeeded();
+  const box = await page.locator(".pane .u-over").boundingBox();
+  await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+  await until(
+    "a click in a plot seeks",
+    ({ begin, end }) =>
+      Math.abs(window.ruedo.page.now.playback.now - (begin + end) / 2) < 0.2 * (end - begin),
+    given,
+  );
+  await picture("fields-log");
+  check("(it is seen)", true);
+}

@@ -1,0 +1,86 @@
+// What the view tells and gives: coordinates, ways, edges, pictures, videos, and links that lead back.
+import { readFileSync } from "node:fs";
+
+export default async function looks({ page, until, check, ready, still }) {
+  await page.setViewportSize({ width: 1000, height: 520 });
+  await ready();
+  await page.locator("#canvas").focus();
+  await page.keyboard.press(" ");
+  await until("(paused)", () => document.getElementById("state").textContent === "paused");
+  await page.getByRole("tab", { name: "World" }).click();
+  await page.keyboard.press("3");
+  await still();
+  const at = (x, y, z = 0) =>
+    page.evaluate(
+      (place) => {
+        const { stage } = window.ruedo,
+          box = document.getElementById("canvas").getBoundingClientRect(),
+          p = stage.camera.position
+            .clone()
+            .set(...place)
+            .project(stage.camera);
+        return [box.left + ((p.x + 1) / 2) * box.width, box.top + ((1 - p.y) / 2) * box.height];
+      },
+      [x, y, z],
+    );
+  const words = () => document.getElementById("coordinates").textContent;
+  await page.mouse.move(...(await at(-1, 0.5)));
+  await until("coordinates are those under the pointer", () => {
+    const [x, y] = document.getElementById("coordinates").textContent.split(",").map(parseFloat);
+    return Math.abs(x + 1) < 0.05 && Math.abs(y - 0.5) < 0.05;
+  });
+  await page.locator("#measure").click();
+  await page.mouse.click(...(await at(-1, 0.5)));
+  await page.mouse.click(...(await at(-1, -2.5)));
+  await until(
+    "a way is measured",
+    () =>
+      Math.abs(parseFloat(document.getElementById("coordinates").textContent) - 3) < 0.05 &&
+      /level/.test(document.getElementById("coordinates").textContent),
+  );
+  check("(in words)", true, await page.evaluate(words));
+  await page.locator("#measure").click();
+  const lines = () =>
+    page.evaluate(() =>
+      window.ruedo.stage.built.standing.every(({ meshes }) =>
+        meshes.every((mesh) => mesh.material.wireframe),
+      ),
+    );
+  await page.locator("#wireframe").check();
+  check("edges alone are drawn", await lines());
+  await page.locator("#wireframe").uncheck();
+  check("(and surfaces again)", !(await lines()));
+  const saved = async (click) => {
+    const [download] = await Promise.all([page.waitForEvent("download"), click()]);
+    return [download.suggestedFilename(), readFileSync(await download.path())];
+  };
+  const [name, png] = await saved(() => page.locator("#screenshot").click());
+  check(
+    "a screenshot is a picture",
+    name === "ruedo.png" && png.subarray(1, 4).toString() === "PNG" && png.length > 5000,
+    png.length,
+  );
+  await page.locator("#record").click();
+  await page.locator("#canvas").focus();
+  await page.keyboard.press("1");
+  for (let i = 0; i < 6; ++i) await page.keyboard.press("j");
+  await still();
+  const [film, webm] = await saved(() => page.locator("#record").click());
+  check(
+    "a video is one",
+    (film === "ruedo.webm" && webm.readUInt32BE(0) === 0x1a45dfa3) || film === "ruedo.mp4",
+    film,
+  );
+  await page.locator('[data-model="box_1"]').click();
+  const before = await page.evaluate(() => window.ruedo.stage.viewpoint);
+  await page.locator("#link").click();
+  await until("(the address has it)", () => location.hash.includes("selected=box_1"));
+  await page.reload();
+  await until(
+    "a link leads back to camera and selection",
+    (was) =>
+      window.ruedo?.page.now.selected === "box_1" &&
+      window.ruedo.stage.viewpoint.every((v, i) => Math.abs(v - was[i]) < 0.01),
+    before,
+  );
+}

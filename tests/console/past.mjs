@@ -1,0 +1,69 @@
+// The last minutes of a run are looked at while it goes on: by the time line, with what came and went meanwhile.
+export default async function past({ page, seen, until, check, ready, server, picture, fact }) {
+  await page.setViewportSize({ width: 1000, height: 460 }); // software draws every pixel
+  await ready();
+  await page.getByRole("tab", { name: "Robot" }).click();
+  await page.locator("#canvas").focus();
+  const pose = () => page.evaluate(() => window.ruedo.poses.to[0]);
+  await until(
+    "a live run has a time line",
+    () =>
+      document.getElementById("scrub").checkVisibility() &&
+      window.ruedo.rewind.range.end - window.ruedo.rewind.range.begin > 1,
+  );
+  const begin = await page.evaluate(() => ({
+    time: window.ruedo.page.now.time_s,
+    x: window.ruedo.poses.to[0],
+  }));
+  await page.keyboard.down("KeyW");
+  await until("(it drives)", (x) => window.ruedo.poses.to[0] > x + 0.5, begin.x);
+  await page.keyboard.up("KeyW");
+  await page.keyboard.press("b");
+  const place = await page.evaluate(() => {
+    const { stage } = window.ruedo,
+      box = document.getElementById("canvas").getBoundingClientRect(),
+      p = stage.camera.position.clone().set(-1.5, 0.4, 0).project(stage.camera); // nothing is there
+    return [box.left + ((p.x + 1) / 2) * box.width, box.top + ((1 - p.y) / 2) * box.height];
+  });
+  await page.mouse.click(...place);
+  const box = () => window.ruedo.page.now.scene.models.some(({ name }) => name === "box");
+  await until("(a box is placed)", box);
+  const scrub = async (time_s) => {
+    await page.evaluate((t) => {
+      const slider = document.getElementById("scrub");
+      slider.value = String(t);
+      slider.dispatchEvent(new Event("change"));
+    }, time_s);
+  };
+  await scrub(begin.time);
+  await until(
+    "the robot is where it was",
+    (x) => Math.abs(window.ruedo.poses.to[0] - x) < 0.02,
+    begin.x,
+  );
+  await until(
+    "what came later is not there",
+    () => !window.ruedo.page.now.scene.models.some(({ name }) => name === "box"),
+  );
+  check(
+    "it says how long ago that was",
+    /s ago$/.test(await page.locator("#state").innerText()),
+    await page.locator("#state").innerText(),
+  );
+  check("values are of that moment", Math.abs(parseFloat(await fact("pose")) - begin.x) < 0.05);
+  await picture("past");
+  const first = await server();
+  await until(
+    "the run goes on meanwhile",
+    (t) => window.ruedo.rewind.range.end > t + 0.5,
+    first.utime * 1e-6,
+  );
+  check("(and the page stays)", Math.abs((await pose()) - begin.x) < 0.02);
+  await page.locator("#timeline button").first().click();
+  await until("the past plays on", (t) => window.ruedo.page.now.past.now > t + 0.3, begin.time);
+  await page.locator("#live").click();
+  await until("Live shows what runs now", (x) => window.ruedo.poses.to[0] > x + 0.5, begin.x);
+  await until("with all that came", box);
+  check("(nothing is said of the past)", (await page.locator("#state").innerText()) === "running");
+  seen("all was seen");
+}
