@@ -1,4 +1,5 @@
-// A world is edited as a user does it: drawn, placed, moved by handles and numbers, cut, undone, settled, saved.
+// A world is edited as a user does it: drawn, placed, moved by handles and numbers, cut, undone,
+// settled, saved.
 export default async function edit({ page, seen, until, check, picture, still, given }) {
   await page.setViewportSize({ width: 1100, height: 640 });
   await until(
@@ -154,7 +155,8 @@ export default async function edit({ page, seen, until, check, picture, still, g
   await until("it is scaled", () => window.ruedo.page.now.edits.undo === "scale box");
   await has("box");
 
-  // ---- settled: the box, now 0.8 m high, was put back where it stood before: its lower half in the ground
+  // ---- settled: the box, now 0.8 m high, was put back where it stood before: its lower half in
+  // the ground
   await page.locator('[data-model="box"]').click();
   await page.locator('[data-number="z"]').fill("1");
   await page.locator('[data-number="z"]').press("Enter");

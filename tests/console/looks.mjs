@@ -1,4 +1,5 @@
-// What the view tells and gives: coordinates, ways, edges, pictures, videos, and links that lead back.
+// What the view tells and gives: coordinates, ways, edges, pictures, videos, and links that lead
+// back.
 import { readFileSync } from "node:fs";
 
 export default async function looks({ page, until, check, ready, still }) {

@@ -244,7 +244,8 @@ export class App {
       controlled: request !== "" || !live,
       ...(live ? { paused: world.paused } : {}),
     });
-    // The info that was kept for newcomers may be older than the last pause: the state itself is asked for.
+    // The info that was kept for newcomers may be older than the last pause: the state itself is
+    // asked for.
     if (live && request !== "" && !this.asked) {
       this.asked = true;
       void this.control.request(request_t.GET_STATE, encode("name_request_t", { name: "" }));

@@ -45,7 +45,8 @@ describe("history", () => {
 
 describe("poses", () => {
   it("are six numbers and back: roll, pitch and yaw about fixed axes", () => {
-    // 90 degrees about z after 90 about x: x to y, y to z, z to x; the quaternion (1, 1, 1, 1) / 2 turns like that.
+    // 90 degrees about z after 90 about x: x to y, y to z, z to x; the quaternion (1, 1, 1, 1) / 2
+    // turns like that.
     expect(poseFrom([1, 2, 3, 90, 0, 90]).map((v) => Number(v.toFixed(6)))).toEqual([
       1, 2, 3, 0.5, 0.5, 0.5, 0.5,
     ]);
@@ -93,7 +94,8 @@ describe("sdf", () => {
       "<size>2 2 3</size>",
       "<size>2 2 3</size>",
     ]);
-    // 600 kg of 1 x 2 x 3 m become 1200 kg of 2 x 2 x 3 m: m/12 (y^2 + z^2) = 1300, m/12 (x^2 + z^2) = 1300, m/12 (x^2 + y^2) = 800.
+    // 600 kg of 1 x 2 x 3 m become 1200 kg of 2 x 2 x 3 m: m/12 (y^2 + z^2) = 1300, m/12 (x^2 +
+    // z^2) = 1300, m/12 (x^2 + y^2) = 800.
     expect(after).toMatch(
       /<mass>1200<\/mass>\s*<inertia><ixx>1300<\/ixx><ixy>0<\/ixy><ixz>0<\/ixz><iyy>1300<\/iyy><iyz>0<\/iyz><izz>800<\/izz>/,
     );

@@ -171,7 +171,8 @@ export class Editor {
     return this.control.request(request_t.REMOVE, encode("name_request_t", { name }));
   }
 
-  // Another text for a model, raised by so much; where the new one cannot stand there, the old one comes back.
+  // Another text for a model, raised by so much; where the new one cannot stand there, the old one
+  // comes back.
   private async rewrite(
     name: string,
     what: string,

@@ -1,4 +1,5 @@
-// The handles at the selected model: they move, turn or scale what is seen at once, and the world when they are let go.
+// The handles at the selected model: they move, turn or scale what is seen at once, and the world
+// when they are let go.
 import * as THREE from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
 import { matrixOf } from "../scene/matrix";

@@ -1,4 +1,5 @@
-// What was done and can be taken back: steps one after the other, each of which may wait for the server.
+// What was done and can be taken back: steps one after the other, each of which may wait for the
+// server.
 export interface Step {
   name: string; // "move box_1"
   apply(): Promise<boolean>; // false: it did not come to pass

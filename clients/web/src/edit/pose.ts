@@ -1,4 +1,5 @@
-// Poses as seven numbers x, y, z, qw, qx, qy, qz, and as the six that people write: x, y, z in metres, roll, pitch and yaw in degrees.
+// Poses as seven numbers x, y, z, qw, qx, qy, qz, and as the six that people write: x, y, z in
+// metres, roll, pitch and yaw in degrees.
 import * as THREE from "three";
 import type { ModelDescription } from "../scene/description";
 import { matrixOf } from "../scene/matrix";

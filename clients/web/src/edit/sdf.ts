@@ -1,5 +1,5 @@
-// SDF as text: of what is drawn on the floor, and of models with another name, another size, a door. A text is changed where it
-// must be, and stays as it was written elsewhere.
+// SDF as text: of what is drawn on the floor, and of models with another name, another size, a
+// door. A text is changed where it must be, and stays as it was written elsewhere.
 
 // ---- making
 
@@ -202,82 +202,68 @@ function each(place: Place, name: string, found: (place: Place) => void): void {
   }
 }
 
-// Larger or smaller by a factor along each of its axes: shapes, and what stands apart in it. Masses go with the volume. Throws
-// where it cannot be: in words.
+// Larger or smaller by a factor along each of its axes: shapes, and what stands apart in it. Masses
+// go with the volume. Throws where it cannot be: in words.
 export function scaled(xml: string, factor: Size): string {
   const top = topModel(xml),
-    [fx, fy, fz] = factor,
     changes: Change[] = [],
-    same = Math.abs(fx - fy) < 1e-9 && Math.abs(fx - fz) < 1e-9,
-    round = Math.abs(fx - fy) < 1e-9;
+    links = top.children.filter(({ name }) => name === "link");
   if (!factor.every((f) => Number.isFinite(f) && f > 0)) throw new Error("a factor is above 0");
-  if (child(top, "joint") || top.children.filter(({ name }) => name === "link").length !== 1)
+  if (child(top, "joint") || links.length !== 1)
     throw new Error("it has joints or several links: those are not scaled");
-  const write = (place: Place, values: number[]) =>
-    changes.push([place.inside, place.past, list(values)]);
-  const turned = (pose: number[]) => pose.slice(3).some((angle) => Math.abs(angle) > 1e-9);
-  each(top, "box", (box) => {
-    const size = child(box, "size");
-    if (size)
-      write(
-        size,
-        numbers(xml, size).map((v, i) => v * factor[i]!),
-      );
+  const [fx, fy, fz] = factor,
+    isSame = Math.abs(fx - fy) < 1e-9 && Math.abs(fx - fz) < 1e-9;
+  scaleShapes(xml, top, factor, isSame, changes);
+  each(links[0]!, "pose", (pose) => {
+    const values = numbers(xml, pose);
+    if (!isSame && values.slice(3).some((angle) => Math.abs(angle) > 1e-9))
+      throw new Error("parts of it are turned: only one factor in all directions fits");
+    const to = values.map((v, i) => (i < 3 ? v * factor[i]! : v));
+    changes.push([pose.inside, pose.past, list(to)]);
   });
+  each(links[0]!, "mass", (mass) => multiply(xml, mass, [fx * fy * fz], changes));
+  each(links[0]!, "inertia", (moments) => scaleMoments(xml, moments, factor, changes));
+  return changed(xml, changes);
+}
+
+// Numbers, each by its factor.
+function multiply(
+  xml: string,
+  place: Place | undefined,
+  factors: number[],
+  changes: Change[],
+): void {
+  if (!place) return;
+  const values = numbers(xml, place).map((v, i) => v * (factors[i] ?? factors[0]!));
+  changes.push([place.inside, place.past, list(values)]);
+}
+
+function scaleShapes(
+  xml: string,
+  top: Place,
+  factor: Size,
+  isSame: boolean,
+  changes: Change[],
+): void {
+  const [fx, fy, fz] = factor;
+  each(top, "box", (box) => multiply(xml, child(box, "size"), factor, changes));
   each(top, "cylinder", (shape) => {
-    if (!round) throw new Error("a cylinder keeps its circle: x and y by the same factor");
-    const radius = child(shape, "radius"),
-      length = child(shape, "length");
-    if (radius)
-      write(
-        radius,
-        numbers(xml, radius).map((v) => v * fx),
-      );
-    if (length)
-      write(
-        length,
-        numbers(xml, length).map((v) => v * fz),
-      );
+    if (Math.abs(fx - fy) > 1e-9)
+      throw new Error("a cylinder keeps its circle: x and y by the same factor");
+    multiply(xml, child(shape, "radius"), [fx], changes);
+    multiply(xml, child(shape, "length"), [fz], changes);
   });
   for (const shape of ["sphere", "capsule", "cone"]) {
     each(top, shape, (found) => {
-      if (!same) throw new Error(`a ${shape} is scaled by one factor in all directions`);
-      for (const place of found.children)
-        if (["radius", "length"].includes(place.name))
-          write(
-            place,
-            numbers(xml, place).map((v) => v * fx),
-          );
+      if (!isSame) throw new Error(`a ${shape} is scaled by one factor in all directions`);
+      for (const part of ["radius", "length"]) multiply(xml, child(found, part), [fx], changes);
     });
   }
   each(top, "mesh", (mesh) => {
     const scale = child(mesh, "scale");
-    if (scale)
-      write(
-        scale,
-        numbers(xml, scale).map((v, i) => v * factor[i]!),
-      );
+    if (scale) multiply(xml, scale, factor, changes);
     else changes.push([mesh.past, mesh.past, `<scale>${list(factor)}</scale>`]);
   });
-  const link = child(top, "link")!;
-  each(link, "pose", (pose) => {
-    const values = numbers(xml, pose);
-    if (!same && turned(values))
-      throw new Error("parts of it are turned: only one factor in all directions fits");
-    write(
-      pose,
-      values.map((v, i) => (i < 3 ? v * factor[i]! : v)),
-    );
-  });
-  const volume = fx * fy * fz;
-  each(link, "mass", (mass) =>
-    write(
-      mass,
-      numbers(xml, mass).map((v) => v * volume),
-    ),
-  );
-  each(link, "inertia", (moments) => scaleMoments(xml, moments, factor, changes));
-  return changed(xml, changes);
 }
 
 // Moments of a body's second moments, each of which goes with the square of its axis.
@@ -314,8 +300,8 @@ export interface Door {
   height: number;
 }
 
-// A door in the wall that holds a point of the model: the wall becomes what is left of it, right of it and above it. Throws where
-// there is no wall, in words.
+// A door in the wall that holds a point of the model: the wall becomes what is left of it, right of
+// it and above it. Throws where there is no wall, in words.
 export function withDoor(xml: string, [px, py]: [x: number, y: number], door: Door): string {
   const top = topModel(xml),
     changes: Change[] = [],

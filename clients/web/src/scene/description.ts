@@ -23,8 +23,8 @@ export interface LightDescription {
   quadratic: number;
   shadows: boolean;
 }
-// fast: it never moves. body: that carries the model, -1 for none; pose: x, y, z, qw, qx, qy, qz of the model in it, or in the
-// world. A model that was removed has no name.
+// fast: it never moves. body: that carries the model, -1 for none; pose: x, y, z, qw, qx, qy, qz of
+// the model in it, or in the world. A model that was removed has no name.
 export interface ModelDescription {
   name: string;
   first_link: number;
@@ -84,7 +84,8 @@ export interface FileStore {
   file(path: string): Uint8Array<ArrayBuffer> | null;
 }
 
-// Null when there is no world to show. base: where its files are. store: null for the program that serves this page.
+// Null when there is no world to show. base: where its files are. store: null for the program that
+// serves this page.
 export async function loadScene(
   store: FileStore | null,
   base = "/scene",

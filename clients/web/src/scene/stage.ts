@@ -355,8 +355,8 @@ export class Stage {
     this.touch();
   }
 
-  // What is under a point of the canvas: a robot (-1 for none), the name of a model ("" for none) and the point of it that is seen, and
-  // where the floor is there.
+  // What is under a point of the canvas: a robot (-1 for none), the name of a model ("" for none)
+  // and the point of it that is seen, and where the floor is there.
   pick(
     x: number,
     y: number,

@@ -72,8 +72,8 @@ export function statisticsOf(values: Iterable<number>): Statistics | null {
   return count === 0 ? null : { count, min, max, mean, deviation: Math.sqrt(squares / count) };
 }
 
-// Rows of times and columns of values, as a spreadsheet reads them. Where a column has no value at a
-// time, its place is empty.
+// Rows of times and columns of values, as a spreadsheet reads them. Where a column has no value at
+// a time, its place is empty.
 export function csvOf(names: string[], columns: [times: number[], values: number[]][]): string {
   const rows = new Map<number, (number | undefined)[]>();
   columns.forEach(([times, values], column) => {

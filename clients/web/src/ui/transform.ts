@@ -2,7 +2,7 @@
 import type { Editor } from "../edit/editor";
 import { numbersOf, poseFrom, samePose } from "../edit/pose";
 import type { Handle, Page } from "../state/page";
-import { h, recall, remember, say } from "./dom";
+import { h, remember, say } from "./dom";
 
 const kFields = [
   ["x", "m"],
@@ -46,6 +46,24 @@ export class Transform {
     private readonly editor: Editor,
   ) {
     for (const field of this.fields) field.addEventListener("change", () => this.put());
+    const numbers = this.fields.map((field, i) =>
+      h("label", {}, h("span", { class: "dim" }, `${kFields[i]![0]}, ${kFields[i]![1]}`), field),
+    );
+    const scale = h("button", { id: "scale", click: () => this.scale() }, "Scale");
+    this.body = h(
+      "div",
+      {},
+      h("div", { class: "row" }, ...this.handles(), this.snap()),
+      h("div", { class: "numbers" }, ...numbers),
+      h("div", { class: "row" }, h("span", { class: "dim" }, "scale"), ...this.factors, scale),
+      h("div", { class: "row" }, ...this.ends()),
+    );
+    this.element = h("section", {}, this.title, this.body);
+    page.watch(["selected", "scene"], () => this.show());
+  }
+
+  private handles(): HTMLElement[] {
+    const { page } = this;
     const handles = kHandles.map(([handle, name, key]) =>
       h(
         "button",
@@ -57,6 +75,17 @@ export class Transform {
         name,
       ),
     );
+    page.watch(["handle"], ({ handle }) => {
+      for (const button of handles) {
+        button.classList.toggle("on", button.dataset.handle === handle);
+        button.setAttribute("aria-pressed", button.dataset.handle === handle ? "true" : "false");
+      }
+    });
+    return handles;
+  }
+
+  private snap(): HTMLElement {
+    const { page } = this;
     const snap = h(
       "select",
       { "aria-label": "snap" },
@@ -67,61 +96,21 @@ export class Transform {
       remember("snap", snap.value);
       page.set({ snap_m: Number(snap.value) });
     });
-    if (recall("snap") === null) snap.value = "0.1";
-    this.body = h(
-      "div",
-      {},
-      h("div", { class: "row" }, ...handles, snap),
-      h(
-        "div",
-        { class: "numbers" },
-        ...this.fields.map((field, i) =>
-          h(
-            "label",
-            {},
-            h("span", { class: "dim" }, `${kFields[i]![0]}, ${kFields[i]![1]}`),
-            field,
-          ),
-        ),
-      ),
-      h(
-        "div",
-        { class: "row" },
-        h("span", { class: "dim" }, "scale"),
-        ...this.factors,
-        h("button", { id: "scale", click: () => this.scale() }, "Scale"),
-      ),
-      h(
-        "div",
-        { class: "row" },
-        h(
-          "button",
-          {
-            id: "duplicate",
-            title: "a copy beside it (Ctrl D)",
-            click: () => void editor.duplicate(page.now.selected),
-          },
-          "Duplicate",
-        ),
-        h(
-          "button",
-          {
-            id: "delete",
-            title: "take it away (Delete)",
-            click: () => void editor.remove(page.now.selected),
-          },
-          "Delete",
-        ),
-      ),
-    );
-    this.element = h("section", {}, this.title, this.body);
-    page.watch(["handle"], ({ handle }) => {
-      for (const button of handles) {
-        button.classList.toggle("on", button.dataset.handle === handle);
-        button.setAttribute("aria-pressed", button.dataset.handle === handle ? "true" : "false");
-      }
-    });
-    page.watch(["selected", "scene"], () => this.show());
+    return snap;
+  }
+
+  private ends(): HTMLElement[] {
+    const { page, editor } = this,
+      button = (id: string, text: string, title: string, click: () => void) =>
+        h("button", { id, title, click }, text);
+    return [
+      button("duplicate", "Duplicate", "a copy beside it (Ctrl D)", () => {
+        void editor.duplicate(page.now.selected);
+      }),
+      button("delete", "Delete", "take it away (Delete)", () => {
+        void editor.remove(page.now.selected);
+      }),
+    ];
   }
 
   // The numbers, as things move; what is being typed stays.

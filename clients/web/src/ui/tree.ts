@@ -1,4 +1,5 @@
-// The models of the world as a tree that can be searched: robots, things that move, and what stands fast, each with its links.
+// The models of the world as a tree that can be searched: robots, things that move, and what stands
+// fast, each with its links.
 import type { Editor } from "../edit/editor";
 import type { ModelDescription } from "../scene/description";
 import type { Page } from "../state/page";

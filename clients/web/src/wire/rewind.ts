@@ -1,5 +1,6 @@
-// The last minutes of a live run as this page has seen them: a link that keeps what passes, so that an earlier moment can be shown
-// while the run goes on. What the page steers acts on the run, whatever is shown.
+// The last minutes of a live run as this page has seen them: a link that keeps what passes, so that
+// an earlier moment can be shown while the run goes on. What the page steers acts on the run,
+// whatever is shown.
 
 import { kTypes } from "../../generated/messages";
 import type { LinkHandler, RunLink } from "./link";
