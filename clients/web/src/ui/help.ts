@@ -5,7 +5,7 @@ const kKeys: [string[], string][] = [
   [["W", "A", "S", "D"], "drive the chosen robot (arrow keys, a gamepad and the stick, too)"],
   [["X"], "stop it"],
   [["Space"], "pause and go on"],
-  [["."], "one step, while paused; in a log, 0.1 s ahead (", " back)"],
+  [[".", ","], "one step, while paused; in a log or the past, 0.1 s on and back"],
   [["R"], "reset the world"],
   [["1", "2", "3"], "orbit, follow and top view"],
   [["I", "J", "K", "L"], "turn the view; with Shift, move it"],
