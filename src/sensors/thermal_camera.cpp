@@ -6,8 +6,8 @@
 // (0.01 K with 16 bits, 3 K with the format L8) of the plugin ThermalSensor, within its <min_temp>
 // and <max_temp>, rounded; <noise> of the camera is in K.
 #include <algorithm>
-#include <cmath>
 
+#include "core/whole.h"
 #include "model/plugins.h"
 #include "ruedo/image_t.hpp"
 #include "sensors/camera_view.h"
@@ -93,7 +93,7 @@ class ThermalCamera : public Sensor {
   }
 
   int counts(double kelvin) const {
-    return static_cast<int>(std::lround(std::clamp(kelvin, lowest_, highest_) / resolution_));
+    return rounded<int>(std::clamp(kelvin, lowest_, highest_) / resolution_);
   }
 
   RandomSource random_;

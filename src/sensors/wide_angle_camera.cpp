@@ -11,7 +11,6 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "core/whole.h"
 #include "model/codecs.h"
 #include "ruedo/image_t.hpp"
 #include "ruedo/math.h"
