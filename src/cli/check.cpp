@@ -59,8 +59,8 @@ std::vector<Finding> find_all(const CheckArguments& arguments, bool& loaded) {
       const Progress progress("reading textures");
       check_textures(*world, findings);
     }
-    // All that `ruedo run` makes before it starts; but it stops at the first device that cannot be
-    // made.
+    // All that `ruedo run` makes before it starts; but it stops at the first device that it
+    // refuses.
     engine::Channels channels;
     Findings of_run;
     engine::FleetOptions options;
@@ -68,10 +68,7 @@ std::vector<Finding> find_all(const CheckArguments& arguments, bool& loaded) {
     options.keep_going = true;
     const Progress progress("making " + world->name);
     const engine::World made(world, options, channels, of_run);
-    const auto is_error = [](const Finding& finding) {
-      return finding.kind == Finding::Kind::error;
-    };
-    loaded = std::none_of(of_run.list().begin(), of_run.list().end(), is_error);
+    loaded = !made.refused();
     findings.insert(findings.end(), of_run.list().begin(), of_run.list().end());
   } catch (const InputError& error) {
     if (error.source().file.empty()) throw;  // wrong usage

@@ -47,9 +47,10 @@ int Channels::add(Channel channel) {
   return index;
 }
 
-void Channels::remove(const std::string& robot) {
+void Channels::remove(const std::string& robot, const std::string& device) {
   for (Channel& channel : channels_) {
     if (channel.robot != robot || channel.gone) continue;
+    if (!device.empty() && channel.device != device) continue;
     channel.gone = true;
     by_bus_name_.erase(channel.bus_name);
   }

@@ -45,8 +45,8 @@ class Channels {
   const std::vector<Channel>& list() const { return channels_; }
   const Channel& operator[](int index) const { return channels_[static_cast<size_t>(index)]; }
 
-  // A robot is gone. The indices of all other channels stay.
-  void remove(const std::string& robot);
+  // A robot is gone, or one device of it. The indices of all other channels stay.
+  void remove(const std::string& robot, const std::string& device = "");
 
   // Throws InputError, with a suggestion, when a remap names no channel.
   void check_remaps() const;

@@ -9,6 +9,7 @@
 
 #include "core/whole.h"
 #include "engine/world_state.h"
+#include "model/read_context.h"
 #include "ruedo/fault_t.hpp"
 #include "ruedo/joint_command_t.hpp"
 #include "ruedo/move_command_t.hpp"
@@ -159,18 +160,25 @@ class FleetMaker {
       ModuleSetup module = setup.without_devices();
       for (size_t k = first; k < last; ++k) add_device(wanted[k], module);
       for (const Device& device : module.devices) module.wants_visual_rays |= device.visual_rays;
-      fleet_.modules.push_back(std::move(module));
+      if (!module.devices.empty()) fleet_.modules.push_back(std::move(module));
     }
   }
 
+  // As everywhere in a file: what is wrong with an element of the format costs the sensor and is
+  // named; what is wrong with one of Ruedo's own, or with names and options, is the author's.
   void add_device(const Wanted& wanted, ModuleSetup& module) {
+    const std::string& robot = instance(wanted.robot).name;
+    const std::string where = robot + "/" + wanted.name;
     try {
-      module.devices.push_back(make_device(wanted));
+      if (model::read_or_leave_out(where, "the sensor is left out", findings_,
+                                   [&] { module.devices.push_back(make_device(wanted)); }))
+        return;
     } catch (const InputError& error) {
       if (!options_.keep_going) throw;
-      findings_.error(error.source(), instance(wanted.robot).name + "/" + wanted.name,
-                      error.message());
+      findings_.error(error.source(), where, error.message());
+      fleet_.refused = true;
     }
+    channels_.remove(robot, wanted.name);  // what it had announced
   }
 
   Device make_device(const Wanted& wanted) {

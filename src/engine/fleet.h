@@ -19,7 +19,7 @@ struct FleetOptions {
   bool noise = true;
   std::vector<std::string> disabled;  // "ROBOT/DEVICE"
   int epoch = 0;
-  bool keep_going = false;  // a device that is configured wrongly is an error finding, and left out
+  bool keep_going = false;  // what would throw is an error finding, and the device left out
   int only_robot = -1;      // index into BodyLayout::robots: one that joins a world that runs
   int64_t first_step = 0;   // samples count from its time
 };
@@ -29,10 +29,12 @@ struct Fleet {
   std::vector<device_info_t>
       devices;  // robots in world order, their devices in the order of the modules
   std::vector<Input> inputs;
+  bool refused = false;  // with keep_going: without it, making them would have thrown
 };
 
 // Makes all devices and announces all channels. world and layout must outlive the fleet. What is
-// not supported goes to `findings`; a configuration that is wrong throws InputError.
+// not supported goes to `findings`, and so does a <sensor> that is written wrongly, which is left
+// out; a wrong element of Ruedo's own throws InputError.
 Fleet make_fleet(const model::WorldModel& world, const model::BodyLayout& layout,
                  const FleetOptions& options, Channels& channels, Findings& findings);
 

@@ -49,6 +49,7 @@ class World {
   const model::WorldModel& model() const { return model_; }
   const model::BodyLayout& layout() const { return layout_; }
   const std::vector<device_info_t>& devices() const { return devices_; }
+  bool refused() const { return fleet_.refused; }  // Fleet::refused
   CommandInbox& inbox() { return inbox_; }
   const Faults& faults() const { return faults_; }
   const physics::PhysicsWorld& physics() const { return *physics_; }

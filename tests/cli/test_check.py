@@ -60,6 +60,20 @@ COLLISION = "model m/link l/collision c"
 # What the world says; other files beside it; the exit code; the finding's kind, line and element,
 # and a part of its text.
 FILES = {
+    "a sensor that is none": (
+        in_link(
+            "<sensor name='s' type='ray'><ray><scan><horizontal><samples>0</samples></horizontal></scan><range><max>3</max></range></ray></sensor>"
+        ),
+        {},
+        1,
+        ("error", 4, "m/s", "; the sensor is left out"),
+    ),
+    "a sensor whose own element is wrong": (
+        in_link("<sensor name='s' type='imu'><ruedo:phase>x</ruedo:phase></sensor>"),
+        {},
+        3,
+        ("error", 4, "m/s", "<ruedo:phase>"),
+    ),
     "broken mesh": (
         mesh("a.dae"),
         {"a.dae": b"<COLLADA>no"},

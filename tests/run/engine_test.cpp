@@ -189,6 +189,36 @@ TEST(Engine, ArraysFollowTheRuns) {
   EXPECT_EQ(value_of(position, 0), 0.0);
 }
 
+// What is wrong with a <sensor> costs that sensor, and is told; the rest of the world runs. A wrong
+// element of Ruedo's own is its author's.
+TEST(Engine, GoesOnWithoutASensorThatIsWrittenWrongly) {
+  const std::string wrong =
+      "<sensor name='laser' type='ray'><ray><scan><horizontal><samples>-3</samples></horizontal>"
+      "</scan><range><min>1</min><max>2</max></range></ray></sensor>"
+      "<sensor name='good' type='imu'/><sensor name='eye' type='camera'><camera><image><width>0"
+      "</width><height>1</height></image></camera></sensor>";
+  Engine engine(load_text(robot_sdf("a", 0, 0, wrong)), {});
+  engine.step(10);
+  EXPECT_EQ(engine.observe("good", "angular_velocity")->shape.back(), 3);
+  EXPECT_THROW(engine.observe("laser", "ranges"), InputError);
+  std::vector<std::string> told;
+  for (const Finding& finding : engine.findings().list()) {
+    EXPECT_EQ(finding.kind, Finding::Kind::error);
+    EXPECT_GT(finding.source.line, 0);
+    told.push_back(finding.element + ": " + finding.text);
+  }
+  EXPECT_THAT(told, testing::UnorderedElementsAre(
+                        testing::AllOf(testing::StartsWith("a/laser: <samples>"),
+                                       testing::EndsWith("; the sensor is left out")),
+                        testing::AllOf(testing::StartsWith("a/eye: <width>"),
+                                       testing::EndsWith("; the sensor is left out"))));
+  EXPECT_THROW(
+      Engine(load_text(robot_sdf(
+                 "a", 0, 0, "<sensor name='i' type='imu'><ruedo:phase>x</ruedo:phase></sensor>")),
+             {}),
+      InputError);
+}
+
 TEST(Engine, SaysWhatCannotBe) {
   engine::EngineOptions options;
   Engine engine(load_text(robot_sdf("a", 0, 0)), options);
