@@ -304,10 +304,14 @@ void BodyLayout::add(const WorldModel& world, int i, Known& known) {
       const int index = static_cast<int>(wheels.size());
       for (const int below : subtree(model, joint.child)) {
         int& turned_by = links[static_cast<size_t>(first + below)].wheel;
-        if (turned_by >= 0)
-          wheels[static_cast<size_t>(turned_by)].on = index;
-        else if (kinematic)
+        if (kinematic && turned_by < 0) {
           turned_by = index;
+          continue;
+        }
+        for (const int other : placement.wheels) {  // that hangs on this one
+          if (wheels[static_cast<size_t>(other)].link == first + below)
+            wheels[static_cast<size_t>(other)].on = index;
+        }
       }
       placement.wheels.push_back(index);
       wheels.push_back(wheel);

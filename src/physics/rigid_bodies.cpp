@@ -73,8 +73,8 @@ int driven_wheel(const model::BodyLayout& layout, int index) {
   if (robot == layout.robots.end() || robot->instance != instance || robot->body == index)
     return -1;
   for (const int wheel : robot->wheels) {
-    if (layout.links[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].link)].body ==
-        index)
+    const model::WheelPlacement& placement = layout.wheels[static_cast<size_t>(wheel)];
+    if (!placement.steers && layout.links[static_cast<size_t>(placement.link)].body == index)
       return wheel;
   }
   return -1;
@@ -149,11 +149,20 @@ ShapeSurface RigidBodies::tyre_of(const model::WorldModel& world, const model::B
                                   int wheel, const ShapeSurface& surface) const {
   const auto& robot =
       layout.robots[static_cast<size_t>(layout.wheels[static_cast<size_t>(wheel)].robot)];
+  const model::Model& model = *world.models[static_cast<size_t>(robot.instance)].model;
   ShapeSurface tyre = surface;
+  using Steering = model::DriveDescription::Steering;
+  const bool rolls_sideways = model.drive && (model.drive->steering == Steering::mecanum ||
+                                              model.drive->steering == Steering::omni);
+  if (rolls_sideways) {  // it grips along the roller's axis only; the roller turns freely
+    const Vec3& rim = layout.wheels[static_cast<size_t>(wheel)].rim;
+    tyre.along_I.setZero();
+    tyre.friction2 = 0.0;
+    if (model.drive->steering == Steering::mecanum) tyre.roller_rad = math::atan2(rim.y(), rim.x());
+  }
   if (tyre.along_I == Vec3::Zero()) tyre.axle_I = Vec3::UnitY();
   if (tyre.stiffness > 0.0) return tyre;  // the file says how it gives
-  const double share =
-      mass_on_each_wheel(*world.models[static_cast<size_t>(robot.instance)].model, robot);
+  const double share = mass_on_each_wheel(model, robot);
   tyre.stiffness = share * world.gravity.norm() / kTyreGives_m;
   tyre.damping = kTyreDamping * 2.0 * std::sqrt(tyre.stiffness * share);
   return tyre;

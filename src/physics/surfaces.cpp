@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "physics/rigid_bodies.h"
+#include "ruedo/math.h"
 
 namespace ruedo::physics {
 
@@ -34,9 +35,10 @@ Vec3 direction_of(const ShapeSurface& surface, const btCollisionObject& object,
   };
   if (surface.along_I != Vec3::Zero()) return in_world(surface.along_I);
   if (surface.axle_I == Vec3::Zero() || surface.friction == surface.friction2) return Vec3::Zero();
-  const Vec3 ahead = in_world(surface.axle_I).cross(normal);
-  return ahead.norm() > 1e-3 ? ahead
-                             : Vec3(Vec3::Zero());  // a wheel that lies on its side has none
+  const Vec3 axle = in_world(surface.axle_I), ahead = axle.cross(normal);
+  if (ahead.norm() <= 1e-3) return Vec3::Zero();  // a wheel that lies on its side has none
+  if (surface.roller_rad == 0.0) return ahead;
+  return math::cos(surface.roller_rad) * ahead.normalized() + math::sin(surface.roller_rad) * axle;
 }
 
 double torsional_lever(const ShapeSurface& surface, double depth_m) {

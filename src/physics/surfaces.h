@@ -16,6 +16,9 @@ struct ShapeSurface {
       Vec3::Zero();  // direction of `friction` in the body's frame I; zero: none is given
   Vec3 axle_I =
       Vec3::Zero();  // of a wheel: `friction` acts across it, `friction2` along it; zero: no wheel
+  double roller_rad =
+      0.0;  // of a wheel with rollers: its friction acts so far from across the axle
+            // towards it, along the axis of the roller that stands on the ground
   double slip = 0.0, slip2 = 0.0;  // m/s per N
   double torsional = 0.0;          // coefficient
   double patch_radius_m = 0.0;     // of the torsional friction; 0: from the two below

@@ -15,6 +15,7 @@ namespace {
 constexpr double kRateTime_s = 0.01, kAngleTime_s = 0.02;
 // What a servo may lag behind; a robot that is held does not wind it up further.
 constexpr double kLargestLag_m = 0.05;
+constexpr double kSteeringTorque = 100.0;  // rad/s missing, for which steering gives all it can
 constexpr double kMostOfLag = 0.5;  // of it, that one step may make good: more would overshoot
 constexpr double kLargestYawError_rad = 0.3;
 constexpr double kSupportNormal = 0.5;  // cosine between a support's normal and the robot's up
@@ -30,6 +31,7 @@ WheelsDrive::WheelsDrive(const model::WorldModel& world, const model::BodyLayout
       servos_(wheels_.size()),
       max_torque_(description_.max_wheel_torque),
       believed_(WheelKinematics::believed(description_)) {
+  place_wheels(layout);
   bodies_.push_back(body_);
   double mass = physics.mass(body_);
   for (size_t i = 0; i < wheels_.size(); ++i) {
@@ -39,33 +41,60 @@ WheelsDrive::WheelsDrive(const model::WorldModel& world, const model::BodyLayout
     bodies_.push_back(body);
     mass += physics.mass(body);
   }
+  set_gains(mass);
+  begin_at_rest();
+}
+
+void WheelsDrive::place_wheels(const model::BodyLayout& layout) {
+  if (model::BaseOdometry::is_for(description_))
+    base_.emplace(layout, robot_, description_, description_.track_error, 0.0);
+  const Pose X_BaseW = (layout.bodies[static_cast<size_t>(body_)].X_WB * X_BBase_).inverse();
+  for (const int index : wheels_) {
+    const model::WheelPlacement& wheel = layout.wheels[static_cast<size_t>(index)];
+    const model::WheelPlacement& place =
+        wheel.on < 0 ? wheel : layout.wheels[static_cast<size_t>(wheel.on)];
+    const model::LinkPlacement& link = layout.links[static_cast<size_t>(place.link)];
+    const Vec3 p_Base = X_BaseW * (layout.bodies[static_cast<size_t>(link.body)].X_WB *
+                                   (link.X_BL * place.center_in_L));
+    places_.push_back({wheel.left, wheel.steers, wheel.on >= 0, wheel.rim, p_Base.x(), p_Base.y()});
+  }
+}
+
+void WheelsDrive::set_gains(double mass) {
   const double r = description_.wheel_radius;
-  if (!wheels_.empty())
-    max_torque_ =
-        std::min(max_torque_, description_.max_force * r / static_cast<double>(wheels_.size()));
+  const auto rolling = static_cast<double>(
+      std::count_if(places_.begin(), places_.end(), [](const Place& at) { return !at.steers; }));
+  if (rolling > 0) max_torque_ = std::min(max_torque_, description_.max_force * r / rolling);
   max_torque_ = std::min(max_torque_, description_.stall_torque * description_.gear);
-  for (Servo& servo : servos_) {
-    const double inertia = mass * r * r / static_cast<double>(wheels_.size());
+  for (size_t i = 0; i < servos_.size(); ++i) {
+    Servo& servo = servos_[i];
+    const double inertia = mass * r * r / rolling;
+    if (places_[i].steers) {
+      servo.rate_gain = inertia / kRateTime_s;
+      servo.angle_gain = servo.rate_gain / kAngleTime_s;
+      continue;
+    }
     servo.rate_gain =
         description_.servo_rate_gain > 0.0 ? description_.servo_rate_gain : inertia / kRateTime_s;
     servo.angle_gain = description_.servo_angle_gain > 0.0 ? description_.servo_angle_gain
                                                            : servo.rate_gain / kAngleTime_s;
   }
-  begin_at_rest();
 }
 
-SideRates WheelsDrive::mean_of_sides(double (physics::PhysicsWorld::*of_wheel)(int) const) const {
+// Of what each wheel has, in the order of wheels_.
+SideRates WheelsDrive::mean_of_sides(const std::vector<double>& of_wheels) const {
   SideRates sum{};
-  for (size_t i = 0; i < wheels_.size(); ++i)
-    (is_left(i) ? sum.left : sum.right) += (physics_.*of_wheel)(wheels_[i]);
+  for (size_t i = 0; i < of_wheels.size(); ++i)
+    (places_[i].left ? sum.left : sum.right) += of_wheels[i];
   const size_t left = description_.left_joints.size();
   return {sum.left / static_cast<double>(left),
           sum.right / static_cast<double>(wheels_.size() - left)};
 }
 
 void WheelsDrive::begin_at_rest() {
-  for (size_t i = 0; i < wheels_.size(); ++i) servos_[i].angle = physics_.wheel_angle(wheels_[i]);
-  last_angles_ = mean_of_sides(&physics::PhysicsWorld::wheel_angle);
+  last_angles_.resize(wheels_.size());
+  for (size_t i = 0; i < wheels_.size(); ++i)
+    last_angles_[i] = servos_[i].angle = physics_.wheel_angle(wheels_[i]);
   way_missing_ = angle_missing_ = yaw_integral_ = 0.0;
 }
 
@@ -83,7 +112,7 @@ void WheelsDrive::before_step(SimTime now) {
   way_ = motion_.step(now, step_us_);
   way_missing_ += way_.way;
   angle_missing_ += way_.angle;
-  drive_wheels(believed_.wheels({way_.way / step_s_, way_.angle / step_s_ + yaw_correction()}));
+  turn_wheels(way_);
 }
 
 // rad/s, from what the gyro says; wheel commands go past it.
@@ -97,11 +126,50 @@ double WheelsDrive::yaw_correction() {
   return gain * error + yaw_integral_;
 }
 
-void WheelsDrive::drive_wheels(const SideRates& rates) {
+void WheelsDrive::turn_wheels(const Displacement& way) {
+  const Vec3 twist(way.way / step_s_, way.side / step_s_, way.angle / step_s_ + yaw_correction());
+  const double curvature = motion_.curvature();
+  const SideRates sides = base_ ? SideRates{} : believed_.wheels({twist.x(), twist.z()});
   for (size_t i = 0; i < wheels_.size(); ++i) {
-    const double rate = is_left(i) ? rates.left : rates.right;
+    if (places_[i].steers) {
+      steer(i, steering_of(i, curvature));
+      continue;
+    }
+    const double rate = base_             ? rate_of(i, twist, curvature)
+                        : places_[i].left ? sides.left
+                                          : sides.right;
     drive_wheel(i, std::clamp(rate, -description_.max_wheel_rate, description_.max_wheel_rate));
   }
+}
+
+// rad/s, by what the robot believes of its radii and levers; curvature: 1/m, of a base that steers.
+double WheelsDrive::rate_of(size_t wheel, const Vec3& twist, double curvature) const {
+  const Place& at = places_[wheel];
+  const double radius =
+      description_.wheel_radius * (1.0 + description_.radius_error[at.left ? 0 : 1]);
+  const double lever = 1.0 + description_.track_error;
+  if (base_->rolls_sideways())
+    return Vec3(at.rim.x(), at.rim.y(), at.rim.z() * lever).dot(twist) / radius;
+  const double along = 1.0 - curvature * lever * at.y;
+  return twist.x() * (at.steered ? math::hypot(along, curvature * lever * at.x) : along) / radius;
+}
+
+// Across the line to the middle of the circle.
+double WheelsDrive::steering_of(size_t wheel, double curvature) const {
+  const Place& at = places_[wheel];
+  const double lever = 1.0 + description_.track_error;
+  return math::atan2(curvature * lever * at.x, 1.0 - curvature * lever * at.y);
+}
+
+void WheelsDrive::steer(size_t wheel, double angle) {
+  Servo& servo = servos_[wheel];
+  const double missing = angle - physics_.wheel_angle(wheels_[wheel]);
+  physics::WheelServo command;
+  command.rate = std::min(servo.angle_gain / servo.rate_gain, kMostOfLag / step_s_) * missing;
+  command.gain = servo.rate_gain;
+  command.highest_torque = kSteeringTorque * servo.rate_gain;
+  command.lowest_torque = -command.highest_torque;
+  physics_.drive_wheel(wheels_[wheel], command);
 }
 
 void WheelsDrive::drive_wheel(size_t wheel, double rate) {
@@ -153,12 +221,11 @@ void WheelsDrive::after_step(SimTime now) {
   const double ahead =
       (X_WBase_.rotation.conjugate() * (X_WBase.translation - X_WBase_.translation)).x();
   set_state(X_WBase, base_twist(X_WBase));
-  read_wheel_rates();
 
-  const SideRates angles = mean_of_sides(&physics::PhysicsWorld::wheel_angle);
-  PlaneMotion made =
-      believed_.motion({angles.left - last_angles_.left, angles.right - last_angles_.right});
-  last_angles_ = angles;
+  const Vec3 way = believed_way();
+  believed_rate_ = way / step_s_;
+  PlaneMotion made{way.x(), way.z()};
+  read_wheel_rates();
   if (description_.yaw_gain > 0.0)
     made.omega = turned * (1.0 + description_.gyro_scale_error) + description_.gyro_bias * step_s_;
   believed_heading_ = wrap_angle(believed_heading_ + made.omega);
@@ -186,9 +253,31 @@ Lag WheelsDrive::lag() const {
   return {way_missing_, angle_missing_, moving};
 }
 
+// m ahead, m to the left, rad: of this step, by the encoders.
+Vec3 WheelsDrive::believed_way() {
+  const SideRates before = mean_of_sides(last_angles_);
+  std::vector<double> ways(wheels_.size());
+  for (size_t i = 0; i < wheels_.size(); ++i) {
+    const double angle = physics_.wheel_angle(wheels_[i]);
+    ways[i] = (angle - last_angles_[i]) * description_.wheel_radius *
+              (1.0 + description_.radius_error[places_[i].left ? 0 : 1]);
+    last_angles_[i] = angle;
+  }
+  if (base_) return base_->moved(ways, last_angles_);
+  const SideRates now = mean_of_sides(last_angles_);
+  const PlaneMotion made = believed_.motion({now.left - before.left, now.right - before.right});
+  return {made.v, 0.0, made.omega};
+}
+
 void WheelsDrive::read_wheel_rates() {
-  const PlaneMotion motion =
-      WheelKinematics::real(description_).motion(mean_of_sides(&physics::PhysicsWorld::wheel_rate));
+  if (base_) {
+    wheel_v_ = believed_rate_.x();
+    wheel_omega_ = believed_rate_.z();
+    return;
+  }
+  std::vector<double> rates;
+  for (const int wheel : wheels_) rates.push_back(physics_.wheel_rate(wheel));
+  const PlaneMotion motion = WheelKinematics::real(description_).motion(mean_of_sides(rates));
   wheel_v_ = motion.v;
   wheel_omega_ = motion.omega;
 }

@@ -19,11 +19,11 @@
 #include <optional>
 
 #include "core/whole.h"
+#include "model/base_odometry.h"
 #include "model/body_layout.h"
 #include "ruedo/math.h"
 #include "ruedo/odometry_t.hpp"
 #include "ruedo/sensor.h"
-#include "sensors/base_odometry.h"
 
 namespace ruedo {
 namespace {
@@ -91,7 +91,7 @@ class Odometry : public Sensor {
       wheels_.push_back({wheel, side, placement.steers});
       if (!placement.steers) ++wheels_of_side_[side];
     }
-    if (BaseOdometry::is_for(drive))
+    if (model::BaseOdometry::is_for(drive))
       base_.emplace(setup.layout, robot_, drive, configuration_.track_error,
                     configuration_.steering_error);
     message_.n = static_cast<int32_t>(wheels_.size());
@@ -315,8 +315,8 @@ class Odometry : public Sensor {
   double radius_ = 0.0, track_ = 0.0;  // m; the track is the one that the robot believes in
   std::vector<Wheel> wheels_;
   int wheels_of_side_[2] = {0, 0};
-  std::optional<BaseOdometry> base_;  // of what is no differential drive
-  Pose X_WBase_;                      // at the step before
+  std::optional<model::BaseOdometry> base_;  // of what is no differential drive
+  Pose X_WBase_;                             // at the step before
   Vec3 rate_ = Vec3::Zero();  // m/s ahead and to the left, rad/s: of the last step, with base_
   std::vector<double> ways_, angles_;
 

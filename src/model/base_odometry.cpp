@@ -1,24 +1,23 @@
 // Forward kinematics of wheels.
-#include "sensors/base_odometry.h"
+#include "model/base_odometry.h"
 
 #include <algorithm>
 
 #include "ruedo/math.h"
 
-namespace ruedo {
+namespace ruedo::model {
 
-using Steering = model::DriveDescription::Steering;
+using Steering = DriveDescription::Steering;
 
-bool BaseOdometry::is_for(const model::DriveDescription& drive) {
+bool BaseOdometry::is_for(const DriveDescription& drive) {
   if (drive.steering == Steering::differential) return false;
   return drive.steering != Steering::tracked || drive.left_joints.empty();
 }
 
-BaseOdometry::BaseOdometry(const model::BodyLayout& layout, int robot,
-                           const model::DriveDescription& drive, double track_error,
-                           double steering_error)
+BaseOdometry::BaseOdometry(const BodyLayout& layout, int robot, const DriveDescription& drive,
+                           double track_error, double steering_error)
     : lever_(1.0 + track_error), steering_error_(steering_error) {
-  const model::RobotPlacement& placement = layout.robots[static_cast<size_t>(robot)];
+  const RobotPlacement& placement = layout.robots[static_cast<size_t>(robot)];
   if (drive.steering == Steering::mecanum || drive.steering == Steering::omni) {
     normal_.setZero();
     for (const int wheel : placement.wheels) {
@@ -30,11 +29,15 @@ BaseOdometry::BaseOdometry(const model::BodyLayout& layout, int robot,
   } else if (drive.steering == Steering::ackermann || drive.steering == Steering::tricycle) {
     const Pose X_BaseB = placement.X_BBase.inverse();
     for (const int index : placement.wheels) {
-      const model::WheelPlacement& wheel = layout.wheels[static_cast<size_t>(index)];
-      const model::WheelPlacement& place =
+      const WheelPlacement& wheel = layout.wheels[static_cast<size_t>(index)];
+      const WheelPlacement& place =
           wheel.on < 0 ? wheel : layout.wheels[static_cast<size_t>(wheel.on)];
-      const Vec3 p =
-          X_BaseB * (layout.links[static_cast<size_t>(place.link)].X_BL * place.center_in_L);
+      const LinkPlacement& link = layout.links[static_cast<size_t>(place.link)];
+      Pose X_BL = link.X_BL;  // in the body that carries base_link
+      if (link.body != placement.body)
+        X_BL = layout.bodies[static_cast<size_t>(placement.body)].X_WB.inverse() *
+               layout.bodies[static_cast<size_t>(link.body)].X_WB * X_BL;
+      const Vec3 p = X_BaseB * (X_BL * place.center_in_L);
       const auto on = std::find(placement.wheels.begin(), placement.wheels.end(), wheel.on);
       wheels_.push_back({wheel.steers, wheel.on >= 0,
                          static_cast<int>(on - placement.wheels.begin()), p.x(), p.y()});
@@ -94,4 +97,4 @@ Vec3 BaseOdometry::moved(const Pose& before, const Pose& after) const {
           angle / lever_};
 }
 
-}  // namespace ruedo
+}  // namespace ruedo::model

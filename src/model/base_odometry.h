@@ -7,16 +7,17 @@
 
 #include "model/body_layout.h"
 
-namespace ruedo {
+namespace ruedo::model {
 
 class BaseOdometry {
  public:
-  static bool is_for(const model::DriveDescription& drive);
+  static bool is_for(const DriveDescription& drive);
 
   // track_error: of the lever between turning and the wheels' ways, relative. steering_error: rad.
-  BaseOdometry(const model::BodyLayout& layout, int robot, const model::DriveDescription& drive,
+  BaseOdometry(const BodyLayout& layout, int robot, const DriveDescription& drive,
                double track_error, double steering_error);
 
+  bool rolls_sideways() const { return !rims_.empty(); }
   bool has_wheels() const { return !wheels_.empty() || !rims_.empty(); }
 
   // m ahead, m to the left, rad, of base_link in a step. Of the robot's wheels in their order:
@@ -40,4 +41,4 @@ class BaseOdometry {
   bool started_ = false;
 };
 
-}  // namespace ruedo
+}  // namespace ruedo::model
