@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "cli/commands.h"
+#include "cli/cut_away.h"
 #include "cli/render_devices.h"
 #include "cli/render_view.h"
 #include "core/progress.h"
@@ -22,6 +23,7 @@ namespace {
 struct RenderArguments {
   WorldArguments world;
   std::string output, camera, view = "iso", size;
+  std::string cut = "auto";
   bool rays = false;
 };
 
@@ -122,6 +124,19 @@ std::shared_ptr<const model::WorldModel> load(const RenderArguments& arguments) 
   return world;
 }
 
+// nullopt: nothing is taken off.
+std::optional<double> height_to_cut_at(const RenderArguments& arguments,
+                                       const model::WorldModel& world) {
+  const bool from_outside = arguments.view == "top" || arguments.view == "iso";
+  if (arguments.cut == "none") return std::nullopt;
+  if (arguments.cut == "auto")
+    return arguments.camera.empty() && from_outside ? height_of_ceiling(world) : std::nullopt;
+  const std::optional<double> height = parse_number(arguments.cut);
+  if (!height)
+    throw InputError({}, "--cut " + arguments.cut + ": allowed are a height in m, auto and none");
+  return height;
+}
+
 int render(const RenderArguments& arguments) {
   if (!arguments.camera.empty() && arguments.rays) {
     throw InputError({},
@@ -134,8 +149,15 @@ int render(const RenderArguments& arguments) {
     throw InputError(
         {}, "-o " + arguments.output + ": allowed are names that end in .png, .jpg or .jpeg");
   }
-  const auto world = load(arguments);
+  auto world = load(arguments);
   print_findings(world->findings);
+  if (const auto height = height_to_cut_at(arguments, *world)) {
+    world = without_what_is_above(*world, *height);
+    if (arguments.cut == "auto")
+      fmt::print(
+          "what is above {:.3g} m is left out, since it hides the rest; --cut none shows it\n",
+          *height);
+  }
   const model::BodyLayout layout(*world);
   const Progress progress("drawing " + world->name);
   const cv::Mat bgr = arguments.camera.empty() ? picture_of_world(arguments, *world, layout)
@@ -164,6 +186,12 @@ void add_render(CLI::App& app, Action& chosen) {
       ->add_option("--view", arguments->view,
                    "top, iso, or x,y,z,roll,pitch,yaw (m, rad; x looks ahead, 1.2 rad wide)")
       ->type_name("VIEW")
+      ->capture_default_str()
+      ->excludes(camera);
+  command
+      ->add_option("--cut", arguments->cut,
+                   "leave out what is above this height (m); auto: a roof that hides the world")
+      ->type_name("HEIGHT")
       ->capture_default_str()
       ->excludes(camera);
   command->add_option("--size", arguments->size, "of the picture, in pixels")->type_name("WxH");

@@ -86,6 +86,12 @@ scene::View at_an_angle(Size size, const scene::Bounds& bounds, const Vec3& sunl
 
 }  // namespace
 
+std::optional<double> parse_number(const std::string& text) {
+  const std::vector<double> values = numbers(text);
+  return values.size() == 1 && text.find(',') == std::string::npos ? std::optional(values[0])
+                                                                   : std::nullopt;
+}
+
 Size parse_size(const std::string& text) {
   Size size;
   const char* end = text.data() + text.size();

@@ -1,6 +1,7 @@
 // Where ruedo render looks from: a pose on the command line, or one that frames the whole world.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "ruedo/pose.h"
@@ -11,6 +12,9 @@ namespace ruedo::cli {
 struct Size {
   int width = 0, height = 0;  // pixels; 0: not given
 };
+
+// A finite number, all of the text; nullopt: it is none.
+std::optional<double> parse_number(const std::string& text);
 
 // "WxH". Throws InputError.
 Size parse_size(const std::string& text);

@@ -17,7 +17,7 @@ ARENA = str(Path(os.environ["RUEDO_SOURCE_DIR"]) / "worlds/arena.sdf")
 
 def render(*arguments):
     return subprocess.run(
-        [RUEDO, "render", *arguments], capture_output=True, text=True, timeout=120
+        [RUEDO, "render", *map(str, arguments)], capture_output=True, text=True, timeout=120
     )
 
 
@@ -89,6 +89,34 @@ def test_a_box_where_it_must_be(tmp_path):
     assert (pixels[0, 0] == (0, 0, 255)).all()
 
 
+def test_a_roof_is_taken_off(tmp_path):
+    def box(name, at, size, colour):
+        geometry = f"<geometry><box><size>{size}</size></box></geometry>"
+        return f"<model name='{name}'><static>true</static><pose>{at} 0 0 0</pose><link name='l'><visual name='v'>{geometry}<material><ambient>{colour} 1</ambient><diffuse>{colour} 1</diffuse></material></visual></link></model>"
+
+    (tmp_path / "w.sdf").write_text(
+        "<sdf version='1.9'><world name='w'>"
+        + box("floor", "0 0 0", "8 8 0.1", "0.2 0.2 0.2")
+        + box("roof", "0 0 3", "8 8 0.2", "0.3 0.3 0.3")
+        + box("thing", "1 1 0.5", "1 1 1", "1 0 0")
+        + "</world></sdf>"
+    )
+
+    def reds(*options):
+        out = tmp_path / "w.png"
+        result = render(tmp_path / "w.sdf", "--size", "100x100", "-o", out, *options)
+        assert result.returncode == 0, result.stderr
+        picture = read_png(out)
+        return int(((picture[:, :, 0] > 60) & (picture[:, :, 1] < 40)).sum()), result.stdout
+
+    for view in ("top", "iso"):
+        count, said = reds("--view", view)
+        assert count > 50 and "is left out" in said and "--cut none" in said
+        assert reds("--view", view, "--cut", "none")[0] == 0
+        assert reds("--view", view, "--cut", "2.5")[0] > 50
+    assert "is left out" not in render(ARENA, "-o", tmp_path / "a.png").stdout
+
+
 def test_picture_of_a_camera(tmp_path):
     path = tmp_path / "camera.png"
     result = render(ARENA, "--camera", "p3at/camera", "--size", "96x72", "-o", str(path))
@@ -116,6 +144,7 @@ def test_picture_of_a_camera(tmp_path):
         (["-o", "x.png", "--camera", "p3at/camera", "--rays"], 2, "--rays"),
         (["-o", "x.png", "--view", "below"], 2, "top, iso"),
         (["-o", "x.png", "--size", "0x9"], 2, "WIDTHxHEIGHT"),
+        (["-o", "x.png", "--cut", "low"], 2, "--cut low: allowed are a height in m, auto and none"),
     ],
 )
 def test_says_what_is_wrong(arguments, code, words):

@@ -1,0 +1,148 @@
+// By shapes and triangles: what reaches below the height stays whole.
+#include "cli/cut_away.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "model/geometry.h"
+
+namespace ruedo::cli {
+namespace {
+
+constexpr double kPerson_m = 1.8;
+constexpr double kCovered = 0.5;  // of the world's area
+constexpr double kShown_m = 2.0;  // of walls, above the lowest thing
+
+using Box = Eigen::AlignedBox3d;
+
+Box placed(const model::Geometry& geometry, const Pose& X_WG) {
+  Box result;
+  const Box box = model::bounds(geometry);
+  if (box.isEmpty()) return result;
+  for (int corner = 0; corner < 8; ++corner)
+    result.extend(X_WG * box.corner(static_cast<Box::CornerType>(corner)));
+  return result;
+}
+
+template <class Visit>
+void for_each_visual(const model::WorldModel& world, Visit visit) {
+  for (const model::ModelInstance& instance : world.models) {
+    if (instance.removed) continue;
+    for (const model::Link& link : instance.model->links) {
+      for (const model::Visual& visual : link.visuals) {
+        if (visual.geometry.shape != model::Shape::plane)
+          visit(visual, instance.X_WM * link.X_ML * visual.X_LV);
+      }
+    }
+  }
+}
+
+Vec3 corner_of(const model::Geometry& g, const Pose& X_WG, uint32_t index) {
+  return X_WG * g.scale.cwiseProduct(g.mesh->positions[index].cast<double>());
+}
+
+// m^2, as seen from above, of what lies wholly above that height, and of what does not.
+struct Area {
+  double above = 0.0, below = 0.0;
+};
+
+Area area_of(const model::Visual& visual, const Pose& X_WV, double height) {
+  Area area;
+  const Box box = placed(visual.geometry, X_WV);
+  if (box.isEmpty()) return area;
+  const model::Geometry& g = visual.geometry;
+  if (g.shape != model::Shape::mesh) {
+    (box.min().z() > height ? area.above : area.below) = box.sizes().x() * box.sizes().y();
+    return area;
+  }
+  const double sides = g.mesh->closed ? 2.0 : 1.0;
+  for (const auto& t : g.mesh->triangles) {
+    const Vec3 a = corner_of(g, X_WV, t[0]), b = corner_of(g, X_WV, t[1]),
+               c = corner_of(g, X_WV, t[2]);
+    (std::min({a.z(), b.z(), c.z()}) > height ? area.above : area.below) +=
+        std::abs((b - a).cross(c - a).z()) / 2 / sides;
+  }
+  return area;
+}
+
+std::shared_ptr<const model::Mesh> cut(const model::Geometry& g, const Pose& X_WG, double height) {
+  auto mesh = std::make_shared<model::Mesh>(*g.mesh);
+  mesh->triangles.clear();
+  mesh->closed = false;
+  for (model::Mesh::Part& part : mesh->parts) {
+    const uint32_t first = part.first_triangle, count = part.triangle_count;
+    part.first_triangle = static_cast<uint32_t>(mesh->triangles.size());
+    for (uint32_t i = first; i < first + count; ++i) {
+      const auto& t = g.mesh->triangles[i];
+      const bool above = std::all_of(t.begin(), t.end(), [&](uint32_t corner) {
+        return corner_of(g, X_WG, corner).z() > height;
+      });
+      if (!above) mesh->triangles.push_back(t);
+    }
+    part.triangle_count = static_cast<uint32_t>(mesh->triangles.size()) - part.first_triangle;
+  }
+  return mesh;
+}
+
+void cut(model::Link& link, const Pose& X_WL, double height) {
+  std::vector<model::Visual> kept;
+  for (model::Visual& visual : link.visuals) {
+    const Pose X_WV = X_WL * visual.X_LV;
+    const Box box = placed(visual.geometry, X_WV);
+    if (!box.isEmpty() && box.min().z() > height) continue;
+    if (!box.isEmpty() && box.max().z() > height && visual.geometry.shape == model::Shape::mesh)
+      visual.geometry.mesh = cut(visual.geometry, X_WV, height);
+    kept.push_back(std::move(visual));
+  }
+  link.visuals = std::move(kept);
+}
+
+}  // namespace
+
+namespace {
+
+bool has_ground_plane(const model::WorldModel& world) {
+  return std::any_of(world.models.begin(), world.models.end(), [](const auto& instance) {
+    const std::vector<model::Link>& links = instance.model->links;
+    return std::any_of(links.begin(), links.end(), [](const model::Link& link) {
+      return std::any_of(link.visuals.begin(), link.visuals.end(), [](const model::Visual& visual) {
+        return visual.geometry.shape == model::Shape::plane;
+      });
+    });
+  });
+}
+
+}  // namespace
+
+std::optional<double> height_of_ceiling(const model::WorldModel& world) {
+  Box bounds;
+  for_each_visual(world, [&](const model::Visual& visual, const Pose& X_WV) {
+    bounds.extend(placed(visual.geometry, X_WV));
+  });
+  if (bounds.isEmpty()) return std::nullopt;
+  const double floor = bounds.min().z(), whole = bounds.sizes().x() * bounds.sizes().y();
+  Area area;
+  for_each_visual(world, [&](const model::Visual& visual, const Pose& X_WV) {
+    const Area own = area_of(visual, X_WV, floor + kPerson_m);
+    area.above += own.above;
+    area.below += own.below;
+  });
+  if (has_ground_plane(world)) area.below += whole;
+  // A mountain hides nothing: it has no floor below it.
+  if (area.above < kCovered * whole || area.below < kCovered * whole) return std::nullopt;
+  return floor + kShown_m;
+}
+
+std::shared_ptr<const model::WorldModel> without_what_is_above(const model::WorldModel& world,
+                                                               double height_m) {
+  auto open = std::make_shared<model::WorldModel>(world);
+  for (model::ModelInstance& instance : open->models) {
+    auto own = std::make_shared<model::Model>(*instance.model);
+    for (model::Link& link : own->links) cut(link, instance.X_WM * link.X_ML, height_m);
+    instance.model = std::move(own);
+  }
+  return open;
+}
+
+}  // namespace ruedo::cli
