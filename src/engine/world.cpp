@@ -24,7 +24,7 @@ World::World(std::shared_ptr<const model::WorldModel> world, const FleetOptions&
       inbox_(std::move(fleet_.inputs), static_cast<int>(layout_.robots.size())),
       faults_(model_, layout_, devices_, options.seed),
       physics_(std::make_unique<physics::PhysicsWorld>(model_, layout_)),
-      robots_(std::make_unique<robot::Robots>(model_, layout_, *physics_)),
+      robots_(std::make_unique<robot::Robots>(model_, layout_, *physics_, options.seed)),
       statics_(statics ? std::move(statics) : std::make_shared<StaticScenes>()) {
   for (const Finding& finding : physics_->findings()) {
     switch (finding.kind) {

@@ -405,11 +405,13 @@ DriveDescription read_drive(std::shared_ptr<const Element> element,
     e.fail("type '" + *type + "' is not allowed; allowed are kinematic and wheels");
   if (type && *type == "wheels") drive.kind = DriveDescription::Kind::wheels;
   drive.steering = read_steering(e);
-  if (drive.kind == DriveDescription::Kind::wheels && drive.steering != Steering::differential) {
-    e.fail("type 'wheels' is not allowed with steering '" + name_of(drive.steering) +
-           "'; allowed is kinematic");
-  }
   read_joints(e, model, drive);
+  if (drive.kind == DriveDescription::Kind::wheels &&
+      (drive.steering == Steering::holonomic ||
+       (drive.left_joints.empty() && drive.right_joints.empty()))) {
+    e.fail("type 'wheels' is not allowed with steering '" + name_of(drive.steering) +
+           "', which has no wheels that could drive it; allowed is kinematic");
+  }
   if (drive.left_joints.empty() && drive.right_joints.empty()) {
     drive.wheel_radius =
         e.number("ruedo:wheel_radius", 0, Allowed::not_negative(quantity::kLength));
@@ -429,7 +431,7 @@ DriveDescription read_drive(std::shared_ptr<const Element> element,
   const bool wheels = drive.kind == DriveDescription::Kind::wheels;
   drive.on_odometry = e.choice("ruedo:primitives", wheels ? "odometry" : "truth",
                                {"truth", "odometry"}) == "odometry";
-  if (drive.on_odometry && drive.steering != Steering::differential) {
+  if (drive.on_odometry && !wheels && drive.steering != Steering::differential) {
     e.child("ruedo:primitives")
         ->fail("'odometry' is not allowed with steering '" + name_of(drive.steering) +
                "'; allowed is truth");
@@ -460,6 +462,20 @@ void name_plugin(const Element& plugin, const PluginKind& kind, const std::strin
     text = "the plugin " + kind.name + " does nothing here: " + kind.would;
   if (kind.does == PluginKind::Does::unknown) text = "plugins are not loaded: " + kind.name;
   if (!text.empty() && named.insert(text).second) findings.unsupported(plugin.source, where, text);
+}
+
+// A track of no vehicle: a conveyor.
+void name_lone_track(const std::vector<const Element*>& plugins, const std::string& where,
+                     Findings& findings) {
+  const auto of_kind = [&](const char* name) {
+    return std::find_if(plugins.begin(), plugins.end(),
+                        [&](const Element* each) { return kind_of(*each).name == name; });
+  };
+  const auto track = of_kind("TrackController");
+  if (track == plugins.end() || of_kind("TrackedVehicle") != plugins.end()) return;
+  findings.unsupported((*track)->source, where,
+                       "the plugin TrackController does nothing here: its belt would run as it is "
+                       "told; <ruedo:belt> has one run");
 }
 
 bool looks_like_robot(const Element& model_element, const std::vector<const Element*>& plugins,
@@ -553,6 +569,7 @@ void read_drive_of(const Element& model_element, const std::string& where, ReadC
   std::vector<const Element*> plugins;
   collect_plugins(model_element, plugins);
   std::set<std::string> named;
+  name_lone_track(plugins, where, context.findings);
   for (const Element* plugin : plugins) {
     const PluginKind kind = kind_of(*plugin);
     model.commanded |=

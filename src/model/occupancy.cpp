@@ -135,9 +135,16 @@ class Cut {
 
 }  // namespace
 
-OccupancyGrid occupancy_of(const WorldModel& world, double resolution, double height) {
+OccupancyGrid occupancy_of(const WorldModel& world, double resolution, double height,
+                           const Rect* within) {
   const Cut cut(world, height);
   Box box = cut.bounds();
+  if (within) {
+    box.extend(Vec3(within->low.x(), within->low.y(), height));
+    box.extend(Vec3(within->high.x(), within->high.y(), height));
+    box = box.intersection(Box(Vec3(within->low.x(), within->low.y(), box.min().z()),
+                               Vec3(within->high.x(), within->high.y(), box.max().z())));
+  }
   if (box.isEmpty()) box.extend(Vec3::Zero());
   OccupancyGrid grid;
   grid.resolution = resolution;

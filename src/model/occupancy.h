@@ -28,10 +28,19 @@ struct OccupancyGrid {
   }
 };
 
+struct Rect {
+  Eigen::Vector2d low = Eigen::Vector2d::Zero(), high = Eigen::Vector2d::Zero();  // m
+
+  Eigen::Vector2d nearest(const Eigen::Vector2d& p) const { return p.cwiseMax(low).cwiseMin(high); }
+  bool has(const Eigen::Vector2d& p) const { return nearest(p) == p; }
+};
+
 // What of a world a horizontal plane at `height` (m, above z = 0) cuts: robots and what moves along
 // a path left out, meshes as their outlines, with a metre of free cells around. Cells lie at
-// multiples of `resolution`. Throws InputError for a map of more than 100 million cells.
-OccupancyGrid occupancy_of(const WorldModel& world, double resolution, double height);
+// multiples of `resolution`. Of a part of the world where `within` says so. Throws InputError for a
+// map of more than 100 million cells.
+OccupancyGrid occupancy_of(const WorldModel& world, double resolution, double height,
+                           const Rect* within = nullptr);
 
 // As ROS's map_server reads it: `path` (.yaml), and the picture beside it, a PGM of the same name.
 // Throws EnvironmentError when they cannot be written.

@@ -279,7 +279,21 @@ void Room::add(const ModelInstance& instance) {
               [&](size_t l) { return instance.X_WM * instance.model->links[l].X_ML; });
 }
 
-double Room::ground_height(double x, double y) const {
+namespace {
+
+// The lowest, and what can be stepped on from there.
+double walkable(const std::vector<double>& heights) {
+  const double lowest = *std::min_element(heights.begin(), heights.end());
+  double ground = lowest;
+  for (const double z : heights) {
+    if (z <= lowest + kStep_m) ground = std::max(ground, z);
+  }
+  return ground;
+}
+
+}  // namespace
+
+std::vector<double> Room::surfaces(double x, double y) const {
   std::vector<double> heights;
   for (const int plane : index_->planes) {
     const Index::Solid& s = index_->solids[static_cast<size_t>(plane)];
@@ -302,13 +316,21 @@ double Room::ground_height(double x, double y) const {
     }
   }
   std::erase_if(heights, [](double z) { return !(std::abs(z) < kFar_m); });
-  if (heights.empty()) return 0;
-  const double lowest = *std::min_element(heights.begin(), heights.end());
-  double ground = lowest;
-  for (const double z : heights) {
-    if (z <= lowest + kStep_m) ground = std::max(ground, z);
-  }
-  return ground;
+  return heights;
+}
+
+double Room::ground_height(double x, double y) const {
+  const std::vector<double> heights = surfaces(x, y);
+  return heights.empty() ? 0 : walkable(heights);
+}
+
+double Room::floor_height(double x, double y, double z) const {
+  constexpr double kHips_m = 1.3,
+                   kAbove_m = 0.25;  // skins have their origin there, or in the floor
+  std::vector<double> heights = surfaces(x, y);
+  std::erase_if(heights, [&](double at) { return at > z + kAbove_m || at < z - kHips_m; });
+  if (!heights.empty()) return walkable(heights);
+  return z > 0 && z <= kHips_m ? 0 : z;
 }
 
 // The ground under a model at its level pose, as a plane: z = c[0] + c[1] (x - x0) + c[2] (y - y0)

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "model/world_model.h"
 
@@ -28,6 +29,11 @@ class Room {
   // where there is nothing.
   double ground_height(double x, double y) const;
 
+  // The same of the storey that somebody stands on whose own origin is at z, somewhere between his
+  // feet and his hips. Where nothing is below him he stands at z, or at 0 where that may be his
+  // hips'.
+  double floor_height(double x, double y, double z) const;
+
   // The pose of a model at (x, y) with that yaw, its lowest collision point on the ground. Level,
   // or where it would stick in the ground then and that is as good as a plane, tilted as the ground
   // is.
@@ -40,6 +46,7 @@ class Room {
   std::string overlapped(const Model& model, const Pose& X_WM) const;
 
  private:
+  std::vector<double> surfaces(double x, double y) const;
   std::optional<Pose> on_slope(const Model& model, const Pose& level, double lowest) const;
 
   struct Index;

@@ -88,6 +88,15 @@ const std::map<std::string, Known>& of_gz() {
       {"CommsEndpoint", {Does::dead, "it would take part in modelled radio"}},
       {"EnvironmentPreload", {Does::dead, "the environment's data would be read"}},
       {"EnvironmentalSensor", {Does::dead, "it would measure the environment's data"}},
+      {"DriveToPoseController", {Does::dead, "it would drive to poses that it is told"}},
+      {"LighterThanAirDynamics", {Does::dead, "air would carry it"}},
+      {"LogicalAudioSensorPlugin", {Does::dead, "microphones would tell what sounds"}},
+      {"PythonSystemLoader", {Does::dead, "its Python system would run"}},
+      {"MotorFailureSystem", {Does::dead, "a motor would fail when it is told"}},
+      {"LensFlare", {Does::dead, "pictures would show flares of the lens"}},
+      {"ShaderParam", {Does::dead, "pictures would show its shader"}},
+      {"ModelPhotoShoot", {Does::irrelevant}},
+      {"Dvl", {Does::dead, "its velocity log would publish"}},
       {"GravityCompensation", {Does::dead, "gravity would be compensated"}},
       {"HydrodynamicsPlugin", {Does::dead, "water would slow it"}},
   };
@@ -186,7 +195,7 @@ const std::map<std::string, Known>& of_classic() {
       {"gazebo_ros_harness", {Does::dead, "a harness would hold it"}},
       {"gazebo_ros_light", {Does::dead, "lights would go on and off"}},
       {"slotcar", {Does::dead, "it would drive the lanes of a fleet manager"}},
-      {"door", {Does::dead, "doors would open on request"}},
+      {"door", {Does::dead, "doors would open on request; <ruedo:door> opens for who comes near"}},
       {"lift", {Does::dead, "a lift would go where it is called"}},
       {"TeleportDispenserPlugin", {Does::dead, "things would be handed to robots"}},
       {"TeleportIngestorPlugin", {Does::dead, "things would be taken from robots"}},
@@ -194,7 +203,7 @@ const std::map<std::string, Known>& of_classic() {
       {"toggle_floors", {Does::irrelevant}},
       {"toggle_charging", {Does::irrelevant}},
       {"thumbnail_generator", {Does::irrelevant}},
-      {"crowd_simulator", {Does::dead, "a crowd would walk"}},
+      {"crowd_simulator", {Does::dead, "a crowd would walk; here <ruedo:crowd> does"}},
   };
   return table;
 }

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "model/no_effect.h"
 #include "model/sdf_reader.h"
 #include "model/urdf.h"
 #include "model/xacro.h"
@@ -36,6 +37,7 @@ SdfVersion SdfReader::version_of(const Element& root) {
         root.source, "sdf",
         "version " + *written + " is newer than 1.12; what it adds is left out");
   }
+  name_what_has_no_effect(root, context_.findings);
   return *version;
 }
 
@@ -125,10 +127,11 @@ std::shared_ptr<const ScopedModel> SdfReader::read_overridden(const Element& mod
 
 std::optional<SdfReader::Included> SdfReader::include(const Element& element,
                                                       const std::string& where) {
-  report_other_children(element,
-                        {"uri", "name", "pose", "static", "placement_frame", "plugin", "sensor",
-                         "ruedo:drive", "ruedo:joints", "ruedo:odometry", "ruedo:path"},
-                        {"allow_auto_disable", "enable_wind"}, where, context_.findings);
+  report_other_children(
+      element,
+      {"uri", "name", "pose", "static", "placement_frame", "plugin", "sensor", "ruedo:drive",
+       "ruedo:joints", "ruedo:odometry", "ruedo:path", "ruedo:belt", "ruedo:door"},
+      {"allow_auto_disable", "enable_wind"}, where, context_.findings);
   if (const Element* changes = element.child("experimental:params")) {
     context_.findings.unsupported(
         changes->source, where,

@@ -117,7 +117,7 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
   report_other_children(element,
                         {"link", "joint", "frame", "model", "include", "pose", "static",
                          "self_collide", "plugin", "ruedo:drive", "ruedo:joints", "ruedo:odometry",
-                         "ruedo:path", "transmission", "ros2_control"},
+                         "ruedo:path", "ruedo:belt", "ruedo:door", "transmission", "ros2_control"},
                         {"allow_auto_disable", "enable_wind"}, where, context_.findings);
   model->source = element.source;
   model->is_static = element.boolean("static", false);
@@ -292,8 +292,11 @@ std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
                                                        [](const Joint& joint) {
                                                          return joint.type != JointType::fixed;
                                                        });
-  if (const Element* path = element.child("ruedo:path")) {
-    path->refuse_unknown({"ruedo:waypoint", "ruedo:loop"}, false);
+  for (const char* name : {"ruedo:path", "ruedo:belt", "ruedo:door"}) {
+    const Element* path = element.child(name);
+    if (!path) continue;
+    if (model->path) path->fail("a model has one of <ruedo:path>, <ruedo:belt> and <ruedo:door>");
+    if (path->name == "ruedo:path") path->refuse_unknown({"ruedo:waypoint", "ruedo:loop"}, false);
     model->path = path->clone();
     model->is_static = false;
   }

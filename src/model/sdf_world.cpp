@@ -5,8 +5,10 @@
 #include <set>
 
 #include "core/whole.h"
+#include "model/crowd.h"
 #include "model/environment.h"
 #include "model/material.h"
+#include "model/placement.h"
 #include "model/plugins.h"
 #include "model/sdf_link.h"
 #include "model/sdf_reader.h"
@@ -131,7 +133,77 @@ Fault read_fault(const Element& e) {
 
 }  // namespace
 
-// An actor is a person: a cylinder that stands on the ground and moves along the trajectory,
+namespace {
+
+// The trajectories of an actor's <script>, one after another, each with a clock of its own, as one
+// list of waypoints "time x y z 0 0 yaw". Skins lie on their back in their own frame; a person
+// walks upright.
+class Script {
+ public:
+  Script(const Element& script, const std::string& where, Findings& findings)
+      : where_(where),
+        findings_(findings),
+        end_(script.number("delay_start", 0, Allowed::not_negative(quantity::kTime))) {
+    for (const Element* trajectory : script.all("trajectory")) add(*trajectory);
+  }
+
+  const std::vector<std::string>& waypoints() const { return waypoints_; }
+
+ private:
+  void add(const Element& trajectory) {
+    const double begin = end_;
+    double last = -1;
+    for (const Element* waypoint : trajectory.all("waypoint")) {
+      const double time = waypoint->number("time", 0, Allowed::not_negative(quantity::kTime));
+      if (time <= last) {
+        findings_.error(waypoint->source, where_,
+                        "the time " + shown(time) +
+                            " s is not after that of the waypoint before; this one is left out");
+        continue;
+      }
+      std::vector<double> at =
+          waypoint->has("pose")
+              ? waypoint->child("pose")->as_numbers(Allowed::any(quantity::kLength))
+              : std::vector<double>(6, 0.0);
+      if (at.size() != 6)
+        waypoint->child("pose")->fail("'" + waypoint->child("pose")->text +
+                                      "' is not allowed; allowed are x y z roll pitch yaw");
+      if (last < 0 && time > 0) walk(begin, at);  // there from the start
+      walk(begin + time, at);
+      last = time;
+    }
+  }
+
+  void walk(double time, const std::vector<double>& at) {
+    constexpr double kJump_s = 1e-6;  // to where the next trajectory begins
+    if (!waypoints_.empty() && time <= end_) time = end_ + kJump_s;
+    end_ = time;
+    std::string text;
+    for (const double value : {time, at[0], at[1], at[2], 0.0, 0.0, at[5]})
+      text += (text.empty() ? "" : " ") + shown(value);
+    waypoints_.push_back(text);
+  }
+
+  const std::string& where_;
+  Findings& findings_;
+  double end_;
+  std::vector<std::string> waypoints_;
+};
+
+void name_plugins_of_actor(const Element& actor, const std::string& where, Findings& findings) {
+  for (const Element* plugin : actor.all("plugin")) {
+    const PluginKind kind = kind_of(*plugin);
+    if (kind.does == PluginKind::Does::dead)
+      findings.unsupported(plugin->source, where,
+                           "the plugin " + kind.name + " does nothing here: " + kind.would);
+    else if (kind.does == PluginKind::Does::unknown)
+      findings.unsupported(plugin->source, where, "plugins are not loaded: " + kind.name);
+  }
+}
+
+}  // namespace
+
+// An actor is a person: a cylinder that stands on the floor and moves along his trajectories,
 // without a skin.
 std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& X_WM,
                                                     ReadContext& context) {
@@ -139,86 +211,65 @@ std::shared_ptr<const Model> SdfReader::actor_model(const Element& actor, Pose& 
   auto model = std::make_shared<Model>();
   model->name = required_name(actor);
   model->source = actor.source;
+  const std::string where = "actor " + model->name;
   context.findings.unsupported(
-      actor.source, "actor " + model->name,
-      "actors move as cylinders of 1.7 m; skins and animations are not shown");
+      actor.source, where, "actors move as cylinders of 1.7 m; skins and animations are not shown");
+  name_plugins_of_actor(actor, where, context.findings);
   X_WM = actor.pose("pose");
   auto path = std::make_shared<Element>();
   path->name = "ruedo:path";
   path->source = actor.source;
-  bool loop = true;
-  double height = X_WM.translation.z();
   if (const Element* script = actor.child("script")) {
-    loop = script->boolean("loop", true);
-    const double delay = script->number("delay_start", 0, Allowed::not_negative(quantity::kTime));
-    const std::string where = "actor " + model->name;
-    const auto trajectories = script->all("trajectory");
-    if (trajectories.size() > 1) {
-      context.findings.unsupported(trajectories[1]->source, where,
-                                   "an actor has one <trajectory>; this one is not walked");
-    }
-    if (!trajectories.empty()) {
-      const Element* trajectory = trajectories[0];
-      double last = -1;
-      for (const Element* waypoint : trajectory->all("waypoint")) {
-        const double time =
-            delay + waypoint->number("time", 0, Allowed::not_negative(quantity::kTime));
-        if (time <= last) {
-          context.findings.error(
-              waypoint->source, where,
-              "the time " + shown(time) +
-                  " s is not after that of the waypoint before; this one is left out");
-          continue;
-        }
-        const std::vector<double> numbers =
-            waypoint->has("pose")
-                ? waypoint->child("pose")->as_numbers(Allowed::any(quantity::kLength))
-                : std::vector<double>(6, 0.0);
-        if (numbers.size() != 6)
-          waypoint->child("pose")->fail("'" + waypoint->child("pose")->text +
-                                        "' is not allowed; allowed are x y z roll pitch yaw");
-        constexpr double kUpstairs_m = 2;  // above any skin's own origin
-        if (numbers[2] > kUpstairs_m)
-          context.findings.unsupported(waypoint->source, where,
-                                       "actors walk on z = 0, not above it");
-        // Skins lie on their back in their own frame; a person walks upright.
-        const double values[] = {time, numbers[0], numbers[1], 0, 0, 0, numbers[5]};
-        std::string text;
-        for (const double value : values) text += (text.empty() ? "" : " ") + shown(value);
-        add_child(*path, "ruedo:waypoint", text);
-        if (last < 0) X_WM = Pose::from_xyz_rpy({numbers[0], numbers[1], 0}, {0, 0, numbers[5]});
-        last = time;
-        height = 0;
-      }
+    const Script walk(*script, where, context.findings);
+    for (const std::string& waypoint : walk.waypoints())
+      add_child(*path, "ruedo:waypoint", waypoint);
+    if (!walk.waypoints().empty()) {
+      const std::vector<double> at =
+          path->children.front()->as_numbers(Allowed::any(quantity::kTime));
+      X_WM = Pose::from_xyz_rpy({at[1], at[2], at[3]}, {0, 0, at[6]});
+      add_child(*path, "ruedo:loop", script->boolean("loop", true) ? "true" : "false");
     }
   }
-  X_WM.translation.z() = std::min(height, 0.0);
   X_WM.rotation = Quat(Eigen::AngleAxisd(heading(X_WM.rotation), Vec3::UnitZ()));
-  if (!path->children.empty()) {
-    add_child(*path, "ruedo:loop", loop ? "true" : "false");
-    model->path = path;
-  }
-  Link link;
-  link.name = "link";
-  link.source = actor.source;
-  link.kinematic = true;
-  link.inertial.mass = 75;
-  Collision collision;
-  collision.name = "body";
-  collision.X_LC.translation.z() = kHeight / 2;
-  collision.geometry.shape = Shape::cylinder;
-  collision.geometry.size = {kRadius, kHeight, 0};
-  collision.source = actor.source;
-  Visual visual;
-  visual.name = "body";
-  visual.X_LV = collision.X_LC;
-  visual.geometry = collision.geometry;
-  link.collisions.push_back(std::move(collision));
-  link.visuals.push_back(std::move(visual));
-  model->links.push_back(std::move(link));
+  if (path->children.size() > 1) model->path = path;
+  model->links.push_back(person_link(kRadius, kHeight, actor.source));
   model->is_static = !model->path;
   return model;
 }
+
+namespace {
+
+// Puts an actor's feet on the floor of each of his waypoints: only the world knows where that is.
+void stand_actor(const Room& room, ModelInstance& instance) {
+  Vec3& at = instance.X_WM.translation;
+  at.z() = room.floor_height(at.x(), at.y(), at.z());
+  if (!instance.model->path) return;
+  auto model = std::make_shared<Model>(*instance.model);
+  std::shared_ptr<Element> path = instance.model->path->clone();
+  for (const auto& waypoint : path->children) {
+    if (waypoint->name != "ruedo:waypoint") continue;
+    std::vector<double> values = waypoint->as_numbers(Allowed::any(quantity::kTime));
+    values[3] = room.floor_height(values[1], values[2], values[3]);
+    waypoint->text.clear();
+    for (const double value : values)
+      waypoint->text += (waypoint->text.empty() ? "" : " ") + shown(value);
+  }
+  model->path = std::move(path);
+  instance.model = std::move(model);
+}
+
+void stand_actors(const std::set<std::string>& actors, WorldModel& world) {
+  if (actors.empty()) return;
+  Room room;
+  for (const ModelInstance& instance : world.models) {
+    if (!actors.contains(instance.name)) room.add(instance);
+  }
+  for (ModelInstance& instance : world.models) {
+    if (actors.contains(instance.name)) stand_actor(room, instance);
+  }
+}
+
+}  // namespace
 
 namespace {
 
@@ -279,11 +330,12 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     world.name = "world";
     findings.repaired(element.source, "world", "the world has no name; it is called 'world'");
   }
-  report_other_children(
-      element,
-      {"model", "include", "light", "frame", "physics", "gravity", "scene", "actor", "joint",
-       "atmosphere", "magnetic_field", "spherical_coordinates", "ruedo:fleet", "ruedo:fault"},
-      {"gui", "wind", "audio", "plugin", "state", "population"}, "world " + world.name, findings);
+  report_other_children(element,
+                        {"model", "include", "light", "frame", "physics", "gravity", "scene",
+                         "actor", "joint", "atmosphere", "magnetic_field", "spherical_coordinates",
+                         "ruedo:fleet", "ruedo:crowd", "ruedo:fault"},
+                        {"gui", "wind", "audio", "plugin", "state", "population"},
+                        "world " + world.name, findings);
   const std::string in_world = "world " + world.name;
   read_or_leave_out(in_world, "what is usual is taken", findings,
                     [&] { read_physics(element, world, findings); });
@@ -316,6 +368,7 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     std::shared_ptr<const ScopedModel> scope;
   };
   std::vector<Placed> placed;
+  std::set<std::string> actors;
   const auto place_actor = [&](const Element& actor, const std::string& name, const Element& by) {
     auto scope = std::make_shared<ScopedModel>();
     scope->model = actor_model(actor, scope->pose, context_);
@@ -326,6 +379,7 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     node.scope = scope;
     frames.add(node);
     placed.push_back({name, &by, scope});
+    actors.insert(dotted(name));
   };
   std::map<std::string, int> numbers;  // of the next thing of a name
   const auto read_child = [&](const std::unique_ptr<Element>& child) {
@@ -440,7 +494,9 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     check_channel_names(instance, each.element->source);
     world.models.push_back(std::move(instance));
   }
+  stand_actors(actors, world);
   for (const Element* fleet : element.all("ruedo:fleet")) read_fleet(*fleet, world, kMaxModels);
+  for (const Element* crowd : element.all("ruedo:crowd")) add_crowd(*crowd, world, kMaxModels);
   for (const Element* fault : element.all("ruedo:fault"))
     world.faults.push_back(read_fault(*fault));
   for (const Element* light : element.all("light")) {

@@ -112,6 +112,9 @@ void add_geometry(Element& parent, const urdf::Geometry* geometry, const Source&
 // What <gazebo reference="NAME"> blocks say of a link.
 struct GazeboLink {
   std::vector<const Element*> sensors;
+  std::vector<const Element*> as_written;  // elements of an SDF link, as Gazebo puts them there
+  const Element* colour = nullptr;         // <visual><material>
+  const Element* fdir1 = nullptr;
   std::string material;
   const Element* mu1 = nullptr;
   const Element* mu2 = nullptr;
@@ -140,6 +143,7 @@ struct Converter {
   const urdf::ModelInterface& urdf;
   std::map<std::string, GazeboLink> gazebo;
   std::map<std::string, std::vector<const Element*>> joint_sensors = {};
+  std::map<std::string, std::vector<const Element*>> springs = {};  // of joints
   std::unique_ptr<Element> model = std::make_unique<Element>();
 
   void read_gazebo() {
@@ -185,14 +189,19 @@ struct Converter {
                                    "\"> is not supported and left out");
         };
         if (!urdf.getLink(*reference)) {
-          if (urdf.getJoint(*reference)) {
-            if (name == "sensor")
-              joint_sensors[*reference].push_back(child.get());
-            else
-              leave_out();
-          }
+          if (!urdf.getJoint(*reference)) continue;
+          if (name == "sensor")
+            joint_sensors[*reference].push_back(child.get());
+          else if (name == "springStiffness" || name == "springReference")
+            springs[*reference].push_back(child.get());
+          else
+            leave_out();
           continue;
         }
+        constexpr std::string_view kOfLinks[] = {
+            "gravity",   "self_collide", "selfCollide",    "enable_wind",
+            "kinematic", "light",        "velocity_decay", "battery",
+            "projector", "audio_source", "audio_sink",     "particle_emitter"};
         GazeboLink& link = gazebo[*reference];
         if (name == "sensor")
           link.sensors.push_back(child.get());
@@ -204,8 +213,14 @@ struct Converter {
           link.mu2 = child.get();
         else if (name == "turnGravityOff")
           link.gravity_off = child.get();
+        else if (name == "fdir1")
+          link.fdir1 = child.get();
+        else if (name == "visual" && child->has("material"))
+          link.colour = child->child("material");
         else if (name == "plugin")
           model->children.push_back(child->clone());
+        else if (std::find(std::begin(kOfLinks), std::end(kOfLinks), name) != std::end(kOfLinks))
+          link.as_written.push_back(child.get());
         else
           leave_out();
       }
@@ -296,11 +311,12 @@ struct Converter {
                                         i == 0 ? "collision" : "collision_" + std::to_string(i));
       add_pose(collision, from->collision_array[i]->origin, source);
       add_geometry(collision, from->collision_array[i]->geometry.get(), source);
-      if (block.mu1 || block.mu2) {
+      if (block.mu1 || block.mu2 || block.fdir1) {
         Element& ode =
             add(add(add(collision, "surface", source), "friction", source), "ode", source);
         if (block.mu1) add(ode, "mu", block.mu1->source, value_of(*block.mu1));
         if (block.mu2) add(ode, "mu2", block.mu2->source, value_of(*block.mu2));
+        if (block.fdir1) add(ode, "fdir1", block.fdir1->source, value_of(*block.fdir1));
       }
     }
     for (size_t i = 0; i < from->visual_array.size(); ++i) {
@@ -309,9 +325,18 @@ struct Converter {
       visual.attributes.emplace_back("name", i == 0 ? "visual" : "visual_" + std::to_string(i));
       add_pose(visual, from->visual_array[i]->origin, source);
       add_geometry(visual, from->visual_array[i]->geometry.get(), source);
-      add_material(visual, *from->visual_array[i], block, source);
+      if (block.colour)
+        visual.children.push_back(block.colour->clone());
+      else
+        add_material(visual, *from->visual_array[i], block, source);
     }
     for (const Element* sensor : block.sensors) link.children.push_back(sensor->clone());
+    for (const Element* written_there : block.as_written) {
+      link.children.push_back(written_there->clone());
+      Element& last = *link.children.back();
+      if (last.name == "selfCollide") last.name = "self_collide";
+      last.text = value_of(*written_there);
+    }
   }
 
   void add_joint(const Element& written) {
@@ -349,6 +374,12 @@ struct Converter {
       Element& dynamics = add(axis, "dynamics", source);
       add(dynamics, "damping", source, shown(std::max(from->dynamics->damping, 0.0)));
       add(dynamics, "friction", source, shown(std::max(from->dynamics->friction, 0.0)));
+    }
+    for (const Element* spring : springs[from->name]) {
+      Element* dynamics = axis.child("dynamics");
+      if (!dynamics) dynamics = &add(axis, "dynamics", source);
+      add(*dynamics, spring->name == "springStiffness" ? "spring_stiffness" : "spring_reference",
+          spring->source, value_of(*spring));
     }
     if (const Element* mimic = written.child("mimic"); mimic && from->mimic) {
       Element& follows = add(axis, "mimic", mimic->source);

@@ -10,6 +10,10 @@ namespace ruedo::robot {
 
 class Mover {
  public:
+  // Whether a model has one.
+  static bool moves(const model::Model& model) {
+    return model.path && model.path->name == "ruedo:path";
+  }
   // Throws InputError for waypoints that are not numbers, or whose times do not grow.
   Mover(const model::WorldModel& world, const model::BodyLayout& layout,
         physics::PhysicsWorld& physics, int instance);

@@ -4,11 +4,13 @@
 
 #include <ruedo/motion_status_t.hpp>
 
+#include "robot/crowd.h"
 #include "robot/ground.h"
 #include "robot/joint_control.h"
 #include "robot/kinematic_drive.h"
 #include "robot/mover.h"
 #include "robot/robots.h"
+#include "robot/surroundings.h"
 #include "robot/wheels_drive.h"
 
 namespace ruedo::robot {
@@ -16,7 +18,7 @@ namespace ruedo::robot {
 class Robots::Impl {
  public:
   Impl(const model::WorldModel& world, const model::BodyLayout& layout,
-       physics::PhysicsWorld& physics);
+       physics::PhysicsWorld& physics, uint64_t seed);
 
   void apply(const Command& command);
   void step();
@@ -53,21 +55,25 @@ class Robots::Impl {
   std::vector<std::unique_ptr<Drive>> drives_;  // of each robot; null: it has none, or cannot move
   std::vector<MotionLog> driveless_;            // refusals of those
   std::vector<std::unique_ptr<Mover>> movers_;
+  Crowd crowd_;
+  Surroundings surroundings_;
   JointControl joints_;
 };
 
 Robots::Impl::Impl(const model::WorldModel& world, const model::BodyLayout& layout,
-                   physics::PhysicsWorld& physics)
+                   physics::PhysicsWorld& physics, uint64_t seed)
     : world_(world),
       layout_(layout),
       physics_(physics),
       planes_(level_planes(world, layout)),
       driveless_(layout.robots.size()),
+      crowd_(world, layout, physics, seed),
+      surroundings_(world, layout, physics),
       joints_(world, layout, physics) {
   for (size_t i = 0; i < layout.robots.size(); ++i)
     drives_.push_back(make_drive(static_cast<int>(i)));
   for (size_t i = 0; i < world.models.size(); ++i) {
-    if (world.models[i].model->path)
+    if (Mover::moves(*world.models[i].model))
       movers_.push_back(std::make_unique<Mover>(world, layout, physics, static_cast<int>(i)));
   }
 }
@@ -122,6 +128,8 @@ void Robots::Impl::apply(const Command& command) {
 
 void Robots::Impl::step() {
   for (auto& mover : movers_) mover->before_step(now());
+  crowd_.before_step(now());
+  surroundings_.before_step(now());
   for (auto& drive : drives_)
     if (drive) drive->before_step(now());
   joints_.before_step();
@@ -188,7 +196,9 @@ void Robots::Impl::add(int instance) {
     drives_[static_cast<size_t>(robot)] = make_drive(robot);
     driveless_[static_cast<size_t>(robot)] = {};
   }
-  if (!world_.models[static_cast<size_t>(instance)].model->path) return;
+  crowd_.add(instance, layout_);
+  surroundings_.add(instance);
+  if (!Mover::moves(*world_.models[static_cast<size_t>(instance)].model)) return;
   movers_.push_back(std::make_unique<Mover>(world_, layout_, physics_, instance));
   movers_.back()->start_again(now());
 }
@@ -196,6 +206,8 @@ void Robots::Impl::add(int instance) {
 void Robots::Impl::remove(int instance) {
   if (const int robot = robot_of(instance); robot >= 0) drives_[static_cast<size_t>(robot)].reset();
   std::erase_if(movers_, [instance](const auto& mover) { return mover->instance() == instance; });
+  crowd_.remove(instance);
+  surroundings_.remove(instance);
   joints_.forget(instance);
   change_ground();
 }
@@ -264,6 +276,8 @@ void Robots::Impl::start_again(int instance) {
   joints_.forget(instance);
   for (auto& mover : movers_)
     if (mover->instance() == instance) mover->start_again(now());
+  crowd_.start_again(instance, now());
+  surroundings_.start_again(instance);
   end_put(instance);
 }
 
@@ -272,13 +286,15 @@ SimTime Robots::Impl::set_time_to_zero() {
   for (auto& drive : drives_)
     if (drive) drive->motion().shift_time(was);
   for (auto& mover : movers_) mover->shift_time(was);
+  crowd_.shift_time(was);
+  surroundings_.shift_time(was);
   step_ = 0;
   return was;
 }
 
 Robots::Robots(const model::WorldModel& world, const model::BodyLayout& layout,
-               physics::PhysicsWorld& physics)
-    : impl_(std::make_unique<Impl>(world, layout, physics)) {}
+               physics::PhysicsWorld& physics, uint64_t seed)
+    : impl_(std::make_unique<Impl>(world, layout, physics, seed)) {}
 Robots::~Robots() = default;
 void Robots::apply(const Command& command) { impl_->apply(command); }
 void Robots::step() { impl_->step(); }

@@ -45,9 +45,9 @@ void check_path(const Element& path);
 
 class Robots {
  public:
-  // All must outlive it.
+  // All must outlive it. seed: of what people of crowds do.
   Robots(const model::WorldModel& world, const model::BodyLayout& layout,
-         physics::PhysicsWorld& physics);
+         physics::PhysicsWorld& physics, uint64_t seed = 1);
   ~Robots();
 
   // Takes effect on the current state: at the beginning of the next step. Bad values refuse the

@@ -140,8 +140,8 @@ TEST(DriveKinds, WhatIsMissingIsNamed) {
       {"<ruedo:drive steering='tracked'/>",
        "<ruedo:drive>: has no <ruedo:track>, and no wheels to take it from"},
       {"<ruedo:drive type='wheels' steering='holonomic'/>",
-       "<ruedo:drive>: type 'wheels' is not allowed with steering 'holonomic'; allowed is "
-       "kinematic"},
+       "<ruedo:drive>: type 'wheels' is not allowed with steering 'holonomic', which has "
+       "no wheels that could drive it; allowed is kinematic"},
       {"<ruedo:drive "
        "steering='ackermann'><ruedo:left_joint>j_rl</ruedo:left_joint><ruedo:steer_joint>j_rl</"
        "ruedo:steer_joint></ruedo:drive>",

@@ -195,10 +195,67 @@ TEST(Scene, ActorsWalkAsCylinders) {
       "0</pose></waypoint><waypoint><time>1</time><pose>0 0 1 0 0 0</pose>"
       "</waypoint><waypoint><time>2</time><pose>3 2 4 0 0 "
       "0</pose></waypoint></trajectory><trajectory id='1'/></script></actor>");
-  EXPECT_EQ(odd->models.at(0).model->path->all("ruedo:waypoint").size(), 2u);
-  EXPECT_THAT(texts(*odd), testing::IsSupersetOf({testing::HasSubstr("one <trajectory>"),
-                                                  testing::HasSubstr("this one is left out"),
-                                                  testing::HasSubstr("walk on z = 0")}));
+  EXPECT_EQ(odd->models.at(0).model->path->all("ruedo:waypoint").size(), 3u);
+  EXPECT_THAT(texts(*odd), testing::Contains(testing::HasSubstr("this one is left out")));
+}
+
+// One trajectory after another, each with a clock of its own; feet on the floor of each storey,
+// and where there is none as high as the file says.
+TEST(Scene, ActorsWalkAllTheirTrajectoriesOnAnyFloor) {
+  const auto waypoint = [](const std::string& time, const std::string& at) {
+    return "<waypoint><time>" + time + "</time><pose>" + at + "</pose></waypoint>";
+  };
+  const auto world = world_of(
+      "<model name='upstairs'><static>true</static><link name='l'><collision name='c'><pose>10 0 "
+      "2.9 0 0 0</pose><geometry><box><size>4 4 0.2</size></box></geometry></collision></link>"
+      "</model><actor name='p'><script><delay_start>1</delay_start><trajectory id='0'>" +
+      waypoint("2", "0 0 1 0 0 0") + waypoint("4", "2 0 1 0 0 0") +
+      "</trajectory><trajectory id='1'>" + waypoint("0", "2 0 1 0 0 0") +
+      waypoint("5", "10 0 4 0 0 1") + waypoint("6", "20 0 4 0 0 1") +
+      "</trajectory></script></actor>");
+  std::vector<std::string> walked;
+  for (const Element* each : world->models.at(1).model->path->all("ruedo:waypoint"))
+    walked.push_back(each->text);
+  EXPECT_THAT(walked,
+              testing::ElementsAre("1 0 0 0 0 0 0", "3 0 0 0 0 0 0", "5 2 0 0 0 0 0",
+                                   "5.000001 2 0 0 0 0 0", "10 10 0 3 0 0 1", "11 20 0 4 0 0 1"));
+  EXPECT_THAT(texts(*world_of("<actor name='p'><plugin name='x' filename='libActorPlugin.so'/>"
+                              "</actor>")),
+              testing::Contains(testing::HasSubstr("the plugin ActorPlugin does nothing here")));
+}
+
+TEST(Scene, ACrowdStandsWhereThereIsRoom) {
+  const auto crowd = [](const std::string& more, const std::string& walls = "") {
+    return world_of(walls + "<ruedo:crowd name='people'><ruedo:area>-3 -3 3 3</ruedo:area>" + more +
+                    "</ruedo:crowd>");
+  };
+  const std::string wall =
+      "<model name='wall'><static>true</static><link name='l'><collision name='c'><pose>0 0 1 0 0 "
+      "0</pose><geometry><box><size>2 6 2</size></box></geometry></collision></link></model>";
+  const auto world = crowd("<ruedo:count>20</ruedo:count><ruedo:goal>2 0</ruedo:goal>", wall);
+  ASSERT_EQ(world->models.size(), 21u);
+  EXPECT_EQ(world->models[20].name, "people_20");
+  EXPECT_FALSE(world->models[1].is_robot());
+  for (size_t i = 1; i < 21; ++i) {
+    const Vec3& at = world->models[i].X_WM.translation;
+    EXPECT_GE(std::abs(at.x()), 1.25);
+    for (size_t k = 1; k < i; ++k) EXPECT_GE((at - world->models[k].X_WM.translation).norm(), 0.5);
+  }
+  const auto fault = [&](const std::string& more) {
+    try {
+      crowd(more);
+    } catch (const InputError& error) {
+      return error.message();
+    }
+    return std::string("nothing");
+  };
+  EXPECT_THAT(fault("<ruedo:count>500</ruedo:count>"), testing::HasSubstr("there is room for"));
+  EXPECT_THAT(
+      fault("<ruedo:goal>1 2 3</ruedo:goal>"),
+      testing::HasSubstr("<ruedo:goal>: '1 2 3' is not allowed; allowed are x y of a place"));
+  EXPECT_THAT(fault("<ruedo:speed>0</ruedo:speed>"), testing::HasSubstr("a mean above 0"));
+  EXPECT_THAT(fault("<ruedo:at_end>rest</ruedo:at_end>"), testing::HasSubstr("again"));
+  EXPECT_THAT(fault("<ruedo:gaol>1 2</ruedo:gaol>"), testing::HasSubstr("<ruedo:goal>"));
 }
 
 }  // namespace

@@ -85,6 +85,30 @@ INSTANTIATE_TEST_SUITE_P(
             surface("<contact><collide_bitmask>0xffff</collide_bitmask><collide_without_contact>1</"
                     "collide_without_contact></contact>"),
             "<collide_without_contact> is not supported: the shape collides as others do"},
+        Part{"LoneTrack",
+             "<plugin filename='gz-sim-track-controller-system' "
+             "name='gz::sim::systems::TrackController'/>",
+             "the plugin TrackController does nothing here: its belt would run as it is told; "
+             "<ruedo:belt> has one run"},
+        Part{
+            "BounceThreshold",
+            surface("<bounce><restitution_coefficient>0.5</restitution_coefficient><threshold>0.1"
+                    "</threshold></bounce>") +
+                "<link name='d'><collision name='c'><geometry><sphere/></geometry><surface><bounce>"
+                "<threshold>100000.0</threshold></bounce></surface></collision></link>",
+            "<threshold> is not supported: what bounces, bounces at any speed"},
+        Part{"SoftStops",
+             joint("revolute",
+                   "<limit><lower>-1</lower><upper>1</upper><stiffness>100</stiffness><dissipation>"
+                   "1.0</dissipation></limit>"),
+             "<stiffness> is not supported: a joint's stops are stiff"},
+        Part{"VisibilityFlags",
+             "<link name='c'><visual name='v'><visibility_flags>1</visibility_flags><geometry>"
+             "<box><size>1 1 1</size></box></geometry></visual></link>",
+             "<visibility_flags> is not supported: every camera sees every visual"},
+        Part{"SoftContact",
+             surface("<soft_contact><dart><stiffness>1</stiffness></dart></soft_contact>"),
+             "<soft_contact> is not supported: nothing is soft"},
         Part{"SecondDrive",
              "<model name='n'>" + driven() + "</model><model name='k'>" + driven() + "</model>",
              "a second drive, of the nested model 'k', is not supported: its wheels turn freely"}),

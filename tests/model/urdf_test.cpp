@@ -293,8 +293,30 @@ TEST(Urdf, WhatGazebosBlocksHaveBesidesIsNamed) {
       "/nowhere/r.urdf");
   EXPECT_EQ(texts(*world),
             (std::vector<std::string>{
-                "<colision> in <gazebo reference=\"a\"> is not supported and left out",
-                "<springStiffness> in <gazebo reference=\"j\"> is not supported and left out"}));
+                "<colision> in <gazebo reference=\"a\"> is not supported and left out"}));
+  EXPECT_EQ(world->models.back().model->joints.at(0).axis.spring_stiffness, 5.0);
+}
+
+// As Gazebo takes them: springs of joints, colours, friction's direction, and elements of a link.
+TEST(Urdf, WhatGazebosBlocksSayActs) {
+  const auto world = load_world_text(
+      "<robot name='r'><link name='a'><visual><geometry><box size='1 1 1'/></geometry></visual>"
+      "<collision><geometry><box size='1 1 1'/></geometry></collision></link><link name='b'/>"
+      "<joint name='j' type='prismatic'><parent link='a'/><child link='b'/><limit lower='-1' "
+      "upper='1' effort='1' velocity='1'/></joint><gazebo reference='a'><mu1>0.5</mu1><mu2>0.1"
+      "</mu2><fdir1>0 1 0</fdir1><gravity>false</gravity><visual><material><diffuse>1 0 0 1"
+      "</diffuse></material></visual></gazebo><gazebo reference='j'><springStiffness value='40'/>"
+      "<springReference>-0.1</springReference></gazebo></robot>",
+      "/nowhere/r.urdf");
+  EXPECT_EQ(texts(*world), std::vector<std::string>{});
+  const Model& model = *world->models.back().model;
+  EXPECT_EQ(model.joints.at(0).axis.spring_stiffness, 40.0);
+  EXPECT_EQ(model.joints[0].axis.spring_reference, -0.1);
+  const Link& a = model.links.at(0);
+  EXPECT_FALSE(a.gravity);
+  EXPECT_EQ(a.collisions.at(0).surface.friction_direction, Vec3(0, 1, 0));
+  EXPECT_EQ(a.collisions[0].surface.friction2, 0.1);
+  EXPECT_EQ(a.visuals.at(0).material->diffuse, (Rgba{1, 0, 0, 1}));
 }
 
 // The user's own folder is no package, whatever a file calls it.

@@ -1,0 +1,566 @@
+// Forces, ways and goals of people.
+#include "robot/crowd.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <mutex>
+
+#include "core/whole.h"
+#include "model/geometry.h"
+#include "model/placement.h"
+#include "ruedo/math.h"
+
+namespace ruedo::robot {
+
+namespace {
+
+using model::Vec2;
+
+constexpr SimTime kTick_us = 10'000;
+constexpr double kTick_s = 1e-6 * kTick_us;
+// Helbing and Molnar 1995.
+constexpr double kRelaxation_s = 0.5, kLookAhead_s = 2.0;
+constexpr double kPotential = 2.1, kReachOfThings_m = 0.3;  // m^2/s^2
+constexpr double kCosineOfSight = -0.17364817766693033;     // of 100 degrees to each side
+constexpr double kBehind = 0.5, kFasterThanLiked = 1.3;
+// Helbing, Farkas and Vicsek 2000, divided by 80 kg.
+constexpr double kKeepsAway_m_s2 = 2000.0 / 80.0, kReach_m = 0.08;
+constexpr double kBody = 1.2e5 / 80.0, kSliding = 2.4e5 / 80.0;  // 1/s^2, 1/(m s)
+
+constexpr double kSeesPeople_m = 2.0, kSeesWalls_m = 1.5;  // beyond, forces are below 1e-4 m/s^2
+constexpr double kBesideWalls_m = 0.2;                     // of ways, from a person's side
+constexpr double kAtGoal_m = 0.75;                         // of a goal that is a place
+constexpr int kLooksEvery = 20;                            // ticks, for the way
+constexpr int kPlaces = 8;          // to wander between, where the file names no goal
+constexpr double kTurns_m_s = 0.2;  // slower, a person looks where he looked
+constexpr double kRoom_m = 0.1;     // around who comes again
+constexpr int kTriesToCome = 8;     // in a tick
+constexpr double kSeesThings_m = 4.0, kStands_m_s = 0.2;  // things to go around
+constexpr double kBesideThings_m = 0.2;
+constexpr double kAboveFloor_m = 0.1;  // what is lower is stepped over
+
+bool is_person(const model::Model& model) {
+  return model.path && model.path->name == "ruedo:crowd";
+}
+
+Vec2 turned(const Vec2& v, double c, double s) {
+  return {c * v.x() - s * v.y(), s * v.x() + c * v.y()};
+}
+
+// Repulsion by what is d away (from it to me) and moves by `way` while I look ahead: eqs. 3 and 4.
+Vec2 repulsion(const Vec2& d, const Vec2& way) {
+  const double here = d.norm(), there = (d - way).norm();
+  if (here < 1e-9 || there < 1e-9) return Vec2::Zero();
+  const double both = here + there, squared = both * both - way.squaredNorm();
+  if (squared < 1e-12) return Vec2::Zero();
+  const double b = 0.5 * std::sqrt(squared);
+  const Vec2 gradient = both / (4.0 * b) * (d / here + (d - way) / there);
+  return kPotential / kReachOfThings_m * math::exp(-b / kReachOfThings_m) * gradient;
+}
+
+// What comes from where I do not look counts less: eq. 8.
+Vec2 as_seen(const Vec2& force, const Vec2& ahead) {
+  return ahead.dot(-force) >= force.norm() * kCosineOfSight ? force : Vec2(kBehind * force);
+}
+
+// Of two that overlap by `deep`; n towards me, `slides` the other's velocity less mine: eq. 2.
+Vec2 of_contact(double deep, const Vec2& n, const Vec2& slides) {
+  const Vec2 t(-n.y(), n.x());
+  // In one tick friction ends a sliding at most.
+  const double friction = std::min(kSliding * deep, 0.5 / kTick_s);
+  return kBody * deep * n + friction * slides.dot(t) * t;
+}
+
+// The same of two that keep apart, too: eqs. 2 and 3.
+Vec2 of_neighbour(double deep, const Vec2& n, const Vec2& slides) {
+  const Vec2 apart = kKeepsAway_m_s2 * math::exp(deep / kReach_m) * n;
+  return deep > 0.0 ? Vec2(apart + of_contact(deep, n, slides)) : apart;
+}
+
+}  // namespace
+
+namespace {
+
+// The walls, and the ways to the goals that the file names.
+struct Plan {
+  model::FloorPlan walls;
+  std::vector<model::Route> routes;
+
+  Plan(const model::WorldModel& world, const model::CrowdDescription& crowd, double floor)
+      : walls(model::walls_for(world, crowd, floor)) {
+    for (const model::Rect& goal : crowd.goals)
+      routes.push_back(walls.route_to(goal, crowd.radius, crowd.radius + kBesideWalls_m));
+  }
+};
+
+// One for all copies of a world: it depends on the file alone, and takes some tenths of a second.
+std::shared_ptr<const Plan> plan_for(const model::WorldModel& world,
+                                     const model::ModelInstance& first,
+                                     const model::CrowdDescription& crowd) {
+  using Known = std::map<std::weak_ptr<const Element>, std::weak_ptr<const Plan>,
+                         std::owner_less<std::weak_ptr<const Element>>>;
+  static std::mutex mutex;
+  static Known known;
+  const std::lock_guard lock(mutex);
+  std::erase_if(known, [](const auto& each) { return each.first.expired(); });
+  std::weak_ptr<const Plan>& place = known[first.model->path];
+  std::shared_ptr<const Plan> plan = place.lock();
+  if (!plan) place = plan = std::make_shared<Plan>(world, crowd, first.X_WM.translation.z());
+  return plan;
+}
+
+}  // namespace
+
+struct Crowd::Group {
+  model::CrowdDescription description;
+  double floor = 0.0;
+  std::shared_ptr<const Plan> plan;
+  const model::FloorPlan& walls;
+  std::vector<model::Rect> goals;
+  std::vector<model::Route> routes;  // as goals
+  RandomSource random;
+
+  uint64_t people = 0;
+  const Element* element;
+
+  Group(const model::WorldModel& world, const model::ModelInstance& first, uint64_t seed)
+      : description(model::read_crowd(*first.model->path)),
+        floor(first.X_WM.translation.z()),
+        plan(plan_for(world, first, description)),
+        walls(plan->walls),
+        goals(description.goals),
+        routes(plan->routes),
+        random(seed, description.name, "people"),
+        element(first.model->path.get()) {
+    if (!goals.empty()) return;
+    model::CrowdDescription places = description;
+    places.count = kPlaces;
+    places.name += "/goals";
+    for (const Vec2& at : model::places_of(places, walls, {}, seed)) {
+      goals.push_back({at, at});
+      routes.push_back(walls.route_to(goals.back(), description.radius, clearance()));
+    }
+  }
+  double clearance() const { return description.radius + kBesideWalls_m; }
+};
+
+struct Crowd::Person {
+  int instance, body;
+  Group* group;
+  uint64_t number;  // in the group
+  Vec2 start = Vec2::Zero();
+  Vec2 p = Vec2::Zero(), before = Vec2::Zero();  // m, when they last thought, and a tick before
+  Vec2 v = Vec2::Zero();
+  Vec2 next = Vec2::Zero();  // where to head for
+  double heading = 0.0, heading_before = 0.0;
+  double speed = 0.0;  // m/s that he likes
+  size_t goal = 0;
+  bool arrived = false, gone = false, jumped = false;
+  uint64_t ticks = 0;
+
+  RandomStream draw(uint64_t purpose) const {
+    return group->random.stream((number << 40) + (ticks << 8) + purpose);
+  }
+};
+
+struct Crowd::Other {
+  int instance, body;
+  bool is_robot;
+  Eigen::AlignedBox3d box;  // of its shapes, in the body's frame
+  // At this tick:
+  Vec2 at = Vec2::Zero(), v = Vec2::Zero();
+  double c = 1.0, s = 0.0, low = 0.0, high = 0.0;
+
+  bool is_in_way_of(const model::CrowdDescription& crowd, double floor) const {
+    return high > floor + kAboveFloor_m && low < floor + crowd.height &&
+           (!is_robot || crowd.avoids_robots);
+  }
+  Vec2 middle() const { return at + turned(box.center().head<2>(), c, s); }
+  Vec2 nearest(const Vec2& p) const {
+    const Vec2 in = turned(p - at, c, -s);
+    const Vec2 on = in.cwiseMax(box.min().head<2>()).cwiseMin(box.max().head<2>());
+    return at + turned(on, c, s);
+  }
+};
+
+Crowd::Crowd(const model::WorldModel& world, const model::BodyLayout& layout,
+             physics::PhysicsWorld& physics, uint64_t seed)
+    : world_(world), physics_(physics), seed_(seed), step_us_(world.step_us) {
+  gather(layout);
+  if (people_.empty()) return;
+  std::vector<model::Circle> taken;
+  for (const model::ModelInstance& instance : world.models) {
+    if (!instance.model->is_static && !is_person(*instance.model))
+      taken.push_back(
+          {instance.X_WM.translation.head<2>(), model::footprint_radius(*instance.model)});
+  }
+  size_t first = 0;
+  for (const auto& group : groups_) {
+    const std::vector<Vec2> places =
+        model::places_of(group->description, group->walls, taken, seed_);
+    for (size_t i = 0; first + i < people_.size() && people_[first + i].group == group.get(); ++i) {
+      people_[first + i].start = places[i];
+      taken.push_back({places[i], group->description.radius});
+    }
+    first += places.size();
+  }
+  for (Person& person : people_) begin(person);
+}
+
+Crowd::~Crowd() = default;
+
+void Crowd::gather(const model::BodyLayout& layout) {
+  if (std::none_of(world_.models.begin(), world_.models.end(),
+                   [](const auto& instance) { return is_person(*instance.model); }))
+    return;
+  for (size_t b = 0; b < layout.bodies.size(); ++b) {
+    const int instance = layout.bodies[b].instance, body = static_cast<int>(b);
+    is_person(*world_.models[static_cast<size_t>(instance)].model) ? add_person(layout, body)
+                                                                   : add_other(layout, body);
+  }
+}
+
+void Crowd::add(int instance, const model::BodyLayout& layout) {
+  if (people_.empty()) return;
+  for (size_t b = 0; b < layout.bodies.size(); ++b) {
+    if (layout.bodies[b].instance == instance) add_other(layout, static_cast<int>(b));
+  }
+}
+
+void Crowd::add_other(const model::BodyLayout& layout, int body) {
+  const model::BodyPlacement& placed = layout.bodies[static_cast<size_t>(body)];
+  const model::ModelInstance& instance = world_.models[static_cast<size_t>(placed.instance)];
+  Other other{placed.instance, body, instance.is_robot(), {}};
+  for (const int l : placed.links) {
+    const model::LinkPlacement& link = layout.links[static_cast<size_t>(l)];
+    for (const model::Collision& collision :
+         instance.model->links[static_cast<size_t>(link.link)].collisions) {
+      const Eigen::AlignedBox3d box = model::bounds(collision.geometry);
+      if (box.isEmpty()) continue;
+      for (int corner = 0; corner < 8; ++corner)
+        other.box.extend(
+            link.X_BL *
+            (collision.X_LC * box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner))));
+    }
+  }
+  if (!other.box.isEmpty()) others_.push_back(other);
+}
+
+void Crowd::add_person(const model::BodyLayout& layout, int body) {
+  const int index = layout.bodies[static_cast<size_t>(body)].instance;
+  const model::ModelInstance& instance = world_.models[static_cast<size_t>(index)];
+  const auto known = std::find_if(groups_.begin(), groups_.end(), [&](const auto& group) {
+    return group->element == instance.model->path.get();
+  });
+  if (known == groups_.end()) {
+    groups_.push_back(std::make_unique<Group>(world_, instance, seed_));
+    people_.push_back({index, body, groups_.back().get(), 0});
+  } else {
+    people_.push_back({index, body, known->get(), (*known)->people});
+  }
+  ++people_.back().group->people;
+}
+
+void Crowd::begin(Person& person) {
+  person.ticks = 0;
+  const model::CrowdDescription& crowd = person.group->description;
+  RandomStream stream = person.draw(0);
+  constexpr double kSlowest = 0.3;  // of the mean
+  person.speed =
+      std::max(kSlowest * crowd.speed, crowd.speed + crowd.speed_deviation * stream.gaussian());
+  person.v.setZero();
+  person.arrived = false;
+  person.goal = 0;
+  put(person, person.start);
+  if (crowd.goals.empty()) choose_goal(person);
+  look_for_way(person);
+  const Vec2 ahead = person.next - person.p;
+  person.heading = person.heading_before = math::atan2(ahead.y(), ahead.x());
+  physics_.set_pose(person.body, {Quat(Eigen::AngleAxisd(person.heading, Vec3::UnitZ())),
+                                  {person.p.x(), person.p.y(), person.group->floor}});
+}
+
+void Crowd::put(Person& person, const Vec2& at) {
+  person.p = person.before = at;
+  person.jumped = true;
+}
+
+void Crowd::remove(int instance) {
+  for (Person& person : people_) person.gone |= person.instance == instance;
+  std::erase_if(others_, [&](const Other& other) { return other.instance == instance; });
+}
+
+void Crowd::start_again(int instance, SimTime now) {
+  for (Person& person : people_) {
+    if (person.instance != instance || person.gone) continue;
+    begin(person);
+    thought_ = now;
+  }
+}
+
+void Crowd::before_step(SimTime now) {
+  if (people_.empty()) return;
+  for (Person& person : people_) person.jumped = false;
+  const SimTime end = now + step_us_;
+  while (thought_ < end) think();
+  const double part = 1.0 - static_cast<double>(thought_ - end) / kTick_us;
+  const double step_s = 1e-6 * static_cast<double>(step_us_);
+  for (const Person& person : people_) {
+    if (person.gone) continue;
+    const Vec2 at = person.before + part * (person.p - person.before);
+    const double turn = wrap_angle(person.heading - person.heading_before);
+    const Pose X_WB{Quat(Eigen::AngleAxisd(person.heading_before + part * turn, Vec3::UnitZ())),
+                    {at.x(), at.y(), person.group->floor}};
+    Twist mean;
+    if (!person.jumped) {
+      const Pose& was = physics_.pose(person.body);
+      mean.linear = (X_WB.translation - was.translation) / step_s;
+      mean.angular.z() = wrap_angle(heading(X_WB.rotation) - heading(was.rotation)) / step_s;
+    }
+    physics_.guide(person.body, mean, X_WB);
+  }
+}
+
+// One tick: all forces from one state, then all move.
+void Crowd::think() {
+  see_others();
+  sort_into_cells();
+  std::vector<Vec2> forces(people_.size(), Vec2::Zero());
+  for (size_t i = 0; i < people_.size(); ++i) {
+    Person& person = people_[i];
+    if (person.gone) continue;
+    if (person.ticks % kLooksEvery == person.number % kLooksEvery) look_for_way(person);
+    forces[i] = force_on(person, i);
+  }
+  for (size_t i = 0; i < people_.size(); ++i) {
+    Person& person = people_[i];
+    if (person.gone) continue;
+    ++person.ticks;
+    person.before = person.p;
+    person.heading_before = person.heading;
+    const Vec2 was = person.v;
+    person.v += kTick_s * forces[i];
+    const double fastest = kFasterThanLiked * person.speed, speed = person.v.norm();
+    if (speed > fastest) person.v *= fastest / speed;
+    person.p += 0.5 * kTick_s * (was + person.v);
+    if (speed > kTurns_m_s) person.heading = math::atan2(person.v.y(), person.v.x());
+    choose_goal(person);
+  }
+  thought_ += kTick_us;
+}
+
+void Crowd::see_others() {
+  for (Other& other : others_) {
+    const Pose& X_WB = physics_.pose(other.body);
+    const Eigen::Matrix3d R = X_WB.rotation.toRotationMatrix();
+    const double middle = (X_WB * Vec3(other.box.center())).z(),
+                 half = 0.5 * R.row(2).cwiseAbs().dot(other.box.sizes());
+    other.low = middle - half;
+    other.high = middle + half;
+    const double yaw = heading(X_WB.rotation);
+    other.c = math::cos(yaw);
+    other.s = math::sin(yaw);
+    other.at = X_WB.translation.head<2>();
+    other.v = physics_.twist(other.body).linear.head<2>();
+  }
+}
+
+void Crowd::sort_into_cells() {
+  constexpr double kWidest_m = 500.0;  // a grid over who is farther apart has wider cells
+  Vec2 low = Vec2::Constant(1e9), high = Vec2::Constant(-1e9);
+  for (const Person& person : people_) {
+    low = low.cwiseMin(person.p);
+    high = high.cwiseMax(person.p);
+  }
+  high = high.cwiseMin(low + Vec2::Constant(kWidest_m));
+  cells_from_ = low;
+  columns_ = std::max(1, rounded_up<int>((high.x() - low.x()) / kSeesPeople_m));
+  rows_ = std::max(1, rounded_up<int>((high.y() - low.y()) / kSeesPeople_m));
+  cells_.resize(static_cast<size_t>(columns_) * static_cast<size_t>(rows_));
+  for (auto& cell : cells_) cell.clear();
+  for (size_t i = 0; i < people_.size(); ++i) {
+    if (people_[i].gone) continue;
+    const Vec2 at = (people_[i].p - cells_from_) / kSeesPeople_m;
+    const int c = std::min(rounded_down<int>(std::min(at.x(), 1e6)), columns_ - 1),
+              r = std::min(rounded_down<int>(std::min(at.y(), 1e6)), rows_ - 1);
+    cells_[static_cast<size_t>(r * columns_ + c)].push_back(static_cast<int>(i));
+  }
+}
+
+Crowd::Vec2 Crowd::force_on(const Person& person, size_t index) const {
+  const Vec2 way = person.next - person.p;
+  const double far = way.norm();
+  const bool walks = !person.arrived && far > 1e-6;
+  const Vec2 ahead =
+      walks ? Vec2(way / far) : Vec2(math::cos(person.heading), math::sin(person.heading));
+  const Vec2 liked = walks ? Vec2(person.speed * ahead) : Vec2(Vec2::Zero());
+  Vec2 force = (liked - person.v) / kRelaxation_s + of_people(person, index) +
+               of_others(person, ahead) + of_walls(person);
+  if (const double sigma = person.group->description.fluctuation; sigma > 0.0) {
+    RandomStream stream = person.draw(1);
+    const double x = stream.gaussian();
+    force += sigma * Vec2(x, stream.gaussian());
+  }
+  return force;
+}
+
+Crowd::Vec2 Crowd::of_people(const Person& person, size_t index) const {
+  Vec2 sum = Vec2::Zero();
+  const Vec2 at = (person.p - cells_from_) / kSeesPeople_m;
+  const int c = std::min(rounded_down<int>(std::min(at.x(), 1e6)), columns_ - 1),
+            r = std::min(rounded_down<int>(std::min(at.y(), 1e6)), rows_ - 1);
+  for (int row = std::max(0, r - 1); row <= std::min(rows_ - 1, r + 1); ++row) {
+    for (int column = std::max(0, c - 1); column <= std::min(columns_ - 1, c + 1); ++column) {
+      for (const int i : cells_[static_cast<size_t>(row * columns_ + column)]) {
+        const Person& other = people_[static_cast<size_t>(i)];
+        if (static_cast<size_t>(i) == index || other.group->floor != person.group->floor) continue;
+        const Vec2 d = person.p - other.p;
+        const double distance = d.norm();
+        if (distance > kSeesPeople_m || distance < 1e-9) continue;
+        const double deep =
+            person.group->description.radius + other.group->description.radius - distance;
+        sum += of_neighbour(deep, d / distance, other.v - person.v);
+      }
+    }
+  }
+  return sum;
+}
+
+// A thing keeps people away as a person at its nearest point would, whose middle is a radius
+// behind.
+Crowd::Vec2 Crowd::of_others(const Person& person, const Vec2& ahead) const {
+  const model::CrowdDescription& crowd = person.group->description;
+  Vec2 sum = Vec2::Zero();
+  for (size_t i = 0; i < others_.size();) {
+    const int instance = others_[i].instance;
+    const Other* near = nullptr;  // of all bodies of a model
+    double least = kSeesThings_m;
+    Vec2 d = Vec2::Zero();
+    for (; i < others_.size() && others_[i].instance == instance; ++i) {
+      const Other& other = others_[i];
+      if (!other.is_in_way_of(crowd, person.group->floor)) continue;
+      const Vec2 away = person.p - other.nearest(person.p);
+      if (away.norm() >= least) continue;
+      least = away.norm();
+      d = away;
+      near = &other;
+    }
+    if (!near) continue;
+    const Vec2 n = least > 1e-9                          ? Vec2(d / least)
+                   : (person.p - near->at).norm() > 1e-9 ? Vec2((person.p - near->at).normalized())
+                                                         : Vec2::UnitX();
+    sum += as_seen(repulsion(d + crowd.radius * n, kLookAhead_s * near->v), ahead);
+    if (least < crowd.radius) sum += of_contact(crowd.radius - least, n, near->v - person.v);
+  }
+  return sum;
+}
+
+Crowd::Vec2 Crowd::of_walls(const Person& person) const {
+  const double radius = person.group->description.radius;
+  model::FloorPlan::Near near[2];
+  const int count = person.group->walls.nearest(person.p, kSeesWalls_m, near);
+  Vec2 sum = Vec2::Zero();
+  for (int i = 0; i < count; ++i) {
+    const Vec2 d = near[i].inside ? Vec2(near[i].point - person.p) : Vec2(person.p - near[i].point);
+    const double distance = d.norm();
+    if (distance < 1e-9) continue;
+    const double deep = near[i].inside ? radius + distance : radius - distance;
+    sum += of_neighbour(deep, d / distance, -person.v);
+  }
+  return sum;
+}
+
+// The next one, when a goal is reached.
+void Crowd::choose_goal(Person& person) {
+  const Group& group = *person.group;
+  const model::CrowdDescription& crowd = group.description;
+  const bool wanders = crowd.goals.empty();
+  if (person.arrived) {
+    if (crowd.at_end == model::CrowdDescription::AtEnd::again) come_again(person);
+    return;
+  }
+  const model::Rect& goal = group.goals[person.goal];
+  const bool there =
+      goal.low == goal.high ? (goal.low - person.p).norm() < kAtGoal_m : goal.has(person.p);
+  if (!there && !(wanders && person.ticks == 0)) return;
+  if (wanders) {
+    const size_t other = static_cast<size_t>(person.draw(2).uniform() * (kPlaces - 1));
+    person.goal = (person.goal + 1 + other) % kPlaces;
+  } else if (person.goal + 1 < group.goals.size()) {
+    ++person.goal;
+  } else if (crowd.at_end == model::CrowdDescription::AtEnd::loop && group.goals.size() > 1) {
+    person.goal = 0;
+  } else {
+    person.arrived = true;
+    if (crowd.at_end == model::CrowdDescription::AtEnd::again) come_again(person);
+    return;
+  }
+  look_for_way(person);
+}
+
+void Crowd::look_for_way(Person& person) {
+  const Group& group = *person.group;
+  person.next = group.walls.next(group.routes[person.goal], group.goals[person.goal], person.p,
+                                 group.clearance());
+  go_around_what_stands(person);
+}
+
+// Beside the first thing that stands in the way, on the side that is nearer: forces alone would
+// hold him before it.
+void Crowd::go_around_what_stands(Person& person) const {
+  const model::CrowdDescription& crowd = person.group->description;
+  const Vec2 way = person.next - person.p;
+  const double far = way.norm();
+  if (far < 1e-6) return;
+  const Vec2 ahead = way / far, left(-ahead.y(), ahead.x());
+  double first = std::min(far, kSeesThings_m);
+  for (const Other& other : others_) {
+    if (!other.is_in_way_of(crowd, person.group->floor) || other.v.norm() > kStands_m_s) continue;
+    const Vec2 to = other.middle() - person.p;
+    const double half = 0.5 * (other.box.sizes().head<2>()).norm();  // whichever way it points
+    const double along = to.dot(ahead), beside = to.dot(left);
+    const double needs = half + crowd.radius;
+    if (along < 0.0 || along - half > first || std::abs(beside) > needs) continue;
+    first = std::max(0.0, along - half);
+    const double side = beside > 0.0 ? -1.0 : 1.0;
+    person.next = person.p + along * ahead + (beside + side * (needs + kBesideThings_m)) * left;
+  }
+}
+
+// Somewhere in the area where they began, where there is room.
+bool Crowd::come_again(Person& person) {
+  const Group& group = *person.group;
+  const model::CrowdDescription& crowd = group.description;
+  const auto is_free = [&](const Vec2& at) {
+    model::FloorPlan::Near near[2];
+    if (group.walls.nearest(at, crowd.radius, near) > 0) return false;
+    for (const Person& other : people_) {
+      if (&other != &person && !other.gone &&
+          (other.p - at).norm() < other.group->description.radius + crowd.radius + kRoom_m)
+        return false;
+    }
+    return std::none_of(others_.begin(), others_.end(), [&](const Other& other) {
+      return (other.nearest(at) - at).norm() < crowd.radius + kRoom_m;
+    });
+  };
+  RandomStream stream = person.draw(3);
+  for (int i = 0; i < kTriesToCome; ++i) {
+    const double x = stream.uniform(), y = stream.uniform();
+    const Vec2 at = crowd.area.low + Vec2(x, y).cwiseProduct(crowd.area.high - crowd.area.low);
+    if (!is_free(at)) continue;
+    put(person, at);
+    person.arrived = false;
+    person.goal = 0;
+    look_for_way(person);
+    const Vec2 ahead = person.next - at;
+    if (ahead.norm() > 1e-6) {
+      person.heading = person.heading_before = math::atan2(ahead.y(), ahead.x());
+      person.v = person.speed * ahead.normalized();
+    }
+    return true;
+  }
+  return false;
+}
+
+}  // namespace ruedo::robot

@@ -1,0 +1,63 @@
+// What moves of its own accord: conveyor belts (<ruedo:belt>), and doors that open for who comes
+// near (<ruedo:door>).
+#pragma once
+
+#include <vector>
+
+#include "model/body_layout.h"
+#include "physics/physics_world.h"
+
+namespace ruedo::robot {
+
+// Throws InputError for a <ruedo:belt> or <ruedo:door> that cannot be read.
+void check_belt(const Element& belt);
+void check_door(const Element& door);
+
+class Surroundings {
+ public:
+  Surroundings(const model::WorldModel& world, const model::BodyLayout& layout,
+               physics::PhysicsWorld& physics);
+
+  void before_step(SimTime now);
+
+  void add(int instance);
+  void remove(int instance);
+  void start_again(int instance);
+  void shift_time(SimTime us);  // sim time was set back by so much
+
+ private:
+  struct Part {
+    int body;
+    Pose X_MB;
+  };
+  // Stands where it is, with a surface that moves.
+  struct Belt {
+    int instance;
+    std::vector<Part> parts;
+    Pose X_WM;
+    Vec3 velocity;  // m/s, in the world
+  };
+  // Moves from where the file has it by X_MOpen and back.
+  struct Door {
+    int instance;
+    std::vector<Part> parts;
+    Pose X_WM, X_MOpen;
+    double opening_s, distance_m;
+    SimTime hold_us;
+    double open = 0.0;    // 0 to 1
+    SimTime wanted = -1;  // when somebody was last near; -1: nobody was
+    Pose pose() const;
+  };
+  std::vector<Part> parts_of(int instance) const;
+  bool is_near(const Door& door) const;
+  void guide(const std::vector<Part>& parts, const Pose& X_WM);
+
+  const model::WorldModel& world_;
+  const model::BodyLayout& layout_;
+  physics::PhysicsWorld& physics_;
+  const double step_s_;
+  std::vector<Belt> belts_;
+  std::vector<Door> doors_;
+};
+
+}  // namespace ruedo::robot
