@@ -137,6 +137,21 @@ std::vector<Vec2> places_of(const CrowdDescription& crowd, const FloorPlan& wall
   return places;
 }
 
+namespace {
+
+// The lowest ground of its corners and its middle: the others may be under something.
+double floor_of(const Rect& area, const WorldModel& world) {
+  const Room room(world);
+  const Vec2 middle = (area.low + area.high) / 2;
+  return std::min({room.ground_height(middle.x(), middle.y()),
+                   room.ground_height(area.low.x(), area.low.y()),
+                   room.ground_height(area.high.x(), area.low.y()),
+                   room.ground_height(area.low.x(), area.high.y()),
+                   room.ground_height(area.high.x(), area.high.y())});
+}
+
+}  // namespace
+
 void add_crowd(const Element& element, WorldModel& world, size_t most_models) {
   const CrowdDescription crowd = read_crowd(element);
   if (world.models.size() + static_cast<size_t>(crowd.count) > most_models)
@@ -146,8 +161,7 @@ void add_crowd(const Element& element, WorldModel& world, size_t most_models) {
   person->source = crowd.source;
   person->path = element.clone();
   person->links.push_back(person_link(crowd.radius, crowd.height, crowd.source));
-  const Vec2 middle = (crowd.area.low + crowd.area.high) / 2;
-  const double floor = ground_height(world, middle.x(), middle.y());
+  const double floor = floor_of(crowd.area, world);
   std::vector<Circle> taken;
   for (const ModelInstance& instance : world.models) {
     if (!instance.model->is_static)

@@ -94,7 +94,8 @@ INSTANTIATE_TEST_SUITE_P(
             "BounceThreshold",
             surface("<bounce><restitution_coefficient>0.5</restitution_coefficient><threshold>0.1"
                     "</threshold></bounce>") +
-                "<link name='d'><collision name='c'><geometry><sphere/></geometry><surface><bounce>"
+                "<link name='d'><collision "
+                "name='c'><geometry><sphere><radius>1</radius></sphere></geometry><surface><bounce>"
                 "<threshold>100000.0</threshold></bounce></surface></collision></link>",
             "<threshold> is not supported: what bounces, bounces at any speed"},
         Part{"SoftStops",
