@@ -269,6 +269,24 @@ struct Converter {
       add(add(add(material, "pbr", source), "metal", source), "albedo_map", source, texture);
   }
 
+  static void add_friction(Element& collision, const GazeboLink& block, const Source& source) {
+    if (!block.mu1 && !block.mu2 && !block.fdir1) return;
+    Element& ode = add(add(add(collision, "surface", source), "friction", source), "ode", source);
+    if (block.mu1) add(ode, "mu", block.mu1->source, value_of(*block.mu1));
+    if (block.mu2) add(ode, "mu2", block.mu2->source, value_of(*block.mu2));
+    if (block.fdir1) add(ode, "fdir1", block.fdir1->source, value_of(*block.fdir1));
+  }
+
+  static void add_what_gazebo_adds(Element& link, const GazeboLink& block) {
+    for (const Element* sensor : block.sensors) link.children.push_back(sensor->clone());
+    for (const Element* written_there : block.as_written) {
+      link.children.push_back(written_there->clone());
+      Element& last = *link.children.back();
+      if (last.name == "selfCollide") last.name = "self_collide";
+      last.text = value_of(*written_there);
+    }
+  }
+
   void add_link(const Element& written) {
     const urdf::LinkConstSharedPtr from = urdf.getLink(name_of(written));
     if (!from) return;
@@ -311,13 +329,7 @@ struct Converter {
                                         i == 0 ? "collision" : "collision_" + std::to_string(i));
       add_pose(collision, from->collision_array[i]->origin, source);
       add_geometry(collision, from->collision_array[i]->geometry.get(), source);
-      if (block.mu1 || block.mu2 || block.fdir1) {
-        Element& ode =
-            add(add(add(collision, "surface", source), "friction", source), "ode", source);
-        if (block.mu1) add(ode, "mu", block.mu1->source, value_of(*block.mu1));
-        if (block.mu2) add(ode, "mu2", block.mu2->source, value_of(*block.mu2));
-        if (block.fdir1) add(ode, "fdir1", block.fdir1->source, value_of(*block.fdir1));
-      }
+      add_friction(collision, block, source);
     }
     for (size_t i = 0; i < from->visual_array.size(); ++i) {
       const Source source = lines("visual", i);
@@ -330,13 +342,7 @@ struct Converter {
       else
         add_material(visual, *from->visual_array[i], block, source);
     }
-    for (const Element* sensor : block.sensors) link.children.push_back(sensor->clone());
-    for (const Element* written_there : block.as_written) {
-      link.children.push_back(written_there->clone());
-      Element& last = *link.children.back();
-      if (last.name == "selfCollide") last.name = "self_collide";
-      last.text = value_of(*written_there);
-    }
+    add_what_gazebo_adds(link, block);
   }
 
   void add_joint(const Element& written) {
