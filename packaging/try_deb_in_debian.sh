@@ -58,23 +58,25 @@ source /usr/share/bash-completion/completions/ruedo
 COMP_WORDS=(ruedo ver) COMP_CWORD=1; _ruedo; test "${COMPREPLY[*]}" = verify
 COMP_WORDS=(ruedo run --rec) COMP_CWORD=2; _ruedo; test "${COMPREPLY[*]}" = --record'
 
-inside 'apt-get -q update >/dev/null; apt-get -q install --no-install-recommends -y g++ cmake pkg-config default-jdk-headless' >"$folder/$suite.apt.log" 2>&1 ||
+inside 'apt-get -q update >/dev/null; apt-get -q install --no-install-recommends -y g++ make cmake pkg-config default-jdk-headless' >"$folder/$suite.apt.log" 2>&1 ||
   { cat "$folder/$suite.apt.log"; exit 1; }
 as_user 'rm -rf cpp && mkdir cpp && cd cpp
 cat > drive.cpp <<CPP
 #include <cstdio>
 #include <ruedo/client.h>
 int main() {
-  ruedo::client::LaunchOptions options;
-  auto sim = ruedo::client::launch("arena", options);
+  auto sim = ruedo::client::launch("arena");
   auto robot = sim.robot("p3at");
   robot.advance(0.5).wait();
-  std::printf("%.3f from %s\n", robot.pose().latest().x(), options.program.c_str());
+  std::printf("c++: %.3f\n", robot.pose().latest().x());
 }
 CPP
-g++ -std=c++17 drive.cpp -o by-pkg-config $(pkg-config --cflags --libs ruedo) && ./by-pkg-config
+g++ -std=c++17 drive.cpp -o by-pkg-config $(pkg-config --cflags --libs ruedo)
+./by-pkg-config
 printf "cmake_minimum_required(VERSION 3.25)\nproject(drive CXX)\nfind_package(ruedo REQUIRED)\nadd_executable(drive drive.cpp)\ntarget_link_libraries(drive PRIVATE ruedo::client)\n" > CMakeLists.txt
-cmake -B build . && cmake --build build && build/drive
+cmake -B build .
+cmake --build build
+build/drive
 cat > Drive.java <<JAVA
 import ruedo.*;
 public class Drive {

@@ -352,11 +352,11 @@ struct ConnectOptions {
 Simulation connect(const std::string& url = "", const ConnectOptions& options = {});
 
 struct LaunchOptions {
-#ifdef RUEDO_PROGRAM  // find_package(ruedo) and ruedo.pc define it
+#ifdef RUEDO_PROGRAM  // find_package(ruedo) defines it
   std::string program = RUEDO_PROGRAM;
 #else
-  std::string program;  // the server, unless the environment's RUEDO names one; "": by the PATH, or
-                        // above this program
+  std::string program;  // the server, unless the environment's RUEDO names one; "": of the same
+                        // installation, by the PATH, or above this program
 #endif
   int64_t seed = -1;              // -1: the server's default
   double rate = 1.0;              // sim time per real time; kFast: as fast as it goes

@@ -153,20 +153,21 @@ def test_the_moved_engine_finds_its_own(prefix):
 
 
 def test_pkg_config_leads_to_library_and_server(prefix, tmp_path):
-    """Of the same installation."""
+    """Of the same installation, with what pkg-config prints as it is: no shell reads it again."""
     (tmp_path / "a.cpp").write_text(
-        '#include <ruedo/client.h>\n#include <cstdio>\n'
-        'int main() { std::puts(ruedo::client::LaunchOptions{}.program.c_str()); return &ruedo::client::launch == nullptr; }\n'
+        '#include <ruedo/client.h>\n#include <iostream>\n'
+        "int main() {\n"
+        "  try { auto sim = ruedo::client::launch(\"nowhere\"); }\n"
+        "  catch (const std::exception& error) { std::cout << error.what(); }\n"
+        "}\n"
     )
     flags = run(
-        "pkg-config",
-        "--cflags",
-        "--libs",
-        "ruedo",
+        *("pkg-config", "--cflags", "--libs", "ruedo"),
         more={"PKG_CONFIG_PATH": str(next(prefix.glob("lib/**/pkgconfig")))},
-    ).stdout
-    run("sh", "-c", f"g++ -std=c++17 a.cpp -o a {flags.strip()}", cwd=tmp_path)
-    assert Path(run(tmp_path / "a").stdout.strip()).resolve() == prefix / "bin/ruedo"
+    ).stdout.split()
+    run("g++", "-std=c++17", "a.cpp", "-o", "a", *flags, cwd=tmp_path)
+    said = run(tmp_path / "a").stdout
+    assert f"searched in {prefix.resolve()}/share/ruedo/worlds" in said, said
 
 
 def test_the_example_from_nothing_to_green(project):
