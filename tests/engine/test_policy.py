@@ -1,0 +1,52 @@
+"""The policy that lies in the repository: in its environments, and through a server over LCM."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import ruedo.gym
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "clients/python/examples/navigate"
+sys.path.insert(0, str(EXAMPLE))
+from policy import Policy
+
+
+# 184 of these rooms when it was trained; the seeds are fixed, and so are the results.
+def test_it_reaches_its_goals_in_rooms_that_it_has_never_seen():
+    policy = Policy.load()
+    envs = ruedo.gym.NavigateVectorEnv(
+        200, beams=policy.beams, split="test", autoreset_mode="Disabled"
+    )
+    observations, _ = envs.reset(seed=1)
+    running, success = np.ones(200, bool), np.zeros(200, bool)
+    for _ in range(envs.most_actions):
+        observations, _, terminated, truncated, info = envs.step(policy(observations))
+        success |= running & info["success"]
+        running &= ~(terminated | truncated)
+        if not running.any():
+            break
+    envs.close()
+    assert success.sum() >= 180
+
+
+def test_it_is_a_few_kb():
+    assert (EXAMPLE / "policy.npz").stat().st_size < 10_000
+
+
+def test_it_drives_a_server_over_lcm_and_its_run_verifies(tmp_path):
+    run = subprocess.run(
+        [sys.executable, EXAMPLE / "drive.py", "--rooms", "3", "--record", tmp_path],
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert run.returncode == 0, run.stdout + run.stderr
+    assert int(re.search(r"^(\d) of 3 rooms", run.stdout, re.MULTILINE).group(1)) >= 2, run.stdout
+    for log in tmp_path.glob("*.lcm"):
+        verify = subprocess.run(
+            [os.environ["RUEDO"], "verify", log], capture_output=True, text=True, timeout=300
+        )
+        assert verify.returncode == 0, verify.stdout + verify.stderr
