@@ -1,12 +1,28 @@
 // Convex shapes that Bullet lacks: an exact ellipsoid, and a tyre, which touches the ground in one
-// point as a sphere does but is no wider than the wheel.
+// point as a sphere does but is no wider than the wheel. And Bullet's own, seen a little ahead.
 //
-// Both are given to Bullet's GJK by their support function.
+// Ellipsoid and tyre are given to Bullet's GJK by their support function.
 #pragma once
 
 #include "physics/bullet.h"
 
 namespace ruedo::physics {
+
+// Bullet looks for contacts where the bounds of two shapes overlap. With these, before they touch:
+// what was put down exactly shall not fall by a rounding error.
+constexpr btScalar kSeenAhead_m = 2e-4;
+
+template <class Shape>
+class SeenAhead final : public Shape {
+ public:
+  using Shape::Shape;
+  void getAabb(const btTransform& X, btVector3& low, btVector3& high) const override {
+    constexpr btScalar k = kSeenAhead_m;
+    Shape::getAabb(X, low, high);
+    low -= {k, k, k};
+    high += {k, k, k};
+  }
+};
 
 class ConvexShape : public btConvexInternalShape {
  public:
@@ -26,7 +42,7 @@ class ConvexShape : public btConvexInternalShape {
 };
 
 // The ellipsoid of the given radii (m).
-class EllipsoidShape final : public ConvexShape {
+class EllipsoidShape : public ConvexShape {
  public:
   explicit EllipsoidShape(const btVector3& radii) : radii_(radii) { m_collisionMargin = 0.0; }
   btVector3 localGetSupportingVertexWithoutMargin(const btVector3& direction) const override {
@@ -43,7 +59,7 @@ class EllipsoidShape final : public ConvexShape {
 // All points within width / 2 of a disc: the shape of a wheel with a round tyre. The axis is z;
 // radius and width (m) are the outer ones. The tyre's roundness is Bullet's collision margin, the
 // disc its core.
-class TyreShape final : public ConvexShape {
+class TyreShape : public ConvexShape {
  public:
   TyreShape(btScalar radius, btScalar width) : core_(radius - btMin(width / 2, radius)) {
     m_collisionMargin = btMin(width / 2, radius);

@@ -23,6 +23,14 @@ constexpr size_t kMostInBlock =
 
 Vec3 vector_at(const btScalar* v) { return {v[0], v[1], v[2]}; }
 
+// A universal joint's rows have a target of their own, whatever part of the error is undone.
+bool says_more(const btTypedConstraint& constraint) {
+  return constraint.getConstraintType() == D6_CONSTRAINT_TYPE ||
+         constraint.getConstraintType() == D6_SPRING_CONSTRAINT_TYPE ||
+         constraint.getConstraintType() == D6_SPRING_2_CONSTRAINT_TYPE ||
+         constraint.getConstraintType() == FIXED_CONSTRAINT_TYPE;
+}
+
 bool is_stop(const Row& row) { return row.lower == 0.0 || row.upper == 0.0; }
 
 }  // namespace
@@ -77,8 +85,10 @@ void JointBlocks::add(btTypedConstraint& constraint, int a, int b, const SolverB
   joint.first = rows_.size();
   joint.a = a;
   joint.b = b;
+  joint.errors_only = !says_more(constraint);
   for (int i = 0; i < n; ++i) {
     const size_t at = static_cast<size_t>(i) * kSkip;
+    joint.errors_only = joint.errors_only && values.error[at] == 0.0;
     Row row;
     row.a = a;
     row.b = b;
@@ -165,23 +175,45 @@ void JointBlocks::prepare(const SolverBodies& bodies) {
   }
 }
 
-void JointBlocks::factor(Block& block) {
+// The joints of a chain follow one another, and each is tied to its neighbours alone: near the
+// diagonal is all that there is, and Cholesky's factor has it there, too.
+void JointBlocks::find_envelope(Block& block) {
+  constexpr size_t kNone = static_cast<size_t>(-1);
   const size_t n = block.free.size();
-  block.factor.assign(n * n, 0.0);
+  block.begin.resize(n);
+  for (const size_t i : block.free) {
+    for (const int body : {rows_[i].a, rows_[i].b}) {
+      if (first_of_body_.size() <= static_cast<size_t>(body))
+        first_of_body_.resize(static_cast<size_t>(body) + 1);
+      first_of_body_[static_cast<size_t>(body)] = kNone;
+    }
+  }
+  for (size_t i = 0; i < n; ++i) {
+    block.begin[i] = i;
+    for (const int body : {rows_[block.free[i]].a, rows_[block.free[i]].b}) {
+      if (body == 0) continue;  // nothing moves it
+      size_t& first = first_of_body_[static_cast<size_t>(body)];
+      if (first == kNone) first = i;
+      block.begin[i] = std::min(block.begin[i], first);
+    }
+  }
+}
+
+void JointBlocks::factor(Block& block) {
+  find_envelope(block);
+  const size_t n = block.free.size();
+  block.factor.resize(n * n);
   for (size_t i = 0; i < n; ++i) {
     const Row& row = rows_[block.free[i]];
     double* of_i = &block.factor[i * n];
-    for (size_t j = 0; j < i; ++j) of_i[j] = row.coupling(rows_[block.free[j]]);
+    for (size_t j = block.begin[i]; j < i; ++j) of_i[j] = row.coupling(rows_[block.free[j]]);
     of_i[i] = row.response * (1.0 + kRegular) + row.softness;
-  }
-  for (size_t i = 0; i < n; ++i) {
-    double* of_i = &block.factor[i * n];
-    for (size_t j = 0; j <= i; ++j) {
+    for (size_t j = block.begin[i]; j <= i; ++j) {
       const double* of_j = &block.factor[j * n];
       double sum = of_i[j];
-      for (size_t k = 0; k < j; ++k) sum -= of_i[k] * of_j[k];
-      of_i[j] = j < i ? sum / of_j[j]
-                      : std::sqrt(std::max(sum, 1e-300 + kRegular * rows_[block.free[i]].response));
+      for (size_t k = std::max(block.begin[i], block.begin[j]); k < j; ++k)
+        sum -= of_i[k] * of_j[k];
+      of_i[j] = j < i ? sum / of_j[j] : std::sqrt(std::max(sum, 1e-300 + kRegular * row.response));
     }
   }
   block.factored = true;
@@ -192,13 +224,13 @@ void JointBlocks::solve(const Block& block, std::vector<double>& x) const {
   for (size_t i = 0; i < n; ++i) {
     const double* of_i = &block.factor[i * n];
     double sum = x[i];
-    for (size_t k = 0; k < i; ++k) sum -= of_i[k] * x[k];
+    for (size_t k = block.begin[i]; k < i; ++k) sum -= of_i[k] * x[k];
     x[i] = sum / of_i[i];
   }
   for (size_t i = n; i-- > 0;) {
-    double sum = x[i];
-    for (size_t k = i + 1; k < n; ++k) sum -= block.factor[k * n + i] * x[k];
-    x[i] = sum / block.factor[i * n + i];
+    const double* of_i = &block.factor[i * n];
+    x[i] /= of_i[i];
+    for (size_t k = block.begin[i]; k < i; ++k) x[k] -= of_i[k] * x[i];
   }
 }
 
@@ -241,11 +273,11 @@ double JointBlocks::look_again(double substep_s) {
   Values whole, none;
   for (Joint& joint : joints_) {
     const int n = ask(*joint.constraint, 1.0, substep_s, whole);
-    ask(*joint.constraint, 0.0, substep_s, none);
+    if (!joint.errors_only) ask(*joint.constraint, 0.0, substep_s, none);
     const size_t motors = joint.motors[1] ? 2 : joint.motors[0] ? 1 : 0;
     for (size_t i = 0; i < joint.count - motors && i < static_cast<size_t>(n); ++i) {
       Row& row = rows_[joint.first + i];
-      row.push_target = whole.error[i * kSkip] - none.error[i * kSkip];
+      row.push_target = whole.error[i * kSkip] - (joint.errors_only ? 0.0 : none.error[i * kSkip]);
       largest = std::max(largest, std::abs(row.push_target));
     }
   }
@@ -276,6 +308,16 @@ double JointBlocks::sweep_push(SolverBodies& bodies) {
     }
   }
   return worst;
+}
+
+void JointBlocks::tell_pairs(std::vector<std::pair<int, int>>& pairs) const {
+  for (const Joint& joint : joints_) pairs.emplace_back(joint.a, joint.b);
+}
+
+void JointBlocks::tell_rows(Newton& newton) {
+  for (Row& row : rows_) {
+    if (row.inverse > 0.0) newton.add(row);
+  }
 }
 
 void JointBlocks::write_back() const {

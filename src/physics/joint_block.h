@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "physics/newton.h"
 #include "physics/rows.h"
 
 namespace ruedo::physics {
@@ -28,11 +29,16 @@ class JointBlocks {
   double look_again(double substep_s);
   void write_back() const;  // to the motors
 
+  // Which bodies are tied together, and by which rows.
+  void tell_pairs(std::vector<std::pair<int, int>>& pairs) const;
+  void tell_rows(Newton& newton);
+
  private:
   struct Joint {
     size_t first = 0, count = 0;  // rows
     btTypedConstraint* constraint = nullptr;
     JointMotor* motors[2] = {};  // of the last rows, in that order
+    bool errors_only = true;     // without reduction, no row has a target
     int a = 0, b = 0;
     size_t block = 0;
   };
@@ -40,6 +46,7 @@ class JointBlocks {
     std::vector<size_t> free;     // rows that are solved directly: none of them is at a bound
     std::vector<size_t> bounded;  // rows at a bound, relaxed one by one
     std::vector<double> factor;   // Cholesky, lower, by rows, of the free ones
+    std::vector<size_t> begin;    // of each of its rows: the first column that is not 0
     bool factored = false;
   };
 
@@ -47,6 +54,7 @@ class JointBlocks {
   int ask(btTypedConstraint& constraint, double reduction, double substep_s, Values& values);
   void add_motor(JointMotor& motor, Joint& joint, const SolverBodies& bodies);
   size_t root(size_t body);
+  void find_envelope(Block& block);
   void factor(Block& block);
   void solve(const Block& block, std::vector<double>& x) const;
 
@@ -56,7 +64,8 @@ class JointBlocks {
   std::vector<Block> blocks_;
   size_t block_count_ = 0;
   std::vector<size_t> block_of_root_;
-  std::vector<double> x_;  // scratch
+  std::vector<double> x_;              // scratch
+  std::vector<size_t> first_of_body_;  // scratch: a block's first row at each body
 };
 
 }  // namespace ruedo::physics

@@ -4,6 +4,7 @@
 // the axis.
 #pragma once
 
+#include <cmath>
 #include <memory>
 #include <vector>
 
@@ -35,6 +36,11 @@ class JointConstraint {
   void set_motor(double rate, double lowest_effort, double highest_effort, double gain);
   void set_effort(double effort);  // gives that effort until another command
   bool commanded() const { return mode_ != Mode::passive; }
+
+  // It may move faster than its bodies do now: it is told to, or a spring pulls.
+  bool may_start() const {
+    return mode_ == Mode::effort || limits_.spring_stiffness > 0.0 || std::abs(command_) > 1e-3;
+  }
 
   // The bodies were put back to where they started: the position is 0, and no command holds.
   void start_again() {

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "physics/collisions.h"
 #include "physics/state_check.h"
 #include "ruedo/errors.h"
 #include "ruedo/quantity.h"
@@ -71,6 +72,7 @@ PhysicsWorld::Impl::Impl(const model::WorldModel& world, const model::BodyLayout
   dispatcher_.setDispatcherFlags(
       dispatcher_.getDispatcherFlags() &
       ~btCollisionDispatcher::CD_USE_RELATIVE_CONTACT_BREAKING_THRESHOLD);
+  register_collisions(dispatcher_);
   dynamics_.setForceUpdateAllAabbs(false);
   substeps_[kCoarse] = substeps_for(kLongestSubstep_us);
   substeps_[kFine] = substeps_for(kLongestSubstepOfJoints_us);
@@ -173,6 +175,7 @@ void PhysicsWorld::Impl::add_wheel(size_t i) {
   wheel_sign_.push_back(1.0);
   if (link.body < 0 || link.body == robot.body) return;
   wheel_joint_[i] = static_cast<int>(wheels_.size());
+  rolling_.push_back(link.body);
   wheels_.push_back(make_joint(robot.instance, wheel.joint));
   const auto& model = *world_.models[index(robot.instance)].model;
   const model::Joint& joint = model.joints[index(wheel.joint)];
@@ -306,15 +309,37 @@ void PhysicsWorld::Impl::choose_pace() {
     parents_[std::max(of_a, of_b)] = std::min(of_a, of_b);
   }
   for (Motion& motion : motions_) motion.fine = false;
-  for (size_t i = 0; i < motions_.size(); ++i) {
-    if (motions_[i].simulated && motions_[i].tied) motions_[root(i)].fine = true;
-  }
+  find_hurried();
   for (size_t i = 0; i < motions_.size(); ++i) {
     if (!motions_[i].simulated) continue;
     if (rigid_.bodies[i].info.moved) continue;
     motions_[i].fine = motions_[root(i)].fine;
     motions_[i].awake = rigid_.bodies[i].bullet->isActive();
     simulated_[motions_[i].fine ? kFine : kCoarse].push_back(rigid_.bodies[i].bullet.get());
+  }
+}
+
+// A mechanism that has stood still for a while, and that nothing tells to move, needs no short
+// substeps: an arm that holds its load.
+void PhysicsWorld::Impl::find_hurried() {
+  constexpr double kStill_m_s = 1e-3, kStill_rad_s = 1e-3;
+  constexpr int kStillSteps = 20;
+  for (size_t i = 0; i < motions_.size(); ++i) {
+    Motion& motion = motions_[i];
+    if (!motion.simulated || !motion.tied) continue;
+    const bool still = twists_[i].linear.squaredNorm() < kStill_m_s * kStill_m_s &&
+                       twists_[i].angular.squaredNorm() < kStill_rad_s * kStill_rad_s;
+    motion.still = still ? std::min(motion.still + 1, kStillSteps) : 0;
+    if (motion.still < kStillSteps) motions_[root(i)].fine = true;
+  }
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    const int body = body_of(i);
+    if (body >= 0 && motions_[index(body)].simulated &&
+        (joints_[i].may_start() || leaders_[i] >= 0))
+      motions_[root(index(body))].fine = true;
+  }
+  for (const int body : rolling_) {
+    if (motions_[index(body)].simulated) motions_[root(index(body))].fine = true;
   }
 }
 
@@ -326,14 +351,40 @@ void PhysicsWorld::Impl::move_on(btRigidBody& mover, double substep_s) {
   mover.setWorldTransform(next);
 }
 
-void PhysicsWorld::Impl::before_substep(double substep_s) {
+void PhysicsWorld::Impl::before_substep(int pace, double substep_s) {
   for (size_t i = 0; i < joints_.size(); ++i) {
-    if (leaders_[i] < 0) continue;
+    if (leaders_[i] < 0 || !at_pace(i, pace)) continue;
     const JointConstraint& leader = joints_[index(leaders_[i])];
     joints_[i].follow(leader.position(), leader.velocity(), substep_s);
   }
-  for (JointConstraint& joint : joints_) joint.before_substep(substep_s);
-  for (JointConstraint& joint : wheels_) joint.before_substep(substep_s);
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    if (at_pace(i, pace)) joints_[i].before_substep(substep_s);
+  }
+  if (pace == kFine) {
+    for (JointConstraint& joint : wheels_) joint.before_substep(substep_s);
+  }
+}
+
+void PhysicsWorld::Impl::after_substep(int pace, double substep_s) {
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    if (at_pace(i, pace)) joints_[i].after_substep(substep_s);
+  }
+  if (pace == kFine) {
+    for (JointConstraint& joint : wheels_) joint.after_substep(substep_s);
+  }
+}
+
+// One that takes no part goes on at the shorter substeps, as it was.
+bool PhysicsWorld::Impl::at_pace(size_t joint, int pace) const {
+  const int body = body_of(joint);
+  const bool coarse = body >= 0 && motions_[index(body)].simulated && !motions_[index(body)].fine;
+  return coarse == (pace == kCoarse);
+}
+
+int PhysicsWorld::Impl::body_of(size_t joint) const {
+  const auto& placed = layout_.joints[joint];
+  const int child = placed.child_body;
+  return child >= 0 && !rigid_.bodies[index(child)].info.moved ? child : placed.parent_body;
 }
 
 void PhysicsWorld::Impl::step_at(int pace) {
@@ -357,13 +408,10 @@ void PhysicsWorld::Impl::step_at(int pace) {
     return;
   }
   for (int s = 0; s < substeps_[pace]; ++s) {
-    if (pace == kFine) before_substep(substep_s);
+    before_substep(pace, substep_s);
     dynamics_.substep(substep_s);
     bound_speeds(bodies);
-    if (pace == kFine) {
-      for (JointConstraint& joint : joints_) joint.after_substep(substep_s);
-      for (JointConstraint& joint : wheels_) joint.after_substep(substep_s);
-    }
+    after_substep(pace, substep_s);
     contacts_.add(dynamics_.manifolds(), 1, s + 1 == substeps_[pace]);
     for (auto& [mover, start] : movers) move_on(*mover, substep_s);
   }

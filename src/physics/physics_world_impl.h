@@ -32,6 +32,7 @@ struct Motion {
   bool simulated = false;  // in this step
   bool fine = false;       // ... in the shorter substeps
   bool awake = false;      // when the step began
+  int still = 0;           // steps for which it hardly moved, where it is tied
   bool fresh = true;  // put there since the last step: nothing says how it accelerates but gravity
   Twist mean;
   Pose end;
@@ -84,7 +85,8 @@ class PhysicsWorld::Impl {
 
  private:
   void add_joints();  // those that are new
-  void before_substep(double substep_s);
+  void before_substep(int pace, double substep_s);
+  void after_substep(int pace, double substep_s);
   void add_wheel(size_t wheel);
   JointConstraint make_joint(int instance, int joint);
   void add_joints(int instance);  // in the simulation, too
@@ -93,6 +95,9 @@ class PhysicsWorld::Impl {
   void refilter_all();
   int substeps_for(int64_t longest_us) const;
   void choose_pace();
+  void find_hurried();
+  bool at_pace(size_t joint, int pace) const;
+  int body_of(size_t joint) const;  // that moves
   void step_at(int pace);
   void move_on(btRigidBody& mover, double substep_s);
   void tie(int body, int other);
@@ -118,6 +123,7 @@ class PhysicsWorld::Impl {
   Dynamics dynamics_;
   std::vector<btRigidBody*> simulated_[2];                    // of each pace
   std::vector<size_t> parents_;                               // union-find over bodies
+  std::vector<int> rolling_;                                  // bodies that are driven wheels
   std::vector<std::pair<btRigidBody*, btTransform>> movers_;  // and where they began the step
 };
 

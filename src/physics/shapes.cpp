@@ -89,7 +89,7 @@ std::unique_ptr<btConvexHullShape> hull_of(const std::vector<btVector3>& points,
   computer.compute(&points[0].m_floats[0], sizeof(btVector3), static_cast<int>(points.size()), 0,
                    0);
   volume += volume_of(computer);
-  auto shape = std::make_unique<btConvexHullShape>();
+  auto shape = std::make_unique<SeenAhead<btConvexHullShape>>();
   const int corners = computer.vertices.size();
   std::vector<bool> keep(static_cast<size_t>(corners),
                          corners <= static_cast<int>(kMaxHullVertices));
@@ -147,21 +147,23 @@ btCollisionShape* ShapeFactory::primitive(const model::Geometry& geometry) {
   const Vec3& size = geometry.size;
   switch (geometry.shape) {
     case model::Shape::box: {
-      auto box = std::make_unique<btBoxShape>(to_bt(Vec3(size / 2)));
+      auto box = std::make_unique<SeenAhead<btBoxShape>>(to_bt(Vec3(size / 2)));
       box->setMargin(margin_for(size.minCoeff() / 2));
       return own(std::move(box));
     }
-    case model::Shape::sphere: return own(std::make_unique<btSphereShape>(size.x()));
+    case model::Shape::sphere: return own(std::make_unique<SeenAhead<btSphereShape>>(size.x()));
     case model::Shape::cylinder: {
-      auto cylinder =
-          std::make_unique<btCylinderShapeZ>(btVector3(size.x(), size.x(), size.y() / 2));
+      auto cylinder = std::make_unique<SeenAhead<btCylinderShapeZ>>(
+          btVector3(size.x(), size.x(), size.y() / 2));
       cylinder->setMargin(margin_for(std::min(size.x(), size.y() / 2)));
       return own(std::move(cylinder));
     }
-    case model::Shape::capsule: return own(std::make_unique<btCapsuleShapeZ>(size.x(), size.y()));
-    case model::Shape::ellipsoid: return own(std::make_unique<EllipsoidShape>(to_bt(size)));
+    case model::Shape::capsule:
+      return own(std::make_unique<SeenAhead<btCapsuleShapeZ>>(size.x(), size.y()));
+    case model::Shape::ellipsoid:
+      return own(std::make_unique<SeenAhead<EllipsoidShape>>(to_bt(size)));
     case model::Shape::cone: {
-      auto cone = std::make_unique<btConeShapeZ>(size.x(), size.y());
+      auto cone = std::make_unique<SeenAhead<btConeShapeZ>>(size.x(), size.y());
       cone->setMargin(0.0);  // a cone's margin is added outside
       return own(std::move(cone));
     }
@@ -226,7 +228,7 @@ bool ShapeFactory::moving(const model::Geometry& geometry, std::vector<btCollisi
 }
 
 btCollisionShape* ShapeFactory::tyre(double radius, double width) {
-  return own(std::make_unique<TyreShape>(radius, width));
+  return own(std::make_unique<SeenAhead<TyreShape>>(radius, width));
 }
 
 }  // namespace ruedo::physics

@@ -17,6 +17,12 @@ constexpr double kSlowestBounce_m_s = 1e-3;
 constexpr double kRestingDepth_m = 5e-5;
 constexpr int kPushSweeps = 30;
 constexpr double kPushTolerance_m_s = 1e-5;
+// Sweeps that come first, and again after so many. One factorization may cost as much as so many
+// sweeps.
+constexpr int kSweepsBeforeNewton = 1, kSweepsBetweenNewton = 40, kNewtonSteps = 15;
+constexpr int kSweepsOfMechanisms = 20;  // before Newton: their joints are solved at once anyway
+constexpr size_t kFewBodies = 2;         // what never moves, and another one: sweeps are faster
+constexpr double kSweepsForAFactor = 30.0, kProductsOfARow = 40.0, kSmall = 20'000.0;
 // A joint that comes apart faster did so by no motion of its own: it was pushed, or put.
 constexpr double kFastestClosing_m_s = 0.5;
 
@@ -281,36 +287,84 @@ double Solver::sweep(int number) {
   return worst;
 }
 
+// Where that is not soon still, all rows are solved at once; where that did no good, it is undone.
 // Between the sweeps the impulses go on along conjugate directions (M. Silcowitz-Hansen, S. Niebel,
 // K. Erleben, "A nonsmooth nonlinear conjugate gradient method for interactive contact force
 // problems", 2010): stacks and large ratios of masses take a part of the sweeps. The next sweep
 // brings them back within their bounds; the last one goes nowhere.
 void Solver::sweep_until_still() {
-  double last_square = 0.0;
-  for (size_t c = 0; c < contact_count_; ++c) {
-    for (Row* row : contacts_[c].main_rows()) row->before = row->impulse, row->heading = 0.0;
-  }
+  const int first = blocks_.empty() ? kSweepsBeforeNewton : kSweepsOfMechanisms;
+  const auto start_conjugates = [](Row& row) { row.before = row.impulse, row.heading = 0.0; };
+  for_each_main_row(start_conjugates);
+  double last_square = 0.0, before_newton = 0.0;
+  bool after_newton = false;
   for (int i = 0; i < settings_.iterations; ++i) {
     const double worst = sweep(i);
     ++sweeps_;
     if (worst <= settings_.tolerance_m_s || i + 1 == settings_.iterations) break;
-    double square = 0.0;
-    for (size_t c = 0; c < contact_count_; ++c) {
-      for (const Row* row : contacts_[c].main_rows())
-        square += (row->impulse - row->before) * (row->impulse - row->before) * row->response;
+    if (after_newton && worst > before_newton) {
+      for_each_main_row([this](Row& row) { row.give(bodies_, row.before - row.impulse); });
     }
-    const double further = i > 0 && last_square > 0.0 ? square / last_square : 0.0;
-    const bool on = further < 1.0 && i + 2 < settings_.iterations;
-    for (size_t c = 0; c < contact_count_; ++c) {
-      for (Row* row : contacts_[c].main_rows()) {
-        const double step = row->impulse - row->before;
-        if (on && row->heading != 0.0) row->give(bodies_, further * row->heading);
-        row->heading = (on ? further * row->heading : 0.0) + step;
-        row->before = row->impulse;
-      }
+    if (after_newton) for_each_main_row(start_conjugates);
+    after_newton = i % kSweepsBetweenNewton == first && newton_pays();
+    if (after_newton) {
+      for_each_main_row(start_conjugates);
+      solve_at_once();
+      before_newton = worst;
+      last_square = 0.0;
+    } else {
+      go_on_along_conjugates(last_square, i);
     }
-    last_square = square;
   }
+}
+
+void Solver::go_on_along_conjugates(double& last_square, int sweep) {
+  double square = 0.0;
+  for_each_main_row([&](const Row& row) {
+    square += (row.impulse - row.before) * (row.impulse - row.before) * row.response;
+  });
+  const double further = sweep > 0 && last_square > 0.0 ? square / last_square : 0.0;
+  const bool on = further < 1.0 && sweep + 2 < settings_.iterations;
+  for_each_main_row([&](Row& row) {
+    const double step = row.impulse - row.before;
+    if (on && row.heading != 0.0) row.give(bodies_, further * row.heading);
+    row.heading = (on ? further * row.heading : 0.0) + step;
+    row.before = row.impulse;
+  });
+  last_square = square;
+}
+
+// Asked for an island whose sweeps do not come to an end soon.
+bool Solver::newton_pays() {
+  if (newton_known_) return newton_pays_;
+  newton_known_ = true;
+  pairs_.clear();
+  blocks_.tell_pairs(pairs_);
+  for (size_t c = 0; c < contact_count_; ++c) {
+    const std::pair pair(contacts_[c].normal.a, contacts_[c].normal.b);
+    if (pairs_.empty() || pairs_.back() != pair) pairs_.push_back(pair);
+  }
+  const double rows = 3.0 * static_cast<double>(contact_count_);
+  newton_pays_ =
+      contact_count_ > 0 && bodies_.size() > kFewBodies &&
+      newton_.prepare(bodies_, pairs_) < kSweepsForAFactor * kProductsOfARow * rows + kSmall;
+  return newton_pays_;
+}
+
+void Solver::solve_at_once() {
+  newton_.begin();
+  blocks_.tell_rows(newton_);
+  for (size_t c = 0; c < contact_count_; ++c) {
+    ContactRows& contact = contacts_[c];
+    if (contact.normal.inverse == 0.0) continue;
+    const size_t load = newton_.add(contact.normal);
+    if (contact.friction > 0.0 && contact.friction2 > 0.0)
+      newton_.add(contact.along, contact.across, contact.friction, contact.friction2, load);
+    if (contact.spinning > 0.0) newton_.add(contact.spin, load, contact.spinning);
+    for (int k = 0; contact.rolling > 0.0 && k < 2; ++k)
+      newton_.add(contact.roll[k], load, contact.rolling);
+  }
+  newton_.solve(bodies_, settings_.tolerance_m_s, kNewtonSteps);
 }
 
 // Of contacts: by velocities that move the bodies in this substep and are not kept.
@@ -419,6 +473,7 @@ void Solver::solve(const std::vector<btRigidBody*>& bodies,
                    const std::vector<btPersistentManifold*>& manifolds,
                    const std::vector<btTypedConstraint*>& joints, double substep_s) {
   sweeps_ = 0;
+  newton_known_ = false;
   contact_count_ = 0;
   bodies_.clear();
   bodies_.emplace_back();

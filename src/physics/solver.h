@@ -21,6 +21,7 @@
 
 #include "physics/bullet.h"
 #include "physics/joint_block.h"
+#include "physics/newton.h"
 #include "physics/rows.h"
 
 namespace ruedo::physics {
@@ -91,6 +92,15 @@ class Solver {
   double rub(ContactRows& contact);
   double sweep(int number);
   void sweep_until_still();
+  void go_on_along_conjugates(double& last_square, int sweep);
+  bool newton_pays();
+  void solve_at_once();
+  template <class Do>
+  void for_each_main_row(Do&& act) {
+    for (size_t c = 0; c < contact_count_; ++c) {
+      for (Row* row : contacts_[c].main_rows()) act(*row);
+    }
+  }
   void undo_penetration();
   void close_joints(double substep_s);
   void advance(double substep_s);
@@ -104,6 +114,9 @@ class Solver {
   std::vector<ContactRows> contacts_;
   size_t contact_count_ = 0;
   JointBlocks blocks_;
+  Newton newton_;
+  bool newton_known_ = false, newton_pays_ = false;  // of this island
+  std::vector<std::pair<int, int>> pairs_;           // of bodies that rows tie together
 };
 
 }  // namespace ruedo::physics

@@ -227,3 +227,20 @@ def test_copies_that_share_a_world_outlive_the_first():
     for _ in range(3):
         engine.reset()
     assert (engine.observe("lrf.ranges") == before).all()
+
+
+@pytest.mark.parametrize("integrator", ["arc", "trapezoid"])
+def test_slip_is_unbiased(integrator):
+    """Ten metres straight on: the wheels' way is 10 m in the mean. The heading walks at random by sigma^2 2 L / track^2, so
+    that the mean of x falls behind by the mean of its cosine: (1 - exp(-k L)) / k with k = (sigma / track)^2."""
+    sigma, track, length, runs = 0.02, 0.4, 10.0, 300
+    slip = f"<ruedo:odometry><ruedo:slip_noise>{sigma}</ruedo:slip_noise><ruedo:integrator>{integrator}</ruedo:integrator></ruedo:odometry>"
+    text = world().replace("<ruedo:drive>", slip + "<ruedo:drive>")
+    with ruedo.Engine("w.sdf", text=text, worlds=runs, seed=1) as e:
+        e.step([-1.0, 0.0], 2000)  # away from the wall
+        way = -0.1 * e["odometry.angle"].mean(axis=(1, 2))
+        ahead = -e["odometry.x"][:, 0]
+    k = (sigma / track) ** 2
+    wanted = (1 - math.exp(-k * length)) / k
+    for values, mean in ((way, length), (ahead, wanted)):
+        assert abs(values.mean() - mean) < 3.29 * values.std() / math.sqrt(runs)
