@@ -132,14 +132,20 @@ class OnPlane final : public Pair {
 class OnRealBoxes final : public btDiscreteCollisionDetectorInterface::Result {
  public:
   OnRealBoxes(const btTransform& X_WA, const btVector3& half_a, const btTransform& X_WB,
-              const btVector3& half_b, btManifoldResult& result)
-      : X_WA_(X_WA), X_WB_(X_WB), half_a_(half_a), half_b_(half_b), result_(result) {}
+              const btVector3& half_b, btScalar ahead, btManifoldResult& result)
+      : X_WA_(X_WA),
+        X_WB_(X_WB),
+        half_a_(half_a),
+        half_b_(half_b),
+        ahead_(ahead),
+        result_(result) {}
   void setShapeIdentifiersA(int, int) override {}
   void setShapeIdentifiersB(int, int) override {}
 
   void addContactPoint(const btVector3& normal, const btVector3& point, btScalar depth) override {
-    const btScalar larger_a = kAhead_m * (normal * X_WA_.getBasis()).absolute().dot({1, 1, 1}),
-                   larger_b = kAhead_m * (normal * X_WB_.getBasis()).absolute().dot({1, 1, 1});
+    if (ahead_ == 0.0) return result_.addContactPoint(normal, point, depth);
+    const btScalar larger_a = ahead_ * (normal * X_WA_.getBasis()).absolute().dot({1, 1, 1}),
+                   larger_b = ahead_ * (normal * X_WB_.getBasis()).absolute().dot({1, 1, 1});
     const btScalar gap = depth + larger_a + larger_b;
     btVector3 on_b = point - larger_b * normal;
     btScalar beside = 0.0;
@@ -165,8 +171,15 @@ class OnRealBoxes final : public btDiscreteCollisionDetectorInterface::Result {
 
   const btTransform &X_WA_, &X_WB_;
   const btVector3 half_a_, half_b_;
+  const btScalar ahead_;
   btManifoldResult& result_;
 };
+
+// A robot that its drive moves along a plane touches what it overlaps, and nothing before.
+bool moves_along_plane(const btCollisionObjectWrapper& box) {
+  const auto* body = btRigidBody::upcast(box.getCollisionObject());
+  return body && body->getLinearFactor().z() == 0.0;
+}
 
 class BoxOnBox final : public Pair {
  public:
@@ -178,12 +191,14 @@ class BoxOnBox final : public Pair {
     const auto half_of = [](const btCollisionObjectWrapper& box) {
       return static_cast<const btBoxShape&>(*box.getCollisionShape()).getHalfExtentsWithMargin();
     };
-    const btVector3 more(kAhead_m, kAhead_m, kAhead_m), half_a = half_of(a), half_b = half_of(b);
+    const btScalar ahead = moves_along_plane(a) || moves_along_plane(b) ? 0.0 : kAhead_m;
+    const btVector3 more(ahead, ahead, ahead), half_a = half_of(a), half_b = half_of(b);
     const btBoxShape larger_a(half_a + more), larger_b(half_b + more);
     btDiscreteCollisionDetectorInterface::ClosestPointInput input;
     input.m_transformA = a.getWorldTransform();
     input.m_transformB = b.getWorldTransform();
-    OnRealBoxes on_real(a.getWorldTransform(), half_a, b.getWorldTransform(), half_b, result);
+    OnRealBoxes on_real(a.getWorldTransform(), half_a, b.getWorldTransform(), half_b, ahead,
+                        result);
     btBoxBoxDetector(&larger_a, &larger_b).getClosestPoints(input, on_real, nullptr);
   }
 };

@@ -188,6 +188,7 @@ void PhysicsWorld::Impl::tie(int body, int other) {
   motions_[index(body)].tied = true;
   if (other < 0) return;
   motions_[index(other)].tied = true;
+  tied_.emplace_back(body, other);
   rigid_.bodies[index(body)].info.joined.push_back(other);
   rigid_.bodies[index(other)].info.joined.push_back(body);
 }
@@ -297,6 +298,12 @@ void PhysicsWorld::Impl::choose_pace() {
   const auto movable = [&](int body) {
     return body >= 0 && motions_[index(body)].simulated && !rigid_.bodies[index(body)].info.moved;
   };
+  const auto together = [&](int a, int b) {
+    if (!movable(a) || !movable(b)) return;
+    const size_t of_a = root(index(a)), of_b = root(index(b));
+    parents_[std::max(of_a, of_b)] = std::min(of_a, of_b);
+  };
+  for (const auto& [a, b] : tied_) together(a, b);
   const btBroadphasePairArray& pairs =
       broadphase_.getOverlappingPairCache()->getOverlappingPairArray();
   for (int i = 0; i < pairs.size(); ++i) {
@@ -304,9 +311,7 @@ void PhysicsWorld::Impl::choose_pace() {
         info_of(*static_cast<btCollisionObject*>(pairs[i].m_pProxy0->m_clientObject)).body;
     const int b =
         info_of(*static_cast<btCollisionObject*>(pairs[i].m_pProxy1->m_clientObject)).body;
-    if (!movable(a) || !movable(b)) continue;
-    const size_t of_a = root(index(a)), of_b = root(index(b));
-    parents_[std::max(of_a, of_b)] = std::min(of_a, of_b);
+    together(a, b);
   }
   for (Motion& motion : motions_) motion.fine = false;
   find_hurried();

@@ -124,6 +124,7 @@ class PhysicsWorld::Impl {
   std::vector<btRigidBody*> simulated_[2];                    // of each pace
   std::vector<size_t> parents_;                               // union-find over bodies
   std::vector<int> rolling_;                                  // bodies that are driven wheels
+  std::vector<std::pair<int, int>> tied_;                     // bodies that a joint ties together
   std::vector<std::pair<btRigidBody*, btTransform>> movers_;  // and where they began the step
 };
 

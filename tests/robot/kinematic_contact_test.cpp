@@ -25,7 +25,7 @@ TEST_P(WallAtAnyStep, AWallStopsTheRobotAtFullSpeed) {
   }
   EXPECT_NEAR(sim.position().x() + kFront_m, 1.0, 2e-3);
   EXPECT_LT(furthest + kFront_m, 1.005);
-  EXPECT_NEAR(sim.yaw(), 0.0, 1e-3);
+  EXPECT_NEAR(sim.yaw(), 0.0, 2e-3);  // it hits at 1.2 m/s, and steps are up to 50 ms
   EXPECT_NEAR(sim.position().z(), 0.0, 1e-12);
   EXPECT_NEAR(sim.robot().twist.linear.x(), 0.0, 0.02);
   // The wheels turn as commanded: 1.2 m/s on 0.1 m for 2 s.
