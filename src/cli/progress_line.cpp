@@ -13,6 +13,7 @@
 
 #include "core/progress.h"
 #include "core/utf8.h"
+#include "core/whole.h"
 
 namespace ruedo::cli {
 namespace {
@@ -35,10 +36,10 @@ size_t columns() {
 }
 
 std::string duration(double seconds) {
-  const auto whole = static_cast<int64_t>(std::clamp(seconds, 0.0, 1e9) + 0.5);
-  return whole < 60     ? fmt::format("{} s", whole)
-         : whole < 3600 ? fmt::format("{}:{:02} min", whole / 60, whole % 60)
-                        : fmt::format("{}:{:02} h", whole / 3600, whole % 3600 / 60);
+  const int64_t all = rounded(std::clamp(seconds, 0.0, 1e9));
+  return all < 60     ? fmt::format("{} s", all)
+         : all < 3600 ? fmt::format("{}:{:02} min", all / 60, all % 60)
+                      : fmt::format("{}:{:02} h", all / 3600, all % 3600 / 60);
 }
 
 std::string text_of(const Progress::State& state, size_t width) {
