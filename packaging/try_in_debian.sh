@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # try_in_debian.sh FOLDER SUITE...: installs and tries Ruedo's wheel in a bare Debian of each suite (bookworm, trixie), made by debootstrap below
 # FOLDER/SUITE: as an ordinary user, without compiler, network, GPU or display. FOLDER/wheels holds Ruedo's wheel and those of lcm and numpy
-# for each suite's Python; with those of pytest, pandas, gymnasium and matplotlib, too, the tests of the Python client and engine run
+# for each suite's Python; with those of pytest, pandas, gymnasium, matplotlib and pyyaml, too, the tests of the Python client and engine run
 # there (RUEDO_TESTS: which; all by default). Prints what happens; fails when something does not work, or the results of two suites differ.
 # Wants root.
 set -euo pipefail
@@ -52,7 +52,7 @@ for one in venv other; do
   $one/bin/python -c "import importlib; found = importlib.import_module('ruedo.launch').find_ruedo(); assert found.startswith('$PWD/$one/'), found"
 done
 if compgen -G '/wheels/pytest-*' >/dev/null; then
-  venv/bin/pip install -q --no-index --find-links /wheels pytest pandas gymnasium matplotlib
+  venv/bin/pip install -q --no-index --find-links /wheels pytest pandas gymnasium matplotlib pyyaml
   export RUEDO=$PWD/venv/bin/ruedo RUEDO_SOURCE_DIR=/src RUEDO_BUILD_DIR=/nowhere
   cd /src/tests
   tests=(clients/{client,lockstep,unix,world,motion,launch,hostile,python}_test.py engine)
