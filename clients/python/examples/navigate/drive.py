@@ -4,8 +4,9 @@ LCM, as it would drive a robot.
     python drive.py [--rooms 20] [--first 0] [--record FOLDER] [--url URL]
 
 Each room is a server in lockstep of its own, with noise; what is said is whether the robot reached
-its goal without touching anything, and at the end how often. --record keeps the runs as
-FOLDER/room-NUMBER.lcm, which `ruedo verify` repeats. Neither torch nor Gymnasium is needed.
+its goal without touching anything, and at the end how often. A bumper around its body feels that,
+which its wheels are no part of. --record keeps the runs as FOLDER/room-NUMBER.lcm, which `ruedo
+verify` repeats. Neither torch nor Gymnasium is needed.
 """
 
 from __future__ import annotations
