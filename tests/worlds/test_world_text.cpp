@@ -79,9 +79,9 @@ void expect_near(const Pose& a, const Pose& b) {
   EXPECT_LT(a.rotation.angularDistance(b.rotation), 5e-6);
 }
 
-class OurWorlds : public testing::TestWithParam<const char*> {};
+class TextOfOurWorlds : public testing::TestWithParam<const char*> {};
 
-TEST_P(OurWorlds, GoThroughToTheByte) {
+TEST_P(TextOfOurWorlds, GoThroughToTheByte) {
   const auto world = load_world(kWorlds + GetParam());
   const WorldText::Written written =
       WorldText(bytes(kWorlds + GetParam()), *world).with(as_loaded(*world));
@@ -90,7 +90,7 @@ TEST_P(OurWorlds, GoThroughToTheByte) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    All, OurWorlds,
+    All, TextOfOurWorlds,
     testing::Values("arena.sdf", "rooms.sdf", "maze.sdf", "office.sdf", "warehouse.sdf",
                     "field.sdf", "crossing.sdf", "fleet.sdf", "terrain.sdf", "empty.sdf"),
     [](const auto& info) {
@@ -146,8 +146,9 @@ TEST(WorldTextTest, ANewModelStandsAtTheEndUnderItsName) {
   const std::string saved = world.saved();
   EXPECT_EQ(saved.substr(0, saved.find("    <model name=\"c &amp; d\">")),
             world.text().substr(0, world.text().find("  </world>")));
-  EXPECT_THAT(saved, HasSubstr("<include>\n      <uri>model://p3dx</uri>\n      <pose>0 2 0 0 0 1"
-                               "</pose>\n      <name>guest</name>\n    </include>\n  </world>"));
+  EXPECT_THAT(saved,
+              HasSubstr("<include>\n      <uri>model://p3dx</uri>\n      <name>guest</name>\n"
+                        "      <pose>0 2 0 0 0 1</pose>\n    </include>\n  </world>"));
   expect_near(world.put("guest"), Pose::from_xyz_rpy({0, 2, 0}, {0, 0, 1}));
 }
 

@@ -6,6 +6,10 @@
 #include <sdf/sdf.hh>
 #include <sstream>
 #include <string>
+#include <vector>
+
+#include "model/load.h"
+#include "model/world_text.h"
 
 namespace {
 
@@ -36,6 +40,35 @@ TEST_P(Libsdformat, LoadsOurFileCleanly) {
   }
   EXPECT_TRUE(root.WorldCount() == 1 || root.Model() || root.Light());
   sdf::Console::Instance()->GetMsgStream().SetStream(nullptr);
+}
+
+// A world as `ruedo edit` saves it: what was moved, what came, and what went.
+TEST(LibsdformatText, ReadsWhatTheEditorSaves) {
+  using ruedo::Pose;
+  const auto world = ruedo::model::load_world(kWorlds + "arena.sdf");
+  std::vector<ruedo::model::ModelNow> models;
+  for (const auto& model : world->models) {
+    if (model.name != "box_2") models.push_back({model.name, model.X_WM, "", false});
+    if (model.name == "box_1")
+      models.back().X_WM = Pose::from_xyz_rpy({1.5, -2.5, 0.35}, {0, 0, 0.75});
+  }
+  const std::string include =
+      "<sdf version='1.9'>\n<include>\n      <uri>model://p3dx</uri>\n    </include>\n</sdf>";
+  models.push_back({"guest", Pose::from_xyz_rpy({3, 3, 0}, {0, 0, -1}), include, true});
+  const std::string text =
+      ruedo::model::WorldText(ruedo::model::world_text_of(*world), *world).with(models).text;
+  sdf::ParserConfig config;
+  config.SetFindCallback(find_model);
+  sdf::Root root;
+  for (const auto& error : root.LoadSdfString(text, config)) ADD_FAILURE() << error.Message();
+  ASSERT_EQ(root.WorldCount(), 1u);
+  const sdf::World& saved = *root.WorldByIndex(0);
+  EXPECT_FALSE(saved.ModelNameExists("box_2"));
+  ASSERT_TRUE(saved.ModelNameExists("box_1") && saved.ModelNameExists("guest"));
+  EXPECT_EQ(saved.ModelByName("box_1")->RawPose(),
+            ignition::math::Pose3d(1.5, -2.5, 0.35, 0, 0, 0.75));
+  EXPECT_EQ(saved.ModelByName("guest")->RawPose(), ignition::math::Pose3d(3, 3, 0, 0, 0, -1));
+  EXPECT_EQ(saved.ModelCount(), world->models.size());  // one went, one came
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Libsdformat,

@@ -11,13 +11,13 @@ describe("history", () => {
       history = new History((state) => states.push(state));
     const step = (name: string, good = true) => ({
       name,
-      apply: async () => {
+      apply: () => {
         said.push(`+${name}`);
-        return good;
+        return Promise.resolve(good);
       },
-      revert: async () => {
+      revert: () => {
         said.push(`-${name}`);
-        return good;
+        return Promise.resolve(good);
       },
     });
     return { said, states, history, step };

@@ -194,7 +194,9 @@ export class Rewind implements RunLink {
       this.entries.get(channel)?.shift();
       this.bytes -= size;
     }
-    if (this.first > 4096) (this.order.splice(0, this.first), (this.first = 0));
+    if (this.first <= 4096) return;
+    this.order.splice(0, this.first);
+    this.first = 0;
   }
 
   private tick(): void {
