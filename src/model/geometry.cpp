@@ -156,104 +156,144 @@ bool is_too_large(const Geometry& g, const Element& element, const std::string& 
   return true;
 }
 
-}  // namespace
+// Reads the shapes that are a few numbers. Converters write sizes of zero for what has no shape:
+// they are nothing. Negative sizes are errors.
+class SizedShape {
+ public:
+  SizedShape(const Element& shape, const std::string& where, Findings& findings)
+      : shape_(shape), where_(where), findings_(findings) {}
 
-std::optional<Geometry> read_geometry(const Element& element, const std::string& where,
-                                      ReadContext& context) {
+  std::optional<Geometry> box() { return of_vector(Shape::box, "size", "sizes"); }
+  std::optional<Geometry> ellipsoid() { return of_vector(Shape::ellipsoid, "radii", "radii"); }
+  std::optional<Geometry> sphere();
+  std::optional<Geometry> round(Shape kind);  // cylinder, capsule or cone
+  Geometry plane();
+
+ private:
+  std::optional<Geometry> of_vector(Shape kind, const char* name, const std::string& plural);
+  std::nullopt_t nothing(const char* name);
+  double required(const char* name) const;
+  void tell_default(const char* name, const std::string& value);
+
+  const Element& shape_;
+  const std::string& where_;
+  Findings& findings_;
+};
+
+std::nullopt_t SizedShape::nothing(const char* name) {
+  findings_.repaired(shape_.source, where_,
+                     "a <" + shape_.name + "> whose <" + name + "> is 0; the shape is left out");
+  return std::nullopt;
+}
+
+double SizedShape::required(const char* name) const {
+  if (!shape_.has(name)) shape_.fail(std::string("has no <") + name + ">");
+  return shape_.number(name, 0, Allowed::not_negative(quantity::kLength));
+}
+
+// Where SDF has a default, a file may rely on it.
+void SizedShape::tell_default(const char* name, const std::string& value) {
+  if (shape_.has(name)) return;
+  findings_.repaired(shape_.source, where_,
+                     "a <" + shape_.name + "> without <" + name + ">; it is " + value +
+                         " as in SDF's description");
+}
+
+std::optional<Geometry> SizedShape::of_vector(Shape kind, const char* name,
+                                              const std::string& plural) {
+  Geometry g;
+  g.shape = kind;
+  tell_default(name, "1 1 1");
+  g.size = shape_.vector3(name, Vec3::Ones(), Allowed::any(quantity::kLength));
+  if (g.size.minCoeff() < 0)
+    shape_.child(name)->fail("'" + shape_.child(name)->text + "' is not allowed; " + plural +
+                             " are above 0");
+  if (g.size.minCoeff() == 0) return nothing(name);
+  return g;
+}
+
+std::optional<Geometry> SizedShape::sphere() {
+  Geometry g;
+  g.shape = Shape::sphere;
+  tell_default("radius", "1");
+  g.size = Vec3::Constant(shape_.number("radius", 1, Allowed::not_negative(quantity::kLength)));
+  if (g.size.x() == 0) return nothing("radius");
+  return g;
+}
+
+std::optional<Geometry> SizedShape::round(Shape kind) {
+  Geometry g;
+  g.shape = kind;
+  const double radius = required("radius");
+  g.size = {radius, required("length"), 0};
+  if (g.size.x() == 0) return nothing("radius");
+  if (g.size.y() == 0 && kind != Shape::capsule) return nothing("length");
+  return g;
+}
+
+Geometry SizedShape::plane() {
+  Geometry g;
+  g.shape = Shape::plane;
+  const Vec3 normal = shape_.vector3("normal", Vec3::UnitZ(), Allowed::any(quantity::kFactor));
+  if (!(normal.norm() > 1e-9))
+    shape_.child("normal")->fail("'" + shape_.child("normal")->text +
+                                 "' is not allowed; a normal is not zero");
+  g.normal = normal.normalized();
+  const Element* size = shape_.child("size");
+  if (!size) return g;
+  std::vector<double> v = size->as_numbers(Allowed::any(quantity::kLength));
+  if (v.size() == 3) {  // of a box, which some files have here
+    findings_.repaired(size->source, where_,
+                       "<size> of a plane has two numbers; the third is left out");
+    v.pop_back();
+  }
+  if (v.size() != 2 || v[0] <= 0 || v[1] <= 0)
+    size->fail("'" + size->text + "' is not allowed; allowed are two numbers above 0");
+  g.extent = {v[0], v[1]};
+  return g;
+}
+
+// The one shape of a <geometry>; nullptr: it has none, or says so.
+const Element* shape_of(const Element& element) {
   const Element* shape = nullptr;
   for (const auto& child : element.children) {
-    if (child->name == "empty") return std::nullopt;
+    if (child->name == "empty") return nullptr;
     if (child->name.find(':') != std::string::npos)
       child->fail("is not allowed here; <geometry> has no elements of ruedo:");
     if (shape && child->name != "polyline") child->fail("is a second shape; <geometry> holds one");
     if (!shape) shape = child.get();
   }
+  return shape;
+}
+
+}  // namespace
+
+std::optional<Geometry> read_geometry(const Element& element, const std::string& where,
+                                      ReadContext& context) {
+  const Element* shape = shape_of(element);
   if (!shape) return std::nullopt;
-  // Converters write shapes of size zero for what has none: they are nothing. Negative sizes are
-  // errors.
-  const Allowed not_negative = Allowed::not_negative(quantity::kLength),
-                length = Allowed::any(quantity::kLength);
-  const auto nothing = [&](const char* name) {
-    context.findings.repaired(
-        shape->source, where,
-        "a <" + shape->name + "> whose <" + name + "> is 0; the shape is left out");
-    return std::nullopt;
-  };
-  const auto required = [&](const char* name) {
-    if (!shape->has(name)) shape->fail(std::string("has no <") + name + ">");
-    return shape->number(name, 0, not_negative);
-  };
-  // Where SDF has a default, a file may rely on it.
-  const auto or_default = [&](const char* name, const auto& value) {
-    if (!shape->has(name))
-      context.findings.repaired(shape->source, where,
-                                "a <" + shape->name + "> without <" + name + ">; it is " + value +
-                                    " as in SDF's description");
+  const auto unless_too_large = [&](std::optional<Geometry> g) {
+    return g && is_too_large(*g, *shape, where, context) ? std::nullopt : g;
   };
   const std::string& kind = shape->name;
-  Geometry g;
-  if (kind == "box") {
-    g.shape = Shape::box;
-    or_default("size", "1 1 1");
-    g.size = shape->vector3("size", Vec3::Ones(), length);
-    if (g.size.minCoeff() < 0)
-      shape->child("size")->fail("'" + shape->child("size")->text +
-                                 "' is not allowed; sizes are above 0");
-    if (g.size.minCoeff() == 0) return nothing("size");
-  } else if (kind == "sphere") {
-    g.shape = Shape::sphere;
-    or_default("radius", "1");
-    g.size = Vec3::Constant(shape->number("radius", 1, not_negative));
-    if (g.size.x() == 0) return nothing("radius");
-  } else if (kind == "cylinder" || kind == "capsule" || kind == "cone") {
-    g.shape = kind == "cylinder" ? Shape::cylinder : kind == "cone" ? Shape::cone : Shape::capsule;
-    g.size = {required("radius"), required("length"), 0};
-    if (g.size.x() == 0) return nothing("radius");
-    if (g.size.y() == 0 && kind != "capsule") return nothing("length");
-  } else if (kind == "ellipsoid") {
-    g.shape = Shape::ellipsoid;
-    or_default("radii", "1 1 1");
-    g.size = shape->vector3("radii", Vec3::Ones(), length);
-    if (g.size.minCoeff() < 0)
-      shape->child("radii")->fail("'" + shape->child("radii")->text +
-                                  "' is not allowed; radii are above 0");
-    if (g.size.minCoeff() == 0) return nothing("radii");
-  } else if (kind == "plane") {
-    g.shape = Shape::plane;
-    const Vec3 normal = shape->vector3("normal", Vec3::UnitZ(), Allowed::any(quantity::kFactor));
-    if (!(normal.norm() > 1e-9))
-      shape->child("normal")->fail("'" + shape->child("normal")->text +
-                                   "' is not allowed; a normal is not zero");
-    g.normal = normal.normalized();
-    if (const Element* size = shape->child("size")) {
-      std::vector<double> v = size->as_numbers(length);
-      if (v.size() == 3) {  // of a box, which some files have here
-        context.findings.repaired(size->source, where,
-                                  "<size> of a plane has two numbers; the third is left out");
-        v.pop_back();
-      }
-      if (v.size() != 2 || v[0] <= 0 || v[1] <= 0)
-        size->fail("'" + size->text + "' is not allowed; allowed are two numbers above 0");
-      g.extent = {v[0], v[1]};
-    }
-  } else if (kind == "mesh") {
-    std::optional<Geometry> mesh = read_mesh(*shape, where, context);
-    return mesh && is_too_large(*mesh, *shape, where, context) ? std::nullopt : mesh;
-  } else if (kind == "polyline") {
-    return read_polyline(element, *shape, where, context);
-  } else if (kind == "heightmap") {
-    std::optional<Geometry> ground = read_heightmap(*shape, where, context);
-    return ground && is_too_large(*ground, *shape, where, context) ? std::nullopt : ground;
-  } else {
-    const std::string near =
-        nearest_word(kind, {"box", "sphere", "cylinder", "capsule", "cone", "ellipsoid", "plane",
-                            "mesh", "polyline", "heightmap"});
-    context.findings.unsupported(shape->source, where,
-                                 "the shape <" + kind + "> is not supported and left out" +
-                                     (near.empty() ? "" : "; did you mean <" + near + ">?"));
-    return std::nullopt;
-  }
-  return g;
+  SizedShape sized(*shape, where, context.findings);
+  if (kind == "box") return sized.box();
+  if (kind == "sphere") return sized.sphere();
+  if (kind == "cylinder") return sized.round(Shape::cylinder);
+  if (kind == "capsule") return sized.round(Shape::capsule);
+  if (kind == "cone") return sized.round(Shape::cone);
+  if (kind == "ellipsoid") return sized.ellipsoid();
+  if (kind == "plane") return sized.plane();
+  if (kind == "mesh") return unless_too_large(read_mesh(*shape, where, context));
+  if (kind == "polyline") return read_polyline(element, *shape, where, context);
+  if (kind == "heightmap") return unless_too_large(read_heightmap(*shape, where, context));
+  const std::string near =
+      nearest_word(kind, {"box", "sphere", "cylinder", "capsule", "cone", "ellipsoid", "plane",
+                          "mesh", "polyline", "heightmap"});
+  context.findings.unsupported(shape->source, where,
+                               "the shape <" + kind + "> is not supported and left out" +
+                                   (near.empty() ? "" : "; did you mean <" + near + ">?"));
+  return std::nullopt;
 }
 
 Eigen::AlignedBox3d bounds(const Geometry& g) {

@@ -125,6 +125,65 @@ std::shared_ptr<const ScopedModel> SdfReader::read_overridden(const Element& mod
   return read_model(*copy, version);
 }
 
+namespace {
+
+// What of an <include> changes the model itself, not only where it stands.
+bool is_override(const Element& child) {
+  return child.name == "static" || child.name == "plugin" || child.name == "sensor" ||
+         child.name.rfind("ruedo:", 0) == 0;
+}
+
+// False also for <static> alone with the value that the model has: nothing is to be read again.
+bool changes_model(const Element& include, const Model& model) {
+  return std::any_of(include.children.begin(), include.children.end(), [&](const auto& child) {
+    return is_override(*child) &&
+           (child->name != "static" || include.boolean("static", false) != model.is_static);
+  });
+}
+
+// Equal for equal overrides (a fleet's), which share one model.
+std::string override_key(const std::string& path, const Element& include) {
+  std::string key = path;
+  for (const auto& child : include.children) {
+    if (child->name == "static")
+      key += "\nstatic " + child->text;
+    else if (is_override(*child))
+      key += "\n" + child->source.str();
+  }
+  return key;
+}
+
+void report_not_found(const Element& element, const std::string& uri, const std::string& where,
+                      ReadContext& context) {
+  if (uri.rfind("https://fuel.", 0) == 0 || uri.rfind("http://fuel.", 0) == 0) {
+    context.findings.error(element.source,
+                           where + " " + uri,  // one text, so that they are one list
+                           "models of Fuel that are not here; the world goes on without them. "
+                           "`gz fuel download -u URI` fetches each");
+    return;
+  }
+  context.findings.error(element.source, where,
+                         "'" + uri + "' " + context.resources.why_not(uri, element.source.file) +
+                             "; the world goes on without it");
+}
+
+// The model where <pose> and <placement_frame> of the <include> put it.
+std::shared_ptr<const ScopedModel> placed_by(const Element& include,
+                                             std::shared_ptr<const ScopedModel> model) {
+  if (!include.has("pose") && !include.has("placement_frame")) return model;
+  auto placed = std::make_shared<ScopedModel>(*model);
+  if (include.has("pose")) {
+    placed->pose = include.pose("pose");
+    placed->relative_to = relative_to(include);
+  }
+  placed->placement_frame = include.string("placement_frame", model->placement_frame);
+  if (include.has("placement_frame") && !include.has("pose"))
+    include.child("placement_frame")->fail("needs a <pose> beside it");
+  return placed;
+}
+
+}  // namespace
+
 std::optional<SdfReader::Included> SdfReader::include(const Element& element,
                                                       const std::string& where) {
   report_other_children(
@@ -141,67 +200,26 @@ std::optional<SdfReader::Included> SdfReader::include(const Element& element,
   if (!uri || uri->text.empty()) element.fail("has no <uri>");
   const auto path = context_.resources.find_model(uri->text, element.source.file);
   if (!path) {
-    if (uri->text.rfind("https://fuel.", 0) == 0 ||
-        uri->text.rfind("http://fuel.", 0) == 0) {  // one text, so that they are one list
-      context_.findings.error(element.source, where + " " + uri->text,
-                              "models of Fuel that are not here; the world goes on without them. "
-                              "`gz fuel download -u URI` fetches each");
-      return std::nullopt;
-    }
-    context_.findings.error(element.source, where,
-                            "'" + uri->text + "' " +
-                                context_.resources.why_not(uri->text, element.source.file) +
-                                "; the world goes on without it");
+    report_not_found(element, uri->text, where, context_);
     return std::nullopt;
   }
   Included result = read_file(*path, element);
-  const bool overridden =
-      std::any_of(element.children.begin(), element.children.end(), [](const auto& child) {
-        return child->name == "static" || child->name == "plugin" || child->name == "sensor" ||
-               child->name.rfind("ruedo:", 0) == 0;
-      });
-  if (overridden && result.model) {
-    // <static> alone, with the value that the model has: nothing to read again.
-    const bool only_static =
-        element.has("static") && !element.has("plugin") && !element.has("sensor") &&
-        element.boolean("static", false) == result.model->model->is_static &&
-        std::none_of(element.children.begin(), element.children.end(),
-                     [](const auto& child) { return child->name.rfind("ruedo:", 0) == 0; });
-    if (!only_static) {
-      enter(*path, element);
-      // Equal overrides (a fleet's) share one model, too.
-      std::string key = *path;
-      for (const auto& child : element.children) {
-        if (child->name == "static")
-          key += "\nstatic " + child->text;
-        else if (child->name == "plugin" || child->name == "sensor" ||
-                 child->name.rfind("ruedo:", 0) == 0)
-          key += "\n" + child->source.str();
-      }
-      if (const auto known = cache_.find(key); known != cache_.end()) {
-        result = known->second;
-      } else {
-        result.model = read_overridden(*result.document->child("model"), element, result.version);
-        cache_[key] = result;
-      }
-      leave();
+  if (result.model && changes_model(element, *result.model->model)) {
+    enter(*path, element);
+    const std::string key = override_key(*path, element);
+    if (const auto known = cache_.find(key); known != cache_.end()) {
+      result = known->second;
+    } else {
+      result.model = read_overridden(*result.document->child("model"), element, result.version);
+      cache_[key] = result;
     }
+    leave();
   }
   if (const Element* name = element.child("name")) {
     if (name->text.empty()) name->fail("is empty");
     result.name = name->text;
   }
-  if (result.model && (element.has("pose") || element.has("placement_frame"))) {
-    auto placed = std::make_shared<ScopedModel>(*result.model);
-    if (element.has("pose")) {
-      placed->pose = element.pose("pose");
-      placed->relative_to = relative_to(element);
-    }
-    placed->placement_frame = element.string("placement_frame", result.model->placement_frame);
-    if (element.has("placement_frame") && !element.has("pose"))
-      element.child("placement_frame")->fail("needs a <pose> beside it");
-    result.model = std::move(placed);
-  }
+  if (result.model) result.model = placed_by(element, std::move(result.model));
   return result;
 }
 

@@ -126,6 +126,81 @@ std::string joint_end(const Element& joint, const char* which) {
                                          : joint.string(which, "");
 }
 
+namespace {
+
+JointType read_type(const Element& element, const std::string& where, Findings& findings) {
+  const std::string* type = element.attribute("type");
+  if (!type) element.fail("has no type");
+  static const std::vector<std::pair<std::string, JointType>> kTypes = {
+      {"fixed", JointType::fixed},
+      {"revolute", JointType::revolute},
+      {"continuous", JointType::continuous},
+      {"prismatic", JointType::prismatic},
+      {"ball", JointType::ball},
+      {"universal", JointType::universal},
+      {"revolute2", JointType::universal},
+      {"screw", JointType::screw}};
+  for (const auto& [name, value] : kTypes) {
+    if (*type == name) return value;
+  }
+  if (*type != "gearbox" && *type != "planar" && *type != "floating") {
+    std::vector<std::string> names;
+    for (const auto& each : kTypes) names.push_back(each.first);
+    const std::string near = nearest_word(*type, names);
+    element.fail("type '" + *type +
+                 "' is not allowed; allowed are fixed, revolute, continuous, prismatic, ball, "
+                 "universal, screw" +
+                 (near.empty() ? "" : "; did you mean '" + near + "'?"));
+  }
+  findings.unsupported(element.source, where,
+                       "joints of type '" + *type + "' are not supported; this one is held fixed");
+  return Joint().type;
+}
+
+// <parent> or <child>, which must name something.
+const Element& named_end(const Element& element, const char* which) {
+  const Element* found = element.child(which);
+  if (!found) element.fail(std::string("has no <") + which + ">");
+  if (joint_end(element, which).empty()) found->fail("is empty; the name of a link is needed");
+  return *found;
+}
+
+void read_ends(const Element& element, FrameGraph& frames, const std::vector<Link>& links,
+               Joint& joint) {
+  const Element &parent = named_end(element, "parent"), &child = named_end(element, "child");
+  const std::string parent_name = joint_end(element, "parent"),
+                    child_name = joint_end(element, "child");
+  if (child_name == "world") child.fail("'world' is not allowed as the child of a joint");
+  joint.parent = parent_name == "world" ? -1 : frames.link(parent_name, parent);
+  joint.child = frames.link(child_name, child);
+  if (joint.child < 0) child.fail("'" + child_name + "' is not part of a link");
+  if (joint.parent < 0 && parent_name != "world")
+    parent.fail("'" + parent_name + "' is not part of a link");
+  if (joint.parent == joint.child)
+    element.fail("joins the link '" + links[static_cast<size_t>(joint.child)].name + "' to itself");
+}
+
+void read_axes(const Element& element, SdfVersion version, FrameGraph& frames,
+               const std::string& where, ReadContext& context, Joint& joint) {
+  const bool needs_axis = joint.type == JointType::revolute ||
+                          joint.type == JointType::continuous ||
+                          joint.type == JointType::prismatic || joint.type == JointType::screw;
+  if (const Element* axis = element.child("axis")) {
+    if (joint.type != JointType::fixed && joint.type != JointType::ball)
+      joint.axis = read_axis(*axis, version, joint.X_MJ, frames, joint, where + "/axis", context);
+  } else if (needs_axis) {
+    element.fail("has no <axis>; joints of type '" + *element.attribute("type") + "' need one");
+  }
+  if (joint.type == JointType::screw) joint.advance = read_advance(element);
+  if (joint.type != JointType::universal) return;
+  if (const Element* axis2 = element.child("axis2"))
+    joint.axis2 = read_axis(*axis2, version, joint.X_MJ, frames, joint, where + "/axis2", context);
+  else
+    joint.axis2.axis_in_J = Vec3::UnitX();
+}
+
+}  // namespace
+
 Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
                  const std::vector<Link>& links, const std::string& where, ReadContext& context) {
   report_other_children(
@@ -140,75 +215,10 @@ Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
   Joint joint;
   joint.name = dotted(required_name(element));
   joint.source = element.source;
-  const std::string* type = element.attribute("type");
-  if (!type) element.fail("has no type");
-  static const std::vector<std::pair<std::string, JointType>> kTypes = {
-      {"fixed", JointType::fixed},
-      {"revolute", JointType::revolute},
-      {"continuous", JointType::continuous},
-      {"prismatic", JointType::prismatic},
-      {"ball", JointType::ball},
-      {"universal", JointType::universal},
-      {"revolute2", JointType::universal},
-      {"screw", JointType::screw}};
-  bool known = false;
-  for (const auto& [name, value] : kTypes) {
-    if (*type == name) joint.type = value, known = true;
-  }
-  if (!known) {
-    if (*type != "gearbox" && *type != "planar" && *type != "floating") {
-      std::vector<std::string> names;
-      for (const auto& each : kTypes) names.push_back(each.first);
-      const std::string near = nearest_word(*type, names);
-      element.fail("type '" + *type +
-                   "' is not allowed; allowed are fixed, revolute, continuous, prismatic, ball, "
-                   "universal, screw" +
-                   (near.empty() ? "" : "; did you mean '" + near + "'?"));
-    }
-    context.findings.unsupported(
-        element.source, where,
-        "joints of type '" + *type + "' are not supported; this one is held fixed");
-  }
-
-  const auto end = [&](const char* which) -> const Element& {
-    const Element* found = element.child(which);
-    if (!found) element.fail(std::string("has no <") + which + ">");
-    if (joint_end(element, which).empty()) found->fail("is empty; the name of a link is needed");
-    return *found;
-  };
-  const Element &parent = end("parent"), &child = end("child");
-  const std::string parent_name = joint_end(element, "parent"),
-                    child_name = joint_end(element, "child");
-  if (child_name == "world") child.fail("'world' is not allowed as the child of a joint");
-  joint.parent = parent_name == "world" ? -1 : frames.link(parent_name, parent);
-  joint.child = frames.link(child_name, child);
-  if (joint.child < 0) child.fail("'" + child_name + "' is not part of a link");
-  if (joint.parent < 0 && parent_name != "world")
-    parent.fail("'" + parent_name + "' is not part of a link");
-  if (joint.parent == joint.child) {
-    element.fail("joins the link '" + links[static_cast<size_t>(joint.child)].name + "' to itself");
-  }
+  joint.type = read_type(element, where, context.findings);
+  read_ends(element, frames, links, joint);
   joint.X_MJ = frames.pose(required_name(element), element);
-
-  const bool needs_axis = joint.type == JointType::revolute ||
-                          joint.type == JointType::continuous ||
-                          joint.type == JointType::prismatic || joint.type == JointType::screw;
-  if (const Element* axis = element.child("axis")) {
-    if (joint.type != JointType::fixed && joint.type != JointType::ball) {
-      joint.axis = read_axis(*axis, version, joint.X_MJ, frames, joint, where + "/axis", context);
-    }
-  } else if (needs_axis) {
-    element.fail("has no <axis>; joints of type '" + *type + "' need one");
-  }
-  if (joint.type == JointType::screw) joint.advance = read_advance(element);
-  if (joint.type == JointType::universal) {
-    if (const Element* axis2 = element.child("axis2")) {
-      joint.axis2 =
-          read_axis(*axis2, version, joint.X_MJ, frames, joint, where + "/axis2", context);
-    } else {
-      joint.axis2.axis_in_J = Vec3::UnitX();
-    }
-  }
+  read_axes(element, version, frames, where, context, joint);
   return joint;
 }
 

@@ -108,265 +108,362 @@ void read_joint_sensor(const Element& element, FrameGraph& frames, Model& model)
 
 }  // namespace
 
+// Reads one <model>: first the names of all its parts, then their poses, since frames may be
+// written in any order.
+class SdfReader::ModelReader {
+ public:
+  ModelReader(SdfReader& reader, const Element& element, SdfVersion version)
+      : reader_(reader),
+        findings_(reader.context_.findings),
+        element_(element),
+        version_(version),
+        where_("model " + required_name(element)),
+        frames_(where_) {}
+
+  // nullptr: it has no link, which is told.
+  std::shared_ptr<const ScopedModel> read();
+
+ private:
+  void read_attributes();
+  // Names and frames.
+  void read_parts();
+  void read_part(const Element& child);
+  FrameGraph::Node framed(const Element& child) const;
+  FrameGraph::Node link_node(const Element& child);
+  FrameGraph::Node attached_node(const Element& child, const std::string& attached_to) const;
+  std::optional<FrameGraph::Node> nested_node(const Element& child);
+  std::optional<Nested> nested_part(const Element& child);
+  // Links and joints, where the frames are.
+  void append_links();
+  void append_link(const Element& child);
+  void append_part(const Nested& part, const Element& child);
+  void read_joints();
+  void read_joint_and_sensors(const Element& child);
+  bool lacks_an_end(const Element& joint);
+  void read_plugin_sensors();
+  // What is said of the whole.
+  void export_frames();
+  int canonical_link();
+  void read_path();
+
+  SdfReader& reader_;
+  Findings& findings_;
+  const Element& element_;
+  SdfVersion version_;
+  std::string where_;
+  FrameGraph frames_;
+  std::shared_ptr<ScopedModel> scope_ = std::make_shared<ScopedModel>();
+  std::shared_ptr<Model> model_ = std::make_shared<Model>();
+  std::vector<Nested> nested_;
+  size_t link_count_ = 0;
+  int first_own_link_ = -1;
+  bool parts_missing_ = false;
+  bool all_static_ = true;             // all that it consists of
+  std::set<const Element*> left_out_;  // children
+  std::vector<Joint> anchors_;
+};
+
 std::shared_ptr<const ScopedModel> SdfReader::read_model(const Element& element,
                                                          SdfVersion version) {
-  auto scope = std::make_shared<ScopedModel>();
-  auto model = std::make_shared<Model>();
-  model->name = required_name(element);
-  const std::string where = "model " + model->name;
-  report_other_children(element,
+  return ModelReader(*this, element, version).read();
+}
+
+std::shared_ptr<const ScopedModel> SdfReader::ModelReader::read() {
+  read_attributes();
+  read_parts();
+  if (link_count_ == 0) {
+    findings_.error(element_.source, where_, "it has no link; the model is left out");
+    return nullptr;
+  }
+  append_links();
+  if (all_static_) model_->is_static = true;
+  read_joints();
+  if (!model_->is_static)
+    model_->joints.insert(model_->joints.end(), anchors_.begin(), anchors_.end());
+  read_plugin_sensors();
+  read_labels_and_temperatures(element_, where_, findings_, *model_);
+  export_frames();
+  bring_to_front(canonical_link(), *scope_, *model_);
+  make_sensor_names_unique(*model_, where_, findings_);
+  read_drive_of(element_, where_, reader_.context_, *model_);
+  model_->commanded |= element_.has("ruedo:joints");
+  model_->commanded &=
+      !model_->is_static &&
+      std::any_of(model_->joints.begin(), model_->joints.end(),
+                  [](const Joint& joint) { return joint.type != JointType::fixed; });
+  read_path();
+  scope_->model = std::move(model_);
+  return scope_;
+}
+
+void SdfReader::ModelReader::read_attributes() {
+  model_->name = required_name(element_);
+  report_other_children(element_,
                         {"link", "joint", "frame", "model", "include", "pose", "static",
                          "self_collide", "plugin", "ruedo:drive", "ruedo:joints", "ruedo:odometry",
                          "ruedo:path", "ruedo:belt", "ruedo:door", "transmission", "ros2_control"},
-                        {"allow_auto_disable", "enable_wind"}, where, context_.findings);
-  model->source = element.source;
-  model->is_static = element.boolean("static", false);
-  model->self_collide = element.boolean("self_collide", false);
-  scope->pose = element.pose("pose");
-  scope->relative_to = relative_to(element);
-  if (const std::string* frame = element.attribute("placement_frame"))
-    scope->placement_frame = *frame;
+                        {"allow_auto_disable", "enable_wind"}, where_, findings_);
+  model_->source = element_.source;
+  model_->is_static = element_.boolean("static", false);
+  model_->self_collide = element_.boolean("self_collide", false);
+  scope_->pose = element_.pose("pose");
+  scope_->relative_to = relative_to(element_);
+  if (const std::string* frame = element_.attribute("placement_frame"))
+    scope_->placement_frame = *frame;
+}
 
-  // First all names, then poses: frames may be written in any order.
-  FrameGraph frames(where);
-  std::vector<const Element*> links;
-  std::vector<Nested> nested;
-  size_t link_count = 0;
-  int first_own_link = -1;
-  bool parts_missing = false;
-  std::set<const Element*> left_out;
-  const auto read_part = [&](const Element* child) {
-    FrameGraph::Node node;
-    node.element = child;
-    // A frame may be named like something else; everything else may not.
-    const auto is_taken = [&] { return child->name == "frame" && frames.has(node.name); };
-    if (child->name == "link") {
-      node.name = required_name(*child);
-      if (frames.has(node.name)) frames.add(std::move(node));  // throws
-      node.pose = child->pose("pose");
-      node.relative_to = relative_to(*child);
-      node.link = static_cast<int>(link_count++);
-      if (first_own_link < 0) first_own_link = node.link;
-    } else if (child->name == "joint") {
-      node.name = required_name(*child);
-      node.pose = child->pose("pose");
-      node.relative_to = relative_to(*child);
-      node.attached_to = joint_end(*child, "child");
-      if (node.relative_to.empty()) node.relative_to = node.attached_to;
-    } else if (child->name == "frame") {
-      node.name = required_name(*child);
-      node.pose = child->pose("pose");
-      node.relative_to = relative_to(*child);
-      if (const std::string* frame = child->attribute("attached_to")) node.attached_to = *frame;
-      if (node.relative_to.empty()) node.relative_to = node.attached_to;
-    } else if (child->name == "model" || child->name == "include") {
-      Nested part;
-      part.where = where;
-      if (child->name == "model") {
-        part.scope = read_model(*child, version);
-        part.name = required_name(*child);
-      } else {
-        auto included = include(*child, where + "/include");
-        if (included && !included->model)
-          child->fail("is no model; a model can include models only");
-        if (included) part.scope = included->model, part.name = included->name;
-        const std::string* merge = child->attribute("merge");
-        part.merged = merge && (*merge == "true" || *merge == "1");
-      }
-      if (!part.scope) {
-        parts_missing = true;
-        return;
-      }
-      part.first_link = link_count;
-      node.name = part.merged ? "__merged " + std::to_string(nested.size()) + "__" : part.name;
-      node.pose = part.scope->pose;
-      node.relative_to = part.scope->relative_to;
-      node.placement_frame = part.scope->placement_frame;
-      node.scope = part.scope;
-      node.first_link = static_cast<int>(link_count);
-      node.merged = part.merged;
-      part.name = node.name;
-      link_count += part.scope->model->links.size();
-      nested.push_back(std::move(part));
-    } else {
-      return;
-    }
-    if (is_taken()) child->fail("the name '" + node.name + "' is taken in " + where);
-    frames.add(std::move(node));
-    if (link_count > kMaxLinks)
-      throw TooLarge(child->source, "<" + child->name + ">: the model has more than " +
-                                        std::to_string(kMaxLinks) + " links");
-  };
+void SdfReader::ModelReader::read_parts() {
   std::vector<const Element*> in_order;  // frames last: of two of one name the frame goes
   for (const bool is_frame : {false, true}) {
-    for (const auto& child : element.children) {
+    for (const auto& child : element_.children) {
       if ((child->name == "frame") == is_frame) in_order.push_back(child.get());
     }
   }
   for (const Element* child : in_order) {
-    const size_t open_files = files_.size(), links_before = link_count,
-                 nested_before = nested.size();
+    const size_t open_files = reader_.files_.size(), links_before = link_count_,
+                 nested_before = nested_.size();
     const std::string what =
         child->name == "include" || child->name == "model" ? "part" : child->name;
-    if (read_or_leave_out(where, "the " + what + " is left out", context_.findings,
-                          [&] { read_part(child); }))
+    if (read_or_leave_out(where_, "the " + what + " is left out", findings_,
+                          [&] { read_part(*child); }))
       continue;
-    files_.resize(open_files);
-    link_count = links_before;
-    nested.resize(nested_before);
-    left_out.insert(child);
-    parts_missing |= what != "frame";
+    reader_.files_.resize(open_files);
+    link_count_ = links_before;
+    nested_.resize(nested_before);
+    left_out_.insert(child);
+    parts_missing_ |= what != "frame";
   }
-  if (link_count == 0) {
-    context_.findings.error(element.source, where, "it has no link; the model is left out");
-    return nullptr;
-  }
+}
 
-  // Links and nested models in the file's order, as the indices were given.
-  std::vector<Joint> anchors;
+void SdfReader::ModelReader::read_part(const Element& child) {
+  std::optional<FrameGraph::Node> node;
+  if (child.name == "link") {
+    node = link_node(child);
+  } else if (child.name == "joint") {
+    node = attached_node(child, joint_end(child, "child"));
+  } else if (child.name == "frame") {
+    const std::string* frame = child.attribute("attached_to");
+    node = attached_node(child, frame ? *frame : "");
+    // A frame may be named like something else, which is told; everything else may not.
+    if (frames_.has(node->name)) child.fail("the name '" + node->name + "' is taken in " + where_);
+  } else if (child.name == "model" || child.name == "include") {
+    node = nested_node(child);
+  }
+  if (!node) return;
+  frames_.add(std::move(*node));
+  if (link_count_ > kMaxLinks)
+    throw TooLarge(child.source, "<" + child.name + ">: the model has more than " +
+                                     std::to_string(kMaxLinks) + " links");
+}
+
+// What is called and placed as its element says.
+FrameGraph::Node SdfReader::ModelReader::framed(const Element& child) const {
+  FrameGraph::Node node;
+  node.element = &child;
+  node.name = required_name(child);
+  node.pose = child.pose("pose");
+  node.relative_to = relative_to(child);
+  return node;
+}
+
+FrameGraph::Node SdfReader::ModelReader::link_node(const Element& child) {
+  FrameGraph::Node node = framed(child);
+  if (frames_.has(node.name)) frames_.add(std::move(node));  // throws
+  node.link = static_cast<int>(link_count_++);
+  if (first_own_link_ < 0) first_own_link_ = node.link;
+  return node;
+}
+
+FrameGraph::Node SdfReader::ModelReader::attached_node(const Element& child,
+                                                       const std::string& attached_to) const {
+  FrameGraph::Node node = framed(child);
+  node.attached_to = attached_to;
+  if (node.relative_to.empty()) node.relative_to = attached_to;
+  return node;
+}
+
+// nullopt: the part is missing, which is told.
+std::optional<FrameGraph::Node> SdfReader::ModelReader::nested_node(const Element& child) {
+  std::optional<Nested> part = nested_part(child);
+  if (!part) {
+    parts_missing_ = true;
+    return std::nullopt;
+  }
+  FrameGraph::Node node;
+  node.element = &child;
+  node.name = part->merged ? "__merged " + std::to_string(nested_.size()) + "__" : part->name;
+  node.pose = part->scope->pose;
+  node.relative_to = part->scope->relative_to;
+  node.placement_frame = part->scope->placement_frame;
+  node.scope = part->scope;
+  node.first_link = static_cast<int>(link_count_);
+  node.merged = part->merged;
+  part->name = node.name;
+  part->first_link = link_count_;
+  link_count_ += part->scope->model->links.size();
+  nested_.push_back(std::move(*part));
+  return node;
+}
+
+std::optional<Nested> SdfReader::ModelReader::nested_part(const Element& child) {
+  Nested part;
+  part.where = where_;
+  if (child.name == "model") {
+    part.scope = reader_.read_model(child, version_);
+    part.name = required_name(child);
+  } else {
+    auto included = reader_.include(child, where_ + "/include");
+    if (included && !included->model) child.fail("is no model; a model can include models only");
+    if (included) part.scope = included->model, part.name = included->name;
+    const std::string* merge = child.attribute("merge");
+    part.merged = merge && (*merge == "true" || *merge == "1");
+  }
+  if (!part.scope) return std::nullopt;
+  return part;
+}
+
+// Links and nested models in the file's order, as the indices were given.
+void SdfReader::ModelReader::append_links() {
   size_t next_nested = 0;
-  bool all_static = true;
-  for (const auto& child : element.children) {
-    if (left_out.count(child.get())) continue;
+  for (const auto& child : element_.children) {
+    if (left_out_.count(child.get())) continue;
     if (child->name == "link") {
-      all_static = false;
-      const Pose X_ML = frames.pose(required_name(*child), *child);
-      const auto in_link = [&](const Element& owner) {
-        const std::string frame = relative_to(owner);
-        const Pose pose = owner.pose("pose");
-        return frame.empty() ? pose : X_ML.inverse() * (frames.pose(frame, owner) * pose);
-      };
-      const int index = static_cast<int>(model->links.size());
-      Link link = read_link(*child, in_link, where + "/link " + required_name(*child), context_,
-                            index, model->sensors);
-      link.name = dotted(link.name);
-      link.X_ML = X_ML;
-      model->links.push_back(std::move(link));
-    } else if (next_nested < nested.size() &&
+      append_link(*child);
+    } else if (next_nested < nested_.size() &&
                (child->name == "model" || child->name == "include") &&
-               model->links.size() == nested[next_nested].first_link) {
-      const Nested& part = nested[next_nested];
+               model_->links.size() == nested_[next_nested].first_link) {
+      const Nested& part = nested_[next_nested];
       // A part that is missing left no entry: this one is told by whose element it is.
-      if (!frames.is_from(part.name, *child)) continue;
+      if (!frames_.is_from(part.name, *child)) continue;
       ++next_nested;
-      const Pose X_MN = frames.pose(part.name, *child);
-      append_nested(part, X_MN, *model, context_.findings);
-      if (part.scope->model->is_static) {
-        for (size_t i = 0; i < part.scope->model->links.size(); ++i) {
-          const int link = static_cast<int>(part.first_link + i);
-          anchors.push_back(anchor(model->links[static_cast<size_t>(link)].name, link,
-                                   model->links[static_cast<size_t>(link)].X_ML, child->source));
-        }
-      } else {
-        all_static = false;
-      }
+      append_part(part, *child);
     }
   }
-  if (all_static) model->is_static = true;
+}
 
-  read_joints(element, version, frames, left_out, parts_missing, where, *model);
-  if (!model->is_static) model->joints.insert(model->joints.end(), anchors.begin(), anchors.end());
+void SdfReader::ModelReader::append_link(const Element& child) {
+  all_static_ = false;
+  const Pose X_ML = frames_.pose(required_name(child), child);
+  const auto in_link = [&](const Element& owner) {
+    const std::string frame = relative_to(owner);
+    const Pose pose = owner.pose("pose");
+    return frame.empty() ? pose : X_ML.inverse() * (frames_.pose(frame, owner) * pose);
+  };
+  const int index = static_cast<int>(model_->links.size());
+  Link link = read_link(child, in_link, where_ + "/link " + required_name(child), reader_.context_,
+                        index, model_->sensors);
+  link.name = dotted(link.name);
+  link.X_ML = X_ML;
+  model_->links.push_back(std::move(link));
+}
 
-  read_plugin_sensors(element, frames, where, *model);
-  read_labels_and_temperatures(element, where, context_.findings, *model);
+void SdfReader::ModelReader::append_part(const Nested& part, const Element& child) {
+  append_nested(part, frames_.pose(part.name, child), *model_, findings_);
+  if (!part.scope->model->is_static) {
+    all_static_ = false;
+    return;
+  }
+  for (size_t i = part.first_link; i < part.first_link + part.scope->model->links.size(); ++i)
+    anchors_.push_back(
+        anchor(model_->links[i].name, static_cast<int>(i), model_->links[i].X_ML, child.source));
+}
 
-  // Every name's pose and link, for whoever nests or places this model.
-  for (const std::string& name : frames.names()) {
-    read_or_leave_out(where, "the frame '" + name + "' is left out", context_.findings, [&] {
-      scope->frames[name] = {frames.pose(name, element), frames.link(name, element)};
+// Every name's pose and link, for whoever nests or places this model.
+void SdfReader::ModelReader::export_frames() {
+  for (const std::string& name : frames_.names()) {
+    read_or_leave_out(where_, "the frame '" + name + "' is left out", findings_, [&] {
+      scope_->frames[name] = {frames_.pose(name, element_), frames_.link(name, element_)};
     });
   }
-  int canonical = first_own_link >= 0 ? first_own_link : 0;
-  if (const std::string* name = element.attribute("canonical_link"); name && !name->empty()) {
-    read_or_leave_out(where, "its first link is taken", context_.findings, [&] {
-      const int link = frames.link(*name, element);
-      if (link < 0) element.fail("canonical_link '" + *name + "' is no link");
+}
+
+int SdfReader::ModelReader::canonical_link() {
+  int canonical = std::max(first_own_link_, 0);
+  if (const std::string* name = element_.attribute("canonical_link"); name && !name->empty()) {
+    read_or_leave_out(where_, "its first link is taken", findings_, [&] {
+      const int link = frames_.link(*name, element_);
+      if (link < 0) element_.fail("canonical_link '" + *name + "' is no link");
       canonical = link;
     });
   }
-  bring_to_front(canonical, *scope, *model);
-  make_sensor_names_unique(*model, where, context_.findings);
-  read_drive_of(element, where, context_, *model);
-  model->commanded |= element.has("ruedo:joints");
-  model->commanded &= !model->is_static && std::any_of(model->joints.begin(), model->joints.end(),
-                                                       [](const Joint& joint) {
-                                                         return joint.type != JointType::fixed;
-                                                       });
-  for (const char* name : {"ruedo:path", "ruedo:belt", "ruedo:door"}) {
-    const Element* path = element.child(name);
-    if (!path) continue;
-    if (model->path) path->fail("a model has one of <ruedo:path>, <ruedo:belt> and <ruedo:door>");
-    if (path->name == "ruedo:path") path->refuse_unknown({"ruedo:waypoint", "ruedo:loop"}, false);
-    model->path = path->clone();
-    model->is_static = false;
-  }
-  if (model->path) {
-    for (Link& link : model->links) link.kinematic = true;
-  }
-  scope->model = std::move(model);
-  return scope;
+  return canonical;
 }
 
-void SdfReader::read_plugin_sensors(const Element& element, FrameGraph& frames,
-                                    const std::string& where, Model& model) {
-  for (const Element* plugin : element.all("plugin")) {
-    read_or_leave_out(where, "the sensor is left out", context_.findings, [&] {
-      const PluginSensor made = sensor_from_plugin(*plugin, where, context_.findings);
+void SdfReader::ModelReader::read_path() {
+  for (const char* name : {"ruedo:path", "ruedo:belt", "ruedo:door"}) {
+    const Element* path = element_.child(name);
+    if (!path) continue;
+    if (model_->path) path->fail("a model has one of <ruedo:path>, <ruedo:belt> and <ruedo:door>");
+    if (path->name == "ruedo:path") path->refuse_unknown({"ruedo:waypoint", "ruedo:loop"}, false);
+    model_->path = path->clone();
+    model_->is_static = false;
+  }
+  if (!model_->path) return;
+  for (Link& link : model_->links) link.kinematic = true;
+}
+
+void SdfReader::ModelReader::read_plugin_sensors() {
+  for (const Element* plugin : element_.all("plugin")) {
+    read_or_leave_out(where_, "the sensor is left out", findings_, [&] {
+      const PluginSensor made = sensor_from_plugin(*plugin, where_, findings_);
       if (!made.sensor) return;
       const Pose pose = made.sensor->pose("pose");
       if (made.joint.empty()) {
-        const int link = made.link.empty() ? 0 : frames.link(made.link, *plugin);
+        const int link = made.link.empty() ? 0 : frames_.link(made.link, *plugin);
         if (link < 0) plugin->fail("'" + made.link + "' is no link");
-        model.sensors.push_back(read_sensor(*made.sensor, link, pose));
+        model_->sensors.push_back(read_sensor(*made.sensor, link, pose));
         return;
       }
       const auto joint =
-          std::find_if(model.joints.begin(), model.joints.end(),
+          std::find_if(model_->joints.begin(), model_->joints.end(),
                        [&](const Joint& each) { return each.name == dotted(made.joint); });
-      if (joint == model.joints.end()) plugin->fail("'" + made.joint + "' is no joint");
-      model.sensors.push_back(joint_sensor(*made.sensor, *joint, joint->X_MJ * pose, model));
+      if (joint == model_->joints.end()) plugin->fail("'" + made.joint + "' is no joint");
+      model_->sensors.push_back(joint_sensor(*made.sensor, *joint, joint->X_MJ * pose, *model_));
     });
   }
 }
 
-void SdfReader::read_joints(const Element& element, SdfVersion version, FrameGraph& frames,
-                            const std::set<const Element*>& left_out, bool parts_missing,
-                            const std::string& where, Model& model) {
-  for (const auto& child : element.children) {
-    if (child->name != "joint" || left_out.count(child.get())) continue;
-    const std::string name = required_name(*child), here = where + "/joint " + name;
-    if (parts_missing) {
-      // What was not found may have held its links.
-      const std::string parent = joint_end(*child, "parent"), end = joint_end(*child, "child");
-      if ((parent != "world" && !frames.has(parent)) || !frames.has(end)) {
-        context_.findings.error(
-            child->source, here,
-            "it joins a link of a part that was not found; the joint is left out");
-        frames.drop(name);
-        continue;
-      }
-    }
-    const bool read = read_or_leave_out(here, "the joint is left out", context_.findings, [&] {
-      model.joints.push_back(read_joint(*child, version, frames, model.links, here, context_));
-    });
-    if (!read) {
-      frames.drop(name);
-      continue;
-    }
-    for (const Element* sensor : child->all("sensor")) {
-      read_or_leave_out(here, "the sensor is left out", context_.findings,
-                        [&] { read_joint_sensor(*sensor, frames, model); });
-    }
+void SdfReader::ModelReader::read_joints() {
+  for (const auto& child : element_.children) {
+    if (child->name == "joint" && !left_out_.count(child.get())) read_joint_and_sensors(*child);
   }
-  for (const auto& child : element.children) {
+  for (const auto& child : element_.children) {
     if (child->name != "joint") continue;
     const std::string name = dotted(required_name(*child));
-    const auto joint = std::find_if(model.joints.begin(), model.joints.end(),
+    const auto joint = std::find_if(model_->joints.begin(), model_->joints.end(),
                                     [&](const Joint& each) { return each.name == name; });
-    if (joint == model.joints.end()) continue;
-    read_or_leave_out(where + "/joint " + name, "the joint moves on its own", context_.findings,
-                      [&] { read_mimic(*child, model.joints, *joint); });
+    if (joint == model_->joints.end()) continue;
+    read_or_leave_out(where_ + "/joint " + name, "the joint moves on its own", findings_,
+                      [&] { read_mimic(*child, model_->joints, *joint); });
   }
+}
+
+void SdfReader::ModelReader::read_joint_and_sensors(const Element& child) {
+  const std::string name = required_name(child), here = where_ + "/joint " + name;
+  if (parts_missing_ && lacks_an_end(child)) {
+    findings_.error(child.source, here,
+                    "it joins a link of a part that was not found; the joint is left out");
+    frames_.drop(name);
+    return;
+  }
+  const bool read = read_or_leave_out(here, "the joint is left out", findings_, [&] {
+    model_->joints.push_back(
+        read_joint(child, version_, frames_, model_->links, here, reader_.context_));
+  });
+  if (!read) {
+    frames_.drop(name);
+    return;
+  }
+  for (const Element* sensor : child.all("sensor")) {
+    read_or_leave_out(here, "the sensor is left out", findings_,
+                      [&] { read_joint_sensor(*sensor, frames_, *model_); });
+  }
+}
+
+// What was not found may have held its links.
+bool SdfReader::ModelReader::lacks_an_end(const Element& joint) {
+  const std::string parent = joint_end(joint, "parent");
+  return (parent != "world" && !frames_.has(parent)) || !frames_.has(joint_end(joint, "child"));
 }
 
 }  // namespace ruedo::model

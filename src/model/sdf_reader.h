@@ -8,7 +8,6 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -56,11 +55,7 @@ class SdfReader {
                                                      SdfVersion version);
   // The instances of a <ruedo:fleet>, after what the world has already.
   void read_fleet(const Element& element, WorldModel& world, size_t most_models);
-  void read_plugin_sensors(const Element& element, FrameGraph& frames, const std::string& where,
-                           Model& model);
-  void read_joints(const Element& model, SdfVersion version, FrameGraph& frames,
-                   const std::set<const Element*>& left_out, bool parts_missing,
-                   const std::string& where, Model& result);
+  class ModelReader;  // of one <model>
 
   ReadContext& context_;
   std::vector<std::string> files_;
