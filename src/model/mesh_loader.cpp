@@ -1,26 +1,22 @@
 // The cache of meshes and the child process that fills it.
 #include "model/mesh_loader.h"
 
-#include <fcntl.h>
 #include <signal.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
-#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
-#include <thread>
 
 #include <Eigen/Geometry>
 
 #include "core/installation.h"
 #include "core/progress.h"
+#include "model/child_process.h"
 #include "model/document.h"
 #include "model/mesh_format.h"
 
@@ -34,27 +30,6 @@ std::string default_importer() {
     return installed;
   return std::string(RUEDO_BIN_DIR) + "/ruedo-import-mesh";
 }
-
-// A folder for one import's result; removed with all that is in it.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name = (fs::temp_directory_path() / "ruedo-mesh-XXXXXX").string();
-    if (!::mkdtemp(name.data()))
-      throw std::runtime_error(std::string("no temporary folder: ") + std::strerror(errno));
-    path_ = name;
-  }
-  ~TemporaryFolder() {
-    std::error_code error;
-    fs::remove_all(path_, error);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  std::string operator/(const char* name) const { return path_ + "/" + name; }
-
- private:
-  std::string path_;
-};
 
 std::string first_line(const std::string& file) {
   std::ifstream in(file);
@@ -79,53 +54,24 @@ constexpr bool kLimitAddressSpace = false;  // sanitizers reserve terabytes of a
 constexpr bool kLimitAddressSpace = true;
 #endif
 
-void set_limit(decltype(RLIMIT_AS) which, rlim_t value) {
-  const rlimit limit{value, value};
-  ::setrlimit(which, &limit);
-}
-
-// Runs the importer; throws what is wrong. Between fork and exec only system calls are made.
+// Runs the importer; throws what is wrong.
 void run_importer(const MeshImport& import, const std::string& input, const std::string& output,
                   const std::string& log) {
-  const char* arguments[] = {import.importer.c_str(), input.c_str(), output.c_str(), nullptr};
-  const pid_t child = ::fork();
-  if (child < 0)
-    throw std::runtime_error(std::string("the importer cannot be started: ") +
-                             std::strerror(errno));
-  if (child == 0) {
-    ::setpgid(0, 0);
-    set_limit(RLIMIT_CORE, 0);
-    set_limit(RLIMIT_CPU, static_cast<rlim_t>(import.cpu_limit_s));
-    set_limit(RLIMIT_FSIZE, rlim_t{1} << 30);
-    if (kLimitAddressSpace) set_limit(RLIMIT_AS, import.memory_limit_bytes);
-    const int nothing = ::open("/dev/null", O_RDWR);
-    const int messages = ::open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-    ::dup2(nothing, 0);
-    ::dup2(nothing, 1);
-    ::dup2(messages, 2);
-    ::execv(arguments[0], const_cast<char**>(arguments));
-    ::_exit(127);
+  ProcessLimits limits;
+  limits.cpu_s = static_cast<rlim_t>(import.cpu_limit_s);
+  limits.file_bytes = rlim_t{1} << 30;
+  limits.memory_bytes = kLimitAddressSpace ? import.memory_limit_bytes : 0;
+  limits.wall_s = import.wall_limit_s;
+  bool out_of_budget = false;
+  const std::optional<int> ended = run_limited({import.importer, input, output}, log, limits, [&] {
+    return out_of_budget = import.budget && import.budget->is_over();
+  });
+  if (!ended) {
+    if (out_of_budget) import.budget->take_time();
+    throw std::runtime_error("the importer took longer than " +
+                             std::to_string(import.wall_limit_s) + " s");
   }
-  const auto deadline =
-      std::chrono::steady_clock::now() + std::chrono::seconds(import.wall_limit_s);
-  int status = 0;
-  for (auto pause = std::chrono::microseconds(200);;
-       pause = std::min(pause * 2, std::chrono::microseconds(20'000))) {
-    const pid_t ended = ::waitpid(child, &status, WNOHANG);
-    if (ended == child) break;
-    if (ended < 0 && errno != EINTR)
-      throw std::runtime_error(std::string("the importer is lost: ") + std::strerror(errno));
-    const bool too_long = std::chrono::steady_clock::now() > deadline;
-    if (too_long || (import.budget && import.budget->is_over())) {
-      ::kill(-child, SIGKILL);
-      ::kill(child, SIGKILL);
-      ::waitpid(child, &status, 0);
-      if (!too_long) import.budget->take_time();
-      throw std::runtime_error("the importer took longer than " +
-                               std::to_string(import.wall_limit_s) + " s");
-    }
-    std::this_thread::sleep_for(pause);
-  }
+  const int status = *ended;
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
   if (WIFEXITED(status) && WEXITSTATUS(status) == 127) {
     throw std::runtime_error("the importer " + import.importer + " cannot be run");
@@ -250,7 +196,7 @@ Mesh MeshLoader::import_or_cached(const std::string& path) {
     }
   }
   const Progress progress("importing " + path);
-  TemporaryFolder folder;
+  const TemporaryFolder folder("mesh");
   run_importer(import_, path, folder / "mesh", folder / "log");
   const std::string bytes = bytes_of(folder / "mesh", kMostBytes);
   MeshPackage package = unpack_mesh(bytes);

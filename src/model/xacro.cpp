@@ -1,20 +1,16 @@
 // The child process, and what it leaves behind.
 #include "model/xacro.h"
 
-#include <fcntl.h>
-#include <signal.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <sstream>
-#include <thread>
 #include <vector>
+
+#include "model/child_process.h"
 
 namespace fs = std::filesystem;
 
@@ -25,28 +21,6 @@ constexpr rlim_t kCpu_s = 20, kMemory_bytes = rlim_t{2} << 30, kFile_bytes = rli
 constexpr int kWall_s = 60;
 constexpr size_t kLargest_bytes = size_t{64} << 20;
 
-// Where the child writes.
-class Folder {
- public:
-  Folder() {
-    std::string pattern = (fs::temp_directory_path() / "ruedo-xacro-XXXXXX").string();
-    if (!::mkdtemp(pattern.data()))
-      throw InputError(
-          {}, std::string("no folder for xacro's output can be made: ") + std::strerror(errno));
-    path_ = pattern;
-  }
-  ~Folder() {
-    std::error_code error;
-    fs::remove_all(path_, error);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  std::string operator/(const char* name) const { return path_ + "/" + name; }
-
- private:
-  std::string path_;
-};
-
 std::string script() {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
@@ -54,44 +28,11 @@ std::string script() {
   return !error && fs::exists(installed, error) ? installed.string() : RUEDO_XACRO_DIR "/expand.py";
 }
 
-void set_limit(decltype(RLIMIT_AS) which, rlim_t value) {
-  const rlimit limit{value, value};
-  ::setrlimit(which, &limit);
-}
-
-// Exit code, or -1 for a child that was ended. Between fork and exec only system calls are made.
+// Exit code, or -1 for a child that was ended.
 int run(std::vector<std::string> words, const std::string& log) {
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  const pid_t child = ::fork();
-  if (child < 0) return -1;
-  if (child == 0) {
-    ::setpgid(0, 0);
-    set_limit(RLIMIT_CORE, 0);
-    set_limit(RLIMIT_CPU, kCpu_s);
-    set_limit(RLIMIT_FSIZE, kFile_bytes);
-    set_limit(RLIMIT_AS, kMemory_bytes);
-    const int nothing = ::open("/dev/null", O_RDWR);
-    const int messages = ::open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-    ::dup2(nothing, 0);
-    ::dup2(nothing, 1);
-    ::dup2(messages, 2);
-    ::execvp(arguments[0], arguments.data());
-    ::_exit(127);
-  }
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(kWall_s);
-  int status = 0;
-  while (true) {
-    const pid_t ended = ::waitpid(child, &status, WNOHANG);
-    if (ended == child) return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-    if ((ended < 0 && errno != EINTR) || std::chrono::steady_clock::now() > deadline) {
-      ::kill(-child, SIGKILL);
-      ::waitpid(child, &status, 0);
-      return -1;
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
+  const std::optional<int> status =
+      run_limited(std::move(words), log, {kCpu_s, kFile_bytes, kMemory_bytes, kWall_s});
+  return status && WIFEXITED(*status) ? WEXITSTATUS(*status) : -1;
 }
 
 std::string text_or_nothing(const std::string& path) {
@@ -135,8 +76,10 @@ bool is_xacro(const std::string& path, const Element* root) {
                      [](const auto& child) { return child->name.rfind("xacro:", 0) == 0; });
 }
 
-std::shared_ptr<const Element> expand_xacro(const std::string& path, ReadContext& context) {
-  const Folder folder;
+namespace {
+
+std::shared_ptr<const Element> expand(const std::string& path, ReadContext& context) {
+  const TemporaryFolder folder("xacro");
   const std::string out = folder / "robot.urdf", log = folder / "messages";
   std::vector<std::string> words{xacro_python(), script(), path, out};
   for (const std::string& root : context.resources.folders())
@@ -164,6 +107,18 @@ std::shared_ptr<const Element> expand_xacro(const std::string& path, ReadContext
   std::unique_ptr<Element> root = parse_document(read_text_file(out, kLargest_bytes), path);
   take_lines(*root, {path, 1});
   return root;
+}
+
+}  // namespace
+
+std::shared_ptr<const Element> expand_xacro(const std::string& path, ReadContext& context) {
+  try {
+    return expand(path, context);
+  } catch (const InputError&) {
+    throw;
+  } catch (const std::runtime_error& error) {  // of the folder or the process
+    throw InputError({path, 0}, std::string("the xacro file cannot be expanded: ") + error.what());
+  }
 }
 
 }  // namespace ruedo::model
