@@ -184,7 +184,7 @@ void LcmBus::subscribe_missing() {
     }
     return;
   }
-  // A slow reader is none of ours: the handler only checks and stores. Room for a burst from every
+  // Our handler only checks and stores, so it never blocks; the queue holds a burst from every
   // robot.
   const int queue_size = static_cast<int>(std::clamp<size_t>(4 * channels_.size(), 64, 65536));
   for (const std::string& pattern : channel_patterns({channels_.begin(), channels_.end()})) {

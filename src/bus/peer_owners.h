@@ -1,5 +1,5 @@
-// Whose the other ends of TCP connections are: of this machine's processes by their number, of
-// other machines by address.
+// Who owns the other end of a TCP connection: a process of this machine, by its number, or another
+// machine, by its address.
 #pragma once
 
 #include <cstdint>

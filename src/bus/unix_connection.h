@@ -1,4 +1,4 @@
-// A client's end of a Unix-domain socket: connects, sends, and takes what came apart (see
+// A client's end of a Unix-domain socket: connects, sends, and parses what was received (see
 // unix_server.h).
 //
 // Safe to publish and subscribe from any thread; take() from one at a time.

@@ -1,8 +1,8 @@
-// Walls around this process: of files by Landlock, of system calls by seccomp. What the kernel of
-// the machine lacks of them is named.
+// Confines this process: its access to files by Landlock, its system calls by seccomp. What the
+// kernel does not support is reported.
 //
-// For worlds, meshes and logs of strangers: a fault in what reads them reaches no file beside those
-// that it needs.
+// For untrusted worlds, meshes and logs: a bug in the code that reads them reaches no file beyond
+// those that it needs.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
-// Texts from files and messages, as those take them who insist on UTF-8 (JSON, browsers), or obey
-// what they are shown (terminals).
+// Sanitises texts from files and messages for consumers that need valid UTF-8 (JSON, browsers), and
+// for terminals, which obey control characters.
 #pragma once
 
 #include <string>

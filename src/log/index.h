@@ -1,5 +1,5 @@
-// Where each message of a log is, by channel and time, so that any moment of it can be shown at
-// once.
+// Where each message of a log is, by channel and time: gives random access to any moment of the
+// log.
 //
 // The log is read through once; of most messages only the place is kept. Times never go back: an
 // event that does counts as at the time of the one before it.

@@ -1,5 +1,5 @@
-// Requests of the log are carried out on its world as the server did, but for the motion: names,
-// and places in the lists of bodies, come out the same.
+// Executes the log's requests on its world as the server did, except for motion, so that names and
+// indices of bodies are those of the run.
 #include "run/log_worlds.h"
 
 #include <algorithm>

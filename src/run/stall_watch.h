@@ -1,8 +1,8 @@
 // Says within two seconds why a run does not go on, once for each time that it stands.
 //
 // While the publisher has nothing to do it asks for the reason itself: a client, a sensor, a step.
-// What holds the publisher up, a request or a disk, is told by a thread of the watch's own, which
-// sees that the publisher's beats have ended; so is that the whole process stood.
+// When the publisher itself is held up, by a request or a disk, a thread of the watch notices that
+// its beats have stopped, and reports it; likewise when the whole process was stopped.
 #pragma once
 
 #include <atomic>

@@ -1,4 +1,4 @@
-// Whether a log's run, repeated from what acted on it, gives the log's bytes.
+// Repeats a log's run from its recorded inputs and checks that the bytes are the log's.
 #pragma once
 
 #include <functional>
