@@ -74,7 +74,6 @@ for suite in "$@"; do
   cp -r "$here/../tests" "$here/../worlds" "$here/../proto" "$here/../docs" "$root/src"
   chroot "$root" id user >/dev/null 2>&1 || chroot "$root" useradd --create-home user
   # A network of its own with nothing in it but the loopback interface; /proc for the program's way to its own files.
-  # shellcheck disable=SC2016  # the inner shell expands $0
   unshare --net --mount bash -c 'ip link set lo up; ip route add 224.0.0.0/4 dev lo; mount -t proc proc "$0/proc"
     exec chroot --userspec=user:user "$0" env -i HOME=/home/user PATH=/usr/bin:/bin LANG=C.UTF-8 RUEDO_TESTS="${RUEDO_TESTS-}" bash /inside.sh' "$root"
   echo "$suite: all of it works"

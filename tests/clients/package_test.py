@@ -67,7 +67,8 @@ def test_jar_is_whole_and_for_java_11():
     with zipfile.ZipFile(jar) as archive:
         names = set(archive.namelist())
         assert {"ruedo/Ruedo.class", "ruedo/lcmtypes/world_info_t.class"} <= names
-        # Another LCM may lie beside it, on the module path, too, where a package is in one jar alone.
+        # Another LCM may lie beside it, on the module path, too, where a package is in one jar
+        # alone.
         assert {name.split("/")[0] for name in names} == {"META-INF", "ruedo"}
         for name in names:
             if name.endswith(".class"):

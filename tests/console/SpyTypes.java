@@ -27,9 +27,10 @@ public class SpyTypes {
             }
             Object decoded =
                     type.getConstructor(DataInput.class)
-                                    .newInstance(new LCMDataInputStream(message));
+                            .newInstance(new LCMDataInputStream(message));
             ByteArrayOutputStream encoded = new ByteArrayOutputStream();
-            type.getMethod("encode", DataOutput.class).invoke(decoded, new DataOutputStream(encoded));
+            type.getMethod("encode", DataOutput.class)
+                    .invoke(decoded, new DataOutputStream(encoded));
             System.out.println(
                     "= "
                             + words[0]

@@ -1,4 +1,6 @@
-"""ruedo run --foxglove: seen by Foxglove's own client library, message by message as `ruedo export` writes the same run."""
+"""ruedo run --foxglove: seen by Foxglove's own client library, message by message as `ruedo export`
+writes the same run.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +56,9 @@ def seen(url: str, seconds: float, *topics: str) -> list[dict]:
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[dict], dict]:
-    """What a viewer saw in six seconds of a run, and the same run's messages as an exported file has them."""
+    """What a viewer saw in six seconds of a run, and the same run's messages as an exported file
+    has them.
+    """
     folder = tmp_path_factory.mktemp("foxglove")
     with serving("--record", str(folder / "run.lcm")) as (_, url):
         lines = seen(url, 6, *TOPICS)

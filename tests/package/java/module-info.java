@@ -1,3 +1,3 @@
 module trial {
-  requires ruedo;
+    requires ruedo;
 }

@@ -1,7 +1,6 @@
 package ruedo;
 
 import ruedo.lcmtypes.Message;
-
 import ruedo.lcmtypes.join_t;
 import ruedo.lcmtypes.reply_t;
 import ruedo.lcmtypes.request_t;

@@ -1,7 +1,6 @@
 package ruedo;
 
 import ruedo.lcmtypes.Message;
-
 import ruedo.lcmtypes.channel_info_t;
 import ruedo.lcmtypes.name_request_t;
 import ruedo.lcmtypes.rate_request_t;
