@@ -95,7 +95,9 @@ def test_the_past_of_a_live_run_is_looked_at(tmp_path):
 
 
 def test_any_field_is_plotted(tmp_path):
-    """Of a live run what is known, and of a log the whole of it: its times, least and most are the log's."""
+    """Of a live run what is known, and of a log the whole of it: its times, least and most are the
+    log's.
+    """
     from ruedo.lcmtypes import odometry_t
 
     log = tmp_path / "run.lcm"
