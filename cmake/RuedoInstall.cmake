@@ -19,8 +19,21 @@ install(TARGETS ${late} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/ruedo)
 
 # find_package(ruedo): target ruedo::client in the export set ruedo.
 install(TARGETS ruedo_client EXPORT ruedo ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+set_target_properties(ruedo_engine_library PROPERTIES INSTALL_RPATH "\$ORIGIN/ruedo")
+install(TARGETS ruedo_engine_library EXPORT ruedo LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(FILES ${PROJECT_SOURCE_DIR}/include/ruedo/engine.h ${PROJECT_SOURCE_DIR}/include/ruedo/errors.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ruedo)
 install(FILES ${PROJECT_SOURCE_DIR}/include/ruedo/client.h ${PROJECT_SOURCE_DIR}/include/ruedo/client_samples.h
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ruedo)
+# ruedo::plugin, in the component of that name.
+install(TARGETS ruedo_plugin EXPORT ruedo_plugin ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(EXPORT ruedo_plugin FILE ruedoPluginTargets.cmake NAMESPACE ruedo:: DESTINATION ${package})
+install(FILES ${RUEDO_PLUGIN_HEADERS} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ruedo)
+install(FILES ${RUEDO_PLUGIN_ABI} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ruedo)
+foreach(header ${RUEDO_PLUGIN_LAYER_HEADERS})
+  get_filename_component(layer ${header} DIRECTORY)
+  install(FILES src/${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ruedo/plugin/${layer})
+endforeach()
+install(FILES cmake/plugin_entry.cpp DESTINATION ${CMAKE_INSTALL_DATADIR}/ruedo)
 if(TARGET ruedo_jar)
   install(FILES ${PROJECT_BINARY_DIR}/java/ruedo.jar DESTINATION ${CMAKE_INSTALL_DATADIR}/java)
 endif()

@@ -22,7 +22,7 @@ readonly BUILD_PACKAGES=(
 # is the firewall that a test runs into; libfaketime sets clocks; MPFR is the oracle of the elementary functions, and qemu has other processors.
 readonly TEST_PACKAGES=(
   libgtest-dev libgmock-dev libbenchmark-dev libopencv-contrib-dev "?libsdformat-dev" "?chromium" clang "?libclang-rt-dev"
-  nftables libmpfr-dev qemu-user libfaketime maven
+  nftables libmpfr-dev qemu-user libfaketime maven doxygen
 )
 
 # The web console's page is built by node and npm; a machine that has an npm of another origin keeps it.

@@ -110,12 +110,13 @@ RobotInfo Core::robot_info(const std::string& name) const {
                     (names.empty() ? "none" : names));
 }
 
-std::shared_ptr<StreamCore> Core::stream(const ChannelInfo& channel) {
+std::shared_ptr<StreamCore> Core::stream(const ChannelInfo& channel, bool raw) {
   const std::lock_guard lock(mutex_);
-  auto& stream = streams_[channel.name];
-  if (!stream || stream->type() != channel.type)
-    stream =
-        std::make_shared<StreamCore>(weak_from_this(), channel);  // the next run's may be another
+  auto& stream = streams_[{channel.name, raw}];
+  if (!stream || stream->type() != channel.type) {  // the next run's may be another
+    stream = std::make_shared<StreamCore>(weak_from_this(), channel,
+                                          raw ? raw_decoder() : find_decoder(channel.type));
+  }
   return stream;
 }
 
@@ -180,7 +181,7 @@ void Core::forget_removed(const WorldInfo& info) {
       it = gone ? drivers_.erase(it) : std::next(it);
     }
     for (auto it = streams_.begin(); it != streams_.end();) {
-      const bool gone = !channels.count(it->first);
+      const bool gone = !channels.count(it->first.first);
       if (gone) streams.push_back(it->second);
       it = gone ? streams_.erase(it) : std::next(it);
     }

@@ -52,8 +52,8 @@ class Core : public std::enable_shared_from_this<Core> {
   int64_t utime() const { return utime_; }
   int64_t next_id() { return ++ids_; }
 
-  // The stream of a channel, made on first use.
-  std::shared_ptr<StreamCore> stream(const ChannelInfo& channel);
+  // The stream of a channel, made on first use. raw: of its messages as they come.
+  std::shared_ptr<StreamCore> stream(const ChannelInfo& channel, bool raw = false);
   std::shared_ptr<Driver> driver(const std::string& robot);
 
   void keep_repeating(const std::shared_ptr<Driver>& driver);
@@ -84,7 +84,7 @@ class Core : public std::enable_shared_from_this<Core> {
   WorldInfoAssembler assembler_;  // the receiving thread's
   std::shared_ptr<const WorldInfo> known_;
   std::exception_ptr fault_;
-  std::map<std::string, std::shared_ptr<StreamCore>> streams_;
+  std::map<std::pair<std::string, bool>, std::shared_ptr<StreamCore>> streams_;  // channel, raw
   std::map<std::string, std::shared_ptr<Driver>> drivers_;
   std::set<std::shared_ptr<Driver>> repeating_;
   std::atomic<int64_t> utime_{0}, ids_{0};

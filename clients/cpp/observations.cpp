@@ -20,6 +20,11 @@ SampleType decoded(const Observations::Message& message) {
                      ", or another version of it");
 }
 
+template <>
+RawSample decoded<RawSample>(const Observations::Message& message) {
+  return raw_sample(WireReader(message.bytes.data(), message.bytes.size()));
+}
+
 }  // namespace
 
 template <class SampleType>
@@ -43,6 +48,7 @@ std::optional<SampleType> Observations::latest(const Stream<SampleType>& stream)
   template std::vector<SampleType> Observations::all(const Stream<SampleType>&) const; \
   template std::optional<SampleType> Observations::latest(const Stream<SampleType>&) const;
 RUEDO_SAMPLE_TYPES(RUEDO_OBSERVATIONS)
+RUEDO_OBSERVATIONS(RawSample, )
 #undef RUEDO_OBSERVATIONS
 
 }  // namespace ruedo::client

@@ -169,6 +169,20 @@ Stream<CameraInfo> Camera::intrinsics() const {
 
 RobotInfo Robot::info() const { return core_->robot_info(name_); }
 
+Stream<RawSample> Robot::raw_stream(const std::string& name) const {
+  core_->robot_info(name_);
+  const auto info = core_->info();
+  std::string there;
+  for (const ChannelInfo& channel : channels_of(*info, name_)) {
+    if (channel.input) continue;
+    if (channel.device == name || channel.name == name || channel.name == name_ + "/" + name)
+      return Stream<RawSample>(core_->stream(channel, true));
+    there += (there.empty() ? "" : ", ") + (channel.device.empty() ? channel.name : channel.device);
+  }
+  throw UnknownName(name_ + " publishes no '" + name + "'; it publishes " +
+                    (there.empty() ? "nothing" : there));
+}
+
 std::vector<DeviceInfo> Robot::devices() const {
   core_->robot_info(name_);
   return devices_of(*core_->info(), name_);

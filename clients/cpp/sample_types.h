@@ -43,6 +43,10 @@ struct SampleDecoder {
 // nullptr when this client does not know the type.
 const SampleDecoder* find_decoder(const std::string& type);
 
+// Of any type: fingerprint 0.
+const SampleDecoder* raw_decoder();
+RawSample raw_sample(WireReader in);
+
 // The message type that a sample is made from: message_type<Scan>() is "planar_lidar_t".
 template <class SampleType>
 const char* message_type();

@@ -387,6 +387,19 @@ const char* to_string(MotionKind kind) { return text_of(kind); }
 const char* to_string(MotionState state) { return text_of(state); }
 const char* to_string(MotionReason reason) { return text_of(reason); }
 
+RawSample raw_sample(WireReader in) {
+  RawSample sample;
+  sample.bytes = in.whole();
+  return sample;
+}
+
+const SampleDecoder* raw_decoder() {
+  static const SampleDecoder decoder{"", 0, [](WireReader& in) -> std::shared_ptr<const Sample> {
+                                       return std::make_shared<RawSample>(raw_sample(in));
+                                     }};
+  return &decoder;
+}
+
 const SampleDecoder* find_decoder(const std::string& type) {
   for (const SampleDecoder& decoder : kDecoders) {
     if (type == decoder.type) return &decoder;

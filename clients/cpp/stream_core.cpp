@@ -17,13 +17,14 @@ std::string hex(int64_t fingerprint) {
 
 }  // namespace
 
-StreamCore::StreamCore(std::weak_ptr<Core> core, const ChannelInfo& channel)
+StreamCore::StreamCore(std::weak_ptr<Core> core, const ChannelInfo& channel,
+                       const SampleDecoder* decoder)
     : core_(std::move(core)),
       channel_(channel.name),
       type_(channel.type),
       fingerprint_(channel.fingerprint),
       rate_(channel.rate),
-      decoder_(find_decoder(channel.type)) {}
+      decoder_(decoder) {}
 
 std::shared_ptr<Core> StreamCore::connection() const {
   auto core = core_.lock();
@@ -50,8 +51,11 @@ TypeMismatch StreamCore::mismatch(int64_t fingerprint) const {
 void StreamCore::subscribe(Core& core) {
   const std::lock_guard lock(opening_);
   if (source_.open()) return;
-  if (!decoder_) throw TypeMismatch(channel_ + ": this client does not know the type " + type_);
-  if (fingerprint_ != decoder_->fingerprint) throw mismatch(fingerprint_);
+  if (!decoder_)
+    throw TypeMismatch(channel_ + " carries " + type_ +
+                       ", of which this client has no samples: robot.stream<" + type_ +
+                       ">() takes the class that lcm-gen made of its .lcm file");
+  if (!is_raw() && fingerprint_ != decoder_->fingerprint) throw mismatch(fingerprint_);
   source_ =
       core.bus().subscribe(channel_, [self = weak_from_this()](const uint8_t* bytes, size_t size) {
         if (const auto stream = self.lock()) stream->receive(bytes, size);
@@ -78,7 +82,7 @@ void StreamCore::receive(const uint8_t* bytes, size_t size) {
   try {
     WireReader in(bytes, size);
     const int64_t fingerprint = in.int64();
-    if (fingerprint != decoder_->fingerprint) throw mismatch(fingerprint);
+    if (!is_raw() && fingerprint != decoder_->fingerprint) throw mismatch(fingerprint);
     sample = decoder_->decode(in);
   } catch (const WireError& error) {
     fault =
@@ -97,7 +101,7 @@ void StreamCore::receive(const uint8_t* bytes, size_t size) {
   }
   news_.notify_all();
   if (!sample) return;
-  if (const auto core = core_.lock()) core->note_time(sample->utime);
+  if (const auto core = core_.lock(); core && !is_raw()) core->note_time(sample->utime);
   callbacks_->call(*sample);
 }
 
@@ -149,5 +153,6 @@ Subscription Stream<SampleType>::on_sample(std::function<void(const SampleType&)
 #define RUEDO_STREAM(SampleType, type) template class Stream<SampleType>;
 RUEDO_SAMPLE_TYPES(RUEDO_STREAM)
 #undef RUEDO_STREAM
+template class Stream<RawSample>;
 
 }  // namespace ruedo::client

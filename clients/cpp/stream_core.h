@@ -21,7 +21,8 @@ struct ChannelInfo;
 // Thread safe. The connection has one for each channel that was asked for; handles may outlive it.
 class StreamCore : public std::enable_shared_from_this<StreamCore> {
  public:
-  StreamCore(std::weak_ptr<Core> core, const ChannelInfo& channel);
+  // decoder: null where there is none for the channel's type.
+  StreamCore(std::weak_ptr<Core> core, const ChannelInfo& channel, const SampleDecoder* decoder);
 
   const std::string& channel() const { return channel_; }
   const std::string& type() const { return type_; }
@@ -37,6 +38,7 @@ class StreamCore : public std::enable_shared_from_this<StreamCore> {
   using Callbacks = CallbackList<const Sample&>;
 
   std::shared_ptr<Core> connection() const;  // throws NoServer once it was closed
+  bool is_raw() const { return decoder_ == raw_decoder(); }
   void subscribe(Core& core);
   void receive(const uint8_t* bytes, size_t size);
   TypeMismatch mismatch(int64_t fingerprint) const;

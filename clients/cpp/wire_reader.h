@@ -19,7 +19,10 @@ struct WireError : std::runtime_error {
 
 class WireReader {
  public:
-  WireReader(const uint8_t* bytes, size_t size) : at_(bytes), end_(bytes + size) {}
+  WireReader(const uint8_t* bytes, size_t size) : begin_(bytes), at_(bytes), end_(bytes + size) {}
+
+  // The whole message, whatever was read of it.
+  std::vector<uint8_t> whole() const { return {begin_, end_}; }
 
   int8_t int8() { return static_cast<int8_t>(take(1)[0]); }
   bool boolean() { return int8() != 0; }
@@ -91,6 +94,7 @@ class WireReader {
     return at_ - n;
   }
 
+  const uint8_t* const begin_;
   const uint8_t* at_;
   const uint8_t* end_;
 };

@@ -145,6 +145,51 @@ class Stream {
       seen_;  // of the samples received, the newest that a call has returned
 };
 
+/// A stream of messages of a type of one's own: `robot.stream<thermometer_t>("temp")`.
+///
+/// It reads as Stream does, and is made of one.
+/// @tparam Message a class that lcm-gen made of an .lcm file (lcm-gen -x)
+template <class Message>
+class MessageStream {
+ public:
+  explicit MessageStream(Stream<RawSample> raw) : raw_(std::move(raw)) {}
+  [[nodiscard]] const std::string& channel() const { return raw_.channel(); }
+
+  /// As Stream::latest().
+  [[nodiscard]] Message latest(Duration timeout = 5.0) const {
+    return decoded(channel(), raw_.latest(timeout).bytes);
+  }
+  /// As Stream::next().
+  Message next(Duration timeout = 5.0) const {
+    return decoded(channel(), raw_.next(timeout).bytes);
+  }
+  /// As Stream::on_sample(). A message that is no Message is said on the terminal, and passed over.
+  Subscription on_sample(std::function<void(const Message&)> callback) const {
+    return raw_.on_sample([callback = std::move(callback), name = channel()](const RawSample& raw) {
+      callback(decoded(name, raw.bytes));
+    });
+  }
+
+  /// @param channel names it in the error
+  /// @throws TypeMismatch when the bytes are no Message
+  static Message decoded(const std::string& channel, const std::vector<uint8_t>& bytes) {
+    const auto fail = [&](const char* what) -> Message {
+      throw TypeMismatch(channel + ": a message of " + std::to_string(bytes.size()) + " bytes " +
+                         what + " " + Message::getTypeName() + " of this program");
+    };
+    uint64_t fingerprint = 0;
+    for (size_t i = 0; i < 8 && i < bytes.size(); ++i) fingerprint = fingerprint << 8 | bytes[i];
+    if (bytes.size() < 8 || fingerprint != static_cast<uint64_t>(Message::getHash()))
+      return fail("is another type than, or of another version of, the");
+    Message message;
+    const int size = static_cast<int>(bytes.size());
+    return message.decode(bytes.data(), 0, size) == size ? message : fail("is no valid");
+  }
+
+ private:
+  Stream<RawSample> raw_;
+};
+
 // What step() saw: the state after its last step, and the sensor messages of all its steps.
 struct Observations : State {
   struct Message {
@@ -160,6 +205,23 @@ struct Observations : State {
   std::vector<SampleType> all(const Stream<SampleType>& stream) const;
   template <class SampleType>
   std::optional<SampleType> latest(const Stream<SampleType>& stream) const;
+  template <class MessageType>
+  std::vector<MessageType> all(const MessageStream<MessageType>& stream) const {
+    std::vector<MessageType> found;
+    for (const Message& message : messages) {
+      if (message.channel == stream.channel())
+        found.push_back(stream.decoded(message.channel, message.bytes));
+    }
+    return found;
+  }
+  template <class MessageType>
+  std::optional<MessageType> latest(const MessageStream<MessageType>& stream) const {
+    for (auto message = messages.rbegin(); message != messages.rend(); ++message) {
+      if (message->channel == stream.channel())
+        return stream.decoded(message->channel, message->bytes);
+    }
+    return std::nullopt;
+  }
 };
 
 // A sensor of a robot.
@@ -226,6 +288,15 @@ class Robot {
   // when its samples are of another kind.
   template <class SampleType>
   Device<SampleType> device(const std::string& name) const;
+  /// The messages of a device or channel of this robot, by its name ("temp"), of a plugin's, too.
+  /// @tparam Message a class that lcm-gen made of its .lcm file
+  /// @throws UnknownName, with those that exist
+  template <class Message>
+  [[nodiscard]] MessageStream<Message> stream(const std::string& name) const {
+    return MessageStream<Message>(raw_stream(name));
+  }
+  /// The same as bytes, whatever their type is.
+  [[nodiscard]] Stream<RawSample> raw_stream(const std::string& name) const;
   // The first device of a kind; UnknownName when there is none.
   Device<Scan> lrf() const;
   Device<LidarScan> lidar() const;

@@ -1,3 +1,4 @@
+/// @file
 // What Ruedo's client for C++ delivers and throws: samples and errors. ruedo/client.h includes it.
 //
 // SI units, radians; x ahead, y left, z up; quaternions w, x, y, z. utime is sim time in
@@ -316,6 +317,11 @@ struct MotionStatus : Sample {
   MotionReason reason = MotionReason::none;  // why it ended or was refused
   double progress = 0.0, remaining = 0.0;    // m or rad
   double v = 0.0, omega = 0.0;               // m/s, rad/s
+};
+
+/// A message of any type, as it came.
+struct RawSample : Sample {    // utime: where the type's first field is one; else 0
+  std::vector<uint8_t> bytes;  ///< LCM's encoding, its fingerprint first
 };
 
 }  // namespace ruedo::client

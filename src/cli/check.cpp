@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
+#include "cli/extensions.h"
 #include "cli/listing.h"
 #include "cli/sandboxed.h"
 #include "core/json.h"
@@ -110,6 +111,7 @@ void print_text(const std::vector<Finding>& findings) {
 }
 
 int check(const CheckArguments& arguments) {
+  load_given_plugins();
   if (arguments.sandboxed) enter_sandbox(model::world_file(arguments.world.world), {});
   bool loaded = false;
   const std::vector<Finding> findings = find_all(arguments, loaded);

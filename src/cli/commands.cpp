@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "cli/extensions.h"
 #include "core/option_text.h"
 #include "core/utf8.h"
 #include "core/whole.h"
@@ -42,6 +43,7 @@ std::vector<RegisterCommand::Add> registered_commands() {
 void add_world_arguments(CLI::App& command, WorldArguments& arguments) {
   command.add_option("WORLD", arguments.world, "SDF world or model, or URDF robot (xacro, too)")
       ->required();
+  add_plugin_argument(command);
   command
       .add_option("--spawn", arguments.spawns,
                   "place a model on the ground: MODEL[:NAME]@X,Y[,YAW] (m, rad); a file, or one of "
@@ -143,6 +145,7 @@ model::LoadOptions load_options(const WorldArguments& arguments) {
 
 std::shared_ptr<const model::WorldModel> load(const WorldArguments& arguments) {
   if (arguments.fast_pixels) scene::draw_as_fast_as_it_goes();
+  load_given_plugins();
   return model::load_world(arguments.world, load_options(arguments));
 }
 

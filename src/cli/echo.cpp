@@ -13,6 +13,7 @@
 
 #include "bus/lcm_bus.h"
 #include "cli/commands.h"
+#include "cli/extensions.h"
 #include "core/utf8.h"
 #include "ruedo/schema.h"
 
@@ -95,7 +96,10 @@ void print(const Message& message) {
   const Schema* schema = find_schema(fingerprint_of(message.bytes));
   const std::string channel = for_terminal(message.channel);
   if (schema == nullptr) {
-    fmt::print("{}: {} bytes of a type that Ruedo does not know\n", channel, message.bytes.size());
+    fmt::print(
+        "{}: {} bytes of a type that Ruedo does not know (its hash is {:#018x}); --types reads its "
+        ".lcm file\n",
+        channel, message.bytes.size(), static_cast<uint64_t>(fingerprint_of(message.bytes)));
     return;
   }
   fmt::print("{} ({}, {} bytes)\n", channel, schema->name, message.bytes.size());
@@ -115,6 +119,7 @@ struct EchoArguments {
 };
 
 int echo(const EchoArguments& arguments) {
+  read_given_types();
   Mailbox mailbox;
   bus::LcmBus bus(arguments.lcm);
   bus.listen(arguments.channels, [&](const std::string& channel, const uint8_t* data, size_t size) {
@@ -201,6 +206,7 @@ void add(CLI::App& app, Action& chosen, const char* name, const char* help, cons
       ->type_name("N")
       ->check(CLI::Range(1, 1'000'000'000));
   if (action == echo) {
+    add_types_argument(*command);
     command
         ->add_option("--timeout", arguments->timeout_s, "end with 1 when nothing came for so long")
         ->type_name("S")

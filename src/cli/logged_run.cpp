@@ -1,6 +1,7 @@
 // The inverse of result_options(), and of what ruedo run adds to them.
 #include "cli/logged_run.h"
 
+#include "cli/extensions.h"
 #include "log/header.h"
 #include "ruedo/errors.h"
 
@@ -15,7 +16,9 @@ LoggedOptions read_options(const log_header_t& header, const std::string& log) {
     const size_t equals = option.find('=');
     const std::string name = option.substr(0, equals),
                       value = equals == std::string::npos ? "" : option.substr(equals + 1);
-    if (name == "--spawn")
+    if (name == "--plugin")
+      load_logged_plugin(value, log);
+    else if (name == "--spawn")
       world.spawns.push_back(value);
     else if (name == "--drive")
       world.drives.push_back(value);

@@ -11,6 +11,7 @@
 
 #include "bus/lcm_bus.h"
 #include "cli/commands.h"
+#include "cli/extensions.h"
 #include "cli/sandboxed.h"
 #include "cli/view.h"
 #include "log/header.h"
@@ -58,6 +59,7 @@ int view(const PlayArguments& arguments, double speed) {
 }
 
 int play(const PlayArguments& arguments) {
+  load_given_plugins();
   if (arguments.sandboxed) enter_sandbox(arguments.log, {arguments.html});
   const double speed = parse_rate(arguments.speed);
   std::signal(SIGINT, [](int) { interrupted = 1; });
@@ -116,6 +118,7 @@ void add_play(CLI::App& app, Action& chosen) {
       ->add_option("--lcm", arguments->lcm,
                    "LCM address (default: $LCM_DEFAULT_URL, or LCM's group)")
       ->type_name("URL");
+  add_plugin_argument(*command);
   add_sandbox_argument(*command, arguments->sandboxed);
   command->callback([arguments, view, &chosen] {
     arguments->viewed = view->count() > 0;

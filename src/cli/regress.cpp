@@ -13,6 +13,7 @@
 #include "bus/server_bus.h"
 #include "cli/client_process.h"
 #include "cli/commands.h"
+#include "cli/extensions.h"
 #include "cli/isolation.h"
 #include "cli/view.h"
 #include "core/json.h"
@@ -50,6 +51,7 @@ run::RunOptions server_options(const RegressArguments& arguments) {
   options.lockstep = {arguments.lockstep, 30.0, run::LockstepOptions::Policy::fail};
   options.record = arguments.record;
   options.result_options = result_options(arguments.world);
+  for (std::string& plugin : plugin_options()) options.result_options.push_back(std::move(plugin));
   for (const std::string& text : arguments.remaps) {
     options.remaps.push_back(parse_remap(text));
     options.result_options.push_back("--remap=" + text);

@@ -18,6 +18,7 @@
 #include "bus/rival_watch.h"
 #include "bus/server_bus.h"
 #include "cli/commands.h"
+#include "cli/extensions.h"
 #include "cli/foxglove_server.h"
 #include "cli/listing.h"
 #include "cli/progress_line.h"
@@ -212,6 +213,7 @@ std::string socket_of(const std::string& lcm) {
 
 int run_world(const RunArguments& arguments) {
   run::RunOptions options = server_options(arguments);
+  load_given_plugins();
   if (arguments.sandboxed)
     enter_sandbox(model::world_file(arguments.world.world),
                   {arguments.record, arguments.snapshots, socket_of(arguments.lcm)});
@@ -219,6 +221,7 @@ int run_world(const RunArguments& arguments) {
   if (arguments.watch_stdin) watch_stdin();
   const engine::ThreadLimit limit(arguments.threads);
   const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
+  for (std::string& plugin : plugin_options()) options.result_options.push_back(std::move(plugin));
   bus::ServerBus place = bus::open_server_bus(arguments.lcm, world->name);
   bus::RivalWatch bus(std::move(place.bus), [](const std::string& line) { spdlog::warn(line); });
   ViewedBus viewed(bus, arguments.viewed, arguments.view);

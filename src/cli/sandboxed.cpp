@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 
 #include "core/late_library.h"
+#include "core/plugins.h"
 #include "core/sandbox.h"
 #include "model/mesh_loader.h"
 #include "model/resources.h"
@@ -45,6 +46,7 @@ void enter_sandbox(const std::string& file, const std::vector<std::string>& writ
   Sandbox sandbox;
   sandbox.readable = model::ResourceFinder::for_strangers(file).folders();
   sandbox.readable.push_back(fs::absolute(file).parent_path().string());
+  for (std::string& folder : plugin_folders()) sandbox.readable.push_back(std::move(folder));
   const fs::path python = model::xacro_python();
   if (python.has_parent_path())
     sandbox.runnable.push_back(python.parent_path().parent_path().string());

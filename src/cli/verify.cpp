@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include "cli/commands.h"
+#include "cli/extensions.h"
 #include "cli/logged_run.h"
 #include "cli/sandboxed.h"
 #include "core/utf8.h"
@@ -70,6 +71,7 @@ int repeat(const VerifyArguments& arguments, const log_header_t& header) {
 }
 
 int verify(const VerifyArguments& arguments) {
+  load_given_plugins();
   if (arguments.sandboxed) enter_sandbox(arguments.log, {});
   const log_header_t header = run::read_header(arguments.log);
   log::check_files(header, arguments.log);
@@ -86,6 +88,7 @@ void add_verify(CLI::App& app, Action& chosen) {
                    "most threads inside a module (default: one a core)")
       ->type_name("N")
       ->check(CLI::Range(1, 1024));
+  add_plugin_argument(*command);
   add_sandbox_argument(*command, arguments->sandboxed);
   command->callback([arguments, &chosen] { chosen = [arguments] { return verify(*arguments); }; });
 }

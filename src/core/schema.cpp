@@ -10,8 +10,16 @@
 #include <cctype>
 #include <charconv>
 #include <deque>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <map>
-#include <stdexcept>
+#include <memory>
+
+#include "core/type_files.h"
+#include "ruedo/errors.h"
+
+namespace fs = std::filesystem;
 
 namespace ruedo {
 
@@ -35,7 +43,20 @@ constexpr std::array<std::pair<std::string_view, Primitive>, 9> kPrimitives{
 // Words and single punctuation characters, without comments.
 class Tokens {
  public:
-  explicit Tokens(std::string_view text) : text_(text) {}
+  Tokens(std::string_view text, const std::string& file) : text_(text), file_(file) {}
+
+  // The next token. Throws at the end: a text ends between its types.
+  std::string_view want() {
+    const std::string_view token = next();
+    if (token.empty()) fail("it ends within a type");
+    return token;
+  }
+
+  [[noreturn]] void fail(const std::string& what) const {
+    const auto line =
+        1 + std::count(text_.begin(), text_.begin() + static_cast<ptrdiff_t>(at_), '\n');
+    throw InputError({file_, static_cast<int>(line)}, what);
+  }
 
   // The next token, empty at the end.
   std::string_view next() {
@@ -68,6 +89,7 @@ class Tokens {
     }
   }
   std::string_view text_;
+  const std::string& file_;
   size_t at_ = 0;
 };
 
@@ -97,28 +119,37 @@ Primitive primitive_of(std::string_view type) {
 // Reads `name[size][count];` after a type; true when another name follows a comma.
 bool parse_member(Tokens& tokens, std::string_view type, Parsed& parsed) {
   Field field;
-  field.name = tokens.next();
+  field.name = tokens.want();
   field.primitive = primitive_of(type);
   parsed.hash = mix(parsed.hash, field.name);
   if (field.primitive != Primitive::none) parsed.hash = mix(parsed.hash, type);
 
   std::vector<std::string_view> sizes;
-  std::string_view token = tokens.next();
-  for (; token == "["; token = tokens.next()) {
-    sizes.push_back(tokens.next());
-    if (tokens.next() != "]") throw std::logic_error("bad dimension of " + field.name);
+  std::string_view token = tokens.want();
+  for (; token == "["; token = tokens.want()) {
+    sizes.push_back(tokens.want());
+    if (tokens.want() != "]") tokens.fail("the dimension of '" + field.name + "' has no ]");
   }
+  if (token != "," && token != ";")
+    tokens.fail("'" + std::string(token) + "' stands behind '" + field.name +
+                "'; allowed are [, \",\" and ;");
   parsed.hash = mix(parsed.hash, static_cast<uint8_t>(sizes.size()));
   for (const std::string_view size : sizes) {
     Dimension dimension;
     const bool fixed = std::isdigit(static_cast<unsigned char>(size.front())) != 0;
     if (fixed) {
-      std::from_chars(size.data(), size.data() + size.size(), dimension.size);
+      const auto [end, error] =
+          std::from_chars(size.data(), size.data() + size.size(), dimension.size);
+      if (error != std::errc() || end != size.data() + size.size())
+        tokens.fail("the length '" + std::string(size) + "' of '" + field.name +
+                    "' is no whole number");
     } else {
       const auto& fields = parsed.schema.fields;
       const auto counter = std::find_if(fields.begin(), fields.end(),
                                         [&](const Field& f) { return f.name == size; });
-      if (counter == fields.end()) throw std::logic_error("unknown length " + std::string(size));
+      if (counter == fields.end())
+        tokens.fail("the length '" + std::string(size) + "' of '" + field.name +
+                    "' is no field before it");
       dimension.counted_by = static_cast<int>(counter - fields.begin());
     }
     parsed.hash = mix(mix(parsed.hash, static_cast<uint8_t>(fixed ? 0 : 1)), size);
@@ -129,17 +160,16 @@ bool parse_member(Tokens& tokens, std::string_view type, Parsed& parsed) {
   return token == ",";
 }
 
-void parse_file(std::string_view text, std::deque<Parsed>& all) {
-  Tokens tokens(text);
+void parse_file(std::string_view text, const std::string& file, std::deque<Parsed>& all) {
+  Tokens tokens(text, file);
   for (std::string_view token = tokens.next(); !token.empty(); token = tokens.next()) {
     if (token != "struct") continue;
     Parsed parsed;
-    parsed.schema.name = tokens.next();
-    if (tokens.next() != "{") throw std::logic_error("no body of " + parsed.schema.name);
-    for (token = tokens.next(); token != "}"; token = tokens.next()) {
-      if (token.empty()) throw std::logic_error("no end of " + parsed.schema.name);
+    parsed.schema.name = tokens.want();
+    if (tokens.want() != "{") tokens.fail("'" + parsed.schema.name + "' has no {");
+    for (token = tokens.want(); token != "}"; token = tokens.want()) {
       if (token == "const") {
-        while (tokens.next() != ";") {
+        while (tokens.want() != ";") {
         }
         continue;
       }
@@ -150,55 +180,91 @@ void parse_file(std::string_view text, std::deque<Parsed>& all) {
   }
 }
 
-struct Registry {
-  std::vector<Schema> schemas;  // by name
-  std::map<int64_t, const Schema*> by_fingerprint;
-
-  Registry() {
+// Ruedo's types, or a user's, which may hold some of Ruedo's.
+class Registry {
+ public:
+  // texts: of .lcm files, each with its name. Throws InputError.
+  Registry(const std::vector<std::pair<std::string, std::string>>& texts, const Registry* others) {
     std::deque<Parsed> parsed;
-    for (size_t i = 0; i < kLcmSourceCount; ++i) parse_file(kLcmSources[i], parsed);
+    for (const auto& [file, text] : texts) parse_file(text, file, parsed);
     std::sort(parsed.begin(), parsed.end(),
               [](const Parsed& a, const Parsed& b) { return a.schema.name < b.schema.name; });
-    for (const Parsed& p : parsed) schemas.push_back(p.schema);
-    for (size_t i = 0; i < schemas.size(); ++i) {
-      for (size_t f = 0; f < schemas[i].fields.size(); ++f) {
-        Field& field = schemas[i].fields[f];
-        if (field.primitive == Primitive::none)
-          field.type = find(without_package(parsed[i].type_names[f]));
+    for (const Parsed& p : parsed) schemas_.push_back(p.schema);
+    for (size_t i = 0; i < schemas_.size(); ++i) {
+      for (size_t f = 0; f < schemas_[i].fields.size(); ++f) {
+        Field& field = schemas_[i].fields[f];
+        const std::string_view type = without_package(parsed[i].type_names[f]);
+        if (field.primitive != Primitive::none) continue;
+        field.type = find(type);
+        if (field.type == nullptr && others != nullptr) field.type = others->find(type);
+        if (field.type == nullptr)
+          throw InputError({schemas_[i].name}, "'" + field.name + "' is of the type '" +
+                                                   parsed[i].type_names[f] +
+                                                   "', which is in no .lcm file that was read");
       }
     }
-    for (size_t i = 0; i < schemas.size(); ++i) {
-      schemas[i].fingerprint = static_cast<int64_t>(fingerprint(i, parsed));
-      by_fingerprint.emplace(schemas[i].fingerprint, &schemas[i]);
+    for (size_t i = 0; i < schemas_.size(); ++i) {
+      schemas_[i].fingerprint = static_cast<int64_t>(fingerprint(schemas_[i], parsed, 0));
+      by_fingerprint_.emplace(schemas_[i].fingerprint, &schemas_[i]);
     }
   }
 
   const Schema* find(std::string_view name) const {
     const auto at =
-        std::lower_bound(schemas.begin(), schemas.end(), name,
+        std::lower_bound(schemas_.begin(), schemas_.end(), name,
                          [](const Schema& s, std::string_view n) { return s.name < n; });
-    return at != schemas.end() && at->name == name ? &*at : nullptr;
+    return at != schemas_.end() && at->name == name ? &*at : nullptr;
   }
+  const Schema* find(int64_t fingerprint) const {
+    const auto at = by_fingerprint_.find(fingerprint);
+    return at == by_fingerprint_.end() ? nullptr : at->second;
+  }
+  std::span<const Schema> schemas() const { return schemas_; }
 
  private:
   static std::string_view without_package(std::string_view type) {
     return type.substr(type.rfind('.') + 1);
   }
 
-  // No type of ours holds itself, so the recursion ends.
-  uint64_t fingerprint(size_t index, const std::deque<Parsed>& parsed) const {
-    uint64_t hash = parsed[index].hash;
-    for (const Field& field : schemas[index].fields) {
-      if (field.type != nullptr)
-        hash += fingerprint(static_cast<size_t>(field.type - schemas.data()), parsed);
+  // LCM's hash of a type of this registry, or, as it stands there, of another one.
+  uint64_t fingerprint(const Schema& schema, const std::deque<Parsed>& parsed, size_t depth) const {
+    if (&schema < schemas_.data() || &schema >= schemas_.data() + schemas_.size())
+      return static_cast<uint64_t>(schema.fingerprint);
+    if (depth > schemas_.size())
+      throw InputError({schema.name}, "holds itself, which cannot be read");
+    uint64_t hash = parsed[static_cast<size_t>(&schema - schemas_.data())].hash;
+    for (const Field& field : schema.fields) {
+      if (field.type != nullptr) hash += fingerprint(*field.type, parsed, depth + 1);
     }
     return (hash << 1) + (hash >> 63);
   }
+
+  std::vector<Schema> schemas_;  // by name
+  std::map<int64_t, const Schema*> by_fingerprint_;
 };
 
 const Registry& registry() {
-  static const Registry kRegistry;
+  static const Registry kRegistry(
+      [] {
+        std::vector<std::pair<std::string, std::string>> texts;
+        for (size_t i = 0; i < kLcmSourceCount; ++i) texts.emplace_back("proto", kLcmSources[i]);
+        return texts;
+      }(),
+      nullptr);
   return kRegistry;
+}
+
+// Of the user's .lcm files; null before read_types().
+std::unique_ptr<const Registry>& own_registry() {
+  static std::unique_ptr<const Registry> own;
+  return own;
+}
+
+std::string text_of(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (!file) throw InputError({path.string()}, "cannot be read");
+  return text;
 }
 
 }  // namespace
@@ -206,10 +272,29 @@ const Registry& registry() {
 const Schema* find_schema(std::string_view name) { return registry().find(name); }
 
 const Schema* find_schema(int64_t fingerprint) {
-  const auto at = registry().by_fingerprint.find(fingerprint);
-  return at == registry().by_fingerprint.end() ? nullptr : at->second;
+  const Schema* found = registry().find(fingerprint);
+  return found != nullptr || !own_registry() ? found : own_registry()->find(fingerprint);
 }
 
-std::span<const Schema> schemas() { return registry().schemas; }
+void read_types(const std::vector<std::string>& places) {
+  std::vector<std::pair<std::string, std::string>> texts;
+  for (const std::string& place : places) {
+    std::vector<fs::path> files;
+    std::error_code error;
+    if (fs::is_directory(place, error)) {
+      for (const auto& entry : fs::directory_iterator(place, error)) {
+        if (entry.path().extension() == ".lcm") files.push_back(entry.path());
+      }
+      if (error || files.empty()) throw InputError({place}, "the folder has no .lcm file");
+      std::sort(files.begin(), files.end());
+    } else {
+      files.emplace_back(place);
+    }
+    for (const fs::path& file : files) texts.emplace_back(file.string(), text_of(file));
+  }
+  if (!texts.empty()) own_registry() = std::make_unique<const Registry>(texts, &registry());
+}
+
+std::span<const Schema> schemas() { return registry().schemas(); }
 
 }  // namespace ruedo

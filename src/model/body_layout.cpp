@@ -133,12 +133,6 @@ Grouping group(const Model& model) {
 
 namespace {
 
-// What turning by an angle does to the link, in its own frame.
-Pose turned(const WheelPlacement& wheel, double angle) {
-  const Quat turn(Eigen::AngleAxisd(angle, wheel.axis_in_L));
-  return {turn, wheel.center_in_L - turn * wheel.center_in_L};
-}
-
 // The rim's speed for a speed of base_link of 1 ahead, 1 to the left, and 1 rad/s. p: the wheel in
 // base_link; axis: about which it turns, there.
 Vec3 rim_of(const DriveDescription& drive, bool left, const Vec3& p, const Vec3& axis) {
@@ -158,21 +152,6 @@ Vec3 rim_of(const DriveDescription& drive, bool left, const Vec3& p, const Vec3&
 }
 
 }  // namespace
-
-Pose BodyLayout::link_in_body(int link, const std::vector<double>& wheel_angles) const {
-  const LinkPlacement& placement = links[static_cast<size_t>(link)];
-  if (placement.wheel < 0) return placement.X_BL;
-  const WheelPlacement& wheel = wheels[static_cast<size_t>(placement.wheel)];
-  const Pose& X_BWheel = links[static_cast<size_t>(wheel.link)].X_BL;
-  const Pose X_turn = turned(wheel, wheel_angles[static_cast<size_t>(placement.wheel)]);
-  const Pose X_BL = wheel.link == link ? X_BWheel * X_turn
-                                       : X_BWheel * X_turn * X_BWheel.inverse() * placement.X_BL;
-  if (wheel.on < 0) return X_BL;
-  const WheelPlacement& steer = wheels[static_cast<size_t>(wheel.on)];
-  const Pose& X_BSteer = links[static_cast<size_t>(steer.link)].X_BL;
-  return X_BSteer * turned(steer, wheel_angles[static_cast<size_t>(wheel.on)]) *
-         X_BSteer.inverse() * X_BL;
-}
 
 // Of the last models seen: fleets follow one another.
 struct BodyLayout::Known {

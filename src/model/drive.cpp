@@ -9,9 +9,11 @@
 #include "core/whole.h"
 #include "model/drive_guess.h"
 #include "model/geometry.h"
+#include "model/own_plugins.h"
 #include "model/plugins.h"
 #include "model/ros_control.h"
 #include "model/sdf_link.h"
+#include "ruedo/drive.h"
 #include "ruedo/math.h"
 
 namespace ruedo::model {
@@ -395,14 +397,31 @@ const std::vector<std::string>& odometry_elements() {
   return names;
 }
 
+namespace {
+
+bool is_own_drive(const std::string& type) {
+  const auto& kinds = drive_kinds();
+  return std::any_of(kinds.begin(), kinds.end(),
+                     [&](const DriveKind& kind) { return kind.type == type; });
+}
+
+std::string drive_types() {
+  std::string all = "kinematic";
+  for (const DriveKind& kind : drive_kinds()) all += ", " + kind.type;
+  return all + " and wheels";
+}
+
+}  // namespace
+
 DriveDescription read_drive(std::shared_ptr<const Element> element,
                             std::shared_ptr<const Element> odometry, const Model& model) {
   const Element& e = *element;
-  e.refuse_unknown(drive_elements(), false);
   DriveDescription drive;
   const std::string* type = e.attribute("type");
-  if (type && *type != "kinematic" && *type != "wheels")
-    e.fail("type '" + *type + "' is not allowed; allowed are kinematic and wheels");
+  const bool own = type && is_own_drive(*type);
+  if (type && *type != "kinematic" && *type != "wheels" && !own)
+    e.fail("type '" + *type + "' is not allowed; allowed are " + drive_types());
+  e.refuse_unknown(drive_elements(), own);  // a plugin's drive reads children of its own
   if (type && *type == "wheels") drive.kind = DriveDescription::Kind::wheels;
   drive.steering = read_steering(e);
   read_joints(e, model, drive);
@@ -436,6 +455,9 @@ DriveDescription read_drive(std::shared_ptr<const Element> element,
         ->fail("'odometry' is not allowed with steering '" + name_of(drive.steering) +
                "'; allowed is truth");
   }
+  if (own && drive.on_odometry)
+    e.child("ruedo:primitives")
+        ->fail("'odometry' is not allowed with a plugin's drive; allowed is truth");
   if (wheels && !drive.on_odometry)
     e.child("ruedo:primitives")
         ->fail(
@@ -560,14 +582,15 @@ void find_drive(const Element& model_element, const std::vector<const Element*>&
 
 void read_drive_of(const Element& model_element, const std::string& where, ReadContext& context,
                    Model& model) {
+  std::vector<const Element*> plugins;
+  collect_plugins(model_element, plugins);
+  load_own_plugins(plugins);
   std::shared_ptr<const Element> odometry;
   if (const Element* written = model_element.child("ruedo:odometry")) odometry = written->clone();
   if (const auto drives = model_element.all("ruedo:drive"); !drives.empty()) {
     if (drives.size() > 1) drives[1]->fail("a second drive; a model has one");
     model.drive = read_drive(drives[0]->clone(), odometry, model);
   }
-  std::vector<const Element*> plugins;
-  collect_plugins(model_element, plugins);
   std::set<std::string> named;
   name_lone_track(plugins, where, context.findings);
   for (const Element* plugin : plugins) {

@@ -8,6 +8,7 @@
 
 #include "core/progress.h"
 #include "model/drive.h"
+#include "model/own_plugins.h"
 #include "model/placement.h"
 #include "model/sdf_link.h"
 #include "model/sdf_reader.h"
@@ -33,6 +34,7 @@ class Loader {
         path_(path) {}
 
   std::shared_ptr<const WorldModel> load(const Element& written, const LoadOptions& options) {
+    const LoadsPlugins loads_plugins;
     findings_ = {};
     world_ = {};
     world_.file = path_;

@@ -253,6 +253,9 @@ std::string system_of(const std::string& library) {
 PluginKind kind_of(const Element& plugin) {
   const std::string* name = plugin.attribute("name");
   const std::string* filename = plugin.attribute("filename");
+  // A user's own: own_plugins.h.
+  if (name && (*name == "ruedo" || begins_with(*name, "ruedo::")))
+    return {filename ? *filename : "", Does::served, ""};
   const std::string library = filename ? library_of(*filename) : "";
   std::string system = system_of(library);
   for (const char* space : {"::systems::", "gz_ros2_control::", "ign_ros2_control::"}) {

@@ -8,6 +8,7 @@
 #include "model/crowd.h"
 #include "model/environment.h"
 #include "model/material.h"
+#include "model/own_plugins.h"
 #include "model/placement.h"
 #include "model/plugins.h"
 #include "model/sdf_link.h"
@@ -346,6 +347,7 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
   name_what_has_no_effect(element, world.environment, in_world, findings);
 
   std::set<std::string> named;
+  load_own_plugins(element.all("plugin"));
   for (const Element* plugin : element.all("plugin")) {
     const PluginKind kind = kind_of(*plugin);
     const bool dead = kind.does == PluginKind::Does::dead;

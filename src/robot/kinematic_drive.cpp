@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "physics/state_check.h"
+#include "robot/base_motion.h"
 #include "robot/ground.h"
 #include "ruedo/math.h"
 
@@ -57,7 +59,24 @@ KinematicDrive::KinematicDrive(const model::WorldModel& world, const model::Body
       lever_(description_.track > 0.0 ? 0.5 * description_.track : kLeverWithoutWheels_m),
       max_force_(std::min(description_.max_force, mass_ * world.gravity.norm())),
       gravity_(world.gravity) {
+  make_model();
   stand_on_near_plane();
+}
+
+const std::string& KinematicDrive::robot_name() const {
+  return world_.models[static_cast<size_t>(layout_.robots[static_cast<size_t>(robot_)].instance)]
+      .name;
+}
+
+void KinematicDrive::make_model() {
+  const Element* element = description_.element.get();
+  const std::string* type = element ? element->attribute("type") : nullptr;
+  if (!type) return;
+  for (const DriveKind& kind : drive_kinds()) {
+    if (kind.type == *type) model_ = kind.make({*element, robot_name(), step_s_});
+  }
+  made_ = {};
+  lag_ = {};
 }
 
 void KinematicDrive::stand_on_near_plane() {
@@ -84,6 +103,7 @@ void KinematicDrive::begin_at_rest() {
   touched_ = held_ = behind_ = false;
   sent_.setZero();
   way_ = {};
+  make_model();
   if (on_plane_) leave_plane();
   supported_ = false;
   stand_on_near_plane();
@@ -206,12 +226,38 @@ void KinematicDrive::wake() {
   physics_.wake(body_);
 }
 
+// What the plugin's drive makes of the plan.
+Displacement KinematicDrive::follow_model(SimTime now) {
+  const BaseVelocity asked{planned_.way / step_s_, planned_.side / step_s_,
+                           planned_.angle / step_s_};
+  const BaseVelocity actual{twist_.linear.x(), twist_.linear.y(), twist_.angular.z()};
+  made_ = model_->step({now, asked, actual, X_WBase_});
+  if (!std::isfinite(made_.ahead) || !std::isfinite(made_.left) || !std::isfinite(made_.turn)) {
+    throw physics::StateError(
+        robot_name() + ": its drive '" + *description_.element->attribute("type") +
+        "' gave the velocity " + std::to_string(made_.ahead) + ", " + std::to_string(made_.left) +
+        ", " + std::to_string(made_.turn) + " at " + std::to_string(now) + " us");
+  }
+  const Displacement made =
+      along_twist(made_.ahead * step_s_, made_.left * step_s_, made_.turn * step_s_);
+  lag_.way += planned_.way - made.way;
+  lag_.angle += planned_.angle - made.angle;
+  lag_.moving = !is_still();
+  return made;
+}
+
+bool KinematicDrive::is_still() const {
+  return !model_ ||
+         (math::hypot(made_.ahead, made_.left) < kStill_m_s && std::abs(made_.turn) < kStill_rad_s);
+}
+
 void KinematicDrive::before_step(SimTime now) {
   if (asleep_) {
     if (physics_.sleeping(body_)) return;
     wake();
   }
   way_ = planned_ = motion_.step(now, step_us_);
+  if (model_) way_ = follow_model(now);
   if (description_.on_odometry) {  // the wheels turn as the robot believes it must; what comes of
                                    // it depends on what they are
     believed_heading_ = wrap_angle(believed_heading_ + planned_.angle);
@@ -325,6 +371,7 @@ void KinematicDrive::after_step(SimTime now) {
 
 // What the wheels, at the rates of the plan, make of speed and turn rate.
 PlaneMotion KinematicDrive::of_wheels() const {
+  if (model_) return {made_.ahead, made_.turn};
   if (!description_.on_odometry) return {motion_.v(), motion_.omega()};
   return WheelKinematics::real(description_)
       .motion(WheelKinematics::believed(description_).wheels({motion_.v(), motion_.omega()}));
@@ -333,7 +380,9 @@ PlaneMotion KinematicDrive::of_wheels() const {
 // On odometry the wheels do as planned, and the robot believes them.
 void KinematicDrive::finish(SimTime now, double way, double angle, bool touched) {
   if (description_.on_odometry) return motion_.finish(now, planned_.way, planned_.angle, false);
-  motion_.finish(now, way, angle, touched);
+  motion_.finish(now, way, angle, touched, lag_);
+  if (touched || !motion_.has_primitive())
+    lag_ = {0.0, 0.0, lag_.moving};  // a velocity is not made up for
 }
 
 void KinematicDrive::after_on_plane(SimTime now) {
@@ -344,7 +393,7 @@ void KinematicDrive::after_on_plane(SimTime now) {
     if (std::abs(heading_) > M_PI) heading_ = wrap_angle(heading_);
     finish(now, way_.way, way_.angle, false);
     const PlaneMotion wheels = of_wheels();
-    const Twist twist{{wheels.v, motion_.side(), 0.0}, {0.0, 0.0, wheels.omega}};
+    const Twist twist{{wheels.v, side(), 0.0}, {0.0, 0.0, wheels.omega}};
     set_state(next_, twist);
     physics_.set_twist(body_, body_twist(X_WBase_, twist));
     fall_asleep_when_still(true);
@@ -390,7 +439,7 @@ void KinematicDrive::after_on_contacts(SimTime now) {
   finish(now, way_.way, way_.angle, false);
   const PlaneMotion wheels = of_wheels();
   twist.linear.x() = wheels.v + carrier_.linear.x();
-  twist.linear.y() = motion_.side() + carrier_.linear.y();
+  twist.linear.y() = side() + carrier_.linear.y();
   twist.angular.z() = wheels.omega + carrier_.angular.z();
   physics_.set_pose(body_, X_WBase * X_BaseB_);
   physics_.set_twist(body_, body_twist(X_WBase, twist));
@@ -402,7 +451,7 @@ void KinematicDrive::after_on_contacts(SimTime now) {
 }
 
 void KinematicDrive::fall_asleep_when_still(bool still) {
-  if (!still || !motion_.resting()) {
+  if (!still || !motion_.resting() || !is_still()) {
     still_us_ = 0;
     return;
   }
@@ -415,7 +464,7 @@ void KinematicDrive::fall_asleep_when_still(bool still) {
 }
 
 void KinematicDrive::read_wheels(Snapshot& snapshot) const {
-  wheel_angles_.read(snapshot, {wheel_v_, motion_.side(), wheel_omega_}, motion_.curvature());
+  wheel_angles_.read(snapshot, {wheel_v_, side(), wheel_omega_}, motion_.curvature());
 }
 
 }  // namespace ruedo::robot

@@ -12,11 +12,13 @@
 // level plane only against what it touches.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "robot/drive.h"
 #include "robot/ground.h"
 #include "robot/wheel_angles.h"
+#include "ruedo/drive.h"
 
 namespace ruedo::robot {
 
@@ -34,6 +36,11 @@ class KinematicDrive final : public Drive {
 
  private:
   void begin_at_rest() override;
+  const std::string& robot_name() const;
+  void make_model();
+  Displacement follow_model(SimTime now);
+  double side() const { return model_ ? made_.left : motion_.side(); }
+  bool is_still() const;
   void stand_on_near_plane();
   void choose_support();
   void stand_on_plane(const LevelPlane& plane);
@@ -67,10 +74,13 @@ class KinematicDrive final : public Drive {
   Twist carrier_{
       Vec3::Zero(),
       Vec3::Zero()};  // of what carries it, at base_link and in it; zero: it stands still
-  std::vector<Contact> carriers_;  // contacts of the wheels with what can move
-  double plane_friction_ = 1.0;    // of the plane that it stands on
-  Displacement way_, planned_;     // that the wheels make in this step, and the plan
-  double heading_ = 0.0;           // of base_link on a plane, rad
+  std::vector<Contact> carriers_;      // contacts of the wheels with what can move
+  double plane_friction_ = 1.0;        // of the plane that it stands on
+  Displacement way_, planned_;         // that the wheels make in this step, and the plan
+  std::unique_ptr<DriveModel> model_;  // a plugin's drive; null: the base does as planned
+  BaseVelocity made_;                  // what the plugin's drive gave last
+  Lag lag_;                            // of what it made, behind the plan
+  double heading_ = 0.0;               // of base_link on a plane, rad
   WheelAngles wheel_angles_;
   SimTime still_us_ = 0;
   Pose next_;  // of base_link after this step, on a plane

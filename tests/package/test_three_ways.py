@@ -79,10 +79,20 @@ def archive(tmp_path_factory):
 
 
 def test_find_package(tmp_path):
+    """The client, and the engine as its page shows it."""
     run(CMAKE, "--install", BUILD, "--prefix", tmp_path / "ruedo")
-    program, error = use("package", tmp_path / "build", f"-DCMAKE_PREFIX_PATH={tmp_path / 'ruedo'}")
+    page = (SOURCE / "docs/engine.md").read_text(encoding="utf-8")
+    code = re.search(r"<!-- test: engine cpp -->\n```cpp\n(.*?)```", page, re.DOTALL).group(1)
+    (tmp_path / "embedded.cpp").write_text(code)
+    program, error = use(
+        "package",
+        tmp_path / "build",
+        f"-DCMAKE_PREFIX_PATH={tmp_path / 'ruedo'}",
+        f"-DEMBEDDED={tmp_path / 'embedded.cpp'}",
+    )
     assert Path(program).resolve() == tmp_path / "ruedo/bin/ruedo"
     assert "/nowhere" in error
+    assert run(tmp_path / "build/embedded", cwd="/") == "5 s, 181 beams\n"
 
 
 def test_add_subdirectory(tmp_path):

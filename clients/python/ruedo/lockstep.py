@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from . import lcmtypes, samples
+from . import lcmtypes
 from .control import State
 from .errors import LeaseLost, NoServer, RequestError, RuedoError, Timeout, TypeMismatch
 from .stream import Stream
@@ -85,13 +85,13 @@ class Observations(State):
         """The samples of a device or stream, decoded, in order; none when none was due. Raises
         TypeMismatch.
         """
-        return [_sample(m.data, stream) for m in self.messages if m.channel == stream.channel]
+        return [stream._sample_of(m.data) for m in self.messages if m.channel == stream.channel]
 
     def latest(self, stream: Stream[T]) -> T | None:
         """The last of them."""
         for message in reversed(self.messages):
             if message.channel == stream.channel:
-                return _sample(message.data, stream)
+                return stream._sample_of(message.data)
         return None
 
 
@@ -120,21 +120,6 @@ def observed(state: State | tuple[int, int, int], messages: list[Message]) -> Ob
         )
     values["messages"] = messages
     return made
-
-
-def _sample(data: bytes, stream: Stream[T]) -> T:
-    message, convert = samples.CONVERSIONS.get(stream.type, (None, None))
-    if message is None or convert is None or data[:8] != message._get_packed_fingerprint():
-        raise TypeMismatch(
-            f"{stream.channel} carries another type than {stream.type}, or another version of it"
-        )
-    try:
-        sample: T = convert(message.decode(data))
-    except Exception as error:
-        raise TypeMismatch(
-            f"{stream.channel}: a message is no valid {stream.type} ({error})"
-        ) from None
-    return sample
 
 
 class _Entry:

@@ -27,7 +27,7 @@ from .samples import (
     Scan,
     SonarReading,
 )
-from .stream import Stream
+from .stream import RAW, Form, Stream, form_of
 
 if TYPE_CHECKING:
     from .simulation import Simulation
@@ -399,6 +399,26 @@ class Robot:
         command.deceleration = _limit("deceleration", deceleration)
         return command
 
+    def stream(self, name: str, type: Any = None, *, raw: bool = False) -> Stream[Any]:
+        """The messages of a device or channel, by its name ("temp"); of a plugin's, too.
+
+        type: the class that lcm-gen made of its .lcm file; samples are its objects. raw: samples
+        are the bytes of the messages. Neither: Ruedo's own samples, where there are some of its
+        type. What step() returns takes the stream, too.
+        Raises UnknownName; at the first use TypeMismatch.
+        """
+        if type is not None and raw:
+            raise TypeError("stream() takes a type or raw=True, not both")
+        form = RAW if raw else form_of(type) if type is not None else None
+        outputs = [channel for channel in self._channels if not channel.input]
+        for channel in outputs:
+            if name in (channel.device, channel.name) or channel.name == f"{self.name}/{name}":
+                if form is None and any(device.name == channel.device for device in self.devices):
+                    return next(d for d in self.devices if d.name == channel.device)
+                return self._plain(channel, form)
+        there = ", ".join(sorted({c.device or c.name for c in outputs}))
+        raise UnknownName(f"{self.name} publishes no {name!r}; it publishes {there or 'nothing'}")
+
     # Channels, by what info says of them: names on the bus may be remapped.
 
     @property
@@ -454,12 +474,13 @@ class Robot:
             f"{self.name}/{camera} publishes no {part}; <ruedo:{part}> in the world file switches it on"
         )
 
-    def _plain(self, channel: Any) -> Stream[Any]:
+    def _plain(self, channel: Any, form: Form | None = None) -> Stream[Any]:
         return self._sim._stream(
             channel,
             lambda: Stream(
-                self._sim, channel.name, channel.type, channel.fingerprint, channel.rate
+                self._sim, channel.name, channel.type, channel.fingerprint, channel.rate, form
             ),
+            form.key if form else None,
         )
 
 

@@ -95,7 +95,7 @@ class Simulation:
         self._session = Session(self, name)
         self._stepper = Stepper(self)
         self._ids = _name_hash(name) << 20  # two clients number their primitives apart
-        self._streams: dict[str, Stream[Any]] = {}  # by channel
+        self._streams: dict[tuple[str, Any], Stream[Any]] = {}  # by channel and form
         self._drivers: dict[str, Driver] = {}  # by robot
         self._repeating: set[Driver] = set()
         self._another_run = False  # is what the last tick was of
@@ -432,12 +432,14 @@ class Simulation:
             self._last_sign = time.monotonic()
             self._news.notify_all()
 
-    def _stream(self, channel: Any, make: Callable[[], Stream[Any]]) -> Stream[Any]:
-        """The stream of a channel, made on first use."""
+    def _stream(
+        self, channel: Any, make: Callable[[], Stream[Any]], form: Any = None
+    ) -> Stream[Any]:
+        """The stream of a channel, made on first use. form: the key of its Form."""
         with self._news:
-            known = self._streams.get(channel.name)
+            known = self._streams.get((channel.name, form))
             if known is None or known.type != channel.type:  # the next run's may be another
-                known = self._streams[channel.name] = make()
+                known = self._streams[channel.name, form] = make()
             return known
 
     def _driver(self, robot: str) -> Driver:
@@ -483,7 +485,7 @@ class Simulation:
             channels = {channel.name for channel in info.channel_list}
             gone = [name for name in self._drivers if name not in info.robots]
             streams = [
-                self._streams.pop(name) for name in list(self._streams) if name not in channels
+                self._streams.pop(key) for key in list(self._streams) if key[0] not in channels
             ]
             for name in [name for name in self._robots if name not in info.robots]:
                 del self._robots[name]

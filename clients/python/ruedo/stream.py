@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from . import samples
 from .bus import Subscription
@@ -15,6 +15,29 @@ if TYPE_CHECKING:
     from .simulation import Simulation
 
 T = TypeVar("T")
+
+
+class Form(NamedTuple):
+    """What a stream makes of its messages."""
+
+    fingerprint: bytes | None  # of the messages that it can be made of; None: of any
+    make: Callable[[bytes], Any]
+    key: Any  # what tells it from others: the class that lcm-gen made, or "raw"; None: the channel's own samples
+
+
+RAW = Form(None, bytes, "raw")
+
+
+def form_of(message: Any) -> Form:
+    """Of a class that lcm-gen made: its objects, as they are."""
+    try:
+        fingerprint = message._get_packed_fingerprint()
+        decode = message.decode
+    except AttributeError:
+        raise TypeError(
+            f"type is {message!r}: it must be a class that lcm-gen made of an .lcm file"
+        ) from None
+    return Form(fingerprint, decode, message)
 
 
 class Reader(Generic[T]):
@@ -45,8 +68,17 @@ class Stream(Reader[T]):
     own.
     """
 
-    def __init__(self, sim: Simulation, channel: str, type: str, fingerprint: int, rate: float):
+    def __init__(
+        self,
+        sim: Simulation,
+        channel: str,
+        type: str,
+        fingerprint: int,
+        rate: float,
+        form: Form | None = None,
+    ):
         super().__init__(self)
+        self._given = form
         self.channel, self.type, self.rate = channel, type, rate
         self._sim = sim
         self._fingerprint = fingerprint & 0xFFFFFFFFFFFFFFFF
@@ -80,17 +112,40 @@ class Stream(Reader[T]):
         with self._news:
             if self._source:
                 return
-            if self.type not in samples.CONVERSIONS:
-                raise TypeMismatch(
-                    f"{self.channel}: this client does not know the type {self.type} of the server's "
-                    f"Ruedo {self._sim.version}"
-                )
-            message, self._convert = samples.CONVERSIONS[self.type]
-            self._decode = message.decode
-            self._expected: bytes = message._get_packed_fingerprint()
-            if self._fingerprint != int.from_bytes(self._expected, "big"):
-                raise self._mismatch(self._fingerprint)
+            form = self._form()
+            if form.fingerprint and self._fingerprint != int.from_bytes(form.fingerprint, "big"):
+                raise self._mismatch(self._fingerprint, form.fingerprint)
             self._source = self._sim._bus.subscribe(self.channel, self._receive)
+
+    def _form(self) -> Form:
+        if self._given is None:
+            if self.type not in samples.CONVERSIONS:
+                name = self.channel.rpartition("/")[2]
+                raise TypeMismatch(
+                    f"{self.channel} carries {self.type}, of which this client has no samples: "
+                    f'robot.stream("{name}", {self.type}) takes the class that lcm-gen made of its .lcm file, '
+                    f'robot.stream("{name}", raw=True) gives the bytes'
+                )
+            message, convert = samples.CONVERSIONS[self.type]
+            self._given = Form(
+                message._get_packed_fingerprint(),
+                lambda data: convert(message.decode(data)),
+                None,
+            )
+        return self._given
+
+    def _sample_of(self, data: bytes) -> T:
+        """Raises TypeMismatch."""
+        form = self._form()
+        if form.fingerprint and data[:8] != form.fingerprint:
+            raise self._mismatch(int.from_bytes(data[:8], "big"), form.fingerprint)
+        try:
+            sample: T = form.make(data)
+        except Exception as error:
+            raise TypeMismatch(
+                f"{self.channel}: a message of {len(data)} bytes is no valid {self.type} ({error})"
+            ) from None
+        return sample
 
     def _end(self) -> None:
         """Its robot is gone."""
@@ -104,27 +159,26 @@ class Stream(Reader[T]):
         with self._news:
             self._sample = self._fault = None
 
-    def _mismatch(self, fingerprint: int) -> TypeMismatch:
+    def _mismatch(self, fingerprint: int, expected: bytes) -> TypeMismatch:
+        ours = int.from_bytes(expected, "big")
+        form = self._form()
+        if form.key is not None:
+            return TypeMismatch(
+                f"{self.channel} carries {self.type} (fingerprint {fingerprint:016x}), which {form.key.__name__} "
+                f"({ours:016x}) does not read: it is another type, or made of another version of its .lcm file"
+            )
         return TypeMismatch(
             f"{self.channel} carries another version of {self.type} (fingerprint {fingerprint:016x}) than "
-            f"this client reads ({int.from_bytes(self._expected, 'big'):016x}): the server is Ruedo "
+            f"this client reads ({ours:016x}): the server is Ruedo "
             f"{self._sim.version}; install the client of the same version"
         )
 
     def _receive(self, data: bytes) -> None:
         try:
-            if data[:8] != self._expected:
-                raise self._mismatch(int.from_bytes(data[:8], "big"))
-            sample = self._convert(self._decode(data))
-        except Exception as error:  # whatever came, the receiving thread lives
+            sample = self._sample_of(data)
+        except RuedoError as error:  # whatever came, the receiving thread lives
             with self._news:
-                self._fault = (
-                    error
-                    if isinstance(error, RuedoError)
-                    else TypeMismatch(
-                        f"{self.channel}: a message of {len(data)} bytes is no valid {self.type} ({error})"
-                    )
-                )
+                self._fault = error
                 self._news.notify_all()
             return
         with self._news:
@@ -132,7 +186,9 @@ class Stream(Reader[T]):
             self._count += 1
             self._news.notify_all()
             callbacks = self._callbacks
-        self._sim._note_time(sample.utime)
+        utime = getattr(sample, "utime", None)  # a type of a user's own may have none
+        if isinstance(utime, int):
+            self._sim._note_time(utime)
         for callback in callbacks:
             callback._call(sample)
 

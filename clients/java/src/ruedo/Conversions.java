@@ -35,10 +35,22 @@ final class Conversions {
     static final class Conversion {
         final long fingerprint;
         final Decoder decoder;
+        final boolean any; // of messages of any type
+        final String key; // what tells it from others of a channel; "": Ruedo's own samples
 
         Conversion(long fingerprint, Decoder decoder) {
+            this(fingerprint, decoder, false, "");
+        }
+
+        Conversion(long fingerprint, Decoder decoder, boolean any, String key) {
             this.fingerprint = fingerprint;
             this.decoder = decoder;
+            this.any = any;
+            this.key = key;
+        }
+
+        boolean reads(long found) {
+            return any || found == fingerprint;
         }
     }
 

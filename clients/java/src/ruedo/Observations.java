@@ -82,10 +82,10 @@ public final class Observations extends State {
 
     @SuppressWarnings("unchecked")
     private static <T extends Sample> T sample(Message message, Stream<T> stream) {
-        Conversions.Conversion conversion = Conversions.of(stream.type);
+        Conversions.Conversion conversion = stream.conversion;
         try {
             WireReader in = new WireReader(message.data);
-            if (conversion != null && in.int64() == conversion.fingerprint)
+            if (conversion != null && conversion.reads(in.int64()))
                 return (T) conversion.decoder.decode(in);
         } catch (IOException error) {
             throw new RuedoException.TypeMismatch(

@@ -324,6 +324,44 @@ public final class Robot {
         throw new RuedoException.UnknownName(name + " has no " + what + "; it has " + names(all));
     }
 
+    /**
+     * The messages of a device or channel, by its name ("temp"), of a plugin's, too. What step()
+     * returns takes the stream, too. Throws UnknownName.
+     *
+     * @param type the class that lcm-gen made of its .lcm file
+     * @param <M> that class
+     */
+    @SuppressWarnings("unchecked")
+    public <M> Stream<MessageSample<M>> stream(String device, Class<M> type) {
+        return (Stream<MessageSample<M>>) messages(device, MessageSample.of(type));
+    }
+
+    /** The same as bytes, whatever their type is. */
+    @SuppressWarnings("unchecked")
+    public Stream<MessageSample<byte[]>> rawStream(String device) {
+        return (Stream<MessageSample<byte[]>>) messages(device, MessageSample.raw());
+    }
+
+    private Stream<?> messages(String device, Conversions.Conversion conversion) {
+        List<String> there = new ArrayList<>();
+        for (channel_info_t channel : sim.info().channels(name)) {
+            if (channel.input) continue;
+            if (device.equals(channel.device)
+                    || device.equals(channel.name)
+                    || channel.name.equals(name + "/" + device)) {
+                return sim.stream(
+                        channel, conversion.key, () -> new Stream<>(sim, channel, conversion));
+            }
+            there.add(channel.device.isEmpty() ? channel.name : channel.device);
+        }
+        throw new RuedoException.UnknownName(
+                name
+                        + " publishes no '"
+                        + device
+                        + "'; it publishes "
+                        + (there.isEmpty() ? "nothing" : String.join(", ", there)));
+    }
+
     private Stream<?> firstStream(String type, String what) {
         for (Device<?> device : devices()) {
             if (device.type.equals(type)) return device;

@@ -474,12 +474,18 @@ public final class Simulation implements AutoCloseable {
 
     /** The stream of a channel, made on first use. */
     Stream<?> stream(channel_info_t channel, Supplier<Stream<?>> make) {
+        return stream(channel, "", make);
+    }
+
+    /** form: the key of its conversion. */
+    Stream<?> stream(channel_info_t channel, String form, Supplier<Stream<?>> make) {
+        String key = channel.name + "\0" + form;
         synchronized (robots) {
-            Stream<?> known = streams.get(channel.name);
+            Stream<?> known = streams.get(key);
             if (known == null
                     || !known.type.equals(channel.type)) { // the next run's may be another
                 known = make.get();
-                streams.put(channel.name, known);
+                streams.put(key, known);
             }
             return known;
         }
@@ -505,11 +511,8 @@ public final class Simulation implements AutoCloseable {
                         if (!info.robots.containsKey(name)) gone.add(driver);
                     });
             drivers.keySet().retainAll(info.robots.keySet());
-            streams.forEach(
-                    (name, stream) -> {
-                        if (!channels.contains(name)) ended.add(stream);
-                    });
-            streams.keySet().retainAll(channels);
+            streams.values()
+                    .removeIf(stream -> !channels.contains(stream.channel) && ended.add(stream));
         }
         endDrivers(gone, "removed");
         for (Stream<?> stream : ended) stream.end();

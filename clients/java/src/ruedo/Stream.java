@@ -25,7 +25,7 @@ public class Stream<T extends Sample> extends Reader<T> {
 
     final Simulation sim;
     private final long fingerprint;
-    private final Conversions.Conversion conversion;
+    final Conversions.Conversion conversion; // null: there is none for the type
     private final List<Subscription> callbacks = new CopyOnWriteArrayList<>();
     private Subscription source; // these under this object's monitor
     private T sample;
@@ -33,13 +33,17 @@ public class Stream<T extends Sample> extends Reader<T> {
     private RuedoException fault;
 
     Stream(Simulation sim, channel_info_t info) {
+        this(sim, info, Conversions.of(info.type));
+    }
+
+    Stream(Simulation sim, channel_info_t info, Conversions.Conversion conversion) {
         super(null);
         this.sim = sim;
         channel = info.name;
         type = info.type;
         rate = info.rate;
         fingerprint = info.fingerprint;
-        conversion = Conversions.of(type);
+        this.conversion = conversion;
     }
 
     /** A reader that has seen nothing yet. */
@@ -66,12 +70,15 @@ public class Stream<T extends Sample> extends Reader<T> {
             if (conversion == null) {
                 throw new RuedoException.TypeMismatch(
                         channel
-                                + ": this client does not know the type "
+                                + " carries "
                                 + type
-                                + " of the server's Ruedo "
-                                + sim.version());
+                                + ", of which this client has no samples: robot.stream(\""
+                                + channel.substring(channel.lastIndexOf('/') + 1)
+                                + "\", "
+                                + type
+                                + ".class) takes the class that lcm-gen made of its .lcm file");
             }
-            if (fingerprint != conversion.fingerprint) throw mismatch(fingerprint);
+            if (!conversion.reads(fingerprint)) throw mismatch(fingerprint);
             source = sim.bus.subscribe(channel, this::receive);
         }
     }
@@ -93,6 +100,13 @@ public class Stream<T extends Sample> extends Reader<T> {
     }
 
     private RuedoException.TypeMismatch mismatch(long found) {
+        if (!conversion.key.isEmpty()) {
+            return new RuedoException.TypeMismatch(
+                    String.format(
+                            "%s carries %s (fingerprint %016x), which %s (%016x) does not read: it"
+                                + " is another type, or made of another version of its .lcm file",
+                            channel, type, found, conversion.key, conversion.fingerprint));
+        }
         return new RuedoException.TypeMismatch(
                 String.format(
                         "%s carries another version of %s (fingerprint %016x) than this client"
@@ -108,7 +122,7 @@ public class Stream<T extends Sample> extends Reader<T> {
         try {
             WireReader in = new WireReader(message);
             long found = in.int64();
-            if (found != conversion.fingerprint) throw mismatch(found);
+            if (!conversion.reads(found)) throw mismatch(found);
             received = (T) conversion.decoder.decode(in);
         } catch (RuedoException error) {
             wrong = error;
@@ -132,7 +146,7 @@ public class Stream<T extends Sample> extends Reader<T> {
             notifyAll();
         }
         if (received == null) return;
-        sim.noteTime(received.utime);
+        if (received.utime != 0) sim.noteTime(received.utime);
         for (Subscription callback : callbacks) callback.call(received);
     }
 

@@ -19,6 +19,11 @@ final class WireReader {
         bytes = ByteBuffer.wrap(message);
     }
 
+    /** The whole message, whatever was read of it. */
+    byte[] whole() {
+        return bytes.array();
+    }
+
     private interface Read<T> {
         T read();
     }

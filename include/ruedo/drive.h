@@ -1,0 +1,72 @@
+// What the author of a drive writes against: how fast a base really goes for what it is asked. A
+// drive is one source file: a class derived from DriveModel, and one registration at its end.
+// docs/plugins.md is the story.
+//
+// Commands, limits, motion primitives, the watchdog and contacts stay Ruedo's: a DriveModel stands
+// between what the plan wants in a step and what the wheels do. What it returns holds as long as
+// nothing is touched; against contacts the base pushes with the drive's force, as the kinematic
+// drive does.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ruedo/element.h"
+#include "ruedo/pose.h"
+#include "ruedo/sim_time.h"
+
+namespace ruedo {
+
+/// Velocity of base_link in its own plane, expressed in base_link.
+struct BaseVelocity {
+  double ahead = 0.0;  ///< m/s
+  double left = 0.0;   ///< m/s
+  double turn = 0.0;   ///< rad/s, positive to the left
+};
+
+/// What a drive is told when it is made.
+struct DriveSetup {
+  const Element&
+      element;        ///< its `<ruedo:drive type="...">`; children of one's own are read from it
+  std::string robot;  ///< name
+  double step_s;      ///< length of a step, s
+};
+
+/// What a drive is given for a step.
+struct DriveInput {
+  SimTime time;         ///< us, at the beginning of the step
+  BaseVelocity asked;   ///< mean over the step, by the command in force, within the robot's limits
+  BaseVelocity actual;  ///< at the beginning of the step: what contacts left of it
+  const Pose& X_WBase;  ///< base_link in the world
+};
+
+/// One robot's drive. It reads its input, its configuration and its own state, and nothing else: no
+/// clock, no other robot, no generator seeded by anything.
+class DriveModel {
+ public:
+  virtual ~DriveModel() = default;
+  /// Called once a step, in order; not while the robot rests.
+  /// @return the mean velocity of base_link over the step
+  /// @throws std::exception ends the run, which says the text
+  virtual BaseVelocity step(const DriveInput& input) = 0;
+};
+
+/// A kind of drive: `<ruedo:drive type="TYPE">`.
+struct DriveKind {
+  std::string type;
+  /// Reads the element; throws InputError. Called again when the robot is put somewhere, or begins
+  /// anew.
+  std::function<std::unique_ptr<DriveModel>(const DriveSetup&)> make;
+};
+
+/// All registered kinds, by type.
+const std::vector<DriveKind>& drive_kinds();
+
+/// Put one at namespace scope in the drive's file: static const RegisterDrive kRegister{{...}};
+struct RegisterDrive {
+  explicit RegisterDrive(DriveKind kind);
+};
+
+}  // namespace ruedo

@@ -1,0 +1,15 @@
+// Message types of a user's own, by their .lcm files: what prints, compares and exports messages
+// then knows them, too.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace ruedo {
+
+// Reads .lcm files, and those of folders; find_schema(fingerprint) finds their types from then on.
+// They may hold types of Ruedo's. Once, before any thread asks. Throws InputError with file and
+// line.
+void read_types(const std::vector<std::string>& places);
+
+}  // namespace ruedo
