@@ -171,6 +171,7 @@ class MessageStream {
   }
 
   /// @param channel names it in the error
+  /// @param bytes LCM's encoding
   /// @throws TypeMismatch when the bytes are no Message
   static Message decoded(const std::string& channel, const std::vector<uint8_t>& bytes) {
     const auto fail = [&](const char* what) -> Message {
