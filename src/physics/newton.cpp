@@ -41,6 +41,25 @@ Eigen::Matrix3d root_of(const Eigen::Matrix3d& A) {
 
 }  // namespace
 
+// What usual islands need is there from the start: steady runs allocate nothing.
+Newton::Newton() {
+  constexpr size_t kBodies = 8, kEntries = 64;
+  bodies_.reserve(kBodies);
+  movable_.reserve(kBodies);
+  degree_.reserve(kBodies);
+  order_.reserve(kBodies);
+  first_neighbour_.reserve(kBodies + 1);
+  neighbours_.reserve(kEntries);
+  first_.reserve(kBodies);
+  start_.reserve(kBodies);
+  blocks_.reserve(kBodies * (kBodies + 1) / 2);
+  y_.reserve(kBodies);
+  trial_.reserve(kBodies);
+  gradient_.reserve(kBodies);
+  step_.reserve(kBodies);
+  entries_.reserve(kEntries);
+}
+
 double Newton::prepare(const SolverBodies& bodies, const std::vector<std::pair<int, int>>& pairs) {
   bodies_.assign(bodies.size(), {});
   movable_.clear();

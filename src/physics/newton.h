@@ -18,6 +18,8 @@ namespace ruedo::physics {
 
 class Newton {
  public:
+  Newton();
+
   // Of a new island: which of its bodies rows tie together. Returns what a factorization costs, in
   // products of numbers.
   double prepare(const SolverBodies& bodies, const std::vector<std::pair<int, int>>& pairs);

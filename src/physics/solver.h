@@ -57,6 +57,7 @@ class Solver {
       : surfaces_(surfaces), settings_(settings) {
     bodies_.reserve(kUsually);
     contacts_.reserve(kUsually);
+    pairs_.reserve(kUsually);
   }
 
   // Solves one island for a substep: forces and gravity, which the bodies hold, are added;

@@ -124,7 +124,7 @@ def test_another_command_is_another_run(driven, tmp_path):
 
 def test_a_changed_file_is_named_first(tmp_path):
     world = tmp_path / "arena.sdf"
-    text = Path(ARENA).read_text()
+    text = Path(ARENA).read_text() + "<!-- mine: Ruedo's own would be found by its hash -->\n"
     world.write_text(text)
     record(tmp_path / "a.lcm", world=str(world), seconds=1)
     assert program("verify", tmp_path / "a.lcm").returncode == 0

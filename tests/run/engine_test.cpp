@@ -208,9 +208,9 @@ TEST(Engine, GoesOnWithoutASensorThatIsWrittenWrongly) {
     told.push_back(finding.element + ": " + finding.text);
   }
   EXPECT_THAT(told, testing::UnorderedElementsAre(
-                        testing::AllOf(testing::StartsWith("a/laser: <samples>"),
+                        testing::AllOf(testing::StartsWith("a/laser: <horizontal/samples>"),
                                        testing::EndsWith("; the sensor is left out")),
-                        testing::AllOf(testing::StartsWith("a/eye: <width>"),
+                        testing::AllOf(testing::StartsWith("a/eye: <camera/image/width>"),
                                        testing::EndsWith("; the sensor is left out"))));
   EXPECT_THROW(
       Engine(load_text(robot_sdf(
