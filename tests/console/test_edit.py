@@ -1,4 +1,5 @@
-"""ruedo edit: worlds drawn, moved and saved in a browser, on the default transport; what is saved, and what is refused."""
+"""ruedo edit: worlds drawn, moved and saved in a browser, on the default transport; what is saved,
+and what is refused."""
 
 import json
 import re
@@ -6,7 +7,6 @@ import struct
 import subprocess
 
 import pytest
-
 from harness import (
     ARENA,
     RUEDO,

@@ -231,8 +231,9 @@ def test_copies_that_share_a_world_outlive_the_first():
 
 @pytest.mark.parametrize("integrator", ["arc", "trapezoid"])
 def test_slip_is_unbiased(integrator):
-    """Ten metres straight on: the wheels' way is 10 m in the mean. The heading walks at random by sigma^2 2 L / track^2, so
-    that the mean of x falls behind by the mean of its cosine: (1 - exp(-k L)) / k with k = (sigma / track)^2."""
+    """Ten metres straight on: the wheels' way is 10 m in the mean. The heading walks at random by
+    sigma^2 2 L / track^2, so that the mean of x falls behind by the mean of its cosine:
+    (1 - exp(-k L)) / k with k = (sigma / track)^2."""
     sigma, track, length, runs = 0.02, 0.4, 10.0, 300
     slip = f"<ruedo:odometry><ruedo:slip_noise>{sigma}</ruedo:slip_noise><ruedo:integrator>{integrator}</ruedo:integrator></ruedo:odometry>"
     text = world().replace("<ruedo:drive>", slip + "<ruedo:drive>")
