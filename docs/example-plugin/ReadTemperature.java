@@ -1,4 +1,5 @@
 import example.thermometer_t;
+
 import ruedo.MessageSample;
 import ruedo.Ruedo;
 import ruedo.Simulation;
