@@ -86,6 +86,7 @@ def include(uri, pose, name=""):
 
 
 def world(name, about, content, ground=True):
+    about = " ".join(about.split())
     floor = '    <include><uri>model://ground_plane</uri></include>\n' if ground else ""
     return (
         f'<?xml version="1.0"?>\n<!-- Made by worlds/make_worlds.py. {about} -->\n<sdf version="1.9" xmlns:ruedo="urn:ruedo">\n  <world name="{name}">\n'

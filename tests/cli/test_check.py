@@ -62,7 +62,7 @@ COLLISION = "model m/link l/collision c"
 FILES = {
     "a sensor that is none": (
         in_link(
-            "<sensor name='s' type='ray'><ray><scan><horizontal><samples>0</samples></horizontal></scan><range><max>3</max></range></ray></sensor>"
+            "<sensor name='s' type='ray'><ray><scan><horizontal><samples>-1</samples></horizontal></scan><range><max>3</max></range></ray></sensor>"
         ),
         {},
         1,
@@ -72,7 +72,7 @@ FILES = {
         in_link("<sensor name='s' type='imu'><ruedo:phase>x</ruedo:phase></sensor>"),
         {},
         3,
-        ("error", 4, "m/s", "<ruedo:phase>"),
+        ("error", 4, "m/s", "ruedo:phase>: 'x' is not a number"),
     ),
     "broken mesh": (
         mesh("a.dae"),
