@@ -8,12 +8,11 @@ runner.py converse N...  steps so often, over a transport on standard input and 
 import select
 import struct
 import sys
-import types
 import zlib
 
 import ruedo
-from ruedo.lockstep import _sample
 from ruedo.simulation import Simulation
+from ruedo.stream import Stream
 
 
 def row(name, values=()):
@@ -93,9 +92,7 @@ def decode():
             lines = list(
                 meaning(
                     type,
-                    _sample(
-                        bytes.fromhex("".join(data)), types.SimpleNamespace(channel="c", type=type)
-                    ),
+                    Stream(None, "c", type, 0, 0.0)._sample_of(bytes.fromhex("".join(data))),
                 )
             )
         except ruedo.TypeMismatch:
