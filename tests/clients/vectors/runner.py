@@ -8,6 +8,7 @@ runner.py converse N...  steps so often, over a transport on standard input and 
 import select
 import struct
 import sys
+import types
 import zlib
 
 import ruedo
@@ -92,7 +93,9 @@ def decode():
             lines = list(
                 meaning(
                     type,
-                    Stream(None, "c", type, 0, 0.0)._sample_of(bytes.fromhex("".join(data))),
+                    Stream(types.SimpleNamespace(version=""), "c", type, 0, 0.0)._sample_of(
+                        bytes.fromhex("".join(data))
+                    ),
                 )
             )
         except ruedo.TypeMismatch:
