@@ -2,6 +2,7 @@
 #include "engine/fleet.h"
 
 #include <algorithm>
+#include <exception>
 #include <optional>
 #include <set>
 #include <span>
@@ -169,10 +170,12 @@ class FleetMaker {
   void add_device(const Wanted& wanted, ModuleSetup& module) {
     const std::string& robot = instance(wanted.robot).name;
     const std::string where = robot + "/" + wanted.name;
+    channel_refused_ = nullptr;
     try {
       if (model::read_or_leave_out(where, "the sensor is left out", findings_,
                                    [&] { module.devices.push_back(make_device(wanted)); }))
         return;
+      if (channel_refused_) std::rethrow_exception(channel_refused_);
     } catch (const InputError& error) {
       if (!options_.keep_going) throw;
       findings_.error(error.source(), where, error.message());
@@ -207,8 +210,13 @@ class FleetMaker {
     setup.add_channel = [&](const std::string& suffix, const std::string& type,
                             int64_t fingerprint) {
       const std::string device = suffix.empty() ? wanted.name : wanted.name + "/" + suffix;
-      return channels_.add(
-          {robot + "/" + device, "", robot, wanted.name, type, fingerprint, rate, false});
+      try {
+        return channels_.add(
+            {robot + "/" + device, "", robot, wanted.name, type, fingerprint, rate, false});
+      } catch (const InputError&) {
+        channel_refused_ = std::current_exception();
+        throw;
+      }
     };
     Device device{wanted.kind->make(setup),
                   rate,
@@ -287,6 +295,7 @@ class FleetMaker {
   const FleetOptions& options_;
   Channels& channels_;
   Findings& findings_;
+  std::exception_ptr channel_refused_;  // why the device that is made cannot have a channel
   Fleet fleet_;
   std::set<std::string> disabled_;                      // "ROBOT/DEVICE"
   std::vector<std::vector<device_info_t>> devices_of_;  // each robot

@@ -344,7 +344,7 @@ def test_a_controller_that_dies_is_said(bot_core):
     assert controller.stdout.readline() == "a second of scans\n"
     controller.kill()
     said = []
-    while not said or "--wait-for wants message" not in said[-1]:
+    while not said or "it waits for what --wait-for wants, message" not in said[-1]:
         said.append(server.process.stderr.readline())
         assert said[-1], said
     assert "VELOCITY" in said[-1]
@@ -353,7 +353,7 @@ def test_a_controller_that_dies_is_said(bot_core):
     bus.subscribe("ruedo/info", lambda channel, data: signs.append(data))
     until(lambda: bus.handle_timeout(100) and len(signs) >= 3)
     code, errors = server.end(signal.SIGINT)
-    assert code == 0 and "--wait-for wants message" not in errors
+    assert code == 0 and "--wait-for wants" not in errors
 
 
 @pytest.mark.parametrize(

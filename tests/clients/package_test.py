@@ -15,6 +15,7 @@ def test_wheel(tmp_path):
 
     shutil.copytree(SOURCE / "proto", tmp_path / "proto")
     shutil.copytree(SOURCE / "clients/python", tmp_path / "clients/python")
+    shutil.copy(SOURCE / "VERSION", tmp_path)
     subprocess.run(
         [
             sys.executable,

@@ -78,7 +78,8 @@ def test_echo_of_strangers_and_of_half_a_message():
     with published("stranger", b"\0" * 8 + b"hello"):
         assert (
             ruedo("echo", "stranger", "-n", "1").stdout
-            == "stranger: 13 bytes of a type that Ruedo does not know\n"
+            == "stranger: 13 bytes of a type that Ruedo does not know "
+            "(its hash is 0x0000000000000000); --types reads its .lcm file\n"
         )
     with published("half", velocity_command_t().encode()[:20]):
         said = ruedo("echo", "half", "-n", "1").stdout
