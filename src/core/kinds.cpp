@@ -30,7 +30,7 @@ class Kinds {
   }
 
  private:
-  const std::vector<Kind> none_;
+  const std::vector<Kind> none_{};
   std::mutex mutex_;
   std::vector<std::unique_ptr<std::vector<Kind>>> lists_;
   std::atomic<const std::vector<Kind>*> newest_{&none_};

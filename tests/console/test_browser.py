@@ -95,13 +95,7 @@ def test_the_past_of_a_live_run_is_looked_at(tmp_path):
 
 
 def test_any_field_is_plotted(tmp_path):
-    """Of a live run what is known, and of a log the whole of it: its times, least and most are the
-    log's.
-    """
-    from ruedo.lcmtypes import odometry_t
-
-    log = tmp_path / "run.lcm"
-    with running("--disable", "p3at/camera", "--record", log) as process:
+    with running("--disable", "p3at/camera") as process:
         seen = browse(process.url, tmp_path, "fields")
     assert {
         "a click on a field plots it",
@@ -110,17 +104,6 @@ def test_any_field_is_plotted(tmp_path):
         "it is a table",
         "panes are kept",
     } <= set(seen)
-    found = [
-        odometry_t.decode(data) for channel, _, data in events(log) if channel == "p3at/odometry"
-    ]
-    given = {
-        "begin": found[0].utime * 1e-6,
-        "end": found[-1].utime * 1e-6,
-        "most": max(each.x for each in found),
-    }
-    with playing(log) as process:
-        seen = browse(process.url, tmp_path, "fields_log", given)
-    assert {"the whole run is plotted", "a click in a plot seeks"} <= set(seen)
 
 
 def test_the_view_tells_and_gives(tmp_path):
