@@ -57,20 +57,17 @@ const script = document.createElement("script");
 script.type = "module";
 script.textContent = await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
 document.body.append(script);`;
-const shell = Buffer.from(
-  text(files[0].name)
-    .replace(
-      "/icon.svg",
-      `data:image/svg+xml;base64,${Buffer.from(text("src/icon.svg")).toString("base64")}`,
-    )
-    .replace('<link rel="stylesheet" href="/main.css">', () => `<style>${text("main.css")}</style>`)
-    .replace(
-      '<script type="module" src="/main.js"></script>',
-      () =>
-        `<script type="text/plain" id="code">${gzipSync(Buffer.from(text("main.js")), { level: 9 }).toString("base64")}</script>\n<script type="module">${boot}</script>`,
-    )
-    .replace(/<\/body>[^]*$/, ""),
-);
+const parts = {
+  "/icon.svg": `data:image/svg+xml;base64,${Buffer.from(text("src/icon.svg")).toString("base64")}`,
+  '<link rel="stylesheet" href="/main.css" />': `<style>${text("main.css")}</style>`,
+  '<script type="module" src="/main.js"></script>': `<script type="text/plain" id="code">${gzipSync(Buffer.from(text("main.js")), { level: 9 }).toString("base64")}</script>\n<script type="module">${boot}</script>`,
+};
+let alone = text(files[0].name).replace(/<\/body>[^]*$/, "");
+for (const [link, content] of Object.entries(parts)) {
+  if (!alone.includes(link)) throw new Error(`index.html has no ${link}`);
+  alone = alone.replace(link, () => content);
+}
+const shell = Buffer.from(alone);
 code += "const uint8_t kShellBytes[] = {";
 for (let at = 0; at < shell.length; at += 32)
   code += `${[...shell.subarray(at, at + 32)].join(",")},\n`;
