@@ -34,7 +34,7 @@ export default async function steer({ page, seen, until, ready, server, check })
   for (let i = 0; i < 50 && is.rate !== 0.25; ++i) is = await server();
   check("a rate is taken", is.rate === 0.25, is.rate);
   await page.keyboard.press("b");
-  await page.locator("#canvas").click({ position: { x: 330, y: 200 } });
+  await page.locator("#canvas").click({ position: { x: 420, y: 150 } }); // above the time line
   await until("a box is placed", () =>
     window.ruedo.page.now.world.bodies.some((b) => b.name === "box/link"),
   );
