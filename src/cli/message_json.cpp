@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <openssl/evp.h>
 
 #include "core/json.h"
 #include "core/utf8.h"
@@ -139,20 +140,10 @@ class Walk {
 }  // namespace
 
 std::string base64(std::span<const uint8_t> bytes) {
-  constexpr std::string_view kDigits =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (size_t i = 0; i < bytes.size(); i += 3) {
-    const size_t left = bytes.size() - i;
-    const uint32_t three = uint32_t{bytes[i]} << 16 |
-                           (left > 1 ? uint32_t{bytes[i + 1]} << 8 : 0u) |
-                           (left > 2 ? uint32_t{bytes[i + 2]} : 0u);
-    text += kDigits[three >> 18];
-    text += kDigits[three >> 12 & 63];
-    text += left > 1 ? kDigits[three >> 6 & 63] : '=';
-    text += left > 2 ? kDigits[three & 63] : '=';
-  }
+  std::string text((bytes.size() + 2) / 3 * 4 + 1, '\0');  // and the zero that OpenSSL adds
+  const int size = ::EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()), bytes.data(),
+                                     static_cast<int>(bytes.size()));
+  text.resize(static_cast<size_t>(size));
   return text;
 }
 
