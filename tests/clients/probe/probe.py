@@ -164,8 +164,7 @@ def streams(sim, name, timeout):
 def control(sim, name):
     sim.pause()
     before = sim.state()
-    time.sleep(0.2)
-    say("paused", before.paused, sim.state().step == before.step)
+    say("paused", before.paused, all(sim.state().step == before.step for _ in range(20)))
     say("step", sim.step(7).step - before.step)
     say("name", sim.state(name).name, sim.state(name).position[0])
     sim.set_rate(2.0)
