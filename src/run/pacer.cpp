@@ -22,7 +22,7 @@ Pacer::Clock::time_point Pacer::due(int64_t step) const {
   return origin_time_ + std::chrono::nanoseconds(whole(std::min(real_us * 1e3, 9e18)));
 }
 
-void Pacer::start_anew() {
+void Pacer::reset() {
   origin_step_ = granted_ + 1;
   origin_time_ = Clock::now();
 }
@@ -35,7 +35,7 @@ void Pacer::sleep(std::unique_lock<std::mutex>& lock) {
 
 int Pacer::wait(int64_t& step, int limit) {
   std::unique_lock lock(mutex_);
-  if (granted_ < 0) start_anew();
+  if (granted_ < 0) reset();
   for (;;) {
     if (lent_) {
       sleep(lock);
@@ -136,7 +136,7 @@ void Pacer::begin_time_anew() {
   std::lock_guard lock(mutex_);
   granted_ = -1;
   until_ = paused_ ? 0 : last_step_;
-  start_anew();
+  reset();
 }
 
 void Pacer::stop() {
@@ -160,7 +160,7 @@ void Pacer::resume() {
     if (!paused_) return;
     paused_ = false;
     until_ = last_step_;
-    start_anew();
+    reset();
   }
   changed_.notify_all();
 }
@@ -180,7 +180,7 @@ void Pacer::set_rate(double rate) {
   {
     std::lock_guard lock(mutex_);
     rate_ = rate;
-    start_anew();
+    reset();
   }
   changed_.notify_all();
 }

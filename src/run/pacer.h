@@ -52,7 +52,7 @@ class Pacer : public engine::Pace, public Gate {
 
  private:
   Clock::time_point due(int64_t step) const;
-  void start_anew();
+  void reset();
   void sleep(std::unique_lock<std::mutex>& lock);
 
   // A host that was held up catches up by at most this much; beyond it, the run is simply late from

@@ -39,11 +39,15 @@ class LockstepClient {
     }
   }
 
-  void take_part() {
+  void join() {
     join_t join;
     join.client = name_;
     session_ =
         ask(request_t::JOIN, std::random_device{}() + int64_t{1}, engine::encoded(join)).session;
+  }
+
+  // Takes part from where the run stands.
+  void begin() {
     grant_request_t grant;
     grant.granted = grant.step_until = grant.received = -1;
     grant.ncommands = 0;
@@ -55,6 +59,11 @@ class LockstepClient {
     }
     granted_ = stands.granted;
     have_ = stands.received;
+  }
+
+  void take_part() {
+    join();
+    begin();
   }
 
   void command(int64_t step, const std::string& channel, const std::vector<uint8_t>& bytes) {

@@ -90,9 +90,10 @@ TEST_F(LockstepTest, PausesForASilentClientAndGoesOnWithIt) {
   // While its lease lasts nobody else has its name; when it has ended somebody may, and begins
   // where it stood.
   LockstepClient other = client("b");
+  other.join();
   for (bool there = false; !there;) {
     try {
-      other.take_part();
+      other.begin();
       there = true;
     } catch (const std::runtime_error& refused) {
       ASSERT_NE(std::string(refused.what()).find("a client called 'b' takes part already"),
