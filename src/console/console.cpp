@@ -63,6 +63,7 @@ struct Console::Impl {
   HttpResponse get(std::string_view path);
   HttpResponse scene_file(const SceneData& data, std::string_view path);
   HttpResponse library_file(std::string_view path);
+  HttpResponse history(std::string_view path);
   HttpResponse model_text(size_t index);
   HttpResponse blob(Bytes body, const std::string& type);
   bool tick();
@@ -94,9 +95,7 @@ HttpResponse Console::Impl::get(std::string_view path) {
     return response;
   }
   constexpr std::string_view kHistory = "/history/";
-  if (path.starts_with(kHistory))
-    return blob(stage.source->history(std::string(path.substr(kHistory.size()))),
-                "application/octet-stream");
+  if (path.starts_with(kHistory)) return history(path.substr(kHistory.size()));
   if (path.starts_with("/library"))
     return library_file(path.substr(std::string_view("/library").size()));
   if (const auto model = number_after("/scene/models/", path)) return model_text(*model);
@@ -104,6 +103,15 @@ HttpResponse Console::Impl::get(std::string_view path) {
   const SceneData* data = current_scene();
   if (!data) return not_found();
   return scene_file(*data, path.substr(std::string_view("/scene").size()));
+}
+
+// "FIELD/CHANNEL": names of channels have slashes in them.
+HttpResponse Console::Impl::history(std::string_view path) {
+  const size_t slash = path.find('/');
+  if (slash == std::string_view::npos) return not_found();
+  return blob(stage.source->history(std::string(path.substr(slash + 1)),
+                                    std::string(path.substr(0, slash))),
+              "application/octet-stream");
 }
 
 // A file of a scene: ".json", "/meshes", "/links", "/textures/NUMBER".

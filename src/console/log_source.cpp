@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/utf8.h"
 #include "core/whole.h"
+#include "ruedo/schema.h"
 #include "ruedo/world_info_t.hpp"
 
 namespace ruedo::console {
@@ -15,6 +17,21 @@ namespace {
 constexpr double kLongestPause_s =
     0.5;  // between two looks at the clock; after a longer one the log does not jump
 constexpr double kSlowest = 0.01, kFastest = 1000.0;
+
+// The number at a field's path; none where the message has none there.
+std::optional<double> number_at(std::span<const uint8_t> message, const std::string& path) {
+  const Schema* schema = find_schema(fingerprint_of(message));
+  std::optional<double> found;
+  if (!schema) return found;
+  visit_message(*schema, message, [&](const FieldPath& at, const FieldValue& value) {
+    if (!path.starts_with(at.parts.front().field->name) || at.str() != path) return true;
+    if (const auto* real = std::get_if<double>(&value)) found = *real;
+    if (const auto* whole = std::get_if<int64_t>(&value)) found = static_cast<double>(*whole);
+    if (const auto* yes = std::get_if<bool>(&value)) found = *yes ? 1.0 : 0.0;
+    return false;
+  });
+  return found;
+}
 
 }  // namespace
 
@@ -103,24 +120,29 @@ bool LogSource::read(size_t channel, size_t entry) {
   return reader_.next(event_);  // false when the file is no longer what it was
 }
 
-Bytes LogSource::history(const std::string& name) {
+// The first message and the last one are always among those that are read.
+Bytes LogSource::history(const std::string& name, const std::string& field) {
   const auto& channels = index_.channels();
   const auto found = std::find_if(
       channels.begin(), channels.end(),
       [&](const log::Index::Channel& channel) { return printable(channel.name) == name; });
   if (found == channels.end()) return nullptr;
   const auto channel = static_cast<size_t>(found - channels.begin());
-  const size_t every = 1 + found->entries.size() / kMostHistory;
-  std::vector<uint8_t> bytes;
-  for (size_t entry = 0; entry < found->entries.size() && bytes.size() < kMostHistoryBytes;
-       entry += every) {
-    if (!read(channel, entry)) continue;
-    const auto size = static_cast<uint32_t>(event_.data.size());
-    const auto* head = reinterpret_cast<const uint8_t*>(&size);
-    bytes.insert(bytes.end(), head, head + sizeof size);
-    bytes.insert(bytes.end(), event_.data.begin(), event_.data.end());
+  const std::vector<log::Index::Entry>& entries = found->entries;
+  const size_t every = 1 + entries.size() / kMostHistory;
+  std::vector<double> numbers{static_cast<double>(every)};
+  for (size_t i = 0; i < entries.size();
+       i = i + 1 < entries.size() ? std::min(i + every, entries.size() - 1) : entries.size()) {
+    if (!read(channel, i)) continue;
+    const auto value = number_at(event_.data, field);
+    const double time_s = static_cast<double>(entries[i].time_us) * 1e-6;
+    if (!value || (numbers.size() > 1 && time_s <= numbers[numbers.size() - 2])) continue;
+    numbers.push_back(time_s);
+    numbers.push_back(*value);
   }
-  return std::make_shared<const std::vector<uint8_t>>(std::move(bytes));
+  const auto* bytes = reinterpret_cast<const uint8_t*>(numbers.data());
+  return std::make_shared<const std::vector<uint8_t>>(bytes,
+                                                      bytes + numbers.size() * sizeof(double));
 }
 
 Source::Count LogSource::traffic(size_t channel) const {

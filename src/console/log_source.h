@@ -16,7 +16,7 @@ namespace ruedo::console {
 
 class LogSource : public Source {
  public:
-  static constexpr size_t kMostHistory = 4000, kMostHistoryBytes = size_t{32} << 20;
+  static constexpr size_t kMostHistory = 100'000;  // messages of a channel that are read for a plot
   static constexpr uint32_t kMostMessage = 64u << 20;  // bytes; a larger one is not shown
 
   // Throws InputError for what is no log. speed: log time per real time.
@@ -28,7 +28,7 @@ class LogSource : public Source {
   std::shared_ptr<const model::WorldModel> world() override { return scene_->world; }
   std::string fault() const override;
   std::string info_channel() const override { return info_channel_; }
-  Bytes history(const std::string& channel) override;
+  Bytes history(const std::string& channel, const std::string& field) override;
   const Playback* playback() const override { return &playback_; }
   void play(bool on, double speed) override;
   void seek(Board& board, double time_s) override;

@@ -51,10 +51,10 @@ class Source {
   // Of the file that SAVE writes; "" for none.
   virtual std::string save_name() const { return {}; }
 
-  // All messages of a channel of a log, or so many of them evenly, each with its size (uint32,
-  // little endian) before it; null where there is no such channel.
-  virtual Bytes history(const std::string& channel) {
-    static_cast<void>(channel);
+  // A field ("vel[0]") over the whole of a log, as float64s, little endian: every how many messages
+  // were read, then time in s and value of each; null where there is no such channel.
+  virtual Bytes history(const std::string& channel, const std::string& field) {
+    static_cast<void>(channel), static_cast<void>(field);
     return nullptr;
   }
 

@@ -8,14 +8,23 @@ export default async function fieldsOfLog({ page, until, check, ready, given, pi
   await page.getByLabel("field to plot").selectOption("x");
   await page.locator("#plot").click();
   await until(
-    "the whole run is plotted",
-    ({ begin, end, most }) => {
-      const { times, values } = window.ruedo.plots.panes[0].series[0];
-      if (times.length === 0) return false;
-      const whole = Math.abs(times[0] - begin) < 1e-6 && Math.abs(times.at(-1) - end) < 1e-6;
-      return whole && Math.abs(Math.max(...values) - most) < 1e-9;
-    },
-    given,
+    "the whole run is there",
+    () => window.ruedo.plots.panes[0]?.series[0]?.times.length > 0,
+  );
+  const found = await page.evaluate(() => {
+    const { times, values, note } = window.ruedo.plots.panes[0].series[0];
+    return [times.length, times[0], times.at(-1), Math.min(...values), Math.max(...values), note];
+  });
+  const { count, begin, end, least, most } = given;
+  check(
+    "it is the log's, from its first message to its last",
+    found.join() === [count, begin, end, least, most, ""].join(),
+    found.join(),
+  );
+  await until(
+    "and its statistics are told",
+    (text) => document.querySelector(".statistics .number")?.textContent === text,
+    String(Number(least.toPrecision(5))),
   );
   await page.locator(".pane").scrollIntoViewIfNeeded();
   const box = await page.locator(".pane .u-over").boundingBox();

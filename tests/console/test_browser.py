@@ -106,6 +106,43 @@ def test_any_field_is_plotted(tmp_path):
     } <= set(seen)
 
 
+def test_a_log_is_plotted_whole(tmp_path):
+    """Its times, least and most are the log's, however many messages there are."""
+    from ruedo.lcmtypes import odometry_t, velocity_command_t
+
+    log = tmp_path / "run.lcm"
+    options = ("--disable", "p3at/camera", "--rate", "max", "--duration", "99.98")
+    with running(*options, "--record", log) as process:
+        driver = Socket(process.port)
+        command = velocity_command_t()
+        command.vx, command.omega = 0.5, 1.0
+        while process.poll() is None:
+            with contextlib.suppress(OSError):  # when it has just ended
+                driver.command("p3at/velocity", command)
+            time.sleep(0.02)
+    found = [
+        (time_us * 1e-6, odometry_t.decode(data).x)
+        for channel, time_us, data in events(log)
+        if channel == "p3at/odometry"
+    ]
+    assert len(found) > 4000
+    given = {
+        "begin": found[0][0],
+        "end": found[-1][0],
+        "count": len(found),
+        "least": min(x for _, x in found),
+        "most": max(x for _, x in found),
+    }
+    assert given["most"] - given["least"] > 0.1  # it has moved
+    with playing(log) as process:
+        seen = browse(process.url, tmp_path, "fields_log", given)
+    assert {
+        "it is the log's, from its first message to its last",
+        "and its statistics are told",
+        "a click in a plot seeks",
+    } <= set(seen)
+
+
 def test_the_view_tells_and_gives(tmp_path):
     with running("--disable", "p3at/camera") as process:
         seen = browse(process.url, tmp_path, "looks")

@@ -168,6 +168,34 @@ def event(number, time_us, channel, data):
     )
 
 
+@pytest.mark.parametrize("count, every", [(1, 1), (3, 1), (150_000, 2), (200_001, 3)])
+def test_a_field_is_told_over_the_whole_log(tmp_path, count, every):
+    """Its first and its last message are always there; of many every so many."""
+    from ruedo.lcmtypes import odometry_t
+
+    message, path = odometry_t(), tmp_path / "long.lcm"
+    message.x = 0.25
+    place = message.encode().index(struct.pack("!d", 0.25))
+    data = bytearray(message.encode())
+    with open(path, "wb") as log:
+        for i in range(count):
+            struct.pack_into("!d", data, place, i)
+            log.write(event(i, 1000 * i, b"p3at/odometry", bytes(data)))
+    with playing(path) as process:
+        status, body, _ = get(process.port, "/history/x/p3at/odometry")
+        assert status == 200
+        numbers = struct.unpack(f"<{len(body) // 8}d", body)
+        wanted = sorted({*range(0, count, every), count - 1})
+        assert numbers[0] == every
+        assert numbers[1::2] == pytest.approx([0.001 * i for i in wanted])
+        assert list(numbers[2::2]) == wanted
+        assert get(process.port, "/history/angle%5B7%5D/p3at/odometry")[1] == struct.pack(
+            "<d", every
+        )
+        for none in ("x/p3at/lrf", "x", "", "%00/p3at/odometry"):
+            assert get(process.port, f"/history/{none}")[0] in (200, 404)
+
+
 def test_strange_logs_do_not_hurt(log, tmp_path):
     """Times that go back and forth, names that are no text, lengths that lie, messages that are
     none.

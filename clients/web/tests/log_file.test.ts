@@ -1,6 +1,7 @@
 // A log in the page: at each moment the newest message of every channel that is wanted.
 import { describe, expect, it, vi } from "vitest";
-import type { LinkHandler } from "../src/wire/link";
+import { encode } from "../src/wire/lcm";
+import { historyOf, type LinkHandler } from "../src/wire/link";
 import { LogFile, newestAt } from "../src/wire/log_file";
 
 describe("a log in the page", () => {
@@ -10,6 +11,27 @@ describe("a log in the page", () => {
       -1, 0, 0, 2, 2, 3, 3,
     ]);
     expect(newestAt([], 1)).toBe(-1);
+  });
+
+  it("tells a field over time, without what is no message", () => {
+    const pose = (x: number) =>
+      encode("pose_t", {
+        utime: 1n,
+        pos: new Float64Array([x, 0, 0]),
+        vel: new Float64Array(3),
+        orientation: new Float64Array(4),
+        rotation_rate: new Float64Array(3),
+        accel: new Float64Array(3),
+      }).slice();
+    const entries = [pose(3), new Uint8Array(5), pose(1).subarray(0, 40), pose(4), pose(1)].map(
+      (message, i) => ({ time: 10 + i, messages: [message] }),
+    );
+    entries.push({ time: 99, messages: [] });
+    expect(historyOf(entries, "pos[0]")).toEqual({
+      every: 1,
+      times: [10, 13, 14],
+      values: [3, 4, 1],
+    });
   });
 
   // Entries of (channel, time, bytes of each of its messages), as write_log_page has them.

@@ -4,8 +4,8 @@ import uPlot from "uplot";
 import { csvOf, fieldsOf, statisticsOf, valueAt } from "../state/fields";
 import type { Page } from "../state/page";
 import { decode, typeOf } from "../wire/lcm";
-import type { RunLink } from "../wire/link";
-import { h, recall, remember } from "./dom";
+import type { History, RunLink } from "../wire/link";
+import { h, recall, remember, toast } from "./dom";
 import { padded } from "./plots";
 
 const kMostPoints = 40_000; // of a series; then every second one stays
@@ -23,6 +23,7 @@ interface Series {
   values: number[];
   stride: number; // every so many messages is kept
   skipped: number;
+  note: string; // what of it is missing; "" for nothing
 }
 
 class Pane {
@@ -54,7 +55,7 @@ class Pane {
   }
 
   add(channel: string, path: string): Series {
-    const series = { channel, path, times: [], values: [], stride: 1, skipped: 0 };
+    const series = { channel, path, times: [], values: [], stride: 1, skipped: 0, note: "" };
     this.series.push(series);
     this.build();
     this.actions.changed();
@@ -76,6 +77,20 @@ class Pane {
     this.dirty = true;
   }
 
+  // What is known so far, and behind it what has come meanwhile.
+  begin(series: Series, { every, times, values }: History): void {
+    const { times: laterTimes, values: laterValues } = series;
+    Object.assign(series, { times, values });
+    if (every > 1) series.note = `1 of ${every} messages`;
+    laterTimes.forEach((time_s, i) => this.take(series, time_s, laterValues[i]!));
+    this.dirty = true;
+  }
+
+  // Where the time line begins: 0 s of what is drawn.
+  private get origin(): number {
+    return this.page.now.playback?.begin ?? 0;
+  }
+
   clear(): void {
     for (const series of this.series) series.times = [];
     for (const series of this.series) series.values = [];
@@ -93,13 +108,16 @@ class Pane {
       this.dirty = false;
       this.plot?.setData(
         uPlot.join(
-          this.series.map(({ times, values }) => [times, values] as uPlot.AlignedData),
+          this.series.map(
+            ({ times, values }) =>
+              [times.map((time_s) => time_s - this.origin), values] as uPlot.AlignedData,
+          ),
           this.series.map(() => [2]),
         ),
       );
       this.summarise();
     }
-    const left = this.plot?.valToPos(now_s, "x") ?? -1;
+    const left = this.plot?.valToPos(now_s - this.origin, "x") ?? -1;
     const cursor = this.body.querySelector<HTMLElement>(".now");
     if (cursor) cursor.style.left = `${left}px`;
   }
@@ -127,7 +145,12 @@ class Pane {
       return h(
         "tr",
         {},
-        h("th", { style: colour }, labelOf(series)),
+        h(
+          "th",
+          { style: colour },
+          labelOf(series),
+          series.note && h("div", { class: "dim" }, series.note),
+        ),
         ...cells,
         h("td", {}, remove),
       );
@@ -185,7 +208,7 @@ class Pane {
     this.plot.over.addEventListener("click", () => {
       const { left } = this.plot!.cursor;
       if (left !== undefined && left >= 0 && this.page.now.hello)
-        this.actions.seek(this.plot!.posToVal(left, "x"));
+        this.actions.seek(this.origin + this.plot!.posToVal(left, "x"));
     });
     this.dirty = true;
   }
@@ -303,12 +326,11 @@ export class FieldPlots {
   }
 
   private async fillFromHistory(pane: Pane, series: Series): Promise<void> {
-    const messages = await this.link.history(series.channel);
-    const { times, values } = series;
-    series.times = [];
-    series.values = [];
-    for (const message of messages) this.take(pane, series, message);
-    times.forEach((time, i) => pane.take(series, time, values[i]!)); // what came meanwhile
+    try {
+      pane.begin(series, await this.link.history(series.channel, series.path));
+    } catch (error) {
+      toast(`${labelOf(series)}: ${(error as Error).message}`, "error");
+    }
   }
 
   private drop(event: DragEvent): void {

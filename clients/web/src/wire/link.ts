@@ -1,6 +1,9 @@
 // The WebSocket to the program: texts, frames of messages, and what this page asks for. Comes back
 // by itself when the connection is lost.
 
+import { valueAt } from "../state/fields";
+import { decode, typeOf } from "./lcm";
+
 // save: the file that SAVE writes; "" for none.
 export interface Hello {
   mode: "live" | "log";
@@ -38,8 +41,35 @@ export interface RunLink {
   command(channel: string, message: Uint8Array): boolean;
   play(on: boolean, speed: number): void;
   seek(time_s: number): void;
-  // What is known of a channel so far, in order; of long logs not every message.
-  history(channel: string): Promise<Uint8Array[]>;
+  // What is known of a field so far.
+  history(channel: string, path: string): Promise<History>;
+}
+
+// A field over time, which only goes ahead: the time line's.
+export interface History {
+  every: number; // so many messages: 1 for all of them
+  times: number[];
+  values: number[];
+}
+
+// Of messages with their times.
+export function historyOf(
+  entries: { time: number; messages: Uint8Array[] }[],
+  path: string,
+): History {
+  const found: History = { every: 1, times: [], values: [] };
+  for (const { time, messages } of entries) {
+    const bytes = messages[0],
+      type = bytes && typeOf(bytes);
+    if (!type) continue;
+    try {
+      found.values.push(valueAt(decode(type, bytes), path));
+      found.times.push(time);
+    } catch {
+      /* not whole: others say so */
+    }
+  }
+  return found;
 }
 
 const enum Operation {
@@ -123,19 +153,16 @@ export class Link implements RunLink {
     this.send([Operation.seek], new Uint8Array(bytes.buffer));
   }
 
-  async history(channel: string): Promise<Uint8Array[]> {
-    const path = channel.split("/").map(encodeURIComponent).join("/");
-    const answer = await fetch(`/history/${path}`).catch(() => null);
-    if (!answer?.ok) return [];
-    const bytes = await answer.arrayBuffer(),
-      view = new DataView(bytes),
-      messages: Uint8Array[] = [];
-    for (let at = 0; at + 4 <= bytes.byteLength;) {
-      const size = view.getUint32(at, true);
-      messages.push(new Uint8Array(bytes, at + 4, size));
-      at += 4 + size;
-    }
-    return messages;
+  async history(channel: string, path: string): Promise<History> {
+    const place = [path, ...channel.split("/")].map(encodeURIComponent).join("/");
+    const answer = await fetch(`/history/${place}`);
+    if (!answer.ok) throw new Error(`${channel} is not in the log`);
+    const [every = 1, ...numbers] = new Float64Array(await answer.arrayBuffer());
+    return {
+      every,
+      times: numbers.filter((_, i) => i % 2 === 0),
+      values: numbers.filter((_, i) => i % 2 === 1),
+    };
   }
 
   private sendWanted(): void {

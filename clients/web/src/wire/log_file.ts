@@ -1,6 +1,13 @@
 // A recorded run that is in the page itself: it answers as the program would, from the bytes behind
 // the page.
-import type { Hello, LinkHandler, Playback, RunLink } from "./link";
+import {
+  historyOf,
+  type Hello,
+  type History,
+  type LinkHandler,
+  type Playback,
+  type RunLink,
+} from "./link";
 
 interface Head {
   title: string;
@@ -161,9 +168,9 @@ export class LogFile implements RunLink {
     this.show();
   }
 
-  history(channel: string): Promise<Uint8Array[]> {
+  history(channel: string, path: string): Promise<History> {
     const index = this.head.channels.indexOf(channel);
-    return Promise.resolve((this.entries[index] ?? []).flatMap(({ messages }) => messages));
+    return Promise.resolve(historyOf(this.entries[index] ?? [], path));
   }
 
   private tell(): void {

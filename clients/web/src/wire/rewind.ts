@@ -3,7 +3,7 @@
 // whatever is shown.
 
 import { kTypes } from "../../generated/messages";
-import type { LinkHandler, RunLink } from "./link";
+import { historyOf, type History, type LinkHandler, type RunLink } from "./link";
 import { newestAt } from "./log_file";
 import { typeOf } from "./lcm";
 
@@ -135,10 +135,9 @@ export class Rewind implements RunLink {
   }
 
   // Of a live run what is kept.
-  history(channel: string): Promise<Uint8Array[]> {
-    const kept = this.entries.get(channel);
-    if (!this.isLive) return this.inner.history(channel);
-    return Promise.resolve((kept ?? []).flatMap(({ messages }) => messages));
+  history(channel: string, path: string): Promise<History> {
+    if (!this.isLive) return this.inner.history(channel, path);
+    return Promise.resolve(historyOf(this.entries.get(channel) ?? [], path));
   }
 
   private onMessage(channel: string, bytes: Uint8Array): void {
