@@ -87,7 +87,8 @@ ros2::NodeOptions node_options(run::Run& server, const Ros2Arguments& arguments)
     for (const robot_info_t& robot : part.robots) robots.push_back(robot.name);
   }
   options.conversion = {distro_of(arguments), robots.size() == 1 ? robots.front() : "",
-                        arguments.topics, arguments.channels};
+                        arguments.topics, arguments.channels,
+                        [&server] { return ros2::robot_frames(*server.world()); }};
   options.clock_hz = arguments.clock_hz;
   options.joints = [&server](const std::string& robot) {
     return joints_of(*server.world(), robot);

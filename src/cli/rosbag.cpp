@@ -84,10 +84,15 @@ void Rosbag::begin_scene(const run::LogWorlds::Scene& scene, uint64_t time_ns) {
     options_.root = robots.size() == 1 ? robots.front() : "";
     names_.emplace(options_.root, options_.topics);
   }
+  options_.robots = [&scene] {
+    return scene.world ? ros2::robot_frames(*scene.world)
+                       : std::map<std::string, ros2::RobotFrames>();
+  };
   const bool first = !conversions_;
   conversions_ = std::make_unique<ros2::Conversions>(info, options_, *names_);
-  write({names_->topic("", "tf_static"), "tf2_msgs/msg/TFMessage", ros2::kLatchedQos}, time_ns,
-        conversions_->static_frames());
+  options_.robots = {};  // the scene's
+  for (const ros2::Conversions::Standing& each : conversions_->standing())
+    write(each.topic, time_ns, each.cdr);
   if (first) names_->check_remaps();
 }
 

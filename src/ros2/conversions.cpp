@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 
 #include "ros2/pictures.h"
 #include "ruedo/air_pressure_t.hpp"
@@ -35,9 +36,17 @@
 namespace ruedo::ros2 {
 namespace {
 
+// A link that a wheel's angle or a joint's position moves.
+struct MovedLink {
+  double sign = 1.0;
+  std::optional<LinkFrame> frame;  // none: no frame moves with it
+  std::string parent, child;
+};
+
 // Where a message comes from, for those who write it down.
 struct Source {
-  std::vector<std::string> wheels;  // names of their joints
+  std::vector<std::string> wheels;       // names of their joints
+  std::vector<MovedLink> turned, moved;  // by odometry_t and joint_state_t, in their order
   device_info_t device{};
   std::string part;   // of the channel's name behind the device: "depth", "info", ...
   double rate = 0.0;  // Hz
@@ -167,11 +176,30 @@ void write_odometry(const odometry_t& odometry, const Source& from, CdrWriter& o
   put_zeros<36>(out);
 }
 
+size_t count_frames(const std::vector<MovedLink>& links, size_t count) {
+  return static_cast<size_t>(
+      std::count_if(links.begin(), links.begin() + static_cast<std::ptrdiff_t>(count),
+                    [](const MovedLink& link) { return link.frame.has_value(); }));
+}
+
+template <class Number>
+void put_moved(CdrWriter& out, int64_t utime, const std::vector<MovedLink>& links,
+               std::span<const Number> positions) {
+  for (size_t i = 0; i < positions.size(); ++i) {
+    if (!links[i].frame) continue;
+    const Pose X = links[i].frame->at(links[i].sign * static_cast<double>(positions[i]));
+    const double wxyz[4] = {X.rotation.w(), X.rotation.x(), X.rotation.y(), X.rotation.z()};
+    put_transform(out, utime, links[i].parent, links[i].child, X.translation.data(), wxyz);
+  }
+}
+
 void write_odometry_frame(const odometry_t& odometry, const Source& from, CdrWriter& out) {
   const double position[3] = {odometry.x, odometry.y, 0.0};
   const double wxyz[4] = {math::cos(odometry.theta / 2), 0.0, 0.0, math::sin(odometry.theta / 2)};
-  out.put_length(1);
+  const size_t count = std::min(from.turned.size(), odometry.angle.size());
+  out.put_length(1 + count_frames(from.turned, count));
   put_transform(out, odometry.utime, from.odom, from.base, position, wxyz);
+  put_moved(out, odometry.utime, from.turned, std::span(odometry.angle.data(), count));
 }
 
 void write_wheels(const odometry_t& odometry, const Source& from, CdrWriter& out) {
@@ -179,9 +207,12 @@ void write_wheels(const odometry_t& odometry, const Source& from, CdrWriter& out
   const size_t count = std::min({from.wheels.size(), odometry.angle.size(), odometry.rate.size()});
   out.put_length(count);
   for (size_t i = 0; i < count; ++i) out.put(from.wheels[i]);
-  out.put_sequence(std::span(odometry.angle.data(), count))
-      .put_sequence(std::span(odometry.rate.data(), count))
-      .put_length(0);
+  for (const auto* values : {&odometry.angle, &odometry.rate}) {
+    out.put_length(count);
+    for (size_t i = 0; i < count; ++i)
+      out.put((i < from.turned.size() ? from.turned[i].sign : 1.0) * (*values)[i]);
+  }
+  out.put_length(0);
 }
 
 bool has_wheels(const Source& from) { return !from.wheels.empty(); }
@@ -195,6 +226,14 @@ void write_joints(const joint_state_t& joints, const Source&, CdrWriter& out) {
     out.put_length(values->size());
     for (const float value : *values) out.put(static_cast<double>(value));
   }
+}
+
+bool moves_links(const Source& from) { return count_frames(from.moved, from.moved.size()) > 0; }
+
+void write_joint_frames(const joint_state_t& joints, const Source& from, CdrWriter& out) {
+  const size_t count = std::min(from.moved.size(), joints.joint_position.size());
+  out.put_length(count_frames(from.moved, count));
+  put_moved(out, joints.utime, from.moved, std::span(joints.joint_position.data(), count));
 }
 
 void write_imu(const imu_t& imu, const Source& from, CdrWriter& out) {
@@ -448,8 +487,11 @@ RUEDO_ROWS(odometry_t,
             Scope::world},
            {"joint_states", "sensor_msgs/msg/JointState", kStateQos, write_wheels, has_wheels,
             nullptr, Scope::robot})
-RUEDO_ROWS(joint_state_t, {"joint_states", "sensor_msgs/msg/JointState", kStateQos, write_joints,
-                           nullptr, nullptr, Scope::robot})
+RUEDO_ROWS(joint_state_t,
+           {"joint_states", "sensor_msgs/msg/JointState", kStateQos, write_joints, nullptr, nullptr,
+            Scope::robot},
+           {"tf", "tf2_msgs/msg/TFMessage", kTfQos, write_joint_frames, moves_links, nullptr,
+            Scope::world})
 RUEDO_ROWS(imu_t, {"imu", "sensor_msgs/msg/Imu", kSensorQos, write_imu})
 RUEDO_ROWS(navsat_t, {"fix", "sensor_msgs/msg/NavSatFix", kSensorQos, write_fix},
            {"fix_velocity", "geometry_msgs/msg/TwistStamped", kSensorQos, write_fix_velocity})
@@ -502,6 +544,22 @@ struct Conversions::Plan {
   std::map<std::string, const robot_info_t*> robots;
   std::map<std::string, const device_info_t*> devices;      // by "ROBOT/DEVICE"
   std::map<std::pair<std::string, std::string>, int> uses;  // of a robot's topic, by its devices
+  std::map<std::string, RobotFrames> links;
+
+  std::vector<MovedLink> moved(const std::string& robot,
+                               const std::vector<RobotFrames::Moved>& all) const {
+    const std::vector<LinkFrame>& frames = links.at(robot).frames;
+    std::vector<MovedLink> moved;
+    for (const RobotFrames::Moved& each : all) {
+      MovedLink& link = moved.emplace_back();
+      link.sign = each.sign;
+      if (each.frame == 0) continue;
+      link.frame = frames[each.frame];
+      link.parent = names.frame(robot, frames[link.frame->parent].name);
+      link.child = names.frame(robot, link.frame->name);
+    }
+    return moved;
+  }
 
   Source source(const channel_info_t& channel) const {
     Source from;
@@ -512,6 +570,10 @@ struct Conversions::Plan {
       from.device = *device->second;
     const std::string original = original_name(channel.name);
     if (original.starts_with(name + "/")) from.part = original.substr(name.size() + 1);
+    if (const auto robot = links.find(channel.robot); robot != links.end()) {
+      from.turned = moved(channel.robot, robot->second.wheels);
+      from.moved = moved(channel.robot, robot->second.joints);
+    }
     from.rate = channel.rate;
     from.distro = options.distro;
     from.world = "world";
@@ -601,7 +663,7 @@ void with_type(const std::string& type, const Visit& visit) {
 
 Conversions::Conversions(const std::vector<world_info_t>& info, const ConversionOptions& options,
                          Names& names) {
-  Plan plan{options, names, {}, {}, {}};
+  Plan plan{options, names, {}, {}, {}, options.robots()};
   const auto each_channel = [&](const auto& visit) {
     for (const world_info_t& part : info) {
       for (const channel_info_t& channel : part.channels) {
@@ -620,7 +682,14 @@ Conversions::Conversions(const std::vector<world_info_t>& info, const Conversion
   each_channel([&](const channel_info_t& channel) {
     with_type(channel.type, [&]<class Message>() { add_route<Message>(channel, plan); });
   });
-  for (const auto& [name, device] : plan.devices) add_frames(*device, names);
+  for (const auto& [name, device] : plan.devices) add_frames(*device, plan);
+  for (const auto& [name, robot] : plan.links) add_links(name, robot, names);
+  CdrWriter out;
+  out.put_length(frames_.size());
+  for (const Frame& frame : frames_)
+    put_transform(out, 0, frame.parent, frame.child, frame.position, frame.orientation);
+  standing_.push_back(
+      {{names.topic("", "tf_static"), "tf2_msgs/msg/TFMessage", kLatchedQos}, out.bytes()});
 }
 
 Conversions::~Conversions() = default;
@@ -652,41 +721,58 @@ size_t Conversions::add_topic(Topic topic) {
   return at->second;
 }
 
-void Conversions::add_frames(const device_info_t& device, const Names& names) {
-  constexpr double kOptical[4] = {0.5, -0.5, 0.5, -0.5};  // z ahead, x right, y down
-  constexpr double kNowhere[3] = {0, 0, 0};
+void Conversions::add_frame(const std::string& parent, const std::string& child, const Pose& X) {
+  const Quat& q = X.rotation;
+  Frame& added = frames_.emplace_back(Frame{parent, child, {}, {q.w(), q.x(), q.y(), q.z()}});
+  std::copy(X.translation.data(), X.translation.data() + 3, added.position);
+}
+
+void Conversions::add_frames(const device_info_t& device, const Plan& plan) {
+  static const Pose kOptical{Quat(0.5, -0.5, 0.5, -0.5), Vec3::Zero()};  // z ahead, x right, y down
   if (device.kind == "odometry" || device.kind == "pose" || device.kind == "motion" ||
       device.kind == "joints")
     return;
+  const Names& names = plan.names;
   const std::string frame = names.frame(device.robot, ros_name(device.name));
-  const auto add = [this](const std::string& parent, const std::string& child,
-                          const double* position, const double* wxyz) {
-    Frame& added = frames_.emplace_back(Frame{parent, child, {}, {}});
-    std::copy(position, position + 3, added.position);
-    std::copy(wxyz, wxyz + 4, added.orientation);
-  };
-  add(names.frame(device.robot, "base_link"), frame, device.position, device.orientation);
-  if (is_camera(device.kind)) add(frame, frame + "_optical", kNowhere, kOptical);
+  const double* q = device.orientation;
+  const Pose X_BD{Quat(q[0], q[1], q[2], q[3]),
+                  Vec3(device.position[0], device.position[1], device.position[2])};
+  std::string parent = "base_link";
+  Pose X_PD = X_BD;
+  if (const auto robot = plan.links.find(device.robot); robot != plan.links.end()) {
+    const auto carrier = robot->second.carriers.find(device.name);
+    if (carrier != robot->second.carriers.end()) {
+      const LinkFrame& link = robot->second.frames[carrier->second];
+      parent = link.name;
+      X_PD = link.X_BF.inverse() * X_BD;
+    }
+  }
+  add_frame(names.frame(device.robot, parent), frame, X_PD);
+  if (is_camera(device.kind)) add_frame(frame, frame + "_optical", kOptical);
   for (size_t i = 0; i < device.element_pose.size(); ++i) {
     const std::vector<double>& e = device.element_pose[i];
-    const Pose X = Pose::from_xyz_rpy(Vec3(e[0], e[1], e[2]), Vec3(e[3], e[4], e[5]));
-    const double wxyz[4] = {X.rotation.w(), X.rotation.x(), X.rotation.y(), X.rotation.z()};
-    add(frame, frame + "_" + std::to_string(i), X.translation.data(), wxyz);
+    add_frame(frame, frame + "_" + std::to_string(i),
+              Pose::from_xyz_rpy(Vec3(e[0], e[1], e[2]), Vec3(e[3], e[4], e[5])));
   }
+}
+
+void Conversions::add_links(const std::string& name, const RobotFrames& robot, Names& names) {
+  for (size_t i = 1; i < robot.frames.size(); ++i) {
+    const LinkFrame& link = robot.frames[i];
+    if (link.motion == LinkFrame::Motion::none)
+      add_frame(names.frame(name, robot.frames[link.parent].name), names.frame(name, link.name),
+                link.X_PF);
+  }
+  CdrWriter out;
+  out.put(robot.description);
+  standing_.push_back(
+      {{names.topic(name, "robot_description"), "std_msgs/msg/String", kLatchedQos}, out.bytes()});
 }
 
 bool Conversions::convert(const std::string& channel, std::span<const uint8_t> message,
                           const Wanted& wanted, const Emit& emit) {
   const auto route = routes_.find(channel);
   return route != routes_.end() && route->second->run(message, wanted, emit);
-}
-
-std::vector<uint8_t> Conversions::static_frames() const {
-  CdrWriter out;
-  out.put_length(frames_.size());
-  for (const Frame& frame : frames_)
-    put_transform(out, 0, frame.parent, frame.child, frame.position, frame.orientation);
-  return out.bytes();
 }
 
 void put_time(CdrWriter& out, int64_t utime) {

@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -16,7 +17,9 @@
 #include "ros2/cdr.h"
 #include "ros2/interfaces.h"
 #include "ros2/names.h"
+#include "ros2/robot_frames.h"
 #include "ros2/topic.h"
+#include "ruedo/pose.h"
 #include "ruedo/world_info_t.hpp"
 
 namespace ruedo::ros2 {
@@ -26,6 +29,10 @@ struct ConversionOptions {
   std::string root;  // the robot without a namespace; "": none
   Remaps topics;     // of ROS names
   std::vector<std::pair<std::string, std::string>> channels;  // the bus's --remap
+  // The links of the robots that there are now; none: what links there are is not known.
+  std::function<std::map<std::string, RobotFrames>()> robots = [] {
+    return std::map<std::string, RobotFrames>();
+  };
 };
 
 class Conversions {
@@ -44,8 +51,13 @@ class Conversions {
   bool convert(const std::string& channel, std::span<const uint8_t> message, const Wanted& wanted,
                const Emit& emit);
 
-  // /tf_static: where the devices sit on their robots.
-  std::vector<uint8_t> static_frames() const;
+  // What is said once, to all who come later, too: where the links and devices sit on their robots
+  // (/tf_static), and each robot_description.
+  struct Standing {
+    Topic topic;
+    std::vector<uint8_t> cdr;
+  };
+  const std::vector<Standing>& standing() const { return standing_; }
 
   struct Route;
 
@@ -54,7 +66,9 @@ class Conversions {
   template <class Message>
   void add_route(const channel_info_t& channel, Plan& plan);
   size_t add_topic(Topic topic);
-  void add_frames(const device_info_t& device, const Names& names);
+  void add_frame(const std::string& parent, const std::string& child, const Pose& X);
+  void add_frames(const device_info_t& device, const Plan& plan);
+  void add_links(const std::string& name, const RobotFrames& robot, Names& names);
 
   std::vector<Topic> topics_;
   std::unordered_map<std::string, size_t> by_name_;                 // of topics
@@ -64,6 +78,7 @@ class Conversions {
     double position[3], orientation[4];  // w, x, y, z
   };
   std::vector<Frame> frames_;
+  std::vector<Standing> standing_;
 };
 
 // rosgraph_msgs/msg/Clock, and the others that no bus message stands for.

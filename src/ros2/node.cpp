@@ -53,9 +53,7 @@ Node::Node(NodeOptions options, std::unique_ptr<Transport> transport,
       }),
       clock_period_us_(std::max<int64_t>(1, rounded(1e6 / options_.clock_hz))) {
   clock_topic_ = {names_.topic("", "clock"), "rosgraph_msgs/msg/Clock", kStateQos};
-  static_frames_topic_ = {names_.topic("", "tf_static"), "tf2_msgs/msg/TFMessage", kLatchedQos};
   clock_ = transport_->add_writer(endpoint(clock_topic_));
-  static_frames_ = transport_->add_writer(endpoint(static_frames_topic_));
   services_ =
       std::make_unique<Services>(*transport_, options_.conversion.distro, names_, requests_);
   graph_ = transport_->add_writer(
@@ -129,8 +127,21 @@ void Node::take_over(const std::vector<world_info_t>& info) {
   writers_ = std::move(writers);
   writer_of_topic_ = std::move(of_topic);
   add_commands(info);
-  static_frames_->write(conversions_->static_frames());
+  tell_standing();
   tell_graph();
+}
+
+// Of a robot that is gone, nobody is told any more what it looks like.
+void Node::tell_standing() {
+  std::map<std::string, std::unique_ptr<Writer>> writers;
+  for (const Conversions::Standing& each : conversions_->standing()) {
+    const auto known = standing_.find(key(each.topic));
+    auto& writer = writers[key(each.topic)];
+    writer = known != standing_.end() ? std::move(known->second)
+                                      : transport_->add_writer(endpoint(each.topic));
+    writer->write(each.cdr);
+  }
+  standing_ = std::move(writers);
 }
 
 // Of a robot that is gone, the run itself refuses what comes.
@@ -169,11 +180,11 @@ void Node::tell_graph() {
   out.put_length(readers_.size() + services_->readers().size());
   for (const auto& [name, reader] : readers_) put_gid(reader->gid());
   for (const Reader* reader : services_->readers()) put_gid(reader->gid());
-  out.put_length(writers_.size() + services_->writers().size() + 2);
+  out.put_length(writers_.size() + standing_.size() + services_->writers().size() + 1);
   for (const auto& [name, writer] : writers_) put_gid(writer->gid());
   for (const Writer* writer : services_->writers()) put_gid(writer->gid());
   put_gid(clock_->gid());
-  put_gid(static_frames_->gid());
+  for (const auto& [name, writer] : standing_) put_gid(writer->gid());
   graph_->write(out.bytes());
 }
 
@@ -235,7 +246,8 @@ size_t Node::peers() const {
 
 std::vector<Topic> Node::outputs() const {
   std::vector<Topic> topics = conversions_->topics();
-  topics.insert(topics.end(), {clock_topic_, static_frames_topic_});
+  topics.push_back(clock_topic_);
+  for (const Conversions::Standing& each : conversions_->standing()) topics.push_back(each.topic);
   return topics;
 }
 

@@ -65,6 +65,7 @@ class Node : public run::Sink {
  private:
   void take_over(const std::vector<world_info_t>& info);  // of robots that have come or gone
   void add_commands(const std::vector<world_info_t>& info);
+  void tell_standing();
   void tell_graph();  // ros_discovery_info
   void receive(const Command& command, std::span<const uint8_t> cdr);
   void receive_pose(const std::string& robot, const std::string& topic,
@@ -82,8 +83,9 @@ class Node : public run::Sink {
   std::unique_ptr<Conversions> conversions_;
   std::map<std::string, std::unique_ptr<Writer>> writers_;  // by name and type
   std::vector<Writer*> writer_of_topic_;
-  Topic clock_topic_, static_frames_topic_;
-  std::unique_ptr<Writer> clock_, static_frames_, graph_;
+  Topic clock_topic_;
+  std::unique_ptr<Writer> clock_, graph_;
+  std::map<std::string, std::unique_ptr<Writer>> standing_;  // by name and type
   std::map<std::string, std::unique_ptr<Reader>> readers_;
   std::map<std::string, Command> commands_;  // by name and type
   std::map<std::string, Topic> poses_;       // initialpose of each robot, by name and type

@@ -1,0 +1,203 @@
+#include "ros2/robot_frames.h"
+
+#include <algorithm>
+#include <set>
+
+#include "model/body_layout.h"
+#include "ros2/names.h"
+
+namespace ruedo::ros2 {
+namespace {
+
+using model::Joint;
+using model::JointType;
+using Motion = LinkFrame::Motion;
+
+Motion motion_of(JointType type) {
+  switch (type) {
+    case JointType::revolute:
+    case JointType::continuous: return Motion::turn;
+    case JointType::prismatic: return Motion::slide;
+    case JointType::screw: return Motion::screw;
+    default: return Motion::none;  // joints without one position stay where they are at the start
+  }
+}
+
+// From the links that base_link sits on, along the joints, in whichever direction.
+class Tree {
+ public:
+  Tree(const model::WorldModel& world, const model::BodyLayout& layout,
+       const model::RobotPlacement& robot)
+      : instance_(world.models[static_cast<size_t>(robot.instance)]),
+        model_(*instance_.model),
+        layout_(layout),
+        robot_(robot),
+        frame_of_link_(model_.links.size(), 0),
+        seen_(model_.links.size(), false),
+        moves_(model_.joints.size(), false) {
+    for (const int j : robot.joints) moves_[joint_of(j)] = true;
+    for (const int w : robot.wheels) moves_[wheel_joint(w)] = true;
+    reserve_names();
+    add_base();
+    for (size_t link = 0; link < model_.links.size(); ++link) {
+      if (!seen_[link] && is_carrier(link)) add(link, 0, -1, false);
+    }
+    list_moved();
+  }
+
+  RobotFrames result() && {
+    result_.description = urdf_of(model_, result_);
+    return std::move(result_);
+  }
+
+ private:
+  size_t joint_of(int placed) const {
+    return static_cast<size_t>(layout_.joints[static_cast<size_t>(placed)].joint);
+  }
+  size_t wheel_joint(int wheel) const {
+    return static_cast<size_t>(layout_.wheels[static_cast<size_t>(wheel)].joint);
+  }
+  const model::LinkPlacement& placement(size_t link) const {
+    const int first = layout_.first_link[static_cast<size_t>(robot_.instance)];
+    return layout_.links[static_cast<size_t>(first) + link];
+  }
+  // Moves as base_link does, though no joint ties it to that.
+  bool is_carrier(size_t link) const {
+    if (placement(link).body != robot_.body) return false;
+    return std::none_of(model_.joints.begin(), model_.joints.end(), [&](const Joint& joint) {
+      return joint.child == static_cast<int>(link) && joint.parent >= 0 &&
+             placement(static_cast<size_t>(joint.parent)).body == robot_.body;
+    });
+  }
+
+  void reserve_names() {
+    names_ = {"base_link", "odom", "map", "world"};
+    for (const model::SensorDescription& sensor : model_.sensors) {
+      const std::string name = ros_name(sensor.name);
+      names_.insert({name, name + "_optical"});
+    }
+  }
+  std::string unique(const std::string& wanted) {
+    std::string name = ros_name(wanted);
+    while (!names_.insert(name).second) name += "_link";
+    return name;
+  }
+
+  void add_base() {
+    LinkFrame base;
+    base.name = "base_link";
+    base.X_MF = model_.drive ? model_.drive->X_MBase : Pose{};
+    result_.frames.push_back(base);
+  }
+
+  // A link that is called base_link and lies there is that frame.
+  bool is_base(size_t link, const Pose& X_BF) const {
+    constexpr double kNear = 1e-6;
+    return model_.links[link].name == "base_link" && result_.frames[0].link < 0 &&
+           X_BF.translation.norm() < kNear &&
+           X_BF.rotation.angularDistance(Quat::Identity()) < kNear;
+  }
+
+  void add(size_t link, size_t parent, int joint, bool backwards) {
+    seen_[link] = true;
+    LinkFrame frame;
+    frame.link = static_cast<int>(link);
+    frame.joint = joint;
+    frame.parent = parent;
+    frame.X_MF = model_.links[link].X_ML;
+    if (joint >= 0) move(frame, model_.joints[static_cast<size_t>(joint)], backwards);
+    const Pose X_MBase = result_.frames[0].X_MF;
+    frame.X_BF = X_MBase.inverse() * frame.X_MF;
+    frame.X_PF = result_.frames[parent].X_MF.inverse() * frame.X_MF;
+    if (parent == 0 && frame.motion == Motion::none && is_base(link, frame.X_BF)) {
+      result_.frames[0].link = frame.link;
+      frame_of_link_[link] = 0;
+    } else {
+      frame.name = unique(model_.links[link].name);
+      frame_of_link_[link] = result_.frames.size();
+      result_.frames.push_back(std::move(frame));
+    }
+    add_neighbours(link);
+  }
+
+  void move(LinkFrame& frame, const Joint& joint, bool backwards) const {
+    if (!moves_[static_cast<size_t>(frame.joint)]) return;
+    frame.motion = motion_of(joint.type);
+    if (frame.motion == Motion::none) return;
+    frame.X_MF = joint.X_MJ;
+    frame.axis = backwards ? Vec3(-joint.axis.axis_in_J) : joint.axis.axis_in_J;
+    frame.advance = joint.advance;
+  }
+
+  void add_neighbours(size_t link) {
+    for (size_t j = 0; j < model_.joints.size(); ++j) {
+      const Joint& joint = model_.joints[j];
+      if (joint.parent < 0) continue;
+      const auto parent = static_cast<size_t>(joint.parent),
+                 child = static_cast<size_t>(joint.child);
+      if (parent == link && !seen_[child])
+        add(child, frame_of_link_[link], static_cast<int>(j), false);
+      else if (child == link && !seen_[parent])
+        add(parent, frame_of_link_[link], static_cast<int>(j), true);
+    }
+  }
+
+  size_t frame_of_joint(size_t joint) const {
+    const auto found = std::find_if(
+        result_.frames.begin(), result_.frames.end(),
+        [&](const LinkFrame& frame) { return frame.joint == static_cast<int>(joint); });
+    return found == result_.frames.end() || found->motion == Motion::none
+               ? 0
+               : static_cast<size_t>(found - result_.frames.begin());
+  }
+
+  void list_moved() {
+    for (const int w : robot_.wheels) {
+      const model::WheelPlacement& wheel = layout_.wheels[static_cast<size_t>(w)];
+      const Joint& joint = model_.joints[static_cast<size_t>(wheel.joint)];
+      const Pose X_LM = model_.links[static_cast<size_t>(joint.child)].X_ML.inverse();
+      const Vec3 axis_in_L = X_LM.rotation * (joint.X_MJ.rotation * joint.axis.axis_in_J);
+      result_.wheels.push_back(
+          {frame_of_joint(wheel_joint(w)), axis_in_L.dot(wheel.axis_in_L) < 0 ? -1.0 : 1.0});
+    }
+    for (const int j : robot_.joints) result_.joints.push_back({frame_of_joint(joint_of(j))});
+    for (const model::SensorDescription& sensor : model_.sensors) {
+      const size_t frame = frame_of_link_[static_cast<size_t>(sensor.link)];
+      for (size_t each = frame; each != 0; each = result_.frames[each].parent) {
+        if (result_.frames[each].motion != Motion::none) result_.carriers[sensor.name] = frame;
+      }
+    }
+  }
+
+  const model::ModelInstance& instance_;
+  const model::Model& model_;
+  const model::BodyLayout& layout_;
+  const model::RobotPlacement& robot_;
+  RobotFrames result_;
+  std::vector<size_t> frame_of_link_;
+  std::vector<bool> seen_, moves_;
+  std::set<std::string> names_;
+};
+
+}  // namespace
+
+Pose LinkFrame::at(double position) const {
+  Pose moved;
+  if (motion == Motion::turn || motion == Motion::screw)
+    moved.rotation = Quat(Eigen::AngleAxisd(position, axis));
+  if (motion == Motion::slide) moved.translation = position * axis;
+  if (motion == Motion::screw) moved.translation = position * advance * axis;
+  return X_PF * moved;
+}
+
+std::map<std::string, RobotFrames> robot_frames(const model::WorldModel& world) {
+  const model::BodyLayout layout(world);
+  std::map<std::string, RobotFrames> robots;
+  for (const model::RobotPlacement& robot : layout.robots) {
+    const model::ModelInstance& instance = world.models[static_cast<size_t>(robot.instance)];
+    if (!instance.removed) robots[instance.name] = Tree(world, layout, robot).result();
+  }
+  return robots;
+}
+
+}  // namespace ruedo::ros2
