@@ -3,6 +3,7 @@ that jump, an interface that goes down."""
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import time
@@ -19,6 +20,7 @@ BOX = (
     "<sdf version='1.9'><model name='box'><static>true</static><link name='l'><collision name='c'>"
     "<geometry><box><size>0.1 0.1 0.1</size></box></geometry></collision></link></model></sdf>"
 )
+STOP = float(os.environ.get("RUEDO_STOP_SECONDS", "4"))  # s; a minute in the nightly run
 NO_CAMERA = ("--disable", "p3at/camera")
 
 
@@ -62,11 +64,11 @@ def test_a_stopped_server_goes_on_from_where_it_was() -> None:
             sim.sleep(0.2)
             server.process.send_signal(signal.SIGSTOP)
             before, stopped_at = sim.time, time.monotonic()
-            time.sleep(4)  # the fault itself
+            time.sleep(STOP)  # the fault itself
             server.process.send_signal(signal.SIGCONT)
             wait_until(lambda: sim.time > before + 0.6, "the run went on")
             gained = sim.time - before
-            running = time.monotonic() - stopped_at - 4
+            running = time.monotonic() - stopped_at - STOP
             assert (
                 gained <= running + 0.5
             )  # a quarter of a second is caught up, and what was on its way
@@ -82,7 +84,7 @@ def test_a_stopped_server_ends_no_lease() -> None:
             sim.step(10)
             for _ in range(3):
                 server.process.send_signal(signal.SIGSTOP)
-                time.sleep(3)  # the fault itself
+                time.sleep(STOP)  # the fault itself
                 server.process.send_signal(signal.SIGCONT)
                 sim.step(10)
         server.end()
