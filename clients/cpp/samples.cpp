@@ -318,7 +318,7 @@ std::shared_ptr<const Sample> decode_logical_camera(WireReader& in) {
   s->utime = in.int64();
   s->objects.resize(in.count(5 + 7 * 8));
   for (LogicalObject& object : s->objects) {
-    object.name = in.string();
+    object.model = in.string();
     object.position = in.array<3>();
     object.orientation = in.array<4>();
   }

@@ -261,7 +261,7 @@ struct ForceTorque : Sample {
 
 // A model that a logical camera sees, in the device's frame.
 struct LogicalObject {
-  std::string name;
+  std::string model;         // its name
   Vector3 position{};        // m
   Quaternion orientation{};  // model to device
 };

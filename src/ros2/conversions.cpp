@@ -406,11 +406,11 @@ void write_logical_camera(const logical_camera_t& seen, const Source& from, CdrW
   out.put_length(seen.objects.size());
   for (const logical_object_t& object : seen.objects) {
     put_header(out, seen.utime, from.frame);
-    put_hypothesis(out, object.name, object.position, object.orientation);
+    put_hypothesis(out, object.model, object.position, object.orientation);
     put_vector(out, object.position);
     put_quaternion(out, object.orientation);
     put_vector(out, kNowhere);  // its size is not known
-    out.put(object.name);
+    out.put(object.model);
   }
 }
 

@@ -45,7 +45,7 @@ class LogicalCamera : public Sensor {
       const Pose X_SM = X_SW * model_pose(world_, layout_, static_cast<int>(i), now);
       if (!sees(X_SM.translation)) continue;
       logical_object_t& object = message_.objects.emplace_back();
-      object.name = instance.name;
+      object.model = instance.name;
       const Quat& q = X_SM.rotation;
       const double wxyz[] = {q.w(), q.x(), q.y(), q.z()};
       std::copy(std::begin(wxyz), std::end(wxyz), object.orientation);

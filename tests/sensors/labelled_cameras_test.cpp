@@ -230,7 +230,7 @@ TEST(LogicalCamera, ListsWhatHasItsOriginInTheFrustum) {
   device.sensor->sample({bench.snapshot(), 0, nullptr, nullptr}, out);
   const logical_camera_t seen = Device::decode<logical_camera_t>(out).at(0);
   std::vector<std::string> names;
-  for (const logical_object_t& object : seen.objects) names.push_back(object.name);
+  for (const logical_object_t& object : seen.objects) names.push_back(object.model);
   EXPECT_THAT(names, ElementsAre("crate", "board", "low"));
   EXPECT_EQ(seen.objects.at(0).position[0], 5);
   EXPECT_NEAR(seen.objects.at(2).position[2], 0.9, 1e-15);

@@ -369,7 +369,7 @@ class ForceTorque(Sample):
 class LogicalObject(_Value):
     """A model that a logical camera sees, in the device's frame."""
 
-    name: str
+    model: str  # its name
     position: Floats  # (3,) m
     orientation: Floats  # (4,) w, x, y, z: model to device
 
@@ -569,7 +569,7 @@ def _logical_camera(m: Any) -> LogicalCamera:
     _counted(m.n)
     return LogicalCamera(
         m.utime,
-        [LogicalObject(o.name, _floats(o.position), _floats(o.orientation)) for o in m.objects],
+        [LogicalObject(o.model, _floats(o.position), _floats(o.orientation)) for o in m.objects],
     )
 
 

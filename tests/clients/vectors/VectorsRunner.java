@@ -95,7 +95,7 @@ public final class VectorsRunner {
             row("torque", (Object) ((ForceTorque) sample).torque);
         } else if (sample instanceof LogicalCamera) {
             for (LogicalCamera.LogicalObject o : ((LogicalCamera) sample).objects)
-                row("object " + o.name, o.position, o.orientation);
+                row("object " + o.model, o.position, o.orientation);
         } else if (sample instanceof Boxes2D) {
             Boxes2D s = (Boxes2D) sample;
             row("picture", s.width, s.height);

@@ -110,7 +110,7 @@ CASES = [
             utime=15,
             n=1,
             objects=[
-                dict(name="crate", position=[1.0, -2.0, 0.5], orientation=[1.0, 0.0, 0.0, 0.0])
+                dict(model="crate", position=[1.0, -2.0, 0.5], orientation=[1.0, 0.0, 0.0, 0.0])
             ],
         ),
         "utime 15|object crate 1.000000 -2.000000 0.500000 1.000000 0.000000 0.000000 0.000000",

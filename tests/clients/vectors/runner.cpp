@@ -87,7 +87,7 @@ void mean(const std::string& type, const Sample& sample) {
     for (const LogicalObject& o : logical->objects) {
       std::vector<double> values(o.position.begin(), o.position.end());
       values.insert(values.end(), o.orientation.begin(), o.orientation.end());
-      row("object " + o.name, values);
+      row("object " + o.model, values);
     }
   } else if (const auto* flat = as<Boxes2D>(type, sample)) {
     row("picture", std::vector{flat->width, flat->height});

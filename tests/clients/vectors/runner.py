@@ -64,7 +64,7 @@ def meaning(type, s):
         yield row("torque", floats(s.torque))
     elif type == "logical_camera_t":
         for o in s.objects:
-            yield row(f"object {o.name}", floats([*o.position, *o.orientation]))
+            yield row(f"object {o.model}", floats([*o.position, *o.orientation]))
     elif type == "boxes_2d_t":
         yield row("picture", [s.width, s.height])
         for b in s.boxes:

@@ -14,8 +14,8 @@ public final class LogicalCamera extends Sample {
 
     /** A model that is seen, in the device's frame. */
     public static final class LogicalObject {
-        /** Of the model. */
-        public final String name;
+        /** Its name. */
+        public final String model;
 
         /** m. */
         public final double[] position;
@@ -23,8 +23,8 @@ public final class LogicalCamera extends Sample {
         /** w, x, y, z: model to device. */
         public final double[] orientation;
 
-        LogicalObject(String name, double[] position, double[] orientation) {
-            this.name = name;
+        LogicalObject(String model, double[] position, double[] orientation) {
+            this.model = model;
             this.position = position;
             this.orientation = orientation;
         }
