@@ -19,6 +19,7 @@
 #include "bus/server_bus.h"
 #include "cli/commands.h"
 #include "cli/extensions.h"
+#include "cli/find_all.h"
 #include "cli/foxglove_server.h"
 #include "cli/listing.h"
 #include "cli/progress_line.h"
@@ -209,6 +210,17 @@ std::string socket_of(const std::string& lcm) {
   return url.scheme == "unix" ? url.host : "";
 }
 
+// --strict: the exit code where the world is not as its files say, with what `ruedo check` finds.
+int strict_check(const WorldArguments& world) {
+  bool loaded = false;
+  const std::vector<Finding> findings = find_all(world, loaded);
+  if (findings.empty()) return kGood;
+  print_findings(findings);
+  fmt::print(stderr, "ruedo: {} is not run: --strict refuses what has findings\n",
+             for_terminal(world.world));
+  return loaded ? kCheckFailed : kBadInput;
+}
+
 }  // namespace
 
 int run_world(const RunArguments& arguments) {
@@ -220,6 +232,9 @@ int run_world(const RunArguments& arguments) {
   SignalThread signals;
   if (arguments.watch_stdin) watch_stdin();
   const engine::ThreadLimit limit(arguments.threads);
+  if (arguments.strict) {
+    if (const int code = strict_check(arguments.world); code != kGood) return code;
+  }
   const std::shared_ptr<const model::WorldModel> world = load(arguments.world);
   for (std::string& plugin : plugin_options()) options.result_options.push_back(std::move(plugin));
   bus::ServerBus place = bus::open_server_bus(arguments.lcm, world->name);
@@ -351,6 +366,8 @@ void add_run(CLI::App& app, Action& chosen) {
       ->add_option("--restore", arguments->restore,
                    "begin with the state of a snapshot of the same world and options")
       ->type_name("FILE");
+  command->add_flag("--strict", arguments->strict,
+                    "run nothing that `ruedo check --strict` would not call good");
   command->add_flag("--paused", arguments->paused, "start paused, at step 0");
   command
       ->add_option("--lockstep", arguments->lockstep,

@@ -22,7 +22,7 @@ struct RunArguments {
   std::vector<std::string> remaps, wait_for;
   std::string view;
   bool viewed = false;
-  bool paused = false, quiet = false, watch_stdin = false, sandboxed = false;
+  bool paused = false, quiet = false, strict = false, watch_stdin = false, sandboxed = false;
   int threads = 0;
   Ros2Arguments ros2;
   bool foxglove = false;

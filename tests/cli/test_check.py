@@ -18,6 +18,13 @@ def check(file, *options):
     return subprocess.run([RUEDO, "check", str(file), *options], capture_output=True, timeout=60)
 
 
+def run_strictly(file, log):
+    quick = ("--lcm", "memq://", "--rate", "max", "--duration", "0.1", "--record", str(log))
+    return subprocess.run(
+        [RUEDO, "run", str(file), "--strict", *quick], capture_output=True, timeout=60
+    )
+
+
 def world(inside):
     return f"<sdf version='1.9'>\n<world name='w'>\n{inside}\n</world></sdf>"
 
@@ -217,6 +224,9 @@ def test_files_that_are_wrong(name, tmp_path):
         place = found["file"] + (f":{line}" if line else "")
         assert part in text and place in text and "\x1b" not in text
     assert check(tmp_path / "w.sdf", "--strict").returncode == (code or 1)
+    done = run_strictly(tmp_path / "w.sdf", tmp_path / "run.lcm")
+    assert done.returncode == (code or 1) and not (tmp_path / "run.lcm").exists()
+    assert all(part in done.stderr.decode() for _, _, _, part in expected)
 
 
 SERVED = [

@@ -192,6 +192,7 @@ def test_check_finds_all_with_lines(tmp_path):
     result = ruedo("check", str(world))
     assert f"{world}:6" in result.stdout and "samples" in result.stdout
     assert ruedo("check", ARENA, "--strict").returncode == 0
+    assert ruedo("run", ARENA, "--strict", *quick).returncode == 0
 
 
 def events(path):
