@@ -2,42 +2,15 @@
 #include "run/tick.h"
 
 #include <algorithm>
-#include <array>
+
+#include <zlib.h>
 
 #include "engine/world_state.h"
 
 namespace ruedo::run {
 
-namespace {
-
-// tables[k][b]: what byte b does to the remainder when k more bytes follow it.
-using CrcTables = std::array<std::array<uint32_t, 256>, 8>;
-constexpr CrcTables kCrc = [] {
-  CrcTables tables{};
-  for (uint32_t i = 0; i < 256; ++i) {
-    uint32_t value = i;
-    for (int bit = 0; bit < 8; ++bit) value = value & 1 ? value >> 1 ^ 0xEDB88320u : value >> 1;
-    tables[0][i] = value;
-  }
-  for (size_t k = 1; k < 8; ++k)
-    for (size_t i = 0; i < 256; ++i)
-      tables[k][i] = tables[0][tables[k - 1][i] & 0xff] ^ tables[k - 1][i] >> 8;
-  return tables;
-}();
-
-}  // namespace
-
-// Eight bytes at a time ("slicing by 8"; Kounavis, Berry, IEEE Transactions on Computers 57, 2008).
 uint32_t crc32(const uint8_t* data, size_t size, uint32_t before) {
-  uint32_t crc = ~before;
-  for (; size >= 8; data += 8, size -= 8) {
-    const uint32_t low = crc ^ (data[0] | data[1] << 8 | data[2] << 16 | uint32_t{data[3]} << 24);
-    crc = kCrc[7][low & 0xff] ^ kCrc[6][low >> 8 & 0xff] ^ kCrc[5][low >> 16 & 0xff] ^
-          kCrc[4][low >> 24] ^ kCrc[3][data[4]] ^ kCrc[2][data[5]] ^ kCrc[1][data[6]] ^
-          kCrc[0][data[7]];
-  }
-  for (; size > 0; ++data, --size) crc = kCrc[0][(crc ^ *data) & 0xff] ^ crc >> 8;
-  return ~crc;
+  return static_cast<uint32_t>(::crc32_z(before, data, size));
 }
 
 void TickWriter::begin(int64_t utime, int64_t run_id, int32_t epoch, int64_t step) {
