@@ -19,7 +19,7 @@ constexpr auto kUnseenTime = std::chrono::seconds(1);
 
 }  // namespace
 
-void MotionCore::update(const MotionStatus& status) {
+void MotionCore::update(const MotionStatus& status, const std::string& blocker) {
   const std::lock_guard lock(mutex);
   if (done() || status.utime < utime) return;
   utime = status.utime;
@@ -28,6 +28,7 @@ void MotionCore::update(const MotionStatus& status) {
     remaining = status.remaining;
     state = status.state;
     reason = status.reason;
+    blocked_by = reason == MotionReason::blocked ? blocker : "";
   } else if (status.state == MotionState::refused) {
     // another command, which changed nothing
   } else if (state != MotionState::sent ||
@@ -49,7 +50,8 @@ void MotionCore::end(MotionReason why) {
 Driver::Driver(std::weak_ptr<Core> core, std::string robot, double watchdog)
     : core_(std::move(core)), robot_(std::move(robot)), watchdog_(watchdog) {}
 
-void Driver::listen(const std::shared_ptr<StreamCore>& motion) {
+void Driver::listen(const std::shared_ptr<StreamCore>& motion,
+                    const std::shared_ptr<StreamCore>& collisions) {
   {
     const std::lock_guard lock(mutex_);
     if (ended_ != MotionReason::none)
@@ -58,6 +60,14 @@ void Driver::listen(const std::shared_ptr<StreamCore>& motion) {
   }
   const std::lock_guard lock(listening_);
   if (statuses_.open()) return;
+  if (collisions) {  // of a step they come before the status
+    collisions_ = collisions->on_sample([self = weak_from_this()](const Sample& sample) {
+      const auto driver = self.lock();
+      if (!driver) return;
+      const std::lock_guard driver_lock(driver->mutex_);
+      driver->blocked_by_ = static_cast<const Collisions&>(sample).blocked_by;
+    });
+  }
   statuses_ = motion->on_sample([self = weak_from_this()](const Sample& sample) {
     if (const auto driver = self.lock())
       driver->on_status(static_cast<const MotionStatus&>(sample));
@@ -122,20 +132,23 @@ void Driver::end(MotionReason reason) {
     motions = std::move(motions_);
     motions_.clear();
   }
-  Subscription statuses;
+  Subscription statuses, collisions;
   {
     const std::lock_guard lock(listening_);
     statuses = std::move(statuses_);
+    collisions = std::move(collisions_);
   }
   for (const auto& motion : motions) motion->end(reason);
 }
 
 void Driver::on_status(const MotionStatus& status) {
   std::vector<std::shared_ptr<MotionCore>> motions;
+  std::string blocker;
   bool stopped = false;
   {
     const std::lock_guard lock(mutex_);
     motions = motions_;
+    blocker = blocked_by_;
     running_ =
         running_ || (!held_.empty() && status.id == 0 && status.state == MotionState::running);
     stopped =
@@ -147,7 +160,7 @@ void Driver::on_status(const MotionStatus& status) {
                  "ruedo: %s: stopped by its watchdog: no command came for %g s of sim time\n",
                  robot_.c_str(), watchdog_);
   }
-  for (const auto& motion : motions) motion->update(status);
+  for (const auto& motion : motions) motion->update(status, blocker);
 }
 
 int64_t Motion::id() const { return core_->id; }
@@ -162,6 +175,10 @@ MotionState Motion::state() const {
 MotionReason Motion::reason() const {
   std::lock_guard lock(core_->mutex);
   return core_->reason;
+}
+std::string Motion::blocked_by() const {
+  std::lock_guard lock(core_->mutex);
+  return core_->blocked_by;
 }
 double Motion::progress() const {
   std::lock_guard lock(core_->mutex);
@@ -194,7 +211,9 @@ const Motion& Motion::wait(Duration timeout) const {
   if (motion.state != MotionState::done) {
     throw MotionError(motion.robot + ": " + motion.kind +
                           (motion.state == MotionState::refused ? " was refused: " : " ended: ") +
-                          to_string(motion.reason) + ", " + remaining_text(),
+                          to_string(motion.reason) +
+                          (motion.blocked_by.empty() ? "" : " by " + motion.blocked_by) + ", " +
+                          remaining_text(),
                       motion.reason);
   }
   return *this;

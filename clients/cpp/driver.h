@@ -30,6 +30,7 @@ struct MotionCore {
   std::condition_variable news;
   MotionState state = MotionState::sent;
   MotionReason reason = MotionReason::none;
+  std::string blocked_by;
   double progress = 0.0, remaining = 0.0;
   int unseen = 0;  // statuses that did not show it
   int64_t utime =
@@ -40,7 +41,7 @@ struct MotionCore {
     return state == MotionState::done || state == MotionState::ended ||
            state == MotionState::refused;
   }
-  void update(const MotionStatus& status);
+  void update(const MotionStatus& status, const std::string& blocker);
   void end(MotionReason why);
 };
 
@@ -56,9 +57,11 @@ class Driver : public std::enable_shared_from_this<Driver> {
 
   std::shared_ptr<MotionCore> move(Bus& bus, const std::string& channel,
                                    const move_command_t& command, const std::string& kind);
-  void listen(
-      const std::shared_ptr<StreamCore>& motion);  // throws UnknownName when the robot is gone
-  void begin_epoch();                              // sim time was set back
+  // collisions may be null: what is blocked does not know by what then. Throws UnknownName when the
+  // robot is gone.
+  void listen(const std::shared_ptr<StreamCore>& motion,
+              const std::shared_ptr<StreamCore>& collisions);
+  void begin_epoch();             // sim time was set back
   void end(MotionReason reason);  // its robot, or its run, is gone: nothing is repeated to the next
                                   // one of that name
 
@@ -68,12 +71,13 @@ class Driver : public std::enable_shared_from_this<Driver> {
   const std::weak_ptr<Core> core_;
   const std::string robot_;
   const double watchdog_;  // s
-  std::mutex listening_;   // statuses_
-  Subscription statuses_;
+  std::mutex listening_;   // the two that follow
+  Subscription statuses_, collisions_;
   std::mutex mutex_;
   std::string held_channel_;
   std::vector<uint8_t> held_;  // empty: nothing
   std::vector<std::shared_ptr<MotionCore>> motions_;
+  std::string blocked_by_;
   MotionReason ended_ = MotionReason::none;
   bool running_ = false, watchdog_told_ = false;
 };

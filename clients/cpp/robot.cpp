@@ -1,5 +1,7 @@
 // A robot: its devices by what ruedo/info says of them, and its commands.
+#include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "core.h"
 #include "ruedo/move_command_t.hpp"
@@ -102,11 +104,15 @@ double limit(const char* name, double value) {
 
 void listen(Core& core, const std::string& robot, Driver& driver) {
   const auto info = core.info();
+  std::shared_ptr<StreamCore> motion, collisions;
   for (const ChannelInfo& channel : channels_of(*info, robot)) {
-    if (channel.type == message_type<MotionStatus>() && !channel.input)
-      return driver.listen(core.stream(channel));
+    if (channel.input) continue;
+    if (!motion && channel.type == message_type<MotionStatus>()) motion = core.stream(channel);
+    if (!collisions && channel.type == message_type<Collisions>())
+      collisions = core.stream(channel);
   }
-  throw NotSupported(robot + " publishes no motion status");
+  if (!motion) throw NotSupported(robot + " publishes no motion status");
+  driver.listen(motion, collisions);
 }
 
 void hold(Core& core, const std::string& robot, const std::string& channel,
@@ -220,6 +226,19 @@ Device<Odometry> Robot::odometry() const {
 Device<Imu> Robot::imu() const { return first_device<Imu>(*core_, name_, "IMU"); }
 Device<Contact> Robot::contact() const {
   return first_device<Contact>(*core_, name_, "contact sensor");
+}
+Stream<Collisions> Robot::collisions() const {
+  return first_stream<Collisions>(*core_, name_, "collisions");
+}
+Subscription Robot::on_collision(std::function<void(const Collisions&)> callback) const {
+  return collisions().on_sample([callback = std::move(callback), touched = std::set<std::string>()](
+                                    const Collisions& sample) mutable {
+    std::set<std::string> now;
+    for (const ContactPoint& point : sample.points) now.insert(point.body);
+    const bool news = !std::includes(touched.begin(), touched.end(), now.begin(), now.end());
+    touched = std::move(now);
+    if (news) callback(sample);
+  });
 }
 Stream<Pose> Robot::pose() const { return first_stream<Pose>(*core_, name_, "true pose"); }
 Stream<MotionStatus> Robot::motion() const {

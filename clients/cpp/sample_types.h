@@ -21,6 +21,7 @@ namespace ruedo::client {
   X(CameraInfo, camera_info_t)       \
   X(Imu, imu_t)                      \
   X(Contact, contact_t)              \
+  X(Collisions, collisions_t)        \
   X(Joints, joint_state_t)           \
   X(MotionStatus, motion_status_t)   \
   X(NavSat, navsat_t)                \

@@ -9,6 +9,7 @@
 #include "ruedo/boxes_2d_t.hpp"
 #include "ruedo/boxes_3d_t.hpp"
 #include "ruedo/camera_info_t.hpp"
+#include "ruedo/collisions_t.hpp"
 #include "ruedo/contact_t.hpp"
 #include "ruedo/force_torque_t.hpp"
 #include "ruedo/image_t.hpp"
@@ -225,18 +226,31 @@ std::shared_ptr<const Sample> decode_imu(WireReader& in) {
   return s;
 }
 
-std::shared_ptr<const Sample> decode_contact(WireReader& in) {
-  auto s = std::make_shared<Contact>();
-  s->utime = in.int64();
-  s->pressed = in.boolean();
-  s->points.resize(in.count(5 + 8 * 8));
-  for (ContactPoint& point : s->points) {
+std::vector<ContactPoint> contact_points(WireReader& in) {
+  std::vector<ContactPoint> points(in.count(5 + 8 * 8));
+  for (ContactPoint& point : points) {
     point.body = in.string();
     point.position = in.array<3>();
     point.normal = in.array<3>();
     point.force = in.float64();
     point.depth = in.float64();
   }
+  return points;
+}
+
+std::shared_ptr<const Sample> decode_contact(WireReader& in) {
+  auto s = std::make_shared<Contact>();
+  s->utime = in.int64();
+  s->pressed = in.boolean();
+  s->points = contact_points(in);
+  return s;
+}
+
+std::shared_ptr<const Sample> decode_collisions(WireReader& in) {
+  auto s = std::make_shared<Collisions>();
+  s->utime = in.int64();
+  s->blocked_by = in.string();
+  s->points = contact_points(in);
   return s;
 }
 
@@ -363,6 +377,7 @@ const SampleDecoder kDecoders[] = {
     {"camera_info_t", camera_info_t::getHash(), decode_camera_info},
     {"imu_t", imu_t::getHash(), decode_imu},
     {"contact_t", contact_t::getHash(), decode_contact},
+    {"collisions_t", collisions_t::getHash(), decode_collisions},
     {"joint_state_t", joint_state_t::getHash(), decode_joints},
     {"motion_status_t", motion_status_t::getHash(), decode_motion},
     {"navsat_t", navsat_t::getHash(), decode_navsat},

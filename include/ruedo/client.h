@@ -258,9 +258,10 @@ class Motion {
   int64_t id() const;
   bool done() const;  // true when the robot is not executing it any more, for whatever reason
   MotionState state() const;
-  MotionReason reason() const;  // why it ended early or was refused
-  double progress() const;      // m or rad
-  double remaining() const;     // m or rad
+  MotionReason reason() const;     // why it ended early or was refused
+  std::string blocked_by() const;  // the body that blocked it; "": none did
+  double progress() const;         // m or rad
+  double remaining() const;        // m or rad
   /// Waits until it is done.
   /// @param timeout of real time
   /// @throws MotionError when it ended early or was refused; Timeout when it still runs: the robot
@@ -306,6 +307,11 @@ class Robot {
   Camera camera() const;
   Device<Imu> imu() const;
   Device<Contact> contact() const;
+  Stream<Collisions> collisions() const;  // what it runs into, and what blocks it; without a bumper
+  /// Calls back as Stream::on_sample() does, but only when the robot runs into a body that it did
+  /// not touch a moment before.
+  /// @throws UnknownName, TypeMismatch, NoServer
+  Subscription on_collision(std::function<void(const Collisions&)> callback) const;
   Stream<Pose> pose() const;            // the true pose
   Stream<MotionStatus> motion() const;  // what it is executing
   Stream<Joints> joints() const;

@@ -304,6 +304,12 @@ struct Contact : Sample {
   std::vector<ContactPoint> points;
 };
 
+// What a robot runs into: with what neither carries it nor lies on it.
+struct Collisions : Sample {
+  std::string blocked_by;            // the body that blocks what it was told to do; "": nothing
+  std::vector<ContactPoint> points;  // empty: nothing is touched
+};
+
 struct Joints : Sample {
   std::vector<std::string> names;
   std::vector<float> positions, velocities, efforts;  // rad or m, rad/s or m/s, N m or N

@@ -26,11 +26,20 @@ struct Contact {
   int shape_a = -1, shape_b = -1;  // indices into the links' collisions; -1: not known
 };
 
-// What a robot's drive is executing; the members are motion_status_t's.
+// A contact of a robot with what it runs into: with something that is no part of it, that does not
+// carry it and does not lie on it.
+struct Collision {
+  int robot = -1;    // index into BodyLayout::robots
+  int contact = -1;  // index into Snapshot::contacts
+  bool as_a = true;  // the robot's is link_a
+};
+
+// What a robot's drive is executing; the members are motion_status_t's, but for the last two.
 struct MotionState {
   int64_t id = 0;
   int8_t kind = 0, state = 0, reason = 0;
   double done = 0.0, remaining = 0.0;
+  int blocked_by = -1;  // while the reason is that it is blocked: index into BodyLayout::links
   int64_t changes = 0;  // counts the changes of id, kind, state and reason, and the MotionEnds
 };
 
@@ -65,6 +74,7 @@ struct Snapshot {
   std::vector<RobotState> robots;
   std::vector<MotionEnd> motion_ends;  // by robot, then in the order of the commands
   std::vector<Contact> contacts;       // in a fixed order
+  std::vector<Collision> collisions;   // by robot, then in the order of the contacts
 };
 
 }  // namespace ruedo

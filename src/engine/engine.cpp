@@ -21,7 +21,6 @@ namespace ruedo::engine {
 namespace {
 
 constexpr int64_t kBatchSteps = 32;
-constexpr double kUpright = 0.70710678118654752;  // cosine of 45 degrees
 const std::atomic<bool> kNeverLeftOff{false};
 
 // Rounding and denormals as in every thread that computes, whatever the caller's program has set;
@@ -65,6 +64,9 @@ struct Engine::Copy {
     const Outbox::Entry* entry;
   };
   std::vector<Place> places;  // of the newest messages of a batch
+  // Of each driven robot, the links that it ran into in the last step(), in the order in which it
+  // met them.
+  std::vector<std::vector<int>> met;
 
   void keep_newest();
 };
@@ -164,6 +166,7 @@ void Engine::compute(size_t index, int64_t steps) {
   }
   const size_t robots = driven_.size();
   std::vector<int32_t> touching(robots, 0);
+  copy.met.assign(robots, {});
   for (int64_t left = steps; left > 0; left -= batch.count) {
     batch.first_step = copy.step + 1;
     batch.count = static_cast<int>(std::min(left, kBatchSteps));
@@ -227,22 +230,37 @@ void Engine::tell(size_t index) {
   }
 }
 
-void Engine::count_touching(size_t index, int32_t* counts) const {
-  const Copy& copy = *copies_[index];
-  const model::BodyLayout& layout = copy.world->layout();
+void Engine::count_touching(size_t index, int32_t* counts) {
+  Copy& copy = *copies_[index];
   for (int i = 0; i < copy.batch.count; ++i) {
-    const std::vector<Contact>& contacts = copy.batch.snapshots[static_cast<size_t>(i)].contacts;
+    const Snapshot& state = copy.batch.snapshots[static_cast<size_t>(i)];
+    if (state.collisions.empty()) continue;
     for (size_t robot = 0; robot < driven_robots_.size(); ++robot) {
-      const int instance = layout.robots[static_cast<size_t>(driven_robots_[robot])].instance;
-      const auto is_its = [&](int link) {
-        return link >= 0 && layout.links[static_cast<size_t>(link)].instance == instance;
-      };
-      counts[robot] += std::any_of(contacts.begin(), contacts.end(), [&](const Contact& contact) {
-        return std::abs(contact.normal.z()) < kUpright &&
-               is_its(contact.link_a) != is_its(contact.link_b);
-      });
+      bool touched = false;
+      for (const Collision& collision : state.collisions) {
+        if (collision.robot != driven_robots_[robot]) continue;
+        touched = true;
+        const Contact& contact = state.contacts[static_cast<size_t>(collision.contact)];
+        const int other = collision.as_a ? contact.link_b : contact.link_a;
+        std::vector<int>& met = copy.met[robot];
+        if (std::find(met.begin(), met.end(), other) == met.end()) met.push_back(other);
+      }
+      counts[robot] += touched;
     }
   }
+}
+
+std::vector<std::vector<std::string>> Engine::collisions(int world) const {
+  const Copy& copy = *copies_.at(static_cast<size_t>(world));
+  std::vector<std::vector<std::string>> names;
+  for (const std::vector<int>& links : copy.met) {
+    std::vector<std::string>& of_robot = names.emplace_back();
+    for (const int link : links)
+      of_robot.push_back(model::body_name(copy.world->model(), copy.world->layout(), link));
+    std::sort(of_robot.begin(), of_robot.end());
+    of_robot.erase(std::unique(of_robot.begin(), of_robot.end()), of_robot.end());
+  }
+  return names;
 }
 
 void Engine::update(Observer& observer, size_t world) {

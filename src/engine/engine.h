@@ -95,10 +95,11 @@ class Engine {
   // ("lrf") where each robot has at most one of them. Throws InputError.
   std::shared_ptr<const FieldArray> observe(const std::string& device, const std::string& field);
 
-  // Of each copy and driven robot (int32): how many of the states of the last step() it touched
-  // something in, that does not carry it and that it does not carry: the contact's normal is nearer
-  // to level than to upright.
+  // Of each copy and driven robot (int32): how many of the states of the last step() it ran into
+  // something in (Snapshot::collisions).
   std::shared_ptr<const FieldArray> touching() const { return touching_; }
+  // Of each driven robot of a copy: the bodies that it ran into in these states, sorted.
+  std::vector<std::vector<std::string>> collisions(int world) const;
 
   uint64_t state_hash(int world) const;
 
@@ -117,7 +118,7 @@ class Engine {
   std::unique_ptr<Copy> make_copy(std::shared_ptr<const model::WorldModel> model, uint64_t seed);
   void reset_one(const Reset& reset);
   std::shared_ptr<StaticScenes> statics_of(const std::shared_ptr<const model::WorldModel>& model);
-  void count_touching(size_t world, int32_t* counts) const;
+  void count_touching(size_t world, int32_t* counts);
   void compute(size_t world, int64_t steps);
   void tell(size_t world);
   void update(Observer& observer, size_t world);

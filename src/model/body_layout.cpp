@@ -315,4 +315,12 @@ void BodyLayout::add(const WorldModel& world, int i, Known& known) {
   if (robot >= 0) robots.push_back(std::move(placement));
 }
 
+std::string body_name(const WorldModel& world, const BodyLayout& layout, int link) {
+  if (link < 0) return "";
+  const LinkPlacement& placement = layout.links[static_cast<size_t>(link)];
+  if (placement.body >= 0) return layout.bodies[static_cast<size_t>(placement.body)].name;
+  const ModelInstance& instance = world.models[static_cast<size_t>(placement.instance)];
+  return instance.name + "/" + instance.model->links[static_cast<size_t>(placement.link)].name;
+}
+
 }  // namespace ruedo::model

@@ -93,4 +93,7 @@ struct BodyLayout {
   void list(size_t first_body, size_t first_link);
 };
 
+// As ruedo/info names what a link belongs to: its body's MODEL/LINK, or its own where it is static.
+std::string body_name(const WorldModel& world, const BodyLayout& layout, int link);
+
 }  // namespace ruedo::model

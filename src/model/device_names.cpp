@@ -11,8 +11,9 @@ namespace {
 
 constexpr size_t kMaxChannel = 63;  // bytes; LCM's limit
 
-constexpr const char* kFixedDevices[] = {"odometry", "pose", "motion", "velocity",
-                                         "wheels",   "move", "joints", "joint_command"};
+constexpr const char* kFixedDevices[] = {"odometry", "pose",          "motion",
+                                         "velocity", "wheels",        "move",
+                                         "joints",   "joint_command", "collisions"};
 
 bool is_fit(char c) { return static_cast<unsigned char>(c) > 0x20 && c != 0x7f && c != '/'; }
 

@@ -13,8 +13,9 @@ namespace {
 
 constexpr const char* kDriveDevices[] = {"velocity", "wheels", "odometry",
                                          "pose",     "motion", "move"};
-constexpr const char* kFixedDevices[] = {"velocity", "wheels", "odometry", "pose",
-                                         "motion",   "move",   "joints",   "joint_command"};
+constexpr const char* kFixedDevices[] = {"velocity", "wheels",        "odometry",
+                                         "pose",     "motion",        "move",
+                                         "joints",   "joint_command", "collisions"};
 
 template <class List>
 bool contains(const List& list, const std::string& what) {

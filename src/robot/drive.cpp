@@ -1,6 +1,9 @@
 // Frames and published state of a drive.
 #include "robot/drive.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace ruedo::robot {
 
 namespace {
@@ -57,6 +60,21 @@ void Drive::set_state(const Pose& X_WBase, const Twist& twist) {
   const Vec3 velocity = X_WBase.rotation * twist.linear;
   acceleration_ = X_WBase.rotation.conjugate() * Vec3((velocity - velocity_) / step_s_);
   velocity_ = velocity;
+}
+
+// The power of the contact's force at the velocity that its point has by the plan. Of what carries
+// the robot friction does not count: it drives, and takes power where wheels slip.
+void Drive::resist(const Contact& contact) {
+  if (contact.link_b < 0) return;
+  const bool collides =
+      std::abs(contact.normal.dot(X_WBase_.rotation * Vec3::UnitZ())) < kSupportNormal;
+  const Quat to_base = X_WBase_.rotation.conjugate();
+  Vec3 force = to_base * Vec3(contact.force * contact.normal);
+  if (collides) force += to_base * contact.friction;
+  const Vec3 p = to_base * Vec3(contact.position - X_WBase_.translation);
+  const Vec3 planned(motion_.v() - motion_.omega() * p.y(),
+                     motion_.side() + motion_.omega() * p.x(), 0.0);
+  motion_.resist(contact.link_b, std::max(collides ? 1e-9 : 0.0, -force.dot(planned)) * step_s_);
 }
 
 void Drive::reset_odometry() {

@@ -12,6 +12,10 @@
 
 namespace ruedo::robot {
 
+// Cosine between a contact's normal and the robot's up from which on what is touched carries the
+// robot, or lies on it.
+inline constexpr double kSupportNormal = 0.5;
+
 // Writes what a robot's motion shows at this step.
 void read_motion(const MotionLog& log, int robot, Snapshot& snapshot);
 
@@ -56,6 +60,8 @@ class Drive {
   // The other way round: the twist of the body's frame B in the world.
   Twist body_twist(const Pose& X_WBase, const Twist& of_base) const;
   void set_state(const Pose& X_WBase, const Twist& twist);  // after a step
+  // Tells the motion what a contact of the robot took from what it is told to do.
+  void resist(const Contact& contact);
 
   physics::PhysicsWorld& physics_;
   const int robot_, body_;

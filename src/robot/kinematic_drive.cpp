@@ -14,9 +14,8 @@ namespace ruedo::robot {
 
 namespace {
 
-constexpr double kSupportNormal = 0.5;  // cosine between a support's normal and the robot's up
-constexpr double kStanding_m = 2e-3;    // a wheel so near to the ground stands on it
-constexpr double kSeesBump_m = 1e-2;    // a bump so near makes the robot leave the plane's support
+constexpr double kStanding_m = 2e-3;  // a wheel so near to the ground stands on it
+constexpr double kSeesBump_m = 1e-2;  // a bump so near makes the robot leave the plane's support
 // A robot so level, near and calm goes over to the plane's support; at the start its height may be
 // further off, as wheels of many models are a little in the ground.
 constexpr double kLevel_rad = 5e-3, kNear_m = 2e-3, kCalm_m_s = 0.05, kNearAtStart_m = 5e-3;
@@ -379,7 +378,10 @@ PlaneMotion KinematicDrive::of_wheels() const {
 
 // On odometry the wheels do as planned, and the robot believes them.
 void KinematicDrive::finish(SimTime now, double way, double angle, bool touched) {
-  if (description_.on_odometry) return motion_.finish(now, planned_.way, planned_.angle, false);
+  if (description_.on_odometry && motion_.has_primitive())
+    return motion_.finish(now, planned_.way, planned_.angle, false);
+  if (touched)
+    for (const Contact& contact : physics_.contacts(body_)) resist(contact);
   motion_.finish(now, way, angle, touched, lag_);
   if (touched || !motion_.has_primitive())
     lag_ = {0.0, 0.0, lag_.moving};  // a velocity is not made up for

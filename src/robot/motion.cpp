@@ -75,12 +75,13 @@ bool Motion::moves_sideways() const {
          drive_.steering == Steering::holonomic;
 }
 
-void Motion::show(int64_t id, int8_t kind, int8_t state, int8_t reason) {
+void Motion::show(int64_t id, int8_t kind, int8_t state, int8_t reason, int blocked_by) {
   MotionState shown;
   shown.id = id;
   shown.kind = kind;
   shown.state = state;
   shown.reason = reason;
+  shown.blocked_by = blocked_by;
   log_.set(shown);
   publish_progress();
 }
@@ -186,7 +187,8 @@ void Motion::hold(double v, double side, double omega, SimTime now, int8_t kind)
   deadline_ = drive_.watchdog_us > 0 ? now + drive_.watchdog_us : kNever;
   const bool blocked =
       same && log_.current().kind == kind && log_.current().reason == Status::REASON_BLOCKED;
-  show(0, kind, Status::STATE_RUNNING, blocked ? Status::REASON_BLOCKED : Status::REASON_NONE);
+  show(0, kind, Status::STATE_RUNNING, blocked ? Status::REASON_BLOCKED : Status::REASON_NONE,
+       blocked ? log_.current().blocked_by : -1);
   if (same) return;  // a repeated command only feeds the watchdog
   begin_window(now);
   target_v_ = v;
@@ -461,6 +463,26 @@ void Motion::begin_window(SimTime now) {
   window_start_ = now;
   window_done_ = window_turned_ = window_fastest_ = window_fastest_turn_ = 0.0;
   window_touched_ = false;
+  window_work_.clear();
+}
+
+void Motion::resist(int link, double work) {
+  const auto known = std::find_if(window_work_.begin(), window_work_.end(),
+                                  [link](const auto& each) { return each.first == link; });
+  if (known == window_work_.end()) {
+    window_work_.emplace_back(link, work);
+  } else {
+    known->second += work;
+  }
+}
+
+// What took the most work from the robot since the window began; of equal ones the lowest link.
+int Motion::strongest() const {
+  const auto weaker = [](const auto& a, const auto& b) {
+    return a.second < b.second || (a.second == b.second && a.first > b.first);
+  };
+  const auto most = std::max_element(window_work_.begin(), window_work_.end(), weaker);
+  return most == window_work_.end() ? -1 : most->first;
 }
 
 // A velocity holds on; its status says while it leads nowhere.
@@ -470,6 +492,8 @@ void Motion::watch_held(SimTime now, double way, double angle, bool touched) {
   window_turned_ += angle;
   window_fastest_ = std::max(window_fastest_, std::abs(v_));
   window_fastest_turn_ = std::max(window_fastest_turn_, std::abs(omega_));
+  // It still brakes from the other way: that leads nowhere yet, and nothing blocks it.
+  if (v_ * target_v_ < 0.0 || omega_ * target_omega_ < 0.0) return begin_window(now);
   if (now - window_start_ < kBlockWindow_us) return;
   const double seconds = static_cast<double>(now - window_start_) * 1e-6;
   const bool wanted = window_fastest_ > 0.0 || window_fastest_turn_ > 0.0;
@@ -478,31 +502,35 @@ void Motion::watch_held(SimTime now, double way, double angle, bool touched) {
   };
   const bool stuck =
       short_of(window_done_, window_fastest_) && short_of(window_turned_, window_fastest_turn_);
-  const int8_t reason =
-      wanted && window_touched_ && stuck ? Status::REASON_BLOCKED : Status::REASON_NONE;
-  if (log_.current().state == Status::STATE_RUNNING && log_.current().reason != reason)
-    show(0, log_.current().kind, Status::STATE_RUNNING, reason);
+  const bool blocked = wanted && window_touched_ && stuck;
+  const int8_t reason = blocked ? Status::REASON_BLOCKED : Status::REASON_NONE;
+  if (log_.current().state == Status::STATE_RUNNING)
+    show(0, log_.current().kind, Status::STATE_RUNNING, reason, blocked ? strongest() : -1);
   begin_window(now);
 }
 
 void Motion::watch_for_block(SimTime now, bool touched) {
   window_touched_ |= touched;
-  window_fastest_ =
-      std::max(window_fastest_, std::abs(primitive_.axis == Axis::angle ? omega_ : v_));
+  const double planned = primitive_.axis == Axis::angle ? omega_ : v_;
+  window_fastest_ = std::max(window_fastest_, std::abs(planned));
+  // It still brakes, before its own way begins.
+  if (seconds(now) < primitive_.begins || planned * (primitive_.target - primitive_.done) < 0.0) {
+    begin_window(now);
+    window_done_ = primitive_.done;
+    return;
+  }
   if (now - window_start_ < kBlockWindow_us) return;
   const double wanted = window_fastest_ * static_cast<double>(now - window_start_) * 1e-6;
   if (window_touched_ && std::abs(primitive_.done - window_done_) < kBlockedPart * wanted) {
     publish_progress();
     const MotionState state = log_.current();
     brake(now);
-    show(state.id, state.kind, Status::STATE_ENDED, Status::REASON_BLOCKED);
+    show(state.id, state.kind, Status::STATE_ENDED, Status::REASON_BLOCKED, strongest());
     log_.progress(state.done, state.remaining);
     return;
   }
-  window_start_ = now;
+  begin_window(now);
   window_done_ = primitive_.done;
-  window_fastest_ = 0.0;
-  window_touched_ = false;
 }
 
 void Motion::publish_progress() {

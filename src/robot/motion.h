@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "model/world_model.h"
@@ -43,6 +44,9 @@ class Motion {
 
   // The way that the plan makes from now to now + step_us.
   Displacement step(SimTime now, int64_t step_us);
+  // Before finish(): a link of another thing that the robot touched in this step, and the work (J)
+  // that it took from what the robot is told to do.
+  void resist(int link, double work);
   // After step(): how it came out, with the way (m) and angle (rad) that base_link really made.
   // `touched`: by something that may have changed them. Ends primitives: when the plan is over and
   // the robot has settled, too.
@@ -89,7 +93,8 @@ class Motion {
   void set_plan(const Profile& v, const Profile& omega, SimTime now, double side = 0.0);
   void plan_primitive(SimTime now);
   void replace_running();
-  void show(int64_t id, int8_t kind, int8_t state, int8_t reason = 0);
+  void show(int64_t id, int8_t kind, int8_t state, int8_t reason = 0, int blocked_by = -1);
+  int strongest() const;
   void publish_progress();
   void begin_window(SimTime now);
   void watch_for_block(SimTime now, bool touched);
@@ -119,6 +124,7 @@ class Motion {
   double window_done_ = 0.0, window_fastest_ = 0.0;
   double window_turned_ = 0.0, window_fastest_turn_ = 0.0;  // beside the way, of a velocity command
   bool window_touched_ = false;
+  std::vector<std::pair<int, double>> window_work_;  // by link that resisted, J
   MotionLog log_;
 };
 

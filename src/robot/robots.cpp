@@ -46,6 +46,8 @@ class Robots::Impl {
   void put(int body, const Pose& X_WB);
   void end_put(int instance);
   void read_driveless(size_t robot, RobotState& state) const;
+  void read_collisions(Snapshot& snapshot) const;
+  void number_robots();
   SimTime now() const { return step_ * world_.step_us; }
 
   const model::WorldModel& world_;
@@ -54,6 +56,7 @@ class Robots::Impl {
   std::vector<LevelPlane> planes_;
   std::vector<std::unique_ptr<Drive>> drives_;  // of each robot; null: it has none, or cannot move
   std::vector<MotionLog> driveless_;            // refusals of those
+  std::vector<int> robot_of_link_;              // -1: none's
   std::vector<std::unique_ptr<Mover>> movers_;
   Crowd crowd_;
   Surroundings surroundings_;
@@ -70,6 +73,7 @@ Robots::Impl::Impl(const model::WorldModel& world, const model::BodyLayout& layo
       crowd_(world, layout, physics, seed),
       surroundings_(world, layout, physics),
       joints_(world, layout, physics) {
+  number_robots();
   for (size_t i = 0; i < layout.robots.size(); ++i)
     drives_.push_back(make_drive(static_cast<int>(i)));
   for (size_t i = 0; i < world.models.size(); ++i) {
@@ -158,6 +162,40 @@ void Robots::Impl::read(Snapshot& snapshot) const {
       read_motion(driveless_[i], static_cast<int>(i), snapshot);
     }
   }
+  read_collisions(snapshot);
+}
+
+void Robots::Impl::number_robots() {
+  std::vector<int> of_instance(world_.models.size(), -1);
+  for (size_t i = 0; i < layout_.robots.size(); ++i)
+    of_instance[static_cast<size_t>(layout_.robots[i].instance)] = static_cast<int>(i);
+  robot_of_link_.clear();
+  for (const model::LinkPlacement& link : layout_.links)
+    robot_of_link_.push_back(of_instance[static_cast<size_t>(link.instance)]);
+}
+
+void Robots::Impl::read_collisions(Snapshot& snapshot) const {
+  snapshot.collisions.clear();
+  const auto robot_of_link = [this](int link) {
+    return link < 0 ? -1 : robot_of_link_[static_cast<size_t>(link)];
+  };
+  for (size_t i = 0; i < snapshot.contacts.size(); ++i) {
+    const Contact& contact = snapshot.contacts[i];
+    const int a = robot_of_link(contact.link_a), b = robot_of_link(contact.link_b);
+    if (a == b) continue;  // no robot's, or a robot's own links
+    const auto add = [&](int robot, bool as_a) {
+      if (robot < 0) return;
+      const Vec3 up = snapshot.robots[static_cast<size_t>(robot)].X_WBase.rotation * Vec3::UnitZ();
+      if (std::abs(contact.normal.dot(up)) < kSupportNormal)
+        snapshot.collisions.push_back({robot, static_cast<int>(i), as_a});
+    };
+    add(a, true);
+    add(b, false);
+  }
+  std::sort(snapshot.collisions.begin(), snapshot.collisions.end(),
+            [](const Collision& one, const Collision& other) {
+              return std::pair(one.robot, one.contact) < std::pair(other.robot, other.contact);
+            });
 }
 
 // A robot that only senses: base_link is where its body is.
@@ -190,6 +228,7 @@ void Robots::Impl::change_ground() {
 
 void Robots::Impl::add(int instance) {
   change_ground();
+  number_robots();
   drives_.resize(layout_.robots.size());
   driveless_.resize(layout_.robots.size());
   if (const int robot = robot_of(instance); robot >= 0) {

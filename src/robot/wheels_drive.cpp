@@ -18,7 +18,6 @@ constexpr double kLargestLag_m = 0.05;
 constexpr double kSteeringTorque = 100.0;  // rad/s missing, for which steering gives all it can
 constexpr double kMostOfLag = 0.5;  // of it, that one step may make good: more would overshoot
 constexpr double kLargestYawError_rad = 0.3;
-constexpr double kSupportNormal = 0.5;  // cosine between a support's normal and the robot's up
 constexpr SimTime kFallAsleep_us = 500'000;
 constexpr double kSettled_m_s = 2e-3, kSettled_rad_s = 1e-2;  // a primitive ends below these
 constexpr double kStill_m_s = 5e-3, kStill_rad_s = 2e-2;
@@ -197,15 +196,17 @@ void WheelsDrive::drive_wheel(size_t wheel, double rate) {
   physics_.drive_wheel(wheels_[wheel], command);
 }
 
-bool WheelsDrive::touches_something() const {
+bool WheelsDrive::touches_something() {
   const Vec3 up = X_WBase_.rotation * Vec3::UnitZ();
+  bool touched = false;
   for (const int body : bodies_) {
     for (const Contact& contact : physics_.contacts(body)) {
-      if (contact.normal.dot(up) < kSupportNormal && contact.normal.dot(up) > -kSupportNormal)
-        return true;
+      if (std::abs(contact.normal.dot(up)) >= kSupportNormal) continue;
+      touched = true;
+      resist(contact);
     }
   }
-  return false;
+  return touched;
 }
 
 void WheelsDrive::after_step(SimTime now) {

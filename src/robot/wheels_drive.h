@@ -45,7 +45,7 @@ class WheelsDrive final : public Drive {
   void drive_wheel(size_t wheel, double rate);
   Lag lag() const;
   void read_wheel_rates();
-  bool touches_something() const;
+  bool touches_something();
   void fall_asleep_when_still();
 
   struct Servo {

@@ -730,7 +730,7 @@ void Conversions::add_frame(const std::string& parent, const std::string& child,
 void Conversions::add_frames(const device_info_t& device, const Plan& plan) {
   static const Pose kOptical{Quat(0.5, -0.5, 0.5, -0.5), Vec3::Zero()};  // z ahead, x right, y down
   if (device.kind == "odometry" || device.kind == "pose" || device.kind == "motion" ||
-      device.kind == "joints")
+      device.kind == "collisions" || device.kind == "joints")
     return;
   const Names& names = plan.names;
   const std::string frame = names.frame(device.robot, ros_name(device.name));

@@ -63,8 +63,7 @@ class ContactSensor : public Sensor {
       const bool as_a = is_a(contact);
       if (!as_a && !is_b(contact)) continue;
       contact_point_t& point = message_.points.emplace_back();
-      point.body = as_a ? body_name(contact.body_b, contact.link_b)
-                        : body_name(contact.body_a, contact.link_a);
+      point.body = model::body_name(world_, layout_, as_a ? contact.link_b : contact.link_a);
       for (int i = 0; i < 3; ++i) {
         point.position[i] = contact.position[i];
         point.normal[i] = as_a ? contact.normal[i] : -contact.normal[i];
@@ -88,14 +87,6 @@ class ContactSensor : public Sensor {
   }
   bool is_b(const Contact& contact) const {
     return contact.link_b == link_ && counts(contact.shape_b);
-  }
-
-  std::string body_name(int body, int link) const {
-    if (body >= 0) return layout_.bodies[static_cast<size_t>(body)].name;
-    if (link < 0) return "";
-    const model::LinkPlacement& placement = layout_.links[static_cast<size_t>(link)];
-    const model::ModelInstance& instance = world_.models[static_cast<size_t>(placement.instance)];
-    return instance.name + "/" + instance.model->links[static_cast<size_t>(placement.link)].name;
   }
 
   const model::WorldModel& world_;

@@ -240,7 +240,16 @@ def test_every_message_after_a_restore_in_the_same_process(tmp_path):
     )
     assert {
         f"p3at/{device}"
-        for device in ("lrf", "sonar_front", "sonar_rear", "camera", "odometry", "pose", "motion")
+        for device in (
+            "lrf",
+            "sonar_front",
+            "sonar_rear",
+            "camera",
+            "odometry",
+            "pose",
+            "motion",
+            "collisions",
+        )
     } < {channel for _, channel, _ in first}
     assert first == again
     assert program("verify", log).returncode == 0

@@ -113,6 +113,21 @@ def test_primitives(language, server):
     assert said.one("too_long").startswith("Timeout: p3at: advance was not done within 0.3 s (")
 
 
+def test_collisions_need_no_bumper(language):
+    """20 m ahead the wall stands in the way, at 6 m: its name is in what is raised."""
+    with ruedo_run("--rate", "8", "--disable", "p3at/camera", world=HALL) as server:
+        said = probe(language, server.url, "collisions", "p3at")
+    assert said.words("free") == ["0", "-"]
+    for what in ("once", "twice"):
+        assert said.one(what).startswith(
+            "MotionError: p3at: advance ended: blocked by wall/link, "
+        ), said.text
+        assert said.words(f"{what}_by") == ["wall/link"]
+        assert said.words(f"{what}_seen") == ["wall/link", "wall/link"]
+    assert said.words("met") == ["wall/link", "wall/link"]
+    assert said.words("off") == ["-"]
+
+
 def test_errors_name_what_exists(language, server):
     said = probe(language, server.url, "errors", "p3at")
     assert said.one("robot") == "UnknownName: there is no robot 'nobody'; there is p3at"

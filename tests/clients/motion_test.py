@@ -29,3 +29,15 @@ def test_a_refused_command_leaves_what_runs():
     assert m.state == "running" and not m.done
     m._update(status(8, "running"))  # its own end was lost
     assert (m.state, m.reason) == ("ended", "replaced")
+
+
+def test_what_blocks_it_is_named():
+    m = motion()
+    m._update(status(7, "running", "", 0.5, 1.5), "wall/link")
+    assert m.blocked_by == ""
+    m._update(status(7, "ended", "blocked", 0.75, 1.25), "wall/link")
+    assert m.blocked_by == "wall/link"
+    assert (
+        repr(m)
+        == "<Motion advance of p3at: ended (blocked by wall/link), 0.750 done, 1.250 remain>"
+    )

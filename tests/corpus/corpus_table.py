@@ -52,7 +52,7 @@ def what(ruedo, path):
     sensors = [
         f"{count} {kind}" if count > 1 else kind
         for kind, count in sorted(kinds.items())
-        if kind not in ("odometry", "pose", "motion", "joints")
+        if kind not in ("odometry", "pose", "motion", "collisions", "joints")
     ]
     drives = [robot["drive"] for robot in info["robots"] if robot["drive"]]
     robots = (

@@ -108,7 +108,7 @@ def drive(path):
         sensors = [
             device
             for device in robot.devices
-            if device.kind not in ("odometry", "pose", "motion", "joints")
+            if device.kind not in ("odometry", "pose", "motion", "collisions", "joints")
         ]
         alive = sum(
             any(

@@ -118,6 +118,7 @@ def test_a_copy_may_get_another_world():
         assert (
             touching[0, 0] == 0 and touching[1, 0] >= 99
         )  # the first of them may still be on its way
+        assert e.collisions(0) == {} and e.collisions(1) == {"r0": ["wall/l"]}
         e.reset(1)  # keeps its world
         assert ranges[1, 0, 2] == pytest.approx(1.0) and touching[1, 0] == 0
         with pytest.raises(ValueError, match="its robots and devices are not those of"):
@@ -166,7 +167,7 @@ def test_messages_are_those_of_the_channels():
         (
             lambda e: e.observe("camera.data"),
             ValueError,
-            "no robot has a device 'camera'; there are r0/motion",
+            "no robot has a device 'camera'; there are r0/collisions, r0/motion",
         ),
         (lambda e: e.reset(2), IndexError, "world 2 of 2"),
         (lambda e: e.reset([0, 1], seed=[1]), ValueError, "1 seeds for 2 worlds"),

@@ -1,5 +1,8 @@
 // The kinematic drive against the world: walls, boxes, other robots, ramps, steps, falls.
+#include <algorithm>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -123,6 +126,139 @@ TEST(KinematicContact, AVelocityBlockedByAWallSaysSo) {
   sim.velocity(-0.3, 0.0);
   sim.run(1.0);
   EXPECT_EQ(sim.robot().motion.reason, Status::REASON_NONE);
+}
+
+std::string blocked_by(const Sim& sim, int robot = 0) {
+  return model::body_name(*sim.world, sim.layout, sim.robot(robot).motion.blocked_by);
+}
+
+// The robot rubs along a wall at its side all the way, and stands before a crate in the end.
+TEST(KinematicContact, WhatBlocksIsNamed) {
+  for (const char* drive : {"kinematic", "wheels"}) {
+    Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog, drive) +
+            box_sdf("side", "1 0.3299 0.5 0 0 0", "6 0.2 1") +
+            box_sdf("crate", "1 0 0.5 0 0 0", "0.4 0.4 1", 400.0));
+    sim.velocity(0.4, 0.0);
+    EXPECT_EQ(blocked_by(sim), "") << drive;
+    sim.run(5.0);
+    EXPECT_EQ(sim.robot().motion.reason, Status::REASON_BLOCKED) << drive;
+    EXPECT_EQ(blocked_by(sim), "crate/l") << drive;
+    sim.velocity(-0.4, 0.0);
+    sim.run(1.0);
+    EXPECT_EQ(blocked_by(sim), "") << drive;
+  }
+}
+
+TEST(KinematicContact, WhatBlocksAPrimitiveIsNamedUntilTheNextCommand) {
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0") + robot_sdf("s", "0 2 0 0 0 0") +
+          box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 6 1"));
+  sim.move(Move::ADVANCE, 3.0);
+  sim.run(6.0);
+  EXPECT_EQ(sim.robot().motion.reason, Status::REASON_BLOCKED);
+  EXPECT_EQ(blocked_by(sim), "wall/l");
+  sim.run(2.0);
+  EXPECT_EQ(blocked_by(sim), "wall/l");
+  EXPECT_EQ(blocked_by(sim, 1), "");
+  sim.move(Move::ADVANCE, -0.2);
+  sim.step();
+  EXPECT_EQ(blocked_by(sim), "");
+}
+
+// It is told to back off while its wheels still turn ahead: they brake at the wall for 1.2 s, which
+// is no block of what it was told.
+TEST(KinematicContact, BackingOffAWallIsNotBlockedByIt) {
+  for (const bool primitive : {true, false}) {
+    Sim sim(plane_sdf() +
+            robot_sdf("r", "0 0 0 0 0 0", limits(0.6, 1.0, 0.5, 0.5, 1.0) + kNoWatchdog) +
+            box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"));
+    sim.move(Move::ADVANCE, 3.0);
+    while (sim.robot().motion.reason != Status::REASON_BLOCKED) sim.step();
+    primitive ? sim.move(Move::ADVANCE, -0.5, 0, 0, 0, 0, 0, 7) : sim.velocity(-0.2, 0.0);
+    for (int i = 0; i < 1200; ++i) {
+      sim.step();
+      EXPECT_NE(sim.robot().motion.reason, Status::REASON_BLOCKED);
+    }
+    EXPECT_LT(sim.position().x(), 0.35);
+    if (primitive) EXPECT_EQ(sim.robot().motion.state, Status::STATE_DONE);
+  }
+}
+
+// It does not fit between two posts, and cannot turn there.
+TEST(KinematicContact, WhatBlocksATurnIsNamed) {
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) +
+          box_sdf("post", "0.2 0.29 0.5 0 0 0", "0.1 0.1 1") +
+          box_sdf("other", "-0.2 -0.29 0.5 0 0 0", "0.1 0.1 1"));
+  sim.velocity(0.0, 0.5);
+  sim.run(4.0);
+  EXPECT_EQ(sim.robot().motion.reason, Status::REASON_BLOCKED);
+  EXPECT_TRUE(blocked_by(sim) == "post/l" || blocked_by(sim) == "other/l") << blocked_by(sim);
+}
+
+// A slope that is too steep blocks as a wall does.
+TEST(KinematicContact, ASlopeThatIsTooSteepIsNamed) {
+  Sim sim(plane_sdf() + robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog) +
+          box_sdf("ramp", "2.3 0 0.4 0 -0.9 0", "3 3 0.1"));
+  sim.velocity(0.5, 0.0);
+  sim.run(8.0);
+  EXPECT_EQ(sim.robot().motion.reason, Status::REASON_BLOCKED);
+  EXPECT_EQ(blocked_by(sim), "ramp/l");
+}
+
+// The robot whose file says that it runs on its odometry believes its wheels, but what blocks a
+// velocity is a matter of the room.
+TEST(KinematicContact, ARobotThatBelievesItsWheelsIsBlockedAllTheSame) {
+  Sim sim(
+      plane_sdf() +
+      robot_sdf("r", "0 0 0 0 0 0", kNoWatchdog + "<ruedo:primitives>odometry</ruedo:primitives>") +
+      box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"));
+  sim.velocity(0.5, 0.0);
+  sim.run(4.0);
+  EXPECT_EQ(sim.robot().motion.reason, Status::REASON_BLOCKED);
+  EXPECT_EQ(blocked_by(sim), "wall/l");
+}
+
+std::vector<std::string> collides_with(const Sim& sim, int robot = 0) {
+  std::vector<std::string> names;
+  for (const Collision& each : sim.state.collisions) {
+    const Contact& contact = sim.state.contacts[static_cast<size_t>(each.contact)];
+    if (each.robot != robot) continue;
+    names.push_back(
+        model::body_name(*sim.world, sim.layout, each.as_a ? contact.link_b : contact.link_a));
+  }
+  std::sort(names.begin(), names.end());
+  names.erase(std::unique(names.begin(), names.end()), names.end());
+  return names;
+}
+
+// Each of two robots that meet has the other, whichever is first in the world; what carries them
+// and what they carry is left out.
+TEST(KinematicContact, CollisionsAreWithNeitherTheFloorNorTheCargo) {
+  for (const char* drive : {"kinematic", "wheels"}) {
+    Sim sim(plane_sdf() + robot_sdf("a", "0 0 0 0 0 0", kNoWatchdog, drive) +
+            robot_sdf("b", "1.5 0 0 0 0 3.14159265358979", kNoWatchdog, drive) +
+            box_sdf("cargo", "0 0 0.3 0 0 0", "0.1 0.1 0.1", 1.0));
+    sim.run(1.0);
+    EXPECT_TRUE(sim.state.collisions.empty()) << drive;
+    EXPECT_FALSE(sim.state.contacts.empty()) << drive;  // the cargo's
+    sim.velocity(0.5, 0.0, 0);
+    sim.velocity(0.3, 0.0, 1);
+    sim.run(3.0);
+    EXPECT_EQ(collides_with(sim, 0), (std::vector<std::string>{"b/base"})) << drive;
+    EXPECT_EQ(collides_with(sim, 1), (std::vector<std::string>{"a/base"})) << drive;
+  }
+}
+
+// What has come to rest against something still touches it.
+TEST(KinematicContact, AsleepAtAWallItStillTouchesIt) {
+  for (const char* drive : {"kinematic", "wheels"}) {
+    Sim sim(plane_sdf() + robot_sdf("a", "0 0 0 0 0 0", "", drive) +
+            box_sdf("wall", "1.1 0 0.5 0 0 0", "0.2 4 1"));
+    sim.move(Move::ADVANCE, 3.0);
+    sim.run(6.0);
+    ASSERT_EQ(collides_with(sim), (std::vector<std::string>{"wall/l"})) << drive;
+    sim.run(60.0);
+    EXPECT_EQ(collides_with(sim), (std::vector<std::string>{"wall/l"})) << drive;
+  }
 }
 
 TEST(KinematicContact, APrimitiveThatPushesABoxStillEndsAtItsDistance) {

@@ -233,7 +233,8 @@ TEST(Engine, SaysWhatCannotBe) {
   EXPECT_THAT(message([&] { engine.step(0); }), testing::HasSubstr("1 step or more, not 0"));
   EXPECT_THAT(
       message([&] { engine.observe("lrf", "ranges"); }),
-      testing::HasSubstr("no robot has a device 'lrf'; there are a/motion, a/odometry, a/pose"));
+      testing::HasSubstr(
+          "no robot has a device 'lrf'; there are a/collisions, a/motion, a/odometry, a/pose"));
   EXPECT_THAT(
       message([&] { engine.observe("pose", "position"); }),
       testing::HasSubstr("'position' is no field of numbers in pose_t; there are utime, pos,"));

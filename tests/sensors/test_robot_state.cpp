@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "ruedo/collisions_t.hpp"
 #include "ruedo/joint_state_t.hpp"
 #include "ruedo/motion_status_t.hpp"
 #include "ruedo/pose_t.hpp"
@@ -137,6 +138,126 @@ TEST(MotionStatus, TheSuccessorShowsAtTheStepOfItsCommand) {
   for (const auto& message : messages) EXPECT_EQ(message.utime, 35'000);
 }
 
+const char* const kTwoRobots =
+    "<sdf version='1.9'><world name='w'>"
+    "<model name='wall'><static>true</static><link name='l'/></model>"
+    "<model name='crate'><link name='l'/></model>"
+    "<model name='one'><link name='base'><sensor name='s' type='imu'/></link></model>"
+    "<model name='two'><link name='base'><sensor name='s' type='imu'/></link></model>"
+    "</world></sdf>";
+
+class CollisionsOf : public ::testing::Test {
+ protected:
+  CollisionsOf() { test::step(device_, now_, out_, 0); }  // the initial state
+  int link(const std::string& name) const {
+    for (size_t i = 0; i < bench_.layout.links.size(); ++i) {
+      if (model::body_name(*bench_.world, bench_.layout, static_cast<int>(i)) == name)
+        return static_cast<int>(i);
+    }
+    throw std::logic_error(name);
+  }
+  // Robot "one" touches these; the force tells one step's contact from another's.
+  void step(const std::vector<std::string>& others, bool due = false, double force = 1.0) {
+    ++now_.step;
+    now_.time += 5000;
+    now_.contacts.clear();
+    now_.collisions.clear();
+    for (const std::string& other : others) {
+      Contact contact;
+      contact.link_a = link("one/base");
+      contact.link_b = link(other);
+      contact.normal = Vec3(-1.0, 0.0, 0.0);
+      contact.position = Vec3(1.0, 2.0, 3.0);
+      contact.force = force;
+      contact.depth = 0.25;
+      now_.collisions.push_back({0, static_cast<int>(now_.contacts.size()), true});
+      now_.contacts.push_back(contact);
+    }
+    test::step(device_, now_, out_, due ? 1 : -1);
+  }
+  std::vector<collisions_t> messages() const { return Device::decode<collisions_t>(out_); }
+
+  SensorBench bench_{kTwoRobots};
+  Device device_ = bench_.make("one", "collisions");
+  Snapshot now_ = bench_.snapshot();
+  Outbox out_;
+};
+
+TEST_F(CollisionsOf, EveryRobotAndTellTheInitialState) {
+  EXPECT_EQ(device_.rate, (Rate{10, 1}));
+  ASSERT_EQ(messages().size(), 1u);
+  EXPECT_EQ(messages()[0].n, 0);
+  EXPECT_EQ(messages()[0].blocked_by, "");
+}
+
+TEST_F(CollisionsOf, ATouchIsToldAtOnceAndItsEndWithTheNextSample) {
+  step({});
+  EXPECT_EQ(messages().size(), 1u);
+  step({"wall/l"}, false, 7.0);  // step 2: at once
+  step({"wall/l"}, false, 8.0);
+  step({});  // it trembles
+  step({"wall/l"}, false, 9.0);
+  step({}, true);  // step 6: still told, as it was last
+  step({}, true);  // step 7: no more
+  const auto told = messages();
+  ASSERT_EQ(told.size(), 4u);
+  EXPECT_EQ(told[1].utime, 10'000);
+  ASSERT_EQ(told[1].n, 1);
+  EXPECT_EQ(told[1].points[0].body, "wall/l");
+  EXPECT_EQ(told[1].points[0].force, 7.0);
+  EXPECT_EQ(told[1].points[0].depth, 0.25);
+  EXPECT_EQ(told[1].points[0].normal[0], -1.0);  // towards the robot
+  EXPECT_EQ(told[1].points[0].position[1], 2.0);
+  EXPECT_EQ(told[2].utime, 30'000);
+  ASSERT_EQ(told[2].n, 1);
+  EXPECT_EQ(told[2].points[0].force, 9.0);
+  EXPECT_EQ(told[3].n, 0);
+}
+
+TEST_F(CollisionsOf, ASecondBodyIsNewsTheFirstOneIsNot) {
+  step({"wall/l"});
+  step({"wall/l", "crate/l"});
+  step({"wall/l", "crate/l"});
+  const auto told = messages();
+  ASSERT_EQ(told.size(), 3u);
+  ASSERT_EQ(told[2].n, 2);
+  EXPECT_EQ(told[2].points[0].body, "wall/l");
+  EXPECT_EQ(told[2].points[1].body, "crate/l");
+}
+
+TEST_F(CollisionsOf, AnotherRobotsAreNotItsOwn) {
+  step({"wall/l"});
+  now_.collisions[0].robot = 1;
+  ++now_.step;
+  test::step(device_, now_, out_, 1);
+  EXPECT_EQ(messages().back().n, 0);
+}
+
+TEST_F(CollisionsOf, SeenFromTheOtherSideTheNormalStillPointsToTheRobot) {
+  step({"two/base"});
+  Device other = bench_.make("two", "collisions");
+  Outbox out;
+  now_.collisions[0] = {1, 0, false};
+  test::step(other, now_, out, 0);
+  const collisions_t m = Device::decode<collisions_t>(out).at(0);
+  ASSERT_EQ(m.n, 1);
+  EXPECT_EQ(m.points[0].body, "one/base");
+  EXPECT_EQ(m.points[0].normal[0], 1.0);
+}
+
+TEST_F(CollisionsOf, WhatBlocksIsToldAtOnce) {
+  now_.robots[0].motion.blocked_by = link("crate/l");
+  step({});
+  step({});
+  now_.robots[0].motion.blocked_by = -1;
+  step({});
+  const auto told = messages();
+  ASSERT_EQ(told.size(), 3u);
+  EXPECT_EQ(told[1].blocked_by, "crate/l");
+  EXPECT_EQ(told[1].utime, 5000);
+  EXPECT_EQ(told[2].blocked_by, "");
+}
+
 TEST(Joints, ThoseThatAreNoWheels) {
   SensorBench bench(kWorld);
   Device device = bench.make("rover", "joints");
@@ -165,7 +286,8 @@ TEST(SensorKinds, AreSortedAndComplete) {
   }
   std::vector<std::string> names;
   for (const SensorKind& kind : kinds) names.push_back(kind.name());
-  for (const char* name : {"odometry", "pose", "motion", "joints", "imu", "contact"}) {
+  for (const char* name :
+       {"odometry", "pose", "motion", "collisions", "joints", "imu", "contact"}) {
     EXPECT_EQ(std::count(names.begin(), names.end(), name), 1) << name;
   }
   for (const SensorKind& kind : kinds) {

@@ -213,6 +213,8 @@ class PyEngine {
 
   nb::object touching() const { return view_of(engine().touching()); }
 
+  auto collisions(int world) const { return engine().collisions(world); }
+
   nb::object observe(const std::string& device, const std::string& field) {
     return view_of(engine().observe(device, field));
   }
@@ -289,6 +291,7 @@ NB_MODULE(_engine, module) {
       .def("end_run", &PyEngine::end_run)
       .def("files_read", &PyEngine::files_read)
       .def("touching", &PyEngine::touching)
+      .def("collisions", &PyEngine::collisions)
       .def("messages", &PyEngine::messages)
       .def("devices", &PyEngine::devices)
       .def("findings", &PyEngine::findings)

@@ -231,14 +231,20 @@ class Engine:
         )
 
     def touching(self) -> NDArray[np.int32]:
-        """(worlds, driven robots): in how many of the states of the last ``step`` a robot touched
-        something that does not carry it.
+        """(worlds, driven robots): in how many of the states of the last ``step`` a robot ran into
+        something that neither carries it nor lies on it.
 
-        A contact counts whose normal is nearer to level than to upright. Like what ``observe``
-        gives, it is a view.
+        Like what ``observe`` gives, it is a view. ``collisions`` names what was touched.
         """
         array: NDArray[np.int32] = self._core.touching()
         return array
+
+    def collisions(self, world: int = 0) -> dict[str, list[str]]:
+        """The robots of a copy that ran into something in the states of the last ``step``, each
+        with the names of the bodies; empty when none did.
+        """
+        met = self._core.collisions(self._checked(world))
+        return {robot: bodies for robot, bodies in zip(self._robots, met) if bodies}
 
     def reset(
         self,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from . import lcmtypes
 from .errors import MotionError, Timeout, UnknownName
-from .samples import MotionStatus
+from .samples import Collisions, MotionStatus
 
 if TYPE_CHECKING:
     from .bus import Subscription
@@ -34,6 +34,7 @@ class Motion:
         self.progress = 0.0  # m or rad done
         self.remaining = amount  # m or rad
         self.reason = ""  # why it ended early or was refused: MotionStatus's, "removed", "new run"
+        self.blocked_by = ""  # the body that blocked it
         self._sim, self._robot = sim, robot
         self._unseen = 0
         self._utime = (
@@ -64,12 +65,15 @@ class Motion:
         if self.state != "done":
             raise MotionError(
                 f"{self._robot}: {self.kind} {'was refused' if self.state == 'refused' else 'ended'}: "
-                f"{self.reason}, {self.remaining:.3f} remain",
+                f"{self._why()}, {self.remaining:.3f} remain",
                 self.reason,
             )
         return self
 
-    def _update(self, status: MotionStatus) -> None:
+    def _why(self) -> str:
+        return f"{self.reason} by {self.blocked_by}" if self.blocked_by else self.reason
+
+    def _update(self, status: MotionStatus, blocked_by: str = "") -> None:
         with self._news:
             if status.utime < self._utime:
                 return
@@ -77,6 +81,7 @@ class Motion:
             if status.id == self.id:
                 self.progress, self.remaining = status.progress, status.remaining
                 self.state, self.reason = status.state, status.reason
+                self.blocked_by = blocked_by if status.reason == "blocked" else ""
             elif status.state == "refused":
                 pass  # another command, which changed nothing
             elif self.state != "sent":
@@ -100,7 +105,7 @@ class Motion:
             self._news.notify_all()
 
     def __repr__(self) -> str:
-        state = f"{self.state} ({self.reason})" if self.reason else self.state
+        state = f"{self.state} ({self._why()})" if self.reason else self.state
         return f"<Motion {self.kind} of {self._robot}: {state}, {self.progress:.3f} done, {self.remaining:.3f} remain>"
 
 
@@ -115,6 +120,8 @@ class Driver:
         self._held: tuple[str, bytes] | None = None
         self._motions: list[Motion] = []
         self._statuses: Subscription | None = None
+        self._collisions: Subscription | None = None
+        self._blocked_by = ""
         self._running = False  # a status has shown the held command
         self._watchdog_told = False
         self._ended = ""
@@ -152,9 +159,11 @@ class Driver:
         with self._lock:
             self._ended, self._held = reason, None
             motions, self._motions = self._motions, []
-            statuses, self._statuses = self._statuses, None
-        if statuses:
-            statuses.close()
+            listening = (self._statuses, self._collisions)
+            self._statuses = self._collisions = None
+        for subscription in listening:
+            if subscription:
+                subscription.close()
         for motion in motions:
             motion._end(reason)
 
@@ -173,11 +182,20 @@ class Driver:
             if self._ended:  # while the command was being made
                 raise UnknownName(f"{self._robot} is gone: {self._ended}")
             if self._statuses is None:
-                self._statuses = self._sim.robot(self._robot).motion.on_sample(self._on_status)
+                robot = self._sim.robot(self._robot)
+                try:  # of a step they come before the status
+                    self._collisions = robot.collisions.on_sample(self._on_collisions)
+                except UnknownName:
+                    pass  # switched off: a motion that is blocked does not know by what
+                self._statuses = robot.motion.on_sample(self._on_status)
+
+    def _on_collisions(self, collisions: Collisions) -> None:
+        with self._lock:
+            self._blocked_by = collisions.blocked_by
 
     def _on_status(self, status: MotionStatus) -> None:
         with self._lock:
-            motions = list(self._motions)
+            motions, blocked_by = list(self._motions), self._blocked_by
             self._running = self._running or (
                 self._held is not None and status.id == 0 and status.state == "running"
             )
@@ -196,4 +214,4 @@ class Driver:
             )
         for motion in motions:
             if not motion.done:
-                motion._update(status)
+                motion._update(status, blocked_by)

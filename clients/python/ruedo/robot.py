@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
@@ -16,6 +17,7 @@ from .lockstep import Command
 from .motion import Motion
 from .samples import (
     CameraInfo,
+    Collisions,
     Contact,
     Image,
     Imu,
@@ -30,6 +32,7 @@ from .samples import (
 from .stream import RAW, Form, Stream, form_of
 
 if TYPE_CHECKING:
+    from .bus import Subscription
     from .simulation import Simulation
 
 T = TypeVar("T")
@@ -195,6 +198,25 @@ class Robot:
     def contact(self) -> Device[Contact]:
         """The first bumper."""
         return self._first("contact_t", "contact sensor")
+
+    @property
+    def collisions(self) -> Stream[Collisions]:
+        """What the robot runs into, and what blocks it; it needs no bumper."""
+        return self._stream("collisions_t", "collisions")
+
+    def on_collision(self, callback: Callable[[Collisions], None]) -> Subscription:
+        """Calls callback(collisions) as on_sample() does, but only when the robot runs into a body
+        that it did not touch a moment before.
+        """
+        touched: list[str] = []
+
+        def see(sample: Collisions) -> None:
+            news = not set(sample.bodies) <= set(touched)
+            touched[:] = sample.bodies
+            if news:
+                callback(sample)
+
+        return self.collisions.on_sample(see)
 
     @property
     def pose(self) -> Stream[Pose]:

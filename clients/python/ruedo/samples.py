@@ -432,6 +432,19 @@ class Contact(Sample):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class Collisions(Sample):
+    """What a robot runs into: with what neither carries it nor lies on it."""
+
+    blocked_by: str  # the body that blocks what it was told to do; "": nothing does
+    points: list[ContactPoint]
+
+    @property
+    def bodies(self) -> list[str]:
+        """The names of what is touched, each once, sorted; empty: nothing is."""
+        return sorted({point.body for point in self.points})
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Joints(Sample):
     names: list[str]
     positions: Floats  # (n,) rad or m
@@ -593,13 +606,20 @@ def _counted(length: int) -> None:
         raise ValueError(f"a length of {length}")
 
 
-def _contact(m: Any) -> Contact:
+def _points(m: Any) -> list[ContactPoint]:
     _counted(m.n)
-    points = [
+    return [
         ContactPoint(p.body, _floats(p.position), _floats(p.normal), p.force, p.depth)
         for p in m.points
     ]
-    return Contact(m.utime, bool(m.pressed), points)
+
+
+def _contact(m: Any) -> Contact:
+    return Contact(m.utime, bool(m.pressed), _points(m))
+
+
+def _collisions(m: Any) -> Collisions:
+    return Collisions(m.utime, m.blocked_by, _points(m))
 
 
 def _joints(m: Any) -> Joints:
@@ -638,6 +658,7 @@ CONVERSIONS: dict[str, tuple[Any, Callable[[Any], Any]]] = {
     "camera_info_t": (lcmtypes.camera_info_t, _camera_info),
     "imu_t": (lcmtypes.imu_t, _imu),
     "contact_t": (lcmtypes.contact_t, _contact),
+    "collisions_t": (lcmtypes.collisions_t, _collisions),
     "joint_state_t": (lcmtypes.joint_state_t, _joints),
     "motion_status_t": (lcmtypes.motion_status_t, _motion),
     "navsat_t": (lcmtypes.navsat_t, _navsat),

@@ -1,5 +1,7 @@
 import ruedo.Body;
+import ruedo.Collisions;
 import ruedo.Command;
+import ruedo.Contact;
 import ruedo.Device;
 import ruedo.Image;
 import ruedo.LaunchOptions;
@@ -16,12 +18,16 @@ import ruedo.Scan;
 import ruedo.Simulation;
 import ruedo.SonarReading;
 import ruedo.State;
+import ruedo.Subscription;
 
 import java.nio.charset.StandardCharsets;
 import java.util.ArrayList;
 import java.util.Arrays;
+import java.util.Collections;
 import java.util.List;
 import java.util.Locale;
+import java.util.Set;
+import java.util.TreeSet;
 import java.util.function.Supplier;
 import java.util.zip.CRC32;
 
@@ -202,6 +208,30 @@ public final class Probe {
         robot.stop().await(PATIENCE);
     }
 
+    /** Into the wall, off it, and into it again. */
+    private static void collisions(Simulation sim, String name) {
+        Robot robot = sim.robot(name);
+        Collisions first = robot.collisions().latest(PATIENCE);
+        say("free", first.points.size(), first.blockedBy.isEmpty() ? "-" : first.blockedBy);
+        List<Object> met = Collections.synchronizedList(new ArrayList<>(List.of("met")));
+        try (Subscription open = robot.onCollision(sample -> met.add(sample.points.get(0).body))) {
+            for (String what : List.of("once", "twice")) {
+                Motion motion = robot.advance(20.0);
+                attempt(what, () -> motion.await());
+                say(what + "_by", motion.blockedBy());
+                Collisions seen = robot.collisions().latest(PATIENCE);
+                Set<String> bodies = new TreeSet<>();
+                for (Contact.Point point : seen.points) bodies.add(point.body);
+                say(what + "_seen", seen.blockedBy, String.join(" ", bodies));
+                robot.advance(-0.5).await(PATIENCE);
+                while (!robot.collisions().next(PATIENCE).points.isEmpty()) continue;
+            }
+        }
+        say(met.toArray());
+        String off = robot.collisions().latest(PATIENCE).blockedBy;
+        say("off", off.isEmpty() ? "-" : off);
+    }
+
     private static void errors(Simulation sim, String name) {
         attempt("robot", () -> sim.robot("nobody"));
         Robot robot = sim.robot(name);
@@ -379,6 +409,9 @@ public final class Probe {
                     break;
                 case "primitives":
                     primitives(sim, a[0]);
+                    break;
+                case "collisions":
+                    collisions(sim, a[0]);
                     break;
                 case "errors":
                     errors(sim, a[0]);

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <mutex>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -180,6 +182,38 @@ void primitives(const rc::Simulation& sim, const std::string& name) {
   robot.stop().wait(kPatience);
 }
 
+// Into the wall, off it, and into it again.
+void collisions(const rc::Simulation& sim, const std::string& name) {
+  const rc::Robot robot = sim.robot(name);
+  const auto stream = robot.collisions();
+  const auto or_none = [](const std::string& text) { return text.empty() ? "-" : text; };
+  const rc::Collisions first = stream.latest(kPatience);
+  say("free", first.points.size(), or_none(first.blocked_by));
+  std::string met = "met";
+  std::mutex mutex;
+  {
+    const rc::Subscription subscription = robot.on_collision([&](const rc::Collisions& sample) {
+      const std::lock_guard lock(mutex);
+      met += " " + sample.points.at(0).body;
+    });
+    for (const std::string what : {"once", "twice"}) {
+      const rc::Motion motion = robot.advance(20.0);
+      report(what, [&] { motion.wait(); });
+      say(what + "_by", motion.blocked_by());
+      const rc::Collisions seen = stream.latest(kPatience);
+      std::set<std::string> bodies;
+      for (const rc::ContactPoint& point : seen.points) bodies.insert(point.body);
+      std::string line = what + "_seen " + seen.blocked_by;
+      for (const std::string& body : bodies) line += " " + body;
+      say(line);
+      robot.advance(-0.5).wait(kPatience);
+      while (!stream.next(kPatience).points.empty()) continue;
+    }
+  }
+  say(met);
+  say("off", or_none(stream.latest(kPatience).blocked_by));
+}
+
 void errors(const rc::Simulation& sim, const std::string& name) {
   report("robot", [&] { (void)sim.robot("nobody"); });
   const rc::Robot robot = sim.robot(name);
@@ -347,6 +381,7 @@ void act(const std::string& url, const std::string& command, const std::vector<s
   if (command == "velocity") drive(sim, a, false);
   if (command == "wheels") drive(sim, a, true);
   if (command == "primitives") primitives(sim, a[0]);
+  if (command == "collisions") collisions(sim, a[0]);
   if (command == "errors") errors(sim, a[0]);
   if (command == "streams") streams(sim, a[0], std::stod(a[1]));
   if (command == "control") control(sim, a[0]);

@@ -145,6 +145,26 @@ def primitives(sim, name):
     robot.stop().wait(PATIENCE)
 
 
+def collisions(sim, name):
+    """Into the wall, off it, and into it again."""
+    robot = sim.robot(name)
+    first = robot.collisions.latest(PATIENCE)
+    say("free", len(first.points), first.blocked_by or "-")
+    met = []
+    with robot.on_collision(lambda sample: met.append(sample.points[0].body)):
+        for what in ("once", "twice"):
+            motion = robot.advance(20.0)
+            attempt(what, motion.wait)
+            say(f"{what}_by", motion.blocked_by)
+            seen = robot.collisions.latest(PATIENCE)
+            say(f"{what}_seen", seen.blocked_by, *{point.body for point in seen.points})
+            robot.advance(-0.5).wait(PATIENCE)
+            while robot.collisions.next(PATIENCE).points:
+                pass
+    say("met", *met)
+    say("off", robot.collisions.latest(PATIENCE).blocked_by or "-")
+
+
 def errors(sim, name):
     attempt("robot", lambda: sim.robot("nobody"))
     robot = sim.robot(name)
@@ -295,6 +315,7 @@ def main():
                 "velocity": lambda: drive(sim, *rest, False),
                 "wheels": lambda: drive(sim, *rest, True),
                 "primitives": lambda: primitives(sim, *rest),
+                "collisions": lambda: collisions(sim, *rest),
                 "errors": lambda: errors(sim, *rest),
                 "streams": lambda: streams(sim, *rest),
                 "control": lambda: control(sim, *rest),

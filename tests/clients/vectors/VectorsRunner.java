@@ -109,6 +109,11 @@ public final class VectorsRunner {
             row("pressed", s.pressed);
             for (Contact.Point p : s.points)
                 row("point " + p.body, p.position, p.normal, p.force, p.depth);
+        } else if (sample instanceof Collisions) {
+            Collisions s = (Collisions) sample;
+            System.out.println("blocked by " + s.blockedBy);
+            for (Contact.Point p : s.points)
+                row("point " + p.body, p.position, p.normal, p.force, p.depth);
         } else if (sample instanceof Joints) {
             Joints s = (Joints) sample;
             for (int i = 0; i < s.names.size(); i++)

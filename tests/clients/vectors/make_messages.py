@@ -162,6 +162,24 @@ CASES = [
         "utime 5|pressed 1|point wall/link 1.000000 2.000000 3.000000 0.000000 -1.000000 0.000000 12.500000 0.250000",
     ),
     (
+        "collisions_t",
+        dict(
+            utime=9,
+            blocked_by="crate/link",
+            n=1,
+            points=[
+                dict(
+                    body="wall/link",
+                    position=[1.0, 2.0, 3.0],
+                    normal=[0.0, -1.0, 0.0],
+                    force=12.5,
+                    depth=0.25,
+                )
+            ],
+        ),
+        "utime 9|blocked by crate/link|point wall/link 1.000000 2.000000 3.000000 0.000000 -1.000000 0.000000 12.500000 0.250000",
+    ),
+    (
         "joint_state_t",
         dict(
             utime=6,
@@ -190,6 +208,7 @@ CASES = [
 
 PARTS = {
     "contact_t": "contact_point_t",
+    "collisions_t": "contact_point_t",
     "logical_camera_t": "logical_object_t",
     "boxes_2d_t": "box_2d_t",
     "boxes_3d_t": "box_3d_t",
@@ -223,6 +242,7 @@ def main():
         ("sonar_t", 16),
         ("odometry_t", 56),
         ("contact_t", 17),
+        ("collisions_t", 31),
         ("logical_camera_t", 16),
         ("boxes_2d_t", 24),
         ("boxes_3d_t", 16),

@@ -107,6 +107,12 @@ void mean(const std::string& type, const Sample& sample) {
       row("point " + p.body, std::vector{p.position[0], p.position[1], p.position[2], p.normal[0],
                                          p.normal[1], p.normal[2], p.force, p.depth});
     }
+  } else if (const auto* collisions = as<Collisions>(type, sample)) {
+    std::printf("blocked by %s\n", collisions->blocked_by.c_str());
+    for (const ContactPoint& p : collisions->points) {
+      row("point " + p.body, std::vector{p.position[0], p.position[1], p.position[2], p.normal[0],
+                                         p.normal[1], p.normal[2], p.force, p.depth});
+    }
   } else if (const auto* joints = as<Joints>(type, sample)) {
     for (size_t i = 0; i < joints->names.size(); ++i) {
       row("joint " + joints->names[i],

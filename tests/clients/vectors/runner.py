@@ -76,6 +76,10 @@ def meaning(type, s):
         yield row("pressed", [s.pressed])
         for p in s.points:
             yield row(f"point {p.body}", floats([*p.position, *p.normal, p.force, p.depth]))
+    elif type == "collisions_t":
+        yield f"blocked by {s.blocked_by}"
+        for p in s.points:
+            yield row(f"point {p.body}", floats([*p.position, *p.normal, p.force, p.depth]))
     elif type == "joint_state_t":
         for i, name in enumerate(s.names):
             yield row(f"joint {name}", floats([s.positions[i], s.velocities[i], s.efforts[i]]))

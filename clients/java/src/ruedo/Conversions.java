@@ -6,6 +6,7 @@ import ruedo.lcmtypes.altimeter_t;
 import ruedo.lcmtypes.boxes_2d_t;
 import ruedo.lcmtypes.boxes_3d_t;
 import ruedo.lcmtypes.camera_info_t;
+import ruedo.lcmtypes.collisions_t;
 import ruedo.lcmtypes.contact_t;
 import ruedo.lcmtypes.force_torque_t;
 import ruedo.lcmtypes.image_t;
@@ -80,6 +81,9 @@ final class Conversions {
                     Map.entry(
                             "contact_t",
                             new Conversion(contact_t.LCM_FINGERPRINT, Conversions::contact)),
+                    Map.entry(
+                            "collisions_t",
+                            new Conversion(collisions_t.LCM_FINGERPRINT, Conversions::collisions)),
                     Map.entry(
                             "joint_state_t",
                             new Conversion(joint_state_t.LCM_FINGERPRINT, Conversions::joints)),
@@ -310,16 +314,22 @@ final class Conversions {
         return new Boxes3D(utime, List.copyOf(boxes));
     }
 
-    private static Sample contact(WireReader in) throws IOException {
-        long utime = in.int64();
-        boolean pressed = in.bool();
+    private static List<Contact.Point> contactPoints(WireReader in) throws IOException {
         List<Contact.Point> points = new ArrayList<>();
         for (int n = in.count(5 + 8 * 8); n > 0; n--) {
             points.add(
                     new Contact.Point(
                             in.string(), in.doubles(3), in.doubles(3), in.float64(), in.float64()));
         }
-        return new Contact(utime, pressed, List.copyOf(points));
+        return List.copyOf(points);
+    }
+
+    private static Sample contact(WireReader in) throws IOException {
+        return new Contact(in.int64(), in.bool(), contactPoints(in));
+    }
+
+    private static Sample collisions(WireReader in) throws IOException {
+        return new Collisions(in.int64(), in.string(), contactPoints(in));
     }
 
     private static Sample joints(WireReader in) throws IOException {

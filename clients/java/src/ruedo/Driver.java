@@ -17,6 +17,8 @@ final class Driver {
     private byte[] held;
     private List<Motion> motions = new ArrayList<>();
     private Subscription statuses;
+    private Subscription collisions;
+    private String blockedBy = "";
     private boolean running; // a status has shown the held command
     private boolean watchdogTold;
     private String ended = "";
@@ -82,16 +84,18 @@ final class Driver {
     /** Its robot, or its run, is gone: nothing is repeated to the next one of that name. */
     void end(String reason) {
         List<Motion> underWay;
-        Subscription listening;
+        List<Subscription> listening = new ArrayList<>();
         synchronized (this) {
             ended = reason;
             held = null;
             underWay = motions;
             motions = new ArrayList<>();
-            listening = statuses;
+            if (statuses != null) listening.add(statuses);
+            if (collisions != null) listening.add(collisions);
             statuses = null;
+            collisions = null;
         }
-        if (listening != null) listening.close();
+        for (Subscription subscription : listening) subscription.close();
         for (Motion motion : underWay) motion.end(reason);
     }
 
@@ -99,14 +103,26 @@ final class Driver {
         if (!ended.isEmpty())
             throw new RuedoException.UnknownName(
                     robot + " is gone: " + ended); // while the command was made
-        if (statuses == null) statuses = sim.robot(robot).motion().onSample(this::onStatus);
+        if (statuses != null) return;
+        try { // of a step they come before the status
+            collisions = sim.robot(robot).collisions().onSample(this::onCollisions);
+        } catch (RuedoException.UnknownName switchedOff) {
+            blockedBy = ""; // a motion that is blocked does not know by what
+        }
+        statuses = sim.robot(robot).motion().onSample(this::onStatus);
+    }
+
+    private synchronized void onCollisions(Collisions sample) {
+        blockedBy = sample.blockedBy;
     }
 
     private void onStatus(MotionStatus status) {
         List<Motion> underWay;
         boolean stopped;
+        String blocker;
         synchronized (this) {
             underWay = motions;
+            blocker = blockedBy;
             running = running || (held != null && status.id == 0 && status.state.equals("running"));
             stopped = running && held != null && status.reason.equals("watchdog") && !watchdogTold;
             watchdogTold = watchdogTold || stopped;
@@ -119,6 +135,6 @@ final class Driver {
                             + watchdog()
                             + " s of sim time");
         }
-        for (Motion motion : underWay) motion.update(status);
+        for (Motion motion : underWay) motion.update(status, blocker);
     }
 }

@@ -16,6 +16,7 @@ public final class Motion {
     private final Deadline unseenUntil = new Deadline(UNSEEN_SECONDS);
     private String state = "sent";
     private String reason = "";
+    private String blockedBy = "";
     private double progress;
     private double remaining;
     private int unseen;
@@ -46,6 +47,11 @@ public final class Motion {
      */
     public synchronized String reason() {
         return reason;
+    }
+
+    /** The body that blocked it; "": none did. */
+    public synchronized String blockedBy() {
+        return blockedBy;
     }
 
     /** m or rad done. */
@@ -88,7 +94,7 @@ public final class Motion {
                             robot,
                             kind,
                             state.equals("refused") ? "was refused" : "ended",
-                            reason,
+                            blockedBy.isEmpty() ? reason : reason + " by " + blockedBy,
                             remaining),
                     reason);
         }
@@ -107,7 +113,7 @@ public final class Motion {
         notifyAll();
     }
 
-    synchronized void update(MotionStatus status) {
+    synchronized void update(MotionStatus status, String blocker) {
         if (done() || status.utime < utime) return;
         utime = status.utime;
         if (status.id == id) {
@@ -115,6 +121,7 @@ public final class Motion {
             remaining = status.remaining;
             state = status.state;
             reason = status.reason;
+            blockedBy = reason.equals("blocked") ? blocker : "";
         } else if (status.state.equals("refused")) {
             return; // another command, which changed nothing
         } else if (!state.equals("sent") || (++unseen >= UNSEEN_STATUSES && unseenUntil.passed())) {

@@ -8,7 +8,10 @@ import ruedo.lcmtypes.velocity_command_t;
 import ruedo.lcmtypes.wheel_command_t;
 
 import java.util.ArrayList;
+import java.util.HashSet;
 import java.util.List;
+import java.util.Set;
+import java.util.function.Consumer;
 
 /**
  * A robot of the simulation. Lengths in m, angles in rad, counter-clockwise is positive. Thread
@@ -137,6 +140,30 @@ public final class Robot {
     @SuppressWarnings("unchecked")
     public Device<Contact> contact() {
         return (Device<Contact>) first("contact_t", "contact sensor");
+    }
+
+    /** What it runs into, and what blocks it; it needs no bumper. */
+    @SuppressWarnings("unchecked")
+    public Stream<Collisions> collisions() {
+        return (Stream<Collisions>) firstStream("collisions_t", "collisions");
+    }
+
+    /**
+     * Calls back as {@link Stream#onSample} does, but only when the robot runs into a body that it
+     * did not touch a moment before.
+     */
+    public Subscription onCollision(Consumer<? super Collisions> callback) {
+        Set<String> touched = new HashSet<>();
+        return collisions()
+                .onSample(
+                        sample -> {
+                            Set<String> now = new HashSet<>();
+                            for (Contact.Point point : sample.points) now.add(point.body);
+                            boolean news = !touched.containsAll(now);
+                            touched.clear();
+                            touched.addAll(now);
+                            if (news) callback.accept(sample);
+                        });
     }
 
     /** The true pose. */

@@ -286,7 +286,7 @@ export class RobotOverlay {
     this.baseFrame.matrixAutoUpdate = false;
     for (const device of devices) {
       const axes = new THREE.AxesHelper(0.14);
-      if (!["odometry", "pose", "motion", "joints"].includes(device.kind)) {
+      if (!["odometry", "pose", "motion", "collisions", "joints"].includes(device.kind)) {
         axes.applyMatrix4(devicePose(device, new THREE.Matrix4()));
         this.baseFrame.add(axes);
       }

@@ -3,6 +3,7 @@ import {
   image_t,
   motion_status_t,
   move_command_t,
+  type collisions_t,
   type contact_t,
   type device_info_t,
   type imu_t,
@@ -336,6 +337,11 @@ export class RobotPages {
         ? `touches ${[...new Set(m.points.map((p) => p.body))].join(", ") || "something"}`
         : "free",
     );
+  }
+  collisions(m: collisions_t): void {
+    const touched = [...new Set(m.points.map((p) => p.body))].join(", ");
+    const blocked = m.blocked_by ? ` · blocked by ${m.blocked_by}` : "";
+    this.fact("runs into", (touched || "nothing") + blocked);
   }
   scan(device: device_info_t, m: planar_lidar_t): void {
     this.polar.scan(device, m);

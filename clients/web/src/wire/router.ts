@@ -140,6 +140,9 @@ export class Router {
         if (device) pages?.contact(device, m);
         return;
       }
+      case "collisions_t":
+        pages?.collisions(read(type));
+        return;
       case "motion_status_t":
         pages?.motion(read(type));
         return;

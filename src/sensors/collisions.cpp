@@ -1,0 +1,118 @@
+// What every robot runs into, on ROBOT/collisions: no sensor that a robot has, but what a program
+// wants to know of it. Ends of touches wait for the next sample, so that one that trembles does not
+// flood the channel.
+#include <algorithm>
+#include <iterator>
+#include <utility>
+#include <vector>
+
+#include "model/body_layout.h"
+#include "ruedo/collisions_t.hpp"
+#include "ruedo/sensor.h"
+
+namespace ruedo {
+namespace {
+
+class Collisions : public Sensor {
+ public:
+  explicit Collisions(const SensorSetup& setup)
+      : world_(setup.world),
+        layout_(setup.layout),
+        robot_(setup.robot_index),
+        channel_(setup.channel<collisions_t>()) {}
+
+  bool observes() const override { return true; }
+
+  void observe(const Snapshot& now, Outbox& out) override {
+    const int blocked_by = now.robots[static_cast<size_t>(robot_)].motion.blocked_by;
+    if (now.collisions.empty() && blocked_by == blocked_by_) return;
+    const bool news = gather(now) || blocked_by != blocked_by_;
+    blocked_by_ = blocked_by;
+    if (news && now.step > 0) show(now, out);  // the initial state is a sample anyway
+  }
+
+  void shift_time(SimTime) override { shown_step_ = -1; }
+
+  void sample(const SampleInput& input, Outbox& out) override {
+    if (input.snapshot.step != shown_step_) show(input.snapshot, out);
+  }
+
+ private:
+  struct Touched {
+    int link;  // the other's, index into BodyLayout::links
+    int64_t step;
+    std::vector<contact_point_t> points;  // at that step
+  };
+
+  // Notes what is touched. True when some of it was not in the last message.
+  bool gather(const Snapshot& now) {
+    const auto own =
+        std::equal_range(now.collisions.begin(), now.collisions.end(), Collision{robot_, 0, true},
+                         [](const Collision& a, const Collision& b) { return a.robot < b.robot; });
+    bool news = false;
+    for (auto each = own.first; each != own.second; ++each) {
+      const Contact& contact = now.contacts[static_cast<size_t>(each->contact)];
+      const int link = each->as_a ? contact.link_b : contact.link_a;
+      auto known = std::find_if(touched_.begin(), touched_.end(),
+                                [link](const Touched& one) { return one.link == link; });
+      if (known == touched_.end()) {
+        known = touched_.insert(known, {link, now.step, {}});
+        news |= std::find(told_.begin(), told_.end(), link) == told_.end();
+      }
+      if (known->step != now.step) known->points.clear();
+      known->step = now.step;
+      known->points.push_back(point(contact, each->as_a));
+    }
+    return news;
+  }
+
+  contact_point_t point(const Contact& contact, bool as_a) const {
+    contact_point_t point;
+    point.body = model::body_name(world_, layout_, as_a ? contact.link_b : contact.link_a);
+    for (int i = 0; i < 3; ++i) {
+      point.position[i] = contact.position[i];
+      point.normal[i] = as_a ? contact.normal[i] : -contact.normal[i];
+    }
+    point.force = contact.force;
+    point.depth = contact.depth;
+    return point;
+  }
+
+  void show(const Snapshot& now, Outbox& out) {
+    shown_step_ = now.step;
+    message_.utime = now.time;
+    message_.blocked_by = model::body_name(world_, layout_, blocked_by_);
+    message_.points.clear();
+    told_.clear();
+    for (Touched& touched : touched_) {
+      told_.push_back(touched.link);
+      std::move(touched.points.begin(), touched.points.end(), std::back_inserter(message_.points));
+    }
+    touched_.clear();
+    message_.n = static_cast<int32_t>(message_.points.size());
+    out.publish(channel_, message_);
+  }
+
+  const model::WorldModel& world_;
+  const model::BodyLayout& layout_;
+  int robot_;
+  int channel_;
+  int blocked_by_ = -1;
+  std::vector<Touched> touched_;  // since the last message, in the order in which it came
+  std::vector<int> told_;         // links in the last message
+  int64_t shown_step_ = -1;
+  collisions_t message_;
+};
+
+const RegisterSensor kRegister{
+    {.module = "odometry",
+     .order = 1,
+     .types = {},
+     .attach_to = "robot",
+     .device_name = "collisions",
+     .default_rate = {10, 1},
+     .make = [](const SensorSetup& setup) { return std::make_unique<Collisions>(setup); },
+     .kind = "collisions"}};
+
+}  // namespace
+}  // namespace ruedo
