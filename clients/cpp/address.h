@@ -17,7 +17,7 @@ std::string resolve_url(const std::string& url);
 bool has_multicast_route(const std::string& group = "239.255.76.67");
 bool is_claimed(
     const std::string& url);  // by a server on this machine: its claim goes with its process
-bool is_served(const std::string& url);  // false for a tcpq or unix address where nobody listens
+bool is_served(const std::string& url);  // false for a tcpq or unix address without a listener
 // Throws NoServer, with the cure. The route is checked before LCM sees the URL, because LCM's own
 // self-test blocks for ten seconds where multicast has no route.
 void check_reachable(const std::string& url);

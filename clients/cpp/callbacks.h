@@ -47,7 +47,7 @@ class Callback : public CallbackCore {
   Callback(std::string what, Function function)
       : CallbackCore(std::move(what)), function_(std::move(function)) {}
 
-  // What the callback throws is said once, and hurts nobody else.
+  // What the callback throws is reported once, and harms no other callback.
   void call(Arguments... arguments) {
     const std::lock_guard lock(running_);
     if (closed_) return;

@@ -190,7 +190,7 @@ void Core::forget_removed(const WorldInfo& info) {
   for (const auto& stream : streams) stream->end();
 }
 
-// The server was started anew, or another has taken its place.
+// The server was restarted, or another has taken its place.
 void Core::begin_run() {
   std::vector<std::shared_ptr<Driver>> drivers;
   std::vector<std::shared_ptr<StreamCore>> streams;

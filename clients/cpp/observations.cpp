@@ -1,4 +1,4 @@
-// What step() saw, decoded where somebody looks.
+// What step() saw, decoded on demand.
 #include "core.h"
 #include "sample_types.h"
 

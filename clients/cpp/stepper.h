@@ -29,7 +29,7 @@ class Stepper {
   explicit Stepper(Core& core) : core_(core) {}
 
   Observations step(int64_t n, const std::vector<Command>& commands, Duration timeout);
-  void forget();  // the client has reset the world, or left: the next step takes part anew
+  void forget();  // the client has reset the world, or left: the next step takes part again
 
   // The receiving thread's.
   void on_tick(const uint8_t* bytes, size_t size);

@@ -16,7 +16,7 @@ class Bus {
   // Safe from any thread. Never throws: a message that cannot be sent is counted.
   virtual void publish(const std::string& channel, const uint8_t* data, size_t size) = 0;
 
-  // What was published is on its way when this returns, at the latest. For whoever publishes much
+  // What was published is on its way when this returns, at the latest. For busy publishers
   // at once: a bus may send it as one piece. Any thread.
   virtual void flush() {}
 

@@ -92,7 +92,7 @@ struct MotionCore;
 ///
 /// Once close() has returned, or the destructor, the callback is not called any more, and no call
 /// of it is under way (but for the one that closes it itself): what it refers to may go. What a
-/// callback throws is said on the terminal once, and hurts nobody else.
+/// callback throws is reported once on the terminal, and harms no other callback.
 class [[nodiscard]] Subscription {
  public:
   Subscription() = default;
@@ -163,7 +163,7 @@ class MessageStream {
   Message next(Duration timeout = 5.0) const {
     return decoded(channel(), raw_.next(timeout).bytes);
   }
-  /// As Stream::on_sample(). A message that is no Message is said on the terminal, and passed over.
+  /// As Stream::on_sample(). A message of another type is reported on the terminal and skipped.
   Subscription on_sample(std::function<void(const Message&)> callback) const {
     return raw_.on_sample([callback = std::move(callback), name = channel()](const RawSample& raw) {
       callback(decoded(name, raw.bytes));
@@ -374,7 +374,7 @@ class [[nodiscard]] Simulation {
   [[nodiscard]] std::vector<BodyInfo> bodies() const;        // all that there are
   [[nodiscard]] Robot robot(const std::string& name) const;  // UnknownName lists those that exist
   void sleep(Duration time) const;                           // of sim time
-  /// Calls back in the receiving thread when another server, or the same one started anew, answers
+  /// Calls back in the receiving thread when another server, or the same one restarted, answers
   /// at this address. Commands are not repeated into the new run, and primitives under way have
   /// ended.
   Subscription on_new_run(std::function<void()> callback) const;

@@ -59,7 +59,7 @@ enum class MotionState : int8_t {
   sent = 64,
   unknown = 127
 };
-/// removed: the robot is gone; new_run: the server was started anew.
+/// removed: the robot is gone; new_run: the server was restarted.
 enum class MotionReason : int8_t {
   none = 0,
   replaced = 1,

@@ -1,4 +1,4 @@
-// Decoding of messages that nobody vouches for. lcm-gen's decoders read past the end of a buffer
+// Decoding of messages that are not trusted. lcm-gen's decoders read past the end of a buffer
 // whose lengths lie, so the bytes are walked by the type's schema first: fingerprint, every length
 // and string, and nothing left over.
 #pragma once

@@ -51,7 +51,7 @@ struct EngineDevice {
 /// The values of one field of a device's messages, of all robots that have it, in all copies: they
 /// follow the runs.
 ///
-/// A handle on memory of the engine's, which step() and reset() write anew: copy what you keep. It
+/// A handle on memory of the engine's, which step() and reset() overwrite: copy what you keep. It
 /// may outlive the engine.
 class Observation {
  public:
@@ -142,7 +142,7 @@ class Engine {
   /// @throws InputError, with what there is
   [[nodiscard]] Observation observe(const std::string& name);
 
-  /// Begins a copy, or all of them, anew: what follows equals a fresh run.
+  /// Resets a copy, or all of them: what follows equals a fresh run.
   /// @param world the copy
   /// @param seed of the copy
   void reset(int world, uint64_t seed);

@@ -224,7 +224,7 @@ void LcmBus::read() {
 }
 
 // False when the connection was lost: LCM connects again when it is next asked for a message. A
-// unix one is not made anew: what was lost meanwhile would not be known.
+// unix one is not reopened: what was lost meanwhile would not be known.
 bool LcmBus::handle() {
   if (unix_) {
     unix_->take(0, [this](std::string_view channel, const uint8_t* data, size_t size) {

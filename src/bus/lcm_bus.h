@@ -2,7 +2,7 @@
 //
 // An LCM instance that only sends (it never subscribes, so LCM gives it no thread), and for
 // multicast a receiver of our own: a message takes one thread from the network to the handler, not
-// two, and what we send ourselves wakes nobody. With tcpq another LCM instance listens, with memq
+// two, and what we send ourselves wakes no one. With tcpq another LCM instance listens, with memq
 // the same one. A unix address is a connection of our own.
 #pragma once
 

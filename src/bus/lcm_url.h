@@ -33,7 +33,7 @@ bool has_route(const LcmUrl& url);
 // Throws EnvironmentError, with the cure, when this machine has no way to the multicast group.
 void check_route(const LcmUrl& url);
 
-// True when somebody listens at a tcpq address.
+// True when a server listens at a tcpq address.
 bool is_served(const LcmUrl& url, int timeout_ms);
 
 // True when a datagram sent to the group comes back within `timeout_ms`: route, loopback and

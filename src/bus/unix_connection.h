@@ -19,7 +19,7 @@ class UnixConnection {
  public:
   using Handler = std::function<void(std::string_view channel, const uint8_t* data, size_t size)>;
 
-  // Throws EnvironmentError when nobody serves there.
+  // Throws EnvironmentError when no server listens there.
   explicit UnixConnection(const std::string& path);
 
   // False when the server is gone, for good.

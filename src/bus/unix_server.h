@@ -1,10 +1,10 @@
 // The bus as a Unix-domain socket: for programs of one user on one machine.
 //
-// The socket has mode 0600, and the kernel says whose the other end is: nobody else reads or sends.
+// The socket has mode 0600, and the kernel names its peer: no other user reads or sends.
 // The frames are tcpq's (tcpq_wire.h). What is published waits for flush(), and then goes to each
 // client in one call of the system; what a client does not take at once is kept for it, in order.
 // So nothing is lost on the way, but for a client that falls kMostBehind behind: it loses whole
-// messages, and that is said.
+// messages, and logs that.
 #pragma once
 
 #include <atomic>
@@ -29,8 +29,7 @@ class UnixServer : public Bus {
   static constexpr size_t kMostClients = 256;
   static constexpr size_t kMostBehind = size_t{64} << 20;  // bytes that one client has not taken
   static constexpr size_t kMostHeld =
-      size_t{256}
-      << 20;  // bytes that wait for clients, or are messages of theirs which are not whole yet
+      size_t{256} << 20;  // bytes that wait for clients, or belong to messages that are incomplete
 
   // Makes the socket; a file that a server left behind is replaced. Throws EnvironmentError when
   // the path is served, or cannot be.
@@ -50,7 +49,7 @@ class UnixServer : public Bus {
 
   // Counts since the start.
   uint64_t connections() const { return connections_; }
-  uint64_t refused() const { return refused_; }  // of other users, too many, or no clients of ours
+  uint64_t refused() const { return refused_; }  // other users, one too many, or foreign programs
 
  private:
   using Clock = std::chrono::steady_clock;

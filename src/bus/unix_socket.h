@@ -11,7 +11,7 @@ namespace ruedo::bus {
 // cure.
 FileHandle connect_unix(const std::string& path);
 
-// True when somebody listens there.
+// True when a server listens there.
 bool is_unix_served(const std::string& path);
 
 // Binds a socket of mode 0600 and listens; what a server left behind is replaced. Throws

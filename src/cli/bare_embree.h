@@ -1,4 +1,4 @@
-// Embree's own triangles in single precision and nothing of ours: what the ray caster is measured
+// Embree's own triangles in single precision without our code: what the ray caster is measured
 // against.
 #pragma once
 

@@ -207,7 +207,7 @@ const RegisterCommand kRegister{80, add_bench};
 
 }  // namespace
 
-// The row's lines come back through a pipe; what goes wrong is said on stderr by the child.
+// The row's lines come back through a pipe; the child reports errors on stderr.
 std::vector<std::string> measure_apart(const BenchTask& task) {
   std::vector<std::string> words{"/proc/self/exe",    "bench", "--one", "--quiet", "--only",
                                  name_of(task.table), "--lcm", task.lcm};

@@ -25,7 +25,7 @@ class FoxgloveOutput {
   virtual uint16_t add_schema(const std::string& name, const std::string& schema) = 0;
   virtual uint16_t add_channel(uint16_t schema, const std::string& topic) = 0;
   virtual void add_message(uint16_t channel, uint64_t time_ns, const std::string& json) = 0;
-  // False when nobody wants what comes on this topic, or on TOPIC/values.
+  // False when no client wants what comes on this topic, or on TOPIC/values.
   virtual bool wants(const std::string& topic) const {
     static_cast<void>(topic);
     return true;
@@ -58,7 +58,7 @@ class FoxgloveExport {
 
   // What runs from now on: frames of robots and devices, and what the world looks like.
   void begin_scene(const run::LogWorlds::Scene& scene, uint64_t time_ns);
-  // A message as it came. One that is none of Ruedo's types, or damaged, is left out and counted.
+  // A message as it came. One of an unknown type, or damaged, is left out and counted.
   void add(const std::string& channel, uint64_t time_ns, std::span<const uint8_t> message);
 
   uint64_t left_out() const { return left_out_; }

@@ -1,4 +1,4 @@
-// A network of this program's own: nobody else's messages come in, and none of its go out.
+// A network of this program's own: no message comes in from outside or goes out.
 #pragma once
 
 namespace ruedo::cli {

@@ -72,7 +72,7 @@ McapWriter::McapWriter(const std::string& path, const std::string& profile)
 McapWriter::~McapWriter() {
   if (finished_) return;
   file_.reset();
-  std::error_code error;  // a device is none of ours to remove
+  std::error_code error;  // a device must not be removed
   if (std::filesystem::is_regular_file(path_, error)) std::filesystem::remove(path_, error);
 }
 

@@ -33,7 +33,7 @@ struct PlayArguments {
   bool viewed = false, sandboxed = false;
 };
 
-// Channels that a log has for those who read it, and that nobody published.
+// Channels that only a log has: they were never published.
 bool in_logs_only(const std::string& channel) {
   return channel == log::kHeaderChannel || channel == log::kAppliedChannel ||
          channel == log::kStateHashChannel;

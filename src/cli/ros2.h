@@ -34,7 +34,7 @@ class Ros2Node {
   virtual ~Ros2Node() = default;   // after the run, before the server
   virtual void print() const = 0;  // the topics
 
-  // Returns when somebody publishes each topic that the run waits for, and reads something of this
+  // Returns when each topic that the run waits for has a publisher, and a reader of this
   // run; or the run is to end.
   virtual void wait_for_peers() = 0;
 };

@@ -38,7 +38,7 @@ namespace {
 
 // Takes SIGINT, SIGTERM, and SIGHUP where it is not ignored (nohup), in a thread of its own: a
 // handler could do next to nothing. Make it before any other thread, which then inherits that the
-// signals are blocked. A pipe that nobody reads is no signal here, but an error of who writes.
+// signals are blocked. A closed pipe is an error of write() here, not a signal.
 class SignalThread {
  public:
   SignalThread() {
@@ -92,7 +92,7 @@ void watch_stdin() {
   }).detach();
 }
 
-// False when nobody reads it: a closed pipe, a terminal that is gone.
+// False when it has no reader: a closed pipe, a terminal that is gone.
 bool is_printed(const std::function<void()>& print) {
   try {
     print();

@@ -2,7 +2,7 @@
 // thread's alone.
 //
 // Of most channels one message is kept. Messages in parts are kept together, and so are the last
-// few replies, so that nobody misses his own.
+// few replies, so that no one misses their own.
 #pragma once
 
 #include <cstdint>

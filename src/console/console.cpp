@@ -52,7 +52,7 @@ struct Console::Impl {
   Stage stage;
   std::shared_ptr<const model::WorldModel> world;
   std::unique_ptr<SceneData> scene;  // of that world; null: not made yet
-  std::unique_ptr<Library> library;  // null: nobody has asked for it
+  std::unique_ptr<Library> library;  // null: not asked for yet
   Playback told;                     // to the viewers
   std::chrono::steady_clock::time_point told_at;
   std::unique_ptr<WebServer> web;

@@ -86,7 +86,7 @@ void LogSource::show(Board& board) {
   const auto& channels = index_.channels();
   for (size_t i = 0; i < channels.size(); ++i) {
     if (board.channels()[i].watchers == 0) {
-      shown_[i] = kNothing;  // it is read again when somebody wants it
+      shown_[i] = kNothing;  // it is read again on demand
       continue;
     }
     size_t count = channels[i].count_until(time_us);

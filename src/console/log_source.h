@@ -1,7 +1,7 @@
 // A recorded run, as the console sees it: at each moment the newest message of every channel that
 // somebody watches.
 //
-// All viewers see the same moment. Time stands still while nobody watches.
+// All viewers see the same moment. Time stands still without viewers.
 #pragma once
 
 #include <chrono>

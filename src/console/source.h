@@ -33,7 +33,7 @@ class Source {
   };
   virtual Count traffic(size_t channel) const = 0;
 
-  // A viewer's message to the simulation; false where nobody takes it.
+  // A viewer's message to the simulation; false where none is taken.
   virtual bool command(const std::string& channel, std::span<const uint8_t> message) = 0;
 
   // The world to show, another pointer when it has changed; null when there is none.

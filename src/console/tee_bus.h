@@ -1,6 +1,6 @@
 // A bus that forwards to another one and lets the console see what goes over it.
 //
-// Who publishes pays a look-up and two counters a message, and a copy of those that somebody
+// Who publishes pays a look-up and two counters a message, and a copy of those that a viewer
 // watches. It waits for nothing: when two threads publish in the same moment, or the ring is full,
 // the console misses a message.
 #pragma once
@@ -45,7 +45,7 @@ class TeeBus : public Bus {
   uint64_t failed() const override { return inner_.failed(); }
 
   // The console's. A command or request of a viewer's goes straight to who listens to the bus: a
-  // bus need not hear what this process sends. False for a channel on which nobody listens.
+  // bus need not hear what this process sends. False for a channel without a listener.
   bool command(const std::string& channel, const uint8_t* data, size_t size);
 
   // Whether anybody watches; without that, messages are only counted.

@@ -1,5 +1,5 @@
 // A name without a folder is searched where the program says (its RUNPATH), since this code is part
-// of the program, or of the shared library that stands for it.
+// of the program, or of the shared library in its place.
 #include "core/late_library.h"
 
 #include <dlfcn.h>

@@ -1,4 +1,4 @@
-// Shared libraries of ours that are loaded when they are first needed. What they are linked to
+// Our own shared libraries, loaded when they are first needed. What they are linked to
 // takes a tenth of a second to load: a picture's codecs, the renderer. They lie where the program's
 // own copies of libraries lie.
 #pragma once
@@ -18,7 +18,7 @@ Function* late_function(LateLibrary library, const char* name, std::string& why)
   return reinterpret_cast<Function*>(late_symbol(library, name, why));
 }
 
-// Loads all that there are: before files are out of reach, or before somebody asks which libraries
+// Loads all that there are: before files are out of reach, or before a caller asks which libraries
 // this process has.
 void load_late_libraries();
 

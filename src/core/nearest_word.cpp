@@ -35,7 +35,7 @@ size_t edit_distance(std::string_view a, std::string_view b) {
 
 std::string nearest_word(std::string_view word, const std::vector<std::string>& known) {
   constexpr std::string_view kPrefix = "ruedo:";
-  constexpr size_t kLongest = 64;  // longer is no typing mistake of ours
+  constexpr size_t kLongest = 64;  // longer words are not mistyped ones
   if (word.size() > kLongest) return "";
   const size_t written = word.size() - (word.starts_with(kPrefix) ? kPrefix.size() : 0);
   size_t best_distance = std::max<size_t>(1, written / 3) + 1;

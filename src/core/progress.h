@@ -1,5 +1,5 @@
 // How far something long has come, for who watches it: a terminal's line (src/cli/progress_line.h).
-// Where nobody does, it costs a store.
+// Without a reader it costs a store.
 #pragma once
 
 #include <atomic>
@@ -15,7 +15,7 @@ class Progress {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // what: in words, such as "reading run.lcm". whole: where it will be done; 0 where nobody knows.
+  // what: in words, such as "reading run.lcm". whole: where it will be done; 0: unknown.
   explicit Progress(std::string what, int64_t whole = 0);
   ~Progress();
   Progress(const Progress&) = delete;

@@ -116,7 +116,7 @@ class Walk {
     const auto length = static_cast<size_t>(length_with_zero);
     if (bytes_.size() - at_ < length || bytes_[at_ + length - 1] != 0) return false;
     const std::string_view text(reinterpret_cast<const char*>(bytes_.data()) + at_, length - 1);
-    if (text.find('\0') != text.npos) return false;  // whoever encodes it again would end there
+    if (text.find('\0') != text.npos) return false;  // a text ends there when it is encoded again
     at_ += length;
     return give(text);
   }

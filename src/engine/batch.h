@@ -46,7 +46,7 @@ struct Batch {
   };
   std::vector<Output> outputs;  // one per module, in the order of the schedule
 
-  // Modules that still work on it; kFree when nobody does.
+  // Modules that still work on it; kFree when none does.
   static constexpr int kFree = -1;
   std::atomic<int> pending{kFree};
   std::atomic<bool> failed{false};

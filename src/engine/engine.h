@@ -71,7 +71,7 @@ class Engine {
   // channel that takes no commands, or bytes that are no such message.
   void command(int world, const std::string& channel, std::span<const uint8_t> message);
 
-  // A copy begins anew.
+  // Resets a copy.
   struct Reset {
     int world = 0;
     uint64_t seed = 1;

@@ -107,7 +107,7 @@ void Module::process(const Batch& batch, Batch::Output& output, const std::atomi
     to_sample_.pass(batch.first_step + batch.count - 1);
     return;
   }
-  // The scene of the movers stands at one step at a time, and only at those where somebody looks.
+  // The scene of the movers stands at one step at a time, and only where a device looks.
   int begin = 0;
   for (int i = 0; i < batch.count; ++i) {
     if (to_sample_.next() != batch.first_step + i) continue;

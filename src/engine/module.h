@@ -83,13 +83,13 @@ class Module {
   void drop_renderer() { renderer_.reset(); }
   bool has_renderer() const { return renderer_ != nullptr; }
 
-  // For whoever makes batches: whether one up to `last_step` has work for it; and that it gets that
+  // For the maker of batches: whether one up to `last_step` has work for it; and that it gets that
   // batch.
   bool wants(int64_t last_step) const { return observes_ || to_hand_over_.next() <= last_step; }
   void pass(int64_t last_step) { to_hand_over_.pass(last_step); }
 
   // Lets its devices observe and sample the states of a batch, and writes their messages into
-  // `output`. Batches come in order; left_off: once it is true nobody wants samples any more.
+  // `output`. Batches come in order; left_off: once it is true samples are no longer wanted.
   void process(const Batch& batch, Batch::Output& output, const std::atomic<bool>& left_off);
   // Whether a sample is due before that step.
   bool is_due(int64_t before_step) const { return to_sample_.next() < before_step; }

@@ -18,7 +18,7 @@ class ModuleThread {
  public:
   struct Host {
     Wakeup& finished;                   // set when a module was the last to finish a batch
-    const std::atomic<bool>& left_off;  // once it is true nobody wants samples any more
+    const std::atomic<bool>& left_off;  // once it is true samples are no longer wanted
     // For tests: called in the module's thread before each batch.
     std::function<void(const std::string& module)> before_batch;
   };
@@ -29,7 +29,7 @@ class ModuleThread {
 
   // Starts the thread and waits until the module's scenes are made. Throws what making them threw.
   void start(const SceneMakers& makers);
-  // Between two batches: waits until they are made anew; throws what making them threw.
+  // Between two batches: waits until they are rebuilt; throws what making them threw.
   void renew_scenes(const SceneMakers& makers);
 
   bool running() const { return thread_.joinable(); }
@@ -40,7 +40,7 @@ class ModuleThread {
 
   // For the thread that makes batches: hands one over.
   void hand_over(Batch& batch, int64_t last_step);
-  // For whoever dispatches a batch of a few steps: whether working through it takes less than
+  // For the dispatcher of a batch of a few steps: whether working through it takes less than
   // waking the module's thread, by how long the last took, and doing so in the caller's thread.
   bool is_quick() const;
   void work_here(Batch& batch, int64_t last_step);

@@ -144,7 +144,7 @@ void FaultFilter::pass(const Outbox& published, const std::vector<SensorFault>& 
 }
 
 // The first message under the fault comes again and again, with the time of its day: a driver that
-// hangs stamps its old data anew.
+// hangs puts new stamps on its old data.
 void FaultFilter::freeze(const SensorFault& fault, std::vector<Message>& messages) {
   for (Message& message : messages) {
     const auto [kept, first] = frozen_.try_emplace({fault.id, message.channel}, message.bytes);

@@ -196,7 +196,7 @@ void Simulation::dispatch(Batch& batch, bool here) {
     batch.outputs[m].woken = batch.count > 0 && threads_[m]->module().wants(last_step);
     woken += batch.outputs[m].woken;
   }
-  // One more than the modules: nobody finds it finished before all have it.
+  // One more than the modules: it is not finished before all have it.
   batch.pending.store(woken + 1, std::memory_order_release);
   bool any_here = false;
   for (size_t m = 0; m < threads_.size(); ++m) {

@@ -2,7 +2,7 @@
 //
 // The simulation thread (the module "kinematics") takes commands, drives the robots and steps
 // Bullet; batches of snapshots go to the modules that have something due; the publisher takes
-// finished batches, in order. At most kBatches batches are on their way: whoever is slow makes the
+// finished batches, in order. At most kBatches batches are on their way: a slow module makes the
 // others wait, and nothing is dropped.
 #pragma once
 
@@ -110,7 +110,7 @@ class Simulation {
   std::vector<Batch> batches_;
   Wakeup batch_freed_;
   std::atomic<int64_t> step_ns_{INT64_MAX};  // what the last step took of real time
-  size_t round_ = 0;                         // of the batches; whoever computes one counts it
+  size_t round_ = 0;                         // of the batches; whose thread counts it
   Pace* pace_ = nullptr;
   std::thread thread_;
 

@@ -59,7 +59,7 @@ class World {
   SceneMakers scene_makers() const;  // valid until a model comes or goes
 
   // ---- Changes between two steps, while no module is at work; in world_edits.cpp. When models
-  // have come or gone, modules may be others, and those that have scenes want them anew.
+  // have come or gone, modules may be others, and those that have scenes need new ones.
 
   // Puts a model in, which is seen from the next state on; `step` is that state's number. Returns
   // its index in model().models. Throws InputError; the world is then as it was.

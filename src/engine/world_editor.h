@@ -2,7 +2,7 @@
 // it: names and places in the lists come out the same.
 //
 // What has left keeps its place in the list of models, which the next instance of the same model
-// takes: whoever lets models come and go for days has lists that do not grow.
+// takes: when models come and go for days, the lists do not grow.
 #pragma once
 
 #include <memory>

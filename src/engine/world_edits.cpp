@@ -1,4 +1,4 @@
-// Models that come and go, and time that begins anew.
+// Models that come and go, and time that starts over.
 #include <algorithm>
 #include <thread>
 

@@ -1,4 +1,4 @@
-// World state in parts that fit a datagram, and the hash that stands for all of it.
+// World state in parts that fit a datagram, and the hash of all of it.
 #include "engine/world_state.h"
 
 #include <algorithm>

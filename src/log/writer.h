@@ -26,7 +26,7 @@ class Writer {
   // Hands everything so far to the operating system.
   void flush();
 
-  // Begins anew with an empty file, whatever went wrong before.
+  // Starts over with an empty file, whatever went wrong before.
   void truncate();
 
   // Adds the events of another log that was written from its beginning and flushed, to an empty

@@ -167,7 +167,7 @@ void add_crowd(const Element& element, WorldModel& world, size_t most_models) {
     if (!instance.model->is_static)
       taken.push_back({instance.X_WM.translation.head<2>(), footprint_radius(*instance.model)});
   }
-  constexpr uint64_t kBeforeARun = 1;  // a run's own seed draws them anew
+  constexpr uint64_t kBeforeARun = 1;  // a run's own seed draws them again
   const std::vector<Vec2> places =
       places_of(crowd, walls_for(world, crowd, floor), std::move(taken), kBeforeARun);
   std::unordered_set<std::string> names;

@@ -21,7 +21,7 @@ struct FrameInModel {
   int link = -1;
 };
 
-// A model as its own file sees it, before somebody places it.
+// A model as its own file sees it, before it is placed.
 struct ScopedModel {
   std::shared_ptr<const Model> model;
   std::map<std::string, FrameInModel, std::less<>> frames;  // by SDF's scoped names, "arm::wrist"

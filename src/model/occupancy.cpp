@@ -210,7 +210,7 @@ std::vector<WallPiece> walls_of(const OccupancyGrid& grid) {
 
 std::string world_of_walls(const std::string& name, const std::vector<WallPiece>& walls,
                            double height) {
-  // Rounded to a micrometre: 0.15000000000000002 helps nobody.
+  // Rounded to a micrometre: 0.15000000000000002 is no more exact.
   const auto number = [](double v) { return shown(std::round(v * 1e6) / 1e6 + 0.0); };
   std::string plain;
   for (const char c : name) plain += c == '<' || c == '&' || c == '"' ? '_' : c;

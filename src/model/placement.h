@@ -29,7 +29,7 @@ class Room {
   // where there is nothing.
   double ground_height(double x, double y) const;
 
-  // The same of the storey that somebody stands on whose own origin is at z, somewhere between his
+  // The same of the storey on which a person stands whose origin is at z, somewhere between his
   // feet and his hips. Where nothing is below him he stands at z, or at 0 where that may be his
   // hips'.
   double floor_height(double x, double y, double z) const;

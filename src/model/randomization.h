@@ -1,4 +1,4 @@
-// Domain randomisation: what of a world is drawn anew for each seed, and from which distributions.
+// Domain randomisation: what of a world is drawn again for each seed, and from which distributions.
 //
 // A description is a list of draws, TARGET=DISTRIBUTION, as --randomize and ruedo.Engine take them.
 // What a seed gives depends on the seed and the target alone: not on the other draws, nor on their
@@ -27,7 +27,7 @@ struct Distribution {
 // - MODEL.friction: the friction coefficient of all of its collisions.
 // - LIGHT.brightness: a factor for the intensity of one of the world's lights.
 // - ROBOT/DEVICE.KEY: as --set has it.
-// "*" in MODEL or LIGHT stands for any text: each that it names draws for itself.
+// "*" in MODEL or LIGHT matches any text; each match draws for itself.
 struct Draw {
   std::string target;
   Distribution distribution;

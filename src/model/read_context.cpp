@@ -1,4 +1,4 @@
-// Small helpers of all readers: names, elements that nobody reads, numbers in messages.
+// Small helpers of all readers: names, elements that no reader knows, numbers in messages.
 #include "model/read_context.h"
 
 #include <algorithm>

@@ -141,7 +141,7 @@ class SdfReader::ModelReader {
   void read_joint_and_sensors(const Element& child);
   bool lacks_an_end(const Element& joint);
   void read_plugin_sensors();
-  // What is said of the whole.
+  // Findings about the model as a whole.
   void export_frames();
   int canonical_link();
   void read_path();
@@ -368,7 +368,7 @@ void SdfReader::ModelReader::append_part(const Nested& part, const Element& chil
         anchor(model_->links[i].name, static_cast<int>(i), model_->links[i].X_ML, child.source));
 }
 
-// Every name's pose and link, for whoever nests or places this model.
+// Every name's pose and link, for files that nest or place this model.
 void SdfReader::ModelReader::export_frames() {
   for (const std::string& name : frames_.names()) {
     read_or_leave_out(where_, "the frame '" + name + "' is left out", findings_, [&] {

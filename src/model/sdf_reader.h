@@ -65,7 +65,7 @@ class SdfReader {
 // The frame in <pose relative_to=""> (SDF 1.7 on) or <pose frame=""> (before); "": none.
 std::string relative_to(const Element& owner);
 
-// A name without '/', spaces and control characters: '_' stands for each, '?' for what is not UTF-8
+// A name without '/', spaces and control characters: each becomes '_', '?' for what is not UTF-8
 // and for its control characters.
 std::string made_fit_for_channel(const std::string& name);
 

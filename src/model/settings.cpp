@@ -268,7 +268,7 @@ void apply_disabled(const std::vector<std::string>& disabled, WorldModel& world)
     const std::string device = each.substr(slash + 1);
     const auto is_it = [&](const auto& sensor) { return sensor.name == device; };
     if (std::any_of(instance.model->sensors.begin(), instance.model->sensors.end(), is_it)) {
-      // A robot whose last sensor goes, and which has no drive, is no robot any more.
+      // A model without drive or sensors is not a robot.
       auto& less = without[{instance.model, device}];
       if (!less) {
         auto model = std::make_shared<Model>(*instance.model);

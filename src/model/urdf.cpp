@@ -121,7 +121,7 @@ struct GazeboLink {
   const Element* gravity_off = nullptr;
 };
 
-// The root link of this name stands for the world: what hangs on it is fixed to the world by its
+// The root link of this name is the world: what hangs on it is fixed to the world by its
 // joint, as Gazebo has it.
 constexpr const char* kWorld = "world";
 

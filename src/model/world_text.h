@@ -17,7 +17,7 @@ struct ModelNow {
   std::string name;
   Pose X_WM;
   std::string spawned;  // SDF or URDF that it came from; "": it is of the file
-  bool put = false;     // somebody put it there: micrometres count, else what is less than a
+  bool put = false;     // placed by a user: micrometres count, else what is less than a
                         // millimetre is the solver's
 };
 

@@ -22,7 +22,7 @@ class ContactBook {
   // Starts a step of that length (s).
   void clear(double step_s);
   // Adds what manifolds hold after a substep; the last one of a step says what is near. Where
-  // everything sleeps, one call stands for `substeps`.
+  // everything sleeps, one call counts as `substeps`.
   void add(const std::vector<btPersistentManifold*>& manifolds, int substeps, bool last);
   // Ends the step.
   void finish();

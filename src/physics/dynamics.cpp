@@ -110,7 +110,7 @@ void Dynamics::reserve(size_t bodies) {
 }
 
 void Dynamics::take(const std::vector<btRigidBody*>& bodies) {
-  m_collisionObjects.resizeNoInitialize(0);  // Bullet's own lists: nobody uses them
+  m_collisionObjects.resizeNoInitialize(0);  // Bullet's own lists are not used
   m_nonStaticRigidBodies.resizeNoInitialize(0);
   for (btRigidBody* body : bodies_) body->setIslandTag(-1);
   bodies_ = bodies;

@@ -138,7 +138,7 @@ void PhysicsWorld::Impl::remove(int instance) {
     broadphase_.refilter(rigid.bullet->getBroadphaseHandle(), &dispatcher_);
   }
   if (!has_statics) return;
-  refilter_all();  // nobody may know them when their boxes go
+  refilter_all();  // no pair may refer to them when their boxes go
   for (const auto& object : rigid_.statics) {
     if (!is_of(object->info)) continue;
     broadphase_.destroyProxy(object->bullet->getBroadphaseHandle(), &dispatcher_);

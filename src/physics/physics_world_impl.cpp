@@ -18,7 +18,7 @@ namespace ruedo::physics {
 namespace {
 
 // What joints tie together wants shorter substeps; so does what touches it. Nothing else: what
-// somebody else's robot does shall change no bit of a stack.
+// an unrelated robot does must not change one bit of a stack.
 constexpr int64_t kLongestSubstep_us = 5000, kLongestSubstepOfJoints_us = 1000;
 enum Pace { kCoarse, kFine };
 // Distance at which Bullet begins to see a contact: a body may come so near in one substep without

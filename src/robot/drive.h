@@ -52,7 +52,7 @@ class Drive {
   virtual void ground_changed() {}
 
  protected:
-  // What the drive keeps of its motion begins anew.
+  // Resets what the drive remembers of its motion.
   virtual void begin_at_rest() = 0;
   // base_link as the physics has it, and the twist of base_link expressed in it.
   Pose base_pose() const { return physics_.pose(body_) * X_BBase_; }

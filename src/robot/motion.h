@@ -2,7 +2,7 @@
 // turn rate, which keeps the robot's limits, and a state to be published.
 //
 // A plan starts at a whole microsecond and is evaluated in closed form, so that a robot's way does
-// not depend on the step size. A new command plans anew from the velocities of that moment, so that
+// not depend on the step size. A new command replans from the velocities of that moment, so that
 // nothing jumps beyond the limits.
 #pragma once
 

@@ -24,7 +24,7 @@ class Mover {
   Pose pose_at(SimTime time) const;
 
   int instance() const { return instance_; }
-  // The path begins anew at that sim time.
+  // The path starts over at that sim time.
   void start_again(SimTime now);
   void shift_time(SimTime us) {
     offset_ += us;

@@ -70,7 +70,7 @@ class Robots {
   // odometry stays.
   void set_pose(int instance, const Pose& X_WM);
   void set_twist(int instance, const Twist& twist);  // of the model's frame, expressed in the world
-  void start_again(int instance);  // back where it started, at rest; paths begin anew
+  void start_again(int instance);  // back where it started, at rest; paths start over
   SimTime set_time_to_zero();      // nothing moves; returns what the time was
 
  private:

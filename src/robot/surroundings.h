@@ -45,7 +45,7 @@ class Surroundings {
     double opening_s, distance_m;
     SimTime hold_us;
     double open = 0.0;    // 0 to 1
-    SimTime wanted = -1;  // when somebody was last near; -1: nobody was
+    SimTime wanted = -1;  // when a body was last near; -1: never
     Pose pose() const;
   };
   std::vector<Part> parts_of(int instance) const;

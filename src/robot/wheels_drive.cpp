@@ -237,9 +237,8 @@ void WheelsDrive::after_step(SimTime now) {
   const bool believes = motion_.has_primitive();
   motion_.finish(now, believes ? made.v : ahead, believes ? made.omega : turned, touched, lag());
   if (touched && motion_.has_primitive())
-    way_missing_ = angle_missing_ =
-        0.0;                       // it was planned anew, from where the robot believes to be
-  if (!motion_.has_primitive()) {  // a velocity is not made up for later
+    way_missing_ = angle_missing_ = 0.0;  // it was replanned from where the robot believes to be
+  if (!motion_.has_primitive()) {         // a velocity is not made up for later
     way_missing_ = 0.0;
     angle_missing_ = std::clamp(angle_missing_, -kLargestYawError_rad, kLargestYawError_rad);
   }

@@ -69,7 +69,7 @@ class CdrWriter {
   std::vector<uint8_t> bytes_;
 };
 
-// Reads what somebody sent. After a fault every value is 0 and good() is false.
+// Reads what a peer sent. After a fault every value is 0 and good() is false.
 class CdrReader {
  public:
   explicit CdrReader(std::span<const uint8_t> bytes) : bytes_(bytes) {

@@ -1,5 +1,5 @@
 // REP-103 (units, optical frames), 105 (frames), 117 (ranges without return), 145 (IMU).
-// Covariances that nobody knows are 0, as sensor_msgs says; what is not measured at all has -1 in
+// Unknown covariances are 0, as sensor_msgs defines; what is not measured at all has -1 in
 // its first element.
 #include "ros2/conversions.h"
 

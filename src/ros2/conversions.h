@@ -1,4 +1,4 @@
-// The one table of what Ruedo publishes and how it is said in ROS: a bus message in, one or more
+// The one table of what Ruedo publishes and what it becomes in ROS: a bus message in, one or more
 // ROS messages out.
 //
 // It knows no network: `ruedo run --ros2` sends what comes out, `ruedo export --ros2` writes it
@@ -51,7 +51,7 @@ class Conversions {
   bool convert(const std::string& channel, std::span<const uint8_t> message, const Wanted& wanted,
                const Emit& emit);
 
-  // What is said once, to all who come later, too: where the links and devices sit on their robots
+  // Published once, also for late subscribers: where the links and devices sit on their robots
   // (/tf_static), and each robot_description.
   struct Standing {
     Topic topic;
@@ -81,7 +81,7 @@ class Conversions {
   std::vector<Standing> standing_;
 };
 
-// rosgraph_msgs/msg/Clock, and the others that no bus message stands for.
+// rosgraph_msgs/msg/Clock, and the others that have no bus message.
 std::vector<uint8_t> clock_message(int64_t utime);
 
 void put_time(CdrWriter& out, int64_t utime);

@@ -131,7 +131,7 @@ void Node::take_over(const std::vector<world_info_t>& info) {
   tell_graph();
 }
 
-// Of a robot that is gone, nobody is told any more what it looks like.
+// The description of a robot that is gone is withdrawn.
 void Node::tell_standing() {
   std::map<std::string, std::unique_ptr<Writer>> writers;
   for (const Conversions::Standing& each : conversions_->standing()) {
@@ -195,7 +195,7 @@ void Node::receive(const Command& command, std::span<const uint8_t> cdr) {
   count_faulty(command.topic.name, command.topic.type, cdr.size());
 }
 
-// Where somebody says that the robot is, there it is put: the map's frame is the world's.
+// The robot is put where the message says: the map's frame is the world's.
 void Node::receive_pose(const std::string& robot, const std::string& topic,
                         std::span<const uint8_t> cdr) {
   ++received_;

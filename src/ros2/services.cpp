@@ -153,7 +153,7 @@ class Filter {
 };
 
 // A client's first request may be here before it is known who reads the replies, which would then
-// go to nobody: rmw_cyclonedds waits for that, too. Each client has a writer and a reader; one that
+// are lost: rmw_cyclonedds waits for that, too. Each client has a writer and a reader; one that
 // has no reader costs the wait once.
 void await_reader(const Reader& requests, const Writer& replies, size_t& deaf) {
   constexpr auto kLongest = std::chrono::milliseconds(500), kLook = std::chrono::milliseconds(1);

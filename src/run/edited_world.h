@@ -22,7 +22,7 @@ class EditedWorld {
   EditedWorld(const model::WorldModel& first, std::string file);
 
   // The run tells what requests have done.
-  void begin();  // the world is made anew
+  void begin();  // the world is rebuilt
   void spawned(const std::string& name, const spawn_request_t& body);
   void put(const std::string& name);
   void removed(const std::string& name);

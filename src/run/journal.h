@@ -25,7 +25,7 @@ class Journal : public Sink {
   // Throws EnvironmentError when nothing can be written in the folder.
   explicit Journal(const std::string& folder);
 
-  // The world is made, or made anew, at that stamp.
+  // The world is built, or rebuilt, at that stamp.
   void begin(const log_header_t& header, SimTime stamp_us);
 
   Hears hears() const override { return {.samples = false, .records = true, .repeated = true}; }

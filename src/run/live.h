@@ -20,7 +20,7 @@ class Live : public Mode {
   bool receive(const std::string& channel, const uint8_t* data, size_t size) override;
 
  private:
-  std::unique_ptr<WaitFor> wait_for_;  // null: for nobody
+  std::unique_ptr<WaitFor> wait_for_;  // null: for no client
 };
 
 }  // namespace ruedo::run

@@ -101,7 +101,7 @@ bool Lockstep::early(const request_t& request, const Session& session) const {
          !has_room(*member, grant.commands.size(), bytes);
 }
 
-// Each has the same share of what is held, so that nobody takes another's.
+// Each has the same share of what is held, so that none takes another's.
 bool Lockstep::has_room(const Member& member, size_t count, size_t bytes) const {
   const size_t share = std::max<size_t>(members_.size(), 1);
   return member.held.size() + count <= kMostHeld / share &&

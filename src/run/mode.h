@@ -2,7 +2,7 @@
 // (Repeating).
 //
 // The run asks its mode whether it may go on, tells it what was published, and asks when it wants
-// to be called again. What is said of states, requests and messages is the same in all modes. The
+// to be called again. States, requests and messages are the same in all modes. The
 // publisher's thread calls everything here; receive() comes from any thread, never beside begin()
 // or attend().
 #pragma once
@@ -53,12 +53,12 @@ class Mode {
 
   // The run goes on from the state `step` of that world; -1: from its beginning. Throws InputError.
   virtual void begin(const Stage& stage, int64_t step) = 0;
-  // False while somebody has to catch up with what was published: no batch is taken.
+  // False while a reader has to catch up with what was published: no batch is taken.
   virtual bool has_room() const { return true; }
   // Clients say how far it goes: every step has its tick, and the publisher computes a few steps
   // itself.
   virtual bool takes_grants() const { return false; }
-  // Who has to do what before the state after `step` can be computed, in words; "": nobody.
+  // Who has to do what before the state after `step` can be computed, in words; "": no client.
   virtual std::string waits_for(int64_t step) const {
     static_cast<void>(step);
     return "";

@@ -3,7 +3,7 @@
 //
 // Messages travel in pages, so that a queue costs a lock and a wake-up for many of them, and the
 // pages' memory is used again. When the sink is slower than the run, the run waits for it (a log,
-// which must be whole), or the sink misses whole steps (whoever only looks on, and must not slow
+// which must be whole), or the sink misses whole steps (for onlookers, which must not slow
 // the run).
 #pragma once
 

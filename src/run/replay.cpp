@@ -84,7 +84,7 @@ const applied_t* Replay::advance(int64_t step, const Target& target) {
 
 void Replay::executed() {
   waits_ = false;
-  known_ = -1;  // sim time may begin anew
+  known_ = -1;  // sim time may start over
 }
 
 void Replay::read(const Target& target) {

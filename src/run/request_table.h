@@ -40,7 +40,7 @@ struct RequestKind {
 // Null: there is no such kind.
 const RequestKind* find_request_kind(int32_t kind);
 
-// False for a body that is none of that type, or has bytes left over.
+// False for a body of another type, or has bytes left over.
 template <class Body>
 bool read_body(const request_t& request, Body& body) {
   return decode_checked(request.body.data(), request.body.size(), body) == DecodeFault::none;

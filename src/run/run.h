@@ -89,7 +89,7 @@ class Run {
   void add(Sink& sink) { publisher_.add(sink); }
 
   // A command on one of the input channels, or a request, as it would come over the bus: bytes that
-  // nobody has checked. For the bus and for whatever else clients speak. Any thread.
+  // nobody has checked, from the bus or another way that clients speak. Any thread.
   void receive(const std::string& channel, const uint8_t* data, size_t size);
   void receive(const std::string& channel, const std::vector<uint8_t>& bytes) {
     receive(channel, bytes.data(), bytes.size());
@@ -141,13 +141,13 @@ class Run {
   void tell_watchdog(size_t robot);  // on the terminal
 
   // The world and the mode in which it runs; in run_world.cpp.
-  void make_world();  // anew: what follows equals a fresh run
+  void make_world();  // again: what follows equals a fresh run
   struct Pace {
     double rate;
     bool paused;
   };
   void make_simulation(const Pace& pace);
-  void begin_epoch();  // with a world made anew
+  void begin_epoch();  // with a rebuilt world
   void announce();
   Mode::Stage stage();
   Mode& mode() { return repeating_ ? static_cast<Mode&>(*repeating_) : *mode_; }
@@ -235,7 +235,7 @@ class Run {
   std::function<void(const Snapshot&)> on_state_;
   Clock::time_point next_status_;
 
-  std::unique_ptr<EditedWorld> edited_;  // null: nobody edits it
+  std::unique_ptr<EditedWorld> edited_;  // null: it is not edited
   engine::ModelStore models_{first_world_->file};
   ModelWorker worker_;                     // of SPAWNs
   std::optional<ModelWorker::Made> made_;  // the next that is ready,

@@ -44,7 +44,7 @@ class Sessions {
   Session* join(const std::string& client, int64_t sequence, Time now,
                 const std::function<bool(int64_t)>& keeps = {});
   void leave(int64_t id);
-  // Nobody could be heard for so long: nobody was silent.
+  // The process was deaf for so long: no client is blamed for silence.
   void forgive(Time::duration deaf);
 
   // answer_again: `reply` is the one to send.

@@ -1,4 +1,4 @@
-// The sinks of a server: the bus, the log, and whoever watches in the same process.
+// The sinks of a server: the bus, the log, and watchers in the same process.
 #pragma once
 
 #include <functional>

@@ -73,7 +73,7 @@ void StallWatch::watch() {
           "this process was held up for {:.1f} s: stopped by a signal, or without a processor. "
           "Sim time goes on from where it was",
           std::chrono::duration<double>(blind).count()));
-      last_beat = now;  // nobody else is to blame
+      last_beat = now;  // no client is to blame
     } else if (beats_now != std::exchange(beats, beats_now)) {
       last_beat = now;
       told = false;

@@ -44,7 +44,7 @@ class StallWatch {
   }
   // It begins with a request that may take long: "SPAWN of 'planner'".
   void beat(std::string request);
-  // A state was published, or the run stands because somebody wants it to.
+  // A state was published, or the run stands because a client wants it to.
   void moved(Clock::time_point now);
   // It has nothing to do. why: who or what is waited for; "" when it need not be said.
   void idle(Clock::time_point now, const std::function<std::string()>& why);

@@ -28,7 +28,7 @@ class WaitFor {
 
   WaitFor(std::vector<WaitForOption> options, int64_t step_us);
 
-  // For a simulation that was made anew, or is at `step` for another reason. Throws InputError for
+  // For a simulation that was rebuilt, or is at `step` for another reason. Throws InputError for
   // what is no input.
   void attach(const engine::Channels& channels, engine::CommandInbox& inbox, Gate& gate,
               int64_t step);

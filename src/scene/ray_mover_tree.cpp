@@ -65,7 +65,7 @@ double MoverTree::fit() {
 }
 
 void MoverTree::refit() {
-  // A tree whose neighbours have parted is built anew.
+  // A tree whose neighbours have parted is rebuilt.
   if (fit() > 2.0 * built_area_) build_nodes();
 }
 

@@ -1,6 +1,6 @@
 // The tree over the boxes of the movers: a binary tree of our own in double precision, because it
 // is brought up to date in a twentieth of the time that Embree takes (which builds user geometry
-// anew, whatever quality is asked for).
+// again, whatever quality is asked for).
 //
 // What it gives does not depend on its shape: every mover whose box a ray meets is visited.
 #pragma once

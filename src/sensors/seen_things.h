@@ -1,4 +1,4 @@
-// What labels drawn by the renderer stand for: classes of objects, and temperatures.
+// What the labels drawn by the renderer mean: classes of objects, and temperatures.
 //
 // Pictures tell bodies apart, not the visuals of one: a body has the first label and the first
 // temperature of its visuals.
