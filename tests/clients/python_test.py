@@ -2,9 +2,11 @@
 for wrong types, forks, logs.
 """
 
+import gc
 import math
 import os
 import sys
+import time
 import warnings
 import zlib
 
@@ -12,7 +14,7 @@ import lcm
 import numpy as np
 import pytest
 import ruedo
-from conftest import HALL, PATIENCE
+from conftest import HALL, PATIENCE, free_url, ruedo_run, tcp_server
 from ruedo import samples
 from ruedo.launch import _options
 
@@ -221,8 +223,6 @@ def test_callbacks_are_taken_back_and_readers_do_not_meet(caplog):
 
 
 def test_a_server_that_was_started_anew_is_noticed():
-    from conftest import free_url, ruedo_run
-
     url = free_url()
     events = []
     with ruedo_run("--disable", "p3at/camera", world=HALL, url=url) as first:
@@ -394,3 +394,38 @@ def test_show_opens_the_console_of_its_server(monkeypatch):
         pytest.raises(ruedo.NotSupported, match="view=True"),
     ):
         sim.show()
+
+
+@pytest.mark.parametrize("scheme", ["udpm", "tcpq", "unix"])
+def test_a_closed_simulation_leaves_nothing_running(scheme, tmp_path):
+    """Neither threads nor files: LCM's own receiving thread would go on for ever."""
+
+    def held() -> tuple[int, int]:
+        gc.collect()  # an exception holds the frames of connect()
+        return len(os.listdir("/proc/self/task")), len(os.listdir("/proc/self/fd"))
+
+    def settles_at_most_at(before: tuple[int, int]) -> bool:
+        deadline = time.monotonic() + PATIENCE  # a joined thread ends a little later
+        while not all(now <= then for now, then in zip(held(), before, strict=True)):
+            if time.monotonic() > deadline:
+                return False
+        return True
+
+    options = ("--disable", "p3at/camera")
+    url = f"unix://{tmp_path}/bus" if scheme == "unix" else None
+    server = tcp_server(*options) if scheme == "tcpq" else ruedo_run(*options, world=HALL, url=url)
+    with server:
+        ruedo.connect(server.url, timeout=PATIENCE).close()
+        before = held()
+        kept = []  # by a program that does not let go of what it closed
+        for _ in range(5):
+            kept.append(ruedo.connect(server.url, timeout=PATIENCE))
+            kept[-1].robot("p3at").odometry.next()
+            kept[-1].close()
+        assert settles_at_most_at(before), (held(), before)
+    if scheme == "udpm":
+        before = held()
+        for _ in range(3):
+            with pytest.raises(ruedo.NoServer):
+                ruedo.connect(server.url, timeout=0.2)
+        assert settles_at_most_at(before), (held(), before)

@@ -52,12 +52,15 @@ class LcmTransport:
     - Over TCP publish(), subscribe() and handle() use one socket without a lock: they mix their
       bytes, and one closes what another writes to.
 
-    So one lock is around every call; what comes is handed over after it was released, and waiting
-    is done outside.
+    - A subscription and its LCM hold each other, out of sight of the garbage collector: an LCM with
+      a subscription is never freed, nor is its thread, which goes on receiving.
+
+    So one lock is around every call; what comes is handed over after it was released, waiting is
+    done outside, and close() takes every subscription back.
     """
 
     def __init__(self, url: str):
-        self._lcm = lcm.LCM(url)
+        self._lcm: lcm.LCM | None = lcm.LCM(url)  # None: closed
         self._lock = threading.Lock()
         self._sending: AbstractContextManager[Any] = (
             nullcontext() if url.startswith("udpm:") else self._lock
@@ -66,29 +69,33 @@ class LcmTransport:
         self._arrived: list[tuple[str, bytes]] = []
         self._poll = select.poll()
         self._polled = -1
-        self._closed = False
 
     def subscribe(self, channel: str) -> None:
         escaped = "".join(
             "\\" + c if c in ".^$*+?{}[]\\|()" else c for c in channel
         )  # LCM takes a regex
         with self._lock:
-            self._subscriptions[channel] = self._lcm.subscribe(escaped, self._arrive)
+            if self._lcm:
+                self._subscriptions[channel] = self._lcm.subscribe(escaped, self._arrive)
 
     def unsubscribe(self, channel: str) -> None:
         with self._lock:
-            self._lcm.unsubscribe(self._subscriptions.pop(channel))
+            if self._lcm:
+                self._lcm.unsubscribe(self._subscriptions.pop(channel))
 
     def publish(self, channel: str, data: bytes) -> None:
         with self._sending:
-            if not self._closed:
-                self._lcm.publish(channel, data)
+            if open_lcm := self._lcm:
+                open_lcm.publish(channel, data)
 
     def receive(self, seconds: float, receiver: Receiver) -> bool:
+        open_lcm = self._lcm
+        if open_lcm is None:
+            return False
         try:
-            if self._wait(seconds):
+            if self._wait(open_lcm, seconds):
                 with self._lock:
-                    self._lcm.handle_timeout(0)
+                    open_lcm.handle_timeout(0)
         except OSError:  # TCP: the server is gone; those who wait find out by their timeouts
             time.sleep(min(seconds, 0.1))
         arrived, self._arrived = self._arrived, []
@@ -97,13 +104,18 @@ class LcmTransport:
         return bool(arrived)
 
     def close(self) -> None:
-        self._closed = True
+        with self._lock:
+            if self._lcm:
+                for subscription in self._subscriptions.values():
+                    self._lcm.unsubscribe(subscription)
+            self._subscriptions.clear()
+            self._lcm = None  # freed here, or by a receive() that is under way
 
     def _arrive(self, channel: str, data: bytes) -> None:
         self._arrived.append((channel, data))
 
-    def _wait(self, seconds: float) -> bool:
-        file = self._lcm.fileno()
+    def _wait(self, open_lcm: lcm.LCM, seconds: float) -> bool:
+        file = open_lcm.fileno()
         if file != self._polled:  # TCP: connected again
             if self._polled >= 0:
                 self._poll.unregister(self._polled)

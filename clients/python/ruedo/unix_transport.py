@@ -100,6 +100,9 @@ class UnixTransport:
 
     def close(self) -> None:
         self._closed = True
+        if connection := self._socket:
+            with contextlib.suppress(OSError):
+                connection.shutdown(socket.SHUT_RDWR)  # the server keeps nothing for it any more
 
     def _connect(self) -> None:
         self._socket = connect(self._path)
