@@ -4,6 +4,7 @@
 // every CPU.
 #include "ruedo/random.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 
@@ -115,6 +116,7 @@ inline double cell_of(uint64_t high, uint64_t low) {
 #endif
 
 constexpr size_t kBlocks = 16;
+constexpr size_t kFewest = 8;  // draws that cost more singly
 
 // The uniform draws of kBlocks blocks from `block` on, two a block, in `p`; and what the formula of
 // the centre makes of them in `values`: right for those that lie there.
@@ -129,13 +131,15 @@ RUEDO_WIDE void draw_blocks(uint64_t key, uint64_t sample, uint64_t block, doubl
   }
   uint32_t key0 = static_cast<uint32_t>(key), key1 = static_cast<uint32_t>(key >> 32);
   for (int round = 0; round < 10; ++round) {
+#pragma GCC unroll 1  // left as a loop it becomes one over wide registers
     for (size_t i = 0; i < kBlocks; ++i) {
-      const uint64_t product0 = uint64_t{0xD2511F53u} * word[0][i],
-                     product1 = uint64_t{0xCD9E8D57u} * word[2][i];
-      word[0][i] = static_cast<uint32_t>(product1 >> 32) ^ word[1][i] ^ key0;
-      word[1][i] = static_cast<uint32_t>(product1);
-      word[2][i] = static_cast<uint32_t>(product0 >> 32) ^ word[3][i] ^ key1;
-      word[3][i] = static_cast<uint32_t>(product0);
+      const uint32_t a = word[0][i], b = word[2][i];
+      const auto high_a = static_cast<uint32_t>(uint64_t{0xD2511F53u} * a >> 32),
+                 high_b = static_cast<uint32_t>(uint64_t{0xCD9E8D57u} * b >> 32);
+      word[0][i] = high_b ^ word[1][i] ^ key0;
+      word[1][i] = 0xCD9E8D57u * b;
+      word[2][i] = high_a ^ word[3][i] ^ key1;
+      word[3][i] = 0xD2511F53u * a;
     }
     key0 += 0x9E3779B9u;
     key1 += 0xBB67AE85u;
@@ -196,14 +200,15 @@ void RandomStream::gaussians(std::span<double> values) {
   size_t done = 0;
   while (next_ != 4 && done < values.size()) values[done++] = gaussian();
   // Two values a block. The centre's formula runs for all, in a loop without branches; the tails,
-  // 15 %, follow singly.
-  for (; values.size() - done >= 2 * kBlocks; done += 2 * kBlocks) {
-    double p[2 * kBlocks];
-    double* out = values.data() + done;
-    draw_blocks(key_, sample_, block_, p, out);
-    block_ += kBlocks;
-    for (size_t i = 0; i < 2 * kBlocks; ++i)
-      if (std::abs(p[i] - 0.5) > kCentre) out[i] = normal_quantile(p[i]);
+  // 15 %, follow singly. A few that are left are worth the loop, too.
+  while (values.size() - done >= kFewest) {
+    const size_t count = std::min(values.size() - done, 2 * kBlocks) & ~size_t{1};
+    double p[2 * kBlocks], drawn[2 * kBlocks];
+    draw_blocks(key_, sample_, block_, p, drawn);
+    block_ += count / 2;
+    for (size_t i = 0; i < count; ++i)
+      values[done + i] = std::abs(p[i] - 0.5) > kCentre ? normal_quantile(p[i]) : drawn[i];
+    done += count;
   }
   for (; done < values.size(); ++done) values[done] = gaussian();
 }

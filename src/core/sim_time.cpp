@@ -91,6 +91,12 @@ SampleClock::SampleClock(Rate rate, int64_t step_us, SimTime phase_us)
 int64_t SampleClock::step_of(int64_t sample) const {
   if (every_step_) return static_cast<int64_t>(ceil_div(phase_us_, step_us_)) + sample;
   // The first s with s * step >= phase + sample * 1e6 * denominator / numerator.
+  if (int64_t of_samples = 0, phase = 0, time = 0, divisor = 0;  // mostly, 64 bits hold it all
+      !__builtin_mul_overflow(sample, rate_.denominator * kMicrosPerSecond, &of_samples) &&
+      !__builtin_mul_overflow(phase_us_, rate_.numerator, &phase) &&
+      !__builtin_add_overflow(of_samples, phase, &time) &&
+      !__builtin_mul_overflow(rate_.numerator, step_us_, &divisor) && time >= 0)
+    return time / divisor + (time % divisor != 0);
   const Wide time_times_rate = static_cast<Wide>(phase_us_) * rate_.numerator +
                                static_cast<Wide>(sample) * rate_.denominator * kMicrosPerSecond;
   return static_cast<int64_t>(

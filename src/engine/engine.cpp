@@ -8,7 +8,9 @@
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
+#include <utility>
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/task_arena.h>
 
 #include "engine/outcome.h"
@@ -47,6 +49,34 @@ bool same_name(const std::string& a, const std::string& b) {
 
 struct Engine::Arena {
   tbb::task_arena tasks;
+  // What a copy's steps are computed in, and what nobody reads after step(): snapshots and
+  // messages. They are a thread's, so that with many copies they stay in its cache; more than one
+  // where TBB lets a thread that waits begin with another copy.
+  tbb::enumerable_thread_specific<std::vector<std::unique_ptr<Batch>>> spare;
+};
+
+// A batch of the thread's, as long as it is needed.
+class Engine::Borrowed {
+ public:
+  Borrowed(Arena& arena, const World& world) : spare_(arena.spare.local()) {
+    if (spare_.empty()) {
+      batch_ = std::make_unique<Batch>();
+      batch_->snapshots.resize(kBatchSteps);
+    } else {
+      batch_ = std::move(spare_.back());
+      spare_.pop_back();
+    }
+    batch_->outputs.resize(world.modules().size());
+    for (size_t m = 0; m < world.modules().size(); ++m)
+      batch_->outputs[m].pieces.resize(static_cast<size_t>(world.modules()[m]->pieces()));
+  }
+  ~Borrowed() { spare_.push_back(std::move(batch_)); }
+
+  Batch& operator*() { return *batch_; }
+
+ private:
+  std::vector<std::unique_ptr<Batch>>& spare_;
+  std::unique_ptr<Batch> batch_;
 };
 
 struct Engine::Copy {
@@ -55,8 +85,8 @@ struct Engine::Copy {
   std::shared_ptr<StaticScenes> statics;
   Channels channels;
   std::unique_ptr<World> world;
-  Batch batch;
-  int64_t step = -1;  // of the state that there is
+  int64_t step = -1;    // of the state that there is
+  bool driven = false;  // velocities_ has rows of it that the inbox does not have yet
   bool scenes_made = false;
   std::vector<std::vector<uint8_t>> newest;  // message of each channel; empty: none yet
   struct Place {
@@ -68,7 +98,7 @@ struct Engine::Copy {
   // met them.
   std::vector<std::vector<int>> met;
 
-  void keep_newest();
+  void keep_newest(const Batch& batch);
 };
 
 struct Engine::Observer {
@@ -121,11 +151,6 @@ std::unique_ptr<Engine::Copy> Engine::make_copy(std::shared_ptr<const model::Wor
   copy->world = std::make_unique<World>(drawn, fleet, copy->channels,
                                         first_made_ ? findings : findings_, copy->statics);
   copy->model = std::move(model);
-  copy->batch.snapshots.resize(kBatchSteps);
-  for (const auto& module : copy->world->modules()) {
-    copy->batch.outputs.push_back(
-        {false, false, std::vector<Outbox>(static_cast<size_t>(module->pieces()))});
-  }
   return copy;
 }
 
@@ -158,15 +183,19 @@ void Engine::for_each(size_t count, const std::function<void(size_t)>& body) {
 void Engine::compute(size_t index, int64_t steps) {
   Copy& copy = *copies_[index];
   World& world = *copy.world;
-  Batch& batch = copy.batch;
+  Borrowed borrowed(*arena_, world);
+  Batch& batch = *borrowed;
+  take_velocities(index);
   if (!copy.scenes_made) {
     const SceneMakers makers = world.scene_makers();
     for (auto& module : world.modules()) module->make_scenes(makers);
     copy.scenes_made = true;
   }
-  const size_t robots = driven_.size();
-  std::vector<int32_t> touching(robots, 0);
-  copy.met.assign(robots, {});
+  auto* const touching =
+      reinterpret_cast<int32_t*>(touching_->values.data()) + index * driven_.size();
+  std::fill_n(touching, driven_.size(), 0);
+  copy.met.resize(driven_.size());
+  for (std::vector<int>& met : copy.met) met.clear();
   for (int64_t left = steps; left > 0; left -= batch.count) {
     batch.first_step = copy.step + 1;
     batch.count = static_cast<int>(std::min(left, kBatchSteps));
@@ -181,16 +210,14 @@ void Engine::compute(size_t index, int64_t steps) {
       module.pass(copy.step);
       module.process(batch, batch.outputs[m], kNeverLeftOff);
     }
-    copy.keep_newest();
-    count_touching(index, touching.data());
-    if (handler_ || state_handler_) tell(index);
+    copy.keep_newest(batch);
+    count_touching(copy, batch, touching);
+    if (handler_ || state_handler_) tell(index, batch);
   }
-  std::memcpy(touching_->values.data() + index * robots * sizeof(int32_t), touching.data(),
-              robots * sizeof(int32_t));
   for (auto& observer : observers_) update(*observer, index);
 }
 
-void Engine::Copy::keep_newest() {
+void Engine::Copy::keep_newest(const Batch& batch) {
   newest.resize(channels.list().size());
   places.assign(newest.size(), {});
   for (const Batch::Output& output : batch.outputs) {
@@ -208,16 +235,14 @@ void Engine::Copy::keep_newest() {
 }
 
 // In the order in which a server publishes them: step by step, then by the schedule.
-void Engine::tell(size_t index) {
+void Engine::tell(size_t index, const Batch& batch) {
   const Copy& copy = *copies_[index];
-  for (int64_t step = copy.batch.first_step; step < copy.batch.first_step + copy.batch.count;
-       ++step) {
+  for (int64_t step = batch.first_step; step < batch.first_step + batch.count; ++step) {
     if (state_handler_)
       state_handler_(static_cast<int>(index),
-                     copy.batch.snapshots[static_cast<size_t>(step - copy.batch.first_step)],
-                     copy.batch);
+                     batch.snapshots[static_cast<size_t>(step - batch.first_step)], batch);
     if (!handler_) continue;
-    for (const Batch::Output& output : copy.batch.outputs) {
+    for (const Batch::Output& output : batch.outputs) {
       if (!output.woken) continue;
       for (const Outbox& outbox : output.pieces) {
         for (const Outbox::Entry& entry : outbox.entries()) {
@@ -230,10 +255,9 @@ void Engine::tell(size_t index) {
   }
 }
 
-void Engine::count_touching(size_t index, int32_t* counts) {
-  Copy& copy = *copies_[index];
-  for (int i = 0; i < copy.batch.count; ++i) {
-    const Snapshot& state = copy.batch.snapshots[static_cast<size_t>(i)];
+void Engine::count_touching(Copy& copy, const Batch& batch, int32_t* counts) const {
+  for (int i = 0; i < batch.count; ++i) {
+    const Snapshot& state = batch.snapshots[static_cast<size_t>(i)];
     if (state.collisions.empty()) continue;
     for (size_t robot = 0; robot < driven_robots_.size(); ++robot) {
       bool touched = false;
@@ -292,9 +316,18 @@ void Engine::drive(std::span<const double> velocities) {
   if (velocities.size() != 3 * rows)
     throw InputError({}, "velocities are " + std::to_string(rows) +
                              " rows of 3, one for each driven robot of each world");
+  for (size_t i = 0; i < copies_.size(); ++i) take_velocities(i);  // of a call before
+  velocities_.assign(velocities.begin(), velocities.end());
+  for (auto& copy : copies_) copy->driven = true;
+}
+
+// Puts what drive() was given into the copy's inbox: when it is computed, by the thread that does.
+void Engine::take_velocities(size_t index) {
+  Copy& copy = *copies_[index];
+  if (!std::exchange(copy.driven, false)) return;
   uint8_t bytes[64];
-  for (size_t row = 0; row < rows; ++row) {
-    const double* v = velocities.data() + 3 * row;
+  for (size_t robot = 0; robot < velocity_inputs_.size(); ++robot) {
+    const double* v = velocities_.data() + 3 * (index * velocity_inputs_.size() + robot);
     if (std::isnan(v[0]) || std::isnan(v[1]) || std::isnan(v[2])) continue;
     velocity_command_t command;
     command.utime = 0;
@@ -302,14 +335,14 @@ void Engine::drive(std::span<const double> velocities) {
     command.vy = v[1];
     command.omega = v[2];
     const int size = command.encode(bytes, 0, sizeof bytes);
-    Copy& copy = *copies_[row / velocity_inputs_.size()];
-    copy.world->inbox().schedule(copy.step, velocity_inputs_[row % velocity_inputs_.size()], bytes,
+    copy.world->inbox().schedule(copy.step, velocity_inputs_[robot], bytes,
                                  static_cast<size_t>(size));
   }
 }
 
 void Engine::command(int world, const std::string& channel, std::span<const uint8_t> message) {
   Copy& copy = *copies_.at(static_cast<size_t>(world));
+  take_velocities(static_cast<size_t>(world));  // which came first
   CommandInbox& inbox = copy.world->inbox();
   const auto input = std::find_if(inbox.inputs().begin(), inbox.inputs().end(),
                                   [&](const Input& one) { return one.channel == channel; });
@@ -433,8 +466,9 @@ const std::vector<Channel>& Engine::channels() const { return copies_[0]->channe
 
 uint64_t Engine::state_hash(int world) const {
   const Copy& copy = *copies_.at(static_cast<size_t>(world));
-  return static_cast<uint64_t>(
-      engine::state_hash(copy.batch.snapshots[static_cast<size_t>(copy.batch.count - 1)]));
+  Snapshot state;
+  copy.world->read(copy.step, state);
+  return static_cast<uint64_t>(engine::state_hash(state));
 }
 
 }  // namespace ruedo::engine

@@ -114,13 +114,15 @@ class Engine {
  private:
   struct Copy;
   struct Observer;
+  class Borrowed;
 
   std::unique_ptr<Copy> make_copy(std::shared_ptr<const model::WorldModel> model, uint64_t seed);
   void reset_one(const Reset& reset);
   std::shared_ptr<StaticScenes> statics_of(const std::shared_ptr<const model::WorldModel>& model);
-  void count_touching(size_t world, int32_t* counts);
+  void count_touching(Copy& copy, const Batch& batch, int32_t* counts) const;
+  void take_velocities(size_t world);
   void compute(size_t world, int64_t steps);
-  void tell(size_t world);
+  void tell(size_t world, const Batch& batch);
   void update(Observer& observer, size_t world);
   void for_each(size_t count, const std::function<void(size_t)>& body);
   std::vector<int> channels_of(const std::string& device) const;
@@ -140,6 +142,7 @@ class Engine {
   std::vector<std::string> driven_;
   std::vector<int> velocity_inputs_;  // of the driven robots
   std::vector<int> driven_robots_;    // indices into BodyLayout::robots
+  std::vector<double> velocities_;    // of the last drive(): see Copy::driven
   std::shared_ptr<FieldArray> touching_ = std::make_shared<FieldArray>();
   std::vector<std::unique_ptr<Observer>> observers_;
   MessageHandler handler_;

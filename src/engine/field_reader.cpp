@@ -32,6 +32,13 @@ void copy_swapped(const uint8_t* from, std::byte* to, size_t count) {
   }
 }
 
+// Values of the fields that say how long others are, of the message that is read: messages are read
+// in many threads at once.
+std::vector<int64_t>& counts_of_thread() {
+  thread_local std::vector<int64_t> counts;
+  return counts;
+}
+
 int64_t read_integer(const uint8_t* at, Primitive type) {
   int64_t value = static_cast<int8_t>(at[0]);  // keeps the sign
   for (size_t i = 1; i < wire_size(type); ++i) value = value * 256 + at[i];
@@ -40,8 +47,7 @@ int64_t read_integer(const uint8_t* at, Primitive type) {
 
 }  // namespace
 
-FieldReader::FieldReader(const Schema& schema, const std::string& field)
-    : schema_(&schema), counts_(schema.fields.size(), 0) {
+FieldReader::FieldReader(const Schema& schema, const std::string& field) : schema_(&schema) {
   std::string readable;
   for (size_t i = 0; i < schema.fields.size(); ++i) {
     const Field& one = schema.fields[i];
@@ -63,16 +69,18 @@ FieldReader::FieldReader(const Schema& schema, const std::string& field)
 
 size_t FieldReader::value_size() const { return wire_size(type_); }
 
-int64_t FieldReader::length(const Field& field) const {
+int64_t FieldReader::length(const Field& field, const std::vector<int64_t>& counts) {
   int64_t length = 1;
   for (const Dimension& dimension : field.dimensions) {
     length *= dimension.counted_by < 0 ? dimension.size
-                                       : counts_[static_cast<size_t>(dimension.counted_by)];
+                                       : counts[static_cast<size_t>(dimension.counted_by)];
   }
   return length;
 }
 
 FieldReader::Place FieldReader::find(std::span<const uint8_t> message) const {
+  std::vector<int64_t>& counts = counts_of_thread();
+  counts.assign(schema_->fields.size(), 0);
   size_t offset = sizeof(int64_t);  // the fingerprint
   for (size_t i = 0; i < target_; ++i) {
     const Field& field = schema_->fields[i];
@@ -82,18 +90,19 @@ FieldReader::Place FieldReader::find(std::span<const uint8_t> message) const {
       continue;
     }
     if (field.dimensions.empty() && is_integer(field.primitive))
-      counts_[i] = read_integer(message.data() + offset, field.primitive);
-    offset += static_cast<size_t>(length(field)) * wire_size(field.primitive);
+      counts[i] = read_integer(message.data() + offset, field.primitive);
+    offset += static_cast<size_t>(length(field, counts)) * wire_size(field.primitive);
   }
-  return {offset, static_cast<size_t>(length(schema_->fields[target_]))};
+  return {offset, static_cast<size_t>(length(schema_->fields[target_], counts))};
 }
 
 std::vector<int64_t> FieldReader::shape(std::span<const uint8_t> message) const {
   find(message);
+  const std::vector<int64_t>& counts = counts_of_thread();
   std::vector<int64_t> shape;
   for (const Dimension& dimension : schema_->fields[target_].dimensions) {
     shape.push_back(dimension.counted_by < 0 ? dimension.size
-                                             : counts_[static_cast<size_t>(dimension.counted_by)]);
+                                             : counts[static_cast<size_t>(dimension.counted_by)]);
   }
   return shape;
 }

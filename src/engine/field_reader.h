@@ -34,12 +34,11 @@ class FieldReader {
     size_t offset, count;
   };
   Place find(std::span<const uint8_t> message) const;
-  int64_t length(const Field& field) const;
+  static int64_t length(const Field& field, const std::vector<int64_t>& counts);
 
   const Schema* schema_;
   size_t target_ = 0;  // index into the schema's fields
   Primitive type_ = Primitive::none;
-  mutable std::vector<int64_t> counts_;  // of the fields before the target that count something
 };
 
 }  // namespace ruedo::engine

@@ -102,9 +102,18 @@ void Module::make_scenes(const SceneMakers& makers) {
 
 void Module::process(const Batch& batch, Batch::Output& output, const std::atomic<bool>& left_off) {
   for (Outbox& outbox : output.pieces) outbox.clear();
-  if (!rays_ && !visual_rays_) {
+  const int64_t end = batch.first_step + batch.count;
+  if (!rays_ && !visual_rays_ && (observes_ || batch.sensor_faults || pieces() > 1)) {
     process_pieces(batch, output, 0, batch.count, left_off);
-    to_sample_.pass(batch.first_step + batch.count - 1);
+    to_sample_.pass(end - 1);
+    return;
+  }
+  if (!rays_ && !visual_rays_) {  // one thread, and nobody looks at the steps between samples
+    for (int64_t due = to_sample_.next(); due < end; due = to_sample_.next()) {
+      const auto i = static_cast<int>(due - batch.first_step);
+      if (i >= 0) process_pieces(batch, output, i, i + 1, left_off);
+      to_sample_.pass(due);
+    }
     return;
   }
   // The scene of the movers stands at one step at a time, and only where a device looks.

@@ -52,12 +52,16 @@ void World::advance(int64_t step, Snapshot& snapshot, Batch& batch) {
     inbox_.apply(*robots_, faults_, step - 1, batch);  // on the state before
     robots_->step();
   }
+  read(step, snapshot);
+  batch.sensor_faults = faults_.of_sensors();
+  physics::check_finite(snapshot, model_, layout_);
+}
+
+void World::read(int64_t step, Snapshot& snapshot) {
   robots_->read(snapshot);
   snapshot.step = step;
   snapshot.time = step * model_.step_us;
   faults_.show_wheels(snapshot);
-  batch.sensor_faults = faults_.of_sensors();
-  physics::check_finite(snapshot, model_, layout_);
 }
 
 SceneMakers World::scene_makers() const {

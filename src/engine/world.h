@@ -45,6 +45,8 @@ class World {
   // noted in the batch), then the physics step. States follow on one another from 0, the initial
   // one. Throws physics::StateError for a state that is not finite.
   void advance(int64_t step, Snapshot& snapshot, Batch& batch);
+  // The state that there is, whose number is `step`.
+  void read(int64_t step, Snapshot& snapshot);
 
   const model::WorldModel& model() const { return model_; }
   const model::BodyLayout& layout() const { return layout_; }
@@ -56,6 +58,7 @@ class World {
   robot::Robots& robots() { return *robots_; }
   // In the order of the schedule.
   std::vector<std::unique_ptr<Module>>& modules() { return modules_; }
+  const std::vector<std::unique_ptr<Module>>& modules() const { return modules_; }
   SceneMakers scene_makers() const;  // valid until a model comes or goes
 
   // ---- Changes between two steps, while no module is at work; in world_edits.cpp. When models

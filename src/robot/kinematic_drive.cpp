@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/sincos.h"
 #include "physics/state_check.h"
 #include "robot/base_motion.h"
 #include "robot/ground.h"
@@ -37,7 +38,10 @@ bool have_shapes(const model::WorldModel& world, const model::BodyLayout& layout
   });
 }
 
-Quat about_z(double angle) { return {math::cos(0.5 * angle), 0.0, 0.0, math::sin(0.5 * angle)}; }
+Quat about_z(double angle) {
+  const auto [sine, cosine] = math::sincos(0.5 * angle);
+  return {cosine, 0.0, 0.0, sine};
+}
 
 }  // namespace
 

@@ -5,8 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "core/sincos.h"
 #include "core/whole.h"
-#include "ruedo/math.h"
 
 namespace ruedo::robot {
 
@@ -36,8 +36,9 @@ Displacement over_piece(double v0, double a, double w0, double b, double duratio
   const double half = 0.5 * duration / panels;
   const auto add = [&](double t, double weight) {
     const double heading = (w0 + 0.5 * b * t) * t, speed = (v0 + a * t) * weight;
-    result.x += speed * math::cos(heading);
-    result.y += speed * math::sin(heading);
+    const auto [sine, cosine] = math::sincos(heading);
+    result.x += speed * cosine;
+    result.y += speed * sine;
   };
   for (int panel = 0; panel < panels; ++panel) {
     const double middle = (2 * panel + 1) * half;
@@ -59,16 +60,17 @@ Displacement along_arc(double way, double angle) {
     result.x = way;
     return result;
   }
-  const double half = 0.5 * angle, sine = math::sin(half);
+  const double half = 0.5 * angle;
+  const auto [sine, cosine] = math::sincos(half);
   const double chord =
       way * (sine / half);  // sin(h) / h is well conditioned down to the smallest angles
-  result.x = chord * math::cos(half);
+  result.x = chord * cosine;
   result.y = chord * sine;
   return result;
 }
 
 Displacement chained(const Displacement& first, const Displacement& second) {
-  const double c = math::cos(first.angle), s = math::sin(first.angle);
+  const auto [s, c] = math::sincos(first.angle);
   return {first.x + c * second.x - s * second.y, first.y + s * second.x + c * second.y,
           first.angle + second.angle, first.way + second.way, first.side + second.side};
 }

@@ -8,9 +8,14 @@
 // ray, so that what one ray meets changes no other's noise; then follow the resolution and the
 // limits.
 #include <cmath>
+#include <map>
+#include <memory>
+#include <mutex>
 #include <string>
+#include <tuple>
 #include <vector>
 
+#include "core/sincos.h"
 #include "core/whole.h"
 #include "ruedo/device_info_t.hpp"
 #include "ruedo/lidar_t.hpp"
@@ -116,29 +121,25 @@ class Lrf : public Sensor {
 
   void sample(const SampleInput& input, Outbox& out) override {
     RandomStream stream = random_.stream(static_cast<uint64_t>(input.sample));
-    aim(input.snapshot, stream);
-    input.rays->cast(rays_, hits_, ignored_link_);
+    Scratch& scratch = scratch_for(directions_->size());
+    aim(input.snapshot, stream, scratch);
+    const std::vector<Ray>& rays = scratch.rays;
+    input.rays->cast(rays, scratch.hits, ignored_link_);
     const double dt_s =
         sampled_ ? 1e-6 * static_cast<double>(input.snapshot.time - sample_time_) : 0.0;
     sampled_ = true;
     sample_time_ = input.snapshot.time;
     const bool drawn = !noise_.none() && !noise_.wanders();  // one draw a ray, all at once
-    if (drawn) stream.gaussians(draws_);
-    for (size_t i = 0; i < rays_.size(); ++i) {
-      const Return back = returned(*input.rays, rays_[i], hits_[i]);
-      const double measured = drawn ? noise_.apply_draw(back.range, draws_[i])
+    if (drawn) stream.gaussians(scratch.draws);
+    for (size_t i = 0; i < rays.size(); ++i) {
+      const Return back = returned(*input.rays, rays[i], scratch.hits[i]);
+      const double measured = drawn ? noise_.apply_draw(back.range, scratch.draws[i])
                                     : noise_.apply(back.range, i == 0 ? dt_s : 0.0, stream);
-      ranges()[i] = report(back.range, measured);
+      const float range = scratch.ranges[i] = report(back.range, measured);
       if (intensities_)
-        brightness()[i] = std::isfinite(ranges()[i]) ? static_cast<float>(back.intensity) : 0.0f;
+        scratch.intensities[i] = std::isfinite(range) ? static_cast<float>(back.intensity) : 0.0f;
     }
-    if (flat()) {
-      planar_.utime = input.snapshot.time;
-      out.publish(channel_, planar_);
-    } else {
-      layered_.utime = input.snapshot.time;
-      out.publish(channel_, layered_);
-    }
+    flat() ? publish(planar_, scratch, input, out) : publish(layered_, scratch, input, out);
   }
 
   void describe(device_info_t& info) const override {
@@ -160,9 +161,35 @@ class Lrf : public Sensor {
     Pose X_WS;
   };
 
+  // What a sample is computed in, and what nobody reads after it. It is the thread's, not the
+  // device's: of a thousand devices it stays in the processor's cache.
+  struct Scratch {
+    std::vector<Ray> rays;
+    std::vector<Hit> hits;
+    std::vector<double> draws;  // of the bearings, then of the ranges
+    std::vector<float> ranges, intensities;
+  };
+  Scratch& scratch_for(size_t rays) const {
+    thread_local Scratch scratch;
+    scratch.rays.resize(rays);
+    scratch.hits.resize(rays);
+    scratch.draws.resize(rays);
+    scratch.ranges.resize(rays);
+    scratch.intensities.resize(intensities_ ? rays : 0);
+    return scratch;
+  }
+
+  template <class Message>
+  void publish(Message& message, Scratch& scratch, const SampleInput& input, Outbox& out) const {
+    message.utime = input.snapshot.time;
+    message.ranges.swap(scratch.ranges);
+    message.intensities.swap(scratch.intensities);
+    out.publish(channel_, message);
+    message.ranges.swap(scratch.ranges);
+    message.intensities.swap(scratch.intensities);
+  }
+
   bool flat() const { return layers_.count == 1; }
-  std::vector<float>& ranges() { return flat() ? planar_.ranges : layered_.ranges; }
-  std::vector<float>& brightness() { return flat() ? planar_.intensities : layered_.intensities; }
 
   void read_range(const Element& laser) {
     const Element* range = laser.child("range");
@@ -177,16 +204,8 @@ class Lrf : public Sensor {
 
   // Directions in the device's frame, and messages of their final size: nothing grows later.
   void prepare(const SensorSetup& setup) {
-    for (int64_t layer = 0; layer < layers_.count; ++layer)
-      for (int64_t column = 0; column < columns_.count; ++column)
-        directions_.push_back(direction(layer, columns_.angle(column)));
-    const size_t n = directions_.size();
-    rays_.resize(n);
-    hits_.resize(n);
-    draws_.resize(n);
-    for (Ray& ray : rays_) ray.max_range = max_;
-    ranges().resize(n);
-    if (intensities_) brightness().resize(n);
+    directions_ = shared_directions();
+    const size_t n = directions_->size();
     const auto n32 = static_cast<int32_t>(n);
     if (flat()) {
       channel_ = setup.channel<planar_lidar_t>();
@@ -207,37 +226,61 @@ class Lrf : public Sensor {
     }
   }
 
-  Vec3 direction(int64_t layer, double azimuth) const {
-    const double elevation = layers_.angle(layer);
-    return {math::cos(elevation) * math::cos(azimuth), math::cos(elevation) * math::sin(azimuth),
-            math::sin(elevation)};
+  // Devices with the same angles have one array of them: copies of a world, and robots of a fleet.
+  std::shared_ptr<const std::vector<Vec3>> shared_directions() const {
+    using Key = std::tuple<int64_t, double, double, int64_t, double, double>;
+    static std::mutex mutex;
+    static std::map<Key, std::weak_ptr<const std::vector<Vec3>>> known;
+    const std::lock_guard lock(mutex);
+    std::weak_ptr<const std::vector<Vec3>>& place = known[{
+        columns_.count, columns_.first, columns_.step, layers_.count, layers_.first, layers_.step}];
+    if (auto shared = place.lock()) return shared;
+    std::erase_if(
+        known, [&](const auto& each) { return &each.second != &place && each.second.expired(); });
+    auto directions = std::make_shared<std::vector<Vec3>>();
+    directions->reserve(static_cast<size_t>(layers_.count * columns_.count));
+    for (int64_t layer = 0; layer < layers_.count; ++layer) {
+      const math::SineCosine up = math::sincos(layers_.angle(layer));
+      for (int64_t column = 0; column < columns_.count; ++column)
+        directions->push_back(direction(up, columns_.angle(column)));
+    }
+    place = directions;
+    return directions;
+  }
+
+  static Vec3 direction(const math::SineCosine& up, double azimuth) {
+    const math::SineCosine around = math::sincos(azimuth);
+    return {up.cosine * around.cosine, up.cosine * around.sine, up.sine};
   }
 
   // Puts the rays into the world. All layers of a column are taken at once.
-  void aim(const Snapshot& now, RandomStream& stream) {
+  void aim(const Snapshot& now, RandomStream& stream, Scratch& scratch) {
+    std::vector<Ray>& rays = scratch.rays;
+    const std::vector<Vec3>& directions = *directions_;
+    for (Ray& ray : rays) ray.max_range = max_;
     Pose X_WS = mount_.X_WS(now);
     Eigen::Matrix3d R_WS = X_WS.rotation.toRotationMatrix();
-    if (bearing_noise_ > 0.0) stream.gaussians(draws_);
+    if (bearing_noise_ > 0.0) stream.gaussians(scratch.draws);
     if (sweep_us_ == 0 && bearing_noise_ == 0.0) {
-      for (size_t i = 0; i < rays_.size(); ++i) {
-        rays_[i].origin = X_WS.translation;
-        rays_[i].direction = R_WS * directions_[i];
+      for (size_t i = 0; i < rays.size(); ++i) {
+        rays[i].origin = X_WS.translation;
+        rays[i].direction = R_WS * directions[i];
       }
       return;
     }
-    for (size_t i = 0; i < rays_.size(); ++i) {
-      const auto column = static_cast<int64_t>(i) % columns_.count,
-                 layer = static_cast<int64_t>(i) / columns_.count;
-      if (sweep_us_ > 0 && columns_.count > 1) {
-        X_WS = place(now.time - sweep_us_ * (columns_.count - 1 - column) / (columns_.count - 1));
-        R_WS = X_WS.rotation.toRotationMatrix();
-      }
-      rays_[i].origin = X_WS.translation;
-      if (bearing_noise_ > 0.0) {
-        rays_[i].direction =
-            R_WS * direction(layer, columns_.angle(column) + bearing_noise_ * draws_[i]);
-      } else {
-        rays_[i].direction = R_WS * directions_[i];
+    size_t i = 0;
+    for (int64_t layer = 0; layer < layers_.count; ++layer) {
+      const math::SineCosine up = math::sincos(layers_.angle(layer));
+      for (int64_t column = 0; column < columns_.count; ++column, ++i) {
+        if (sweep_us_ > 0 && columns_.count > 1) {
+          X_WS = place(now.time - sweep_us_ * (columns_.count - 1 - column) / (columns_.count - 1));
+          R_WS = X_WS.rotation.toRotationMatrix();
+        }
+        rays[i].origin = X_WS.translation;
+        rays[i].direction =
+            R_WS * (bearing_noise_ > 0.0
+                        ? direction(up, columns_.angle(column) + bearing_noise_ * scratch.draws[i])
+                        : directions[i]);
       }
     }
   }
@@ -297,10 +340,7 @@ class Lrf : public Sensor {
   std::vector<Place> track_;  // over the sweep time
   SimTime sample_time_ = 0;
   bool sampled_ = false;
-  std::vector<Vec3> directions_;  // in S, layer by layer
-  std::vector<Ray> rays_;
-  std::vector<Hit> hits_;
-  std::vector<double> draws_;  // of the bearings, then of the ranges
+  std::shared_ptr<const std::vector<Vec3>> directions_;  // in S, layer by layer
   planar_lidar_t planar_{};
   lidar_t layered_{};
 };

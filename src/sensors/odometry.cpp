@@ -18,6 +18,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/sincos.h"
 #include "core/whole.h"
 #include "model/base_odometry.h"
 #include "model/body_layout.h"
@@ -252,8 +253,9 @@ class Odometry : public Sensor {
     const double turn = (way[1] - way[0]) / track_;
     const double chord = 0.5 * (way[0] + way[1]) * sinc(0.5 * turn);
     const double along = theta_ + 0.5 * turn;
-    x_ += chord * math::cos(along);
-    y_ += chord * math::sin(along);
+    const auto [sine, cosine] = math::sincos(along);
+    x_ += chord * cosine;
+    y_ += chord * sine;
     theta_ += turn;
   }
 

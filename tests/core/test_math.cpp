@@ -8,11 +8,13 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <mpfr.h>
 #include <Eigen/Geometry>
 
+#include "core/sincos.h"
 #include "ruedo/random.h"
 
 namespace ruedo {
@@ -139,6 +141,22 @@ TEST(ArcTangentOfTwo, KnowsZerosAndInfinities) {  // C11, F.10.1.4
   EXPECT_EQ(math::atan2(1.0, -kInf), M_PI);
   EXPECT_EQ(math::atan2(kInf, -kInf), 3 * M_PI / 4);
   EXPECT_TRUE(std::isnan(math::atan2(std::nan(""), 1.0)));
+}
+
+// Angles of every size, the limits between which the library goes other ways among them.
+TEST(SineAndCosine, AtOnceAreTheSameBits) {
+  RandomStream random(7, 1);
+  std::vector<double> angles{0.0, -0.0, 0x1p-27, 0x1.6a09ep-27, 0x1p-26, M_PI / 4, M_PI / 2, M_PI};
+  for (int i = 0; i < kDraws; ++i) {
+    angles.push_back(8.0 * (random.uniform() - 0.5));
+    angles.push_back(std::ldexp(random.uniform() - 0.5, static_cast<int>(random.bits() % 80) - 40));
+    angles.push_back(std::nextafter(0x1p-27 * (1 + 3 * random.uniform()), 1.0));
+  }
+  for (const double angle : angles) {
+    const auto [sine, cosine] = math::sincos(angle);
+    ASSERT_EQ(std::bit_cast<uint64_t>(sine), std::bit_cast<uint64_t>(math::sin(angle))) << angle;
+    ASSERT_EQ(std::bit_cast<uint64_t>(cosine), std::bit_cast<uint64_t>(math::cos(angle))) << angle;
+  }
 }
 
 TEST(Math, KnowsWhatIsNoNumber) {

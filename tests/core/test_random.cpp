@@ -90,7 +90,7 @@ TEST(NormalQuantile, IsOddAboutOneHalf) {
 // if nothing was.
 TEST(RandomStream, ManyGaussiansAreTheSameOneByOne) {
   for (const int before : {0, 1, 2, 3, 4, 5}) {
-    for (const size_t count : {0u, 1u, 2u, 3u, 31u, 32u, 33u, 64u, 181u, 1000u}) {
+    for (const size_t count : {0u, 1u, 2u, 3u, 7u, 8u, 9u, 24u, 31u, 32u, 33u, 64u, 181u, 1000u}) {
       RandomStream singly(0x1234567890abcdefu, ~uint64_t{6}),
           many(0x1234567890abcdefu, ~uint64_t{6});
       for (int i = 0; i < before; ++i) EXPECT_EQ(singly.bits(), many.bits());

@@ -79,6 +79,37 @@ def test_commands_are_broadcast_and_nan_is_none():
         np.testing.assert_allclose(x, [[0.2, 0.1]] * 2, atol=1e-12)
 
 
+# What was commanded first acts first, by whichever call: the last one holds.
+def test_commands_act_in_the_order_of_the_calls():
+    stop = lcmtypes.velocity_command_t()
+    with engine(worlds=2) as e:
+        x = e["pose.pos"][:, 0, 0]
+        e.step([0.2, 0.0], 100)  # at full speed
+        e._core.drive(np.full((2, 1, 3), [0.4, 0.0, 0.0]))
+        e.command(0, "r0/velocity", stop)
+        e.step(n=100)
+        np.testing.assert_allclose(x, [0.1, 0.3], atol=1e-12)
+        e._core.drive(np.full((2, 1, 3), [0.4, 0.0, 0.0]))
+        e._core.drive(np.zeros((2, 1, 3)))
+        e.reset(1)
+        e.step(n=100)
+        np.testing.assert_allclose(x, [0.1, 0.0], atol=1e-12)
+
+
+def test_the_hash_of_a_state_is_the_same_whoever_computed_it():
+    runs = []
+    for threads in (1, 2):
+        with engine(worlds=5, threads=threads) as e:
+            e.step([0.2, 0.1], 57)
+            runs.append([e.state_hash(i) for i in range(5)])
+            assert runs[-1] == [e.state_hash(i) for i in range(5)]
+            e.reset(2)
+            begun = e.state_hash(2)
+            e.step([0.2, 0.1], 57)
+            assert e.state_hash(2) == runs[-1][2] != begun
+    assert runs[0] == runs[1]
+
+
 def test_seeds_make_the_noise():
     with engine(worlds=3, seed=5) as several, engine(seed=7) as third:
         a, b = several["scan.ranges"], third["scan.ranges"]
