@@ -15,13 +15,14 @@ from pettingzoo.test import parallel_api_test
 from ruedo.rooms import (
     TEST_ROOMS,
     make_corridor,
+    make_crowd_hall,
     make_fleet_room,
     make_landmark_room,
     make_push_room,
     make_room,
 )
 
-TASKS = ["Navigate", "Corridor", "Push", "Camera"]
+TASKS = ["Navigate", "Corridor", "Crowd", "Push", "Camera"]
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -194,6 +195,54 @@ def test_a_corridor_leads_to_its_end():
     assert info["success"] and not info["collision"]
     assert total == pytest.approx(length - 0.5 + 5.0 - 0.01 * steps, abs=0.15)
     env.close()
+
+
+# In front of a robot that stands still people pass; without them nothing changes, without noise.
+def test_a_hall_has_as_many_people_as_are_asked_for():
+    for people in (0, 1, 7, 50):
+        sdf = ET.fromstring(make_crowd_hall(3, people=people).sdf)
+        counts = [int(one.text) for one in sdf.iter("{urn:ruedo}count")]
+        assert sum(counts) == people
+    for people, changes in ((0, False), (8, True)):
+        env = ruedo.gym.CrowdEnv(people=people, noise=False, beams=181)
+        first, _ = env.reset(seed=5)
+        scans = [env.step(np.array([-1.0, 0.0]))[0][:181] for _ in range(50)]
+        changed = max(np.abs(scan - first[:181]).max() for scan in scans)
+        assert changed > 0.1 if changes else changed < 1e-6
+        env.close()
+
+
+# Whoever waits for people who are in the way comes through; rewards are the metres nearer, less
+# 0.01 each step, and 5 at the goal.
+def test_a_robot_that_waits_comes_through_a_crowd():
+    env = ruedo.gym.CrowdEnv(beams=61, people=4, split="test")
+    came = 0
+    for seed in range(4):
+        observation, _ = env.reset(seed=seed)
+        first = math.dist(env.scene.start[:2], env.scene.goal)
+        total, steps, over = 0.0, 0, False
+        while not over:
+            ranges, (_, cosine, sine) = observation[:61], observation[61:64]
+            bearing = math.atan2(sine, cosine)
+            clear = 8 * ranges[15:46].min() > 0.7 and abs(bearing) < 0.4
+            action = np.array([1.0 if clear else -1.0, np.clip(2 * bearing, -1, 1)])
+            observation, reward, terminated, truncated, info = env.step(action)
+            total, steps, over = total + reward, steps + 1, terminated or truncated
+        if not info["success"]:
+            continue
+        came += 1
+        place = env._one._places[0, 0, :2]
+        nearer = first - math.dist(place, env.scene.goal)
+        assert total == pytest.approx(nearer + 5.0 - 0.01 * steps, abs=2e-3)
+    assert came >= 2
+    env.close()
+
+
+def test_wrong_numbers_of_people_are_refused():
+    with pytest.raises(ValueError, match="people is 51; allowed are 0 to 50"):
+        ruedo.gym.CrowdVectorEnv(1, people=51)
+    with pytest.raises(TypeError, match="no obstacles"):
+        ruedo.gym.CrowdVectorEnv(1, obstacles=3)
 
 
 # The robot drives to behind the box, as seen from the place, and pushes.

@@ -12,10 +12,12 @@ from itertools import pairwise
 
 __all__ = [
     "Corridor",
+    "CrowdHall",
     "PushRoom",
     "Room",
     "Scene",
     "make_corridor",
+    "make_crowd_hall",
     "make_fleet_room",
     "make_landmark_room",
     "make_push_room",
@@ -63,6 +65,14 @@ class PushRoom(Room):
     """A room whose goal is one for a box."""
 
     box: tuple[float, float, float]  # m, m, rad
+
+
+@dataclass(frozen=True)
+class CrowdHall(Room):
+    """A hall with people."""
+
+    def _extent(self) -> tuple[float, float, float]:
+        return 0.0, 0.0, 10.6
 
 
 @dataclass(frozen=True)
@@ -272,6 +282,44 @@ def make_landmark_room(number: int, robot: str = "p3at", size: float = 6.0) -> R
         hue = (0.85, 0.05, 0.05) if i == 0 else (0.1, between(0.2, 0.9), between(0.2, 0.9))
         models.append(_pillar(f"pillar{i}", x, y, 0.2, _colour(*hue)))
     return Room(number, _world(f"landmark-{number}", models), start, places[0])
+
+
+def make_crowd_hall(number: int, robot: str = "p3at", people: int = 8) -> CrowdHall:
+    """The hall of that number: 10 m long and 8 m wide, a start at one end and a goal at the other,
+    and people between, some of whom walk across and some along it.
+
+    Where they begin and how they walk comes from the run's seed.
+    """
+    between = _between(random.Random(number))
+    turned = 1.0 if between(0.0, 1.0) < 0.5 else -1.0  # which end is the start
+    ahead = 0.0 if turned > 0.0 else math.pi
+    start = (-4.0 * turned, between(-2.5, 2.5), ahead + between(-0.5, 0.5))
+    goal = (4.0 * turned, between(-2.5, 2.5))
+    across = round(people * between(0.3, 0.7))
+    speed = between(0.6, 1.2)
+    sides = ("-3 2.4 3 3.2", "-3 -3.2 3 -2.4")
+    ends = ("-3.6 -3 -2.8 3", "2.8 -3 3.6 3")
+    crowds = [
+        f"<ruedo:crowd name='{name}'><ruedo:count>{count}</ruedo:count>"
+        f"<ruedo:area>-2.5 -3 2.5 3</ruedo:area><ruedo:goal>{goals[0]}</ruedo:goal>"
+        f"<ruedo:goal>{goals[1]}</ruedo:goal><ruedo:speed>{speed:.3f} 0.2</ruedo:speed>"
+        "</ruedo:crowd>"
+        for name, count, goals in (("across", across, sides), ("along", people - across, ends))
+        if count > 0
+    ]
+    walls = [
+        _wall(f"wall{i}", *place)
+        for i, place in enumerate(
+            [
+                (0, 4.0, 0, (10.2, 0.1, 1.0)),
+                (0, -4.0, 0, (10.2, 0.1, 1.0)),
+                (5.0, 0, 1.5707963, (8.2, 0.1, 1.0)),
+                (-5.0, 0, 1.5707963, (8.2, 0.1, 1.0)),
+            ]
+        )
+    ]
+    sdf = _world(f"crowd-{number}", [_robot("robot", robot, start), *walls, *crowds])
+    return CrowdHall(number, sdf, start, goal)
 
 
 def make_fleet_room(

@@ -8,9 +8,9 @@ process, many at once.
     envs = gymnasium.make_vec("ruedo/Navigate-v0", num_envs=64, beams=24)     # one engine, all
     cores
 
-ruedo/Navigate-v0, ruedo/Corridor-v0, ruedo/Push-v0 and ruedo/Camera-v0; `FleetEnv` for several
-robots. docs/environments.md says what each observes, does, is rewarded for and succeeds with; the
-modules of this package say the same in short.
+ruedo/Navigate-v0, ruedo/Corridor-v0, ruedo/Crowd-v0, ruedo/Push-v0 and ruedo/Camera-v0;
+`FleetEnv` for several robots. docs/environments.md says what each observes, does, is rewarded for
+and succeeds with; the modules of this package say the same in short.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ except ImportError as _error:
 
 from .camera import CameraEnv, CameraVectorEnv
 from .corridor import CorridorEnv, CorridorVectorEnv
+from .crowd import CrowdEnv, CrowdVectorEnv
 from .navigate import NavigateEnv, NavigateVectorEnv
 from .push import PushEnv, PushVectorEnv
 
@@ -30,6 +31,8 @@ __all__ = [
     "CameraVectorEnv",
     "CorridorEnv",
     "CorridorVectorEnv",
+    "CrowdEnv",
+    "CrowdVectorEnv",
     "FleetEnv",
     "NavigateEnv",
     "NavigateVectorEnv",
@@ -49,7 +52,7 @@ def __getattr__(name: str) -> object:
     return FleetEnv
 
 
-for _task in ("Navigate", "Corridor", "Push", "Camera"):
+for _task in ("Navigate", "Corridor", "Crowd", "Push", "Camera"):
     gymnasium.register(
         f"ruedo/{_task}-v0",
         entry_point=f"ruedo.gym:{_task}Env",

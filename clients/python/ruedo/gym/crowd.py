@@ -1,0 +1,48 @@
+"""Crowd-v0: a Pioneer 3-AT drives from one end of a hall to a goal at the other, through people who
+walk across it and along it.
+
+- Observation, action and reward: Navigate-v0's. A scan shows where people are, not where they go:
+  Gymnasium's ``FrameStackObservation`` shows the last few.
+- People go around what is in their way, robots too, by the social force model of
+  ``<ruedo:crowd>``; who is cut off can still walk into the robot.
+- An episode is terminated at the goal (nearer than 0.4 m) or by touching a person or a wall, even
+  when it was the person who walked; truncated after 600 actions (60 s).
+- ``people``: how many there are, 8 by default, 0 to 50. Their places, likes and chance come from
+  the episode's seed.
+- ``split``: as Navigate-v0's.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..rooms import Room, make_crowd_hall
+from .base import TaskEnv
+from .navigate import NavigateVectorEnv
+
+MOST_PEOPLE = 50
+
+
+class CrowdVectorEnv(NavigateVectorEnv):
+    """``num_envs`` of them in one engine. options: those of `NavigateVectorEnv` but for
+    ``obstacles``.
+    """
+
+    most_actions = 600
+
+    def __init__(self, num_envs: int = 1, *, people: int = 8, **options: Any) -> None:
+        if "obstacles" in options:
+            raise TypeError("Crowd-v0 has no obstacles but people: people=8")
+        if not 0 <= people <= MOST_PEOPLE:
+            raise ValueError(f"people is {people}; allowed are 0 to {MOST_PEOPLE}")
+        self._people = people
+        super().__init__(num_envs, **options)
+
+    def _scene(self, number: int) -> Room:
+        return make_crowd_hall(number, people=self._people)
+
+
+class CrowdEnv(TaskEnv):
+    """One of them."""
+
+    task = CrowdVectorEnv
