@@ -7,6 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "core/element_watch.h"
 #include "core/whole.h"
 
 namespace ruedo {
@@ -204,6 +205,10 @@ Pose pose_of(const Value& where) {
 
 }  // namespace
 
+thread_local ElementWatch* ElementWatch::watch_ = nullptr;
+ElementWatch::ElementWatch() { watch_ = this; }
+ElementWatch::~ElementWatch() { watch_ = nullptr; }
+
 std::unique_ptr<Element> Element::clone() const {
   auto copy = std::make_unique<Element>();
   copy->name = name;
@@ -216,6 +221,7 @@ std::unique_ptr<Element> Element::clone() const {
 }
 
 const std::string* Element::attribute(std::string_view key) const {
+  ElementWatch::note(*this, key);
   for (const auto& [name_, value] : attributes) {
     if (name_ == key) return &value;
   }
@@ -226,8 +232,9 @@ const Element* Element::child(std::string_view path) const {
   const size_t slash = path.find('/');
   const std::string_view first = path.substr(0, slash);
   for (const auto& each : children) {
-    if (each->name == first)
-      return slash == std::string_view::npos ? each.get() : each->child(path.substr(slash + 1));
+    if (each->name != first) continue;
+    ElementWatch::note(*each);
+    return slash == std::string_view::npos ? each.get() : each->child(path.substr(slash + 1));
   }
   return nullptr;
 }
@@ -239,7 +246,9 @@ Element* Element::child(std::string_view path) {
 std::vector<const Element*> Element::all(std::string_view child_name) const {
   std::vector<const Element*> found;
   for (const auto& each : children) {
-    if (each->name == child_name) found.push_back(each.get());
+    if (each->name != child_name) continue;
+    ElementWatch::note(*each);
+    found.push_back(each.get());
   }
   return found;
 }

@@ -486,15 +486,33 @@ void name_plugin(const Element& plugin, const PluginKind& kind, const std::strin
   if (!text.empty() && named.insert(text).second) findings.unsupported(plugin.source, where, text);
 }
 
-// A track of no vehicle: a conveyor.
-void name_lone_track(const std::vector<const Element*>& plugins, const std::string& where,
-                     Findings& findings) {
+// Whether a joint that moves carries the link of that name.
+bool is_carried(const Model& model, const std::string& link) {
+  return std::any_of(model.joints.begin(), model.joints.end(), [&](const Joint& joint) {
+    return joint.type != JointType::fixed &&
+           model.links[static_cast<size_t>(joint.child)].name == link;
+  });
+}
+
+// A track of no vehicle, a conveyor; and those of flippers, which only turn.
+void name_lone_track(const std::vector<const Element*>& plugins, const Model& model,
+                     const std::string& where, Findings& findings) {
   const auto of_kind = [&](const char* name) {
     return std::find_if(plugins.begin(), plugins.end(),
                         [&](const Element* each) { return kind_of(*each).name == name; });
   };
   const auto track = of_kind("TrackController");
-  if (track == plugins.end() || of_kind("TrackedVehicle") != plugins.end()) return;
+  if (track == plugins.end()) return;
+  if (of_kind("TrackedVehicle") != plugins.end()) {
+    for (const Element* each : plugins) {
+      if (kind_of(*each).name == "TrackController" && is_carried(model, each->string("link", "")))
+        findings.unsupported(
+            each->source, where,
+            "the belt of a flipper does not run: its joint takes commands, and the "
+            "tracks that are fixed to the robot drive it");
+    }
+    return;
+  }
   findings.unsupported((*track)->source, where,
                        "the plugin TrackController does nothing here: its belt would run as it is "
                        "told; <ruedo:belt> has one run");
@@ -578,6 +596,13 @@ void find_drive(const Element& model_element, const std::vector<const Element*>&
   }
 }
 
+// Whose joints somebody else has to tell where to go.
+bool moves_joints(const PluginKind& kind) {
+  static const std::set<std::string> kKinds = {"Elevator", "ElevatorPlugin", "gazebo_ros_elevator",
+                                               "lift", "door"};
+  return kKinds.contains(kind.name);
+}
+
 }  // namespace
 
 void read_drive_of(const Element& model_element, const std::string& where, ReadContext& context,
@@ -592,11 +617,11 @@ void read_drive_of(const Element& model_element, const std::string& where, ReadC
     model.drive = read_drive(drives[0]->clone(), odometry, model);
   }
   std::set<std::string> named;
-  name_lone_track(plugins, where, context.findings);
+  name_lone_track(plugins, model, where, context.findings);
   for (const Element* plugin : plugins) {
     const PluginKind kind = kind_of(*plugin);
-    model.commanded |=
-        kind.does == PluginKind::Does::joints || kind.does == PluginKind::Does::control;
+    model.commanded |= kind.does == PluginKind::Does::joints ||
+                       kind.does == PluginKind::Does::control || moves_joints(kind);
     name_plugin(*plugin, kind, where, context.findings, named);
     auto translated = drive_from_plugin(*plugin);
     if (!translated || model_element.has("ruedo:drive"))

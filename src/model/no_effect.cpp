@@ -1,9 +1,12 @@
 // The table, and the walk over a document.
 #include "model/no_effect.h"
 
+#include <algorithm>
 #include <charconv>
+#include <map>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace ruedo::model {
 namespace {
@@ -19,6 +22,14 @@ constexpr const char* kSky = "the sky is a gradient without clouds, whatever its
 constexpr const char* kMaps = "of the maps of a material only the albedo is shown";
 constexpr const char* kSeesAll = "every camera sees every visual";
 constexpr const char* kStops = "a joint's stops are stiff";
+constexpr const char* kBits = "the shape collides with everything";
+constexpr const char* kShine = "<specular> and <shininess> say what shines";
+constexpr const char* kChannels = "channels begin with the model's name";
+constexpr const char* kSecondAxis = "the second axis of a joint follows nothing";
+constexpr const char* kInWorld = "the poses of a state are those in the world";
+constexpr const char* kFrames = "frames have the names of the devices";
+constexpr const char* kCalm = "the wind pushes nothing";
+constexpr const char* kElastic = "<kp> and <kd> say how a contact yields";
 
 constexpr NoEffect kTable[] = {
     {"scene/sky/clouds", "", kSky},
@@ -32,16 +43,23 @@ constexpr NoEffect kTable[] = {
     {"ray/visibility_mask", "4294967295", "rays see every shape"},
     {"lidar/visibility_mask", "4294967295", "rays see every shape"},
     {"surface/soft_contact", "", "nothing is soft"},
+    {"contact/category_bitmask", "65535", kBits},
+    {"contact/collide_without_contact_bitmask", "1", kBits},
+    {"contact/elastic_modulus", "0", kElastic},
+    {"contact/poissons_ratio", "0.3|0", kElastic},
     {"torsional/ode/slip", "0", "friction that turning meets does not slip"},
     {"bounce/threshold", "100000|0", "what bounces, bounces at any speed"},
     {"axis/limit/stiffness", "100000000", kStops},
     {"axis/limit/dissipation", "1", kStops},
+    {"axis2/mimic", "", kSecondAxis},
     {"axis2/limit/stiffness", "100000000", kStops},
     {"axis2/limit/dissipation", "1", kStops},
     {"script/auto_start", "true|1", "the actor walks from the start"},
     {"camera/triggered", "false|0", "pictures come at the camera's rate"},
     {"camera/trigger_topic", "", "pictures come at the camera's rate"},
     {"camera/save", "", "pictures are not written to files; `ruedo export` does that"},
+    {"metal/metalness", "0.5", kShine},
+    {"metal/roughness", "0.5", kShine},
     {"metal/normal_map", "", kMaps},
     {"metal/roughness_map", "", kMaps},
     {"metal/metalness_map", "", kMaps},
@@ -51,15 +69,56 @@ constexpr NoEffect kTable[] = {
     {"metal/emissive_map", "", kMaps},
     {"specular/normal_map", "", kMaps},
     {"specular/specular_map", "", kMaps},
+    {"specular/glossiness", "0", kShine},
     {"specular/glossiness_map", "", kMaps},
     {"specular/environment_map", "", kMaps},
+    {"specular/ambient_occlusion_map", "", kMaps},
+    {"specular/light_map", "", kMaps},
+    {"specular/emissive_map", "", kMaps},
+    {"material/shader", "", "surfaces are lit by <ambient>, <diffuse>, <specular> and <emissive>"},
+    {"material/render_order", "0", "what is nearer is drawn over what is behind it"},
     {"material/lighting", "true|1", "every material is lit"},
     {"orientation_reference_frame/localization", "CUSTOM|ENU",
      "the orientation is that in the world's axes"},
     {"orientation_reference_frame/custom_rpy", "0 0 0",
      "the orientation is that in the world's axes"},
-    {"include/enable_wind", "false|0", "the included model says what feels the wind"},
+    {"include/enable_wind", "false|0", kCalm},
+    {"model/enable_wind", "false|0", kCalm},
+    {"link/enable_wind", "false|0", kCalm},
+    {"sensor/frame_id", "", kFrames},
+    {"sensor/gz_frame_id", "", kFrames},
+    {"sensor/ignition_frame_id", "", kFrames},
+    {"physics/real_time_factor", "1|0", "`ruedo run --rate` says how fast it goes"},
+    {"state/model/pose/@relative_to", "", kInWorld},
+    {"state/model/link/pose/@relative_to", "", kInWorld},
+    {"state/light/pose/@relative_to", "", kInWorld},
+    {"state/model_state/pose/@relative_to", "", kInWorld},
+    {"model_state/link_state/pose/@relative_to", "", kInWorld},
+    {"state/light_state/pose/@relative_to", "", kInWorld},
+    {"world/@namespace", "", kChannels},
+    {"model/@namespace", "", kChannels},
 };
+
+// What may stand in an element; of those that are not here readers name what they do not know.
+const std::map<std::string_view, std::string_view>& children_in_sdf() {
+  static const std::map<std::string_view, std::string_view> table = {
+#include "model/sdf_children.inc"
+  };
+  return table;
+}
+constexpr std::string_view kReadersName[] = {
+    "sdf",      "world",   "model",    "link",      "joint",     "axis",    "axis2",
+    "visual",   "surface", "include",  "light",     "scene",     "physics", "inertia",
+    "material", "mesh",    "inertial", "collision", "heightmap", "state"};
+
+std::vector<std::string> words_of(std::string_view list) {
+  std::vector<std::string> words;
+  while (!list.empty()) {
+    words.emplace_back(list.substr(0, list.find(' ')));
+    list.remove_prefix(std::min(list.size(), words.back().size() + 1));
+  }
+  return words;
+}
 
 bool ends_with_path(std::string_view path, std::string_view end) {
   return path.ends_with(end) &&
@@ -75,40 +134,96 @@ bool same_number(std::string_view a, std::string_view b) {
   return read(a, x) && read(b, y) && x == y;
 }
 
-bool is_usual(const Element& element, std::string_view usual) {
-  const std::string* enabled = element.attribute("enabled");
-  if (enabled && (*enabled == "false" || *enabled == "0")) return true;
+bool is_one_of(const std::string& value, std::string_view usual) {
   while (!usual.empty()) {
     const std::string_view one = usual.substr(0, usual.find('|'));
-    if (element.text == one || same_number(element.text, one)) return true;
+    if (value == one || same_number(value, one)) return true;
     usual.remove_prefix(std::min(usual.size(), one.size() + 1));
   }
   return false;
 }
 
-struct Walk {
-  Findings& findings;
+bool is_usual(const Element& element, std::string_view usual) {
+  for (const auto& [name, value] : element.attributes) {
+    if (name == "enabled" && (value == "false" || value == "0")) return true;
+  }
+  return is_one_of(element.text, usual);
+}
+
+class Walk {
+ public:
+  explicit Walk(Findings& to) : findings_(to) {}
 
   void below(const Element& element, const std::string& path, const std::string& where) {
     for (const auto& child : element.children) {
-      if (child->name.find(':') != std::string::npos || child->name == "plugin") continue;
+      if (child->name.find(':') != std::string::npos || is_of_others(child->name)) continue;
       const std::string here = path + "/" + child->name;
-      for (const NoEffect& each : kTable) {
-        if (ends_with_path(here, each.path) && !is_usual(*child, each.usual))
-          findings.unsupported(child->source, where,
-                               "<" + child->name + "> is not supported: " + each.text);
+      if (!name_element(element, *child, here, where)) continue;
+      std::string inside = where;
+      for (const auto& [name, value] : child->attributes) {
+        if (name == "name") inside += (where.empty() ? "" : "/") + child->name + " " + value;
+        name_attribute(*child, here + "/@" + name, value, where);
       }
-      const std::string* name = child->attribute("name");
-      below(*child, here,
-            name ? where + (where.empty() ? "" : "/") + child->name + " " + *name : where);
+      below(*child, here, inside);
     }
   }
+
+ private:
+  // False where nothing in it counts.
+  bool name_element(const Element& parent, const Element& child, const std::string& path,
+                    const std::string& where) {
+    bool known = may_stand_in(parent, child);
+    for (const NoEffect& each : kTable) {
+      if (!ends_with_path(path, each.path)) continue;
+      known = true;
+      if (!is_usual(child, each.usual))
+        findings_.unsupported(child.source, where,
+                              "<" + child.name + "> is not supported: " + each.text);
+    }
+    if (known) return true;
+    const std::string near = nearest_word(child.name, words_in(parent));
+    findings_.unsupported(child.source, where,
+                          "<" + child.name + "> in <" + parent.name +
+                              "> is not supported and left out" +
+                              (near.empty() ? "" : "; did you mean <" + near + ">?"));
+    return false;
+  }
+
+  void name_attribute(const Element& element, const std::string& path, const std::string& value,
+                      const std::string& where) {
+    for (const NoEffect& each : kTable) {
+      if (each.path.find('@') == std::string::npos || !ends_with_path(path, each.path) ||
+          is_one_of(value, each.usual))
+        continue;
+      findings_.unsupported(element.source, where,
+                            path.substr(path.rfind('@') + 1) + "=\"" + value + "\" of <" +
+                                element.name + "> is not supported: " + each.text);
+    }
+  }
+
+  // Of no format of ours: what readers name as a whole, or take as it is.
+  static bool is_of_others(const std::string& name) {
+    return name == "plugin" || name == "transmission" || name == "ros2_control" || name == "gui";
+  }
+  static std::vector<std::string> words_in(const Element& element) {
+    const auto found = children_in_sdf().find(element.name);
+    return found == children_in_sdf().end() ? std::vector<std::string>() : words_of(found->second);
+  }
+  static bool may_stand_in(const Element& element, const Element& child) {
+    if (std::find(std::begin(kReadersName), std::end(kReadersName), element.name) !=
+        std::end(kReadersName))
+      return true;
+    const std::vector<std::string> known = words_in(element);
+    return known.empty() || std::find(known.begin(), known.end(), child.name) != known.end();
+  }
+
+  Findings& findings_;
 };
 
 }  // namespace
 
 void name_what_has_no_effect(const Element& sdf, Findings& findings) {
-  Walk{findings}.below(sdf, "sdf", "");
+  Walk(findings).below(sdf, "sdf", "");
 }
 
 }  // namespace ruedo::model

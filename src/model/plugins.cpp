@@ -15,6 +15,9 @@ struct Known {
   const char* would = "";
 };
 
+constexpr const char* kLift =
+    "a lift would go where it is called; its joints go where ROBOT/joint_command says";
+
 const std::map<std::string, Known>& of_gz() {
   static const std::map<std::string, Known> table = {
       {"DiffDrive", {Does::drive}},
@@ -76,7 +79,7 @@ const std::map<std::string, Known>& of_gz() {
       {"TouchPlugin", {Does::dead, "it would tell what touches"}},
       {"DetachableJoint",
        {Does::dead, "a joint would hold another model until it is told to let go"}},
-      {"Elevator", {Does::dead, "a lift would go where it is called"}},
+      {"Elevator", {Does::dead, kLift}},
       {"ApplyLinkWrench", {Does::dead, "forces would be taken from messages"}},
       {"FollowActor", {Does::dead, "it would follow an actor"}},
       {"TrajectoryFollower", {Does::dead, "it would follow its waypoints"}},
@@ -182,21 +185,23 @@ const std::map<std::string, Known>& of_classic() {
       {"ActorPlugin", {Does::dead, "actors would walk by forces instead of their trajectory"}},
       {"ActorCollisionsPlugin", {Does::served}},
       {"RandomVelocityPlugin", {Does::dead, "it would move at random"}},
-      {"ElevatorPlugin", {Does::dead, "a lift would go where it is called"}},
+      {"ElevatorPlugin", {Does::dead, kLift}},
       {"VacuumGripperPlugin", {Does::dead, "a gripper would suck"}},
       {"gazebo_ros_vacuum_gripper", {Does::dead, "a gripper would suck"}},
       {"gazebo_grasp_fix", {Does::dead, "what is grasped would stick to the gripper"}},
-      {"gazebo_mimic_joint_plugin", {Does::dead, "one joint would follow another"}},
-      {"roboticsgroup_upatras_gazebo_mimic_joint_plugin",
-       {Does::dead, "one joint would follow another"}},
-      {"roboticsgroup_gazebo_mimic_joint_plugin", {Does::dead, "one joint would follow another"}},
-      {"gazebo_ros_elevator", {Does::dead, "a lift would go where it is called"}},
+      {"gazebo_mimic_joint_plugin", {Does::served}},  // read_mimic_plugin()
+      {"roboticsgroup_upatras_gazebo_mimic_joint_plugin", {Does::served}},
+      {"roboticsgroup_gazebo_mimic_joint_plugin", {Does::served}},
+      {"gazebo_ros_elevator", {Does::dead, kLift}},
       {"gazebo_ros_projector", {Does::dead, "a pattern would be projected"}},
       {"gazebo_ros_harness", {Does::dead, "a harness would hold it"}},
       {"gazebo_ros_light", {Does::dead, "lights would go on and off"}},
       {"slotcar", {Does::dead, "it would drive the lanes of a fleet manager"}},
-      {"door", {Does::dead, "doors would open on request; <ruedo:door> opens for who comes near"}},
-      {"lift", {Does::dead, "a lift would go where it is called"}},
+      {"door",
+       {Does::dead,
+        "doors would open on request; <ruedo:door> opens for who comes near, and its joints take "
+        "commands"}},
+      {"lift", {Does::dead, kLift}},
       {"TeleportDispenserPlugin", {Does::dead, "things would be handed to robots"}},
       {"TeleportIngestorPlugin", {Does::dead, "things would be taken from robots"}},
       {"readonly", {Does::irrelevant}},

@@ -14,13 +14,8 @@ JointAxis read_axis(const Element& element, SdfVersion version, const Pose& X_MJ
                     ReadContext& context) {
   report_other_children(element,
                         {"xyz", "limit", "dynamics", "use_parent_model_frame", "mimic",
-                         "ruedo:position_gain", "ruedo:rate_gain"},
-                        {"initial_position"}, where, context.findings);
-  if (const Element* start = element.child("initial_position");
-      start && start->as_number(Allowed::any(quantity::kLength)) != 0.0) {
-    context.findings.unsupported(start->source, where,
-                                 "<initial_position> is not supported: the joint begins at 0");
-  }
+                         "initial_position", "ruedo:position_gain", "ruedo:rate_gain"},
+                        {}, where, context.findings);
   JointAxis axis;
   Vec3 xyz = element.vector3("xyz", Vec3::UnitZ(), Allowed::any(quantity::kFactor));
   if (!(xyz.norm() > 1e-9))

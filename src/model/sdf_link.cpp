@@ -50,8 +50,10 @@ void read_contact(const Element& surface, Surface& s) {
                          : 0.0;
     s.surface_radius = torsional->number("surface_radius", 0.0, length);
   }
-  s.stiffness = surface.number("contact/ode/kp", 0.0, contact);
-  s.damping = surface.number("contact/ode/kd", 1.0, contact);
+  s.stiffness =
+      surface.number("contact/ode/kp", surface.number("contact/bullet/kp", 0.0, contact), contact);
+  s.damping =
+      surface.number("contact/ode/kd", surface.number("contact/bullet/kd", 1.0, contact), contact);
 }
 
 Surface read_surface(const Element& surface, const std::string& where, ReadContext& context) {

@@ -3,6 +3,8 @@
 #include <set>
 
 #include "model/drive.h"
+#include "model/joint_start.h"
+#include "model/plugins.h"
 #include "model/sdf_link.h"
 #include "model/sdf_reader.h"
 #include "model/sensor_plugins.h"
@@ -139,8 +141,11 @@ class SdfReader::ModelReader {
   void append_part(const Nested& part, const Element& child);
   void read_joints();
   void read_joint_and_sensors(const Element& child);
+  void read_initial_values(const Element& system);
+  void read_initial_position(const Element& child, const std::string& where);
   bool lacks_an_end(const Element& joint);
   void read_plugin_sensors();
+  void read_mimic_plugin(const Element& plugin);
   // Findings about the model as a whole.
   void export_frames();
   int canonical_link();
@@ -157,6 +162,7 @@ class SdfReader::ModelReader {
   std::vector<Nested> nested_;
   size_t link_count_ = 0;
   int first_own_link_ = -1;
+  std::vector<double> starts_;  // <initial_position> of each joint
   bool parts_missing_ = false;
   bool all_static_ = true;             // all that it consists of
   std::set<const Element*> left_out_;  // children
@@ -192,6 +198,7 @@ std::shared_ptr<const ScopedModel> SdfReader::ModelReader::read() {
       std::any_of(model_->joints.begin(), model_->joints.end(),
                   [](const Joint& joint) { return joint.type != JointType::fixed; });
   read_path();
+  begin_at(starts_, where_, *model_, findings_);
   scope_->model = std::move(model_);
   return scope_;
 }
@@ -311,6 +318,7 @@ std::optional<Nested> SdfReader::ModelReader::nested_part(const Element& child) 
   if (child.name == "model") {
     part.scope = reader_.read_model(child, version_);
     part.name = required_name(child);
+    part.merged = child.attribute("merge") != nullptr;  // by a joint of the world
   } else {
     auto included = reader_.include(child, where_ + "/include");
     if (included && !included->model) child.fail("is no model; a model can include models only");
@@ -436,6 +444,34 @@ void SdfReader::ModelReader::read_joints() {
     read_or_leave_out(where_ + "/joint " + name, "the joint moves on its own", findings_,
                       [&] { read_mimic(*child, model_->joints, *joint); });
   }
+  starts_.resize(model_->joints.size(), 0.0);
+  for (const Element* system : element_.all("ros2_control"))
+    read_or_leave_out(where_, "its joints begin at 0", findings_,
+                      [&] { read_initial_values(*system); });
+  for (const Element* plugin : element_.all("plugin")) {
+    if (kind_of(*plugin).name.find("mimic_joint_plugin") != std::string::npos)
+      read_or_leave_out(where_, "the joint moves on its own", findings_,
+                        [&] { read_mimic_plugin(*plugin); });
+  }
+}
+
+// Of Gazebo Classic, where a joint had no <mimic>.
+void SdfReader::ModelReader::read_mimic_plugin(const Element& plugin) {
+  const auto named = [&](const char* what) -> Joint& {
+    const std::string name = dotted(plugin.string(what, ""));
+    const auto found = std::find_if(model_->joints.begin(), model_->joints.end(),
+                                    [&](const Joint& each) { return each.name == name; });
+    if (found == model_->joints.end())
+      plugin.fail(std::string("<") + what + ">: '" + name + "' is none of the model's joints");
+    return *found;
+  };
+  const Joint& leader = named("joint");
+  Joint& follower = named("mimicJoint");
+  if (&leader == &follower || leader.leader >= 0)
+    plugin.fail("a joint cannot follow itself, or one that follows");
+  follower.leader = static_cast<int>(&leader - model_->joints.data());
+  follower.mimic_multiplier = plugin.number("multiplier", 1.0, Allowed::any(quantity::kFactor));
+  follower.mimic_offset = plugin.number("offset", 0.0, Allowed::any(quantity::kAngle));
 }
 
 void SdfReader::ModelReader::read_joint_and_sensors(const Element& child) {
@@ -454,9 +490,44 @@ void SdfReader::ModelReader::read_joint_and_sensors(const Element& child) {
     frames_.drop(name);
     return;
   }
+  read_initial_position(child, here);
   for (const Element* sensor : child.all("sensor")) {
     read_or_leave_out(here, "the sensor is left out", findings_,
                       [&] { read_joint_sensor(*sensor, frames_, *model_); });
+  }
+}
+
+void SdfReader::ModelReader::read_initial_position(const Element& child, const std::string& where) {
+  starts_.resize(model_->joints.size(), 0.0);
+  read_or_leave_out(where, "it begins at 0", findings_, [&] {
+    const double start =
+        child.number("axis/initial_position", 0.0, Allowed::any(quantity::kLength));
+    if (start == 0.0 || has_position(model_->joints.back()))
+      starts_.back() = start;
+    else
+      findings_.unsupported(child.child("axis/initial_position")->source, where,
+                            "<initial_position> is not supported in such a joint: it begins at 0");
+  });
+}
+
+// <ros2_control>: where gz_ros2_control puts a joint at the start.
+void SdfReader::ModelReader::read_initial_values(const Element& system) {
+  for (const Element* joint : system.all("joint")) {
+    const std::string* name = joint->attribute("name");
+    const auto own =
+        std::find_if(model_->joints.begin(), model_->joints.end(),
+                     [&](const Joint& each) { return name && each.name == dotted(*name); });
+    if (own == model_->joints.end() || !has_position(*own)) continue;
+    for (const Element* state : joint->all("state_interface")) {
+      const std::string* what = state->attribute("name");
+      if (!what || *what != "position") continue;
+      for (const Element* param : state->all("param")) {
+        const std::string* key = param->attribute("name");
+        if (key && *key == "initial_value")
+          starts_[static_cast<size_t>(own - model_->joints.begin())] =
+              param->as_number(Allowed::any(quantity::kLength));
+      }
+    }
   }
 }
 

@@ -57,6 +57,19 @@ class SdfReader {
   void read_fleet(const Element& element, WorldModel& world, size_t most_models);
   class ModelReader;  // of one <model>
 
+  // A <model> or <include> of a world.
+  struct Member {
+    const Element* element;
+    std::string name;
+    bool is_robot;
+  };
+  std::vector<Member> members(const Element& world, SdfVersion version);
+  // A world with joints of its own, as one without: models that they tie together are in one.
+  std::unique_ptr<Element> with_joined_models(const Element& world, SdfVersion version);
+  std::unique_ptr<Element> join(const std::vector<Member>& all, const std::vector<int>& group,
+                                int which,
+                                const std::vector<std::pair<const Element*, int>>& joints);
+
   ReadContext& context_;
   std::vector<std::string> files_;
   std::map<std::string, Included> cache_;

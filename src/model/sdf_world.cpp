@@ -11,6 +11,7 @@
 #include "model/own_plugins.h"
 #include "model/placement.h"
 #include "model/plugins.h"
+#include "model/saved_state.h"
 #include "model/sdf_link.h"
 #include "model/sdf_reader.h"
 
@@ -272,58 +273,11 @@ void stand_actors(const std::set<std::string>& actors, WorldModel& world) {
 
 }  // namespace
 
-namespace {
-
-constexpr double kMoved_m = 0.01;  // from where a link is in its model, by a joint
-
-struct SavedModel {
-  struct Link {
-    std::string name;
-    Vec3 p_W;
-  };
-  Pose X_WM;
-  Source source;
-  std::vector<Link> links;
-};
-
-// Where Gazebo Classic's <state> has the models: a world that was saved is as it was then, not as
-// its models' own poses say.
-std::map<std::string, SavedModel> saved_models(const Element& world, Findings& findings) {
-  std::map<std::string, SavedModel> models;
-  for (const Element* state : world.all("state")) {
-    for (const Element* model : state->all("model")) {
-      const std::string* name = model->attribute("name");
-      if (!name || !model->has("pose")) continue;
-      try {
-        SavedModel saved{model->pose("pose"), model->source, {}};
-        for (const Element* link : model->all("link")) {
-          const std::string* own = link->attribute("name");
-          if (own && link->has("pose"))
-            saved.links.push_back({dotted(*own), link->pose("pose").translation});
-        }
-        models.insert_or_assign(*name, std::move(saved));
-        if ((model->vector3("scale", Vec3::Ones(), Allowed::any(quantity::kFactor)) - Vec3::Ones())
-                .norm() > 1e-9) {
-          findings.unsupported(model->child("scale")->source, "state/model " + *name,
-                               "models are not scaled; it has its own size");
-        }
-      } catch (const InputError& error) {  // a simulation that went wrong saves such numbers; the
-                                           // models have poses of their own
-        findings.error(error.source(), "state/model " + *name, error.message());
-      }
-    }
-    for (const char* change : {"insertions", "deletions"}) {
-      if (const Element* it = state->child(change))
-        findings.unsupported(it->source, "state",
-                             "<" + it->name + "> are not supported and left out");
-    }
-  }
-  return models;
-}
-
-}  // namespace
-
 void SdfReader::read_world(const Element& element, SdfVersion version, WorldModel& world) {
+  if (element.has("joint")) {
+    read_world(*with_joined_models(element, version), version, world);
+    return;
+  }
   Findings& findings = context_.findings;
   const std::string* name = element.attribute("name");  // no name is reserved for it
   world.name = name ? *name : "";
@@ -357,12 +311,6 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
                          dead ? "the plugin " + kind.name + " does nothing here: " + kind.would
                               : "plugins of Gazebo's server are not loaded: " + kind.name);
   }
-  if (const Element* joint = element.child("joint")) {
-    findings.unsupported(joint->source, "world " + world.name,
-                         "joints between models are not supported and left out; put both models, "
-                         "and the joint, into one <model>");
-  }
-
   FrameGraph frames("the world");
   struct Placed {
     std::string name;
@@ -455,7 +403,7 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
             findings, [&] { read_child(child); }))
       files_.resize(open_files);
   }
-  const std::map<std::string, SavedModel> saved = saved_models(element, findings);
+  const SavedState saved(element, findings);
   for (const Placed& each : placed) {
     ModelInstance instance;
     instance.name = dotted(each.name);
@@ -463,20 +411,7 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
                            [&] { instance.X_WM = frames.pose(each.name, *each.element); }))
       continue;
     instance.model = each.scope->model;
-    if (const auto state = saved.find(each.name); state != saved.end() && !instance.model->path) {
-      instance.X_WM = state->second.X_WM;
-      for (const SavedModel::Link& link : state->second.links) {
-        const auto own = std::find_if(instance.model->links.begin(), instance.model->links.end(),
-                                      [&](const Link& one) { return one.name == link.name; });
-        if (own == instance.model->links.end() ||
-            (link.p_W - (instance.X_WM * own->X_ML).translation).norm() < kMoved_m)
-          continue;
-        findings.unsupported(
-            state->second.source, "state/model " + each.name,
-            "its link '" + link.name + "' was moved by a joint; it stands where the model has it");
-        break;
-      }
-    }
+    saved.put_back(each.name, instance, findings);
     if (instance.is_robot()) {
       const std::string fit = made_fit_for_channel(instance.name);
       std::string name = fit;
@@ -505,6 +440,7 @@ void SdfReader::read_world(const Element& element, SdfVersion version, WorldMode
     read_or_leave_out(in_world, "the light is left out", findings, [&] {
       const Pose pose = frames.pose(relative_to(*light), *light) * light->pose("pose");
       world.lights.push_back(read_light(*light, pose, "world/light", context_));
+      saved.put_back(world.lights.back());
     });
   }
 }

@@ -11,7 +11,9 @@
 #include <urdf_model/model.h>
 #include <urdf_parser/urdf_parser.h>
 
+#include "model/no_effect.h"
 #include "model/read_context.h"
+#include "model/urdf_format.h"
 
 namespace ruedo::model {
 namespace {
@@ -118,6 +120,8 @@ struct GazeboLink {
   std::string material;
   const Element* mu1 = nullptr;
   const Element* mu2 = nullptr;
+  const Element* kp = nullptr;
+  const Element* kd = nullptr;
   const Element* gravity_off = nullptr;
 };
 
@@ -153,7 +157,7 @@ struct Converter {
         const std::string& name = child->name;
         if (!reference || reference->empty()) {
           if (name == "plugin" || name == "static" || name == "self_collide" ||
-              name.rfind("ruedo:", 0) == 0) {
+              name == "enable_wind" || name.rfind("ruedo:", 0) == 0) {
             model->children.push_back(child->clone());
           } else if (name.find(':') == std::string::npos) {
             findings.unsupported(child->source, "robot " + urdf.getName(),
@@ -162,9 +166,7 @@ struct Converter {
           continue;
         }
         // Settings of Gazebo's contact and joint solvers, for which there is nothing to set here.
-        constexpr std::string_view kOfSolvers[] = {"kp",
-                                                   "kd",
-                                                   "minDepth",
+        constexpr std::string_view kOfSolvers[] = {"minDepth",
                                                    "min_depth",
                                                    "maxVel",
                                                    "max_vel",
@@ -211,6 +213,10 @@ struct Converter {
           link.mu1 = child.get();
         else if (name == "mu2")
           link.mu2 = child.get();
+        else if (name == "kp")
+          link.kp = child.get();
+        else if (name == "kd")
+          link.kd = child.get();
         else if (name == "turnGravityOff")
           link.gravity_off = child.get();
         else if (name == "fdir1")
@@ -269,12 +275,20 @@ struct Converter {
       add(add(add(material, "pbr", source), "metal", source), "albedo_map", source, texture);
   }
 
-  static void add_friction(Element& collision, const GazeboLink& block, const Source& source) {
-    if (!block.mu1 && !block.mu2 && !block.fdir1) return;
-    Element& ode = add(add(add(collision, "surface", source), "friction", source), "ode", source);
-    if (block.mu1) add(ode, "mu", block.mu1->source, value_of(*block.mu1));
-    if (block.mu2) add(ode, "mu2", block.mu2->source, value_of(*block.mu2));
-    if (block.fdir1) add(ode, "fdir1", block.fdir1->source, value_of(*block.fdir1));
+  static void add_surface(Element& collision, const GazeboLink& block, const Source& source) {
+    const auto add_ode = [&](const char* part,
+                             std::initializer_list<std::pair<const char*, const Element*>> values) {
+      if (std::none_of(values.begin(), values.end(), [](const auto& each) { return each.second; }))
+        return;
+      Element* surface = collision.child("surface");
+      if (!surface) surface = &add(collision, "surface", source);
+      Element& ode = add(add(*surface, part, source), "ode", source);
+      for (const auto& [name, written] : values) {
+        if (written) add(ode, name, written->source, value_of(*written));
+      }
+    };
+    add_ode("friction", {{"mu", block.mu1}, {"mu2", block.mu2}, {"fdir1", block.fdir1}});
+    add_ode("contact", {{"kp", block.kp}, {"kd", block.kd}});
   }
 
   static void add_what_gazebo_adds(Element& link, const GazeboLink& block) {
@@ -329,7 +343,7 @@ struct Converter {
                                         i == 0 ? "collision" : "collision_" + std::to_string(i));
       add_pose(collision, from->collision_array[i]->origin, source);
       add_geometry(collision, from->collision_array[i]->geometry.get(), source);
-      add_friction(collision, block, source);
+      add_surface(collision, block, source);
     }
     for (size_t i = 0; i < from->visual_array.size(); ++i) {
       const Source source = lines("visual", i);
@@ -501,6 +515,7 @@ std::unique_ptr<Element> urdf_as_sdf(const Element& written, Findings& findings)
   if (!urdf || !urdf->getRoot())
     whom_it_names(fault, robot).fail("urdfdom cannot read it: " + fault);
 
+  name_what_urdf_lacks(robot, findings);
   Converter converter{robot, findings, *urdf, {}};
   Element& model = *converter.model;
   model.name = "model";
@@ -516,7 +531,11 @@ std::unique_ptr<Element> urdf_as_sdf(const Element& written, Findings& findings)
   }
   if (!model.has("ruedo:joints"))
     add(model, "ruedo:joints", robot.source);  // a <robot> is one, be it an arm without sensors
-  return std::move(converter.model);
+  Element sdf;
+  sdf.name = "sdf";
+  sdf.children.push_back(std::move(converter.model));
+  name_what_has_no_effect(sdf, findings);
+  return std::move(sdf.children.front());
 }
 
 }  // namespace ruedo::model

@@ -202,7 +202,7 @@ TEST(DrivePlugins, AreKnownByTheirLibraryOrTheirClass) {
   EXPECT_EQ(kind("x", "/opt/lib/libgazebo_ros_diff_drive.so").does, Does::drive);
   EXPECT_EQ(kind("x", "ignition-gazebo6-diff-drive-system").name, "DiffDrive");
   EXPECT_EQ(kind("gz::sim::systems::Physics", "gz-sim-physics-system").does, Does::served);
-  EXPECT_EQ(kind("gz::sim::systems::WindEffects", "gz-sim-wind-effects-system").does, Does::dead);
+  EXPECT_EQ(kind("gz::sim::systems::Buoyancy", "gz-sim-buoyancy-system").does, Does::dead);
   EXPECT_EQ(kind("gz_ros2_control::GazeboSimROS2ControlPlugin", "gz_ros2_control-system").does,
             Does::control);
   EXPECT_EQ(kind("x", "gz-sim-imu-system").does, Does::served);
@@ -211,11 +211,11 @@ TEST(DrivePlugins, AreKnownByTheirLibraryOrTheirClass) {
 TEST(DrivePlugins, OfWhichNothingComesAreNamedWithWhatTheyWouldDo) {
   const auto world = world_of(
       "<model name='m'><link name='l'/><plugin name='a' "
-      "filename='libWindPlugin.so'/><plugin name='b' filename='libRayPlugin.so'/>"
+      "filename='libBuoyancyPlugin.so'/><plugin name='b' filename='libRayPlugin.so'/>"
       "<plugin name='c' filename='libgazebo_ros_p3d.so'/><plugin name='d' "
       "filename='libmine.so'/></model>");
-  EXPECT_THAT(texts(*world), ElementsAre("the plugin WindPlugin does nothing here: the wind would "
-                                         "push what is loose",
+  EXPECT_THAT(texts(*world), ElementsAre("the plugin BuoyancyPlugin does nothing here: things "
+                                         "would float",
                                          "plugins are not loaded: libmine.so"));
 }
 

@@ -89,6 +89,9 @@ TEST(OddElements, WhatWasSilentIsNamed) {
   const auto named = [](const std::string& inside) { return texts(*world_of(inside)); };
   EXPECT_THAT(named("<wind><linear_velocity>1 0 0</linear_velocity></wind>"),
               ElementsAre(HasSubstr("<wind> is not supported: only air speed sensors feel it")));
+  EXPECT_THAT(named("<model name='m'><enable_wind>true</enable_wind><link "
+                    "name='l'><enable_wind>false</enable_wind></link></model>"),
+              ElementsAre("<enable_wind> is not supported: the wind pushes nothing"));
   EXPECT_THAT(
       named("<wind/><atmosphere type='adiabatic'/><magnetic_field>1e-5 0 0</magnetic_field>"),
       IsEmpty());  // written by Gazebo into every world
@@ -109,6 +112,42 @@ TEST(OddElements, WhatWasSilentIsNamed) {
       IsEmpty());
   EXPECT_THAT(named(joint("<physics><ode><limit><cfm>0.01</cfm></limit></ode></physics>")),
               ElementsAre(HasSubstr("<physics> of a joint is not supported")));
+}
+
+// Deep inside an element, too, and in attributes.
+TEST(OddElements, WhatSdfDoesNotHaveIsNamed) {
+  const auto named = [](const std::string& inside) { return texts(*world_of(inside)); };
+  EXPECT_THAT(
+      named("<model name='m'><link name='l'><collision name='c'><geometry><box><size>1 1 "
+            "1</size></box></geometry><surface><friction><ode><mu3>1</mu3></ode></friction>"
+            "<contact><ode><tension>1</tension></ode></contact></surface></collision></link>"
+            "</model>"),
+      ElementsAre("<mu3> in <ode> is not supported and left out; did you mean <mu>?",
+                  HasSubstr("<tension> in <ode> is not supported and left out")));
+  EXPECT_THAT(named("<model name='m'><link name='l'><sensor name='s' type='imu'><imu><angular_"
+                    "velocity><x><noise type='gaussian'><sigma>1</sigma></noise></x></angular_"
+                    "velocity></imu></sensor></link></model>"),
+              ElementsAre(HasSubstr("<sigma> in <noise> is not supported and left out")));
+  EXPECT_THAT(
+      named("<model name='m' namespace='fleet'><link name='l'/></model>"),
+      ElementsAre("namespace=\"fleet\" of <model> is not supported: channels begin with the "
+                  "model's name"));
+}
+
+TEST(OddElements, WhatUrdfDoesNotHaveIsNamed) {
+  const auto world = load_world_text(
+      "<robot name='r'><link name='a'><collisoin/><visual><geometry><box size='1 1 "
+      "1'/></geometry></visual></link><link name='b'/>\n"
+      "<joint name='j' type='revolute'><parent link='a'/><child link='b'/><limit efort='1' "
+      "effort='1' velocity='1' lower='0' upper='1'/>"
+      "<safety_controller k_velocity='1'/></joint></robot>",
+      "/nowhere/r.urdf");
+  EXPECT_THAT(texts(*world),
+              ElementsAre("<collisoin> in <link> is not supported and left out; did you mean "
+                          "<collision>?",
+                          "efort=\"1\" of <limit> is not supported and left out; did you mean "
+                          "effort?"));
+  EXPECT_EQ(world->findings[1].source.line, 2);
 }
 
 // A list of their addresses, with the command that fetches them, instead of a text each.

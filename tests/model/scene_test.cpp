@@ -112,7 +112,8 @@ TEST(Scene, ASavedStateMovesItsModels) {
       "name='leaf'><pose>2 1 0 0 0 1.57</pose></link></model></state>");
   EXPECT_EQ(texts(*door),
             std::vector<std::string>{
-                "its link 'leaf' was moved by a joint; it stands where the model has it"});
+                "its link 'leaf' was elsewhere than any position of its joints puts it; it stands "
+                "where the model has it"});
 }
 
 // Three by three heights of which the middle one is full: a pyramid of 2 m on a square of 4 m.

@@ -1,0 +1,108 @@
+#include "model/joint_start.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "model/read_context.h"
+#include "ruedo/math.h"
+
+namespace ruedo::model {
+namespace {
+
+bool turns(const Joint& joint) {
+  return joint.type == JointType::revolute || joint.type == JointType::continuous ||
+         joint.type == JointType::screw;
+}
+
+Pose moved_by(const Joint& joint, double position) {
+  Pose X;
+  const Vec3& axis = joint.axis.axis_in_J;
+  if (turns(joint)) X.rotation = Quat(Eigen::AngleAxisd(position, axis));
+  if (joint.type == JointType::prismatic) X.translation = position * axis;
+  if (joint.type == JointType::screw) X.translation = joint.advance * position * axis;
+  return X;
+}
+
+}  // namespace
+
+bool has_position(const Joint& joint) { return turns(joint) || joint.type == JointType::prismatic; }
+
+double position_of(const Model& model, const Joint& joint, const Pose& X_MParent,
+                   const Pose& X_MChild) {
+  const Pose& X_MC = model.links[static_cast<size_t>(joint.child)].X_ML;
+  const Pose X_MP = joint.parent < 0 ? Pose{} : model.links[static_cast<size_t>(joint.parent)].X_ML;
+  const Pose before = X_MP.inverse() * X_MC, after = X_MParent.inverse() * X_MChild;
+  const Pose X_PJ = X_MP.inverse() * joint.X_MJ;
+  const Pose moved = X_PJ.inverse() * after * before.inverse() * X_PJ;
+  if (joint.type == JointType::prismatic) return joint.axis.axis_in_J.dot(moved.translation);
+  if (!turns(joint)) return 0.0;
+  return wrap_angle(
+      2.0 * math::atan2(moved.rotation.vec().dot(joint.axis.axis_in_J), moved.rotation.w()));
+}
+
+namespace {
+
+// Where each link goes, in the model, from where it was.
+std::vector<Pose> moves_of_links(const Model& model, const std::vector<double>& positions) {
+  const size_t n = model.links.size();
+  std::vector<int> carrier(n, -1);  // the joint that carries a link
+  for (size_t j = 0; j < model.joints.size(); ++j)
+    carrier[static_cast<size_t>(model.joints[j].child)] = static_cast<int>(j);
+  std::vector<Pose> moves(n);
+  std::vector<char> done(n, 0);
+  for (size_t i = 0; i < n; ++i) {
+    std::vector<size_t> way;  // towards the root, as far as it is not done yet
+    for (size_t at = i; !done[at] && carrier[at] >= 0;) {
+      done[at] = 1;  // a loop of joints ends here, too
+      way.push_back(at);
+      const int parent = model.joints[static_cast<size_t>(carrier[at])].parent;
+      if (parent < 0) break;
+      at = static_cast<size_t>(parent);
+    }
+    for (; !way.empty(); way.pop_back()) {
+      const size_t j = static_cast<size_t>(carrier[way.back()]);
+      const Joint& joint = model.joints[j];
+      const Pose X_parent = joint.parent < 0 ? Pose{} : moves[static_cast<size_t>(joint.parent)];
+      moves[way.back()] =
+          X_parent * joint.X_MJ * moved_by(joint, positions[j]) * joint.X_MJ.inverse();
+    }
+  }
+  return moves;
+}
+
+// Of a joint that reads 0 where its file has `position`.
+void count_from(double position, size_t j, Model& model) {
+  Joint& joint = model.joints[j];
+  joint.axis.lower -= position;
+  joint.axis.upper -= position;
+  joint.axis.spring_reference -= position;
+  joint.mimic_offset -= position;
+  for (Joint& other : model.joints) {
+    if (other.leader == static_cast<int>(j)) other.mimic_reference -= position;
+  }
+}
+
+}  // namespace
+
+void begin_at(const std::vector<double>& positions, const std::string& where, Model& model,
+              Findings& findings) {
+  std::vector<double> all = positions;
+  all.resize(model.joints.size(), 0.0);
+  if (std::all_of(all.begin(), all.end(), [](double each) { return each == 0.0; })) return;
+  const std::vector<Pose> moves = moves_of_links(model, all);
+  for (size_t i = 0; i < model.links.size(); ++i)
+    model.links[i].X_ML = moves[i] * model.links[i].X_ML;
+  for (size_t j = 0; j < all.size(); ++j) {
+    Joint& joint = model.joints[j];
+    if (joint.parent >= 0) joint.X_MJ = moves[static_cast<size_t>(joint.parent)] * joint.X_MJ;
+    if (all[j] == 0.0) continue;
+    count_from(all[j], j, model);
+    findings.repaired(joint.source, where + "/joint " + joint.name,
+                      "it begins at " + shown(std::round(all[j] * 1e6) / 1e6) +
+                          (joint.type == JointType::prismatic ? " m" : " rad") +
+                          " of its file, and its positions count from there");
+  }
+}
+
+}  // namespace ruedo::model

@@ -1,0 +1,179 @@
+#include "model/saved_state.h"
+
+#include <algorithm>
+
+#include "model/joint_start.h"
+#include "model/read_context.h"
+
+namespace ruedo::model {
+namespace {
+
+constexpr double kAside_m = 0.01;  // from where the joints put a link
+constexpr double kExact = 1e-6;    // rad, m: what saving with few digits makes of 0
+constexpr double kMoving = 0.01;   // m/s, rad/s: what rests has less
+
+std::vector<const Element*> states_of(const Element& parent, const std::string& what) {
+  std::vector<const Element*> list = parent.all(what + "_state");
+  const std::vector<const Element*> older = parent.all(what);
+  list.insert(list.end(), older.begin(), older.end());
+  return list;
+}
+
+// The position of its first axis; false: none is written.
+bool position_in(const Element& joint, double& position) {
+  if (const Element* written = joint.child("axis_state/position")) {
+    const std::string* degrees = written->attribute("degrees");
+    position = written->as_number(Allowed::any(quantity::kAngle));
+    if (degrees && (*degrees == "true" || *degrees == "1")) position *= M_PI / 180.0;
+    return true;
+  }
+  for (const Element* angle : joint.all("angle")) {
+    const std::string* axis = angle->attribute("axis");
+    if (axis && *axis != "0") continue;
+    position = angle->as_number(Allowed::any(quantity::kAngle));
+    return true;
+  }
+  return false;
+}
+
+// However far a wheel has turned, it begins at 0.
+bool is_of_drive(const Model& model, int joint) {
+  if (!model.drive) return false;
+  const DriveDescription& drive = *model.drive;
+  for (const auto* joints : {&drive.left_joints, &drive.right_joints, &drive.steer_joints}) {
+    if (std::find(joints->begin(), joints->end(), joint) != joints->end()) return true;
+  }
+  return false;
+}
+
+// Everything begins at rest.
+void name_motion(const Element& link, const std::string& where, Findings& findings) {
+  const Element* velocity = link.child("velocity");
+  if (!velocity) return;
+  const std::vector<double> values = velocity->as_numbers(Allowed::any(quantity::kSpeed));
+  if (std::all_of(values.begin(), values.end(), [](double v) { return std::abs(v) < kMoving; }))
+    return;
+  findings.unsupported(velocity->source, where,
+                       "<velocity> is not supported: everything begins at rest");
+}
+
+void name_joint(const Element& joint, const std::string& where, Findings& findings) {
+  for (const char* of : {"axis_state/velocity", "axis2_state/velocity", "axis2_state/position"}) {
+    const Element* written = joint.child(of);
+    if (written && std::abs(written->as_number(Allowed::any(quantity::kAngle))) > kMoving)
+      findings.unsupported(
+          written->source, where,
+          std::string("<") + of + "> is not supported: joints begin at rest, second axes at 0");
+  }
+}
+
+}  // namespace
+
+SavedState::SavedState(const Element& world, Findings& findings) {
+  for (const Element* state : world.all("state")) {
+    for (const Element* model : states_of(*state, "model")) read_model(*model, findings);
+    for (const Element* light : states_of(*state, "light")) {
+      const std::string* name = light->attribute("name");
+      if (!name || !light->has("pose")) continue;
+      read_or_leave_out("state/light " + *name, "it is where it was", findings,
+                        [&] { lights_.insert_or_assign(*name, light->pose("pose")); });
+    }
+    for (const Element* joint : states_of(*state, "joint")) {
+      findings.unsupported(joint->source, "state",
+                           "<" + joint->name +
+                               "> outside of a model is not supported: joints between models begin "
+                               "at 0");
+    }
+    for (const char* change : {"insertions", "deletions"}) {
+      if (const Element* it = state->child(change))
+        findings.unsupported(it->source, "state",
+                             "<" + it->name + "> are not supported and left out");
+    }
+  }
+}
+
+void SavedState::read_model(const Element& element, Findings& findings) {
+  const std::string* name = element.attribute("name");
+  if (!name) return;
+  // A simulation that went wrong saves numbers that are none; the models have poses of their own.
+  read_or_leave_out("state/model " + *name, "it is where its own pose says", findings, [&] {
+    SavedModel saved{element.pose("pose"), element.source, {}, {}};
+    read_parts(element, "", saved, findings);
+    if (element.has("pose")) models_.insert_or_assign(*name, std::move(saved));
+  });
+}
+
+void SavedState::read_parts(const Element& element, const std::string& prefix, SavedModel& saved,
+                            Findings& findings) const {
+  const std::string where = "state/model " + *element.attribute("name");
+  const Vec3 scale = element.vector3("scale", Vec3::Ones(), Allowed::any(quantity::kFactor));
+  if ((scale - Vec3::Ones()).norm() > 1e-9)
+    findings.unsupported(element.child("scale")->source, where,
+                         "models are not scaled; it has its own size");
+  for (const Element* link : states_of(element, "link")) {
+    const std::string* own = link->attribute("name");
+    if (own && link->has("pose"))
+      saved.links.push_back({prefix + dotted(*own), link->pose("pose")});
+    name_motion(*link, where, findings);
+  }
+  for (const Element* joint : states_of(element, "joint")) {
+    const std::string* own = joint->attribute("name");
+    double position = 0.0;
+    if (own && position_in(*joint, position)) saved.joints[prefix + dotted(*own)] = position;
+    name_joint(*joint, where, findings);
+  }
+  for (const Element* inner : states_of(element, "model")) {
+    if (const std::string* own = inner->attribute("name"))
+      read_parts(*inner, prefix + dotted(*own) + ".", saved, findings);
+  }
+}
+
+void SavedState::put_back(const std::string& name, ModelInstance& instance,
+                          Findings& findings) const {
+  const auto found = models_.find(name);
+  if (found == models_.end() || instance.model->path) return;
+  const SavedModel& saved = found->second;
+  instance.X_WM = saved.X_WM;
+  const Pose X_MW = saved.X_WM.inverse();
+  const auto pose_of = [&](int link) -> const Pose* {
+    if (link < 0) return nullptr;
+    const std::string& own = instance.model->links[static_cast<size_t>(link)].name;
+    const auto at = std::find_if(saved.links.begin(), saved.links.end(),
+                                 [&](const Link& each) { return each.name == own; });
+    return at == saved.links.end() ? nullptr : &at->X_WL;
+  };
+  auto model = std::make_shared<Model>(*instance.model);
+  std::vector<double> starts(model->joints.size(), 0.0);
+  for (size_t j = 0; j < starts.size(); ++j) {
+    const Joint& joint = model->joints[j];
+    if (is_of_drive(*model, static_cast<int>(j)) || !has_position(joint)) continue;
+    const Pose* child = pose_of(joint.child);
+    const Pose* parent = pose_of(joint.parent);
+    if (const auto at = saved.joints.find(joint.name); at != saved.joints.end())
+      starts[j] = at->second;
+    else if (child && (parent || joint.parent < 0))
+      starts[j] = position_of(*model, joint, parent ? X_MW * *parent : Pose{}, X_MW * *child);
+    if (std::abs(starts[j]) < kExact) starts[j] = 0.0;
+  }
+  begin_at(starts, "state/model " + name, *model, findings);
+  instance.model = model;
+  for (const Link& link : saved.links) {
+    const auto own = std::find_if(model->links.begin(), model->links.end(),
+                                  [&](const auto& one) { return one.name == link.name; });
+    if (own == model->links.end() ||
+        (link.X_WL.translation - (instance.X_WM * own->X_ML).translation).norm() < kAside_m)
+      continue;
+    findings.unsupported(saved.source, "state/model " + name,
+                         "its link '" + link.name +
+                             "' was elsewhere than any position of its joints puts it; it stands "
+                             "where the model has it");
+    break;
+  }
+}
+
+void SavedState::put_back(Light& light) const {
+  if (const auto found = lights_.find(light.name); found != lights_.end())
+    light.pose = found->second;
+}
+
+}  // namespace ruedo::model

@@ -1,0 +1,41 @@
+// <state>: a world that was saved while it ran is as it was then, not as its models' own poses say.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "model/world_model.h"
+#include "ruedo/element.h"
+
+namespace ruedo::model {
+
+// In the words of SDF 1.12 (<model_state>, ...) and in those before it (<model>, ...).
+class SavedState {
+ public:
+  SavedState(const Element& world, Findings& findings);
+
+  // Where it was, and its joints; what cannot be is named.
+  void put_back(const std::string& name, ModelInstance& instance, Findings& findings) const;
+  void put_back(Light& light) const;
+
+ private:
+  struct Link {
+    std::string name;
+    Pose X_WL;
+  };
+  struct SavedModel {
+    Pose X_WM;
+    Source source;
+    std::vector<Link> links;
+    std::map<std::string, double> joints;  // rad or m, where they are written
+  };
+  void read_model(const Element& element, Findings& findings);
+  void read_parts(const Element& element, const std::string& prefix, SavedModel& saved,
+                  Findings& findings) const;
+
+  std::map<std::string, SavedModel> models_;
+  std::map<std::string, Pose> lights_;
+};
+
+}  // namespace ruedo::model

@@ -1,0 +1,22 @@
+// What SDF 1.12 has outside of its sensors.
+#include "sdf_elements.h"
+
+#include <gtest/gtest.h>
+
+namespace ruedo::model {
+namespace {
+
+TEST(SdfElements, NoneOfAWorldIsSilent) {
+  const auto of_the_world = [](const std::string& path) {
+    return path.find("/sensor") == std::string::npos;
+  };
+  const auto load = [](const std::string& text, std::multiset<std::string>& found) {
+    for (const Finding& finding : load_world_text(text, "/nowhere/w.sdf")->findings)
+      found.insert(finding.text);
+  };
+  ASSERT_GT(test::rows().size(), 1000u);
+  EXPECT_EQ(test::silent_ones(of_the_world, load), "");
+}
+
+}  // namespace
+}  // namespace ruedo::model
