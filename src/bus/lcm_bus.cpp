@@ -22,6 +22,7 @@ namespace ruedo::bus {
 
 namespace {
 
+constexpr std::chrono::milliseconds kBetweenLooks{1000}, kBetweenWarnings{60000};
 constexpr int kConnectMs = 2000;
 constexpr int kTakenTogether = 64;  // messages, before it is looked whether the bus ends
 constexpr const char* kSelfTest = "LCM_SELF_TEST";
@@ -141,6 +142,7 @@ void LcmBus::open() {
       throw EnvironmentError("cannot listen on '" + url_.str() + "' (" + error.what() +
                              "): run `ruedo doctor`");
     }
+    loss_.emplace(static_cast<uint16_t>(url_.port), multicast_->file());
     return ignore_own();
   }
   if (url_.scheme == "memq") {
@@ -203,7 +205,11 @@ void LcmBus::read() {
                      : multicast_ ? multicast_->file()
                                   : in_->getFileno();  // another one for each connection
     pollfd waiting[2] = {{lost ? -1 : file, POLLIN, 0}, {stop_event_, POLLIN, 0}};
-    if (::poll(waiting, 2, lost ? static_cast<int>(pause.count()) : -1) < 0) continue;  // a signal
+    const int longest = lost    ? static_cast<int>(pause.count())
+                        : loss_ ? static_cast<int>(kBetweenLooks.count())
+                                : -1;
+    if (::poll(waiting, 2, longest) < 0) continue;  // a signal
+    if (loss_) look_for_loss();
     if (waiting[1].revents != 0) {
       if (stopping_) return;
       uint64_t count;
@@ -221,6 +227,21 @@ void LcmBus::read() {
       spdlog::warn("{}: the server has closed the connection{}", url_.str(),
                    unix_ ? "" : "; it is looked for again");
   }
+}
+
+// Whoever lost datagrams mostly does not know: it is told here, with the cure.
+void LcmBus::look_for_loss() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_look_) return;
+  next_look_ = now + kBetweenLooks;
+  lost_ += loss_->look();
+  if (lost_ == told_lost_ || now < next_warning_) return;
+  told_lost_ = lost_;
+  next_warning_ = now + kBetweenWarnings;
+  spdlog::warn(
+      "{} datagrams to {} were lost on this machine so far: who listens did not take them "
+      "in time, and the receive buffer was full; {}",
+      lost_, url_.str(), cure_of_datagram_loss());
 }
 
 // False when the connection was lost: LCM connects again when it is next asked for a message. A

@@ -7,9 +7,11 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -18,6 +20,7 @@
 
 #include <lcm/lcm-cpp.hpp>
 
+#include "bus/datagram_loss.h"
 #include "bus/lcm_url.h"
 #include "bus/multicast_receiver.h"
 #include "bus/unix_connection.h"
@@ -51,6 +54,7 @@ class LcmBus : public Bus {
   void subscribe_missing();
   void take_up();  // what listen_to() left
   void read();
+  void look_for_loss();
   bool handle();  // what is there
   void on_message(const lcm::ReceiveBuffer* buffer, const std::string& channel);
   void deliver(std::string_view channel, const uint8_t* data, size_t size);
@@ -60,6 +64,9 @@ class LcmBus : public Bus {
   std::shared_ptr<lcm::LCM> in_;  // with memq and tcpq
   std::unique_ptr<MulticastReceiver> multicast_;
   std::unique_ptr<UnixConnection> unix_;
+  std::optional<DatagramLossWatch> loss_;  // with multicast: of those who listen to us
+  std::chrono::steady_clock::time_point next_look_, next_warning_;
+  int64_t lost_ = 0, told_lost_ = 0;     // datagrams
   size_t receive_buffer_;                // of clients with this address
   std::atomic<bool> told_large_{false};  // that a message is larger
   Handler handler_;

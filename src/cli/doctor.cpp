@@ -6,6 +6,7 @@
 
 #include <lcm/lcm_version.h>
 
+#include "bus/datagram_loss.h"
 #include "bus/lcm_url.h"
 #include "bus/url_claim.h"
 #include "cli/commands.h"
@@ -64,6 +65,25 @@ void check_multicast(Report& report, const bus::LcmUrl& url) {
   }
 }
 
+// What listeners of this machine have lost, as the kernel has counted it.
+void check_loss(Report& report, const bus::LcmUrl& url) {
+  const auto loss = bus::datagram_loss(static_cast<uint16_t>(url.port));
+  if (!loss) return report.hint("datagrams", "whether any were lost is not known on this system");
+  if (loss->of_machine == 0)
+    return report.good("datagrams", "none was lost at a full receive buffer so far");
+  const std::string all =
+      fmt::format("{} were lost at full receive buffers, of all ports, since this machine began",
+                  loss->of_machine);
+  if (loss->at_port == 0)
+    return report.good("datagrams",
+                       all + fmt::format("; none by who listens on port {} now", url.port));
+  report.hint("datagrams", all +
+                               fmt::format("; who listens on port {} now may have lost some "
+                                           "({} were dropped or filtered there): ",
+                                           url.port, loss->at_port) +
+                               bus::cure_of_datagram_loss());
+}
+
 // Who serves the address, or would. Where the environment names none and there is no multicast,
 // that is TCP.
 void check_server(Report& report, const bus::LcmUrl& url) {
@@ -81,7 +101,10 @@ void check_server(Report& report, const bus::LcmUrl& url) {
 
 void check_bus(Report& report, const std::string& text) {
   const bus::LcmUrl url = bus::parse_url(text);
-  if (url.scheme == "udpm") check_multicast(report, url);
+  if (url.scheme == "udpm") {
+    check_multicast(report, url);
+    check_loss(report, url);
+  }
   const char* environment = std::getenv("LCM_DEFAULT_URL");
   const bool asked = !text.empty() || (environment && *environment);
   check_server(report, asked || bus::has_route(url) ? url : bus::parse_url("tcpq://"));

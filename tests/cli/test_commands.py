@@ -5,6 +5,7 @@ import os
 import select
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -109,6 +110,49 @@ def test_a_firewall_is_one_line_with_its_cure():
             "does not come back" in line and f"let the firewall pass UDP port {port}" in line
             for line in found
         )
+
+
+# Who listens and never reads: the server says that datagrams are lost, with the cure; doctor, too.
+LISTENS_AND_NEVER_READS = """
+import socket, struct, subprocess, sys
+listener = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1)
+listener.bind(("", 7667))
+group = struct.pack("4s4s", socket.inet_aton("239.255.76.67"), socket.inet_aton("127.0.0.1"))
+listener.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, group)
+ruedo, world = sys.argv[1:]
+url = "udpm://239.255.76.67:7667?ttl=0"
+server = subprocess.Popen(
+    [ruedo, "run", world, "--disable", "p3at/camera", "--lcm", url],
+    stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+for line in server.stdout:
+    if "datagrams" in line:
+        print(line)
+        break
+server.terminate()
+server.wait()
+print(subprocess.run([ruedo, "doctor", "--lcm", url], capture_output=True, text=True).stdout)
+"""
+
+
+def test_lost_datagrams_are_told_with_their_cure():
+    network = "ip link set lo up multicast on; ip route add 239.255.76.67/32 dev lo; "
+    isolated = ["unshare", "-rn", "sh", "-ec"]
+    if subprocess.run([*isolated, network], capture_output=True).returncode != 0:
+        pytest.skip("no network namespaces here")
+    said = subprocess.run(
+        [*isolated, network + 'exec "$@"', "sh", sys.executable]
+        + ["-c", LISTENS_AND_NEVER_READS, RUEDO, ARENA],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    ).stdout.splitlines()
+    warning = next(line for line in said if "were lost on this machine" in line)
+    hint = next(line for line in said if line.split()[:2] == ["hint", "datagrams"])
+    for line in (warning, hint):
+        assert "--lcm unix:///PATH" in line and "net.core.rmem_max" in line
 
 
 def needs(*command):
