@@ -3,6 +3,7 @@ says.
 """
 
 import math
+import urllib.request
 import xml.etree.ElementTree as ET
 
 import gymnasium
@@ -311,6 +312,26 @@ def test_a_frame_shows_the_scene_from_above():
         assert (127.5 - rows.mean()) * metres == pytest.approx(scene.goal[0], abs=0.15)
         assert (127.5 - columns.mean()) * metres == pytest.approx(scene.goal[1], abs=0.15)
     envs.close()
+
+
+# What the console shows is a server's run, which goes on with the same state.
+@pytest.mark.parametrize("task", ["Crowd", "Navigate"])
+def test_the_console_shows_the_same_episode(task, monkeypatch):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    env = gymnasium.make(f"ruedo/{task}-v0", render_mode="human", beams=8)
+    for seed in (3, 4):  # at one address
+        env.reset(seed=seed)
+        for _ in range(20):
+            env.step(np.array([-0.5, 0.4], np.float32))
+        core = env.unwrapped._one
+        core._engine.step(n=1)
+        shown = core._console._simulation.step(1)
+        assert shown.step == 401 and shown.state_hash % 2**64 == core._engine.state_hash(0)
+    assert len(opened) == 1
+    with urllib.request.urlopen(opened[0], timeout=60) as page:
+        assert page.status == 200
+    env.close()
 
 
 def test_pettingzoo_finds_nothing_wrong():
