@@ -9,6 +9,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -134,11 +135,30 @@ std::string free_url(int& token) {
   throw LaunchError("no free UDP port was found in 100 tries");
 }
 
+// Of this user's alone, for the socket.
+fs::path make_folder() {
+  const char* runtime = std::getenv("XDG_RUNTIME_DIR");
+  constexpr size_t kLongest = 60;  // a socket's path has 107 bytes at most
+  const bool usable =
+      runtime && *runtime && std::strlen(runtime) < kLongest && access(runtime, W_OK | X_OK) == 0;
+  std::string name = std::string(usable ? runtime : "/tmp") + "/ruedo-XXXXXX";
+  if (!mkdtemp(name.data()))
+    throw LaunchError("no folder for the server's socket: " + name + ": " + std::strerror(errno));
+  return name;
+}
+
 }  // namespace
 
 ServerProcess::ServerProcess(const std::string& world, const LaunchOptions& options) {
   const std::string program = find_ruedo(options.program);
-  url_ = options.url.empty() ? free_url(token_) : options.url;
+  if (options.url == "auto") {
+    url_ = free_url(token_);
+  } else if (options.url.empty()) {
+    folder_ = make_folder();
+    url_ = "unix://" + (folder_ / "bus").string();
+  } else {
+    url_ = options.url;
+  }
   std::vector<std::string> command{program, "run", world, "--lcm", url_, "--watch-stdin"};
   if (options.seed >= 0) command.insert(command.end(), {"--seed", std::to_string(options.seed)});
   std::ostringstream rate;
@@ -194,8 +214,8 @@ void ServerProcess::start(const std::vector<std::string>& command, bool verbose)
   }
 }
 
-// A tcpq server listens once its world is loaded; who ends before that is found out by the
-// connection.
+// A server listens on a socket or by tcpq once its world is loaded; who ends before that is found
+// out by the connection.
 void ServerProcess::await_port(Duration timeout) {
   const auto deadline = deadline_after(timeout);
   while (!is_served(url_) && !ended() && std::chrono::steady_clock::now() < deadline) {
@@ -233,6 +253,8 @@ void ServerProcess::end() {
   }
   if (output_ >= 0) close(std::exchange(output_, -1));
   if (token_ >= 0) close(std::exchange(token_, -1));
+  std::error_code gone_already;
+  if (!folder_.empty()) fs::remove_all(folder_, gone_already);
 }
 
 std::string ServerProcess::last_lines() const {

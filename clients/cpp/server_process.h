@@ -7,6 +7,7 @@
 
 #include <sys/types.h>
 
+#include <filesystem>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -35,6 +36,7 @@ class ServerProcess {
   std::string last_lines() const;
 
   std::string url_, command_;
+  std::filesystem::path folder_;  // of the socket; empty: none of ours
   std::mutex mutex_;
   pid_t pid_ = -1;
   int status_ = 0;

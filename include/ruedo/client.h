@@ -439,7 +439,9 @@ struct LaunchOptions {
   int64_t seed = -1;              // -1: the server's default
   double rate = 1.0;              // sim time per real time; kFast: as fast as it goes
   std::vector<std::string> args;  // further options of `ruedo run`
-  std::string url;                // "": a free port of this machine
+  std::string url;                // "": a local socket, which no other user of the machine
+                                  // reads, and plain LCM programs do not know; "auto": a free
+                                  // port for LCM
   std::string name = "client";
   Duration timeout = 30.0;  // of real time until the world is loaded
   bool verbose = false;     // show what the server prints; else it is shown in errors alone

@@ -30,7 +30,10 @@ public final class LaunchOptions {
         return this;
     }
 
-    /** Default: a free port of this machine. */
+    /**
+     * Default: a local socket, which no other user of the machine reads, and plain LCM programs do
+     * not know (before Java 16, as "auto"); "auto": a free port for LCM.
+     */
     public LaunchOptions url(String url) {
         this.url = url;
         return this;

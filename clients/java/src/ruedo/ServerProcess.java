@@ -28,10 +28,12 @@ final class ServerProcess {
     private final Process process;
     private final Path output; // null when verbose
     private ServerSocket token; // see freeUrl()
+    private Path folder; // of the socket; null: none of ours
 
     ServerProcess(String world, LaunchOptions options) {
         String program = findRuedo();
-        url = options.url.isEmpty() ? freeUrl() : options.url;
+        if (options.url.isEmpty()) url = privateUrl();
+        else url = options.url.equals("auto") ? freeUrl() : options.url;
         command = new ArrayList<>(List.of(program, "run", world, "--lcm", url, "--watch-stdin"));
         if (options.seed != null) command.addAll(List.of("--seed", Long.toString(options.seed)));
         command.addAll(
@@ -97,6 +99,10 @@ final class ServerProcess {
             process.getOutputStream().close();
             if (!process.waitFor(5, TimeUnit.SECONDS)) process.destroyForcibly().waitFor();
             if (token != null) token.close();
+            if (folder != null) {
+                Files.deleteIfExists(folder.resolve("bus"));
+                Files.deleteIfExists(folder);
+            }
             if (output != null) Files.deleteIfExists(output);
         } catch (IOException error) {
             // it is gone already
@@ -174,6 +180,26 @@ final class ServerProcess {
 
     private static boolean isProgram(File file) {
         return file.isFile() && file.canExecute();
+    }
+
+    /**
+     * A local socket in a folder of this user's alone; Java before 16 has none, and takes a port.
+     */
+    private String privateUrl() {
+        if (Runtime.version().feature() < 16) return freeUrl();
+        String runtime = System.getenv("XDG_RUNTIME_DIR");
+        boolean usable = // a socket's path has 107 bytes at most
+                runtime != null
+                        && !runtime.isEmpty()
+                        && runtime.length() < 60
+                        && Files.isWritable(Path.of(runtime));
+        try {
+            folder = Files.createTempDirectory(Path.of(usable ? runtime : "/tmp"), "ruedo-");
+        } catch (IOException error) {
+            throw new RuedoException.LaunchError(
+                    "no folder for the server's socket: " + error.getMessage());
+        }
+        return "unix://" + folder.resolve("bus");
     }
 
     /**
