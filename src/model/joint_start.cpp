@@ -47,8 +47,10 @@ namespace {
 std::vector<Pose> moves_of_links(const Model& model, const std::vector<double>& positions) {
   const size_t n = model.links.size();
   std::vector<int> carrier(n, -1);  // the joint that carries a link
-  for (size_t j = 0; j < model.joints.size(); ++j)
-    carrier[static_cast<size_t>(model.joints[j].child)] = static_cast<int>(j);
+  for (size_t j = 0; j < model.joints.size(); ++j) {
+    if (model.joints[j].type != JointType::gearbox)  // which carries nothing
+      carrier[static_cast<size_t>(model.joints[j].child)] = static_cast<int>(j);
+  }
   std::vector<Pose> moves(n);
   std::vector<char> done(n, 0);
   for (size_t i = 0; i < n; ++i) {

@@ -134,17 +134,18 @@ JointType read_type(const Element& element, const std::string& where, Findings& 
       {"ball", JointType::ball},
       {"universal", JointType::universal},
       {"revolute2", JointType::universal},
-      {"screw", JointType::screw}};
+      {"screw", JointType::screw},
+      {"gearbox", JointType::gearbox}};
   for (const auto& [name, value] : kTypes) {
     if (*type == name) return value;
   }
-  if (*type != "gearbox" && *type != "planar" && *type != "floating") {
+  if (*type != "planar" && *type != "floating") {
     std::vector<std::string> names;
     for (const auto& each : kTypes) names.push_back(each.first);
     const std::string near = nearest_word(*type, names);
     element.fail("type '" + *type +
                  "' is not allowed; allowed are fixed, revolute, continuous, prismatic, ball, "
-                 "universal, screw" +
+                 "universal, screw, gearbox" +
                  (near.empty() ? "" : "; did you mean '" + near + "'?"));
   }
   findings.unsupported(element.source, where,
@@ -179,7 +180,8 @@ void read_axes(const Element& element, SdfVersion version, FrameGraph& frames,
                const std::string& where, ReadContext& context, Joint& joint) {
   const bool needs_axis = joint.type == JointType::revolute ||
                           joint.type == JointType::continuous ||
-                          joint.type == JointType::prismatic || joint.type == JointType::screw;
+                          joint.type == JointType::prismatic || joint.type == JointType::screw ||
+                          joint.type == JointType::gearbox;
   if (const Element* axis = element.child("axis")) {
     if (joint.type != JointType::fixed && joint.type != JointType::ball)
       joint.axis = read_axis(*axis, version, joint.X_MJ, frames, joint, where + "/axis", context);
@@ -187,21 +189,34 @@ void read_axes(const Element& element, SdfVersion version, FrameGraph& frames,
     element.fail("has no <axis>; joints of type '" + *element.attribute("type") + "' need one");
   }
   if (joint.type == JointType::screw) joint.advance = read_advance(element);
-  if (joint.type != JointType::universal) return;
+  if (joint.type != JointType::universal && joint.type != JointType::gearbox) return;
+  if (joint.type == JointType::gearbox) joint.axis2 = joint.axis;
   if (const Element* axis2 = element.child("axis2"))
     joint.axis2 = read_axis(*axis2, version, joint.X_MJ, frames, joint, where + "/axis2", context);
-  else
+  else if (joint.type == JointType::universal)
     joint.axis2.axis_in_J = Vec3::UnitX();
+}
+
+void read_gear(const Element& element, FrameGraph& frames, Joint& joint) {
+  joint.gear_ratio = element.number("gearbox_ratio", 1.0, Allowed::any(quantity::kFactor));
+  const Element* reference = element.child("gearbox_reference_body");
+  if (!reference)
+    element.fail(
+        "has no <gearbox_reference_body>; joints of type 'gearbox' need the link that carries "
+        "their gears, or 'world'");
+  if (reference->text == "world") return;
+  joint.gear_reference = frames.link(reference->text, *reference);
+  if (joint.gear_reference < 0) reference->fail("'" + reference->text + "' is not part of a link");
 }
 
 }  // namespace
 
 Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
                  const std::vector<Link>& links, const std::string& where, ReadContext& context) {
-  report_other_children(
-      element,
-      {"parent", "child", "pose", "axis", "axis2", "sensor", "thread_pitch", "screw_thread_pitch"},
-      {"physics", "gearbox_ratio", "gearbox_reference_body"}, where, context.findings);
+  report_other_children(element,
+                        {"parent", "child", "pose", "axis", "axis2", "sensor", "thread_pitch",
+                         "screw_thread_pitch", "gearbox_ratio", "gearbox_reference_body"},
+                        {"physics"}, where, context.findings);
   if (const Element* solver = element.child("physics"); solver && sets_anything(*solver)) {
     context.findings.unsupported(
         solver->source, where,
@@ -214,6 +229,7 @@ Joint read_joint(const Element& element, SdfVersion version, FrameGraph& frames,
   read_ends(element, frames, links, joint);
   joint.X_MJ = frames.pose(required_name(element), element);
   read_axes(element, version, frames, where, context, joint);
+  if (joint.type == JointType::gearbox) read_gear(element, frames, joint);
   return joint;
 }
 

@@ -49,6 +49,7 @@ void append_nested(const Nested& nested, const Pose& X_MN, Model& into, Findings
     joint.name = prefix + joint.name;
     joint.X_MJ = X_MN * joint.X_MJ;
     if (joint.parent >= 0) joint.parent += first_link;
+    if (joint.gear_reference >= 0) joint.gear_reference += first_link;
     joint.child += first_link;
     if (joint.leader >= 0) joint.leader += first_joint;
     into.joints.push_back(std::move(joint));

@@ -107,7 +107,7 @@ struct Link {
   Source source;
 };
 
-enum class JointType { fixed, revolute, continuous, prismatic, ball, universal, screw };
+enum class JointType { fixed, revolute, continuous, prismatic, ball, universal, screw, gearbox };
 
 struct JointAxis {
   Vec3 axis_in_J = Vec3::UnitZ();  // unit vector, in the joint's frame (expressed_in is resolved)
@@ -128,9 +128,13 @@ struct Joint {
   int parent = -1;  // index into links; -1: the world
   int child = 0;
   Pose X_MJ;              // at the start
-  JointAxis axis, axis2;  // axis2: universal only
+  JointAxis axis, axis2;  // axis2: universal and gearbox only
   double advance = 0.0;   // m/rad along the axis: screw only
-  int leader = -1;        // index into joints: the one that this one mimics
+  // Gearbox only: against the reference (a link; -1: the world) the child turns -gear_ratio times
+  // as far about axis2 as the parent does about axis.
+  double gear_ratio = 1.0;
+  int gear_reference = -1;
+  int leader = -1;  // index into joints: the one that this one mimics
   double mimic_multiplier = 1.0, mimic_offset = 0.0,
          mimic_reference = 0.0;  // multiplier (leader - reference) + offset
   Source source;

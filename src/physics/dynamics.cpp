@@ -192,8 +192,13 @@ void Dynamics::find_islands() {
   std::iota(parents_.begin(), parents_.end(), size_t{0});
   for (const btPersistentManifold* manifold : manifolds_)
     join(*manifold->getBody0(), *manifold->getBody1());
-  for (const btTypedConstraint* joint : joints_)
+  for (btTypedConstraint* joint : joints_) {
     join(joint->getRigidBodyA(), joint->getRigidBodyB());
+    const auto* motors = static_cast<const JointMotors*>(joint->getUserConstraintPtr());
+    if (!motors || !motors->first.reference) continue;
+    join(*motors->first.reference, joint->getRigidBodyA());
+    join(*motors->first.reference, joint->getRigidBodyB());
+  }
   island_count_ = 0;
   island_of_root_.resize(bodies_.size());
   for (size_t i = 0; i < bodies_.size(); ++i) {

@@ -42,6 +42,7 @@ struct JointBlocks::Values {
 
 void JointBlocks::clear() {
   rows_.clear();
+  thirds_.clear();
   joints_.clear();
   block_count_ = 0;
 }
@@ -75,8 +76,64 @@ int JointBlocks::ask(btTypedConstraint& constraint, double reduction, double sub
   return size.m_numConstraintRows;
 }
 
-void JointBlocks::add(btTypedConstraint& constraint, int a, int b, const SolverBodies& bodies,
-                      double substep_s) {
+const JointBlocks::Third* JointBlocks::third_of(size_t row) const {
+  for (const Third& third : thirds_)
+    if (third.row == row) return &third;
+  return nullptr;
+}
+
+double JointBlocks::coupling(size_t i, size_t j) const {
+  const Row &one = rows_[i], &other = rows_[j];
+  double sum = one.coupling(other);
+  if (thirds_.empty()) return sum;
+  const Third *of_one = third_of(i), *of_other = third_of(j);
+  if (of_one) {
+    const int body = of_one->body;
+    if (other.a == body) sum += of_one->angular.dot(other.turns_a);
+    if (other.b == body) sum += of_one->angular.dot(other.turns_b);
+    if (of_other && of_other->body == body) sum += of_one->angular.dot(of_other->turns);
+  }
+  if (of_other) {
+    if (one.a == of_other->body) sum += one.angular_a.dot(of_other->turns);
+    if (one.b == of_other->body) sum += one.angular_b.dot(of_other->turns);
+  }
+  return sum;
+}
+
+double JointBlocks::velocity(size_t i, const SolverBodies& bodies) const {
+  const Third* third = third_of(i);
+  return rows_[i].velocity(bodies) +
+         (third ? third->angular.dot(bodies[static_cast<size_t>(third->body)].w) : 0.0);
+}
+
+double JointBlocks::push_velocity(size_t i, const SolverBodies& bodies) const {
+  const Third* third = third_of(i);
+  return rows_[i].push_velocity(bodies) +
+         (third ? third->angular.dot(bodies[static_cast<size_t>(third->body)].push_w) : 0.0);
+}
+
+void JointBlocks::give(size_t i, SolverBodies& bodies, double more) {
+  rows_[i].give(bodies, more);
+  if (const Third* third = third_of(i))
+    bodies[static_cast<size_t>(third->body)].w += third->turns * more;
+}
+
+void JointBlocks::give_push(size_t i, SolverBodies& bodies, double more) {
+  rows_[i].give_push(bodies, more);
+  if (const Third* third = third_of(i))
+    bodies[static_cast<size_t>(third->body)].push_w += third->turns * more;
+}
+
+double JointBlocks::relax(size_t i, SolverBodies& bodies) {
+  Row& row = rows_[i];
+  if (!third_of(i)) return row.relax(bodies);
+  const double more = (row.target - velocity(i, bodies) - row.softness * row.impulse) * row.inverse;
+  give(i, bodies, more);
+  return std::abs(more) * row.response;
+}
+
+void JointBlocks::add(btTypedConstraint& constraint, int a, int b, int reference,
+                      const SolverBodies& bodies, double substep_s) {
   Values values;
   const int n = ask(constraint, 0.0, substep_s, values);
   auto* motors = static_cast<JointMotors*>(constraint.getUserConstraintPtr());
@@ -103,13 +160,14 @@ void JointBlocks::add(btTypedConstraint& constraint, int a, int b, const SolverB
     row.prepare(bodies);
     rows_.push_back(row);
   }
-  if (motors && motors->first.on) add_motor(motors->first, joint, bodies);
-  if (motors && motors->second.on) add_motor(motors->second, joint, bodies);
+  if (motors && motors->first.on) add_motor(motors->first, joint, reference, bodies);
+  if (motors && motors->second.on) add_motor(motors->second, joint, reference, bodies);
   joint.count = rows_.size() - joint.first;
 }
 
 // Positive as the child, body b, moves against the parent.
-void JointBlocks::add_motor(JointMotor& motor, Joint& joint, const SolverBodies& bodies) {
+void JointBlocks::add_motor(JointMotor& motor, Joint& joint, int reference,
+                            const SolverBodies& bodies) {
   Row row;
   row.a = joint.a;
   row.b = joint.b;
@@ -123,6 +181,9 @@ void JointBlocks::add_motor(JointMotor& motor, Joint& joint, const SolverBodies&
     row.angular_a = motor.advance * motor.axis - arm(joint.a).cross(motor.axis);
     row.linear_b = motor.axis;
     row.angular_b = arm(joint.b).cross(motor.axis) - motor.advance * motor.axis;
+  } else if (motor.reference) {
+    row.angular_a = motor.parent_axis;
+    row.angular_b = motor.axis;
   } else {
     row.angular_a = -motor.axis;
     row.angular_b = motor.axis;
@@ -134,6 +195,20 @@ void JointBlocks::add_motor(JointMotor& motor, Joint& joint, const SolverBodies&
   row.prepare(bodies);
   (joint.motors[0] ? joint.motors[1] : joint.motors[0]) = &motor;
   rows_.push_back(row);
+  if (motor.reference && reference > 0) add_third(motor, reference, bodies);
+}
+
+// The last row's: the reference bears what the moments on parent and child leave over.
+void JointBlocks::add_third(const JointMotor& motor, int reference, const SolverBodies& bodies) {
+  Third third;
+  third.row = rows_.size() - 1;
+  third.body = reference;
+  third.angular = -motor.axis - motor.parent_axis;
+  third.turns = bodies[static_cast<size_t>(reference)].inverse_inertia * third.angular;
+  thirds_.push_back(third);
+  Row& row = rows_.back();
+  row.response = coupling(third.row, third.row);
+  row.inverse = row.response > 1e-12 ? 1.0 / (row.response + row.softness) : 0.0;
 }
 
 size_t JointBlocks::root(size_t body) {
@@ -148,10 +223,15 @@ void JointBlocks::prepare(const SolverBodies& bodies) {
   const auto moves = [&](int body) {
     return bodies[static_cast<size_t>(body)].inverse_mass != Vec3::Zero();
   };
-  for (const Joint& joint : joints_) {
-    if (!moves(joint.a) || !moves(joint.b)) continue;
-    const size_t a = root(static_cast<size_t>(joint.a)), b = root(static_cast<size_t>(joint.b));
+  const auto unite = [&](int one, int other) {
+    if (!moves(one) || !moves(other)) return;
+    const size_t a = root(static_cast<size_t>(one)), b = root(static_cast<size_t>(other));
     parents_[std::max(a, b)] = std::min(a, b);
+  };
+  for (const Joint& joint : joints_) unite(joint.a, joint.b);
+  for (const Third& third : thirds_) {
+    unite(third.body, rows_[third.row].a);
+    unite(third.body, rows_[third.row].b);
   }
   constexpr size_t kNone = static_cast<size_t>(-1);
   block_of_root_.assign(bodies.size(), kNone);
@@ -182,20 +262,20 @@ void JointBlocks::find_envelope(Block& block) {
   const size_t n = block.free.size();
   block.begin.resize(n);
   for (const size_t i : block.free) {
-    for (const int body : {rows_[i].a, rows_[i].b}) {
+    for_each_body(i, [&](int body) {
       if (first_of_body_.size() <= static_cast<size_t>(body))
         first_of_body_.resize(static_cast<size_t>(body) + 1);
       first_of_body_[static_cast<size_t>(body)] = kNone;
-    }
+    });
   }
   for (size_t i = 0; i < n; ++i) {
     block.begin[i] = i;
-    for (const int body : {rows_[block.free[i]].a, rows_[block.free[i]].b}) {
-      if (body == 0) continue;  // nothing moves it
+    for_each_body(block.free[i], [&](int body) {
+      if (body == 0) return;  // nothing moves it
       size_t& first = first_of_body_[static_cast<size_t>(body)];
       if (first == kNone) first = i;
       block.begin[i] = std::min(block.begin[i], first);
-    }
+    });
   }
 }
 
@@ -206,7 +286,7 @@ void JointBlocks::factor(Block& block) {
   for (size_t i = 0; i < n; ++i) {
     const Row& row = rows_[block.free[i]];
     double* of_i = &block.factor[i * n];
-    for (size_t j = block.begin[i]; j < i; ++j) of_i[j] = row.coupling(rows_[block.free[j]]);
+    for (size_t j = block.begin[i]; j < i; ++j) of_i[j] = coupling(block.free[i], block.free[j]);
     of_i[i] = row.response * (1.0 + kRegular) + row.softness;
     for (size_t j = block.begin[i]; j <= i; ++j) {
       const double* of_j = &block.factor[j * n];
@@ -243,7 +323,7 @@ double JointBlocks::sweep(SolverBodies& bodies) {
       x_.resize(block.free.size());
       for (size_t i = 0; i < x_.size(); ++i) {
         const Row& row = rows_[block.free[i]];
-        x_[i] = row.target - row.velocity(bodies) - row.softness * row.impulse;
+        x_[i] = row.target - velocity(block.free[i], bodies) - row.softness * row.impulse;
         worst = std::max(worst, std::abs(x_[i]));
       }
       solve(block, x_);
@@ -260,10 +340,10 @@ double JointBlocks::sweep(SolverBodies& bodies) {
       if (kept == x_.size()) break;
       block.free.resize(kept);
       block.factored = false;
-      for (const size_t i : block.bounded) worst = std::max(worst, rows_[i].relax(bodies));
+      for (const size_t i : block.bounded) worst = std::max(worst, relax(i, bodies));
     }
-    for (size_t i = 0; i < x_.size(); ++i) rows_[block.free[i]].give(bodies, x_[i]);
-    for (const size_t i : block.bounded) worst = std::max(worst, rows_[i].relax(bodies));
+    for (size_t i = 0; i < x_.size(); ++i) give(block.free[i], bodies, x_[i]);
+    for (const size_t i : block.bounded) worst = std::max(worst, relax(i, bodies));
   }
   return worst;
 }
@@ -292,11 +372,11 @@ double JointBlocks::sweep_push(SolverBodies& bodies) {
     x_.resize(block.free.size());
     for (size_t i = 0; i < x_.size(); ++i) {
       const Row& row = rows_[block.free[i]];
-      x_[i] = row.push_target - row.push_velocity(bodies);
+      x_[i] = row.push_target - push_velocity(block.free[i], bodies);
       worst = std::max(worst, std::abs(x_[i]));
     }
     solve(block, x_);
-    for (size_t i = 0; i < x_.size(); ++i) rows_[block.free[i]].give_push(bodies, x_[i]);
+    for (size_t i = 0; i < x_.size(); ++i) give_push(block.free[i], bodies, x_[i]);
     for (const size_t i : block.bounded) {
       Row& row = rows_[i];
       if (!is_stop(row)) continue;  // a motor at its limit holds nothing

@@ -13,12 +13,13 @@ class JointBlocks {
  public:
   void clear();
   // Adds the rows of an enabled constraint between two bodies of the solver, with its motors
-  // (Bullet's user pointer).
-  void add(btTypedConstraint& constraint, int a, int b, const SolverBodies& bodies,
+  // (Bullet's user pointer). reference: the third body of a gearbox; 0: none, or what never moves.
+  void add(btTypedConstraint& constraint, int a, int b, int reference, const SolverBodies& bodies,
            double substep_s);
   // All are added: sorts the rows into blocks.
   void prepare(const SolverBodies& bodies);
   bool empty() const { return rows_.empty(); }
+  bool has_gears() const { return !thirds_.empty(); }  // their rows have three bodies
 
   // Brings all rows to their targets, as far as their bounds allow. Returns how far off the worst
   // was, m/s or rad/s.
@@ -50,15 +51,37 @@ class JointBlocks {
     bool factored = false;
   };
 
+  // What a gearbox's row does to its reference.
+  struct Third {
+    size_t row = 0;
+    int body = 0;
+    Vec3 angular = Vec3::Zero(), turns = Vec3::Zero();  // J and M^-1 J^T
+  };
+  const Third* third_of(size_t row) const;
+  double coupling(size_t i, size_t j) const;
+  double velocity(size_t i, const SolverBodies& bodies) const;
+  double push_velocity(size_t i, const SolverBodies& bodies) const;
+  void give(size_t i, SolverBodies& bodies, double more);
+  void give_push(size_t i, SolverBodies& bodies, double more);
+  double relax(size_t i, SolverBodies& bodies);
+  template <class Do>
+  void for_each_body(size_t i, Do&& act) const {
+    act(rows_[i].a);
+    act(rows_[i].b);
+    if (const Third* third = third_of(i)) act(third->body);
+  }
+
   struct Values;
   int ask(btTypedConstraint& constraint, double reduction, double substep_s, Values& values);
-  void add_motor(JointMotor& motor, Joint& joint, const SolverBodies& bodies);
+  void add_motor(JointMotor& motor, Joint& joint, int reference, const SolverBodies& bodies);
+  void add_third(const JointMotor& motor, int reference, const SolverBodies& bodies);
   size_t root(size_t body);
   void find_envelope(Block& block);
   void factor(Block& block);
   void solve(const Block& block, std::vector<double>& x) const;
 
   std::vector<Row> rows_;
+  std::vector<Third> thirds_;
   std::vector<Joint> joints_;
   std::vector<size_t> parents_;  // union-find over bodies
   std::vector<Block> blocks_;

@@ -46,16 +46,39 @@ void set_turns(btRotationalLimitMotor& turns, double lower, double upper) {
 
 double bounded(double value, double limit) { return std::clamp(value, -limit, limit); }
 
+// Holds nothing itself: its motor is all that there is.
+class Unconstrained : public btTypedConstraint {
+ public:
+  Unconstrained(btRigidBody& a, btRigidBody& b) : btTypedConstraint(GEAR_CONSTRAINT_TYPE, a, b) {}
+  void getInfo1(btConstraintInfo1* info) override { info->m_numConstraintRows = info->nub = 0; }
+  void getInfo2(btConstraintInfo2*) override {}
+  void setParam(int, btScalar, int) override {}
+  btScalar getParam(int, int) const override { return 0.0; }
+};
+
+Quat rotation_of(const btRigidBody& body) {
+  return from_bt(body.getWorldTransform().getRotation());
+}
+
+// rad, about an axis that the turn need not be about altogether.
+double angle_about(const Vec3& axis, const Quat& turn) {
+  const Vec3 square = axis.unitOrthogonal(), now = turn * square;
+  return math::atan2(axis.dot(square.cross(now)), square.dot(now));
+}
+
 }  // namespace
 
 JointConstraint::JointConstraint(const model::Joint& joint, btRigidBody& parent, btRigidBody& child,
-                                 const Pose& X_PJ, const Pose& X_CJ)
+                                 const Pose& X_PJ, const Pose& X_CJ, btRigidBody* reference)
     : type_(joint.type),
       advance_(joint.advance),
       multiplier_(joint.mimic_multiplier),
       offset_(joint.mimic_offset - joint.mimic_multiplier * joint.mimic_reference),
+      ratio_(joint.gear_ratio),
+      reference_(reference),
       limits_(joint.axis),
       limits2_(joint.axis2),
+      written_{joint.axis.effort, joint.axis.velocity, joint.axis.rate_gain},
       parent_(parent),
       child_(child),
       X_PJ_(X_PJ),
@@ -127,6 +150,14 @@ JointConstraint::JointConstraint(const model::Joint& joint, btRigidBody& parent,
       constraint_ = std::move(universal);
       break;
     }
+    case model::JointType::gearbox: {
+      const Quat to_R = rotation_of(*reference_).conjugate();
+      R_RP_ = to_R * rotation_of(parent_);
+      R_RC_ = to_R * rotation_of(child_);
+      R_RJ_ = R_RP_ * X_PJ.rotation;
+      constraint_ = std::make_unique<Unconstrained>(parent_, child_);
+      break;
+    }
     case model::JointType::fixed:
       constraint_ = std::make_unique<btFixedConstraint>(parent_, child_, to_bt(X_PJ), to_bt(X_CJ));
       break;
@@ -152,12 +183,25 @@ double JointConstraint::velocity() const {
           from_bt(child_.getVelocityInLocalPoint(arm - child_.getCenterOfMassPosition()) -
                   parent_.getVelocityInLocalPoint(arm - parent_.getCenterOfMassPosition())));
     }
+    case model::JointType::gearbox:
+      return gear_axis(limits2_).dot(
+          from_bt(child_.getAngularVelocity() - reference_->getAngularVelocity()));
     default: return 0.0;
   }
 }
 
+void JointConstraint::set(JointSetting setting, double value) {
+  (setting == JointSetting::rate_gain ? limits_.rate_gain
+   : setting == JointSetting::effort  ? limits_.effort
+                                      : limits_.velocity) = value;
+  if (mode_ == Mode::motor) set_motor(told_.rate, told_.lowest, told_.highest, told_.gain);
+  if (mode_ == Mode::effort) set_effort(told_.effort);
+  wake();
+}
+
 void JointConstraint::set_motor(double rate, double lowest_effort, double highest_effort,
                                 double gain) {
+  told_ = {rate, lowest_effort, highest_effort, gain, 0.0};
   rate = bounded(rate, limits_.velocity);
   lowest_effort = std::max(lowest_effort, -limits_.effort);
   highest_effort = std::min(highest_effort, limits_.effort);
@@ -171,6 +215,7 @@ void JointConstraint::set_motor(double rate, double lowest_effort, double highes
 }
 
 void JointConstraint::set_effort(double effort) {
+  told_.effort = effort;
   effort = bounded(effort, limits_.effort);
   const bool news = mode_ != Mode::effort || effort != command_;
   mode_ = Mode::effort;
@@ -240,6 +285,27 @@ void JointConstraint::hold_thread(double substep_s) {
   motors_->second.advance = advance_;
 }
 
+Vec3 JointConstraint::gear_axis(const model::JointAxis& axis) const {
+  return rotation_of(*reference_) * (R_RJ_ * axis.axis_in_J);
+}
+
+double JointConstraint::turned(const btRigidBody& body, const Quat& start_in_R,
+                               const model::JointAxis& axis, double before) const {
+  const Quat turn =
+      rotation_of(*reference_).conjugate() * rotation_of(body) * start_in_R.conjugate();
+  return before + wrap_angle(angle_about(R_RJ_ * axis.axis_in_J, turn) - before);
+}
+
+void JointConstraint::mesh_gears(double substep_s) {
+  constexpr double kEachSubstep = 0.2;  // of an error that is undone
+  constexpr double kAnything = 1e9;     // N m
+  const double error = position_ + ratio_ * parent_position_;
+  turn_on(motors_->first, gear_axis(limits2_), -kEachSubstep * error / substep_s, -kAnything,
+          kAnything, substep_s);
+  motors_->first.parent_axis = ratio_ * gear_axis(limits_);
+  motors_->first.reference = reference_;
+}
+
 void JointConstraint::follow(double leader_position, double leader_rate, double substep_s) {
   constexpr double kEachSubstep = 0.3;  // of what it lags
   follows_ = true;
@@ -251,6 +317,7 @@ void JointConstraint::follow(double leader_position, double leader_rate, double 
 
 void JointConstraint::before_substep(double substep_s) {
   if (!constraint_ || !constraint_->isEnabled()) return;
+  if (type_ == model::JointType::gearbox) return mesh_gears(substep_s);
   if (type_ == model::JointType::screw) hold_thread(substep_s);
   if (type_ == model::JointType::revolute && limited(limits_) && !within_a_turn(limits_)) {
     static_cast<btHingeConstraint&>(*constraint_)
@@ -279,9 +346,8 @@ void JointConstraint::before_substep(double substep_s) {
 
 void JointConstraint::after_substep(double substep_s) {
   if (!constraint_ || !constraint_->isEnabled()) return;
-  effort_ = follows_ || mode_ == Mode::motor ? motors_->first.impulse / substep_s
-            : mode_ == Mode::effort          ? command_
-                                             : 0.0;
+  const bool driven = follows_ || mode_ == Mode::motor || type_ == model::JointType::gearbox;
+  effort_ = driven ? motors_->first.impulse / substep_s : mode_ == Mode::effort ? command_ : 0.0;
   switch (type_) {
     case model::JointType::revolute:
     case model::JointType::continuous: {
@@ -293,15 +359,15 @@ void JointConstraint::after_substep(double substep_s) {
     }
     case model::JointType::prismatic: position_ = advanced(); break;
     case model::JointType::screw: {
-      const Vec3 first = X_PJ_.rotation * limits_.axis_in_J, square = first.unitOrthogonal();
-      const Quat turned = from_bt(parent_.getWorldTransform().getRotation()).conjugate() *
-                          from_bt(child_.getWorldTransform().getRotation()) * X_CJ_.rotation *
-                          X_PJ_.rotation.conjugate();
-      const Vec3 now = turned * square;
-      position_ +=
-          wrap_angle(math::atan2(first.dot(square.cross(now)), square.dot(now)) - position_);
+      const Quat turn = rotation_of(parent_).conjugate() * rotation_of(child_) * X_CJ_.rotation *
+                        X_PJ_.rotation.conjugate();
+      position_ += wrap_angle(angle_about(X_PJ_.rotation * limits_.axis_in_J, turn) - position_);
       break;
     }
+    case model::JointType::gearbox:
+      position_ = turned(child_, R_RC_, limits2_, position_);
+      parent_position_ = turned(parent_, R_RP_, limits_, parent_position_);
+      break;
     case model::JointType::universal: {
       // A turn about the parent's axis, then one about the child's: where the child's second axis
       // points, seen along the first.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "model/body_layout.h"
+#include "physics/physics_world.h"
 #include "physics/rigid_bodies.h"
 #include "physics/rows.h"
 
@@ -16,16 +17,17 @@ namespace ruedo::physics {
 
 class JointConstraint {
  public:
-  // X_PJ, X_CJ: the joint's frame in Bullet's frames I of parent and child.
+  // X_PJ, X_CJ: the joint's frame in Bullet's frames I of parent and child. reference: a gearbox's;
+  // others have none.
   JointConstraint(const model::Joint& joint, btRigidBody& parent, btRigidBody& child,
-                  const Pose& X_PJ, const Pose& X_CJ);
+                  const Pose& X_PJ, const Pose& X_CJ, btRigidBody* reference = nullptr);
 
   btTypedConstraint* constraint() {
     return constraint_.get();
   }  // null: nothing to hold (no such joint)
 
-  // Of a universal joint these, and what it is told, are about its first axis; a ball joint has
-  // none: 0.
+  // Of a universal joint these, and what it is told, are about its first axis; of a gearbox the
+  // child's, about the second one, against the reference; a ball joint has none: 0.
   double position() const { return position_; }  // rad or m
   double velocity() const;
   double effort() const { return effort_; }
@@ -35,6 +37,8 @@ class JointConstraint {
   // the rate is held at once.
   void set_motor(double rate, double lowest_effort, double highest_effort, double gain);
   void set_effort(double effort);  // gives that effort until another command
+  // Until the bodies are put back; what it is told already is held within them at once.
+  void set(JointSetting setting, double value);
   bool commanded() const { return mode_ != Mode::passive; }
 
   // It may move faster than its bodies do now: it is told to, or a spring pulls.
@@ -45,7 +49,11 @@ class JointConstraint {
   // The bodies were put back to where they started: the position is 0, and no command holds.
   void start_again() {
     position_ = effort_ = command_ = 0.0;
+    parent_position_ = 0.0;
     mode_ = Mode::passive;
+    limits_.effort = written_.effort;
+    limits_.velocity = written_.velocity;
+    limits_.rate_gain = written_.rate_gain;
   }
 
   void disable() {  // it holds nothing any more
@@ -70,13 +78,28 @@ class JointConstraint {
   void brake_second_axis(double substep_s);
   double advanced() const;  // m along the axis since the start
   void hold_thread(double substep_s);
+  Vec3 gear_axis(const model::JointAxis& axis) const;  // world
+  void mesh_gears(double substep_s);
+  // rad about an axis of the reference, since the start, nearest to what it was
+  double turned(const btRigidBody& body, const Quat& start_in_R, const model::JointAxis& axis,
+                double before) const;
 
   model::JointType type_;
   double advance_;              // m/rad: screw only
   double multiplier_, offset_;  // of the leader's position
   bool follows_ = false;        // in the coming substep, at follow_rate_
   double follow_rate_ = 0.0;
-  model::JointAxis limits_, limits2_;  // of the second axis: universal only
+  double ratio_;  // gearbox only, as what follows
+  btRigidBody* reference_;
+  Quat R_RJ_, R_RP_, R_RC_;  // at the start: the joint's frame and both bodies' in the reference
+  double parent_position_ = 0.0;       // rad about the first axis
+  model::JointAxis limits_, limits2_;  // of the second axis: universal and gearbox only
+  struct {
+    double effort, velocity, rate_gain;
+  } written_;  // as the file has them
+  struct {
+    double rate = 0.0, lowest = 0.0, highest = 0.0, gain = 0.0, effort = 0.0;
+  } told_;  // before limits
   btRigidBody& parent_;
   btRigidBody& child_;
   Pose X_PJ_, X_CJ_;

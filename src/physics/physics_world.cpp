@@ -79,6 +79,10 @@ void PhysicsWorld::apply_joint_effort(int joint, double effort) {
   impl_->joints_[Impl::index(joint)].set_effort(effort);
 }
 
+void PhysicsWorld::set_joint(int joint, JointSetting setting, double value) {
+  impl_->joints_[Impl::index(joint)].set(setting, value);
+}
+
 double PhysicsWorld::wheel_angle(int wheel) const {
   const int joint = impl_->wheel_joint_[Impl::index(wheel)];
   return joint < 0 ? 0.0

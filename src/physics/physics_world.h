@@ -29,6 +29,9 @@ struct WheelServo {
   double lowest_torque = 0.0, highest_torque = 0.0;  // N m
 };
 
+// What messages change of a joint: N m s/rad or N s/m; N m or N; rad/s or m/s.
+enum class JointSetting { rate_gain, effort, velocity };
+
 // Deterministic: the same calls give the same bits, and what does not touch changes nothing of each
 // other. A step is divided into equal substeps of 5 ms at most; of 1 ms for what joints tie
 // together, wheels among them, and for all that may touch it.
@@ -79,6 +82,8 @@ class PhysicsWorld {
   double joint_effort(int joint) const;    // N m or N: what its motor gave in the last step
   void drive_joint_velocity(int joint, double rate, double max_effort);  // rad/s or m/s; N m or N
   void apply_joint_effort(int joint, double effort);
+  // Instead of what the file says, until the joint starts again.
+  void set_joint(int joint, JointSetting setting, double value);
 
   // Wheels that are bodies of their own (the wheels drive); wheel as in BodyLayout::wheels.
   // Positive rolls ahead.

@@ -143,8 +143,20 @@ JointConstraint PhysicsWorld::Impl::make_joint(int instance, int joint_index) {
   } else {
     tie(parent, child);  // what the joint carries is fixed to the world
   }
-  return {joint, parent < 0 ? ground_ : bullet(parent), child < 0 ? ground_ : bullet(child),
-          in_body(parent), in_body(child)};
+  const int reference = body_of(joint.gear_reference);
+  const bool gears = joint.type == model::JointType::gearbox;
+  if (gears && reference >= 0) {
+    for (const int body : {parent, child})
+      if (body >= 0) tie(body, reference);
+  }
+  return {joint,
+          parent < 0 ? ground_ : bullet(parent),
+          child < 0 ? ground_ : bullet(child),
+          in_body(parent),
+          in_body(child),
+          !gears          ? nullptr
+          : reference < 0 ? &ground_
+                          : &bullet(reference)};
 }
 
 void PhysicsWorld::Impl::add_joints() {
@@ -186,7 +198,10 @@ void PhysicsWorld::Impl::add_wheel(size_t i) {
 
 void PhysicsWorld::Impl::tie(int body, int other) {
   motions_[index(body)].tied = true;
-  if (other < 0) return;
+  if (other < 0) {
+    motions_[index(body)].hung = true;
+    return;
+  }
   motions_[index(other)].tied = true;
   tied_.emplace_back(body, other);
   rigid_.bodies[index(body)].info.joined.push_back(other);
@@ -445,9 +460,20 @@ void PhysicsWorld::Impl::step() {
   }
 }
 
+// With all that joints tie to it: a mechanism that stands still in the air falls as one.
 bool PhysicsWorld::Impl::falling(int body) const {
-  const ObjectInfo& info = rigid_.bodies[index(body)].info;
-  return !motions_[index(body)].tied && !info.moved && !info.gone && !info.on_plane && alone(body);
+  const btVector3& gravity = rigid_.bodies[index(body)].bullet->getGravity();
+  std::vector<int> tied{body};
+  for (size_t i = 0; i < tied.size(); ++i) {
+    const RigidBody& rigid = rigid_.bodies[index(tied[i])];
+    if (motions_[index(tied[i])].hung || rigid.info.moved || rigid.info.gone ||
+        rigid.info.on_plane || rigid.bullet->getGravity() != gravity || !alone(tied[i]))
+      return false;
+    for (const int other : rigid.info.joined) {
+      if (std::find(tied.begin(), tied.end(), other) == tied.end()) tied.push_back(other);
+    }
+  }
+  return true;
 }
 
 // Forces that are allowed, each on its own, can throw a light body at any speed, and what is thrown

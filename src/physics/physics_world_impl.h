@@ -29,6 +29,7 @@ struct Motion {
   Kind kind = Kind::free;
   bool dirty = false;      // our pose and twist are newer than Bullet's
   bool tied = false;       // by a joint: always simulated while awake
+  bool hung = false;       // by a joint to what never moves
   bool simulated = false;  // in this step
   bool fine = false;       // ... in the shorter substeps
   bool awake = false;      // when the step began

@@ -22,7 +22,11 @@ struct SolverBody {
 struct JointMotor {
   bool on = false, linear = false;
   Vec3 axis = Vec3::UnitZ(), anchor = Vec3::Zero();  // world; the child turns or moves positively
-  double advance = 0.0;             // m/rad, linear: of a thread, which the rate does not count
+  double advance = 0.0;  // m/rad, linear: of a thread, which the rate does not count
+  // Of a gearbox: the rate is the child's about the axis plus the parent's about this one, both
+  // against the reference, which bears the rest of the moments.
+  Vec3 parent_axis = Vec3::Zero();
+  btRigidBody* reference = nullptr;
   double rate = 0.0;                // rad/s or m/s
   double lower = 0.0, upper = 0.0;  // impulse in a substep, N m s or N s
   double softness = 0.0;            // rate lost for an impulse: 1 / (gain * substep)

@@ -346,7 +346,7 @@ bool Solver::newton_pays() {
   }
   const double rows = 3.0 * static_cast<double>(contact_count_);
   newton_pays_ =
-      contact_count_ > 0 && bodies_.size() > kFewBodies &&
+      contact_count_ > 0 && !blocks_.has_gears() && bodies_.size() > kFewBodies &&
       newton_.prepare(bodies_, pairs_) < kSweepsForAFactor * kProductsOfARow * rows + kSmall;
   return newton_pays_;
 }
@@ -486,7 +486,9 @@ void Solver::solve(const std::vector<btRigidBody*>& bodies,
   };
   for (btTypedConstraint* joint : joints) {
     const int a = tie(joint->getRigidBodyA()), b = tie(joint->getRigidBodyB());
-    blocks_.add(*joint, a, b, bodies_, substep_s);
+    const auto* motors = static_cast<const JointMotors*>(joint->getUserConstraintPtr());
+    btRigidBody* reference = motors ? motors->first.reference : nullptr;
+    blocks_.add(*joint, a, b, reference ? tie(*reference) : 0, bodies_, substep_s);
   }
   blocks_.prepare(bodies_);
   for (btPersistentManifold* manifold : manifolds) add_contacts(*manifold, substep_s);

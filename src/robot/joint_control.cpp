@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include <ruedo/joint_command_t.hpp>
@@ -15,7 +16,31 @@ namespace ruedo::robot {
 
 namespace {
 
+using physics::JointSetting;
+
 constexpr double kGainPerStep = 0.2;  // no more than this part of the error in a step
+// The joint's own limit, which the physics knows, holds.
+constexpr double kUnlimited = std::numeric_limits<double>::infinity();
+
+struct Limits {
+  double least, most;
+};
+
+// Of a command's value; null: there is no such mode.
+const Limits* limits_of(int8_t mode) {
+  constexpr double kLeastGain = 1e-9;
+  static constexpr Limits kOfModes[] = {
+      {-quantity::kLength.most, quantity::kLength.most},
+      {-quantity::kSpeed.most, quantity::kSpeed.most},
+      {-quantity::kEffort.most, quantity::kEffort.most},
+      {kLeastGain, quantity::kFactor.most},
+      {kLeastGain, quantity::kDamping.most},
+      {0.0, quantity::kEffort.most},
+      {0.0, quantity::kSpeed.most},
+  };
+  return mode >= 0 && static_cast<size_t>(mode) < std::size(kOfModes) ? &kOfModes[mode] : nullptr;
+}
+
 }  // namespace
 
 JointControl::JointControl(const model::WorldModel& world, const model::BodyLayout& layout,
@@ -27,49 +52,42 @@ JointControl::JointControl(const model::WorldModel& world, const model::BodyLayo
   targets_.reserve(layout.joints.size());
 }
 
+const model::Joint& JointControl::description(int joint) const {
+  const auto& placed = layout_.joints[static_cast<size_t>(joint)];
+  return world_.models[static_cast<size_t>(placed.instance)]
+      .model->joints[static_cast<size_t>(placed.joint)];
+}
+
+int JointControl::find(int robot, const std::string& name) const {
+  const std::vector<int>& joints = layout_.robots[static_cast<size_t>(robot)].joints;
+  const auto found = std::find_if(joints.begin(), joints.end(),
+                                  [&](int joint) { return description(joint).name == name; });
+  return found == joints.end() ? -1 : *found;
+}
+
+int8_t JointControl::check(int robot, const std::string& name, int8_t mode, double value) const {
+  if (!std::isfinite(value)) return motion_status_t::REASON_NOT_FINITE;
+  const Limits* limits = limits_of(mode);
+  if (!limits) return motion_status_t::REASON_BAD_KIND;
+  if (value > limits->most || value < limits->least) return motion_status_t::REASON_BAD_VALUE;
+  const int joint = find(robot, name);
+  // One that mimics another, and a gearbox, take no commands.
+  const bool takes = joint >= 0 && description(joint).leader < 0 &&
+                     description(joint).type != model::JointType::gearbox;
+  return takes ? motion_status_t::REASON_NONE : motion_status_t::REASON_BAD_VALUE;
+}
+
 int8_t JointControl::apply(int robot, const JointCommand& command) {
   const size_t n = command.names.size();
   if (command.modes.size() != n || command.values.size() != n)
     return motion_status_t::REASON_BAD_VALUE;
-  const auto& placement = layout_.robots[static_cast<size_t>(robot)];
-  const auto& model = *world_.models[static_cast<size_t>(placement.instance)].model;
-  const auto description = [&](int joint) -> const model::Joint& {
-    return model.joints[static_cast<size_t>(layout_.joints[static_cast<size_t>(joint)].joint)];
-  };
-  const auto find = [&](const std::string& name) {
-    const auto found = std::find_if(placement.joints.begin(), placement.joints.end(),
-                                    [&](int joint) { return description(joint).name == name; });
-    return found == placement.joints.end() ? -1 : *found;
-  };
   for (size_t i = 0; i < n; ++i) {
-    if (!std::isfinite(command.values[i])) return motion_status_t::REASON_NOT_FINITE;
-    const double most = command.modes[i] == joint_command_t::EFFORT     ? quantity::kEffort.most
-                        : command.modes[i] == joint_command_t::VELOCITY ? quantity::kSpeed.most
-                                                                        : quantity::kLength.most;
-    if (std::abs(command.values[i]) > most) return motion_status_t::REASON_BAD_VALUE;
-    if (command.modes[i] < joint_command_t::POSITION ||
-        command.modes[i] > joint_command_t::EFFORT) {
-      return motion_status_t::REASON_BAD_KIND;
-    }
-    const int joint = find(command.names[i]);
-    if (joint < 0 || description(joint).leader >= 0)
-      return motion_status_t::REASON_BAD_VALUE;  // one that mimics another takes no commands
+    if (const int8_t reason = check(robot, command.names[i], command.modes[i], command.values[i]))
+      return reason;
   }
   for (size_t i = 0; i < n; ++i) {
-    const int joint = find(command.names[i]);
-    const model::JointAxis& axis = description(joint).axis;
-    std::erase_if(targets_, [joint](const Target& target) { return target.joint == joint; });
-    if (command.modes[i] == joint_command_t::VELOCITY) {
-      physics_.drive_joint_velocity(joint, command.values[i], axis.effort);
-    } else if (command.modes[i] == joint_command_t::EFFORT) {
-      physics_.apply_joint_effort(joint, command.values[i]);
-    } else {
-      const bool limited = axis.lower <= axis.upper;
-      targets_.push_back(
-          {joint,
-           limited ? std::clamp(command.values[i], axis.lower, axis.upper) : command.values[i],
-           std::min(axis.position_gain, largest_gain_)});
-    }
+    const int joint = find(robot, command.names[i]);
+    tell(joint, command.modes[i], command.values[i]);
     const auto& placed = layout_.joints[static_cast<size_t>(joint)];
     if (placed.parent_body >= 0) physics_.wake(placed.parent_body);
     if (placed.child_body >= 0) physics_.wake(placed.child_body);
@@ -77,19 +95,46 @@ int8_t JointControl::apply(int robot, const JointCommand& command) {
   return motion_status_t::REASON_NONE;
 }
 
+// What passed check().
+void JointControl::tell(int joint, int8_t mode, double value) {
+  using Mode = joint_command_t;
+  const auto of_joint = [joint](const auto& each) { return each.joint == joint; };
+  switch (mode) {
+    case Mode::RATE_GAIN: return physics_.set_joint(joint, JointSetting::rate_gain, value);
+    case Mode::EFFORT_LIMIT: return physics_.set_joint(joint, JointSetting::effort, value);
+    case Mode::VELOCITY_LIMIT: return physics_.set_joint(joint, JointSetting::velocity, value);
+    case Mode::POSITION_GAIN:
+      std::erase_if(gains_, of_joint);
+      return gains_.push_back({joint, value});
+    default: break;
+  }
+  std::erase_if(targets_, of_joint);
+  if (mode == Mode::VELOCITY) return physics_.drive_joint_velocity(joint, value, kUnlimited);
+  if (mode == Mode::EFFORT) return physics_.apply_joint_effort(joint, value);
+  const model::JointAxis& axis = description(joint).axis;
+  const bool limited = axis.lower <= axis.upper;
+  targets_.push_back({joint, limited ? std::clamp(value, axis.lower, axis.upper) : value});
+}
+
+double JointControl::gain_of(int joint) const {
+  const auto set = std::find_if(gains_.begin(), gains_.end(),
+                                [joint](const Gain& gain) { return gain.joint == joint; });
+  const double gain = set == gains_.end() ? description(joint).axis.position_gain : set->value;
+  return std::min(gain, largest_gain_);
+}
+
 void JointControl::forget(int instance) {
-  std::erase_if(targets_, [&](const Target& target) {
-    return layout_.joints[static_cast<size_t>(target.joint)].instance == instance;
-  });
+  const auto of_instance = [&](const auto& each) {
+    return layout_.joints[static_cast<size_t>(each.joint)].instance == instance;
+  };
+  std::erase_if(targets_, of_instance);
+  std::erase_if(gains_, of_instance);
 }
 
 void JointControl::before_step() {
   for (const Target& target : targets_) {
     const double error = target.position - physics_.joint_position(target.joint);
-    const auto& placed = layout_.joints[static_cast<size_t>(target.joint)];
-    const auto& model = *world_.models[static_cast<size_t>(placed.instance)].model;
-    physics_.drive_joint_velocity(target.joint, target.gain * error,
-                                  model.joints[static_cast<size_t>(placed.joint)].axis.effort);
+    physics_.drive_joint_velocity(target.joint, gain_of(target.joint) * error, kUnlimited);
   }
 }
 

@@ -2,6 +2,7 @@
 // until the next one for that joint.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "model/body_layout.h"
@@ -16,23 +17,33 @@ class JointControl {
                physics::PhysicsWorld& physics);
 
   // Returns a reason of motion_status_t: 0 for accepted. A refused command changes no joint:
-  // unknown names, unknown modes, numbers that are not finite.
+  // unknown names, unknown modes, numbers that are not finite or not allowed.
   int8_t apply(int robot, const JointCommand& command);
   void before_step();
-  void forget(int instance);  // no command holds for its joints
+  void forget(int instance);  // no command holds for its joints, nor a setting
 
  private:
   struct Target {
     int joint;  // index into BodyLayout::joints
     double position;
-    double gain;  // 1/s
   };
+  struct Gain {
+    int joint;
+    double value;  // 1/s
+  };
+
+  const model::Joint& description(int joint) const;
+  int find(int robot, const std::string& name) const;  // -1: it has none of that name
+  int8_t check(int robot, const std::string& name, int8_t mode, double value) const;
+  void tell(int joint, int8_t mode, double value);
+  double gain_of(int joint) const;
 
   const model::WorldModel& world_;
   const model::BodyLayout& layout_;
   physics::PhysicsWorld& physics_;
   double largest_gain_;          // 1/s, of the position controller
   std::vector<Target> targets_;  // joints under position control
+  std::vector<Gain> gains_;      // that messages have set, in place of the file's
 };
 
 }  // namespace ruedo::robot

@@ -277,3 +277,27 @@ def test_slip_is_unbiased(integrator):
     wanted = (1 - math.exp(-k * length)) / k
     for values, mean in ((way, length), (ahead, wanted)):
         assert abs(values.mean() - mean) < 3.29 * values.std() / math.sqrt(runs)
+
+
+def falling(name, x, more=""):
+    return f"""<model name='{name}'><pose>{x} 0 5 0.3 0.2 0.1</pose><link name='body'><inertial><mass>2</mass>
+        <inertia><ixx>.02</ixx><iyy>.03</iyy><izz>.04</izz></inertia></inertial>
+        <sensor name='imu' type='imu'><update_rate>100</update_rate></sensor></link>{more}</model>"""
+
+
+def test_what_falls_feels_nothing_from_its_first_sample_on():
+    """A stone, and robots of both drives: an accelerometer in free fall shows 0, not 9.81."""
+    wheels = WHEEL.format(side="left", y=0.2) + WHEEL.format(side="right", y=-0.2)
+    drive = "<ruedo:drive type='{}'><ruedo:left_joint>left_joint</ruedo:left_joint><ruedo:right_joint>right_joint</ruedo:right_joint></ruedo:drive>"
+    text = (
+        "<sdf version='1.9' xmlns:ruedo='https://ruedo.org'><world name='w'>"
+        + falling("stone", 0)
+        + falling("kinematic", 3, wheels + drive.format("kinematic"))
+        + falling("wheels", 6, wheels + drive.format("wheels"))
+        + "</world></sdf>"
+    )
+    with ruedo.Engine(text=text, noise=False) as e:
+        felt = e["imu.linear_acceleration"]
+        for _ in range(20):
+            assert felt == pytest.approx(np.zeros((1, 3, 3)), abs=1e-6)
+            e.step(None, 2)

@@ -179,7 +179,7 @@ const std::vector<BadWorld>& table() {
       {"MistypedJoint",
        joint("<joint name='j' type='revolut'><parent>a</parent><child>b</child></joint>"),
        ":5: <joint>: type 'revolut' is not allowed; allowed are fixed, revolute, continuous, "
-       "prismatic, ball, universal, screw; did you mean 'revolute'?",
+       "prismatic, ball, universal, screw, gearbox; did you mean 'revolute'?",
        "the joint is left out"},
       {"JointWithoutChild", joint("<joint name='j' type='fixed'><parent>a</parent></joint>"),
        ":5: <joint>: has no <child>", "the joint is left out"},

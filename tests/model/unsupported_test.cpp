@@ -66,8 +66,8 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         Part{"OtherPlugin", plugin("libx.so", "x") + plugin("libx.so", "y"),
              "plugins are not loaded: libx.so"},
-        Part{"Gearbox", joint("gearbox"),
-             "joints of type 'gearbox' are not supported; this one is held fixed"},
+        Part{"Planar", joint("planar"),
+             "joints of type 'planar' are not supported; this one is held fixed"},
         Part{"InitialPositionOfABall", joint("ball", "<initial_position>0.5</initial_position>"),
              "<initial_position> is not supported in such a joint: it begins at 0"},
         Part{"VelocityDecay",

@@ -33,6 +33,40 @@ TEST(FreeMotion, TheFirstStateKnowsWhatFalls) {
   }
 }
 
+// A mechanism in the air falls as one; one that hangs on the world, or of which a part stands on
+// something, does not.
+TEST(FreeMotion, TheFirstStateKnowsWhichMechanismFalls) {
+  const auto two = [](const std::string& name, const std::string& pose, const std::string& more) {
+    const std::string inertial =
+        "<inertial><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia>"
+        "</inertial><collision name='c'><geometry>" +
+        kBall + "</geometry></collision></link>";
+    return "<model name='" + name + "'><pose>" + pose + "</pose><link name='a'>" + inertial +
+           "<link name='b'><pose>0.15 0 0 0 0 0</pose>" + inertial +
+           "<joint name='j' type='revolute'><parent>a</parent><child>b</child><axis><xyz>0 1 "
+           "0</xyz></axis></joint>" +
+           more + "</model>";
+  };
+  World w(kPlane + two("falling", "0 0 5 0 0 0", "") + two("standing", "5 0 0.1 0 0 0", "") +
+              two("hanging", "10 0 5 0 0 0",
+                  "<joint name='h' type='ball'><parent>world</parent><child>a</child></joint>"),
+          5000);
+  Snapshot first, second;
+  w.physics.read(first);
+  w.physics.step();
+  w.physics.read(second);
+  for (const char* link : {"/a", "/b"}) {
+    for (const Snapshot* state : {&first, &second}) {
+      const auto z = [&](const std::string& model) {
+        return state->body_accelerations[static_cast<size_t>(w.body(model + link))].z();
+      };
+      EXPECT_NEAR(z("falling"), -10.0, 1e-6) << link;
+      EXPECT_NEAR(z("standing"), 0.0, 1e-3) << link;
+      if (state == &first) EXPECT_EQ(z("hanging"), 0.0) << link;
+    }
+  }
+}
+
 // A body with three moments, spun near its middle axis, tumbles; energy and angular momentum stay.
 TEST(FreeMotion, RotationKeepsEnergyAndAngularMomentum) {
   World w(

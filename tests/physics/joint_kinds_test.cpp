@@ -90,5 +90,118 @@ TEST(JointKinds, ARateGainYields) {
   EXPECT_NEAR(w.physics.joint_velocity(0), 5.0 / 500.0, 1e-4);
 }
 
+std::string gearbox(const std::string& reference, double ratio, const std::string& xyz2 = "0 0 1") {
+  return joint("gear", "gearbox", "p", "c", "0 0 1", "",
+               "<axis2><xyz>" + xyz2 + "</xyz></axis2><gearbox_ratio>" + std::to_string(ratio) +
+                   "</gearbox_ratio><gearbox_reference_body>" + reference +
+                   "</gearbox_reference_body>");
+}
+constexpr int kTable = 0, kParent = 1, kChild = 2, kGear = 3;  // joints
+
+// Two wheels of 0.01 kg m^2 on a table, which turns or is held; geared by g = 3.
+std::string geared(const std::string& table_joint, const std::string& reference) {
+  return "<model name='m'>" + link("r", "0 0 1 0 0 0") + link("p", "0.2 0 1 0 0 0") +
+         link("c", "-0.3 0 1 0 0 0") + joint("t", table_joint, "world", "r", "0 0 1") +
+         joint("jp", "continuous", "r", "p", "0 0 1") +
+         joint("jc", "continuous", "r", "c", "0 0 1") + gearbox(reference, 3.0) + "</model>";
+}
+
+// A torque on the one wheel turns both: (J + g^2 J) alpha = tau, theta2 = -g theta1.
+TEST(JointKinds, AGearboxHoldsItsRatio) {
+  World w("<model name='m'>" + link("p", "0.2 0 1 0 0 0") + link("c", "-0.3 0 1 0 0 0") +
+              joint("jp", "continuous", "world", "p", "0 0 1") +
+              joint("jc", "continuous", "world", "c", "0 0 1") + gearbox("world", 3.0) + "</model>",
+          5000);
+  w.physics.apply_joint_effort(0, 0.5);
+  w.run(1.0);
+  const double alpha = 0.5 / (0.01 + 9 * 0.01);  // 5 rad/s^2
+  EXPECT_NEAR(w.physics.joint_velocity(0), alpha, 1e-3 * alpha);
+  EXPECT_NEAR(w.physics.joint_velocity(1), -3.0 * alpha, 1e-3 * alpha);
+  EXPECT_NEAR(w.physics.joint_position(1), -3.0 * w.physics.joint_position(0), 1e-6);
+  EXPECT_NEAR(w.physics.joint_position(2), w.physics.joint_position(1), 1e-6);  // 7.5 rad
+  EXPECT_GT(w.physics.joint_position(0), 2.4);
+  // The moment on the child: J times its acceleration.
+  EXPECT_NEAR(std::abs(w.physics.joint_effort(2)), 0.01 * 3.0 * alpha, 1e-3);
+}
+
+// The axes may be square to each other, as of a bevel gear, and the ratio negative.
+TEST(JointKinds, ABevelGear) {
+  World w("<model name='m'>" + link("p", "0.2 0 1 0 0 0") + link("c", "-0.3 0 1 0 0 0") +
+              joint("jp", "continuous", "world", "p", "0 0 1") +
+              joint("jc", "continuous", "world", "c", "1 0 0") + gearbox("world", -0.5, "1 0 0") +
+              "</model>",
+          5000);
+  w.physics.drive_joint_velocity(0, 2.0, 1e3);
+  w.run(5.0);
+  EXPECT_NEAR(w.physics.joint_position(0), 10.0, 0.02);
+  EXPECT_NEAR(w.physics.joint_position(1), 0.5 * w.physics.joint_position(0), 1e-6);
+}
+
+// On a table that turns freely no moment comes from outside: with S the moment of inertia of all,
+// and those of table and wheels about its axis, S w + (J - g J) theta1' = 0, and
+// (J + g^2 J - (J - g J)^2 / S) theta1'' = tau.
+TEST(JointKinds, AGearboxTurnsWhatCarriesIt) {
+  World w(geared("continuous", "r"), 5000);
+  w.physics.apply_joint_effort(kParent, 0.5);
+  w.run(1.0);
+  const double J = 0.01, g = 3.0, S = 3 * J + 0.2 * 0.2 + 0.3 * 0.3, d = J - g * J;
+  const double alpha = 0.5 / (J + g * g * J - d * d / S);
+  EXPECT_NEAR(w.physics.joint_velocity(kParent), alpha, 2e-3 * alpha);
+  EXPECT_NEAR(w.physics.joint_velocity(kTable), -d / S * alpha, 2e-3 * alpha);
+  EXPECT_NEAR(w.physics.joint_position(kChild), -g * w.physics.joint_position(kParent), 1e-6);
+  EXPECT_NEAR(w.physics.joint_position(kGear), w.physics.joint_position(kChild), 1e-6);
+}
+
+// Carried round on a table, gears that nothing turns against it stand still against it.
+TEST(JointKinds, AGearboxIsCarriedRound) {
+  World w(geared("continuous", "r"), 5000);
+  w.physics.drive_joint_velocity(kTable, 3.0, 1e3);
+  w.physics.drive_joint_velocity(kParent, 0.0, 1e3);
+  w.run(4.0);
+  EXPECT_NEAR(w.physics.joint_position(kTable), 12.0, 0.02);
+  EXPECT_NEAR(w.physics.joint_position(kParent), 0.0, 1e-6);
+  EXPECT_NEAR(w.physics.joint_position(kChild), 0.0, 1e-5);
+}
+
+// A motor of 1e-5 kg m^2 holds an arm of m g r = 5 N m through 100 : 1, with a hundredth of its
+// moment, and the arm does not sink.
+TEST(JointKinds, AMotorHoldsAnArmThroughItsGearbox) {
+  World w(
+      "<model name='m'><link name='p'><pose>0 1 1 0 0 0</pose><inertial><mass>0.1</mass>"
+      "<inertia><ixx>1e-5</ixx><iyy>1e-5</iyy><izz>1e-5</izz></inertia></inertial></link>"
+      "<link name='c'><pose>0 0 1 0 0 0</pose><inertial><pose>0.5 0 0 0 0 0</pose>"
+      "<mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia>"
+      "</inertial></link>" +
+          joint("jp", "continuous", "world", "p", "0 1 0") +
+          joint("jc", "continuous", "world", "c", "0 1 0") +
+          joint("gear", "gearbox", "p", "c", "0 1 0", "",
+                "<gearbox_ratio>0.01</gearbox_ratio>"
+                "<gearbox_reference_body>world</gearbox_reference_body>") +
+          "</model>",
+      5000);
+  w.physics.drive_joint_velocity(0, 0.0, 1e3);
+  w.run(10.0);
+  EXPECT_NEAR(w.physics.joint_position(1), 0.0, 1e-5);
+  EXPECT_NEAR(std::abs(w.physics.joint_effort(0)), 0.05, 1e-4);
+}
+
+TEST(JointKinds, AGearboxNeedsItsReference) {
+  const auto loaded = [](const std::string& more) {
+    return model::load_world_text("<sdf version='1.9'><world name='w'><model name='m'>" +
+                                      link("p", "0 0 0 0 0 0") + link("c", "0 0 0 0 0 0") +
+                                      joint("g", "gearbox", "p", "c", "0 0 1", "", more) +
+                                      "</model></world></sdf>",
+                                  "test.sdf");
+  };
+  const auto said = [&](const std::string& more) {
+    const auto world = loaded(more);
+    return world->findings.empty() ? "nothing" : world->findings[0].text;
+  };
+  EXPECT_NE(said("").find("has no <gearbox_reference_body>"), std::string::npos) << said("");
+  EXPECT_NE(said("<gearbox_reference_body>nobody</gearbox_reference_body>").find("nobody"),
+            std::string::npos);
+  EXPECT_EQ(said("<gearbox_reference_body>p</gearbox_reference_body>"), "nothing");
+}
+
 }  // namespace
 }  // namespace ruedo::physics::testing

@@ -100,7 +100,7 @@ TEST_F(Gimbal, TheNewestCommandHoldsAndARefusedOneChangesNothing) {
   tell("pan", kVelocity, 0.3);
   tell("pan", kPosition, 0.5);
   for (const auto& [joint, mode, value] :
-       {std::tuple("pan", int8_t{3}, 1.0), std::tuple("pan", kPosition, std::nan("")),
+       {std::tuple("pan", int8_t{7}, 1.0), std::tuple("pan", kPosition, std::nan("")),
         std::tuple("fl_joint", kVelocity, 1.0)}) {
     tell(joint, mode, value);
     sim.step();
@@ -109,6 +109,85 @@ TEST_F(Gimbal, TheNewestCommandHoldsAndARefusedOneChangesNothing) {
   }
   sim.run(3.0);
   EXPECT_NEAR(position("pan"), 0.5, 5e-3);
+}
+
+// Head and eye have 0.2 kg m^2 about the pan: 0.1 N m make 0.5 rad/s^2 of that, 0.2 N m 1 rad/s^2.
+TEST_F(Gimbal, ALimitOfEffortComesByMessage) {
+  tell("pan", kVelocity, 10.0);
+  tell("pan", joint_command_t::EFFORT_LIMIT, 0.1);
+  sim.run(0.5);
+  const double inertia = 0.2;  // head and eye
+  EXPECT_NEAR(rate("pan"), 0.1 / inertia * 0.5, 2e-3);
+  tell("pan", joint_command_t::EFFORT_LIMIT, 0.2);  // what it was told already goes on within it
+  sim.run(0.5);
+  EXPECT_NEAR(rate("pan"), (0.1 + 0.2) / inertia * 0.5, 4e-3);
+}
+
+TEST_F(Gimbal, ALimitOfVelocityComesByMessageAndMayBeAboveTheFiles) {
+  tell("tilt", kVelocity, 2.0);
+  sim.run(0.2);
+  EXPECT_NEAR(rate("tilt"), 0.5, 5e-3);
+  tell("tilt", joint_command_t::VELOCITY_LIMIT, 0.8);
+  sim.run(0.2);
+  EXPECT_NEAR(rate("tilt"), 0.8, 5e-3);
+  tell("tilt", joint_command_t::VELOCITY_LIMIT, 0.0);
+  sim.run(0.2);
+  EXPECT_NEAR(rate("tilt"), 0.0, 5e-3);
+}
+
+// Towards a position the error falls as exp(-k t).
+TEST_F(Gimbal, APositionGainComesByMessage) {
+  tell("pan", joint_command_t::POSITION_GAIN, 2.0);
+  tell("pan", kPosition, 1.0);
+  sim.run(1.0);
+  EXPECT_NEAR(1.0 - position("pan"), std::exp(-2.0), 2e-3);
+  tell("pan", joint_command_t::POSITION_GAIN, 4.0);
+  sim.run(0.5);
+  EXPECT_NEAR(1.0 - position("pan"), std::exp(-4.0), 1e-3);
+}
+
+// With k N s/m the lift's 1 kg sinks at m g / k.
+TEST_F(Gimbal, ARateGainComesByMessage) {
+  tell("lift", kPosition, 0.4);
+  sim.run(3.0);
+  tell("lift", kVelocity, 0.0);
+  tell("lift", joint_command_t::RATE_GAIN, 196.0);
+  sim.run(0.5);
+  EXPECT_NEAR(rate("lift"), -9.8 / 196.0, 1e-3);
+}
+
+// Started again it is as its file says.
+TEST_F(Gimbal, SettingsEndWhenItStartsAgain) {
+  tell("tilt", joint_command_t::VELOCITY_LIMIT, 0.1);
+  tell("pan", joint_command_t::POSITION_GAIN, 1e-3);
+  sim.robots.start_again(1);
+  tell("tilt", kVelocity, 2.0);
+  tell("pan", kPosition, 1.0);
+  sim.run(1.0);
+  EXPECT_NEAR(rate("tilt"), 0.5, 5e-3);
+  EXPECT_NEAR(position("pan"), 1.0, 1e-3);
+}
+
+TEST_F(Gimbal, SettingsThatAreNotAllowedAreRefused) {
+  struct Case {
+    int8_t mode;
+    double value;
+  };
+  for (const Case& each :
+       {Case{joint_command_t::POSITION_GAIN, 0.0}, Case{joint_command_t::POSITION_GAIN, -1.0},
+        Case{joint_command_t::RATE_GAIN, 0.0}, Case{joint_command_t::RATE_GAIN, 1e30},
+        Case{joint_command_t::EFFORT_LIMIT, -1e-3}, Case{joint_command_t::VELOCITY_LIMIT, -1.0},
+        Case{joint_command_t::VELOCITY_LIMIT, std::nan("")}, Case{7, 1.0}, Case{-1, 1.0}}) {
+    // The first of the two is fine; with the other one neither counts.
+    sim.robots.apply({0, JointCommand{{"tilt", "tilt"},
+                                      {joint_command_t::VELOCITY_LIMIT, each.mode},
+                                      {0.1, each.value}}});
+    sim.step();
+    EXPECT_EQ(sim.state.motion_ends.size(), 1u) << int{each.mode} << " " << each.value;
+  }
+  tell("tilt", kVelocity, 2.0);
+  sim.run(0.2);
+  EXPECT_NEAR(rate("tilt"), 0.5, 5e-3);
 }
 
 }  // namespace

@@ -220,5 +220,36 @@ TEST(Wheels, StandsAcrossASlopeWithTheFrictionOfItsFile) {
   }
 }
 
+// Two wheels, and a caster before and behind: rigid, the casters may carry all of the load, for
+// nothing says how it is shared. Sprung ones leave it to the wheels.
+TEST(Wheels, SprungCastersLeaveTheLoadToTheWheels) {
+  const auto wheel = [](const std::string& name, const std::string& y) {
+    return "<link name='" + name + "'><pose>0 " + y +
+           " 0.1 -1.5707963267948966 0 0</pose><inertial><mass>1</mass><inertia><ixx>0.003</ixx>"
+           "<iyy>0.003</iyy><izz>0.005</izz></inertia></inertial><collision name='c'><geometry>"
+           "<cylinder><radius>0.1</radius><length>0.04</length></cylinder></geometry></collision>"
+           "</link><joint name='" +
+           name + "_joint' type='continuous'><parent>base</parent><child>" + name +
+           "</child><axis><xyz>0 0 1</xyz></axis></joint>";
+  };
+  const auto caster = [](const std::string& name, const std::string& x) {
+    return "<collision name='" + name + "'><pose>" + x +
+           " 0 -0.15 0 0 0</pose><geometry><sphere><radius>0.05</radius></sphere></geometry>"
+           "<surface><friction><ode><mu>0</mu><mu2>0</mu2></ode></friction><contact><ode>"
+           "<kp>1e5</kp><kd>1e3</kd></ode></contact></surface></collision>";
+  };
+  Sim sim(plane_sdf() +
+          "<model name='r'><link name='base'><pose>0 0 0.2 0 0 0</pose><inertial><mass>20</mass>"
+          "<inertia><ixx>0.5</ixx><iyy>1</iyy><izz>1.5</izz></inertia></inertial>" +
+          caster("front", "0.3") + caster("rear", "-0.3") + "</link>" + wheel("l", "0.3") +
+          wheel("r", "-0.3") +
+          "<ruedo:drive type='wheels'><ruedo:left_joint>l_joint</ruedo:left_joint>"
+          "<ruedo:right_joint>r_joint</ruedo:right_joint><ruedo:acceleration>1</"
+          "ruedo:acceleration><ruedo:watchdog>0</ruedo:watchdog></ruedo:drive></model>");
+  sim.velocity(0.5, 0.0);
+  sim.run(5.0);  // 0.125 m while it gains speed, then 4.5 s
+  EXPECT_NEAR(sim.position().x(), 2.375, 0.02);
+}
+
 }  // namespace
 }  // namespace ruedo::robot::testing
