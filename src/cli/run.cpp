@@ -354,6 +354,12 @@ void add_run(CLI::App& app, Action& chosen) {
       ->capture_default_str()
       ->check(CLI::Range(0.1, 10000.0));
   command
+      ->add_option("--ros2-services", arguments->ros2.services,
+                   "how services are mapped: as each call came, or as one middleware does")
+      ->type_name("RMW")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "cyclonedds", "fastrtps"}));
+  command
       ->add_option("--wait-for", arguments->wait_for,
                    "wait at each step where a command is due: CHANNEL@HZ")
       ->type_name("INPUT")

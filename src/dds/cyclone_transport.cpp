@@ -19,6 +19,7 @@
 #include <spdlog/spdlog.h>
 #include <sys/socket.h>
 
+#include "dds/identity.h"
 #include "dds/raw_type.h"
 #include "ros2/interfaces.h"
 #include "ruedo/errors.h"
@@ -166,6 +167,7 @@ class CycloneWriter : public ros2::Writer {
                      "topic " + name);
     writer_ = checked(dds_create_writer(participant, topic_, qos_of(endpoint).get(), nullptr),
                       "writer of " + name);
+    if (endpoint.role == Role::reply) tell_identities(*type_);
   }
   ~CycloneWriter() override {
     dds_delete(writer_);
@@ -175,6 +177,10 @@ class CycloneWriter : public ros2::Writer {
   bool write(std::span<const uint8_t> cdr) override {
     ddsi_serdata* sample = make_sample(type_, cdr);
     return dds_writecdr(writer_, sample) == DDS_RETCODE_OK;
+  }
+  bool reply(std::span<const uint8_t> cdr, const ros2::SampleIdentity& request) override {
+    const std::vector<uint8_t> marked = with_identity(cdr, request);
+    return !marked.empty() && write(marked);
   }
   size_t readers() const override {
     dds_publication_matched_status_t status{};
@@ -232,7 +238,7 @@ class CycloneReader : public ros2::Reader {
     for (int count = kMostTaken; count == kMostTaken;) {
       count = dds_takecdr(reader_, samples, kMostTaken, infos, DDS_ANY_STATE);
       for (int i = 0; i < count; ++i) {
-        if (infos[i].valid_data) handler_(bytes_of(samples[i]));
+        if (infos[i].valid_data) handler_(as_sample(samples[i]));
         ddsi_serdata_unref(samples[i]);
       }
     }

@@ -11,6 +11,8 @@
 
 #include <dds/ddsi/q_radmin.h>
 
+#include "dds/identity.h"
+
 namespace ruedo::dds {
 namespace {
 
@@ -21,6 +23,8 @@ struct RawType : ddsi_sertype {};
 struct RawSample : ddsi_serdata {
   std::vector<uint8_t> bytes;  // with CDR's header, filled up to a multiple of four
   size_t size = 0;             // without what fills up
+  ros2::SampleIdentity identity;
+  bool is_related = false;
 };
 
 RawSample* new_sample(const ddsi_sertype* type, ddsi_serdata_kind kind, size_t size) {
@@ -47,11 +51,22 @@ bool is_too_large(ddsi_serdata_kind kind, size_t size) {
   return too_large;
 }
 
+// From the datagram that the sample came in.
+void identify(RawSample& sample, const nn_rdata& first) {
+  const unsigned char* packet = NN_RMSG_PAYLOAD(first.rmsg);
+  const DataIdentity found =
+      identity_in({packet, NN_RDATA_PAYLOAD_OFF(&first)}, NN_RDATA_SUBMSG_OFF(&first));
+  sample.identity = found.sample;
+  sample.is_related = found.related.has_value();
+  if (found.related) sample.identity.writer = *found.related;
+}
+
 // Fragments come in the order of their offsets and may overlap.
 ddsi_serdata* from_fragments(const ddsi_sertype* type, ddsi_serdata_kind kind,
                              const nn_rdata* fragment, size_t size) {
   if (is_too_large(kind, size)) return nullptr;
   RawSample* sample = new_sample(type, kind, size);
+  const nn_rdata* first = fragment;
   uint32_t done = 0;
   for (; fragment; fragment = fragment->nextfrag) {
     if (fragment->maxp1 <= done || fragment->min > done || fragment->maxp1 > size) continue;
@@ -61,6 +76,7 @@ ddsi_serdata* from_fragments(const ddsi_sertype* type, ddsi_serdata_kind kind,
                 fragment->maxp1 - done);
     done = fragment->maxp1;
   }
+  identify(*sample, *first);
   return sample;
 }
 
@@ -179,9 +195,9 @@ ddsi_serdata* make_sample(const ddsi_sertype* type, std::span<const uint8_t> byt
   return sample;
 }
 
-std::span<const uint8_t> bytes_of(const ddsi_serdata* sample) {
+ros2::Sample as_sample(const ddsi_serdata* sample) {
   const RawSample& raw = as_raw(sample);
-  return {raw.bytes.data(), raw.size};
+  return {{raw.bytes.data(), raw.size}, raw.identity, raw.is_related};
 }
 
 uint64_t refused_samples() { return refused; }

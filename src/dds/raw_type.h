@@ -11,6 +11,8 @@
 #include <dds/ddsi/ddsi_serdata.h>
 #include <dds/ddsi/ddsi_sertype.h>
 
+#include "ros2/transport.h"
+
 namespace ruedo::dds {
 
 // Samples that come in and are larger are dropped, and counted.
@@ -24,8 +26,8 @@ dds_entity_t create_raw_topic(dds_entity_t participant, const char* topic, const
 // A sample of that topic's type to be written by dds_writecdr(), which takes it over.
 ddsi_serdata* make_sample(const ddsi_sertype* type, std::span<const uint8_t> bytes);
 
-// The bytes of a sample that dds_takecdr() gave.
-std::span<const uint8_t> bytes_of(const ddsi_serdata* sample);
+// What a sample that dds_takecdr() gave holds, while that lives.
+ros2::Sample as_sample(const ddsi_serdata* sample);
 
 uint64_t refused_samples();
 

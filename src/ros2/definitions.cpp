@@ -150,6 +150,26 @@ constexpr Definition kDefinitions[] = {
      "string entity\n---\nResult result\nEntityState state\n"},
     {"simulation_interfaces/srv/SetEntityState",
      "string entity\nEntityState state\n---\nResult result\n"},
+    {"unique_identifier_msgs/msg/UUID", "uint8[16] uuid\n"},
+    {"action_msgs/msg/GoalInfo",
+     "unique_identifier_msgs/UUID goal_id\nbuiltin_interfaces/Time stamp\n"},
+    {"action_msgs/msg/GoalStatus", "GoalInfo goal_info\nint8 status\n"},
+    {"action_msgs/msg/GoalStatusArray", "GoalStatus[] status_list\n"},
+    {"action_msgs/srv/CancelGoal",
+     "GoalInfo goal_info\n---\nint8 return_code\nGoalInfo[] goals_canceling\n"},
+    {"simulation_interfaces/action/SimulateSteps_Goal", "uint64 steps\n"},
+    {"simulation_interfaces/action/SimulateSteps_Result", "Result result\n"},
+    {"simulation_interfaces/action/SimulateSteps_Feedback",
+     "uint64 completed_steps\nuint64 remaining_steps\n"},
+    {"simulation_interfaces/action/SimulateSteps_SendGoal",
+     "unique_identifier_msgs/UUID goal_id\nsimulation_interfaces/action/SimulateSteps_Goal goal\n"
+     "---\nbool accepted\nbuiltin_interfaces/Time stamp\n"},
+    {"simulation_interfaces/action/SimulateSteps_GetResult",
+     "unique_identifier_msgs/UUID goal_id\n---\nint8 status\n"
+     "simulation_interfaces/action/SimulateSteps_Result result\n"},
+    {"simulation_interfaces/action/SimulateSteps_FeedbackMessage",
+     "unique_identifier_msgs/UUID goal_id\n"
+     "simulation_interfaces/action/SimulateSteps_Feedback feedback\n"},
     {"rmw_dds_common/msg/Gid", "char[16] data\n", "char[24] data\n"},
     {"rmw_dds_common/msg/NodeEntitiesInfo",
      "string<=256 node_namespace\nstring<=256 node_name\nGid[] reader_gid_seq\nGid[] "

@@ -54,9 +54,10 @@ Field read_field(const std::string& package, std::string type, const std::string
     field.text_capacity = number(type.substr(bound + 2));
     type.resize(bound);
   }
-  if (const size_t slash = type.find('/'); slash != std::string::npos) {
+  const size_t slash = type.find('/');
+  if (slash != std::string::npos && slash == type.rfind('/')) {
     type = type.substr(0, slash) + "/msg/" + type.substr(slash + 1);
-  } else if (!kTypeIds.contains(type)) {
+  } else if (slash == std::string::npos && !kTypeIds.contains(type)) {
     type = package + "/msg/" + type;
   }
   field.type = type;
@@ -86,8 +87,8 @@ struct Library {
   }
 
   void add(const std::string& name, const std::string& text) {
-    if (name.find("/srv/") == std::string::npos) return put(name, text);
-    const size_t half = text.find("---\n");
+    const size_t half = text.find("---\n");  // a service, an action's among them
+    if (half == std::string::npos) return put(name, text);
     put(name + "_Request", text.substr(0, half));
     put(name + "_Response", text.substr(half + 4));
     fields[name + "_Event"] = {{"service_msgs/msg/ServiceEventInfo", "info"},

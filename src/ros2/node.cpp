@@ -54,8 +54,8 @@ Node::Node(NodeOptions options, std::unique_ptr<Transport> transport,
       clock_period_us_(std::max<int64_t>(1, rounded(1e6 / options_.clock_hz))) {
   clock_topic_ = {names_.topic("", "clock"), "rosgraph_msgs/msg/Clock", kStateQos};
   clock_ = transport_->add_writer(endpoint(clock_topic_));
-  services_ =
-      std::make_unique<Services>(*transport_, options_.conversion.distro, names_, requests_);
+  services_ = std::make_unique<Services>(
+      ServiceContext{*transport_, options_.conversion.distro, options_.mapping, names_}, requests_);
   graph_ = transport_->add_writer(
       endpoint({"ros_discovery_info", "rmw_dds_common/msg/ParticipantEntitiesInfo", kLatchedQos},
                Role::graph));
@@ -152,7 +152,7 @@ void Node::add_commands(const std::vector<world_info_t>& info) {
     if (!fresh) continue;
     readers_[name] = transport_->add_reader(
         endpoint(at->second.topic),
-        [this, added = &at->second](std::span<const uint8_t> cdr) { receive(*added, cdr); });
+        [this, added = &at->second](const Sample& sample) { receive(*added, sample.cdr); });
   }
   for (const world_info_t& part : info) {
     for (const robot_info_t& robot : part.robots) {
@@ -160,8 +160,8 @@ void Node::add_commands(const std::vector<world_info_t>& info) {
                         "geometry_msgs/msg/PoseWithCovarianceStamped", kCommandQos};
       if (!poses_.try_emplace(key(topic), topic).second) continue;
       readers_[key(topic)] = transport_->add_reader(
-          endpoint(topic), [this, name = robot.name, topic](std::span<const uint8_t> cdr) {
-            receive_pose(name, topic.name, cdr);
+          endpoint(topic), [this, name = robot.name, topic](const Sample& sample) {
+            receive_pose(name, topic.name, sample.cdr);
           });
     }
   }

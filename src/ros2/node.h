@@ -25,6 +25,7 @@ namespace ruedo::ros2 {
 struct NodeOptions {
   ConversionOptions conversion;
   double clock_hz = 100.0;  // of sim time, at most
+  ServiceMapping mapping = ServiceMapping::automatic;
   JointNames joints = [](const std::string&) { return std::vector<std::string>(); };
 };
 

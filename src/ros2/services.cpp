@@ -4,9 +4,8 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <map>
-#include <thread>
+#include <set>
 
 #include <regex.h>
 
@@ -25,34 +24,6 @@
 #include "ruedo/step_request_t.hpp"
 
 namespace ruedo::ros2 {
-
-class Services::Call {
- public:
-  Call(Writer& replies, std::span<const uint8_t> cdr)
-      : bytes_(cdr.begin(), cdr.end()), in(bytes_), replies_(replies) {
-    client_ = in.get<uint64_t>();
-    sequence_ = in.get<int64_t>();
-  }
-
-  // Begins the answer.
-  CdrWriter answer() const {
-    CdrWriter out;
-    out.put(client_).put(sequence_);
-    return out;
-  }
-  void send(const CdrWriter& out) { replies_.write(out.bytes()); }
-
- private:
-  std::vector<uint8_t> bytes_;
-
- public:
-  CdrReader in;
-
- private:
-  Writer& replies_;
-  uint64_t client_ = 0;
-  int64_t sequence_ = 0;
-};
 
 namespace {
 
@@ -152,43 +123,15 @@ class Filter {
   regex_t expression_{};
 };
 
-// A client's first request may be here before it is known who reads the replies, which would then
-// are lost: rmw_cyclonedds waits for that, too. Each client has a writer and a reader; one that
-// has no reader costs the wait once.
-void await_reader(const Reader& requests, const Writer& replies, size_t& deaf) {
-  constexpr auto kLongest = std::chrono::milliseconds(500), kLook = std::chrono::milliseconds(1);
-  const auto missing = [&] {
-    const size_t clients = requests.writers(), readers = replies.readers();
-    return clients > readers ? clients - readers : 0;
-  };
-  deaf = std::min(deaf, missing());
-  const auto deadline = std::chrono::steady_clock::now() + kLongest;
-  while (missing() > deaf && std::chrono::steady_clock::now() < deadline)
-    std::this_thread::sleep_for(kLook);
-  deaf = missing();
-}
-
-// Both ends of a service say that they belong together.
-std::string service_id(const Gid& gid, const std::string& name) {
-  uint64_t hash = 14695981039346656037u;  // FNV-1a
-  const auto mix = [&](uint8_t byte) { hash = (hash ^ byte) * 1099511628211u; };
-  for (const uint8_t byte : gid) mix(byte);
-  for (const char c : name) mix(static_cast<uint8_t>(c));
-  std::string text;
-  for (int i = 0; i < 16; ++i) {
-    const char* digits = "0123456789abcdef";
-    const auto byte = static_cast<uint8_t>(hash >> (i % 8 * 8)) ^ static_cast<uint8_t>(i);
-    text += i == 0 ? "" : ".";
-    text += digits[byte / 16];
-    text += digits[byte % 16];
-  }
-  return text;
-}
-
 }  // namespace
 
-Services::Services(Transport& transport, Distro distro, Names& names, Requests& requests)
-    : requests_(requests) {
+Services::Services(const ServiceContext& context, Requests& requests)
+    : requests_(requests), step_action_(context, requests, faulty_) {
+  struct Row {
+    const char* name;
+    const char* type;
+    void (Services::*handler)(const CallPointer& call);
+  };
   static constexpr Row kRows[] = {
       {"get_simulator_features", "GetSimulatorFeatures", &Services::get_simulator_features},
       {"reset_simulation", "ResetSimulation", &Services::reset_simulation},
@@ -201,50 +144,30 @@ Services::Services(Transport& transport, Distro distro, Names& names, Requests& 
       {"get_entity_state", "GetEntityState", &Services::get_entity_state},
       {"set_entity_state", "SetEntityState", &Services::set_entity_state},
   };
-  for (const Row& row : kRows) add(transport, distro, names, row);
-}
-
-void Services::add(Transport& transport, Distro distro, Names& names, const Row& row) {
-  auto service = std::make_unique<Service>();
-  const std::string type = std::string("simulation_interfaces/srv/") + row.type;
-  service->topic = {names.topic("", row.name), type, kCommandQos};
-  const std::string hash = type_hash(type, distro),
-                    id = service_id(transport.gid(), service->topic.name);
-  service->replies = transport.add_writer(
-      {Role::reply, {service->topic.name, type + "_Response", kCommandQos}, hash, id});
-  service->requests = transport.add_reader(
-      {Role::request, {service->topic.name, type + "_Request", kCommandQos}, hash, id},
-      [this, added = service.get(), handler = row.handler](std::span<const uint8_t> cdr) {
-        receive(*added, handler, cdr);
-      });
-  services_.push_back(std::move(service));
-}
-
-void Services::receive(Service& service, Handler handler, std::span<const uint8_t> cdr) {
-  const auto call = std::make_shared<Call>(*service.replies, cdr);
-  if (!call->in.good()) {
-    ++faulty_;
-    return;
+  for (const Row& row : kRows) {
+    services_.push_back(std::make_unique<ServiceServer>(
+        context, row.name, std::string("simulation_interfaces/srv/") + row.type,
+        [this, handler = row.handler](const CallPointer& call) { (this->*handler)(call); },
+        faulty_));
   }
-  await_reader(*service.requests, *service.replies, service.deaf);
-  (this->*handler)(call);
 }
 
 std::vector<Topic> Services::list() const {
   std::vector<Topic> topics;
-  for (const auto& service : services_) topics.push_back(service->topic);
+  for (const auto& service : services_) topics.push_back(service->topic());
+  topics.push_back(step_action_.topic());
   return topics;
 }
 
 std::vector<const Reader*> Services::readers() const {
-  std::vector<const Reader*> all;
-  for (const auto& service : services_) all.push_back(service->requests.get());
+  std::vector<const Reader*> all = step_action_.readers();
+  for (const auto& service : services_) all.push_back(&service->requests());
   return all;
 }
 
 std::vector<const Writer*> Services::writers() const {
-  std::vector<const Writer*> all;
-  for (const auto& service : services_) all.push_back(service->replies.get());
+  std::vector<const Writer*> all = step_action_.writers();
+  for (const auto& service : services_) all.push_back(&service->replies());
   return all;
 }
 
@@ -279,8 +202,10 @@ void Services::pass_on(const CallPointer& call, int32_t kind, std::vector<uint8_
 
 void Services::get_simulator_features(const CallPointer& call) {
   // SimulatorFeatures' numbers: spawning, deleting, categories, from texts, states of entities,
-  // resets of time and state, state of the simulation with pausing, one step and many.
-  constexpr std::array<uint16_t, 14> kFeatures{0, 1, 8, 9, 10, 11, 20, 21, 22, 24, 25, 26, 31, 32};
+  // resets of time and state, state of the simulation with pausing, one step and many, these as an
+  // action.
+  constexpr std::array<uint16_t, 15> kFeatures{0,  1,  8,  9,  10, 11, 20, 21,
+                                               22, 24, 25, 26, 31, 32, 33};
   CdrWriter out = call->answer();
   out.put_sequence(std::span<const uint16_t>(kFeatures));
   out.put_length(2).put("sdf").put("urdf");

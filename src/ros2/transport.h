@@ -15,6 +15,19 @@ namespace ruedo::ros2 {
 
 using Gid = std::array<uint8_t, 16>;
 
+// Which sample of which writer; of a request, by which its reply is known.
+struct SampleIdentity {
+  Gid writer{};
+  int64_t sequence = 0;
+};
+
+// What came.
+struct Sample {
+  std::span<const uint8_t> cdr;
+  SampleIdentity identity;  // where it is related: of the reader that waits for the reply
+  bool is_related = false;  // it names that reader (DDS-RPC's related sample identity)
+};
+
 // Where a sample goes by, and what the transport's middleware calls it.
 enum class Role { topic, request, reply, graph };
 
@@ -30,6 +43,9 @@ class Writer {
   virtual ~Writer() = default;
   // Never waits; false: it could not be sent.
   virtual bool write(std::span<const uint8_t> cdr) = 0;
+  // The same, as the reply to that request (DDS-RPC's related sample identity); false for more than
+  // fits into one datagram, too.
+  virtual bool reply(std::span<const uint8_t> cdr, const SampleIdentity& request) = 0;
   virtual size_t readers() const = 0;  // of others
   bool is_read() const { return readers() > 0; }
   virtual Gid gid() const = 0;
@@ -46,7 +62,7 @@ class Transport {
  public:
   virtual ~Transport() = default;
 
-  using Handler = std::function<void(std::span<const uint8_t> cdr)>;
+  using Handler = std::function<void(const Sample& sample)>;
 
   // Both throw EnvironmentError. The handler is called from the transport's thread.
   virtual std::unique_ptr<Writer> add_writer(const Endpoint& endpoint) = 0;

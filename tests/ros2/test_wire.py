@@ -30,7 +30,7 @@ from ros_types import (
     TwistStamped,
     Vector3,
 )
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 
 @pytest.fixture(scope="module")
@@ -147,9 +147,20 @@ def ros_name(dds_type: str) -> str:
     return dds_type.replace("::dds_::", "::").replace("::", "/").removesuffix("_")
 
 
+# From SimulateSteps.action, as rosidl makes messages of an action.
+STEPS = "simulation_interfaces/action/SimulateSteps_"
+ACTION = {
+    STEPS + "Feedback": "uint64 completed_steps\nuint64 remaining_steps\n",
+    STEPS + "FeedbackMessage": "unique_identifier_msgs/msg/UUID goal_id\n"
+    f"{STEPS}Feedback feedback\n",
+}
+
+
 @pytest.mark.parametrize("kind", [BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription])
 def test_type_hashes_are_those_of_rosbags(standing, kind):
     store = get_typestore(Stores.ROS2_JAZZY)
+    for name, fields in ACTION.items():
+        store.register(get_types_from_msg(fields, name))
     compared = 0
     for (topic, dds_type), data in endpoints(standing, kind).items():
         told = re.fullmatch(rb"typehash=(RIHS01_[0-9a-f]{64});", data)
@@ -172,7 +183,7 @@ def test_the_node_is_in_the_graph(standing):
     guids = {bytes(s.key.bytes): s.topic_name for s in found.take(N=1000)}
     listed = {guids[bytes(g.data)] for g in node.writer_gid_seq if bytes(g.data) in guids}
     assert {"rt/scan", "rt/odom", "rt/clock", "rt/tf", "rt/tf_static"} <= listed
-    assert len(node.reader_gid_seq) == 3 + 10  # commands and services
+    assert len(node.reader_gid_seq) == 3 + 10 + 3  # commands, services, and the action's
 
 
 def test_many_robots_have_namespaces_and_frames_of_their_own():
