@@ -1,30 +1,38 @@
 """Nav2 (or slam_toolbox with it) and rviz2 beside `ruedo run WORLD --ros2`, for Jazzy and Kilted,
-with Nav2's own parameters.
+with Nav2's own parameters, and what ROBOT.yaml beside this file says of the robot.
 
     # Ruedo map worlds/arena.sdf -o arena.yaml
     ros2 launch clients/ros2/ruedo_nav2.launch.py map:=arena.yaml
-    ros2 launch clients/ros2/ruedo_nav2.launch.py slam:=True
+    ros2 launch clients/ros2/ruedo_nav2.launch.py slam:=True robot:=turtle
 
 Written from Nav2's documentation; nobody has run it with a real ROS 2 yet.
 """
 
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
+from pathlib import Path
+
+import yaml
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription, OpaqueFunction
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.substitutions import FindPackageShare
 from nav2_common.launch import RewrittenYaml
 
+HERE = Path(__file__).resolve().parent
 
-def generate_launch_description() -> LaunchDescription:
+
+def rewrites(robot: str) -> dict[str, str]:
+    """What of Nav2's parameters is another for the robot."""
+    told = yaml.safe_load((HERE / f"{robot}.yaml").read_text(encoding="utf-8"))
+    return {name: str(value) for name, value in told.items()}
+
+
+def bring_up(context: LaunchContext) -> list:
     bringup = FindPackageShare("nav2_bringup")
-    defaults = PathJoinSubstitution([bringup, "params", "nav2_params.yaml"])
-    # A P3-AT is larger than the TurtleBot that Nav2's parameters are for; 0.22 is right for a
-    # TurtleBot.
     parameters = RewrittenYaml(
-        source_file=defaults,
-        param_rewrites={"robot_radius": LaunchConfiguration("robot_radius")},
+        source_file=PathJoinSubstitution([bringup, "params", "nav2_params.yaml"]),
+        param_rewrites=rewrites(LaunchConfiguration("robot").perform(context)),
         convert_types=True,
     )
 
@@ -32,6 +40,22 @@ def generate_launch_description() -> LaunchDescription:
         source = PythonLaunchDescriptionSource(PathJoinSubstitution([bringup, "launch", name]))
         return IncludeLaunchDescription(source, launch_arguments=arguments.items())
 
+    return [
+        include(
+            "bringup_launch.py",
+            {
+                "map": LaunchConfiguration("map"),
+                "slam": LaunchConfiguration("slam"),
+                "use_sim_time": "True",
+                "params_file": parameters,
+                "autostart": "True",
+            },
+        ),
+        include("rviz_launch.py", {"use_sim_time": "True"}),
+    ]
+
+
+def generate_launch_description() -> LaunchDescription:
     return LaunchDescription(
         [
             DeclareLaunchArgument(
@@ -40,7 +64,7 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "slam", default_value="False", description="make the map by slam_toolbox instead"
             ),
-            DeclareLaunchArgument("robot_radius", default_value="0.38", description="m"),
+            DeclareLaunchArgument("robot", default_value="p3at", description="p3at or turtle"),
             # Ruedo's base_link is on the ground, where Nav2's parameters have base_footprint.
             Node(
                 package="tf2_ros",
@@ -48,16 +72,6 @@ def generate_launch_description() -> LaunchDescription:
                 parameters=[{"use_sim_time": True}],
                 arguments=["--frame-id", "base_link", "--child-frame-id", "base_footprint"],
             ),
-            include(
-                "bringup_launch.py",
-                {
-                    "map": LaunchConfiguration("map"),
-                    "slam": LaunchConfiguration("slam"),
-                    "use_sim_time": "True",
-                    "params_file": parameters,
-                    "autostart": "True",
-                },
-            ),
-            include("rviz_launch.py", {"use_sim_time": "True"}),
+            OpaqueFunction(function=bring_up),
         ]
     )

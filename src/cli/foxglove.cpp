@@ -16,6 +16,7 @@
 #include "ruedo/decode.h"
 #include "ruedo/image_t.hpp"
 #include "ruedo/math.h"
+#include "ruedo/navsat_t.hpp"
 #include "ruedo/odometry_t.hpp"
 #include "ruedo/planar_lidar_t.hpp"
 #include "ruedo/pose_t.hpp"
@@ -161,6 +162,20 @@ std::string pose_json(const Pose& X, const std::string& frame, uint64_t time_ns)
   json.member("frame_id", frame);
   write_pose(json, X);
   json.close('}');
+  return json.text();
+}
+
+std::string location_json(const navsat_t& navsat, const std::string& frame, uint64_t time_ns) {
+  constexpr int kCovarianceUnknown = 0;
+  JsonWriter json;
+  json.open('{');
+  write_time(json, "timestamp", time_ns);
+  json.member("frame_id", frame)
+      .member("latitude", navsat.latitude_deg)
+      .member("longitude", navsat.longitude_deg)
+      .member("altitude", navsat.altitude);
+  write_numbers(json, "position_covariance", std::array<double, 9>{});
+  json.member("position_covariance_type", kCovarianceUnknown).close('}');
   return json.text();
 }
 
@@ -358,6 +373,13 @@ bool FoxgloveExport::convert(const std::string& channel, uint64_t time_ns,
     send(channel, foxglove::pose_in_frame(), time_ns,
          pose_json(pose_of(pose.pos, pose.orientation), "world", time_ns));
     return true;
+  }
+  if (fingerprint == navsat_t::getHash()) {
+    navsat_t navsat;
+    if (!read(navsat)) return false;
+    send(channel, foxglove::location_fix(), time_ns,
+         location_json(navsat, device_frame(channel), time_ns));
+    return true;  // velocities are in the message itself alone
   }
   if (fingerprint == odometry_t::getHash()) {
     odometry_t odometry;

@@ -122,6 +122,17 @@ const Type& pose_in_frame() {
   return made;
 }
 
+const Type& location_fix() {
+  static const Type made = type("foxglove.LocationFix", {{"timestamp", time("time")},
+                                                         {"frame_id", kText},
+                                                         {"latitude", kNumber},
+                                                         {"longitude", kNumber},
+                                                         {"altitude", kNumber},
+                                                         {"position_covariance", list(kNumber)},
+                                                         {"position_covariance_type", kCount}});
+  return made;
+}
+
 const Type& frame_transforms() {
   static const Type made =
       type("foxglove.FrameTransforms",

@@ -16,6 +16,7 @@ const Type& compressed_image();
 const Type& raw_image();
 const Type& camera_calibration();
 const Type& pose_in_frame();
+const Type& location_fix();
 const Type& frame_transforms();
 const Type& scene_update();
 

@@ -144,6 +144,7 @@ DataIdentity identity_in(std::span<const uint8_t> message, size_t submessage) {
   if (message.size() < kMessageHeader || numbers + kToInlineQos > message.size()) return found;
   const uint8_t kind = message[submessage], flags = message[submessage + 1];
   if (kind != kData && kind != kDataFrag) return found;
+  std::copy_n(message.begin() + 6, found.vendor.size(), found.vendor.begin());
   std::copy_n(message.begin() + 8, kPrefix, found.sample.writer.begin());
   std::copy_n(message.begin() + static_cast<std::ptrdiff_t>(numbers) + 4, 4,
               found.sample.writer.begin() + kPrefix);

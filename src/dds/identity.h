@@ -5,6 +5,7 @@
 // socket, where it is moved to the inline QoS: Cyclone keeps, sends and repeats it as any sample.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -19,6 +20,7 @@ namespace ruedo::dds {
 struct DataIdentity {
   ros2::SampleIdentity sample;
   std::optional<ros2::Gid> related;  // whom the reply is for
+  std::array<uint8_t, 2> vendor{};
 };
 
 // Of the DATA or DATA_FRAG submessage at that offset of an RTPS message, whose payload, which is

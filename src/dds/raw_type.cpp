@@ -3,6 +3,7 @@
 #include "dds/raw_type.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstring>
 #include <functional>
@@ -25,6 +26,7 @@ struct RawSample : ddsi_serdata {
   size_t size = 0;             // without what fills up
   ros2::SampleIdentity identity;
   bool is_related = false;
+  std::array<uint8_t, 2> vendor{};
 };
 
 RawSample* new_sample(const ddsi_sertype* type, ddsi_serdata_kind kind, size_t size) {
@@ -58,6 +60,7 @@ void identify(RawSample& sample, const nn_rdata& first) {
       identity_in({packet, NN_RDATA_PAYLOAD_OFF(&first)}, NN_RDATA_SUBMSG_OFF(&first));
   sample.identity = found.sample;
   sample.is_related = found.related.has_value();
+  sample.vendor = found.vendor;
   if (found.related) sample.identity.writer = *found.related;
 }
 
@@ -197,7 +200,7 @@ ddsi_serdata* make_sample(const ddsi_sertype* type, std::span<const uint8_t> byt
 
 ros2::Sample as_sample(const ddsi_serdata* sample) {
   const RawSample& raw = as_raw(sample);
-  return {{raw.bytes.data(), raw.size}, raw.identity, raw.is_related};
+  return {{raw.bytes.data(), raw.size}, raw.identity, raw.is_related, raw.vendor};
 }
 
 uint64_t refused_samples() { return refused; }

@@ -25,18 +25,35 @@ int64_t read64(const uint8_t* bytes) {
   return static_cast<int64_t>(uint64_t{read32(bytes)} << 32 | read32(bytes + 4));
 }
 
+// What others play: a bag's folder, and a file of MCAP, which begins with this.
+constexpr uint32_t kMcap = 0x894D4341;
+
+[[noreturn]] void refuse_bag(const std::string& path) {
+  throw InputError({path},
+                   "is a ROS 2 bag or an MCAP file, which Ruedo writes and does not read: play it "
+                   "by `ros2 bag play --clock`, or open it in Foxglove; LOG is the log that it was "
+                   "exported from");
+}
+
+bool is_bag_folder(const std::string& path) {
+  struct stat status{};
+  return stat((path + "/metadata.yaml").c_str(), &status) == 0;
+}
+
 }  // namespace
 
 Reader::Reader(const std::string& path) : path_(path) {
   struct stat status{};
   if (stat(path.c_str(), &status) != 0)
     throw InputError({path}, std::string("cannot be read: ") + std::strerror(errno));
+  if (S_ISDIR(status.st_mode) && is_bag_folder(path)) refuse_bag(path);
   if (!S_ISREG(status.st_mode)) throw InputError({path}, "is not a file; an LCM log is expected");
   size_ = status.st_size;
   file_.reset(std::fopen(path.c_str(), "rb"));
   if (!file_) throw InputError({path}, std::string("cannot be read: ") + std::strerror(errno));
   std::array<uint8_t, 4> sync{};
   if (size_ > 0 && (!read(sync.data(), sync.size()) || read32(sync.data()) != kSync)) {
+    if (read32(sync.data()) == kMcap) refuse_bag(path);
     throw InputError({path}, "is not an LCM log: it does not begin with the sync word EDA1DA01");
   }
   std::rewind(file_.get());

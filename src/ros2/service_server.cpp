@@ -10,6 +10,8 @@
 namespace ruedo::ros2 {
 namespace {
 
+constexpr std::array<uint8_t, 2> kCyclone{1, 16};  // as OMG has numbered the vendors of DDS
+
 // Both ends of a service say that they belong together.
 std::string service_id(const Gid& gid, const std::string& name) {
   uint64_t hash = 14695981039346656037u;  // FNV-1a
@@ -42,7 +44,8 @@ Call::Call(Writer& replies, const Sample& sample, ServiceMapping mapping)
       in(bytes_),
       replies_(replies),
       has_header_(mapping == ServiceMapping::cyclonedds ||
-                  (mapping == ServiceMapping::automatic && !sample.is_related)),
+                  (mapping == ServiceMapping::automatic && !sample.is_related &&
+                   sample.vendor == kCyclone)),
       identity_(sample.identity) {
   if (!has_header_) return;
   client_ = in.get<uint64_t>();

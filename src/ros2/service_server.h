@@ -19,8 +19,8 @@
 
 namespace ruedo::ros2 {
 
-// automatic: each call is answered as it came; who sends no reader beside it calls as
-// rmw_cyclonedds does.
+// automatic: each call is answered as it came: what Cyclone DDS sent without a reader beside it is
+// rmw_cyclonedds's.
 enum class ServiceMapping { automatic, cyclonedds, fastrtps };
 
 // Throws InputError.

@@ -24,8 +24,9 @@ struct SampleIdentity {
 // What came.
 struct Sample {
   std::span<const uint8_t> cdr;
-  SampleIdentity identity;  // where it is related: of the reader that waits for the reply
-  bool is_related = false;  // it names that reader (DDS-RPC's related sample identity)
+  SampleIdentity identity;          // where it is related: of the reader that waits for the reply
+  bool is_related = false;          // it names that reader (DDS-RPC's related sample identity)
+  std::array<uint8_t, 2> vendor{};  // of the DDS that sent it
 };
 
 // Where a sample goes by, and what the transport's middleware calls it.

@@ -359,3 +359,24 @@ def test_it_is_listed():
         "export"
         in subprocess.run([RUEDO, "--help"], capture_output=True, text=True, timeout=20).stdout
     )
+
+
+def test_a_fix_is_a_place_on_the_map(tmp_path):
+    """By hand: tests/ros2/instruments.sdf lies at 45 degrees north, 8 east, 110 m high."""
+    world, log, out = SOURCE / "tests/ros2/instruments.sdf", tmp_path / "i.lcm", tmp_path / "i.mcap"
+    quiet = ["--lcm", "memq://", "--quiet", "--rate", "max", "--duration", "1", "--no-noise"]
+    subprocess.run([RUEDO, "run", world, *quiet, "--record", log], check=True, timeout=120)
+    subprocess.run([RUEDO, "export", log, out], check=True, timeout=120, capture_output=True)
+    with open(out, "rb") as file:
+        fixes = [
+            json.loads(message.data)
+            for schema, _, message in make_reader(file).iter_messages()
+            if schema.name == "foxglove.LocationFix"
+        ]
+    assert fixes
+    for fix in fixes:
+        assert fix["latitude"] == pytest.approx(45, abs=1e-12)
+        assert fix["longitude"] == pytest.approx(8, abs=1e-12)
+        assert fix["altitude"] == pytest.approx(110, abs=1e-8)
+        assert fix["frame_id"].endswith("/gps") and fix["position_covariance"] == [0] * 9
+        assert fix["position_covariance_type"] == 0

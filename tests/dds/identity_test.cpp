@@ -76,6 +76,7 @@ TEST(Identity, OfARequestIsItsWritersNumberOrTheReaderThatWaits) {
   EXPECT_THAT(own.sample.writer, ElementsAreArray({100, 101, 102, 103, 104, 105, 106, 107, 108, 109,
                                                    110, 111, 0, 0, 21, 3}));
   EXPECT_EQ(own.sample.sequence, 5);
+  EXPECT_THAT(own.vendor, ElementsAreArray({1, 16}));
   EXPECT_FALSE(own.related);
   for (const Bytes& parameter : {kRelated, kRelatedFast}) {
     const Bytes message = joined({kHeader, data(7, joined({parameter, kSentinel}))});

@@ -19,6 +19,32 @@ TEST(Interfaces, HashesAreThoseOfRosPackages) {
             "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e");
 }
 
+// From descriptions that rosidl generated (rosidl_generator_c) in others' builds of Jazzy.
+TEST(Interfaces, HashesAreThoseOfGeneratedDescriptions) {
+  const std::pair<const char*, const char*> kHashes[] = {
+      {"vision_msgs/msg/ObjectHypothesis",
+       "51da43cec11c01957a64d1e05a24acd18aae7745ec30b74348ad5f6d634f7f90"},
+      {"vision_msgs/msg/Detection2D",
+       "0d12b69df5c593b3455b7346fac8205437a7d4bcb09b9e0e0b2dde787ded38ea"},
+      {"vision_msgs/msg/Detection2DArray",
+       "214274120007f4a683866481336b70310268cfa107aebe9d594a6acf75bda968"},
+      {"vision_msgs/msg/BoundingBox3D",
+       "bbb73a65c163d7f9bb29009c7bde9f7faa576bd2d23299c4511d19230dab4698"},
+      {"vision_msgs/msg/Detection3DArray",
+       "793f5eab9595ac1c0da07873cc859db42eae51f0ee76056db8562515d830e018"},
+      {"ros_gz_interfaces/msg/Entity",
+       "266a26f377057ebb0a1f08f7fb9dc435a841d9ec4fa3ab8fa0085e66e653504e"},
+      {"ros_gz_interfaces/msg/Contact",
+       "ba5acbac280b8650f9ad7caf995888ff8aca861742e0159d8d36efe8460d0db3"},
+      {"unique_identifier_msgs/msg/UUID",
+       "1b8e8aca958cbea28fe6ef60bf6c19b683c97a9ef60bb34752067d0f2f7ab437"},
+      {"action_msgs/srv/CancelGoal",
+       "573d8b0a534451d7bc2ac8c5ffde8ac14b8593b7001175d0cd6516dcbeb8689a"},
+  };
+  for (const auto& [type, hash] : kHashes)
+    EXPECT_EQ(type_hash(type, Distro::jazzy), std::string("RIHS01_") + hash) << type;
+}
+
 TEST(Interfaces, HumbleHasItsOwn) {
   EXPECT_NE(type_hash("sensor_msgs/msg/Range", Distro::humble),
             type_hash("sensor_msgs/msg/Range", Distro::jazzy));

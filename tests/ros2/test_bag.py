@@ -205,3 +205,12 @@ def test_a_folder_that_is_there_is_left_alone(logged):
     )
     assert result.returncode in (2, 3) and "is there already" in result.stderr
     assert list((logged / "mine").iterdir()) == []
+
+
+@pytest.mark.parametrize("what", ["run", "run/run_0.mcap"])
+def test_play_says_who_plays_a_bag(logged, what):
+    result = subprocess.run(
+        [RUEDO, "play", logged / what], capture_output=True, text=True, timeout=120
+    )
+    assert result.returncode in (2, 3)
+    assert "`ros2 bag play --clock`" in result.stderr and len(result.stderr.splitlines()) == 1

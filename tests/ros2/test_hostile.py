@@ -3,12 +3,18 @@
 import math
 import random
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 from conftest import Peer, Run, take, wait_for
-from cyclonedds.idl import IdlStruct
+from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsSubscription
+from cyclonedds.core import Policy
+from cyclonedds.idl import IdlStruct, make_idl_struct
 from cyclonedds.idl.types import float64, sequence, uint8
 from ros_types import LaserScan, Odometry, Twist, Vector3
+from test_services import Client
+
+RIG = str(Path(__file__).resolve().parent / "sensors.sdf")
 
 
 @dataclass
@@ -58,6 +64,48 @@ def test_bytes_that_are_no_message_are_counted(kind, samples):
     assert run.process.returncode == 0
     assert f"{len(samples)} messages that came were faulty" in output
     assert "that are no geometry_msgs/msg/Twist" in output
+
+
+def inputs(peer) -> set[tuple[str, str]]:
+    """(topic, type) of all that the run reads: topics, services and the action's."""
+    reader = BuiltinDataReader(peer.participant, BuiltinTopicDcpsSubscription)
+    found: set[tuple[str, str]] = set()
+
+    def all_there():
+        for sample in reader.take(N=1000):
+            told = sample.qos[Policy.Userdata] if sample.qos else None
+            if told and b"typehash=" in told.data:
+                found.add((sample.topic_name, sample.type_name))
+        return {"rq/get_entitiesRequest", "rt/initialpose"} <= {topic for topic, _ in found}
+
+    wait_for(all_there, "what the run reads")
+    return found
+
+
+def noise(seed: int) -> bytes:
+    """Random bytes, among which lengths of billions are frequent."""
+    random_ = random.Random(seed)
+    words = [bytes(random_.randrange(256) for _ in range(4)) for _ in range(random_.randrange(60))]
+    return b"".join(random_.choice((w, w, b"\xff\xff\xff\xff", b"\0\0\0\0")) for w in words)
+
+
+def test_noise_on_every_topic_that_is_read_is_harmless():
+    with Run("--no-noise", world=RIG) as run:
+        peer = Peer(run.domain)
+        read = inputs(peer)
+        # Each kind of joint command, cmd_vel's absence aside; the pose; ten services; the action.
+        assert len(read) == 4 + 1 + 10 + 3
+        # Services have noise of good requests among it, to take 2^60 steps, say: not here.
+        for topic, kind in sorted(each for each in read if each[0].startswith("rt/")):
+            liar = peer.writer(topic, make_idl_struct("Noise", kind, {"data": sequence[uint8]}), "")
+            wait_for(liar.get_matched_subscriptions, f"a reader of {topic}")
+            for seed in range(40):
+                liar.write(liar.topic.data_type(noise(seed)))
+        client = Client(run.domain)
+        assert client.call("get_simulation_state").result.result == 1
+        output = run.end()
+    assert run.process.returncode == 0
+    assert "messages that came were faulty" in output
 
 
 def test_a_message_of_64_mb_is_not_looked_at():
