@@ -66,6 +66,7 @@ class Tree {
     if (placement(link).body != robot_.body) return false;
     return std::none_of(model_.joints.begin(), model_.joints.end(), [&](const Joint& joint) {
       return joint.child == static_cast<int>(link) && joint.parent >= 0 &&
+             joint.type != JointType::gearbox &&
              placement(static_cast<size_t>(joint.parent)).body == robot_.body;
     });
   }
@@ -132,7 +133,7 @@ class Tree {
   void add_neighbours(size_t link) {
     for (size_t j = 0; j < model_.joints.size(); ++j) {
       const Joint& joint = model_.joints[j];
-      if (joint.parent < 0) continue;
+      if (joint.parent < 0 || joint.type == JointType::gearbox) continue;  // others carry its links
       const auto parent = static_cast<size_t>(joint.parent),
                  child = static_cast<size_t>(joint.child);
       if (parent == link && !seen_[child])
