@@ -19,7 +19,9 @@ class LiveSource : public Source {
  public:
   // The bus must outlive it.
   LiveSource(TeeBus& bus, LiveHost host, std::string info_channel)
-      : bus_(bus), host_(std::move(host)), info_channel_(std::move(info_channel)) {}
+      : bus_(bus), host_(std::move(host)), info_channel_(std::move(info_channel)) {
+    events_.plan(host_.world()->faults);
+  }
   ~LiveSource() override { bus_.watch(false); }
 
   void pump(Board& board, bool viewers) override {
@@ -27,10 +29,16 @@ class LiveSource : public Source {
     const size_t count = bus_.channel_count();
     for (size_t i = board.channels().size(); i < count; ++i) board.name(i, bus_.channel(i).name);
     bus_.ring().drain([&](uint32_t channel, std::vector<uint8_t> message) {
-      if (channel < board.channels().size()) board.put(channel, std::move(message));
+      if (channel >= board.channels().size()) return;
+      events_.hear(0, board.channels()[channel].name, message);
+      board.put(channel, std::move(message));
     });
+    events_.lost(bus_.failed());
     for (size_t i = 0; i < board.channels().size(); ++i) {
-      bus_.channel(i).wanted.store(board.channels()[i].watchers > 0, std::memory_order_relaxed);
+      const Board::Channel& channel = board.channels()[i];
+      // What a channel carries is known by its first message.
+      const bool heard = channel.last_number == 0 || Events::tells(channel.fingerprint);
+      bus_.channel(i).wanted.store(heard || channel.watchers > 0, std::memory_order_relaxed);
     }
   }
 
@@ -46,10 +54,12 @@ class LiveSource : public Source {
   std::string model_text(const std::string& name) override { return host_.model_text(name); }
   std::string save_name() const override { return host_.save_name; }
   std::string info_channel() const override { return info_channel_; }
+  const Events* events() const override { return &events_; }
 
  private:
   TeeBus& bus_;
   LiveHost host_;
+  Events events_{true};
   std::string info_channel_;
 };
 

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <memory>
 #include <vector>
@@ -15,6 +16,7 @@
 
 #include "console/assets.h"
 #include "console/board.h"
+#include "console/events.h"
 #include "console/scene_data.h"
 #include "core/json.h"
 #include "core/utf8.h"
@@ -83,8 +85,10 @@ class Writer {
     LogPage page;
     page.fault = fault();
     add_scenes();
+    add_events();
     // Base64 takes four bytes for three.
-    const size_t fixed = kShellSize + json_scenes_.size() + 64 * index_.channels().size() + 4096;
+    const size_t fixed = kShellSize + json_scenes_.size() + json_events_.size() +
+                         64 * index_.channels().size() + 4096;
     const size_t room = most_bytes > fixed ? (most_bytes - fixed) / 4 * 3 : 0;
     if (room <= bytes_.size()) {
       throw InputError(
@@ -154,6 +158,14 @@ class Writer {
     bytes_.resize((bytes_.size() + 7) / 8 * 8);
   }
 
+  void add_events() {
+    EventScan scan(index_, worlds_.at(index_.begin_us()).world.get());
+    scan.advance(reader_, std::numeric_limits<size_t>::max());
+    JsonWriter json;
+    write_events(json, scan.events().list());
+    json_events_ = json.text();
+  }
+
   // Channel, number of messages (a message may come in parts), time in s; then of each message its
   // size and bytes.
   void add_entry(uint32_t channel, SimTime time_us,
@@ -210,7 +222,7 @@ class Writer {
         .name("channels")
         .open('[');
     for (const std::string& name : names_) json.value(name);
-    json.close(']').name("scenes").raw(json_scenes_).close('}');
+    json.close(']').name("events").raw(json_events_).name("scenes").raw(json_scenes_).close('}');
     std::string text;
     for (const char c : json.text()) {  // nothing in it ends the element that it stands in
       if (c == '<') {
@@ -261,7 +273,7 @@ class Writer {
   log::Reader reader_;
   log::Event event_;
   std::vector<const run::LogWorlds::Scene*> scenes_;
-  std::string json_scenes_, info_;
+  std::string json_scenes_, json_events_, info_;
   std::vector<std::string> names_;
   std::vector<uint8_t> bytes_;
 };

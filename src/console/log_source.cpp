@@ -10,6 +10,7 @@
 #include "core/whole.h"
 #include "ruedo/schema.h"
 #include "ruedo/world_info_t.hpp"
+#include "ruedo/world_state_t.hpp"
 
 namespace ruedo::console {
 namespace {
@@ -38,6 +39,7 @@ std::optional<double> number_at(std::span<const uint8_t> message, const std::str
 LogSource::LogSource(const std::string& path, const run::LoadRun& load, double speed)
     : index_(path),
       worlds_(index_, load),
+      scan_(index_, worlds_.at(index_.begin_us()).world.get()),
       reader_(path),
       scene_(&worlds_.at(index_.begin_us())),
       shown_(index_.channels().size(), kNothing) {
@@ -69,6 +71,7 @@ void LogSource::pump(Board& board, bool viewers) {
     for (size_t i = 0; i < index_.channels().size(); ++i) board.name(i, index_.channels()[i].name);
     if (makes_info_) board.name(index_.channels().size(), info_channel_);
   }
+  if (viewers && !scanned_) scanned_ = scan_.advance(reader_, kScanned);
   const auto now = std::chrono::steady_clock::now();
   const double passed_s =
       std::min(kLongestPause_s, std::chrono::duration<double>(now - last_).count());
@@ -167,6 +170,27 @@ void LogSource::seek(Board& board, double time_s) {
   playback_.now_s = std::clamp(time_s, playback_.begin_s, playback_.end_s);
   ++playback_.jumps;
   show(board);
+}
+
+// From one state to the next; where the log has none, from one message to the next.
+void LogSource::step(Board& board, int states) {
+  const auto& channels = index_.channels();
+  const auto found = std::find_if(channels.begin(), channels.end(), [](const auto& channel) {
+    return channel.fingerprint == world_state_t::getHash();
+  });
+  const auto& entries = (found == channels.end() ? channels.front() : *found).entries;
+  const SimTime now = now_us();
+  const auto after = [&](SimTime time_us) {
+    return std::upper_bound(
+        entries.begin(), entries.end(), time_us,
+        [](SimTime time, const log::Index::Entry& entry) { return time < entry.time_us; });
+  };
+  playback_.playing = false;
+  auto at = after(states > 0 ? now : now - 1);
+  if (states > 0 && at == entries.end()) return seek(board, playback_.end_s);
+  if (states < 0 && at == entries.begin()) return seek(board, playback_.begin_s);
+  if (states < 0) --at;
+  seek(board, static_cast<double>(at->time_us) * 1e-6);
 }
 
 }  // namespace ruedo::console

@@ -17,6 +17,7 @@ namespace ruedo::console {
 class LogSource : public Source {
  public:
   static constexpr size_t kMostHistory = 100'000;  // messages of a channel that are read for a plot
+  static constexpr size_t kScanned = 2'000;        // messages at a time, for what happened
   static constexpr uint32_t kMostMessage = 64u << 20;  // bytes; a larger one is not shown
 
   // Throws InputError for what is no log. speed: log time per real time.
@@ -29,9 +30,11 @@ class LogSource : public Source {
   std::string fault() const override;
   std::string info_channel() const override { return info_channel_; }
   Bytes history(const std::string& channel, const std::string& field) override;
+  const Events* events() const override { return scanned_ ? &scan_.events() : nullptr; }
   const Playback* playback() const override { return &playback_; }
   void play(bool on, double speed) override;
   void seek(Board& board, double time_s) override;
+  void step(Board& board, int states) override;
 
  private:
   static constexpr size_t kNothing = static_cast<size_t>(-1);
@@ -43,6 +46,8 @@ class LogSource : public Source {
 
   log::Index index_;
   run::LogWorlds worlds_;
+  EventScan scan_;
+  bool scanned_ = false;
   log::Reader reader_;
   log::Event event_;
   const run::LogWorlds::Scene* scene_;

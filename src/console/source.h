@@ -7,6 +7,7 @@
 #include <string>
 
 #include "console/board.h"
+#include "console/events.h"
 #include "model/world_model.h"
 
 namespace ruedo::console {
@@ -58,11 +59,18 @@ class Source {
     return nullptr;
   }
 
+  // What happened; null: not known yet.
+  virtual const Events* events() const { return nullptr; }
+
   // Of logs.
   virtual const Playback* playback() const { return nullptr; }
   virtual void play(bool on, double speed) { static_cast<void>(on), static_cast<void>(speed); }
   virtual void seek(Board& board, double time_s) {
     static_cast<void>(board), static_cast<void>(time_s);
+  }
+  // So many states on, or back.
+  virtual void step(Board& board, int states) {
+    static_cast<void>(board), static_cast<void>(states);
   }
 };
 

@@ -65,6 +65,10 @@ bool Viewer::receive(std::span<const uint8_t> message) {
       if (const double time_s = read_double(rest); std::isfinite(time_s))
         stage_.source->seek(stage_.board, time_s);
       return true;
+    case Operation::step:
+      if (rest.size() != 1) return false;
+      stage_.source->step(stage_.board, rest[0] != 0 ? 1 : -1);
+      return true;
   }
   return false;
 }
@@ -161,7 +165,25 @@ bool Viewer::next_text(std::string& text) {
     text = json.text();
     return true;
   }
-  return false;
+  return next_events(text);
+}
+
+// {"events": [...], "first": 0}: from that one on. From 0 on: those that were told before hold no
+// more.
+bool Viewer::next_events(std::string& text) {
+  const Events* events = stage_.source->events();
+  if (!events) return false;
+  const bool anew = told_generation_ != events->generation();
+  if (!anew && told_events_ == events->list().size()) return false;
+  if (anew) told_events_ = 0;
+  told_generation_ = events->generation();
+  const size_t count = std::min(kMostEvents, events->list().size() - told_events_);
+  JsonWriter json;
+  json.open('{').member("first", static_cast<int64_t>(told_events_)).name("events");
+  write_events(json, std::span(events->list()).subspan(told_events_, count));
+  text = json.close('}').text();
+  told_events_ += count;
+  return true;
 }
 
 // A frame: its kind (4 bytes), then of each message channel (4 bytes), size (4 bytes), bytes. In

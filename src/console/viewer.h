@@ -35,6 +35,7 @@ enum class Operation : uint8_t {
   traffic = 4,  // 1 or 0: how much goes over each channel, once a second
   play = 5,     // of a log: 1 or 0 (1 byte), speed (float64, little endian)
   seek = 6,     // of a log: time in s (float64, little endian)
+  step = 7,     // of a log: 1 or 0 (1 byte): to the next state, or the one before
 };
 // What it gets as binary messages; what is text is JSON.
 enum class Frame : uint8_t { messages = 1, traffic = 2 };
@@ -44,6 +45,7 @@ class Viewer : public Connection {
   static constexpr int kMostUnseen = 2;                  // frames
   static constexpr size_t kMostFrame = size_t{8} << 20;  // bytes; one message more may pass it
   static constexpr size_t kMostWanted = 4096;            // channels
+  static constexpr size_t kMostEvents = 1000;            // in one message
 
   explicit Viewer(Stage& stage);
   ~Viewer() override;
@@ -56,6 +58,7 @@ class Viewer : public Connection {
   void match_names();
   bool next_text(std::string& text);
   bool next_messages(std::vector<uint8_t>& frame);
+  bool next_events(std::string& text);
   void add_traffic(std::vector<uint8_t>& frame);
 
   Stage& stage_;
@@ -67,6 +70,8 @@ class Viewer : public Connection {
   std::vector<Sight> sights_;  // of each of the board's channels
   size_t told_channels_ = 0;   // whose names the browser has
   uint64_t told_world_ = 0, told_playback_ = 0;
+  size_t told_events_ = 0;                 // of the list's
+  uint64_t told_generation_ = UINT64_MAX;  // whose list that is
   bool greeted_ = false, parted_ = false, traffic_ = false;
   std::string note_;  // to say next
   int unseen_ = 0;

@@ -5,12 +5,21 @@
 
 #include <thread>
 
+#include <fmt/format.h>
+
 #include "console/board.h"
+#include "console/events.h"
 #include "console/guard.h"
 #include "console/offer_ring.h"
 #include "console/tee_bus.h"
+#include "ruedo/applied_t.hpp"
+#include "ruedo/contact_t.hpp"
 #include "ruedo/errors.h"
+#include "ruedo/fault_t.hpp"
+#include "ruedo/move_command_t.hpp"
+#include "ruedo/name_request_t.hpp"
 #include "ruedo/reply_t.hpp"
+#include "ruedo/spawn_request_t.hpp"
 #include "ruedo/velocity_command_t.hpp"
 #include "ruedo/world_state_t.hpp"
 
@@ -134,6 +143,163 @@ TEST(Board, KeepsTheNewestAllPartsAndTheLastReplies) {
   EXPECT_EQ(board.channels()[2].newest.size(), Board::kKeptReplies);
   board.put(0, {1, 2, 3});  // not a message at all
   EXPECT_EQ(board.channels()[0].newest.size(), 1u);
+}
+
+// What is heard of a run, one message after the other.
+class EventsTest : public testing::Test {
+ protected:
+  template <class Message>
+  void hear(double time_s, const std::string& channel, const Message& message) {
+    events.hear(time_s, channel, encoded(message));
+  }
+  void touch(double time_s, const std::vector<std::string>& bodies,
+             const std::string& channel = "r/bumper") {
+    contact_t contact{};
+    for (const std::string& body : bodies) contact.points.emplace_back().body = body;
+    contact.n = static_cast<int32_t>(bodies.size());
+    hear(time_s, channel, contact);
+  }
+  void status(double time_s, int64_t id, int kind, int state, int reason, double done = 0) {
+    motion_status_t message{};
+    message.utime = static_cast<int64_t>(time_s * 1e6);
+    message.id = id;
+    message.kind = static_cast<int8_t>(kind);
+    message.state = static_cast<int8_t>(state);
+    message.reason = static_cast<int8_t>(reason);
+    message.done = done;
+    hear(time_s, "r/motion", message);
+  }
+  void apply(double time_s, int kind, std::vector<uint8_t> data, const std::string& channel) {
+    applied_t applied{};
+    applied.kind = kind;
+    applied.channel = channel;
+    applied.size = static_cast<int32_t>(data.size());
+    applied.data = std::move(data);
+    hear(time_s, "ruedo/applied", applied);
+  }
+  std::vector<std::string> told() const {
+    std::vector<std::string> lines;
+    for (const Event& event : events.list())
+      lines.push_back(
+          fmt::format("{:g} {} {}: {}", event.time_s, event.kind, event.robot, event.text));
+    return lines;
+  }
+
+  Events events{false};
+};
+
+TEST_F(EventsTest, ATouchIsOneCollisionHoweverItBounces) {
+  touch(0.0, {"floor/link"});  // from the beginning: nothing happened
+  touch(0.1, {"floor/link", "box/link"});
+  touch(0.2, {"floor/link"});
+  touch(0.4, {"floor/link", "box/link"});
+  touch(0.5, {"floor/link", "box/link", "wall/link"});
+  touch(0.5, {"wall/link"}, "r/other");  // another channel's first
+  touch(0.6, {"wall/link"}, "r/other");  // of the same robot
+  touch(2.0, {"floor/link", "box/link"});
+  EXPECT_EQ(told(), (std::vector<std::string>{
+                        "0.1 collision r: touches box/link", "0.5 collision r: touches wall/link",
+                        "2 collision r: touches box/link", "2 collision r: touches floor/link"}));
+}
+
+TEST_F(EventsTest, MotionsEndInOneWayOrAnother) {
+  using M = motion_status_t;
+  status(0, 0, M::KIND_NONE, M::STATE_IDLE, 0);
+  status(1, 7, move_command_t::ADVANCE, M::STATE_RUNNING, 0);
+  status(2, 7, move_command_t::ADVANCE, M::STATE_RUNNING, 0, 0.3);
+  status(3, 7, move_command_t::ADVANCE, M::STATE_DONE, 0, 0.4);
+  status(4, 7, move_command_t::ADVANCE, M::STATE_DONE, 0, 0.4);
+  status(5, 8, move_command_t::ARC, M::STATE_REFUSED, M::REASON_BAD_VALUE);
+  status(6, 0, M::KIND_VELOCITY, M::STATE_RUNNING, M::REASON_BLOCKED);
+  status(7, 0, M::KIND_VELOCITY, M::STATE_ENDED, M::REASON_WATCHDOG);
+  status(8, 9, move_command_t::ADVANCE, M::STATE_ENDED, M::REASON_REPLACED);
+  EXPECT_EQ(told(),
+            (std::vector<std::string>{
+                "3 goal r: advance 0.4 m done", "5 refused r: arc of 0.0°: value out of range",
+                "6 blocked r: velocity is blocked", "7 watchdog r: no command came: stopped"}));
+}
+
+TEST_F(EventsTest, WhatWasCommandedAndAskedForIsTold) {
+  velocity_command_t velocity{};
+  velocity.vx = 0.5;
+  for (int i = 0; i < 30; ++i) apply(1 + 0.1 * i, 0, encoded(velocity), "r/velocity");
+  apply(9, 0, encoded(velocity), "r/velocity");
+  name_request_t box{};
+  box.name = "box";
+  apply(10, request_t::REMOVE, encoded(box), "ruedo/request");
+  apply(11, request_t::RESET, {}, "ruedo/request");
+  apply(12, request_t::REMOVE, {1, 2, 3}, "ruedo/request");
+  fault_t fault{};
+  fault.kind = "lag";
+  fault.target = "lrf";
+  fault.duration = 2;
+  apply(13, 0, encoded(fault), "r/fault");
+  events.lost(0);
+  events.lost(3);
+  events.lost(3);
+  EXPECT_EQ(told(), (std::vector<std::string>{
+                        "1 command r: drive at 0.50 m/s, 0.00 rad/s",
+                        "9 command r: drive at 0.50 m/s, 0.00 rad/s", "10 request : remove box",
+                        "11 reset : reset", "12 request : remove", "13 fault r: lag of lrf for 2 s",
+                        "13 lost : 3 messages could not be sent"}));
+}
+
+TEST_F(EventsTest, ALiveRunTellsWhatWasAnsweredOnceAndBeginsAnewWithAReset) {
+  events = Events(true);
+  request_t request{};
+  request.session = 4;
+  request.kind = request_t::SPAWN;
+  spawn_request_t spawn{};
+  spawn.model = "p3at";
+  request.body = encoded(spawn);
+  request.size = static_cast<int32_t>(request.body.size());
+  reply_t reply{};
+  reply.session = 4;
+  reply.kind = request_t::SPAWN;
+  reply.utime = 2'000'000;
+  const auto ask = [&](int64_t sequence, int code) {
+    request.sequence = reply.sequence = sequence;
+    reply.code = code;
+    for (int i = 0; i < 2; ++i) hear(0, "ruedo/request", request);
+    for (int i = 0; i < 2; ++i) hear(0, "ruedo/reply", reply);
+  };
+  ask(1, reply_t::OK);
+  ask(2, reply_t::REFUSED);
+  EXPECT_EQ(told(), std::vector<std::string>{"2 request : spawn p3at"});
+  request.kind = reply.kind = request_t::RESET;
+  request.body.clear();
+  request.size = 0;
+  reply.utime = 0;
+  const uint64_t before = events.generation();
+  ask(3, reply_t::OK);
+  EXPECT_EQ(told(), std::vector<std::string>{"0 reset : reset"});
+  EXPECT_NE(events.generation(), before);
+}
+
+TEST_F(EventsTest, FaultsOfTheRunItselfComeWhenTheirTimeDoes) {
+  model::Fault late, early;
+  early.robot = late.robot = "r";
+  early.kind = "dropout";
+  early.target = "lrf";
+  early.at_s = 1.5;
+  late.kind = "kidnapped";
+  late.at_s = 4;
+  events.plan({late, early});
+  EXPECT_TRUE(told().empty());
+  touch(2, {});
+  EXPECT_EQ(told(), std::vector<std::string>{"1.5 fault r: dropout of lrf"});
+  touch(4, {});
+  EXPECT_EQ(told().back(), "4 fault r: kidnapped");
+}
+
+TEST_F(EventsTest, WhatIsNoMessageIsNoEventAndThereAreNotTooMany) {
+  const std::vector<uint8_t> good = encoded(contact_t{});
+  for (size_t size = 0; size < good.size(); ++size)
+    events.hear(1, "x", std::span(good).first(size));
+  EXPECT_TRUE(told().empty());
+  move_command_t move{};
+  for (size_t i = 0; i < Events::kMost + 5; ++i) apply(1, 0, encoded(move), "r/move");
+  EXPECT_EQ(events.list().size(), Events::kMost);
 }
 
 class FakeBus : public Bus {

@@ -143,6 +143,96 @@ def test_a_log_is_plotted_whole(tmp_path):
     } <= set(seen)
 
 
+@pytest.fixture(scope="module")
+def crash(tmp_path_factory):
+    """A world with a pad ahead of the robot, which feels what touches it."""
+    text = BUMPER.read_text()
+    assert "1.5 1 0.1 0 0 0" in text
+    path = tmp_path_factory.mktemp("crash") / "crash.sdf"
+    path.write_text(text.replace("1.5 1 0.1 0 0 0", "1.2 0 0.1 0 0 0"))
+    return path
+
+
+def test_what_happened_in_a_log_is_jumped_to(crash, tmp_path):
+    """A motion primitive, a collision, the watchdog and a fault: each at the time at which the log
+    has it.
+    """
+    from ruedo.lcmtypes import (
+        applied_t,
+        contact_t,
+        motion_status_t,
+        move_command_t,
+        velocity_command_t,
+    )
+
+    log = tmp_path / "run.lcm"
+    ahead, drive = move_command_t(), velocity_command_t()
+    ahead.id, ahead.kind, ahead.value = 1, move_command_t.ADVANCE, 0.1
+    drive.vx = 0.5
+    options = ("--record", log, "--duration", "7", "--fault", "p3dx:weak_motor@6.5,value=0.5")
+    with running(*options, world=crash) as process:
+        driver = Socket(process.port)
+        driver.command("p3dx/move", ahead)
+        time.sleep(1.5)
+        for _ in range(20):
+            driver.command("p3dx/velocity", drive)
+            time.sleep(0.1)
+        process.wait(60)
+    expected = {("fault", "p3dx", "weak_motor"): 6.5}
+    for channel, time_us, data in events(log):
+        found = None
+        if channel == "ruedo/applied":
+            applied = applied_t.decode(data)
+            found = {
+                "p3dx/move": ("command", "p3dx", "advance 0.1 m"),
+                "p3dx/velocity": ("command", "p3dx", "drive at 0.50 m/s"),
+            }.get(applied.channel)
+        elif channel == "pad/BUMPER":
+            touched = [point.body for point in contact_t.decode(data).points]
+            hit = [body for body in touched if body.startswith("p3dx/")]
+            if hit:
+                found = ("collision", "pad", "touches p3dx/")
+        elif channel == "p3dx/motion":
+            status = motion_status_t.decode(data)
+            if status.state == motion_status_t.STATE_DONE:
+                found = ("goal", "p3dx", "advance 0.1 m done")
+            elif status.reason == motion_status_t.REASON_WATCHDOG:
+                found = ("watchdog", "p3dx", "no command came")
+        if found:
+            expected.setdefault(found, time_us * 1e-6)
+    assert len(expected) == 6, expected
+    worlds = [time_us * 1e-6 for channel, time_us, _ in events(log) if channel == "ruedo/world"]
+    given = {
+        "events": [[when, *what] for what, when in sorted(expected.items(), key=lambda e: e[1])],
+        "begin": 0,
+        "end": max(time_us for _, time_us, _ in events(log)) * 1e-6,
+        "states": worlds[40:43],
+    }
+    with playing(log) as process:
+        seen = browse(process.url, tmp_path, "events", given)
+    assert {
+        "jumps lead from one to the next, and back",
+        "one kind alone is jumped to, and said in words",
+        "a click on the lane goes there",
+        "frames are stepped through both ways",
+        "a part is played again and again",
+        "until it is no more",
+        "a phone has all of it",
+    } <= set(seen)
+
+
+def test_what_happens_in_a_run_is_told(crash, tmp_path):
+    with running(world=crash) as process:
+        seen = browse(process.url, tmp_path, "events")
+    assert {
+        "a command is told",
+        "a collision is told",
+        "the past is jumped into",
+        "End comes back",
+        "after a reset earlier events hold no more",
+    } <= set(seen)
+
+
 def test_the_view_tells_and_gives(tmp_path):
     with running("--disable", "p3at/camera") as process:
         seen = browse(process.url, tmp_path, "looks")

@@ -41,7 +41,6 @@ import { Router } from "./wire/router";
 import { Session } from "./wire/session";
 
 const kMostScenes = 32; // that are kept for the past
-const kMoment_s = 0.1; // of what is past: from one to the next
 const kJump_s = 0.5; // further is another moment, not the next one
 const kTurn_rad = Math.PI / 24,
   kPan = 0.06,
@@ -112,6 +111,7 @@ export class App {
     (robot) => this.choose(robot),
   );
   private readonly router = new Router(this.page, this);
+  readonly timeline: Timeline;
   private asked = false; // for the state, on this connection
   private shown = ""; // run and name of the robot in the panel
 
@@ -129,10 +129,11 @@ export class App {
       help: () => help.showModal(),
       panel: () => this.togglePanel(),
     });
-    new Timeline(byId("timeline"), page, {
+    this.timeline = new Timeline(byId("timeline"), page, {
       play: (on, speed) => this.link.play(on, speed),
       seek: (time_s) => this.seek(time_s),
       live: () => this.rewind?.live(),
+      step: (ahead) => this.link.step(ahead),
     });
     if (this.rewind) {
       this.rewind.onPast = (past, kept) => this.onPast(past, kept);
@@ -167,8 +168,14 @@ export class App {
     listenToEditing(page, this.editor);
     listenToKeys({
       " ": () => control.pauseOrResume(),
-      ".": () => this.step(1),
-      ",": () => this.step(-1),
+      ".": () => this.step(true),
+      ",": () => this.step(false),
+      ">": () => this.timeline.lane.jump(true),
+      "<": () => this.timeline.lane.jump(false),
+      o: () => page.set({ loop: !page.now.loop }),
+      "[": () => this.timeline.lane.mark("begin"),
+      "]": () => this.timeline.lane.mark("end"),
+      End: () => this.rewind?.live(),
       r: () => void control.reset(),
       x: () => control.stop(),
       "1": () => this.setMode("orbit"),
@@ -208,6 +215,8 @@ export class App {
       hello: (hello) => this.loading.onHello(hello),
       scene: () => void this.loading.onScene(),
       playback: (playback) => this.onPlayback(playback),
+      events: (first, events) =>
+        page.set({ events: [...page.now.events.slice(0, first), ...events] }),
       message: (channel, bytes) => this.router.onMessage(channel, bytes),
       traffic: (channels, messages, sizes) => this.channels.traffic(channels, messages, sizes),
       refused: (channel) =>
@@ -392,12 +401,11 @@ export class App {
 
   // ---- what the user does with the page
 
-  // A step of a live run, or a moment of what is past, to and fro.
-  private step(by: number): void {
-    const { past, playback, hello } = this.page.now,
-      now = hello?.mode === "log" ? playback?.now : past?.now;
-    if (now !== undefined) this.seek(now + by * kMoment_s);
-    else if (by > 0) this.control.step();
+  // A step of a live run, or a state of what is past, to and fro.
+  private step(ahead: boolean): void {
+    const { past, paused, hello } = this.page.now;
+    if (ahead && hello?.mode !== "log" && !past && paused) this.control.step();
+    else this.link.step(ahead);
   }
 
   setMode(mode: ViewMode): void {

@@ -11,7 +11,6 @@ import type { Session } from "./wire/session";
 
 const kFastest_m_s = 1.0,
   kQuickestTurn_rad_s = 1.5; // that the page drives at
-const kLogStep_s = 0.1;
 const kStop = {
   kind: move_command_t.STOP,
   value: 0,
@@ -69,9 +68,7 @@ export class Control {
   }
 
   step(): void {
-    const { playback } = this.page.now;
-    if (!this.isLog) void this.request(request_t.STEP, encode("step_request_t", { steps: 1n }));
-    else if (playback) this.link.seek(playback.now + kLogStep_s);
+    void this.request(request_t.STEP, encode("step_request_t", { steps: 1n }));
   }
 
   rate(rate: number): void {

@@ -59,6 +59,7 @@ describe("a log in the page", () => {
         pictures: 0,
         messages: 0,
         channels: ["a", "b", "i"],
+        events: [],
         scenes: [
           { from: 0, files: {} },
           { from: 6, files: {} },
@@ -84,6 +85,7 @@ describe("a log in the page", () => {
       scene: () => told.push("scene"),
       message: (name: string, m: Uint8Array) => told.push(`${name}${m.join()}`),
       traffic: () => undefined,
+      events: () => undefined,
       refused: (name: string) => told.push(`no ${name}`),
     };
     log.connect(handler as unknown as LinkHandler);

@@ -1,7 +1,7 @@
 // The past of a live run: what is kept, what is shown of it, and what goes on meanwhile.
 import { beforeEach, describe, expect, it, vi } from "vitest";
 import { decode, encode } from "../src/wire/lcm";
-import type { LinkHandler, RunLink } from "../src/wire/link";
+import type { Hello, LinkHandler, RunLink } from "../src/wire/link";
 import { kMostSeconds, Rewind, type Past } from "../src/wire/rewind";
 
 // A link whose end is in the test's hands.
@@ -19,6 +19,9 @@ class Hand implements RunLink {
   }
   history() {
     return Promise.resolve({ every: 1, times: [], values: [] });
+  }
+  step(ahead: boolean) {
+    this.sent.push(ahead ? "ahead" : "back");
   }
   play() {}
   seek() {}
@@ -46,6 +49,7 @@ describe("the past", () => {
     pasts = [];
     rewind.onPast = (past) => pasts.push(past);
     rewind.connect({
+      hello: () => undefined,
       message: (channel: string, bytes: Uint8Array) => {
         if (channel !== "ruedo/world") return seen.push([channel, 0, 0]);
         const { utime, position } = decode("world_state_t", bytes);
@@ -78,6 +82,26 @@ describe("the past", () => {
     vi.advanceTimersByTime(1000);
     expect(last()![1]).toBeGreaterThanOrEqual(3);
     expect(last()![1]).toBeLessThanOrEqual(4);
+  });
+
+  it("goes from state to state, both ways, and no further than there are any", () => {
+    for (let t = 0; t <= 5; ++t) come(t, 10 * t);
+    rewind.step(false); // from the present
+    expect(last()![1]).toBe(4);
+    rewind.step(false);
+    expect(last()![1]).toBe(3);
+    rewind.show(2.5);
+    rewind.step(false);
+    expect(last()![1]).toBe(2);
+    rewind.step(true);
+    rewind.step(true);
+    expect(last()![1]).toBe(4);
+    rewind.show(0);
+    rewind.step(false);
+    expect(last()![1]).toBe(0);
+    hand.handler.hello({ mode: "log" } as Hello);
+    rewind.step(true);
+    expect(hand.sent).toEqual(["ahead"]); // of a log the server knows
   });
 
   it("is bounded", () => {

@@ -1,5 +1,5 @@
 // The page's state: what runs, what is shown of it, and how.
-import type { Hello, LinkState, Playback } from "../wire/link";
+import type { Hello, LinkState, Playback, RunEvent } from "../wire/link";
 import type { Past } from "../wire/rewind";
 import type { Description } from "../scene/description";
 import { kLayers, type Layer } from "../scene/layers";
@@ -31,6 +31,10 @@ export interface PageState {
   playback: Playback | null; // of a log
   past: Past | null; // of a live run: the earlier moment that is shown; null: the present
   kept: { begin: number; end: number }; // what can be shown of it
+  events: readonly RunEvent[]; // what happened, in the order of time
+  eventKind: string; // which of them are shown; "" for all
+  loop: boolean; // what plays begins anew when it has ended
+  marks: { begin: number | null; end: number | null }; // of what is looped; null: all of it
   layers: ReadonlySet<Layer>;
   mode: ViewMode;
   reduced: boolean; // drawn with fewer pixels than the page has
@@ -63,6 +67,10 @@ export function makePage(): Page {
     playback: null,
     past: null,
     kept: { begin: 0, end: 0 },
+    events: [],
+    eventKind: "",
+    loop: false,
+    marks: { begin: null, end: null },
     layers: new Set(kLayers.filter((layer) => layers.includes(layer))),
     mode: "orbit",
     reduced: false,

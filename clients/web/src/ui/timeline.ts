@@ -1,30 +1,15 @@
 // The time line of a recorded run, and of the last minutes of a live one: play, scrub, speed.
-import type { Page, PageState } from "../state/page";
+import type { Page } from "../state/page";
+import { loopedTo, shownOf, type Shown } from "../state/time";
 import { h, say } from "./dom";
 import { icon, iconButton } from "./bar";
+import { EventLane } from "./event_lane";
 
-interface Shown {
-  begin: number;
-  end: number;
-  now: number;
-  speed: number;
-  playing: boolean;
-}
 export interface TimelineActions {
   play(on: boolean, speed: number): void;
   seek(time_s: number): void;
   live(): void;
-}
-
-const kFewest_s = 0.2; // of a live run's past, before it can be looked at
-
-// What of it is there to be shown; null: nothing.
-function shownOf({ hello, playback, past, kept }: Readonly<PageState>): Shown | null {
-  if (hello?.mode === "log") return playback;
-  if (past) return past;
-  return kept.end - kept.begin > kFewest_s
-    ? { ...kept, now: kept.end, speed: 1, playing: true }
-    : null;
+  step(ahead: boolean): void;
 }
 
 export class Timeline {
@@ -45,7 +30,9 @@ export class Timeline {
     { "aria-label": "speed" },
     ...["0.25", "0.5", "1", "2", "5", "10"].map((value) => h("option", { value }, `× ${value}`)),
   );
+  readonly lane: EventLane;
   private held = false;
+  private played = false; // when it was shown last
   private lastSeek = 0;
 
   constructor(
@@ -76,8 +63,34 @@ export class Timeline {
       this.go(true);
     });
     this.slider.addEventListener("input", () => this.go(false));
-    place.append(this.button, this.slider, this.time, this.speed, this.live);
-    page.watch(["playback", "past", "kept", "hello"], (state) => this.show(shownOf(state)));
+    const { canvas, text, kinds, before, after, loop } = (this.lane = new EventLane(
+      page,
+      (time_s) => actions.seek(time_s),
+    ));
+    const back = iconButton("back", "the state before (,)", () => actions.step(false)),
+      ahead = iconButton("step", "the next state (.)", () => actions.step(true));
+    place.append(
+      this.button,
+      h("span", { class: "row tight" }, back, ahead),
+      h("div", { class: "line" }, this.slider, canvas),
+      h("div", { class: "times" }, this.time, text),
+      h("span", { class: "row tight" }, before, after, kinds, loop),
+      this.speed,
+      this.live,
+    );
+    // After a click space is for playing again; who came by the keyboard stays.
+    place.addEventListener("click", (event) => {
+      if (event.detail > 0) (event.target as Element).closest("button")?.blur();
+    });
+    page.watch(["playback", "past", "kept", "hello"], (state) => {
+      const shown = shownOf(state);
+      this.show(shown);
+      const to = shown && loopedTo(page.now, shown, this.played);
+      this.played = (shown?.playing ?? false) && (state.hello?.mode === "log" || !!state.past);
+      if (to === null) return;
+      actions.seek(to);
+      actions.play(true, shown!.speed);
+    });
   }
 
   private toggle(): void {

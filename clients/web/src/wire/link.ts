@@ -21,6 +21,13 @@ export interface Playback {
   playing: boolean;
   jumps: number;
 }
+// Something that happened in a run.
+export interface RunEvent {
+  t: number; // s, the time line's
+  kind: string;
+  robot: string; // "" for the whole run
+  text: string;
+}
 export type LinkState = "connecting" | "open" | "lost" | "ended";
 
 export interface LinkHandler {
@@ -28,6 +35,8 @@ export interface LinkHandler {
   hello(hello: Hello): void;
   scene(): void;
   playback(playback: Playback): void;
+  // What happened, from the event of that number on; from 0 on: earlier ones hold no more.
+  events(first: number, events: RunEvent[]): void;
   message(channel: string, bytes: Uint8Array): void;
   traffic(channels: string[], messages: Uint32Array, sizes: Uint32Array): void;
   refused(channel: string): void;
@@ -41,6 +50,8 @@ export interface RunLink {
   command(channel: string, message: Uint8Array): boolean;
   play(on: boolean, speed: number): void;
   seek(time_s: number): void;
+  // To the next state of the bodies, or the one before.
+  step(ahead: boolean): void;
   // What is known of a field so far.
   history(channel: string, path: string): Promise<History>;
 }
@@ -79,6 +90,7 @@ const enum Operation {
   traffic = 4,
   play = 5,
   seek = 6,
+  step = 7,
 }
 const enum Frame {
   messages = 1,
@@ -153,6 +165,10 @@ export class Link implements RunLink {
     this.send([Operation.seek], new Uint8Array(bytes.buffer));
   }
 
+  step(ahead: boolean): void {
+    this.send([Operation.step, ahead ? 1 : 0]);
+  }
+
   async history(channel: string, path: string): Promise<History> {
     const place = [path, ...channel.split("/")].map(encodeURIComponent).join("/");
     const answer = await fetch(`/history/${place}`);
@@ -186,6 +202,7 @@ export class Link implements RunLink {
       playback?: Playback;
       first?: number;
       channels?: string[];
+      events?: RunEvent[];
       ended?: string;
       refused?: string;
     };
@@ -196,6 +213,7 @@ export class Link implements RunLink {
       said.channels.forEach((name, i) => {
         this.channels[said.first! + i] = name;
       });
+    if (said.events) this.handler.events(said.first!, said.events);
     if (said.refused !== undefined) this.handler.refused(said.refused);
     if (said.ended !== undefined) {
       this.over = true;

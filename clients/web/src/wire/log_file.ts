@@ -6,8 +6,10 @@ import {
   type History,
   type LinkHandler,
   type Playback,
+  type RunEvent,
   type RunLink,
 } from "./link";
+import { typeOf } from "./lcm";
 
 interface Head {
   title: string;
@@ -19,6 +21,7 @@ interface Head {
   pictures: number;
   messages: number;
   channels: string[];
+  events: RunEvent[];
   scenes: { from: number; files: Record<string, [at: number, size: number]> }[];
 }
 interface Entry {
@@ -129,6 +132,7 @@ export class LogFile implements RunLink {
       handler.state("open", "");
       handler.hello(hello);
       this.tell();
+      handler.events(0, this.head.events);
       setInterval(() => this.tick(), kTick_ms);
     });
   }
@@ -166,6 +170,20 @@ export class LogFile implements RunLink {
     ++this.playback.jumps;
     this.tell();
     this.show();
+  }
+
+  // From one message to the next where the log has no states.
+  step(ahead: boolean): void {
+    const stateful = this.entries.find((entries) => {
+        const bytes = entries[0]?.messages[0];
+        return bytes && typeOf(bytes) === "world_state_t";
+      }),
+      entries = stateful ?? this.entries[0] ?? [];
+    const { now, begin, end } = this.playback,
+      at = newestAt(entries, now),
+      to = ahead ? at + 1 : entries[at]?.time === now ? at - 1 : at;
+    this.playback.playing = false;
+    this.seek(entries[to]?.time ?? (ahead ? end : begin));
   }
 
   history(channel: string, path: string): Promise<History> {

@@ -57,6 +57,7 @@ export class Rewind implements RunLink {
   private bytes = 0;
   private newest_s = 0;
   private epoch = -1;
+  private states = ""; // the channel of the bodies' states
   private isLive = true;
   private past: { now: number; playing: boolean; speed: number } | null = null; // null: the present is shown
   private shown = new Map<string, Entry>();
@@ -83,6 +84,7 @@ export class Rewind implements RunLink {
       },
       scene: () => handler.scene(),
       playback: (playback) => handler.playback(playback),
+      events: (first, events) => handler.events(first, events),
       message: (channel, bytes) => this.onMessage(channel, bytes),
       traffic: (channels, messages, sizes) => handler.traffic(channels, messages, sizes),
       refused: (channel) => handler.refused(channel),
@@ -104,6 +106,17 @@ export class Rewind implements RunLink {
   }
   seek(time_s: number): void {
     this.inner.seek(time_s);
+  }
+
+  // Of a live run the past stands still then.
+  step(ahead: boolean): void {
+    if (!this.isLive) return this.inner.step(ahead);
+    const states = this.entries.get(this.states) ?? [],
+      now = this.past?.now ?? this.range.end,
+      at = newestAt(states, now),
+      isThere = states[at]?.time === now;
+    const to = states[ahead ? at + 1 : isThere ? at - 1 : at];
+    if (to) this.show(to.time);
   }
 
   // Shows that moment of sim time, as far as it is kept.
@@ -144,6 +157,7 @@ export class Rewind implements RunLink {
     const type = typeOf(bytes);
     if (!type || kNow.has(type) || !this.isLive) return this.handler.message(channel, bytes);
     if (type === "world_state_t" || type === "tick_t") this.heed(type, bytes);
+    if (type === "world_state_t") this.states = channel;
     this.keep(channel, type, bytes);
     this.onKept(channel, bytes);
     if (!this.past) this.handler.message(channel, bytes);

@@ -1,0 +1,133 @@
+// What happened, below the time line: of a log, or of a run that goes on. Given, of a log: the
+// events that there must be, in their order, and the times of states that follow each other.
+export default async function events({ page, until, check, seen, ready, given, picture }) {
+  await page.setViewportSize({ width: 1100, height: 480 });
+  await ready();
+  await page.locator("#canvas").focus();
+  if (!given) return live({ page, until, check, seen });
+  await page.keyboard.press(" ");
+  await until("(it stands still)", () => !window.ruedo.page.now.playback.playing);
+  await until("(events are there)", () => window.ruedo.page.now.events.length > 0);
+  const told = await page.evaluate(() =>
+    window.ruedo.page.now.events.map(({ t, kind, robot, text }) => [t, kind, robot, text]),
+  );
+  let last = -1;
+  for (const [t, kind, robot, words] of given.events) {
+    const found = told.findIndex(
+      (event, i) =>
+        i > last &&
+        Math.abs(event[0] - t) < 1e-6 &&
+        event[1] === kind &&
+        event[2] === robot &&
+        event[3].includes(words),
+    );
+    check(`a ${kind} at its time`, found > last, `${t} ${words}: ${JSON.stringify(told)}`);
+    last = found;
+  }
+  const now = () => page.evaluate(() => window.ruedo.page.now.playback.now);
+  const seek = async (t) => {
+    await page.evaluate((to) => window.ruedo.link.seek(to), t);
+    await at(t);
+  };
+  const at = (t) =>
+    until(`(at ${t} s)`, (to) => Math.abs(window.ruedo.page.now.playback.now - to) < 1e-6, t);
+  await seek(0);
+  const apart = [...new Set(told.map(([t]) => t))].filter((t) => t > 0);
+  for (const t of apart) {
+    await page.keyboard.press(">");
+    await at(t);
+  }
+  await page.keyboard.press(">");
+  await until(
+    "behind the last one there is none",
+    () => document.getElementById("event").textContent === "no later event",
+  );
+  for (const t of apart.slice(0, -1).reverse()) {
+    await page.getByRole("button", { name: "the event before" }).click();
+    await at(t);
+  }
+  seen("jumps lead from one to the next, and back");
+  await seek(0);
+  await page.getByLabel("events", { exact: true }).selectOption("watchdog");
+  await page.getByRole("button", { name: "the next event" }).click();
+  await at(given.events.find(([, kind]) => kind === "watchdog")[0]);
+  await until("one kind alone is jumped to, and said in words", () =>
+    document.getElementById("event").textContent.endsWith("p3dx: no command came: stopped"),
+  );
+  await picture("events");
+  await page.getByLabel("events", { exact: true }).selectOption("");
+  const lane = await page.locator("#events").boundingBox();
+  await page.mouse.click(lane.x + 8 + 0.5 * (lane.width - 16) + 1.5, lane.y + 7);
+  await until(
+    "a click on the lane goes there",
+    ({ begin, end }) =>
+      Math.abs(window.ruedo.page.now.playback.now - (begin + end) / 2) < 0.02 * (end - begin),
+    given,
+  );
+  await seek(given.states[1]);
+  await page.keyboard.press(".");
+  await at(given.states[2]);
+  await page.getByRole("button", { name: "the state before" }).click();
+  await at(given.states[1]);
+  await page.keyboard.press(",");
+  await at(given.states[0]);
+  seen("frames are stepped through both ways");
+  await seek(1);
+  await page.keyboard.press("[");
+  await seek(1.5);
+  await page.keyboard.press("]");
+  await seek(1);
+  const { jumps } = await page.evaluate(() => window.ruedo.page.now.playback);
+  await page.keyboard.press(" ");
+  await until(
+    "a part is played again and again",
+    (n) => window.ruedo.page.now.playback.jumps >= n + 2 && window.ruedo.page.now.playback.playing,
+    jumps,
+  );
+  check("(and no other)", (await now()) < 2.2, await now());
+  await page.keyboard.press("o");
+  await until("until it is no more", () => window.ruedo.page.now.playback.now > 2.2);
+  await page.setViewportSize({ width: 390, height: 780 });
+  await picture("events-phone");
+  check(
+    "a phone has all of it",
+    await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth),
+  );
+}
+
+async function live({ page, until, seen }) {
+  const has = (kind, text) =>
+    until(
+      `a ${kind} is told`,
+      ([wanted, words]) =>
+        window.ruedo.page.now.events.some((e) => e.kind === wanted && e.text.includes(words)),
+      [kind, text],
+    );
+  await page.keyboard.down("KeyW");
+  await has("command", "drive at");
+  await has("collision", "p3dx");
+  await page.keyboard.up("KeyW");
+  const { now, t } = await page.evaluate(() => ({
+    now: window.ruedo.page.now.time_s,
+    t: window.ruedo.page.now.events.find(({ kind }) => kind === "collision").t,
+  }));
+  await page.getByLabel("events", { exact: true }).selectOption("collision");
+  await page.keyboard.press("<");
+  await until(
+    "the past is jumped into",
+    ([from, to]) => {
+      const { past } = window.ruedo.page.now;
+      return past && past.now >= from - 1e-6 && past.now <= to;
+    },
+    [t, now],
+  );
+  await page.keyboard.press("End");
+  await until("End comes back", () => window.ruedo.page.now.past === null);
+  await page.keyboard.press("r");
+  await page.keyboard.press("Enter");
+  await until("after a reset earlier events hold no more", () => {
+    const { events } = window.ruedo.page.now;
+    return events[0]?.kind === "reset" && events.every(({ kind }) => kind !== "collision");
+  });
+  seen("all was seen");
+}
