@@ -51,9 +51,10 @@ std::optional<size_t> number_after(std::string_view begin, std::string_view path
 struct Console::Impl {
   Stage stage;
   std::shared_ptr<const model::WorldModel> world;
-  std::unique_ptr<SceneData> scene;  // of that world; null: not made yet
-  std::unique_ptr<Library> library;  // null: not asked for yet
-  Playback told;                     // to the viewers
+  std::unique_ptr<SceneData> scene;   // of that world; null: not made yet
+  std::unique_ptr<SceneData> shapes;  // of that world's collisions; null: not asked for yet
+  std::unique_ptr<Library> library;   // null: not asked for yet
+  Playback told;                      // to the viewers
   std::chrono::steady_clock::time_point told_at;
   std::unique_ptr<WebServer> web;
   std::thread thread;
@@ -98,6 +99,13 @@ HttpResponse Console::Impl::get(std::string_view path) {
   if (path.starts_with(kHistory)) return history(path.substr(kHistory.size()));
   if (path.starts_with("/library"))
     return library_file(path.substr(std::string_view("/library").size()));
+  constexpr std::string_view kCollision = "/collision";
+  if (path.starts_with(kCollision) && world) {
+    if (!shapes)
+      shapes = std::make_unique<SceneData>(collision_shapes(*world),
+                                           static_cast<int>(stage.world_version));
+    return scene_file(*shapes, path.substr(kCollision.size()));
+  }
   if (const auto model = number_after("/scene/models/", path)) return model_text(*model);
   if (!path.starts_with("/scene")) return not_found();
   const SceneData* data = current_scene();
@@ -149,6 +157,7 @@ bool Console::Impl::tick() {
   if (auto now = stage.source->world(); now != world) {
     world = std::move(now);
     scene.reset();
+    shapes.reset();
     ++stage.world_version;
   }
   if (const Playback* playback = stage.source->playback(); playback && *playback != told) {

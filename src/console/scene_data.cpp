@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
+#include <memory>
 
 #include <opencv2/imgproc.hpp>
 
@@ -117,6 +119,31 @@ void write_model(JsonWriter& json, const model::ModelInstance& instance,
 }
 
 }  // namespace
+
+model::WorldModel collision_shapes(const model::WorldModel& world) {
+  constexpr model::Rgba kStanding{0.55f, 0.6f, 0.66f, 1}, kMoving{0.56f, 0.82f, 0.31f, 1};
+  model::WorldModel shown = world;
+  std::map<const model::Model*, std::shared_ptr<const model::Model>> made;  // looked up only
+  for (model::ModelInstance& instance : shown.models) {
+    auto& replaced = made[instance.model.get()];
+    if (!replaced) {
+      auto model = std::make_shared<model::Model>(*instance.model);
+      for (model::Link& link : model->links) {
+        link.visuals.clear();
+        for (const model::Collision& collision : link.collisions) {
+          model::Visual& visual = link.visuals.emplace_back();
+          visual.name = collision.name;
+          visual.X_LV = collision.X_LC;
+          visual.geometry = collision.geometry;
+          visual.material.emplace().diffuse = model->is_static ? kStanding : kMoving;
+        }
+      }
+      replaced = std::move(model);
+    }
+    instance.model = replaced;
+  }
+  return shown;
+}
 
 SceneData::SceneData(const model::WorldModel& world, int version) {
   const model::BodyLayout layout(world);

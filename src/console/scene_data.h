@@ -19,6 +19,9 @@ struct Picture {
   Bytes bytes;
 };
 
+// The world with what physics and range finders know of it in place of what it looks like.
+model::WorldModel collision_shapes(const model::WorldModel& world);
+
 struct SceneData {
   // Of each link: int32 kind, int32 body (-1: does not move), float32 x, y, z, qw, qx, qy, qz of
   // the link in its body, or in the world; little endian.

@@ -246,6 +246,23 @@ def test_the_view_tells_and_gives(tmp_path):
     } <= set(seen)
 
 
+def test_what_robots_sense_in_space_is_shown(tmp_path):
+    with running(world=SOURCE / "tests/console/senses.sdf") as process:
+        seen = browse(process.url, tmp_path, "senses")
+    assert {
+        "the cloud of LIDAR lies on the wall",
+        "the cloud of EYE lies on the wall",
+        "names stand over what they name",
+        "a camera's picture is in the view",
+        "whatever the panel shows",
+        "joints are told",
+        "an IMU at rest shows gravity, and no turning",
+        "frames are a tree",
+        "shapes of physics take the place of looks",
+        "and looks come back",
+    } <= set(seen)
+
+
 def test_the_order_of_loading_is_one(tmp_path):
     """Greeting, messages, names of channels, and each file of the scene held back in turn: nothing
     that is shown depends on it.

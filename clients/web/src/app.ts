@@ -9,6 +9,7 @@ import { Gizmo } from "./edit/gizmo";
 import { listenToEditing } from "./edit/keys";
 import { Outline } from "./edit/outline";
 import { loadScene, type SceneFiles } from "./scene/description";
+import { Labels } from "./scene/labels";
 import { Measure } from "./scene/measure";
 import { OverlaySet } from "./scene/overlay_set";
 import { Stage, type ViewMode } from "./scene/stage";
@@ -26,7 +27,9 @@ import { Drive } from "./ui/drive";
 import { h, recall, remember, say, toast } from "./ui/dom";
 import { EditPage } from "./ui/edit_page";
 import { FieldPlots } from "./ui/field_plots";
+import { FrameTree } from "./ui/frames";
 import { fillHelp } from "./ui/help";
+import { Inset } from "./ui/inset";
 import { listenToKeys } from "./ui/keys";
 import { makeLegend } from "./ui/legend";
 import { Notice } from "./ui/notice";
@@ -60,7 +63,7 @@ export class App {
   readonly clock = new Clock(this.page, (anew) => this.forgetPast(anew));
   readonly notice = new Notice(byId("notice"), this.page);
   readonly loading = new Loading<SceneFiles>({
-    fetchScene: () => loadScene(this.file),
+    fetchScene: () => this.loadScene(),
     greeted: (hello) => this.onHello(hello),
     running: (world) => this.onWorld(world),
     complete: (world, scene) => this.onComplete(world, scene),
@@ -93,6 +96,9 @@ export class App {
   );
   readonly channels = new ChannelList(() => this.want());
   readonly measure = new Measure(this.page, this.stage, byId("canvas"));
+  readonly labels = new Labels(byId("view"), this.page, this.stage);
+  readonly frames = new FrameTree(this.page, this.stage);
+  readonly inset = new Inset(byId("view"), this.page, () => this.want());
   readonly plots = new FieldPlots(
     this.page,
     this.link,
@@ -165,6 +171,7 @@ export class App {
       ),
     );
     byId("view").append(this.measure.readout);
+    this.pages.extras.append(this.inset.chooser, this.frames.element);
     listenToEditing(page, this.editor);
     listenToKeys({
       " ": () => control.pauseOrResume(),
@@ -207,6 +214,12 @@ export class App {
       this.stage.setTheme(theme === "dark");
       this.pages.restyle();
       this.plots.restyle();
+    });
+    let shapes = page.now.layers.has("collisions");
+    page.watch(["layers"], ({ layers }) => {
+      if (shapes === layers.has("collisions")) return;
+      shapes = !shapes;
+      if (page.now.hello) void this.loading.onScene();
     });
     page.watch(["world", "scene", "robot"], () => this.showRobot());
     page.watch(["hello", "world", "scene", "robot", "layers", "tab", "panel"], () => this.want());
@@ -262,11 +275,26 @@ export class App {
     if (live) this.clock.tell(Number(world.utime) * 1e-6, world.epoch);
   }
 
+  // As it looks, or as physics has it.
+  private async loadScene(): Promise<SceneFiles | null> {
+    if (!this.page.now.layers.has("collisions")) return loadScene(this.file);
+    const shapes = await loadScene(this.file, "/collision");
+    if (!shapes && this.page.now.scene) toast("The collision shapes are not in this page.");
+    return shapes ?? loadScene(this.file);
+  }
+
   // Kept for who looks back; shown, unless the past is.
   private onComplete(world: World, files: SceneFiles | null): void {
-    this.scenes.push({ from: this.rewind?.range.end ?? 0, world, files });
+    const last = this.scenes.at(-1),
+      isSame =
+        last?.world.runId === world.runId &&
+        last.files?.description.version === files?.description.version;
+    const isShown = !this.page.now.past || this.page.now.scene === last?.files?.description;
+    if (last && isSame)
+      last.files = files; // the same world in another form
+    else this.scenes.push({ from: this.rewind?.range.end ?? 0, world, files });
     if (this.scenes.length > kMostScenes) this.scenes.shift();
-    if (!this.page.now.past) this.present(world, files);
+    if (!this.page.now.past || (isSame && isShown)) this.present(world, files);
   }
 
   // The chosen robot stays, by its name.
@@ -384,6 +412,7 @@ export class App {
       wantedChannels(this.page.now, this.loading.complete, [
         ...this.channels.opened,
         ...this.plots.channels,
+        ...(this.inset.channel ? [this.inset.channel] : []),
       ]),
     );
     this.link.watchTraffic(panel && tab === "Channels");
@@ -395,6 +424,8 @@ export class App {
     this.outline.follow();
     this.editPage.transform.show();
     this.stage.frame(at, () => this.overlays.place());
+    this.labels.follow();
+    this.frames.follow(at);
     this.pages.draw();
     requestAnimationFrame((next) => this.frame(next));
   }

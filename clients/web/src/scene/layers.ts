@@ -7,6 +7,9 @@ export const kLayers = [
   "odometry",
   "contacts",
   "frames",
+  "clouds",
+  "labels",
+  "collisions",
 ] as const;
 export type Layer = (typeof kLayers)[number];
 
@@ -18,4 +21,10 @@ export const kLayerColours: Record<Layer, string> = {
   odometry: "#ff9d2e",
   contacts: "#ff2d8a",
   frames: "linear-gradient(90deg,#e33,#3c3,#36f)",
+  clouds: "linear-gradient(90deg,#f33,#3f3,#33f)",
+  labels: "var(--text)",
+  collisions: "#8fd14f",
 };
+
+// Those that are off until somebody wants them.
+export const kOffAtFirst: readonly Layer[] = ["frames", "labels", "collisions"];

@@ -11,6 +11,7 @@ import type {
   sonar_t,
 } from "../../generated/messages";
 import type { Layer } from "./layers";
+import { Cloud } from "./clouds";
 import { matrixOf } from "./matrix";
 
 const kColours = {
@@ -254,6 +255,7 @@ export class RobotOverlay {
   readonly group = new THREE.Group();
   private readonly scans = new Map<string, ScanView>();
   private readonly sonars = new Map<string, SonarView>();
+  readonly clouds = new Map<string, Cloud>();
   private readonly truth = new Trail(kColours.trail);
   private readonly odometry = new Trail(kColours.odometry);
   private readonly contacts = new Strip(
@@ -307,6 +309,16 @@ export class RobotOverlay {
     this.view(this.sonars, device, SonarView).show(message);
     this.changed = true;
   }
+  cloud(device: device_info_t, points: Float32Array): void {
+    let cloud = this.clouds.get(device.name);
+    if (!cloud) {
+      cloud = new Cloud(device);
+      this.clouds.set(device.name, cloud);
+      this.group.add(cloud.object);
+    }
+    cloud.show(points);
+    this.changed = true;
+  }
   pose(message: pose_t): void {
     this.truth.add(message.pos[0]!, message.pos[1]!, message.pos[2]! + 0.02);
     this.changed = true;
@@ -344,6 +356,7 @@ export class RobotOverlay {
 
   place(base: THREE.Matrix4, layers: ReadonlySet<Layer>): boolean {
     for (const view of [...this.scans.values(), ...this.sonars.values()]) view.place(base, layers);
+    for (const cloud of this.clouds.values()) cloud.place(base, layers.has("clouds"));
     this.baseFrame.matrix.copy(base);
     this.truth.strip.object.visible = layers.has("trail");
     this.odometry.strip.object.visible = layers.has("odometry");

@@ -324,6 +324,13 @@ export class Stage {
     return true;
   }
 
+  // Where a model is.
+  modelAt(model: ModelDescription, into: THREE.Matrix4): void {
+    matrixOf(model.pose, 0, into);
+    if (model.body >= 0 && model.body < this.poses.size)
+      into.premultiply(matrixOf(this.poses.now, 7 * model.body, kScratch));
+  }
+
   // Where the floor is under a point of the canvas; null above the horizon.
   ground(x: number, y: number): THREE.Vector3 | null {
     return this.caster(x, y).ray.intersectPlane(

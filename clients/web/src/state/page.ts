@@ -2,7 +2,7 @@
 import type { Hello, LinkState, Playback, RunEvent } from "../wire/link";
 import type { Past } from "../wire/rewind";
 import type { Description } from "../scene/description";
-import { kLayers, type Layer } from "../scene/layers";
+import { kLayers, kOffAtFirst, type Layer } from "../scene/layers";
 import type { ViewMode } from "../scene/stage";
 import { recall } from "../ui/dom";
 import type { HistoryState } from "../edit/history";
@@ -52,7 +52,8 @@ export interface PageState {
 export type Page = Store<PageState>;
 
 export function makePage(): Page {
-  const layers = recall("layers")?.split(",") ?? kLayers.filter((layer) => layer !== "frames");
+  const layers =
+    recall("layers")?.split(",") ?? kLayers.filter((layer) => !kOffAtFirst.includes(layer));
   const tab = recall("page");
   return new Store<PageState>({
     link: "connecting",

@@ -8,15 +8,18 @@ const kOfTab: Record<Exclude<Tab, "Robot">, string[]> = {
   Channels: [],
   World: [],
 };
-const kNotOnRobotPage = ["lidar_t", "camera_info_t", "joint_state_t"]; // it shows all others
+const kNotOnRobotPage = ["lidar_t", "camera_info_t"]; // it shows all others
 const kOfLayer: Partial<Record<Layer, string>> = {
   rays: "planar_lidar_t",
   points: "planar_lidar_t",
   sonar: "sonar_t",
   trail: "pose_t",
   contacts: "contact_t",
+  clouds: "lidar_t",
 };
 
+export const isDepth = (channel: string, type: string) =>
+  type === "image_t" && channel.endsWith("/depth");
 const onTab = (tab: Tab, type: string) =>
   tab === "Robot" ? !kNotOnRobotPage.includes(type) : kOfTab[tab].includes(type);
 
@@ -40,13 +43,15 @@ export function wantedChannels(
     "odometry_t",
     ...[...layers].map((layer) => kOfLayer[layer]),
   ]); // the wheels turn by odometry
+  const depths = layers.has("clouds");
   for (const { name, type, robot: of, input } of world.channels) {
     if (input) continue;
     if (!of) {
       if (type === "reply_t" || (complete && kOfPage.includes(type))) wanted.add(name);
     } else if (
       complete &&
-      ((shown.has(of) && drawn.has(type)) || (of === chosen && panel && onTab(tab, type)))
+      ((shown.has(of) && (drawn.has(type) || (depths && isDepth(name, type)))) ||
+        (of === chosen && panel && onTab(tab, type)))
     ) {
       wanted.add(name);
     }

@@ -7,6 +7,7 @@ import {
   type contact_t,
   type device_info_t,
   type imu_t,
+  type joint_state_t,
   type odometry_t,
   type planar_lidar_t,
   type pose_t,
@@ -39,6 +40,7 @@ const kKinds: Record<number, string> = {
   [motion_status_t.KIND_VELOCITY]: "velocity",
   [motion_status_t.KIND_WHEELS]: "wheels",
 };
+const shortly = (values: Iterable<number>) => [...values].map((v) => v.toFixed(2)).join(", ");
 const degrees = (rad: number) => `${((rad * 180) / Math.PI).toFixed(1)}°`;
 const heading = (rad: number) => degrees(wrap(rad)); // all headings alike, from -180 to 180
 const yawOf = (q: ArrayLike<number>) =>
@@ -132,6 +134,8 @@ export class RobotPages {
   readonly plotPage: HTMLElement;
   private readonly pictures = new Map<string, Picture>();
   private readonly pictureList = h("div");
+  private readonly jointTable = h("table", { class: "statistics", id: "joints", hidden: true });
+  readonly extras = h("div"); // more of the robot
   private readonly values = new Map<string, HTMLElement>();
   private readonly polar = new PolarPlot();
   private readonly speed = new TimePlot("Velocity profile", "m/s, rad/s", [
@@ -206,6 +210,7 @@ export class RobotPages {
       "section",
       {},
       this.facts,
+      this.jointTable,
       h("h2", {}, "Motion primitive"),
       h(
         "div",
@@ -222,6 +227,7 @@ export class RobotPages {
       this.polar.element,
       h("h2", {}, "Pictures"),
       this.pictureList,
+      this.extras,
     );
     this.plotPage = h("section", {}, this.speed.element, this.path.element, this.error.element);
   }
@@ -233,6 +239,7 @@ export class RobotPages {
 
   show(robot: robot_info_t, devices: device_info_t[]): void {
     this.values.clear();
+    this.jointTable.hidden = true;
     this.facts.replaceChildren();
     this.pictures.clear();
     this.truth = this.reckoned = null;
@@ -317,8 +324,29 @@ export class RobotPages {
   imu(device: device_info_t, m: imu_t): void {
     this.fact(
       device.name,
-      `${[...m.linear_acceleration].map((v) => v.toFixed(2)).join(", ")} m/s²`,
+      [
+        `${shortly(m.linear_acceleration)} m/s²`,
+        `${shortly(m.angular_velocity)} rad/s`,
+        m.orientation.some((v) => v !== 0) ? `heading ${heading(yawOf(m.orientation))}` : "",
+      ]
+        .filter(Boolean)
+        .join(" · "),
     );
+  }
+  joints(m: joint_state_t): void {
+    this.jointTable.hidden = m.num_joints === 0;
+    const rows = m.joint_name.map((name, i) =>
+      h(
+        "tr",
+        {},
+        h("th", {}, name),
+        ...[m.joint_position, m.joint_velocity, m.joint_effort].map((values) =>
+          h("td", { class: "number" }, values[i]!.toFixed(3)),
+        ),
+      ),
+    );
+    const heads = ["joint", "position", "speed", "effort"].map((text) => h("th", {}, text));
+    this.jointTable.replaceChildren(h("tr", {}, ...heads), ...rows);
   }
   // Of a device that the page does not know: its members by name.
   other(device: device_info_t, m: object): void {

@@ -1,6 +1,8 @@
 // Messages to those who show them. Which type a channel has is told by ruedo/info.
 import type { device_info_t, Messages } from "../../generated/messages";
 import type { Loading } from "../state/loading";
+import { pointsOfDepth, pointsOfLidar } from "../scene/clouds";
+import { isDepth } from "../state/wanted";
 import { channelOfType, type World } from "../state/world";
 import type { Clock } from "../state/clock";
 import type { Page } from "../state/page";
@@ -8,6 +10,7 @@ import type { Poses } from "../state/poses";
 import type { OverlaySet } from "../scene/overlay_set";
 import type { Stage } from "../scene/stage";
 import type { ChannelList } from "../ui/channels";
+import type { Inset } from "../ui/inset";
 import type { RobotPages } from "../ui/robot";
 import { decode, fingerprint, typeOf, type TypeName } from "./lcm";
 import type { Session } from "./session";
@@ -41,6 +44,7 @@ export interface Views {
   overlays: OverlaySet;
   pages: RobotPages;
   channels: ChannelList;
+  inset: Inset;
 }
 
 export class Router {
@@ -149,8 +153,21 @@ export class Router {
       case "imu_t":
         if (device) pages?.imu(device, read(type));
         return;
-      case "image_t":
-        pages?.camera(channel.slice(channel.indexOf("/") + 1), read(type));
+      case "image_t": {
+        const m = read(type);
+        if (device && isDepth(channel, type)) {
+          const points = pointsOfDepth(m, device.fov_horizontal);
+          if (points) overlay?.cloud(device, points);
+        }
+        this.views.inset.message(channel, m);
+        pages?.camera(channel.slice(channel.indexOf("/") + 1), m);
+        return;
+      }
+      case "lidar_t":
+        if (device) overlay?.cloud(device, pointsOfLidar(read(type)));
+        return;
+      case "joint_state_t":
+        pages?.joints(read(type));
         return;
       default:
         if (device) pages?.other(device, read(type));

@@ -1,0 +1,91 @@
+// Points in space: what 3-D range finders and depth cameras see, in the device's frame.
+import * as THREE from "three";
+import { image_t, type device_info_t, type lidar_t } from "../../generated/messages";
+import { matrixOf } from "./matrix";
+
+const kMostPoints = 40_000; // of a picture; of more every second or third row and column
+
+// x, y, z of each return, one after the other.
+export function pointsOfLidar(scan: lidar_t): Float32Array {
+  const { nlayers, ncolumns, ranges } = scan,
+    points = new Float32Array(3 * ranges.length);
+  let at = 0;
+  for (let layer = 0; layer < nlayers; ++layer) {
+    const elevation = scan.elevation0 + layer * scan.elevation_step,
+      flat = Math.cos(elevation),
+      up = Math.sin(elevation);
+    for (let column = 0; column < ncolumns; ++column) {
+      const range = ranges[layer * ncolumns + column]!;
+      if (!Number.isFinite(range)) continue;
+      const azimuth = scan.azimuth0 + column * scan.azimuth_step;
+      points[at++] = range * flat * Math.cos(azimuth);
+      points[at++] = range * flat * Math.sin(azimuth);
+      points[at++] = range * up;
+    }
+  }
+  return points.subarray(0, at);
+}
+
+// Of a picture of depths along the optical axis, whose width spans the field of view: x ahead, y
+// left, z up, as the device's frame has them. Null for another kind of picture.
+export function pointsOfDepth(picture: image_t, fov: number): Float32Array | null {
+  const { width, height, pixelformat, data, row_stride } = picture;
+  if (pixelformat !== image_t.PIXEL_FORMAT_FLOAT_GRAY32 || width < 1 || height < 1) return null;
+  const stride = row_stride || 4 * width;
+  if (data.length < (height - 1) * stride + 4 * width) return null;
+  const view = new DataView(data.buffer, data.byteOffset, data.byteLength),
+    focus = width / (2 * Math.tan(fov / 2)),
+    every = Math.max(1, Math.ceil(Math.sqrt((width * height) / kMostPoints))),
+    points = new Float32Array(3 * Math.ceil(width / every) * Math.ceil(height / every));
+  let at = 0;
+  for (let v = 0; v < height; v += every) {
+    for (let u = 0; u < width; u += every) {
+      const depth = view.getFloat32(v * stride + 4 * u, true);
+      if (!Number.isFinite(depth)) continue;
+      points[at++] = depth;
+      points[at++] = (depth * ((width - 1) / 2 - u)) / focus;
+      points[at++] = (depth * ((height - 1) / 2 - v)) / focus;
+    }
+  }
+  return points.subarray(0, at);
+}
+
+export class Cloud {
+  readonly object = new THREE.Points(
+    new THREE.BufferGeometry(),
+    new THREE.PointsMaterial({
+      size: 2.5,
+      sizeAttenuation: false,
+      vertexColors: true,
+      toneMapped: false,
+      fog: false,
+    }),
+  );
+  private readonly mount = new THREE.Matrix4();
+
+  constructor(device: device_info_t) {
+    matrixOf([...device.position, ...device.orientation], 0, this.mount);
+    this.object.matrixAutoUpdate = false;
+    this.object.frustumCulled = false;
+  }
+
+  // Near is warm, far is cold.
+  show(points: Float32Array): void {
+    const { geometry } = this.object,
+      colours = new Float32Array(points.length),
+      colour = new THREE.Color();
+    for (let i = 0; i < points.length; i += 3) {
+      const away = Math.hypot(points[i]!, points[i + 1]!, points[i + 2]!);
+      colour.setHSL(0.66 * (1 - Math.exp(-away / 6)), 1, 0.55).toArray(colours, i);
+    }
+    geometry.dispose();
+    geometry.setAttribute("position", new THREE.BufferAttribute(points, 3));
+    geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
+    geometry.setDrawRange(0, points.length / 3);
+  }
+
+  place(base: THREE.Matrix4, visible: boolean): void {
+    this.object.matrix.multiplyMatrices(base, this.mount);
+    this.object.visible = visible;
+  }
+}

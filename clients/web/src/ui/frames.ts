@@ -1,0 +1,82 @@
+// The tree of frames of a robot: world, odom and base_link, and the frame of each device below it.
+import type { Page } from "../state/page";
+import type { Stage } from "../scene/stage";
+import * as THREE from "three";
+import { h, say } from "./dom";
+
+const kNoFrame = new Set(["odometry", "pose", "motion", "joints"]);
+const kPeriod_ms = 200;
+
+const number = (value: number, unit: string) =>
+  `${(Math.abs(value) < 5e-4 ? 0 : value).toFixed(3)} ${unit}`;
+
+// "1.000 m, 0.000 m, 0.200 m, turned 90.0°"
+export function poseWords(position: ArrayLike<number>, orientation: ArrayLike<number>): string {
+  const [w, x, y, z] = [0, 1, 2, 3].map((i) => orientation[i]!) as [number, number, number, number];
+  const yaw = Math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
+    pitch = Math.asin(Math.max(-1, Math.min(1, 2 * (w * y - z * x)))),
+    roll = Math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y));
+  const turns = Object.entries({ roll, pitch, yaw })
+    .filter(([, angle]) => Math.abs(angle) > 5e-4)
+    .map(([name, angle]) => `${name} ${((angle * 180) / Math.PI).toFixed(1)}°`);
+  const place = [0, 1, 2].map((i) => number(position[i]!, "m")).join(", ");
+  return [place, ...turns].join(", ");
+}
+
+export class FrameTree {
+  readonly element = h("details", { id: "tf" }, h("summary", {}, "Frames"));
+  private readonly list = h("ul", { class: "frames" });
+  private readonly basePose = h("span", { class: "dim" });
+  private readonly matrix = new THREE.Matrix4();
+  private readonly position = new THREE.Vector3();
+  private readonly rotation = new THREE.Quaternion();
+  private readonly scale = new THREE.Vector3();
+  private shown_ms = 0;
+
+  constructor(
+    private readonly page: Page,
+    private readonly stage: Stage,
+  ) {
+    this.element.append(this.list);
+    page.watch(["world", "scene", "robot"], () => this.make());
+  }
+
+  private make(): void {
+    const { world, scene, robot: at } = this.page.now,
+      robot = world?.robots[at],
+      base = scene?.bases.find((each) => each.robot === robot?.name);
+    const item = (name: string, pose: Node | string, ...below: HTMLElement[]) =>
+      h("li", {}, h("b", {}, name), " ", pose, below.length > 0 && h("ul", {}, ...below));
+    if (!robot) return this.list.replaceChildren();
+    const devices = world!.devices
+      .filter(({ robot: of, kind }) => of === robot.name && !kNoFrame.has(kind))
+      .map(({ name, position, orientation }) =>
+        item(
+          `${robot.name}/${name}`,
+          h("span", { class: "dim" }, poseWords(position, orientation)),
+        ),
+      );
+    const start = base ? poseWords(base.start.slice(0, 3), base.start.slice(3)) : "";
+    this.list.replaceChildren(
+      item(
+        "world",
+        "",
+        item(`${robot.name}/odom`, h("span", { class: "dim" }, start)),
+        item(`${robot.name}/base_link`, this.basePose, ...devices),
+      ),
+    );
+  }
+
+  // Once a frame: where base_link is now.
+  follow(at_ms: number): void {
+    if (!(this.element as HTMLDetailsElement).open || at_ms - this.shown_ms < kPeriod_ms) return;
+    this.shown_ms = at_ms;
+    const { world, scene, robot } = this.page.now,
+      name = world?.robots[robot]?.name;
+    if (!this.stage.base(scene?.bases.findIndex((base) => base.robot === name) ?? -1, this.matrix))
+      return;
+    this.matrix.decompose(this.position, this.rotation, this.scale);
+    const { x, y, z, w } = this.rotation;
+    say(this.basePose, poseWords(this.position.toArray(), [w, x, y, z]));
+  }
+}

@@ -1,0 +1,89 @@
+// What robots sense in space, and what is known of them: clouds, names, frames, joints, an IMU, a
+// camera in the view, and the shapes that physics knows.
+export default async function senses({ page, until, check, seen, ready, picture }) {
+  await page.setViewportSize({ width: 1000, height: 560 });
+  await ready();
+  await page.getByRole("tab", { name: "Robot" }).click();
+  // The wall stands 3 m ahead of the robot: all that is seen above the ground lies in its face.
+  for (const device of ["LIDAR", "EYE"])
+    await until(
+      `the cloud of ${device} lies on the wall`,
+      (name) => {
+        const cloud = window.ruedo.overlays.of.get("probe")?.clouds.get(name)?.object;
+        if (!cloud?.visible) return false;
+        const { array } = cloud.geometry.getAttribute("position"),
+          matrix = cloud.matrix.elements;
+        let hits = 0;
+        for (let i = 0; i < array.length; i += 3) {
+          const at = (row) =>
+            matrix[row] * array[i] +
+            matrix[row + 4] * array[i + 1] +
+            matrix[row + 8] * array[i + 2] +
+            matrix[row + 12];
+          if (at(2) < 0.05) continue;
+          if (Math.abs(at(0) - 3) > 0.02) return false;
+          ++hits;
+        }
+        return hits > 150;
+      },
+      device,
+    );
+  const layer = (name) => page.locator(`[data-layer="${name}"]`).click();
+  await layer("labels");
+  await until("names stand over what they name", () => {
+    const spans = [...document.querySelectorAll(".labels span")];
+    return (
+      spans.map((each) => each.textContent).includes("probe") &&
+      spans.every((each) => each.hidden || each.style.transform.includes("px"))
+    );
+  });
+  await page.locator("#inset").selectOption("probe/EYE/depth");
+  await until("a camera's picture is in the view", () => {
+    const canvas = document.querySelector(".inset canvas");
+    return canvas?.width === 64 && canvas.height === 48;
+  });
+  await page.getByRole("tab", { name: "Channels" }).click();
+  const told = () => document.querySelector(".inset figcaption").textContent;
+  const before = await page.evaluate(told);
+  await until(
+    "whatever the panel shows",
+    (text) => document.querySelector(".inset figcaption").textContent !== text,
+    before,
+  );
+  await page.getByRole("tab", { name: "Robot" }).click();
+  await until("joints are told", () =>
+    /shoulder-?\d/.test(document.getElementById("joints").textContent),
+  );
+  await until("an IMU at rest shows gravity, and no turning", () => {
+    const words = document.querySelector('[data-fact="IMU"]')?.textContent ?? "";
+    return /9\.8\d m\/s².* rad\/s/.test(words);
+  });
+  await page.locator("#tf summary").click();
+  await until("frames are a tree", () => {
+    const text = document.getElementById("tf").textContent;
+    return (
+      text.includes("probe/LIDAR 0.000 m, 0.000 m, 0.300 m") &&
+      /probe\/base_link -?0\.00\d m/.test(text)
+    );
+  });
+  await picture("senses");
+  const triangles = () => window.ruedo.stage.renderer.info.render.triangles;
+  await until("(it is drawn)", (n) => window.ruedo.stage.frames > n, 3);
+  const looks = await page.evaluate(triangles);
+  await layer("collisions");
+  // A box of 12 triangles in place of a ball of some hundred.
+  await until(
+    "shapes of physics take the place of looks",
+    (n) => window.ruedo.stage.renderer.info.render.triangles < n - 100,
+    looks,
+  );
+  await picture("senses-shapes");
+  await layer("collisions");
+  await until(
+    "and looks come back",
+    (n) => window.ruedo.stage.renderer.info.render.triangles > n - 50,
+    looks,
+  );
+  seen("all was seen");
+  check("(done)", true);
+}
