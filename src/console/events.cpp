@@ -142,6 +142,7 @@ void Events::begin_anew() {
   list_.clear();
   touched_.clear();
   heard_.clear();
+  blocked_by_.clear();
   motions_.clear();
   commanded_.clear();
   due_ = 0;
@@ -206,14 +207,15 @@ void Events::hear(double time_s, const std::string& channel, std::span<const uin
 // Bodies that were not touched a moment before. What a channel tells first lasts already.
 void Events::touches(const std::string& channel, std::span<const uint8_t> message) {
   std::set<std::string> bodies;
-  const bool whole =
-      visit_message(*find_schema(fingerprint_of(message)), message,
-                    [&](const FieldPath& at, const FieldValue& value) {
-                      const auto* text = std::get_if<std::string_view>(&value);
-                      if (text && at.parts.size() == 2 && at.parts[1].field->name == "body")
-                        bodies.emplace(*text);
-                      return true;
-                    });
+  std::optional<std::string> blocked_by;
+  const auto look = [&](const FieldPath& at, const FieldValue& value) {
+    const auto* text = std::get_if<std::string_view>(&value);
+    const std::string& field = at.parts.back().field->name;
+    if (text && at.parts.size() == 2 && field == "body") bodies.emplace(*text);
+    if (text && at.parts.size() == 1 && field == "blocked_by") blocked_by = *text;
+    return true;
+  };
+  const bool whole = visit_message(*find_schema(fingerprint_of(message)), message, look);
   if (!whole) return;
   const std::string robot = robot_of(channel);
   const bool first = heard_.insert(channel).second;
@@ -224,6 +226,11 @@ void Events::touches(const std::string& channel, std::span<const uint8_t> messag
       add("collision", robot, body.empty() ? "touches something" : "touches " + body);
     if (at != touched.end() || touched.size() < kMostBodies) touched[body] = now_s_;
   }
+  if (!blocked_by) return;
+  std::string& before = blocked_by_[robot];
+  if (!blocked_by->empty() && *blocked_by != before)
+    add("blocked", robot, "blocked by " + *blocked_by);
+  before = *blocked_by;
 }
 
 void Events::motion(const std::string& channel, const motion_status_t& now) {
@@ -237,6 +244,7 @@ void Events::motion(const std::string& channel, const motion_status_t& now) {
   if (now.state == motion_status_t::STATE_REFUSED) {
     add("refused", robot, words_of(now.kind, now.done) + ": " + why_refused(now.reason));
   } else if (now.reason == motion_status_t::REASON_BLOCKED) {
+    if (blocked_by_.contains(robot) && !ended) return;  // who tells by what tells that, too
     add("blocked", robot, what + (ended ? " ended: blocked" : " is blocked"));
   } else if (now.reason == motion_status_t::REASON_WATCHDOG && ended) {
     add("watchdog", robot, "no command came: stopped");

@@ -69,6 +69,7 @@ class Events {
   std::map<std::string, Touched> touched_;                  // by robot
   std::set<std::string> heard_;                             // channels of touches
   std::map<std::string, motion_status_t> motions_;          // by channel, the newest
+  std::map<std::string, std::string> blocked_by_;           // by robot, of those that tell
   std::map<std::string, double> commanded_;                 // by channel, when last
   std::map<std::pair<int64_t, int64_t>, request_t> asked_;  // by session and sequence; not answered
   std::vector<model::Fault> planned_;                       // by time

@@ -13,6 +13,7 @@
 #include "console/offer_ring.h"
 #include "console/tee_bus.h"
 #include "ruedo/applied_t.hpp"
+#include "ruedo/collisions_t.hpp"
 #include "ruedo/contact_t.hpp"
 #include "ruedo/errors.h"
 #include "ruedo/fault_t.hpp"
@@ -200,6 +201,28 @@ TEST_F(EventsTest, ATouchIsOneCollisionHoweverItBounces) {
   EXPECT_EQ(told(), (std::vector<std::string>{
                         "0.1 collision r: touches box/link", "0.5 collision r: touches wall/link",
                         "2 collision r: touches box/link", "2 collision r: touches floor/link"}));
+}
+
+TEST_F(EventsTest, WhatBlocksARobotIsNamed) {
+  collisions_t collisions{};
+  const auto tell = [&](double time_s, const std::string& by) {
+    collisions.blocked_by = by;
+    hear(time_s, "r/collisions", collisions);
+  };
+  tell(0, "");
+  collisions.points.emplace_back().body = "wall/link";
+  collisions.n = 1;
+  tell(1, "");
+  tell(1.5, "wall/link");
+  tell(1.6, "wall/link");
+  status(1.5, 0, motion_status_t::KIND_VELOCITY, motion_status_t::STATE_RUNNING, 0);
+  status(1.6, 0, motion_status_t::KIND_VELOCITY, motion_status_t::STATE_RUNNING,
+         motion_status_t::REASON_BLOCKED);
+  tell(2, "");
+  tell(3, "box/link");
+  EXPECT_EQ(told(), (std::vector<std::string>{
+                        "1 collision r: touches wall/link", "1.5 blocked r: blocked by wall/link",
+                        "3 collision r: touches wall/link", "3 blocked r: blocked by box/link"}));
 }
 
 TEST_F(EventsTest, MotionsEndInOneWayOrAnother) {

@@ -70,7 +70,7 @@ export default async function senses({ page, until, check, seen, ready, picture 
   const triangles = () => window.ruedo.stage.renderer.info.render.triangles;
   await until("(it is drawn)", (n) => window.ruedo.stage.frames > n, 3);
   const looks = await page.evaluate(triangles);
-  await layer("collisions");
+  await layer("shapes");
   // A box of 12 triangles in place of a ball of some hundred.
   await until(
     "shapes of physics take the place of looks",
@@ -78,7 +78,7 @@ export default async function senses({ page, until, check, seen, ready, picture 
     looks,
   );
   await picture("senses-shapes");
-  await layer("collisions");
+  await layer("shapes");
   await until(
     "and looks come back",
     (n) => window.ruedo.stage.renderer.info.render.triangles > n - 50,

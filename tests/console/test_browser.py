@@ -159,6 +159,7 @@ def test_what_happened_in_a_log_is_jumped_to(crash, tmp_path):
     """
     from ruedo.lcmtypes import (
         applied_t,
+        collisions_t,
         contact_t,
         motion_status_t,
         move_command_t,
@@ -187,11 +188,12 @@ def test_what_happened_in_a_log_is_jumped_to(crash, tmp_path):
                 "p3dx/move": ("command", "p3dx", "advance 0.1 m"),
                 "p3dx/velocity": ("command", "p3dx", "drive at 0.50 m/s"),
             }.get(applied.channel)
-        elif channel == "pad/BUMPER":
-            touched = [point.body for point in contact_t.decode(data).points]
-            hit = [body for body in touched if body.startswith("p3dx/")]
-            if hit:
-                found = ("collision", "pad", "touches p3dx/")
+        elif channel in ("pad/BUMPER", "pad/collisions", "p3dx/collisions"):
+            robot, device = channel.split("/")
+            other = {"pad": "p3dx/", "p3dx": "pad/"}[robot]
+            contacts = (contact_t if device == "BUMPER" else collisions_t).decode(data)
+            if any(point.body.startswith(other) for point in contacts.points):
+                found = ("collision", robot, f"touches {other}")
         elif channel == "p3dx/motion":
             status = motion_status_t.decode(data)
             if status.state == motion_status_t.STATE_DONE:
@@ -200,7 +202,7 @@ def test_what_happened_in_a_log_is_jumped_to(crash, tmp_path):
                 found = ("watchdog", "p3dx", "no command came")
         if found:
             expected.setdefault(found, time_us * 1e-6)
-    assert len(expected) == 6, expected
+    assert len(expected) == 7, expected
     worlds = [time_us * 1e-6 for channel, time_us, _ in events(log) if channel == "ruedo/world"]
     given = {
         "events": [[when, *what] for what, when in sorted(expected.items(), key=lambda e: e[1])],

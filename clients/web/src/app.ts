@@ -215,9 +215,9 @@ export class App {
       this.pages.restyle();
       this.plots.restyle();
     });
-    let shapes = page.now.layers.has("collisions");
+    let shapes = page.now.layers.has("shapes");
     page.watch(["layers"], ({ layers }) => {
-      if (shapes === layers.has("collisions")) return;
+      if (shapes === layers.has("shapes")) return;
       shapes = !shapes;
       if (page.now.hello) void this.loading.onScene();
     });
@@ -277,7 +277,7 @@ export class App {
 
   // As it looks, or as physics has it.
   private async loadScene(): Promise<SceneFiles | null> {
-    if (!this.page.now.layers.has("collisions")) return loadScene(this.file);
+    if (!this.page.now.layers.has("shapes")) return loadScene(this.file);
     const shapes = await loadScene(this.file, "/collision");
     if (!shapes && this.page.now.scene) toast("The collision shapes are not in this page.");
     return shapes ?? loadScene(this.file);

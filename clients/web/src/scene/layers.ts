@@ -9,7 +9,7 @@ export const kLayers = [
   "frames",
   "clouds",
   "labels",
-  "collisions",
+  "shapes",
 ] as const;
 export type Layer = (typeof kLayers)[number];
 
@@ -23,8 +23,8 @@ export const kLayerColours: Record<Layer, string> = {
   frames: "linear-gradient(90deg,#e33,#3c3,#36f)",
   clouds: "linear-gradient(90deg,#f33,#3f3,#33f)",
   labels: "var(--text)",
-  collisions: "#8fd14f",
+  shapes: "#8fd14f",
 };
 
 // Those that are off until somebody wants them.
-export const kOffAtFirst: readonly Layer[] = ["frames", "labels", "collisions"];
+export const kOffAtFirst: readonly Layer[] = ["frames", "labels", "shapes"];

@@ -4,7 +4,7 @@ import type { Stage } from "../scene/stage";
 import * as THREE from "three";
 import { h, say } from "./dom";
 
-const kNoFrame = new Set(["odometry", "pose", "motion", "joints"]);
+const kNoFrame = new Set(["odometry", "pose", "motion", "collisions", "joints"]);
 const kPeriod_ms = 200;
 
 const number = (value: number, unit: string) =>
