@@ -23,23 +23,15 @@ export default async function fields({ page, until, check, ready, picture }) {
     () => window.ruedo.page.now.tab === "Plots" && document.querySelectorAll(".pane").length === 1,
   );
   await open("p3at/odometry");
-  await page
-    .locator('[data-field="theta"]')
-    .dragTo(page.locator("#fields"), { force: true })
-    .catch(() => undefined);
-  if ((await page.evaluate(() => window.ruedo.plots.panes[0].series.length)) < 2) {
-    await page.evaluate(() => {
-      const data = new DataTransfer();
-      data.setData("text/ruedo-field", "p3at/odometry\ntheta");
-      const over = new DragEvent("dragover", { dataTransfer: data, cancelable: true });
-      document.getElementById("tab-Plots").dispatchEvent(over);
-      document
-        .getElementById("fields")
-        .dispatchEvent(
-          new DragEvent("drop", { dataTransfer: data, cancelable: true, bubbles: true }),
-        );
-    });
-  }
+  // By hand: the page that it is dropped on opens on the way, which Playwright's dragTo waits for.
+  await page.evaluate(() => {
+    const data = new DataTransfer(),
+      event = (type) =>
+        new DragEvent(type, { dataTransfer: data, cancelable: true, bubbles: true });
+    document.querySelector('[data-field="theta"]').dispatchEvent(event("dragstart"));
+    document.getElementById("tab-Plots").dispatchEvent(event("dragover"));
+    document.getElementById("fields").dispatchEvent(event("drop"));
+  });
   await until("a drag onto Plots does, too", () => window.ruedo.plots.panes[0].series.length === 2);
   const before = await points(0);
   await until(

@@ -54,6 +54,14 @@ export default async function senses({ page, until, check, seen, ready, picture 
   await until("joints are told", () =>
     /shoulder-?\d/.test(document.getElementById("joints").textContent),
   );
+  await page.getByLabel("move shoulder").evaluate((slider) => {
+    slider.value = "0.5";
+    slider.dispatchEvent(new Event("input"));
+  });
+  await until("a slider moves a joint", () => {
+    const position = document.querySelector("#joints td").textContent;
+    return Math.abs(Number(position) - 0.5) < 0.05;
+  });
   await until("an IMU at rest shows gravity, and no turning", () => {
     const words = document.querySelector('[data-fact="IMU"]')?.textContent ?? "";
     return /9\.8\d m\/s².* rad\/s/.test(words);

@@ -258,6 +258,7 @@ def test_what_robots_sense_in_space_is_shown(tmp_path):
         "a camera's picture is in the view",
         "whatever the panel shows",
         "joints are told",
+        "a slider moves a joint",
         "an IMU at rest shows gravity, and no turning",
         "frames are a tree",
         "shapes of physics take the place of looks",

@@ -93,6 +93,10 @@ export class App {
   readonly pages = new RobotPages(
     (command) => this.control.move(command),
     () => this.control.stop(),
+    {
+      move: (name, position) => this.control.joint(name, position),
+      canMove: () => this.control.jointChannel !== undefined,
+    },
   );
   readonly channels = new ChannelList(() => this.want());
   readonly measure = new Measure(this.page, this.stage, byId("canvas"));

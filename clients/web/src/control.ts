@@ -1,5 +1,5 @@
 // What the user does with the run: requests, driving, motion primitives, placing.
-import { move_command_t, request_t, type reply_t } from "../generated/messages";
+import { joint_command_t, move_command_t, request_t, type reply_t } from "../generated/messages";
 import type { Clock } from "./state/clock";
 import type { Page } from "./state/page";
 import { inputOf } from "./state/world";
@@ -110,6 +110,27 @@ export class Control {
     this.link.command(
       channel,
       encode("move_command_t", { ...command, utime: 0n, id: ++this.motionId }),
+    );
+  }
+
+  // Where the chosen robot takes commands to its joints.
+  get jointChannel(): string | undefined {
+    const { world, robot: chosen } = this.page.now,
+      robot = world?.robots[chosen];
+    return robot && !this.isLog ? inputOf(world!, robot.name, "joint_command_t") : undefined;
+  }
+
+  joint(name: string, position: number): void {
+    if (!this.jointChannel) return;
+    this.link.command(
+      this.jointChannel,
+      encode("joint_command_t", {
+        utime: 0n,
+        n: 1,
+        name: [name],
+        mode: new Uint8Array([joint_command_t.POSITION]),
+        value: new Float64Array([position]),
+      }),
     );
   }
 

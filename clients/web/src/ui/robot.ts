@@ -16,6 +16,7 @@ import {
 } from "../../generated/messages";
 import { textOf } from "./channels";
 import { h, say } from "./dom";
+import { JointTable } from "./joints";
 import { inWorld, type Heading } from "./odometry";
 import { PolarPlot, TimePlot } from "./plots";
 
@@ -134,7 +135,7 @@ export class RobotPages {
   readonly plotPage: HTMLElement;
   private readonly pictures = new Map<string, Picture>();
   private readonly pictureList = h("div");
-  private readonly jointTable = h("table", { class: "statistics", id: "joints", hidden: true });
+  private readonly jointTable: JointTable;
   readonly extras = h("div"); // more of the robot
   private readonly values = new Map<string, HTMLElement>();
   private readonly polar = new PolarPlot();
@@ -158,7 +159,15 @@ export class RobotPages {
   private truth: pose_t | null = null;
   private reckoned: odometry_t | null = null;
 
-  constructor(move: (command: Omit<move_command_t, "utime" | "id">) => void, stop: () => void) {
+  constructor(
+    move: (command: Omit<move_command_t, "utime" | "id">) => void,
+    stop: () => void,
+    joint: { move(name: string, position: number): void; canMove(): boolean },
+  ) {
+    this.jointTable = new JointTable(
+      (name, position) => joint.move(name, position),
+      () => joint.canMove(),
+    );
     const kind = h(
       "select",
       { "aria-label": "motion primitive" },
@@ -210,7 +219,7 @@ export class RobotPages {
       "section",
       {},
       this.facts,
-      this.jointTable,
+      this.jointTable.element,
       h("h2", {}, "Motion primitive"),
       h(
         "div",
@@ -239,7 +248,7 @@ export class RobotPages {
 
   show(robot: robot_info_t, devices: device_info_t[]): void {
     this.values.clear();
-    this.jointTable.hidden = true;
+    this.jointTable.clear();
     this.facts.replaceChildren();
     this.pictures.clear();
     this.truth = this.reckoned = null;
@@ -334,19 +343,7 @@ export class RobotPages {
     );
   }
   joints(m: joint_state_t): void {
-    this.jointTable.hidden = m.num_joints === 0;
-    const rows = m.joint_name.map((name, i) =>
-      h(
-        "tr",
-        {},
-        h("th", {}, name),
-        ...[m.joint_position, m.joint_velocity, m.joint_effort].map((values) =>
-          h("td", { class: "number" }, values[i]!.toFixed(3)),
-        ),
-      ),
-    );
-    const heads = ["joint", "position", "speed", "effort"].map((text) => h("th", {}, text));
-    this.jointTable.replaceChildren(h("tr", {}, ...heads), ...rows);
+    this.jointTable.show(m);
   }
   // Of a device that the page does not know: its members by name.
   other(device: device_info_t, m: object): void {
