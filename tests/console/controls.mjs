@@ -114,8 +114,8 @@ export default async function controls(tools) {
   // ---- layers
   const chosen = await page.evaluate(() => [...window.ruedo.page.now.layers]);
   check(
-    "frames are off at first, all else is on",
-    chosen.length === 6 && !chosen.includes("frames"),
+    "what robots sense and where they were is on at first",
+    chosen.join() === "rays,points,sonar,trail,odometry,contacts,clouds",
     chosen,
   );
   await until(
