@@ -108,9 +108,10 @@ export class Timeline {
   }
 
   private show(shown: Shown | null): void {
-    this.place.hidden = shown === null;
     const { hello, past } = this.page.now,
       isLive = hello?.mode === "live";
+    // After a reset there is no past for a moment: nothing moves on the page for that.
+    this.place.hidden = shown === null && (!isLive || hello.save !== "");
     this.live.hidden = !isLive;
     this.speed.hidden = isLive && !past;
     this.live.classList.toggle("on", !past);
