@@ -176,6 +176,7 @@ void Robots::Impl::number_robots() {
 
 void Robots::Impl::read_collisions(Snapshot& snapshot) const {
   snapshot.collisions.clear();
+  snapshot.collisions.reserve(2 * snapshot.contacts.capacity());  // so that none is made in a run
   const auto robot_of_link = [this](int link) {
     return link < 0 ? -1 : robot_of_link_[static_cast<size_t>(link)];
   };

@@ -2,8 +2,6 @@
 // wants to know of it. Ends of touches wait for the next sample, so that one that trembles does not
 // flood the channel.
 #include <algorithm>
-#include <iterator>
-#include <utility>
 #include <vector>
 
 #include "model/body_layout.h"
@@ -19,7 +17,12 @@ class Collisions : public Sensor {
       : world_(setup.world),
         layout_(setup.layout),
         robot_(setup.robot_index),
-        channel_(setup.channel<collisions_t>()) {}
+        channel_(setup.channel<collisions_t>()) {
+    touched_.reserve(kUsual);
+    told_.reserve(kUsual);
+    points_.reserve(4 * kUsual);
+    message_.points.resize(4 * kUsual);
+  }
 
   bool observes() const override { return true; }
 
@@ -38,10 +41,17 @@ class Collisions : public Sensor {
   }
 
  private:
+  // Links touched between two messages: as many as this without new memory, four points each.
+  static constexpr size_t kUsual = 8;
+
   struct Touched {
     int link;  // the other's, index into BodyLayout::links
     int64_t step;
-    std::vector<contact_point_t> points;  // at that step
+  };
+  struct Point {
+    int link;
+    Contact contact;
+    bool as_a;
   };
 
   // Notes what is touched. True when some of it was not in the last message.
@@ -56,40 +66,43 @@ class Collisions : public Sensor {
       auto known = std::find_if(touched_.begin(), touched_.end(),
                                 [link](const Touched& one) { return one.link == link; });
       if (known == touched_.end()) {
-        known = touched_.insert(known, {link, now.step, {}});
+        known = touched_.insert(known, {link, now.step});
         news |= std::find(told_.begin(), told_.end(), link) == told_.end();
       }
-      if (known->step != now.step) known->points.clear();
+      if (known->step != now.step)
+        std::erase_if(points_, [link](const Point& point) { return point.link == link; });
       known->step = now.step;
-      known->points.push_back(point(contact, each->as_a));
+      points_.push_back({link, contact, each->as_a});
     }
     return news;
   }
 
-  contact_point_t point(const Contact& contact, bool as_a) const {
-    contact_point_t point;
-    point.body = model::body_name(world_, layout_, as_a ? contact.link_b : contact.link_a);
+  void put(const Point& from, contact_point_t& point) const {
+    point.body = model::body_name(world_, layout_, from.link);
     for (int i = 0; i < 3; ++i) {
-      point.position[i] = contact.position[i];
-      point.normal[i] = as_a ? contact.normal[i] : -contact.normal[i];
+      point.position[i] = from.contact.position[i];
+      point.normal[i] = from.as_a ? from.contact.normal[i] : -from.contact.normal[i];
     }
-    point.force = contact.force;
-    point.depth = contact.depth;
-    return point;
+    point.force = from.contact.force;
+    point.depth = from.contact.depth;
   }
 
   void show(const Snapshot& now, Outbox& out) {
     shown_step_ = now.step;
     message_.utime = now.time;
     message_.blocked_by = model::body_name(world_, layout_, blocked_by_);
-    message_.points.clear();
+    message_.n = static_cast<int32_t>(points_.size());
+    if (message_.points.size() < points_.size()) message_.points.resize(points_.size());
     told_.clear();
-    for (Touched& touched : touched_) {
+    auto next = message_.points.begin();  // which keeps its memory: n of them count
+    for (const Touched& touched : touched_) {
       told_.push_back(touched.link);
-      std::move(touched.points.begin(), touched.points.end(), std::back_inserter(message_.points));
+      for (const Point& point : points_) {
+        if (point.link == touched.link) put(point, *next++);
+      }
     }
     touched_.clear();
-    message_.n = static_cast<int32_t>(message_.points.size());
+    points_.clear();
     out.publish(channel_, message_);
   }
 
@@ -99,6 +112,7 @@ class Collisions : public Sensor {
   int channel_;
   int blocked_by_ = -1;
   std::vector<Touched> touched_;  // since the last message, in the order in which it came
+  std::vector<Point> points_;     // of each, at the last step at which it was touched
   std::vector<int> told_;         // links in the last message
   int64_t shown_step_ = -1;
   collisions_t message_;

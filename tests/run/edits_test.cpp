@@ -53,7 +53,7 @@ TEST_F(EditsTest, ASpawnedRobotIsThereAndDrives) {
     inputs += channel.robot == "guest" && channel.input;
   for (const device_info_t& device : info.devices) devices += device.robot == "guest";
   EXPECT_EQ(inputs, 4);   // velocity, wheels, move, fault
-  EXPECT_EQ(devices, 4);  // odometry, pose, motion, lrf
+  EXPECT_EQ(devices, 5);  // odometry, collisions, pose, motion, lrf
 
   const size_t from = bus.count();
   drive("guest", 0.5);

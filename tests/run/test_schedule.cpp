@@ -26,8 +26,8 @@ TEST(Schedule, StepThenModuleThenRobot) {
   MemoryBus bus;
   run::Run server(load_text(robot_sdf("b", 0, 0) + robot_sdf("a", 2, 0)), fast(0.1), bus);
   server.run();
-  // At 0 and at every 20 ms: odometry and pose of b (first in the world), then of a; and the world
-  // at 30 Hz, last.
+  // At 0 and at every 20 ms: odometry and pose of b (first in the world), then of a; collisions at
+  // 10 Hz; and the world at 30 Hz, last.
   std::map<int64_t, std::vector<std::string>> at;
   int64_t last = 0;
   for (const Message& message : bus.messages()) {
@@ -47,8 +47,8 @@ TEST(Schedule, StepThenModuleThenRobot) {
   };
   EXPECT_EQ(names_at(20'000), (Names{"b/odometry", "b/pose", "a/odometry", "a/pose"}));
   EXPECT_EQ(names_at(35'000), (Names{"ruedo/world"}));  // the first step at or after 33.3 ms
-  EXPECT_EQ(names_at(100'000),
-            (Names{"b/odometry", "b/pose", "a/odometry", "a/pose", "ruedo/world"}));
+  EXPECT_EQ(names_at(100'000), (Names{"b/collisions", "b/odometry", "b/pose", "a/collisions",
+                                      "a/odometry", "a/pose", "ruedo/world"}));
 }
 
 // An hour of sim time: sample k is at the first step at or after k / rate, and none is missing.
