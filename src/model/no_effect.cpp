@@ -111,6 +111,43 @@ constexpr std::string_view kReadersName[] = {
     "visual",   "surface", "include",  "light",     "scene",     "physics", "inertia",
     "material", "mesh",    "inertial", "collision", "heightmap", "state"};
 
+// A sensor of another type is a plugin's, and so is what stands in it.
+constexpr std::string_view kSensorTypes[] = {"air_pressure",
+                                             "air_speed",
+                                             "altimeter",
+                                             "boundingbox",
+                                             "boundingbox_camera",
+                                             "camera",
+                                             "contact",
+                                             "custom",
+                                             "depth",
+                                             "depth_camera",
+                                             "force_torque",
+                                             "gps",
+                                             "gpu_lidar",
+                                             "gpu_ray",
+                                             "imu",
+                                             "lidar",
+                                             "logical_camera",
+                                             "magnetometer",
+                                             "multicamera",
+                                             "navsat",
+                                             "none",
+                                             "ray",
+                                             "rfid",
+                                             "rfidtag",
+                                             "rgbd",
+                                             "rgbd_camera",
+                                             "segmentation",
+                                             "segmentation_camera",
+                                             "sonar",
+                                             "thermal",
+                                             "thermal_camera",
+                                             "wide_angle_camera",
+                                             "wideanglecamera",
+                                             "wireless_receiver",
+                                             "wireless_transmitter"};
+
 std::vector<std::string> words_of(std::string_view list) {
   std::vector<std::string> words;
   while (!list.empty()) {
@@ -212,6 +249,10 @@ class Walk {
   static bool may_stand_in(const Element& element, const Element& child) {
     if (std::find(std::begin(kReadersName), std::end(kReadersName), element.name) !=
         std::end(kReadersName))
+      return true;
+    const std::string* type = element.name == "sensor" ? element.attribute("type") : nullptr;
+    if (type && std::find(std::begin(kSensorTypes), std::end(kSensorTypes), *type) ==
+                    std::end(kSensorTypes))
       return true;
     const std::vector<std::string> known = words_in(element);
     return known.empty() || std::find(known.begin(), known.end(), child.name) != known.end();

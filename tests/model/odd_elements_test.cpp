@@ -128,6 +128,9 @@ TEST(OddElements, WhatSdfDoesNotHaveIsNamed) {
                     "velocity><x><noise type='gaussian'><sigma>1</sigma></noise></x></angular_"
                     "velocity></imu></sensor></link></model>"),
               ElementsAre(HasSubstr("<sigma> in <noise> is not supported and left out")));
+  EXPECT_THAT(named("<model name='m'><link name='l'><sensor name='s' type='thermometer'>"
+                    "<thermometer><power>1</power></thermometer></sensor></link></model>"),
+              IsEmpty());  // a plugin's own
   EXPECT_THAT(
       named("<model name='m' namespace='fleet'><link name='l'/></model>"),
       ElementsAre("namespace=\"fleet\" of <model> is not supported: channels begin with the "
