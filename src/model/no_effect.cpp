@@ -107,9 +107,11 @@ const std::map<std::string_view, std::string_view>& children_in_sdf() {
   return table;
 }
 constexpr std::string_view kReadersName[] = {
-    "sdf",      "world",   "model",    "link",      "joint",     "axis",    "axis2",
-    "visual",   "surface", "include",  "light",     "scene",     "physics", "inertia",
-    "material", "mesh",    "inertial", "collision", "heightmap", "state"};
+    "sdf",          "world",   "model",    "link",         "joint",         "axis",
+    "axis2",        "visual",  "surface",  "include",      "light",         "scene",
+    "physics",      "inertia", "material", "mesh",         "inertial",      "collision",
+    "heightmap",    "state",   "geometry", "air_pressure", "air_speed",     "altimeter",
+    "force_torque", "gps",     "navsat",   "magnetometer", "logical_camera"};
 
 // A sensor of another type is a plugin's, and so is what stands in it.
 constexpr std::string_view kSensorTypes[] = {"air_pressure",

@@ -160,7 +160,7 @@ FILES = {
         ),
         {},
         0,
-        ("unsupported", 3, "world w", "put both models, and the joint, into one <model>"),
+        ("repaired", 4, "model a", "together they are one model, called 'a'"),
     ),
     "circle": (
         world("<include><uri>a.sdf</uri></include>"),
