@@ -219,7 +219,10 @@ def foreign_math(root):
             continue
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
             code = re.sub(r'"(?:[^"\\]|\\.)*"|//.*', "", line)
-            declared = re.search(r"\b(?:void|Log|Logger|MotionLog&?|Reader)\s+(?:log)\(|\bSineCosine\s+sincos\(", code)
+            declared = re.search(
+                r"\b(?:void|Log|Logger|MotionLog&?|Reader)\s+(?:log)\(|\bSineCosine\s+sincos\(",
+                code,
+            )
             problems += [
                 f"{path.relative_to(root)}:{number}: {name}() is the C library's; use math::{name} of ruedo/math.h"
                 for name in call.findall(code)
