@@ -14,7 +14,7 @@
 #include "console/live_source.h"
 #include "console/log_page.h"
 #include "console/log_source.h"
-#include "console/tee_bus.h"
+#include "console/tap.h"
 #include "core/whole.h"
 #include "ruedo/world_info_t.hpp"
 #include "run/run.h"
@@ -29,30 +29,42 @@ void print_urls(const console::Console& serving) {
 
 }  // namespace
 
-struct ViewedBus::Impl {
+struct RunView::Impl {
   console::Address address;
-  console::TeeBus tee;
+  console::Tap tap;
 };
 
-ViewedBus::ViewedBus(Bus& bus, bool viewed, const std::string& address) : inner_(bus) {
-  if (viewed) impl_.reset(new Impl{console::parse_address(address), console::TeeBus(bus)});
+RunView::RunView(bool viewed, const std::string& address) {
+  if (viewed) impl_.reset(new Impl{console::parse_address(address), {}});
 }
 
-ViewedBus::~ViewedBus() = default;
+RunView::~RunView() = default;
 
-Bus& ViewedBus::bus() { return impl_ ? impl_->tee : inner_; }
+void RunView::follow(run::RunOptions& options) {
+  if (!impl_) return;
+  options.hearer = [&tap = impl_->tap](const std::string& channel, const uint8_t* data,
+                                       size_t size) { tap.hear(channel, data, size); };
+}
 
-std::shared_ptr<void> ViewedBus::open(run::Run& server, const std::string& title,
-                                      const std::string& save) {
+std::shared_ptr<void> RunView::open(run::Run& run, const std::string& title,
+                                    const std::string& save) {
   if (!impl_) return nullptr;
+  console::Tap& tap = impl_->tap;
+  run.add(tap);
   std::string info;
-  for (const engine::Channel& channel : server.channels().list()) {
+  for (const engine::Channel& channel : run.channels().list()) {
     if (channel.name == "ruedo/info") info = channel.bus_name;
   }
-  console::LiveHost host{[&server] { return server.world(); },
-                         [&server](const std::string& name) { return server.model_text(name); },
-                         save.empty() ? "" : std::filesystem::path(save).filename().string()};
-  auto source = std::make_unique<console::LiveSource>(impl_->tee, std::move(host), info);
+  console::LiveHost host{
+      .world = [&run] { return run.world(); },
+      .model_text = [&run](const std::string& name) { return run.model_text(name); },
+      .receive =
+          [&run](const std::string& channel, std::span<const uint8_t> message) {
+            run.receive(channel, message.data(), message.size());
+          },
+      .lost = [&run] { return run.lost(); },
+      .save_name = save.empty() ? "" : std::filesystem::path(save).filename().string()};
+  auto source = std::make_unique<console::LiveSource>(tap, std::move(host), info);
   auto serving =
       std::make_shared<console::Console>(impl_->address, std::move(source), "live", title);
   print_urls(*serving);
@@ -103,17 +115,17 @@ namespace {
 
 }  // namespace
 
-struct ViewedBus::Impl {};
+struct RunView::Impl {};
 
-ViewedBus::ViewedBus(Bus& bus, bool viewed, const std::string&) : inner_(bus) {
+RunView::RunView(bool viewed, const std::string&) {
   if (viewed) no_console();
 }
 
-ViewedBus::~ViewedBus() = default;
+RunView::~RunView() = default;
 
-Bus& ViewedBus::bus() { return inner_; }
+void RunView::follow(run::RunOptions&) {}
 
-std::shared_ptr<void> ViewedBus::open(run::Run&, const std::string&, const std::string&) {
+std::shared_ptr<void> RunView::open(run::Run&, const std::string&, const std::string&) {
   return nullptr;
 }
 

@@ -5,32 +5,31 @@
 #include <memory>
 #include <string>
 
-#include "ruedo/bus.h"
-
 namespace ruedo::run {
 class Run;
-}
+struct RunOptions;
+}  // namespace ruedo::run
 
 namespace ruedo::cli {
 
-// The bus of a server that is viewed. Made before the server; without --view it is the bus itself.
-class ViewedBus {
+// The console of a run that is viewed. Made before the run, which it outlives.
+class RunView {
  public:
   // Throws InputError for a bad address, EnvironmentError when this build has no console.
-  ViewedBus(Bus& bus, bool viewed, const std::string& address);
-  ~ViewedBus();
+  RunView(bool viewed, const std::string& address);
+  ~RunView();
 
-  Bus& bus();
+  // What the run's options must hold.
+  void follow(run::RunOptions& options);
 
-  // Serves the console for as long as the returned object lives, and prints where. Null without
-  // --view. Throws EnvironmentError when the address cannot be had. The server must outlive it.
-  // save: the file that SAVE writes; "" for none.
-  std::shared_ptr<void> open(run::Run& server, const std::string& title, const std::string& save);
+  // Serves the console for as long as the returned object lives, and prints where. Null when it is
+  // not viewed. Before run.run(). Throws EnvironmentError when the address cannot be had. The run
+  // must outlive what is returned. save: the file that SAVE writes; "" for none.
+  std::shared_ptr<void> open(run::Run& run, const std::string& title, const std::string& save);
 
  private:
   struct Impl;
-  Bus& inner_;
-  std::unique_ptr<Impl> impl_;
+  std::unique_ptr<Impl> impl_;  // null: not viewed
 };
 
 // Serves the console with a recorded run for as long as the returned object lives, and prints

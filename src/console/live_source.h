@@ -1,10 +1,13 @@
-// A running server, as the console sees it: what goes over its bus, and its world.
+// A running server, as the console sees it: what goes through its run, and its world.
 #pragma once
 
 #include <functional>
+#include <memory>
+#include <span>
+#include <string>
 
 #include "console/source.h"
-#include "console/tee_bus.h"
+#include "console/tap.h"
 
 namespace ruedo::console {
 
@@ -12,43 +15,46 @@ namespace ruedo::console {
 struct LiveHost {
   std::function<std::shared_ptr<const model::WorldModel>()> world;
   std::function<std::string(const std::string& name)> model_text;
-  std::string save_name;  // of the file that SAVE writes
+  std::function<void(const std::string& channel, std::span<const uint8_t> message)> receive;
+  std::function<uint64_t()> lost;  // messages that the bus could not send
+  std::string save_name;           // of the file that SAVE writes
 };
 
 class LiveSource : public Source {
  public:
-  // The bus must outlive it.
-  LiveSource(TeeBus& bus, LiveHost host, std::string info_channel)
-      : bus_(bus), host_(std::move(host)), info_channel_(std::move(info_channel)) {
+  // The tap must outlive it.
+  LiveSource(Tap& tap, LiveHost host, std::string info_channel)
+      : tap_(tap), host_(std::move(host)), info_channel_(std::move(info_channel)) {
     events_.plan(host_.world()->faults);
   }
-  ~LiveSource() override { bus_.watch(false); }
+  ~LiveSource() override { tap_.watch(false); }
 
   void pump(Board& board, bool viewers) override {
-    bus_.watch(viewers);
-    const size_t count = bus_.channel_count();
-    for (size_t i = board.channels().size(); i < count; ++i) board.name(i, bus_.channel(i).name);
-    bus_.ring().drain([&](uint32_t channel, std::vector<uint8_t> message) {
+    tap_.watch(viewers);
+    const size_t count = tap_.channel_count();
+    for (size_t i = board.channels().size(); i < count; ++i) board.name(i, tap_.channel(i).name);
+    tap_.ring().drain([&](uint32_t channel, std::vector<uint8_t> message) {
       if (channel >= board.channels().size()) return;
       events_.hear(0, board.channels()[channel].name, message);
       board.put(channel, std::move(message));
     });
-    events_.lost(bus_.failed());
-    for (size_t i = 0; i < board.channels().size(); ++i) {
-      const Board::Channel& channel = board.channels()[i];
-      // What a channel carries is known by its first message.
-      const bool heard = channel.last_number == 0 || Events::tells(channel.fingerprint);
-      bus_.channel(i).wanted.store(heard || channel.watchers > 0, std::memory_order_relaxed);
-    }
+    events_.lost(host_.lost());
+    choose(board);
+  }
+  void attend(const Board& board) override {
+    tap_.watch(true);
+    choose(board);
   }
 
   Count traffic(size_t channel) const override {
-    const Traffic& traffic = bus_.channel(channel);
+    const Traffic& traffic = tap_.channel(channel);
     return {traffic.messages.load(std::memory_order_relaxed),
             traffic.size.load(std::memory_order_relaxed)};
   }
   bool command(const std::string& channel, std::span<const uint8_t> message) override {
-    return bus_.command(channel, message.data(), message.size());
+    if (!tap_.takes(channel)) return false;
+    host_.receive(channel, message);
+    return true;
   }
   std::shared_ptr<const model::WorldModel> world() override { return host_.world(); }
   std::string model_text(const std::string& name) override { return host_.model_text(name); }
@@ -57,7 +63,16 @@ class LiveSource : public Source {
   const Events* events() const override { return &events_; }
 
  private:
-  TeeBus& bus_;
+  void choose(const Board& board) {
+    for (size_t i = 0; i < board.channels().size(); ++i) {
+      const Board::Channel& channel = board.channels()[i];
+      // What a channel carries is known by its first message.
+      const bool heard = channel.last_number == 0 || Events::tells(channel.fingerprint);
+      tap_.channel(i).wanted.store(heard || channel.watchers > 0, std::memory_order_relaxed);
+    }
+  }
+
+  Tap& tap_;
   LiveHost host_;
   Events events_{true};
   std::string info_channel_;

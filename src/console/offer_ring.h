@@ -1,76 +1,83 @@
-// Messages on their way from the publisher to the console: a ring of bytes that never makes its
-// writer wait.
+// Messages on their way from the run to the console: a ring of bytes in which nobody who writes
+// waits for anybody.
 //
-// One writer and one reader at a time. What has no room is dropped and counted.
+// Any number of writers, one reader. A writer takes its place, fills it, and marks it as filled
+// last; the reader stops at the first place that is not filled yet. What has no room is dropped and
+// counted.
 #pragma once
 
 #include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <cstring>
-#include <span>
+#include <utility>
 #include <vector>
 
 namespace ruedo::console {
 
 class OfferRing {
  public:
-  // size: a power of two, in bytes.
-  explicit OfferRing(size_t size) : bytes_(size), mask_(size - 1) {}
+  // size: a power of two, in bytes, from 16 on.
+  explicit OfferRing(size_t size) : words_(size / kWord), mask_(size / kWord - 1) {}
 
-  // The writer's. False when there is no room for it now.
+  // Of any thread. False when there is no room for it now.
   bool offer(uint32_t channel, const uint8_t* data, size_t size) {
-    const uint64_t begin = written_.load(std::memory_order_relaxed);
-    const uint64_t used = begin - read_.load(std::memory_order_acquire);
-    const size_t needed = sizeof(Head) + size;
-    if (needed > bytes_.size() - used) {
-      dropped_.store(dropped_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-      return false;
-    }
-    const Head head{channel, static_cast<uint32_t>(size)};
-    put(begin, &head, sizeof head);
-    put(begin + sizeof head, data, size);
-    written_.store(begin + needed, std::memory_order_release);
+    const uint64_t needed = words_for(size);
+    uint64_t begin = taken_.load(std::memory_order_relaxed);
+    do {
+      // Acquired: the reader has emptied what it gave back.
+      if (begin + needed - read_.load(std::memory_order_acquire) > words_.size()) {
+        dropped_.fetch_add(1, std::memory_order_relaxed);
+        return false;
+      }
+    } while (!taken_.compare_exchange_weak(begin, begin + needed, std::memory_order_relaxed));
+    copy(begin + 1, size,
+         [&](void* place, size_t at, size_t count) { std::memcpy(place, data + at, count); });
+    head(begin).store(uint64_t{channel} << 32 | (size + 1), std::memory_order_release);
     return true;
   }
 
   // The reader's: handler(channel, bytes) for each message that waits, in their order.
   template <class Handler>
   void drain(const Handler& handler) {
-    uint64_t at = read_.load(std::memory_order_relaxed);
-    const uint64_t end = written_.load(std::memory_order_acquire);
-    while (at != end) {
-      Head head;
-      get(at, &head, sizeof head);
-      std::vector<uint8_t> message(head.size);
-      get(at + sizeof head, message.data(), head.size);
-      at += sizeof head + head.size;
-      read_.store(at, std::memory_order_release);
-      handler(head.channel, std::move(message));
+    for (uint64_t begin = read_.load(std::memory_order_relaxed);;) {
+      if (begin == taken_.load(std::memory_order_relaxed)) return;
+      const uint64_t filled = head(begin).load(std::memory_order_acquire);
+      if (filled == 0) return;
+      std::vector<uint8_t> message((filled & 0xffffffff) - 1);
+      copy(begin + 1, message.size(), [&](void* place, size_t at, size_t count) {
+        std::memcpy(message.data() + at, place, count);
+        std::memset(place, 0, count);  // any word may be the head of a later message
+      });
+      head(begin).store(0, std::memory_order_relaxed);
+      begin += words_for(message.size());
+      read_.store(begin, std::memory_order_release);
+      handler(static_cast<uint32_t>(filled >> 32), std::move(message));
     }
   }
 
   uint64_t dropped() const { return dropped_.load(std::memory_order_relaxed); }
 
  private:
-  struct Head {
-    uint32_t channel, size;
-  };
+  static constexpr size_t kWord = sizeof(uint64_t);
 
-  void put(uint64_t at, const void* from, size_t size) {
-    const size_t begin = at & mask_, first = std::min(size, bytes_.size() - begin);
-    std::memcpy(bytes_.data() + begin, from, first);
-    std::memcpy(bytes_.data(), static_cast<const uint8_t*>(from) + first, size - first);
-  }
-  void get(uint64_t at, void* into, size_t size) const {
-    const size_t begin = at & mask_, first = std::min(size, bytes_.size() - begin);
-    std::memcpy(into, bytes_.data() + begin, first);
-    std::memcpy(static_cast<uint8_t*>(into) + first, bytes_.data(), size - first);
+  // A head, which is 0 until the message is there, and the bytes.
+  static uint64_t words_for(size_t size) { return 1 + (size + kWord - 1) / kWord; }
+
+  std::atomic_ref<uint64_t> head(uint64_t at) { return std::atomic_ref(words_[at & mask_]); }
+
+  // part(place in the ring, offset in the message, count) for the up to two pieces of a message.
+  template <class Part>
+  void copy(uint64_t at, size_t size, const Part& part) {
+    if (size == 0) return;
+    const size_t begin = at & mask_, first = std::min(size, (words_.size() - begin) * kWord);
+    part(words_.data() + begin, 0, first);
+    if (first < size) part(words_.data(), first, size - first);
   }
 
-  std::vector<uint8_t> bytes_;
+  std::vector<uint64_t> words_;
   const uint64_t mask_;
-  alignas(64) std::atomic<uint64_t> written_{0};
+  alignas(64) std::atomic<uint64_t> taken_{0};  // words since the beginning, as read_
   alignas(64) std::atomic<uint64_t> read_{0};
   std::atomic<uint64_t> dropped_{0};
 };

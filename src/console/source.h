@@ -27,6 +27,9 @@ class Source {
 
   // Brings what is new to the board. viewers: whether anybody watches.
   virtual void pump(Board& board, bool viewers) = 0;
+  // Another viewer, or another channel that one wants, which the board knows: from now on nothing
+  // of it is missed, a reply to the viewer's very next request neither.
+  virtual void attend(const Board& board) { static_cast<void>(board); }
 
   struct Count {
     uint64_t messages = 0;

@@ -27,7 +27,10 @@ double read_double(std::span<const uint8_t> bytes) {
 
 }  // namespace
 
-Viewer::Viewer(Stage& stage) : stage_(stage), told_world_(stage.world_version) { ++stage_.viewers; }
+Viewer::Viewer(Stage& stage) : stage_(stage), told_world_(stage.world_version) {
+  ++stage_.viewers;
+  stage_.source->attend(stage_.board);
+}
 
 Viewer::~Viewer() {
   --stage_.viewers;
@@ -94,11 +97,15 @@ void Viewer::want(std::string_view names) {
 
 void Viewer::match_names() {
   auto& channels = stage_.board.channels();
+  bool more = false;
   for (size_t i = sights_.size(); i < channels.size(); ++i) {
     Sight& sight = sights_.emplace_back();
     sight.wanted = std::binary_search(wanted_names_.begin(), wanted_names_.end(), channels[i].name);
-    if (sight.wanted) ++channels[i].watchers;
+    if (!sight.wanted) continue;
+    ++channels[i].watchers;
+    more = true;
   }
+  if (more) stage_.source->attend(stage_.board);
 }
 
 bool Viewer::next(std::vector<uint8_t>& message, bool& text) {

@@ -24,7 +24,6 @@ struct Stage {
   uint64_t world_version = 0;  // another one when the scene has changed
   uint64_t playback_version = 0;
   int viewers = 0;
-  int traffic_viewers = 0;
 };
 
 // What a browser sends: an operation, then what it is about.

@@ -112,6 +112,7 @@ Control::Host Run::control_host() {
 }
 
 void Run::receive(const std::string& channel, const uint8_t* data, size_t size) {
+  if (options_.hearer) options_.hearer(channel, data, size);
   if (!request_channel_.empty() && channel == request_channel_) {
     if (control_.receive(data, size)) wakeup_.set();
     return;

@@ -57,6 +57,8 @@ struct RunOptions {
   std::string repeat;            // log or snapshot to begin with: what acted on that run acts again
   bool end_with_repeat = false;  // and then end; else go on, and publish from there on
   Watcher watcher;               // sees what a log would get
+  Bus::Handler hearer;  // sees each command and request before it is taken, in the thread that
+                        // brings it
   std::function<void()> before_model;  // for tests: called in the worker's thread before a SPAWN's
                                        // model is made ready
   std::vector<std::string> result_options;  // for the log's header
@@ -94,6 +96,9 @@ class Run {
   void receive(const std::string& channel, const std::vector<uint8_t>& bytes) {
     receive(channel, bytes.data(), bytes.size());
   }
+
+  // Messages that the bus could not send. Any thread.
+  uint64_t lost() const { return bus_.failed(); }
 
   const engine::Channels& channels() const { return channels_; }
   // What clients are told of the world; until models come or go.

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
+#include <atomic>
 #include <thread>
 
 #include <fmt/format.h>
@@ -10,8 +12,10 @@
 #include "console/board.h"
 #include "console/events.h"
 #include "console/guard.h"
+#include "console/live_source.h"
 #include "console/offer_ring.h"
-#include "console/tee_bus.h"
+#include "console/tap.h"
+#include "console/viewer.h"
 #include "ruedo/applied_t.hpp"
 #include "ruedo/collisions_t.hpp"
 #include "ruedo/contact_t.hpp"
@@ -103,26 +107,64 @@ TEST(OfferRing, KeepsOrderAcrossItsEndAndDropsWhatHasNoRoom) {
   EXPECT_EQ(ring.dropped(), 50u);
 }
 
-TEST(OfferRing, TwoThreads) {
-  OfferRing ring(1024);
-  std::thread writer([&] {
-    for (uint32_t i = 0; i < 20000; ++i) {
-      const std::vector<uint8_t> message(i % 60, static_cast<uint8_t>(i));
-      ring.offer(i, message.data(), message.size());
-    }
-  });
-  int64_t last = -1;
+// Where there is room nothing is missed, whoever writes in the same moment.
+TEST(OfferRing, HoldsAllThatManyThreadsWriteInTheOrderOfEach) {
+  constexpr uint32_t kWriters = 3, kEach = 20000;
+  OfferRing ring(size_t{1} << 23);
+  std::vector<std::thread> writers;
+  for (uint32_t writer = 0; writer < kWriters; ++writer) {
+    writers.emplace_back([&ring, writer] {
+      for (uint32_t i = 0; i < kEach; ++i) {
+        const std::vector<uint8_t> message(i % 60, static_cast<uint8_t>(writer + i));
+        ring.offer(writer << 24 | i, message.data(), message.size());
+      }
+    });
+  }
+  std::array<uint32_t, kWriters> next{};
   const auto read = [&] {
     ring.drain([&](uint32_t channel, const std::vector<uint8_t>& bytes) {
-      EXPECT_GT(int64_t{channel}, last);
-      last = channel;
-      EXPECT_EQ(bytes.size(), channel % 60);
-      EXPECT_THAT(bytes, testing::Each(static_cast<uint8_t>(channel)));
+      const uint32_t writer = channel >> 24, i = channel & 0xffffff;
+      EXPECT_EQ(i, next.at(writer)++);
+      EXPECT_EQ(bytes.size(), i % 60);
+      EXPECT_THAT(bytes, testing::Each(static_cast<uint8_t>(writer + i)));
     });
   };
   for (int i = 0; i < 1000; ++i) read();
-  writer.join();
+  for (std::thread& writer : writers) writer.join();
   read();
+  EXPECT_THAT(next, testing::Each(kEach));
+  EXPECT_EQ(ring.dropped(), 0u);
+}
+
+// A reader that follows, in a ring that is full again and again.
+TEST(OfferRing, WhatIsDroppedLeavesTheRestWhole) {
+  OfferRing ring(1024);
+  std::atomic<int> writing{2};
+  const auto write = [&](uint32_t writer) {
+    for (uint32_t i = 0; i < 20000; ++i) {
+      const std::vector<uint8_t> message(i % 60, static_cast<uint8_t>(writer + i));
+      ring.offer(writer << 24 | i, message.data(), message.size());
+    }
+    --writing;
+  };
+  std::thread first(write, 0u), second(write, 1u);
+  std::array<int64_t, 2> last{-1, -1};
+  uint64_t read_count = 0;
+  const auto read = [&] {
+    ring.drain([&](uint32_t channel, const std::vector<uint8_t>& bytes) {
+      const uint32_t writer = channel >> 24, i = channel & 0xffffff;
+      EXPECT_GT(int64_t{i}, last.at(writer));
+      last.at(writer) = i;
+      EXPECT_EQ(bytes.size(), i % 60);
+      EXPECT_THAT(bytes, testing::Each(static_cast<uint8_t>(writer + i)));
+      ++read_count;
+    });
+  };
+  while (writing > 0) read();
+  first.join();
+  second.join();
+  read();
+  EXPECT_EQ(read_count + ring.dropped(), 40000u);
 }
 
 TEST(Board, KeepsTheNewestAllPartsAndTheLastReplies) {
@@ -325,63 +367,108 @@ TEST_F(EventsTest, WhatIsNoMessageIsNoEventAndThereAreNotTooMany) {
   EXPECT_EQ(events.list().size(), Events::kMost);
 }
 
-class FakeBus : public Bus {
- public:
-  void publish(const std::string& channel, const uint8_t*, size_t) override {
-    published.push_back(channel);
+class TapTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    auto announced = std::make_shared<run::Announcement>();
+    announced->channels.add<contact_t>("a", "", "", {});
+    announced->channels.add<contact_t>("b", "", "", {});
+    announced->channels.add<velocity_command_t>("p3at/velocity", "p3at", "", {}, true);
+    announcement = announced;
+    tap.announce(announcement);
   }
-  void listen(const std::vector<std::string>&, Handler handler,
-              const std::vector<std::string>&) override {
-    received = std::move(handler);
+  void publish(int index) {
+    tap.message({.kind = run::Kind::sample,
+                 .time_us = 0,
+                 .stamp_us = 0,
+                 .channel = announcement->channels[index].bus_name,
+                 .index = index,
+                 .sequence = 0,
+                 .data = &byte,
+                 .size = 1});
   }
-  std::vector<std::string> published;
-  Handler received;
+  std::vector<std::string> offered() {
+    std::vector<std::string> names;
+    tap.ring().drain([&](uint32_t channel, const std::vector<uint8_t>&) {
+      names.push_back(tap.channel(channel).name);
+    });
+    return names;
+  }
+
+  std::shared_ptr<const run::Announcement> announcement;
+  const uint8_t byte = 1;
+  Tap tap;
 };
 
-TEST(TeeBus, ForwardsAllAndOffersWhatIsWanted) {
-  FakeBus inner;
-  TeeBus tee(inner);
-  tee.listen({"p3at/velocity"}, [](const std::string&, const uint8_t*, size_t) {});
-  const uint8_t byte = 1;
-  const auto offered = [&] {
-    int count = 0;
-    tee.ring().drain([&](uint32_t, const std::vector<uint8_t>&) { ++count; });
-    return count;
-  };
-  tee.publish("a", &byte, 1);
-  EXPECT_EQ(offered(), 0);  // nobody watches
-  tee.watch(true);
-  tee.publish("a", &byte, 1);
-  tee.publish("b", &byte, 1);
-  EXPECT_EQ(offered(), 2);
-  tee.channel(0).wanted = false;
-  tee.publish("a", &byte, 1);
-  inner.received("p3at/velocity", &byte, 1);
-  EXPECT_EQ(offered(), 1);
-  EXPECT_EQ(tee.channel(0).messages, 3u);
-  EXPECT_THAT(inner.published, testing::ElementsAre("a", "a", "b", "a"));
+TEST_F(TapTest, CountsAllAndOffersWhatIsWanted) {
+  publish(0);
+  EXPECT_THAT(offered(), testing::IsEmpty());  // nobody watches
+  tap.watch(true);
+  publish(0);
+  tap.hear("p3at/velocity", &byte, 1);
+  publish(1);
+  EXPECT_THAT(offered(), testing::ElementsAre("a", "p3at/velocity", "b"));
+  tap.channel(0).wanted = false;
+  publish(0);
+  publish(1);
+  EXPECT_THAT(offered(), testing::ElementsAre("b"));
+  EXPECT_EQ(tap.channel(0).messages, 3u);
 }
 
-// On a bus that does not hear itself, as over the network, and on one that does, a command arrives
-// once.
-TEST(TeeBus, ACommandGoesToTheListenerAndNotOverTheBus) {
-  FakeBus inner;
-  TeeBus tee(inner);
-  std::vector<std::string> heard;
-  const uint8_t byte = 1;
-  EXPECT_FALSE(tee.command("p3at/velocity", &byte, 1));  // nobody listens yet
-  tee.listen({"p3at/velocity"}, [&](const std::string& channel, const uint8_t* data, size_t size) {
-    heard.push_back(channel + std::to_string(data[0]) + std::to_string(size));
+TEST_F(TapTest, CommandsAreTakenWhereTheRunTakesThem) {
+  EXPECT_TRUE(tap.takes("p3at/velocity"));
+  EXPECT_FALSE(tap.takes("a"));
+  EXPECT_FALSE(tap.takes("c"));
+}
+
+// A reply goes out while the request's own thread still shows the request: both are seen.
+TEST_F(TapTest, NothingIsMissedWhenTwoThreadsOfferInTheSameMoment) {
+  constexpr int kEach = 20000;
+  tap.watch(true);
+  std::thread requests([&] {
+    for (int i = 0; i < kEach; ++i) tap.hear("ruedo/request", &byte, 1);
   });
-  tee.watch(true);
-  EXPECT_TRUE(tee.command("p3at/velocity", &byte, 1));
-  EXPECT_FALSE(tee.command("ruedo/world", &byte, 1));  // nobody listens there
-  EXPECT_THAT(heard, testing::ElementsAre("p3at/velocity11"));
-  EXPECT_THAT(inner.published, testing::IsEmpty());
-  EXPECT_EQ(tee.channel(0).messages, 1u);  // and it is shown, as what others send
-  tee.stop();
-  tee.command("p3at/velocity", &byte, 1);
-  EXPECT_EQ(heard.size(), 1u);
+  for (int i = 0; i < kEach; ++i) publish(0);
+  requests.join();
+  EXPECT_THAT(offered(), testing::SizeIs(2 * kEach));
+}
+
+// A viewer that has just come, or just said what it wants, gets the reply to its next request.
+TEST_F(TapTest, AViewerMissesNothingFromItsFirstWordOn) {
+  const auto world = std::make_shared<const model::WorldModel>();
+  Stage stage;
+  stage.source = std::make_unique<LiveSource>(tap,
+                                              LiveHost{.world = [=] { return world; },
+                                                       .model_text = {},
+                                                       .receive = {},
+                                                       .lost = [] { return uint64_t{0}; },
+                                                       .save_name = {}},
+                                              "ruedo/info");
+  const auto seen = [&](Viewer& viewer) {
+    stage.source->pump(stage.board, true);
+    size_t frames = 0;
+    for (bool text = false; true;) {
+      std::vector<uint8_t> message;
+      if (!viewer.next(message, text)) return frames;
+      frames += text ? 0 : 1;
+    }
+  };
+  const std::vector<uint8_t> want_a{static_cast<uint8_t>(Operation::want), 'a'};
+
+  stage.source->pump(stage.board, false);  // nobody is there
+  Viewer viewer(stage);
+  viewer.receive(want_a);
+  publish(0);  // the first on its channel
+  EXPECT_EQ(seen(viewer), 1u);
+  publish(0);  // the viewer has met the channel
+  EXPECT_EQ(seen(viewer), 1u);
+
+  Viewer late(stage);
+  publish(1);
+  EXPECT_EQ(seen(late), 0u);  // it wants nothing
+  late.receive(std::vector<uint8_t>{static_cast<uint8_t>(Operation::want), 'b'});
+  publish(1);
+  EXPECT_EQ(seen(late), 1u);
 }
 
 }  // namespace

@@ -213,11 +213,10 @@ export default async function controls(tools) {
   await page.getByRole("tab", { name: "World" }).click();
   await page.keyboard.press("3");
   await still();
-  const click = async (thing, at) => {
+  const put = async (thing, at) => {
     await page.getByLabel("what to place").selectOption({ label: thing });
     await page.locator("#canvas").focus();
-    const isPlacing = await page.evaluate(() => typeof window.ruedo.page.now.tool !== "string");
-    if (!isPlacing) await page.keyboard.press("b");
+    await page.keyboard.press("b");
     // Where those metres are on the screen, by the page's own camera.
     const [px, py, gx, gy] = await page.evaluate(([gx, gy]) => {
       const { stage } = window.ruedo,
@@ -231,22 +230,7 @@ export default async function controls(tools) {
     await page.mouse.click(px, py);
     return [gx, gy];
   };
-  // As a user does, who clicks again where nothing came of it.
-  const put = async (thing, at, done) => {
-    for (let tries = 1; ; ++tries) {
-      const where = await click(thing, at);
-      const came = await page.waitForFunction(done, null, { timeout: 30000 }).then(
-        () => true,
-        () => false,
-      );
-      if (came || tries === 3) return where;
-      const now = () => [typeof window.ruedo.page.now.tool, window.notes.slice(-3)];
-      seen(`(clicked again: ${JSON.stringify(await page.evaluate(now))})`);
-    }
-  };
-  const clicked = await put("a box", [-1.5, 1], () =>
-    window.ruedo.page.now.world.bodies.some((b) => b.name === "box/link"),
-  );
+  const clicked = await put("a box", [-1.5, 1]);
   await until(
     "a box was placed",
     () =>
@@ -270,15 +254,11 @@ export default async function controls(tools) {
     },
     clicked,
   );
-  await put("Pioneer 3-DX", [-1.5, -1], () =>
-    window.ruedo.page.now.world.robots.some((r) => r.name === "p3dx_2"),
-  );
+  await put("Pioneer 3-DX", [-1.5, -1]);
   await until("a robot was placed", () =>
     window.ruedo.page.now.world.robots.some((r) => r.name === "p3dx_2"),
   );
-  await put("a box", [-1.5, -1], () =>
-    window.notes.some((note) => /there is no room for/.test(note)),
-  );
+  await put("a box", [-1.5, -1]);
   await until("where there is no room, it says so", () =>
     window.notes.some((note) => /there is no room for/.test(note)),
   );

@@ -54,8 +54,6 @@ class Client:
         self.socket.command("ruedo/request", request)
         while True:
             opcode, data = self.socket.receive()
-            if opcode == 1 and b'"refused"' in data:  # it does not listen yet: again
-                self.socket.command("ruedo/request", request)
             if opcode != 2:
                 continue
             self.socket.send(bytes([SEEN]))

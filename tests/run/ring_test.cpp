@@ -106,7 +106,9 @@ TEST_F(RingTest, KeepsWhatActedAndTheLastOfTheRest) {
     std::erase_if(events, [](const Event& event) { return event.channel.starts_with("ruedo/"); });
     EXPECT_EQ(events.front().channel, "r/scan");  // whole steps
     EXPECT_EQ(events.back().channel, "r/pose");
-    if (next >= 0) EXPECT_EQ(events.front().timestamp_us, next);
+    if (next >= 0) {
+      EXPECT_EQ(events.front().timestamp_us, next);
+    }
     next = events.back().timestamp_us + 1;
   }
   EXPECT_EQ(next, 1000);

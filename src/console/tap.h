@@ -1,0 +1,73 @@
+// What goes through a run, for the console: the messages that it publishes, and the commands and
+// requests that come to it, whichever way they come.
+//
+// Who publishes pays two counters a message, and a copy of those that a viewer watches. It waits
+// for nothing: when the ring is full, the console misses a message.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
+
+#include "console/offer_ring.h"
+#include "run/sink.h"
+
+namespace ruedo::console {
+
+// What has gone over a channel so far.
+struct Traffic {
+  std::string name;
+  uint32_t index = 0;  // its number among the channels
+  std::atomic<uint64_t> messages{0};
+  std::atomic<uint32_t> size{0};   // bytes, of the newest
+  std::atomic<bool> wanted{true};  // its messages are offered; until the console says otherwise
+};
+
+class Tap : public run::Sink {
+ public:
+  static constexpr size_t kMostChannels = 65536;  // more are not shown
+  static constexpr size_t kRingSize = size_t{1} << 25;
+
+  // The run's; in the publisher's thread.
+  Hears hears() const override { return {.samples = true, .services = true}; }
+  void announce(const std::shared_ptr<const run::Announcement>& announcement) override;
+  void message(const run::Published& message) override;
+
+  // A command or request that came to the run, before it is taken. Any thread.
+  void hear(const std::string& channel, const uint8_t* data, size_t size);
+
+  // The rest is the console's.
+
+  // Whether the run takes commands or requests on it.
+  bool takes(const std::string& channel) const;
+
+  // Whether anybody watches; without that, messages are only counted.
+  void watch(bool on) { watched_.store(on, std::memory_order_relaxed); }
+
+  size_t channel_count() const { return count_.load(std::memory_order_acquire); }
+  Traffic& channel(size_t index) const { return *list_[index].load(std::memory_order_acquire); }
+  OfferRing& ring() { return ring_; }
+
+ private:
+  Traffic* find(const std::string& channel);  // null: there are too many
+  void offer(Traffic& traffic, const uint8_t* data, size_t size);
+
+  OfferRing ring_{kRingSize};
+  std::atomic<bool> watched_{false};
+  std::vector<Traffic*> by_index_;  // of the announcement; null: not heard yet. The publisher's
+
+  mutable std::mutex names_mutex_;                     // held for a look-up, and to add a channel
+  std::unordered_map<std::string, uint32_t> by_name_;  // looked up only
+  std::unordered_set<std::string> inputs_;
+  std::vector<std::unique_ptr<Traffic>> channels_;
+
+  std::unique_ptr<std::atomic<Traffic*>[]> list_{new std::atomic<Traffic*>[kMostChannels]};
+  std::atomic<size_t> count_{0};
+};
+
+}  // namespace ruedo::console
