@@ -173,6 +173,7 @@ const tools = {
   // Until nothing moves on the canvas: the camera has come to rest.
   still: () =>
     tools.until("(the camera is at rest)", () => {
+      window.ruedo.stage.camera.updateMatrixWorld(); // else it is of the last frame
       const is = [...window.ruedo.stage.camera.matrixWorld.elements]
           .map((v) => v.toFixed(3))
           .join(),

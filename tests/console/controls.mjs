@@ -230,6 +230,15 @@ export default async function controls(tools) {
     await page.mouse.click(px, py);
     return [gx, gy];
   };
+  check(
+    "beside what lies over it, a click reaches the view",
+    await page.evaluate(() => {
+      window.ruedo.page.set({ reduced: true }); // one more chip, in a row of its own
+      const { right, bottom } = document.getElementById("legend").getBoundingClientRect();
+      return document.elementFromPoint(right - 2, bottom - 2)?.id;
+    }) === "canvas",
+    "something else is there",
+  );
   const clicked = await put("a box", [-1.5, 1]);
   await until(
     "a box was placed",
